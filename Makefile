@@ -27,7 +27,7 @@ test:
 	@scripts/install-deps.sh test
 	@CARGO="$(CARGO)" scripts/test.sh
 
-# Every reader of foreign bytes under a coverage-guided fuzzer, SECONDS each (docs/robustness.md).
+# Every reader of foreign bytes under a coverage-guided fuzzer, SECONDS each (docs/results/robustness.md).
 SECONDS ?= 60
 fuzz:
 	@OUT="$(OUT)" scripts/fuzz.sh -t $(SECONDS)

@@ -45,7 +45,7 @@ PYTHON
 done
 mv "$csv.part" "$csv"
 
-# Tables of the last view, in benches/techniques.md: each scene's techniques, what orders save with them, published figures.
+# Tables of the last view, in docs/results/techniques.md: each scene's techniques, what orders save with them, published figures.
 view=${views##* }
 python3 - "$out" "${view%%:*}" <<'PYTHON'
 import csv, json, sys

@@ -15,16 +15,18 @@ for name in crytek-sponza atrium jungle; do
         run plain
         run victim 'l1.size_bytes = "8KiB"' 'l1.victim_lines = 16'
         run sectored 'l2.size_bytes = "128KiB"' 'l2.sectors = 4'
+        run private-l2 'l2.size_bytes = "64KiB"' 'l2.shared = false'
+        run private-l2-l3 'l2.size_bytes = "64KiB"' 'l2.shared = false' 'l3.size_bytes = "256KiB"'
         run long-lines 'line_bytes = 64'
         run sectored-64 'line_bytes = 64' 'l2.size_bytes = "128KiB"' 'l2.sectors = 2'
         for inclusion in none inclusive exclusive; do
-            run l3-$inclusion '[[level]]' 'size_bytes = "256KiB"' "inclusion = \"$inclusion\""
+            run l3-$inclusion 'l3.size_bytes = "256KiB"' "l3.inclusion = \"$inclusion\""
         done
         for mshrs in 32 16 8 4; do
             run mshrs-$mshrs "tmu.l2_mshrs = $mshrs"
         done
         for footprints in 16 64 256 1024; do
-            run fifo-$footprints 'mode = "prefetch-fifo"' "tmu.fifo_footprints = $footprints"
+            run fifo-$footprints 'tmu.model = "prefetch-fifo"' "tmu.fifo_footprints = $footprints"
         done
         for px in 8 16 32 64; do
             run tile-$px "tile_px = $px"
@@ -40,6 +42,8 @@ MACHINES = {
     "plain": "as in the default preset",
     "victim": "victim cache of 16 lines for each L1",
     "sectored": "L2: 4 sectors of 16 bytes per tag",
+    "private-l2": "L2 of 64 KiB for each core",
+    "private-l2-l3": "L2 of 64 KiB for each core, shared L3 of 256 KiB",
     "long-lines": "lines of 64 bytes",
     "sectored-64": "lines of 64 bytes, L2: 2 sectors per tag",
     "l3-none": "L3 of 256 KiB",

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Measures the tables of docs/paper-comparison.md that compare savings with the paper's: `scripts/paper.sh SCENES`
+# Measures the tables of docs/results/z2-comparison.md that compare savings with the paper's: `scripts/paper.sh SCENES`
 #   results/paper-savings.csv   every scene, cache configuration and order
 #   results/paper-means.csv     its means over cache configurations
 #   results/paper-preset.csv    Crytek Sponza as the paper counts
@@ -106,7 +106,7 @@ for row in rows("preset.csv"):
 write("paper-preset.csv", [
     "scripts/paper.sh SCENES  (tracegen raster crytek-sponza/sponza.gltf --hmd dk2 -o crytek-sponza.textrace)",
     "replay paper crytek-sponza.textrace --preset z2-paper --base-align 64KiB --csv FILE",
-], ["caches, order", "paper", "preset", "paper saved", "preset saved, L1 x L2", "bytes saved, preset", "bytes saved, today's model"], table)
+], ["caches, order", "paper", "preset", "paper saved", "preset saved, L1 x L2", "bytes saved, preset", "bytes saved, default model"], table)
 
 table = []
 for align, bias in (("64", "0"), ("64KiB", "0"), ("64KiB", "-1"), ("64KiB", "-2")):

@@ -8,8 +8,9 @@ for name in crytek-sponza atrium jungle; do
     for order in morton z2-sta; do
         "$bin/replay" run "$name.textrace" --order $order --json 2>/dev/null >"$name,$order,none,0.json"
         "$bin/replay" run "$name.textrace" --order $order --prefetch tile-ahead --json 2>/dev/null >"$name,$order,tile-ahead,4096.json"
-        for prefetcher in next-line aligned-block; do
+        for prefetcher in next-line aligned-block next-mip; do
             for lines in 1 2 4 8; do
+                [ "$prefetcher" = next-mip ] && [ $lines -gt 2 ] && continue
                 # A block of one line prefetches nothing.
                 [ "$prefetcher,$lines" = aligned-block,1 ] && continue
                 printf 'order = "%s"\n[prefetch]\nprefetcher = "%s"\nlines = %s\n' $order $prefetcher $lines >machine.toml
@@ -21,7 +22,7 @@ done
 python3 - "$results" <<'PYTHON'
 import csv, json, sys
 
-KINDS = [("none", 0), *(("next-line", lines) for lines in (1, 2, 4, 8)), *(("aligned-block", lines) for lines in (2, 4, 8)), ("tile-ahead", 4096)]
+KINDS = [("none", 0), *(("next-line", lines) for lines in (1, 2, 4, 8)), *(("aligned-block", lines) for lines in (2, 4, 8)), *(("next-mip", levels) for levels in (1, 2)), ("tile-ahead", 4096)]
 rows = []
 for scene in ("crytek-sponza", "atrium", "jungle"):
     for kind, lines in KINDS:

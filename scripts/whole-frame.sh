@@ -1,11 +1,11 @@
 #!/bin/sh
-# All memory traffic of a frame: `scripts/whole-frame.sh SCENES` writes results/whole-frame{,-orders,-bytes}.csv: Crytek Sponza, the black
+# All memory traffic of a frame: `scripts/whole-frame.sh SCENES` writes results/whole-frame{,-orders,-bytes,-dram}.csv: Crytek Sponza, the black
 # forest and jungle as the DK2 shows them, with shadow cascades, four frames of a head's path, on three machines.
 set -eu
 . "$(dirname "$0")/captures.sh"
 for scene in "$scenes/crytek-sponza/sponza.gltf" "$scenes/stk-black-forest/stk-black-forest.gltf" jungle; do
     name=$(basename "${scene%/sponza.gltf}" .gltf)
-    "$bin/tracegen" raster "$scene" --hmd dk2 --shadows --path head --frames 4 --geometry --no-plain --quiet -o "$name.textrace"
+    "$bin/tracegen" raster "$scene" --hmd dk2 --shadows --path head --frames 4 --geometry --no-plain --quiet --image "$name.png" -o "$name.textrace"
     "$bin/replay" info "$name.textrace" --json >"$name.json"
     for machine in tile-based tile-based-g-buffer immediate; do
         for order in morton z2-sta; do
@@ -15,6 +15,18 @@ for scene in "$scenes/crytek-sponza/sponza.gltf" "$scenes/stk-black-forest/stk-b
     # Textures that are not compressed, as the literature's shares are from.
     for order in morton z2-sta; do
         "$bin/replay" run "$name.textrace" --mode functional --order $order --frame tile-based --texel-format rgba8 --json 2>/dev/null >"$name,tile-based rgba8,$order.json"
+    done
+    # The same on a tile-based machine with DRAM, and what may change the answer.
+    for variant in plain "level-3 all clients" "colour compressed" "tiles of 32" "tiles of 64"; do
+        case $variant in
+            plain) set -- ;;
+            level-3*) printf 'l3 = {size_bytes = "2MiB", line_bytes = 64, clients = "all"}\n' >machine.toml; set -- --config machine.toml ;;
+            colour*) set -- --picture "$name.png" ;;
+            tiles*) set -- --tile-px "${variant#tiles of }" ;;
+        esac
+        for order in morton z2-sta; do
+            "$bin/replay" run "$name.textrace" --mode functional --order $order --frame tile-based --dram lpddr4 "$@" --json 2>/dev/null >"$name,$variant,$order.json"
+        done
     done
 done
 python3 - "$results" <<'PYTHON'
@@ -47,7 +59,9 @@ def save(name, head, rows):
         table.writerows(rows)
 
 
-shares, orders, sizes = [], [], []
+VARIANTS = {"plain": "as above", "level-3 all clients": "an L3 of 2 MiB for all clients", "colour compressed": "colour compressed without loss",
+            "tiles of 32": "tiles of 32x32 pixels", "tiles of 64": "tiles of 64x64 pixels"}
+shares, orders, sizes, drams = [], [], [], []
 for scene in SCENES:
     chunks = {c["tag"]: c["length_bytes"] for c in json.load(open(f"{scene}.json"))["chunks"]}
     geometry = [chunks["GEOM"], chunks["PLST"] + chunks["PLIX"]]
@@ -62,6 +76,17 @@ for scene in SCENES:
                        saved(sta["shaded-vertex"], morton["shaded-vertex"]) if "shaded-vertex" in morton else "-",
                        saved(total_sta, total), f"{total / FRAMES * HERTZ / 1e9:.2f}", f"{total_sta / FRAMES * HERTZ / 1e9:.2f}",
                        *(f"{milliwatts(scene, machine, order):.0f}" for order in ("morton", "z2-sta"))])
+    for variant, title in VARIANTS.items():
+        found = [json.load(open(f"{scene},{variant},{order}.json")) for order in ("morton", "z2-sta")]
+        totals = [sum(c["read_bytes"] + c["write_bytes"] for c in of["result"]["clients"]) for of in found]
+        dram = [of["result"]["dram"] for of in found]
+        hits = [100 * (of["row_hits"] + of["write_row_hits"]) / (of["reads"] + of["writes"]) for of in dram]
+        energy = [of["energy_mj"] / FRAMES for of in dram]
+        permille = found[0]["config"]["frame"].get("color_compressed_permille")
+        drams.append([scene, title + (f" to {permille / 10:.1f} %" if permille else ""), *(f"{total / FRAMES / 1e6:.2f}" for total in totals),
+                      saved(totals[1], totals[0]), *(f"{hit:.1f}" for hit in hits), *(f"{mj:.2f}" for mj in energy), saved(energy[1], energy[0])])
+save("whole-frame-dram", ["scene", "machine", "Morton: all, MB per frame", "Z2 STA: all, MB per frame", "saved %", "Morton: row hits %",
+                          "Z2 STA: row hits %", "Morton: DRAM energy, mJ per frame", "Z2 STA: DRAM energy, mJ per frame", "energy saved %"], drams)
 save("whole-frame-bytes", ["scene", "texture samples, MB", "meshes, MB", "primitive lists of 4 frames, MB"], sizes)
 save("whole-frame", ["scene", "machine"] + CLIENTS + ["all, MB per frame", "texture % of all"], shares)
 save("whole-frame-orders", ["scene", "machine", "texture saved %", "shaded vertices saved %", "all saved %", "Morton GB/s at 90 Hz", "Z2 STA GB/s at 90 Hz",

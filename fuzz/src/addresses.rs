@@ -9,7 +9,7 @@ use formats::interop::plain::{
     AddressFile, AddressForm, Block, CompressedWriter, Compression, Found,
 };
 use replay::addresses::{KindSet, replay};
-use replay::config::{CacheConfig, RunConfig};
+use replay::config::RunConfig;
 use std::io::{Read, Write};
 
 /// Bytes that are changed of what an input holds compressed: zeros shrink to a thousandth.
@@ -120,13 +120,8 @@ pub fn run(bytes: &[u8]) {
     }
     let file = AddressFile::of_stream("input".to_owned(), form, bytes);
     let config = RunConfig::default();
-    let small = RunConfig {
-        l1: CacheConfig {
-            size_bytes: 1024,
-            ..config.l1
-        },
-        ..config
-    };
+    let mut small = config;
+    small.level.l1.size_bytes = 1024;
     let file = file.expect("it was opened before");
     if let Ok(outcome) = replay(file, &[config, small], KindSet::ALL) {
         for point in &outcome.points {

@@ -1,85 +1,81 @@
-//! The whole configuration of one replay. Its default is the Z2 paper's machine (section 4.1).
+//! The configuration of one replay. The default is the Z2 paper's machine (section 4.1).
 
-mod caches;
-mod lower_levels;
+mod dram;
+mod error;
+mod frame;
+mod level;
+mod levels;
 mod prefetch;
 mod tmu;
 
-use crate::memory::clients::FrameConfig;
 use crate::memory::dram::DramConfig;
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
-pub use crate::cache::Replacement;
+pub use crate::memory::Replacement;
 pub use crate::order::Order;
-pub use caches::{CacheConfig, Inclusion};
+pub use error::ConfigError;
+pub(crate) use error::{accept, in_range};
 use formats::footprint::MOST_ANISOTROPY;
 pub use formats::footprint::{
     AnisotropyModel, FilterOverride, LodFormula, SamplingOptions as SamplingConfig,
 };
 pub use formats::layout::{BlockOrder, LayoutConfig, TextureOrder};
 use formats::view::TILE_SIZE_PX;
-pub use lower_levels::{LevelConfig, LowerLevels};
+pub use frame::{FrameConfig, FrameMachine};
+pub use level::{Inclusion, LevelClients, LevelConfig};
+pub use levels::Levels;
 pub use prefetch::{PrefetchConfig, Prefetching};
-pub use tmu::{Allocation, TmuConfig};
+pub use tmu::{Allocation, TmuConfig, TmuModel};
 
-/// How time passes in a replay.
+/// How time is modelled.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
-    /// The cycle model of the texture unit decides how the cores' accesses interleave.
+    /// Each core's texture unit (`tmu.model`) has a clock. The clocks decide how the cores' accesses interleave.
     #[default]
     Timed,
-    /// The machine of the Z2 paper as its table suggests it: a thread stops at its first miss, and
-    /// rates count first look-ups beside primary misses.
-    FirstMiss,
-    /// Tags are checked in order, and footprints wait in a FIFO until their lines have arrived (Igehy et al., 1998).
-    PrefetchFifo,
-    /// Without latencies: a footprint is a unit of time, and a miss fills at once.
+    /// No latencies: each footprint takes one unit of time and misses fill immediately.
     Functional,
 }
 
 impl Mode {
-    /// Its name in configuration files.
+    /// Name in configuration files.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Timed => "timed",
-            Self::FirstMiss => "first-miss",
-            Self::PrefetchFifo => "prefetch-fifo",
             Self::Functional => "functional",
         }
     }
 }
 
-/// How work items are given to cores.
+/// How work items are assigned to cores.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Assign {
-    /// The next item goes to the core that becomes idle first.
+    /// The next item goes to the first idle core.
     #[default]
     FirstIdle,
     /// Round robin (with LRTA and two cores: left tiles on core 0, right tiles on core 1).
     Static,
 }
 
-/// Which of the fragments that draws cover are shaded.
+/// Which of the covered fragments are shaded.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Hsr {
-    /// All of them; needs a trace that was captured without the depth test.
+    /// All of them. Needs a trace captured without the depth test.
     None,
-    /// Those that pass the depth test when they are drawn: what a trace holds.
+    /// Those that pass the depth test when drawn, as recorded in the trace.
     #[default]
     EarlyZ,
-    /// Of each pixel the last opaque one and what is drawn over it, as tile-based deferred
-    /// renderers do.
+    /// Per pixel, the last opaque fragment and the fragments blended over it, as in tile-based deferred renderers.
     Deferred,
 }
 
@@ -89,16 +85,16 @@ impl Hsr {
     }
 }
 
-/// What becomes of the caches between the frames of a trace.
+/// What happens to cache contents between the frames of a trace.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum BetweenFrames {
-    /// They keep their lines, so that a frame finds what the one before has left.
+    /// Caches keep their lines, so that a frame can hit lines of the frame before.
     #[default]
     Keep,
-    /// They are emptied, as where other work runs between two frames.
+    /// Caches are emptied, as if other work ran between the frames.
     Flush,
 }
 
@@ -108,7 +104,7 @@ impl BetweenFrames {
     }
 }
 
-/// What a replay breaks its counts down by, beside views and tiles.
+/// What counts are broken down by, in addition to views and tiles.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
@@ -135,59 +131,57 @@ fn is_recorded_tile(tile_px: &u32) -> bool {
     *tile_px == TILE_SIZE_PX
 }
 
-/// Everything that decides the result of a replay of a given trace.
+/// The complete configuration of a replay.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct RunConfig {
-    /// Timed or functional.
+    /// How time is modelled.
     pub mode: Mode,
     /// Tile order.
     pub order: Order,
-    /// Seed of the random order and of random replacement.
+    /// Seed of the random tile order and of random replacement.
     pub seed: u64,
     /// Shader cores, each with its own L1 and texture unit.
     pub cores: u32,
     /// Assignment of tiles to cores.
     pub assign: Assign,
-    /// Line size of both levels in bytes, a power of two.
+    /// Line size of the L1 and the L2 in bytes, a power of two.
     pub line_bytes: u32,
-    /// First level, one a core.
-    pub l1: CacheConfig,
-    /// Second level, shared.
-    pub l2: CacheConfig,
+    /// Cache levels, two to six, the L1 first.
+    pub level: Levels,
+    /// Cycles in which a line travels from memory to the last level.
+    pub memory_cycles: u32,
     /// Filter and level of detail.
     pub sampling: SamplingConfig,
     /// Memory layout of the textures.
     pub layout: LayoutConfig,
     /// Texture unit.
     pub tmu: TmuConfig,
-    /// Width and height of a tile in pixels; other tiles than the recorded ones of 16 pixels are regrouped.
+    /// Width and height of a tile in pixels. Sizes other than the recorded 16 regroup the recorded tiles.
     #[serde(skip_serializing_if = "is_recorded_tile")]
     pub tile_px: u32,
-    /// Also count by tile.
+    /// Also count per tile.
     pub tile_maps: bool,
-    /// What counts are broken down by.
+    /// What counts are broken down by, in addition to views and tiles.
     #[serde(skip_serializing_if = "CountBy::is_default")]
     pub count_by: CountBy,
-    /// Also record which core works on which tiles when (timed mode, `--timeline`); no key of a file.
+    /// Also record when each core works on which tiles (timed mode, `--timeline`); not a key of
+    /// configuration files.
     #[serde(skip)]
     pub timeline: bool,
-    /// Hidden-surface removal; results name it where it is not the default.
+    /// Hidden-surface removal. Results name it if it is not the default.
     #[serde(skip_serializing_if = "Hsr::is_default")]
     pub hsr: Hsr,
-    /// The caches between frames; results name it where it is not the default.
+    /// Cache contents between frames. Results name it if it is not the default.
     #[serde(skip_serializing_if = "BetweenFrames::is_default")]
     pub between_frames: BetweenFrames,
-    /// The prefetcher of the L2; without it, only what is requested is fetched.
+    /// The prefetcher of the L2. Without it, only requested lines are fetched.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub prefetch: Option<PrefetchConfig>,
-    /// Further cache levels between the L2 and memory, at most four.
-    #[serde(skip_serializing_if = "LowerLevels::is_empty")]
-    pub level: LowerLevels,
-    /// The DRAM below the caches; without it, lines that leave the chip are only counted.
+    /// The DRAM model below the caches. Without it, lines from memory are only counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dram: Option<DramConfig>,
-    /// The machine around the texture units; without it, texture traffic alone is counted.
+    /// The machine around the texture units. Without it, only texture traffic is counted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame: Option<FrameConfig>,
 }
@@ -201,8 +195,8 @@ impl Default for RunConfig {
             cores: 2,
             assign: Assign::FirstIdle,
             line_bytes: 16,
-            l1: CacheConfig::lru(8 << 10),
-            l2: CacheConfig::lru(128 << 10),
+            level: Levels::default(),
+            memory_cycles: 200,
             sampling: SamplingConfig::default(),
             layout: LayoutConfig::default(),
             tmu: TmuConfig::default(),
@@ -213,174 +207,104 @@ impl Default for RunConfig {
             hsr: Hsr::EarlyZ,
             between_frames: BetweenFrames::Keep,
             prefetch: None,
-            level: LowerLevels::default(),
             dram: None,
             frame: None,
         }
     }
 }
 
-/// More sets of a cache than this are taken for a mistake.
+/// Upper limit for the sets of a cache. More are taken for a mistake.
 const MOST_SETS: u64 = 1 << 24;
 
-/// More lines of all caches of a level together than this are taken for a mistake: the tags of as many take
-/// up to some 300 MiB of this machine's memory.
+/// Upper limit for the lines of all caches of a level. Their tags take up to about 300 MiB of this
+/// machine's memory.
 const MOST_LINES: u64 = 1 << 24;
 
-/// A configuration that no machine can have.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum ConfigError {
-    /// Sets are not a power of two.
-    #[error(
-        "{level} cache of {size}, {ways} ways, {line_bytes}-byte lines: expected a power-of-two number of sets up to {MOST_SETS}, found {found}"
-    )]
-    Sets {
-        /// `L1`, `L2`, ...
-        level: &'static str,
-        /// Size as text.
-        size: String,
-        /// Ways.
-        ways: u32,
-        /// Line size.
-        line_bytes: u32,
-        /// Size over ways and line size.
-        found: String,
-    },
-    /// More lines than this machine can keep.
-    #[error(
-        "{level} cache of {size}, {line_bytes}-byte lines: expected at most {MOST_LINES} lines in all caches of the level, found {caches} x {found}"
-    )]
-    Lines {
-        /// `L1`, `L2`, ...
-        level: &'static str,
-        /// Size as text.
-        size: String,
-        /// Line size.
-        line_bytes: u32,
-        /// Caches of this size.
-        caches: u32,
-        /// Lines of each.
-        found: u64,
-    },
-    /// Ways that the policy cannot have.
-    #[error("{level} cache with {policy}: expected {expected} ways, found {found}")]
-    Ways {
-        /// `L1`, `L2`, ...
-        level: &'static str,
-        /// Replacement policy.
-        policy: &'static str,
-        /// What the policy can have.
-        expected: &'static str,
-        /// Ways.
-        found: u32,
-    },
-    /// A number out of range.
-    #[error("{key}: expected {expected}, found {found}")]
-    Range {
-        /// Key as in the configuration file.
-        key: &'static str,
-        /// What is accepted.
-        expected: &'static str,
-        /// What was given.
-        found: String,
-    },
-}
-
 impl RunConfig {
+    /// The model of the texture units, or none in functional mode.
+    #[must_use]
+    pub fn tmu_model(&self) -> Option<TmuModel> {
+        (self.mode == Mode::Timed).then_some(self.tmu.model)
+    }
+
+    /// True for the headline model, in which threads loop until their lines are filled.
+    #[must_use]
+    pub fn is_looping(&self) -> bool {
+        self.tmu_model() == Some(TmuModel::Looping)
+    }
+
+    /// The mode or, if it is not the default, the model of the texture unit.
+    #[must_use]
+    pub fn mode_name(&self) -> &'static str {
+        match self.tmu_model() {
+            None => "functional",
+            Some(TmuModel::Looping) => "timed",
+            Some(model) => model.name(),
+        }
+    }
+
     /// Checks every value.
     ///
     /// # Errors
     /// The first value that is out of range.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        let range = |ok: bool, key, expected, found: String| {
-            if ok {
-                Ok(())
-            } else {
-                Err(ConfigError::Range {
-                    key,
-                    expected,
-                    found,
-                })
-            }
-        };
-        range(
+        accept(
             self.line_bytes.is_power_of_two() && (16..=4096).contains(&self.line_bytes),
             "line_bytes",
             "a power of two from 16 (the largest block) to 4096",
-            self.line_bytes.to_string(),
+            self.line_bytes,
         )?;
-        range(
-            (1..=64).contains(&self.cores),
-            "cores",
-            "1 to 64",
-            self.cores.to_string(),
-        )?;
-        range(
+        in_range("cores", self.cores, 1..=64)?;
+        in_range("memory_cycles", self.memory_cycles, 0..=100_000)?;
+        accept(
             matches!(self.tile_px, 8 | 16 | 32 | 64),
             "tile_px",
             "8, 16, 32 or 64",
-            self.tile_px.to_string(),
+            self.tile_px,
         )?;
-        range(
-            self.frame.is_none() || self.tile_px == TILE_SIZE_PX,
+        accept(
+            self.frame.is_none() || self.tile_px >= TILE_SIZE_PX,
             "tile_px",
-            "16 with [frame], whose primitive lists are recorded by tile",
-            self.tile_px.to_string(),
+            "16, 32 or 64 with [frame], whose primitive lists are recorded by tiles of 16",
+            self.tile_px,
         )?;
-        range(
-            self.layout.base_align_bytes.is_power_of_two()
-                && self.layout.base_align_bytes <= 1 << 24,
+        let align = self.layout.base_align_bytes;
+        accept(
+            align.is_power_of_two() && align <= 1 << 24,
             "layout.base_align_bytes",
             "a power of two up to 16 MiB",
-            self.layout.base_align_bytes.to_string(),
+            align,
         )?;
-        range(
-            self.sampling.lod_bias.is_finite() && self.sampling.lod_bias.abs() <= 16.0,
-            "sampling.lod_bias",
-            "-16 to 16",
-            self.sampling.lod_bias.to_string(),
-        )?;
-        range(
-            (1..=MOST_ANISOTROPY).contains(&self.sampling.max_anisotropy),
+        in_range("sampling.lod_bias", self.sampling.lod_bias, -16.0..=16.0)?;
+        in_range(
             "sampling.max_anisotropy",
-            "1 to 16",
-            self.sampling.max_anisotropy.to_string(),
+            self.sampling.max_anisotropy,
+            1..=MOST_ANISOTROPY,
         )?;
-        let dram = self.dram.as_ref().map_or(Ok(()), DramConfig::check);
-        let dram = dram.map_err(|(key, expected, found)| (key, expected, u64::from(found)));
-        let frame = self.frame.as_ref().map_or(Ok(()), FrameConfig::check);
-        dram.and(frame)
-            .map_err(|(key, expected, found)| ConfigError::Range {
-                key,
-                expected,
-                found: found.to_string(),
-            })?;
+        self.dram.as_ref().map_or(Ok(()), DramConfig::check)?;
+        self.frame.as_ref().map_or(Ok(()), FrameConfig::check)?;
         self.tmu.check()?;
-        self.l1.sets("L1", self.line_bytes)?;
-        self.l2.sets("L2", self.line_bytes)?;
-        self.l1.check_lines("L1", self.line_bytes, self.cores)?;
-        self.level.check(self.line_bytes, &self.l2)?;
+        self.level.check(self.line_bytes, self.cores)?;
         let prefetch = self.prefetch.as_ref();
         prefetch.map_or(Ok(()), |prefetch| prefetch.check(self.mode))
     }
 
-    /// True where the order of the L2's misses matters: they go to further levels or to DRAM, or prefetch others.
+    /// True if a miss fills the cache immediately, so that later look-ups of the same thread hit.
+    #[must_use]
+    pub fn misses_change_caches_at_once(&self) -> bool {
+        self.level.l2.hit_cycles == 0 || self.tmu.allocation == Allocation::OnMiss
+    }
+
+    /// True if the order of the L2's misses matters, because further levels, DRAM or a prefetcher see them.
     #[must_use]
     pub fn follows_l2_misses(&self) -> bool {
-        self.simulates_below_l2() || self.prefetch.is_some() || self.levels_depend_on_evictions()
+        self.simulates_below_l2() || self.prefetch.is_some() || self.level.depend_on_evictions()
     }
 
-    /// True where a level holds, or does not hold, a line because another one does.
-    #[must_use]
-    pub fn levels_depend_on_evictions(&self) -> bool {
-        let mut levels = self.level.iter().map(|level| level.inclusion);
-        !self.l2.inclusion.is_none() || levels.any(|inclusion| !inclusion.is_none())
-    }
-
-    /// True where the misses of the L2 go to further levels or to DRAM.
+    /// True if L2 misses go to further levels or to DRAM.
     #[must_use]
     pub const fn simulates_below_l2(&self) -> bool {
-        self.dram.is_some() || !self.level.is_empty()
+        self.dram.is_some() || self.level.has_lower()
     }
 }
 
@@ -392,14 +316,14 @@ mod tests {
     fn the_default_is_the_papers_machine_and_valid() {
         let config = RunConfig::default();
         config.validate().unwrap();
-        assert_eq!(config.l1.sets("L1", config.line_bytes), Ok(128));
-        assert_eq!(config.l2.sets("L2", config.line_bytes), Ok(2048));
+        assert_eq!(config.level.l1.sets("L1", config.line_bytes), Ok(128));
+        assert_eq!(config.level.l2.sets("L2", config.line_bytes), Ok(2048));
     }
 
     #[test]
     fn sets_that_are_no_power_of_two_are_named() {
         let config = RunConfig {
-            l1: CacheConfig::lru(6 << 10),
+            level: Levels::two(LevelConfig::lru(6 << 10), LevelConfig::lru(128 << 10)),
             ..RunConfig::default()
         };
         assert_eq!(
@@ -407,9 +331,9 @@ mod tests {
             "L1 cache of 6 KiB, 4 ways, 16-byte lines: expected a power-of-two number of sets up to 16777216, found 96"
         );
         let refused = |size_bytes, ways| {
-            let cache = CacheConfig {
+            let cache = LevelConfig {
                 ways,
-                ..CacheConfig::lru(size_bytes)
+                ..LevelConfig::lru(size_bytes)
             };
             cache.sets("L2", 16).unwrap_err().to_string()
         };
@@ -426,9 +350,9 @@ mod tests {
                 cores,
                 ..RunConfig::default()
             };
-            config.l1 = CacheConfig {
+            config.level.l1 = LevelConfig {
                 ways,
-                ..CacheConfig::lru(l1_bytes)
+                ..Levels::usual(0, l1_bytes)
             };
             config.validate()
         };
@@ -464,12 +388,13 @@ mod tests {
                 "L2 cache with lru: expected 1 to 255 ways, found 0",
             ),
         ] {
+            let l2 = LevelConfig {
+                ways,
+                replacement,
+                ..LevelConfig::lru(3 << 16)
+            };
             let config = RunConfig {
-                l2: CacheConfig {
-                    ways,
-                    replacement,
-                    ..CacheConfig::lru(3 << 16)
-                },
+                level: Levels::two(LevelConfig::lru(8 << 10), l2),
                 ..RunConfig::default()
             };
             assert_eq!(config.validate().unwrap_err().to_string(), expected);
@@ -478,14 +403,19 @@ mod tests {
 
     #[test]
     fn toml_takes_sizes_with_units_and_refuses_unknown_keys() {
-        let config: RunConfig =
-            toml::from_str("order = \"z2-sta\"\n[l1]\nsize_bytes = \"16KiB\"\n").unwrap();
-        assert_eq!(config.l1, CacheConfig::lru(16 << 10));
+        let config: RunConfig = toml::from_str(
+            "order = \"z2-sta\"\n[[level]]\nsize_bytes = \"16KiB\"\n[[level]]\nsize_bytes = 1024\n",
+        )
+        .unwrap();
+        assert_eq!(
+            config.level,
+            Levels::two(LevelConfig::lru(16 << 10), LevelConfig::lru(1 << 10))
+        );
         assert_eq!(config.order, Order::Z2_STA);
-        let error = toml::from_str::<RunConfig>("l3 = 1")
+        let error = toml::from_str::<RunConfig>("l2 = 1")
             .unwrap_err()
             .to_string();
-        assert!(error.contains("unknown field `l3`"), "{error}");
+        assert!(error.contains("unknown field `l2`"), "{error}");
     }
 
     #[test]

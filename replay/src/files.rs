@@ -1,4 +1,4 @@
-//! Output files appear whole or not at all, in folders that are made for them.
+//! Writes output files whole or not at all, and creates their folders.
 
 use anyhow::Context;
 use formats::container::AtomicFile;
@@ -20,11 +20,12 @@ fn make_folder(path: &Path) -> std::io::Result<()> {
     folder.map_or(Ok(()), std::fs::create_dir_all)
 }
 
-/// Makes the folders of outputs and checks that each can be written and replaces neither an input
-/// nor another output; tells whether standard output is left for the command's own result.
+/// Creates the folders of outputs and checks that each output can be written and replaces neither
+/// an input nor another output. Returns whether standard output is free for the command's own
+/// result.
 ///
 /// # Errors
-/// The first output for which that does not hold.
+/// The first output that fails a check.
 pub fn check_outputs<'a>(
     outputs: &[Output],
     inputs: impl IntoIterator<Item = &'a Path>,

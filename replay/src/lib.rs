@@ -1,9 +1,9 @@
-//! Trace to answer: replays texture traces through caches and a texture unit in any tile order,
-//! and ray traces through a model of a mobile ray-tracing GPU.
+//! Replays texture traces through caches and a texture unit in any tile order, and ray traces
+//! through a model of a mobile ray-tracing GPU.
 
+mod access;
 pub mod accuracy;
 pub mod addresses;
-pub mod cache;
 pub mod cli;
 pub mod compare;
 pub mod config;
@@ -25,4 +25,3 @@ pub mod size;
 pub mod stream;
 pub mod techniques;
 mod tmu;
-mod whole_frame;

@@ -1,6 +1,6 @@
-//! `replay`: trace to answer.
+//! The `replay` program.
 
-/// Running out of memory is reported and ends with exit code 2.
+/// Reports an exhausted memory and exits with code 2.
 #[global_allocator]
 static ALLOCATOR: shell::Allocator = shell::Allocator;
 

@@ -16,7 +16,7 @@ pub const GREEN: Rgb = [0x00, 0x9E, 0x73];
 pub const VERMILION: Rgb = [0xD5, 0x5E, 0x00];
 /// Reddish purple.
 pub const PURPLE: Rgb = [0xCC, 0x79, 0xA7];
-/// Yellow, darkened to be seen on white.
+/// Yellow, darkened to be visible on white.
 pub const YELLOW: Rgb = [0xC9, 0xB8, 0x1A];
-/// Grey, the neutral one.
+/// Neutral grey.
 pub const GREY: Rgb = [0x80, 0x86, 0x8E];

@@ -1,7 +1,6 @@
-//! Things that a user picks by name (tile orders, replacement policies): a table with a row each.
+//! Tables of things that a user picks by name (tile orders, replacement policies), one row each.
 //!
-//! The table is all there is to edit. Names in configurations and results, the values and help of
-//! command-line flags and the list in error messages are derived from it.
+//! Configurations, results, command-line flags, their help and error messages all derive from the table.
 
 use clap::builder::PossibleValue;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
@@ -14,18 +13,18 @@ pub trait Row: fmt::Debug + Sized + 'static {
     fn name(&self) -> &'static str;
     /// One line of help.
     fn help(&self) -> &'static str;
-    /// The whole table, in the order in which it is shown.
+    /// The whole table, in display order.
     fn table() -> &'static [Named<Self>];
     /// The table's names, in the same order.
     fn names() -> &'static [&'static str];
 }
 
-/// A row, by reference. Written and read by its name.
+/// A reference to a row, serialized as its name.
 #[derive(Debug)]
 pub struct Named<R: 'static>(&'static R);
 
 impl<R: Row> Named<R> {
-    /// The handle of a row.
+    /// A reference to `row`.
     pub const fn new(row: &'static R) -> Self {
         Self(row)
     }
@@ -35,19 +34,19 @@ impl<R: Row> Named<R> {
         R::table().iter().copied()
     }
 
-    /// The row of that name.
+    /// The row with this name.
     #[must_use]
     pub fn find(name: &str) -> Option<Self> {
         Self::all().find(|row| row.name() == name)
     }
 
-    /// Name as in configurations, results and flags.
+    /// Name in configurations, results and flags.
     #[must_use]
     pub fn name(self) -> &'static str {
         self.0.name()
     }
 
-    /// What the row holds.
+    /// The row itself.
     pub(crate) const fn row(self) -> &'static R {
         self.0
     }
@@ -98,8 +97,7 @@ impl<R: Row> clap::ValueEnum for Named<R> {
     }
 }
 
-/// Makes a table of rows of one type, which has the fields `name` and `help`: a constant of the
-/// handle for each, and [`Row`].
+/// Implements [`Row`] for a type with the fields `name` and `help`, and defines one constant per row.
 macro_rules! registry {
     ($row:ty: $($(#[$only:meta])* $id:ident = $value:expr;)+) => {
         impl $crate::registry::Named<$row> {

@@ -1,12 +1,12 @@
-//! Byte sizes as people write them: `8KiB`, `128 KiB`, `4096`.
+//! Byte sizes in text: `8KiB`, `128 KiB`, `4096`.
 
 use serde::{Deserializer, Serializer, de};
 
-/// Parses a byte count with an optional binary unit (`B`, `KiB`, `MiB`; `K`/`KB` are read as KiB
-/// because cache sizes are always binary).
+/// Parses a byte count with an optional unit (`B`, `KiB`, `MiB`). `K` and `KB` mean KiB, because
+/// cache sizes are always binary.
 ///
 /// # Errors
-/// Says what was found and what is accepted.
+/// The text is not a size; names the text and the accepted forms.
 pub fn parse_bytes(text: &str) -> Result<u64, String> {
     let text = text.trim();
     let digits = text.bytes().take_while(u8::is_ascii_digit).count();
@@ -28,7 +28,7 @@ pub fn parse_bytes(text: &str) -> Result<u64, String> {
         .ok_or_else(|| format!("size `{text}`: expected a number and B, KiB or MiB"))
 }
 
-/// Writes a byte count with the largest binary unit that divides it.
+/// Formats a byte count with the largest binary unit that divides it.
 #[must_use]
 pub fn format_bytes(bytes: u64) -> String {
     match bytes {
@@ -38,8 +38,7 @@ pub fn format_bytes(bytes: u64) -> String {
     }
 }
 
-/// For `#[serde(with = "crate::size::serde_bytes")]`: a number in outputs, a number or a text with
-/// a unit in inputs.
+/// For `#[serde(with = "crate::size::serde_bytes")]`: writes a number; reads a number or a text with a unit.
 pub mod serde_bytes {
     use super::{Deserializer, Serializer, de, parse_bytes};
     use std::fmt;
@@ -47,7 +46,7 @@ pub mod serde_bytes {
     /// Writes the number.
     ///
     /// # Errors
-    /// Those of the serializer.
+    /// Any error of the serializer.
     pub fn serialize<S: Serializer>(bytes: &u64, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.serialize_u64(*bytes)
     }
@@ -55,7 +54,7 @@ pub mod serde_bytes {
     /// Reads a number or a text such as `8KiB`.
     ///
     /// # Errors
-    /// Names the text that is no size.
+    /// The value is not a size.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
         struct Size;
 
@@ -114,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_size_in_a_file_is_told_with_what_is_one() {
+    fn an_invalid_size_in_a_file_is_refused_with_the_accepted_forms() {
         #[derive(Debug, serde::Deserialize)]
         struct File {
             #[serde(with = "serde_bytes")]

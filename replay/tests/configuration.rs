@@ -1,12 +1,12 @@
-//! `docs/configuration.md` says what the code reads: keys, defaults, values and what they mean come
+//! `docs/use/configuration.md` says what the code reads: keys, defaults, values and what they mean come
 //! from the types themselves. `UPDATE_DOCS=1` rewrites the page; review the diff.
 
 use clap::ValueEnum;
 use replay::config::{
-    Allocation, Assign, BetweenFrames, CountBy, Hsr, Inclusion, LevelConfig, LowerLevels, Mode,
-    Order, PrefetchConfig, Prefetching, Replacement, RunConfig,
+    Allocation, Assign, BetweenFrames, CountBy, Hsr, Inclusion, LevelClients, Levels, Mode, Order,
+    PrefetchConfig, Prefetching, Replacement, RunConfig, TmuModel,
 };
-use replay::memory::clients::{FrameConfig, FrameMachine};
+use replay::config::{FrameConfig, FrameMachine};
 use replay::memory::dram::{DramConfig, DramPreset, Mapping, PagePolicy};
 use std::fmt::Write as _;
 use std::fs;
@@ -22,10 +22,12 @@ refused. Sizes (`size_bytes`) are numbers of bytes or texts such as `\"16KiB\"`;
 and all caches of a level together have at most 2^24 lines.
 
     order = \"z2-sta\"
-    l1.size_bytes = \"16KiB\"
-    [[level]]                         # an L3; a second table is an L4
-    size_bytes = \"4MiB\"
-    line_bytes = 64
+    l1.size_bytes = \"16KiB\"          # a key of one level: l1 to l6
+    l3.size_bytes = \"4MiB\"           # a level that is added
+    l3.line_bytes = 64
+
+Levels are a list of two to six `[[level]]` tables, the L1 first; such a list in a file replaces the levels of the default
+machine, while `l1.KEY` changes one key of one level.
 
 ## Experiment files
 
@@ -39,8 +41,6 @@ and all caches of a level together have at most 2^24 lines.
     l1.size_bytes = [\"8KiB\", \"16KiB\"]
     [one-at-a-time]                   # each value alone, the rest as in base; crossed with axes
     layout.block_order = [\"morton\", \"tiled\"]
-
-A number in a key is an index into a list of tables: `level.0.size_bytes = [\"1MiB\", \"4MiB\"]` varies the L3, and adds one where `[base]` has none.
 
 At most 100000 points; a point that no machine can have is refused before any is replayed. A sweep that was
 stopped goes on where it stopped: each point's result is a row of a file under `points/` in the output folder.
@@ -120,11 +120,13 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
         "Prefetching" => of::<Prefetching>(),
         "Mode" => of::<Mode>(),
         "Allocation" => of::<Allocation>(),
+        "TmuModel" => of::<TmuModel>(),
         "Assign" => of::<Assign>(),
         "Hsr" => of::<Hsr>(),
         "BetweenFrames" => of::<BetweenFrames>(),
         "CountBy" => of::<CountBy>(),
         "Inclusion" => of::<Inclusion>(),
+        "LevelClients" => of::<LevelClients>(),
         "DramPreset" => of::<DramPreset>(),
         "Mapping" => of::<Mapping>(),
         "PagePolicy" => of::<PagePolicy>(),
@@ -146,7 +148,9 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
 fn defaults() -> Table {
     let config = RunConfig {
         prefetch: Some(PrefetchConfig::default()),
-        level: LowerLevels::of(&[LevelConfig::lru(4 << 20)]).unwrap(),
+        level: Levels::default()
+            .over(&[Levels::usual(2, 4 << 20)])
+            .unwrap(),
         dram: Some(DramConfig::default()),
         frame: Some(FrameConfig::default()),
         ..RunConfig::default()
@@ -160,7 +164,7 @@ fn with(key: &str, value: Value) -> Result<RunConfig, String> {
     let (mut inner, mut rest) = (&mut table, key);
     while let Some((first, last)) = rest.split_once('.') {
         inner = match inner.get_mut(first).unwrap() {
-            Value::Array(tables) => tables[0].as_table_mut().unwrap(),
+            Value::Array(tables) => tables.last_mut().unwrap().as_table_mut().unwrap(),
             table => table.as_table_mut().unwrap(),
         };
         rest = last;
@@ -207,7 +211,7 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
             continue;
         }
         if let Some(Value::Array(tables)) = default {
-            let inner = tables[0].as_table().unwrap();
+            let inner = tables.last().unwrap().as_table().unwrap();
             describe(sources, "LevelConfig", &format!("{key}."), inner, page);
             continue;
         }
@@ -217,18 +221,23 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
             "between_frames" => Value::try_from(BetweenFrames::default()).ok(),
             "count_by" => Value::try_from(CountBy::default()).ok(),
             "tile_px" => Some(Value::Integer(16)),
+            "frame.color_compressed_permille" => Some(Value::Integer(1000)),
             "tmu.fifo_footprints" => Some(Value::Integer(64)),
             "tmu.l2_mshrs" => Some(Value::Integer(0)),
             _ => match name {
                 "sectors" => Some(Value::Integer(1)),
                 "victim_lines" => Some(Value::Integer(0)),
                 "inclusion" => Value::try_from(Inclusion::default()).ok(),
+                "clients" => Value::try_from(LevelClients::default()).ok(),
                 _ => None,
             },
         };
         let default = default.or(left_out.as_ref());
         let default = match default {
             _ if key == "level.size_bytes" => "required".to_owned(),
+            _ if key == "level.ways" => "`4`; below the L2 `16`".to_owned(),
+            _ if key == "level.shared" => "`true`; the L1 `false`".to_owned(),
+            _ if key == "level.hit_cycles" => "`20`; below the L2 `60`".to_owned(),
             None => "none".to_owned(),
             Some(value) => format!("`{value}`"),
         };
@@ -250,11 +259,10 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
 fn page() -> String {
     let sources: String = [
         "replay/src/config.rs",
-        "replay/src/config/caches.rs",
-        "replay/src/config/lower_levels.rs",
+        "replay/src/config/level.rs",
         "replay/src/config/prefetch.rs",
         "replay/src/config/tmu.rs",
-        "replay/src/memory/clients.rs",
+        "replay/src/config/frame.rs",
         "replay/src/memory/dram/mod.rs",
         "replay/src/memory/dram/mapping.rs",
         "replay/src/memory/dram/presets.rs",
@@ -274,7 +282,7 @@ fn page() -> String {
 
 #[test]
 fn the_page_of_keys_is_what_the_code_reads() {
-    let path = root().join("docs/configuration.md");
+    let path = root().join("docs/use/configuration.md");
     let page = page();
     if std::env::var_os("UPDATE_DOCS").is_some() {
         fs::write(&path, &page).unwrap();
@@ -282,7 +290,7 @@ fn the_page_of_keys_is_what_the_code_reads() {
     let found = fs::read_to_string(&path).unwrap_or_default();
     assert!(
         found == page,
-        "docs/configuration.md is not what the code reads; UPDATE_DOCS=1 rewrites it"
+        "docs/use/configuration.md is not what the code reads; UPDATE_DOCS=1 rewrites it"
     );
 }
 
@@ -300,9 +308,9 @@ fn every_key_has_a_line_that_says_what_it_is() {
         .lines()
         .filter(|line| line.starts_with("| `"))
         .collect();
-    // Three keys have no default, and seventeen are written where they are another.
+    // Three keys have no default, and thirteen are written where they are another.
     let written = count(&defaults());
-    assert_eq!(keys.len(), written + 20);
+    assert_eq!(keys.len(), written + 16);
     for line in keys {
         let about = line.split(" | ").last().unwrap();
         assert!(about.len() > 8, "{line}");

@@ -3,7 +3,7 @@
 
 use formats::textrace::{Pass, Tables, Textrace, TextraceWriter, Tile};
 use formats::view::FrameViews;
-use replay::config::{CacheConfig, Mode, Order, RunConfig};
+use replay::config::{LevelConfig, Levels, Mode, Order, RunConfig, TmuModel};
 use replay::engine::replay_all;
 use replay::stream::synthetic::Synthetic;
 use replay::stream::{LineMemory, TileSource};
@@ -99,16 +99,20 @@ fn memory_does_not_grow_with_the_number_of_frames() {
         (frames, Textrace::open(&path).unwrap())
     });
     drop(source);
+    let first_miss = |mut config: RunConfig| {
+        config.tmu.model = TmuModel::FirstMiss;
+        config
+    };
     let config = |mode, l1_kib: u64| RunConfig {
         mode,
         order: Order::Z2_STA,
-        l1: CacheConfig::lru(l1_kib << 10),
+        level: Levels::two(LevelConfig::lru(l1_kib << 10), LevelConfig::lru(128 << 10)),
         ..RunConfig::default()
     };
     let batches: [(&str, Vec<RunConfig>); 5] = [
         ("functional", vec![config(Mode::Functional, 8)]),
         ("timed", vec![config(Mode::Timed, 8)]),
-        ("first miss", vec![config(Mode::FirstMiss, 8)]),
+        ("first miss", vec![first_miss(config(Mode::Timed, 8))]),
         ("both, three caches each", {
             let modes = [Mode::Functional, Mode::Timed];
             let all = modes

@@ -8,8 +8,8 @@ use formats::layout::{Layout, LayoutConfig};
 use formats::raytrace::{RayTile, Raytrace};
 use formats::textrace::{Textrace, Tile, with_operands};
 use formats::view::Eye;
-use replay::config::{Hsr, LevelConfig, LowerLevels, Mode, PrefetchConfig, RunConfig};
-use replay::memory::clients::{FrameConfig, FrameMachine};
+use replay::config::{FrameConfig, FrameMachine};
+use replay::config::{Hsr, Levels, Mode, PrefetchConfig, RunConfig, TmuConfig, TmuModel};
 use replay::memory::dram::DramConfig;
 use replay::sgrt::compose::Reuse;
 use replay::sgrt::config::SgrtConfig;
@@ -31,16 +31,16 @@ pub fn exercise(bytes: Vec<u8>) -> bool {
         Trace::Texture(trace) => {
             expand(&trace);
             let machines = [
-                (Mode::Functional, Hsr::EarlyZ),
-                (Mode::Timed, Hsr::Deferred),
-                (Mode::FirstMiss, Hsr::None),
+                (Mode::Functional, TmuModel::Looping, Hsr::EarlyZ),
+                (Mode::Timed, TmuModel::Looping, Hsr::Deferred),
+                (Mode::Timed, TmuModel::FirstMiss, Hsr::None),
             ];
             let frames = [
                 FrameMachine::TileBased,
                 FrameMachine::TileBasedGBuffer,
                 FrameMachine::Immediate,
             ];
-            for ((mode, hsr), machine) in machines.into_iter().zip(frames) {
+            for ((mode, model, hsr), machine) in machines.into_iter().zip(frames) {
                 let machine = FrameConfig {
                     machine,
                     multiview: mode == Mode::Functional,
@@ -51,8 +51,14 @@ pub fn exercise(bytes: Vec<u8>) -> bool {
                     hsr,
                     frame: trace.geometry().map(|_| machine),
                     prefetch: (mode != Mode::Functional).then(PrefetchConfig::default),
-                    level: LowerLevels::of(&[LevelConfig::lru(64 << 10)]).unwrap_or_default(),
-                    dram: (mode == Mode::Timed).then(DramConfig::default),
+                    level: Levels::default()
+                        .over(&[Levels::usual(2, 64 << 10)])
+                        .unwrap_or_default(),
+                    dram: (model == TmuModel::Looping).then(DramConfig::default),
+                    tmu: TmuConfig {
+                        model,
+                        ..TmuConfig::default()
+                    },
                     ..RunConfig::default()
                 };
                 // Textures may be too large for a layout, which is an error and no panic.

@@ -1,4 +1,4 @@
-//! The examples of `docs/analysis.md` print what the page says, and Parquet holds what CSV does.
+//! The examples of `docs/use/analysis.md` print what the page says, and Parquet holds what CSV does.
 
 use parallax_tests::{program, root, run_ok};
 use std::fs;
@@ -60,7 +60,7 @@ fn sweep(folder: &Path, experiment: &str, line: &str) {
 
 #[test]
 fn the_examples_print_what_the_page_says() {
-    let page = fs::read_to_string(root().join("docs/analysis.md")).expect("the page");
+    let page = fs::read_to_string(root().join("docs/use/analysis.md")).expect("the page");
     let blocks = blocks(&page);
     let first = |language: &str| {
         let block = blocks.iter().find(|(found, _)| found == language);

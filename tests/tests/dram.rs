@@ -22,9 +22,9 @@ fn count(value: &Value) -> u64 {
 
 #[test]
 fn every_line_that_leaves_the_caches_is_read_once_in_every_mode() {
-    for mode in ["functional", "timed", "first-miss"] {
+    for mode in ["--mode=functional", "--tmu=looping", "--tmu=first-miss"] {
         for (trace, order) in [("atrium.textrace", "morton"), ("jungle.textrace", "z2-sta")] {
-            let machine = ["--mode", mode, "--order", order];
+            let machine = [mode, "--order", order];
             let place = format!("{mode}, {order}");
             let without = result(trace, &machine);
             assert!(without.get("dram").is_none(), "{place}");

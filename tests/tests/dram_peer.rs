@@ -41,5 +41,5 @@ fn row_hits_and_latencies_are_ramulators() {
     let text = String::from_utf8_lossy(&output.stdout);
     let messages = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{text}{messages}");
-    assert_eq!(text.lines().count(), 1 + 5, "{text}");
+    assert_eq!(text.lines().count(), 1 + 7, "{text}");
 }

@@ -39,7 +39,7 @@ const TEXTRACE_RUNS: &[(&str, &[&str])] = &[
     ),
     (
         "z2-sta-first-miss",
-        &["--order", "z2-sta", "--mode", "first-miss"],
+        &["--order", "z2-sta", "--tmu", "first-miss"],
     ),
     (
         "hilbert-functional",

@@ -57,7 +57,7 @@ fn bytes_of_the_first_miss_model_come_with_a_warning_outside_the_papers_preset()
         let output = replay(subcommand, &[arguments, &["-q"]].concat());
         String::from_utf8_lossy(&output.stderr).into_owned()
     };
-    let bare = ["--mode", "first-miss"];
+    let bare = ["--tmu", "first-miss"];
     let one = ["--caches", "8/128", "--orders", "morton"];
     for warned in [
         stderr("run", &bare),
@@ -68,7 +68,7 @@ fn bytes_of_the_first_miss_model_come_with_a_warning_outside_the_papers_preset()
         for part in [
             "warning",
             "external bytes count",
-            "--mode timed",
+            "--tmu looping",
             "--preset z2-paper",
         ] {
             assert!(warned.contains(part), "no {part:?} in {warned:?}");

@@ -29,13 +29,13 @@ fn write(folder: &Path, text: &str) -> String {
 #[test]
 fn a_flag_and_a_table_give_the_same_l3() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    for mode in ["functional", "timed", "first-miss"] {
-        let flag = result(&["--mode", mode, "--l3", "1MiB"]);
+    for mode in ["--mode=functional", "--tmu=looping", "--tmu=first-miss"] {
+        let flag = result(&[mode, "--l3", "1MiB"]);
         let table = write(
             folder.path(),
-            &format!("mode = \"{mode}\"\n[[level]]\nsize_bytes = \"1MiB\"\n"),
+            "[[level]]\nsize_bytes = \"8KiB\"\n[[level]]\nsize_bytes = \"128KiB\"\n[[level]]\nsize_bytes = \"1MiB\"\n",
         );
-        let table = result(&["--config", &table]);
+        let table = result(&["--config", &table, mode]);
         assert_eq!(flag["result"], table["result"], "{mode}");
         let levels = flag["result"]["lower_levels"].as_array().expect("levels");
         assert_eq!(levels[0]["name"], "L3");
@@ -51,7 +51,7 @@ fn a_flag_and_a_table_give_the_same_l3() {
 #[test]
 fn each_level_looks_up_what_the_one_above_misses() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let text = "[[level]]\nsize_bytes = \"64KiB\"\nline_bytes = 32\n[[level]]\nsize_bytes = \"256KiB\"\nline_bytes = 64\nhit_cycles = 120\nreplacement = \"srrip\"\n[dram]\n";
+    let text = "l3 = {size_bytes = \"64KiB\", line_bytes = 32}\nl4.size_bytes = \"256KiB\"\nl4.line_bytes = 64\nl4.hit_cycles = 120\nl4.replacement = \"srrip\"\n[dram]\n";
     let found = result(&["--config", &write(folder.path(), text)]);
     let levels = found["result"]["lower_levels"].as_array().expect("levels");
     assert_eq!(levels.len(), 2);
@@ -73,25 +73,18 @@ fn what_cannot_be_simulated_is_refused() {
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {messages}");
         assert!(messages.contains(expected), "{arguments:?}: {messages}");
     };
-    let five = write(folder.path(), &level.repeat(5));
-    refused(
-        &["run", trace, "--config", &five],
-        "at most 4 levels below the L2",
-    );
-    let unknown = write(folder.path(), "[[level]]\nsize_bytes = 4096\nsets = 4\n");
+    for count in [1, 7] {
+        let levels = write(folder.path(), &level.repeat(count));
+        refused(
+            &["run", trace, "--config", &levels],
+            "expected 2 to 6 levels, the L1 first",
+        );
+    }
+    let unknown = write(folder.path(), "l3.size_bytes = 4096\nl3.sets = 4\n");
     refused(
         &["run", trace, "--config", &unknown],
         "unknown field `sets`",
     );
-    let one = write(folder.path(), level);
-    let addresses = folder.path().join("a.din");
-    std::fs::write(&addresses, "0 10\n0 20\n").expect("a file");
-    let addresses = addresses.to_str().expect("UTF-8");
-    refused(
-        &["run", "--addresses", addresses, "--config", &one],
-        "[[level]]",
-    );
-    refused(&["run", "--addresses", addresses, "--l3", "1MiB"], "--l3");
     refused(&["locality", trace, "--l3", "1MiB"], "[[level]]");
     refused(&["locality", trace, "--dram", "lpddr4"], "[dram]");
 }

@@ -337,14 +337,14 @@ fn a_job_array_on_two_nodes_gives_one_machines_bytes_also_after_a_task_was_kille
     let after = after.last().and_then(|job| job.strip_prefix("job "));
     let log = cluster.path(&format!("slurm-{}_0.out", after.unwrap_or_default()));
     let log = fs::read_to_string(log).expect("the merge's log");
-    assert!(log.contains("of 18 points are not there"), "{log}");
+    assert!(log.contains("of 18 points are missing"), "{log}");
     let merge = sweep(&out)
         .arg("--merge-only")
         .output()
         .expect("replay starts");
     let told = String::from_utf8_lossy(&merge.stderr).into_owned();
     assert!(
-        merge.status.code() == Some(2) && told.contains("of 18 points are not there"),
+        merge.status.code() == Some(2) && told.contains("of 18 points are missing"),
         "{told}"
     );
     // The same script again does what is left.

@@ -169,7 +169,7 @@ fn a_merge_lists_what_is_missing_damaged_or_of_another_version() {
     refuse(
         &mut sweep.command("out", &["--merge-only"]),
         &[
-            &format!("{POINTS} of {POINTS} points are not there"),
+            &format!("{POINTS} of {POINTS} points are missing"),
             "order=morton",
             ": missing",
         ],
@@ -196,7 +196,7 @@ fn a_merge_lists_what_is_missing_damaged_or_of_another_version() {
     last.truncate(last.len() / 2);
     put(&damaged);
     let listed = [
-        format!("3 of {POINTS} points are not there"),
+        format!("3 of {POINTS} points are missing"),
         ": missing".to_owned(),
         format!("{name}: row 2: expected checksum "),
         ", found \"".to_owned(),
@@ -217,8 +217,8 @@ fn a_merge_lists_what_is_missing_damaged_or_of_another_version() {
     refuse(
         &mut sweep.command("out", &["--merge-only"]),
         &[
-            &format!("{POINTS} of {POINTS} points are not there"),
-            &format!("not taken: {POINTS} rows of model version 0, expected {MODEL_VERSION}"),
+            &format!("{POINTS} of {POINTS} points are missing"),
+            &format!("skipped: {POINTS} rows of model version 0, expected {MODEL_VERSION}"),
         ],
     );
     put(&damaged);

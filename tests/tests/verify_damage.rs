@@ -1,6 +1,6 @@
 //! What `tracegen verify` reports of a capture with one thing wrong: each column of a record and each field of
 //! the tables. `results/verify-damage.csv` holds what the test finds; `UPDATE_GOLDEN=1` writes it anew, and
-//! `make figures` then the table in docs/verify.md. Damages of graded size are searched for the smallest one that is
+//! `make figures` then the table in docs/results/verify.md. Damages of graded size are searched for the smallest one that is
 //! reported; the test then holds that size, and that two steps below it nothing is reported (drivers differ by a step).
 
 use formats::textrace::{NO_GROUP, QuadRecord, SUBTEXELS, Tables, Textrace, TextraceWriter, Tile};

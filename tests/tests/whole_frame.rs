@@ -21,11 +21,15 @@ fn capture(folder: &Path, name: &str, scene: &[&str]) -> PathBuf {
 }
 
 fn replayed(trace: &Path, options: &[&str]) -> Value {
+    replayed_in("functional", trace, options)
+}
+
+fn replayed_in(mode: &str, trace: &Path, options: &[&str]) -> Value {
     let mut command = program("replay");
     command
         .arg("run")
         .arg(trace)
-        .args(["--mode", "functional", "--json"])
+        .args(["--mode", mode, "--json"])
         .args(options);
     serde_json::from_slice(&run_ok(&mut command).stdout).expect("JSON")
 }
@@ -247,4 +251,112 @@ fn what_cannot_be_is_refused() {
             &[expected],
         );
     }
+}
+
+/// All clients go through the levels that are for all, and to DRAM: each byte once, whatever the mode and the levels.
+#[test]
+fn what_clients_read_and_write_is_what_dram_reads_and_writes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let trace = capture(
+        folder.path(),
+        "shadows",
+        &["atrium", "--shadows", "--size", "160x144"],
+    );
+    let config = |text: &str| {
+        let path = folder.path().join("machine.toml");
+        fs::write(&path, text).expect("a file");
+        path.to_str().expect("UTF-8").to_owned()
+    };
+    let shared_l3 = config("l3 = {size_bytes = \"1MiB\", line_bytes = 64, clients = \"all\"}\n");
+    for mode in ["functional", "timed"] {
+        for machine in ["tile-based", "tile-based-g-buffer", "immediate"] {
+            let options = ["--frame", machine, "--dram", "lpddr4"];
+            let found = replayed_in(mode, &trace, &options);
+            let clients = found["result"]["clients"].as_array().expect("clients");
+            let sum = |key: &str| {
+                clients
+                    .iter()
+                    .map(|c| c[key].as_u64().expect("bytes"))
+                    .sum::<u64>()
+            };
+            let dram = &found["result"]["dram"];
+            let place = format!("{mode}, {machine}");
+            assert_eq!(
+                dram["write_bytes"].as_u64(),
+                Some(sum("write_bytes")),
+                "{place}"
+            );
+            // A texture line of 16 bytes takes a burst of 32.
+            let textures = client(&found, "texture")["read_bytes"]
+                .as_u64()
+                .expect("bytes");
+            assert_eq!(
+                dram["read_bytes"].as_u64(),
+                Some(sum("read_bytes") + textures),
+                "{place}"
+            );
+            // An L3 for all: fewer reads, the same writes, and each byte of reads leaves it once.
+            let options = [&options[..], &["--config", &shared_l3]].concat();
+            let with_l3 = replayed_in(mode, &trace, &options);
+            let of_dram = |key: &str| with_l3["result"]["dram"][key].as_u64().expect("bytes");
+            assert_eq!(
+                Some(of_dram("write_bytes")),
+                dram["write_bytes"].as_u64(),
+                "{place}"
+            );
+            let clients = with_l3["result"]["clients"].as_array().expect("clients");
+            let reads: u64 = clients
+                .iter()
+                .map(|c| c["read_bytes"].as_u64().expect("bytes"))
+                .sum();
+            assert_eq!(of_dram("read_bytes"), reads, "{place}");
+            assert!(reads < sum("read_bytes"), "{place}");
+        }
+    }
+}
+
+/// Larger tiles have fewer list entries; the pictures that are written stay what they are.
+#[test]
+fn larger_tiles_have_shorter_lists_and_the_same_pictures() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let trace = capture(
+        folder.path(),
+        "atrium",
+        &["atrium-plain", "--size", "160x144"],
+    );
+    let of = |tile_px: &str| replayed(&trace, &["--frame", "tile-based", "--tile-px", tile_px]);
+    let entries = |found: &Value| found["result"]["geometry"]["list_entries"].as_u64();
+    let [small, middle, large] = ["16", "32", "64"].map(of);
+    assert!(entries(&large) < entries(&middle) && entries(&middle) < entries(&small));
+    for found in [&middle, &large] {
+        assert_eq!(client(found, "colour"), client(&small, "colour"));
+        assert_eq!(client(found, "vertex"), client(&small, "vertex"));
+    }
+}
+
+#[test]
+fn a_picture_says_how_far_colour_is_compressed() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let picture = folder.path().join("picture.png");
+    let picture = picture.to_str().expect("UTF-8");
+    let scene = ["atrium-plain", "--size", "160x144", "--image", picture];
+    let trace = capture(folder.path(), "atrium", &scene);
+    let plain = replayed(&trace, &["--frame", "tile-based"]);
+    let packed = replayed(&trace, &["--frame", "tile-based", "--picture", picture]);
+    let permille = packed["config"]["frame"]["color_compressed_permille"]
+        .as_u64()
+        .expect("a number");
+    assert!((100..900).contains(&permille), "{permille}");
+    let written = |found: &Value| {
+        client(found, "colour")["write_bytes"]
+            .as_u64()
+            .expect("bytes")
+    };
+    let ratio = 1000.0 * written(&packed) as f64 / written(&plain) as f64;
+    // Each tile takes whole lines.
+    assert!((ratio - permille as f64).abs() < 63.0, "{ratio} {permille}");
+    refuse(
+        program("replay").args(["run", trace.to_str().expect("UTF-8"), "--picture", picture]),
+        &["--picture: only with --frame"],
+    );
 }

@@ -141,6 +141,8 @@ pub struct TextureLayout {
     pub block: BlockInfo,
     /// Distance between layers.
     pub layer_bytes: u64,
+    /// Number of layers.
+    pub layers: u32,
     /// Levels from fine to coarse.
     pub levels: Vec<LevelLayout>,
 }
@@ -148,8 +150,8 @@ pub struct TextureLayout {
 impl TextureLayout {
     /// Size of all layers.
     #[must_use]
-    pub fn size_bytes(&self, layers: u32) -> u64 {
-        self.layer_bytes * u64::from(layers)
+    pub fn size_bytes(&self) -> u64 {
+        self.layer_bytes * u64::from(self.layers)
     }
 
     /// Address of the block that holds a texel; `None` where the level does not exist.
@@ -163,6 +165,19 @@ impl TextureLayout {
         let within = level.placement.index(block) * u64::from(self.block.bytes);
         Some(self.base + u64::from(layer) * self.layer_bytes + level.offset_bytes + within)
     }
+}
+
+/// A block of a texture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BlockAt {
+    /// Index of the texture.
+    pub texture: u32,
+    /// Layer.
+    pub layer: u32,
+    /// Mip level.
+    pub level: u32,
+    /// Column and row, in blocks; beyond the level where the layout pads it.
+    pub block: [u32; 2],
 }
 
 /// Placement of all textures of a trace.
@@ -219,6 +234,29 @@ impl Layout {
     #[must_use]
     pub fn end(&self) -> u64 {
         self.end
+    }
+
+    /// The block that an address lies in; `None` between textures and behind the last one.
+    #[must_use]
+    pub fn block_at(&self, address: u64) -> Option<BlockAt> {
+        let holds = |texture: &TextureLayout| {
+            let end = texture.base + texture.size_bytes();
+            (texture.base..end).contains(&address)
+        };
+        let (number, texture) = (0..).zip(&self.textures).find(|(_, t)| holds(t))?;
+        let within = address - texture.base;
+        let (layer, within) = (within / texture.layer_bytes, within % texture.layer_bytes);
+        let levels = &texture.levels;
+        let level = levels.partition_point(|level| level.offset_bytes <= within);
+        let level = level.checked_sub(1)?;
+        let placed = levels.get(level)?;
+        let block = (within - placed.offset_bytes) / u64::from(texture.block.bytes);
+        Some(BlockAt {
+            texture: number,
+            layer: layer as u32,
+            level: level as u32,
+            block: placed.placement.block(block),
+        })
     }
 
     /// Address of the block that holds a texel; `None` where texture or level does not exist.
@@ -279,6 +317,7 @@ fn place(texture: &Texture, config: &LayoutConfig) -> Option<TextureLayout> {
         format,
         block,
         layer_bytes: offset_bytes,
+        layers: texture.layers,
         levels,
     })
 }

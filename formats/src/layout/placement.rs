@@ -74,6 +74,45 @@ impl BlockPlacement {
     }
 }
 
+impl BlockPlacement {
+    /// The block with a number in memory order, padding included.
+    #[must_use]
+    pub fn block(&self, index: u64) -> [u32; 2] {
+        match *self {
+            Self::Linear { pitch } => {
+                let pitch = u64::from(pitch.max(1));
+                [(index % pitch) as u32, (index / pitch) as u32]
+            }
+            Self::Morton { bits } => {
+                let common = bits[0].min(bits[1]);
+                let rest = ((index >> (2 * common)) as u32) << common;
+                let [x, y] = [collect(index, common), collect(index >> 1, common)];
+                match bits[0] > bits[1] {
+                    true => [x | rest, y],
+                    false => [x, y | rest],
+                }
+            }
+            Self::Tiled { shift, pitch } => {
+                let (tile, within) = (index >> (shift[0] + shift[1]), index as u32);
+                let pitch = u64::from(pitch.max(1));
+                let [column, row] = [(tile % pitch) as u32, (tile / pitch) as u32];
+                let low = |value: u32, axis: usize| value & ((1 << shift[axis]) - 1);
+                [
+                    column << shift[0] | low(within, 0),
+                    row << shift[1] | low(within >> shift[0], 1),
+                ]
+            }
+        }
+    }
+}
+
+/// The lowest `bits` even bits of a number, side by side.
+fn collect(interleaved: u64, bits: u32) -> u32 {
+    (0..bits).fold(0, |value, bit| {
+        value | ((interleaved >> (2 * bit)) as u32 & 1) << bit
+    })
+}
+
 /// Spreads 32 bits so that a zero follows each.
 fn interleave(v: u32) -> u64 {
     let mut v = u64::from(v);

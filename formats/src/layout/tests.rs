@@ -187,3 +187,38 @@ proptest! {
         }
     }
 }
+
+proptest! {
+    /// Every address of every block leads back to it, whatever the order of the blocks and of the textures.
+    #[test]
+    fn blocks_are_found_by_their_addresses(
+        shapes in prop::collection::vec((1_u32..70, 1_u32..70, 1_u32..4, 0_usize..3), 1..4),
+        order in 0_usize..3,
+        largest_first in any::<bool>(),
+    ) {
+        let formats = [TexelFormat::Bc1, TexelFormat::Astc6x6, TexelFormat::R32f];
+        let textures: Vec<Texture> = shapes.iter().map(|&(width, height, layers, format)| {
+            let levels = width.max(height).ilog2() + 1;
+            texture([width, height], levels, layers, formats[format])
+        }).collect();
+        let config = LayoutConfig {
+            texture_order: if largest_first { TextureOrder::LargestFirst } else { TextureOrder::Table },
+            ..config(ORDERS[order])
+        };
+        let layout = Layout::new(&textures, &config).unwrap();
+        for (index, of) in (0..).zip(&textures) {
+            let edge = of.format.block().texels;
+            for (layer, level) in (0..of.layers).flat_map(|layer| (0..of.levels).map(move |level| (layer, level))) {
+                let size = of.level_size(level);
+                for (y, x) in (0..size[1].div_ceil(edge[1])).flat_map(|y| (0..size[0].div_ceil(edge[0])).map(move |x| (y, x))) {
+                    let address = layout.address(index, layer, level, [x * edge[0], y * edge[1]]).unwrap();
+                    let last = address + u64::from(of.format.block().bytes) - 1;
+                    let expected = Some(BlockAt { texture: index, layer, level, block: [x, y] });
+                    prop_assert_eq!(layout.block_at(address), expected);
+                    prop_assert_eq!(layout.block_at(last), expected);
+                }
+            }
+        }
+        prop_assert_eq!(layout.block_at(layout.end()), None);
+    }
+}

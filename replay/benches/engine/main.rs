@@ -1,6 +1,6 @@
 //! What each stage of a replay costs on one core, in one table: beside the bandwidth at which this
 //! machine reads memory (the roofline), and beside a plain LRU loop over the same lines in a mapped
-//! file (the yardstick). `benches/engine.md` says how to read it.
+//! file (the yardstick). `docs/results/stages.md` says how to read it.
 //!
 //! `cargo bench -p replay --bench engine [-- TRACE]`, or `TEXTRACE=file make bench`.
 

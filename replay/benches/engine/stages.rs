@@ -3,9 +3,9 @@
 use crate::plain_lru;
 use crate::table::Row;
 use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as};
-use replay::cache::AnyCache;
-use replay::config::{CacheConfig, Mode, Order, RunConfig};
+use replay::config::{LevelConfig, Levels, Mode, Order, RunConfig};
 use replay::engine::replay_all;
+use replay::memory::AnyCache;
 use replay::order::{self, Phase, WorkItem};
 use replay::stream::{
     Consumer, Cores, Expander, Frame, LineMemory, QuadLines, TraceCounts, interleave,
@@ -103,10 +103,10 @@ pub fn measure(trace: &Textrace) -> Vec<Row> {
         4 * listed,
         seconds(&mut cores),
     ));
-    for (name, l2) in [("L1", None), ("L1 and L2", Some(config.l2))] {
+    for (name, l2) in [("L1", None), ("L1 and L2", Some(config.level.l2))] {
         let took = seconds(|| {
             let mut caches = Caches {
-                l1: cache(&config.l1, "L1"),
+                l1: cache(&config.level.l1, "L1"),
                 l2: l2.map(|l2| cache(&l2, "L2")),
                 misses: 0,
             };
@@ -121,7 +121,7 @@ pub fn measure(trace: &Textrace) -> Vec<Row> {
     rows
 }
 
-fn cache(config: &CacheConfig, level: &'static str) -> AnyCache {
+fn cache(config: &LevelConfig, level: &'static str) -> AnyCache {
     AnyCache::build(config, level, 16, 1).expect("a usual cache")
 }
 
@@ -209,7 +209,7 @@ fn yardstick(lines: &[u32], config: &RunConfig) -> Row {
         file.write_all(&bytes).map(|()| file)
     });
     let file = file.expect("the temporary folder takes a file");
-    let sets = config.l1.sets("L1", config.line_bytes);
+    let sets = config.level.l1.sets("L1", config.line_bytes);
     let sets = sets.expect("a usual cache");
     let took = seconds(|| {
         let misses = plain_lru::misses(file.path(), sets);
@@ -227,8 +227,7 @@ fn whole(trace: &Textrace, listed: u64) -> Vec<Row> {
     let replay = |mode, l1_kib: &[u64], l2_kib: &[u64]| {
         let config = |(l1, l2)| RunConfig {
             mode,
-            l1: CacheConfig::lru(l1 << 10),
-            l2: CacheConfig::lru(l2 << 10),
+            level: Levels::two(LevelConfig::lru(l1 << 10), LevelConfig::lru(l2 << 10)),
             ..RunConfig::default()
         };
         let pairs = l1_kib

@@ -1,8 +1,9 @@
 //! Utilisation by a formula in place of a cycle model.
 
+use super::configurations::{functional, looping};
 use super::inputs::{Inputs, time_ratio};
 use super::study::{Choice, Figure, Study, StudyError, figure};
-use crate::config::{Mode, RunConfig};
+use crate::config::TmuModel;
 use crate::result::RunResult;
 use crate::tmu::closed_form;
 
@@ -23,17 +24,9 @@ pub const CLOSED_FORM: Study = Study {
 fn forms(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
     let mut choices = Vec::new();
     for subject in inputs.stills() {
-        let of = |mode| {
-            let mut config = RunConfig {
-                mode,
-                ..inputs.config
-            };
-            if mode == Mode::FirstMiss {
-                config.tmu.loop_cycles = 24;
-            }
-            inputs.replays.of(subject, config)
-        };
-        let (model, functional) = (of(Mode::FirstMiss)?, of(Mode::Functional)?);
+        let of = |config| inputs.replays.of(subject, config);
+        let model = of(looping(inputs.config, TmuModel::FirstMiss, 24))?;
+        let functional = of(functional(inputs.config))?;
         let first = |r: &RunResult| r.first_lookups.map(|f| (f.l1_miss_rate, f.l2_miss_rate));
         let all = |r: &RunResult| Some((r.l1.miss_rate, r.l2.miss_rate));
         for (name, rates, from) in [

@@ -1,9 +1,9 @@
 //! A functional replay of a part, counted by set, by tile and by frame: all lines of an L1 set, of the
 //! L2 sets that hold them, and of no others, are a *cluster*, which can be replayed alone and exactly.
 
-use crate::cache::{AnyCache, Cache, Levels};
 use crate::config::{BetweenFrames, ConfigError, Order, RunConfig};
 use crate::engine::ReplayError;
+use crate::memory::{Cache, Found, Hierarchy};
 use crate::order::{self, Phase};
 use crate::stream::{
     Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, TraceCounts, interleave, rendered,
@@ -41,8 +41,7 @@ pub struct Counts {
 }
 
 struct Counting<'a> {
-    l1: Vec<Box<dyn Cache>>,
-    l2: Box<dyn Cache>,
+    caches: Hierarchy<Box<dyn Cache>>,
     mask: u32,
     chosen: Option<&'a [bool]>,
     counts: Counts,
@@ -58,7 +57,7 @@ impl Consumer for Counting<'_> {
                     if self.chosen.is_some_and(|chosen| !chosen[cluster]) {
                         continue;
                     }
-                    if !self.l1[core].access(line) && !self.l2.access(line) {
+                    if self.caches.access(core, line) == Found::Below {
                         self.counts.by_cluster[cluster] += 1;
                         self.counts.by_tile[tile].0 += 1;
                     }
@@ -84,10 +83,8 @@ pub fn counts(
     let expander = Expander::new(&rendered, config)?;
     let mut accesses = TraceCounts::new(expander.bins());
     let clusters = cluster_count(config)?;
-    let Levels { l1, l2 } = Levels::build(config)?;
     let mut counting = Counting {
-        l1: l1.into_iter().map(AnyCache::into_box).collect(),
-        l2: l2.into_box(),
+        caches: Hierarchy::build(config)?,
         mask: clusters - 1,
         chosen: part.clusters,
         counts: Counts {
@@ -102,8 +99,7 @@ pub fn counts(
     for &number in part.frames {
         let memory = LineMemory::new(LineMemory::USUAL_BYTES);
         if config.between_frames == BetweenFrames::Flush {
-            counting.l1.iter_mut().for_each(Cache::clear);
-            counting.l2.clear();
+            counting.caches.clear();
         }
         let frame = expander.frame(number, &memory, &mut accesses)?;
         let mut keep = |phase: Phase| -> Phase {
@@ -126,8 +122,8 @@ pub fn counts(
 
 /// The clusters of a configuration: sets of the smaller level.
 pub fn cluster_count(config: &RunConfig) -> Result<u32, ConfigError> {
-    let l1 = config.l1.sets("L1", config.line_bytes)?;
-    let l2 = config.l2.sets("L2", config.line_bytes)?;
+    let l1 = config.level.l1.sets("L1", config.line_bytes)?;
+    let l2 = config.level.l2.sets("L2", config.line_bytes)?;
     Ok(l1.min(l2))
 }
 
@@ -142,7 +138,7 @@ pub fn frames(trace: &dyn TileSource) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{Assign, CacheConfig, Hsr, Mode};
+    use crate::config::{Assign, Hsr, LevelConfig, Levels, Mode};
     use crate::engine::replay;
     use crate::stream::synthetic::Synthetic;
     use formats::textrace::{Pass, Surfaces};
@@ -170,8 +166,7 @@ mod tests {
         }
         let plain = RunConfig {
             mode: Mode::Functional,
-            l1: CacheConfig::lru(2 << 10),
-            l2: CacheConfig::lru(64 << 10),
+            level: Levels::two(LevelConfig::lru(2 << 10), LevelConfig::lru(64 << 10)),
             ..RunConfig::default()
         };
         let variants = [
@@ -225,8 +220,7 @@ mod tests {
         .generate();
         let config = RunConfig {
             mode: Mode::Functional,
-            l1: CacheConfig::lru(1 << 10),
-            l2: CacheConfig::lru(8 << 10),
+            level: Levels::two(LevelConfig::lru(1 << 10), LevelConfig::lru(8 << 10)),
             ..RunConfig::default()
         };
         for order in [Order::MORTON, Order::Z2_STA] {

@@ -3,7 +3,7 @@
 use super::headline::TEXTURE_FIGURES;
 use super::inputs::{Inputs, time_ratio};
 use super::study::{Choice, Contribution, Study, StudyError};
-use crate::config::{LodFormula, Mode, RunConfig};
+use crate::config::{LodFormula, Mode, RunConfig, TmuModel};
 
 /// A configuration under its name.
 struct Variant {
@@ -50,13 +50,10 @@ fn measured(
 }
 
 fn timed(config: RunConfig) -> RunConfig {
-    RunConfig {
-        mode: Mode::Timed,
-        ..config
-    }
+    looping(config, TmuModel::Looping, config.tmu.loop_cycles)
 }
 
-fn functional(config: RunConfig) -> RunConfig {
+pub(super) fn functional(config: RunConfig) -> RunConfig {
     RunConfig {
         mode: Mode::Functional,
         ..config
@@ -69,9 +66,10 @@ fn lod(config: RunConfig, formula: LodFormula) -> RunConfig {
     config
 }
 
-fn looping(config: RunConfig, mode: Mode, cycles: u32) -> RunConfig {
-    let mut config = RunConfig { mode, ..config };
-    config.tmu.loop_cycles = cycles;
+/// Threads of a model, which are back at the first stage after so many cycles.
+pub(super) fn looping(mut config: RunConfig, model: TmuModel, cycles: u32) -> RunConfig {
+    config.mode = Mode::Timed;
+    (config.tmu.model, config.tmu.loop_cycles) = (model, cycles);
     config
 }
 
@@ -121,7 +119,7 @@ pub const LOD: Study = Study {
     },
 };
 
-/// The loop is moved as far as docs/tmu-model.md says that it may be.
+/// The loop is moved as far as docs/models/texture-unit.md says that it may be.
 pub const LOOP: Study = Study {
     key: "loop",
     title: "Calibrated loop of the cycle model",
@@ -134,10 +132,14 @@ pub const LOOP: Study = Study {
     measure: |inputs| {
         let calibration = Some(Contribution::Calibration);
         let variants = [
-            variant("36 cycles", calibration, |c| looping(c, Mode::Timed, 36)),
-            variant("74 cycles", calibration, |c| looping(c, Mode::Timed, 74)),
+            variant("36 cycles", calibration, |c| {
+                looping(c, TmuModel::Looping, 36)
+            }),
+            variant("74 cycles", calibration, |c| {
+                looping(c, TmuModel::Looping, 74)
+            }),
         ];
-        measured(inputs, |c| looping(c, Mode::Timed, 64), &variants)
+        measured(inputs, |c| looping(c, TmuModel::Looping, 64), &variants)
     },
 };
 
@@ -153,13 +155,13 @@ pub const MODEL: Study = Study {
     measure: |inputs| {
         let model = Some(Contribution::Model);
         let variants = [variant("first miss", model, |c| {
-            looping(c, Mode::FirstMiss, 24)
+            looping(c, TmuModel::FirstMiss, 24)
         })];
         measured(inputs, timed, &variants)
     },
 };
 
-/// As far as docs/paper-comparison.md says that it may be moved.
+/// As far as docs/models/z2.md says that it may be moved.
 pub const FIRST_MISS_LOOP: Study = Study {
     key: "first-miss-loop",
     title: "Calibrated loop of the first-miss model",
@@ -171,10 +173,10 @@ pub const FIRST_MISS_LOOP: Study = Study {
     figures: &TEXTURE_FIGURES,
     measure: |inputs| {
         let variants = [
-            variant("20 cycles", None, |c| looping(c, Mode::FirstMiss, 20)),
-            variant("28 cycles", None, |c| looping(c, Mode::FirstMiss, 28)),
+            variant("20 cycles", None, |c| looping(c, TmuModel::FirstMiss, 20)),
+            variant("28 cycles", None, |c| looping(c, TmuModel::FirstMiss, 28)),
         ];
-        measured(inputs, |c| looping(c, Mode::FirstMiss, 24), &variants)
+        measured(inputs, |c| looping(c, TmuModel::FirstMiss, 24), &variants)
     },
 };
 

@@ -249,7 +249,7 @@ mod tests {
         let trace = repeated(&small_trace(), 8);
         let mut inputs = inputs(&trace);
         // All of a frame stays in the caches.
-        inputs.config.l2.size_bytes = 1 << 22;
+        inputs.config.level.l2.size_bytes = 1 << 22;
         let choices = (FRAMES.measure)(&inputs).unwrap();
         assert_eq!(choices.len(), 4);
         let bias = |name: &str| {

@@ -13,7 +13,7 @@ const FIGURES: [Figure; 2] = [
 pub const TECHNIQUES: Study = Study {
     key: "techniques",
     title: "Rendering techniques",
-    about: "What a frame may leave out or do more coarsely. Errors are against each eye rendered in full; docs/techniques.md has every figure of them.",
+    about: "What a frame may leave out or do more coarsely. Errors are against each eye rendered in full; docs/models/techniques.md has every figure of them.",
     time: "frame through the capturing rasteriser, over the baseline's (median)",
     reference: "per-eye",
     recommended: "per-eye",

@@ -2,7 +2,7 @@
 
 use super::headline::Replays;
 use super::inputs::Inputs;
-use crate::config::{CacheConfig, RunConfig};
+use crate::config::{LevelConfig, Levels, RunConfig};
 use crate::experiment::Subject;
 use crate::result::TraceId;
 use crate::stream::synthetic::Synthetic;
@@ -28,7 +28,7 @@ pub fn subject<'a>(trace: &'a dyn TileSource, label: &str) -> Subject<'a> {
 pub fn inputs(trace: &dyn TileSource) -> Inputs<'_> {
     Inputs {
         config: RunConfig {
-            l2: CacheConfig::lru(16 << 10),
+            level: Levels::two(LevelConfig::lru(8 << 10), LevelConfig::lru(16 << 10)),
             ..RunConfig::default()
         },
         subjects: vec![subject(trace, "small")],

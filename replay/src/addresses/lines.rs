@@ -1,21 +1,21 @@
-//! Accesses to cache lines, block by block.
+//! Converts accesses to cache lines, in blocks.
 
 use super::AddressError;
 use super::names::Names;
 use formats::interop::plain::{AccessKind, AddressFile, Block, PlainAccess};
 
-/// Lines of a block, at most.
+/// Maximum lines per block.
 pub(super) const BLOCK: usize = 4096;
 
-/// Kinds of accesses.
+/// A set of access kinds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct KindSet([bool; 3]);
 
 impl KindSet {
-    /// All of them.
+    /// All kinds.
     pub const ALL: Self = Self([true; 3]);
 
-    /// Some of them.
+    /// These kinds.
     #[must_use]
     pub fn of(kinds: &[AccessKind]) -> Self {
         let has = |kind| kinds.contains(&kind);
@@ -27,30 +27,30 @@ impl KindSet {
     }
 }
 
-/// Lines that are looked up one after another.
+/// Consecutive line look-ups.
 #[derive(Clone, Copy, Debug)]
 pub struct LineBlock<'a> {
-    /// Numbers of the lines, or names of such beyond 2^32: equal for equal lines, with the same low
-    /// bits, never `u32::MAX`.
+    /// Line numbers. Lines beyond 2^32 are renumbered: equal lines stay equal, low bits stay, and
+    /// `u32::MAX` is never used.
     pub lines: &'a [u32],
-    /// What each look-up is for; empty if all are reads.
+    /// Kind of each look-up; empty if all are reads.
     pub kinds: &'a [AccessKind],
 }
 
-/// What was accessed. Arrays are by kind: reads, writes, fetches.
+/// Totals of the input. Arrays are by kind: reads, writes, fetches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Totals {
     /// Accesses.
     pub accesses: [u64; 3],
-    /// Lines that they touch: an access that straddles lines touches each.
+    /// Line look-ups: an access that straddles lines looks up each line.
     pub lookups: [u64; 3],
-    /// Accesses of kinds that were not wanted.
+    /// Accesses of kinds that were not selected.
     pub left_out: u64,
-    /// gem5 packets that are no accesses.
+    /// gem5 packets that are not accesses.
     pub other_packets: u64,
 }
 
-/// Lines on their way out, and how they are made.
+/// The current block, and the conversion from addresses to lines.
 struct Lines<V> {
     shift: u32,
     names: Names,
@@ -65,7 +65,7 @@ impl<V: FnMut(LineBlock<'_>)> Lines<V> {
     fn block(&mut self, block: Block<'_>) -> Option<()> {
         match block {
             Block::U32(words) => self.words(words, |words, shift, _, lines| {
-                // Four bits at least fall away, so no line is `u32::MAX`.
+                // At least four bits are shifted out, so no line is `u32::MAX`.
                 lines.extend(words.iter().map(|word| u32::from_le_bytes(*word) >> shift));
                 Some(())
             }),
@@ -79,7 +79,7 @@ impl<V: FnMut(LineBlock<'_>)> Lines<V> {
         }
     }
 
-    /// Reads of one line each.
+    /// Adds reads of one line each.
     fn words<T>(
         &mut self,
         words: &[T],
@@ -133,13 +133,13 @@ impl<V: FnMut(LineBlock<'_>)> Lines<V> {
     }
 }
 
-/// Hands the lines of all accesses of `kinds` to `visit`, at most 4096 at once, in their order and
-/// with all repeats. `line_bytes` is a power of two from 16 on; bits that choose among up to
-/// `most_sets` sets (a power of two up to 2^24) stay what they are.
+/// Passes the lines of all accesses of `kinds` to `visit`, in blocks of at most 4096, in order and with all
+/// repeats. `line_bytes` is a power of two from 16 on. The bits that select among up to `most_sets` sets (a
+/// power of two up to 2^24) are preserved.
 ///
 /// # Errors
-/// Input that cannot be read or is not of its form; no access at all, or none of `kinds`; memory that
-/// is touched so sparsely that 32 bits do not number the lines.
+/// Unreadable or malformed input; no access, or none of `kinds`; accesses so sparse that 32 bits cannot
+/// number the lines.
 pub fn for_line_blocks(
     file: AddressFile<'_>,
     line_bytes: u32,
@@ -178,10 +178,10 @@ pub fn for_line_blocks(
     Ok(totals)
 }
 
-/// Hands the lines of all accesses to `visit`, as [`for_line_blocks`] does, without their kinds.
+/// Passes the lines of all accesses to `visit`, as [`for_line_blocks`] does, without their kinds.
 ///
 /// # Errors
-/// As those of [`for_line_blocks`].
+/// As [`for_line_blocks`].
 pub fn for_lines(
     file: AddressFile<'_>,
     line_bytes: u32,

@@ -1,27 +1,27 @@
-//! Line numbers of 64 bits as numbers of 32 bits, which all caches take.
+//! Renumbers 64-bit lines with 32 bits, as required by all caches.
 //!
-//! The low bits, which choose the set, stay; what is above them, a range of neighbouring lines, gets a
-//! number when it is first seen. Equal lines stay equal and others different, so that no count
-//! changes. Memory that is touched sparsely over more than 2^32 lines cannot be told apart any more.
+//! The low bits, which select the set, are preserved. The bits above them identify a range of neighbouring
+//! lines, which is numbered when first accessed. Distinct lines stay distinct, so no count changes.
+//! Accesses spread too sparsely over more than 2^32 lines cannot be numbered.
 
 use std::collections::HashMap;
 
-/// Ranges are at least so many lines, so that few are met.
+/// Minimum size of a range (log2 of lines), so that there are few ranges.
 const LEAST_BITS: u32 = 12;
 
-/// Ranges that are found without a look into the table.
+/// Ranges cached in front of the table.
 const RECENT: usize = 256;
 
-/// Gives lines their names.
+/// Maps lines to 32-bit numbers.
 pub struct Names {
     kept_bits: u32,
     numbers: HashMap<u64, u32>,
-    /// Range and number, by the range's low bits.
+    /// Range and number, by the low bits of the range.
     recent: Box<[(u64, u32); RECENT]>,
 }
 
 impl Names {
-    /// Keeps what chooses among up to `most_sets` sets, a power of two up to 2^24.
+    /// Preserves the bits that select among up to `most_sets` sets, a power of two up to 2^24.
     pub fn new(most_sets: u32) -> Self {
         Self {
             kept_bits: most_sets.ilog2().max(LEAST_BITS),
@@ -30,18 +30,17 @@ impl Names {
         }
     }
 
-    /// Ranges that can be told apart. The last number is not used: it would hold the line that caches
-    /// take for none.
+    /// Maximum number of ranges. The last number is reserved, because it contains `u32::MAX`.
     pub fn most_ranges(&self) -> u64 {
         (1 << (32 - self.kept_bits)) - 1
     }
 
-    /// Lines of a range.
+    /// Lines per range.
     pub fn range_lines(&self) -> u64 {
         1 << self.kept_bits
     }
 
-    /// The name of a line; nothing if there are too many ranges.
+    /// The number of a line, or none if there are too many ranges.
     #[inline(always)]
     pub fn name(&mut self, line: u64) -> Option<u32> {
         let range = line >> self.kept_bits;

@@ -1,75 +1,68 @@
-//! Drops look-ups of the line that was looked up before: they find it in every cache of every policy
-//! and change nothing.
+//! Drops repeated look-ups of the previous line, which hit in every cache of every policy and change nothing.
 
 use super::lines::{BLOCK, LineBlock};
+use crate::stream::Tag;
 use formats::interop::plain::AccessKind;
 
-/// Look-ups of which no two neighbours are the same line.
-pub struct Distinct<'a> {
-    /// The lines.
-    pub lines: &'a [u32],
-    /// What the first of the look-ups of each was for; empty if all are reads.
-    kinds: &'a [AccessKind],
-}
-
-impl Distinct<'_> {
-    /// Counts the look-ups at these places by kind.
-    pub fn count(&self, places: &[u16], counts: &mut [u64; 3]) {
-        if self.kinds.is_empty() {
-            counts[AccessKind::Read as usize] += places.len() as u64;
-            return;
-        }
-        for &place in places {
-            counts[self.kinds[usize::from(place)] as usize] += 1;
-        }
-    }
-
-    /// What the look-up at a place is for.
-    pub fn kind(&self, place: usize) -> AccessKind {
-        self.kinds.get(place).copied().unwrap_or_default()
-    }
-}
-
-/// Drops repeats, also those of the last line of the block before.
+/// Drops repeats, also across blocks.
 pub struct Repeats {
-    /// `u32::MAX` is no line.
+    /// The previous line, or `u32::MAX` for none.
     last: u32,
+    drops: bool,
     lines: Box<[u32; BLOCK]>,
-    kinds: Vec<AccessKind>,
-}
-
-impl Default for Repeats {
-    fn default() -> Self {
-        Self {
-            last: u32::MAX,
-            lines: Box::new([0; BLOCK]),
-            kinds: Vec::with_capacity(BLOCK),
-        }
-    }
+    tags: Vec<Tag>,
+    /// The tag of a read, repeated.
+    reads: Box<[Tag; BLOCK]>,
 }
 
 impl Repeats {
-    /// What is left of a block.
-    pub fn drop_from(&mut self, block: &LineBlock<'_>) -> Distinct<'_> {
-        self.kinds.clear();
+    /// Without `drops`, all look-ups are kept.
+    pub fn new(drops: bool) -> Self {
+        Self {
+            last: u32::MAX,
+            drops,
+            lines: Box::new([0; BLOCK]),
+            tags: Vec::with_capacity(BLOCK),
+            reads: Box::new([tag(AccessKind::Read); BLOCK]),
+        }
+    }
+
+    /// The remaining lines of a block, each with a tag for its kind of access.
+    #[inline(always)]
+    pub fn drop_from<'a>(&'a mut self, block: &LineBlock<'a>) -> (&'a [u32], &'a [Tag]) {
+        self.tags.clear();
+        if !self.drops {
+            self.tags.extend(block.kinds.iter().map(|&kind| tag(kind)));
+            return (block.lines, self.tags_of(block.lines.len()));
+        }
         let mut last = self.last;
         for (&line, &kind) in block.lines.iter().zip(block.kinds) {
             if line != last {
-                self.kinds.push(kind);
+                self.tags.push(tag(kind));
             }
             last = line;
         }
         let (mut last, mut count) = (self.last, 0);
         for &line in block.lines {
-            // No branch: whether a line repeats is a coin toss to the processor.
+            // Branch-free: whether a line repeats is unpredictable.
             self.lines[count % BLOCK] = line;
             count += usize::from(line != last);
             last = line;
         }
         self.last = last;
-        Distinct {
-            lines: &self.lines[..count],
-            kinds: &self.kinds,
+        (&self.lines[..count], self.tags_of(count))
+    }
+
+    /// The tags of a block, which are all reads if it has no kinds.
+    fn tags_of(&self, count: usize) -> &[Tag] {
+        match self.tags.is_empty() {
+            true => &self.reads[..count],
+            false => &self.tags,
         }
     }
+}
+
+/// Kinds correspond to the cells of [`crate::stream::Bins::of_kinds`].
+fn tag(kind: AccessKind) -> Tag {
+    Tag::of_line(kind as u32)
 }

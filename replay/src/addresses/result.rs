@@ -1,31 +1,33 @@
-//! What a replay of plain addresses yields.
+//! The result of replaying plain addresses.
 
 use super::Totals;
 use crate::config::RunConfig;
+use crate::engine::LineOutcome;
+use crate::result::MemoryResult;
 
 /// Counters of one level, by kind: reads, writes, fetches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LevelCounts {
-    /// Lines asked for.
+    /// Line look-ups.
     pub lookups: [u64; 3],
-    /// Lines that had to be fetched from below.
+    /// Lines fetched from below.
     pub misses: [u64; 3],
 }
 
 impl LevelCounts {
-    /// Lines asked for, all kinds together.
+    /// Line look-ups of all kinds.
     #[must_use]
     pub fn line_lookups(&self) -> u64 {
         self.lookups.iter().sum()
     }
 
-    /// Lines that had to be fetched, all kinds together.
+    /// Line misses of all kinds.
     #[must_use]
     pub fn line_misses(&self) -> u64 {
         self.misses.iter().sum()
     }
 
-    /// Missing line look-ups over line look-ups; none over none is none.
+    /// Line misses over line look-ups; 0 without look-ups.
     #[must_use]
     pub fn miss_rate(&self) -> f64 {
         match self.line_lookups() {
@@ -35,23 +37,32 @@ impl LevelCounts {
     }
 }
 
-/// One configuration.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// The result for one configuration.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Its caches and line size are what counts here.
+    /// The configuration, of which only caches and line size matter here.
     pub config: RunConfig,
     /// First level.
     pub l1: LevelCounts,
-    /// Second level: what misses the first comes here.
+    /// Second level, which receives the misses of the first.
     pub l2: LevelCounts,
+    /// Counts beside and below the L2.
+    pub memory: MemoryResult,
 }
 
 impl Point {
-    /// A point with the misses of both levels.
-    pub(super) fn new(config: &RunConfig, totals: &Totals, misses: [[u64; 3]; 2]) -> Self {
-        let [l1, l2] = misses;
+    /// Combines totals with the misses of all levels.
+    pub(super) fn new(config: &RunConfig, totals: &Totals, outcome: LineOutcome) -> Self {
+        let [l1, l2] = [0, 1].map(|level: usize| {
+            let mut misses = [0; 3];
+            for (sum, cell) in misses.iter_mut().zip(&outcome.misses) {
+                *sum = cell[level].lines;
+            }
+            misses
+        });
         Self {
             config: *config,
+            memory: outcome.memory,
             l1: LevelCounts {
                 lookups: totals.lookups,
                 misses: l1,
@@ -66,17 +77,19 @@ impl Point {
     /// Bytes fetched from memory.
     #[must_use]
     pub fn external_bytes(&self) -> u64 {
-        self.l2.line_misses() * u64::from(self.config.line_bytes)
+        let l2_misses = self.l2.line_misses();
+        self.memory
+            .external_bytes(l2_misses, self.config.line_bytes)
     }
 }
 
-/// All configurations of one replay.
-#[derive(Clone, Debug, PartialEq)]
+/// The results for all configurations.
+#[derive(Clone, Debug)]
 pub struct Outcome {
-    /// What was accessed.
+    /// Totals of the input.
     pub totals: Totals,
     /// Distinct lines: the misses of an infinite cache.
     pub unique_lines: u64,
-    /// In the order in which they were asked for.
+    /// In the order of the configurations.
     pub points: Vec<Point>,
 }

@@ -1,5 +1,6 @@
 use super::*;
-use crate::config::{CacheConfig, Replacement};
+use crate::config::{LevelConfig, Levels, Replacement};
+use crate::engine::{LineOutcome, Misses};
 use formats::interop::plain::{AccessKind, AddressForm, PlainAccess, PlainForm, PlainWriter};
 use std::collections::{HashSet, VecDeque};
 
@@ -37,20 +38,19 @@ fn file(accesses: &[PlainAccess]) -> AddressFile<'static> {
 }
 
 fn config(line_bytes: u32, l1: (u64, u32), l2: (u64, u32), policy: Replacement) -> RunConfig {
-    let cache = |(size_bytes, ways)| CacheConfig {
+    let cache = |(size_bytes, ways)| LevelConfig {
         ways,
         replacement: policy,
-        ..CacheConfig::lru(size_bytes)
+        ..LevelConfig::lru(size_bytes)
     };
     RunConfig {
         line_bytes,
-        l1: cache(l1),
-        l2: cache(l2),
+        level: Levels::two(cache(l1), cache(l2)),
         ..RunConfig::default()
     }
 }
 
-/// Sets as lists: the newest first, for LRU and, if hits do not count as use, FIFO.
+/// Sets as lists, newest first: LRU, or FIFO if hits do not count as use.
 struct Plain {
     sets: Vec<VecDeque<u64>>,
     ways: usize,
@@ -58,7 +58,7 @@ struct Plain {
 }
 
 impl Plain {
-    fn new(cache: &CacheConfig, line_bytes: u32) -> Self {
+    fn new(cache: &LevelConfig, line_bytes: u32) -> Self {
         let sets = cache.size_bytes / u64::from(cache.ways * line_bytes);
         Self {
             sets: vec![VecDeque::new(); sets as usize],
@@ -86,10 +86,10 @@ impl Plain {
     }
 }
 
-/// Look-ups and misses by kind, and distinct lines, the plainest way.
+/// Look-ups and misses by kind, and distinct lines, computed in the plainest way.
 fn plainly(accesses: &[PlainAccess], config: &RunConfig) -> (Point, u64) {
-    let mut l1 = Plain::new(&config.l1, config.line_bytes);
-    let mut l2 = Plain::new(&config.l2, config.line_bytes);
+    let mut l1 = Plain::new(&config.level.l1, config.line_bytes);
+    let mut l2 = Plain::new(&config.level.l2, config.line_bytes);
     let (mut totals, mut misses, mut seen) = (Totals::default(), [[0; 3]; 2], HashSet::new());
     for access in accesses {
         let bytes = u64::from(config.line_bytes);
@@ -104,7 +104,17 @@ fn plainly(accesses: &[PlainAccess], config: &RunConfig) -> (Point, u64) {
             }
         }
     }
-    (Point::new(config, &totals, misses), seen.len() as u64)
+    let of_kind = |kind: usize| {
+        [0, 1].map(|level: usize| Misses {
+            lines: misses[level][kind],
+            ..Misses::default()
+        })
+    };
+    let outcome = LineOutcome {
+        misses: (0..3).map(of_kind).collect(),
+        ..LineOutcome::default()
+    };
+    (Point::new(config, &totals, outcome), seen.len() as u64)
 }
 
 #[test]
@@ -120,7 +130,7 @@ fn one_configuration_counts_as_plain_lists_do() {
         let config = config(line_bytes, l1, l2, policy);
         let outcome = replay(file(&all), &[config], KindSet::ALL).unwrap();
         let (point, unique) = plainly(&all, &config);
-        assert_eq!(outcome.points, [point]);
+        assert_eq!(outcome.points, std::slice::from_ref(&point));
         assert_eq!(outcome.unique_lines, unique);
         assert!(point.l2.line_misses() > unique && point.l2.misses.iter().all(|&m| m > 0));
     }
@@ -135,7 +145,7 @@ fn many_configurations_in_one_pass_count_as_each_alone() {
             configs.push(config(32, l1, l2, Replacement::LRU));
         }
     }
-    // The same geometry with other policies is no part of the pass.
+    // The same geometry with other policies is not part of the shared pass.
     for policy in [
         Replacement::FIFO,
         Replacement::TREE_PLRU,
@@ -147,7 +157,7 @@ fn many_configurations_in_one_pass_count_as_each_alone() {
     assert_eq!(together.points.len(), configs.len());
     for (config, point) in configs.iter().zip(&together.points) {
         let alone = replay(file(&all), &[*config], KindSet::ALL).unwrap();
-        assert_eq!(alone.points, [*point]);
+        assert_eq!(alone.points, std::slice::from_ref(point));
         assert_eq!(alone.unique_lines, together.unique_lines);
     }
     let policies: HashSet<u64> = together.points[20..]
@@ -158,7 +168,7 @@ fn many_configurations_in_one_pass_count_as_each_alone() {
 }
 
 #[test]
-fn kinds_that_are_not_wanted_are_left_out_and_counted() {
+fn kinds_that_are_not_selected_are_skipped_and_counted() {
     let all = accesses(5000);
     let config = config(32, (1024, 4), (4096, 4), Replacement::LRU);
     let wanted = KindSet::of(&[AccessKind::Read, AccessKind::Write]);
@@ -175,7 +185,7 @@ fn kinds_that_are_not_wanted_are_left_out_and_counted() {
 }
 
 #[test]
-fn lines_are_handed_over_with_all_repeats() {
+fn lines_are_passed_on_with_all_repeats() {
     let all = accesses(10_000);
     let (mut lines, mut blocks) = (Vec::new(), 0);
     let totals = for_lines(file(&all), 64, 1 << 12, |block| {

@@ -1,9 +1,9 @@
-//! The lines that are touched at all: the misses of an infinite cache.
+//! The set of accessed lines, whose size equals the misses of an infinite cache.
 
-/// Lines of a page, a bit each.
+/// Lines per page, one bit each.
 const PAGE_LINES: usize = 1 << 15;
 
-/// A set of lines. Takes memory where lines are: 4 KiB for 32,768 neighbours.
+/// A set of lines, stored in pages of 4 KiB for 32,768 neighbouring lines.
 #[derive(Default)]
 pub struct Touched {
     pages: Vec<Option<Box<[u64; PAGE_LINES / 64]>>>,

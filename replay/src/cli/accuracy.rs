@@ -4,7 +4,7 @@ use super::ConfigArgs;
 use super::addresses::two_levels_only;
 use super::subjects::Traces;
 use crate::accuracy::{Inputs, Rays, Replays, STUDIES, TraversalRow};
-use crate::config::{Mode, RunConfig};
+use crate::config::RunConfig;
 use crate::files::{check_outputs, write_atomically};
 use crate::report::accuracy::{AccuracyReport, Measured};
 use crate::result::scene_name;
@@ -74,7 +74,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     shell::Threads::default().start()?;
     let config = args.machine.resolve()?;
     ensure!(
-        config.mode == Mode::Timed && config.order == RunConfig::default().order,
+        config.is_looping() && config.order == RunConfig::default().order,
         "--mode and --order are varied here"
     );
     two_levels_only(&config, "accuracy")?;

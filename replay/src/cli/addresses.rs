@@ -127,7 +127,8 @@ pub fn two_levels_only(config: &RunConfig, place: &str) -> Result<()> {
         "{place}: expected an L1 and an L2 only, found [prefetch], [[level]], [dram], [frame] or l2.inclusion"
     );
     ensure!(
-        [config.l1, config.l2].map(|cache| (cache.sectors, cache.victim_lines)) == [(1, 0); 2],
+        [config.level.l1, config.level.l2].map(|cache| (cache.sectors, cache.victim_lines))
+            == [(1, 0); 2],
         "{place}: expected caches of whole lines without victim caches, found sectors or victim_lines"
     );
     Ok(())
@@ -176,7 +177,6 @@ impl AddressArgs {
     /// # Errors
     /// Wrong cache sizes, unreadable input.
     pub fn run(&self, path: &Path, config: &RunConfig, json: bool) -> Result<ExitCode> {
-        two_levels_only(config, "--addresses")?;
         let configs = self.configs(config)?;
         let kinds = self.input.kinds();
         let start = Instant::now();
@@ -208,8 +208,8 @@ impl AddressArgs {
         let mut configs = Vec::new();
         for (l1, l2) in parse_caches(caches)? {
             let mut config = *config;
-            config.l1.size_bytes = l1;
-            config.l2.size_bytes = l2;
+            config.level.l1.size_bytes = l1;
+            config.level.l2.size_bytes = l2;
             config.validate()?;
             configs.push(config);
         }

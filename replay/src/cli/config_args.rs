@@ -1,10 +1,11 @@
 //! Flags that set the machine; they win over `--config`, which wins over the paper's defaults.
 
+use crate::config::FrameMachine;
 use crate::config::{
     Allocation, AnisotropyModel, Assign, BetweenFrames, BlockOrder, CountBy, FilterOverride, Hsr,
-    LodFormula, Mode, Order, Prefetching, Replacement, RunConfig, TextureOrder,
+    LodFormula, Mode, Order, Prefetching, Replacement, RunConfig, TextureOrder, TmuModel,
 };
-use crate::memory::clients::FrameMachine;
+use crate::experiment::parse_config;
 use crate::memory::dram::DramPreset;
 use crate::preset::Preset;
 use crate::size::parse_bytes;
@@ -33,7 +34,7 @@ pub struct ConfigArgs {
     /// Tile order
     #[arg(long)]
     order: Option<Order>,
-    /// Cycle model, or footprints without latencies
+    /// Texture units with clocks, or footprints without latencies
     #[arg(long)]
     mode: Option<Mode>,
     /// Size of each core's L1
@@ -42,7 +43,7 @@ pub struct ConfigArgs {
     /// Size of the shared L2
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     l2: Option<u64>,
-    /// Size of an L3 below the L2, 16 ways unless a `[[level]]` of --config says otherwise
+    /// Size of an L3 below the L2, 16 ways unless --config says otherwise
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
     l3: Option<u64>,
     /// Associativity of L1 and L2
@@ -135,12 +136,15 @@ pub struct ConfigArgs {
     #[arg(long, value_parser = named::<TextureOrder>, help_heading = "Layout")]
     texture_order: Option<TextureOrder>,
 
-    /// Cycles of an L1 miss
+    /// What a thread does whose lines are not in the L1
+    #[arg(long, value_name = "MODEL", help_heading = "Texture unit")]
+    tmu: Option<TmuModel>,
+    /// Cycles that a line takes from the L2 to an L1
     #[arg(long, value_name = "CYCLES", help_heading = "Texture unit")]
-    l1_penalty: Option<u32>,
-    /// Further cycles of an L2 miss
+    l2_cycles: Option<u32>,
+    /// Cycles that a line takes from memory to the last level
     #[arg(long, value_name = "CYCLES", help_heading = "Texture unit")]
-    l2_penalty: Option<u32>,
+    memory_cycles: Option<u32>,
     /// Cycles that a thread which missed takes to be back at the first stage
     #[arg(long, value_name = "CYCLES", help_heading = "Texture unit")]
     loop_cycles: Option<u32>,
@@ -200,8 +204,8 @@ impl ConfigArgs {
     fn resolve_file_over(&self, defaults: RunConfig) -> Result<RunConfig> {
         let mut config = match &self.config {
             None => defaults,
-            Some(path) => toml::from_str(&shell::read_settings(path)?)
-                .map_err(|e| anyhow!("{}: {}", path.display(), e.to_string().trim()))?,
+            Some(path) => parse_config(&shell::read_settings(path)?)
+                .map_err(|error| anyhow!("{}: {error}", path.display()))?,
         };
         self.apply(&mut config)?;
         config.validate()?;
@@ -222,9 +226,6 @@ impl ConfigArgs {
             ("--count-by", self.count_by.is_some()),
             ("--tile-px", self.tile_px.is_some()),
             ("--hsr", self.hsr.is_some()),
-            ("--l3", self.l3.is_some()),
-            ("--prefetch", self.prefetch.is_some()),
-            ("--dram", self.dram.is_some()),
             ("--frame", self.frame.is_some()),
             ("--filter", self.filter.is_some()),
             ("--lod", self.lod.is_some()),
@@ -237,8 +238,9 @@ impl ConfigArgs {
             ("--shadow-map-order", self.shadow_map_order.is_some()),
             ("--base-align", self.base_align.is_some()),
             ("--texture-order", self.texture_order.is_some()),
-            ("--l1-penalty", self.l1_penalty.is_some()),
-            ("--l2-penalty", self.l2_penalty.is_some()),
+            ("--tmu", self.tmu.is_some()),
+            ("--l2-cycles", self.l2_cycles.is_some()),
+            ("--memory-cycles", self.memory_cycles.is_some()),
             ("--loop-cycles", self.loop_cycles.is_some()),
             ("--tmu-threads", self.tmu_threads.is_some()),
             ("--retry-footprints", self.retry_footprints.is_some()),
@@ -264,12 +266,12 @@ impl ConfigArgs {
     pub fn apply(&self, config: &mut RunConfig) -> Result<()> {
         set(&mut config.order, self.order);
         set(&mut config.mode, self.mode);
-        set(&mut config.l1.size_bytes, self.l1);
-        set(&mut config.l2.size_bytes, self.l2);
-        set(&mut config.l1.ways, self.l1_ways.or(self.ways));
-        set(&mut config.l2.ways, self.l2_ways.or(self.ways));
-        set(&mut config.l1.replacement, self.replacement);
-        set(&mut config.l2.replacement, self.replacement);
+        set(&mut config.level.l1.size_bytes, self.l1);
+        set(&mut config.level.l2.size_bytes, self.l2);
+        set(&mut config.level.l1.ways, self.l1_ways.or(self.ways));
+        set(&mut config.level.l2.ways, self.l2_ways.or(self.ways));
+        set(&mut config.level.l1.replacement, self.replacement);
+        set(&mut config.level.l2.replacement, self.replacement);
         if let Some(line) = self.line {
             config.line_bytes = u32::try_from(line).context("--line")?;
         }
@@ -281,7 +283,7 @@ impl ConfigArgs {
         set(&mut config.hsr, self.hsr);
         set(&mut config.between_frames, self.between_frames);
         if let Some(size_bytes) = self.l3 {
-            config.level.l3(size_bytes);
+            config.level.set_l3(size_bytes);
         }
         if let Some(prefetcher) = self.prefetch {
             config.prefetch.get_or_insert_default().prefetcher = prefetcher;
@@ -303,8 +305,9 @@ impl ConfigArgs {
         set(&mut config.layout.shadow_map_order, self.shadow_map_order);
         set(&mut config.layout.base_align_bytes, self.base_align);
         set(&mut config.layout.texture_order, self.texture_order);
-        set(&mut config.tmu.l1_penalty_cycles, self.l1_penalty);
-        set(&mut config.tmu.l2_penalty_cycles, self.l2_penalty);
+        set(&mut config.tmu.model, self.tmu);
+        set(&mut config.level.l2.hit_cycles, self.l2_cycles);
+        set(&mut config.memory_cycles, self.memory_cycles);
         set(&mut config.tmu.loop_cycles, self.loop_cycles);
         set(&mut config.tmu.threads, self.tmu_threads);
         set(&mut config.tmu.retry_footprints, self.retry_footprints);

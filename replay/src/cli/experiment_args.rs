@@ -2,7 +2,7 @@
 
 use super::ConfigArgs;
 use super::subjects::Traces;
-use crate::config::{Mode, Order, RunConfig};
+use crate::config::{Order, RunConfig};
 use crate::experiment::{self, Plan, Subject};
 use crate::files::{self, write_atomically};
 use crate::paper::{self, z2};
@@ -64,7 +64,8 @@ impl ExperimentArgs {
             "--order is varied here; use --orders"
         );
         ensure!(
-            (base.l1.size_bytes, base.l2.size_bytes) == (usual.l1.size_bytes, usual.l2.size_bytes),
+            (base.level.l1.size_bytes, base.level.l2.size_bytes)
+                == (usual.level.l1.size_bytes, usual.level.l2.size_bytes),
             "--l1 and --l2 are varied here; use --caches"
         );
         let images = self.images.iter().map(|image| {
@@ -79,7 +80,7 @@ impl ExperimentArgs {
         let mut plan = Plan::paper(base, &caches, &parse_orders(&self.orders)?, functional)?;
         if let Some(preset) = self.machine.preset() {
             ensure!(
-                base.mode == Mode::Timed,
+                base.is_looping(),
                 "--preset: it stands beside the timed model; leave out --mode"
             );
             plan = plan.beside(preset, self.machine.resolve()?)?;

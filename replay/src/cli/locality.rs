@@ -26,7 +26,7 @@ const USUAL_ORDERS: &str = "morton,z2-lrta,z2-sta,z2-sta-merge";
   replay locality c.textrace --orders morton,z2-sta --l1 16KiB --json
   replay locality c.textrace --csv tables
   replay locality --addresses gcc.din.gz --l1 32KiB --l2 256KiB --line 64
-docs/locality.md defines every figure.")]
+docs/models/locality.md defines every figure.")]
 pub struct Args {
     /// Texture traces
     #[arg(

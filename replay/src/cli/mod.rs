@@ -26,7 +26,7 @@ pub mod validate;
 
 pub use config_args::ConfigArgs;
 
-use crate::config::{Mode, RunConfig};
+use crate::config::{RunConfig, TmuModel};
 use crate::experiment::Plan;
 use crate::preset::Preset;
 use crate::result::TraceId;
@@ -133,13 +133,13 @@ pub fn open_textrace(path: &Path) -> Result<(Textrace, TraceId)> {
 /// Warns where bytes of the first-miss model will be printed that do not belong to the Z2 paper's machine.
 fn warn_of_first_miss_bytes(plan: &Plan) {
     let bare = |config: &RunConfig| {
-        config.mode == Mode::FirstMiss && Preset::Z2_PAPER.over(*config) != *config
+        config.tmu_model() == Some(TmuModel::FirstMiss) && Preset::Z2_PAPER.over(*config) != *config
     };
     if plan.points.iter().any(|point| bare(&point.config)) {
         shell::warn(
-            "mode first-miss without --preset z2-paper: external bytes count every fetch from memory, also of lines that \
+            "--tmu first-miss without --preset z2-paper: external bytes count every fetch from memory, also of lines that \
              were replaced before their waiting thread came back for them, up to several times the memory traffic of \
-             --mode timed; use --mode timed for memory traffic",
+             --tmu looping; use --tmu looping for memory traffic",
         );
     }
 }

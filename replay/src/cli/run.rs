@@ -3,11 +3,11 @@
 use super::ConfigArgs;
 use super::addresses::AddressArgs;
 use super::subjects::Traces;
-use crate::config::Mode;
+use crate::config::{Mode, TmuModel};
 use crate::experiment::{self, Plan};
 use crate::files;
 use crate::report::run as report;
-use anyhow::{Result, ensure};
+use anyhow::{Result, bail, ensure};
 use shell::Output;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -41,6 +41,9 @@ pub struct Args {
     /// Also write which core works on which tiles when, for ui.perfetto.dev (timed mode)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["addresses", "compare_modes", "print_config"])]
     timeline: Option<PathBuf>,
+    /// Rendered picture whose tiles say how far colour is compressed without loss (with --frame, tile-based machines)
+    #[arg(long, value_name = "FILE", conflicts_with = "addresses")]
+    picture: Option<PathBuf>,
     /// Replay in both modes and print the difference
     #[arg(long, conflicts_with_all = ["mode", "preset", "addresses"])]
     compare_modes: bool,
@@ -74,17 +77,31 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     config.tile_maps |= args.tiles;
     config.timeline = args.timeline.is_some();
     ensure!(
-        !config.timeline || config.mode == Mode::Timed,
-        "--timeline: expected --mode timed: only there time passes as on the texture units"
+        !config.timeline || config.is_looping(),
+        "--timeline: expected --mode timed --tmu looping: only there time passes as on the texture units"
     );
+    if let Some(picture) = &args.picture {
+        let Some(frame) = &mut config.frame else {
+            bail!("--picture: only with --frame");
+        };
+        let rgb = crate::report::picture::read(picture)?;
+        frame.color_compressed_permille = crate::access::compressed_permille(
+            rgb.as_raw(),
+            rgb.width() as usize,
+            config.tile_px,
+            frame.line_bytes,
+        );
+        config.validate()?;
+    }
     let Some(path) = args.trace.clone().filter(|_| !args.print_config) else {
         super::print(&toml::to_string(&config)?)?;
         return Ok(ExitCode::SUCCESS);
     };
     if args.compare_modes {
-        config.mode = Mode::Timed;
+        (config.mode, config.tmu.model) = (Mode::Timed, TmuModel::Looping);
     }
     let inputs = std::iter::once(path.as_path()).chain(args.machine.file());
+    let inputs = inputs.chain(args.picture.as_deref());
     let prints = files::check_outputs(&outputs(args), inputs)?;
     let plan = Plan::single(config, args.compare_modes)?;
     args.threads.start()?;

@@ -233,7 +233,7 @@ impl FolderTraces {
 
     /// Replays every trace in every order.
     fn replay(&self, config: &RunConfig, orders: &[Order]) -> Result<Vec<Vec<RowCaches>>> {
-        let caches_bytes = [(config.l1.size_bytes, config.l2.size_bytes)];
+        let caches_bytes = [(config.level.l1.size_bytes, config.level.l2.size_bytes)];
         let plan = Plan::paper(*config, &caches_bytes, orders, false)?;
         let subjects = self.traces.subjects();
         let replays = (subjects.len() * (plan.points.len() + 1)) as u64;

@@ -1,20 +1,20 @@
-//! Why two captures cannot be held against each other.
+//! The error for captures that cannot be compared.
 
 use serde::Serialize;
 
-/// What the captures do not have in common.
+/// A property that the captures do not share.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what}: expected the same in both traces, found {left} and {right}")]
 pub struct NotComparable {
-    /// Which part of the tables.
+    /// The property.
     pub what: String,
-    /// The first trace's.
+    /// Its value in the first trace.
     pub left: String,
-    /// The second one's.
+    /// Its value in the second trace.
     pub right: String,
 }
 
-/// Refuses what differs.
+/// Fails if the values differ.
 pub fn same<T: PartialEq + Serialize>(
     what: impl FnOnce() -> String,
     left: &T,
@@ -30,7 +30,7 @@ pub fn same<T: PartialEq + Serialize>(
     })
 }
 
-/// A value as the tables' JSON has it.
+/// A value in the JSON form of the tables.
 fn shown(value: &impl Serialize) -> String {
     serde_json::to_string(value).map_or_else(
         |_| "a value that JSON cannot hold".to_owned(),

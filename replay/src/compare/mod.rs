@@ -1,8 +1,8 @@
-//! How two captures of the same views differ, fragment by fragment.
+//! Compares two captures of the same views, fragment by fragment.
 //!
-//! A fragment is a lane of a quad of a primitive; primitives have the same numbers in both. What is
-//! in both is held against each other: texture coordinates, levels of detail and footprints. What
-//! that does to caches is the replay's to say.
+//! A fragment is a lane of a quad of a primitive; both captures number primitives alike. Fragments in both
+//! are compared by texture coordinates, levels of detail and footprints. The effect on caches is measured
+//! by replays.
 
 mod fault;
 mod partners;
@@ -25,61 +25,61 @@ use rayon::prelude::*;
 use serde::Serialize;
 use tile::Comparer;
 
-/// Why there is no comparison.
+/// Reasons why captures cannot be compared.
 #[derive(Debug, thiserror::Error)]
 pub enum CompareError {
-    /// The captures do not show the same.
+    /// The captures do not show the same scene and views.
     #[error(transparent)]
     NotComparable(#[from] NotComparable),
-    /// A trace cannot be read.
+    /// An unreadable trace.
     #[error(transparent)]
     Trace(#[from] StreamError),
 }
 
-/// A part of the fragments: a material's, or those of opaque draws.
+/// A class of fragments: those of a material, or of opaque draws.
 #[derive(Clone, Debug, Serialize)]
 pub struct Class {
-    /// What they have in common.
+    /// Name of the class.
     pub name: String,
-    /// How they differ.
+    /// Differences in the class.
     #[serde(flatten)]
     pub tally: Tally,
 }
 
-/// How two captures differ.
+/// The result of a comparison.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// All fragments.
     pub all: Tally,
-    /// Opaque draws and others, where the first trace tells them apart.
+    /// Opaque draws and others, if the first trace records which are opaque.
     pub by_opacity: Vec<Class>,
     /// By material, in the order of the first trace's draws.
     pub by_material: Vec<Class>,
-    /// Tiles of which any record differs.
+    /// Tiles with at least one different record.
     pub tiles_that_differ: u64,
-    /// Tiles of the views.
+    /// Number of tiles of the views.
     pub tiles: u64,
 }
 
-/// Whether two captures show the same views of the same textured triangles.
+/// Checks that two captures show the same views of the same textured triangles.
 ///
 /// # Errors
-/// What they do not have in common.
+/// The first property that they do not share.
 pub fn comparable(tables: [&Tables; 2]) -> Result<(), NotComparable> {
     Partners::new(tables).map(drop)
 }
 
-/// Compares what a replay of two captures shades: their fragments after the configuration's
-/// hidden-surface removal, sampled as it says.
+/// Compares the fragments that a replay of two captures shades, after the configuration's hidden-surface
+/// removal and with its sampling.
 ///
 /// # Errors
-/// Captures that do not show the same views of the same textured triangles; a removal that a trace
-/// does not hold the fragments for; a tile that cannot be read.
+/// Captures that do not show the same views of the same textured triangles; a trace without the fragments
+/// that the removal needs; an unreadable tile.
 pub fn compare(
     traces: [&dyn TileSource; 2],
     config: &RunConfig,
 ) -> Result<Comparison, CompareError> {
-    /// Tiles that a thread compares at a time.
+    /// Tiles that a thread compares per task.
     const CHUNK: usize = 64;
     let partners = Partners::new(traces.map(TileSource::tables))?;
     let [a, b] = traces;
@@ -119,7 +119,7 @@ pub fn compare(
     })
 }
 
-/// Draws of one name together, in the order in which names come up.
+/// Sums over draws with the same name, in order of first occurrence.
 fn classes<'n>(by_draw: &[Tally], name: impl Fn(usize) -> Option<&'n str>) -> Vec<Class> {
     let mut classes: Vec<Class> = Vec::new();
     for (draw, tally) in by_draw.iter().enumerate() {

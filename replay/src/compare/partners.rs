@@ -1,13 +1,13 @@
-//! Which draw of one capture is which of the other, and whether the captures show the same at all.
+//! Matches the draws of two captures, and checks that both show the same scene.
 
 use super::fault::{NotComparable, same};
 use formats::textrace::{Draw, Pass, Tables, UvGroup};
 use formats::texture::Sampler;
 
-/// The draws of both captures, by their primitives.
+/// The draws of both captures, matched by their primitives.
 pub struct Partners<'a> {
     tables: [&'a Tables; 2],
-    /// First primitive and draw, ascending, by capture.
+    /// First primitive and index of each draw, ascending, by capture.
     starts: [Vec<(u32, u32)>; 2],
     opaque: Option<Vec<bool>>,
 }
@@ -16,7 +16,7 @@ impl<'a> Partners<'a> {
     /// Checks that the captures show the same views of the same triangles and textures.
     ///
     /// # Errors
-    /// What they do not have in common.
+    /// The first property that they do not share.
     pub fn new(tables: [&'a Tables; 2]) -> Result<Self, NotComparable> {
         let [a, b] = tables;
         same(
@@ -70,7 +70,7 @@ impl<'a> Partners<'a> {
         })
     }
 
-    /// Draws of the first capture.
+    /// Number of draws of the first capture.
     pub fn count(&self) -> usize {
         self.tables[0].draws.len().max(1)
     }
@@ -81,7 +81,7 @@ impl<'a> Partners<'a> {
         draw.map_or("", |draw| draw.material.as_str())
     }
 
-    /// Whether a draw is opaque, where the capture tells.
+    /// Whether a draw is opaque, if the capture records it.
     pub fn opacity(&self, draw: usize) -> Option<&'static str> {
         let opaque = self.opaque.as_ref()?.get(draw)?;
         Some(if *opaque {
@@ -91,7 +91,7 @@ impl<'a> Partners<'a> {
         })
     }
 
-    /// The first capture's draw that has a primitive.
+    /// The draw of the first capture that contains a primitive.
     pub fn draw_of(&self, primitive: u32) -> usize {
         let starts = &self.starts[0];
         let after = starts.partition_point(|(first, _)| *first <= primitive);
@@ -99,7 +99,7 @@ impl<'a> Partners<'a> {
         at.map_or(0, |(_, draw)| *draw as usize)
     }
 
-    /// The groups of two draws' records of one number, if they sample the same.
+    /// The uv group with this number in two draws, if both sample the same textures.
     pub fn group(&self, draws: [u32; 2], number: u8) -> Option<&'a UvGroup> {
         let group = |side: usize| -> Option<&'a UvGroup> {
             let draw: &Draw = self.tables[side].draws.get(draws[side] as usize)?;

@@ -1,27 +1,27 @@
-//! How a difference is spread over what is compared: mean, 99th percentile, largest.
+//! The distribution of a difference: mean, 99th percentile, maximum.
 
 use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 
-/// Differences in whole steps. Mean and largest are exact; percentiles beyond [`EXACT_STEPS`] are
-/// rounded up by less than a 64th.
+/// Differences in whole steps. Mean and maximum are exact; percentiles beyond [`EXACT_STEPS`] are rounded
+/// up by less than 1/64.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Spread {
     steps_per_unit: u32,
     count: u64,
     sum: u128,
     largest: u64,
-    /// Differences that are not zero, by their upper bound in steps.
+    /// Number of non-zero differences, by the upper bound of their bin in steps.
     bins: BTreeMap<u64, u64>,
 }
 
-/// Differences up to here have a bin each.
+/// Differences up to this one have their own bins.
 const EXACT_STEPS: u64 = 1 << 13;
 
 /// Significant bits of larger bins.
 const BITS: u32 = 7;
 
-/// The bin of a difference: its largest value.
+/// The bin of a difference: the largest value in it.
 fn bin(steps: u64) -> u64 {
     if steps <= EXACT_STEPS {
         return steps;
@@ -31,7 +31,7 @@ fn bin(steps: u64) -> u64 {
 }
 
 impl Spread {
-    /// Nothing compared; a unit has so many steps.
+    /// An empty distribution with this many steps per unit.
     #[must_use]
     pub fn new(steps_per_unit: u32) -> Self {
         Self {
@@ -43,7 +43,7 @@ impl Spread {
         }
     }
 
-    /// Adds `times` differences of so many steps.
+    /// Adds a difference `times` times.
     #[inline]
     pub fn record(&mut self, steps: u64, times: u64) {
         self.count += times;
@@ -54,7 +54,7 @@ impl Spread {
         }
     }
 
-    /// Adds what another one holds.
+    /// Adds another distribution.
     pub fn add(&mut self, other: &Self) {
         self.count += other.count;
         self.sum += other.sum;
@@ -64,7 +64,7 @@ impl Spread {
         }
     }
 
-    /// How many were compared.
+    /// Number of differences.
     #[must_use]
     pub fn count(&self) -> u64 {
         self.count
@@ -76,13 +76,13 @@ impl Spread {
         self.units(self.sum as f64 / self.count.max(1) as f64)
     }
 
-    /// Largest, in units.
+    /// Maximum, in units.
     #[must_use]
     pub fn largest(&self) -> f64 {
         self.units(self.largest as f64)
     }
 
-    /// The least value that so many percent do not exceed, in units.
+    /// The smallest value that this percentage of differences does not exceed, in units.
     #[must_use]
     pub fn percentile(&self, percent: f64) -> f64 {
         let wanted = (self.count as f64 * percent / 100.0).ceil() as u64;

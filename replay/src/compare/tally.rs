@@ -1,32 +1,30 @@
-//! What differs in a part of the fragments.
+//! Counts of differences in a class of fragments.
 
 use super::spread::Spread;
 use formats::textrace::SUBTEXELS;
 use serde::Serialize;
 
-/// Steps of a level of detail.
+/// Steps per level of detail.
 pub const LOD_STEPS: u32 = 1 << 16;
 
-/// Differences of a part of the fragments.
+/// Differences in a class of fragments.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Tally {
-    /// Fragments that both captures have.
+    /// Fragments in both captures.
     pub fragments_in_both: u64,
-    /// Fragments that only the first one has.
+    /// Fragments in the first capture only.
     pub fragments_only_in_a: u64,
-    /// Fragments that only the second one has.
+    /// Fragments in the second capture only.
     pub fragments_only_in_b: u64,
-    /// Coordinates that only one capture has of a fragment that is in both, or that sample other
-    /// textures.
+    /// Texture coordinates of common fragments that only one capture has, or that sample other textures.
     pub lanes_sampled_differently: u64,
-    /// Distance of the texture coordinates, the larger of both axes, in texels of the largest texture
-    /// that is sampled there.
+    /// Distance of texture coordinates (the larger of both axes), in texels of the largest texture sampled with them.
     pub uv_texels: Spread,
-    /// Difference of the exact level of detail, in levels, a record each.
+    /// Difference of the exact level of detail in levels, per record.
     pub lod_levels: Spread,
-    /// Footprints of the fragments in both.
+    /// Footprints of the common fragments.
     pub footprints: u64,
-    /// Footprints that the other capture's fragment has not.
+    /// Footprints that the other capture's fragment does not have.
     pub footprints_that_differ: u64,
 }
 
@@ -46,7 +44,7 @@ impl Default for Tally {
 }
 
 impl Tally {
-    /// Adds another part.
+    /// Adds another class.
     pub fn add(&mut self, other: &Self) {
         self.fragments_in_both += other.fragments_in_both;
         self.fragments_only_in_a += other.fragments_only_in_a;
@@ -58,7 +56,7 @@ impl Tally {
         self.footprints_that_differ += other.footprints_that_differ;
     }
 
-    /// Fragments of either.
+    /// Fragments in at least one capture.
     #[must_use]
     pub fn fragments_in_either(&self) -> u64 {
         self.fragments_in_both + self.fragments_only_in_a + self.fragments_only_in_b
@@ -70,7 +68,7 @@ impl Tally {
         self.fragments_in_either() == 0
     }
 
-    /// Fragments in both over fragments in either, percent.
+    /// Common fragments over fragments in at least one capture, percent.
     #[must_use]
     pub fn intersection_over_union_pct(&self) -> f64 {
         match self.fragments_in_either() {
@@ -79,7 +77,7 @@ impl Tally {
         }
     }
 
-    /// Footprints that differ over footprints, percent.
+    /// Different footprints over footprints, percent.
     #[must_use]
     pub fn footprints_that_differ_pct(&self) -> f64 {
         100.0 * self.footprints_that_differ as f64 / self.footprints.max(1) as f64

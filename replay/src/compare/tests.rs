@@ -1,4 +1,4 @@
-//! An altered capture whose differences are known exactly.
+//! Compares altered captures with known differences.
 
 use super::*;
 use crate::config::{Hsr, Mode};
@@ -50,7 +50,7 @@ fn a_capture_does_not_differ_from_itself() {
         .map(|record| u64::from(record.mask.count_ones()))
         .sum();
     assert_eq!(found.all.fragments_in_both, lanes);
-    // Two textures, and two levels each or one.
+    // Two textures with one or two levels each.
     assert!(found.all.footprints > 2 * lanes && found.all.footprints <= 4 * lanes);
     assert_eq!(found.all.uv_texels.count(), lanes);
     let differences = [
@@ -88,14 +88,14 @@ fn fragments_are_those_that_a_replay_with_the_same_removal_shades() {
     };
     let (all, seen) = (with(Hsr::EarlyZ), with(Hsr::Deferred));
     assert!(seen.fragments_in_both < all.fragments_in_both);
-    // What lies behind another opaque fragment is shaded by neither replay.
+    // Neither replay shades fragments behind another opaque fragment.
     assert_eq!(
         (all.uv_texels.largest(), seen.uv_texels.largest()),
         (5.0, 0.0)
     );
 }
 
-/// A quad of the right eye that a later one covers: its tile and its record.
+/// The tile and the record of a quad of the right eye that a later one covers.
 fn hidden_quad(trace: &MemoryTrace) -> (usize, usize) {
     let find = |(tile, t): (usize, &formats::textrace::Tile)| {
         let covered = |at: usize| {
@@ -159,7 +159,7 @@ fn two_records_of_a_quad_are_what_one_with_all_their_lanes_is() {
     let itself = compared(&a, &a).all;
     for found in [compared(&a, &b), compared(&b, &a)] {
         assert_eq!(found.tiles_that_differ, 1);
-        // Levels of detail alone are counted by pairs of records.
+        // Levels of detail are counted per pair of records, so they differ.
         let lod_levels = itself.lod_levels.clone();
         assert_eq!(
             Tally {
@@ -188,8 +188,8 @@ fn moved_coordinates_are_measured_in_texels() {
     let a = small();
     let mut b = a.clone();
     let (tile, record) = full_quad(&b);
-    // By three and a half texels of level 0: no footprint of the four lanes on any level that is
-    // read stays the same only where levels are coarse; at level 0 all differ.
+    // Moves by three and a half texels of level 0. All footprints on level 0 change; on coarse levels some
+    // may stay the same.
     let moved = &mut b.tiles[1][tile].records[record];
     moved.uv[1] += 7 * SUBTEXELS / 2;
     moved.uv[0] -= SUBTEXELS / 4;
@@ -247,7 +247,7 @@ fn another_texture_is_another_sample() {
 }
 
 #[test]
-fn what_does_not_show_the_same_is_refused_by_name() {
+fn captures_of_different_views_are_refused_by_property() {
     let text = refused(|b| b.tables.passes[1].size_px = [1, 1]);
     assert_eq!(
         text,

@@ -1,4 +1,4 @@
-//! The same tile of two captures.
+//! Compares a tile of two captures.
 
 use super::partners::Partners;
 use super::tally::{LOD_STEPS, Tally};
@@ -11,10 +11,10 @@ use formats::textrace::{
 };
 use std::cmp::Ordering;
 
-/// Levels of detail below this differ in nothing: the finest level is magnified.
+/// Smaller levels of detail are equivalent, because the finest level is magnified.
 const LEAST_LOD: f32 = -16.0;
 
-/// Compares tile after tile.
+/// Compares tiles.
 pub struct Comparer<'a> {
     traces: [&'a dyn TileSource; 2],
     partners: &'a Partners<'a>,
@@ -25,7 +25,7 @@ pub struct Comparer<'a> {
     footprints: [Vec<Footprint>; 2],
 }
 
-/// A primitive's quads in a tile: its draw and, quad by quad, its records.
+/// A primitive's quads in a tile, each as its records.
 fn quads<'t>(tile: &'t Tile, run: &PrimitiveRun) -> Vec<&'t [QuadRecord]> {
     let records = &tile.records[run.first as usize..][..run.count as usize];
     records.chunk_by(|a, b| (a.x, a.y) == (b.x, b.y)).collect()
@@ -44,7 +44,7 @@ fn sampled(records: &[QuadRecord], group: u8) -> u8 {
     of_group.fold(0, |mask, record| mask | record.mask)
 }
 
-/// Pairs of what two ascending lists have under the same key, and what only one has.
+/// Merges two ascending lists by key: pairs under the same key, and elements of only one list.
 fn joined<'t, T>(
     lists: [&'t [T]; 2],
     key: impl Fn(&T) -> u64,
@@ -73,7 +73,7 @@ fn joined<'t, T>(
 }
 
 impl<'a> Comparer<'a> {
-    /// Nothing compared yet.
+    /// An empty comparison.
     pub fn new(
         traces: [&'a dyn TileSource; 2],
         partners: &'a Partners<'a>,
@@ -90,7 +90,7 @@ impl<'a> Comparer<'a> {
         }
     }
 
-    /// Tallies by the first capture's draws, and the number of tiles that differ.
+    /// Counts by the first capture's draws, and the number of tiles that differ.
     pub fn finish(self) -> (Vec<Tally>, u64) {
         (self.by_draw, self.tiles_that_differ)
     }
@@ -98,7 +98,7 @@ impl<'a> Comparer<'a> {
     /// Compares a tile.
     ///
     /// # Errors
-    /// It cannot be read.
+    /// An unreadable tile.
     pub fn tile(&mut self, at: TileRef) -> Result<(), StreamError> {
         let mut tiles = std::mem::take(&mut self.tiles);
         for (trace, tile) in self.traces.iter().zip(&mut tiles) {
@@ -143,7 +143,7 @@ impl<'a> Comparer<'a> {
         if both == 0 {
             return;
         }
-        // Lane by lane: what one capture has as a record may be two in the other, parts of a clipped primitive.
+        // Compared per lane, because one record in a capture may be two in the other (parts of a clipped primitive).
         let alone = |of: &[QuadRecord], other: &[QuadRecord]| -> u32 {
             let lanes = |r: &QuadRecord| r.mask & both & !sampled(other, r.group);
             of.iter().map(|r| lanes(r).count_ones()).sum()
@@ -167,7 +167,7 @@ impl<'a> Comparer<'a> {
         }
     }
 
-    /// Records of the same lanes and the same textures, with their operands.
+    /// Compares two records of the same lanes and textures, with their operands.
     fn records(
         &mut self,
         draw: usize,

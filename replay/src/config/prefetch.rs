@@ -1,16 +1,18 @@
 //! The prefetcher of the L2: the `[prefetch]` table of a configuration.
 
-use super::{ConfigError, Mode};
-pub use crate::cache::Prefetching;
+use super::{ConfigError, Mode, accept};
+pub use crate::memory::Prefetching;
 use serde::{Deserialize, Serialize};
 
-/// The `[prefetch]` table: lines that are fetched into the L2 before they are requested.
+/// The `[prefetch]` table: which lines are fetched into the L2 before they are requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PrefetchConfig {
-    /// Which lines are prefetched, and when.
+    /// The prefetching algorithm.
     pub prefetcher: Prefetching,
-    /// Lines that one request can prefetch at most (4 unless given); for `aligned-block` the lines of a block (4), for `tile-ahead` those of an item (4096).
+    /// Maximum number of lines that one request can prefetch (default 4). For `aligned-block`: the
+    /// lines of a block (4); for `next-mip`: the levels (1); for `tile-ahead`: the lines of an item
+    /// (4096).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lines: Option<u32>,
 }
@@ -25,32 +27,35 @@ impl Default for PrefetchConfig {
 }
 
 impl PrefetchConfig {
-    /// Lines that one request can prefetch at most.
+    /// Maximum number of lines that one request can prefetch.
     #[must_use]
     pub fn lines(&self) -> u32 {
         self.lines.unwrap_or_else(|| self.prefetcher.usual_lines())
     }
 
+    /// True if the prefetcher only works for textures.
+    #[must_use]
+    pub fn needs_textures(&self) -> bool {
+        self.build(16, None).needs_layout()
+    }
+
     /// Checks every value.
     ///
     /// # Errors
-    /// The first one out of range, or that `mode` does not have.
+    /// The first value that is out of range, or a prefetcher that `mode` does not support.
     pub fn check(&self, mode: Mode) -> Result<(), ConfigError> {
         let (expected, accepts) = self.prefetcher.lines_rule();
-        if !accepts(self.lines()) {
-            return Err(ConfigError::Range {
-                key: "prefetch.lines",
-                expected,
-                found: self.lines().to_string(),
-            });
-        }
-        if mode == Mode::Functional && self.build().lines_of_next_item() > 0 {
-            return Err(ConfigError::Range {
-                key: "prefetch.prefetcher",
-                expected: "one that goes by requests, where time does not pass (functional mode)",
-                found: self.prefetcher.name().to_owned(),
-            });
-        }
-        Ok(())
+        accept(
+            accepts(self.lines()),
+            "prefetch.lines",
+            expected,
+            self.lines(),
+        )?;
+        accept(
+            mode == Mode::Timed || self.build(16, None).lines_of_next_item() == 0,
+            "prefetch.prefetcher",
+            "one that goes by requests, where time does not pass (functional mode)",
+            self.prefetcher.name(),
+        )
     }
 }

@@ -1,54 +1,53 @@
-//! Many configurations of one trace: who shares what.
+//! Replays many configurations of a trace and shares work between them.
 //!
-//! Configurations of one sampling, layout and mode are a *stream*: frame by frame its lines are expanded
-//! once and read by all. Of those, LRU caches without latencies that see the same order share a
-//! *pass* ([`OnePass`]); every other configuration (another policy, timed) is a pass of its own.
+//! Configurations with the same sampling, layout and mode form a *stream*: each frame is expanded to lines
+//! once for all of them. In a stream, LRU caches without latencies that use the same order form a *group*,
+//! which is simulated in a single pass ([`OnePass`]). Every other configuration (another policy, timed) is
+//! a group of its own.
 
 use super::counts::CacheCounts;
-use super::first_miss::FirstMiss;
+use super::fast::one_pass::{LevelGeometry, OnePass, geometry};
 use super::functional::Functional;
-use super::one_pass::{LevelGeometry, OnePass, geometry};
-use super::prefetch_fifo::PrefetchFifo;
 use super::scheduler::{Stage, run_within_memory};
-use super::timed::Timed;
 use super::wave::Wave;
-use super::{Machine, ReplayError};
-use crate::cache::{Delay, Levels, MissPath, MissPathResult};
-use crate::config::{Allocation, CacheConfig, Mode, RunConfig, TmuConfig};
-use crate::result::{RunResult, Timeline, TmuResult};
-use crate::stream::{Expander, LineMemory, TileSource};
+use super::{AtOnce, Machine, ReplayError, threads};
+use crate::access::{self, FrameClients};
+use crate::config::{ConfigError, Mode, RunConfig, TmuConfig};
+use crate::memory::{Caches, Hierarchy, MissPath};
+use crate::result::{FirstLookups, MemoryResult, RunResult, Timeline, TmuResult};
+use crate::stream::{Bins, Expander, LineMemory, TileSource};
 use crate::tmu::PipelineStats;
-use crate::whole_frame;
+use formats::layout::Layout;
 use std::collections::HashMap;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
-/// Passes whose machines are kept from frame to frame; beyond them a stream is expanded again.
+/// Groups whose machines are kept from frame to frame. A stream with more groups is expanded again for the others.
 const WAVE: usize = 256;
 
-/// Configurations that share a pass at most: their counters are large, and several passes keep several cores busy.
-/// It does not depend on the number of cores, so that shards of a sweep agree.
+/// Configurations per group at most. Their counters are large, and several groups use several cores. It
+/// does not depend on the number of cores, so that all shards of a sweep form the same groups.
 const MOST_TOGETHER: usize = 256;
 
-/// What a batch of replays shared.
+/// How much work a batch of replays shared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
     /// Configurations replayed.
     pub replays: usize,
-    /// Passes over the lines of an order that answered them.
+    /// Groups, each simulated in one pass over the lines.
     pub passes: usize,
-    /// Times that a whole trace was expanded to lines.
+    /// How often a whole trace was expanded to lines.
     pub expansions: usize,
 }
 
 impl Work {
-    /// Adds another batch's.
+    /// Adds the counts of another batch.
     pub fn add(&mut self, other: &Self) {
         self.replays += other.replays;
         self.passes += other.passes;
         self.expansions += other.expansions;
     }
 
-    /// What was shared and skipped of so many points, as a line for the user.
+    /// Describes for the user what was shared and skipped among `points` points.
     #[must_use]
     pub fn summary(&self, points: usize) -> String {
         let Self {
@@ -66,22 +65,24 @@ impl Work {
     }
 }
 
-/// What a machine yields for one configuration.
+/// The counts of a machine for one configuration.
 pub struct Outcome {
-    /// What missed.
+    /// Cache misses.
     pub counts: CacheCounts,
-    /// Texture units together; none in functional mode.
+    /// Sum over texture units; none in functional mode.
     pub tmu: Option<TmuResult>,
-    /// Cycles until the last core was done; none in functional mode.
+    /// Cycles until the last core finished; none in functional mode.
     pub cycles: Option<u64>,
-    /// What was counted beside and below the L2.
-    pub path: MissPathResult,
-    /// The replay over time, where it was recorded.
+    /// First look-ups, for the model in which threads stop at their first miss.
+    pub first_lookups: Option<FirstLookups>,
+    /// Counts beside and below the L2.
+    pub memory: MemoryResult,
+    /// The replay over time, if recorded.
     pub timeline: Option<Timeline>,
 }
 
 impl Outcome {
-    /// What texture units and caches counted.
+    /// Combines the counts of texture units and caches.
     pub(super) fn timed(
         counts: CacheCounts,
         units: impl Iterator<Item = PipelineStats>,
@@ -90,6 +91,7 @@ impl Outcome {
         let mut sum = PipelineStats::default();
         units.for_each(|unit| sum.add(&unit));
         Self {
+            first_lookups: None,
             counts,
             tmu: Some(TmuResult {
                 utilization: sum.utilization(),
@@ -98,7 +100,7 @@ impl Outcome {
                 loops: sum.loops,
             }),
             cycles: Some(cycles),
-            path: MissPathResult::default(),
+            memory: MemoryResult::default(),
             timeline: None,
         }
     }
@@ -107,27 +109,28 @@ impl Outcome {
 impl From<CacheCounts> for Outcome {
     fn from(counts: CacheCounts) -> Self {
         Self {
+            first_lookups: None,
             counts,
             tmu: None,
             cycles: None,
-            path: MissPathResult::default(),
+            memory: MemoryResult::default(),
             timeline: None,
         }
     }
 }
 
-/// Configurations to replay a trace under.
+/// A trace and the configurations to replay it with.
 #[derive(Clone, Copy)]
 pub struct Job<'a> {
     /// The trace.
     pub trace: &'a dyn TileSource,
     /// The configurations.
     pub configs: &'a [RunConfig],
-    /// Called with each result and the index of its configuration, as soon as it is complete.
+    /// Called with the index of a configuration and its result as soon as that is complete.
     pub finished: &'a (dyn Fn(usize, RunResult) + Sync),
 }
 
-/// Replays `trace` under every configuration, as one job.
+/// Replays `trace` with every configuration.
 ///
 /// # Errors
 /// As [`replay_jobs`].
@@ -149,11 +152,10 @@ pub fn replay_all(
         .unwrap_or_else(|| Ok(Work::default()))
 }
 
-/// Replays all jobs, in parallel: what each shared.
+/// Replays all jobs in parallel, and returns the work that each shared.
 ///
 /// # Errors
-/// Of each job: an impossible configuration or a trace that cannot be read, with the index of the first
-/// configuration that it concerns.
+/// Per job, an impossible configuration or an unreadable trace, with the index of the first configuration affected.
 pub fn replay_jobs(
     jobs: &[Job<'_>],
     memory: &LineMemory,
@@ -172,11 +174,11 @@ pub fn replay_jobs(
         }
     }
     if jobs.len() > 1 {
-        // The smallest last, so that all threads are done at nearly the same time.
+        // Smallest last, so that all threads finish at nearly the same time.
         let records: Vec<u64> = jobs.iter().map(|job| job.trace.records()).collect();
         waves.sort_by_key(|(_, (_, job, _))| std::cmp::Reverse(records[*job]));
     }
-    // A stream's tiles are expanded by all threads: what has fewer leaves some of them idle.
+    // All threads expand the tiles of a stream. A stream with fewer tiles leaves some threads idle.
     let enough = Expander::CHUNK * rayon::current_num_threads();
     let failed = Mutex::new(Vec::new());
     let run = |(index, job, passes): (usize, usize, Vec<Pass<'_>>),
@@ -194,7 +196,7 @@ pub fn replay_jobs(
     };
     run_within_memory(waves, enough, || memory.half_is_left(), run);
     let mut failed = failed.into_inner().unwrap_or_else(PoisonError::into_inner);
-    // Each job reports its first failure.
+    // Each job reports its first error.
     failed.sort_by_key(|(index, ..)| std::cmp::Reverse(*index));
     for (_, job, first, error) in failed {
         answers[job] = Err((first, error));
@@ -202,12 +204,12 @@ pub fn replay_jobs(
     answers
 }
 
-/// What is shared of a job so far: nothing.
+/// Checks the configurations of a job.
 fn checked(job: &Job<'_>) -> Result<Work, (usize, ReplayError)> {
     for (index, config) in job.configs.iter().enumerate() {
         config.validate().map_err(|error| (index, error.into()))?;
         if config.frame.is_some() && job.trace.geometry().is_none() {
-            return Err((index, whole_frame::missing().into()));
+            return Err((index, access::missing().into()));
         }
     }
     Ok(Work {
@@ -216,7 +218,7 @@ fn checked(job: &Job<'_>) -> Result<Work, (usize, ReplayError)> {
     })
 }
 
-/// The passes of a job, those of a wave together.
+/// The groups of a job, by wave.
 fn of_job<'a>(job: &Job<'a>) -> Vec<Vec<Pass<'a>>> {
     let configs = job.configs;
     let streams = grouped(0..configs.len(), |&index| stream_key(&configs[index]));
@@ -232,7 +234,7 @@ fn of_job<'a>(job: &Job<'a>) -> Vec<Vec<Pass<'a>>> {
     streams.into_iter().flat_map(waves).collect()
 }
 
-/// Tiles of the largest frame.
+/// Number of tiles in the largest frame.
 fn tiles_of_a_frame(trace: &dyn TileSource) -> usize {
     let mut tiles: HashMap<u32, usize> = HashMap::new();
     for pass in &trace.tables().passes {
@@ -241,7 +243,7 @@ fn tiles_of_a_frame(trace: &dyn TileSource) -> usize {
     tiles.into_values().max().unwrap_or(0)
 }
 
-/// Who shares what: by stream, the passes that its configurations, by index, are answered in.
+/// The groups, by stream. A group lists indices of configurations.
 #[must_use]
 pub fn sharing(configs: &[RunConfig]) -> Vec<Vec<Vec<usize>>> {
     let streams = grouped(0..configs.len(), |&index| stream_key(&configs[index]));
@@ -252,7 +254,7 @@ pub fn sharing(configs: &[RunConfig]) -> Vec<Vec<Vec<usize>>> {
         .collect()
 }
 
-/// Groups of equal keys, each in the order of its first member.
+/// Groups the indices by equal keys, in order of first member.
 fn grouped(
     indexes: impl IntoIterator<Item = usize>,
     key: impl Fn(&usize) -> RunConfig,
@@ -270,9 +272,10 @@ fn grouped(
     groups
 }
 
-/// The configuration without what the lines that are listed do not depend on.
+/// The configuration reduced to the settings that determine the stream.
 fn stream_key(config: &RunConfig) -> RunConfig {
     let usual = RunConfig::default();
+    let model = config.tmu_model().unwrap_or_default();
     RunConfig {
         order: usual.order,
         seed: usual.seed,
@@ -280,35 +283,37 @@ fn stream_key(config: &RunConfig) -> RunConfig {
         assign: usual.assign,
         between_frames: usual.between_frames,
         prefetch: None,
-        level: usual.level,
         dram: None,
+        tmu: TmuConfig { model, ..usual.tmu },
         ..pass_key(config)
     }
 }
 
-/// The configuration without what LRU caches that share a pass may differ in.
+/// The configuration reduced to the settings that must agree within a group.
 fn pass_key(config: &RunConfig) -> RunConfig {
-    const ANY: CacheConfig = CacheConfig::lru(0);
+    let usual = RunConfig::default();
     RunConfig {
-        l1: ANY,
-        l2: ANY,
-        tmu: TmuConfig::default(),
+        level: usual.level,
+        memory_cycles: usual.memory_cycles,
+        tmu: usual.tmu,
         tile_maps: false,
         frame: None,
         ..*config
     }
 }
 
-/// Configurations, by index, that one machine answers together.
+/// A group of configurations that one machine simulates.
 pub(super) struct Pass<'a> {
     pub(super) points: Vec<usize>,
     configs: &'a [RunConfig],
-    /// Built when it first runs.
+    /// Built on first use.
     pub(super) machine: Option<Box<dyn Machine>>,
+    /// The other clients of memory, if a configuration has a `[frame]` table.
+    pub(super) clients: Option<FrameClients<'a>>,
 }
 
-/// The passes of a stream's configurations.
-fn passes(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Pass<'_>> {
+/// Divides the configurations of a stream into groups.
+pub(super) fn passes(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Pass<'_>> {
     let shared = |index: &usize| {
         let config = &configs[*index];
         shares_passes(config) && geometry(config).is_some()
@@ -316,7 +321,7 @@ fn passes(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Pass<'_>> {
     let (together, alone): (Vec<usize>, Vec<usize>) = stream.into_iter().partition(shared);
     let mut groups: Vec<Vec<usize>> = alone.into_iter().map(|index| vec![index]).collect();
     for mut group in grouped(together, |&index| pass_key(&configs[index])) {
-        // Neighbours share most.
+        // Similar geometries share most work.
         group.sort_by_key(|&index| geometry(&configs[index]));
         groups.extend(group.chunks(MOST_TOGETHER).map(<[usize]>::to_vec));
     }
@@ -325,12 +330,13 @@ fn passes(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Pass<'_>> {
         points,
         configs,
         machine: None,
+        clients: None,
     };
     groups.into_iter().map(pass).collect()
 }
 
-impl Pass<'_> {
-    /// What all its configurations agree on.
+impl<'a> Pass<'a> {
+    /// The settings that all configurations of the group share.
     pub(super) fn config(&self) -> &RunConfig {
         &self.configs[self.points[0]]
     }
@@ -340,10 +346,10 @@ impl Pass<'_> {
         self.points.iter().map(of).collect()
     }
 
-    /// The fewest sets of an L1, if all are LRU caches in which a footprint's lines cannot crowd each other
-    /// out, and in which no other level invalidates them: its repeats find all of them then.
+    /// The fewest sets of any L1, if repeated footprints always hit: all caches are LRU, the lines of a
+    /// footprint cannot evict each other, and no other level invalidates them.
     pub(super) fn least_sets(&self) -> Option<u32> {
-        if self.config().levels_depend_on_evictions() {
+        if self.config().level.depend_on_evictions() {
             return None;
         }
         let l1 = self.geometries()?.into_iter().map(|(l1, _)| l1);
@@ -351,61 +357,66 @@ impl Pass<'_> {
         sets.min().flatten()
     }
 
+    /// The clients other than the texture units.
+    pub(super) fn build_clients(
+        &mut self,
+        source: &'a dyn TileSource,
+        expander: &Expander<'_>,
+    ) -> Result<(), ReplayError> {
+        let config = *self.config();
+        if let Some(machine) = config.frame {
+            let texture_bytes = expander.lines() * u64::from(config.line_bytes);
+            let clients = FrameClients::new(source, &config, machine, texture_bytes)?;
+            self.clients = Some(clients);
+        }
+        Ok(())
+    }
+
     pub(super) fn build(&self, expander: &Expander<'_>) -> Result<Box<dyn Machine>, ReplayError> {
         let config = self.config();
-        let bins = expander.bins();
-        let counts = || CacheCounts::new(bins, config.tile_maps);
-        let geometries = self.geometries().filter(|_| shares_passes(config));
-        if let Some(geometries) = geometries {
+        let layout = config.prefetch.and_then(|_| expander.layout(config));
+        let layout = layout.as_ref();
+        if config.mode == Mode::Timed {
+            let counts = CacheCounts::new(expander.bins(), config.tile_maps);
+            return Ok(threads::machine(config, counts, layout)?);
+        }
+        Ok(self.build_at_once(expander.bins(), layout)?)
+    }
+
+    /// The machine of configurations whose caches fill immediately.
+    pub(super) fn build_at_once(
+        &self,
+        bins: &Bins,
+        layout: Option<&Arc<Layout>>,
+    ) -> Result<Box<dyn AtOnce>, ConfigError> {
+        let config = self.config();
+        if shares_passes(config)
+            && let Some(geometries) = self.geometries()
+        {
             let maps = self.points.iter().any(|&p| self.configs[p].tile_maps);
-            return Ok(Box::new(OnePass::new(
-                bins,
-                config.cores,
-                maps,
-                &geometries,
-            )));
+            let one_pass = OnePass::new(bins, config.cores, maps, &geometries);
+            return Ok(Box::new(one_pass));
         }
-        let levels = Levels::build(config)?;
-        let path = MissPath::build(config)?;
-        if config.mode == Mode::Functional {
-            return Ok(match levels.all_four_way() {
-                Ok(levels) => Box::new(Functional::new(levels, counts(), path)),
-                Err(levels) => Box::new(Functional::new(levels, counts(), path)),
-            });
-        }
-        if config.tmu.allocation == Allocation::OnMiss || config.mode == Mode::PrefetchFifo {
-            return Ok(with_latencies(
-                config,
-                levels.allocate_on_miss(),
-                counts(),
-                path,
-            ));
-        }
-        Ok(match levels.all_four_way() {
-            Ok(levels) => with_latencies(config, levels, counts(), path),
-            Err(levels) => with_latencies(config, levels, counts(), path),
+        self.build_alone(bins, layout)
+    }
+
+    /// The machine of a configuration that is a group of its own.
+    pub(super) fn build_alone(
+        &self,
+        bins: &Bins,
+        layout: Option<&Arc<Layout>>,
+    ) -> Result<Box<dyn AtOnce>, ConfigError> {
+        let config = self.config();
+        let counts = CacheCounts::new(bins, config.tile_maps);
+        let path = MissPath::build(config, layout)?;
+        Ok(match Caches::build(config)?.all_four_way() {
+            Ok(caches) => Box::new(Functional::new(Hierarchy::new(caches, path), counts)),
+            Err(caches) => Box::new(Functional::new(Hierarchy::new(caches, path), counts)),
         })
     }
 }
 
-/// A shared pass does not see the misses of one L2 in their order.
+/// A single pass does not produce the misses of one L2 in order.
 fn shares_passes(config: &RunConfig) -> bool {
-    matches!(config.mode, Mode::Functional) && !config.follows_l2_misses()
-}
-
-/// The machine of a configuration where time passes.
-fn with_latencies<C: Delay>(
-    config: &RunConfig,
-    levels: Levels<C>,
-    counts: CacheCounts,
-    path: MissPath,
-) -> Box<dyn Machine>
-where
-    C::Delayed: 'static,
-{
-    match config.mode {
-        Mode::FirstMiss => Box::new(FirstMiss::new(levels, config.tmu, counts, path)),
-        Mode::PrefetchFifo => Box::new(PrefetchFifo::new(levels, config.tmu, counts, path)),
-        _ => Box::new(Timed::new(levels, config.tmu, counts, path).with_timeline(config.timeline)),
-    }
+    config.mode == Mode::Functional && !config.follows_l2_misses() && config.frame.is_none()
 }

@@ -1,19 +1,20 @@
-//! Counts of what a cache hierarchy makes of the accesses.
+//! Miss counts of a cache hierarchy.
 
+use crate::memory::Answer;
 use crate::stream::Bins;
 
 /// Misses of one level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Misses {
-    /// Footprints with any line that had to be fetched.
+    /// Footprints with at least one line fetched.
     pub footprints: u64,
-    /// Lines that had to be fetched.
+    /// Lines fetched.
     pub lines: u64,
-    /// Lines that were in flight already (timed mode only).
+    /// Look-ups of lines in flight (timed mode only).
     pub secondary: u64,
 }
 
-/// Misses of both levels. What misses the L1 is what comes to the L2.
+/// Misses of both levels. L1 misses are the L2's look-ups.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CellMisses {
     /// First level.
@@ -22,7 +23,7 @@ pub struct CellMisses {
     pub l2: Misses,
 }
 
-/// Misses of one tile, which has fewer than 2^32 accesses: the expander refuses more.
+/// Misses of a tile. A tile has fewer than 2^32 accesses, which the expander checks.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileMisses {
     /// Footprints with an L1 miss.
@@ -31,7 +32,7 @@ pub struct TileMisses {
     pub l2_lines: u32,
 }
 
-/// What became of the lines of one footprint.
+/// Misses among the lines of one footprint.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct FootprintMisses {
     /// Lines that the L1 fetched.
@@ -44,10 +45,28 @@ pub struct FootprintMisses {
     pub l2_secondary: u32,
 }
 
+impl FootprintMisses {
+    /// Counts the L2's answer to a request at `now`, and returns the line's arrival.
+    #[inline(always)]
+    pub fn ask_l2(&mut self, answer: Answer, now: u64) -> u64 {
+        match answer {
+            Answer::Hit => now,
+            Answer::Miss(arrival) => {
+                self.l2_lines += 1;
+                arrival
+            }
+            Answer::InFlight(arrival) => {
+                self.l2_secondary += 1;
+                arrival
+            }
+        }
+    }
+}
+
 /// All misses of a replay.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CacheCounts {
-    /// By cell, see [`Bins`].
+    /// By cell (see [`Bins`]).
     pub cells: Vec<CellMisses>,
     /// By tile; empty unless requested.
     pub tiles: Vec<TileMisses>,
@@ -64,14 +83,14 @@ impl CacheCounts {
         }
     }
 
-    /// Counts lines of footprints that were in flight into the L1.
+    /// Counts look-ups of lines in flight into the L1.
     #[inline]
     pub fn secondary(&mut self, cell: usize, lines: u32) {
         self.cells[cell].l1.secondary += u64::from(lines);
     }
 
-    /// Counts lines that a footprint fetches, one or all of them. `missed`: whether this footprint has fetched a line into
-    /// the L1 and into the L2; true from now on for what it has.
+    /// Counts one or all of the lines that a footprint fetches. `missed` records whether the footprint has
+    /// already fetched a line into the L1 and into the L2, and is updated.
     #[inline(always)]
     pub fn fetched(
         &mut self,
@@ -81,7 +100,7 @@ impl CacheCounts {
         missed: &mut [bool; 2],
     ) {
         let CellMisses { l1, l2 } = &mut self.cells[cell];
-        // Sums without branches: whether it is the footprint of the line before is a coin toss.
+        // Branch-free: whether the line belongs to the previous footprint is unpredictable.
         let from_memory = misses.l2_lines > 0;
         let [first, first_from_memory] = [!missed[0], from_memory & !missed[1]].map(u32::from);
         l1.footprints += u64::from(first);
@@ -97,11 +116,10 @@ impl CacheCounts {
         *missed = [true, missed[1] | from_memory];
     }
 
-    /// Counts a footprint that did not find all its lines.
+    /// Counts a footprint with missing lines.
     #[inline]
     pub fn footprint(&mut self, cell: usize, tile: usize, misses: &FootprintMisses) {
         if misses.l1_lines == 0 {
-            // The L2 was not asked.
             self.secondary(cell, misses.l1_secondary);
         } else {
             self.fetched(cell, tile, misses, &mut [false; 2]);

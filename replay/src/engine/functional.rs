@@ -1,51 +1,43 @@
-//! Caches without latencies, of any policy: a miss fills at once.
+//! Caches of any policy without latencies: a miss fills immediately.
 
-use super::Machine;
 use super::batch::Outcome;
 use super::counts::{CacheCounts, FootprintMisses};
-use crate::cache::{Cache, Levels, MissPath, SharedLevel};
+use super::{AtOnce, Machine};
+use crate::access::FrameClients;
 use crate::config::{Assign, RunConfig};
-use crate::order::Phase;
-use crate::stream::{Consumer, Cores, QuadLines, StreamError, interleave};
+use crate::memory::{Cache, Hierarchy};
+use crate::order::{Phase, WorkItem};
+use crate::stream::{Consumer, Cores, QuadLines, StreamError, Tag, interleave};
 
 /// L1 caches over a shared L2.
 pub struct Functional<C> {
-    l1: Vec<C>,
-    l2: SharedLevel<C>,
-    /// A footprint of more lines may evict some of its own, so that its repeats are simulated.
+    caches: Hierarchy<C>,
+    /// Larger footprints may evict their own lines, so their repeats must be simulated.
     most_safe_lines: u32,
-    /// What missed.
-    pub counts: CacheCounts,
+    counts: CacheCounts,
 }
 
 impl<C: Cache> Functional<C> {
     /// Empty caches.
-    pub fn new(levels: Levels<C>, counts: CacheCounts, path: MissPath) -> Self {
-        let own = levels.l1.iter().map(Cache::repeat_safe_lines).min();
-        let most_safe_lines = match path.invalidates() {
-            true => 1,
-            false => own.unwrap_or(1),
-        };
+    pub fn new(caches: Hierarchy<C>, counts: CacheCounts) -> Self {
         Self {
-            most_safe_lines,
-            l1: levels.l1,
-            l2: SharedLevel::new(levels.l2, path),
+            most_safe_lines: caches.repeat_safe_lines(),
+            caches,
             counts,
         }
     }
 
-    /// A footprint's lines that missed the L1 go to the L2.
+    /// Sends the L1 misses of a footprint to the L2.
     #[inline(never)]
-    fn missed(&mut self, cell: usize, tile: usize, lines: &[u32]) {
+    fn missed(&mut self, core: usize, cell: usize, tile: usize, lines: &[u32]) {
         let mut misses = FootprintMisses {
             l1_lines: lines.len() as u32,
             ..FootprintMisses::default()
         };
         for &line in lines {
-            misses.l2_lines += u32::from(!self.l2.access(line));
+            misses.l2_lines += u32::from(!self.caches.access_l2(core, line));
         }
-        let l1 = &mut self.l1;
-        (self.l2).invalidate_l1(|line| l1.iter_mut().map(|l1| u64::from(l1.remove(line))).sum());
+        self.caches.follow_evictions();
         self.counts.footprint(cell, tile, &misses);
     }
 }
@@ -54,7 +46,7 @@ impl<C: Cache> Consumer for Functional<C> {
     fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
         let safe_lines = self.most_safe_lines as usize;
         for footprint in quad.footprints() {
-            // Repeats that would find everything there need no simulation.
+            // Repeats that only hit need no simulation.
             let repeats_are_idle = footprint.lines.len() <= safe_lines;
             let repeats = if repeats_are_idle {
                 0
@@ -62,19 +54,38 @@ impl<C: Cache> Consumer for Functional<C> {
                 footprint.repeats
             };
             for _ in 0..=repeats {
-                let l1 = &mut self.l1[core];
                 let (mut missing, mut count) = ([0; 4], 0);
                 for &line in footprint.lines {
-                    if !l1.access(line) {
+                    if !self.caches.access_l1(core, line) {
                         missing[count & 3] = line;
                         count += 1;
                     }
                 }
                 if count > 0 {
-                    self.missed(footprint.cell, quad.tile(), &missing[..count]);
+                    self.missed(core, footprint.cell, quad.tile(), &missing[..count]);
                 }
             }
         }
+    }
+}
+
+/// The caches, and the other clients of memory, which follow the cores' items.
+struct WithClients<'m, 'f, C> {
+    caches: &'m mut Functional<C>,
+    clients: &'m mut FrameClients<'f>,
+}
+
+impl<C: Cache> Consumer for WithClients<'_, '_, C> {
+    fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
+        self.caches.quad(core, quad);
+    }
+
+    fn start_item(&mut self, core: usize, item: &WorkItem) -> Result<(), StreamError> {
+        self.clients.start_item(core, item)?;
+        let caches = &mut self.caches.caches;
+        (self.clients).send(|access| caches.client_access(core, access));
+        caches.follow_evictions();
+        Ok(())
     }
 }
 
@@ -84,19 +95,55 @@ impl<C: Cache> Machine for Functional<C> {
         cores: &mut Cores<'_>,
         phases: &[Phase],
         assign: Assign,
+        clients: Option<&mut FrameClients<'_>>,
     ) -> Result<(), StreamError> {
-        interleave(cores, phases, assign, self)
+        match clients {
+            None => interleave(cores, phases, assign, self),
+            Some(clients) => {
+                let mut both = WithClients {
+                    caches: self,
+                    clients,
+                };
+                interleave(cores, phases, assign, &mut both)
+            }
+        }
+    }
+
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>) {
+        clients.send(|access| self.caches.client_access(0, access));
+        self.caches.follow_evictions();
     }
 
     fn flush(&mut self) {
-        self.l1.iter_mut().for_each(Cache::clear);
-        self.l2.empty();
+        self.caches.clear();
     }
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {
         Outcome {
-            path: self.l2.result(),
+            memory: self.caches.result(),
             ..self.counts.clone().into()
+        }
+    }
+}
+
+impl<C: Cache> AtOnce for Functional<C> {
+    fn lines(&mut self, lines: &[u32], tags: &[Tag], missed: &mut Vec<u32>) {
+        /// L1 look-ups before the L2 sees their misses. One, if the L2 can invalidate L1 lines.
+        const CHUNK: usize = 256;
+        let chunk = if self.caches.invalidates() { 1 } else { CHUNK };
+        let mut places = [0_u8; CHUNK];
+        for (lines, tags) in lines.chunks(chunk).zip(tags.chunks(chunk)) {
+            let mut count = 0;
+            for (place, &line) in lines.iter().enumerate() {
+                // Branch-free: whether a line hits is unpredictable.
+                places[count % CHUNK] = place as u8;
+                count += usize::from(!self.caches.access_l1(0, line));
+            }
+            for &place in &places[..count] {
+                let (line, tag) = (lines[usize::from(place)], tags[usize::from(place)]);
+                missed.push(line);
+                self.missed(0, tag.cell() as usize, 0, &[line]);
+            }
         }
     }
 }

@@ -1,33 +1,34 @@
 //! Starts as many traces and streams at a time as memory allows.
 //!
-//! A frame's lines stay in memory while a replay reads them. Replaying all traces at once would exhaust memory, so that
-//! tiles are expanded again for every replay; one at a time would leave threads idle at its end. So the next one starts
-//! when there is memory for it, or when threads would be idle.
+//! A frame's lines stay in memory while replays read them. Replaying all traces at once would exhaust
+//! memory, and tiles would have to be expanded for every replay. Replaying one trace at a time would leave
+//! threads idle at its end. Therefore the next trace starts when there is memory for it, or when threads
+//! would become idle.
 
 use rayon::Scope;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Items that wait, and counts of those that run.
+/// Waiting items, and counts of the running ones.
 struct State<T> {
     waiting: std::vec::IntoIter<T>,
-    /// Running items whose last replay has not started.
+    /// Running items that have replays left to start.
     busy: usize,
-    /// Weight of those that have not loaded their lines yet.
+    /// Total weight of the items still loading.
     loading: usize,
 }
 
-/// What an item reports.
+/// Progress of an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
-    /// A frame's lines are in memory.
+    /// The lines of a frame are in memory.
     Loaded,
-    /// No replay of the item waits for a thread any more.
+    /// The item's last replay has started.
     LastReplayStarted,
 }
 
-/// Calls `work` on all items; each reports its stages to the function that `work` gets. The next item starts when all
-/// before it are loaded and `room` returns true, or when the last replays of all before it have started. Items load at
-/// the same time while their weights add up to less than `enough`.
+/// Runs `work` for all items. `work` reports stages through the function it receives. The next item starts
+/// when all earlier items are loaded and `room` returns true, or when the last replays of all earlier items
+/// have started. Items load concurrently while their total weight is less than `enough`.
 pub fn run_within_memory<T: Send>(
     items: Vec<(usize, T)>,
     enough: usize,
@@ -61,7 +62,7 @@ where
     R: Fn() -> bool + Sync,
     W: Fn(T, &(dyn Fn(Stage) + Sync)) + Sync,
 {
-    /// Starts the items that may start.
+    /// Starts all items that can start.
     fn start<'s>(&'s self, scope: &Scope<'s>) {
         let mut state = self.state();
         while state.busy == 0 || (state.loading < self.enough && (self.room)()) {
@@ -75,7 +76,7 @@ where
     }
 
     fn work<'s>(&'s self, weight: usize, item: T, scope: &Scope<'s>) {
-        // The item's share of `loading` and `busy`.
+        // The item's contributions to `loading` and `busy`.
         let own = Mutex::new((weight, 1));
         let report_stage = |stage| {
             let mut own = own.lock().unwrap_or_else(PoisonError::into_inner);
@@ -102,7 +103,7 @@ mod tests {
     use super::*;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    /// Items that take memory and give it back: how much was taken at most.
+    /// Runs items that allocate and free memory, and returns the peak.
     fn most_taken(sizes: &[usize], limit: usize, enough: usize, threads: usize) -> usize {
         let (taken, most, done) = Default::default();
         let (taken, most, done): (AtomicUsize, AtomicUsize, AtomicUsize) = (taken, most, done);
@@ -126,10 +127,10 @@ mod tests {
     #[test]
     fn nothing_starts_without_room_and_everything_is_done() {
         for threads in [1, 2, 8] {
-            // Each takes more than half: one at a time, also where one alone takes more than there is.
+            // Each takes more than half of the memory, so they run one at a time, even if one exceeds the limit.
             assert_eq!(most_taken(&[60; 40], 100, 1, threads), 60);
             assert_eq!(most_taken(&[300; 5], 100, 1, threads), 300);
-            // Room for those that half of the memory holds, and one more.
+            // Half of the memory is filled, and one more item starts.
             assert!(most_taken(&[20; 40], 100, 1, threads) <= 80);
             assert!(most_taken(&[1; 100], 100, 8, threads) <= 100);
         }
@@ -137,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn light_items_grow_together() {
+    fn light_items_load_concurrently() {
         let (now, most) = (AtomicUsize::new(0), AtomicUsize::new(0));
         let together = std::sync::Barrier::new(4);
         let work = |(), report_stage: &(dyn Fn(Stage) + Sync)| {
@@ -153,11 +154,11 @@ mod tests {
     }
 
     #[test]
-    fn the_next_item_starts_while_the_one_before_is_ending() {
+    fn the_next_item_starts_while_the_previous_one_finishes() {
         let together = std::sync::Barrier::new(2);
         let work = |(), report_stage: &(dyn Fn(Stage) + Sync)| {
             report_stage(Stage::LastReplayStarted);
-            // Two of them are here at the same time, or this never ends.
+            // Both items must be running at the same time, or this blocks forever.
             together.wait();
         };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build();

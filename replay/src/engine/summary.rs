@@ -1,13 +1,13 @@
-//! A replay's result: counts of the trace and counts of the caches summed up.
+//! The result of a replay: sums of trace counts and cache counts.
 
 use super::counts::{CacheCounts, CellMisses, Misses};
 use crate::config::{CountBy, RunConfig};
-use crate::result::{LevelCounters, LevelResult, Part, RunResult, TileMap};
+use crate::result::{LevelCounters, LevelResult, MemoryResult, Part, RunResult, TileMap};
 use crate::stream::{Bins, Cell, CellAccesses, TraceCounts};
 use formats::textrace::{Pass, Tables};
 
-/// Sums everything up; the configuration says what a line is and whether tiles are wanted. Texture
-/// unit and cycles are left out.
+/// Computes the sums. The configuration determines the line size and whether tile maps are included.
+/// Texture unit and cycles are not set.
 pub fn summary(
     tables: &Tables,
     bins: &Bins,
@@ -56,12 +56,8 @@ pub fn summary(
         tmu: None,
         cycles: None,
         first_lookups: None,
-        prefetch: None,
-        l2_mshrs: None,
-        invalidated_lines: None,
+        memory: MemoryResult::default(),
         timeline: None,
-        lower_levels: Vec::new(),
-        dram: None,
         clients: Vec::new(),
         geometry: None,
         by_view,
@@ -88,7 +84,7 @@ pub fn summary(
     }
 }
 
-/// The number of each draw and the name of its material.
+/// Number of each draw and name of its material.
 fn draw_names(tables: &Tables) -> Vec<String> {
     let draws = tables.draws.iter().enumerate();
     draws
@@ -96,7 +92,7 @@ fn draw_names(tables: &Tables) -> Vec<String> {
         .collect()
 }
 
-/// A cell's counters of both levels: what misses the L1 is what comes to the L2.
+/// A cell's counters of both levels. L1 misses are the L2's look-ups.
 fn levels(accesses: &CellAccesses, misses: &CellMisses) -> (LevelCounters, LevelCounters) {
     let counters = |footprints, line_lookups, misses: &Misses| LevelCounters {
         footprints,
@@ -147,7 +143,7 @@ fn tile_maps(
         .collect()
 }
 
-/// Pixels of a tile inside the image, which cuts the last ones.
+/// Pixels of a tile inside the image, whose edges cut the last tiles.
 fn pixels(pass: &Pass, tile: u32, tile_px: u32) -> u32 {
     let at = [tile % pass.tiles[0], tile / pass.tiles[0]];
     let side = |axis: usize| {
@@ -165,7 +161,7 @@ mod tests {
     use crate::stream::Expander;
     use crate::stream::synthetic::Synthetic;
 
-    /// As after a trace of many hours.
+    /// Uses counts as large as those of a trace of many hours.
     #[test]
     fn counters_beyond_32_bits_keep_every_digit_in_sums_rates_bytes_and_json() {
         const MANY: u64 = 1 << 40;

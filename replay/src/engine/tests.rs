@@ -2,8 +2,10 @@ use super::counts::CacheCounts;
 use super::functional::Functional;
 use super::summary::summary;
 use super::*;
-use crate::cache::{AnyCache, Levels, MissPath};
-use crate::config::{BetweenFrames, CacheConfig, CountBy, Mode, Order, Replacement};
+use crate::config::{
+    BetweenFrames, CountBy, LevelConfig, Levels, Mode, Order, Replacement, TmuModel,
+};
+use crate::memory::Hierarchy;
 use crate::order::{self, WorkItem};
 use crate::result::LevelCounters;
 use crate::stream::synthetic::Synthetic;
@@ -30,17 +32,28 @@ fn functional(order: Order) -> RunConfig {
     RunConfig {
         mode: Mode::Functional,
         order,
-        l1: CacheConfig::lru(1 << 10),
-        l2: CacheConfig::lru(8 << 10),
+        level: Levels::two(LevelConfig::lru(1 << 10), LevelConfig::lru(8 << 10)),
         ..RunConfig::default()
     }
 }
 
-/// LRU sets as plain lists, most recent last.
+/// Mode, and model of the texture unit.
+type Time = (Mode, TmuModel);
+
+const AT_ONCE: Time = (Mode::Functional, TmuModel::Looping);
+const LOOPING: Time = (Mode::Timed, TmuModel::Looping);
+const FIRST_MISS: Time = (Mode::Timed, TmuModel::FirstMiss);
+
+fn in_time((mode, model): Time, mut config: RunConfig) -> RunConfig {
+    (config.mode, config.tmu.model) = (mode, model);
+    config
+}
+
+/// LRU sets as plain lists, most recently used last.
 struct TwinCache(Vec<Vec<u64>>);
 
 impl TwinCache {
-    fn new(config: &CacheConfig) -> Self {
+    fn new(config: &LevelConfig) -> Self {
         Self(vec![Vec::new(); config.sets("", 16).unwrap() as usize])
     }
 
@@ -57,10 +70,13 @@ impl TwinCache {
     }
 }
 
-/// A straightforward single-core replay: no tables, no shortcuts.
+/// A straightforward single-core replay without tables and shortcuts.
 fn twin(trace: &MemoryTrace, config: &RunConfig) -> (LevelCounters, LevelCounters, usize) {
     let (mut c1, mut c2) = (LevelCounters::default(), LevelCounters::default());
-    let (mut l1, mut l2) = (TwinCache::new(&config.l1), TwinCache::new(&config.l2));
+    let (mut l1, mut l2) = (
+        TwinCache::new(&config.level.l1),
+        TwinCache::new(&config.level.l2),
+    );
     let mut seen = HashSet::new();
     let layout = Layout::new(&trace.tables.textures, &config.layout).unwrap();
     let order = config.order.build(config.seed);
@@ -210,7 +226,7 @@ fn without_penalties_timed_equals_functional_on_one_core() {
             mode: Mode::Timed,
             ..functional
         };
-        (timed.tmu.l1_penalty_cycles, timed.tmu.l2_penalty_cycles) = (0, 0);
+        (timed.level.l2.hit_cycles, timed.memory_cycles) = (0, 0);
         let expected = replay(&trace, &functional).unwrap();
         let mut found = replay(&trace, &timed).unwrap();
         assert_eq!(found.tmu.take().unwrap().utilization, 1.0);
@@ -225,8 +241,7 @@ fn an_infinite_cache_misses_each_line_once() {
     for mode in [Mode::Functional, Mode::Timed] {
         let config = RunConfig {
             mode,
-            l1: CacheConfig::lru(1 << 10),
-            l2: CacheConfig::lru(64 << 20),
+            level: Levels::two(LevelConfig::lru(1 << 10), LevelConfig::lru(64 << 20)),
             ..RunConfig::default()
         };
         let result = replay(&trace, &config).unwrap();
@@ -279,7 +294,7 @@ fn tile_overdraw_counts_pixels_inside_the_image_only() {
     let result = replay(&trace, &config).unwrap();
     let left = &result.tile_maps[0];
     assert_eq!(left.tiles, [3, 3]);
-    // One layer of patches covers the left eye's image, and the cut tiles beyond it.
+    // One layer of patches covers the left eye's image and the parts of cut tiles beyond it.
     assert!(
         left.overdraw[..2].iter().all(|&o| o == 1.0),
         "{:?}",
@@ -289,7 +304,7 @@ fn tile_overdraw_counts_pixels_inside_the_image_only() {
 
 #[test]
 fn misses_in_flight_are_merged_and_counted_apart() {
-    // Two quads at the same place: the second wants the lines that the first has in flight.
+    // Two quads at the same place: the second needs the lines that the first has in flight.
     let trace = MemoryTrace {
         tables: testing::tables(&[[64, 64]]),
         tiles: vec![
@@ -305,7 +320,7 @@ fn misses_in_flight_are_merged_and_counted_apart() {
 
 #[test]
 fn static_lrta_gives_each_core_its_own_view() {
-    // With one view a core, each L1 behaves as if it were alone.
+    // With one view per core, each L1 behaves as if it were the only one.
     let trace = small();
     let config = RunConfig {
         assign: Assign::Static,
@@ -351,7 +366,7 @@ fn a_trace_without_textures_has_no_footprints() {
     }
 }
 
-/// Results of all configurations in one batch that may keep so many bytes of lines.
+/// Results of all configurations in one batch, with a limit for the bytes of lines kept.
 fn all(trace: &MemoryTrace, configs: &[RunConfig], bytes: u64) -> Vec<RunResult> {
     let results = Mutex::new(vec![None; configs.len()]);
     let keep = |index: usize, result| results.lock().unwrap()[index] = Some(result);
@@ -361,7 +376,7 @@ fn all(trace: &MemoryTrace, configs: &[RunConfig], bytes: u64) -> Vec<RunResult>
     results.into_iter().map(Option::unwrap).collect()
 }
 
-/// One configuration on a machine of its own.
+/// Replays one configuration on the given machine.
 fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> RunResult {
     let expander = Expander::new(trace, config).unwrap();
     let expander = expander.with_distinct_lines(config.mode == Mode::Timed);
@@ -370,13 +385,15 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     let frame = expander.frame(0, &memory, &mut counts).unwrap();
     let phases = order::plan(&*config.order.build(config.seed), &trace.tables.passes);
     let mut cores = Cores::new(&frame, config.cores as usize);
-    machine.run(&mut cores, &phases, config.assign).unwrap();
+    machine
+        .run(&mut cores, &phases, config.assign, None)
+        .unwrap();
     let outcome = machine.outcome(config);
     let (tmu, cycles) = (outcome.tmu, outcome.cycles);
     RunResult {
         tmu,
         cycles,
-        l2_mshrs: outcome.path.mshrs,
+        memory: outcome.memory,
         ..summary(
             &trace.tables,
             expander.bins(),
@@ -387,23 +404,15 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     }
 }
 
-/// One functional configuration in caches of its own, behind pointers as any policy's are.
+/// Replays one functional configuration in caches of its own, boxed like those of any policy.
 fn single(trace: &MemoryTrace, config: &RunConfig) -> RunResult {
-    let Levels { l1, l2 } = Levels::build(config).unwrap();
-    let levels = Levels {
-        l1: l1.into_iter().map(AnyCache::into_box).collect(),
-        l2: l2.into_box(),
-    };
     let bins = Bins::new(&trace.tables, CountBy::Texture).unwrap();
     let counts = CacheCounts::new(&bins, config.tile_maps);
-    alone(
-        trace,
-        config,
-        &mut Functional::new(levels, counts, MissPath::build(config).unwrap()),
-    )
+    let caches = Hierarchy::build(config).unwrap();
+    alone(trace, config, &mut Functional::new(caches, counts))
 }
 
-/// Random machines that a twin is held against: `MACHINES=1000` for many.
+/// Number of random machines to compare with a twin; `MACHINES=1000` runs many.
 fn machines(usual: u32) -> u32 {
     let many = std::env::var("MACHINES").ok();
     many.map_or(usual, |many| many.parse().expect("MACHINES: a number"))
@@ -425,21 +434,21 @@ impl Random {
         values[self.below(values.len() as u64) as usize]
     }
 
-    /// An LRU cache of up to `most_sets` sets and any small number of ways.
-    fn cache(&mut self, most_sets: u64) -> CacheConfig {
+    /// A random LRU cache of up to `most_sets` sets and any small number of ways.
+    fn cache(&mut self, most_sets: u64) -> LevelConfig {
         let ways = self.of(&[1, 2, 3, 4, 4, 4, 5, 8, 12, 16]);
         let sets = 1 << self.below(u64::from(most_sets.ilog2()) + 1);
-        CacheConfig {
+        LevelConfig {
             ways,
-            ..CacheConfig::lru(sets * u64::from(ways) * 16)
+            ..LevelConfig::lru(sets * u64::from(ways) * 16)
         }
     }
 }
 
-/// A footprint as it was sent: core, cell and lines, repeats written out.
+/// A footprint in the stream: core, cell and lines, with repeats written out.
 type Sent = (usize, usize, Vec<u32>);
 
-/// Keeps the stream as it comes.
+/// Records the stream.
 #[derive(Default)]
 struct Recorder {
     sent: Vec<Sent>,
@@ -483,8 +492,8 @@ fn several_cores_equal_brute_force_caches_on_the_recorded_stream() {
                 ..functional(order)
             };
             let sent = sent(&trace, &config);
-            let mut l1: Vec<TwinCache> = (0..3).map(|_| TwinCache::new(&config.l1)).collect();
-            let mut l2 = TwinCache::new(&config.l2);
+            let mut l1: Vec<TwinCache> = (0..3).map(|_| TwinCache::new(&config.level.l1)).collect();
+            let mut l2 = TwinCache::new(&config.level.l2);
             let (mut l1_lines, mut l2_lines) = (0, 0);
             for (core, _, lines) in &sent {
                 for &line in lines {
@@ -513,7 +522,7 @@ fn unique_lines_are_those_of_the_stream_whatever_the_caches() {
         for l1 in [64, 1 << 10, 1 << 20] {
             let config = RunConfig {
                 mode,
-                l1: CacheConfig::lru(l1),
+                level: Levels::two(LevelConfig::lru(l1), LevelConfig::lru(8 << 10)),
                 ..functional(Order::Z2_STA)
             };
             let result = replay(&trace, &config).unwrap();
@@ -526,10 +535,12 @@ fn unique_lines_are_those_of_the_stream_whatever_the_caches() {
 fn caches_take_lines_that_no_trace_sent() {
     let config = functional(Order::MORTON);
     let bins = Bins::new(&testing::tables(&[[64, 64]]), CountBy::Texture).unwrap();
-    let levels = Levels::build(&config).unwrap().all_four_way().ok().unwrap();
-    let path = MissPath::build(&config).unwrap();
-    let mut caches = Functional::new(levels, CacheCounts::new(&bins, false), path);
-    let (mut l1, mut l2) = (TwinCache::new(&config.l1), TwinCache::new(&config.l2));
+    let hierarchy = Hierarchy::build(&config).unwrap();
+    let mut caches = Functional::new(hierarchy, CacheCounts::new(&bins, false));
+    let (mut l1, mut l2) = (
+        TwinCache::new(&config.level.l1),
+        TwinCache::new(&config.level.l2),
+    );
     let (mut l1_lines, mut l2_lines) = (0, 0);
     for step in 0..10_000_u64 {
         let line = step * step % 1009 + step % 7;
@@ -540,7 +551,7 @@ fn caches_take_lines_that_no_trace_sent() {
             l2_lines += u64::from(!l2.access(line));
         }
     }
-    let counted = &caches.counts.cells[0];
+    let counted = caches.outcome(&config).counts.cells[0];
     assert_eq!((counted.l1.lines, counted.l2.lines), (l1_lines, l2_lines));
     assert!(l1_lines > l2_lines && l2_lines > 1009);
 }
@@ -552,7 +563,7 @@ mod plain_timed;
 mod prefetch_fifo;
 mod timeline;
 
-/// The same frame several times over.
+/// The same frame `frames` times.
 fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {
     let mut long = trace.clone();
     for frame in 1..frames {
@@ -573,9 +584,9 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
                 mode,
                 ..functional(Order::Z2_STA)
             };
-            // A slot that is not full is carried over, a full one is not.
+            // A partly filled slot is carried over between frames. One footprint per slot leaves none partly filled.
             config.tmu.retry_footprints = 1;
-            (config.l1.replacement, config.l2.replacement) = (policy, policy);
+            (config.level.l1.replacement, config.level.l2.replacement) = (policy, policy);
             let flush = RunConfig {
                 between_frames: BetweenFrames::Flush,
                 ..config
@@ -583,10 +594,11 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
             let single = replay(&one, &config).unwrap();
             let [kept, flushed] = [config, flush].map(|c| replay(&three, &c).unwrap());
             assert_eq!(flushed.footprints, 3 * single.footprints);
-            // Whom random replacement hits differs from frame to frame.
+            // Random victims differ from frame to frame.
             if policy != Replacement::RANDOM {
                 assert_ne!(kept.l2.misses, flushed.l2.misses, "{policy:?} {mode:?}");
-                // Predictions of the frame before may mislead; lines of the frame before are hit.
+                // Predictions trained by the previous frame can be wrong; without them, the previous
+                // frame's lines only add hits.
                 if [Replacement::LRU, Replacement::FIFO, Replacement::TREE_PLRU].contains(&policy) {
                     assert!(kept.l2.misses < flushed.l2.misses, "{policy:?} {mode:?}");
                 }
@@ -606,15 +618,12 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
     }
 }
 
-/// Counts by draw add up to those by texture: each material of the trace has textures of its own.
+/// Each material of the trace has its own textures, so counts by draw are sums of counts by texture.
 #[test]
 fn counts_by_draw_are_those_of_its_textures() {
     let trace = small();
-    for mode in [Mode::Functional, Mode::Timed, Mode::FirstMiss] {
-        let config = RunConfig {
-            mode,
-            ..functional(Order::Z2_STA)
-        };
+    for time in [AT_ONCE, LOOPING, FIRST_MISS] {
+        let config = in_time(time, functional(Order::Z2_STA));
         let by_texture = replay(&trace, &config).unwrap();
         let by_draw = RunConfig {
             count_by: CountBy::Draw,
@@ -626,7 +635,7 @@ fn counts_by_draw_are_those_of_its_textures() {
         assert!(by_draw.by_texture.is_empty() && by_draw.by_level.is_empty());
         by_draw.by_texture.clone_from(&by_texture.by_texture);
         by_draw.by_level.clone_from(&by_texture.by_level);
-        assert_eq!(by_draw, by_texture, "{mode:?}");
+        assert_eq!(by_draw, by_texture, "{time:?}");
         let textures_of = |draw: &formats::textrace::Draw| {
             let samples = draw.groups.iter().flat_map(|group| &group.samples);
             samples
@@ -649,8 +658,8 @@ fn counts_by_draw_are_those_of_its_textures() {
                 expected[0].add(&part.l1);
                 expected[1].add(&part.l2);
             }
-            // A footprint counts once, and so does a look-up of a line that several of its textures have.
-            assert_eq!(levels, expected, "{mode:?}");
+            // A footprint counts once per draw, and so does a look-up of a line shared by several of its textures.
+            assert_eq!(levels, expected, "{time:?}");
         }
     }
 }

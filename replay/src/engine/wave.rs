@@ -1,31 +1,28 @@
-//! The passes of one stream, frame after frame.
+//! Runs the groups of a stream, frame by frame.
 
 use super::batch::{Job, Pass};
 use super::scheduler::Stage;
 use super::summary::summary;
 use super::{Machine, ReplayError};
-use crate::cache::MissPathResult;
-use crate::config::{BetweenFrames, Mode, Order, RunConfig};
+use crate::config::{BetweenFrames, Order, RunConfig, TmuModel};
 use crate::order::{self, Phase};
 use crate::result::RunResult;
 use crate::stream::{Cores, Expander, Frame, LineMemory, TileSource, TraceCounts, rendered};
-use crate::whole_frame::traffic;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// What passes that read the same lines need.
+/// Groups that read the same lines, and what they need.
 pub(super) struct Wave<'a> {
     pub(super) job: Job<'a>,
     pub(super) memory: &'a LineMemory,
-    /// Called when a frame's lines are loaded and again when the last replay has started.
+    /// Reports the stages of a frame: lines loaded, last replay started.
     pub(super) report_stage: &'a (dyn Fn(Stage) + Sync),
 }
 
-impl Wave<'_> {
-    /// Runs the passes, of which there is one at least. While a frame is replayed, the next one is expanded, if
-    /// there is memory for it.
-    pub(super) fn run(&self, mut passes: Vec<Pass<'_>>) -> Result<(), ReplayError> {
+impl<'a> Wave<'a> {
+    /// Runs at least one group. While a frame is replayed, the next one is expanded if there is memory for it.
+    pub(super) fn run(&self, mut passes: Vec<Pass<'a>>) -> Result<(), ReplayError> {
         let rendered = rendered(self.job.trace, passes[0].config())?;
         let trace_passes = &rendered.tables().passes;
         let expander = expander_for(Expander::new(&rendered, passes[0].config())?, &passes);
@@ -44,7 +41,7 @@ impl Wave<'_> {
             let plans = orders.plans(trace_passes, number);
             let waiting = AtomicUsize::new(passes.len());
             let is_last = index + 1 == frames.len();
-            let replay = |pass: &mut Pass<'_>, frame: &Frame<'_>| {
+            let replay = |pass: &mut Pass<'a>, frame: &Frame<'_>| {
                 if waiting.fetch_sub(1, Ordering::Relaxed) == 1 && is_last {
                     (self.report_stage)(Stage::LastReplayStarted);
                 }
@@ -56,18 +53,30 @@ impl Wave<'_> {
                         }
                         machine
                     }
-                    None => pass.build(&expander)?,
+                    None => {
+                        pass.build_clients(self.job.trace, &expander)?;
+                        pass.build(&expander)?
+                    }
                 };
                 let mut cores = Cores::new(frame, config.cores as usize);
-                machine.run(&mut cores, orders.plan(&plans, &config), config.assign)?;
+                if let Some(clients) = &mut pass.clients {
+                    clients.start_frame(number)?;
+                    machine.client_accesses(clients);
+                }
+                let phases = orders.plan(&plans, &config);
+                machine.run(&mut cores, phases, config.assign, pass.clients.as_mut())?;
+                if let Some(clients) = &mut pass.clients {
+                    clients.end_frame();
+                    machine.client_accesses(clients);
+                }
                 Ok::<_, ReplayError>(machine)
             };
-            // The last pass frees the frame's memory, also while this thread is busy.
+            // The last group to finish frees the frame's memory, even while this thread is busy.
             let frame = Arc::new(frame);
             let share = |pass| (pass, Arc::clone(&frame));
             let all: Vec<_> = passes.iter_mut().map(share).collect();
             drop(frame);
-            // One after the other, as threads come free: of passes together the first ones take longest.
+            // Started in order as threads become free, because the first groups take longest.
             let all = all.into_iter().par_bridge();
             let Some(&next) = frames.get(index + 1) else {
                 return all.try_for_each(|(pass, frame)| {
@@ -90,7 +99,7 @@ impl Wave<'_> {
             kept?;
             ahead = expanded.transpose()?;
         }
-        // No frames at all.
+        // The trace has no frames.
         for pass in &passes {
             self.finish(
                 pass,
@@ -116,32 +125,19 @@ impl Wave<'_> {
             let config = &self.job.configs[index];
             let outcome = machine.outcome(config);
             let (tmu, cycles) = (outcome.tmu, outcome.cycles);
-            let MissPathResult {
-                below,
-                prefetch,
-                mshrs,
-                invalidated_lines,
-            } = outcome.path;
             let mut result = RunResult {
                 tmu,
                 cycles,
-                dram: below.dram,
-                prefetch,
-                l2_mshrs: mshrs,
-                invalidated_lines,
                 timeline: outcome.timeline,
-                lower_levels: below.levels,
-                first_lookups: machine.first_lookups(),
+                first_lookups: outcome.first_lookups,
                 ..summary(tables, expander.bins(), counts, &outcome.counts, config)
             };
-            if let Some(last) = result.lower_levels.last() {
-                result.external_bytes = last.line_misses * u64::from(last.line_bytes);
-            } else if let Some(prefetch) = &result.prefetch {
-                result.external_bytes += prefetch.lines * u64::from(config.line_bytes);
-            }
-            if let Some(machine) = &config.frame {
-                let whole = traffic(self.job.trace, config, machine, result.external_bytes)?;
-                (result.clients, result.geometry) = (whole.clients, Some(whole.geometry));
+            let l2_misses = result.l2.misses;
+            result.external_bytes = outcome.memory.external_bytes(l2_misses, config.line_bytes);
+            result.memory = outcome.memory;
+            if let Some(clients) = &pass.clients {
+                let (traffic, geometry) = clients.result(result.external_bytes);
+                (result.clients, result.geometry) = (traffic, Some(geometry));
             }
             (self.job.finished)(index, result);
         }
@@ -149,22 +145,22 @@ impl Wave<'_> {
     }
 }
 
-/// Lists what the passes read.
+/// Configures the expander to list what the groups read.
 fn expander_for<'a>(expander: Expander<'a>, passes: &[Pass<'_>]) -> Expander<'a> {
-    let at_once = |pass: &Pass<'_>| pass.config().tmu.misses_change_caches_at_once();
-    match passes[0].config().mode {
-        Mode::Functional => match passes.iter().map(Pass::least_sets).min() {
+    let at_once = |pass: &Pass<'_>| pass.config().misses_change_caches_at_once();
+    match passes[0].config().tmu_model() {
+        None => match passes.iter().map(Pass::least_sets).min() {
             Some(Some(sets)) => expander.without_idle_accesses(sets),
             _ => expander,
         },
-        Mode::FirstMiss | Mode::PrefetchFifo => expander,
-        // Where a miss changes a cache at once, the timed machine looks footprints up one by one.
-        Mode::Timed if passes.iter().any(at_once) => expander.with_distinct_lines(true),
-        Mode::Timed => expander.only_distinct_lines(),
+        Some(TmuModel::FirstMiss | TmuModel::PrefetchFifo) => expander,
+        // If a miss fills the cache immediately, the timed machine looks footprints up one by one.
+        Some(TmuModel::Looping) if passes.iter().any(at_once) => expander.with_distinct_lines(true),
+        Some(TmuModel::Looping) => expander.only_distinct_lines(),
     }
 }
 
-/// The orders of some passes, each once.
+/// The distinct orders of some groups.
 struct Orders(Vec<(Order, u64)>);
 
 impl Orders {
@@ -179,7 +175,7 @@ impl Orders {
         Self(orders)
     }
 
-    /// What each does with a frame.
+    /// The plan of each order for a frame.
     fn plans(&self, trace_passes: &[formats::textrace::Pass], frame: u32) -> Vec<Vec<Phase>> {
         let plan = |&(order, seed): &(Order, u64)| {
             order::plan_frame(&*order.build(seed), trace_passes, frame)

@@ -1,5 +1,5 @@
-//! Settings tried on some scenes and judged on others. A scene may be captured at several distances between the eyes;
-//! the distance is then tried as the settings are.
+//! Calibration: trials of settings, chosen on some scenes and validated on others. If scenes were captured
+//! at several interpupillary distances (IPD), the distance is one of the settings.
 
 use super::{Outcome, Plan, ResultRow, Setting, Subject, scene_label};
 use crate::paper::score::{Measured, Score, score};
@@ -8,63 +8,63 @@ use crate::tmu::closed_form;
 use serde::Serialize;
 use toml::Value;
 
-/// What a setting is chosen by.
+/// The measure by which a setting is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Objective {
-    /// Distance of the utilisation from the one that the Z2 paper's table implies for the machine's
-    /// own rates: for any scene.
+    /// Distance of the utilisation from the one that the Z2 paper's table implies for the machine's own
+    /// miss rates. Defined for any scene.
     #[default]
     Surface,
-    /// Distance from the rows of the paper's table: for scenes that stand for its own.
+    /// Distance from the rows of the paper's table. Defined for stand-in scenes.
     Table,
 }
 
-/// How a setting does on a scene.
+/// Fit of a setting on a scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SceneFit {
     /// The trace's label.
     pub scene: String,
-    /// Whether settings are not chosen by it.
+    /// True for a validation scene, which does not influence the choice.
     pub held_out: bool,
-    /// Root mean square distance from the surface, points of utilisation; none without a texture unit.
+    /// Root mean square distance from the surface in points of utilisation; none without a texture unit.
     pub surface_points: Option<f64>,
     /// Distance from the paper's rows.
     pub table: Option<Score>,
 }
 
-/// A setting and how it does.
+/// A trial: settings and their fit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Trial {
-    /// What is set.
+    /// The settings.
     pub settings: Vec<Setting>,
-    /// Scene by scene.
+    /// Fit on each scene.
     pub scenes: Vec<SceneFit>,
-    /// The objective over the scenes that choose: root mean square; none where it is known of none.
+    /// Root mean square of the objective over the scenes used for the choice; none if undefined.
     pub chosen_by: Option<f64>,
-    /// The objective over the scenes that are held out.
+    /// The objective over the validation scenes.
     pub held_out: Option<f64>,
 }
 
-/// Rows of a trial on a scene: the paper's caches in its orders.
+/// Rows of a trial per scene: the paper's caches in its orders.
 pub const ROWS: usize = z2::CACHES_KIB.len() * z2::ORDERS.len();
 
-/// Key of the distance between the eyes among a trial's settings.
+/// Key of the IPD among a trial's settings.
 pub const IPD_KEY: &str = "capture.ipd_m";
 
-/// A scene, and the captures of it that a trial may take.
+/// A scene with its captures.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneCaptures {
     /// Its label.
     pub label: String,
-    /// Whether settings are not chosen by it.
+    /// True for a validation scene, which does not influence the choice.
     pub held_out: bool,
-    /// Distance between the eyes in metres and index of the trace, by distance; as many in every scene.
+    /// IPD in metres and trace index of each capture, by IPD. The same number in every scene.
     pub captures: Vec<(f64, usize)>,
 }
 
 impl SceneCaptures {
-    /// Every trace as a scene of its own.
+    /// Each trace as a separate scene.
     #[must_use]
     pub fn one_each(subjects: &[Subject<'_>]) -> Vec<Self> {
         let scene = |(index, subject): (usize, &Subject<'_>)| Self {
@@ -75,11 +75,10 @@ impl SceneCaptures {
         subjects.iter().enumerate().map(scene).collect()
     }
 
-    /// The scenes of the traces, in the order of their first ones, each with its captures by distance between the
-    /// eyes.
+    /// Groups traces by scene, in order of first occurrence, with captures sorted by IPD.
     ///
     /// # Errors
-    /// A scene that was captured twice at one distance, or not at a distance at which another one was.
+    /// A scene with two captures at one IPD, or without a capture at an IPD that another scene has.
     pub fn by_ipd(subjects: &[Subject<'_>]) -> Result<Vec<Self>, String> {
         let mut scenes: Vec<Self> = Vec::new();
         for (index, subject) in subjects.iter().enumerate() {
@@ -116,14 +115,14 @@ impl SceneCaptures {
     }
 }
 
-/// Distance between the eyes of a trace, metres.
+/// IPD of a trace in metres.
 fn ipd_m(subject: &Subject<'_>) -> f64 {
-    // Through text: 0.064 as a single-precision number is no 0.064 in double precision.
+    // Converts through text, because 0.064 in single precision is not 0.064 in double precision.
     let text = subject.source.tables().meta.hmd.ipd_m.to_string();
     text.parse().unwrap_or_default()
 }
 
-/// A row's rates: of first look-ups where the machine counts them, as the paper does, else of primary misses.
+/// Miss rates of a row: of first look-ups as in the paper if the machine counts them, else of primary misses.
 fn measured(row: &ResultRow) -> Measured {
     let result = row.result;
     let (l1, l2) = row.caches_kib();
@@ -145,8 +144,7 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> Option<f64> {
     (count > 0).then(|| (sum / count as f64).sqrt())
 }
 
-/// The trials of a plan whose last axes are the paper's caches and orders, distance by distance and then in the
-/// plan's order.
+/// The trials of a plan whose last axes are the paper's caches and orders, by IPD and then in the plan's order.
 #[must_use]
 pub fn trials(
     plan: &Plan,
@@ -190,7 +188,7 @@ pub fn trials(
     trials.collect()
 }
 
-/// How the paper's caches and orders do on a scene.
+/// Fit of the paper's caches and orders on a scene.
 fn fit(scene: &SceneCaptures, rows: &[ResultRow]) -> SceneFit {
     let measured: Vec<Measured> = rows.iter().map(measured).collect();
     let off = measured.iter().filter_map(|row| {
@@ -206,7 +204,7 @@ fn fit(scene: &SceneCaptures, rows: &[ResultRow]) -> SceneFit {
     }
 }
 
-/// Keys that the paper's table varies.
+/// True for the settings that vary within the paper's table.
 #[must_use]
 pub fn is_of_the_table(key: &str) -> bool {
     ["l1.size_bytes", "l2.size_bytes", "order"].contains(&key)

@@ -1,4 +1,4 @@
-//! An experiment file: traces, a base configuration and what is varied around it.
+//! An experiment file: traces, a base configuration, and the values to vary.
 //!
 //! ```toml
 //! traces = ["crytek.textrace"]      # beside the file; the command line's traces win
@@ -12,7 +12,7 @@
 //! ```
 
 use super::plan::{Axis, MOST_POINTS, Plan, PlanError};
-use crate::config::RunConfig;
+use crate::config::{Levels, RunConfig};
 use serde::Deserialize;
 use std::collections::HashSet;
 use toml::de::{DeTable, DeValue};
@@ -21,20 +21,20 @@ use toml::{Table, Value};
 /// A parsed experiment file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExperimentFile {
-    /// Traces that it names.
+    /// Traces named in the file.
     pub traces: Vec<String>,
     /// The base configuration.
     pub base: RunConfig,
-    /// Axes that are crossed, in the order of the file; the last one runs fastest.
+    /// Axes to be crossed, in file order; the last one varies fastest.
     pub axes: Vec<Axis>,
-    /// Values that are tried alone.
+    /// Values tried one at a time.
     pub one_at_a_time: Vec<Axis>,
 }
 
-/// A leaf of the document: its key with dots, where the key stands, and its value.
+/// A leaf of the document: dotted key, position of the key, and value.
 type Leaf<'a, 'i> = (String, usize, &'a DeValue<'i>);
 
-/// What is wrong with a key, and where the key stands in the text.
+/// An error at a key, and the key's position in the text.
 struct Fault {
     offset: usize,
     key: String,
@@ -45,18 +45,9 @@ impl ExperimentFile {
     /// Parses an experiment file.
     ///
     /// # Errors
-    /// Syntax, an unknown key, a value that its key does not take; each with its line.
+    /// A syntax error, an unknown key or an invalid value, each with its line.
     pub fn parse(text: &str) -> Result<Self, PlanError> {
-        let line_at = |offset: usize| 1 + text.bytes().take(offset).filter(|b| *b == b'\n').count();
-        let document = DeTable::parse(text).map_err(|e| PlanError::Syntax {
-            line: line_at(e.span().map_or(0, |s| s.start)),
-            message: brief(e.message()),
-        })?;
-        Self::read(document.get_ref()).map_err(|fault| PlanError::Key {
-            line: line_at(fault.offset),
-            key: brief(&fault.key),
-            message: brief(&fault.message),
-        })
+        read(text, Self::read)
     }
 
     fn read(document: &DeTable) -> Result<Self, Fault> {
@@ -67,7 +58,7 @@ impl ExperimentFile {
             one_at_a_time: Vec::new(),
         };
         let mut base = to_table(&file.base);
-        // Axes are checked against the base, wherever the file has it.
+        // Axes are checked against the base, wherever it stands in the file.
         let mut sections: Vec<_> = document.iter().collect();
         sections.sort_by_key(|(key, _)| (key.get_ref() != "base", key.span().start));
         for (key, value) in sections {
@@ -84,19 +75,7 @@ impl ExperimentFile {
                         file.traces.push(name.to_owned());
                     }
                 }
-                ("base", DeValue::Table(table)) => {
-                    for (key, offset, value) in leaves(table)? {
-                        let set = to_value(value).and_then(|value| {
-                            set(&mut base, &key, value);
-                            parsed(&base)
-                        });
-                        file.base = set.map_err(|message| Fault {
-                            offset,
-                            key,
-                            message,
-                        })?;
-                    }
-                }
+                ("base", DeValue::Table(table)) => file.base = with_keys(&mut base, table)?,
                 ("axes", DeValue::Table(table)) => file.axes = axes(table, &base)?,
                 ("one-at-a-time", DeValue::Table(table)) => {
                     file.one_at_a_time = axes(table, &base)?;
@@ -120,16 +99,57 @@ impl ExperimentFile {
         Ok(file)
     }
 
-    /// Every point of the file.
+    /// All points of the file.
     ///
     /// # Errors
-    /// Too many points, or one whose configuration is impossible.
+    /// Too many points, or an impossible configuration.
     pub fn plan(&self) -> Result<Plan, PlanError> {
         Plan::cross(self.base, &self.axes, &self.one_at_a_time)
     }
 }
 
-/// The beginning of a text that may repeat a whole file.
+/// Parses a configuration file: its keys override the defaults.
+///
+/// # Errors
+/// As [`ExperimentFile::parse`].
+pub fn parse_config(text: &str) -> Result<RunConfig, PlanError> {
+    read(text, |document| {
+        with_keys(&mut to_table(&RunConfig::default()), document)
+    })
+}
+
+/// Reads a document, adding lines to errors.
+fn read<T>(text: &str, content: impl Fn(&DeTable) -> Result<T, Fault>) -> Result<T, PlanError> {
+    let line_at = |offset: usize| 1 + text.bytes().take(offset).filter(|b| *b == b'\n').count();
+    let document = DeTable::parse(text).map_err(|e| PlanError::Syntax {
+        line: line_at(e.span().map_or(0, |s| s.start)),
+        message: brief(e.message()),
+    })?;
+    content(document.get_ref()).map_err(|fault| PlanError::Key {
+        line: line_at(fault.offset),
+        key: brief(&fault.key),
+        message: brief(&fault.message),
+    })
+}
+
+/// Sets the keys of a table in a configuration.
+fn with_keys(config: &mut Table, table: &DeTable) -> Result<RunConfig, Fault> {
+    let mut last = parsed(config).unwrap_or_default();
+    for (key, offset, value) in leaves(table)? {
+        let found = to_value(value).and_then(|value| {
+            set(config, &key, value);
+            parsed(config)
+        });
+        last = found.map_err(|message| Fault {
+            offset,
+            key,
+            message,
+        })?;
+    }
+    Ok(last)
+}
+
+/// The beginning of a text, which may quote a whole file.
 fn brief(text: &str) -> String {
     const LONGEST_CHARS: usize = 500;
     match text.char_indices().nth(LONGEST_CHARS) {
@@ -138,7 +158,7 @@ fn brief(text: &str) -> String {
     }
 }
 
-/// The axes of a section, in the order of the file, every value checked against the base.
+/// The axes of a section, in file order, with every value checked against the base.
 fn axes(table: &DeTable, base: &Table) -> Result<Vec<Axis>, Fault> {
     let axis = |key: &str, value: &DeValue| {
         let values = match to_value(value)? {
@@ -173,14 +193,16 @@ fn axes(table: &DeTable, base: &Table) -> Result<Vec<Axis>, Fault> {
         .collect()
 }
 
-/// The leaves of nested tables with dotted keys, in the order of the file. One key may be written in several
-/// ways (`"l1.ways"`, `l1.ways`), but only once.
+/// The leaves of nested tables with dotted keys, in file order. A key can be written in several ways
+/// (`"l1.ways"`, `l1.ways`), but only once.
 fn leaves<'a, 'i>(table: &'a DeTable<'i>) -> Result<Vec<Leaf<'a, 'i>>, Fault> {
     fn walk<'a, 'i>(table: &'a DeTable<'i>, prefix: &str, out: &mut Vec<Leaf<'a, 'i>>) {
         for (key, value) in table.iter() {
             let path = format!("{prefix}{}", key.get_ref());
             match value.get_ref() {
-                DeValue::Table(inner) => walk(inner, &format!("{path}."), out),
+                DeValue::Table(inner) if !inner.is_empty() => {
+                    walk(inner, &format!("{path}."), out);
+                }
                 leaf => out.push((path, key.span().start, leaf)),
             }
         }
@@ -228,43 +250,35 @@ fn to_value(value: &DeValue) -> Result<Value, String> {
     }
 }
 
-/// Sets a dotted key, and makes the tables that it goes through. A number is an index into a list of tables, or that of
-/// a table after the last one: `level.0.size_bytes`.
+/// Sets a dotted key, creating the tables on its path. Levels are addressed by name (`l1.size_bytes`); the
+/// level after the last one is added.
 pub(super) fn set(table: &mut Table, key: &str, value: Value) {
-    match key.split_once('.') {
-        None => {
-            table.insert(key.to_owned(), value);
+    let Some((first, rest)) = key.split_once('.') else {
+        table.insert(key.to_owned(), value);
+        return;
+    };
+    let is_level = |name: &&str| name.eq_ignore_ascii_case(first);
+    if let Some(index) = Levels::NAMES.iter().position(is_level)
+        && let Some(levels) = table.get_mut("level").and_then(Value::as_array_mut)
+        && index <= levels.len()
+    {
+        if index == levels.len() {
+            levels.push(Value::Table(Table::new()));
         }
-        Some((first, rest)) => {
-            let inner = table
-                .entry(first)
-                .or_insert_with(|| Value::Table(Table::new()));
-            if let Some((index, rest)) = rest.split_once('.')
-                && let Ok(index) = index.parse::<usize>()
-                && let Some(item) = item_of(inner, index)
-            {
-                return set(item, rest, value);
-            }
-            if !inner.is_table() {
-                *inner = Value::Table(Table::new());
-            }
-            if let Value::Table(inner) = inner {
-                set(inner, rest, value);
-            }
+        if let Some(level) = levels[index].as_table_mut() {
+            set(level, rest, value);
         }
+        return;
     }
-}
-
-/// A table of a list, which is made where there is none.
-fn item_of(list: &mut Value, index: usize) -> Option<&mut Table> {
-    if !list.is_array() {
-        *list = Value::Array(Vec::new());
+    let inner = table
+        .entry(first)
+        .or_insert_with(|| Value::Table(Table::new()));
+    if !inner.is_table() {
+        *inner = Value::Table(Table::new());
     }
-    let items = list.as_array_mut()?;
-    if items.len() == index {
-        items.push(Value::Table(Table::new()));
+    if let Value::Table(inner) = inner {
+        set(inner, rest, value);
     }
-    items.get_mut(index)?.as_table_mut()
 }
 
 fn to_table(config: &RunConfig) -> Table {

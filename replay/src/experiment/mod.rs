@@ -1,10 +1,9 @@
-//! Experiments: which points to replay, replaying them, and keeping their results.
+//! Experiments: planning, replaying and storing points.
 //!
-//! A point is a configuration with its provenance (which axes are set, which single change is
-//! tried); a [`Plan`] is a list of points, checked before any work; [`run`] replays every point on
-//! every trace, and its [`Outcome`] hands out rows that know their neighbours. A [`Split`] deals the
-//! points out to machines, [`run_part`] replays what one of them has to, and [`merge`] puts what
-//! all have kept together.
+//! A point is a configuration together with the axis values and the single change that produced it. A
+//! [`Plan`] is a list of points, checked before any work. [`run`] replays every point on every trace; its
+//! [`Outcome`] provides rows with references to their comparison points. A [`Split`] distributes points to
+//! machines, [`run_part`] replays one machine's points, and [`merge`] combines the stored results.
 
 mod calibration;
 mod file;
@@ -17,7 +16,7 @@ mod store;
 mod subject;
 
 pub use calibration::{Objective, SceneCaptures, SceneFit, Trial, is_of_the_table, trials};
-pub use file::ExperimentFile;
+pub use file::{ExperimentFile, parse_config};
 pub use outcome::{Outcome, ResultRow};
 pub use plan::{Axis, MOST_POINTS, Plan, PlanError, Point, Setting, plain};
 pub use runner::{AbsentPoint, Incomplete, RunError, merge, run, run_part};

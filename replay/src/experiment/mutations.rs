@@ -1,4 +1,4 @@
-//! Damaged experiment files and configurations: read or refused, quickly.
+//! Damaged experiment files and configurations must be read or refused, quickly.
 
 use super::*;
 use crate::config::RunConfig;
@@ -11,7 +11,7 @@ const SEEDS: [&str; 4] = [
     "traces = [\"a.textrace\", \"b.textrace\"]\n[base]\nmode = \"functional\"\ncores = 4\n[base.l1]\nsize_bytes = \"8KiB\"\nways = 4\nreplacement = \"fifo\"\n[base.tmu]\nthreads = 64\n[axes]\norder = [\"morton\"]\nseed = [1, 2]\n",
 ];
 
-/// What a file may hold at a wrong place.
+/// Pieces inserted at random positions.
 const PIECES: [&str; 16] = [
     "9223372036854775807",
     "-1",
@@ -57,7 +57,7 @@ fn mutated(random: &mut Random) -> String {
             }
             2 if !text.is_empty() => text[at] = char::from(random.below(128) as u8),
             3 => {
-                // A value in place of a value.
+                // Replaces a value by another value.
                 let rest = text[at..]
                     .iter()
                     .position(|c| *c == '=')
@@ -73,7 +73,7 @@ fn mutated(random: &mut Random) -> String {
     text.into_iter().collect()
 }
 
-/// Plans a file as `replay sweep` does and reads it as `replay run --config` does.
+/// Reads a file both as `replay sweep` and as `replay run --config` do.
 fn read(text: &str) -> bool {
     let start = Instant::now();
     let planned = ExperimentFile::parse(text).and_then(|file| file.plan());
@@ -96,7 +96,7 @@ fn read(text: &str) -> bool {
 fn ten_thousand_damaged_files_are_read_or_refused() {
     let mut random = Random(8);
     let read = (0..10_000).filter(|_| read(&mutated(&mut random))).count();
-    // Neither everything nor nothing is refused, or the mutations test nothing.
+    // If all or none were refused, the mutations would test nothing.
     assert!((500..9500).contains(&read), "{read}");
 }
 

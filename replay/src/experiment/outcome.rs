@@ -1,4 +1,4 @@
-//! Results in the order of the plan, as rows that know the points they are held against.
+//! Results in plan order, as rows that know their comparison points.
 
 use super::plan::{functional, on_preset};
 use super::{Plan, Point, Setting, Subject, frame_count};
@@ -9,19 +9,19 @@ use crate::preset::Preset;
 use crate::result::RunResult;
 use std::collections::HashMap;
 
-/// What a plan yields.
+/// The results of a plan.
 pub struct Outcome<'a> {
     /// The traces.
     pub subjects: &'a [Subject<'a>],
     /// The points.
     pub plan: &'a Plan,
-    /// What was replayed now; other results came from the store or were the same point's.
+    /// Work of this run; other results were stored already or belong to equal points.
     pub work: Work,
     /// `results[subject * points + point]`.
     results: Vec<RunResult>,
 }
 
-/// A point of a trace with its result, and the results of the points it is held against.
+/// A point of a trace with its result, and the results that it is compared with.
 #[derive(Clone, Copy)]
 pub struct ResultRow<'a> {
     /// The trace.
@@ -30,21 +30,21 @@ pub struct ResultRow<'a> {
     pub point: &'a Point,
     /// Its result.
     pub result: &'a RunResult,
-    /// Everything the same in Morton order; none where the order does not vary.
+    /// The same settings in Morton order; none if the order does not vary.
     pub morton: Option<&'a RunResult>,
-    /// The same settings without the change; none where there is no change.
+    /// The same settings without the change; none if there is no change.
     pub unchanged: Option<&'a RunResult>,
-    /// The same settings in functional mode, where this is not that change.
+    /// The same settings in functional mode, unless that is the change.
     pub functional: Option<&'a RunResult>,
-    /// The same settings on the machine of [`Preset::Z2_PAPER`], where this is not that change.
+    /// The same settings on the machine of [`Preset::Z2_PAPER`], unless that is the change.
     pub z2_paper: Option<&'a RunResult>,
-    /// The same in Morton order.
+    /// Those in Morton order.
     pub z2_paper_morton: Option<&'a RunResult>,
-    /// The paper's row for the scene that the trace stands for.
+    /// The paper's row for the scene that the trace stands in for.
     pub paper: Option<&'static PublishedRow>,
 }
 
-/// Name of a point in an index.
+/// Key of a point in an index.
 type PointName = (Vec<(String, String)>, Option<(String, String)>);
 
 fn name(settings: &[Setting], change: Option<&Setting>, order: Option<&str>) -> PointName {
@@ -56,7 +56,7 @@ fn name(settings: &[Setting], change: Option<&Setting>, order: Option<&str>) -> 
 }
 
 impl<'a> Outcome<'a> {
-    /// Results of every point on every trace, `results[subject * points + point]`.
+    /// The results of every point on every trace, `results[subject * points + point]`.
     #[must_use]
     pub fn new(
         plan: &'a Plan,
@@ -72,13 +72,13 @@ impl<'a> Outcome<'a> {
         }
     }
 
-    /// What the results share, for whoever waited for them.
+    /// Describes for the user how much work was shared.
     #[must_use]
     pub fn shared(&self) -> String {
         self.work.summary(self.results.len())
     }
 
-    /// A row for every point of every trace, in that order.
+    /// One row per trace and point, in that order.
     #[must_use]
     pub fn rows(&self) -> Vec<ResultRow<'_>> {
         let points = &self.plan.points;
@@ -130,9 +130,9 @@ impl<'a> Outcome<'a> {
     }
 }
 
-/// The paper's row for a trace's scene, if the caches are the paper's, too.
+/// The paper's row for a trace's scene, if the caches are also the paper's.
 fn published(subject: &Subject, point: &Point, order: Order) -> Option<&'static PublishedRow> {
-    let [l1, l2] = [&point.config.l1, &point.config.l2].map(|cache| cache.size_bytes);
+    let [l1, l2] = [&point.config.level.l1, &point.config.level.l2].map(|cache| cache.size_bytes);
     let exact = l1.is_multiple_of(1024) && l2.is_multiple_of(1024);
     let kib = |bytes: u64| u32::try_from(bytes / 1024).ok().filter(|_| exact);
     z2::row(subject.stand_in_for?, kib(l1)?, kib(l2)?, order)
@@ -144,7 +144,10 @@ impl ResultRow<'_> {
     pub fn caches_kib(&self) -> (f64, f64) {
         let config = &self.point.config;
         let kib = |bytes: u64| bytes as f64 / 1024.0;
-        (kib(config.l1.size_bytes), kib(config.l2.size_bytes))
+        (
+            kib(config.level.l1.size_bytes),
+            kib(config.level.l2.size_bytes),
+        )
     }
 
     /// Both sizes in KiB, as `8/128`.
@@ -154,26 +157,26 @@ impl ResultRow<'_> {
         format!("{l1}/{l2}")
     }
 
-    /// Bytes of all frames as MB (10^6 bytes) a frame.
+    /// Converts bytes of all frames to MB (10^6 bytes) per frame.
     #[must_use]
     pub fn mb_per_frame(&self, bytes: u64) -> f64 {
         self.per_frame(bytes as f64 / 1e6)
     }
 
-    /// A sum over all frames as a mean per frame.
+    /// Converts a sum over all frames to a mean per frame.
     #[must_use]
     pub fn per_frame(&self, sum: f64) -> f64 {
         let frames = frame_count(self.subject.source.tables()).max(1);
         sum / f64::from(frames)
     }
 
-    /// Traffic of an infinite cache, bytes.
+    /// DRAM traffic of an infinite cache in bytes.
     #[must_use]
     pub fn bound_bytes(&self) -> u64 {
         self.result.unique_lines * u64::from(self.point.config.line_bytes)
     }
 
-    /// External traffic saved against another result, percent; none where that has none.
+    /// DRAM traffic saved relative to another result, percent; none if that has no traffic.
     #[must_use]
     pub fn saved_pct(&self, against: Option<&RunResult>) -> Option<f64> {
         let whole = against?.external_bytes as f64;

@@ -1,4 +1,4 @@
-//! Points and their provenance.
+//! Points, and where they come from.
 
 use super::file::{parsed, set};
 use crate::config::{Mode, Order, RunConfig};
@@ -7,18 +7,18 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 use toml::{Table, Value};
 
-/// More points than this are taken for a mistake.
+/// Upper limit for the number of points. More are taken for a mistake.
 pub const MOST_POINTS: usize = 100_000;
 
-/// A key of the configuration, with dots, and a value.
+/// A dotted key of the configuration, and a value.
 pub type Setting = (String, Value);
 
 /// A key and its values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Axis {
-    /// Key of the configuration, with dots.
+    /// Dotted key of the configuration.
     pub key: String,
-    /// Values in the order of the file.
+    /// Values in file order.
     pub values: Vec<Value>,
 }
 
@@ -29,19 +29,19 @@ impl Axis {
     }
 }
 
-/// One configuration and where it comes from.
+/// A configuration and where it comes from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
-    /// Values of the axes, in their order.
+    /// Values of the axes, in order.
     pub settings: Vec<Setting>,
-    /// The value that is tried alone, if any.
+    /// The value tried alone, if any.
     pub change: Option<Setting>,
-    /// The whole configuration.
+    /// The complete configuration.
     pub config: RunConfig,
 }
 
 impl Point {
-    /// `order=z2-sta l1.size_bytes=8KiB`, with the change at the end.
+    /// `order=z2-sta l1.size_bytes=8KiB`, followed by the change.
     #[must_use]
     pub fn title(&self) -> String {
         let parts: Vec<String> = self
@@ -66,49 +66,49 @@ pub fn plain(value: &Value) -> String {
         .map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// Why an experiment cannot be planned. What comes from a file names the line.
+/// Reasons why an experiment cannot be planned. Errors in files name the line.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 pub enum PlanError {
-    /// No TOML.
+    /// Invalid TOML.
     #[error("line {line}: {message}")]
     Syntax {
-        /// Line from 1.
+        /// Line, counted from 1.
         line: usize,
-        /// The parser's words.
+        /// The parser's message.
         message: String,
     },
-    /// A key that the experiment or the configuration does not have, or a value it does not take.
+    /// An unknown key, or an invalid value.
     #[error("line {line}: `{key}`: {message}")]
     Key {
-        /// Line from 1.
+        /// Line, counted from 1.
         line: usize,
-        /// Key with dots.
+        /// Dotted key.
         key: String,
-        /// Expected and found.
+        /// What was expected and found.
         message: String,
     },
-    /// A configuration that no machine can have.
+    /// An impossible configuration.
     #[error("point {point}: {message}")]
     Point {
-        /// What is set at the point.
+        /// Settings of the point.
         point: String,
-        /// What is wrong.
+        /// Description of the error.
         message: String,
     },
     /// Too many points.
     #[error("expected at most {MOST_POINTS} points, found {found}")]
     TooMany {
-        /// Points.
+        /// Number of points.
         found: usize,
     },
 }
 
-/// Points in the order of their results, each a configuration that a machine can have.
+/// Points in the order of their results, with valid configurations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// What every point has but for its settings and its change.
+    /// The configuration of every point before its settings and its change.
     pub base: RunConfig,
-    /// The points: changes outermost, then the axes, the last one running fastest.
+    /// The points: changes outermost, then axes, the last one varying fastest.
     pub points: Vec<Point>,
 }
 
@@ -116,7 +116,7 @@ impl Plan {
     /// The product of `axes`, with the base and with every single change.
     ///
     /// # Errors
-    /// Too many points, or one whose configuration is impossible.
+    /// Too many points, or an impossible configuration.
     pub fn cross(
         base: RunConfig,
         axes: &[Axis],
@@ -162,10 +162,10 @@ impl Plan {
         Self { base, points }.checked()
     }
 
-    /// One point, and the same in the other mode as a change if `both_modes`.
+    /// A single point, and with `both_modes` the same in the other mode as a change.
     ///
     /// # Errors
-    /// A configuration that no machine can have.
+    /// An impossible configuration.
     pub fn single(config: RunConfig, both_modes: bool) -> Result<Self, PlanError> {
         let point = Point {
             settings: Vec::new(),
@@ -185,7 +185,7 @@ impl Plan {
     /// The Z2 paper's experiment: every order with every pair of L1 and L2 sizes in bytes.
     ///
     /// # Errors
-    /// A configuration that no machine can have.
+    /// An impossible configuration.
     pub fn paper(
         base: RunConfig,
         caches_bytes: &[(u64, u64)],
@@ -196,8 +196,8 @@ impl Plan {
         for &(l1_bytes, l2_bytes) in caches_bytes {
             for &order in orders {
                 let mut config = RunConfig { order, ..base };
-                config.l1.size_bytes = l1_bytes;
-                config.l2.size_bytes = l2_bytes;
+                config.level.l1.size_bytes = l1_bytes;
+                config.level.l2.size_bytes = l2_bytes;
                 let setting = |key: &str, value: Value| (key.to_owned(), value);
                 points.push(Point {
                     settings: vec![
@@ -217,35 +217,35 @@ impl Plan {
         plan.checked()
     }
 
-    /// Asks for counts by tile of the first caches, for the baseline and for what the paper
-    /// proposes.
+    /// Requests per-tile counts with the first caches, for the baseline and for the paper's proposal.
     #[must_use]
     pub fn with_tile_maps(mut self) -> Self {
-        let caches = |point: &Point| [point.config.l1, point.config.l2];
+        let caches = |point: &Point| [point.config.level.l1, point.config.level.l2];
         let first = self.points.first().map(caches);
         for point in &mut self.points {
             let mapped = [Order::MORTON, Order::Z2_STA].contains(&point.config.order);
             if mapped && point.change.is_none() && Some(caches(point)) == first {
                 point.config.tile_maps = true;
+                point.config.timeline = point.config.is_looping();
             }
         }
         self
     }
 
-    /// Adds every timed point on another machine: `machine` but for its caches' sizes and its order.
+    /// Adds every timed point on another machine: `machine` with the point's cache sizes and order.
     ///
     /// # Errors
-    /// A configuration that no machine can have.
+    /// An impossible configuration.
     pub fn beside(mut self, preset: Preset, machine: RunConfig) -> Result<Self, PlanError> {
         let timed = (self.points.iter())
-            .filter(|point| point.change.is_none() && point.config.mode == Mode::Timed);
+            .filter(|point| point.change.is_none() && point.config.is_looping());
         let others = timed.map(|point| {
             let mut config = RunConfig {
                 order: point.config.order,
                 ..machine
             };
-            config.l1.size_bytes = point.config.l1.size_bytes;
-            config.l2.size_bytes = point.config.l2.size_bytes;
+            config.level.l1.size_bytes = point.config.level.l1.size_bytes;
+            config.level.l2.size_bytes = point.config.level.l2.size_bytes;
             Point {
                 settings: point.settings.clone(),
                 change: Some(on_preset(preset)),
@@ -259,7 +259,7 @@ impl Plan {
 
     /// Adds every timed point in functional mode.
     fn add_functional(&mut self) {
-        let timed = self.points.iter().filter(|p| p.config.mode == Mode::Timed);
+        let timed = self.points.iter().filter(|p| p.config.is_looping());
         let functional: Vec<Point> = timed
             .map(|point| Point {
                 settings: point.settings.clone(),

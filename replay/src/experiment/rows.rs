@@ -1,11 +1,12 @@
-//! Rows of a points file: a line each, whose checksum notices every changed byte.
+//! Rows of a points file: one line each, with a checksum that detects every changed byte.
 //!
-//! `CRC-32 MODEL-VERSION KEY JSON\n`, the checksum in 8 hex digits over what follows it and its space.
+//! The form is `CRC-32 MODEL-VERSION KEY JSON\n`. The checksum has 8 hex digits and covers everything after
+//! the following space.
 
-/// What a line holds behind its checksum.
+/// Content of a line after the checksum.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Row<'a> {
-    /// Version of the models that counted.
+    /// Version of the models that produced the counts.
     pub model_version: u32,
     /// Key of the point.
     pub key: &'a str,
@@ -14,7 +15,7 @@ pub(super) struct Row<'a> {
 }
 
 impl<'a> Row<'a> {
-    /// The line, with its line feed.
+    /// The line, including its line feed.
     pub fn encode(&self) -> Vec<u8> {
         let Self {
             model_version,
@@ -25,10 +26,10 @@ impl<'a> Row<'a> {
         format!("{:08x} {content}\n", crc32fast::hash(content.as_bytes())).into_bytes()
     }
 
-    /// Reads a line with its line feed.
+    /// Reads a line, including its line feed.
     ///
     /// # Errors
-    /// What was expected and what was found.
+    /// What was expected and found.
     pub fn decode(line: &'a [u8]) -> Result<Self, String> {
         let Some(line) = line.strip_suffix(b"\n") else {
             return Err("expected a line feed at its end, found the end of the file".to_owned());

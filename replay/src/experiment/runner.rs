@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// A point failed.
+/// A point that failed.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The replay failed.
@@ -22,19 +22,19 @@ pub enum RunError {
         label: String,
         /// The point's settings.
         point: String,
-        /// What went wrong.
+        /// The error.
         source: Box<ReplayError>,
     },
-    /// The result could not be kept.
+    /// The result could not be stored.
     #[error("{0:#}")]
     Store(anyhow::Error),
 }
 
-/// Replays every point on every trace, in parallel, taking what the store has; `done` is called with how
-/// many points are done with each step.
+/// Replays every point on every trace in parallel, except points in the store. `done` is called with the
+/// number of points completed by each step.
 ///
 /// # Errors
-/// The first point, in the plan's order, that fails; results of other points are kept.
+/// The first failing point in plan order. Results of other points are stored.
 pub fn run<'a>(
     plan: &'a Plan,
     subjects: &'a [Subject<'a>],
@@ -54,8 +54,8 @@ pub fn run<'a>(
     Ok(outcome(plan, subjects, &groups, &results, work))
 }
 
-/// Replays the points that are wanted and not in the store, and keeps them there; `wanted[subject]`
-/// are the distinct configurations, as [`super::Split`] numbers them.
+/// Replays the wanted points that are not in the store, and stores them. `wanted[subject]` lists distinct
+/// configurations by their number in [`super::Split`].
 ///
 /// # Errors
 /// As [`run`].
@@ -79,7 +79,7 @@ pub fn run_part(
     Ok(work)
 }
 
-/// The outcome of a plan whose every point is in the store.
+/// The outcome of a plan whose points are all in the store.
 ///
 /// # Errors
 /// All points that are not.
@@ -118,7 +118,7 @@ pub fn merge<'a>(
     Ok(outcome(plan, subjects, &groups, &results, Work::default()))
 }
 
-/// Hands every point its group's result; `results[subject]` has one a group.
+/// Assigns each point its group's result; `results[subject]` has one result per group.
 fn outcome<'a>(
     plan: &'a Plan,
     subjects: &'a [Subject<'a>],
@@ -139,34 +139,34 @@ fn outcome<'a>(
     Outcome::new(plan, subjects, of_all, work)
 }
 
-/// Points of a plan that the store lacks.
+/// Points of a plan that are not in the store.
 #[derive(Debug, thiserror::Error)]
 pub struct Incomplete {
-    /// Distinct points of the plan.
+    /// Number of distinct points of the plan.
     pub expected: usize,
-    /// Those that are not there.
+    /// The missing points.
     pub absent: Vec<AbsentPoint>,
-    /// Rows of the store that were not taken.
+    /// Rows of the store that were skipped.
     pub damages: Vec<String>,
-    /// Its rows of other model versions, by version.
+    /// Number of rows of each other model version.
     pub foreign: BTreeMap<u32, usize>,
 }
 
-/// A point that the store lacks.
+/// A point that is not in the store.
 #[derive(Debug)]
 pub struct AbsentPoint {
     /// Trace and settings.
     pub name: String,
-    /// Why.
+    /// The reason.
     pub why: Absent,
 }
 
 impl fmt::Display for Incomplete {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        /// More than these nobody reads; `--plan --json` has them all.
+        /// Longer lists are cut; `--plan --json` prints all points.
         const LISTED: usize = 50;
         let (expected, found) = (self.expected, self.absent.len());
-        write!(f, "{found} of {expected} points are not there:")?;
+        write!(f, "{found} of {expected} points are missing:")?;
         for AbsentPoint { name, why } in self.absent.iter().take(LISTED) {
             write!(f, "\n  {name}: {why}")?;
         }
@@ -174,20 +174,20 @@ impl fmt::Display for Incomplete {
             write!(f, "\n  and {more} more (--plan --json lists all)")?;
         }
         for damage in self.damages.iter().take(LISTED) {
-            write!(f, "\n  not taken: {damage}")?;
+            write!(f, "\n  skipped: {damage}")?;
         }
         for (version, rows) in &self.foreign {
             write!(
                 f,
-                "\n  not taken: {rows} rows of model version {version}, expected {MODEL_VERSION}"
+                "\n  skipped: {rows} rows of model version {version}, expected {MODEL_VERSION}"
             )?;
         }
         Ok(())
     }
 }
 
-/// Points, by index, that one replay of a trace answers together: those with the same
-/// configuration (a change may try the value that the base has).
+/// Groups points, by index, with the same configuration, which need one replay per trace. (A change may try
+/// the base's value.)
 pub(super) fn groups(points: &[Point]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     let mut known: HashMap<String, usize> = HashMap::new();
@@ -202,14 +202,14 @@ pub(super) fn groups(points: &[Point]) -> Vec<Vec<usize>> {
     groups
 }
 
-/// Groups of points of a trace that are wanted: what the store has of them, and what the engine finds.
+/// The wanted groups of a trace: stored results, and results of the engine.
 struct Part<'p> {
     plan: &'p Plan,
     subject: &'p Subject<'p>,
     groups: Vec<Vec<usize>>,
     store: Option<&'p Store>,
     done: &'p (dyn Fn(u64) + Sync),
-    /// Groups that the store lacks, and their configurations.
+    /// Groups that are not in the store, and their configurations.
     missing: Vec<usize>,
     configs: Vec<RunConfig>,
     /// By group.
@@ -218,7 +218,7 @@ struct Part<'p> {
 }
 
 impl<'p> Part<'p> {
-    /// Takes what the store has.
+    /// Reads the stored results.
     fn new(
         plan: &'p Plan,
         subject: &'p Subject<'p>,
@@ -245,7 +245,7 @@ impl<'p> Part<'p> {
         }
     }
 
-    /// Keeps what the engine found.
+    /// Stores a result of the engine.
     fn finished(&self, index: usize, mut result: RunResult) {
         let group = self.missing[index];
         if let Some(store) = self.store {
@@ -258,7 +258,7 @@ impl<'p> Part<'p> {
         (self.done)(self.groups[group].len() as u64);
     }
 
-    /// A result for each group.
+    /// One result per group.
     fn end(
         self,
         replayed: Result<Work, (usize, ReplayError)>,
@@ -276,7 +276,7 @@ impl<'p> Part<'p> {
     }
 }
 
-/// What the engine finds of each part, beside what the store has.
+/// Replays the missing groups of each part.
 fn replayed(parts: Vec<Part<'_>>) -> Vec<Result<(Vec<RunResult>, Work), RunError>> {
     let memory = LineMemory::new(LineMemory::USUAL_BYTES);
     let tell = |part| move |index, result| Part::finished(part, index, result);
@@ -297,7 +297,7 @@ fn replayed(parts: Vec<Part<'_>>) -> Vec<Result<(Vec<RunResult>, Work), RunError
         .collect()
 }
 
-/// A thread that panicked while it held the lock ends the whole run; until then nothing is lost.
+/// A thread that panics while holding the lock ends the whole run, so the data is still valid.
 fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

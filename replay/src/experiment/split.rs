@@ -1,60 +1,60 @@
-//! Who replays what when a plan is split over machines.
+//! Distributes the points of a plan to machines.
 //!
-//! Points that share a pass stay together, and passes that share a trace's expansion stay side by
-//! side, so that few machines expand it again.
+//! Points of a group (one pass) stay together, and groups that share a trace's expansion are adjacent, so
+//! that few machines repeat an expansion.
 
 use super::Plan;
 use super::runner::groups;
-use crate::config::{Mode, RunConfig};
+use crate::config::{RunConfig, TmuModel};
 use crate::engine::sharing;
 use shell::{Piece, Shard, balanced};
 
-/// Estimated costs a quad record, in quarters of what expanding it to lines costs. They decide how
-/// well shards are balanced, never what comes out.
+/// Estimated costs per quad record, relative to expanding it to lines (4). They affect the balance of
+/// shards, never the results.
 mod cost {
     pub const EXPANSION: u64 = 4;
-    /// Caches without latencies: the first configuration of a pass, and each that shares it.
+    /// Caches without latencies: the first configuration of a pass, and each further one.
     pub const FUNCTIONAL: u64 = 3;
     pub const FUNCTIONAL_PART: (u64, u64) = (1, 8);
     pub const TIMED: u64 = 6;
     pub const FIRST_MISS: u64 = 9;
-    /// Four times the longest that a unit took of one processor in results/replay-costs.csv.
+    /// Nanoseconds per unit: four times the slowest measurement in results/replay-costs.csv.
     pub const NANOSECONDS: u64 = 1200;
 }
 
-/// Points of a trace that are replayed together.
+/// Points of a trace that are replayed in one pass.
 struct Pass {
     subject: usize,
     /// Indexes of [`groups`].
     groups: Vec<usize>,
     piece: Piece,
-    /// Its part of the expansion that it shares with others.
+    /// Its share of an expansion used by several passes.
     expansion: u64,
 }
 
-/// A plan's points on its traces, as they are best dealt out.
+/// The points of a plan on its traces, in the order of their distribution.
 pub struct Split {
     passes: Vec<Pass>,
-    /// Cost of expanding a trace, by [`Piece::set`].
+    /// Cost of each expansion, by [`Piece::set`].
     expansions: Vec<u64>,
     subjects: usize,
 }
 
-/// A point on a trace: their indexes, and what they cost.
+/// A point on a trace, and its cost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Task {
     /// Index of the trace.
     pub subject: usize,
     /// Index of the first point of the plan with this configuration.
     pub point: usize,
-    /// Number of the pass; points of one pass cost little more than one of them.
+    /// Number of the pass. All points of a pass cost little more than one of them.
     pub pass: usize,
-    /// Estimated share of the work, in no unit.
+    /// Estimated share of the work, unitless.
     pub cost: u64,
 }
 
 impl Split {
-    /// Splits the points of a plan; `records[subject]` are the quad records of each trace.
+    /// Splits the points of a plan; `records[subject]` is the number of quad records of each trace.
     #[must_use]
     pub fn new(plan: &Plan, records: &[u64]) -> Self {
         let distinct = groups(&plan.points);
@@ -101,7 +101,7 @@ impl Split {
         wanted
     }
 
-    /// Minutes that the costliest of so many shards takes, estimated with a margin; ten at least.
+    /// Estimated minutes of the slowest of `count` shards, with a margin, and at least ten.
     #[must_use]
     pub fn minutes(&self, count: u32) -> u64 {
         let cost = |passes: std::ops::Range<usize>| -> u64 {
@@ -126,8 +126,7 @@ impl Split {
         balanced(&pieces, &self.expansions, count)
     }
 
-    /// Every distinct point on every trace, those of one pass together; only a shard's if one is
-    /// given.
+    /// Every distinct point on every trace, grouped by pass; with `shard`, only its points.
     #[must_use]
     pub fn tasks(&self, plan: &Plan, shard: Option<Shard>) -> Vec<Task> {
         let distinct = groups(&plan.points);
@@ -147,13 +146,13 @@ impl Split {
     }
 }
 
-/// Cost a quad record of a pass over an order that answers so many configurations.
+/// Cost per quad record of a pass that simulates `configs` configurations.
 fn pass_cost(config: &RunConfig, configs: u64) -> u64 {
     let (part, of) = cost::FUNCTIONAL_PART;
-    match config.mode {
-        Mode::Timed | Mode::PrefetchFifo => cost::TIMED,
-        Mode::FirstMiss => cost::FIRST_MISS,
-        Mode::Functional => cost::FUNCTIONAL + cost::FUNCTIONAL * (configs - 1) * part / of,
+    match config.tmu_model() {
+        Some(TmuModel::Looping | TmuModel::PrefetchFifo) => cost::TIMED,
+        Some(TmuModel::FirstMiss) => cost::FIRST_MISS,
+        None => cost::FUNCTIONAL + cost::FUNCTIONAL * (configs - 1) * part / of,
     }
 }
 
@@ -180,7 +179,7 @@ mod tests {
     #[test]
     fn every_point_of_every_trace_is_in_one_shard_whatever_their_number() {
         let (plan, split) = split(FILE, &[1000, 50, 0]);
-        // Changing the seed to what it is makes no new points.
+        // Changing the seed to its own value adds no points.
         let distinct = plan.points.len() - 9;
         for count in [1, 2, 3, 7, 40, 500] {
             let mut seen = vec![vec![0; distinct]; 3];
@@ -221,7 +220,7 @@ mod tests {
         let file = "[axes]\nseed = [1, 2, 3, 4, 5, 6, 7, 8]\n";
         let minutes = |records, count| split(file, &[records]).1.minutes(count);
         assert_eq!(minutes(1000, 1), 10);
-        // 8 timed passes and one expansion of 10^9 records in units of 1200 ns.
+        // 8 timed passes and one expansion of 10^9 records, in units of 1200 ns.
         assert_eq!(minutes(1_000_000_000, 1), (8 * 6 + 4) * 20);
         assert_eq!(minutes(1_000_000_000, 8), (6 + 4) * 20);
     }

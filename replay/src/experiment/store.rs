@@ -1,7 +1,7 @@
-//! Results of points in append-only files, so that a sweep that was cut off goes on where it stopped.
+//! Stores results of points in append-only files, so that an interrupted sweep can be resumed.
 //!
-//! Every process that has results writes one file of its own, so no two write to the same. Reading takes
-//! the rows of all files. A row that a killed process left unfinished is not taken, nor is a damaged one.
+//! Every process writes its own file, so no file has two writers. Reading takes the rows of all files,
+//! except damaged ones and those that a killed process left incomplete.
 
 use super::rows::Row;
 use crate::config::RunConfig;
@@ -20,13 +20,13 @@ use std::sync::{Mutex, PoisonError};
 /// Schema of a stored point.
 pub const POINT_SCHEMA: &str = "replay.point/2";
 
-/// What the names of points files end with.
+/// Extension of points files.
 const EXTENSION: &str = "rows";
 
-/// Larger than any point, counts by tile included.
+/// Upper limit for the size of a row, larger than any point with per-tile counts.
 const LARGEST_ROW_BYTES: u64 = 1 << 29;
 
-/// What a row holds.
+/// Content of a row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StoredPoint {
     /// `replay.point/2`.
@@ -35,47 +35,47 @@ pub struct StoredPoint {
     pub tool: String,
     /// Checksum of the trace's content.
     pub trace: String,
-    /// The whole configuration.
+    /// The complete configuration.
     pub config: RunConfig,
     /// Result.
     pub result: RunResult,
 }
 
-/// Why the store has no result of a point.
+/// Reasons why the store has no result for a point.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Absent {
     /// There is no row.
     #[error("missing")]
     Missing,
-    /// Its row cannot be read, or holds something else.
+    /// Its row is unreadable or belongs to another point.
     #[error("damaged: {0}")]
     Damaged(String),
 }
 
-/// Where a row lies.
+/// Location of a row.
 #[derive(Clone, Copy, Debug)]
 struct Place {
     /// Index of the file.
     file: usize,
-    /// From 1.
+    /// Line, counted from 1.
     line: usize,
     offset_bytes: u64,
     length_bytes: u64,
     crc32: u32,
 }
 
-/// The points of a sweep: what its files held when it was opened, and a file for what is added.
+/// The points of a sweep: the content of its files when opened, and a file for new rows.
 #[derive(Debug)]
 pub struct Store {
     folder: PathBuf,
-    /// First part of the name of a new file.
+    /// First part of new files' names.
     name: String,
     files: Vec<PathBuf>,
     rows: HashMap<String, Place>,
-    /// Keys that have two different results.
+    /// Keys with two different results.
     contradictions: HashMap<String, String>,
     damages: Vec<String>,
-    /// Rows of other model versions.
+    /// Number of rows of each other model version.
     foreign: BTreeMap<u32, usize>,
     added: Mutex<Added>,
 }
@@ -85,15 +85,14 @@ pub struct Store {
 enum Added {
     Nothing,
     To(File, PathBuf),
-    /// Writing failed for this reason: the last row may be cut, and nothing may follow it. Every thread names the first
-    /// failure's reason, as it is not settled whose error is shown.
+    /// Writing failed with this error. The last row may be incomplete, so nothing is appended. All threads
+    /// report the first error, because any of them may be the one shown.
     Failed(PathBuf, String),
 }
 
-/// Key of a point: a 128-bit FNV-1a hash of the model version, the trace's checksum and the whole
-/// configuration.
+/// Key of a point: a 128-bit FNV-1a hash of the model version, the trace's checksum and the complete configuration.
 ///
-/// The row repeats them, so that a collision costs a run and never gives a wrong result.
+/// The row repeats these, so a collision costs a replay but never gives a wrong result.
 #[must_use]
 pub fn point_key(trace: &TraceId, config: &RunConfig) -> String {
     const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013B;
@@ -110,11 +109,10 @@ pub fn point_key(trace: &TraceId, config: &RunConfig) -> String {
 }
 
 impl Store {
-    /// The points of the sweep whose outputs lie in `folder`; new ones go to a file of their own, named by
-    /// the shard.
+    /// Opens the points of the sweep with outputs in `folder`. New points go to a separate file, named after the shard.
     ///
     /// # Errors
-    /// The folder cannot be read. Files in it that cannot are damages.
+    /// The folder cannot be read. Unreadable files in it count as damages.
     pub fn open(folder: &Path, shard: Option<Shard>) -> anyhow::Result<Self> {
         let folder = folder.join("points");
         let cannot = || format!("{}: cannot read", folder.display());
@@ -154,25 +152,25 @@ impl Store {
         Ok(store)
     }
 
-    /// Where the points' files lie.
+    /// The folder of the points files.
     #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// Rows and files that were not taken: file, row, expected and found.
+    /// Skipped rows and files: file, row, expected and found.
     #[must_use]
     pub fn damages(&self) -> &[String] {
         &self.damages
     }
 
-    /// Rows of other model versions, by version.
+    /// Number of rows of each other model version.
     #[must_use]
     pub fn foreign(&self) -> &BTreeMap<u32, usize> {
         &self.foreign
     }
 
-    /// Notes every row of a file. What is no file is not opened: a pipe would be waited for.
+    /// Indexes every row of a file. Only regular files are opened, because a pipe would block.
     fn read_rows(&mut self, file: usize) -> io::Result<()> {
         let path = self.files[file].clone();
         let mut reader = BufReader::with_capacity(1 << 16, open_regular(&path)?);
@@ -212,7 +210,7 @@ impl Store {
         Ok(())
     }
 
-    /// Notes where a row is; the same row may be in several files.
+    /// Indexes a row; the same row may be in several files.
     fn note(&mut self, key: String, place: Place) {
         let known = *self.rows.entry(key.clone()).or_insert(place);
         if (known.crc32, known.length_bytes) != (place.crc32, place.length_bytes) {
@@ -226,7 +224,7 @@ impl Store {
         format!("{}: row {}", self.files[place.file].display(), place.line)
     }
 
-    /// A point's result, if it was computed before.
+    /// The stored result of a point.
     ///
     /// # Errors
     /// Why there is none: no row, or a damaged one.
@@ -260,8 +258,8 @@ impl Store {
         Ok(line)
     }
 
-    /// Keeps a point's result and returns it as it will be read back, so that a first run and a
-    /// resumed one print the same digits.
+    /// Stores a point's result and returns it as it will be read back, so that first and resumed runs print
+    /// the same digits.
     ///
     /// # Errors
     /// The row cannot be written.
@@ -288,7 +286,7 @@ impl Store {
         Ok(serde_json::from_str::<StoredPoint>(&json)?.result)
     }
 
-    /// Appends a row in one write, so that a killed process leaves at most its last row unfinished.
+    /// Appends a row in a single write, so that a killed process leaves at most its last row incomplete.
     fn append(&self, row: &[u8]) -> anyhow::Result<()> {
         let mut added = self.added.lock().unwrap_or_else(PoisonError::into_inner);
         if matches!(*added, Added::Nothing) {
@@ -306,7 +304,7 @@ impl Store {
         written.with_context(|| format!("{}: cannot write", path.display()))
     }
 
-    /// A file that no other process has.
+    /// Creates a file that no other process uses.
     fn new_file(&self) -> anyhow::Result<(File, PathBuf)> {
         let cannot = |path: &Path| format!("{}: cannot write", path.display());
         std::fs::create_dir_all(&self.folder).with_context(|| cannot(&self.folder))?;
@@ -320,7 +318,7 @@ impl Store {
                 Err(error) => return Err(error).with_context(|| cannot(&path)),
             }
         }
-        unreachable!("names do not end")
+        unreachable!("file names are unlimited")
     }
 }
 
@@ -424,7 +422,7 @@ mod tests {
                 assert!(found.is_err() || found == Ok(result(expected)), "byte {at}");
             }
         }
-        // What a killed process leaves: the rows before it are taken.
+        // A killed process leaves an incomplete last row; the rows before it are valid.
         std::fs::write(&path, &bytes[..bytes.len() - 5]).unwrap();
         let store = open(&folder);
         assert_eq!(store.find(&trace(), &config), Ok(result(7)));
@@ -448,7 +446,7 @@ mod tests {
         let store = open(&folder);
         assert_eq!(store.find(&trace(), &config), Err(Absent::Missing));
         assert_eq!(store.foreign(), &BTreeMap::from([(0, 1)]));
-        // A program that counts otherwise under the same version.
+        // A program with other counts under the same version.
         open(&folder).save(&trace(), &config, &result(7)).unwrap();
         open(&folder).save(&trace(), &config, &result(8)).unwrap();
         let found = open(&folder).find(&trace(), &config).unwrap_err();
@@ -478,7 +476,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn what_is_no_file_or_has_too_large_a_row_is_not_read() {
+    fn irregular_files_and_too_large_rows_are_not_read() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("points/all.1.rows");
         std::fs::create_dir_all(&path).unwrap();

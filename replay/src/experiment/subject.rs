@@ -1,4 +1,4 @@
-//! Traces of an experiment and their names.
+//! Traces of an experiment, and their labels.
 
 use crate::paper::z2;
 use crate::result::{TraceId, scene_name};
@@ -6,7 +6,7 @@ use crate::stream::TileSource;
 use formats::textrace::Tables;
 use formats::texture::TexelFormat;
 
-/// A trace to replay, and how to name it.
+/// A trace to replay, and its label.
 pub struct Subject<'a> {
     /// The trace.
     pub source: &'a dyn TileSource,
@@ -14,12 +14,12 @@ pub struct Subject<'a> {
     pub id: TraceId,
     /// Short name in tables, unique in the experiment.
     pub label: String,
-    /// Scene of the Z2 paper that it stands for.
+    /// Scene of the Z2 paper that it stands in for.
     pub stand_in_for: Option<&'static str>,
 }
 
 impl<'a> Subject<'a> {
-    /// A trace under a label; what it stands for follows from its scene's name.
+    /// A trace with a label. The scene's name determines what it stands in for.
     pub fn new(source: &'a dyn TileSource, id: TraceId, label: String) -> Self {
         let tables = source.tables();
         Self {
@@ -31,7 +31,7 @@ impl<'a> Subject<'a> {
     }
 }
 
-/// Frames that a trace renders.
+/// Number of frames of a trace.
 #[must_use]
 pub fn frame_count(tables: &Tables) -> u32 {
     let seen = tables.passes.iter().filter(|p| p.is_seen());
@@ -48,11 +48,11 @@ pub fn has_shadow_maps(tables: &Tables) -> bool {
     textures.any(|t| t.format == TexelFormat::R32f)
 }
 
-/// Short, unique names for traces given as tables, identity and file name without extension.
+/// Short, unique labels for traces, given as tables, identity and file stem.
 ///
-/// A trace goes by its scene's short name, with `+shadows` where a scene that is usually without
-/// them has shadow maps. Traces that would share a name go by their files' names, and by the
-/// checksum, too, where those are the same.
+/// The label is the scene's short name, with `+shadows` if the trace has shadow maps and the scene usually
+/// has none. Traces that would share a label are labelled by file stem, and by checksum as well if stems
+/// are equal.
 #[must_use]
 pub fn labels(traces: &[(&Tables, &TraceId, String)]) -> Vec<String> {
     let scenes: Vec<String> = traces
@@ -78,7 +78,7 @@ pub fn labels(traces: &[(&Tables, &TraceId, String)]) -> Vec<String> {
     names.iter().zip(traces).map(unique).collect()
 }
 
-/// A scene's short name, with `+shadows` where a scene that is usually without them has shadow maps.
+/// The scene's short name, with `+shadows` if the trace has shadow maps and the scene usually has none.
 #[must_use]
 pub fn scene_label(tables: &Tables) -> String {
     let name = scene_name(&tables.meta.scene);

@@ -5,7 +5,7 @@ use crate::result::TraceId;
 use crate::stream::MemoryTrace;
 use crate::stream::testing::tables;
 
-/// A trace without passes: its replay is empty, which is enough to count replays.
+/// A trace without passes. Its replay is empty, which suffices to count replays.
 fn empty(scene: &str) -> MemoryTrace {
     let mut tables = tables(&[]);
     tables.meta.scene = scene.to_owned();
@@ -47,42 +47,43 @@ fn axes_are_crossed_and_changes_come_alone() {
     );
     assert!(points.iter().all(|p| p.config.mode == Mode::Functional));
     assert_eq!(points[3].config.order, Order::Z2_STA);
-    assert_eq!(points[3].config.l1.size_bytes, 16 << 10);
-    assert_eq!(points[3].config.l1.ways, 4);
+    assert_eq!(points[3].config.level.l1.size_bytes, 16 << 10);
+    assert_eq!(points[3].config.level.l1.ways, 4);
 }
 
 #[test]
 fn levels_below_the_l2_are_axes_too() {
     let sizes = |file: &str| -> Vec<Vec<u64>> {
         let points = plan(file).points.into_iter();
-        let sizes = points.map(|p| p.config.level.iter().map(|l| l.size_bytes).collect());
+        let sizes = points.map(|p| p.config.level.lower().map(|l| l.size_bytes).collect());
         sizes.collect()
     };
-    let added = "[axes]\nlevel.0.size_bytes = [\"1MiB\", \"4MiB\"]\n";
+    let added = "[axes]\nl3.size_bytes = [\"1MiB\", \"4MiB\"]\n";
     assert_eq!(sizes(added), [vec![1 << 20], vec![4 << 20]]);
-    let base = "[base]\n[[base.level]]\nsize_bytes = \"1MiB\"\nways = 8\n";
+    let base = "[base.l3]\nsize_bytes = \"1MiB\"\nways = 8\n";
     assert_eq!(sizes(base), [vec![1 << 20]]);
-    let second = "[axes]\nlevel.1.size_bytes = [\"4MiB\"]\n[one-at-a-time]\nlevel.0.ways = [4]\n";
+    let second = "[axes]\nl4.size_bytes = [\"4MiB\"]\n[one-at-a-time]\nl3.ways = [4]\n";
     let both = format!("{base}{second}");
     assert_eq!(
         sizes(&both),
         [vec![1 << 20, 4 << 20], vec![1 << 20, 4 << 20]]
     );
     let points = plan(&both).points;
-    let ways = |point: &Point| point.config.level.iter().next().unwrap().ways;
+    let ways = |point: &Point| point.config.level.lower().next().unwrap().ways;
     assert_eq!(points.iter().map(ways).collect::<Vec<_>>(), [8, 4]);
-    let whole = "[one-at-a-time]\nlevel = [[{ size_bytes = \"1MiB\" }], []]\n";
-    assert_eq!(sizes(whole).last().unwrap().len(), 0);
+    let three = "[{ size_bytes = 1024 }, { size_bytes = 4096 }, { size_bytes = \"1MiB\" }]";
+    let whole = format!("[one-at-a-time]\nlevel = [{three}]\n");
+    assert_eq!(sizes(&whole).last().unwrap(), &[1 << 20]);
     for (file, text) in [
         (
-            "[axes]\nlevel.1.size_bytes = [\"1MiB\"]\n",
-            "expected a sequence",
+            "[axes]\nl4.size_bytes = [\"1MiB\"]\n",
+            "`l4.size_bytes`: unknown field `l4`",
         ),
         (
             "[axes]\nlevel.size_bytes = [\"1MiB\"]\n",
             "expected a sequence",
         ),
-        ("[axes]\nlevel.0.ways = [4]\n", "missing field `size_bytes`"),
+        ("[axes]\nl3.ways = [4]\n", "missing field `size_bytes`"),
         ("[axes]\nl1.0.ways = [4]\n", "line 2: `l1.0.ways`"),
     ] {
         let found = refusal(file);
@@ -91,11 +92,11 @@ fn levels_below_the_l2_are_axes_too() {
 }
 
 #[test]
-fn what_a_file_may_not_say_is_refused_with_its_line() {
+fn invalid_files_are_refused_with_the_line() {
     for (file, text) in [
         (
-            "[axes]\norder = [\"morton\"]\nl3.size_bytes = [\"1MiB\"]\n",
-            "line 3: `l3.size_bytes`: unknown field `l3`, expected one of `mode`, `order`",
+            "[axes]\norder = [\"morton\"]\nl7.size_bytes = [\"1MiB\"]\n",
+            "line 3: `l7.size_bytes`: unknown field `l7`, expected one of `mode`, `order`",
         ),
         (
             "[base]\nseed = 2\n[axis]\n",

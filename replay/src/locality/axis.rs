@@ -1,11 +1,11 @@
-//! Sets of times on an axis that is numbered anew when it is full: what is kept is as long as the
-//! distinct lines are many, however long the stream.
+//! Sets of times on an axis that is renumbered when full, so that memory depends on the number of distinct
+//! lines, not on the length of the stream.
 
-/// A set of times, a bit each, with a bit for every word that holds any, and so on: the last member
-/// before a time is found in a few words.
+/// A hierarchical bit set of times: one bit per time, one bit per non-empty word, and so on. Finding the
+/// last member before a time reads few words.
 #[derive(Clone, Debug)]
 pub(super) struct TimeSet {
-    /// From the members up; the last has one word.
+    /// Lowest level first; the last level has one word.
     levels: Vec<Vec<u64>>,
 }
 
@@ -46,12 +46,12 @@ impl TimeSet {
         }
     }
 
-    /// The last member at `time` or before.
+    /// The last member not later than `time`.
     #[inline(always)]
     pub(super) fn last_until(&self, time: u32) -> Option<u32> {
         let mut at = time as usize;
         let mut level = 0;
-        // Up until a word has a member at `at` or before it.
+        // Ascends to a word with a member at `at` or before it.
         let mut found = loop {
             let word = self.levels.get(level)?[at / 64] & (u64::MAX >> (63 - at % 64));
             if word != 0 {
@@ -60,7 +60,7 @@ impl TimeSet {
             at = (at / 64).checked_sub(1)?;
             level += 1;
         };
-        // Down to the last member below it.
+        // Descends to the last member below that bit.
         while level > 0 {
             level -= 1;
             found = found * 64 + self.levels[level][found].ilog2() as usize;
@@ -81,7 +81,7 @@ impl TimeSet {
         })
     }
 
-    /// The set under new numbers, on an axis of `times`.
+    /// The renumbered set, on an axis of `times`.
     pub(super) fn renumbered(&self, numbers: &Renumbering, times: u32) -> Self {
         let mut new = Self::new(times);
         self.iter().for_each(|time| new.insert(numbers.of(time)));
@@ -89,7 +89,7 @@ impl TimeSet {
     }
 }
 
-/// A set of times that tells how many members come after one.
+/// A set of times that counts the members after a time.
 #[derive(Clone, Debug)]
 pub(super) struct CountedTimes {
     words: Vec<u64>,
@@ -98,7 +98,7 @@ pub(super) struct CountedTimes {
     count: u32,
 }
 
-/// Words of a block.
+/// Words per block.
 const BLOCK: usize = 8;
 
 impl CountedTimes {
@@ -129,8 +129,7 @@ impl CountedTimes {
         self.count_in_block(word, 1);
     }
 
-    /// Takes out a member and puts in another, later one, which is the last: how many members lay
-    /// between them.
+    /// Removes a member and inserts `end`, which becomes the last one. Returns the number of members between them.
     #[inline(always)]
     pub(super) fn move_to_end(&mut self, time: u32, end: u32) -> u32 {
         let (from, to) = (time as usize / 64, end as usize / 64);
@@ -150,7 +149,7 @@ impl CountedTimes {
         after
     }
 
-    /// Members in the words up to `word`.
+    /// Number of members in the words up to `word`.
     fn count_until(&self, word: usize) -> u32 {
         let block = word / BLOCK;
         let own = &self.words[block * BLOCK..=word];
@@ -163,7 +162,7 @@ impl CountedTimes {
         count
     }
 
-    /// Its members become the first times of a new axis.
+    /// The renumbered set: members become the first times of a new axis.
     pub(super) fn renumbered(&self, numbers: &Renumbering, times: u32) -> Self {
         let mut new = Self::new(times);
         let members = TimeSet {
@@ -174,11 +173,11 @@ impl CountedTimes {
     }
 }
 
-/// New numbers of times: those that are still needed follow each other from zero.
+/// Maps the times still needed to consecutive new numbers from zero.
 #[derive(Clone, Debug)]
 pub(super) struct Renumbering {
     needed: Vec<u64>,
-    /// Needed times before each word.
+    /// Number of needed times before each word.
     before: Vec<u32>,
     count: u32,
 }
@@ -211,13 +210,13 @@ impl Renumbering {
         }
     }
 
-    /// Times that are kept.
+    /// Number of times kept.
     pub(super) fn len(&self) -> u32 {
         self.count
     }
 
-    /// The new number of a time: the needed times before it. Times that are not needed keep their
-    /// place among the needed ones.
+    /// The new number of a time: the number of needed times before it. Times that are not needed keep their
+    /// position among the needed ones.
     pub(super) fn of(&self, time: u32) -> u32 {
         let word = time as usize / 64;
         match self.needed.get(word) {
@@ -270,7 +269,7 @@ mod tests {
         let (mut set, mut plain) = (CountedTimes::new(times), BTreeSet::new());
         let (mut state, mut now) = (1, 0);
         while now < times {
-            // Members that lie far apart, too, and long empty stretches.
+            // Also uses distant members and long empty stretches.
             now += 1 + random(&mut state, if now % 7 == 0 { 900 } else { 2 });
             if now >= times {
                 break;

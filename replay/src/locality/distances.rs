@@ -1,11 +1,10 @@
-//! Counts of reuse distances: the distinct other lines used between two uses of a line (LRU stack
-//! distance, Mattson et al. 1970). A fully associative LRU cache of `n` lines hits at distances
-//! below `n`.
+//! Counts of reuse distances: the distinct other lines used between two uses of a line (LRU stack distance,
+//! Mattson et al. 1970). A fully associative LRU cache of `n` lines hits at distances below `n`.
 
 use super::place::{ByOrigin, add};
 use super::set_associative::CacheHits;
 
-/// Reuses by distance and by where the use before was.
+/// Reuses by distance and by location of the previous use.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Distances(Vec<ByOrigin>);
 
@@ -16,7 +15,7 @@ pub struct DistanceBin {
     pub from: u64,
     /// Last distance.
     pub to: u64,
-    /// Reuses by where the use before was.
+    /// Reuses by location of the previous use.
     pub reuses: ByOrigin,
 }
 
@@ -30,7 +29,7 @@ impl Distances {
         self.0[distance][origin] += times;
     }
 
-    /// Adds another stream's.
+    /// Adds the counts of another stream.
     pub(super) fn add(&mut self, other: &Self) {
         if self.0.len() < other.0.len() {
             self.0.resize(other.0.len(), ByOrigin::default());
@@ -60,7 +59,7 @@ impl Distances {
         self.below(usize::try_from(lines).unwrap_or(usize::MAX))
     }
 
-    /// Distances that occur, ascending.
+    /// The distances that occur, ascending.
     pub fn iter(&self) -> impl Iterator<Item = (u64, &ByOrigin)> {
         let all = (0..).zip(&self.0);
         all.filter(|(_, reuses)| **reuses != ByOrigin::default())
@@ -106,7 +105,7 @@ impl Distances {
         sizes.iter().map(point).collect()
     }
 
-    /// The smallest size in lines that hits wherever any size does.
+    /// The smallest size in lines with the maximum number of hits.
     #[must_use]
     pub fn enough_lines(&self) -> u64 {
         self.0.len() as u64

@@ -1,4 +1,4 @@
-//! What the analysis of a stream of lines yields.
+//! The results of analysing a stream of lines.
 
 use super::distances::Distances;
 use super::place::{ByOrigin, add};
@@ -6,34 +6,34 @@ use super::set_associative::CacheHits;
 use super::split::MissSplit;
 use super::working_set::WorkingSet;
 
-/// Figures of the lines that a cache is asked for; those of several caches of a level are sums.
+/// Figures of the lines looked up in a cache. Those of several caches of a level are sums.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Figures {
-    /// Lines asked for; first uses and reuses.
+    /// Line look-ups: first uses and reuses.
     pub accesses: u64,
     /// Distinct lines.
     pub unique_lines: u64,
-    /// Tiles in which lines were asked for.
+    /// Tiles with look-ups.
     pub tiles: u64,
-    /// Distinct lines of every frame, summed over frames.
+    /// Distinct lines per frame, summed over frames.
     pub frame_lines: u64,
-    /// Of those, lines that both eyes' tiles of the frame use.
+    /// Lines of a frame that tiles of both eyes use, summed over frames.
     pub frame_lines_of_both_eyes: u64,
-    /// Of those, lines that an earlier frame used.
+    /// Lines of a frame that an earlier frame used, summed over frames.
     pub frame_lines_of_earlier_frames: u64,
     /// Reuses by LRU stack distance.
     pub distances: Distances,
-    /// The configured cache.
+    /// Misses of the configured cache by cause.
     pub split: MissSplit,
-    /// LRU caches of some sizes and ways.
+    /// LRU caches of several sizes and ways.
     pub lru: Vec<CacheHits>,
-    /// Fully associative caches of some sizes under OPT, ascending.
+    /// Fully associative caches of several sizes under OPT, ascending.
     pub opt: Vec<CacheHits>,
     /// Capacity of the configured cache in lines.
     pub configured_lines: u64,
     /// Hits of the configured geometry under OPT.
     pub opt_of_geometry: ByOrigin,
-    /// By length.
+    /// By window length.
     pub working_sets: Vec<WorkingSet>,
 }
 
@@ -56,7 +56,7 @@ impl Figures {
             }
         }
         add(&mut self.opt_of_geometry, &other.opt_of_geometry);
-        // A core with less to do has fewer lengths.
+        // A core with fewer tiles has fewer lengths.
         for (index, other) in other.working_sets.iter().enumerate() {
             match self.working_sets.get_mut(index) {
                 Some(own) => own.add(other),
@@ -65,7 +65,7 @@ impl Figures {
         }
     }
 
-    /// Reuses by where the use before was: hits of a cache that forgets nothing.
+    /// Reuses by location of the previous use: the hits of an infinite cache.
     #[must_use]
     pub fn reuses(&self) -> ByOrigin {
         self.distances.total()

@@ -1,4 +1,4 @@
-//! When and where each line was used last, for the lines that were used at all.
+//! Time and place of the last use of each used line.
 
 use super::place::TileOfEye;
 
@@ -8,22 +8,22 @@ pub(super) const NEVER: u32 = u32::MAX;
 /// The last use of a line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LastUse {
-    /// On the axis of the stream; [`NEVER`] for a line that was not used yet.
+    /// Time on the axis of the stream; [`NEVER`] for an unused line.
     pub(super) time: u32,
-    /// Where.
+    /// Tile and eye.
     pub(super) place: TileOfEye,
-    /// When on the tiles' clock, by any eye, the left and the right; zero for never.
+    /// Work item of the last use by any eye, by the left and by the right; zero for never.
     pub(super) span: Span,
     pub(super) span_of_eye: [Span; 2],
 }
 
-/// A work item on the clock of tiles: its first tile, counted from 1, and how many it has. Zero
-/// stands for none. Later items are larger.
+/// A work item on the clock of tiles: its first tile, counted from 1, and its number of tiles. Zero stands
+/// for none. Later items compare as larger.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Span(u32);
 
 impl Span {
-    /// Tiles that a stream may have.
+    /// Maximum number of tiles of a stream.
     pub(super) const MOST_TILES: u32 = (1 << 31) - 2;
 
     /// `tiles` is 1 or 2.
@@ -39,7 +39,7 @@ impl Span {
         self.0 >> 1
     }
 
-    /// Tiles beyond the first.
+    /// Number of tiles after the first.
     pub(super) fn beyond(self) -> u32 {
         self.0 & 1
     }
@@ -54,13 +54,13 @@ impl LastUse {
     };
 }
 
-/// Lines of a page.
+/// Lines per page.
 const PAGE: usize = 64;
 
-/// Last uses by line; pages without a used line take no memory.
+/// Last uses by line. Pages without a used line take no memory.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LastUses {
-    /// Number of the page, counted from 1; zero where there is none.
+    /// Page number, counted from 1; zero for no page.
     directory: Vec<u32>,
     pages: Vec<[LastUse; PAGE]>,
 }
@@ -87,7 +87,7 @@ impl LastUses {
         self.directory[page]
     }
 
-    /// Lines that were used.
+    /// The lines used so far.
     pub(super) fn used(&mut self) -> impl Iterator<Item = &mut LastUse> {
         let lines = self.pages.iter_mut().flatten();
         lines.filter(|line| line.time != NEVER)

@@ -1,7 +1,7 @@
-//! Locality: how far apart the uses of lines lie, and what that means for caches of every size.
+//! Locality: the distances between uses of lines, and the resulting hits in caches of every size.
 //!
-//! [`Profile`] analyses one stream of lines, which it gets line by line, each with its place;
-//! [`analyse`] makes the streams of a trace, one pass an order, [`analyse_addresses`] those of plain addresses. `docs/locality.md` defines every
+//! [`Profile`] analyses a stream of lines, each with its place. [`analyse`] creates the streams of a trace,
+//! one per order, and [`analyse_addresses`] those of plain addresses. `docs/models/locality.md` defines every
 //! figure.
 
 mod axis;

@@ -1,11 +1,11 @@
-//! Belady's OPT (MIN): the fewest misses that a cache of a size can have, filled by every miss.
+//! Belady's OPT (MIN): the minimum number of misses of a cache that fills on every miss.
 //!
-//! A line that is kept from one use to the next takes a place meanwhile; every other use in between
-//! takes one, too, but only for itself. So a cache of `n` lines can keep those lines, and no more,
-//! that `n - 1` places can hold, where a place holds one line at a time. Which gives most hits is
-//! the scheduling of intervals on machines (Carlisle & Lloyd 1995, Faigle & Nawijn 1995): take
-//! intervals as they end, each into the place that became free last before it began. That needs no
-//! look ahead, so a pass over the stream is enough, and many sizes share it.
+//! A line kept between two uses occupies one of the cache's lines for that interval. One line must stay
+//! free for the other accesses in between, so a cache of `n` lines can keep intervals in `n - 1` places,
+//! each holding one interval at a time. Maximising hits is interval scheduling on machines (Carlisle &
+//! Lloyd 1995, Faigle & Nawijn 1995): process intervals in order of their end, and assign each to the place
+//! that became free last before its start. This needs no look-ahead, so one pass over the stream suffices,
+//! and many sizes share it.
 
 use super::axis::{Renumbering, TimeSet};
 use super::place::ByOrigin;
@@ -15,11 +15,11 @@ use super::place::ByOrigin;
 pub(super) struct FullyAssociative {
     /// Capacity.
     pub(super) lines: u32,
-    /// When places became free: the time of the last use before the end of what they held.
+    /// Times at which places became free: the last use before the end of the interval they held.
     free_since: TimeSet,
-    /// Places that held nothing yet.
+    /// Places without an interval so far.
     unused: u32,
-    /// Hits by where the use before was.
+    /// Hits by location of the previous use.
     pub(super) hits: ByOrigin,
 }
 
@@ -34,8 +34,8 @@ impl FullyAssociative {
         }
     }
 
-    /// A line that was used last at `before`, earlier than the time before `now`, is used: whether
-    /// it was kept.
+    /// Processes a use whose previous use at `before` is earlier than the access before `now`. Returns
+    /// whether the line was kept.
     #[inline(always)]
     pub(super) fn reuse(&mut self, before: u32, now: u32) -> bool {
         if let Some(free) = self.free_since.last_until(before) {
@@ -49,7 +49,7 @@ impl FullyAssociative {
         true
     }
 
-    /// Times when its places became free.
+    /// Times at which its places became free.
     pub(super) fn times(&self) -> &TimeSet {
         &self.free_since
     }
@@ -59,15 +59,15 @@ impl FullyAssociative {
     }
 }
 
-/// A set-associative cache under OPT: each set is a cache of its own.
+/// A set-associative cache under OPT, with independent sets.
 #[derive(Clone, Debug)]
 pub(super) struct SetAssociative {
-    /// By set: the time of its last use, then since when its other places are free; times are
-    /// counted from 1, and zero is before all.
+    /// By set: the time of its last use, then the times since which its other places are free. Times count
+    /// from 1; zero is before all.
     sets: Vec<u32>,
     ways: usize,
     set_mask: u32,
-    /// Hits by where the use before was.
+    /// Hits by location of the previous use.
     pub(super) hits: ByOrigin,
 }
 
@@ -82,7 +82,7 @@ impl SetAssociative {
         }
     }
 
-    /// A line is used, for the first time or after the use at `before`: whether it was kept.
+    /// Processes a first use or a use after `before`. Returns whether the line was kept.
     #[inline(always)]
     pub(super) fn access(&mut self, line: u32, before: Option<u32>, now: u32) -> bool {
         let first = (line & self.set_mask) as usize * self.ways;

@@ -1,9 +1,9 @@
-//! The analysis of a trace: one pass over its lines an order.
+//! Analyses a trace, with one pass over its lines per order.
 
 use super::figures::Figures;
 use super::place::Place;
 use super::profile::{Profile, StreamCache, check_size};
-use crate::config::{BetweenFrames, CacheConfig, ConfigError, Order, RunConfig};
+use crate::config::{BetweenFrames, ConfigError, LevelConfig, Order, RunConfig};
 use crate::engine::ReplayError;
 use crate::order::{self, Phase};
 use crate::stream::{
@@ -17,11 +17,11 @@ use rayon::prelude::*;
 /// A stream of lines in a machine without latencies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stream {
-    /// What each core asks its L1 for; figures are sums over the cores.
+    /// The L1 look-ups of each core; figures are sums over cores.
     L1,
-    /// What misses the configured L1 caches, in the order in which it reaches the L2.
+    /// The L2 look-ups: misses of the configured L1 caches, in order.
     L2,
-    /// What all cores ask for, as one L1 that they share would see it.
+    /// The look-ups of all cores, as in a shared L1.
     Merged,
 }
 
@@ -47,12 +47,12 @@ impl Stream {
     }
 }
 
-/// What puts accesses one after another.
+/// The order of the accesses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sequence {
     /// A tile order.
     Order(Order),
-    /// Plain addresses: the file.
+    /// As given in a file of plain addresses.
     AsGiven,
 }
 
@@ -76,7 +76,7 @@ impl Sequence {
     }
 }
 
-/// What a sequence of accesses makes of locality.
+/// The locality of a sequence of accesses.
 #[derive(Clone, Debug)]
 pub struct OrderFigures {
     /// The sequence.
@@ -85,11 +85,11 @@ pub struct OrderFigures {
     pub streams: Vec<(Stream, Figures)>,
 }
 
-/// Analyses a trace in every order, in parallel. Of `config` the order and latencies do not matter.
-/// `done` is called for every frame of every order.
+/// Analyses a trace in every order, in parallel. Order and latencies of `config` are not used. `done` is
+/// called for every frame of every order.
 ///
 /// # Errors
-/// An impossible configuration, or a trace that cannot be read.
+/// An impossible configuration, or an unreadable trace.
 pub fn analyse(
     trace: &dyn TileSource,
     config: &RunConfig,
@@ -103,8 +103,7 @@ pub fn analyse(
     let mut frames: Vec<u32> = passes.iter().map(|pass| pass.frame).collect();
     frames.sort_unstable();
     frames.dedup();
-    // What is known of the lines is kept from frame to frame, so only as many orders as run at the
-    // same time share an expansion of several frames.
+    // State is kept from frame to frame, so with several frames only orders that run concurrently share an expansion.
     let together = match frames.len() {
         0 | 1 => orders.len(),
         _ => rayon::current_num_threads(),
@@ -173,13 +172,13 @@ pub fn analyse(
     Ok(figures)
 }
 
-/// Where the tiles of a frame are, in an order.
+/// Places of a frame's tiles in an order.
 struct Places {
     /// Number of the first tile.
     first: usize,
-    /// Work item by tile, counted from 1, and whether it has two tiles.
+    /// Work item of each tile, counted from 1, and whether it has two tiles.
     items: Vec<(u32, bool)>,
-    /// First tile of each pass of the frame and its eye.
+    /// First tile and eye of each pass of the frame.
     passes: Vec<(usize, Option<Eye>)>,
 }
 
@@ -219,13 +218,13 @@ impl Places {
     }
 }
 
-/// The machine: analyses in place of caches.
+/// A machine with analyses instead of caches.
 struct Analysis {
     l1: Vec<Core>,
     l2: Shared,
     merged: Option<Shared>,
     places: Option<Places>,
-    /// Figures of what was asked for before the caches were emptied last.
+    /// Figures of the streams before the last flush.
     flushed: Vec<(Stream, Figures)>,
 }
 
@@ -237,14 +236,14 @@ fn add(streams: &mut Vec<(Stream, Figures)>, stream: Stream, figures: Figures) {
     }
 }
 
-/// A core's analysis, and where the core is.
+/// A core's analysis, and its current place.
 struct Core {
     profile: Profile,
     tile: Option<usize>,
     place: Place,
 }
 
-/// The analysis of what several cores share, and the tile that it was told of.
+/// The analysis of a stream shared by cores, and its current tile.
 struct Shared {
     profile: Profile,
     tile: Option<usize>,
@@ -263,8 +262,8 @@ impl Shared {
 
 impl Analysis {
     fn new(config: &RunConfig, merged: bool) -> Result<Self, ConfigError> {
-        // Seeds as in a replay.
-        let profile = |level: &'static str, cache: &CacheConfig, number: u32| {
+        // The seeds of a replay.
+        let profile = |level: &'static str, cache: &LevelConfig, number: u32| {
             Profile::new(StreamCache {
                 cache: *cache,
                 level,
@@ -277,23 +276,25 @@ impl Analysis {
             tile: None,
         };
         let core = |number| {
-            profile("L1", &config.l1, number).map(|profile| Core {
+            profile("L1", &config.level.l1, number).map(|profile| Core {
                 profile,
                 tile: None,
                 place: Place::default(),
             })
         };
-        let merged = merged.then(|| profile("L1", &config.l1, 1)).transpose()?;
+        let merged = merged
+            .then(|| profile("L1", &config.level.l1, 1))
+            .transpose()?;
         Ok(Self {
             l1: (1..=config.cores).map(core).collect::<Result<_, _>>()?,
-            l2: shared(profile("L2", &config.l2, 0)?),
+            l2: shared(profile("L2", &config.level.l2, 0)?),
             merged: merged.map(shared),
             places: None,
             flushed: Vec::new(),
         })
     }
 
-    /// Empties all caches, unless nothing was asked for yet.
+    /// Empties all caches, unless nothing has been looked up.
     fn flush(&mut self) -> Result<(), ConfigError> {
         if self.places.is_none() {
             return Ok(());

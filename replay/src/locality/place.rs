@@ -1,26 +1,26 @@
-//! Where an access comes from, and what that makes of a reuse.
+//! The place of an access, and the classification of reuses by it.
 
 use formats::view::Eye;
 
-/// Where an access comes from.
+/// The place of an access.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Place {
     /// Number of the tile, below [`Place::MOST_TILES`].
     pub tile: u32,
-    /// The eye that the tile is of.
+    /// The eye of the tile.
     pub eye: Option<Eye>,
-    /// Number of the work item (a tile, or tiles rendered together): later items have larger ones.
+    /// Number of the work item (one tile, or tiles rendered together), ascending in time.
     pub item: u32,
     /// Tiles of the work item: 1 or 2.
     pub tiles: u32,
 }
 
 impl Place {
-    /// Tiles that can be told apart.
+    /// Maximum number of tiles.
     pub const MOST_TILES: u32 = 1 << 30;
 }
 
-/// Tile and eye in a word.
+/// Tile and eye in one word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct TileOfEye(u32);
 
@@ -43,7 +43,7 @@ impl TileOfEye {
     }
 }
 
-/// Where the use before a reuse was. The first that fits counts.
+/// Location of the previous use of a reused line. The first that applies counts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
     /// In an earlier frame.
@@ -57,7 +57,7 @@ pub enum Origin {
 }
 
 impl Origin {
-    /// All of them, in the order of [`ByOrigin`].
+    /// All locations, in the order of [`ByOrigin`].
     pub const ALL: [Self; 4] = [
         Self::SameTile,
         Self::OtherTile,
@@ -88,7 +88,7 @@ impl Origin {
         }
     }
 
-    /// What a use at `before`, in this frame or not, makes of a reuse at `now`.
+    /// Classifies a reuse at `now` of a line previously used at `before`.
     #[inline(always)]
     pub(super) fn of(before: TileOfEye, in_this_frame: bool, now: TileOfEye) -> Self {
         if !in_this_frame {
@@ -104,7 +104,7 @@ impl Origin {
     }
 }
 
-/// Counts by where the use before was; see [`Origin::index`].
+/// Counts by location of the previous use; see [`Origin::index`].
 pub type ByOrigin = [u64; 4];
 
 /// Adds counts.

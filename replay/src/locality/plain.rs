@@ -1,16 +1,16 @@
-//! The analysis of plain addresses, in the sequence in which they are.
+//! Analyses plain addresses in their own order.
 
 use super::orders::{OrderFigures, Sequence, Stream};
 use super::place::Place;
 use super::profile::{Profile, StreamCache, check_size};
 use crate::addresses::{AddressError, KindSet, for_line_blocks};
-use crate::config::{CacheConfig, ConfigError, RunConfig};
+use crate::config::{ConfigError, LevelConfig, RunConfig};
 use formats::interop::plain::AddressFile;
 
-/// Look-ups of the first level that stand for a tile.
+/// First-level look-ups that count as one tile.
 const LOOKUPS_A_TILE: u64 = 1024;
 
-/// A level's analysis, and the tile that it was told of.
+/// The analysis of a level, and its current tile.
 struct Level {
     profile: Profile,
     tile: Option<u64>,
@@ -19,7 +19,7 @@ struct Level {
 impl Level {
     fn new(
         level: &'static str,
-        cache: &CacheConfig,
+        cache: &LevelConfig,
         config: &RunConfig,
         number: u64,
     ) -> Result<Self, ConfigError> {
@@ -27,7 +27,7 @@ impl Level {
             cache: *cache,
             level,
             line_bytes: config.line_bytes,
-            // As in a replay.
+            // The seed of a replay.
             seed: config.seed.wrapping_add(number),
         })?;
         Ok(Self {
@@ -36,7 +36,7 @@ impl Level {
         })
     }
 
-    /// True if the cache has the line.
+    /// Returns true for a hit.
     fn access(&mut self, tile: u64, line: u32) -> bool {
         if self.tile != Some(tile) {
             self.tile = Some(tile);
@@ -52,35 +52,34 @@ impl Level {
     }
 }
 
-/// Sets that lines must be told apart by: those of the largest cache of the curves.
+/// Number of sets that line numbers must distinguish: that of the largest cache of the curves.
 fn most_sets(
     level: &'static str,
-    cache: &CacheConfig,
+    cache: &LevelConfig,
     line_bytes: u32,
 ) -> Result<u32, ConfigError> {
-    /// What lines can be told apart by.
+    /// The limit of line renumbering.
     const MOST: u32 = 1 << 24;
     let lines = u64::from(cache.sets(level, line_bytes)?) * u64::from(cache.ways);
     let largest = lines.next_power_of_two() * Profile::LARGEST_OVER_CONFIGURED;
     Ok(u32::try_from(largest).unwrap_or(MOST).min(MOST))
 }
 
-/// Analyses the accesses of `kinds`: what the L1 is asked for, and what of it the L2 is. Of `config` line size,
-/// caches and seed count.
+/// Analyses the accesses of `kinds` at the L1, and its misses at the L2. Uses line size, caches and seed of `config`.
 ///
 /// # Errors
-/// An impossible configuration; input that cannot be read, is damaged or has nothing to analyse.
+/// An impossible configuration; input that is unreadable, damaged or has nothing to analyse.
 pub fn analyse_addresses(
     file: AddressFile<'_>,
     config: &RunConfig,
     kinds: KindSet,
 ) -> Result<OrderFigures, AddressError> {
     check_size(config, 1)?;
-    let sets = [("L1", &config.l1), ("L2", &config.l2)]
+    let sets = [("L1", &config.level.l1), ("L2", &config.level.l2)]
         .map(|(level, cache)| most_sets(level, cache, config.line_bytes));
     let [l1_sets, l2_sets] = sets;
-    let mut l1 = Level::new("L1", &config.l1, config, 1)?;
-    let mut l2 = Level::new("L2", &config.l2, config, 0)?;
+    let mut l1 = Level::new("L1", &config.level.l1, config, 1)?;
+    let mut l2 = Level::new("L2", &config.level.l2, config, 0)?;
     let mut lookups = 0;
     let most_sets = l1_sets?.max(l2_sets?);
     for_line_blocks(file, config.line_bytes, most_sets, kinds, |block| {

@@ -1,9 +1,9 @@
-//! The analysis of one stream of lines, line by line.
+//! Analyses a stream of lines.
 //!
-//! Every new use of a line gets the next time on an axis. The times of the lines' last uses that lie
-//! behind a line's own are the distinct lines used since: its stack distance (Bennett & Kruskal
-//! 1975, Olken 1981), counted in O(log n). A line that is used again at once moves nothing. A full
-//! axis is numbered anew, so that memory follows from the distinct lines alone.
+//! Every use of a line gets the next time on an axis. The number of lines whose last use is later than this
+//! line's is the number of distinct lines used since: its stack distance (Bennett & Kruskal 1975, Olken
+//! 1981), counted in O(log n). Immediate reuse changes nothing. A full axis is renumbered, so memory
+//! depends only on the number of distinct lines.
 
 use super::axis::{CountedTimes, Renumbering};
 use super::distances::Distances;
@@ -14,54 +14,52 @@ use super::place::{ByOrigin, Origin, Place, TileOfEye, add};
 use super::set_associative::{CacheHits, SetAssociative};
 use super::split::MissSplit;
 use super::working_set::WorkingSets;
-use crate::cache::{AnyCache, Cache};
-use crate::config::{CacheConfig, ConfigError, RunConfig};
+use crate::config::{ConfigError, LevelConfig, RunConfig, accept};
+use crate::memory::{AnyCache, Cache};
 
-/// The cache that a stream goes to.
+/// The cache that receives a stream.
 #[derive(Clone, Copy, Debug)]
 pub struct StreamCache {
     /// Size, ways and policy.
-    pub cache: CacheConfig,
+    pub cache: LevelConfig,
     /// `L1` or `L2`, for errors.
     pub level: &'static str,
-    /// Bytes of a line.
+    /// Bytes per line.
     pub line_bytes: u32,
     /// Seed of random replacement.
     pub seed: u64,
 }
 
-/// Associativities of the curves.
+/// Associativities in the curves.
 const WAYS: [u32; 5] = [1, 2, 4, 8, 16];
 
-/// Sizes of the curves: the configured one over 8 to 16 times it.
+/// Sizes in the curves: from 1/8 to 16 times the configured size, as powers of two.
 const SIZES: std::ops::RangeInclusive<i32> = -3..=4;
 
-/// More lines of all caches together than this are taken for a mistake: the curves' caches, up to sixteen times
-/// as large and of several associativities, take some 800 MiB for as many.
+/// Upper limit for the lines of all caches. The caches of the curves, up to sixteen times as large and of
+/// several associativities, then take about 800 MiB.
 const MOST_LINES: u64 = 1 << 21;
 
-/// Checks that memory holds what stands for caches of a configuration, `first_levels` of them L1s.
+/// Checks that memory suffices for the caches of a configuration with `first_levels` L1s.
 ///
 /// # Errors
 /// Too many lines.
 pub(super) fn check_size(config: &RunConfig, first_levels: u32) -> Result<(), ConfigError> {
-    let lines = |cache: &CacheConfig| cache.size_bytes / u64::from(config.line_bytes);
-    let of_first = lines(&config.l1).saturating_mul(first_levels.into());
-    let found = of_first.saturating_add(lines(&config.l2));
-    if found <= MOST_LINES {
-        return Ok(());
-    }
-    Err(ConfigError::Range {
-        key: "lines of all L1 and L2 caches",
-        expected: "at most 2097152 for locality, whose curves go to sixteen times the size",
-        found: found.to_string(),
-    })
+    let lines = |cache: &LevelConfig| cache.size_bytes / u64::from(config.line_bytes);
+    let of_first = lines(&config.level.l1).saturating_mul(first_levels.into());
+    let found = of_first.saturating_add(lines(&config.level.l2));
+    accept(
+        found <= MOST_LINES,
+        "lines of all L1 and L2 caches",
+        "at most 2097152 for locality, whose curves extend to 16 times the size",
+        found,
+    )
 }
 
-/// Times of the first axis.
+/// Length of the first axis.
 const FIRST_AXIS: u32 = 1 << 16;
 
-/// An analysis under way. Tell it the place, then every line asked for there.
+/// An analysis in progress. Set the place with [`Self::at`], then add every line looked up there.
 pub struct Profile {
     of: StreamCache,
     cache: Box<dyn Cache>,
@@ -71,21 +69,21 @@ pub struct Profile {
     here: TileOfEye,
     item: Option<u32>,
     span: Span,
-    /// Tiles begun.
+    /// Number of tiles so far.
     tiles: u32,
 
     uses: LastUses,
-    /// Times of all lines' last uses.
+    /// Times of the last uses of all lines.
     last_times: CountedTimes,
     now: u32,
     /// Length of the axis.
     times: u32,
-    /// When the frame began: on the axis, and on the clock of tiles.
+    /// Start of the frame, on the axis and on the clock of tiles.
     frame_start: u32,
     frame_first: Span,
 
     distances: Distances,
-    /// Reuses of the line that was used last.
+    /// Immediate reuses.
     at_once: ByOrigin,
     split: MissSplit,
     lru: SetAssociative,
@@ -98,18 +96,18 @@ pub struct Profile {
 }
 
 impl Profile {
-    /// Largest size of the curves over the configured one, rounded up to a power of two.
+    /// Largest size in the curves over the configured size rounded up to a power of two.
     pub(super) const LARGEST_OVER_CONFIGURED: u64 = 1 << *SIZES.end();
 
-    /// An analysis before its first line.
+    /// An empty analysis.
     ///
     /// # Errors
-    /// A cache that cannot be built.
+    /// An impossible cache.
     pub fn new(of: StreamCache) -> Result<Self, ConfigError> {
         Self::with_axis(of, FIRST_AXIS)
     }
 
-    /// An analysis whose first axis has so many times, a multiple of 64.
+    /// An analysis whose first axis has this length, a multiple of 64.
     pub(super) fn with_axis(of: StreamCache, times: u32) -> Result<Self, ConfigError> {
         let sets = of.cache.sets(of.level, of.line_bytes)?;
         let ways = of.cache.ways;
@@ -162,12 +160,11 @@ impl Profile {
         })
     }
 
-    /// Empties all caches and returns the figures of what was asked for until then. What follows is
-    /// analysed as a stream of its own. The configured cache stays the same one, since random
-    /// replacement goes on with its numbers.
+    /// Empties all caches and returns the figures so far. What follows is analysed as a separate stream.
+    /// The configured cache is reused, because random replacement continues its sequence.
     ///
     /// # Errors
-    /// A cache that cannot be built.
+    /// An impossible cache.
     pub fn flush(&mut self) -> Result<Figures, ConfigError> {
         let next = Self::with_axis(self.of, self.times)?;
         let mut last = std::mem::replace(self, next);
@@ -176,14 +173,14 @@ impl Profile {
         Ok(last.finish())
     }
 
-    /// A frame begins. Caches keep what they hold.
+    /// Starts a frame. Caches keep their lines.
     pub fn begin_frame(&mut self) {
         self.frame_start = self.now;
         self.frame_first = Span::new(self.tiles + 1, 1);
         self.item = None;
     }
 
-    /// What follows is asked for here.
+    /// Sets the place of the following look-ups.
     pub fn at(&mut self, place: &Place) {
         self.here = TileOfEye::of(place);
         if self.item.is_none_or(|item| place.item > item) {
@@ -193,7 +190,7 @@ impl Profile {
         }
     }
 
-    /// A line is asked for. True if the configured cache has it; it is filled where not.
+    /// Looks up a line in all caches, and fills it on a miss. Returns true for a hit in the configured cache.
     pub fn access(&mut self, line: u32) -> bool {
         if self.now == self.times {
             self.renumber();
@@ -245,7 +242,7 @@ impl Profile {
         hit
     }
 
-    /// Leaves on the axis only the times that something still refers to.
+    /// Removes all times from the axis that are no longer referenced.
     #[cold]
     fn renumber(&mut self) {
         let opt_times = self.opt.iter().map(opt::FullyAssociative::times);
@@ -264,7 +261,7 @@ impl Profile {
         (self.now, self.times) = (numbers.len(), times);
     }
 
-    /// The figures of all that was asked for.
+    /// The figures of all look-ups.
     #[must_use]
     pub fn finish(mut self) -> Figures {
         for last in self.uses.used() {

@@ -1,20 +1,20 @@
-//! Set-associative LRU caches of many sizes and ways, by the forest that sweeps use.
+//! Set-associative LRU caches of many sizes and ways, simulated by the forest that sweeps use.
 
 use super::place::{ByOrigin, add};
-use crate::cache::Forest;
+use crate::memory::Forest;
 
 /// Hits of a cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CacheHits {
     /// Capacity in lines.
     pub lines: u64,
-    /// Associativity; none is full.
+    /// Associativity; none for fully associative.
     pub ways: Option<u32>,
-    /// Hits by where the use before was.
+    /// Hits by location of the previous use.
     pub hits: ByOrigin,
 }
 
-/// Caches that see the same lines.
+/// Caches that receive the same lines.
 #[derive(Clone, Debug)]
 pub(super) struct SetAssociative {
     forest: Forest,
@@ -26,14 +26,14 @@ pub(super) struct SetAssociative {
 #[derive(Clone, Debug)]
 struct Tree {
     sets: u32,
-    /// Associativities asked for, ascending.
+    /// Requested associativities, ascending.
     ways: Vec<u32>,
     /// Reuses by depth.
     depths: Vec<ByOrigin>,
 }
 
 impl SetAssociative {
-    /// Empty caches: powers of two of sets, with ways; at least one.
+    /// Empty caches of at least one geometry: sets (a power of two) and ways.
     pub(super) fn new(mut geometries: Vec<(u32, u32)>) -> Self {
         geometries.sort_unstable();
         geometries.dedup();
@@ -57,7 +57,7 @@ impl SetAssociative {
         }
     }
 
-    /// A line is used, for the first time or again.
+    /// Accesses a line for the first time or again.
     #[inline(always)]
     pub(super) fn access(&mut self, line: u32, origin: Option<usize>) {
         self.forest.access(line, &mut self.depths);

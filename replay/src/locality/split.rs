@@ -1,20 +1,20 @@
-//! Why a cache misses: compulsory, capacity and conflict misses (Hill & Smith 1989), access by
-//! access as Dinero IV tells them apart.
+//! Classifies misses as compulsory, capacity and conflict misses (Hill & Smith 1989), access by access as
+//! Dinero IV does.
 
 use super::place::{ByOrigin, add};
 
-/// What became of the accesses to a cache, held against a fully associative LRU cache of its size.
+/// Accesses of a cache, compared with a fully associative LRU cache of its size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MissSplit {
-    /// First uses: no cache has the line.
+    /// First uses, which miss in every cache.
     pub compulsory: u64,
-    /// Misses of both caches but the first uses, by where the use before was.
+    /// Other misses of both caches, by location of the previous use.
     pub capacity: ByOrigin,
-    /// Misses where the fully associative cache hits.
+    /// Misses that hit in the fully associative cache.
     pub conflict: ByOrigin,
-    /// Hits where the fully associative cache misses.
+    /// Hits that miss in the fully associative cache.
     pub spared: ByOrigin,
-    /// Hits of both.
+    /// Hits in both caches.
     pub hits_of_both: ByOrigin,
 }
 
@@ -50,7 +50,7 @@ impl MissSplit {
         self.compulsory + sum(&self.capacity) + sum(&self.spared)
     }
 
-    /// Adds another cache's.
+    /// Adds the counts of another cache.
     pub(super) fn add(&mut self, other: &Self) {
         self.compulsory += other.compulsory;
         add(&mut self.capacity, &other.capacity);

@@ -1,9 +1,9 @@
-//! The analysis against plain twins that know the whole stream: lists, sets and full look-ahead.
+//! Compares the analysis with plain twins that use lists, sets and full look-ahead.
 
 mod plain;
 
 use super::*;
-use crate::config::{BetweenFrames, CacheConfig, Mode, Order, Replacement, RunConfig};
+use crate::config::{BetweenFrames, LevelConfig, Levels, Mode, Order, Replacement, RunConfig};
 use crate::engine::replay;
 use crate::stream::MemoryTrace;
 use crate::stream::synthetic::Synthetic;
@@ -11,7 +11,7 @@ use formats::textrace::Pass;
 use formats::view::Eye;
 use proptest::prelude::*;
 
-/// A line asked for, with all that is known of it.
+/// A look-up, with everything known about it.
 #[derive(Clone, Copy, Debug)]
 struct Access {
     frame: u32,
@@ -19,7 +19,7 @@ struct Access {
     line: u32,
 }
 
-/// Items one after another, some of them pairs whose tiles alternate, in some frames.
+/// Streams of items in several frames, some of them pairs whose tiles alternate.
 fn streams() -> impl Strategy<Value = Vec<Access>> {
     let line = prop_oneof![4 => 0..12_u32, 2 => 0..60_u32, 1 => 0..4000_u32];
     let eye = prop_oneof![Just(None), Just(Some(Eye::Left)), Just(Some(Eye::Right))];
@@ -58,25 +58,25 @@ fn streams() -> impl Strategy<Value = Vec<Access>> {
     })
 }
 
-fn geometries() -> impl Strategy<Value = CacheConfig> {
+fn geometries() -> impl Strategy<Value = LevelConfig> {
     let ways = prop_oneof![Just(1_u32), Just(2), Just(3), Just(4), Just(8)];
     let policy = proptest::sample::select(Replacement::all().collect::<Vec<_>>());
     (0..5_u32, ways, policy)
-        .prop_map(|(sets, ways, replacement)| CacheConfig {
+        .prop_map(|(sets, ways, replacement)| LevelConfig {
             ways: if replacement == Replacement::TREE_PLRU && ways == 3 {
                 1
             } else {
                 ways
             },
             replacement,
-            ..CacheConfig::lru((u64::from(ways) << sets) * 16)
+            ..LevelConfig::lru((u64::from(ways) << sets) * 16)
         })
         .prop_filter("sets are powers of two", |cache| {
             cache.sets("L1", 16).is_ok()
         })
 }
 
-fn of(cache: &CacheConfig) -> StreamCache {
+fn of(cache: &LevelConfig) -> StreamCache {
     StreamCache {
         cache: *cache,
         level: "L1",
@@ -85,8 +85,8 @@ fn of(cache: &CacheConfig) -> StreamCache {
     }
 }
 
-/// The analysis of a stream, on an axis so short that it is numbered anew all the time.
-fn analysed(stream: &[Access], cache: &CacheConfig) -> Figures {
+/// Analyses a stream on an axis so short that it is renumbered frequently.
+fn analysed(stream: &[Access], cache: &LevelConfig) -> Figures {
     let mut profile = Profile::with_axis(of(cache), 64).unwrap();
     let mut frame = None;
     for access in stream {
@@ -159,7 +159,7 @@ proptest! {
         let lines = figures.configured_lines;
         let full = figures.distances.hits(lines);
         prop_assert_eq!(figures.misses(&full), split.fully_associative_misses());
-        // The forest and the histogram: a cache of one set is fully associative.
+        // The forest agrees with the histogram: a cache of one set is fully associative.
         for point in figures.lru.iter().filter(|p| p.ways.map(u64::from) == Some(p.lines)) {
             prop_assert_eq!(point.hits, figures.distances.hits(point.lines));
         }
@@ -173,7 +173,7 @@ proptest! {
     }
 }
 
-/// Both levels of every order miss as in a replay, whatever the policy and the number of cores.
+/// Both levels have the misses of a replay in every order, for every policy and number of cores.
 #[test]
 fn misses_are_those_of_a_replay() {
     let trace = Synthetic {
@@ -190,17 +190,16 @@ fn misses_are_those_of_a_replay() {
         (1, Replacement::RANDOM, 4, crate::config::Assign::FirstIdle),
     ];
     for (cores, replacement, ways, assign) in machines {
-        let cache = |size_bytes| CacheConfig {
+        let cache = |size_bytes| LevelConfig {
             ways,
             replacement,
-            ..CacheConfig::lru(size_bytes)
+            ..LevelConfig::lru(size_bytes)
         };
         let config = RunConfig {
             mode: crate::config::Mode::Functional,
             cores,
             assign,
-            l1: cache(2 << 10),
-            l2: cache(16 << 10),
+            level: Levels::two(cache(2 << 10), cache(16 << 10)),
             ..RunConfig::default()
         };
         let figures = analyse(&trace, &config, &orders, true, &|_| ()).unwrap();
@@ -229,7 +228,7 @@ fn misses_are_those_of_a_replay() {
     }
 }
 
-/// The first frame again, so many times.
+/// The first frame, repeated `frames` times.
 fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {
     let mut out = trace.clone();
     for frame in 1..frames {
@@ -253,15 +252,14 @@ fn caches_that_are_emptied_between_frames_find_in_each_frame_what_they_find_in_i
     let three = repeated(&one, 3);
     let orders = [Order::MORTON, Order::Z2_STA];
     for replacement in [Replacement::LRU, Replacement::RANDOM] {
-        let cache = |size_bytes| CacheConfig {
+        let cache = |size_bytes| LevelConfig {
             replacement,
-            ..CacheConfig::lru(size_bytes)
+            ..LevelConfig::lru(size_bytes)
         };
         let config = RunConfig {
             mode: Mode::Functional,
             between_frames: BetweenFrames::Flush,
-            l1: cache(2 << 10),
-            l2: cache(16 << 10),
+            level: Levels::two(cache(2 << 10), cache(16 << 10)),
             ..RunConfig::default()
         };
         let of = |trace: &MemoryTrace| analyse(trace, &config, &orders, true, &|_| ()).unwrap();

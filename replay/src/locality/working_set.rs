@@ -1,9 +1,9 @@
-//! Working sets (Denning 1968) by tiles: how many distinct lines a stretch of tiles uses, on average
-//! over all stretches of a length.
+//! Working sets (Denning 1968) over tiles: the distinct lines in a window of tiles, averaged over all
+//! windows of a length.
 //!
-//! The mean over all stretches follows from the gaps between the uses of a line (Denning & Schwartz
-//! 1972), so a pass that counts gaps answers all lengths. Gaps are counted in bins that end at powers
-//! of two, each with its sum, so lengths that are powers of two are exact.
+//! The mean over all windows follows from the gaps between uses of a line (Denning & Schwartz 1972), so one
+//! pass that counts gaps answers all lengths. Gaps are counted in bins that end at powers of two, each with
+//! its sum, so lengths that are powers of two are exact.
 
 use super::last_use::{LastUse, Span};
 use super::place::TileOfEye;
@@ -11,7 +11,7 @@ use super::place::TileOfEye;
 /// Bins up to 2^32.
 const BINS: usize = 33;
 
-/// How many numbers up to a power of two, and their sum.
+/// Count and sum of the numbers in a bin.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Bin {
     count: u64,
@@ -29,13 +29,13 @@ impl Default for Bins {
 
 impl Bins {
     fn add(&mut self, number: u32) {
-        // The first power of two that is not less.
+        // The smallest power of two that is not less.
         let bin = u64::from(number).next_power_of_two().ilog2() as usize;
         self.0[bin].count += 1;
         self.0[bin].sum += u64::from(number);
     }
 
-    /// Numbers up to 2^power: how many, and their sum.
+    /// Count and sum of the numbers up to 2^power.
     fn up_to(&self, power: usize) -> Bin {
         self.0[..=power]
             .iter()
@@ -46,17 +46,17 @@ impl Bins {
     }
 }
 
-/// The gaps between the uses of the lines that something uses.
+/// The gaps between uses of a set of lines.
 #[derive(Clone, Debug, Default)]
 struct Gaps {
     firsts: Bins,
     gaps: Bins,
-    /// Tiles beyond the first of the items of all uses.
+    /// Tiles after the first, summed over the items of all uses.
     beyond: u64,
 }
 
 impl Gaps {
-    /// A line that was used in `before` is used in `now`, a later item.
+    /// Adds a use in `now` of a line last used in the earlier item `before`.
     #[inline(always)]
     fn used(&mut self, before: Span, now: Span) {
         if before.is_none() {
@@ -66,7 +66,7 @@ impl Gaps {
         }
     }
 
-    /// A line was used last in `last`; the clock stopped at `tiles`.
+    /// Ends a line last used in `last`, with the clock at `tiles`.
     fn ended(&mut self, last: Span, tiles: u32) {
         if !last.is_none() {
             self.gap(last, tiles + 1);
@@ -74,34 +74,33 @@ impl Gaps {
     }
 
     fn gap(&mut self, before: Span, next: u32) {
-        // A stretch sees the use from the item's first tile until the stretch begins behind its
-        // last one.
+        // A window contains the use from the item's first tile until the window starts after the item's last tile.
         self.gaps.add(next - before.first() - before.beyond());
         self.beyond += u64::from(before.beyond());
     }
 
-    /// Distinct lines of every stretch of 2^power tiles, summed over the stretches.
+    /// Distinct lines of every window of 2^power tiles, summed over the windows.
     fn lines(&self, power: usize) -> u64 {
         let length = 1_u64 << power;
         let short = self.gaps.up_to(power);
         let all = self.gaps.up_to(BINS - 1);
         let seen = short.sum + (all.count - short.count) * length + self.beyond;
-        // Stretches that would begin before the first tile.
+        // Windows that would start before the first tile.
         let early = self.firsts.up_to(power);
         seen - (early.count * length - early.sum)
     }
 }
 
-/// Distinct lines of all stretches of a length. The means are these over `stretches`.
+/// Distinct lines of all windows of a length. Means are these over `stretches`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct WorkingSet {
-    /// Length of the stretches in tiles.
+    /// Length of the windows in tiles.
     pub tiles: u64,
-    /// Number of stretches.
+    /// Number of windows.
     pub stretches: u64,
-    /// Lines that any tile of the stretch uses.
+    /// Lines that any tile of the window uses.
     pub lines: u64,
-    /// Lines that the left eye's tiles use, and the right eye's.
+    /// Lines that tiles of the left and of the right eye use.
     pub lines_of_eye: [u64; 2],
     /// Lines that tiles of either eye use.
     pub lines_of_either: u64,
@@ -114,7 +113,7 @@ impl WorkingSet {
         self.lines_of_eye[0] + self.lines_of_eye[1] - self.lines_of_either
     }
 
-    /// Adds the stretches of another core.
+    /// Adds the windows of another core.
     pub(super) fn add(&mut self, other: &Self) {
         self.stretches += other.stretches;
         self.lines += other.lines;
@@ -125,7 +124,7 @@ impl WorkingSet {
     }
 }
 
-/// The gaps of each kind that is counted apart.
+/// The gaps of each class of uses.
 #[derive(Clone, Debug, Default)]
 pub(super) struct WorkingSets {
     any: Gaps,
@@ -134,7 +133,7 @@ pub(super) struct WorkingSets {
 }
 
 impl WorkingSets {
-    /// A line is used at a place in an item that are not both those of its last use.
+    /// Processes a use whose tile or item differs from the last use.
     pub(super) fn used(&mut self, last: &mut LastUse, here: TileOfEye, now: Span) {
         if last.span < now {
             self.any.used(last.span, now);
@@ -151,7 +150,7 @@ impl WorkingSets {
         }
     }
 
-    /// The stream is over: this was the last use of a line, and the clock stopped at `tiles`.
+    /// Ends the stream for a line, with the clock at `tiles`.
     pub(super) fn ended(&mut self, last: &LastUse, tiles: u32) {
         let [left, right] = last.span_of_eye;
         self.any.ended(last.span, tiles);
@@ -161,7 +160,7 @@ impl WorkingSets {
         }
     }
 
-    /// Every length that is a power of two and fits into `tiles`.
+    /// Every length that is a power of two and at most `tiles`.
     pub(super) fn curve(&self, tiles: u32) -> Vec<WorkingSet> {
         let lengths = (0..32).take_while(|power| 1 << power <= u64::from(tiles));
         lengths

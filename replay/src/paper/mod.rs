@@ -1,17 +1,16 @@
-//! Published figures, to be set beside measured ones, and the scenes that stand for the papers'.
+//! Published figures to compare with, and the stand-in scenes for the papers' scenes.
 //!
-//! The papers' scenes are not free. A stand-in scene takes the place of one of them when its short name is
-//! in the paper's table, or when the command line says so; nothing is guessed from parts of names.
+//! The papers' scenes are not freely available. A scene stands in for one of them if the paper's table
+//! lists its exact short name, or if the command line says so. Parts of names never match.
 
 pub mod score;
 pub mod sgrt;
 pub mod vr;
 pub mod z2;
 
-/// The entry of a scene in a paper's table of `(our short name, entry)`.
+/// Finds a scene in a paper's table of `(our short name, entry)`.
 ///
-/// `scene` is the name or path that the trace records; see
-/// [`scene_name`](crate::result::scene_name).
+/// `scene` is the name or path that the trace records; see [`scene_name`](crate::result::scene_name).
 pub fn stand_in<'t, T>(scene: &str, table: &'t [(&str, T)]) -> Option<&'t T> {
     let short = crate::result::scene_name(scene);
     let entry = table.iter().find(|(name, _)| *name == short)?;
@@ -26,9 +25,8 @@ pub struct UnknownScene {
     found: String,
 }
 
-/// The scene of a paper that the values of `--as` give to a trace's label: SCENE for every trace,
-/// LABEL=SCENE for one, `none` for no scene; the last that fits wins. `None` where no value is for
-/// this label.
+/// The paper's scene that the values of `--as` assign to a trace's label: SCENE for every trace,
+/// LABEL=SCENE for one, `none` for no scene. The last matching value counts. `None` if no value matches.
 ///
 /// # Errors
 /// A scene that is not among `scenes`.
@@ -61,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn part_of_a_name_makes_no_stand_in() {
+    fn parts_of_a_name_do_not_match() {
         let table = [("car", "BMW"), ("lab", "Chemical Lab.")];
         assert_eq!(stand_in("car", &table), Some(&"BMW"));
         for other in ["scarf.gltf", "label", "collab/model.gltf", "car-park"] {

@@ -1,11 +1,11 @@
-//! How near a machine comes to the Z2 paper's Table 2 on a scene: levels, savings and slopes.
+//! Distance of a machine from the Z2 paper's Table 2 on a scene: levels, savings and slopes.
 
 use super::z2::{self, PublishedRow};
 use crate::config::Order;
 use serde::Serialize;
 use std::sync::LazyLock;
 
-/// A row of Table 2 as a machine gives it, rates counted as the paper's are.
+/// A row of Table 2 measured on a machine, with rates counted as in the paper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     /// L1 and L2 size in KiB.
@@ -23,24 +23,24 @@ pub struct Measured {
 /// Root mean square distances from the paper's rows of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Score {
-    /// Of the L1 miss rates, points.
+    /// L1 miss rates, in points.
     pub l1_points: f64,
-    /// Of the L2 miss rates, points.
+    /// L2 miss rates, in points.
     pub l2_points: f64,
-    /// Of the utilisations, points; none without a texture unit.
+    /// Utilisations, in points; none without a texture unit.
     pub tmu_points: Option<f64>,
-    /// Of the savings against Morton that follow from both rates, points.
+    /// Savings relative to Morton order that follow from both rates, in points.
     pub saved_points: f64,
-    /// Of the slopes of the L1 rate over the product of both rates, by L1 size.
+    /// Slopes of the L1 miss rate over the product of both rates, by L1 size.
     pub slope: f64,
-    /// All of these, each over its standard deviation in the paper's table: 1 is as far off as its rows
-    /// are from each other.
+    /// Combination of all parts, each divided by its standard deviation in the paper's table: at 1, the
+    /// distance equals the spread of the table's rows.
     pub total: f64,
 }
 
-/// What the score compares, row by row and L1 size by L1 size.
+/// The compared quantities, by row and by L1 size.
 struct Parts {
-    /// L1, L2, TMU of each row, then its saving against Morton; Morton has none.
+    /// L1, L2 and TMU of each row, and its saving relative to Morton order, which has none itself.
     rows: Vec<[Option<f64>; 4]>,
     slopes: Vec<f64>,
 }
@@ -80,14 +80,14 @@ impl Parts {
         }
     }
 
-    /// By part: L1, L2, TMU, saving, slope.
+    /// Lists of L1, L2, TMU, saving and slope.
     fn lists(&self) -> [Vec<f64>; 5] {
         let part = |i: usize| self.rows.iter().filter_map(|row| row[i]).collect();
         [part(0), part(1), part(2), part(3), self.slopes.clone()]
     }
 }
 
-/// Least squares through points; 0 where they do not spread.
+/// Least-squares slope through points; 0 if all x are equal.
 fn slope(points: &[(f64, f64)]) -> f64 {
     let count = points.len().max(1) as f64;
     let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
@@ -135,8 +135,8 @@ static SPREADS: LazyLock<[f64; 5]> = LazyLock::new(|| {
     })
 });
 
-/// Holds a machine's rows of a scene against the paper's; none where the rows are not all of the
-/// paper's caches and orders, each once.
+/// Compares a machine's rows of a scene with the paper's. None unless the rows have all of the paper's
+/// caches and orders, each once.
 #[must_use]
 pub fn score(scene: &str, rows: &[Measured]) -> Option<Score> {
     let expected = scene_rows(scene);
@@ -149,7 +149,7 @@ pub fn score(scene: &str, rows: &[Measured]) -> Option<Score> {
         .collect();
     let ours = ours.filter(|ours| !ours.is_empty())?;
     let (ours, theirs) = (Parts::of(&ours).lists(), Parts::of(&expected).lists());
-    // A part that our rows lack is left out.
+    // Parts that the rows lack are left out.
     let distance = |part: usize| {
         let (ours, theirs) = (&ours[part], &theirs[part]);
         let known = ours.len() == theirs.len();
@@ -197,20 +197,20 @@ mod tests {
         let tmu = changed(|row| row.tmu_util_pct = row.tmu_util_pct.map(|pct| pct + 2.0));
         assert!((tmu.tmu_points.unwrap() - 2.0).abs() < 1e-9 && tmu.l1_points == 0.0);
         assert!((tmu.total - (2.0 / SPREADS[2]) / 5_f64.sqrt()).abs() < 1e-9);
-        // Twice the L1 rate: savings and slopes are ratios and stay.
+        // Twice the L1 rate leaves savings and slopes, which are ratios, unchanged.
         let twice = changed(|row| row.l1_miss_pct *= 2.0);
         assert!(twice.l1_points > 8.0 && twice.saved_points < 1e-9 && twice.slope < 1e-9);
-        // Without a texture unit its part is left out, of the total as well.
+        // Without a texture unit, its part is left out of the total as well.
         let none =
             changed(|row| (row.tmu_util_pct, row.l1_miss_pct) = (None, row.l1_miss_pct + 1.0));
         assert_eq!(none.tmu_points, None);
         assert!((none.l1_points - 1.0).abs() < 1e-9 && none.total > 0.0);
-        // A flat L1 rate has no slope.
+        // A constant L1 rate has slope zero.
         let flat = changed(|row| row.l1_miss_pct = 10.0);
         assert!(flat.slope > 0.4, "{flat:?}");
     }
 
-    /// The slopes that the table has: T-Rex .58 to .63, Crytek 16 KB .62 to .70 and 8 KB .10 to .13.
+    /// The table's slopes: T-Rex .58 to .63, Crytek 16 KB .62 to .70 and 8 KB .10 to .13.
     #[test]
     fn slopes_are_those_of_the_table() {
         let slopes = |scene| Parts::of(&scene_rows(scene)).slopes;

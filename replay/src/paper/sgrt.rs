@@ -10,28 +10,28 @@ pub struct PaperScene {
     pub id: &'static str,
     /// Name in the figures.
     pub title: &'static str,
-    /// Frames per second over the reference's.
+    /// Frames per second relative to the reference.
     pub relative_performance: f64,
-    /// Energy over the reference's.
+    /// Energy relative to the reference.
     pub relative_energy: f64,
 }
 
-/// What is printed of the paper beside a trace.
+/// The paper's values shown for a trace.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PaperValues {
     /// Scene in the paper.
     pub scene: String,
-    /// Frames per second over the reference's.
+    /// Frames per second relative to the reference.
     pub relative_performance: f64,
-    /// Energy over the reference's.
+    /// Energy relative to the reference.
     pub relative_energy: f64,
 }
 
 /// Right pixels that could be shaded with the left image's results, average over the six scenes.
 pub const REUSE_PCT: f64 = 91.54;
-/// Work that the units were spared.
+/// Reduction of the units' work.
 pub const TNI_REDUCTION_PCT: f64 = 68.0;
-/// Work that the kernels added.
+/// Work added by the kernels.
 pub const SRP_OVERHEAD_PCT: f64 = 10.0;
 
 const fn scene(
@@ -58,15 +58,15 @@ pub const SCENES: [PaperScene; 6] = [
     scene("provence", "Provence", 1.51, 0.80),
 ];
 
-/// Built-in scenes of another name than the paper's scene that they stand for.
+/// Built-in stand-in scenes with another name than the paper's scene.
 const STAND_INS: [(&str, &str); 3] = [
     ("car", "bmw"),
     ("lab", "chemical-lab"),
     ("meadow", "provence"),
 ];
 
-/// The paper's values for a trace: of the scene that the values of `--as` give to its label, else
-/// of the scene of its very name or whose stand-in it is.
+/// The paper's values for a trace: of the scene that `--as` assigns to its label, else of the scene with
+/// exactly its name or for which it stands in.
 ///
 /// # Errors
 /// A value of `--as` that names no scene of the paper.
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_scenes_of_the_very_name_or_asked_for_stand_beside_the_paper() {
+    fn only_scenes_with_the_exact_name_or_requested_ones_are_compared() {
         let found = |scene, label, asked: &[&str]| {
             let asked: Vec<String> = asked.iter().map(|&a| a.to_owned()).collect();
             let values = values(scene, label, &asked).expect("known scenes");

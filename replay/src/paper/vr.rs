@@ -1,7 +1,7 @@
-//! What the thesis and vendors say that techniques of stereo rendering save: Preissner,
+//! Published savings of stereo rendering techniques, from the thesis and from vendors: Preissner,
 //! "Rendering optimisations for virtual reality", TUM 2020, and the sources that it names.
 
-/// What a claim counts.
+/// The quantity of a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Bounds tested against a frustum.
@@ -15,7 +15,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// As a table writes it.
+    /// Name in tables.
     #[must_use]
     pub fn title(self) -> &'static str {
         match self {
@@ -30,18 +30,18 @@ impl Quantity {
 /// A published saving.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Claim {
-    /// Setting of our technique, as a JSON pointer, and its value.
+    /// Setting of the technique here, as a JSON pointer, and its value.
     pub setting: (&'static str, &'static str),
-    /// What is saved.
+    /// The quantity saved.
     pub quantity: Quantity,
-    /// Least and most that is saved, percent.
+    /// Minimum and maximum saving, percent.
     pub saved_pct: [f64; 2],
-    /// Where, and on what.
+    /// Source and measured scene.
     pub source: &'static str,
 }
 
 impl Claim {
-    /// Whether settings are those of the technique.
+    /// True if these settings match the technique.
     #[must_use]
     pub fn is_about(&self, settings: &serde_json::Value) -> bool {
         let (pointer, expected) = self.setting;
@@ -53,7 +53,7 @@ impl Claim {
         })
     }
 
-    /// The saving as a table writes it.
+    /// The saving as text.
     #[must_use]
     pub fn text(&self) -> String {
         let [low, high] = self.saved_pct;

@@ -25,8 +25,8 @@ pub struct PublishedRow {
 }
 
 impl PublishedRow {
-    /// External traffic in lines per footprint (L1 times L2 miss rate): Fig. 5 but for the scale,
-    /// which the paper's text does not give as numbers.
+    /// DRAM traffic in lines per footprint (L1 times L2 miss rate). This is Fig. 5 except for its scale,
+    /// which the paper does not give in numbers.
     #[must_use]
     pub fn external_lines_per_footprint(&self) -> f64 {
         self.l1_miss_pct * self.l2_miss_pct / 1e4
@@ -38,21 +38,21 @@ impl PublishedRow {
         row(&self.scene, self.l1_kib, self.l2_kib, Order::MORTON)
     }
 
-    /// External traffic saved against Morton order, percent.
+    /// DRAM traffic saved relative to Morton order, percent.
     #[must_use]
     pub fn reduction_pct(&self) -> Option<f64> {
         let morton = self.morton()?.external_lines_per_footprint();
         Some(100.0 * (1.0 - self.external_lines_per_footprint() / morton))
     }
 
-    /// TMU utilisation over Morton order's.
+    /// TMU utilisation relative to Morton order.
     #[must_use]
     pub fn tmu_ratio(&self) -> Option<f64> {
         Some(self.tmu_util_pct / self.morton()?.tmu_util_pct)
     }
 }
 
-/// The paper's scenes, as its tables order them.
+/// The paper's scenes, in table order.
 pub const SCENES: [&str; 4] = [
     "gfxbench-t-rex",
     "crytek-sponza",
@@ -83,14 +83,14 @@ pub fn row(scene: &str, l1_kib: u32, l2_kib: u32, order: Order) -> Option<&'stat
         .find(|r| r.scene == scene && r.l1_kib == l1_kib && r.l2_kib == l2_kib && r.order == order)
 }
 
-/// Lines that do not parse are left out; a test holds that there are none.
+/// Skips lines that do not parse; a test checks that there are none.
 fn parse_table(text: &str) -> Vec<PublishedRow> {
     let mut lines = csv::Reader::from_reader(text.as_bytes());
     lines.deserialize().filter_map(Result::ok).collect()
 }
 
-/// Our scenes that stand for the paper's: short name, and the paper's scene without and with shadow
-/// maps. The built-in ones were made for it, the others are the same models or alike.
+/// Stand-in scenes: short name, and the paper's scene without and with shadow maps. The built-in ones were
+/// made for this purpose, the others are the same or similar models.
 const STAND_INS: [(&str, [Option<&str>; 2]); 7] = {
     let [t_rex, crytek, plain, shadows] = SCENES;
     [
@@ -104,8 +104,7 @@ const STAND_INS: [(&str, [Option<&str>; 2]); 7] = {
     ]
 };
 
-/// The scene of the paper that a scene stands for, by its exact short name and by whether it
-/// samples shadow maps.
+/// The paper's scene that a scene stands in for, by its exact short name and by whether it samples shadow maps.
 #[must_use]
 pub fn stand_in(scene: &str, shadow_maps: bool) -> Option<&'static str> {
     super::stand_in(scene, &STAND_INS)?[usize::from(shadow_maps)]
@@ -138,14 +137,14 @@ mod tests {
         };
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
         let sta = reductions(Order::Z2_STA);
-        // The table's rates are rounded and weigh L2 look-ups alike; the paper sums bytes.
+        // The table's rates are rounded and weight all L2 look-ups equally; the paper sums bytes.
         assert!((mean(&reductions(Order::Z2_LRTA)) - 24.8).abs() < 0.4);
         assert!((mean(&sta) - 27.9).abs() < 0.4);
         assert!((sta.iter().copied().fold(0.0, f64::max) - 47.8).abs() < 0.4);
     }
 
     #[test]
-    fn a_scene_stands_for_the_papers_by_its_exact_name() {
+    fn a_scene_stands_in_by_its_exact_name() {
         let path = "../scenes/crytek-sponza/sponza.gltf";
         assert_eq!(stand_in(path, false), Some("crytek-sponza"));
         assert_eq!(stand_in("atrium", false), Some("crytek-sponza"));

@@ -1,6 +1,7 @@
 //! Plain addresses through caches: a row a configuration.
 
 use super::columns::{Column, Records, Show};
+use super::memory_columns;
 use super::table::Table;
 use crate::addresses::{LevelCounts, Outcome, Point, Totals};
 use crate::model_version::MODEL_VERSION;
@@ -71,25 +72,25 @@ fn columns<'a, 'r: 'a>() -> Vec<Column<'a, PointRow<'r>>> {
             u64::from(r.point.config.line_bytes)
         }),
         Column::real("l1.kib", "L1", "KiB", 0, move |r: &PointRow<'r>| {
-            kib(r.point.config.l1.size_bytes)
+            kib(r.point.config.level.l1.size_bytes)
         }),
         Column::real("l1.ways", "ways", "", 0, |r: &PointRow<'r>| {
-            u64::from(r.point.config.l1.ways)
+            u64::from(r.point.config.level.l1.ways)
         }),
         Column::text("l1.replacement", "policy", |r: &PointRow<'r>| {
-            r.point.config.l1.replacement.name()
+            r.point.config.level.l1.replacement.name()
         }),
     ];
     columns.extend(level("l1", "L1", |point| &point.l1));
     columns.extend([
         Column::real("l2.kib", "L2", "KiB", 0, move |r: &PointRow<'r>| {
-            kib(r.point.config.l2.size_bytes)
+            kib(r.point.config.level.l2.size_bytes)
         }),
         Column::real("l2.ways", "ways", "", 0, |r: &PointRow<'r>| {
-            u64::from(r.point.config.l2.ways)
+            u64::from(r.point.config.level.l2.ways)
         }),
         Column::text("l2.replacement", "policy", |r: &PointRow<'r>| {
-            r.point.config.l2.replacement.name()
+            r.point.config.level.l2.replacement.name()
         }),
     ]);
     columns.extend(level("l2", "L2", |point| &point.l2));
@@ -101,7 +102,7 @@ fn columns<'a, 'r: 'a>() -> Vec<Column<'a, PointRow<'r>>> {
             0,
             |r: &PointRow<'r>| r.point.external_bytes(),
         )
-        .about("line misses of the L2 times the line size"),
+        .about("lines from memory times the line size of the last level"),
     );
     columns.push(
         Column::real("bound_bytes", "bound", "bytes", 0, |r: &PointRow<'r>| {
@@ -119,6 +120,8 @@ fn columns<'a, 'r: 'a>() -> Vec<Column<'a, PointRow<'r>>> {
             }));
         }
     }
+    let memory = memory_columns::columns().into_iter();
+    columns.extend(memory.map(|column| column.on(|r: &PointRow<'r>| &r.point.memory)));
     columns
 }
 
@@ -219,7 +222,7 @@ pub fn text(input: &str, outcome: &Outcome) -> String {
             text += &format!("\n{}", all.picked(keys).text());
         }
         let line_bytes = point.config.line_bytes;
-        text += &format!("\nlines of {line_bytes} bytes\n");
+        text += &format!("\nlines of {line_bytes} bytes\n{}", point.memory);
         return text + &part(&["external_bytes", "bound_bytes"]);
     }
     text + "\n" + &part(&SEVERAL)

@@ -238,6 +238,17 @@ impl<'a, R: ?Sized> Column<'a, R> {
         Self::new(key, name, unit, Show::Decimals(decimals), value)
     }
 
+    /// The same column of what holds such rows.
+    pub fn on<S>(self, of: impl Fn(&S) -> &R + 'a) -> Column<'a, S>
+    where
+        R: 'a,
+    {
+        Column {
+            heading: self.heading,
+            value: Box::new(move |row| (self.value)(of(row))),
+        }
+    }
+
     /// Says what the figure is.
     #[must_use]
     pub fn about(mut self, about: &'static str) -> Self {

@@ -3,7 +3,7 @@
 
 use super::columns::Value;
 use super::figures::Figure;
-use crate::config::{CacheConfig, RunConfig};
+use crate::config::{LevelConfig, RunConfig};
 use crate::experiment::{ResultRow, plain, scene_label};
 use crate::model_version::MODEL_VERSION;
 use serde::Serialize;
@@ -39,7 +39,7 @@ pub fn trace<'a>() -> Vec<Figure<'a>> {
     ]
 }
 
-/// Every key of the configuration, as docs/configuration.md lists them.
+/// Every key of the configuration, as docs/use/configuration.md lists them.
 #[rustfmt::skip]
 pub fn config<'a>() -> Vec<Figure<'a>> {
     fn key<'a, V: super::columns::Cell + 'static>(
@@ -48,8 +48,8 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
     ) -> Figure<'a> {
         Figure::text(key, key, move |r: &ResultRow| value(&r.point.config))
     }
-    fn cache<'a>(keys: [&'static str; 6], level: fn(&RunConfig) -> &CacheConfig) -> [Figure<'a>; 6] {
-        let [size_bytes, ways, replacement, sectors, victim_lines, inclusion] = keys;
+    fn cache<'a>(keys: [&'static str; 5], level: fn(&RunConfig) -> &LevelConfig) -> [Figure<'a>; 5] {
+        let [size_bytes, ways, replacement, sectors, victim_lines] = keys;
         let of = move |r: &ResultRow| *level(&r.point.config);
         [
             Figure::text(size_bytes, size_bytes, move |r: &ResultRow| of(r).size_bytes),
@@ -57,7 +57,6 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
             Figure::text(replacement, replacement, move |r: &ResultRow| of(r).replacement.name()),
             Figure::text(sectors, sectors, move |r: &ResultRow| u64::from(of(r).sectors)),
             Figure::text(victim_lines, victim_lines, move |r: &ResultRow| u64::from(of(r).victim_lines)),
-            Figure::text(inclusion, inclusion, move |r: &ResultRow| name(&of(r).inclusion)),
         ]
     }
     let mut columns = vec![
@@ -71,9 +70,14 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         key("assign", |c| name(&c.assign)),
         key("line_bytes", |c| u64::from(c.line_bytes)),
     ];
-    columns.extend(cache(["l1.size_bytes", "l1.ways", "l1.replacement", "l1.sectors", "l1.victim_lines", "l1.inclusion"], |c| &c.l1));
-    columns.extend(cache(["l2.size_bytes", "l2.ways", "l2.replacement", "l2.sectors", "l2.victim_lines", "l2.inclusion"], |c| &c.l2));
+    columns.extend(cache(["l1.size_bytes", "l1.ways", "l1.replacement", "l1.sectors", "l1.victim_lines"], |c| &c.level.l1));
+    columns.extend(cache(["l2.size_bytes", "l2.ways", "l2.replacement", "l2.sectors", "l2.victim_lines"], |c| &c.level.l2));
     columns.extend([
+        key("l2.inclusion", |c| name(&c.level.l2.inclusion)),
+        key("l2.shared", |c| c.level.l2.shared),
+        key("l2.hit_cycles", |c| u64::from(c.level.l2.hit_cycles)),
+        key("level", |c| c.level.lower_text(c.line_bytes)),
+        key("memory_cycles", |c| u64::from(c.memory_cycles)),
         key("sampling.filter", |c| name(&c.sampling.filter)),
         key("sampling.lod_bias", |c| f64::from(c.sampling.lod_bias)),
         key("sampling.lod", |c| name(&c.sampling.lod)),
@@ -85,8 +89,7 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         key("layout.shadow_map_order", |c| name(&c.layout.shadow_map_order)),
         key("layout.base_align_bytes", |c| c.layout.base_align_bytes),
         key("layout.texture_order", |c| name(&c.layout.texture_order)),
-        key("tmu.l1_penalty_cycles", |c| u64::from(c.tmu.l1_penalty_cycles)),
-        key("tmu.l2_penalty_cycles", |c| u64::from(c.tmu.l2_penalty_cycles)),
+        key("tmu.model", |c| name(&c.tmu.model)),
         key("tmu.loop_cycles", |c| u64::from(c.tmu.loop_cycles)),
         key("tmu.threads", |c| u64::from(c.tmu.threads)),
         key("tmu.retry_footprints", |c| u64::from(c.tmu.retry_footprints)),
@@ -101,7 +104,6 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         key("between_frames", |c| name(&c.between_frames)),
         key("prefetch.prefetcher", |c| c.prefetch.map(|p| p.prefetcher.name())),
         key("prefetch.lines", |c| c.prefetch.map(|p| u64::from(p.lines()))),
-        key("level", |c| c.level.text(c.line_bytes)),
         key("dram.preset", |c| c.dram.map(|dram| name(&dram.preset))),
         key("dram.channels", |c| c.dram.map(|dram| u64::from(dram.channels))),
         key("dram.mapping", |c| c.dram.map(|dram| name(&dram.mapping))),
@@ -112,6 +114,7 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         key("frame.multiview", |c| c.frame.map(|frame| frame.multiview)),
         key("frame.composition", |c| c.frame.map(|frame| frame.composition)),
         key("frame.color_bytes", |c| c.frame.map(|frame| u64::from(frame.color_bytes))),
+        key("frame.color_compressed_permille", |c| c.frame.map(|frame| u64::from(frame.color_compressed_permille))),
         key("frame.depth_bytes", |c| c.frame.map(|frame| u64::from(frame.depth_bytes))),
         key("frame.g_buffer_bytes", |c| c.frame.map(|frame| u64::from(frame.g_buffer_bytes))),
         key("frame.samples", |c| c.frame.map(|frame| u64::from(frame.samples))),
@@ -149,12 +152,12 @@ mod tests {
 
     #[test]
     fn every_key_of_the_configuration_is_a_column() {
-        let page = include_str!("../../../docs/configuration.md");
+        let page = include_str!("../../../docs/use/configuration.md");
         let documented = page.lines().filter_map(|line| {
             let key = line.strip_prefix("| `")?;
             Some(key.split_once('`')?.0)
         });
-        // All levels below the L2 are one column.
+        // The keys of all levels are columns of the L1 and the L2, and one of the levels below.
         let column = |key: &'static str| {
             if key.starts_with("level.") {
                 "level"
@@ -165,7 +168,10 @@ mod tests {
         let mut documented: Vec<&str> = documented.map(column).collect();
         documented.dedup();
         let columns = config();
-        let keys: Vec<&str> = columns.iter().map(|c| c.heading.key.as_ref()).collect();
+        let keys = columns.iter().map(|c| c.heading.key.as_ref());
+        let keys: Vec<&str> = keys
+            .filter(|key| !key.starts_with("l1.") && !key.starts_with("l2."))
+            .collect();
         assert!(keys.len() > 30);
         assert_eq!(keys, documented);
     }

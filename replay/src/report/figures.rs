@@ -1,11 +1,12 @@
 //! The figures of a replayed point, a line each: every table, file and chart takes them from here.
 
 use super::columns::{Column, Row, Show, pick};
-use super::config_columns;
+use super::{config_columns, memory_columns};
 use crate::experiment::ResultRow;
-use crate::memory::clients::ClientTraffic;
+use crate::result::ClientTraffic;
 use crate::result::{Part, RunResult};
 use crate::tmu::closed_form;
+use formats::texture::TexelFormat;
 
 /// A column of point results.
 pub type Figure<'a> = Column<'static, ResultRow<'a>>;
@@ -26,7 +27,7 @@ fn identity<'a>() -> Vec<Figure<'a>> {
 /// What is counted, and what follows from it.
 #[rustfmt::skip]
 pub fn figures<'a>() -> Vec<Figure<'a>> {
-    vec![
+    let mut figures = vec![
         Figure::real("l1_miss_pct", "L1 miss", "%", 2, |r| 100.0 * r.result.l1.miss_rate)
             .about("footprints with a missing line"),
         Figure::real("l2_miss_pct", "L2 miss", "%", 2, |r| 100.0 * r.result.l2.miss_rate)
@@ -47,6 +48,10 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
             .about("external traffic over the bound"),
         Figure::real("over_base", "external", "\u{d7} base", 3, |r| over(r.result.external_bytes, r.unchanged?.external_bytes))
             .about("external traffic over that of the same settings without the change"),
+        Figure::real("static_footprints_per_pixel", "static", "footprints/pixel", 2, |r| complexity(r, false))
+            .about("footprints of loaded textures for each covered pixel: static texture complexity (Z2 paper, table 1)"),
+        Figure::real("dynamic_footprints_per_pixel", "dynamic", "footprints/pixel", 2, |r| complexity(r, true))
+            .about("footprints of shadow maps for each covered pixel: dynamic texture complexity (Z2 paper, table 1)"),
         Figure::real("first_l1_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.result))
             .about("footprints whose first look-up found a line absent or in flight"),
         Figure::real("first_l2_miss_pct", "first L2", "%", 2, |r| first_l2_pct(r.result))
@@ -55,38 +60,14 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
             .about("utilisation that the Z2 paper's table implies for the rates of first look-ups"),
         Figure::real("closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| deviation_points(r.result))
             .about("simulated utilisation less the one that the Z2 paper's table implies for the rates of first look-ups"),
-        Figure::real("prefetched_lines", "prefetched", "", 0, |r| Some(r.result.prefetch?.lines))
-            .about("lines that the prefetcher of the L2 fetched"),
-        Figure::real("prefetch_accuracy_pct", "useful", "% of prefetched", 1, |r| { let p = r.result.prefetch?; Some(100.0 * over(p.useful_lines, p.lines)?) })
-            .about("prefetched lines that were requested while they were there or in flight"),
-        Figure::real("prefetch_coverage_pct", "covered", "% of L2 misses", 1, |r| { let useful = r.result.prefetch?.useful_lines; Some(100.0 * over(useful, useful + r.result.l2.misses)?) })
+        Figure::real("prefetch_coverage_pct", "covered", "% of L2 misses", 1, |r| { let useful = r.result.memory.prefetch?.useful_lines; Some(100.0 * over(useful, useful + r.result.l2.misses)?) })
             .about("useful prefetches over these and the line misses of the L2"),
-        Figure::real("l2_mshrs_peak", "MSHRs", "", 0, |r| Some(r.result.l2_mshrs?.peak))
-            .about("MSHRs of the L2 in use at most, where their number is limited"),
-        Figure::real("l2_stalled_misses_pct", "stalled", "% of L2 misses", 2, |r| { let stalled = r.result.l2_mshrs?.stalled_misses; Some(100.0 * over(stalled, r.result.l2.misses)?) })
+        Figure::real("l2_stalled_misses_pct", "stalled", "% of L2 misses", 2, |r| { let stalled = r.result.memory.l2_mshrs?.stalled_misses; Some(100.0 * over(stalled, r.result.l2.misses)?) })
             .about("misses of the L2 that found all MSHRs in use"),
-        Figure::real("l2_stall_cycles", "stalls", "cycles", 0, |r| Some(r.result.l2_mshrs?.stall_cycles))
-            .about("cycles that misses of the L2 waited for an MSHR, together"),
-        Figure::real("invalidated_lines", "invalidated", "lines", 0, |r| r.result.invalidated_lines)
-            .about("lines that inclusive levels invalidated in L1 caches and in the L2"),
-        Figure::real("last_level_miss_pct", "last level", "%", 2, |r| Some(100.0 * r.result.lower_levels.last()?.miss_rate))
-            .about("line look-ups of the last level below the L2 that miss"),
-        Figure::real("dram_row_hit_pct", "row hits", "%", 2, |r| Some(100.0 * r.result.dram.as_ref()?.row_hit_rate))
-            .about("reads of DRAM whose row was open"),
-        Figure::real("dram_activates", "activates", "", 0, |r| Some(r.result.dram.as_ref()?.activates))
-            .about("rows of DRAM opened"),
-        Figure::real("dram_read_bytes", "DRAM reads", "bytes", 0, |r| Some(r.result.dram.as_ref()?.read_bytes))
-            .about("whole bursts: more than the lines where these are smaller"),
-        Figure::real("dram_bandwidth_gb_per_s", "bandwidth", "GB/s", 2, |r| Some(r.result.dram.as_ref()?.bandwidth_gb_per_s))
-            .about("bytes read over the time of the replay; functional mode: as fast as the DRAM can"),
-        Figure::real("dram_peak_gb_per_s", "peak", "GB/s", 1, |r| Some(r.result.dram.as_ref()?.peak_gb_per_s))
-            .about("what the data buses carry at most"),
-        Figure::real("dram_latency_mean_ns", "latency", "ns", 1, |r| Some(r.result.dram.as_ref()?.latency_mean_ns))
-            .about("of a read of DRAM, from its arrival to its last data"),
-        Figure::real("dram_latency_p99_ns", "latency, 99 %", "ns", 1, |r| Some(r.result.dram.as_ref()?.latency_p99_ns))
-            .about("99 of 100 reads take no longer"),
-        Figure::real("dram_energy_mj", "DRAM energy", "mJ", 4, |r| Some(r.result.dram.as_ref()?.energy_mj))
-            .about("activates, reads, refreshes and standing by"),
+    ];
+    let memory = memory_columns::columns().into_iter();
+    figures.extend(memory.map(|column| column.on(|r: &ResultRow| &r.result.memory)));
+    figures.extend(vec![
         Figure::real("frame_read_bytes", "all reads", "bytes", 0, |r| whole(r.result, |c| c.read_bytes))
             .about("bytes that all clients of memory read, all frames"),
         Figure::real("frame_write_bytes", "all writes", "bytes", 0, |r| whole(r.result, |c| c.write_bytes))
@@ -101,7 +82,20 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
             .about("traffic of all clients saved against Morton order, everything else the same"),
         Figure::real("cycles", "cycles", "", 0, |r| r.result.cycles)
             .about("cycles until the last core is done"),
-    ]
+    ]);
+    figures
+}
+
+/// Footprints of shadow maps, or of all other textures, over covered pixels; none where counts are by draw.
+fn complexity(row: &ResultRow, of_shadow_maps: bool) -> Option<f64> {
+    let parts = &row.result.by_texture;
+    let textures = row.subject.source.tables().textures.iter();
+    let wanted = textures
+        .zip(parts)
+        .filter(|(texture, _)| (texture.format == TexelFormat::R32f) == of_shadow_maps);
+    let footprints: u64 = wanted.map(|(_, part)| part.l1.footprints).sum();
+    let is_counted = !parts.is_empty() && row.result.lanes > 0;
+    is_counted.then(|| footprints as f64 / row.result.lanes as f64)
 }
 
 /// A sum over the clients of memory, where the whole frame was counted.
@@ -251,7 +245,7 @@ fn saved_pct(result: &RunResult, morton: &RunResult) -> Option<f64> {
 }
 
 /// `part / whole`, none when the whole is nothing.
-fn over(part: u64, whole: u64) -> Option<f64> {
+pub(super) fn over(part: u64, whole: u64) -> Option<f64> {
     (whole > 0).then(|| part as f64 / whole as f64)
 }
 

@@ -10,6 +10,7 @@ pub mod errors;
 pub mod figures;
 pub mod html;
 pub mod locality;
+mod memory_columns;
 pub mod parquet;
 pub mod picture;
 pub mod plots;

@@ -21,19 +21,26 @@ pub struct EmbeddedPicture {
 const WIDEST_PX: u32 = 1200;
 const JPEG_QUALITY: u8 = 85;
 
+/// Reads a PNG or JPEG file.
+///
+/// # Errors
+/// The file is missing or is no picture; the message names it.
+pub fn read(path: &Path) -> anyhow::Result<RgbImage> {
+    let picture = ImageReader::open(path)
+        .and_then(ImageReader::with_guessed_format)
+        .with_context(|| format!("{}: cannot read", path.display()))?
+        .decode()
+        .with_context(|| format!("{}: not a picture", path.display()))?;
+    Ok(picture.to_rgb8())
+}
+
 impl EmbeddedPicture {
     /// Reads a PNG or JPEG file.
     ///
     /// # Errors
     /// The file is missing or is no picture; the message names it.
     pub fn open(label: &str, path: &Path) -> anyhow::Result<Self> {
-        let picture = ImageReader::open(path)
-            .and_then(ImageReader::with_guessed_format)
-            .with_context(|| format!("{}: cannot read", path.display()))?
-            .decode()
-            .with_context(|| format!("{}: not a picture", path.display()))?
-            .to_rgb8();
-        Self::encode(label, picture).with_context(|| path.display().to_string())
+        Self::encode(label, read(path)?).with_context(|| path.display().to_string())
     }
 
     /// A picture that was computed.

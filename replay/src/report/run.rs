@@ -6,8 +6,8 @@ use super::figures::figures;
 use super::table::Table;
 use crate::config::RunConfig;
 use crate::experiment::ResultRow;
-use crate::memory::clients::ClientTraffic;
 use crate::model_version::MODEL_VERSION;
+use crate::result::ClientTraffic;
 use crate::result::{LevelResult, Part, RUN_SCHEMA, RunResult, TOOL, TraceId};
 use crate::size::format_bytes;
 use serde::Serialize;
@@ -68,14 +68,14 @@ pub fn text(row: &ResultRow) -> String {
     ];
     let levels = Table::new(&level, &[("L1", &result.l1), ("L2", &result.l2)]);
     let views = Table::new(&Part::columns(), &result.by_view);
-    let mode = config.mode.name();
+    let mode = config.mode_name();
     let mut text = format!(
         "{} ({}), {}, {mode}, L1 {}, L2 {}\n\n{}\n{}\n{}\n",
         row.subject.id.scene,
         row.subject.id.checksum,
         config.order.name(),
-        format_bytes(config.l1.size_bytes),
-        format_bytes(config.l2.size_bytes),
+        format_bytes(config.level.l1.size_bytes),
+        format_bytes(config.level.l2.size_bytes),
         levels.text(),
         views.text(),
         whole(row).text().trim_start(),
@@ -87,35 +87,7 @@ pub fn text(row: &ResultRow) -> String {
     if !result.by_draw.is_empty() {
         text += &busiest_draws(&result.by_draw);
     }
-    if let Some(prefetch) = &result.prefetch {
-        text += &format!(
-            "prefetched {} lines: {} useful ({} of them late), {} evicted before their use\n",
-            prefetch.lines, prefetch.useful_lines, prefetch.late_lines, prefetch.evicted_lines
-        );
-    }
-    if let Some(mshrs) = &result.l2_mshrs {
-        text += &format!(
-            "MSHRs of the L2: {} in use at most, {} misses waited {} cycles together\n",
-            mshrs.peak, mshrs.stalled_misses, mshrs.stall_cycles
-        );
-    }
-    if let Some(lines) = result.invalidated_lines {
-        text += &format!("invalidated by inclusive levels: {lines} lines\n");
-    }
-    for level in &result.lower_levels {
-        text += &format!(
-            "{}, {}-byte lines: {} look-ups, {} misses ({:.2} %), {} merged\n",
-            level.name,
-            level.line_bytes,
-            level.line_lookups,
-            level.line_misses,
-            100.0 * level.miss_rate,
-            level.secondary_misses
-        );
-    }
-    if let Some(dram) = &result.dram {
-        text += &dram.to_string();
-    }
+    text += &result.memory.to_string();
     if !result.clients.is_empty() {
         text += &clients(row).text();
     }

@@ -1,4 +1,4 @@
-//! Reused hits against the traced truth.
+//! Compares reused hits with traced hits.
 
 use super::detect::{Decision, PixelClass};
 use super::frame::{Frame, Sample};
@@ -7,32 +7,32 @@ use formats::view::Eye;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// Pixels of one class and what is wrong with them. Percentages elsewhere are of all right pixels.
+/// Pixels of a class, and their errors. Percentages elsewhere are of all right pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ClassCounts {
     /// Samples of the class.
     pub pixels: u64,
-    /// Reused hit is on another object than the true one, sky counted as an object.
+    /// The reused hit is on another object than the true one. The sky counts as an object.
     pub wrong_object: u64,
-    /// Right object, another triangle, and farther off than [`POSITION_LIMITS_PX`]'s first.
+    /// Right object, another triangle, and a position error above the first of [`POSITION_LIMITS_PX`].
     pub wrong_primitive: u64,
-    /// Right object, position off by more than each of [`POSITION_LIMITS_PX`].
+    /// Right object, and a position error above each of [`POSITION_LIMITS_PX`].
     pub position_over: [u64; 2],
 }
 
-/// Position errors that are counted, in pixels.
+/// Limits of the position error, in pixels.
 pub const POSITION_LIMITS_PX: [f32; 2] = [1.0, 2.0];
 
-/// All classes and the position error of reused hits on the right object.
+/// Counts of all classes, and the position error of reused hits on the right object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Accuracy {
-    /// The only arrival, reused.
+    /// Reused; a single arrival.
     pub reused: ClassCounts,
-    /// Nearest of several arrivals, reused.
+    /// Reused; the nearest of several arrivals.
     pub overlapped: ClassCounts,
-    /// Nothing arrived; traced.
+    /// Traced; no arrival.
     pub missing: ClassCounts,
-    /// Rejected; traced.
+    /// Traced; rejected by the rule.
     pub bad: ClassCounts,
     /// Mean position error, pixels.
     pub position_mean_px: f64,
@@ -41,13 +41,13 @@ pub struct Accuracy {
 }
 
 impl Accuracy {
-    /// Right samples.
+    /// Number of right samples.
     #[must_use]
     pub fn total(&self) -> u64 {
         self.reused.pixels + self.overlapped.pixels + self.missing.pixels + self.bad.pixels
     }
 
-    /// Counts of reused samples, overlapped ones included.
+    /// Counts of all reused samples, overlapped ones included.
     #[must_use]
     pub fn all_reused(&self) -> ClassCounts {
         let (a, b) = (&self.reused, &self.overlapped);
@@ -69,9 +69,8 @@ impl Accuracy {
     }
 }
 
-/// Distance between the reused hit and the true one over the pixel's width at the true hit's
-/// depth, in pixels: grazing surfaces stretch it. The sky has none; between sky and surface it is
-/// infinite.
+/// Distance between the reused and the true hit, over the pixel's width at the true hit's depth, in pixels.
+/// Grazing surfaces increase it. It is zero between sky and sky, and infinite between sky and surface.
 #[must_use]
 pub fn position_error_px(
     eye: &EyeCamera,
@@ -91,7 +90,7 @@ pub fn position_error_px(
     reused.distance(actual) / pixel_m
 }
 
-/// Counts the decisions by class and holds reused hits against the traced ones.
+/// Counts decisions by class, and compares reused hits with traced ones.
 #[must_use]
 pub fn count_errors(frame: &Frame, decisions: &[Decision]) -> Accuracy {
     let eye = frame.tables.camera(Eye::Right);

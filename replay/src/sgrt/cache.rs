@@ -1,24 +1,24 @@
-//! Caches between the traversal units and memory: how many accesses of a batch miss.
+//! Cache misses between the traversal units and memory.
 //!
-//! Where the trace lists the visited addresses, they run through set-associative LRU caches in the
-//! order that the rays are traced; else stated hit rates decide.
+//! If the trace lists the visited addresses, they are simulated in set-associative LRU caches in the order
+//! in which rays are traced. Otherwise, configured hit rates apply.
 
 use super::config::{HitRates, SgrtConfig};
 use super::work::{BatchWork, RayClass};
-use crate::cache::{self, AnyWays};
+use crate::memory::{AnyCache, Cache, Caches, Found, Hierarchy, MissPath};
 use formats::raytrace::{BvhSummary, Visit};
 
-/// Misses of a batch. Traffic goes by lines; time goes by visits, since a visit asks for all lines
+/// Misses of a batch. Traffic depends on lines. Time depends on visits, because a visit requests all lines
 /// of its node or triangle at once and waits for the last one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Misses {
-    /// Lines that missed an L1.
+    /// Lines that missed in an L1.
     pub l1_lines: f64,
-    /// Of those, lines that missed the L2.
+    /// Lines of these that missed in the L2.
     pub l2_lines: f64,
     /// Visits that waited for a line from the L2 or from memory.
     pub l1_visits: f64,
-    /// Of those, visits that waited for a line from memory.
+    /// Visits of these that waited for a line from memory.
     pub l2_visits: f64,
 }
 
@@ -31,16 +31,16 @@ impl Misses {
         self.l2_visits += other.l2_visits;
     }
 
-    /// Bytes that the L2 fetched.
+    /// Bytes fetched by the L2.
     #[must_use]
     pub fn dram_bytes(&self, line_bytes: u64) -> f64 {
         self.l2_lines * line_bytes as f64
     }
 }
 
-/// Lines that records of so many bytes, packed one after another, lie in: the mean over all records.
-/// A record of `b` bytes begins at a multiple of `g = gcd(b, line)`, each multiple as often as the
-/// others, and lies in `1 + (b - g) / line` lines on average.
+/// Mean number of lines that a record touches, for records stored consecutively. A record of `b` bytes
+/// starts at a multiple of `g = gcd(b, line)`, all multiples equally often, and touches `1 + (b - g) /
+/// line` lines on average.
 #[must_use]
 pub fn lines_per_record(record_bytes: u32, line_bytes: u64) -> f64 {
     let bytes = u64::from(record_bytes).max(1);
@@ -51,8 +51,8 @@ pub fn lines_per_record(record_bytes: u32, line_bytes: u64) -> f64 {
     1.0 + (bytes - divisor) as f64 / line_bytes as f64
 }
 
-/// Misses of a batch by the stated hit rates, which are shares of visits: a visit finds all its
-/// lines or none. Re-tests count as primary accesses.
+/// Misses of a batch by the configured hit rates, which apply per visit: all lines of a visit hit, or all
+/// miss. Re-tests count as primary accesses.
 #[must_use]
 pub fn by_rates(work: &BatchWork, bvh: &BvhSummary, config: &SgrtConfig) -> Misses {
     let cache = &config.cache;
@@ -86,54 +86,58 @@ pub fn by_rates(work: &BatchWork, bvh: &BvhSummary, config: &SgrtConfig) -> Miss
     misses
 }
 
-/// Node and triangle addresses may need more than 32 bits of line number.
-type Lru = cache::Lru<AnyWays, u64>;
-
-fn lru(bytes: u64, ways: u32, line_bytes: u64) -> Lru {
+fn lru(bytes: u64, ways: u32, line_bytes: u64) -> Box<dyn Cache> {
     let sets = bytes / (u64::from(ways) * line_bytes);
-    Lru::new(sets as u32, AnyWays(ways as usize))
+    AnyCache::lru(sets as u32, ways).into_box()
 }
 
-/// The caches of the whole device, fed with addresses.
-#[derive(Clone, Debug)]
-pub struct Hierarchy {
-    nodes: Vec<Lru>,
-    triangles: Vec<Lru>,
-    l2: Lru,
+/// The caches of the whole device, simulated by addresses.
+pub struct DeviceCaches {
+    /// Per unit, the node cache and then the triangle cache.
+    caches: Hierarchy<Box<dyn Cache>>,
+    units: usize,
     line_bytes: u64,
 }
 
-impl Hierarchy {
+impl DeviceCaches {
+    /// Limit for the lines of nodes and triangles.
+    pub const MOST_LINES: u64 = u32::MAX as u64;
+
     /// Empty caches.
     #[must_use]
     pub fn new(config: &SgrtConfig) -> Self {
         let c = &config.cache;
         let units = config.tni.units as usize;
+        let of_unit = |_| [c.node_l1_bytes, c.triangle_l1_bytes];
+        let l1 = (0..units).flat_map(of_unit);
+        let caches = Caches {
+            l1: l1
+                .map(|bytes| lru(bytes, c.l1_ways, c.line_bytes))
+                .collect(),
+            l2: vec![lru(c.l2_bytes, c.l2_ways, c.line_bytes)],
+        };
         Self {
-            nodes: vec![lru(c.node_l1_bytes, c.l1_ways, c.line_bytes); units],
-            triangles: vec![lru(c.triangle_l1_bytes, c.l1_ways, c.line_bytes); units],
-            l2: lru(c.l2_bytes, c.l2_ways, c.line_bytes),
+            caches: Hierarchy::new(caches, MissPath::memory_alone()),
+            units,
             line_bytes: c.line_bytes,
         }
     }
 
-    /// Reads what a visit of a ray on `unit` reads and counts what misses.
+    /// Performs the reads of a visit by a ray on `unit`, and counts the misses. The hierarchy has at most
+    /// [`Self::MOST_LINES`] lines.
     pub fn visit(&mut self, unit: usize, visit: Visit, bvh: &BvhSummary, misses: &mut Misses) {
         let first = bvh.address(visit);
         let last = first + u64::from(bvh.visit_bytes(visit)).max(1) - 1;
-        let unit = unit % self.nodes.len();
+        let cache = 2 * (unit % self.units) + usize::from(matches!(visit, Visit::Triangle(_)));
         let before = *misses;
         for line in first / self.line_bytes..=last / self.line_bytes {
-            let l1 = match visit {
-                Visit::Node(_) => &mut self.nodes[unit],
-                Visit::Triangle(_) => &mut self.triangles[unit],
-            };
-            if l1.access(line) {
-                continue;
-            }
-            misses.l1_lines += 1.0;
-            if !self.l2.access(line) {
-                misses.l2_lines += 1.0;
+            match self.caches.access(cache, line as u32) {
+                Found::L1 => {}
+                Found::L2 => misses.l1_lines += 1.0,
+                Found::Below => {
+                    misses.l1_lines += 1.0;
+                    misses.l2_lines += 1.0;
+                }
             }
         }
         misses.l1_visits += f64::from(misses.l1_lines > before.l1_lines);
@@ -148,7 +152,7 @@ mod tests {
 
     #[test]
     fn the_first_touch_of_every_line_misses_and_the_second_hits() {
-        let mut caches = Hierarchy::new(&SgrtConfig::default());
+        let mut caches = DeviceCaches::new(&SgrtConfig::default());
         let mut misses = Misses::default();
         for _ in 0..2 {
             for node in 0..64 {
@@ -160,7 +164,7 @@ mod tests {
         assert_eq!(misses.dram_bytes(64), lines * 64.0);
     }
 
-    /// Caches too small to hold anything until its next use: rates of 0 must count what addresses count.
+    /// With caches too small for any reuse, hit rates of 0 must give the counts of addresses.
     #[test]
     fn rates_and_addresses_count_lines_and_visits_alike() {
         for (node_bytes, triangle_bytes) in [(64, 48), (256, 48), (80, 36), (32, 64), (100, 7)] {
@@ -183,9 +187,9 @@ mod tests {
             c.l2_hit_rate = lowest;
             (c.node_l1_bytes, c.triangle_l1_bytes, c.l2_bytes) = (64, 64, 64);
             (c.l1_ways, c.l2_ways) = (1, 1);
-            let mut caches = Hierarchy::new(&config);
+            let mut caches = DeviceCaches::new(&config);
             let mut found = Misses::default();
-            // 389 has no divisor in common with 1024, and no two visits in a row share a line.
+            // 389 is coprime to 1024, and consecutive visits share no line.
             let spread = (0..1024).map(|at| at * 389 % 1024);
             for index in spread {
                 caches.visit(0, Visit::Node(index), &bvh, &mut found);
@@ -201,15 +205,15 @@ mod tests {
     #[test]
     fn a_loop_larger_than_an_lru_cache_always_misses_it() {
         let mut cache = lru(64 * 8, 8, 64);
-        let hits = (0..90u64).filter(|i| cache.access(i % 9)).count();
+        let hits = (0..90).filter(|i| cache.access(i % 9)).count();
         assert_eq!(hits, 0);
-        let hits = (0..90u64).filter(|i| cache.access(100 + i % 8)).count();
+        let hits = (0..90).filter(|i| cache.access(100 + i % 8)).count();
         assert_eq!(hits, 82);
     }
 
     #[test]
     fn units_share_the_l2_but_not_the_l1() {
-        let mut caches = Hierarchy::new(&SgrtConfig::default());
+        let mut caches = DeviceCaches::new(&SgrtConfig::default());
         let mut misses = Misses::default();
         caches.visit(0, Visit::Node(5), &bvh(), &mut misses);
         caches.visit(1, Visit::Node(5), &bvh(), &mut misses);

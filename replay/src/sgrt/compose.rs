@@ -1,15 +1,15 @@
-//! The right image that reprojection yields.
+//! Composes the right image of reprojection.
 //!
-//! A traced pixel takes the traced colour, bit for bit. A reused one is put together from what the
-//! hardware would have: the left eye's view-independent radiance, and view-dependent radiance that
-//! it still traces for the right eye. The trace has that radiance for the right eye's true hit, so:
+//! A traced pixel has the traced colour, bit for bit. A reused pixel combines what the hardware would have:
+//! the left eye's view-independent radiance, and view-dependent radiance that is still traced for the right
+//! eye. The trace has the latter for the right eye's true hit. There are three cases:
 //!
-//! - The re-test found the true triangle and only the primary hit is reused: everything after the
-//!   hit is traced, so the colour is the traced one. The same holds for the sky where it is seen.
-//! - The reused hit is on the same surface as the true one (same object, within a pixel): left
-//!   view-independent part + right view-dependent part. With `primary` reuse this stands for
-//!   shading at the left hit, whose shadows and texels are those of the left pixel.
-//! - Any other hit is wrong: both parts are the left pixel's, so that the error shows.
+//! - The re-test found the true triangle and only the primary hit is reused. Everything after the hit is
+//!   traced, so the colour is the traced one. This also applies to visible sky.
+//! - The reused hit is on the same surface as the true one (same object, within a pixel). The colour is the
+//!   left view-independent part plus the right view-dependent part. With `primary` reuse this approximates
+//!   shading at the left hit, with the shadows and texels of the left pixel.
+//! - The hit is wrong. Both parts are those of the left pixel, so that the error is visible.
 
 use super::accuracy::position_error_px;
 use super::detect::Decision;
@@ -19,7 +19,7 @@ use formats::view::Eye;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// What a reused right pixel takes over from the left one.
+/// What a right pixel reuses from a left one.
 #[derive(
     Clone,
     Copy,
@@ -39,18 +39,18 @@ pub enum Reuse {
     /// The primary hit; shadow rays are traced again.
     #[default]
     Primary,
-    /// And the outcome of its shadow rays.
+    /// Also the results of its shadow rays.
     Shadow,
-    /// And the final colour where the material looks alike from everywhere.
+    /// Also the final colour, if the material looks the same from everywhere.
     Color,
 }
 
 impl Reuse {
-    /// All levels, least first.
+    /// All levels, in increasing order.
     pub const ALL: [Self; 3] = [Self::Primary, Self::Shadow, Self::Color];
 }
 
-/// Farthest that a reused hit may lie from the true one to count as the same spot, in pixels.
+/// Maximum distance between the reused and the true hit to count as the same spot, in pixels.
 pub const SAME_SPOT_PX: f32 = 1.0;
 
 /// Colours of the right samples, linear RGB.

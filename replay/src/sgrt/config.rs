@@ -1,9 +1,9 @@
-//! The model's parameters, read from TOML. Defaults and their reasons: `data/sgrt-default.toml`.
+//! The parameters of the model, read from TOML. `data/sgrt-default.toml` documents the defaults.
 
 use formats::raytrace::TraversalKind;
 use serde::{Deserialize, Serialize};
 
-/// The default parameters with their comments.
+/// The default parameters, with comments.
 pub const DEFAULT_TOML: &str = include_str!("../../data/sgrt-default.toml");
 
 /// All parameters.
@@ -28,27 +28,27 @@ pub struct SgrtConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tni {
-    /// Units.
+    /// Number of units.
     pub units: u32,
-    /// Clock.
+    /// Clock in MHz.
     pub clock_mhz: f64,
-    /// Traversal pipelines of a unit.
+    /// Traversal pipelines per unit.
     pub trv_pipelines: u32,
-    /// Issue cycles of a step at a binary node.
+    /// Issue cycles per step at a binary node.
     pub trv_cycles_per_step: f64,
-    /// Issue cycles of a step at an eight-wide node.
+    /// Issue cycles per step at an eight-wide node.
     pub trv_cycles_per_wide_step: f64,
     /// Stages of a traversal pipeline.
     pub trv_depth_cycles: u32,
-    /// Intersection pipelines of a unit.
+    /// Intersection pipelines per unit.
     pub ist_pipelines: u32,
-    /// Issue cycles of a ray-triangle test.
+    /// Issue cycles per ray-triangle test.
     pub ist_cycles_per_test: f64,
     /// Stages of an intersection pipeline.
     pub ist_depth_cycles: u32,
-    /// Rays that a unit holds in flight.
+    /// Rays in flight per unit.
     pub rays_in_flight: u32,
-    /// Rays that a unit takes in or hands back in a cycle.
+    /// Rays that a unit accepts or returns per cycle.
     pub rays_per_cycle: f64,
 }
 
@@ -56,25 +56,25 @@ pub struct Tni {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Cache {
-    /// Node cache of a unit.
+    /// Node cache of each unit.
     pub node_l1_bytes: u64,
-    /// Triangle cache of a unit.
+    /// Triangle cache of each unit.
     pub triangle_l1_bytes: u64,
-    /// Ways of both.
+    /// Ways of both L1 caches.
     pub l1_ways: u32,
-    /// Cache that all units share.
+    /// Cache shared by all units.
     pub l2_bytes: u64,
-    /// Its ways.
+    /// Ways of the L2.
     pub l2_ways: u32,
-    /// Line size of all.
+    /// Line size of all caches.
     pub line_bytes: u64,
-    /// Cycles from an L1 miss to data out of the L2.
+    /// Cycles from an L1 miss to data from the L2.
     pub l2_latency_cycles: u32,
-    /// Node visits that hit the L1, where the trace has no addresses.
+    /// Share of node visits that hit the L1, if the trace has no addresses.
     pub node_l1_hit_rate: HitRates,
-    /// Triangle visits that hit the L1, where the trace has no addresses.
+    /// Share of triangle visits that hit the L1, if the trace has no addresses.
     pub triangle_l1_hit_rate: HitRates,
-    /// L1 misses that hit the L2, where the trace has no addresses.
+    /// Share of L1 misses that hit the L2, if the trace has no addresses.
     pub l2_hit_rate: HitRates,
 }
 
@@ -86,7 +86,7 @@ pub struct HitRates {
     pub primary: f64,
     /// Shadow rays of primary hits.
     pub shadow: f64,
-    /// Everything further down the ray tree.
+    /// All later rays of the ray tree.
     pub secondary: f64,
 }
 
@@ -94,41 +94,41 @@ pub struct HitRates {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Memory {
-    /// Peak bandwidth, 10^9 bytes a second.
+    /// Peak bandwidth, 10^9 bytes per second.
     pub bandwidth_gb_s: f64,
     /// Latency of a read.
     pub latency_ns: f64,
     /// Attributes and texels per shaded hit.
     pub shading_bytes: f64,
-    /// Frame buffer per pixel.
+    /// Frame buffer bytes per pixel.
     pub frame_buffer_bytes: u32,
 }
 
-/// Programmable cores and the kernels' costs in cycles of one lane.
+/// Programmable cores and the cost of kernels in cycles of one lane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Srp {
-    /// Cores.
+    /// Number of cores.
     pub cores: u32,
-    /// Lanes of a core.
+    /// Lanes per core.
     pub lanes_per_core: u32,
-    /// Clock.
+    /// Clock in MHz.
     pub clock_mhz: f64,
-    /// Per ray generated.
+    /// Cycles per generated ray.
     pub ray_generation_cycles: f64,
-    /// Per closest-hit ray, hit or miss.
+    /// Cycles per closest-hit ray, hit or miss.
     pub shading_cycles: f64,
-    /// Per alpha look-up.
+    /// Cycles per alpha look-up.
     pub alpha_test_cycles: f64,
-    /// Per left pixel projected into the right eye.
+    /// Cycles per left pixel projected into the right eye.
     pub reproject_cycles: f64,
-    /// Per right pixel tested.
+    /// Cycles per right pixel tested.
     pub detect_cycles: f64,
-    /// Per right pixel reused.
+    /// Cycles per right pixel reused.
     pub reuse_cycles: f64,
 }
 
-/// Bytes of a G-buffer record.
+/// Bytes of the fields of a G-buffer record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Gbuffer {
@@ -140,9 +140,9 @@ pub struct Gbuffer {
     pub texcoord_bytes: u32,
     /// Position.
     pub position_bytes: u32,
-    /// Object number, in the record where error detection reads it.
+    /// Object number, part of the record if error detection reads it.
     pub object_bytes: u32,
-    /// Triangle number, in the record where error detection reads it.
+    /// Triangle number, part of the record if error detection reads it.
     pub triangle_bytes: u32,
 }
 
@@ -156,7 +156,7 @@ pub struct Energy {
     pub wide_step_pj: f64,
     /// Per ray-triangle test.
     pub triangle_test_pj: f64,
-    /// Per ray taken in and handed back.
+    /// Per ray accepted and returned.
     pub ray_pj: f64,
     /// Per cycle of one lane of a programmable core.
     pub srp_lane_cycle_pj: f64,
@@ -164,41 +164,40 @@ pub struct Energy {
     pub l1_pj_per_byte: f64,
     /// Per byte read from the L2.
     pub l2_pj_per_byte: f64,
-    /// Per byte moved in or out of the tile G-buffer.
+    /// Per byte read from or written to the tile G-buffer.
     pub sram_pj_per_byte: f64,
-    /// Per byte moved in or out of external memory.
+    /// Per byte read from or written to external memory.
     pub dram_pj_per_byte: f64,
-    /// Power that flows whatever is done.
+    /// Static power.
     pub static_mw: f64,
 }
 
-/// Parameters that cannot be used.
+/// Invalid parameters.
 #[derive(Debug, thiserror::Error)]
 pub enum ConfigError {
-    /// Not TOML, an unknown key, or a value of the wrong type.
+    /// Invalid TOML, an unknown key, or a value of the wrong type.
     #[error("{0}")]
     Toml(#[from] toml::de::Error),
     /// A value outside its range.
     #[error("{key}: expected {expected}, found {found}")]
     Range {
-        /// Dotted name.
+        /// Dotted key.
         key: String,
-        /// What is allowed.
+        /// The valid values.
         expected: &'static str,
-        /// What the file says.
+        /// The value found.
         found: String,
     },
 }
 
 impl Default for SgrtConfig {
     fn default() -> Self {
-        // A test holds that the embedded file parses.
         toml::from_str(DEFAULT_TOML).expect("the embedded defaults parse")
     }
 }
 
 impl SgrtConfig {
-    /// Issue cycles and energy of a step of a tree.
+    /// Issue cycles and energy of a traversal step.
     #[must_use]
     pub fn step(&self, traversal: TraversalKind) -> (f64, f64) {
         match traversal {
@@ -207,7 +206,7 @@ impl SgrtConfig {
         }
     }
 
-    /// The defaults with a file's values laid over them.
+    /// The defaults, overridden by a file's values.
     ///
     /// # Errors
     /// [`ConfigError`] names the key and what was expected.
@@ -222,7 +221,7 @@ impl SgrtConfig {
     /// Checks every value against its range.
     ///
     /// # Errors
-    /// `ConfigError::Range` for the first value outside.
+    /// `ConfigError::Range` for the first value out of range.
     pub fn check(&self) -> Result<(), ConfigError> {
         for (key, value) in self.numbers() {
             let rate = key.contains("hit_rate");
@@ -267,7 +266,7 @@ impl SgrtConfig {
         Ok(())
     }
 
-    /// Every parameter by its dotted name, in file order.
+    /// Every parameter by its dotted key, in file order.
     #[must_use]
     pub fn numbers(&self) -> Vec<(String, f64)> {
         let mut out = Vec::new();
@@ -277,8 +276,8 @@ impl SgrtConfig {
         out
     }
 
-    /// A copy with one parameter scaled; whole numbers are rounded and stay at least 1, rates stay
-    /// rates (their miss rate is scaled). `None` for an unknown name.
+    /// A copy with one parameter scaled. Integers are rounded and stay at least 1; for rates, the miss rate
+    /// is scaled. `None` for an unknown key.
     #[must_use]
     pub fn scaled(&self, key: &str, factor: f64) -> Option<Self> {
         let mut table = toml::Table::try_from(self).ok()?;
@@ -310,7 +309,7 @@ fn overlay(base: &mut toml::Table, over: toml::Table) {
     for (key, value) in over {
         match (base.get_mut(&key), value) {
             (Some(toml::Value::Table(b)), toml::Value::Table(o)) => overlay(b, o),
-            // A whole number is fine where the default is a fraction.
+            // An integer is valid for a floating-point parameter.
             (Some(slot @ toml::Value::Float(_)), toml::Value::Integer(n)) => {
                 *slot = toml::Value::Float(n as f64);
             }

@@ -1,4 +1,4 @@
-//! Error detection: what becomes of each right sample.
+//! Error detection: decides whether each right sample is reused or traced.
 
 use super::frame::{Frame, SKY};
 use super::place::Place;
@@ -10,39 +10,39 @@ mod retest;
 
 pub use retest::intersect;
 
-/// What becomes of a right sample.
+/// The class of a right sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u8)]
 pub enum PixelClass {
-    /// The only arrival, reused.
+    /// Reused; a single arrival.
     Reused,
-    /// The nearest of several arrivals, reused.
+    /// Reused; the nearest of several arrivals.
     Overlapped,
-    /// Nothing arrived: traced.
+    /// Traced; no arrival.
     #[default]
     Missing,
-    /// Rejected by the rule: traced.
+    /// Traced; rejected by the rule.
     Bad,
 }
 
 impl PixelClass {
-    /// True for the classes that are reused.
+    /// True for the reused classes.
     #[must_use]
     pub fn is_reused(self) -> bool {
         matches!(self, Self::Reused | Self::Overlapped)
     }
 }
 
-/// Decision on a right sample.
+/// The decision on a right sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decision {
-    /// What becomes of it.
+    /// Its class.
     pub class: PixelClass,
-    /// Left sample that is reused; of no meaning for traced classes.
+    /// The reused left sample; undefined for traced classes.
     pub source: u32,
-    /// Primitive that is reused ([`SKY`] for the sky).
+    /// The reused primitive ([`SKY`] for the sky).
     pub primitive: u32,
-    /// Where the right-eye ray hit that primitive; `None` where the left hit is taken as it is.
+    /// The right-eye ray's hit on that primitive; `None` if the left hit is reused.
     pub exact: Option<[f32; 3]>,
     /// Triangles that the ray was intersected with.
     pub tests: u8,
@@ -79,7 +79,7 @@ pub fn decide(frame: &Frame, arrived: &Reprojection, rule: &Rule) -> Vec<Decisio
         .collect()
 }
 
-/// The decision where no test rejects what arrived.
+/// The decision if no test rejects the arrival.
 fn candidate(at: Place) -> Decision {
     let candidate = at.candidate();
     let (class, primitive) = match candidate.arrivals {

@@ -1,12 +1,12 @@
-//! External memory: one account of what is moved, from which both time and energy follow.
+//! External memory traffic, from which both time and energy are computed.
 
 use super::config::SgrtConfig;
 use serde::{Deserialize, Serialize};
 
-/// Bytes in and out of external memory by what needs them.
+/// Bytes read from and written to external memory, by use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DramBytes {
-    /// Nodes and triangles that missed the caches.
+    /// Nodes and triangles that missed in the caches.
     pub hierarchy_bytes: u64,
     /// G-buffer.
     pub gbuffer_bytes: u64,
@@ -17,13 +17,13 @@ pub struct DramBytes {
 }
 
 impl DramBytes {
-    /// All of them.
+    /// Total bytes.
     #[must_use]
     pub fn total(&self) -> u64 {
         self.hierarchy_bytes + self.gbuffer_bytes + self.shading_bytes + self.frame_buffer_bytes
     }
 
-    /// Adds another batch's.
+    /// Adds another batch's bytes.
     pub fn add(&mut self, other: &Self) {
         self.hierarchy_bytes += other.hierarchy_bytes;
         self.gbuffer_bytes += other.gbuffer_bytes;
@@ -31,7 +31,7 @@ impl DramBytes {
         self.frame_buffer_bytes += other.frame_buffer_bytes;
     }
 
-    /// Time of the transfer at full bandwidth (a GB/s is a byte a nanosecond).
+    /// Transfer time at full bandwidth (1 GB/s is 1 byte/ns).
     #[must_use]
     pub fn time_ns(&self, config: &SgrtConfig) -> f64 {
         self.total() as f64 / config.memory.bandwidth_gb_s

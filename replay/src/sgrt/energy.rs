@@ -1,4 +1,4 @@
-//! Energy of a frame by component. Only ratios between two runs of this model mean anything.
+//! Energy of a frame by component. Only ratios between two runs of this model are meaningful.
 
 use super::config::SgrtConfig;
 use super::hardware::Run;
@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 /// Energy by component in picojoules.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EnergyPj {
-    /// Steps, tests and hand-over of the fixed-function units.
+    /// Steps, tests and ray transfers of the fixed-function units.
     pub tni_pj: f64,
     /// Kernels.
     pub srp_pj: f64,
@@ -18,19 +18,19 @@ pub struct EnergyPj {
     pub sram_pj: f64,
     /// External memory.
     pub dram_pj: f64,
-    /// Leakage and clocks over the frame's time.
+    /// Static power over the frame's time.
     pub static_pj: f64,
 }
 
 impl EnergyPj {
-    /// All components.
+    /// Sum of all components.
     #[must_use]
     pub fn total(&self) -> f64 {
         self.tni_pj + self.srp_pj + self.caches_pj + self.sram_pj + self.dram_pj + self.static_pj
     }
 }
 
-/// Energy of what a frame did.
+/// Energy of a run.
 #[must_use]
 pub fn energy(run: &Run, bvh: &BvhSummary, config: &SgrtConfig) -> EnergyPj {
     let e = &config.energy;
@@ -47,7 +47,7 @@ pub fn energy(run: &Run, bvh: &BvhSummary, config: &SgrtConfig) -> EnergyPj {
             + run.misses.l1_lines * config.cache.line_bytes as f64 * e.l2_pj_per_byte,
         sram_pj: run.on_chip_bytes as f64 * e.sram_pj_per_byte,
         dram_pj: run.dram.total() as f64 * e.dram_pj_per_byte,
-        // A milliwatt is a picojoule a nanosecond.
+        // 1 mW is 1 pJ/ns.
         static_pj: run.time_ns * e.static_mw,
     }
 }

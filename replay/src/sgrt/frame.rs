@@ -1,4 +1,4 @@
-//! A whole stereo frame of a ray trace: what each pixel sees and what its rays cost.
+//! A stereo frame of a ray trace: the hit of each pixel and the cost of its rays.
 
 use super::work::PixelWork;
 use formats::raytrace::camera::sample_position_px;
@@ -7,18 +7,18 @@ use formats::view::{Eye, TILE_SIZE_PX};
 use rayon::prelude::*;
 use std::error::Error;
 
-/// Object and primitive number of a pixel that sees the sky.
+/// Object and primitive number of a sky pixel.
 pub const SKY: u32 = u32::MAX;
 
-/// Anything that tiles of a ray trace come from.
+/// A source of ray trace tiles.
 pub trait RaySource: Sync {
-    /// Everything but the tiles.
+    /// All tables.
     fn tables(&self) -> &RaytraceTables;
 
     /// Decodes a tile of an eye into `tile`.
     ///
     /// # Errors
-    /// Whatever is wrong with the tile, saying where.
+    /// An invalid tile, with its location.
     fn tile(
         &self,
         eye: Eye,
@@ -42,42 +42,50 @@ impl RaySource for Raytrace {
     }
 }
 
-/// A frame that could not be put together.
+/// Reasons why a frame cannot be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum FrameError {
-    /// The source could not give a tile.
+    /// An unreadable tile.
     #[error("{eye} eye, tile {tile}: {source}")]
     Tile {
-        /// Eye asked for.
+        /// The eye.
         eye: Eye,
         /// Tile number.
         tile: u32,
-        /// Why.
+        /// The error.
         source: Box<dyn Error + Send + Sync>,
     },
-    /// A tile has another number of pixel records than its size asks for.
+    /// Nodes and triangles occupy more lines than cache line numbers allow.
+    #[error(
+        "hierarchy: expected fewer than 2^32 - 1 cache lines of nodes and triangles, found {lines}"
+    )]
+    Lines {
+        /// Lines of all nodes and triangles.
+        lines: u64,
+    },
+    /// A tile with a wrong number of pixel records.
     #[error("{eye} eye, tile {tile}: expected {expected} pixel records, found {found}")]
     Pixels {
-        /// Eye asked for.
+        /// The eye.
         eye: Eye,
         /// Tile number.
         tile: u32,
         /// Width times height times samples.
         expected: usize,
-        /// Records there.
+        /// Records in the tile.
         found: usize,
     },
-    /// Several samples a pixel: their number decides how many left samples there are to fill a right
-    /// pixel from, so that reuse would say more about it than about the scene.
+    /// Several samples per pixel. Their number would determine how many left samples are available per
+    /// right pixel, and thus dominate the reuse.
     #[error(
-        "samples per pixel: expected 1, found {found}: the scheme keeps one hit a pixel in its \
+        "samples per pixel: expected 1, found {found}: the scheme keeps one hit per pixel in its \
          G-buffer"
     )]
     Samples {
         /// Samples of the trace.
         found: u32,
     },
-    /// Sizes that reprojection cannot work with.
+    /// Image sizes that reprojection does not support.
     #[error("eyes: expected two images of one size above 0, found {}x{} and {}x{} px", left[0], left[1], right[0], right[1])]
     Size {
         /// Left image.
@@ -87,10 +95,10 @@ pub enum FrameError {
     },
 }
 
-/// What a sample of a pixel sees.
+/// The hit of a pixel's sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Hit position relative to the trace's origin; for the sky the unit direction towards it.
+    /// Hit position relative to the trace's origin; for the sky, the unit direction.
     pub position: [f32; 3],
     /// Primitive, or [`SKY`].
     pub primitive: u32,
@@ -98,14 +106,14 @@ pub struct Sample {
     pub object: u32,
     /// Material; 0 for the sky.
     pub material: u32,
-    /// Radiance that any eye sees alike, linear RGB.
+    /// View-independent radiance, linear RGB.
     pub view_independent: [f32; 3],
-    /// The rest, linear RGB.
+    /// View-dependent radiance, linear RGB.
     pub view_dependent: [f32; 3],
 }
 
 impl Sample {
-    /// True where nothing was hit.
+    /// True if nothing was hit.
     #[must_use]
     pub fn is_sky(&self) -> bool {
         self.primitive == SKY
@@ -124,23 +132,23 @@ pub fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|c| a[c] + b[c])
 }
 
-/// One eye, an entry a pixel, row by row.
+/// One eye, with one entry per pixel, row by row.
 #[derive(Clone, Debug, Default)]
 pub struct EyeFrame {
-    /// What is seen.
+    /// The hits.
     pub samples: Vec<Sample>,
-    /// What it cost to trace.
+    /// The tracing costs.
     pub work: Vec<PixelWork>,
 }
 
-/// Both eyes, traced in full.
+/// Both eyes, completely traced.
 #[derive(Clone, Debug)]
 pub struct Frame {
     /// The trace's tables.
     pub tables: RaytraceTables,
     /// Left and right eye.
     pub eyes: [EyeFrame; 2],
-    /// Width and height of an eye's image in pixels.
+    /// Width and height of one eye's image in pixels.
     pub size_px: [u32; 2],
 }
 
@@ -148,8 +156,7 @@ impl Frame {
     /// Decodes all tiles of both eyes.
     ///
     /// # Errors
-    /// [`FrameError`] for eyes or samples that reprojection is not made for, or the first tile that
-    /// cannot be read.
+    /// [`FrameError`] for eyes or sample counts that reprojection does not support, or for the first unreadable tile.
     pub fn load(source: &dyn RaySource) -> Result<Self, FrameError> {
         let tables = source.tables().clone();
         let [left, right] = [Eye::Left, Eye::Right].map(|e| tables.camera(e).size_px);
@@ -181,13 +188,13 @@ impl Frame {
         &self.eyes[1]
     }
 
-    /// Samples of an eye, one a pixel.
+    /// Samples per eye, one per pixel.
     #[must_use]
     pub fn sample_count(&self) -> usize {
         self.size_px[0] as usize * self.size_px[1] as usize
     }
 
-    /// Sample numbers of the pixels of a tile, row by row.
+    /// Sample indices of a tile's pixels, row by row.
     pub fn tile_samples(&self, tile: u32) -> impl Iterator<Item = usize> + use<> {
         let ([x, y], [w, h]) = self.tables.tile_rect(tile);
         let width = self.size_px[0] as usize;

@@ -1,47 +1,46 @@
-//! Bytes that reprojection moves: with the tile's G-buffer on chip, and with a whole-screen
-//! G-buffer in DRAM.
+//! G-buffer traffic of reprojection, with one tile's G-buffer on chip or the whole screen's in DRAM.
 //!
-//! Tile by tile (paper section III), shading leaves a tile's records in internal SRAM, from which
-//! the reproject and reuse kernels read; only error detection needs other tiles, so what it reads of
-//! every left pixel goes to DRAM once and DMA fetches the rows that a band of tiles needs, once for
-//! the whole band. On the whole screen, every record goes to DRAM, each kernel reads it back, and
-//! detection reads the same rows.
+//! Tile by tile (paper section III), shading leaves a tile's records in on-chip SRAM, from which the
+//! reproject and reuse kernels read. Only error detection needs other tiles. The fields it reads of every
+//! left pixel are written to DRAM once, and DMA fetches the rows for each band of tiles, once per band.
+//! With a whole-screen G-buffer, every record is written to DRAM, each kernel reads it back, and detection
+//! reads the same rows.
 
 use super::config::Gbuffer;
 use super::reads::Reads;
 use serde::{Deserialize, Serialize};
 
-/// Bytes moved by one way of keeping the G-buffer.
+/// Bytes moved for a G-buffer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Traffic {
-    /// In and out of the on-chip buffers.
+    /// Read from and written to on-chip buffers.
     pub on_chip_bytes: u64,
-    /// In and out of external memory.
+    /// Read from and written to external memory.
     pub dram_bytes: u64,
 }
 
-/// Where the G-buffer's records are kept.
+/// Where G-buffer records are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Keeping {
-    /// One tile's on chip.
+    /// One tile on chip.
     Tile,
-    /// The whole screen's in DRAM.
+    /// The whole screen in DRAM.
     Screen,
 }
 
-/// Pixels of a right tile that the kernels handle.
+/// Pixels of a right tile processed by the kernels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RightTile {
     /// Pixels tested.
     pub tested: u64,
     /// Pixels reused.
     pub reused: u64,
-    /// The tile's share of the bytes that its band's rows are fetched with.
+    /// The tile's share of the bytes fetched for its band.
     pub fetched_bytes: u64,
 }
 
-/// Traffic of a left tile: shading writes its records, the reproject kernel reads what detection
-/// will, and that is written for the rows.
+/// Traffic of a left tile: shading writes its records, the reproject kernel reads the fields that detection
+/// needs, and these are written to DRAM.
 #[must_use]
 pub fn left_tile(pixels: u64, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Traffic {
     let record = pixels * reads.record_bytes(g);
@@ -58,8 +57,8 @@ pub fn left_tile(pixels: u64, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Tr
     }
 }
 
-/// Traffic of a right tile: the rows come in and detection looks things up in them, reuse reads the
-/// left records, and the tile's own records are written.
+/// Traffic of a right tile: rows are fetched and searched by detection, reuse reads left records, and the
+/// tile's own records are written.
 #[must_use]
 pub fn right_tile(tile: &RightTile, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Traffic {
     let records = (tile.reused + tile.tested) * reads.record_bytes(g);
@@ -101,7 +100,7 @@ mod tests {
         let (tiled, screen) = (both(Keeping::Tile), both(Keeping::Screen));
         assert_eq!(tiled[0], 12_000 + 12_500);
         assert!(tiled[0] < screen[0] / 2);
-        // A tile keeps on chip what the whole screen moves through DRAM.
+        // The tile G-buffer keeps on chip what the whole screen moves through DRAM.
         assert_eq!(screen[0] - tiled[0], tiled[1] - screen[1] - 12_000);
     }
 }

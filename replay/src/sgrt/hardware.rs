@@ -1,10 +1,10 @@
-//! The modelled hardware: a frame with both eyes traced in full, and with reprojection.
+//! The hardware model: a frame with both eyes completely traced, and with reprojection.
 //!
-//! Units, cores and memory form a pipeline over tiles: while the units trace a tile, the cores
-//! shade the one before and DMA moves the rows of the next, so a batch (a tile of one eye) takes
-//! the slowest of the three and a frame the sum over its batches.
+//! Units, cores and memory form a pipeline over tiles: while the units trace a tile, the cores shade the
+//! previous one and DMA fetches the rows of the next. A batch (a tile of one eye) therefore takes the
+//! maximum of the three, and a frame the sum over its batches.
 
-use super::cache::{self, Hierarchy, Misses};
+use super::cache::{self, DeviceCaches, Misses};
 use super::compose::Reuse;
 use super::config::SgrtConfig;
 use super::detect::Decision;
@@ -17,7 +17,7 @@ use super::rows::RowNeeds;
 use super::srp::{self, SrpCycles};
 use super::tni::{self, TniCycles};
 use super::work::{BatchWork, RayClass};
-use formats::raytrace::RayTile;
+use formats::raytrace::{RayTile, Visit};
 use formats::view::Eye;
 use rayon::prelude::*;
 
@@ -30,45 +30,45 @@ pub struct Run {
     pub misses: Misses,
     /// Unit cycles by resource, summed over batches.
     pub tni: TniCycles,
-    /// Unit cycles: the scarcest resource of each batch, summed.
+    /// Unit cycles: those of the scarcest resource of each batch, summed.
     pub tni_cycles: f64,
     /// Kernel cycles.
     pub srp: SrpCycles,
-    /// Bytes in and out of the tile buffers.
+    /// Bytes read from and written to the tile buffers.
     pub on_chip_bytes: u64,
-    /// Bytes in and out of external memory.
+    /// Bytes read from and written to external memory.
     pub dram: DramBytes,
     /// Time of the frame.
     pub time_ns: f64,
-    /// Part of it in which a batch waits for external memory.
+    /// Time during which batches wait for external memory.
     pub memory_bound_ns: f64,
     /// Energy by component.
     pub energy: EnergyPj,
 }
 
-/// The frame rendered in three ways, and the right eye's share.
+/// The frame rendered in three ways, with the right eye's share.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Comparison {
-    /// Both eyes traced in full.
+    /// Both eyes completely traced.
     pub reference: Run,
-    /// With reprojection, tile by tile.
+    /// Reprojection, tile by tile.
     pub reprojected: Run,
-    /// With reprojection, the whole screen's G-buffer in DRAM.
+    /// Reprojection, with the whole screen's G-buffer in DRAM.
     pub whole_screen: Run,
-    /// Unit cycles of the right eye traced in full.
+    /// Unit cycles of the right eye, completely traced.
     pub right_full_tni_cycles: f64,
     /// Unit cycles of the right eye with reprojection.
     pub right_tni_cycles: f64,
 }
 
 impl Run {
-    /// Frames per second over another run's.
+    /// Frames per second relative to another run.
     #[must_use]
     pub fn performance_over(&self, reference: &Self) -> f64 {
         reference.time_ns / self.time_ns
     }
 
-    /// Energy over another run's.
+    /// Energy relative to another run.
     #[must_use]
     pub fn energy_over(&self, reference: &Self) -> f64 {
         self.energy.total() / reference.energy.total()
@@ -76,13 +76,13 @@ impl Run {
 }
 
 impl Comparison {
-    /// Frames per second of reprojection over the reference's.
+    /// Frames per second of reprojection relative to the reference.
     #[must_use]
     pub fn relative_performance(&self) -> f64 {
         self.reprojected.performance_over(&self.reference)
     }
 
-    /// Energy of reprojection over the reference's.
+    /// Energy of reprojection relative to the reference.
     #[must_use]
     pub fn relative_energy(&self) -> f64 {
         self.reprojected.energy_over(&self.reference)
@@ -94,13 +94,13 @@ impl Comparison {
 pub struct TileWork {
     /// Left eye.
     pub left: BatchWork,
-    /// Right eye traced in full.
+    /// Right eye, completely traced.
     pub right_full: BatchWork,
     /// Right eye with reprojection.
     pub right: BatchWork,
 }
 
-/// Sums each tile's work under a decision and a level of reuse; by tile number.
+/// The work of each tile, for given decisions and reuse, by tile number.
 #[must_use]
 pub fn tile_work(frame: &Frame, decisions: &[Decision], reuse: Reuse) -> Vec<TileWork> {
     (0..frame.tables.tile_count())
@@ -141,7 +141,7 @@ fn add_right(frame: &Frame, decision: &Decision, i: usize, reuse: Reuse, batch: 
     }
 }
 
-/// True where rays of a class are traced for a right sample.
+/// True if rays of a class are traced for a right sample.
 fn is_traced(decision: &Decision, class: RayClass, reuse: Reuse) -> bool {
     match class {
         _ if !decision.class.is_reused() => true,
@@ -151,8 +151,8 @@ fn is_traced(decision: &Decision, class: RayClass, reuse: Reuse) -> bool {
     }
 }
 
-/// Misses of a tile's batches. The left eye is traced alike both ways, but with reprojection it
-/// finds other lines in the caches.
+/// Misses of a tile's batches. The left eye's rays are the same with and without reprojection, but find
+/// other lines in the caches.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TileMisses {
     /// Left eye of the reference.
@@ -165,7 +165,7 @@ pub struct TileMisses {
     pub right: Misses,
 }
 
-/// Misses by the configuration's hit rates; by tile number.
+/// Misses by the configured hit rates, by tile number.
 #[must_use]
 pub fn misses_by_rates(work: &[TileWork], frame: &Frame, config: &SgrtConfig) -> Vec<TileMisses> {
     let of = |batch: &BatchWork| cache::by_rates(batch, &frame.tables.bvh, config);
@@ -181,12 +181,12 @@ pub fn misses_by_rates(work: &[TileWork], frame: &Frame, config: &SgrtConfig) ->
     work.par_iter().map(tile).collect()
 }
 
-/// Misses of the addresses that the trace lists, through the configuration's caches: tiles in
-/// order, left before right, pixels of a tile over the units in turn. A re-test's triangle counts
-/// by hit rate, since its address is not in the trace.
+/// Misses of the addresses in the trace, simulated in the configured caches: tiles in order, left before
+/// right, pixels assigned to the units round robin. The triangle of a re-test counts by hit rate, because
+/// its address is not in the trace.
 ///
 /// # Errors
-/// [`FrameError`] where a tile cannot be read.
+/// [`FrameError`] for an unreadable tile.
 pub fn misses_by_addresses(
     source: &dyn RaySource,
     frame: &Frame,
@@ -196,7 +196,13 @@ pub fn misses_by_addresses(
     config: &SgrtConfig,
 ) -> Result<Vec<TileMisses>, FrameError> {
     let bvh = &frame.tables.bvh;
-    let [mut reference, mut reprojected] = [(); 2].map(|()| Hierarchy::new(config));
+    let last = bvh.triangles.checked_sub(1);
+    let end = last.map_or(0, |last| bvh.address(Visit::Triangle(last as u32)));
+    let lines = (end + u64::from(bvh.bytes_per_triangle)) / config.cache.line_bytes;
+    if lines >= DeviceCaches::MOST_LINES {
+        return Err(FrameError::Lines { lines });
+    }
+    let [mut reference, mut reprojected] = [(); 2].map(|()| DeviceCaches::new(config));
     let mut tile_data = RayTile::default();
     let mut out = vec![TileMisses::default(); work.len()];
     for ((tile, misses), work) in (0u32..).zip(&mut out).zip(work) {
@@ -235,7 +241,7 @@ pub fn misses_by_addresses(
     Ok(out)
 }
 
-/// Runs the three ways through the unit, core, memory and energy models.
+/// Runs the three ways through the models of units, cores, memory and energy.
 #[must_use]
 pub fn compare(
     frame: &Frame,
@@ -301,7 +307,7 @@ struct Model<'a> {
 }
 
 impl Model<'_> {
-    /// Adds a batch of `pixels` finished pixels to a run and returns its unit cycles.
+    /// Adds a batch of `pixels` finished pixels to a run, and returns its unit cycles.
     fn add(
         &self,
         run: &mut Run,

@@ -1,5 +1,4 @@
-//! A trace in memory, and one rule run on it: decisions, right image, its error, and what the
-//! hardware saves.
+//! A loaded trace, and the result of a rule: decisions, right image, image error and hardware savings.
 
 use super::accuracy::count_errors;
 use super::compose::{Reuse, compose};
@@ -18,7 +17,7 @@ use formats::view::Eye;
 use image_error::flip::{FlipMap, Prepared};
 use image_error::{Picture, pixels_per_degree, psnr, ssim};
 
-/// A loaded trace, ready for any number of rules.
+/// A loaded trace, on which rules can be run.
 pub struct LoadedTrace<'a> {
     source: &'a dyn RaySource,
     pub(super) frame: Frame,
@@ -29,7 +28,7 @@ pub struct LoadedTrace<'a> {
     ppd: f32,
 }
 
-/// A rule's result with its pictures.
+/// The result of a rule, with pictures.
 pub struct RuleRun {
     /// The figures.
     pub outcome: Outcome,
@@ -37,7 +36,7 @@ pub struct RuleRun {
     pub decisions: Vec<Decision>,
     /// The right image.
     pub picture: Picture,
-    /// Its error.
+    /// Its error map.
     pub flip: FlipMap,
     pub(super) reads: Reads,
     pub(super) work: Vec<TileWork>,
@@ -48,7 +47,7 @@ impl<'a> LoadedTrace<'a> {
     /// Loads and reprojects a trace.
     ///
     /// # Errors
-    /// [`FrameError`] where a tile cannot be read.
+    /// [`FrameError`] for an unreadable tile.
     pub fn load(source: &'a dyn RaySource) -> Result<Self, FrameError> {
         let frame = Frame::load(source)?;
         let arrived = reproject(&frame);
@@ -74,7 +73,7 @@ impl<'a> LoadedTrace<'a> {
         &self.frame
     }
 
-    /// Left rows that the right image needs.
+    /// The left rows needed for the right image.
     #[must_use]
     pub fn rows(&self) -> &RowNeeds {
         &self.rows
@@ -86,7 +85,7 @@ impl<'a> LoadedTrace<'a> {
         traced(&self.frame, Eye::Left)
     }
 
-    /// Where cache misses come from.
+    /// The source of cache misses.
     #[must_use]
     pub fn cache_misses(&self) -> &'static str {
         if self.frame.tables.meta.has_visits {
@@ -96,10 +95,10 @@ impl<'a> LoadedTrace<'a> {
         }
     }
 
-    /// Runs a rule and a level of reuse through the model.
+    /// Runs the model with a rule and a level of reuse.
     ///
     /// # Errors
-    /// [`FrameError`] where a tile cannot be read again for its addresses.
+    /// [`FrameError`] for a tile whose addresses cannot be read.
     pub fn run(
         &self,
         rule: &Rule,
@@ -215,7 +214,7 @@ mod tests {
         let error = LoadedTrace::load(&source).map(drop).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "samples per pixel: expected 1, found 4: the scheme keeps one hit a pixel in its G-buffer"
+            "samples per pixel: expected 1, found 4: the scheme keeps one hit per pixel in its G-buffer"
         );
     }
 
@@ -229,7 +228,7 @@ mod tests {
         assert_eq!((sky.reuse_pct, sky.flip_mean), (100.0, 0.0));
     }
 
-    /// A scene around the origin: walls and globes of some material.
+    /// A scene around the origin: walls and globes of various materials.
     fn placed() -> impl Strategy<Value = Vec<Placed>> {
         let thing = (
             prop::array::uniform3(-1.0f32..1.0),

@@ -1,9 +1,9 @@
-//! The right image with its bad pixels in yellow, as the paper's figure 1 shows them.
+//! The right image with bad pixels in yellow, as in the paper's figure 1.
 
 use super::detect::Decision;
 use image_error::Picture;
 
-/// Traced pixels, missing or rejected.
+/// Colour of traced pixels, missing or rejected.
 pub const BAD_PIXEL: [u8; 3] = [255, 230, 0];
 
 /// The picture with every traced pixel yellow.

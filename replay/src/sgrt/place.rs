@@ -1,14 +1,14 @@
-//! A right sample under test and what arrived around it.
+//! A right sample under test, and the arrivals around it.
 
 use super::frame::{Frame, Sample};
 use super::reproject::{Candidate, Reprojection};
 
-/// Columns and rows from a pixel to a neighbour.
+/// Column and row offset of a neighbour.
 pub type Offset = (i32, i32);
 
 /// Neighbours that share an edge.
 pub const FOUR: [Offset; 4] = [(0, -1), (-1, 0), (1, 0), (0, 1)];
-/// And those that share a corner.
+/// Neighbours that share an edge or a corner.
 pub const EIGHT: [Offset; 8] = [
     (0, -1),
     (-1, 0),
@@ -25,26 +25,26 @@ pub const EIGHT: [Offset; 8] = [
 pub struct Place<'a> {
     /// Both eyes.
     pub frame: &'a Frame,
-    /// What arrived where.
+    /// All arrivals.
     pub arrived: &'a Reprojection,
-    /// Number of the sample.
+    /// Index of the sample.
     pub index: usize,
 }
 
 impl<'a> Place<'a> {
-    /// What arrived here.
+    /// The arrival here.
     #[must_use]
     pub fn candidate(&self) -> &'a Candidate {
         &self.arrived.candidates[self.index]
     }
 
-    /// The left sample that arrived here; there must be one.
+    /// The left sample that arrived here. Panics if there is none.
     #[must_use]
     pub fn source(&self) -> &'a Sample {
         &self.frame.left().samples[self.candidate().source as usize]
     }
 
-    /// Neighbouring pixels, where they lie in the image.
+    /// Neighbouring pixels inside the image.
     pub fn neighbours(self, offsets: &'static [Offset]) -> impl Iterator<Item = Self> {
         let [width, height] = self.frame.size_px.map(|s| s as i32);
         let index = self.index as i32;
@@ -58,7 +58,7 @@ impl<'a> Place<'a> {
         })
     }
 
-    /// Those at which something arrived.
+    /// Neighbouring pixels with an arrival.
     pub fn arrived_neighbours(self, offsets: &'static [Offset]) -> impl Iterator<Item = Self> {
         self.neighbours(offsets)
             .filter(|place| !place.candidate().is_missing())

@@ -1,26 +1,26 @@
-//! What error detection reads of the left pixels: its DMA, its share of a G-buffer record and its
-//! look-ups in the row buffers follow from it.
+//! The left pixels' fields that error detection reads. They determine its DMA traffic, its share of a
+//! G-buffer record and its look-ups in the row buffers.
 
 use super::config::Gbuffer;
 use serde::{Deserialize, Serialize};
 
-/// Left pixels, around the one that arrived, of which detection reads a field for one right pixel.
-/// Each choice holds those before it.
+/// Left pixels around the arrived one of which detection reads a field, per right pixel. Each variant
+/// includes the previous ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Around {
-    /// That pixel.
+    /// The arrived pixel.
     Own,
-    /// And the next one of its row.
+    /// Also the next pixel of its row.
     Next,
-    /// And its four neighbours.
+    /// Also its four neighbours.
     Cross,
-    /// And its eight neighbours.
+    /// Also its eight neighbours.
     Square,
 }
 
 impl Around {
-    /// Pixels read for one right pixel.
+    /// Pixels read per right pixel.
     #[must_use]
     pub fn pixels(self) -> u64 {
         match self {
@@ -31,19 +31,19 @@ impl Around {
         }
     }
 
-    /// True where rows above and below are read, too.
+    /// True if the rows above and below are read as well.
     #[must_use]
     pub fn has_neighbour_rows(self) -> bool {
         self >= Self::Cross
     }
 }
 
-/// Fields that detection reads, and of which pixels; `None` for a field that it does not read.
+/// The fields that detection reads, and of which pixels; `None` for unread fields.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Reads {
     /// Hit position.
     pub position: Option<Around>,
-    /// Object number, which gives the material as well.
+    /// Object number, which implies the material.
     pub object: Option<Around>,
     /// Triangle number.
     pub triangle: Option<Around>,
@@ -57,13 +57,13 @@ impl Reads {
         triangle: None,
     };
 
-    /// What every rule reads: where the left pixels of a row are seen decides which one arrives.
+    /// The reads of every rule: positions along the row determine which pixel arrives.
     pub const ARRIVALS: Self = Self {
         position: Some(Around::Own),
         ..Self::NOTHING
     };
 
-    /// All that two tests read which run together.
+    /// The union of two tests' reads.
     #[must_use]
     pub fn and(self, other: Self) -> Self {
         Self {
@@ -73,7 +73,7 @@ impl Reads {
         }
     }
 
-    /// Bytes and pixels of each field read.
+    /// Bytes and pixels of each field.
     fn fields(self, g: &Gbuffer) -> impl Iterator<Item = (u64, Around)> {
         [
             (g.position_bytes, self.position),
@@ -84,14 +84,14 @@ impl Reads {
         .filter_map(|(bytes, around)| Some((u64::from(bytes), around?)))
     }
 
-    /// Bytes of a left pixel that detection reads, hence that go through DRAM.
+    /// Bytes per left pixel that detection reads, and that go through DRAM.
     #[must_use]
     pub fn pixel_bytes(self, g: &Gbuffer) -> u64 {
         self.fields(g).map(|(bytes, _)| bytes).sum()
     }
 
-    /// Bytes that DMA fetches for a band of rows of which `rows` hold what arrives in the band, and
-    /// `with_neighbours` what arrives in the band and the rows beside it, `row_px` pixels each.
+    /// Bytes that DMA fetches for a band of rows. The band's arrivals come from `rows` left rows, and those
+    /// of the band and its adjacent rows from `with_neighbours`, of `row_px` pixels each.
     #[must_use]
     pub fn fetched_bytes(self, g: &Gbuffer, rows: u64, with_neighbours: u64, row_px: u64) -> u64 {
         self.fields(g)
@@ -106,7 +106,7 @@ impl Reads {
             .sum()
     }
 
-    /// Bytes that detection of one right pixel reads from the row buffers.
+    /// Bytes read from the row buffers per tested right pixel.
     #[must_use]
     pub fn looked_up_bytes(self, g: &Gbuffer) -> u64 {
         self.fields(g)
@@ -114,7 +114,7 @@ impl Reads {
             .sum()
     }
 
-    /// Bytes of a G-buffer record: the paper's fields and the numbers that detection reads.
+    /// Bytes per G-buffer record: the paper's fields, and the numbers that detection reads.
     #[must_use]
     pub fn record_bytes(self, g: &Gbuffer) -> u64 {
         let numbers = [
@@ -148,7 +148,7 @@ mod tests {
     #[test]
     fn a_rule_is_charged_for_the_fields_and_the_rows_that_it_reads() {
         let g = SgrtConfig::default().gbuffer;
-        // Bytes a left pixel, bytes of a record, and whether rows beside the own are fetched.
+        // Bytes per left pixel, bytes per record, and whether adjacent rows are fetched.
         for (rule, pixel, record, rows_beside) in [
             ("none", 12, 28, false),
             ("depth", 12, 28, true),

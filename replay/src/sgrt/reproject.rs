@@ -1,24 +1,23 @@
-//! Forward reprojection: every left hit goes to the right pixel in which it is seen; where several
-//! meet, the nearest wins.
+//! Forward reprojection: projects every left hit into the right eye; the nearest hit per pixel wins.
 //!
-//! The sky is reprojected by its direction, as a surface at infinity.
+//! The sky is reprojected by direction, as a surface at infinity.
 
 use super::frame::{Frame, Sample};
 use formats::raytrace::EyeCamera;
 use formats::view::Eye;
 use rayon::prelude::*;
 
-/// Source of a right sample that no left sample reached.
+/// Marks a right sample without arrivals.
 pub const NONE: u32 = u32::MAX;
 
-/// What reached a right sample.
+/// The arrivals at a right sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
     /// Nearest left sample, or [`NONE`].
     pub source: u32,
-    /// Its depth along the right eye's view direction, metres; infinite for the sky.
+    /// Depth along the right eye's view direction in metres; infinite for the sky.
     pub depth: f32,
-    /// Left samples that met here.
+    /// Number of left samples that arrived.
     pub arrivals: u16,
 }
 
@@ -29,19 +28,19 @@ impl Candidate {
         arrivals: 0,
     };
 
-    /// True where nothing arrived.
+    /// True without arrivals.
     #[must_use]
     pub fn is_missing(&self) -> bool {
         self.source == NONE
     }
 }
 
-/// Where a left sample is seen by the right eye.
+/// Position of a left sample in the right eye.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Projected {
-    /// Image coordinates in pixels; not a number where the right eye cannot see it.
+    /// Image coordinates in pixels; NaN if the right eye cannot see it.
     pub at_px: [f32; 2],
-    /// Depth along the view direction, metres; infinite for the sky.
+    /// Depth along the view direction in metres; infinite for the sky.
     pub depth: f32,
 }
 
@@ -51,7 +50,7 @@ impl Projected {
         depth: f32::INFINITY,
     };
 
-    /// Number of the pixel's row and column, where it lies in the image.
+    /// Row and column of the pixel, if inside the image.
     #[must_use]
     pub fn pixel(&self, [width, height]: [u32; 2]) -> Option<[u32; 2]> {
         let [x, y] = self.at_px;
@@ -60,7 +59,7 @@ impl Projected {
     }
 }
 
-/// All left samples in the right eye.
+/// All left samples projected into the right eye.
 #[derive(Clone, Debug)]
 pub struct Reprojection {
     /// By right sample.
@@ -81,7 +80,7 @@ pub fn reproject(frame: &Frame) -> Reprojection {
         .collect();
 
     let mut candidates = vec![Candidate::EMPTY; frame.sample_count()];
-    // In order, so that of two equally near hits the left one wins on every run.
+    // In order, so that the first of two equally near hits wins on every run.
     for (source, p) in projected.iter().enumerate() {
         let Some([x, y]) = p.pixel(frame.size_px) else {
             continue;
@@ -101,7 +100,7 @@ pub fn reproject(frame: &Frame) -> Reprojection {
 
 fn project(eye: &EyeCamera, sample: &Sample) -> Projected {
     if sample.is_sky() {
-        // A direction is seen alike from everywhere: no distance may blur it.
+        // A direction looks the same from everywhere, so the eye's position is not used.
         let at_origin = EyeCamera {
             position: [0.0; 3],
             ..*eye

@@ -1,4 +1,4 @@
-//! What `replay reproject` yields: plain data that the printers read.
+//! The result of `replay reproject`: plain data for the printers.
 
 use super::accuracy::Accuracy;
 use super::compose::Reuse;
@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 /// Schema of the object that `replay reproject --json` prints.
 pub const SCHEMA: &str = "replay.reproject/2";
 
-/// Everything about one trace.
+/// The result for one trace.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Report {
     /// [`SCHEMA`].
@@ -29,91 +29,91 @@ pub struct Report {
     pub trace: TraceId,
     /// Triangles of the scene.
     pub scene_triangles: u64,
-    /// Width and height of an eye's image.
+    /// Width and height of one eye's image.
     pub eye_size_px: [u32; 2],
     /// Whether the paper's row test applies to the eyes.
     pub rows: RowSummary,
     /// The whole configuration.
     pub config: Config,
-    /// Under the rule asked for.
+    /// Result of the selected rule.
     pub result: Outcome,
-    /// The paper's plain reuse: every arrival, as it is.
+    /// Result of the paper's plain reuse of every arrival.
     pub plain: Outcome,
-    /// The paper's values, where the trace is set beside one of its scenes.
+    /// The paper's values, if the trace stands in for one of its scenes.
     pub paper: Option<PaperValues>,
-    /// Units' cycles saved against image error, where asked for.
+    /// Unit cycles saved against image error, if requested.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub curve: Vec<CurvePoint>,
-    /// What the ratios owe to each parameter, where asked for.
+    /// Effect of each parameter on the ratios, if requested.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub sensitivity: Vec<Sensitivity>,
 }
 
-/// What was run.
+/// The configuration of the run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     /// Error detection.
     pub rule: Rule,
-    /// What a reused pixel takes over.
+    /// What a reused pixel takes from the left one.
     pub reuse: Reuse,
-    /// Where cache misses come from: `addresses` of the trace or hit `rates`.
+    /// Source of cache misses: `addresses` of the trace or hit `rates`.
     pub cache_misses: String,
     /// The hardware.
     pub model: SgrtConfig,
 }
 
-/// The figures of one rule and level of reuse.
+/// The figures of a rule and a level of reuse.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
-    /// Right pixels reused, overlapped ones included.
+    /// Share of right pixels reused, overlapped ones included.
     pub reuse_pct: f64,
-    /// Right pixels reused whose hit is on another object than the true one.
+    /// Share of right pixels reused with a hit on another object than the true one.
     pub wrong_object_pct: f64,
-    /// Right object, another triangle, and more than a pixel off.
+    /// Right object, another triangle, and more than one pixel off.
     pub wrong_primitive_pct: f64,
     /// Right object, more than one pixel off.
     pub position_over_1px_pct: f64,
     /// Right object, more than two pixels off.
     pub position_over_2px_pct: f64,
-    /// Frames per second over those of tracing both eyes in full.
+    /// Frames per second relative to tracing both eyes completely.
     pub relative_performance: f64,
-    /// Energy over that of tracing both eyes in full.
+    /// Energy relative to tracing both eyes completely.
     pub relative_energy: f64,
-    /// Unit cycles of tracing both eyes in full over those with reprojection: what the ratio would
-    /// be if the units were always the bottleneck.
+    /// Unit cycles of tracing both eyes completely over those with reprojection: the relative performance
+    /// if the units were always the bottleneck.
     pub tni_relative_performance: f64,
-    /// Traversal steps that are primary rays', of both eyes' in full: reusing a share r of primary
-    /// hits can save at most half of r times this.
+    /// Share of primary rays in the traversal steps of both eyes. Reusing a share r of primary hits can
+    /// save at most half of r times this.
     pub primary_steps_pct: f64,
     /// Cycles of the traversal and intersection units.
     pub tni_cycles: u64,
     /// Cycles of the programmable cores.
     pub srp_cycles: u64,
-    /// The same with both eyes traced in full.
+    /// The same with both eyes completely traced.
     pub reference_tni_cycles: u64,
-    /// The same with both eyes traced in full.
+    /// The same with both eyes completely traced.
     pub reference_srp_cycles: u64,
-    /// Unit cycles saved, of both eyes' in full.
+    /// Unit cycles saved, relative to both eyes completely traced.
     pub tni_reduction_pct: f64,
-    /// Unit cycles saved, of the right eye's in full.
+    /// Unit cycles saved, relative to the right eye completely traced.
     pub right_tni_reduction_pct: f64,
-    /// Kernel cycles that reprojection adds, of the reference's.
+    /// Kernel cycles added by reprojection, relative to the reference.
     pub srp_overhead_pct: f64,
-    /// The units' scarcest resource.
+    /// The scarcest resource of the units.
     pub tni_bottleneck: String,
     /// Time of the frame in the model.
     pub time_us: f64,
-    /// Part of it in which external memory is the bottleneck.
+    /// Time during which external memory is the bottleneck.
     pub memory_bound_us: f64,
     /// Time of the reference in the model.
     pub reference_time_us: f64,
-    /// The same with both eyes traced in full.
+    /// The same with both eyes completely traced.
     pub reference_memory_bound_us: f64,
-    /// Mean FLIP of the right image against the traced one.
+    /// Mean FLIP of the right image relative to the traced one.
     pub flip_mean: f64,
     /// 99th percentile of FLIP.
     pub flip_p99: f64,
-    /// Pixels per degree that FLIP is for.
+    /// Pixels per degree used for FLIP.
     pub pixels_per_degree: f64,
     /// Peak signal-to-noise ratio; 100 for identical pictures.
     pub psnr_db: f64,
@@ -123,32 +123,32 @@ pub struct Outcome {
     pub classes: Accuracy,
     /// Rays, steps and triangle tests.
     pub work: Work,
-    /// The same with both eyes traced in full.
+    /// The same with both eyes completely traced.
     pub reference_work: Work,
-    /// What error detection reads, hence what goes through DRAM for it.
+    /// The fields that error detection reads through DRAM.
     pub detection_reads: Reads,
-    /// Bytes in and out of the tile buffers.
+    /// Bytes read from and written to the tile buffers.
     pub on_chip_bytes: u64,
-    /// Bytes in and out of external memory.
+    /// Bytes read from and written to external memory.
     pub dram: DramBytes,
-    /// The same with both eyes traced in full.
+    /// The same with both eyes completely traced.
     pub reference_dram: DramBytes,
-    /// With the whole screen's G-buffer in DRAM.
+    /// The same with the whole screen's G-buffer in DRAM.
     pub whole_screen: WholeScreen,
     /// Energy by component.
     pub energy: EnergyPj,
-    /// The same with both eyes traced in full.
+    /// The same with both eyes completely traced.
     pub reference_energy: EnergyPj,
 }
 
 /// Reprojection without tiles: the whole screen's G-buffer in DRAM.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WholeScreen {
-    /// Frames per second over those of tracing both eyes in full.
+    /// Frames per second relative to tracing both eyes completely.
     pub relative_performance: f64,
-    /// Energy over that of tracing both eyes in full.
+    /// Energy relative to tracing both eyes completely.
     pub relative_energy: f64,
-    /// Bytes in and out of external memory.
+    /// Bytes read from and written to external memory.
     pub dram: DramBytes,
 }
 
@@ -159,15 +159,15 @@ pub struct Work {
     pub rays: u64,
     /// Traversal steps.
     pub steps: u64,
-    /// Triangle tests, re-tests included.
+    /// Triangle tests, including re-tests.
     pub triangle_tests: u64,
-    /// Of those, re-tests of reused triangles.
+    /// Re-tests of reused triangles.
     pub retests: u64,
-    /// Shading kernels.
+    /// Shading kernels run.
     pub shaded: u64,
-    /// Lines that missed an L1.
+    /// Lines that missed in an L1.
     pub l1_misses: u64,
-    /// Lines that missed the L2.
+    /// Lines that missed in the L2.
     pub l2_misses: u64,
 }
 
@@ -185,22 +185,22 @@ impl Work {
     }
 }
 
-/// One point of the run-time-against-error curve.
+/// A point of the curve of run time against error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CurvePoint {
     /// Error detection.
     pub rule: Rule,
-    /// What a reused pixel takes over.
+    /// What a reused pixel takes from the left one.
     pub reuse: Reuse,
-    /// Right pixels reused.
+    /// Share of right pixels reused.
     pub reuse_pct: f64,
-    /// Wrong object.
+    /// Share of right pixels with a wrong object.
     pub wrong_object_pct: f64,
-    /// Unit cycles saved, of both eyes' in full.
+    /// Unit cycles saved, relative to both eyes completely traced.
     pub tni_reduction_pct: f64,
-    /// Frames per second over the reference's.
+    /// Frames per second relative to the reference.
     pub relative_performance: f64,
-    /// Energy over the reference's.
+    /// Energy relative to the reference.
     pub relative_energy: f64,
     /// Mean FLIP.
     pub flip_mean: f64,
@@ -208,20 +208,20 @@ pub struct CurvePoint {
     pub flip_p99: f64,
 }
 
-/// What a parameter does to the ratios.
+/// Effect of a parameter on the ratios.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Sensitivity {
     /// Dotted name.
     pub parameter: String,
     /// Its value.
     pub value: f64,
-    /// Relative performance with half of it and with twice of it (a rate: its miss rate).
+    /// Relative performance with half and with twice the value (for a rate, of its miss rate).
     pub relative_performance: [f64; 2],
-    /// Relative energy with half of it and with twice of it.
+    /// Relative energy with half and with twice the value.
     pub relative_energy: [f64; 2],
 }
 
-/// Image error of the right image.
+/// Error of the right image.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ImageError {
     /// Mean FLIP.
@@ -237,7 +237,7 @@ pub struct ImageError {
 }
 
 impl Outcome {
-    /// Puts the figures together.
+    /// Combines the figures.
     #[must_use]
     pub fn new(
         accuracy: &Accuracy,

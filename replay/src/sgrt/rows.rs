@@ -1,52 +1,52 @@
-//! Which rows of the left image error detection needs.
+//! The left rows that error detection needs.
 //!
-//! For parallel eyes that look through like frusta, what arrives in a right row comes from the left
-//! row of that number, and the paper prefetches just that one. Eyes that are canted or see farther
-//! up or down than each other bend a right row's sources over many left rows; DMA then fetches each
-//! of them, whole, for every band of tiles that needs it.
+//! For parallel eyes with equal frusta, the sources of a right row lie in the left row with the same
+//! number, which is the only one the paper prefetches. For canted eyes, or eyes with different vertical
+//! fields of view, the sources of a right row are spread over many left rows. DMA then fetches all of these
+//! rows for every band of tiles.
 
 use super::frame::Frame;
 use super::reproject::Reprojection;
 use formats::view::TILE_SIZE_PX;
 use serde::{Deserialize, Serialize};
 
-/// A shift below this is rounding.
+/// Smaller shifts are rounding errors.
 const STILL_PX: f32 = 1.0 / 64.0;
 
-/// A right row whose sources are in more left rows than this is no epipolar line any more: a shift
-/// that is not a whole number of rows spreads them over two, and only a rotation over more.
+/// Maximum number of left rows that the sources of a right row on an epipolar line occupy: a fractional
+/// shift spreads them over two rows, only a rotation over more.
 const LINE_ROWS: f64 = 2.0;
 
-/// Left rows that the right image needs.
+/// The left rows needed for the right image.
 #[derive(Clone, Debug)]
 pub struct RowNeeds {
-    /// By band of tiles: left rows of which a pixel arrives in the band.
+    /// By band of tiles: number of left rows whose pixels arrive in the band.
     band: Vec<u64>,
-    /// The same for the band and the row on either side of it.
+    /// The same for the band and its adjacent rows.
     band_and_beside: Vec<u64>,
-    /// What the rows say about the eyes.
+    /// Properties of the eyes that follow from the rows.
     pub summary: RowSummary,
 }
 
-/// Whether a right row's sources are a left row.
+/// Whether the sources of a right row form a left row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RowSummary {
-    /// Left pixels seen by the right eye that arrive in a row of another number.
+    /// Share of visible left pixels that arrive in a row with another number.
     pub other_row_pct: f64,
-    /// Left rows that the pixels of one right row come from, on average.
+    /// Mean number of left rows that the pixels of a right row come from.
     pub left_rows_per_right_row: f64,
-    /// False where the paper's row test does not apply: a right row's sources are not one left row
-    /// (nor two, of a shift by part of a row). All rows that are needed are fetched and charged.
+    /// False if the paper's row test does not apply, because the sources of a right row do not lie in one
+    /// left row (or two, for a fractional shift). All rows needed are fetched and charged.
     pub row_test_applies: bool,
 }
 
 impl RowNeeds {
-    /// Looks where every left sample arrives.
+    /// Analyses where left samples arrive.
     #[must_use]
     pub fn new(frame: &Frame, arrived: &Reprojection) -> Self {
         let [width, height] = frame.size_px.map(|s| s as usize);
         let words = height.div_ceil(64);
-        // A bit for each left row, by right row.
+        // One bit per left row, by right row.
         let mut sources = vec![0u64; height * words];
         let (mut seen, mut elsewhere) = (0u64, 0u64);
         for (source, projected) in arrived.projected.iter().enumerate() {
@@ -87,7 +87,7 @@ impl RowNeeds {
         }
     }
 
-    /// Left rows that a tile's band needs: what arrives in it, and with the rows beside it.
+    /// Left rows that a tile's band needs, without and with its adjacent rows.
     #[must_use]
     pub fn of_tile(&self, frame: &Frame, tile: u32) -> [u64; 2] {
         let band = (tile / frame.tables.tiles()[0]) as usize;
@@ -114,14 +114,14 @@ mod tests {
         assert_eq!(needs.summary.left_rows_per_right_row, 1.0);
         assert!(needs.summary.row_test_applies);
         let tiles_a_band = frame.tables.tiles()[0];
-        // 40 rows: two whole bands and half a one.
+        // 40 rows form two whole bands and half a band.
         let bands = [0, 1, 2].map(|band| needs.of_tile(&frame, band * tiles_a_band));
         assert_eq!(bands, [[16, 17], [16, 18], [8, 9]]);
     }
 
     #[test]
     fn a_frustum_shifted_by_whole_rows_needs_no_more_of_them() {
-        // 1.2 of tangent are 40 rows: 0.06 are two.
+        // A tangent of 1.2 spans 40 rows, so 0.06 spans two.
         let (_, needs) = needs(View {
             right_tilt: 0.06,
             ..View::default()

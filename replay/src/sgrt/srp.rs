@@ -1,14 +1,14 @@
-//! Programmable cores: cycles of the kernels of a batch.
+//! The programmable cores: cycles of a batch's kernels.
 
 use super::config::SgrtConfig;
 use super::work::BatchWork;
 
-/// Cycles of all lanes together by kernel; [`SrpCycles::total`] divides them over the lanes.
+/// Cycles by kernel, summed over all lanes; [`SrpCycles::total`] divides by the number of lanes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SrpCycles {
     /// Ray generation.
     pub generation: f64,
-    /// Shading, alpha look-ups included.
+    /// Shading, including alpha look-ups.
     pub shading: f64,
     /// Projection of left pixels.
     pub reproject: f64,
@@ -16,18 +16,18 @@ pub struct SrpCycles {
     pub detect: f64,
     /// Reuse.
     pub reuse: f64,
-    /// Lanes.
+    /// Number of lanes.
     lanes: f64,
 }
 
 impl SrpCycles {
-    /// Cycles of one lane, summed over kernels.
+    /// Lane cycles of all kernels.
     #[must_use]
     pub fn lane_cycles(&self) -> f64 {
         self.generation + self.shading + self.added_lane_cycles()
     }
 
-    /// Cycles of one lane of the three kernels that reprojection adds.
+    /// Lane cycles of the three kernels that reprojection adds.
     #[must_use]
     pub fn added_lane_cycles(&self) -> f64 {
         self.reproject + self.detect + self.reuse
@@ -43,7 +43,7 @@ impl SrpCycles {
         }
     }
 
-    /// Adds another batch's.
+    /// Adds another batch's cycles.
     pub fn add(&mut self, other: &Self) {
         self.generation += other.generation;
         self.shading += other.shading;

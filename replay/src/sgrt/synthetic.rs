@@ -1,4 +1,4 @@
-//! Ray traces of scenes simple enough to know the answer, for tests.
+//! Ray traces of scenes with known results, for tests.
 
 use super::detect::intersect;
 use super::frame::{Frame, RaySource};
@@ -21,16 +21,16 @@ pub const MIRROR: u32 = 1;
 /// Index of a diffuse material with holes.
 pub const LEAF: u32 = 2;
 
-/// Something to look at.
+/// The geometry of an object.
 #[derive(Clone, Copy, Debug)]
 pub enum Shape {
-    /// A triangle, in the trace's table.
+    /// A triangle, part of the trace's table.
     Triangle([[f32; 3]; 3]),
-    /// An exact sphere, which no table holds.
+    /// An exact sphere, not part of any table.
     Sphere { center: [f32; 3], radius: f32 },
 }
 
-/// A shape with its object and material; its primitive number is its index.
+/// A shape with object and material. Its index is its primitive number.
 #[derive(Clone, Copy, Debug)]
 pub struct Placed {
     pub shape: Shape,
@@ -77,7 +77,7 @@ impl RaySource for Synthetic {
 }
 
 impl Synthetic {
-    /// The trace as a file's bytes.
+    /// The bytes of a file with the trace.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut writer = RaytraceWriter::in_memory().expect("a writer");
         for tile in self.tiles.iter().flatten() {
@@ -88,19 +88,19 @@ impl Synthetic {
     }
 }
 
-/// How to look at a scene.
+/// View of a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     pub size_px: [u32; 2],
     pub ipd_m: f32,
     pub samples_per_px: u32,
-    /// Outward turn of each eye.
+    /// Outward rotation of each eye.
     pub cant_deg: f32,
-    /// What the right eye sees more upwards than the left one and less downwards, as a tangent.
+    /// By how much the right frustum is shifted upwards, as a tangent.
     pub right_tilt: f32,
-    /// Position between the eyes.
+    /// Midpoint between the eyes.
     pub center: [f32; 3],
-    /// Tree that the steps are of.
+    /// Kind of tree that the steps belong to.
     pub tree: TraversalKind,
 }
 
@@ -220,7 +220,7 @@ pub fn trace(scene: &[Placed], view: View) -> Synthetic {
 }
 
 impl Synthetic {
-    /// With addresses: every ray of a pixel walks down a path of its own that neighbours share in part.
+    /// Adds addresses: the rays of each pixel visit a path that neighbours partly share.
     pub fn with_visits(mut self) -> Self {
         self.tables.meta.has_visits = true;
         for tile in self.tiles.iter_mut().flatten() {
@@ -236,7 +236,7 @@ impl Synthetic {
     }
 }
 
-/// The scene's frame, through the same loading as a file's.
+/// The scene's frame, loaded like a file's.
 pub fn frame(scene: &[Placed], view: View) -> Frame {
     Frame::load(&trace(scene, view)).expect("a synthetic trace loads")
 }
@@ -332,7 +332,7 @@ fn hit(placed: &Placed, origin: [f32; 3], direction: [f32; 3]) -> Option<f32> {
     }
 }
 
-/// A rectangle across the view at a depth, as two triangles.
+/// A rectangle perpendicular to the view direction, as two triangles.
 pub fn wall(depth: f32, half: [f32; 2], center_x: f32, object: u32) -> Vec<Placed> {
     let corner = |x: f32, y: f32| [center_x + x * half[0], y * half[1], -depth];
     let (a, b) = (corner(-1.0, -1.0), corner(1.0, -1.0));

@@ -1,36 +1,36 @@
-//! Traversal and intersection unit: cycles of a batch of rays.
+//! The traversal and intersection units: cycles of a batch of rays.
 //!
-//! A unit holds many rays in flight and issues, each cycle, at most one step per traversal
-//! pipeline and one triangle test per intersection pipeline, whichever ray is ready. Its
-//! throughput is therefore set by the scarcest of four resources, and the batch takes
+//! A unit holds many rays in flight. In each cycle it issues at most one step per traversal pipeline and
+//! one triangle test per intersection pipeline, for any ray that is ready. The scarcest of four resources
+//! therefore limits its throughput, and a batch takes
 //!
-//! `max(traversal issue, intersection issue, ray hand-over, latency / rays in flight)`
+//! `max(traversal issue, intersection issue, ray transfer, latency / rays in flight)`
 //!
-//! where latency is what a ray would take alone: its steps and tests through the full depth of
-//! their pipelines, plus what its visits wait that miss a cache, once a visit however many lines it misses. Batches follow each other without a gap, so
-//! filling and draining cancel. A cycle-by-cycle simulation of one unit in the tests stays within
-//! a few per cent of this.
+//! cycles. Latency is the time of a ray on its own: its steps and tests through the full depth of their
+//! pipelines, plus the wait of each visit that misses a cache (once per visit, however many lines it
+//! misses). Batches follow each other without a gap, so filling and draining cancel out. A cycle-by-cycle
+//! simulation of one unit in the tests deviates by a few per cent.
 
 use super::cache::Misses;
 use super::config::SgrtConfig;
 use super::work::BatchWork;
 use formats::raytrace::TraversalKind;
 
-/// Cycles that each resource needs for a batch.
+/// Cycles per resource for a batch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TniCycles {
     /// Issue slots of the traversal pipelines.
     pub traversal: f64,
     /// Issue slots of the intersection pipelines.
     pub intersection: f64,
-    /// Rays in and out.
+    /// Rays accepted and returned.
     pub handover: f64,
     /// Serial latency of all rays over the rays in flight.
     pub latency: f64,
 }
 
 impl TniCycles {
-    /// Cycles of the batch: the scarcest resource.
+    /// Cycles of the batch, which the scarcest resource determines.
     #[must_use]
     pub fn total(&self) -> f64 {
         [
@@ -67,8 +67,8 @@ impl TniCycles {
     }
 }
 
-/// Cycles of a batch in a tree of a kind whose memory accesses missed as told. A step that holds
-/// its pipeline for several cycles leaves it as much later.
+/// Cycles of a batch with these misses, in a tree of this kind. A step that occupies its pipeline for
+/// several cycles also leaves it that much later.
 #[must_use]
 pub fn cycles(
     work: &BatchWork,

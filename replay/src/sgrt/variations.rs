@@ -1,4 +1,4 @@
-//! One trace under many rules, and one rule under many parameters.
+//! Runs a trace with many rules, and a rule with many parameters.
 
 use super::accuracy::count_errors;
 use super::compose::Reuse;
@@ -13,11 +13,11 @@ use image_error::Picture;
 use image_error::flip::FlipMap;
 
 impl LoadedTrace<'_> {
-    /// Units' cycles saved against image error, over rules and levels of reuse. Misses are counted as
-    /// in [`LoadedTrace::run`], so that a point is what a run of its rule gives.
+    /// Unit cycles saved against image error, over rules and levels of reuse. Misses are counted as in
+    /// [`LoadedTrace::run`], so that a point equals a run with its rule.
     ///
     /// # Errors
-    /// [`FrameError`] where a tile cannot be read again for its addresses.
+    /// [`FrameError`] for a tile whose addresses cannot be read.
     pub fn curve(
         &self,
         rules: &[Rule],
@@ -59,10 +59,10 @@ impl LoadedTrace<'_> {
         Ok(points)
     }
 
-    /// Halves and doubles every parameter in turn.
+    /// Halves and doubles every parameter separately.
     ///
     /// # Errors
-    /// [`FrameError`] where a tile cannot be read again for its addresses.
+    /// [`FrameError`] for a tile whose addresses cannot be read.
     pub fn sensitivity(
         &self,
         run: &RuleRun,
@@ -94,7 +94,7 @@ impl LoadedTrace<'_> {
     }
 }
 
-/// Rules of the curve: the paper's plain reuse, thresholds, each test alone, and combinations.
+/// The rules of the curve: the paper's plain reuse, thresholds, single tests, and combinations.
 #[must_use]
 pub fn curve_rules() -> Vec<Rule> {
     [

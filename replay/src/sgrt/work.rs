@@ -1,16 +1,16 @@
-//! What rays cost, by class of ray: the input of the cycle and energy models.
+//! The cost of rays by class: the input of the cycle and energy models.
 
 use formats::raytrace::{NO_PARENT, RayKind, RayRecord};
 
-/// Rays that reuse treats alike.
+/// Classes of rays that reuse treats differently.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(usize)]
 pub enum RayClass {
     /// From the eye.
     Primary = 0,
-    /// From the primary hit to a light: its outcome does not depend on the eye.
+    /// From the primary hit to a light. The result does not depend on the eye.
     Shadow = 1,
-    /// Reflection and refraction rays, and everything that they spawn: these do.
+    /// Reflection and refraction rays and all their descendants. The results depend on the eye.
     Secondary = 2,
 }
 
@@ -24,7 +24,7 @@ impl RayClass {
         match ray.kind {
             RayKind::Primary => Self::Primary,
             RayKind::Shadow if ray.parent == 0 => Self::Shadow,
-            // A trace without parents cannot tell; by depth is the same for the first level.
+            // Without parents in the trace, the depth identifies shadow rays of the first level.
             RayKind::Shadow if ray.parent == NO_PARENT && ray.depth <= 1 => Self::Shadow,
             _ => Self::Secondary,
         }
@@ -59,12 +59,12 @@ impl RayWork<u64> {
 pub struct PixelWork {
     /// By [`RayClass`].
     pub by_class: [RayWork<u32>; 3],
-    /// Reflection and refraction rays: each ends in a shading kernel.
+    /// Reflection and refraction rays. Each ends in a shading kernel.
     pub secondary_shaded: u32,
 }
 
 impl PixelWork {
-    /// Sums a pixel's rays; sums that do not fit saturate.
+    /// Sums over a pixel's rays; sums saturate.
     #[must_use]
     pub fn of(rays: &[RayRecord]) -> Self {
         let mut work = Self::default();
@@ -88,9 +88,9 @@ impl PixelWork {
 pub struct BatchWork {
     /// Rays traced, by class.
     pub by_class: [RayWork<u64>; 3],
-    /// Right-eye rays intersected with the triangle that they may reuse.
+    /// Right-eye rays intersected with triangles that may be reused.
     pub retest_rays: u64,
-    /// Triangle tests of those.
+    /// Triangle tests of these rays.
     pub retest_tests: u64,
     /// Shading kernels run.
     pub shaded: u64,
@@ -103,7 +103,7 @@ pub struct BatchWork {
 }
 
 impl BatchWork {
-    /// Adds a pixel whose whole ray tree is traced.
+    /// Adds a pixel whose ray tree is completely traced.
     pub fn add_traced(&mut self, pixel: &PixelWork) {
         for class in RayClass::ALL {
             self.add_class(pixel, class);
@@ -111,7 +111,7 @@ impl BatchWork {
         self.shaded += 1 + u64::from(pixel.secondary_shaded);
     }
 
-    /// Adds the rays of one class of a pixel's tree.
+    /// Adds the rays of one class of a pixel's ray tree.
     pub fn add_class(&mut self, pixel: &PixelWork, class: RayClass) {
         self.by_class[class as usize].add(&pixel.by_class[class as usize]);
     }
@@ -144,7 +144,7 @@ impl BatchWork {
         self.by_class.iter().map(|w| w.steps).sum()
     }
 
-    /// Triangle tests, re-tests included.
+    /// Triangle tests, including re-tests.
     #[must_use]
     pub fn triangle_tests(&self) -> u64 {
         self.retest_tests + self.by_class.iter().map(|w| w.triangle_tests).sum::<u64>()

@@ -1,4 +1,4 @@
-//! What each core works on: the quads of its work item, one after another.
+//! The work of each core: the quads of its work item, in order.
 
 use super::expand::Work;
 use super::lines::interleaved;
@@ -7,21 +7,21 @@ use crate::order::{TileRef, WorkItem};
 use std::collections::HashSet;
 use std::ops::Range;
 
-/// The cores' work items and their positions in them.
+/// The cores' work items, and their positions in them.
 pub struct Cores<'f> {
     frame: &'f Frame<'f>,
     cores: Vec<Core<'f>>,
-    /// Tiles of an item that no core has yet.
+    /// Tiles of an item that has not been given to a core.
     upcoming: [Slot<'f>; 2],
 }
 
-/// A core's item. Runs are left to do in order: which tile, which run.
+/// A core's item. The remaining runs are listed in order by tile and run.
 #[derive(Debug, Default)]
 struct Core<'f> {
     tiles: [Slot<'f>; 2],
     runs: Vec<(u8, u32)>,
     next_run: usize,
-    /// Quads of the current run that are left, and the tile that they are of.
+    /// Remaining quads of the current run, and the slot of their tile.
     slot: usize,
     quads: Range<usize>,
 }
@@ -31,9 +31,9 @@ struct Core<'f> {
 enum Slot<'f> {
     #[default]
     None,
-    /// From the frame.
+    /// Lines kept in the frame.
     Kept(&'f TileLines),
-    /// Expanded for this core.
+    /// Lines expanded for this core.
     Own(Box<Work>),
 }
 
@@ -65,10 +65,10 @@ impl<'f> Cores<'f> {
         self.cores.len()
     }
 
-    /// Gives a core its next work item. Whatever was left of the last one is dropped.
+    /// Assigns the next work item to a core, dropping the rest of its previous one.
     ///
     /// # Errors
-    /// A tile that cannot be read.
+    /// An unreadable tile.
     pub fn load(&mut self, core: usize, item: &WorkItem) -> Result<(), StreamError> {
         let frame = self.frame;
         let core = &mut self.cores[core];
@@ -93,16 +93,16 @@ impl<'f> Cores<'f> {
         Ok(())
     }
 
-    /// The distinct lines of an item, up to so many, in the order of their first use.
+    /// Up to `most` distinct lines of an item, in order of first use.
     ///
     /// # Errors
-    /// A tile that cannot be read.
+    /// An unreadable tile.
     pub fn lines_of(&mut self, item: &WorkItem, most: usize) -> Result<Vec<u32>, StreamError> {
         let (mut lines, mut known) = (Vec::new(), HashSet::new());
         for (slot, at) in self.upcoming.iter_mut().zip(item.tiles()) {
             fill(slot, self.frame, at)?;
             let Some(tile) = slot.lines() else { continue };
-            // Where only distinct lines are listed, quad by quad.
+            // If only distinct lines are listed, they are listed per quad.
             let all = match tile.lines.is_empty() {
                 true => &tile.distinct,
                 false => &tile.lines,
@@ -113,7 +113,7 @@ impl<'f> Cores<'f> {
         Ok(lines)
     }
 
-    /// The quad that [`Self::next_quad`] gave last; none after [`Self::load`].
+    /// The quad last returned by [`Self::next_quad`]; none after [`Self::load`].
     #[inline]
     #[must_use]
     pub fn quad(&self, core: usize) -> Option<QuadLines<'_>> {
@@ -122,7 +122,7 @@ impl<'f> Cores<'f> {
         core.tiles[core.slot].lines().map(|tile| tile.quad(quad))
     }
 
-    /// The core's next quad, until the item is done.
+    /// The core's next quad, or none at the end of the item.
     #[inline(always)]
     pub fn next_quad(&mut self, core: usize) -> Option<QuadLines<'_>> {
         let core = &mut self.cores[core];

@@ -1,4 +1,4 @@
-//! Counts of what a trace accesses: the same for every order and every cache.
+//! Counts of a trace's accesses, which are the same for every order and every cache.
 
 use super::{StreamError, Tag};
 use crate::config::CountBy;
@@ -6,15 +6,15 @@ use crate::order::TileRef;
 use formats::textrace::Tables;
 use formats::view::Eye;
 
-/// Left, right, and passes that belong to no eye.
+/// Left, right, and passes shared by both eyes.
 const VIEWS: [&str; 3] = ["left", "right", "shared"];
 
-/// Where things count: a number for each (view, texture, mip level) or each (view, draw), called a cell, and for each
-/// tile. All counters of a replay are lists by these numbers.
+/// The bins of all counters. Each (view, texture, mip level) or (view, draw) has a number, called a cell,
+/// and so has each tile. All counters of a replay are indexed by these numbers.
 #[derive(Debug)]
 pub struct Bins {
     by: CountBy,
-    /// First cell of each texture or draw within a view, and the number of a view's cells.
+    /// First cell of each texture or draw within a view, and the number of cells per view.
     first_levels: Vec<usize>,
     /// View by pass.
     views: Vec<usize>,
@@ -23,21 +23,21 @@ pub struct Bins {
     tiles: usize,
 }
 
-/// Where a tile's accesses count: its view's first cell and its number.
+/// The bins of a tile: first cell of its view, and tile number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Place {
     pub(super) first_cell: u32,
     pub(super) tile: u32,
 }
 
-/// What a cell stands for.
+/// The meaning of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cell {
     /// Index into [`Bins::view_names`].
     pub view: usize,
-    /// Index into the texture table, or into that of the draws.
+    /// Index into the texture table or the draw table.
     pub part: usize,
-    /// Mip level; 0 where draws are counted.
+    /// Mip level; 0 if counts are by draw.
     pub level: usize,
 }
 
@@ -45,7 +45,7 @@ impl Bins {
     /// Bins for the textures and passes of a trace.
     ///
     /// # Errors
-    /// More mip levels than a [`Tag`] can name, or more than 2^32 tiles.
+    /// More mip levels than a [`Tag`] can hold, or more than 2^32 tiles.
     pub fn new(tables: &Tables, by: CountBy) -> Result<Self, StreamError> {
         let mut first_levels = vec![0];
         let mut levels = 0;
@@ -92,7 +92,19 @@ impl Bins {
         })
     }
 
-    /// Cells of one view.
+    /// One cell per kind of access, for lines without tiles.
+    #[must_use]
+    pub fn of_kinds() -> Self {
+        Self {
+            by: CountBy::Texture,
+            first_levels: vec![0, 1],
+            views: Vec::new(),
+            first_tiles: Vec::new(),
+            tiles: 0,
+        }
+    }
+
+    /// Cells per view.
     fn view_cells(&self) -> usize {
         self.first_levels.last().copied().unwrap_or(0)
     }
@@ -121,17 +133,17 @@ impl Bins {
         VIEWS
     }
 
-    /// True if a pass of the trace shows this view.
+    /// True if a pass of the trace belongs to this view.
     #[must_use]
     pub fn has_view(&self, view: usize) -> bool {
         self.views.contains(&view)
     }
 
-    /// What a cell stands for.
+    /// The meaning of a cell.
     #[must_use]
     pub fn meaning(&self, cell: usize) -> Cell {
         let (view, within) = (cell / self.view_cells(), cell % self.view_cells());
-        // Textures without levels share their first cell with the one that has it.
+        // Textures without levels share their first cell with the next texture that has levels.
         let part = self.first_levels.partition_point(|&first| first <= within) - 1;
         Cell {
             view,
@@ -172,7 +184,7 @@ impl Bins {
 pub struct CellAccesses {
     /// Bilinear footprints.
     pub footprints: u64,
-    /// Distinct lines of a footprint, summed over footprints.
+    /// Distinct lines per footprint, summed over footprints.
     pub line_lookups: u64,
 }
 
@@ -185,14 +197,14 @@ pub struct TileAccesses {
     pub footprints: u32,
 }
 
-/// All that is counted of a trace.
+/// All counts of a trace.
 #[derive(Clone, Debug)]
 pub struct TraceCounts {
     /// Quads.
     pub quads: u64,
     /// Covered lanes.
     pub lanes: u64,
-    /// Hash of all line accesses, which does not depend on their order.
+    /// Order-independent hash of all line accesses.
     pub hash: u64,
     /// Distinct lines.
     pub unique_lines: u64,
@@ -212,7 +224,7 @@ impl TraceCounts {
         }
     }
 
-    /// What a worker counts.
+    /// Counts of a worker thread.
     pub(super) fn without_tiles(bins: &Bins) -> Self {
         Self {
             quads: 0,
@@ -224,7 +236,7 @@ impl TraceCounts {
         }
     }
 
-    /// Adds what a worker counted.
+    /// Adds the counts of a worker thread.
     pub(super) fn add(&mut self, other: &Self) {
         self.quads += other.quads;
         self.lanes += other.lanes;

@@ -1,8 +1,8 @@
-//! Why the accesses of a trace cannot be had.
+//! Errors of reading a trace's accesses.
 
 use thiserror::Error;
 
-/// Why the accesses of a trace cannot be had.
+/// Reasons why a trace's accesses cannot be read.
 #[derive(Debug, Error)]
 pub enum StreamError {
     /// The trace file is damaged.
@@ -15,7 +15,7 @@ pub enum StreamError {
         pass: u32,
         /// Tile index.
         tile: u32,
-        /// What is wrong there.
+        /// Description of the error.
         message: String,
     },
     /// The trace's tables contradict each other.

@@ -1,9 +1,9 @@
-//! Quads to lines, once: a frame's tiles are read, expanded and counted in parallel, and every
-//! order, cache and clock then reads the lines.
+//! Expands quads to lines. The tiles of a frame are read, expanded and counted in parallel, and every
+//! order, cache and clock then reads the same lines.
 //!
-//! A frame is expanded when its turn comes and dropped after it, so memory does not grow with the
-//! frames. Tiles for which the [`LineMemory`] has no room are counted and expanded again when a core
-//! comes to them, until there is room.
+//! A frame is expanded when it is replayed and dropped afterwards, so memory does not grow with the number
+//! of frames. Tiles for which the [`LineMemory`] has no room are counted, and expanded again whenever a
+//! core needs them, until there is room.
 
 use super::distinct::Distinct;
 use super::footprint::{Bundle, Footprints, SampleRef, Scratch};
@@ -13,12 +13,13 @@ use super::{Bins, LineSet, StreamError, TileAccesses, TileSource, TraceCounts, f
 use crate::config::RunConfig;
 use crate::order::TileRef;
 use crate::tmu::Pending;
+use formats::layout::Layout;
 use formats::textrace::Tile;
 use rayon::prelude::*;
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 
-/// Memory for the lines of all frames that are replayed at the same time.
+/// Memory limit for the lines of all frames replayed at the same time.
 #[derive(Debug)]
 pub struct LineMemory {
     bytes: u64,
@@ -26,11 +27,10 @@ pub struct LineMemory {
 }
 
 impl LineMemory {
-    /// What is kept unless said otherwise: four stereo frames of the size of the Z2 paper's, two where
-    /// points are timed.
+    /// Default limit: four stereo frames of the Z2 paper's size, or two if timed configurations are replayed.
     pub const USUAL_BYTES: u64 = 384 << 20;
 
-    /// So much memory.
+    /// A limit of this many bytes.
     #[must_use]
     pub fn new(bytes: u64) -> Self {
         Self {
@@ -39,7 +39,7 @@ impl LineMemory {
         }
     }
 
-    /// Whether half of it is left: room for more frames at the same time.
+    /// True if half of the memory is free, which leaves room for more frames.
     #[must_use]
     pub fn half_is_left(&self) -> bool {
         self.left() >= self.bytes / 2
@@ -49,7 +49,7 @@ impl LineMemory {
         self.left_bytes.load(Ordering::Relaxed)
     }
 
-    /// A copy of lines, if there is room for it.
+    /// Copies the lines if there is room.
     fn keep(&self, lines: &TileLines) -> Option<TileLines> {
         let less = |left: u64| left.checked_sub(lines.bytes());
         let (set, get) = (Ordering::Relaxed, Ordering::Relaxed);
@@ -62,7 +62,7 @@ impl LineMemory {
     }
 }
 
-/// Expands the tiles of a trace under one sampling and layout.
+/// Expands the tiles of a trace with one sampling and layout.
 pub struct Expander<'a> {
     source: &'a dyn TileSource,
     footprints: Footprints,
@@ -70,11 +70,11 @@ pub struct Expander<'a> {
     touched: LineSet,
     distinct: bool,
     all: bool,
-    /// Sets of the cache whose last lines are not listed again.
+    /// Number of sets for which idle accesses are left out (see [`LastUsed`]).
     idle_sets: Option<u32>,
 }
 
-/// Memory for the expansion of a tile, kept from tile to tile, and what was counted.
+/// Buffers for expanding a tile, reused from tile to tile, and the counts.
 #[derive(Debug)]
 pub(super) struct Work {
     tile: Tile,
@@ -87,13 +87,13 @@ pub(super) struct Work {
 }
 
 impl<'a> Expander<'a> {
-    /// Tiles that a thread expands at a time.
+    /// Tiles that a thread expands per task.
     pub const CHUNK: usize = 64;
 
-    /// An expander for a trace. Of the configuration it needs sampling, layout and line size.
+    /// An expander for a trace. Uses sampling, layout and line size of the configuration.
     ///
     /// # Errors
-    /// Tables that refer to what is not there, or too large an address space.
+    /// Tables with invalid references, or too large an address space.
     pub fn new(source: &'a dyn TileSource, config: &RunConfig) -> Result<Self, StreamError> {
         let tables = source.tables();
         let footprints = Footprints::new(tables, config)?;
@@ -108,13 +108,13 @@ impl<'a> Expander<'a> {
         })
     }
 
-    /// Lists each quad's distinct lines, too.
+    /// Also lists the distinct lines of each quad.
     #[must_use]
     pub fn with_distinct_lines(self, distinct: bool) -> Self {
         Self { distinct, ..self }
     }
 
-    /// Lists nothing but each quad's distinct lines.
+    /// Lists only the distinct lines of each quad.
     #[must_use]
     pub fn only_distinct_lines(self) -> Self {
         Self {
@@ -124,8 +124,7 @@ impl<'a> Expander<'a> {
         }
     }
 
-    /// Leaves out accesses that change nothing in a cache of so many sets (a power of two) or more, see
-    /// [`LastUsed`].
+    /// Leaves out accesses that change nothing in a cache of `sets` sets (a power of two) or more, see [`LastUsed`].
     #[must_use]
     pub fn without_idle_accesses(self, sets: u32) -> Self {
         Self {
@@ -134,10 +133,17 @@ impl<'a> Expander<'a> {
         }
     }
 
-    /// Where accesses count.
+    /// The bins for counts.
     #[must_use]
     pub fn bins(&self) -> &Bins {
         &self.bins
+    }
+
+    /// Location of the textures under a configuration.
+    #[must_use]
+    pub fn layout(&self, config: &RunConfig) -> Option<Arc<Layout>> {
+        let layout = Layout::new(&self.source.tables().textures, &config.layout);
+        layout.ok().map(Arc::new)
     }
 
     /// Lines of the whole address space.
@@ -149,7 +155,7 @@ impl<'a> Expander<'a> {
     /// Expands all tiles of a frame and adds their accesses to `counts`.
     ///
     /// # Errors
-    /// A tile that cannot be read.
+    /// An unreadable tile.
     pub fn frame<'e>(
         &'e self,
         number: u32,
@@ -161,8 +167,7 @@ impl<'a> Expander<'a> {
         let tiles: Vec<TileRef> = of_frame
             .flat_map(|(pass, p)| (0..p.tile_count()).map(move |tile| TileRef { pass, tile }))
             .collect();
-        // Memory may come back while other chunks are expanded: those for which there is none are left for
-        // later.
+        // Memory may be freed while other chunks are expanded, so chunks without room are deferred.
         let largest = AtomicU64::new(0);
         let chunk = |tiles: &[TileRef]| {
             let mut work = self.work();
@@ -285,8 +290,8 @@ impl<'a> Expander<'a> {
         sums.checked(at)
     }
 
-    /// Appends the footprints of a bundle without lines whose access is idle; the sum of the footprints'
-    /// [`access_hash`] and of their lines.
+    /// Appends the footprints of a bundle, except lines with idle accesses. Returns the sum of
+    /// [`access_hash`] over all line look-ups, and their number.
     #[inline(always)]
     fn append(
         &self,
@@ -319,7 +324,7 @@ impl<'a> Expander<'a> {
         (hash, lookups)
     }
 
-    /// The sum of [`access_hash`] over the last quad's footprints, where only distinct lines are listed.
+    /// The sum of [`access_hash`] over the last quad's footprints, if only distinct lines are listed.
     #[inline(always)]
     fn touch(&self, lines: &TileLines) -> u64 {
         let start = lines
@@ -335,7 +340,7 @@ impl<'a> Expander<'a> {
     }
 }
 
-/// What a tile's accesses come to.
+/// Access counts of a tile.
 #[derive(Clone, Copy, Debug, Default)]
 struct TileSums {
     lanes: u64,
@@ -344,8 +349,8 @@ struct TileSums {
 }
 
 impl TileSums {
-    /// As what tiles count in. Whatever else is counted or listed by tile, footprints and lines that miss,
-    /// is no more than its line look-ups.
+    /// Checks that the counts fit their types. Every other per-tile count (footprints, missing lines) is at
+    /// most the number of line look-ups.
     fn checked(self, at: TileRef) -> Result<TileAccesses, StreamError> {
         let fit = |name, count: u64| {
             u32::try_from(count).map_err(|_| StreamError::Tile {
@@ -362,7 +367,7 @@ impl TileSums {
     }
 }
 
-/// A quad has no more footprints than a texture unit's thread may have.
+/// Checks that a quad has no more footprints than a thread of a texture unit supports.
 fn checked_quad(at: TileRef, footprints: u32) -> Result<(), StreamError> {
     if footprints <= Pending::MOST {
         return Ok(());
@@ -377,7 +382,7 @@ fn checked_quad(at: TileRef, footprints: u32) -> Result<(), StreamError> {
     })
 }
 
-/// Hash of one line access; accesses are summed, so their order does not matter.
+/// Hash of one line access. Hashes are summed, so that their order does not matter.
 #[inline(always)]
 fn access_hash(line: u32) -> u64 {
     let mixed = (u64::from(line) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -388,7 +393,7 @@ fn access_hash(line: u32) -> u64 {
 pub struct Frame<'e> {
     expander: &'e Expander<'e>,
     memory: &'e LineMemory,
-    /// By pass and tile; empty for passes of other frames, and for what memory had no room for yet.
+    /// By pass and tile. Empty for passes of other frames and for tiles that memory has no room for yet.
     kept: Vec<Vec<OnceLock<TileLines>>>,
 }
 
@@ -401,14 +406,14 @@ impl<'e> Frame<'e> {
         self.slot(at)?.get()
     }
 
-    /// Keeps a tile's lines, which were expanded once more, if there is room for them now.
+    /// Keeps the lines of a tile that was expanded again, if there is room now.
     pub(super) fn keep(&self, at: TileRef, lines: &TileLines) {
         if let Some(slot) = self.slot(at)
             && slot.get().is_none()
             && let Some(copy) = self.memory.keep(lines)
             && let Err(copy) = slot.set(copy)
         {
-            // Another core was faster.
+            // Another core has stored the tile already.
             self.memory.give_back(copy.bytes());
         }
     }
@@ -417,7 +422,7 @@ impl<'e> Frame<'e> {
         self.kept[at.pass as usize].get(at.tile as usize)
     }
 
-    /// Tiles that are expanded again when a core comes to them.
+    /// Number of tiles that are expanded again when a core needs them.
     #[must_use]
     pub fn not_kept(&self) -> usize {
         let slots = self.kept.iter().flatten();

@@ -1,27 +1,27 @@
-//! Work items as quads with their records, for whoever wants the records themselves.
+//! Iterates over the quads of work items with their records.
 
 use super::lines::interleaved;
 use super::{StreamError, TileSource};
 use crate::order::{TileRef, WorkItem};
 use formats::textrace::{PrimitiveRun, QuadRecord, Tile};
 
-/// One quad of one primitive: the unit that a shader core runs as a thread.
+/// A quad of a primitive, which a shader core runs as one thread.
 #[derive(Clone, Copy, Debug)]
 pub struct Quad<'a> {
-    /// Tile that it belongs to.
+    /// Its tile.
     pub at: TileRef,
     /// Index of its draw.
     pub draw: u32,
     /// Global number of its primitive.
     pub primitive: u32,
-    /// Its records, one a uv group (and one a shadow cascade).
+    /// Its records: one per uv group (and one per shadow cascade).
     pub records: &'a [QuadRecord],
 }
 
-/// Sends the quads of a work item to `send`, in the order in which a core runs them.
+/// Passes the quads of a work item to `send`, in a core's order.
 ///
 /// # Errors
-/// A tile cannot be read, or its runs point outside its records; what `send` says.
+/// An unreadable tile, runs outside its records, or an error of `send`.
 pub fn for_quads<E: From<StreamError>>(
     source: &dyn TileSource,
     item: &WorkItem,
@@ -61,7 +61,7 @@ pub fn for_quads<E: From<StreamError>>(
     Ok(())
 }
 
-/// Reads a tile and checks what the tables of the trace say about it.
+/// Reads a tile and checks it against the trace's tables.
 pub(super) fn read(
     source: &dyn TileSource,
     at: TileRef,
@@ -71,7 +71,7 @@ pub(super) fn read(
     check(tile, at, source.tables().draws.len())
 }
 
-/// The quads of a run: records at one position.
+/// The quads of a run: consecutive records at the same position.
 pub(super) fn quads<'a>(
     tile: &'a Tile,
     run: &PrimitiveRun,
@@ -87,7 +87,7 @@ pub(super) fn lanes(records: &[QuadRecord]) -> u32 {
     all.count_ones()
 }
 
-/// Refuses runs that a damaged or hand-made trace might hold.
+/// Refuses invalid runs of damaged or hand-made traces.
 pub(super) fn check(tile: &Tile, at: TileRef, draws: usize) -> Result<(), StreamError> {
     let records = tile.records.len() as u64;
     let bad = tile.runs.iter().find(|run| {

@@ -1,24 +1,23 @@
-//! Hidden-surface removal: which of a trace's fragments a renderer shades.
+//! Hidden-surface removal: selects the fragments of a trace that a renderer shades.
 //!
-//! A trace holds, in submission order, what passed the depth test when it was drawn, or all that
-//! the draws cover. Without depth the one does not follow from the other. A deferred
-//! renderer first finds what is seen of a tile and then shades it: of each pixel, the last opaque
-//! fragment, which lies before all earlier ones, and whatever is drawn over it that only shading
-//! tells to be seen or not (alpha-masked and blended draws).
+//! A trace holds, in submission order, either the fragments that passed the depth test when drawn, or all
+//! covered fragments. Without depth, one cannot be derived from the other. A deferred renderer first
+//! determines what is visible in a tile and then shades it. Per pixel it shades the last opaque fragment,
+//! which lies in front of all earlier ones, and the alpha-masked and blended fragments drawn after it,
+//! whose visibility only shading determines.
 
 use super::{StreamError, TileSource};
 use crate::config::Hsr;
 use formats::textrace::{QuadRecord, Surfaces, Tables, Tile};
 use formats::view::TILE_SIZE_PX;
 
-/// Pixels along a tile's edge.
+/// Pixels per tile edge.
 const EDGE: usize = TILE_SIZE_PX as usize;
 
-/// A trace as a renderer with some hidden-surface removal shades it; the trace itself where that is
-/// what was captured.
+/// The trace as shaded by a renderer with this hidden-surface removal; unchanged if it was captured that way.
 ///
 /// # Errors
-/// A removal that the trace does not hold the fragments for.
+/// The trace does not hold the fragments that the removal needs.
 pub fn shaded<'a>(source: &'a dyn TileSource, hsr: Hsr) -> Result<Shaded<'a>, StreamError> {
     let refused = |expected: &str, found: &str| {
         StreamError::Tables(format!("hsr: expected {expected}, found {found}"))
@@ -27,12 +26,12 @@ pub fn shaded<'a>(source: &'a dyn TileSource, hsr: Hsr) -> Result<Shaded<'a>, St
     let tested = surfaces.is_none_or(|s| s.depth_tested);
     let hidden = match (hsr, tested) {
         (Hsr::None, true) => Err(refused(
-            "early-z or deferred, since the trace was captured with the depth test (for none, capture with --hsr none)",
+            "early-z or deferred, because the trace was captured with the depth test (for none, capture with --hsr none)",
             "none",
         )),
         (Hsr::None, false) | (Hsr::EarlyZ, true) => Ok(None),
         (Hsr::EarlyZ | Hsr::Deferred, false) => Err(refused(
-            "none, since the trace was captured without the depth test and holds no depths (for the others, capture without --hsr none)",
+            "none, because the trace was captured without the depth test and holds no depths (for the others, capture without --hsr none)",
             if hsr == Hsr::EarlyZ {
                 "early-z"
             } else {
@@ -42,7 +41,7 @@ pub fn shaded<'a>(source: &'a dyn TileSource, hsr: Hsr) -> Result<Shaded<'a>, St
         (Hsr::Deferred, true) => match surfaces {
             Some(surfaces) => Ok(Some(opaque_draws(surfaces, source.tables().draws.len()))),
             None => Err(refused(
-                "early-z, since the trace does not tell which draws are opaque (capture it again)",
+                "early-z, because the trace does not record which draws are opaque (capture it again)",
                 "deferred",
             )),
         },
@@ -50,7 +49,7 @@ pub fn shaded<'a>(source: &'a dyn TileSource, hsr: Hsr) -> Result<Shaded<'a>, St
     hidden.map(|opaque| Shaded { source, opaque })
 }
 
-/// By draw, whether its fragments hide what lies behind before they are shaded.
+/// By draw, whether it is opaque, so that its fragments hide what lies behind without being shaded.
 fn opaque_draws(surfaces: &Surfaces, draws: usize) -> Vec<bool> {
     let mut opaque = vec![true; draws];
     for &[first, count] in &surfaces.not_opaque {
@@ -64,7 +63,7 @@ fn opaque_draws(surfaces: &Surfaces, draws: usize) -> Vec<bool> {
 /// See [`shaded`].
 pub struct Shaded<'a> {
     source: &'a dyn TileSource,
-    /// Of deferred rendering.
+    /// Present for deferred rendering: whether each draw is opaque.
     opaque: Option<Vec<bool>>,
 }
 
@@ -86,7 +85,7 @@ impl TileSource for Shaded<'_> {
     }
 }
 
-/// Number of a record's lane in its tile.
+/// Index of the pixel of a record's lane in its tile.
 fn pixel(record: &QuadRecord, lane: usize) -> usize {
     let at = |quad: u8, bit: usize| (2 * usize::from(quad & 7)) + bit;
     at(record.y, lane >> 1) * EDGE + at(record.x, lane & 1)
@@ -96,10 +95,10 @@ fn lanes(mask: u8) -> impl Iterator<Item = usize> {
     (0..4).filter(move |lane| mask >> lane & 1 != 0)
 }
 
-/// Leaves of each pixel its last opaque fragment and what is drawn over it. Runs or draws that the
-/// tile or `opaque` do not have stay as they are: whoever reads the tile refuses them.
+/// Keeps the last opaque fragment of each pixel and the fragments drawn after it. Invalid runs and unknown
+/// draws stay unchanged; the reader of the tile refuses them.
 fn defer(tile: &mut Tile, opaque: &[bool]) {
-    // The last run, counted from 1, whose opaque fragment covers the pixel.
+    // Per pixel, the last run (counted from 1) with an opaque fragment.
     let mut last = [0usize; EDGE * EDGE];
     let records = |tile: &Tile, run: usize| {
         let run = tile.runs[run];
@@ -145,7 +144,7 @@ fn defer(tile: &mut Tile, opaque: &[bool]) {
                 }
             }
             if record.mask != 0 {
-                // Never beyond what was read.
+                // The write position never passes the read position.
                 tile.records[kept] = record;
                 kept += 1;
             }
@@ -187,7 +186,7 @@ mod tests {
         tile
     }
 
-    /// The fragments of a tile: pixel and primitive.
+    /// The fragments of a tile, as pixel and primitive.
     fn fragments(tile: &Tile) -> Vec<(usize, u32)> {
         let of = |run: &PrimitiveRun| {
             let records = &tile.records[run.first as usize..][..run.count as usize];
@@ -201,7 +200,7 @@ mod tests {
         all
     }
 
-    /// Pixel by pixel: the list of its fragments, cut before its last opaque one.
+    /// Per pixel, the list of fragments without those before the last opaque one.
     fn brute_force(primitives: &[Primitive], opaque: &[bool]) -> Vec<(usize, u32)> {
         let mut pixels: HashMap<(usize, usize), Vec<u32>> = HashMap::new();
         for (number, (_, quads)) in primitives.iter().enumerate() {
@@ -230,7 +229,7 @@ mod tests {
     fn primitives() -> impl Strategy<Value = Vec<Primitive>> {
         let quad = (0..8u8, 0..8u8, 1..16u8);
         let quads = prop::collection::vec(quad, 1..20).prop_map(|mut quads| {
-            // A primitive covers a quad once.
+            // A primitive covers a quad at most once.
             quads.sort_unstable();
             quads.dedup_by_key(|quad| (quad.0, quad.1));
             quads
@@ -240,7 +239,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_is_left_is_what_each_pixel_shows(list in primitives()) {
+        fn remaining_fragments_are_those_that_each_pixel_shows(list in primitives()) {
             for opaque in [[true, true, true], [true, false, true], [false, false, false]] {
                 let mut found = tile(&list);
                 defer(&mut found, &opaque);
@@ -253,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn of_opaque_draws_one_fragment_a_pixel_is_left() {
+    fn opaque_draws_leave_one_fragment_per_pixel() {
         let all = (0..8)
             .flat_map(|y| (0..8).map(move |x| (x, y, 15)))
             .collect::<Vec<_>>();
@@ -285,17 +284,17 @@ mod tests {
             (
                 None,
                 Hsr::None,
-                "hsr: expected early-z or deferred, since the trace was captured with the depth test (for none, capture with --hsr none), found none",
+                "hsr: expected early-z or deferred, because the trace was captured with the depth test (for none, capture with --hsr none), found none",
             ),
             (
                 None,
                 Hsr::Deferred,
-                "hsr: expected early-z, since the trace does not tell which draws are opaque (capture it again), found deferred",
+                "hsr: expected early-z, because the trace does not record which draws are opaque (capture it again), found deferred",
             ),
             (
                 surfaces(false),
                 Hsr::Deferred,
-                "hsr: expected none, since the trace was captured without the depth test and holds no depths (for the others, capture without --hsr none), found deferred",
+                "hsr: expected none, because the trace was captured without the depth test and holds no depths (for the others, capture without --hsr none), found deferred",
             ),
         ];
         for (surfaces, hsr, expected) in cases {

@@ -1,20 +1,27 @@
-//! The order in which the cores' quads meet in what they share, where no latencies are known: a
-//! footprint is the unit of time.
+//! The interleaving of the cores' quads at shared resources without latencies: a footprint takes one unit of time.
 
 use super::{Cores, QuadLines, StreamError};
 use crate::config::Assign;
 use crate::order::{Phase, WorkItem};
 
-/// Takes the quads of a trace in the order in which the cores come to them.
+/// Receives the quads of a trace in the order in which cores run them.
 pub trait Consumer {
-    /// `core` runs a quad.
+    /// Runs a quad on `core`.
     fn quad(&mut self, core: usize, quad: QuadLines<'_>);
+
+    /// Starts a work item on `core`.
+    ///
+    /// # Errors
+    /// An unreadable tile.
+    fn start_item(&mut self, _core: usize, _item: &WorkItem) -> Result<(), StreamError> {
+        Ok(())
+    }
 }
 
-/// Sends all quads of `phases` to `consumer`. What comes when does not depend on the consumer.
+/// Passes all quads of `phases` to `consumer`. The order does not depend on the consumer.
 ///
 /// # Errors
-/// A tile that cannot be read.
+/// An unreadable tile.
 pub fn interleave(
     cores: &mut Cores<'_>,
     phases: &[Phase],
@@ -30,25 +37,25 @@ pub fn interleave(
     Ok(())
 }
 
-/// The core that is furthest behind, in footprints, runs a quad; if it has none left, it takes the
-/// next item.
+/// Runs a quad on the core that is furthest behind in footprints, or gives it the next item if it has no quads left.
 fn first_idle(
     cores: &mut Cores<'_>,
     phase: &[WorkItem],
     consumer: &mut impl Consumer,
 ) -> Result<(), StreamError> {
     let mut items = phase.iter();
-    // All cores start a phase together. A core without work is at the end of time.
+    // All cores start a phase together. A core without work has the maximum as its clock.
     let mut clocks = vec![0_u64; cores.count()];
     while let Some((behind, until)) = furthest_behind(&clocks) {
         let clock = &mut clocks[behind];
-        // Nobody else's clock moves until this one has passed the next.
+        // No other clock changes until this one exceeds `until`.
         while *clock <= until {
             if let Some(quad) = cores.next_quad(behind) {
-                // An untextured quad takes its turn, too.
+                // An untextured quad takes one unit of time.
                 *clock += u64::from(quad.footprints.max(1));
                 consumer.quad(behind, quad);
             } else if let Some(item) = items.next() {
+                consumer.start_item(behind, item)?;
                 cores.load(behind, item)?;
             } else {
                 *clock = u64::MAX;
@@ -58,22 +65,22 @@ fn first_idle(
     Ok(())
 }
 
-/// The core with the lowest clock, the first of equals, and the last cycle at which it still is.
+/// The core with the lowest clock (the first one if equal), and the last cycle at which it still has the lowest.
 #[inline]
 pub fn furthest_behind(clocks: &[u64]) -> Option<(usize, u64)> {
     let (behind, &lowest) = clocks.iter().enumerate().min_by_key(|(_, clock)| **clock)?;
     if lowest == u64::MAX {
         return None;
     }
-    // A core before it keeps the turn from its own cycle on, one after it only past it.
+    // At equal clocks, cores with lower numbers run first.
     let before = clocks[..behind].iter().map(|&clock| clock - 1);
     let after = clocks[behind + 1..].iter().copied();
     let until = before.chain(after).min().unwrap_or(u64::MAX);
     Some((behind, until.min(u64::MAX - 1)))
 }
 
-/// Round robin: the cores' i-th items start together and run quad by quad in turn; who is done
-/// first waits. Free-running streams would drift apart and invent locality effects.
+/// Round robin: the i-th items of all cores start together and their quads alternate; a core that finishes
+/// first waits. Independent streams would drift apart and create artificial locality effects.
 fn lockstep(
     cores: &mut Cores<'_>,
     phase: &[WorkItem],
@@ -81,6 +88,7 @@ fn lockstep(
 ) -> Result<(), StreamError> {
     for items in phase.chunks(cores.count()) {
         for (core, item) in items.iter().enumerate() {
+            consumer.start_item(core, item)?;
             cores.load(core, item)?;
         }
         let mut busy: Vec<usize> = (0..items.len()).collect();

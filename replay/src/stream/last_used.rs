@@ -1,20 +1,20 @@
-//! Accesses that change nothing in any cache: to the line that its set used last.
+//! Detects accesses that change nothing in any cache: those to the line that its set used last.
 //!
-//! Whatever the replacement policy, such a line is there, and where it stands in its set stays as it is. The lines
-//! of a set are those of several sets of a larger cache, so what holds for so many sets holds for more.
-//! Quads of a primitive in a tile follow each other on one core in every order; before and after them
-//! orders differ. So only accesses within such a run are known to be idle.
+//! Under every replacement policy, such a line is resident and its state stays the same. A set of a small
+//! cache is a union of sets of a larger one, so an idle access is also idle with more sets. In every order,
+//! the quads of a primitive in a tile are consecutive on one core, but their predecessors and successors
+//! differ. Therefore only accesses within such a run are known to be idle.
 
-/// The line that each set of a cache used last in the run at hand.
+/// The line that each set used last in the current run.
 #[derive(Debug)]
 pub(super) struct LastUsed {
-    /// The run, in the upper half, and the line. A run begins without clearing all sets.
+    /// Number of the run in the upper half, line in the lower. A new number avoids clearing all sets.
     sets: Vec<u64>,
     run: u32,
 }
 
 impl LastUsed {
-    /// For a cache of so many sets, a power of two.
+    /// For a cache with `sets` sets, a power of two.
     pub(super) fn new(sets: u32) -> Self {
         debug_assert!(sets.is_power_of_two());
         Self {
@@ -23,17 +23,17 @@ impl LastUsed {
         }
     }
 
-    /// A run begins: nothing is known of what was used last.
+    /// Starts a run, in which no set has been used yet.
     pub(super) fn begin(&mut self) {
         self.run = self.run.wrapping_add(1);
         if self.run == 0 {
-            // Numbers start again: what was written with them is forgotten.
+            // Run numbers wrap around, so entries with old numbers are cleared.
             self.sets.fill(0);
             self.run = 1;
         }
     }
 
-    /// Uses a line. True if its set used it last.
+    /// Uses a line. Returns true if its set used it last.
     #[inline(always)]
     pub(super) fn uses_again(&mut self, line: u32) -> bool {
         let set = line as usize & (self.sets.len() - 1);
@@ -52,7 +52,7 @@ mod tests {
         fn a_line_is_idle_where_it_was_the_last_of_its_set_in_the_run(
             runs in prop::collection::vec(prop::collection::vec(0_u32..24, 0..40), 1..5),
         ) {
-            // Runs' numbers start again.
+            // Starts near the largest run number, so that numbers wrap around.
             let mut last = LastUsed::new(4);
             last.run = u32::MAX - 1;
             for run in &runs {

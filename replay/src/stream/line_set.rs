@@ -1,23 +1,23 @@
-//! The lines that are touched at all: the misses of an infinite cache.
+//! The set of accessed lines, whose size equals the misses of an infinite cache.
 
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Lines of a block, as a power of two.
+/// log2 of the lines per block.
 const BLOCK_BITS: u32 = 16;
 const BLOCK_WORDS: usize = 1 << (BLOCK_BITS - 6);
 
 type Block = [AtomicU64; BLOCK_WORDS];
 
-/// A set of lines, a bit each, that threads fill together. Only blocks that somebody touches take
-/// memory: a table may name textures of gigabytes of which nobody samples more than a corner.
+/// A bit set of lines that threads fill concurrently. Only accessed blocks take memory, because a trace may
+/// name gigabytes of textures and sample little of them.
 #[derive(Debug)]
 pub struct LineSet {
     blocks: Vec<OnceLock<Box<Block>>>,
 }
 
 impl LineSet {
-    /// An empty set, for lines below `lines`.
+    /// An empty set for lines below `lines`.
     #[must_use]
     pub fn new(lines: u64) -> Self {
         let blocks = lines.div_ceil(1 << BLOCK_BITS);
@@ -33,7 +33,7 @@ impl LineSet {
         let words = block.get_or_init(|| Box::new([const { AtomicU64::new(0) }; BLOCK_WORDS]));
         let word = &words[line as usize / 64 % BLOCK_WORDS];
         let bit = 1 << (line % 64);
-        // Nearly all lines are there already, and a read does not take the word from the others.
+        // Nearly all lines are present already, and a read does not invalidate other cores' copies of the word.
         if word.load(Ordering::Relaxed) & bit == 0 {
             word.fetch_or(bit, Ordering::Relaxed);
         }
@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_count_once_and_blocks_that_nobody_touches_take_no_memory() {
+    fn lines_count_once_and_untouched_blocks_take_no_memory() {
         let set = LineSet::new(u64::from(u32::MAX) + 1);
         for line in [0, 1, 63, 64, 65_535, 65_536, u32::MAX, 1, u32::MAX] {
             set.insert(line);

@@ -1,22 +1,21 @@
-//! A tile's quads as lines: what every order, cache and clock reads in place of the trace.
+//! The quads of a tile as lines, which every order, cache and clock reads instead of the trace.
 
 use super::counts::Place;
 use super::distinct::Use;
 use crate::order::Interleave;
 
-/// What a line belongs to: its footprint's cell within the view and, on a footprint's first line,
-/// how often the same footprint follows right after. One word, so that lines and tags lie side by
-/// side in two plain lists.
+/// The owner of a line: its footprint's cell within the view and, on a footprint's first line, the number
+/// of repeats that follow. It fits one word, so that lines and tags are two plain lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tag(u32);
 
 impl Tag {
-    /// Cells of a view that a tag can name.
+    /// Number of cells per view that a tag can address.
     pub const CELLS: usize = 1 << 29;
     const FIRST: u32 = 1 << 31;
     const REPEATS_SHIFT: u32 = 29;
 
-    /// Tags of a footprint's first line, and of its others.
+    /// Tags of a footprint's first line and of its other lines.
     #[inline(always)]
     pub(super) fn of_footprint(cell: u32, repeats: u32) -> [Self; 2] {
         let other = cell & (Self::CELLS as u32 - 1);
@@ -26,6 +25,13 @@ impl Tag {
         ]
     }
 
+    /// The tag of a footprint of one line.
+    #[must_use]
+    pub fn of_line(cell: u32) -> Self {
+        let [first, _] = Self::of_footprint(cell, 0);
+        first
+    }
+
     /// True for a footprint's first line.
     #[inline(always)]
     #[must_use]
@@ -33,53 +39,55 @@ impl Tag {
         self.0 & Self::FIRST != 0
     }
 
-    /// On a footprint's first line: how often the same lines are asked for once more (0 to 3).
+    /// On a footprint's first line: how often the same lines are looked up again (0 to 3).
     #[inline(always)]
     #[must_use]
     pub fn repeats(self) -> u32 {
         (self.0 & !Self::FIRST) >> Self::REPEATS_SHIFT
     }
 
+    /// Cell within the view.
     #[inline(always)]
-    pub(super) fn cell(self) -> u32 {
+    #[must_use]
+    pub fn cell(self) -> u32 {
         self.0 & (Self::CELLS as u32 - 1)
     }
 }
 
-/// A primitive's quads in a tile: those up to `end`, from the end of the primitive before.
+/// A primitive's quads in a tile: from the end of the previous primitive to `end`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct QuadRun {
     pub(super) primitive: u32,
     pub(super) end: u32,
 }
 
-/// A quad: its lines go up to `end`, from the end of the quad before.
+/// A quad: its lines range from the end of the previous quad to `end`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct QuadEnd {
     pub(super) end: u32,
-    /// Its distinct lines likewise.
+    /// End of its distinct lines.
     pub(super) distinct_end: u32,
-    /// With repeats.
+    /// Number of footprints, repeats included.
     pub(super) footprints: u32,
 }
 
-/// A tile's quads in submission order as the lines of their footprints. Footprints that repeat the
-/// one before, on the same level of the same texture for another lane, are counted, not listed.
+/// A tile's quads in submission order, as the lines of their footprints. Footprints that repeat the one
+/// before (another lane, same level of the same texture) are counted, not listed.
 #[derive(Clone, Debug, Default)]
 pub struct TileLines {
     pub(super) place: Place,
     pub(super) runs: Vec<QuadRun>,
     pub(super) quads: Vec<QuadEnd>,
-    /// Empty where only distinct lines are asked for, like their tags.
+    /// Empty if only distinct lines are requested; the tags likewise.
     pub(super) lines: Vec<u32>,
     pub(super) tags: Vec<Tag>,
-    /// Empty where nobody asked for them, like their uses.
+    /// Empty unless requested; the uses likewise.
     pub(super) distinct: Vec<u32>,
     pub(super) uses: Vec<Use>,
 }
 
 impl TileLines {
-    /// Empties the lists, keeping their memory.
+    /// Empties the lists but keeps their allocations.
     pub(super) fn begin(&mut self, place: Place) {
         self.place = place;
         self.runs.clear();
@@ -90,7 +98,7 @@ impl TileLines {
         self.uses.clear();
     }
 
-    /// Memory that the lists take.
+    /// Size of the lists in bytes.
     #[must_use]
     pub fn bytes(&self) -> u64 {
         let quads = size_of_val(&*self.runs) + size_of_val(&*self.quads);
@@ -99,10 +107,10 @@ impl TileLines {
         (quads + lines + distinct + size_of::<Self>()) as u64
     }
 
-    /// Brings what the timed machine reads into the processor's caches: many cache lines at once,
-    /// where coming to them one by one would wait for each.
+    /// Prefetches the data of the timed machine into the processor's caches, many cache lines at a time
+    /// instead of one by one.
     pub(super) fn touch(&self) {
-        /// Words of a cache line.
+        /// Words per cache line.
         const STEP: usize = 16;
         let distinct = self.distinct.iter().step_by(STEP);
         let uses = self.uses.iter().step_by(STEP / 2);
@@ -120,7 +128,7 @@ impl TileLines {
         self.quads.len()
     }
 
-    /// Quads of a run.
+    /// The quads of a run.
     pub(super) fn run(&self, run: usize) -> std::ops::Range<usize> {
         let end = |run: &QuadRun| run.end as usize;
         let before = run.checked_sub(1).and_then(|before| self.runs.get(before));
@@ -151,8 +159,8 @@ impl TileLines {
     }
 }
 
-/// The order in which two tiles' primitives are rendered together: which tile, which run. The
-/// lists are the runs' primitives.
+/// The combined rendering order of the primitives of two tiles, as tile and run. The lists hold the
+/// primitives of the runs.
 pub fn interleaved(
     interleave: Interleave,
     lists: [&mut dyn Iterator<Item = u32>; 2],
@@ -191,41 +199,54 @@ pub fn interleaved(
 #[derive(Clone, Copy, Debug)]
 pub struct QuadLines<'a> {
     pub(super) place: Place,
-    /// Its footprints, repeats counted.
+    /// Number of footprints, repeats included.
     pub footprints: u32,
-    /// Distinct lines of footprint after footprint: addresses over the line size.
+    /// Distinct lines of each footprint, as addresses over the line size.
     pub lines: &'a [u32],
-    /// A tag for each line.
+    /// One tag per line.
     pub tags: &'a [Tag],
-    /// Segment by segment each line once, in the order of last use. Empty where nobody asked for it.
+    /// By segment, each line once, in order of last use. Empty unless requested.
     pub distinct: &'a [u32],
-    /// Who uses each of these.
+    /// The users of each distinct line.
     pub uses: &'a [Use],
 }
 
 impl<'a> QuadLines<'a> {
-    /// Number of its tile, see [`super::Bins`].
+    /// Lines without a tile, each with its tag.
+    #[must_use]
+    pub fn of_lines(lines: &'a [u32], tags: &'a [Tag]) -> Self {
+        Self {
+            place: Place::default(),
+            footprints: lines.len() as u32,
+            lines,
+            tags,
+            distinct: &[],
+            uses: &[],
+        }
+    }
+
+    /// Number of its tile (see [`super::Bins`]).
     #[inline(always)]
     #[must_use]
     pub fn tile(&self) -> usize {
         self.place.tile as usize
     }
 
-    /// The cell in which the footprint of line `index` counts, see [`super::Bins`].
+    /// The cell of the footprint that contains line `index` (see [`super::Bins`]).
     #[inline(always)]
     #[must_use]
     pub fn cell(&self, index: usize) -> usize {
         self.place.first_cell as usize + self.tags[index].cell() as usize
     }
 
-    /// The cell in which the footprints count that use a distinct line.
+    /// The cell of the footprints that use a distinct line.
     #[inline(always)]
     #[must_use]
     pub fn cell_of(&self, of: Use) -> usize {
         self.place.first_cell as usize + of.cell() as usize
     }
 
-    /// Where the footprint that holds line `index` ends.
+    /// End of the footprint that contains line `index`.
     #[inline(always)]
     #[must_use]
     pub fn end_of_footprint(&self, index: usize) -> usize {
@@ -236,7 +257,7 @@ impl<'a> QuadLines<'a> {
         end
     }
 
-    /// The footprints that are listed, in order.
+    /// The listed footprints, in order.
     pub fn footprints(self) -> impl Iterator<Item = Footprint<'a>> {
         let mut start = 0;
         std::iter::from_fn(move || {
@@ -253,13 +274,13 @@ impl<'a> QuadLines<'a> {
     }
 }
 
-/// One bilinear fetch of one lane at one mip level.
+/// A bilinear fetch of one lane at one mip level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Footprint<'a> {
-    /// Where it counts, see [`super::Bins`].
+    /// Its cell (see [`super::Bins`]).
     pub cell: usize,
-    /// Its one to four distinct lines, in the order in which its texels ask for them.
+    /// Its one to four distinct lines, in texel order.
     pub lines: &'a [u32],
-    /// How often the same footprint follows for further lanes.
+    /// Number of repeats of the same footprint for further lanes.
     pub repeats: u32,
 }

@@ -1,10 +1,9 @@
-//! What is accessed: the quads of each core as the lines of their footprints.
+//! The accesses of a trace: the quads of each core as the lines of their footprints.
 //!
-//! [`Expander`] turns a frame's quads into lines, once; an order gives work items, and [`Cores`]
-//! turns those into each core's quads. Who decides which core runs next decides the interleaving:
-//! [`interleave`] by footprints alone, the timed machine by its texture units' clocks. A
-//! [`Consumer`] of quads is one function: caches without latencies, the tests' plain lists, or
-//! whatever else wants the lines.
+//! [`Expander`] converts a frame's quads to lines once. An order yields work items, which [`Cores`]
+//! converts to the quads of each core. The interleaving depends on how the next core is selected:
+//! [`interleave`] counts footprints, the timed machine uses the clocks of its texture units. A [`Consumer`]
+//! receives the quads: caches without latencies, or the plain lists of tests.
 
 mod cores;
 mod counts;

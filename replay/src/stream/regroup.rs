@@ -1,7 +1,7 @@
-//! Tiles of another size than the trace's: regrouped when they are read.
+//! Regroups the tiles of a trace to another size when they are read.
 //!
-//! Records keep the order that a trace has (`Tile`): primitives in submission order and, within a primitive, quads on the Morton
-//! curve over the tile.
+//! Records keep the order of a trace (`Tile`): primitives in submission order and, within a primitive,
+//! quads on the tile's Morton curve.
 
 use super::feed::check;
 use super::hsr::{Shaded, shaded};
@@ -11,10 +11,10 @@ use crate::order::TileRef;
 use formats::textrace::{PrimitiveRun, QuadRecord, Tables, Tile};
 use formats::view::TILE_SIZE_PX;
 
-/// A trace as a configuration's renderer shades it: hidden surfaces removed, in tiles of its size.
+/// The trace as shaded by a configuration's renderer: hidden surfaces removed, in tiles of its size.
 ///
 /// # Errors
-/// A removal that the trace does not hold the fragments for.
+/// The trace does not hold the fragments that the removal needs.
 pub fn rendered<'a>(
     source: &'a dyn TileSource,
     config: &RunConfig,
@@ -37,7 +37,7 @@ pub fn rendered<'a>(
 /// See [`rendered`].
 pub struct Rendered<'a> {
     shaded: Shaded<'a>,
-    /// Of tiles that are not as recorded.
+    /// Present if tiles differ from the recorded ones.
     tables: Option<Tables>,
     tile_px: u32,
 }
@@ -73,7 +73,7 @@ impl TileSource for Rendered<'_> {
 }
 
 impl Rendered<'_> {
-    /// Reads a recorded tile and checks its runs; nothing if it lies outside the picture.
+    /// Reads a recorded tile and checks its runs. Returns nothing for a tile outside the picture.
     fn recorded(&self, pass: u32, at: [u32; 2], tile: &mut Tile) -> Result<(), StreamError> {
         let tables = self.shaded.tables();
         let [columns, rows] = tables.passes[pass as usize].tiles;
@@ -86,7 +86,7 @@ impl Rendered<'_> {
         check(tile, TileRef { pass, tile: index }, tables.draws.len())
     }
 
-    /// The part of a recorded tile that lies in a smaller one.
+    /// Reads the part of a recorded tile that lies in a smaller tile.
     fn split(&self, pass: u32, at: [u32; 2], tile: &mut Tile) -> Result<(), StreamError> {
         let per_edge = TILE_SIZE_PX / self.tile_px;
         let from = at.map(|place| place / per_edge);
@@ -101,7 +101,7 @@ impl Rendered<'_> {
             for index in run.first as usize..(run.first + run.count) as usize {
                 let record = records[index];
                 if [record.x / edge_quads, record.y / edge_quads] == part {
-                    // Never beyond what was read: runs follow one another.
+                    // The write position never passes the read position, because runs are consecutive.
                     records[kept] = QuadRecord {
                         x: record.x % edge_quads,
                         y: record.y % edge_quads,
@@ -122,7 +122,7 @@ impl Rendered<'_> {
         Ok(())
     }
 
-    /// Smaller tiles end with the picture, so a quad of a recorded tile that lies outside would be lost.
+    /// Smaller tiles end at the picture's edge, so quads of a recorded tile outside the picture would be lost.
     fn check_inside(&self, pass: u32, at: [u32; 2], tile: &Tile) -> Result<(), StreamError> {
         let of_pass = &self.shaded.tables().passes[pass as usize];
         let room = [0, 1].map(|axis| {
@@ -144,7 +144,7 @@ impl Rendered<'_> {
         }
     }
 
-    /// The recorded tiles that lie in a larger one, primitive by primitive.
+    /// Reads the recorded tiles in a larger tile, primitive by primitive.
     fn merge(&self, pass: u32, at: [u32; 2], tile: &mut Tile) -> Result<(), StreamError> {
         let per_edge = self.tile_px / TILE_SIZE_PX;
         let edge_quads = (TILE_SIZE_PX / 2) as u8;
@@ -184,7 +184,7 @@ impl Rendered<'_> {
     }
 }
 
-/// Places of a square grid along the Morton curve; `edge` is a power of two.
+/// The positions of a square grid along the Morton curve; `edge` is a power of two.
 fn morton(edge: u32) -> impl Iterator<Item = [u32; 2]> {
     (0..edge * edge).map(|code| {
         let axis = |shift: u32| {
@@ -222,7 +222,7 @@ mod tests {
         }
     }
 
-    /// Every record with its primitive, draw and quad of the picture.
+    /// Every record with its primitive, its draw and its quad in the picture.
     fn records(
         source: &dyn TileSource,
         tile_px: u32,
@@ -297,7 +297,7 @@ mod tests {
         );
     }
 
-    /// What is sampled does not depend on the tiles; how well it fits the caches does.
+    /// The samples do not depend on the tile size; only the misses do.
     #[test]
     fn replays_of_every_size_shade_the_same() {
         let trace = trace();

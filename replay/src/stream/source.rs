@@ -1,4 +1,4 @@
-//! Where tiles come from: a file, or memory (tests, benchmarks, generated traces).
+//! Sources of tiles: a file, or memory (tests, benchmarks, generated traces).
 
 use super::StreamError;
 use formats::textrace::geometry::{Geometry, TileLists};
@@ -9,16 +9,16 @@ pub trait TileSource: Sync {
     /// Its tables.
     fn tables(&self) -> &Tables;
 
-    /// Quad records of all tiles, as a measure of the work: what reading leaves out included.
+    /// Number of quad records of all tiles, as a measure of work. Includes records that reading leaves out.
     fn records(&self) -> u64;
 
-    /// Decodes a tile into `tile`, which keeps its memory from call to call.
+    /// Decodes a tile into `tile`, reusing its allocations.
     ///
     /// # Errors
     /// The tile does not exist or is damaged.
     fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError>;
 
-    /// Meshes and views, in a trace with geometry.
+    /// Meshes and views of a trace with geometry.
     fn geometry(&self) -> Option<&Geometry> {
         None
     }
@@ -26,7 +26,7 @@ pub trait TileSource: Sync {
     /// The primitive lists of a view of [`Self::geometry`].
     ///
     /// # Errors
-    /// There is no such view, or it is damaged.
+    /// The view does not exist or is damaged.
     fn tile_lists(&self, view: usize) -> Result<TileLists, StreamError> {
         Err(StreamError::Tables(format!(
             "view {view} has no primitive lists"

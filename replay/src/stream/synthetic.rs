@@ -1,5 +1,5 @@
-//! A generated stereo trace for benchmarks and tests: rectangles with texture, at several depths,
-//! seen by two parallel eyes. It has the access pattern of a scene, not its picture.
+//! Generates stereo traces for benchmarks and tests: textured rectangles at several depths, seen by two
+//! parallel eyes. Their access pattern resembles a scene's.
 
 use super::MemoryTrace;
 use formats::textrace::{
@@ -9,16 +9,16 @@ use formats::textrace::{
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use formats::view::{Eye, FovTangents, FrameViews, Hmd, TILE_SIZE_PX};
 
-/// What to generate.
+/// Parameters of a generated trace.
 #[derive(Clone, Copy, Debug)]
 pub struct Synthetic {
-    /// Pixels of one eye.
+    /// Size of one eye's picture in pixels.
     pub size_px: [u32; 2],
     /// Edge of the rectangles in pixels.
     pub patch_px: u32,
     /// Overlapping layers of rectangles.
     pub layers: u32,
-    /// Textures of a material.
+    /// Textures per material.
     pub textures: u32,
     /// Materials.
     pub materials: u32,
@@ -86,7 +86,7 @@ impl Synthetic {
                     if layer > 0 && random(2) == 0 {
                         continue;
                     }
-                    // One to four texels a pixel, turned by a random angle.
+                    // One to four texels per pixel, rotated by a random angle.
                     let angle = f64::from(random(628)) / 100.0;
                     let texels = f64::from(SUBTEXELS) * (1.0 + f64::from(random(300)) / 100.0);
                     let (s, c) = angle.sin_cos();
@@ -184,13 +184,13 @@ impl Synthetic {
     }
 }
 
-/// The quads of a tile that each patch covers, patches as primitives.
+/// The quads of a tile covered by each patch, with patches as primitives.
 fn tile(patches: &[Patch], [column, row]: [u32; 2], eye: i32) -> Tile {
     let mut tile = Tile::default();
     let corner = [column, row].map(|t| (t * TILE_SIZE_PX) as i32);
     for (number, patch) in patches.iter().enumerate() {
         let [left, top, right, bottom] = patch.bounds;
-        // The right eye sees everything further left.
+        // Patches are further left for the right eye.
         let [left, right] = [left, right].map(|x| x - eye * patch.disparity_px);
         if right <= corner[0]
             || left >= corner[0] + 16

@@ -9,8 +9,8 @@ use formats::textrace::{
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use formats::view::{Eye, FovTangents, Hmd};
 
-/// Tables with one draw that samples all textures (of these sizes, BC1, all levels) trilinearly,
-/// and a stereo pair of one-tile passes.
+/// Tables with one draw that samples all textures (of these sizes, BC1, all levels) trilinearly, and a
+/// stereo pair of one-tile passes.
 pub fn tables(sizes: &[[u32; 2]]) -> Tables {
     let fov = FovTangents {
         left: 1.0,
@@ -84,7 +84,7 @@ pub fn tables(sizes: &[[u32; 2]]) -> Tables {
     }
 }
 
-/// A fully covered quad at texel (0, 0), one texel a pixel.
+/// A fully covered quad at texel (0, 0) with one texel per pixel.
 pub fn record(x: u8, y: u8) -> QuadRecord {
     QuadRecord {
         x,
@@ -98,7 +98,7 @@ pub fn record(x: u8, y: u8) -> QuadRecord {
     }
 }
 
-/// A tile of primitives, each with so many quads side by side.
+/// A tile of primitives, each with a number of adjacent quads.
 pub fn tile(primitives: &[(u32, u32)]) -> Tile {
     let mut tile = Tile::default();
     for &(primitive, quads) in primitives {
@@ -114,7 +114,7 @@ pub fn tile(primitives: &[(u32, u32)]) -> Tile {
     tile
 }
 
-/// Quads of footprints of lines, all in cell 0 of tile 0.
+/// Quads with these footprints, all in cell 0 of tile 0.
 pub fn tile_lines(quads: &[&[&[u32]]]) -> TileLines {
     let mut tile = TileLines::default();
     tile.begin(Place::default());

@@ -1,10 +1,10 @@
-//! The utilisation that the Z2 paper's own table implies for a pair of miss rates.
+//! The texture-unit utilisation that the Z2 paper's own table implies for a pair of miss rates.
 
-/// Texture-unit utilisation as a function of the miss rates, fitted to the 48 rows of the Z2
-/// paper's table 2 (mean absolute error 0.20 points, largest 0.65).
+/// Texture-unit utilisation as a function of the miss rates, fitted to the 48 rows of the Z2 paper's table
+/// 2 (mean absolute error 0.20 points, largest 0.65).
 ///
-/// `l1_miss` is missing footprints over footprints, `l2_miss` missing line look-ups over line
-/// look-ups, both 0 to 1. Only for comparison: the cycle model does not use it.
+/// `l1_miss` is footprint misses over footprints, `l2_miss` line misses over line look-ups, both 0 to 1.
+/// For comparison only: the cycle model does not use it.
 #[must_use]
 pub fn closed_form(l1_miss: f64, l2_miss: f64) -> f64 {
     let any_l1_miss = 1.0 - (1.0 - l1_miss).powf(17.12);

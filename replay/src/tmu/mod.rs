@@ -1,5 +1,5 @@
-//! The texture mapping unit: "looping for the next chance" (RayCore, TOG 2014), as the Z2 paper's
-//! simulator uses it. `docs/tmu-model.md` states the model and its parameters in one page.
+//! The texture mapping unit: "looping for the next chance" (RayCore, TOG 2014), as in the Z2 paper's
+//! simulator. `docs/models/texture-unit.md` describes the model and its parameters.
 
 mod closed_form;
 mod pipeline;

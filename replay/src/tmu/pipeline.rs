@@ -1,32 +1,32 @@
-//! Timing of one core's texture unit: which thread enters the pipeline when, and what it costs.
+//! Timing of one core's texture unit: when threads enter the pipeline, and what they cost.
 
 use super::waiting::{Pending, Waiting, drop_arrived};
 use crate::config::TmuConfig;
 use std::collections::VecDeque;
 
-/// What happens at the first stage.
+/// State of the first stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
-    /// A looping thread took the slot, or the pipeline waited for one.
+    /// A looping thread used the slot, or the pipeline waited for one.
     Looped,
     /// The slot is free for a new thread: call [`Pipeline::start`], or [`Pipeline::drain`].
     Free,
-    /// No thread is left.
+    /// No threads are left.
     Done,
 }
 
-/// Counters of a core's texture unit. Cycles are `useful + wasted + idle`.
+/// Counters of a core's texture unit. The total cycles are `useful + wasted + idle`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PipelineStats {
-    /// Footprints filtered; one takes one cycle.
+    /// Footprints filtered, one per cycle.
     pub useful: u64,
-    /// Issue slots taken by footprints whose lines were not there.
+    /// Issue slots used by footprints with missing lines.
     pub wasted: u64,
-    /// Cycles in which no thread could enter.
+    /// Cycles in which no thread entered.
     pub idle: u64,
     /// Threads started.
     pub threads: u64,
-    /// Trips after the first.
+    /// Trips after a thread's first.
     pub loops: u64,
 }
 
@@ -52,14 +52,14 @@ impl PipelineStats {
     }
 }
 
-/// A thread on its way back to the first stage.
+/// A thread that returns to the first stage.
 #[derive(Clone, Copy, Debug)]
 struct Looping {
-    /// When it is there.
+    /// Cycle of its return.
     back: u64,
-    /// When the first of what it waits for is there.
+    /// Earliest arrival that it waits for.
     earliest: u64,
-    /// Footprints that it waits for.
+    /// Number of waiting footprints.
     waiting: u32,
     /// Its list in [`Pipeline::pending`].
     list: u32,
@@ -67,22 +67,22 @@ struct Looping {
 
 /// The pipeline of one core.
 ///
-/// A thread is a quad with all its footprints. Those whose lines are there enter, one a cycle. The
-/// others are inactive for the rest of the trip: their tags have been checked for nothing, several
-/// a cycle. The thread is back at the first stage `loop_cycles` later, where it has precedence
-/// over new threads, and what is still pending is tried again.
+/// A thread is a quad with all its footprints. Footprints with resident lines enter, one per cycle. The
+/// others are inactive for the rest of the trip: their tags were checked without success, several per
+/// cycle. The thread returns to the first stage `loop_cycles` later, with precedence over new threads, and
+/// tries its pending footprints again.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
     config: TmuConfig,
     /// The current cycle.
     clock: u64,
-    /// In order of return, since every loop is equally long.
+    /// In order of return, because all loops have the same length.
     looping: VecDeque<Looping>,
-    /// What they wait for.
+    /// Lists of pending footprints.
     pending: Vec<Vec<Pending>>,
-    /// Lists that no thread has.
+    /// Unused lists.
     spare: Vec<u32>,
-    /// Pending footprints in a retry slot that is not full: the next thread's retries share it.
+    /// Pending footprints in a partly filled retry slot, which the next thread's retries share.
     open_slot: u32,
     drained: bool,
     stats: PipelineStats,
@@ -117,18 +117,18 @@ impl Pipeline {
         self.stats
     }
 
-    /// No further thread will come until [`Self::resume`].
+    /// Announces that no thread will start until [`Self::resume`].
     pub fn drain(&mut self) {
         self.drained = true;
     }
 
-    /// New threads may come, not before `cycle`. Waiting until then is no idle time.
+    /// Allows new threads from `cycle` on. The wait until then does not count as idle.
     pub fn resume(&mut self, cycle: u64) {
         self.drained = false;
         self.clock = self.clock.max(cycle);
     }
 
-    /// Lets time pass until the first stage has been used or is free for a new thread.
+    /// Advances time until the first stage has been used or is free for a new thread.
     #[inline]
     pub fn turn(&mut self) -> Turn {
         let full = self.drained || self.looping.len() >= self.config.threads as usize;
@@ -165,8 +165,8 @@ impl Pipeline {
         self.trip((waited - thread.waiting).into(), thread);
     }
 
-    /// A new thread enters now. What those of its `footprints` that miss wait for is there after now;
-    /// the list is taken, and another one is left for it.
+    /// Starts a thread now. `waiting` lists the future arrivals that some of its `footprints` wait for; its
+    /// list is exchanged for an unused one.
     #[inline(always)]
     pub fn start(&mut self, footprints: u32, waiting: &mut Waiting) {
         self.stats.threads += 1;
@@ -195,7 +195,7 @@ impl Pipeline {
         self.trip((footprints - thread.waiting).into(), thread);
     }
 
-    /// One trip: `hits` footprints are filtered; those that the thread waits for are not.
+    /// One trip: `hits` footprints are filtered, the waiting ones are not.
     #[inline(always)]
     fn trip(&mut self, hits: u64, thread: Looping) {
         let entered = self.clock;
@@ -219,11 +219,10 @@ impl Pipeline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::Allocation;
+    use crate::config::{Allocation, TmuModel};
 
     const CONFIG: TmuConfig = TmuConfig {
-        l1_penalty_cycles: 20,
-        l2_penalty_cycles: 200,
+        model: TmuModel::Looping,
         loop_cycles: 36,
         threads: 4,
         retry_footprints: 4,
@@ -233,7 +232,7 @@ mod tests {
         fifo_footprints: 64,
     };
 
-    /// Runs threads of (hits, latencies of the misses) one after another.
+    /// Runs threads in sequence, each given as hits and latencies of its misses.
     fn run(config: TmuConfig, threads: &[(u32, &[u64])]) -> (u64, PipelineStats) {
         let mut pipeline = Pipeline::new(config);
         let mut threads = threads.iter();
@@ -278,13 +277,13 @@ mod tests {
     #[test]
     fn an_l2_miss_loops_until_memory_has_answered() {
         let (cycles, stats) = run(CONFIG, &[(12, &[220; 4])]);
-        // Back at cycles 36, 72 ... 252, the first after 220; a slot for each failed trip.
+        // The thread returns at cycles 36, 72 ... 252, the first after 220. Each failed trip costs a slot.
         assert_eq!((stats.loops, stats.wasted), (7, 7));
         assert_eq!(cycles, 252 + 4);
     }
 
     #[test]
-    fn what_has_arrived_is_not_tried_again() {
+    fn footprints_with_arrived_lines_are_not_tried_again() {
         let (cycles, stats) = run(CONFIG, &[(0, &[20, 20, 20, 20, 220, 220, 220, 220])]);
         assert_eq!((stats.loops, stats.wasted), (7, 2 + 6));
         assert_eq!(cycles, 252 + 4);

@@ -1,24 +1,24 @@
-//! What threads of a texture unit wait for: lists of cycles, with a bit for each footprint that waits.
+//! The arrivals that threads of a texture unit wait for: cycles, each with a bit mask of waiting footprints.
 
-/// Footprints of a thread that wait until a cycle. One may wait for several.
+/// Footprints of a thread that wait for one cycle. A footprint may wait for several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pending {
-    /// When a line of theirs arrives.
+    /// Arrival of a line that they need.
     ready: u64,
-    /// A bit for each of them in their group, which is two segments, and above these bits the group's number.
+    /// One bit per footprint of their group, which spans two segments, with the group's number above these bits.
     footprints: u64,
 }
 
 impl Pending {
-    /// Footprints of a thread are counted in segments of up to so many.
+    /// Maximum number of footprints per segment. Footprints of a thread are numbered by segment.
     pub const SEGMENT: u32 = 24;
     const GROUP: u32 = 2 * Self::SEGMENT;
 
-    /// Footprints that a thread may have. Of two segments that follow each other, both together have more
-    /// than one can hold, so that groups' numbers fit.
+    /// Maximum number of footprints per thread. Two consecutive segments always hold more footprints than
+    /// fit in one, so that group numbers fit.
     pub const MOST: u32 = 1 << 20;
 
-    /// A bit for each footprint of a segment that waits until the cycle `ready`.
+    /// `footprints` has one bit per footprint of the segment that waits until the cycle `ready`.
     #[inline(always)]
     #[must_use]
     pub fn new(ready: u64, footprints: u32, segment: u32) -> Self {
@@ -37,20 +37,20 @@ impl Pending {
 
 const _: () = assert!(Pending::MOST / Pending::SEGMENT < 1 << (u64::BITS - Pending::GROUP));
 
-/// How many footprints of a group these are, its number left out.
+/// Number of footprints, ignoring the group number.
 #[inline(always)]
 fn count(footprints: u64) -> u32 {
     (footprints & ((1 << Pending::GROUP) - 1)).count_ones()
 }
 
-/// What a thread that enters waits for.
+/// The arrivals that a thread waits for.
 #[derive(Clone, Debug)]
 pub struct Waiting {
-    /// A group's follow each other.
+    /// Sorted by group.
     pub(super) list: Vec<Pending>,
-    /// All of it.
+    /// Union of all footprint masks.
     footprints: u64,
-    /// When the first of what they wait for is there.
+    /// The earliest arrival.
     pub(super) earliest: u64,
 }
 
@@ -65,7 +65,7 @@ impl Default for Waiting {
 }
 
 impl Waiting {
-    /// For nothing.
+    /// Removes all arrivals.
     #[inline(always)]
     pub fn clear(&mut self) {
         self.list.clear();
@@ -73,14 +73,14 @@ impl Waiting {
         self.earliest = u64::MAX;
     }
 
-    /// True if all is there.
+    /// True if the thread waits for nothing.
     #[inline(always)]
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
 
-    /// For this as well.
+    /// Adds an arrival.
     #[inline(always)]
     pub fn push(&mut self, pending: Pending) {
         self.footprints |= pending.footprints;
@@ -88,14 +88,14 @@ impl Waiting {
         self.list.push(pending);
     }
 
-    /// After pushes in another order than that of segments.
+    /// Restores the order by segment after pushes in another order.
     pub fn sort_by_segment(&mut self) {
         if !is_one_group(&self.list) {
             self.list.sort_by_key(|pending| pending.group());
         }
     }
 
-    /// How many footprints wait.
+    /// Number of waiting footprints.
     #[inline(always)]
     pub(super) fn count(&self) -> u32 {
         match is_one_group(&self.list) {
@@ -105,18 +105,18 @@ impl Waiting {
     }
 }
 
-/// True of a list in the order of groups.
+/// True if the list, which is sorted by group, has only one group.
 #[inline(always)]
 fn is_one_group(list: &[Pending]) -> bool {
     let group = |one: Option<&Pending>| one.map(|one| one.group());
     group(list.first()) == group(list.last())
 }
 
-/// Drops what has arrived by `now`: how many footprints wait still, and, if any, when the first of what they
-/// wait for is there.
+/// Removes the arrivals up to `now`. Returns the number of footprints still waiting and, if any, the
+/// earliest remaining arrival.
 ///
-/// No branches: which lines are there is a coin toss to the processor. What has arrived is a negative time
-/// away, or a very long one.
+/// Branch-free, because which lines have arrived is unpredictable. The remaining time wraps around for
+/// lines that have already arrived, so it compares as very large.
 #[inline(always)]
 pub(super) fn drop_arrived(list: &mut Vec<Pending>, now: u64) -> (u32, u64) {
     let one_group = is_one_group(list);
@@ -124,7 +124,7 @@ pub(super) fn drop_arrived(list: &mut Vec<Pending>, now: u64) -> (u32, u64) {
     let mut kept = 0_usize;
     let next = now + 1;
     for at in 0..list.len() {
-        // Read whole, then written: else each would wait for the one before.
+        // Reads before writing, so that iterations do not depend on each other.
         let Pending {
             ready,
             footprints: of,
@@ -147,7 +147,7 @@ pub(super) fn drop_arrived(list: &mut Vec<Pending>, now: u64) -> (u32, u64) {
     (waiting, next.wrapping_add(soonest))
 }
 
-/// How many footprints wait.
+/// Number of waiting footprints.
 #[inline(never)]
 fn of_groups(list: &[Pending]) -> u32 {
     let groups = list.chunk_by(|a, b| a.group() == b.group());

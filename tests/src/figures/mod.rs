@@ -70,11 +70,19 @@ pub fn with_tables(document: &str, folder: &Path) -> Result<(String, Vec<String>
 #[must_use]
 pub fn documents() -> Vec<PathBuf> {
     let root = crate::root();
-    let mut files = vec![root.join("README.md"), root.join("ARCHITECTURE.md")];
-    for folder in ["docs", "benches", "traces"] {
-        let entries = std::fs::read_dir(root.join(folder)).expect("a folder");
-        let paths = entries.map(|entry| entry.expect("an entry").path());
-        files.extend(paths.filter(|path| path.extension().is_some_and(|e| e == "md")));
+    let mut files = ["README.md", "ARCHITECTURE.md", "traces/README.md"]
+        .map(|name| root.join(name))
+        .to_vec();
+    let mut folders = vec![root.join("docs")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "md") {
+                files.push(path);
+            }
+        }
     }
     files.sort();
     files
@@ -83,7 +91,7 @@ pub fn documents() -> Vec<PathBuf> {
 /// Tables that are typed though most of their cells are numbers: file's name and start of the heading.
 const TYPED: [(&str, &str); 1] = [
     // Published tangents, each with its source.
-    ("techniques.md", "| `--hmd` |"),
+    ("displays.md", "| `--hmd` |"),
 ];
 
 /// Headings of tables outside of marks in which more than 12 cells are numbers.

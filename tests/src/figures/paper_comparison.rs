@@ -1,4 +1,4 @@
-//! Tables of docs/paper-comparison.md.
+//! Tables of docs/results/z2-comparison.md.
 
 use super::view::{Results, markdown};
 use replay::paper::z2;

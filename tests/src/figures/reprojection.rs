@@ -1,4 +1,4 @@
-//! Tables of benches/reprojection.md.
+//! Tables of docs/results/reprojection.md.
 
 use super::view::{Results, markdown, rounded};
 

@@ -1,4 +1,4 @@
-//! Tables of docs/many-machines.md.
+//! Tables of docs/use/many-machines.md.
 
 use super::view::{Results, markdown};
 

@@ -20,7 +20,7 @@ impl Results {
     /// Reads a file of [`super`]'s form.
     ///
     /// # Errors
-    /// It cannot be read, has no command, or rows of different lengths.
+    /// It cannot be read, has no command, two columns of one name, or rows of different lengths.
     pub fn read(file: &Path) -> Result<Self, String> {
         let name = file.display();
         let text = std::fs::read_to_string(file).map_err(|e| format!("{name}: {e}"))?;
@@ -40,9 +40,17 @@ impl Results {
         let columns = reader
             .headers()
             .map(|h| h.iter().map(str::to_owned).collect());
+        let columns: Vec<String> = columns.map_err(|e| format!("{name}: {e}"))?;
+        // Rows go by column name: of two columns with one name, the table would show the last one twice.
+        if let Some(twice) = (1..columns.len()).find(|&i| columns[..i].contains(&columns[i])) {
+            return Err(format!(
+                "{name}: expected column names that differ, found '{}' twice",
+                columns[twice]
+            ));
+        }
         Ok(Self {
             commands,
-            columns: columns.map_err(|e| format!("{name}: {e}"))?,
+            columns,
             rows: rows.map_err(|e| format!("{name}: {e}"))?,
         })
     }

@@ -32,7 +32,7 @@ pub struct TechniqueArgs {
     /// Draw nothing that the lens does not show.
     #[arg(long)]
     hidden_area_mask: bool,
-    /// Draw nothing that the headset's own mesh hides: a JSON file of triangles (docs/foveation.md) or a
+    /// Draw nothing that the headset's own mesh hides: a JSON file of triangles (docs/models/foveation.md) or a
     /// recording of hmdq.
     #[arg(long, value_name = "FILE", conflicts_with = "hidden_area_mask")]
     hidden_area_mesh: Option<PathBuf>,

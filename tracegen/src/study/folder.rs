@@ -1,4 +1,4 @@
-//! The folder of a study, schema `tracegen.techniques/1` (see docs/techniques-folder.md).
+//! The folder of a study, schema `tracegen.techniques/1` (see docs/use/techniques-folder.md).
 //!
 //! A row that is complete is a file of its own, so a study that was ended goes on where it was.
 

@@ -1,7 +1,7 @@
 //! How far single precision may move what a capture records: bounds from the arithmetic, none of them fitted.
 //!
 //! `UNIT` is what one rounding does to a term. A bound is the sum of the roundings on the way of a value, each
-//! times the magnitude of its terms (Higham 2002, chapter 3); docs/verify.md derives them.
+//! times the magnitude of its terms (Higham 2002, chapter 3); docs/use/verify.md derives them.
 
 use super::geometry::Coordinates;
 use super::piece::Corner;

@@ -44,7 +44,7 @@ impl Counts {
     }
 }
 
-/// Rows of the table in benches/encodings.md, and the row of each code.
+/// Rows of the table in docs/results/encodings.md, and the row of each code.
 const ROWS: [&str; 6] = [
     "places",
     "first quads",

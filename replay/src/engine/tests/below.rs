@@ -1,87 +1,100 @@
-//! Levels below the L2, through the engine.
+//! Replays with levels below the L2.
 
 use super::*;
-use crate::config::{Inclusion, LevelConfig, LowerLevels, PrefetchConfig, Prefetching};
+use crate::config::{Inclusion, LevelConfig, Levels, PrefetchConfig, Prefetching};
 use crate::memory::dram::DramConfig;
-use crate::result::RunResult;
+use crate::result::{MemoryResult, RunResult};
 
-fn with(levels: &[LevelConfig], mode: Mode) -> RunConfig {
-    RunConfig {
-        mode,
-        level: LowerLevels::of(levels).unwrap(),
-        ..functional(Order::MORTON)
-    }
+/// Two small levels and these below them.
+fn with(levels: &[LevelConfig], time: Time) -> RunConfig {
+    let mut config = in_time(time, functional(Order::MORTON));
+    config.level = config.level.over(levels).unwrap();
+    config
 }
 
-const MODES: [Mode; 3] = [Mode::Functional, Mode::Timed, Mode::FirstMiss];
+/// Replaces the L2.
+fn over_l2(l2: LevelConfig, mut config: RunConfig) -> RunConfig {
+    config.level.l2 = LevelConfig {
+        hit_cycles: config.level.l2.hit_cycles,
+        ..l2
+    };
+    config
+}
 
-/// A result without what lies below the L2.
+/// A level below the L2.
+fn lower(size_bytes: u64) -> LevelConfig {
+    Levels::usual(2, size_bytes)
+}
+
+const TIMES: [Time; 3] = [AT_ONCE, LOOPING, FIRST_MISS];
+
+/// The result without the levels below the L2.
 fn above(result: &RunResult) -> RunResult {
     RunResult {
         external_bytes: 0,
-        lower_levels: Vec::new(),
-        dram: None,
+        memory: MemoryResult {
+            lower_levels: Vec::new(),
+            dram: None,
+            ..result.memory.clone()
+        },
         ..result.clone()
     }
 }
 
 #[test]
-fn an_l3_as_slow_as_memory_changes_external_traffic_alone() {
+fn an_l3_as_slow_as_memory_changes_only_dram_traffic() {
     let trace = small();
-    for mode in MODES {
-        let without = replay(&trace, &with(&[], mode)).unwrap();
+    for time in TIMES {
+        let without = replay(&trace, &with(&[], time)).unwrap();
         let slow = LevelConfig {
-            hit_cycles: RunConfig::default().tmu.l2_penalty_cycles,
-            ..LevelConfig::lru(4 << 20)
+            hit_cycles: RunConfig::default().memory_cycles,
+            ..lower(4 << 20)
         };
-        let result = replay(&trace, &with(&[slow], mode)).unwrap();
-        assert_eq!(above(&result), above(&without), "{mode:?}");
-        let l3 = &result.lower_levels[0];
-        assert_eq!(l3.line_lookups, without.l2.misses, "{mode:?}");
-        // Nothing is evicted from it.
-        assert_eq!(l3.line_misses, result.unique_lines, "{mode:?}");
-        assert_eq!(result.external_bytes, 16 * result.unique_lines, "{mode:?}");
+        let result = replay(&trace, &with(&[slow], time)).unwrap();
+        assert_eq!(above(&result), above(&without), "{time:?}");
+        let l3 = &result.memory.lower_levels[0];
+        assert_eq!(l3.line_lookups, without.l2.misses, "{time:?}");
+        // The L3 evicts nothing.
+        assert_eq!(l3.line_misses, result.unique_lines, "{time:?}");
+        assert_eq!(result.external_bytes, 16 * result.unique_lines, "{time:?}");
     }
 }
 
 #[test]
 fn a_prefetcher_that_fetches_nothing_changes_nothing() {
     let trace = small();
-    for mode in MODES {
-        let without = replay(&trace, &with(&[], mode)).unwrap();
+    for time in TIMES {
+        let without = replay(&trace, &with(&[], time)).unwrap();
         let prefetch = Some(PrefetchConfig {
             prefetcher: Prefetching::ALIGNED_BLOCK,
             lines: Some(1),
         });
-        let config = with(&[], mode);
+        let config = with(&[], time);
         let mut idle = replay(&trace, &RunConfig { prefetch, ..config }).unwrap();
-        assert_eq!(idle.prefetch.take().unwrap().lines, 0, "{mode:?}");
-        assert_eq!(idle, without, "{mode:?}");
+        assert_eq!(idle.memory.prefetch.take().unwrap().lines, 0, "{time:?}");
+        assert_eq!(idle, without, "{time:?}");
     }
 }
 
 #[test]
 fn a_prefetcher_trades_bytes_for_misses() {
     let trace = small();
-    for mode in MODES {
-        // Large enough that prefetched lines evict nothing that is used again.
-        let plain = RunConfig {
-            l2: CacheConfig::lru(128 << 10),
-            ..with(&[], mode)
-        };
+    for time in TIMES {
+        // Large enough that prefetches evict no line that is used again.
+        let plain = over_l2(LevelConfig::lru(128 << 10), with(&[], time));
         let without = replay(&trace, &plain).unwrap();
         let prefetch = Some(PrefetchConfig::default());
         let with = replay(&trace, &RunConfig { prefetch, ..plain }).unwrap();
-        let prefetched = with.prefetch.unwrap();
-        assert!(with.l2.misses < without.l2.misses, "{mode:?}");
-        assert!(with.external_bytes > without.external_bytes, "{mode:?}");
+        let prefetched = with.memory.prefetch.unwrap();
+        assert!(with.l2.misses < without.l2.misses, "{time:?}");
+        assert!(with.external_bytes > without.external_bytes, "{time:?}");
         assert_eq!(
             with.external_bytes,
             16 * (with.l2.misses + prefetched.lines),
-            "{mode:?}"
+            "{time:?}"
         );
-        assert!(prefetched.useful_lines <= prefetched.lines, "{mode:?}");
-        assert!(prefetched.late_lines <= prefetched.useful_lines, "{mode:?}");
+        assert!(prefetched.useful_lines <= prefetched.lines, "{time:?}");
+        assert!(prefetched.late_lines <= prefetched.useful_lines, "{time:?}");
     }
 }
 
@@ -89,11 +102,11 @@ fn a_prefetcher_trades_bytes_for_misses() {
 fn a_faster_l3_shortens_a_replay_whose_l2_is_small() {
     let trace = small();
     let cycles = |levels: &[LevelConfig]| {
-        let mut config = with(levels, Mode::Timed);
-        (config.l1, config.l2) = (CacheConfig::lru(1 << 10), CacheConfig::lru(1 << 10));
+        let mut config = with(levels, LOOPING);
+        (config.level.l1.size_bytes, config.level.l2.size_bytes) = (1 << 10, 1 << 10);
         replay(&trace, &config).unwrap().cycles.unwrap()
     };
-    assert!(cycles(&[LevelConfig::lru(4 << 20)]) < cycles(&[]));
+    assert!(cycles(&[lower(4 << 20)]) < cycles(&[]));
 }
 
 #[test]
@@ -101,15 +114,15 @@ fn a_batch_gives_what_each_replay_gives_alone() {
     let trace = small();
     let long = LevelConfig {
         line_bytes: Some(64),
-        ..LevelConfig::lru(16 << 10)
+        ..lower(16 << 10)
     };
-    let levels: [&[LevelConfig]; 4] = [&[], &[LevelConfig::lru(16 << 10)], &[long], &[long, long]];
+    let levels: [&[LevelConfig]; 4] = [&[], &[lower(16 << 10)], &[long], &[long, long]];
     let mut configs = Vec::new();
-    for mode in MODES {
+    for time in TIMES {
         for levels in levels {
             for dram in [None, Some(DramConfig::default())] {
                 for prefetch in [None, Some(PrefetchConfig::default())] {
-                    let config = with(levels, mode);
+                    let config = with(levels, time);
                     configs.push(RunConfig {
                         dram,
                         prefetch,
@@ -125,10 +138,14 @@ fn a_batch_gives_what_each_replay_gives_alone() {
     replay_all(&trace, &configs, &memory, &keep).unwrap();
     for (config, found) in configs.iter().zip(answers.into_inner().unwrap()) {
         assert_eq!(found, replay(&trace, config).unwrap(), "{config:?}");
-        let Some(dram) = &found.dram else {
+        let Some(dram) = &found.memory.dram else {
             continue;
         };
-        let line_bytes = found.lower_levels.last().map_or(16, |last| last.line_bytes);
+        let line_bytes = found
+            .memory
+            .lower_levels
+            .last()
+            .map_or(16, |last| last.line_bytes);
         let requested = dram.requests * u64::from(line_bytes);
         assert_eq!(requested, found.external_bytes, "{config:?}");
     }
@@ -137,31 +154,32 @@ fn a_batch_gives_what_each_replay_gives_alone() {
 #[test]
 fn inclusion_matters_where_a_level_evicts_what_others_hold() {
     let trace = small();
-    for mode in MODES {
+    for time in TIMES {
         let of = |size_bytes, inclusion| {
             let level = LevelConfig {
                 inclusion,
-                ..LevelConfig::lru(size_bytes)
+                ..lower(size_bytes)
             };
-            let config = RunConfig {
-                l2: CacheConfig::lru(4 << 10),
-                ..with(&[level], mode)
-            };
+            let config = over_l2(LevelConfig::lru(4 << 10), with(&[level], time));
             replay(&trace, &config).unwrap()
         };
-        // Nothing is evicted from a large level.
+        // A large level evicts nothing.
         let [independent, mut inclusive] =
             [Inclusion::None, Inclusion::Inclusive].map(|inclusion| of(4 << 20, inclusion));
-        assert_eq!(inclusive.invalidated_lines.take(), Some(0), "{mode:?}");
-        assert_eq!(inclusive, independent, "{mode:?}");
-        // A level as large as the L2 takes lines from it; an exclusive one adds its own size.
+        assert_eq!(
+            inclusive.memory.invalidated_lines.take(),
+            Some(0),
+            "{time:?}"
+        );
+        assert_eq!(inclusive, independent, "{time:?}");
+        // A level of the L2's size takes lines from it if inclusive and adds its own size if exclusive.
         let [independent, inclusive, exclusive] =
             [Inclusion::None, Inclusion::Inclusive, Inclusion::Exclusive]
                 .map(|inclusion| of(4 << 10, inclusion));
-        assert!(inclusive.invalidated_lines > Some(0), "{mode:?}");
+        assert!(inclusive.memory.invalidated_lines > Some(0), "{time:?}");
         assert!(
             exclusive.external_bytes < independent.external_bytes,
-            "{mode:?}"
+            "{time:?}"
         );
         assert_eq!(exclusive.access_hash, inclusive.access_hash);
     }
@@ -170,49 +188,48 @@ fn inclusion_matters_where_a_level_evicts_what_others_hold() {
 #[test]
 fn more_mshrs_than_are_used_change_nothing_and_few_of_them_cost_cycles() {
     let trace = small();
-    for mode in [Mode::Timed, Mode::FirstMiss] {
+    for time in [LOOPING, FIRST_MISS] {
         let of = |l2_mshrs| {
-            let mut config = with(&[], mode);
+            let mut config = with(&[], time);
             config.tmu.l2_mshrs = l2_mshrs;
             replay(&trace, &config).unwrap()
         };
         let unlimited = of(0);
         let mut many = of(65_536);
-        let counted = many.l2_mshrs.take().unwrap();
-        assert!(counted.peak > 4 && counted.stalled_misses == 0, "{mode:?}");
-        assert_eq!(many, unlimited, "{mode:?}");
+        let counted = many.memory.l2_mshrs.take().unwrap();
+        assert!(counted.peak > 4 && counted.stalled_misses == 0, "{time:?}");
+        assert_eq!(many, unlimited, "{time:?}");
         let few = of(2);
-        let counted = few.l2_mshrs.unwrap();
+        let counted = few.memory.l2_mshrs.unwrap();
         assert_eq!(counted.peak, 2);
         assert!(
             counted.stall_cycles > 0 && few.cycles > unlimited.cycles,
-            "{mode:?}"
+            "{time:?}"
         );
-        // Just enough of them.
+        // Exactly as many as needed.
         let mut enough = of(many_enough(&of(65_536)));
-        assert_eq!(enough.l2_mshrs.take().unwrap().stalled_misses, 0);
-        assert_eq!(enough, unlimited, "{mode:?}");
+        assert_eq!(enough.memory.l2_mshrs.take().unwrap().stalled_misses, 0);
+        assert_eq!(enough, unlimited, "{time:?}");
     }
 }
 
 fn many_enough(result: &RunResult) -> u32 {
-    result.l2_mshrs.unwrap().peak as u32
+    result.memory.l2_mshrs.unwrap().peak as u32
 }
 
 #[test]
 fn sectors_and_victim_caches_are_replayed_in_every_mode() {
     let trace = small();
-    for mode in MODES {
+    for time in TIMES {
         let of = |sectors, victim_lines| {
-            let plain = with(&[], mode);
-            let cache = |cache: CacheConfig| CacheConfig {
+            let plain = with(&[], time);
+            let cache = |cache: LevelConfig| LevelConfig {
                 sectors,
                 victim_lines,
                 ..cache
             };
             let config = RunConfig {
-                l1: cache(plain.l1),
-                l2: cache(CacheConfig::lru(4 << 10)),
+                level: Levels::two(cache(plain.level.l1), cache(LevelConfig::lru(4 << 10))),
                 ..plain
             };
             replay(&trace, &config).unwrap()
@@ -220,16 +237,16 @@ fn sectors_and_victim_caches_are_replayed_in_every_mode() {
         let plain = of(1, 0);
         let (sectored, victims) = (of(4, 0), of(1, 16));
         for other in [&sectored, &victims] {
-            assert_eq!(other.access_hash, plain.access_hash, "{mode:?}");
-            assert_eq!(other.unique_lines, plain.unique_lines, "{mode:?}");
+            assert_eq!(other.access_hash, plain.access_hash, "{time:?}");
+            assert_eq!(other.unique_lines, plain.unique_lines, "{time:?}");
         }
-        assert!(victims.l1.misses < plain.l1.misses, "{mode:?}");
-        assert_ne!(sectored.l2.misses, plain.l2.misses, "{mode:?}");
+        assert!(victims.l1.misses < plain.l1.misses, "{time:?}");
+        assert_ne!(sectored.l2.misses, plain.l2.misses, "{time:?}");
     }
 }
 
-/// Repeats that find their lines in the L1 are left out of a stream only where no other level can invalidate them: one
-/// configuration at a time gives what a machine gives that sees every access.
+/// A stream omits repeats that hit in the L1 only if no other level can invalidate them. A batch must give
+/// the results of a machine that sees every access.
 #[test]
 fn back_invalidation_is_exact_in_functional_mode() {
     let trace = small();
@@ -240,36 +257,35 @@ fn back_invalidation_is_exact_in_functional_mode() {
     ] {
         let level = LevelConfig {
             inclusion: l3_inclusion,
+            ..lower(2 << 10)
+        };
+        let l2 = LevelConfig {
+            inclusion: l2_inclusion,
             ..LevelConfig::lru(2 << 10)
         };
-        let config = RunConfig {
-            l1: CacheConfig::lru(1 << 10),
-            l2: CacheConfig {
-                inclusion: l2_inclusion,
-                ..CacheConfig::lru(2 << 10)
-            },
-            ..with(&[level], Mode::Functional)
-        };
+        let config = over_l2(l2, with(&[level], AT_ONCE));
         let result = replay(&trace, &config).unwrap();
         let mut plain = single(&trace, &config);
-        assert!(result.invalidated_lines > Some(0));
+        assert!(result.memory.invalidated_lines > Some(0));
         plain.external_bytes = result.external_bytes;
-        plain.invalidated_lines = result.invalidated_lines;
-        plain.lower_levels.clone_from(&result.lower_levels);
+        plain.memory.invalidated_lines = result.memory.invalidated_lines;
+        plain
+            .memory
+            .lower_levels
+            .clone_from(&result.memory.lower_levels);
         assert_eq!(result, plain);
     }
 }
 
-/// With an L2 that holds everything, each line is prefetched or missed once; nearly all are prefetched but the first item's, and the
-/// cycles of their misses are saved.
+/// With an L2 that holds everything, each line is prefetched or missed once. Nearly all lines after the
+/// first item's are prefetched, which saves the cycles of their misses.
 #[test]
 fn the_next_items_lines_are_fetched_while_an_item_is_shaded() {
     let trace = small();
-    for (mode, cores) in [(Mode::Timed, 1), (Mode::Timed, 3), (Mode::FirstMiss, 2)] {
+    for (time, cores) in [(LOOPING, 1), (LOOPING, 3), (FIRST_MISS, 2)] {
         let plain = RunConfig {
-            l2: CacheConfig::lru(4 << 20),
             cores,
-            ..with(&[], mode)
+            ..over_l2(LevelConfig::lru(4 << 20), with(&[], time))
         };
         let prefetch = Some(PrefetchConfig {
             prefetcher: Prefetching::TILE_AHEAD,
@@ -277,24 +293,24 @@ fn the_next_items_lines_are_fetched_while_an_item_is_shaded() {
         });
         let without = replay(&trace, &plain).unwrap();
         let ahead = replay(&trace, &RunConfig { prefetch, ..plain }).unwrap();
-        let counted = ahead.prefetch.unwrap();
+        let counted = ahead.memory.prefetch.unwrap();
         assert_eq!(
             ahead.l2.misses + counted.lines,
             ahead.unique_lines,
-            "{mode:?}"
+            "{time:?}"
         );
-        assert_eq!(counted.useful_lines, counted.lines, "{mode:?}");
-        assert_eq!(ahead.external_bytes, without.external_bytes, "{mode:?}");
+        assert_eq!(counted.useful_lines, counted.lines, "{time:?}");
+        assert_eq!(ahead.external_bytes, without.external_bytes, "{time:?}");
         assert!(
             2 * ahead.l2.misses < without.l2.misses,
-            "{mode:?}: {} {}",
+            "{time:?}: {} {}",
             ahead.l2.misses,
             without.l2.misses
         );
-        // Threads that stop at their first miss wait for whole loops, so that fewer misses need not shorten a small frame.
+        // Threads that stop at their first miss wait for whole loops, so fewer misses need not shorten a small frame.
         assert!(
-            mode == Mode::FirstMiss || ahead.cycles < without.cycles,
-            "{mode:?}"
+            time == FIRST_MISS || ahead.cycles < without.cycles,
+            "{time:?}"
         );
     }
     let functional = RunConfig {
@@ -302,7 +318,7 @@ fn the_next_items_lines_are_fetched_while_an_item_is_shaded() {
             prefetcher: Prefetching::TILE_AHEAD,
             lines: None,
         }),
-        ..with(&[], Mode::Functional)
+        ..with(&[], AT_ONCE)
     };
     let error = functional.validate().unwrap_err().to_string();
     assert!(

@@ -1,16 +1,16 @@
-//! Many LRU configurations in one pass against each of them alone, and against plain lists.
+//! Compares the single pass over many LRU configurations with separate replays and with plain lists.
 
 use super::*;
 use crate::config::Replacement;
 
-/// LRU sets as plain lists, most recent last.
+/// LRU sets as plain lists, most recently used last.
 struct Twin {
     sets: Vec<Vec<u32>>,
     ways: usize,
 }
 
 impl Twin {
-    fn new(config: &CacheConfig) -> Self {
+    fn new(config: &LevelConfig) -> Self {
         Self {
             sets: vec![Vec::new(); config.sets("", 16).unwrap() as usize],
             ways: config.ways as usize,
@@ -30,10 +30,12 @@ impl Twin {
     }
 }
 
-/// Counters of both levels on the recorded stream, nothing left out.
+/// Counters of both levels for the complete recorded stream.
 fn twin(sent: &[Sent], config: &RunConfig) -> (LevelCounters, LevelCounters) {
-    let mut l1: Vec<Twin> = (0..config.cores).map(|_| Twin::new(&config.l1)).collect();
-    let mut l2 = Twin::new(&config.l2);
+    let mut l1: Vec<Twin> = (0..config.cores)
+        .map(|_| Twin::new(&config.level.l1))
+        .collect();
+    let mut l2 = Twin::new(&config.level.l2);
     let (mut first, mut second) = (LevelCounters::default(), LevelCounters::default());
     for (core, _, lines) in sent {
         let missing: Vec<u32> = lines
@@ -80,8 +82,7 @@ fn a_thousand_sets_of_configurations_count_as_each_alone() {
         };
         let configs: Vec<RunConfig> = (0..=random.below(6))
             .map(|_| RunConfig {
-                l1: random.cache(32),
-                l2: random.cache(256),
+                level: Levels::two(random.cache(32), random.cache(256)),
                 tile_maps: random.below(3) == 0,
                 ..base
             })
@@ -101,11 +102,11 @@ fn a_thousand_sets_of_configurations_count_as_each_alone() {
 }
 
 #[test]
-fn what_cannot_share_a_pass_has_its_own() {
+fn configurations_that_cannot_share_a_pass_are_separate() {
     let trace = small();
     let base = functional(Order::MORTON);
     let larger = |config: RunConfig| RunConfig {
-        l1: CacheConfig::lru(2 << 10),
+        level: Levels::two(LevelConfig::lru(2 << 10), config.level.l2),
         ..config
     };
     let with = |change: fn(&mut RunConfig)| {
@@ -117,7 +118,7 @@ fn what_cannot_share_a_pass_has_its_own() {
         base,
         larger(base),
         with(|c| c.order = Order::Z2_STA),
-        with(|c| c.l2.replacement = Replacement::FIFO),
+        with(|c| c.level.l2.replacement = Replacement::FIFO),
         with(|c| c.mode = Mode::Timed),
         larger(with(|c| c.mode = Mode::Timed)),
         with(|c| c.line_bytes = 32),

@@ -1,5 +1,5 @@
-//! The first-miss machine in plain terms: cycle by cycle, from the records and the reference
-//! footprints, over sets that are lists. The fast machine has to agree with it to the last count.
+//! A plain version of the first-miss machine: cycle by cycle, from the records and the reference
+//! footprints, with sets as lists. The fast machine must produce exactly the same counts.
 
 use super::*;
 use crate::config::{Allocation, Assign, TmuConfig};
@@ -12,13 +12,13 @@ use std::collections::VecDeque;
 struct PlainLevel {
     sets: Vec<Vec<u64>>,
     ways: usize,
-    /// Cycle and line, in the order of requests.
+    /// Cycle and line, in order of request.
     in_flight: Vec<(u64, u64)>,
     allocation: Allocation,
 }
 
 impl PlainLevel {
-    fn new(config: &CacheConfig, allocation: Allocation) -> Self {
+    fn new(config: &LevelConfig, allocation: Allocation) -> Self {
         Self {
             sets: vec![Vec::new(); config.sets("", 16).unwrap() as usize],
             ways: config.ways as usize,
@@ -32,7 +32,7 @@ impl PlainLevel {
         &mut self.sets[index]
     }
 
-    /// True if the line's data are there; the line is then the most recent.
+    /// Returns true if the line is resident, and makes it the most recently used one.
     fn use_line(&mut self, line: u64) -> bool {
         let set = self.set(line);
         let found = set.iter().position(|&l| l == line);
@@ -79,7 +79,7 @@ impl PlainLevel {
     }
 }
 
-/// A quad: the lines of its footprints, the first one next.
+/// A quad: the remaining lines of its footprints.
 #[derive(Clone, Default)]
 struct PlainThread {
     began: u64,
@@ -129,9 +129,9 @@ impl<'a> PlainFirstMiss<'a> {
             config,
             layout: Layout::new(&trace.tables.textures, &config.layout).unwrap(),
             l1: (0..cores)
-                .map(|_| PlainLevel::new(&config.l1, config.tmu.allocation))
+                .map(|_| PlainLevel::new(&config.level.l1, config.tmu.allocation))
                 .collect(),
-            l2: PlainLevel::new(&config.l2, config.tmu.allocation),
+            l2: PlainLevel::new(&config.level.l2, config.tmu.allocation),
             cores: (0..cores).map(|_| PlainCore::default()).collect(),
             now: 0,
             useful: 0,
@@ -215,8 +215,8 @@ impl<'a> PlainFirstMiss<'a> {
             }
             self.now += 1;
         }
-        // The cycle after the last look-up; what arrives until then is there. Cycles that passed
-        // while the cores found out that they are done bring nothing.
+        // The cycle after the last look-up, with all arrivals until then. The cycles in which cores notice
+        // that they are done do not count.
         let end = self.cores.iter().map(|core| core.last).max().unwrap();
         self.now = end;
     }
@@ -293,11 +293,8 @@ impl<'a> PlainFirstMiss<'a> {
             return;
         }
         self.counts.first.l1_misses += u64::from(first);
-        let [l1_cycles, l2_cycles] = [
-            self.config.tmu.l1_penalty_cycles,
-            self.config.tmu.l2_penalty_cycles,
-        ]
-        .map(u64::from);
+        let [l1_cycles, l2_cycles] =
+            [self.config.level.l2.hit_cycles, self.config.memory_cycles].map(u64::from);
         let (mut latest, mut fetched, mut from_memory) = (now, 0, 0);
         for &line in missing {
             if let Some(arrival) = self.l1[core].arrival(line) {
@@ -375,22 +372,22 @@ fn the_first_miss_machine_agrees_with_the_plain_one_to_the_last_count() {
         let trace = &traces[random.below(2) as usize];
         let mut cache = |most_sets_log2: u64| {
             let ways = random.of(&[1, 2, 4, 4]);
-            CacheConfig {
+            LevelConfig {
                 ways,
-                ..CacheConfig::lru(u64::from(ways) << 4 << random.below(most_sets_log2))
+                ..LevelConfig::lru(u64::from(ways) << 4 << random.below(most_sets_log2))
             }
         };
-        let (l1, l2) = (cache(7), cache(10));
+        let mut level = Levels::two(cache(7), cache(10));
+        level.l2.hit_cycles = random.of(&[0, 1, 20, 20, 90]);
         let config = RunConfig {
-            mode: Mode::FirstMiss,
+            mode: Mode::Timed,
             order: random.of(&orders),
             cores: random.of(&[1, 2, 2, 3]),
             assign: random.of(&[Assign::FirstIdle, Assign::Static]),
-            l1,
-            l2,
+            level,
+            memory_cycles: random.of(&[0, 7, 200, 200]),
             tmu: TmuConfig {
-                l1_penalty_cycles: random.of(&[0, 1, 20, 20, 90]),
-                l2_penalty_cycles: random.of(&[0, 7, 200, 200]),
+                model: TmuModel::FirstMiss,
                 loop_cycles: random.of(&[1, 8, 24, 24, 300]),
                 threads: random.of(&[1, 4, 64, 64]),
                 allocation: random.of(&[Allocation::OnFill, Allocation::OnMiss]),
@@ -411,7 +408,7 @@ fn the_first_miss_machine_agrees_with_the_plain_one_to_the_last_count() {
     );
 }
 
-/// One quad that asks for a line nobody has: the slots that it takes follow from the rules.
+/// One quad that requests an absent line: the slots that it occupies follow from the rules.
 #[test]
 fn a_thread_that_waits_for_memory_is_back_every_loop_until_the_line_is_there() {
     let mut tables = testing::tables(&[[4, 4]]);
@@ -421,8 +418,8 @@ fn a_thread_that_waits_for_memory_is_back_every_loop_until_the_line_is_there() {
         tiles: vec![vec![testing::tile(&[(0, 1)])], vec![testing::tile(&[])]],
     };
     let config = RunConfig {
-        mode: Mode::FirstMiss,
         tmu: TmuConfig {
+            model: TmuModel::FirstMiss,
             loop_cycles: 24,
             ..TmuConfig::default()
         },
@@ -430,7 +427,7 @@ fn a_thread_that_waits_for_memory_is_back_every_loop_until_the_line_is_there() {
     };
     let result = replay(&trace, &config).unwrap();
     let first = result.first_lookups.unwrap();
-    // Looked up at 0, 24 ... 216, all in vain, and at 240; four lanes of one line.
+    // Four lanes of one line are looked up at 0, 24 ... 216 without success, and at 240.
     let tmu = result.tmu.unwrap();
     assert_eq!((tmu.wasted_issues, tmu.loops), (10, 10));
     assert_eq!(result.cycles, Some(240 + 4));
@@ -454,12 +451,13 @@ fn a_flush_between_frames_empties_the_first_miss_caches() {
         let tiles = two.tiles.clone();
         two.tiles.extend(tiles);
         let config = RunConfig {
-            mode: Mode::FirstMiss,
-            l2: CacheConfig::lru(1 << 20),
+            level: Levels::two(LevelConfig::lru(8 << 10), LevelConfig::lru(1 << 20)),
             between_frames,
             ..RunConfig::default()
         };
-        replay(&two, &config).unwrap().external_bytes
+        replay(&two, &in_time(FIRST_MISS, config))
+            .unwrap()
+            .external_bytes
     };
     assert_eq!(
         frames(BetweenFrames::Flush),
@@ -467,16 +465,15 @@ fn a_flush_between_frames_empties_the_first_miss_caches() {
     );
 }
 
-/// The tile that a plain machine would blame is the tile that the maps show.
+/// The maps attribute misses to the same tiles as the plain machine.
 #[test]
 fn tile_maps_add_up_to_the_primary_misses() {
     let trace = small();
     let config = RunConfig {
-        mode: Mode::FirstMiss,
         tile_maps: true,
         ..RunConfig::default()
     };
-    let result = replay(&trace, &config).unwrap();
+    let result = replay(&trace, &in_time(FIRST_MISS, config)).unwrap();
     let sum = |of: fn(&crate::result::TileMap) -> &Vec<u32>| -> u64 {
         let maps = result.tile_maps.iter().flat_map(of);
         maps.map(|&count| u64::from(count)).sum()

@@ -1,13 +1,11 @@
-//! The timed machine in plain terms: a heap and a map of what is in flight, a list of waiting
-//! footprints a thread, one footprint looked up after another. The fast machine has to agree with it
-//! cycle by cycle.
+//! A plain version of the timed machine: a heap and a map of lines in flight, a list of waiting footprints
+//! per thread, and one look-up per footprint. The fast machine must agree cycle by cycle.
 
 use super::*;
-use crate::cache::{Cache, MissPathResult};
 use crate::config::{Allocation, Replacement, TmuConfig};
 use crate::engine::counts::FootprintMisses;
-use crate::engine::timed::Timed;
-use crate::result::{MshrResult, TmuResult};
+use crate::memory::{AnyCache, Cache, Caches};
+use crate::result::{MemoryResult, MshrResult, TmuResult};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
 
@@ -50,7 +48,7 @@ impl PlainLevel {
         }
     }
 
-    /// True if the line's data are there; marks its way used.
+    /// Returns true if the line is resident, and marks its way as used.
     fn has(&mut self, line: u32) -> bool {
         self.cache.lookup(line) && !self.in_flight.lines.contains_key(&line)
     }
@@ -76,7 +74,7 @@ struct PlainUnit {
     clock: u64,
     busy: bool,
     drained: bool,
-    /// When each is back at the first stage, and when its footprints are ready.
+    /// Cycle at which each thread re-enters the first stage, and its footprints' ready cycles.
     looping: VecDeque<(u64, Vec<u64>)>,
     open_slot: u32,
     useful: u64,
@@ -106,30 +104,33 @@ impl PlainUnit {
 
 struct PlainTimed {
     l1: Vec<PlainLevel>,
-    l2: PlainLevel,
+    /// One, or one per core.
+    l2: Vec<PlainLevel>,
+    l2_cycles: u64,
+    memory_cycles: u64,
     tmu: TmuConfig,
     counts: CacheCounts,
     units: Vec<PlainUnit>,
     cycles: u64,
-    /// When each MSHR of the L2 is free.
-    mshrs: Vec<u64>,
+    /// Cycle at which each MSHR of each L2 becomes free.
+    mshrs: Vec<Vec<u64>>,
     mshr_counts: MshrResult,
 }
 
 impl PlainTimed {
     fn new(config: &RunConfig, bins: &Bins) -> Self {
-        let Levels { l1, l2 } = Levels::build(config).unwrap();
-        let l1 = l1
-            .into_iter()
-            .map(|cache| PlainLevel::new(cache.into_box(), config.tmu.allocation));
+        let Caches { l1, l2 } = Caches::build(config).unwrap();
+        let plain = |cache: AnyCache| PlainLevel::new(cache.into_box(), config.tmu.allocation);
         Self {
-            l1: l1.collect(),
-            l2: PlainLevel::new(l2.into_box(), config.tmu.allocation),
+            mshrs: vec![vec![0; config.tmu.l2_mshrs as usize]; l2.len()],
+            l1: l1.into_iter().map(plain).collect(),
+            l2: l2.into_iter().map(plain).collect(),
+            l2_cycles: config.level.l2.hit_cycles.into(),
+            memory_cycles: config.memory_cycles.into(),
             tmu: config.tmu,
             counts: CacheCounts::new(bins, config.tile_maps),
             units: (0..config.cores).map(|_| PlainUnit::default()).collect(),
             cycles: 0,
-            mshrs: vec![0; config.tmu.l2_mshrs as usize],
             mshr_counts: MshrResult::default(),
         }
     }
@@ -137,7 +138,8 @@ impl PlainTimed {
     fn start(&mut self, core: usize, quad: &QuadLines<'_>) {
         let now = self.units[core].clock;
         self.l1[core].arrive(now);
-        self.l2.arrive(now);
+        let own = core.min(self.l2.len() - 1);
+        self.l2[own].arrive(now);
         let (mut pending, mut fetches) = (Vec::new(), 0);
         for footprint in quad.footprints() {
             for _ in 0..=footprint.repeats {
@@ -178,43 +180,45 @@ impl PlainTimed {
         let tmu = &self.tmu;
         let trip = *fetches / u64::from(tmu.fetches_per_trip);
         *fetches += 1;
-        let instant = tmu.l1_penalty_cycles == 0 && tmu.l2_penalty_cycles == 0;
+        let instant = self.l2_cycles == 0 && self.memory_cycles == 0;
+        let own = core.min(self.l2.len() - 1);
+        let (l2, mshrs) = (&mut self.l2[own], &mut self.mshrs[own]);
         let wait = if instant {
             0
         } else {
             trip * u64::from(tmu.loop_cycles)
         };
-        let in_l2 = if self.l2.has(line) {
+        let in_l2 = if l2.has(line) {
             now
-        } else if let Some(&arrival) = self.l2.in_flight.lines.get(&line) {
+        } else if let Some(&arrival) = l2.in_flight.lines.get(&line) {
             misses.l2_secondary += 1;
             arrival
         } else {
             misses.l2_lines += 1;
             let mut start = now;
-            if let Some(first) = (0..self.mshrs.len()).min_by_key(|&slot| self.mshrs[slot]) {
-                start = now.max(self.mshrs[first]);
+            if let Some(first) = (0..mshrs.len()).min_by_key(|&slot| mshrs[slot]) {
+                start = now.max(mshrs[first]);
                 self.mshr_counts.stalled_misses += u64::from(start > now);
                 self.mshr_counts.stall_cycles += start - now;
-                self.mshrs[first] = start + u64::from(tmu.l2_penalty_cycles);
-                let in_use = self.mshrs.iter().filter(|&&free| free > start).count();
-                // A miss that takes no time uses one as well; one that waited takes the place of another.
+                mshrs[first] = start + self.memory_cycles;
+                let in_use = mshrs.iter().filter(|&&free| free > start).count();
+                // A miss without latency occupies an MSHR as well; one that waited replaces another.
                 let in_use = match start > now {
-                    true => self.mshrs.len(),
-                    false => in_use + usize::from(tmu.l2_penalty_cycles == 0),
+                    true => mshrs.len(),
+                    false => in_use + usize::from(self.memory_cycles == 0),
                 };
                 self.mshr_counts.peak = self.mshr_counts.peak.max(in_use as u64);
             }
-            let arrival = start + u64::from(tmu.l2_penalty_cycles);
-            self.l2.enter(line, now, arrival);
+            let arrival = start + self.memory_cycles;
+            l2.enter(line, now, arrival);
             arrival
         };
-        let in_l1 = in_l2 + u64::from(tmu.l1_penalty_cycles) + wait;
+        let in_l1 = in_l2 + self.l2_cycles + wait;
         l1.enter(line, now, in_l1);
         in_l1
     }
 
-    /// What the core's first stage does next.
+    /// Advances the core's first stage.
     fn turn(
         &mut self,
         core: usize,
@@ -254,6 +258,7 @@ impl Machine for PlainTimed {
         work: &mut Cores<'_>,
         phases: &[Phase],
         assign: Assign,
+        _clients: Option<&mut FrameClients<'_>>,
     ) -> Result<(), StreamError> {
         let cores = self.units.len();
         for phase in phases {
@@ -261,7 +266,7 @@ impl Machine for PlainTimed {
                 (unit.busy, unit.drained) = (true, false);
                 unit.clock = unit.clock.max(self.cycles);
             }
-            // Static: the core's items are every so many; first idle: the next of all.
+            // Static: every n-th item belongs to the core. First idle: the next item of all.
             let mut next: Vec<usize> = match assign {
                 Assign::FirstIdle => vec![0],
                 Assign::Static => (0..cores).collect(),
@@ -286,8 +291,8 @@ impl Machine for PlainTimed {
     }
 
     fn flush(&mut self) {
-        self.mshrs.fill(0);
-        for level in self.l1.iter_mut().chain([&mut self.l2]) {
+        self.mshrs.iter_mut().for_each(|mshrs| mshrs.fill(0));
+        for level in self.l1.iter_mut().chain(&mut self.l2) {
             level.cache.clear();
             level.in_flight = PlainInFlight::default();
         }
@@ -310,11 +315,12 @@ impl Machine for PlainTimed {
                 loops: sum(|unit| unit.loops),
             }),
             cycles: Some(self.cycles),
-            path: MissPathResult {
-                mshrs: (self.tmu.l2_mshrs > 0).then_some(self.mshr_counts),
-                ..MissPathResult::default()
+            memory: MemoryResult {
+                l2_mshrs: (self.tmu.l2_mshrs > 0).then_some(self.mshr_counts),
+                ..MemoryResult::default()
             },
             timeline: None,
+            first_lookups: None,
         }
     }
 }
@@ -350,16 +356,17 @@ fn the_fast_machine_agrees_with_the_plain_one_cycle_by_cycle() {
             cache.sectors = random.of(&[1, 1, 1, 4]);
             cache.size_bytes *= u64::from(cache.sectors);
         }
+        let mut level = Levels::two(l1, l2);
+        level.l2.hit_cycles = random.of(&[0, 1, 20, 20, 300]);
+        level.l2.shared = random.of(&[true, true, false]);
         let config = RunConfig {
             mode: Mode::Timed,
             order: random.of(&orders),
             cores: random.of(&[1, 2, 2, 3, 5]),
             assign: random.of(&[Assign::FirstIdle, Assign::Static]),
-            l1,
-            l2,
+            level,
+            memory_cycles: random.of(&[0, 7, 200, 200, 9000]),
             tmu: TmuConfig {
-                l1_penalty_cycles: random.of(&[0, 1, 20, 20, 300]),
-                l2_penalty_cycles: random.of(&[0, 7, 200, 200, 9000]),
                 loop_cycles: random.of(&[1, 36, 64, 64, 5000]),
                 threads: random.of(&[1, 4, 64, 64, 300]),
                 retry_footprints: random.of(&[1, 4, 4, 5]),
@@ -390,20 +397,15 @@ fn compiled_and_general_caches_agree() {
         mode: Mode::Timed,
         ..functional(Order::Z2_STA)
     };
-    let Levels { l1, l2 } = Levels::build(&config).unwrap();
-    let pointers = Levels {
-        l1: l1.into_iter().map(AnyCache::into_box).collect(),
-        l2: l2.into_box(),
-    };
     let counts = CacheCounts::new(&Bins::new(&trace.tables, CountBy::Texture).unwrap(), false);
-    let mut general = Timed::new(
-        pointers,
-        config.tmu,
+    let general = threads::machine_of(
+        &config,
+        Caches::build(&config).unwrap().boxed(),
         counts,
-        crate::cache::MissPath::build(&config).unwrap(),
+        None,
     );
     assert_eq!(
-        alone(&trace, &config, &mut general),
+        alone(&trace, &config, &mut *general.unwrap()),
         replay(&trace, &config).unwrap()
     );
 }

@@ -1,13 +1,14 @@
 //! The texture unit with a prefetching FIFO.
 
 use super::*;
-use crate::config::TmuConfig;
+use crate::config::{TmuConfig, TmuModel};
 
 fn config(fifo_footprints: u32, cores: u32) -> RunConfig {
     RunConfig {
-        mode: Mode::PrefetchFifo,
+        mode: Mode::Timed,
         cores,
         tmu: TmuConfig {
+            model: TmuModel::PrefetchFifo,
             fifo_footprints,
             ..TmuConfig::default()
         },
@@ -15,8 +16,8 @@ fn config(fifo_footprints: u32, cores: u32) -> RunConfig {
     }
 }
 
-/// With room for one footprint nothing is in flight at the next one, so one core misses exactly what it misses without latencies. In a
-/// longer FIFO, a line that is evicted in flight is not requested again.
+/// With a FIFO of one footprint, nothing is in flight at the next look-up, so one core has exactly the
+/// misses of functional mode. With a longer FIFO, a line evicted in flight is not requested again.
 #[test]
 fn one_core_misses_what_functional_mode_misses() {
     let trace = small();
@@ -37,20 +38,20 @@ fn one_core_misses_what_functional_mode_misses() {
     }
 }
 
-/// With room for one footprint, each waits for the slowest of its lines.
+/// With a FIFO of one footprint, each waits for the slowest of its lines.
 #[test]
 fn a_fifo_of_one_footprint_hides_nothing() {
     let trace = small();
     let mut one = config(1, 1);
-    one.tmu.l2_penalty_cycles = 0;
+    one.memory_cycles = 0;
     let result = replay(&trace, &one).unwrap();
-    // A miss takes 20 cycles, a hit one; none is in flight when the next footprint is looked up.
+    // A miss takes 20 cycles, a hit one. Nothing is in flight at the next look-up.
     let expected = result.footprints + 19 * result.l1.counters.footprint_misses;
     assert_eq!(result.cycles, Some(expected));
     assert_eq!(result.l1.counters.secondary_misses, 0);
 }
 
-/// A FIFO longer than the latency of a miss hides it: cycles are those of the footprints, and those of the last miss at most.
+/// A FIFO longer than the miss latency hides it: the cycles are one per footprint plus at most the last miss.
 #[test]
 fn a_long_fifo_hides_every_latency() {
     let trace = small();

@@ -1,4 +1,4 @@
-//! The record of which core works on which tiles when.
+//! Tests the record of the tiles that each core works on over time.
 
 use super::*;
 use crate::config::Assign;

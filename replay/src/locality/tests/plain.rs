@@ -1,12 +1,12 @@
-//! The plainest programs for each figure.
+//! The plainest implementation of each figure.
 
 use super::Access;
-use crate::cache::AnyCache;
 use crate::locality::{ByOrigin, MissSplit, Origin, StreamCache, WorkingSet};
+use crate::memory::AnyCache;
 use formats::view::Eye;
 use std::collections::{HashMap, HashSet};
 
-/// Of every access, where the use before was.
+/// Location of the previous use, for every access.
 pub fn origins(stream: &[Access]) -> Vec<Option<Origin>> {
     let mut last: HashMap<u32, Access> = HashMap::new();
     let origin = |access: &Access| {
@@ -27,7 +27,7 @@ pub fn origins(stream: &[Access]) -> Vec<Option<Origin>> {
     stream.iter().map(origin).collect()
 }
 
-/// The accesses that `which` marks, by where the use before was.
+/// The accesses marked in `which`, by location of the previous use.
 pub fn by_origin(origins: &[Option<Origin>], which: &[bool]) -> ByOrigin {
     let mut counts = ByOrigin::default();
     for (origin, _) in origins.iter().zip(which).filter(|(_, which)| **which) {
@@ -36,7 +36,7 @@ pub fn by_origin(origins: &[Option<Origin>], which: &[bool]) -> ByOrigin {
     counts
 }
 
-/// Stack distances by a list in order of last use.
+/// Stack distances, from a list in order of last use.
 pub fn distances(lines: &[u32]) -> Vec<Option<u64>> {
     let mut stack: Vec<u32> = Vec::new();
     let distance = |line: &u32| {
@@ -67,7 +67,7 @@ pub fn lru(lines: &[u32], sets: u32, ways: u32) -> Vec<bool> {
     lines.iter().map(access).collect()
 }
 
-/// Hits of Belady's cache: a miss drops the line whose next use is furthest.
+/// Hits of Belady's cache: a miss evicts the line whose next use is furthest in the future.
 pub fn opt(lines: &[u32], sets: u32, ways: u32) -> Vec<bool> {
     let mut cache: Vec<Vec<u32>> = vec![Vec::new(); sets as usize];
     let access = |(now, line): (usize, &u32)| {
@@ -97,7 +97,7 @@ pub fn policy(lines: &[u32], of: StreamCache) -> Vec<bool> {
     lines.iter().map(|&line| cache.access(line)).collect()
 }
 
-/// The split of a cache's misses, from its hits and those of the fully associative one.
+/// The split of a cache's misses, given its hits and those of the fully associative cache.
 pub fn split(origins: &[Option<Origin>], own: &[bool], all: &[bool]) -> MissSplit {
     let pairs = || own.iter().zip(all).zip(origins);
     let count = |of_own: bool, of_all: bool| {
@@ -115,9 +115,9 @@ pub fn split(origins: &[Option<Origin>], own: &[bool], all: &[bool]) -> MissSpli
     }
 }
 
-/// Distinct lines of all stretches of tiles, by going through all of them.
+/// Distinct lines of all windows of tiles, enumerated.
 pub fn working_sets(stream: &[Access]) -> Vec<WorkingSet> {
-    // The accesses in whose item each tile's time lies.
+    // The accesses of the item at each tile's time.
     let mut clock: Vec<&[Access]> = Vec::new();
     let new_item = |a: &Access, b: &Access| (a.frame, a.place.item) == (b.frame, b.place.item);
     for item in stream.chunk_by(new_item) {
@@ -150,7 +150,7 @@ pub fn working_sets(stream: &[Access]) -> Vec<WorkingSet> {
     curve
 }
 
-/// Distinct lines of every frame, of both eyes in one frame, and of earlier frames, too.
+/// Distinct lines per frame, of both eyes in a frame, and of earlier frames as well.
 pub fn frame_lines(stream: &[Access]) -> [u64; 3] {
     let (mut counts, mut earlier) = ([0; 3], HashSet::new());
     for frame in stream.chunk_by(|a, b| a.frame == b.frame) {

@@ -1,81 +1,90 @@
-//! One channel: its queue, its banks, and when each command may be issued.
+//! A DRAM channel: its queues, its banks and the earliest clock of each command.
 
 use super::PagePolicy;
 use super::mapping::Place;
 use super::presets::Device;
 use std::collections::VecDeque;
 
-/// What a channel counts.
+/// Counts of a channel.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Counts {
     /// Reads.
     pub reads: u64,
-    /// Reads whose row was open when the scheduler first saw the request, or was opened for an earlier one.
+    /// Reads whose row was open when first scheduled, or was opened for an earlier request.
     pub row_hits: u64,
-    /// Reads that had to open a row in a bank without one.
+    /// Reads that opened a row in a bank without an open row.
     pub row_empty: u64,
-    /// Reads that had to close another row first.
+    /// Reads that first had to close another row.
     pub row_conflicts: u64,
     /// Rows opened.
     pub activates: u64,
+    /// Writes.
+    pub writes: u64,
+    /// Writes whose row was open.
+    pub write_row_hits: u64,
     /// Refreshes of all banks.
     pub refreshes: u64,
-    /// Clock at which the last data was there.
+    /// Clock of the last data.
     pub end: u64,
-    /// Requests by their latency in clocks, arrival to last data.
+    /// Histogram of read latencies in clocks, from arrival to last data.
     pub latencies: Vec<u64>,
 }
 
-/// A request in the queue.
+/// A queued request.
 #[derive(Clone, Copy, Debug)]
 struct Request {
     place: Place,
     arrival: u64,
-    /// The first command that it needed.
+    /// The first command it needed.
     needed: Option<Needed>,
 }
 
-/// What a request found.
+/// The next command of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Needed {
-    Read,
+    /// A read or a write.
+    Data,
     Activate,
     Precharge,
 }
 
-/// A bank: its open row, and the clocks from which on commands may be issued.
+/// A bank: its open row and the earliest clock of each command.
 #[derive(Clone, Copy, Debug, Default)]
 struct Bank {
     row: Option<u64>,
-    read_from: u64,
+    data_from: u64,
     activate_from: u64,
     precharge_from: u64,
 }
 
-/// A channel.
+/// A DRAM channel.
 #[derive(Clone, Debug)]
 pub struct Channel {
     device: Device,
     capacity: usize,
     policy: PagePolicy,
     banks: Vec<Bank>,
-    /// By group.
+    /// Per bank group.
     read_from: Vec<u64>,
+    write_from: Vec<u64>,
     activate_from: Vec<u64>,
-    /// Clocks of the last four activates.
+    /// Clocks of the last four activates (tFAW window).
     window: VecDeque<u64>,
-    queue: Vec<Request>,
-    /// Those that found the queue full, and no time where none was given.
-    backlog: VecDeque<(Place, Option<u64>)>,
-    /// The next clock that has no command.
+    reads: Vec<Request>,
+    writes: Vec<Request>,
+    /// True while writes are served.
+    is_writing: bool,
+    /// Requests that found their queue full: place, true for writes, and arrival clock if given.
+    backlog: VecDeque<(Place, bool, Option<u64>)>,
+    /// The next free clock of the command bus.
     now: u64,
     refresh_due: u64,
-    /// What was counted.
+    /// Counts so far.
     pub counts: Counts,
 }
 
 impl Channel {
-    /// All banks closed.
+    /// A channel with all banks closed.
     pub fn new(device: Device, capacity: usize, policy: PagePolicy) -> Self {
         let groups = device.groups as usize;
         Self {
@@ -84,9 +93,12 @@ impl Channel {
             policy,
             banks: vec![Bank::default(); device.banks() as usize],
             read_from: vec![0; groups],
+            write_from: vec![0; groups],
             activate_from: vec![0; groups],
             window: VecDeque::with_capacity(4),
-            queue: Vec::with_capacity(capacity),
+            reads: Vec::with_capacity(capacity),
+            writes: Vec::new(),
+            is_writing: false,
             backlog: VecDeque::new(),
             now: 0,
             refresh_due: u64::from(device.refi),
@@ -94,13 +106,18 @@ impl Channel {
         }
     }
 
-    /// A request arrives at a clock, or as soon as there is room.
-    pub fn arrive(&mut self, place: Place, clock: Option<u64>) {
+    /// The next free clock of the command bus.
+    pub fn now(&self) -> u64 {
+        self.now
+    }
+
+    /// Adds a request that arrives at `clock`, or without one as soon as the queue has room.
+    pub fn arrive(&mut self, place: Place, write: bool, clock: Option<u64>) {
         if let Some(clock) = clock {
-            // What the channel does before is not changed by what comes later.
-            while !self.queue.is_empty() && self.step(Some(clock)) {}
-            if self.queue.is_empty() {
-                // Idle until now, but for refreshes.
+            // Later requests cannot change earlier commands.
+            while self.is_busy() && self.step(Some(clock)) {}
+            if !self.is_busy() {
+                // The channel was idle; only refreshes happened.
                 while self.refresh_due <= clock {
                     self.now = self.now.max(self.refresh_due);
                     self.refresh();
@@ -108,49 +125,80 @@ impl Channel {
                 self.now = self.now.max(clock);
             }
         } else {
-            while self.queue.len() >= self.capacity {
+            while self.queue(write).len() >= self.capacity || !self.backlog.is_empty() {
                 self.step(None);
             }
         }
-        self.backlog.push_back((place, clock));
+        self.backlog.push_back((place, write, clock));
         self.admit();
     }
 
-    /// Answers everything that is queued.
+    fn is_busy(&self) -> bool {
+        !(self.reads.is_empty() && self.writes.is_empty())
+    }
+
+    fn queue(&mut self, write: bool) -> &mut Vec<Request> {
+        match write {
+            true => &mut self.writes,
+            false => &mut self.reads,
+        }
+    }
+
+    /// The queue being served.
+    fn served(&self) -> &[Request] {
+        match self.is_writing {
+            true => &self.writes,
+            false => &self.reads,
+        }
+    }
+
+    /// Switches between reads and writes when the queue levels require it.
+    fn turn(&mut self) {
+        let writes = self.writes.len();
+        self.is_writing = match self.is_writing {
+            false => 5 * writes > 4 * self.capacity || (self.reads.is_empty() && writes > 0),
+            true => writes > 0 && (5 * writes >= self.capacity || self.reads.is_empty()),
+        };
+    }
+
+    /// Serves all queued requests.
     pub fn drain(&mut self) {
-        while !self.queue.is_empty() {
+        while self.is_busy() {
             self.step(None);
         }
     }
 
-    /// Requests enter the queue while there is room.
+    /// Moves requests from the backlog into the queues while there is room.
     fn admit(&mut self) {
-        while self.queue.len() < self.capacity
-            && let Some((place, clock)) = self.backlog.pop_front()
+        while let Some(&(place, write, clock)) = self.backlog.front()
+            && self.queue(write).len() < self.capacity
         {
-            self.queue.push(Request {
+            self.backlog.pop_front();
+            let arrival = clock.unwrap_or(self.now);
+            self.queue(write).push(Request {
                 place,
-                arrival: clock.unwrap_or(self.now),
+                arrival,
                 needed: None,
             });
         }
     }
 
-    /// Issues the next command, if it comes before `until`; says whether it did.
+    /// Issues the next command if it comes before `until`. Returns whether it did.
     fn step(&mut self, until: Option<u64>) -> bool {
         let before = |clock: u64| until.is_none_or(|until| clock < until);
         if self.now >= self.refresh_due {
             self.refresh();
             return true;
         }
+        self.turn();
         let mut best: Option<(u64, bool, usize, Needed)> = None;
-        for (index, request) in self.queue.iter().enumerate() {
+        for (index, request) in self.served().iter().enumerate() {
             let Some((from, needed)) = self.next_command(request) else {
                 continue;
             };
             let from = from.max(self.now).max(request.arrival);
-            let other = needed != Needed::Read;
-            // The queue is in the order of arrival.
+            let other = needed != Needed::Data;
+            // The queue is in order of arrival, so the older request wins a tie.
             if best.is_none_or(|(clock, is_other, ..)| (from, other) < (clock, is_other)) {
                 best = Some((from, other, index, needed));
             }
@@ -166,32 +214,37 @@ impl Channel {
             return false;
         }
         self.now = clock + 1;
-        self.queue[index].needed.get_or_insert(needed);
-        let place = self.queue[index].place;
+        let write = self.is_writing;
+        let request = &mut self.queue(write)[index];
+        request.needed.get_or_insert(needed);
+        let place = request.place;
         match needed {
             Needed::Precharge => self.precharge(place.bank as usize, clock),
             Needed::Activate => self.activate(place, clock),
-            Needed::Read => self.read(index, clock),
+            Needed::Data => self.transfer(index, clock),
         }
         true
     }
 
-    /// The next command of a request and the clock from which on it may be issued; none while a row that others read
-    /// is open in its bank.
+    /// The next command of a request and its earliest clock. None while queued requests still need
+    /// the bank's open row.
     fn next_command(&self, request: &Request) -> Option<(u64, Needed)> {
         let Place {
             bank, group, row, ..
         } = request.place;
         let (bank_state, group) = (&self.banks[bank as usize], group as usize);
         match bank_state.row {
-            Some(open) if open == row => Some((
-                bank_state.read_from.max(self.read_from[group]),
-                Needed::Read,
-            )),
+            Some(open) if open == row => {
+                let of_bus = match self.is_writing {
+                    true => self.write_from[group],
+                    false => self.read_from[group],
+                };
+                Some((bank_state.data_from.max(of_bus), Needed::Data))
+            }
             Some(open) => {
                 let is_wanted =
                     |other: &Request| other.place.bank == bank && other.place.row == open;
-                (!self.queue.iter().any(is_wanted))
+                (!self.served().iter().any(is_wanted))
                     .then_some((bank_state.precharge_from, Needed::Precharge))
             }
             None => {
@@ -215,7 +268,7 @@ impl Channel {
         let device = &self.device;
         let bank = &mut self.banks[place.bank as usize];
         bank.row = Some(place.row);
-        bank.read_from = clock + u64::from(device.rcd);
+        bank.data_from = clock + u64::from(device.rcd);
         bank.precharge_from = clock + u64::from(device.ras);
         for (group, from) in (0..).zip(&mut self.activate_from) {
             let gap = if group == place.group {
@@ -232,44 +285,72 @@ impl Channel {
         self.counts.activates += 1;
     }
 
-    fn read(&mut self, index: usize, clock: u64) {
-        let device = self.device;
-        let request = self.queue.remove(index);
+    /// Reads or writes the burst of a request.
+    fn transfer(&mut self, index: usize, clock: u64) {
+        let (device, write) = (self.device, self.is_writing);
+        let request = self.queue(write).remove(index);
         let place = request.place;
-        for (group, from) in (0..).zip(&mut self.read_from) {
-            let gap = if group == place.group {
-                device.ccd_l
-            } else {
-                device.ccd_s
+        let burst = u64::from(device.burst);
+        let latency = u64::from(if write { device.cwl } else { device.cl });
+        let data = clock + latency + burst;
+        for group in 0..device.groups as usize {
+            let is_same = group == place.group as usize;
+            let [ccd, wtr] = match is_same {
+                true => [device.ccd_l, device.wtr_l],
+                false => [device.ccd_s, device.wtr_s],
             };
-            *from = (*from).max(clock + u64::from(gap.max(device.burst)));
+            let same_way = clock + u64::from(ccd.max(device.burst));
+            let other_way = match write {
+                true => data + u64::from(wtr),
+                // The data bus needs two idle clocks when it changes direction.
+                false => (data + 2).saturating_sub(u64::from(device.cwl)),
+            };
+            let [reads, writes] = match write {
+                true => [other_way, same_way],
+                false => [same_way, other_way],
+            };
+            self.read_from[group] = self.read_from[group].max(reads);
+            self.write_from[group] = self.write_from[group].max(writes);
         }
         let bank = &mut self.banks[place.bank as usize];
-        bank.precharge_from = bank.precharge_from.max(clock + u64::from(device.rtp));
-        let data = clock + u64::from(device.cl) + u64::from(device.burst);
+        let recovered = match write {
+            true => data + u64::from(device.wr),
+            false => clock + u64::from(device.rtp),
+        };
+        bank.precharge_from = bank.precharge_from.max(recovered);
+        self.count(&request, data);
+        self.admit();
+        let wants =
+            |other: &Request| other.place.bank == place.bank && other.place.row == place.row;
+        if self.policy == PagePolicy::Closed && !self.reads.iter().chain(&self.writes).any(wants) {
+            // Auto-precharge belongs to the transfer and takes no slot on the command bus.
+            let from = self.banks[place.bank as usize].precharge_from;
+            self.precharge(place.bank as usize, from);
+        }
+    }
+
+    fn count(&mut self, request: &Request, data: u64) {
         let counts = &mut self.counts;
-        counts.reads += 1;
         counts.end = counts.end.max(data);
+        let is_hit = !matches!(request.needed, Some(Needed::Precharge | Needed::Activate));
+        if self.is_writing {
+            counts.writes += 1;
+            counts.write_row_hits += u64::from(is_hit);
+            return;
+        }
+        counts.reads += 1;
         match request.needed {
             Some(Needed::Precharge) => counts.row_conflicts += 1,
             Some(Needed::Activate) => counts.row_empty += 1,
             _ => counts.row_hits += 1,
         }
         let latency = (data - request.arrival) as usize;
-        // One bucket for what waited longer than any figure of interest.
+        // Very long latencies share one bucket.
         let latency = latency.min(LONGEST);
         if counts.latencies.len() <= latency {
             counts.latencies.resize(latency + 1, 0);
         }
         counts.latencies[latency] += 1;
-        self.admit();
-        let is_last = !(self.queue.iter())
-            .any(|other| other.place.bank == place.bank && other.place.row == place.row);
-        if self.policy == PagePolicy::Closed && is_last {
-            // With the read, as auto-precharge: it takes no command of its own.
-            let from = self.banks[place.bank as usize].precharge_from;
-            self.precharge(place.bank as usize, from);
-        }
     }
 
     /// Closes all rows and refreshes all banks.
@@ -291,5 +372,5 @@ impl Channel {
     }
 }
 
-/// Latencies beyond this many clocks count as this many.
+/// Latencies above this many clocks count as this many.
 const LONGEST: usize = 1 << 20;

@@ -1,39 +1,38 @@
-//! From addresses to channel, bank, row and column.
+//! Address mapping: bursts to channel, bank, row and column.
 
 use super::presets::Device;
 use serde::{Deserialize, Serialize};
 
-/// Bits of a burst's number, from the highest to the lowest.
+/// Assignment of a burst number's bits, highest to lowest.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Mapping {
-    /// Row, bank, column, channel: bursts that follow each other take turns at the channels, and a row holds what lies
-    /// together.
+    /// Row, bank, column, channel: consecutive bursts alternate between channels, and a row holds adjacent bursts.
     #[default]
     RowBankColumnChannel,
-    /// Row, column, bank, channel: bursts that follow each other lie in different banks.
+    /// Row, column, bank, channel: consecutive bursts lie in different banks.
     RowColumnBankChannel,
-    /// As the default, the bank combined with the row's lowest bits (XOR), so that rows that lie apart by a power of two
-    /// differ in bank.
+    /// As the default, with the bank XORed with the lowest row bits, so that rows a power of two
+    /// apart lie in different banks.
     RowBankXorColumnChannel,
 }
 
-/// Where a burst lies.
+/// Location of a burst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     /// Channel.
     pub channel: u32,
     /// Bank group.
     pub group: u32,
-    /// Bank of the channel, over all groups.
+    /// Bank of the channel, counted over all groups.
     pub bank: u32,
     /// Row.
     pub row: u64,
 }
 
-/// Bits of each part.
+/// Number of bits of each part.
 #[derive(Clone, Copy, Debug)]
 pub struct Mapper {
     mapping: Mapping,
@@ -44,7 +43,7 @@ pub struct Mapper {
 }
 
 impl Mapper {
-    /// For so many channels of a device.
+    /// The mapping for this number of channels of a device.
     pub const fn new(mapping: Mapping, channels: u32, device: &Device) -> Self {
         Self {
             mapping,
@@ -55,7 +54,7 @@ impl Mapper {
         }
     }
 
-    /// Where the burst of a number lies.
+    /// The location of a burst.
     pub const fn place(&self, burst: u64) -> Place {
         let mut rest = burst;
         let channel = take(&mut rest, self.channel_bits);
@@ -77,7 +76,7 @@ impl Mapper {
         };
         Place {
             channel,
-            // Banks that follow each other lie in different groups, as reads of different groups are closest.
+            // Consecutive banks lie in different groups, because reads of different groups can follow most closely.
             group: bank % self.groups,
             bank,
             row,
@@ -85,7 +84,7 @@ impl Mapper {
     }
 }
 
-/// The lowest bits, which are then gone.
+/// Removes and returns the lowest bits.
 const fn take(rest: &mut u64, bits: u32) -> u32 {
     let low = *rest & ((1 << bits) - 1);
     *rest >>= bits;

@@ -1,10 +1,14 @@
-//! DRAM: what the lines that leave the last cache cost in row activations, time and energy.
+//! DRAM model: row activations, time and energy of the lines that miss the last cache level.
 //!
-//! The model is open loop: requests arrive when the caches ask for them, and the caches' own latency
-//! ([`crate::config::TmuConfig::l2_penalty_cycles`]) stays what it is. Requests are reads of whole bursts.
+//! The model is open-loop: requests arrive when the caches issue them, and the caches' own memory
+//! latency (`memory_cycles`) does not change. Requests read or write whole bursts.
 //!
-//! A channel schedules as FR-FCFS (Rixner et al., ISCA 2000): of the commands that may be issued first, reads of open
-//! rows go before others, and older requests before younger ones. A row is closed only when no queued request reads it.
+//! Writes have their own queue. A channel switches to writes when that queue is four fifths full or
+//! no read waits, and back to reads when it is down to one fifth, as in Ramulator.
+//!
+//! The scheduler is FR-FCFS (Rixner et al., ISCA 2000): of the commands that can be issued first,
+//! accesses to open rows take precedence, then older requests. A row is closed only when no queued
+//! request needs it.
 
 mod channel;
 mod mapping;
@@ -21,16 +25,16 @@ use channel::Channel;
 use mapping::Mapper;
 use serde::{Deserialize, Serialize};
 
-/// What becomes of a row after its last queued read.
+/// What happens to a row after its last queued access.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum PagePolicy {
-    /// It stays open until another row of its bank is wanted.
+    /// It stays open until a request needs another row of its bank.
     #[default]
     Open,
-    /// It is closed at once.
+    /// It is closed immediately.
     Closed,
 }
 
@@ -38,17 +42,17 @@ pub enum PagePolicy {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DramConfig {
-    /// Device, with the timings of its standard.
+    /// Device and timings.
     pub preset: DramPreset,
-    /// Channels, a power of two.
+    /// Number of channels, a power of two.
     pub channels: u32,
-    /// Which bits of an address are channel, bank, row and column.
+    /// Which address bits select channel, bank, row and column.
     pub mapping: Mapping,
-    /// What becomes of a row that no queued request reads.
+    /// What happens to a row that no queued request needs.
     pub page_policy: PagePolicy,
-    /// Requests that a channel's scheduler sees at a time; others wait in the order of arrival.
+    /// Requests visible to a channel's scheduler; further requests wait in order of arrival.
     pub queue: u32,
-    /// Clock of the GPU, whose cycles the requests' times are, MHz.
+    /// GPU clock in MHz. Request times are in GPU cycles.
     pub core_mhz: u32,
 }
 
@@ -65,26 +69,7 @@ impl Default for DramConfig {
     }
 }
 
-impl DramConfig {
-    /// The first value out of range: its key, what is accepted and what was found.
-    ///
-    /// # Errors
-    /// See above.
-    pub fn check(&self) -> Result<(), (&'static str, &'static str, u32)> {
-        if !self.channels.is_power_of_two() || self.channels > 64 {
-            return Err(("dram.channels", "a power of two up to 64", self.channels));
-        }
-        if !(1..=1024).contains(&self.queue) {
-            return Err(("dram.queue", "1 to 1024", self.queue));
-        }
-        if !(1..=100_000).contains(&self.core_mhz) {
-            return Err(("dram.core_mhz", "1 to 100000", self.core_mhz));
-        }
-        Ok(())
-    }
-}
-
-/// The channels of a memory.
+/// A memory of several channels.
 #[derive(Clone, Debug)]
 pub struct Dram {
     config: DramConfig,
@@ -93,12 +78,14 @@ pub struct Dram {
     channels: Vec<Channel>,
     line_bytes: u32,
     requests: u64,
-    /// Clock of the last request that had a time.
+    /// Clock of the last request with a time.
     last: u64,
+    /// Clocks spent on requests without a time, which the GPU's cycles do not include.
+    late_by: u64,
 }
 
 impl Dram {
-    /// All rows closed. Lines have so many bytes.
+    /// A memory with all rows closed, accessed in lines of `line_bytes`.
     #[must_use]
     pub fn new(config: &DramConfig, line_bytes: u32) -> Self {
         let device = config.preset.device();
@@ -111,30 +98,42 @@ impl Dram {
             line_bytes,
             requests: 0,
             last: 0,
+            late_by: 0,
         }
     }
 
-    /// A line is asked for at a cycle of the GPU; one before the last request's counts as that. Without a time it arrives
-    /// as soon as the channel's queue has a place.
+    /// Reads a line at a GPU cycle, but not before the last request. Without a cycle, the read
+    /// arrives as soon as the channel's queue has room.
     pub fn read(&mut self, line: u32, cycle: Option<u64>) {
-        self.requests += 1;
-        let first = u64::from(line) * u64::from(self.line_bytes);
-        let last = first + u64::from(self.line_bytes) - 1;
+        let bytes = self.line_bytes.into();
+        self.request(u64::from(line) * bytes, bytes, false, cycle);
+    }
+
+    /// Reads or writes bytes, line by line.
+    pub fn request(&mut self, address: u64, bytes: u64, write: bool, cycle: Option<u64>) {
+        self.requests += bytes.div_ceil(self.line_bytes.into());
         let burst = u64::from(self.device.burst_bytes);
         let clock = cycle.map(|cycle| {
             let ps = u128::from(cycle) * 1_000_000 / u128::from(self.config.core_mhz);
-            self.last = self
-                .last
-                .max((ps / u128::from(self.device.clock_ps)) as u64);
+            let clock = (ps / u128::from(self.device.clock_ps)) as u64 + self.late_by;
+            self.last = self.last.max(clock);
             self.last
         });
-        for number in first / burst..=last / burst {
+        for number in address / burst..=(address + bytes - 1) / burst {
             let place = self.mapper.place(number);
-            self.channels[place.channel as usize].arrive(place, clock);
+            self.channels[place.channel as usize].arrive(place, write, clock);
         }
     }
 
-    /// What was counted, all requests answered.
+    /// Delays all requests from `cycle` on by the time that requests without a time have taken.
+    pub fn catch_up(&mut self, cycle: u64) {
+        let ps = u128::from(cycle) * 1_000_000 / u128::from(self.config.core_mhz);
+        let clock = (ps / u128::from(self.device.clock_ps)) as u64;
+        let now = self.channels.iter().map(Channel::now).max().unwrap_or(0);
+        self.late_by = self.late_by.max(now.saturating_sub(clock));
+    }
+
+    /// Serves all requests and returns the counts.
     #[must_use]
     pub fn result(&self) -> DramResult {
         let mut channels = self.channels.clone();

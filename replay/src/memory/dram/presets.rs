@@ -1,11 +1,11 @@
-//! Devices and their timings.
+//! DRAM devices and their timings.
 //!
-//! Timings are in clocks of the command bus, after the speed bins of the standards. Energies are those of typical
-//! data sheets, to one digit: use them to compare, not as a level.
+//! Timings are in clocks of the command bus and follow the speed bins of the standards. Energies
+//! are typical data-sheet values to one digit: suitable for comparison, not as absolute values.
 
 use serde::{Deserialize, Serialize};
 
-/// A device by name.
+/// A named device.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
@@ -27,19 +27,19 @@ pub enum DramPreset {
 pub struct Device {
     /// Name of the standard and speed.
     pub name: &'static str,
-    /// Bytes of a read.
+    /// Bytes per burst.
     pub burst_bytes: u32,
-    /// Bytes of an open row of the channel.
+    /// Bytes per row of the channel.
     pub row_bytes: u32,
-    /// Bank groups, a power of two; 1 where there are none.
+    /// Bank groups, a power of two; 1 for devices without groups.
     pub groups: u32,
-    /// Banks of a group, a power of two.
+    /// Banks per group, a power of two.
     pub banks_of_group: u32,
-    /// Length of a clock, picoseconds.
+    /// Clock period in picoseconds.
     pub clock_ps: u32,
-    /// Clocks of data of a read.
+    /// Clocks of data per burst.
     pub burst: u32,
-    /// Read to its first data.
+    /// Read to first data.
     pub cl: u32,
     /// Activate to read.
     pub rcd: u32,
@@ -49,32 +49,42 @@ pub struct Device {
     pub ras: u32,
     /// Read to precharge.
     pub rtp: u32,
-    /// Read to read, another group.
+    /// Write to first data.
+    pub cwl: u32,
+    /// Last data of a write to precharge.
+    pub wr: u32,
+    /// Last data of a write to a read of another group.
+    pub wtr_s: u32,
+    /// Last data of a write to a read of the same group.
+    pub wtr_l: u32,
+    /// Read to read of another group.
     pub ccd_s: u32,
-    /// Read to read, the same group.
+    /// Read to read of the same group.
     pub ccd_l: u32,
-    /// Activate to activate, another group.
+    /// Activate to activate in another group.
     pub rrd_s: u32,
-    /// Activate to activate, the same group.
+    /// Activate to activate in the same group.
     pub rrd_l: u32,
-    /// Window of four activates.
+    /// Window in which at most four activates are allowed.
     pub faw: u32,
-    /// Refresh of all banks.
+    /// Duration of a refresh of all banks.
     pub rfc: u32,
-    /// From one refresh to the next.
+    /// Interval between refreshes.
     pub refi: u32,
-    /// Activate and precharge of a row, nanojoules.
+    /// Energy of activating and precharging a row, in nanojoules.
     pub activate_nj: f64,
-    /// Reading and driving a burst, nanojoules.
+    /// Energy of reading and driving a burst, in nanojoules.
     pub read_nj: f64,
-    /// Refresh of all banks, nanojoules.
+    /// Energy of driving and writing a burst, in nanojoules.
+    pub write_nj: f64,
+    /// Energy of refreshing all banks, in nanojoules.
     pub refresh_nj: f64,
-    /// Standing by with open rows, milliwatts.
+    /// Standby power with open rows, in milliwatts.
     pub background_mw: f64,
 }
 
 impl Device {
-    /// Energy of reading a byte, where every second burst opens a row; standing by and refresh are left out.
+    /// Energy per byte read or written if every second burst opens a row. Excludes standby and refresh.
     #[must_use]
     pub fn pj_per_byte(&self) -> f64 {
         1000.0 * (self.read_nj + 0.5 * self.activate_nj) / f64::from(self.burst_bytes)
@@ -99,6 +109,10 @@ impl DramPreset {
                 rp: 29,
                 ras: 68,
                 rtp: 12,
+                cwl: 14,
+                wr: 29,
+                wtr_s: 16,
+                wtr_l: 16,
                 ccd_s: 8,
                 ccd_l: 8,
                 rrd_s: 16,
@@ -108,6 +122,7 @@ impl DramPreset {
                 refi: 6246,
                 activate_nj: 1.5,
                 read_nj: 1.3,
+                write_nj: 1.3,
                 refresh_nj: 30.0,
                 background_mw: 15.0,
             },
@@ -124,6 +139,10 @@ impl DramPreset {
                 rp: 15,
                 ras: 34,
                 rtp: 6,
+                cwl: 11,
+                wr: 28,
+                wtr_s: 5,
+                wtr_l: 10,
                 ccd_s: 2,
                 ccd_l: 4,
                 rrd_s: 4,
@@ -133,6 +152,7 @@ impl DramPreset {
                 refi: 3123,
                 activate_nj: 1.5,
                 read_nj: 1.0,
+                write_nj: 1.0,
                 refresh_nj: 30.0,
                 background_mw: 15.0,
             },
@@ -149,6 +169,10 @@ impl DramPreset {
                 rp: 16,
                 ras: 39,
                 rtp: 9,
+                cwl: 12,
+                wr: 18,
+                wtr_s: 3,
+                wtr_l: 9,
                 ccd_s: 4,
                 ccd_l: 6,
                 rrd_s: 4,
@@ -158,6 +182,7 @@ impl DramPreset {
                 refi: 9360,
                 activate_nj: 10.0,
                 read_nj: 8.0,
+                write_nj: 8.0,
                 refresh_nj: 700.0,
                 background_mw: 400.0,
             },
@@ -174,6 +199,10 @@ impl DramPreset {
                 rp: 26,
                 ras: 53,
                 rtp: 4,
+                cwl: 6,
+                wr: 26,
+                wtr_s: 9,
+                wtr_l: 11,
                 ccd_s: 2,
                 ccd_l: 3,
                 rrd_s: 7,
@@ -183,6 +212,7 @@ impl DramPreset {
                 refi: 3333,
                 activate_nj: 2.0,
                 read_nj: 1.9,
+                write_nj: 1.9,
                 refresh_nj: 50.0,
                 background_mw: 150.0,
             },
@@ -191,13 +221,13 @@ impl DramPreset {
 }
 
 impl Device {
-    /// Banks of a channel.
+    /// Banks per channel.
     #[must_use]
     pub const fn banks(&self) -> u32 {
         self.groups * self.banks_of_group
     }
 
-    /// Bytes per second that a channel's data bus carries at most.
+    /// Peak bandwidth of a channel's data bus in bytes per second.
     #[must_use]
     pub fn peak_bytes_per_s(&self) -> f64 {
         f64::from(self.burst_bytes) / (f64::from(self.burst) * f64::from(self.clock_ps) * 1e-12)

@@ -1,4 +1,4 @@
-//! What a memory counted, in the units of users.
+//! The result of the DRAM model, in physical units.
 
 use super::DramConfig;
 use super::channel::Channel;
@@ -11,17 +11,26 @@ use std::fmt;
 pub struct DramResult {
     /// Device.
     pub device: String,
-    /// Lines asked for.
+    /// Lines requested.
     pub requests: u64,
-    /// Bursts read; a line that is smaller than a burst takes a whole one.
+    /// Bursts read. A line smaller than a burst reads a whole burst.
     pub reads: u64,
-    /// Bytes that the data buses carried.
+    /// Bytes transferred to the chip.
     pub read_bytes: u64,
+    /// Bursts written.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub writes: u64,
+    /// Bytes transferred from the chip.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub write_bytes: u64,
+    /// Writes whose row was open.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub write_row_hits: u64,
     /// Reads whose row was open.
     pub row_hits: u64,
-    /// Reads that opened a row in a bank without one.
+    /// Reads that opened a row in a bank without an open row.
     pub row_empty: u64,
-    /// Reads that had another row closed first.
+    /// Reads that first had to close another row.
     pub row_conflicts: u64,
     /// `row_hits` over `reads`.
     pub row_hit_rate: f64,
@@ -31,22 +40,26 @@ pub struct DramResult {
     pub refreshes: u64,
     /// From the first clock to the last data.
     pub time_us: f64,
-    /// Bytes over time.
+    /// Bytes transferred over time.
     pub bandwidth_gb_per_s: f64,
-    /// What the data buses carry at most.
+    /// Peak bandwidth of the data buses.
     pub peak_gb_per_s: f64,
-    /// From arrival to the last data; where requests carry no time, from the place in the queue on.
+    /// Mean latency from arrival to last data. Requests without a time arrive when they enter the queue.
     pub latency_mean_ns: f64,
-    /// Half of the requests take no longer.
+    /// Median latency.
     pub latency_p50_ns: f64,
-    /// 99 of 100 requests take no longer.
+    /// 99th percentile of the latency.
     pub latency_p99_ns: f64,
-    /// Activates, reads, refreshes and standing by.
+    /// Energy of activates, reads, writes, refreshes and standby.
     pub energy_mj: f64,
 }
 
+fn is_zero(value: &u64) -> bool {
+    *value == 0
+}
+
 impl DramResult {
-    /// Over all channels, each done with its queue.
+    /// Sums over all channels, whose queues are empty.
     pub(super) fn of(
         config: &DramConfig,
         device: &Device,
@@ -59,7 +72,9 @@ impl DramResult {
         let end = channels.iter().map(|c| c.counts.end).max().unwrap_or(0);
         let clock_ns = f64::from(device.clock_ps) * 1e-3;
         let time_s = end as f64 * clock_ns * 1e-9;
-        let read_bytes = reads * u64::from(device.burst_bytes);
+        let writes = sum(|c| c.counts.writes);
+        let [read_bytes, write_bytes] =
+            [reads, writes].map(|bursts| bursts * u64::from(device.burst_bytes));
         let mut latencies: Vec<u64> = Vec::new();
         for channel in channels {
             let of = &channel.counts.latencies;
@@ -88,6 +103,7 @@ impl DramResult {
         let row_hits = sum(|c| c.counts.row_hits);
         let nj = activates as f64 * device.activate_nj
             + reads as f64 * device.read_nj
+            + writes as f64 * device.write_nj
             + refreshes as f64 * device.refresh_nj;
         let background_mj = device.background_mw * time_s * f64::from(config.channels);
         Self {
@@ -95,6 +111,9 @@ impl DramResult {
             requests,
             reads,
             read_bytes,
+            writes,
+            write_bytes,
+            write_row_hits: sum(|c| c.counts.write_row_hits),
             row_hits,
             row_empty: sum(|c| c.counts.row_empty),
             row_conflicts: sum(|c| c.counts.row_conflicts),
@@ -105,7 +124,7 @@ impl DramResult {
             bandwidth_gb_per_s: if end == 0 {
                 0.0
             } else {
-                read_bytes as f64 / time_s * 1e-9
+                (read_bytes + write_bytes) as f64 / time_s * 1e-9
             },
             peak_gb_per_s: f64::from(config.channels) * device.peak_bytes_per_s() * 1e-9,
             latency_mean_ns: over_reads(total as f64 * clock_ns),
@@ -128,6 +147,15 @@ impl fmt::Display for DramResult {
             self.activates,
             self.row_conflicts
         )?;
+        if self.writes > 0 {
+            writeln!(
+                f,
+                "{} writes, {:.2} MB; row hits {:.2} %",
+                self.writes,
+                self.write_bytes as f64 * 1e-6,
+                100.0 * self.write_row_hits as f64 / self.writes as f64
+            )?;
+        }
         writeln!(
             f,
             "{:.2} of {:.2} GB/s; latency mean {:.1}, median {:.1}, 99 % {:.1} ns; {:.4} mJ",

@@ -17,7 +17,7 @@ fn config(preset: DramPreset) -> DramConfig {
     }
 }
 
-/// Reads of whole bursts, all at once.
+/// Reads whole bursts that all arrive at the same time.
 fn at_once(config: &DramConfig, bursts: impl Iterator<Item = u32>) -> DramResult {
     let mut dram = Dram::new(config, config.preset.device().burst_bytes);
     bursts.for_each(|burst| dram.read(burst, None));
@@ -47,7 +47,7 @@ fn a_row_that_is_open_needs_no_activate_and_another_one_a_precharge() {
         let device = preset.device();
         let row = device.row_bytes / device.burst_bytes;
         let mut dram = Dram::new(&config(preset), device.burst_bytes);
-        // Far apart, but before the first refresh.
+        // Far apart, but all before the first refresh.
         let gap = 1_200;
         let next_row_of_bank = row * device.banks();
         for (turn, burst) in (0..).zip([0, 1, next_row_of_bank]) {
@@ -70,12 +70,12 @@ fn a_row_that_is_open_needs_no_activate_and_another_one_a_precharge() {
 }
 
 #[test]
-fn a_stream_opens_each_row_once_and_fills_the_bus_but_for_refreshes() {
+fn a_stream_opens_each_row_once_and_fills_the_bus_between_refreshes() {
     for preset in ALL {
         let device = preset.device();
         let per_row = device.row_bytes / device.burst_bytes;
         let rows = 512;
-        // Refreshes close rows as well: without them for the exact count.
+        // Refreshes close rows too, so the exact count is checked without them.
         let stream = (0..rows * per_row).map(u64::from);
         let mapper = Mapper::new(Mapping::default(), 1, &device);
         let mut channel = Channel::new(
@@ -88,11 +88,11 @@ fn a_stream_opens_each_row_once_and_fills_the_bus_but_for_refreshes() {
         );
         stream
             .clone()
-            .for_each(|burst| channel.arrive(mapper.place(burst), None));
+            .for_each(|burst| channel.arrive(mapper.place(burst), false, None));
         channel.drain();
         assert_eq!(channel.counts.activates, u64::from(rows), "{preset:?}");
-        // A row lies in one group, whose reads are ccd_l apart; where the queue holds bursts of the next row, reads of two
-        // groups take turns.
+        // The reads of a row lie in one group, ccd_l apart. While the queue holds bursts of the
+        // next row, reads of two groups alternate.
         let reads = f64::from(rows * per_row);
         let [fastest, slowest] =
             [device.ccd_s, device.ccd_l].map(|gap| f64::from(gap.max(device.burst)));
@@ -101,7 +101,7 @@ fn a_stream_opens_each_row_once_and_fills_the_bus_but_for_refreshes() {
             (fastest..1.02 * slowest).contains(&gap),
             "{preset:?}: {gap}"
         );
-        // Refreshes take no more than their share of the time (and let the reads of two rows take turns).
+        // Refreshes take no more than their share of the time. (They also let the reads of two rows alternate.)
         let found = at_once(&config(preset), 0..rows * per_row);
         let free = 1.0 - f64::from(device.rfc) / f64::from(device.refi);
         let time = found.time_us * 1e6 / f64::from(device.clock_ps);
@@ -118,7 +118,7 @@ fn strides_of_a_row_conflict_in_one_bank_and_take_the_row_cycle() {
     for preset in ALL {
         let device = preset.device();
         let stride = device.row_bytes / device.burst_bytes * device.banks();
-        // In the order of arrival: a queue of one.
+        // A queue of one serves in order of arrival.
         let config = DramConfig {
             queue: 1,
             ..config(preset)
@@ -137,7 +137,7 @@ fn strides_of_a_row_conflict_in_one_bank_and_take_the_row_cycle() {
             (clocks / expected - 1.0).abs() < 0.04,
             "{preset:?}: {clocks} {expected}"
         );
-        // The bank combined with the row's bits: neighbours lie in different banks.
+        // With the bank XORed with the row, neighbouring rows lie in different banks.
         let spread = DramConfig {
             mapping: Mapping::RowBankXorColumnChannel,
             queue: 32,
@@ -152,7 +152,7 @@ fn strides_of_a_row_conflict_in_one_bank_and_take_the_row_cycle() {
 fn four_activates_fit_a_window() {
     for preset in ALL {
         let device = preset.device();
-        // Each in another bank, one read a row.
+        // Each read in another bank, one read per row.
         let config = DramConfig {
             mapping: Mapping::RowColumnBankChannel,
             ..config(preset)
@@ -160,7 +160,7 @@ fn four_activates_fit_a_window() {
         let mut channel = Channel::new(device, 32, PagePolicy::Open);
         let mapper = Mapper::new(config.mapping, 1, &device);
         let banks = u64::from(device.banks());
-        (0..banks).for_each(|burst| channel.arrive(mapper.place(burst), None));
+        (0..banks).for_each(|burst| channel.arrive(mapper.place(burst), false, None));
         channel.drain();
         let last = channel.counts.end - u64::from(device.rcd + device.cl + device.burst);
         let least = (banks - 1) / 4 * u64::from(device.faw.max(4 * device.rrd_s));
@@ -185,7 +185,7 @@ fn a_closed_page_has_no_hits_of_reads_that_come_one_by_one() {
             dram.result()
         };
         let (open, closed) = (run(&config(preset)), run(&closed));
-        // Those that wait for a refresh together share a row.
+        // Reads that wait for a refresh together share a row.
         assert!(
             closed.row_hits <= 3 * closed.refreshes,
             "{preset:?}: {closed:?}"
@@ -264,6 +264,93 @@ fn every_burst_has_a_place_of_its_own() {
                 "{preset:?} {mapping:?}"
             );
             assert_eq!(rows.len() as u32, 4 * device.banks() * 4);
+        }
+    }
+}
+
+/// Reads or writes whole bursts that all arrive at the same time.
+fn mixed(config: &DramConfig, bursts: impl Iterator<Item = (u32, bool)>) -> DramResult {
+    let bytes = u64::from(config.preset.device().burst_bytes);
+    let mut dram = Dram::new(config, bytes as u32);
+    bursts.for_each(|(burst, write)| dram.request(u64::from(burst) * bytes, bytes, write, None));
+    dram.result()
+}
+
+#[test]
+fn writes_alone_saturate_the_bus_as_reads_do() {
+    for preset in ALL {
+        let [reads, writes] =
+            [false, true].map(|write| mixed(&config(preset), (0..20_000).map(|b| (b, write))));
+        assert_eq!((writes.writes, writes.reads), (20_000, 0));
+        assert_eq!((reads.writes, reads.reads), (0, 20_000));
+        assert_eq!(reads.write_bytes + writes.read_bytes, 0);
+        let ratio = writes.bandwidth_gb_per_s / reads.bandwidth_gb_per_s;
+        assert!((ratio - 1.0).abs() < 0.02, "{preset:?}: {ratio}");
+    }
+}
+
+/// A read that follows a write of an open row waits for the write's data and the bus turnaround.
+#[test]
+fn a_read_after_a_write_waits_for_its_data_and_the_turn_of_the_bus() {
+    for preset in ALL {
+        let device = preset.device();
+        let mapper = Mapper::new(Mapping::default(), 1, &device);
+        let mut channel = Channel::new(device, 32, PagePolicy::Open);
+        channel.arrive(mapper.place(0), true, Some(0));
+        // The write's data transfer has begun when the read arrives.
+        let arrival = u64::from(device.rcd + 1);
+        channel.arrive(mapper.place(1), false, Some(arrival));
+        channel.drain();
+        let write_end = u64::from(device.rcd + device.cwl + device.burst);
+        let read = write_end + u64::from(device.wtr_l);
+        let end = read + u64::from(device.cl + device.burst);
+        assert_eq!(channel.counts.end, end, "{preset:?}");
+        assert_eq!((channel.counts.row_hits, channel.counts.writes), (1, 1));
+    }
+}
+
+/// A written row must be restored before it is closed.
+#[test]
+fn another_row_waits_until_what_was_written_is_restored() {
+    for preset in ALL {
+        let device = preset.device();
+        let row = device.row_bytes / device.burst_bytes * device.banks();
+        let [read_first, write_first] = [false, true]
+            .map(|write| mixed(&config(preset), [(0, write), (row, write)].into_iter()));
+        let clocks = |result: &DramResult| {
+            (result.time_us * 1e6 / f64::from(device.clock_ps)).round() as u32
+        };
+        let after_read = device.ras.max(device.rcd + device.rtp);
+        let after_write = device
+            .ras
+            .max(device.rcd + device.cwl + device.burst + device.wr);
+        let again = device.rp + device.rcd + device.burst;
+        assert_eq!(
+            clocks(&read_first),
+            after_read + again + device.cl,
+            "{preset:?}"
+        );
+        assert_eq!(
+            clocks(&write_first),
+            after_write + again + device.cwl,
+            "{preset:?}"
+        );
+    }
+}
+
+#[test]
+fn every_request_is_answered_once_whatever_the_mixture() {
+    for preset in ALL {
+        for queue in [1, 8, 32] {
+            let config = DramConfig {
+                queue,
+                ..config(preset)
+            };
+            let bursts = (0..5000_u32).map(|i| (i.wrapping_mul(2_654_435_761) >> 12, i % 3 == 0));
+            let found = mixed(&config, bursts);
+            assert_eq!((found.writes, found.reads), (1667, 3333));
+            assert_eq!(found.row_hits + found.row_empty + found.row_conflicts, 3333);
+            assert!(found.write_row_hits <= 1667 && found.activates > 1000);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The tables' rows and their columns, a line each.
 
-use crate::config::CacheConfig;
+use crate::config::LevelConfig;
 use crate::locality::{
     ByOrigin, CacheHits, Figures, MissSplit, Origin, Sequence, Stream, WorkingSet,
 };
@@ -25,7 +25,7 @@ pub struct Summary<'a> {
     /// Whose.
     pub of: Subject<'a>,
     /// The configured cache.
-    pub cache: &'a CacheConfig,
+    pub cache: &'a LevelConfig,
     /// What was found.
     pub figures: &'a Figures,
 }

@@ -6,7 +6,7 @@ mod plots;
 
 use super::columns::Records;
 use super::table::Table;
-use crate::config::{CacheConfig, RunConfig};
+use crate::config::{LevelConfig, RunConfig};
 use crate::locality::{Figures, OrderFigures, Stream};
 use crate::model_version::MODEL_VERSION;
 use crate::result::{TOOL, TraceId};
@@ -96,10 +96,10 @@ impl LocalityReport {
         "working-sets.csv",
     ];
 
-    fn cache(&self, stream: Stream) -> &CacheConfig {
+    fn cache(&self, stream: Stream) -> &LevelConfig {
         match stream {
-            Stream::L1 | Stream::Merged => &self.config.l1,
-            Stream::L2 => &self.config.l2,
+            Stream::L1 | Stream::Merged => &self.config.level.l1,
+            Stream::L2 => &self.config.level.l2,
         }
     }
 

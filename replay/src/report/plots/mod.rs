@@ -10,6 +10,7 @@ pub mod heatmap;
 pub mod lines;
 pub mod paths;
 pub mod scatter;
+pub mod spans;
 pub mod stacked;
 #[cfg(test)]
 pub(crate) mod testing;

@@ -2,6 +2,7 @@
 //!
 //! [`model`] takes an outcome apart; tables, plots and the page only print its rows.
 
+mod cores;
 pub mod model;
 pub mod page;
 pub mod plots;

@@ -2,7 +2,7 @@
 
 use super::model::{PaperReport, TraceInfo};
 use super::plots::{self, TileMeasure};
-use super::{tables, whole_frame};
+use super::{cores, tables, whole_frame};
 use crate::config::{CountBy, Order};
 use crate::report::errors::{self, Of};
 use crate::report::html::{self, Section, figures, folded};
@@ -59,6 +59,7 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
     }
     sections.push(Section::new("Bounds and checks", bounds(report)));
     sections.push(Section::new("Tile orders", orders(report)?));
+    sections.extend(cores::section(report)?);
     sections.push(Section::new("Heat maps by tile", heat_maps(report)?));
     if report.config.count_by == CountBy::Texture {
         sections.push(Section::new("By mip level", levels(report)?));
@@ -332,7 +333,7 @@ fn configuration(report: &PaperReport) -> Markup {
     let text = toml::to_string(&report.config).unwrap_or_default();
     let orders: Vec<&str> = report.orders().into_iter().map(Order::title).collect();
     let caches = report.caches();
-    let mode = report.config.mode.name();
+    let mode = report.config.mode_name();
     html! {
         p {
             "Mode " (mode) "; varied: orders " (orders.join(", ")) "; L1/L2 " (caches.join(", ")) " KiB. "

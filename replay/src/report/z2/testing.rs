@@ -7,7 +7,8 @@ use crate::experiment::{Outcome, Plan, Subject};
 use crate::paper::z2;
 use crate::preset::Preset;
 use crate::result::{
-    FirstLookups, LevelCounters, LevelResult, Part, RunResult, TileMap, TmuResult, TraceId,
+    FirstLookups, LevelCounters, LevelResult, MemoryResult, Part, RunResult, TileMap, TmuResult,
+    TraceId,
 };
 use crate::stream::MemoryTrace;
 use crate::stream::testing::tables;
@@ -40,7 +41,8 @@ pub(crate) fn with_edited<T>(
     let mut results = Vec::new();
     for scene in scenes {
         for (index, point) in plan.points.iter().enumerate() {
-            let [l1, l2] = [&point.config.l1, &point.config.l2].map(|c| c.size_bytes as u32 >> 10);
+            let [l1, l2] =
+                [&point.config.level.l1, &point.config.level.l2].map(|c| c.size_bytes as u32 >> 10);
             let row = z2::row(scene, l1, l2, point.config.order).unwrap();
             let rates = [row.l1_miss_pct, row.l2_miss_pct, row.tmu_util_pct];
             let mut result = result(rates, point.config.tile_maps);
@@ -116,12 +118,8 @@ fn result([l1_pct, l2_pct, tmu_pct]: [f64; 3], maps: bool) -> RunResult {
             ..TmuResult::default()
         }),
         cycles: Some(30_000_000),
-        prefetch: None,
-        l2_mshrs: None,
-        invalidated_lines: None,
+        memory: MemoryResult::default(),
         timeline: None,
-        lower_levels: Vec::new(),
-        dram: None,
         clients: Vec::new(),
         geometry: None,
         first_lookups: Some(FirstLookups {

@@ -3,13 +3,14 @@
 
 use super::model::PaperReport;
 use crate::experiment::ResultRow;
-use crate::memory::clients::{Client, ClientTraffic};
+use crate::memory::Client;
 use crate::report::columns::Column;
 use crate::report::figures::whole_mj;
 use crate::report::html::{Section, figures};
 use crate::report::plots::stacked::StackedChart;
 use crate::report::plots::{PlotError, SeriesStyle};
 use crate::report::table::Table;
+use crate::result::ClientTraffic;
 use maud::html;
 
 /// Frame rates of headsets, Hz.

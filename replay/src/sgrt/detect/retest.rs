@@ -1,12 +1,12 @@
-//! The right-eye ray against the triangles that arrived around it.
+//! Re-tests: intersects the right-eye ray with the triangles that arrived around it.
 
 use super::{Decision, PixelClass};
 use crate::sgrt::frame::SKY;
 use crate::sgrt::place::{Offset, Place};
 use formats::view::Eye;
 
-/// Intersects the right-eye ray with the candidate's triangle and those that arrived at the
-/// neighbours: the decision takes over the nearest hit, or is bad where there is none.
+/// Intersects the right-eye ray with the triangles of the candidate and of its neighbours. The decision
+/// becomes the nearest hit, or bad if there is none.
 pub fn retest(at: Place, offsets: &'static [Offset], decision: &mut Decision) {
     let frame = at.frame;
     let eye = frame.tables.camera(Eye::Right);
@@ -38,22 +38,21 @@ pub fn retest(at: Place, offsets: &'static [Offset], decision: &mut Decision) {
             decision.primitive = primitive;
             decision.exact = Some(eye.at(direction, t));
         }
-        // The sky has no triangle; it stands where nothing around it was hit.
+        // The sky has no triangle. It is reused if no triangle around it is hit.
         None if decision.primitive == SKY => {}
         None => decision.class = PixelClass::Bad,
     }
 }
 
-/// Distance at which a ray from `origin` along `direction` meets a triangle, from either side.
+/// Distance at which a ray from `origin` along `direction` hits a triangle, from either side.
 ///
-/// Double precision throughout, so that the answer is that of exact arithmetic for all but rays
-/// within about 1e-12 of an edge.
+/// Double precision gives the exact answer except for rays within about 1e-12 of an edge.
 #[must_use]
 pub fn intersect(origin: [f32; 3], direction: [f32; 3], vertices: &[[f32; 3]; 3]) -> Option<f32> {
     let o = origin.map(f64::from);
     let d = direction.map(f64::from);
     let [a, b, c] = vertices.map(|v| sub(v.map(f64::from), o));
-    // Volumes of the tetrahedra between the ray and each edge: all of one sign inside.
+    // Volumes of the tetrahedra between the ray and each edge. All have one sign for a hit.
     let u = dot(d, cross(c, b));
     let v = dot(d, cross(a, c));
     let w = dot(d, cross(b, a));
@@ -128,7 +127,7 @@ mod tests {
             let to = glam::Vec3::from(point) - glam::Vec3::from(origin);
             let [a, b, c] = vertices.map(glam::Vec3::from);
             let normal = (b - a).cross(c - a).normalize_or_zero();
-            // Slivers and grazing rays are left to the exact-edge tests of the tracer.
+            // The tracer's exact-edge tests cover slivers and grazing rays.
             prop_assume!((b - a).cross(c - a).length() > 0.5);
             prop_assume!(normal.dot(to.normalize()).abs() > 0.05);
             let t = intersect(origin, to.normalize().to_array(), &vertices);

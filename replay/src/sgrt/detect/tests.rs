@@ -4,7 +4,7 @@ use crate::sgrt::compose::{Reuse, compose};
 use crate::sgrt::reproject::reproject;
 use crate::sgrt::synthetic::{DIFFUSE, LEAF, MIRROR, Placed, Shape, View, frame, globe, wall};
 
-/// The rule that `replay reproject` uses unless told otherwise.
+/// The default rule of `replay reproject`.
 const DEFAULT: &str = crate::sgrt::DEFAULT_RULE;
 
 fn decided(frame: &Frame, rule: &str) -> Vec<Decision> {
@@ -51,7 +51,7 @@ fn an_exact_sphere_has_no_wrong_pixel_inside_its_silhouette() {
     let decisions = decided(&frame, "silhouette");
     let accuracy = count_errors(&frame, &decisions);
     assert_eq!(accuracy.all_reused().wrong_object, 0);
-    // Half a pixel beside, seen at most about ten degrees off the tangent, is under 2 px.
+    // Half a pixel of distance, seen at most about ten degrees from the tangent, is less than 2 px.
     assert_eq!(accuracy.all_reused().position_over[1], 0);
     assert!(accuracy.pct(accuracy.all_reused().pixels) > 80.0);
     let on_sphere = |d: &&Decision| d.class.is_reused() && d.primitive != SKY;
@@ -159,7 +159,7 @@ fn stricter_rules_reuse_less_and_wrong_less() {
 
 #[test]
 fn a_near_surface_stretched_in_the_right_eye_hides_what_is_behind_it() {
-    // A floor-like slanted rectangle that the right eye sees wider, before a wall.
+    // A slanted rectangle in front of a wall that appears wider to the right eye.
     let mut scene = wall(9.0, [40.0, 40.0], 0.0, 1);
     let (near, far) = (-0.4, -1.6);
     let corners = [
@@ -217,7 +217,7 @@ fn mirrored_scenes_reuse_alike_from_the_mirrored_eye() {
             da[*i].class.is_reused() == db[j].class.is_reused()
         })
         .count();
-    // Hits that fall on the line between two pixels go one way in both.
+    // Hits on the line between two pixels are rounded the same way in both.
     assert!(same * 1000 >= da.len() * 985, "{same} of {}", da.len());
 }
 

@@ -28,7 +28,7 @@ fn compared_as(
     compare(frame, &work, &misses, reads, &rows, config)
 }
 
-/// A wall seen by eyes in one place: all of the right image is reused.
+/// A wall seen by two eyes at the same position: the whole right image is reused.
 fn all_reused() -> Frame {
     let view = View {
         ipd_m: 0.0,
@@ -77,7 +77,7 @@ fn a_core_bound_frame_gains_nothing_from_fewer_rays_in_the_units() {
     config.srp.lanes_per_core = 1;
     config.srp.ray_generation_cycles = 0.0;
     let e = compared(&frame, "none", Reuse::Shadow, &config);
-    // Shading runs as often; the three kernels are added.
+    // The same amount of shading, and three more kernels.
     assert!(e.relative_performance() < 1.0);
     let added = e.reprojected.srp.added_lane_cycles() / e.reference.srp.lane_cycles();
     assert!((1.0 / e.relative_performance() - (1.0 + added)).abs() < 1e-9);
@@ -124,7 +124,7 @@ fn detection_moves_the_bytes_that_its_rule_reads() {
         let e = compared(&frame, rule, Reuse::Primary, &SgrtConfig::default());
         e.reprojected.dram.gbuffer_bytes
     };
-    // 40 rows are bands of 16, 16 and 8; each fetches the rows beside it, too.
+    // 40 rows form bands of 16, 16 and 8; each also fetches the adjacent rows.
     let pixels = 72 * 40;
     let with_neighbours = 72 * (17 + 18 + 9);
     assert_eq!(of("none"), 12 * 2 * pixels);
@@ -148,7 +148,7 @@ fn without_bandwidth_time_is_the_bytes_that_energy_is_charged_for() {
         assert!((run.time_ns / ns - 1.0).abs() < 1e-9);
         assert_eq!(run.memory_bound_ns, run.time_ns);
     }
-    // Both eyes in full move fewer bytes: no G-buffer.
+    // Tracing both eyes moves fewer bytes, because it needs no G-buffer.
     assert!(e.relative_performance() < 1.0);
     assert!(e.whole_screen.time_ns > e.reprojected.time_ns);
 }

@@ -1,4 +1,4 @@
-//! `depth`: behind a neighbour.
+//! `depth`: rejects arrivals behind a neighbour.
 
 use super::{RuleKind, Test};
 use crate::sgrt::frame::Sample;

@@ -1,10 +1,9 @@
-//! Rules of error detection: one a file, one line each in [`RULES`].
+//! The rules of error detection, one per file and one line each in [`RULES`].
 //!
-//! The paper tests each right pixel against all pixels of its row (an epipolar line, since the eyes
-//! differ only along it): that finds what arrives where, hence missing pixels and the nearest of
-//! overlapping ones. What arrives may still be wrong: a far surface that shows through the gaps of
-//! a near one, or one that something hides from the right eye only. Rules reject what looks
-//! suspicious; they combine with `+`.
+//! The paper tests each right pixel against all left pixels of its row (an epipolar line, because the eyes
+//! differ only along it). This finds missing pixels and the nearest of overlapping ones. Arrivals can still
+//! be wrong: a far surface visible through the gaps of a near one, or a surface hidden only from the right
+//! eye. Rules reject suspicious arrivals and can be combined with `+`.
 
 mod depth;
 mod object;
@@ -22,7 +21,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// All rules, in the order in which a combination is printed.
+/// All rules, in the order in which combinations are printed.
 pub static RULES: [&RuleKind; 7] = [
     &depth::RULE,
     &row::RULE,
@@ -33,40 +32,40 @@ pub static RULES: [&RuleKind; 7] = [
     &triangles::RULE,
 ];
 
-/// Makes the test of a frame from what arrived and the rule's share.
+/// Creates the test of a frame from its arrivals and the rule's share.
 pub type MakeTest = for<'a> fn(&'a Frame, &'a Reprojection, f32) -> Box<dyn Test + 'a>;
 
-/// A rule as the registry lists it.
+/// A rule of the registry.
 pub struct RuleKind {
     /// Name on the command line.
     pub name: &'static str,
-    /// What is rejected, in a few words.
+    /// What is rejected, briefly.
     pub title: &'static str,
     /// What is rejected, in full.
     pub help: &'static str,
-    /// True where the name may be followed by `=SHARE`, a share of the depth.
+    /// True if the name may be followed by `=SHARE`, a share of the depth.
     pub takes_share: bool,
-    /// What it reads beyond [`Reads::ARRIVALS`].
+    /// Reads in addition to [`Reads::ARRIVALS`].
     pub reads: Reads,
-    /// Sees the whole frame and yields the test; `None` for a rule that only re-tests triangles.
+    /// Creates the test of a frame; `None` for a rule that only re-tests triangles.
     pub test: Option<MakeTest>,
-    /// Intersects the right-eye ray with the candidate's triangle and with those that arrived at
-    /// these neighbours: the nearest hit is reused, a ray that misses all of them rejects.
+    /// Neighbours whose triangles are intersected with the right-eye ray in addition to the candidate's.
+    /// The nearest hit is reused; a ray that misses all triangles is rejected.
     pub retests: Option<&'static [Offset]>,
 }
 
-/// A rule's test of one right sample.
+/// A rule's test of right samples.
 pub trait Test: Sync {
-    /// True where `hit`, the left sample that would be reused, must not stand at a place. After a
-    /// re-test `hit` is the sample whose triangle was hit, else the candidate's.
+    /// True if `hit`, the left sample to be reused, must be rejected. After a re-test, `hit` is the sample
+    /// whose triangle was hit, otherwise the candidate's.
     fn rejects(&self, at: Place, hit: &Sample) -> bool;
 }
 
-/// Depth share of a rule that takes one and is given none.
+/// Default depth share of rules that take one.
 pub const DEFAULT_DEPTH_SHARE: f32 = 0.02;
 
-/// Which candidates error detection rejects: rules of [`RULES`], each at most once; none of them is
-/// the paper's plain reuse.
+/// The rules of error detection: a combination of [`RULES`], each at most once. The empty one is the
+/// paper's plain reuse.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Rule(Vec<Part>);
@@ -85,7 +84,7 @@ impl Part {
 }
 
 impl Rule {
-    /// What detection by this rule reads.
+    /// The fields that the rule reads.
     #[must_use]
     pub fn reads(&self) -> Reads {
         let parts = self.0.iter().map(|part| part.kind().reads);
@@ -103,7 +102,7 @@ impl Rule {
         self.0.iter().filter_map(test).collect()
     }
 
-    /// With every share times a factor.
+    /// The rule with every share multiplied by a factor.
     #[must_use]
     pub fn scaled(&self, factor: f32) -> Self {
         let scaled = |part: &Part| Part {
@@ -113,7 +112,7 @@ impl Rule {
         Self(self.0.iter().map(scaled).collect())
     }
 
-    /// Neighbours whose triangles are intersected beside the candidate's; `None` for no re-test.
+    /// Neighbours whose triangles are intersected in addition to the candidate's; `None` without re-tests.
     #[must_use]
     pub fn retests(&self) -> Option<&'static [Offset]> {
         let retests = self.0.iter().filter_map(|part| part.kind().retests);
@@ -121,7 +120,7 @@ impl Rule {
     }
 }
 
-/// A rule that cannot be understood.
+/// An invalid rule.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 #[error(
     "rule: expected none, or {} joined by '+'; found '{found}'",
@@ -140,7 +139,7 @@ fn synopsis() -> String {
     RULES.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
-/// What `--rule` says about the choices.
+/// Describes the choices of `--rule`.
 #[must_use]
 pub fn help() -> String {
     let mut text = "Which reprojected pixels are rejected and traced: `none` (the paper's plain \
@@ -258,7 +257,7 @@ mod tests {
 
     #[test]
     fn every_rule_stands_in_the_help_and_in_the_documentation() {
-        let page = include_str!("../../../../docs/reprojection-rules.md");
+        let page = include_str!("../../../../docs/models/reprojection-rules.md");
         for kind in RULES {
             assert!(help().contains(kind.title), "{}", kind.name);
             assert!(page.contains(&format!("| `{}", kind.name)), "{}", kind.name);

@@ -1,4 +1,4 @@
-//! `object`: alone among other objects.
+//! `object`: rejects arrivals without a neighbour of the same object.
 
 use super::{RuleKind, Test};
 use crate::sgrt::frame::Sample;

@@ -1,11 +1,11 @@
-//! `opaque`: on a material through which rays may pass.
+//! `opaque`: rejects arrivals on a material through which rays may pass.
 
 use super::{RuleKind, Test};
 use crate::sgrt::frame::{Frame, Sample};
 use crate::sgrt::place::Place;
 use crate::sgrt::reads::{Around, Reads};
 
-/// An object has one material, so its number is enough.
+/// An object has one material, so reading its number suffices.
 pub static RULE: RuleKind = RuleKind {
     name: "opaque",
     title: "its material has holes",

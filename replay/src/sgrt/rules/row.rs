@@ -1,4 +1,4 @@
-//! `row`: behind a surface of its row.
+//! `row`: rejects arrivals behind a surface of their row.
 
 use super::{RuleKind, Test};
 use crate::sgrt::frame::{Frame, Sample};
@@ -25,7 +25,7 @@ pub static RULE: RuleKind = RuleKind {
 };
 
 struct Row {
-    /// Depth of the nearest surface by right sample.
+    /// Depth of the nearest surface, by right sample.
     nearest: Vec<f32>,
     share: f32,
 }
@@ -36,14 +36,13 @@ impl Test for Row {
     }
 }
 
-/// Two adjacent left pixels belong to one surface only where their depths differ by less.
+/// Adjacent left pixels belong to one surface if their depths differ by less than this share.
 const SAME_SURFACE_SHARE: f32 = 0.05;
 
-/// Nearest depth, at each right sample, of the segments that join adjacent left pixels of one
-/// object in its row; infinite where there is none.
+/// The nearest depth, at each right sample, of the segments between adjacent left pixels of one object in
+/// its row; infinite without a segment.
 ///
-/// A near surface that the right eye sees stretched leaves gaps between its splats; the segments
-/// close them.
+/// A near surface that appears stretched to the right eye leaves gaps between its arrivals. The segments close them.
 fn spans(frame: &Frame, arrived: &Reprojection) -> Vec<f32> {
     let width = frame.size_px[0] as usize;
     let mut nearest = vec![f32::INFINITY; frame.sample_count()];

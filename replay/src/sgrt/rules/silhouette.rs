@@ -1,4 +1,4 @@
-//! `silhouette`: at the edge of an object.
+//! `silhouette`: rejects arrivals at the edge of an object.
 
 use super::{RuleKind, Test};
 use crate::sgrt::frame::Sample;

@@ -1,4 +1,4 @@
-//! `triangle`: beside the triangle that it would reuse.
+//! `triangle`: rejects pixels whose ray misses the triangle to be reused.
 
 use super::RuleKind;
 use crate::sgrt::reads::{Around, Reads};

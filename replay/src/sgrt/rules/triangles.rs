@@ -1,4 +1,4 @@
-//! `triangles`: beside the triangles that arrived around it.
+//! `triangles`: rejects pixels whose ray misses all triangles that arrived around it.
 
 use super::RuleKind;
 use crate::sgrt::place::EIGHT;

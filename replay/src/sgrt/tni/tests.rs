@@ -51,7 +51,7 @@ fn a_wide_step_takes_its_own_cycles() {
     assert!(wide.latency > narrow.latency);
 }
 
-/// A ray of the cycle-by-cycle twin: steps, and a triangle test after every `steps_per_test`.
+/// A ray of the cycle-by-cycle twin: steps, with a triangle test after every `steps_per_test`.
 #[derive(Clone, Copy)]
 struct TwinRay {
     steps: u32,
@@ -59,8 +59,8 @@ struct TwinRay {
     miss_every: u32,
 }
 
-/// One unit, cycle by cycle: a ring of rays, each ready at some cycle; each pipeline takes the
-/// first ready ray that wants it.
+/// One unit, cycle by cycle. Rays form a ring, each ready at some cycle; each pipeline takes the first
+/// ready ray that needs it.
 fn twin(rays: &[TwinRay], config: &SgrtConfig) -> (u64, BatchWork, Misses) {
     #[derive(Clone, Copy)]
     struct Slot {
@@ -128,7 +128,7 @@ fn the_throughput_model_stays_close_to_a_cycle_by_cycle_unit() {
         };
         (0..n).map(ray).collect()
     };
-    // Traversal, intersection and latency bound in turn.
+    // One case each for traversal, intersection and latency as the bottleneck.
     for (name, in_flight, steps_per_test, miss_every) in [
         ("traversal", 256, 16, 1000),
         ("intersection", 256, 2, 1000),

@@ -1,24 +1,24 @@
-//! Lines that several bundles of a quad have, listed once.
+//! Merges lines that occur in several bundles of a quad.
 
 use super::Use;
 use std::hint::select_unpredictable;
 
-/// Buckets of the table; a power of two, far more than a segment has lines.
+/// Buckets of the hash table, a power of two much larger than the lines of a segment.
 const BUCKETS: usize = 512;
 
-/// Merges what bundles of the same segment have in common.
+/// Merges the common lines of bundles in a segment.
 #[derive(Debug)]
 pub(super) struct Merge {
-    /// Open addressing: the merge that wrote it, and the index in `seen`. What other merges
-    /// wrote is empty.
+    /// Open addressing: the number of the merge that wrote the bucket, and an index into `seen`. Buckets of
+    /// other merges count as empty.
     buckets: Vec<(u32, u32)>,
-    /// Of this merge.
+    /// Number of the current merge.
     pub(super) number: u32,
-    /// Lines so far.
+    /// Number of lines so far.
     count: u32,
-    /// Each with its use; without footprints once it is written.
+    /// Each line with its use. The footprints are cleared once the line is written.
     seen: [(u32, Use); Use::FIRST_LINES],
-    /// Index in `seen` of what was listed.
+    /// Index into `seen` of each listed line.
     indexes: [u8; Use::FIRST_LINES],
 }
 
@@ -35,12 +35,12 @@ impl Default for Merge {
 }
 
 impl Merge {
-    /// Lists what is listed from `start` on again, each line of each cell once and where it was last.
+    /// Rewrites the list from `start` on so that each line of each cell occurs once, at its last position.
     #[inline(never)]
     pub(super) fn again(&mut self, start: usize, distinct: &mut Vec<u32>, uses: &mut Vec<Use>) {
         self.number = self.number.wrapping_add(1);
         if self.number == 0 {
-            // Numbers start again: what was written with them is forgotten.
+            // Merge numbers wrap around, so entries with old numbers are cleared.
             self.buckets.fill((0, 0));
             self.number = 1;
         }
@@ -54,8 +54,7 @@ impl Merge {
         let (distinct, uses) = (&mut distinct[start..], &mut uses[start..]);
         let mut left = distinct.len();
         for &index in self.indexes[..listed].iter().rev() {
-            // No branches on whether a line comes up for the first time: then it keeps its slot, else the
-            // next one takes it.
+            // Branch-free: a line seen for the first time keeps its slot; otherwise the next line overwrites it.
             let Some(slot) = left.checked_sub(1) else {
                 break;
             };
@@ -66,12 +65,12 @@ impl Merge {
         }
     }
 
-    /// Adds a line; its index in `seen`.
+    /// Adds a line and returns its index in `seen`.
     #[inline(always)]
     fn add(&mut self, line: u32, of: Use) -> u32 {
         let bucket = bucket(line);
         let (number, index) = self.buckets[bucket];
-        // No branches: whether a line is new is a coin toss to the processor.
+        // Branch-free: whether a line is new is unpredictable.
         let new = number != self.number;
         let index = select_unpredictable(new, self.count, index);
         let seen = &mut self.seen[index as usize % Use::FIRST_LINES];
@@ -95,7 +94,7 @@ impl Merge {
         index
     }
 
-    /// Adds a line whose bucket another one has, or the same line of another cell.
+    /// Adds a line whose bucket is occupied by another line, or by the same line of another cell.
     #[inline(never)]
     fn add_beside(&mut self, first: usize, line: u32, of: Use) -> u32 {
         let mut bucket = first;

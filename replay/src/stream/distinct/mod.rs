@@ -1,8 +1,8 @@
-//! A quad's distinct lines: all that a cache has to be asked where the quad's own accesses change
-//! nothing in it but the order of last use.
+//! The distinct lines of a quad. They suffice for a cache in which the quad's own accesses only change the
+//! order of last use.
 //!
-//! A quad is cut into *segments* of so many footprints that a word has a bit for each. In a segment,
-//! each line of each cell is listed once, with the footprints that use it.
+//! A quad is divided into *segments*, whose footprints each have one bit of a word. A segment lists each
+//! line of each cell once, with the footprints that use it.
 
 mod merge;
 
@@ -12,24 +12,24 @@ use super::lines::Tag;
 use crate::tmu::Pending;
 use merge::Merge;
 
-/// Footprints of a segment at most, repeats counted: four lanes of three trilinear textures.
+/// Maximum footprints per segment, repeats included: four lanes of three trilinear textures.
 const FOOTPRINTS: u32 = Pending::SEGMENT;
 
-/// Who uses a distinct line.
+/// The users of a distinct line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Use {
     bits: u32,
-    /// Its cell within the view, and a bit.
+    /// Cell within the view, and a flag.
     cell: u32,
 }
 
 impl Use {
     const LAST: u32 = 1 << 31;
 
-    /// First lines are below this.
+    /// Upper limit of first-line indices.
     pub const FIRST_LINES: usize = 1 << (31 - FOOTPRINTS);
 
-    /// Bits of `cell` that name none.
+    /// Flag in `cell`, outside the bits of a cell.
     const LISTED: u32 = Tag::CELLS as u32;
 
     fn new(footprints: u32, first_line: u32, cell: u32) -> Self {
@@ -39,27 +39,27 @@ impl Use {
         }
     }
 
-    /// Its cell within the view.
+    /// Cell within the view.
     #[inline(always)]
     pub(super) fn cell(self) -> u32 {
         self.cell & (Self::LISTED - 1)
     }
 
-    /// True if the quad may have listed the line already: for another cell, or in another segment.
+    /// True if the quad may already have listed the line, for another cell or in another segment.
     #[inline(always)]
     #[must_use]
     pub fn may_be_listed(self) -> bool {
         self.cell & Self::LISTED != 0
     }
 
-    /// A bit for each footprint of the segment, repeats counted.
+    /// One bit per footprint of the segment, repeats included.
     #[inline(always)]
     #[must_use]
     pub fn footprints(self) -> u32 {
         self.bits & ((1 << FOOTPRINTS) - 1)
     }
 
-    /// Where it stands first among the segment's lines.
+    /// Index of its first occurrence among the segment's lines.
     #[inline(always)]
     #[must_use]
     pub fn first_line(self) -> usize {
@@ -74,21 +74,21 @@ impl Use {
 }
 
 impl<'a> QuadLines<'a> {
-    /// True if all its footprints fit into one segment.
+    /// True if all footprints fit into one segment.
     #[inline(always)]
     #[must_use]
     pub fn is_one_segment(&self) -> bool {
         self.footprints <= FOOTPRINTS
     }
 
-    /// Where the distinct lines of each segment end.
+    /// End of each segment's distinct lines.
     #[inline(always)]
     pub fn segments(self) -> impl Iterator<Item = usize> + use<'a> {
         let mut start = 0;
         std::iter::from_fn(move || {
             let uses = &self.uses[start..];
             start += if self.is_one_segment() && !uses.is_empty() {
-                // All of them fit into one.
+                // All footprints fit into one segment.
                 uses.len()
             } else {
                 1 + uses.iter().position(|of| of.ends_segment())?
@@ -98,30 +98,30 @@ impl<'a> QuadLines<'a> {
     }
 }
 
-/// Finds the distinct lines of one quad after another.
+/// Finds the distinct lines of quads.
 ///
-/// A bundle brings its own, and mostly no other bundle of the quad has any of them: textures and levels
-/// lie in lines of their own, but for the smallest. Only from the first bundle on that has neighbours are
-/// lines looked for among others.
+/// Each bundle already lists its own distinct lines. Bundles of a quad rarely share lines, because textures
+/// and levels occupy their own lines, except for the smallest. Lines are merged only from the first bundle
+/// on whose range of lines overlaps another's.
 #[derive(Debug, Default)]
 pub(super) struct Distinct {
-    /// Footprints of the segment so far, and their lines.
+    /// Footprints of the current segment, and their lines.
     footprints: u32,
     lines: u32,
-    /// Where the segment starts among all distinct lines, and the first bundle that another one meets.
+    /// Start of the segment among all distinct lines, and the first bundle that overlaps another.
     start: usize,
     met: usize,
-    /// [`Use::LISTED`] for all but a quad's first segment.
+    /// [`Use::LISTED`] except in a quad's first segment.
     listed: u32,
     bundles: u32,
-    /// Of all the segment's bundles.
+    /// Range of all bundles of the segment.
     hull: Span,
-    /// Bundles of the segment.
+    /// Ranges of the bundles of the segment.
     spans: [Span; FOOTPRINTS as usize],
     merge: Merge,
 }
 
-/// Where a bundle starts among all distinct lines, and the lines that all of its own are between.
+/// Start of a bundle among all distinct lines, and the range of its lines.
 #[derive(Clone, Copy, Debug, Default)]
 struct Span {
     start: usize,
@@ -129,11 +129,11 @@ struct Span {
     last: u32,
 }
 
-/// A footprint has four lines at most.
+/// A footprint has at most four lines.
 const _: () = assert!(4 * FOOTPRINTS as usize <= Use::FIRST_LINES);
 
 impl Distinct {
-    /// A quad begins, behind so many distinct lines.
+    /// Starts a quad after `start` distinct lines.
     #[inline(always)]
     pub(super) fn begin(&mut self, start: usize) {
         self.begin_segment(start);
@@ -151,7 +151,7 @@ impl Distinct {
         };
     }
 
-    /// Appends the distinct lines and their uses of a bundle whose lines count from `base_line`.
+    /// Appends the distinct lines of a bundle, whose lines are relative to `base_line`, and their uses.
     #[inline(always)]
     pub(super) fn add(
         &mut self,
@@ -179,7 +179,7 @@ impl Distinct {
         self.hull.last = self.hull.last.max(last);
         self.spans[self.bundles as usize % FOOTPRINTS as usize] = span;
         for (lines, count) in own.chunks() {
-            // All four, then those in use: how many is a coin toss to the processor.
+            // Copies all four, because the number in use is unpredictable.
             let end = distinct.len() + count;
             distinct.extend_from_slice(&lines.map(|of| base_line.wrapping_add(of.line())));
             distinct.truncate(end);
@@ -195,7 +195,7 @@ impl Distinct {
         self.lines += own.listed();
     }
 
-    /// Notes whom a bundle meets.
+    /// Records which bundle this range overlaps.
     #[inline(never)]
     fn meet(&mut self, span: &Span) {
         let before = &self.spans[..self.bundles as usize % FOOTPRINTS as usize];
@@ -204,7 +204,7 @@ impl Distinct {
         }
     }
 
-    /// The quad, or its segment, ends.
+    /// Ends the quad or its segment.
     #[inline(always)]
     pub(super) fn end(&mut self, distinct: &mut Vec<u32>, uses: &mut Vec<Use>) {
         if self.met < distinct.len() {
@@ -230,7 +230,7 @@ mod tests {
     use proptest::prelude::*;
     use std::collections::HashMap;
 
-    /// Bundles of up to four footprints: their cell, a base for their lines, the lines.
+    /// Bundles of up to four footprints: cell, base line, and lines.
     fn bundles() -> impl Strategy<Value = Vec<(u32, u32, Vec<[u32; 4]>)>> {
         let line = || prop_oneof![0_u32..3, 0_u32..30];
         let footprints = prop::collection::vec([line(), line(), line(), line()], 0..5);
@@ -240,12 +240,12 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(512))]
 
-        /// Lines are shared within bundles, and by bundles of the same cell and of others.
+        /// Lines are shared within bundles and between bundles of equal and different cells.
         #[test]
         fn segments_say_of_each_line_who_uses_it_and_in_which_order(
             quads in prop::collection::vec(bundles(), 1..4),
         ) {
-            // Numbers of merges start again.
+            // Starts near the largest merge number, so that numbers wrap around.
             let mut distinct = Distinct::default();
             distinct.merge.number = u32::MAX - 1;
             let mut tile = TileLines::default();

@@ -1,39 +1,37 @@
-//! One axis of a mip level: fixed-point coordinate to texels to byte offsets.
+//! One axis of a mip level: converts fixed-point coordinates to texels and byte offsets.
 
 use formats::texture::Wrap;
 
-/// Everything about one axis of one level of a texture under one sampler.
+/// One axis of a level of a texture with a given sampler.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// Texels: below 2^31, as a layer has fewer bytes than that.
+    /// Number of texels, below 2^31, because a layer has fewer bytes.
     size: i32,
     wrap: Wrap,
     /// Texel offset of the sample.
     offset: i32,
     step: Step,
-    /// Byte offset within the level of a texel's block, by texel.
+    /// Byte offset of each texel's block within the level.
     bytes: Vec<u32>,
 }
 
-/// What `f` makes of each lane. The library's `map` is not inlined here, which costs a fifth of a
-/// replay.
+/// Applies `f` to each lane. The library's `map` is not inlined here, which costs a fifth of a replay's time.
 #[inline(always)]
 fn each<A: Copy, T>([a, b, c, d]: [A; 4], f: impl Fn(A) -> T) -> [T; 4] {
     [f(a), f(b), f(c), f(d)]
 }
 
-/// How many fixed-point steps a texel has.
+/// Fixed-point steps per texel.
 #[derive(Clone, Copy, Debug)]
 enum Step {
-    /// `1 << n` steps, n from 2 to 31: the usual case, since sizes in a group differ by powers of two.
+    /// `1 << n` steps, n from 2 to 31. The common case, because sizes in a group differ by powers of two.
     Shift(u32),
     /// `numerator / size` steps.
     Ratio(i64),
 }
 
 impl Axis {
-    /// `steps` fixed-point steps are one unit of the texture coordinate; `bytes` has an entry for
-    /// each of the level's texels.
+    /// `steps` fixed-point steps make one unit of the texture coordinate; `bytes` has one entry per texel of the level.
     pub fn new(steps: i64, wrap: Wrap, offset: i8, bytes: Vec<u32>) -> Self {
         let size = bytes.len() as i64;
         let of_texel = steps / size;
@@ -53,17 +51,16 @@ impl Axis {
         }
     }
 
-    /// For each lane, byte offsets of the two texels around its coordinate (bilinear filtering).
+    /// Byte offsets of the two texels around each lane's coordinate (bilinear filtering).
     ///
-    /// All four lanes at once, whether they are covered or not: the choice of arithmetic is made
-    /// once, and what remains has no branches.
+    /// Computes all four lanes, covered or not. The arithmetic is selected once, so the rest has no branches.
     #[inline(always)]
     pub fn linear(&self, coordinates: [i32; 4]) -> [[u32; 2]; 4] {
         let shift = match self.step {
             Step::Shift(shift) => shift,
             Step::Ratio(steps) => return self.linear_by_ratio(steps, coordinates),
         };
-        // The coordinate less half a texel, in texels: rounded to half ones first, it cannot overflow.
+        // The coordinate minus half a texel, in texels. Rounding to half texels first avoids overflow.
         let first = each(coordinates, |c| {
             (((c >> (shift - 1)) - 1) >> 1) + self.offset
         });
@@ -80,7 +77,7 @@ impl Axis {
         }
     }
 
-    /// Byte offsets of each texel and the next, `wrapped`.
+    /// Byte offsets of each texel and the next, after `wrapped`.
     #[inline(always)]
     fn pairs(&self, first: [i32; 4], wrapped: impl Fn(i32) -> i32) -> [[u32; 2]; 4] {
         let bytes = &self.bytes[..];
@@ -100,7 +97,7 @@ impl Axis {
         })
     }
 
-    /// For each lane, byte offset of the texel that holds its coordinate.
+    /// Byte offset of the texel at each lane's coordinate.
     #[inline(always)]
     pub fn nearest(&self, coordinates: [i32; 4]) -> [u32; 4] {
         each(coordinates, |c| {
@@ -117,12 +114,12 @@ impl Axis {
         texels.map(|texel| self.bytes[texel as usize])
     }
 
-    /// Texels of the level.
+    /// Number of texels of the level.
     pub fn texels(&self) -> u32 {
         self.size as u32
     }
 
-    /// Byte offsets of a texel and the next, before the sample's offset and wrapping.
+    /// Byte offsets of a texel and the next, before sample offset and wrapping.
     pub fn pair_at(&self, texel: i64) -> [u32; 2] {
         let texel = texel + i64::from(self.offset);
         [self.byte(texel), self.byte(texel + 1)]
@@ -145,7 +142,7 @@ impl Axis {
     }
 }
 
-/// Mirrored repetition of so many texels.
+/// Mirrored repetition over `size` texels.
 #[inline(always)]
 fn mirrored(texel: i64, size: i32) -> i32 {
     let size = i64::from(size);
@@ -157,7 +154,7 @@ fn mirrored(texel: i64, size: i32) -> i32 {
 mod tests {
     use super::*;
 
-    /// Texels of any size against the same by division, at the ends of the coordinates, too.
+    /// Compares texels of any size with those of a division, including coordinates at the ends of the range.
     #[test]
     fn shifts_are_divisions_whatever_the_extent() {
         let bytes: Vec<u32> = (0..8).collect();

@@ -1,4 +1,4 @@
-//! Builds the footprint generator's tables from a trace's tables and a layout.
+//! Builds the tables of the footprint generator from a trace's tables and a layout.
 
 use super::axis::Axis;
 use super::general::General;
@@ -11,7 +11,7 @@ use formats::texture::{Sampler, TexelFormat};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// What two samples must agree on to share footprints.
+/// The properties that samples with common footprints share.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct KindKey {
     size: [u32; 2],

@@ -1,28 +1,27 @@
-//! The footprints of one quad at one level of one sample, as cache lines.
+//! The footprints of a quad at one level of one sample, as cache lines.
 
 use std::hint::select_unpredictable;
 
 /// Footprints of up to four lanes at one level.
 ///
-/// Lines are relative to the texture, so that all textures of a material with the same size share
-/// one computation.
+/// Lines are relative to the texture, so that all textures of a material with the same size share the computation.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Bundle {
     /// Mip level.
     pub level: u8,
     /// Footprints (lanes).
     pub count: u8,
-    /// Bit `i`: footprint `i` has the same lines as the one before.
+    /// Bit `i` is set if footprint `i` has the same lines as the footprint before it.
     repeats: u8,
     /// Distinct lines of each footprint, 1 to 4.
     lens: [u8; 4],
     lines: [[u32; 4]; 4],
-    /// Where somebody asked for them.
+    /// Filled if requested.
     distinct: DistinctLines,
 }
 
 impl Bundle {
-    /// Empties the bundle for a level.
+    /// Empties the bundle for a new level.
     #[inline(always)]
     pub fn begin(&mut self, level: u8) {
         self.level = level;
@@ -30,7 +29,7 @@ impl Bundle {
         self.repeats = 0;
     }
 
-    /// Distinct lines of a footprint, in the order in which its texels ask for them.
+    /// Distinct lines of a footprint, in texel order.
     #[inline(always)]
     #[must_use]
     pub fn lines_of(&self, index: usize) -> &[u32] {
@@ -38,14 +37,14 @@ impl Bundle {
         &self.lines[index & 3][..len]
     }
 
-    /// The footprints that do not have the same lines as the one before: of each its index, and how many
-    /// lanes in a row have it.
+    /// The footprints whose lines differ from those of the footprint before, each with its index and its
+    /// number of consecutive lanes.
     #[inline(always)]
     pub fn runs(&self) -> impl Iterator<Item = (usize, u32)> + use<> {
         runs(self.count, self.repeats)
     }
 
-    /// Footprints of level 0 and their distinct lines.
+    /// A bundle of level 0 with these footprints.
     #[cfg(test)]
     pub fn of(footprints: &[[u32; 4]]) -> Self {
         let mut bundle = Self::default();
@@ -57,7 +56,7 @@ impl Bundle {
         bundle
     }
 
-    /// Lists its distinct lines, for [`Self::distinct`].
+    /// Fills the list for [`Self::distinct`].
     #[inline(always)]
     pub(super) fn list_distinct(&mut self) {
         let distinct = &mut self.distinct;
@@ -69,19 +68,18 @@ impl Bundle {
         }
     }
 
-    /// Its distinct lines, if [`Footprints::scratch`](super::Footprints::scratch) was told that they are
-    /// asked for.
+    /// The distinct lines, if they were requested from [`Footprints::scratch`](super::Footprints::scratch).
     #[inline(always)]
     #[must_use]
     pub fn distinct(&self) -> &DistinctLines {
         &self.distinct
     }
 
-    /// Adds the footprint of the lines of its four texels (top left, top right, bottom left,
-    /// bottom right). `last` is the one before, for which the caller keeps room.
+    /// Adds a footprint, given the lines of its four texels (top left, top right, bottom left, bottom
+    /// right). `last` keeps the footprint before.
     ///
-    /// All in registers and without branches: whether a footprint crosses a line is a coin toss to the
-    /// processor, and what is stored by word cannot be loaded as a whole right after.
+    /// Uses registers and no branches: whether a footprint crosses a line is unpredictable, and data stored
+    /// by word cannot be loaded as a whole directly afterwards.
     #[inline(always)]
     pub fn push(&mut self, texels: [u32; 4], last: &mut [u32; 4]) {
         let [a, b, c, d] = texels;
@@ -118,7 +116,7 @@ impl Bundle {
 /// See [`Bundle::runs`].
 #[inline(always)]
 fn runs(count: u8, repeats: u8) -> impl Iterator<Item = (usize, u32)> {
-    // A bit for the first of each run, and one after the last lane.
+    // One bit for the first lane of each run, and one after the last lane.
     let all = 1_u32 << count;
     let mut firsts = (all - 1) & !u32::from(repeats) | all;
     std::iter::from_fn(move || {
@@ -128,45 +126,45 @@ fn runs(count: u8, repeats: u8) -> impl Iterator<Item = (usize, u32)> {
     })
 }
 
-/// The lines of a bundle, each once, in the order of last use.
+/// The distinct lines of a bundle, in order of last use.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DistinctLines {
     count: usize,
-    /// Lines of footprints that do not repeat the one before: some of them again.
+    /// Total lines of footprints that do not repeat the footprint before.
     listed: u32,
-    /// Of all footprints.
+    /// Line look-ups of all footprints.
     lookups: u32,
-    /// The lowest line and the highest one.
+    /// The lowest and the highest line.
     span: [u32; 2],
     lines: [DistinctLine; Self::MOST],
 }
 
-/// A line of a bundle, in one word.
+/// A line of a bundle, packed into one word.
 ///
 /// | bits | content |
 /// | --- | --- |
 /// | 0 to 31 | line relative to the texture |
-/// | 32 to 47 | footprints of the bundle that use it, a bit each |
-/// | 48 to 63 | where it stands first among the lines of footprints that do not repeat the one before |
+/// | 32 to 47 | footprints of the bundle that use it, one bit each |
+/// | 48 to 63 | index of its first occurrence among the lines of footprints that do not repeat the footprint before |
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DistinctLine(u64);
 
 impl DistinctLine {
-    /// Relative to the texture.
+    /// Line relative to the texture.
     #[inline(always)]
     #[must_use]
     pub fn line(self) -> u32 {
         self.0 as u32
     }
 
-    /// Footprints of the bundle that use it, a bit each.
+    /// Footprints of the bundle that use it, one bit each.
     #[inline(always)]
     #[must_use]
     pub fn users(self) -> u32 {
         (self.0 >> 32) as u32 & 0xffff
     }
 
-    /// Where it stands first among the lines of footprints that do not repeat the one before.
+    /// Index of its first occurrence among the lines of footprints that do not repeat the footprint before.
     #[inline(always)]
     #[must_use]
     pub fn first(self) -> u32 {
@@ -175,7 +173,7 @@ impl DistinctLine {
 }
 
 impl DistinctLines {
-    /// Four lanes, four texels each.
+    /// Four lanes with four texels each.
     const MOST: usize = 16;
 
     #[inline(always)]
@@ -184,10 +182,9 @@ impl DistinctLines {
         self.span = [u32::MAX, 0];
     }
 
-    /// Adds the lines of some footprints, `len` of them; the others repeat the first one.
+    /// Adds the first `len` lines of some footprints; the others repeat the first one.
     ///
-    /// Branches on how many lines there are so far, but not on which of them come again: that is a coin
-    /// toss to the processor.
+    /// Branches on the number of lines so far, but not on whether lines recur, which is unpredictable.
     #[inline(always)]
     fn add(&mut self, lines: [u32; 4], len: usize, users: u32) {
         let [a, b, c, d] = lines;
@@ -221,7 +218,7 @@ impl DistinctLines {
         self.lookups += len as u32 * users.count_ones();
     }
 
-    /// All of them: so many at a time, the first ones in use.
+    /// All lines, in chunks of four with the number in use.
     #[inline(always)]
     pub fn chunks(&self) -> impl Iterator<Item = ([DistinctLine; 4], usize)> {
         let count = self.count;
@@ -239,14 +236,14 @@ impl DistinctLines {
         self.lookups
     }
 
-    /// The lowest line and the highest one.
+    /// The lowest and the highest line.
     #[inline(always)]
     #[must_use]
     pub fn span(&self) -> [u32; 2] {
         self.span
     }
 
-    /// Lines of footprints that do not repeat the one before.
+    /// Total lines of footprints that do not repeat the footprint before.
     #[inline(always)]
     #[must_use]
     pub fn listed(&self) -> u32 {

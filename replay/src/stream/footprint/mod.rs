@@ -1,9 +1,9 @@
-//! Quad records to cache lines: the hot path of every replay.
+//! Converts quad records to cache lines. This is the hot path of every replay.
 //!
-//! All that does not depend on the record is computed once a trace: per draw, uv group and
-//! distinct kind of texture (size, sampler, layout) the byte offset of every column and row of
-//! texels of every level, which turns an address into two table look-ups and a sum. Textures of a
-//! group that differ only in their base address share level of detail and footprints.
+//! Everything independent of the record is computed once per trace. For each draw, uv group and kind of
+//! texture (size, sampler, layout), tables hold the byte offsets of all texel columns and rows of all
+//! levels. An address is then two table look-ups and a sum. Textures of a group that differ only in their
+//! base address share level of detail and footprints.
 
 mod axis;
 mod build;
@@ -21,28 +21,28 @@ use formats::texture::{Filter, Sampler};
 use general::General;
 use std::sync::Arc;
 
-/// A texture that a footprint falls into.
+/// The texture of a footprint.
 #[derive(Clone, Copy, Debug)]
 pub struct SampleRef {
-    /// Line that its relative lines count from.
+    /// Origin of the relative lines.
     pub base_line: u32,
     /// Index into the texture table.
     pub texture: u32,
 }
 
-/// Memory for the footprints of one record, kept from quad to quad.
+/// Buffers for the footprints of one record, reused from quad to quad.
 #[derive(Clone, Debug)]
 pub struct Scratch {
-    /// Bundles list their distinct lines.
+    /// Whether bundles list their distinct lines.
     distinct: bool,
-    /// By kind of texture: its one or two levels.
+    /// By kind of texture: one or two levels.
     bundles: Vec<[Bundle; 2]>,
     both: Vec<bool>,
-    /// By kind of texture, where pixels may be long and narrow: all there is.
+    /// By kind of texture, for anisotropic pixels: all bundles.
     many: Vec<Vec<Bundle>>,
 }
 
-/// Footprint generator of a trace under one sampling and layout.
+/// The footprint generator of a trace with one sampling and layout.
 #[derive(Debug)]
 pub struct Footprints {
     draws: Vec<Vec<Group>>,
@@ -67,24 +67,24 @@ impl Group {
     }
 }
 
-/// What the textures have in common that share footprints.
+/// Properties of the textures that share footprints.
 #[derive(Debug)]
 struct Kind {
     /// Texels of level 0.
     size: [u32; 2],
-    /// The group's, which defines the fixed-point step.
+    /// Size of the group, which defines the fixed-point step.
     extent: [u32; 2],
-    /// Fixed-point steps to texels of level 0.
+    /// Texels of level 0 per fixed-point step.
     to_texels: [f32; 2],
     sampler: Sampler,
-    /// Bytes by which the texture starts after the start of a line.
+    /// Offset in bytes from the start of a line to the start of the texture.
     skew_bytes: u32,
     levels: Vec<Level>,
     general: Option<General>,
 }
 
 impl Kind {
-    /// Texels of a level.
+    /// Size of a level in texels.
     fn level_size(&self, level: u32) -> [u32; 2] {
         let Level { u, v, .. } = &self.levels[level as usize];
         [u.texels(), v.texels()]
@@ -100,15 +100,15 @@ struct Level {
 }
 
 impl Footprints {
-    /// Generator for the draws of a trace.
+    /// The generator for the draws of a trace.
     ///
     /// # Errors
-    /// Tables that refer to what is not there, or more than 2^32 - 1 lines of addresses.
+    /// Tables with invalid references, or more than 2^32 - 1 lines.
     pub fn new(tables: &Tables, config: &RunConfig) -> Result<Self, StreamError> {
         build::Builder::new(tables, config)?.finish()
     }
 
-    /// Memory for [`Self::for_quad`]; `distinct`: bundles are to list their distinct lines.
+    /// Buffers for [`Self::for_quad`]. `distinct`: bundles list their distinct lines.
     #[must_use]
     pub fn scratch(&self, distinct: bool) -> Scratch {
         let kinds = self
@@ -132,8 +132,8 @@ impl Footprints {
         self.lines
     }
 
-    /// Calls `emit` for every sample and level of a quad: records, then samples in shader order,
-    /// then levels; where pixels may be long and narrow, several times a level.
+    /// Calls `emit` for every sample and level of a quad: by record, then sample in shader order, then
+    /// level. With anisotropic filtering, a level can have several bundles.
     #[inline(always)]
     pub fn for_quad(
         &self,
@@ -150,7 +150,7 @@ impl Footprints {
         }
         for record in records {
             let Some(group) = groups.get(usize::from(record.group)) else {
-                // NO_GROUP: nothing is sampled.
+                // NO_GROUP: samples nothing.
                 continue;
             };
             let slots = scratch.bundles.iter_mut().zip(&mut scratch.both);
@@ -171,8 +171,7 @@ impl Footprints {
         }
     }
 
-    /// [`Self::for_quad`] where a level may have any number of bundles: pixels may be long and narrow, or
-    /// each lane has levels of its own, or samples are general.
+    /// [`Self::for_quad`] for levels with any number of bundles: anisotropic filtering, levels per lane, or general samples.
     #[inline(never)]
     fn for_long_quad(
         &self,
@@ -202,7 +201,7 @@ impl Footprints {
         }
     }
 
-    /// Footprints of a record in one kind of texture, however long and narrow its pixels are.
+    /// Footprints of a record in one kind of texture with anisotropic filtering.
     fn long(&self, kind: &Kind, record: &QuadRecord, out: &mut Vec<Bundle>) {
         out.clear();
         let lanes = if self.helper_lanes {
@@ -250,7 +249,7 @@ impl Footprints {
         }
     }
 
-    /// Bundles of 2x2 texels, each given by its upper left texel before wrapping.
+    /// Adds bundles of 2x2 texels, each given by its top left texel before wrapping.
     fn push_blocks(
         &self,
         kind: &Kind,
@@ -280,8 +279,8 @@ impl Footprints {
         }
     }
 
-    /// Footprints of a record in one kind of texture where each lane has levels of its own: level by
-    /// level and probe by probe, the lanes that have it; then the ellipses on this level.
+    /// Footprints of a record in one kind of texture with levels per lane: by level and probe, the lanes
+    /// that use them, then the ellipses on this level.
     fn by_lane(
         &self,
         kind: &Kind,
@@ -305,7 +304,7 @@ impl Footprints {
         let probes = lanes_of(lanes).map(|lane| reach[lane].probe_count()).max();
         for level in 0..levels {
             for probe in 0..probes.unwrap_or(0) {
-                // Lanes in a row that filter alike share a bundle.
+                // Consecutive lanes with the same filter share a bundle.
                 let mut open: Option<(Filter, u8)> = None;
                 let mut at = *uv;
                 for lane in lanes_of(lanes) {
@@ -347,7 +346,7 @@ impl Footprints {
         }
     }
 
-    /// Footprints of a record in one kind of texture; true if two levels are read.
+    /// Footprints of a record in one kind of texture. Returns true if two levels are read.
     #[inline(always)]
     fn bundles(&self, kind: &Kind, record: &QuadRecord, out: &mut [Bundle; 2]) -> bool {
         let lod = self.lod(kind, record) + self.sampling.lod_bias;
@@ -373,7 +372,7 @@ impl Footprints {
         both
     }
 
-    /// `quad_lod`, with the scale computed once a trace for the formula that is used by default.
+    /// `quad_lod`, with the scale precomputed for the default formula.
     #[inline(always)]
     fn lod(&self, kind: &Kind, record: &QuadRecord) -> f32 {
         if self.sampling.lod != LodFormula::Llvmpipe {

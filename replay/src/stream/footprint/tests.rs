@@ -10,7 +10,7 @@ use proptest::prelude::*;
 /// Texture, level and lines of a footprint.
 type Read = (u32, u8, Vec<u32>);
 
-/// What the fast generator yields.
+/// Reads of the fast generator.
 fn fast(tables: &Tables, config: &RunConfig, records: &[QuadRecord]) -> Vec<Read> {
     let footprints = Footprints::new(tables, config).unwrap();
     let mut reads = Vec::new();
@@ -35,7 +35,7 @@ fn fast(tables: &Tables, config: &RunConfig, records: &[QuadRecord]) -> Vec<Read
     reads
 }
 
-/// The same from the reference: texel by texel through the layout.
+/// Reads of the reference, texel by texel through the layout.
 fn reference(tables: &Tables, config: &RunConfig, records: &[QuadRecord]) -> Vec<Read> {
     let layout = Layout::new(&tables.textures, &config.layout).unwrap();
     let mut reads = Vec::new();

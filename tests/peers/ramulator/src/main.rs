@@ -20,8 +20,8 @@ const CONFIG: &str = "standard = DDR4\nchannels = 1\nranks = 1\nspeed = DDR4_240
     record_cmd_trace = off\nprint_cmd_trace = off\ncpu_tick = 8\nmem_tick = 3\nearly_exit = on\n\
     expected_limit_insts = 200000000\nwarmup_insts = 100000000\ncache = no\ntranslation = None\naddr_mapping = RoBaRaCoCh\n";
 
-/// A read: number of its burst, clock of its arrival.
-type Read = (u32, u64);
+/// A request: number of its burst, clock of its arrival, and whether it writes.
+type Request = (u32, u64, bool);
 
 /// What a simulator counted.
 struct Counted {
@@ -46,38 +46,38 @@ impl Random {
 const BURSTS: u32 = 1 << 24;
 
 /// Bursts that follow each other, a read every so many clocks.
-fn follow(clocks: u64) -> Vec<Read> {
+fn follow(clocks: u64) -> Vec<Request> {
     (0..READS as u32)
-        .map(|i| (i, clocks * u64::from(i)))
+        .map(|i| (i, clocks * u64::from(i), false))
         .collect()
 }
 
-fn sequential() -> Vec<Read> {
+fn sequential() -> Vec<Request> {
     follow(10)
 }
 
 /// Close to the 6 clocks between reads of a bank group: what queues up behind a refresh takes long to go.
-fn backlog() -> Vec<Read> {
+fn backlog() -> Vec<Request> {
     follow(8)
 }
 
 /// Bursts anywhere, a read every 16 clocks.
-fn random() -> Vec<Read> {
+fn random() -> Vec<Request> {
     let mut random = Random(1);
     (0..READS as u64)
-        .map(|i| (random.below(BURSTS), 16 * i))
+        .map(|i| (random.below(BURSTS), 16 * i, false))
         .collect()
 }
 
 /// Runs of 1 to 16 bursts from anywhere, as a tile's textures give them: a read every other clock, then a pause that leaves
 /// the data bus half idle.
-fn runs() -> Vec<Read> {
+fn runs() -> Vec<Request> {
     let mut random = Random(2);
     let (mut reads, mut clock) = (Vec::new(), 0);
     while reads.len() < READS {
         let (start, length) = (random.below(BURSTS - 16), 1 + random.below(16));
         for burst in start..start + length {
-            reads.push((burst, clock));
+            reads.push((burst, clock, false));
             clock += 2;
         }
         clock += 6 * u64::from(length) + u64::from(random.below(16));
@@ -86,13 +86,32 @@ fn runs() -> Vec<Read> {
 }
 
 /// Strides of three rows' length: every read opens a row.
-fn strided() -> Vec<Read> {
+fn strided() -> Vec<Request> {
     (0..READS as u32)
-        .map(|i| (i * 384 % BURSTS, 24 * u64::from(i)))
+        .map(|i| (i * 384 % BURSTS, 24 * u64::from(i), false))
         .collect()
 }
 
-fn ours(reads: &[Read]) -> Counted {
+/// As [`runs`], with every third run written: tiles that are done between the textures of others.
+fn written_runs() -> Vec<Request> {
+    let mut runs = runs();
+    let (mut run, mut last) = (0, None);
+    for (burst, _, write) in &mut runs {
+        run += u32::from(last.replace(*burst).is_none_or(|last: u32| last + 1 != *burst));
+        *write = run % 3 == 0;
+    }
+    runs
+}
+
+/// A write every fourth request, anywhere, a request every 24 clocks.
+fn random_writes() -> Vec<Request> {
+    let mut random = Random(3);
+    (0..READS as u64)
+        .map(|i| (random.below(BURSTS), 24 * i, i % 4 == 0))
+        .collect()
+}
+
+fn ours(reads: &[Request]) -> Counted {
     let config = DramConfig {
         preset: DramPreset::Ddr4,
         channels: 1,
@@ -103,33 +122,36 @@ fn ours(reads: &[Read]) -> Counted {
     };
     let device = config.preset.device();
     let mut dram = Dram::new(&config, device.burst_bytes);
-    for (burst, clock) in reads {
+    for (burst, clock, write) in reads {
         // The first cycle of 1 ns that is not before the clock: rounding down gives the clock again.
         let cycle = (clock * u64::from(device.clock_ps)).div_ceil(1_000);
-        dram.read(*burst, Some(cycle));
+        let bytes = u64::from(device.burst_bytes);
+        dram.request(u64::from(*burst) * bytes, bytes, *write, Some(cycle));
     }
     let found = dram.result();
     Counted {
-        row_hits: found.row_hits as f64,
+        row_hits: (found.row_hits + found.write_row_hits) as f64,
         latency: found.latency_mean_ns * 1_000.0 / f64::from(device.clock_ps),
     }
 }
 
-fn theirs(reads: &[Read], name: &str) -> Counted {
+fn theirs(reads: &[Request], name: &str) -> Counted {
     let folder = std::env::temp_dir().join(format!("ramulator-peer-{}-{name}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a temporary folder");
     let (config, stats) = (folder.join("ddr4.cfg"), folder.join("stats"));
     std::fs::write(&config, CONFIG).expect("a temporary file");
     let mut peer = RamulatorWrapper::new(&config.to_string_lossy(), &stats.to_string_lossy());
     let (mut clock, mut answered) = (0, 0);
-    for (burst, arrival) in reads {
+    for (burst, arrival, write) in reads {
         while clock < *arrival {
             peer.cycle();
             clock += 1;
         }
-        peer.send(u64::from(*burst) * 64, false);
+        peer.send(u64::from(*burst) * 64, *write);
     }
-    while answered < reads.len() {
+    // Writes are not answered.
+    let wanted = reads.iter().filter(|(.., write)| !write).count();
+    while answered < wanted {
         while peer.ret_available() {
             peer.pop();
             answered += 1;
@@ -154,18 +176,20 @@ fn theirs(reads: &[Read], name: &str) -> Counted {
     Counted {
         row_hits: value(".row_hits_channel_0_core"),
         // A request is seen one clock after its arrival.
-        latency: value("read_latency_sum_0") / reads.len() as f64 - 1.0,
+        latency: value("read_latency_sum_0") / wanted as f64 - 1.0,
     }
 }
 
 /// A stream by name.
-type Stream = (&'static str, fn() -> Vec<Read>);
+type Stream = (&'static str, fn() -> Vec<Request>);
 
-const STREAMS: [Stream; 5] = [
+const STREAMS: [Stream; 7] = [
     ("sequential", sequential),
     ("random", random),
     ("runs", runs),
     ("strided", strided),
+    ("written-runs", written_runs),
+    ("random-writes", random_writes),
     ("backlog", backlog),
 ];
 

@@ -110,7 +110,7 @@ mod tests {
             eyes: Ok(Rule::Halves),
             rows: vec![row],
         };
-        let text = page("a<b", &[list.clone()]);
+        let text = page("a<b", std::slice::from_ref(&list));
         assert!(text.contains("<title>Passes of a&lt;b</title>"));
         assert!(text.contains("frame 4: both eyes by viewport halves"));
         assert!(text.contains("shadow map") && text.contains("data:image/png;base64,iVBOR"));

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::{BTreeMap, HashSet};
 
-/// Extensions that are read (docs/scene-files.md).
+/// Extensions that are read (docs/use/scene-files.md).
 pub(super) const SUPPORTED: [&str; 10] = [
     "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn the_page_on_scene_files_names_every_supported_extension_and_no_other() {
-        let page = include_str!("../../../../docs/scene-files.md");
+        let page = include_str!("../../../../docs/use/scene-files.md");
         let words = page.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
         let is_extension = |word: &&str| word.starts_with("KHR_") || word.starts_with("EXT_");
         let mut named: Vec<&str> = words.filter(is_extension).collect();

@@ -4,7 +4,7 @@
 //! that touches bytes is read here with its own range checks, because the crate's readers panic
 //! on accessors that lie about their buffers.
 //!
-//! docs/scene-files.md says what is read and what is left out. Degenerate triangles are kept: they
+//! docs/use/scene-files.md says what is read and what is left out. Degenerate triangles are kept: they
 //! cost a primitive number and cover nothing.
 
 mod accessors;

@@ -1,4 +1,4 @@
-//! Wavefront OBJ with MTL materials, as the world writes them (docs/scene-files.md).
+//! Wavefront OBJ with MTL materials, as the world writes them (docs/use/scene-files.md).
 
 mod elements;
 mod library;

@@ -1,0 +1,116 @@
+//! Footprints that miss in some L1, collected to be counted and sent to the L2 caches in batches.
+//!
+//! An L2's contents depend only on the order of its accesses, so it may lag behind the L1 caches.
+//! Processing a batch for one number of sets at a time keeps the loops short and free of unpredictable
+//! branches.
+
+use super::tally::{Access, Level};
+use crate::memory::Forest;
+
+/// Accesses per batch: few enough for the processor's L1 cache, and very few in tests, which replay little.
+const MOST: usize = if cfg!(test) { 16 } else { 1024 };
+
+/// Maximum lines per footprint.
+const LINES: usize = 4;
+
+/// All L2 caches below one L1.
+pub(super) struct Under {
+    /// The L1's number of sets, its number of ways, and the rank of the latter.
+    pub(super) tree: usize,
+    pub(super) ways: u8,
+    pub(super) rank: usize,
+    pub(super) level: Level,
+    pub(super) forest: Forest,
+}
+
+/// Accesses to the L1 caches of all cores, in order.
+pub(super) struct Pending {
+    accesses: Vec<Access>,
+    /// Depth of each line, by number of sets, with room for one more footprint.
+    depths: Vec<u8>,
+    /// Number of L1 set counts.
+    trees: usize,
+    /// Misses of one L1, with their depths for one number of L2 sets.
+    missed: Vec<Access>,
+    l2_depths: Vec<u8>,
+}
+
+impl Pending {
+    pub(super) fn new(trees: usize) -> Self {
+        Self {
+            accesses: Vec::with_capacity(MOST + LINES),
+            depths: vec![0; (MOST + LINES) * trees],
+            trees,
+            missed: Vec::new(),
+            l2_depths: Vec::new(),
+        }
+    }
+
+    /// The slot for the depths of the next access.
+    #[inline(always)]
+    pub(super) fn next_depths(&mut self) -> &mut [u8] {
+        let first = self.accesses.len() * self.trees;
+        &mut self.depths[first..first + self.trees]
+    }
+
+    /// Identifies the footprint whose first access comes next.
+    #[inline(always)]
+    pub(super) fn footprint(&self) -> u32 {
+        self.accesses.len() as u32
+    }
+
+    /// Adds an access whose depths have been written.
+    #[inline(always)]
+    pub(super) fn push(&mut self, access: Access) {
+        self.accesses.push(access);
+    }
+
+    /// True if there is no room for another footprint.
+    #[inline(always)]
+    pub(super) fn is_full(&self) -> bool {
+        self.accesses.len() >= MOST
+    }
+
+    /// Counts all accesses and simulates the L2 caches.
+    pub(super) fn drain(&mut self, l1: &mut Level, under: &mut [Under]) {
+        for (tree, tally) in l1.tallies.iter_mut().enumerate() {
+            let depths = of_tree(&self.depths, self.trees, tree);
+            tally.count(&self.accesses, depths);
+        }
+        for under in under {
+            let depths = of_tree(&self.depths, self.trees, under.tree);
+            self.missed.clone_from(&self.accesses);
+            retain(&mut self.missed, depths, under.ways);
+            let last = under.level.tallies.len() - 1;
+            for (tree, tally) in under.level.tallies.iter_mut().enumerate() {
+                let lines = self.missed.iter().map(|access| access.line);
+                under.forest.access_tree(tree, lines, &mut self.l2_depths);
+                let depths = self.l2_depths.iter().copied();
+                tally.count(&self.missed, depths.clone());
+                if tree < last {
+                    // A line on top with fewer sets is on top with more sets.
+                    retain(&mut self.missed, depths, 1);
+                }
+            }
+        }
+        self.accesses.clear();
+    }
+}
+
+/// Depths for one number of sets.
+#[inline(always)]
+fn of_tree(depths: &[u8], trees: usize, tree: usize) -> impl Iterator<Item = u8> {
+    depths.chunks_exact(trees).map(move |depths| depths[tree])
+}
+
+/// Branch-free: keeps the accesses with a depth of at least `least`.
+#[inline(always)]
+fn retain(accesses: &mut Vec<Access>, depths: impl Iterator<Item = u8>, least: u8) {
+    let mut kept = 0;
+    for (index, depth) in (0..accesses.len()).zip(depths) {
+        // A dropped access is overwritten by the next one.
+        accesses[kept] = accesses[index];
+        kept += usize::from(depth >= least);
+    }
+    accesses.truncate(kept);
+}

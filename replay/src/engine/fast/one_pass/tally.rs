@@ -1,0 +1,215 @@
+//! Counts the misses of all caches of a level by the number of associativities that miss.
+//!
+//! Accesses are counted in batches and without branches, because whether a line misses is unpredictable.
+
+use super::Geometry;
+use crate::engine::counts::Misses;
+use crate::memory::Forest;
+use crate::stream::Bins;
+use std::hint::select_unpredictable;
+
+/// A line of a footprint that misses in some cache.
+#[derive(Clone, Copy)]
+pub(super) struct Access {
+    pub(super) line: u32,
+    pub(super) cell: u32,
+    pub(super) tile: u32,
+    /// Distinguishes the footprint from its neighbours.
+    pub(super) footprint: u32,
+}
+
+impl Access {
+    /// Placeholder before the first access.
+    const NONE: Self = Self {
+        line: 0,
+        cell: 0,
+        tile: 0,
+        footprint: u32::MAX,
+    };
+}
+
+/// The per-tile count.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum ByTile {
+    Footprints,
+    Lines,
+}
+
+/// Counts by bin (a cell or a tile) and by the number of associativities that miss, from one on. Index zero
+/// would belong to hits; it overlaps the previous bin, and nothing is added there.
+struct Classes<T> {
+    /// Starts one before the first bin.
+    counts: Vec<T>,
+    classes: usize,
+}
+
+impl<T: Copy + Default> Classes<T> {
+    fn new(bins: usize, classes: usize) -> Self {
+        Self {
+            counts: vec![T::default(); bins * classes + 1],
+            classes,
+        }
+    }
+
+    /// Counts of the associativity with this rank, by bin.
+    fn of(&self, rank: usize, sum: impl Fn(&[T]) -> T) -> impl Iterator<Item = T> {
+        let bins = self.counts[1..].chunks(self.classes);
+        bins.map(move |counts| sum(&counts[rank..]))
+    }
+}
+
+/// Misses of all caches with one number of sets.
+pub(super) struct Tally {
+    pub(super) sets: u32,
+    /// Associativities, ascending.
+    ways: Vec<u32>,
+    /// Number of associativities that miss a line, by its depth.
+    missing: Vec<u8>,
+    lines: Classes<u64>,
+    footprints: Classes<u64>,
+    tiles: Classes<u32>,
+    by_tile: Option<ByTile>,
+}
+
+impl Tally {
+    fn depth(&self) -> u32 {
+        self.ways.last().copied().unwrap_or(0)
+    }
+
+    /// Counts accesses, footprint by footprint. `depths` has each line's depth in its stack.
+    pub(super) fn count(&mut self, accesses: &[Access], depths: impl Iterator<Item = u8>) {
+        match *self.ways {
+            [ways] => self.count_one(ways as u8, accesses, depths),
+            _ => self.count_several(accesses, depths),
+        }
+    }
+
+    /// For one associativity: a footprint counts at its first miss.
+    fn count_one(&mut self, ways: u8, accesses: &[Access], depths: impl Iterator<Item = u8>) {
+        // Separate borrows, so that they stay in registers.
+        let (lines, footprints) = (
+            &mut self.lines.counts[1..],
+            &mut self.footprints.counts[1..],
+        );
+        let (tiles, by_tile) = (&mut self.tiles.counts[1..], self.by_tile);
+        let (mut footprint, mut missed_before) = (u32::MAX, false);
+        for (access, depth) in accesses.iter().zip(depths) {
+            let misses = depth >= ways;
+            missed_before &= access.footprint == footprint;
+            footprint = access.footprint;
+            let first = misses & !missed_before;
+            missed_before |= misses;
+            lines[access.cell as usize] += u64::from(misses);
+            footprints[access.cell as usize] += u64::from(first);
+            if let Some(by_tile) = by_tile {
+                let counts = match by_tile {
+                    ByTile::Footprints => first,
+                    ByTile::Lines => misses,
+                };
+                let total = &mut tiles[access.tile as usize];
+                *total = total.wrapping_add(u32::from(counts));
+            }
+        }
+    }
+
+    /// For several associativities: a footprint counts at its end, by the most associativities that miss
+    /// any of its lines.
+    fn count_several(&mut self, accesses: &[Access], depths: impl Iterator<Item = u8>) {
+        let classes = self.ways.len();
+        let place = |bin: u32, missing: u8| bin as usize * classes + usize::from(missing);
+        let (lines, footprints) = (&mut *self.lines.counts, &mut *self.footprints.counts);
+        let (tiles, by_tile, missing) = (&mut *self.tiles.counts, self.by_tile, &*self.missing);
+        let mut tile = |what, bin, missing: u8, count: bool| {
+            if by_tile == Some(what) {
+                let total = &mut tiles[place(bin, missing)];
+                *total = total.wrapping_add(u32::from(count));
+            }
+        };
+        let mut last = Access::NONE;
+        // The most associativities that miss a line of the current footprint.
+        let mut most = 0;
+        for (access, depth) in accesses.iter().zip(depths) {
+            let missing = missing[usize::from(depth)];
+            let ended = access.footprint != last.footprint;
+            let counts = ended & (most > 0);
+            footprints[place(last.cell, most)] += u64::from(counts);
+            tile(ByTile::Footprints, last.tile, most, counts);
+            most = missing.max(select_unpredictable(ended, 0, most));
+            lines[place(access.cell, missing)] += u64::from(missing > 0);
+            tile(ByTile::Lines, access.tile, missing, missing > 0);
+            last = *access;
+        }
+        footprints[place(last.cell, most)] += u64::from(most > 0);
+        tile(ByTile::Footprints, last.tile, most, most > 0);
+    }
+
+    /// Misses of the associativity with this rank, by cell.
+    pub(super) fn misses(&self, rank: usize) -> impl Iterator<Item = Misses> {
+        let sum = |counts: &[u64]| counts.iter().sum();
+        let footprints = self.footprints.of(rank, sum);
+        self.lines
+            .of(rank, sum)
+            .zip(footprints)
+            .map(|(lines, footprints)| Misses {
+                footprints,
+                lines,
+                secondary: 0,
+            })
+    }
+
+    pub(super) fn tile_misses(&self, rank: usize) -> impl Iterator<Item = u32> {
+        let sum = |counts: &[u32]| counts.iter().copied().fold(0, u32::wrapping_add);
+        self.tiles.of(rank, sum)
+    }
+
+    pub(super) fn rank(&self, ways: u32) -> usize {
+        self.ways.partition_point(|&w| w < ways)
+    }
+}
+
+/// All caches of a level that receive the same lines.
+pub(super) struct Level {
+    /// By number of sets, ascending.
+    pub(super) tallies: Vec<Tally>,
+}
+
+impl Level {
+    pub(super) fn new(
+        bins: &Bins,
+        by_tile: Option<ByTile>,
+        geometries: impl Iterator<Item = Geometry>,
+    ) -> Self {
+        let mut sorted: Vec<Geometry> = geometries.collect();
+        sorted.sort_unstable();
+        sorted.dedup();
+        let tally = |same_sets: &[Geometry]| {
+            let ways: Vec<u32> = same_sets.iter().map(|&(_, ways)| ways).collect();
+            let depth = ways.last().copied().unwrap_or(0);
+            let missing = |depth| ways.iter().filter(|&&w| w <= depth).count() as u8;
+            let tiles = by_tile.map_or(0, |_| bins.tiles());
+            Tally {
+                sets: same_sets[0].0,
+                missing: (0..=depth).map(missing).collect(),
+                lines: Classes::new(bins.cells(), ways.len()),
+                footprints: Classes::new(bins.cells(), ways.len()),
+                tiles: Classes::new(tiles, ways.len()),
+                by_tile,
+                ways,
+            }
+        };
+        Self {
+            tallies: sorted.chunk_by(|a, b| a.0 == b.0).map(tally).collect(),
+        }
+    }
+
+    pub(super) fn forest(&self) -> Forest {
+        let tree = |tally: &Tally| (tally.sets, tally.depth());
+        Forest::new(&self.tallies.iter().map(tree).collect::<Vec<_>>())
+    }
+
+    /// Index of the number of sets, and rank of the associativity.
+    pub(super) fn find(&self, (sets, ways): Geometry) -> (usize, usize) {
+        let tree = self.tallies.partition_point(|tally| tally.sets < sets);
+        (tree, self.tallies[tree].rank(ways))
+    }
+}

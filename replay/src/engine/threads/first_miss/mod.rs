@@ -1,0 +1,190 @@
+//! The machine that the Z2 paper probably simulates: a thread stops at its first footprint that misses, and
+//! rates count first look-ups. `docs/models/z2.md` states the rules and the evidence for them.
+//!
+//! A core's first stage performs one look-up per cycle: for the running thread, else for a returning
+//! thread, else for a new one. In the same cycle, cores with lower numbers go first.
+
+mod memory;
+mod thread;
+
+use super::{Items, ThreadModel, start_item};
+use crate::access::FrameClients;
+use crate::config::{RunConfig, TmuConfig};
+use crate::engine::batch::Outcome;
+use crate::engine::counts::CacheCounts;
+use crate::memory::{Caches, Delay, DelayedFill, MissPath};
+use crate::stream::{Cores, StreamError};
+use crate::tmu::PipelineStats;
+use memory::{Memory, Seen};
+use std::collections::VecDeque;
+pub(super) use thread::Thread;
+
+/// Cores whose threads stop at their first miss, over caches with delayed fill.
+pub struct FirstMiss<D> {
+    memory: Memory<D>,
+    units: Vec<Unit>,
+    tmu: TmuConfig,
+}
+
+/// A core's texture unit.
+#[derive(Default)]
+struct Unit {
+    clock: u64,
+    /// The running thread, and the cycle at which its current trip began.
+    running: Option<(u64, Thread)>,
+    /// Returning threads and the cycles of their return, which ascend, because trips do not overlap.
+    waiting: VecDeque<(u64, Thread)>,
+    /// Finished threads, whose allocations are reused.
+    spare: Vec<Thread>,
+    drained: bool,
+    stats: PipelineStats,
+}
+
+/// State of the first stage.
+enum Next {
+    /// A thread occupies the slot.
+    Run,
+    /// A new thread can use the slot.
+    Free,
+    /// No threads are left.
+    Done,
+}
+
+impl Unit {
+    /// Advances time until a thread occupies the slot or a new one can.
+    fn next(&mut self, threads: u32) -> Next {
+        if self.running.is_some() {
+            return Next::Run;
+        }
+        let full = self.drained || self.waiting.len() >= threads as usize;
+        match self.waiting.front() {
+            Some(&(back, _)) if back <= self.clock || full => {
+                self.stats.idle += back.saturating_sub(self.clock);
+                self.stats.loops += 1;
+                self.clock = self.clock.max(back);
+                let now = self.clock;
+                self.running = self.waiting.pop_front().map(|(_, thread)| (now, thread));
+                Next::Run
+            }
+            None if self.drained => Next::Done,
+            _ => Next::Free,
+        }
+    }
+}
+
+impl<D: DelayedFill> FirstMiss<D> {
+    /// Empty caches, and one texture unit per L1.
+    pub fn new<C: Delay<Delayed = D>>(
+        caches: Caches<C>,
+        config: &RunConfig,
+        counts: CacheCounts,
+        path: MissPath,
+    ) -> Self {
+        Self {
+            units: caches.l1.iter().map(|_| Unit::default()).collect(),
+            memory: Memory::new(caches, config, counts, path),
+            tmu: config.tmu,
+        }
+    }
+
+    /// Runs the current thread until it misses or finishes. Returns false if it must access the L2 later than `until`.
+    fn pass(&mut self, core: usize, until: u64) -> bool {
+        let unit = &mut self.units[core];
+        let Some((began, mut thread)) = unit.running.take() else {
+            return true;
+        };
+        while let Some(footprint) = thread.footprint() {
+            let now = unit.clock;
+            let seen = self.memory.look_up(core, now, footprint.lines);
+            if seen == Seen::All || thread.has_kept(now) {
+                self.memory.forwarded += u64::from(seen != Seen::All);
+                unit.stats.useful += 1;
+                unit.clock += 1;
+                thread.advance();
+            } else if now > until {
+                unit.running = Some((began, thread));
+                return false;
+            } else {
+                self.memory.ask(core, now, &mut thread);
+                unit.stats.wasted += 1;
+                unit.clock += 1;
+                let back = began + u64::from(self.tmu.loop_cycles);
+                unit.waiting.push_back((back.max(unit.clock), thread));
+                return true;
+            }
+        }
+        unit.spare.push(thread);
+        true
+    }
+}
+
+impl<D: DelayedFill> ThreadModel for FirstMiss<D> {
+    fn start_phase(&mut self, cycle: u64) {
+        for unit in &mut self.units {
+            (unit.drained, unit.clock) = (false, cycle);
+        }
+    }
+
+    fn clocks(&self) -> Vec<u64> {
+        self.units.iter().map(|unit| unit.clock).collect()
+    }
+
+    fn run_core(
+        &mut self,
+        core: usize,
+        until: u64,
+        work: &mut Cores<'_>,
+        items: &mut Items<'_, '_>,
+    ) -> Result<u64, StreamError> {
+        loop {
+            let unit = &mut self.units[core];
+            match unit.next(self.tmu.threads) {
+                Next::Done => return Ok(u64::MAX),
+                Next::Run => {
+                    if !self.pass(core, until) {
+                        return Ok(self.units[core].clock);
+                    }
+                }
+                Next::Free => {
+                    if let Some(quad) = work.next_quad(core) {
+                        if quad.footprints > 0 {
+                            unit.stats.threads += 1;
+                            let mut thread = unit.spare.pop().unwrap_or_default();
+                            thread.begin(quad);
+                            unit.running = Some((unit.clock, thread));
+                        }
+                    } else if unit.clock > until {
+                        return Ok(unit.clock);
+                    } else if let Some(item) = items.next(core) {
+                        let now = unit.clock;
+                        start_item(self.memory.l2(), work, items, core, item, now)?;
+                    } else {
+                        unit.drained = true;
+                    }
+                }
+            }
+        }
+    }
+
+    fn end_phase(&mut self) -> u64 {
+        self.units.iter().map(|unit| unit.clock).max().unwrap_or(0)
+    }
+
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64) {
+        self.memory.shared().client_accesses(clients, cycle);
+    }
+
+    fn flush(&mut self) {
+        self.memory.flush();
+    }
+
+    fn outcome(&self, cycles: u64) -> Outcome {
+        let stats = self.units.iter().map(|unit| unit.stats);
+        let useful = self.units.iter().map(|unit| unit.stats.useful).sum();
+        Outcome {
+            memory: self.memory.result(),
+            first_lookups: Some(self.memory.first_lookups(useful)),
+            ..Outcome::timed(self.memory.counts().clone(), stats, cycles)
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! The caches as seen by texture units: a thread's first trip looks up the tags of all its footprints, and
+//! missing lines are fetched.
+//!
+//! Nothing arrives during a thread's look-up. Each distinct line is therefore resident, in flight or absent
+//! for all of its footprints alike, and the state left in the L1 depends only on the order of each line's
+//! last look-up. So the distinct lines are looked up in that order, and single footprints matter only if a
+//! line was missing.
+
+use super::super::Shared;
+use super::asking::{Absent, Asking, Trips};
+use crate::config::{RunConfig, TmuConfig};
+use crate::engine::counts::CacheCounts;
+use crate::memory::{Caches, Delay, DelayedFill, MissPath, NOT_IN_FLIGHT, SecondLevel};
+use crate::result::MemoryResult;
+use crate::stream::{QuadLines, Use};
+use crate::tmu::{Pending, Waiting};
+use std::ops::Range;
+
+/// The last thread looked up on a core.
+#[derive(Default)]
+struct LookedUp {
+    /// The arrivals it waits for.
+    waiting: Waiting,
+    /// Its distinct lines that are neither resident nor in flight, by segment.
+    absent: Vec<Absent>,
+    /// End of each segment in `absent`, if there are several.
+    segments: Vec<usize>,
+}
+
+/// Outcome of a thread's look-up in the core's L1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Found {
+    /// All lines are resident.
+    All,
+    /// The missing lines are all in flight.
+    InFlight,
+    /// Some lines must be requested from the L2.
+    NotAll,
+}
+
+/// L1 caches above a shared L2.
+pub struct Memory<D> {
+    shared: Shared<D>,
+    /// One per core.
+    threads: Vec<LookedUp>,
+    tmu: TmuConfig,
+    memory_cycles: u64,
+    /// True if a miss fills the cache immediately, so that later look-ups of the same thread hit.
+    misses_change_caches_at_once: bool,
+    /// The absent lines of a segment, by first use.
+    by_first_use: [Absent; Use::FIRST_LINES],
+}
+
+impl<D: DelayedFill> Memory<D> {
+    /// Empty caches.
+    pub fn new<C: Delay<Delayed = D>>(
+        caches: Caches<C>,
+        config: &RunConfig,
+        counts: CacheCounts,
+        path: MissPath,
+    ) -> Self {
+        let memory_cycles = u64::from(config.level.l2.hit_cycles) + u64::from(config.memory_cycles);
+        // Includes later trips of threads with many missing lines.
+        let l1_cycles = memory_cycles + 8 * u64::from(config.tmu.loop_cycles);
+        let threads = caches.l1.iter().map(|_| LookedUp::default());
+        Self {
+            threads: threads.collect(),
+            shared: Shared::new(caches, config, counts, path, [l1_cycles, memory_cycles]),
+            tmu: config.tmu,
+            memory_cycles: config.memory_cycles.into(),
+            misses_change_caches_at_once: config.misses_change_caches_at_once(),
+            by_first_use: [Absent::default(); Use::FIRST_LINES],
+        }
+    }
+
+    /// Misses so far.
+    pub fn counts(&self) -> &CacheCounts {
+        &self.shared.counts
+    }
+
+    /// Counts beside and below the L2.
+    pub fn result(&self) -> MemoryResult {
+        self.shared.l2.result()
+    }
+
+    /// Fetches of the L2 per interval of time, if recorded.
+    pub fn fetched_lines(&self) -> &[u32] {
+        self.shared.l2.fetched_lines()
+    }
+
+    /// The caches.
+    pub fn shared(&mut self) -> &mut Shared<D> {
+        &mut self.shared
+    }
+
+    /// The L2 and everything beside and below it.
+    pub fn l2(&mut self) -> &mut SecondLevel<D> {
+        &mut self.shared.l2
+    }
+
+    /// Empties all caches and drops the lines in flight.
+    pub fn flush(&mut self) {
+        self.shared.flush();
+    }
+
+    /// Looks up all lines of a thread that enters at `now` in the core's L1. If lines are neither resident
+    /// nor in flight, the caller must call [`Self::ask`].
+    #[inline(always)]
+    pub fn look_up(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> Found {
+        let LookedUp {
+            waiting,
+            absent,
+            segments,
+        } = &mut self.threads[core];
+        waiting.clear();
+        absent.clear();
+        if self.misses_change_caches_at_once || quad.distinct.is_empty() {
+            // Distinct lines are not listed; `ask` looks footprints up one by one.
+            return Found::NotAll;
+        }
+        let (cache, counts) = (&mut self.shared.l1[core], &mut self.shared.counts);
+        let mut look_up = |lines: Range<usize>, segment: u32| {
+            let uses = &quad.uses[lines.clone()];
+            cache.look_up_all(&quad.distinct[lines], now, |index, line, arrival| {
+                let of = uses[index];
+                if arrival == NOT_IN_FLIGHT {
+                    absent.push(Absent { line, of });
+                } else {
+                    counts.secondary(quad.cell_of(of), of.footprints().count_ones());
+                    waiting.push(Pending::new(arrival, of.footprints(), segment));
+                }
+            });
+            absent.len()
+        };
+        if quad.is_one_segment() {
+            // The case of nearly all quads, which needs no search for segment ends.
+            look_up(0..quad.distinct.len(), 0);
+        } else {
+            segments.clear();
+            let mut start = 0;
+            for (segment, end) in (0..).zip(quad.segments()) {
+                segments.push(look_up(start..end, segment));
+                start = end;
+            }
+        }
+        match (absent.is_empty(), waiting.is_empty()) {
+            (false, _) => Found::NotAll,
+            (true, false) => Found::InFlight,
+            (true, true) => Found::All,
+        }
+    }
+
+    /// The arrivals that the last thread looked up waits for.
+    #[inline(always)]
+    pub fn waiting(&mut self, core: usize) -> &mut Waiting {
+        &mut self.threads[core].waiting
+    }
+
+    /// Requests the absent lines when the core has access to the L2. Returns the arrivals that the footprints wait for.
+    #[inline(never)]
+    pub fn ask(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> &mut Waiting {
+        let first = &mut self.threads[core];
+        let Shared {
+            l1,
+            l2,
+            l2_cycles,
+            counts,
+        } = &mut self.shared;
+        let mut asking = Asking {
+            core,
+            l1: &mut l1[core],
+            l2,
+            l2_cycles: *l2_cycles,
+            // Without latencies no thread loops, so there are no later trips.
+            is_instant: *l2_cycles + self.memory_cycles == 0,
+            tmu: &self.tmu,
+            counts,
+            waiting: &mut first.waiting,
+            now,
+            trips: Trips::default(),
+        };
+        if first.absent.is_empty() {
+            asking.one_by_one(quad);
+        } else if quad.is_one_segment() {
+            asking.segment(quad, &first.absent, 0, &mut self.by_first_use);
+        } else {
+            let mut start = 0;
+            for (segment, &end) in (0..).zip(&first.segments) {
+                asking.segment(
+                    quad,
+                    &first.absent[start..end],
+                    segment,
+                    &mut self.by_first_use,
+                );
+                start = end;
+            }
+            first.waiting.sort_by_segment();
+        }
+        self.shared.follow_evictions(now);
+        &mut self.threads[core].waiting
+    }
+}

@@ -1,0 +1,191 @@
+//! Clocked texture units. The models of what threads do on a miss have one file each (`tmu.model`).
+//!
+//! Each core's texture unit has its own clock. Shared resources, the L2 and the list of items, are accessed
+//! in order of time, by the core with the earliest clock. A core runs ahead on its own until it needs a
+//! shared resource while another core is behind.
+
+mod first_miss;
+mod items;
+mod looping;
+mod prefetch_fifo;
+
+use super::Machine;
+use super::batch::Outcome;
+use super::counts::CacheCounts;
+use crate::access::FrameClients;
+use crate::config::{Allocation, Assign, ConfigError, RunConfig, TmuModel};
+use crate::memory::{Caches, Delay, DelayedFill, MissPath, SecondLevel};
+use crate::order::Phase;
+use crate::stream::{Cores, StreamError, furthest_behind};
+use first_miss::FirstMiss;
+use formats::layout::Layout;
+use items::{Items, start_item};
+use looping::Looping;
+use prefetch_fifo::PrefetchFifo;
+use std::sync::Arc;
+
+/// The texture units of all cores and their shared caches.
+trait ThreadModel: Send {
+    /// Starts a phase at a cycle.
+    fn start_phase(&mut self, cycle: u64);
+
+    /// The clock of each core.
+    fn clocks(&self) -> Vec<u64>;
+
+    /// Runs a core until it needs a shared resource later than `until`. Returns its cycle, or the maximum
+    /// if it is done.
+    fn run_core(
+        &mut self,
+        core: usize,
+        until: u64,
+        work: &mut Cores<'_>,
+        items: &mut Items<'_, '_>,
+    ) -> Result<u64, StreamError>;
+
+    /// Ends the phase and returns the cycle in which the last core finished.
+    fn end_phase(&mut self) -> u64;
+
+    /// Performs the accesses of other clients while no core works, at the maximum rate of memory. The cores
+    /// continue at `cycle`.
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64);
+
+    /// Empties all caches and drops the lines in flight.
+    fn flush(&mut self);
+
+    /// The counts until a cycle.
+    fn outcome(&self, cycles: u64) -> Outcome;
+}
+
+/// A machine of clocked texture units.
+struct Clocked<M> {
+    model: M,
+    /// Cycles until the last core finished.
+    cycles: u64,
+}
+
+impl<M: ThreadModel> Machine for Clocked<M> {
+    /// A phase starts when the last core has finished the previous one.
+    fn run(
+        &mut self,
+        work: &mut Cores<'_>,
+        phases: &[Phase],
+        assign: Assign,
+        mut clients: Option<&mut FrameClients<'_>>,
+    ) -> Result<(), StreamError> {
+        for phase in phases {
+            self.model.start_phase(self.cycles);
+            // A finished core has the maximum as its clock.
+            let mut clocks = self.model.clocks();
+            let mut items = Items::new(phase, assign, clocks.len(), clients.as_deref_mut());
+            while let Some((core, until)) = furthest_behind(&clocks) {
+                clocks[core] = self.model.run_core(core, until, work, &mut items)?;
+            }
+            self.cycles = self.model.end_phase();
+        }
+        Ok(())
+    }
+
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>) {
+        self.model.client_accesses(clients, self.cycles);
+    }
+
+    fn flush(&mut self) {
+        self.model.flush();
+    }
+
+    fn outcome(&self, _config: &RunConfig) -> Outcome {
+        self.model.outcome(self.cycles)
+    }
+}
+
+/// L1 caches with delayed fills above such an L2.
+struct Shared<D> {
+    l1: Vec<D>,
+    l2: SecondLevel<D>,
+    /// Cycles in which a line travels from the L2 to an L1.
+    l2_cycles: u64,
+    counts: CacheCounts,
+}
+
+impl<D: DelayedFill> Shared<D> {
+    /// Most lines arrive within `l1_usual_cycles` after a miss of both levels.
+    fn new<C: Delay<Delayed = D>>(
+        caches: Caches<C>,
+        config: &RunConfig,
+        counts: CacheCounts,
+        path: MissPath,
+        [l1_usual_cycles, l2_usual_cycles]: [u64; 2],
+    ) -> Self {
+        let Caches { l1, l2 } = caches.delayed(l1_usual_cycles, l2_usual_cycles);
+        Self {
+            l1,
+            l2: SecondLevel::new(l2, path),
+            l2_cycles: config.level.l2.hit_cycles.into(),
+            counts,
+        }
+    }
+
+    /// Invalidates L1 lines that lower levels have evicted.
+    #[inline(always)]
+    fn follow_evictions(&mut self, now: u64) {
+        let l1 = &mut self.l1;
+        self.l2.invalidate_l1(|line| {
+            let removed = l1.iter_mut().map(|cache| cache.remove(line, now));
+            removed.map(u64::from).sum()
+        });
+    }
+
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64) {
+        clients.send(|access| self.l2.idle_client_access(access));
+        self.l2.catch_up(cycle);
+    }
+
+    fn flush(&mut self) {
+        self.l1.iter_mut().for_each(D::clear);
+        self.l2.clear();
+    }
+}
+
+/// The clocked machine of a configuration.
+///
+/// # Errors
+/// An impossible cache geometry.
+pub(super) fn machine(
+    config: &RunConfig,
+    counts: CacheCounts,
+    layout: Option<&Arc<Layout>>,
+) -> Result<Box<dyn Machine>, ConfigError> {
+    let caches = Caches::build(config)?;
+    let allocates_on_miss = config.tmu.allocation == Allocation::OnMiss;
+    if allocates_on_miss || config.tmu.model == TmuModel::PrefetchFifo {
+        return machine_of(config, caches.allocate_on_miss(), counts, layout);
+    }
+    match caches.all_four_way() {
+        Ok(caches) => machine_of(config, caches, counts, layout),
+        Err(caches) => machine_of(config, caches, counts, layout),
+    }
+}
+
+/// The clocked machine of a configuration with these caches.
+///
+/// # Errors
+/// An impossible level below the L2.
+pub(super) fn machine_of<C: Delay>(
+    config: &RunConfig,
+    caches: Caches<C>,
+    counts: CacheCounts,
+    layout: Option<&Arc<Layout>>,
+) -> Result<Box<dyn Machine>, ConfigError>
+where
+    C::Delayed: 'static,
+{
+    fn clocked(model: impl ThreadModel + 'static) -> Box<dyn Machine> {
+        Box::new(Clocked { model, cycles: 0 })
+    }
+    let path = MissPath::build(config, layout)?;
+    Ok(match config.tmu.model {
+        TmuModel::Looping => clocked(Looping::new(caches, config, counts, path)),
+        TmuModel::FirstMiss => clocked(FirstMiss::new(caches, config, counts, path)),
+        TmuModel::PrefetchFifo => clocked(PrefetchFifo::new(caches, config, counts, path)),
+    })
+}

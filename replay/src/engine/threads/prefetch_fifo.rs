@@ -1,0 +1,174 @@
+//! A texture unit with a prefetching FIFO (Igehy, Eldridge and Proudfoot, Graphics Hardware 1998, section
+//! 3). Tags are checked in order, one footprint per cycle. Missing lines are requested immediately, and the
+//! footprint waits in a FIFO, which it leaves in order when its lines have arrived. A missing line is
+//! allocated a way when it is requested. A line evicted in flight still arrives, and look-ups until then
+//! merge with its fetch.
+
+use super::first_miss::Thread;
+use super::{Items, Shared, ThreadModel, start_item};
+use crate::access::FrameClients;
+use crate::config::{RunConfig, TmuConfig};
+use crate::engine::batch::Outcome;
+use crate::engine::counts::{CacheCounts, FootprintMisses};
+use crate::memory::{Caches, Delay, DelayedFill, MissPath, NOT_IN_FLIGHT};
+use crate::stream::{Cores, StreamError};
+use crate::tmu::PipelineStats;
+use std::collections::VecDeque;
+
+/// Texture units and their shared caches.
+pub struct PrefetchFifo<D> {
+    shared: Shared<D>,
+    units: Vec<Unit>,
+    tmu: TmuConfig,
+    /// Start of the phase, and footprints that had left each FIFO before it.
+    phase: (u64, Vec<u64>),
+}
+
+/// A core's texture unit.
+#[derive(Default)]
+struct Unit {
+    /// Cycle of the next footprint's tag check.
+    clock: u64,
+    /// The quad whose footprints come next.
+    quad: Thread,
+    /// Cycle at which each footprint leaves the FIFO, ascending.
+    exits: VecDeque<u64>,
+    /// Cycle at which the most recent footprint leaves the FIFO.
+    last_exit: u64,
+    stats: PipelineStats,
+}
+
+impl<D: DelayedFill> PrefetchFifo<D> {
+    /// Empty caches, and one texture unit per L1.
+    pub fn new<C: Delay<Delayed = D>>(
+        caches: Caches<C>,
+        config: &RunConfig,
+        counts: CacheCounts,
+        path: MissPath,
+    ) -> Self {
+        let [l2_cycles, memory_cycles] =
+            [config.level.l2.hit_cycles, config.memory_cycles].map(u64::from);
+        let usual = [l2_cycles + memory_cycles, memory_cycles];
+        Self {
+            units: caches.l1.iter().map(|_| Unit::default()).collect(),
+            shared: Shared::new(caches, config, counts, path, usual),
+            tmu: config.tmu,
+            phase: (0, Vec::new()),
+        }
+    }
+
+    /// Puts the core's next footprint into the FIFO, or advances time until there is room.
+    fn check_tags(&mut self, core: usize) {
+        let unit = &mut self.units[core];
+        let now = unit.clock;
+        while unit.exits.front().is_some_and(|&exit| exit <= now) {
+            unit.exits.pop_front();
+        }
+        if unit.exits.len() >= self.tmu.fifo_footprints as usize {
+            unit.clock = unit.exits.front().copied().unwrap_or(now);
+            return;
+        }
+        let Some(footprint) = unit.quad.footprint() else {
+            return;
+        };
+        let Shared {
+            l1,
+            l2,
+            l2_cycles,
+            counts,
+        } = &mut self.shared;
+        let l1 = &mut l1[core];
+        let mut misses = FootprintMisses::default();
+        let mut ready = now;
+        for &line in footprint.lines {
+            let arrival = match l1.look_up(line, now) {
+                NOT_IN_FLIGHT => {
+                    misses.l1_lines += 1;
+                    let arrival = misses.ask_l2(l2.request(core, line, now), now) + *l2_cycles;
+                    l1.enter(line, now, arrival);
+                    arrival
+                }
+                arrival => {
+                    misses.l1_secondary += u32::from(arrival > 0);
+                    arrival
+                }
+            };
+            ready = ready.max(arrival);
+        }
+        counts.footprint(footprint.cell, footprint.tile, &misses);
+        unit.quad.advance();
+        unit.last_exit = ready.max(unit.last_exit + 1).max(now + 1);
+        unit.exits.push_back(unit.last_exit);
+        unit.stats.useful += 1;
+        unit.clock += 1;
+        self.shared.follow_evictions(now);
+    }
+}
+
+impl<D: DelayedFill> ThreadModel for PrefetchFifo<D> {
+    fn start_phase(&mut self, cycle: u64) {
+        self.phase = (
+            cycle,
+            self.units.iter().map(|unit| unit.stats.useful).collect(),
+        );
+        for unit in &mut self.units {
+            (unit.clock, unit.last_exit) = (cycle, cycle);
+            unit.exits.clear();
+        }
+    }
+
+    fn clocks(&self) -> Vec<u64> {
+        self.units.iter().map(|unit| unit.clock).collect()
+    }
+
+    fn run_core(
+        &mut self,
+        core: usize,
+        until: u64,
+        work: &mut Cores<'_>,
+        items: &mut Items<'_, '_>,
+    ) -> Result<u64, StreamError> {
+        loop {
+            let unit = &mut self.units[core];
+            let now = unit.clock;
+            if now > until {
+                return Ok(now);
+            }
+            if unit.quad.footprint().is_some() {
+                self.check_tags(core);
+            } else if let Some(quad) = work.next_quad(core) {
+                unit.stats.threads += u64::from(quad.footprints > 0);
+                unit.quad.begin(quad);
+            } else if let Some(item) = items.next(core) {
+                start_item(&mut self.shared.l2, work, items, core, item, now)?;
+            } else {
+                return Ok(u64::MAX);
+            }
+        }
+    }
+
+    fn end_phase(&mut self) -> u64 {
+        let (start, before) = &self.phase;
+        for (unit, before) in self.units.iter_mut().zip(before) {
+            unit.stats.idle += unit.last_exit - start - (unit.stats.useful - before);
+        }
+        let exits = self.units.iter().map(|unit| unit.last_exit);
+        exits.max().unwrap_or(*start)
+    }
+
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64) {
+        self.shared.client_accesses(clients, cycle);
+    }
+
+    fn flush(&mut self) {
+        self.shared.flush();
+    }
+
+    fn outcome(&self, cycles: u64) -> Outcome {
+        let stats = self.units.iter().map(|unit| unit.stats);
+        Outcome {
+            memory: self.shared.l2.result(),
+            ..Outcome::timed(self.shared.counts.clone(), stats, cycles)
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! Accelerated caches. Property tests hold each equal to the plain caches.
+
+mod forest;
+mod set_order;
+
+pub use forest::Forest;
+pub(super) use set_order::SetOrder;

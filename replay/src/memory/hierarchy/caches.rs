@@ -1,0 +1,106 @@
+//! The caches of the first two levels, with the type that a replay is compiled for.
+
+use crate::config::{ConfigError, LevelConfig, RunConfig};
+use crate::memory::{AllocateOnMiss, AnyCache, Cache, Delay, FourWayLru};
+
+/// The caches of the first two levels: per level one cache, or one per core.
+pub struct Caches<C> {
+    /// First level.
+    pub l1: Vec<C>,
+    /// Second level.
+    pub l2: Vec<C>,
+}
+
+/// The cache of a level that a core uses.
+#[inline(always)]
+pub(super) fn of_core<C>(caches: &mut [C], core: usize) -> &mut C {
+    let last = caches.len() - 1;
+    &mut caches[core.min(last)]
+}
+
+impl<C: Delay> Caches<C> {
+    /// Turns the caches into caches with delayed fills; most lines arrive within these latencies.
+    #[must_use]
+    pub fn delayed(self, l1_cycles: u64, l2_cycles: u64) -> Caches<C::Delayed> {
+        let delayed = |caches: Vec<C>, cycles| {
+            let all = caches.into_iter().map(|cache| cache.delayed(cycles));
+            all.collect()
+        };
+        Caches {
+            l1: delayed(self.l1, l1_cycles),
+            l2: delayed(self.l2, l2_cycles),
+        }
+    }
+}
+
+impl Caches<AnyCache> {
+    /// Builds the caches of a configuration. Each has its own seed.
+    ///
+    /// # Errors
+    /// An impossible geometry.
+    pub fn build(config: &RunConfig) -> Result<Self, ConfigError> {
+        let build = |level: &LevelConfig, name, number: u32| {
+            let seed = config.seed.wrapping_add(number.into());
+            AnyCache::build(level, name, config.line_bytes, seed)
+        };
+        let l2 = &config.level.l2;
+        let second = |core| build(l2, "L2", if core == 0 { 0 } else { config.cores + core });
+        let watched = |l2: AnyCache| match config.level.depend_on_evictions() {
+            true => l2.watched(),
+            false => l2,
+        };
+        Ok(Self {
+            l1: (1..=config.level.l1.caches(config.cores))
+                .map(|core| build(&config.level.l1, "L1", core))
+                .collect::<Result<_, _>>()?,
+            l2: (0..l2.caches(config.cores))
+                .map(|core| Ok(watched(second(core)?)))
+                .collect::<Result<_, ConfigError>>()?,
+        })
+    }
+
+    /// Turns the caches into caches that allocate on a miss.
+    #[must_use]
+    pub fn allocate_on_miss(self) -> Caches<AllocateOnMiss> {
+        let allocate = |caches: Vec<AnyCache>| {
+            let all = caches.into_iter().map(AnyCache::into_box);
+            all.map(AllocateOnMiss).collect()
+        };
+        Caches {
+            l1: allocate(self.l1),
+            l2: allocate(self.l2),
+        }
+    }
+
+    /// Boxes the caches.
+    #[must_use]
+    pub fn boxed(self) -> Caches<Box<dyn Cache>> {
+        let boxed = |caches: Vec<AnyCache>| caches.into_iter().map(AnyCache::into_box).collect();
+        Caches {
+            l1: boxed(self.l1),
+            l2: boxed(self.l2),
+        }
+    }
+
+    /// Returns the caches with their concrete type if all are [`FourWayLru`].
+    ///
+    /// # Errors
+    /// Otherwise the boxed caches.
+    pub fn all_four_way(self) -> Result<Caches<FourWayLru>, Caches<Box<dyn Cache>>> {
+        let is_four_way = |cache: &AnyCache| matches!(cache, AnyCache::FourWayLru(_));
+        if !self.l1.iter().chain(&self.l2).all(is_four_way) {
+            return Err(self.boxed());
+        }
+        let four_way = |caches: Vec<AnyCache>| {
+            let all = caches.into_iter().filter_map(|cache| match cache {
+                AnyCache::FourWayLru(cache) => Some(cache),
+                AnyCache::Other(_) => None,
+            });
+            all.collect()
+        };
+        Ok(Caches {
+            l1: four_way(self.l1),
+            l2: four_way(self.l2),
+        })
+    }
+}

@@ -1,0 +1,11 @@
+//! The caches of a configuration, and the paths between them.
+
+mod at_once;
+mod below;
+mod caches;
+mod inclusion;
+mod second_level;
+
+pub use at_once::{Found, Hierarchy};
+pub use caches::Caches;
+pub use second_level::{Answer, MissPath, SecondLevel};

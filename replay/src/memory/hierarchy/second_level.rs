@@ -1,0 +1,421 @@
+//! The L2 as seen by the L1 caches: one cache or one per core, with prefetchers and the path of their misses.
+
+use super::below::Below;
+use super::caches::of_core;
+use super::inclusion::Evictions;
+use crate::config::{ConfigError, PrefetchConfig, RunConfig};
+use crate::memory::in_flight::{DelayedFill, LimitedMshrs, NOT_IN_FLIGHT};
+use crate::memory::policy::EMPTY;
+use crate::memory::prefetch::{Demand, Prefetcher};
+use crate::memory::{Access, Cache};
+use crate::result::{MemoryResult, MshrResult, PrefetchResult, Timeline};
+use formats::layout::Layout;
+use std::collections::HashSet;
+use std::sync::Arc;
+
+/// The parts of a configuration beside and below the L2.
+pub struct MissPath {
+    below: Option<Below>,
+    /// One per L2 cache; empty without prefetcher.
+    prefetch: Vec<Prefetch>,
+    /// One per L2 cache, if the number of MSHRs is limited.
+    mshrs: Vec<LimitedMshrs>,
+    /// Present if levels depend on each other's evictions.
+    evictions: Option<Evictions>,
+    /// True if a request has effects after its answer: prefetches or evictions to process.
+    has_consequences: bool,
+    memory_cycles: u64,
+    line_bytes: u64,
+    /// True if the L2 holds lines of all clients.
+    is_for_all_clients: bool,
+    /// Fetches per interval of time, if recorded.
+    fetched_lines: Option<Vec<u32>>,
+}
+
+impl MissPath {
+    /// Memory directly below the L2, which is only counted.
+    #[must_use]
+    pub fn memory_alone() -> Self {
+        Self {
+            below: None,
+            prefetch: Vec::new(),
+            mshrs: Vec::new(),
+            evictions: None,
+            has_consequences: false,
+            memory_cycles: 0,
+            line_bytes: 1,
+            is_for_all_clients: false,
+            fetched_lines: None,
+        }
+    }
+
+    /// Empty levels below the L2. `layout` gives the location of textures, if lines belong to textures.
+    ///
+    /// # Errors
+    /// An impossible geometry.
+    pub fn build(config: &RunConfig, layout: Option<&Arc<Layout>>) -> Result<Self, ConfigError> {
+        let caches = 0..config.level.l2.caches(config.cores);
+        let mshrs = config.tmu.l2_mshrs;
+        let limited = caches.clone().filter(|_| mshrs > 0);
+        let prefetchers = caches.filter_map(|_| config.prefetch.as_ref());
+        Ok(Self {
+            below: Below::build(config)?,
+            prefetch: prefetchers
+                .map(|prefetch| Prefetch::new(prefetch, config.line_bytes, layout))
+                .collect(),
+            mshrs: limited.map(|_| LimitedMshrs::new(mshrs)).collect(),
+            evictions: Evictions::build(config),
+            has_consequences: config.prefetch.is_some() || config.level.depend_on_evictions(),
+            memory_cycles: config.memory_cycles.into(),
+            line_bytes: config.line_bytes.into(),
+            is_for_all_clients: !config.level.l2.clients.is_textures(),
+            fetched_lines: config.timeline.then(Vec::new),
+        })
+    }
+
+    /// True if evictions of other levels invalidate L1 lines.
+    #[must_use]
+    pub fn invalidates(&self) -> bool {
+        self.evictions.is_some()
+    }
+
+    /// Accesses memory for a client below the L2. Returns the bytes that lower levels serve.
+    fn client_access(&mut self, core: usize, access: &Access, now: Option<u64>) -> u64 {
+        let below = self.below.as_mut();
+        below.map_or(0, |below| below.client_access(core, access, now))
+    }
+
+    /// Arrival of a line that the L2 requests at `now`.
+    #[inline(always)]
+    fn fetch(&mut self, core: usize, line: u32, now: u64) -> u64 {
+        if !self.mshrs.is_empty() {
+            return self.fetch_by_mshr(core, line, now);
+        }
+        self.read(core, line, now)
+    }
+
+    #[inline(never)]
+    fn fetch_by_mshr(&mut self, core: usize, line: u32, now: u64) -> u64 {
+        let start = of_core(&mut self.mshrs, core).start(now);
+        let arrival = self.read(core, line, start);
+        of_core(&mut self.mshrs, core).enter(arrival);
+        arrival
+    }
+
+    /// True if a fetch would wait for an MSHR.
+    fn is_busy(&mut self, core: usize, now: u64) -> bool {
+        !self.mshrs.is_empty() && of_core(&mut self.mshrs, core).are_in_use(now)
+    }
+
+    /// Arrival of a line that is read from below at `now`.
+    #[inline(always)]
+    fn read(&mut self, core: usize, line: u32, now: u64) -> u64 {
+        if let Some(fetched_lines) = &mut self.fetched_lines {
+            let interval = (now / Timeline::INTERVAL_CYCLES) as usize;
+            if fetched_lines.len() <= interval {
+                fetched_lines.resize(interval + 1, 0);
+            }
+            fetched_lines[interval] += 1;
+        }
+        match &mut self.below {
+            None => now + self.memory_cycles,
+            Some(below) => below.read_at(core, line, now),
+        }
+    }
+}
+
+/// A prefetcher and the state of its lines.
+struct Prefetch {
+    prefetcher: Box<dyn Prefetcher>,
+    /// Prefetched lines without a demand request so far, resident or not.
+    unused: HashSet<u32>,
+    /// Lines to prefetch after the last request.
+    wanted: Vec<u32>,
+    counts: PrefetchResult,
+}
+
+impl Prefetch {
+    fn new(config: &PrefetchConfig, line_bytes: u32, layout: Option<&Arc<Layout>>) -> Self {
+        Self {
+            prefetcher: config.build(line_bytes, layout.cloned()),
+            unused: HashSet::new(),
+            wanted: Vec::new(),
+            counts: PrefetchResult::default(),
+        }
+    }
+
+    /// Counts a demand request and collects the lines to prefetch.
+    fn observe(&mut self, line: u32, answer: Answer) {
+        let is_first = self.unused.remove(&line);
+        let demand = match answer {
+            Answer::Miss(_) => Demand::Miss,
+            _ if is_first => Demand::FirstUse,
+            _ => Demand::Hit,
+        };
+        self.counts.evicted_lines += u64::from(is_first && demand == Demand::Miss);
+        self.counts.useful_lines += u64::from(demand == Demand::FirstUse);
+        let late = is_first && matches!(answer, Answer::InFlight(_));
+        self.counts.late_lines += u64::from(late);
+        self.wanted.clear();
+        self.prefetcher.observe(line, demand, &mut self.wanted);
+    }
+
+    fn fetched(&mut self, line: u32) {
+        self.counts.lines += 1;
+        self.unused.insert(line);
+    }
+}
+
+/// The L2's answer to a request of an L1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answer {
+    /// The line is resident.
+    Hit,
+    /// The line is in flight and arrives at this cycle.
+    InFlight(u64),
+    /// The line is fetched and arrives at this cycle.
+    Miss(u64),
+}
+
+/// The L2 and everything beside and below it.
+pub struct SecondLevel<C> {
+    /// One cache, or one per core.
+    caches: Vec<C>,
+    path: MissPath,
+}
+
+impl<C> SecondLevel<C> {
+    /// Empty caches above the path of their misses.
+    pub fn new(caches: Vec<C>, path: MissPath) -> Self {
+        Self { caches, path }
+    }
+
+    /// Delays DRAM requests from `cycle` on by the time that requests without a time have taken.
+    pub fn catch_up(&mut self, cycle: u64) {
+        if let Some(below) = &mut self.path.below {
+            below.catch_up(cycle);
+        }
+    }
+
+    /// Accesses memory below the L2 for a client other than the texture units, while no core works.
+    /// Returns the bytes that lower levels serve.
+    pub fn idle_client_access(&mut self, access: &Access) -> u64 {
+        self.path.client_access(0, access, None)
+    }
+
+    /// The cache that a core uses.
+    #[inline(always)]
+    pub fn cache(&mut self, core: usize) -> &mut C {
+        of_core(&mut self.caches, core)
+    }
+
+    /// Serves all requests and returns the counts beside and below the L2.
+    #[must_use]
+    pub fn result(&self) -> MemoryResult {
+        let path = &self.path;
+        let (lower_levels, dram) =
+            (path.below.as_ref()).map_or_else(Default::default, Below::result);
+        let prefetch = path.prefetch.iter().map(|prefetch| prefetch.counts);
+        let mshrs = path.mshrs.iter().map(|mshrs| mshrs.counts);
+        MemoryResult {
+            prefetch: prefetch.reduce(PrefetchResult::plus),
+            l2_mshrs: mshrs.reduce(MshrResult::plus),
+            invalidated_lines: (path.evictions.as_ref())
+                .map(|evictions| evictions.invalidated_lines),
+            lower_levels,
+            dram,
+        }
+    }
+
+    /// Fetches per interval of time; empty if not recorded.
+    #[must_use]
+    pub fn fetched_lines(&self) -> &[u32] {
+        self.path.fetched_lines.as_deref().unwrap_or_default()
+    }
+
+    /// Maximum number of lines of the next work item to prefetch when an item starts.
+    #[must_use]
+    pub fn lines_of_next_item(&self) -> usize {
+        let prefetch = self.path.prefetch.first();
+        prefetch.map_or(0, |prefetch| prefetch.prefetcher.lines_of_next_item())
+    }
+
+    /// Removes lines evicted by inclusive levels from the L1 caches. `remove` removes a line from
+    /// all of them and returns how many held it.
+    #[inline(always)]
+    pub fn invalidate_l1(&mut self, remove: impl FnMut(u32) -> u64) {
+        if let Some(evictions) = &mut self.path.evictions
+            && evictions.are_pending()
+        {
+            evictions.invalidate_l1(remove);
+        }
+    }
+
+    fn clear_path(&mut self) {
+        self.path.below.iter_mut().for_each(Below::clear);
+        self.path.mshrs.iter_mut().for_each(LimitedMshrs::clear);
+        for prefetch in &mut self.path.prefetch {
+            prefetch.unused.clear();
+        }
+    }
+}
+
+/// Timed operation.
+impl<D: DelayedFill> SecondLevel<D> {
+    /// Answers a core's request and fetches a missing line.
+    #[inline(always)]
+    pub fn request(&mut self, core: usize, line: u32, now: u64) -> Answer {
+        let cache = of_core(&mut self.caches, core);
+        let answer = match cache.look_up(line, now) {
+            0 => Answer::Hit,
+            NOT_IN_FLIGHT => {
+                let arrival = self.path.fetch(core, line, now);
+                cache.enter(line, now, arrival);
+                Answer::Miss(arrival)
+            }
+            arrival => Answer::InFlight(arrival),
+        };
+        if self.path.has_consequences {
+            self.prefetch(core, line, now, answer);
+            self.follow_evictions(now);
+        }
+        answer
+    }
+
+    #[inline(never)]
+    fn follow_evictions(&mut self, now: u64) {
+        if let Some(evictions) = &mut self.path.evictions {
+            for cache in &mut self.caches {
+                cache.take_evicted(&mut evictions.evicted);
+            }
+            evictions.follow(self.path.below.as_mut(), |line| {
+                let removed = self.caches.iter_mut().map(|cache| cache.remove(line, now));
+                removed.map(u64::from).sum()
+            });
+        }
+    }
+
+    #[inline(never)]
+    fn prefetch(&mut self, core: usize, line: u32, now: u64, answer: Answer) {
+        if !self.path.prefetch.is_empty() {
+            of_core(&mut self.path.prefetch, core).observe(line, answer);
+            self.fetch_wanted(core, now);
+        }
+    }
+
+    /// Accesses memory for a client other than the texture units. Returns the bytes that caches serve.
+    pub fn client_access(&mut self, core: usize, access: &Access, now: u64) -> u64 {
+        if access.write || !self.path.is_for_all_clients {
+            return self.path.client_access(core, access, Some(now));
+        }
+        let line_bytes = self.path.line_bytes;
+        let last = access.address + access.bytes - 1;
+        let lines = access.address / line_bytes..=last / line_bytes;
+        let hits = lines.filter(|&line| self.request(core, line as u32, now) == Answer::Hit);
+        (hits.count() as u64 * line_bytes).min(access.bytes)
+    }
+
+    /// Prefetches lines of the next work item when an item starts.
+    pub fn prefetch_item(&mut self, core: usize, lines: &[u32], now: u64) {
+        if !self.path.prefetch.is_empty() {
+            let wanted = &mut of_core(&mut self.path.prefetch, core).wanted;
+            wanted.clear();
+            wanted.extend_from_slice(lines);
+            self.fetch_wanted(core, now);
+            self.follow_evictions(now);
+        }
+    }
+
+    fn fetch_wanted(&mut self, core: usize, now: u64) {
+        let wanted = std::mem::take(&mut of_core(&mut self.path.prefetch, core).wanted);
+        for &line in &wanted {
+            let cache = of_core(&mut self.caches, core);
+            if line != EMPTY && !cache.holds(line, now) {
+                if self.path.is_busy(core, now) {
+                    of_core(&mut self.path.prefetch, core).counts.dropped_lines += 1;
+                    continue;
+                }
+                cache.enter(line, now, self.path.fetch(core, line, now));
+                of_core(&mut self.path.prefetch, core).fetched(line);
+            }
+        }
+        of_core(&mut self.path.prefetch, core).wanted = wanted;
+    }
+
+    /// Empties the levels and drops the lines in flight.
+    pub fn clear(&mut self) {
+        self.caches.iter_mut().for_each(D::clear);
+        self.clear_path();
+    }
+}
+
+/// Operation without time: fetches complete immediately.
+impl<C: Cache> SecondLevel<C> {
+    /// Looks up a line for a core and fills it on a miss. Returns true for a hit.
+    #[inline(always)]
+    pub fn access(&mut self, core: usize, line: u32) -> bool {
+        let hit = of_core(&mut self.caches, core).access(line);
+        if !hit && let Some(below) = &mut self.path.below {
+            below.read(core, line);
+        }
+        if self.path.has_consequences {
+            self.prefetch_at_once(core, line, hit);
+            self.follow_evictions_at_once();
+        }
+        hit
+    }
+
+    /// Accesses memory for a client other than the texture units. Returns the bytes that caches serve.
+    pub fn client_access_at_once(&mut self, core: usize, access: &Access) -> u64 {
+        if access.write || !self.path.is_for_all_clients {
+            return self.path.client_access(core, access, None);
+        }
+        let line_bytes = self.path.line_bytes;
+        let last = access.address + access.bytes - 1;
+        let lines = access.address / line_bytes..=last / line_bytes;
+        let hits = lines.filter(|&line| self.access(core, line as u32));
+        (hits.count() as u64 * line_bytes).min(access.bytes)
+    }
+
+    #[inline(never)]
+    fn follow_evictions_at_once(&mut self) {
+        if let Some(evictions) = &mut self.path.evictions {
+            for cache in &mut self.caches {
+                cache.take_evicted(&mut evictions.evicted);
+            }
+            evictions.follow(self.path.below.as_mut(), |line| {
+                let removed = self.caches.iter_mut().map(|cache| cache.remove(line));
+                removed.map(u64::from).sum()
+            });
+        }
+    }
+
+    #[inline(never)]
+    fn prefetch_at_once(&mut self, core: usize, line: u32, hit: bool) {
+        if self.path.prefetch.is_empty() {
+            return;
+        }
+        let prefetch = of_core(&mut self.path.prefetch, core);
+        prefetch.observe(line, if hit { Answer::Hit } else { Answer::Miss(0) });
+        for index in 0..prefetch.wanted.len() {
+            let line = prefetch.wanted[index];
+            let cache = of_core(&mut self.caches, core);
+            if line != EMPTY && !cache.contains(line) {
+                if let Some(below) = &mut self.path.below {
+                    below.read(core, line);
+                }
+                cache.fill(line);
+                prefetch.fetched(line);
+            }
+        }
+    }
+
+    /// Empties the levels.
+    pub fn empty(&mut self) {
+        self.caches.iter_mut().for_each(C::clear);
+        self.clear_path();
+    }
+}
+
+#[cfg(test)]
+mod tests;

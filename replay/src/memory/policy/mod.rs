@@ -1,0 +1,101 @@
+//! Replacement policies, one per file. A new policy is a file with a [`Cache`] (its `mod` line
+//! below) and a row of the table.
+
+mod fifo;
+mod lru;
+mod random;
+mod rrip;
+mod ship;
+mod tree_plru;
+
+pub use lru::{AnyWays, FourWayLru, Lru, WaysOf};
+pub(in crate::memory) use lru::{look_up, lru, take_out, to_front};
+
+use super::cache::{AnyCache, Cache, boxed};
+use crate::registry::{Named, registry};
+use fifo::Fifo;
+use random::RandomReplacement;
+use rrip::{Insertion, Rrip};
+use ship::Ship;
+use tree_plru::TreePlru;
+
+registry! { PolicyRow:
+    // constant   name          help                    supported ways                                 constructor
+    LRU =       row("lru",       "Least recently used", ANY_WAYS,                                      |g| lru(g.sets, g.ways));
+    FIFO =      row("fifo",      "First in, first out", ANY_WAYS,                                      |g| boxed(Fifo::new(g.sets, g.ways)));
+    TREE_PLRU = row("tree-plru", "Tree pseudo-LRU",     ("1, 2, 4 ... 64", tree_plru::accepts_ways),   |g| boxed(TreePlru::new(g.sets, g.ways)));
+    RANDOM =    row("random",    "Seeded random",       ANY_WAYS,                                      |g| boxed(RandomReplacement::new(g.sets, g.ways, g.seed)));
+    SRRIP =     row("srrip",     "Static re-reference interval prediction",  ANY_WAYS,                 |g| boxed(Rrip::new(g.sets, g.ways, Insertion::Static)));
+    BRRIP =     row("brrip",     "Bimodal re-reference interval prediction", ANY_WAYS,                 |g| boxed(Rrip::new(g.sets, g.ways, Insertion::Bimodal)));
+    DRRIP =     row("drrip",     "SRRIP or BRRIP, by set dueling",           ANY_WAYS,                 |g| boxed(Rrip::new(g.sets, g.ways, Insertion::Dueling)));
+    SHIP =      row("ship",      "Signature-based hit prediction by memory region", ANY_WAYS,          |g| boxed(Ship::new(g.sets, g.ways)));
+}
+
+/// A named replacement policy.
+pub type Replacement = Named<PolicyRow>;
+
+impl Default for Replacement {
+    fn default() -> Self {
+        Self::LRU
+    }
+}
+
+/// A row of the table of replacement policies.
+#[derive(Debug)]
+pub struct PolicyRow {
+    name: &'static str,
+    help: &'static str,
+    ways: WaysRule,
+    build: fn(Geometry) -> AnyCache,
+}
+
+/// The associativities that a policy supports, as text and as a test.
+pub(crate) type WaysRule = (&'static str, fn(u32) -> bool);
+
+/// Ways are stored in a byte.
+const ANY_WAYS: WaysRule = ("1 to 255", |ways| (1..=255).contains(&ways));
+
+const fn row(
+    name: &'static str,
+    help: &'static str,
+    ways: WaysRule,
+    build: fn(Geometry) -> AnyCache,
+) -> PolicyRow {
+    PolicyRow {
+        name,
+        help,
+        ways,
+        build,
+    }
+}
+
+impl Replacement {
+    /// An empty cache.
+    pub(in crate::memory) fn build(self, geometry: Geometry) -> AnyCache {
+        (self.row().build)(geometry)
+    }
+
+    /// The associativities that the policy supports.
+    pub(crate) fn ways_rule(self) -> WaysRule {
+        self.row().ways
+    }
+}
+
+/// Parameters of a policy.
+#[derive(Clone, Copy, Debug)]
+pub(in crate::memory) struct Geometry {
+    /// A power of two.
+    pub(in crate::memory) sets: u32,
+    pub(in crate::memory) ways: u32,
+    pub(in crate::memory) seed: u64,
+}
+
+/// Tag of an empty way; no line has this number.
+pub(in crate::memory) const EMPTY: u32 = u32::MAX;
+
+/// Empties the way that holds a line, and returns its index.
+fn empty_way(tags: &mut [u32], line: u32) -> Option<usize> {
+    let way = tags.iter().position(|&tag| tag == line)?;
+    tags[way] = EMPTY;
+    Some(way)
+}
