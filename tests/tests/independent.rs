@@ -2,7 +2,7 @@
 //! `replay dump` and `replay info`: every table and every record of every golden trace and of
 //! traces that are made here.
 
-use parallax_tests::{program, root, run_ok, traces};
+use parallax_tests::{has_lavapipe, program, root, run_ok, traces};
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -173,6 +173,24 @@ fn python_reads_a_fresh_capture_in_every_encoding_as_replay_does() {
     let encoding = ["raster", "teapot", "--encoding", "planes"];
     run_ok(program("tracegen").args(encoding).args(size).arg(&captured));
     assert_eq!(check(&captured), records);
+}
+
+#[test]
+fn python_reads_a_captured_program_in_every_encoding_as_replay_does() {
+    if !has_python() || !has_lavapipe() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut records = Vec::new();
+    for encoding in ["delta", "raw", "planes"] {
+        let trace = folder.path().join(encoding).with_extension("textrace");
+        let mut command = program("tracegen");
+        command.args(["app", "--frames", "1", "--encoding", encoding, "-o"]);
+        command.arg(&trace).arg("--");
+        run_ok(command.args([env!("CARGO_BIN_EXE_vulkan_program"), "--size", "96x64"]));
+        records.push(check(&trace));
+    }
+    assert!(records[0] > 1000 && records.iter().all(|count| *count == records[0]));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use formats::footprint::{Footprint, SamplingOptions, record_footprints};
 use formats::textrace::{NO_GROUP, QuadRecord, Sample, Tables, Textrace, Tile};
 use formats::texture::Filter;
 use formats::view::Eye;
-use parallax_tests::{program, refuse, run_ok};
+use parallax_tests::{has_lavapipe, program, refuse, run_ok, skipped};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -35,22 +35,6 @@ const OBJECTS: [&str; 18] = [
 
 fn vulkan_program() -> Command {
     Command::new(env!("CARGO_BIN_EXE_vulkan_program"))
-}
-
-/// False, with a line on stderr, where no lavapipe is installed.
-fn has_lavapipe() -> bool {
-    let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
-    let mut files = folders
-        .iter()
-        .filter_map(|folder| std::fs::read_dir(folder).ok())
-        .flatten();
-    let found = std::env::var_os("VK_DRIVER_FILES").is_some()
-        || files
-            .any(|file| file.is_ok_and(|f| f.file_name().to_string_lossy().starts_with("lvp_icd")));
-    if !found {
-        parallax_tests::skipped!("lavapipe is absent");
-    }
-    found
 }
 
 struct Captured {
@@ -394,6 +378,208 @@ fn programs_that_end_too_early_or_never_end_a_frame_leave_no_trace() {
         &["--stereo", "mono"],
         &["frame 1: no two eyes were found by the rule a target per eye"],
     );
+}
+
+/// What `tracegen app` records of the program, with arguments of both, into a trace of this name.
+fn captured_by(folder: &Path, name: &str, options: &[&str], program_arguments: &[&str]) -> PathBuf {
+    let trace = folder.join(name).with_extension("textrace");
+    let mut command = program("tracegen");
+    command.args(["app", "-o"]).arg(&trace).args(options);
+    command
+        .arg("--")
+        .arg(env!("CARGO_BIN_EXE_vulkan_program"))
+        .args(program_arguments);
+    run_ok(&mut command);
+    trace
+}
+
+fn assert_same(a: &Path, b: &Path) {
+    run_ok(program("replay").arg("diff").args([a, b]));
+}
+
+#[test]
+fn programs_that_fork_or_are_started_by_scripts_are_captured_alike() {
+    if !has_lavapipe() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let frames = ["--frames", "2"];
+    let plain = captured_by(folder.path(), "plain", &frames, &[]);
+    let forks = captured_by(folder.path(), "forks", &frames, &["--end", "fork"]);
+    assert_same(&plain, &forks);
+    // The script has ended before its program renders.
+    let started = folder.path().join("started.textrace");
+    let script = format!("'{}' --frames 1000 &", env!("CARGO_BIN_EXE_vulkan_program"));
+    let mut command = program("tracegen");
+    command.args(["app", "--frames", "2", "-o"]).arg(&started);
+    run_ok(command.args(["--", "sh", "-c", &script]));
+    assert_same(&plain, &started);
+}
+
+#[test]
+fn a_program_that_never_renders_is_ended_after_a_time_that_the_user_chooses() {
+    if !has_lavapipe() {
+        return;
+    }
+    refused(
+        &["--frames", "1", "--timeout", "1"],
+        &["--end", "hang"],
+        &[
+            "vulkan_program was ended after 1 seconds",
+            "vulkan_program never used Vulkan through the layer",
+        ],
+    );
+}
+
+/// A range of frames is each of its frames, one after the other.
+#[test]
+fn several_frames_are_those_that_are_captured_one_by_one() {
+    if !has_lavapipe() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let arguments = ["--frames", "5"];
+    let all = captured_by(folder.path(), "all", &["--frames", "1..4"], &arguments);
+    let all = Textrace::open(&all).expect("a trace");
+    let counts = |trace: &Textrace, frame: u32| -> u64 {
+        let mut tile = Tile::default();
+        let mut count = 0;
+        for (pass, of) in trace.tables().passes.iter().enumerate() {
+            for index in (0..of.tile_count()).filter(|_| of.frame == frame) {
+                trace
+                    .decode_tile(pass, index as usize, &mut tile)
+                    .expect("a tile");
+                count += tile.records.len() as u64;
+            }
+        }
+        count
+    };
+    for frame in 1..4_u32 {
+        let text = frame.to_string();
+        let one = captured_by(folder.path(), &text, &["--frames", &text], &arguments);
+        let one = Textrace::open(&one).expect("a trace");
+        let expected = counts(&one, frame);
+        assert!(expected > 10_000);
+        assert_eq!(counts(&all, frame), expected, "frame {frame}");
+    }
+}
+
+#[test]
+fn a_list_names_every_pass_and_shows_its_picture() {
+    if !has_lavapipe() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let page = folder.path().join("list.html");
+    let list = |stereo: &str, more: &[&str]| {
+        let mut command = program("tracegen");
+        command.args(["app", "--frames", "1", "--list"]).args(more);
+        command.args([
+            "--",
+            env!("CARGO_BIN_EXE_vulkan_program"),
+            "--stereo",
+            stereo,
+        ]);
+        String::from_utf8(run_ok(&mut command).stdout).expect("text")
+    };
+    let table = list("targets", &["--list-page", page.to_str().expect("a path")]);
+    let lines: Vec<&str> = table.lines().collect();
+    assert_eq!(lines[0], "frame 1: both eyes by a target per eye");
+    let [left, right] = [lines[2], lines[3]];
+    assert!(
+        left.contains("left eye") && right.contains("right eye"),
+        "{table}"
+    );
+    for line in [left, right] {
+        let cells: Vec<&str> = line
+            .split("  ")
+            .map(str::trim)
+            .filter(|cell| !cell.is_empty())
+            .collect();
+        assert_eq!(cells[2], "240x200 R8G8B8A8_UNORM", "{table}");
+        assert_eq!(cells[3], "240x200 at 0,0", "{table}");
+        assert_eq!(cells[4], OBJECTS.len().to_string(), "{table}");
+    }
+    let html = std::fs::read_to_string(&page).expect("the page");
+    let pictures: Vec<&str> = html.split("data:image/png;base64,").skip(1).collect();
+    assert_eq!(pictures.len(), 2, "a picture of each pass");
+    assert!(
+        pictures.iter().all(|data| data.len() > 2_000),
+        "pictures of one colour"
+    );
+    assert!(list("mono", &[]).contains("no two eyes were found"));
+    // Without a page nothing but the table is made.
+    assert_eq!(
+        std::fs::read_dir(folder.path())
+            .expect("the folder")
+            .count(),
+        1
+    );
+}
+
+#[test]
+fn a_file_of_rules_tells_the_eyes_where_asked() {
+    if !has_lavapipe() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let rules = folder.path().join("rules.toml");
+    let text = "[[rule]]\npass = 0\nshows = \"left\"\n[[rule]]\npass = 1\nshows = \"right\"\n";
+    std::fs::write(&rules, text).expect("a file");
+    let by_file = ["--frames", "2", "--rules", rules.to_str().expect("a path")];
+    let arguments = ["--stereo", "targets"];
+    let told = captured_by(folder.path(), "told", &by_file, &arguments);
+    let found = captured_by(folder.path(), "found", &["--frames", "2"], &arguments);
+    assert_same(&told, &found);
+    for (text, expected) in [
+        (
+            "[[rule]]\nshows = \"ignored\"\n",
+            "rules.toml: expected a rule that shows",
+        ),
+        ("[[rule]]\nshow = \"left\"\n", "unknown field `show`"),
+        (
+            "[[rule]]\nsize = [7, 7]\nshows = \"left\"\n",
+            "no two eyes were found",
+        ),
+    ] {
+        std::fs::write(&rules, text).expect("a file");
+        refused(&by_file, &arguments, &[expected]);
+    }
+}
+
+/// Every module that the layer hands to the driver, and every one that the program gave.
+#[test]
+fn spirv_val_accepts_the_rewritten_modules_of_a_program() {
+    if !has_lavapipe() {
+        return;
+    }
+    if Command::new("spirv-val").arg("--version").output().is_err() {
+        skipped!("spirv-val is absent");
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for stereo in ["halves", "multiview"] {
+        let modules = folder.path().join(stereo);
+        let options = [
+            "--frames",
+            "1",
+            "--modules",
+            modules.to_str().expect("a path"),
+        ];
+        captured_by(folder.path(), stereo, &options, &["--stereo", stereo]);
+        let mut valid = 0;
+        for entry in std::fs::read_dir(&modules).expect("the modules") {
+            let path = entry.expect("an entry").path();
+            run_ok(
+                Command::new("spirv-val")
+                    .args(["--target-env", "vulkan1.2"])
+                    .arg(path),
+            );
+            valid += 1;
+        }
+        // As the program gave them and as they record.
+        assert_eq!(valid, 2 * OBJECTS.len(), "{stereo}");
+    }
 }
 
 #[test]

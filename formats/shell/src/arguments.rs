@@ -35,10 +35,11 @@ impl Threads {
 }
 
 /// Options with a value that say where and how, not what.
-const PASSING_OPTIONS: [&str; 5] = [
+const PASSING_OPTIONS: [&str; 6] = [
     "--no-skip",
     "--output",
     "--image",
+    "--modules",
     "--threads",
     "--record-budget",
 ];

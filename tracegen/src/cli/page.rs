@@ -106,15 +106,25 @@ pub fn run(args: &PageArgs) -> anyhow::Result<ExitCode> {
     let launch = Launch::new(&std::env::temp_dir(), &tool, &settings)?;
     let page = page(args)?;
     let (cameras, picture) = draw(args, &launch, &page)?;
-    if let Some(path) = &args.image {
-        write_picture(path, picture.as_deref())?;
+    // The picture gets its name once the trace has its own.
+    let picture = args
+        .image
+        .as_deref()
+        .map(|path| Ok::<_, anyhow::Error>((write_picture(path, picture.as_deref())?, path)))
+        .transpose()?;
+    let code = if args.plain {
+        ExitCode::SUCCESS
+    } else {
+        let mut session = Session::of_capture(launch.folder(), "the page")?;
+        let name = format!("{}{}", page_name(&args.page), args.query);
+        args.capture
+            .finish(&mut session, name, &settings, cameras)?
+    };
+    if let Some((file, path)) = picture {
+        file.persist()
+            .with_context(|| format!("cannot write {}", path.display()))?;
     }
-    if args.plain {
-        return Ok(ExitCode::SUCCESS);
-    }
-    let mut session = Session::of_capture(launch.folder(), "the page")?;
-    let name = format!("{}{}", page_name(&args.page), args.query);
-    args.capture.finish(&mut session, name, &settings, cameras)
+    Ok(code)
 }
 
 /// Name of a page: its file's, or its address.
@@ -233,14 +243,13 @@ fn median(times_ms: &[f64]) -> String {
     }
 }
 
-/// Writes a picture that a page gave as an address of data.
-fn write_picture(path: &Path, picture: Option<&str>) -> anyhow::Result<()> {
+/// Writes a picture that a page gave as an address of data, yet without its final name.
+fn write_picture(path: &Path, picture: Option<&str>) -> anyhow::Result<AtomicFile> {
     let data = picture.and_then(|picture| picture.strip_prefix("data:image/png;base64,"));
     let bytes = data.and_then(|data| STANDARD.decode(data).ok());
     let bytes = bytes.context("the page has no canvas of WebGL")?;
     let place = || format!("cannot write {}", path.display());
     let mut file = AtomicFile::create(path).with_context(place)?;
     file.write_all(&bytes).with_context(place)?;
-    file.persist().with_context(place)?;
-    Ok(())
+    Ok(file)
 }

@@ -27,9 +27,12 @@ pub struct ProgramArgs {
         required_unless_present = "list"
     )]
     output: Option<PathBuf>,
-    /// List the frames' passes, as a table on stdout and as a page with pictures, and write no trace.
-    #[arg(long, value_name = "PAGE.html", conflicts_with_all = ["output", "check"])]
-    list: Option<PathBuf>,
+    /// List the render passes of the frames as a table on stdout, and write no trace.
+    #[arg(long, conflicts_with_all = ["output", "check"])]
+    list: bool,
+    /// Also write the list as a page with a picture of each render pass.
+    #[arg(long, value_name = "PAGE.html", requires = "list")]
+    list_page: Option<PathBuf>,
     /// Frames to capture, counted from 0: `10`, or `10..13` for 10, 11 and 12.
     #[arg(long, value_name = "FRAMES", default_value = "10", value_parser = parse_frames)]
     pub frames: Range<u32>,
@@ -104,7 +107,7 @@ impl ProgramArgs {
     /// Those.
     pub fn check_outputs(&self, more: Option<Output>) -> anyhow::Result<()> {
         let trace = (self.output.as_deref()).map(|path| Output::binary("-o", path));
-        let list = (self.list.as_deref()).map(|path| Output::text("--list", path));
+        let list = (self.list_page.as_deref()).map(|path| Output::text("--list-page", path));
         let outputs: Vec<Output> = trace.into_iter().chain(list).chain(more).collect();
         check_outputs(&outputs, []).map(drop)
     }
@@ -123,9 +126,9 @@ impl ProgramArgs {
             records: true,
             frames: [self.frames.start, self.frames.end],
             frames_by,
-            occlusion: self.check || self.list.is_some(),
+            occlusion: self.check || self.list,
             record_bytes: self.records,
-            pictures: self.list.is_some(),
+            pictures: self.list_page.is_some(),
             modules: self.modules.as_ref().map(absolute).transpose()?,
         })
     }
@@ -198,7 +201,7 @@ impl ProgramArgs {
         for list in &lists {
             shell::print(&format!("{}\n{}", list.eyes_text(), list.table()))?;
         }
-        if let Some(path) = &self.list {
+        if let Some(path) = &self.list_page {
             let place = || format!("cannot write {}", path.display());
             let mut file = AtomicFile::create(path).with_context(place)?;
             let page = programs::list::page(program, &lists);

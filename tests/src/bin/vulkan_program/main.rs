@@ -4,7 +4,7 @@
 //! which texel it shows. Objects differ in how their shaders sample.
 //!
 //!     vulkan_program [--stereo halves|targets|twice|multiview|mono] [--objects NAME,NAME...] [--frames N]
-//!         [--size WIDTHxHEIGHT] [--picture FILE] [--end crash|early|fork]
+//!         [--size WIDTHxHEIGHT] [--picture FILE] [--end crash|early|fork|hang]
 
 mod gpu;
 mod objects;

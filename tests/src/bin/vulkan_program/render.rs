@@ -16,6 +16,10 @@ struct Draw {
 
 /// Renders the frames that are asked for.
 pub fn run(options: &Options) -> Result<()> {
+    if options.end.as_deref() == Some("hang") {
+        // A program that never renders.
+        std::thread::sleep(std::time::Duration::from_secs(600));
+    }
     let gpu = Gpu::open()?;
     let [width, height] = options.size_px;
     let pass = render_pass(&gpu, options.stereo)?;
@@ -61,7 +65,23 @@ fn end_otherwise(how: &str) {
     match how {
         "crash" => std::process::abort(),
         "early" => std::process::exit(3),
+        "fork" => fork_once(),
         _ => {}
+    }
+}
+
+unsafe extern "C" {
+    fn fork() -> i32;
+    fn _exit(status: i32) -> !;
+}
+
+/// Starts a copy of this process that ends at once, as programs do that look for others.
+fn fork_once() {
+    // SAFETY: the copy calls nothing but `_exit`, which is allowed after a fork of a process with threads.
+    unsafe {
+        if fork() == 0 {
+            _exit(0);
+        }
     }
 }
 
