@@ -2,7 +2,7 @@
 # Captures unmodified web libraries in headless Chromium: installs what is missing from Debian and npm, captures three.js's
 # StereoEffect and Babylon.js's VR camera, holds the records to occlusion queries, and replays both traces.
 #   OUT=DIR     where the traces and pictures go (out)
-#   RESULTS=1   instead measure every program of scripts/apps.py and write results/applications.csv (about 15 minutes)
+#   RESULTS=1   instead measure every program of scripts/apps.py and write results/applications.csv (about ten minutes)
 set -eu
 cd "$(dirname "$0")/.."
 scripts/install-deps.sh apps

@@ -4,6 +4,7 @@
 //! a header and rows. A table in a document stands between `<!-- figures: NAME -->` and `<!-- end -->`. It is the
 //! results file as it stands, or what a row of [`VIEWS`] makes of it.
 
+mod applications;
 mod paper_comparison;
 mod reprojection;
 mod shards;
@@ -18,6 +19,13 @@ type View = fn(&Results) -> String;
 
 /// Tables that show another form than their results file.
 const VIEWS: &[(&str, &str, View)] = &[
+    ("applications-orders", "applications", applications::orders),
+    (
+        "applications-records",
+        "applications",
+        applications::records,
+    ),
+    ("applications-times", "applications", applications::times),
     (
         "calibration-ipd-bias",
         "calibration-ipd-bias",
