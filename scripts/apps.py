@@ -70,6 +70,7 @@ def measure_page(page, query, more):
 
 def describe(name, options, times):
     trace = f"{OUT}/{re.sub('[^a-z0-9]+', '-', name.lower())}.textrace"
+    # Exit code 1 where a draw differs, which the table then tells.
     said = run([f"{BIN}/tracegen", "page", *options, "--check", "-o", trace], allowed=(0, 1)).stderr
     equal, different = found(r"occlusion queries: (\d+) draws equal, (\d+) different", said)
     apart = re.findall(r"not compared: (.*) \((\d+) draws\)", said)

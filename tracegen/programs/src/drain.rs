@@ -79,6 +79,11 @@ pub enum DrainError {
         /// Width and height.
         found: [u32; 2],
     },
+    /// The eyes were found, and none of their draws has a record.
+    #[error(
+        "no draw of either eye was recorded; --check compares the draws with queries, --list names the passes"
+    )]
+    Nothing,
     /// Of the trace.
     #[error(transparent)]
     Record(#[from] RecordError),
@@ -146,6 +151,9 @@ pub fn drain<W: Write + Seek>(
         builder.count_ignored(session, &frame.draws, &views, &weights);
     }
     drained.counts = builder.counts;
+    if drained.counts.quads == 0 {
+        return Err(DrainError::Nothing);
+    }
     drained.left_out = builder.left_out();
     let rule = drained.rule.map_or("", Rule::name);
     let meta = meta(

@@ -88,7 +88,11 @@ unsafe fn submit_frame(
     if !capture.wants(frame) {
         // Commands that were recorded for any time record nothing now.
         if let Some(recorder) = known.recorder.as_ref().filter(|r| r.buffer.is_open()) {
-            recorder.buffer.open(false);
+            // Another thread may have begun a wanted frame since, whose commands are still being executed.
+            let _alone = lock(&known.submitting);
+            if !capture.wants(capture.frame()) {
+                recorder.buffer.open(false);
+            }
         }
         return submit();
     }
