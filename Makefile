@@ -6,10 +6,14 @@
 CARGO ?= cargo
 OUT   ?= out
 
-.PHONY: demo techniques accuracy stress test fuzz faults bench lint build deps golden figures reproduce clean
+.PHONY: demo apps techniques accuracy stress test fuzz faults bench lint build deps golden figures reproduce clean
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
+
+# Unmodified programs: two web pages in headless Chromium, captured and replayed (docs/use/applications.md).
+apps: deps build
+	@OUT="$(OUT)" scripts/apps.sh
 
 # Every stereo rendering technique on three scenes, measured against its image error.
 techniques: deps build
@@ -45,7 +49,7 @@ lint:
 	$(CARGO) clippy --release --workspace --all-targets --locked -- -D warnings
 
 build:
-	$(CARGO) build --release --locked -p tracegen -p replay
+	$(CARGO) build --release --locked -p tracegen -p replay -p layer
 
 # lavapipe is the only thing that the programs need from outside Cargo.
 deps:

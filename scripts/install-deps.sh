@@ -4,6 +4,7 @@
 # package of it (the tests that need it are skipped without), a C++ compiler,
 # which the reference implementation of FLIP in the tests needs, and Python for the independent
 # trace readers and Slurm for sweeps on a cluster, whose tests are skipped where they cannot be had.
+# With `apps` also Chromium, npm and Python, which scripts/apps.sh captures pages with.
 set -eu
 
 has_lavapipe() {
@@ -21,6 +22,11 @@ if ! has_lavapipe || ! has_loader; then
 fi
 if [ "${1:-}" = test ] && ! command -v "${CXX:-c++}" >/dev/null 2>&1; then
     packages="$packages g++"
+fi
+if [ "${1:-}" = apps ]; then
+    for program in chromium npm python3; do
+        command -v $program >/dev/null 2>&1 || packages="$packages $program"
+    done
 fi
 wanted="$packages"
 if [ "${1:-}" = test ] && ! command -v python3 >/dev/null 2>&1; then

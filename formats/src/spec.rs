@@ -29,7 +29,7 @@ fn size(heading: &str) -> usize {
         assert_eq!(row[0], end.to_string(), "{heading}: {row:?}");
         end += match row[1] {
             "u8" | "i8" => 1,
-            "u16" => 2,
+            "u16" | "i16" => 2,
             "u32" | "u8[4]" => 4,
             "u64" | "u8[8]" => 8,
             other => panic!("{heading}: type {other}"),
@@ -49,6 +49,8 @@ fn documented_sizes_equal_those_of_the_code() {
         ("draw without name and groups", tables::DRAW_BYTES),
         ("uv group without samples", tables::GROUP_BYTES),
         ("sample", tables::SAMPLE_BYTES),
+        ("sampler of version 2", tables::SAMPLER_BYTES_V2),
+        ("sample of version 2", tables::SAMPLE_BYTES_V2),
         ("pass", tables::PASS_BYTES),
         ("tile index entry", INDEX_ENTRY_BYTES),
         ("mesh without indices", geometry::MESH_BYTES),
@@ -76,6 +78,8 @@ fn documented_fields_add_up() {
     assert_eq!(size("### Texture"), tables::TEXTURE_BYTES);
     assert_eq!(size("### Sampler"), tables::SAMPLER_BYTES);
     assert_eq!(size("### Draw"), tables::DRAW_BYTES);
+    assert_eq!(size("### Sampler of version 2"), tables::SAMPLER_BYTES_V2);
+    assert_eq!(size("### Sample of version 2"), tables::SAMPLE_BYTES_V2);
     assert_eq!(size("### Pass"), tables::PASS_BYTES);
     assert_eq!(size("### Tile index entry"), INDEX_ENTRY_BYTES);
     assert_eq!(

@@ -12,14 +12,26 @@ use serde::{Deserialize, Serialize};
 pub enum TexelFormat {
     /// 4x4 texels in 8 bytes (DXT1).
     Bc1 = 1,
+    /// 4x4 texels in 16 bytes (DXT3).
+    Bc2 = 2,
     /// 4x4 texels in 16 bytes (DXT5).
     Bc3 = 3,
+    /// 4x4 texels of one channel in 8 bytes.
+    Bc4 = 4,
+    /// 4x4 texels of two channels in 16 bytes.
+    Bc5 = 5,
+    /// 4x4 half-float texels in 16 bytes.
+    Bc6h = 6,
     /// 4x4 texels in 16 bytes.
     Bc7 = 7,
     /// 4x4 texels in 8 bytes (ETC2 RGB8).
     Etc2 = 10,
     /// 4x4 texels in 16 bytes (ETC2 RGBA8 with EAC alpha).
     Etc2Rgba = 11,
+    /// 4x4 texels of one channel in 8 bytes (EAC).
+    EacR11 = 12,
+    /// 4x4 texels of two channels in 16 bytes (EAC).
+    EacRg11 = 13,
     /// 4x4 texels in 16 bytes.
     #[serde(rename = "astc-4x4")]
     Astc4x4 = 20,
@@ -36,6 +48,70 @@ pub enum TexelFormat {
     Rgba8 = 40,
     /// One 32-bit float texel in 4 bytes (shadow maps).
     R32f = 41,
+    /// One texel in 1 byte.
+    R8 = 42,
+    /// One texel in 2 bytes.
+    Rg8 = 43,
+    /// One texel in 2 bytes, packed: 5-6-5, 5-5-5-1 or 4-4-4-4 bits.
+    Packed16 = 44,
+    /// One 16-bit texel in 2 bytes, float or not.
+    R16 = 45,
+    /// Two 16-bit channels in 4 bytes.
+    Rg16 = 46,
+    /// Four 16-bit channels in 8 bytes.
+    Rgba16 = 47,
+    /// Two 32-bit channels in 8 bytes.
+    Rg32 = 48,
+    /// Four 32-bit channels in 16 bytes.
+    Rgba32 = 49,
+    /// One texel in 4 bytes, packed: 10-10-10-2 bits, 11-11-10 bits or a shared exponent.
+    Packed32 = 50,
+    /// One 16-bit depth in 2 bytes (shadow maps).
+    D16 = 51,
+}
+
+impl TexelFormat {
+    /// Depth: a shadow map.
+    #[must_use]
+    pub const fn is_depth(self) -> bool {
+        matches!(self, Self::R32f | Self::D16)
+    }
+
+    /// Texels that another colour format could hold: neither depth nor more than 8 bits a channel.
+    #[must_use]
+    pub const fn is_ordinary_color(self) -> bool {
+        !matches!(
+            self,
+            Self::R32f
+                | Self::D16
+                | Self::Bc6h
+                | Self::R16
+                | Self::Rg16
+                | Self::Rgba16
+                | Self::Rg32
+                | Self::Rgba32
+                | Self::Packed32
+        )
+    }
+
+    /// A trace of version 1 can name it.
+    #[must_use]
+    pub(crate) const fn is_in_version_1(self) -> bool {
+        matches!(
+            self,
+            Self::Bc1
+                | Self::Bc3
+                | Self::Bc7
+                | Self::Etc2
+                | Self::Etc2Rgba
+                | Self::Astc4x4
+                | Self::Astc5x5
+                | Self::Astc6x6
+                | Self::Astc8x8
+                | Self::Rgba8
+                | Self::R32f
+        )
+    }
 }
 
 /// Handling of coordinates outside 0..1.
@@ -49,6 +125,18 @@ pub enum Wrap {
     MirroredRepeat = 1,
     /// Clamp to the edge texel.
     ClampToEdge = 2,
+    /// Texels outside have the border's colour: they are not read.
+    ClampToBorder = 3,
+    /// Mirrored once, then clamped to the edge texel.
+    MirrorClampToEdge = 4,
+}
+
+impl Wrap {
+    /// Coordinates that differ by two whole units name the same texel.
+    #[must_use]
+    pub const fn is_periodic(self) -> bool {
+        matches!(self, Self::Repeat | Self::MirroredRepeat)
+    }
 }
 
 /// Minification and magnification filter within a level.
@@ -86,15 +174,67 @@ pub struct Sampler {
     pub min: Filter,
     /// Filter between levels.
     pub mip: MipFilter,
+    /// What becomes of a level of detail before it chooses levels.
+    #[serde(default, skip_serializing_if = "LodRange::is_whole")]
+    pub lod: LodRange,
+}
+
+/// A sampler's bias and bounds of the level of detail, in 1/256 of a level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct LodRange {
+    /// Added first.
+    pub bias_256ths: i16,
+    /// At least this.
+    pub min_256ths: i16,
+    /// At most this.
+    pub max_256ths: i16,
+}
+
+impl Default for LodRange {
+    fn default() -> Self {
+        Self::WHOLE
+    }
+}
+
+impl LodRange {
+    /// Leaves every level of detail as it is.
+    pub const WHOLE: Self = Self {
+        bias_256ths: 0,
+        min_256ths: i16::MIN,
+        max_256ths: i16::MAX,
+    };
+
+    /// Nothing is added, and nothing bounds what a texture's levels do not bound.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        *self == Self::WHOLE
+    }
+
+    /// The level of detail that a sampler makes of one.
+    #[must_use]
+    #[inline]
+    pub fn apply(&self, lod: f32) -> f32 {
+        let [bias, min, max] =
+            [self.bias_256ths, self.min_256ths, self.max_256ths].map(|v| f32::from(v) / 256.0);
+        (lod + bias).max(min).min(max)
+    }
 }
 
 impl Sampler {
-    /// Repeat, trilinear: glTF's usual sampler and the default of the models.
+    /// A trace of version 1 can hold it.
+    #[must_use]
+    pub(crate) fn is_in_version_1(&self) -> bool {
+        let known = |wrap: &Wrap| (*wrap as u8) <= Wrap::ClampToEdge as u8;
+        self.wrap.iter().all(known) && self.lod.is_whole()
+    }
+
+    /// Repeat, trilinear: glTF's usual sampler and the default of every model here.
     pub const TRILINEAR_REPEAT: Self = Self {
         wrap: [Wrap::Repeat; 2],
         mag: Filter::Linear,
         min: Filter::Linear,
         mip: MipFilter::Linear,
+        lod: LodRange::WHOLE,
     };
     /// Clamped, bilinear, without mip levels, for shadow maps.
     pub const SHADOW: Self = Self {
@@ -102,6 +242,7 @@ impl Sampler {
         mag: Filter::Linear,
         min: Filter::Linear,
         mip: MipFilter::None,
+        lod: LodRange::WHOLE,
     };
 }
 

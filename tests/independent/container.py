@@ -76,13 +76,14 @@ def f32(number):
 
 
 def read(path, kind):
-    """Chunks of a file of a kind (1 textrace, 2 raytrace) by tag, in file order; its minor version."""
+    """Chunks of a file of a kind (1 textrace, 2 raytrace) by tag, in file order; its version."""
     with open(path, "rb") as file:
         data = file.read()
     head = Bytes(data)
     magic, major, minor, found_kind, zero16 = head.fields("8sHHHH")
     directory_at, size, entries, directory_crc, zero32, head_crc = head.fields("QQIIII")
-    require(magic == b"PLXTRACE" and major == 1, "not a trace of version 1")
+    known = major == 1 or major == 2 and kind == 1
+    require(magic == b"PLXTRACE" and known, "not a trace of version 1 or 2")
     require(zlib.crc32(data[:44]) == head_crc, "damaged header")
     require(found_kind == kind, "a trace of another kind")
     require(zero16 == 0 and zero32 == 0, "reserved bytes")
@@ -102,7 +103,7 @@ def read(path, kind):
         require(zlib.crc32(chunks[tag]) == crc, f"damaged chunk {tag}")
     start = (end + 7) // 8 * 8
     require(start == directory_at and not any(data[end:start]), "the directory out of place")
-    return {tag.decode("ascii"): chunk for tag, chunk in chunks.items()}, minor
+    return {tag.decode("ascii"): chunk for tag, chunk in chunks.items()}, (major, minor)
 
 
 def tile_spans(index, tiles):

@@ -13,7 +13,10 @@ from container import shaped, tile_spans, unzigzag
 from planes import decode_planes, read_codes
 
 ENCODINGS = (0, 1, 3)
-TAGS = ["META", "TEXS", "SMPS", "DRAW", "PASS", "TILE", "TIDX"]
+TAGS = {
+    1: ["META", "TEXS", "SMPS", "DRAW", "PASS", "TILE", "TIDX"],
+    2: ["TILE", "TIDX", "META", "TEXS", "SMPS", "DRAW", "PASS"],
+}
 GEOMETRY_TAGS = ["GEOM", "PLST", "PLIX"]
 FORMATS = {
     1: "bc1",
@@ -28,10 +31,38 @@ FORMATS = {
     40: "rgba8",
     41: "r32f",
 }
+FORMATS_2 = {
+    **FORMATS,
+    2: "bc2",
+    4: "bc4",
+    5: "bc5",
+    6: "bc6h",
+    12: "eac-r11",
+    13: "eac-rg11",
+    42: "r8",
+    43: "rg8",
+    44: "packed16",
+    45: "r16",
+    46: "rg16",
+    47: "rgba16",
+    48: "rg32",
+    49: "rgba32",
+    50: "packed32",
+    51: "d16",
+}
 WRAPS = {0: "repeat", 1: "mirrored-repeat", 2: "clamp-to-edge"}
+WRAPS_2 = {**WRAPS, 3: "clamp-to-border", 4: "mirror-clamp-to-edge"}
+LOD_RULES = {0: "derivatives", 1: "bias", 2: "explicit"}
+WHOLE_LOD = {"bias_256ths": 0, "min_256ths": -32768, "max_256ths": 32767}
 FILTERS = {0: "nearest", 1: "linear"}
 MIP_FILTERS = {0: "none", 1: "nearest", 2: "linear"}
 NO_GROUP = 15
+PROGRAM = {
+    "cameras_known": "bool",
+    "frames_by": "string",
+    "views_by": "string",
+    "left_out": ({"what": "string", "draws": "u64", "fragments": "u64"},),
+}
 WIDTHS = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 18, 24, 32]
 
 
@@ -40,7 +71,7 @@ def named(names, number):
     return names[number]
 
 
-def read_texture(data):
+def read_texture(data, major):
     width, height, levels, layers, fmt, space, zero = data.fields("IIIIHBB")
     require(1 <= width <= 65536 and 1 <= height <= 65536, "size of a texture")
     require(1 <= levels <= max(width, height).bit_length(), "mip levels")
@@ -49,23 +80,39 @@ def read_texture(data):
         "size": [width, height],
         "levels": levels,
         "layers": layers,
-        "format": named(FORMATS, fmt),
+        "format": named(FORMATS_2 if major == 2 else FORMATS, fmt),
         "color_space": named({0: "linear", 1: "srgb"}, space),
         "name": data.name(),
     }
 
 
-def read_sampler(data):
+def read_sampler(data, major):
     u, v, mag, small, mip = data.fields("5B")
-    return {
-        "wrap": [named(WRAPS, u), named(WRAPS, v)],
+    wraps = WRAPS_2 if major == 2 else WRAPS
+    sampler = {
+        "wrap": [named(wraps, u), named(wraps, v)],
         "mag": named(FILTERS, mag),
         "min": named(FILTERS, small),
         "mip": named(MIP_FILTERS, mip),
     }
+    if major == 2:
+        lod = dict(zip(WHOLE_LOD, data.fields("3h")))
+        if lod != WHOLE_LOD:  # replay leaves out what changes nothing
+            sampler["lod"] = lod
+    return sampler
 
 
-def read_group(data, textures, samplers):
+def read_level(data):
+    rule, operands, lod = data.fields("BBh")
+    require(operands <= 1 and (rule != 0 or lod == 0), "a level of detail")
+    return {"rule": named(LOD_RULES, rule), "lod_256ths": lod, "operands": operands == 1}
+
+
+def asks_operands(group):
+    return any("level" in s and s["level"]["operands"] for s in group["samples"])
+
+
+def read_group(data, textures, samplers, major):
     width, height, count = data.fields("IIH")
     require(1 <= width <= 65536 and 1 <= height <= 65536, "extent")
     samples = []
@@ -73,21 +120,28 @@ def read_group(data, textures, samplers):
         texture, sampler, layer, x, y = data.fields("IHHbb")
         require(texture < len(textures) and sampler < len(samplers), "a sample of nothing")
         require(layer < textures[texture]["layers"], "a layer that is not there")
-        samples.append(
-            {"texture": texture, "sampler": sampler, "layer": layer, "offset": [x, y]}
-        )
+        sample = {"texture": texture, "sampler": sampler, "layer": layer, "offset": [x, y]}
+        level = read_level(data) if major == 2 else {"rule": "derivatives", "operands": False}
+        if level["rule"] != "derivatives" or level["operands"]:
+            sample["level"] = level
+        samples.append(sample)
     return {"extent": [width, height], "samples": samples}
 
 
-def read_draw(data, textures, samplers):
-    first, primitives, groups = data.fields("IIH")
-    require(first + primitives < 1 << 32 and groups <= 15, "a draw")
+def read_draw(data, textures, samplers, major):
+    first, primitives, count = data.fields("IIH")
+    require(first + primitives < 1 << 32 and count <= 15, "a draw")
     material = data.name()
+    groups = [read_group(data, textures, samplers, major) for _ in range(count)]
+    for number, group in enumerate(groups):
+        if asks_operands(group):
+            require(number > 0, "operands of the first group")
+            require(groups[number - 1] == {"extent": [1, 1], "samples": []}, "a group of operands")
     return {
         "material": material,
         "first_primitive": first,
         "primitives": primitives,
-        "groups": [read_group(data, textures, samplers) for _ in range(groups)],
+        "groups": groups,
     }
 
 
@@ -111,8 +165,8 @@ def read_pass(data, meta):
     }
 
 
-def check_layers(layers, minor):
-    require(minor >= 1 or not layers, "layers in a file of version 1.0")
+def check_layers(layers, version):
+    require(version >= (1, 1) or not layers, "layers in a file of version 1.0")
     numbers = {(each["frame"], each["eye"], each["layer"]) for each in layers}
     require(len(numbers) == len(layers), "two layers of a number")
 
@@ -240,6 +294,7 @@ def check_tile(heads, rows, draws):
         number = primitive - of["first_primitive"]
         require(0 <= number < of["primitives"], "a primitive of another draw")
         previous, position = primitive, 0
+        check_operands(rows[first : first + count], of["groups"])
         for x, y, mask, group, *_ in rows[first : first + count]:
             require(x < 8 and y < 8 and 1 <= mask <= 15, "a record")
             require(group < len(of["groups"]) or group == NO_GROUP, "a group")
@@ -248,6 +303,19 @@ def check_tile(heads, rows, draws):
             position = now
         first += count
     require(first == len(rows), "records of the runs")
+
+
+def check_operands(rows, groups):
+    """Operands come right before the record that asks for them, and nowhere else."""
+    asks = [asks_operands(group) for group in groups] + [False] * 16
+    operands = None
+    for x, y, mask, group, *_ in rows:
+        if operands:
+            require(operands == (x, y, mask, group - 1), "operands of another record")
+        else:
+            require(not asks[group], "a record without its operands")
+        operands = (x, y, mask, group) if group < 15 and asks[group + 1] else None
+    require(operands is None, "operands of no record")
 
 
 def ascending(data):
@@ -272,12 +340,13 @@ def read_mesh(data):
     return indices
 
 
-def read_geometry(chunks, minor, draws, passes, frames):
+def read_geometry(chunks, version, draws, passes, frames):
     """Yields (view, tile, primitives) for each tile of each view."""
     tags = [tag for tag in chunks if tag in GEOMETRY_TAGS]
     if not tags:
         return
-    require(tags == GEOMETRY_TAGS and minor >= 2, "geometry missing, out of order or too old")
+    new = version >= (1, 2)
+    require(tags == GEOMETRY_TAGS and new, "geometry missing, out of order or too old")
     require(list(chunks).index("GEOM") > list(chunks).index("TIDX"), "geometry before the tiles")
     data = Bytes(chunks["GEOM"])
     meshes = [read_mesh(data) for _ in range(data.count(12))]
@@ -313,14 +382,19 @@ def read_geometry(chunks, minor, draws, passes, frames):
 
 
 def main(path, *options):
-    chunks, minor = read(path, 1)
-    require([tag for tag in chunks if tag in TAGS] == TAGS, "chunks missing or out of order")
-    meta = check_meta(shaped(parse_json(chunks["META"]), META))
-    textures = read_table(chunks["TEXS"], 22, read_texture)
-    samplers = read_table(chunks["SMPS"], 5, read_sampler)
-    draws = read_table(chunks["DRAW"], 12, lambda data: read_draw(data, textures, samplers))
+    chunks, version = read(path, 1)
+    major = version[0]
+    tags = TAGS[major]
+    require([tag for tag in chunks if tag in tags] == tags, "chunks missing or out of order")
+    description = parse_json(chunks["META"])
+    meta = check_meta(shaped(description, META))
+    if major == 2 and "program" in description:
+        meta["program"] = shaped(description["program"], PROGRAM)
+    textures = read_table(chunks["TEXS"], 22, lambda data: read_texture(data, major))
+    samplers = read_table(chunks["SMPS"], 5, lambda data: read_sampler(data, major))
+    draws = read_table(chunks["DRAW"], 12, lambda data: read_draw(data, textures, samplers, major))
     passes = read_table(chunks["PASS"], 24, lambda data: read_pass(data, meta))
-    check_layers([each for each in passes if each["kind"] == "layer"], minor)
+    check_layers([each for each in passes if each["kind"] == "layer"], version)
     print_line(
         {
             "meta": meta,
@@ -331,7 +405,7 @@ def main(path, *options):
         }
     )
     frames = {views["frame"] for views in meta["frames"]}
-    for view, tile, primitives in read_geometry(chunks, minor, draws, passes, frames):
+    for view, tile, primitives in read_geometry(chunks, version, draws, passes, frames):
         if "--lists" in options:
             print_line({"view": view, "tile": tile, "primitives": primitives})
     if "--lists" in options:

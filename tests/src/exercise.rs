@@ -6,7 +6,7 @@ use formats::footprint::SamplingOptions;
 use formats::interop::{Expander, Granularity, Origin, ray_samples};
 use formats::layout::{Layout, LayoutConfig};
 use formats::raytrace::{RayTile, Raytrace};
-use formats::textrace::{Textrace, Tile};
+use formats::textrace::{Textrace, Tile, with_operands};
 use formats::view::Eye;
 use replay::config::{FrameConfig, FrameMachine};
 use replay::config::{Hsr, Levels, Mode, PrefetchConfig, RunConfig, TmuConfig, TmuModel};
@@ -94,10 +94,10 @@ fn expand(trace: &Textrace) {
                     draw: run.draw,
                     ..Origin::default()
                 };
-                let records = tile.records.iter().skip(run.first as usize);
-                for record in records.take(run.count as usize) {
+                let records = run.first as usize..(run.first + run.count) as usize;
+                for (record, operands) in with_operands(&tile.records[records]) {
                     expander
-                        .expand(origin, record, |_| Ok(()))
+                        .expand(origin, record, operands, |_| Ok(()))
                         .expect("nothing fails here");
                 }
             }

@@ -102,8 +102,25 @@ macro_rules! skipped {
     };
 }
 
-/// Folder of the real test scenes (`PARALLAX_SCENES`, or `../shared/scenes` next to the checkout), or
-/// `None` with a line on stderr.
+/// False, with a line on stderr, where no lavapipe is installed.
+#[must_use]
+pub fn has_lavapipe() -> bool {
+    let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
+    let mut files = folders
+        .iter()
+        .filter_map(|folder| std::fs::read_dir(folder).ok())
+        .flatten();
+    let found = std::env::var_os("VK_DRIVER_FILES").is_some()
+        || files
+            .any(|file| file.is_ok_and(|f| f.file_name().to_string_lossy().starts_with("lvp_icd")));
+    if !found {
+        skipped!("lavapipe is absent");
+    }
+    found
+}
+
+/// Folder of the real test scenes (`PARALLAX_SCENES`, or `../shared/scenes` beside the checkout),
+/// or `None`, with a line on stderr that says so.
 #[must_use]
 pub fn real_scene(relative: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("PARALLAX_SCENES")

@@ -12,7 +12,9 @@ use formats::view::Eye;
 pub struct Parts {
     /// Kind of trace.
     pub kind: Kind,
-    /// Required minor version.
+    /// Major version.
+    pub major: u16,
+    /// Minor version that it needs.
     pub minor: u16,
     /// Tag and bytes of each chunk.
     pub chunks: Vec<([u8; 4], Vec<u8>)>,
@@ -38,6 +40,7 @@ impl Parts {
         let entries = container.directory().iter();
         Ok(Self {
             kind: container.kind(),
+            major: container.version().0,
             minor: container.version().1,
             chunks: entries
                 .map(|entry| Ok((entry.tag.0, chunk(entry.tag)?)))
@@ -169,6 +172,7 @@ impl Parts {
             let _twice = writer.chunk(ChunkTag(*tag), bytes);
         }
         let mut bytes = writer.into_bytes().expect("in memory");
+        bytes[8..10].copy_from_slice(&self.major.to_le_bytes());
         bytes[10..12].copy_from_slice(&self.minor.to_le_bytes());
         repair_header(&mut bytes);
         bytes

@@ -9,10 +9,13 @@ use formats::raytrace::{
 };
 use formats::textrace::geometry::{Geometry, GeometryView, MeshGeometry, TileLists, ViewTarget};
 use formats::textrace::{
-    Draw, Encoding, NO_GROUP, Pass, PassKind, PrimitiveRun, QuadRecord, Sample, Tables,
-    TextraceWriter, Tile, TraceMeta, UvGroup, encode_tile_as, quad_morton,
+    Draw, Encoding, LeftOut, LodRule, NO_GROUP, Pass, PassKind, PrimitiveRun, ProgramCapture,
+    QuadRecord, Sample, SampleLevel, Tables, TextraceWriter, Tile, TraceMeta, UvGroup,
+    encode_tile_as, quad_morton,
 };
-use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
+use formats::texture::{
+    ColorSpace, Filter, LodRange, MipFilter, Sampler, TexelFormat, Texture, Wrap,
+};
 use formats::view::{Eye, FovTangents, FrameViews, Hmd};
 
 /// Width and height of an eye's image; neither is a multiple of the tile size.
@@ -74,6 +77,7 @@ fn meta(frames: u32) -> TraceMeta {
         surfaces: None,
         origin_m: [0.0; 3],
         techniques: None,
+        program: None,
     }
 }
 
@@ -93,6 +97,7 @@ pub fn texture_tables() -> Tables {
         sampler,
         layer: 1,
         offset: [-1, 3],
+        level: Default::default(),
     };
     let group = |extent, samples| UvGroup { extent, samples };
     let draw = |material: &str, first_primitive, groups| Draw {
@@ -127,6 +132,7 @@ pub fn texture_tables() -> Tables {
                 mag: Filter::Nearest,
                 min: Filter::Linear,
                 mip: MipFilter::Nearest,
+                lod: LodRange::WHOLE,
             },
         ],
         draws: vec![
@@ -153,6 +159,55 @@ pub fn texture_tables() -> Tables {
             layer(1, Some(Eye::Right), [1, 1]),
         ],
     }
+}
+
+/// Tables of a program's trace: the same, with what scenes do not have.
+#[must_use]
+pub fn program_tables() -> Tables {
+    let mut tables = texture_tables();
+    tables.meta.program = Some(ProgramCapture {
+        cameras_known: false,
+        frames_by: "present".to_owned(),
+        views_by: "viewport halves".to_owned(),
+        left_out: vec![LeftOut {
+            what: "texel buffers".to_owned(),
+            draws: 1,
+            fragments: 7,
+        }],
+    });
+    tables.textures[0].format = TexelFormat::Bc6h;
+    tables.textures[0].layers = 6;
+    tables.textures[2].format = TexelFormat::D16;
+    tables.samplers.push(Sampler {
+        wrap: [Wrap::ClampToBorder, Wrap::MirrorClampToEdge],
+        lod: LodRange {
+            bias_256ths: -128,
+            min_256ths: 0,
+            max_256ths: 1000,
+        },
+        ..Sampler::TRILINEAR_REPEAT
+    });
+    let level = |rule, lod_256ths, operands| SampleLevel {
+        rule,
+        lod_256ths,
+        operands,
+    };
+    let samples = |draw: &mut Draw, group: usize, level| {
+        for sample in &mut draw.groups[group].samples {
+            (sample.sampler, sample.level) = (2, level);
+        }
+    };
+    let operands = UvGroup {
+        extent: [1, 1],
+        samples: Vec::new(),
+    };
+    let draws = &mut tables.draws;
+    samples(&mut draws[0], 0, level(LodRule::Bias, -300, false));
+    samples(&mut draws[0], 1, level(LodRule::Derivatives, 0, true));
+    draws[0].groups.insert(1, operands.clone());
+    samples(&mut draws[2], 0, level(LodRule::Explicit, 256, true));
+    draws[2].groups.insert(0, operands);
+    tables
 }
 
 /// A tile with a few primitives of every draw.
@@ -188,6 +243,10 @@ fn texture_tile(tables: &Tables, random: &mut Random) -> Tile {
             };
         }
         records.sort_by_key(|record| (quad_morton(record.x, record.y), record.group));
+        let of_draw = &tables.draws[draw as usize];
+        if of_draw.groups.iter().any(UvGroup::has_operands) {
+            records = paired(of_draw, &records);
+        }
         tile.runs.push(PrimitiveRun {
             primitive,
             draw,
@@ -199,7 +258,31 @@ fn texture_tile(tables: &Tables, random: &mut Random) -> Tile {
     tile
 }
 
-/// A texture trace; about one tile in three is untouched.
+/// The records with operands before those that ask for some, and no others.
+fn paired(draw: &Draw, records: &[QuadRecord]) -> Vec<QuadRecord> {
+    let mut pairs = Vec::new();
+    for record in records {
+        let record = match draw.is_operands(record.group) {
+            true => QuadRecord {
+                group: record.group + 1,
+                ..*record
+            },
+            false => *record,
+        };
+        let asks = draw.groups.get(usize::from(record.group));
+        if asks.is_some_and(UvGroup::has_operands) {
+            pairs.push(QuadRecord {
+                group: record.group - 1,
+                uv: [record.uv[0] % 20_000, record.uv[1] % 20_000],
+                ..record
+            });
+        }
+        pairs.push(record);
+    }
+    pairs
+}
+
+/// A texture trace; about a tile in three is untouched.
 #[must_use]
 pub fn texture_trace(encoding: Encoding, seed: u64) -> Vec<u8> {
     texture_trace_of(&texture_tables(), encoding, seed)
@@ -465,6 +548,8 @@ pub fn all() -> Vec<(String, Kind, Vec<u8>)> {
         (name, Kind::Raytrace, ray_trace(samples, visits, 7))
     });
     let geometry = ("geometry".to_owned(), Kind::Textrace, geometry_trace(5));
-    let textures = textures.into_iter().chain([geometry]);
+    let program = texture_trace_of(&program_tables(), Encoding::Delta, 5);
+    let program = ("program".to_owned(), Kind::Textrace, program);
+    let textures = textures.into_iter().chain([geometry, program]);
     textures.chain(rays).collect()
 }

@@ -1,7 +1,7 @@
 //! Compares the readers in `tests/independent/`, written in Python from FORMAT.md only, with `replay dump`
 //! and `replay info`: every table and every record of every golden trace and of generated traces.
 
-use parallax_tests::{program, root, run_ok, traces};
+use parallax_tests::{has_lavapipe, program, root, run_ok, traces};
 use serde_json::Value;
 use std::fs;
 use std::io::{BufRead, BufReader};
@@ -171,6 +171,32 @@ fn python_reads_a_fresh_capture_in_every_encoding_as_replay_does() {
     let encoding = ["raster", "teapot", "--encoding", "planes"];
     run_ok(program("tracegen").args(encoding).args(size).arg(&captured));
     assert_eq!(check(&captured), records);
+}
+
+#[test]
+fn python_reads_a_captured_program_in_every_encoding_as_replay_does() {
+    if !has_python() || !has_lavapipe() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let delta = folder.path().join("delta.textrace");
+    let mut command = program("tracegen");
+    command.args(["app", "--frames", "1", "-o"]).arg(&delta);
+    command.args([
+        "--",
+        env!("CARGO_BIN_EXE_vulkan_program"),
+        "--size",
+        "96x64",
+    ]);
+    run_ok(&mut command);
+    let records = check(&delta);
+    assert!(records > 1000);
+    for encoding in ["raw", "planes"] {
+        let other = folder.path().join(encoding).with_extension("textrace");
+        let encode = ["convert", "--to", "textrace", "--encoding", encoding, "-o"];
+        run_ok(program("replay").args(encode).arg(&other).arg(&delta));
+        assert_eq!(check(&other), records);
+    }
 }
 
 #[test]

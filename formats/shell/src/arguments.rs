@@ -34,11 +34,12 @@ impl Threads {
     }
 }
 
-/// Options with a value that do not affect the content of a trace.
-const PASSING_OPTIONS: [&str; 5] = [
+/// Options with a value that say where and how, not what.
+const PASSING_OPTIONS: [&str; 6] = [
     "--no-skip",
     "--output",
     "--image",
+    "--modules",
     "--threads",
     "--record-budget",
 ];
@@ -53,6 +54,12 @@ pub fn lasting_arguments(arguments: impl IntoIterator<Item = OsString>) -> Vec<S
         .into_iter()
         .map(|argument| argument.to_string_lossy().into_owned());
     while let Some(argument) = arguments.next() {
+        if argument == "--" {
+            // What follows is not this program's.
+            kept.push(argument);
+            kept.extend(arguments);
+            break;
+        }
         let (name, value) = match argument.split_once('=') {
             Some((name, value)) => (name, Some(value)),
             None => (argument.as_str(), None),
@@ -82,7 +89,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn output_paths_and_options_without_effect_on_the_trace_are_not_recorded() {
+    fn arguments_of_another_program_are_all_recorded() {
+        let line = "app -o a -- program -o b --threads 2";
+        let kept = lasting_arguments(line.split(' ').map(OsString::from));
+        assert_eq!(kept, ["app", "--", "program", "-o", "b", "--threads", "2"]);
+    }
+
+    #[test]
+    fn output_paths_and_how_a_trace_was_made_are_not_recorded() {
         for line in [
             "raster s.gltf -o a --shadows --image=b.png --camera -x",
             "raster s.gltf --output=a --shadows --threads 2 --no-skip all --no-plain --camera -x --record-budget 4MiB -ob",

@@ -15,7 +15,7 @@ mod signals;
 mod slurm;
 
 pub use arguments::{Threads, lasting_arguments};
-pub use children::run_child;
+pub use children::{Ended, run_child, run_child_until};
 pub use documents::Documents;
 pub use formats::container::is_stdout;
 pub use memory::Allocator;

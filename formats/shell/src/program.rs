@@ -2,7 +2,7 @@
 
 use super::{memory, message, signals};
 use clap::{CommandFactory, Parser};
-use formats::container::{VERSION_MAJOR, VERSION_MINOR};
+use formats::container::VERSIONS;
 use formats::text::printable_lines;
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -13,8 +13,9 @@ pub(crate) const USAGE: u8 = 2;
 
 /// Version of the programs, with the version of the trace formats.
 pub static VERSION: LazyLock<String> = LazyLock::new(|| {
+    let [first, second] = VERSIONS.map(|(major, minor)| format!("{major}.{minor}"));
     format!(
-        "{} (.textrace and .raytrace format {VERSION_MAJOR}.{VERSION_MINOR})",
+        "{} (.textrace formats {first} and {second}, .raytrace format {first})",
         env!("CARGO_PKG_VERSION")
     )
 });

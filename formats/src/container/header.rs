@@ -1,7 +1,7 @@
 //! Byte layout of the header and of the directory.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::{ChunkEntry, ChunkTag, Kind, MAGIC, VERSION_MAJOR};
+use super::{ChunkEntry, ChunkTag, Kind, MAGIC, MAJOR_1, MAJOR_2};
 use crate::parse::{Fault, Parsed, ensure, zero};
 use nom::Parser;
 use nom::bytes::complete::take;
@@ -19,6 +19,7 @@ const HEADER_CRC_OFFSET: usize = HEADER_BYTES - 4;
 /// Variable fields of the header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Header {
+    pub version_major: u16,
     pub version_minor: u16,
     pub kind: Kind,
     pub directory_offset: u64,
@@ -30,6 +31,7 @@ pub(super) struct Header {
 impl Header {
     pub(super) fn new(kind: Kind) -> Self {
         Self {
+            version_major: MAJOR_1,
             version_minor: 0,
             kind,
             directory_offset: 0,
@@ -42,7 +44,7 @@ impl Header {
     pub(super) fn to_bytes(self) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(HEADER_BYTES);
         bytes.extend(MAGIC);
-        bytes.extend(VERSION_MAJOR.to_le_bytes());
+        bytes.extend(self.version_major.to_le_bytes());
         bytes.extend(self.version_minor.to_le_bytes());
         bytes.extend((self.kind as u16).to_le_bytes());
         bytes.extend(0u16.to_le_bytes());
@@ -66,12 +68,12 @@ impl Header {
             format_args!("\"{}\"", magic.escape_ascii()),
         )?;
         let at_version = rest;
-        let (rest, major) = context("a major version", le_u16).parse(rest)?;
+        let (rest, version_major) = context("a major version", le_u16).parse(rest)?;
         ensure(
             at_version,
-            major == VERSION_MAJOR,
-            || format!("major version {VERSION_MAJOR}"),
-            major,
+            [MAJOR_1, MAJOR_2].contains(&version_major),
+            || format!("major version {MAJOR_1} or {MAJOR_2}"),
+            version_major,
         )?;
         // The checksum is checked before all other fields, so that the error says that the header is
         // damaged.
@@ -92,6 +94,12 @@ impl Header {
             let expected = "kind 1 (textrace) or 2 (raytrace)";
             nom::Err::Failure(Fault::new(at_kind, expected, kind_id))
         })?;
+        ensure(
+            at_version,
+            version_major == MAJOR_1 || kind == Kind::Textrace,
+            || format!("major version {MAJOR_1} of a {kind}"),
+            version_major,
+        )?;
         let (rest, ()) = zero(rest, 2)?;
         let (rest, (directory_offset, file_bytes, directory_count, directory_crc32)) =
             (le_u64, le_u64, le_u32, le_u32).parse(rest)?;
@@ -100,6 +108,7 @@ impl Header {
         Ok((
             rest,
             Self {
+                version_major,
                 version_minor,
                 kind,
                 directory_offset,

@@ -24,11 +24,13 @@ use std::fmt;
 
 /// First eight bytes of every trace file.
 pub const MAGIC: [u8; 8] = *b"PLXTRACE";
-/// Major version. Readers refuse any other.
-pub const VERSION_MAJOR: u16 = 1;
-/// The latest minor version. A file has the earliest one that defines all of its content: 1 if the trace
-/// has layers, else 0. Readers accept later ones, which may only add content.
-pub const VERSION_MINOR: u16 = 1;
+/// Latest minor version of each major version that readers know. A file says the earliest that has all that is in it;
+/// readers accept a later minor version, which may only add, and refuse another major one.
+pub const VERSIONS: [(u16, u16); 2] = [(1, 2), (2, 0)];
+/// Major version of scenes' traces.
+pub(crate) const MAJOR_1: u16 = 1;
+/// Major version of `.textrace` files with their tables behind the tiles: programs' traces.
+pub(crate) const MAJOR_2: u16 = 2;
 /// Chunks start at multiples of this many bytes.
 pub const CHUNK_ALIGNMENT_BYTES: u64 = 8;
 

@@ -184,7 +184,7 @@ impl Container {
     /// Major and minor version.
     #[must_use]
     pub fn version(&self) -> (u16, u16) {
-        (super::VERSION_MAJOR, self.header.version_minor)
+        (self.header.version_major, self.header.version_minor)
     }
 
     /// Size of the file.

@@ -48,11 +48,13 @@ fn all(record: &QuadRecord, options: &SamplingOptions) -> Vec<Footprint> {
         sampler: 0,
         layer: 0,
         offset: [0; 2],
+        level: Default::default(),
     };
     let mut found = Vec::new();
     let sampler = Sampler::TRILINEAR_REPEAT;
     footprints(
         record,
+        None,
         [SIZE; 2],
         &sample,
         &texture(),

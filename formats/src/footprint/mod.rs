@@ -1,22 +1,25 @@
 //! Computes the texels that a quad record reads. This is the reference for tests of faster engines, so it
 //! is written for readability.
 //!
-//! Footprints have a fixed order: by record, by sample in shader order, the finer mip level before the
-//! coarser one, by probe if there are several, then by lane. Those of an ellipse come by lane, then by row.
-//! If each lane has its own levels, a level's footprints are those of the lanes that read it. All code that
-//! counts or writes accesses follows this order.
+//! Footprints come in a fixed order: record by record, sample by sample in shader order, the
+//! finer mip level before the coarser one, probe by probe where there are several, then lane by lane;
+//! those of an ellipse lane by lane, then row by row. Where each lane has levels of its own, a level's footprints
+//! are those of the lanes that read it. A lane whose texels all lie outside a texture with a border has no footprint. Everything that counts or writes
+//! accesses follows it.
 
 mod aniso;
 mod lanes;
 mod lod;
+mod operands;
 mod options;
 
 pub use aniso::{AnisotropyModel, Ellipse, MOST_ANISOTROPY, Probes, Reach};
 pub use lanes::LaneReach;
 pub use lod::{fast_log2, lane_lod, lane_record, quad_lod};
+pub use operands::LaneLevel;
 pub use options::{FilterOverride, LodFormula, SamplingOptions};
 
-use crate::textrace::{NO_GROUP, QuadRecord, SUBTEXELS, Sample, Tables, UvGroup};
+use crate::textrace::{LodRule, NO_GROUP, QuadRecord, SUBTEXELS, Sample, Tables, UvGroup};
 use crate::texture::{Filter, MipFilter, Sampler, Texture, Wrap};
 
 /// Texels of one lane at one level of one sample.
@@ -58,7 +61,15 @@ pub struct LevelSelection {
     pub filter: Filter,
 }
 
-/// Selects the levels for a level of detail, as Vulkan and llvmpipe do.
+impl LevelSelection {
+    /// A level is one of them.
+    #[must_use]
+    pub fn contains(&self, level: u32) -> bool {
+        (self.first..self.first + self.count).contains(&level)
+    }
+}
+
+/// Chooses the levels for a level of detail, as Vulkan and llvmpipe do. The sampler's bias and bounds apply first.
 ///
 /// `lod <= 0` magnifies: level 0 with the `mag` filter. Linear mip filtering reads `floor(lod)` and the
 /// next level; from the last level on, only the last.
@@ -66,6 +77,7 @@ pub struct LevelSelection {
 #[inline]
 pub fn select_levels(lod: f32, sampler: &Sampler, levels: u32) -> LevelSelection {
     let last = levels.saturating_sub(1);
+    let lod = sampler.lod.apply(lod);
     let magnified = lod <= 0.0;
     let filter = if magnified { sampler.mag } else { sampler.min };
     // A cast of a positive float rounds down and saturates.
@@ -107,9 +119,9 @@ fn fetch(coordinate: i32, size: u32, extent: u32, filter: Filter) -> [i64; 2] {
     }
 }
 
-/// Wraps a texel coordinate into `0..size`.
+/// Brings a texel coordinate into `0..size`; `None` where the border is read instead.
 #[must_use]
-pub fn wrap_texel(texel: i64, size: u32, wrap: Wrap) -> u32 {
+pub fn wrap_texel(texel: i64, size: u32, wrap: Wrap) -> Option<u32> {
     let size = i64::from(size);
     let wrapped = match wrap {
         Wrap::Repeat => texel.rem_euclid(size),
@@ -118,14 +130,28 @@ pub fn wrap_texel(texel: i64, size: u32, wrap: Wrap) -> u32 {
             folded.min(2 * size - 1 - folded)
         }
         Wrap::ClampToEdge => texel.clamp(0, size - 1),
+        Wrap::ClampToBorder if (0..size).contains(&texel) => texel,
+        Wrap::ClampToBorder => return None,
+        Wrap::MirrorClampToEdge => texel.max(-1 - texel).min(size - 1),
     };
-    wrapped as u32
+    Some(wrapped as u32)
 }
 
-/// Calls the closure with the footprints of one sample of a quad record, in the order of the module's
-/// description.
+/// Both texels of a fetch along one axis after wrapping, equal where only one of them is read; `None` where none is.
+fn wrap_pair(texels: [i64; 2], size: u32, wrap: Wrap) -> Option<[u32; 2]> {
+    match texels.map(|texel| wrap_texel(texel, size, wrap)) {
+        [Some(a), Some(b)] => Some([a, b]),
+        [Some(one), None] | [None, Some(one)] => Some([one; 2]),
+        [None, None] => None,
+    }
+}
+
+/// Yields the footprints of one sample of a quad record, in the order of the module's description. `operands` is the
+/// record before it, which counts where the sample asks for operands.
+#[allow(clippy::too_many_arguments)]
 pub fn footprints(
     record: &QuadRecord,
+    operands: Option<&QuadRecord>,
     extent: [u32; 2],
     sample: &Sample,
     texture: &Texture,
@@ -139,20 +165,55 @@ pub fn footprints(
         false => record.mask,
     };
     let lanes = (0..4).filter(|lane| lanes >> lane & 1 == 1);
-    let footprint = |lane: u32, level: u32, texels: [[i64; 2]; 2]| {
+    let mut visit_in = |lane: u32, level: u32, layer: u16, texels: [[i64; 2]; 2]| {
         let size = texture.level_size(level);
         let wrapped = |a: usize| {
             let offset = i64::from(sample.offset[a]);
-            texels[a].map(|texel| wrap_texel(texel + offset, size[a], sampler.wrap[a]))
+            let texels = texels[a].map(|texel| texel + offset);
+            wrap_pair(texels, size[a], sampler.wrap[a])
         };
-        Footprint {
-            lane: lane as u8,
-            level: level as u8,
-            layer: sample.layer,
-            i: wrapped(0),
-            j: wrapped(1),
+        if let (Some(i), Some(j)) = (wrapped(0), wrapped(1)) {
+            visit(Footprint {
+                lane: lane as u8,
+                level: level as u8,
+                layer,
+                i,
+                j,
+            });
         }
     };
+    let by_operands = sample.level.rule == LodRule::Explicit || sample.level.operands;
+    if by_operands {
+        let operands = operands.filter(|_| sample.level.operands);
+        let chosen: Vec<_> = lanes
+            .map(|lane| {
+                let derived = || match options.lod {
+                    LodFormula::PerLane => lane_lod(record, lane, extent, texture.size),
+                    formula => quad_lod(record, extent, texture.size, formula),
+                };
+                let own = LaneLevel::of(sample, texture, operands, lane, || {
+                    derived() + options.lod_bias
+                });
+                (lane, own.layer, own.levels(&sampler, texture.levels))
+            })
+            .collect();
+        for level in 0..texture.levels {
+            let size = texture.level_size(level);
+            for (lane, layer, levels) in &chosen {
+                if levels.contains(level) {
+                    let uv = record.lane_uv(*lane);
+                    let axis = |a: usize| fetch(uv[a], size[a], extent[a], levels.filter);
+                    visit_in(*lane, level, *layer, [axis(0), axis(1)]);
+                }
+            }
+        }
+        return;
+    }
+    let options = &SamplingOptions {
+        lod_bias: options.lod_bias + sample.level.lod(),
+        ..*options
+    };
+    let mut visit = |lane: u32, level: u32, texels| visit_in(lane, level, sample.layer, texels);
     if options.lod == LodFormula::PerLane {
         let (size, levels) = (texture.size, texture.levels);
         let reach = lanes.map(|lane| {
@@ -173,7 +234,7 @@ pub fn footprints(
                         let at = uv[a].wrapping_add(from_lane[a]);
                         fetch(at, size[a], extent[a], filter)
                     };
-                    visit(footprint(*lane, level, [axis(0), axis(1)]));
+                    visit(*lane, level, [axis(0), axis(1)]);
                 }
             }
             for (lane, of) in &reach {
@@ -181,7 +242,7 @@ pub fn footprints(
                     .ellipse(level)
                     .map(|ellipse| ellipse.blocks(record.lane_uv(*lane), size, extent));
                 for [x, y] in blocks.into_iter().flatten() {
-                    visit(footprint(*lane, level, [[x, x + 1], [y, y + 1]]));
+                    visit(*lane, level, [[x, x + 1], [y, y + 1]]);
                 }
             }
         }
@@ -205,7 +266,7 @@ pub fn footprints(
             let size = texture.level_size(ellipse.level);
             for lane in lanes {
                 for [x, y] in ellipse.blocks(record.lane_uv(lane), size, extent) {
-                    visit(footprint(lane, ellipse.level, [[x, x + 1], [y, y + 1]]));
+                    visit(lane, ellipse.level, [[x, x + 1], [y, y + 1]]);
                 }
             }
             return;
@@ -222,19 +283,21 @@ pub fn footprints(
                     let at = uv[a].wrapping_add(from_middle[a]);
                     fetch(at, size[a], extent[a], selection.filter)
                 };
-                visit(footprint(lane, level, [axis(0), axis(1)]));
+                visit(lane, level, [axis(0), axis(1)]);
             }
         }
     }
 }
 
-/// Calls the closure with every footprint of a record of `draw` and its sample, sample by sample.
+/// Yields every footprint of a record of `draw`, sample by sample, with the sample it belongs to. `operands` is the
+/// record before it in its run, if any: see [`crate::textrace::with_operands`].
 ///
 /// A record without a group, or with indices that the tables do not have, reads nothing.
 pub fn record_footprints(
     tables: &Tables,
     draw: u32,
     record: &QuadRecord,
+    operands: Option<&QuadRecord>,
     options: &SamplingOptions,
     mut visit: impl FnMut(&Sample, Footprint),
 ) {
@@ -244,6 +307,7 @@ pub fn record_footprints(
         if let Some((texture, sampler)) = texture.zip(sampler) {
             footprints(
                 record,
+                operands,
                 group.extent,
                 sample,
                 texture,

@@ -20,7 +20,7 @@ pub enum FilterOverride {
 }
 
 impl FilterOverride {
-    /// The sampler that results; the wrap modes stay.
+    /// The sampler that results; wrap modes and bounds of the level of detail stay.
     #[must_use]
     pub fn apply(self, sampler: &Sampler) -> Sampler {
         let (filter, mip) = match self {
@@ -30,10 +30,10 @@ impl FilterOverride {
             Self::Nearest => (Filter::Nearest, MipFilter::Nearest),
         };
         Sampler {
-            wrap: sampler.wrap,
             mag: filter,
             min: filter,
             mip,
+            ..*sampler
         }
     }
 }

@@ -1,5 +1,6 @@
 use super::*;
-use crate::texture::{ColorSpace, TexelFormat};
+use crate::textrace::SampleLevel;
+use crate::texture::{ColorSpace, LodRange, TexelFormat};
 use proptest::prelude::*;
 
 fn texture(size: [u32; 2], levels: u32) -> Texture {
@@ -30,6 +31,7 @@ const SAMPLE: Sample = Sample {
     sampler: 0,
     layer: 3,
     offset: [0, 0],
+    level: SampleLevel::DERIVED,
 };
 
 fn all(
@@ -40,9 +42,10 @@ fn all(
 ) -> Vec<Footprint> {
     let mut found = Vec::new();
     let texture = texture([256; 2], 9);
-    footprints(record, [256; 2], sample, &texture, sampler, options, |f| {
-        found.push(f)
-    });
+    let add = |f| found.push(f);
+    footprints(
+        record, None, [256; 2], sample, &texture, sampler, options, add,
+    );
     found
 }
 
@@ -212,9 +215,100 @@ fn offsets_move_by_texels_of_the_sampled_level() {
 #[test]
 fn mirrored_coordinates_fold_at_every_edge() {
     let folded: Vec<u32> = (-5..9)
-        .map(|t| wrap_texel(t, 4, Wrap::MirroredRepeat))
+        .map(|t| wrap_texel(t, 4, Wrap::MirroredRepeat).unwrap())
         .collect();
     assert_eq!(folded, [3, 3, 2, 1, 0, 0, 1, 2, 3, 3, 2, 1, 0, 0]);
+    let once: Vec<u32> = (-6..6)
+        .map(|t| wrap_texel(t, 4, Wrap::MirrorClampToEdge).unwrap())
+        .collect();
+    assert_eq!(once, [3, 3, 3, 2, 1, 0, 0, 1, 2, 3, 3, 3]);
+}
+
+#[test]
+fn texels_of_a_border_are_not_read() {
+    let border = Sampler {
+        wrap: [Wrap::ClampToBorder; 2],
+        ..Sampler::SHADOW
+    };
+    // The lanes' left texels are -2, -1, -2, -1 in u; their upper ones 10, 10, 11, 11 in v.
+    let quad = record([-1.5, 10.5], 1.0);
+    let found = all(&quad, &SAMPLE, &border, &SamplingOptions::default());
+    let read: Vec<_> = found.iter().map(|f| (f.lane, f.i, f.j)).collect();
+    assert_eq!(read, [(1, [0, 0], [10, 11]), (3, [0, 0], [11, 12])]);
+}
+
+#[test]
+fn bias_and_bounds_of_a_sampler_apply_before_its_levels() {
+    let of = |bias_256ths, min_256ths, max_256ths, lod| {
+        let sampler = Sampler {
+            lod: LodRange {
+                bias_256ths,
+                min_256ths,
+                max_256ths,
+            },
+            ..Sampler::TRILINEAR_REPEAT
+        };
+        let chosen = select_levels(lod, &sampler, 9);
+        (chosen.first, chosen.count)
+    };
+    assert_eq!(of(0, i16::MIN, i16::MAX, 2.5), (2, 2));
+    assert_eq!(of(384, i16::MIN, i16::MAX, 2.5), (4, 2));
+    assert_eq!(of(0, 768, i16::MAX, -7.0), (3, 2));
+    assert_eq!(of(2560, 0, 256, 2.5), (1, 2));
+}
+
+/// Operands of a quad's lanes: the same level, layers 0, 1, 2 and 3.
+fn operands(lod: f32) -> QuadRecord {
+    QuadRecord {
+        mask: 15,
+        uv: [(lod * SUBTEXELS as f32) as i32, 0],
+        dx: [0, SUBTEXELS],
+        dy: [0, 2 * SUBTEXELS],
+        ..QuadRecord::default()
+    }
+}
+
+#[test]
+fn operands_choose_level_and_layer_of_each_lane() {
+    let levels = |rule, lod_256ths, has_operands, scale: f64| {
+        let sample = Sample {
+            layer: 1,
+            level: SampleLevel {
+                rule,
+                lod_256ths,
+                operands: has_operands,
+            },
+            ..SAMPLE
+        };
+        let array = Texture {
+            layers: 4,
+            ..texture([256; 2], 9)
+        };
+        let (quad, options) = (record([64.5, 64.5], scale), SamplingOptions::default());
+        let mut found = Vec::new();
+        let add = |f: Footprint| found.push((f.level, f.lane, f.layer));
+        let sampler = FilterOverride::Bilinear.apply(&Sampler::TRILINEAR_REPEAT);
+        footprints(
+            &quad,
+            Some(&operands(2.25)),
+            [256; 2],
+            &sample,
+            &array,
+            &sampler,
+            &options,
+            add,
+        );
+        found
+    };
+    let on = |level| [(level, 0, 1), (level, 1, 2), (level, 2, 3), (level, 3, 3)];
+    // Four texels a pixel: level 2 by the derivatives.
+    assert_eq!(levels(LodRule::Derivatives, 0, true, 4.0), on(2));
+    assert_eq!(levels(LodRule::Bias, 512, true, 4.0), on(6));
+    assert_eq!(levels(LodRule::Explicit, 0, true, 4.0), on(2));
+    assert_eq!(levels(LodRule::Explicit, 256, true, 4.0), on(3));
+    let alone = |level| [0, 1, 2, 3].map(|lane| (level, lane, 1));
+    assert_eq!(levels(LodRule::Explicit, 768, false, 4.0), alone(3));
+    assert_eq!(levels(LodRule::Bias, 768, false, 4.0), alone(5));
 }
 
 proptest! {

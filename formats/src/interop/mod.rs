@@ -91,7 +91,8 @@ pub struct Expander<'a> {
 }
 
 impl Expander<'_> {
-    /// Calls `visit` for each access of a record. Stops at the first error.
+    /// Calls `visit` for each access of a record; `operands` is the record before it in its run, if any. Stops at the
+    /// first error.
     ///
     /// # Errors
     /// Errors of `visit`.
@@ -99,6 +100,7 @@ impl Expander<'_> {
         &self,
         origin: Origin,
         record: &QuadRecord,
+        operands: Option<&QuadRecord>,
         mut visit: impl FnMut(&Access) -> io::Result<()>,
     ) -> io::Result<()> {
         let mut outcome = Ok(());
@@ -107,6 +109,7 @@ impl Expander<'_> {
             self.tables,
             origin.draw,
             record,
+            operands,
             sampling,
             |sample, footprint| {
                 let mut lines = [u64::MAX; 4];

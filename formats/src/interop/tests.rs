@@ -31,7 +31,9 @@ fn accesses(granularity: Granularity, record: &QuadRecord) -> Vec<Access> {
         found.push(*access);
         Ok(())
     };
-    expander.expand(Origin::default(), record, collect).unwrap();
+    expander
+        .expand(Origin::default(), record, None, collect)
+        .unwrap();
     found
 }
 

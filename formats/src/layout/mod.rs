@@ -43,12 +43,12 @@ pub const PAGE_ALIGNMENT_BYTES: u64 = 64 << 10;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct LayoutConfig {
-    /// Format of the colour textures; `None` keeps the captured one. Shadow maps (R32F) always
-    /// keep theirs.
+    /// Format of the colour textures; `None` keeps the captured one. Shadow maps (R32F, D16) and textures of more
+    /// than 8 bits a channel always keep theirs.
     pub texel_format: Option<TexelFormat>,
     /// Block order within a level of a colour texture.
     pub block_order: BlockOrder,
-    /// Block order of shadow maps (R32F). In a linear map whose rows are a multiple of the cache's way size, a
+    /// Block order of shadow maps (R32F, D16). In a linear map whose rows are a multiple of the cache's way size, a
     /// column of texels falls into one cache set.
     pub shadow_map_order: BlockOrder,
     /// Alignment of a texture's first byte, a power of two.
@@ -100,12 +100,17 @@ impl TexelFormat {
     #[must_use]
     pub const fn block(self) -> BlockInfo {
         let (edge, bytes) = match self {
-            Self::Bc1 | Self::Etc2 => (4, 8),
-            Self::Bc3 | Self::Bc7 | Self::Etc2Rgba | Self::Astc4x4 => (4, 16),
+            Self::Bc1 | Self::Bc4 | Self::Etc2 | Self::EacR11 => (4, 8),
+            Self::Bc2 | Self::Bc3 | Self::Bc5 | Self::Bc6h | Self::Bc7 => (4, 16),
+            Self::Etc2Rgba | Self::EacRg11 | Self::Astc4x4 => (4, 16),
             Self::Astc5x5 => (5, 16),
             Self::Astc6x6 => (6, 16),
             Self::Astc8x8 => (8, 16),
-            Self::Rgba8 | Self::R32f => (1, 4),
+            Self::R8 => (1, 1),
+            Self::Rg8 | Self::R16 | Self::Packed16 | Self::D16 => (1, 2),
+            Self::Rgba8 | Self::R32f | Self::Rg16 | Self::Packed32 => (1, 4),
+            Self::Rgba16 | Self::Rg32 => (1, 8),
+            Self::Rgba32 => (1, 16),
         };
         BlockInfo {
             texels: [edge, edge],
@@ -269,21 +274,23 @@ fn too_large(index: usize, texture: &Texture) -> LayoutError {
     }
 }
 
-/// Format in memory. The override applies only to colour textures; depth textures keep their format.
+/// Format in memory: the override is for ordinary colour. Depth and channels of more than 8 bits cannot be
+/// stored in its blocks.
 fn memory_format(texture: &Texture, config: &LayoutConfig) -> TexelFormat {
-    match (texture.format, config.texel_format) {
-        (TexelFormat::R32f, _) | (_, None) => texture.format,
-        (_, Some(format)) => format,
-    }
+    config
+        .texel_format
+        .filter(|_| texture.format.is_ordinary_color())
+        .unwrap_or(texture.format)
 }
 
 /// Lays out one texture from address 0.
 fn place(texture: &Texture, config: &LayoutConfig) -> Option<TextureLayout> {
     let format = memory_format(texture, config);
     let block = format.block();
-    let order = match format {
-        TexelFormat::R32f => config.shadow_map_order,
-        _ => config.block_order,
+    let order = if format.is_depth() {
+        config.shadow_map_order
+    } else {
+        config.block_order
     };
     let mut offset_bytes = 0u64;
     let levels = (0..texture.levels)

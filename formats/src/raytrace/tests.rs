@@ -53,6 +53,7 @@ fn tables(has_visits: bool) -> RaytraceTables {
             surfaces: None,
             origin_m: [0.0; 3],
             techniques: None,
+            program: None,
         },
         origin: [0.1, 1e6 + 1.0 / 3.0, -7.0],
         eyes: [eye(-0.032), eye(0.032)],

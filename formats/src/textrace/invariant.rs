@@ -1,8 +1,8 @@
 //! The invariants of every tile, independent of writer and encoding.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::{Draw, NO_GROUP, QuadRecord, Tile};
-use crate::error::Broken;
+use super::{Draw, NO_GROUP, QuadRecord, Tile, UvGroup};
+use crate::error::{Broken, ensure};
 
 /// Quads along an edge of a tile.
 pub const TILE_QUADS: u8 = 8;
@@ -94,6 +94,9 @@ pub(super) fn check(draws: &[Draw], tile: &Tile) -> Result<(), Broken> {
 }
 
 fn check_records(draw: &Draw, first: u32, records: &[QuadRecord]) -> Result<(), Broken> {
+    if draw.groups.iter().any(UvGroup::has_operands) {
+        check_operands(draw, first, records)?;
+    }
     let mut previous = 0;
     for (index, record) in records.iter().enumerate() {
         let morton = quad_morton(record.x, record.y);
@@ -109,6 +112,35 @@ fn check_records(draw: &Draw, first: u32, records: &[QuadRecord]) -> Result<(), 
         previous = morton;
     }
     Ok(())
+}
+
+/// Operands and the record that they belong to stand in pairs, at one position and with one mask.
+fn check_operands(draw: &Draw, first: u32, records: &[QuadRecord]) -> Result<(), Broken> {
+    let mut operands: Option<&QuadRecord> = None;
+    let paired = |operands: &QuadRecord, record: &QuadRecord| {
+        let place = |r: &QuadRecord| (r.x, r.y, r.mask);
+        place(operands) == place(record) && operands.group.checked_add(1) == Some(record.group)
+    };
+    let broken = |index: usize| {
+        Broken::new(
+            format!("record {}", u64::from(first) + index as u64),
+            "operands right before the record of the next group in the same lanes",
+            "one without the other",
+        )
+    };
+    for (index, record) in records.iter().enumerate() {
+        let asks = draw
+            .groups
+            .get(usize::from(record.group))
+            .is_some_and(UvGroup::has_operands);
+        let holds = match operands {
+            Some(operands) => paired(operands, record),
+            None => !asks,
+        };
+        ensure(holds, || broken(index))?;
+        operands = draw.is_operands(record.group).then_some(record);
+    }
+    ensure(operands.is_none(), || broken(records.len()))
 }
 
 #[cold]

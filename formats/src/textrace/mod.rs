@@ -107,6 +107,33 @@ pub struct TraceMeta {
     /// Techniques of the frames, if they were chosen automatically or given by name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub techniques: Option<ChosenTechniques>,
+    /// Present where a program was captured and not a scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub program: Option<ProgramCapture>,
+}
+
+/// How a program that nothing was known of became a trace.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ProgramCapture {
+    /// The eyes' matrices and frusta are the program's. Otherwise they are placeholders.
+    pub cameras_known: bool,
+    /// What told its frames apart.
+    pub frames_by: String,
+    /// What told its eyes apart.
+    pub views_by: String,
+    /// Texture accesses of recorded fragments that the trace lacks.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// A kind of texture access that a trace lacks.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct LeftOut {
+    /// What it is.
+    pub what: String,
+    /// Draws that have some.
+    pub draws: u64,
+    /// Fragments that did it.
+    pub fragments: u64,
 }
 
 /// The techniques of the frames of a path, by name.
@@ -254,7 +281,48 @@ impl Pass {
     }
 }
 
-/// One texture read per fragment of a draw.
+/// Where a sample's level of detail comes from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+#[repr(u8)]
+pub enum LodRule {
+    /// The derivatives of the coordinates.
+    #[default]
+    Derivatives = 0,
+    /// These, and a bias.
+    Bias = 1,
+    /// The shader names it.
+    Explicit = 2,
+}
+
+/// What decides a sample's level of detail and layer beside its coordinates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct SampleLevel {
+    /// Where the level comes from.
+    pub rule: LodRule,
+    /// The bias or the level of every fragment, in 1/256 of a level. 0 where the derivatives decide alone.
+    pub lod_256ths: i16,
+    /// Each fragment adds a level (in u) and a layer (in v) of its own. The record right before that of the sample's
+    /// group has them: see [`QuadRecord::lane_operands`].
+    pub operands: bool,
+}
+
+impl SampleLevel {
+    /// The derivatives decide alone, and the layer is the sample's.
+    pub const DERIVED: Self = Self {
+        rule: LodRule::Derivatives,
+        lod_256ths: 0,
+        operands: false,
+    };
+
+    /// The derivatives decide alone, and the layer is the sample's.
+    #[must_use]
+    pub fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+/// One texture read that a draw makes per fragment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Sample {
     /// Index into the texture table.
@@ -265,6 +333,9 @@ pub struct Sample {
     pub layer: u16,
     /// Texel offset at the sampled level (the taps of percentage-closer filtering).
     pub offset: [i8; 2],
+    /// What decides level of detail and layer beside the coordinates.
+    #[serde(default, skip_serializing_if = "SampleLevel::is_default")]
+    pub level: SampleLevel,
 }
 
 /// Textures that one draw samples at the same texture coordinates; one quad record serves all.
@@ -275,6 +346,23 @@ pub struct UvGroup {
     pub extent: [u32; 2],
     /// The samples, in shader order.
     pub samples: Vec<Sample>,
+}
+
+impl UvGroup {
+    /// Each record of the group follows on its operands: a record of the group before it.
+    #[must_use]
+    pub fn has_operands(&self) -> bool {
+        self.samples.iter().any(|sample| sample.level.operands)
+    }
+}
+
+impl Draw {
+    /// Records of a group are operands of the group after it.
+    #[must_use]
+    pub fn is_operands(&self, group: u8) -> bool {
+        let next = self.groups.get(usize::from(group) + 1);
+        next.is_some_and(UvGroup::has_operands)
+    }
 }
 
 /// One draw call. The same draw has the same index in every pass.
@@ -336,6 +424,25 @@ impl QuadRecord {
         };
         [axis(0), axis(1)]
     }
+
+    /// Operands of a lane in a record of operands: its level of detail, and its layer rounded to the nearest.
+    #[must_use]
+    pub fn lane_operands(&self, lane: u32) -> (f32, i32) {
+        let [lod, layer] = self.lane_uv(lane);
+        let half = SUBTEXELS / 2;
+        (
+            lod as f32 / SUBTEXELS as f32,
+            layer.saturating_add(half).div_euclid(SUBTEXELS),
+        )
+    }
+}
+
+/// Each record of some, with the record before it, which has its operands where its group asks for any.
+pub fn with_operands(
+    records: &[QuadRecord],
+) -> impl Iterator<Item = (&QuadRecord, Option<&QuadRecord>)> {
+    let before = std::iter::once(None).chain(records.iter().map(Some));
+    records.iter().zip(before)
 }
 
 /// A run of records that belong to one primitive in one tile.
@@ -383,6 +490,19 @@ pub struct Tables {
     pub draws: Vec<Draw>,
     /// Passes in submission order; a stereo frame is left eye then right eye.
     pub passes: Vec<Pass>,
+}
+
+impl Tables {
+    /// They hold what a trace of version 1 cannot say.
+    #[must_use]
+    pub fn need_version_2(&self) -> bool {
+        self.meta.program.is_some()
+            || self.textures.iter().any(|t| !t.format.is_in_version_1())
+            || self.samplers.iter().any(|s| !s.is_in_version_1())
+            || (self.draws.iter().flat_map(|draw| &draw.groups))
+                .flat_map(|group| &group.samples)
+                .any(|sample| !sample.level.is_default())
+    }
 }
 
 #[cfg(test)]

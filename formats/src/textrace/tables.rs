@@ -1,18 +1,23 @@
-//! The tables of a trace as chunks: META (JSON), TEXS, SMPS, DRAW, PASS (binary).
+//! The tables of a trace as chunks: META (JSON), TEXS, SMPS, DRAW, PASS (binary), in both versions.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::{Draw, Pass, PassKind, Sample, TILE_INDEX, TILES, Tables, TraceMeta, UvGroup};
-use crate::container::{ChunkTag, Container, ContainerWriter};
+use super::{
+    Draw, LodRule, Pass, PassKind, Sample, SampleLevel, TILE_INDEX, TILES, Tables, TraceMeta,
+    UvGroup,
+};
+use crate::container::{ChunkTag, Container, ContainerWriter, MAJOR_1, MAJOR_2};
 use crate::error::{Broken, FormatError, Result, ensure};
 use crate::json;
 use crate::parse::{self, Fault, Parsed, zero};
-use crate::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
+use crate::texture::{
+    ColorSpace, Filter, LodRange, MipFilter, Sampler, TexelFormat, Texture, Wrap,
+};
 use crate::view::{Eye, TILE_SIZE_PX};
 use nom::Parser;
 use nom::bytes::complete::take;
 use nom::error::context;
 use nom::multi::count;
-use nom::number::complete::{i8, le_u16, le_u32, u8};
+use nom::number::complete::{i8, le_i16, le_u16, le_u32, u8};
 use std::collections::BTreeSet;
 use std::io::{Seek, Write};
 
@@ -37,6 +42,10 @@ pub const DRAW_BYTES: usize = 12;
 pub const GROUP_BYTES: usize = 10;
 /// Bytes of a sample.
 pub const SAMPLE_BYTES: usize = 10;
+/// Bytes of a sampler in version 2.
+pub const SAMPLER_BYTES_V2: usize = 11;
+/// Bytes of a sample in version 2.
+pub const SAMPLE_BYTES_V2: usize = 14;
 /// Bytes of a pass.
 pub const PASS_BYTES: usize = 24;
 
@@ -51,35 +60,88 @@ const LAYERS_MINOR: u16 = 1;
 /// Number for "both eyes" in a pass.
 const NO_EYE: u8 = 255;
 
-/// Writes the table chunks.
+/// Version of the tables' layout.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Version {
+    /// Tables before the tiles.
+    One,
+    /// Tables behind the tiles; levels of detail, formats and wrap modes of programs.
+    Two,
+}
+
+impl Version {
+    /// The version that tables need, where all of them are known.
+    pub(super) fn of(tables: &Tables) -> Self {
+        if tables.need_version_2() {
+            Self::Two
+        } else {
+            Self::One
+        }
+    }
+
+    pub(super) fn major(self) -> u16 {
+        match self {
+            Self::One => MAJOR_1,
+            Self::Two => MAJOR_2,
+        }
+    }
+}
+
+/// Checks and writes the table chunks.
 pub(super) fn write<W: Write + Seek>(
+    version: Version,
     tables: &Tables,
     container: &mut ContainerWriter<W>,
 ) -> Result<()> {
-    check(tables).map_err(|(_, broken)| broken.unwritable())?;
-    if has_layers(tables) {
+    check_writable(tables)?;
+    container.require_major(version.major());
+    if version == Version::One && has_layers(tables) {
         container.require_minor(LAYERS_MINOR);
     }
     container.chunk(META, &json::write("trace description", &tables.meta)?)?;
     container.chunk(TEXTURES, &table(&tables.textures, write_texture)?)?;
-    container.chunk(SAMPLERS, &table(&tables.samplers, write_sampler)?)?;
-    container.chunk(DRAWS, &table(&tables.draws, write_draw)?)?;
+    let sampler = |s: &Sampler, bytes: &mut Vec<u8>| write_sampler(version, s, bytes);
+    container.chunk(SAMPLERS, &table(&tables.samplers, sampler)?)?;
+    let draw = |d: &Draw, bytes: &mut Vec<u8>| write_draw(version, d, bytes);
+    container.chunk(DRAWS, &table(&tables.draws, draw)?)?;
     container.chunk(PASSES, &table(&tables.passes, write_pass)?)
+}
+
+/// Checks tables that are written later.
+pub(super) fn check_writable(tables: &Tables) -> Result<()> {
+    check(tables).map_err(|(_, broken)| broken.unwritable())
 }
 
 /// Reads and checks the table chunks.
 pub(super) fn read(container: &Container) -> Result<Tables> {
-    container.expect_order(&[META, TEXTURES, SAMPLERS, DRAWS, PASSES, TILES, TILE_INDEX])?;
+    let (version, order) = match container.version().0 {
+        MAJOR_2 => (
+            Version::Two,
+            [TILES, TILE_INDEX, META, TEXTURES, SAMPLERS, DRAWS, PASSES],
+        ),
+        _ => (
+            Version::One,
+            [META, TEXTURES, SAMPLERS, DRAWS, PASSES, TILES, TILE_INDEX],
+        ),
+    };
+    container.expect_order(&order)?;
+    let sampler_bytes = match version {
+        Version::One => SAMPLER_BYTES,
+        Version::Two => SAMPLER_BYTES_V2,
+    };
     let tables = Tables {
         meta: json::read(container, META, "a trace's description")?,
         textures: container.parse_chunk(TEXTURES, |input| {
-            read_table("texture count", TEXTURE_BYTES, read_texture, input)
+            let texture = |input| read_texture(version, input);
+            read_table("texture count", TEXTURE_BYTES, texture, input)
         })?,
         samplers: container.parse_chunk(SAMPLERS, |input| {
-            read_table("sampler count", SAMPLER_BYTES, read_sampler, input)
+            let sampler = |input| read_sampler(version, input);
+            read_table("sampler count", sampler_bytes, sampler, input)
         })?,
         draws: container.parse_chunk(DRAWS, |input| {
-            read_table("draw count", DRAW_BYTES, read_draw, input)
+            let draw = |input| read_draw(version, input);
+            read_table("draw count", DRAW_BYTES, draw, input)
         })?,
         passes: container.parse_chunk(PASSES, |input| {
             read_table("pass count", PASS_BYTES, read_pass, input)
@@ -90,7 +152,7 @@ pub(super) fn read(container: &Container) -> Result<Tables> {
         container.malformed(chunk, 0, expected, broken.found)
     })?;
     let (major, minor) = container.version();
-    if has_layers(&tables) && minor < LAYERS_MINOR {
+    if version == Version::One && has_layers(&tables) && minor < LAYERS_MINOR {
         let expected = format!("version {major}.{LAYERS_MINOR} for passes that are layers");
         return Err(container.malformed(PASSES, 0, expected, format!("{major}.{minor}")));
     }
@@ -193,6 +255,14 @@ fn check_draw(tables: &Tables, index: usize, draw: &Draw) -> std::result::Result
         for sample in &group.samples {
             check_sample(tables, &what, sample)?;
         }
+        if group.has_operands() {
+            let before = number.checked_sub(1).and_then(|n| draw.groups.get(n));
+            let holds = before.is_some_and(|g| g.samples.is_empty() && g.extent == [1, 1]);
+            ensure(holds, || {
+                let expected = "a group of extent 1x1 without samples before it, for its operands";
+                Broken::new(what(), expected, "another one or none")
+            })?;
+        }
     }
     Ok(())
 }
@@ -256,6 +326,13 @@ fn check_sample(
             format!("a layer below {}", texture.layers),
             sample.layer,
         )
+    })?;
+    let SampleLevel {
+        rule, lod_256ths, ..
+    } = sample.level;
+    ensure(rule != LodRule::Derivatives || lod_256ths == 0, || {
+        let expected = "a level of 0 where the derivatives decide";
+        Broken::new(what(), expected, lod_256ths)
     })
 }
 
@@ -336,8 +413,14 @@ macro_rules! ids {
 
 const FORMATS: &[(u16, TexelFormat)] = ids!(TexelFormat: Bc1, Bc3, Bc7, Etc2, Etc2Rgba,
     Astc4x4, Astc5x5, Astc6x6, Astc8x8, Rgba8, R32f);
+const FORMATS_V2: &[(u16, TexelFormat)] = ids!(TexelFormat: Bc1, Bc2, Bc3, Bc4, Bc5, Bc6h, Bc7, Etc2,
+    Etc2Rgba, EacR11, EacRg11, Astc4x4, Astc5x5, Astc6x6, Astc8x8, Rgba8, R32f, R8, Rg8, Packed16, R16,
+    Rg16, Rgba16, Rg32, Rgba32, Packed32, D16);
 const COLOR_SPACES: &[(u16, ColorSpace)] = ids!(ColorSpace: Linear, Srgb);
 const WRAPS: &[(u16, Wrap)] = ids!(Wrap: Repeat, MirroredRepeat, ClampToEdge);
+const WRAPS_V2: &[(u16, Wrap)] =
+    ids!(Wrap: Repeat, MirroredRepeat, ClampToEdge, ClampToBorder, MirrorClampToEdge);
+const LOD_RULES: &[(u16, LodRule)] = ids!(LodRule: Derivatives, Bias, Explicit);
 const FILTERS: &[(u16, Filter)] = ids!(Filter: Nearest, Linear);
 const MIP_FILTERS: &[(u16, MipFilter)] = ids!(MipFilter: None, Nearest, Linear);
 const PASS_KINDS: &[(u16, PassKind)] = ids!(PassKind: Main, Shadow, Layer);
@@ -361,13 +444,17 @@ fn write_texture(texture: &Texture, bytes: &mut Vec<u8>) -> Result<()> {
     write_name(&texture.name, bytes)
 }
 
-fn read_texture(input: &[u8]) -> Parsed<'_, Texture> {
+fn read_texture(version: Version, input: &[u8]) -> Parsed<'_, Texture> {
+    let formats = match version {
+        Version::One => FORMATS,
+        Version::Two => FORMATS_V2,
+    };
     let (rest, (width, height, levels, layers)) = context(
         "a texture of 22 bytes and a name",
         (le_u32, le_u32, le_u32, le_u32),
     )
     .parse(input)?;
-    let (rest, format) = id("a texel format", le_u16, FORMATS)(rest)?;
+    let (rest, format) = id("a texel format", le_u16, formats)(rest)?;
     let (rest, color_space) = id("a colour space", u8, COLOR_SPACES)(rest)?;
     let (rest, ()) = zero(rest, 1)?;
     let (rest, name) = read_name(rest)?;
@@ -382,31 +469,59 @@ fn read_texture(input: &[u8]) -> Parsed<'_, Texture> {
     Ok((rest, texture))
 }
 
-fn write_sampler(sampler: &Sampler, bytes: &mut Vec<u8>) -> Result<()> {
+fn write_sampler(version: Version, sampler: &Sampler, bytes: &mut Vec<u8>) -> Result<()> {
     bytes.extend(sampler.wrap.map(|wrap| wrap as u8));
     bytes.extend([sampler.mag as u8, sampler.min as u8, sampler.mip as u8]);
+    if version == Version::Two {
+        let LodRange {
+            bias_256ths,
+            min_256ths,
+            max_256ths,
+        } = sampler.lod;
+        for number in [bias_256ths, min_256ths, max_256ths] {
+            bytes.extend(number.to_le_bytes());
+        }
+    }
     Ok(())
 }
 
-fn read_sampler(input: &[u8]) -> Parsed<'_, Sampler> {
-    let (rest, wrap_u) = id("a wrap mode", u8, WRAPS)(input)?;
-    let (rest, wrap_v) = id("a wrap mode", u8, WRAPS)(rest)?;
+fn read_sampler(version: Version, input: &[u8]) -> Parsed<'_, Sampler> {
+    let wraps = match version {
+        Version::One => WRAPS,
+        Version::Two => WRAPS_V2,
+    };
+    let (rest, wrap_u) = id("a wrap mode", u8, wraps)(input)?;
+    let (rest, wrap_v) = id("a wrap mode", u8, wraps)(rest)?;
     let (rest, mag) = id("a filter", u8, FILTERS)(rest)?;
     let (rest, min) = id("a filter", u8, FILTERS)(rest)?;
     let (rest, mip) = id("a mip filter", u8, MIP_FILTERS)(rest)?;
-    let wrap = [wrap_u, wrap_v];
-    Ok((
-        rest,
-        Sampler {
-            wrap,
-            mag,
-            min,
-            mip,
-        },
-    ))
+    let (rest, lod) = match version {
+        Version::One => (rest, LodRange::WHOLE),
+        Version::Two => {
+            let (rest, (bias_256ths, min_256ths, max_256ths)) = context(
+                "bias and bounds of a level of detail",
+                (le_i16, le_i16, le_i16),
+            )
+            .parse(rest)?;
+            let lod = LodRange {
+                bias_256ths,
+                min_256ths,
+                max_256ths,
+            };
+            (rest, lod)
+        }
+    };
+    let sampler = Sampler {
+        wrap: [wrap_u, wrap_v],
+        mag,
+        min,
+        mip,
+        lod,
+    };
+    Ok((rest, sampler))
 }
 
-fn write_draw(draw: &Draw, bytes: &mut Vec<u8>) -> Result<()> {
+fn write_draw(version: Version, draw: &Draw, bytes: &mut Vec<u8>) -> Result<()> {
     bytes.extend(draw.first_primitive.to_le_bytes());
     bytes.extend(draw.primitives.to_le_bytes());
     bytes.extend(length_u16("draw groups", draw.groups.len())?.to_le_bytes());
@@ -419,19 +534,29 @@ fn write_draw(draw: &Draw, bytes: &mut Vec<u8>) -> Result<()> {
             bytes.extend(sample.sampler.to_le_bytes());
             bytes.extend(sample.layer.to_le_bytes());
             bytes.extend(sample.offset.iter().flat_map(|offset| offset.to_le_bytes()));
+            if version == Version::Two {
+                let SampleLevel {
+                    rule,
+                    lod_256ths,
+                    operands,
+                } = sample.level;
+                bytes.extend([rule as u8, operands.into()]);
+                bytes.extend(lod_256ths.to_le_bytes());
+            }
         }
     }
     Ok(())
 }
 
-fn read_draw(input: &[u8]) -> Parsed<'_, Draw> {
+fn read_draw(version: Version, input: &[u8]) -> Parsed<'_, Draw> {
     let (rest, (first_primitive, primitives, groups)) = context(
         "a draw of 12 bytes, a name and groups",
         (le_u32, le_u32, le_u16),
     )
     .parse(input)?;
     let (rest, material) = read_name(rest)?;
-    let (rest, groups) = count(read_group, usize::from(groups)).parse(rest)?;
+    let (rest, groups) =
+        count(|input| read_group(version, input), usize::from(groups)).parse(rest)?;
     let draw = Draw {
         material,
         first_primitive,
@@ -441,27 +566,49 @@ fn read_draw(input: &[u8]) -> Parsed<'_, Draw> {
     Ok((rest, draw))
 }
 
-fn read_group(input: &[u8]) -> Parsed<'_, UvGroup> {
+fn read_group(version: Version, input: &[u8]) -> Parsed<'_, UvGroup> {
     let (rest, (width, height, samples)) = context(
         "a uv group of 10 bytes and samples",
         (le_u32, le_u32, le_u16),
     )
     .parse(input)?;
-    let (rest, samples) = count(read_sample, usize::from(samples)).parse(rest)?;
+    let (rest, samples) =
+        count(|input| read_sample(version, input), usize::from(samples)).parse(rest)?;
     let extent = [width, height];
     Ok((rest, UvGroup { extent, samples }))
 }
 
-fn read_sample(input: &[u8]) -> Parsed<'_, Sample> {
+fn read_sample(version: Version, input: &[u8]) -> Parsed<'_, Sample> {
     let (rest, (texture, sampler, layer, x, y)) =
         context("a sample of 10 bytes", (le_u32, le_u16, le_u16, i8, i8)).parse(input)?;
+    let (rest, level) = match version {
+        Version::One => (rest, SampleLevel::default()),
+        Version::Two => read_level(rest)?,
+    };
     let sample = Sample {
         texture,
         sampler,
         layer,
         offset: [x, y],
+        level,
     };
     Ok((rest, sample))
+}
+
+fn read_level(input: &[u8]) -> Parsed<'_, SampleLevel> {
+    let (start, rule) = id("a rule of levels of detail", u8, LOD_RULES)(input)?;
+    let (rest, operands) = context("a sample of 14 bytes", u8).parse(start)?;
+    if operands > 1 {
+        let expected = "0 or 1 for operands";
+        return Err(nom::Err::Failure(Fault::new(start, expected, operands)));
+    }
+    let (rest, lod_256ths) = context("a sample of 14 bytes", le_i16).parse(rest)?;
+    let level = SampleLevel {
+        rule,
+        lod_256ths,
+        operands: operands == 1,
+    };
+    Ok((rest, level))
 }
 
 fn write_pass(pass: &Pass, bytes: &mut Vec<u8>) -> Result<()> {

@@ -29,6 +29,7 @@ pub(crate) fn tables() -> Tables {
         sampler: 1,
         layer: 1,
         offset: [-1, 1],
+        level: Default::default(),
     };
     let group = |textures: &[u32]| UvGroup {
         extent: [1024, 512],
@@ -76,6 +77,7 @@ pub(crate) fn tables() -> Tables {
                 depth_tested: true,
                 not_opaque: vec![[2, 1]],
             }),
+            program: None,
         },
         textures: vec![texture("a.png", 1024), texture("b.png", 64)],
         samplers: vec![Sampler::TRILINEAR_REPEAT, Sampler::SHADOW],
@@ -192,9 +194,170 @@ fn small(encoding: Encoding) -> Vec<u8> {
     write(encoding, &[(0, 0, tile.clone()), (1, 3, tile)])
 }
 
+/// The same tables with what version 1 cannot say: draw 0 samples a layer and a level of each fragment.
+fn program_tables() -> Tables {
+    let mut tables = tables();
+    tables.meta.surfaces = None;
+    tables.meta.program = Some(ProgramCapture::default());
+    tables.textures[0].format = TexelFormat::Rgba16;
+    tables.samplers[1].lod.bias_256ths = -64;
+    for (group, level) in [
+        (0, SampleLevel::DERIVED),
+        (
+            1,
+            SampleLevel {
+                rule: LodRule::Explicit,
+                lod_256ths: 300,
+                operands: true,
+            },
+        ),
+    ] {
+        for sample in &mut tables.draws[0].groups[group].samples {
+            sample.level = level;
+        }
+    }
+    let operands = UvGroup {
+        extent: [1, 1],
+        samples: Vec::new(),
+    };
+    tables.draws[0].groups.insert(1, operands);
+    tables
+}
+
+/// A tile of [`program_tables`]: a loop that samples the group with operands twice in one quad.
+fn program_tile() -> Tile {
+    let record = |group, uv| QuadRecord {
+        x: 2,
+        y: 5,
+        mask: 6,
+        group,
+        uv: [uv; 2],
+        ..QuadRecord::default()
+    };
+    Tile {
+        runs: vec![PrimitiveRun {
+            primitive: 3,
+            draw: 0,
+            first: 0,
+            count: 5,
+        }],
+        records: vec![
+            record(0, 7),
+            record(1, 500),
+            record(2, 8),
+            record(1, 600),
+            record(2, 9),
+        ],
+    }
+}
+
+fn program_trace(encoding: Encoding) -> Vec<u8> {
+    let tables = program_tables();
+    let writer = TextraceWriter::in_memory(&tables).unwrap();
+    let mut writer = writer.with_encoding(encoding);
+    writer.write_tile(1, 4, &program_tile()).unwrap();
+    writer.into_bytes().unwrap()
+}
+
+#[test]
+fn a_trace_whose_tables_grow_is_the_one_whose_tables_were_known() {
+    let tables = program_tables();
+    let mut writer = TextraceWriter::growing_in_memory().unwrap();
+    for (index, pass) in tables.passes.iter().enumerate() {
+        assert_eq!(writer.add_pass(*pass).unwrap(), index);
+        if index == 1 {
+            for (number, draw) in tables.draws.iter().enumerate() {
+                assert_eq!(writer.add_draw(draw.clone()).unwrap(), number as u32);
+            }
+            writer.write_tile(1, 4, &program_tile()).unwrap();
+        }
+    }
+    for texture in &tables.textures {
+        writer.add_texture(texture.clone()).unwrap();
+    }
+    for (index, sampler) in tables.samplers.iter().enumerate() {
+        assert_eq!(writer.add_sampler(*sampler).unwrap(), index as u16);
+    }
+    writer.set_meta(tables.meta.clone()).unwrap();
+    let bytes = writer.into_bytes().unwrap();
+    assert!(bytes == program_trace(Encoding::default()));
+    let trace = Textrace::from_bytes(bytes).unwrap();
+    assert_eq!(trace.container().version(), (2, 0));
+    assert_eq!(trace.tables(), &tables);
+    let mut tile = Tile::default();
+    trace.decode_tile(1, 4, &mut tile).unwrap();
+    assert_eq!(tile, program_tile());
+}
+
+#[test]
+fn tables_that_have_been_written_do_not_grow() {
+    let tables = tables();
+    let mut writer = TextraceWriter::in_memory(&tables).unwrap();
+    let errors = [
+        writer.add_pass(tables.passes[0]).unwrap_err(),
+        writer.add_draw(tables.draws[0].clone()).unwrap_err(),
+        writer.set_meta(TraceMeta::default()).unwrap_err(),
+    ];
+    for error in errors {
+        let text = error.to_string();
+        assert!(
+            text.contains("expected a trace whose tables come last"),
+            "{text}"
+        );
+    }
+    let trace = Textrace::from_bytes(writer.into_bytes().unwrap()).unwrap();
+    assert_eq!(trace.container().version(), (1, 0));
+}
+
+#[test]
+fn operands_without_their_record_and_records_without_operands_are_refused() {
+    let tables = program_tables();
+    let refused = |change: fn(&mut Tile)| {
+        let mut tile = program_tile();
+        change(&mut tile);
+        tile.runs[0].count = tile.records.len() as u32;
+        encode_tile(&tables, &tile)
+            .expect_err("refused")
+            .to_string()
+    };
+    for change in [
+        |tile: &mut Tile| tile.records = [&tile.records[..1], &tile.records[2..]].concat(),
+        |tile: &mut Tile| tile.records = [&tile.records[..2], &tile.records[3..]].concat(),
+        |tile: &mut Tile| tile.records.truncate(4),
+        |tile: &mut Tile| tile.records[1].mask = 2,
+        |tile: &mut Tile| tile.records[2].group = 0,
+    ] {
+        let text = refused(change);
+        assert!(text.contains("operands right before the record"), "{text}");
+    }
+    let mut bad = tables.clone();
+    bad.draws[0].groups[1].extent = [2, 1];
+    let text = TextraceWriter::in_memory(&bad)
+        .expect_err("refused")
+        .to_string();
+    assert!(text.contains("a group of extent 1x1"), "{text}");
+    let mut bad = tables;
+    bad.draws[0].groups[0].samples[0].level.lod_256ths = 1;
+    let text = TextraceWriter::in_memory(&bad)
+        .expect_err("refused")
+        .to_string();
+    assert!(
+        text.contains("a level of 0 where the derivatives decide"),
+        "{text}"
+    );
+}
+
+/// A small trace of each encoding and version.
+fn small_traces() -> Vec<Vec<u8>> {
+    let versions = [small, program_trace];
+    (versions.iter())
+        .flat_map(|trace| Encoding::ALL.map(trace))
+        .collect()
+}
+
 #[test]
 fn every_truncation_is_refused() {
-    for whole in Encoding::ALL.map(small) {
+    for whole in small_traces() {
         read_everything(whole.clone()).unwrap();
         for length in 0..whole.len() {
             assert!(
@@ -206,8 +369,8 @@ fn every_truncation_is_refused() {
 }
 
 #[test]
-fn every_flipped_bit_is_detected() {
-    for whole in Encoding::ALL.map(small) {
+fn every_flipped_bit_is_noticed() {
+    for whole in small_traces() {
         for bit in 0..whole.len() * 8 {
             let mut bytes = whole.clone();
             bytes[bit / 8] ^= 1 << (bit % 8);

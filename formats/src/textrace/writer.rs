@@ -2,9 +2,11 @@
 
 use super::geometry::{Geometry, GeometryView, Spool, TileLists};
 use super::index::IndexEntry;
-use super::{Encoding, Pass, Tables, Tile, delta, invariant, planes, raw, tables};
+use super::tables::{self, Version};
+use super::{Draw, Encoding, Pass, Tables, Tile, TraceMeta, delta, invariant, planes, raw};
 use crate::container::{AtomicFile, ContainerWriter, Kind};
 use crate::error::{Broken, FormatError, Result};
+use crate::texture::{Sampler, Texture};
 use crate::tiles::TileSpan;
 use std::io::{Cursor, Seek, Write};
 use std::path::Path;
@@ -70,10 +72,14 @@ pub fn encode_tile_as(encoding: Encoding, tables: &Tables, tile: &Tile) -> Resul
     })
 }
 
-/// Writes a trace: tables first, then tiles in ascending order of pass and tile.
+/// Writes a trace, tiles in ascending order of pass and tile.
+///
+/// The tables come first where all of them are known before the first tile and version 1 can say what they hold.
+/// Otherwise they come last, and may grow in between.
 #[derive(Debug)]
 pub struct TextraceWriter<W = AtomicFile> {
     container: ContainerWriter<W>,
+    version: Version,
     tables: Tables,
     index: Vec<IndexEntry>,
     /// First index slot that the next tile may have.
@@ -90,6 +96,15 @@ impl TextraceWriter<AtomicFile> {
     /// The tables violate a rule of the format, or the file cannot be written.
     pub fn create(path: &Path, tables: &Tables) -> Result<Self> {
         Self::start(ContainerWriter::create(path, Kind::Textrace)?, tables)
+    }
+
+    /// Starts a trace without tables, which [`Self::finish`] renames to `path`: they are added as they become known.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn create_growing(path: &Path) -> Result<Self> {
+        let container = ContainerWriter::create(path, Kind::Textrace)?;
+        Self::start_version(Version::Two, container, &Tables::default())
     }
 
     /// Completes the file. Returns its size in bytes.
@@ -110,6 +125,15 @@ impl TextraceWriter<Cursor<Vec<u8>>> {
         Self::start(ContainerWriter::in_memory(Kind::Textrace)?, tables)
     }
 
+    /// Starts a trace in memory without tables: see [`TextraceWriter::create_growing`].
+    ///
+    /// # Errors
+    /// None in practice; the signature is that of the file's.
+    pub fn growing_in_memory() -> Result<Self> {
+        let container = ContainerWriter::in_memory(Kind::Textrace)?;
+        Self::start_version(Version::Two, container, &Tables::default())
+    }
+
     /// Completes the trace.
     ///
     /// # Errors
@@ -120,19 +144,29 @@ impl TextraceWriter<Cursor<Vec<u8>>> {
 }
 
 impl<W: Write + Seek> TextraceWriter<W> {
-    fn start(mut container: ContainerWriter<W>, tables: &Tables) -> Result<Self> {
-        tables::write(tables, &mut container)?;
+    fn start(container: ContainerWriter<W>, tables: &Tables) -> Result<Self> {
+        Self::start_version(Version::of(tables), container, tables)
+    }
+
+    fn start_version(
+        version: Version,
+        mut container: ContainerWriter<W>,
+        tables: &Tables,
+    ) -> Result<Self> {
+        match version {
+            Version::One => tables::write(version, tables, &mut container)?,
+            // An error of the tables should come before the work. A trace that grows has none yet.
+            Version::Two if *tables != Tables::default() => tables::check_writable(tables)?,
+            Version::Two => {}
+        }
         container.begin_chunk(super::TILES)?;
         let slots: u64 = tables.passes.iter().map(Pass::tile_count_u64).sum();
-        let too_many = |_| FormatError::Unwritable {
-            what: "tile index".to_owned(),
-            expected: "a number of tiles that fits in memory".to_owned(),
-            found: slots.to_string(),
-        };
+        let tiles = usize::try_from(slots).map_err(|_| too_many_tiles(slots))?;
         Ok(Self {
             container,
+            version,
             tables: tables.clone(),
-            index: vec![IndexEntry::default(); usize::try_from(slots).map_err(too_many)?],
+            index: vec![IndexEntry::default(); tiles],
             next_slot: 0,
             tile_bytes: 0,
             encoding: Encoding::default(),
@@ -140,7 +174,82 @@ impl<W: Write + Seek> TextraceWriter<W> {
         })
     }
 
-    /// Adds geometry: its meshes and draws now, its views with [`Self::append_view`].
+    /// The tables as far as they are known.
+    #[must_use]
+    pub fn tables(&self) -> &Tables {
+        &self.tables
+    }
+
+    /// Adds to the tables of a trace whose tables come last. They are checked when the trace is completed.
+    ///
+    /// # Errors
+    /// The tables have been written.
+    fn growing(&mut self, what: &str) -> Result<&mut Tables> {
+        match self.version {
+            Version::Two => Ok(&mut self.tables),
+            Version::One => Err(FormatError::Unwritable {
+                what: what.to_owned(),
+                expected: "a trace whose tables come last".to_owned(),
+                found: "tables that have been written".to_owned(),
+            }),
+        }
+    }
+
+    /// Sets the description.
+    ///
+    /// # Errors
+    /// The tables have been written.
+    pub fn set_meta(&mut self, meta: TraceMeta) -> Result<()> {
+        self.growing("a description")?.meta = meta;
+        Ok(())
+    }
+
+    /// Adds a texture and tells its index.
+    ///
+    /// # Errors
+    /// The tables have been written, or there are too many.
+    pub fn add_texture(&mut self, texture: Texture) -> Result<u32> {
+        let textures = &mut self.growing("a texture")?.textures;
+        textures.push(texture);
+        index_of_last("texture", textures.len())
+    }
+
+    /// Adds a sampler and tells its index.
+    ///
+    /// # Errors
+    /// The tables have been written, or there are too many.
+    pub fn add_sampler(&mut self, sampler: Sampler) -> Result<u16> {
+        let samplers = &mut self.growing("a sampler")?.samplers;
+        samplers.push(sampler);
+        index_of_last("sampler", samplers.len())
+    }
+
+    /// Adds a draw and tells its index.
+    ///
+    /// # Errors
+    /// The tables have been written, or there are too many.
+    pub fn add_draw(&mut self, draw: Draw) -> Result<u32> {
+        let draws = &mut self.growing("a draw")?.draws;
+        draws.push(draw);
+        index_of_last("draw", draws.len())
+    }
+
+    /// Adds a pass and tells its index.
+    ///
+    /// # Errors
+    /// The tables have been written, or the pass has too many tiles.
+    pub fn add_pass(&mut self, pass: Pass) -> Result<usize> {
+        let tiles = usize::try_from(pass.tile_count_u64()).ok();
+        let slots = tiles.and_then(|tiles| self.index.len().checked_add(tiles));
+        let slots = slots.ok_or_else(|| too_many_tiles(pass.tile_count_u64()))?;
+        let passes = &mut self.growing("a pass")?.passes;
+        passes.push(pass);
+        let number = passes.len() - 1;
+        self.index.resize(slots, IndexEntry::default());
+        Ok(number)
+    }
+
+    /// Adds geometry: its meshes and draws now, its views by [`Self::append_view`].
     ///
     /// # Errors
     /// The geometry violates a rule of the format.
@@ -232,9 +341,28 @@ impl<W: Write + Seek> TextraceWriter<W> {
             entry.write(&mut bytes);
         }
         self.container.chunk(super::TILE_INDEX, &bytes)?;
+        if self.version == Version::Two {
+            tables::write(self.version, &self.tables, &mut self.container)?;
+        }
         if let Some(spool) = self.geometry {
             spool.write(&mut self.container)?;
         }
         Ok(self.container)
     }
+}
+
+fn too_many_tiles(tiles: u64) -> FormatError {
+    FormatError::Unwritable {
+        what: "tile index".to_owned(),
+        expected: "a number of tiles that fits in memory".to_owned(),
+        found: tiles.to_string(),
+    }
+}
+
+fn index_of_last<T: TryFrom<usize>>(what: &str, entries: usize) -> Result<T> {
+    T::try_from(entries - 1).map_err(|_| FormatError::Unwritable {
+        what: format!("{what} table"),
+        expected: "entries that their indices can name".to_owned(),
+        found: entries.to_string(),
+    })
 }

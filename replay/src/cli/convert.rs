@@ -14,7 +14,7 @@ use formats::interop::{
 };
 use formats::layout::Layout;
 use formats::raytrace::{RayTile, Raytrace, RaytraceWriter, encode_ray_tile};
-use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as};
+use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as, with_operands};
 use shell::Output;
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -298,8 +298,8 @@ fn accesses(
                 draw: quad.draw,
                 primitive: quad.primitive,
             };
-            for record in quad.records {
-                expander.expand(origin, record, |access| sink.write(access))?;
+            for (record, operands) in with_operands(quad.records) {
+                expander.expand(origin, record, operands, |access| sink.write(access))?;
             }
             Ok(())
         })?;

@@ -112,7 +112,7 @@ impl<'a> Partners<'a> {
         let alike = a.extent == b.extent
             && a.samples.len() == b.samples.len()
             && a.samples.iter().zip(&b.samples).all(|(a, b)| {
-                (a.texture, a.layer, a.offset) == (b.texture, b.layer, b.offset)
+                (a.texture, a.layer, a.offset, a.level) == (b.texture, b.layer, b.offset, b.level)
                     && sampler(0, a.sampler) == sampler(1, b.sampler)
             });
         alike.then_some(a)

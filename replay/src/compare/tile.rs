@@ -6,7 +6,9 @@ use crate::config::SamplingConfig;
 use crate::order::TileRef;
 use crate::stream::{StreamError, TileSource};
 use formats::footprint::{Footprint, LodFormula, footprints, quad_lod};
-use formats::textrace::{NO_GROUP, PrimitiveRun, QuadRecord, Tile, UvGroup, quad_morton};
+use formats::textrace::{
+    NO_GROUP, PrimitiveRun, QuadRecord, Tile, UvGroup, quad_morton, with_operands,
+};
 use std::cmp::Ordering;
 
 /// Smaller levels of detail are equivalent, because the finest level is magnified.
@@ -147,12 +149,15 @@ impl<'a> Comparer<'a> {
             of.iter().map(|r| lanes(r).count_ones()).sum()
         };
         tally.lanes_sampled_differently += u64::from(alone(a, b) + alone(b, a));
-        for left in a {
-            for right in b.iter().filter(|r| r.group == left.group) {
+        for (left, of_left) in with_operands(a) {
+            for (right, of_right) in with_operands(b).filter(|(r, _)| r.group == left.group) {
                 let shared = left.mask & right.mask & both;
                 match self.partners.group(draws, left.group) {
                     _ if shared == 0 || left.group == NO_GROUP => {}
-                    Some(group) => self.records(draw, group, shared, [left, right]),
+                    Some(group) => {
+                        let pairs = [(left, of_left), (right, of_right)];
+                        self.records(draw, group, shared, pairs);
+                    }
                     None => {
                         let tally = &mut self.by_draw[draw];
                         tally.lanes_sampled_differently += u64::from(shared.count_ones());
@@ -162,9 +167,17 @@ impl<'a> Comparer<'a> {
         }
     }
 
-    /// Compares two records of the same lanes and textures.
-    fn records(&mut self, draw: usize, group: &UvGroup, lanes: u8, records: [&QuadRecord; 2]) {
+    /// Compares two records of the same lanes and textures, with their operands.
+    fn records(
+        &mut self,
+        draw: usize,
+        group: &UvGroup,
+        lanes: u8,
+        pairs: [(&QuadRecord, Option<&QuadRecord>); 2],
+    ) {
         let tally = &mut self.by_draw[draw];
+        let records = pairs.map(|(record, _)| record);
+        let operands = pairs.map(|(_, operands)| operands.copied());
         let [a, b] = records;
         for lane in (0..4).filter(|lane| lanes >> lane & 1 != 0) {
             let ([au, av], [bu, bv]) = (a.lane_uv(lane), b.lane_uv(lane));
@@ -185,11 +198,13 @@ impl<'a> Comparer<'a> {
             mask: lanes,
             ..*record
         });
-        let same = records[0] == records[1];
+        let same =
+            records[0] == records[1] && (!group.has_operands() || operands[0] == operands[1]);
         for sample in &group.samples {
             let texture = &tables.textures[sample.texture as usize];
             let sampler = &tables.samplers[usize::from(sample.sampler)];
-            for (record, list) in records.iter().zip(&mut self.footprints) {
+            let sides = records.iter().zip(&operands);
+            for ((record, operands), list) in sides.zip(&mut self.footprints) {
                 list.clear();
                 if same && std::ptr::eq(record, &records[1]) {
                     continue;
@@ -197,6 +212,7 @@ impl<'a> Comparer<'a> {
                 let visit = |footprint| list.push(footprint);
                 footprints(
                     record,
+                    operands.as_ref(),
                     group.extent,
                     sample,
                     texture,

@@ -15,6 +15,7 @@ use crate::stream::{
 };
 use formats::footprint::record_footprints;
 use formats::layout::Layout;
+use formats::textrace::with_operands;
 use std::collections::{HashMap, HashSet};
 
 fn small() -> MemoryTrace {
@@ -99,11 +100,13 @@ fn twin(trace: &MemoryTrace, config: &RunConfig) -> (LevelCounters, LevelCounter
         };
         let tile = &trace.tiles[at.pass as usize][at.tile as usize];
         for run in &tile.runs {
-            for record in &tile.records[run.first as usize..][..run.count as usize] {
+            let records = &tile.records[run.first as usize..][..run.count as usize];
+            for (record, operands) in with_operands(records) {
                 record_footprints(
                     &trace.tables,
                     run.draw,
                     record,
+                    operands,
                     &config.sampling,
                     |sample, f| {
                         let mut lines: Vec<u64> = Vec::new();

@@ -187,6 +187,7 @@ pub fn trace(scene: &[Placed], view: View) -> Synthetic {
                 surfaces: None,
                 origin_m: [0.0; 3],
                 techniques: None,
+                program: None,
             },
             origin: [0.0; 3],
             eyes,

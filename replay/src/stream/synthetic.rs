@@ -144,6 +144,7 @@ impl Synthetic {
                 surfaces: None,
                 origin_m: [0.0; 3],
                 techniques: None,
+                program: None,
             },
             textures: (0..self.materials * self.textures)
                 .map(|i| {
@@ -172,6 +173,7 @@ impl Synthetic {
                                 sampler: 0,
                                 layer: 0,
                                 offset: [0; 2],
+                                level: Default::default(),
                             })
                             .collect(),
                     }],

@@ -49,6 +49,7 @@ pub fn tables(sizes: &[[u32; 2]]) -> Tables {
             surfaces: None,
             origin_m: [0.0; 3],
             techniques: None,
+            program: None,
         },
         textures: sizes
             .iter()
@@ -75,6 +76,7 @@ pub fn tables(sizes: &[[u32; 2]]) -> Tables {
                         sampler: 0,
                         layer: 0,
                         offset: [0; 2],
+                        level: Default::default(),
                     })
                     .collect(),
             }],

@@ -4,6 +4,7 @@
 //! made it; a header and rows follow. A table in a document is between `<!-- figures: NAME -->` and
 //! `<!-- end -->`. It shows the results file as it is, or as converted by a row of [`VIEWS`].
 
+mod applications;
 mod paper_comparison;
 mod reprojection;
 mod shards;
@@ -18,6 +19,13 @@ type View = fn(&Results) -> String;
 
 /// Tables whose form differs from their results file.
 const VIEWS: &[(&str, &str, View)] = &[
+    ("applications-orders", "applications", applications::orders),
+    (
+        "applications-records",
+        "applications",
+        applications::records,
+    ),
+    ("applications-times", "applications", applications::times),
     (
         "calibration-ipd-bias",
         "calibration-ipd-bias",

@@ -9,7 +9,7 @@ use super::geometry;
 use super::lighting::Lighting;
 use formats::textrace::{Pass, PassKind, Tables, TextraceWriter};
 use formats::view::{Eye, FrameViews, TILE_SIZE_PX};
-use record::{CaptureCounts, Captured, Capturer, RecordError, Recorder, Region, Sink};
+use record::{CaptureCounts, Captured, Capturer, DepthReplay, RecordError, Recorder, Region, Sink};
 use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
@@ -83,10 +83,15 @@ impl CaptureJob<'_> {
     /// The recorder of this job's passes; `tables` are the trace's.
     #[must_use]
     pub fn recorder<'t>(&self, tables: &'t Tables) -> Recorder<'t> {
-        let replayed = |call: &DrawCall| {
-            self.fragments == Fragments::DepthTested && call.mode == DrawMode::Masked
+        let replay = |call: &DrawCall| {
+            let is_tested = self.fragments == Fragments::DepthTested;
+            if is_tested && call.mode == DrawMode::Masked {
+                DepthReplay::Less
+            } else {
+                DepthReplay::None
+            }
         };
-        Recorder::new(tables, self.draws.calls.iter().map(replayed).collect())
+        Recorder::new(tables, self.draws.calls.iter().map(replay).collect())
     }
 
     /// Fits the frame's shadow cascades to both eyes, whichever are captured, and finds what each

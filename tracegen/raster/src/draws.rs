@@ -280,6 +280,7 @@ impl DrawList {
                                     sampler: intern(&mut samplers, t.sampler),
                                     layer: 0,
                                     offset: [0, 0],
+                                    level: Default::default(),
                                 })
                             })
                             .collect();
@@ -295,6 +296,7 @@ impl DrawList {
                             sampler,
                             layer: layer as u16,
                             offset,
+                            level: Default::default(),
                         })
                         .collect();
                     result.push(uv_group(samples, textures));

@@ -156,6 +156,7 @@ fn tables(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> Ray
                 surfaces: None,
                 origin_m: [0.0; 3],
                 techniques: None,
+                program: None,
             },
             origin,
             eyes,

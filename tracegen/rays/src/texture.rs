@@ -145,7 +145,8 @@ fn wrapped(x: f32, size: u32, wrap: Wrap) -> u32 {
             let x = x.rem_euclid(2 * n);
             if x < n { x } else { 2 * n - 1 - x }
         }
-        Wrap::ClampToEdge => x.clamp(0, n - 1),
+        // Scene files have no other modes.
+        Wrap::ClampToEdge | Wrap::ClampToBorder | Wrap::MirrorClampToEdge => x.clamp(0, n - 1),
     };
     at as u32
 }

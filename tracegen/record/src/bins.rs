@@ -89,12 +89,14 @@ impl Chunk {
 }
 
 /// Sort key within a tile: primitive, Morton position of the quad, group, mask. A primitive that
-/// was clipped into several triangles may cover one quad twice, with disjoint masks.
+/// was clipped into several triangles may cover one quad twice, with disjoint masks. Operands have the group of
+/// the record after them, so that both stay together: of equal keys the earlier record comes first.
 fn sort_key(record: &RawRecord) -> u64 {
     let morton = quad_morton((record.qx() & 7) as u8, (record.qy() & 7) as u8);
+    let group = record.group() + u8::from(record.is_operands());
     u64::from(record.primitive) << 32
         | u64::from(morton) << 8
-        | u64::from(record.group()) << 4
+        | u64::from(group) << 4
         | u64::from(record.mask())
 }
 
@@ -172,5 +174,12 @@ mod tests {
         assert!(key(1, 1, 0, 15) < key(1, 0, 1, 0));
         assert!(key(1, 8, 0, 0) < key(1, 9, 0, 0));
         assert!(key(1, 3, 3, 2) < key(1, 3, 3, 3));
+        let operands = RawRecord {
+            header: RawRecord::pack(3, 3, 1, 2),
+            primitive: 1,
+            passing: RawRecord::OPERANDS,
+            ..RawRecord::default()
+        };
+        assert_eq!(sort_key(&operands), key(1, 3, 3, 3));
     }
 }

@@ -28,6 +28,14 @@ pub enum RecordError {
         /// What came.
         found: String,
     },
+    /// An event of a [`crate::Recording`] came at the wrong time.
+    #[error("an event of a recording: expected {expected}, found {found}")]
+    Event {
+        /// What has to come first.
+        expected: String,
+        /// What came.
+        found: String,
+    },
     /// The trace could not be written.
     #[error("writing the trace: {0}")]
     Write(#[from] FormatError),

@@ -1,11 +1,48 @@
-//! Replays the depth test inside an alpha-masked draw.
+//! Replays the depth test inside a draw whose fragments may discard.
 //!
 //! A masked draw is captured with a forced early test against the depth of the draws before it
 //! (see `fragment_masked_record`), so the driver has not tested its primitives against each other.
-//! An in-order GPU with early test and late write would have: a lane survives if it is nearer than
+//! An in-order GPU with early test and late write would have: a lane survives if it passes the depth test against
 //! every earlier primitive of the draw whose alpha passed at that pixel.
 
 use super::raw::{RawDepth, RawRecord};
+
+/// The depth test that a draw's primitives have to be held to among themselves.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum DepthReplay {
+    /// None: the driver has done it, or no primitive of the draw hides another.
+    #[default]
+    None,
+    /// The nearer fragment passes, as depth test *less*.
+    Less,
+    /// *Less or equal*.
+    LessOrEqual,
+    /// *Greater*.
+    Greater,
+    /// *Greater or equal*.
+    GreaterOrEqual,
+}
+
+impl DepthReplay {
+    /// A fragment at `depth` passes where `written` has been written.
+    fn passes(self, depth: f32, written: f32) -> bool {
+        match self {
+            Self::None => true,
+            Self::Less => depth < written,
+            Self::LessOrEqual => depth <= written,
+            Self::Greater => depth > written,
+            Self::GreaterOrEqual => depth >= written,
+        }
+    }
+
+    /// What every fragment passes against.
+    fn nothing(self) -> f32 {
+        match self {
+            Self::Greater | Self::GreaterOrEqual => f32::NEG_INFINITY,
+            _ => f32::INFINITY,
+        }
+    }
+}
 
 /// Quads along a tile's edge.
 const EDGE: usize = formats::textrace::TILE_QUADS as usize;
@@ -34,14 +71,14 @@ impl MaskedDepth {
     }
 
     /// Covered lanes of a quad that survive; quads must come in submission order.
-    pub fn survivors(&mut self, quad: &RawRecord, depth: &RawDepth) -> u8 {
+    pub fn survivors(&mut self, test: DepthReplay, quad: &RawRecord, depth: &RawDepth) -> u8 {
         let (x, y) = ((quad.qx() & 7) as usize, (quad.qy() & 7) as usize);
         if self.draw.replace(quad.draw) != Some(quad.draw) {
-            self.nearest.fill([f32::INFINITY; 4]);
+            self.nearest.fill([test.nothing(); 4]);
         }
         let nearest = &mut self.nearest[y * EDGE + x];
         let nearer = (nearest.iter().zip(&depth.depth).enumerate())
-            .map(|(lane, (nearest, depth))| u8::from(depth < nearest) << lane)
+            .map(|(lane, (nearest, depth))| u8::from(test.passes(*depth, *nearest)) << lane)
             .sum::<u8>();
         let survivors = quad.mask() & nearer;
         // Without a branch: which lanes pass is as good as random.
@@ -75,7 +112,38 @@ mod tests {
             passing: passing.into(),
             ..RawRecord::default()
         };
-        nearest.survivors(&quad, &RawDepth { depth })
+        nearest.survivors(DepthReplay::Less, &quad, &RawDepth { depth })
+    }
+
+    #[test]
+    fn each_depth_test_lets_its_own_fragments_pass() {
+        use DepthReplay::{Greater, GreaterOrEqual, Less, LessOrEqual};
+        let cases = [
+            (Less, [0b0010, 0b0000]),
+            (LessOrEqual, [0b0011, 0b0000]),
+            (Greater, [0b0100, 0b0100]),
+            (GreaterOrEqual, [0b0101, 0b0101]),
+        ];
+        // Second quad: equal, nearer and farther; third: the same once more.
+        for (test, expected) in cases {
+            let mut nearest = MaskedDepth::default();
+            let mut lanes = |depth| {
+                let quad = RawRecord {
+                    header: RawRecord::pack(2, 3, 0b0111, 0),
+                    draw: 9,
+                    passing: 0b0111,
+                    ..RawRecord::default()
+                };
+                nearest.survivors(test, &quad, &RawDepth { depth })
+            };
+            assert_eq!(lanes([0.5; 4]), 0b0111, "{test:?}");
+            assert_eq!(lanes([0.5, 0.4, 0.6, 0.5]), expected[0], "{test:?}");
+            let again = lanes([0.5, 0.5, 0.7, 0.5]);
+            let or_equal = matches!(test, LessOrEqual | GreaterOrEqual);
+            let same = u8::from(or_equal);
+            assert_eq!(again & 0b0001, same, "{test:?}");
+            assert_eq!(again & 0b0100, expected[1] & 0b0100, "{test:?}");
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::raw::RawRecord;
 use formats::textrace::{SUBTEXELS, UvGroup};
-use formats::texture::{Sampler, Wrap};
+use formats::texture::Sampler;
 
 /// Coordinates stay below this, derivatives below half of it, so that no sum of a lane's terms
 /// (`uv + dx + dy + cross`) leaves 32 bits.
@@ -20,12 +20,13 @@ pub(crate) struct GroupScale {
 impl GroupScale {
     /// The rule of `group`.
     pub fn new(group: &UvGroup, samplers: &[Sampler]) -> Self {
+        // Operands have no samples, and no period either.
         let periodic = |axis: usize| {
-            group
+            let mut samplers = group
                 .samples
                 .iter()
-                .filter_map(|s| samplers.get(usize::from(s.sampler)))
-                .all(|s| s.wrap[axis] != Wrap::ClampToEdge)
+                .filter_map(|s| samplers.get(usize::from(s.sampler)));
+            !group.samples.is_empty() && samplers.all(|s| s.wrap[axis].is_periodic())
         };
         Self {
             scale: group.extent.map(|e| f64::from(SUBTEXELS) * f64::from(e)),
@@ -93,6 +94,7 @@ fn round(value: f64, limit: f64) -> i32 {
 mod tests {
     use super::*;
     use formats::textrace::Sample;
+    use formats::texture::Wrap;
 
     fn rule(extent: u32, wrap: Wrap) -> GroupScale {
         let group = UvGroup {
@@ -102,6 +104,7 @@ mod tests {
                 sampler: 0,
                 layer: 0,
                 offset: [0, 0],
+                level: Default::default(),
             }],
         };
         let sampler = Sampler {

@@ -16,7 +16,8 @@ pub struct RawRecord {
     pub primitive: u32,
     /// Index into the draw table.
     pub draw: u32,
-    /// Covered lanes whose alpha passes the test, like [`Self::mask`]; of masked draws alone.
+    /// Covered lanes whose alpha passes the test, like [`Self::mask`]; of masked draws alone. Above them flags of
+    /// records that are pushed: [`Self::HAS_DEPTH`] and [`Self::OPERANDS`].
     pub passing: u32,
     /// Coordinates of the top-left lane, covered or not.
     pub uv: [f32; 2],
@@ -29,6 +30,17 @@ pub struct RawRecord {
 }
 
 impl RawRecord {
+    /// Flag of [`Self::passing`]: the depths beside the record are those of its quad (see [`crate::DepthReplay`]).
+    pub const HAS_DEPTH: u32 = 1 << 31;
+    /// Flag of [`Self::passing`]: the coordinates are operands of the next record, whose group is the next one.
+    pub const OPERANDS: u32 = 1 << 30;
+
+    /// The record's coordinates are operands of the next record.
+    #[must_use]
+    pub fn is_operands(&self) -> bool {
+        self.passing & Self::OPERANDS != 0
+    }
+
     /// Quad column in the view.
     #[must_use]
     pub fn qx(&self) -> u32 {
@@ -73,7 +85,7 @@ pub struct RawDepth {
 pub struct RawRecords<'a> {
     /// One a quad and uv group.
     pub quads: &'a [RawRecord],
-    /// `depths[i]` belongs to `quads[i]` where that is group 0 of a masked draw, and means nothing
-    /// elsewhere; empty where no draw is masked.
+    /// `depths[i]` belongs to `quads[i]` where that is group 0 of a masked draw or has [`RawRecord::HAS_DEPTH`], and
+    /// means nothing elsewhere; empty where no draw is masked.
     pub depths: &'a [RawDepth],
 }

@@ -2,10 +2,11 @@
 
 use super::bins::{Bins, Entry};
 use super::error::RecordError;
-use super::masked::MaskedDepth;
+use super::masked::{DepthReplay, MaskedDepth};
 use super::quantise::{GroupScale, Quantiser};
 use super::raw::{RawRecord, RawRecords};
-use formats::textrace::{NO_GROUP, PrimitiveRun, QuadRecord, Tables, Tile};
+use formats::textrace::{Draw, NO_GROUP, PrimitiveRun, QuadRecord, Tables, Tile};
+use formats::texture::Sampler;
 use std::ops::AddAssign;
 
 /// What a capture counted.
@@ -43,8 +44,8 @@ impl AddAssign for CaptureCounts {
 pub(crate) struct TileRules {
     /// By draw and group.
     scales: Vec<Vec<GroupScale>>,
-    /// By draw: its quads carry depths.
-    masked: Vec<bool>,
+    /// By draw: the depth test that its quads, which carry depths, are held to.
+    replays: Vec<DepthReplay>,
 }
 
 /// Memory that building a tile reuses.
@@ -58,21 +59,19 @@ pub(crate) struct Scratch {
 }
 
 impl TileRules {
-    /// Rules for the draws of `tables`; `masked` tells of each whether its quads carry depths.
-    pub fn new(tables: &Tables, masked: Vec<bool>) -> Self {
+    /// Rules for the draws of `tables`; `replays` tells of each what depth test its quads are held to.
+    pub fn new(tables: &Tables, replays: Vec<DepthReplay>) -> Self {
+        let scales = |draw| scales(draw, &tables.samplers);
         Self {
-            scales: tables
-                .draws
-                .iter()
-                .map(|draw| {
-                    draw.groups
-                        .iter()
-                        .map(|g| GroupScale::new(g, &tables.samplers))
-                        .collect()
-                })
-                .collect(),
-            masked,
+            scales: tables.draws.iter().map(scales).collect(),
+            replays,
         }
+    }
+
+    /// Adds the next draw.
+    pub fn add_draw(&mut self, draw: &Draw, samplers: &[Sampler], replay: DepthReplay) {
+        self.scales.push(scales(draw, samplers));
+        self.replays.push(replay);
     }
 
     /// Builds tile `tile` of the bins into `scratch.tile`.
@@ -117,19 +116,25 @@ impl TileRules {
         };
         let (x, y) = ((first.qx() & 7) as u8, (first.qy() & 7) as u8);
         let mut alive = 15;
-        if self.masked.get(first.draw as usize) == Some(&true) {
+        let replay = self.replays.get(first.draw as usize).copied();
+        if let Some(replay) = replay.filter(|replay| *replay != DepthReplay::None) {
             alive = 0;
-            for &(_, index) in quad.iter().filter(|entry| of(entry).group() == 0) {
+            let has_depth = |r: &RawRecord| {
+                r.group() == 0 && !r.is_operands() || r.passing & RawRecord::HAS_DEPTH != 0
+            };
+            for &(_, index) in quad.iter().filter(|entry| has_depth(of(entry))) {
                 let record = of(&(0, index));
                 let Some(depth) = records.depths.get(index as usize) else {
                     continue;
                 };
-                let survivors = scratch.depth.survivors(record, depth);
+                let survivors = scratch.depth.survivors(replay, record, depth);
                 counts.masked_lanes_killed += u64::from((record.mask() & !survivors).count_ones());
                 alive |= survivors;
             }
         }
         let mut lanes = 0;
+        // Operands wait for the record that they belong to.
+        let mut operands: Option<Option<QuadRecord>> = None;
         for record in quad.iter().map(of) {
             let mask = record.mask() & alive;
             if mask == 0 {
@@ -146,14 +151,25 @@ impl TileRules {
             if record.group() != NO_GROUP {
                 let rule = self.rule(record)?;
                 let quantiser = &mut scratch.quantisers[usize::from(record.group())];
-                let Some(fixed) = quantiser.quantise(rule, record) else {
+                let fixed = quantiser.quantise(rule, record);
+                if let Some(fixed) = fixed {
+                    result.uv = fixed.uv;
+                    result.dx = fixed.dx;
+                    result.dy = fixed.dy;
+                    result.cross = fixed.cross;
+                }
+                if record.is_operands() {
+                    operands = Some(fixed.map(|_| result));
+                    continue;
+                }
+                let before = operands.take();
+                if fixed.is_none() || before == Some(None) {
                     counts.not_finite += 1;
                     continue;
-                };
-                result.uv = fixed.uv;
-                result.dx = fixed.dx;
-                result.dy = fixed.dy;
-                result.cross = fixed.cross;
+                }
+                if let Some(before) = before.flatten() {
+                    push(&mut scratch.tile, before);
+                }
             }
             lanes |= mask;
             push(&mut scratch.tile, result);
@@ -200,6 +216,11 @@ impl TileRules {
             scratch.quantisers = Default::default();
         }
     }
+}
+
+fn scales(draw: &Draw, samplers: &[Sampler]) -> Vec<GroupScale> {
+    let scale = |group| GroupScale::new(group, samplers);
+    draw.groups.iter().map(scale).collect()
 }
 
 fn push(tile: &mut Tile, record: QuadRecord) {

@@ -7,13 +7,14 @@
 //! pixel's centre over 64, so one pixel is one texel.
 
 use formats::textrace::{
-    Draw, Pass, PassKind, SUBTEXELS, Sample, Tables, Textrace, TextraceWriter, Tile, TraceMeta,
-    UvGroup,
+    Draw, LodRule, Pass, PassKind, SUBTEXELS, Sample, SampleLevel, Tables, Textrace,
+    TextraceWriter, Tile, TraceMeta, UvGroup,
 };
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use formats::view::{Eye, EyeView, FovTangents, FrameViews, Hmd};
 use record::{
-    Captured, Capturer, RawDepth, RawRecord, RawRecords, RecordError, Recorder, Region, Sink,
+    Captured, Capturer, DepthReplay, RawDepth, RawRecord, RawRecords, RecordError, Recorder,
+    Recording, Region, Sink,
 };
 use std::collections::BTreeMap;
 
@@ -50,6 +51,7 @@ fn tables() -> Tables {
                 sampler: 0,
                 layer: 0,
                 offset: [0, 0],
+                level: Default::default(),
             }],
         }],
     };
@@ -78,6 +80,7 @@ fn tables() -> Tables {
             surfaces: None,
             origin_m: [0.0; 3],
             techniques: None,
+            program: None,
         },
         textures: vec![Texture {
             name: "grid".into(),
@@ -204,7 +207,7 @@ impl Capturer for Analytic {
 fn trace(capturer: &mut Analytic) -> Result<Vec<u8>, RecordError> {
     let tables = tables();
     let mut writer = TextraceWriter::in_memory(&tables)?;
-    let mut recorder = Recorder::new(&tables, vec![false, true]);
+    let mut recorder = Recorder::new(&tables, vec![DepthReplay::None, DepthReplay::Less]);
     recorder.record_pass(capturer, 0, &mut writer)?;
     Ok(writer.into_bytes()?)
 }
@@ -250,7 +253,7 @@ fn fragments_whose_coordinates_are_no_numbers_are_not_counted() {
     let counts = |not_finite: Option<u32>| {
         let tables = tables();
         let mut writer = TextraceWriter::in_memory(&tables).unwrap();
-        let mut recorder = Recorder::new(&tables, vec![false, true]);
+        let mut recorder = Recorder::new(&tables, vec![DepthReplay::None, DepthReplay::Less]);
         let mut capturer = Analytic {
             not_finite,
             ..Analytic::new(1 << 20, false)
@@ -341,9 +344,177 @@ fn records_that_contradict_the_tables_are_refused() {
     for (record, expected) in cases {
         let tables = tables();
         let mut writer = TextraceWriter::in_memory(&tables).unwrap();
-        let mut recorder = Recorder::new(&tables, vec![false, true]);
+        let mut recorder = Recorder::new(&tables, vec![DepthReplay::None, DepthReplay::Less]);
         let refused = recorder.record_pass(&mut Wrong(record), 0, &mut writer);
         let message = refused.unwrap_err().to_string();
         assert!(message.contains(expected), "{message}");
     }
+}
+
+/// Texture, sampler and draws of the analytic scene as events; a pass is open afterwards.
+fn begun() -> Recording<std::io::Cursor<Vec<u8>>> {
+    let tables = tables();
+    let mut recording = Recording::new(TextraceWriter::growing_in_memory().unwrap());
+    recording.texture(tables.textures[0].clone()).unwrap();
+    let index = |r: &mut Recording<_>| r.sampler(tables.samplers[0]).unwrap();
+    assert_eq!([0, 0], [index(&mut recording), index(&mut recording)]);
+    recording.begin_pass(tables.passes[0]).unwrap();
+    for (draw, replay) in tables.draws.iter().zip(REPLAYS) {
+        recording.draw(draw.clone(), replay).unwrap();
+    }
+    recording
+}
+
+const REPLAYS: [DepthReplay; 2] = [DepthReplay::None, DepthReplay::Less];
+
+/// All records of the analytic scene, with its depths.
+fn all_records() -> (Vec<RawRecord>, Vec<RawDepth>) {
+    let mut all = (Vec::new(), Vec::new());
+    let whole = Region {
+        origin_px: [0, 0],
+        size_px: SIZE_PX,
+    };
+    let mut take = |records: RawRecords<'_>| {
+        all.0.extend(records.quads);
+        all.1.extend(records.depths);
+        Ok(())
+    };
+    let mut capturer = Analytic::new(1 << 20, false);
+    capturer.capture(whole, &mut take).unwrap();
+    all
+}
+
+fn tiles(trace: &Textrace) -> Vec<Tile> {
+    let decode = |index| {
+        let mut tile = Tile::default();
+        trace.decode_tile(0, index, &mut tile).unwrap();
+        tile
+    };
+    (0..24).map(decode).collect()
+}
+
+#[test]
+fn pushed_records_become_the_tiles_of_a_capturer_that_was_asked_for_them() {
+    let asked = trace(&mut Analytic::new(1 << 20, false)).unwrap();
+    let asked = Textrace::from_bytes(asked).unwrap();
+    let (quads, depths) = all_records();
+    for part in [1, 7, quads.len()] {
+        let mut recording = begun();
+        // The first parts have no masked draw, and no depths.
+        for (quads, depths) in quads.chunks(part).zip(depths.chunks(part)) {
+            let masked = quads.iter().any(|quad| quad.draw == 1);
+            let depths = if masked { depths } else { &[] };
+            recording.records(RawRecords { quads, depths }).unwrap();
+        }
+        let recorded = recording.end_pass().unwrap();
+        let bytes = recording
+            .finish(tables().meta)
+            .unwrap()
+            .into_bytes()
+            .unwrap();
+        let pushed = Textrace::from_bytes(bytes).unwrap();
+        assert_eq!(pushed.tables(), asked.tables());
+        assert_eq!(tiles(&pushed), tiles(&asked), "{part} at a time");
+        assert_eq!(recorded.counts.records, asked.records());
+    }
+}
+
+#[test]
+fn operands_stay_with_their_record_through_loops_and_what_is_not_finite() {
+    let mut recording = Recording::new(TextraceWriter::growing_in_memory().unwrap());
+    let tables = tables();
+    recording.texture(tables.textures[0].clone()).unwrap();
+    recording.sampler(tables.samplers[0]).unwrap();
+    let mut draw = tables.draws[0].clone();
+    draw.groups[0].samples[0].level = SampleLevel {
+        rule: LodRule::Explicit,
+        lod_256ths: 0,
+        operands: true,
+    };
+    let operands = UvGroup {
+        extent: [1, 1],
+        samples: Vec::new(),
+    };
+    draw.groups.insert(0, operands);
+    recording.draw(draw, DepthReplay::None).unwrap();
+    recording.begin_pass(tables.passes[0]).unwrap();
+    let pair = |level: f32, u: f32| {
+        let record = RawRecord {
+            header: RawRecord::pack(3, 2, 0b1111, 1),
+            uv: [u, 0.0],
+            ..RawRecord::default()
+        };
+        let operands = RawRecord {
+            header: RawRecord::pack(3, 2, 0b1111, 0),
+            passing: RawRecord::OPERANDS,
+            uv: [level, 0.0],
+            ..RawRecord::default()
+        };
+        [operands, record]
+    };
+    // Four iterations of a loop; one has no coordinate, one no level.
+    let quads = [
+        pair(3.0, 0.25),
+        pair(2.0, f32::NAN),
+        pair(f32::NAN, 0.5),
+        pair(1.0, 0.75),
+    ];
+    let quads = quads.as_flattened();
+    recording
+        .records(RawRecords { quads, depths: &[] })
+        .unwrap();
+    let recorded = recording.end_pass().unwrap();
+    assert_eq!(
+        (recorded.counts.records, recorded.counts.not_finite),
+        (4, 2)
+    );
+    let bytes = recording.finish(tables.meta).unwrap().into_bytes().unwrap();
+    let tile = &tiles(&Textrace::from_bytes(bytes).unwrap())[0];
+    let found: Vec<_> = tile.records.iter().map(|r| (r.group, r.uv[0])).collect();
+    let texel = |u: f32| (u * EDGE as f32) as i32 * SUBTEXELS;
+    assert_eq!(
+        found,
+        [
+            (0, 3 * SUBTEXELS),
+            (1, texel(0.25)),
+            (0, SUBTEXELS),
+            (1, texel(0.75))
+        ]
+    );
+}
+
+#[test]
+fn events_at_the_wrong_time_are_refused() {
+    let none = RawRecords {
+        quads: &[],
+        depths: &[],
+    };
+    let mut recording = begun();
+    let text = recording
+        .begin_pass(tables().passes[0])
+        .unwrap_err()
+        .to_string();
+    assert!(
+        text.contains("expected no open pass, found pass 0"),
+        "{text}"
+    );
+    recording.end_pass().unwrap();
+    for error in [
+        recording.end_pass().unwrap_err(),
+        recording.records(none).unwrap_err(),
+    ] {
+        let text = error.to_string();
+        assert!(text.contains("expected an open pass, found none"), "{text}");
+    }
+    let Err(error) = begun().finish(tables().meta) else {
+        panic!("an open pass was finished");
+    };
+    assert!(error.to_string().contains("no open pass"), "{error}");
+    let depths = [RawDepth::default()];
+    let uneven = RawRecords {
+        depths: &depths,
+        ..none
+    };
+    let text = begun().records(uneven).unwrap_err().to_string();
+    assert!(text.contains("expected no depths or 0, found 1"), "{text}");
 }

@@ -1,11 +1,14 @@
 //! The command line, one file a subcommand.
 
+pub mod app;
 mod cache_args;
 pub mod lens_args;
 mod objective_args;
+pub mod page;
 mod path_args;
 pub mod precision;
 mod prepared;
+mod program_args;
 pub mod raster;
 mod raster_auto;
 mod raster_summary;
@@ -28,6 +31,7 @@ Examples:
   tracegen scenes model.gltf --json
   tracegen raster atrium -o atrium.textrace --image atrium.png
   tracegen raster sponza.gltf --camera gallery --shadows -o sponza.textrace
+  tracegen app -o program.textrace --frames 10..13 -- ./program --stereo
   tracegen techniques atrium --path head -o atrium-techniques
   tracegen sweep captures.toml -o traces
   tracegen verify atrium --tiles 200 --colour
@@ -49,6 +53,10 @@ enum Command {
     Scenes(scenes::ScenesArgs),
     /// Render a stereo frame and capture its texture samples into a .textrace file.
     Raster(Box<raster::RasterArgs>),
+    /// Capture the texture samples of an unmodified Vulkan or OpenGL program into a .textrace file.
+    App(Box<app::AppArgs>),
+    /// Capture the texture samples of a page of WebGL or WebXR in Chromium into a .textrace file.
+    Page(Box<page::PageArgs>),
     /// Measure stereo rendering techniques along a path: times, pictures and traces into a folder.
     Techniques(Box<techniques::TechniquesArgs>),
     /// Capture every combination of a manifest's scenes, cameras and displays; goes on where it stopped.
@@ -74,6 +82,8 @@ pub fn main() -> ExitCode {
             match cli.command {
                 Command::Scenes(args) => scenes::run(args)?,
                 Command::Raster(args) => raster::run(&args)?,
+                Command::App(args) => return app::run(&args),
+                Command::Page(args) => return page::run(&args),
                 Command::Techniques(args) => techniques::run(&args)?,
                 Command::Sweep(args) => sweep::run(&args)?,
                 Command::Verify(args) => return verify::run(&args),

@@ -535,6 +535,7 @@ pub(super) fn tables(
             surfaces: Some(draws.surfaces(fragments)),
             origin_m: setup.scene.origin.to_array(),
             techniques: None,
+            program: None,
         },
         textures,
         samplers,

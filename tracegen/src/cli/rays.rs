@@ -164,6 +164,7 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
             surfaces: None,
             origin_m: scene_origin.to_array(),
             techniques: None,
+            program: None,
         },
         origin: (scene_origin + scene.soup.origin).to_array(),
         eyes,

@@ -357,7 +357,7 @@ fn parse_vfov(text: &str) -> Result<VerticalFov, String> {
     parse_numbers::<1>(text).map(|[degrees]| VerticalFov::Degrees(degrees))
 }
 
-fn parse_size(text: &str) -> Result<[u32; 2], String> {
+pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
     let max = hmd::MAX_EYE_SIZE_PX;
     text.split_once(['x', 'X'])
         .and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]))

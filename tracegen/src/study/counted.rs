@@ -2,7 +2,7 @@
 
 use formats::footprint::{SamplingOptions, record_footprints};
 use formats::layout::{Layout, LayoutConfig};
-use formats::textrace::{Textrace, Tile};
+use formats::textrace::{Textrace, Tile, with_operands};
 use raster::VERTEX_STRIDE;
 use raster::backend::Work;
 use rayon::prelude::*;
@@ -123,11 +123,12 @@ pub fn texture_bytes(trace: &Textrace) -> anyhow::Result<Vec<u64>> {
                 lines.clear();
                 for run in &tile.runs {
                     let records = run.first as usize..(run.first + run.count) as usize;
-                    for record in &tile.records[records] {
+                    for (record, operands) in with_operands(&tile.records[records]) {
                         record_footprints(
                             tables,
                             run.draw,
                             record,
+                            operands,
                             &options,
                             |sample, footprint| {
                                 let (layer, level) =

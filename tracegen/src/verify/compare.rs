@@ -239,6 +239,7 @@ impl Comparison<'_> {
             let mut read: Vec<Read> = Vec::with_capacity(2);
             footprints(
                 &only,
+                None,
                 group.extent,
                 sample,
                 texture,

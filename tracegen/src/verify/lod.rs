@@ -122,7 +122,10 @@ fn wrapped(texel: f64, size: u32, wrap: Wrap) -> u32 {
             let folded = texel.rem_euclid(2.0 * size);
             folded.min(2.0 * size - 1.0 - folded)
         }
-        Wrap::ClampToEdge => texel.clamp(0.0, size - 1.0),
+        // Scene files have no other modes.
+        Wrap::ClampToEdge | Wrap::ClampToBorder | Wrap::MirrorClampToEdge => {
+            texel.clamp(0.0, size - 1.0)
+        }
     };
     inside as u32
 }

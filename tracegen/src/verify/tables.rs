@@ -237,6 +237,7 @@ fn groups(
                 sampler: 0,
                 layer: 0,
                 offset: [0, 0],
+                level: Default::default(),
             };
             (sample, reference.sampler)
         });
@@ -254,6 +255,7 @@ fn groups(
             sampler: 0,
             layer,
             offset,
+            level: Default::default(),
         };
         SHADOW_TAPS
             .map(|offset| (tap(offset), Sampler::SHADOW))

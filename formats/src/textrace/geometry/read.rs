@@ -5,7 +5,7 @@ use super::{
     GEOMETRY, GEOMETRY_MINOR, Geometry, GeometryView, LIST_INDEX, LIST_INDEX_ENTRY_BYTES,
     MESH_BYTES, MeshGeometry, PRIMITIVE_LISTS, TileLists, ViewTarget,
 };
-use crate::container::Container;
+use crate::container::{Container, MAJOR_1};
 use crate::error::Result;
 use crate::parse::{self, Cursor, Fault, Parsed};
 use crate::textrace::{TILE_INDEX, Tables};
@@ -27,7 +27,7 @@ pub(in crate::textrace) fn read(
     }
     container.expect_order(&[TILE_INDEX, GEOMETRY, PRIMITIVE_LISTS, LIST_INDEX])?;
     let (major, minor) = container.version();
-    if minor < GEOMETRY_MINOR {
+    if major == MAJOR_1 && minor < GEOMETRY_MINOR {
         let expected = format!("version {major}.{GEOMETRY_MINOR} for a trace with geometry");
         return Err(container.malformed(GEOMETRY, 0, expected, format!("{major}.{minor}")));
     }

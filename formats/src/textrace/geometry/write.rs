@@ -5,7 +5,7 @@ use super::{
     GEOMETRY, GEOMETRY_MINOR, Geometry, GeometryView, LIST_INDEX, LIST_INDEX_ENTRY_BYTES,
     PRIMITIVE_LISTS, TileLists, ViewTarget,
 };
-use crate::container::ContainerWriter;
+use crate::container::{ContainerWriter, MAJOR_1};
 use crate::error::{Broken, FormatError, Result};
 use crate::textrace::Tables;
 use crate::tiles::TileSpan;
@@ -67,7 +67,9 @@ impl Spool {
 
     /// Writes the chunks.
     pub fn write<W: Write + Seek>(mut self, container: &mut ContainerWriter<W>) -> Result<()> {
-        container.require_minor(GEOMETRY_MINOR);
+        if container.major() == MAJOR_1 {
+            container.require_minor(GEOMETRY_MINOR);
+        }
         container.chunk(GEOMETRY, &meshes(&self.geometry)?)?;
         container.begin_chunk(PRIMITIVE_LISTS)?;
         self.lists.seek(SeekFrom::Start(0)).map_err(spool_error)?;

@@ -145,20 +145,27 @@ impl<'a> PlainFirstMiss<'a> {
         let mut quads = VecDeque::new();
         let send = |quad: crate::stream::Quad<'_>| -> Result<(), StreamError> {
             let mut thread = PlainThread::default();
-            for record in quad.records {
+            for (record, operands) in with_operands(quad.records) {
                 let sampling = &self.config.sampling;
-                record_footprints(tables, quad.draw, record, sampling, |sample, f| {
-                    let mut lines: Vec<u64> = Vec::new();
-                    for texel in f.texels() {
-                        let (layer, level) = (f.layer.into(), f.level.into());
-                        let at = self.layout.address(sample.texture, layer, level, texel);
-                        let line = at.unwrap() / 16;
-                        if !lines.contains(&line) {
-                            lines.push(line);
+                record_footprints(
+                    tables,
+                    quad.draw,
+                    record,
+                    operands,
+                    sampling,
+                    |sample, f| {
+                        let mut lines: Vec<u64> = Vec::new();
+                        for texel in f.texels() {
+                            let (layer, level) = (f.layer.into(), f.level.into());
+                            let at = self.layout.address(sample.texture, layer, level, texel);
+                            let line = at.unwrap() / 16;
+                            if !lines.contains(&line) {
+                                lines.push(line);
+                            }
                         }
-                    }
-                    thread.footprints.push_back(lines);
-                });
+                        thread.footprints.push_back(lines);
+                    },
+                );
             }
             if !thread.footprints.is_empty() {
                 quads.push_back(thread);

@@ -70,6 +70,10 @@ impl Axis {
             Wrap::Repeat => self.pairs(first, |texel| texel.rem_euclid(self.size)),
             Wrap::MirroredRepeat => self.pairs(first, |texel| mirrored(texel.into(), self.size)),
             Wrap::ClampToEdge => self.pairs(first, |texel| texel.max(0).min(last)),
+            // Textures with a border are sampled by `general`.
+            Wrap::ClampToBorder | Wrap::MirrorClampToEdge => {
+                self.pairs(first, |texel| self.wrapped(texel.into()))
+            }
         }
     }
 
@@ -105,6 +109,11 @@ impl Axis {
         })
     }
 
+    /// Byte offsets of two texels of the level.
+    pub fn bytes_of(&self, texels: [u32; 2]) -> [u32; 2] {
+        texels.map(|texel| self.bytes[texel as usize])
+    }
+
     /// Number of texels of the level.
     pub fn texels(&self) -> u32 {
         self.size as u32
@@ -127,7 +136,8 @@ impl Axis {
         match self.wrap {
             Wrap::Repeat => texel.rem_euclid(size) as i32,
             Wrap::MirroredRepeat => mirrored(texel, self.size),
-            Wrap::ClampToEdge => texel.clamp(0, size - 1) as i32,
+            Wrap::ClampToEdge | Wrap::ClampToBorder => texel.clamp(0, size - 1) as i32,
+            Wrap::MirrorClampToEdge => texel.max(-1 - texel).min(size - 1) as i32,
         }
     }
 }

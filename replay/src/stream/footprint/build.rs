@@ -1,11 +1,12 @@
 //! Builds the tables of the footprint generator from a trace's tables and a layout.
 
 use super::axis::Axis;
+use super::general::General;
 use super::{Footprints, Group, Kind, Level, SampleRef};
 use crate::config::RunConfig;
 use crate::stream::StreamError;
 use formats::layout::{Layout, LevelLayout};
-use formats::textrace::{SUBTEXELS, Sample, Tables, UvGroup};
+use formats::textrace::{SUBTEXELS, Sample, SampleLevel, Tables, UvGroup};
 use formats::texture::{Sampler, TexelFormat};
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -20,6 +21,8 @@ struct KindKey {
     offset: [i8; 2],
     extent: [u32; 2],
     skew_bytes: u32,
+    /// Level and layer of a general sample, and the texture's layers.
+    general: Option<(SampleLevel, u16, u32)>,
 }
 
 pub(super) struct Builder<'a> {
@@ -64,12 +67,14 @@ impl<'a> Builder<'a> {
             )));
         }
         let tables = self.tables;
-        let draws = tables
+        let draws: Vec<Vec<Group>> = tables
             .draws
             .iter()
             .map(|draw| draw.groups.iter().map(|group| self.group(group)).collect())
             .collect::<Result<_, _>>()?;
+        let kinds = |groups: &Vec<Group>| groups.iter().any(Group::is_general);
         Ok(Footprints {
+            general: draws.iter().map(kinds).collect(),
             draws,
             line_shift: self.config.line_bytes.trailing_zeros(),
             helper_lanes: self.config.sampling.helper_lanes,
@@ -102,10 +107,15 @@ impl<'a> Builder<'a> {
         Ok(out)
     }
 
-    /// First byte of the sample's texture layer.
+    /// First byte of the sample's texture layer; of the texture itself where fragments choose the layer.
     fn base(&self, sample: &Sample) -> Option<u64> {
         let placed = self.layout.textures().get(sample.texture as usize)?;
-        Some(placed.base + u64::from(sample.layer) * placed.layer_bytes)
+        let sampler = self.tables.samplers.get(usize::from(sample.sampler))?;
+        let layer = match General::is_needed(sample, sampler) {
+            true => 0,
+            false => sample.layer,
+        };
+        Some(placed.base + u64::from(layer) * placed.layer_bytes)
     }
 
     fn kind(&mut self, sample: &Sample, extent: [u32; 2]) -> Result<Arc<Kind>, StreamError> {
@@ -130,7 +140,8 @@ impl<'a> Builder<'a> {
             return Err(unknown("layer", sample.layer.into()));
         }
         let placed = &self.layout.textures()[index];
-        let base = placed.base + u64::from(layer) * placed.layer_bytes;
+        let base = self.base(sample).unwrap_or(0);
+        let is_general = General::is_needed(sample, sampler);
         let key = KindKey {
             size: texture.size,
             levels: texture.levels,
@@ -139,6 +150,7 @@ impl<'a> Builder<'a> {
             offset: sample.offset,
             extent,
             skew_bytes: (base % u64::from(self.config.line_bytes)) as u32,
+            general: is_general.then_some((sample.level, sample.layer, texture.layers)),
         };
         if let Some(kind) = self.kinds.get(&key) {
             return Ok(Arc::clone(kind));
@@ -173,6 +185,12 @@ impl<'a> Builder<'a> {
             sampler: key.sampler,
             skew_bytes: key.skew_bytes,
             levels,
+            general: is_general.then(|| General {
+                texture: texture.clone(),
+                sampler: *sampler,
+                sample: *sample,
+                layer_bytes: placed.layer_bytes,
+            }),
         });
         self.kinds.insert(key, Arc::clone(&kind));
         Ok(kind)

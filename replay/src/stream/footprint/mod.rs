@@ -8,6 +8,7 @@
 mod axis;
 mod build;
 mod bundle;
+mod general;
 
 pub use bundle::Bundle;
 
@@ -15,8 +16,9 @@ use super::StreamError;
 use crate::config::{RunConfig, SamplingConfig};
 use axis::Axis;
 use formats::footprint::{LaneReach, LodFormula, Reach, fast_log2, quad_lod, select_levels};
-use formats::textrace::{QuadRecord, Tables};
+use formats::textrace::{QuadRecord, Tables, with_operands};
 use formats::texture::{Filter, Sampler};
+use general::General;
 use std::sync::Arc;
 
 /// The texture of a footprint.
@@ -44,6 +46,8 @@ pub struct Scratch {
 #[derive(Debug)]
 pub struct Footprints {
     draws: Vec<Vec<Group>>,
+    /// By draw: some of its samples are general.
+    general: Vec<bool>,
     line_shift: u32,
     helper_lanes: bool,
     sampling: SamplingConfig,
@@ -55,6 +59,12 @@ pub struct Footprints {
 struct Group {
     kinds: Vec<Arc<Kind>>,
     samples: Vec<(usize, SampleRef)>,
+}
+
+impl Group {
+    fn is_general(&self) -> bool {
+        self.kinds.iter().any(|kind| kind.general.is_some())
+    }
 }
 
 /// Properties of the textures that share footprints.
@@ -70,6 +80,7 @@ struct Kind {
     /// Offset in bytes from the start of a line to the start of the texture.
     skew_bytes: u32,
     levels: Vec<Level>,
+    general: Option<General>,
 }
 
 impl Kind {
@@ -132,7 +143,8 @@ impl Footprints {
         mut emit: impl FnMut(SampleRef, &Bundle),
     ) {
         let groups = &self.draws[draw as usize];
-        if self.sampling.max_anisotropy > 1 || self.sampling.lod == LodFormula::PerLane {
+        let by_lane = self.sampling.max_anisotropy > 1 || self.sampling.lod == LodFormula::PerLane;
+        if by_lane || self.general[draw as usize] {
             self.for_long_quad(groups, records, scratch, &mut emit);
             return;
         }
@@ -159,7 +171,7 @@ impl Footprints {
         }
     }
 
-    /// [`Self::for_quad`] for levels with any number of bundles: anisotropic filtering, or levels per lane.
+    /// [`Self::for_quad`] for levels with any number of bundles: anisotropic filtering, levels per lane, or general samples.
     #[inline(never)]
     fn for_long_quad(
         &self,
@@ -168,12 +180,15 @@ impl Footprints {
         scratch: &mut Scratch,
         emit: &mut dyn FnMut(SampleRef, &Bundle),
     ) {
-        for record in records {
+        for (record, operands) in with_operands(records) {
             let Some(group) = groups.get(usize::from(record.group)) else {
                 continue;
             };
             for (kind, many) in group.kinds.iter().zip(&mut scratch.many) {
-                self.long(kind, record, many);
+                match &kind.general {
+                    Some(general) => self.general(kind, general, record, operands, many),
+                    None => self.long(kind, record, many),
+                }
                 if scratch.distinct {
                     many.iter_mut().for_each(Bundle::list_distinct);
                 }

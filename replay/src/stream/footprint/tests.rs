@@ -1,22 +1,22 @@
 use super::*;
 use crate::config::{AnisotropyModel, BlockOrder, FilterOverride, LayoutConfig, LodFormula};
 use crate::stream::testing::tables;
-use formats::footprint::record_footprints;
+use formats::footprint::{Footprint, record_footprints};
 use formats::layout::Layout;
-use formats::textrace::{NO_GROUP, Sample, UvGroup};
-use formats::texture::{MipFilter, TexelFormat, Wrap};
+use formats::textrace::{LodRule, NO_GROUP, Sample, SampleLevel, UvGroup};
+use formats::texture::{LodRange, MipFilter, TexelFormat, Wrap};
 use proptest::prelude::*;
 
 /// Texture, level and lines of a footprint.
 type Read = (u32, u8, Vec<u32>);
 
 /// Reads of the fast generator.
-fn fast(tables: &Tables, config: &RunConfig, record: &QuadRecord) -> Vec<Read> {
+fn fast(tables: &Tables, config: &RunConfig, records: &[QuadRecord]) -> Vec<Read> {
     let footprints = Footprints::new(tables, config).unwrap();
     let mut reads = Vec::new();
     footprints.for_quad(
         0,
-        &[*record],
+        records,
         &mut footprints.scratch(true),
         |sample, bundle| {
             let mut firsts = bundle.runs().map(|(first, _)| first).peekable();
@@ -36,10 +36,10 @@ fn fast(tables: &Tables, config: &RunConfig, record: &QuadRecord) -> Vec<Read> {
 }
 
 /// Reads of the reference, texel by texel through the layout.
-fn reference(tables: &Tables, config: &RunConfig, record: &QuadRecord) -> Vec<Read> {
+fn reference(tables: &Tables, config: &RunConfig, records: &[QuadRecord]) -> Vec<Read> {
     let layout = Layout::new(&tables.textures, &config.layout).unwrap();
     let mut reads = Vec::new();
-    record_footprints(tables, 0, record, &config.sampling, |sample, footprint| {
+    let mut read = |sample: &Sample, footprint: Footprint| {
         let mut lines = Vec::new();
         for texel in footprint.texels() {
             let at = layout
@@ -56,12 +56,47 @@ fn reference(tables: &Tables, config: &RunConfig, record: &QuadRecord) -> Vec<Re
             }
         }
         reads.push((sample.texture, footprint.level, lines));
-    });
+    };
+    for (record, operands) in with_operands(records) {
+        record_footprints(tables, 0, record, operands, &config.sampling, &mut read);
+    }
     reads
 }
 
 fn wrap() -> impl Strategy<Value = Wrap> {
-    prop::sample::select(vec![Wrap::Repeat, Wrap::MirroredRepeat, Wrap::ClampToEdge])
+    prop::sample::select(vec![
+        Wrap::Repeat,
+        Wrap::Repeat,
+        Wrap::MirroredRepeat,
+        Wrap::ClampToEdge,
+        Wrap::ClampToBorder,
+        Wrap::MirrorClampToEdge,
+    ])
+}
+
+fn lod_range() -> impl Strategy<Value = LodRange> {
+    let some = (-600_i16..600, -300_i16..600, 0_i16..2000).prop_map(|(bias, min, max)| LodRange {
+        bias_256ths: bias,
+        min_256ths: min,
+        max_256ths: max,
+    });
+    prop_oneof![Just(LodRange::WHOLE), some]
+}
+
+fn level() -> impl Strategy<Value = SampleLevel> {
+    let rules = vec![LodRule::Derivatives, LodRule::Bias, LodRule::Explicit];
+    let some = (prop::sample::select(rules), -900_i16..2500, any::<bool>()).prop_map(
+        |(rule, lod_256ths, operands)| SampleLevel {
+            rule,
+            lod_256ths: if rule == LodRule::Derivatives {
+                0
+            } else {
+                lod_256ths
+            },
+            operands,
+        },
+    );
+    prop_oneof![Just(SampleLevel::DERIVED), Just(SampleLevel::DERIVED), some]
 }
 
 fn filter() -> impl Strategy<Value = Filter> {
@@ -81,12 +116,14 @@ fn sampler() -> impl Strategy<Value = Sampler> {
         filter(),
         filter(),
         prop::sample::select(mips),
+        lod_range(),
     )
-        .prop_map(|(u, v, mag, min, mip)| Sampler {
+        .prop_map(|(u, v, mag, min, mip, lod)| Sampler {
             wrap: [u, v],
             mag,
             min,
             mip,
+            lod,
         })
 }
 
@@ -174,14 +211,30 @@ fn record() -> impl Strategy<Value = QuadRecord> {
     })
 }
 
-/// One draw with a group of three textures, powers of two and not, with layers and offsets.
+/// A quad's record of group 1, after its operands.
+fn quad() -> impl Strategy<Value = [QuadRecord; 2]> {
+    let levels = prop::array::uniform2(-3_000_i32..20_000);
+    let slope = || prop::array::uniform2(-4_000_i32..4_000);
+    (record(), levels, slope(), slope()).prop_map(|(record, uv, dx, dy)| {
+        let operands = QuadRecord {
+            uv,
+            dx,
+            dy,
+            cross: [0; 2],
+            ..record
+        };
+        [operands, QuadRecord { group: 1, ..record }]
+    })
+}
+
+/// One draw with a group of three textures, powers of two and not, with layers and offsets. Group 0 is its operands.
 fn scene() -> impl Strategy<Value = Tables> {
     let size =
         || prop::array::uniform2(prop::sample::select(vec![1_u32, 5, 16, 64, 100, 256, 300]));
     let offset = prop::array::uniform2(-3_i8..4);
     (
         [size(), size(), size()],
-        prop::collection::vec((0_u32..3, 0_u16..2, offset), 1..6),
+        prop::collection::vec((0_u32..3, 0_u16..2, offset, level()), 1..6),
         sampler(),
     )
         .prop_map(|(sizes, samples, sampler)| {
@@ -193,14 +246,19 @@ fn scene() -> impl Strategy<Value = Tables> {
             let extent = [0, 1].map(|a| sizes.iter().map(|s| s[a]).max().unwrap());
             let samples = samples
                 .into_iter()
-                .map(|(texture, layer, offset)| Sample {
+                .map(|(texture, layer, offset, level)| Sample {
                     texture,
                     sampler: 0,
                     layer,
                     offset,
+                    level,
                 })
                 .collect();
-            tables.draws[0].groups = vec![UvGroup { extent, samples }];
+            let operands = UvGroup {
+                extent: [1, 1],
+                samples: Vec::new(),
+            };
+            tables.draws[0].groups = vec![operands, UvGroup { extent, samples }];
             tables
         })
 }
@@ -212,10 +270,10 @@ proptest! {
     fn the_fast_generator_equals_the_reference(
         tables in scene(),
         config in config(),
-        records in prop::collection::vec(record(), 4),
+        quads in prop::collection::vec(quad(), 4),
     ) {
-        for record in &records {
-            prop_assert_eq!(fast(&tables, &config, record), reference(&tables, &config, record));
+        for quad in &quads {
+            prop_assert_eq!(fast(&tables, &config, quad), reference(&tables, &config, quad));
         }
     }
 }
@@ -233,8 +291,8 @@ fn coordinates_at_the_ends_of_their_range_equal_the_reference() {
         };
         let config = RunConfig::default();
         assert_eq!(
-            fast(&tables, &config, &record),
-            reference(&tables, &config, &record)
+            fast(&tables, &config, &[record]),
+            reference(&tables, &config, &[record])
         );
     }
 }
@@ -246,7 +304,7 @@ fn a_quad_without_a_group_reads_nothing() {
         group: NO_GROUP,
         ..QuadRecord::default()
     };
-    assert!(fast(&tables(&[[64, 64]]), &RunConfig::default(), &record).is_empty());
+    assert!(fast(&tables(&[[64, 64]]), &RunConfig::default(), &[record]).is_empty());
 }
 
 #[test]

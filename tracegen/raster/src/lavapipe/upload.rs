@@ -307,7 +307,10 @@ fn sampler_descriptor(state: &Sampler) -> wgpu::SamplerDescriptor<'static> {
     let wrap = |w| match w {
         Wrap::Repeat => wgpu::AddressMode::Repeat,
         Wrap::MirroredRepeat => wgpu::AddressMode::MirrorRepeat,
-        Wrap::ClampToEdge => wgpu::AddressMode::ClampToEdge,
+        // Scene files have no other modes.
+        Wrap::ClampToEdge | Wrap::ClampToBorder | Wrap::MirrorClampToEdge => {
+            wgpu::AddressMode::ClampToEdge
+        }
     };
     let filter = |f| match f {
         Filter::Nearest => wgpu::FilterMode::Nearest,

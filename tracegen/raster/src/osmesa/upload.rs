@@ -242,7 +242,8 @@ fn sampler(gl: &Gl, state: &texture::Sampler, made: &mut Samplers) -> Result<Sam
     let wrap = |w| match w {
         Wrap::Repeat => glow::REPEAT,
         Wrap::MirroredRepeat => glow::MIRRORED_REPEAT,
-        Wrap::ClampToEdge => glow::CLAMP_TO_EDGE,
+        // Scene files have no other modes.
+        Wrap::ClampToEdge | Wrap::ClampToBorder | Wrap::MirrorClampToEdge => glow::CLAMP_TO_EDGE,
     };
     let between = state.mip == MipFilter::Linear;
     let min = match (state.min, between) {

@@ -15,7 +15,7 @@ use crate::image_files::{Embedded, Request, Requests, Source, Usage};
 use crate::uri::{self, Uri};
 use crate::warnings::Warnings;
 use crate::{AlphaMode, LoadOptions, Material, SceneError, TextureRef};
-use formats::texture::{Filter, MipFilter, Sampler, Wrap};
+use formats::texture::{Filter, LodRange, MipFilter, Sampler, Wrap};
 use glam::{Vec3, Vec4};
 use gltf::json::extensions::texture::TextureTransform;
 use gltf::material::AlphaMode as JsonAlphaMode;
@@ -386,5 +386,6 @@ fn sampler(json: &gltf::texture::Sampler<'_>) -> Sampler {
         },
         min,
         mip,
+        lod: LodRange::WHOLE,
     }
 }

@@ -130,6 +130,7 @@ pub(super) fn capture_skipping(
             surfaces: Some(draws.surfaces(fragments)),
             origin_m: [0.0; 3],
             techniques: None,
+            program: None,
         },
         textures,
         samplers,

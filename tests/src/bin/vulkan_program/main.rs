@@ -1,0 +1,102 @@
+//! A small Vulkan program that renders a stereo picture, for the tests of `tracegen app`.
+//!
+//! Every texel holds its own coordinates, level and layer, and the filter is nearest: so the picture tells of each pixel
+//! which texel it shows. Objects differ in how their shaders sample.
+//!
+//!     vulkan_program [--stereo halves|targets|twice|multiview|mono] [--objects NAME,NAME...] [--frames N]
+//!         [--size WIDTHxHEIGHT] [--picture FILE] [--end crash|early|fork|hang]
+
+mod gpu;
+mod objects;
+mod pipeline;
+mod render;
+mod scene;
+mod sets;
+mod shaders;
+mod targets;
+mod textures;
+
+use std::process::ExitCode;
+
+/// How both eyes are rendered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stereo {
+    /// Into the halves of one picture, in one pass.
+    Halves,
+    /// Into a target each.
+    Targets,
+    /// Into one target, one after the other.
+    Twice,
+    /// Into two layers by one draw.
+    Multiview,
+    /// One eye alone.
+    Mono,
+}
+
+/// What the program does.
+pub struct Options {
+    stereo: Stereo,
+    objects: Vec<&'static objects::Object>,
+    frames: u32,
+    size_px: [u32; 2],
+    picture: Option<String>,
+    end: Option<String>,
+}
+
+fn options() -> Result<Options, String> {
+    let mut options = Options {
+        stereo: Stereo::Halves,
+        objects: objects::OBJECTS.iter().collect(),
+        frames: 3,
+        size_px: [240, 200],
+        picture: None,
+        end: None,
+    };
+    let mut arguments = std::env::args().skip(1);
+    while let Some(name) = arguments.next() {
+        let value = arguments
+            .next()
+            .ok_or(format!("{name}: a value is missing"))?;
+        let number = |text: &str| text.parse().map_err(|_| format!("{name}: {text}"));
+        match name.as_str() {
+            "--stereo" => {
+                options.stereo = match value.as_str() {
+                    "halves" => Stereo::Halves,
+                    "targets" => Stereo::Targets,
+                    "twice" => Stereo::Twice,
+                    "multiview" => Stereo::Multiview,
+                    "mono" => Stereo::Mono,
+                    _ => return Err(format!("--stereo: {value}")),
+                }
+            }
+            "--objects" => {
+                let find = |name: &str| {
+                    let mut all = objects::OBJECTS.iter();
+                    all.find(|object| object.name == name)
+                        .ok_or(format!("--objects: {name}"))
+                };
+                options.objects = value.split(',').map(find).collect::<Result<_, _>>()?;
+            }
+            "--frames" => options.frames = number(&value)?,
+            "--size" => {
+                let (width, height) = value.split_once('x').ok_or(format!("--size: {value}"))?;
+                options.size_px = [number(width)?, number(height)?];
+            }
+            "--picture" => options.picture = Some(value),
+            "--end" => options.end = Some(value),
+            _ => return Err(format!("{name} is no option")),
+        }
+    }
+    Ok(options)
+}
+
+fn main() -> ExitCode {
+    let outcome = options().and_then(|options| render::run(&options));
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("vulkan_program: {error}");
+            ExitCode::FAILURE
+        }
+    }
+}

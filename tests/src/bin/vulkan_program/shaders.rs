@@ -1,0 +1,63 @@
+//! Shaders: WGSL to SPIR-V.
+
+use crate::Stereo;
+use crate::objects::Object;
+
+/// Inputs, and what every fragment shader may sample.
+const HEAD: &str = "
+struct Eyes { clip_from_world: array<mat4x4<f32>, 2> }
+@group(0) @binding(0) var<uniform> eyes: Eyes;
+@group(1) @binding(0) var flat: texture_2d<f32>;
+@group(1) @binding(1) var nearest: sampler;
+@group(1) @binding(2) var other: texture_2d<f32>;
+@group(1) @binding(3) var layered: texture_2d_array<f32>;
+@group(1) @binding(4) var sky: texture_cube<f32>;
+@group(1) @binding(5) var volume: texture_3d<f32>;
+@group(1) @binding(6) var bordered: sampler;
+struct Constants { eye: u32, scale: f32 }
+var<immediate> constants: Constants;
+struct Fragment {
+    @builtin(position) position: vec4<f32>,
+    @location(0) uv: vec2<f32>,
+    @location(1) direction: vec3<f32>,
+}
+";
+
+/// SPIR-V of the vertex shader and of an object's fragment shader, entry points `vertex` and `fragment`.
+pub fn words(object: &Object, stereo: Stereo) -> Result<Vec<u32>, String> {
+    let eye = match stereo {
+        Stereo::Multiview => "@builtin(view_index) eye: i32",
+        _ => "@builtin(instance_index) unused: u32",
+    };
+    let index = match stereo {
+        Stereo::Multiview => "eye",
+        _ => "constants.eye",
+    };
+    let text = format!(
+        "{HEAD}
+        @vertex fn vertex(
+            @location(0) place: vec3<f32>, @location(1) uv: vec2<f32>, @location(2) direction: vec3<f32>, {eye}
+        ) -> Fragment {{
+            var out: Fragment;
+            out.position = eyes.clip_from_world[{index}] * vec4(place * constants.scale, 1.0);
+            out.uv = uv;
+            out.direction = direction;
+            return out;
+        }}
+        @fragment fn fragment(in: Fragment) -> @location(0) vec4<f32> {{ {} }}",
+        object.body
+    );
+    let text = if stereo == Stereo::Multiview {
+        text.replace("eye: i32", "eye: u32")
+    } else {
+        text
+    };
+    let module = naga::front::wgsl::parse_str(&text).map_err(|e| e.emit_to_string(&text))?;
+    use naga::valid::{Capabilities, ValidationFlags, Validator};
+    let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
+    let info = validator
+        .validate(&module)
+        .map_err(|e| e.emit_to_string(&text))?;
+    let options = naga::back::spv::Options::default();
+    naga::back::spv::write_vec(&module, &info, &options, None).map_err(|e| e.to_string())
+}

@@ -1,0 +1,54 @@
+//! Tables of docs/results/applications.md.
+
+use super::view::{Results, markdown};
+
+fn columns(results: &Results, columns: &[&str]) -> String {
+    let rows = results.rows.iter();
+    let rows = rows.map(|row| columns.iter().map(|name| row[*name].clone()).collect());
+    markdown(columns, rows)
+}
+
+/// Records against occlusion queries.
+pub fn records(results: &Results) -> String {
+    columns(
+        results,
+        &[
+            "program",
+            "eyes by",
+            "pixels per eye",
+            "fragments",
+            "draws equal to their query",
+            "draws that differ",
+            "draws not compared",
+            "left out",
+        ],
+    )
+}
+
+/// Times of frames.
+pub fn times(results: &Results) -> String {
+    columns(
+        results,
+        &[
+            "program",
+            "plain ms per frame",
+            "with the layer, not recorded",
+            "recorded",
+            "not recorded over plain",
+            "recorded over plain",
+        ],
+    )
+}
+
+/// What tile orders save.
+pub fn orders(results: &Results) -> String {
+    columns(
+        results,
+        &[
+            "program",
+            "texture MB, Morton",
+            "Z2 LRTA saves %",
+            "Z2 STA saves %",
+        ],
+    )
+}

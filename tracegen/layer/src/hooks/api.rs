@@ -1,0 +1,119 @@
+//! What a layer and the loader tell each other: `vk_layer.h`.
+
+use ash::vk;
+use std::ffi::c_void;
+
+/// `VkNegotiateLayerInterface`.
+#[repr(C)]
+pub struct NegotiateLayerInterface {
+    /// 1: this structure.
+    pub s_type: i32,
+    /// None.
+    pub p_next: *mut c_void,
+    /// Version of the interface: asked, then answered.
+    pub version: u32,
+    /// Ours.
+    pub get_instance_proc_addr: Option<vk::PFN_vkGetInstanceProcAddr>,
+    /// Ours.
+    pub get_device_proc_addr: Option<vk::PFN_vkGetDeviceProcAddr>,
+    /// None.
+    pub get_physical_device_proc_addr: Option<unsafe extern "system" fn()>,
+}
+
+/// What a layer's instance calls next.
+#[repr(C)]
+pub(super) struct InstanceLink {
+    next: *mut InstanceLink,
+    pub get_instance_proc_addr: vk::PFN_vkGetInstanceProcAddr,
+    _get_physical_device_proc_addr: Option<unsafe extern "system" fn()>,
+}
+
+/// What a layer's device calls next.
+#[repr(C)]
+pub(super) struct DeviceLink {
+    next: *mut DeviceLink,
+    pub get_instance_proc_addr: vk::PFN_vkGetInstanceProcAddr,
+    pub get_device_proc_addr: vk::PFN_vkGetDeviceProcAddr,
+}
+
+/// `VkLayerInstanceCreateInfo` or `VkLayerDeviceCreateInfo`.
+#[repr(C)]
+struct LayerCreateInfo<T> {
+    s_type: vk::StructureType,
+    p_next: *mut c_void,
+    /// 0: a link follows.
+    function: i32,
+    link: *mut T,
+}
+
+/// A link of a chain, with the next one.
+pub(super) trait Link {
+    /// Type of the structure that holds it.
+    const S_TYPE: vk::StructureType;
+    /// The next layer's link.
+    fn next(&self) -> *mut Self;
+}
+
+impl Link for InstanceLink {
+    const S_TYPE: vk::StructureType = vk::StructureType::LOADER_INSTANCE_CREATE_INFO;
+    fn next(&self) -> *mut Self {
+        self.next
+    }
+}
+
+impl Link for DeviceLink {
+    const S_TYPE: vk::StructureType = vk::StructureType::LOADER_DEVICE_CREATE_INFO;
+    fn next(&self) -> *mut Self {
+        self.next
+    }
+}
+
+/// Takes this layer's link out of a creation's chain.
+///
+/// # Safety
+/// `p_next` is the chain that a loader passes to a layer.
+pub(super) unsafe fn take_link<'a, T: Link>(p_next: *const c_void) -> Option<&'a T> {
+    let mut at = p_next.cast_mut().cast::<LayerCreateInfo<T>>();
+    // SAFETY: the loader's chain has its structures, each with type and successor first.
+    unsafe {
+        loop {
+            let info = at.as_mut()?;
+            if info.s_type == T::S_TYPE && info.function == 0 {
+                let link = info.link.as_ref()?;
+                info.link = link.next();
+                return Some(link);
+            }
+            at = info.p_next.cast();
+        }
+    }
+}
+
+/// A structure of a chain.
+///
+/// # Safety
+/// `p_next` is a valid chain.
+pub(super) unsafe fn find<'a, T: vk::TaggedStructure>(p_next: *const c_void) -> Option<&'a T> {
+    let mut at = p_next.cast::<vk::BaseInStructure<'_>>();
+    // SAFETY: the structures of a chain begin alike, and a structure's type tells what it is.
+    unsafe {
+        while let Some(base) = at.as_ref() {
+            if base.s_type == T::STRUCTURE_TYPE {
+                return at.cast::<T>().as_ref();
+            }
+            at = base.p_next;
+        }
+    }
+    None
+}
+
+/// Elements at a pointer that a program passes, none where it is null.
+///
+/// # Safety
+/// `first` is null or points to so many elements.
+pub(super) unsafe fn slice<'a, T>(first: *const T, count: u32) -> &'a [T] {
+    if first.is_null() || count == 0 {
+        return &[];
+    }
+    // SAFETY: as the caller promises.
+    unsafe { std::slice::from_raw_parts(first, count as usize) }
+}

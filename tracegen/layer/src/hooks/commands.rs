@@ -1,0 +1,157 @@
+//! Hooks of command buffers: what is bound, dynamic state, queries.
+
+use super::api::slice;
+use super::device::Device;
+use crate::track::CommandState;
+use ash::vk::{self, Handle};
+
+pub(super) unsafe extern "system" fn begin_command_buffer(
+    buffer: vk::CommandBuffer,
+    info: *const vk::CommandBufferBeginInfo<'_>,
+) -> vk::Result {
+    // SAFETY: a valid call of vkBeginCommandBuffer.
+    unsafe {
+        let known = Device::of(buffer);
+        let one_time = (*info)
+            .flags
+            .contains(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        known.tracker().commands.begin(buffer.as_raw(), one_time);
+        (known.next.begin_command_buffer)(buffer, info)
+    }
+}
+
+pub(super) unsafe extern "system" fn free_command_buffers(
+    device: vk::Device,
+    pool: vk::CommandPool,
+    count: u32,
+    buffers: *const vk::CommandBuffer,
+) {
+    // SAFETY: a valid call of vkFreeCommandBuffers.
+    unsafe {
+        let known = Device::of(device);
+        for buffer in slice(buffers, count) {
+            known.tracker().commands.free(buffer.as_raw());
+        }
+        (known.next.free_command_buffers)(device, pool, count, buffers);
+    }
+}
+
+pub(super) unsafe extern "system" fn cmd_bind_pipeline(
+    buffer: vk::CommandBuffer,
+    point: vk::PipelineBindPoint,
+    pipeline: vk::Pipeline,
+) {
+    // SAFETY: a valid call of vkCmdBindPipeline. A recording twin has the same dynamic states.
+    unsafe {
+        let known = Device::of(buffer);
+        let mut bound = pipeline;
+        if point == vk::PipelineBindPoint::GRAPHICS {
+            let tracker = &mut *known.tracker();
+            let of = tracker.pipelines.get(pipeline).cloned();
+            let state = tracker.commands.get_mut(buffer.as_raw());
+            let twin = of.as_ref().and_then(|of| of.recorded.as_ref());
+            if let Some(twin) = twin
+                && !twin.twice
+                && super::draws::records(&known, state)
+            {
+                bound = twin.handle;
+            }
+            state.bind(pipeline, of);
+        }
+        (known.next.cmd_bind_pipeline)(buffer, point, bound);
+    }
+}
+
+pub(super) unsafe extern "system" fn cmd_execute_commands(
+    buffer: vk::CommandBuffer,
+    count: u32,
+    secondaries: *const vk::CommandBuffer,
+) {
+    // SAFETY: a valid call of vkCmdExecuteCommands.
+    unsafe {
+        let known = Device::of(buffer);
+        for secondary in slice(secondaries, count) {
+            known
+                .tracker()
+                .commands
+                .execute(buffer.as_raw(), secondary.as_raw());
+        }
+        (known.next.cmd_execute_commands)(buffer, count, secondaries);
+    }
+}
+
+/// Changes what a command buffer is known to have set.
+///
+/// # Safety
+/// A command buffer that is recorded.
+unsafe fn set(
+    buffer: vk::CommandBuffer,
+    change: impl FnOnce(&mut CommandState),
+) -> std::sync::Arc<Device> {
+    // SAFETY: as the caller promises.
+    let known = unsafe { Device::of(buffer) };
+    change(known.tracker().commands.get_mut(buffer.as_raw()));
+    known
+}
+
+/// Hooks of commands that set a state: what they change, and the function that comes next.
+macro_rules! setters {
+    ($($hook:ident ($($argument:ident: $kind:ty),*) $next:ident |$state:ident| $change:expr;)*) => { $(
+        pub(super) unsafe extern "system" fn $hook(buffer: vk::CommandBuffer, $($argument: $kind),*) {
+            // SAFETY: a valid call of the command; its arrays are as long as it says.
+            unsafe {
+                let known = set(buffer, |$state| $change);
+                (known.next.$next)(buffer, $($argument),*);
+            }
+        }
+    )* };
+}
+
+setters! {
+    cmd_set_viewport(first: u32, count: u32, viewports: *const vk::Viewport) cmd_set_viewport |state|
+        if first == 0 { state.dynamic.viewport = slice(viewports, count).first().copied() };
+    cmd_set_viewport_with_count(count: u32, viewports: *const vk::Viewport) cmd_set_viewport_with_count |state|
+        state.dynamic.viewport = slice(viewports, count).first().copied();
+    cmd_set_scissor(first: u32, count: u32, scissors: *const vk::Rect2D) cmd_set_scissor |state|
+        if first == 0 { state.dynamic.scissor = slice(scissors, count).first().copied() };
+    cmd_set_scissor_with_count(count: u32, scissors: *const vk::Rect2D) cmd_set_scissor_with_count |state|
+        state.dynamic.scissor = slice(scissors, count).first().copied();
+    cmd_set_topology(topology: vk::PrimitiveTopology) cmd_set_topology |state|
+        state.dynamic.topology = Some(topology);
+    cmd_set_depth_test(enable: vk::Bool32) cmd_set_depth_test |state|
+        state.dynamic.depth_test = Some(enable != 0);
+    cmd_set_depth_write(enable: vk::Bool32) cmd_set_depth_write |state|
+        state.dynamic.depth_write = Some(enable != 0);
+    cmd_set_depth_compare(compare: vk::CompareOp) cmd_set_depth_compare |state|
+        state.dynamic.depth_compare = Some(compare);
+    cmd_set_stencil_test(enable: vk::Bool32) cmd_set_stencil_test |state|
+        state.dynamic.stencil_test = Some(enable != 0);
+    cmd_set_stencil_op(faces: vk::StencilFaceFlags, fail: vk::StencilOp, pass: vk::StencilOp, depth_fail: vk::StencilOp, compare: vk::CompareOp) cmd_set_stencil_op |state| {
+        state.dynamic.stencil_ops.retain(|op| op.0 != faces);
+        state.dynamic.stencil_ops.push((faces, fail, pass, depth_fail, compare));
+    };
+    cmd_set_stencil_write_mask(faces: vk::StencilFaceFlags, mask: u32) cmd_set_stencil_write_mask |state| {
+        state.dynamic.stencil_write_masks.retain(|of| of.0 != faces);
+        state.dynamic.stencil_write_masks.push((faces, mask));
+    };
+    cmd_set_color_write_mask(first: u32, count: u32, masks: *const vk::ColorComponentFlags) cmd_set_color_write_mask |state|
+        state.dynamic.color_masks = Some((first, slice(masks, count).to_vec()));
+    cmd_set_color_write_enable(count: u32, enables: *const vk::Bool32) cmd_set_color_write_enable |state|
+        state.dynamic.color_enables = Some(slice(enables, count).to_vec());
+    cmd_copy_image_to_buffer(image: vk::Image, layout: vk::ImageLayout, to: vk::Buffer, count: u32, regions: *const vk::BufferImageCopy) cmd_copy_image_to_buffer |state|
+        state.reads_back = true;
+    cmd_copy_image_to_buffer2(info: *const vk::CopyImageToBufferInfo2<'_>) cmd_copy_image_to_buffer2 |state|
+        state.reads_back = true;
+    cmd_begin_query(pool: vk::QueryPool, query: u32, flags: vk::QueryControlFlags) cmd_begin_query |state|
+        state.active_queries += 1;
+    cmd_end_query(pool: vk::QueryPool, query: u32) cmd_end_query |state|
+        state.active_queries = state.active_queries.saturating_sub(1);
+    cmd_begin_query_indexed(pool: vk::QueryPool, query: u32, flags: vk::QueryControlFlags, index: u32) cmd_begin_query_indexed |state|
+        state.active_queries += 1;
+    cmd_end_query_indexed(pool: vk::QueryPool, query: u32, index: u32) cmd_end_query_indexed |state|
+        state.active_queries = state.active_queries.saturating_sub(1);
+    cmd_begin_transform_feedback(first: u32, count: u32, buffers: *const vk::Buffer, offsets: *const vk::DeviceSize) cmd_begin_transform_feedback |state|
+        state.active_queries += 1;
+    cmd_end_transform_feedback(first: u32, count: u32, buffers: *const vk::Buffer, offsets: *const vk::DeviceSize) cmd_end_transform_feedback |state|
+        state.active_queries = state.active_queries.saturating_sub(1);
+}

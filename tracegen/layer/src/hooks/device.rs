@@ -1,0 +1,277 @@
+//! Devices: what a capture keeps for each.
+
+use super::api::{DeviceLink, take_link};
+use super::dispatch_key;
+use super::instance::{Instance, draw_number_offset};
+use super::next::Next;
+use super::pictures::Pictures;
+use super::queries::Queries;
+use crate::capture::{Capture, capture, lock};
+use crate::inject::Target;
+use crate::record_buffer::RecordBuffer;
+use crate::spool::{Event, ShaderInfo};
+use crate::track::Tracker;
+use ash::vk;
+use std::collections::HashMap;
+use std::ffi::CStr;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, LazyLock, Mutex, MutexGuard, RwLock};
+
+/// A device that is followed.
+pub(super) struct Device {
+    pub handle: vk::Device,
+    pub get_device_proc_addr: vk::PFN_vkGetDeviceProcAddr,
+    pub next: Next,
+    pub capture: &'static Capture,
+    /// Where shaders record; none where nothing can be recorded, or is wanted.
+    pub recorder: Option<DeviceRecorder>,
+    pub queries: Option<Queries>,
+    pub pictures: Option<Pictures>,
+    tracker: Mutex<Tracker>,
+    /// Held while commands whose records are wanted are executed.
+    pub submitting: Mutex<()>,
+    /// Swapchains, as they were asked for.
+    pub swapchains: Mutex<HashMap<u64, vk::SwapchainCreateInfoKHR<'static>>>,
+}
+
+/// What recording on a device needs.
+pub(super) struct DeviceRecorder {
+    pub buffer: RecordBuffer,
+    /// Offset of the draw's number among push constants.
+    pub push_constant_bytes: u32,
+    pub ballots: bool,
+    /// Recording shaders by module's words, entry point and number of views.
+    pub shaders: Mutex<HashMap<ShaderKey, Result<RecordingShader, String>>>,
+}
+
+/// A module's words, its entry point, and whether it is for several views.
+pub(super) type ShaderKey = (Arc<[u32]>, String, bool);
+
+/// A shader that records.
+#[derive(Clone)]
+pub(super) struct RecordingShader {
+    pub words: Arc<[u32]>,
+    pub info: Arc<ShaderInfo>,
+}
+
+impl DeviceRecorder {
+    pub fn target(&self, multiview: bool) -> Target {
+        Target {
+            address: self.buffer.address(),
+            push_constant_bytes: self.push_constant_bytes,
+            ballots: self.ballots,
+            multiview,
+        }
+    }
+}
+
+// SAFETY: the swapchains' descriptions have pointers, which are never followed.
+unsafe impl Send for Device {}
+// SAFETY: likewise; all that changes is behind locks.
+unsafe impl Sync for Device {}
+
+/// Devices of the process so far.
+static NUMBER: AtomicU32 = AtomicU32::new(0);
+
+static DEVICES: LazyLock<RwLock<HashMap<usize, Arc<Device>>>> = LazyLock::new(RwLock::default);
+
+/// Lanes of a subgroup at which ballots are known to be sound. With shorter vectors those of Mesa 22.3 corrupt memory.
+const SUBGROUP_LANES: u32 = 8;
+
+impl Device {
+    /// The device of a dispatchable handle.
+    ///
+    /// # Safety
+    /// A device, queue or command buffer that is valid and of a device that is followed.
+    pub unsafe fn of<H: vk::Handle>(handle: H) -> Arc<Self> {
+        // SAFETY: as the caller promises.
+        let key = unsafe { dispatch_key(handle) };
+        let found = DEVICES.read().ok().and_then(|all| all.get(&key).cloned());
+        found.unwrap_or_else(|| {
+            // A hook is only handed out for devices that are followed.
+            eprintln!("parallax: an unknown Vulkan device");
+            std::process::abort()
+        })
+    }
+
+    /// The device of a handle, if it is followed.
+    ///
+    /// # Safety
+    /// A valid dispatchable handle.
+    pub unsafe fn find<H: vk::Handle>(handle: H) -> Option<Arc<Self>> {
+        // SAFETY: as the caller promises.
+        let key = unsafe { dispatch_key(handle) };
+        DEVICES.read().ok()?.get(&key).cloned()
+    }
+
+    /// A recording shader by its number.
+    pub fn shader(&self, number: u32) -> Option<Arc<ShaderInfo>> {
+        let shaders = lock(&self.recorder.as_ref()?.shaders);
+        let made = shaders.values().flatten();
+        made.map(|shader| &shader.info)
+            .find(|info| info.shader == number)
+            .cloned()
+    }
+
+    pub fn tracker(&self) -> MutexGuard<'_, Tracker> {
+        lock(&self.tracker)
+    }
+}
+
+/// Functions of devices that are not followed.
+static OTHERS: LazyLock<RwLock<HashMap<usize, vk::PFN_vkGetDeviceProcAddr>>> =
+    LazyLock::new(RwLock::default);
+
+/// What looks up functions for a device that is not followed.
+pub(super) unsafe fn other(handle: vk::Device) -> Option<vk::PFN_vkGetDeviceProcAddr> {
+    // SAFETY: a valid device, as the caller promises.
+    let key = unsafe { dispatch_key(handle) };
+    OTHERS.read().ok()?.get(&key).copied()
+}
+
+pub(super) unsafe extern "system" fn create_device(
+    physical: vk::PhysicalDevice,
+    info: *const vk::DeviceCreateInfo<'_>,
+    allocator: *const vk::AllocationCallbacks<'_>,
+    device: *mut vk::Device,
+) -> vk::Result {
+    // SAFETY: a valid call of vkCreateDevice by the loader, whose chain has this layer's link.
+    unsafe {
+        let (Some(link), Some(instance)) = (
+            take_link::<DeviceLink>((*info).p_next),
+            Instance::of(physical),
+        ) else {
+            return vk::Result::ERROR_INITIALIZATION_FAILED;
+        };
+        let (get_instance, get_device) = (link.get_instance_proc_addr, link.get_device_proc_addr);
+        let Some(create) = get_instance(instance.handle, c"vkCreateDevice".as_ptr()) else {
+            return vk::Result::ERROR_INITIALIZATION_FAILED;
+        };
+        let create =
+            std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateDevice>(create);
+        let result = create(physical, info, allocator, device);
+        if result != vk::Result::SUCCESS {
+            return result;
+        }
+        let handle = *device;
+        let key = dispatch_key(handle);
+        match capture() {
+            Some(capture) => {
+                let next = Next::load(|name: &CStr| get_device(handle, name.as_ptr()));
+                let followed = follow(capture, &instance, physical, handle, get_device, next);
+                if let Ok(mut all) = DEVICES.write() {
+                    all.insert(key, Arc::new(followed));
+                }
+            }
+            None => {
+                if let Ok(mut all) = OTHERS.write() {
+                    all.insert(key, get_device);
+                }
+            }
+        }
+        result
+    }
+}
+
+/// Starts to follow a device.
+///
+/// # Safety
+/// A device that was just created.
+unsafe fn follow(
+    capture: &'static Capture,
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+    handle: vk::Device,
+    get_device_proc_addr: vk::PFN_vkGetDeviceProcAddr,
+    next: Next,
+) -> Device {
+    // SAFETY: the physical device is the instance's.
+    let (properties, (subgroups, driver)) = unsafe {
+        (
+            instance.real_properties(physical),
+            instance.details(physical),
+        )
+    };
+    let name = properties
+        .device_name_as_c_str()
+        .unwrap_or_default()
+        .to_string_lossy();
+    let text = |name: Result<&CStr, _>| name.unwrap_or_default().to_string_lossy().into_owned();
+    let driver_text = format!(
+        "{} {}",
+        text(driver.driver_name_as_c_str()),
+        text(driver.driver_info_as_c_str())
+    );
+    let ballots = subgroups.subgroup_size == SUBGROUP_LANES
+        && subgroups
+            .supported_stages
+            .contains(vk::ShaderStageFlags::FRAGMENT)
+        && (subgroups.supported_operations).contains(vk::SubgroupFeatureFlags::BALLOT);
+    // A record buffer is memory of the process: its address means something to lavapipe alone.
+    let is_lavapipe = driver.driver_id == vk::DriverId::MESA_LLVMPIPE;
+    let mut refused = (!is_lavapipe)
+        .then(|| format!("{name} is not lavapipe, on which alone programs are recorded"));
+    let mut recorder = None;
+    if capture.settings.records && refused.is_none() {
+        match RecordBuffer::new(capture.settings.record_bytes) {
+            Ok(buffer) => {
+                recorder = Some(DeviceRecorder {
+                    buffer,
+                    push_constant_bytes: draw_number_offset(
+                        properties.limits.max_push_constants_size,
+                    ),
+                    ballots,
+                    shaders: Mutex::default(),
+                });
+            }
+            Err(error) => refused = Some(format!("the record buffer: {error}")),
+        }
+    }
+    capture.event(&Event::Device {
+        name: name.into_owned(),
+        driver: driver_text,
+        refused,
+        ballots,
+    });
+    let queries = (capture.settings.occlusion)
+        // SAFETY: the device is new.
+        .then(|| unsafe { Queries::new(handle, &next) })
+        .flatten();
+    Device {
+        handle,
+        get_device_proc_addr,
+        next,
+        capture,
+        recorder,
+        queries,
+        tracker: Mutex::new(Tracker::of_device(NUMBER.fetch_add(1, Ordering::Relaxed))),
+        pictures: (capture.settings.pictures && is_lavapipe).then(Pictures::default),
+        submitting: Mutex::default(),
+        swapchains: Mutex::default(),
+    }
+}
+
+pub(super) unsafe extern "system" fn destroy_device(
+    device: vk::Device,
+    allocator: *const vk::AllocationCallbacks<'_>,
+) {
+    if device == vk::Device::null() {
+        return;
+    }
+    // SAFETY: a valid call of vkDestroyDevice.
+    unsafe {
+        let key = dispatch_key(device);
+        let removed = DEVICES.write().ok().and_then(|mut all| all.remove(&key));
+        if let Some(known) = removed {
+            if let Some(queries) = &known.queries {
+                queries.destroy(device, &known.next);
+            }
+            if let Some(pictures) = &known.pictures {
+                pictures.destroy(device, &known.next);
+            }
+            known.capture.note_frames();
+            known.capture.event(&Event::Closed);
+            (known.next.destroy_device)(device, allocator);
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! Hooks of draws: each gets a number, and is recorded, where that is wanted.
+
+use super::api::slice;
+use super::device::Device;
+use crate::track::{Call, CommandState, Dynamic, Pipeline};
+use ash::vk::{self, Handle};
+use std::sync::Arc;
+
+/// Draws of a command buffer may be wanted: it is executed in such a frame, or may be executed at any time.
+fn is_wanted(known: &Device, state: &CommandState) -> bool {
+    let capture = known.capture;
+    !capture.is_over() && (!state.one_time() || capture.may_want_commands())
+}
+
+/// Draws of a command buffer record.
+pub(super) fn records(known: &Device, state: &CommandState) -> bool {
+    known.recorder.is_some() && is_wanted(known, state)
+}
+
+/// How a draw is carried out.
+struct Plan {
+    number: u32,
+    /// The program's pipeline as it is bound, and what it is known by.
+    pipeline: Arc<Pipeline>,
+    handle: vk::Pipeline,
+    dynamic: Dynamic,
+    /// Recorded by a draw before the program's.
+    twice: bool,
+    /// Recorded by the program's draw.
+    once: bool,
+    /// Counted by a query.
+    counted: bool,
+}
+
+/// Takes note of a draw; `None` where it is of no interest.
+fn plan(known: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> {
+    let tracker = &mut *known.tracker();
+    let state = tracker.commands.get(buffer.as_raw())?;
+    if !is_wanted(known, state) {
+        return None;
+    }
+    let pipeline = Arc::clone(state.pipeline()?);
+    let handle = state.pipeline_handle();
+    let dynamic = state.dynamic.clone();
+    // A draw that comes twice would be counted twice by the program itself.
+    let counts_itself = state.active_queries > 0;
+    let mut info = tracker.draw(buffer.as_raw(), call)?;
+    let twin = pipeline.recorded.as_ref();
+    let twice = twin.is_some_and(|twin| twin.twice);
+    if twice && counts_itself {
+        info.shader = None;
+        info.twice = false;
+        info.unrecorded = Some("a query of the program counts the draw".to_owned());
+    }
+    let plan = Plan {
+        number: info.draw,
+        handle,
+        dynamic,
+        twice: twice && !counts_itself,
+        once: twin.is_some() && !twice,
+        counted: known.queries.is_some() && !counts_itself,
+        pipeline,
+    };
+    tracker.commands.add(buffer.as_raw(), info);
+    Some(plan)
+}
+
+/// Carries out a draw.
+///
+/// # Safety
+/// A command buffer that is recorded; `draw` records the draw into it.
+unsafe fn carry_out(buffer: vk::CommandBuffer, call: &Call, draw: impl Fn(&Device)) {
+    // SAFETY: as the caller promises.
+    let known = &*unsafe { Device::of(buffer) };
+    let Some(plan) = plan(known, buffer, call) else {
+        draw(known);
+        return;
+    };
+    let next = &known.next;
+    // SAFETY: the program's draw is valid where it stands; the recording pipeline differs in its fragment shader and in
+    // what it writes, and the program's pipeline is bound again with the dynamic states that the other one fixed.
+    unsafe {
+        let begin = || {
+            if let Some(queries) = known.queries.as_ref().filter(|_| plan.counted) {
+                queries.begin(buffer, plan.number, next);
+            }
+        };
+        let end = || {
+            if let Some(queries) = known.queries.as_ref().filter(|_| plan.counted) {
+                queries.end(buffer, plan.number, next);
+            }
+        };
+        if plan.once || plan.twice {
+            push_number(known, buffer, &plan);
+        }
+        if let (true, Some(twin)) = (plan.twice, plan.pipeline.recorded.as_ref()) {
+            let graphics = vk::PipelineBindPoint::GRAPHICS;
+            (next.cmd_bind_pipeline)(buffer, graphics, twin.handle);
+            begin();
+            draw(known);
+            end();
+            (next.cmd_bind_pipeline)(buffer, graphics, plan.handle);
+            restore(known, buffer, &plan.dynamic, &twin.fixed);
+            draw(known);
+        } else {
+            begin();
+            draw(known);
+            end();
+        }
+    }
+}
+
+/// Tells the shader the draw's number.
+///
+/// # Safety
+/// A command buffer that is recorded.
+unsafe fn push_number(known: &Device, buffer: vk::CommandBuffer, plan: &Plan) {
+    let Some(recorder) = &known.recorder else {
+        return;
+    };
+    // SAFETY: the layout has room for the number at this offset, and lives as long as its pipelines.
+    unsafe {
+        (known.next.cmd_push_constants)(
+            buffer,
+            plan.pipeline.layout,
+            plan.pipeline.stages,
+            recorder.push_constant_bytes,
+            size_of::<u32>() as u32,
+            (&raw const plan.number).cast(),
+        );
+    }
+}
+
+/// Sets dynamic states again that a pipeline fixed.
+///
+/// # Safety
+/// A command buffer that is recorded.
+unsafe fn restore(
+    known: &Device,
+    buffer: vk::CommandBuffer,
+    dynamic: &Dynamic,
+    fixed: &[vk::DynamicState],
+) {
+    let next = &known.next;
+    // SAFETY: the program set these states itself before.
+    unsafe {
+        for state in fixed {
+            match *state {
+                vk::DynamicState::DEPTH_WRITE_ENABLE => {
+                    if let Some(enable) = dynamic.depth_write {
+                        (next.cmd_set_depth_write)(buffer, enable.into());
+                    }
+                }
+                vk::DynamicState::STENCIL_OP => {
+                    for &(faces, fail, pass, depth_fail, compare) in &dynamic.stencil_ops {
+                        let set = next.cmd_set_stencil_op;
+                        set(buffer, faces, fail, pass, depth_fail, compare);
+                    }
+                }
+                vk::DynamicState::STENCIL_WRITE_MASK => {
+                    for &(faces, mask) in &dynamic.stencil_write_masks {
+                        (next.cmd_set_stencil_write_mask)(buffer, faces, mask);
+                    }
+                }
+                vk::DynamicState::COLOR_WRITE_MASK_EXT => {
+                    if let Some((first, masks)) = &dynamic.color_masks {
+                        let count = masks.len() as u32;
+                        (next.cmd_set_color_write_mask)(buffer, *first, count, masks.as_ptr());
+                    }
+                }
+                vk::DynamicState::COLOR_WRITE_ENABLE_EXT => {
+                    if let Some(enables) = &dynamic.color_enables {
+                        let count = enables.len() as u32;
+                        (next.cmd_set_color_write_enable)(buffer, count, enables.as_ptr());
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// Instances of a draw share the numbers of its primitives.
+const INSTANCES: &str = "instances share the numbers of primitives";
+/// Draws of one command share them, too.
+const INDIRECT: &str = "draws that the device chooses share a number";
+
+fn direct(vertices: u32, instances: u32) -> Call {
+    let caveat = (instances > 1).then(|| INSTANCES.to_owned());
+    Call {
+        vertices,
+        instances,
+        caveats: caveat.into_iter().collect(),
+    }
+}
+
+fn indirect() -> Call {
+    Call {
+        vertices: 0,
+        instances: 0,
+        caveats: vec![INDIRECT.to_owned()],
+    }
+}
+
+/// Hooks of draw commands.
+macro_rules! draws {
+    ($($hook:ident ($($argument:ident: $kind:ty),*) $call:expr;)*) => { $(
+        pub(super) unsafe extern "system" fn $hook(buffer: vk::CommandBuffer, $($argument: $kind),*) {
+            // SAFETY: a valid call of the draw command.
+            unsafe {
+                carry_out(buffer, &$call, |known| (known.next.$hook)(buffer, $($argument),*));
+            }
+        }
+    )* };
+}
+
+draws! {
+    cmd_draw(vertices: u32, instances: u32, first_vertex: u32, first_instance: u32)
+        direct(vertices, instances);
+    cmd_draw_indexed(indices: u32, instances: u32, first_index: u32, offset: i32, first_instance: u32)
+        direct(indices, instances);
+    cmd_draw_indirect(from: vk::Buffer, at: vk::DeviceSize, count: u32, stride: u32) indirect();
+    cmd_draw_indexed_indirect(from: vk::Buffer, at: vk::DeviceSize, count: u32, stride: u32) indirect();
+    cmd_draw_indirect_count(from: vk::Buffer, at: vk::DeviceSize, counts: vk::Buffer, count_at: vk::DeviceSize, most: u32, stride: u32) indirect();
+    cmd_draw_indexed_indirect_count(from: vk::Buffer, at: vk::DeviceSize, counts: vk::Buffer, count_at: vk::DeviceSize, most: u32, stride: u32) indirect();
+    cmd_draw_indirect_byte_count(instances: u32, first_instance: u32, counts: vk::Buffer, count_at: vk::DeviceSize, counter_offset: u32, stride: u32) indirect();
+}
+
+/// Reads the `number`th entry of a list with a distance between entries.
+///
+/// # Safety
+/// The list has it.
+unsafe fn entry<T: Copy>(first: *const T, number: u32, stride: u32) -> T {
+    let at = number as usize * stride as usize;
+    // SAFETY: as the caller promises; entries need not be aligned.
+    unsafe { first.cast::<u8>().add(at).cast::<T>().read_unaligned() }
+}
+
+pub(super) unsafe extern "system" fn cmd_draw_multi(
+    buffer: vk::CommandBuffer,
+    count: u32,
+    draws: *const vk::MultiDrawInfoEXT,
+    instances: u32,
+    first_instance: u32,
+    stride: u32,
+) {
+    // SAFETY: a valid call of vkCmdDrawMultiEXT.
+    unsafe {
+        let multi = Device::of(buffer).next.cmd_draw_multi;
+        // One by one, so that each has a number; a shader sees the number of the draw in the command as 0.
+        for number in 0..count {
+            let draw = entry(draws, number, stride);
+            let call = direct(draw.vertex_count, instances);
+            carry_out(buffer, &call, |_| {
+                multi(buffer, 1, &draw, instances, first_instance, stride);
+            });
+        }
+    }
+}
+
+pub(super) unsafe extern "system" fn cmd_draw_multi_indexed(
+    buffer: vk::CommandBuffer,
+    count: u32,
+    draws: *const vk::MultiDrawIndexedInfoEXT,
+    instances: u32,
+    first_instance: u32,
+    stride: u32,
+    offset: *const i32,
+) {
+    // SAFETY: a valid call of vkCmdDrawMultiIndexedEXT.
+    unsafe {
+        let multi = Device::of(buffer).next.cmd_draw_multi_indexed;
+        for number in 0..count {
+            let draw = entry(draws, number, stride);
+            let call = direct(draw.index_count, instances);
+            carry_out(buffer, &call, |_| {
+                multi(buffer, 1, &draw, instances, first_instance, stride, offset);
+            });
+        }
+    }
+}
+
+/// The command buffers of submissions.
+///
+/// # Safety
+/// Valid submissions.
+pub(super) unsafe fn buffers_of(submits: &[vk::SubmitInfo<'_>]) -> Vec<vk::CommandBuffer> {
+    let buffers = submits.iter().flat_map(|submit| {
+        // SAFETY: as the caller promises.
+        unsafe { slice(submit.p_command_buffers, submit.command_buffer_count) }
+    });
+    buffers.copied().collect()
+}

@@ -1,0 +1,371 @@
+//! Small pictures of what passes render, for lists of them.
+//!
+//! Lavapipe, on which alone they are made, executes commands one after the other and has no image layouts.
+
+use super::device::Device;
+use super::next::Next;
+use crate::capture::lock;
+use crate::spool::{PassInfo, ViewInfo};
+use ash::vk;
+use std::collections::HashSet;
+use std::sync::Mutex;
+
+/// Longest side.
+const SIDE_PX: u32 = 256;
+
+/// Pictures of a device.
+#[derive(Default)]
+pub(super) struct Pictures {
+    made: Mutex<Vec<Picture>>,
+}
+
+/// A picture of a pass.
+struct Picture {
+    pass: u32,
+    size: [u32; 2],
+    format: vk::Format,
+    image: vk::Image,
+    buffer: vk::Buffer,
+    memory: Vec<vk::DeviceMemory>,
+    /// Address of the buffer's bytes.
+    address: usize,
+}
+
+/// What is kept of a pass's target.
+#[derive(Clone, Copy)]
+struct Kind {
+    format: vk::Format,
+    aspect: vk::ImageAspectFlags,
+}
+
+impl Kind {
+    /// Of a colour: what a page shows, encoded for screens unless it already is; of integers there is no picture.
+    fn color(view: &ViewInfo) -> Option<Self> {
+        let name = format!("{:?}", vk::Format::from_raw(view.format));
+        if name.contains("INT") {
+            return None;
+        }
+        let is_linear = name.contains("SRGB") || name.contains("FLOAT");
+        Some(Self {
+            format: if is_linear {
+                vk::Format::R8G8B8A8_SRGB
+            } else {
+                vk::Format::R8G8B8A8_UNORM
+            },
+            aspect: vk::ImageAspectFlags::COLOR,
+        })
+    }
+
+    fn depth(view: &ViewInfo) -> Self {
+        Self {
+            format: vk::Format::from_raw(view.format),
+            aspect: vk::ImageAspectFlags::DEPTH,
+        }
+    }
+}
+
+/// Grey of depths: the nearest black, the farthest white.
+fn grey(depths: &[f32]) -> Vec<u8> {
+    let low = depths.iter().copied().fold(f32::INFINITY, f32::min);
+    let high = depths.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let scale = if high > low {
+        255.0 / (high - low)
+    } else {
+        0.0
+    };
+    let texel = |depth: &f32| {
+        let grey = ((depth - low) * scale) as u8;
+        [grey, grey, grey, 255]
+    };
+    depths.iter().flat_map(texel).collect()
+}
+
+/// Depths as copies to buffers have them (Vulkan 1.3, "Copying Data Between Buffers and Images").
+fn depths(format: vk::Format, bytes: &[u8]) -> Vec<f32> {
+    let words = || {
+        bytes
+            .chunks_exact(4)
+            .filter_map(|w| Some(u32::from_ne_bytes(w.try_into().ok()?)))
+    };
+    match format {
+        vk::Format::D16_UNORM | vk::Format::D16_UNORM_S8_UINT => (bytes.chunks_exact(2))
+            .map(|b| f32::from(u16::from_ne_bytes([b[0], b[1]])))
+            .collect(),
+        vk::Format::X8_D24_UNORM_PACK32 | vk::Format::D24_UNORM_S8_UINT => {
+            words().map(|word| (word & 0xff_ffff) as f32).collect()
+        }
+        _ => words().map(f32::from_bits).collect(),
+    }
+}
+
+impl Pictures {
+    /// Copies what a pass rendered, once the commands are executed.
+    ///
+    /// # Safety
+    /// A command buffer that is recorded, outside a pass.
+    pub unsafe fn take(&self, known: &Device, buffer: vk::CommandBuffer, pass: &PassInfo) {
+        let (view, kind) = match (pass.colors.first(), &pass.depth) {
+            (Some(color), _) => (color, Kind::color(color)),
+            (None, Some(depth)) => (depth, Some(Kind::depth(depth))),
+            (None, None) => return,
+        };
+        let (Some(kind), tracker) = (kind, known.tracker()) else {
+            return;
+        };
+        let image = tracker.images.numbered(view.image).cloned();
+        let (Some(info), Some(from)) = (image, tracker.images.handle(view.image)) else {
+            return;
+        };
+        drop(tracker);
+        if info.samples > 1 || info.size[2] > 1 {
+            return;
+        }
+        let full = [0, 1].map(|axis| (info.size[axis] >> view.levels[0]).max(1));
+        let longest = full[0].max(full[1]);
+        let side = |length: u32| match longest > SIDE_PX {
+            true => (length * SIDE_PX / longest).max(1),
+            false => length,
+        };
+        let size = full.map(side);
+        // SAFETY: as the caller promises.
+        unsafe {
+            let Some(picture) = Picture::new(known, pass.pass, size, kind) else {
+                return;
+            };
+            picture.record(known, buffer, from, view, full, kind.aspect);
+            lock(&self.made).push(picture);
+        }
+    }
+
+    /// Writes the pictures of passes.
+    ///
+    /// # Safety
+    /// They have been executed.
+    pub unsafe fn write(&self, known: &Device, passes: &HashSet<u32>) {
+        let made = lock(&self.made);
+        for picture in made.iter().filter(|picture| passes.contains(&picture.pass)) {
+            // SAFETY: the buffer is mapped as long as the picture is kept.
+            let bytes = unsafe {
+                std::slice::from_raw_parts(picture.address as *const u8, picture.bytes() as usize)
+            };
+            let is_depth = picture.format != vk::Format::R8G8B8A8_UNORM
+                && picture.format != vk::Format::R8G8B8A8_SRGB;
+            let texels = match is_depth {
+                true => grey(&depths(picture.format, bytes)),
+                false => bytes.to_vec(),
+            };
+            let texels = texels.get(..(4 * picture.size[0] * picture.size[1]) as usize);
+            let texels = texels.unwrap_or_default();
+            known
+                .capture
+                .write(|w| w.picture(picture.pass, picture.size, texels));
+        }
+    }
+
+    /// Ends with the device.
+    ///
+    /// # Safety
+    /// Nothing is being executed.
+    pub unsafe fn destroy(&self, device: vk::Device, next: &Next) {
+        for picture in lock(&self.made).drain(..) {
+            // SAFETY: as the caller promises.
+            unsafe { picture.destroy(device, next) };
+        }
+    }
+}
+
+impl Picture {
+    /// Sets memory aside; `None` where the driver refuses.
+    ///
+    /// # Safety
+    /// A device that is open.
+    unsafe fn new(known: &Device, pass: u32, size: [u32; 2], kind: Kind) -> Option<Self> {
+        let (device, next) = (known.handle, &known.next);
+        let mut picture = Self {
+            pass,
+            size,
+            format: kind.format,
+            image: vk::Image::null(),
+            buffer: vk::Buffer::null(),
+            memory: Vec::new(),
+            address: 0,
+        };
+        let [width, height] = size;
+        let image = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(kind.format)
+            .extent(vk::Extent3D {
+                width,
+                height,
+                depth: 1,
+            })
+            .mip_levels(1)
+            .array_layers(1)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .usage(vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST);
+        let buffer = vk::BufferCreateInfo::default()
+            .size(picture.bytes())
+            .usage(vk::BufferUsageFlags::TRANSFER_DST);
+        // SAFETY: as the caller promises; what was made before an error is destroyed.
+        unsafe {
+            let none = std::ptr::null();
+            let success = vk::Result::SUCCESS;
+            let made = (next.create_image)(device, &image, none, &mut picture.image) == success
+                && (next.create_buffer)(device, &buffer, none, &mut picture.buffer) == success
+                && picture.bind(known);
+            if !made {
+                picture.destroy(device, next);
+                return None;
+            }
+        }
+        Some(picture)
+    }
+
+    /// Gives memory to the image and to the buffer; false where the driver refuses.
+    ///
+    /// # Safety
+    /// Both were just made.
+    unsafe fn bind(&mut self, known: &Device) -> bool {
+        let (device, next) = (known.handle, &known.next);
+        let success = vk::Result::SUCCESS;
+        let mut needs = [vk::MemoryRequirements::default(); 2];
+        // SAFETY: as the caller promises.
+        unsafe {
+            (next.image_requirements)(device, self.image, &mut needs[0]);
+            (next.buffer_requirements)(device, self.buffer, &mut needs[1]);
+            for of in needs {
+                // Lavapipe's only kind of memory is the process's own.
+                let info = vk::MemoryAllocateInfo::default()
+                    .allocation_size(of.size)
+                    .memory_type_index(of.memory_type_bits.trailing_zeros());
+                let mut memory = vk::DeviceMemory::null();
+                let none = std::ptr::null();
+                if (next.allocate_memory)(device, &info, none, &mut memory) != success {
+                    return false;
+                }
+                self.memory.push(memory);
+            }
+            let mut address = std::ptr::null_mut();
+            let (memory, all) = (self.memory[1], vk::WHOLE_SIZE);
+            let flags = vk::MemoryMapFlags::empty();
+            let bound = (next.bind_image_memory)(device, self.image, self.memory[0], 0) == success
+                && (next.bind_buffer_memory)(device, self.buffer, memory, 0) == success
+                && (next.map_memory)(device, memory, 0, all, flags, &mut address) == success;
+            self.address = address as usize;
+            bound
+        }
+    }
+
+    /// Bytes of the buffer: no texel of a picture has more than four.
+    fn bytes(&self) -> u64 {
+        4 * u64::from(self.size[0]) * u64::from(self.size[1])
+    }
+
+    /// Scales the target down and copies it.
+    ///
+    /// # Safety
+    /// A command buffer that is recorded, outside a pass.
+    unsafe fn record(
+        &self,
+        known: &Device,
+        buffer: vk::CommandBuffer,
+        from: vk::Image,
+        view: &ViewInfo,
+        full: [u32; 2],
+        aspect: vk::ImageAspectFlags,
+    ) {
+        let next = &known.next;
+        let corner = |[x, y]: [u32; 2]| vk::Offset3D {
+            x: x as i32,
+            y: y as i32,
+            z: 1,
+        };
+        let zero = vk::Offset3D::default();
+        let layers = |level, layer| vk::ImageSubresourceLayers {
+            aspect_mask: aspect,
+            mip_level: level,
+            base_array_layer: layer,
+            layer_count: 1,
+        };
+        let blit = vk::ImageBlit {
+            src_subresource: layers(view.levels[0], view.layers[0]),
+            src_offsets: [zero, corner(full)],
+            dst_subresource: layers(0, 0),
+            dst_offsets: [zero, corner(self.size)],
+        };
+        let copy = vk::BufferImageCopy {
+            image_subresource: layers(0, 0),
+            image_extent: vk::Extent3D {
+                width: self.size[0],
+                height: self.size[1],
+                depth: 1,
+            },
+            ..Default::default()
+        };
+        let general = vk::ImageLayout::GENERAL;
+        // SAFETY: as the caller promises.
+        unsafe {
+            let nearest = vk::Filter::NEAREST;
+            self.wait(buffer, next);
+            (next.cmd_blit_image)(
+                buffer, from, general, self.image, general, 1, &blit, nearest,
+            );
+            self.wait(buffer, next);
+            let to = self.buffer;
+            (next.cmd_copy_image_to_buffer)(buffer, self.image, general, to, 1, &copy);
+        }
+    }
+
+    /// Lets what follows see what came before.
+    ///
+    /// # Safety
+    /// A command buffer that is recorded, outside a pass.
+    unsafe fn wait(&self, buffer: vk::CommandBuffer, next: &Next) {
+        let all = vk::PipelineStageFlags::ALL_COMMANDS;
+        let memory = vk::MemoryBarrier::default()
+            .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
+            .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE);
+        let flags = vk::DependencyFlags::empty();
+        let (none, no) = (std::ptr::null(), std::ptr::null());
+        // SAFETY: as the caller promises.
+        unsafe {
+            (next.cmd_pipeline_barrier)(buffer, all, all, flags, 1, &memory, 0, none, 0, no);
+        }
+    }
+
+    /// # Safety
+    /// Nothing that uses it is being executed.
+    unsafe fn destroy(&self, device: vk::Device, next: &Next) {
+        // SAFETY: as the caller promises; null handles are ignored.
+        unsafe {
+            (next.destroy_image)(device, self.image, std::ptr::null());
+            (next.destroy_buffer)(device, self.buffer, std::ptr::null());
+            for memory in &self.memory {
+                (next.free_memory)(device, *memory, std::ptr::null());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depths_become_grey_from_the_nearest_to_the_farthest() {
+        let words = [0xff00_0000_u32, 0x0080_0000, 0x00ff_ffff];
+        let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_ne_bytes()).collect();
+        let of_24_bits = depths(vk::Format::D24_UNORM_S8_UINT, &bytes);
+        assert_eq!(of_24_bits, [0.0, 8_388_608.0, 16_777_215.0]);
+        assert_eq!(
+            grey(&of_24_bits),
+            [0, 0, 0, 255, 127, 127, 127, 255, 255, 255, 255, 255]
+        );
+        let floats: Vec<u8> = [0.5_f32, 1.0]
+            .iter()
+            .flat_map(|f| f.to_ne_bytes())
+            .collect();
+        assert_eq!(depths(vk::Format::D32_SFLOAT, &floats), [0.5, 1.0]);
+        assert_eq!(grey(&[1.0, 1.0]), [0, 0, 0, 255, 0, 0, 0, 255]);
+    }
+}

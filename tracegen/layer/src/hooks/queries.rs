@@ -1,0 +1,136 @@
+//! Occlusion queries around draws: a count of their fragments by the driver itself.
+
+use super::next::Next;
+use crate::capture::lock;
+use ash::vk;
+use std::collections::HashMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Queries of a device, and the draws that they count.
+pub(super) struct Queries {
+    pool: vk::QueryPool,
+    next: AtomicU32,
+    /// Query by draw.
+    of_draws: Mutex<HashMap<u32, u32>>,
+}
+
+/// Draws that may wait for their results at once.
+const DRAWS: u32 = 1 << 15;
+/// Queries of a draw: one a view of a multiview pass, of which two are counted on.
+const PER_DRAW: u32 = 2;
+
+impl Queries {
+    /// Makes the queries; `None` where the driver refuses.
+    ///
+    /// # Safety
+    /// A device that is open.
+    pub unsafe fn new(device: vk::Device, next: &Next) -> Option<Self> {
+        let info = vk::QueryPoolCreateInfo {
+            query_type: vk::QueryType::OCCLUSION,
+            query_count: DRAWS * PER_DRAW,
+            ..Default::default()
+        };
+        let mut pool = vk::QueryPool::null();
+        // SAFETY: the device is open.
+        unsafe {
+            let result = (next.create_query_pool)(device, &info, std::ptr::null(), &mut pool);
+            if result != vk::Result::SUCCESS {
+                return None;
+            }
+            (next.reset_query_pool)(device, pool, 0, DRAWS * PER_DRAW);
+        }
+        Some(Self {
+            pool,
+            next: AtomicU32::new(0),
+            of_draws: Mutex::default(),
+        })
+    }
+
+    /// Begins to count a draw.
+    ///
+    /// # Safety
+    /// A command buffer that is recorded, in a pass.
+    pub unsafe fn begin(&self, buffer: vk::CommandBuffer, draw: u32, next: &Next) {
+        let place = self.next.fetch_add(1, Ordering::Relaxed) % DRAWS;
+        let mut of_draws = lock(&self.of_draws);
+        of_draws.retain(|_, query| *query != place * PER_DRAW);
+        of_draws.insert(draw, place * PER_DRAW);
+        let flags = vk::QueryControlFlags::PRECISE;
+        // SAFETY: as the caller promises; the query was reset.
+        unsafe { (next.cmd_begin_query)(buffer, self.pool, place * PER_DRAW, flags) };
+    }
+
+    /// Ends counting.
+    ///
+    /// # Safety
+    /// After [`Self::begin`] of the same draw.
+    pub unsafe fn end(&self, buffer: vk::CommandBuffer, draw: u32, next: &Next) {
+        if let Some(query) = lock(&self.of_draws).get(&draw).copied() {
+            // SAFETY: as the caller promises.
+            unsafe { (next.cmd_end_query)(buffer, self.pool, query) };
+        }
+    }
+
+    /// Makes the queries of draws ready to be executed, perhaps again.
+    ///
+    /// # Safety
+    /// None of them is being executed.
+    pub unsafe fn reset(&self, device: vk::Device, draws: &[u32], next: &Next) {
+        let of_draws = lock(&self.of_draws);
+        for query in draws.iter().filter_map(|draw| of_draws.get(draw)) {
+            // SAFETY: as the caller promises.
+            unsafe { (next.reset_query_pool)(device, self.pool, *query, PER_DRAW) };
+        }
+    }
+
+    /// What draws were counted.
+    ///
+    /// # Safety
+    /// They have been executed.
+    pub unsafe fn results(
+        &self,
+        device: vk::Device,
+        draws: &[u32],
+        next: &Next,
+    ) -> Vec<(u32, u64)> {
+        let of_draws = lock(&self.of_draws);
+        let mut found = Vec::new();
+        for &draw in draws {
+            let Some(&query) = of_draws.get(&draw) else {
+                continue;
+            };
+            let mut count = [0_u64; PER_DRAW as usize];
+            let mut sum = None;
+            for (place, one) in (query..).zip(&mut count) {
+                // SAFETY: the query's result fits the number.
+                let result = unsafe {
+                    (next.get_query_results)(
+                        device,
+                        self.pool,
+                        place,
+                        1,
+                        size_of::<u64>(),
+                        (&raw mut *one).cast(),
+                        size_of::<u64>() as u64,
+                        vk::QueryResultFlags::TYPE_64,
+                    )
+                };
+                if result == vk::Result::SUCCESS {
+                    sum = Some(sum.unwrap_or(0) + *one);
+                }
+            }
+            found.extend(sum.map(|sum| (draw, sum)));
+        }
+        found
+    }
+
+    /// Ends with the device.
+    ///
+    /// # Safety
+    /// Nothing is being executed.
+    pub unsafe fn destroy(&self, device: vk::Device, next: &Next) {
+        // SAFETY: as the caller promises.
+        unsafe { (next.destroy_query_pool)(device, self.pool, std::ptr::null()) };
+    }
+}

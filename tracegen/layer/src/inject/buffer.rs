@@ -1,0 +1,235 @@
+//! The record buffer as shaders write it: a counter, then records of whole units.
+//!
+//! The first unit of a record is its header, the number of the draw, the place of the quad and the number of the
+//! primitive. A record of a quad goes on with two units for each of its coordinate groups: u and v of its four lanes. A
+//! record of a fragment goes on with three units: see [`RawFragment`].
+
+use bytemuck::{Pod, Zeroable};
+
+/// Bytes before the first record. The first word counts units, those beyond the capacity too; the second is the capacity,
+/// 0 while nothing is recorded.
+pub const COUNTER_BYTES: u64 = 64;
+
+/// What records are made of.
+pub type Unit = [u32; 4];
+
+/// Bytes of a unit.
+pub const UNIT_BYTES: u64 = size_of::<Unit>() as u64;
+
+/// First bit of the lanes in a header, above the number of the coordinate group.
+pub(super) const LANES_SHIFT: u32 = 16;
+/// First bit of the number of coordinate groups.
+pub(super) const GROUPS_SHIFT: u32 = 20;
+/// Most coordinate groups of a record.
+pub(super) const MOST_GROUPS: usize = 8;
+/// Set in the header of a record of a fragment.
+pub(super) const FRAGMENT: u32 = 1 << 24;
+/// Units of a record of a fragment.
+pub(super) const FRAGMENT_UNITS: u32 = 4;
+
+/// What is recorded of one coordinate group.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct RawSample {
+    /// Number of the coordinate group in the low 16 bits, lanes of the quad in the next four: bit 0 top left, 1 top right,
+    /// 2 bottom left, 3 bottom right.
+    pub header: u32,
+    /// Number of the draw.
+    pub draw: u32,
+    /// Column and row of the quad in the target, 13 bits each, and the view above them.
+    pub place: u32,
+    /// Number of the primitive within the draw.
+    pub primitive: u32,
+    /// Element of the binding's array.
+    pub element: u32,
+    /// What the site's form says: see [`RawQuad`] and [`RawFragment`].
+    pub values: [f32; 11],
+}
+
+impl RawSample {
+    /// Coordinate group of its shader.
+    #[must_use]
+    pub fn group(&self) -> u16 {
+        self.header as u16
+    }
+
+    /// Lanes of the quad.
+    #[must_use]
+    pub fn lanes(&self) -> u8 {
+        (self.header >> LANES_SHIFT & 15) as u8
+    }
+
+    /// Column and row of the quad.
+    #[must_use]
+    pub fn quad(&self) -> [u32; 2] {
+        [self.place & 0x1fff, self.place >> 13 & 0x1fff]
+    }
+
+    /// View of a pass of several.
+    #[must_use]
+    pub fn view(&self) -> u32 {
+        self.place >> 26
+    }
+
+    /// As a record of a quad.
+    #[must_use]
+    pub fn as_quad(&self) -> RawQuad {
+        let lane = |number: usize| [self.values[2 * number], self.values[2 * number + 1]];
+        RawQuad::of([0, 1, 2, 3].map(lane))
+    }
+
+    /// As a record of a fragment.
+    #[must_use]
+    pub fn as_fragment(&self) -> RawFragment {
+        let v = &self.values;
+        RawFragment {
+            at: [v[0], v[1], v[2]],
+            dx: [v[3], v[4], v[5]],
+            dy: [v[6], v[7], v[8]],
+            lod: v[9],
+        }
+    }
+}
+
+/// Coordinates of a quad: of lane (i, j) `uv + i*dx + j*dy + i*j*cross`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RawQuad {
+    /// Of the top-left lane.
+    pub uv: [f32; 2],
+    /// Difference to the lane right of it.
+    pub dx: [f32; 2],
+    /// Difference to the lane below it.
+    pub dy: [f32; 2],
+    /// Change of `dx` from the top row to the bottom row.
+    pub cross: [f32; 2],
+}
+
+impl RawQuad {
+    /// Of the coordinates of four lanes.
+    #[must_use]
+    pub fn of([a, b, c, d]: [[f32; 2]; 4]) -> Self {
+        let pair = |of: &dyn Fn(usize) -> f32| [of(0), of(1)];
+        Self {
+            uv: a,
+            dx: pair(&|axis| b[axis] - a[axis]),
+            dy: pair(&|axis| c[axis] - a[axis]),
+            cross: pair(&|axis| d[axis] - c[axis] - (b[axis] - a[axis])),
+        }
+    }
+}
+
+/// Coordinates of a fragment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RawFragment {
+    /// Coordinates; the third is a layer or part of a direction.
+    pub at: [f32; 3],
+    /// Change to the right, or the gradient that the instruction names.
+    pub dx: [f32; 3],
+    /// Change downwards, likewise.
+    pub dy: [f32; 3],
+    /// Bias or level, where the instruction names one.
+    pub lod: f32,
+}
+
+/// Takes records apart, coordinate group by coordinate group. False where they end within one.
+#[must_use]
+pub fn unpack(mut units: &[Unit], mut each: impl FnMut(RawSample)) -> bool {
+    while let Some((&[header, draw, place, primitive], rest)) = units.split_first() {
+        let groups = (header >> GROUPS_SHIFT & 15) as usize;
+        let is_fragment = header & FRAGMENT != 0;
+        let length = if is_fragment { 3 } else { 2 * groups };
+        let Some((of, next)) = rest.split_at_checked(length) else {
+            return false;
+        };
+        units = next;
+        let mut sample = RawSample {
+            header: header & 0x000f_ffff,
+            draw,
+            place,
+            primitive,
+            ..RawSample::default()
+        };
+        let words = of.as_flattened();
+        if is_fragment {
+            let (element, values) = words.split_at(1);
+            sample.element = element[0];
+            sample.values.copy_from_slice(bytemuck::cast_slice(values));
+            each(sample);
+            continue;
+        }
+        if groups == 0 {
+            each(sample);
+        }
+        for (number, lanes) in (0_u16..).zip(words.chunks_exact(8)) {
+            let group = (header as u16).wrapping_add(number);
+            sample.header = header & 0x000f_0000 | u32::from(group);
+            sample.values[..8].copy_from_slice(bytemuck::cast_slice(lanes));
+            each(sample);
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn header(group: u32, lanes: u32, groups: u32) -> u32 {
+        group | lanes << LANES_SHIFT | groups << GROUPS_SHIFT
+    }
+
+    fn all(units: &[Unit]) -> (Vec<RawSample>, bool) {
+        let mut found = Vec::new();
+        let whole = unpack(units, |sample| found.push(sample));
+        (found, whole)
+    }
+
+    #[test]
+    fn a_record_has_a_sample_for_each_coordinate_group() {
+        let floats = |v: [f32; 4]| v.map(f32::to_bits);
+        let units = [
+            [header(5, 0b1011, 2), 7, 3 | 4 << 13 | 1 << 26, 9],
+            floats([1.0, 2.0, 1.5, 2.0]),
+            floats([1.0, 2.25, 1.75, 2.25]),
+            floats([0.0; 4]),
+            floats([0.0; 4]),
+            [header(2, 1, 0), 8, 0, 0],
+            [header(6, 4, 0) | FRAGMENT, 8, 0, 1],
+            [3, 1.0_f32.to_bits(), 2.0_f32.to_bits(), 3.0_f32.to_bits()],
+            floats([4.0, 5.0, 6.0, 7.0]),
+            floats([8.0, 9.0, 10.0, 0.0]),
+        ];
+        let (found, whole) = all(&units);
+        assert!(whole);
+        let groups: Vec<_> = found
+            .iter()
+            .map(|s| (s.group(), s.draw, s.lanes()))
+            .collect();
+        assert_eq!(groups, [(5, 7, 11), (6, 7, 11), (2, 8, 1), (6, 8, 4)]);
+        assert_eq!((found[0].quad(), found[0].view()), ([3, 4], 1));
+        let quad = RawQuad {
+            uv: [1.0, 2.0],
+            dx: [0.5, 0.0],
+            dy: [0.0, 0.25],
+            cross: [0.25, 0.0],
+        };
+        assert_eq!(found[0].as_quad(), quad);
+        let fragment = RawFragment {
+            at: [1.0, 2.0, 3.0],
+            dx: [4.0, 5.0, 6.0],
+            dy: [7.0, 8.0, 9.0],
+            lod: 10.0,
+        };
+        assert_eq!((found[3].element, found[3].as_fragment()), (3, fragment));
+        assert!(!all(&units[..4]).1 && !all(&units[..8]).1);
+    }
+
+    proptest! {
+        #[test]
+        fn any_units_are_taken_apart(units in proptest::collection::vec(any::<Unit>(), 0..40)) {
+            let (found, _) = all(&units);
+            prop_assert!(found.len() <= units.len());
+        }
+    }
+}

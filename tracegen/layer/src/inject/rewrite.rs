@@ -1,0 +1,139 @@
+//! Inserts the calls that record, and the declarations that they need.
+
+use super::find::Found;
+use super::recorder::Recorder;
+use super::shader::Shader;
+use super::site::{Form, Lod, Site, What};
+use super::sites::{Batch, Sites, stays_first};
+use super::{DepthTests, InjectError, Target};
+use rspirv::binary::Assemble;
+use rspirv::dr::{Instruction, Operand};
+use rspirv::spirv::{ExecutionMode, Op, Word};
+
+/// The recording module, and its sites.
+pub(super) fn rewrite(
+    shader: Shader,
+    tests: DepthTests,
+    target: &Target,
+) -> Result<(Vec<u32>, Vec<Site>), InjectError> {
+    let mut sites = Sites::new(&shader, tests)?;
+    let (functions, main) = (shader.functions.clone(), shader.main);
+    let mut recorder = Recorder::new(&shader, target)?;
+    if tests == DepthTests::Either || tests == DepthTests::EarlyLateWrite {
+        // The shader that discards is used by a draw of its own, which writes nothing.
+        recorder
+            .builder
+            .execution_mode(main, ExecutionMode::EarlyFragmentTests, []);
+    }
+    for function in functions {
+        let is_main = sites.main == function;
+        let blocks = recorder.builder.module_ref().functions[function]
+            .blocks
+            .len();
+        for block in 0..blocks {
+            let body = &mut recorder.builder.module_mut().functions[function].blocks[block];
+            let old = std::mem::take(&mut body.instructions);
+            let mut new = Vec::with_capacity(2 * old.len());
+            let mut entry = sites.entry.filter(|_| is_main && block == 0);
+            for (place, instruction) in old.into_iter().enumerate() {
+                if !stays_first(&instruction)
+                    && let Some(group) = entry.take()
+                {
+                    recorder.record_depth(group, &mut new)?;
+                }
+                if let Some(batch) = sites.batches.remove(&(function, block, place)) {
+                    record(&mut recorder, &shader, &batch, &mut new)?;
+                }
+                if instruction.class.opcode == Op::Return
+                    && is_main
+                    && let Some(group) = sites.end
+                {
+                    recorder.record_depth(group, &mut new)?;
+                }
+                new.push(instruction);
+            }
+            recorder.builder.module_mut().functions[function].blocks[block].instructions = new;
+        }
+    }
+    Ok((recorder.finish().assemble(), sites.sites))
+}
+
+/// Records coordinate groups before an instruction is executed.
+fn record(
+    recorder: &mut Recorder,
+    shader: &Shader,
+    batch: &Batch,
+    out: &mut Vec<Instruction>,
+) -> Result<(), InjectError> {
+    match &batch.of[..] {
+        [found] if matches!(found.what, What::LeftOut(_)) => {
+            recorder.record_presence(batch.group, out)
+        }
+        [found] if found.form == Form::Fragment => {
+            record_fragment(recorder, shader, batch.group, found, out)
+        }
+        all => {
+            let at: Vec<Vec<Word>> = (all.iter())
+                .map(|found| coordinates(recorder, shader, found, out))
+                .collect();
+            recorder.record_quads(batch.group, &at, out)
+        }
+    }
+}
+
+/// Coordinates as 32-bit floats, divided where the instruction does so.
+fn coordinates(
+    recorder: &mut Recorder,
+    shader: &Shader,
+    found: &Found,
+    out: &mut Vec<Instruction>,
+) -> Vec<Word> {
+    let mut at = recorder.floats(shader, found.coordinate, out);
+    if let Some(divisor) = found.divisor
+        && let Some(&q) = at.get(divisor as usize)
+    {
+        at.truncate(divisor as usize);
+        for part in &mut at {
+            *part = recorder.divided(*part, q, out);
+        }
+    }
+    at
+}
+
+fn record_fragment(
+    recorder: &mut Recorder,
+    shader: &Shader,
+    group: u16,
+    found: &Found,
+    out: &mut Vec<Instruction>,
+) -> Result<(), InjectError> {
+    let at = coordinates(recorder, shader, found, out);
+    let lod = found.lod.map(|lod| recorder.float(shader, lod, out));
+    let gradients = match (&found.what, found.gradients) {
+        (_, Some(named)) => Some(named.map(|id| recorder.floats(shader, id, out))),
+        (What::Texture(of), None) if matches!(of.lod, Lod::Derivatives | Lod::Bias(_)) => {
+            Some(recorder.derivatives(&at, out))
+        }
+        _ => None,
+    };
+    let element = found.element.map(|id| recorder.unsigned(shader, id, out));
+    recorder.record_fragment(group, element, &at, lod, gradients, out)
+}
+
+/// Appends an instruction with a result, and tells its id.
+pub(super) fn put(
+    builder: &mut rspirv::dr::Builder,
+    out: &mut Vec<Instruction>,
+    opcode: Op,
+    result_type: Word,
+    operands: Vec<Operand>,
+) -> Word {
+    let id = builder.id();
+    out.push(Instruction::new(
+        opcode,
+        Some(result_type),
+        Some(id),
+        operands,
+    ));
+    id
+}

@@ -1,0 +1,246 @@
+//! The sites of a shader, their coordinate groups, and the places where groups are recorded together.
+
+use super::buffer::MOST_GROUPS;
+use super::find::{Found, find};
+use super::flow::unconditional;
+use super::numbers::{Number, Numbers};
+use super::shader::Shader;
+use super::site::{Form, Site, What};
+use super::{DepthTests, InjectError};
+use rspirv::dr::{Function, Instruction};
+use rspirv::spirv::Op;
+use std::collections::{HashMap, HashSet};
+
+/// Function, block and instruction.
+pub(super) type At = (usize, usize, usize);
+
+/// A record: coordinate groups with consecutive numbers that the same lanes record at once, before an instruction.
+pub(super) struct Batch {
+    /// Number of the first group.
+    pub group: u16,
+    /// An instruction of each group.
+    pub of: Vec<Found>,
+    at: At,
+}
+
+/// The sites of a shader, and where they record.
+pub(super) struct Sites {
+    pub sites: Vec<Site>,
+    /// Position of the entry point's function.
+    pub main: usize,
+    /// By the instruction before which they are recorded.
+    pub batches: HashMap<At, Batch>,
+    /// Group of every fragment that starts, where no other site tells, or where depths are needed.
+    pub entry: Option<u16>,
+    /// Group of every fragment that ends.
+    pub end: Option<u16>,
+}
+
+impl Sites {
+    pub fn new(shader: &Shader, tests: DepthTests) -> Result<Self, InjectError> {
+        let mut search = Search {
+            shader,
+            discards: shader.instructions().any(|i| discards(i.class.opcode)),
+            sites: Vec::new(),
+            batches: Vec::new(),
+        };
+        let mut main = 0;
+        for &number in &shader.functions {
+            let function = &shader.module.functions[number];
+            let is_main = function.def.as_ref().and_then(|d| d.result_id) == Some(shader.main);
+            if is_main {
+                main = number;
+            }
+            search.function(number, function, is_main);
+        }
+        let Search {
+            sites: open,
+            batches,
+            ..
+        } = search;
+        // Groups are numbered batch by batch, so that the first one's number tells all.
+        let mut next = 0;
+        let mut numbers = Vec::with_capacity(batches.len());
+        for batch in &batches {
+            numbers.push(next);
+            next += batch.of.len();
+        }
+        let number =
+            |number: usize| u16::try_from(number).map_err(|_| InjectError::TooManySites(number));
+        let mut all = Self {
+            sites: Vec::with_capacity(open.len() + 2),
+            main,
+            batches: HashMap::new(),
+            entry: None,
+            end: None,
+        };
+        for site in open {
+            all.sites.push(Site {
+                what: site.what,
+                form: site.form,
+                group: number(numbers[site.group.batch] + site.group.place)?,
+                unconditional: site.unconditional,
+            });
+        }
+        for (mut batch, first) in batches.into_iter().zip(numbers) {
+            batch.group = number(first)?;
+            all.batches.insert(batch.at, batch);
+        }
+        let covers = |site: &Site| site.unconditional && site.form == Form::Quad;
+        let discards = tests == DepthTests::EarlyLateWrite;
+        if discards || !all.sites.iter().any(covers) {
+            all.entry = Some(all.push(What::Coverage, number(next)?, true));
+            next += 1;
+        }
+        if discards {
+            all.end = Some(all.push(What::Survival, number(next)?, false));
+        }
+        Ok(all)
+    }
+
+    fn push(&mut self, what: What, group: u16, unconditional: bool) -> u16 {
+        self.sites.push(Site {
+            what,
+            form: Form::Quad,
+            group,
+            unconditional,
+        });
+        group
+    }
+}
+
+/// Fragments may end, or become helpers.
+fn discards(opcode: Op) -> bool {
+    matches!(
+        opcode,
+        Op::Kill | Op::TerminateInvocation | Op::DemoteToHelperInvocation
+    )
+}
+
+/// Place of a coordinate group while batches still grow.
+#[derive(Clone, Copy)]
+struct Group {
+    batch: usize,
+    place: usize,
+}
+
+struct OpenSite {
+    what: What,
+    form: Form,
+    group: Group,
+    unconditional: bool,
+}
+
+struct Search<'a> {
+    shader: &'a Shader,
+    discards: bool,
+    sites: Vec<OpenSite>,
+    batches: Vec<Batch>,
+}
+
+/// Lanes that are the same: coordinates that they have recorded, and the batch that may still grow.
+#[derive(Default)]
+struct SameLanes {
+    groups: HashMap<Number, Group>,
+    batch: Option<usize>,
+}
+
+impl Search<'_> {
+    fn function(&mut self, number: usize, function: &Function, is_main: bool) {
+        let mut numbers = Numbers::default();
+        let always = if is_main {
+            unconditional(function)
+        } else {
+            HashSet::new()
+        };
+        let mut demoted = false;
+        // Lanes are the same within a block and, unless some are discarded, in all blocks that every fragment executes.
+        let mut of_all = SameLanes::default();
+        for (block, body) in function.blocks.iter().enumerate() {
+            numbers.forget();
+            let mut of_block = SameLanes::default();
+            let is_always = always.contains(&block);
+            let lanes = if is_always && !self.discards {
+                &mut of_all
+            } else {
+                &mut of_block
+            };
+            for (place, instruction) in body.instructions.iter().enumerate() {
+                if let Some(found) = find(self.shader, instruction) {
+                    let coordinate = numbers.of(found.coordinate);
+                    let at = (number, block, place);
+                    self.add(found, coordinate, is_always && !demoted, at, lanes);
+                }
+                let opcode = instruction.class.opcode;
+                demoted |= opcode == Op::DemoteToHelperInvocation;
+                if self.discards && (demoted || opcode == Op::FunctionCall) {
+                    *lanes = SameLanes::default();
+                }
+                numbers.take(self.shader, instruction);
+            }
+        }
+    }
+
+    fn add(
+        &mut self,
+        found: Found,
+        coordinate: Number,
+        unconditional: bool,
+        at: At,
+        lanes: &mut SameLanes,
+    ) {
+        let is_texture = matches!(found.what, What::Texture(_));
+        let is_quad = is_texture && found.form == Form::Quad;
+        // All that is recorded of it is its coordinates.
+        let is_plain = is_quad && found.divisor.is_none();
+        let (what, form) = (found.what.clone(), found.form);
+        let known = lanes.groups.get(&coordinate).copied().filter(|_| is_plain);
+        let group = known.unwrap_or_else(|| {
+            let group = self.group(found, at, is_quad, lanes);
+            if is_plain {
+                lanes.groups.insert(coordinate, group);
+            }
+            group
+        });
+        self.sites.push(OpenSite {
+            what,
+            form,
+            group,
+            unconditional,
+        });
+    }
+
+    /// A new group: in the batch that the same lanes have begun, or in one of its own.
+    fn group(&mut self, found: Found, at: At, joins: bool, lanes: &mut SameLanes) -> Group {
+        let open = lanes.batch.filter(|_| joins);
+        if let Some(number) = open
+            && let Some(batch) = self.batches.get_mut(number)
+            && batch.of.len() < MOST_GROUPS
+        {
+            batch.at = at;
+            batch.of.push(found);
+            return Group {
+                batch: number,
+                place: batch.of.len() - 1,
+            };
+        }
+        let batch = self.batches.len();
+        self.batches.push(Batch {
+            group: 0,
+            of: vec![found],
+            at,
+        });
+        if joins {
+            lanes.batch = Some(batch);
+        }
+        Group { batch, place: 0 }
+    }
+}
+
+/// Instructions that have to stay first in a block.
+pub(super) fn stays_first(instruction: &Instruction) -> bool {
+    matches!(
+        instruction.class.opcode,
+        Op::Variable | Op::Line | Op::NoLine | Op::Phi
+    )
+}

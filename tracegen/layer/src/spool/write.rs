@@ -1,0 +1,111 @@
+//! Writing a process's files.
+
+use super::{EVENTS, Event, RECORDS, Span, file, picture};
+use crate::inject::Unit;
+use std::collections::HashSet;
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Appends events and records of one process.
+#[derive(Debug)]
+pub struct Writer {
+    folder: PathBuf,
+    /// Process that the files are of: a child process that starts as a copy of this one gets files of its own.
+    pid: u32,
+    events: File,
+    records: File,
+    written: u64,
+    /// Kinds and numbers of what has been described.
+    described: HashSet<(&'static str, u32)>,
+}
+
+impl Writer {
+    /// Starts the files of this process in a folder.
+    ///
+    /// # Errors
+    /// Files that cannot be created.
+    pub fn create(folder: &Path) -> io::Result<Self> {
+        let pid = std::process::id();
+        let open = |extension| {
+            let path = file(folder, &pid.to_string(), extension);
+            OpenOptions::new().create_new(true).append(true).open(path)
+        };
+        let mut writer = Self {
+            folder: folder.to_owned(),
+            pid,
+            events: open(EVENTS)?,
+            records: open(RECORDS)?,
+            written: 0,
+            described: HashSet::new(),
+        };
+        let command = std::env::args_os().map(|a| a.to_string_lossy().into_owned());
+        writer.event(&Event::Process {
+            pid,
+            command: command.collect(),
+        })?;
+        Ok(writer)
+    }
+
+    /// Writes an event.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn event(&mut self, event: &Event) -> io::Result<()> {
+        self.after_fork()?;
+        let mut line = serde_json::to_vec(event)?;
+        line.push(b'\n');
+        self.events.write_all(&line)
+    }
+
+    /// Writes an event that describes something, unless it has been written.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn describe(
+        &mut self,
+        kind: &'static str,
+        number: u32,
+        event: impl FnOnce() -> Event,
+    ) -> io::Result<()> {
+        if self.described.contains(&(kind, number)) {
+            return Ok(());
+        }
+        self.event(&event())?;
+        self.described.insert((kind, number));
+        Ok(())
+    }
+
+    /// Writes records and tells where they are.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn records(&mut self, records: &[Unit]) -> io::Result<Span> {
+        self.after_fork()?;
+        self.records.write_all(bytemuck::cast_slice(records))?;
+        let span = Span {
+            first: self.written,
+            count: records.len() as u64,
+        };
+        self.written += span.count;
+        Ok(span)
+    }
+
+    /// Writes the picture of a pass, and its event.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn picture(&mut self, pass: u32, size: [u32; 2], texels: &[u8]) -> io::Result<()> {
+        self.after_fork()?;
+        std::fs::write(picture(&self.folder, &self.pid.to_string(), pass), texels)?;
+        self.event(&Event::Picture { pass, size })
+    }
+
+    /// A process that was forked starts files of its own.
+    fn after_fork(&mut self) -> io::Result<()> {
+        if std::process::id() != self.pid {
+            *self = Self::create(&self.folder.clone())?;
+        }
+        Ok(())
+    }
+}

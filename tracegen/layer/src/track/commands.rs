@@ -1,0 +1,360 @@
+//! Command buffers: what is bound, and the draws that were recorded into them.
+
+use super::descriptors::SetState;
+use super::pipelines::Pipeline;
+use crate::spool::{DrawInfo, PassInfo, TextureInfo};
+use ash::vk;
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Descriptor sets that may be bound at once.
+const MOST_SETS: usize = 32;
+
+/// A draw command.
+#[derive(Clone, Debug, Default)]
+pub struct Call {
+    /// Vertices or indices; 0 where the device knows alone.
+    pub vertices: u32,
+    /// Instances, likewise.
+    pub instances: u32,
+    /// What makes its records less exact.
+    pub caveats: Vec<String>,
+}
+
+/// A draw that executing a command buffer makes, and its pass.
+#[derive(Clone, Debug)]
+pub struct Executed {
+    /// The draw.
+    pub draw: Arc<DrawInfo>,
+    /// Its pass; none in a secondary command buffer before it is executed.
+    pub pass: Option<Arc<PassInfo>>,
+}
+
+/// State that commands set.
+#[derive(Clone, Debug, Default)]
+pub struct Dynamic {
+    /// First viewport.
+    pub viewport: Option<vk::Viewport>,
+    /// First scissor rectangle.
+    pub scissor: Option<vk::Rect2D>,
+    /// Kind of primitives.
+    pub topology: Option<vk::PrimitiveTopology>,
+    /// Depth is tested.
+    pub depth_test: Option<bool>,
+    /// Depth is written.
+    pub depth_write: Option<bool>,
+    /// Comparison of depths.
+    pub depth_compare: Option<vk::CompareOp>,
+    /// Stencil is tested.
+    pub stencil_test: Option<bool>,
+    /// Operations on the stencil, as they were set: faces, fail, pass, depth fail, comparison.
+    pub stencil_ops: Vec<(
+        vk::StencilFaceFlags,
+        vk::StencilOp,
+        vk::StencilOp,
+        vk::StencilOp,
+        vk::CompareOp,
+    )>,
+    /// Bits of the stencil that are written, of each face.
+    pub stencil_write_masks: Vec<(vk::StencilFaceFlags, u32)>,
+    /// Channels written, from the first attachment that was named.
+    pub color_masks: Option<(u32, Vec<vk::ColorComponentFlags>)>,
+    /// Attachments that are written at all.
+    pub color_enables: Option<Vec<vk::Bool32>>,
+}
+
+/// What is bound in a command buffer.
+#[derive(Debug)]
+pub struct CommandState {
+    /// It is submitted once: what it records can be decided when it is recorded.
+    one_time: bool,
+    handle: vk::Pipeline,
+    pipeline: Option<Arc<Pipeline>>,
+    sets: [u64; MOST_SETS],
+    pushed: HashMap<u32, SetState>,
+    /// State that commands set.
+    pub dynamic: Dynamic,
+    /// The pass that is open.
+    pub pass: Option<Arc<PassInfo>>,
+    /// Render pass, framebuffer's views and subpass of it, where it is not a dynamic one.
+    pub open: Option<OpenPass>,
+    /// Queries and transform feedback of the program that are active.
+    pub active_queries: u32,
+    /// It copies an image to a buffer.
+    pub reads_back: bool,
+    items: Vec<Executed>,
+}
+
+/// A render pass under way.
+#[derive(Clone, Debug)]
+pub struct OpenPass {
+    /// The render pass.
+    pub pass: vk::RenderPass,
+    /// Its framebuffer.
+    pub framebuffer: vk::Framebuffer,
+    /// Views of a framebuffer without images.
+    pub views: Option<Vec<Option<crate::spool::ViewInfo>>>,
+    /// Rendered area.
+    pub area: vk::Rect2D,
+    /// Number of the subpass.
+    pub subpass: u32,
+}
+
+impl CommandState {
+    fn new(one_time: bool) -> Self {
+        Self {
+            one_time,
+            handle: vk::Pipeline::null(),
+            pipeline: None,
+            sets: [0; MOST_SETS],
+            pushed: HashMap::new(),
+            dynamic: Dynamic::default(),
+            pass: None,
+            open: None,
+            active_queries: 0,
+            reads_back: false,
+            items: Vec::new(),
+        }
+    }
+
+    /// It is submitted once.
+    #[must_use]
+    pub fn one_time(&self) -> bool {
+        self.one_time
+    }
+
+    /// The graphics pipeline.
+    #[must_use]
+    pub fn pipeline(&self) -> Option<&Arc<Pipeline>> {
+        self.pipeline.as_ref()
+    }
+
+    /// The graphics pipeline's handle.
+    #[must_use]
+    pub fn pipeline_handle(&self) -> vk::Pipeline {
+        self.handle
+    }
+
+    /// Binds a graphics pipeline.
+    pub fn bind(&mut self, handle: vk::Pipeline, pipeline: Option<Arc<Pipeline>>) {
+        self.handle = handle;
+        self.pipeline = pipeline;
+    }
+
+    /// Binds descriptor sets.
+    pub fn bind_sets(&mut self, first: u32, sets: impl IntoIterator<Item = u64>) {
+        for (number, set) in (first..).zip(sets) {
+            if let Some(slot) = self.sets.get_mut(number as usize) {
+                *slot = set;
+                self.pushed.remove(&number);
+            }
+        }
+    }
+
+    /// The set bound at a number.
+    #[must_use]
+    pub fn set(&self, number: u32) -> Option<u64> {
+        self.sets
+            .get(number as usize)
+            .copied()
+            .filter(|set| *set != 0)
+    }
+
+    /// What was pushed to a set.
+    #[must_use]
+    pub fn pushed(&self, number: u32) -> Option<&SetState> {
+        self.pushed.get(&number)
+    }
+
+    /// The set that is pushed to, made by `empty` if nothing was pushed before.
+    pub fn push(&mut self, number: u32, empty: impl FnOnce() -> SetState) -> &mut SetState {
+        self.pushed.entry(number).or_insert_with(empty)
+    }
+
+    /// Takes over the draws of a secondary command buffer.
+    fn execute(&mut self, items: &[Executed]) {
+        for item in items {
+            self.items.push(Executed {
+                draw: Arc::clone(&item.draw),
+                pass: item.pass.clone().or_else(|| self.pass.clone()),
+            });
+        }
+    }
+
+    fn info(&self, draw: u32, call: &Call, textures: Vec<TextureInfo>) -> Option<DrawInfo> {
+        let pipeline = self.pipeline.as_ref()?;
+        let (state, set) = (&pipeline.state, &self.dynamic);
+        let is = |dynamic| state.is_dynamic(dynamic);
+        let with_count = vk::DynamicState::VIEWPORT_WITH_COUNT;
+        let viewport = match is(vk::DynamicState::VIEWPORT) || is(with_count) {
+            true => set.viewport,
+            false => state.viewport,
+        };
+        let with_count = vk::DynamicState::SCISSOR_WITH_COUNT;
+        let scissor = match is(vk::DynamicState::SCISSOR) || is(with_count) {
+            true => set.scissor,
+            false => state.scissor,
+        };
+        let mut depth = state.depth;
+        let flags = [
+            (
+                vk::DynamicState::DEPTH_TEST_ENABLE,
+                set.depth_test,
+                &mut depth.tests,
+            ),
+            (
+                vk::DynamicState::DEPTH_WRITE_ENABLE,
+                set.depth_write,
+                &mut depth.writes,
+            ),
+            (
+                vk::DynamicState::STENCIL_TEST_ENABLE,
+                set.stencil_test,
+                &mut depth.stencil,
+            ),
+        ];
+        for (dynamic, value, flag) in flags {
+            *flag = value.filter(|_| is(dynamic)).unwrap_or(*flag);
+        }
+        if let Some(compare) = set
+            .depth_compare
+            .filter(|_| is(vk::DynamicState::DEPTH_COMPARE_OP))
+        {
+            depth.compare = compare.as_raw();
+        }
+        depth.writes &= depth.tests;
+        let mut color_masks = state.color_masks.clone();
+        if is(vk::DynamicState::COLOR_WRITE_MASK_EXT)
+            && let Some((first, masks)) = &set.color_masks
+        {
+            for (place, mask) in (*first as usize..).zip(masks) {
+                if color_masks.len() <= place {
+                    color_masks.resize(place + 1, 0);
+                }
+                color_masks[place] = mask.as_raw();
+            }
+        }
+        if is(vk::DynamicState::COLOR_WRITE_ENABLE_EXT)
+            && let Some(enables) = &set.color_enables
+        {
+            for (mask, enable) in color_masks.iter_mut().zip(enables) {
+                *mask = if *enable == 0 { 0 } else { *mask };
+            }
+        }
+        let topology = set
+            .topology
+            .filter(|_| is(vk::DynamicState::PRIMITIVE_TOPOLOGY));
+        let viewport = viewport.unwrap_or_default();
+        let scissor = scissor.unwrap_or_default();
+        let side = |value: u32| i32::try_from(value).unwrap_or(i32::MAX);
+        Some(DrawInfo {
+            draw,
+            pipeline: pipeline.number,
+            shader: pipeline.recorded.as_ref().map(|r| r.shader.shader),
+            unrecorded: pipeline.unrecorded.clone(),
+            twice: pipeline.recorded.as_ref().is_some_and(|r| r.twice),
+            viewport: [viewport.x, viewport.y, viewport.width, viewport.height],
+            scissor: [
+                scissor.offset.x,
+                scissor.offset.y,
+                side(scissor.extent.width),
+                side(scissor.extent.height),
+            ],
+            color_masks,
+            blends: state.blends,
+            depth,
+            topology: topology.unwrap_or(state.topology).as_raw(),
+            vertices: call.vertices,
+            instances: call.instances,
+            samples: state.samples,
+            caveats: [&state.caveats[..], &call.caveats].concat(),
+            textures,
+        })
+    }
+}
+
+/// Command buffers by handle, and the draws of all.
+#[derive(Debug, Default)]
+pub struct Commands {
+    buffers: HashMap<u64, CommandState>,
+    draws: u32,
+}
+
+impl Commands {
+    pub(super) fn numbered_from(first: u32) -> Self {
+        Self {
+            draws: first,
+            ..Self::default()
+        }
+    }
+
+    /// Recording begins.
+    pub fn begin(&mut self, buffer: u64, one_time: bool) {
+        self.buffers.insert(buffer, CommandState::new(one_time));
+    }
+
+    /// A command buffer was freed.
+    pub fn free(&mut self, buffer: u64) {
+        self.buffers.remove(&buffer);
+    }
+
+    /// A command buffer.
+    #[must_use]
+    pub fn get(&self, buffer: u64) -> Option<&CommandState> {
+        self.buffers.get(&buffer)
+    }
+
+    /// A command buffer, to be changed.
+    pub fn get_mut(&mut self, buffer: u64) -> &mut CommandState {
+        self.buffers
+            .entry(buffer)
+            .or_insert_with(|| CommandState::new(false))
+    }
+
+    /// Adds a draw and describes it.
+    pub(super) fn draw(
+        &mut self,
+        buffer: u64,
+        call: &Call,
+        textures: Vec<TextureInfo>,
+    ) -> Option<DrawInfo> {
+        let number = self.draws;
+        let state = self.buffers.get_mut(&buffer)?;
+        let info = state.info(number, call, textures)?;
+        self.draws += 1;
+        Some(info)
+    }
+
+    /// Adds a draw that is executed with the command buffer.
+    pub fn add(&mut self, buffer: u64, draw: DrawInfo) {
+        let state = self.get_mut(buffer);
+        let pass = state.pass.clone();
+        state.items.push(Executed {
+            draw: Arc::new(draw),
+            pass,
+        });
+    }
+
+    /// A command buffer executes another.
+    pub fn execute(&mut self, buffer: u64, secondary: u64) {
+        let items = match self.buffers.get(&secondary) {
+            Some(of) => of.items.clone(),
+            None => return,
+        };
+        self.get_mut(buffer).execute(&items);
+    }
+
+    /// A command buffer copies an image to a buffer.
+    #[must_use]
+    pub fn reads_back(&self, buffer: u64) -> bool {
+        self.buffers
+            .get(&buffer)
+            .is_some_and(|state| state.reads_back)
+    }
+
+    /// Draws of a command buffer in the order of execution.
+    #[must_use]
+    pub fn items(&self, buffer: u64) -> &[Executed] {
+        self.buffers.get(&buffer).map_or(&[], |state| &state.items)
+    }
+}

@@ -1,0 +1,171 @@
+//! Images, their views, and samplers.
+
+use crate::spool::{ImageInfo, SamplerInfo, ViewInfo};
+use ash::vk::{self, Handle};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// Images, views and samplers by handle. Handles are used again, so images have numbers of their own.
+#[derive(Debug, Default)]
+pub struct Images {
+    /// Number of the first one.
+    first: u32,
+    images: HashMap<u64, Arc<ImageInfo>>,
+    /// By number, those that were destroyed too: a draw may be described later.
+    numbered: Vec<Arc<ImageInfo>>,
+    views: HashMap<u64, ViewInfo>,
+    samplers: HashMap<u64, SamplerInfo>,
+}
+
+impl Images {
+    pub(super) fn numbered_from(first: u32) -> Self {
+        Self {
+            first,
+            ..Self::default()
+        }
+    }
+
+    /// An image was created.
+    pub fn create(&mut self, image: vk::Image, info: &vk::ImageCreateInfo<'_>) {
+        let size = [info.extent.width, info.extent.height, info.extent.depth];
+        self.add(image, |number| ImageInfo {
+            image: number,
+            format: info.format.as_raw(),
+            size,
+            levels: info.mip_levels,
+            layers: info.array_layers,
+            samples: info.samples.as_raw(),
+            presented: false,
+        });
+    }
+
+    /// An image of a swapchain was handed out, perhaps not for the first time.
+    pub fn of_swapchain(&mut self, image: vk::Image, info: &vk::SwapchainCreateInfoKHR<'_>) {
+        if self
+            .images
+            .get(&image.as_raw())
+            .is_some_and(|known| known.presented)
+        {
+            return;
+        }
+        let size = [info.image_extent.width, info.image_extent.height, 1];
+        self.add(image, |number| ImageInfo {
+            image: number,
+            format: info.image_format.as_raw(),
+            size,
+            levels: 1,
+            layers: info.image_array_layers,
+            samples: 1,
+            presented: true,
+        });
+    }
+
+    fn add(&mut self, image: vk::Image, info: impl FnOnce(u32) -> ImageInfo) {
+        let info = Arc::new(info(self.first + self.numbered.len() as u32));
+        self.numbered.push(Arc::clone(&info));
+        self.images.insert(image.as_raw(), info);
+    }
+
+    /// An image was destroyed.
+    pub fn destroy(&mut self, image: vk::Image) {
+        self.images.remove(&image.as_raw());
+    }
+
+    /// An image by its number.
+    #[must_use]
+    pub fn numbered(&self, number: u32) -> Option<&Arc<ImageInfo>> {
+        let place = number.checked_sub(self.first)?;
+        self.numbered.get(place as usize)
+    }
+
+    /// Handle of an image that was not destroyed.
+    #[must_use]
+    pub fn handle(&self, number: u32) -> Option<vk::Image> {
+        let mut all = self.images.iter();
+        let found = all.find(|(_, image)| image.image == number);
+        found.map(|(handle, _)| vk::Image::from_raw(*handle))
+    }
+
+    /// An image by its handle.
+    #[must_use]
+    pub fn image(&self, image: vk::Image) -> Option<&Arc<ImageInfo>> {
+        self.images.get(&image.as_raw())
+    }
+
+    /// A view was created.
+    pub fn create_view(&mut self, view: vk::ImageView, info: &vk::ImageViewCreateInfo<'_>) {
+        let Some(image) = self.images.get(&info.image.as_raw()) else {
+            return;
+        };
+        let range = &info.subresource_range;
+        let rest = |first: u32, count: u32, all: u32, remaining: u32| {
+            let rest = all.saturating_sub(first);
+            [
+                first,
+                if count == remaining {
+                    rest
+                } else {
+                    count.min(rest)
+                },
+            ]
+        };
+        let of = ViewInfo {
+            image: image.image,
+            format: info.format.as_raw(),
+            kind: info.view_type.as_raw(),
+            levels: rest(
+                range.base_mip_level,
+                range.level_count,
+                image.levels,
+                vk::REMAINING_MIP_LEVELS,
+            ),
+            layers: rest(
+                range.base_array_layer,
+                range.layer_count,
+                image.layers,
+                vk::REMAINING_ARRAY_LAYERS,
+            ),
+        };
+        self.views.insert(view.as_raw(), of);
+    }
+
+    /// A view was destroyed.
+    pub fn destroy_view(&mut self, view: vk::ImageView) {
+        self.views.remove(&view.as_raw());
+    }
+
+    /// A view.
+    #[must_use]
+    pub fn view(&self, view: vk::ImageView) -> Option<ViewInfo> {
+        self.views.get(&view.as_raw()).copied()
+    }
+
+    /// A sampler was created.
+    pub fn create_sampler(&mut self, sampler: vk::Sampler, info: &vk::SamplerCreateInfo<'_>) {
+        // JSON knows finite numbers alone.
+        let finite = |value: f32| if value.is_finite() { value } else { 1000.0 };
+        let of = SamplerInfo {
+            filters: [info.mag_filter.as_raw(), info.min_filter.as_raw()],
+            mip: info.mipmap_mode.as_raw(),
+            wrap: [info.address_mode_u.as_raw(), info.address_mode_v.as_raw()],
+            lod: [info.mip_lod_bias, info.min_lod, info.max_lod].map(finite),
+            anisotropy: match info.anisotropy_enable {
+                0 => 1.0,
+                _ => finite(info.max_anisotropy),
+            },
+            unnormalized: info.unnormalized_coordinates != 0,
+        };
+        self.samplers.insert(sampler.as_raw(), of);
+    }
+
+    /// A sampler was destroyed.
+    pub fn destroy_sampler(&mut self, sampler: vk::Sampler) {
+        self.samplers.remove(&sampler.as_raw());
+    }
+
+    /// A sampler.
+    #[must_use]
+    pub fn sampler(&self, sampler: vk::Sampler) -> Option<SamplerInfo> {
+        self.samplers.get(&sampler.as_raw()).copied()
+    }
+}

@@ -1,0 +1,82 @@
+//! What a program's Vulkan objects are, as far as a draw's texture samples depend on them.
+//!
+//! Nothing here calls Vulkan: hooks tell what a program did, and ask at a draw what it reads and where it goes.
+
+mod commands;
+mod descriptors;
+mod images;
+mod passes;
+mod pipelines;
+
+pub use commands::{Call, CommandState, Commands, Dynamic, Executed, OpenPass};
+pub use descriptors::{Descriptors, Slot, Template, TemplateEntry, Written};
+pub use images::Images;
+pub use passes::{Attachment, Passes, RenderPass, Subpass};
+pub use pipelines::{Layout, Pipeline, Pipelines, Recorded, State};
+
+use crate::spool::{DrawInfo, TextureInfo};
+
+/// All objects of a device.
+#[derive(Debug, Default)]
+pub struct Tracker {
+    /// Images, views and samplers.
+    pub images: Images,
+    /// Descriptor sets.
+    pub descriptors: Descriptors,
+    /// Shader modules and pipelines.
+    pub pipelines: Pipelines,
+    /// Render passes and framebuffers.
+    pub passes: Passes,
+    /// Command buffers.
+    pub commands: Commands,
+}
+
+impl Tracker {
+    /// Of the device with a number in its process: what it numbers has numbers of its own there, too.
+    #[must_use]
+    pub fn of_device(device: u32) -> Self {
+        // More than any program makes of one kind.
+        let first = device << 26;
+        Self {
+            images: Images::numbered_from(first),
+            pipelines: Pipelines::numbered_from(first),
+            passes: Passes::numbered_from(first),
+            commands: Commands::numbered_from(first),
+            ..Self::default()
+        }
+    }
+
+    /// What a draw of a command buffer is, with the next draw's number; `None` where no graphics pipeline is bound.
+    pub fn draw(&mut self, command_buffer: u64, call: &Call) -> Option<DrawInfo> {
+        let textures = self.textures(command_buffer)?;
+        self.commands.draw(command_buffer, call, textures)
+    }
+
+    /// Textures that the bound pipeline's shader may read.
+    fn textures(&self, command_buffer: u64) -> Option<Vec<TextureInfo>> {
+        let bound = self.commands.get(command_buffer)?;
+        let pipeline = bound.pipeline()?;
+        let mut textures = Vec::new();
+        for &(set, binding) in &pipeline.bindings {
+            let slots = match bound.pushed(set) {
+                Some(pushed) => pushed.binding(binding),
+                None => (bound.set(set)).map_or_else(Vec::new, |set| {
+                    self.descriptors
+                        .set(set)
+                        .map_or_else(Vec::new, |s| s.binding(binding))
+                }),
+            };
+            textures.extend(slots.into_iter().map(|(element, slot)| TextureInfo {
+                set,
+                binding,
+                element,
+                view: slot.view,
+                sampler: slot.sampler,
+            }));
+        }
+        Some(textures)
+    }
+}
+
+#[cfg(test)]
+mod tests;

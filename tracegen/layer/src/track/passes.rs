@@ -1,0 +1,144 @@
+//! Render passes, framebuffers and what a pass renders into.
+
+use super::Images;
+use crate::spool::{PassInfo, ViewInfo};
+use ash::vk::{self, Handle};
+use std::collections::HashMap;
+
+/// An attachment that a pass writes, and whether the pass clears it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Attachment {
+    /// Part of an image.
+    pub view: ViewInfo,
+    /// It is cleared.
+    pub clears: bool,
+}
+
+/// What a subpass renders into: positions among the attachments.
+#[derive(Clone, Debug, Default)]
+pub struct Subpass {
+    /// Colours; `None` where one is not used.
+    pub colors: Vec<Option<u32>>,
+    /// Depth.
+    pub depth: Option<u32>,
+    /// Views that each draw is broadcast to.
+    pub view_mask: u32,
+}
+
+/// A render pass.
+#[derive(Clone, Debug, Default)]
+pub struct RenderPass {
+    /// Of each attachment whether it is cleared.
+    pub clears: Vec<bool>,
+    /// Its parts.
+    pub subpasses: Vec<Subpass>,
+}
+
+/// Render passes and framebuffers by handle, and the number of the last pass that was begun.
+#[derive(Debug, Default)]
+pub struct Passes {
+    passes: HashMap<u64, RenderPass>,
+    framebuffers: HashMap<u64, Vec<Option<ViewInfo>>>,
+    begun: u32,
+}
+
+impl Passes {
+    pub(super) fn numbered_from(first: u32) -> Self {
+        Self {
+            begun: first,
+            ..Self::default()
+        }
+    }
+
+    /// A render pass was created.
+    pub fn create(&mut self, handle: vk::RenderPass, pass: RenderPass) {
+        self.passes.insert(handle.as_raw(), pass);
+    }
+
+    /// A render pass was destroyed.
+    pub fn destroy(&mut self, handle: vk::RenderPass) {
+        self.passes.remove(&handle.as_raw());
+    }
+
+    /// Views of a subpass.
+    #[must_use]
+    pub fn view_mask(&self, handle: vk::RenderPass, subpass: u32) -> u32 {
+        let pass = self.passes.get(&handle.as_raw());
+        let subpass = pass.and_then(|pass| pass.subpasses.get(subpass as usize));
+        subpass.map_or(0, |subpass| subpass.view_mask)
+    }
+
+    /// A framebuffer was created.
+    pub fn create_framebuffer(
+        &mut self,
+        handle: vk::Framebuffer,
+        views: &[vk::ImageView],
+        images: &Images,
+    ) {
+        let views = views.iter().map(|view| images.view(*view)).collect();
+        self.framebuffers.insert(handle.as_raw(), views);
+    }
+
+    /// A framebuffer was destroyed.
+    pub fn destroy_framebuffer(&mut self, handle: vk::Framebuffer) {
+        self.framebuffers.remove(&handle.as_raw());
+    }
+
+    /// A subpass begins; `views` are those of a framebuffer without images.
+    pub fn begin(
+        &mut self,
+        handle: vk::RenderPass,
+        framebuffer: vk::Framebuffer,
+        views: Option<Vec<Option<ViewInfo>>>,
+        area: vk::Rect2D,
+        subpass: u32,
+    ) -> PassInfo {
+        let pass = self
+            .passes
+            .get(&handle.as_raw())
+            .cloned()
+            .unwrap_or_default();
+        let views = views
+            .or_else(|| self.framebuffers.get(&framebuffer.as_raw()).cloned())
+            .unwrap_or_default();
+        let of = pass
+            .subpasses
+            .get(subpass as usize)
+            .cloned()
+            .unwrap_or_default();
+        let attachment = |place: u32| {
+            let view = views.get(place as usize).copied().flatten()?;
+            // Later subpasses find what the earlier ones left.
+            let clears = subpass == 0 && pass.clears.get(place as usize) == Some(&true);
+            Some(Attachment { view, clears })
+        };
+        let colors = of
+            .colors
+            .iter()
+            .filter_map(|color| attachment((*color)?))
+            .collect();
+        let depth = of.depth.and_then(attachment);
+        self.info(colors, depth, area, of.view_mask)
+    }
+
+    /// What a pass renders into, with the next pass's number.
+    pub fn info(
+        &mut self,
+        colors: Vec<Attachment>,
+        depth: Option<Attachment>,
+        area: vk::Rect2D,
+        view_mask: u32,
+    ) -> PassInfo {
+        let pass = self.begun;
+        self.begun += 1;
+        let size = [area.extent.width, area.extent.height].map(|s| i32::try_from(s).unwrap_or(0));
+        PassInfo {
+            pass,
+            clears: colors.iter().chain(&depth).any(|a| a.clears),
+            colors: colors.into_iter().map(|a| a.view).collect(),
+            depth: depth.map(|a| a.view),
+            area: [area.offset.x, area.offset.y, size[0], size[1]],
+            view_mask,
+        }
+    }
+}

@@ -1,0 +1,268 @@
+use super::*;
+use crate::spool::ViewInfo;
+use ash::vk::{self, Handle};
+use std::sync::Arc;
+
+fn image_view(images: &mut Images, number: u64, size: u32) -> vk::ImageView {
+    let image = vk::Image::from_raw(number);
+    let info = vk::ImageCreateInfo {
+        extent: vk::Extent3D {
+            width: size,
+            height: size,
+            depth: 1,
+        },
+        mip_levels: 5,
+        array_layers: 3,
+        samples: vk::SampleCountFlags::TYPE_1,
+        ..Default::default()
+    };
+    images.create(image, &info);
+    let view = vk::ImageView::from_raw(number);
+    let range = vk::ImageSubresourceRange {
+        aspect_mask: vk::ImageAspectFlags::COLOR,
+        base_mip_level: 1,
+        level_count: vk::REMAINING_MIP_LEVELS,
+        base_array_layer: 1,
+        layer_count: 1,
+    };
+    let info = vk::ImageViewCreateInfo::default()
+        .image(image)
+        .subresource_range(range);
+    images.create_view(view, &info);
+    view
+}
+
+fn texture(view: vk::ImageView) -> vk::DescriptorImageInfo {
+    vk::DescriptorImageInfo::default().image_view(view)
+}
+
+fn written(binding: u32, element: u32, images: Vec<vk::DescriptorImageInfo>) -> Written {
+    Written {
+        binding,
+        element,
+        kind: vk::DescriptorType::SAMPLED_IMAGE,
+        images,
+    }
+}
+
+fn images_of(slots: &[(u32, Slot)]) -> Vec<(u32, u32)> {
+    let of = |(element, slot): &(u32, Slot)| Some((*element, slot.view?.image));
+    slots.iter().filter_map(of).collect()
+}
+
+#[test]
+fn a_view_is_the_part_of_its_image_that_is_left_and_handles_get_new_numbers() {
+    let mut images = Images::default();
+    let first = image_view(&mut images, 7, 64);
+    let of_first = images.view(first).unwrap();
+    assert_eq!((of_first.levels, of_first.layers), ([1, 4], [1, 1]));
+    images.destroy(vk::Image::from_raw(7));
+    images.destroy_view(first);
+    assert_eq!(images.view(first), None);
+    let second = image_view(&mut images, 7, 32);
+    assert_eq!(images.view(second).map(|view| view.image), Some(1));
+    assert_eq!(images.numbered(0).map(|image| image.size[0]), Some(64));
+}
+
+#[test]
+fn writes_beyond_a_bindings_last_element_go_to_the_next_one() {
+    let mut images = Images::default();
+    let views = [1, 2, 3].map(|n| image_view(&mut images, n, 8));
+    let mut descriptors = Descriptors::default();
+    let layout = vk::DescriptorSetLayout::from_raw(1);
+    let bindings = [(0, 2, Vec::new()), (4, 2, Vec::new())];
+    descriptors.create_layout(layout, bindings, &images);
+    let [a, b] = [1, 2].map(vk::DescriptorSet::from_raw);
+    for set in [a, b] {
+        descriptors.allocate(vk::DescriptorPool::from_raw(1), set, layout);
+    }
+    descriptors.write(a, &written(0, 1, views.map(texture).to_vec()), &images);
+    let of = |set, binding| images_of(&descriptors.set(set).unwrap().binding(binding));
+    assert_eq!((of(1, 0), of(1, 4)), (vec![(1, 0)], vec![(0, 1), (1, 2)]));
+    let copy = vk::CopyDescriptorSet::default()
+        .src_set(a)
+        .src_binding(0)
+        .src_array_element(1)
+        .dst_set(b)
+        .dst_binding(0)
+        .descriptor_count(3);
+    descriptors.copy(&copy);
+    let of = |set, binding| images_of(&descriptors.set(set).unwrap().binding(binding));
+    assert_eq!((of(2, 0), of(2, 4)), (vec![(0, 0), (1, 1)], vec![(0, 2)]));
+    descriptors.reset_pool(vk::DescriptorPool::from_raw(1));
+    assert!(descriptors.set(1).is_none());
+}
+
+#[test]
+fn samplers_of_the_layout_are_those_of_every_set() {
+    let mut images = Images::default();
+    let [fixed, other] = [1, 2].map(vk::Sampler::from_raw);
+    for (sampler, bias) in [(fixed, 1.0), (other, f32::NAN)] {
+        let info = vk::SamplerCreateInfo::default().mip_lod_bias(bias);
+        images.create_sampler(sampler, &info);
+    }
+    let mut descriptors = Descriptors::default();
+    let layout = vk::DescriptorSetLayout::from_raw(1);
+    descriptors.create_layout(layout, [(0, 1, vec![fixed])], &images);
+    let set = vk::DescriptorSet::from_raw(1);
+    descriptors.allocate(vk::DescriptorPool::from_raw(1), set, layout);
+    let write = Written {
+        kind: vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+        ..written(
+            0,
+            0,
+            vec![vk::DescriptorImageInfo::default().sampler(other)],
+        )
+    };
+    descriptors.write(set, &write, &images);
+    let slots = descriptors.set(1).unwrap().binding(0);
+    assert_eq!(slots[0].1.sampler, images.sampler(fixed));
+}
+
+fn pipeline(dynamic: &[vk::DynamicState]) -> Pipeline {
+    Pipeline {
+        number: 0,
+        layout: vk::PipelineLayout::null(),
+        stages: vk::ShaderStageFlags::empty(),
+        recorded: None,
+        unrecorded: None,
+        bindings: vec![(0, 0), (1, 0)],
+        state: State {
+            dynamic: dynamic.iter().map(|state| state.as_raw()).collect(),
+            viewport: Some(vk::Viewport {
+                width: 100.0,
+                ..Default::default()
+            }),
+            color_masks: vec![15, 15],
+            ..State::default()
+        },
+    }
+}
+
+fn tracker(dynamic: &[vk::DynamicState]) -> Tracker {
+    let mut tracker = Tracker::default();
+    tracker
+        .pipelines
+        .create(vk::Pipeline::from_raw(1), pipeline(dynamic));
+    tracker.commands.begin(1, true);
+    let of = tracker.pipelines.get(vk::Pipeline::from_raw(1)).cloned();
+    tracker
+        .commands
+        .get_mut(1)
+        .bind(vk::Pipeline::from_raw(1), of);
+    tracker
+}
+
+#[test]
+fn a_draw_has_the_state_that_its_pipeline_leaves_to_commands() {
+    let wide = vk::Viewport {
+        width: 7.0,
+        ..Default::default()
+    };
+    for (states, width, masks) in [
+        (&[][..], 100.0, [15, 15]),
+        (
+            &[
+                vk::DynamicState::VIEWPORT,
+                vk::DynamicState::COLOR_WRITE_ENABLE_EXT,
+            ],
+            7.0,
+            [0, 15],
+        ),
+    ] {
+        let mut tracker = tracker(states);
+        let dynamic = &mut tracker.commands.get_mut(1).dynamic;
+        dynamic.viewport = Some(wide);
+        dynamic.color_enables = Some(vec![0, 1]);
+        let draw = tracker.draw(1, &Call::default()).unwrap();
+        assert_eq!(
+            (draw.viewport[2], &draw.color_masks[..]),
+            (width, &masks[..])
+        );
+    }
+    assert!(
+        tracker(&[]).draw(2, &Call::default()).is_none(),
+        "nothing is bound"
+    );
+}
+
+#[test]
+fn pushed_descriptors_hide_the_set_that_was_bound_until_another_is() {
+    let mut tracker = tracker(&[]);
+    let [bound, pushed] = [1, 2].map(|n| image_view(&mut tracker.images, n, 8));
+    let set = vk::DescriptorSet::from_raw(9);
+    let images = &tracker.images;
+    tracker
+        .descriptors
+        .write(set, &written(0, 0, vec![texture(bound)]), images);
+    let mut of = |change: &dyn Fn(&mut CommandState, &Images)| {
+        change(tracker.commands.get_mut(1), &tracker.images);
+        let draw = tracker.draw(1, &Call::default()).unwrap();
+        let images = draw.textures.iter().map(|t| (t.set, t.view.unwrap().image));
+        images.collect::<Vec<_>>()
+    };
+    assert_eq!(of(&|state, _| state.bind_sets(1, [9])), [(1, 0)]);
+    let write = written(0, 0, vec![texture(pushed)]);
+    let push = |state: &mut CommandState, images: &Images| {
+        state.push(1, Default::default).write(&write, images);
+    };
+    assert_eq!(of(&push), [(1, 1)]);
+    assert_eq!(of(&|state, _| state.bind_sets(1, [9])), [(1, 0)]);
+}
+
+#[test]
+fn subpasses_write_their_own_attachments_and_only_the_first_one_clears() {
+    let mut tracker = Tracker::default();
+    let views = [1, 2].map(|n| image_view(&mut tracker.images, n, 8));
+    let framebuffer = vk::Framebuffer::from_raw(1);
+    tracker
+        .passes
+        .create_framebuffer(framebuffer, &views, &tracker.images);
+    let subpass = |color| Subpass {
+        colors: vec![Some(color), None],
+        depth: None,
+        view_mask: 3,
+    };
+    let pass = RenderPass {
+        clears: vec![true, true],
+        subpasses: vec![subpass(0), subpass(1)],
+    };
+    let handle = vk::RenderPass::from_raw(1);
+    tracker.passes.create(handle, pass);
+    let area = vk::Rect2D::default();
+    let mut begin = |number| {
+        let info = tracker
+            .passes
+            .begin(handle, framebuffer, None, area, number);
+        let images = info.colors.iter().map(|view: &ViewInfo| view.image);
+        (
+            info.pass,
+            images.collect::<Vec<_>>(),
+            info.clears,
+            info.view_mask,
+        )
+    };
+    assert_eq!(begin(0), (0, vec![0], true, 3));
+    assert_eq!(begin(1), (1, vec![1], false, 3));
+}
+
+#[test]
+fn draws_of_a_secondary_command_buffer_belong_to_the_pass_that_executes_it() {
+    let mut tracker = tracker(&[]);
+    let draw = tracker.draw(1, &Call::default()).unwrap();
+    tracker.commands.add(1, draw);
+    tracker.commands.begin(2, true);
+    let pass = tracker
+        .passes
+        .info(Vec::new(), None, vk::Rect2D::default(), 0);
+    tracker.commands.get_mut(2).pass = Some(Arc::new(pass));
+    for _ in 0..2 {
+        tracker.commands.execute(2, 1);
+    }
+    let items = tracker.commands.items(2);
+    let found: Vec<_> = (items.iter())
+        .map(|item| (item.draw.draw, item.pass.as_ref().map(|pass| pass.pass)))
+        .collect();
+    assert_eq!(found, [(0, Some(0)), (0, Some(0))]);
+    assert!(tracker.commands.items(1)[0].pass.is_none());
+}

@@ -1,0 +1,325 @@
+//! Frames of a session into a trace.
+
+mod build;
+mod places;
+
+use crate::pairs::pair;
+use crate::session::{Executed, Session, SessionError, coverage_group};
+use crate::views::{self, DrawKey, Role, Rule, Views, ViewsError, Wanted};
+use build::{Builder, Merged};
+use formats::textrace::{
+    LeftOut, Pass, PassKind, ProgramCapture, Surfaces, TextraceWriter, TraceMeta,
+};
+use formats::view::{Eye, EyeView, FovTangents, FrameViews, Hmd, TILE_SIZE_PX};
+use parallax_layer::inject::RawSample;
+use parallax_layer::spool::FramesBy;
+use places::Placement;
+use record::{CaptureCounts, RecordError, Recording};
+use std::collections::{BTreeMap, HashMap};
+use std::io::{Seek, Write};
+use thiserror::Error;
+
+/// What becomes of a session.
+pub struct Job<'a> {
+    /// Frames to take, ascending.
+    pub frames: &'a [u32],
+    /// What tells both eyes apart.
+    pub eyes: &'a Wanted,
+    /// What told frames apart.
+    pub frames_by: FramesBy,
+    /// Eyes of frames, where the program told them.
+    pub cameras: BTreeMap<u32, [EyeView; 2]>,
+    /// Name of the program.
+    pub program: String,
+    /// Tool and version.
+    pub tool: String,
+    /// Its arguments without outputs.
+    pub command_line: Vec<String>,
+    /// Bytes of room for the records of one submission.
+    pub record_bytes: u64,
+}
+
+/// What was made.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Drained {
+    /// Frames.
+    pub frames: usize,
+    /// Rule that told both eyes apart.
+    pub rule: Option<Rule>,
+    /// Pixels of an eye's picture.
+    pub size_px: [u32; 2],
+    /// Draws of the trace.
+    pub draws: usize,
+    /// Textures of the trace.
+    pub textures: usize,
+    /// What was recorded.
+    pub counts: CaptureCounts,
+    /// What the trace lacks.
+    pub left_out: Vec<LeftOut>,
+}
+
+/// Why no trace was made.
+#[derive(Debug, Error)]
+pub enum DrainError {
+    /// Of the session.
+    #[error(transparent)]
+    Session(#[from] SessionError),
+    /// No eyes.
+    #[error(transparent)]
+    Views(#[from] ViewsError),
+    /// The frames have pictures of different sizes.
+    #[error(
+        "frame {frame}: expected pictures of {expected:?} pixels as in the frames before, found {found:?}"
+    )]
+    Size {
+        /// Frame.
+        frame: u32,
+        /// Width and height before.
+        expected: [u32; 2],
+        /// Width and height.
+        found: [u32; 2],
+    },
+    /// The eyes were found, and none of their draws has a record.
+    #[error(
+        "no draw of either eye was recorded; --check compares the draws with queries, --list names the passes"
+    )]
+    Nothing,
+    /// Of the trace.
+    #[error(transparent)]
+    Record(#[from] RecordError),
+}
+
+impl From<parallax_layer::spool::ReadError> for DrainError {
+    fn from(error: parallax_layer::spool::ReadError) -> Self {
+        Self::Session(error.into())
+    }
+}
+
+/// Takes frames of a session into a trace, which is yet to be finished.
+///
+/// # Errors
+/// Frames without two eyes, records that were lost, and errors of reading and writing.
+pub fn drain<W: Write + Seek>(
+    session: &mut Session,
+    job: &Job<'_>,
+    writer: TextraceWriter<W>,
+) -> Result<(TextraceWriter<W>, Drained), DrainError> {
+    let mut builder = Builder::new(Recording::new(writer));
+    let mut drained = Drained::default();
+    let mut triangles = 0;
+    for &number in job.frames {
+        let frame = session.frames.get(&number).cloned();
+        let frame = frame.ok_or(SessionError::NotDrawn(number))?;
+        if frame.lost_bytes > 0 {
+            return Err(DrainError::Session(SessionError::Lost {
+                frame: number,
+                lost: frame.lost_bytes,
+                room: job.record_bytes,
+            }));
+        }
+        let records = session.records(number)?;
+        let weights: Vec<u64> = frame
+            .draws
+            .iter()
+            .map(|draw| weight(session, draw, &records))
+            .collect();
+        // Every frame is told by the rule that told the first one.
+        let known = drained
+            .rule
+            .filter(|rule| *rule != Rule::File)
+            .map(Wanted::Rule);
+        let views = views::find(
+            session,
+            &frame,
+            &weights,
+            known.as_ref().unwrap_or(job.eyes),
+        )?;
+        drained.rule = Some(views.rule);
+        let placements = views.eyes.map(Placement::new);
+        let size_px = places::both(placements);
+        if drained.frames > 0 && drained.size_px != size_px {
+            return Err(DrainError::Size {
+                frame: number,
+                expected: drained.size_px,
+                found: size_px,
+            });
+        }
+        drained.size_px = size_px;
+        drained.frames += 1;
+        let merged = merge(session, &frame.draws, &views);
+        triangles = builder.frame(session, number, &merged, &records, placements, size_px)?;
+        builder.count_ignored(session, &frame.draws, &views, &weights);
+    }
+    drained.counts = builder.counts;
+    if drained.counts.quads == 0 {
+        return Err(DrainError::Nothing);
+    }
+    drained.left_out = builder.left_out();
+    let rule = drained.rule.map_or("", Rule::name);
+    let meta = meta(
+        session,
+        job,
+        &drained,
+        rule,
+        triangles,
+        builder.not_opaque(),
+    );
+    let writer = builder.finish(meta)?;
+    drained.draws = writer.tables().draws.len();
+    drained.textures = writer.tables().textures.len();
+    Ok((writer, drained))
+}
+
+/// Fragments of an executed draw.
+pub(crate) fn weight(
+    session: &Session,
+    executed: &Executed,
+    records: &HashMap<u32, Vec<RawSample>>,
+) -> u64 {
+    let group = session
+        .draw(executed.draw)
+        .and_then(|draw| coverage_group(session.shader_of(draw)?));
+    match (group, records.get(&executed.draw)) {
+        (Some(group), Some(records)) => {
+            let of = records.iter().filter(|record| record.group() == group);
+            of.map(|record| u64::from(record.lanes().count_ones()))
+                .sum()
+        }
+        _ => executed.occlusion.unwrap_or(0),
+    }
+}
+
+/// What makes two draws the same for a trace: their textures, too.
+fn key(session: &Session, draw: u32) -> Option<(DrawKey, String)> {
+    let info = session.draw(draw)?;
+    Some((DrawKey::of(info), format!("{:?}", info.textures)))
+}
+
+/// The draws of a frame, those of both eyes joined, in an order that is that of each eye.
+fn merge(session: &Session, draws: &[Executed], views: &Views) -> Vec<Merged> {
+    let with = |wanted: Role| -> Vec<Executed> {
+        let both = draws.iter().zip(&views.roles);
+        both.filter(|(_, role)| **role == wanted)
+            .map(|(draw, _)| *draw)
+            .collect()
+    };
+    let mut merged: Vec<Merged> = with(Role::Shadow).into_iter().map(Merged::Shadow).collect();
+    let layers = views.layers;
+    merged.extend(
+        with(Role::Multiview)
+            .into_iter()
+            .map(|draw| Merged::Multiview(draw, layers)),
+    );
+    merged.extend(with(Role::Seen(None)).into_iter().map(Merged::Mono));
+    let [left, right] = [Eye::Left, Eye::Right].map(|eye| with(Role::Seen(Some(eye))));
+    let keys =
+        |of: &[Executed]| -> Vec<_> { of.iter().map(|draw| key(session, draw.draw)).collect() };
+    let pairs = pair(&keys(&left), &keys(&right));
+    merged.extend(
+        pairs
+            .into_iter()
+            .map(|(l, r)| Merged::Eyes([l.map(|l| left[l]), r.map(|r| right[r])])),
+    );
+    merged
+}
+
+fn meta(
+    session: &Session,
+    job: &Job<'_>,
+    drained: &Drained,
+    rule: &str,
+    triangles: u64,
+    not_opaque: Vec<[u32; 2]>,
+) -> TraceMeta {
+    let cameras_known = job
+        .frames
+        .iter()
+        .all(|frame| job.cameras.contains_key(frame));
+    let first = job.frames.first().and_then(|frame| job.cameras.get(frame));
+    let (fov, ipd_m) = match first.filter(|_| cameras_known) {
+        Some(eyes) => (eyes.map(|eye| fov(&eye)), distance_m(eyes)),
+        None => ([STRAIGHT; 2], 0.0),
+    };
+    let frames_by = match job.frames_by {
+        FramesBy::Auto | FramesBy::Present => "presents",
+        FramesBy::Readback => "readbacks",
+        FramesBy::Launcher => "the launcher",
+    };
+    TraceMeta {
+        tool: job.tool.clone(),
+        command_line: job.command_line.clone(),
+        scene: job.program.clone(),
+        scene_triangles: triangles,
+        camera: "program".to_owned(),
+        backend: "layer".to_owned(),
+        driver: session.driver.clone(),
+        seed: 0,
+        hmd: Hmd {
+            name: if cameras_known { "emulated" } else { "unknown" }.to_owned(),
+            source: "a program's viewports".to_owned(),
+            eye_size_px: drained.size_px,
+            fov,
+            ipd_m,
+            cant_deg: 0.0,
+        },
+        frames: (job.frames.iter())
+            .map(|frame| FrameViews {
+                frame: *frame,
+                eyes: job.cameras.get(frame).copied().unwrap_or_default(),
+            })
+            .collect(),
+        surfaces: Some(Surfaces {
+            depth_tested: true,
+            not_opaque,
+        }),
+        origin_m: [0.0; 3],
+        techniques: None,
+        program: Some(ProgramCapture {
+            cameras_known,
+            frames_by: frames_by.to_owned(),
+            views_by: rule.to_owned(),
+            left_out: drained.left_out.clone(),
+        }),
+    }
+}
+
+/// A field of view where nothing is known of it.
+const STRAIGHT: FovTangents = FovTangents {
+    left: 1.0,
+    right: 1.0,
+    up: 1.0,
+    down: 1.0,
+};
+
+/// Tangents to the edges of a projection's picture.
+fn fov(eye: &EyeView) -> FovTangents {
+    let m = &eye.eye_to_clip;
+    let edge = |axis: usize, side: f32| (1.0 + side * m[2][axis]) / m[axis][axis];
+    FovTangents {
+        left: edge(0, -1.0),
+        right: edge(0, 1.0),
+        up: edge(1, 1.0),
+        down: edge(1, -1.0),
+    }
+}
+
+/// Distance between two eyes.
+fn distance_m(eyes: &[EyeView; 2]) -> f32 {
+    let [a, b] = [eyes[0].position, eyes[1].position];
+    let squared: f32 = (0..3)
+        .map(|axis| (a[axis] - b[axis]) * (a[axis] - b[axis]))
+        .sum();
+    squared.sqrt()
+}
+
+/// A pass of a trace.
+pub(crate) fn pass(frame: u32, kind: PassKind, eye: Option<Eye>, size_px: [u32; 2]) -> Pass {
+    Pass {
+        frame,
+        kind,
+        eye,
+        layer: 0,
+        size_px,
+        tiles: size_px.map(|size| size.div_ceil(TILE_SIZE_PX)),
+    }
+}

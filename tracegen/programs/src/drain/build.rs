@@ -1,0 +1,642 @@
+//! The draws of a frame: their groups, and the records of each eye.
+
+use super::DrainError;
+use super::pass;
+use super::places::Placement;
+use crate::groups::{Bound, Group};
+use crate::lanes::visits;
+use crate::session::{Executed, Session, coverage_group, survival_group};
+use crate::texture::{FETCH, gathering, sampler, texture};
+use crate::views::{Role, Views, viewport};
+use ash::vk;
+use formats::textrace::{Draw, LeftOut, NO_GROUP, PassKind, Surfaces, TraceMeta, UvGroup};
+use formats::textrace::{TextraceWriter, tables::MAX_GROUPS};
+use formats::view::Eye;
+use parallax_layer::inject::{Access, Form, RawQuad, RawSample, Site, TextureSite, What};
+use parallax_layer::spool::{DrawInfo, ShaderInfo, ViewInfo};
+use rayon::prelude::*;
+use record::{CaptureCounts, DepthReplay, RawDepth, RawRecord, RawRecords, Recording};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::io::{Seek, Write};
+
+/// A draw of the trace.
+#[derive(Clone, Copy, Debug)]
+pub enum Merged {
+    /// Of a shadow map.
+    Shadow(Executed),
+    /// Of one picture that belongs to both eyes.
+    Mono(Executed),
+    /// Of both eyes at once, which are these views.
+    Multiview(Executed, [u32; 2]),
+    /// Of the left and the right eye.
+    Eyes([Option<Executed>; 2]),
+}
+
+impl Merged {
+    /// The draws that it is made of, and the eye that a record of some view belongs to.
+    fn parts(&self) -> Vec<(Executed, Part)> {
+        match *self {
+            Self::Shadow(draw) => vec![(draw, Part::Pass(draw.pass))],
+            Self::Mono(draw) => vec![(draw, Part::Both)],
+            Self::Multiview(draw, layers) => vec![(draw, Part::Layers(layers))],
+            Self::Eyes(eyes) => (eyes.into_iter().zip([Eye::Left, Eye::Right]))
+                .filter_map(|(draw, eye)| Some((draw?, Part::Eye(eye))))
+                .collect(),
+        }
+    }
+}
+
+/// Where the records of a draw go.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    Eye(Eye),
+    Both,
+    Layers([u32; 2]),
+    Pass(u32),
+}
+
+/// A pass of the trace: pictures of eyes, then shadow maps by their pass in the program.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Into {
+    Shadow(u32),
+    Left,
+    Right,
+    Both,
+}
+
+/// Records of one pass.
+#[derive(Default)]
+struct Records {
+    quads: Vec<RawRecord>,
+    depths: Vec<RawDepth>,
+}
+
+/// Makes a trace, frame by frame.
+pub struct Builder<W: Write + Seek> {
+    recording: Recording<W>,
+    pub counts: CaptureCounts,
+    textures: HashMap<ViewInfo, Option<u32>>,
+    next_primitive: u32,
+    /// Of each draw whether all its fragments hide what lies behind.
+    opaque: Vec<bool>,
+    left_out: BTreeMap<String, [u64; 2]>,
+}
+
+impl<W: Write + Seek> Builder<W> {
+    /// An empty trace.
+    pub fn new(recording: Recording<W>) -> Self {
+        Self {
+            recording,
+            counts: CaptureCounts::default(),
+            textures: HashMap::new(),
+            next_primitive: 0,
+            opaque: Vec::new(),
+            left_out: BTreeMap::new(),
+        }
+    }
+
+    /// What the trace lacks so far.
+    pub fn left_out(&self) -> Vec<LeftOut> {
+        let of = |(what, [draws, fragments]): (&String, &[u64; 2])| LeftOut {
+            what: what.clone(),
+            draws: *draws,
+            fragments: *fragments,
+        };
+        self.left_out.iter().map(of).collect()
+    }
+
+    /// Draws that are not opaque.
+    pub fn not_opaque(&self) -> Vec<[u32; 2]> {
+        Surfaces::ranges(self.opaque.iter().copied())
+    }
+
+    /// The trace with its description.
+    pub fn finish(self, meta: TraceMeta) -> Result<TextraceWriter<W>, DrainError> {
+        Ok(self.recording.finish(meta)?)
+    }
+
+    /// Takes note of the draws that no pass of the trace has.
+    pub fn count_ignored(
+        &mut self,
+        session: &Session,
+        draws: &[Executed],
+        views: &Views,
+        weights: &[u64],
+    ) {
+        for ((executed, role), weight) in draws.iter().zip(&views.roles).zip(weights) {
+            let info = session.draw(executed.draw);
+            if let Role::Other(other) = role {
+                self.leave_out(other.name(), 1, *weight);
+            } else if let Some(why) = info.and_then(|info| info.unrecorded.as_ref()) {
+                self.leave_out(why, 1, *weight);
+            } else if let Some(info) = info {
+                for caveat in &info.caveats {
+                    self.leave_out(caveat, 1, *weight);
+                }
+            }
+        }
+    }
+
+    fn leave_out(&mut self, what: &str, draws: u64, fragments: u64) {
+        let of = self.left_out.entry(what.to_owned()).or_default();
+        of[0] += draws;
+        of[1] += fragments;
+    }
+
+    /// Adds a frame. Tells its triangles.
+    pub fn frame(
+        &mut self,
+        session: &Session,
+        number: u32,
+        merged: &[Merged],
+        records: &HashMap<u32, Vec<RawSample>>,
+        placements: [Placement; 2],
+        size_px: [u32; 2],
+    ) -> Result<u64, DrainError> {
+        let mut passes: BTreeMap<Into, Records> = BTreeMap::new();
+        let eyes = match merged {
+            _ if merged.iter().any(|draw| matches!(draw, Merged::Mono(_))) => &[Into::Both][..],
+            _ => &[Into::Left, Into::Right],
+        };
+        for eye in eyes {
+            passes.insert(*eye, Records::default());
+        }
+        let mut shadow_sizes: HashMap<u32, (Placement, [u32; 2])> = HashMap::new();
+        let mut triangles = 0;
+        for draw in merged {
+            if let Merged::Shadow(executed) = draw
+                && let Some(info) = session.draw(executed.draw)
+            {
+                let view = viewport(info);
+                let of = (
+                    Placement::new(view),
+                    super::places::both([Placement::new(view); 2]),
+                );
+                shadow_sizes.entry(executed.pass).or_insert(of);
+            }
+            triangles += self.draw(
+                session,
+                draw,
+                records,
+                placements,
+                &shadow_sizes,
+                &mut passes,
+            )?;
+        }
+        for (into, of) in passes {
+            let (kind, eye, size_px) = match into {
+                Into::Left => (PassKind::Main, Some(Eye::Left), size_px),
+                Into::Right => (PassKind::Main, Some(Eye::Right), size_px),
+                Into::Both => (PassKind::Main, None, size_px),
+                Into::Shadow(pass) => {
+                    let size = shadow_sizes.get(&pass).map_or(size_px, |(_, size)| *size);
+                    (PassKind::Shadow, None, size)
+                }
+            };
+            if kind == PassKind::Shadow && of.quads.is_empty() {
+                continue;
+            }
+            self.recording
+                .begin_pass(pass(number, kind, eye, size_px))?;
+            self.recording.records(RawRecords {
+                quads: &of.quads,
+                depths: &of.depths,
+            })?;
+            self.counts += self.recording.end_pass()?.counts;
+        }
+        Ok(triangles)
+    }
+
+    /// Adds a draw and its records. Tells its triangles.
+    fn draw(
+        &mut self,
+        session: &Session,
+        merged: &Merged,
+        records: &HashMap<u32, Vec<RawSample>>,
+        placements: [Placement; 2],
+        shadows: &HashMap<u32, (Placement, [u32; 2])>,
+        passes: &mut BTreeMap<Into, Records>,
+    ) -> Result<u64, DrainError> {
+        let parts = merged.parts();
+        let Some((info, shader)) = parts.iter().find_map(|(executed, _)| {
+            let info = session.draw(executed.draw)?;
+            Some((info, session.shader_of(info)?))
+        }) else {
+            return Ok(0);
+        };
+        let of_part = |executed: &Executed| -> &[RawSample] {
+            records.get(&executed.draw).map_or(&[], Vec::as_slice)
+        };
+        let mut used: BTreeSet<GroupKey> = BTreeSet::new();
+        let mut most = 0;
+        for record in parts.iter().flat_map(|(executed, _)| of_part(executed)) {
+            if let Some((_, texture)) = texture_of(shader, record.group()) {
+                let own = texture.image.element.is_none();
+                used.insert((record.group(), own.then_some(record.element)));
+            }
+            most = most.max(record.primitive.saturating_add(1));
+        }
+        self.count_left_out(
+            shader,
+            parts.iter().flat_map(|(executed, _)| of_part(executed)),
+        );
+        let triangles = most.max(primitives(info));
+        let draws = self.declare(session, info, shader, &used, triangles)?;
+        let replay = draws.replay;
+        for (executed, part) in &parts {
+            let quads = self.quads(shader, &draws, of_part(executed));
+            for (view, quad) in quads {
+                let (into, placement) = match *part {
+                    Part::Eye(Eye::Left) => (Into::Left, placements[0]),
+                    Part::Eye(Eye::Right) => (Into::Right, placements[1]),
+                    Part::Both => (Into::Both, placements[0]),
+                    Part::Layers(layers) => match layers.iter().position(|layer| *layer == view) {
+                        Some(0) => (Into::Left, placements[0]),
+                        Some(_) => (Into::Right, placements[1]),
+                        None => continue,
+                    },
+                    Part::Pass(pass) => match shadows.get(&pass) {
+                        Some((placement, _)) => (Into::Shadow(pass), *placement),
+                        None => continue,
+                    },
+                };
+                quad.place(placement, replay, passes.entry(into).or_default());
+            }
+        }
+        Ok(triangles.into())
+    }
+
+    /// Counts what sites do that no trace can hold.
+    fn count_left_out<'r>(
+        &mut self,
+        shader: &ShaderInfo,
+        records: impl Iterator<Item = &'r RawSample>,
+    ) {
+        let mut counts: BTreeMap<u16, u64> = BTreeMap::new();
+        for record in records {
+            *counts.entry(record.group()).or_default() += u64::from(record.lanes().count_ones());
+        }
+        for site in &shader.sites {
+            if let (What::LeftOut(what), Some(fragments)) = (&site.what, counts.get(&site.group)) {
+                self.leave_out(what, 1, *fragments);
+            }
+        }
+    }
+
+    /// Declares the draws of the trace that a draw becomes: more than one if it has more groups than one can have.
+    fn declare(
+        &mut self,
+        session: &Session,
+        info: &DrawInfo,
+        shader: &ShaderInfo,
+        used: &BTreeSet<GroupKey>,
+        primitives: u32,
+    ) -> Result<Declared, DrainError> {
+        let mut declared = Declared {
+            draws: Vec::new(),
+            groups: HashMap::new(),
+            replay: replay(info),
+        };
+        let mut of_draws: Vec<Vec<UvGroup>> = vec![Vec::new()];
+        for &(coordinates, element) in used {
+            let last = of_draws.len() - 1;
+            let first = of_draws[last].len();
+            let made = self.group(session, info, shader, (coordinates, element), first as u8);
+            let (mut group, groups) = match made {
+                Ok(made) => made,
+                Err(why) => {
+                    self.leave_out(&why, 1, 0);
+                    continue;
+                }
+            };
+            if first + groups.len() > MAX_GROUPS {
+                group.number = groups.len() as u8 - 1;
+                of_draws.push(groups);
+            } else {
+                of_draws[last].extend(groups);
+            }
+            let draw = of_draws.len() - 1;
+            declared
+                .groups
+                .insert((coordinates, element), (draw, group));
+        }
+        for (number, groups) in of_draws.into_iter().enumerate() {
+            let rest = if number == 0 {
+                ""
+            } else {
+                ", more coordinates"
+            };
+            let draw = Draw {
+                material: format!("pipeline {}{rest}", info.pipeline),
+                first_primitive: self.next_primitive,
+                primitives,
+                groups,
+            };
+            let first = self.next_primitive;
+            self.next_primitive = first.saturating_add(primitives);
+            let index = self.recording.draw(draw, declared.replay)?;
+            self.opaque.push(!info.twice && !info.blends);
+            declared.draws.push((index, first));
+        }
+        Ok(declared)
+    }
+
+    fn group(
+        &mut self,
+        session: &Session,
+        info: &DrawInfo,
+        shader: &ShaderInfo,
+        (coordinates, element): GroupKey,
+        first: u8,
+    ) -> Result<(Group, Vec<UvGroup>), String> {
+        let mut bound: HashMap<String, Result<Bound, String>> = HashMap::new();
+        let members = shader.sites.iter();
+        for of in members.filter(|site| site.group == coordinates) {
+            if let What::Texture(texture) = &of.what {
+                let found = self.bound(session, info, texture, element);
+                bound.insert(format!("{texture:?}"), found);
+            }
+        }
+        let of = |texture: &TextureSite| {
+            let found = bound.get(&format!("{texture:?}")).cloned();
+            found.unwrap_or_else(|| Err("a texture that is not known".to_owned()))
+        };
+        Group::new(shader, coordinates, element, first, of)
+    }
+
+    /// The texture and sampler that a site reads.
+    fn bound(
+        &mut self,
+        session: &Session,
+        info: &DrawInfo,
+        site: &TextureSite,
+        element: Option<u32>,
+    ) -> Result<Bound, String> {
+        let find = |binding: &parallax_layer::inject::Binding| {
+            let wanted = binding.element.or(element).unwrap_or(0);
+            info.textures.iter().find(|texture| {
+                (texture.set, texture.binding, texture.element)
+                    == (binding.set, binding.binding, wanted)
+            })
+        };
+        let view = find(&site.image).and_then(|texture| texture.view);
+        let view = view.ok_or("textures whose descriptor is not known")?;
+        let image = session
+            .image(view.image)
+            .ok_or("textures whose image is not known")?;
+        let format = || format!("textures of format {:?}", vk::Format::from_raw(view.format));
+        let of_trace = texture(&view, image);
+        let size = of_trace
+            .as_ref()
+            .map(|texture| texture.size)
+            .ok_or_else(format)?;
+        let known = self.textures.get(&view).copied().flatten();
+        let index = match (known, of_trace) {
+            (Some(index), _) => index,
+            (None, Some(of_trace)) => {
+                let index = self
+                    .recording
+                    .texture(of_trace)
+                    .map_err(|e| e.to_string())?;
+                self.textures.insert(view, Some(index));
+                index
+            }
+            (None, None) => return Err(format()),
+        };
+        let state = site.sampler.as_ref().and_then(|s| find(s)?.sampler);
+        let unnormalized = state.is_some_and(|state| state.unnormalized);
+        let state = match (site.access, state) {
+            (Access::Fetch, _) => FETCH,
+            (Access::Gather, Some(state)) => gathering(sampler(&state)),
+            (_, Some(state)) => sampler(&state),
+            (_, None) => return Err("textures whose sampler is not known".to_owned()),
+        };
+        Ok(Bound {
+            texture: index,
+            sampler: self.recording.sampler(state).map_err(|e| e.to_string())?,
+            size,
+            unnormalized,
+        })
+    }
+
+    /// The quads of a draw's records, by view, primitive and place.
+    fn quads(
+        &self,
+        shader: &ShaderInfo,
+        declared: &Declared,
+        records: &[RawSample],
+    ) -> Vec<(u32, Quad)> {
+        let mut order: Vec<(u64, u32)> = (records.iter().enumerate())
+            .map(|(index, record)| (place(record), index as u32))
+            .collect();
+        // Of one place in the order in which they were recorded.
+        order.par_sort_unstable();
+        let sites = Sites {
+            coverage: coverage_group(shader),
+            survival: survival_group(shader),
+            shader,
+        };
+        let places: Vec<&[(u64, u32)]> = order.chunk_by(|a, b| a.0 == b.0).collect();
+        places
+            .par_iter()
+            .map(|place| {
+                let of: Vec<&RawSample> = place
+                    .iter()
+                    .map(|(_, index)| &records[*index as usize])
+                    .collect();
+                (of[0].view(), quad(&sites, declared, &of))
+            })
+            .collect()
+    }
+}
+
+/// View, primitive and quad of a record.
+fn place(record: &RawSample) -> u64 {
+    u64::from(record.primitive) << 32 | u64::from(record.place)
+}
+
+/// A coordinate group, and the element of its binding's array where fragments choose it.
+type GroupKey = (u16, Option<u32>);
+
+/// The first site of a coordinate group that reads a texture.
+fn texture_of(shader: &ShaderInfo, group: u16) -> Option<(&Site, &TextureSite)> {
+    let mut of = shader.sites.iter().filter(|site| site.group == group);
+    of.find_map(|site| match &site.what {
+        What::Texture(texture) => Some((site, texture)),
+        _ => None,
+    })
+}
+
+/// The trace's draws of a draw.
+struct Declared {
+    /// Index and first primitive.
+    draws: Vec<(u32, u32)>,
+    /// Which of the draws, and the group.
+    groups: HashMap<GroupKey, (usize, Group)>,
+    replay: DepthReplay,
+}
+
+struct Sites<'a> {
+    coverage: Option<u16>,
+    survival: Option<u16>,
+    shader: &'a ShaderInfo,
+}
+
+/// Records of one quad of one primitive.
+struct Quad {
+    at: [u32; 2],
+    records: Vec<RawRecord>,
+    depth: RawDepth,
+}
+
+fn record(draw: (u32, u32), primitive: u32, mask: u8, group: u8, at: &RawQuad) -> RawRecord {
+    RawRecord {
+        header: RawRecord::pack(0, 0, mask, group),
+        primitive: draw.1.saturating_add(primitive),
+        draw: draw.0,
+        passing: 0,
+        uv: at.uv,
+        dx: at.dx,
+        dy: at.dy,
+        cross: at.cross,
+    }
+}
+
+/// Joins the records of a quad of a primitive.
+fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
+    let primitive = of[0].primitive;
+    let lanes_of = |group: Option<u16>| {
+        let of = of.iter().filter(|record| Some(record.group()) == group);
+        of.fold(0, |mask, record| mask | record.lanes())
+    };
+    let covered = lanes_of(sites.coverage);
+    let mut records = Vec::new();
+    // Lanes that sample something in the first draw, whose records tell what is covered.
+    let mut sampled = 0;
+    let mut fragments: BTreeMap<GroupKey, Vec<(u8, &RawSample)>> = BTreeMap::new();
+    for sample in of {
+        let Some((site, texture)) = texture_of(sites.shader, sample.group()) else {
+            continue;
+        };
+        let element = texture.image.element.is_none().then_some(sample.element);
+        let key = (sample.group(), element);
+        let Some((draw, group)) = declared.groups.get(&key) else {
+            continue;
+        };
+        if site.form == Form::Fragment {
+            let lane = sample.lanes().trailing_zeros() as u8;
+            fragments.entry(key).or_default().push((lane, sample));
+            continue;
+        }
+        let at = group.quad(sample.as_quad());
+        let to = declared.draws[*draw];
+        records.push(record(to, primitive, sample.lanes(), group.number, &at));
+        sampled |= if *draw == 0 { sample.lanes() } else { 0 };
+    }
+    for (key, of) in fragments {
+        let (draw, group) = &declared.groups[&key];
+        let lanes: Vec<_> = (of.iter())
+            .map(|(lane, sample)| (*lane, group.fragment(&sample.as_fragment())))
+            .collect();
+        let to = declared.draws[*draw];
+        for visit in visits(&lanes, group.by_layer()) {
+            if group.operands {
+                let before = group.number - 1;
+                let mut operands = record(to, primitive, visit.mask, before, &visit.operands);
+                operands.passing = RawRecord::OPERANDS;
+                records.push(operands);
+            }
+            records.push(record(to, primitive, visit.mask, group.number, &visit.uv));
+            sampled |= if *draw == 0 { visit.mask } else { 0 };
+        }
+    }
+    let first = declared.draws[0];
+    let alone = covered & !sampled;
+    let none = RawQuad::default();
+    let mut depth = RawDepth::default();
+    if declared.replay == DepthReplay::None {
+        if alone != 0 {
+            records.push(record(first, primitive, alone, NO_GROUP, &none));
+        }
+        return Quad {
+            at: of[0].quad(),
+            records,
+            depth,
+        };
+    }
+    // Every covered lane is held to the depth of those that survived before.
+    let survived = lanes_of(sites.survival);
+    let depths = of
+        .iter()
+        .find(|record| Some(record.group()) == sites.coverage);
+    if let Some(depths) = depths.map(|record| record.as_quad()) {
+        let [z, dx, dy, cross] = [depths.uv, depths.dx, depths.dy, depths.cross].map(|v| v[0]);
+        depth.depth = [z, z + dx, z + dy, z + dx + dy + cross];
+    }
+    let flags = RawRecord::HAS_DEPTH | u32::from(survived);
+    let whole = records
+        .iter_mut()
+        .find(|record| record.draw == first.0 && record.mask() == covered && !record.is_operands());
+    match whole {
+        Some(record) => record.passing |= flags,
+        None => {
+            let mut coverage = record(first, primitive, covered, NO_GROUP, &none);
+            coverage.passing = flags;
+            records.push(coverage);
+        }
+    }
+    Quad {
+        at: of[0].quad(),
+        records,
+        depth,
+    }
+}
+
+impl Quad {
+    /// Adds the records of the lanes that are in a picture.
+    fn place(self, placement: Placement, replay: DepthReplay, into: &mut Records) {
+        let has_depths = replay != DepthReplay::None;
+        for mut record in self.records {
+            let Some(([x, y], mask)) = placement.quad(self.at, record.mask()) else {
+                continue;
+            };
+            record.header = RawRecord::pack(x, y, mask, record.group());
+            into.quads.push(record);
+            if has_depths || !into.depths.is_empty() {
+                into.depths
+                    .resize(into.quads.len() - 1, RawDepth::default());
+                into.depths.push(self.depth);
+            }
+        }
+    }
+}
+
+/// Primitives of a draw by its command; 0 where the device knew alone.
+fn primitives(info: &DrawInfo) -> u32 {
+    use vk::PrimitiveTopology as Kind;
+    let vertices = info.vertices;
+    match Kind::from_raw(info.topology) {
+        Kind::POINT_LIST => vertices,
+        Kind::LINE_LIST => vertices / 2,
+        Kind::LINE_STRIP => vertices.saturating_sub(1),
+        Kind::TRIANGLE_LIST => vertices / 3,
+        Kind::TRIANGLE_STRIP | Kind::TRIANGLE_FAN => vertices.saturating_sub(2),
+        _ => 0,
+    }
+}
+
+/// The depth test that primitives of a draw are held to among themselves: the driver has not done it where fragments may
+/// be discarded.
+fn replay(info: &DrawInfo) -> DepthReplay {
+    if !info.twice || !info.depth.tests || !info.depth.writes {
+        return DepthReplay::None;
+    }
+    match vk::CompareOp::from_raw(info.depth.compare) {
+        vk::CompareOp::LESS => DepthReplay::Less,
+        vk::CompareOp::LESS_OR_EQUAL => DepthReplay::LessOrEqual,
+        vk::CompareOp::GREATER => DepthReplay::Greater,
+        vk::CompareOp::GREATER_OR_EQUAL => DepthReplay::GreaterOrEqual,
+        // Nothing that is written changes what passes.
+        _ => DepthReplay::None,
+    }
+}

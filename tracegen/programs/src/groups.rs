@@ -1,0 +1,355 @@
+//! The uv groups of a draw: which sites share records, and what they sample.
+
+use crate::lanes::{LaneSample, lod, on_cube};
+use formats::textrace::{LodRule, Sample, SampleLevel, UvGroup};
+use parallax_layer::inject::{Access, Form, Lod, RawFragment, RawQuad, Shape, TextureSite, What};
+use parallax_layer::spool::ShaderInfo;
+
+/// A texture of the trace, and the sampler that a site uses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bound {
+    /// Index of the texture.
+    pub texture: u32,
+    /// Index of the sampler.
+    pub sampler: u16,
+    /// Texels of level 0.
+    pub size: [u32; 2],
+    /// Coordinates are texels.
+    pub unnormalized: bool,
+}
+
+/// What a group's records are made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Group {
+    /// Element of the binding's array, where fragments choose it.
+    pub element: Option<u32>,
+    /// Number among the draw's groups; the operands' is one less.
+    pub number: u8,
+    /// Records come after operands.
+    pub operands: bool,
+    kind: TextureSite,
+    /// The first texture, whose size makes texels of coordinates.
+    size: [u32; 2],
+    unnormalized: bool,
+}
+
+/// Why a site is in no group.
+pub type LeftOut = String;
+
+impl Group {
+    /// Makes the group of the sites of a shader's coordinate group. `bound` tells the texture of a site.
+    ///
+    /// # Errors
+    /// What its records cannot be.
+    pub fn new(
+        shader: &ShaderInfo,
+        coordinates: u16,
+        element: Option<u32>,
+        first_number: u8,
+        bound: impl Fn(&TextureSite) -> Result<Bound, LeftOut>,
+    ) -> Result<(Self, Vec<UvGroup>), LeftOut> {
+        let members = (shader.sites.iter()).filter(|site| site.group == coordinates);
+        let mut group: Option<Self> = None;
+        let mut samples = Vec::new();
+        let mut extent = [1; 2];
+        let mut reason = "a site without a texture".to_owned();
+        for of in members {
+            let What::Texture(texture) = &of.what else {
+                continue;
+            };
+            let bound = match bound(texture) {
+                Ok(bound) => bound,
+                Err(why) => {
+                    reason = why;
+                    continue;
+                }
+            };
+            let operands = needs_operands(texture, of.form);
+            let of_group = group.get_or_insert(Self {
+                element,
+                number: first_number + u8::from(operands),
+                operands,
+                kind: texture.clone(),
+                size: bound.size,
+                unnormalized: bound.unnormalized,
+            });
+            extent = [0, 1].map(|axis| extent[axis].max(bound.size[axis]));
+            samples.push(Sample {
+                texture: bound.texture,
+                sampler: bound.sampler,
+                layer: 0,
+                offset: texture.offset,
+                level: level(texture, of_group.operands),
+            });
+        }
+        let group = group.ok_or(reason)?;
+        let mut groups = Vec::with_capacity(2);
+        if group.operands {
+            groups.push(UvGroup {
+                extent: [1, 1],
+                samples: Vec::new(),
+            });
+        }
+        groups.push(UvGroup { extent, samples });
+        Ok((group, groups))
+    }
+
+    /// A quad's coordinates as a trace has them.
+    #[must_use]
+    pub fn quad(&self, raw: RawQuad) -> RawQuad {
+        let Some((size, shift)) = self.texels(self.constant_level()) else {
+            return raw;
+        };
+        let scaled = |v: [f32; 2]| [0, 1].map(|axis| v[axis] / size[axis] as f32);
+        RawQuad {
+            uv: scaled(raw.uv.map(|v| v + shift)),
+            dx: scaled(raw.dx),
+            dy: scaled(raw.dy),
+            cross: scaled(raw.cross),
+        }
+    }
+
+    /// What a fragment samples.
+    #[must_use]
+    pub fn fragment(&self, raw: &RawFragment) -> LaneSample {
+        let own_lod = match self.kind.lod {
+            Lod::Bias(None) | Lod::Explicit(None) => raw.lod,
+            _ => 0.0,
+        };
+        if self.kind.shape == Shape::Cube {
+            let (face, uv, slopes) = on_cube(raw);
+            let derived = || lod(slopes, self.size);
+            let lod = match self.kind.lod {
+                Lod::Derivatives | Lod::Gradients => derived(),
+                Lod::Bias(bias) => derived() + bias.unwrap_or(raw.lod),
+                Lod::Explicit(_) => own_lod,
+            };
+            return LaneSample {
+                uv,
+                lod,
+                layer: face as f32,
+                slope: [[0.0; 2]; 2],
+            };
+        }
+        let pair = |v: [f32; 3]| [v[0], v[1]];
+        let level = match self.kind.lod {
+            Lod::Explicit(None) => own_lod,
+            _ => self.constant_level(),
+        };
+        let (mut uv, mut slope) = (pair(raw.at), [pair(raw.dx), pair(raw.dy)]);
+        let gradient = match self.kind.lod {
+            Lod::Gradients => lod(slope, self.size),
+            _ => own_lod,
+        };
+        if let Some((size, shift)) = self.texels(level) {
+            let scaled = |v: [f32; 2]| [0, 1].map(|axis| v[axis] / size[axis] as f32);
+            (uv, slope) = (scaled(uv.map(|v| v + shift)), slope.map(scaled));
+        }
+        if !matches!(self.kind.lod, Lod::Derivatives | Lod::Bias(_)) {
+            // Gradients that an instruction names tell nothing of its neighbours.
+            slope = [[0.0; 2]; 2];
+        }
+        LaneSample {
+            uv,
+            lod: gradient,
+            layer: match self.kind.shape {
+                // To the nearest, ties to even (Vulkan 1.3, "Integer Texel Coordinate Operations").
+                Shape::Array => raw.at[2].round_ties_even().max(0.0),
+                _ => 0.0,
+            },
+            slope,
+        }
+    }
+
+    /// Lanes of different layers have records of their own: their coordinates lie on different faces.
+    #[must_use]
+    pub fn by_layer(&self) -> bool {
+        self.kind.shape == Shape::Cube
+    }
+
+    fn constant_level(&self) -> f32 {
+        match self.kind.lod {
+            Lod::Explicit(Some(level)) => level,
+            _ => 0.0,
+        }
+    }
+
+    /// Size of the level that coordinates in texels are of, and how far a texel's coordinate is from its middle; `None`
+    /// where coordinates are those of the whole texture.
+    fn texels(&self, level: f32) -> Option<([u32; 2], f32)> {
+        if self.kind.access == Access::Fetch {
+            let level = level.clamp(0.0, 31.0) as u32;
+            return Some((self.size.map(|size| (size >> level).max(1)), 0.5));
+        }
+        self.unnormalized.then_some((self.size, 0.0))
+    }
+}
+
+/// A site's records have a level or a layer of their own.
+fn needs_operands(texture: &TextureSite, form: Form) -> bool {
+    let own_level = matches!(
+        texture.lod,
+        Lod::Bias(None) | Lod::Explicit(None) | Lod::Gradients
+    );
+    form == Form::Fragment && (own_level || texture.shape != Shape::Flat)
+}
+
+fn level(texture: &TextureSite, operands: bool) -> SampleLevel {
+    let fixed = |lod: f32| (256.0 * lod).round().clamp(-32768.0, 32767.0) as i16;
+    let (rule, lod_256ths) = match (texture.shape, texture.lod) {
+        // Its derivatives cross faces: the level is an operand.
+        (Shape::Cube, Lod::Explicit(Some(level))) => (LodRule::Explicit, fixed(level)),
+        (Shape::Cube, _) => (LodRule::Explicit, 0),
+        (_, Lod::Derivatives) => (LodRule::Derivatives, 0),
+        (_, Lod::Bias(bias)) => (LodRule::Bias, fixed(bias.unwrap_or(0.0))),
+        (_, Lod::Explicit(level)) => (LodRule::Explicit, fixed(level.unwrap_or(0.0))),
+        (_, Lod::Gradients) => (LodRule::Explicit, 0),
+    };
+    SampleLevel {
+        rule,
+        lod_256ths,
+        operands,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use parallax_layer::inject::{Binding, DepthTests, Site};
+
+    fn site(form: Form, group: u16, shape: Shape, access: Access, lod: Lod) -> Site {
+        let binding = Binding {
+            set: 0,
+            binding: 0,
+            element: Some(0),
+        };
+        Site {
+            what: What::Texture(TextureSite {
+                access,
+                shape,
+                image: binding,
+                sampler: Some(binding),
+                lod,
+                offset: [1, 0],
+            }),
+            form,
+            group,
+            unconditional: true,
+        }
+    }
+
+    fn made(sites: Vec<Site>) -> (Group, Vec<UvGroup>) {
+        let shader = ShaderInfo {
+            shader: 0,
+            tests: DepthTests::Either,
+            sites,
+        };
+        let mut sizes = std::cell::RefCell::new([[64, 32], [16, 128]].into_iter());
+        let bound = |_: &TextureSite| {
+            let size = sizes.borrow_mut().next().ok_or("no more".to_owned())?;
+            Ok(Bound {
+                texture: 5,
+                sampler: 1,
+                size,
+                unnormalized: false,
+            })
+        };
+        let made = Group::new(&shader, 0, None, 3, bound).unwrap();
+        sizes.get_mut().for_each(drop);
+        made
+    }
+
+    #[test]
+    fn sites_that_follow_share_the_group_and_its_extent() {
+        let flat = |group| {
+            site(
+                Form::Quad,
+                group,
+                Shape::Flat,
+                Access::Sample,
+                Lod::Derivatives,
+            )
+        };
+        let (group, groups) = made(vec![flat(0), flat(0), flat(1)]);
+        assert_eq!((group.number, group.operands), (3, false));
+        let [of] = &groups[..] else {
+            panic!("{groups:?}");
+        };
+        assert_eq!((of.extent, of.samples.len()), ([64, 128], 2));
+        assert!(
+            of.samples
+                .iter()
+                .all(|s| s.level.is_default() && s.offset == [1, 0])
+        );
+    }
+
+    #[test]
+    fn a_level_or_layer_of_its_own_takes_operands_before_it() {
+        let array = site(
+            Form::Fragment,
+            0,
+            Shape::Array,
+            Access::Sample,
+            Lod::Bias(None),
+        );
+        let (group, groups) = made(vec![array]);
+        assert_eq!((group.number, group.operands, groups.len()), (4, true, 2));
+        assert!(groups[1].has_operands() && groups[0].samples.is_empty());
+        let raw = RawFragment {
+            at: [0.5, 0.25, 2.5],
+            lod: 1.5,
+            ..RawFragment::default()
+        };
+        let lane = group.fragment(&raw);
+        assert_eq!((lane.uv, lane.lod, lane.layer), ([0.5, 0.25], 1.5, 2.0));
+    }
+
+    #[test]
+    fn a_fetched_texel_is_the_middle_of_its_coordinates_at_its_level() {
+        let fetch = site(
+            Form::Quad,
+            0,
+            Shape::Flat,
+            Access::Fetch,
+            Lod::Explicit(Some(2.0)),
+        );
+        let (group, groups) = made(vec![fetch]);
+        assert_eq!(groups[0].samples[0].level.lod_256ths, 512);
+        let raw = RawQuad {
+            uv: [3.0, 1.0],
+            dx: [1.0, 0.0],
+            ..RawQuad::default()
+        };
+        let quad = group.quad(raw);
+        // Level 2 has 16x8 texels.
+        assert_eq!(
+            (quad.uv, quad.dx),
+            ([3.5 / 16.0, 1.5 / 8.0], [1.0 / 16.0, 0.0])
+        );
+    }
+
+    #[test]
+    fn a_level_of_a_cube_follows_from_its_faces_or_is_named() {
+        let sky = |lod| {
+            made(vec![site(
+                Form::Fragment,
+                0,
+                Shape::Cube,
+                Access::Sample,
+                lod,
+            )])
+            .0
+        };
+        let raw = RawFragment {
+            at: [0.0, 0.0, 1.0],
+            dx: [0.25, 0.0, 0.0],
+            lod: 7.0,
+            ..RawFragment::default()
+        };
+        // An eighth of 64 texels.
+        assert_eq!(sky(Lod::Derivatives).fragment(&raw).lod, 3.0);
+        assert_eq!(sky(Lod::Bias(Some(1.0))).fragment(&raw).lod, 4.0);
+        assert_eq!(sky(Lod::Explicit(None)).fragment(&raw).lod, 7.0);
+        assert_eq!(sky(Lod::Derivatives).fragment(&raw).layer, 4.0);
+    }
+}

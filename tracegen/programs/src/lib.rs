@@ -1,0 +1,25 @@
+//! From a program to a trace.
+//!
+//! ```text
+//! launch: the program under the layer -> a folder of events and records (layer::spool)
+//!   -> session: frames, passes, draws -> views: which draw shows which eye
+//!   -> drain: records of draws -> quads and their groups -> record::Recording -> .textrace
+//! ```
+
+pub mod browser;
+mod check;
+mod drain;
+mod groups;
+mod lanes;
+mod launch;
+pub mod list;
+mod pairs;
+mod session;
+mod texture;
+mod views;
+
+pub use check::{Check, Difference, check};
+pub use drain::{DrainError, Drained, Job, drain};
+pub use launch::{Launch, LaunchError};
+pub use session::{Executed, Frame, Session, SessionError};
+pub use views::{FileError, Other, Role, Rule, RuleFile, View, Views, ViewsError, Wanted};

@@ -1,0 +1,262 @@
+//! The passes of a frame, as a table and as a page with pictures.
+
+mod page;
+
+pub use page::page;
+
+use crate::drain::weight;
+use crate::session::{Frame, Session, SessionError};
+use crate::texture::texture;
+use crate::views::{self, Role, View, Views, ViewsError, Wanted, viewport};
+use ash::vk;
+use parallax_layer::inject::{RawSample, What};
+use parallax_layer::spool::{ShaderInfo, ViewInfo};
+use std::collections::{HashMap, HashSet};
+use std::fmt::Write as _;
+
+/// A picture, small: red, green, blue and alpha, row by row.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// Width and height.
+    pub size: [u32; 2],
+    /// Texels.
+    pub texels: Vec<u8>,
+}
+
+/// A pass of a frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Row {
+    /// Number within the frame.
+    pub number: usize,
+    /// What its draws show, each once.
+    pub shows: Vec<Role>,
+    /// Size and format of the target.
+    pub target: String,
+    /// Rectangles that are rendered, each once.
+    pub viewports: Vec<View>,
+    /// Views that draws are broadcast to.
+    pub views: u32,
+    /// Draws.
+    pub draws: u64,
+    /// Draws that are not recorded, or less exactly: why, each once.
+    pub caveats: Vec<String>,
+    /// Fragments.
+    pub fragments: u64,
+    /// Texture samples of fragments.
+    pub samples: u64,
+    /// Textures that were read.
+    pub textures: usize,
+    /// Their bytes, all levels.
+    pub texture_bytes: u64,
+    /// What it rendered.
+    pub picture: Option<Picture>,
+}
+
+/// The passes of a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct List {
+    /// The frame's number.
+    pub frame: u32,
+    /// Which rule told both eyes apart, or why none did.
+    pub eyes: Result<views::Rule, ViewsError>,
+    /// Passes in the order of execution.
+    pub rows: Vec<Row>,
+}
+
+/// Lists a frame.
+///
+/// # Errors
+/// A frame that was not drawn, or records that cannot be read.
+pub fn list(session: &mut Session, number: u32, wanted: &Wanted) -> Result<List, SessionError> {
+    let frame = session.frames.get(&number).cloned();
+    let frame = frame.ok_or(SessionError::NotDrawn(number))?;
+    let records = session.records(number)?;
+    let weight = |draw| weight(session, draw, &records);
+    let weights: Vec<u64> = frame.draws.iter().map(weight).collect();
+    let views = views::find(session, &frame, &weights, wanted);
+    let rows = rows(session, &frame, &weights, &records, views.as_ref().ok());
+    Ok(List {
+        frame: number,
+        eyes: views.map(|views| views.rule),
+        rows,
+    })
+}
+
+fn rows(
+    session: &Session,
+    frame: &Frame,
+    weights: &[u64],
+    records: &HashMap<u32, Vec<RawSample>>,
+    views: Option<&Views>,
+) -> Vec<Row> {
+    let numbers = views::pass_numbers(frame);
+    let mut rows: Vec<Row> = Vec::new();
+    let mut textures: Vec<HashSet<ViewInfo>> = Vec::new();
+    for (place, executed) in frame.draws.iter().enumerate() {
+        let number = numbers[place];
+        if number == rows.len() {
+            rows.push(empty_row(session, number, executed.pass));
+            textures.push(HashSet::new());
+        }
+        let row = &mut rows[number];
+        row.draws += 1;
+        row.fragments += weights[place];
+        if let Some(views) = views {
+            add(&mut row.shows, views.roles[place]);
+        }
+        let Some(info) = session.draw(executed.draw) else {
+            continue;
+        };
+        add(&mut row.viewports, viewport(info));
+        for caveat in info.unrecorded.iter().chain(&info.caveats) {
+            add(&mut row.caveats, caveat.clone());
+        }
+        if let (Some(shader), Some(of)) = (session.shader_of(info), records.get(&executed.draw)) {
+            row.samples += samples(shader, of);
+        }
+        textures[number].extend(info.textures.iter().filter_map(|texture| texture.view));
+    }
+    for (row, textures) in rows.iter_mut().zip(textures) {
+        row.textures = textures.len();
+        let bytes = textures.iter().filter_map(|view| {
+            let texture = texture(view, session.image(view.image)?)?;
+            let block = texture.format.block();
+            let level = |level| {
+                let size = texture.level_size(level);
+                let blocks = [0, 1].map(|axis| u64::from(size[axis].div_ceil(block.texels[axis])));
+                blocks[0] * blocks[1] * u64::from(block.bytes)
+            };
+            Some((0..texture.levels).map(level).sum::<u64>() * u64::from(texture.layers))
+        });
+        row.texture_bytes = bytes.sum();
+    }
+    rows
+}
+
+/// Adds what is not there yet.
+fn add<T: PartialEq>(all: &mut Vec<T>, one: T) {
+    if !all.contains(&one) {
+        all.push(one);
+    }
+}
+
+fn empty_row(session: &Session, number: usize, pass: u32) -> Row {
+    let info = session.pass(pass).cloned().unwrap_or_default();
+    let name = |view: &ViewInfo| {
+        let size = session.image(view.image).map_or([0; 2], |image| {
+            [0, 1].map(|axis| (image.size[axis] >> view.levels[0]).max(1))
+        });
+        let format = vk::Format::from_raw(view.format);
+        format!("{}x{} {format:?}", size[0], size[1])
+    };
+    let target = match (&info.colors[..], &info.depth) {
+        ([], None) => "nothing".to_owned(),
+        ([], Some(depth)) => name(depth),
+        ([one], _) => name(one),
+        ([first, rest @ ..], _) => format!("{} and {} more", name(first), rest.len()),
+    };
+    Row {
+        number,
+        target,
+        views: info.view_mask.count_ones(),
+        picture: (session.picture(pass)).map(|(size, texels)| Picture { size, texels }),
+        ..Row::default()
+    }
+}
+
+/// Texture samples of records.
+fn samples(shader: &ShaderInfo, records: &[RawSample]) -> u64 {
+    let mut of_groups: HashMap<u16, u64> = HashMap::new();
+    for site in &shader.sites {
+        if matches!(site.what, What::Texture(_)) {
+            *of_groups.entry(site.group).or_default() += 1;
+        }
+    }
+    let of = |record: &RawSample| {
+        let sites = of_groups.get(&record.group()).copied().unwrap_or(0);
+        sites * u64::from(record.lanes().count_ones())
+    };
+    records.iter().map(of).sum()
+}
+
+/// Names of what a pass's draws show.
+fn shows(row: &Row) -> String {
+    let names: Vec<&str> = row.shows.iter().map(|role| role.name()).collect();
+    names.join(" + ")
+}
+
+fn rectangles(row: &Row) -> String {
+    const MOST: usize = 3;
+    let name = |view: &View| {
+        let View {
+            origin: [x, y],
+            size: [width, height],
+        } = view;
+        format!("{width}x{height} at {x},{y}")
+    };
+    let mut names: Vec<String> = row.viewports.iter().take(MOST).map(name).collect();
+    if row.viewports.len() > MOST {
+        names.push(format!("{} more", row.viewports.len() - MOST));
+    }
+    if row.views > 0 {
+        names.push(format!("{} views", row.views));
+    }
+    names.join(" + ")
+}
+
+const COLUMNS: [&str; 8] = [
+    "pass",
+    "shows",
+    "target",
+    "viewports",
+    "draws",
+    "fragments",
+    "samples",
+    "textures",
+];
+
+fn cells(row: &Row) -> [String; 8] {
+    [
+        row.number.to_string(),
+        shows(row),
+        row.target.clone(),
+        rectangles(row),
+        row.draws.to_string(),
+        row.fragments.to_string(),
+        row.samples.to_string(),
+        format!(
+            "{} ({:.1} MB)",
+            row.textures,
+            row.texture_bytes as f64 / 1e6
+        ),
+    ]
+}
+
+impl List {
+    /// How both eyes were told apart.
+    #[must_use]
+    pub fn eyes_text(&self) -> String {
+        match &self.eyes {
+            Ok(rule) => format!("frame {}: both eyes by {}", self.frame, rule.name()),
+            Err(error) => error.to_string(),
+        }
+    }
+
+    /// As lines of text.
+    #[must_use]
+    pub fn table(&self) -> String {
+        let mut lines = vec![COLUMNS.map(str::to_owned)];
+        lines.extend(self.rows.iter().map(cells));
+        let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max();
+        let widths: Vec<usize> = (0..COLUMNS.len()).filter_map(width).collect();
+        let mut text = String::new();
+        for line in &lines {
+            let cells = line.iter().zip(&widths);
+            let cells: Vec<String> = cells
+                .map(|(cell, width)| format!("{cell:width$}"))
+                .collect();
+            let _ = writeln!(text, "{}", cells.join("  ").trim_end());
+        }
+        text
+    }
+}

@@ -1,0 +1,123 @@
+//! The list as a page of its own.
+
+use super::{COLUMNS, List, Picture, Row, cells};
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD;
+use image::ImageEncoder;
+use image::codecs::png::PngEncoder;
+use std::fmt::Write as _;
+
+const STYLE: &str =
+    "body { font: 14px sans-serif; margin: 2em; } table { border-collapse: collapse; }
+th, td { border: 1px solid #ccc; padding: 4px 8px; text-align: left; vertical-align: top; }
+img { max-width: 256px; max-height: 256px; background: #888; } .why { color: #a30; }";
+
+/// The page of some frames of a program.
+#[must_use]
+pub fn page(program: &str, lists: &[List]) -> String {
+    let title = escaped(program);
+    let mut text = format!(
+        "<!doctype html>\n<meta charset=\"utf-8\">\n<title>Passes of {title}</title>\n<style>{STYLE}</style>\n\
+         <h1>Passes of {title}</h1>\n"
+    );
+    for list in lists {
+        let _ = writeln!(
+            text,
+            "<h2>{}</h2>\n<table>\n<tr><th>picture</th>",
+            escaped(&list.eyes_text())
+        );
+        for column in COLUMNS {
+            let _ = write!(text, "<th>{column}</th>");
+        }
+        let _ = writeln!(text, "</tr>");
+        for row in &list.rows {
+            line(row, &mut text);
+        }
+        let _ = writeln!(text, "</table>");
+    }
+    text
+}
+
+fn line(row: &Row, text: &mut String) {
+    let picture = row
+        .picture
+        .as_ref()
+        .and_then(png)
+        .map_or_else(String::new, |png| {
+            let data = STANDARD.encode(png);
+            format!(
+                "<img alt=\"pass {}\" src=\"data:image/png;base64,{data}\">",
+                row.number
+            )
+        });
+    let _ = write!(text, "<tr><td>{picture}</td>");
+    for cell in cells(row) {
+        let _ = write!(text, "<td>{}</td>", escaped(&cell));
+    }
+    let _ = writeln!(text, "</tr>");
+    if !row.caveats.is_empty() {
+        let why = escaped(&row.caveats.join("; "));
+        let span = COLUMNS.len() + 1;
+        let _ = writeln!(
+            text,
+            "<tr><td colspan=\"{span}\" class=\"why\">{why}</td></tr>"
+        );
+    }
+}
+
+/// A picture as a PNG file, opaque.
+fn png(picture: &Picture) -> Option<Vec<u8>> {
+    let [width, height] = picture.size;
+    let rgb: Vec<u8> = (picture.texels.chunks_exact(4))
+        .flat_map(|texel| [texel[0], texel[1], texel[2]])
+        .collect();
+    let mut bytes = Vec::new();
+    let color = image::ExtendedColorType::Rgb8;
+    let written = PngEncoder::new(&mut bytes).write_image(&rgb, width, height, color);
+    written.ok().map(|()| bytes)
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::views::{Role, Rule, View};
+
+    #[test]
+    fn a_page_shows_passes_and_their_pictures_and_escapes_names() {
+        let row = Row {
+            shows: vec![Role::Shadow],
+            target: "64x64 D32_SFLOAT".to_owned(),
+            viewports: vec![View {
+                origin: [0, 0],
+                size: [64, 64],
+            }],
+            draws: 3,
+            caveats: vec!["alpha to coverage".to_owned()],
+            picture: Some(Picture {
+                size: [1, 1],
+                texels: vec![255; 4],
+            }),
+            ..Row::default()
+        };
+        let list = List {
+            frame: 4,
+            eyes: Ok(Rule::Halves),
+            rows: vec![row],
+        };
+        let text = page("a<b", std::slice::from_ref(&list));
+        assert!(text.contains("<title>Passes of a&lt;b</title>"));
+        assert!(text.contains("frame 4: both eyes by viewport halves"));
+        assert!(text.contains("shadow map") && text.contains("data:image/png;base64,iVBOR"));
+        assert!(text.contains("alpha to coverage"));
+        let table = list.table();
+        let lines: Vec<&str> = table.lines().collect();
+        assert!(lines[0].starts_with("pass  shows"), "{table}");
+        assert!(lines[1].contains("64x64 at 0,0"), "{table}");
+    }
+}

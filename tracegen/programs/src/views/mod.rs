@@ -1,0 +1,330 @@
+//! Which draws show which eye: rules for how programs render stereo pictures, and files of rules for those that no rule
+//! fits.
+
+mod file;
+mod others;
+mod rules;
+
+pub use file::{FileError, RuleFile};
+pub use others::Other;
+
+use crate::session::{Frame, Session};
+use formats::view::Eye;
+use parallax_layer::spool::{DrawInfo, PassInfo, ViewInfo};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// How a program renders for two eyes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rule {
+    /// A draw is broadcast to two layers.
+    Multiview,
+    /// Two viewports of one target.
+    Halves,
+    /// A target for each eye.
+    Targets,
+    /// One target for both, one eye after the other, told apart by the channels that are written.
+    Channels,
+    /// One target for both: the same draws twice.
+    Twice,
+    /// One eye alone.
+    Mono,
+    /// A file of rules.
+    File,
+}
+
+impl Rule {
+    /// Every rule that finds two eyes, in the order in which they are tried.
+    pub const ALL: [Self; 5] = [
+        Self::Multiview,
+        Self::Halves,
+        Self::Targets,
+        Self::Channels,
+        Self::Twice,
+    ];
+
+    /// In words.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Multiview => "multiview",
+            Self::Halves => "viewport halves",
+            Self::Targets => "a target per eye",
+            Self::Channels => "colour channels",
+            Self::Twice => "equal draws twice",
+            Self::Mono => "one eye",
+            Self::File => "a file of rules",
+        }
+    }
+}
+
+/// What is to find the views.
+#[derive(Clone, Debug, Default)]
+pub enum Wanted {
+    /// The first rule that fits.
+    #[default]
+    First,
+    /// A rule.
+    Rule(Rule),
+    /// A file of rules.
+    File(RuleFile),
+}
+
+/// A rectangle of a target, in pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct View {
+    /// Left and top edge.
+    pub origin: [i32; 2],
+    /// Width and height.
+    pub size: [u32; 2],
+}
+
+/// What a draw shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// A view of an eye; `None` for one that belongs to both.
+    Seen(Option<Eye>),
+    /// Both eyes: the views of the draw tell which.
+    Multiview,
+    /// Depth seen from a light.
+    Shadow,
+    /// Nothing that a trace is of.
+    Other(Other),
+}
+
+impl Role {
+    /// In words.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Seen(Some(Eye::Left)) => "left eye",
+            Self::Seen(Some(Eye::Right)) => "right eye",
+            Self::Seen(None) => "one eye",
+            Self::Multiview => "both eyes",
+            Self::Shadow => "shadow map",
+            Self::Other(other) => other.name(),
+        }
+    }
+}
+
+/// The views of a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Views {
+    /// The rule that found them.
+    pub rule: Rule,
+    /// Rectangle of the left and the right eye in its target.
+    pub eyes: [View; 2],
+    /// Views of a multiview pass that are the left and the right eye.
+    pub layers: [u32; 2],
+    /// Of each executed draw of the frame.
+    pub roles: Vec<Role>,
+}
+
+/// No rule fits.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum ViewsError {
+    /// None of the rules.
+    #[error(
+        "frame {0}: no two eyes were found, by none of: multiview, viewport halves, a target per eye, colour channels, equal draws \
+         twice; --list shows the frame's passes, --eyes names a rule, --eyes mono takes the largest target alone, --rules a file"
+    )]
+    NoStereo(u32),
+    /// The rule that was named.
+    #[error("frame {frame}: no two eyes were found by the rule {rule}")]
+    NotBy {
+        /// Frame.
+        frame: u32,
+        /// Rule.
+        rule: &'static str,
+    },
+    /// Nothing was drawn.
+    #[error("frame {0}: nothing was drawn into a colour target")]
+    Empty(u32),
+    /// The eyes of a file's rules have different sizes.
+    #[error("frame {frame}: expected eyes of one size, found {left:?} and {right:?} pixels")]
+    Sizes {
+        /// Frame.
+        frame: u32,
+        /// Of the left eye.
+        left: [u32; 2],
+        /// Of the right eye.
+        right: [u32; 2],
+    },
+}
+
+/// A draw with what rules look at.
+struct Drawn<'a> {
+    place: usize,
+    info: &'a DrawInfo,
+    pass: Option<&'a PassInfo>,
+    /// Number of the pass within its frame.
+    pass_number: usize,
+    /// Fragments that tell what the frame is about.
+    weight: u64,
+}
+
+/// What makes a draw of one eye the same as one of the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct DrawKey {
+    /// Pipeline.
+    pub pipeline: u32,
+    /// Vertices or indices.
+    pub vertices: u32,
+    /// Instances.
+    pub instances: u32,
+}
+
+impl DrawKey {
+    /// A draw's.
+    #[must_use]
+    pub fn of(draw: &DrawInfo) -> Self {
+        Self {
+            pipeline: draw.pipeline,
+            vertices: draw.vertices,
+            instances: draw.instances,
+        }
+    }
+}
+
+impl Drawn<'_> {
+    /// First colour attachment that is written.
+    fn target(&self) -> Option<ViewInfo> {
+        let pass = self.pass?;
+        let written = |(place, _): &(usize, &ViewInfo)| {
+            self.info
+                .color_masks
+                .get(*place)
+                .is_none_or(|mask| *mask != 0)
+        };
+        let mut colors = pass.colors.iter().enumerate();
+        colors.find(written).map(|(_, view)| *view)
+    }
+
+    fn depth(&self) -> Option<ViewInfo> {
+        self.pass?.depth
+    }
+
+    fn is_depth_alone(&self) -> bool {
+        self.depth().is_some() && self.target().is_none()
+    }
+
+    /// Whatever is seen of a scene hides what lies behind.
+    fn is_of_scene(&self) -> bool {
+        self.info.depth.tests && self.depth().is_some() && self.target().is_some()
+    }
+
+    fn channels(&self) -> u32 {
+        self.info.color_masks.first().copied().unwrap_or(0)
+    }
+}
+
+/// The rectangle that a draw's viewport covers.
+#[must_use]
+pub fn viewport(draw: &DrawInfo) -> View {
+    let [x, y, width, height] = draw.viewport;
+    // Upside down: the corner is the lower one.
+    let top = if height < 0.0 { y + height } else { y };
+    let whole = |v: f32| v.round() as i32;
+    let size = |v: f32| v.abs().round() as u32;
+    View {
+        origin: [whole(x), whole(top)],
+        size: [size(width), size(height)],
+    }
+}
+
+/// Number of each draw's pass within its frame.
+#[must_use]
+pub fn pass_numbers(frame: &Frame) -> Vec<usize> {
+    let mut seen: Vec<u32> = Vec::new();
+    let number = |draw: &crate::session::Executed| {
+        let known = seen.iter().rposition(|pass| *pass == draw.pass);
+        known.unwrap_or_else(|| {
+            seen.push(draw.pass);
+            seen.len() - 1
+        })
+    };
+    frame.draws.iter().map(number).collect()
+}
+
+/// Finds the views of a frame. `weights` are the fragments of each executed draw.
+///
+/// # Errors
+/// No rule fits.
+pub fn find(
+    session: &Session,
+    frame: &Frame,
+    weights: &[u64],
+    wanted: &Wanted,
+) -> Result<Views, ViewsError> {
+    let numbers = pass_numbers(frame);
+    let mut draws: Vec<Drawn<'_>> = (frame.draws.iter().zip(weights).enumerate())
+        .filter_map(|(place, (executed, weight))| {
+            Some(Drawn {
+                place,
+                info: session.draw(executed.draw)?,
+                pass: session.pass(executed.pass),
+                pass_number: numbers[place],
+                weight: *weight,
+            })
+        })
+        .collect();
+    let of_scene = |draw: &Drawn<'_>| draw.is_of_scene() && draw.weight > 0;
+    if draws.iter().any(of_scene) {
+        // What composes pictures, or works on them, covers more than what they are of.
+        for draw in draws.iter_mut().filter(|draw| !draw.is_of_scene()) {
+            draw.weight = 0;
+        }
+    }
+    let colored = draws.iter().filter(|draw| draw.target().is_some());
+    let colored: u64 = colored.map(|draw| draw.weight).sum();
+    if colored == 0 {
+        return Err(ViewsError::Empty(frame.frame));
+    }
+    let (rule, found) = match wanted {
+        Wanted::File(file) => (Rule::File, file.find(frame.frame, &draws)?),
+        Wanted::Rule(rule) => {
+            let found = rules::find(*rule, &draws).ok_or(ViewsError::NotBy {
+                frame: frame.frame,
+                rule: rule.name(),
+            })?;
+            (*rule, found)
+        }
+        Wanted::First => {
+            let all = Rule::ALL.into_iter();
+            let mut fitting = all
+                .filter_map(|rule| Some((rule, rules::find(rule, &draws)?)))
+                .filter(|(_, found)| found.weight * 2 >= colored);
+            fitting.next().ok_or(ViewsError::NoStereo(frame.frame))?
+        }
+    };
+    let mut roles = vec![Role::Other(Other::Elsewhere); frame.draws.len()];
+    for (place, role) in &found.roles {
+        roles[*place] = *role;
+    }
+    if rule != Rule::File {
+        others::tell(&draws, &mut roles);
+    }
+    Ok(Views {
+        rule,
+        eyes: found.eyes,
+        layers: found.layers,
+        roles,
+    })
+}
+
+/// What a rule found.
+struct Found {
+    eyes: [View; 2],
+    layers: [u32; 2],
+    /// Of draws by their place.
+    roles: Vec<(usize, Role)>,
+    /// Fragments that it explains.
+    weight: u64,
+}
+
+const LEFT: Role = Role::Seen(Some(Eye::Left));
+const RIGHT: Role = Role::Seen(Some(Eye::Right));
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,281 @@
+//! What `app` and `page` do alike: options of a capture, and the trace that it becomes.
+
+use super::raster::{TileEncoding, parse_bytes};
+use anyhow::Context;
+use clap::{Args, ValueEnum};
+use formats::container::AtomicFile;
+use formats::textrace::TextraceWriter;
+use formats::view::EyeView;
+use parallax_layer::spool::{FramesBy, Settings};
+use programs::list::List;
+use programs::{Check, Drained, Job, Rule, RuleFile, Session, Wanted, check, drain};
+use shell::{Output, check_outputs, lasting_arguments, note, warn};
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Options of a program's capture.
+#[derive(Args, Debug)]
+pub struct ProgramArgs {
+    /// The trace to write.
+    #[arg(
+        short,
+        long,
+        value_name = "FILE.textrace",
+        required_unless_present = "list"
+    )]
+    output: Option<PathBuf>,
+    /// List the render passes of the frames as a table on stdout, and write no trace.
+    #[arg(long, conflicts_with_all = ["output", "check"])]
+    list: bool,
+    /// Also write the list as a page with a picture of each render pass.
+    #[arg(long, value_name = "PAGE.html", requires = "list")]
+    list_page: Option<PathBuf>,
+    /// Frames to capture, counted from 0: `10`, or `10..13` for 10, 11 and 12.
+    #[arg(long, value_name = "FRAMES", default_value = "10", value_parser = parse_frames)]
+    pub frames: Range<u32>,
+    /// How it renders for two eyes; by default the first of these that fits.
+    #[arg(long, value_enum, value_name = "RULE")]
+    eyes: Option<Eyes>,
+    /// A file of rules that tell which draws show which eye, where none of the tool's own does.
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "eyes")]
+    rules: Option<PathBuf>,
+    /// Hold the records of every draw against an occlusion query of the driver; exit with 1 where they differ.
+    #[arg(long)]
+    check: bool,
+    /// Memory for the records of one submission. What is not used takes none.
+    #[arg(long, value_name = "SIZE", default_value = "768MiB", value_parser = parse_bytes)]
+    records: u64,
+    /// Folder for the fragment shaders: as the program gave them, and as they record.
+    #[arg(long, value_name = "FOLDER")]
+    modules: Option<PathBuf>,
+    /// How the trace's tiles are packed.
+    #[arg(long, value_enum, default_value_t = TileEncoding::Delta, value_name = "NAME")]
+    encoding: TileEncoding,
+}
+
+/// `--eyes`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Eyes {
+    /// A draw is broadcast to two layers.
+    Multiview,
+    /// Two viewports of one target.
+    Halves,
+    /// A target per eye.
+    Targets,
+    /// One target for both, told apart by the colour channels that are written.
+    Channels,
+    /// One target for both: the same draws twice.
+    Twice,
+    /// One eye alone: the largest target.
+    Mono,
+}
+
+impl Eyes {
+    fn rule(self) -> Rule {
+        match self {
+            Self::Multiview => Rule::Multiview,
+            Self::Halves => Rule::Halves,
+            Self::Targets => Rule::Targets,
+            Self::Channels => Rule::Channels,
+            Self::Twice => Rule::Twice,
+            Self::Mono => Rule::Mono,
+        }
+    }
+}
+
+/// A frame, or a range of frames without its end.
+fn parse_frames(text: &str) -> Result<Range<u32>, String> {
+    let number = |text: &str| text.parse::<u32>().map_err(|_| text.to_owned());
+    let range = match text.split_once("..") {
+        Some((first, end)) => number(first).and_then(|first| Ok(first..number(end)?)),
+        None => number(text).map(|frame| frame..frame.saturating_add(1)),
+    };
+    let range = range.map_err(|found| format!("expected 10 or 10..13, found {found:?}"))?;
+    if range.is_empty() {
+        return Err(format!("expected at least one frame, found {text}"));
+    }
+    Ok(range)
+}
+
+impl ProgramArgs {
+    /// Refuses outputs that cannot be.
+    ///
+    /// # Errors
+    /// Those.
+    pub fn check_outputs(&self, more: Option<Output>) -> anyhow::Result<()> {
+        let trace = (self.output.as_deref()).map(|path| Output::binary("-o", path));
+        let list = (self.list_page.as_deref()).map(|path| Output::text("--list-page", path));
+        let outputs: Vec<Output> = trace.into_iter().chain(list).chain(more).collect();
+        check_outputs(&outputs, []).map(drop)
+    }
+
+    /// What the layer is asked for.
+    ///
+    /// # Errors
+    /// A folder that cannot be made.
+    pub fn settings(&self, frames_by: FramesBy) -> anyhow::Result<Settings> {
+        let absolute = |folder: &PathBuf| {
+            std::fs::create_dir_all(folder)
+                .and_then(|()| folder.canonicalize())
+                .with_context(|| format!("cannot make {}", folder.display()))
+        };
+        Ok(Settings {
+            records: true,
+            frames: [self.frames.start, self.frames.end],
+            frames_by,
+            occlusion: self.check || self.list,
+            record_bytes: self.records,
+            pictures: self.list_page.is_some(),
+            modules: self.modules.as_ref().map(absolute).transpose()?,
+        })
+    }
+
+    /// Makes the trace, and tells of it on stderr.
+    ///
+    /// # Errors
+    /// A session without two eyes, and a trace that cannot be written.
+    pub fn finish(
+        &self,
+        session: &mut Session,
+        program: String,
+        settings: &Settings,
+        cameras: BTreeMap<u32, [EyeView; 2]>,
+    ) -> anyhow::Result<ExitCode> {
+        for trouble in &session.troubles {
+            warn(trouble);
+        }
+        let frames: Vec<u32> = self.frames.clone().collect();
+        let eyes = self.wanted()?;
+        let Some(output) = &self.output else {
+            self.write_list(session, &program, &eyes)?;
+            return Ok(ExitCode::SUCCESS);
+        };
+        let job = Job {
+            frames: &frames,
+            eyes: &eyes,
+            frames_by: settings.frames_by,
+            cameras,
+            program,
+            tool: super::tool(),
+            command_line: lasting_arguments(std::env::args_os().skip(1)),
+            record_bytes: settings.record_bytes,
+        };
+        let writer = TextraceWriter::create_growing(output)?;
+        let writer = writer.with_encoding(self.encoding.encoding());
+        let (writer, drained) = drain(session, &job, writer)?;
+        let checked = self.check.then(|| check(session, &frames)).transpose()?;
+        let bytes = writer.finish()?;
+        report(session, &drained, bytes);
+        Ok(match &checked {
+            Some(checked) => report_check(checked),
+            None => ExitCode::SUCCESS,
+        })
+    }
+}
+
+impl ProgramArgs {
+    /// What is to tell both eyes apart.
+    fn wanted(&self) -> anyhow::Result<Wanted> {
+        Ok(match (&self.rules, self.eyes) {
+            (Some(path), _) => Wanted::File(RuleFile::load(path)?),
+            (None, Some(eyes)) => Wanted::Rule(eyes.rule()),
+            (None, None) => Wanted::First,
+        })
+    }
+
+    /// Prints the frames' passes and writes their page.
+    fn write_list(
+        &self,
+        session: &mut Session,
+        program: &str,
+        wanted: &Wanted,
+    ) -> anyhow::Result<()> {
+        let frames = self.frames.clone();
+        let lists: Result<Vec<List>, _> = frames
+            .map(|frame| programs::list::list(session, frame, wanted))
+            .collect();
+        let lists = lists?;
+        for list in &lists {
+            shell::print(&format!("{}\n{}", list.eyes_text(), list.table()))?;
+        }
+        if let Some(path) = &self.list_page {
+            let place = || format!("cannot write {}", path.display());
+            let mut file = AtomicFile::create(path).with_context(place)?;
+            let page = programs::list::page(program, &lists);
+            file.write_all(page.as_bytes()).with_context(place)?;
+            file.persist().with_context(place)?;
+        }
+        Ok(())
+    }
+}
+
+fn report(session: &Session, drained: &Drained, bytes: u64) {
+    let [width, height] = drained.size_px;
+    let frames = match drained.frames {
+        1 => "1 frame".to_owned(),
+        frames => format!("{frames} frames"),
+    };
+    let eyes = drained.rule.map_or("", Rule::name);
+    note(&format!(
+        "{frames} of {width}x{height} px per eye by {eyes}: {} draws, {} textures",
+        drained.draws, drained.textures
+    ));
+    let counts = &drained.counts;
+    note(&format!(
+        "{} quads, {} fragments, {} records; {:.1} MB",
+        counts.quads,
+        counts.fragments,
+        counts.records,
+        bytes as f64 / 1e6
+    ));
+    if counts.not_finite > 0 {
+        note(&format!(
+            "left out: {} records whose coordinates are no numbers",
+            counts.not_finite
+        ));
+    }
+    for left_out in &drained.left_out {
+        note(&format!(
+            "not in the trace, or less exactly: {} ({} draws, {} fragments)",
+            left_out.what, left_out.draws, left_out.fragments
+        ));
+    }
+    note(&format!("driver: {}", session.driver));
+}
+
+fn report_check(checked: &Check) -> ExitCode {
+    note(&format!(
+        "occlusion queries: {} draws equal, {} different",
+        checked.equal, checked.different
+    ));
+    for (why, draws) in &checked.apart {
+        note(&format!("not compared: {why} ({draws} draws)"));
+    }
+    match checked.first {
+        None => ExitCode::SUCCESS,
+        Some(first) => {
+            warn(&format!(
+                "frame {}, draw {}: {} fragments recorded, {} counted",
+                first.frame, first.draw, first.recorded, first.counted
+            ));
+            ExitCode::from(1)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frames_are_one_or_a_range_without_its_end() {
+        assert_eq!(parse_frames("7"), Ok(7..8));
+        assert_eq!(parse_frames("10..13"), Ok(10..13));
+        for text in ["", "a", "3..", "5..5", "-1"] {
+            assert!(parse_frames(text).is_err(), "{text}");
+        }
+    }
+}
