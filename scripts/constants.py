@@ -71,6 +71,11 @@ SGRT = {
     "srp.reproject_cycles": ("lane cycles per left pixel", "with the next two about 10 % of a frame's kernels (section III)"),
     "srp.detect_cycles": ("lane cycles per right pixel", "the same"),
     "srp.reuse_cycles": ("lane cycles per reused pixel", "the same"),
+    "srp.row_test_cycles": ("lane cycles per left pixel of the row that a right pixel is tested against; 0: only what arrived", OURS),
+    "srp.compaction": ("pixels are compacted by kernel (inspector-executor)", "section III"),
+    "gbuffer.shadow_bytes": ("shadow outcomes, only for rules that read them", OURS),
+    "gbuffer.detect_position_bytes": ("position in the copy that detection reads; 4 is a depth", OURS),
+    "gbuffer.rows": ("where that copy waits for the right eye", "section III: DRAM"),
     "gbuffer.color_bytes": ("colour in a G-buffer record", "fields: figure 2; bytes: ours"),
     "gbuffer.normal_bytes": ("normal", "fields: figure 2; bytes: ours"),
     "gbuffer.texcoord_bytes": ("texture coordinates", "fields: figure 2; bytes: ours"),
@@ -97,6 +102,8 @@ def config(*arguments):
 def value(found, key):
     for part in key.split("."):
         found = found[int(part)] if part.isdigit() else found[part]
+    if isinstance(found, bool):
+        return str(found).lower()
     return ", ".join(f"{v}" for v in found.values()) if isinstance(found, dict) else found
 
 

@@ -11,6 +11,8 @@ pub const HISTORY: &[&str] = &[
     "Shadow maps lie in Morton order; anisotropic filtering takes its level from the unrounded ratio.",
     // 3
     "Ray tracing: traffic goes by lines and waiting by visits, whether misses come from rates or from addresses; curves go by addresses, too.",
+    // 4
+    "Ray tracing: with reuse of shadow outcomes, a re-tested pixel is shaded at its exact hit. Functional mode: each core has its own L2 if the L2 is not shared.",
 ];
 
 /// The version of the models, recorded with every result and part of every point's key.
