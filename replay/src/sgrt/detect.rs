@@ -77,9 +77,8 @@ pub fn decide(frame: &Frame, arrived: &Reprojection, rule: &Rule) -> Vec<Decisio
                 }
             }
             if decision.class.is_reused() {
-                let retraces =
-                    |test: &Box<dyn Test + '_>| test.retraces_shadows(at, decision.source);
-                decision.retraces_shadows = tests.iter().any(retraces);
+                let source = decision.source;
+                decision.retraces_shadows = tests.iter().any(|t| t.retraces_shadows(at, source));
             }
             decision
         })
