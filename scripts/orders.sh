@@ -81,14 +81,14 @@ for part in $parts; do
             ;;
         cameras)
             [ -d symmetric-100 ] || capture symmetric-100 --hmd symmetric-100
-            study cameras.json symmetric-100/*.textrace --orders z2-sta,zig-zag+sta+offset,adaptive+sta+offset,adaptive+sta+offset+runs,adaptive+halves+offset+runs --bounds --search greedy,greedy-16,greedy-64,greedy-256,anneal --moves 200000
+            study cameras.json symmetric-100/*.textrace --orders z2-sta,zig-zag+sta+offset,adaptive+sta+offset,adaptive+sta+offset+runs,adaptive+halves+offset+runs --bounds --search greedy,greedy-64,anneal --moves 20000 --caches 8/128
             write cameras
             ;;
         frames)
             # KEEP=FOLDER keeps these traces (9 GB) for another run.
             head=${KEEP:-$work}/head
             mkdir -p "$head"
-            cameras | grep -E 'crytek-atrium|dabrovic-gallery|cocoa-jungle|chess-player|crytek-gallery|cocoa-pond|forest-brook' |
+            cameras | grep -E ' (chess-player|dabrovic-gallery|crytek-atrium|crytek-gallery) ' |
                 while read -r set label file camera; do
                     trace="$head/$set,$label.textrace"
                     [ -f "$trace" ] ||
