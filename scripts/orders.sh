@@ -81,7 +81,7 @@ for part in $parts; do
             ;;
         cameras)
             [ -d symmetric-100 ] || capture symmetric-100 --hmd symmetric-100
-            study cameras.json symmetric-100/*.textrace --orders z2-sta,zig-zag+sta+offset,adaptive+sta+offset,adaptive+sta+offset+runs,adaptive+halves+offset+runs --bounds --search greedy,greedy-64,anneal --moves 20000 --caches 8/128
+            study cameras.json symmetric-100/*.textrace --orders z2-sta,zig-zag+sta+offset,adaptive+sta+offset,adaptive+sta+offset+runs,adaptive+halves+offset+runs --bounds --search greedy,greedy-64,anneal --moves 20000
             write cameras
             ;;
         frames)
