@@ -60,7 +60,8 @@ for row in sorted(chosen, key=lambda r: (r["set"], DESIGN.index(r["scene"]))):
                   two(row, "paper_relative_energy"), two(row, "relative_energy"), two(other, "relative_energy"),
                   row["paper_frames_per_second"], f"{float(row['frames_per_second']):.1f}"])
 write("sgrt-figure-3", f"replay readings, {PAPER_SIZE} per eye: the reading closest on the calibration scenes, and the default of replay reproject",
-      ["scene", "set", "performance: paper", "preset", "default", "energy: paper", "preset", "default", "frames per second: paper", "preset"], table)
+      ["scene", "set", "performance: paper", "performance: preset", "performance: default", "energy: paper", "energy: preset", "energy: default",
+       "frames per second: paper", "frames per second: preset"], table)
 
 table = []
 for size in ("512x512", "1024x1024", PAPER_SIZE):

@@ -110,7 +110,7 @@ fn removals_that_need_data_missing_in_the_trace_are_refused() {
             &[expected],
         );
     };
-    run("deferred", "does not tell which draws are opaque");
+    run("deferred", "does not record which draws are opaque");
     run("none", "capture with --hsr none");
 }
 
