@@ -214,7 +214,7 @@ impl ReadingsReport {
         let (count, scenes) = (self.fits.len(), self.scenes.len());
         let saving = self.fits.iter().filter(|f| f.relative_energy < 1.0).count();
         let mut text = format!(
-            "Does reprojection save energy? In the mean over {scenes} scenes, under {saving} of {count} readings of the paper it does."
+            "Does reprojection save energy? In the mean over all scenes ({scenes}), it does under {saving} of {count} readings of the paper."
         );
         if let Some(fit) = self.chosen.and_then(|index| self.fits.get(index)) {
             let distance = |d: Option<f64>| d.map_or("-".to_owned(), |d| format!("{d:.3}"));
