@@ -46,7 +46,7 @@ pub struct Decision {
     pub exact: Option<[f32; 3]>,
     /// Triangles that the ray was intersected with.
     pub tests: u8,
-    /// True if the rule wants the shadow rays of a reused pixel traced again, whatever is reused.
+    /// True if the shadow rays of a reused pixel are traced again, even if shadow outcomes are reused.
     pub retraces_shadows: bool,
 }
 

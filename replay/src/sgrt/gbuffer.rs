@@ -112,6 +112,16 @@ mod tests {
         let (tiled, screen) = (both(Keeping::Tile), both(Keeping::Screen));
         assert_eq!(tiled[0], 12_000 + 12_500);
         assert!(tiled[0] < screen[0] / 2);
+        let chip = Gbuffer {
+            rows: RowStorage::Chip,
+            ..g.clone()
+        };
+        let left = left_tile(1000, Keeping::Tile, reads, &chip);
+        let right_bytes = right_tile(&right, Keeping::Tile, reads, &chip);
+        assert_eq!([left.dram_bytes, right_bytes.dram_bytes], [0, 0]);
+        // The copy is written to the row buffers instead of DRAM, and not written again by DMA.
+        let on_chip = left.on_chip_bytes + right_bytes.on_chip_bytes;
+        assert_eq!(on_chip, tiled[1] + 12_000 - 12_500);
         // The tile G-buffer keeps on chip what the whole screen moves through DRAM.
         assert_eq!(screen[0] - tiled[0], tiled[1] - screen[1] - 12_000);
     }

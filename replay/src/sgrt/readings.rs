@@ -23,7 +23,7 @@ pub enum Scope {
     Frame,
 }
 
-/// Whom a right pixel is tested against ("the whole pixels in the same row", section III).
+/// The left pixels that a right pixel is tested against ("the whole pixels in the same row", section III).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum RowTest {
@@ -52,7 +52,7 @@ pub struct Reading {
     pub reuse: Reuse,
     /// Error detection.
     pub rule: Rule,
-    /// Whom a right pixel is tested against.
+    /// The left pixels that a right pixel is tested against.
     pub row_test: RowTest,
     /// Where the G-buffer is.
     pub gbuffer: GbufferPlace,
@@ -189,8 +189,8 @@ fn energy_pj(run: &Run, scope: Scope, config: &SgrtConfig) -> f64 {
     }
 }
 
-/// How far a reading is from published ratios: the root mean square of the natural logarithms of ours over theirs,
-/// performance and energy alike. 0.1 is about 10 %. `None` without pairs.
+/// Distance of a reading from published ratios: the root mean square of ln(ours / published) over performance and
+/// energy. 0.1 is about 10 %. `None` without pairs.
 #[must_use]
 pub fn rms_log(pairs: impl IntoIterator<Item = (Figures, [f64; 2])>) -> Option<f64> {
     let squares: Vec<f64> = pairs

@@ -217,6 +217,32 @@ mod tests {
     }
 
     #[test]
+    fn only_warps_with_both_kinds_of_pixels_have_idle_lanes() {
+        let mut batch = BatchWork::default();
+        batch.add_warp(32, 0);
+        batch.add_warp(0, 32);
+        batch.add_warp(5, 27);
+        let idle = (batch.idle_traced_lanes, batch.idle_reused_lanes);
+        assert_eq!(idle, (27, 5));
+    }
+
+    #[test]
+    fn shadow_outcomes_are_a_bit_per_ray_of_the_primary_hit() {
+        let shadow = |parent, depth, outcome| RayRecord {
+            outcome,
+            ..ray(RayKind::Shadow, parent, depth)
+        };
+        let rays = [
+            ray(RayKind::Primary, NO_PARENT, 0),
+            shadow(0, 1, Outcome::Miss),
+            shadow(0, 1, Outcome::Occluded),
+            ray(RayKind::Reflection, 0, 1),
+            shadow(3, 2, Outcome::Occluded),
+        ];
+        assert_eq!(PixelWork::of(&rays).shadow_outcomes(), (0b10, 2));
+    }
+
+    #[test]
     fn a_traced_pixel_counts_every_ray_once() {
         let pixel = PixelWork::of(&[
             ray(RayKind::Primary, NO_PARENT, 0),

@@ -26,6 +26,12 @@ use std::sync::Arc;
 
 /// The texture units of all cores and their shared caches.
 trait ThreadModel: Send {
+    /// The L1 caches, with their bookkeeping of lines in flight.
+    type L1: DelayedFill;
+
+    /// The caches.
+    fn shared(&mut self) -> &mut Shared<Self::L1>;
+
     /// Starts a phase at a cycle.
     fn start_phase(&mut self, cycle: u64);
 
@@ -47,13 +53,19 @@ trait ThreadModel: Send {
 
     /// Performs the accesses of other clients while no core works, at the maximum rate of memory. The cores
     /// continue at `cycle`.
-    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64);
+    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64) {
+        self.shared().client_accesses(clients, cycle);
+    }
 
     /// Empties all caches and drops the lines in flight.
-    fn flush(&mut self);
+    fn flush(&mut self) {
+        self.shared().flush();
+    }
 
     /// Empties the L1 caches, and other work fills part of each other cache.
-    fn lose(&mut self, other: OtherWork, cycle: u64);
+    fn lose(&mut self, other: OtherWork, cycle: u64) {
+        self.shared().lose(other, cycle);
+    }
 
     /// The counts until a cycle.
     fn outcome(&self, cycles: u64) -> Outcome;
@@ -115,19 +127,22 @@ struct Shared<D> {
 }
 
 impl<D: DelayedFill> Shared<D> {
-    /// Most lines arrive within `l1_usual_cycles` after a miss of both levels.
+    /// Most lines arrive in an L1 within the latencies of a miss of both levels and `later_trips_cycles`.
     fn new<C: Delay<Delayed = D>>(
         caches: Caches<C>,
         config: &RunConfig,
         counts: CacheCounts,
         path: MissPath,
-        [l1_usual_cycles, l2_usual_cycles]: [u64; 2],
+        later_trips_cycles: u64,
     ) -> Self {
-        let Caches { l1, l2 } = caches.delayed(l1_usual_cycles, l2_usual_cycles);
+        let [l2_cycles, memory_cycles] =
+            [config.level.l2.hit_cycles, config.memory_cycles].map(u64::from);
+        let usual_cycles = l2_cycles + memory_cycles;
+        let Caches { l1, l2 } = caches.delayed(usual_cycles + later_trips_cycles, usual_cycles);
         Self {
             l1,
             l2: SecondLevel::new(l2, path),
-            l2_cycles: config.level.l2.hit_cycles.into(),
+            l2_cycles,
             counts,
         }
     }

@@ -6,11 +6,10 @@
 
 use super::first_miss::Thread;
 use super::{Items, Shared, ThreadModel, start_item};
-use crate::access::FrameClients;
 use crate::config::{RunConfig, TmuConfig};
 use crate::engine::batch::Outcome;
 use crate::engine::counts::{CacheCounts, FootprintMisses};
-use crate::memory::{Caches, Delay, DelayedFill, MissPath, NOT_IN_FLIGHT, OtherWork};
+use crate::memory::{Caches, Delay, DelayedFill, MissPath, NOT_IN_FLIGHT};
 use crate::stream::{Cores, StreamError};
 use crate::tmu::PipelineStats;
 use std::collections::VecDeque;
@@ -46,12 +45,9 @@ impl<D: DelayedFill> PrefetchFifo<D> {
         counts: CacheCounts,
         path: MissPath,
     ) -> Self {
-        let [l2_cycles, memory_cycles] =
-            [config.level.l2.hit_cycles, config.memory_cycles].map(u64::from);
-        let usual = [l2_cycles + memory_cycles, memory_cycles];
         Self {
             units: caches.l1.iter().map(|_| Unit::default()).collect(),
-            shared: Shared::new(caches, config, counts, path, usual),
+            shared: Shared::new(caches, config, counts, path, 0),
             tmu: config.tmu,
             phase: (0, Vec::new()),
         }
@@ -106,6 +102,12 @@ impl<D: DelayedFill> PrefetchFifo<D> {
 }
 
 impl<D: DelayedFill> ThreadModel for PrefetchFifo<D> {
+    type L1 = D;
+
+    fn shared(&mut self) -> &mut Shared<D> {
+        &mut self.shared
+    }
+
     fn start_phase(&mut self, cycle: u64) {
         self.phase = (
             cycle,
@@ -154,18 +156,6 @@ impl<D: DelayedFill> ThreadModel for PrefetchFifo<D> {
         }
         let exits = self.units.iter().map(|unit| unit.last_exit);
         exits.max().unwrap_or(*start)
-    }
-
-    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64) {
-        self.shared.client_accesses(clients, cycle);
-    }
-
-    fn flush(&mut self) {
-        self.shared.flush();
-    }
-
-    fn lose(&mut self, other: OtherWork, cycle: u64) {
-        self.shared.lose(other, cycle);
     }
 
     fn outcome(&self, cycles: u64) -> Outcome {

@@ -239,3 +239,99 @@ fn a_material_with_holes_is_never_reused_under_opaque() {
         assert!(!reuses_leaf(rule), "{rule}");
     }
 }
+
+#[test]
+fn tests_against_whole_rows_find_the_arrivals_of_parallel_eyes() {
+    let frame = frame(&room(), View::default());
+    let arrived = reproject(&frame);
+    let width = frame.size_px[0] as usize;
+    for (index, candidate) in arrived.candidates.iter().enumerate() {
+        let row = index / width * width;
+        let mut nearest: Option<(f32, usize)> = None;
+        let mut arrivals = 0;
+        for left in row..row + width {
+            let projected = &arrived.projected[left];
+            if projected.at_px[0].floor() == (index - row) as f32 {
+                arrivals += 1;
+                if nearest.is_none_or(|(depth, _)| projected.depth < depth) {
+                    nearest = Some((projected.depth, left));
+                }
+            }
+        }
+        let source = (!candidate.is_missing()).then_some(candidate.source as usize);
+        assert_eq!(
+            source,
+            nearest.map(|(_, left)| left),
+            "right sample {index}"
+        );
+        assert_eq!(candidate.arrivals, arrivals, "right sample {index}");
+    }
+}
+
+/// The room with a shadow over everything right of the middle.
+fn half_in_shadow() -> Frame {
+    let mut frame = frame(&room(), View::default());
+    for eye in &mut frame.eyes {
+        for (sample, work) in eye.samples.iter().zip(&mut eye.work) {
+            let in_shadow = !sample.is_sky() && sample.position[0] > 0.05;
+            work.shadows_blocked = u64::from(in_shadow);
+        }
+    }
+    frame
+}
+
+#[test]
+fn shadow_rays_are_traced_again_exactly_where_a_neighbours_outcome_differs() {
+    let frame = half_in_shadow();
+    let arrived = reproject(&frame);
+    let decisions = decided(&frame, "triangles+shadow-edge");
+    let outcome = |source: u32| frame.left().work[source as usize].shadow_outcomes();
+    let [width, height] = frame.size_px.map(|s| s as i32);
+    let mut retraced = 0;
+    for (index, decision) in (0i32..).zip(&decisions) {
+        if !decision.class.is_reused() {
+            assert!(!decision.retraces_shadows);
+            continue;
+        }
+        let (x, y) = (index % width, index / width);
+        let expected = (-1..=1).any(|dy| {
+            (-1..=1).any(|dx| {
+                let (x, y) = (x + dx, y + dy);
+                let inside = (0..width).contains(&x) && (0..height).contains(&y);
+                let is_self = (dx, dy) == (0, 0);
+                inside && !is_self && {
+                    let beside = arrived.candidates[(y * width + x) as usize];
+                    !beside.is_missing() && outcome(beside.source) != outcome(decision.source)
+                }
+            })
+        });
+        assert_eq!(decision.retraces_shadows, expected, "right sample {index}");
+        retraced += usize::from(expected);
+    }
+    assert!(retraced > 0 && retraced < decisions.len() / 3, "{retraced}");
+}
+
+#[test]
+fn reused_shadow_outcomes_are_wrong_only_where_they_differ() {
+    let frame = half_in_shadow();
+    let wrong = |rule: &str| {
+        let decisions = decided(&frame, rule);
+        let colors = compose(&frame, &decisions, Reuse::Shadow);
+        let truth = &frame.right().samples;
+        let of = |(i, color): (usize, &[f32; 3])| {
+            let decision = &decisions[i];
+            let is_true_hit = decision.exact.is_some() && decision.primitive == truth[i].primitive;
+            if !decision.class.is_reused() || !is_true_hit {
+                return false;
+            }
+            let left = frame.left().work[decision.source as usize].shadow_outcomes();
+            let differs = left != frame.right().work[i].shadow_outcomes();
+            let is_wrong = *color != truth[i].color();
+            assert!(differs || !is_wrong, "right sample {i}");
+            is_wrong
+        };
+        colors.iter().enumerate().filter(|&at| of(at)).count()
+    };
+    let (plain, with_edges) = (wrong("triangles"), wrong("triangles+shadow-edge"));
+    assert!(with_edges < plain, "{with_edges} of {plain}");
+}

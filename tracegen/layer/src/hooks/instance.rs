@@ -104,8 +104,8 @@ pub(super) fn draw_number_offset(real_limit: u32) -> u32 {
     real_limit.saturating_sub(4)
 }
 
-/// What programs are told of the limit of push constants.
-fn told_limit(real_limit: u32) -> u32 {
+/// The limit of push constants that programs see.
+fn visible_limit(real_limit: u32) -> u32 {
     // No device may have fewer than the least.
     draw_number_offset(real_limit).max(LEAST_PUSH_CONSTANTS)
 }
@@ -242,7 +242,7 @@ pub(super) unsafe extern "system" fn enumerate_device_extension_properties(
 fn hide(properties: &mut vk::PhysicalDeviceProperties) {
     properties.api_version = properties.api_version.min(NEWEST | 0xfff);
     let limit = &mut properties.limits.max_push_constants_size;
-    *limit = told_limit(*limit);
+    *limit = visible_limit(*limit);
 }
 
 pub(super) unsafe extern "system" fn get_physical_device_properties(
@@ -278,8 +278,8 @@ mod tests {
 
     #[test]
     fn the_draws_number_lies_behind_what_programs_are_told_of() {
-        assert_eq!((draw_number_offset(256), told_limit(256)), (252, 252));
+        assert_eq!((draw_number_offset(256), visible_limit(256)), (252, 252));
         // Nothing is left of the least that Vulkan promises.
-        assert_eq!((draw_number_offset(128), told_limit(128)), (124, 128));
+        assert_eq!((draw_number_offset(128), visible_limit(128)), (124, 128));
     }
 }

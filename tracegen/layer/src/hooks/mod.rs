@@ -77,7 +77,7 @@ hooks! { instance_hook:
     b"vkCreateDevice" => device::create_device;
 }
 
-// What programs are told of devices changes only where a capture is under way.
+// Reported properties of devices change only during a capture.
 hooks! { physical_device_hook:
     b"vkEnumerateDeviceExtensionProperties" => instance::enumerate_device_extension_properties;
     b"vkGetPhysicalDeviceProperties" => instance::get_physical_device_properties;

@@ -35,12 +35,9 @@ impl<D: DelayedFill> Memory<D> {
         counts: CacheCounts,
         path: MissPath,
     ) -> Self {
-        let [l2_cycles, memory_cycles] =
-            [config.level.l2.hit_cycles, config.memory_cycles].map(u64::from);
-        let usual = [l2_cycles + memory_cycles, memory_cycles];
         Self {
             missing: vec![Vec::with_capacity(4); caches.l1.len()],
-            shared: Shared::new(caches, config, counts, path, usual),
+            shared: Shared::new(caches, config, counts, path, 0),
             first: FirstLookups::default(),
             forwarded: 0,
         }
@@ -73,11 +70,6 @@ impl<D: DelayedFill> Memory<D> {
     /// The L2 and everything beside and below it.
     pub fn l2(&mut self) -> &mut SecondLevel<D> {
         &mut self.shared.l2
-    }
-
-    /// Empties all caches and drops the lines in flight.
-    pub fn flush(&mut self) {
-        self.shared.flush();
     }
 
     /// Looks up all lines of a footprint in the core's L1. A second look-up in the same cycle changes nothing.

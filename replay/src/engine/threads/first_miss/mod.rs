@@ -7,12 +7,11 @@
 mod memory;
 mod thread;
 
-use super::{Items, ThreadModel, start_item};
-use crate::access::FrameClients;
+use super::{Items, Shared, ThreadModel, start_item};
 use crate::config::{RunConfig, TmuConfig};
 use crate::engine::batch::Outcome;
 use crate::engine::counts::CacheCounts;
-use crate::memory::{Caches, Delay, DelayedFill, MissPath, OtherWork};
+use crate::memory::{Caches, Delay, DelayedFill, MissPath};
 use crate::stream::{Cores, StreamError};
 use crate::tmu::PipelineStats;
 use memory::{Memory, Seen};
@@ -119,6 +118,12 @@ impl<D: DelayedFill> FirstMiss<D> {
 }
 
 impl<D: DelayedFill> ThreadModel for FirstMiss<D> {
+    type L1 = D;
+
+    fn shared(&mut self) -> &mut Shared<D> {
+        self.memory.shared()
+    }
+
     fn start_phase(&mut self, cycle: u64) {
         for unit in &mut self.units {
             (unit.drained, unit.clock) = (false, cycle);
@@ -168,18 +173,6 @@ impl<D: DelayedFill> ThreadModel for FirstMiss<D> {
 
     fn end_phase(&mut self) -> u64 {
         self.units.iter().map(|unit| unit.clock).max().unwrap_or(0)
-    }
-
-    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64) {
-        self.memory.shared().client_accesses(clients, cycle);
-    }
-
-    fn flush(&mut self) {
-        self.memory.flush();
-    }
-
-    fn lose(&mut self, other: OtherWork, cycle: u64) {
-        self.memory.shared().lose(other, cycle);
     }
 
     fn outcome(&self, cycles: u64) -> Outcome {

@@ -59,13 +59,12 @@ impl<D: DelayedFill> Memory<D> {
         counts: CacheCounts,
         path: MissPath,
     ) -> Self {
-        let memory_cycles = u64::from(config.level.l2.hit_cycles) + u64::from(config.memory_cycles);
-        // Includes later trips of threads with many missing lines.
-        let l1_cycles = memory_cycles + 8 * u64::from(config.tmu.loop_cycles);
+        // Threads with many missing lines request the last ones on later trips.
+        let later_trips_cycles = 8 * u64::from(config.tmu.loop_cycles);
         let threads = caches.l1.iter().map(|_| LookedUp::default());
         Self {
             threads: threads.collect(),
-            shared: Shared::new(caches, config, counts, path, [l1_cycles, memory_cycles]),
+            shared: Shared::new(caches, config, counts, path, later_trips_cycles),
             tmu: config.tmu,
             memory_cycles: config.memory_cycles.into(),
             misses_change_caches_at_once: config.misses_change_caches_at_once(),
@@ -96,11 +95,6 @@ impl<D: DelayedFill> Memory<D> {
     /// The L2 and everything beside and below it.
     pub fn l2(&mut self) -> &mut SecondLevel<D> {
         &mut self.shared.l2
-    }
-
-    /// Empties all caches and drops the lines in flight.
-    pub fn flush(&mut self) {
-        self.shared.flush();
     }
 
     /// Looks up all lines of a thread that enters at `now` in the core's L1. If lines are neither resident

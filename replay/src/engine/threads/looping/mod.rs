@@ -5,12 +5,11 @@ mod asking;
 mod memory;
 mod timeline;
 
-use super::{Items, ThreadModel, start_item};
-use crate::access::FrameClients;
+use super::{Items, Shared, ThreadModel, start_item};
 use crate::config::RunConfig;
 use crate::engine::batch::Outcome;
 use crate::engine::counts::CacheCounts;
-use crate::memory::{Caches, Delay, DelayedFill, MissPath, OtherWork};
+use crate::memory::{Caches, Delay, DelayedFill, MissPath};
 use crate::stream::{Cores, StreamError};
 use crate::tmu::{Pipeline, Turn};
 use memory::{Found, Memory};
@@ -45,6 +44,12 @@ impl<D: DelayedFill> Looping<D> {
 }
 
 impl<D: DelayedFill> ThreadModel for Looping<D> {
+    type L1 = D;
+
+    fn shared(&mut self) -> &mut Shared<D> {
+        self.memory.shared()
+    }
+
     fn start_phase(&mut self, cycle: u64) {
         self.units.iter_mut().for_each(|unit| unit.resume(cycle));
     }
@@ -112,18 +117,6 @@ impl<D: DelayedFill> ThreadModel for Looping<D> {
             }
         }
         self.units.iter().map(Pipeline::clock).max().unwrap_or(0)
-    }
-
-    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64) {
-        self.memory.shared().client_accesses(clients, cycle);
-    }
-
-    fn flush(&mut self) {
-        self.memory.flush();
-    }
-
-    fn lose(&mut self, other: OtherWork, cycle: u64) {
-        self.memory.shared().lose(other, cycle);
     }
 
     fn outcome(&self, cycles: u64) -> Outcome {
