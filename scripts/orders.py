@@ -142,12 +142,12 @@ def all_orders():
     for order in sorted(split["design"], key=lambda order: change([row for row in every if row["order"] == order])):
         own = [row for row in every if row["order"] == order]
         least, label = worst(own)
-        miss = sum(row["l1_miss_pct"] for row in own) / len(own)
+        miss = sum(row["l1_footprint_miss_pct"] for row in own) / len(own)
         needs = own[0]
         table.append([order, one(change(own)), one(split["design"][order]), one(split["held-out"][order]), f"{label}: {one(least)}", one(miss, 2),
-                      needs["state_bytes"], needs["table_bytes"], needs["look_ahead_items"], needs["tile_buffers"], needs["decision_cycles"], needs["knows"]])
+                      needs["state_bytes"], needs["table_bytes"], needs["look_ahead_items"], needs["tile_buffers"], needs["decision_cycles"], needs["information"]])
     write("orders-all", "replay orders TRACES --json: rows", ["order", "all cameras, %", "design, %", "held out, %", "worst camera, %", "L1 misses, %",
-          "state, bytes", "tables, bytes", "look-ahead, items", "tile buffers", "decision, cycles", "knows"], table)
+          "state, bytes", "tables, bytes", "look-ahead, items", "tile buffers", "decision, cycles", "information"], table)
     print("rank correlation, all orders:", rank_correlation(split["design"], split["held-out"]))
 
 
@@ -194,7 +194,7 @@ def timed():
             energy = math.exp(sum(math.log(row["dram_energy_mj"]) for row in own) / len(own))
             cycles = [1 + row["cycles_change_pct"] / 100 for row in own]
             cycles = 100 * (math.exp(sum(map(math.log, cycles)) / len(cycles)) - 1)
-            per_order.setdefault(order, []).append((cores, change(own), cycles, mean("utilization_pct"), mean("l1_miss_pct"), mean("dram_row_hit_pct"), energy))
+            per_order.setdefault(order, []).append((cores, change(own), cycles, mean("utilization_pct"), mean("l1_footprint_miss_pct"), mean("dram_row_hit_pct"), energy))
         if cores == 2:
             split = {of: {order: change([row for row in rows if row["order"] == order and row["set"] == of]) for order in orders_in(rows)} for of in ("design", "held-out")}
             print("rank correlation, timed:", rank_correlation(split["design"], split["held-out"]))

@@ -70,7 +70,7 @@ def figures(scene, machine):
     morton, sta = (result(scene, order, machine) for order in ("morton", "z2-sta"))
     cells = []
     for one in (morton, sta):
-        cells += [f"{100 * one['l1']['miss_rate']:.2f}", f"{one['external_bytes'] / 1e6:.3f}", f"{one['cycles'] / 1e6:.2f}"]
+        cells += [f"{100 * one['l1']['footprint_miss_rate']:.2f}", f"{one['external_bytes'] / 1e6:.3f}", f"{one['cycles'] / 1e6:.2f}"]
     return [*cells, f"{100 * (1 - sta['external_bytes'] / morton['external_bytes']):.1f}"]
 
 COLUMNS = ("L1 misses %", "MB per frame", "million cycles")

@@ -63,7 +63,7 @@ def write_table():
         for order, title in TITLES.items():
             found = results[order]
             saved = "-" if order == "morton" else f"{saved_pct(order):.1f}"
-            table.writerow([title, f"{100 * found['l1']['miss_rate']:.2f}", f"{100 * found['l2']['miss_rate']:.1f}",
+            table.writerow([title, f"{100 * found['l1']['footprint_miss_rate']:.2f}", f"{100 * found['l2']['line_miss_rate']:.1f}",
                             f"{found['external_bytes'] / 1e6:.2f}", saved, f"{100 * found['tmu']['utilization']:.1f}", f"{found['cycles'] / 1e6:.2f}"])
 
 

@@ -72,9 +72,9 @@ for trace, title, stands_for in ROWS:
         for row in own:
             points.append([
                 trace, layout, row["l1_kib"], row["l2_kib"], row["order"],
-                *(f"{float(row[key]):.3f}" for key in ("l1_miss_pct", "l2_miss_pct", "tmu_util_pct")), row["external_bytes"],
+                *(f"{float(row[key]):.3f}" for key in ("l1_footprint_miss_pct", "l2_line_miss_pct", "tmu_util_pct")), row["external_bytes"],
                 f"{float(row['reduction_pct']):.3f}",
-                *(row[f"paper_{key}"] for key in ("l1_miss_pct", "l2_miss_pct", "tmu_util_pct")),
+                *(row[f"paper_{key}"] for key in ("l1_footprint_miss_pct", "l2_line_miss_pct", "tmu_util_pct")),
                 f"{float(row['paper_reduction_pct']):.2f}" if row["paper_reduction_pct"] else "",
             ])
         cells = []
@@ -90,8 +90,8 @@ commands = [
     "replay paper dabrovic-sponza-shadows.textrace atrium-shadows.textrace jungle.textrace --shadow-map-order linear --csv FILE",
 ]
 write("paper-savings.csv", commands, [
-    "scene", "shadow_map_order", "l1_kib", "l2_kib", "order", "l1_miss_pct", "l2_miss_pct", "tmu_util_pct", "external_bytes", "saved_pct",
-    "paper_l1_miss_pct", "paper_l2_miss_pct", "paper_tmu_util_pct", "paper_saved_pct"], points)
+    "scene", "shadow_map_order", "l1_kib", "l2_kib", "order", "l1_footprint_miss_pct", "l2_line_miss_pct", "tmu_util_pct", "external_bytes", "saved_pct",
+    "paper_l1_footprint_miss_pct", "paper_l2_line_miss_pct", "paper_tmu_util_pct", "paper_saved_pct"], points)
 write("paper-means.csv", commands,
       ["scene", "stands for", "LRTA saved %", "STA saved %", "LRTA TMU", "STA TMU"], means)
 
@@ -99,7 +99,7 @@ names = {"morton": "Morton", "z2-lrta": "LRTA", "z2-sta": "STA"}
 table = []
 for row in rows("preset.csv"):
     rates = lambda start, digits: " / ".join(
-        f"{float(row[start + key]):.{digits}f}" for key in ("l1_miss_pct", "l2_miss_pct", "tmu_util_pct"))
+        f"{float(row[start + key]):.{digits}f}" for key in ("l1_footprint_miss_pct", "l2_line_miss_pct", "tmu_util_pct"))
     saved = [row[key] for key in ("paper_reduction_pct", "z2_paper_product_reduction_pct", "z2_paper_reduction_pct", "reduction_pct")]
     saved = [f"{float(value):.1f}" if row["order"] != "morton" else "" for value in saved]
     table.append([f"{row['l1_kib']}/{row['l2_kib']} {names[row['order']]}", rates("paper_", 1), rates("z2_paper_", 1), *saved])
@@ -112,12 +112,12 @@ table = []
 for align, bias in (("64", "0"), ("64KiB", "0"), ("64KiB", "-1"), ("64KiB", "-2")):
     found = {order: json.load(open(f"choice,{align},{bias},{order}.json"))["result"] for order in names}
     saved = [100 * (1 - found[order]["external_bytes"] / found["morton"]["external_bytes"]) for order in ("z2-lrta", "z2-sta")]
-    l1 = [100 * found[order]["l1"]["miss_rate"] for order in ("morton", "z2-sta")]
+    l1 = [100 * found[order]["l1"]["footprint_miss_rate"] for order in ("morton", "z2-sta")]
     table.append(["64 bytes" if align == "64" else "64 KiB", bias, *(f"{rate:.2f}" for rate in l1),
-                  f"{100 * found['morton']['l2']['miss_rate']:.1f}", *(f"{value:.1f}" for value in saved)])
+                  f"{100 * found['morton']['l2']['line_miss_rate']:.1f}", *(f"{value:.1f}" for value in saved)])
 paper = {row["order"]: row for row in rows("preset.csv") if (row["l1_kib"], row["l2_kib"]) == ("8", "128")}
-table.append(["paper", "", f"{float(paper['morton']['paper_l1_miss_pct']):.2f}", f"{float(paper['z2-sta']['paper_l1_miss_pct']):.2f}",
-              f"{float(paper['morton']['paper_l2_miss_pct']):.1f}",
+table.append(["paper", "", f"{float(paper['morton']['paper_l1_footprint_miss_pct']):.2f}", f"{float(paper['z2-sta']['paper_l1_footprint_miss_pct']):.2f}",
+              f"{float(paper['morton']['paper_l2_line_miss_pct']):.1f}",
               *(f"{float(paper[order]['paper_reduction_pct']):.1f}" for order in ("z2-lrta", "z2-sta"))])
 write("open-choices.csv", [
     "scripts/paper.sh SCENES  (tracegen raster crytek-sponza/sponza.gltf --hmd dk2 -o crytek-sponza.textrace)",

@@ -19,7 +19,7 @@ for scene in ("crytek-sponza", "atrium", "jungle"):
         row = [scene, policy]
         for order in ("morton", "z2-sta"):
             result = json.load(open(f"{scene},{order},{policy}.json"))["result"]
-            row += [f"{100 * result['l1']['miss_rate']:.2f}", f"{result['external_bytes'] / 1e6:.3f}"]
+            row += [f"{100 * result['l1']['footprint_miss_rate']:.2f}", f"{result['external_bytes'] / 1e6:.3f}"]
         rows.append(row)
 with open(sys.argv[1] + "/policies.csv", "w", newline="") as file:
     file.write("# command: scripts/policies.sh SCENES  (tracegen raster SCENE --hmd dk2 --no-plain, replay run TRACE --mode functional --order ORDER --replacement POLICY)\n")

@@ -56,12 +56,12 @@ class Level:
             cause = "conflict" if full else "capacity" if line in self.seen else "compulsory"
             counts[cause] += 1
         elif not full:
-            counts["spared"] += 1
+            counts["avoided"] += 1
         self.seen.add(line)
         return own
 
 
-KEYS = ["accesses", "misses", "compulsory", "capacity", "conflict", "spared", "fully_associative_misses"]
+KEYS = ["accesses", "misses", "compulsory", "capacity", "conflict", "avoided", "fully_associative_misses"]
 
 
 def twin(addresses, l1, l2):

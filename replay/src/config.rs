@@ -33,6 +33,7 @@ pub use tmu::{Allocation, TmuConfig, TmuModel};
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Mode {
     /// Each core's texture unit (`tmu.model`) has a clock. The clocks decide how the cores' accesses interleave.
@@ -57,6 +58,7 @@ impl Mode {
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Assign {
     /// The next item goes to the first idle core.
@@ -70,6 +72,7 @@ pub enum Assign {
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Hsr {
     /// All of them. Needs a trace captured without the depth test.
@@ -91,6 +94,7 @@ impl Hsr {
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum CountBy {
     /// Textures and mip levels.
@@ -116,6 +120,7 @@ fn is_recorded_tile(tile_px: &u32) -> bool {
 
 /// The complete configuration of a replay.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct RunConfig {
     /// How time is modelled.
@@ -135,8 +140,10 @@ pub struct RunConfig {
     /// Cycles in which a line travels from memory to the last level.
     pub memory_cycles: u32,
     /// Filter and level of detail.
+    #[cfg_attr(test, schemars(with = "crate::schemas::Sampling"))]
     pub sampling: SamplingConfig,
     /// Memory layout of the textures.
+    #[cfg_attr(test, schemars(with = "crate::schemas::Layout"))]
     pub layout: LayoutConfig,
     /// Texture unit.
     pub tmu: TmuConfig,

@@ -21,6 +21,8 @@ pub mod preset;
 mod registry;
 pub mod report;
 pub mod result;
+#[cfg(test)]
+mod schemas;
 pub mod sgrt;
 pub mod size;
 pub mod stream;

@@ -11,10 +11,11 @@ use std::path::Path;
 pub const TOOL: &str = concat!("replay ", env!("CARGO_PKG_VERSION"));
 
 /// Schema of the object that `replay run --json` prints.
-pub const RUN_SCHEMA: &str = "replay.run/1";
+pub const RUN_SCHEMA: &str = "replay.run/2";
 
 /// Counters of one cache level, or of a part of its traffic (a view, texture, mip level or tile).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LevelCounters {
     /// Bilinear footprints looked up at this level.
     pub footprints: u64,
@@ -41,18 +42,33 @@ impl LevelCounters {
 
 /// A cache level's summary.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LevelResult {
-    /// L1: footprint misses over footprints. L2: line misses over line look-ups.
-    pub miss_rate: f64,
-    /// Same as `line_misses`. For the L2, these cause the DRAM traffic.
-    pub misses: u64,
+    /// `footprint_misses` over `footprints`.
+    pub footprint_miss_rate: f64,
+    /// `line_misses` over `line_lookups`.
+    pub line_miss_rate: f64,
     /// The counters (L1: summed over cores).
     #[serde(flatten)]
     pub counters: LevelCounters,
 }
 
+impl LevelResult {
+    /// Counters with their rates, which are 0 without look-ups.
+    #[must_use]
+    pub fn new(counters: LevelCounters) -> Self {
+        let rate = |part: u64, whole: u64| part as f64 / whole.max(1) as f64;
+        Self {
+            footprint_miss_rate: rate(counters.footprint_misses, counters.footprints),
+            line_miss_rate: rate(counters.line_misses, counters.line_lookups),
+            counters,
+        }
+    }
+}
+
 /// The MSHRs of the L2, if their number is limited.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct MshrResult {
     /// Peak number in use.
     pub peak: u64,
@@ -80,6 +96,7 @@ fn is_zero(value: &u64) -> bool {
 
 /// Counts of a prefetcher of the L2.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PrefetchResult {
     /// Prefetched lines.
     pub lines: u64,
@@ -110,13 +127,14 @@ impl PrefetchResult {
 
 /// A level below the L2.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LowerLevelResult {
     /// `L3`, `L4`, ...
     pub name: String,
     /// Line size in bytes.
     pub line_bytes: u32,
     /// `line_misses` over `line_lookups`.
-    pub miss_rate: f64,
+    pub line_miss_rate: f64,
     /// Line misses of the level above.
     pub line_lookups: u64,
     /// Lines fetched from below.
@@ -127,6 +145,7 @@ pub struct LowerLevelResult {
 
 /// Traffic of a client between chip and memory, over all frames.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ClientTraffic {
     /// The client.
     pub client: Client,
@@ -150,6 +169,7 @@ impl ClientTraffic {
 
 /// Counts of vertex processing and binning, over all frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct GeometryCounts {
     /// Triangles of the submitted draws, over all views.
     pub triangles_submitted: u64,
@@ -163,6 +183,7 @@ pub struct GeometryCounts {
 
 /// Counts of the memory system beside and below the L2. Empty for a machine of two caches and memory.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct MemoryResult {
     /// The prefetcher of the L2, if configured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -221,7 +242,7 @@ impl fmt::Display for MemoryResult {
                 level.line_bytes,
                 level.line_lookups,
                 level.line_misses,
-                100.0 * level.miss_rate,
+                100.0 * level.line_miss_rate,
                 level.secondary_misses
             )?;
         }
@@ -271,6 +292,7 @@ impl Timeline {
 
 /// Texture-unit figures of a timed replay, summed over cores.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TmuResult {
     /// Cycles in which a useful footprint left the pipeline over all cycles, 0 to 1.
     pub utilization: f64,
@@ -285,11 +307,12 @@ pub struct TmuResult {
 /// First look-ups of footprints, counted by the model in which threads stop at their first miss.
 /// Lines in flight count as misses, and merged requests count, so these are not traffic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct FirstLookups {
     /// `l1_misses` over footprints.
-    pub l1_miss_rate: f64,
+    pub l1_footprint_miss_rate: f64,
     /// `l2_misses` over `l2_lookups`.
-    pub l2_miss_rate: f64,
+    pub l2_line_miss_rate: f64,
     /// Footprints whose first look-up found a line absent or in flight.
     pub l1_misses: u64,
     /// Lines missing in these footprints.
@@ -306,8 +329,8 @@ impl FirstLookups {
     pub fn over(self, footprints: u64) -> Self {
         let rate = |part: u64, whole: u64| part as f64 / whole.max(1) as f64;
         Self {
-            l1_miss_rate: rate(self.l1_misses, footprints),
-            l2_miss_rate: rate(self.l2_misses, self.l2_lookups),
+            l1_footprint_miss_rate: rate(self.l1_misses, footprints),
+            l2_line_miss_rate: rate(self.l2_misses, self.l2_lookups),
             ..self
         }
     }
@@ -315,6 +338,7 @@ impl FirstLookups {
 
 /// L1 and L2 counters of a part of the traffic.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Part {
     /// Name of the part: a texture's name, `left`, `level 3`, ...
     pub name: String,
@@ -326,6 +350,7 @@ pub struct Part {
 
 /// Per-tile counts of one render pass, row by row.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TileMap {
     /// Index of the render pass in the trace.
     pub pass: u32,
@@ -343,6 +368,7 @@ pub struct TileMap {
 
 /// The result of replaying one trace with one configuration.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct RunResult {
     /// Quads replayed.
     pub quads: u64,
@@ -406,6 +432,7 @@ impl RunResult {
 
 /// Identifies the trace of a result.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TraceId {
     /// Name of the file without folder and extension.
     pub name: String,

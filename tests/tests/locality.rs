@@ -62,7 +62,7 @@ struct Level {
     own: Lru,
     full: Lru,
     seen: HashSet<u64>,
-    /// Compulsory, capacity and conflict misses, and avoided misses (`spared`).
+    /// Compulsory, capacity and conflict misses, and avoided misses (`avoided`).
     counts: [u64; 4],
 }
 
@@ -110,7 +110,7 @@ fn causes_of_misses_equal_those_of_plain_caches_with_din_input() {
         }
     }
     for (row, level) in json["rows"].as_array().expect("rows").iter().zip([l1, l2]) {
-        let keys = ["compulsory", "capacity", "conflict", "spared"];
+        let keys = ["compulsory", "capacity", "conflict", "avoided"];
         let counts = keys.map(|key| row[key].as_u64().expect("a count"));
         assert_eq!(counts, level.counts, "{}", row["stream"]);
         assert!(counts.iter().all(|&count| count > 0), "{counts:?}");

@@ -42,7 +42,7 @@ fn a_flag_and_a_table_configure_the_same_l3() {
         let misses = levels[0]["line_misses"].as_u64().expect("a count");
         assert_eq!(flag["result"]["external_bytes"], 16 * misses, "{mode}");
         assert_eq!(
-            flag["result"]["l2"]["misses"], levels[0]["line_lookups"],
+            flag["result"]["l2"]["line_misses"], levels[0]["line_lookups"],
             "{mode}"
         );
     }

@@ -101,10 +101,10 @@ fn rows_say_what_an_order_is_and_what_it_needs() {
         "8/64",
         "--bounds",
     ]);
-    assert_eq!(json["schema"], "replay.orders/1");
+    assert_eq!(json["schema"], "replay.orders/2");
     let own = row(&json, "zig-zag+sta+offset+boustro");
     assert_eq!(own["buildable"], true);
-    assert_eq!(own["knows"], "display");
+    assert_eq!(own["information"], "display");
     assert!(own["state_bytes"].as_u64() <= Some(64));
     assert_eq!(own["tile_buffers"], 2);
     assert_eq!(
@@ -164,7 +164,7 @@ fn searched_orders_come_from_files_and_replay_to_the_same_bytes() {
     let read = orders(&[&usual[..], &files[..]].concat());
     for name in ["greedy", "anneal"] {
         assert_eq!(row(&searched, name), row(&read, name));
-        assert_eq!(row(&read, name)["knows"], "future");
+        assert_eq!(row(&read, name)["information"], "future");
         assert_eq!(row(&read, name)["buildable"], false);
     }
     assert_eq!(row(&read, "greedy")["closed_pct"], 100.0);

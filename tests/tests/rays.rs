@@ -46,7 +46,7 @@ fn a_reprojection_saves_work_and_reports_its_error() {
     let golden = root().join("traces/chess-rays.raytrace");
     let careful = reproject(&golden, &[]);
     let plain = reproject(&golden, &["--rule", "none"]);
-    assert_eq!(careful["schema"], "replay.reproject/2");
+    assert_eq!(careful["schema"], "replay.reproject/3");
     for report in [&careful, &plain] {
         assert!(figure(report, "relative_performance") > 1.0);
         assert!(figure(report, "relative_energy") > 0.0);

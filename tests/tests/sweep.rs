@@ -258,7 +258,7 @@ fn the_plan_lists_keys_costs_and_finished_points() {
     let plan = |flags: &[&str]| -> Vec<serde_json::Value> {
         let output = run_ok(&mut sweep.command("out", &[&["--plan", "--json"], flags].concat()));
         let plan: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
-        assert_eq!(plan["schema"], "replay.plan/1");
+        assert_eq!(plan["schema"], "replay.plan/2");
         plan["points"].as_array().expect("points").clone()
     };
     let all = plan(&[]);

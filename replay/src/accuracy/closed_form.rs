@@ -27,8 +27,11 @@ fn forms(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
         let of = |config| inputs.replays.of(subject, config);
         let model = of(looping(inputs.config, TmuModel::FirstMiss, 24))?;
         let functional = of(functional(inputs.config))?;
-        let first = |r: &RunResult| r.first_lookups.map(|f| (f.l1_miss_rate, f.l2_miss_rate));
-        let all = |r: &RunResult| Some((r.l1.miss_rate, r.l2.miss_rate));
+        let first = |r: &RunResult| {
+            r.first_lookups
+                .map(|f| (f.l1_footprint_miss_rate, f.l2_line_miss_rate))
+        };
+        let all = |r: &RunResult| Some((r.l1.footprint_miss_rate, r.l2.line_miss_rate));
         for (name, rates, from) in [
             ("at first look-ups", first as fn(&RunResult) -> _, &model),
             ("at functional rates", all, &functional),

@@ -206,7 +206,10 @@ mod tests {
                 ..config
             };
             let expected = replay(&trace, &config).unwrap();
-            assert_eq!(sampled(&config), (expected.l2.misses, expected.footprints));
+            assert_eq!(
+                sampled(&config),
+                (expected.l2.counters.line_misses, expected.footprints)
+            );
             assert_ne!(
                 sampled(&config),
                 sampled(&plain),
@@ -233,9 +236,12 @@ mod tests {
             let frames = frames(&trace);
             let found = counts(&trace, &config, order, &Part::frames(&frames)).unwrap();
             let expected = replay(&trace, &RunConfig { order, ..config }).unwrap();
-            assert_eq!(found.by_cluster.iter().sum::<u64>(), expected.l2.misses);
+            assert_eq!(
+                found.by_cluster.iter().sum::<u64>(),
+                expected.l2.counters.line_misses
+            );
             assert_eq!(found.by_cluster.len(), 16);
-            assert_eq!(found.by_frame, [expected.l2.misses]);
+            assert_eq!(found.by_frame, [expected.l2.counters.line_misses]);
             // Each cluster has the same count alone as together with the others.
             let chosen: Vec<bool> = (0..16).map(|cluster| cluster % 5 == 1).collect();
             let part = Part {
@@ -251,7 +257,7 @@ mod tests {
             let (misses, footprints) = tiles.fold((0, 0), |(m, f), t| (m + t.0, f + t.1));
             assert_eq!(
                 (misses, footprints),
-                (expected.l2.misses, expected.footprints)
+                (expected.l2.counters.line_misses, expected.footprints)
             );
         }
     }

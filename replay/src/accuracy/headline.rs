@@ -13,8 +13,8 @@ use std::time::Duration;
 /// Headline figures of texture traces.
 pub const TEXTURE_FIGURES: [Figure; 6] = [
     figure("external_bytes", "external bytes", "%"),
-    figure("l1_miss_pct", "L1 miss rate", "points"),
-    figure("l2_miss_pct", "L2 miss rate", "points"),
+    figure("l1_footprint_miss_pct", "L1 miss rate", "points"),
+    figure("l2_line_miss_pct", "L2 miss rate", "points"),
     figure("reduction_pct", "saved against Morton", "points"),
     figure("tmu_util_pct", "TMU utilisation", "points"),
     figure("tmu_ratio", "TMU utilisation over Morton's", "%"),
@@ -88,8 +88,8 @@ impl Replayed {
         let ratio = tmu(sta).zip(tmu(morton)).map(|(sta, morton)| sta / morton);
         [
             both(|r| r.external_bytes as f64),
-            both(|r| 100.0 * r.l1.miss_rate),
-            both(|r| 100.0 * r.l2.miss_rate),
+            both(|r| 100.0 * r.l1.footprint_miss_rate),
+            both(|r| 100.0 * r.l2.line_miss_rate),
             [None, Some(100.0 * saved)],
             [tmu(morton), tmu(sta)],
             [None, ratio],

@@ -29,7 +29,7 @@ impl LevelCounts {
 
     /// Line misses over line look-ups; 0 without look-ups.
     #[must_use]
-    pub fn miss_rate(&self) -> f64 {
+    pub fn line_miss_rate(&self) -> f64 {
         match self.line_lookups() {
             0 => 0.0,
             lookups => self.line_misses() as f64 / lookups as f64,

@@ -44,7 +44,7 @@ pub struct Args {
     /// Folder for results; a repeated search reads them and continues
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// Print one JSON object (schema replay.calibration/1)
+    /// Print one JSON object (schema replay.calibration/2)
     #[arg(long)]
     json: bool,
     #[command(flatten)]

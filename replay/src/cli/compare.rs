@@ -31,7 +31,7 @@ pub struct Args {
     /// Orders for the replays of both, comma-separated, or `all`
     #[arg(long, value_name = "ORDERS", default_value = "morton,z2-lrta,z2-sta")]
     orders: String,
-    /// Print one JSON object (schema replay.compare/1)
+    /// Print one JSON object (schema replay.compare/2)
     #[arg(long)]
     json: bool,
     #[command(flatten)]

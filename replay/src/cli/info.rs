@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Schema of the object that `replay info --json` prints.
-const SCHEMA: &str = "replay.info/1";
+const SCHEMA: &str = "replay.info/2";
 
 /// Arguments of `replay info`.
 #[derive(Clone, Debug, clap::Args)]
@@ -26,7 +26,7 @@ const SCHEMA: &str = "replay.info/1";
 pub struct InfoArgs {
     /// Trace, .textrace or .raytrace
     pub trace: PathBuf,
-    /// Print one JSON object (schema replay.info/1) with the complete tables
+    /// Print one JSON object (schema replay.info/2) with the complete tables
     #[arg(long)]
     pub json: bool,
 }
@@ -76,6 +76,8 @@ fn to_json(trace: &Trace) -> Result<Value> {
             value["meta"] = serde_json::to_value(&tables.meta)?;
             value["totals"] = json!({ "left": left.to_json(), "right": right.to_json() });
             value["hierarchy"] = serde_json::to_value(&tables.bvh)?;
+            let settings = tables.bvh.settings.iter();
+            value["hierarchy"]["settings"] = settings.map(|(k, v)| (k.clone(), json!(v))).collect();
             value["materials"] = serde_json::to_value(&tables.materials)?;
             value["lights"] = serde_json::to_value(&tables.lights)?;
             value["triangles"] = serde_json::to_value(&tables.triangles)?;
@@ -454,7 +456,7 @@ mod tests {
             .map(|p| p["counts"]["records"].as_u64().unwrap())
             .sum();
         assert_eq!(sum, records as u64);
-        assert_eq!(value["schema"], "replay.info/1");
+        assert_eq!(value["schema"], "replay.info/2");
     }
 
     #[test]

@@ -42,7 +42,7 @@ pub struct Args {
     /// Also analyse the accesses of all cores as one stream
     #[arg(long)]
     merged: bool,
-    /// Print one JSON object (schema replay.locality/1)
+    /// Print one JSON object (schema replay.locality/2)
     #[arg(long)]
     json: bool,
     /// Also write the tables as CSV files into this folder, with exact counts of every distance

@@ -70,7 +70,7 @@ pub struct Args {
     /// curves with sta, offset and boustro]
     #[arg(long, value_name = "ORDERS", num_args = 0..=1, default_missing_value = LEARNER)]
     learn: Option<String>,
-    /// Print one JSON object (schema replay.orders/1)
+    /// Print one JSON object (schema replay.orders/2)
     #[arg(long)]
     json: bool,
     /// Also write the rows as CSV; - writes them to standard output instead of the table

@@ -23,7 +23,7 @@ pub struct Args {
     /// Also replay in functional mode and show the difference
     #[arg(long)]
     functional: bool,
-    /// Print one JSON object (schema replay.paper/1)
+    /// Print one JSON object (schema replay.paper/3)
     #[arg(long)]
     json: bool,
     /// Also write the rows as CSV; - writes them to standard output instead of the table

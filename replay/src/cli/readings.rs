@@ -33,7 +33,7 @@ pub struct ReadingsArgs {
     /// [default: the scene that a built-in one of the paper's stands for].
     #[arg(long = "as", value_name = "SCENE")]
     paper_scenes: Vec<String>,
-    /// Prints JSON (schema replay.readings/1).
+    /// Prints JSON (schema replay.readings/2).
     #[arg(long, conflicts_with = "csv")]
     json: bool,
     /// Prints CSV: a row per reading and trace.

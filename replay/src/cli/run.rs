@@ -28,7 +28,7 @@ pub struct Args {
     /// Texture trace; optional with --addresses and --print-config
     #[arg(required_unless_present_any = ["print_config", "addresses"], conflicts_with = "addresses")]
     trace: Option<PathBuf>,
-    /// Print one JSON object (schema replay.run/1, or replay.addresses/1)
+    /// Print one JSON object (schema replay.run/2, or replay.addresses/2)
     #[arg(long)]
     json: bool,
     /// Also count by tile (in the JSON)

@@ -29,7 +29,7 @@ pub struct Args {
     /// Folder for results.json, results.csv, report.html and points/ [default: out/NAME]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Print one JSON object (schema replay.sweep/2, with --plan replay.plan/1)
+    /// Print one JSON object (schema replay.sweep/3, with --plan replay.plan/2)
     #[arg(long, conflicts_with_all = ["emit_slurm"])]
     json: bool,
     #[command(flatten)]

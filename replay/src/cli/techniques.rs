@@ -40,7 +40,7 @@ pub struct Args {
         default_value = "morton,z2-lrta,z2-sta,z2-sta-merge"
     )]
     orders: String,
-    /// Print one JSON object (schema replay.techniques/1)
+    /// Print one JSON object (schema replay.techniques/2)
     #[arg(long)]
     json: bool,
     /// Also write the rows as CSV; - writes them to standard output instead of the table
@@ -281,8 +281,8 @@ fn cache_figures(row: &ResultRow) -> CacheFigures {
     CacheFigures {
         order: row.point.config.order,
         footprints: result.footprints,
-        l1_miss_pct: 100.0 * result.l1.miss_rate,
-        l2_miss_pct: 100.0 * result.l2.miss_rate,
+        l1_footprint_miss_pct: 100.0 * result.l1.footprint_miss_rate,
+        l2_line_miss_pct: 100.0 * result.l2.line_miss_rate,
         external_bytes: result.external_bytes,
         bound_bytes: row.bound_bytes(),
         frames: frame_count(row.subject.source.tables()),
@@ -377,7 +377,7 @@ mod tests {
         assert_eq!(first[2], first[3]);
 
         let json: Value = serde_json::from_str(&first[1]).unwrap();
-        assert_eq!(json["schema"], "replay.techniques/1");
+        assert_eq!(json["schema"], "replay.techniques/2");
         let rows = json["rows"].as_array().unwrap();
         let names: Vec<&Value> = rows.iter().map(|r| &r["technique"]).collect();
         assert_eq!(names, ["per-eye", "superfrustum", "grey"]);

@@ -38,6 +38,7 @@ pub enum CompareError {
 
 /// A class of fragments: those of a material, or of opaque draws.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Class {
     /// Name of the class.
     pub name: String,
@@ -48,6 +49,7 @@ pub struct Class {
 
 /// The result of a comparison.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Comparison {
     /// All fragments.
     pub all: Tally,

@@ -105,15 +105,22 @@ impl Spread {
     }
 }
 
+/// What JSON has of the differences.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(crate) struct Summary {
+    /// Number of values compared.
+    compared: u64,
+    /// Mean difference.
+    mean: f64,
+    /// 99th percentile of the differences.
+    percentile_99: f64,
+    /// Largest difference.
+    largest: f64,
+}
+
 impl Serialize for Spread {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        #[derive(Serialize)]
-        struct Summary {
-            compared: u64,
-            mean: f64,
-            percentile_99: f64,
-            largest: f64,
-        }
         Summary {
             compared: self.count,
             mean: self.mean(),

@@ -9,6 +9,7 @@ pub const LOD_STEPS: u32 = 1 << 16;
 
 /// Differences in a class of fragments.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Tally {
     /// Fragments in both captures.
     pub fragments_in_both: u64,
@@ -19,8 +20,10 @@ pub struct Tally {
     /// Texture coordinates of common fragments that only one capture has, or that sample other textures.
     pub lanes_sampled_differently: u64,
     /// Distance of texture coordinates (the larger of both axes), in texels of the largest texture sampled with them.
+    #[cfg_attr(test, schemars(with = "crate::compare::spread::Summary"))]
     pub uv_texels: Spread,
     /// Difference of the exact level of detail in levels, per record.
+    #[cfg_attr(test, schemars(with = "crate::compare::spread::Summary"))]
     pub lod_levels: Spread,
     /// Footprints of the common fragments.
     pub footprints: u64,

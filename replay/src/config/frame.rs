@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// How a frame is rendered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum FrameMachine {
     /// Tile by tile on chip. A G-buffer, if the scene needs one, stays in pixel-local storage.
@@ -18,6 +19,7 @@ pub enum FrameMachine {
 
 /// The machine around the texture units, for the traffic of a whole frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct FrameConfig {
     /// How the frame is rendered.

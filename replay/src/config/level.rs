@@ -7,6 +7,7 @@ use serde::Serialize;
 
 /// A cache level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LevelConfig {
     /// Capacity in bytes.
     pub size_bytes: u64,
@@ -157,6 +158,7 @@ impl LevelConfig {
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, serde::Deserialize, clap::ValueEnum,
 )]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum LevelClients {
     /// The texture units.
@@ -178,6 +180,7 @@ impl LevelClients {
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, serde::Deserialize, clap::ValueEnum,
 )]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Inclusion {
     /// Levels evict independently.

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// The `[prefetch]` table: which lines are fetched into the L2 before they are requested.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct PrefetchConfig {
     /// The prefetching algorithm.

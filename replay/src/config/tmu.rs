@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Allocation {
     /// When the line is filled, as in the Z2 paper: lines in flight occupy no way.
@@ -20,6 +21,7 @@ pub enum Allocation {
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
 )]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum TmuModel {
     /// It requests all its lines and loops through the pipeline until they are filled ("looping for
@@ -47,6 +49,7 @@ impl TmuModel {
 
 /// The texture unit's pipeline; see `docs/models/texture-unit.md`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct TmuConfig {
     /// What a thread does whose lines are not in the L1. Not used in functional mode.

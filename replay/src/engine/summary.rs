@@ -40,16 +40,8 @@ pub fn summary(
         quads: trace.quads,
         lanes: trace.lanes,
         footprints: all.l1.footprints,
-        l1: LevelResult {
-            miss_rate: rate(all.l1.footprint_misses, all.l1.footprints),
-            misses: all.l1.line_misses,
-            counters: all.l1,
-        },
-        l2: LevelResult {
-            miss_rate: rate(all.l2.line_misses, all.l2.line_lookups),
-            misses: all.l2.line_misses,
-            counters: all.l2,
-        },
+        l1: LevelResult::new(all.l1),
+        l2: LevelResult::new(all.l2),
         external_bytes: all.l2.line_misses * u64::from(config.line_bytes),
         unique_lines: trace.unique_lines,
         access_hash: format!("{:016x}", trace.hash),
@@ -106,14 +98,6 @@ fn levels(accesses: &CellAccesses, misses: &CellMisses) -> (LevelCounters, Level
         counters(accesses.footprints, accesses.line_lookups, l1),
         counters(l1.footprints, l1.lines, l2),
     )
-}
-
-fn rate(part: u64, whole: u64) -> f64 {
-    if whole == 0 {
-        0.0
-    } else {
-        part as f64 / whole as f64
-    }
 }
 
 fn tile_maps(
@@ -193,11 +177,11 @@ mod tests {
         let cells = bins.cells() as u64;
         let result = summary(&trace.tables, bins, &accesses, &caches, &config);
         assert_eq!(result.footprints, 8 * MANY * cells);
-        assert_eq!(result.l1.misses, 4 * MANY * cells + 3);
+        assert_eq!(result.l1.counters.line_misses, 4 * MANY * cells + 3);
         assert_eq!(result.l2.counters.line_lookups, 4 * MANY * cells + 3);
         assert_eq!(result.external_bytes, (MANY * cells + 1) * 16);
-        assert!((result.l1.miss_rate - 0.25).abs() < 1e-12);
-        assert!((result.l2.miss_rate - 0.25).abs() < 1e-12);
+        assert!((result.l1.footprint_miss_rate - 0.25).abs() < 1e-12);
+        assert!((result.l2.line_miss_rate - 0.25).abs() < 1e-12);
         let of_parts: u64 = result.by_level.iter().map(|p| p.l2.line_misses).sum();
         assert_eq!(of_parts, MANY * cells + 1);
         let json = serde_json::to_string(&result).unwrap();

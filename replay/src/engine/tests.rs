@@ -259,7 +259,7 @@ fn an_infinite_cache_misses_each_line_once() {
             ..RunConfig::default()
         };
         let result = replay(&trace, &config).unwrap();
-        assert_eq!(result.l2.misses, result.unique_lines);
+        assert_eq!(result.l2.counters.line_misses, result.unique_lines);
     }
 }
 
@@ -289,7 +289,7 @@ fn parts_add_up_to_the_whole() {
         };
         assert_eq!(total(&|m| &m.footprints), r.footprints);
         assert_eq!(total(&|m| &m.l1_misses), r.l1.counters.footprint_misses);
-        assert_eq!(total(&|m| &m.l2_misses), r.l2.misses);
+        assert_eq!(total(&|m| &m.l2_misses), r.l2.counters.line_misses);
     }
 }
 
@@ -327,7 +327,7 @@ fn misses_in_flight_are_merged_and_counted_apart() {
         ],
     };
     let result = replay(&trace, &RunConfig::default()).unwrap();
-    assert_eq!(result.l1.misses, result.unique_lines);
+    assert_eq!(result.l1.counters.line_misses, result.unique_lines);
     assert!(result.l1.counters.secondary_misses >= result.unique_lines);
     assert_eq!(result.l2.counters.line_lookups, result.unique_lines);
 }
@@ -375,7 +375,7 @@ fn a_trace_without_textures_has_no_footprints() {
             },
         )
         .unwrap();
-        assert_eq!((result.footprints, result.l1.miss_rate), (0, 0.0));
+        assert_eq!((result.footprints, result.l1.footprint_miss_rate), (0, 0.0));
         assert!(result.quads > 0);
     }
 }
@@ -521,7 +521,13 @@ fn several_cores_equal_brute_force_caches_on_the_recorded_stream() {
             }
             let result = replay(&trace, &config).unwrap();
             assert_eq!(sent.len() as u64, result.footprints);
-            assert_eq!((result.l1.misses, result.l2.misses), (l1_lines, l2_lines));
+            assert_eq!(
+                (
+                    result.l1.counters.line_misses,
+                    result.l2.counters.line_misses
+                ),
+                (l1_lines, l2_lines)
+            );
         }
     }
 }
@@ -600,20 +606,26 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
             assert_eq!(flushed.footprints, 3 * single.footprints);
             // Random victims differ from frame to frame.
             if policy != Replacement::RANDOM {
-                assert_ne!(kept.l2.misses, flushed.l2.misses, "{policy:?} {mode:?}");
+                assert_ne!(
+                    kept.l2.counters.line_misses, flushed.l2.counters.line_misses,
+                    "{policy:?} {mode:?}"
+                );
                 // Predictions trained by the previous frame can be wrong; without them, the previous
                 // frame's lines only add hits.
                 if [Replacement::LRU, Replacement::FIFO, Replacement::TREE_PLRU].contains(&policy) {
-                    assert!(kept.l2.misses < flushed.l2.misses, "{policy:?} {mode:?}");
+                    assert!(
+                        kept.l2.counters.line_misses < flushed.l2.counters.line_misses,
+                        "{policy:?} {mode:?}"
+                    );
                 }
                 assert_eq!(
-                    flushed.l1.misses,
-                    3 * single.l1.misses,
+                    flushed.l1.counters.line_misses,
+                    3 * single.l1.counters.line_misses,
                     "{policy:?} {mode:?}"
                 );
                 assert_eq!(
-                    flushed.l2.misses,
-                    3 * single.l2.misses,
+                    flushed.l2.counters.line_misses,
+                    3 * single.l2.counters.line_misses,
                     "{policy:?} {mode:?}"
                 );
                 assert_eq!(flushed.cycles, single.cycles.map(|cycles| 3 * cycles));

@@ -154,7 +154,7 @@ impl<'a> Wave<'a> {
                 first_lookups: outcome.first_lookups,
                 ..summary(tables, expander.bins(), counts, &outcome.counts, config)
             };
-            let l2_misses = result.l2.misses;
+            let l2_misses = result.l2.counters.line_misses;
             result.external_bytes = outcome.memory.external_bytes(l2_misses, config.line_bytes);
             result.memory = outcome.memory;
             if let Some(clients) = &pass.clients {

@@ -5,11 +5,12 @@ use super::{Outcome, Plan, ResultRow, Setting, Subject, scene_label};
 use crate::paper::score::{Measured, Score, score};
 use crate::paper::z2;
 use crate::tmu::closed_form;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use toml::Value;
 
 /// The measure by which a setting is chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, clap::ValueEnum)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Objective {
     /// Distance of the utilisation from the one that the Z2 paper's table implies for the machine's own
@@ -22,6 +23,7 @@ pub enum Objective {
 
 /// Fit of a setting on a scene.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SceneFit {
     /// The trace's label.
     pub scene: String,
@@ -35,8 +37,11 @@ pub struct SceneFit {
 
 /// A trial: settings and their fit.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Trial {
     /// The settings.
+    #[serde(serialize_with = "as_map")]
+    #[cfg_attr(test, schemars(with = "serde_json::Map<String, serde_json::Value>"))]
     pub settings: Vec<Setting>,
     /// Fit on each scene.
     pub scenes: Vec<SceneFit>,
@@ -44,6 +49,10 @@ pub struct Trial {
     pub chosen_by: Option<f64>,
     /// The objective over the validation scenes.
     pub held_out: Option<f64>,
+}
+
+fn as_map<S: Serializer>(settings: &[Setting], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(settings.iter().map(|(key, value)| (key, value)))
 }
 
 /// Rows of a trial per scene: the paper's caches in its orders.
@@ -127,14 +136,14 @@ fn measured(row: &ResultRow) -> Measured {
     let result = row.result;
     let (l1, l2) = row.caches_kib();
     let rates = match &result.first_lookups {
-        Some(first) => (first.l1_miss_rate, first.l2_miss_rate),
-        None => (result.l1.miss_rate, result.l2.miss_rate),
+        Some(first) => (first.l1_footprint_miss_rate, first.l2_line_miss_rate),
+        None => (result.l1.footprint_miss_rate, result.l2.line_miss_rate),
     };
     Measured {
         caches_kib: (l1 as u32, l2 as u32),
         order: row.point.config.order,
-        l1_miss_pct: 100.0 * rates.0,
-        l2_miss_pct: 100.0 * rates.1,
+        l1_footprint_miss_pct: 100.0 * rates.0,
+        l2_line_miss_pct: 100.0 * rates.1,
         tmu_util_pct: result.tmu.as_ref().map(|tmu| 100.0 * tmu.utilization),
     }
 }
@@ -192,7 +201,10 @@ pub fn trials(
 fn fit(scene: &SceneCaptures, rows: &[ResultRow]) -> SceneFit {
     let measured: Vec<Measured> = rows.iter().map(measured).collect();
     let off = measured.iter().filter_map(|row| {
-        let form = closed_form(row.l1_miss_pct / 100.0, row.l2_miss_pct / 100.0);
+        let form = closed_form(
+            row.l1_footprint_miss_pct / 100.0,
+            row.l2_line_miss_pct / 100.0,
+        );
         Some(row.tmu_util_pct? - 100.0 * form)
     });
     let paper = rows.first().and_then(|row| row.subject.stand_in_for);

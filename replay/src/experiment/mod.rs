@@ -21,6 +21,8 @@ pub use outcome::{Outcome, ResultRow};
 pub use plan::{Axis, MOST_POINTS, Plan, PlanError, Point, Setting, plain};
 pub use runner::{AbsentPoint, Incomplete, RunError, merge, run, run_part};
 pub use split::{Split, Task};
+#[cfg(test)]
+pub(crate) use store::point_schema;
 pub use store::{Absent, POINT_SCHEMA, Store, StoredPoint, point_key};
 pub use subject::{Subject, frame_count, has_shadow_maps, labels, scene_label};
 

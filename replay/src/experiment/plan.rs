@@ -15,10 +15,12 @@ pub type Setting = (String, Value);
 
 /// A key and its values.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Axis {
     /// Dotted key of the configuration.
     pub key: String,
     /// Values in file order.
+    #[cfg_attr(test, schemars(with = "Vec<serde_json::Value>"))]
     pub values: Vec<Value>,
 }
 

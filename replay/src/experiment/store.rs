@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// Schema of a stored point.
-pub const POINT_SCHEMA: &str = "replay.point/2";
+pub const POINT_SCHEMA: &str = "replay.point/3";
 
 /// Extension of points files.
 const EXTENSION: &str = "rows";
@@ -28,8 +28,9 @@ const LARGEST_ROW_BYTES: u64 = 1 << 29;
 
 /// Content of a row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct StoredPoint {
-    /// `replay.point/2`.
+    /// `replay.point/3`.
     pub schema: String,
     /// Program and version.
     pub tool: String,
@@ -320,6 +321,12 @@ impl Store {
         }
         unreachable!("file names are unlimited")
     }
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn point_schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<StoredPoint>(POINT_SCHEMA)
 }
 
 #[cfg(test)]

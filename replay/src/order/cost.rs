@@ -8,8 +8,9 @@ use serde::Serialize;
 
 /// The information that an order uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
-pub enum Knows {
+pub enum Information {
     /// The grid alone.
     #[default]
     Grid,
@@ -21,7 +22,7 @@ pub enum Knows {
     Future,
 }
 
-impl Knows {
+impl Information {
     /// Name in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -48,7 +49,7 @@ pub struct Cost {
     /// Cycles until the next item is known.
     pub decision_cycles: u32,
     /// The information that it uses.
-    pub knows: Knows,
+    pub information: Information,
 }
 
 impl Cost {
@@ -76,8 +77,11 @@ impl Cost {
         }
     }
 
-    pub(super) fn knowing(self, knows: Knows) -> Self {
-        Self { knows, ..self }
+    pub(super) fn with_information(self, information: Information) -> Self {
+        Self {
+            information,
+            ..self
+        }
     }
 
     pub(super) fn looking_ahead(self, look_ahead_items: u32) -> Self {
@@ -103,13 +107,13 @@ impl Cost {
             look_ahead_items: self.look_ahead_items.max(other.look_ahead_items),
             tile_buffers: self.tile_buffers.max(other.tile_buffers),
             decision_cycles: self.decision_cycles + other.decision_cycles,
-            knows: self.knows.max(other.knows),
+            information: self.information.max(other.information),
         }
     }
 
     /// True if hardware can implement the order, because it does not use accesses of the current frame.
     #[must_use]
     pub fn is_buildable(&self) -> bool {
-        self.knows < Knows::Future
+        self.information < Information::Future
     }
 }

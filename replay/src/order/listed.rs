@@ -1,7 +1,7 @@
 //! Orders given as lists of items. A search finds them from the accesses of the frame, so hardware cannot
 //! implement them.
 
-use super::cost::{Cost, Knows};
+use super::cost::{Cost, Information};
 use super::parts::Parts;
 use super::{Order, OrderRow, View, WorkItem};
 use crate::palette::GREY;
@@ -24,7 +24,7 @@ impl Listed {
             .with_table(4 * items)
             .deciding_in(1)
             .with_tile_buffers(buffers as u32)
-            .knowing(Knows::Future)
+            .with_information(Information::Future)
     }
 }
 

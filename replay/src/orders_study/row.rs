@@ -120,8 +120,8 @@ impl Row<'_> {
 
     /// Name of the information that the order uses; `bound` for bounds.
     #[must_use]
-    pub fn knows(&self) -> &'static str {
-        self.cost.map_or("bound", |cost| cost.knows.name())
+    pub fn information(&self) -> &'static str {
+        self.cost.map_or("bound", |cost| cost.information.name())
     }
 
     /// The part of the distance from the baseline to the greedy order that the order closes, percent.

@@ -13,15 +13,16 @@ pub struct Measured {
     /// Order.
     pub order: Order,
     /// L1 miss rate, percent.
-    pub l1_miss_pct: f64,
+    pub l1_footprint_miss_pct: f64,
     /// L2 miss rate, percent.
-    pub l2_miss_pct: f64,
+    pub l2_line_miss_pct: f64,
     /// TMU utilisation, percent; none without a texture unit.
     pub tmu_util_pct: Option<f64>,
 }
 
 /// Root mean square distances from the paper's rows of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Score {
     /// L1 miss rates, in points.
     pub l1_points: f64,
@@ -47,7 +48,7 @@ struct Parts {
 
 impl Parts {
     fn of(rows: &[Measured]) -> Self {
-        let product = |row: &Measured| row.l1_miss_pct * row.l2_miss_pct;
+        let product = |row: &Measured| row.l1_footprint_miss_pct * row.l2_line_miss_pct;
         let saved = |row: &Measured| {
             let of_caches = |other: &&Measured| {
                 other.caches_kib == row.caches_kib && other.order == Order::MORTON
@@ -64,7 +65,7 @@ impl Parts {
         let slope = |&l1_kib: &u32| {
             let of_size = rows.iter().filter(|row| row.caches_kib.0 == l1_kib);
             let points: Vec<(f64, f64)> = of_size
-                .map(|row| (product(row) / 100.0, row.l1_miss_pct))
+                .map(|row| (product(row) / 100.0, row.l1_footprint_miss_pct))
                 .collect();
             slope(&points)
         };
@@ -72,7 +73,7 @@ impl Parts {
             rows: rows
                 .iter()
                 .map(|row| {
-                    let rates = [row.l1_miss_pct, row.l2_miss_pct].map(Some);
+                    let rates = [row.l1_footprint_miss_pct, row.l2_line_miss_pct].map(Some);
                     [rates[0], rates[1], row.tmu_util_pct, saved(row)]
                 })
                 .collect(),
@@ -104,8 +105,8 @@ fn published(row: &PublishedRow) -> Measured {
     Measured {
         caches_kib: (row.l1_kib, row.l2_kib),
         order: row.order,
-        l1_miss_pct: row.l1_miss_pct,
-        l2_miss_pct: row.l2_miss_pct,
+        l1_footprint_miss_pct: row.l1_footprint_miss_pct,
+        l2_line_miss_pct: row.l2_line_miss_pct,
         tmu_util_pct: Some(row.tmu_util_pct),
     }
 }
@@ -198,15 +199,16 @@ mod tests {
         assert!((tmu.tmu_points.unwrap() - 2.0).abs() < 1e-9 && tmu.l1_points == 0.0);
         assert!((tmu.total - (2.0 / SPREADS[2]) / 5_f64.sqrt()).abs() < 1e-9);
         // Twice the L1 rate leaves savings and slopes, which are ratios, unchanged.
-        let twice = changed(|row| row.l1_miss_pct *= 2.0);
+        let twice = changed(|row| row.l1_footprint_miss_pct *= 2.0);
         assert!(twice.l1_points > 8.0 && twice.saved_points < 1e-9 && twice.slope < 1e-9);
         // Without a texture unit, its part is left out of the total as well.
-        let none =
-            changed(|row| (row.tmu_util_pct, row.l1_miss_pct) = (None, row.l1_miss_pct + 1.0));
+        let none = changed(|row| {
+            (row.tmu_util_pct, row.l1_footprint_miss_pct) = (None, row.l1_footprint_miss_pct + 1.0)
+        });
         assert_eq!(none.tmu_points, None);
         assert!((none.l1_points - 1.0).abs() < 1e-9 && none.total > 0.0);
         // A constant L1 rate has slope zero.
-        let flat = changed(|row| row.l1_miss_pct = 10.0);
+        let flat = changed(|row| row.l1_footprint_miss_pct = 10.0);
         assert!(flat.slope > 0.4, "{flat:?}");
     }
 

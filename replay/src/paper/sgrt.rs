@@ -20,6 +20,7 @@ pub struct PaperScene {
 
 /// The paper's values shown for a trace.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PaperValues {
     /// Scene in the paper.
     pub scene: String,

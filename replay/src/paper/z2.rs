@@ -7,6 +7,7 @@ use std::sync::LazyLock;
 
 /// One row of the paper's Table 2: a scene, a cache configuration, an order.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PublishedRow {
     /// Scene, as in [`SCENES`].
     pub scene: String,
@@ -17,9 +18,9 @@ pub struct PublishedRow {
     /// Order.
     pub order: Order,
     /// L1 miss rate, percent of footprints.
-    pub l1_miss_pct: f64,
+    pub l1_footprint_miss_pct: f64,
     /// L2 miss rate, percent of L2 look-ups.
-    pub l2_miss_pct: f64,
+    pub l2_line_miss_pct: f64,
     /// TMU utilisation, percent.
     pub tmu_util_pct: f64,
 }
@@ -29,7 +30,7 @@ impl PublishedRow {
     /// which the paper does not give in numbers.
     #[must_use]
     pub fn external_lines_per_footprint(&self) -> f64 {
-        self.l1_miss_pct * self.l2_miss_pct / 1e4
+        self.l1_footprint_miss_pct * self.l2_line_miss_pct / 1e4
     }
 
     /// The same scene and caches in Morton order.

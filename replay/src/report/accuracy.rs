@@ -1,4 +1,4 @@
-//! Run time against error (`replay.accuracy/2`): a table and a chart per study, the recommended choices,
+//! Run time against error (`replay.accuracy/3`): a table and a chart per study, the recommended choices,
 //! and the table of errors on reports.
 
 use super::columns::{Column, Record};
@@ -18,7 +18,7 @@ use maud::{Markup, html};
 use serde::Serialize;
 
 /// Schema of `accuracy.json`.
-pub const ACCURACY_SCHEMA: &str = "replay.accuracy/2";
+pub const ACCURACY_SCHEMA: &str = "replay.accuracy/3";
 
 /// A study with its measurements.
 pub struct Measured {
@@ -154,6 +154,7 @@ struct Advice<'a> {
 
 /// The JSON object. It has no values that depend on the host machine.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct AccuracyJson<'a> {
     schema: &'a str,
     tool: &'a str,
@@ -163,6 +164,7 @@ struct AccuracyJson<'a> {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct StudyJson<'a> {
     key: &'a str,
     title: &'a str,
@@ -381,6 +383,12 @@ fn section(measured: &Measured) -> Result<Markup, PlotError> {
         (measured.table().markup())
         p.note { "Time: " (study.time) "." }
     })
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<AccuracyJson<'_>>(ACCURACY_SCHEMA)
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use crate::result::TOOL;
 use serde::Serialize;
 
 /// Schema of the object that `replay run --addresses --json` prints.
-const SCHEMA: &str = "replay.addresses/1";
+const SCHEMA: &str = "replay.addresses/2";
 
 /// A configuration of an outcome.
 struct PointRow<'a> {
@@ -47,11 +47,11 @@ fn level<'a, 'r>(
             of(r.point).line_misses()
         }),
         Column::real(
-            key("miss_pct"),
+            key("line_miss_pct"),
             name("miss"),
             "%",
             2,
-            move |r: &PointRow<'r>| 100.0 * of(r.point).miss_rate(),
+            move |r: &PointRow<'r>| 100.0 * of(r.point).line_miss_rate(),
         ),
     ]
 }
@@ -132,6 +132,7 @@ fn rows(outcome: &Outcome) -> Vec<PointRow<'_>> {
 
 /// Counts of the accesses, as JSON.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Accesses {
     accesses: u64,
     reads: u64,
@@ -160,6 +161,7 @@ impl Accesses {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct AddressesJson<'a, P> {
     schema: &'static str,
     tool: &'static str,
@@ -235,7 +237,7 @@ const LEVEL: [&str; 6] = [
     "replacement",
     "line_lookups",
     "line_misses",
-    "miss_pct",
+    "line_miss_pct",
 ];
 
 /// Columns for several configurations.
@@ -244,8 +246,15 @@ const SEVERAL: [&str; 8] = [
     "l1.kib",
     "l2.kib",
     "l1.line_misses",
-    "l1.miss_pct",
+    "l1.line_miss_pct",
     "l2.line_misses",
-    "l2.miss_pct",
+    "l2.line_miss_pct",
     "external_bytes",
 ];
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<AddressesJson<'_, Vec<serde_json::Value>>>(SCHEMA)
+        .rows("points", &crate::report::columns::headings(&columns()))
+}

@@ -1,4 +1,4 @@
-//! Results of a calibration (`replay.calibration/1`): the error of each setting on the scenes it was chosen
+//! Results of a calibration (`replay.calibration/2`): the error of each setting on the scenes it was chosen
 //! on and on the others.
 
 use super::columns::{Column, Row};
@@ -10,10 +10,11 @@ use crate::result::TOOL;
 use serde::Serialize;
 
 /// Schema of the object that `replay calibrate --json` prints.
-pub const CALIBRATION_SCHEMA: &str = "replay.calibration/1";
+pub const CALIBRATION_SCHEMA: &str = "replay.calibration/2";
 
 /// A calibration: every trial, and the index of the chosen one.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct CalibrationReport {
     schema: &'static str,
     tool: &'static str,
@@ -115,6 +116,12 @@ impl CalibrationReport {
         }
         text
     }
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<CalibrationReport>(CALIBRATION_SCHEMA)
 }
 
 #[cfg(test)]

@@ -158,7 +158,7 @@ impl Show {
 /// A column without its values.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Heading {
-    /// Name in CSV and JSON. In JSON, a dot makes a nested object (`paper.l1_miss_pct`); in CSV it becomes
+    /// Name in CSV and JSON. In JSON, a dot makes a nested object (`paper.l1_footprint_miss_pct`); in CSV it becomes
     /// `_`.
     pub key: Cow<'static, str>,
     /// Heading of a table.
@@ -348,6 +348,15 @@ impl<R> Serialize for Records<'_, '_, R> {
         let columns = self.columns;
         serializer.collect_seq(self.rows.iter().map(|row| Record { columns, row }))
     }
+}
+
+/// The columns without their values.
+#[cfg(test)]
+pub(crate) fn headings<R>(columns: &[Column<'_, R>]) -> Vec<Heading> {
+    columns
+        .iter()
+        .map(|column| column.heading.clone())
+        .collect()
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! Results of comparing two captures (`replay.compare/1`).
+//! Results of comparing two captures (`replay.compare/2`).
 
 use super::columns::{Column, Records, Row, Show, Value};
 use super::table::Table;
@@ -10,17 +10,19 @@ use formats::textrace::TraceMeta;
 use serde::Serialize;
 
 /// Schema of the object that `replay compare --json` prints.
-pub const COMPARE_SCHEMA: &str = "replay.compare/1";
+pub const COMPARE_SCHEMA: &str = "replay.compare/2";
 
 /// Materials that the terminal's table shows.
 const MATERIALS: usize = 12;
 
 /// A capture.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Side<'a> {
     /// Scene and checksum.
     pub trace: &'a TraceId,
     /// Description.
+    #[cfg_attr(test, schemars(with = "crate::schemas::Meta"))]
     pub meta: &'a TraceMeta,
 }
 
@@ -64,16 +66,16 @@ impl Row for Replayed<'_> {
         let bytes = |r: &Self, side: usize| r.results[side].external_bytes;
         vec![
             Column::text("order", "order", |r: &Self| Value::Named(r.order.name(), r.order.title())),
-            Column::real("a.l1_miss_pct", "A: L1", "%", 3, |r: &Self| 100.0 * r.results[0].l1.miss_rate),
-            Column::real("a.l2_miss_pct", "A: L2", "%", 3, |r: &Self| 100.0 * r.results[0].l2.miss_rate),
+            Column::real("a.l1_footprint_miss_pct", "A: L1", "% of footprints", 3, |r: &Self| 100.0 * r.results[0].l1.footprint_miss_rate),
+            Column::real("a.l2_line_miss_pct", "A: L2", "% of lines", 3, |r: &Self| 100.0 * r.results[0].l2.line_miss_rate),
             Column::new("a.external_bytes", "A: external", "bytes", Show::Whole, move |r: &Self| bytes(r, 0)),
             Column::real("a.reduction_pct", "A: saved", "% of Morton", 2, |r: &Self| saved_pct(r, 0)),
-            Column::real("b.l1_miss_pct", "B: L1", "%", 3, |r: &Self| 100.0 * r.results[1].l1.miss_rate),
-            Column::real("b.l2_miss_pct", "B: L2", "%", 3, |r: &Self| 100.0 * r.results[1].l2.miss_rate),
+            Column::real("b.l1_footprint_miss_pct", "B: L1", "% of footprints", 3, |r: &Self| 100.0 * r.results[1].l1.footprint_miss_rate),
+            Column::real("b.l2_line_miss_pct", "B: L2", "% of lines", 3, |r: &Self| 100.0 * r.results[1].l2.line_miss_rate),
             Column::new("b.external_bytes", "B: external", "bytes", Show::Whole, move |r: &Self| bytes(r, 1)),
             Column::real("b.reduction_pct", "B: saved", "% of Morton", 2, |r: &Self| saved_pct(r, 1)),
-            Column::real("l1_miss_over_pct", "L1 miss", "B/A \u{2212} 1, %", 3, |r: &Self| over_pct(r.results.map(|x| x.l1.miss_rate))),
-            Column::real("l2_miss_over_pct", "L2 miss", "B/A \u{2212} 1, %", 3, |r: &Self| over_pct(r.results.map(|x| x.l2.miss_rate))),
+            Column::real("l1_miss_over_pct", "L1 miss", "B/A \u{2212} 1, %", 3, |r: &Self| over_pct(r.results.map(|x| x.l1.footprint_miss_rate))),
+            Column::real("l2_miss_over_pct", "L2 miss", "B/A \u{2212} 1, %", 3, |r: &Self| over_pct(r.results.map(|x| x.l2.line_miss_rate))),
             Column::real("external_over_pct", "external", "B/A \u{2212} 1, %", 3, |r: &Self| over_pct(r.results.map(|x| x.external_bytes as f64))),
         ]
     }
@@ -101,6 +103,7 @@ impl Row for Class {
 
 /// The JSON object.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct CompareJson<'a, 'r> {
     schema: &'a str,
     tool: &'a str,
@@ -187,4 +190,13 @@ impl CompareReport<'_> {
         classes.truncate(MATERIALS);
         Table::new(&Class::columns(), classes)
     }
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<CompareJson<'_, '_>>(COMPARE_SCHEMA).rows(
+        "replayed",
+        &crate::report::columns::headings(&Replayed::columns()),
+    )
 }

@@ -29,9 +29,9 @@ fn identity<'a>() -> Vec<Figure<'a>> {
 #[rustfmt::skip]
 pub fn figures<'a>() -> Vec<Figure<'a>> {
     let mut figures = vec![
-        Figure::real("l1_miss_pct", "L1 miss", "%", 2, |r| 100.0 * r.result.l1.miss_rate)
+        Figure::real("l1_footprint_miss_pct", "L1 miss", "% of footprints", 2, |r| 100.0 * r.result.l1.footprint_miss_rate)
             .about("footprints with a missing line"),
-        Figure::real("l2_miss_pct", "L2 miss", "%", 2, |r| 100.0 * r.result.l2.miss_rate)
+        Figure::real("l2_line_miss_pct", "L2 miss", "% of lines", 2, |r| 100.0 * r.result.l2.line_miss_rate)
             .about("line look-ups of the L2 that miss"),
         Figure::real("tmu_util_pct", "TMU", "%", 2, |r| tmu_util_pct(r.result))
             .about("percentage of cycles in which a footprint leaves the texture unit"),
@@ -53,17 +53,17 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
             .about("footprints of loaded textures per covered pixel: static texture complexity (Z2 paper, table 1)"),
         Figure::real("dynamic_footprints_per_pixel", "dynamic", "footprints/pixel", 2, |r| complexity(r, true))
             .about("footprints of shadow maps per covered pixel: dynamic texture complexity (Z2 paper, table 1)"),
-        Figure::real("first_l1_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.result))
+        Figure::real("first_l1_footprint_miss_pct", "first L1", "% of footprints", 2, |r| first_l1_pct(r.result))
             .about("footprints whose first look-up found a line absent or in flight"),
-        Figure::real("first_l2_miss_pct", "first L2", "%", 2, |r| first_l2_pct(r.result))
+        Figure::real("first_l2_line_miss_pct", "first L2", "% of lines", 2, |r| first_l2_pct(r.result))
             .about("lines of these look-ups that were absent from the L2, merged requests counted"),
         Figure::real("closed_form_util_pct", "TMU fit", "%", 2, |r| closed_form_pct(r.result))
             .about("utilisation that the Z2 paper's table implies for the rates of first look-ups"),
         Figure::real("closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| deviation_points(r.result))
             .about("simulated utilisation minus the utilisation that the Z2 paper's table implies for the rates of first look-ups"),
-        Figure::real("prefetch_coverage_pct", "covered", "% of L2 misses", 1, |r| { let useful = r.result.memory.prefetch?.useful_lines; Some(100.0 * over(useful, useful + r.result.l2.misses)?) })
+        Figure::real("prefetch_coverage_pct", "covered", "% of L2 misses", 1, |r| { let useful = r.result.memory.prefetch?.useful_lines; Some(100.0 * over(useful, useful + r.result.l2.counters.line_misses)?) })
             .about("useful prefetches as a share of useful prefetches and L2 line misses"),
-        Figure::real("l2_stalled_misses_pct", "stalled", "% of L2 misses", 2, |r| { let stalled = r.result.memory.l2_mshrs?.stalled_misses; Some(100.0 * over(stalled, r.result.l2.misses)?) })
+        Figure::real("l2_stalled_misses_pct", "stalled", "% of L2 misses", 2, |r| { let stalled = r.result.memory.l2_mshrs?.stalled_misses; Some(100.0 * over(stalled, r.result.l2.counters.line_misses)?) })
             .about("L2 misses that were delayed because all MSHRs were in use"),
     ];
     let memory = memory_columns::columns().into_iter();
@@ -120,8 +120,8 @@ fn whole_saved_pct(row: &ResultRow) -> Option<f64> {
 #[rustfmt::skip]
 fn published<'a>() -> Vec<Figure<'a>> {
     vec![
-        Figure::real("paper.l1_miss_pct", "paper L1", "%", 2, |r| Some(r.paper?.l1_miss_pct)),
-        Figure::real("paper.l2_miss_pct", "paper L2", "%", 2, |r| Some(r.paper?.l2_miss_pct)),
+        Figure::real("paper.l1_footprint_miss_pct", "paper L1", "%", 2, |r| Some(r.paper?.l1_footprint_miss_pct)),
+        Figure::real("paper.l2_line_miss_pct", "paper L2", "%", 2, |r| Some(r.paper?.l2_line_miss_pct)),
         Figure::real("paper.tmu_util_pct", "paper TMU", "%", 2, |r| Some(r.paper?.tmu_util_pct)),
         Figure::real("paper.tmu_ratio", "paper TMU", "\u{d7} Morton", 3, |r| r.paper?.tmu_ratio()),
         Figure::real("paper.reduction_pct", "paper saved", "% of Morton", 1, |r| r.paper?.reduction_pct()),
@@ -132,8 +132,8 @@ fn published<'a>() -> Vec<Figure<'a>> {
 #[rustfmt::skip]
 fn functional<'a>() -> Vec<Figure<'a>> {
     vec![
-        Figure::real("functional.l1_miss_pct", "functional L1", "%", 2, |r| Some(100.0 * r.functional?.l1.miss_rate)),
-        Figure::real("functional.l2_miss_pct", "functional L2", "%", 2, |r| Some(100.0 * r.functional?.l2.miss_rate)),
+        Figure::real("functional.l1_footprint_miss_pct", "functional L1", "% of footprints", 2, |r| Some(100.0 * r.functional?.l1.footprint_miss_rate)),
+        Figure::real("functional.l2_line_miss_pct", "functional L2", "% of lines", 2, |r| Some(100.0 * r.functional?.l2.line_miss_rate)),
         Figure::real("functional.external_mb_per_frame", "functional", "MB/frame", 2, |r| Some(r.mb_per_frame(r.functional?.external_bytes))),
         Figure::real("functional.external_difference_pct", "difference", "%", 2, |r| Some(100.0 * (over(r.functional?.external_bytes, r.result.external_bytes).unwrap_or(1.0) - 1.0))),
     ]
@@ -144,9 +144,9 @@ fn functional<'a>() -> Vec<Figure<'a>> {
 #[rustfmt::skip]
 fn z2_paper<'a>() -> Vec<Figure<'a>> {
     vec![
-        Figure::real("z2_paper.l1_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.z2_paper?))
+        Figure::real("z2_paper.l1_footprint_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.z2_paper?))
             .about("footprints whose first look-up found a line absent or in flight"),
-        Figure::real("z2_paper.l2_miss_pct", "first L2", "%", 2, |r| first_l2_pct(r.z2_paper?))
+        Figure::real("z2_paper.l2_line_miss_pct", "first L2", "%", 2, |r| first_l2_pct(r.z2_paper?))
             .about("lines of these look-ups that were absent from the L2, merged requests counted"),
         Figure::real("z2_paper.tmu_util_pct", "TMU", "%", 2, |r| tmu_util_pct(r.z2_paper?))
             .about("percentage of cycles in which a footprint leaves the texture unit"),
@@ -158,9 +158,9 @@ fn z2_paper<'a>() -> Vec<Figure<'a>> {
             .about("simulated utilisation minus the utilisation that the Z2 paper's table implies for the rates of first look-ups"),
         Figure::real("z2_paper.product_reduction_pct", "saved, L1 \u{d7} L2", "% of Morton", 1, |r| product_saved_pct(r))
             .about("traffic saved according to the product of both rates, as in the paper; merged requests count"),
-        Figure::real("z2_paper.primary_l1_miss_pct", "primary L1", "%", 2, |r| Some(100.0 * r.z2_paper?.l1.miss_rate))
+        Figure::real("z2_paper.primary_l1_footprint_miss_pct", "primary L1", "% of footprints", 2, |r| Some(100.0 * r.z2_paper?.l1.footprint_miss_rate))
             .about("footprints that fetched a line"),
-        Figure::real("z2_paper.primary_l2_miss_pct", "primary L2", "%", 2, |r| Some(100.0 * r.z2_paper?.l2.miss_rate))
+        Figure::real("z2_paper.primary_l2_line_miss_pct", "primary L2", "% of lines", 2, |r| Some(100.0 * r.z2_paper?.l2.line_miss_rate))
             .about("fetched lines that came from memory"),
         Figure::real("z2_paper.external_bytes", "external", "bytes", 0, |r| Some(r.z2_paper?.external_bytes))
             .about("bytes read from memory"),
@@ -198,9 +198,9 @@ impl Row for Part {
         vec![
             Column::text("name", "", |p: &Self| p.name.clone()),
             Column::new("footprints", "footprints", "millions", Show::Millions(3), |p: &Self| p.l1.footprints),
-            Column::real("l1_miss_pct", "L1 miss", "%", 2, |p: &Self| Some(100.0 * over(p.l1.footprint_misses, p.l1.footprints)?))
+            Column::real("l1_footprint_miss_pct", "L1 miss", "% of footprints", 2, |p: &Self| Some(100.0 * over(p.l1.footprint_misses, p.l1.footprints)?))
                 .about("footprints with a missing line"),
-            Column::real("l2_miss_pct", "L2 miss", "%", 2, |p: &Self| Some(100.0 * over(p.l2.line_misses, p.l2.line_lookups)?))
+            Column::real("l2_line_miss_pct", "L2 miss", "% of lines", 2, |p: &Self| Some(100.0 * over(p.l2.line_misses, p.l2.line_lookups)?))
                 .about("line look-ups of the L2 that miss"),
             Column::real("external_lines", "external", "1000 lines", 1, |p: &Self| p.l2.line_misses as f64 / 1e3)
                 .about("external traffic"),
@@ -217,17 +217,17 @@ fn tmu_util_pct(result: &RunResult) -> Option<f64> {
 }
 
 fn first_l1_pct(result: &RunResult) -> Option<f64> {
-    Some(100.0 * result.first_lookups?.l1_miss_rate)
+    Some(100.0 * result.first_lookups?.l1_footprint_miss_rate)
 }
 
 fn first_l2_pct(result: &RunResult) -> Option<f64> {
-    Some(100.0 * result.first_lookups?.l2_miss_rate)
+    Some(100.0 * result.first_lookups?.l2_line_miss_rate)
 }
 
 /// The closed form relates rates counted as in the paper; primary rates are counted differently.
 fn closed_form_pct(result: &RunResult) -> Option<f64> {
     let first = result.first_lookups?;
-    Some(100.0 * closed_form(first.l1_miss_rate, first.l2_miss_rate))
+    Some(100.0 * closed_form(first.l1_footprint_miss_rate, first.l2_line_miss_rate))
 }
 
 fn deviation_points(result: &RunResult) -> Option<f64> {

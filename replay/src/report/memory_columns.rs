@@ -18,7 +18,7 @@ pub fn columns() -> Vec<Column<'static, MemoryResult>> {
             .about("total cycles that L2 misses waited for an MSHR"),
         Column::real("invalidated_lines", "invalidated", "lines", 0, |r: &MemoryResult| r.invalidated_lines)
             .about("lines that inclusive levels invalidated in L1 caches and in the L2"),
-        Column::real("last_level_miss_pct", "last level", "%", 2, |r: &MemoryResult| Some(100.0 * r.lower_levels.last()?.miss_rate))
+        Column::real("last_level_line_miss_pct", "last level", "%", 2, |r: &MemoryResult| Some(100.0 * r.lower_levels.last()?.line_miss_rate))
             .about("line look-ups of the last level below the L2 that miss"),
         Column::real("dram_row_hit_pct", "row hits", "%", 2, |r: &MemoryResult| Some(100.0 * r.dram.as_ref()?.row_hit_rate))
             .about("DRAM reads whose row was open"),

@@ -164,8 +164,14 @@ mod tests {
     fn table(rows: &[Cells]) -> Table {
         let columns: Vec<Column<Cells>> = vec![
             Column::text("scene", "scene", |r: &Cells| r.0),
-            Column::real("paper.l1_miss_pct", "L1 miss", "%", 2, |r: &Cells| r.1)
-                .about("footprints"),
+            Column::real(
+                "paper.l1_footprint_miss_pct",
+                "L1 miss",
+                "%",
+                2,
+                |r: &Cells| r.1,
+            )
+            .about("footprints"),
             Column::real("bytes", "external", "bytes", 0, |r: &Cells| r.2),
             Column::text("lossless", "lossless", |r: &Cells| r.3),
         ];
@@ -200,7 +206,7 @@ mod tests {
         assert_eq!(written, bytes(&table).unwrap());
         let (rows, facts) = read(written);
         let named = |fields: [Field; 4]| {
-            let names = ["scene", "paper_l1_miss_pct", "bytes", "lossless"];
+            let names = ["scene", "paper_l1_footprint_miss_pct", "bytes", "lossless"];
             names
                 .map(str::to_owned)
                 .into_iter()
@@ -221,7 +227,7 @@ mod tests {
         );
         let facts: serde_json::Value = serde_json::from_str(&facts).unwrap();
         assert_eq!(
-            facts["paper_l1_miss_pct"],
+            facts["paper_l1_footprint_miss_pct"],
             json!({ "unit": "%", "about": "footprints" })
         );
         assert_eq!(facts["bytes"]["unit"], "bytes");
@@ -231,7 +237,7 @@ mod tests {
     fn a_table_without_rows_keeps_its_columns() {
         let (rows, facts) = read(bytes(&table(&[])).unwrap());
         assert!(rows.is_empty());
-        assert!(facts.contains("paper_l1_miss_pct"));
+        assert!(facts.contains("paper_l1_footprint_miss_pct"));
     }
 
     #[test]

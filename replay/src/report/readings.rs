@@ -1,4 +1,4 @@
-//! Every reading of the SGRT paper's figure 3, beside the paper's values (`replay.readings/1`).
+//! Every reading of the SGRT paper's figure 3, beside the paper's values (`replay.readings/2`).
 
 use super::columns::Column;
 use super::html::{Section, figures, folded, page};
@@ -11,13 +11,14 @@ use crate::result::{TOOL, TraceId};
 use crate::sgrt::config::SgrtConfig;
 use crate::sgrt::readings::{Figures, GbufferPlace, Reading, RowTest, Scope, rms_log};
 use maud::{Markup, html};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Schema of the object that `replay readings --json` prints.
-pub const SCHEMA: &str = "replay.readings/1";
+pub const SCHEMA: &str = "replay.readings/2";
 
 /// The readings of a trace.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SceneReadings {
     /// Name in tables.
     pub label: String,
@@ -30,11 +31,35 @@ pub struct SceneReadings {
     /// True if the closest reading is chosen by this scene.
     pub calibrates: bool,
     /// The figures of each reading, the same readings for all scenes.
+    #[serde(serialize_with = "by_reading")]
+    #[cfg_attr(test, schemars(with = "Vec<ReadingFigures<'static>>"))]
     pub readings: Vec<(Reading, Figures)>,
+}
+
+/// A reading and its figures in JSON.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct ReadingFigures<'a> {
+    /// Index in `fits`, which describes the reading.
+    index: usize,
+    #[serde(flatten)]
+    figures: &'a Figures,
+}
+
+fn by_reading<'a, S: Serializer>(
+    readings: &'a [(Reading, Figures)],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let one = |(index, pair): (usize, &'a (Reading, Figures))| ReadingFigures {
+        index,
+        figures: &pair.1,
+    };
+    serializer.collect_seq(readings.iter().enumerate().map(one))
 }
 
 /// How a reading does over all scenes.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Fit {
     /// Index of the reading.
     index: usize,
@@ -52,6 +77,7 @@ struct Fit {
 
 /// All readings of all scenes.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ReadingsReport {
     schema: &'static str,
     tool: &'static str,
@@ -320,4 +346,10 @@ impl ReadingsReport {
             ),
         ]))
     }
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<ReadingsReport>(SCHEMA)
 }

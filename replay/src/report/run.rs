@@ -13,10 +13,11 @@ use crate::size::format_bytes;
 use serde::Serialize;
 
 /// Schema of the object that `--compare-modes --json` prints.
-const COMPARE_SCHEMA: &str = "replay.compare-modes/1";
+const COMPARE_SCHEMA: &str = "replay.compare-modes/2";
 
 /// The JSON object of `replay run --json`.
 #[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct RunJson<'a> {
     schema: &'a str,
     tool: &'a str,
@@ -26,6 +27,17 @@ struct RunJson<'a> {
     result: &'a RunResult,
     /// Known errors of the figures. Last, because they are not about this trace.
     errors: Vec<&'static KnownError>,
+}
+
+/// Both modes of a point as JSON.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct ModesJson<'a> {
+    schema: &'a str,
+    timed: RunJson<'a>,
+    functional: RunJson<'a>,
+    /// Relative difference of each figure.
+    timed_over_functional_less_one: serde_json::Map<String, serde_json::Value>,
 }
 
 impl<'a> RunJson<'a> {
@@ -62,9 +74,20 @@ pub fn text(row: &ResultRow) -> String {
         count("line look-ups", |l| l.1.counters.line_lookups),
         count("line misses", |l| l.1.counters.line_misses),
         count("merged", |l| l.1.counters.secondary_misses),
-        Column::real("miss_pct", "miss rate", "%", 2, |l: &(_, &LevelResult)| {
-            100.0 * l.1.miss_rate
-        }),
+        Column::real(
+            "footprint_miss_pct",
+            "miss rate",
+            "% of footprints",
+            2,
+            |l: &(_, &LevelResult)| 100.0 * l.1.footprint_miss_rate,
+        ),
+        Column::real(
+            "line_miss_pct",
+            "miss rate",
+            "% of lines",
+            2,
+            |l: &(_, &LevelResult)| 100.0 * l.1.line_miss_rate,
+        ),
     ];
     let levels = Table::new(&level, &[("L1", &result.l1), ("L2", &result.l2)]);
     let views = Table::new(&Part::columns(), &result.by_view);
@@ -188,8 +211,16 @@ type Measure = (
 );
 
 const MEASURES: [Measure; 3] = [
-    ("l1_miss_rate", "L1 miss rate", "%", 2, |r| r.l1.miss_rate),
-    ("l2_miss_rate", "L2 miss rate", "%", 2, |r| r.l2.miss_rate),
+    (
+        "l1_footprint_miss_rate",
+        "L1 miss rate",
+        "% of footprints",
+        2,
+        |r| r.l1.footprint_miss_rate,
+    ),
+    ("l2_line_miss_rate", "L2 miss rate", "% of lines", 2, |r| {
+        r.l2.line_miss_rate
+    }),
     ("external_bytes", "external", "bytes", 0, |r| {
         r.external_bytes as f64
     }),
@@ -200,26 +231,23 @@ const MEASURES: [Measure; 3] = [
 /// # Errors
 /// A figure that is not finite.
 pub fn modes_json(timed: &ResultRow, functional: &ResultRow) -> serde_json::Result<String> {
-    let differences: serde_json::Map<String, serde_json::Value> = MEASURES
-        .iter()
-        .map(|(key, .., value)| {
-            let difference = difference(value(timed.result), value(functional.result));
-            ((*key).to_owned(), difference.into())
-        })
-        .collect();
-    serde_json::to_string_pretty(&serde_json::json!({
-        "schema": COMPARE_SCHEMA,
-        "timed": RunJson::new(timed),
-        "functional": RunJson::new(functional),
-        "timed_over_functional_less_one": differences,
-    }))
+    let differences = MEASURES.iter().map(|(key, .., value)| {
+        let difference = difference(value(timed.result), value(functional.result));
+        ((*key).to_owned(), difference.into())
+    });
+    serde_json::to_string_pretty(&ModesJson {
+        schema: COMPARE_SCHEMA,
+        timed: RunJson::new(timed),
+        functional: RunJson::new(functional),
+        timed_over_functional_less_one: differences.collect(),
+    })
 }
 
 /// Both modes of a point side by side.
 #[must_use]
 pub fn modes_text(timed: &ResultRow, functional: &ResultRow) -> String {
     let cell = |(.., unit, decimals, value): &Measure, row: &ResultRow| {
-        let scale = if *unit == "%" { 100.0 } else { 1.0 };
+        let scale = if unit.starts_with('%') { 100.0 } else { 1.0 };
         format!("{:.*} {unit}", decimals, scale * value(row.result))
     };
     let columns = [
@@ -250,4 +278,16 @@ fn busiest_draws(draws: &[Part]) -> String {
         more => format!("and {more} more draws (--json lists all)\n"),
     };
     format!("\n{}{more}", Table::new(&Part::columns(), &rows).text())
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<RunJson<'_>>(RUN_SCHEMA)
+}
+
+/// The schema of the JSON object of both modes.
+#[cfg(test)]
+pub(crate) fn modes_schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<ModesJson<'_>>(COMPARE_SCHEMA)
 }

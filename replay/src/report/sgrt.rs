@@ -114,6 +114,7 @@ pub fn sections(entries: &[Entry]) -> Result<Vec<Section>, PlotError> {
 /// A figure that is not finite.
 pub fn json(report: &Report, pretty: bool) -> serde_json::Result<String> {
     #[derive(Serialize)]
+    #[cfg_attr(test, derive(schemars::JsonSchema))]
     struct ReprojectJson<'a> {
         #[serde(flatten)]
         report: &'a Report,

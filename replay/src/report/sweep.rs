@@ -10,7 +10,9 @@ use super::plots::{PlotError, SeriesStyle};
 use super::table::Table;
 use super::theme;
 use crate::config::{Order, RunConfig};
-use crate::experiment::{Axis, ExperimentFile, Outcome, ResultRow, Setting, plain, point_key};
+use crate::experiment::{
+    Axis, ExperimentFile, Outcome, ResultRow, Setting, Subject, plain, point_key,
+};
 use crate::model_version::MODEL_VERSION;
 use crate::palette;
 use crate::result::{TOOL, TraceId};
@@ -19,7 +21,7 @@ use serde::Serialize;
 use toml::Value;
 
 /// Schema of a sweep's JSON.
-pub const SWEEP_SCHEMA: &str = "replay.sweep/2";
+pub const SWEEP_SCHEMA: &str = "replay.sweep/3";
 
 const ORDER: &str = "order";
 const TRAFFIC: &str = "external_mb_per_frame";
@@ -31,14 +33,31 @@ pub struct SweepReport<'a> {
     rows: Vec<ResultRow<'a>>,
 }
 
+/// A trace and its label in the rows.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+pub(super) struct LabelledTrace<'a> {
+    label: &'a str,
+    trace: &'a TraceId,
+}
+
+impl<'a> LabelledTrace<'a> {
+    pub(super) fn of(subject: &'a Subject<'_>) -> Self {
+        Self {
+            label: &subject.label,
+            trace: &subject.id,
+        }
+    }
+}
+
 /// The JSON object.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct SweepJson<'a, 'r> {
     schema: &'a str,
     tool: &'a str,
     model_version: u32,
-    /// Labels and traces.
-    traces: Vec<(&'a str, &'a TraceId)>,
+    traces: Vec<LabelledTrace<'a>>,
     base: RunConfig,
     axes: &'a [Axis],
     one_at_a_time: &'a [Axis],
@@ -74,7 +93,7 @@ impl<'a> SweepReport<'a> {
             schema: SWEEP_SCHEMA,
             tool: TOOL,
             model_version: MODEL_VERSION,
-            traces: subjects.map(|s| (s.label.as_str(), &s.id)).collect(),
+            traces: subjects.map(LabelledTrace::of).collect(),
             base: self.file.base,
             axes: &self.file.axes,
             one_at_a_time: &self.file.one_at_a_time,
@@ -132,8 +151,8 @@ impl<'a> SweepReport<'a> {
         columns.extend(axes.map(|(i, axis)| Self::written(i, axis)));
         let groups = 1 + usize::from(!self.file.one_at_a_time.is_empty());
         let shown = [
-            "l1_miss_pct",
-            "l2_miss_pct",
+            "l1_footprint_miss_pct",
+            "l2_line_miss_pct",
             "tmu_util_pct",
             TRAFFIC,
             "bound_mb_per_frame",
@@ -283,4 +302,13 @@ impl<'a> Charts<'a> {
             })
             .collect()
     }
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<SweepJson<'_, '_>>(SWEEP_SCHEMA).rows(
+        "rows",
+        &crate::report::columns::headings(&SweepReport::columns()),
+    )
 }

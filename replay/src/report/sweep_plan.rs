@@ -1,25 +1,27 @@
 //! The plan of a sweep, for schedulers: each point with its key, its estimated cost and whether it is done.
 
+use super::sweep::LabelledTrace;
 use crate::experiment::{Plan, Store, Subject, Task, point_key};
 use crate::model_version::MODEL_VERSION;
-use crate::result::{TOOL, TraceId};
+use crate::result::TOOL;
 use rayon::prelude::*;
 use serde::Serialize;
 
 /// Schema of a plan's JSON.
-pub const PLAN_SCHEMA: &str = "replay.plan/1";
+pub const PLAN_SCHEMA: &str = "replay.plan/2";
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct PlanJson<'a> {
     schema: &'a str,
     tool: &'a str,
     model_version: u32,
-    /// Labels and traces.
-    traces: Vec<(&'a str, &'a TraceId)>,
+    traces: Vec<LabelledTrace<'a>>,
     points: Vec<PlannedPoint<'a>>,
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct PlannedPoint<'a> {
     /// Key of its row in a file of `points/`.
     key: String,
@@ -59,7 +61,13 @@ pub fn json(
         schema: PLAN_SCHEMA,
         tool: TOOL,
         model_version: MODEL_VERSION,
-        traces: subjects.iter().map(|s| (s.label.as_str(), &s.id)).collect(),
+        traces: subjects.iter().map(LabelledTrace::of).collect(),
         points: tasks.par_iter().map(point).collect(),
     })
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<PlanJson<'_>>(PLAN_SCHEMA)
 }

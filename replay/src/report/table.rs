@@ -191,8 +191,15 @@ mod tests {
     fn columns() -> Vec<Column<'static, Cells>> {
         vec![
             Column::text("order", "order", |r: &Cells| r.0),
-            Column::real("l1_miss_pct", "L1 miss", "%", 2, |r: &Cells| r.1),
-            Column::real("paper.l1_miss_pct", "paper", "%", 2, |r: &Cells| r.2).published(),
+            Column::real("l1_footprint_miss_pct", "L1 miss", "%", 2, |r: &Cells| r.1),
+            Column::real(
+                "paper.l1_footprint_miss_pct",
+                "paper",
+                "%",
+                2,
+                |r: &Cells| r.2,
+            )
+            .published(),
         ]
     }
 
@@ -222,7 +229,7 @@ mod tests {
     fn csv_is_exact_and_quotes_what_it_must() {
         assert_eq!(
             table(&[("a, \"b\"", 9.814, None)]).csv(),
-            "order,l1_miss_pct,paper_l1_miss_pct\n\"a, \"\"b\"\"\",9.814,\n"
+            "order,l1_footprint_miss_pct,paper_l1_footprint_miss_pct\n\"a, \"\"b\"\"\",9.814,\n"
         );
     }
 
@@ -235,9 +242,10 @@ mod tests {
 
     #[test]
     fn columns_and_rows_can_be_picked() {
-        let table = table(&ROWS)
-            .only("order", "z2-sta")
-            .picked(["l1_miss_pct", "order", "none"]);
+        let table =
+            table(&ROWS)
+                .only("order", "z2-sta")
+                .picked(["l1_footprint_miss_pct", "order", "none"]);
         assert_eq!(table.cells(), [["9.81", "z2-sta"]]);
     }
 

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// Pixels of a class, and their errors. Percentages elsewhere are of all right pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ClassCounts {
     /// Samples of the class.
     pub pixels: u64,
@@ -16,8 +17,10 @@ pub struct ClassCounts {
     pub wrong_object: u64,
     /// Right object, another triangle, and a position error above the first of [`POSITION_LIMITS_PX`].
     pub wrong_primitive: u64,
-    /// Right object, and a position error above each of [`POSITION_LIMITS_PX`].
-    pub position_over: [u64; 2],
+    /// Right object, and a position error above the first of [`POSITION_LIMITS_PX`].
+    pub position_over_1px: u64,
+    /// Right object, and a position error above the second of [`POSITION_LIMITS_PX`].
+    pub position_over_2px: u64,
 }
 
 /// Limits of the position error, in pixels.
@@ -25,6 +28,7 @@ pub const POSITION_LIMITS_PX: [f32; 2] = [1.0, 2.0];
 
 /// Counts of all classes, and the position error of reused hits on the right object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Accuracy {
     /// Reused; a single arrival.
     pub reused: ClassCounts,
@@ -55,7 +59,8 @@ impl Accuracy {
             pixels: a.pixels + b.pixels,
             wrong_object: a.wrong_object + b.wrong_object,
             wrong_primitive: a.wrong_primitive + b.wrong_primitive,
-            position_over: std::array::from_fn(|i| a.position_over[i] + b.position_over[i]),
+            position_over_1px: a.position_over_1px + b.position_over_1px,
+            position_over_2px: a.position_over_2px + b.position_over_2px,
         }
     }
 
@@ -123,9 +128,8 @@ pub fn count_errors(frame: &Frame, decisions: &[Decision]) -> Accuracy {
             counts.wrong_object += 1;
             continue;
         }
-        for (count, limit) in counts.position_over.iter_mut().zip(POSITION_LIMITS_PX) {
-            *count += u64::from(*error > limit);
-        }
+        counts.position_over_1px += u64::from(*error > POSITION_LIMITS_PX[0]);
+        counts.position_over_2px += u64::from(*error > POSITION_LIMITS_PX[1]);
         let elsewhere = *error > POSITION_LIMITS_PX[0];
         counts.wrong_primitive += u64::from(decision.primitive != truth.primitive && elsewhere);
     }

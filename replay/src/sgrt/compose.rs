@@ -35,6 +35,7 @@ use serde::{Deserialize, Serialize};
     Deserialize,
     ValueEnum,
 )]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Reuse {
     /// The primary hit; shadow rays are traced again.

@@ -8,6 +8,7 @@ pub const DEFAULT_TOML: &str = include_str!("../../data/sgrt-default.toml");
 
 /// All parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct SgrtConfig {
     /// Traversal and intersection units.
@@ -26,6 +27,7 @@ pub struct SgrtConfig {
 
 /// Fixed-function traversal and intersection.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Tni {
     /// Number of units.
@@ -54,6 +56,7 @@ pub struct Tni {
 
 /// Caches of the hierarchy.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Cache {
     /// Node cache of each unit.
@@ -80,6 +83,7 @@ pub struct Cache {
 
 /// A hit rate by class of ray, 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct HitRates {
     /// Primary rays.
@@ -92,6 +96,7 @@ pub struct HitRates {
 
 /// External memory.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Memory {
     /// Peak bandwidth, 10^9 bytes per second.
@@ -106,6 +111,7 @@ pub struct Memory {
 
 /// Programmable cores and the cost of kernels in cycles of one lane.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Srp {
     /// Number of cores.
@@ -136,6 +142,7 @@ pub struct Srp {
 
 /// Bytes of the fields of a G-buffer record.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Gbuffer {
     /// Colour.
@@ -160,6 +167,7 @@ pub struct Gbuffer {
 
 /// Where the fields that error detection reads of left pixels wait for the right eye.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum RowStorage {
     /// In DRAM: written once per left pixel, fetched by DMA for each band of right tiles (paper, section III).
@@ -170,6 +178,7 @@ pub enum RowStorage {
 
 /// Energy per operation and per byte.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Energy {
     /// Per step at a binary node.

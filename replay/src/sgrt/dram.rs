@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// Bytes read from and written to external memory, by use.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct DramBytes {
     /// Nodes and triangles that missed in the caches.
     pub hierarchy_bytes: u64,

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 /// Energy by component in picojoules.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct EnergyPj {
     /// Steps, tests and ray transfers of the fixed-function units.
     pub tni_pj: f64,

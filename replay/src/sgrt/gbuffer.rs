@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize};
 
 /// Bytes moved for a G-buffer.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Traffic {
     /// Read from and written to on-chip buffers.
     pub on_chip_bytes: u64,

@@ -13,6 +13,7 @@ use serde::Serialize;
 
 /// What performance and energy are measured of ("for the T&I unit", section IV).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Scope {
     /// Cycles of the T&I units; energy of the units and their caches.
@@ -25,6 +26,7 @@ pub enum Scope {
 
 /// The left pixels that a right pixel is tested against ("the whole pixels in the same row", section III).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum RowTest {
     /// What the reproject kernel scattered into the pixel.
@@ -35,6 +37,7 @@ pub enum RowTest {
 
 /// Where the G-buffer is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum GbufferPlace {
     /// One tile on chip; rows go through DRAM.
@@ -45,6 +48,7 @@ pub enum GbufferPlace {
 
 /// One choice for each open question.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Reading {
     /// What figure 3 measures.
     pub scope: Scope,
@@ -60,6 +64,7 @@ pub struct Reading {
 
 /// The figures of a reading on a trace.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Figures {
     /// Frames per second relative to tracing both eyes completely.
     pub relative_performance: f64,

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Left pixels around the arrived one of which detection reads a field, per right pixel. Each variant
 /// includes the previous ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub enum Around {
     /// The arrived pixel.
@@ -40,6 +41,7 @@ impl Around {
 
 /// The fields that detection reads, and of which pixels; `None` for unread fields.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Reads {
     /// Hit position.
     pub position: Option<Around>,

@@ -14,10 +14,11 @@ use crate::result::TraceId;
 use serde::{Deserialize, Serialize};
 
 /// Schema of the object that `replay reproject --json` prints.
-pub const SCHEMA: &str = "replay.reproject/2";
+pub const SCHEMA: &str = "replay.reproject/3";
 
 /// The result for one trace.
 #[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Report {
     /// [`SCHEMA`].
     pub schema: String,
@@ -51,6 +52,7 @@ pub struct Report {
 
 /// The configuration of the run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Config {
     /// Error detection.
     pub rule: Rule,
@@ -64,6 +66,7 @@ pub struct Config {
 
 /// The figures of a rule and a level of reuse.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Outcome {
     /// Share of right pixels reused, overlapped ones included.
     pub reuse_pct: f64,
@@ -145,6 +148,7 @@ pub struct Outcome {
 
 /// Reprojection without tiles: the whole screen's G-buffer in DRAM.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct WholeScreen {
     /// Frames per second relative to tracing both eyes completely.
     pub relative_performance: f64,
@@ -156,6 +160,7 @@ pub struct WholeScreen {
 
 /// Work of a frame on the units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Work {
     /// Rays.
     pub rays: u64,
@@ -189,6 +194,7 @@ impl Work {
 
 /// A point of the curve of run time against error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct CurvePoint {
     /// Error detection.
     pub rule: Rule,
@@ -212,6 +218,7 @@ pub struct CurvePoint {
 
 /// Effect of a parameter on the ratios.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Sensitivity {
     /// Dotted name.
     pub parameter: String,
@@ -263,8 +270,8 @@ impl Outcome {
             reuse_pct: accuracy.pct(reused.pixels),
             wrong_object_pct: accuracy.pct(reused.wrong_object),
             wrong_primitive_pct: accuracy.pct(reused.wrong_primitive),
-            position_over_1px_pct: accuracy.pct(reused.position_over[0]),
-            position_over_2px_pct: accuracy.pct(reused.position_over[1]),
+            position_over_1px_pct: accuracy.pct(reused.position_over_1px),
+            position_over_2px_pct: accuracy.pct(reused.position_over_2px),
             relative_performance: comparison.relative_performance(),
             relative_energy: comparison.relative_energy(),
             tni_relative_performance: reference.tni_cycles / run.tni_cycles,

@@ -34,6 +34,7 @@ pub struct RowNeeds {
 
 /// Whether the sources of a right row form a left row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct RowSummary {
     /// Share of visible left pixels that arrive in a row with another number.
     pub other_row_pct: f64,

@@ -306,7 +306,7 @@ mod tests {
     fn replays_of_every_size_shade_the_same() {
         let trace = trace();
         let recorded = replay(&trace, &config(16)).unwrap();
-        let mut misses = vec![recorded.l1.misses];
+        let mut misses = vec![recorded.l1.counters.line_misses];
         for tile_px in [8, 32, 64] {
             let other = replay(&trace, &config(tile_px)).unwrap();
             assert_eq!(other.access_hash, recorded.access_hash, "{tile_px}");
@@ -326,7 +326,7 @@ mod tests {
             };
             let difference = covered(map, tile_px) - covered(&recorded.tile_maps[0], 16);
             assert!(difference.abs() < 1.0, "{difference}");
-            misses.push(other.l1.misses);
+            misses.push(other.l1.counters.line_misses);
         }
         misses.dedup();
         assert!(misses.len() > 1);

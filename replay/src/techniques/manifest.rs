@@ -165,6 +165,7 @@ pub struct Frame {
 
 /// A search for the cheapest techniques within a budget.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Auto {
     /// The budget.
     pub budget: Value,

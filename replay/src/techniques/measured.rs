@@ -12,9 +12,9 @@ pub struct CacheFigures {
     /// Bilinear footprints.
     pub footprints: u64,
     /// Footprints with a missing line, percent.
-    pub l1_miss_pct: f64,
+    pub l1_footprint_miss_pct: f64,
     /// Line look-ups of the L2 that miss, percent.
-    pub l2_miss_pct: f64,
+    pub l2_line_miss_pct: f64,
     /// Line misses of the L2 times the line size, all frames of the trace.
     pub external_bytes: u64,
     /// Traffic of an infinite cache in bytes.

@@ -51,8 +51,8 @@ pub fn table_2(results: &Results) -> String {
                     scene.to_owned(),
                     format!("{l1}/{l2}"),
                     order.to_owned(),
-                    both("l1_miss_pct"),
-                    both("l2_miss_pct"),
+                    both("l1_footprint_miss_pct"),
+                    both("l2_line_miss_pct"),
                     both("tmu_util_pct"),
                     saved,
                 ]
@@ -83,10 +83,10 @@ pub fn crytek_500mm(results: &Results) -> String {
         };
         vec![
             format!("{l1}/{l2}"),
-            of("l1_miss_pct", &ORDERS),
-            of("paper_l1_miss_pct", &ORDERS),
-            of("l2_miss_pct", &ORDERS),
-            of("paper_l2_miss_pct", &ORDERS),
+            of("l1_footprint_miss_pct", &ORDERS),
+            of("paper_l1_footprint_miss_pct", &ORDERS),
+            of("l2_line_miss_pct", &ORDERS),
+            of("paper_l2_line_miss_pct", &ORDERS),
             of("saved_pct", &ORDERS[1..]),
             of("paper_saved_pct", &ORDERS[1..]),
         ]
@@ -128,8 +128,8 @@ pub fn shadow_maps(results: &Results) -> String {
                 title.to_owned(),
                 if eyes == "dk2" { "DK2" } else { eyes }.to_owned(),
                 format!("{l2} KB"),
-                number("morton", "l1_miss_pct"),
-                number("morton", "l2_miss_pct"),
+                number("morton", "l1_footprint_miss_pct"),
+                number("morton", "l2_line_miss_pct"),
                 number("z2-lrta", "saved_pct"),
                 number("z2-sta", "saved_pct"),
             ]
@@ -143,8 +143,8 @@ pub fn shadow_maps(results: &Results) -> String {
             "paper".to_owned(),
             String::new(),
             format!("{l2} KB"),
-            format!("{:.1}", morton.l1_miss_pct),
-            format!("{:.1}", morton.l2_miss_pct),
+            format!("{:.1}", morton.l1_footprint_miss_pct),
+            format!("{:.1}", morton.l2_line_miss_pct),
             saved(lrta),
             saved(sta),
         ]

@@ -53,7 +53,7 @@ fn an_l3_as_slow_as_memory_changes_only_dram_traffic() {
         let result = replay(&trace, &with(&[slow], time)).unwrap();
         assert_eq!(above(&result), above(&without), "{time:?}");
         let l3 = &result.memory.lower_levels[0];
-        assert_eq!(l3.line_lookups, without.l2.misses, "{time:?}");
+        assert_eq!(l3.line_lookups, without.l2.counters.line_misses, "{time:?}");
         // The L3 evicts nothing.
         assert_eq!(l3.line_misses, result.unique_lines, "{time:?}");
         assert_eq!(result.external_bytes, 16 * result.unique_lines, "{time:?}");
@@ -86,11 +86,14 @@ fn a_prefetcher_trades_bytes_for_misses() {
         let prefetch = Some(PrefetchConfig::default());
         let with = replay(&trace, &RunConfig { prefetch, ..plain }).unwrap();
         let prefetched = with.memory.prefetch.unwrap();
-        assert!(with.l2.misses < without.l2.misses, "{time:?}");
+        assert!(
+            with.l2.counters.line_misses < without.l2.counters.line_misses,
+            "{time:?}"
+        );
         assert!(with.external_bytes > without.external_bytes, "{time:?}");
         assert_eq!(
             with.external_bytes,
-            16 * (with.l2.misses + prefetched.lines),
+            16 * (with.l2.counters.line_misses + prefetched.lines),
             "{time:?}"
         );
         assert!(prefetched.useful_lines <= prefetched.lines, "{time:?}");
@@ -240,8 +243,14 @@ fn sectors_and_victim_caches_are_replayed_in_every_mode() {
             assert_eq!(other.access_hash, plain.access_hash, "{time:?}");
             assert_eq!(other.unique_lines, plain.unique_lines, "{time:?}");
         }
-        assert!(victims.l1.misses < plain.l1.misses, "{time:?}");
-        assert_ne!(sectored.l2.misses, plain.l2.misses, "{time:?}");
+        assert!(
+            victims.l1.counters.line_misses < plain.l1.counters.line_misses,
+            "{time:?}"
+        );
+        assert_ne!(
+            sectored.l2.counters.line_misses, plain.l2.counters.line_misses,
+            "{time:?}"
+        );
     }
 }
 
@@ -295,17 +304,17 @@ fn the_next_items_lines_are_fetched_while_an_item_is_shaded() {
         let ahead = replay(&trace, &RunConfig { prefetch, ..plain }).unwrap();
         let counted = ahead.memory.prefetch.unwrap();
         assert_eq!(
-            ahead.l2.misses + counted.lines,
+            ahead.l2.counters.line_misses + counted.lines,
             ahead.unique_lines,
             "{time:?}"
         );
         assert_eq!(counted.useful_lines, counted.lines, "{time:?}");
         assert_eq!(ahead.external_bytes, without.external_bytes, "{time:?}");
         assert!(
-            2 * ahead.l2.misses < without.l2.misses,
+            2 * ahead.l2.counters.line_misses < without.l2.counters.line_misses,
             "{time:?}: {} {}",
-            ahead.l2.misses,
-            without.l2.misses
+            ahead.l2.counters.line_misses,
+            without.l2.counters.line_misses
         );
         // Threads that stop at their first miss wait for whole loops, so fewer misses need not shorten a small frame.
         assert!(

@@ -90,7 +90,7 @@ fn a_thousand_sets_of_configurations_count_as_each_alone() {
         let results = all(trace, &configs, 1 << 30);
         for (config, result) in configs.iter().zip(&results) {
             assert_eq!(*result, single(trace, config), "set {set}: {config:?}");
-            missed += result.l2.misses;
+            missed += result.l2.counters.line_misses;
         }
         let of = random.below(configs.len() as u64) as usize;
         let expected = twin(&sent(trace, &base), &configs[of]);

@@ -435,7 +435,7 @@ fn a_thread_that_waits_for_memory_is_back_every_loop_until_the_line_is_there() {
         (first.l1_misses, first.l2_lookups, first.l2_misses),
         (1, 1, 1)
     );
-    assert_eq!(first.l1_miss_rate, 0.25);
+    assert_eq!(first.l1_footprint_miss_rate, 0.25);
     assert_eq!(result.external_bytes, 16);
 }
 
@@ -482,5 +482,5 @@ fn tile_maps_add_up_to_the_primary_misses() {
         sum(|map| &map.l1_misses),
         result.l1.counters.footprint_misses
     );
-    assert_eq!(sum(|map| &map.l2_misses), result.l2.misses);
+    assert_eq!(sum(|map| &map.l2_misses), result.l2.counters.line_misses);
 }

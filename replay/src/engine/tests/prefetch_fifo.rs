@@ -33,7 +33,7 @@ fn one_core_misses_what_functional_mode_misses() {
     for fifo in [7, 64, 4096] {
         let result = replay(&trace, &config(fifo, 1)).unwrap();
         assert_eq!(result.access_hash, expected.access_hash);
-        let ratio = result.l1.misses as f64 / expected.l1.misses as f64;
+        let ratio = result.l1.counters.line_misses as f64 / expected.l1.counters.line_misses as f64;
         assert!((0.9..=1.0).contains(&ratio), "{fifo}: {ratio}");
     }
 }

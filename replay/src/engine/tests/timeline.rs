@@ -51,7 +51,7 @@ fn items_cover_each_core_and_every_tile_once() {
         let useful: u64 = timeline.items.iter().map(|item| item.useful_cycles).sum();
         assert_eq!(useful, with.footprints, "{order:?}");
         let fetched: u64 = timeline.fetched_lines.iter().map(|&n| u64::from(n)).sum();
-        assert_eq!(fetched, with.l2.misses, "{order:?}");
+        assert_eq!(fetched, with.l2.counters.line_misses, "{order:?}");
         let intervals = timeline.fetched_lines.len() as u64;
         assert!(intervals <= cycles / Timeline::INTERVAL_CYCLES + 1);
     }

@@ -8,6 +8,7 @@ use std::fmt;
 
 /// The `dram` object of a result.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct DramResult {
     /// Device.
     pub device: String,

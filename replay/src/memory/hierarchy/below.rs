@@ -266,7 +266,7 @@ impl Below {
         let level = |level: &Level| LowerLevelResult {
             name: level.name.to_owned(),
             line_bytes: level.line_bytes,
-            miss_rate: level.misses as f64 / level.look_ups.max(1) as f64,
+            line_miss_rate: level.misses as f64 / level.look_ups.max(1) as f64,
             line_lookups: level.look_ups,
             line_misses: level.misses,
             secondary_misses: level.secondary_misses,

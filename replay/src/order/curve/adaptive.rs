@@ -3,7 +3,7 @@
 
 use super::band::lay;
 use super::{Ground, Path};
-use crate::order::cost::{Cost, Knows};
+use crate::order::cost::{Cost, Information};
 
 /// Minimum and maximum rows of a band, and the number of adjacent columns of a band that the L2 should hold.
 /// Chosen on the design cameras of docs/results/orders.md with four texel formats, three line sizes and shadow
@@ -36,7 +36,9 @@ impl Path for Adaptive {
 
     /// The counters and bounds of a band, its height, and a sum.
     fn cost(&self, _grid: [u32; 2]) -> Cost {
-        Cost::state(14).deciding_in(1).knowing(Knows::LastFrame)
+        Cost::state(14)
+            .deciding_in(1)
+            .with_information(Information::LastFrame)
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::offset::Offset;
 use super::{Placement, Rule, tiles};
-use crate::order::cost::{Cost, Knows};
+use crate::order::cost::{Cost, Information};
 use crate::order::{Known, View};
 
 /// Pairs by direction, on the grid of a picture that faces straight ahead of the head.
@@ -45,6 +45,6 @@ impl Rule for Infinity {
         Cost::state(4)
             .with_table(2 * tiles)
             .deciding_in(1)
-            .knowing(Knows::Display)
+            .with_information(Information::Display)
     }
 }

@@ -1,7 +1,7 @@
 //! Shifts the right eye's tiles by a constant of the display, so that distant points fall into the same cell.
 
 use super::{Placement, Rule, tiles};
-use crate::order::cost::{Cost, Knows};
+use crate::order::cost::{Cost, Information};
 use crate::order::{Known, View};
 
 /// Pairs with a constant shift.
@@ -22,6 +22,8 @@ impl Rule for Offset {
 
     /// Two registers that a driver writes once.
     fn cost(&self, _grid: [u32; 2]) -> Cost {
-        Cost::state(4).deciding_in(1).knowing(Knows::Display)
+        Cost::state(4)
+            .deciding_in(1)
+            .with_information(Information::Display)
     }
 }

@@ -3,7 +3,7 @@
 
 use super::offset::Offset;
 use super::{Placement, Rule, tiles};
-use crate::order::cost::{Cost, Knows};
+use crate::order::cost::{Cost, Information};
 use crate::order::known::ViewCounters;
 use crate::order::{Known, View};
 
@@ -48,6 +48,6 @@ impl Rule for Row {
         Cost::state(4)
             .with_table(rows.into())
             .deciding_in(1)
-            .knowing(Knows::LastFrame)
+            .with_information(Information::LastFrame)
     }
 }

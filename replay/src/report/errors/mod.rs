@@ -11,6 +11,7 @@ use std::sync::LazyLock;
 
 /// A contribution to a figure's error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct KnownError {
     /// Key of the figure.
     pub figure: String,

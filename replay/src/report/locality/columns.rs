@@ -126,15 +126,15 @@ pub const SHORT: [&str; 15] = [
     "stream",
     "accesses",
     "unique_lines",
-    "miss_pct",
+    "line_miss_pct",
     "compulsory_pct",
     "capacity_pct",
     "conflict_pct",
-    "spared_pct",
-    "fully_associative_miss_pct",
-    "opt_miss_pct",
-    "hits.other_eye_pct",
-    "hits.earlier_frame_pct",
+    "avoided_pct",
+    "fully_associative_line_miss_pct",
+    "opt_line_miss_pct",
+    "hits_other_eye_pct",
+    "hits_earlier_frame_pct",
     "tile_lines",
 ];
 
@@ -145,6 +145,7 @@ pub fn summary<'a>() -> Vec<Column<'a, Summary<'a>>> {
     type C<'a> = Column<'a, Summary<'a>>;
     let whole = |key: &'static str, name: &'static str, of: fn(&Summary) -> u64| C::new(key, name, "", Show::Whole, of);
     let real = |key: &'static str, name: &'static str, of: fn(&Summary) -> Option<f64>| C::real(key, name, "%", 2, of);
+    let of_lines = |key: &'static str, name: &'static str, of: fn(&Summary) -> Option<f64>| C::real(key, name, "% of lines", 2, of);
     let mut columns = subject_columns(|r: &Summary| &r.of);
     columns.extend([
         whole("size_bytes", "size", |r| r.cache.size_bytes),
@@ -161,17 +162,17 @@ pub fn summary<'a>() -> Vec<Column<'a, Summary<'a>>> {
             .about("percentage of the frames' lines that an earlier frame used"),
 
         whole("misses", "misses", |r| r.split().misses()),
-        real("miss_pct", "miss rate", |r| r.share_pct(r.split().misses())).about("misses of the configured cache, percent of line accesses"),
+        of_lines("line_miss_pct", "miss rate", |r| r.share_pct(r.split().misses())).about("misses of the configured cache, percent of line accesses"),
         whole("compulsory", "compulsory", |r| r.split().compulsory),
         whole("capacity", "capacity", |r| r.split().capacity.iter().sum()),
         whole("conflict", "conflict", |r| r.split().conflict.iter().sum()),
-        whole("spared", "avoided", |r| r.split().avoided.iter().sum()),
-        real("compulsory_pct", "compulsory", |r| r.share_pct(r.split().compulsory)).about("first uses"),
-        real("capacity_pct", "capacity", |r| r.share_pct(r.split().capacity.iter().sum()))
+        whole("avoided", "avoided", |r| r.split().avoided.iter().sum()),
+        of_lines("compulsory_pct", "compulsory", |r| r.share_pct(r.split().compulsory)).about("first uses"),
+        of_lines("capacity_pct", "capacity", |r| r.share_pct(r.split().capacity.iter().sum()))
             .about("misses that a fully associative LRU cache of this size also has, without first uses"),
-        real("conflict_pct", "conflict", |r| r.share_pct(r.split().conflict.iter().sum()))
+        of_lines("conflict_pct", "conflict", |r| r.share_pct(r.split().conflict.iter().sum()))
             .about("misses where the fully associative cache hits"),
-        real("spared_pct", "avoided", |r| r.share_pct(r.split().avoided.iter().sum()))
+        of_lines("avoided_pct", "avoided", |r| r.share_pct(r.split().avoided.iter().sum()))
             .about("hits where the fully associative cache misses: limited associativity avoids these misses"),
         C::real("conflict_net", "conflict, net", "", 0, |r| r.split().misses() as f64 - r.split().fully_associative_misses() as f64)
             .about("conflict misses minus avoided misses; negative if limited associativity helps"),
@@ -183,28 +184,28 @@ pub fn summary<'a>() -> Vec<Column<'a, Summary<'a>>> {
         real("conflict_earlier_frame_pct", "conflict, earlier frame's", |r| share(&r.split().conflict, Origin::EarlierFrame)),
 
         whole("fully_associative_misses", "fully associative", |r| r.split().fully_associative_misses()),
-        real("fully_associative_miss_pct", "full LRU", |r| r.share_pct(r.split().fully_associative_misses()))
+        of_lines("fully_associative_line_miss_pct", "full LRU", |r| r.share_pct(r.split().fully_associative_misses()))
             .about("misses of a fully associative LRU cache of this size"),
         whole("opt_misses", "OPT", |r| r.opt_misses()),
-        real("opt_miss_pct", "full OPT", |r| r.share_pct(r.opt_misses()))
+        of_lines("opt_line_miss_pct", "full OPT", |r| r.share_pct(r.opt_misses()))
             .about("misses of a fully associative cache of this size under Belady's OPT"),
         whole("opt_ways_misses", "OPT, ways", |r| r.opt_ways_misses()),
-        real("opt_ways_miss_pct", "OPT, ways", |r| r.share_pct(r.opt_ways_misses()))
+        of_lines("opt_ways_line_miss_pct", "OPT, ways", |r| r.share_pct(r.opt_ways_misses()))
             .about("misses of the configured sets and ways under OPT"),
     ]);
     for origin in Origin::ALL {
         let name = origin.key().replace('_', " ");
-        columns.push(C::real(format!("hits.{}_pct", origin.key()), name, "% of hits", 2, move |r| share(&r.split().hits(), origin))
+        columns.push(C::real(format!("hits_{}_pct", origin.key()), name, "% of hits", 2, move |r| share(&r.split().hits(), origin))
             .about("hits of the configured cache, by the origin of the previous use"));
     }
     for origin in Origin::ALL {
         let name = origin.key().replace('_', " ");
-        columns.push(C::real(format!("reuses.{}_pct", origin.key()), name, "% of reuses", 2, move |r| share(&r.figures.reuses(), origin))
+        columns.push(C::real(format!("reuses_{}_pct", origin.key()), name, "% of reuses", 2, move |r| share(&r.figures.reuses(), origin))
             .about("all reuses, by the origin of the previous use: the hits of an infinite cache"));
     }
     columns.extend([
         whole("tiles", "tiles", |r| r.figures.tiles).about("tiles with line accesses"),
-        C::real("tile_lines", "lines a tile", "", 1, |r| {
+        C::real("tile_lines", "lines per tile", "", 1, |r| {
             let set = r.figures.working_sets.first()?;
             Some(set.lines as f64 / set.stretches as f64)
         }).about("mean number of distinct lines per work item (a tile or a pair of tiles)"),
@@ -224,12 +225,12 @@ pub fn curves<'a>() -> Vec<Column<'a, CurvePoint<'a>>> {
         C::new("lines", "lines", "", Show::Whole, |r| r.cache.lines),
         C::new("size_bytes", "size", "bytes", Show::Whole, CurvePoint::size_bytes),
         C::new("misses", "misses", "", Show::Whole, |r| r.accesses - r.cache.hits.iter().sum::<u64>()),
-        C::real("miss_pct", "miss rate", "%", 3, CurvePoint::miss_pct),
+        C::real("line_miss_pct", "miss rate", "% of lines", 3, CurvePoint::line_miss_pct),
         C::real("other_eye_pct", "from the other eye", "% of hits", 2, |r| share(&r.cache.hits, Origin::OtherEye)),
         C::real("earlier_frame_pct", "from an earlier frame", "% of hits", 2, |r| share(&r.cache.hits, Origin::EarlierFrame)),
     ]);
     columns.extend(origin_columns(|r: &CurvePoint| &r.cache.hits).into_iter().map(|mut column| {
-        column.heading.key = format!("hits.{}", column.heading.key).into();
+        column.heading.key = format!("hits_{}", column.heading.key).into();
         column
     }));
     columns
@@ -244,7 +245,7 @@ impl CurvePoint<'_> {
 
     /// Misses in percent of the line accesses.
     #[must_use]
-    pub fn miss_pct(&self) -> Option<f64> {
+    pub fn line_miss_pct(&self) -> Option<f64> {
         let hits: u64 = self.cache.hits.iter().sum();
         pct(self.accesses - hits, self.accesses)
     }

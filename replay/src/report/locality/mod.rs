@@ -14,7 +14,7 @@ use columns::{CurvePoint, Reuses, Subject, Summary, Window};
 use serde::Serialize;
 
 /// Schema of the JSON object.
-pub const SCHEMA: &str = "replay.locality/1";
+pub const SCHEMA: &str = "replay.locality/2";
 
 /// A trace's figures.
 pub struct TraceFigures {
@@ -45,6 +45,7 @@ pub struct LocalityReport {
 
 /// The JSON object.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct LocalityJson<'r, 'a> {
     schema: &'a str,
     tool: &'a str,
@@ -58,6 +59,7 @@ struct LocalityJson<'r, 'a> {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct TraceFacts<'a> {
     label: &'a str,
     #[serde(flatten)]
@@ -251,4 +253,26 @@ impl LocalityReport {
             },
         })
     }
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<LocalityJson<'_, '_>>(SCHEMA)
+        .rows(
+            "rows",
+            &crate::report::columns::headings(&columns::summary()),
+        )
+        .rows(
+            "curves",
+            &crate::report::columns::headings(&columns::curves()),
+        )
+        .rows(
+            "distances",
+            &crate::report::columns::headings(&columns::distances()),
+        )
+        .rows(
+            "working_sets",
+            &crate::report::columns::headings(&columns::working_sets()),
+        )
 }

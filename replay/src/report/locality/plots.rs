@@ -62,7 +62,8 @@ pub fn miss_ratio(rows: &[Summary]) -> LineChart {
         "Miss ratio by size, fully associative LRU".into(),
         y,
         |row| {
-            let points = full_lru(row).filter_map(|p| Some((p.size_bytes() as f64, p.miss_pct()?)));
+            let points =
+                full_lru(row).filter_map(|p| Some((p.size_bytes() as f64, p.line_miss_pct()?)));
             points.filter(|p| p.1 > 0.0).collect()
         },
     )
@@ -123,7 +124,7 @@ pub fn associativity(row: &Summary) -> LineChart {
     };
     let line = |ways: Option<u32>| {
         let points = lru().filter(|p| p.cache.ways == ways).filter(in_range);
-        let at = |p: &CurvePoint| Some((p.size_bytes() as f64, p.miss_pct()?));
+        let at = |p: &CurvePoint| Some((p.size_bytes() as f64, p.line_miss_pct()?));
         points.filter_map(at).filter(|p| p.1 > 0.0).collect()
     };
     let of_ways = ways.iter().enumerate().map(|(index, &ways)| LineSeries {

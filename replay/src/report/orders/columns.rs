@@ -15,7 +15,7 @@ pub const SHORT_MEANS: [&str; 13] = [
     "worst_trace",
     "worst_trace_change_pct",
     "closed_pct",
-    "l1_miss_pct",
+    "l1_footprint_miss_pct",
     "utilization_pct",
     "cycles_change_pct",
     "state_bytes",
@@ -54,7 +54,7 @@ pub fn rows<'a>() -> Vec<Column<'a, Row<'a>>> {
         C::text("direction", "direction", |r| part(r, |order| order.parts().direction.name().to_owned())),
         C::text("assign", "assignment", |r| part(r, |order| order.parts().assignment.map_or("as configured", crate::order::assignment::Assignment::name).to_owned())),
         C::text("buildable", "buildable", |r| r.is_buildable()).about("no part of it needs accesses that are not made yet"),
-        C::text("knows", "knows", |r| r.knows()).about("what the order decides by: the grid, constants of the display, counters of the last frame, the future; or a bound"),
+        C::text("information", "information", |r| r.information()).about("what the order decides by: the grid, constants of the display, counters of the last frame, the future; or a bound"),
         whole("state_bytes", "state", "bytes", |r| r.cost.map(|c| c.state_bytes.into())).about("registers"),
         whole("table_bytes", "tables", "bytes", |r| r.cost.map(|c| c.table_bytes)),
         whole("look_ahead_items", "look-ahead", "items", |r| r.cost.map(|c| c.look_ahead_items.into())),
@@ -72,8 +72,8 @@ pub fn rows<'a>() -> Vec<Column<'a, Row<'a>>> {
         real("change_pct", "against Z2 STA", "%", 2, |r| r.ratio().map(|ratio| 100.0 * (ratio - 1.0))).about("bytes against those of z2-sta with the same caches"),
         real("closed_pct", "of the way to greedy", "%", 1, |r| r.closed_pct()).about("of the distance from z2-sta to the offline greedy order"),
         whole("distinct_bytes", "distinct", "bytes", |r| Some(r.distinct_bytes)).about("traffic of an infinite cache"),
-        real("l1_miss_pct", "L1 misses", "%", 3, |r| l1_miss_rate(r).map(|rate| 100.0 * rate)).about("of footprints"),
-        real("l2_miss_pct", "L2 misses", "%", 2, |r| l2_miss_rate(r).map(|rate| 100.0 * rate)).about("of L2 look-ups"),
+        real("l1_footprint_miss_pct", "L1 misses", "% of footprints", 3, |r| l1_footprint_miss_rate(r).map(|rate| 100.0 * rate)).about("of footprints"),
+        real("l2_line_miss_pct", "L2 misses", "% of lines", 2, |r| l2_line_miss_rate(r).map(|rate| 100.0 * rate)).about("of L2 look-ups"),
         real("utilization_pct", "utilisation", "%", 2, |r| utilization(r).map(|rate| 100.0 * rate)).about("of the texture units, in timed mode"),
         whole("cycles", "cycles", "", |r| r.result.as_ref().and_then(|result| result.cycles)),
         real("cycles_change_pct", "cycles against Z2 STA", "%", 2, |r| {
@@ -90,12 +90,14 @@ pub fn rows<'a>() -> Vec<Column<'a, Row<'a>>> {
     ]
 }
 
-fn l1_miss_rate(row: &Row<'_>) -> Option<f64> {
-    row.result.as_ref().map(|result| result.l1.miss_rate)
+fn l1_footprint_miss_rate(row: &Row<'_>) -> Option<f64> {
+    row.result
+        .as_ref()
+        .map(|result| result.l1.footprint_miss_rate)
 }
 
-fn l2_miss_rate(row: &Row<'_>) -> Option<f64> {
-    row.result.as_ref().map(|result| result.l2.miss_rate)
+fn l2_line_miss_rate(row: &Row<'_>) -> Option<f64> {
+    row.result.as_ref().map(|result| result.l2.line_miss_rate)
 }
 
 fn utilization(row: &Row<'_>) -> Option<f64> {
@@ -113,19 +115,19 @@ pub fn means<'a>() -> Vec<Column<'a, Mean<'a>>> {
     type C<'a> = Column<'a, Mean<'a>>;
     let whole = |key: &'static str, name: &'static str, unit: &'static str, of: fn(&Mean<'a>) -> Option<u64>| C::new(key, name, unit, Show::Whole, of);
     let real = |key: &'static str, name: &'static str, unit: &'static str, decimals: usize, of: fn(&Mean<'a>) -> Option<f64>| C::real(key, name, unit, decimals, of);
-    let knows = |mean: &Mean<'a>| mean.rows.first().map(|row| Value::from(row.knows())).unwrap_or_default();
+    let information = |mean: &Mean<'a>| mean.rows.first().map(|row| Value::from(row.information())).unwrap_or_default();
     vec![
         C::text("between_frames", "between frames", |m| m.between.to_string()),
         C::text("order", "order", |m| m.name()),
         C::text("buildable", "buildable", |m| m.cost().is_some_and(|cost| cost.is_buildable())),
-        C::text("knows", "knows", knows),
+        C::text("information", "information", information),
         whole("rows", "rows", "", |m| Some(m.count())).about("traces times caches, without traces in which the baseline fetches each line once"),
         real("change_pct", "against Z2 STA", "%", 2, Mean::change_pct).about("geometric mean of bytes over those of z2-sta"),
         C::text("worst_trace", "worst trace", |m| m.worst_trace().map(|(label, _)| label.to_owned())).about("by the geometric mean over its caches"),
         real("worst_trace_change_pct", "there", "%", 2, |m| m.worst_trace().map(|(_, change)| change)),
         real("worst_pct", "worst row", "%", 2, Mean::worst_pct).about("of a trace with a pair of caches"),
         real("closed_pct", "of the way to greedy", "%", 1, Mean::closed_pct).about("of the distance from z2-sta to the offline greedy order, by geometric means"),
-        real("l1_miss_pct", "L1 misses", "%", 3, |m| m.rate_pct(l1_miss_rate)).about("mean, of footprints"),
+        real("l1_footprint_miss_pct", "L1 misses", "% of footprints", 3, |m| m.rate_pct(l1_footprint_miss_rate)).about("mean, of footprints"),
         real("utilization_pct", "utilisation", "%", 2, |m| m.rate_pct(utilization)),
         real("cycles_change_pct", "cycles", "%", 2, Mean::cycles_change_pct).about("geometric mean of cycles over those of z2-sta"),
         real("dram_row_hit_pct", "DRAM row hits", "%", 2, |m| m.rate_pct(row_hit_rate)),

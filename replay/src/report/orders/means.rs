@@ -121,7 +121,7 @@ impl<'a> Mean<'a> {
     #[must_use]
     pub fn cost(&self) -> Option<Cost> {
         let costs = self.rows.iter().filter_map(|row| row.cost);
-        costs.max_by_key(|cost| (cost.knows, cost.state_bytes, cost.table_bytes))
+        costs.max_by_key(|cost| (cost.information, cost.state_bytes, cost.table_bytes))
     }
 }
 

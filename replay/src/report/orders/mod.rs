@@ -16,7 +16,7 @@ pub use means::Mean;
 use serde::Serialize;
 
 /// Schema of the JSON object.
-pub const SCHEMA: &str = "replay.orders/1";
+pub const SCHEMA: &str = "replay.orders/2";
 
 /// The results of a study.
 pub struct OrdersReport<'a> {
@@ -29,6 +29,7 @@ pub struct OrdersReport<'a> {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Document<'r, 'a> {
     schema: &'a str,
     tool: &'a str,
@@ -41,6 +42,7 @@ struct Document<'r, 'a> {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct TraceFacts<'a> {
     label: &'a str,
     #[serde(flatten)]
@@ -127,4 +129,19 @@ impl<'a> OrdersReport<'a> {
             },
         })
     }
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<Document<'_, '_>>(SCHEMA)
+        .rows("rows", &crate::report::columns::headings(&columns::rows()))
+        .rows(
+            "means",
+            &crate::report::columns::headings(&columns::means()),
+        )
+        .rows(
+            "learned",
+            &crate::report::columns::headings(&columns::learned()),
+        )
 }

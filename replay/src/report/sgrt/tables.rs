@@ -381,8 +381,8 @@ pub fn classes(entries: &[Entry]) -> Table {
         }),
         pixels("wrong_object", "wrong object", |c| c.wrong_object),
         pixels("wrong_primitive", "wrong triangle", |c| c.wrong_primitive),
-        pixels("over_1px", "off > 1 px", |c| c.position_over[0]),
-        pixels("over_2px", "off > 2 px", |c| c.position_over[1]),
+        pixels("over_1px", "off > 1 px", |c| c.position_over_1px),
+        pixels("over_2px", "off > 2 px", |c| c.position_over_2px),
     ];
     let rows: Vec<ClassRow> = runs
         .iter()

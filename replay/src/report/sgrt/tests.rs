@@ -96,7 +96,7 @@ fn csv_has_as_many_cells_in_each_row_as_in_its_heading() {
 #[test]
 fn json_holds_the_agreed_fields() {
     let json = serde_json::to_value(entry().report).expect("json");
-    assert_eq!(json["schema"], "replay.reproject/2");
+    assert_eq!(json["schema"], "replay.reproject/3");
     for field in [
         "reuse_pct",
         "wrong_object_pct",

@@ -195,8 +195,8 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
     columns.extend([
         Figure::new("footprints", "footprints", "", Show::Whole, move |m| Some(m.caches_in(order)?.footprints))
             .about("bilinear footprints of the trace"),
-        Figure::real("l1_miss_pct", "L1 miss", "%", 2, move |m| Some(m.caches_in(order)?.l1_miss_pct)),
-        Figure::real("l2_miss_pct", "L2 miss", "%", 2, move |m| Some(m.caches_in(order)?.l2_miss_pct)),
+        Figure::real("l1_footprint_miss_pct", "L1 miss", "% of footprints", 2, move |m| Some(m.caches_in(order)?.l1_footprint_miss_pct)),
+        Figure::real("l2_line_miss_pct", "L2 miss", "% of lines", 2, move |m| Some(m.caches_in(order)?.l2_line_miss_pct)),
         Figure::new("external_bytes", "external", "bytes", Show::Whole, move |m| Some(m.caches_in(order)?.external_bytes))
             .about("line misses of the L2 times the line size, all frames of the trace"),
         Figure::real("external_mb_per_frame", "external", "MB/frame", 3, move |m| m.caches_in(order).map(CacheFigures::external_mb_per_frame))

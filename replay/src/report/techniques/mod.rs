@@ -21,7 +21,7 @@ use published::{ClaimRow, claim_columns, claims};
 use serde::Serialize;
 
 /// Schema of the JSON object.
-pub const SCHEMA: &str = "replay.techniques/1";
+pub const SCHEMA: &str = "replay.techniques/2";
 
 /// Measurements of the techniques on some scenes.
 pub struct TechniquesReport<'a> {
@@ -37,6 +37,7 @@ pub struct TechniquesReport<'a> {
 
 /// The JSON object.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct TechniquesJson<'r, 'a> {
     schema: &'a str,
     tool: &'a str,
@@ -50,6 +51,7 @@ struct TechniquesJson<'r, 'a> {
 
 /// Facts about a scene, for the JSON.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct SceneFacts<'a> {
     scene: &'a str,
     path: Option<&'a str>,
@@ -58,6 +60,7 @@ struct SceneFacts<'a> {
     instances: u64,
     size_px: [u32; 2],
     hmd: &'a str,
+    #[cfg_attr(test, schemars(with = "[serde_json::Value; 2]"))]
     lens: [Lens; 2],
     pixels_per_degree: f32,
     adapter: &'a str,
@@ -219,4 +222,10 @@ impl<'a> TechniquesReport<'a> {
             },
         })
     }
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<TechniquesJson<'_, '_>>(SCHEMA)
 }

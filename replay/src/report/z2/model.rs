@@ -1,4 +1,4 @@
-//! The Z2 paper's experiment: its rows, their averages and their checks (`replay.paper/1`).
+//! The Z2 paper's experiment: its rows, their averages and their checks (`replay.paper/3`).
 
 use crate::config::{Order, RunConfig};
 use crate::experiment::{Outcome, ResultRow, Subject, frame_count};
@@ -13,10 +13,11 @@ use formats::textrace::TraceMeta;
 use serde::Serialize;
 
 /// Schema of the object that `replay paper --json` prints.
-pub const PAPER_SCHEMA: &str = "replay.paper/2";
+pub const PAPER_SCHEMA: &str = "replay.paper/3";
 
 /// A trace of the experiment.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TraceInfo {
     /// Short name in tables.
     pub label: String,
@@ -40,6 +41,7 @@ pub struct TraceInfo {
     /// Render passes of the first frame's left and right eye.
     pub eye_passes: Vec<u32>,
     /// Description from the trace.
+    #[cfg_attr(test, schemars(with = "crate::schemas::Meta"))]
     pub meta: TraceMeta,
 }
 
@@ -77,6 +79,7 @@ impl Row for Average {
 /// Deviation of the utilisation from the surface of the paper's table, on the machine of
 /// `--preset z2-paper`, which counts rates as the paper does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Deviation {
     /// Mean absolute deviation, points.
     pub mean_absolute_points: f64,
@@ -88,6 +91,7 @@ pub struct Deviation {
 
 /// Whether every run of a trace replayed the same multiset of accesses.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Conservation {
     /// The trace's label.
     pub scene: String,
@@ -277,6 +281,7 @@ impl<'a> PaperReport<'a> {
 
 /// The JSON object.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct PaperJson<'a, 'r> {
     schema: &'a str,
     tool: &'a str,
@@ -294,6 +299,7 @@ struct PaperJson<'a, 'r> {
 
 /// Breakdown of a trace's traffic for one configuration and order.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Detail<'a> {
     scene: &'a str,
     l1_kib: f64,
@@ -393,6 +399,20 @@ fn unique<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
     seen
 }
 
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<PaperJson<'_, '_>>(PAPER_SCHEMA)
+        .rows(
+            "rows",
+            &crate::report::columns::headings(&PaperReport::figures()),
+        )
+        .rows(
+            "averages",
+            &crate::report::columns::headings(&Average::columns()),
+        )
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::testing::with_report;
@@ -437,14 +457,14 @@ mod tests {
     fn the_json_names_its_schema_and_keeps_every_row_with_the_papers_beside_it() {
         with_report(|report| {
             let json: serde_json::Value = serde_json::from_str(&report.json().unwrap()).unwrap();
-            assert_eq!(json["schema"], "replay.paper/2");
+            assert_eq!(json["schema"], "replay.paper/3");
             assert_eq!(json["rows"].as_array().unwrap().len(), report.rows.len());
             let row = &json["rows"][2];
             assert_eq!(row["order"], "z2-sta");
             assert_eq!(row["external_bytes"], report.rows[2].result.external_bytes);
             let lrta = &json["rows"][10]["paper"];
             assert_eq!(
-                (&lrta["l1_miss_pct"], &lrta["l2_miss_pct"]),
+                (&lrta["l1_footprint_miss_pct"], &lrta["l2_line_miss_pct"]),
                 (&8.76.into(), &54.81.into())
             );
             assert!((lrta["reduction_pct"].as_f64().unwrap() - 42.7).abs() < 0.1);

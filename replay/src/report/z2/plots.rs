@@ -91,8 +91,8 @@ pub fn bandwidth(report: &PaperReport, scene: &str) -> BarChart {
 #[must_use]
 pub fn rates(report: &PaperReport, scene: &str) -> Vec<BarChart> {
     [
-        ("L1 miss rate", "l1_miss_pct"),
-        ("L2 miss rate", "l2_miss_pct"),
+        ("L1 miss rate", "l1_footprint_miss_pct"),
+        ("L2 miss rate", "l2_line_miss_pct"),
         ("TMU utilisation", "tmu_util_pct"),
     ]
     .into_iter()
@@ -117,7 +117,7 @@ pub fn surface(report: &PaperReport) -> Result<String, PlotError> {
         },
         points: z2::table()
             .iter()
-            .map(|r| (r.l1_miss_pct, r.l2_miss_pct))
+            .map(|r| (r.l1_footprint_miss_pct, r.l2_line_miss_pct))
             .collect(),
         hollow: true,
     }];
@@ -129,8 +129,11 @@ pub fn surface(report: &PaperReport) -> Result<String, PlotError> {
                 .iter()
                 .filter(|r| r.point.config.order == order)
                 .filter_map(|r| {
-                    let l1_miss_pct = number(r, "z2_paper.l1_miss_pct")?;
-                    Some((l1_miss_pct.max(0.5), number(r, "z2_paper.l2_miss_pct")?))
+                    let l1_footprint_miss_pct = number(r, "z2_paper.l1_footprint_miss_pct")?;
+                    Some((
+                        l1_footprint_miss_pct.max(0.5),
+                        number(r, "z2_paper.l2_line_miss_pct")?,
+                    ))
                 })
                 .collect(),
             hollow: false,
@@ -240,7 +243,7 @@ pub fn by_level(details: &[&ResultRow]) -> Vec<BarChart> {
             .collect(),
         ..BarChart::default()
     };
-    let columns = pick(&["l1_miss_pct", "external_lines"]).into_iter();
+    let columns = pick(&["l1_footprint_miss_pct", "external_lines"]).into_iter();
     let titles = ["L1 miss rate", "external traffic"];
     columns.zip(titles).map(chart).collect()
 }
@@ -268,7 +271,12 @@ pub fn by_part(details: &[&ResultRow], most: usize) -> Vec<HBarChart> {
             })
             .collect(),
     };
-    let columns = pick(&["l1_miss_pct", "l2_miss_pct", "external_lines"]).into_iter();
+    let columns = pick(&[
+        "l1_footprint_miss_pct",
+        "l2_line_miss_pct",
+        "external_lines",
+    ])
+    .into_iter();
     let titles = ["L1 miss rate", "L2 miss rate", "external traffic"];
     columns.zip(titles).map(chart).collect()
 }

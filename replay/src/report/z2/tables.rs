@@ -14,15 +14,15 @@ pub fn table_2(report: &PaperReport) -> Table {
         "label",
         "caches",
         "order",
-        "l1_miss_pct",
-        "l2_miss_pct",
+        "l1_footprint_miss_pct",
+        "l2_line_miss_pct",
         "tmu_util_pct",
         "tmu_ratio",
         "external_mb_per_frame",
         "reduction_pct",
         "bound_mb_per_frame",
-        "paper.l1_miss_pct",
-        "paper.l2_miss_pct",
+        "paper.l1_footprint_miss_pct",
+        "paper.l2_line_miss_pct",
         "paper.tmu_util_pct",
         "paper.tmu_ratio",
         "paper.reduction_pct",
@@ -38,17 +38,17 @@ pub fn as_the_paper_counts(report: &PaperReport) -> Option<Table> {
         "label",
         "caches",
         "order",
-        "z2_paper.l1_miss_pct",
-        "z2_paper.l2_miss_pct",
+        "z2_paper.l1_footprint_miss_pct",
+        "z2_paper.l2_line_miss_pct",
         "z2_paper.tmu_util_pct",
         "z2_paper.product_reduction_pct",
-        "paper.l1_miss_pct",
-        "paper.l2_miss_pct",
+        "paper.l1_footprint_miss_pct",
+        "paper.l2_line_miss_pct",
         "paper.tmu_util_pct",
         "paper.reduction_pct",
         "z2_paper.closed_form_deviation_points",
-        "z2_paper.primary_l1_miss_pct",
-        "z2_paper.primary_l2_miss_pct",
+        "z2_paper.primary_l1_footprint_miss_pct",
+        "z2_paper.primary_l2_line_miss_pct",
         "z2_paper.external_mb_per_frame",
         "z2_paper.reduction_pct",
     ]);
@@ -71,10 +71,10 @@ pub fn modes(report: &PaperReport) -> Option<Table> {
         "label",
         "caches",
         "order",
-        "l1_miss_pct",
-        "functional.l1_miss_pct",
-        "l2_miss_pct",
-        "functional.l2_miss_pct",
+        "l1_footprint_miss_pct",
+        "functional.l1_footprint_miss_pct",
+        "l2_line_miss_pct",
+        "functional.l2_line_miss_pct",
         "external_mb_per_frame",
         "functional.external_mb_per_frame",
         "functional.external_difference_pct",
@@ -121,7 +121,11 @@ pub fn parts<'a>(
         .map(|(column, name)| at(column, first, name.to_owned()))
         .collect();
     for detail in details {
-        for column in pick::<Part>(&["l1_miss_pct", "l2_miss_pct", "external_lines"]) {
+        for column in pick::<Part>(&[
+            "l1_footprint_miss_pct",
+            "l2_line_miss_pct",
+            "external_lines",
+        ]) {
             let order = detail.point.config.order.title();
             let name = format!("{} {order}", column.heading.name);
             columns.push(at(column, parts_of(detail), name));

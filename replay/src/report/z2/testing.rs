@@ -44,7 +44,11 @@ pub(crate) fn with_edited<T>(
             let [l1, l2] =
                 [&point.config.level.l1, &point.config.level.l2].map(|c| c.size_bytes as u32 >> 10);
             let row = z2::row(scene, l1, l2, point.config.order).unwrap();
-            let rates = [row.l1_miss_pct, row.l2_miss_pct, row.tmu_util_pct];
+            let rates = [
+                row.l1_footprint_miss_pct,
+                row.l2_line_miss_pct,
+                row.tmu_util_pct,
+            ];
             let mut result = result(rates, point.config.tile_maps);
             edit(index, &mut result);
             results.push(result);
@@ -81,11 +85,7 @@ fn result([l1_pct, l2_pct, tmu_pct]: [f64; 3], maps: bool) -> RunResult {
         line_misses: misses,
         secondary_misses: 0,
     };
-    let level = |lookups: u64, misses: u64| LevelResult {
-        miss_rate: misses as f64 / lookups as f64,
-        misses,
-        counters: counters(lookups, misses),
-    };
+    let level = |lookups: u64, misses: u64| LevelResult::new(counters(lookups, misses));
     let parts = |names: &[&str]| {
         names
             .iter()
@@ -123,8 +123,8 @@ fn result([l1_pct, l2_pct, tmu_pct]: [f64; 3], maps: bool) -> RunResult {
         clients: Vec::new(),
         geometry: None,
         first_lookups: Some(FirstLookups {
-            l1_miss_rate: l1_pct / 100.0,
-            l2_miss_rate: l2_pct / 100.0,
+            l1_footprint_miss_rate: l1_pct / 100.0,
+            l2_line_miss_rate: l2_pct / 100.0,
             ..FirstLookups::default()
         }),
         by_view: parts(&["left", "right"]),

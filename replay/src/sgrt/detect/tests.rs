@@ -27,7 +27,11 @@ fn a_plane_across_the_view_has_no_wrong_pixel_under_any_rule() {
             let reused = accuracy.all_reused();
             assert_eq!(reused.wrong_object, 0);
             assert_eq!(reused.wrong_primitive, 0);
-            assert_eq!(reused.position_over, [0, 0], "depth {depth}, {rule}");
+            assert_eq!(
+                (reused.position_over_1px, reused.position_over_2px),
+                (0, 0),
+                "depth {depth}, {rule}"
+            );
             // Only the strip that the left eye does not see is missing.
             let strip = (36.0 * 0.064 / depth).ceil() as u64 * 40;
             assert!(accuracy.missing.pixels <= strip);
@@ -52,7 +56,7 @@ fn an_exact_sphere_has_no_wrong_pixel_inside_its_silhouette() {
     let accuracy = count_errors(&frame, &decisions);
     assert_eq!(accuracy.all_reused().wrong_object, 0);
     // Half a pixel of distance, seen at most about ten degrees from the tangent, is less than 2 px.
-    assert_eq!(accuracy.all_reused().position_over[1], 0);
+    assert_eq!(accuracy.all_reused().position_over_2px, 0);
     assert!(accuracy.pct(accuracy.all_reused().pixels) > 80.0);
     let on_sphere = |d: &&Decision| d.class.is_reused() && d.primitive != SKY;
     for decision in decisions.iter().filter(on_sphere) {
@@ -68,7 +72,7 @@ fn a_sphere_of_triangles_has_no_wrong_pixel_under_the_default_rule() {
     let accuracy = count_errors(&frame, &decided(&frame, DEFAULT));
     let reused = accuracy.all_reused();
     assert_eq!((reused.wrong_object, reused.wrong_primitive), (0, 0));
-    assert_eq!(reused.position_over, [0, 0]);
+    assert_eq!((reused.position_over_1px, reused.position_over_2px), (0, 0));
     assert!(accuracy.pct(reused.pixels) > 85.0);
 }
 

@@ -74,6 +74,7 @@ pub const DEFAULT_DEPTH_SHARE: f32 = 0.02;
 /// The rules of error detection: a combination of [`RULES`], each at most once. The empty one
 /// reuses every arrival.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(into = "String", try_from = "String")]
 pub struct Rule(Vec<Part>);
 
