@@ -71,9 +71,8 @@ fn recipe(name: &'static str, maps: Maps, tile_m: f32, surface: Surface) -> Reci
     }
 }
 
-/// Texture sets of the rich palette, in the order that [`rich`] consumes them.
-#[must_use]
-pub fn rich_textures() -> Vec<Recipe> {
+/// Texture sets of floors, walls and roofs, in the order of the [`Palette`].
+fn masonry_textures() -> Vec<Recipe> {
     use Maps::{Full, FullOcclusion};
     let sand = [rgb(0xcdb894), rgb(0xb39b74)];
     let cream = [rgb(0xd9cbb0), rgb(0xc2ae8c)];
@@ -149,6 +148,13 @@ pub fn rich_textures() -> Vec<Recipe> {
             2.6,
             roof_tiles([rgb(0xb5643e), rgb(0x8f4a30)]),
         ),
+    ]
+}
+
+/// Texture sets of what stands and hangs in the building, in the order of the [`Palette`].
+fn furnishing_textures() -> Vec<Recipe> {
+    use Maps::Full;
+    vec![
         recipe(
             "old-beams",
             Full,
@@ -219,8 +225,8 @@ pub fn rich_textures() -> Vec<Recipe> {
 }
 
 /// Every surface its own material.
-pub fn rich(scene: &mut SceneBuilder, sets: Vec<Recipe>) -> Palette {
-    let mut sets = sets.into_iter();
+pub fn rich(scene: &mut SceneBuilder) -> Palette {
+    let mut sets = masonry_textures().into_iter().chain(furnishing_textures());
     let mut next = |leafy: bool| {
         let Some(set) = sets.next() else {
             return scene.plain("missing", rgb(0xff_00ff), 0.8, |_| {});

@@ -66,30 +66,36 @@ struct Solids {
     eye: MaterialId,
 }
 
-fn textures() -> Vec<Recipe> {
-    use LeafShape::{Blade, Frond, Grass, Ivy, Palm, Spray};
-    let color = |name, size, surface: Surface| Recipe {
+fn color(name: &'static str, size: u32, surface: Surface) -> Recipe {
+    Recipe {
         name,
         size,
         maps: Maps::Color,
         tile_m: 1.0,
         surface,
-    };
-    let normal = |name, tile_m, surface: Surface| Recipe {
+    }
+}
+
+fn normal(name: &'static str, tile_m: f32, surface: Surface) -> Recipe {
+    Recipe {
         name,
         size: 1024,
         maps: Maps::ColorNormal,
         tile_m,
         surface,
-    };
-    let full = |name, tile_m, surface: Surface| Recipe {
-        name,
-        size: 1024,
+    }
+}
+
+fn full(name: &'static str, tile_m: f32, surface: Surface) -> Recipe {
+    Recipe {
         maps: Maps::Full,
-        tile_m,
-        surface,
-    };
-    let moss_stone = [rgb(0x8d8a72), rgb(0x6b6d55)];
+        ..normal(name, tile_m, surface)
+    }
+}
+
+/// Texture sets of [`Leaves`], in the order of its fields.
+fn leaf_textures() -> Vec<Recipe> {
+    use LeafShape::{Blade, Frond, Grass, Ivy, Palm, Spray};
     vec![
         color(
             "fern-bright",
@@ -149,6 +155,13 @@ fn textures() -> Vec<Recipe> {
             leaf(Spray, [rgb(0x2a5220), rgb(0x5c8a36)]),
         ),
         color("ivy", 512, leaf(Ivy, [rgb(0x2a5223), rgb(0x5f8f3f)])),
+    ]
+}
+
+/// Texture sets of [`Solids`], in the order of its fields.
+fn solid_textures() -> Vec<Recipe> {
+    let moss_stone = [rgb(0x8d8a72), rgb(0x6b6d55)];
+    vec![
         full(
             "forest-floor",
             3.0,
@@ -186,7 +199,7 @@ fn textures() -> Vec<Recipe> {
 }
 
 fn materials(scene: &mut SceneBuilder) -> (Leaves, Solids) {
-    let mut sets = textures().into_iter();
+    let mut sets = leaf_textures().into_iter().chain(solid_textures());
     let mut next = |foliage: bool| match sets.next() {
         Some(set) => scene.textured(set, |m| {
             if foliage {

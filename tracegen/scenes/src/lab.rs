@@ -203,6 +203,7 @@ fn furniture(scene: &mut SceneBuilder, kit: &Kit) {
     scene.add("wall", wall, kit.tiles);
 }
 
+/// Conical flasks and beakers with what they hold; a rod, a dish and a funnel.
 fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     let flask = erlenmeyer(0.145, 3);
     vessel(
@@ -256,7 +257,36 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
         Some((kit.liquids[2], 0.03)),
         &[at(-0.24, 0.0, 0.19)],
     );
-    // A graduated cylinder and its foot.
+    graduated_cylinder(scene, kit);
+    // A stirring rod in the beaker and a petri dish before it.
+    let rod = glass_tube(
+        &[
+            (vec3(0.052, 0.006, 0.15), 0.003),
+            (vec3(0.085, 0.08, 0.155), 0.003),
+            (vec3(0.118, 0.155, 0.16), 0.003),
+        ],
+        0.4,
+        16,
+    );
+    scene.add("rod", rod, kit.glass);
+    let dish = beaker(0.038, 0.012, 3);
+    vessel(
+        scene,
+        kit.glass,
+        &Ware {
+            outer: &dish,
+            wall: 0.0014,
+            segments: 40,
+            lip: 0.0,
+        },
+        Some((kit.liquids[3], 0.005)),
+        &[at(0.0, 0.0, 0.245)],
+    );
+    funnel(scene, kit);
+}
+
+/// The cylinder, its foot and its marks.
+fn graduated_cylinder(scene: &mut SceneBuilder, kit: &Kit) {
     let cylinder = beaker(0.0155, 0.19, 3);
     vessel(
         scene,
@@ -302,30 +332,9 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     marks.orient(|p| vec3(p.x, 0.0, p.z));
     let marks = scene.mesh("graduation", marks, kit.rubber);
     scene.place(marks, at(-0.185, 0.006, 0.065));
-    // A stirring rod in the beaker and a petri dish before it.
-    let rod = glass_tube(
-        &[
-            (vec3(0.052, 0.006, 0.15), 0.003),
-            (vec3(0.085, 0.08, 0.155), 0.003),
-            (vec3(0.118, 0.155, 0.16), 0.003),
-        ],
-        0.4,
-        16,
-    );
-    scene.add("rod", rod, kit.glass);
-    let dish = beaker(0.038, 0.012, 3);
-    vessel(
-        scene,
-        kit.glass,
-        &Ware {
-            outer: &dish,
-            wall: 0.0014,
-            segments: 40,
-            lip: 0.0,
-        },
-        Some((kit.liquids[3], 0.005)),
-        &[at(0.0, 0.0, 0.245)],
-    );
+}
+
+fn funnel(scene: &mut SceneBuilder, kit: &Kit) {
     let mut funnel = MeshBuilder::new();
     let cone = curve(
         &[

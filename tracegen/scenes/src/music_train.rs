@@ -219,8 +219,14 @@ pub(super) fn bells(scene: &mut SceneBuilder, kit: &Kit) {
     scene.add("bell-rod", rod, kit.brass);
 }
 
-/// Bedplate, its screws, spring barrel and the winding key.
+/// Bedplate, spring barrels and the winding key.
 pub(super) fn fittings(scene: &mut SceneBuilder, kit: &Kit) {
+    bedplate(scene, kit);
+    spring_barrels(scene, kit);
+    winding_key(scene, kit);
+}
+
+fn bedplate(scene: &mut SceneBuilder, kit: &Kit) {
     let mut bed = MeshBuilder::new();
     bed.block(
         vec3(-0.080, 0.0066, -0.042),
@@ -244,7 +250,10 @@ pub(super) fn fittings(scene: &mut SceneBuilder, kit: &Kit) {
             Affine3A::from_rotation_translation(turn, vec3(x, 0.0090, z)),
         );
     }
-    // Spring barrel behind the cylinder, its mainspring seen from above.
+}
+
+/// Barrels behind the cylinder, their mainsprings seen from above.
+fn spring_barrels(scene: &mut SceneBuilder, kit: &Kit) {
     let mut barrel = MeshBuilder::new();
     let (r, h) = (0.0085, 0.012);
     barrel.lathe(
@@ -295,7 +304,10 @@ pub(super) fn fittings(scene: &mut SceneBuilder, kit: &Kit) {
         scene.place(barrel_mesh, place);
         scene.place(spring, place);
     }
-    // Key in the front of the box.
+}
+
+/// The key in the front of the box.
+fn winding_key(scene: &mut SceneBuilder, kit: &Kit) {
     let mut key = MeshBuilder::new();
     key.lathe(
         &curve(

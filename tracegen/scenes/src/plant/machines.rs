@@ -321,17 +321,23 @@ fn hook() -> MeshBuilder {
     m
 }
 
-/// Adds all of them.
-pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
-    let mut add = |name: &str, m: MeshBuilder, material| scene.mesh(name, m, material);
+fn tank_leg() -> MeshBuilder {
     let mut leg = MeshBuilder::new();
     leg.block(vec3(-0.06, 0.02, -0.06), vec3(0.06, 1.2, 0.06), 0.0);
     leg.block(vec3(-0.14, 0.0, -0.14), vec3(0.14, 0.02, 0.14), 0.0);
+    leg
+}
+
+fn signal() -> MeshBuilder {
     let mut signal = MeshBuilder::new();
     signal.lathe(
         &[sharp(0.05, 0.0), sharp(0.05, 0.14), smooth(0.0, 0.17)],
         10,
     );
+    signal
+}
+
+fn roller() -> MeshBuilder {
     let mut roller = MeshBuilder::new();
     let mut turned = MeshBuilder::new();
     turned.lathe(
@@ -347,6 +353,10 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
         &turned,
         Affine3A::from_translation(Vec3::X * 0.32) * Affine3A::from_rotation_z(FRAC_PI_2),
     );
+    roller
+}
+
+fn panel() -> MeshBuilder {
     let mut panel = MeshBuilder::new();
     panel.surface(1, 1, |s, t| {
         (
@@ -354,12 +364,19 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
             glam::vec2(s, 1.0 - t),
         )
     });
+    panel
+}
+
+fn rope() -> MeshBuilder {
     let mut rope = MeshBuilder::new();
     for (x, z) in [(-0.12, -0.05), (-0.12, 0.05), (0.12, -0.05), (0.12, 0.05)] {
         let at = vec3(x, 0.0, z);
         rope.tube(&[(at, 0.014), (at + Vec3::Y * 3.5, 0.014)], 5);
     }
-    let span = NAVE_M - 1.5;
+    rope
+}
+
+fn wheel() -> MeshBuilder {
     let mut wheel = MeshBuilder::new();
     let mut tyre = MeshBuilder::new();
     tyre.lathe(
@@ -372,15 +389,23 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
         12,
     );
     wheel.merge(&tyre, Affine3A::from_rotation_z(FRAC_PI_2));
-    // Rails and wheels of the trolley ride on the girders' tops at 0.9 m.
-    let girder = boxes(
+    wheel
+}
+
+/// A girder of the crane; rails and wheels of the trolley ride on its top at 0.9 m.
+fn girder() -> MeshBuilder {
+    let span = NAVE_M - 1.5;
+    boxes(
         &[
             ([-span / 2.0, 0.0, -0.22], [span / 2.0, 0.9, 0.22]),
             ([-span / 2.0, 0.9, -0.04], [span / 2.0, 0.96, 0.04]),
         ],
         0.0,
-    );
-    let trolley = boxes(
+    )
+}
+
+fn trolley() -> MeshBuilder {
+    boxes(
         &[
             ([-0.9, 0.2, -1.3], [0.9, 0.4, 1.3]),
             ([-0.5, 0.4, -0.5], [0.5, 1.15, 0.5]),
@@ -391,8 +416,11 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
             ([0.5, 0.0, 0.85], [0.9, 0.2, 1.15]),
         ],
         0.0,
-    );
-    let bench = boxes(
+    )
+}
+
+fn bench() -> MeshBuilder {
+    boxes(
         &[
             ([-1.0, 0.86, -0.4], [1.0, 0.92, 0.4]),
             ([-0.95, 0.0, -0.35], [-0.88, 0.86, 0.35]),
@@ -400,11 +428,16 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
             ([0.3, 0.35, -0.35], [0.88, 0.86, 0.3]),
         ],
         0.0,
-    );
+    )
+}
+
+/// Adds the machines.
+pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
+    let mut add = |name: &str, m: MeshBuilder, material| scene.mesh(name, m, material);
     Machines {
         tank: add("tank", tank(), kit.stainless),
         vessel: add("vessel", vessel(), kit.pipes[4]),
-        tank_leg: add("tank-leg", leg, kit.frame),
+        tank_leg: add("tank-leg", tank_leg(), kit.frame),
         saddle: add(
             "saddle",
             block([-0.55, 0.0, -0.12], [0.55, 0.7, 0.12], 0.0),
@@ -430,10 +463,10 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
             block([-0.5, 0.0, -0.25], [0.5, 2.0, 0.25], 0.02),
             kit.machine,
         ),
-        panel: add("panel", panel, kit.panel),
-        signal: std::array::from_fn(|i| add("signal", signal.clone(), kit.signals[i])),
+        panel: add("panel", panel(), kit.panel),
+        signal: std::array::from_fn(|i| add("signal", signal(), kit.signals[i])),
         conveyor: add("conveyor", conveyor(), kit.press),
-        roller: add("roller", roller, kit.zinc),
+        roller: add("roller", roller(), kit.zinc),
         upright: add("rack-upright", upright(), kit.rack),
         beam: add(
             "shelf-beam",
@@ -457,21 +490,21 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
             block([-0.18, 0.0, -0.2], [0.18, 0.26, 0.2], 0.01),
             kit.bin,
         ),
-        bench: add("bench", bench, kit.wood),
-        girder: add("crane-girder", girder, kit.crane),
+        bench: add("bench", bench(), kit.wood),
+        girder: add("crane-girder", girder(), kit.crane),
         end_truck: add(
             "crane-end-truck",
             block([-0.2, -0.1, -1.9], [0.2, 0.35, 1.9], 0.0),
             kit.crane,
         ),
-        trolley: add("crane-trolley", trolley, kit.hazard),
-        rope: add("crane-rope", rope, kit.rubber),
+        trolley: add("crane-trolley", trolley(), kit.hazard),
+        rope: add("crane-rope", rope(), kit.rubber),
         hook: add("crane-hook", hook(), kit.crane),
         cart: add(
             "cart",
             block([-0.45, 0.12, -0.75], [0.45, 0.35, 0.75], 0.03),
             kit.crane,
         ),
-        wheel: add("cart-wheel", wheel, kit.rubber),
+        wheel: add("cart-wheel", wheel(), kit.rubber),
     }
 }
