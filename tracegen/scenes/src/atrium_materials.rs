@@ -62,13 +62,7 @@ pub struct Palette {
 }
 
 fn recipe(name: &'static str, maps: Maps, tile_m: f32, surface: Surface) -> Recipe {
-    Recipe {
-        name,
-        size: 1024,
-        maps,
-        tile_m,
-        surface,
-    }
+    Recipe::new(name, 1024, maps, tile_m, surface)
 }
 
 /// Texture sets of floors, walls and roofs, in the order of the [`Palette`].
@@ -269,13 +263,7 @@ pub fn rich(scene: &mut SceneBuilder) -> Palette {
 
 /// Eight base-colour textures, shared widely; only the floor has a normal map.
 pub fn plain(scene: &mut SceneBuilder) -> Palette {
-    let simple = |name, size, maps, tile_m, surface| Recipe {
-        name,
-        size,
-        maps,
-        tile_m,
-        surface,
-    };
+    let simple = Recipe::new;
     let sand = [rgb(0xcdb894), rgb(0xb39b74)];
     let mut sets = [
         simple(

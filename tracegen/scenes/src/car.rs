@@ -25,13 +25,7 @@ pub(super) struct Kit {
 }
 
 fn kit(scene: &mut SceneBuilder) -> Kit {
-    let recipe = |name, size, maps, tile_m, surface| Recipe {
-        name,
-        size,
-        maps,
-        tile_m,
-        surface,
-    };
+    let recipe = Recipe::new;
     let mut sets = [
         recipe(
             "studio-floor",

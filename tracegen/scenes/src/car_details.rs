@@ -2,7 +2,7 @@
 
 use super::car::Kit;
 use super::car_body::{self, AXLES, TYRE};
-use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
+use super::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
 use super::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -137,8 +137,7 @@ fn spoke(angle: f32, pair: f32) -> MeshBuilder {
 }
 
 fn wheel_nut() -> MeshBuilder {
-    let mut nut = MeshBuilder::new();
-    nut.lathe(
+    lathed(
         &curve(
             &[
                 sharp(0.0085, 0.0),
@@ -149,13 +148,11 @@ fn wheel_nut() -> MeshBuilder {
             2,
         ),
         8,
-    );
-    nut
+    )
 }
 
 fn brake_disc() -> MeshBuilder {
-    let mut disc = MeshBuilder::new();
-    disc.lathe(
+    lathed(
         &[
             sharp(0.0, 0.0),
             sharp(0.165, 0.0),
@@ -165,8 +162,7 @@ fn brake_disc() -> MeshBuilder {
             sharp(0.0, 0.035),
         ],
         40,
-    );
-    disc
+    )
 }
 
 fn caliper() -> MeshBuilder {
@@ -299,8 +295,7 @@ impl Details {
             ),
         );
         for k in [-1.0f32, 1.0] {
-            let mut bowl = MeshBuilder::new();
-            bowl.lathe(
+            let bowl = lathed(
                 &curve(
                     &[
                         sharp(0.0, 0.0),
@@ -375,8 +370,7 @@ impl Details {
                 head + vec3(0.0, 0.03, side * 0.03),
             ),
         );
-        let mut face = MeshBuilder::new();
-        face.lathe(&[smooth(0.0, 0.0), smooth(1.0, 0.0)], 24);
+        let mut face = lathed(&[smooth(0.0, 0.0), smooth(1.0, 0.0)], 24);
         face.orient(|_| Vec3::Y);
         self.chrome.merge(
             &face,
@@ -403,8 +397,7 @@ impl Details {
     fn exhausts(&mut self, side: f32) {
         for k in 0..2 {
             let z = side * (0.28 + 0.095 * k as f32);
-            let mut pipe = MeshBuilder::new();
-            pipe.lathe(
+            let pipe = lathed(
                 &[
                     sharp(0.036, 0.0),
                     sharp(0.040, 0.01),

@@ -1,7 +1,7 @@
 //! A full chess set on a reflective board, a few moves into the Italian game: 42 K triangles.
 
 use super::masonry::carved_stone;
-use super::mesh_builder::{Knot, MeshBuilder, curve, sharp, smooth};
+use super::mesh_builder::{Knot, MeshBuilder, curve, lathed, sharp, smooth};
 use super::noise::smoothstep;
 use super::organic::polished_wood;
 use super::scene_builder::{MaterialId, SceneBuilder};
@@ -40,9 +40,7 @@ fn collar(r: f32, y: f32) -> [Knot; 4] {
 fn turned(radius: f32, upper: &[Knot]) -> MeshBuilder {
     let mut knots = foot(radius);
     knots.extend_from_slice(upper);
-    let mut m = MeshBuilder::new();
-    m.lathe(&curve(&knots, 2), SEGMENTS);
-    m
+    lathed(&curve(&knots, 2), SEGMENTS)
 }
 
 fn pawn() -> MeshBuilder {
@@ -238,8 +236,7 @@ fn knight() -> MeshBuilder {
     head.orient(|p| vec3(0.0, 0.0, p.z.signum()));
     m.merge(&head, Affine3A::IDENTITY);
     for side in [-1.0f32, 1.0] {
-        let mut ear = MeshBuilder::new();
-        ear.lathe(
+        let ear = lathed(
             &curve(
                 &[
                     sharp(0.0026, 0.0),
@@ -255,8 +252,7 @@ fn knight() -> MeshBuilder {
             &ear,
             Affine3A::from_rotation_translation(tilt, vec3(0.0005, 0.0655, side * 0.0035)),
         );
-        let mut eye = MeshBuilder::new();
-        eye.lathe(
+        let eye = lathed(
             &curve(
                 &[
                     smooth(0.0, -0.0016),
@@ -326,13 +322,7 @@ struct Kit {
 }
 
 fn kit(scene: &mut SceneBuilder) -> Kit {
-    let recipe = |name, tile_m, surface| Recipe {
-        name,
-        size: 512,
-        maps: Maps::Color,
-        tile_m,
-        surface,
-    };
+    let recipe = |name, tile_m, surface| Recipe::new(name, 512, Maps::Color, tile_m, surface);
     let mut sets = [
         recipe(
             "light-marble",

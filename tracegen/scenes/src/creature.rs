@@ -1,6 +1,6 @@
 //! A tyrannosaur: ovals swept along the lines of its body, neck, tail, legs and arms.
 
-use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
+use super::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
 use super::noise::{bank, smoothstep};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::TAU;
@@ -84,8 +84,7 @@ fn limb(rings: &[Ring], cells: [usize; 2], swell: impl Fn(f32, f32) -> f32) -> M
 }
 
 fn cone(m: &mut MeshBuilder, at: Vec3, direction: Vec3, radius: f32, length: f32) {
-    let mut one = MeshBuilder::new();
-    one.lathe(
+    let one = lathed(
         &curve(
             &[
                 sharp(radius, 0.0),
@@ -199,8 +198,7 @@ impl Creature {
                 size * 0.75,
             );
         }
-        let mut ball = MeshBuilder::new();
-        ball.lathe(
+        let ball = lathed(
             &curve(
                 &[smooth(0.0, -0.055), smooth(0.055, 0.0), smooth(0.0, 0.055)],
                 4,

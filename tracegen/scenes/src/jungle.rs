@@ -67,23 +67,11 @@ struct Solids {
 }
 
 fn color(name: &'static str, size: u32, surface: Surface) -> Recipe {
-    Recipe {
-        name,
-        size,
-        maps: Maps::Color,
-        tile_m: 1.0,
-        surface,
-    }
+    Recipe::new(name, size, Maps::Color, 1.0, surface)
 }
 
 fn normal(name: &'static str, tile_m: f32, surface: Surface) -> Recipe {
-    Recipe {
-        name,
-        size: 1024,
-        maps: Maps::ColorNormal,
-        tile_m,
-        surface,
-    }
+    Recipe::new(name, 1024, Maps::ColorNormal, tile_m, surface)
 }
 
 fn full(name: &'static str, tile_m: f32, surface: Surface) -> Recipe {

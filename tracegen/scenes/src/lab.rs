@@ -4,7 +4,7 @@ use super::glassware::{
     beaker, bottle, erlenmeyer, filling, glass_tube, shell, stopper, test_tube,
 };
 use super::masonry::octagon_tiles;
-use super::mesh_builder::{Knot, MeshBuilder, curve, sharp, smooth};
+use super::mesh_builder::{Knot, MeshBuilder, curve, lathed, sharp, smooth};
 use super::noise::smoothstep;
 use super::organic::{paper_label, polished_wood};
 use super::scene_builder::{MaterialId, SceneBuilder};
@@ -28,13 +28,8 @@ pub(super) struct Kit {
 }
 
 fn kit(scene: &mut SceneBuilder) -> Kit {
-    let recipe = |name, size, tile_m, surface| Recipe {
-        name,
-        size,
-        maps: Maps::Color,
-        tile_m,
-        surface,
-    };
+    let recipe =
+        |name, size, tile_m, surface| Recipe::new(name, size, Maps::Color, tile_m, surface);
     let mut sets = [
         recipe(
             "rack-beech",
@@ -130,6 +125,17 @@ pub(super) struct Ware<'a> {
     pub(super) lip: f32,
 }
 
+impl<'a> Ware<'a> {
+    pub(super) fn new(outer: &'a [Knot], wall: f32, segments: usize, lip: f32) -> Self {
+        Self {
+            outer,
+            wall,
+            segments,
+            lip,
+        }
+    }
+}
+
 /// A turned vessel and what is in it (liquid and its level), placed together.
 pub(super) fn vessel(
     scene: &mut SceneBuilder,
@@ -156,8 +162,7 @@ pub(super) fn vessel(
         scene.place(mesh, *place);
     }
     if let Some((liquid, level)) = fill {
-        let mut inside = MeshBuilder::new();
-        inside.lathe(&filling(outer, wall, 0.0004, level), segments);
+        let inside = lathed(&filling(outer, wall, 0.0004, level), segments);
         let mesh = scene.mesh("liquid", inside, liquid);
         for place in places {
             scene.place(mesh, *place);
@@ -209,12 +214,7 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &flask,
-            wall: 0.0018,
-            segments: 47,
-            lip: 0.0,
-        },
+        &Ware::new(&flask, 0.0018, 47, 0.0),
         Some((kit.liquids[0], 0.055)),
         &[at(-0.10, 0.0, 0.16)],
     );
@@ -222,12 +222,7 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &small,
-            wall: 0.0016,
-            segments: 40,
-            lip: 0.0,
-        },
+        &Ware::new(&small, 0.0016, 40, 0.0),
         Some((kit.liquids[4], 0.036)),
         &[at(0.20, 0.0, 0.185)],
     );
@@ -235,12 +230,7 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &large,
-            wall: 0.0017,
-            segments: 47,
-            lip: 0.14,
-        },
+        &Ware::new(&large, 0.0017, 47, 0.14),
         Some((kit.liquids[1], 0.062)),
         &[at(0.075, 0.0, 0.155)],
     );
@@ -248,12 +238,7 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &cup,
-            wall: 0.0014,
-            segments: 40,
-            lip: 0.14,
-        },
+        &Ware::new(&cup, 0.0014, 40, 0.14),
         Some((kit.liquids[2], 0.03)),
         &[at(-0.24, 0.0, 0.19)],
     );
@@ -273,12 +258,7 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &dish,
-            wall: 0.0014,
-            segments: 40,
-            lip: 0.0,
-        },
+        &Ware::new(&dish, 0.0014, 40, 0.0),
         Some((kit.liquids[3], 0.005)),
         &[at(0.0, 0.0, 0.245)],
     );
@@ -291,12 +271,7 @@ fn graduated_cylinder(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &cylinder,
-            wall: 0.0013,
-            segments: 34,
-            lip: 0.18,
-        },
+        &Ware::new(&cylinder, 0.0013, 34, 0.18),
         Some((kit.liquids[3], 0.11)),
         &[at(-0.185, 0.006, 0.065)],
     );
@@ -393,12 +368,7 @@ fn rack(scene: &mut SceneBuilder, kit: &Kit) {
         vessel(
             scene,
             kit.glass,
-            &Ware {
-                outer: &tube,
-                wall: 0.0010,
-                segments: 17,
-                lip: 0.0,
-            },
+            &Ware::new(&tube, 0.0010, 17, 0.0),
             Some((kit.liquids[(i * 2 + 1) % 5], level)),
             &[place],
         );
@@ -426,8 +396,7 @@ fn plate_with_hole(m: &mut MeshBuilder, center: Vec3, half: glam::Vec2, hole: f3
         face.normals.fill(normal);
         m.merge(&face, Affine3A::IDENTITY);
     }
-    let mut bore = MeshBuilder::new();
-    bore.lathe(&[sharp(hole, 0.0), sharp(hole, thick)], 32);
+    let mut bore = lathed(&[sharp(hole, 0.0), sharp(hole, thick)], 32);
     bore.flip();
     m.merge(&bore, Affine3A::from_translation(center));
     for side in [-1.0f32, 1.0] {
@@ -461,41 +430,25 @@ fn shelf(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.amber,
-        &Ware {
-            outer: &outer,
-            wall: 0.002,
-            segments: 22,
-            lip: 0.0,
-        },
+        &Ware::new(&outer, 0.002, 22, 0.0),
         Some((kit.liquids[1], 0.05)),
         &amber,
     );
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &outer,
-            wall: 0.002,
-            segments: 22,
-            lip: 0.0,
-        },
+        &Ware::new(&outer, 0.002, 22, 0.0),
         Some((kit.liquids[0], 0.062)),
         &clear,
     );
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &outer,
-            wall: 0.002,
-            segments: 22,
-            lip: 0.0,
-        },
+        &Ware::new(&outer, 0.002, 22, 0.0),
         Some((kit.liquids[4], 0.045)),
         &low,
     );
-    let mut plug = MeshBuilder::new();
-    plug.lathe(&stopper(0.0145), 12);
+    let plug = lathed(&stopper(0.0145), 12);
     let plug = scene.mesh("glass-stopper", plug, kit.glass);
     let mut label = MeshBuilder::new();
     label.surface(12, 1, |s, t| {

@@ -2,7 +2,7 @@
 
 use super::glassware::{glass_tube, helix, round_flask, stopper};
 use super::lab::{Kit, Ware, at, vessel};
-use super::mesh_builder::{Knot, MeshBuilder, curve, sharp, smooth};
+use super::mesh_builder::{Knot, MeshBuilder, curve, lathed, sharp, smooth};
 use super::noise::smoothstep;
 use super::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
@@ -48,8 +48,7 @@ fn burner(scene: &mut SceneBuilder, kit: &Kit) {
     burner.lathe(&curve(&body, 3), 32);
     let burner = scene.mesh("burner", burner, kit.brass);
     scene.place(burner, at(AXIS_X, 0.0, AXIS_Z));
-    let mut flame = MeshBuilder::new();
-    flame.lathe(
+    let flame = lathed(
         &curve(
             &[
                 smooth(0.0, 0.08),
@@ -91,17 +90,11 @@ fn retort(scene: &mut SceneBuilder, kit: &Kit) -> Vec3 {
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &bulb,
-            wall: 0.0015,
-            segments: 47,
-            lip: 0.0,
-        },
+        &Ware::new(&bulb, 0.0015, 47, 0.0),
         Some((kit.liquids[2], 0.034)),
         &[at(AXIS_X, LIFT, AXIS_Z)],
     );
-    let mut plug = MeshBuilder::new();
-    plug.lathe(&stopper(0.0125), 24);
+    let plug = lathed(&stopper(0.0125), 24);
     let plug = scene.mesh("stopper", plug, kit.rubber);
     scene.place(plug, at(AXIS_X, LIFT + 0.103, AXIS_Z));
     let neck: Vec<(Vec3, f32)> = (0..=40)
@@ -146,8 +139,7 @@ fn condenser(scene: &mut SceneBuilder, kit: &Kit, neck_end: Vec3) -> Vec3 {
         sharp: k.sharp,
     }));
     walls.push(jacket[0]);
-    let mut m = MeshBuilder::new();
-    m.lathe(&walls, 32);
+    let m = lathed(&walls, 32);
     let jacket = scene.mesh("condenser", m, kit.glass);
     scene.place(jacket, slant);
     let mut coil = helix(0.0125, 0.0125, 9.0, 0.0032, 20);
@@ -175,17 +167,11 @@ fn receiver(scene: &mut SceneBuilder, kit: &Kit, outlet: Vec3) {
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &flask,
-            wall: 0.0014,
-            segments: 40,
-            lip: 0.0,
-        },
+        &Ware::new(&flask, 0.0014, 40, 0.0),
         Some((kit.liquids[0], 0.018)),
         &[at(outlet.x, low, outlet.z)],
     );
-    let mut cork = MeshBuilder::new();
-    cork.lathe(
+    let cork = lathed(
         &curve(
             &[
                 sharp(0.019, 0.0),

@@ -50,13 +50,7 @@ pub(super) struct Kit {
 }
 
 fn kit(scene: &mut SceneBuilder) -> Kit {
-    let recipe = |name, tile_m, surface| Recipe {
-        name,
-        size: 1024,
-        maps: Maps::Color,
-        tile_m,
-        surface,
-    };
+    let recipe = |name, tile_m, surface| Recipe::new(name, 1024, Maps::Color, tile_m, surface);
     let mut sets = [
         recipe(
             "lavender-field",

@@ -48,6 +48,14 @@ pub fn sharp(x: f32, y: f32) -> Knot {
     }
 }
 
+/// A solid of revolution; see [`MeshBuilder::lathe`].
+#[must_use]
+pub fn lathed(profile: &[Knot], segments: usize) -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    m.lathe(profile, segments);
+    m
+}
+
 /// Rounds a profile: `steps` points of a Catmull-Rom curve between each pair of smooth knots.
 #[must_use]
 pub fn curve(knots: &[Knot], steps: usize) -> Vec<Knot> {

@@ -2,7 +2,7 @@
 //! air governor. 106 K triangles of brass and steel.
 
 use super::gears::screw;
-use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
+use super::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
 use super::noise::{Rng, smoothstep};
 use super::organic::{damask, polished_wood};
 use super::scene_builder::{MaterialId, SceneBuilder};
@@ -32,13 +32,8 @@ pub(super) struct Kit {
 }
 
 fn kit(scene: &mut SceneBuilder) -> Kit {
-    let recipe = |name, size, tile_m, surface| Recipe {
-        name,
-        size,
-        maps: Maps::Color,
-        tile_m,
-        surface,
-    };
+    let recipe =
+        |name, size, tile_m, surface| Recipe::new(name, size, Maps::Color, tile_m, surface);
     let mut sets = [
         recipe(
             "rosewood",
@@ -136,8 +131,7 @@ fn casket(scene: &mut SceneBuilder, kit: &Kit) {
             0.0012,
         );
         for z in [-d + 0.012, d - 0.012] {
-            let mut foot = MeshBuilder::new();
-            foot.lathe(
+            let foot = lathed(
                 &curve(
                     &[
                         sharp(0.0, -0.009),
@@ -236,8 +230,7 @@ fn cylinder(scene: &mut SceneBuilder, kit: &Kit) {
     let drum = scene.mesh("cylinder", drum, kit.polished);
     scene.place(drum, Affine3A::from_rotation_translation(along_x, CYLINDER));
     // Pins: a melody of chords and runs on the tracks of the comb's tines.
-    let mut pin = MeshBuilder::new();
-    pin.lathe(
+    let pin = lathed(
         &[
             sharp(0.00022, -0.0004),
             sharp(0.0002, 0.0010),

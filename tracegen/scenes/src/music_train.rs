@@ -1,7 +1,7 @@
 //! The music box's gear train, governor, bells and fittings.
 
 use super::gears::{Gear, placed, screw, worm};
-use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
+use super::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
 use super::music_box::{CYLINDER, CYLINDER_HALF, Kit, MODULE};
 use super::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
@@ -59,8 +59,7 @@ pub(super) fn train(scene: &mut SceneBuilder, kit: &Kit) {
                 sharp(0.0007, 0.011),
                 sharp(0.0, 0.011),
             ];
-            let mut rod = MeshBuilder::new();
-            rod.lathe(&shaft, 20);
+            let rod = lathed(&shaft, 20);
             arbors.merge(
                 &rod,
                 Affine3A::from_rotation_translation(
@@ -81,8 +80,7 @@ pub(super) fn train(scene: &mut SceneBuilder, kit: &Kit) {
         scene.add("plate", plate, kit.polished);
         let mut jewels = MeshBuilder::new();
         for c in [center, c1, c2] {
-            let mut jewel = MeshBuilder::new();
-            jewel.lathe(
+            let jewel = lathed(
                 &curve(
                     &[
                         sharp(0.0017, 0.0),
@@ -161,8 +159,7 @@ pub(super) fn bells(scene: &mut SceneBuilder, kit: &Kit) {
     let skin: Vec<_> = skin.into_iter().rev().collect();
     bell.lathe(&curve(&skin, 2), 32);
     let bell = scene.mesh("bell", bell, kit.polished);
-    let mut hammer = MeshBuilder::new();
-    hammer.lathe(
+    let mut hammer = lathed(
         &curve(
             &[
                 smooth(0.0, -0.0016),
@@ -308,8 +305,7 @@ fn spring_barrels(scene: &mut SceneBuilder, kit: &Kit) {
 
 /// The key in the front of the box.
 fn winding_key(scene: &mut SceneBuilder, kit: &Kit) {
-    let mut key = MeshBuilder::new();
-    key.lathe(
+    let mut key = lathed(
         &curve(
             &[
                 sharp(0.0, 0.0),

@@ -43,13 +43,7 @@ pub fn teapot() -> MeshBuilder {
 #[must_use]
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("teapot");
-    let recipe = |name, tile_m, surface| Recipe {
-        name,
-        size: 512,
-        maps: Maps::ColorNormal,
-        tile_m,
-        surface,
-    };
+    let recipe = |name, tile_m, surface| Recipe::new(name, 512, Maps::ColorNormal, tile_m, surface);
     let mut sets = [
         recipe(
             "checker-floor",

@@ -154,6 +154,18 @@ pub struct RecipeSource {
 }
 
 impl Recipe {
+    /// A recipe; see the fields.
+    #[must_use]
+    pub fn new(name: &'static str, size: u32, maps: Maps, tile_m: f32, surface: Surface) -> Self {
+        Self {
+            name,
+            size,
+            maps,
+            tile_m,
+            surface,
+        }
+    }
+
     /// The source of the recipe's images in a scene.
     #[must_use]
     pub fn into_source(self, scene: &str) -> Arc<RecipeSource> {

@@ -3,7 +3,7 @@
 
 use super::materials::Kit;
 use super::parts::{NAVE_M, bar};
-use crate::mesh_builder::{MeshBuilder, sharp, smooth};
+use crate::mesh_builder::{MeshBuilder, lathed, sharp, smooth};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -59,8 +59,7 @@ fn boxes(list: &[([f32; 3], [f32; 3])], bevel: f32) -> MeshBuilder {
 
 /// An upright tank of radius 1.1 m from 0.7 m to 4.4 m above the floor.
 fn tank() -> MeshBuilder {
-    let mut m = MeshBuilder::new();
-    m.lathe(
+    lathed(
         &[
             smooth(0.0, 0.62),
             smooth(0.7, 0.7),
@@ -78,14 +77,12 @@ fn tank() -> MeshBuilder {
             sharp(0.0, 4.5),
         ],
         18,
-    );
-    m
+    )
 }
 
 /// A vessel of radius 0.6 m that lies along z from 0 to 4.2 m, its axis at the origin's height.
 fn vessel() -> MeshBuilder {
-    let mut upright = MeshBuilder::new();
-    upright.lathe(
+    let upright = lathed(
         &[
             smooth(0.0, 0.0),
             smooth(0.42, 0.08),
@@ -124,8 +121,7 @@ fn ladder() -> MeshBuilder {
 /// A centrifugal pump: shaft towards +z at 0.35 m, suction along -z, discharge up to 0.95 m.
 fn pump() -> MeshBuilder {
     let mut m = MeshBuilder::new();
-    let mut volute = MeshBuilder::new();
-    volute.lathe(
+    let volute = lathed(
         &[
             sharp(0.09, -0.42),
             sharp(0.16, -0.42),
@@ -143,8 +139,7 @@ fn pump() -> MeshBuilder {
     );
     let place = Affine3A::from_translation(Vec3::Y * 0.35) * Affine3A::from_rotation_x(FRAC_PI_2);
     m.merge(&volute, place);
-    let mut neck = MeshBuilder::new();
-    neck.lathe(
+    let neck = lathed(
         &[
             sharp(0.09, 0.4),
             sharp(0.09, 0.9),
@@ -201,8 +196,7 @@ fn mill() -> MeshBuilder {
     );
     // Spindle head above a table with a vice.
     m.block(vec3(-0.3, 1.5, 0.0), vec3(0.1, 2.1, 0.45), 0.0);
-    let mut spindle = MeshBuilder::new();
-    spindle.lathe(
+    let spindle = lathed(
         &[
             sharp(0.0, 1.1),
             sharp(0.03, 1.1),
@@ -230,8 +224,7 @@ fn press() -> MeshBuilder {
         ],
         0.02,
     );
-    let mut ram = MeshBuilder::new();
-    ram.lathe(&[sharp(0.18, 1.85), sharp(0.18, 2.6)], 12);
+    let ram = lathed(&[sharp(0.18, 1.85), sharp(0.18, 2.6)], 12);
     m.merge(&ram, Affine3A::IDENTITY);
     m
 }
@@ -250,8 +243,7 @@ fn pallet() -> MeshBuilder {
 }
 
 fn drum() -> MeshBuilder {
-    let mut m = MeshBuilder::new();
-    m.lathe(
+    lathed(
         &[
             sharp(0.29, 0.0),
             sharp(0.29, 0.28),
@@ -266,8 +258,7 @@ fn drum() -> MeshBuilder {
             sharp(0.0, 0.86),
         ],
         12,
-    );
-    m
+    )
 }
 
 /// Uprights of a pallet rack with their bracing, 1.1 m deep along x and 4.6 m high.
@@ -329,18 +320,15 @@ fn tank_leg() -> MeshBuilder {
 }
 
 fn signal() -> MeshBuilder {
-    let mut signal = MeshBuilder::new();
-    signal.lathe(
+    lathed(
         &[sharp(0.05, 0.0), sharp(0.05, 0.14), smooth(0.0, 0.17)],
         10,
-    );
-    signal
+    )
 }
 
 fn roller() -> MeshBuilder {
     let mut roller = MeshBuilder::new();
-    let mut turned = MeshBuilder::new();
-    turned.lathe(
+    let turned = lathed(
         &[
             sharp(0.0, 0.0),
             sharp(0.035, 0.0),
@@ -378,8 +366,7 @@ fn rope() -> MeshBuilder {
 
 fn wheel() -> MeshBuilder {
     let mut wheel = MeshBuilder::new();
-    let mut tyre = MeshBuilder::new();
-    tyre.lathe(
+    let tyre = lathed(
         &[
             sharp(0.0, -0.05),
             sharp(0.14, -0.05),

@@ -54,13 +54,7 @@ fn textured(
     tile_m: f32,
     surface: Surface,
 ) -> MaterialId {
-    let recipe = Recipe {
-        name,
-        size,
-        maps,
-        tile_m,
-        surface,
-    };
+    let recipe = Recipe::new(name, size, maps, tile_m, surface);
     let full = maps == Maps::Full;
     scene.textured(recipe, |m| {
         if !full {
@@ -94,13 +88,7 @@ fn pipes(scene: &mut SceneBuilder) -> [MaterialId; SERVICES] {
 }
 
 fn grating(scene: &mut SceneBuilder) -> MaterialId {
-    let recipe = Recipe {
-        name: "grating",
-        size: 256,
-        maps: Maps::Color,
-        tile_m: 1.0,
-        surface: grating_bars(),
-    };
+    let recipe = Recipe::new("grating", 256, Maps::Color, 1.0, grating_bars());
     scene.textured(recipe, |m| {
         m.alpha = AlphaMode::Mask(0.5);
         m.double_sided = true;

@@ -3,7 +3,7 @@
 //! Long parts run along +z from their origin; what stands on the floor has its origin there.
 
 use super::materials::{Kit, SERVICES};
-use crate::mesh_builder::{Frame, Knot, MeshBuilder, sharp, smooth};
+use crate::mesh_builder::{Frame, Knot, MeshBuilder, lathed, sharp, smooth};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -151,7 +151,7 @@ fn bent_pipe(radius: f32, sides: usize) -> MeshBuilder {
 fn flange(radius: f32, sides: usize) -> MeshBuilder {
     let (r, h) = (1.55 * radius, 0.22 * radius + 0.012);
     let mut m = MeshBuilder::new();
-    let disc = lathe(
+    let disc = lathed(
         &[sharp(0.0, -h), sharp(r, -h), sharp(r, h), sharp(0.0, h)],
         sides,
     );
@@ -163,8 +163,7 @@ fn flange(radius: f32, sides: usize) -> MeshBuilder {
 fn valve() -> MeshBuilder {
     let r = RADII_M[1];
     let mut m = MeshBuilder::new();
-    let mut body = MeshBuilder::new();
-    body.lathe(
+    let body = lathed(
         &[
             sharp(r * 1.5, -0.2),
             sharp(r * 1.5, -0.17),
@@ -177,8 +176,7 @@ fn valve() -> MeshBuilder {
         10,
     );
     m.merge(&body, Affine3A::from_rotation_x(FRAC_PI_2));
-    let mut bonnet = MeshBuilder::new();
-    bonnet.lathe(
+    let bonnet = lathed(
         &[
             sharp(0.07, 0.08),
             sharp(0.06, 0.22),
@@ -204,11 +202,9 @@ fn valve() -> MeshBuilder {
 /// A pressure gauge on a stem, its face to +z.
 fn gauge() -> MeshBuilder {
     let mut m = MeshBuilder::new();
-    let mut stem = MeshBuilder::new();
-    stem.lathe(&[sharp(0.012, 0.0), sharp(0.012, 0.16)], 6);
+    let stem = lathed(&[sharp(0.012, 0.0), sharp(0.012, 0.16)], 6);
     m.merge(&stem, Affine3A::IDENTITY);
-    let mut can = MeshBuilder::new();
-    can.lathe(
+    let can = lathed(
         &[
             sharp(0.0, -0.02),
             sharp(0.06, -0.02),
@@ -310,8 +306,7 @@ fn fan_blades() -> MeshBuilder {
         blade.block(vec3(0.08, -0.11, -0.01), vec3(0.68, 0.11, 0.01), 0.0);
         m.merge(&blade, turn * Affine3A::from_rotation_x(0.5));
     }
-    let mut hub = MeshBuilder::new();
-    hub.lathe(
+    let hub = lathed(
         &[
             sharp(0.0, -0.08),
             sharp(0.11, -0.08),
@@ -325,8 +320,7 @@ fn fan_blades() -> MeshBuilder {
 }
 
 fn fan_ring() -> MeshBuilder {
-    let mut ring = MeshBuilder::new();
-    ring.lathe(
+    let ring = lathed(
         &[
             sharp(0.74, -0.15),
             sharp(0.82, -0.15),
@@ -339,12 +333,6 @@ fn fan_ring() -> MeshBuilder {
     let mut m = MeshBuilder::new();
     m.merge(&ring, Affine3A::from_rotation_x(FRAC_PI_2));
     bar(&mut m, vec3(-0.8, 0.0, 0.12), vec3(0.8, 0.0, 0.12), 0.05);
-    m
-}
-
-fn lathe(profile: &[Knot], segments: usize) -> MeshBuilder {
-    let mut m = MeshBuilder::new();
-    m.lathe(profile, segments);
     m
 }
 
@@ -380,7 +368,7 @@ fn bracket() -> MeshBuilder {
 }
 
 fn bolt() -> MeshBuilder {
-    lathe(
+    lathed(
         &[
             sharp(0.024, 0.0),
             sharp(0.024, 0.03),
@@ -393,7 +381,7 @@ fn bolt() -> MeshBuilder {
 }
 
 fn lamp_shade() -> MeshBuilder {
-    lathe(
+    lathed(
         &[
             sharp(0.32, 0.0),
             smooth(0.3, 0.1),
@@ -407,7 +395,7 @@ fn lamp_shade() -> MeshBuilder {
 }
 
 fn lamp() -> MeshBuilder {
-    let mut lamp = lathe(&[sharp(0.0, 0.02), sharp(0.29, 0.06)], 12);
+    let mut lamp = lathed(&[sharp(0.0, 0.02), sharp(0.29, 0.06)], 12);
     lamp.orient(|_| Vec3::NEG_Y);
     lamp
 }
@@ -459,8 +447,7 @@ fn stand() -> MeshBuilder {
 fn duct() -> MeshBuilder {
     let mut duct = straight_pipe(0.45, BAY_M, 14);
     for z in [0.02, 2.0, 4.0] {
-        let mut ring = MeshBuilder::new();
-        ring.lathe(
+        let ring = lathed(
             &[
                 sharp(0.45, -0.03),
                 sharp(0.48, -0.03),
@@ -476,7 +463,7 @@ fn duct() -> MeshBuilder {
 }
 
 fn diffuser() -> MeshBuilder {
-    lathe(
+    lathed(
         &[
             sharp(0.0, -0.75),
             sharp(0.35, -0.75),
@@ -488,7 +475,7 @@ fn diffuser() -> MeshBuilder {
 }
 
 fn sprinkler() -> MeshBuilder {
-    lathe(
+    lathed(
         &[
             sharp(0.0, -0.2),
             sharp(0.035, -0.19),
@@ -521,7 +508,7 @@ fn leg() -> MeshBuilder {
 }
 
 fn bollard() -> MeshBuilder {
-    lathe(
+    lathed(
         &[
             sharp(0.1, 0.0),
             sharp(0.1, 0.9),
