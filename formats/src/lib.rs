@@ -11,6 +11,7 @@ pub mod interop;
 mod json;
 pub mod layout;
 mod parse;
+pub mod random;
 pub mod raytrace;
 pub mod text;
 pub mod textrace;

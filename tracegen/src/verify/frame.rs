@@ -9,6 +9,7 @@ use super::sampler::SoftwareSampler;
 use super::write::reference_tile;
 use anyhow::{Context, ensure};
 use formats::footprint::LodFormula;
+use formats::random::Random;
 use formats::textrace::{Draw, EncodedTile, Pass, PassKind, Surfaces, Textrace, Tile, encode_tile};
 use formats::view::{Eye, FrameViews};
 use raster::backend::{Fragments, Texels};
@@ -243,12 +244,11 @@ fn choose(choice: TileChoice, counts: &[usize]) -> Vec<Vec<bool>> {
         TileChoice::All => vec![true; all],
         TileChoice::Some { count, seed } => {
             // Selection sampling (Knuth, algorithm S).
-            let mut random = SplitMix(seed);
+            let mut random = Random(seed);
             let mut needed = count.min(all);
             (0..all)
                 .map(|tile| {
-                    let left = (all - tile) as u64;
-                    let take = random.below(left) < needed as u64;
+                    let take = random.below(all - tile) < needed;
                     needed -= usize::from(take);
                     take
                 })
@@ -260,21 +260,6 @@ fn choose(choice: TileChoice, counts: &[usize]) -> Vec<Vec<bool>> {
         .iter()
         .map(|&count| chosen.by_ref().take(count).collect())
         .collect()
-}
-
-/// Steele, Lea and Flood 2014.
-struct SplitMix(u64);
-
-impl SplitMix {
-    /// A number below `end`.
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^= z >> 31;
-        ((u128::from(z) * u128::from(end)) >> 64) as u64
-    }
 }
 
 #[cfg(test)]

@@ -4,13 +4,8 @@ use super::*;
 
 /// Deterministic numbers in 0..1.
 pub(super) fn random(seed: u32) -> impl FnMut() -> f32 {
-    let mut state = u64::from(seed) * 2 + 1;
-    move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / (1 << 24) as f32
-    }
+    let mut random = formats::random::Random(u64::from(seed));
+    move || random.unit_f32()
 }
 
 /// An image of 4x4-texel cells, which BC1 holds exactly; `opaque` decides each cell's alpha.

@@ -1,24 +1,12 @@
 //! The closed forms against brute force: random points projected into both eyes and the camera between.
 
 use super::*;
+use formats::random::Random;
 use formats::view::FovTangents;
 use glam::{EulerRot, Vec2, Vec3};
 
-/// Numbers from a seed.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
+fn between(random: &mut Random, low: f64, high: f64) -> f64 {
+    low + (high - low) * random.unit_f64()
 }
 
 /// Eyes `ipd_m` apart, turned outwards, of a head somewhere; `fov` is the left eye's.
@@ -76,8 +64,8 @@ fn displays() -> Vec<[EyeView; 2]> {
 /// A point of an eye's picture between the split and the far plane, and its pixel.
 fn point_beyond(stereo: &Stereo, eye: usize, split_m: f64, random: &mut Random) -> (DVec3, DVec2) {
     let e = &stereo.eyes[eye];
-    let ndc = DVec2::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0));
-    let depth = 1.0 / random.between(1.0 / (0.99 * e.far_m), 1.0 / split_m);
+    let ndc = DVec2::new(between(random, -1.0, 1.0), between(random, -1.0, 1.0));
+    let depth = 1.0 / between(random, 1.0 / (0.99 * e.far_m), 1.0 / split_m);
     let point = e
         .world_from_eye
         .transform_point3(e.tangents(ndc).extend(-1.0) * depth);
