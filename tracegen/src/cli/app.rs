@@ -1,8 +1,10 @@
 //! `tracegen app`.
 
+use super::choice::choice;
 use super::program_args::ProgramArgs;
 use anyhow::{Context, bail};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 use parallax_layer::spool::FramesBy;
 use programs::{Launch, Session, SessionError};
 use shell::{Ended, run_child_until, warn};
@@ -18,8 +20,8 @@ pub struct AppArgs {
     #[command(flatten)]
     capture: ProgramArgs,
     /// What ends a frame.
-    #[arg(long, value_enum, value_name = "BY", default_value_t = FrameEnd::Auto)]
-    frames_by: FrameEnd,
+    #[arg(long, value_parser = frames_by_parser(), value_name = "BY", default_value = "auto")]
+    frames_by: FramesBy,
     /// The program uses OpenGL: run it on Mesa's zink, which is OpenGL on Vulkan.
     #[arg(long)]
     gl: bool,
@@ -34,25 +36,24 @@ pub struct AppArgs {
     program: Vec<OsString>,
 }
 
-/// `--frames-by`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum FrameEnd {
-    /// A present; a readback where the program has no swapchain.
-    Auto,
-    /// Presenting an image of a swapchain.
-    Present,
-    /// Copying an image to a buffer.
-    Readback,
-}
-
-impl From<FrameEnd> for FramesBy {
-    fn from(end: FrameEnd) -> Self {
-        match end {
-            FrameEnd::Auto => Self::Auto,
-            FrameEnd::Present => Self::Present,
-            FrameEnd::Readback => Self::Readback,
-        }
-    }
+fn frames_by_parser() -> impl TypedValueParser<Value = FramesBy> {
+    choice([
+        (
+            "auto",
+            FramesBy::Auto,
+            "A present; a readback where the program has no swapchain",
+        ),
+        (
+            "present",
+            FramesBy::Present,
+            "Presenting an image of a swapchain",
+        ),
+        (
+            "readback",
+            FramesBy::Readback,
+            "Copying an image to a buffer",
+        ),
+    ])
 }
 
 /// Runs `tracegen app`.
@@ -61,7 +62,7 @@ impl From<FrameEnd> for FramesBy {
 /// Wrong use, a program that cannot be captured, and outputs that cannot be written.
 pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
     args.capture.check_outputs(None)?;
-    let settings = args.capture.settings(args.frames_by.into())?;
+    let settings = args.capture.settings(args.frames_by)?;
     let tool = std::env::current_exe().context("cannot find this program's own file")?;
     let launch = Launch::new(&std::env::temp_dir(), &tool, &settings)?;
     let program = program_name(&args.program);

@@ -2,6 +2,8 @@
 
 pub mod app;
 mod cache_args;
+mod capture_steps;
+mod choice;
 pub mod lens_args;
 mod objective_args;
 pub mod page;
@@ -11,6 +13,7 @@ mod prepared;
 mod program_args;
 pub mod raster;
 mod raster_auto;
+mod raster_frames;
 mod raster_summary;
 pub mod rays;
 pub mod scene_args;

@@ -1,6 +1,8 @@
 //! Flags that say where the head goes.
 
-use clap::{Args, ValueEnum};
+use super::choice::choice;
+use clap::Args;
+use clap::builder::TypedValueParser;
 use scene::paths::{DEFAULT_FPS, HeadPath, MAX_FRAMES, Moments, PathOrigin, PathSpec};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -18,20 +20,26 @@ pub struct PathArgs {
     )]
     pub path: PathSpec,
     /// What a file's poses are relative to [default: camera for CSV, world for glTF].
-    #[arg(long, value_enum, value_name = "ORIGIN")]
-    pub path_origin: Option<Origin>,
+    #[arg(long, value_parser = origin_parser(), value_name = "ORIGIN")]
+    pub path_origin: Option<PathOrigin>,
     /// Frames a second along the path.
     #[arg(long, value_name = "HZ", default_value_t = DEFAULT_FPS, value_parser = parse_fps)]
     pub fps: f32,
 }
 
-/// `--path-origin`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Origin {
-    /// The path starts at the camera's place and heading.
-    Camera,
-    /// Poses stand as the file has them.
-    World,
+fn origin_parser() -> impl TypedValueParser<Value = PathOrigin> {
+    choice([
+        (
+            "camera",
+            PathOrigin::Camera,
+            "The path starts at the camera's place and heading",
+        ),
+        (
+            "world",
+            PathOrigin::World,
+            "Poses stand as the file has them",
+        ),
+    ])
 }
 
 impl PathArgs {
@@ -59,11 +67,7 @@ impl PathArgs {
     /// # Errors
     /// An unreadable file, or one that ends before the last frame.
     pub fn open(&self, frames: Range<u32>) -> anyhow::Result<(HeadPath, Moments)> {
-        let origin = self.path_origin.map(|origin| match origin {
-            Origin::Camera => PathOrigin::Camera,
-            Origin::World => PathOrigin::World,
-        });
-        let (path, warnings) = HeadPath::open(&self.path, origin)?;
+        let (path, warnings) = HeadPath::open(&self.path, self.path_origin)?;
         for warning in warnings {
             shell::warn(&format!("{}: {warning}", self.path));
         }

@@ -1,10 +1,12 @@
 //! What `app` and `page` do alike: options of a capture, and the trace that it becomes.
 
-use super::raster::{TileEncoding, parse_bytes};
+use super::choice::choice;
+use super::raster::{encoding_parser, parse_bytes};
 use anyhow::Context;
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 use formats::container::AtomicFile;
-use formats::textrace::TextraceWriter;
+use formats::textrace::{Encoding, TextraceWriter};
 use formats::view::EyeView;
 use parallax_layer::spool::{FramesBy, Settings};
 use programs::list::List;
@@ -37,8 +39,8 @@ pub struct ProgramArgs {
     #[arg(long, value_name = "FRAMES", default_value = "10", value_parser = parse_frames)]
     pub frames: Range<u32>,
     /// How it renders for two eyes; by default the first of these that fits.
-    #[arg(long, value_enum, value_name = "RULE")]
-    eyes: Option<Eyes>,
+    #[arg(long, value_parser = eyes_parser(), value_name = "RULE")]
+    eyes: Option<Rule>,
     /// A file of rules that tell which draws show which eye, where none of the tool's own does.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "eyes")]
     rules: Option<PathBuf>,
@@ -52,38 +54,31 @@ pub struct ProgramArgs {
     #[arg(long, value_name = "FOLDER")]
     modules: Option<PathBuf>,
     /// How the trace's tiles are packed.
-    #[arg(long, value_enum, default_value_t = TileEncoding::Delta, value_name = "NAME")]
-    encoding: TileEncoding,
+    #[arg(long, value_parser = encoding_parser(), default_value = "delta", value_name = "NAME")]
+    encoding: Encoding,
 }
 
-/// `--eyes`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Eyes {
-    /// A draw is broadcast to two layers.
-    Multiview,
-    /// Two viewports of one target.
-    Halves,
-    /// A target per eye.
-    Targets,
-    /// One target for both, told apart by the colour channels that are written.
-    Channels,
-    /// One target for both: the same draws twice.
-    Twice,
-    /// One eye alone: the largest target.
-    Mono,
-}
-
-impl Eyes {
-    fn rule(self) -> Rule {
-        match self {
-            Self::Multiview => Rule::Multiview,
-            Self::Halves => Rule::Halves,
-            Self::Targets => Rule::Targets,
-            Self::Channels => Rule::Channels,
-            Self::Twice => Rule::Twice,
-            Self::Mono => Rule::Mono,
-        }
-    }
+fn eyes_parser() -> impl TypedValueParser<Value = Rule> {
+    choice([
+        (
+            "multiview",
+            Rule::Multiview,
+            "A draw is broadcast to two layers",
+        ),
+        ("halves", Rule::Halves, "Two viewports of one target"),
+        ("targets", Rule::Targets, "A target per eye"),
+        (
+            "channels",
+            Rule::Channels,
+            "One target for both, told apart by the colour channels that are written",
+        ),
+        (
+            "twice",
+            Rule::Twice,
+            "One target for both: the same draws twice",
+        ),
+        ("mono", Rule::Mono, "One eye alone: the largest target"),
+    ])
 }
 
 /// A frame, or a range of frames without its end.
@@ -164,7 +159,7 @@ impl ProgramArgs {
             record_bytes: settings.record_bytes,
         };
         let writer = TextraceWriter::create_growing(output)?;
-        let writer = writer.with_encoding(self.encoding.encoding());
+        let writer = writer.with_encoding(self.encoding);
         let (writer, drained) = drain(session, &job, writer)?;
         let checked = self.check.then(|| check(session, &frames)).transpose()?;
         let bytes = writer.finish()?;
@@ -181,7 +176,7 @@ impl ProgramArgs {
     fn wanted(&self) -> anyhow::Result<Wanted> {
         Ok(match (&self.rules, self.eyes) {
             (Some(path), _) => Wanted::File(RuleFile::load(path)?),
-            (None, Some(eyes)) => Wanted::Rule(eyes.rule()),
+            (None, Some(eyes)) => Wanted::Rule(eyes),
             (None, None) => Wanted::First,
         })
     }

@@ -109,6 +109,19 @@ impl Summary {
         file_bytes: u64,
         work: &Work,
     ) {
+        self.print_counts([frames, views], size_px, file_bytes);
+        self.print_work(frames, work);
+        self.print_times();
+        if let Some(bytes) = memory::peak_bytes() {
+            note(&format!(
+                "peak memory    {:.0} MiB",
+                bytes as f64 / f64::from(1 << 20)
+            ));
+        }
+    }
+
+    /// What was recorded, and the size of the trace.
+    fn print_counts(&self, [frames, views]: [usize; 2], size_px: [u32; 2], file_bytes: u64) {
         let CaptureCounts {
             quads,
             fragments,
@@ -116,7 +129,7 @@ impl Summary {
             masked_lanes_killed,
             not_finite,
             tile_bytes,
-            empty_tiles,
+            ..
         } = self.counts;
         let per = |bytes: u64, n: u64| bytes as f64 / n.max(1) as f64;
         let pixels = (views * frames) as f64 * f64::from(size_px[0]) * f64::from(size_px[1]);
@@ -153,6 +166,10 @@ impl Summary {
             per(tile_bytes, records),
             record::RECORD_BYTES
         ));
+    }
+
+    /// What was drawn and left out.
+    fn print_work(&self, frames: usize, work: &Work) {
         note(&format!(
             "shadow maps    {} in {:.3} s: {}",
             work.shadow_maps,
@@ -171,10 +188,14 @@ impl Summary {
             self.culling.as_secs_f64() * 1e3 / frames as f64
         ));
         note(&format!(
-            "never drawn    {empty_tiles} empty tiles, {} shadow cascades that nobody sees (draws found in {:.3} s)",
+            "never drawn    {} empty tiles, {} shadow cascades that nobody sees (draws found in {:.3} s)",
+            self.counts.empty_tiles,
             self.skipped.cascades,
             self.looking.as_secs_f64()
         ));
+    }
+
+    fn print_times(&self) {
         let captured = self.captured.as_secs_f64();
         let includes = "all views";
         if !self.plain.is_zero() {
@@ -207,12 +228,6 @@ impl Summary {
             note(&format!(
                 "with capture   {captured:.3} s ({includes}, draining, sorting, encoding and writing the trace): {}, {} regions",
                 self.capture_draws, self.capture_draws.regions
-            ));
-        }
-        if let Some(bytes) = memory::peak_bytes() {
-            note(&format!(
-                "peak memory    {:.0} MiB",
-                bytes as f64 / f64::from(1 << 20)
             ));
         }
     }

@@ -1,9 +1,11 @@
 //! `tracegen rays`.
 
+use super::choice::choice;
 use super::path_args::PathArgs;
 use super::scene_args::{SceneArgs, SceneSetup, capture_outputs};
 use anyhow::{Context, bail};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 use formats::container::AtomicFile;
 use formats::raytrace::{
     EyeCamera, RayKind, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
@@ -51,19 +53,25 @@ pub struct RaysArgs {
     #[arg(long)]
     visits: bool,
     /// Tree that is walked; the steps of bvh2 are T&I unit 2.0's.
-    #[arg(long, value_enum, default_value_t = Tree::Bvh2)]
-    bvh: Tree,
+    #[arg(long, value_parser = bvh_parser(), default_value = "bvh2")]
+    bvh: TraversalKind,
     #[command(flatten)]
     threads: Threads,
 }
 
-/// `--bvh`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Tree {
-    /// Binary: a step tests two boxes.
-    Bvh2,
-    /// Eight-wide: a step tests eight.
-    Bvh8,
+fn bvh_parser() -> impl TypedValueParser<Value = TraversalKind> {
+    choice([
+        (
+            "bvh2",
+            TraversalKind::Bvh2,
+            "Binary: a step tests two boxes",
+        ),
+        (
+            "bvh8",
+            TraversalKind::Bvh8,
+            "Eight-wide: a step tests eight",
+        ),
+    ])
 }
 
 impl RaysArgs {
@@ -137,10 +145,7 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
     scene.pose(moments.time_s(moments.frames.start));
     let (scene_triangles, scene_origin) = (scene.triangle_count(), scene.origin);
     let scene = TraceScene::new(scene)?;
-    let traversal = match args.bvh {
-        Tree::Bvh2 => TraversalKind::Bvh2,
-        Tree::Bvh8 => TraversalKind::Bvh8,
-    };
+    let traversal = args.bvh;
     let bvh = scene.bvh.summary(traversal);
     let Some(views) = frames.first() else {
         bail!("the camera path has no frame");

@@ -1,10 +1,11 @@
 //! Flags that say what a capture may leave out or do more coarsely.
 
+use super::choice::choice;
 use super::lens_args::LensArgs;
 use crate::hidden_mesh;
 use anyhow::ensure;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 use formats::view::Hmd;
 use scene::paths::read_gazes;
 use std::path::{Path, PathBuf};
@@ -56,11 +57,11 @@ pub struct TechniqueArgs {
     #[arg(long, value_name = "METRES|Npx|least-work", conflicts_with = "foveate")]
     far_field: Option<SplitFlag>,
     /// How both eyes get it.
-    #[arg(long, value_enum, value_name = "HOW", requires = "far_field", default_value_t = FarVariant::Plain)]
-    far_field_variant: FarVariant,
+    #[arg(long, value_parser = variant_parser(), value_name = "HOW", requires = "far_field", default_value = "plain")]
+    far_field_variant: Variant,
     /// Shade more coarsely away from the gaze.
-    #[arg(long, value_enum, value_name = "HOW")]
-    foveate: Option<Foveate>,
+    #[arg(long, value_parser = foveate_parser(), value_name = "HOW")]
+    foveate: Option<FoveationKind>,
     /// Where the user looks: degrees right and up of straight ahead, or a CSV file with the header
     /// time_s,x_deg,y_deg [default: 0,0].
     #[arg(
@@ -99,28 +100,54 @@ impl FromStr for SplitFlag {
     }
 }
 
-/// `--far-field-variant`.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum FarVariant {
-    /// As a camera between the eyes sees it.
-    Plain,
-    /// Shifted for each eye by the disparity at the split.
-    DepthShift,
-    /// From the left eye in even frames, from the right eye in odd ones.
-    AlternateEye,
+fn variant_parser() -> impl TypedValueParser<Value = Variant> {
+    choice([
+        (
+            "plain",
+            Variant::Plain,
+            "As a camera between the eyes sees it",
+        ),
+        (
+            "depth-shift",
+            Variant::DepthShift,
+            "Shifted for each eye by the disparity at the split",
+        ),
+        (
+            "alternate-eye",
+            Variant::AlternateEye,
+            "From the left eye in even frames, from the right eye in odd ones",
+        ),
+    ])
 }
 
-/// `--foveate`.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Foveate {
-    /// A rate for each 16x16 tile: 1, 1/2, 1/4, 1/8 or 1/16 of the pixels.
-    Rings,
-    /// 3x3 viewports, the outer ones at half the resolution.
-    MultiResolution,
-    /// Every other 2x2 quad of the periphery, filled from its neighbours.
-    RadialDensity,
-    /// 2x2 viewports, coarser towards the edges by a projective map.
-    LensMatched,
+fn foveate_parser() -> impl TypedValueParser<Value = FoveationKind> {
+    use FoveationKind::{LensMatched, MultiResolution, RadialDensity, Rings};
+    choice([
+        (
+            "rings",
+            Rings,
+            "A rate for each 16x16 tile: 1, 1/2, 1/4, 1/8 or 1/16 of the pixels",
+        ),
+        (
+            "multi-resolution",
+            MultiResolution,
+            "3x3 viewports, the outer ones at half the resolution",
+        ),
+        (
+            "radial-density",
+            RadialDensity,
+            "Every other 2x2 quad of the periphery, filled from its neighbours",
+        ),
+        (
+            "lens-matched",
+            LensMatched,
+            "2x2 viewports, coarser towards the edges by a projective map",
+        ),
+    ])
+}
+
+fn culling_parser() -> impl TypedValueParser<Value = Culling> {
+    choice(Culling::all().map(|culling| (culling.name(), culling, culling.help())))
 }
 
 /// `--rates`.
@@ -188,11 +215,7 @@ impl TechniqueArgs {
             half_rate: None,
             far_field: self.far_field.map(|SplitFlag(split)| FarField {
                 split,
-                variant: match self.far_field_variant {
-                    FarVariant::Plain => Variant::Plain,
-                    FarVariant::DepthShift => Variant::DepthShift,
-                    FarVariant::AlternateEye => Variant::AlternateEye,
-                },
+                variant: self.far_field_variant,
             }),
             foveation: self.foveation(hmd)?,
         };
@@ -201,14 +224,8 @@ impl TechniqueArgs {
     }
 
     fn foveation(&self, hmd: &Hmd) -> anyhow::Result<Option<Foveation>> {
-        let Some(foveate) = self.foveate else {
+        let Some(kind) = self.foveate else {
             return Ok(None);
-        };
-        let kind = match foveate {
-            Foveate::Rings => FoveationKind::Rings,
-            Foveate::MultiResolution => FoveationKind::MultiResolution,
-            Foveate::RadialDensity => FoveationKind::RadialDensity,
-            Foveate::LensMatched => FoveationKind::LensMatched,
         };
         ensure!(
             kind != FoveationKind::LensMatched || self.rates.is_none() && self.gaze.is_none(),
@@ -233,11 +250,6 @@ impl TechniqueArgs {
             },
         }))
     }
-}
-
-fn culling_parser() -> impl TypedValueParser<Value = Culling> {
-    let value = |technique: Culling| PossibleValue::new(technique.name()).help(technique.help());
-    PossibleValuesParser::new(Culling::all().map(value)).try_map(|name| name.parse::<Culling>())
 }
 
 /// A direction, or a file of them.

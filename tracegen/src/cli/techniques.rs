@@ -1,21 +1,23 @@
 //! `tracegen techniques`.
 
 use super::cache_args::CacheArgs;
+use super::capture_steps::warn_of_multiview_defect;
 use super::lens_args::LensArgs;
 use super::objective_args::ObjectiveArgs;
 use super::path_args::PathArgs;
-use super::prepared::{Prepared, prepare};
-use super::raster::{self, TileEncoding};
-use super::scene_args::SceneArgs;
+use super::prepared::{Preparation, Prepared, prepare};
+use super::raster::{self, encoding_parser};
+use super::scene_args::{SceneArgs, SceneSetup};
 use crate::study::auto::{AutoRecord, Budget, Objective, choose};
 use crate::study::folder::{self, Folder, RowRecord, Subject};
 use crate::study::frames;
 use crate::study::measure::{Bench, Extent};
 use crate::study::rows::Row;
-use ::raster::backend::CaptureBackend;
-use ::raster::lavapipe::device;
+use crate::study::world::World;
+use ::raster::lavapipe::device::{self, Gpu};
 use anyhow::{Context, ensure};
 use clap::Args;
+use formats::textrace::Encoding;
 use image_error::PIXELS_PER_DEGREE;
 use scene::LoadOptions;
 use shell::{Progress, Threads, note};
@@ -57,8 +59,8 @@ pub struct TechniquesArgs {
     #[arg(long, value_name = "N", default_value_t = 1)]
     trace_frames: u32,
     /// How the tiles of the traces are packed.
-    #[arg(long, value_enum, default_value_t = TileEncoding::Delta, value_name = "NAME")]
-    encoding: TileEncoding,
+    #[arg(long, value_parser = encoding_parser(), default_value = "delta", value_name = "NAME")]
+    encoding: Encoding,
     /// Times that each frame is timed, the baseline's beside it.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: u32,
@@ -92,7 +94,7 @@ pub struct TechniquesArgs {
 pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
     raster::prepare_environment(args.threads.count);
     args.threads.start()?;
-    let mut rows = match &args.only {
+    let rows = match &args.only {
         Some(list) => Row::parse_list(list).context("--only")?,
         None => Row::all(),
     };
@@ -113,77 +115,33 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         &LoadOptions::ALL,
     )?;
     folder::check(&args.output, &setup.inputs)?;
-    let extent = args.extent();
     progress.stage("preparing textures and shaders", 0, "");
-    let (adapter, captures) = (gpu.adapter.clone(), gpu.no_capture.is_none());
+    let captures = gpu.no_capture.is_none();
     if let Some(what) = &gpu.no_capture {
         shell::warn(&format!(
-            "{adapter} lacks {what}: no traces, no counts of fragments"
+            "{} lacks {what}: no traces, no counts of fragments",
+            gpu.adapter
         ));
     }
-    let cascades = raster::cascades(&setup.scene, args.shadows);
-    let lens = args.lens.lenses(&setup.hmd)?;
-    let pixels_per_degree =
-        image_error::pixels_per_degree(setup.hmd.eye_size_px[0], &setup.hmd.fov[0]);
-    ensure!(
-        PIXELS_PER_DEGREE.contains(&pixels_per_degree),
-        "--size: expected {} to {} pixels per degree, which image errors belong to, found {pixels_per_degree}",
-        PIXELS_PER_DEGREE.start(),
-        PIXELS_PER_DEGREE.end()
-    );
-    let mut subject = Subject {
-        tool: super::tool(),
-        scene: args.scene.scene.clone(),
-        scene_triangles: setup.scene.triangle_count(),
-        instances: setup.scene.instances.len() as u64,
-        camera: setup.camera.name.clone(),
-        path: args.path.path.to_string(),
-        path_frames: args.path_frames,
-        frames: extent.frames(),
-        fps: args.path.fps,
-        size_px: setup.hmd.eye_size_px,
-        hmd: setup.hmd.clone(),
-        lens,
-        pixels_per_degree,
-        adapter,
-        driver: gpu.driver.clone(),
-        software_driver: gpu.is_software,
-        baseline: Row::baseline().name,
-        repeats: args.repeats,
-        trace_frames: extent.trace_frames.clone(),
-        trace_encoding: args.encoding.encoding(),
-        shadow_cascades: cascades,
-        input_checksum: checksum(&setup.inputs)?,
-    };
-    if !captures {
-        subject.trace_frames.clear();
-    }
-    let sizes = [cascades.into(), RECORD_BUDGET];
-    let prepared = prepare(
-        setup,
-        lens,
-        args.path.fps,
-        &args.scene.scene,
-        gpu,
-        sizes,
-        args.cache,
-    )?;
+    let subject = args.subject(&setup, &gpu)?;
     let Prepared {
         mut world,
         mut backend,
-    } = prepared;
-    let mut impossible = Vec::new();
-    for row in &rows {
-        if let Err(error) = world.check(&row.settings) {
-            if args.only.is_some() {
-                return Err(error.context(row.name.clone()));
-            }
-            shell::warn(&format!("{} is left out: {error}", row.name));
-            impossible.push(row.name.clone());
-        }
-    }
-    rows.retain(|row| !impossible.contains(&row.name));
+    } = prepare(
+        Preparation {
+            scene: &args.scene.scene,
+            lens: subject.lens,
+            fps: args.path.fps,
+            shadows: args.shadows,
+            record_budget: RECORD_BUDGET,
+            cache: args.cache,
+        },
+        setup,
+        gpu,
+    )?;
+    let rows = args.possible(rows, &world)?;
     let folder = Folder::create(&args.output, &subject)?;
+    let extent = args.extent();
     let mut bench = Bench {
         world: &mut world,
         backend: &mut backend,
@@ -204,14 +162,10 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         records.push(row);
         record
     });
-    let at_once = records.iter().any(|row| row.settings.multiview);
-    let defect = match at_once {
-        true => backend.multiview_defect()?,
+    let defect = match records.iter().any(|row| row.settings.multiview) {
+        true => warn_of_multiview_defect(&mut backend)?,
         false => None,
     };
-    if let Some(defect) = &defect {
-        raster::warn_of_multiview(defect);
-    }
     let manifest = folder.finish(&subject, &records, auto.as_ref(), defect.as_deref())?;
     if records
         .iter()
@@ -304,6 +258,60 @@ fn measure_auto(
 }
 
 impl TechniquesArgs {
+    /// What the study measures: its scene, path, display and device.
+    fn subject(&self, setup: &SceneSetup, gpu: &Gpu) -> anyhow::Result<Subject> {
+        let pixels_per_degree =
+            image_error::pixels_per_degree(setup.hmd.eye_size_px[0], &setup.hmd.fov[0]);
+        ensure!(
+            PIXELS_PER_DEGREE.contains(&pixels_per_degree),
+            "--size: expected {} to {} pixels per degree, which image errors belong to, found {pixels_per_degree}",
+            PIXELS_PER_DEGREE.start(),
+            PIXELS_PER_DEGREE.end()
+        );
+        let extent = self.extent();
+        let trace_frames = match gpu.no_capture {
+            None => extent.trace_frames.clone(),
+            Some(_) => Vec::new(),
+        };
+        Ok(Subject {
+            tool: super::tool(),
+            scene: self.scene.scene.clone(),
+            scene_triangles: setup.scene.triangle_count(),
+            instances: setup.scene.instances.len() as u64,
+            camera: setup.camera.name.clone(),
+            path: self.path.path.to_string(),
+            path_frames: self.path_frames,
+            frames: extent.frames(),
+            fps: self.path.fps,
+            size_px: setup.hmd.eye_size_px,
+            hmd: setup.hmd.clone(),
+            lens: self.lens.lenses(&setup.hmd)?,
+            pixels_per_degree,
+            adapter: gpu.adapter.clone(),
+            driver: gpu.driver.clone(),
+            software_driver: gpu.is_software,
+            baseline: Row::baseline().name,
+            repeats: self.repeats,
+            trace_frames,
+            trace_encoding: self.encoding,
+            shadow_cascades: raster::cascades(&setup.scene, self.shadows),
+            input_checksum: checksum(&setup.inputs)?,
+        })
+    }
+
+    /// The rows that the display and the path allow; the others are an error if they were asked for.
+    fn possible(&self, rows: Vec<Row>, world: &World) -> anyhow::Result<Vec<Row>> {
+        let mut possible = Vec::new();
+        for row in rows {
+            match world.check(&row.settings) {
+                Ok(()) => possible.push(row),
+                Err(error) if self.only.is_some() => return Err(error.context(row.name)),
+                Err(error) => shell::warn(&format!("{} is left out: {error}", row.name)),
+            }
+        }
+        Ok(possible)
+    }
+
     /// Files that the study reads.
     fn inputs(&self) -> Vec<PathBuf> {
         let scene = Path::new(&self.scene.scene);

@@ -10,7 +10,7 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use formats::footprint::LodFormula;
 use formats::textrace::{Textrace, TextraceWriter};
-use formats::view::Eye;
+use formats::view::{Eye, Lens};
 use raster::backend::{CaptureBackend, Fragments, Texels};
 use raster::capture::CaptureJob;
 use raster::draws::DrawList;
@@ -117,13 +117,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     }
     let mut draws = DrawList::new(&setup.scene, shadow_cascades)?;
     draws.pose(&setup.scene, setup.moments.time_s(0));
-    let planner = Planner::new(
-        &Settings::default(),
-        &setup.hmd,
-        setup.hmd.fov.map(|fov| formats::view::Lens::of(&fov)),
-        &[Eye::Left, Eye::Right],
-        scene::paths::DEFAULT_FPS,
-    )?;
+    let planner = plain_planner(&setup)?;
     let bounds = setup.scene.bounds().unwrap_or_default();
     let job = CaptureJob {
         scene: &setup.scene,
@@ -139,17 +133,16 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     progress.stage("preparing textures", 0, "");
     let finest = job.finest_levels(&setup.frames)?;
     let textures = TextureSet::prepare(&setup.scene, |image| finest[image], cache.as_ref())?;
-    let mut backend = None;
-    if existing.is_none() || args.colour {
-        let budget = RECORD_BUDGET_BYTES;
-        backend = Some(Lavapipe::new(
+    let mut backend = match existing.is_none() || args.colour {
+        true => Some(Lavapipe::new(
             &setup.scene,
             &draws,
             &textures,
             setup.hmd.eye_size_px,
-            budget,
-        )?);
-    }
+            RECORD_BUDGET_BYTES,
+        )?),
+        false => None,
+    };
     progress.stage("capturing", 0, "");
     let trace = match (existing, &mut backend) {
         (None, Some(backend)) => capture(&job, &setup, &args.scene.scene, &textures, backend)?,
@@ -169,20 +162,15 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     };
     progress.stage("verifying", 0, "");
     let captured = started.elapsed();
-    let (choice, seed) = match args.tiles {
-        Tiles::All => (TileChoice::All, None),
-        Tiles::Some(count) => (
-            TileChoice::Some {
-                count,
-                seed: args.seed,
-            },
-            Some(args.seed),
-        ),
-    };
     let formula = args
         .lod
         .unwrap_or_else(|| formula_of(&trace.tables().meta.driver));
-    let verified = subject.verify(choice, formula, &texels, args.write_reference.is_some())?;
+    let verified = subject.verify(
+        args.choice(),
+        formula,
+        &texels,
+        args.write_reference.is_some(),
+    )?;
     drop(progress);
     if let Some(file) = &args.write_reference {
         write_reference(file, &subject, &verified)?;
@@ -192,9 +180,15 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         (started.elapsed() - captured).as_secs_f64(),
         captured.as_secs_f64()
     ));
+    let seed = (args.tiles != Tiles::All).then_some(args.seed);
     let report = Report::new(&args.scene.scene, trace.tables(), &verified, seed);
-    if args.json {
-        shell::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;
+    print(&report, args.json)
+}
+
+/// Prints a report, and its failures on stderr.
+fn print(report: &Report, json: bool) -> anyhow::Result<ExitCode> {
+    if json {
+        shell::print(&(serde_json::to_string_pretty(report)? + "\n"))?;
     } else {
         shell::print(&report.table())?;
     }
@@ -206,13 +200,23 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         let more = failures.len() - MOST_FAILURES;
         shell::error(&format!("and {more} more, which --json lists"));
     }
-    if report.failures().is_empty() {
-        return Ok(ExitCode::SUCCESS);
+    match failures.is_empty() {
+        true => Ok(ExitCode::SUCCESS),
+        false => Ok(ExitCode::FAILURE),
     }
-    Ok(ExitCode::FAILURE)
 }
 
 impl VerifyArgs {
+    fn choice(&self) -> TileChoice {
+        match self.tiles {
+            Tiles::All => TileChoice::All,
+            Tiles::Some(count) => TileChoice::Some {
+                count,
+                seed: self.seed,
+            },
+        }
+    }
+
     /// What the command writes, checked as far as its arguments tell.
     fn outputs(&self) -> anyhow::Result<Vec<Output>> {
         let Some(file) = &self.write_reference else {
@@ -235,6 +239,14 @@ fn filter_in_single_precision() {
         // SAFETY: as in `prepare_environment`: no thread reads the environment meanwhile.
         unsafe { std::env::set_var("GALLIVM_PERF", "no_aos_sampling") }
     }
+}
+
+/// Plans both eyes without techniques.
+fn plain_planner(setup: &SceneSetup) -> anyhow::Result<Planner> {
+    let lenses = setup.hmd.fov.map(|fov| Lens::of(&fov));
+    let (eyes, fps) = (&[Eye::Left, Eye::Right], scene::paths::DEFAULT_FPS);
+    let settings = Settings::default();
+    Ok(Planner::new(&settings, &setup.hmd, lenses, eyes, fps)?)
 }
 
 /// How a driver makes levels of detail of derivatives.

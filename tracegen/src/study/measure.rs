@@ -187,50 +187,23 @@ impl Bench<'_> {
                 .folder
                 .write_images(&row.name, number, &pictures, size_px)?;
             let job = self.world.job(planner(number));
-            let counts = if shot.reprojection.is_some() {
-                self.captures.then(|| Ok(CaptureCounts::default()))
-            } else if kept.contains(&number) {
-                traced
-                    .as_mut()
-                    .map(|t| t.capture(&job, self.backend, &shot.frame))
-            } else {
-                counted
-                    .as_mut()
-                    .map(|t| t.capture(&job, self.backend, &shot.frame))
-            }
-            .transpose()?;
+            let (backend, frame) = (&mut *self.backend, &shot.frame);
+            let captured = match (&mut traced, &mut counted) {
+                _ if shot.reprojection.is_some() => None,
+                (Some(tracer), _) if kept.contains(&number) => {
+                    Some(tracer.capture(&job, backend, frame)?)
+                }
+                (_, Some(tracer)) => Some(tracer.capture(&job, backend, frame)?),
+                _ => None,
+            };
+            let counts = (self.captures)
+                .then(|| captured.map_or_else(CaptureCounts::default, |frame| frame.counts));
             let wrong = self.wrong(number, &shot)?;
-            let work = &shot.work;
-            let targets = shot.frame.plan.target_bytes(row.settings.multiview);
+            let multiview = row.settings.multiview;
             frames.push(FrameRecord {
-                frame: number,
-                cull_tests: shot.frame.cull_tests + shot.frame.occlusion_tests,
-                cull_s: 0.0,
-                false_negatives: wrong.map(|wrong| wrong.negatives),
-                false_positives: wrong.map(|wrong| wrong.positives),
-                draws: work.draws,
-                draw_calls: work.calls,
-                state_changes: work.state_changes,
-                vertices: work.vertices,
-                triangles: work.triangles,
-                quads: counts.map(|counts| counts.quads),
-                fragments: counts.map(|counts| counts.fragments),
-                bytes_uploaded: work.bytes_uploaded,
-                counted: counts.map(|counts| shot.counted(counts.fragments)),
-                // Textures come on top once the trace is complete.
-                memory_bytes: counts.map(|counts| shot.counted(counts.fragments).bytes()),
-                energy_mj: counts.map(|counts| shot.counted(counts.fragments).energy_mj()),
-                target_color_bytes: targets.color,
-                target_depth_bytes: targets.depth,
-                bytes_reprojected: (shot.reprojection.as_ref()).map_or(0, |made| made.bytes),
-                frame_s: Vec::new(),
-                baseline_s: Vec::new(),
-                processor_s: Vec::new(),
-                baseline_processor_s: Vec::new(),
-                stages_s: BTreeMap::new(),
                 images,
                 image_checksums,
-                predicted: shot.frame.plan.predicted,
+                ..frame_record(number, &shot, counts, wrong, multiview)
             });
             self.progress.advance(1);
         }
@@ -396,4 +369,46 @@ pub fn median_s(times: &[Duration]) -> f64 {
     sorted.sort();
     let middle = sorted.get(sorted.len().saturating_sub(1) / 2);
     middle.copied().unwrap_or_default().as_secs_f64()
+}
+
+/// Counts of a frame that was shot; its times and images follow.
+fn frame_record(
+    number: u32,
+    shot: &Shot,
+    counts: Option<CaptureCounts>,
+    wrong: Option<Wrong>,
+    multiview: bool,
+) -> FrameRecord {
+    let work = &shot.work;
+    let targets = shot.frame.plan.target_bytes(multiview);
+    FrameRecord {
+        frame: number,
+        cull_tests: shot.frame.cull_tests + shot.frame.occlusion_tests,
+        cull_s: 0.0,
+        false_negatives: wrong.map(|wrong| wrong.negatives),
+        false_positives: wrong.map(|wrong| wrong.positives),
+        draws: work.draws,
+        draw_calls: work.calls,
+        state_changes: work.state_changes,
+        vertices: work.vertices,
+        triangles: work.triangles,
+        quads: counts.map(|counts| counts.quads),
+        fragments: counts.map(|counts| counts.fragments),
+        bytes_uploaded: work.bytes_uploaded,
+        counted: counts.map(|counts| shot.counted(counts.fragments)),
+        // Textures come on top once the trace is complete.
+        memory_bytes: counts.map(|counts| shot.counted(counts.fragments).bytes()),
+        energy_mj: counts.map(|counts| shot.counted(counts.fragments).energy_mj()),
+        target_color_bytes: targets.color,
+        target_depth_bytes: targets.depth,
+        bytes_reprojected: (shot.reprojection.as_ref()).map_or(0, |made| made.bytes),
+        frame_s: Vec::new(),
+        baseline_s: Vec::new(),
+        processor_s: Vec::new(),
+        baseline_processor_s: Vec::new(),
+        stages_s: BTreeMap::new(),
+        images: Default::default(),
+        image_checksums: Default::default(),
+        predicted: shot.frame.plan.predicted,
+    }
 }

@@ -63,112 +63,7 @@ impl Part {
         let others = Culling::all().filter(|culling| *culling != baseline);
         let mut parts = vec![Self::culling(baseline)];
         parts.extend(others.map(Self::culling));
-        // Name, title, whether no visible pixel changes, what it excludes, how it is set.
-        parts.extend([
-            Self::new(
-                "occlusion",
-                "Occlusion culling",
-                true,
-                Setting::Occlusion,
-                |s| {
-                    s.occlusion = true;
-                },
-            ),
-            Self::new(
-                "hidden-area-mask",
-                "Hidden-area mask",
-                true,
-                Setting::Mask,
-                |s| {
-                    s.hidden_area_mask = true;
-                },
-            ),
-            Self::new("multiview", "Multiview", true, Setting::Multiview, |s| {
-                s.multiview = true;
-            }),
-            Self::new(
-                "distance-culling",
-                "Distance culling, 4 px",
-                false,
-                Setting::Distance,
-                |s| s.distance_cull = Some(DistanceCull::Pixels(4.0)),
-            ),
-            Self::new(
-                "half-rate",
-                "Half rate, turned with the head",
-                false,
-                Setting::Rate,
-                |s| s.half_rate = Some(Reprojection::Rotation),
-            ),
-            Self::new(
-                "half-rate-depth",
-                "Half rate, moved with the head by depth",
-                false,
-                Setting::Rate,
-                |s| s.half_rate = Some(Reprojection::Depth),
-            ),
-            Self::far_field("far-field", "Mono far field, 1 px", |s| {
-                s.far_field = far_field(Split::Pixels(1.0), Variant::Plain);
-            }),
-            Self::far_field(
-                "far-field-least-work",
-                "Mono far field where it saves most",
-                |s| {
-                    s.far_field = far_field(Split::LeastWork { within_px: 1.0 }, Variant::Plain);
-                },
-            ),
-            Self::far_field(
-                "far-field-depth-shift",
-                "Mono far field with depth shift, 0.5 px",
-                |s| {
-                    // The split of the plain one.
-                    s.far_field = far_field(Split::Pixels(0.5), Variant::DepthShift);
-                },
-            ),
-            Self::far_field(
-                "far-field-alternate-eye",
-                "Mono far field from alternate eyes, 1 px",
-                |s| {
-                    s.far_field = far_field(Split::Pixels(1.0), Variant::AlternateEye);
-                },
-            ),
-            Self::new(
-                "foveation-rings",
-                "Foveation by rings",
-                false,
-                Setting::Foveation,
-                |s| {
-                    s.foveation = Some(foveation(FoveationKind::Rings, Rates::default()));
-                },
-            ),
-            Self::new(
-                "multi-resolution",
-                "Multi-resolution",
-                false,
-                Setting::Foveation,
-                |s| {
-                    s.foveation = Some(foveation(FoveationKind::MultiResolution, Rates::default()));
-                },
-            ),
-            Self::new(
-                "radial-density",
-                "Radial density mask",
-                false,
-                Setting::Foveation,
-                |s| {
-                    s.foveation = Some(foveation(FoveationKind::RadialDensity, Rates::default()));
-                },
-            ),
-            Self::new(
-                "lens-matched",
-                "Lens-matched viewports",
-                false,
-                Setting::Foveation,
-                |s| {
-                    s.foveation = Some(foveation(FoveationKind::LensMatched, Rates::default()));
-                },
-            ),
-        ]);
+        parts.extend(TECHNIQUES.iter().map(Self::switch));
         parts
     }
 
@@ -178,39 +73,7 @@ impl Part {
         let mut parts = Self::all();
         // A search looks at frames one by one, and half of these have no picture of their own.
         parts.retain(|part| part.setting() != Setting::Rate);
-        parts.extend([
-            Self::far_field("far-field-0.5px", "Mono far field, 0.5 px", |s| {
-                s.far_field = far_field(Split::Pixels(0.5), Variant::Plain);
-            }),
-            Self::far_field("far-field-2px", "Mono far field, 2 px", |s| {
-                s.far_field = far_field(Split::Pixels(2.0), Variant::Plain);
-            }),
-            Self::far_field(
-                "far-field-depth-shift-1px",
-                "Mono far field with depth shift, 1 px",
-                |s| {
-                    s.far_field = far_field(Split::Pixels(1.0), Variant::DepthShift);
-                },
-            ),
-            Self::new(
-                "foveation-rings-wide",
-                "Foveation by rings, 1.5 times as wide",
-                false,
-                Setting::Foveation,
-                |s| {
-                    s.foveation = Some(foveation(FoveationKind::Rings, wide()));
-                },
-            ),
-            Self::new(
-                "radial-density-wide",
-                "Radial density mask, 1.5 times as wide",
-                false,
-                Setting::Foveation,
-                |s| {
-                    s.foveation = Some(foveation(FoveationKind::RadialDensity, wide()));
-                },
-            ),
-        ]);
+        parts.extend(VARIANTS.iter().map(Self::switch));
         let acuity = Rates::of_acuity(hmd);
         for (name, title, kind) in [
             (
@@ -234,23 +97,13 @@ impl Part {
         parts
     }
 
-    fn new(
-        name: &str,
-        title: &str,
-        lossless: bool,
-        setting: Setting,
-        change: fn(&mut Settings),
-    ) -> Self {
+    fn switch(&Switch(name, title, lossless, setting, change): &Switch) -> Self {
         Self {
             name: name.to_owned(),
             title: title.to_owned(),
             lossless,
             change: Change::Switch(setting, change),
         }
-    }
-
-    fn far_field(name: &str, title: &str, change: fn(&mut Settings)) -> Self {
-        Self::new(name, title, false, Setting::FarField, change)
     }
 
     fn culling(culling: Culling) -> Self {
@@ -286,6 +139,146 @@ impl Part {
         }
     }
 }
+
+/// Name, title, whether no visible pixel changes, the setting that it changes, and how.
+struct Switch(&'static str, &'static str, bool, Setting, fn(&mut Settings));
+
+/// The techniques besides culling.
+const TECHNIQUES: &[Switch] = &[
+    Switch(
+        "occlusion",
+        "Occlusion culling",
+        true,
+        Setting::Occlusion,
+        |s| s.occlusion = true,
+    ),
+    Switch(
+        "hidden-area-mask",
+        "Hidden-area mask",
+        true,
+        Setting::Mask,
+        |s| s.hidden_area_mask = true,
+    ),
+    Switch("multiview", "Multiview", true, Setting::Multiview, |s| {
+        s.multiview = true
+    }),
+    Switch(
+        "distance-culling",
+        "Distance culling, 4 px",
+        false,
+        Setting::Distance,
+        |s| s.distance_cull = Some(DistanceCull::Pixels(4.0)),
+    ),
+    Switch(
+        "half-rate",
+        "Half rate, turned with the head",
+        false,
+        Setting::Rate,
+        |s| s.half_rate = Some(Reprojection::Rotation),
+    ),
+    Switch(
+        "half-rate-depth",
+        "Half rate, moved with the head by depth",
+        false,
+        Setting::Rate,
+        |s| s.half_rate = Some(Reprojection::Depth),
+    ),
+    Switch(
+        "far-field",
+        "Mono far field, 1 px",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::Pixels(1.0), Variant::Plain),
+    ),
+    Switch(
+        "far-field-least-work",
+        "Mono far field where it saves most",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::LeastWork { within_px: 1.0 }, Variant::Plain),
+    ),
+    Switch(
+        "far-field-depth-shift",
+        "Mono far field with depth shift, 0.5 px",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::Pixels(0.5), Variant::DepthShift),
+    ),
+    Switch(
+        "far-field-alternate-eye",
+        "Mono far field from alternate eyes, 1 px",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::Pixels(1.0), Variant::AlternateEye),
+    ),
+    Switch(
+        "foveation-rings",
+        "Foveation by rings",
+        false,
+        Setting::Foveation,
+        |s| s.foveation = Some(foveation(FoveationKind::Rings, Rates::default())),
+    ),
+    Switch(
+        "multi-resolution",
+        "Multi-resolution",
+        false,
+        Setting::Foveation,
+        |s| s.foveation = Some(foveation(FoveationKind::MultiResolution, Rates::default())),
+    ),
+    Switch(
+        "radial-density",
+        "Radial density mask",
+        false,
+        Setting::Foveation,
+        |s| s.foveation = Some(foveation(FoveationKind::RadialDensity, Rates::default())),
+    ),
+    Switch(
+        "lens-matched",
+        "Lens-matched viewports",
+        false,
+        Setting::Foveation,
+        |s| s.foveation = Some(foveation(FoveationKind::LensMatched, Rates::default())),
+    ),
+];
+
+/// Other settings of these techniques, for searches.
+const VARIANTS: &[Switch] = &[
+    Switch(
+        "far-field-0.5px",
+        "Mono far field, 0.5 px",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::Pixels(0.5), Variant::Plain),
+    ),
+    Switch(
+        "far-field-2px",
+        "Mono far field, 2 px",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::Pixels(2.0), Variant::Plain),
+    ),
+    Switch(
+        "far-field-depth-shift-1px",
+        "Mono far field with depth shift, 1 px",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::Pixels(1.0), Variant::DepthShift),
+    ),
+    Switch(
+        "foveation-rings-wide",
+        "Foveation by rings, 1.5 times as wide",
+        false,
+        Setting::Foveation,
+        |s| s.foveation = Some(foveation(FoveationKind::Rings, wide())),
+    ),
+    Switch(
+        "radial-density-wide",
+        "Radial density mask, 1.5 times as wide",
+        false,
+        Setting::Foveation,
+        |s| s.foveation = Some(foveation(FoveationKind::RadialDensity, wide())),
+    ),
+];
 
 fn far_field(split: Split, variant: Variant) -> Option<FarField> {
     Some(FarField { split, variant })

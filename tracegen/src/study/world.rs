@@ -5,12 +5,12 @@ use super::timewarp;
 use formats::textrace::{Tables, TextraceWriter};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
 use raster::backend::{CaptureBackend, Fragments, Work};
-use raster::capture::{CaptureJob, Pictures};
+use raster::capture::{CaptureJob, CapturedFrame, Pictures};
 use raster::draws::DrawList;
 use raster::error::RasterError;
 use raster::frame::Frame;
 use raster::lighting::Lighting;
-use record::CaptureCounts;
+use record::Recorder;
 use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
@@ -288,6 +288,8 @@ impl World {
 pub struct Tracer<'a, W: Write + Seek> {
     tables: &'a Tables,
     writer: TextraceWriter<W>,
+    /// Kept between frames, because it remembers how many regions the records of a view need.
+    recorder: Option<Recorder<'a>>,
     pass: usize,
 }
 
@@ -298,6 +300,7 @@ impl<'a, W: Write + Seek> Tracer<'a, W> {
         Self {
             tables,
             writer,
+            recorder: None,
             pass: 0,
         }
     }
@@ -311,12 +314,11 @@ impl<'a, W: Write + Seek> Tracer<'a, W> {
         job: &CaptureJob<'_>,
         backend: &mut dyn CaptureBackend,
         frame: &Frame,
-    ) -> Result<CaptureCounts, RasterError> {
-        let mut recorder = job.recorder(self.tables);
-        let captured =
-            job.capture_frame(backend, frame, self.pass, &mut recorder, &mut self.writer)?;
+    ) -> Result<CapturedFrame, RasterError> {
+        let recorder = (self.recorder).get_or_insert_with(|| job.recorder(self.tables));
+        let captured = job.capture_frame(backend, frame, self.pass, recorder, &mut self.writer)?;
         self.pass += frame.plan.layers.len();
-        Ok(captured.counts)
+        Ok(captured)
     }
 
     /// The writer, to be finished.

@@ -341,48 +341,12 @@ impl Report {
                 ),
             );
         }
-        for (name, samples) in [
-            ("same LOD formula", &self.capture_precision),
-            ("specification", &self.specification),
-        ] {
-            line(
-                &format!("{name}: LOD error, mean and max"),
-                format!(
-                    "{:.6}, {:.4}",
-                    samples.lod_error_mean, samples.lod_error_max
-                ),
-            );
-            line(
-                &format!("{name}: levels that differ"),
-                percent(samples.levels_differ_share),
-            );
-            line(
-                &format!("{name}: footprints that differ"),
-                percent(samples.footprints_differ_share),
-            );
-            for Count { cause, count } in &samples.causes {
-                if *count > 0 {
-                    line(&format!("  {}", cause.told()), count.to_string());
-                }
-            }
-        }
+        self.capture_precision.lines("same LOD formula", &mut line);
+        self.specification.lines("specification", &mut line);
         for colour in &self.colour {
             line(
                 &format!("{}: texels within 1/255", colour.texture),
-                format!(
-                    "{} of {} ({} as light; mean {:.5}, max {:.4}, {:.5} as the driver decodes; beyond: {} by blocks decoded in 8 bits, {} by a polynomial for sRGB, {} by 1/64 texel, {} unexplained, {} without a record)",
-                    percent(colour.within_1_255_share),
-                    colour.fragments,
-                    percent(colour.within_1_255_as_light_share),
-                    colour.mean,
-                    colour.max,
-                    colour.max_as_driver,
-                    colour.beyond_by_decoding,
-                    colour.beyond_by_srgb,
-                    colour.beyond_by_coordinates,
-                    colour.beyond_unexplained,
-                    colour.unrecorded
-                ),
+                colour.text(),
             );
         }
         text
@@ -394,6 +358,27 @@ fn percent(share: f64) -> String {
 }
 
 impl Samples {
+    /// Lines of the table: names and values.
+    fn lines(&self, name: &str, mut line: impl FnMut(&str, String)) {
+        line(
+            &format!("{name}: LOD error, mean and max"),
+            format!("{:.6}, {:.4}", self.lod_error_mean, self.lod_error_max),
+        );
+        line(
+            &format!("{name}: levels that differ"),
+            percent(self.levels_differ_share),
+        );
+        line(
+            &format!("{name}: footprints that differ"),
+            percent(self.footprints_differ_share),
+        );
+        for Count { cause, count } in &self.causes {
+            if *count > 0 {
+                line(&format!("  {}", cause.told()), count.to_string());
+            }
+        }
+    }
+
     fn new(errors: &SampleErrors) -> Self {
         Self {
             samples: errors.samples,
@@ -412,6 +397,23 @@ impl Samples {
 }
 
 impl Colour {
+    fn text(&self) -> String {
+        format!(
+            "{} of {} ({} as light; mean {:.5}, max {:.4}, {:.5} as the driver decodes; beyond: {} by blocks decoded in 8 bits, {} by a polynomial for sRGB, {} by 1/64 texel, {} unexplained, {} without a record)",
+            percent(self.within_1_255_share),
+            self.fragments,
+            percent(self.within_1_255_as_light_share),
+            self.mean,
+            self.max,
+            self.max_as_driver,
+            self.beyond_by_decoding,
+            self.beyond_by_srgb,
+            self.beyond_by_coordinates,
+            self.beyond_unexplained,
+            self.unrecorded
+        )
+    }
+
     fn new(texture: &'static str, errors: &ColourErrors) -> Self {
         let compared = errors.fragments - errors.unrecorded;
         Self {

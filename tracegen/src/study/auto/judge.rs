@@ -109,7 +109,7 @@ impl Bench<'_> {
         let trace = Textrace::from_bytes(tracer.into_writer().into_bytes()?)?;
         Ok(Counted {
             texture_bytes: texture_bytes(&trace)?.iter().sum(),
-            ..shot.counted(captured.fragments)
+            ..shot.counted(captured.counts.fragments)
         })
     }
 

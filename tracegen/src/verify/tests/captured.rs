@@ -92,6 +92,54 @@ pub(super) fn capture_as(
     Ok(capture_skipping(planner, scene, cascades, budget, plain, skips, tested)?.0)
 }
 
+/// The tables of a trace of one frame.
+fn tables(
+    job: &CaptureJob<'_>,
+    views: &FrameViews,
+    set: &TextureSet,
+    backend: &Lavapipe,
+) -> Tables {
+    let textures = job.draws.textures(set);
+    let (samplers, draw_table) = job.draws.tables(job.scene, set, &textures);
+    Tables {
+        meta: TraceMeta {
+            tool: "test".into(),
+            command_line: Vec::new(),
+            scene: "test".into(),
+            scene_triangles: job.scene.triangle_count(),
+            camera: "test".into(),
+            backend: "lavapipe".into(),
+            driver: backend.driver().into(),
+            seed: 0,
+            hmd: display(job.planner.hmd().eye_size_px),
+            frames: vec![views.clone()],
+            surfaces: Some(job.draws.surfaces(job.fragments)),
+            origin_m: [0.0; 3],
+            techniques: None,
+            program: None,
+        },
+        textures,
+        samplers,
+        draws: draw_table,
+        passes: job.passes(views).unwrap(),
+    }
+}
+
+fn tiles(trace: &Textrace) -> Vec<Vec<Tile>> {
+    let passes = &trace.tables().passes;
+    (0..passes.len())
+        .map(|pass| {
+            (0..passes[pass].tile_count() as usize)
+                .map(|index| {
+                    let mut tile = Tile::default();
+                    trace.decode_tile(pass, index, &mut tile).unwrap();
+                    tile
+                })
+                .collect()
+        })
+        .collect()
+}
+
 /// As [`capture_as`], with the given skips and fragments; also what they left out of the textures and of the frame.
 pub(super) fn capture_skipping(
     planner: &Planner,
@@ -113,30 +161,7 @@ pub(super) fn capture_skipping(
     let finest = job.finest_levels(std::slice::from_ref(&views))?;
     let set = TextureSet::prepare(scene, |image| finest[image], None).unwrap();
     let mut backend = Lavapipe::new(scene, &draws, &set, size_px, budget)?;
-    let textures = draws.textures(&set);
-    let (samplers, draw_table) = draws.tables(scene, &set, &textures);
-    let tables = Tables {
-        meta: TraceMeta {
-            tool: "test".into(),
-            command_line: Vec::new(),
-            scene: "test".into(),
-            scene_triangles: scene.triangle_count(),
-            camera: "test".into(),
-            backend: "lavapipe".into(),
-            driver: backend.driver().into(),
-            seed: 0,
-            hmd: display(size_px),
-            frames: vec![views.clone()],
-            surfaces: Some(draws.surfaces(fragments)),
-            origin_m: [0.0; 3],
-            techniques: None,
-            program: None,
-        },
-        textures,
-        samplers,
-        draws: draw_table,
-        passes: job.passes(&views).unwrap(),
-    };
+    let tables = tables(&job, &views, &set, &backend);
     let frame = job.frame(&views)?;
     job.light(&mut backend, &frame)?;
     let plain = plain.then(|| job.plain_frame(&mut backend, &frame));
@@ -175,21 +200,10 @@ pub(super) fn capture_skipping(
         );
     }
     let reader = Textrace::from_bytes(trace.clone()).unwrap();
-    let tiles = (0..tables.passes.len())
-        .map(|pass| {
-            (0..tables.passes[pass].tile_count() as usize)
-                .map(|index| {
-                    let mut tile = Tile::default();
-                    reader.decode_tile(pass, index, &mut tile).unwrap();
-                    tile
-                })
-                .collect()
-        })
-        .collect();
     let captured = Captured {
         trace,
         tables,
-        tiles,
+        tiles: tiles(&reader),
         pictures_match: match plain {
             Some(plain) => Some(plain?.0) == pictures,
             None => true,
