@@ -20,7 +20,7 @@ impl Random {
     #[inline]
     pub fn below<N: TryFrom<u64> + TryInto<u64> + Default>(&mut self, end: N) -> N {
         let end: u64 = end.try_into().unwrap_or(0);
-        let scaled = u128::from(self.bits()) * u128::from(end) >> 64;
+        let scaled = (u128::from(self.bits()) * u128::from(end)) >> 64;
         N::try_from(scaled as u64).unwrap_or_default()
     }
 
