@@ -3,44 +3,10 @@
 use super::draws::DrawList;
 use super::error::RasterError;
 use super::frame::Frame;
-use super::lighting::Lighting;
+pub use super::view::{Fragments, View};
 use formats::view::Lens;
-use glam::Mat4;
 use record::{Captured, Region, Sink};
 use std::time::Duration;
-use techniques::Layer;
-
-/// One layer to render: its camera, its light and its draws.
-#[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
-    /// Position of the layer in the frame's plan: the target that it is rendered into.
-    pub target: usize,
-    /// Matrices, size and mask.
-    pub layer: &'a Layer,
-    /// Lights and shadow matrices of the frame.
-    pub lighting: &'a Lighting,
-    /// Draws that may be visible, as indices into the draw list, ascending.
-    pub visible: &'a [u32],
-}
-
-impl View<'_> {
-    /// World to clip space.
-    #[must_use]
-    pub fn clip_from_world(&self) -> Mat4 {
-        self.layer.clip_from_world()
-    }
-}
-
-/// Which fragments of a layer are recorded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Fragments {
-    /// Those that pass the depth test when they are drawn.
-    #[default]
-    DepthTested,
-    /// All that the draws cover, whatever other draws lie before them. What a layer starts with
-    /// (the far plane, its mask) still bounds them.
-    All,
-}
 
 /// What is recorded of a region, and who takes it.
 pub struct Recording<'s, 't> {

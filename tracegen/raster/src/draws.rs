@@ -1,8 +1,9 @@
 //! The draws of a scene in submission order, and their entries in the trace's tables.
 
-use super::backend::{Fragments, View};
+pub use super::cascades::SHADOW_SIZE;
 use super::error::RasterError;
 use super::groups::MaterialGroups;
+use super::view::{Fragments, View};
 use formats::textrace::{Draw, Sample, Surfaces, UvGroup};
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use glam::{Affine3A, Mat4, Vec3};
@@ -12,9 +13,6 @@ use scene::{AlphaMode, Instance, Material, Mesh, Scene};
 use std::collections::{HashMap, HashSet};
 use textures::TextureSet;
 use visibility::{Hierarchy, frustum};
-
-/// Edge length of a shadow cascade in texels (Z2 paper section 4.1: 4 x 2048^2, uncompressed).
-pub const SHADOW_SIZE: u32 = 2048;
 
 /// Texel offsets of the four bilinear taps of the shadow lookup. Two texels apart, their 2x2
 /// footprints tile a 4x4 neighbourhood without overlap.

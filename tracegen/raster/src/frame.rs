@@ -1,9 +1,9 @@
 //! What one frame draws: its light, its layers, and which draws enter each of them.
 
-use super::backend::View;
 use super::draws::{DrawList, DrawMode};
 use super::lighting::Lighting;
-use super::skips::Skipped;
+use super::view::View;
+use std::ops::AddAssign;
 use std::time::{Duration, Instant};
 use techniques::{FramePlan, Stage, Start};
 use visibility::{Culling, Rig, Scratch, TooWide};
@@ -114,5 +114,18 @@ fn enters(stage: Stage, mode: DrawMode) -> bool {
         Stage::All => true,
         Stage::Opaque => mode != DrawMode::Blended,
         Stage::Transparent => mode == DrawMode::Blended,
+    }
+}
+
+/// What the skips have left out of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Skipped {
+    /// Shadow cascades.
+    pub cascades: u64,
+}
+
+impl AddAssign for Skipped {
+    fn add_assign(&mut self, other: Self) {
+        self.cascades += other.cascades;
     }
 }

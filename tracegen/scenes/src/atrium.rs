@@ -3,11 +3,15 @@
 //! Everything sits on a lattice of 3.5 m bays: an open court of 8 x 2 bays, ringed by an arcade
 //! one bay deep with a gallery on top.
 
-use super::atrium_materials::{self as materials, Palette};
-use super::atrium_parts::{Bay, Column, baluster, cornice, groin_vault, moulding, rib};
+mod furnishing;
+mod materials;
+pub(crate) mod parts;
+
 use super::mesh_builder::MeshBuilder;
 use super::scene_builder::{MaterialId, SceneBuilder};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
+use materials::Palette;
+use parts::{Bay, Column, baluster, cornice, groin_vault, moulding, rib};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -185,7 +189,7 @@ fn build(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
     arcade_ceilings(scene, p, d);
     mouldings_and_roof(scene, p, d);
     if d.furnished {
-        super::atrium_furnishing::furnish(scene, p);
+        furnishing::furnish(scene, p);
     }
     scene.camera(
         "default",

@@ -1,11 +1,14 @@
 //! A sports car in a studio: paint, glass, chrome, rubber. 55 K triangles.
 
-use super::car_body::{self, AXLES, TYRE};
+mod body;
+mod details;
+
 use super::masonry::carved_stone;
 use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
 use super::organic::damask;
 use super::scene_builder::{MaterialId, SceneBuilder};
 use super::texture_synth::{Maps, Recipe, rgb};
+use body::{AXLES, TYRE};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -99,8 +102,8 @@ pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("car");
     let kit = kit(&mut scene);
     skin(&mut scene, &kit);
-    super::car_details::wheels(&mut scene, &kit);
-    super::car_details::details(&mut scene, &kit);
+    details::wheels(&mut scene, &kit);
+    details::details(&mut scene, &kit);
     interior(&mut scene, &kit);
     studio(&mut scene, &kit);
     scene.camera(
@@ -130,10 +133,10 @@ pub fn scene() -> Scene {
 }
 
 fn skin(scene: &mut SceneBuilder, kit: &Kit) {
-    scene.add("body", car_body::body_mesh(92, 40), kit.paint);
-    scene.add("intake", car_body::end_cap(32, true), kit.trim);
-    scene.add("rear-panel", car_body::end_cap(32, false), kit.paint);
-    let [paint, glass, trim] = car_body::cabin_meshes(60, 52);
+    scene.add("body", body::body_mesh(92, 40), kit.paint);
+    scene.add("intake", body::end_cap(32, true), kit.trim);
+    scene.add("rear-panel", body::end_cap(32, false), kit.paint);
+    let [paint, glass, trim] = body::cabin_meshes(60, 52);
     scene.add("roof", paint, kit.paint);
     scene.add("windows", glass, kit.glass);
     scene.add("window-trim", trim, kit.trim);

@@ -2,9 +2,10 @@
 //!
 //! A winding path leads to the ruin; foliage with alpha masks is instanced from few meshes.
 
+pub(crate) mod plants;
+mod temple;
+
 use super::creature::{self, Creature};
-use super::jungle_plants as plants;
-use super::jungle_temple;
 use super::masonry::{carved_band, carved_stone, dressed_stone};
 use super::mesh_builder::MeshBuilder;
 use super::noise::{Rng, bank, smoothstep};
@@ -239,10 +240,10 @@ pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("jungle");
     let (leaves, solids) = materials(&mut scene);
     terrain(&mut scene, &solids);
-    jungle_temple::build(
+    temple::build(
         &mut scene,
         TEMPLE,
-        &jungle_temple::Stones {
+        &temple::Stones {
             blocks: solids.masonry,
             frieze: solids.carved,
             steps: solids.steps,

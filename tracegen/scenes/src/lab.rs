@@ -1,5 +1,7 @@
 //! A chemistry bench: flasks, tubes, a retort and a condenser in glass. 98 K triangles.
 
+mod still;
+
 use super::glassware::{
     beaker, bottle, erlenmeyer, filling, glass_tube, shell, stopper, test_tube,
 };
@@ -178,7 +180,7 @@ pub fn scene() -> Scene {
     furniture(&mut scene, &kit);
     flasks(&mut scene, &kit);
     rack(&mut scene, &kit);
-    super::lab_still::distillation(&mut scene, &kit);
+    still::distillation(&mut scene, &kit);
     shelf(&mut scene, &kit);
     scene.camera(
         "default",

@@ -1,8 +1,10 @@
 //! Lavender rows before a farm house, after Provence: 600 K triangles.
 
-use super::jungle_plants::{boughs, buttressed_trunk};
+mod house;
+mod parts;
+
+use super::jungle::plants::{boughs, buttressed_trunk};
 use super::masonry::{dressed_stone, plaster, roof_tiles};
-use super::meadow_parts as parts;
 use super::mesh_builder::MeshBuilder;
 use super::noise::{Rng, bank, smoothstep};
 use super::organic::{bark, planks, rock, soil, turf, upright};
@@ -151,7 +153,7 @@ pub fn scene() -> Scene {
     let kit = kit(&mut scene);
     let mut rng = Rng::new(600);
     land(&mut scene, &kit);
-    super::meadow_house::farm_house(&mut scene, &kit);
+    house::farm_house(&mut scene, &kit);
     garden_wall(&mut scene, &kit, &mut rng);
     trees(&mut scene, &kit, &mut rng);
     lavender(&mut scene, &kit, &mut rng);

@@ -433,12 +433,6 @@ impl MeshBuilder {
         }
     }
 
-    /// Number of triangles so far.
-    #[must_use]
-    pub fn triangles(&self) -> usize {
-        self.indices.len() / 3
-    }
-
     /// The finished mesh: degenerate triangles dropped, tangents computed, uv divided by `tile_m`.
     #[must_use]
     pub fn finish(mut self, name: &str, material: usize, tile_m: f32) -> Mesh {

@@ -1,6 +1,8 @@
 //! A musical movement in an open wooden box: pinned cylinder, comb, spring barrel, gear train and
 //! air governor. 106 K triangles of brass and steel.
 
+mod train;
+
 use super::gears::screw;
 use super::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
 use super::noise::{Rng, smoothstep};
@@ -94,9 +96,9 @@ pub fn scene() -> Scene {
     casket(&mut scene, &kit);
     cylinder(&mut scene, &kit);
     comb(&mut scene, &kit);
-    super::music_train::train(&mut scene, &kit);
-    super::music_train::fittings(&mut scene, &kit);
-    super::music_train::bells(&mut scene, &kit);
+    train::train(&mut scene, &kit);
+    train::fittings(&mut scene, &kit);
+    train::bells(&mut scene, &kit);
     scene.camera(
         "default",
         vec3(-0.002, 0.096, 0.070),

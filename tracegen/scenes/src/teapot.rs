@@ -1,12 +1,14 @@
 //! The Utah teapot on a polished checker floor: 15 K triangles.
 
+mod patches;
+
 use super::masonry::checker;
 use super::mesh_builder::MeshBuilder;
 use super::organic::polished_wood;
 use super::scene_builder::SceneBuilder;
-use super::teapot_patches::PATCHES;
 use super::texture_synth::{Maps, Recipe, rgb};
 use glam::{Affine3A, Vec3, vec2, vec3};
+use patches::PATCHES;
 use scene::Scene;
 
 /// Cells along a patch's edge: 32 patches of 2 x 15² triangles, less those at the poles.

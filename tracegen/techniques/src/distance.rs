@@ -1,6 +1,6 @@
 //! Distance culling: draws that are too far or too small to matter are left out.
 
-use crate::settings::SettingsError;
+use crate::error::SettingsError;
 use formats::view::{FrameViews, Hmd};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};

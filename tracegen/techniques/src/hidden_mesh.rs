@@ -1,7 +1,7 @@
 //! A headset's hidden-area mesh: the triangles of each eye's picture that its lens does not show.
 
 use crate::Mask;
-use crate::settings::SettingsError;
+use crate::error::SettingsError;
 use serde::{Deserialize, Serialize};
 
 /// Most triangles of an eye: headsets' own meshes have fewer than 200.

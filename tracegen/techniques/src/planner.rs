@@ -1,5 +1,6 @@
 //! From settings to plans.
 
+use crate::error::SettingsError;
 use crate::eye::EyePicture;
 use crate::far_field::{self, FarFieldError, FarView, Stereo};
 use crate::foveation::{lens_matched, multi_resolution, radial_density, rings};
@@ -7,7 +8,7 @@ use crate::layer::Predicted;
 use crate::least_work::Object;
 use crate::patch::EyePatches;
 use crate::plan::{FramePlan, Picture};
-use crate::settings::{FoveationKind, SettingsError};
+use crate::settings::FoveationKind;
 use crate::{Settings, hidden_area};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
 use std::sync::{Arc, Mutex};

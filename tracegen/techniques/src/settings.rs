@@ -1,6 +1,7 @@
 //! What a capture leaves out or does more coarsely.
 
 use crate::distance::DistanceCull;
+use crate::error::SettingsError;
 use crate::gaze::{self, Gaze};
 use crate::hidden_mesh::HiddenMesh;
 use formats::view::Hmd;
@@ -125,18 +126,6 @@ impl Default for Rates {
             edges_deg: [15.0, 25.0, 35.0, 45.0],
         }
     }
-}
-
-/// Settings that cannot be.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{what}: expected {expected}, found {found}")]
-pub struct SettingsError {
-    /// Which setting.
-    pub what: &'static str,
-    /// What it may be.
-    pub expected: String,
-    /// What it is.
-    pub found: String,
 }
 
 impl Settings {

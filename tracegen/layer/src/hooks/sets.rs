@@ -203,10 +203,8 @@ pub(super) unsafe extern "system" fn create_template(
                 offset: entry.offset,
                 stride: entry.stride,
             });
-            let pushes = info.template_type != vk::DescriptorUpdateTemplateType::DESCRIPTOR_SET;
             let of = Template {
                 entries: entries.collect(),
-                set: if pushes { info.set } else { 0 },
                 graphics: info.pipeline_bind_point == vk::PipelineBindPoint::GRAPHICS,
             };
             known.tracker().descriptors.create_template(*template, of);

@@ -49,8 +49,6 @@ pub struct TemplateEntry {
 pub struct Template {
     /// Its entries that are textures.
     pub entries: Vec<TemplateEntry>,
-    /// Set that it pushes.
-    pub set: u32,
     /// It is for graphics pipelines.
     pub graphics: bool,
 }

@@ -86,12 +86,6 @@ impl Images {
         found.map(|(handle, _)| vk::Image::from_raw(*handle))
     }
 
-    /// An image by its handle.
-    #[must_use]
-    pub fn image(&self, image: vk::Image) -> Option<&Arc<ImageInfo>> {
-        self.images.get(&image.as_raw())
-    }
-
     /// A view was created.
     pub fn create_view(&mut self, view: vk::ImageView, info: &vk::ImageViewCreateInfo<'_>) {
         let Some(image) = self.images.get(&info.image.as_raw()) else {

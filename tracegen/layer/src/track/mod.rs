@@ -9,7 +9,7 @@ mod passes;
 mod pipelines;
 
 pub use commands::{Call, CommandState, Commands, Dynamic, Executed, OpenPass};
-pub use descriptors::{Descriptors, Slot, Template, TemplateEntry, Written};
+pub use descriptors::{Descriptors, Template, TemplateEntry, Written};
 pub use images::Images;
 pub use passes::{Attachment, Passes, RenderPass, Subpass};
 pub use pipelines::{Layout, Pipeline, Pipelines, Recorded, State};

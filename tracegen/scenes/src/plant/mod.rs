@@ -55,12 +55,6 @@ struct Layout {
     m: Machines,
 }
 
-/// The scene with its usual number of instances.
-#[must_use]
-pub fn scene() -> Scene {
-    with_instances(DEFAULT_INSTANCES)
-}
-
 /// The scene with exactly so many instances, of [`INSTANCES`].
 #[must_use]
 pub fn with_instances(instances: u32) -> Scene {

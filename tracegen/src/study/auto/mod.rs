@@ -13,10 +13,10 @@ mod search;
 mod tests;
 
 pub use budget::Budget;
-pub use choose::{Choice, choose, search_frames};
+pub use choose::{choose, search_frames};
 pub use guard::{Held, hold};
 pub use judge::{Bench, Known};
 pub use objective::Objective;
 pub use record::AutoRecord;
 pub use schedule::Schedule;
-pub use search::{Cost, Elsewhere, Found, Infeasible, Judge, Spread, Verdict, search};
+use search::search;

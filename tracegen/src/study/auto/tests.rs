@@ -1,6 +1,6 @@
 //! The search and the guard against made-up costs and errors.
 
-use super::search::Tried;
+use super::search::{Cost, Found, Infeasible, Judge, Spread, Tried, Verdict};
 use super::*;
 use crate::study::rows::{Part, Row};
 use formats::view::Hmd;

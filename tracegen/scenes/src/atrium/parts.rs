@@ -1,7 +1,7 @@
 //! Architectural parts of the atrium: columns, arches, vaults, drapes, reliefs, plants.
 
-use super::mesh_builder::{Frame, Knot, MeshBuilder, curve, sharp, smooth};
-use super::noise::{Rng, smoothstep};
+use crate::mesh_builder::{Frame, Knot, MeshBuilder, curve, sharp, smooth};
+use crate::noise::{Rng, smoothstep};
 use glam::{Affine3A, Quat, Vec2, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 

@@ -1,9 +1,9 @@
 //! The farm house: walls with recessed openings, shutters, tiled roof, barn.
 
-use super::meadow::{HOUSE, Kit, ground};
-use super::meadow_parts as parts;
-use super::mesh_builder::MeshBuilder;
-use super::scene_builder::SceneBuilder;
+use super::parts;
+use super::{HOUSE, Kit, ground};
+use crate::mesh_builder::MeshBuilder;
+use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::FRAC_PI_2;
 

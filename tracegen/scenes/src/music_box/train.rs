@@ -1,9 +1,9 @@
 //! The music box's gear train, governor, bells and fittings.
 
-use super::gears::{Gear, placed, screw, worm};
-use super::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
-use super::music_box::{CYLINDER, CYLINDER_HALF, Kit, MODULE};
-use super::scene_builder::SceneBuilder;
+use super::{CYLINDER, CYLINDER_HALF, Kit, MODULE};
+use crate::gears::{Gear, placed, screw, worm};
+use crate::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
+use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
 

@@ -1,9 +1,9 @@
 //! Wheels, lamps, mirrors, seams and the other small parts of the car.
 
-use super::car::Kit;
-use super::car_body::{self, AXLES, TYRE};
-use super::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
-use super::scene_builder::SceneBuilder;
+use super::Kit;
+use super::body::{self, AXLES, TYRE};
+use crate::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
+use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -191,11 +191,11 @@ fn seam(points: &[(f32, f32)], width: f32) -> MeshBuilder {
         .flat_map(|w| (0..6).map(move |k| (w[0], w[1], k as f32 / 6.0)))
         .map(|(a, b, f)| {
             (
-                car_body::body(a.0 + (b.0 - a.0) * f, a.1 + (b.1 - a.1) * f),
+                body::body(a.0 + (b.0 - a.0) * f, a.1 + (b.1 - a.1) * f),
                 width,
             )
         })
-        .chain(points.last().map(|p| (car_body::body(p.0, p.1), width)))
+        .chain(points.last().map(|p| (body::body(p.0, p.1), width)))
         .collect();
     m.tube(&line, 5);
     m
@@ -284,7 +284,7 @@ pub(super) fn details(scene: &mut SceneBuilder, kit: &Kit) {
 impl Details {
     /// A lens over two reflectors.
     fn headlamp(&mut self, side: f32) {
-        let at = car_body::body(1.86, side * 0.50);
+        let at = body::body(1.86, side * 0.50);
         let tilt = Quat::from_rotation_y(-side * 0.45) * Quat::from_rotation_z(-0.55);
         self.lamps.merge(
             &ball(16),
@@ -352,7 +352,7 @@ impl Details {
     }
 
     fn mirror(&mut self, side: f32) {
-        let foot = car_body::body(0.62, side * 0.48);
+        let foot = body::body(0.62, side * 0.48);
         let head = foot + vec3(-0.02, 0.10, side * 0.13);
         self.paint.tube(
             &[
@@ -383,7 +383,7 @@ impl Details {
     }
 
     fn door_handle(&mut self, side: f32) {
-        let middle = car_body::body(-0.34, side * 0.62);
+        let middle = body::body(-0.34, side * 0.62);
         self.chrome.tube(
             &[
                 (middle + vec3(-0.07, 0.0, side * 0.004), 0.009),
@@ -435,8 +435,8 @@ impl Details {
 
     fn wiper(&mut self, side: f32) {
         let (a, b) = (
-            car_body::cabin(0.03, 0.3 * side + 0.22),
-            car_body::cabin(0.085, 0.3 * side - 0.22),
+            body::cabin(0.03, 0.3 * side + 0.22),
+            body::cabin(0.085, 0.3 * side - 0.22),
         );
         self.dark.tube(
             &[
@@ -466,7 +466,7 @@ impl Details {
             Affine3A::from_scale_rotation_translation(
                 vec3(0.03, 0.008, 0.03),
                 Quat::from_rotation_z(-0.5),
-                car_body::body(2.1, 0.0),
+                body::body(2.1, 0.0),
             ),
         );
     }

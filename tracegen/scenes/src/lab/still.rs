@@ -1,10 +1,10 @@
 //! The still: burner, retort, condenser, receiver and the stand that holds them.
 
-use super::glassware::{glass_tube, helix, round_flask, stopper};
-use super::lab::{Kit, Ware, at, vessel};
-use super::mesh_builder::{Knot, MeshBuilder, curve, lathed, sharp, smooth};
-use super::noise::smoothstep;
-use super::scene_builder::SceneBuilder;
+use super::{Kit, Ware, at, vessel};
+use crate::glassware::{glass_tube, helix, round_flask, stopper};
+use crate::mesh_builder::{Knot, MeshBuilder, curve, lathed, sharp, smooth};
+use crate::noise::smoothstep;
+use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::TAU;
 

@@ -1,11 +1,11 @@
 //! Materials of the atrium: the rich palette and the plain one.
 
-use super::masonry::{
+use crate::masonry::{
     brick, carved_band, carved_stone, dressed_stone, octagon_tiles, plaster, roof_tiles, slabs,
 };
-use super::organic::{LeafShape, damask, leaf, metal, planks, soil, upright};
-use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, Surface, rgb};
+use crate::organic::{LeafShape, damask, leaf, metal, planks, soil, upright};
+use crate::scene_builder::{MaterialId, SceneBuilder};
+use crate::texture_synth::{Maps, Recipe, Surface, rgb};
 use scene::AlphaMode;
 
 /// The materials that the architecture asks for.
