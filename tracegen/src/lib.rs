@@ -3,9 +3,9 @@
 
 mod captures;
 pub mod cli;
-mod doubtful;
 mod hidden_mesh;
 mod picture;
 mod stress;
 mod study;
+mod unstable_triangles;
 mod verify;

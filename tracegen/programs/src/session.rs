@@ -76,7 +76,7 @@ pub struct Executed {
 
 /// A frame.
 #[derive(Clone, Debug, Default)]
-pub struct Frame {
+pub struct ProgramFrame {
     /// Number.
     pub frame: u32,
     /// Draws in the order of execution.
@@ -103,7 +103,7 @@ pub struct Session {
     /// What made the capture worth less.
     pub troubles: Vec<String>,
     /// Frames by number.
-    pub frames: BTreeMap<u32, Frame>,
+    pub frames: BTreeMap<u32, ProgramFrame>,
     draws: HashMap<u32, DrawInfo>,
     passes: HashMap<u32, PassInfo>,
     images: HashMap<u32, ImageInfo>,

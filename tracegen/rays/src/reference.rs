@@ -237,7 +237,7 @@ impl<'a> Reference<'a> {
                 }
             }
             Some(t) => Verdict::Hit(Some((t, near.shift()))),
-            None if near.is_doubtful() => Verdict::Borderline,
+            None if near.is_borderline() => Verdict::Borderline,
             None => Verdict::Miss,
         }
     }
@@ -347,7 +347,7 @@ impl Near {
     }
 
     /// True where the ray starts on a triangle, or passes just outside of one that lies ahead.
-    fn is_doubtful(&self) -> bool {
+    fn is_borderline(&self) -> bool {
         self.triangles.iter().any(|t| {
             if t.covers() {
                 return t.height().abs() <= self.tolerance;

@@ -61,7 +61,7 @@ impl Findings {
 }
 
 /// A mesh as the traversal sees it, ready for checks from many threads.
-pub struct Subject {
+pub struct MeshUnderTest {
     /// Relative to the centre, not rounded.
     mesh: TestMesh,
     rounded: Vec<[[f32; 3]; 3]>,
@@ -71,7 +71,7 @@ pub struct Subject {
     convex: bool,
 }
 
-impl Subject {
+impl MeshUnderTest {
     /// A closed test mesh, moved away from the world's origin and recentred as scenes are.
     ///
     /// # Panics
@@ -254,7 +254,7 @@ mod tests {
     fn no_ray_leaks_or_hits_falsely_at_any_distance_from_the_origin() {
         for mesh in meshes() {
             for distance in TRANSLATIONS {
-                let subject = Subject::new(&mesh, DVec3::new(1.0, 0.7, -0.9) * distance);
+                let subject = MeshUnderTest::new(&mesh, DVec3::new(1.0, 0.7, -0.9) * distance);
                 let findings = subject.check(1200, 7);
                 assert!(
                     findings.clean(),

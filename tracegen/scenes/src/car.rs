@@ -13,7 +13,7 @@ use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-pub(super) struct Kit {
+pub(super) struct CarMaterials {
     pub(super) paint: MaterialId,
     pub(super) glass: MaterialId,
     pub(super) trim: MaterialId,
@@ -27,7 +27,7 @@ pub(super) struct Kit {
     pub(super) floor: MaterialId,
 }
 
-fn kit(scene: &mut SceneBuilder) -> Kit {
+fn kit(scene: &mut SceneBuilder) -> CarMaterials {
     let recipe = Recipe::new;
     let mut sets = [
         recipe(
@@ -57,7 +57,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
         Some(set) => scene.textured(set, |m| m.roughness = 0.6),
         None => floor,
     };
-    Kit {
+    CarMaterials {
         paint: scene.plain("paint", rgb(0xb3141c), 0.08, |m| {
             m.mirror = 0.12;
             m.double_sided = true;
@@ -132,7 +132,7 @@ pub fn scene() -> Scene {
     scene.finish(vec3(0.30, 0.34, 0.40), 0)
 }
 
-fn skin(scene: &mut SceneBuilder, kit: &Kit) {
+fn skin(scene: &mut SceneBuilder, kit: &CarMaterials) {
     scene.add("body", body::body_mesh(92, 40), kit.paint);
     scene.add("intake", body::end_cap(32, true), kit.trim);
     scene.add("rear-panel", body::end_cap(32, false), kit.paint);
@@ -176,7 +176,7 @@ fn skin(scene: &mut SceneBuilder, kit: &Kit) {
     scene.add("floor-pan", pan, kit.trim);
 }
 
-fn interior(scene: &mut SceneBuilder, kit: &Kit) {
+fn interior(scene: &mut SceneBuilder, kit: &CarMaterials) {
     let mut seats = MeshBuilder::new();
     for side in [-1.0f32, 1.0] {
         let at = vec3(-0.38, 0.34, side * 0.34);
@@ -245,7 +245,7 @@ fn interior(scene: &mut SceneBuilder, kit: &Kit) {
     scene.add("dashboard", dash, kit.trim);
 }
 
-fn studio(scene: &mut SceneBuilder, kit: &Kit) {
+fn studio(scene: &mut SceneBuilder, kit: &CarMaterials) {
     // A round floor that runs up into the backdrop in one curve; uv unrolls from the middle.
     let mut floor = MeshBuilder::new();
     let profile = [

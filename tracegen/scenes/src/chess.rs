@@ -272,7 +272,7 @@ fn knight() -> MeshBuilder {
 }
 
 /// Squares, their frame and the table below.
-fn board(scene: &mut SceneBuilder, kit: &Kit) {
+fn board(scene: &mut SceneBuilder, kit: &ChessMaterials) {
     let mut fields = [MeshBuilder::new(), MeshBuilder::new()];
     for rank in 0..8 {
         for file in 0..8 {
@@ -312,7 +312,7 @@ fn board(scene: &mut SceneBuilder, kit: &Kit) {
     scene.add("table", table, kit.oak);
 }
 
-struct Kit {
+struct ChessMaterials {
     light: MaterialId,
     dark: MaterialId,
     walnut: MaterialId,
@@ -321,7 +321,7 @@ struct Kit {
     ebony: MaterialId,
 }
 
-fn kit(scene: &mut SceneBuilder) -> Kit {
+fn kit(scene: &mut SceneBuilder) -> ChessMaterials {
     let recipe = |name, tile_m, surface| Recipe::new(name, 512, Maps::Color, tile_m, surface);
     let mut sets = [
         recipe(
@@ -353,7 +353,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
         }),
         None => scene.plain("missing", rgb(0xff_00ff), roughness, |_| {}),
     };
-    Kit {
+    ChessMaterials {
         light: textured(scene, 0.22, 0.1),
         dark: textured(scene, 0.22, 0.1),
         walnut: textured(scene, 0.06, 0.3),
@@ -390,7 +390,7 @@ pub fn scene() -> Scene {
 }
 
 /// The position after 1. e4 e5 2. Nf3 Nc6 3. Bc4 Bc5 4. c3 Nf6 5. d3 d6.
-fn pieces(scene: &mut SceneBuilder, kit: &Kit) {
+fn pieces(scene: &mut SceneBuilder, kit: &ChessMaterials) {
     let back = [
         "rook", "knight", "bishop", "queen", "king", "bishop", "knight", "rook",
     ];

@@ -15,7 +15,7 @@ use glam::{Affine3A, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-pub(super) struct Kit {
+pub(super) struct LabMaterials {
     pub(super) glass: MaterialId,
     pub(super) amber: MaterialId,
     pub(super) liquids: [MaterialId; 5],
@@ -29,7 +29,7 @@ pub(super) struct Kit {
     pub(super) flame: MaterialId,
 }
 
-fn kit(scene: &mut SceneBuilder) -> Kit {
+fn kit(scene: &mut SceneBuilder) -> LabMaterials {
     let recipe =
         |name, size, tile_m, surface| Recipe::new(name, size, Maps::Color, tile_m, surface);
     let mut sets = [
@@ -85,7 +85,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
             m.mirror = mirror;
         })
     };
-    Kit {
+    LabMaterials {
         glass: glass(scene, "borosilicate", 0xf6fbfa),
         amber: glass(scene, "amber-glass", 0xb5641a),
         liquids: [
@@ -201,7 +201,7 @@ pub fn scene() -> Scene {
     scene.finish(vec3(0.32, 0.36, 0.40), 0)
 }
 
-fn furniture(scene: &mut SceneBuilder, kit: &Kit) {
+fn furniture(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let mut bench = MeshBuilder::new();
     bench.block(vec3(-1.1, -0.04, -0.32), vec3(1.1, 0.0, 0.55), 0.006);
     scene.add("bench", bench, kit.bench);
@@ -211,7 +211,7 @@ fn furniture(scene: &mut SceneBuilder, kit: &Kit) {
 }
 
 /// Conical flasks and beakers with what they hold; a rod, a dish and a funnel.
-fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
+fn flasks(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let flask = erlenmeyer(0.145, 3);
     vessel(
         scene,
@@ -268,7 +268,7 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
 }
 
 /// The cylinder, its foot and its marks.
-fn graduated_cylinder(scene: &mut SceneBuilder, kit: &Kit) {
+fn graduated_cylinder(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let cylinder = beaker(0.0155, 0.19, 3);
     vessel(
         scene,
@@ -311,7 +311,7 @@ fn graduated_cylinder(scene: &mut SceneBuilder, kit: &Kit) {
     scene.place(marks, at(-0.185, 0.006, 0.065));
 }
 
-fn funnel(scene: &mut SceneBuilder, kit: &Kit) {
+fn funnel(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let mut funnel = MeshBuilder::new();
     let cone = curve(
         &[
@@ -334,7 +334,7 @@ fn funnel(scene: &mut SceneBuilder, kit: &Kit) {
     scene.place(funnel, at(-0.10, 0.105, 0.16));
 }
 
-fn rack(scene: &mut SceneBuilder, kit: &Kit) {
+fn rack(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let (x0, z) = (0.235, 0.045);
     let mut rack = MeshBuilder::new();
     rack.block(
@@ -412,7 +412,7 @@ fn plate_with_hole(m: &mut MeshBuilder, center: Vec3, half: glam::Vec2, hole: f3
     }
 }
 
-fn shelf(scene: &mut SceneBuilder, kit: &Kit) {
+fn shelf(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let mut board = MeshBuilder::new();
     board.block(vec3(-0.62, 0.262, -0.32), vec3(0.62, 0.282, -0.16), 0.003);
     for x in [-0.5, 0.0, 0.5] {

@@ -30,7 +30,7 @@ pub(super) fn ground(x: f32, z: f32) -> f32 {
     yard * (1.6 * swell + hills * (0.6 + 1.4 * swell.abs())) + 0.012 * -z.min(0.0) * yard
 }
 
-pub(super) struct Kit {
+pub(super) struct MeadowMaterials {
     pub(super) field: MaterialId,
     pub(super) grass_ground: MaterialId,
     pub(super) walls: MaterialId,
@@ -51,7 +51,7 @@ pub(super) struct Kit {
     pub(super) pane: MaterialId,
 }
 
-fn kit(scene: &mut SceneBuilder) -> Kit {
+fn kit(scene: &mut SceneBuilder) -> MeadowMaterials {
     let recipe = |name, tile_m, surface| Recipe::new(name, 1024, Maps::Color, tile_m, surface);
     let mut sets = [
         recipe(
@@ -113,7 +113,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
     let leafy = |scene: &mut SceneBuilder, name: &str, color: u32| {
         scene.plain(name, rgb(color), 0.7, |m| m.double_sided = true)
     };
-    Kit {
+    MeadowMaterials {
         field,
         grass_ground,
         walls,
@@ -184,7 +184,7 @@ pub fn scene() -> Scene {
     scene.finish(vec3(0.36, 0.52, 0.78), 0)
 }
 
-fn land(scene: &mut SceneBuilder, kit: &Kit) {
+fn land(scene: &mut SceneBuilder, kit: &MeadowMaterials) {
     let mut far = MeshBuilder::new();
     far.surface(96, 96, |s, t| {
         // Cells widen with distance.
@@ -207,7 +207,7 @@ fn land(scene: &mut SceneBuilder, kit: &Kit) {
 }
 
 /// A dry-stone wall along the edge of the yard, with a gap for the gate.
-fn garden_wall(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+fn garden_wall(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
     let mut m = MeshBuilder::new();
     for course in 0..4 {
         let mut x = -9.0;
@@ -235,7 +235,7 @@ fn garden_wall(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
     scene.add("garden-wall", m, kit.stone);
 }
 
-fn trees(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+fn trees(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
     let oaks: Vec<[usize; 3]> = (0..3)
         .map(|i| {
             let (height, radius) = ([5.2, 4.2, 3.4][i], [3.4, 2.7, 2.3][i]);
@@ -295,7 +295,7 @@ fn trees(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
     }
 }
 
-fn lavender(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+fn lavender(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
     let bushes =
         |scene: &mut SceneBuilder, stalks: usize, spike: f32, rng: &mut Rng| -> Vec<[usize; 2]> {
             (0..4)
@@ -331,7 +331,7 @@ fn lavender(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
     }
 }
 
-fn grass_and_poppies(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+fn grass_and_poppies(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
     let poppies: Vec<[usize; 2]> = (0..3)
         .map(|_| {
             let [green, red] = parts::poppy(0.42, rng);

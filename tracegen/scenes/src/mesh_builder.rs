@@ -322,7 +322,7 @@ impl MeshBuilder {
 
     /// Sweeps a profile along frames (right x up = direction of travel); outside is to the right of
     /// the profile's direction, so a counter-clockwise outline is solid inside.
-    pub fn sweep(&mut self, profile: &[Knot], path: &[Frame]) {
+    pub fn sweep(&mut self, profile: &[Knot], path: &[SweepFrame]) {
         let mut across = 0.0;
         for run in smooth_runs(profile) {
             let first = self.positions.len() as u32;
@@ -359,7 +359,7 @@ impl MeshBuilder {
                 smooth(cos, sin)
             })
             .collect();
-        let frames = Frame::along(points);
+        let frames = SweepFrame::along(points);
         let before = self.positions.len();
         self.sweep(&circle, &frames);
         // The sweep sees an open outline; around a circle the normals are the radii.
@@ -469,7 +469,7 @@ impl MeshBuilder {
 
 /// A place along a sweep.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame {
+pub struct SweepFrame {
     /// Where the profile's origin goes.
     pub origin: Vec3,
     /// Direction of the profile's x.
@@ -480,7 +480,7 @@ pub struct Frame {
     pub scale: f32,
 }
 
-impl Frame {
+impl SweepFrame {
     /// Frames along a polyline that twist as little as possible.
     #[must_use]
     pub fn along(points: &[(Vec3, f32)]) -> Vec<Self> {

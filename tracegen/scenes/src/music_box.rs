@@ -22,7 +22,7 @@ const CYLINDER_RADIUS: f32 = 0.0115;
 /// Teeth of the comb.
 const TINES: usize = 64;
 
-pub(super) struct Kit {
+pub(super) struct MusicBoxMaterials {
     pub(super) brass: MaterialId,
     pub(super) polished: MaterialId,
     pub(super) steel: MaterialId,
@@ -33,7 +33,7 @@ pub(super) struct Kit {
     pub(super) ruby: MaterialId,
 }
 
-fn kit(scene: &mut SceneBuilder) -> Kit {
+fn kit(scene: &mut SceneBuilder) -> MusicBoxMaterials {
     let recipe =
         |name, size, tile_m, surface| Recipe::new(name, size, Maps::Color, tile_m, surface);
     let mut sets = [
@@ -73,7 +73,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
             m.mirror = mirror;
         })
     };
-    Kit {
+    MusicBoxMaterials {
         brass: metal(scene, "brass", 0xdcb45e, 0.22, 0.25),
         polished: metal(scene, "polished-brass", 0xe8bf62, 0.08, 0.6),
         steel: metal(scene, "steel", 0xcfd3d8, 0.1, 0.6),
@@ -119,7 +119,7 @@ pub fn scene() -> Scene {
 }
 
 /// Box with an open lid, lined with velvet, on a table.
-fn casket(scene: &mut SceneBuilder, kit: &Kit) {
+fn casket(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let (w, d, h, t) = (0.092, 0.062, 0.052, 0.007);
     let mut wood = MeshBuilder::new();
     wood.block(vec3(-w, 0.0, -d), vec3(w, 0.006, d), 0.0015);
@@ -212,7 +212,7 @@ fn casket(scene: &mut SceneBuilder, kit: &Kit) {
     scene.add("table", table, kit.table);
 }
 
-fn cylinder(scene: &mut SceneBuilder, kit: &Kit) {
+fn cylinder(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let along_x = Quat::from_rotation_z(-FRAC_PI_2);
     let mut drum = MeshBuilder::new();
     let (r, half) = (CYLINDER_RADIUS, CYLINDER_HALF);
@@ -271,7 +271,7 @@ fn tine_x(tine: usize) -> f32 {
 }
 
 /// The comb: tines cut to length, lead weights under the bass, held by a clamp with screws.
-fn comb(scene: &mut SceneBuilder, kit: &Kit) {
+fn comb(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let mut steel = MeshBuilder::new();
     let tip = CYLINDER.z + CYLINDER_RADIUS + 0.0011;
     let root = tip + 0.0235;

@@ -5,9 +5,9 @@ use super::capture_steps::{TraceOutput, load, warn_of_multiview_defect};
 use super::prepared::{Preparation, Prepared, prepare};
 use super::raster::RasterArgs;
 use super::scene_args::warn_of_nothing_seen;
-use crate::doubtful::Doubtful;
 use crate::study::auto::{Budget, Known, Objective, Schedule, choose, search_frames};
 use crate::study::world::World;
+use crate::unstable_triangles::UnstableTriangles;
 use ::raster::lavapipe::{Lavapipe, device};
 use anyhow::ensure;
 use formats::textrace::{Choice, ChosenTechniques};
@@ -79,14 +79,14 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
     progress.stage("capturing", frames.len() as u64, "frames");
     let mut memory = Occlusion::default();
     let mut counts = CaptureCounts::default();
-    let (mut first, mut doubtful) = (None, Doubtful::default());
+    let (mut first, mut unstable) = (None, UnstableTriangles::default());
     for &frame in &frames {
         let planner = planners.of_frame(frame);
         let shot = world.shoot(&mut backend, planner, frame, &mut memory)?;
         if first.is_none() {
             first = Some(world.pictures(&mut backend, &shot)?);
             for eye in &world.views[frame as usize].eyes {
-                doubtful.look(&world.scene, &world.draws, eye, world.hmd.eye_size_px);
+                unstable.look(&world.scene, &world.draws, eye, world.hmd.eye_size_px);
             }
         }
         let job = world.job(planner);
@@ -101,7 +101,7 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
     if counts.fragments == 0 {
         warn_of_nothing_seen(&camera, world.bounds, world.scene.origin);
     }
-    for warning in doubtful.warnings(&world.scene, counts.fragments / u64::from(args.frames)) {
+    for warning in unstable.warnings(&world.scene, counts.fragments / u64::from(args.frames)) {
         shell::warn(&warning);
     }
     note(&format!(

@@ -4,8 +4,8 @@ use super::capture_steps::{TraceOutput, load, prepare_textures, warn_of_multivie
 use super::raster::{RasterArgs, cascades, shadow_range_m, tables};
 use super::raster_summary::{Summary, worked_since};
 use super::scene_args::SceneSetup;
-use crate::doubtful::Doubtful;
 use crate::study::processor;
+use crate::unstable_triangles::UnstableTriangles;
 use anyhow::ensure;
 use formats::textrace::Pass;
 use formats::view::FrameViews;
@@ -92,8 +92,8 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
         super::scene_args::warn_of_nothing_seen(&setup.camera, session.bounds, setup.scene.origin);
     }
     let per_frame = summary.counts.fragments / setup.frames.len().max(1) as u64;
-    let doubtful = summary.doubtful.unwrap_or_default();
-    for warning in doubtful.warnings(&setup.scene, per_frame) {
+    let unstable = summary.unstable.unwrap_or_default();
+    for warning in unstable.warnings(&setup.scene, per_frame) {
         shell::warn(&warning);
     }
     note(&texels);
@@ -209,10 +209,10 @@ impl<'a> Session<'a> {
     ) -> anyhow::Result<Option<Pictures>> {
         self.pose(views.frame);
         backend.pose(&self.draws);
-        if summary.doubtful.is_none() {
-            let doubtful = summary.doubtful.insert(Doubtful::default());
+        if summary.unstable.is_none() {
+            let unstable = summary.unstable.insert(UnstableTriangles::default());
             for eye in self.args.views {
-                doubtful.look(
+                unstable.look(
                     &self.setup.scene,
                     &self.draws,
                     &views.eyes[*eye as usize],

@@ -1,7 +1,7 @@
 //! What `tracegen raster` says when it is done: what was drawn, recorded and left out, and how long it took.
 
-use crate::doubtful::Doubtful;
 use crate::study::{memory, processor};
+use crate::unstable_triangles::UnstableTriangles;
 use formats::view::FrameViews;
 use raster::backend::{CaptureBackend, Work};
 use raster::capture::CaptureJob;
@@ -54,7 +54,7 @@ pub struct Summary {
     pub counts: CaptureCounts,
     pub predicted: Vec<Predicted>,
     /// Of the first frame.
-    pub doubtful: Option<Doubtful>,
+    pub unstable: Option<UnstableTriangles>,
     /// What is the same with and without capture.
     pub compared: Option<&'static str>,
     pub looking: Duration,

@@ -11,7 +11,7 @@ use formats::raytrace::{
     EyeCamera, RayKind, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
 };
 use formats::textrace::TraceMeta;
-use rays::frame::{Frame, trace_frame};
+use rays::frame::{RayFrame, trace_frame};
 use rays::picture;
 use rays::scene::TraceScene;
 use rays::tracer::TraceSettings;
@@ -194,7 +194,7 @@ fn trace(
     scene: &TraceScene,
     tables: &mut RaytraceTables,
     progress: &Progress,
-) -> anyhow::Result<(Frame, RaytraceWriter)> {
+) -> anyhow::Result<(RayFrame, RaytraceWriter)> {
     let settings = TraceSettings {
         max_depth: args.depth,
         samples_per_px: args.spp,
@@ -213,7 +213,7 @@ fn cannot_write(path: &Path) -> String {
     format!("cannot write {}", path.display())
 }
 
-fn image_file(frame: &Frame, path: &Path) -> anyhow::Result<AtomicFile> {
+fn image_file(frame: &RayFrame, path: &Path) -> anyhow::Result<AtomicFile> {
     let place = || cannot_write(path);
     let mut file = AtomicFile::create(path).with_context(place)?;
     picture::write_png(&frame.images, &mut file).with_context(place)?;
@@ -221,7 +221,7 @@ fn image_file(frame: &Frame, path: &Path) -> anyhow::Result<AtomicFile> {
 }
 
 /// The figures of a trace, on stderr: they vary from run to run.
-fn report(tables: &RaytraceTables, frame: &Frame, bytes: u64, at: [Duration; 3]) {
+fn report(tables: &RaytraceTables, frame: &RayFrame, bytes: u64, at: [Duration; 3]) {
     let (bvh, stats) = (&tables.bvh, &frame.stats);
     let [loaded, prepared, traced] = at.map(|t| t.as_secs_f64());
     let rays = stats.total_rays();

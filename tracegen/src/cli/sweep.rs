@@ -64,7 +64,7 @@ struct Planned {
 }
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct PlanDocument<'a> {
     schema: &'a str,
     tool: String,
     captures: Vec<PlannedCapture<'a>>,
@@ -222,7 +222,7 @@ fn plan_text(planned: &[Planned], json: bool) -> anyhow::Result<String> {
         cost: p.cost,
         done: p.done,
     });
-    Ok(serde_json::to_string(&Document {
+    Ok(serde_json::to_string(&PlanDocument {
         schema: PLAN_SCHEMA,
         tool: super::tool(),
         captures: captures.collect(),

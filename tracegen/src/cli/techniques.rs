@@ -9,7 +9,7 @@ use super::prepared::{Preparation, Prepared, prepare};
 use super::raster::{self, encoding_parser};
 use super::scene_args::{SceneArgs, SceneSetup};
 use crate::study::auto::{AutoRecord, Budget, Objective, choose};
-use crate::study::folder::{self, Folder, RowRecord, Subject};
+use crate::study::folder::{self, Folder, RowRecord, StudySetup};
 use crate::study::frames;
 use crate::study::measure::{Bench, Extent};
 use crate::study::rows::Row;
@@ -259,7 +259,7 @@ fn measure_auto(
 
 impl TechniquesArgs {
     /// What the study measures: its scene, path, display and device.
-    fn subject(&self, setup: &SceneSetup, gpu: &Gpu) -> anyhow::Result<Subject> {
+    fn subject(&self, setup: &SceneSetup, gpu: &Gpu) -> anyhow::Result<StudySetup> {
         let pixels_per_degree =
             image_error::pixels_per_degree(setup.hmd.eye_size_px[0], &setup.hmd.fov[0]);
         ensure!(
@@ -273,7 +273,7 @@ impl TechniquesArgs {
             None => extent.trace_frames.clone(),
             Some(_) => Vec::new(),
         };
-        Ok(Subject {
+        Ok(StudySetup {
             tool: super::tool(),
             scene: self.scene.scene.clone(),
             scene_triangles: setup.scene.triangle_count(),

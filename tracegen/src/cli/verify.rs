@@ -4,7 +4,7 @@ use super::cache_args::CacheArgs;
 use super::path_args::PathArgs;
 use super::raster::{cascades, prepare_environment, shadow_range_m, tables};
 use super::scene_args::{SceneArgs, SceneSetup};
-use crate::verify::frame::{Subject, TileChoice, Verified};
+use crate::verify::frame::{CaptureUnderTest, TileChoice, Verified};
 use crate::verify::report::{Report, SLOTS};
 use anyhow::{Context, ensure};
 use clap::Args;
@@ -149,7 +149,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         (Some(trace), _) => trace,
         (None, None) => unreachable!("a driver is opened where there is no trace"),
     };
-    let subject = Subject {
+    let subject = CaptureUnderTest {
         trace: &trace,
         scene: &setup.scene,
         draws: &draws,
@@ -304,7 +304,7 @@ fn capture(
 fn texels(
     job: &CaptureJob<'_>,
     setup: &SceneSetup,
-    subject: &Subject<'_>,
+    subject: &CaptureUnderTest<'_>,
     backend: &mut Lavapipe,
 ) -> anyhow::Result<Vec<Vec<Texels>>> {
     let frame = job.frame(&setup.frames[0])?;
@@ -322,7 +322,11 @@ fn texels(
         .collect()
 }
 
-fn write_reference(file: &Path, subject: &Subject<'_>, verified: &Verified) -> anyhow::Result<()> {
+fn write_reference(
+    file: &Path,
+    subject: &CaptureUnderTest<'_>,
+    verified: &Verified,
+) -> anyhow::Result<()> {
     let mut tables = subject.trace.tables().clone();
     let passes = subject.passes();
     let frame = passes.first().map_or(0, |(_, pass, _)| pass.frame);

@@ -8,11 +8,11 @@ use std::fmt::Write;
 #[derive(Debug, Serialize)]
 pub struct Report {
     schema: &'static str,
-    sweeps: Vec<Row>,
+    sweeps: Vec<SweepRow>,
 }
 
 #[derive(Debug, Serialize)]
-struct Row {
+struct SweepRow {
     name: &'static str,
     about: &'static str,
     bounds: Bounds,
@@ -30,7 +30,7 @@ impl Default for Report {
 
 impl Report {
     pub(super) fn add(&mut self, sweep: &Sweep, points: Vec<Point>) {
-        self.sweeps.push(Row {
+        self.sweeps.push(SweepRow {
             name: sweep.name,
             about: sweep.about,
             bounds: sweep.bounds,

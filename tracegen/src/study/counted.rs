@@ -8,7 +8,7 @@ use raster::backend::Work;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
-use techniques::plan::{FramePlan, Picture};
+use techniques::plan::{FramePlan, PictureSource};
 
 /// Bytes of a cache line.
 const LINE_BYTES: u64 = 64;
@@ -95,8 +95,8 @@ fn picture_bytes(plan: &FramePlan, occludes: bool) -> u64 {
     let written: u64 = layers.iter().sum();
     let depths = if occludes { 2 * written } else { 0 };
     let composed = plan.pictures.iter().map(|picture| match picture {
-        Picture::Layer(_) => 0,
-        Picture::Composed { size_px, parts } => {
+        PictureSource::Layer(_) => 0,
+        PictureSource::Composed { size_px, parts } => {
             let read: u64 = parts.iter().map(|part| layers[part.layer]).sum();
             read + area(*size_px)
         }

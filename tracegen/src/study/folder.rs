@@ -21,7 +21,7 @@ const SCHEMA: &str = "tracegen.techniques/1";
 
 /// What a study looks at and how: the manifest without its rows. Rows are kept as long as it stays.
 #[derive(Clone, Debug, Serialize)]
-pub struct Subject {
+pub struct StudySetup {
     /// Program and version.
     pub tool: String,
     /// Scene as given.
@@ -167,7 +167,7 @@ pub struct FrameRecord {
 struct Manifest<'a> {
     schema: &'static str,
     #[serde(flatten)]
-    subject: &'a Subject,
+    subject: &'a StudySetup,
     rows: &'a [RowRecord],
     #[serde(skip_serializing_if = "Option::is_none")]
     auto: Option<&'a AutoRecord>,
@@ -262,7 +262,7 @@ impl Folder {
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn create(root: &Path, subject: &Subject) -> anyhow::Result<Self> {
+    pub fn create(root: &Path, subject: &StudySetup) -> anyhow::Result<Self> {
         for folder in ["rows", "images", "traces"] {
             let path = root.join(folder);
             fs::create_dir_all(&path).with_context(|| cannot_write(&path))?;
@@ -373,7 +373,7 @@ impl Folder {
     /// It cannot be written.
     pub fn finish(
         &self,
-        subject: &Subject,
+        subject: &StudySetup,
         rows: &[RowRecord],
         auto: Option<&AutoRecord>,
         multiview_defect: Option<&str>,
@@ -429,8 +429,8 @@ fn cannot_write(path: &Path) -> String {
 mod tests {
     use super::*;
 
-    fn subject(frames: &[u32]) -> Subject {
-        Subject {
+    fn subject(frames: &[u32]) -> StudySetup {
+        StudySetup {
             tool: "test".into(),
             scene: "test".into(),
             scene_triangles: 1,

@@ -102,7 +102,7 @@ impl SampleCause {
 }
 
 /// A fragment's coordinates in one group, captured and as they should be.
-pub struct Subject<'a> {
+pub struct FragmentCoordinates<'a> {
     /// The primitive's coordinates.
     pub coordinates: &'a Coordinates<'a>,
     /// The fragment's pixel.
@@ -115,7 +115,7 @@ pub struct Subject<'a> {
     pub formula: LodFormula,
 }
 
-impl Subject<'_> {
+impl FragmentCoordinates<'_> {
     /// The cause of an error of the coordinates that a record has, `error` being these less the true ones, in repeats.
     #[must_use]
     pub fn of_uv(&self, record: &QuadRecord, error: DVec2) -> UvCause {

@@ -97,10 +97,10 @@ pub fn classify(
     let mut class = Class::Unexplained;
     for (_, earlier) in geometry.of_tile(tile).filter(|(other, _)| *other < index) {
         let distance = earlier.distance_px(pixel);
-        let doubtful = distance.abs() <= if earlier.clipped { CLIPPED_PX } else { EDGE_PX }
+        let borderline = distance.abs() <= if earlier.clipped { CLIPPED_PX } else { EDGE_PX }
             || earlier.dropped
             || earlier.height_px() <= SLIVER_PX;
-        if own(earlier) || (distance < 0.0 && !doubtful) {
+        if own(earlier) || (distance < 0.0 && !borderline) {
             continue;
         }
         let mode = geometry.call(earlier).mode;
@@ -123,7 +123,7 @@ pub fn classify(
         }
         if margin.abs() <= ALPHA {
             class = Class::AlphaBorder;
-        } else if doubtful && class == Class::Unexplained {
+        } else if borderline && class == Class::Unexplained {
             class = Class::Hidden;
         }
     }

@@ -1,7 +1,7 @@
 //! How well the tiles of a captured pass agree with the reference.
 
 use super::agreement::{Agreement, Read, Side};
-use super::causes::{LARGEST_DIFFERENCE, SMALL, Subject, UvCause};
+use super::causes::{FragmentCoordinates, LARGEST_DIFFERENCE, SMALL, UvCause};
 use super::classes::classify;
 use super::geometry::Geometry;
 use super::lod::{clamped, level_of_detail, taps};
@@ -155,7 +155,7 @@ impl Comparison<'_> {
             let record = &tile.records[lane.record as usize];
             let index = (fragment.pixel[0] & 1) | (fragment.pixel[1] & 1) << 1;
             let coordinates = geometry.coordinates(piece, &leader);
-            let subject = Subject {
+            let subject = FragmentCoordinates {
                 coordinates: &coordinates,
                 pixel: fragment.pixel,
                 extent: extent(group),
@@ -217,7 +217,7 @@ impl Comparison<'_> {
         record: &QuadRecord,
         lane: u32,
         group: &UvGroup,
-        subject: &Subject<'_>,
+        subject: &FragmentCoordinates<'_>,
         uv: UvCause,
         result: &mut Agreement,
     ) {
@@ -273,7 +273,7 @@ impl Comparison<'_> {
 /// Adds a lane's error to the means of its draw and group, and with the first lane of a record those of its
 /// differences over the quad.
 fn add_to_means(
-    subject: &Subject<'_>,
+    subject: &FragmentCoordinates<'_>,
     record: &QuadRecord,
     lane: u32,
     error: DVec2,

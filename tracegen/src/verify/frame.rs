@@ -19,7 +19,7 @@ use scene::Scene;
 use textures::TextureSet;
 
 /// What is verified, and by what.
-pub struct Subject<'a> {
+pub struct CaptureUnderTest<'a> {
     /// The capture.
     pub trace: &'a Textrace,
     /// Its scene, posed as it was captured.
@@ -63,7 +63,7 @@ pub struct Verified {
     pub reference: Vec<Vec<EncodedTile>>,
 }
 
-impl<'a> Subject<'a> {
+impl<'a> CaptureUnderTest<'a> {
     /// Checks that the trace is one of the scene's draws, pass by pass pictures of eyes.
     ///
     /// # Errors

@@ -116,7 +116,7 @@ pub fn least_work(
     costs: &Costs,
     nearest_m: f32,
 ) -> Option<f32> {
-    let mut frame = Frame::new(objects);
+    let mut frame = WorkSums::new(objects);
     // A depth at which a box begins or ends, and the box.
     let mut events: Vec<(f32, bool, &Object)> = objects
         .iter()
@@ -130,7 +130,7 @@ pub fn least_work(
     // At one depth what ends goes before what begins.
     events.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut least: Option<(f64, f32)> = None;
-    let mut consider = |frame: &Frame, split_m: f32| {
+    let mut consider = |frame: &WorkSums, split_m: f32| {
         let cost = frame.cost(split_m, pixels, costs);
         if least.is_none_or(|(known, _)| cost < known) {
             least = Some((cost, split_m));
@@ -161,7 +161,7 @@ pub fn least_work(
 }
 
 /// The sums of the model while the split moves away from the eyes.
-struct Frame {
+struct WorkSums {
     /// Draws and triangles, all of them.
     all: [f64; 2],
     /// Those that begin before the split.
@@ -174,7 +174,7 @@ struct Frame {
     beyond: [f64; 2],
 }
 
-impl Frame {
+impl WorkSums {
     fn new(objects: &[Object]) -> Self {
         let triangles = objects.iter().map(|o| f64::from(o.triangles)).sum();
         let all = [objects.len() as f64, triangles];

@@ -3,7 +3,7 @@
 use crate::Mask;
 use crate::eye::EyePicture;
 use crate::layer::{Layer, Stage};
-use crate::plan::{Filter, Part};
+use crate::plan::{Filter, PicturePart};
 use crate::start::Start;
 use formats::view::{Eye, EyeView, TILE_SIZE_PX};
 use glam::{DMat3, DMat4, DVec3, DVec4, Mat4};
@@ -116,8 +116,8 @@ impl Patch {
     }
 
     /// The part of the picture that it fills; `layer` is its position in the plan.
-    pub fn part(&self, layer: usize) -> Part {
-        Part {
+    pub fn part(&self, layer: usize) -> PicturePart {
+        PicturePart {
             layer,
             origin_px: self.origin_px,
             coarseness: self.coarseness,

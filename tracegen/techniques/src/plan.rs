@@ -12,14 +12,14 @@ pub struct FramePlan {
     /// The layers, in the order in which they are rendered and written as passes.
     pub layers: Vec<Layer>,
     /// The pictures that they become: one an eye, in the order of the eyes asked for.
-    pub pictures: Vec<Picture>,
+    pub pictures: Vec<PictureSource>,
     /// What the techniques promise of the frame.
     pub predicted: Predicted,
 }
 
 /// Where an eye's picture comes from.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Picture {
+pub enum PictureSource {
     /// It is a layer, by its position in the plan.
     Layer(usize),
     /// Parts of layers, each drawn over the ones before, on black.
@@ -27,13 +27,13 @@ pub enum Picture {
         /// Width and height of the picture.
         size_px: [u32; 2],
         /// The parts.
-        parts: Vec<Part>,
+        parts: Vec<PicturePart>,
     },
 }
 
 /// A part of a picture that a layer fills.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Part {
+pub struct PicturePart {
     /// Position of the layer in the plan.
     pub layer: usize,
     /// Left and top edge of the layer, in pixels of the picture.
@@ -59,7 +59,7 @@ pub enum Filter {
     /// The layer's mask leaves out 2x2 quads: their pixels are the mean of the linear interpolations
     /// along row and column between the nearest pixels that are there, in linear light. The others are copied.
     FillQuads,
-    /// Linear between the four nearest pixels of a layer that the picture is mapped to by [`Part::layer_from_px`], in
+    /// Linear between the four nearest pixels of a layer that the picture is mapped to by [`PicturePart::layer_from_px`], in
     /// linear light.
     Projective,
 }
@@ -90,8 +90,8 @@ impl FramePlan {
             })
         };
         let composed = self.pictures.iter().map(|picture| match picture {
-            Picture::Composed { size_px, .. } => bytes(*size_px),
-            Picture::Layer(_) => 0,
+            PictureSource::Composed { size_px, .. } => bytes(*size_px),
+            PictureSource::Layer(_) => 0,
         });
         let layers = || self.layers.iter().enumerate();
         let (kept, shared): (Vec<_>, Vec<_>) =
@@ -110,6 +110,6 @@ impl FramePlan {
     /// Whether a layer is the picture of an eye as it is.
     #[must_use]
     pub fn is_picture(&self, layer: usize) -> bool {
-        self.pictures.contains(&Picture::Layer(layer))
+        self.pictures.contains(&PictureSource::Layer(layer))
     }
 }

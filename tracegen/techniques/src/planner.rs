@@ -7,7 +7,7 @@ use crate::foveation::{lens_matched, multi_resolution, radial_density, rings};
 use crate::layer::Predicted;
 use crate::least_work::Object;
 use crate::patch::EyePatches;
-use crate::plan::{FramePlan, Picture};
+use crate::plan::{FramePlan, PictureSource};
 use crate::settings::FoveationKind;
 use crate::{Settings, hidden_area};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
@@ -156,8 +156,8 @@ impl Planner {
             own.map(|(layer, (_, patch))| (layer, *patch))
         };
         let picture = |(eye, made): (usize, &EyePatches)| match of_eye(eye).next() {
-            Some((layer, _)) if made.is_picture => Picture::Layer(layer),
-            _ => Picture::Composed {
+            Some((layer, _)) if made.is_picture => PictureSource::Layer(layer),
+            _ => PictureSource::Composed {
                 size_px: self.hmd.eye_size_px,
                 parts: (of_eye(eye))
                     .map(|(layer, patch)| made.patches[patch].part(layer))

@@ -30,7 +30,7 @@ pub struct Receivers {
 /// Where a point lies: bit per plane of the view and of a volume that has it outside; bit per volume that
 /// surely has it inside.
 #[derive(Clone, Copy)]
-struct Place {
+struct PointCode {
     outside_view: u8,
     outside: u32,
     inside: u32,
@@ -100,12 +100,12 @@ impl Receivers {
             let high_on = [i & 1 != 0, i & 2 != 0, i & 4 != 0];
             Vec3::select(high_on.into(), high, low)
         };
-        let places: Vec<Place> = (0..8).map(|i| self.place(corner(i), 0.0)).collect();
+        let places: Vec<PointCode> = (0..8).map(|i| self.place(corner(i), 0.0)).collect();
         if !self.is_new(&places) {
             return;
         }
         let m = &world_from_object.matrix3;
-        let places: Vec<Place> = positions
+        let places: Vec<PointCode> = positions
             .iter()
             .map(|p| {
                 // Rounding errors of the world position grow with the magnitude of its terms.
@@ -116,7 +116,7 @@ impl Receivers {
                 self.place(world_from_object.transform_point3(*p), terms.max_element())
             })
             .collect();
-        let anywhere = Place {
+        let anywhere = PointCode {
             outside_view: 0,
             outside: 0,
             inside: 0,
@@ -134,11 +134,11 @@ impl Receivers {
     }
 
     /// Whether the hull of `places` may be looked up in a volume that has not been found.
-    fn is_new(&self, places: &[Place]) -> bool {
+    fn is_new(&self, places: &[PointCode]) -> bool {
         (self.looked_up(places) & self.missing()) != 0
     }
 
-    fn find(&mut self, places: &[Place]) {
+    fn find(&mut self, places: &[PointCode]) {
         let bits = self.looked_up(places);
         for (number, found) in self.found.iter_mut().enumerate() {
             *found |= bits >> number & 1 == 1;
@@ -153,7 +153,7 @@ impl Receivers {
     }
 
     /// Bit per volume in which the hull of `places` may be looked up.
-    fn looked_up(&self, places: &[Place]) -> u32 {
+    fn looked_up(&self, places: &[PointCode]) -> u32 {
         let outside_view = places.iter().fold(!0, |all, p| all & p.outside_view);
         if outside_view != 0 {
             return 0;
@@ -173,7 +173,7 @@ impl Receivers {
         bits
     }
 
-    fn place(&self, point: Vec3, terms: f32) -> Place {
+    fn place(&self, point: Vec3, terms: f32) -> PointCode {
         let distance = |plane: &Vec4| plane.truncate().dot(point) + plane.w;
         // For the rounding of these sums and of the shader's.
         let rounding = |plane: &Vec4| {
@@ -192,7 +192,7 @@ impl Receivers {
         };
         let inside =
             |planes: &[Vec4; 5]| planes.iter().all(|plane| distance(plane) > rounding(plane));
-        Place {
+        PointCode {
             outside_view: bits(&self.view) as u8,
             outside: (0..)
                 .zip(&self.sides)

@@ -25,7 +25,7 @@ pub(super) struct Functions {
 const FIND_LOWEST: u32 = 73;
 
 /// Where a fragment is.
-struct Place {
+struct FragmentPlace {
     /// Lane of the quad.
     lane: Word,
     /// Column and row of the quad, and view.
@@ -185,7 +185,7 @@ impl Functions {
     }
 
     /// Where the fragment is.
-    fn place(&self, w: &mut Writer<'_>) -> Place {
+    fn place(&self, w: &mut Writer<'_>) -> FragmentPlace {
         let Types { f32, vec4, .. } = self.types;
         let Input { variable, .. } = self.inputs.frag_coord;
         let at = w.pure(Op::Load, vec4, &[variable]);
@@ -206,11 +206,11 @@ impl Functions {
             packed = w.unsigned(Op::BitwiseOr, &[packed, view]);
         }
         let own = w.unsigned(Op::ShiftLeftLogical, &[one, lane]);
-        Place { lane, packed, own }
+        FragmentPlace { lane, packed, own }
     }
 
     /// Lanes that come by: the lane itself where it cannot know the others.
-    fn lanes(&self, w: &mut Writer<'_>, place: &Place) -> Lanes {
+    fn lanes(&self, w: &mut Writer<'_>, place: &FragmentPlace) -> Lanes {
         let Types {
             uvec4, bool, u32, ..
         } = self.types;

@@ -17,13 +17,13 @@ enum Key {
     /// A value that only its id tells.
     Id(Word),
     /// An operation: opcode, type, and its operands.
-    Operation(Op, Word, Vec<Part>),
+    Operation(Op, Word, Vec<OperandKey>),
     /// What a pointer pointed to since some time.
     Memory(Number, u32),
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-enum Part {
+enum OperandKey {
     Number(Number),
     Literal(u32),
 }
@@ -111,9 +111,9 @@ impl Numbers {
         let mut parts = Vec::with_capacity(instruction.operands.len());
         for operand in &instruction.operands {
             parts.push(match operand {
-                Operand::IdRef(id) => Part::Number(self.of(*id)),
+                Operand::IdRef(id) => OperandKey::Number(self.of(*id)),
                 Operand::LiteralBit32(value) | Operand::LiteralExtInstInteger(value) => {
-                    Part::Literal(*value)
+                    OperandKey::Literal(*value)
                 }
                 _ => return Key::Id(id),
             });

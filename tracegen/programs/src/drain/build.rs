@@ -34,13 +34,13 @@ pub enum Merged {
 
 impl Merged {
     /// The draws that it is made of, and the eye that a record of some view belongs to.
-    fn parts(&self) -> Vec<(Executed, Part)> {
+    fn parts(&self) -> Vec<(Executed, RecordTarget)> {
         match *self {
-            Self::Shadow(draw) => vec![(draw, Part::Pass(draw.pass))],
-            Self::Mono(draw) => vec![(draw, Part::Both)],
-            Self::Multiview(draw, layers) => vec![(draw, Part::Layers(layers))],
+            Self::Shadow(draw) => vec![(draw, RecordTarget::Pass(draw.pass))],
+            Self::Mono(draw) => vec![(draw, RecordTarget::Both)],
+            Self::Multiview(draw, layers) => vec![(draw, RecordTarget::Layers(layers))],
             Self::Eyes(eyes) => (eyes.into_iter().zip([Eye::Left, Eye::Right]))
-                .filter_map(|(draw, eye)| Some((draw?, Part::Eye(eye))))
+                .filter_map(|(draw, eye)| Some((draw?, RecordTarget::Eye(eye))))
                 .collect(),
         }
     }
@@ -48,7 +48,7 @@ impl Merged {
 
 /// Where the records of a draw go.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Part {
+enum RecordTarget {
     Eye(Eye),
     Both,
     Layers([u32; 2]),
@@ -247,15 +247,17 @@ impl<W: Write + Seek> Builder<W> {
             let quads = self.quads(shader, &draws, of_part(executed));
             for (view, quad) in quads {
                 let (into, placement) = match *part {
-                    Part::Eye(Eye::Left) => (Into::Left, placements[0]),
-                    Part::Eye(Eye::Right) => (Into::Right, placements[1]),
-                    Part::Both => (Into::Both, placements[0]),
-                    Part::Layers(layers) => match layers.iter().position(|layer| *layer == view) {
-                        Some(0) => (Into::Left, placements[0]),
-                        Some(_) => (Into::Right, placements[1]),
-                        None => continue,
-                    },
-                    Part::Pass(pass) => match shadows.get(&pass) {
+                    RecordTarget::Eye(Eye::Left) => (Into::Left, placements[0]),
+                    RecordTarget::Eye(Eye::Right) => (Into::Right, placements[1]),
+                    RecordTarget::Both => (Into::Both, placements[0]),
+                    RecordTarget::Layers(layers) => {
+                        match layers.iter().position(|layer| *layer == view) {
+                            Some(0) => (Into::Left, placements[0]),
+                            Some(_) => (Into::Right, placements[1]),
+                            None => continue,
+                        }
+                    }
+                    RecordTarget::Pass(pass) => match shadows.get(&pass) {
                         Some((placement, _)) => (Into::Shadow(pass), *placement),
                         None => continue,
                     },

@@ -8,7 +8,7 @@ mod rules;
 pub use file::{FileError, RuleFile};
 pub use others::Other;
 
-use crate::session::{Frame, Session};
+use crate::session::{ProgramFrame, Session};
 use formats::view::Eye;
 use parallax_layer::spool::{DrawInfo, PassInfo, ViewInfo};
 use serde::{Deserialize, Serialize};
@@ -235,7 +235,7 @@ pub fn viewport(draw: &DrawInfo) -> View {
 
 /// Number of each draw's pass within its frame.
 #[must_use]
-pub fn pass_numbers(frame: &Frame) -> Vec<usize> {
+pub fn pass_numbers(frame: &ProgramFrame) -> Vec<usize> {
     let mut seen: Vec<u32> = Vec::new();
     let number = |draw: &crate::session::Executed| {
         let known = seen.iter().rposition(|pass| *pass == draw.pass);
@@ -253,7 +253,7 @@ pub fn pass_numbers(frame: &Frame) -> Vec<usize> {
 /// No rule fits.
 pub fn find(
     session: &Session,
-    frame: &Frame,
+    frame: &ProgramFrame,
     weights: &[u64],
     wanted: &Wanted,
 ) -> Result<Views, ViewsError> {

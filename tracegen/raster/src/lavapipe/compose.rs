@@ -8,7 +8,7 @@ use super::whole::{OverLayer, Whole};
 use crate::error::RasterError;
 use formats::view::TILE_SIZE_PX;
 use techniques::Mask;
-use techniques::plan::{Filter, Part};
+use techniques::plan::{Filter, PicturePart};
 use wgpu::util::DeviceExt;
 
 /// Pipelines that mask layers and compose pictures.
@@ -22,7 +22,7 @@ pub struct Composer {
     absent: wgpu::TextureView,
 }
 
-/// The shader's `Part`.
+/// The shader's `PicturePart`.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct PartData {
@@ -99,7 +99,7 @@ impl Composer {
         &self,
         gpu: &Gpu,
         picture: &ColorTarget,
-        parts: &[(&Part, &LayerTarget)],
+        parts: &[(&PicturePart, &LayerTarget)],
     ) -> Result<(), RasterError> {
         let unmasked = self.mask_bindings(gpu, &self.absent);
         gpu.checked("composing a picture", || {
@@ -144,7 +144,7 @@ impl Composer {
         })
     }
 
-    fn bind_part(&self, gpu: &Gpu, part: &Part, layer: &LayerTarget) -> wgpu::BindGroup {
+    fn bind_part(&self, gpu: &Gpu, part: &PicturePart, layer: &LayerTarget) -> wgpu::BindGroup {
         let data = PartData {
             origin: part.origin_px.map(|px| px as i32),
             coarseness: part.coarseness.map(|n| n as i32),

@@ -39,7 +39,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use targets::{ColorTarget, LayerMask, LayerTarget, ShadowMaps};
 use techniques::Start;
-use techniques::plan::Picture;
+use techniques::plan::PictureSource;
 use techniques::start::Opening;
 use textures::TextureSet;
 use upload::SceneBuffers;
@@ -586,7 +586,7 @@ impl CaptureBackend for Lavapipe {
         let start = Instant::now();
         let mut composes = false;
         for (number, picture) in frame.plan.pictures.iter().enumerate() {
-            let Picture::Composed { size_px, parts } = picture else {
+            let PictureSource::Composed { size_px, parts } = picture else {
                 continue;
             };
             composes = true;
@@ -624,8 +624,8 @@ impl CaptureBackend for Lavapipe {
 
     fn picture(&mut self, frame: &Frame, number: usize) -> Result<Vec<u8>, RasterError> {
         let picture = match frame.plan.pictures[number] {
-            Picture::Layer(layer) => &self.target(layer)?.color,
-            Picture::Composed { .. } => (self.composed.get(number).and_then(Option::as_ref))
+            PictureSource::Layer(layer) => &self.target(layer)?.color,
+            PictureSource::Composed { .. } => (self.composed.get(number).and_then(Option::as_ref))
                 .ok_or_else(|| {
                     RasterError::Scene(format!("picture {number} has not been composed"))
                 })?,

@@ -29,7 +29,7 @@ use scene::Scene;
 use std::time::Instant;
 use targets::{ShadowMaps, Target};
 use techniques::Start;
-use techniques::plan::Picture;
+use techniques::plan::PictureSource;
 use textures::TextureSet;
 use upload::SceneObjects;
 
@@ -360,7 +360,7 @@ impl CaptureBackend for Osmesa {
     }
 
     fn compose(&mut self, frame: &Frame) -> Result<(), RasterError> {
-        let is_layer = |picture: &Picture| matches!(picture, Picture::Layer(_));
+        let is_layer = |picture: &PictureSource| matches!(picture, PictureSource::Layer(_));
         if frame.plan.pictures.iter().all(is_layer) {
             return Ok(());
         }
@@ -375,7 +375,7 @@ impl CaptureBackend for Osmesa {
     }
 
     fn picture(&mut self, frame: &Frame, number: usize) -> Result<Vec<u8>, RasterError> {
-        let Picture::Layer(layer) = frame.plan.pictures[number] else {
+        let PictureSource::Layer(layer) = frame.plan.pictures[number] else {
             return self.lacks("pictures that are composed of layers");
         };
         let target = self.rendered(layer)?;

@@ -1,6 +1,6 @@
 //! Wheels, lamps, mirrors, seams and the other small parts of the car.
 
-use super::Kit;
+use super::CarMaterials;
 use super::body::{self, AXLES, TYRE};
 use crate::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
 use crate::scene_builder::SceneBuilder;
@@ -10,7 +10,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 /// Half the width of a tyre, metres. Wheels turn about y; their outside is at +y.
 const HALF_WIDTH: f32 = 0.118;
 
-pub(super) fn wheels(scene: &mut SceneBuilder, kit: &Kit) {
+pub(super) fn wheels(scene: &mut SceneBuilder, kit: &CarMaterials) {
     let tyre = scene.mesh("tyre", tyre(), kit.tyre);
     let rim = scene.mesh("rim", rim(), kit.alloy);
     let disc = scene.mesh("brake-disc", brake_disc(), kit.brake);
@@ -261,7 +261,7 @@ struct Details {
     paint: MeshBuilder,
 }
 
-pub(super) fn details(scene: &mut SceneBuilder, kit: &Kit) {
+pub(super) fn details(scene: &mut SceneBuilder, kit: &CarMaterials) {
     scene.add("panel-gaps", panel_gaps(), kit.trim);
     let mut details = Details::default();
     for side in [-1.0f32, 1.0] {

@@ -1,6 +1,6 @@
 //! The still: burner, retort, condenser, receiver and the stand that holds them.
 
-use super::{Kit, Ware, at, vessel};
+use super::{LabMaterials, Ware, at, vessel};
 use crate::glassware::{glass_tube, helix, round_flask, stopper};
 use crate::mesh_builder::{Knot, MeshBuilder, curve, lathed, sharp, smooth};
 use crate::noise::smoothstep;
@@ -14,7 +14,7 @@ const AXIS_Z: f32 = 0.0;
 /// Height of the retort's bottom, metres.
 const LIFT: f32 = 0.131;
 
-pub(super) fn distillation(scene: &mut SceneBuilder, kit: &Kit) {
+pub(super) fn distillation(scene: &mut SceneBuilder, kit: &LabMaterials) {
     burner(scene, kit);
     hose(scene, kit);
     let neck_end = retort(scene, kit);
@@ -26,7 +26,7 @@ pub(super) fn distillation(scene: &mut SceneBuilder, kit: &Kit) {
     scene.add("stand", metal, kit.steel);
 }
 
-fn burner(scene: &mut SceneBuilder, kit: &Kit) {
+fn burner(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let mut burner = MeshBuilder::new();
     let body = [
         sharp(0.0, 0.0),
@@ -65,7 +65,7 @@ fn burner(scene: &mut SceneBuilder, kit: &Kit) {
     scene.place(flame, at(AXIS_X, 0.0, AXIS_Z));
 }
 
-fn hose(scene: &mut SceneBuilder, kit: &Kit) {
+fn hose(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let hose: Vec<(Vec3, f32)> = (0..=24)
         .map(|i| {
             let t = i as f32 / 24.0;
@@ -85,7 +85,7 @@ fn hose(scene: &mut SceneBuilder, kit: &Kit) {
 }
 
 /// A bulb whose neck bends over into the condenser; returns the neck's end.
-fn retort(scene: &mut SceneBuilder, kit: &Kit) -> Vec3 {
+fn retort(scene: &mut SceneBuilder, kit: &LabMaterials) -> Vec3 {
     let bulb = round_flask(0.045, 0.012, 1);
     vessel(
         scene,
@@ -114,7 +114,7 @@ fn retort(scene: &mut SceneBuilder, kit: &Kit) -> Vec3 {
 }
 
 /// Jacket, coil and nozzles, at a slant below the neck's end; returns the point below the outlet.
-fn condenser(scene: &mut SceneBuilder, kit: &Kit, neck_end: Vec3) -> Vec3 {
+fn condenser(scene: &mut SceneBuilder, kit: &LabMaterials, neck_end: Vec3) -> Vec3 {
     let slant = Affine3A::from_rotation_translation(
         Quat::from_rotation_z(0.42),
         neck_end + vec3(0.022, -0.175, 0.0),
@@ -161,7 +161,7 @@ fn condenser(scene: &mut SceneBuilder, kit: &Kit, neck_end: Vec3) -> Vec3 {
 }
 
 /// The flask below the condenser, on a ring of cork.
-fn receiver(scene: &mut SceneBuilder, kit: &Kit, outlet: Vec3) {
+fn receiver(scene: &mut SceneBuilder, kit: &LabMaterials, outlet: Vec3) {
     let flask = round_flask(0.031, 0.022, 1);
     let low = (outlet.y - 0.088).max(0.012);
     vessel(

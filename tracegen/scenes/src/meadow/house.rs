@@ -1,7 +1,7 @@
 //! The farm house: walls with recessed openings, shutters, tiled roof, barn.
 
 use super::parts;
-use super::{HOUSE, Kit, ground};
+use super::{HOUSE, MeadowMaterials, ground};
 use crate::mesh_builder::MeshBuilder;
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
@@ -64,7 +64,7 @@ const DEPTH: f32 = 6.0;
 const EAVES: f32 = 4.9;
 const RISE: f32 = 1.75;
 
-pub(super) fn farm_house(scene: &mut SceneBuilder, kit: &Kit) {
+pub(super) fn farm_house(scene: &mut SceneBuilder, kit: &MeadowMaterials) {
     let mut house = House::default();
     house.facades();
     house.gables();

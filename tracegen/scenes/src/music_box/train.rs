@@ -1,6 +1,6 @@
 //! The music box's gear train, governor, bells and fittings.
 
-use super::{CYLINDER, CYLINDER_HALF, Kit, MODULE};
+use super::{CYLINDER, CYLINDER_HALF, MODULE, MusicBoxMaterials};
 use crate::gears::{Gear, placed, screw, worm};
 use crate::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
 use crate::scene_builder::SceneBuilder;
@@ -8,7 +8,7 @@ use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
 /// Spring barrel, great wheel, intermediate wheels and the governor.
-pub(super) fn train(scene: &mut SceneBuilder, kit: &Kit) {
+pub(super) fn train(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     // Gears stand in planes of constant x: their z axis turns to +x.
     let facing = Quat::from_rotation_y(FRAC_PI_2);
     let wheel = |teeth: u32, thickness: f32, spokes: u32| Gear {
@@ -103,7 +103,7 @@ pub(super) fn train(scene: &mut SceneBuilder, kit: &Kit) {
 }
 
 /// Worm and fan: an upright endless screw with two vanes.
-fn governor(scene: &mut SceneBuilder, kit: &Kit) {
+fn governor(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let foot = vec3(-0.071, 0.010, 0.022);
     let upright = Quat::from_rotation_x(-FRAC_PI_2);
     let thread = scene.mesh("worm", worm(0.0016, 0.014, 9.0, 18), kit.steel);
@@ -140,7 +140,7 @@ fn governor(scene: &mut SceneBuilder, kit: &Kit) {
 }
 
 /// Six bells on a rod behind the cylinder, largest on the left, each with its hammer.
-pub(super) fn bells(scene: &mut SceneBuilder, kit: &Kit) {
+pub(super) fn bells(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let mut bell = MeshBuilder::new();
     let skin = [
         sharp(0.0, 1.0),
@@ -217,13 +217,13 @@ pub(super) fn bells(scene: &mut SceneBuilder, kit: &Kit) {
 }
 
 /// Bedplate, spring barrels and the winding key.
-pub(super) fn fittings(scene: &mut SceneBuilder, kit: &Kit) {
+pub(super) fn fittings(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     bedplate(scene, kit);
     spring_barrels(scene, kit);
     winding_key(scene, kit);
 }
 
-fn bedplate(scene: &mut SceneBuilder, kit: &Kit) {
+fn bedplate(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let mut bed = MeshBuilder::new();
     bed.block(
         vec3(-0.080, 0.0066, -0.042),
@@ -250,7 +250,7 @@ fn bedplate(scene: &mut SceneBuilder, kit: &Kit) {
 }
 
 /// Barrels behind the cylinder, their mainsprings seen from above.
-fn spring_barrels(scene: &mut SceneBuilder, kit: &Kit) {
+fn spring_barrels(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let mut barrel = MeshBuilder::new();
     let (r, h) = (0.0085, 0.012);
     barrel.lathe(
@@ -304,7 +304,7 @@ fn spring_barrels(scene: &mut SceneBuilder, kit: &Kit) {
 }
 
 /// The key in the front of the box.
-fn winding_key(scene: &mut SceneBuilder, kit: &Kit) {
+fn winding_key(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let mut key = lathed(
         &curve(
             &[

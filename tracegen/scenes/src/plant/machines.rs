@@ -1,7 +1,7 @@
 //! What stands in the plant: tanks, pumps, machines, conveyors, racks and their loads, and the
 //! crane, each about its own origin on the floor.
 
-use super::materials::Kit;
+use super::materials::PlantMaterials;
 use super::parts::{NAVE_M, bar};
 use crate::mesh_builder::{MeshBuilder, lathed, sharp, smooth};
 use crate::scene_builder::SceneBuilder;
@@ -419,7 +419,7 @@ fn bench() -> MeshBuilder {
 }
 
 /// Adds the machines.
-pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
+pub(super) fn machines(scene: &mut SceneBuilder, kit: &PlantMaterials) -> Machines {
     let mut add = |name: &str, m: MeshBuilder, material| scene.mesh(name, m, material);
     Machines {
         tank: add("tank", tank(), kit.stainless),

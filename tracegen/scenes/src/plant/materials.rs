@@ -11,7 +11,7 @@ use std::f32::consts::TAU;
 /// Services that pipes carry, by the colour of their paint.
 pub(super) const SERVICES: usize = 6;
 
-pub(super) struct Kit {
+pub(super) struct PlantMaterials {
     pub(super) floor: MaterialId,
     pub(super) wall: MaterialId,
     pub(super) roof: MaterialId,
@@ -114,12 +114,12 @@ fn plain(
     scene.plain(name, rgb(color), roughness, |m| m.emissive = emissive)
 }
 
-pub(super) fn kit(scene: &mut SceneBuilder) -> Kit {
+pub(super) fn kit(scene: &mut SceneBuilder) -> PlantMaterials {
     use Maps::{Color, ColorNormal, Full};
     let stainless = metal(rgb(0xc6cacc), rgb(0x8a7a66), 0.15, 0.32);
     let pallet_wood = planks([rgb(0xb98d58), rgb(0x8d6638)], 6, 0.85);
     let dark = Vec3::ZERO;
-    Kit {
+    PlantMaterials {
         pipes: pipes(scene),
         floor: textured(scene, "floor", 1024, Full, 6.0, concrete()),
         wall: textured(

@@ -2,8 +2,8 @@
 //!
 //! Long parts run along +z from their origin; what stands on the floor has its origin there.
 
-use super::materials::{Kit, SERVICES};
-use crate::mesh_builder::{Frame, Knot, MeshBuilder, lathed, sharp, smooth};
+use super::materials::{PlantMaterials, SERVICES};
+use crate::mesh_builder::{Knot, MeshBuilder, SweepFrame, lathed, sharp, smooth};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -71,7 +71,7 @@ fn prism(outline: &[[f32; 2]], length: f32) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     let mut knots: Vec<Knot> = outline.iter().map(|p| sharp(p[0], p[1])).collect();
     knots.extend(knots.first().copied());
-    let frame = |z: f32| Frame {
+    let frame = |z: f32| SweepFrame {
         origin: Vec3::Z * z,
         right: Vec3::X,
         up: Vec3::Y,
@@ -528,7 +528,7 @@ fn sign() -> MeshBuilder {
 }
 
 /// Flat sheets: slab, lane, wall, window, roof deck and sky light.
-fn panels(scene: &mut SceneBuilder, kit: &Kit) -> [usize; 6] {
+fn panels(scene: &mut SceneBuilder, kit: &PlantMaterials) -> [usize; 6] {
     let mut panel = |name: &str, corner: Vec3, right: Vec3, up: Vec3, material| {
         let mut m = MeshBuilder::new();
         m.panel(corner, right, up, 1, 1);
@@ -578,7 +578,7 @@ fn panels(scene: &mut SceneBuilder, kit: &Kit) -> [usize; 6] {
 }
 
 /// Pipes, spools and elbows, each by size and service.
-fn pipes(scene: &mut SceneBuilder, kit: &Kit) -> [[[usize; SERVICES]; 3]; 3] {
+fn pipes(scene: &mut SceneBuilder, kit: &PlantMaterials) -> [[[usize; SERVICES]; 3]; 3] {
     let services = ["water", "air", "gas", "fire", "steam", "acid"];
     let mut each = |what: &str, mesh: &dyn Fn(usize) -> MeshBuilder| {
         std::array::from_fn(|size| {
@@ -599,7 +599,7 @@ fn pipes(scene: &mut SceneBuilder, kit: &Kit) -> [[[usize; SERVICES]; 3]; 3] {
 }
 
 /// Adds the parts.
-pub(super) fn parts(scene: &mut SceneBuilder, kit: &Kit) -> Parts {
+pub(super) fn parts(scene: &mut SceneBuilder, kit: &PlantMaterials) -> Parts {
     let [slab, lane, wall, window, deck, sky_light] = panels(scene, kit);
     let [pipe, spool, elbow] = pipes(scene, kit);
     let flange = std::array::from_fn(|size| {

@@ -1,6 +1,6 @@
 //! From a budget to what every frame of a path is rendered with.
 
-use super::{AutoRecord, Bench, Budget, Held, Known, Objective, hold, search};
+use super::{AutoRecord, Budget, Held, Known, Objective, SearchBench, hold, search};
 use crate::study::measure::{Extent, median_s};
 use crate::study::rows::{Part, Row};
 use crate::study::world::World;
@@ -65,7 +65,7 @@ pub fn choose(
         options.len() as u64 + 1,
         "techniques alone, and combinations",
     );
-    let mut bench = Bench {
+    let mut bench = SearchBench {
         is_software: backend.is_software(),
         world,
         backend,

@@ -38,7 +38,7 @@ pub struct Seen {
 }
 
 /// Renders combinations and the baseline beside them.
-pub struct Bench<'a> {
+pub struct SearchBench<'a> {
     /// Scene and path.
     pub world: &'a mut World,
     /// The device.
@@ -63,7 +63,7 @@ pub struct Bench<'a> {
     pub progress: &'a Progress,
 }
 
-impl Bench<'_> {
+impl SearchBench<'_> {
     /// The error of a combination in a frame, in the budget's unit, after the frame before it.
     ///
     /// # Errors
@@ -242,7 +242,7 @@ impl Bench<'_> {
     }
 }
 
-impl Judge for Bench<'_> {
+impl Judge for SearchBench<'_> {
     type Error = anyhow::Error;
 
     fn can(&self, row: &Row) -> bool {

@@ -15,7 +15,7 @@ mod tests;
 pub use budget::Budget;
 pub use choose::{choose, search_frames};
 pub use guard::{Held, hold};
-pub use judge::{Bench, Known};
+pub use judge::{Known, SearchBench};
 pub use objective::Objective;
 pub use record::AutoRecord;
 pub use schedule::Schedule;

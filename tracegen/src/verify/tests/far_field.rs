@@ -102,7 +102,7 @@ fn corridor() -> Scene {
 }
 
 /// What one frame came to.
-struct Frame {
+struct RenderedFrame {
     pictures: Vec<Vec<u8>>,
     /// Depths of each layer; none without a far field.
     depths: Vec<Vec<f32>>,
@@ -115,20 +115,20 @@ fn draw(
     draws: &DrawList,
     planner: &Planner,
     views: &FrameViews,
-) -> Frame {
+) -> RenderedFrame {
     let job = job(scene, draws, planner);
     let frame = job.frame(views).unwrap();
     job.light(backend, &frame).unwrap();
     let (pictures, _) = job.plain_frame(backend, &frame).unwrap();
     let layers = 0..frame.plan.layers.len();
-    Frame {
+    RenderedFrame {
         pictures,
         depths: layers.map(|layer| backend.depths(layer).unwrap()).collect(),
         plan: frame.plan,
     }
 }
 
-fn composition(frame: &Frame, eye: usize) -> &Composition {
+fn composition(frame: &RenderedFrame, eye: usize) -> &Composition {
     match &frame.plan.layers[3 + eye].start {
         Start::Composed(composition) => composition,
         other => panic!("layer {} starts with {other:?}", 3 + eye),
@@ -248,7 +248,7 @@ fn a_far_field_is_captured_as_it_is_drawn_and_records_far_pixels_once() {
 }
 
 /// Distances between where far points are drawn and where they are, in pixels of the eyes, ascending.
-fn shifts(frame: &Frame, views: &FrameViews, size_px: [u32; 2]) -> Vec<f32> {
+fn shifts(frame: &RenderedFrame, views: &FrameViews, size_px: [u32; 2]) -> Vec<f32> {
     let clip = |view: &formats::view::EyeView| -> DMat4 {
         let [projection, pose] = [view.eye_to_clip, view.world_to_eye];
         Mat4::from_cols_array_2d(&projection).as_dmat4()

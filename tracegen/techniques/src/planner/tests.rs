@@ -3,7 +3,7 @@ use crate::Mask;
 use crate::gaze::Gaze;
 use crate::hidden_mesh::HiddenMesh;
 use crate::layer::Layer;
-use crate::plan::{Filter, Part};
+use crate::plan::{Filter, PicturePart};
 use crate::settings::{FarField, Foveation, Rates, Reprojection, Split, Variant};
 use formats::view::{EyeView, FovTangents};
 
@@ -67,7 +67,7 @@ fn all() -> Vec<Settings> {
 }
 
 /// What the pixels of a layer are read for a pixel of the picture.
-fn taps(part: &Part, layer: &Layer, pixel: [u32; 2]) -> Vec<[u32; 2]> {
+fn taps(part: &PicturePart, layer: &Layer, pixel: [u32; 2]) -> Vec<[u32; 2]> {
     let own = [0, 1].map(|axis: usize| pixel[axis] - part.origin_px[axis]);
     match part.filter {
         Filter::Projective => {
@@ -125,7 +125,7 @@ fn each_shown_pixel_comes_of_one_part_and_of_pixels_that_are_drawn() {
             let plan = plan(&settings, &hmd);
             for (eye, picture) in plan.pictures.iter().enumerate() {
                 let whole = match picture {
-                    Picture::Layer(layer) => vec![Part {
+                    PictureSource::Layer(layer) => vec![PicturePart {
                         layer: *layer,
                         origin_px: [0, 0],
                         coarseness: [1, 1],
@@ -133,7 +133,7 @@ fn each_shown_pixel_comes_of_one_part_and_of_pixels_that_are_drawn() {
                         filter: Filter::Copy,
                         layer_from_px: None,
                     }],
-                    Picture::Composed { parts, .. } => parts.clone(),
+                    PictureSource::Composed { parts, .. } => parts.clone(),
                 };
                 let lens = Lens::of(&hmd.fov[eye]);
                 for pixel in (0..size_px[1]).flat_map(|y| (0..size_px[0]).map(move |x| [x, y])) {
@@ -142,13 +142,13 @@ fn each_shown_pixel_comes_of_one_part_and_of_pixels_that_are_drawn() {
                     {
                         continue;
                     }
-                    let fills = |part: &&Part| {
+                    let fills = |part: &&PicturePart| {
                         let tile = pixel.map(|px| px / 16);
                         part.tiles
                             .as_ref()
                             .is_none_or(|tiles| tiles.get(tile[0], tile[1]))
                     };
-                    let filling: Vec<&Part> = whole.iter().filter(fills).collect();
+                    let filling: Vec<&PicturePart> = whole.iter().filter(fills).collect();
                     assert_eq!(filling.len(), 1, "{settings:?} {pixel:?}");
                     let part = filling[0];
                     let layer = &plan.layers[part.layer];
@@ -189,7 +189,7 @@ fn a_layers_pixels_look_where_the_pictures_pixels_that_they_cover_look() {
             .plan(&views, Vec::new)
             .unwrap();
         for picture in &plan.pictures {
-            let Picture::Composed { parts, .. } = picture else {
+            let PictureSource::Composed { parts, .. } = picture else {
                 continue;
             };
             for part in parts {
@@ -381,7 +381,10 @@ fn a_headsets_mesh_masks_a_picture_in_place_of_the_lens() {
         ..Settings::default()
     };
     let made = plan(&settings, &hmd);
-    assert_eq!(made.pictures, [Picture::Layer(0), Picture::Layer(1)]);
+    assert_eq!(
+        made.pictures,
+        [PictureSource::Layer(0), PictureSource::Layer(1)]
+    );
     for (layer, shown) in made.layers.iter().zip([
         (|x, _| x >= 64) as fn(u32, u32) -> bool,
         // Rows count downwards, the mesh upwards.

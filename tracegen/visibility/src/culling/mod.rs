@@ -23,7 +23,7 @@ use crate::volume::{Prepared, Volume, frustum};
 use glam::{DVec3, Mat4};
 
 /// What the volumes of a frame follow from.
-pub(crate) struct Frame<'a> {
+pub(crate) struct CullInput<'a> {
     rig: &'a Rig,
     /// Frame number: its parity chooses the eye of round-robin techniques.
     number: u32,
@@ -46,7 +46,7 @@ impl Hierarchy {
     /// # Errors
     /// Eyes that the technique cannot lay one volume around.
     pub fn volumes(&self, rig: &Rig, culling: Culling, frame: u32) -> Result<Volumes, TooWide> {
-        culling.volumes(&Frame {
+        culling.volumes(&CullInput {
             rig,
             number: frame,
             extent: self.extent(),

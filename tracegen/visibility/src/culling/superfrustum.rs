@@ -5,13 +5,13 @@
 //! `tan_v * far / (far + recession)`. Here the planes are laid around the corners of both frusta,
 //! which gives the same for parallel eyes and holds for canted and asymmetric ones.
 
-use super::{Frame, Volumes};
+use super::{CullInput, Volumes};
 use crate::rig::{Eye, MAX_COMBINED_DEG, Rig, TooWide};
 use crate::volume::{HalfSpace, Volume};
 use glam::DVec3;
 
 /// The superfrustum.
-pub(super) fn volumes(frame: &Frame<'_>) -> Result<Volumes, TooWide> {
+pub(super) fn volumes(frame: &CullInput<'_>) -> Result<Volumes, TooWide> {
     let planes = Superfrustum::new(frame.rig, frame.extent)?.planes;
     Ok(Volumes::Any(vec![Volume::new(planes, None)]))
 }

@@ -30,7 +30,7 @@ const SAME_PLACE_PX: f64 = 1.0 / 16.0;
 /// depths a further one goes unnoticed, where the time for a stack would grow with the square of its height.
 const MOST_DEPTHS: usize = 64;
 
-/// What a view shows of a kind of doubtful triangles.
+/// What a view shows of a kind of unstable triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Kind {
     triangles: u64,
@@ -49,7 +49,7 @@ impl Kind {
 
 /// Doubtful triangles of some views.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Doubtful {
+pub struct UnstableTriangles {
     thin: Kind,
     coincident: Kind,
 }
@@ -73,7 +73,7 @@ struct Shown {
     double_sided: bool,
 }
 
-impl Doubtful {
+impl UnstableTriangles {
     /// Looks at a view.
     pub fn look(&mut self, scene: &Scene, draws: &DrawList, view: &EyeView, size_px: [u32; 2]) {
         let wide = |m: &[[f32; 4]; 4]| Mat4::from_cols_array_2d(m).as_dmat4();
@@ -317,18 +317,18 @@ mod tests {
     }
 
     #[test]
-    fn few_doubtful_pixels_are_no_warning() {
-        let mut doubtful = Doubtful::default();
-        doubtful.thin.add(1.0, 0);
+    fn few_unstable_pixels_are_no_warning() {
+        let mut unstable = UnstableTriangles::default();
+        unstable.thin.add(1.0, 0);
         let scene = Scene {
             meshes: vec![scene::Mesh::default()],
             ..Scene::default()
         };
-        assert!(doubtful.warnings(&scene, 1_000_000).is_empty());
-        let said = doubtful.warnings(&scene, 100);
+        assert!(unstable.warnings(&scene, 1_000_000).is_empty());
+        let warnings = unstable.warnings(&scene, 100);
         assert!(
-            said[0].contains("1 triangles are thinner than 1/256 pixel"),
-            "{said:?}"
+            warnings[0].contains("1 triangles are thinner than 1/256 pixel"),
+            "{warnings:?}"
         );
     }
 }
