@@ -19,16 +19,16 @@ use std::time::{Duration, Instant};
 pub struct AppArgs {
     #[command(flatten)]
     capture: ProgramArgs,
-    /// What ends a frame.
+    /// Event that ends a frame.
     #[arg(long, value_parser = frames_by_parser(), value_name = "BY", default_value = "auto")]
     frames_by: FramesBy,
-    /// The program uses OpenGL: run it on Mesa's zink, which is OpenGL on Vulkan.
+    /// The program uses OpenGL: run it on Mesa's zink, an OpenGL implementation on Vulkan.
     #[arg(long)]
     gl: bool,
-    /// Let the program run to its end. By default it is asked to end after the last frame.
+    /// Let the program run to its end. By default it is terminated after the last frame.
     #[arg(long)]
     to_end: bool,
-    /// Seconds after which a program that has not rendered the frames is ended.
+    /// Timeout in seconds; a program that has not rendered the frames by then is terminated.
     #[arg(long, value_name = "SECONDS", default_value_t = 600)]
     timeout: u64,
     /// The program and its arguments.
@@ -84,7 +84,7 @@ pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
         .finish(&mut session, program, &settings, BTreeMap::new())
 }
 
-/// Name of a program in messages: its file's.
+/// Name of a program in messages: its file name.
 fn program_name(program: &[OsString]) -> String {
     let path = program
         .first()
@@ -93,7 +93,7 @@ fn program_name(program: &[OsString]) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// Runs the program until it has rendered its frames, or ends.
+/// Runs the program until it has rendered its frames or ends.
 fn run_program(args: &AppArgs, launch: &Launch, program: &str) -> anyhow::Result<Ended> {
     let Some((first, rest)) = args.program.split_first() else {
         bail!("expected a program, found none");

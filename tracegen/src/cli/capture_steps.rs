@@ -76,7 +76,7 @@ impl<'a> TraceOutput<'a> {
         })
     }
 
-    /// Writes the picture and the trace, which appear both or not at all. Returns the trace's bytes.
+    /// Writes the picture and the trace; both appear or neither does. Returns the size of the trace in bytes.
     pub fn finish(self, pictures: Option<&Pictures>, size_px: [u32; 2]) -> anyhow::Result<u64> {
         let cannot_write = |path: &Path| format!("cannot write {}", path.display());
         let image = match (self.image, pictures) {

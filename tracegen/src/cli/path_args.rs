@@ -1,4 +1,4 @@
-//! Flags that say where the head goes.
+//! Flags for the path of the head.
 
 use super::choice::choice;
 use clap::Args;
@@ -11,18 +11,18 @@ use std::path::PathBuf;
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Camera")]
 pub struct PathArgs {
-    /// Where the head goes: `walk` (slowly ahead), `head` (a model of a person who looks around),
-    /// a CSV file of poses, or a glTF file's animated camera.
+    /// Path of the head: `walk` (slowly ahead), `head` (a model of a person who looks around), a CSV file of
+    /// poses, or a glTF file's animated camera.
     #[arg(
         long,
         value_name = "walk|head|FILE.csv|FILE.gltf[#CAMERA]",
         default_value = "walk"
     )]
     pub path: PathSpec,
-    /// What a file's poses are relative to [default: camera for CSV, world for glTF].
+    /// Coordinate system of a file's poses [default: camera for CSV, world for glTF].
     #[arg(long, value_parser = origin_parser(), value_name = "ORIGIN")]
     pub path_origin: Option<PathOrigin>,
-    /// Frames a second along the path.
+    /// Frames per second along the path.
     #[arg(long, value_name = "HZ", default_value_t = DEFAULT_FPS, value_parser = parse_fps)]
     pub fps: f32,
 }
@@ -43,7 +43,7 @@ fn origin_parser() -> impl TypedValueParser<Value = PathOrigin> {
 }
 
 impl PathArgs {
-    /// The path of a single frame, which starts where every path does.
+    /// The path of a single frame, at the start of every path.
     #[must_use]
     pub fn still() -> Self {
         Self {
@@ -62,7 +62,7 @@ impl PathArgs {
         }
     }
 
-    /// The path and its moments; what is odd about its file goes to stderr.
+    /// The path and its frame times; warnings about its file go to stderr.
     ///
     /// # Errors
     /// An unreadable file, or one that ends before the last frame.
@@ -80,7 +80,7 @@ impl PathArgs {
     }
 }
 
-/// A number of frames, for clap.
+/// Parser for a number of frames.
 pub fn frame_count() -> clap::builder::RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES))
 }

@@ -1,4 +1,4 @@
-//! A scene made ready for [`crate::study`]: its world, and the device with the scene on it.
+//! Prepares a scene for [`crate::study`]: its world, and a device with the uploaded scene.
 
 use super::cache_args::CacheArgs;
 use super::capture_steps::prepare_textures;
@@ -15,7 +15,7 @@ use formats::view::Lens;
 pub struct Prepared {
     /// Scene, path and display.
     pub world: World,
-    /// The device with the scene on it.
+    /// The device with the uploaded scene.
     pub backend: Lavapipe,
 }
 
@@ -23,13 +23,13 @@ pub struct Prepared {
 pub struct Preparation<'a> {
     /// The scene as given.
     pub scene: &'a str,
-    /// What the user sees of the left and right eye's picture.
+    /// Visible parts of the left and right eye's pictures.
     pub lens: [Lens; 2],
     /// Frames per second along the path.
     pub fps: f32,
-    /// Shadow cascades are added.
+    /// Whether shadow cascades are added.
     pub shadows: bool,
-    /// Bytes of raw records.
+    /// Size limit of raw records in bytes.
     pub record_budget: u64,
     /// The cache of textures.
     pub cache: CacheArgs,

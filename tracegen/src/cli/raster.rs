@@ -51,10 +51,10 @@ pub struct RasterArgs {
     /// Driver that captures; osmesa captures plain frames alone, without techniques.
     #[arg(long, value_parser = driver_parser(), default_value = "lavapipe", value_name = "NAME")]
     pub(super) backend: Driver,
-    /// Skip the render without capture that times and depths are compared with.
+    /// Skip the render without capture, which times and depths are compared with.
     #[arg(long)]
     pub(super) no_plain: bool,
-    /// Draw the picture while capturing, too, and compare it with the plain one.
+    /// Also draw the picture while capturing, and compare it with the picture without capture.
     #[arg(long)]
     pub(super) shade: bool,
     /// Hidden-surface removal of the renderer whose texture accesses are captured.
@@ -67,16 +67,16 @@ pub struct RasterArgs {
     /// How the trace's tiles are packed.
     #[arg(long, value_parser = encoding_parser(), default_value = "delta", value_name = "NAME")]
     pub(super) encoding: Encoding,
-    /// Add what vertex processing reads and the primitives that enter each tile, for `replay run --frame`.
+    /// Add the data that vertex processing reads and the primitives per tile, for `replay run --frame`.
     #[arg(long)]
     pub(super) geometry: bool,
-    /// Draw or prepare what nobody sees, too: images, mip-levels, cascades, regions or all of
-    /// them. Pictures and trace stay the same.
+    /// Draw or prepare invisible things as well: images, mip-levels, cascades, regions or all of them.
+    /// Pictures and trace stay the same.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub(super) no_skip: Vec<Skip>,
-    /// Choose the techniques under a budget, for each frame: `flip=ERROR` (mean FLIP inside the
-    /// lens, 0 for lossless ones alone) or `pixels=PX` for those of least cost inside it, `budget-ms=MS` for the least
-    /// error whose median frame takes no longer.
+    /// Choose the techniques of each frame under a budget: `flip=ERROR` (mean FLIP inside the lens; 0 allows
+    /// only lossless techniques) or `pixels=PX` choose the least cost within that error; `budget-ms=MS`
+    /// chooses the least error whose median frame time stays within the budget.
     #[arg(long, value_name = "BUDGET", help_heading = "Techniques",
           conflicts_with_all = ["cull", "occlusion", "multiview", "hidden_area_mask", "hidden_area_mesh",
                                 "cull_distance", "cull_px", "far_field", "foveate",
@@ -84,8 +84,9 @@ pub struct RasterArgs {
     auto: Option<Budget>,
     #[command(flatten)]
     objective: ObjectiveArgs,
-    /// Render with techniques by name: `TECHNIQUE`, those of `tracegen techniques --only`, joined by `+`, then those of
-    /// single frames, `,FRAME:TECHNIQUE` or `,FIRST-LAST:TECHNIQUE`. What `--auto` chose can be captured again so.
+    /// Render with techniques by name: `TECHNIQUE` as in `tracegen techniques --only`, joined by `+`,
+    /// followed by exceptions for single frames, `,FRAME:TECHNIQUE` or `,FIRST-LAST:TECHNIQUE`. `--auto`
+    /// prints its choice in this form.
     #[arg(long, value_name = "TECHNIQUE", help_heading = "Techniques",
           conflicts_with_all = ["auto", "cull", "occlusion", "multiview", "hidden_area_mask", "far_field", "foveate",
                                 "views", "no_plain", "shade", "no_skip"])]
@@ -99,10 +100,10 @@ pub struct RasterArgs {
 }
 
 impl RasterArgs {
-    /// Pixels of all frames, as far as they can be told without the scene.
+    /// Pixels of all frames, as far as they are known without the scene.
     ///
     /// # Errors
-    /// A display that cannot be.
+    /// An invalid display.
     pub(super) fn pixels(&self) -> anyhow::Result<u64> {
         let [width, height] = self
             .scene
@@ -172,7 +173,7 @@ fn hsr_parser() -> impl TypedValueParser<Value = Fragments> {
 }
 
 impl RasterArgs {
-    /// Refuses what the OSMesa backend does not do.
+    /// Refuses options that the OSMesa backend does not support.
     pub(super) fn check_plain_frames(&self) -> anyhow::Result<()> {
         let auto = self.auto.map(|_| "--auto");
         let named = self.technique.as_ref().map(|_| "--technique");
@@ -187,7 +188,7 @@ impl RasterArgs {
         Ok(())
     }
 
-    /// Refuses what leaves fragments out by depth, or is measured with the depth test.
+    /// Refuses options that depend on the depth test.
     fn check_without_depth_test(&self) -> anyhow::Result<()> {
         ensure!(
             !self.techniques.has_far_field(),
@@ -233,7 +234,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     super::raster_auto::run(args, &techniques, &outputs)
 }
 
-/// Shadow cascades of a scene, or those that `--shadows` adds.
+/// Shadow cascades of a scene, or the cascades that `--shadows` adds.
 pub(super) fn cascades(scene: &Scene, shadows: bool) -> u32 {
     if shadows {
         CASCADES
@@ -248,12 +249,13 @@ pub(super) fn shadow_range_m(setup: &SceneSetup, (lo, hi): (glam::Vec3, glam::Ve
         .abs()
         .max((setup.camera.eye - hi).abs())
         .length();
-    // What is nearer than 5 cm needs no shadows of its own, nor a twentieth of a smaller scene.
+    // Nothing nearer than 5 cm needs shadows of its own, nor anything nearer than a twentieth of a small
+    // scene.
     let near = setup.camera.near.max(farthest.min(1.0) * 0.05);
     [near, farthest.min(setup.camera.far).max(2.0 * near)]
 }
 
-/// The tables of a trace of the scene's frames, of which `fragments` are recorded.
+/// The tables of a trace of the scene's frames that records `fragments`.
 pub(super) fn tables(
     setup: &SceneSetup,
     spec: &str,
@@ -289,11 +291,11 @@ pub(super) fn tables(
     }
 }
 
-/// Sets what Mesa reads from the environment.
+/// Sets the environment variables that Mesa reads.
 pub(super) fn prepare_environment(threads: Option<u16>) {
     // SAFETY: the only other thread waits for signals; nothing reads the environment meanwhile.
     unsafe {
-        // Mesa's device selection asks a display server, in vain and aloud where there is none.
+        // Mesa's device selection tries to connect to a display server, and prints errors if there is none.
         std::env::set_var("NODEVICE_SELECT", "1");
         // At narrow vectors Mesa 22.3 corrupts memory where the processor has AVX2, and on some that have AVX.
         let set = |name: &str| std::env::var_os(name);
@@ -302,7 +304,7 @@ pub(super) fn prepare_environment(threads: Option<u16>) {
         {
             std::env::set_var("GALLIUM_OVERRIDE_CPU_CAPS", "sse4.1");
         }
-        // softpipe has all that the capture needs of OpenGL 4.5, as extensions of 3.3.
+        // softpipe provides all features of OpenGL 4.5 that the capture needs, as extensions of 3.3.
         if set("GALLIUM_DRIVER").is_some_and(|driver| driver == "softpipe") {
             std::env::set_var("MESA_GL_VERSION_OVERRIDE", "4.5");
             std::env::set_var("MESA_GLSL_VERSION_OVERRIDE", "450");

@@ -1,5 +1,5 @@
-//! `tracegen raster --auto` and `--technique`: the trace of a path whose frames are rendered with techniques that are
-//! chosen under a budget, or named.
+//! `tracegen raster --auto` and `--technique`: captures a path whose frames use techniques that a search
+//! chose or the user named.
 
 use super::capture_steps::{TraceOutput, load, warn_of_multiview_defect};
 use super::prepared::{Preparation, Prepared, prepare};
@@ -16,16 +16,16 @@ use shell::{Output, Progress, note};
 use techniques::Planner;
 use visibility::Occlusion;
 
-/// Where the techniques of the frames come from.
+/// Source of the frames' techniques.
 #[derive(Clone, Debug)]
 pub enum Techniques {
     /// A search under a budget.
     Chosen(Budget, Objective),
-    /// The user.
+    /// Names from the user.
     Named(Box<Schedule>),
 }
 
-/// Chooses unless techniques are named, and captures each frame of the path with its own.
+/// Chooses the techniques unless they are named, and captures each frame of the path with its techniques.
 ///
 /// # Errors
 /// Unreadable input, no driver, a budget that nothing meets, or a file that cannot be written.

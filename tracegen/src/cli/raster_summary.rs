@@ -1,4 +1,4 @@
-//! What `tracegen raster` says when it is done: what was drawn, recorded and left out, and how long it took.
+//! Summary of `tracegen raster`: what was drawn, recorded and skipped, and the times.
 
 use crate::study::{memory, processor};
 use crate::unstable_triangles::UnstableTriangles;
@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use techniques::layer::Predicted;
 use visibility::Occlusion;
 
-/// What a stage of all frames submitted.
+/// Work that a stage submitted over all frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Submitted {
     draws: u64,
@@ -22,7 +22,7 @@ pub struct Submitted {
 }
 
 impl Submitted {
-    /// Adds what a backend did between two readings of its work.
+    /// Adds the difference of two readings of a backend's work.
     pub fn add(&mut self, before: Work, after: Work) {
         let work = after - before;
         self.draws += work.draws;
@@ -40,22 +40,22 @@ impl std::fmt::Display for Submitted {
 /// Sums over the frames.
 #[derive(Default)]
 pub struct Summary {
-    /// By stage; what warms the driver up or compares depths is in none.
+    /// Draws per stage. Warming up the driver and comparing depths are not counted.
     pub shadow_draws: Submitted,
     pub plain_draws: Submitted,
     pub capture_draws: Submitted,
     pub shadows: Duration,
     pub plain: Duration,
     pub captured: Duration,
-    /// Processors' time of the plain renders and of the captures; zero where the system does not tell.
+    /// Processor time of the plain renders and of the captures; zero if the system does not report it.
     pub plain_work: Duration,
     pub captured_work: Duration,
     pub sorting: Duration,
     pub counts: CaptureCounts,
     pub predicted: Vec<Predicted>,
-    /// Of the first frame.
+    /// Unstable triangles of the first frame.
     pub unstable: Option<UnstableTriangles>,
-    /// What is the same with and without capture.
+    /// What was found identical with and without capture.
     pub compared: Option<&'static str>,
     pub looking: Duration,
     pub culling: Duration,
@@ -80,7 +80,7 @@ impl Summary {
         Ok(())
     }
 
-    /// Finds what a frame draws.
+    /// Culls the draws of a frame.
     pub fn look(
         &mut self,
         job: &CaptureJob<'_>,
@@ -167,7 +167,7 @@ impl Summary {
         ));
     }
 
-    /// What was drawn and left out.
+    /// What was drawn and skipped.
     fn print_work(&self, frames: usize, work: &Work) {
         note(&format!(
             "shadow maps    {} in {:.3} s: {}",
@@ -232,7 +232,7 @@ impl Summary {
     }
 }
 
-/// Processors' time since `before`.
+/// Processor time since `before`.
 pub fn worked_since(before: Option<Duration>) -> Duration {
     let since = before
         .zip(processor::time())

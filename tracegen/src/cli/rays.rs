@@ -21,7 +21,7 @@ use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Eye size where neither `--size` nor `--hmd` is given: together 2048x1024, as in the paper.
+/// Default eye size, without `--size` and `--hmd`: together 2048x1024, as in the paper.
 const DEFAULT_SIZE_PX: [u32; 2] = [1024, 1024];
 
 /// Arguments of `tracegen rays`.
@@ -34,7 +34,7 @@ pub struct RaysArgs {
     output: PathBuf,
     #[command(flatten)]
     path: PathArgs,
-    /// Number of the path's frame that is traced.
+    /// Number of the frame of the path that is traced.
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Camera",
           value_parser = clap::value_parser!(u32).range(0..i64::from(MAX_FRAMES)))]
     frame: u32,
@@ -52,7 +52,7 @@ pub struct RaysArgs {
     /// Record every node and triangle that each ray visits, for cache models (large).
     #[arg(long)]
     visits: bool,
-    /// Tree that is walked; the steps of bvh2 are T&I unit 2.0's.
+    /// Tree that rays traverse; steps of bvh2 are counted as in T&I unit 2.0.
     #[arg(long, value_parser = bvh_parser(), default_value = "bvh2")]
     bvh: TraversalKind,
     #[command(flatten)]
@@ -75,10 +75,10 @@ fn bvh_parser() -> impl TypedValueParser<Value = TraversalKind> {
 }
 
 impl RaysArgs {
-    /// Samples of both eyes, as far as they can be told without the scene.
+    /// Samples of both eyes, as far as they are known without the scene.
     ///
     /// # Errors
-    /// A display that cannot be.
+    /// An invalid display.
     pub(super) fn samples(&self) -> anyhow::Result<u64> {
         let hmd = self.scene.hmd.resolve(Some(DEFAULT_SIZE_PX), None)?;
         let [width, height] = hmd.eye_size_px.map(u64::from);
@@ -97,7 +97,7 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     let start = Instant::now();
     let progress = Progress::new("loading the scene", 0, "");
     let textures = LoadOptions {
-        // Base colour, metallic-roughness and emissive: what rays look at.
+        // Base colour, metallic-roughness and emissive: the textures that rays sample.
         slots: [true, false, true, false, false, true],
     };
     let setup = {
@@ -118,7 +118,7 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     let (frame, writer) = trace(args, &scene, &mut tables, &progress)?;
     drop(progress);
     let traced = start.elapsed();
-    // Complete before the trace gets its name: a full disk leaves neither.
+    // The picture is complete before the trace is renamed, so that a full disk leaves neither.
     let image = args.image.as_deref().map(|path| image_file(&frame, path));
     let image = image.transpose()?;
     let file_bytes = writer.finish(&tables)?;
@@ -132,7 +132,7 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Builds the hierarchy and everything of the trace but its tiles.
+/// Builds the hierarchy and the tables of the trace.
 fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, RaytraceTables)> {
     let SceneSetup {
         mut scene,
@@ -220,7 +220,7 @@ fn image_file(frame: &RayFrame, path: &Path) -> anyhow::Result<AtomicFile> {
     Ok(file)
 }
 
-/// The figures of a trace, on stderr: they vary from run to run.
+/// Prints figures that vary from run to run on stderr.
 fn report(tables: &RaytraceTables, frame: &RayFrame, bytes: u64, at: [Duration; 3]) {
     let (bvh, stats) = (&tables.bvh, &frame.stats);
     let [loaded, prepared, traced] = at.map(|t| t.as_secs_f64());

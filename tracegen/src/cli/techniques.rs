@@ -25,12 +25,12 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// Eye size where neither `--size` nor `--hmd` is given: half the default display's.
+/// Default eye size, without `--size` and `--hmd`: half the default display's.
 const SIZE_PX: [u32; 2] = [480, 540];
 /// Memory for raw records.
 const RECORD_BUDGET: u64 = 128 << 20;
 
-/// Name that errors and counts of searches are kept under.
+/// Name under which errors and counts of searches are stored.
 const SEEN: &str = "seen-by-searches";
 
 /// Arguments of `tracegen techniques`.
@@ -38,8 +38,8 @@ const SEEN: &str = "seen-by-searches";
 pub struct TechniquesArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Folder to write: a manifest, pictures and traces. What an earlier run of the same study has
-    /// finished there is kept.
+    /// Folder to write: a manifest, pictures and traces. Results of an earlier run of the same study in this
+    /// folder are kept.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Techniques, alone or joined by `+`, separated by commas; the baseline is always measured
@@ -61,7 +61,7 @@ pub struct TechniquesArgs {
     /// How the tiles of the traces are packed.
     #[arg(long, value_parser = encoding_parser(), default_value = "delta", value_name = "NAME")]
     encoding: Encoding,
-    /// Times that each frame is timed, the baseline's beside it.
+    /// Repetitions of each frame's timing; the baseline is timed alternately.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: u32,
     #[command(flatten)]
@@ -69,14 +69,13 @@ pub struct TechniquesArgs {
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
     shadows: bool,
-    /// Device to render on: a part of its name [default: Mesa's software driver]. One that cannot
+    /// Device to render on: a part of its name [default: Mesa's software driver]. A device that cannot
     /// capture is timed, without traces and counts of fragments.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
-    /// Also search for the best combination under a budget, and measure it: `flip=ERROR` (mean FLIP
-    /// inside the lens) or `pixels=PX` for the least cost whose error stays inside in every frame of
-    /// the path, `budget-ms=MS` for the least error whose median frame takes no longer on this
-    /// device.
+    /// Also search for the best combination under a budget, and measure it: `flip=ERROR` (mean FLIP inside
+    /// the lens) or `pixels=PX` choose the least cost within that error in every frame of the path;
+    /// `budget-ms=MS` chooses the least error whose median frame time on this device stays within the budget.
     #[arg(long, value_name = "BUDGET")]
     auto: Option<Budget>,
     #[command(flatten)]
@@ -186,7 +185,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
     shell::print(&text)
 }
 
-/// Measures the rows that are not there already, in their order.
+/// Measures the rows that have no stored result, in their order.
 fn measure(bench: &mut Bench<'_>, rows: &[Row]) -> anyhow::Result<Vec<RowRecord>> {
     let mut records: Vec<_> = (rows.iter())
         .map(|row| bench.folder.finished(&row.name, &row.settings))
@@ -215,7 +214,7 @@ fn measure(bench: &mut Bench<'_>, rows: &[Row]) -> anyhow::Result<Vec<RowRecord>
     Ok(records.into_iter().flatten().collect())
 }
 
-/// Chooses under a budget and measures what was chosen, unless that is there already.
+/// Chooses under a budget and measures the choice, unless its result is stored.
 fn measure_auto(
     bench: &mut Bench<'_>,
     budget: Budget,
@@ -299,7 +298,8 @@ impl TechniquesArgs {
         })
     }
 
-    /// The rows that the display and the path allow; the others are an error if they were asked for.
+    /// The rows that are possible with the display and the path. Impossible rows are an error if the user
+    /// named them.
     fn possible(&self, rows: Vec<Row>, world: &World) -> anyhow::Result<Vec<Row>> {
         let mut possible = Vec::new();
         for row in rows {
@@ -315,7 +315,7 @@ impl TechniquesArgs {
     /// Files that the study reads.
     fn inputs(&self) -> Vec<PathBuf> {
         let scene = Path::new(&self.scene.scene);
-        // The names of built-in scenes have no extension and name no file.
+        // Names of built-in scenes have no extension and are not files.
         let scene = scene.extension().map(|_| scene.to_owned());
         scene.into_iter().chain(self.path.file()).collect()
     }
@@ -339,7 +339,7 @@ impl TechniquesArgs {
 fn checksum(files: &[PathBuf]) -> anyhow::Result<String> {
     let mut sums = Vec::new();
     for file in files {
-        // A scene may name an image that no material uses, and that nobody has looked for.
+        // A scene may refer to an image that no material uses and that does not exist.
         let bytes = match std::fs::metadata(file) {
             Ok(found) if found.is_file() => {
                 std::fs::read(file).with_context(|| file.display().to_string())?

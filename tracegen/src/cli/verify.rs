@@ -27,7 +27,7 @@ use textures::TextureSet;
 /// Memory for raw records.
 const RECORD_BUDGET_BYTES: u64 = 128 << 20;
 
-/// How many failures are printed one by one.
+/// Largest number of failures that are printed one by one.
 const MOST_FAILURES: usize = 20;
 
 /// Arguments of `tracegen verify`.
@@ -35,27 +35,28 @@ const MOST_FAILURES: usize = 20;
 pub struct VerifyArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Verify the first frame of this capture of the scene instead of a new one; camera and display are
-    /// then the trace's.
+    /// Verify the first frame of this capture of the scene instead of a new one; camera and display are taken
+    /// from the trace.
     #[arg(long, value_name = "FILE.textrace",
           conflicts_with_all = ["camera", "eye", "vfov", "hmd", "size", "hfov", "fov_tangents", "ipd", "cant", "shadows"])]
     trace: Option<PathBuf>,
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
     shadows: bool,
-    /// Tiles to verify, drawn from both views: a number, or `all`.
+    /// Tiles to verify, sampled from both views: a number, or `all`.
     #[arg(long, value_name = "N|all", default_value = "all", value_parser = parse_tiles)]
     tiles: Tiles,
     /// Seed of the sample of tiles.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Also filter every visible texel in software, by what its record says, and compare it with the driver's.
+    /// Also filter every visible texel in software, according to its record, and compare it with the driver's
+    /// result.
     #[arg(long)]
     colour: bool,
-    /// Level of detail as the driver makes it of the derivatives [default: softpipe for its traces, else llvmpipe].
+    /// Formula of the level of detail [default: softpipe for traces of softpipe, else llvmpipe].
     #[arg(long, value_name = "FORMULA", value_parser = parse_formula)]
     lod: Option<LodFormula>,
-    /// Write what the reference would have captured, for `replay`; needs all tiles.
+    /// Write what the reference would have captured, for `replay`; requires all tiles.
     #[arg(long, value_name = "FILE.textrace")]
     write_reference: Option<PathBuf>,
     /// Print JSON.
@@ -94,7 +95,7 @@ fn parse_formula(text: &str) -> Result<LodFormula, String> {
     }
 }
 
-/// Runs `tracegen verify`: exit code 1 where something has no cause that a correct capture has.
+/// Runs `tracegen verify`: exit code 1 if a difference has no known cause.
 ///
 /// # Errors
 /// Unreadable input, no driver where one is needed, or a file that cannot be written.
@@ -112,7 +113,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     let mut shadow_cascades = cascades(&setup.scene, args.shadows);
     if let (Some(trace), Some(file)) = (&existing, &args.trace) {
         look_as(trace, file, &mut setup)?;
-        // The groups of the trace's draws show how many there were; none is verified.
+        // The groups of the trace's draws determine the number of cascades; none of these is verified.
         shadow_cascades = 0;
     }
     let mut draws = DrawList::new(&setup.scene, shadow_cascades)?;
@@ -217,7 +218,7 @@ impl VerifyArgs {
         }
     }
 
-    /// What the command writes, checked as far as its arguments tell.
+    /// The outputs of the command, checked as far as the arguments allow.
     fn outputs(&self) -> anyhow::Result<Vec<Output>> {
         let Some(file) = &self.write_reference else {
             return Ok(Vec::new());
@@ -233,7 +234,7 @@ impl VerifyArgs {
     }
 }
 
-/// llvmpipe filters some formats in 8 bits unless an option turns that off. Such filtering is not what is checked.
+/// llvmpipe filters some formats in 8 bits by default, which is not what is verified.
 fn filter_in_single_precision() {
     if std::env::var_os("GALLIVM_PERF").is_none() {
         // SAFETY: as in `prepare_environment`: no thread reads the environment meanwhile.
@@ -249,7 +250,7 @@ fn plain_planner(setup: &SceneSetup) -> anyhow::Result<Planner> {
     Ok(Planner::new(&settings, &setup.hmd, lenses, eyes, fps)?)
 }
 
-/// How a driver makes levels of detail of derivatives.
+/// Formula of the level of detail of a driver.
 fn formula_of(driver: &str) -> LodFormula {
     if driver.contains("softpipe") {
         LodFormula::Softpipe
@@ -258,7 +259,7 @@ fn formula_of(driver: &str) -> LodFormula {
     }
 }
 
-/// Takes display and views over from a trace.
+/// Takes display and views from a trace.
 fn look_as(trace: &Textrace, file: &Path, setup: &mut SceneSetup) -> anyhow::Result<()> {
     let meta = &trace.tables().meta;
     let first = meta
@@ -300,7 +301,7 @@ fn capture(
     Ok(Textrace::from_bytes(writer.into_bytes()?)?)
 }
 
-/// The driver's texels by pass of the trace's first frame, then by slot.
+/// The driver's texels, by pass of the trace's first frame and by slot.
 fn texels(
     job: &CaptureJob<'_>,
     setup: &SceneSetup,

@@ -143,7 +143,7 @@ fn the_records_of_each_pixel_are_as_many_as_an_additive_counter_sees() {
 #[test]
 fn untextured_draws_record_their_quads_without_a_group() {
     let scene = scene(
-        vec![triangles(50, 41, 0)],
+        vec![triangles(200, 41, 0)],
         vec![Material::default()],
         Vec::new(),
     );
