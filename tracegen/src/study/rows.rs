@@ -8,14 +8,14 @@ use techniques::settings::{
 use techniques::{Gaze, Settings};
 use visibility::Culling;
 
-/// One technique: what it changes of the baseline.
+/// One technique: a change of the baseline's settings.
 #[derive(Clone, Debug)]
 pub struct Part {
     /// Name as in `--only`, manifests and results.
     pub name: String,
-    /// Name for people.
+    /// Title for readers.
     pub title: String,
-    /// No pixel that the user can see is to change.
+    /// Whether no visible pixel may change.
     pub lossless: bool,
     change: Change,
 }
@@ -27,24 +27,24 @@ enum Change {
     Foveation(Foveation),
 }
 
-/// The setting that a part changes: of two parts with the same one, only one can be.
+/// The setting that a part changes. Two parts that change the same setting exclude each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting {
-    /// How draws are found.
+    /// How visible draws are found.
     Culling,
-    /// Whether hidden ones are left out.
+    /// Whether hidden draws are left out.
     Occlusion,
-    /// Whether what the lens hides is drawn.
+    /// Whether pixels outside the lens are drawn.
     Mask,
     /// Whether both eyes are drawn at once.
     Multiview,
-    /// What is too far or too small to be drawn.
+    /// Which draws are too far or too small to be drawn.
     Distance,
     /// How often a frame is rendered.
     Rate,
-    /// Where and how both eyes share a picture of what is far.
+    /// Where and how both eyes share a picture of the far field.
     FarField,
-    /// How the periphery is coarsened.
+    /// How the periphery is shaded more coarsely.
     Foveation,
 }
 
@@ -56,7 +56,7 @@ impl PartialEq for Part {
 }
 
 impl Part {
-    /// Every technique, the baseline first: a line a technique.
+    /// Every technique, the baseline first.
     #[must_use]
     pub fn all() -> Vec<Self> {
         let baseline = Culling::default();
@@ -67,11 +67,11 @@ impl Part {
         parts
     }
 
-    /// Every technique with the settings that are worth a search on a display.
+    /// Every technique with the settings that a search tries on a display.
     #[must_use]
     pub fn options(hmd: &Hmd) -> Vec<Self> {
         let mut parts = Self::all();
-        // A search looks at frames one by one, and half of these have no picture of their own.
+        // A search renders single frames, and every other frame at half rate has no picture of its own.
         parts.retain(|part| part.setting() != Setting::Rate);
         parts.extend(VARIANTS.iter().map(Self::switch));
         let acuity = Rates::of_acuity(hmd);
@@ -115,7 +115,7 @@ impl Part {
         }
     }
 
-    /// Its error is a shift of what is seen, in pixels, and bounded for every frame.
+    /// Whether its error is a shift in pixels that is bounded for every frame.
     #[must_use]
     pub fn is_shift(&self) -> bool {
         self.setting() == Setting::FarField
@@ -140,7 +140,7 @@ impl Part {
     }
 }
 
-/// Name, title, whether no visible pixel changes, the setting that it changes, and how.
+/// Name, title, whether it is lossless, the setting that it changes, and the change.
 struct Switch(&'static str, &'static str, bool, Setting, fn(&mut Settings));
 
 /// The techniques besides culling.
@@ -284,7 +284,7 @@ fn far_field(split: Split, variant: Variant) -> Option<FarField> {
     Some(FarField { split, variant })
 }
 
-/// Straight ahead.
+/// Gaze straight ahead.
 fn foveation(kind: FoveationKind, rates: Rates) -> Foveation {
     Foveation {
         kind,
@@ -293,14 +293,14 @@ fn foveation(kind: FoveationKind, rates: Rates) -> Foveation {
     }
 }
 
-/// The usual rates, each beginning 1.5 times as far out.
+/// The default rates, each starting 1.5 times as far out.
 fn wide() -> Rates {
     Rates {
         edges_deg: Rates::default().edges_deg.map(|edge| 1.5 * edge),
     }
 }
 
-/// Combinations that a study measures beside the techniques alone: title and parts.
+/// Combinations that a study measures in addition to the single techniques: title and parts.
 const COMBINATIONS: &[(&str, &str)] = &[
     ("Culling and occlusion", "superfrustum+occlusion"),
     (
@@ -321,36 +321,36 @@ const COMBINATIONS: &[(&str, &str)] = &[
     ),
 ];
 
-/// A technique or a combination of some, measured as one.
+/// A technique or a combination, measured as one.
 #[derive(Clone, Debug)]
 pub struct Row {
     /// The parts' names joined by `+`.
     pub name: String,
-    /// Name for people.
+    /// Title for readers.
     pub title: String,
-    /// What it consists of.
+    /// Its parts.
     pub parts: Vec<Part>,
-    /// All of its parts are.
+    /// Whether all of its parts are lossless.
     pub lossless: bool,
-    /// What it is captured with.
+    /// Settings of its capture.
     pub settings: Settings,
 }
 
-/// A row that cannot be.
+/// An invalid row.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RowError {
     /// No technique of that name.
     #[error("unknown technique '{name}': expected some of {known}, alone or joined by '+'")]
     Unknown {
-        /// As asked.
+        /// The name as given.
         name: String,
         /// Names of all techniques.
         known: String,
     },
-    /// Two techniques in one another's place.
+    /// Two techniques that change the same setting.
     #[error("'{row}': {first} and {second} exclude each other")]
     Contradiction {
-        /// As asked.
+        /// The row as given.
         row: String,
         /// One of them.
         first: String,
@@ -360,19 +360,19 @@ pub enum RowError {
 }
 
 impl Row {
-    /// The technique that all others are held against.
+    /// The technique that all others are compared with.
     ///
     /// # Panics
-    /// Never: the baseline is a technique.
+    /// Never, because the baseline is a technique.
     #[must_use]
     pub fn baseline() -> Self {
         Self::parse(Culling::default().name()).expect("the baseline is a technique")
     }
 
-    /// Every row of a study without a choice, the baseline first.
+    /// Every row of a study by default, the baseline first.
     ///
     /// # Panics
-    /// Never: the tests parse every row.
+    /// Never, because the tests parse every row.
     #[must_use]
     pub fn all() -> Vec<Self> {
         let alone = Part::all().into_iter();
@@ -380,20 +380,20 @@ impl Row {
         alone.chain(Self::combinations()).collect()
     }
 
-    /// The combinations that a study measures beside the techniques alone.
+    /// The combinations that a study measures in addition to the single techniques.
     ///
     /// # Panics
-    /// Never: the tests parse every row.
+    /// Never, because the tests parse every row.
     #[must_use]
     pub fn combinations() -> Vec<Self> {
         let parse = |name: &str| Self::parse(name).expect("rows of the table are techniques");
         COMBINATIONS.iter().map(|(_, name)| parse(name)).collect()
     }
 
-    /// The row of some parts, the baseline where there are none.
+    /// The row of some parts; the baseline if there are none.
     ///
     /// # Errors
-    /// Two of them exclude each other.
+    /// Two of the parts exclude each other.
     pub fn of(parts: Vec<Part>) -> Result<Self, RowError> {
         if parts.is_empty() {
             return Ok(Self::baseline());
@@ -439,7 +439,7 @@ impl Row {
         Self::of(name.split('+').map(part).collect::<Result<_, _>>()?)
     }
 
-    /// The rows of a list of names separated by commas, with the baseline before them.
+    /// The rows of a list of names separated by commas, preceded by the baseline.
     ///
     /// # Errors
     /// See [`Self::parse`].

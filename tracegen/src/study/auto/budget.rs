@@ -1,25 +1,24 @@
-//! `--auto`: what a combination of techniques must keep.
+//! `--auto`: the budget of a combination of techniques.
 
 use serde::Serialize;
 use std::fmt;
 use std::str::FromStr;
 
-/// What a combination of techniques must keep in every frame.
+/// A limit that a combination of techniques must keep in every frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Budget {
-    /// Mean FLIP inside the lens of the worse eye, against the baseline's picture, 0 (lossless) to 1.
+    /// Mean FLIP inside the lens of the worse eye, compared with the baseline's picture, 0 (lossless) to 1.
     Flip(f64),
-    /// Pixels between a point's place in the picture and its true place. Only techniques whose
-    /// error is such a shift may be used.
+    /// Distance in pixels between a point's place in the picture and its true place. Only techniques whose
+    /// error is such a shift are allowed.
     Pixels(f64),
-    /// Median time of a frame on the device as it is, milliseconds. The error is as small as that
-    /// allows.
+    /// Median frame time on this device in milliseconds. The error is minimised within it.
     BudgetMs(f64),
 }
 
 impl Budget {
-    /// The largest error of a frame, if errors are bounded.
+    /// The largest error of a frame, if the budget limits errors.
     #[must_use]
     pub fn error_limit(self) -> Option<f64> {
         match self {

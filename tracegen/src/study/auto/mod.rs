@@ -1,5 +1,5 @@
-//! Finds the techniques that are worth it: the cheapest combination inside an error budget, or the
-//! least error inside a time budget, and holds the promise on every frame of the path.
+//! Finds the best techniques: the cheapest combination within an error budget, or the least error within a
+//! time budget, checked on every frame of the path.
 
 mod budget;
 mod choose;
