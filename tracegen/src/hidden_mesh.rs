@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_file_is_told() {
+    fn faults_of_a_file_are_reported() {
         for (text, part) in [
             ("", "expected JSON"),
             ("[]", "ham_mesh"),

@@ -71,7 +71,7 @@ fn eyes_parser() -> impl TypedValueParser<Value = Rule> {
         (
             "channels",
             Rule::Channels,
-            "One target for both, told apart by the colour channels that are written",
+            "One target for both, distinguished by the colour channels that are written",
         ),
         (
             "twice",

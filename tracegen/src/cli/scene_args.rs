@@ -451,7 +451,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_parsed_is_told() {
+    fn what_cannot_be_parsed_is_reported() {
         for (flags, part) in [
             ("--size 0x5", "0x5"),
             ("--size 9000x10", "8192"),
@@ -479,7 +479,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_and_poses_out_of_range_are_told_before_the_scene_is_read() {
+    fn angles_and_poses_out_of_range_are_reported_before_the_scene_is_read() {
         for (flags, part) in [
             ("--hfov 180", "less than 180"),
             ("--hfov 0", "more than 0"),

@@ -1,4 +1,4 @@
-//! The table: JSON for programs, Markdown for people.
+//! The table: JSON for programs, Markdown for readers.
 
 use super::{Bounds, Outcome, Point, Sweep};
 use serde::Serialize;
@@ -38,14 +38,14 @@ impl Report {
         });
     }
 
-    /// Points beyond their bounds of which the program said nothing.
+    /// Points beyond their bounds without the expected warning.
     #[must_use]
     pub fn broken(&self) -> usize {
         let points = self.sweeps.iter().flat_map(|row| &row.points);
         points.filter(|p| p.outcome == Outcome::Broken).count()
     }
 
-    /// A line a sweep, then a table of points a sweep.
+    /// One line per sweep, then a table of points per sweep.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = String::from(

@@ -489,7 +489,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_and_contradictory_techniques_are_told() {
+    fn unknown_and_contradictory_techniques_are_refused() {
         let error = |list: &str| Row::parse_list(list).unwrap_err().to_string();
         let text = error("conical,octree");
         assert!(

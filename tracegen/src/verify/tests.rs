@@ -1,4 +1,4 @@
-//! The capture through lavapipe against the reference.
+//! Compares captures through lavapipe with the reference.
 
 use super::agreement::Agreement;
 use super::classes::Class;

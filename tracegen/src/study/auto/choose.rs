@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_whose_median_frame_is_too_slow_is_told() {
+    fn a_path_whose_median_frame_is_too_slow_is_an_error() {
         let row = Row::baseline();
         check_median(Budget::BudgetMs(11.0), &row, 0.010_9).unwrap();
         let error = check_median(Budget::BudgetMs(11.0), &row, 0.012).unwrap_err();

@@ -292,7 +292,7 @@ fn a_frame_that_breaks_the_budget_falls_back_to_what_is_safer() {
 }
 
 #[test]
-fn budgets_are_read_and_nonsense_is_told() {
+fn budgets_are_read_and_nonsense_is_refused() {
     assert_eq!("flip=0.01".parse(), Ok(Budget::Flip(0.01)));
     assert_eq!("flip=0".parse(), Ok(Budget::Flip(0.0)));
     assert_eq!("flip=1".parse(), Ok(Budget::Flip(1.0)));

@@ -1,4 +1,4 @@
-//! One captured frame of a scene, and what it agrees with.
+//! One captured frame of a scene, and its agreement with the reference.
 
 use super::*;
 
@@ -33,7 +33,7 @@ pub(super) fn views(scene: &Scene, size_px: [u32; 2]) -> FrameViews {
         .remove(0)
 }
 
-/// The baseline of `eyes`.
+/// A planner of `eyes` without techniques.
 pub(super) fn baseline(size_px: [u32; 2], eyes: &[Eye]) -> Planner {
     planner(&Settings::default(), size_px, eyes)
 }
@@ -62,12 +62,12 @@ pub(super) fn job<'a>(
     }
 }
 
-/// Captures one stereo frame; fails, naming the packages, where there is no lavapipe.
+/// Captures one stereo frame; fails with the names of the packages if there is no lavapipe.
 pub(super) fn capture(scene: &Scene, size_px: [u32; 2], cascades: u32, budget: u64) -> Captured {
     try_capture(scene, size_px, cascades, budget, BOTH, true).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Captures one frame of `eyes`, after a plain picture of it where one is wanted.
+/// Captures one frame of `eyes`, after a plain picture of it if `plain` is set.
 pub(super) fn try_capture(
     scene: &Scene,
     size_px: [u32; 2],
@@ -79,7 +79,7 @@ pub(super) fn try_capture(
     capture_as(&baseline(size_px, eyes), scene, cascades, budget, plain)
 }
 
-/// Captures one frame as planned, after a plain picture of it where one is wanted.
+/// Captures one planned frame, after a plain picture of it if `plain` is set.
 pub(super) fn capture_as(
     planner: &Planner,
     scene: &Scene,
@@ -140,7 +140,8 @@ fn tiles(trace: &Textrace) -> Vec<Vec<Tile>> {
         .collect()
 }
 
-/// As [`capture_as`], with the given skips and fragments; also what they left out of the textures and of the frame.
+/// Like [`capture_as`], with the given skips and fragments; also returns what was skipped of textures and
+/// frame.
 pub(super) fn capture_skipping(
     planner: &Planner,
     scene: &Scene,
@@ -165,7 +166,7 @@ pub(super) fn capture_skipping(
     let frame = job.frame(&views)?;
     job.light(&mut backend, &frame)?;
     let plain = plain.then(|| job.plain_frame(&mut backend, &frame));
-    // Both views at once leave no depth of their own.
+    // Multiview leaves no depth per view.
     let compares = matches!(plain, Some(Ok(_))) && !planner.settings().multiview;
     let depths = compares.then(|| job.depths(&mut backend, &frame).unwrap());
     let mut writer = TextraceWriter::in_memory(&tables).unwrap();
@@ -179,7 +180,7 @@ pub(super) fn capture_skipping(
     if let Some(depths) = &depths {
         assert!(job.depths(&mut backend, &frame)? == *depths, "shaded");
     }
-    // Records do not depend on whether a picture is drawn as well, and depth neither.
+    // Neither records nor depth depend on whether a picture is drawn.
     let unshaded = CaptureJob {
         shaded: false,
         ..job
