@@ -25,7 +25,7 @@ const MARGIN: f32 = 1.01;
 pub struct Cascade {
     /// World to the cascade's clip space, depth 0 to 1.
     pub clip_from_world: Mat4,
-    /// Edge of a texel in the world, metres.
+    /// Size of a texel in the world, metres.
     pub texel_m: f32,
 }
 

@@ -1,4 +1,4 @@
-//! What a frame need not draw, although the boxes of its draws say so.
+//! Skips invisible work that culling by bounding boxes keeps.
 
 use super::capture::CaptureJob;
 use super::cascades::{Cascade, SHADOW_SIZE};
@@ -11,7 +11,7 @@ use visibility::receivers::{Receivers, Volume};
 const LOOKUP_TEXELS: f32 = 2.0 + 1.6 + 0.4;
 
 impl CaptureJob<'_> {
-    /// Takes from a frame what nobody sees of it.
+    /// Removes invisible work from a frame.
     pub(crate) fn skip(&self, frame: &mut Frame) {
         if self.skips.cascades {
             self.skip_cascades(frame);

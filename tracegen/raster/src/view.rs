@@ -31,7 +31,7 @@ pub enum Fragments {
     /// Those that pass the depth test when they are drawn.
     #[default]
     DepthTested,
-    /// All that the draws cover, whatever other draws lie before them. What a layer starts with
+    /// All covered fragments, even behind other draws. The initial contents of a layer
     /// (the far plane, its mask) still bounds them.
     All,
 }

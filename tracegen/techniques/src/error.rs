@@ -6,8 +6,8 @@
 pub struct SettingsError {
     /// Which setting.
     pub what: &'static str,
-    /// What it may be.
+    /// The expected value.
     pub expected: String,
-    /// What it is.
+    /// The value found.
     pub found: String,
 }

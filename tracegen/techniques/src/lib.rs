@@ -1,4 +1,4 @@
-//! What a frame may leave out or do more coarsely, and the layers that it is then rendered as.
+//! Settings of techniques, and the layers of the frames that they produce.
 //!
 //! Knows displays and angles, and neither drivers nor scenes: a driver renders the [`layer::Layer`]s.
 

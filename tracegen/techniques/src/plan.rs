@@ -6,21 +6,21 @@ use crate::start::Start;
 use glam::DMat3;
 use std::sync::Arc;
 
-/// How one frame is rendered.
+/// Plan of one frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FramePlan {
     /// The layers, in the order in which they are rendered and written as passes.
     pub layers: Vec<Layer>,
-    /// The pictures that they become: one an eye, in the order of the eyes asked for.
+    /// The resulting pictures: one per eye, in the order of the requested eyes.
     pub pictures: Vec<PictureSource>,
-    /// What the techniques promise of the frame.
+    /// Predictions of the techniques for the frame.
     pub predicted: Predicted,
 }
 
-/// Where an eye's picture comes from.
+/// Source of an eye's picture.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PictureSource {
-    /// It is a layer, by its position in the plan.
+    /// A layer, by its position in the plan.
     Layer(usize),
     /// Parts of layers, each drawn over the ones before, on black.
     Composed {
@@ -41,15 +41,15 @@ pub struct PicturePart {
     /// Columns and rows of the picture that a pixel of the layer covers. The layer may reach beyond
     /// the picture's right and lower edge.
     pub coarseness: [u32; 2],
-    /// Tiles of the picture (16x16 pixels, a bit each) that the part fills; all where there is none.
+    /// Tiles of the picture (16x16 pixels, one bit each) that the part fills; all if there is no mask.
     pub tiles: Option<Arc<Mask>>,
-    /// How its pixels come of the layer's.
+    /// Filter from the layer's pixels to the picture's.
     pub filter: Filter,
-    /// Pixels of the picture to those of the layer, homogeneous, in place of origin and coarseness.
+    /// Homogeneous map from pixels of the picture to pixels of the layer, in place of origin and coarseness.
     pub layer_from_px: Option<DMat3>,
 }
 
-/// How a picture's pixels come of a layer's.
+/// Filter from a layer's pixels to a picture's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Filter {
     /// The layer has the picture's pixels: they are copied.
@@ -64,7 +64,7 @@ pub enum Filter {
     Projective,
 }
 
-/// Bytes of what a frame is rendered into.
+/// Bytes of the targets of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TargetBytes {
     /// Colour of the layers, and of the pictures composed of them.
@@ -107,7 +107,7 @@ impl FramePlan {
         }
     }
 
-    /// Whether a layer is the picture of an eye as it is.
+    /// Whether a layer is the unmodified picture of an eye.
     #[must_use]
     pub fn is_picture(&self, layer: usize) -> bool {
         self.pictures.contains(&PictureSource::Layer(layer))

@@ -1,4 +1,4 @@
-//! Which draw enters which view or shadow cascade. One technique a file.
+//! Decides which draws enter which view or shadow cascade. One technique per file.
 //!
 //! ```text
 //! bounds -> Hierarchy (kept, refitted)

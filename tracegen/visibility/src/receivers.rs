@@ -1,4 +1,4 @@
-//! Whether a volume of nested ones is ever looked up: a shadow cascade that nobody sees.
+//! Finds nested volumes that are never looked up, such as invisible shadow cascades.
 
 use crate::frustum::frustum_planes;
 use glam::{Affine3A, Mat4, Vec3, Vec4};
@@ -23,7 +23,7 @@ pub struct Receivers {
     sides: Vec<[Vec4; 4]>,
     /// What a point surely inside is inside of.
     insides: Vec<[Vec4; 5]>,
-    /// What has been found so far.
+    /// Volumes that were found so far.
     found: Vec<bool>,
 }
 
@@ -70,7 +70,7 @@ impl Receivers {
         }
     }
 
-    /// Goes on with what another view sees.
+    /// Continues with another view.
     pub fn look(&mut self, clip_from_world: Mat4) {
         self.view = frustum_planes(clip_from_world);
     }
@@ -133,7 +133,7 @@ impl Receivers {
         }
     }
 
-    /// Whether the hull of `places` may be looked up in a volume that has not been found.
+    /// Whether the hull of `places` may be looked up in a volume that was not found yet.
     fn is_new(&self, places: &[PointCode]) -> bool {
         (self.looked_up(places) & self.missing()) != 0
     }
@@ -270,7 +270,7 @@ mod tests {
         assert_eq!(found(&volumes, &at(-30.0)), [false, false, true]);
         // Within the margin of a side both may be.
         assert_eq!(found(&volumes, &at(-4.95)), [true, true, false]);
-        // Behind the viewer: seen by nobody.
+        // Behind the viewer, so invisible.
         assert_eq!(found(&volumes, &at(2.0)), [false; 3]);
         // Across all of them.
         let long = [

@@ -6,7 +6,7 @@ use formats::view::{FovTangents, Hmd, Lens};
 use glam::Vec3;
 use scene::{Camera, cameras};
 
-/// Pixels of an eye's picture.
+/// Size of an eye's picture in pixels.
 pub const SIZE_PX: [u32; 2] = [1000, 1000];
 
 /// Eyes at the origin that look along -z, as the cameras make them; the lenses are the default

@@ -1,4 +1,4 @@
-//! What is done with whole layers: masks before their draws, pictures of them after.
+//! Operations on whole layers: masks before their draws, pictures after them.
 
 use super::bindings;
 use super::device::Gpu;
@@ -18,7 +18,7 @@ pub struct Composer {
     /// Writes the nearest depth wherever a layer's mask is not set.
     pub mask: OverLayer,
     filters: [(Filter, wgpu::RenderPipeline); 4],
-    /// Stands for the mask of a layer and the tiles of a part that have none.
+    /// Used as the mask of layers and the tiles of parts that have none.
     absent: wgpu::TextureView,
 }
 
@@ -173,7 +173,7 @@ impl Composer {
     }
 }
 
-/// A texture of a byte a pixel: 1 where the mask is set.
+/// A texture with one byte per pixel: 1 where the mask is set.
 fn upload(gpu: &Gpu, mask: &Mask) -> wgpu::TextureView {
     let [width, height] = mask.size_px();
     let bytes: Vec<u8> = mask.flags().iter().map(|flag| u8::from(*flag)).collect();

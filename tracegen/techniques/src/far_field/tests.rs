@@ -9,7 +9,7 @@ fn between(random: &mut Random, low: f64, high: f64) -> f64 {
     low + (high - low) * random.unit_f64()
 }
 
-/// Eyes `ipd_m` apart, turned outwards, of a head somewhere; `fov` is the left eye's.
+/// Eyes `ipd_m` apart, turned outwards, for a head at some pose; `fov` is the left eye's.
 fn eyes(fov: FovTangents, ipd_m: f64, cant_deg: f64, far_m: f64) -> [EyeView; 2] {
     let head = DMat4::from_translation(DVec3::new(3.0, 1.7, -2.0))
         * DMat4::from_euler(EulerRot::YXZ, 0.6, -0.2, 0.1);
@@ -110,7 +110,7 @@ fn no_point_beyond_the_split_is_off_by_more_than_predicted_and_some_nearly_so() 
                     }
                     let bound = f64::from(budget_px);
                     let told = format!("display {display} {variant:?} {budget_px} px: {worst}");
-                    // Matrices of 32 bits are right to a hundredth of a pixel.
+                    // Matrices of 32 bits are accurate to a hundredth of a pixel.
                     assert!(worst <= bound + 0.01, "{told}");
                     // The far plane ends the depth shift before infinity.
                     assert!(
@@ -135,7 +135,7 @@ fn parallel_eyes_have_the_split_and_the_shift_of_the_published_formulae() {
             (split_m / expected - 1.0).abs() < 1e-4,
             "{split_m} {expected}"
         );
-        // From an eye instead of the middle, twice as far.
+        // From an eye instead of the midpoint, twice as far.
         let alternate = Stereo::new(&pair, [1024, 1024], Variant::AlternateEye, 1);
         assert!((alternate.split_m(budget_px) / expected - 2.0).abs() < 2e-4);
     }

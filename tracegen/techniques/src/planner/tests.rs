@@ -66,7 +66,7 @@ fn all() -> Vec<Settings> {
     all
 }
 
-/// What the pixels of a layer are read for a pixel of the picture.
+/// Pixels of the layer that are read for a pixel of the picture.
 fn taps(part: &PicturePart, layer: &Layer, pixel: [u32; 2]) -> Vec<[u32; 2]> {
     let own = [0, 1].map(|axis: usize| pixel[axis] - part.origin_px[axis]);
     match part.filter {
@@ -274,7 +274,7 @@ fn rings_around_the_gaze_have_the_shares_that_a_circle_has() {
     let share = plan(&settings, &hmd).predicted.rate_share.unwrap();
     let disc = std::f32::consts::PI * 20.0_f32.to_radians().tan().powi(2) / 2.3_f32.powi(2);
     let expected = disc + (1.0 - disc) / 16.0;
-    // Tiles that touch the disc belong to it: a ring of half a tile at most.
+    // Tiles that touch the disc belong to it: a ring of at most half a tile.
     assert!(
         share > expected && share < expected + 0.02,
         "{share} {expected}"
@@ -328,7 +328,7 @@ fn eyes_that_no_far_field_serves_are_an_error_of_the_plan() {
             .to_cols_array_2d(),
         ..EyeView::default()
     };
-    // Eyes that look apart: no picture of less than 180 degrees holds both views.
+    // Eyes with divergent directions: no picture of less than 180 degrees contains both views.
     let views = FrameViews {
         frame: 3,
         eyes: [view(-80.0), view(80.0)],
@@ -434,7 +434,7 @@ fn views_at_once_need_a_depth_buffer_each_and_passes_in_turn_share_one() {
     };
     assert_eq!(bytes(&baseline, false), (2 * view, view));
     assert_eq!(bytes(&baseline, true), (2 * view, 2 * view));
-    // Composed pictures are there beside their layers, and the largest layer lends its depth.
+    // Composed pictures exist in addition to their layers, and the largest layer's depth buffer is shared.
     let rings = plan(&foveated(FoveationKind::Rings, [0.0; 2], false), &hmd);
     let layers: u64 = (rings.layers.iter())
         .map(|layer| 4 * u64::from(layer.size_px[0]) * u64::from(layer.size_px[1]))

@@ -1,6 +1,6 @@
 //! Conical culling: the part of each eye's frustum that its round lens shows.
 //!
-//! The frustum stays: where the lens is larger than the picture, the picture ends first.
+//! The frustum is still tested: if the lens is larger than the picture, the picture ends first.
 
 use super::{CullInput, Volumes};
 use crate::rig::TooWide;

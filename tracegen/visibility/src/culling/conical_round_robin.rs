@@ -1,4 +1,4 @@
-//! Conical round-robin culling: what one eye's lens shows, and the other eye's in the next frame.
+//! Conical round-robin culling: by one eye's lens, and by the other eye's in the next frame.
 
 use super::{CullInput, Volumes};
 use crate::rig::TooWide;

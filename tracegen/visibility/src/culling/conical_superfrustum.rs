@@ -61,7 +61,7 @@ fn cone(rig: &Rig, extent: DVec3) -> Result<Cone, TooWide> {
     })
 }
 
-/// Direction of the middle of an eye's lens.
+/// Direction of the centre of an eye's lens.
 fn lens_direction(eye: &Eye) -> DVec3 {
     let [right, up, forward] = eye.axes().map(|axis| axis.gradient);
     let [x, y] = eye.lens.center.map(f64::from);

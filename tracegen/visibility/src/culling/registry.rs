@@ -94,7 +94,7 @@ impl Culling {
         self.0.help
     }
 
-    /// Where it looks for draws.
+    /// The volumes in which it searches for draws.
     pub(super) fn volumes(self, frame: &CullInput<'_>) -> Result<Volumes, TooWide> {
         (self.0.volumes)(frame)
     }

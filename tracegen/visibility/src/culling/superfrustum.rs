@@ -1,4 +1,4 @@
-//! Superfrustum culling: one frustum around both eyes', from a point behind them (Everitt).
+//! Superfrustum culling: one frustum around both eyes' frusta, from a point behind them (Everitt).
 //!
 //! For parallel eyes with outer tangents `tan_l` and `tan_r`, the side planes of the outer edges
 //! meet `ipd / (tan_l + tan_r)` behind the eyes, and the vertical tangents shrink to
@@ -16,7 +16,7 @@ pub(super) fn volumes(frame: &CullInput<'_>) -> Result<Volumes, TooWide> {
     Ok(Volumes::Any(vec![Volume::new(planes, None)]))
 }
 
-/// A frustum that holds those of all eyes.
+/// A frustum that contains those of all eyes.
 #[derive(Clone, Debug)]
 pub struct Superfrustum {
     /// Where its side planes meet, at the height of the eyes.
@@ -116,7 +116,7 @@ mod tests {
     use crate::testing;
     use formats::view::FovTangents;
 
-    /// The facts' figures: 90 degrees, 64 mm, hence 32 mm behind the eyes.
+    /// Known values: 90 degrees, 64 mm, hence 32 mm behind the eyes.
     #[test]
     fn the_recession_of_parallel_eyes_is_the_closed_form() {
         let (near, far) = (0.1, 50.0);

@@ -97,7 +97,7 @@ impl Watcher {
         rig.eyes().iter().map(watcher).collect()
     }
 
-    /// Whether a point is in the picture, and whether the lens shows it.
+    /// Whether a point is in the picture, and whether it is visible through the lens.
     fn sees(&self, point: Vec3) -> [bool; 2] {
         let c = self.clip_from_world * point.extend(1.0);
         if !(c.x.abs() <= c.w && c.y.abs() <= c.w && 0.0 <= c.z && c.z <= c.w) {
@@ -191,7 +191,7 @@ fn nothing_with_a_point_in_view_is_lost_by_the_exact_techniques() {
     assert!(seen(0) > 1_000_000 && seen(1) > 100_000 && widest > 168.0);
 }
 
-/// Points on the edges of the frusta and on the circles of the lenses, where nothing is to spare.
+/// Points on the edges of the frusta and on the circles of the lenses, the tightest cases.
 #[test]
 fn the_edges_of_what_the_eyes_see_lie_in_the_exact_techniques_volumes() {
     let mut random = Random(77);
@@ -260,7 +260,7 @@ fn one_volume_takes_about_half_the_tests_of_two() {
             one / two,
             turn / two
         );
-        // What the superfrustum keeps in vain is little.
+        // The superfrustum keeps few invisible draws.
         assert!(kept[1] >= kept[0] && kept[1] as f64 <= 1.02 * kept[0] as f64);
         assert!(one <= 0.55 * two, "{preset}: {one} of {two}");
         assert!(turn <= 0.51 * two, "{preset}: {turn} of {two}");

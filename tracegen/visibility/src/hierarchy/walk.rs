@@ -4,7 +4,7 @@ use super::{Hierarchy, Node, WIDTH};
 use crate::draw_set::DrawSet;
 use crate::volume::{Prepared, Sides};
 
-/// What a walk needs and the next one reuses.
+/// Memory that walks reuse.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     /// Nodes to visit, each with the sides of the volume that it is not known to be inside of.
@@ -65,7 +65,7 @@ impl Hierarchy {
     }
 }
 
-/// What a box holds.
+/// Contents of a box.
 enum Subtree {
     /// One draw, by its place in the order.
     Draw(u32),
