@@ -24,7 +24,7 @@ pub struct EyeImage {
     pub pixels: Vec<Vec3>,
 }
 
-/// What a frame cost.
+/// Cost of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameStats {
     /// Rays by kind, in the order of [`RayKind`].
@@ -79,7 +79,7 @@ pub struct RayFrame {
     pub stats: FrameStats,
 }
 
-/// What a worker hands over for a tile.
+/// A worker's results of a tile.
 struct TileResult {
     encoded: Result<EncodedRayTile>,
     origin_px: [u32; 2],

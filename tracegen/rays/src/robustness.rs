@@ -11,14 +11,14 @@ use glam::{DVec3, Vec3};
 /// half a unit in the last place of each coordinate and of the shear, a few times over.
 const TOLERANCE: f64 = 1e-5;
 
-/// What a check found.
+/// Results of a check.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Findings {
     /// Rays checked.
     pub rays: u64,
     /// Rays that hit, by the reference.
     pub hits: u64,
-    /// Rays whose answer hangs on less than the rounding of the mesh; not held against anyone.
+    /// Rays whose result depends on less than the rounding of the mesh; they are not counted as errors.
     pub borderline: u64,
     /// Closest-hit or any-hit, in either tree, that says hit where the reference says miss or the
     /// other way round.
@@ -198,7 +198,7 @@ impl MeshUnderTest {
         if self.convex && hits(offset(point, outward), away) {
             findings.self_hits += 1;
         }
-        // A point on an edge may leave at once through the face next to it: the reference knows.
+        // A point on an edge may leave at once through the adjacent face, so the reference decides.
         let within = offset(point, -outward);
         let exits = reference.verdict(within.as_dvec3(), -away.as_dvec3(), TOLERANCE);
         if !hits(within, -away) && matches!(exits, Verdict::Hit(_)) {

@@ -19,7 +19,7 @@ const LEAST_WEIGHT: f32 = 0.01;
 /// Nor are shadow rays for less than this radiance.
 const LEAST_RADIANCE: f32 = 1.0 / 1024.0;
 
-/// What is traced and recorded.
+/// Settings of tracing and recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TraceSettings {
     /// Levels of reflection and refraction.
@@ -301,7 +301,7 @@ impl<'a> Tracer<'a> {
         radiance
     }
 
-    /// What an opaque surface mirrors: a ray where it is polished, else the sky's mean.
+    /// Reflection of an opaque surface: a ray if it is polished, else the sky's mean.
     fn reflection(
         &mut self,
         path: &Path,
@@ -385,7 +385,7 @@ impl<'a> Tracer<'a> {
         light
     }
 
-    /// What lies behind a blended surface: the ray goes straight on.
+    /// The surface behind a blended surface: the ray continues straight.
     fn behind(
         &mut self,
         path: &Path,

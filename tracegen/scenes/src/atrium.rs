@@ -1,4 +1,4 @@
-//! A two-storey colonnaded courtyard: stands for the Sponza scenes.
+//! A two-storey colonnaded courtyard: a stand-in for the Sponza scenes.
 //!
 //! Everything sits on a lattice of 3.5 m bays: an open court of 8 x 2 bays, ringed by an arcade
 //! one bay deep with a gallery on top.

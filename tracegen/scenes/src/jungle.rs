@@ -1,4 +1,4 @@
-//! A jungle clearing with a temple ruin: stands for GFXBench's T-Rex.
+//! A jungle clearing with a temple ruin: a stand-in for GFXBench's T-Rex.
 //!
 //! A winding path leads to the ruin; foliage with alpha masks is instanced from few meshes.
 
@@ -317,7 +317,7 @@ fn terrain(scene: &mut SceneBuilder, solids: &Solids) {
     scene.add("path", path, solids.path);
 }
 
-/// Whether a plant that keeps `clear` metres off the path would stand in the creature or before it.
+/// Whether a plant that keeps `clear` metres from the path would be inside the creature or in front of it.
 fn hides_creature(x: f32, z: f32, clear: f32) -> bool {
     let eye = vec2(-8.5, path_z(-8.5));
     let (to, at) = (vec2(CREATURE.x, CREATURE.z) - eye, vec2(x, z) - eye);
@@ -336,7 +336,7 @@ fn spot(rng: &mut Rng, clear: f32, reach: f32, temple: f32) -> Vec3 {
     loop {
         let x = rng.range(-28.0, 28.0);
         let side = if rng.bits() & 1 == 0 { 1.0 } else { -1.0 };
-        // Denser beside the path, where it is seen.
+        // Denser along the path, where it is visible.
         let z = path_z(x) + side * (clear + (reach - clear) * rng.unit().powf(1.6));
         if z.abs() < HALF - 2.0
             && !hides_creature(x, z, clear)

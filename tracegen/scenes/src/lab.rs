@@ -392,7 +392,7 @@ fn plate_with_hole(m: &mut MeshBuilder, center: Vec3, half: glam::Vec2, hole: f3
             let p = (vec2(cos, sin) * hole).lerp(square(a), t);
             (center + vec3(p.x, y, p.y), p)
         });
-        // The face is flat, whatever its outline's corners do to derivatives.
+        // The face is flat, so its normals do not depend on derivatives at the corners of its outline.
         let normal = if up { Vec3::Y } else { Vec3::NEG_Y };
         face.orient(|_| normal);
         face.normals.fill(normal);

@@ -29,13 +29,13 @@ use std::path::Path;
 pub struct Builtin {
     /// Name on the command line.
     pub name: &'static str,
-    /// What is seen, and what it stands for.
+    /// What it shows, and which scene it is a stand-in for.
     pub description: &'static str,
     /// Triangles with instances counted.
     pub triangles: u64,
     /// Its cameras; the first is the default.
     pub cameras: &'static [&'static str],
-    /// Numbers of instances that can be asked for with `name:NUMBER`.
+    /// Allowed numbers of instances in `name:NUMBER`.
     pub instances: Option<RangeInclusive<u32>>,
     builder: Builder,
 }

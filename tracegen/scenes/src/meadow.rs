@@ -358,7 +358,7 @@ fn grass_and_poppies(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut 
             scene.mesh("tuft", parts::tuft(blades, 0.30, rng), material)
         })
         .collect();
-    // Grass takes what is left of the triangles.
+    // Grass uses the remaining triangles.
     let left = TRIANGLES.saturating_sub(scene.triangles()) / (3 * blades as u64);
     for i in 0..left {
         let (x, z) = match i % 5 {

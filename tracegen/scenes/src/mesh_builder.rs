@@ -13,11 +13,11 @@ use std::f32::consts::TAU;
 pub struct MeshBuilder {
     /// Positions, metres.
     pub positions: Vec<Vec3>,
-    /// Normals, one a position.
+    /// Normals, one per position.
     pub normals: Vec<Vec3>,
     /// Texture coordinates in metres (or 0..1 for sheets that show a texture once).
     pub uvs: Vec<Vec2>,
-    /// Three indices a triangle, counter-clockwise seen from outside.
+    /// Three indices per triangle, counter-clockwise seen from outside.
     pub indices: Vec<u32>,
 }
 
@@ -165,7 +165,7 @@ impl MeshBuilder {
                     let dt = surface(s, t1).0 - surface(s, t0).0;
                     ds.cross(dt).try_normalize()
                 };
-                // At a pole one derivative vanishes: take the normal just beside it.
+                // At a pole one derivative vanishes, so the normal next to it is used.
                 let inward = |x: f32| x + (0.5 - x).signum() * 4.0 * step;
                 let normal = slope(s, t)
                     .or_else(|| slope(s, inward(t)))

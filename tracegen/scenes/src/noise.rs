@@ -17,7 +17,7 @@ pub const FIELD_SIZE: usize = 1024;
 pub struct Rng(Random);
 
 impl Rng {
-    /// A generator whose stream depends on `seed` alone.
+    /// A generator whose sequence depends only on `seed`.
     #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(Random(seed ^ 0x5851_f42d_4c95_7f2d))
@@ -207,7 +207,7 @@ pub fn bank() -> &'static NoiseBank {
             let join = |(field, thread): (fn() -> Field, io::Result<ScopedJoinHandle<'_, _>>)| {
                 match thread {
                     Ok(thread) => thread.join().unwrap_or_else(|panic| resume_unwind(panic)),
-                    // Little memory is left, too little for one more thread.
+                    // Too little memory is left for another thread.
                     Err(_) => field(),
                 }
             };

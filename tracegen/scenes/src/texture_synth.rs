@@ -34,7 +34,7 @@ pub fn linear(color: Rgb) -> glam::Vec3 {
     glam::Vec3::from(color.map(srgb::decode_f32))
 }
 
-/// What a surface looks like at one point.
+/// Appearance of a surface at one point.
 #[derive(Clone, Copy, Debug)]
 pub struct Texel {
     /// Base colour.
@@ -66,7 +66,7 @@ impl Texel {
     }
 }
 
-/// Which images a material gets beside base colour.
+/// Images of a material in addition to base colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Maps {
     /// Base colour only.
@@ -88,7 +88,7 @@ pub struct Recipe {
     pub name: &'static str,
     /// Edge in texels, a power of two.
     pub size: u32,
-    /// Images wanted.
+    /// Images of the material.
     pub maps: Maps,
     /// Metres that one repeat covers.
     pub tile_m: f32,
@@ -147,7 +147,7 @@ fn byte(x: f32) -> u8 {
     (x.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }
 
-/// A recipe as a source of images. Within a scene, its name tells it from all others.
+/// A recipe as a source of images. Within a scene, its name identifies it.
 pub struct RecipeSource {
     recipe: Recipe,
     scene: String,
@@ -175,11 +175,11 @@ impl Recipe {
         })
     }
 
-    /// Evaluates the surface once a texel and packs the images that are asked for, by number.
+    /// Evaluates the surface once per texel and packs the requested images, by number.
     fn synthesize(&self, parts: &[usize]) -> Vec<Vec<u8>> {
         let n = self.size as usize;
         let wants = |map: Map| parts.contains(&(map as usize));
-        // A map that is not wanted has rows of one texel, so that the loop stays one shape.
+        // An unused map has rows of one texel, so that the loop stays the same.
         let row_bytes = |map| if wants(map) { 4 * n } else { 4 };
         let buffer = |map| vec![255u8; row_bytes(map) * n];
         let (mut color, mut mr, mut ao) = (
@@ -235,7 +235,7 @@ impl ImageSource for RecipeSource {
 }
 
 impl OpenSource for &RecipeSource {
-    /// A surface is code: what tells it apart is the text of this crate.
+    /// A surface is code, so the text of this crate identifies it.
     fn identify(&self, sink: &mut dyn FnMut(&[u8])) {
         for text in SOURCE_TEXT {
             sink(text.as_bytes());

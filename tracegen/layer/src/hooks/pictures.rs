@@ -1,6 +1,6 @@
 //! Small pictures of what passes render, for lists of them.
 //!
-//! Lavapipe, on which alone they are made, executes commands one after the other and has no image layouts.
+//! Pictures are only made on lavapipe, which executes commands one after the other and ignores image layouts.
 
 use super::device::Device;
 use super::next::Next;
@@ -31,7 +31,7 @@ struct PassReadback {
     address: usize,
 }
 
-/// What is kept of a pass's target.
+/// Description of the kept picture of a pass's target.
 #[derive(Clone, Copy)]
 struct Kind {
     format: vk::Format,

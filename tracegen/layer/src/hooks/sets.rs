@@ -126,7 +126,7 @@ pub(super) unsafe extern "system" fn destroy_pool(
 /// A valid `VkWriteDescriptorSet`.
 unsafe fn written(write: &vk::WriteDescriptorSet<'_>) -> Written {
     let images = match is_texture(write.descriptor_type) {
-        // SAFETY: of these kinds the array has so many elements.
+        // SAFETY: for these kinds, the array has this number of elements.
         true => unsafe { slice(write.p_image_info, write.descriptor_count) },
         false => &[],
     };
@@ -226,7 +226,7 @@ pub(super) unsafe extern "system" fn destroy_template(
     }
 }
 
-/// What a template's entries write.
+/// The writes of a template's entries.
 ///
 /// # Safety
 /// `data` has what the template describes.

@@ -5,7 +5,7 @@ use crate::spool::{SamplerInfo, ViewInfo};
 use ash::vk::{self, Handle};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-/// What a descriptor of a texture holds.
+/// Contents of a descriptor of a texture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slot {
     /// Its image.
@@ -61,7 +61,7 @@ struct SetLayout {
 #[derive(Clone, Debug)]
 struct LayoutBinding {
     count: u32,
-    /// Samplers that stand in the layout.
+    /// Immutable samplers of the layout.
     immutable: Vec<Option<SamplerInfo>>,
 }
 

@@ -11,7 +11,7 @@ pub struct Images {
     /// Number of the first one.
     first: u32,
     images: HashMap<u64, Arc<ImageInfo>>,
-    /// By number, those that were destroyed too: a draw may be described later.
+    /// By number, including destroyed ones, because a draw may be described later.
     numbered: Vec<Arc<ImageInfo>>,
     views: HashMap<u64, ViewInfo>,
     samplers: HashMap<u64, SamplerInfo>,
@@ -136,7 +136,7 @@ impl Images {
 
     /// A sampler was created.
     pub fn create_sampler(&mut self, sampler: vk::Sampler, info: &vk::SamplerCreateInfo<'_>) {
-        // JSON knows finite numbers alone.
+        // JSON has only finite numbers.
         let finite = |value: f32| if value.is_finite() { value } else { 1000.0 };
         let of = SamplerInfo {
             filters: [info.mag_filter.as_raw(), info.min_filter.as_raw()],

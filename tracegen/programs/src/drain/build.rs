@@ -33,7 +33,7 @@ pub enum Merged {
 }
 
 impl Merged {
-    /// The draws that it is made of, and the eye that a record of some view belongs to.
+    /// Its draws, and the eye of the records of each view.
     fn parts(&self) -> Vec<(Executed, RecordTarget)> {
         match *self {
             Self::Shadow(draw) => vec![(draw, RecordTarget::Pass(draw.pass))],
@@ -46,7 +46,7 @@ impl Merged {
     }
 }
 
-/// Where the records of a draw go.
+/// Destination of the records of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum RecordTarget {
     Eye(Eye),
@@ -143,7 +143,7 @@ impl<W: Write + Seek> Builder<W> {
         of[1] += fragments;
     }
 
-    /// Adds a frame. Tells its triangles.
+    /// Adds a frame. Returns its number of triangles.
     pub fn frame(
         &mut self,
         session: &Session,
@@ -207,7 +207,7 @@ impl<W: Write + Seek> Builder<W> {
         Ok(triangles)
     }
 
-    /// Adds a draw and its records. Tells its triangles.
+    /// Adds a draw and its records. Returns its number of triangles.
     fn draw(
         &mut self,
         session: &Session,
@@ -285,7 +285,7 @@ impl<W: Write + Seek> Builder<W> {
         }
     }
 
-    /// Declares the draws of the trace that a draw becomes: more than one if it has more groups than one can have.
+    /// Declares the trace's draws of a draw: more than one if it has more groups than one draw can have.
     fn declare(
         &mut self,
         session: &Session,
@@ -513,7 +513,7 @@ fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
     };
     let covered = lanes_of(sites.coverage);
     let mut records = Vec::new();
-    // Lanes that sample something in the first draw, whose records tell what is covered.
+    // Lanes that sample something in the first draw, whose records hold the coverage.
     let mut sampled = 0;
     let mut fragments: BTreeMap<GroupKey, Vec<(u8, &RawSample)>> = BTreeMap::new();
     for sample in of {
@@ -613,7 +613,7 @@ impl Quad {
     }
 }
 
-/// Primitives of a draw by its command; 0 where the device knew alone.
+/// Primitives of a draw by its command; 0 if only the device knew the number.
 fn primitives(info: &DrawInfo) -> u32 {
     use vk::PrimitiveTopology as Kind;
     let vertices = info.vertices;

@@ -28,7 +28,7 @@ pub struct Thumbnail {
 pub struct PassRow {
     /// Number within the frame.
     pub number: usize,
-    /// What its draws show, each once.
+    /// Roles of its draws, each once.
     pub shows: Vec<Role>,
     /// Size and format of the target.
     pub target: String,
@@ -48,7 +48,7 @@ pub struct PassRow {
     pub textures: usize,
     /// Their bytes, all levels.
     pub texture_bytes: u64,
-    /// What it rendered.
+    /// Its picture.
     pub picture: Option<Thumbnail>,
 }
 
@@ -57,7 +57,7 @@ pub struct PassRow {
 pub struct List {
     /// The frame's number.
     pub frame: u32,
-    /// Which rule told both eyes apart, or why none did.
+    /// The rule that identified both eyes, or why none did.
     pub eyes: Result<views::Rule, ViewsError>,
     /// Passes in the order of execution.
     pub rows: Vec<PassRow>,
@@ -233,7 +233,7 @@ fn cells(row: &PassRow) -> [String; 8] {
 }
 
 impl List {
-    /// How both eyes were told apart.
+    /// How both eyes were identified.
     #[must_use]
     pub fn eyes_text(&self) -> String {
         match &self.eyes {

@@ -1,4 +1,4 @@
-//! The list as a page of its own.
+//! The list as an HTML page.
 
 use super::{COLUMNS, List, PassRow, Thumbnail, cells};
 use base64::Engine;

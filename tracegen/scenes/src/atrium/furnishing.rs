@@ -1,4 +1,4 @@
-//! What makes the atrium lived in: drapes, plants, reliefs, lamps, a fountain.
+//! Furnishing of the atrium: drapes, plants, reliefs, lamps, a fountain.
 
 use super::materials::Palette;
 use super::parts::{arching_leaf, drape, lion_medallion, pot, rosette};

@@ -8,7 +8,7 @@ use crate::scene_builder::{MaterialId, SceneBuilder};
 use crate::texture_synth::{Maps, Recipe, Surface, rgb};
 use scene::AlphaMode;
 
-/// The materials that the architecture asks for.
+/// The materials of the architecture.
 #[derive(Clone, Copy, Debug)]
 pub struct Palette {
     /// Slabs of the open court.

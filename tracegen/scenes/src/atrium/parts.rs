@@ -154,7 +154,7 @@ impl Bay {
                     .map(|p| m.vertex(p.extend(z), Vec3::Z * side, vec2(p.x * side + half, -p.y)));
                 m.indices.extend([v[0], v[1], v[2], v[0], v[2], v[3]]);
             }
-            // The strip beside the arch below its shoulder is level with the spring.
+            // The strip next to the arch below its shoulder is level with the spring.
         }
         m
     }

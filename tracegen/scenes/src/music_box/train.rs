@@ -9,7 +9,7 @@ use std::f32::consts::{FRAC_PI_2, TAU};
 
 /// Spring barrel, great wheel, intermediate wheels and the governor.
 pub(super) fn train(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
-    // Gears stand in planes of constant x: their z axis turns to +x.
+    // Gears are in planes of constant x: their z axis turns to +x.
     let facing = Quat::from_rotation_y(FRAC_PI_2);
     let wheel = |teeth: u32, thickness: f32, spokes: u32| Gear {
         teeth,
@@ -155,7 +155,7 @@ pub(super) fn bells(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         smooth(0.46, 0.80),
         smooth(0.0, 0.92),
     ];
-    // The outline runs from the crown down: turned round, it faces outwards.
+    // The outline runs from the crown down, so it is reversed to face outwards.
     let skin: Vec<_> = skin.into_iter().rev().collect();
     bell.lathe(&curve(&skin, 2), 32);
     let bell = scene.mesh("bell", bell, kit.polished);

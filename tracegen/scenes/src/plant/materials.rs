@@ -1,4 +1,4 @@
-//! What the plant is made of: concrete, cladding, painted and bare steel, gratings, signs.
+//! Materials of the plant: concrete, cladding, painted and bare steel, gratings, signs.
 
 use crate::noise::{bank, hash_unit, lerp, smoothstep};
 use crate::organic::{metal, planks};
