@@ -25,7 +25,7 @@ impl ObjectiveArgs {
     /// # Errors
     /// A time budget with an objective.
     pub fn of(self, budget: Option<Budget>) -> anyhow::Result<Objective> {
-        if let Some(Budget::BudgetMs(_)) = budget {
+        if let Some(Budget::FrameMs(_)) = budget {
             let other = self.objective.filter(|other| *other != Objective::Time);
             ensure!(
                 other.is_none(),

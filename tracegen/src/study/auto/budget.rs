@@ -14,7 +14,8 @@ pub enum Budget {
     /// error is such a shift are allowed.
     Pixels(f64),
     /// Median frame time on this device in milliseconds. The error is minimised within it.
-    BudgetMs(f64),
+    #[serde(rename = "budget-ms")]
+    FrameMs(f64),
 }
 
 impl Budget {
@@ -23,7 +24,7 @@ impl Budget {
     pub fn error_limit(self) -> Option<f64> {
         match self {
             Self::Flip(limit) | Self::Pixels(limit) => Some(limit),
-            Self::BudgetMs(_) => None,
+            Self::FrameMs(_) => None,
         }
     }
 }
@@ -43,7 +44,7 @@ impl FromStr for Budget {
         match name {
             "flip" if (0.0..=1.0).contains(&value) => Ok(Self::Flip(value)),
             "pixels" if is_positive => Ok(Self::Pixels(value)),
-            "budget-ms" if is_positive => Ok(Self::BudgetMs(value)),
+            "budget-ms" if is_positive => Ok(Self::FrameMs(value)),
             _ => Err(known()),
         }
     }
@@ -54,7 +55,7 @@ impl fmt::Display for Budget {
         match self {
             Self::Flip(limit) => write!(f, "flip={limit}"),
             Self::Pixels(limit) => write!(f, "pixels={limit}"),
-            Self::BudgetMs(limit) => write!(f, "budget-ms={limit}"),
+            Self::FrameMs(limit) => write!(f, "budget-ms={limit}"),
         }
     }
 }

@@ -132,7 +132,7 @@ pub fn choose(
 }
 
 fn check_median(budget: Budget, chosen: &Row, median_s: f64) -> anyhow::Result<()> {
-    if let Budget::BudgetMs(limit_ms) = budget
+    if let Budget::FrameMs(limit_ms) = budget
         && median_s * 1e3 > limit_ms
     {
         bail!(
@@ -169,7 +169,7 @@ fn options(budget: Budget, hmd: &Hmd) -> Vec<Part> {
         .filter(|part| match budget {
             Budget::Pixels(_) => part.lossless || part.is_shift(),
             Budget::Flip(limit) => part.lossless || limit > 0.0,
-            Budget::BudgetMs(_) => true,
+            Budget::FrameMs(_) => true,
         })
         .collect()
 }
@@ -206,8 +206,8 @@ mod tests {
     #[test]
     fn a_path_whose_median_frame_is_too_slow_is_an_error() {
         let row = Row::baseline();
-        check_median(Budget::BudgetMs(11.0), &row, 0.010_9).unwrap();
-        let error = check_median(Budget::BudgetMs(11.0), &row, 0.012).unwrap_err();
+        check_median(Budget::FrameMs(11.0), &row, 0.010_9).unwrap();
+        let error = check_median(Budget::FrameMs(11.0), &row, 0.012).unwrap_err();
         assert!(error.to_string().contains("12.0 ms"), "{error}");
     }
 }

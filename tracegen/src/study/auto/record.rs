@@ -126,7 +126,7 @@ fn reason(budget: Budget, objective: Objective, found: &Found, held: &Held) -> S
     text += &match budget {
         Budget::Flip(_) => ", FLIP".to_owned(),
         Budget::Pixels(limit) => format!(" px; every shift is at most {limit} px by construction"),
-        Budget::BudgetMs(limit) => {
+        Budget::FrameMs(limit) => {
             format!(", FLIP: the least that fits {limit} ms on this device, not scaled")
         }
     };

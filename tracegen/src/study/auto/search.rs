@@ -242,7 +242,7 @@ pub fn search<J: Judge>(
                 _ => Ok(Ok(search.least(best_single, fits_error))),
             }
         }
-        Budget::BudgetMs(limit_ms) => {
+        Budget::FrameMs(limit_ms) => {
             let limit_s = limit_ms / 1e3;
             let fits = |tried: &Tried| tried.per_frame() <= limit_s;
             let (free, lossy): (Vec<Tried>, Vec<Tried>) =

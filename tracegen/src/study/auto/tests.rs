@@ -269,7 +269,7 @@ fn where_nothing_saves_time_the_baseline_stays() {
 #[test]
 fn a_time_budget_takes_no_error_it_does_not_need_and_tells_when_nothing_meets_it() {
     // The baseline takes 100 ms.
-    let chosen = |ms| found(COSTS, Budget::BudgetMs(ms)).map(|found| found.chosen.row.name);
+    let chosen = |ms| found(COSTS, Budget::FrameMs(ms)).map(|found| found.chosen.row.name);
     assert_eq!(chosen(95.0).unwrap(), "superfrustum");
     assert_eq!(chosen(80.0).unwrap(), "round-robin");
     let infeasible = chosen(50.0).unwrap_err();
@@ -297,7 +297,7 @@ fn budgets_are_read_and_nonsense_is_refused() {
     assert_eq!("flip=0".parse(), Ok(Budget::Flip(0.0)));
     assert_eq!("flip=1".parse(), Ok(Budget::Flip(1.0)));
     assert_eq!("pixels=1".parse(), Ok(Budget::Pixels(1.0)));
-    assert_eq!("budget-ms=11".parse(), Ok(Budget::BudgetMs(11.0)));
+    assert_eq!("budget-ms=11".parse(), Ok(Budget::FrameMs(11.0)));
     for text in [
         "",
         "flip",
