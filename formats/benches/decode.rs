@@ -3,6 +3,7 @@
 //! `cargo bench -p formats` uses generated tiles; `TEXTRACE=file cargo bench -p formats` uses a trace.
 
 use criterion::{Criterion, Throughput};
+use formats::random::Random;
 use formats::textrace::{
     Draw, Encoding, Pass, PassKind, PrimitiveRun, QuadRecord, Tables, Textrace, TextraceWriter,
     Tile, TraceMeta, UvGroup, encode_tile_as, quad_morton,
@@ -11,18 +12,9 @@ use formats::view::{FovTangents, FrameViews};
 use std::hint::black_box;
 use std::path::Path;
 
-/// Reproducible pseudo-random numbers (splitmix64).
-struct Random(u64);
-
-impl Random {
-    /// Uniform in `low..high`.
-    fn range(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        low + (high - low) * ((z ^ z >> 31) >> 11) as f64 / (1u64 << 53) as f64
-    }
+/// Uniform in `low..high`.
+fn between(random: &mut Random, low: f64, high: f64) -> f64 {
+    low + (high - low) * random.unit_f64()
 }
 
 /// Texture coordinates in perspective: `(a x + b y + c) / w` for u and v.
@@ -44,22 +36,22 @@ impl Plane {
 fn made_up_tile(random: &mut Random, cell: f64) -> Tile {
     let base = Plane {
         numerators: [0, 1].map(|_| {
-            let slope = |r: &mut Random| r.range(-0.002, 0.002);
-            [slope(random), slope(random), random.range(0.0, 1.0)]
+            let slope = |r: &mut Random| between(r, -0.002, 0.002);
+            [slope(random), slope(random), between(random, 0.0, 1.0)]
         }),
         w: [
-            random.range(-0.004, 0.004),
-            random.range(-0.004, 0.004),
+            between(random, -0.004, 0.004),
+            between(random, -0.004, 0.004),
             1.0,
         ],
     };
     let mut tile = Tile::default();
     let cells = (16.0 / cell).ceil() as i32 + 1;
-    let offset = [random.range(-cell, 0.0), random.range(-cell, 0.0)];
-    let first_primitive = random.range(0.0, 1000.0) as u32;
+    let offset = [between(random, -cell, 0.0), between(random, -cell, 0.0)];
+    let first_primitive = between(random, 0.0, 1000.0) as u32;
     for triangle in 0..cells * cells * 2 {
         let (column, row) = (triangle / 2 % cells, triangle / 2 / cells);
-        let wobble = |r: &mut Random, n: f64| n * r.range(0.95, 1.05);
+        let wobble = |r: &mut Random, n: f64| n * between(r, 0.95, 1.05);
         let plane = Plane {
             numerators: base
                 .numerators

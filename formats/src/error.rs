@@ -1,6 +1,6 @@
 //! Errors that name the file, the place, what was expected and what was found.
 
-use crate::container::ChunkTag;
+use crate::chunk_tag::ChunkTag;
 use std::fmt;
 use std::io;
 use thiserror::Error;

@@ -4,6 +4,7 @@
 //! two programs communicate only through the files it describes. FORMAT.md in the repository root is the
 //! byte-level specification.
 
+mod chunk_tag;
 pub mod container;
 pub mod error;
 pub mod footprint;
@@ -11,6 +12,7 @@ pub mod interop;
 mod json;
 pub mod layout;
 mod parse;
+pub mod random;
 pub mod raytrace;
 pub mod text;
 pub mod textrace;

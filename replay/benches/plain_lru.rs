@@ -75,10 +75,9 @@ fn misses(words: &[[u8; 4]], line_bytes: u32) -> [u64; 2] {
 /// A random walk with short steps, occasional jumps and many repeats: a few million addresses.
 fn made_up() -> File {
     let mut bytes = Vec::new();
-    let (mut state, mut address) = (1_u64, 0_u32);
+    let (mut numbers, mut address) = (formats::random::Random(1), 0_u32);
     for _ in 0..4 << 20 {
-        state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1);
-        let random = (state >> 40) as u32;
+        let random = (numbers.bits() >> 40) as u32;
         address = match random % 64 {
             0 => random << 4 & 0xff_ffff,
             1..24 => address.wrapping_add(random >> 6 & 0x3f) & 0xff_ffff,

@@ -1,6 +1,7 @@
 //! Small generated traces of both kinds that use every feature of the format.
 
 use formats::container::Kind;
+pub use formats::random::Random;
 use formats::raytrace::camera::sample_position_px;
 use formats::raytrace::{
     BvhSummary, EyeCamera, Hit, NO_PARENT, Outcome, PixelRecord, RayKind, RayLight, RayMaterial,
@@ -20,26 +21,6 @@ use formats::view::{Eye, FovTangents, FrameViews, Hmd};
 
 /// Width and height of an eye's image; neither is a multiple of the tile size.
 const EYE_SIZE_PX: [u32; 2] = [39, 21];
-
-/// Reproducible pseudo-random numbers (splitmix64).
-#[derive(Clone, Debug)]
-pub struct Random(pub u64);
-
-impl Random {
-    /// The next 64 bits.
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
-    }
-
-    /// A number below a positive bound.
-    pub fn below(&mut self, bound: u32) -> u32 {
-        (self.bits() % u64::from(bound)) as u32
-    }
-}
 
 fn fov() -> FovTangents {
     FovTangents {

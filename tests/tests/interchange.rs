@@ -485,6 +485,13 @@ fn input_without_addresses_is_refused() {
             expected,
         );
     }
+}
+
+#[test]
+fn options_of_traces_are_refused_with_addresses() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plain = folder.path().join("good.u32");
+    fs::write(&plain, [1; 400]).expect("room");
     let of_traces: [&[&str]; 24] = [
         &["x.textrace"],
         &["--order", "morton"],
@@ -519,6 +526,10 @@ fn input_without_addresses_is_refused() {
             .args(options);
         refuse(&mut command, &["cannot be used with"]);
     }
+}
+
+#[test]
+fn options_of_addresses_are_refused_with_traces() {
     let of_addresses: [&[&str]; 4] = [
         &["--csv"],
         &["--kinds", "read"],

@@ -7,7 +7,7 @@
 //! scene = ["atrium", "sponza.gltf"]
 //! hmd = ["vive", "quest2"]
 //! [[captures]]
-//! command = "rays"                # `raster` where it is left out
+//! //! command = "rays"                # default: `raster`
 //! scene = "chess"
 //! ```
 
@@ -15,10 +15,10 @@ use anyhow::{Context, bail, ensure};
 use std::path::Path;
 use toml::{Table, Value};
 
-/// More captures than this are taken for a mistake.
+/// A manifest with more captures is refused, because it is probably a mistake.
 const MOST_CAPTURES: usize = 10_000;
 
-/// Options that a manifest does not set: the sweep does.
+/// Options that a manifest must not contain, because the sweep sets them.
 const OWN_OPTIONS: [&str; 5] = ["output", "image", "threads", "quiet", "help"];
 
 /// A capture to make.
@@ -26,28 +26,28 @@ const OWN_OPTIONS: [&str; 5] = ["output", "image", "threads", "quiet", "help"];
 pub struct Capture {
     /// Name of the trace's file.
     pub file: String,
-    /// Arguments of `tracegen` but for the output.
+    /// Arguments of `tracegen` without the output.
     pub arguments: Vec<String>,
-    /// Which `[[captures]]` it is of, from 1.
+    /// Number of its `[[captures]]` table, from 1.
     pub table: usize,
 }
 
 impl Capture {
-    /// The arguments in a line, as golden traces have them.
+    /// The arguments in one line, as in the recipes of golden traces.
     #[must_use]
     pub fn recipe(&self) -> String {
         let words: Vec<_> = self.arguments.iter().map(|a| shell::quoted(a)).collect();
         words.join(" ")
     }
 
-    /// Name of the recipe's file: the trace's with `.recipe` behind it, so that a texture trace and a ray
-    /// trace of one name have a recipe each.
+    /// Name of the recipe's file: the trace's name with `.recipe` appended, so that a texture trace and a ray
+    /// trace with the same name have separate recipes.
     #[must_use]
     pub fn recipe_file(&self) -> String {
         format!("{}.recipe", self.file)
     }
 
-    /// The recipe's file: the arguments, and what they made.
+    /// Text of the recipe's file: the arguments and the checksum of the trace.
     #[must_use]
     pub fn recipe_text(&self, checksum: u32) -> String {
         format!("{}\n# content checksum {checksum:08x}\n", self.recipe())
@@ -57,7 +57,7 @@ impl Capture {
 /// Reads a manifest.
 ///
 /// # Errors
-/// Syntax, an unknown table, a value that is no option's, two captures of one name.
+/// A syntax error, an unknown table, an invalid option value, or two captures with one file name.
 pub fn parse(text: &str) -> anyhow::Result<Vec<Capture>> {
     let manifest: Table =
         toml::from_str(text).map_err(|e| anyhow::anyhow!("{}", e.to_string().trim()))?;
@@ -112,7 +112,7 @@ fn crossed(mut options: Table, table: usize) -> anyhow::Result<Vec<Capture>> {
     let command = word("command")?.unwrap_or_else(|| "raster".to_owned());
     let name = word("name")?;
     if let Some(name) = &name {
-        // It begins a file's name in the sweep's folder, and must not lead out of it.
+        // The name starts a file name in the sweep's folder, so it must not lead to another folder.
         ensure!(
             !name.contains(['/', '\\', '\0']),
             "`name`: expected a part of a file's name, found {name:?}"
@@ -145,7 +145,7 @@ fn crossed(mut options: Table, table: usize) -> anyhow::Result<Vec<Capture>> {
         let mut arguments = vec![command.clone()];
         let mut parts: Vec<String> = name.iter().cloned().collect();
         let mut chosen = Vec::new();
-        // The last axis runs fastest.
+        // The last axis varies fastest.
         for (key, values) in axes.iter().rev() {
             chosen.push((key, &values[number % values.len()], values.len() > 1));
             number /= values.len();
@@ -172,7 +172,7 @@ fn crossed(mut options: Table, table: usize) -> anyhow::Result<Vec<Capture>> {
     Ok((0..count).map(capture).collect())
 }
 
-/// The values of an option: text, empty for a switch that is set, none for one that is not.
+/// The values of an option: text; empty for a switch that is set, `None` for one that is not.
 fn values(key: &str, value: Value) -> anyhow::Result<Vec<Option<String>>> {
     let values = match value {
         Value::Array(values) if values.is_empty() => bail!("`{key}`: expected values, found none"),
@@ -189,7 +189,7 @@ fn values(key: &str, value: Value) -> anyhow::Result<Vec<Option<String>>> {
     values.into_iter().map(text).collect()
 }
 
-/// A value as part of a file's name; a scene goes by its file's without extension.
+/// A value as part of a file name; a scene is represented by its file name without extension.
 fn short(value: &str, is_scene: bool) -> String {
     let stem = Path::new(value).file_stem().filter(|_| is_scene);
     let text = stem.map_or(value.into(), |stem| stem.to_string_lossy());

@@ -1,7 +1,7 @@
-//! Files of hidden-area meshes: this project's own, and those that hmdq records from a headset's runtime.
+//! Files of hidden-area meshes: this project's format, and recordings of a headset's runtime by hmdq.
 //!
-//! Coordinates are parts of the picture's width and height. They count from the left and, unless a file in this project's form
-//! says `"origin": "top-left"`, upwards, as OpenVR's do.
+//! Coordinates are fractions of the picture's width and height. They start at the left and, unless a file in
+//! this project's format says `"origin": "top-left"`, at the bottom, as in OpenVR.
 
 use anyhow::{Context, bail, ensure};
 use serde::Deserialize;
@@ -11,13 +11,13 @@ use std::io::Read;
 use std::path::Path;
 use techniques::hidden_mesh::{HiddenMesh, Triangle};
 
-/// More than this is no mesh.
+/// Larger files are refused.
 const LONGEST_BYTES: u64 = 16 << 20;
 
-/// Schema of our own files.
+/// Schema of this project's format.
 pub const SCHEMA: &str = "parallax.hidden-area/1";
 
-/// Our own file.
+/// A file in this project's format.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Own {
@@ -36,20 +36,20 @@ enum Corner {
     TopLeft,
 }
 
-/// An eye's mesh as hmdq writes it, of which other keys are left aside.
+/// An eye's mesh as hmdq writes it; other keys are ignored.
 #[derive(Deserialize)]
 struct Recorded {
-    /// Corners of triangles one after the other.
+    /// Corners of the triangles, three per triangle.
     verts_raw: Option<Vec<[f32; 2]>>,
-    /// Corners once each, and the convex polygons that they make.
+    /// Distinct corners, and the convex polygons of their indices.
     verts_opt: Option<Vec<[f32; 2]>>,
     faces_opt: Option<Vec<Vec<usize>>>,
 }
 
-/// Reads a file of either kind.
+/// Reads a file in either format.
 ///
 /// # Errors
-/// A file that cannot be read, is too long, or holds no mesh; the message names it and the key.
+/// A file that cannot be read, is too long, or holds no mesh; the message names the file and the key.
 pub fn read(path: &Path) -> anyhow::Result<HiddenMesh> {
     let name = || format!("hidden-area mesh {}", path.display());
     // Opening a pipe would wait for a writer.
@@ -109,7 +109,7 @@ fn parse(bytes: &[u8]) -> anyhow::Result<HiddenMesh> {
     })
 }
 
-/// The triangles of an eye in a recording; none where the headset has no mesh.
+/// The triangles of an eye in a recording; none if the headset has no mesh.
 fn recorded(mesh: &Value, eye: &str) -> anyhow::Result<Vec<Triangle>> {
     let place = || format!("ham_mesh.{eye}");
     let Some(value) = mesh.get(eye).filter(|value| !value.is_null()) else {
@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_file_is_told() {
+    fn faults_of_a_file_are_reported() {
         for (text, part) in [
             ("", "expected JSON"),
             ("[]", "ham_mesh"),

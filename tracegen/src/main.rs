@@ -1,6 +1,6 @@
 //! `tracegen`: scene to trace.
 
-/// Running out of memory is reported and ends with exit code 2.
+/// Reports exhausted memory with exit code 2.
 #[global_allocator]
 static ALLOCATOR: shell::Allocator = shell::Allocator;
 

@@ -4,7 +4,7 @@
 //! Metrics compare displayed pictures, so all of them use 8-bit sRGB.
 
 pub mod color;
-pub mod colormap;
+mod colormap;
 pub mod flicker;
 pub mod flip;
 pub mod motion;

@@ -1,16 +1,14 @@
 //! Pictures for the metrics' tests.
 
 use crate::Picture;
+use formats::random::Random;
 
 /// Uniform noise from a seed.
 pub fn noise(size_px: [u32; 2], seed: u32) -> Picture {
-    let mut state = seed.wrapping_mul(0x9E37_79B9) | 1;
+    let mut random = Random(u64::from(seed));
     let mut picture = Picture::filled(size_px, [0; 3]);
     for channel in picture.pixels.iter_mut().flatten() {
-        state ^= state << 13;
-        state ^= state >> 17;
-        state ^= state << 5;
-        *channel = (state >> 11) as u8;
+        *channel = random.bits() as u8;
     }
     picture
 }

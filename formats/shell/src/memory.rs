@@ -82,7 +82,7 @@ fn tell_and_leave(bytes: usize) {
     let left = write_message(&mut text, bytes);
     let length = text.len() - left;
     let _untold = rustix::io::write(std::io::stderr(), &text[..length]);
-    signal_hook::low_level::exit(super::program::USAGE.into());
+    signal_hook::low_level::exit(super::message::USAGE.into());
 }
 
 /// Does nothing on systems without signals.

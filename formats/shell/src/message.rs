@@ -4,6 +4,9 @@ use formats::text::printable_lines;
 use std::io::{self, BufWriter, IsTerminal, StdoutLock, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+/// Exit code of wrong use or unreadable input, also used by clap.
+pub(crate) const USAGE: u8 = 2;
+
 /// `--quiet`, set once before the command starts.
 static QUIET: AtomicBool = AtomicBool::new(false);
 

@@ -8,9 +8,6 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 use std::sync::LazyLock;
 
-/// Exit code of wrong use or unreadable input, also used by clap.
-pub(crate) const USAGE: u8 = 2;
-
 /// Version of the programs, with the version of the trace formats.
 pub static VERSION: LazyLock<String> = LazyLock::new(|| {
     let [first, second] = VERSIONS.map(|(major, minor)| format!("{major}.{minor}"));
@@ -52,7 +49,7 @@ pub fn run<C: Parser>(
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             message::error(&described(&error));
-            ExitCode::from(USAGE)
+            ExitCode::from(message::USAGE)
         }
     }
 }
@@ -107,7 +104,7 @@ fn parse<C: Parser>() -> C {
             error.exit();
         }
         let _untold = write!(io::stderr(), "{}", printable_lines(&error.to_string()));
-        std::process::exit(USAGE.into());
+        std::process::exit(message::USAGE.into());
     })
 }
 

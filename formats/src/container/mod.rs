@@ -11,6 +11,7 @@ mod regular;
 mod scratch;
 mod writer;
 
+pub use crate::chunk_tag::ChunkTag;
 pub use atomic::{
     AtomicFile, check_target, discard_unfinished, is_stdout, kind_of, remove_abandoned,
 };
@@ -58,22 +59,6 @@ impl fmt::Display for Kind {
             Self::Textrace => "textrace",
             Self::Raytrace => "raytrace",
         })
-    }
-}
-
-/// Four printable ASCII characters that name a chunk.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ChunkTag(pub [u8; 4]);
-
-impl fmt::Display for ChunkTag {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.0.escape_ascii())
-    }
-}
-
-impl fmt::Debug for ChunkTag {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "ChunkTag({self})")
     }
 }
 

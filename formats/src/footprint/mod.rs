@@ -159,12 +159,17 @@ pub fn footprints(
     options: &SamplingOptions,
     mut visit: impl FnMut(Footprint),
 ) {
-    let sampler = options.filter.apply(sampler);
-    let lanes = match options.helper_lanes {
-        true => 15,
-        false => record.mask,
+    let mut quad = Quad {
+        record,
+        extent,
+        texture,
+        sampler: options.filter.apply(sampler),
+        options: *options,
+        mask: match options.helper_lanes {
+            true => 15,
+            false => record.mask,
+        },
     };
-    let lanes = (0..4).filter(|lane| lanes >> lane & 1 == 1);
     let mut visit_in = |lane: u32, level: u32, layer: u16, texels: [[i64; 2]; 2]| {
         let size = texture.level_size(level);
         let wrapped = |a: usize| {
@@ -182,78 +187,137 @@ pub fn footprints(
             });
         }
     };
-    let by_operands = sample.level.rule == LodRule::Explicit || sample.level.operands;
-    if by_operands {
+    if sample.level.rule == LodRule::Explicit || sample.level.operands {
         let operands = operands.filter(|_| sample.level.operands);
-        let chosen: Vec<_> = lanes
-            .map(|lane| {
-                let derived = || match options.lod {
-                    LodFormula::PerLane => lane_lod(record, lane, extent, texture.size),
-                    formula => quad_lod(record, extent, texture.size, formula),
-                };
-                let own = LaneLevel::of(sample, texture, operands, lane, || {
-                    derived() + options.lod_bias
-                });
-                (lane, own.layer, own.levels(&sampler, texture.levels))
-            })
-            .collect();
-        for level in 0..texture.levels {
-            let size = texture.level_size(level);
-            for (lane, layer, levels) in &chosen {
-                if levels.contains(level) {
-                    let uv = record.lane_uv(*lane);
-                    let axis = |a: usize| fetch(uv[a], size[a], extent[a], levels.filter);
-                    visit_in(*lane, level, *layer, [axis(0), axis(1)]);
-                }
+        return at_given_levels(&quad, sample, operands, visit_in);
+    }
+    quad.options.lod_bias += sample.level.lod();
+    let visit = |lane: u32, level: u32, texels| visit_in(lane, level, sample.layer, texels);
+    match options.lod {
+        LodFormula::PerLane => at_levels_per_lane(&quad, visit),
+        _ => at_levels_of_the_quad(&quad, visit),
+    }
+}
+
+/// A quad that samples a texture.
+struct Quad<'a> {
+    record: &'a QuadRecord,
+    extent: [u32; 2],
+    texture: &'a Texture,
+    sampler: Sampler,
+    options: SamplingOptions,
+    /// A bit per lane that samples.
+    mask: u8,
+}
+
+impl Quad<'_> {
+    fn lanes(&self) -> impl Iterator<Item = u32> + Clone + use<> {
+        let mask = self.mask;
+        (0..4).filter(move |lane| mask >> lane & 1 == 1)
+    }
+}
+
+/// Levels that the sample or its operands give.
+fn at_given_levels(
+    quad: &Quad<'_>,
+    sample: &Sample,
+    operands: Option<&QuadRecord>,
+    mut visit_in: impl FnMut(u32, u32, u16, [[i64; 2]; 2]),
+) {
+    let Quad {
+        record,
+        extent,
+        texture,
+        sampler,
+        options,
+        ..
+    } = quad;
+    let extent = *extent;
+    let chosen: Vec<_> = (quad.lanes())
+        .map(|lane| {
+            let derived = || match options.lod {
+                LodFormula::PerLane => lane_lod(record, lane, extent, texture.size),
+                formula => quad_lod(record, extent, texture.size, formula),
+            };
+            let own = LaneLevel::of(sample, texture, operands, lane, || {
+                derived() + options.lod_bias
+            });
+            (lane, own.layer, own.levels(sampler, texture.levels))
+        })
+        .collect();
+    for level in 0..texture.levels {
+        let size = texture.level_size(level);
+        for (lane, layer, levels) in &chosen {
+            if levels.contains(level) {
+                let uv = record.lane_uv(*lane);
+                let axis = |a: usize| fetch(uv[a], size[a], extent[a], levels.filter);
+                visit_in(*lane, level, *layer, [axis(0), axis(1)]);
             }
         }
-        return;
     }
-    let options = &SamplingOptions {
-        lod_bias: options.lod_bias + sample.level.lod(),
-        ..*options
-    };
-    let mut visit = |lane: u32, level: u32, texels| visit_in(lane, level, sample.layer, texels);
-    if options.lod == LodFormula::PerLane {
-        let (size, levels) = (texture.size, texture.levels);
-        let reach = lanes.map(|lane| {
-            let of = LaneReach::of(record, lane, extent, size, levels, &sampler, options);
-            (lane, of)
-        });
-        let reach: Vec<(u32, LaneReach)> = reach.collect();
-        let probes = reach.iter().map(|(_, of)| of.probe_count()).max();
-        for level in 0..levels {
-            let size = texture.level_size(level);
-            for probe in 0..probes.unwrap_or(0) {
-                for (lane, of) in &reach {
-                    let Some((from_lane, filter)) = of.probe(level, probe) else {
-                        continue;
-                    };
-                    let uv = record.lane_uv(*lane);
-                    let axis = |a: usize| {
-                        let at = uv[a].wrapping_add(from_lane[a]);
-                        fetch(at, size[a], extent[a], filter)
-                    };
-                    visit(*lane, level, [axis(0), axis(1)]);
-                }
-            }
+}
+
+/// Levels from the derivatives of each lane.
+fn at_levels_per_lane(quad: &Quad<'_>, mut visit: impl FnMut(u32, u32, [[i64; 2]; 2])) {
+    let Quad {
+        record,
+        extent,
+        texture,
+        sampler,
+        options,
+        ..
+    } = quad;
+    let extent = *extent;
+    let (size, levels) = (texture.size, texture.levels);
+    let reach = quad.lanes().map(|lane| {
+        let of = LaneReach::of(record, lane, extent, size, levels, sampler, options);
+        (lane, of)
+    });
+    let reach: Vec<(u32, LaneReach)> = reach.collect();
+    let probes = reach.iter().map(|(_, of)| of.probe_count()).max();
+    for level in 0..levels {
+        let size = texture.level_size(level);
+        for probe in 0..probes.unwrap_or(0) {
             for (lane, of) in &reach {
-                let blocks = of
-                    .ellipse(level)
-                    .map(|ellipse| ellipse.blocks(record.lane_uv(*lane), size, extent));
-                for [x, y] in blocks.into_iter().flatten() {
-                    visit(*lane, level, [[x, x + 1], [y, y + 1]]);
-                }
+                let Some((from_lane, filter)) = of.probe(level, probe) else {
+                    continue;
+                };
+                let uv = record.lane_uv(*lane);
+                let axis = |a: usize| {
+                    let at = uv[a].wrapping_add(from_lane[a]);
+                    fetch(at, size[a], extent[a], filter)
+                };
+                visit(*lane, level, [axis(0), axis(1)]);
             }
         }
-        return;
+        for (lane, of) in &reach {
+            let blocks = of
+                .ellipse(level)
+                .map(|ellipse| ellipse.blocks(record.lane_uv(*lane), size, extent));
+            for [x, y] in blocks.into_iter().flatten() {
+                visit(*lane, level, [[x, x + 1], [y, y + 1]]);
+            }
+        }
     }
+}
+
+/// One level of detail for all lanes.
+fn at_levels_of_the_quad(quad: &Quad<'_>, mut visit: impl FnMut(u32, u32, [[i64; 2]; 2])) {
+    let Quad {
+        record,
+        extent,
+        texture,
+        sampler,
+        options,
+        ..
+    } = quad;
+    let extent = *extent;
     let reach = Reach::of(
         record,
         extent,
         texture.size,
         texture.levels,
-        &sampler,
+        sampler,
         options,
     );
     let (lod, probes) = match reach {
@@ -264,7 +328,7 @@ pub fn footprints(
         Reach::Probes(probes) => (probes.lod, Some(probes)),
         Reach::Ellipse(ellipse) => {
             let size = texture.level_size(ellipse.level);
-            for lane in lanes {
+            for lane in quad.lanes() {
                 for [x, y] in ellipse.blocks(record.lane_uv(lane), size, extent) {
                     visit(lane, ellipse.level, [[x, x + 1], [y, y + 1]]);
                 }
@@ -272,12 +336,12 @@ pub fn footprints(
             return;
         }
     };
-    let selection = select_levels(lod, &sampler, texture.levels);
+    let selection = select_levels(lod, sampler, texture.levels);
     for level in selection.first..selection.first + selection.count {
         let size = texture.level_size(level);
         for probe in 0..probes.map_or(1, |probes| probes.count) {
             let from_middle = probes.map_or([0; 2], |probes| probes.offset(probe));
-            for lane in lanes.clone() {
+            for lane in quad.lanes() {
                 let uv = record.lane_uv(lane);
                 let axis = |a: usize| {
                     let at = uv[a].wrapping_add(from_middle[a]);

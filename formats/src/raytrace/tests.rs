@@ -8,7 +8,7 @@ use proptest::prelude::*;
 
 const SIZE_PX: [u32; 2] = [20, 18];
 
-fn tables(has_visits: bool) -> RaytraceTables {
+fn meta(has_visits: bool) -> RaytraceMeta {
     let fov = FovTangents {
         left: 1.2,
         right: 1.0,
@@ -28,7 +28,7 @@ fn tables(has_visits: bool) -> RaytraceTables {
         eye_to_clip: [[0.3; 4]; 4],
         position: [0.032, 1.6, 0.0],
     };
-    let meta = RaytraceMeta {
+    RaytraceMeta {
         trace: TraceMeta {
             tool: "test 1".to_owned(),
             command_line: vec!["rays".to_owned()],
@@ -61,7 +61,10 @@ fn tables(has_visits: bool) -> RaytraceTables {
         samples_per_px: 1,
         has_visits,
         sky: [[0.3, 0.4, 0.5], [0.1; 3]],
-    };
+    }
+}
+
+fn tables(has_visits: bool) -> RaytraceTables {
     let material = |name: &str, mirror| RayMaterial {
         name: name.to_owned(),
         diffuse: true,
@@ -71,7 +74,7 @@ fn tables(has_visits: bool) -> RaytraceTables {
         alpha_masked: false,
     };
     RaytraceTables {
-        meta,
+        meta: meta(has_visits),
         bvh: BvhSummary {
             builder: "test".to_owned(),
             settings: vec![("leaf".to_owned(), "4".to_owned())],

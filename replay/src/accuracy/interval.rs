@@ -1,27 +1,16 @@
 //! Means of samples, their confidence intervals, and how often these contain the true value.
 
-/// SplitMix64.
-pub struct Random(pub u64);
+use formats::random::Random;
 
-impl Random {
-    pub fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
+/// `count` of the first `of` numbers, every subset with equal probability.
+pub fn some(random: &mut Random, count: usize, of: usize) -> Vec<usize> {
+    let mut all: Vec<usize> = (0..of).collect();
+    for at in 0..count.min(of) {
+        let with = at + (random.bits() % (of - at) as u64) as usize;
+        all.swap(at, with);
     }
-
-    /// `count` of the first `of` numbers, every subset with equal probability.
-    pub fn some(&mut self, count: usize, of: usize) -> Vec<usize> {
-        let mut all: Vec<usize> = (0..of).collect();
-        for at in 0..count.min(of) {
-            let with = at + (self.next() % (of - at) as u64) as usize;
-            all.swap(at, with);
-        }
-        all.truncate(count);
-        all
-    }
+    all.truncate(count);
+    all
 }
 
 /// Student's t for 95 %, two-sided, from 1 degree of freedom.
@@ -91,7 +80,7 @@ pub fn drawn(values: &[f64], one_in: u64, truth: f64) -> Judged {
     let whole = values.len();
     let count = (whole / one_in as usize).max(2);
     let draw = |seed: u64| {
-        let chosen = Random(seed).some(count, whole);
+        let chosen = some(&mut Random(seed), count, whole);
         let sample: Vec<f64> = chosen.iter().map(|&at| values[at]).collect();
         let (mean, half) = interval(&sample, whole);
         (mean * whole as f64, half * whole as f64)
@@ -113,7 +102,7 @@ mod tests {
     #[test]
     fn intervals_hold_where_values_are_alike_and_lie_where_few_have_it_all() {
         let mut random = Random(5);
-        let mut value = || 1000.0 + (random.next() % 200) as f64;
+        let mut value = || 1000.0 + (random.bits() % 200) as f64;
         let alike: Vec<f64> = (0..128).map(|_| value()).collect();
         for one_in in [8, 32] {
             let good = of(&alike, one_in);
@@ -139,7 +128,7 @@ mod tests {
     #[test]
     fn draws_are_without_repetition() {
         for seed in 0..50 {
-            let mut chosen = Random(seed).some(20, 32);
+            let mut chosen = some(&mut Random(seed), 20, 32);
             chosen.sort_unstable();
             chosen.dedup();
             assert_eq!(chosen.len(), 20);

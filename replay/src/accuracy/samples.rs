@@ -2,11 +2,12 @@
 
 use super::clusters::{Counts, Part, cluster_count, counts, frames};
 use super::inputs::{Inputs, time_ratio};
-use super::interval::{Judged, Random, drawn, interval, judged};
+use super::interval::{Judged, drawn, interval, judged, some};
 use super::stopwatch::Stopwatch;
 use super::study::{Choice, Figure, Study, StudyError, figure};
 use crate::config::{Mode, Order, RunConfig};
 use crate::experiment::Subject;
+use formats::random::Random;
 use std::time::Duration;
 
 const FIGURES: [Figure; 4] = [
@@ -117,7 +118,11 @@ fn sets(subject: &Subject<'_>, config: &RunConfig) -> Result<Vec<Choice>, StudyE
     let mut choices = Vec::new();
     for one_in in [4, 8, 16] {
         let mut chosen = vec![false; clusters];
-        for at in Random(0).some((clusters / one_in as usize).max(2), clusters) {
+        for at in some(
+            &mut Random(0),
+            (clusters / one_in as usize).max(2),
+            clusters,
+        ) {
             chosen[at] = true;
         }
         let part = Part {

@@ -2,14 +2,14 @@ use super::*;
 use crate::config::{LevelConfig, Levels, Replacement};
 use crate::engine::{LineOutcome, Misses};
 use formats::interop::plain::{AccessKind, AddressForm, PlainAccess, PlainForm, PlainWriter};
+use formats::random::Random;
 use std::collections::{HashSet, VecDeque};
 
 /// Accesses that stay near, jump, repeat and straddle lines, far apart in 64 bits.
 fn accesses(count: u64) -> Vec<PlainAccess> {
-    let (mut state, mut address) = (7_u64, 0_u64);
+    let (mut numbers, mut address) = (Random(7), 0_u64);
     let access = |_| {
-        state = state.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(3);
-        let random = state >> 33;
+        let random = numbers.bits() >> 33;
         address = match random % 16 {
             0 => (random >> 8 & 0x7fff) + ((random >> 4 & 3) << 44),
             1..9 => address + (random >> 4 & 0x1ff),

@@ -15,6 +15,7 @@ use crate::stream::{
 };
 use formats::footprint::record_footprints;
 use formats::layout::Layout;
+use formats::random::Random;
 use formats::textrace::with_operands;
 use std::collections::{HashMap, HashSet};
 
@@ -433,33 +434,15 @@ fn machines(usual: u32) -> u32 {
     many.map_or(usual, |many| many.parse().expect("MACHINES: a number"))
 }
 
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ z >> 31) % end
-    }
-
-    fn of<T: Copy>(&mut self, values: &[T]) -> T {
-        values[self.below(values.len() as u64) as usize]
-    }
-
-    /// A random LRU cache of up to `most_sets` sets and any small number of ways.
-    fn cache(&mut self, most_sets: u64) -> LevelConfig {
-        let ways = self.of(&[1, 2, 3, 4, 4, 4, 5, 8, 12, 16]);
-        let sets = 1 << self.below(u64::from(most_sets.ilog2()) + 1);
-        LevelConfig {
-            ways,
-            ..LevelConfig::lru(sets * u64::from(ways) * 16)
-        }
+/// A random LRU cache of up to `most_sets` sets and any small number of ways.
+fn random_cache(random: &mut Random, most_sets: u64) -> LevelConfig {
+    let ways = random.pick(&[1, 2, 3, 4, 4, 4, 5, 8, 12, 16]);
+    let sets = 1 << random.below(u64::from(most_sets.ilog2()) + 1);
+    LevelConfig {
+        ways,
+        ..LevelConfig::lru(sets * u64::from(ways) * 16)
     }
 }
-
 /// A footprint in the stream: core, cell and lines, with repeats written out.
 type Sent = (usize, usize, Vec<u32>);
 

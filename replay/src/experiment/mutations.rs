@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::config::RunConfig;
+use formats::random::Random;
 use std::time::{Duration, Instant};
 
 const SEEDS: [&str; 4] = [
@@ -30,19 +31,6 @@ const PIECES: [&str; 16] = [
     "1979-05-27T07:32:00Z",
     "'''",
 ];
-
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ z >> 31) as usize % end.max(1)
-    }
-}
 
 fn mutated(random: &mut Random) -> String {
     let mut text: Vec<char> = SEEDS[random.below(SEEDS.len())].chars().collect();

@@ -232,30 +232,24 @@ impl Renumbering {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use formats::random::Random;
     use std::collections::BTreeSet;
-
-    fn random(state: &mut u64, below: u32) -> u32 {
-        *state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
-        ((*state >> 33) % u64::from(below)) as u32
-    }
 
     #[test]
     fn the_last_member_until_a_time_is_that_of_a_sorted_set() {
         for times in [1, 64, 65, 5000, 300_000] {
             let (mut set, mut plain) = (TimeSet::new(times), BTreeSet::new());
-            let mut state = u64::from(times);
+            let mut random = Random(u64::from(times));
             for _ in 0..4000 {
-                let time = random(&mut state, times);
-                if random(&mut state, 3) == 0 {
+                let time = random.below(times);
+                if random.below(3) == 0 {
                     set.remove(time);
                     plain.remove(&time);
-                } else if random(&mut state, 40) == 0 {
+                } else if random.below(40) == 0 {
                     set.insert(time);
                     plain.insert(time);
                 }
-                let at = random(&mut state, times);
+                let at = random.below(times);
                 let expected = plain.range(..=at).next_back().copied();
                 assert_eq!(set.last_until(at), expected, "{times} times, at {at}");
             }
@@ -267,14 +261,14 @@ mod tests {
     fn members_that_are_passed_on_the_way_to_the_end_are_counted() {
         let times = 40_000;
         let (mut set, mut plain) = (CountedTimes::new(times), BTreeSet::new());
-        let (mut state, mut now) = (1, 0);
+        let (mut random, mut now) = (Random(1), 0);
         while now < times {
             // Also uses distant members and long empty stretches.
-            now += 1 + random(&mut state, if now % 7 == 0 { 900 } else { 2 });
+            now += 1 + random.below(if now % 7 == 0 { 900 } else { 2 });
             if now >= times {
                 break;
             }
-            let pick = random(&mut state, 1 + plain.len() as u32 * 5 / 4) as usize;
+            let pick = random.below(1 + plain.len() as u32 * 5 / 4) as usize;
             match plain.iter().nth(pick).copied() {
                 None => set.insert(now),
                 Some(member) => {

@@ -5,6 +5,7 @@
 //! the first changed block to the block at whose end the cache contents equal the former ones.
 
 use super::items::{Items, Lru};
+use formats::random::Random;
 
 /// Number of items between two stored states of the cache.
 const BLOCK: usize = 32;
@@ -35,28 +36,6 @@ impl Schedule {
             to_misses: 1.0,
             seed,
         }
-    }
-}
-
-/// SplitMix64.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ z >> 31
-    }
-
-    fn below(&mut self, end: usize) -> usize {
-        ((u128::from(self.next()) * end as u128) >> 64) as usize
-    }
-
-    /// Above 0, at most 1.
-    fn share(&mut self) -> f64 {
-        ((self.next() >> 11) + 1) as f64 / (1_u64 << 53) as f64
     }
 }
 
@@ -268,7 +247,7 @@ pub fn anneal(
         let Some(change) = walk.draw(beside, &mut random) else {
             continue;
         };
-        let limit = (-temperature * random.share().ln()) as i64;
+        let limit = (-temperature * (random.unit_f64() + f64::EPSILON / 2.0).ln()) as i64;
         change.apply(&mut walk.order);
         match walk.judge(change.changed(), limit) {
             Some(difference) if difference <= limit => {

@@ -2,6 +2,7 @@
 //! parallel eyes. Their access pattern resembles a scene's.
 
 use super::MemoryTrace;
+use formats::random::Random;
 use formats::textrace::{
     Draw, Pass, PassKind, PrimitiveRun, QuadRecord, SUBTEXELS, Sample, Tables, Tile, TraceMeta,
     UvGroup,
@@ -70,14 +71,8 @@ impl Synthetic {
     }
 
     fn patches(&self) -> Vec<Patch> {
-        let mut state = self.seed;
-        let mut random = move |below: u32| {
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut z = state;
-            z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-            ((((z ^ (z >> 31)) >> 32) * u64::from(below)) >> 32) as i32
-        };
+        let mut random = Random(self.seed);
+        let mut random = move |below: u32| random.below(below) as i32;
         let edge = self.patch_px as i32;
         let mut patches = Vec::new();
         for layer in 0..self.layers {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// What the launcher asked this process for.
+/// The launcher's settings for this process.
 #[derive(Debug)]
 pub(crate) struct Capture {
     pub settings: Settings,
@@ -14,7 +14,7 @@ pub(crate) struct Capture {
     control: Control,
     /// The process's files, once there is something to write.
     writer: Mutex<Option<Writer>>,
-    /// Frames that the process told apart itself.
+    /// Frames that the process counted itself.
     counted: AtomicU32,
     /// Frames whose end has been written.
     ended: AtomicU32,
@@ -24,7 +24,7 @@ pub(crate) struct Capture {
     failed: AtomicBool,
 }
 
-/// The capture, if a launcher asked for one.
+/// The capture, if a launcher requested one.
 pub(crate) fn capture() -> Option<&'static Capture> {
     static CAPTURE: OnceLock<Option<Capture>> = OnceLock::new();
     CAPTURE.get_or_init(Capture::start).as_ref()
@@ -66,7 +66,7 @@ impl Capture {
         }
     }
 
-    /// The launcher wants a frame.
+    /// Whether the launcher requested the current frame.
     pub fn wants(&self, frame: u32) -> bool {
         let [first, end] = self.settings.frames;
         (first..end).contains(&frame)
@@ -79,7 +79,7 @@ impl Capture {
         self.wants(frame) || self.wants(frame.saturating_add(1))
     }
 
-    /// All frames that the launcher wants are over.
+    /// Whether all requested frames are over.
     pub fn is_over(&self) -> bool {
         self.frame() >= self.settings.frames[1]
     }
@@ -129,7 +129,7 @@ impl Capture {
         self.write(|writer| writer.event(event));
     }
 
-    /// Writes to the process's files. What cannot be written ends the capture with a line on stderr.
+    /// Writes to the process's files. A write error ends the capture with a line on stderr.
     pub fn write<T>(&self, write: impl FnOnce(&mut Writer) -> std::io::Result<T>) -> Option<T> {
         if self.failed.load(Ordering::Relaxed) {
             return None;

@@ -48,7 +48,8 @@ impl Control {
         if file.metadata()?.len() < BYTES {
             return Err(io::ErrorKind::UnexpectedEof.into());
         }
-        // SAFETY: nobody shortens the file while the capture's folder lives; its words are accessed atomically alone.
+        // SAFETY: the file is not shortened while the capture's folder exists; its words are accessed only
+        // atomically.
         let map = unsafe { MmapMut::map_mut(&file) }?;
         Ok(Self { map })
     }

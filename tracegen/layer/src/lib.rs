@@ -2,8 +2,8 @@
 
 mod capture;
 pub mod control;
-pub mod hooks;
+mod hooks;
 pub mod inject;
 mod record_buffer;
 pub mod spool;
-pub mod track;
+mod track;

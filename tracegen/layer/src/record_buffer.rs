@@ -18,11 +18,11 @@ pub(crate) struct RecordBuffer {
 
 /// Word of the buffer that counts units.
 const COUNT: usize = 0;
-/// Word of the buffer that tells shaders how many fit.
+/// Word of the buffer with its capacity, for shaders.
 const CAPACITY: usize = 1;
 
 impl RecordBuffer {
-    /// Sets memory aside for records of so many bytes.
+    /// Reserves this number of bytes for records.
     pub fn new(bytes: u64) -> io::Result<Self> {
         let capacity = u32::try_from(bytes / UNIT_BYTES).unwrap_or(u32::MAX);
         let bytes = COUNTER_BYTES + u64::from(capacity) * UNIT_BYTES;
@@ -31,7 +31,7 @@ impl RecordBuffer {
         Ok(Self { map, capacity })
     }
 
-    /// Address that shaders know.
+    /// Address that shaders use.
     pub fn address(&self) -> u64 {
         self.map.as_ptr() as u64
     }

@@ -19,15 +19,15 @@ use std::collections::{BTreeMap, HashMap};
 use std::io::{Seek, Write};
 use thiserror::Error;
 
-/// What becomes of a session.
+/// Options for draining a session.
 pub struct Job<'a> {
     /// Frames to take, ascending.
     pub frames: &'a [u32],
-    /// What tells both eyes apart.
+    /// How both eyes are identified.
     pub eyes: &'a Wanted,
-    /// What told frames apart.
+    /// How frames were counted.
     pub frames_by: FramesBy,
-    /// Eyes of frames, where the program told them.
+    /// Eyes of frames, if the program reported them.
     pub cameras: BTreeMap<u32, [EyeView; 2]>,
     /// Name of the program.
     pub program: String,
@@ -39,20 +39,20 @@ pub struct Job<'a> {
     pub record_bytes: u64,
 }
 
-/// What was made.
+/// The resulting trace.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drained {
     /// Frames.
     pub frames: usize,
-    /// Rule that told both eyes apart.
+    /// Rule that identified both eyes.
     pub rule: Option<Rule>,
-    /// Pixels of an eye's picture.
+    /// Size of an eye's picture in pixels.
     pub size_px: [u32; 2],
     /// Draws of the trace.
     pub draws: usize,
     /// Textures of the trace.
     pub textures: usize,
-    /// What was recorded.
+    /// Counts of the records.
     pub counts: CaptureCounts,
     /// What the trace lacks.
     pub left_out: Vec<LeftOut>,
@@ -123,7 +123,7 @@ pub fn drain<W: Write + Seek>(
             .iter()
             .map(|draw| weight(session, draw, &records))
             .collect();
-        // Every frame is told by the rule that told the first one.
+        // Every frame uses the rule that fitted the first one.
         let known = drained
             .rule
             .filter(|rule| *rule != Rule::File)
@@ -189,13 +189,13 @@ pub(crate) fn weight(
     }
 }
 
-/// What makes two draws the same for a trace: their textures, too.
+/// Key of draws that are the same for a trace, including their textures.
 fn key(session: &Session, draw: u32) -> Option<(DrawKey, String)> {
     let info = session.draw(draw)?;
     Some((DrawKey::of(info), format!("{:?}", info.textures)))
 }
 
-/// The draws of a frame, those of both eyes joined, in an order that is that of each eye.
+/// The draws of a frame, joined over both eyes, in an order that agrees with each eye's.
 fn merge(session: &Session, draws: &[Executed], views: &Views) -> Vec<Merged> {
     let with = |wanted: Role| -> Vec<Executed> {
         let both = draws.iter().zip(&views.roles);

@@ -18,7 +18,7 @@ pub struct Bound {
     pub unnormalized: bool,
 }
 
-/// What a group's records are made of.
+/// Sources of a group's records.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Group {
     /// Element of the binding's array, where fragments choose it.
@@ -37,10 +37,10 @@ pub struct Group {
 pub type LeftOut = String;
 
 impl Group {
-    /// Makes the group of the sites of a shader's coordinate group. `bound` tells the texture of a site.
+    /// Builds the group of the sites of a shader's coordinate group. `bound` returns the texture of a site.
     ///
     /// # Errors
-    /// What its records cannot be.
+    /// A property that its records cannot have.
     pub fn new(
         shader: &ShaderInfo,
         coordinates: u16,
@@ -109,7 +109,7 @@ impl Group {
         }
     }
 
-    /// What a fragment samples.
+    /// Samples of a fragment.
     #[must_use]
     pub fn fragment(&self, raw: &RawFragment) -> LaneSample {
         let own_lod = match self.kind.lod {
@@ -146,7 +146,7 @@ impl Group {
             (uv, slope) = (scaled(uv.map(|v| v + shift)), slope.map(scaled));
         }
         if !matches!(self.kind.lod, Lod::Derivatives | Lod::Bias(_)) {
-            // Gradients that an instruction names tell nothing of its neighbours.
+            // Gradients in an instruction do not depend on neighbouring lanes.
             slope = [[0.0; 2]; 2];
         }
         LaneSample {

@@ -63,7 +63,8 @@ fn visit<'a>(lanes: impl Iterator<Item = &'a (u8, LaneSample)>) -> Visit {
         .sum();
     let first = (of.iter().position(Option::is_some)).unwrap_or(0);
     let known = of[first].unwrap_or_default();
-    // A lane that is not there is as far from the first one as its slopes say, and has its operands.
+    // A missing lane's coordinates are extrapolated from the first one's by its derivatives, and it has its
+    // operands.
     let at = |lane: usize| {
         of[lane].unwrap_or_else(|| {
             let [right, down] =

@@ -35,7 +35,7 @@ const LIBRARY: &str = "libparallax_layer.so";
 /// File by which the loader finds it.
 const MANIFEST: &str = "parallax_layer.json";
 
-/// Folders in which drivers tell the loader of themselves.
+/// Folders in which drivers register with the loader.
 const DRIVER_FOLDERS: [&str; 3] = [
     "/usr/share/vulkan/icd.d",
     "/etc/vulkan/icd.d",
@@ -104,7 +104,7 @@ impl Launch {
         }
     }
 
-    /// Lets a program run under the layer; OpenGL through Mesa's zink if asked for.
+    /// Runs a program under the layer; OpenGL through Mesa's zink if requested.
     pub fn prepare(&self, command: &mut Command, opengl: bool) {
         command
             .env(FOLDER_VARIABLE, self.folder())
@@ -134,7 +134,7 @@ fn with(variable: &str, entry: OsString) -> OsString {
     list
 }
 
-/// The layer's library, beside a program or among what Cargo built with it.
+/// The layer's library, next to a program or among Cargo's build outputs.
 fn library(tool: &Path) -> Result<PathBuf, LaunchError> {
     let folder = tool.parent().unwrap_or(Path::new("."));
     let places = [folder.join(LIBRARY), folder.join("deps").join(LIBRARY)];

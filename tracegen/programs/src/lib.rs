@@ -21,5 +21,5 @@ mod views;
 pub use check::{Check, Difference, check};
 pub use drain::{DrainError, Drained, Job, drain};
 pub use launch::{Launch, LaunchError};
-pub use session::{Executed, Frame, Session, SessionError};
+pub use session::{Executed, ProgramFrame, Session, SessionError};
 pub use views::{FileError, Other, Role, Rule, RuleFile, View, Views, ViewsError, Wanted};

@@ -1,4 +1,4 @@
-//! What a captured program did: its frames, passes and draws.
+//! Frames, passes and draws of a captured program.
 
 use parallax_layer::inject::{Form, RawSample, Site, What};
 use parallax_layer::spool::{
@@ -27,7 +27,7 @@ pub enum SessionError {
     Refused {
         /// The program.
         program: String,
-        /// As the layer says.
+        /// The layer's message.
         why: String,
     },
     /// None of the frames was rendered.
@@ -37,7 +37,7 @@ pub enum SessionError {
     TooFew {
         /// The program.
         program: String,
-        /// First frame that was asked for.
+        /// First requested frame.
         first: u32,
         /// Last one.
         last: u32,
@@ -76,7 +76,7 @@ pub struct Executed {
 
 /// A frame.
 #[derive(Clone, Debug, Default)]
-pub struct Frame {
+pub struct ProgramFrame {
     /// Number.
     pub frame: u32,
     /// Draws in the order of execution.
@@ -89,7 +89,7 @@ pub struct Frame {
     pub ended: bool,
 }
 
-/// What one process of a program did.
+/// One process of a program.
 #[derive(Debug, Default)]
 pub struct Session {
     /// The process's command line.
@@ -100,10 +100,10 @@ pub struct Session {
     pub driver: String,
     /// Why the device cannot be recorded on.
     pub refused: Option<String>,
-    /// What made the capture worth less.
+    /// Reasons why the capture is incomplete.
     pub troubles: Vec<String>,
     /// Frames by number.
-    pub frames: BTreeMap<u32, Frame>,
+    pub frames: BTreeMap<u32, ProgramFrame>,
     draws: HashMap<u32, DrawInfo>,
     passes: HashMap<u32, PassInfo>,
     images: HashMap<u32, ImageInfo>,
@@ -115,7 +115,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// What a process left behind.
+    /// Files of a process.
     ///
     /// # Errors
     /// Files that cannot be read.
@@ -267,7 +267,7 @@ impl Session {
     }
 }
 
-/// Coordinate group whose records tell every fragment of a shader that starts.
+/// Coordinate group whose records contain every started fragment of a shader.
 #[must_use]
 pub fn coverage_group(shader: &ShaderInfo) -> Option<u16> {
     let covers = |site: &&Site| site.unconditional && site.form == Form::Quad;
@@ -278,7 +278,8 @@ pub fn coverage_group(shader: &ShaderInfo) -> Option<u16> {
     found.map(|site| site.group)
 }
 
-/// Coordinate group whose records tell every fragment that was not discarded, where any may be.
+/// Coordinate group whose records contain every fragment that was not discarded, if fragments may be
+/// discarded.
 #[must_use]
 pub fn survival_group(shader: &ShaderInfo) -> Option<u16> {
     let mut sites = shader.sites.iter();

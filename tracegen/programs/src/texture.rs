@@ -84,7 +84,7 @@ pub fn texel_format(format: i32) -> Option<(TexelFormat, ColorSpace)> {
     })
 }
 
-/// The part of an image that a view shows, as a texture of a trace; `None` where the trace has no such format.
+/// The part of an image in a view, as a texture of a trace; `None` if the trace has no such format.
 #[must_use]
 pub fn texture(view: &ViewInfo, image: &ImageInfo) -> Option<Texture> {
     let (format, color_space) = texel_format(view.format)?;
@@ -156,7 +156,7 @@ pub const FETCH: Sampler = Sampler {
     lod: LodRange::WHOLE,
 };
 
-/// The sampler of a gather: the four texels of a bilinear footprint, whatever the filter.
+/// The sampler of a gather: the four texels of a bilinear footprint, independent of the filter.
 #[must_use]
 pub fn gathering(sampler: Sampler) -> Sampler {
     Sampler {

@@ -3,52 +3,18 @@
 use super::draws::DrawList;
 use super::error::RasterError;
 use super::frame::Frame;
-use super::lighting::Lighting;
+pub use super::view::{Fragments, View};
 use formats::view::Lens;
-use glam::Mat4;
 use record::{Captured, Region, Sink};
 use std::time::Duration;
-use techniques::Layer;
 
-/// One layer to render: its camera, its light and its draws.
-#[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
-    /// Position of the layer in the frame's plan: the target that it is rendered into.
-    pub target: usize,
-    /// Matrices, size and mask.
-    pub layer: &'a Layer,
-    /// Lights and shadow matrices of the frame.
-    pub lighting: &'a Lighting,
-    /// Draws that may be visible, as indices into the draw list, ascending.
-    pub visible: &'a [u32],
-}
-
-impl View<'_> {
-    /// World to clip space.
-    #[must_use]
-    pub fn clip_from_world(&self) -> Mat4 {
-        self.layer.clip_from_world()
-    }
-}
-
-/// Which fragments of a layer are recorded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Fragments {
-    /// Those that pass the depth test when they are drawn.
-    #[default]
-    DepthTested,
-    /// All that the draws cover, whatever other draws lie before them. What a layer starts with
-    /// (the far plane, its mask) still bounds them.
-    All,
-}
-
-/// What is recorded of a region, and who takes it.
+/// What is recorded of a region, and the sink of the records.
 pub struct Recording<'s, 't> {
     /// Which fragments.
     pub fragments: Fragments,
     /// Draws the picture as well, as without recording; else the layer's colour stays as it is.
     pub picture: bool,
-    /// Gets every record of the region (see [`record::Capturer::capture`]).
+    /// Receives every record of the region (see [`record::Capturer::capture`]).
     pub sink: &'s mut Sink<'t>,
 }
 
@@ -57,7 +23,7 @@ pub struct Recording<'s, 't> {
 pub struct Marks {
     /// Anywhere in the picture.
     pub picture: bool,
-    /// At a pixel whose centre the lens shows.
+    /// At a pixel whose centre is visible through the lens.
     pub lens: bool,
 }
 
@@ -75,10 +41,10 @@ impl Texels {
     pub const NO_PRIMITIVE: u32 = u32::MAX;
 }
 
-/// What a backend has done so far.
+/// Counts of a backend's work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Work {
-    /// Regions of layers rendered, those that overflowed counted too.
+    /// Rendered regions of layers, including those that overflowed.
     pub regions: u64,
     /// Draws of all passes.
     pub draws: u64,
@@ -86,7 +52,7 @@ pub struct Work {
     pub calls: u64,
     /// Pipelines, materials and meshes set before draw calls.
     pub state_changes: u64,
-    /// Vertices of the draws' meshes, each once a draw.
+    /// Vertices of the draws' meshes, counted once per draw.
     pub vertices: u64,
     /// Triangles of the draws.
     pub triangles: u64,
@@ -96,7 +62,7 @@ pub struct Work {
     pub submitting: Duration,
     /// Time of waiting for their pictures.
     pub waiting: Duration,
-    /// Time of making the pictures from layers, where they are not layers.
+    /// Time of composing pictures from layers.
     pub composing: Duration,
     /// Shadow maps rendered, one a cascade.
     pub shadow_maps: u64,
@@ -109,7 +75,7 @@ pub struct Work {
 impl std::ops::Sub for Work {
     type Output = Self;
 
-    /// What was done since `earlier`.
+    /// The work done since `earlier`.
     fn sub(self, earlier: Self) -> Self {
         Self {
             regions: self.regions - earlier.regions,
@@ -149,10 +115,10 @@ pub trait CaptureBackend {
     /// by one and merged, for the same records.
     fn records_fragments_because(&self) -> Option<&str>;
 
-    /// What was done so far.
+    /// The work done so far.
     fn work(&self) -> Work;
 
-    /// Takes over where the draws that move stand now; the others stand as they were uploaded.
+    /// Updates the positions of moving draws; the others stay as they were uploaded.
     fn pose(&mut self, draws: &DrawList);
 
     /// Renders the shadow maps of a frame, if its lighting has any.
@@ -211,7 +177,7 @@ pub trait CaptureBackend {
         })
     }
 
-    /// Why the driver's multiview cannot be trusted; `None` where it can.
+    /// Defect of the driver's multiview; `None` if it works.
     ///
     /// # Errors
     /// Driver errors.
@@ -239,7 +205,7 @@ pub trait CaptureBackend {
     /// Driver errors.
     fn compose(&mut self, frame: &Frame) -> Result<(), RasterError>;
 
-    /// Reads the depth that rendering left in a layer's target: row by row, 1 where there is nothing.
+    /// Reads the depth in a layer's target: row by row, 1 where nothing was drawn.
     ///
     /// # Errors
     /// A layer that has not been rendered, and driver errors.

@@ -17,7 +17,7 @@ use techniques::least_work::Object;
 use techniques::{FramePlan, Planner, Skips, Start};
 use visibility::Rig;
 
-/// What to capture, the same for plain rendering and capture.
+/// Inputs of a capture, the same for plain rendering and for the capture.
 pub struct CaptureJob<'a> {
     /// The scene.
     pub scene: &'a Scene,
@@ -31,7 +31,7 @@ pub struct CaptureJob<'a> {
     pub shadow_range_m: [f32; 2],
     /// Which layers the frames have.
     pub planner: &'a Planner,
-    /// What is left out because nobody sees it.
+    /// Invisible work that is skipped.
     pub skips: Skips,
     /// Which fragments are recorded.
     pub fragments: Fragments,
@@ -39,17 +39,17 @@ pub struct CaptureJob<'a> {
     pub shaded: bool,
 }
 
-/// What capturing a frame gives beside its tiles.
+/// Results of capturing a frame, besides its tiles.
 pub struct CapturedFrame {
     /// Its pictures, if the job is shaded.
     pub pictures: Option<Pictures>,
-    /// What was recorded.
+    /// Counts of the records.
     pub counts: CaptureCounts,
-    /// What sorting, encoding and writing took.
+    /// Time of sorting, encoding and writing.
     pub sorting: Duration,
 }
 
-/// The pictures of one frame, one an eye: sRGB RGBA8.
+/// The pictures of one frame, one per eye: sRGB RGBA8.
 pub type Pictures = Vec<Vec<u8>>;
 
 impl CaptureJob<'_> {
@@ -285,7 +285,7 @@ impl CaptureJob<'_> {
         })
     }
 
-    /// Refuses a frame whose layers are not those that its passes were written for.
+    /// Refuses a frame whose layers differ from those that its passes were written for.
     fn check_passes(
         &self,
         frame: &Frame,

@@ -6,10 +6,12 @@
 //! rotation and its texels stay put in the world, which keeps shadow edges still from frame to
 //! frame.
 
-use super::draws::SHADOW_SIZE;
 use formats::view::EyeView;
 use glam::camera::rh::{proj::directx::orthographic, view::look_at_mat4};
 use glam::{Mat4, Vec3};
+
+/// Edge length of a shadow cascade in texels (Z2 paper section 4.1: 4 x 2048^2, uncompressed).
+pub const SHADOW_SIZE: u32 = 2048;
 
 /// Weight of the logarithmic split against the uniform one (Zhang et al. 2006, practical split
 /// scheme).
@@ -23,7 +25,7 @@ const MARGIN: f32 = 1.01;
 pub struct Cascade {
     /// World to the cascade's clip space, depth 0 to 1.
     pub clip_from_world: Mat4,
-    /// Edge of a texel in the world, metres.
+    /// Size of a texel in the world, metres.
     pub texel_m: f32,
 }
 

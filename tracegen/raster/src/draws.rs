@@ -1,8 +1,9 @@
 //! The draws of a scene in submission order, and their entries in the trace's tables.
 
-use super::backend::{Fragments, View};
+pub use super::cascades::SHADOW_SIZE;
 use super::error::RasterError;
 use super::groups::MaterialGroups;
+use super::view::{Fragments, View};
 use formats::textrace::{Draw, Sample, Surfaces, UvGroup};
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use glam::{Affine3A, Mat4, Vec3};
@@ -13,26 +14,23 @@ use std::collections::{HashMap, HashSet};
 use textures::TextureSet;
 use visibility::{Hierarchy, frustum};
 
-/// Edge length of a shadow cascade in texels (Z2 paper section 4.1: 4 x 2048^2, uncompressed).
-pub const SHADOW_SIZE: u32 = 2048;
-
 /// Texel offsets of the four bilinear taps of the shadow lookup. Two texels apart, their 2x2
 /// footprints tile a 4x4 neighbourhood without overlap.
 pub const SHADOW_TAPS: [[i8; 2]; 4] = [[-1, -1], [1, -1], [-1, 1], [1, 1]];
 
-/// How a draw treats alpha. Where alpha is a constant, the test is made here and not a pixel.
+/// How a draw treats alpha. If alpha is constant, it is tested here instead of at every pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DrawMode {
     /// Every fragment is kept.
     Opaque,
     /// Fragments are discarded by their texture's alpha.
     Masked,
-    /// Blended over what is there, depth not written.
+    /// Blended over earlier draws, depth not written.
     Blended,
 }
 
 impl DrawMode {
-    /// The mode of a material, or `None` where nothing of it is seen.
+    /// The mode of a material, or `None` if it is invisible.
     fn new(material: &Material) -> Option<Self> {
         match material.alpha {
             AlphaMode::Opaque => Some(Self::Opaque),
@@ -43,14 +41,14 @@ impl DrawMode {
     }
 }
 
-/// What the draws of a mesh have in common.
+/// Properties that all draws of a mesh share.
 struct ShownMesh {
     mode: DrawMode,
     object_box: [Vec3; 2],
 }
 
 impl ShownMesh {
-    /// Checks a mesh; `None` where nothing of it is seen.
+    /// Checks a mesh; `None` if it is invisible.
     fn new(scene: &Scene, mesh: &Mesh) -> Result<Option<Self>, RasterError> {
         let material = scene.materials.get(mesh.material).ok_or_else(|| {
             RasterError::Scene(format!(
@@ -90,7 +88,7 @@ pub struct DrawCall {
     pub mesh: usize,
     /// Index into the scene's materials.
     pub material: usize,
-    /// How it treats alpha.
+    /// How the draw treats alpha.
     pub mode: DrawMode,
     /// Object to world.
     pub transform: Affine3A,
@@ -120,7 +118,7 @@ pub struct DrawList {
 }
 
 impl DrawList {
-    /// What a trace of these fragments says of the draws: which of them hide what lies behind.
+    /// The trace's record of which draws hide what is behind them, for these fragments.
     #[must_use]
     pub fn surfaces(&self, fragments: Fragments) -> Surfaces {
         Surfaces {

@@ -14,9 +14,9 @@ pub enum Driver {
     /// Mesa's Vulkan driver on the processor.
     #[default]
     Lavapipe,
-    /// Mesa's OpenGL without a window: plain frames alone.
+    /// Mesa's OpenGL without a window, which captures plain frames only.
     Osmesa,
-    /// The first where it is found and can capture, else the second.
+    /// Lavapipe if it is installed and can capture, else OSMesa.
     Auto,
 }
 
@@ -59,11 +59,11 @@ impl Driver {
 pub struct Opened {
     /// The driver.
     pub backend: Box<dyn CaptureBackend>,
-    /// Why the one that would have come first does not capture, where there was one.
+    /// Why the preferred driver does not capture, if it does not.
     pub instead_of: Option<RasterError>,
 }
 
-/// The first, or the second and why, where the first one's driver is missing or lacks something.
+/// The first driver or, if it is missing or lacks a feature, the second one with the reason.
 fn either<B>(
     first: Result<B, RasterError>,
     second: impl FnOnce() -> Result<B, RasterError>,

@@ -5,7 +5,7 @@ use techniques::far_field::FarFieldError;
 use visibility::TooWide;
 
 impl RasterError {
-    /// Whether another backend may do what this one cannot.
+    /// Whether another backend might support what this one does not.
     #[must_use]
     pub fn is_of_the_driver(&self) -> bool {
         matches!(
@@ -26,7 +26,7 @@ pub enum RasterError {
     /// A driver that is installed and does not start: why.
     #[error("lavapipe (Mesa's CPU Vulkan driver) is installed and does not start: {0}")]
     NotLoaded(String),
-    /// No OSMesa: the file that was looked for, and what the loader says.
+    /// OSMesa is missing: the name of the file, and the loader's message.
     #[error(
         "{0} (OSMesa, Mesa without a window) cannot be loaded: {1}; install it with: apt-get install libosmesa6 (Mesa 25.1 and later have none)"
     )]
@@ -37,7 +37,7 @@ pub enum RasterError {
     /// No adapter of that name.
     #[error("no adapter '{wanted}': expected a part of one of these names: {known}")]
     NoAdapter {
-        /// As asked.
+        /// The name as given.
         wanted: String,
         /// Those present.
         known: String,
@@ -47,13 +47,13 @@ pub enum RasterError {
     Unsupported {
         /// Driver string.
         driver: String,
-        /// What is missing.
+        /// The missing feature.
         what: String,
     },
     /// The driver reported an error.
     #[error("the driver failed while {doing}: {message}")]
     Driver {
-        /// What was being done.
+        /// The failed operation.
         doing: &'static str,
         /// Its message.
         message: String,
@@ -61,11 +61,11 @@ pub enum RasterError {
     /// Something is larger than the driver takes.
     #[error("{what}: {found} exceeds the limit of {limit}")]
     TooLarge {
-        /// What is too large.
+        /// The quantity that is too large.
         what: String,
-        /// How large it is.
+        /// Its size.
         found: u64,
-        /// How large it may be.
+        /// Its largest allowed size.
         limit: u64,
     },
     /// Inconsistent input.

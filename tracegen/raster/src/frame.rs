@@ -1,9 +1,9 @@
-//! What one frame draws: its light, its layers, and which draws enter each of them.
+//! A planned frame: its light, its layers, and the draws in each of them.
 
-use super::backend::View;
 use super::draws::{DrawList, DrawMode};
 use super::lighting::Lighting;
-use super::skips::Skipped;
+use super::view::View;
+use std::ops::AddAssign;
 use std::time::{Duration, Instant};
 use techniques::{FramePlan, Stage, Start};
 use visibility::{Culling, Rig, Scratch, TooWide};
@@ -13,7 +13,7 @@ use visibility::{Culling, Rig, Scratch, TooWide};
 pub struct Frame {
     /// Lights, with the shadow cascades fitted to the frame.
     pub lighting: Lighting,
-    /// Draws that each shadow cascade may see.
+    /// Draws that may be visible in each shadow cascade.
     pub casters: Vec<Vec<u32>>,
     /// Which shadow cascades may be looked up; the others need not be rendered.
     pub cascades_seen: Vec<bool>,
@@ -21,7 +21,7 @@ pub struct Frame {
     pub plan: FramePlan,
     /// Boxes that were tested to find the draws of the eyes' pictures.
     pub cull_tests: u64,
-    /// Boxes that were held against the depth of others.
+    /// Boxes that were tested for occlusion.
     pub occlusion_tests: u64,
     /// Draws of layers that others hide.
     pub occluded: u64,
@@ -29,9 +29,9 @@ pub struct Frame {
     pub cull_time: Duration,
     /// The eyes.
     pub rig: Rig,
-    /// Draws that each layer may see.
+    /// Draws that may be visible in each layer.
     pub(crate) visible: Vec<Vec<u32>>,
-    /// What nobody sees of it and has been left out.
+    /// Invisible work that was skipped.
     pub skipped: Skipped,
 }
 
@@ -108,11 +108,24 @@ impl Frame {
     }
 }
 
-/// Whether draws of a mode belong to a stage.
+/// Whether draws of a mode are drawn in a stage.
 fn enters(stage: Stage, mode: DrawMode) -> bool {
     match stage {
         Stage::All => true,
         Stage::Opaque => mode != DrawMode::Blended,
         Stage::Transparent => mode == DrawMode::Blended,
+    }
+}
+
+/// Work of a frame that was skipped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Skipped {
+    /// Shadow cascades.
+    pub cascades: u64,
+}
+
+impl AddAssign for Skipped {
+    fn add_assign(&mut self, other: Self) {
+        self.cascades += other.cascades;
     }
 }

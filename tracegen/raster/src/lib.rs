@@ -26,9 +26,10 @@ mod osmesa;
 mod roles;
 mod seen;
 mod shader;
-pub mod skips;
+mod skips;
 pub mod truth;
 mod uniforms;
 mod vertices;
+mod view;
 
 pub use vertices::VERTEX_STRIDE;

@@ -1,4 +1,4 @@
-//! The light that a frame is shaded with.
+//! The lighting of a frame.
 
 use super::cascades::Cascade;
 use glam::Vec3;

@@ -1,4 +1,4 @@
-//! What a draw does in each pass, and what distinguishes the pipelines that do it.
+//! Roles of a draw in each pass, and the keys of their pipelines.
 
 use crate::backend::Fragments;
 use crate::backend::Recording;
@@ -6,12 +6,12 @@ use crate::draws::{DrawCall, DrawMode};
 use crate::groups::MaterialGroups;
 use scene::Material;
 
-/// What a pipeline does with a draw.
+/// Role of a draw in a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Role {
     /// Colour and depth with forced early depth test.
     Opaque,
-    /// Colour blended over what is there; depth tested early, not written.
+    /// Colour blended over earlier draws; depth tested early, not written.
     Blended,
     /// Colour and late depth of an alpha-masked draw.
     Masked,
@@ -29,22 +29,22 @@ pub(crate) enum Role {
     Count,
     /// Fragments of a blended draw, added up.
     CountBlended,
-    /// Depth alone.
+    /// Only depth.
     Depth,
-    /// Depth of an alpha-masked draw alone.
+    /// Only depth of an alpha-masked draw.
     DepthMasked,
-    /// Marks the draw where a fragment is no farther than the depth there.
+    /// Marks the draw if a fragment is not farther than the stored depth.
     Mark,
     /// The same of an alpha-masked draw.
     MarkMasked,
-    /// What is sampled of one texture of the material, and which primitive does it.
+    /// Records the samples of one texture of the material, and the primitive.
     Texel,
     /// The same of an alpha-masked draw.
     TexelMasked,
 }
 
 impl Role {
-    /// What the shader does with fragments, unless depth alone is written.
+    /// The shader's fragment entry point, unless only depth is written.
     pub fn fragment_entry_point(self) -> Option<&'static str> {
         match self {
             Self::Opaque | Self::Blended => Some("fragment_early"),
@@ -72,7 +72,7 @@ impl Role {
         self.casts() || alone.contains(&self)
     }
 
-    /// It leaves the colour as it is, where there is any.
+    /// Whether it leaves colour unchanged, if there is any.
     pub fn keeps_color(self) -> bool {
         self == Self::MaskedRecord
     }
@@ -87,7 +87,7 @@ impl Role {
         matches!(self, Self::Mark | Self::MarkMasked)
     }
 
-    /// Neither texture nor vertex colour changes what it does.
+    /// Whether neither texture nor vertex colour affects its result.
     fn is_plain(self) -> bool {
         matches!(
             self,
@@ -109,16 +109,16 @@ impl Role {
     }
 }
 
-/// What all draws of a pass are drawn for.
+/// Purpose of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
-    /// The picture alone.
+    /// Only the picture.
     Plain,
     /// The picture and the records.
     Capture,
     /// The records of what passes the depth test when it is drawn, and depth: no picture.
     Trace,
-    /// The records alone, of what lies before the depth that the layer starts with.
+    /// Only the records of fragments in front of the layer's initial depth.
     Record,
     /// A shadow map.
     Shadow,
@@ -128,12 +128,12 @@ pub(crate) enum Purpose {
     Depth,
     /// Which draws are visible.
     Mark,
-    /// What visible fragments sample of one texture of their materials.
+    /// Samples of visible fragments of one texture of their materials.
     Texel,
 }
 
 impl Purpose {
-    /// What a region is rendered for, one pass after the other.
+    /// The passes over a region, one after the other.
     pub fn of(recording: Option<&Recording<'_, '_>>) -> &'static [Self] {
         match recording.map(|recording| (recording.fragments, recording.picture)) {
             None => &[Self::Plain],
@@ -152,7 +152,7 @@ impl Purpose {
     }
 }
 
-/// Roles of a draw in the order in which it takes them.
+/// Roles of a draw, in order.
 pub(crate) fn roles(mode: DrawMode, purpose: Purpose) -> &'static [Role] {
     match (mode, purpose) {
         (DrawMode::Opaque, Purpose::Plain | Purpose::Capture) => &[Role::Opaque],
@@ -197,10 +197,10 @@ impl MaterialState {
     }
 }
 
-/// What distinguishes pipelines.
+/// Key of a pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct PipelineKey {
-    /// What the pipeline does.
+    /// Role of the draw.
     pub role: Role,
     /// Records are written.
     pub capture: bool,
@@ -235,7 +235,7 @@ impl PipelineKey {
         ]
     }
 
-    /// The pipeline that gives `call` its `role` in a frame with `cascades`.
+    /// The key of the pipeline for `role` of `call` in a frame with `cascades`.
     pub fn new(
         call: &DrawCall,
         material: &MaterialState,

@@ -1,4 +1,5 @@
-//! What a capture's views sample of the scene's images: only that needs texels.
+//! Finds the mip levels of the scene's images that a capture's views can sample, because only those need
+//! texels.
 
 use super::capture::CaptureJob;
 use super::draws::{DrawCall, DrawMode, SHADOW_SIZE};
@@ -47,7 +48,7 @@ impl CaptureJob<'_> {
             return Ok(());
         }
         finest.resize(scene.images.len(), None);
-        // What moves is elsewhere in every frame, and little: whatever it has is wanted.
+        // Moving draws are elsewhere in every frame, and few, so all their levels are prepared.
         for &draw in &self.draws.moving {
             let material = &scene.materials[self.draws.calls[draw as usize].material];
             for texture in material.textures().iter().flatten() {
@@ -80,7 +81,7 @@ impl CaptureJob<'_> {
         Ok(())
     }
 
-    /// Adds what a view samples through the first `slots` of its draws' materials.
+    /// Adds the samples of a view through the first `slots` of its draws' materials.
     fn sample(
         &self,
         scene: &Scene,
@@ -146,7 +147,7 @@ fn derivative_squared(
     least_derivative_squared(&mesh.positions, &mesh.indices, uv, &call.transform, pixels)
 }
 
-/// Whether more of a texture's image may be needed than is known.
+/// Whether more of a texture's image may be needed than was found so far.
 fn is_new(texture: &TextureRef, finest: &[Option<u32>]) -> bool {
     finest
         .get(texture.image)

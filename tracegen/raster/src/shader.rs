@@ -23,10 +23,10 @@ pub(crate) const MATERIAL_BINDING: u32 = 0;
 pub(crate) const TEXTURES_BINDING: u32 = 1;
 /// First of the sampler bindings in group 1, in the order of the textures.
 pub(crate) const SAMPLERS_BINDING: u32 = TEXTURES_BINDING + MATERIAL_TEXTURES as u32;
-/// Binding of the copy that alpha tests sample in group 1, where there are copies.
+/// Binding of the copy that alpha tests sample in group 1, if there are copies.
 pub(crate) const ALPHA_BINDING: u32 = SAMPLERS_BINDING + MATERIAL_TEXTURES as u32;
 
-/// What alpha tests sample.
+/// Source of alpha tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum AlphaSource {
     /// The base colour.

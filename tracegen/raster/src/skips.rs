@@ -1,32 +1,17 @@
-//! What a frame need not draw, although the boxes of its draws say so.
+//! Skips invisible work that culling by bounding boxes keeps.
 
 use super::capture::CaptureJob;
-use super::cascades::Cascade;
-use super::draws::SHADOW_SIZE;
+use super::cascades::{Cascade, SHADOW_SIZE};
 use super::frame::Frame;
 use glam::Mat4;
-use std::ops::AddAssign;
 use visibility::receivers::{Receivers, Volume};
 
 /// Texels of a cascade's edge that its lookup leaves free, and by which it moves a point off its surface,
 /// as in the shader; rounded up.
 const LOOKUP_TEXELS: f32 = 2.0 + 1.6 + 0.4;
 
-/// What the skips have left out of a frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Skipped {
-    /// Shadow cascades.
-    pub cascades: u64,
-}
-
-impl AddAssign for Skipped {
-    fn add_assign(&mut self, other: Self) {
-        self.cascades += other.cascades;
-    }
-}
-
 impl CaptureJob<'_> {
-    /// Takes from a frame what nobody sees of it.
+    /// Removes invisible work from a frame.
     pub(crate) fn skip(&self, frame: &mut Frame) {
         if self.skips.cascades {
             self.skip_cascades(frame);

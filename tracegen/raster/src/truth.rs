@@ -1,4 +1,4 @@
-//! What culling got wrong, by drawing everything.
+//! Errors of culling, found by drawing everything.
 
 use super::backend::{CaptureBackend, Marks};
 use super::capture::CaptureJob;
@@ -7,7 +7,7 @@ use super::frame::Frame;
 use std::ops::AddAssign;
 use techniques::Layer;
 
-/// Wrong guesses about the draws of an eye.
+/// Wrong decisions about the draws of an eye.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wrong {
     /// Visible and left out.
@@ -23,19 +23,19 @@ impl AddAssign for Wrong {
     }
 }
 
-/// What culling got wrong of an eye's picture.
+/// Errors of culling in an eye's picture.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Judgement {
     /// Against everything in the picture.
     pub picture: Wrong,
-    /// Against what the lens shows of it.
+    /// Compared with what is visible through the lens.
     pub lens: Wrong,
     /// Draws that the lens shows and that are left out, ascending.
     pub lost: Vec<u32>,
 }
 
 impl Judgement {
-    /// Of a list of draws (ascending) against what is visible, by draw.
+    /// Compares a list of draws (ascending) with the visibility of every draw.
     #[must_use]
     pub fn new(listed: &[u32], visible: &[Marks]) -> Self {
         let mut found = Self::default();
@@ -77,7 +77,7 @@ impl CaptureJob<'_> {
             .collect()
     }
 
-    /// What the frame's lists get wrong, in the order of the job's eyes: an eye's list is that of
+    /// Errors of the frame's lists, in the order of the job's eyes: an eye's list is that of
     /// all layers that its picture is made of.
     ///
     /// # Errors
@@ -90,7 +90,7 @@ impl CaptureJob<'_> {
         Ok(self.judge_against(frame, &self.truth(backend, frame)?))
     }
 
-    /// As [`Self::judge`], by what [`Self::truth`] has told of the frame's eyes.
+    /// Like [`Self::judge`], with the results of [`Self::truth`] for the frame's eyes.
     #[must_use]
     pub fn judge_against(&self, frame: &Frame, truth: &[Vec<Marks>]) -> Vec<Judgement> {
         let judge = |(eye, visible): (_, &Vec<Marks>)| {

@@ -26,7 +26,7 @@ pub(crate) struct InstanceData {
 }
 
 impl InstanceData {
-    /// The row of a draw.
+    /// The row of the draw.
     pub fn new(draw: u32, call: &DrawCall) -> Self {
         let matrix = glam::Mat3::from(call.transform.matrix3);
         let inverse = matrix.inverse().transpose();
@@ -46,7 +46,7 @@ impl InstanceData {
     }
 }
 
-/// Interleaves a mesh's vertices; what it lacks gets a default.
+/// Interleaves a mesh's vertices; missing attributes get defaults.
 pub(crate) fn pack(mesh: &Mesh) -> Vec<VertexData> {
     let at2 = |set: &[glam::Vec2], i: usize| set.get(i).copied().unwrap_or_default();
     mesh.positions
@@ -80,7 +80,7 @@ pub(crate) type ColorData = [u16; 4];
 /// Bytes between two colours.
 pub(crate) const COLOR_STRIDE: u64 = size_of::<ColorData>() as u64;
 
-/// The mesh's vertex colours; none where it has none.
+/// The mesh's vertex colours, if it has any.
 pub(crate) fn pack_colors(mesh: &Mesh) -> Vec<ColorData> {
     if mesh.colors.is_empty() {
         return Vec::new();
@@ -91,7 +91,7 @@ pub(crate) fn pack_colors(mesh: &Mesh) -> Vec<ColorData> {
         .collect()
 }
 
-/// One row a draw, at least one.
+/// One row per draw, at least one.
 pub(crate) fn instances(draws: &DrawList) -> Vec<InstanceData> {
     let mut rows: Vec<InstanceData> = (0_u32..)
         .zip(&draws.calls)

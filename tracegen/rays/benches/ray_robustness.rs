@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use rays::robustness::{Findings, Subject, TRANSLATIONS, meshes};
+use rays::robustness::{Findings, MeshUnderTest, TRANSLATIONS, meshes};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
@@ -18,7 +18,7 @@ fn main() -> ExitCode {
     );
     for mesh in meshes() {
         for distance in TRANSLATIONS {
-            let subject = Subject::new(&mesh, DVec3::new(1.0, 0.7, -0.9) * distance);
+            let subject = MeshUnderTest::new(&mesh, DVec3::new(1.0, 0.7, -0.9) * distance);
             let f = (0..rays.div_ceil(CHUNK))
                 .into_par_iter()
                 .map(|chunk| subject.check(CHUNK.min(rays - chunk * CHUNK), chunk + 1))

@@ -24,7 +24,7 @@ pub struct EyeImage {
     pub pixels: Vec<Vec3>,
 }
 
-/// What a frame cost.
+/// Cost of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameStats {
     /// Rays by kind, in the order of [`RayKind`].
@@ -70,7 +70,7 @@ impl FrameStats {
 }
 
 /// A traced frame.
-pub struct Frame {
+pub struct RayFrame {
     /// Both eyes' pictures.
     pub images: [EyeImage; 2],
     /// Triangles that primary rays hit, for the trace's table.
@@ -79,7 +79,7 @@ pub struct Frame {
     pub stats: FrameStats,
 }
 
-/// What a worker hands over for a tile.
+/// A worker's results of a tile.
 struct TileResult {
     encoded: Result<EncodedRayTile>,
     origin_px: [u32; 2],
@@ -101,13 +101,13 @@ pub fn trace_frame<W: Write + Seek + Send>(
     tables: &RaytraceTables,
     writer: &mut RaytraceWriter<W>,
     mut progress: impl FnMut(u64),
-) -> Result<Frame> {
+) -> Result<RayFrame> {
     let size_px = tables.meta.eyes[0].size_px;
     let blank = || EyeImage {
         size_px,
         pixels: vec![Vec3::ZERO; size_px[0] as usize * size_px[1] as usize],
     };
-    let mut frame = Frame {
+    let mut frame = RayFrame {
         images: [blank(), blank()],
         triangles: Vec::new(),
         stats: FrameStats::default(),
@@ -139,7 +139,7 @@ pub fn trace_frame<W: Write + Seek + Send>(
     Ok(frame)
 }
 
-impl Frame {
+impl RayFrame {
     /// Writes a batch of an eye's tiles and adds it to the frame.
     fn take<W: Write + Seek>(
         &mut self,

@@ -2,8 +2,8 @@
 
 pub mod bvh;
 pub mod frame;
-pub mod light;
-pub mod material;
+mod light;
+mod material;
 pub mod picture;
 pub mod precision;
 pub mod ray;
@@ -11,7 +11,7 @@ pub mod reference;
 pub mod robustness;
 pub mod scene;
 pub mod soup;
-pub mod texture;
+mod texture;
 pub mod tracer;
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use formats::raytrace::RayLight;
 use glam::Vec3;
 
-/// What a light sends to a point.
+/// Light that reaches a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Incident {
     /// Unit direction towards the light.
@@ -83,7 +83,7 @@ pub fn blinn_phong(normal: Vec3, to_light: Vec3, to_eye: Vec3, exponent: u32) ->
         return 0.0;
     }
     let n = exponent as f32;
-    // 2^(-n/2), nothing beside n from 60 on.
+    // 2^(-n/2), negligible from n = 60 on.
     let tail = 0.5f32.powi(exponent.min(120) as i32).sqrt();
     let scale = (n + 2.0) * (n + 4.0) / (8.0 * std::f32::consts::PI * (tail + n));
     scale * n_h.powi(exponent as i32) * n_l

@@ -1,4 +1,4 @@
-//! What a scene's materials mean to a ray.
+//! Properties of a scene's materials for rays.
 
 use super::soup::{Attributes, Soup};
 use super::texture::{Pyramid, fast_log2};
@@ -39,7 +39,7 @@ pub struct Surface {
     pub tint: Vec3,
     /// Index of refraction.
     pub ior: f32,
-    /// Coverage: 1 but for blended surfaces.
+    /// Coverage: 1 except for blended surfaces.
     pub alpha: f32,
     /// Emitted radiance.
     pub emissive: Vec3,
@@ -130,7 +130,7 @@ impl Materials {
             let uv = soup.uv(scene, primitive, bary, t.uv_set);
             Some(pyramid.sample(t, uv, 0.0, self.srgb).w)
         });
-        // As in the raster capture, where a mask without a texture is decided once for a draw.
+        // As in the raster capture, where a mask without a texture is decided once per draw.
         let constant = texel.is_none() && material.alpha != AlphaMode::Blend;
         let vertex = if constant {
             1.0

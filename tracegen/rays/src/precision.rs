@@ -14,7 +14,7 @@ use glam::DVec3;
 use std::ops::{Add, Div, Mul, Sub};
 use std::time::{Duration, Instant};
 
-/// What is calculated in.
+/// The arithmetic.
 trait Real:
     Copy
     + PartialOrd
@@ -25,7 +25,7 @@ trait Real:
 {
     const ZERO: Self;
     const MAX: Self;
-    /// What a box's exit may be too early by, relative.
+    /// Relative margin of a box's exit for rounding.
     const PADDED: Self;
     fn of(value: f64) -> Self;
     fn to_f64(self) -> f64;
@@ -221,7 +221,7 @@ impl<T: Real> Node<T> {
 /// An arithmetic at a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Precision {
-    /// What is calculated in.
+    /// The arithmetic.
     pub arithmetic: &'static str,
     /// Distance from the origin on the diagonal's axes, metres.
     pub at_m: f64,

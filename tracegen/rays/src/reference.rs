@@ -187,7 +187,7 @@ impl TestMesh {
     }
 }
 
-/// What the reference says of a ray.
+/// The reference's answer for a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
     /// Hits at this distance give or take what rounding the mesh may shift it, or at an unsure
@@ -237,7 +237,7 @@ impl<'a> Reference<'a> {
                 }
             }
             Some(t) => Verdict::Hit(Some((t, near.shift()))),
-            None if near.is_doubtful() => Verdict::Borderline,
+            None if near.is_borderline() => Verdict::Borderline,
             None => Verdict::Miss,
         }
     }
@@ -346,8 +346,8 @@ impl Near {
             .map(|t| t.distance)
     }
 
-    /// True where the ray starts on a triangle, or passes just outside of one that lies ahead.
-    fn is_doubtful(&self) -> bool {
+    /// Whether the ray starts on a triangle, or passes just outside of one in front of it.
+    fn is_borderline(&self) -> bool {
         self.triangles.iter().any(|t| {
             if t.covers() {
                 return t.height().abs() <= self.tolerance;
@@ -385,7 +385,7 @@ impl Near {
             .any(|s| s.len() == 2 && (s[0] * s[1] <= 0.0 || s[0].abs().min(s[1].abs()) < 1e-6))
     }
 
-    /// True where the line passes through a triangle at more than the tolerance from its edges.
+    /// Whether the line passes through a triangle at more than the tolerance from its edges.
     fn hits_inside(&self) -> bool {
         self.triangles.iter().any(|t| {
             let clear = !t.edge_near(self.direction, self.tolerance);

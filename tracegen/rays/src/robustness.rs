@@ -11,14 +11,14 @@ use glam::{DVec3, Vec3};
 /// half a unit in the last place of each coordinate and of the shear, a few times over.
 const TOLERANCE: f64 = 1e-5;
 
-/// What a check found.
+/// Results of a check.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Findings {
     /// Rays checked.
     pub rays: u64,
     /// Rays that hit, by the reference.
     pub hits: u64,
-    /// Rays whose answer hangs on less than the rounding of the mesh; not held against anyone.
+    /// Rays whose result depends on less than the rounding of the mesh; they are not counted as errors.
     pub borderline: u64,
     /// Closest-hit or any-hit, in either tree, that says hit where the reference says miss or the
     /// other way round.
@@ -61,7 +61,7 @@ impl Findings {
 }
 
 /// A mesh as the traversal sees it, ready for checks from many threads.
-pub struct Subject {
+pub struct MeshUnderTest {
     /// Relative to the centre, not rounded.
     mesh: TestMesh,
     rounded: Vec<[[f32; 3]; 3]>,
@@ -71,7 +71,7 @@ pub struct Subject {
     convex: bool,
 }
 
-impl Subject {
+impl MeshUnderTest {
     /// A closed test mesh, moved away from the world's origin and recentred as scenes are.
     ///
     /// # Panics
@@ -198,7 +198,7 @@ impl Subject {
         if self.convex && hits(offset(point, outward), away) {
             findings.self_hits += 1;
         }
-        // A point on an edge may leave at once through the face next to it: the reference knows.
+        // A point on an edge may leave at once through the adjacent face, so the reference decides.
         let within = offset(point, -outward);
         let exits = reference.verdict(within.as_dvec3(), -away.as_dvec3(), TOLERANCE);
         if !hits(within, -away) && matches!(exits, Verdict::Hit(_)) {
@@ -254,7 +254,7 @@ mod tests {
     fn no_ray_leaks_or_hits_falsely_at_any_distance_from_the_origin() {
         for mesh in meshes() {
             for distance in TRANSLATIONS {
-                let subject = Subject::new(&mesh, DVec3::new(1.0, 0.7, -0.9) * distance);
+                let subject = MeshUnderTest::new(&mesh, DVec3::new(1.0, 0.7, -0.9) * distance);
                 let findings = subject.check(1200, 7);
                 assert!(
                     findings.clean(),

@@ -1,6 +1,6 @@
 //! The tracer on a small scene with every kind of material.
 
-use super::frame::{Frame, trace_frame};
+use super::frame::{RayFrame, trace_frame};
 use super::material::Materials;
 use super::scene::TraceScene;
 use super::soup::Soup;
@@ -172,7 +172,7 @@ fn tables(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> Ray
     }
 }
 
-fn trace(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> (Frame, Vec<u8>) {
+fn trace(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> (RayFrame, Vec<u8>) {
     let mut tables = tables(scene, settings, size_px);
     let mut writer = RaytraceWriter::in_memory().expect("in memory");
     let mut frame = trace_frame(scene, settings, &tables, &mut writer, |_| ()).expect("traces");

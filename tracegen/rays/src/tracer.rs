@@ -19,7 +19,7 @@ const LEAST_WEIGHT: f32 = 0.01;
 /// Nor are shadow rays for less than this radiance.
 const LEAST_RADIANCE: f32 = 1.0 / 1024.0;
 
-/// What is traced and recorded.
+/// Settings of tracing and recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TraceSettings {
     /// Levels of reflection and refraction.
@@ -230,7 +230,7 @@ impl<'a> Tracer<'a> {
         // The footprint stretches as the surface turns away; half of that is a fair mean width.
         let footprint = length * self.px_spread / cosine.max(0.1).sqrt();
         let surface = materials.surface(soup.material(source, hit.primitive), &at, footprint);
-        let place = Place {
+        let place = ShadedPoint {
             point: point_at(&hit.vertices, bary),
             geometric,
             shading,
@@ -261,7 +261,7 @@ impl<'a> Tracer<'a> {
         &mut self,
         path: &Path,
         surface: &Surface,
-        place: &Place,
+        place: &ShadedPoint,
         out: &mut RayTile,
     ) -> Radiance {
         let mut radiance = Radiance::default();
@@ -301,12 +301,12 @@ impl<'a> Tracer<'a> {
         radiance
     }
 
-    /// What an opaque surface mirrors: a ray where it is polished, else the sky's mean.
+    /// Reflection of an opaque surface: a ray if it is polished, else the sky's mean.
     fn reflection(
         &mut self,
         path: &Path,
         surface: &Surface,
-        place: &Place,
+        place: &ShadedPoint,
         out: &mut RayTile,
     ) -> Vec3 {
         if surface.transmission > 0.0 {
@@ -326,7 +326,7 @@ impl<'a> Tracer<'a> {
     fn mirror_ray(
         &mut self,
         path: &Path,
-        place: &Place,
+        place: &ShadedPoint,
         mirrored: Vec3,
         weight: f32,
         out: &mut RayTile,
@@ -356,7 +356,7 @@ impl<'a> Tracer<'a> {
         &mut self,
         path: &Path,
         surface: &Surface,
-        place: &Place,
+        place: &ShadedPoint,
         front: bool,
         out: &mut RayTile,
     ) -> Vec3 {
@@ -385,15 +385,21 @@ impl<'a> Tracer<'a> {
         light
     }
 
-    /// What lies behind a blended surface: the ray goes straight on.
-    fn behind(&mut self, path: &Path, surface: &Surface, place: &Place, out: &mut RayTile) -> Vec3 {
+    /// The surface behind a blended surface: the ray continues straight.
+    fn behind(
+        &mut self,
+        path: &Path,
+        surface: &Surface,
+        place: &ShadedPoint,
+        out: &mut RayTile,
+    ) -> Vec3 {
         self.through(path, place, -place.to_eye, 1.0 - surface.alpha, out)
     }
 
     fn through(
         &mut self,
         path: &Path,
-        place: &Place,
+        place: &ShadedPoint,
         direction: Vec3,
         fraction: f32,
         out: &mut RayTile,
@@ -415,7 +421,7 @@ impl<'a> Tracer<'a> {
 }
 
 /// A shaded point.
-struct Place {
+struct ShadedPoint {
     point: Vec3,
     /// Normals on the ray's side.
     geometric: Vec3,

@@ -11,7 +11,7 @@ pub struct Region {
     pub size_px: [u32; 2],
 }
 
-/// What became of one region.
+/// Result of capturing a region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Captured {
     /// The region is complete, and its records were handed over.
@@ -32,7 +32,7 @@ pub type Sink<'a> = dyn FnMut(RawRecords<'_>) -> Result<(), RecordError> + 'a;
 /// Records may come in any order, and so may primitives, those of alpha-masked draws too. Regions
 /// may be asked for in any order.
 pub trait Capturer {
-    /// Its errors, and those of the recording that it passes on.
+    /// Its errors, including those of the sink.
     type Error: From<RecordError>;
 
     /// Records that one region may produce.

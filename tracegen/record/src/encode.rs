@@ -10,12 +10,12 @@ use std::io::{Seek, Write};
 use std::ops::AddAssign;
 use std::time::{Duration, Instant};
 
-/// What became of one pass.
+/// Result of capturing a pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Recorded {
-    /// What was counted.
+    /// Counts of the records.
     pub counts: CaptureCounts,
-    /// Regions that the view was captured in, those that overflowed left out.
+    /// Regions in which the view was captured, without those that overflowed.
     pub regions: u32,
     /// Time of sorting, encoding and writing.
     pub sorting: Duration,

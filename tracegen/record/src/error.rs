@@ -25,15 +25,15 @@ pub enum RecordError {
     Invalid {
         /// What the tables allow.
         expected: String,
-        /// What came.
+        /// What was found.
         found: String,
     },
     /// An event of a [`crate::Recording`] came at the wrong time.
     #[error("an event of a recording: expected {expected}, found {found}")]
     Event {
-        /// What has to come first.
+        /// What must come first.
         expected: String,
-        /// What came.
+        /// What was found.
         found: String,
     },
     /// The trace could not be written.

@@ -1,4 +1,4 @@
-//! From what a capturer hands over to the tiles of a trace.
+//! Converts the records of a capturer to the tiles of a trace.
 //!
 //! ```text
 //! Capturer (any driver) -> Recorder  ─┐ raw quad records, region by region or pass by pass
@@ -6,8 +6,9 @@
 //!                                           -> encoded tiles -> TextraceWriter
 //! ```
 //!
-//! Nothing here knows a driver or a scene. Whoever can draw a region again implements [`Capturer`] and fills
-//! `formats::textrace::Tables` first; whoever sees a program draw once pushes what it sees into a [`Recording`].
+//! This crate depends on no driver and no scene. A capturer that can draw a region again implements
+//! [`Capturer`] and fills `formats::textrace::Tables` first; a capturer that observes a program pushes its
+//! events into a [`Recording`].
 
 mod bins;
 mod capturer;

@@ -7,7 +7,7 @@
 
 use super::raw::{RawDepth, RawRecord};
 
-/// The depth test that a draw's primitives have to be held to among themselves.
+/// The depth test among the primitives of a draw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DepthReplay {
     /// None: the driver has done it, or no primitive of the draw hides another.
@@ -35,7 +35,7 @@ impl DepthReplay {
         }
     }
 
-    /// What every fragment passes against.
+    /// The initial value, with which every fragment passes.
     fn nothing(self) -> f32 {
         match self {
             Self::Greater | Self::GreaterOrEqual => f32::NEG_INFINITY,
@@ -44,14 +44,14 @@ impl DepthReplay {
     }
 }
 
-/// Quads along a tile's edge.
+/// Quads along the edge of a tile.
 const EDGE: usize = formats::textrace::TILE_QUADS as usize;
 
 /// Depth that one masked draw has written so far in one tile.
 #[derive(Clone, Debug)]
 pub(crate) struct MaskedDepth {
     draw: Option<u32>,
-    /// Four lanes a quad, quads row by row.
+    /// Four lanes per quad, quads row by row.
     nearest: [[f32; 4]; EDGE * EDGE],
 }
 
@@ -81,7 +81,7 @@ impl MaskedDepth {
             .map(|(lane, (nearest, depth))| u8::from(test.passes(*depth, *nearest)) << lane)
             .sum::<u8>();
         let survivors = quad.mask() & nearer;
-        // Without a branch: which lanes pass is as good as random.
+        // Branchless, because passing lanes are unpredictable.
         let written = u32::from(survivors) & quad.passing;
         for (lane, (nearest, &depth)) in nearest.iter_mut().zip(&depth.depth).enumerate() {
             *nearest = if written >> lane & 1 == 1 {

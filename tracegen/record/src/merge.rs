@@ -70,7 +70,7 @@ impl Merged {
     }
 }
 
-/// Bits of a [`key`] that tell the lane.
+/// Bits of a [`key`] that identify the lane.
 const LANE_BITS: u32 = 2;
 
 /// Primitive, position of the quad, group, lane.

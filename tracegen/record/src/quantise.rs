@@ -58,7 +58,7 @@ pub(crate) struct Quantiser {
 }
 
 impl Quantiser {
-    /// Fixed-point coordinates of `record`, or `None` where a coordinate is not finite.
+    /// Fixed-point coordinates of `record`, or `None` if a coordinate is not finite.
     pub fn quantise(&mut self, rule: &GroupScale, record: &RawRecord) -> Option<FixedUv> {
         let mut fixed = FixedUv::default();
         for axis in 0..2 {

@@ -1,4 +1,4 @@
-//! What a capturer hands over.
+//! Raw records of a capturer.
 
 /// Bytes of one raw record.
 pub const RECORD_BYTES: u64 = size_of::<RawRecord>() as u64;
@@ -30,7 +30,8 @@ pub struct RawRecord {
 }
 
 impl RawRecord {
-    /// Flag of [`Self::passing`]: the depths beside the record are those of its quad (see [`crate::DepthReplay`]).
+    /// Flag of [`Self::passing`]: the depths next to the record are those of its quad (see
+    /// [`crate::DepthReplay`]).
     pub const HAS_DEPTH: u32 = 1 << 31;
     /// Flag of [`Self::passing`]: the coordinates are operands of the next record, whose group is the next one.
     pub const OPERANDS: u32 = 1 << 30;
@@ -72,7 +73,7 @@ impl RawRecord {
     }
 }
 
-/// What the in-order replay of an alpha-masked draw needs to know about a quad, beside its record.
+/// Data of a quad for the in-order replay of an alpha-masked draw, in addition to its record.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct RawDepth {
@@ -83,7 +84,7 @@ pub struct RawDepth {
 /// The raw records of one region, in no particular order.
 #[derive(Clone, Copy, Debug)]
 pub struct RawRecords<'a> {
-    /// One a quad and uv group.
+    /// One per quad and uv group.
     pub quads: &'a [RawRecord],
     /// `depths[i]` belongs to `quads[i]` where that is group 0 of a masked draw or has [`RawRecord::HAS_DEPTH`], and
     /// means nothing elsewhere; empty where no draw is masked.

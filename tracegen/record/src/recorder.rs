@@ -35,7 +35,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Captures a view as pass `pass` of the trace, in as many regions as its records need.
+    /// Captures a view as pass `pass` of the trace, in as many regions as its records require.
     ///
     /// # Errors
     /// The capturer's errors, a tile that overflows alone, records that contradict the tables,

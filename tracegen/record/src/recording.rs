@@ -1,4 +1,5 @@
-//! A trace from events as they happen, for capturers that know no pass, draw or texture before it comes.
+//! Writes a trace from events in their order, for capturers that do not know passes, draws or textures in
+//! advance.
 
 use crate::encode::{Recorded, write_region};
 use crate::masked::DepthReplay;
@@ -42,7 +43,7 @@ impl<W: Write + Seek> Recording<W> {
         }
     }
 
-    /// Adds a texture and tells its index.
+    /// Adds a texture and returns its index.
     ///
     /// # Errors
     /// A full table.
@@ -50,7 +51,7 @@ impl<W: Write + Seek> Recording<W> {
         Ok(self.writer.add_texture(texture)?)
     }
 
-    /// Adds a sampler, unless the trace has it, and tells its index.
+    /// Adds a sampler, unless the trace has it, and returns its index.
     ///
     /// # Errors
     /// A full table.
@@ -74,7 +75,7 @@ impl<W: Write + Seek> Recording<W> {
         Ok(self.writer.add_draw(draw)?)
     }
 
-    /// Starts a pass and tells its index.
+    /// Starts a pass and returns its index.
     ///
     /// # Errors
     /// A pass that is open, or one with too many tiles.

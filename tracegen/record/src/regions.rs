@@ -38,7 +38,7 @@ impl TileRect {
         ]
     }
 
-    /// All tiles, those of a [`BLOCK_TILES`] square one after the other.
+    /// All tiles, ordered by squares of [`BLOCK_TILES`].
     pub fn by_blocks(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.count()).collect();
         order.sort_by_key(|&index| {
@@ -48,7 +48,7 @@ impl TileRect {
         order
     }
 
-    /// Position of the tile that holds a record's quad, or `None` where it is outside.
+    /// Position of the tile that contains a record's quad, or `None` if it is outside.
     pub fn index(&self, record: &RawRecord) -> Option<usize> {
         let column = (record.qx() / 8)
             .checked_sub(self.origin[0])

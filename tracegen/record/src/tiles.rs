@@ -1,4 +1,4 @@
-//! From a tile's raw records to the trace's `Tile`.
+//! Converts a tile's raw records to the trace's `Tile`.
 
 use super::bins::{Bins, Entry};
 use super::error::RecordError;
@@ -9,10 +9,10 @@ use formats::textrace::{Draw, NO_GROUP, PrimitiveRun, QuadRecord, Tables, Tile};
 use formats::texture::Sampler;
 use std::ops::AddAssign;
 
-/// What a capture counted.
+/// Counts of a capture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CaptureCounts {
-    /// Covered quads with a record in the trace, counted once whatever the number of their uv groups.
+    /// Covered quads with a record in the trace, counted once for all their uv groups.
     pub quads: u64,
     /// Covered lanes of those quads that have a record in the trace.
     pub fragments: u64,
@@ -40,7 +40,7 @@ impl AddAssign for CaptureCounts {
     }
 }
 
-/// What building tiles needs to know about the draws.
+/// Properties of the draws that building tiles depends on.
 pub(crate) struct TileRules {
     /// By draw and group.
     scales: Vec<Vec<GroupScale>>,
@@ -48,7 +48,7 @@ pub(crate) struct TileRules {
     replays: Vec<DepthReplay>,
 }
 
-/// Memory that building a tile reuses.
+/// Memory that is reused between tiles.
 #[derive(Default)]
 pub(crate) struct Scratch {
     order: Vec<Entry>,
@@ -59,7 +59,7 @@ pub(crate) struct Scratch {
 }
 
 impl TileRules {
-    /// Rules for the draws of `tables`; `replays` tells of each what depth test its quads are held to.
+    /// Rules for the draws of `tables`; `replays` holds each draw's depth test among its quads.
     pub fn new(tables: &Tables, replays: Vec<DepthReplay>) -> Self {
         let scales = |draw| scales(draw, &tables.samplers);
         Self {
@@ -179,7 +179,7 @@ impl TileRules {
         Ok(())
     }
 
-    /// How the coordinates of a record's group become fixed point.
+    /// Conversion of the coordinates of a record's group to fixed point.
     fn rule(&self, record: &RawRecord) -> Result<&GroupScale, RecordError> {
         let invalid = |expected: String, found: u32| RecordError::Invalid {
             expected,

@@ -103,7 +103,7 @@ fn tables() -> Tables {
     }
 }
 
-/// Primitive, draw and covered lanes of the quad at column `x` and row `y`, as a driver sees them.
+/// Primitive, draw and covered lanes of the quad at column `x` and row `y`, as a driver reports them.
 fn covered(x: u32, y: u32) -> Vec<(u32, u32, u8)> {
     let mut found = Vec::new();
     match x + y {
@@ -118,7 +118,7 @@ fn covered(x: u32, y: u32) -> Vec<(u32, u32, u8)> {
     found
 }
 
-/// Renders nothing and knows everything.
+/// Computes its records instead of rendering.
 struct Analytic {
     capacity: u64,
     /// Hands the last quad over first.
@@ -237,7 +237,7 @@ fn a_capturer_without_a_driver_writes_a_valid_trace_of_the_records_that_it_compu
                 let y = index / 4 * 8 + u32::from(record.y);
                 let found = expected.remove(&(x, y, run.primitive));
                 assert_eq!(found, Some((run.draw, record.mask)), "quad ({x}, {y})");
-                // Half a texel to the pixel's centre.
+                // Half a texel, to the pixel's centre.
                 let texels = [x, y].map(|q| (2 * q as i32) * SUBTEXELS + SUBTEXELS / 2);
                 assert_eq!(record.uv, texels);
                 assert_eq!((record.dx, record.dy), ([SUBTEXELS, 0], [0, SUBTEXELS]));
@@ -264,7 +264,7 @@ fn fragments_whose_coordinates_are_no_numbers_are_not_counted() {
         (counts, trace.records())
     };
     let (all, _) = counts(None);
-    // Primitive 0 alone: its quads and lanes.
+    // Only primitive 0: its quads and lanes.
     let of_first = (0..48).flat_map(|y| (0..32).flat_map(move |x| covered(x, y)));
     let of_first: Vec<u8> = (of_first.filter(|(primitive, ..)| *primitive == 0))
         .map(|(.., mask)| mask)

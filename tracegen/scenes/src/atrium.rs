@@ -1,13 +1,17 @@
-//! A two-storey colonnaded courtyard: stands for the Sponza scenes.
+//! A two-storey colonnaded courtyard: a stand-in for the Sponza scenes.
 //!
 //! Everything sits on a lattice of 3.5 m bays: an open court of 8 x 2 bays, ringed by an arcade
 //! one bay deep with a gallery on top.
 
-use super::atrium_materials::{self as materials, Palette};
-use super::atrium_parts::{Bay, Column, baluster, cornice, groin_vault, moulding, rib};
+mod furnishing;
+mod materials;
+pub(crate) mod parts;
+
 use super::mesh_builder::MeshBuilder;
 use super::scene_builder::{MaterialId, SceneBuilder};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
+use materials::Palette;
+use parts::{Bay, Column, baluster, cornice, groin_vault, moulding, rib};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -99,7 +103,7 @@ const PLAIN: Detail = Detail {
 #[must_use]
 pub fn rich() -> Scene {
     let mut scene = SceneBuilder::new("atrium");
-    let palette = materials::rich(&mut scene, materials::rich_textures());
+    let palette = materials::rich(&mut scene);
     build(&mut scene, &palette, &RICH);
     scene.finish(vec3(0.62, 0.74, 0.92), 0)
 }
@@ -185,7 +189,7 @@ fn build(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
     arcade_ceilings(scene, p, d);
     mouldings_and_roof(scene, p, d);
     if d.furnished {
-        super::atrium_furnishing::furnish(scene, p);
+        furnishing::furnish(scene, p);
     }
     scene.camera(
         "default",
@@ -380,7 +384,13 @@ fn colonnades(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
 }
 
 fn arcade_ceilings(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
-    let bevel = f32::from(u8::from(d.chamfer));
+    vaults(scene, p, d);
+    ribs_and_pilasters(scene, p, d);
+    joists(scene, p, d);
+    doors(scene, p, d);
+}
+
+fn vaults(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
     let mut vaults = Vec::new();
     for i in -5..5 {
         for j in -2..2 {
@@ -398,8 +408,12 @@ fn arcade_ceilings(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
         p.vault,
         &vaults,
     );
+}
 
-    // Ribs from each column to the wall, on pilasters.
+/// Ribs from each column to the wall, on pilasters.
+fn ribs_and_pilasters(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
+    let bevel = f32::from(u8::from(d.chamfer));
+    let half = 0.5 * BAY;
     let mut ribs = Vec::new();
     let mut pilasters = Vec::new();
     for side in [-1.0, 1.0] {
@@ -438,8 +452,12 @@ fn arcade_ceilings(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
         0.03 * bevel,
     );
     place_all(scene, "pilaster", pilaster, p.rib, &pilasters);
+}
 
-    // Joists under the gallery's ceiling, every 0.7 m along the long sides.
+/// Joists under the gallery's ceiling, every 0.7 m along the long sides.
+fn joists(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
+    let bevel = f32::from(u8::from(d.chamfer));
+    let half = 0.5 * BAY;
     let mut joist = MeshBuilder::new();
     joist.block(
         vec3(-0.09, EAVES - 0.32, -half),
@@ -453,8 +471,11 @@ fn arcade_ceilings(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
         }))
         .collect();
     place_all(scene, "joist", joist, p.beam, &joists);
+}
 
-    // Doors in the outer wall, every other bay.
+/// Doors in the outer wall, every other bay.
+fn doors(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
+    let bevel = f32::from(u8::from(d.chamfer));
     let mut door = MeshBuilder::new();
     door.block(
         vec3(-0.75, 0.0, -0.05),

@@ -1,16 +1,19 @@
 //! A sports car in a studio: paint, glass, chrome, rubber. 55 K triangles.
 
-use super::car_body::{self, AXLES, TYRE};
+mod body;
+mod details;
+
 use super::masonry::carved_stone;
 use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
 use super::organic::damask;
 use super::scene_builder::{MaterialId, SceneBuilder};
 use super::texture_synth::{Maps, Recipe, rgb};
+use body::{AXLES, TYRE};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-pub(super) struct Kit {
+pub(super) struct CarMaterials {
     pub(super) paint: MaterialId,
     pub(super) glass: MaterialId,
     pub(super) trim: MaterialId,
@@ -24,14 +27,8 @@ pub(super) struct Kit {
     pub(super) floor: MaterialId,
 }
 
-fn kit(scene: &mut SceneBuilder) -> Kit {
-    let recipe = |name, size, maps, tile_m, surface| Recipe {
-        name,
-        size,
-        maps,
-        tile_m,
-        surface,
-    };
+fn kit(scene: &mut SceneBuilder) -> CarMaterials {
+    let recipe = Recipe::new;
     let mut sets = [
         recipe(
             "studio-floor",
@@ -60,7 +57,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
         Some(set) => scene.textured(set, |m| m.roughness = 0.6),
         None => floor,
     };
-    Kit {
+    CarMaterials {
         paint: scene.plain("paint", rgb(0xb3141c), 0.08, |m| {
             m.mirror = 0.12;
             m.double_sided = true;
@@ -105,8 +102,8 @@ pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("car");
     let kit = kit(&mut scene);
     skin(&mut scene, &kit);
-    super::car_details::wheels(&mut scene, &kit);
-    super::car_details::details(&mut scene, &kit);
+    details::wheels(&mut scene, &kit);
+    details::details(&mut scene, &kit);
     interior(&mut scene, &kit);
     studio(&mut scene, &kit);
     scene.camera(
@@ -135,11 +132,11 @@ pub fn scene() -> Scene {
     scene.finish(vec3(0.30, 0.34, 0.40), 0)
 }
 
-fn skin(scene: &mut SceneBuilder, kit: &Kit) {
-    scene.add("body", car_body::body_mesh(92, 40), kit.paint);
-    scene.add("intake", car_body::end_cap(32, true), kit.trim);
-    scene.add("rear-panel", car_body::end_cap(32, false), kit.paint);
-    let [paint, glass, trim] = car_body::cabin_meshes(60, 52);
+fn skin(scene: &mut SceneBuilder, kit: &CarMaterials) {
+    scene.add("body", body::body_mesh(92, 40), kit.paint);
+    scene.add("intake", body::end_cap(32, true), kit.trim);
+    scene.add("rear-panel", body::end_cap(32, false), kit.paint);
+    let [paint, glass, trim] = body::cabin_meshes(60, 52);
     scene.add("roof", paint, kit.paint);
     scene.add("windows", glass, kit.glass);
     scene.add("window-trim", trim, kit.trim);
@@ -179,7 +176,7 @@ fn skin(scene: &mut SceneBuilder, kit: &Kit) {
     scene.add("floor-pan", pan, kit.trim);
 }
 
-fn interior(scene: &mut SceneBuilder, kit: &Kit) {
+fn interior(scene: &mut SceneBuilder, kit: &CarMaterials) {
     let mut seats = MeshBuilder::new();
     for side in [-1.0f32, 1.0] {
         let at = vec3(-0.38, 0.34, side * 0.34);
@@ -248,7 +245,7 @@ fn interior(scene: &mut SceneBuilder, kit: &Kit) {
     scene.add("dashboard", dash, kit.trim);
 }
 
-fn studio(scene: &mut SceneBuilder, kit: &Kit) {
+fn studio(scene: &mut SceneBuilder, kit: &CarMaterials) {
     // A round floor that runs up into the backdrop in one curve; uv unrolls from the middle.
     let mut floor = MeshBuilder::new();
     let profile = [

@@ -1,7 +1,7 @@
 //! A full chess set on a reflective board, a few moves into the Italian game: 42 K triangles.
 
 use super::masonry::carved_stone;
-use super::mesh_builder::{Knot, MeshBuilder, curve, sharp, smooth};
+use super::mesh_builder::{Knot, MeshBuilder, curve, lathed, sharp, smooth};
 use super::noise::smoothstep;
 use super::organic::polished_wood;
 use super::scene_builder::{MaterialId, SceneBuilder};
@@ -40,9 +40,7 @@ fn collar(r: f32, y: f32) -> [Knot; 4] {
 fn turned(radius: f32, upper: &[Knot]) -> MeshBuilder {
     let mut knots = foot(radius);
     knots.extend_from_slice(upper);
-    let mut m = MeshBuilder::new();
-    m.lathe(&curve(&knots, 2), SEGMENTS);
-    m
+    lathed(&curve(&knots, 2), SEGMENTS)
 }
 
 fn pawn() -> MeshBuilder {
@@ -238,8 +236,7 @@ fn knight() -> MeshBuilder {
     head.orient(|p| vec3(0.0, 0.0, p.z.signum()));
     m.merge(&head, Affine3A::IDENTITY);
     for side in [-1.0f32, 1.0] {
-        let mut ear = MeshBuilder::new();
-        ear.lathe(
+        let ear = lathed(
             &curve(
                 &[
                     sharp(0.0026, 0.0),
@@ -255,8 +252,7 @@ fn knight() -> MeshBuilder {
             &ear,
             Affine3A::from_rotation_translation(tilt, vec3(0.0005, 0.0655, side * 0.0035)),
         );
-        let mut eye = MeshBuilder::new();
-        eye.lathe(
+        let eye = lathed(
             &curve(
                 &[
                     smooth(0.0, -0.0016),
@@ -275,7 +271,8 @@ fn knight() -> MeshBuilder {
     m
 }
 
-fn board(scene: &mut SceneBuilder, light: MaterialId, dark: MaterialId, wood: MaterialId) {
+/// Squares, their frame and the table below.
+fn board(scene: &mut SceneBuilder, kit: &ChessMaterials) {
     let mut fields = [MeshBuilder::new(), MeshBuilder::new()];
     for rank in 0..8 {
         for file in 0..8 {
@@ -289,8 +286,8 @@ fn board(scene: &mut SceneBuilder, light: MaterialId, dark: MaterialId, wood: Ma
         }
     }
     let [a, b] = fields;
-    scene.add("light-squares", a, light);
-    scene.add("dark-squares", b, dark);
+    scene.add("light-squares", a, kit.light);
+    scene.add("dark-squares", b, kit.dark);
     let mut frame = MeshBuilder::new();
     let (inner, outer) = (4.0 * SQUARE, 4.0 * SQUARE + 0.042);
     for turn in 0..4 {
@@ -303,20 +300,29 @@ fn board(scene: &mut SceneBuilder, light: MaterialId, dark: MaterialId, wood: Ma
         let rotation = Quat::from_rotation_y(turn as f32 * FRAC_PI_2);
         frame.merge(&side, Affine3A::from_quat(rotation));
     }
-    scene.add("board-frame", frame, wood);
+    scene.add("board-frame", frame, kit.walnut);
+    let mut table = MeshBuilder::new();
+    table.panel(
+        vec3(-1.2, -0.022, 1.2),
+        Vec3::X * 2.4,
+        Vec3::NEG_Z * 2.4,
+        8,
+        8,
+    );
+    scene.add("table", table, kit.oak);
 }
 
-/// The scene.
-#[must_use]
-pub fn scene() -> Scene {
-    let mut scene = SceneBuilder::new("chess");
-    let recipe = |name, tile_m, surface| Recipe {
-        name,
-        size: 512,
-        maps: Maps::Color,
-        tile_m,
-        surface,
-    };
+struct ChessMaterials {
+    light: MaterialId,
+    dark: MaterialId,
+    walnut: MaterialId,
+    oak: MaterialId,
+    ivory: MaterialId,
+    ebony: MaterialId,
+}
+
+fn kit(scene: &mut SceneBuilder) -> ChessMaterials {
+    let recipe = |name, tile_m, surface| Recipe::new(name, 512, Maps::Color, tile_m, surface);
     let mut sets = [
         recipe(
             "light-marble",
@@ -347,23 +353,44 @@ pub fn scene() -> Scene {
         }),
         None => scene.plain("missing", rgb(0xff_00ff), roughness, |_| {}),
     };
-    let light = textured(&mut scene, 0.22, 0.1);
-    let dark = textured(&mut scene, 0.22, 0.1);
-    let walnut = textured(&mut scene, 0.06, 0.3);
-    let oak = textured(&mut scene, 0.02, 0.45);
-    let ivory = scene.plain("ivory", rgb(0xe2d0a8), 0.18, |m| m.mirror = 0.04);
-    let ebony = scene.plain("ebony", rgb(0x241a16), 0.12, |m| m.mirror = 0.14);
-    board(&mut scene, light, dark, walnut);
-    let mut table = MeshBuilder::new();
-    table.panel(
-        vec3(-1.2, -0.022, 1.2),
-        Vec3::X * 2.4,
-        Vec3::NEG_Z * 2.4,
-        8,
-        8,
-    );
-    scene.add("table", table, oak);
+    ChessMaterials {
+        light: textured(scene, 0.22, 0.1),
+        dark: textured(scene, 0.22, 0.1),
+        walnut: textured(scene, 0.06, 0.3),
+        oak: textured(scene, 0.02, 0.45),
+        ivory: scene.plain("ivory", rgb(0xe2d0a8), 0.18, |m| m.mirror = 0.04),
+        ebony: scene.plain("ebony", rgb(0x241a16), 0.12, |m| m.mirror = 0.14),
+    }
+}
 
+/// The scene.
+#[must_use]
+pub fn scene() -> Scene {
+    let mut scene = SceneBuilder::new("chess");
+    let kit = kit(&mut scene);
+    board(&mut scene, &kit);
+    pieces(&mut scene, &kit);
+    scene.camera(
+        "default",
+        vec3(0.05, 0.20, 0.30),
+        vec3(0.0, 0.0, 0.03),
+        0.01,
+        20.0,
+    );
+    scene.camera(
+        "low",
+        vec3(0.20, 0.10, 0.26),
+        vec3(-0.05, 0.03, 0.0),
+        0.01,
+        20.0,
+    );
+    scene.sun(vec3(-0.5, -0.8, -0.35), vec3(1.3, 1.2, 1.05));
+    scene.lamp(vec3(0.5, 0.7, 0.3), vec3(0.36, 0.32, 0.26));
+    scene.finish(vec3(0.28, 0.32, 0.38), 0)
+}
+
+/// The position after 1. e4 e5 2. Nf3 Nc6 3. Bc4 Bc5 4. c3 Nf6 5. d3 d6.
+fn pieces(scene: &mut SceneBuilder, kit: &ChessMaterials) {
     let back = [
         "rook", "knight", "bishop", "queen", "king", "bishop", "knight", "rook",
     ];
@@ -374,7 +401,7 @@ pub fn scene() -> Scene {
             (3.5 - rank as f32) * SQUARE,
         )
     };
-    for (color, material) in [ivory, ebony].into_iter().enumerate() {
+    for (color, material) in [kit.ivory, kit.ebony].into_iter().enumerate() {
         let (home, forward) = if color == 0 {
             (0, FRAC_PI_2)
         } else {
@@ -394,7 +421,6 @@ pub fn scene() -> Scene {
             .collect();
         let mesh = |name: &str| kinds.iter().find(|(n, _)| *n == name).map_or(0, |k| k.1);
         for (file, name) in back.into_iter().enumerate() {
-            // 1. e4 e5 2. Nf3 Nc6 3. Bc4 Bc5 4. c3 Nf6 5. d3 d6
             let (f, r) = match (color, name, file) {
                 (0, "knight", 6) => (5, 2),
                 (1, "knight", 1) => (2, 5),
@@ -420,21 +446,4 @@ pub fn scene() -> Scene {
             scene.place(mesh("pawn"), Affine3A::from_translation(square(file, rank)));
         }
     }
-    scene.camera(
-        "default",
-        vec3(0.05, 0.20, 0.30),
-        vec3(0.0, 0.0, 0.03),
-        0.01,
-        20.0,
-    );
-    scene.camera(
-        "low",
-        vec3(0.20, 0.10, 0.26),
-        vec3(-0.05, 0.03, 0.0),
-        0.01,
-        20.0,
-    );
-    scene.sun(vec3(-0.5, -0.8, -0.35), vec3(1.3, 1.2, 1.05));
-    scene.lamp(vec3(0.5, 0.7, 0.3), vec3(0.36, 0.32, 0.26));
-    scene.finish(vec3(0.28, 0.32, 0.38), 0)
 }

@@ -1,6 +1,6 @@
 //! Clockwork: spur gears whose teeth mesh, worms, screws.
 
-use super::mesh_builder::{MeshBuilder, sharp, smooth};
+use super::mesh_builder::{MeshBuilder, lathed, sharp, smooth};
 use glam::{Affine3A, Quat, Vec2, Vec3, vec2, vec3};
 use std::f32::consts::{PI, TAU};
 
@@ -115,8 +115,7 @@ impl Gear {
         }
         ring_wall(&mut m, rim, half, 72, false);
         let hub = (self.bore * 2.2).min(rim * 0.5);
-        let mut boss = MeshBuilder::new();
-        boss.lathe(
+        let boss = lathed(
             &[
                 sharp(self.bore, -0.75 * self.thickness),
                 sharp(hub * 0.92, -0.75 * self.thickness),
@@ -172,8 +171,7 @@ fn wall(m: &mut MeshBuilder, a: Vec2, b: Vec2, low: f32, high: f32, normal: Vec2
 
 /// A cylinder's wall about z, facing the axis.
 fn ring_wall(m: &mut MeshBuilder, radius: f32, half: f32, segments: usize, outwards: bool) {
-    let mut ring = MeshBuilder::new();
-    ring.lathe(&[sharp(radius, -half), sharp(radius, half)], segments);
+    let mut ring = lathed(&[sharp(radius, -half), sharp(radius, half)], segments);
     if !outwards {
         ring.flip();
     }

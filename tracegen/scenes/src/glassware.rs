@@ -1,6 +1,6 @@
 //! Laboratory glass, each piece a closed shell: outer skin, rim, inner skin.
 
-use super::mesh_builder::{Frame, Knot, MeshBuilder, curve, sharp, smooth};
+use super::mesh_builder::{Knot, MeshBuilder, SweepFrame, curve, sharp, smooth};
 use glam::{Vec2, Vec3, vec2, vec3};
 use std::f32::consts::TAU;
 
@@ -186,7 +186,7 @@ pub fn glass_tube(points: &[(Vec3, f32)], bore: f32, sides: usize) -> MeshBuilde
     inside.tube(&inner, sides);
     inside.flip();
     m.merge(&inside, glam::Affine3A::IDENTITY);
-    let frames = Frame::along(points);
+    let frames = SweepFrame::along(points);
     for (end, frame) in [(0, frames.first()), (1, frames.last())] {
         let Some(f) = frame else { continue };
         let travel = f.right.cross(f.up);

@@ -1,10 +1,11 @@
-//! A jungle clearing with a temple ruin: stands for GFXBench's T-Rex.
+//! A jungle clearing with a temple ruin: a stand-in for GFXBench's T-Rex.
 //!
 //! A winding path leads to the ruin; foliage with alpha masks is instanced from few meshes.
 
+pub(crate) mod plants;
+mod temple;
+
 use super::creature::{self, Creature};
-use super::jungle_plants as plants;
-use super::jungle_temple;
 use super::masonry::{carved_band, carved_stone, dressed_stone};
 use super::mesh_builder::MeshBuilder;
 use super::noise::{Rng, bank, smoothstep};
@@ -66,30 +67,24 @@ struct Solids {
     eye: MaterialId,
 }
 
-fn textures() -> Vec<Recipe> {
-    use LeafShape::{Blade, Frond, Grass, Ivy, Palm, Spray};
-    let color = |name, size, surface: Surface| Recipe {
-        name,
-        size,
-        maps: Maps::Color,
-        tile_m: 1.0,
-        surface,
-    };
-    let normal = |name, tile_m, surface: Surface| Recipe {
-        name,
-        size: 1024,
-        maps: Maps::ColorNormal,
-        tile_m,
-        surface,
-    };
-    let full = |name, tile_m, surface: Surface| Recipe {
-        name,
-        size: 1024,
+fn color(name: &'static str, size: u32, surface: Surface) -> Recipe {
+    Recipe::new(name, size, Maps::Color, 1.0, surface)
+}
+
+fn normal(name: &'static str, tile_m: f32, surface: Surface) -> Recipe {
+    Recipe::new(name, 1024, Maps::ColorNormal, tile_m, surface)
+}
+
+fn full(name: &'static str, tile_m: f32, surface: Surface) -> Recipe {
+    Recipe {
         maps: Maps::Full,
-        tile_m,
-        surface,
-    };
-    let moss_stone = [rgb(0x8d8a72), rgb(0x6b6d55)];
+        ..normal(name, tile_m, surface)
+    }
+}
+
+/// Texture sets of [`Leaves`], in the order of its fields.
+fn leaf_textures() -> Vec<Recipe> {
+    use LeafShape::{Blade, Frond, Grass, Ivy, Palm, Spray};
     vec![
         color(
             "fern-bright",
@@ -149,6 +144,13 @@ fn textures() -> Vec<Recipe> {
             leaf(Spray, [rgb(0x2a5220), rgb(0x5c8a36)]),
         ),
         color("ivy", 512, leaf(Ivy, [rgb(0x2a5223), rgb(0x5f8f3f)])),
+    ]
+}
+
+/// Texture sets of [`Solids`], in the order of its fields.
+fn solid_textures() -> Vec<Recipe> {
+    let moss_stone = [rgb(0x8d8a72), rgb(0x6b6d55)];
+    vec![
         full(
             "forest-floor",
             3.0,
@@ -186,7 +188,7 @@ fn textures() -> Vec<Recipe> {
 }
 
 fn materials(scene: &mut SceneBuilder) -> (Leaves, Solids) {
-    let mut sets = textures().into_iter();
+    let mut sets = leaf_textures().into_iter().chain(solid_textures());
     let mut next = |foliage: bool| match sets.next() {
         Some(set) => scene.textured(set, |m| {
             if foliage {
@@ -238,10 +240,10 @@ pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("jungle");
     let (leaves, solids) = materials(&mut scene);
     terrain(&mut scene, &solids);
-    jungle_temple::build(
+    temple::build(
         &mut scene,
         TEMPLE,
-        &jungle_temple::Stones {
+        &temple::Stones {
             blocks: solids.masonry,
             frieze: solids.carved,
             steps: solids.steps,
@@ -315,7 +317,7 @@ fn terrain(scene: &mut SceneBuilder, solids: &Solids) {
     scene.add("path", path, solids.path);
 }
 
-/// Whether a plant that keeps `clear` metres off the path would stand in the creature or before it.
+/// Whether a plant that keeps `clear` metres from the path would be inside the creature or in front of it.
 fn hides_creature(x: f32, z: f32, clear: f32) -> bool {
     let eye = vec2(-8.5, path_z(-8.5));
     let (to, at) = (vec2(CREATURE.x, CREATURE.z) - eye, vec2(x, z) - eye);
@@ -334,7 +336,7 @@ fn spot(rng: &mut Rng, clear: f32, reach: f32, temple: f32) -> Vec3 {
     loop {
         let x = rng.range(-28.0, 28.0);
         let side = if rng.bits() & 1 == 0 { 1.0 } else { -1.0 };
-        // Denser beside the path, where it is seen.
+        // Denser along the path, where it is visible.
         let z = path_z(x) + side * (clear + (reach - clear) * rng.unit().powf(1.6));
         if z.abs() < HALF - 2.0
             && !hides_creature(x, z, clear)

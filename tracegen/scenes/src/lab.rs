@@ -1,10 +1,12 @@
 //! A chemistry bench: flasks, tubes, a retort and a condenser in glass. 98 K triangles.
 
+mod still;
+
 use super::glassware::{
     beaker, bottle, erlenmeyer, filling, glass_tube, shell, stopper, test_tube,
 };
 use super::masonry::octagon_tiles;
-use super::mesh_builder::{Knot, MeshBuilder, curve, sharp, smooth};
+use super::mesh_builder::{Knot, MeshBuilder, curve, lathed, sharp, smooth};
 use super::noise::smoothstep;
 use super::organic::{paper_label, polished_wood};
 use super::scene_builder::{MaterialId, SceneBuilder};
@@ -13,7 +15,7 @@ use glam::{Affine3A, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-pub(super) struct Kit {
+pub(super) struct LabMaterials {
     pub(super) glass: MaterialId,
     pub(super) amber: MaterialId,
     pub(super) liquids: [MaterialId; 5],
@@ -27,14 +29,9 @@ pub(super) struct Kit {
     pub(super) flame: MaterialId,
 }
 
-fn kit(scene: &mut SceneBuilder) -> Kit {
-    let recipe = |name, size, tile_m, surface| Recipe {
-        name,
-        size,
-        maps: Maps::Color,
-        tile_m,
-        surface,
-    };
+fn kit(scene: &mut SceneBuilder) -> LabMaterials {
+    let recipe =
+        |name, size, tile_m, surface| Recipe::new(name, size, Maps::Color, tile_m, surface);
     let mut sets = [
         recipe(
             "rack-beech",
@@ -88,7 +85,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
             m.mirror = mirror;
         })
     };
-    Kit {
+    LabMaterials {
         glass: glass(scene, "borosilicate", 0xf6fbfa),
         amber: glass(scene, "amber-glass", 0xb5641a),
         liquids: [
@@ -130,6 +127,17 @@ pub(super) struct Ware<'a> {
     pub(super) lip: f32,
 }
 
+impl<'a> Ware<'a> {
+    pub(super) fn new(outer: &'a [Knot], wall: f32, segments: usize, lip: f32) -> Self {
+        Self {
+            outer,
+            wall,
+            segments,
+            lip,
+        }
+    }
+}
+
 /// A turned vessel and what is in it (liquid and its level), placed together.
 pub(super) fn vessel(
     scene: &mut SceneBuilder,
@@ -156,8 +164,7 @@ pub(super) fn vessel(
         scene.place(mesh, *place);
     }
     if let Some((liquid, level)) = fill {
-        let mut inside = MeshBuilder::new();
-        inside.lathe(&filling(outer, wall, 0.0004, level), segments);
+        let inside = lathed(&filling(outer, wall, 0.0004, level), segments);
         let mesh = scene.mesh("liquid", inside, liquid);
         for place in places {
             scene.place(mesh, *place);
@@ -173,7 +180,7 @@ pub fn scene() -> Scene {
     furniture(&mut scene, &kit);
     flasks(&mut scene, &kit);
     rack(&mut scene, &kit);
-    super::lab_still::distillation(&mut scene, &kit);
+    still::distillation(&mut scene, &kit);
     shelf(&mut scene, &kit);
     scene.camera(
         "default",
@@ -194,7 +201,7 @@ pub fn scene() -> Scene {
     scene.finish(vec3(0.32, 0.36, 0.40), 0)
 }
 
-fn furniture(scene: &mut SceneBuilder, kit: &Kit) {
+fn furniture(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let mut bench = MeshBuilder::new();
     bench.block(vec3(-1.1, -0.04, -0.32), vec3(1.1, 0.0, 0.55), 0.006);
     scene.add("bench", bench, kit.bench);
@@ -203,17 +210,13 @@ fn furniture(scene: &mut SceneBuilder, kit: &Kit) {
     scene.add("wall", wall, kit.tiles);
 }
 
-fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
+/// Conical flasks and beakers with what they hold; a rod, a dish and a funnel.
+fn flasks(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let flask = erlenmeyer(0.145, 3);
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &flask,
-            wall: 0.0018,
-            segments: 47,
-            lip: 0.0,
-        },
+        &Ware::new(&flask, 0.0018, 47, 0.0),
         Some((kit.liquids[0], 0.055)),
         &[at(-0.10, 0.0, 0.16)],
     );
@@ -221,12 +224,7 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &small,
-            wall: 0.0016,
-            segments: 40,
-            lip: 0.0,
-        },
+        &Ware::new(&small, 0.0016, 40, 0.0),
         Some((kit.liquids[4], 0.036)),
         &[at(0.20, 0.0, 0.185)],
     );
@@ -234,12 +232,7 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &large,
-            wall: 0.0017,
-            segments: 47,
-            lip: 0.14,
-        },
+        &Ware::new(&large, 0.0017, 47, 0.14),
         Some((kit.liquids[1], 0.062)),
         &[at(0.075, 0.0, 0.155)],
     );
@@ -247,26 +240,40 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &cup,
-            wall: 0.0014,
-            segments: 40,
-            lip: 0.14,
-        },
+        &Ware::new(&cup, 0.0014, 40, 0.14),
         Some((kit.liquids[2], 0.03)),
         &[at(-0.24, 0.0, 0.19)],
     );
-    // A graduated cylinder and its foot.
+    graduated_cylinder(scene, kit);
+    // A stirring rod in the beaker and a petri dish before it.
+    let rod = glass_tube(
+        &[
+            (vec3(0.052, 0.006, 0.15), 0.003),
+            (vec3(0.085, 0.08, 0.155), 0.003),
+            (vec3(0.118, 0.155, 0.16), 0.003),
+        ],
+        0.4,
+        16,
+    );
+    scene.add("rod", rod, kit.glass);
+    let dish = beaker(0.038, 0.012, 3);
+    vessel(
+        scene,
+        kit.glass,
+        &Ware::new(&dish, 0.0014, 40, 0.0),
+        Some((kit.liquids[3], 0.005)),
+        &[at(0.0, 0.0, 0.245)],
+    );
+    funnel(scene, kit);
+}
+
+/// The cylinder, its foot and its marks.
+fn graduated_cylinder(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let cylinder = beaker(0.0155, 0.19, 3);
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &cylinder,
-            wall: 0.0013,
-            segments: 34,
-            lip: 0.18,
-        },
+        &Ware::new(&cylinder, 0.0013, 34, 0.18),
         Some((kit.liquids[3], 0.11)),
         &[at(-0.185, 0.006, 0.065)],
     );
@@ -302,30 +309,9 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     marks.orient(|p| vec3(p.x, 0.0, p.z));
     let marks = scene.mesh("graduation", marks, kit.rubber);
     scene.place(marks, at(-0.185, 0.006, 0.065));
-    // A stirring rod in the beaker and a petri dish before it.
-    let rod = glass_tube(
-        &[
-            (vec3(0.052, 0.006, 0.15), 0.003),
-            (vec3(0.085, 0.08, 0.155), 0.003),
-            (vec3(0.118, 0.155, 0.16), 0.003),
-        ],
-        0.4,
-        16,
-    );
-    scene.add("rod", rod, kit.glass);
-    let dish = beaker(0.038, 0.012, 3);
-    vessel(
-        scene,
-        kit.glass,
-        &Ware {
-            outer: &dish,
-            wall: 0.0014,
-            segments: 40,
-            lip: 0.0,
-        },
-        Some((kit.liquids[3], 0.005)),
-        &[at(0.0, 0.0, 0.245)],
-    );
+}
+
+fn funnel(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let mut funnel = MeshBuilder::new();
     let cone = curve(
         &[
@@ -348,7 +334,7 @@ fn flasks(scene: &mut SceneBuilder, kit: &Kit) {
     scene.place(funnel, at(-0.10, 0.105, 0.16));
 }
 
-fn rack(scene: &mut SceneBuilder, kit: &Kit) {
+fn rack(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let (x0, z) = (0.235, 0.045);
     let mut rack = MeshBuilder::new();
     rack.block(
@@ -384,12 +370,7 @@ fn rack(scene: &mut SceneBuilder, kit: &Kit) {
         vessel(
             scene,
             kit.glass,
-            &Ware {
-                outer: &tube,
-                wall: 0.0010,
-                segments: 17,
-                lip: 0.0,
-            },
+            &Ware::new(&tube, 0.0010, 17, 0.0),
             Some((kit.liquids[(i * 2 + 1) % 5], level)),
             &[place],
         );
@@ -411,14 +392,13 @@ fn plate_with_hole(m: &mut MeshBuilder, center: Vec3, half: glam::Vec2, hole: f3
             let p = (vec2(cos, sin) * hole).lerp(square(a), t);
             (center + vec3(p.x, y, p.y), p)
         });
-        // The face is flat, whatever its outline's corners do to derivatives.
+        // The face is flat, so its normals do not depend on derivatives at the corners of its outline.
         let normal = if up { Vec3::Y } else { Vec3::NEG_Y };
         face.orient(|_| normal);
         face.normals.fill(normal);
         m.merge(&face, Affine3A::IDENTITY);
     }
-    let mut bore = MeshBuilder::new();
-    bore.lathe(&[sharp(hole, 0.0), sharp(hole, thick)], 32);
+    let mut bore = lathed(&[sharp(hole, 0.0), sharp(hole, thick)], 32);
     bore.flip();
     m.merge(&bore, Affine3A::from_translation(center));
     for side in [-1.0f32, 1.0] {
@@ -432,7 +412,7 @@ fn plate_with_hole(m: &mut MeshBuilder, center: Vec3, half: glam::Vec2, hole: f3
     }
 }
 
-fn shelf(scene: &mut SceneBuilder, kit: &Kit) {
+fn shelf(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let mut board = MeshBuilder::new();
     board.block(vec3(-0.62, 0.262, -0.32), vec3(0.62, 0.282, -0.16), 0.003);
     for x in [-0.5, 0.0, 0.5] {
@@ -452,41 +432,25 @@ fn shelf(scene: &mut SceneBuilder, kit: &Kit) {
     vessel(
         scene,
         kit.amber,
-        &Ware {
-            outer: &outer,
-            wall: 0.002,
-            segments: 22,
-            lip: 0.0,
-        },
+        &Ware::new(&outer, 0.002, 22, 0.0),
         Some((kit.liquids[1], 0.05)),
         &amber,
     );
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &outer,
-            wall: 0.002,
-            segments: 22,
-            lip: 0.0,
-        },
+        &Ware::new(&outer, 0.002, 22, 0.0),
         Some((kit.liquids[0], 0.062)),
         &clear,
     );
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &outer,
-            wall: 0.002,
-            segments: 22,
-            lip: 0.0,
-        },
+        &Ware::new(&outer, 0.002, 22, 0.0),
         Some((kit.liquids[4], 0.045)),
         &low,
     );
-    let mut plug = MeshBuilder::new();
-    plug.lathe(&stopper(0.0145), 12);
+    let plug = lathed(&stopper(0.0145), 12);
     let plug = scene.mesh("glass-stopper", plug, kit.glass);
     let mut label = MeshBuilder::new();
     label.surface(12, 1, |s, t| {

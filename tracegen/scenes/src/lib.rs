@@ -1,35 +1,23 @@
 //! Built-in scenes that need no file, and scenes by name or path.
 
-pub mod atrium;
-pub mod atrium_furnishing;
-pub mod atrium_materials;
-pub mod atrium_parts;
-pub mod car;
-pub mod car_body;
-pub mod car_details;
-pub mod chess;
-pub mod creature;
-pub mod gears;
-pub mod glassware;
-pub mod jungle;
-pub mod jungle_plants;
-pub mod jungle_temple;
-pub mod lab;
-pub mod lab_still;
-pub mod masonry;
-pub mod meadow;
-pub mod meadow_house;
-pub mod meadow_parts;
-pub mod mesh_builder;
-pub mod music_box;
-pub mod music_train;
-pub mod noise;
-pub mod organic;
-pub mod plant;
-pub mod scene_builder;
-pub mod teapot;
-pub mod teapot_patches;
-pub mod texture_synth;
+mod atrium;
+mod car;
+mod chess;
+mod creature;
+mod gears;
+mod glassware;
+mod jungle;
+mod lab;
+mod masonry;
+mod meadow;
+mod mesh_builder;
+mod music_box;
+mod noise;
+mod organic;
+mod plant;
+mod scene_builder;
+mod teapot;
+mod texture_synth;
 
 use scene::{LoadOptions, Loaded, Scene, SceneError};
 use std::ops::RangeInclusive;
@@ -41,13 +29,13 @@ use std::path::Path;
 pub struct Builtin {
     /// Name on the command line.
     pub name: &'static str,
-    /// What is seen, and what it stands for.
+    /// What it shows, and which scene it is a stand-in for.
     pub description: &'static str,
     /// Triangles with instances counted.
     pub triangles: u64,
     /// Its cameras; the first is the default.
     pub cameras: &'static [&'static str],
-    /// Numbers of instances that can be asked for with `name:NUMBER`.
+    /// Allowed numbers of instances in `name:NUMBER`.
     pub instances: Option<RangeInclusive<u32>>,
     builder: Builder,
 }

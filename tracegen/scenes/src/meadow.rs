@@ -1,8 +1,10 @@
 //! Lavender rows before a farm house, after Provence: 600 K triangles.
 
-use super::jungle_plants::{boughs, buttressed_trunk};
+mod house;
+mod parts;
+
+use super::jungle::plants::{boughs, buttressed_trunk};
 use super::masonry::{dressed_stone, plaster, roof_tiles};
-use super::meadow_parts as parts;
 use super::mesh_builder::MeshBuilder;
 use super::noise::{Rng, bank, smoothstep};
 use super::organic::{bark, planks, rock, soil, turf, upright};
@@ -28,7 +30,7 @@ pub(super) fn ground(x: f32, z: f32) -> f32 {
     yard * (1.6 * swell + hills * (0.6 + 1.4 * swell.abs())) + 0.012 * -z.min(0.0) * yard
 }
 
-pub(super) struct Kit {
+pub(super) struct MeadowMaterials {
     pub(super) field: MaterialId,
     pub(super) grass_ground: MaterialId,
     pub(super) walls: MaterialId,
@@ -49,14 +51,8 @@ pub(super) struct Kit {
     pub(super) pane: MaterialId,
 }
 
-fn kit(scene: &mut SceneBuilder) -> Kit {
-    let recipe = |name, tile_m, surface| Recipe {
-        name,
-        size: 1024,
-        maps: Maps::Color,
-        tile_m,
-        surface,
-    };
+fn kit(scene: &mut SceneBuilder) -> MeadowMaterials {
+    let recipe = |name, tile_m, surface| Recipe::new(name, 1024, Maps::Color, tile_m, surface);
     let mut sets = [
         recipe(
             "lavender-field",
@@ -117,7 +113,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
     let leafy = |scene: &mut SceneBuilder, name: &str, color: u32| {
         scene.plain(name, rgb(color), 0.7, |m| m.double_sided = true)
     };
-    Kit {
+    MeadowMaterials {
         field,
         grass_ground,
         walls,
@@ -157,7 +153,7 @@ pub fn scene() -> Scene {
     let kit = kit(&mut scene);
     let mut rng = Rng::new(600);
     land(&mut scene, &kit);
-    super::meadow_house::farm_house(&mut scene, &kit);
+    house::farm_house(&mut scene, &kit);
     garden_wall(&mut scene, &kit, &mut rng);
     trees(&mut scene, &kit, &mut rng);
     lavender(&mut scene, &kit, &mut rng);
@@ -188,7 +184,7 @@ pub fn scene() -> Scene {
     scene.finish(vec3(0.36, 0.52, 0.78), 0)
 }
 
-fn land(scene: &mut SceneBuilder, kit: &Kit) {
+fn land(scene: &mut SceneBuilder, kit: &MeadowMaterials) {
     let mut far = MeshBuilder::new();
     far.surface(96, 96, |s, t| {
         // Cells widen with distance.
@@ -211,7 +207,7 @@ fn land(scene: &mut SceneBuilder, kit: &Kit) {
 }
 
 /// A dry-stone wall along the edge of the yard, with a gap for the gate.
-fn garden_wall(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+fn garden_wall(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
     let mut m = MeshBuilder::new();
     for course in 0..4 {
         let mut x = -9.0;
@@ -239,7 +235,7 @@ fn garden_wall(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
     scene.add("garden-wall", m, kit.stone);
 }
 
-fn trees(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+fn trees(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
     let oaks: Vec<[usize; 3]> = (0..3)
         .map(|i| {
             let (height, radius) = ([5.2, 4.2, 3.4][i], [3.4, 2.7, 2.3][i]);
@@ -299,7 +295,7 @@ fn trees(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
     }
 }
 
-fn lavender(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+fn lavender(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
     let bushes =
         |scene: &mut SceneBuilder, stalks: usize, spike: f32, rng: &mut Rng| -> Vec<[usize; 2]> {
             (0..4)
@@ -335,7 +331,7 @@ fn lavender(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
     }
 }
 
-fn grass_and_poppies(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
+fn grass_and_poppies(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
     let poppies: Vec<[usize; 2]> = (0..3)
         .map(|_| {
             let [green, red] = parts::poppy(0.42, rng);
@@ -362,7 +358,7 @@ fn grass_and_poppies(scene: &mut SceneBuilder, kit: &Kit, rng: &mut Rng) {
             scene.mesh("tuft", parts::tuft(blades, 0.30, rng), material)
         })
         .collect();
-    // Grass takes what is left of the triangles.
+    // Grass uses the remaining triangles.
     let left = TRIANGLES.saturating_sub(scene.triangles()) / (3 * blades as u64);
     for i in 0..left {
         let (x, z) = match i % 5 {

@@ -13,11 +13,11 @@ use std::f32::consts::TAU;
 pub struct MeshBuilder {
     /// Positions, metres.
     pub positions: Vec<Vec3>,
-    /// Normals, one a position.
+    /// Normals, one per position.
     pub normals: Vec<Vec3>,
     /// Texture coordinates in metres (or 0..1 for sheets that show a texture once).
     pub uvs: Vec<Vec2>,
-    /// Three indices a triangle, counter-clockwise seen from outside.
+    /// Three indices per triangle, counter-clockwise seen from outside.
     pub indices: Vec<u32>,
 }
 
@@ -46,6 +46,14 @@ pub fn sharp(x: f32, y: f32) -> Knot {
         at: vec2(x, y),
         sharp: true,
     }
+}
+
+/// A solid of revolution; see [`MeshBuilder::lathe`].
+#[must_use]
+pub fn lathed(profile: &[Knot], segments: usize) -> MeshBuilder {
+    let mut m = MeshBuilder::new();
+    m.lathe(profile, segments);
+    m
 }
 
 /// Rounds a profile: `steps` points of a Catmull-Rom curve between each pair of smooth knots.
@@ -157,7 +165,7 @@ impl MeshBuilder {
                     let dt = surface(s, t1).0 - surface(s, t0).0;
                     ds.cross(dt).try_normalize()
                 };
-                // At a pole one derivative vanishes: take the normal just beside it.
+                // At a pole one derivative vanishes, so the normal next to it is used.
                 let inward = |x: f32| x + (0.5 - x).signum() * 4.0 * step;
                 let normal = slope(s, t)
                     .or_else(|| slope(s, inward(t)))
@@ -314,7 +322,7 @@ impl MeshBuilder {
 
     /// Sweeps a profile along frames (right x up = direction of travel); outside is to the right of
     /// the profile's direction, so a counter-clockwise outline is solid inside.
-    pub fn sweep(&mut self, profile: &[Knot], path: &[Frame]) {
+    pub fn sweep(&mut self, profile: &[Knot], path: &[SweepFrame]) {
         let mut across = 0.0;
         for run in smooth_runs(profile) {
             let first = self.positions.len() as u32;
@@ -351,7 +359,7 @@ impl MeshBuilder {
                 smooth(cos, sin)
             })
             .collect();
-        let frames = Frame::along(points);
+        let frames = SweepFrame::along(points);
         let before = self.positions.len();
         self.sweep(&circle, &frames);
         // The sweep sees an open outline; around a circle the normals are the radii.
@@ -425,12 +433,6 @@ impl MeshBuilder {
         }
     }
 
-    /// Number of triangles so far.
-    #[must_use]
-    pub fn triangles(&self) -> usize {
-        self.indices.len() / 3
-    }
-
     /// The finished mesh: degenerate triangles dropped, tangents computed, uv divided by `tile_m`.
     #[must_use]
     pub fn finish(mut self, name: &str, material: usize, tile_m: f32) -> Mesh {
@@ -467,7 +469,7 @@ impl MeshBuilder {
 
 /// A place along a sweep.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame {
+pub struct SweepFrame {
     /// Where the profile's origin goes.
     pub origin: Vec3,
     /// Direction of the profile's x.
@@ -478,7 +480,7 @@ pub struct Frame {
     pub scale: f32,
 }
 
-impl Frame {
+impl SweepFrame {
     /// Frames along a polyline that twist as little as possible.
     #[must_use]
     pub fn along(points: &[(Vec3, f32)]) -> Vec<Self> {

@@ -1,8 +1,10 @@
 //! A musical movement in an open wooden box: pinned cylinder, comb, spring barrel, gear train and
 //! air governor. 106 K triangles of brass and steel.
 
+mod train;
+
 use super::gears::screw;
-use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
+use super::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
 use super::noise::{Rng, smoothstep};
 use super::organic::{damask, polished_wood};
 use super::scene_builder::{MaterialId, SceneBuilder};
@@ -20,7 +22,7 @@ const CYLINDER_RADIUS: f32 = 0.0115;
 /// Teeth of the comb.
 const TINES: usize = 64;
 
-pub(super) struct Kit {
+pub(super) struct MusicBoxMaterials {
     pub(super) brass: MaterialId,
     pub(super) polished: MaterialId,
     pub(super) steel: MaterialId,
@@ -31,14 +33,9 @@ pub(super) struct Kit {
     pub(super) ruby: MaterialId,
 }
 
-fn kit(scene: &mut SceneBuilder) -> Kit {
-    let recipe = |name, size, tile_m, surface| Recipe {
-        name,
-        size,
-        maps: Maps::Color,
-        tile_m,
-        surface,
-    };
+fn kit(scene: &mut SceneBuilder) -> MusicBoxMaterials {
+    let recipe =
+        |name, size, tile_m, surface| Recipe::new(name, size, Maps::Color, tile_m, surface);
     let mut sets = [
         recipe(
             "rosewood",
@@ -76,7 +73,7 @@ fn kit(scene: &mut SceneBuilder) -> Kit {
             m.mirror = mirror;
         })
     };
-    Kit {
+    MusicBoxMaterials {
         brass: metal(scene, "brass", 0xdcb45e, 0.22, 0.25),
         polished: metal(scene, "polished-brass", 0xe8bf62, 0.08, 0.6),
         steel: metal(scene, "steel", 0xcfd3d8, 0.1, 0.6),
@@ -99,9 +96,9 @@ pub fn scene() -> Scene {
     casket(&mut scene, &kit);
     cylinder(&mut scene, &kit);
     comb(&mut scene, &kit);
-    super::music_train::train(&mut scene, &kit);
-    super::music_train::fittings(&mut scene, &kit);
-    super::music_train::bells(&mut scene, &kit);
+    train::train(&mut scene, &kit);
+    train::fittings(&mut scene, &kit);
+    train::bells(&mut scene, &kit);
     scene.camera(
         "default",
         vec3(-0.002, 0.096, 0.070),
@@ -122,7 +119,7 @@ pub fn scene() -> Scene {
 }
 
 /// Box with an open lid, lined with velvet, on a table.
-fn casket(scene: &mut SceneBuilder, kit: &Kit) {
+fn casket(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let (w, d, h, t) = (0.092, 0.062, 0.052, 0.007);
     let mut wood = MeshBuilder::new();
     wood.block(vec3(-w, 0.0, -d), vec3(w, 0.006, d), 0.0015);
@@ -136,8 +133,7 @@ fn casket(scene: &mut SceneBuilder, kit: &Kit) {
             0.0012,
         );
         for z in [-d + 0.012, d - 0.012] {
-            let mut foot = MeshBuilder::new();
-            foot.lathe(
+            let foot = lathed(
                 &curve(
                     &[
                         sharp(0.0, -0.009),
@@ -216,7 +212,7 @@ fn casket(scene: &mut SceneBuilder, kit: &Kit) {
     scene.add("table", table, kit.table);
 }
 
-fn cylinder(scene: &mut SceneBuilder, kit: &Kit) {
+fn cylinder(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let along_x = Quat::from_rotation_z(-FRAC_PI_2);
     let mut drum = MeshBuilder::new();
     let (r, half) = (CYLINDER_RADIUS, CYLINDER_HALF);
@@ -236,8 +232,7 @@ fn cylinder(scene: &mut SceneBuilder, kit: &Kit) {
     let drum = scene.mesh("cylinder", drum, kit.polished);
     scene.place(drum, Affine3A::from_rotation_translation(along_x, CYLINDER));
     // Pins: a melody of chords and runs on the tracks of the comb's tines.
-    let mut pin = MeshBuilder::new();
-    pin.lathe(
+    let pin = lathed(
         &[
             sharp(0.00022, -0.0004),
             sharp(0.0002, 0.0010),
@@ -276,7 +271,7 @@ fn tine_x(tine: usize) -> f32 {
 }
 
 /// The comb: tines cut to length, lead weights under the bass, held by a clamp with screws.
-fn comb(scene: &mut SceneBuilder, kit: &Kit) {
+fn comb(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let mut steel = MeshBuilder::new();
     let tip = CYLINDER.z + CYLINDER_RADIUS + 0.0011;
     let root = tip + 0.0235;

@@ -3,6 +3,7 @@
 //! Textures of a scene share a handful of precomputed fields: looking one up costs a few
 //! nanoseconds where evaluating six octaves would cost fifty, and a scene has some 70 M texels.
 
+use formats::random::Random;
 use std::io;
 use std::panic::resume_unwind;
 use std::sync::OnceLock;
@@ -11,29 +12,25 @@ use std::thread::{Builder, ScopedJoinHandle};
 /// Edge of the shared noise fields in samples; a power of two, so that wrapping is a mask.
 pub const FIELD_SIZE: usize = 1024;
 
-/// A small deterministic generator (SplitMix64).
+/// Pseudo-random numbers for placing and shaping things.
 #[derive(Clone, Debug)]
-pub struct Rng(u64);
+pub struct Rng(Random);
 
 impl Rng {
-    /// A generator whose stream depends on `seed` alone.
+    /// A generator whose sequence depends only on `seed`.
     #[must_use]
     pub fn new(seed: u64) -> Self {
-        Self(seed ^ 0x5851_f42d_4c95_7f2d)
+        Self(Random(seed ^ 0x5851_f42d_4c95_7f2d))
     }
 
     /// The next 32 random bits.
     pub fn bits(&mut self) -> u32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 32) as u32
+        (self.0.bits() >> 32) as u32
     }
 
     /// Uniform in 0..1.
     pub fn unit(&mut self) -> f32 {
-        (self.bits() >> 8) as f32 * (1.0 / 16_777_216.0)
+        self.0.unit_f32()
     }
 
     /// Uniform in `low..high`.
@@ -210,7 +207,7 @@ pub fn bank() -> &'static NoiseBank {
             let join = |(field, thread): (fn() -> Field, io::Result<ScopedJoinHandle<'_, _>>)| {
                 match thread {
                     Ok(thread) => thread.join().unwrap_or_else(|panic| resume_unwind(panic)),
-                    // Little memory is left, too little for one more thread.
+                    // Too little memory is left for another thread.
                     Err(_) => field(),
                 }
             };

@@ -135,108 +135,119 @@ pub fn leaf(shape: LeafShape, colors: [Rgb; 2]) -> Surface {
 /// Signed distance-like inside measure (positive inside) and strength of veins, for x in -1..1
 /// and y from the stalk (0) to the tip (1).
 fn leaf_outline(shape: LeafShape, x: f32, y: f32) -> (f32, f32) {
-    let blade = |x: f32, y: f32, width: f32| {
-        let half = width
-            * (PI * y.clamp(0.0, 1.0).powf(0.75))
-                .sin()
-                .max(0.0)
-                .powf(0.85);
-        let inside = (half - x.abs()).min(y - 0.01).min(0.99 - y);
-        let side = ((y * 12.0 - x.abs() * 5.0 / width.max(0.05)).fract() - 0.5).abs();
-        let rib = 1.0 - smoothstep(0.012, 0.035, x.abs());
-        (inside, rib.max(0.55 * (1.0 - smoothstep(0.02, 0.12, side))))
-    };
     match shape {
         LeafShape::Blade => blade(x, y, 0.78),
-        LeafShape::Ivy => {
-            let (dx, dy) = (x, y - 0.36);
-            let angle = dx.atan2(dy);
-            let lobe = 0.36
-                + 0.22 * (angle * 2.5).cos().abs().powf(0.7) * (1.0 - 0.22 * angle.abs() / PI)
-                + 0.08 * (-angle.abs()).exp();
-            let r = (dx * dx * 0.62 + dy * dy).sqrt();
-            let star = ((angle * 2.5 / PI).fract() - 0.0).abs();
-            let vein = 1.0 - smoothstep(0.03, 0.10, star.min(1.0 - star) * (r + 0.15));
-            (lobe - r, vein)
+        LeafShape::Ivy => ivy(x, y),
+        LeafShape::Frond => frond(x, y),
+        LeafShape::Palm => palm(x, y),
+        LeafShape::Spray => spray(x, y),
+        LeafShape::Grass => grass(x, y),
+    }
+}
+
+fn blade(x: f32, y: f32, width: f32) -> (f32, f32) {
+    let half = width
+        * (PI * y.clamp(0.0, 1.0).powf(0.75))
+            .sin()
+            .max(0.0)
+            .powf(0.85);
+    let inside = (half - x.abs()).min(y - 0.01).min(0.99 - y);
+    let side = ((y * 12.0 - x.abs() * 5.0 / width.max(0.05)).fract() - 0.5).abs();
+    let rib = 1.0 - smoothstep(0.012, 0.035, x.abs());
+    (inside, rib.max(0.55 * (1.0 - smoothstep(0.02, 0.12, side))))
+}
+
+fn ivy(x: f32, y: f32) -> (f32, f32) {
+    let (dx, dy) = (x, y - 0.36);
+    let angle = dx.atan2(dy);
+    let lobe = 0.36
+        + 0.22 * (angle * 2.5).cos().abs().powf(0.7) * (1.0 - 0.22 * angle.abs() / PI)
+        + 0.08 * (-angle.abs()).exp();
+    let r = (dx * dx * 0.62 + dy * dy).sqrt();
+    let star = ((angle * 2.5 / PI).fract() - 0.0).abs();
+    let vein = 1.0 - smoothstep(0.03, 0.10, star.min(1.0 - star) * (r + 0.15));
+    (lobe - r, vein)
+}
+
+fn frond(x: f32, y: f32) -> (f32, f32) {
+    let pairs = 15.0;
+    let envelope = 0.96 * (PI * (0.06 + 0.94 * y)).sin().powf(0.6) * (1.0 - 0.25 * y);
+    let stem = 0.018 - x.abs();
+    // Leaflets sweep forwards: a leaflet's axis is a line of constant y - 0.35 |x|.
+    let s = (y - 0.38 * x.abs()) * pairs;
+    let within = (s - s.floor() - 0.5).abs();
+    let reach = (x.abs() / envelope.max(0.02)).clamp(0.0, 1.2);
+    let half = 0.44 * (1.0 - reach * reach) * smoothstep(0.0, 0.08, reach + 0.05);
+    let leaflet = (half - within) / pairs * 2.0;
+    let inside = if y > 0.985 || s < 0.0 {
+        -1.0
+    } else {
+        leaflet.max(stem)
+    };
+    (
+        inside,
+        (1.0 - smoothstep(0.015, 0.04, x.abs()))
+            .max(0.8 - within * 12.0)
+            .clamp(0.0, 1.0),
+    )
+}
+
+fn palm(x: f32, y: f32) -> (f32, f32) {
+    let angle = x.atan2(y + 0.02);
+    let r = (x * x + (y + 0.02) * (y + 0.02)).sqrt();
+    let fingers = 11.0;
+    let s = (angle / 2.9 + 0.5) * fingers;
+    let within = (s.fract() - 0.5).abs();
+    let length = 0.97 - 0.22 * (angle / 1.4).powi(2);
+    let half = 0.47 * (1.0 - ((r - 0.35) / (length - 0.35)).clamp(0.0, 1.0).powi(2));
+    let inside = if (0.0..fingers).contains(&s) {
+        (half - within) * r * 0.26
+    } else {
+        -1.0
+    };
+    let stem = if y < 0.2 { 0.02 - x.abs() } else { -1.0 };
+    (
+        inside.min(length - r).max(stem),
+        1.0 - smoothstep(0.0, 0.10, within),
+    )
+}
+
+fn spray(x: f32, y: f32) -> (f32, f32) {
+    let mut best = (0.012 - (x - 0.06 * (y * 7.0).sin()).abs(), 0.6);
+    for i in 0..9 {
+        let side = if i % 2 == 0 { 1.0 } else { -1.0f32 };
+        let base = 0.06 + 0.088 * i as f32;
+        let (angle, size) = (side * (1.05 - 0.06 * i as f32), 0.60 - 0.028 * i as f32);
+        let (sin, cos) = angle.sin_cos();
+        let (dx, dy) = (x - 0.06 * (base * 7.0).sin(), (y - base) * 2.0);
+        let (lx, ly) = (dx * cos - dy * sin, dx * sin + dy * cos);
+        // Most texels are far from most leaves: skip the powers.
+        if !(-0.1..1.4).contains(&ly) || lx.abs() > 0.4 {
+            continue;
         }
-        LeafShape::Frond => {
-            let pairs = 15.0;
-            let envelope = 0.96 * (PI * (0.06 + 0.94 * y)).sin().powf(0.6) * (1.0 - 0.25 * y);
-            let stem = 0.018 - x.abs();
-            // Leaflets sweep forwards: a leaflet's axis is a line of constant y - 0.35 |x|.
-            let s = (y - 0.38 * x.abs()) * pairs;
-            let within = (s - s.floor() - 0.5).abs();
-            let reach = (x.abs() / envelope.max(0.02)).clamp(0.0, 1.2);
-            let half = 0.44 * (1.0 - reach * reach) * smoothstep(0.0, 0.08, reach + 0.05);
-            let leaflet = (half - within) / pairs * 2.0;
-            let inside = if y > 0.985 || s < 0.0 {
-                -1.0
-            } else {
-                leaflet.max(stem)
-            };
-            (
-                inside,
-                (1.0 - smoothstep(0.015, 0.04, x.abs()))
-                    .max(0.8 - within * 12.0)
-                    .clamp(0.0, 1.0),
-            )
-        }
-        LeafShape::Palm => {
-            let angle = x.atan2(y + 0.02);
-            let r = (x * x + (y + 0.02) * (y + 0.02)).sqrt();
-            let fingers = 11.0;
-            let s = (angle / 2.9 + 0.5) * fingers;
-            let within = (s.fract() - 0.5).abs();
-            let length = 0.97 - 0.22 * (angle / 1.4).powi(2);
-            let half = 0.47 * (1.0 - ((r - 0.35) / (length - 0.35)).clamp(0.0, 1.0).powi(2));
-            let inside = if (0.0..fingers).contains(&s) {
-                (half - within) * r * 0.26
-            } else {
-                -1.0
-            };
-            let stem = if y < 0.2 { 0.02 - x.abs() } else { -1.0 };
-            (
-                inside.min(length - r).max(stem),
-                1.0 - smoothstep(0.0, 0.10, within),
-            )
-        }
-        LeafShape::Spray => {
-            let mut best = (0.012 - (x - 0.06 * (y * 7.0).sin()).abs(), 0.6);
-            for i in 0..9 {
-                let side = if i % 2 == 0 { 1.0 } else { -1.0f32 };
-                let base = 0.06 + 0.088 * i as f32;
-                let (angle, size) = (side * (1.05 - 0.06 * i as f32), 0.60 - 0.028 * i as f32);
-                let (sin, cos) = angle.sin_cos();
-                let (dx, dy) = (x - 0.06 * (base * 7.0).sin(), (y - base) * 2.0);
-                let (lx, ly) = (dx * cos - dy * sin, dx * sin + dy * cos);
-                // Most texels are far from most leaves: skip the powers.
-                if !(-0.1..1.4).contains(&ly) || lx.abs() > 0.4 {
-                    continue;
-                }
-                let (inside, vein) = blade(lx / size * 1.15, ly / size * 0.8, 0.42);
-                if inside * size > best.0 {
-                    best = (inside * size, vein);
-                }
-            }
-            if !(0.01..=0.99).contains(&y) || x.abs() > 0.98 {
-                (-1.0, 0.0)
-            } else {
-                best
-            }
-        }
-        LeafShape::Grass => {
-            let mut best = -1.0f32;
-            for i in 0..17 {
-                let root = -0.8 + 0.1 * i as f32;
-                let height = 0.55 + 0.42 * hash_unit(i, 1, 3);
-                let lean = (hash_unit(i, 2, 3) - 0.5) * 0.9;
-                let center = root * 0.8 + lean * (y / height).powi(2) * height;
-                let half = 0.05 * (1.0 - y / height);
-                best = best.max((half - (x - center).abs()).min(0.97 - x.abs()));
-            }
-            (best, 0.3)
+        let (inside, vein) = blade(lx / size * 1.15, ly / size * 0.8, 0.42);
+        if inside * size > best.0 {
+            best = (inside * size, vein);
         }
     }
+    if !(0.01..=0.99).contains(&y) || x.abs() > 0.98 {
+        (-1.0, 0.0)
+    } else {
+        best
+    }
+}
+
+fn grass(x: f32, y: f32) -> (f32, f32) {
+    let mut best = -1.0f32;
+    for i in 0..17 {
+        let root = -0.8 + 0.1 * i as f32;
+        let height = 0.55 + 0.42 * hash_unit(i, 1, 3);
+        let lean = (hash_unit(i, 2, 3) - 0.5) * 0.9;
+        let center = root * 0.8 + lean * (y / height).powi(2) * height;
+        let half = 0.05 * (1.0 - y / height);
+        best = best.max((half - (x - center).abs()).min(0.97 - x.abs()));
+    }
+    (best, 0.3)
 }
 
 /// Soil with pebbles and twigs, or a forest floor under leaf litter.

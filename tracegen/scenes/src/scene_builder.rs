@@ -5,7 +5,7 @@ use super::texture_synth::{Map, Recipe, Rgb, linear};
 use glam::{Affine3A, Vec3};
 use scene::{Camera, Instance, Light, Material, Motion, Movement, Scene, TextureRef};
 
-/// A material's index, with what a mesh needs to know of it.
+/// A material's index and properties for meshes.
 #[derive(Clone, Copy, Debug)]
 pub struct MaterialId {
     index: usize,

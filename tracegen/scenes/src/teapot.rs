@@ -1,12 +1,14 @@
 //! The Utah teapot on a polished checker floor: 15 K triangles.
 
+mod patches;
+
 use super::masonry::checker;
 use super::mesh_builder::MeshBuilder;
 use super::organic::polished_wood;
 use super::scene_builder::SceneBuilder;
-use super::teapot_patches::PATCHES;
 use super::texture_synth::{Maps, Recipe, rgb};
 use glam::{Affine3A, Vec3, vec2, vec3};
+use patches::PATCHES;
 use scene::Scene;
 
 /// Cells along a patch's edge: 32 patches of 2 x 15² triangles, less those at the poles.
@@ -43,13 +45,7 @@ pub fn teapot() -> MeshBuilder {
 #[must_use]
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("teapot");
-    let recipe = |name, tile_m, surface| Recipe {
-        name,
-        size: 512,
-        maps: Maps::ColorNormal,
-        tile_m,
-        surface,
-    };
+    let recipe = |name, tile_m, surface| Recipe::new(name, 512, Maps::ColorNormal, tile_m, surface);
     let mut sets = [
         recipe(
             "checker-floor",

@@ -1,4 +1,4 @@
-//! What every built-in scene promises to the renderers.
+//! Properties of every built-in scene that renderers rely on.
 
 use super::{BUILTINS, build};
 use glam::Vec3;
@@ -197,7 +197,7 @@ fn a_plant_has_as_many_instances_as_asked_for_and_a_mesh_s_follow_each_other() {
             "{}",
             built.meshes.len()
         );
-        // Nothing lies outside the hall or beneath its floor, but for what goes into the ground.
+        // Nothing lies outside the hall or below its floor, except for foundations.
         let (low, high) = built.bounds().unwrap();
         assert!(low.y > -3.0 && high.y < 13.5, "{low} {high}");
     }

@@ -34,7 +34,7 @@ pub fn linear(color: Rgb) -> glam::Vec3 {
     glam::Vec3::from(color.map(srgb::decode_f32))
 }
 
-/// What a surface looks like at one point.
+/// Appearance of a surface at one point.
 #[derive(Clone, Copy, Debug)]
 pub struct Texel {
     /// Base colour.
@@ -66,7 +66,7 @@ impl Texel {
     }
 }
 
-/// Which images a material gets beside base colour.
+/// Images of a material in addition to base colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Maps {
     /// Base colour only.
@@ -88,7 +88,7 @@ pub struct Recipe {
     pub name: &'static str,
     /// Edge in texels, a power of two.
     pub size: u32,
-    /// Images wanted.
+    /// Images of the material.
     pub maps: Maps,
     /// Metres that one repeat covers.
     pub tile_m: f32,
@@ -147,13 +147,25 @@ fn byte(x: f32) -> u8 {
     (x.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }
 
-/// A recipe as a source of images. Within a scene, its name tells it from all others.
+/// A recipe as a source of images. Within a scene, its name identifies it.
 pub struct RecipeSource {
     recipe: Recipe,
     scene: String,
 }
 
 impl Recipe {
+    /// A recipe; see the fields.
+    #[must_use]
+    pub fn new(name: &'static str, size: u32, maps: Maps, tile_m: f32, surface: Surface) -> Self {
+        Self {
+            name,
+            size,
+            maps,
+            tile_m,
+            surface,
+        }
+    }
+
     /// The source of the recipe's images in a scene.
     #[must_use]
     pub fn into_source(self, scene: &str) -> Arc<RecipeSource> {
@@ -163,11 +175,11 @@ impl Recipe {
         })
     }
 
-    /// Evaluates the surface once a texel and packs the images that are asked for, by number.
+    /// Evaluates the surface once per texel and packs the requested images, by number.
     fn synthesize(&self, parts: &[usize]) -> Vec<Vec<u8>> {
         let n = self.size as usize;
         let wants = |map: Map| parts.contains(&(map as usize));
-        // A map that is not wanted has rows of one texel, so that the loop stays one shape.
+        // An unused map has rows of one texel, so that the loop stays the same.
         let row_bytes = |map| if wants(map) { 4 * n } else { 4 };
         let buffer = |map| vec![255u8; row_bytes(map) * n];
         let (mut color, mut mr, mut ao) = (
@@ -223,7 +235,7 @@ impl ImageSource for RecipeSource {
 }
 
 impl OpenSource for &RecipeSource {
-    /// A surface is code: what tells it apart is the text of this crate.
+    /// A surface is code, so the text of this crate identifies it.
     fn identify(&self, sink: &mut dyn FnMut(&[u8])) {
         for text in SOURCE_TEXT {
             sink(text.as_bytes());
@@ -259,28 +271,28 @@ fn normal_map(height: &[f32], n: usize) -> Vec<u8> {
 /// The text of every file of this crate that may take part in a texture.
 const SOURCE_TEXT: &[&str] = &[
     include_str!("atrium.rs"),
-    include_str!("atrium_furnishing.rs"),
-    include_str!("atrium_materials.rs"),
-    include_str!("atrium_parts.rs"),
+    include_str!("atrium/furnishing.rs"),
+    include_str!("atrium/materials.rs"),
+    include_str!("atrium/parts.rs"),
     include_str!("car.rs"),
-    include_str!("car_body.rs"),
-    include_str!("car_details.rs"),
+    include_str!("car/body.rs"),
+    include_str!("car/details.rs"),
     include_str!("chess.rs"),
     include_str!("creature.rs"),
     include_str!("gears.rs"),
     include_str!("glassware.rs"),
     include_str!("jungle.rs"),
-    include_str!("jungle_plants.rs"),
-    include_str!("jungle_temple.rs"),
+    include_str!("jungle/plants.rs"),
+    include_str!("jungle/temple.rs"),
     include_str!("lab.rs"),
-    include_str!("lab_still.rs"),
+    include_str!("lab/still.rs"),
     include_str!("masonry.rs"),
     include_str!("meadow.rs"),
-    include_str!("meadow_house.rs"),
-    include_str!("meadow_parts.rs"),
+    include_str!("meadow/house.rs"),
+    include_str!("meadow/parts.rs"),
     include_str!("mesh_builder.rs"),
     include_str!("music_box.rs"),
-    include_str!("music_train.rs"),
+    include_str!("music_box/train.rs"),
     include_str!("noise.rs"),
     include_str!("organic.rs"),
     include_str!("plant/building.rs"),
@@ -293,7 +305,7 @@ const SOURCE_TEXT: &[&str] = &[
     include_str!("plant/process.rs"),
     include_str!("scene_builder.rs"),
     include_str!("teapot.rs"),
-    include_str!("teapot_patches.rs"),
+    include_str!("teapot/patches.rs"),
     include_str!("texture_synth.rs"),
 ];
 

@@ -1,8 +1,10 @@
 //! `tracegen app`.
 
+use super::choice::choice;
 use super::program_args::ProgramArgs;
 use anyhow::{Context, bail};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 use parallax_layer::spool::FramesBy;
 use programs::{Launch, Session, SessionError};
 use shell::{Ended, run_child_until, warn};
@@ -17,16 +19,16 @@ use std::time::{Duration, Instant};
 pub struct AppArgs {
     #[command(flatten)]
     capture: ProgramArgs,
-    /// What ends a frame.
-    #[arg(long, value_enum, value_name = "BY", default_value_t = FrameEnd::Auto)]
-    frames_by: FrameEnd,
-    /// The program uses OpenGL: run it on Mesa's zink, which is OpenGL on Vulkan.
+    /// Event that ends a frame.
+    #[arg(long, value_parser = frames_by_parser(), value_name = "BY", default_value = "auto")]
+    frames_by: FramesBy,
+    /// The program uses OpenGL: run it on Mesa's zink, an OpenGL implementation on Vulkan.
     #[arg(long)]
     gl: bool,
-    /// Let the program run to its end. By default it is asked to end after the last frame.
+    /// Let the program run to its end. By default it is terminated after the last frame.
     #[arg(long)]
     to_end: bool,
-    /// Seconds after which a program that has not rendered the frames is ended.
+    /// Timeout in seconds; a program that has not rendered the frames by then is terminated.
     #[arg(long, value_name = "SECONDS", default_value_t = 600)]
     timeout: u64,
     /// The program and its arguments.
@@ -34,25 +36,24 @@ pub struct AppArgs {
     program: Vec<OsString>,
 }
 
-/// `--frames-by`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum FrameEnd {
-    /// A present; a readback where the program has no swapchain.
-    Auto,
-    /// Presenting an image of a swapchain.
-    Present,
-    /// Copying an image to a buffer.
-    Readback,
-}
-
-impl From<FrameEnd> for FramesBy {
-    fn from(end: FrameEnd) -> Self {
-        match end {
-            FrameEnd::Auto => Self::Auto,
-            FrameEnd::Present => Self::Present,
-            FrameEnd::Readback => Self::Readback,
-        }
-    }
+fn frames_by_parser() -> impl TypedValueParser<Value = FramesBy> {
+    choice([
+        (
+            "auto",
+            FramesBy::Auto,
+            "A present; a readback where the program has no swapchain",
+        ),
+        (
+            "present",
+            FramesBy::Present,
+            "Presenting an image of a swapchain",
+        ),
+        (
+            "readback",
+            FramesBy::Readback,
+            "Copying an image to a buffer",
+        ),
+    ])
 }
 
 /// Runs `tracegen app`.
@@ -61,7 +62,7 @@ impl From<FrameEnd> for FramesBy {
 /// Wrong use, a program that cannot be captured, and outputs that cannot be written.
 pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
     args.capture.check_outputs(None)?;
-    let settings = args.capture.settings(args.frames_by.into())?;
+    let settings = args.capture.settings(args.frames_by)?;
     let tool = std::env::current_exe().context("cannot find this program's own file")?;
     let launch = Launch::new(&std::env::temp_dir(), &tool, &settings)?;
     let program = program_name(&args.program);
@@ -83,7 +84,7 @@ pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
         .finish(&mut session, program, &settings, BTreeMap::new())
 }
 
-/// Name of a program in messages: its file's.
+/// Name of a program in messages: its file name.
 fn program_name(program: &[OsString]) -> String {
     let path = program
         .first()
@@ -92,7 +93,7 @@ fn program_name(program: &[OsString]) -> String {
     name.to_string_lossy().into_owned()
 }
 
-/// Runs the program until it has rendered its frames, or ends.
+/// Runs the program until it has rendered its frames or ends.
 fn run_program(args: &AppArgs, launch: &Launch, program: &str) -> anyhow::Result<Ended> {
     let Some((first, rest)) = args.program.split_first() else {
         bail!("expected a program, found none");

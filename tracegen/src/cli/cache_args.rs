@@ -1,4 +1,4 @@
-//! The cache of prepared textures: where it is, how large it may be, whether it is used.
+//! The cache of prepared textures: location, size limit and use.
 
 use anyhow::Context;
 use clap::Args;
@@ -6,20 +6,20 @@ use std::env;
 use std::path::PathBuf;
 use textures::Cache;
 
-/// Bound of the cache where `PARALLAX_CACHE_SIZE` does not say otherwise.
+/// Default size limit, without `PARALLAX_CACHE_SIZE`.
 const DEFAULT_BYTES: u64 = 2 << 30;
 
 /// `--no-cache`.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct CacheArgs {
-    /// Prepare all textures anew. Prepared ones are kept in ~/.cache/parallax or where
-    /// XDG_CACHE_HOME or PARALLAX_CACHE_DIR say, at most 2GiB or PARALLAX_CACHE_SIZE.
+    /// Do not use the cache of prepared textures. The cache is in ~/.cache/parallax or the folder that
+    /// XDG_CACHE_HOME or PARALLAX_CACHE_DIR sets; it holds at most 2GiB or PARALLAX_CACHE_SIZE.
     #[arg(long)]
     no_cache: bool,
 }
 
 impl CacheArgs {
-    /// The cache, if one is to be used and there is a place for it.
+    /// Opens the cache if it is enabled and has a folder.
     ///
     /// # Errors
     /// A size that cannot be read.
@@ -39,13 +39,13 @@ impl CacheArgs {
     }
 }
 
-/// The folder of everything that is kept between runs.
+/// The folder of the cache.
 fn folder(variable: impl Fn(&str) -> Option<PathBuf>) -> Option<PathBuf> {
     let set = |name| variable(name).filter(|path| !path.as_os_str().is_empty());
     if let Some(folder) = set("PARALLAX_CACHE_DIR") {
         return Some(folder);
     }
-    // The XDG specification has relative paths ignored.
+    // The XDG specification says that relative paths are ignored.
     let caches = set("XDG_CACHE_HOME").filter(|path| path.is_absolute());
     let caches = caches.or_else(|| Some(set("HOME")?.join(".cache")))?;
     Some(caches.join("parallax"))

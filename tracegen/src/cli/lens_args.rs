@@ -1,4 +1,4 @@
-//! Flags that say what the lenses show.
+//! Flags for the lenses.
 
 use super::technique_args::numbers;
 use anyhow::{bail, ensure};
@@ -6,16 +6,16 @@ use clap::Args;
 use formats::view::{Hmd, Lens};
 use std::str::FromStr;
 
-/// What the lenses show of an eye's picture.
+/// The visible part of each eye's picture.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Techniques")]
 pub struct LensArgs {
-    /// Radius of the circle that the lens shows of an eye's picture, as a tangent [default: half of
-    /// the sum of the longer axis's tangents].
+    /// Radius of the circle of an eye's picture that is visible through the lens, as a tangent [default: half
+    /// of the sum of the longer axis's tangents].
     #[arg(long, value_name = "TAN", allow_hyphen_values = true)]
     lens_radius: Option<f32>,
-    /// Centre of that circle, as tangents right and up of straight ahead in the right eye's picture;
-    /// the left eye's is mirrored.
+    /// Centre of that circle in the right eye's picture, as tangents to the right and up from straight ahead;
+    /// the left eye's circle is mirrored.
     #[arg(
         long,
         value_name = "X,Y",
@@ -40,10 +40,10 @@ impl FromStr for Center {
 }
 
 impl LensArgs {
-    /// What the lenses show of the left and right eye's picture.
+    /// The visible parts of the left and right eye's pictures.
     ///
     /// # Errors
-    /// A radius or a centre out of range, or a lens that shows nothing.
+    /// A radius or a centre out of range, or a lens through which nothing is visible.
     pub fn lenses(&self, hmd: &Hmd) -> anyhow::Result<[Lens; 2]> {
         let Center([x, y]) = self.lens_center;
         let mirrored = [-1.0, 1.0];
@@ -58,7 +58,8 @@ impl LensArgs {
                 let (expected, found) = (broken.expected, broken.found);
                 bail!("--lens-radius, --lens-center: expected {expected}, found {found}");
             }
-            // What lies in the picture is seen only if its point next to the centre is.
+            // A point of the picture is visible only if it is inside the circle, so it suffices to check the
+            // point nearest to the centre.
             let next = [
                 lens.center[0].clamp(-fov.left, fov.right),
                 lens.center[1].clamp(-fov.down, fov.up),

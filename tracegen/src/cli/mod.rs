@@ -1,7 +1,9 @@
-//! The command line, one file a subcommand.
+//! The command line, one file per subcommand.
 
 pub mod app;
 mod cache_args;
+mod capture_steps;
+mod choice;
 pub mod lens_args;
 mod objective_args;
 pub mod page;
@@ -11,6 +13,7 @@ mod prepared;
 mod program_args;
 pub mod raster;
 mod raster_auto;
+mod raster_frames;
 mod raster_summary;
 pub mod rays;
 pub mod scene_args;
@@ -59,21 +62,23 @@ enum Command {
     Page(Box<page::PageArgs>),
     /// Measure stereo rendering techniques along a path: times, pictures and traces into a folder.
     Techniques(Box<techniques::TechniquesArgs>),
-    /// Capture every combination of a manifest's scenes, cameras and displays; goes on where it stopped.
+    /// Capture every combination of a manifest's scenes, cameras and displays; an interrupted sweep resumes.
     Sweep(sweep::SweepArgs),
-    /// Hold a captured frame against a reference in double precision: coverage, coordinates, levels, colours.
+    /// Compare a captured frame with a reference in double precision: coverage, coordinates, levels, colours.
     Verify(Box<verify::VerifyArgs>),
     /// Trace a stereo frame and capture its rays into a .raytrace file.
     Rays(Box<rays::RaysArgs>),
-    /// Drive captures to where arithmetic ends and hold them against a reference: numbers of every kind, their errors and bounds.
+    /// Capture extreme inputs and compare them with a reference: errors and their bounds near the limits of
+    /// arithmetic.
     Stress(stress::StressArgs),
-    /// Measure what rays cost and get wrong in single and in double precision, near the origin and far from it.
+    /// Measure the cost and the errors of rays in single and in double precision, near the origin and far
+    /// from it.
     Precision(precision::PrecisionArgs),
     #[command(flatten)]
     Documents(Documents),
 }
 
-/// Parses the arguments, runs the subcommand and turns its outcome into an exit code.
+/// Parses the arguments, runs the subcommand and returns its exit code.
 #[must_use]
 pub fn main() -> ExitCode {
     shell::run(
@@ -97,7 +102,7 @@ pub fn main() -> ExitCode {
     )
 }
 
-/// What traces name as their maker.
+/// Name and version of the program, as traces record it.
 pub(crate) fn tool() -> String {
     format!("tracegen {}", env!("CARGO_PKG_VERSION"))
 }

@@ -1,4 +1,4 @@
-//! What `--auto` makes as small as its budget allows.
+//! The quantity that `--auto` minimises.
 
 use crate::study::auto::{Budget, Objective};
 use anyhow::ensure;
@@ -7,8 +7,8 @@ use clap::Args;
 /// The option, shared by `raster` and `techniques`.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct ObjectiveArgs {
-    /// What `--auto` makes as small as an error budget allows: counts, which are the same in every run, or time
-    /// [default: energy].
+    /// Quantity that `--auto` minimises under an error budget: a count, which is the same in every run, or
+    /// time [default: energy].
     #[arg(
         long,
         value_enum,
@@ -20,12 +20,12 @@ pub struct ObjectiveArgs {
 }
 
 impl ObjectiveArgs {
-    /// The objective under a budget.
+    /// The objective for a budget.
     ///
     /// # Errors
-    /// A budget of time with another objective.
+    /// A time budget with an objective.
     pub fn of(self, budget: Option<Budget>) -> anyhow::Result<Objective> {
-        if let Some(Budget::BudgetMs(_)) = budget {
+        if let Some(Budget::FrameMs(_)) = budget {
             let other = self.objective.filter(|other| *other != Objective::Time);
             ensure!(
                 other.is_none(),

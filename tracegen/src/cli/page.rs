@@ -22,12 +22,12 @@ use std::process::ExitCode;
 pub struct PageArgs {
     #[command(flatten)]
     capture: ProgramArgs,
-    /// The page: a file, or an address that begins with http.
+    /// The page: a file, or an address that starts with http.
     page: String,
-    /// Folder whose files the page may use; by default the page's own.
+    /// Folder with the files that the page may load; by default the page's own folder.
     #[arg(long, value_name = "FOLDER")]
     root: Option<PathBuf>,
-    /// Address after the page's name: `?mode=stereo`.
+    /// Query string appended to the page's name: `?mode=stereo`.
     #[arg(long, value_name = "QUERY", default_value = "")]
     query: String,
     /// Also write the page's largest canvas after the last frame.
@@ -36,13 +36,13 @@ pub struct PageArgs {
     /// Width and height of the window.
     #[arg(long, value_name = "WIDTHxHEIGHT", default_value = "1280x720", value_parser = parse_size)]
     size: [u32; 2],
-    /// Give the page a WebXR headset by the emulator iwer, of which this is the script (build/iwer.min.js).
+    /// Provide a WebXR headset with the emulator iwer; the value is its script (build/iwer.min.js).
     #[arg(long, value_name = "iwer.min.js")]
     iwer: Option<PathBuf>,
-    /// Distance between the eyes of that headset in millimetres.
+    /// Distance between the headset's eyes in millimetres.
     #[arg(long, value_name = "MM", default_value_t = 64.0, requires = "iwer")]
     ipd: f64,
-    /// Its vertical field of view in degrees.
+    /// The headset's vertical field of view in degrees.
     #[arg(
         long,
         value_name = "DEGREES",
@@ -50,20 +50,20 @@ pub struct PageArgs {
         requires = "iwer"
     )]
     fov: f64,
-    /// Where its wearer's head is, in metres.
+    /// Position of the headset in metres.
     #[arg(long, value_name = "X,Y,Z", default_value = "0,1.6,0", value_parser = parse_place, requires = "iwer",
           allow_hyphen_values = true)]
     head: [f64; 3],
     /// Seed of the page's random numbers.
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u32,
-    /// Frames per second of the page's clock.
+    /// Frame rate of the page's clock in hertz.
     #[arg(long, value_name = "HZ", default_value_t = 60.0)]
     rate: f64,
     /// Seconds without a request after which the page counts as loaded.
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0)]
     settle: f64,
-    /// Draw the page without the layer and write no trace: for its times and its picture.
+    /// Draw the page without the layer and write no trace, to measure times and save the picture.
     #[arg(long)]
     plain: bool,
     /// The browser.
@@ -106,7 +106,7 @@ pub fn run(args: &PageArgs) -> anyhow::Result<ExitCode> {
     let launch = Launch::new(&std::env::temp_dir(), &tool, &settings)?;
     let page = page(args)?;
     let (cameras, picture) = draw(args, &launch, &page)?;
-    // The picture gets its name once the trace has its own.
+    // The picture is renamed to its final name only after the trace.
     let picture = args
         .image
         .as_deref()
@@ -127,7 +127,7 @@ pub fn run(args: &PageArgs) -> anyhow::Result<ExitCode> {
     Ok(code)
 }
 
-/// Name of a page: its file's, or its address.
+/// Name of a page: its file name or its address.
 fn page_name(page: &str) -> String {
     let name = Path::new(page).file_name().filter(|_| !is_address(page));
     name.map_or_else(
@@ -140,7 +140,7 @@ fn is_address(page: &str) -> bool {
     page.starts_with("http://") || page.starts_with("https://")
 }
 
-/// What is drawn.
+/// Address of the page that is drawn.
 fn page(args: &PageArgs) -> anyhow::Result<Page> {
     let (address, root) = if is_address(&args.page) {
         ensure!(
@@ -181,10 +181,10 @@ fn page(args: &PageArgs) -> anyhow::Result<Page> {
     })
 }
 
-/// Eyes by frame, and the picture of the last one.
+/// Matrices of the eyes by frame, and the picture of the last frame.
 type Drawn = (BTreeMap<u32, [EyeView; 2]>, Option<String>);
 
-/// Draws the frames up to the last one that is wanted.
+/// Draws the frames up to the last captured one.
 fn draw(args: &PageArgs, launch: &Launch, page: &Page) -> anyhow::Result<Drawn> {
     let profile = launch.folder().join("profile");
     let mut tab = Tab::open(&args.chromium, &profile, page, |command| {
@@ -223,7 +223,7 @@ fn draw(args: &PageArgs, launch: &Launch, page: &Page) -> anyhow::Result<Drawn> 
         note(&format!("drawn by {renderer}"));
     }
     tab.close();
-    // The first frames make textures and shaders.
+    // The first frames create textures and shaders, so they are not timed.
     let settled = before_ms.get(before_ms.len() / 2..).unwrap_or_default();
     note(&format!(
         "milliseconds per frame: {} before, {} captured",
@@ -233,7 +233,7 @@ fn draw(args: &PageArgs, launch: &Launch, page: &Page) -> anyhow::Result<Drawn> 
     Ok((cameras, picture))
 }
 
-/// The middle of some times, in words.
+/// The median of some times as text.
 fn median(times_ms: &[f64]) -> String {
     let mut sorted = times_ms.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -243,7 +243,7 @@ fn median(times_ms: &[f64]) -> String {
     }
 }
 
-/// Writes a picture that a page gave as an address of data, yet without its final name.
+/// Writes a picture that the page returned as a data URL to a temporary file.
 fn write_picture(path: &Path, picture: Option<&str>) -> anyhow::Result<AtomicFile> {
     let data = picture.and_then(|picture| picture.strip_prefix("data:image/png;base64,"));
     let bytes = data.and_then(|data| STANDARD.decode(data).ok());

@@ -1,6 +1,8 @@
-//! Flags that say where the head goes.
+//! Flags for the path of the head.
 
-use clap::{Args, ValueEnum};
+use super::choice::choice;
+use clap::Args;
+use clap::builder::TypedValueParser;
 use scene::paths::{DEFAULT_FPS, HeadPath, MAX_FRAMES, Moments, PathOrigin, PathSpec};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -9,33 +11,39 @@ use std::path::PathBuf;
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Camera")]
 pub struct PathArgs {
-    /// Where the head goes: `walk` (slowly ahead), `head` (a model of a person who looks around),
-    /// a CSV file of poses, or a glTF file's animated camera.
+    /// Path of the head: `walk` (slowly ahead), `head` (a model of a person who looks around), a CSV file of
+    /// poses, or a glTF file's animated camera.
     #[arg(
         long,
         value_name = "walk|head|FILE.csv|FILE.gltf[#CAMERA]",
         default_value = "walk"
     )]
     pub path: PathSpec,
-    /// What a file's poses are relative to [default: camera for CSV, world for glTF].
-    #[arg(long, value_enum, value_name = "ORIGIN")]
-    pub path_origin: Option<Origin>,
-    /// Frames a second along the path.
+    /// Coordinate system of a file's poses [default: camera for CSV, world for glTF].
+    #[arg(long, value_parser = origin_parser(), value_name = "ORIGIN")]
+    pub path_origin: Option<PathOrigin>,
+    /// Frames per second along the path.
     #[arg(long, value_name = "HZ", default_value_t = DEFAULT_FPS, value_parser = parse_fps)]
     pub fps: f32,
 }
 
-/// `--path-origin`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Origin {
-    /// The path starts at the camera's place and heading.
-    Camera,
-    /// Poses stand as the file has them.
-    World,
+fn origin_parser() -> impl TypedValueParser<Value = PathOrigin> {
+    choice([
+        (
+            "camera",
+            PathOrigin::Camera,
+            "The path starts at the camera's place and heading",
+        ),
+        (
+            "world",
+            PathOrigin::World,
+            "Poses stand as the file has them",
+        ),
+    ])
 }
 
 impl PathArgs {
-    /// The path of a single frame, which starts where every path does.
+    /// The path of a single frame, at the start of every path.
     #[must_use]
     pub fn still() -> Self {
         Self {
@@ -54,16 +62,12 @@ impl PathArgs {
         }
     }
 
-    /// The path and its moments; what is odd about its file goes to stderr.
+    /// The path and its frame times; warnings about its file go to stderr.
     ///
     /// # Errors
     /// An unreadable file, or one that ends before the last frame.
     pub fn open(&self, frames: Range<u32>) -> anyhow::Result<(HeadPath, Moments)> {
-        let origin = self.path_origin.map(|origin| match origin {
-            Origin::Camera => PathOrigin::Camera,
-            Origin::World => PathOrigin::World,
-        });
-        let (path, warnings) = HeadPath::open(&self.path, origin)?;
+        let (path, warnings) = HeadPath::open(&self.path, self.path_origin)?;
         for warning in warnings {
             shell::warn(&format!("{}: {warning}", self.path));
         }
@@ -76,7 +80,7 @@ impl PathArgs {
     }
 }
 
-/// A number of frames, for clap.
+/// Parser for a number of frames.
 pub fn frame_count() -> clap::builder::RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES))
 }

@@ -15,10 +15,10 @@ use std::path::PathBuf;
     after_help = "The times in the result are of this machine. `replay accuracy --traversal FILE` sets it beside other choices."
 )]
 pub struct PrecisionArgs {
-    /// Where the JSON goes (schema tracegen.precision/1) [default: standard output].
+    /// File for the JSON (schema tracegen.precision/1) [default: standard output].
     #[arg(short, long, value_name = "JSON")]
     output: Option<PathBuf>,
-    /// Rays at each place.
+    /// Rays per distance.
     #[arg(long, value_name = "N", default_value_t = 6000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     rays: u32,
 }

@@ -1,6 +1,7 @@
-//! A scene made ready for [`crate::study`]: its world, and the device with the scene on it.
+//! Prepares a scene for [`crate::study`]: its world, and a device with the uploaded scene.
 
 use super::cache_args::CacheArgs;
+use super::capture_steps::prepare_textures;
 use super::raster;
 use super::scene_args::SceneSetup;
 use crate::study::world::World;
@@ -9,41 +10,45 @@ use ::raster::draws::DrawList;
 use ::raster::lavapipe::{Lavapipe, device::Gpu};
 use ::raster::lighting::Lighting;
 use formats::view::Lens;
-use textures::TextureSet;
 
 /// A world and the device that renders it.
 pub struct Prepared {
     /// Scene, path and display.
     pub world: World,
-    /// The device with the scene on it.
+    /// The device with the uploaded scene.
     pub backend: Lavapipe,
 }
 
-/// Compresses the scene's textures, all of them (techniques and frames may sample what others do
-/// not), and uploads it to `gpu`. `spec` is the scene as given.
+/// Options of a preparation.
+pub struct Preparation<'a> {
+    /// The scene as given.
+    pub scene: &'a str,
+    /// Visible parts of the left and right eye's pictures.
+    pub lens: [Lens; 2],
+    /// Frames per second along the path.
+    pub fps: f32,
+    /// Whether shadow cascades are added.
+    pub shadows: bool,
+    /// Size limit of raw records in bytes.
+    pub record_budget: u64,
+    /// The cache of textures.
+    pub cache: CacheArgs,
+}
+
+/// Compresses all textures of the scene, because techniques and frames may sample what others do not, and
+/// uploads it to `gpu`.
 ///
 /// # Errors
 /// Unreadable textures, driver errors.
-pub fn prepare(
-    setup: SceneSetup,
-    lens: [Lens; 2],
-    fps: f32,
-    spec: &str,
-    gpu: Gpu,
-    [cascades, record_budget]: [u64; 2],
-    cache: CacheArgs,
-) -> anyhow::Result<Prepared> {
+pub fn prepare(of: Preparation<'_>, setup: SceneSetup, gpu: Gpu) -> anyhow::Result<Prepared> {
     let scene = &setup.scene;
-    let draws = DrawList::new(scene, cascades as u32)?;
-    let uploads = TextureSet::prepare(scene, |_| Some(0), cache.open()?.as_ref())?;
-    for note in &uploads.notes {
-        shell::warn(note);
-    }
+    let draws = DrawList::new(scene, raster::cascades(scene, of.shadows))?;
+    let uploads = prepare_textures(scene, |_| Some(0), of.cache.open()?.as_ref())?;
     let size_px = setup.hmd.eye_size_px;
-    let backend = Lavapipe::on(gpu, scene, &draws, &uploads, size_px, record_budget)?;
+    let backend = Lavapipe::on(gpu, scene, &draws, &uploads, size_px, of.record_budget)?;
     let tables = raster::tables(
         &setup,
-        spec,
+        of.scene,
         &draws,
         &uploads,
         &backend,
@@ -56,9 +61,9 @@ pub fn prepare(
         lighting: Lighting::new(scene),
         bounds,
         shadow_range_m: raster::shadow_range_m(&setup, bounds),
-        lens,
+        lens: of.lens,
         tables,
-        fps,
+        fps: of.fps,
         hmd: setup.hmd,
         views: setup.frames,
         scene: setup.scene,

@@ -1,10 +1,12 @@
-//! What `app` and `page` do alike: options of a capture, and the trace that it becomes.
+//! Options and steps that `app` and `page` share.
 
-use super::raster::{TileEncoding, parse_bytes};
+use super::choice::choice;
+use super::raster::{encoding_parser, parse_bytes};
 use anyhow::Context;
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 use formats::container::AtomicFile;
-use formats::textrace::TextraceWriter;
+use formats::textrace::{Encoding, TextraceWriter};
 use formats::view::EyeView;
 use parallax_layer::spool::{FramesBy, Settings};
 use programs::list::List;
@@ -36,54 +38,48 @@ pub struct ProgramArgs {
     /// Frames to capture, counted from 0: `10`, or `10..13` for 10, 11 and 12.
     #[arg(long, value_name = "FRAMES", default_value = "10", value_parser = parse_frames)]
     pub frames: Range<u32>,
-    /// How it renders for two eyes; by default the first of these that fits.
-    #[arg(long, value_enum, value_name = "RULE")]
-    eyes: Option<Eyes>,
-    /// A file of rules that tell which draws show which eye, where none of the tool's own does.
+    /// How the program renders both eyes; by default the first of these that fits.
+    #[arg(long, value_parser = eyes_parser(), value_name = "RULE")]
+    eyes: Option<Rule>,
+    /// File of rules that assign draws to eyes, for programs that no built-in rule fits.
     #[arg(long, value_name = "FILE.toml", conflicts_with = "eyes")]
     rules: Option<PathBuf>,
-    /// Hold the records of every draw against an occlusion query of the driver; exit with 1 where they differ.
+    /// Compare the number of records of every draw with an occlusion query of the driver; exit code 1 if they
+    /// differ.
     #[arg(long)]
     check: bool,
-    /// Memory for the records of one submission. What is not used takes none.
+    /// Size limit of the records of one submission. Unused memory is not allocated.
     #[arg(long, value_name = "SIZE", default_value = "768MiB", value_parser = parse_bytes)]
     records: u64,
-    /// Folder for the fragment shaders: as the program gave them, and as they record.
+    /// Folder for the fragment shaders, before and after the recording code is inserted.
     #[arg(long, value_name = "FOLDER")]
     modules: Option<PathBuf>,
     /// How the trace's tiles are packed.
-    #[arg(long, value_enum, default_value_t = TileEncoding::Delta, value_name = "NAME")]
-    encoding: TileEncoding,
+    #[arg(long, value_parser = encoding_parser(), default_value = "delta", value_name = "NAME")]
+    encoding: Encoding,
 }
 
-/// `--eyes`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Eyes {
-    /// A draw is broadcast to two layers.
-    Multiview,
-    /// Two viewports of one target.
-    Halves,
-    /// A target per eye.
-    Targets,
-    /// One target for both, told apart by the colour channels that are written.
-    Channels,
-    /// One target for both: the same draws twice.
-    Twice,
-    /// One eye alone: the largest target.
-    Mono,
-}
-
-impl Eyes {
-    fn rule(self) -> Rule {
-        match self {
-            Self::Multiview => Rule::Multiview,
-            Self::Halves => Rule::Halves,
-            Self::Targets => Rule::Targets,
-            Self::Channels => Rule::Channels,
-            Self::Twice => Rule::Twice,
-            Self::Mono => Rule::Mono,
-        }
-    }
+fn eyes_parser() -> impl TypedValueParser<Value = Rule> {
+    choice([
+        (
+            "multiview",
+            Rule::Multiview,
+            "A draw is broadcast to two layers",
+        ),
+        ("halves", Rule::Halves, "Two viewports of one target"),
+        ("targets", Rule::Targets, "A target per eye"),
+        (
+            "channels",
+            Rule::Channels,
+            "One target for both, distinguished by the colour channels that are written",
+        ),
+        (
+            "twice",
+            Rule::Twice,
+            "One target for both: the same draws twice",
+        ),
+        ("mono", Rule::Mono, "One eye alone: the largest target"),
+    ])
 }
 
 /// A frame, or a range of frames without its end.
@@ -101,10 +97,10 @@ fn parse_frames(text: &str) -> Result<Range<u32>, String> {
 }
 
 impl ProgramArgs {
-    /// Refuses outputs that cannot be.
+    /// Refuses outputs that cannot be written.
     ///
     /// # Errors
-    /// Those.
+    /// An output that cannot be written.
     pub fn check_outputs(&self, more: Option<Output>) -> anyhow::Result<()> {
         let trace = (self.output.as_deref()).map(|path| Output::binary("-o", path));
         let list = (self.list_page.as_deref()).map(|path| Output::text("--list-page", path));
@@ -112,10 +108,10 @@ impl ProgramArgs {
         check_outputs(&outputs, []).map(drop)
     }
 
-    /// What the layer is asked for.
+    /// Settings of the layer.
     ///
     /// # Errors
-    /// A folder that cannot be made.
+    /// A folder that cannot be created.
     pub fn settings(&self, frames_by: FramesBy) -> anyhow::Result<Settings> {
         let absolute = |folder: &PathBuf| {
             std::fs::create_dir_all(folder)
@@ -133,10 +129,10 @@ impl ProgramArgs {
         })
     }
 
-    /// Makes the trace, and tells of it on stderr.
+    /// Writes the trace and prints a summary on stderr.
     ///
     /// # Errors
-    /// A session without two eyes, and a trace that cannot be written.
+    /// A session without two eyes, or a trace that cannot be written.
     pub fn finish(
         &self,
         session: &mut Session,
@@ -164,7 +160,7 @@ impl ProgramArgs {
             record_bytes: settings.record_bytes,
         };
         let writer = TextraceWriter::create_growing(output)?;
-        let writer = writer.with_encoding(self.encoding.encoding());
+        let writer = writer.with_encoding(self.encoding);
         let (writer, drained) = drain(session, &job, writer)?;
         let checked = self.check.then(|| check(session, &frames)).transpose()?;
         let bytes = writer.finish()?;
@@ -177,11 +173,11 @@ impl ProgramArgs {
 }
 
 impl ProgramArgs {
-    /// What is to tell both eyes apart.
+    /// How the eyes are identified.
     fn wanted(&self) -> anyhow::Result<Wanted> {
         Ok(match (&self.rules, self.eyes) {
             (Some(path), _) => Wanted::File(RuleFile::load(path)?),
-            (None, Some(eyes)) => Wanted::Rule(eyes.rule()),
+            (None, Some(eyes)) => Wanted::Rule(eyes),
             (None, None) => Wanted::First,
         })
     }

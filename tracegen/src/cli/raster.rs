@@ -1,32 +1,25 @@
 //! `tracegen raster`.
 
 use super::cache_args::CacheArgs;
+use super::choice::choice;
 use super::objective_args::ObjectiveArgs;
 use super::path_args::{PathArgs, frame_count};
 use super::raster_auto::Techniques;
-use super::raster_summary::{Summary, worked_since};
 use super::scene_args::{SceneArgs, SceneSetup, capture_outputs};
 use super::technique_args::TechniqueArgs;
-use crate::doubtful::Doubtful;
-use crate::picture;
 use crate::study::auto::{Budget, Schedule};
-use crate::study::processor;
-use anyhow::{Context, bail, ensure};
-use clap::{Args, ValueEnum};
-use formats::textrace::{Encoding, Pass, Tables, TextraceWriter, TraceMeta};
+use anyhow::{bail, ensure};
+use clap::Args;
+use clap::builder::TypedValueParser;
+use formats::textrace::{Encoding, Pass, Tables, TraceMeta};
 use formats::view::Eye;
 use raster::backend::{CaptureBackend, Fragments};
-use raster::capture::{CaptureJob, Pictures};
 use raster::draws::DrawList;
 use raster::drivers::Driver;
-use raster::geometry::geometry;
-use raster::lighting::Lighting;
-use scene::{LoadOptions, Scene};
-use shell::{Progress, Threads, lasting_arguments, note};
-use std::path::{Path, PathBuf};
-use std::time::Instant;
+use scene::Scene;
+use shell::{Threads, lasting_arguments};
+use std::path::PathBuf;
 use techniques::skips::Skip;
-use techniques::{Planner, Skips};
 use textures::TextureSet;
 
 /// Cascades that `--shadows` adds (Z2 paper section 4.1).
@@ -53,37 +46,37 @@ pub struct RasterArgs {
     #[arg(long)]
     pub(super) shadows: bool,
     /// Views of each frame.
-    #[arg(long, value_enum, default_value_t = Views::Stereo, help_heading = "Camera")]
-    views: Views,
+    #[arg(long, value_parser = views_parser(), default_value = "stereo", help_heading = "Camera")]
+    pub(super) views: &'static [Eye],
     /// Driver that captures; osmesa captures plain frames alone, without techniques.
-    #[arg(long, value_enum, default_value_t = Backend::Lavapipe, value_name = "NAME")]
-    backend: Backend,
-    /// Skip the render without capture that times and depths are compared with.
+    #[arg(long, value_parser = driver_parser(), default_value = "lavapipe", value_name = "NAME")]
+    pub(super) backend: Driver,
+    /// Skip the render without capture, which times and depths are compared with.
     #[arg(long)]
-    no_plain: bool,
-    /// Draw the picture while capturing, too, and compare it with the plain one.
+    pub(super) no_plain: bool,
+    /// Also draw the picture while capturing, and compare it with the picture without capture.
     #[arg(long)]
-    shade: bool,
+    pub(super) shade: bool,
     /// Hidden-surface removal of the renderer whose texture accesses are captured.
-    #[arg(long, value_enum, default_value_t = Hsr::EarlyZ)]
-    hsr: Hsr,
+    #[arg(long, value_parser = hsr_parser(), default_value = "early-z")]
+    pub(super) hsr: Fragments,
     /// Memory for raw records; a frame that needs more is captured in parts. The driver's limit is
     /// 128MiB.
     #[arg(long, value_name = "SIZE", default_value = "128MiB", value_parser = parse_bytes)]
     pub(super) record_budget: u64,
     /// How the trace's tiles are packed.
-    #[arg(long, value_enum, default_value_t = TileEncoding::Delta, value_name = "NAME")]
-    pub(super) encoding: TileEncoding,
-    /// Add what vertex processing reads and the primitives that enter each tile, for `replay run --frame`.
+    #[arg(long, value_parser = encoding_parser(), default_value = "delta", value_name = "NAME")]
+    pub(super) encoding: Encoding,
+    /// Add the data that vertex processing reads and the primitives per tile, for `replay run --frame`.
     #[arg(long)]
     pub(super) geometry: bool,
-    /// Draw or prepare what nobody sees, too: images, mip-levels, cascades, regions or all of
-    /// them. Pictures and trace stay the same.
+    /// Draw or prepare invisible things as well: images, mip-levels, cascades, regions or all of them.
+    /// Pictures and trace stay the same.
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
-    no_skip: Vec<Skip>,
-    /// Choose the techniques under a budget, for each frame: `flip=ERROR` (mean FLIP inside the
-    /// lens, 0 for lossless ones alone) or `pixels=PX` for those of least cost inside it, `budget-ms=MS` for the least
-    /// error whose median frame takes no longer.
+    pub(super) no_skip: Vec<Skip>,
+    /// Choose the techniques of each frame under a budget: `flip=ERROR` (mean FLIP inside the lens; 0 allows
+    /// only lossless techniques) or `pixels=PX` choose the least cost within that error; `budget-ms=MS`
+    /// chooses the least error whose median frame time stays within the budget.
     #[arg(long, value_name = "BUDGET", help_heading = "Techniques",
           conflicts_with_all = ["cull", "occlusion", "multiview", "hidden_area_mask", "hidden_area_mesh",
                                 "cull_distance", "cull_px", "far_field", "foveate",
@@ -91,8 +84,9 @@ pub struct RasterArgs {
     auto: Option<Budget>,
     #[command(flatten)]
     objective: ObjectiveArgs,
-    /// Render with techniques by name: `TECHNIQUE`, those of `tracegen techniques --only`, joined by `+`, then those of
-    /// single frames, `,FRAME:TECHNIQUE` or `,FIRST-LAST:TECHNIQUE`. What `--auto` chose can be captured again so.
+    /// Render with techniques by name: `TECHNIQUE` as in `tracegen techniques --only`, joined by `+`,
+    /// followed by exceptions for single frames, `,FRAME:TECHNIQUE` or `,FIRST-LAST:TECHNIQUE`. `--auto`
+    /// prints its choice in this form.
     #[arg(long, value_name = "TECHNIQUE", help_heading = "Techniques",
           conflicts_with_all = ["auto", "cull", "occlusion", "multiview", "hidden_area_mask", "far_field", "foveate",
                                 "views", "no_plain", "shade", "no_skip"])]
@@ -106,10 +100,10 @@ pub struct RasterArgs {
 }
 
 impl RasterArgs {
-    /// Pixels of all frames, as far as they can be told without the scene.
+    /// Pixels of all frames, as far as they are known without the scene.
     ///
     /// # Errors
-    /// A display that cannot be.
+    /// An invalid display.
     pub(super) fn pixels(&self) -> anyhow::Result<u64> {
         let [width, height] = self
             .scene
@@ -117,99 +111,70 @@ impl RasterArgs {
             .resolve(None, None)?
             .eye_size_px
             .map(u64::from);
-        let views = self.views.eyes().len() as u64;
+        let views = self.views.len() as u64;
         Ok(width * height * views * u64::from(self.frames))
     }
 }
 
-/// Drivers that capture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Backend {
-    /// Mesa's Vulkan driver on the processor.
-    Lavapipe,
-    /// OpenGL without a window, through llvmpipe or (GALLIUM_DRIVER=softpipe) softpipe.
-    Osmesa,
-    /// lavapipe where it is found, else OSMesa.
-    Auto,
+fn driver_parser() -> impl TypedValueParser<Value = Driver> {
+    choice([
+        (
+            "lavapipe",
+            Driver::Lavapipe,
+            "Mesa's Vulkan driver on the processor",
+        ),
+        (
+            "osmesa",
+            Driver::Osmesa,
+            "OpenGL without a window, through llvmpipe or (GALLIUM_DRIVER=softpipe) softpipe",
+        ),
+        (
+            "auto",
+            Driver::Auto,
+            "lavapipe where it is found, else OSMesa",
+        ),
+    ])
 }
 
-impl Backend {
-    fn driver(self) -> Driver {
-        match self {
-            Self::Lavapipe => Driver::Lavapipe,
-            Self::Osmesa => Driver::Osmesa,
-            Self::Auto => Driver::Auto,
-        }
-    }
+pub(super) fn encoding_parser() -> impl TypedValueParser<Value = Encoding> {
+    choice([
+        ("delta", Encoding::Delta, "Bit-packed differences"),
+        (
+            "planes",
+            Encoding::Planes,
+            "A plane for each primitive: about 0.5 of the size, slower to read and to write",
+        ),
+    ])
 }
 
-/// Tile encodings by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum TileEncoding {
-    /// Bit-packed differences.
-    Delta,
-    /// A plane for each primitive: about 0.5 of the size, slower to read and to write.
-    Planes,
+fn views_parser() -> impl TypedValueParser<Value = &'static [Eye]> {
+    const BOTH: &[Eye] = &[Eye::Left, Eye::Right];
+    choice([
+        ("stereo", BOTH, "Both eyes, left before right"),
+        ("left", &BOTH[..1], "The left eye alone"),
+        ("right", &BOTH[1..], "The right eye alone"),
+    ])
 }
 
-impl TileEncoding {
-    pub(super) fn encoding(self) -> Encoding {
-        match self {
-            Self::Delta => Encoding::Delta,
-            Self::Planes => Encoding::Planes,
-        }
-    }
-}
-
-/// Views of a frame.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Views {
-    /// Both eyes, left before right.
-    Stereo,
-    /// The left eye alone.
-    Left,
-    /// The right eye alone.
-    Right,
-}
-
-/// Hidden-surface removal while fragments are recorded; the words of `replay run --hsr`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Hsr {
-    /// Every fragment that a draw covers, whatever lies before it; for `replay run --hsr none`.
-    None,
-    /// Fragments that pass the depth test when they are drawn; for `--hsr early-z` and `deferred`.
-    EarlyZ,
-}
-
-impl Hsr {
-    fn fragments(self) -> Fragments {
-        match self {
-            Self::None => Fragments::All,
-            Self::EarlyZ => Fragments::DepthTested,
-        }
-    }
-}
-
-impl Views {
-    fn eyes(self) -> &'static [Eye] {
-        match self {
-            Self::Stereo => &[Eye::Left, Eye::Right],
-            Self::Left => &[Eye::Left],
-            Self::Right => &[Eye::Right],
-        }
-    }
-}
-
-/// Says that both views are not drawn at once, and why.
-pub(super) fn warn_of_multiview(defect: &str) {
-    shell::warn(&format!(
-        "multiview cannot be trusted, so views are drawn one by one: {defect}"
-    ));
+/// Names as in `replay run --hsr`.
+fn hsr_parser() -> impl TypedValueParser<Value = Fragments> {
+    choice([
+        (
+            "none",
+            Fragments::All,
+            "Every fragment that a draw covers, whatever lies before it; for `replay run --hsr none`",
+        ),
+        (
+            "early-z",
+            Fragments::DepthTested,
+            "Fragments that pass the depth test when they are drawn; for `--hsr early-z` and `deferred`",
+        ),
+    ])
 }
 
 impl RasterArgs {
-    /// Refuses what the OSMesa backend does not do.
-    fn check_plain_frames(&self) -> anyhow::Result<()> {
+    /// Refuses options that the OSMesa backend does not support.
+    pub(super) fn check_plain_frames(&self) -> anyhow::Result<()> {
         let auto = self.auto.map(|_| "--auto");
         let named = self.technique.as_ref().map(|_| "--technique");
         if let Some(flag) = auto
@@ -223,7 +188,7 @@ impl RasterArgs {
         Ok(())
     }
 
-    /// Refuses what leaves fragments out by depth, or is measured with the depth test.
+    /// Refuses options that depend on the depth test.
     fn check_without_depth_test(&self) -> anyhow::Result<()> {
         ensure!(
             !self.techniques.has_far_field(),
@@ -254,241 +219,22 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         &outputs,
         args.techniques.inputs().iter().map(PathBuf::as_path),
     )?;
-    if args.hsr == Hsr::None {
+    if args.hsr == Fragments::All {
         args.check_without_depth_test()?;
     }
-    if args.backend == Backend::Osmesa {
+    if args.backend == Driver::Osmesa {
         args.check_plain_frames()?;
     }
     let objective = args.objective.of(args.auto)?;
-    let chosen = args
-        .auto
-        .map(|budget| Techniques::Chosen(budget, objective));
-    let named = args
-        .technique
-        .clone()
-        .map(|named| Techniques::Named(Box::new(named)));
-    if let Some(techniques) = chosen.or(named) {
-        return super::raster_auto::run(args, &techniques, &outputs);
-    }
-    let started = Instant::now();
-    let cache = args.cache.open()?;
-    let progress = Progress::new("loading the scene", 0, "");
-    let setup = args
-        .scene
-        .setup(None, &args.path, 0..args.frames, &LoadOptions::ALL)?;
-    setup.check_outputs(&outputs)?;
-    let loaded = started.elapsed();
-    let cascades = cascades(&setup.scene, args.shadows);
-    progress.stage("preparing textures and shaders", 0, "");
-    let mut draws = DrawList::new(&setup.scene, cascades)?;
-    let size_px = setup.hmd.eye_size_px;
-    let bounds = setup.scene.bounds().unwrap_or_default();
-    let planner = Planner::new(
-        &args.techniques.settings(&setup.hmd)?,
-        &setup.hmd,
-        args.techniques.lens.lenses(&setup.hmd)?,
-        args.views.eyes(),
-        args.path.fps,
-    )?;
-    let (mut passes, mut finest) = (Vec::new(), Vec::new());
-    for views in &setup.frames {
-        // What moves decides what a frame's layers are.
-        draws.pose(&setup.scene, setup.moments.time_s(views.frame));
-        let job = self::job(args, &setup, &draws, &planner, bounds);
-        passes.extend(job.passes(views)?);
-        job.add_finest_levels(views, &mut finest)?;
-    }
-    draws.pose(
-        &setup.scene,
-        setup.moments.time_s(setup.moments.frames.start),
-    );
-    let job = job(args, &setup, &draws, &planner, bounds);
-    let searched = started.elapsed();
-    let uploads = TextureSet::prepare(&setup.scene, |image| finest[image], cache.as_ref())?;
-    let textured = started.elapsed();
-    for note in &uploads.notes {
-        shell::warn(note);
-    }
-    let driver = args.backend.driver();
-    let mut opened = driver.open(&setup.scene, &draws, &uploads, size_px, args.record_budget)?;
-    let backend = opened.backend.as_mut();
-    if let Some(reason) = &opened.instead_of {
-        shell::warn(&format!("{reason}; {} captures instead", backend.name()));
-    }
-    if backend.name() == "osmesa" {
-        args.check_plain_frames()?;
-    }
-    if let Some(lacks) = backend.records_fragments_because() {
-        note(&format!(
-            "{} lacks {lacks}: fragments are recorded one by one and merged into quads",
-            backend.driver()
-        ));
-    }
-    let tables = tables(
-        &setup,
-        &args.scene.scene,
-        &draws,
-        &uploads,
-        backend,
-        passes,
-        job.fragments,
-    );
-    let (total, cached, unseen) = (uploads.textures.len(), uploads.cached, uploads.unseen());
-    let texels = format!(
-        "{:.1} MiB of texels, {:.1} MiB left out ({unseen} images and the finest levels of {} that no view samples, found in {:.2} s)",
-        mib(uploads.bytes()),
-        mib(uploads.skipped_bytes()),
-        uploads.shortened(),
-        (searched - loaded).as_secs_f64()
-    );
-    drop(uploads);
-    let mut summary = Summary::default();
-    let first = summary.look(&job, backend, &setup.frames[0])?;
-    summary.light(&job, backend, &first)?;
-    if !args.no_plain {
-        job.warm_up(backend, &first)?;
-    }
-    if planner.settings().multiview
-        && let Some(defect) = backend.multiview_defect()?
-    {
-        warn_of_multiview(&defect);
-    }
-    let mut first = Some(first);
-    let mut recorder = job.recorder(&tables);
-    let ready = started.elapsed();
-    note(&format!(
-        "{}: ready in {:.2} s (scene {:.2} s; textures {:.2} s: {} compressed, {cached} from the cache, {unseen} seen by no view; driver {:.2} s)",
-        args.scene.scene,
-        ready.as_secs_f64(),
-        loaded.as_secs_f64(),
-        (textured - loaded).as_secs_f64(),
-        total - cached - unseen,
-        (ready - textured).as_secs_f64(),
-    ));
-    progress.stage("capturing", setup.frames.len() as u64, "frames");
-
-    let writer = TextraceWriter::create(&args.output, &tables)?;
-    let mut writer = writer.with_encoding(args.encoding.encoding());
-    if args.geometry {
-        writer = writer.with_geometry(geometry(&setup.scene, &draws))?;
-    }
-    let mut first_pictures: Option<Pictures> = None;
-    let mut first_pass = 0;
-    for views in &setup.frames {
-        let time_s = setup.moments.time_s(views.frame);
-        draws.pose(&setup.scene, time_s);
-        backend.pose(&draws);
-        if summary.doubtful.is_none() {
-            let doubtful = summary.doubtful.insert(Doubtful::default());
-            for eye in planner.eyes() {
-                doubtful.look(&setup.scene, &draws, &views.eyes[*eye as usize], size_px);
-            }
-        }
-        let job = self::job(args, &setup, &draws, &planner, bounds);
-        let frame = match first.take() {
-            Some(first) => first,
-            None => {
-                let frame = summary.look(&job, backend, views)?;
-                summary.light(&job, backend, &frame)?;
-                frame
-            }
-        };
-        // Without a picture, what the capture shares with the plain render is depth.
-        let compares_depth = !job.shaded && job.fragments == Fragments::DepthTested;
-        let mut plain = None;
-        if !args.no_plain {
-            let (worked, before) = (processor::time(), backend.work());
-            let (pictures, time) = job.plain_frame(backend, &frame)?;
-            summary.plain += time;
-            summary.plain_draws.add(before, backend.work());
-            summary.plain_work += worked_since(worked);
-            let depths = compares_depth.then(|| job.depths(backend, &frame));
-            plain = Some((pictures, depths.transpose()?));
-        }
-        let (start, worked, before) = (Instant::now(), processor::time(), backend.work());
-        let captured =
-            job.capture_frame(backend, &frame, first_pass, &mut recorder, &mut writer)?;
-        summary.capture_draws.add(before, backend.work());
-        first_pass += frame.plan.layers.len();
-        summary.sorting += captured.sorting;
-        summary.captured += start.elapsed();
-        summary.captured_work += worked_since(worked);
-        summary.counts += captured.counts;
-        summary.predicted.push(frame.plan.predicted);
-        let mut pictures = captured.pictures;
-        if let Some((plain, depths)) = plain {
-            let what = match (&pictures, depths) {
-                (Some(drawn), _) => Some(("pictures", *drawn == plain)),
-                (_, Some(depths)) => Some(("depths", job.depths(backend, &frame)? == depths)),
-                _ => None,
-            };
-            if let Some((what, same)) = what {
-                ensure!(
-                    same,
-                    "frame {}: {what} with and without capture differ: the capture disturbed the rendering",
-                    views.frame
-                );
-                summary.compared = Some(what);
-            }
-            pictures = Some(plain);
-        }
-        first_pictures = first_pictures.or(pictures);
-        progress.advance(1);
-    }
-    drop(progress);
-    let cannot_write = |path: &Path| format!("cannot write {}", path.display());
-    let image = match (&args.image, &first_pictures) {
-        (Some(path), Some(pictures)) => {
-            let prepared = picture::prepare_side_by_side(path, pictures, size_px)
-                .with_context(|| cannot_write(path))?;
-            Some((path, prepared))
-        }
-        _ => None,
+    let techniques = match (args.auto, &args.technique) {
+        (Some(budget), _) => Techniques::Chosen(budget, objective),
+        (None, Some(schedule)) => Techniques::Named(Box::new(schedule.clone())),
+        (None, None) => return super::raster_frames::run(args, &outputs),
     };
-    let start = Instant::now();
-    let file_bytes = writer.finish()?;
-    summary.captured += start.elapsed();
-    if let Some((path, prepared)) = image {
-        prepared.persist().with_context(|| cannot_write(path))?;
-    }
-    if summary.counts.fragments == 0 {
-        super::scene_args::warn_of_nothing_seen(&setup.camera, bounds, setup.scene.origin);
-    }
-    let of_a_frame = summary.counts.fragments / setup.frames.len().max(1) as u64;
-    let doubtful = summary.doubtful.unwrap_or_default();
-    for warning in doubtful.warnings(&setup.scene, of_a_frame) {
-        shell::warn(&warning);
-    }
-    let views = [setup.frames.len(), planner.eyes().len()];
-    note(&texels);
-    summary.print(views, size_px, file_bytes, &backend.work());
-    Ok(())
+    super::raster_auto::run(args, &techniques, &outputs)
 }
 
-/// What to capture of the draws where they stand.
-fn job<'a>(
-    args: &RasterArgs,
-    setup: &'a SceneSetup,
-    draws: &'a DrawList,
-    planner: &'a Planner,
-    bounds: (glam::Vec3, glam::Vec3),
-) -> CaptureJob<'a> {
-    CaptureJob {
-        scene: &setup.scene,
-        draws,
-        lighting: Lighting::new(&setup.scene),
-        bounds,
-        shadow_range_m: shadow_range_m(setup, bounds),
-        planner,
-        skips: Skips::without(&args.no_skip),
-        fragments: args.hsr.fragments(),
-        // Both views at once leave no depth to compare.
-        shaded: args.shade || planner.settings().multiview || args.no_plain && args.image.is_some(),
-    }
-}
-
-/// Shadow cascades of a scene, or those that `--shadows` adds.
+/// Shadow cascades of a scene, or the cascades that `--shadows` adds.
 pub(super) fn cascades(scene: &Scene, shadows: bool) -> u32 {
     if shadows {
         CASCADES
@@ -503,12 +249,13 @@ pub(super) fn shadow_range_m(setup: &SceneSetup, (lo, hi): (glam::Vec3, glam::Ve
         .abs()
         .max((setup.camera.eye - hi).abs())
         .length();
-    // What is nearer than 5 cm needs no shadows of its own, nor a twentieth of a smaller scene.
+    // Nothing nearer than 5 cm needs shadows of its own, nor anything nearer than a twentieth of a small
+    // scene.
     let near = setup.camera.near.max(farthest.min(1.0) * 0.05);
     [near, farthest.min(setup.camera.far).max(2.0 * near)]
 }
 
-/// The tables of a trace of the scene's frames, of which `fragments` are recorded.
+/// The tables of a trace of the scene's frames that records `fragments`.
 pub(super) fn tables(
     setup: &SceneSetup,
     spec: &str,
@@ -544,16 +291,11 @@ pub(super) fn tables(
     }
 }
 
-/// Bytes in MiB.
-fn mib(bytes: usize) -> f64 {
-    bytes as f64 / f64::from(1 << 20)
-}
-
-/// Sets what Mesa reads from the environment.
+/// Sets the environment variables that Mesa reads.
 pub(super) fn prepare_environment(threads: Option<u16>) {
     // SAFETY: the only other thread waits for signals; nothing reads the environment meanwhile.
     unsafe {
-        // Mesa's device selection asks a display server, in vain and aloud where there is none.
+        // Mesa's device selection tries to connect to a display server, and prints errors if there is none.
         std::env::set_var("NODEVICE_SELECT", "1");
         // At narrow vectors Mesa 22.3 corrupts memory where the processor has AVX2, and on some that have AVX.
         let set = |name: &str| std::env::var_os(name);
@@ -562,7 +304,7 @@ pub(super) fn prepare_environment(threads: Option<u16>) {
         {
             std::env::set_var("GALLIUM_OVERRIDE_CPU_CAPS", "sse4.1");
         }
-        // softpipe has all that the capture needs of OpenGL 4.5, as extensions of 3.3.
+        // softpipe provides all features of OpenGL 4.5 that the capture needs, as extensions of 3.3.
         if set("GALLIUM_DRIVER").is_some_and(|driver| driver == "softpipe") {
             std::env::set_var("MESA_GL_VERSION_OVERRIDE", "4.5");
             std::env::set_var("MESA_GLSL_VERSION_OVERRIDE", "450");

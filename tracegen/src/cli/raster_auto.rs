@@ -1,165 +1,107 @@
-//! `tracegen raster --auto` and `--technique`: the trace of a path whose frames are rendered with techniques that are
-//! chosen under a budget, or named.
+//! `tracegen raster --auto` and `--technique`: captures a path whose frames use techniques that a search
+//! chose or the user named.
 
-use super::prepared::{Prepared, prepare};
-use super::raster::{RasterArgs, cascades, warn_of_multiview};
+use super::capture_steps::{TraceOutput, load, warn_of_multiview_defect};
+use super::prepared::{Preparation, Prepared, prepare};
+use super::raster::RasterArgs;
 use super::scene_args::warn_of_nothing_seen;
-use crate::doubtful::Doubtful;
-use crate::picture;
 use crate::study::auto::{Budget, Known, Objective, Schedule, choose, search_frames};
-use crate::study::world::Tracer;
-use ::raster::backend::CaptureBackend;
-use ::raster::geometry::geometry;
-use ::raster::lavapipe::device;
-use anyhow::{Context, ensure};
-use formats::textrace::{Choice, ChosenTechniques, TextraceWriter};
+use crate::study::world::World;
+use crate::unstable_triangles::UnstableTriangles;
+use ::raster::lavapipe::{Lavapipe, device};
+use anyhow::ensure;
+use formats::textrace::{Choice, ChosenTechniques};
 use record::CaptureCounts;
-use scene::LoadOptions;
 use shell::{Output, Progress, note};
 use techniques::Planner;
 use visibility::Occlusion;
 
-/// Where the techniques of the frames come from.
+/// Source of the frames' techniques.
 #[derive(Clone, Debug)]
 pub enum Techniques {
     /// A search under a budget.
     Chosen(Budget, Objective),
-    /// The user.
+    /// Names from the user.
     Named(Box<Schedule>),
 }
 
-/// Chooses unless techniques are named, and captures each frame of the path with its own.
+/// Chooses the techniques unless they are named, and captures each frame of the path with its techniques.
 ///
 /// # Errors
 /// Unreadable input, no driver, a budget that nothing meets, or a file that cannot be written.
 pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> anyhow::Result<()> {
     let progress = Progress::new("loading the scene", 0, "");
-    let setup = args
-        .scene
-        .setup(None, &args.path, 0..args.frames, &LoadOptions::ALL)?;
-    setup.check_outputs(outputs)?;
-    let sizes = [
-        cascades(&setup.scene, args.shadows).into(),
-        args.record_budget,
-    ];
+    let setup = load(args, outputs)?;
     progress.stage("preparing textures and shaders", 0, "");
     let gpu = device::open(None)?;
-    let lens = args.techniques.lens.lenses(&setup.hmd)?;
     let camera = setup.camera.clone();
-    let prepared = prepare(
-        setup,
-        lens,
-        args.path.fps,
-        &args.scene.scene,
-        gpu,
-        sizes,
-        args.cache,
-    )?;
     let Prepared {
         mut world,
         mut backend,
-    } = prepared;
-    let frames: Vec<u32> = (0..args.frames).collect();
+    } = prepare(
+        Preparation {
+            lens: args.techniques.lens.lenses(&setup.hmd)?,
+            fps: args.path.fps,
+            scene: &args.scene.scene,
+            shadows: args.shadows,
+            record_budget: args.record_budget,
+            cache: args.cache,
+        },
+        setup,
+        gpu,
+    )?;
     let (schedule, choice) = match techniques {
         Techniques::Named(schedule) => ((**schedule).clone(), None),
         Techniques::Chosen(budget, objective) => {
-            // Alone: techniques tell even frames from odd ones.
-            let runs = search_frames(args.frames)
-                .into_iter()
-                .map(|frame| vec![frame]);
-            let found = choose(
+            let (schedule, choice) = search(
+                args.frames,
+                (*budget, *objective),
                 &mut world,
                 &mut backend,
-                runs.collect(),
-                *budget,
-                *objective,
-                Known::new(),
                 &progress,
             )?;
-            let choice = Choice {
-                budget: budget.to_string(),
-                objective: objective.name().to_owned(),
-                reason: found.record.reason,
-            };
-            (Schedule::of(&found.held), Some(choice))
+            (schedule, Some(choice))
         }
     };
-    if let Some(last) = schedule.last_frame() {
-        ensure!(
-            last < args.frames,
-            "--technique: expected frames below {}, found {last}",
-            args.frames
-        );
+    let planners = Planners::new(&world, &schedule, args.frames)?;
+    if planners.use_multiview() {
+        warn_of_multiview_defect(&mut backend)?;
     }
-    let mut planners: Vec<Planner> = Vec::new();
-    let mut of_frame = Vec::new();
-    for &frame in &frames {
-        let settings = &schedule.row(frame).settings;
-        let known = planners.iter().position(|p| p.settings() == settings);
-        of_frame.push(known.unwrap_or(planners.len()));
-        if known.is_none() {
-            ensure!(
-                settings.half_rate.is_none(),
-                "--technique: expected techniques that render every frame, found {}",
-                schedule.row(frame).name
-            );
-            world.check(settings)?;
-            planners.push(world.planner(settings)?);
-        }
-    }
-    let planner = |frame: u32| &planners[of_frame[frame as usize]];
-    if planners.iter().any(|planner| planner.settings().multiview)
-        && let Some(defect) = backend.multiview_defect()?
-    {
-        warn_of_multiview(&defect);
-    }
-    let mut tables = world.trace_tables(planner, &frames)?;
+    let frames: Vec<u32> = (0..args.frames).collect();
+    let mut tables = world.trace_tables(|frame| planners.of_frame(frame), &frames)?;
     let name = |frame: &u32| schedule.row(*frame).name.clone();
     tables.meta.techniques = Some(ChosenTechniques {
         frames: frames.iter().map(name).collect(),
         schedule: schedule.to_string(),
         choice: choice.clone(),
     });
-    let writer = TextraceWriter::create(&args.output, &tables)?;
-    let mut writer = writer.with_encoding(args.encoding.encoding());
-    if args.geometry {
-        writer = writer.with_geometry(geometry(&world.scene, &world.draws))?;
-    }
-    let mut tracer = Tracer::new(&tables, writer);
+    let mut output = TraceOutput::create(args, &tables, &world.scene, &world.draws)?;
     progress.stage("capturing", frames.len() as u64, "frames");
     let mut memory = Occlusion::default();
     let mut counts = CaptureCounts::default();
-    let (mut first, mut doubtful) = (None, Doubtful::default());
+    let (mut first, mut unstable) = (None, UnstableTriangles::default());
     for &frame in &frames {
-        let shot = world.shoot(&mut backend, planner(frame), frame, &mut memory)?;
+        let planner = planners.of_frame(frame);
+        let shot = world.shoot(&mut backend, planner, frame, &mut memory)?;
         if first.is_none() {
             first = Some(world.pictures(&mut backend, &shot)?);
-            let views = &world.views[frame as usize];
-            for eye in &views.eyes {
-                doubtful.look(&world.scene, &world.draws, eye, world.hmd.eye_size_px);
+            for eye in &world.views[frame as usize].eyes {
+                unstable.look(&world.scene, &world.draws, eye, world.hmd.eye_size_px);
             }
         }
-        counts += tracer.capture(&world.job(planner(frame)), &mut backend, &shot.frame)?;
+        let job = world.job(planner);
+        counts += output
+            .tracer
+            .capture(&job, &mut backend, &shot.frame)?
+            .counts;
         progress.advance(1);
     }
     drop(progress);
-    let image = match (&args.image, &first) {
-        (Some(path), Some(pictures)) => {
-            let cannot_write = || format!("cannot write {}", path.display());
-            let size_px = world.hmd.eye_size_px;
-            let prepared = picture::prepare_side_by_side(path, pictures, size_px);
-            Some((prepared.with_context(cannot_write)?, cannot_write()))
-        }
-        _ => None,
-    };
-    let file_bytes = tracer.into_writer().finish()?;
-    if let Some((image, cannot_write)) = image {
-        image.persist().context(cannot_write)?;
-    }
+    let file_bytes = output.finish(first.as_ref(), world.hmd.eye_size_px)?;
     if counts.fragments == 0 {
         warn_of_nothing_seen(&camera, world.bounds, world.scene.origin);
     }
-    for warning in doubtful.warnings(&world.scene, counts.fragments / u64::from(args.frames)) {
+    for warning in unstable.warnings(&world.scene, counts.fragments / u64::from(args.frames)) {
         shell::warn(&warning);
     }
     note(&format!(
@@ -175,4 +117,74 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
         ),
         None => format!("--technique {schedule}"),
     })
+}
+
+/// Searches for the techniques of a path's frames under a budget.
+fn search(
+    frames: u32,
+    (budget, objective): (Budget, Objective),
+    world: &mut World,
+    backend: &mut Lavapipe,
+    progress: &Progress,
+) -> anyhow::Result<(Schedule, Choice)> {
+    // Single frames, because techniques treat even and odd frames differently.
+    let runs = search_frames(frames).into_iter().map(|frame| vec![frame]);
+    let known = Known::new();
+    let found = choose(
+        world,
+        backend,
+        runs.collect(),
+        budget,
+        objective,
+        known,
+        progress,
+    )?;
+    let choice = Choice {
+        budget: budget.to_string(),
+        objective: objective.name().to_owned(),
+        reason: found.record.reason,
+    };
+    Ok((Schedule::of(&found.held), choice))
+}
+
+/// The planners of a path's frames, one per different settings.
+struct Planners {
+    planners: Vec<Planner>,
+    of_frame: Vec<usize>,
+}
+
+impl Planners {
+    fn new(world: &World, schedule: &Schedule, frames: u32) -> anyhow::Result<Self> {
+        if let Some(last) = schedule.last_frame() {
+            ensure!(
+                last < frames,
+                "--technique: expected frames below {frames}, found {last}"
+            );
+        }
+        let mut planners: Vec<Planner> = Vec::new();
+        let mut of_frame = Vec::new();
+        for frame in 0..frames {
+            let row = schedule.row(frame);
+            let known = (planners.iter()).position(|p| p.settings() == &row.settings);
+            of_frame.push(known.unwrap_or(planners.len()));
+            if known.is_none() {
+                ensure!(
+                    row.settings.half_rate.is_none(),
+                    "--technique: expected techniques that render every frame, found {}",
+                    row.name
+                );
+                world.check(&row.settings)?;
+                planners.push(world.planner(&row.settings)?);
+            }
+        }
+        Ok(Self { planners, of_frame })
+    }
+
+    fn of_frame(&self, frame: u32) -> &Planner {
+        &self.planners[self.of_frame[frame as usize]]
+    }
+
+    fn use_multiview(&self) -> bool {
+        (self.planners.iter()).any(|planner| planner.settings().multiview)
+    }
 }

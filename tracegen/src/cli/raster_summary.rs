@@ -1,20 +1,19 @@
-//! What `tracegen raster` says when it is done: what was drawn, recorded and left out, and how long it took.
+//! Summary of `tracegen raster`: what was drawn, recorded and skipped, and the times.
 
-use crate::doubtful::Doubtful;
 use crate::study::{memory, processor};
+use crate::unstable_triangles::UnstableTriangles;
 use formats::view::FrameViews;
 use raster::backend::{CaptureBackend, Work};
 use raster::capture::CaptureJob;
 use raster::error::RasterError;
-use raster::frame::Frame;
-use raster::skips::Skipped;
+use raster::frame::{Frame, Skipped};
 use record::CaptureCounts;
 use shell::note;
 use std::time::{Duration, Instant};
 use techniques::layer::Predicted;
 use visibility::Occlusion;
 
-/// What a stage of all frames submitted.
+/// Work that a stage submitted over all frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Submitted {
     draws: u64,
@@ -23,7 +22,7 @@ pub struct Submitted {
 }
 
 impl Submitted {
-    /// Adds what a backend did between two readings of its work.
+    /// Adds the difference of two readings of a backend's work.
     pub fn add(&mut self, before: Work, after: Work) {
         let work = after - before;
         self.draws += work.draws;
@@ -41,22 +40,22 @@ impl std::fmt::Display for Submitted {
 /// Sums over the frames.
 #[derive(Default)]
 pub struct Summary {
-    /// By stage; what warms the driver up or compares depths is in none.
+    /// Draws per stage. Warming up the driver and comparing depths are not counted.
     pub shadow_draws: Submitted,
     pub plain_draws: Submitted,
     pub capture_draws: Submitted,
     pub shadows: Duration,
     pub plain: Duration,
     pub captured: Duration,
-    /// Processors' time of the plain renders and of the captures; zero where the system does not tell.
+    /// Processor time of the plain renders and of the captures; zero if the system does not report it.
     pub plain_work: Duration,
     pub captured_work: Duration,
     pub sorting: Duration,
     pub counts: CaptureCounts,
     pub predicted: Vec<Predicted>,
-    /// Of the first frame.
-    pub doubtful: Option<Doubtful>,
-    /// What is the same with and without capture.
+    /// Unstable triangles of the first frame.
+    pub unstable: Option<UnstableTriangles>,
+    /// What was found identical with and without capture.
     pub compared: Option<&'static str>,
     pub looking: Duration,
     pub culling: Duration,
@@ -81,7 +80,7 @@ impl Summary {
         Ok(())
     }
 
-    /// Finds what a frame draws.
+    /// Culls the draws of a frame.
     pub fn look(
         &mut self,
         job: &CaptureJob<'_>,
@@ -109,6 +108,19 @@ impl Summary {
         file_bytes: u64,
         work: &Work,
     ) {
+        self.print_counts([frames, views], size_px, file_bytes);
+        self.print_work(frames, work);
+        self.print_times();
+        if let Some(bytes) = memory::peak_bytes() {
+            note(&format!(
+                "peak memory    {:.0} MiB",
+                bytes as f64 / f64::from(1 << 20)
+            ));
+        }
+    }
+
+    /// What was recorded, and the size of the trace.
+    fn print_counts(&self, [frames, views]: [usize; 2], size_px: [u32; 2], file_bytes: u64) {
         let CaptureCounts {
             quads,
             fragments,
@@ -116,7 +128,7 @@ impl Summary {
             masked_lanes_killed,
             not_finite,
             tile_bytes,
-            empty_tiles,
+            ..
         } = self.counts;
         let per = |bytes: u64, n: u64| bytes as f64 / n.max(1) as f64;
         let pixels = (views * frames) as f64 * f64::from(size_px[0]) * f64::from(size_px[1]);
@@ -153,6 +165,10 @@ impl Summary {
             per(tile_bytes, records),
             record::RECORD_BYTES
         ));
+    }
+
+    /// What was drawn and skipped.
+    fn print_work(&self, frames: usize, work: &Work) {
         note(&format!(
             "shadow maps    {} in {:.3} s: {}",
             work.shadow_maps,
@@ -171,10 +187,14 @@ impl Summary {
             self.culling.as_secs_f64() * 1e3 / frames as f64
         ));
         note(&format!(
-            "never drawn    {empty_tiles} empty tiles, {} shadow cascades that nobody sees (draws found in {:.3} s)",
+            "never drawn    {} empty tiles, {} shadow cascades that nobody sees (draws found in {:.3} s)",
+            self.counts.empty_tiles,
             self.skipped.cascades,
             self.looking.as_secs_f64()
         ));
+    }
+
+    fn print_times(&self) {
         let captured = self.captured.as_secs_f64();
         let includes = "all views";
         if !self.plain.is_zero() {
@@ -209,16 +229,10 @@ impl Summary {
                 self.capture_draws, self.capture_draws.regions
             ));
         }
-        if let Some(bytes) = memory::peak_bytes() {
-            note(&format!(
-                "peak memory    {:.0} MiB",
-                bytes as f64 / f64::from(1 << 20)
-            ));
-        }
     }
 }
 
-/// Processors' time since `before`.
+/// Processor time since `before`.
 pub fn worked_since(before: Option<Duration>) -> Duration {
     let since = before
         .zip(processor::time())

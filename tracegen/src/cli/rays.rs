@@ -1,15 +1,17 @@
 //! `tracegen rays`.
 
+use super::choice::choice;
 use super::path_args::PathArgs;
 use super::scene_args::{SceneArgs, SceneSetup, capture_outputs};
 use anyhow::{Context, bail};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 use formats::container::AtomicFile;
 use formats::raytrace::{
     EyeCamera, RayKind, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
 };
 use formats::textrace::TraceMeta;
-use rays::frame::{Frame, trace_frame};
+use rays::frame::{RayFrame, trace_frame};
 use rays::picture;
 use rays::scene::TraceScene;
 use rays::tracer::TraceSettings;
@@ -19,7 +21,7 @@ use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Eye size where neither `--size` nor `--hmd` is given: together 2048x1024, as in the paper.
+/// Default eye size, without `--size` and `--hmd`: together 2048x1024, as in the paper.
 const DEFAULT_SIZE_PX: [u32; 2] = [1024, 1024];
 
 /// Arguments of `tracegen rays`.
@@ -32,7 +34,7 @@ pub struct RaysArgs {
     output: PathBuf,
     #[command(flatten)]
     path: PathArgs,
-    /// Number of the path's frame that is traced.
+    /// Number of the frame of the path that is traced.
     #[arg(long, value_name = "N", default_value_t = 0, help_heading = "Camera",
           value_parser = clap::value_parser!(u32).range(0..i64::from(MAX_FRAMES)))]
     frame: u32,
@@ -50,27 +52,33 @@ pub struct RaysArgs {
     /// Record every node and triangle that each ray visits, for cache models (large).
     #[arg(long)]
     visits: bool,
-    /// Tree that is walked; the steps of bvh2 are T&I unit 2.0's.
-    #[arg(long, value_enum, default_value_t = Tree::Bvh2)]
-    bvh: Tree,
+    /// Tree that rays traverse; steps of bvh2 are counted as in T&I unit 2.0.
+    #[arg(long, value_parser = bvh_parser(), default_value = "bvh2")]
+    bvh: TraversalKind,
     #[command(flatten)]
     threads: Threads,
 }
 
-/// `--bvh`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Tree {
-    /// Binary: a step tests two boxes.
-    Bvh2,
-    /// Eight-wide: a step tests eight.
-    Bvh8,
+fn bvh_parser() -> impl TypedValueParser<Value = TraversalKind> {
+    choice([
+        (
+            "bvh2",
+            TraversalKind::Bvh2,
+            "Binary: a step tests two boxes",
+        ),
+        (
+            "bvh8",
+            TraversalKind::Bvh8,
+            "Eight-wide: a step tests eight",
+        ),
+    ])
 }
 
 impl RaysArgs {
-    /// Samples of both eyes, as far as they can be told without the scene.
+    /// Samples of both eyes, as far as they are known without the scene.
     ///
     /// # Errors
-    /// A display that cannot be.
+    /// An invalid display.
     pub(super) fn samples(&self) -> anyhow::Result<u64> {
         let hmd = self.scene.hmd.resolve(Some(DEFAULT_SIZE_PX), None)?;
         let [width, height] = hmd.eye_size_px.map(u64::from);
@@ -89,7 +97,7 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     let start = Instant::now();
     let progress = Progress::new("loading the scene", 0, "");
     let textures = LoadOptions {
-        // Base colour, metallic-roughness and emissive: what rays look at.
+        // Base colour, metallic-roughness and emissive: the textures that rays sample.
         slots: [true, false, true, false, false, true],
     };
     let setup = {
@@ -110,7 +118,7 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     let (frame, writer) = trace(args, &scene, &mut tables, &progress)?;
     drop(progress);
     let traced = start.elapsed();
-    // Complete before the trace gets its name: a full disk leaves neither.
+    // The picture is complete before the trace is renamed, so that a full disk leaves neither.
     let image = args.image.as_deref().map(|path| image_file(&frame, path));
     let image = image.transpose()?;
     let file_bytes = writer.finish(&tables)?;
@@ -124,7 +132,7 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Builds the hierarchy and everything of the trace but its tiles.
+/// Builds the hierarchy and the tables of the trace.
 fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, RaytraceTables)> {
     let SceneSetup {
         mut scene,
@@ -137,10 +145,7 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
     scene.pose(moments.time_s(moments.frames.start));
     let (scene_triangles, scene_origin) = (scene.triangle_count(), scene.origin);
     let scene = TraceScene::new(scene)?;
-    let traversal = match args.bvh {
-        Tree::Bvh2 => TraversalKind::Bvh2,
-        Tree::Bvh8 => TraversalKind::Bvh8,
-    };
+    let traversal = args.bvh;
     let bvh = scene.bvh.summary(traversal);
     let Some(views) = frames.first() else {
         bail!("the camera path has no frame");
@@ -189,7 +194,7 @@ fn trace(
     scene: &TraceScene,
     tables: &mut RaytraceTables,
     progress: &Progress,
-) -> anyhow::Result<(Frame, RaytraceWriter)> {
+) -> anyhow::Result<(RayFrame, RaytraceWriter)> {
     let settings = TraceSettings {
         max_depth: args.depth,
         samples_per_px: args.spp,
@@ -208,15 +213,15 @@ fn cannot_write(path: &Path) -> String {
     format!("cannot write {}", path.display())
 }
 
-fn image_file(frame: &Frame, path: &Path) -> anyhow::Result<AtomicFile> {
+fn image_file(frame: &RayFrame, path: &Path) -> anyhow::Result<AtomicFile> {
     let place = || cannot_write(path);
     let mut file = AtomicFile::create(path).with_context(place)?;
     picture::write_png(&frame.images, &mut file).with_context(place)?;
     Ok(file)
 }
 
-/// The figures of a trace, on stderr: they vary from run to run.
-fn report(tables: &RaytraceTables, frame: &Frame, bytes: u64, at: [Duration; 3]) {
+/// Prints figures that vary from run to run on stderr.
+fn report(tables: &RaytraceTables, frame: &RayFrame, bytes: u64, at: [Duration; 3]) {
     let (bvh, stats) = (&tables.bvh, &frame.stats);
     let [loaded, prepared, traced] = at.map(|t| t.as_secs_f64());
     let rays = stats.total_rays();

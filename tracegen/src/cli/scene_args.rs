@@ -1,4 +1,4 @@
-//! Flags that say what is looked at, from where and through which display.
+//! Flags for the scene, the camera and the display.
 
 use super::path_args::PathArgs;
 use clap::Args;
@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 pub struct SceneArgs {
     /// A built-in scene (see `tracegen scenes`) or a .gltf, .glb or .obj file.
     ///
-    /// A file's images may together decode to 512 MiB of RGBA8 texels, or to 128 bytes a byte of
-    /// their files where that is more.
+    /// The images of a file may decode to at most 512 MiB of RGBA8 texels, or to 128 bytes per byte of their
+    /// files if that is more.
     #[arg(value_name = "SCENE")]
     pub scene: String,
     /// Camera flags.
@@ -28,7 +28,7 @@ pub struct SceneArgs {
     pub hmd: HmdArgs,
 }
 
-/// A capture's outputs: the trace and perhaps a picture.
+/// A capture's outputs: the trace and optionally a picture.
 #[must_use]
 pub fn capture_outputs(trace: &Path, image: Option<&Path>) -> Vec<Output> {
     let mut outputs = vec![Output::binary("--output", trace)];
@@ -36,31 +36,31 @@ pub fn capture_outputs(trace: &Path, image: Option<&Path>) -> Vec<Output> {
     outputs
 }
 
-/// Everything that a capture needs to know about its scene and views.
+/// Scene and views of a capture.
 #[derive(Debug)]
 pub struct SceneSetup {
     /// The scene.
     pub scene: Scene,
-    /// The pose that the head's path leaves from.
+    /// The pose at the start of the head's path.
     pub camera: Camera,
     /// The display.
     pub hmd: Hmd,
     /// The eyes' matrices by frame.
     pub frames: Vec<FrameViews>,
-    /// When the frames are.
+    /// Times of the frames.
     pub moments: Moments,
-    /// Every file that scene and path were read from or refer to.
+    /// Every file that was read for the scene and the path.
     pub inputs: Vec<PathBuf>,
 }
 
 impl SceneArgs {
-    /// Checks outputs before minutes go into loading the scene, as far as its arguments tell; see
+    /// Checks outputs before the scene is loaded, as far as the arguments allow; see
     /// [`SceneSetup::check_outputs`] for the rest.
     ///
     /// # Errors
-    /// One that cannot be written, or that would replace the scene, the path or another.
+    /// An output that cannot be written, or that would replace the scene, the path or another output.
     pub fn check_outputs(&self, path: &PathArgs, outputs: &[Output]) -> anyhow::Result<()> {
-        // The names of built-in scenes have no extension and name no file.
+        // Names of built-in scenes have no extension and are not files.
         let scene = Path::new(&self.scene);
         let path = path.file();
         let inputs = scene.extension().map(|_| scene).into_iter();
@@ -68,13 +68,13 @@ impl SceneArgs {
         Ok(())
     }
 
-    /// Loads the scene (its warnings go to stderr) and works out the views.
+    /// Loads the scene (its warnings go to stderr) and computes the views.
     ///
-    /// `default_size_px` is the eye size where neither `--size` nor `--hmd` is given; `frames` are
-    /// the numbers of the frames along the path.
+    /// `default_size_px` is the eye size without `--size` and `--hmd`; `frames` are the numbers of the frames
+    /// along the path.
     ///
     /// # Errors
-    /// Wrong flags and an unreadable path, checked first, or an unreadable scene.
+    /// Wrong flags and an unreadable path, which are checked first, or an unreadable scene.
     pub fn setup(
         &self,
         default_size_px: Option<[u32; 2]>,
@@ -82,7 +82,7 @@ impl SceneArgs {
         frames: Range<u32>,
         options: &LoadOptions,
     ) -> anyhow::Result<SceneSetup> {
-        // Flags that need no scene are checked before minutes go into loading one.
+        // Flags that do not depend on the scene are checked before it is loaded, which may take minutes.
         self.hmd.resolve(default_size_px, None)?;
         self.camera.validate_alone()?;
         let path_file = path.file();
@@ -113,7 +113,8 @@ impl SceneArgs {
 }
 
 impl SceneSetup {
-    /// Checks a command's outputs against every file that scene and path refer to, which only loading them tells.
+    /// Checks a command's outputs against every file that scene and path refer to, which are only known after
+    /// loading.
     ///
     /// # Errors
     /// See [`shell::check_outputs`].
@@ -123,12 +124,12 @@ impl SceneSetup {
     }
 }
 
-/// Warns of eyes so far from the scene's origin that what is near them has coarse coordinates.
+/// Warns if the eyes are so far from the scene's origin that nearby coordinates are coarse.
 fn warn_of_coarse_places(camera: &Camera, frames: &[FrameViews], origin: DVec3) {
     let eyes = frames.iter().flat_map(|views| &views.eyes);
     let farthest = (eyes.flat_map(|eye| eye.position)).fold(0.0_f32, |far, at| far.max(at.abs()));
     let step_m = farthest * f32::EPSILON;
-    // A sixty-fourth of the near plane's distance is about a pixel there.
+    // A sixty-fourth of the near plane's distance is about one pixel there.
     if step_m > camera.near / 64.0 {
         shell::warn(&format!(
             "the eyes are {farthest:.0} m from where the scene's coordinates are counted from ({origin:.0}): \
@@ -137,7 +138,7 @@ fn warn_of_coarse_places(camera: &Camera, frames: &[FrameViews], origin: DVec3) 
     }
 }
 
-/// Loads a scene, with the files that it refers to, and prints its warnings on stderr.
+/// Loads a scene and its files, and prints its warnings on stderr.
 ///
 /// # Errors
 /// An unreadable scene.
@@ -153,7 +154,7 @@ pub fn load_scene(spec: &str, options: &LoadOptions) -> anyhow::Result<(Scene, V
     Ok((scene, files))
 }
 
-/// Warns of a picture without any part of the scene; coordinates are relative to `origin`.
+/// Warns that no part of the scene is in the picture; coordinates are relative to `origin`.
 pub fn warn_of_nothing_seen(camera: &Camera, (low, high): (Vec3, Vec3), origin: DVec3) {
     let [eye, target, low, high] =
         [camera.eye, camera.target, low, high].map(|point| origin + point.as_dvec3());
@@ -164,11 +165,11 @@ pub fn warn_of_nothing_seen(camera: &Camera, (low, high): (Vec3, Vec3), origin: 
     ));
 }
 
-/// Where the head is.
+/// Position and direction of the head.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Camera")]
 pub struct CameraArgs {
-    /// Camera of the scene by name, with or without its `cam_`; the first one if left out.
+    /// Name of a camera of the scene, with or without `cam_` [default: the first camera].
     #[arg(long, value_name = "NAME")]
     pub camera: Option<String>,
     /// Position between the eyes in metres (with --target, instead of --camera).
@@ -202,7 +203,7 @@ impl CameraArgs {
     /// The head's pose in `scene`.
     ///
     /// # Errors
-    /// An unknown camera, or one that looks nowhere.
+    /// An unknown camera, or one without a direction.
     pub fn resolve(&self, scene: &Scene) -> Result<Camera, cameras::CameraError> {
         let from_scene = cameras::find(scene, self.camera.as_deref())?;
         let camera = match (self.eye, self.target) {
@@ -215,7 +216,7 @@ impl CameraArgs {
         Ok(camera)
     }
 
-    /// Checks the pose that flags give, as far as that is possible without a scene.
+    /// Checks the pose from the flags, as far as that is possible without a scene.
     fn validate_alone(&self) -> Result<(), cameras::CameraError> {
         let (Some(eye), Some(target)) = (self.eye, self.target) else {
             return Ok(());
@@ -238,8 +239,8 @@ pub struct HmdArgs {
     /// Horizontal field of view of symmetric eyes with square pixels.
     #[arg(long, value_name = "DEG", conflicts_with = "fov_tangents")]
     pub hfov: Option<f32>,
-    /// Tangents of the half-angles (left,right,up,down) of the left eye, and after a semicolon of
-    /// the right eye; without it the right eye mirrors the left.
+    /// Tangents of the half-angles (left,right,up,down) of the left eye, and after a semicolon of the right
+    /// eye; without a semicolon the right eye mirrors the left.
     #[arg(long, value_name = "L,R,U,D[;L,R,U,D]", value_parser = parse_tangents,
           allow_hyphen_values = true)]
     pub fov_tangents: Option<[FovTangents; 2]>,
@@ -252,10 +253,10 @@ pub struct HmdArgs {
 }
 
 impl HmdArgs {
-    /// The display that the flags describe; `custom` where any of them changes the preset.
+    /// The display that the flags describe; named `custom` if any flag changes the preset.
     ///
-    /// `default_size_px` is a command's own eye size for the default preset; `vfov_deg` makes the
-    /// eyes symmetric with that vertical field of view.
+    /// `default_size_px` is a command's own eye size for the default preset; `vfov_deg` makes the eyes
+    /// symmetric with that vertical field of view.
     ///
     /// # Errors
     /// An unknown preset or a figure out of range.
@@ -270,7 +271,7 @@ impl HmdArgs {
         if let Some(size) = size {
             result.eye_size_px = size;
             if is_default {
-                // The default is defined by its angle, so another aspect keeps square pixels.
+                // The default is defined by its angle, so another aspect ratio keeps square pixels.
                 result.fov = [hmd::symmetric(100.0, size); 2];
             }
         }
@@ -324,7 +325,7 @@ fn parse_numbers<const N: usize>(text: &str) -> Result<[f32; N], String> {
     Ok(parse_doubles::<N>(text)?.map(|number| number as f32))
 }
 
-/// Exactly `N` numbers separated by commas that are finite in single precision, too.
+/// Exactly `N` numbers separated by commas that are finite in single precision as well.
 fn parse_doubles<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let numbers = text
         .split(',')
@@ -345,7 +346,7 @@ fn parse_vec3(text: &str) -> Result<Vec3, String> {
     parse_numbers::<3>(text).map(Vec3::from)
 }
 
-/// A point of the world, which may lie far out.
+/// A point of the world, which may be far from the origin.
 fn parse_point(text: &str) -> Result<DVec3, String> {
     parse_doubles::<3>(text).map(DVec3::from)
 }
@@ -450,7 +451,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_parsed_is_told() {
+    fn what_cannot_be_parsed_is_reported() {
         for (flags, part) in [
             ("--size 0x5", "0x5"),
             ("--size 9000x10", "8192"),
@@ -478,7 +479,7 @@ mod tests {
     }
 
     #[test]
-    fn angles_and_poses_out_of_range_are_told_before_the_scene_is_read() {
+    fn angles_and_poses_out_of_range_are_reported_before_the_scene_is_read() {
         for (flags, part) in [
             ("--hfov 180", "less than 180"),
             ("--hfov 0", "more than 0"),

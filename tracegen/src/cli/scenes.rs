@@ -1,4 +1,4 @@
-//! `tracegen scenes`: built-in scenes, or what a file holds.
+//! `tracegen scenes`: lists the built-in scenes, or describes a scene.
 
 use super::cache_args::CacheArgs;
 use super::scene_args::load_scene;
@@ -13,10 +13,10 @@ use textures::{Cache, TextureSet};
 /// Arguments of `tracegen scenes`.
 #[derive(Args, Debug)]
 pub struct ScenesArgs {
-    /// A scene file or built-in scene to describe; without it the built-in scenes are listed.
+    /// Scene file or built-in scene to describe; without it the built-in scenes are listed.
     #[arg(value_name = "SCENE")]
     scene: Option<String>,
-    /// Also read the images, compress them as a capture does, and tell the bytes.
+    /// Also read and compress the images as a capture does, and print their size.
     #[arg(long, requires = "scene")]
     textures: bool,
     #[command(flatten)]
@@ -103,7 +103,7 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
     shell::print(&text)
 }
 
-/// Loads and compresses everything; how long that took goes to stderr.
+/// Loads and compresses everything, and prints the time on stderr.
 fn read_textures(spec: &str, cache: Option<&Cache>) -> anyhow::Result<Description> {
     let start = Instant::now();
     let (scene, _) = load_scene(spec, &LoadOptions::ALL)?;
@@ -197,7 +197,7 @@ fn describe(scene: &Scene) -> Description {
     }
 }
 
-/// World coordinates of a point; digits that single precision does not have are left out.
+/// World coordinates of a point, with the digits that single precision has.
 fn in_world(scene: &Scene, point: Vec3) -> [f64; 3] {
     std::array::from_fn(|axis| {
         let written: f64 = point[axis].to_string().parse().unwrap_or(f64::NAN);

@@ -11,13 +11,13 @@ use std::process::ExitCode;
 /// Arguments of `tracegen stress`.
 #[derive(Args, Debug)]
 pub struct StressArgs {
-    /// Folder for stress.json and stress.md; what else it holds stays as it is.
+    /// Folder for stress.json and stress.md; its other files stay as they are.
     #[arg(short, long, value_name = "FOLDER")]
     output: PathBuf,
     /// Sweeps to run, separated by commas [default: all].
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = names())]
     only: Vec<String>,
-    /// Also points that take minutes and gigabytes: 10 million triangles.
+    /// Also run points that take minutes and gigabytes: 10 million triangles.
     #[arg(long)]
     full: bool,
 }

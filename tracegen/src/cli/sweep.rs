@@ -18,11 +18,11 @@ use std::time::Duration;
 /// Schema of `--plan --json`.
 const PLAN_SCHEMA: &str = "tracegen.plan/1";
 
-/// An unfinished trace that nobody has written to for so long has no writer.
+/// An unfinished trace that has not changed for this long is abandoned.
 const ABANDONED_AFTER: Duration = Duration::from_secs(24 * 3600);
 
-/// Pixels that take as long to draw as a triangle to load and prepare, and samples to trace
-/// (results/capture-costs.csv).
+/// Number of pixels that take as long to draw as one triangle takes to load and prepare, and the same for
+/// samples of rays (results/capture-costs.csv).
 const PIXELS_PER_TRIANGLE: u64 = 8;
 const SAMPLES_PER_TRIANGLE: u64 = 10;
 
@@ -54,17 +54,17 @@ pub struct SweepArgs {
     threads: Threads,
 }
 
-/// A capture, and whether it is there.
+/// A capture, and whether its trace exists.
 struct Planned {
     capture: Capture,
     trace: PathBuf,
-    /// Estimated, in pixels or samples.
+    /// Estimated cost in pixels or samples.
     cost: u64,
     done: bool,
 }
 
 #[derive(Serialize)]
-struct Document<'a> {
+struct PlanDocument<'a> {
     schema: &'a str,
     tool: String,
     captures: Vec<PlannedCapture<'a>>,
@@ -99,7 +99,7 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
         Some(shard) => of_shard(&planned, shard),
     };
     let mine = &mut planned[mine];
-    // Reads every trace to its end, so only those of this shard.
+    // This reads every trace to its end, so only the traces of this shard are checked.
     for p in &mut *mine {
         p.done = is_done(&p.capture, &args.output);
     }
@@ -110,7 +110,7 @@ pub fn run(args: &SweepArgs) -> anyhow::Result<()> {
     capture_all(args, mine)
 }
 
-/// The folder that paths in a manifest are relative to.
+/// The folder of a manifest; paths in the manifest are relative to it.
 fn folder_of(manifest: &Path) -> &Path {
     match manifest.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
@@ -118,9 +118,9 @@ fn folder_of(manifest: &Path) -> &Path {
     }
 }
 
-/// Triangles of scenes, each loaded once, without its images.
+/// Numbers of triangles of scenes, each loaded once, without its images.
 struct SceneSizes<'a> {
-    /// What paths are relative to.
+    /// Folder that paths are relative to.
     folder: &'a Path,
     triangles: HashMap<String, u64>,
 }
@@ -152,12 +152,12 @@ impl<'a> SceneSizes<'a> {
     }
 }
 
-/// True where the capture's trace is there, whole, and the one that its recipe made.
+/// Whether the capture's trace exists, is whole, and was made by its recipe.
 fn is_done(capture: &Capture, folder: &Path) -> bool {
     let Ok(recipe) = read_regular(&folder.join(capture.recipe_file())) else {
         return false;
     };
-    // Traces take a while to read: most that are not done differ in the arguments already.
+    // Reading traces takes long, and the arguments of most unfinished captures differ already.
     let first = recipe.split(|byte| *byte == b'\n').next();
     let same = first == Some(capture.recipe().as_bytes());
     let checksum = || content_checksum(&folder.join(&capture.file));
@@ -222,15 +222,15 @@ fn plan_text(planned: &[Planned], json: bool) -> anyhow::Result<String> {
         cost: p.cost,
         done: p.done,
     });
-    Ok(serde_json::to_string(&Document {
+    Ok(serde_json::to_string(&PlanDocument {
         schema: PLAN_SCHEMA,
         tool: super::tool(),
         captures: captures.collect(),
     })?)
 }
 
-/// Makes what is not there, each capture in a process of its own: it has the driver to itself, and
-/// its trace is that of the same command line by hand.
+/// Makes the missing captures. Each runs in its own process, so it has the driver to itself and its trace
+/// equals that of the same command line.
 fn capture_all(args: &SweepArgs, planned: &[Planned]) -> anyhow::Result<()> {
     let place = || args.output.display().to_string();
     shell::check_folder("--output", &args.output)?;
@@ -248,7 +248,7 @@ fn capture_all(args: &SweepArgs, planned: &[Planned]) -> anyhow::Result<()> {
     let mut failed = Vec::new();
     for p in &open {
         let recipe = args.output.join(p.capture.recipe_file());
-        // A recipe stands only beside the trace that it made.
+        // A recipe exists only beside the trace that it made.
         if recipe.exists() {
             std::fs::remove_file(&recipe).with_context(|| recipe.display().to_string())?;
         }
@@ -270,7 +270,7 @@ fn capture_all(args: &SweepArgs, planned: &[Planned]) -> anyhow::Result<()> {
         progress.advance(1);
     }
     drop(progress);
-    // What cannot be removed does no harm: nobody reads unfinished files.
+    // Unfinished files that cannot be removed are harmless, because they are never read.
     let _left = remove_abandoned(&args.output, ABANDONED_AFTER);
     ensure!(
         failed.is_empty(),

@@ -1,10 +1,11 @@
-//! Flags that say what a capture may leave out or do more coarsely.
+//! Flags for techniques, which leave out work or do it more coarsely.
 
+use super::choice::choice;
 use super::lens_args::LensArgs;
 use crate::hidden_mesh;
 use anyhow::ensure;
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
+use clap::Args;
+use clap::builder::TypedValueParser;
 use formats::view::Hmd;
 use scene::paths::read_gazes;
 use std::path::{Path, PathBuf};
@@ -20,23 +21,24 @@ use visibility::Culling;
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Techniques")]
 pub struct TechniqueArgs {
-    /// How the draws of a frame are found.
+    /// How the visible draws of a frame are found.
     #[arg(long, value_name = "NAME", default_value = Culling::default().name(),
           value_parser = culling_parser())]
     cull: Culling,
-    /// Leave out draws that others hide: what the last frame showed is drawn for its depth first.
+    /// Leave out draws that are hidden behind others: the draws visible in the last frame are drawn first,
+    /// for their depth.
     #[arg(long)]
     occlusion: bool,
     #[command(flatten)]
     pub lens: LensArgs,
-    /// Draw nothing that the lens does not show.
+    /// Draw nothing outside the visible part of the lens.
     #[arg(long)]
     hidden_area_mask: bool,
-    /// Draw nothing that the headset's own mesh hides: a JSON file of triangles (docs/models/foveation.md) or a
-    /// recording of hmdq.
+    /// Draw nothing inside the headset's hidden-area mesh: a JSON file of triangles
+    /// (docs/models/foveation.md) or a recording of hmdq.
     #[arg(long, value_name = "FILE", conflicts_with = "hidden_area_mask")]
     hidden_area_mesh: Option<PathBuf>,
-    /// Leave out draws of which every point is farther than this from the head.
+    /// Leave out draws whose every point is farther than this from the head.
     #[arg(
         long,
         value_name = "METRES",
@@ -47,22 +49,23 @@ pub struct TechniqueArgs {
     /// Leave out draws whose bounding sphere spans fewer pixels.
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
     cull_px: Option<f32>,
-    /// Submit both eyes at once where the driver can be trusted with that (the capture goes eye by eye).
+    /// Submit both eyes at once if the driver does so correctly (the capture still records one eye after the
+    /// other).
     #[arg(long)]
     multiview: bool,
-    /// Draw what is farther than a distance in metres once for both eyes: 7.5, or so far that nothing is
-    /// off by more than some pixels: 1px, or where a frame then costs least: least-work, least-work:2px
-    /// [default of least-work: 1px].
+    /// Draw everything beyond a distance once for both eyes. The distance is given in metres (7.5), as the
+    /// largest error in pixels (1px), or as the distance of least cost within an error (least-work:2px;
+    /// least-work alone means 1px).
     #[arg(long, value_name = "METRES|Npx|least-work", conflicts_with = "foveate")]
     far_field: Option<SplitFlag>,
-    /// How both eyes get it.
-    #[arg(long, value_enum, value_name = "HOW", requires = "far_field", default_value_t = FarVariant::Plain)]
-    far_field_variant: FarVariant,
+    /// How the far field's picture is used for both eyes.
+    #[arg(long, value_parser = variant_parser(), value_name = "HOW", requires = "far_field", default_value = "plain")]
+    far_field_variant: Variant,
     /// Shade more coarsely away from the gaze.
-    #[arg(long, value_enum, value_name = "HOW")]
-    foveate: Option<Foveate>,
-    /// Where the user looks: degrees right and up of straight ahead, or a CSV file with the header
-    /// time_s,x_deg,y_deg [default: 0,0].
+    #[arg(long, value_parser = foveate_parser(), value_name = "HOW")]
+    foveate: Option<FoveationKind>,
+    /// Gaze: degrees right and up from straight ahead, or a CSV file with the header time_s,x_deg,y_deg
+    /// [default: 0,0].
     #[arg(
         long,
         value_name = "X,Y|FILE.csv",
@@ -70,8 +73,8 @@ pub struct TechniqueArgs {
         allow_hyphen_values = true
     )]
     gaze: Option<String>,
-    /// Degrees from the gaze at which rates 1/2, 1/4, 1/8 and 1/16 begin (radial-density: every other
-    /// quad at the first), or `acuity`: where the eye cannot tell [default: 15,25,35,45].
+    /// Degrees from the gaze at which rates 1/2, 1/4, 1/8 and 1/16 start (radial-density: every other quad
+    /// from the first on), or `acuity`, from the eye's resolution [default: 15,25,35,45].
     #[arg(long, value_name = "A,B,C,D|acuity", requires = "foveate")]
     rates: Option<RatesFlag>,
 }
@@ -99,28 +102,54 @@ impl FromStr for SplitFlag {
     }
 }
 
-/// `--far-field-variant`.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum FarVariant {
-    /// As a camera between the eyes sees it.
-    Plain,
-    /// Shifted for each eye by the disparity at the split.
-    DepthShift,
-    /// From the left eye in even frames, from the right eye in odd ones.
-    AlternateEye,
+fn variant_parser() -> impl TypedValueParser<Value = Variant> {
+    choice([
+        (
+            "plain",
+            Variant::Plain,
+            "As a camera between the eyes sees it",
+        ),
+        (
+            "depth-shift",
+            Variant::DepthShift,
+            "Shifted for each eye by the disparity at the split",
+        ),
+        (
+            "alternate-eye",
+            Variant::AlternateEye,
+            "From the left eye in even frames, from the right eye in odd ones",
+        ),
+    ])
 }
 
-/// `--foveate`.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum Foveate {
-    /// A rate for each 16x16 tile: 1, 1/2, 1/4, 1/8 or 1/16 of the pixels.
-    Rings,
-    /// 3x3 viewports, the outer ones at half the resolution.
-    MultiResolution,
-    /// Every other 2x2 quad of the periphery, filled from its neighbours.
-    RadialDensity,
-    /// 2x2 viewports, coarser towards the edges by a projective map.
-    LensMatched,
+fn foveate_parser() -> impl TypedValueParser<Value = FoveationKind> {
+    use FoveationKind::{LensMatched, MultiResolution, RadialDensity, Rings};
+    choice([
+        (
+            "rings",
+            Rings,
+            "A rate for each 16x16 tile: 1, 1/2, 1/4, 1/8 or 1/16 of the pixels",
+        ),
+        (
+            "multi-resolution",
+            MultiResolution,
+            "3x3 viewports, the outer ones at half the resolution",
+        ),
+        (
+            "radial-density",
+            RadialDensity,
+            "Every other 2x2 quad of the periphery, filled from its neighbours",
+        ),
+        (
+            "lens-matched",
+            LensMatched,
+            "2x2 viewports, coarser towards the edges by a projective map",
+        ),
+    ])
+}
+
+fn culling_parser() -> impl TypedValueParser<Value = Culling> {
+    choice(Culling::all().map(|culling| (culling.name(), culling, culling.help())))
 }
 
 /// `--rates`.
@@ -144,12 +173,12 @@ impl FromStr for RatesFlag {
 }
 
 impl TechniqueArgs {
-    /// Far geometry has a layer of its own.
+    /// Whether far geometry has its own layer.
     pub fn has_far_field(&self) -> bool {
         self.far_field.is_some()
     }
 
-    /// Files that the flags name.
+    /// Files that the flags refer to.
     pub fn inputs(&self) -> Vec<PathBuf> {
         let gaze = self.gaze.as_ref().map(PathBuf::from);
         let gaze = gaze.filter(|path| path.extension().is_some());
@@ -158,7 +187,7 @@ impl TechniqueArgs {
             .collect()
     }
 
-    /// The first flag that needs more than each eye's own picture, drawn once from its list of draws.
+    /// The first flag that needs more than one picture per eye, drawn once from the eye's draw list.
     pub fn beyond_plain_frames(&self) -> Option<&'static str> {
         let flags = [
             (self.occlusion, "--occlusion"),
@@ -171,10 +200,10 @@ impl TechniqueArgs {
         flags.iter().find(|flag| flag.0).map(|flag| flag.1)
     }
 
-    /// What is left out or done more coarsely.
+    /// The settings of the techniques.
     ///
     /// # Errors
-    /// A gaze that cannot be read, rates that nothing uses, and what [`Settings::check`] refuses.
+    /// A gaze that cannot be read, rates that are not used, and what [`Settings::check`] refuses.
     pub fn settings(&self, hmd: &Hmd) -> anyhow::Result<Settings> {
         let settings = Settings {
             culling: self.cull,
@@ -188,11 +217,7 @@ impl TechniqueArgs {
             half_rate: None,
             far_field: self.far_field.map(|SplitFlag(split)| FarField {
                 split,
-                variant: match self.far_field_variant {
-                    FarVariant::Plain => Variant::Plain,
-                    FarVariant::DepthShift => Variant::DepthShift,
-                    FarVariant::AlternateEye => Variant::AlternateEye,
-                },
+                variant: self.far_field_variant,
             }),
             foveation: self.foveation(hmd)?,
         };
@@ -201,14 +226,8 @@ impl TechniqueArgs {
     }
 
     fn foveation(&self, hmd: &Hmd) -> anyhow::Result<Option<Foveation>> {
-        let Some(foveate) = self.foveate else {
+        let Some(kind) = self.foveate else {
             return Ok(None);
-        };
-        let kind = match foveate {
-            Foveate::Rings => FoveationKind::Rings,
-            Foveate::MultiResolution => FoveationKind::MultiResolution,
-            Foveate::RadialDensity => FoveationKind::RadialDensity,
-            Foveate::LensMatched => FoveationKind::LensMatched,
         };
         ensure!(
             kind != FoveationKind::LensMatched || self.rates.is_none() && self.gaze.is_none(),
@@ -235,12 +254,7 @@ impl TechniqueArgs {
     }
 }
 
-fn culling_parser() -> impl TypedValueParser<Value = Culling> {
-    let value = |technique: Culling| PossibleValue::new(technique.name()).help(technique.help());
-    PossibleValuesParser::new(Culling::all().map(value)).try_map(|name| name.parse::<Culling>())
-}
-
-/// A direction, or a file of them.
+/// A direction, or a file of directions.
 fn gaze(text: &str) -> anyhow::Result<Gaze> {
     if let Some(deg) = numbers(text) {
         return Ok(Gaze::Fixed(deg));
@@ -257,7 +271,7 @@ fn gaze(text: &str) -> anyhow::Result<Gaze> {
     Ok(Gaze::Path(rows.into_iter().map(sample).collect()))
 }
 
-/// Exactly N numbers with commas between them.
+/// Exactly N numbers separated by commas.
 pub(super) fn numbers<const N: usize>(text: &str) -> Option<[f32; N]> {
     let numbers: Option<Vec<f32>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
     numbers?.try_into().ok()

@@ -1,21 +1,23 @@
 //! `tracegen techniques`.
 
 use super::cache_args::CacheArgs;
+use super::capture_steps::warn_of_multiview_defect;
 use super::lens_args::LensArgs;
 use super::objective_args::ObjectiveArgs;
 use super::path_args::PathArgs;
-use super::prepared::{Prepared, prepare};
-use super::raster::{self, TileEncoding};
-use super::scene_args::SceneArgs;
+use super::prepared::{Preparation, Prepared, prepare};
+use super::raster::{self, encoding_parser};
+use super::scene_args::{SceneArgs, SceneSetup};
 use crate::study::auto::{AutoRecord, Budget, Objective, choose};
-use crate::study::folder::{self, Folder, RowRecord, Subject};
+use crate::study::folder::{self, Folder, RowRecord, StudySetup};
 use crate::study::frames;
 use crate::study::measure::{Bench, Extent};
 use crate::study::rows::Row;
-use ::raster::backend::CaptureBackend;
-use ::raster::lavapipe::device;
+use crate::study::world::World;
+use ::raster::lavapipe::device::{self, Gpu};
 use anyhow::{Context, ensure};
 use clap::Args;
+use formats::textrace::Encoding;
 use image_error::PIXELS_PER_DEGREE;
 use scene::LoadOptions;
 use shell::{Progress, Threads, note};
@@ -23,12 +25,12 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// Eye size where neither `--size` nor `--hmd` is given: half the default display's.
+/// Default eye size, without `--size` and `--hmd`: half the default display's.
 const SIZE_PX: [u32; 2] = [480, 540];
 /// Memory for raw records.
 const RECORD_BUDGET: u64 = 128 << 20;
 
-/// Name that errors and counts of searches are kept under.
+/// Name under which errors and counts of searches are stored.
 const SEEN: &str = "seen-by-searches";
 
 /// Arguments of `tracegen techniques`.
@@ -36,8 +38,8 @@ const SEEN: &str = "seen-by-searches";
 pub struct TechniquesArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Folder to write: a manifest, pictures and traces. What an earlier run of the same study has
-    /// finished there is kept.
+    /// Folder to write: a manifest, pictures and traces. Results of an earlier run of the same study in this
+    /// folder are kept.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
     /// Techniques, alone or joined by `+`, separated by commas; the baseline is always measured
@@ -57,9 +59,9 @@ pub struct TechniquesArgs {
     #[arg(long, value_name = "N", default_value_t = 1)]
     trace_frames: u32,
     /// How the tiles of the traces are packed.
-    #[arg(long, value_enum, default_value_t = TileEncoding::Delta, value_name = "NAME")]
-    encoding: TileEncoding,
-    /// Times that each frame is timed, the baseline's beside it.
+    #[arg(long, value_parser = encoding_parser(), default_value = "delta", value_name = "NAME")]
+    encoding: Encoding,
+    /// Repetitions of each frame's timing; the baseline is timed alternately.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1000))]
     repeats: u32,
     #[command(flatten)]
@@ -67,14 +69,13 @@ pub struct TechniquesArgs {
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
     shadows: bool,
-    /// Device to render on: a part of its name [default: Mesa's software driver]. One that cannot
+    /// Device to render on: a part of its name [default: Mesa's software driver]. A device that cannot
     /// capture is timed, without traces and counts of fragments.
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
-    /// Also search for the best combination under a budget, and measure it: `flip=ERROR` (mean FLIP
-    /// inside the lens) or `pixels=PX` for the least cost whose error stays inside in every frame of
-    /// the path, `budget-ms=MS` for the least error whose median frame takes no longer on this
-    /// device.
+    /// Also search for the best combination under a budget, and measure it: `flip=ERROR` (mean FLIP inside
+    /// the lens) or `pixels=PX` choose the least cost within that error in every frame of the path;
+    /// `budget-ms=MS` chooses the least error whose median frame time on this device stays within the budget.
     #[arg(long, value_name = "BUDGET")]
     auto: Option<Budget>,
     #[command(flatten)]
@@ -92,7 +93,7 @@ pub struct TechniquesArgs {
 pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
     raster::prepare_environment(args.threads.count);
     args.threads.start()?;
-    let mut rows = match &args.only {
+    let rows = match &args.only {
         Some(list) => Row::parse_list(list).context("--only")?,
         None => Row::all(),
     };
@@ -113,77 +114,33 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         &LoadOptions::ALL,
     )?;
     folder::check(&args.output, &setup.inputs)?;
-    let extent = args.extent();
     progress.stage("preparing textures and shaders", 0, "");
-    let (adapter, captures) = (gpu.adapter.clone(), gpu.no_capture.is_none());
+    let captures = gpu.no_capture.is_none();
     if let Some(what) = &gpu.no_capture {
         shell::warn(&format!(
-            "{adapter} lacks {what}: no traces, no counts of fragments"
+            "{} lacks {what}: no traces, no counts of fragments",
+            gpu.adapter
         ));
     }
-    let cascades = raster::cascades(&setup.scene, args.shadows);
-    let lens = args.lens.lenses(&setup.hmd)?;
-    let pixels_per_degree =
-        image_error::pixels_per_degree(setup.hmd.eye_size_px[0], &setup.hmd.fov[0]);
-    ensure!(
-        PIXELS_PER_DEGREE.contains(&pixels_per_degree),
-        "--size: expected {} to {} pixels per degree, which image errors belong to, found {pixels_per_degree}",
-        PIXELS_PER_DEGREE.start(),
-        PIXELS_PER_DEGREE.end()
-    );
-    let mut subject = Subject {
-        tool: super::tool(),
-        scene: args.scene.scene.clone(),
-        scene_triangles: setup.scene.triangle_count(),
-        instances: setup.scene.instances.len() as u64,
-        camera: setup.camera.name.clone(),
-        path: args.path.path.to_string(),
-        path_frames: args.path_frames,
-        frames: extent.frames(),
-        fps: args.path.fps,
-        size_px: setup.hmd.eye_size_px,
-        hmd: setup.hmd.clone(),
-        lens,
-        pixels_per_degree,
-        adapter,
-        driver: gpu.driver.clone(),
-        software_driver: gpu.is_software,
-        baseline: Row::baseline().name,
-        repeats: args.repeats,
-        trace_frames: extent.trace_frames.clone(),
-        trace_encoding: args.encoding.encoding(),
-        shadow_cascades: cascades,
-        input_checksum: checksum(&setup.inputs)?,
-    };
-    if !captures {
-        subject.trace_frames.clear();
-    }
-    let sizes = [cascades.into(), RECORD_BUDGET];
-    let prepared = prepare(
-        setup,
-        lens,
-        args.path.fps,
-        &args.scene.scene,
-        gpu,
-        sizes,
-        args.cache,
-    )?;
+    let subject = args.subject(&setup, &gpu)?;
     let Prepared {
         mut world,
         mut backend,
-    } = prepared;
-    let mut impossible = Vec::new();
-    for row in &rows {
-        if let Err(error) = world.check(&row.settings) {
-            if args.only.is_some() {
-                return Err(error.context(row.name.clone()));
-            }
-            shell::warn(&format!("{} is left out: {error}", row.name));
-            impossible.push(row.name.clone());
-        }
-    }
-    rows.retain(|row| !impossible.contains(&row.name));
+    } = prepare(
+        Preparation {
+            scene: &args.scene.scene,
+            lens: subject.lens,
+            fps: args.path.fps,
+            shadows: args.shadows,
+            record_budget: RECORD_BUDGET,
+            cache: args.cache,
+        },
+        setup,
+        gpu,
+    )?;
+    let rows = args.possible(rows, &world)?;
     let folder = Folder::create(&args.output, &subject)?;
+    let extent = args.extent();
     let mut bench = Bench {
         world: &mut world,
         backend: &mut backend,
@@ -204,14 +161,10 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         records.push(row);
         record
     });
-    let at_once = records.iter().any(|row| row.settings.multiview);
-    let defect = match at_once {
-        true => backend.multiview_defect()?,
+    let defect = match records.iter().any(|row| row.settings.multiview) {
+        true => warn_of_multiview_defect(&mut backend)?,
         false => None,
     };
-    if let Some(defect) = &defect {
-        raster::warn_of_multiview(defect);
-    }
     let manifest = folder.finish(&subject, &records, auto.as_ref(), defect.as_deref())?;
     if records
         .iter()
@@ -232,7 +185,7 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
     shell::print(&text)
 }
 
-/// Measures the rows that are not there already, in their order.
+/// Measures the rows that have no stored result, in their order.
 fn measure(bench: &mut Bench<'_>, rows: &[Row]) -> anyhow::Result<Vec<RowRecord>> {
     let mut records: Vec<_> = (rows.iter())
         .map(|row| bench.folder.finished(&row.name, &row.settings))
@@ -261,7 +214,7 @@ fn measure(bench: &mut Bench<'_>, rows: &[Row]) -> anyhow::Result<Vec<RowRecord>
     Ok(records.into_iter().flatten().collect())
 }
 
-/// Chooses under a budget and measures what was chosen, unless that is there already.
+/// Chooses under a budget and measures the choice, unless its result is stored.
 fn measure_auto(
     bench: &mut Bench<'_>,
     budget: Budget,
@@ -304,10 +257,65 @@ fn measure_auto(
 }
 
 impl TechniquesArgs {
+    /// What the study measures: its scene, path, display and device.
+    fn subject(&self, setup: &SceneSetup, gpu: &Gpu) -> anyhow::Result<StudySetup> {
+        let pixels_per_degree =
+            image_error::pixels_per_degree(setup.hmd.eye_size_px[0], &setup.hmd.fov[0]);
+        ensure!(
+            PIXELS_PER_DEGREE.contains(&pixels_per_degree),
+            "--size: expected {} to {} pixels per degree, which image errors belong to, found {pixels_per_degree}",
+            PIXELS_PER_DEGREE.start(),
+            PIXELS_PER_DEGREE.end()
+        );
+        let extent = self.extent();
+        let trace_frames = match gpu.no_capture {
+            None => extent.trace_frames.clone(),
+            Some(_) => Vec::new(),
+        };
+        Ok(StudySetup {
+            tool: super::tool(),
+            scene: self.scene.scene.clone(),
+            scene_triangles: setup.scene.triangle_count(),
+            instances: setup.scene.instances.len() as u64,
+            camera: setup.camera.name.clone(),
+            path: self.path.path.to_string(),
+            path_frames: self.path_frames,
+            frames: extent.frames(),
+            fps: self.path.fps,
+            size_px: setup.hmd.eye_size_px,
+            hmd: setup.hmd.clone(),
+            lens: self.lens.lenses(&setup.hmd)?,
+            pixels_per_degree,
+            adapter: gpu.adapter.clone(),
+            driver: gpu.driver.clone(),
+            software_driver: gpu.is_software,
+            baseline: Row::baseline().name,
+            repeats: self.repeats,
+            trace_frames,
+            trace_encoding: self.encoding,
+            shadow_cascades: raster::cascades(&setup.scene, self.shadows),
+            input_checksum: checksum(&setup.inputs)?,
+        })
+    }
+
+    /// The rows that are possible with the display and the path. Impossible rows are an error if the user
+    /// named them.
+    fn possible(&self, rows: Vec<Row>, world: &World) -> anyhow::Result<Vec<Row>> {
+        let mut possible = Vec::new();
+        for row in rows {
+            match world.check(&row.settings) {
+                Ok(()) => possible.push(row),
+                Err(error) if self.only.is_some() => return Err(error.context(row.name)),
+                Err(error) => shell::warn(&format!("{} is left out: {error}", row.name)),
+            }
+        }
+        Ok(possible)
+    }
+
     /// Files that the study reads.
     fn inputs(&self) -> Vec<PathBuf> {
         let scene = Path::new(&self.scene.scene);
-        // The names of built-in scenes have no extension and name no file.
+        // Names of built-in scenes have no extension and are not files.
         let scene = scene.extension().map(|_| scene.to_owned());
         scene.into_iter().chain(self.path.file()).collect()
     }
@@ -331,7 +339,7 @@ impl TechniquesArgs {
 fn checksum(files: &[PathBuf]) -> anyhow::Result<String> {
     let mut sums = Vec::new();
     for file in files {
-        // A scene may name an image that no material uses, and that nobody has looked for.
+        // A scene may refer to an image that no material uses and that does not exist.
         let bytes = match std::fs::metadata(file) {
             Ok(found) if found.is_file() => {
                 std::fs::read(file).with_context(|| file.display().to_string())?

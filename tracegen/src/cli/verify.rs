@@ -4,13 +4,13 @@ use super::cache_args::CacheArgs;
 use super::path_args::PathArgs;
 use super::raster::{cascades, prepare_environment, shadow_range_m, tables};
 use super::scene_args::{SceneArgs, SceneSetup};
-use crate::verify::frame::{Subject, TileChoice, Verified};
+use crate::verify::frame::{CaptureUnderTest, TileChoice, Verified};
 use crate::verify::report::{Report, SLOTS};
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::footprint::LodFormula;
 use formats::textrace::{Textrace, TextraceWriter};
-use formats::view::Eye;
+use formats::view::{Eye, Lens};
 use raster::backend::{CaptureBackend, Fragments, Texels};
 use raster::capture::CaptureJob;
 use raster::draws::DrawList;
@@ -27,7 +27,7 @@ use textures::TextureSet;
 /// Memory for raw records.
 const RECORD_BUDGET_BYTES: u64 = 128 << 20;
 
-/// How many failures are printed one by one.
+/// Largest number of failures that are printed one by one.
 const MOST_FAILURES: usize = 20;
 
 /// Arguments of `tracegen verify`.
@@ -35,27 +35,28 @@ const MOST_FAILURES: usize = 20;
 pub struct VerifyArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Verify the first frame of this capture of the scene instead of a new one; camera and display are
-    /// then the trace's.
+    /// Verify the first frame of this capture of the scene instead of a new one; camera and display are taken
+    /// from the trace.
     #[arg(long, value_name = "FILE.textrace",
           conflicts_with_all = ["camera", "eye", "vfov", "hmd", "size", "hfov", "fov_tangents", "ipd", "cant", "shadows"])]
     trace: Option<PathBuf>,
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
     shadows: bool,
-    /// Tiles to verify, drawn from both views: a number, or `all`.
+    /// Tiles to verify, sampled from both views: a number, or `all`.
     #[arg(long, value_name = "N|all", default_value = "all", value_parser = parse_tiles)]
     tiles: Tiles,
     /// Seed of the sample of tiles.
     #[arg(long, value_name = "N", default_value_t = 0)]
     seed: u64,
-    /// Also filter every visible texel in software, by what its record says, and compare it with the driver's.
+    /// Also filter every visible texel in software, according to its record, and compare it with the driver's
+    /// result.
     #[arg(long)]
     colour: bool,
-    /// Level of detail as the driver makes it of the derivatives [default: softpipe for its traces, else llvmpipe].
+    /// Formula of the level of detail [default: softpipe for traces of softpipe, else llvmpipe].
     #[arg(long, value_name = "FORMULA", value_parser = parse_formula)]
     lod: Option<LodFormula>,
-    /// Write what the reference would have captured, for `replay`; needs all tiles.
+    /// Write what the reference would have captured, for `replay`; requires all tiles.
     #[arg(long, value_name = "FILE.textrace")]
     write_reference: Option<PathBuf>,
     /// Print JSON.
@@ -94,7 +95,7 @@ fn parse_formula(text: &str) -> Result<LodFormula, String> {
     }
 }
 
-/// Runs `tracegen verify`: exit code 1 where something has no cause that a correct capture has.
+/// Runs `tracegen verify`: exit code 1 if a difference has no known cause.
 ///
 /// # Errors
 /// Unreadable input, no driver where one is needed, or a file that cannot be written.
@@ -112,18 +113,12 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     let mut shadow_cascades = cascades(&setup.scene, args.shadows);
     if let (Some(trace), Some(file)) = (&existing, &args.trace) {
         look_as(trace, file, &mut setup)?;
-        // The groups of the trace's draws show how many there were; none is verified.
+        // The groups of the trace's draws determine the number of cascades; none of these is verified.
         shadow_cascades = 0;
     }
     let mut draws = DrawList::new(&setup.scene, shadow_cascades)?;
     draws.pose(&setup.scene, setup.moments.time_s(0));
-    let planner = Planner::new(
-        &Settings::default(),
-        &setup.hmd,
-        setup.hmd.fov.map(|fov| formats::view::Lens::of(&fov)),
-        &[Eye::Left, Eye::Right],
-        scene::paths::DEFAULT_FPS,
-    )?;
+    let planner = plain_planner(&setup)?;
     let bounds = setup.scene.bounds().unwrap_or_default();
     let job = CaptureJob {
         scene: &setup.scene,
@@ -139,24 +134,23 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     progress.stage("preparing textures", 0, "");
     let finest = job.finest_levels(&setup.frames)?;
     let textures = TextureSet::prepare(&setup.scene, |image| finest[image], cache.as_ref())?;
-    let mut backend = None;
-    if existing.is_none() || args.colour {
-        let budget = RECORD_BUDGET_BYTES;
-        backend = Some(Lavapipe::new(
+    let mut backend = match existing.is_none() || args.colour {
+        true => Some(Lavapipe::new(
             &setup.scene,
             &draws,
             &textures,
             setup.hmd.eye_size_px,
-            budget,
-        )?);
-    }
+            RECORD_BUDGET_BYTES,
+        )?),
+        false => None,
+    };
     progress.stage("capturing", 0, "");
     let trace = match (existing, &mut backend) {
         (None, Some(backend)) => capture(&job, &setup, &args.scene.scene, &textures, backend)?,
         (Some(trace), _) => trace,
         (None, None) => unreachable!("a driver is opened where there is no trace"),
     };
-    let subject = Subject {
+    let subject = CaptureUnderTest {
         trace: &trace,
         scene: &setup.scene,
         draws: &draws,
@@ -169,20 +163,15 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     };
     progress.stage("verifying", 0, "");
     let captured = started.elapsed();
-    let (choice, seed) = match args.tiles {
-        Tiles::All => (TileChoice::All, None),
-        Tiles::Some(count) => (
-            TileChoice::Some {
-                count,
-                seed: args.seed,
-            },
-            Some(args.seed),
-        ),
-    };
     let formula = args
         .lod
         .unwrap_or_else(|| formula_of(&trace.tables().meta.driver));
-    let verified = subject.verify(choice, formula, &texels, args.write_reference.is_some())?;
+    let verified = subject.verify(
+        args.choice(),
+        formula,
+        &texels,
+        args.write_reference.is_some(),
+    )?;
     drop(progress);
     if let Some(file) = &args.write_reference {
         write_reference(file, &subject, &verified)?;
@@ -192,9 +181,15 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         (started.elapsed() - captured).as_secs_f64(),
         captured.as_secs_f64()
     ));
+    let seed = (args.tiles != Tiles::All).then_some(args.seed);
     let report = Report::new(&args.scene.scene, trace.tables(), &verified, seed);
-    if args.json {
-        shell::print(&(serde_json::to_string_pretty(&report)? + "\n"))?;
+    print(&report, args.json)
+}
+
+/// Prints a report, and its failures on stderr.
+fn print(report: &Report, json: bool) -> anyhow::Result<ExitCode> {
+    if json {
+        shell::print(&(serde_json::to_string_pretty(report)? + "\n"))?;
     } else {
         shell::print(&report.table())?;
     }
@@ -206,14 +201,24 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         let more = failures.len() - MOST_FAILURES;
         shell::error(&format!("and {more} more, which --json lists"));
     }
-    if report.failures().is_empty() {
-        return Ok(ExitCode::SUCCESS);
+    match failures.is_empty() {
+        true => Ok(ExitCode::SUCCESS),
+        false => Ok(ExitCode::FAILURE),
     }
-    Ok(ExitCode::FAILURE)
 }
 
 impl VerifyArgs {
-    /// What the command writes, checked as far as its arguments tell.
+    fn choice(&self) -> TileChoice {
+        match self.tiles {
+            Tiles::All => TileChoice::All,
+            Tiles::Some(count) => TileChoice::Some {
+                count,
+                seed: self.seed,
+            },
+        }
+    }
+
+    /// The outputs of the command, checked as far as the arguments allow.
     fn outputs(&self) -> anyhow::Result<Vec<Output>> {
         let Some(file) = &self.write_reference else {
             return Ok(Vec::new());
@@ -229,7 +234,7 @@ impl VerifyArgs {
     }
 }
 
-/// llvmpipe filters some formats in 8 bits unless an option turns that off. Such filtering is not what is checked.
+/// llvmpipe filters some formats in 8 bits by default, which is not what is verified.
 fn filter_in_single_precision() {
     if std::env::var_os("GALLIVM_PERF").is_none() {
         // SAFETY: as in `prepare_environment`: no thread reads the environment meanwhile.
@@ -237,7 +242,15 @@ fn filter_in_single_precision() {
     }
 }
 
-/// How a driver makes levels of detail of derivatives.
+/// Plans both eyes without techniques.
+fn plain_planner(setup: &SceneSetup) -> anyhow::Result<Planner> {
+    let lenses = setup.hmd.fov.map(|fov| Lens::of(&fov));
+    let (eyes, fps) = (&[Eye::Left, Eye::Right], scene::paths::DEFAULT_FPS);
+    let settings = Settings::default();
+    Ok(Planner::new(&settings, &setup.hmd, lenses, eyes, fps)?)
+}
+
+/// Formula of the level of detail of a driver.
 fn formula_of(driver: &str) -> LodFormula {
     if driver.contains("softpipe") {
         LodFormula::Softpipe
@@ -246,7 +259,7 @@ fn formula_of(driver: &str) -> LodFormula {
     }
 }
 
-/// Takes display and views over from a trace.
+/// Takes display and views from a trace.
 fn look_as(trace: &Textrace, file: &Path, setup: &mut SceneSetup) -> anyhow::Result<()> {
     let meta = &trace.tables().meta;
     let first = meta
@@ -288,11 +301,11 @@ fn capture(
     Ok(Textrace::from_bytes(writer.into_bytes()?)?)
 }
 
-/// The driver's texels by pass of the trace's first frame, then by slot.
+/// The driver's texels, by pass of the trace's first frame and by slot.
 fn texels(
     job: &CaptureJob<'_>,
     setup: &SceneSetup,
-    subject: &Subject<'_>,
+    subject: &CaptureUnderTest<'_>,
     backend: &mut Lavapipe,
 ) -> anyhow::Result<Vec<Vec<Texels>>> {
     let frame = job.frame(&setup.frames[0])?;
@@ -310,7 +323,11 @@ fn texels(
         .collect()
 }
 
-fn write_reference(file: &Path, subject: &Subject<'_>, verified: &Verified) -> anyhow::Result<()> {
+fn write_reference(
+    file: &Path,
+    subject: &CaptureUnderTest<'_>,
+    verified: &Verified,
+) -> anyhow::Result<()> {
     let mut tables = subject.trace.tables().clone();
     let passes = subject.passes();
     let frame = passes.first().map_or(0, |(_, pass, _)| pass.frame);

@@ -4,7 +4,7 @@ use formats::textrace::{Draw, NO_GROUP, SUBTEXELS, Tile};
 use glam::DVec2;
 use std::collections::BTreeMap;
 
-/// A captured lane in group 0.
+/// A captured lane of group 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lane {
     /// Coordinates.
@@ -16,11 +16,11 @@ pub(super) struct Lane {
 /// Pixel and primitive of a fragment.
 pub(super) type FragmentKey = ([u32; 2], u32);
 
-/// The lanes of a pass's tiles by pixel and primitive, those of group 0 and of draws without
-/// groups; `tiles` yields column, row and content. A lane that is recorded twice is an error.
+/// The lanes of a pass's tiles by pixel and primitive: lanes of group 0 and of draws without groups. `tiles`
+/// yields column, row and content. A lane that is recorded twice is an error.
 ///
 /// # Errors
-/// Names the first duplicate.
+/// The error names the first duplicate.
 pub(super) fn lanes<'a>(
     draws: &[Draw],
     tiles: impl Iterator<Item = ([u32; 2], &'a Tile)>,

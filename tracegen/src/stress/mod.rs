@@ -1,8 +1,8 @@
-//! Captures that try to break `tracegen raster`: each sweep drives one figure to where arithmetic
-//! ends, and holds the capture against a reference or against the same scene in an easy place.
+//! Extreme captures: each sweep drives one parameter of `tracegen raster` to the limits of arithmetic, and
+//! compares the capture with a reference or with a capture of the same scene without extremes.
 //!
-//! A point is in order where the error keeps its bound, or where the program says that it does not:
-//! by refusing (exit code 2) or by a warning. Anything else is a break.
+//! A point passes if the error stays within its bound, or if the program reports the problem by refusing
+//! (exit code 2) or by a warning. All other results are failures.
 
 mod lanes;
 mod probe;
@@ -21,51 +21,51 @@ use std::path::Path;
 pub struct Sweep {
     /// Name on the command line and in the table.
     pub name: &'static str,
-    /// What is driven, and what the error is measured against.
+    /// The parameter, and what the error is measured against.
     pub about: &'static str,
-    /// Bounds that its points have to keep.
+    /// Bounds of its points.
     bounds: Bounds,
-    /// Part of the warning of a point beyond them; none where there should be no such point.
+    /// Part of the warning that points beyond the bounds must print; none if no point may exceed them.
     warning: Option<&'static str>,
     run: fn(&mut Points<'_>) -> anyhow::Result<()>,
 }
 
-/// Largest errors that a sweep's points may have without saying so.
+/// Largest errors that a sweep's points may have without a warning.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Bounds {
-    /// Fragments that only one of capture and reference has, percent of all.
+    /// Fragments that only the capture or only the reference has, in percent of all.
     pub fragments_pct: f64,
     /// Distance of texture coordinates, texels.
     pub uv_texels: f64,
 }
 
-/// How far a capture is from what it is held against.
+/// Differences of a capture from its reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Error {
-    /// Fragments (pixel and primitive) in either.
+    /// Fragments (pixel and primitive) in either of them.
     pub fragments: u64,
-    /// Those that only one has, percent.
+    /// Fragments that only one of them has, in percent.
     pub fragments_pct: f64,
-    /// Largest distance of texture coordinates, texels; whole repeats do not count.
+    /// Largest distance of texture coordinates in texels; whole repeats are ignored.
     pub uv_texels: f64,
 }
 
-/// What became of a point.
+/// Result of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
-    /// Captured, within the bounds.
+    /// Captured within the bounds.
     Within,
-    /// Captured beyond the bounds, with the warning that belongs to them.
+    /// Captured beyond the bounds, with the expected warning.
     Warned,
     /// Refused with exit code 2.
     Refused,
-    /// Captured beyond the bounds without a word, or neither captured nor refused.
+    /// Captured beyond the bounds without the expected warning, or neither captured nor refused.
     Broken,
 }
 
 impl Outcome {
-    /// Of a run, with the error of its capture where it has one.
+    /// Result of a run, with the error of its capture if there is one.
     fn of(ran: &Ran, error: Option<&Error>, bounds: &Bounds, warning: Option<&str>) -> Self {
         match (ran.exit_code, error) {
             (Some(0), Some(error)) => {
@@ -87,20 +87,20 @@ impl Outcome {
 /// A point of a sweep.
 #[derive(Clone, Debug, Serialize)]
 pub struct Point {
-    /// The figure's value.
+    /// Value of the parameter.
     pub at: String,
-    /// What became of it.
+    /// Result of the point.
     pub outcome: Outcome,
-    /// Its error, where there is a capture.
+    /// Its error, if there is a capture.
     pub error: Option<Error>,
-    /// What the program said: its error, the warning that belongs to the point, or its first one.
+    /// Output of the program: its error, the expected warning, or its first warning.
     pub said: Option<String>,
 }
 
-/// The points of a sweep as they are made.
+/// The points of a sweep, in the order of their runs.
 pub struct Points<'a> {
     probe: &'a Probe<'a>,
-    /// Whether points that take minutes are wanted, too.
+    /// Whether points that take minutes are included.
     full: bool,
     bounds: Bounds,
     warning: Option<&'static str>,
@@ -130,7 +130,7 @@ impl Points<'_> {
         Ok(())
     }
 
-    /// As [`Self::add`], held against the reference in double precision.
+    /// Like [`Self::add`], compared with the reference in double precision.
     fn add_against_reference(
         &mut self,
         at: impl Into<String>,
@@ -140,11 +140,11 @@ impl Points<'_> {
     }
 }
 
-/// Runs the sweeps of these names (all where there are none), with points that take minutes where
-/// `full`; scratch files go into `folder`.
+/// Runs the named sweeps (all if there are none), including points that take minutes if `full` is set;
+/// temporary files are written to `folder`.
 ///
 /// # Errors
-/// A folder that cannot be written, a program that cannot be started.
+/// A folder that cannot be written, or a program that cannot be started.
 pub fn run(
     folder: &Path,
     names: &[String],
@@ -156,7 +156,7 @@ pub fn run(
     let chosen = |sweep: &&Sweep| names.is_empty() || names.iter().any(|name| name == sweep.name);
     for sweep in SWEEPS.iter().filter(chosen) {
         progress(sweep);
-        // What a sweep may replace.
+        // Files that a sweep may replace.
         probe.write("stress.png", shapes::checker([64, 64])?)?;
         probe.write("holes.png", shapes::holes([64, 64])?)?;
         probe.write("stress.mtl", shapes::MATERIALS)?;
@@ -203,7 +203,7 @@ mod tests {
             of(Some(0), "", Some(off(0.2, 0.0))),
             of(Some(0), "", Some(off(0.0, 0.6))),
             of(Some(0), "", Some(off(0.0, f64::NAN))),
-            // Another warning is none for this.
+            // Another warning does not count.
             of(
                 Some(0),
                 "warning: a texture is missing",

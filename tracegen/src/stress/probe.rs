@@ -1,4 +1,4 @@
-//! Captures by this very program, as a user runs it, and what they are held against.
+//! Captures by this program, run as a user runs it, and comparisons of them.
 
 use super::Error;
 use super::lanes::{FragmentKey, Lane, lanes};
@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use textures::TextureSet;
 
-/// The views of a trace, left and right.
+/// Fragments of a trace, left and right.
 pub(super) type Views = [BTreeMap<FragmentKey, Lane>; 2];
 
 /// A scene and how it is captured.
@@ -42,16 +42,16 @@ impl Capture {
     }
 }
 
-/// What a run of the program did.
+/// Result of a run of the program.
 pub(super) struct Ran {
     /// `None` after a signal.
     pub exit_code: Option<i32>,
-    /// Its warnings and errors, a line each.
+    /// Its warnings and errors, one per line.
     pub said: Vec<String>,
 }
 
 impl Ran {
-    /// The first line that has this part.
+    /// The first line that contains this part.
     pub fn said(&self, part: &str) -> Option<&str> {
         self.said
             .iter()
@@ -76,7 +76,7 @@ impl<'a> Probe<'a> {
         })
     }
 
-    /// A file of the folder with this content.
+    /// Writes a file into the folder.
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> anyhow::Result<PathBuf> {
         let path = self.folder.join(name);
         std::fs::write(&path, content)
@@ -88,7 +88,7 @@ impl<'a> Probe<'a> {
         self.folder.join("stress.textrace")
     }
 
-    /// Captures; the trace of the capture before is gone.
+    /// Captures, replacing the trace of the last capture.
     pub fn capture(&self, capture: &Capture) -> anyhow::Result<Ran> {
         let _ = std::fs::remove_file(self.trace());
         let output = Command::new(&self.program)
@@ -131,11 +131,11 @@ impl<'a> Probe<'a> {
         Ok(views)
     }
 
-    /// The last capture against the brute-force rasteriser.
+    /// Compares the last capture with the brute-force rasteriser.
     pub fn against_reference(&self, capture: &Capture) -> anyhow::Result<Error> {
         let scene = load_file(&capture.scene, &LoadOptions::ALL)?.scene;
         let draws = DrawList::new(&scene, 0)?;
-        // Alpha is tested on the texels; where nothing is masked they need not be made.
+        // Only the alpha test needs texels, so they are prepared only for masked scenes.
         let masked = draws.calls.iter().any(|call| call.mode == DrawMode::Masked);
         let textures = match masked {
             true => TextureSet::prepare(&scene, |_| Some(0), None)?,
@@ -174,7 +174,7 @@ impl<'a> Probe<'a> {
         Ok(total.error())
     }
 
-    /// The last capture against an earlier one of the same thing.
+    /// Compares the last capture with an earlier one of the same scene.
     pub fn against(&self, expected: &Views) -> anyhow::Result<Error> {
         let mut total = Totals::default();
         for (expected, found) in expected.iter().zip(&self.views()?) {
@@ -206,7 +206,7 @@ impl Totals {
             };
             both += 1;
             let off = uv - lane.uv;
-            // A trace leaves out multiples of two repeats where numbers get large.
+            // A trace leaves out multiples of two repeats in large coordinates.
             let off = off - 2.0 * (off / 2.0).round();
             self.uv_texels = self.uv_texels.max((off * lane.extent).length());
         }

@@ -1,4 +1,4 @@
-//! The table: JSON for programs, Markdown for people.
+//! The table: JSON for programs, Markdown for readers.
 
 use super::{Bounds, Outcome, Point, Sweep};
 use serde::Serialize;
@@ -8,11 +8,11 @@ use std::fmt::Write;
 #[derive(Debug, Serialize)]
 pub struct Report {
     schema: &'static str,
-    sweeps: Vec<Row>,
+    sweeps: Vec<SweepRow>,
 }
 
 #[derive(Debug, Serialize)]
-struct Row {
+struct SweepRow {
     name: &'static str,
     about: &'static str,
     bounds: Bounds,
@@ -30,7 +30,7 @@ impl Default for Report {
 
 impl Report {
     pub(super) fn add(&mut self, sweep: &Sweep, points: Vec<Point>) {
-        self.sweeps.push(Row {
+        self.sweeps.push(SweepRow {
             name: sweep.name,
             about: sweep.about,
             bounds: sweep.bounds,
@@ -38,14 +38,14 @@ impl Report {
         });
     }
 
-    /// Points beyond their bounds of which the program said nothing.
+    /// Points beyond their bounds without the expected warning.
     #[must_use]
     pub fn broken(&self) -> usize {
         let points = self.sweeps.iter().flat_map(|row| &row.points);
         points.filter(|p| p.outcome == Outcome::Broken).count()
     }
 
-    /// A line a sweep, then a table of points a sweep.
+    /// One line per sweep, then a table of points per sweep.
     #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = String::from(

@@ -1,4 +1,4 @@
-//! Small scenes as text, and files for their textures.
+//! Small scenes as text, and files of their textures.
 
 use serde_json::json;
 use std::f64::consts::PI;
@@ -8,7 +8,7 @@ use std::fmt::Write;
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shape {
     pub positions: Vec<[f64; 3]>,
-    /// One a position.
+    /// One per position.
     pub uvs: Vec<[f64; 2]>,
     pub triangles: Vec<[usize; 3]>,
 }
@@ -63,8 +63,7 @@ impl Shape {
         square
     }
 
-    /// Triangles of all sizes around the origin: some close by, some across the eyes, none beyond
-    /// `reach`.
+    /// Triangles of all sizes around the origin: some close to it, some across the eyes, none beyond `reach`.
     pub fn clutter(count: usize, reach: f64) -> Self {
         let mut state = 1_u64;
         let mut random = || {
@@ -94,7 +93,7 @@ impl Shape {
         clutter
     }
 
-    /// Every position and coordinate through a function.
+    /// Applies functions to every position and coordinate.
     pub fn map(
         mut self,
         position: impl Fn([f64; 3]) -> [f64; 3],
@@ -105,7 +104,7 @@ impl Shape {
         self
     }
 
-    /// Moved, then enlarged from the origin by `scale` before that.
+    /// Enlarged by `scale` from the origin, then moved.
     pub fn placed(self, scale: f64, at: [f64; 3]) -> Self {
         self.map(
             |p| [0, 1, 2].map(|axis| at[axis] + scale * p[axis]),
@@ -113,7 +112,7 @@ impl Shape {
         )
     }
 
-    /// OBJ text; `material` of `stress.mtl` where there is one.
+    /// OBJ text; `material` refers to `stress.mtl`, if given.
     pub fn obj(&self, material: Option<&str>) -> String {
         let mut obj = String::new();
         if let Some(name) = material {
@@ -164,7 +163,7 @@ impl Shape {
 }
 
 /// A material library: `checker` repeats `stress.png`, `clamped` does not; `masked` has the holes of
-/// `holes.png`, `blended` lets half of the light through.
+/// `holes.png`, `blended` transmits half of the light.
 pub(super) const MATERIALS: &str = "newmtl checker\nmap_Kd stress.png\n\
                                     newmtl clamped\nmap_Kd -clamp on stress.png\n\
                                     newmtl masked\nmap_Kd holes.png\nmap_d holes.png\n\

@@ -1,4 +1,5 @@
-//! What a frame takes of memory and energy, by counting: the same on every machine, and without a cache model.
+//! Memory traffic and energy of a frame by counts, which are the same on every machine and need no cache
+//! model.
 
 use formats::footprint::{SamplingOptions, record_footprints};
 use formats::layout::{Layout, LayoutConfig};
@@ -8,7 +9,7 @@ use raster::backend::Work;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;
-use techniques::plan::{FramePlan, Picture};
+use techniques::plan::{FramePlan, PictureSource};
 
 /// Bytes of a cache line.
 const LINE_BYTES: u64 = 64;
@@ -29,22 +30,22 @@ const VERTEX_MULTIPLY_ADDS: f64 = 41.0;
 pub struct Counted {
     /// Shaded fragments.
     pub fragments: u64,
-    /// Vertices that are transformed, those of depth passes for occlusion culling included.
+    /// Transformed vertices, including those of depth passes for occlusion culling.
     pub vertices: u64,
-    /// Texture lines of 64 bytes, each once a tile of 16x16 pixels that samples it: what a cache reads that holds
-    /// the lines of one tile.
+    /// Distinct texture lines of 64 bytes per tile of 16x16 pixels: the reads of a cache that holds the lines
+    /// of one tile.
     pub texture_bytes: u64,
     /// Attributes of the vertices.
     pub vertex_bytes: u64,
-    /// Colour of layers and pictures, written and, where pictures are composed of layers, read again; depth that
-    /// occlusion culling writes and reads. Depth that a tile buffer holds is not in it.
+    /// Colour of layers and pictures, written and, if pictures are composed of layers, read again; depth that
+    /// occlusion culling writes and reads. Depth that stays in a tile buffer is not included.
     pub picture_bytes: u64,
     /// Views, lists of draws, and transforms of draws that move.
     pub uploaded_bytes: u64,
 }
 
 impl Counted {
-    /// A frame of `fragments` that sample `texture_bytes`, by its plan and what the backend did.
+    /// Counts of a frame of `fragments` that sample `texture_bytes`, from its plan and the backend's work.
     #[must_use]
     pub fn of(plan: &FramePlan, occludes: bool, work: &Work, fragments: u64) -> Self {
         Self {
@@ -95,8 +96,8 @@ fn picture_bytes(plan: &FramePlan, occludes: bool) -> u64 {
     let written: u64 = layers.iter().sum();
     let depths = if occludes { 2 * written } else { 0 };
     let composed = plan.pictures.iter().map(|picture| match picture {
-        Picture::Layer(_) => 0,
-        Picture::Composed { size_px, parts } => {
+        PictureSource::Layer(_) => 0,
+        PictureSource::Composed { size_px, parts } => {
             let read: u64 = parts.iter().map(|part| layers[part.layer]).sum();
             read + area(*size_px)
         }
@@ -104,7 +105,7 @@ fn picture_bytes(plan: &FramePlan, occludes: bool) -> u64 {
     (written + depths + composed.sum::<u64>()) * PIXEL_BYTES
 }
 
-/// Texture bytes of a trace's frames, in their order: see [`Counted::texture_bytes`].
+/// Texture bytes of a trace's frames, in order; see [`Counted::texture_bytes`].
 ///
 /// # Errors
 /// A trace that cannot be read, or textures beyond the address space.
@@ -141,7 +142,7 @@ pub fn texture_bytes(trace: &Textrace) -> anyhow::Result<Vec<u64>> {
                             },
                         );
                     }
-                    // Most of a run's lines are those of its neighbours: a list stays short.
+                    // Most lines of a run also belong to its neighbours, so the list stays short.
                     if lines.len() > 1 << 16 {
                         lines.sort_unstable();
                         lines.dedup();

@@ -1,6 +1,6 @@
 //! The folder of a study, schema `tracegen.techniques/1` (see docs/use/techniques-folder.md).
 //!
-//! A row that is complete is a file of its own, so a study that was ended goes on where it was.
+//! A complete row is stored in its own file, so that an interrupted study resumes.
 
 use super::auto::AutoRecord;
 use super::counted::Counted;
@@ -19,14 +19,14 @@ use xxhash_rust::xxh3::xxh3_64;
 
 const SCHEMA: &str = "tracegen.techniques/1";
 
-/// What a study looks at and how: the manifest without its rows. Rows are kept as long as it stays.
+/// Configuration of a study: the manifest without rows. Stored rows are reused as long as it stays the same.
 #[derive(Clone, Debug, Serialize)]
-pub struct Subject {
+pub struct StudySetup {
     /// Program and version.
     pub tool: String,
     /// Scene as given.
     pub scene: String,
-    /// Triangles, instances counted.
+    /// Triangles, including instances.
     pub scene_triangles: u64,
     /// Instances.
     pub instances: u64,
@@ -38,13 +38,13 @@ pub struct Subject {
     pub path_frames: u32,
     /// Numbers of the measured frames, ascending.
     pub frames: Vec<u32>,
-    /// Frames a second along the path.
+    /// Frames per second along the path.
     pub fps: f32,
     /// Width and height of an eye's picture.
     pub size_px: [u32; 2],
     /// The display.
     pub hmd: Hmd,
-    /// What the user sees of the left and right eye's picture.
+    /// Visible parts of the left and right eye's pictures.
     pub lens: [Lens; 2],
     /// At the centre of an eye's picture.
     pub pixels_per_degree: f32,
@@ -52,11 +52,11 @@ pub struct Subject {
     pub adapter: String,
     /// Its driver.
     pub driver: String,
-    /// The device is the processor: times are a processor's.
+    /// Whether the device is the processor, so that times are processor time.
     pub software_driver: bool,
-    /// Technique that the others are held against.
+    /// Technique that the others are compared with.
     pub baseline: String,
-    /// Times of each frame that are measured.
+    /// Repetitions of each frame's timing.
     pub repeats: u32,
     /// Frames of each row's trace.
     pub trace_frames: Vec<u32>,
@@ -73,19 +73,19 @@ pub struct Subject {
 pub struct RowRecord {
     /// Name, see [`super::rows`].
     pub technique: String,
-    /// Name for people.
+    /// Title for readers.
     pub title: String,
-    /// What it was captured with.
+    /// Settings of its capture.
     pub settings: Settings,
     /// Techniques that it consists of.
     pub parts: Vec<String>,
-    /// No pixel that the user can see is to change.
+    /// Whether no visible pixel may change.
     pub lossless: bool,
-    /// One a measured frame.
+    /// One per measured frame.
     pub frames: Vec<FrameRecord>,
-    /// Most memory that the process held meanwhile, where the system tells.
+    /// Peak memory of the process, if the system reports it.
     pub peak_memory_bytes: Option<u64>,
-    /// Texels of the scene, there once whatever is drawn.
+    /// Texels of the scene, which do not depend on the technique.
     #[serde(default)]
     pub texture_bytes: u64,
     /// Texture trace, relative to the folder.
@@ -105,9 +105,9 @@ pub struct FrameRecord {
     pub cull_tests: u64,
     /// Time of culling, the median of the repeats.
     pub cull_s: f64,
-    /// Draws that an eye's lens shows and that were left out, both eyes.
+    /// Draws that were culled although they are visible through the lens, both eyes.
     pub false_negatives: Option<u64>,
-    /// Draws that were drawn for an eye and that its lens does not show, both eyes.
+    /// Draws that were submitted although they are not visible through the lens, both eyes.
     pub false_positives: Option<u64>,
     /// Draws submitted.
     pub draws: u64,
@@ -125,41 +125,41 @@ pub struct FrameRecord {
     pub fragments: Option<u64>,
     /// Bytes written to the device for views and lists of draws.
     pub bytes_uploaded: u64,
-    /// What it takes of memory by counts; none where the device cannot capture.
+    /// Memory traffic by counts; none if the device cannot capture.
     #[serde(default)]
     pub counted: Option<Counted>,
-    /// All of these bytes together.
+    /// The sum of these bytes.
     #[serde(default)]
     pub memory_bytes: Option<u64>,
     /// Energy of the counts.
     #[serde(default)]
     pub energy_mj: Option<f64>,
-    /// Bytes of pictures read and written where the frame was made of the one before.
+    /// Bytes of pictures read and written, if the frame was reprojected from the one before.
     #[serde(default)]
     pub bytes_reprojected: u64,
     /// Bytes of the colour that the frame is rendered into.
     #[serde(default)]
     pub target_color_bytes: u64,
-    /// Bytes of its depth buffers that have to be there at a time.
+    /// Bytes of its depth buffers that exist at the same time.
     #[serde(default)]
     pub target_depth_bytes: u64,
-    /// Times of the frame without capture, one a repeat.
+    /// Times of the frame without capture, one per repetition.
     pub frame_s: Vec<f64>,
-    /// Times of the baseline's frame, each measured beside the repeat.
+    /// Times of the baseline's frame, each measured next to the repetition.
     pub baseline_s: Vec<f64>,
-    /// What processors worked for the frame in each repeat, all threads together, where the system tells.
+    /// Processor time of the frame in each repetition over all threads, if the system reports it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub processor_s: Vec<f64>,
-    /// What they worked for the baseline's beside it.
+    /// Processor time of the baseline next to it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub baseline_processor_s: Vec<f64>,
-    /// Processor time by stage, the median of the repeats.
+    /// Processor time by stage, the median of the repetitions.
     pub stages_s: BTreeMap<String, f64>,
     /// Left and right picture, relative to the folder.
     pub images: [String; 2],
     /// CRC-32 of their files.
     pub image_checksums: [String; 2],
-    /// What the techniques promise.
+    /// Errors that the techniques predict.
     pub predicted: Predicted,
 }
 
@@ -167,7 +167,7 @@ pub struct FrameRecord {
 struct Manifest<'a> {
     schema: &'static str,
     #[serde(flatten)]
-    subject: &'a Subject,
+    subject: &'a StudySetup,
     rows: &'a [RowRecord],
     #[serde(skip_serializing_if = "Option::is_none")]
     auto: Option<&'a AutoRecord>,
@@ -175,7 +175,7 @@ struct Manifest<'a> {
     multiview_defect: Option<&'a str>,
 }
 
-/// A finished row on its own, with what it belongs to.
+/// A finished row with the key of its study.
 #[derive(Serialize, Deserialize)]
 struct Kept<T> {
     key: String,
@@ -186,14 +186,14 @@ struct Kept<T> {
 #[derive(Debug)]
 pub struct Folder {
     root: PathBuf,
-    /// Of the subject.
+    /// Key of the study's configuration.
     key: u64,
 }
 
-/// Checks that `root` is a folder for a study, or may become one, before minutes of work.
+/// Checks before the measurements that `root` is a folder of a study, or can become one.
 ///
 /// # Errors
-/// A file in its place, a folder of something else, or one that holds an input.
+/// A file in its place, a folder with other content, or one that holds an input.
 pub fn check(root: &Path, inputs: &[PathBuf]) -> anyhow::Result<()> {
     ensure!(
         !root.as_os_str().is_empty() && !formats::container::is_stdout(root),
@@ -228,8 +228,8 @@ pub fn check(root: &Path, inputs: &[PathBuf]) -> anyhow::Result<()> {
     own.iter().try_for_each(|path| check_regular_below(path))
 }
 
-/// Refuses pipes and devices where the study reads and writes files: they would be found only when
-/// minutes have gone into a row.
+/// Refuses pipes and devices where the study reads and writes files. Otherwise they would only be found after
+/// minutes of measuring.
 fn check_regular_below(path: &Path) -> anyhow::Result<()> {
     if path.is_dir() {
         for entry in fs::read_dir(path).with_context(|| path.display().to_string())? {
@@ -257,12 +257,11 @@ fn remove_temporaries(folder: &Path) -> std::io::Result<()> {
 }
 
 impl Folder {
-    /// Makes the folder of a study, or takes up an earlier one, without what a killed run left
-    /// half-written under temporary names.
+    /// Creates the folder of a study, or opens an earlier one and removes unfinished files.
     ///
     /// # Errors
-    /// It cannot be written.
-    pub fn create(root: &Path, subject: &Subject) -> anyhow::Result<Self> {
+    /// The folder cannot be written.
+    pub fn create(root: &Path, subject: &StudySetup) -> anyhow::Result<Self> {
         for folder in ["rows", "images", "traces"] {
             let path = root.join(folder);
             fs::create_dir_all(&path).with_context(|| cannot_write(&path))?;
@@ -282,11 +281,11 @@ impl Folder {
         (name, path)
     }
 
-    /// Writes both eyes' pictures of a frame (sRGB RGBA8); tells their paths in the folder and the
+    /// Writes both eyes' pictures of a frame (sRGB RGBA8). Returns their paths in the folder and the
     /// checksums of the files.
     ///
     /// # Errors
-    /// They cannot be written.
+    /// The files cannot be written.
     pub fn write_images(
         &self,
         row: &str,
@@ -308,14 +307,14 @@ impl Folder {
         Ok([names, checksums])
     }
 
-    /// A finished row of this study, if it is there with all its files as they were written.
+    /// A finished row of this study, if it and all its files exist unchanged.
     #[must_use]
     pub fn finished(&self, name: &str, settings: &Settings) -> Option<RowRecord> {
         let row: RowRecord = self.kept(name, settings)?;
         self.is_whole(&row).then_some(row)
     }
 
-    /// True where the row's pictures and its trace have the checksums that the row tells.
+    /// Whether the row's pictures and its trace have the checksums in the row.
     #[must_use]
     pub fn is_whole(&self, row: &RowRecord) -> bool {
         let picture = |(file, sum): (&String, &String)| {
@@ -329,15 +328,15 @@ impl Folder {
         trace && frames.all(|f| f.images.iter().zip(&f.image_checksums).all(picture))
     }
 
-    /// Keeps a finished row.
+    /// Stores a finished row.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The file cannot be written.
     pub fn keep(&self, row: &RowRecord) -> anyhow::Result<()> {
         self.write_kept(&row.technique, &row.settings, row)
     }
 
-    /// What an earlier run of this study kept under a name and a question.
+    /// The result that an earlier run of this study stored for a question under a name.
     #[must_use]
     pub fn kept<T: for<'de> Deserialize<'de>>(
         &self,
@@ -349,10 +348,10 @@ impl Folder {
         (kept.key == self.row_key(question)).then_some(kept.row)
     }
 
-    /// Keeps the answer to a question under a name.
+    /// Stores the result for a question under a name.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The file cannot be written.
     pub fn write_kept(
         &self,
         name: &str,
@@ -366,14 +365,14 @@ impl Folder {
         write_json(&self.row_path(name), &kept)
     }
 
-    /// Writes the manifest: the study is complete. `multiview_defect` tells why the device drew view by
-    /// view where both were to be drawn at once.
+    /// Writes the manifest, which completes the study. `multiview_defect` is the reason why the device drew
+    /// one view after the other although both were to be drawn at once.
     ///
     /// # Errors
-    /// It cannot be written.
+    /// The file cannot be written.
     pub fn finish(
         &self,
-        subject: &Subject,
+        subject: &StudySetup,
         rows: &[RowRecord],
         auto: Option<&AutoRecord>,
         multiview_defect: Option<&str>,
@@ -397,7 +396,7 @@ impl Folder {
         self.root.join("rows").join(format!("{name}.json"))
     }
 
-    /// What a row's content hangs on: the study and its own settings.
+    /// Hash of everything that a row depends on: the study and the row's settings.
     fn row_key(&self, question: &impl Serialize) -> String {
         let text = serde_json::to_string(question).unwrap_or_default();
         format!(
@@ -407,10 +406,10 @@ impl Folder {
     }
 }
 
-/// Content checksum of a trace, read to its end; a damaged one has none.
+/// Content checksum of a trace, read to its end.
 ///
 /// # Errors
-/// It cannot be read, or is no whole trace.
+/// The file cannot be read, or is not a whole trace.
 pub fn trace_checksum(path: &Path) -> anyhow::Result<String> {
     check_regular(path).with_context(|| path.display().to_string())?;
     Ok(format!("{:08x}", Trace::open(path)?.content_checksum()))
@@ -429,8 +428,8 @@ fn cannot_write(path: &Path) -> String {
 mod tests {
     use super::*;
 
-    fn subject(frames: &[u32]) -> Subject {
-        Subject {
+    fn subject(frames: &[u32]) -> StudySetup {
+        StudySetup {
             tool: "test".into(),
             scene: "test".into(),
             scene_triangles: 1,

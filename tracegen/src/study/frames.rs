@@ -1,11 +1,11 @@
 //! Which frames of a path are measured.
 
-/// Frames in a row: what flickers differs between neighbours, and what a technique remembers of a
-/// frame it shows in the next.
+/// Consecutive frames per run: flicker is a difference of neighbouring frames, and techniques with state show
+/// it in the next frame.
 pub const RUN: u32 = 2;
 
-/// Runs of [`RUN`] frames, spread evenly over a path of `path_frames` from its first frame to its
-/// last: `frames` in all, the last run shorter where they do not divide. At most the whole path.
+/// Runs of [`RUN`] frames, spread evenly over a path of `path_frames` from its first frame to its last:
+/// `frames` in all, at most the whole path. The last run is shorter if they do not divide evenly.
 #[must_use]
 pub fn runs(frames: u32, path_frames: u32) -> Vec<Vec<u32>> {
     let frames = frames.min(path_frames);
@@ -18,7 +18,7 @@ pub fn runs(frames: u32, path_frames: u32) -> Vec<Vec<u32>> {
             1 => 0,
             _ => (u64::from(last_start) * u64::from(number) / u64::from(count - 1)) as u32,
         };
-        // Runs do not overlap where there is little room between them.
+        // Runs do not overlap if there is little space between them.
         let after = runs
             .last()
             .and_then(|run| run.last())

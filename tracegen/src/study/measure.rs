@@ -1,4 +1,4 @@
-//! Measures one row: what its frames are, then how long they take beside the baseline's.
+//! Measures one row: first the content of its frames, then their times next to the baseline's.
 
 use super::counted::texture_bytes;
 use super::folder::{Folder, FrameRecord, RowRecord, trace_checksum};
@@ -18,14 +18,14 @@ use std::time::Duration;
 use techniques::{Planner, Settings};
 use visibility::Occlusion;
 
-/// What is measured of every row.
+/// Frames and repetitions that are measured of every row.
 #[derive(Clone, Debug)]
 pub struct Extent {
-    /// The measured frames, as runs of consecutive ones.
+    /// The measured frames, as runs of consecutive frames.
     pub runs: Vec<Vec<u32>>,
-    /// Those of them that go into the trace, ascending.
+    /// The measured frames that are written to the trace, ascending.
     pub trace_frames: Vec<u32>,
-    /// Times of each frame.
+    /// Repetitions of each frame's timing.
     pub repeats: u32,
 }
 
@@ -42,8 +42,8 @@ impl Extent {
         self.frames().len() as u64 * (1 + u64::from(self.repeats))
     }
 
-    /// Every frame that is rendered, and whether it is measured: where techniques remember frames,
-    /// the one before comes before a run.
+    /// Every rendered frame, and whether it is measured. For techniques with state, the frame before a run is
+    /// rendered as well.
     pub fn rendered(&self, remembers: bool) -> impl Iterator<Item = (u32, bool)> + '_ {
         self.runs.iter().flat_map(move |run| {
             let before = run[0]
@@ -63,37 +63,37 @@ pub struct Bench<'a> {
     pub world: &'a mut World,
     /// The device.
     pub backend: &'a mut Lavapipe,
-    /// It can capture.
+    /// Whether it can capture.
     pub captures: bool,
-    /// What is measured.
+    /// Frames and repetitions.
     pub extent: &'a Extent,
     /// How the tiles of the traces are packed.
     pub encoding: Encoding,
-    /// What the eyes see in truth, by frame, as far as it was asked for.
+    /// Draws that are really visible, by frame, as far as they were needed.
     pub truth: HashMap<u32, Vec<Vec<Marks>>>,
-    /// Where it goes.
+    /// Folder of the results.
     pub folder: &'a Folder,
-    /// How far it is.
+    /// Progress of the study.
     pub progress: &'a Progress,
 }
 
-/// Times of one frame, by repeat.
+/// Times of one frame, by repetition.
 #[derive(Debug, Default)]
 pub struct Times {
-    /// With the settings that are measured.
+    /// With the measured settings.
     pub frame: Vec<Duration>,
-    /// The baseline's, each beside the other's.
+    /// The baseline's, each measured next to the other's.
     pub baseline: Vec<Duration>,
-    /// What processors worked for the frame, where the system tells.
+    /// Processor time of the frame, if the system reports it.
     pub processor: Vec<Duration>,
-    /// What they worked for the baseline's.
+    /// Processor time of the baseline.
     pub baseline_processor: Vec<Duration>,
-    /// By stage, with the settings that are measured.
+    /// By stage, with the measured settings.
     pub stages: BTreeMap<&'static str, Vec<Duration>>,
 }
 
 impl Bench<'_> {
-    /// Measures a row, whose frames may each have a planner of their own.
+    /// Measures a row, whose frames may have different planners.
     ///
     /// # Errors
     /// Driver errors, and errors of writing.
@@ -138,8 +138,8 @@ impl Bench<'_> {
         })
     }
 
-    /// Everything about a row's frames but their times: counts, pictures, the trace. Also makes the
-    /// driver compile every shader that they need.
+    /// Everything about a row's frames except their times: counts, pictures, the trace. The driver also
+    /// compiles all shaders on the way.
     fn take<'s>(
         &mut self,
         row: &Row,
@@ -147,7 +147,7 @@ impl Bench<'_> {
     ) -> anyhow::Result<(Vec<FrameRecord>, Option<String>)> {
         let extent = self.extent;
         let (kept, left_out): (Vec<u32>, Vec<u32>) = (extent.frames().into_iter())
-            // What is made of the frame before samples nothing of the scene.
+            // A reprojected frame samples no textures of the scene.
             .filter(|frame| !row.settings.reprojects(*frame))
             .partition(|frame| extent.trace_frames.contains(frame));
         let tables = [
@@ -162,7 +162,7 @@ impl Bench<'_> {
                 TextraceWriter::create(&trace_path, &tables[0])?.with_encoding(self.encoding),
             )),
         };
-        // Frames that are not kept are captured, too: for what they sample.
+        // Frames outside the trace are captured as well, to count what they sample.
         let mut counted = match left_out.is_empty() || !self.captures {
             true => None,
             false => Some(Tracer::new(
@@ -187,50 +187,23 @@ impl Bench<'_> {
                 .folder
                 .write_images(&row.name, number, &pictures, size_px)?;
             let job = self.world.job(planner(number));
-            let counts = if shot.reprojection.is_some() {
-                self.captures.then(|| Ok(CaptureCounts::default()))
-            } else if kept.contains(&number) {
-                traced
-                    .as_mut()
-                    .map(|t| t.capture(&job, self.backend, &shot.frame))
-            } else {
-                counted
-                    .as_mut()
-                    .map(|t| t.capture(&job, self.backend, &shot.frame))
-            }
-            .transpose()?;
+            let (backend, frame) = (&mut *self.backend, &shot.frame);
+            let captured = match (&mut traced, &mut counted) {
+                _ if shot.reprojection.is_some() => None,
+                (Some(tracer), _) if kept.contains(&number) => {
+                    Some(tracer.capture(&job, backend, frame)?)
+                }
+                (_, Some(tracer)) => Some(tracer.capture(&job, backend, frame)?),
+                _ => None,
+            };
+            let counts = (self.captures)
+                .then(|| captured.map_or_else(CaptureCounts::default, |frame| frame.counts));
             let wrong = self.wrong(number, &shot)?;
-            let work = &shot.work;
-            let targets = shot.frame.plan.target_bytes(row.settings.multiview);
+            let multiview = row.settings.multiview;
             frames.push(FrameRecord {
-                frame: number,
-                cull_tests: shot.frame.cull_tests + shot.frame.occlusion_tests,
-                cull_s: 0.0,
-                false_negatives: wrong.map(|wrong| wrong.negatives),
-                false_positives: wrong.map(|wrong| wrong.positives),
-                draws: work.draws,
-                draw_calls: work.calls,
-                state_changes: work.state_changes,
-                vertices: work.vertices,
-                triangles: work.triangles,
-                quads: counts.map(|counts| counts.quads),
-                fragments: counts.map(|counts| counts.fragments),
-                bytes_uploaded: work.bytes_uploaded,
-                counted: counts.map(|counts| shot.counted(counts.fragments)),
-                // Textures come on top once the trace is complete.
-                memory_bytes: counts.map(|counts| shot.counted(counts.fragments).bytes()),
-                energy_mj: counts.map(|counts| shot.counted(counts.fragments).energy_mj()),
-                target_color_bytes: targets.color,
-                target_depth_bytes: targets.depth,
-                bytes_reprojected: (shot.reprojection.as_ref()).map_or(0, |made| made.bytes),
-                frame_s: Vec::new(),
-                baseline_s: Vec::new(),
-                processor_s: Vec::new(),
-                baseline_processor_s: Vec::new(),
-                stages_s: BTreeMap::new(),
                 images,
                 image_checksums,
-                predicted: shot.frame.plan.predicted,
+                ..frame_record(number, &shot, counts, wrong, multiview)
             });
             self.progress.advance(1);
         }
@@ -249,8 +222,8 @@ impl Bench<'_> {
         Ok((frames, trace))
     }
 
-    /// What the lists of a frame get wrong of what the lenses show, both eyes; none where the device
-    /// cannot tell.
+    /// Errors of a frame's draw lists compared with what is visible through the lenses, both eyes; none if
+    /// the device cannot count fragments.
     fn wrong(&mut self, number: u32, shot: &Shot) -> anyhow::Result<Option<Wrong>> {
         if !self.captures || shot.reprojection.is_some() {
             return Ok(None);
@@ -284,8 +257,8 @@ fn count_textures(frames: &mut [FrameRecord], trace: &Textrace) -> anyhow::Resul
     Ok(())
 }
 
-/// Times frames with a row's planners and with the baseline's, which take turns, several times over: one entry
-/// a measured frame.
+/// Times frames alternately with a row's planners and with the baseline's, repeatedly: one entry per measured
+/// frame.
 ///
 /// # Errors
 /// Driver errors.
@@ -322,9 +295,9 @@ pub fn time<'s>(
 }
 
 /// Renders each measured frame with every contestant, one after the other, as often as `extent` says;
-/// `planner` tells what a contestant renders a frame with. `took`
-/// hears the contestant's number, the position of the frame among the measured ones, what was rendered, and the
-/// processors' time that it took, where the system tells.
+/// `planner` returns a contestant's planner for a frame. `took` receives the contestant's number, the
+/// position of the frame among the measured ones, what was rendered, and the processor time, if the system
+/// reports it.
 ///
 /// # Errors
 /// Driver errors.
@@ -345,7 +318,7 @@ pub fn in_turns<'s>(
         let mut measured = 0;
         for (number, is_measured) in extent.rendered(remembers) {
             for place in 0..contestants {
-                // Whoever comes later finds warmer caches: they take turns at that as well.
+                // Later contestants find warmer caches, so the order rotates.
                 let contestant = (place + repeat + 1) % contestants;
                 let memory = &mut memories[contestant];
                 let before = processor::time();
@@ -364,7 +337,7 @@ pub fn in_turns<'s>(
     Ok(())
 }
 
-/// The time of all frames together without what disturbed them: of each frame's repeats the shortest.
+/// The time of all frames together without disturbances: the sum of the shortest repetitions.
 pub fn undisturbed_s<'a>(frames: impl IntoIterator<Item = &'a [Duration]>) -> f64 {
     let shortest = |times: &[Duration]| times.iter().min().copied().unwrap_or_default();
     frames
@@ -390,10 +363,52 @@ impl Times {
     }
 }
 
-/// The median in seconds, the lower one of an even number.
+/// The median in seconds; the lower one of an even number of times.
 pub fn median_s(times: &[Duration]) -> f64 {
     let mut sorted = times.to_vec();
     sorted.sort();
     let middle = sorted.get(sorted.len().saturating_sub(1) / 2);
     middle.copied().unwrap_or_default().as_secs_f64()
+}
+
+/// Counts of a rendered frame; its times and images are added later.
+fn frame_record(
+    number: u32,
+    shot: &Shot,
+    counts: Option<CaptureCounts>,
+    wrong: Option<Wrong>,
+    multiview: bool,
+) -> FrameRecord {
+    let work = &shot.work;
+    let targets = shot.frame.plan.target_bytes(multiview);
+    FrameRecord {
+        frame: number,
+        cull_tests: shot.frame.cull_tests + shot.frame.occlusion_tests,
+        cull_s: 0.0,
+        false_negatives: wrong.map(|wrong| wrong.negatives),
+        false_positives: wrong.map(|wrong| wrong.positives),
+        draws: work.draws,
+        draw_calls: work.calls,
+        state_changes: work.state_changes,
+        vertices: work.vertices,
+        triangles: work.triangles,
+        quads: counts.map(|counts| counts.quads),
+        fragments: counts.map(|counts| counts.fragments),
+        bytes_uploaded: work.bytes_uploaded,
+        counted: counts.map(|counts| shot.counted(counts.fragments)),
+        // Textures are added when the trace is complete.
+        memory_bytes: counts.map(|counts| shot.counted(counts.fragments).bytes()),
+        energy_mj: counts.map(|counts| shot.counted(counts.fragments).energy_mj()),
+        target_color_bytes: targets.color,
+        target_depth_bytes: targets.depth,
+        bytes_reprojected: (shot.reprojection.as_ref()).map_or(0, |made| made.bytes),
+        frame_s: Vec::new(),
+        baseline_s: Vec::new(),
+        processor_s: Vec::new(),
+        baseline_processor_s: Vec::new(),
+        stages_s: BTreeMap::new(),
+        images: Default::default(),
+        image_checksums: Default::default(),
+        predicted: shot.frame.plan.predicted,
+    }
 }

@@ -1,4 +1,4 @@
-//! How much memory the process holds at most, where the system tells (Linux).
+//! Peak memory of the process, if the system reports it (Linux).
 
 use std::fs;
 
@@ -11,7 +11,7 @@ pub fn peak_bytes() -> Option<u64> {
     Some(kib * 1024)
 }
 
-/// Lets the largest resident set be the present one; tells whether the system lets it.
+/// Resets the largest resident set to the present one; returns whether the system supports it.
 pub fn forget_peak() -> bool {
     fs::write("/proc/self/clear_refs", "5").is_ok()
 }
@@ -29,7 +29,7 @@ mod tests {
         let with = peak_bytes().unwrap();
         assert!(with >= 256 << 20 && with >= before, "{before} {with}");
         drop(held);
-        // Other tests of the process allocate, too; none of them so much.
+        // Other tests of the process also allocate, but much less.
         if forget_peak() {
             assert!(peak_bytes().unwrap() < with);
         }

@@ -1,5 +1,5 @@
-//! Studies of stereo rendering techniques: a path through a scene is rendered with each technique
-//! and with none, and what that takes and shows goes into a folder.
+//! Studies of stereo rendering techniques: renders a path through a scene with each technique and with the
+//! baseline, and writes costs and errors to a folder.
 
 pub mod auto;
 pub mod counted;

@@ -1,9 +1,9 @@
-//! Time that processors have worked for this process: unlike the clock's it does not pass while others work.
+//! Processor time of this process. In contrast to wall time, other programs hardly affect it.
 
 use std::fs;
 use std::time::Duration;
 
-/// Sum over all threads, where the system tells (Linux).
+/// Sum over all threads, if the system reports it (Linux).
 #[must_use]
 pub fn time() -> Option<Duration> {
     let mut nanoseconds = 0_u64;
@@ -34,7 +34,7 @@ mod tests {
             sum = std::hint::black_box(sum.wrapping_add(1));
         }
         let worked = time().map(|now| now.saturating_sub(before));
-        // Others may work beside it, on this machine and in this process.
+        // Other threads may run at the same time, on this machine and in this process.
         assert!(worked > Some(Duration::from_millis(2)), "{worked:?}");
     }
 }

@@ -8,14 +8,14 @@ use techniques::settings::{
 use techniques::{Gaze, Settings};
 use visibility::Culling;
 
-/// One technique: what it changes of the baseline.
+/// One technique: a change of the baseline's settings.
 #[derive(Clone, Debug)]
 pub struct Part {
     /// Name as in `--only`, manifests and results.
     pub name: String,
-    /// Name for people.
+    /// Title for readers.
     pub title: String,
-    /// No pixel that the user can see is to change.
+    /// Whether no visible pixel may change.
     pub lossless: bool,
     change: Change,
 }
@@ -27,24 +27,24 @@ enum Change {
     Foveation(Foveation),
 }
 
-/// The setting that a part changes: of two parts with the same one, only one can be.
+/// The setting that a part changes. Two parts that change the same setting exclude each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting {
-    /// How draws are found.
+    /// How visible draws are found.
     Culling,
-    /// Whether hidden ones are left out.
+    /// Whether hidden draws are left out.
     Occlusion,
-    /// Whether what the lens hides is drawn.
+    /// Whether pixels outside the lens are drawn.
     Mask,
     /// Whether both eyes are drawn at once.
     Multiview,
-    /// What is too far or too small to be drawn.
+    /// Which draws are too far or too small to be drawn.
     Distance,
     /// How often a frame is rendered.
     Rate,
-    /// Where and how both eyes share a picture of what is far.
+    /// Where and how both eyes share a picture of the far field.
     FarField,
-    /// How the periphery is coarsened.
+    /// How the periphery is shaded more coarsely.
     Foveation,
 }
 
@@ -56,161 +56,24 @@ impl PartialEq for Part {
 }
 
 impl Part {
-    /// Every technique, the baseline first: a line a technique.
+    /// Every technique, the baseline first.
     #[must_use]
     pub fn all() -> Vec<Self> {
         let baseline = Culling::default();
         let others = Culling::all().filter(|culling| *culling != baseline);
         let mut parts = vec![Self::culling(baseline)];
         parts.extend(others.map(Self::culling));
-        // Name, title, whether no visible pixel changes, what it excludes, how it is set.
-        parts.extend([
-            Self::new(
-                "occlusion",
-                "Occlusion culling",
-                true,
-                Setting::Occlusion,
-                |s| {
-                    s.occlusion = true;
-                },
-            ),
-            Self::new(
-                "hidden-area-mask",
-                "Hidden-area mask",
-                true,
-                Setting::Mask,
-                |s| {
-                    s.hidden_area_mask = true;
-                },
-            ),
-            Self::new("multiview", "Multiview", true, Setting::Multiview, |s| {
-                s.multiview = true;
-            }),
-            Self::new(
-                "distance-culling",
-                "Distance culling, 4 px",
-                false,
-                Setting::Distance,
-                |s| s.distance_cull = Some(DistanceCull::Pixels(4.0)),
-            ),
-            Self::new(
-                "half-rate",
-                "Half rate, turned with the head",
-                false,
-                Setting::Rate,
-                |s| s.half_rate = Some(Reprojection::Rotation),
-            ),
-            Self::new(
-                "half-rate-depth",
-                "Half rate, moved with the head by depth",
-                false,
-                Setting::Rate,
-                |s| s.half_rate = Some(Reprojection::Depth),
-            ),
-            Self::far_field("far-field", "Mono far field, 1 px", |s| {
-                s.far_field = far_field(Split::Pixels(1.0), Variant::Plain);
-            }),
-            Self::far_field(
-                "far-field-least-work",
-                "Mono far field where it saves most",
-                |s| {
-                    s.far_field = far_field(Split::LeastWork { within_px: 1.0 }, Variant::Plain);
-                },
-            ),
-            Self::far_field(
-                "far-field-depth-shift",
-                "Mono far field with depth shift, 0.5 px",
-                |s| {
-                    // The split of the plain one.
-                    s.far_field = far_field(Split::Pixels(0.5), Variant::DepthShift);
-                },
-            ),
-            Self::far_field(
-                "far-field-alternate-eye",
-                "Mono far field from alternate eyes, 1 px",
-                |s| {
-                    s.far_field = far_field(Split::Pixels(1.0), Variant::AlternateEye);
-                },
-            ),
-            Self::new(
-                "foveation-rings",
-                "Foveation by rings",
-                false,
-                Setting::Foveation,
-                |s| {
-                    s.foveation = Some(foveation(FoveationKind::Rings, Rates::default()));
-                },
-            ),
-            Self::new(
-                "multi-resolution",
-                "Multi-resolution",
-                false,
-                Setting::Foveation,
-                |s| {
-                    s.foveation = Some(foveation(FoveationKind::MultiResolution, Rates::default()));
-                },
-            ),
-            Self::new(
-                "radial-density",
-                "Radial density mask",
-                false,
-                Setting::Foveation,
-                |s| {
-                    s.foveation = Some(foveation(FoveationKind::RadialDensity, Rates::default()));
-                },
-            ),
-            Self::new(
-                "lens-matched",
-                "Lens-matched viewports",
-                false,
-                Setting::Foveation,
-                |s| {
-                    s.foveation = Some(foveation(FoveationKind::LensMatched, Rates::default()));
-                },
-            ),
-        ]);
+        parts.extend(TECHNIQUES.iter().map(Self::switch));
         parts
     }
 
-    /// Every technique with the settings that are worth a search on a display.
+    /// Every technique with the settings that a search tries on a display.
     #[must_use]
     pub fn options(hmd: &Hmd) -> Vec<Self> {
         let mut parts = Self::all();
-        // A search looks at frames one by one, and half of these have no picture of their own.
+        // A search renders single frames, and every other frame at half rate has no picture of its own.
         parts.retain(|part| part.setting() != Setting::Rate);
-        parts.extend([
-            Self::far_field("far-field-0.5px", "Mono far field, 0.5 px", |s| {
-                s.far_field = far_field(Split::Pixels(0.5), Variant::Plain);
-            }),
-            Self::far_field("far-field-2px", "Mono far field, 2 px", |s| {
-                s.far_field = far_field(Split::Pixels(2.0), Variant::Plain);
-            }),
-            Self::far_field(
-                "far-field-depth-shift-1px",
-                "Mono far field with depth shift, 1 px",
-                |s| {
-                    s.far_field = far_field(Split::Pixels(1.0), Variant::DepthShift);
-                },
-            ),
-            Self::new(
-                "foveation-rings-wide",
-                "Foveation by rings, 1.5 times as wide",
-                false,
-                Setting::Foveation,
-                |s| {
-                    s.foveation = Some(foveation(FoveationKind::Rings, wide()));
-                },
-            ),
-            Self::new(
-                "radial-density-wide",
-                "Radial density mask, 1.5 times as wide",
-                false,
-                Setting::Foveation,
-                |s| {
-                    s.foveation = Some(foveation(FoveationKind::RadialDensity, wide()));
-                },
-            ),
-        ]);
+        parts.extend(VARIANTS.iter().map(Self::switch));
         let acuity = Rates::of_acuity(hmd);
         for (name, title, kind) in [
             (
@@ -234,23 +97,13 @@ impl Part {
         parts
     }
 
-    fn new(
-        name: &str,
-        title: &str,
-        lossless: bool,
-        setting: Setting,
-        change: fn(&mut Settings),
-    ) -> Self {
+    fn switch(&Switch(name, title, lossless, setting, change): &Switch) -> Self {
         Self {
             name: name.to_owned(),
             title: title.to_owned(),
             lossless,
             change: Change::Switch(setting, change),
         }
-    }
-
-    fn far_field(name: &str, title: &str, change: fn(&mut Settings)) -> Self {
-        Self::new(name, title, false, Setting::FarField, change)
     }
 
     fn culling(culling: Culling) -> Self {
@@ -262,7 +115,7 @@ impl Part {
         }
     }
 
-    /// Its error is a shift of what is seen, in pixels, and bounded for every frame.
+    /// Whether its error is a shift in pixels that is bounded for every frame.
     #[must_use]
     pub fn is_shift(&self) -> bool {
         self.setting() == Setting::FarField
@@ -287,11 +140,151 @@ impl Part {
     }
 }
 
+/// Name, title, whether it is lossless, the setting that it changes, and the change.
+struct Switch(&'static str, &'static str, bool, Setting, fn(&mut Settings));
+
+/// The techniques besides culling.
+const TECHNIQUES: &[Switch] = &[
+    Switch(
+        "occlusion",
+        "Occlusion culling",
+        true,
+        Setting::Occlusion,
+        |s| s.occlusion = true,
+    ),
+    Switch(
+        "hidden-area-mask",
+        "Hidden-area mask",
+        true,
+        Setting::Mask,
+        |s| s.hidden_area_mask = true,
+    ),
+    Switch("multiview", "Multiview", true, Setting::Multiview, |s| {
+        s.multiview = true
+    }),
+    Switch(
+        "distance-culling",
+        "Distance culling, 4 px",
+        false,
+        Setting::Distance,
+        |s| s.distance_cull = Some(DistanceCull::Pixels(4.0)),
+    ),
+    Switch(
+        "half-rate",
+        "Half rate, turned with the head",
+        false,
+        Setting::Rate,
+        |s| s.half_rate = Some(Reprojection::Rotation),
+    ),
+    Switch(
+        "half-rate-depth",
+        "Half rate, moved with the head by depth",
+        false,
+        Setting::Rate,
+        |s| s.half_rate = Some(Reprojection::Depth),
+    ),
+    Switch(
+        "far-field",
+        "Mono far field, 1 px",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::Pixels(1.0), Variant::Plain),
+    ),
+    Switch(
+        "far-field-least-work",
+        "Mono far field where it saves most",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::LeastWork { within_px: 1.0 }, Variant::Plain),
+    ),
+    Switch(
+        "far-field-depth-shift",
+        "Mono far field with depth shift, 0.5 px",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::Pixels(0.5), Variant::DepthShift),
+    ),
+    Switch(
+        "far-field-alternate-eye",
+        "Mono far field from alternate eyes, 1 px",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::Pixels(1.0), Variant::AlternateEye),
+    ),
+    Switch(
+        "foveation-rings",
+        "Foveation by rings",
+        false,
+        Setting::Foveation,
+        |s| s.foveation = Some(foveation(FoveationKind::Rings, Rates::default())),
+    ),
+    Switch(
+        "multi-resolution",
+        "Multi-resolution",
+        false,
+        Setting::Foveation,
+        |s| s.foveation = Some(foveation(FoveationKind::MultiResolution, Rates::default())),
+    ),
+    Switch(
+        "radial-density",
+        "Radial density mask",
+        false,
+        Setting::Foveation,
+        |s| s.foveation = Some(foveation(FoveationKind::RadialDensity, Rates::default())),
+    ),
+    Switch(
+        "lens-matched",
+        "Lens-matched viewports",
+        false,
+        Setting::Foveation,
+        |s| s.foveation = Some(foveation(FoveationKind::LensMatched, Rates::default())),
+    ),
+];
+
+/// Other settings of these techniques, for searches.
+const VARIANTS: &[Switch] = &[
+    Switch(
+        "far-field-0.5px",
+        "Mono far field, 0.5 px",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::Pixels(0.5), Variant::Plain),
+    ),
+    Switch(
+        "far-field-2px",
+        "Mono far field, 2 px",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::Pixels(2.0), Variant::Plain),
+    ),
+    Switch(
+        "far-field-depth-shift-1px",
+        "Mono far field with depth shift, 1 px",
+        false,
+        Setting::FarField,
+        |s| s.far_field = far_field(Split::Pixels(1.0), Variant::DepthShift),
+    ),
+    Switch(
+        "foveation-rings-wide",
+        "Foveation by rings, 1.5 times as wide",
+        false,
+        Setting::Foveation,
+        |s| s.foveation = Some(foveation(FoveationKind::Rings, wide())),
+    ),
+    Switch(
+        "radial-density-wide",
+        "Radial density mask, 1.5 times as wide",
+        false,
+        Setting::Foveation,
+        |s| s.foveation = Some(foveation(FoveationKind::RadialDensity, wide())),
+    ),
+];
+
 fn far_field(split: Split, variant: Variant) -> Option<FarField> {
     Some(FarField { split, variant })
 }
 
-/// Straight ahead.
+/// Gaze straight ahead.
 fn foveation(kind: FoveationKind, rates: Rates) -> Foveation {
     Foveation {
         kind,
@@ -300,14 +293,14 @@ fn foveation(kind: FoveationKind, rates: Rates) -> Foveation {
     }
 }
 
-/// The usual rates, each beginning 1.5 times as far out.
+/// The default rates, each starting 1.5 times as far out.
 fn wide() -> Rates {
     Rates {
         edges_deg: Rates::default().edges_deg.map(|edge| 1.5 * edge),
     }
 }
 
-/// Combinations that a study measures beside the techniques alone: title and parts.
+/// Combinations that a study measures in addition to the single techniques: title and parts.
 const COMBINATIONS: &[(&str, &str)] = &[
     ("Culling and occlusion", "superfrustum+occlusion"),
     (
@@ -328,36 +321,36 @@ const COMBINATIONS: &[(&str, &str)] = &[
     ),
 ];
 
-/// A technique or a combination of some, measured as one.
+/// A technique or a combination, measured as one.
 #[derive(Clone, Debug)]
 pub struct Row {
     /// The parts' names joined by `+`.
     pub name: String,
-    /// Name for people.
+    /// Title for readers.
     pub title: String,
-    /// What it consists of.
+    /// Its parts.
     pub parts: Vec<Part>,
-    /// All of its parts are.
+    /// Whether all of its parts are lossless.
     pub lossless: bool,
-    /// What it is captured with.
+    /// Settings of its capture.
     pub settings: Settings,
 }
 
-/// A row that cannot be.
+/// An invalid row.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum RowError {
     /// No technique of that name.
     #[error("unknown technique '{name}': expected some of {known}, alone or joined by '+'")]
     Unknown {
-        /// As asked.
+        /// The name as given.
         name: String,
         /// Names of all techniques.
         known: String,
     },
-    /// Two techniques in one another's place.
+    /// Two techniques that change the same setting.
     #[error("'{row}': {first} and {second} exclude each other")]
     Contradiction {
-        /// As asked.
+        /// The row as given.
         row: String,
         /// One of them.
         first: String,
@@ -367,19 +360,19 @@ pub enum RowError {
 }
 
 impl Row {
-    /// The technique that all others are held against.
+    /// The technique that all others are compared with.
     ///
     /// # Panics
-    /// Never: the baseline is a technique.
+    /// Never, because the baseline is a technique.
     #[must_use]
     pub fn baseline() -> Self {
         Self::parse(Culling::default().name()).expect("the baseline is a technique")
     }
 
-    /// Every row of a study without a choice, the baseline first.
+    /// Every row of a study by default, the baseline first.
     ///
     /// # Panics
-    /// Never: the tests parse every row.
+    /// Never, because the tests parse every row.
     #[must_use]
     pub fn all() -> Vec<Self> {
         let alone = Part::all().into_iter();
@@ -387,20 +380,20 @@ impl Row {
         alone.chain(Self::combinations()).collect()
     }
 
-    /// The combinations that a study measures beside the techniques alone.
+    /// The combinations that a study measures in addition to the single techniques.
     ///
     /// # Panics
-    /// Never: the tests parse every row.
+    /// Never, because the tests parse every row.
     #[must_use]
     pub fn combinations() -> Vec<Self> {
         let parse = |name: &str| Self::parse(name).expect("rows of the table are techniques");
         COMBINATIONS.iter().map(|(_, name)| parse(name)).collect()
     }
 
-    /// The row of some parts, the baseline where there are none.
+    /// The row of some parts; the baseline if there are none.
     ///
     /// # Errors
-    /// Two of them exclude each other.
+    /// Two of the parts exclude each other.
     pub fn of(parts: Vec<Part>) -> Result<Self, RowError> {
         if parts.is_empty() {
             return Ok(Self::baseline());
@@ -446,7 +439,7 @@ impl Row {
         Self::of(name.split('+').map(part).collect::<Result<_, _>>()?)
     }
 
-    /// The rows of a list of names separated by commas, with the baseline before them.
+    /// The rows of a list of names separated by commas, preceded by the baseline.
     ///
     /// # Errors
     /// See [`Self::parse`].
@@ -496,7 +489,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_and_contradictory_techniques_are_told() {
+    fn unknown_and_contradictory_techniques_are_refused() {
         let error = |list: &str| Row::parse_list(list).unwrap_err().to_string();
         let text = error("conical,octree");
         assert!(

@@ -1,4 +1,4 @@
-//! Timewarp of a frame's pictures: what a runtime shows where no new frame is there.
+//! Timewarp of a frame's pictures: what a runtime shows if no new frame is ready.
 
 use super::world::{Reprojected, Shown};
 use formats::view::FrameViews;
@@ -17,8 +17,8 @@ static LINEAR: LazyLock<[f32; 256]> =
 /// Bytes of a pixel: sRGB RGBA8.
 const PIXEL_BYTES: usize = 4;
 
-/// Both eyes' pictures of a frame that was shown `before`, as the head sees them `now`: turned, and moved where
-/// their depth is at hand.
+/// Reprojects both eyes' pictures of a frame shown `before` to the head's pose `now`: rotated, and translated
+/// if their depth is known.
 #[must_use]
 pub fn reproject(
     shown: &Shown,
@@ -45,7 +45,8 @@ pub fn reproject(
             }
         })
         .collect();
-    // Neighbours read nearly the same pixels, so each is fetched once, with its depth, and each is written once.
+    // Neighbouring pixels read nearly the same pixels, so each is fetched once, with its depth, and each is
+    // written once.
     let per_picture = if shown.depths.is_some() { 3 } else { 2 };
     let bytes = per_picture
         * pictures
@@ -59,8 +60,8 @@ pub fn reproject(
     }
 }
 
-/// A picture of which each pixel shows what `before_px` says was there, linear between the nearest four pixels in
-/// linear light. Beyond the edge its last pixels are repeated.
+/// A picture whose pixels sample the source at `before_px`, bilinearly in linear light. Beyond the edge, the
+/// last pixels are repeated.
 fn warp(
     picture: &[u8],
     before_px: impl Fn([f64; 2]) -> [f64; 2] + Sync,
@@ -129,7 +130,7 @@ mod tests {
         }
     }
 
-    /// A world at infinity: light by direction, slow enough for linear interpolation.
+    /// A world at infinity: light by direction, smooth enough for linear interpolation.
     fn sky(views: &FrameViews) -> Vec<u8> {
         let clip_from_direction = Mat4::from_cols_array_2d(&views.eyes[0].eye_to_clip)
             * Mat4::from_cols_array_2d(&views.eyes[0].world_to_eye);
@@ -175,7 +176,7 @@ mod tests {
         assert!(moved > 5_000, "nothing to correct: {moved}");
     }
 
-    /// A wall one metre ahead, seen by eyes that stand `right_m` to the right.
+    /// A wall one metre ahead, seen by eyes `right_m` to the right.
     fn wall(right_m: f32) -> (FrameViews, Vec<u8>, f32) {
         let mut views = views(0.0);
         for eye in &mut views.eyes {
@@ -197,7 +198,7 @@ mod tests {
     fn a_head_that_moves_needs_depth() {
         let (before, picture, depth) = wall(0.0);
         let (now, expected, _) = wall(0.1);
-        // A metre is 73 px, so 8 columns came in at the right edge.
+        // A metre is 73 px, so 8 columns enter at the right edge.
         let worst = |shown: &Shown| {
             let warped = reproject(shown, &before, &now, SIZE_PX);
             let pixels = warped.pictures[0].iter().zip(&expected).enumerate();
@@ -212,7 +213,8 @@ mod tests {
             ..shown(turned.pictures[0].clone())
         };
         assert!(worst(&by_depth) <= Some(2), "{:?}", worst(&by_depth));
-        // Without depth light is off by up to 0.8 sin(0.25): 0.2 of linear light, over 30 codes of sRGB at mid grey.
+        // Without depth, light is off by up to 0.8 sin(0.25): 0.2 of linear light, over 30 codes of sRGB at
+        // mid grey.
         assert!(worst(&turned) > Some(30), "{:?}", worst(&turned));
     }
 

@@ -1,16 +1,16 @@
-//! What every row of a study shares: the scene, the path through it, and how a frame is taken.
+//! What all rows of a study share: the scene, the path through it, and rendering a frame.
 
 use super::counted::Counted;
 use super::timewarp;
 use formats::textrace::{Tables, TextraceWriter};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
 use raster::backend::{CaptureBackend, Fragments, Work};
-use raster::capture::{CaptureJob, Pictures};
+use raster::capture::{CaptureJob, CapturedFrame, Pictures};
 use raster::draws::DrawList;
 use raster::error::RasterError;
 use raster::frame::Frame;
 use raster::lighting::Lighting;
-use record::CaptureCounts;
+use record::Recorder;
 use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
@@ -25,7 +25,7 @@ const EYES: &[Eye] = &[Eye::Left, Eye::Right];
 pub struct World {
     /// The scene.
     pub scene: Scene,
-    /// Draws.
+    /// Draws of the scene.
     pub draws: DrawList,
     /// Lights.
     pub lighting: Lighting,
@@ -35,9 +35,9 @@ pub struct World {
     pub shadow_range_m: [f32; 2],
     /// The display.
     pub hmd: Hmd,
-    /// What the user sees of the left and right eye's picture.
+    /// Visible parts of the left and right eye's pictures.
     pub lens: [Lens; 2],
-    /// Frames a second along the path.
+    /// Frames per second along the path.
     pub fps: f32,
     /// The path, by frame number.
     pub views: Vec<FrameViews>,
@@ -45,55 +45,55 @@ pub struct World {
     pub tables: Tables,
     /// Texels of its textures.
     pub texture_bytes: u64,
-    /// At half rate the last frame that was rendered.
+    /// The last rendered frame, at half rate.
     pub shown: Option<Shown>,
 }
 
-/// What a frame leaves to the next one at half rate.
+/// What a frame leaves for the next one at half rate.
 #[derive(Clone, Debug)]
 pub struct Shown {
     /// Its number.
     pub number: u32,
     /// Its pictures.
     pub pictures: Pictures,
-    /// Their depth, where it is asked for.
+    /// Their depth, if it is needed.
     pub depths: Option<Vec<Vec<f32>>>,
 }
 
-/// A frame that was made of the one before.
+/// A frame that was reprojected from the one before.
 #[derive(Debug)]
 pub struct Reprojected {
     /// Its pictures.
     pub pictures: Pictures,
     /// Bytes of pictures and depth that were read and written for it.
     pub bytes: u64,
-    /// Time that it took.
+    /// Its time.
     pub took: Duration,
 }
 
-/// A frame that was rendered without capture: what it took.
+/// A frame that was rendered without capture, and its cost.
 #[derive(Debug)]
 pub struct Shot {
     /// What was drawn.
     pub frame: Frame,
-    /// Time of making the pictures of the layers.
+    /// Time of composing the pictures from the layers.
     pub compose: Duration,
-    /// Time of the whole frame but for its shadow maps, which are the same whatever the technique.
+    /// Time of the whole frame without its shadow maps, which do not depend on the technique.
     pub total: Duration,
-    /// What the backend did for it.
+    /// The backend's work for it.
     pub work: Work,
-    /// What it did to find what is hidden.
+    /// The backend's work for occlusion culling.
     pub hiding: Work,
-    /// Depth passes found what is hidden.
+    /// Whether depth passes for occlusion culling were drawn.
     pub occludes: bool,
-    /// One draw made both eyes' pictures.
+    /// Whether one draw rendered both eyes.
     pub at_once: bool,
-    /// What was done in place of rendering it.
+    /// The reprojection, if the frame was not rendered.
     pub reprojection: Option<Reprojected>,
 }
 
 impl Shot {
-    /// What it takes by counts, but for its textures, which only a capture tells.
+    /// Its counts, without textures, which require a capture.
     #[must_use]
     pub fn counted(&self, fragments: u64) -> Counted {
         if let Some(reprojection) = &self.reprojection {
@@ -107,7 +107,7 @@ impl Shot {
         work.bytes_uploaded += self.hiding.bytes_uploaded;
         let mut counted = Counted::of(&self.frame.plan, self.occludes, &work, fragments);
         if self.at_once {
-            // Read once, transformed for either eye.
+            // Read once, transformed for each eye.
             counted.vertices += self.work.vertices;
         }
         counted
@@ -123,7 +123,7 @@ impl World {
         Planner::new(settings, &self.hmd, self.lens, EYES, self.fps)
     }
 
-    /// The job of capturing what `planner` plans.
+    /// The job that captures the plans of `planner`.
     #[must_use]
     pub fn job<'a>(&'a self, planner: &'a Planner) -> CaptureJob<'a> {
         CaptureJob {
@@ -133,7 +133,8 @@ impl World {
             bounds: self.bounds,
             shadow_range_m: self.shadow_range_m,
             planner,
-            // What is searched for anew in every frame would hide what the techniques find.
+            // Skips would hide part of what the techniques find, because they are searched anew in every
+            // frame.
             skips: Skips::NONE,
             fragments: Fragments::DepthTested,
             shaded: false,
@@ -143,7 +144,7 @@ impl World {
     /// Checks that settings do not contradict each other and suit the display.
     ///
     /// # Errors
-    /// They do not.
+    /// Settings that contradict each other or do not suit the display.
     pub fn check(&self, settings: &Settings) -> anyhow::Result<()> {
         let planner = self.planner(settings)?;
         self.views
@@ -153,11 +154,11 @@ impl World {
         Ok(())
     }
 
-    /// Renders a frame of the path without capture, and leaves its pictures on the device. `memory` is
-    /// what the technique remembers of the frame before.
+    /// Renders a frame of the path without capture, and leaves its pictures on the device. `memory` is the
+    /// state of occlusion culling from the frame before.
     ///
     /// # Errors
-    /// Driver errors, and eyes that the culling technique is not made for.
+    /// Driver errors, or eyes that the culling technique does not support.
     pub fn shoot(
         &mut self,
         backend: &mut dyn CaptureBackend,
@@ -178,7 +179,7 @@ impl World {
         let job = self.job(planner);
         let mut frame = job.frame(&self.views[number as usize])?;
         let planned = start.elapsed();
-        // Of another technique's frame, the last one's targets and masks would not fit.
+        // Targets and masks of another technique's frame would not fit.
         backend.prepare(&frame)?;
         let (start, before) = (Instant::now(), backend.work());
         let occludes = planner.settings().occlusion;
@@ -207,7 +208,8 @@ impl World {
             reprojection: None,
         };
         if let Some(follows) = planner.settings().half_rate {
-            // What a runtime would still hold; reading it back is no part of the frame.
+            // A runtime would still hold these pictures, so reading them back is not part of the frame's
+            // time.
             let job = self.job(planner);
             let depths = (follows == Reprojection::Depth).then(|| job.depths(backend, &shot.frame));
             let depths = depths.transpose()?;
@@ -220,7 +222,7 @@ impl World {
         Ok(shot)
     }
 
-    /// Makes a frame of the one before, whose pictures are at hand.
+    /// Reprojects a frame from the one before.
     fn reproject(
         &self,
         planner: &Planner,
@@ -229,7 +231,7 @@ impl World {
     ) -> Result<Shot, RasterError> {
         let [before, now] = [shown.number, number].map(|number| &self.views[number as usize]);
         let mut frame = self.job(planner).frame(now)?;
-        // Nothing is drawn, so nothing is looked for.
+        // Nothing is drawn, so nothing is culled.
         (frame.cull_tests, frame.cull_time) = (0, Duration::ZERO);
         let reprojection = timewarp::reproject(shown, before, now, self.hmd.eye_size_px);
         Ok(Shot {
@@ -244,7 +246,7 @@ impl World {
         })
     }
 
-    /// Reads the pictures of the frame that was just shot.
+    /// Reads the pictures of the frame that was shot last.
     ///
     /// # Errors
     /// Driver errors.
@@ -275,7 +277,7 @@ impl World {
             .map(|&number| self.views[number as usize].clone())
             .collect();
         for views in &tables.meta.frames {
-            // What moves decides what a frame's layers are.
+            // The layers of a frame depend on where its draws are.
             self.draws.pose(&self.scene, views.frame as f32 / self.fps);
             let passes = self.job(planner(views.frame)).passes(views)?;
             tables.passes.extend(passes);
@@ -288,6 +290,8 @@ impl World {
 pub struct Tracer<'a, W: Write + Seek> {
     tables: &'a Tables,
     writer: TextraceWriter<W>,
+    /// Kept between frames, because it remembers how many regions the records of a view need.
+    recorder: Option<Recorder<'a>>,
     pass: usize,
 }
 
@@ -298,11 +302,12 @@ impl<'a, W: Write + Seek> Tracer<'a, W> {
         Self {
             tables,
             writer,
+            recorder: None,
             pass: 0,
         }
     }
 
-    /// Captures the next frame, whose shadow maps have been rendered.
+    /// Captures the next frame; its shadow maps must have been rendered.
     ///
     /// # Errors
     /// Driver errors, and errors of writing.
@@ -311,15 +316,14 @@ impl<'a, W: Write + Seek> Tracer<'a, W> {
         job: &CaptureJob<'_>,
         backend: &mut dyn CaptureBackend,
         frame: &Frame,
-    ) -> Result<CaptureCounts, RasterError> {
-        let mut recorder = job.recorder(self.tables);
-        let captured =
-            job.capture_frame(backend, frame, self.pass, &mut recorder, &mut self.writer)?;
+    ) -> Result<CapturedFrame, RasterError> {
+        let recorder = (self.recorder).get_or_insert_with(|| job.recorder(self.tables));
+        let captured = job.capture_frame(backend, frame, self.pass, recorder, &mut self.writer)?;
         self.pass += frame.plan.layers.len();
-        Ok(captured.counts)
+        Ok(captured)
     }
 
-    /// The writer, to be finished.
+    /// The writer, to finish the trace.
     #[must_use]
     pub fn into_writer(self) -> TextraceWriter<W> {
         self.writer

@@ -1,10 +1,10 @@
-//! What a comparison counts, and its sums over tiles.
+//! Counts of a comparison, summed over tiles.
 
 use super::causes::{SampleCause, UvCause};
 use super::classes::Class;
 use super::means::Means;
 
-/// Who has a fragment that the other has not.
+/// The side that has a fragment which the other does not have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
     /// The reference.
@@ -13,7 +13,7 @@ pub enum Side {
     Capture,
 }
 
-/// Levels and texels of samples against one notion of the truth.
+/// Differences of sampled levels and texels from one definition of the correct result.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SampleErrors {
     /// Samples compared: fragments times textures.
@@ -22,21 +22,22 @@ pub struct SampleErrors {
     pub lod_sum: f64,
     /// Largest of them.
     pub lod_max: f64,
-    /// Samples whose finer level differs.
+    /// Samples with a different finer level.
     pub levels_differ: u64,
-    /// Samples that read other levels.
+    /// Samples that read different levels.
     pub other_levels: u64,
-    /// Samples that read other texels of the same levels.
+    /// Samples that read different texels of the same levels.
     pub other_texels: u64,
-    /// Samples that read other levels or texels, by [`SampleCause::ALL`].
+    /// Samples that read different levels or texels, by [`SampleCause::ALL`].
     pub causes: [u64; SampleCause::ALL.len()],
 }
 
-/// A level and its columns and rows.
+/// A level with its columns and rows.
 pub(super) type Read = (u32, [[u32; 2]; 2]);
 
 impl SampleErrors {
-    /// Adds a sample: clamped levels of detail, and what was read and should have been; whether that differs.
+    /// Adds a sample: the clamped levels of detail, and the texels that were read and that should have been
+    /// read. Returns whether they differ.
     pub(super) fn add(
         &mut self,
         [lod, expected_lod]: [f64; 2],
@@ -70,12 +71,12 @@ impl SampleErrors {
     }
 }
 
-/// Distances, in no order.
+/// Distances, unordered.
 #[derive(Clone, Default, PartialEq)]
 pub struct Distances(pub Vec<f32>);
 
 impl Distances {
-    /// Mean, 99th percentile and maximum; zeros where there are none.
+    /// Mean, 99th percentile and maximum; zeros if there are none.
     #[must_use]
     pub fn summary(&self) -> [f64; 3] {
         let mut values = self.0.clone();
@@ -111,29 +112,30 @@ impl std::fmt::Debug for Distances {
 pub struct Agreement {
     /// Fragments (draw, primitive and pixel) in both.
     pub both: u64,
-    /// Fragments only in the reference, then only in the capture, by [`Class::ALL`].
+    /// Fragments only in the reference and only in the capture, by [`Class::ALL`].
     pub only: [[u64; Class::ALL.len()]; 2],
-    /// Lanes that the capture has twice.
+    /// Lanes that the capture records twice.
     pub recorded_twice: u64,
     /// Distances of coordinates of common fragments and their groups, texels of the group's extent.
     pub uv_errors_texels: Distances,
-    /// They by [`UvCause::ALL`].
+    /// The same by [`UvCause::ALL`].
     pub uv_causes: [u64; UvCause::ALL.len()],
     /// Signed means of coordinates and of their differences over a quad.
     pub means: Means,
-    /// Differences over a quad that neither rounding nor single precision explains, by record, column and axis.
+    /// Differences over a quad that neither rounding nor single precision explains, by record, column and
+    /// axis.
     pub differences_unexplained: u64,
     /// Uv groups of common fragments without a record.
     pub groups_missing: u64,
     /// Records without a group of fragments that sample textures.
     pub groups_unexpected: u64,
-    /// Common fragments whose coordinates are no numbers on either side.
+    /// Common fragments with coordinates that are not finite on either side.
     pub not_finite: u64,
-    /// Shadow-map look-ups of common fragments: not compared.
+    /// Shadow-map look-ups of common fragments, which are not compared.
     pub shadow_lookups: u64,
-    /// Against the same formula of the level of detail, so that what remains is the capture's precision.
+    /// Compared with the same formula of the level of detail, so that only the capture's precision remains.
     pub capture: SampleErrors,
-    /// Against the specification: the exact logarithm of each fragment's own derivatives.
+    /// Compared with the specification: the exact logarithm of each fragment's own derivatives.
     pub specification: SampleErrors,
 }
 
@@ -142,7 +144,7 @@ impl Agreement {
         self.only[side as usize][class as usize] += 1;
     }
 
-    /// Fragments that one side alone has.
+    /// Fragments that only one side has.
     #[must_use]
     pub fn only(&self, side: Side) -> u64 {
         self.only[side as usize].iter().sum()
@@ -165,7 +167,7 @@ impl Agreement {
         }
     }
 
-    /// Adds another tile's or pass's.
+    /// Adds the counts of another tile or pass.
     pub fn merge(&mut self, other: &Self) {
         self.both += other.both;
         for (sum, side) in self.only.iter_mut().zip(&other.only) {

@@ -12,7 +12,7 @@ use scene::AlphaMode;
 pub struct SampledAlpha<'a> {
     /// The texture unit.
     pub sampler: &'a SoftwareSampler<'a>,
-    /// How the driver makes a level of detail of the derivatives: it decides what the driver's test saw.
+    /// The driver's formula of the level of detail, which its alpha test used.
     pub formula: LodFormula,
 }
 

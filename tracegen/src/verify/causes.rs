@@ -1,4 +1,4 @@
-//! Why the coordinates or footprints of a fragment that both sides have differ.
+//! Causes of different coordinates or footprints of a fragment that both sides have.
 
 use super::geometry::{Coordinates, Sampled};
 use super::lod::{clamped, level_of_detail};
@@ -8,15 +8,15 @@ use formats::texture::Texture;
 use glam::DVec2;
 use serde::Serialize;
 
-/// Distance of coordinates, and of levels of detail, that needs no cause but the rounding of a trace and of
-/// single precision.
+/// Distance of coordinates and of levels of detail that rounding in the trace and in single precision
+/// explains.
 pub(super) const SMALL: f64 = 1.0 / 64.0;
 
-/// By how much transforming, clipping and projecting in single precision moves a vertex on the screen: units in the
-/// last place of the largest coordinate there.
+/// Screen error of a vertex that is transformed, clipped and projected in single precision: units in the last
+/// place of its largest screen coordinate.
 const VERTEX_ULPS: f64 = 32.0;
 
-/// Where captures let the differences of a record end: sums of four stay in 32 bits.
+/// Limit of the differences in captured records: sums of four fit in 32 bits.
 pub(super) const LARGEST_DIFFERENCE: u32 = 1 << 28;
 
 /// A cause of an error of coordinates.
@@ -25,29 +25,29 @@ pub(super) const LARGEST_DIFFERENCE: u32 = 1 << 28;
 pub enum UvCause {
     /// At most 1/64 texel.
     Small,
-    /// The driver's derivatives are the same for the whole quad: the far lane lacks the cross term.
+    /// The driver uses the same derivatives for the whole quad, so the opposite lane lacks the cross term.
     NoCross,
-    /// Vertices in single precision: near the horizon and on slivers, coordinates change fast with them.
+    /// Vertices in single precision: near the horizon and on slivers, coordinates depend strongly on them.
     SinglePrecision,
-    /// Slivers whose differences over a quad are beyond the trace's fixed point.
+    /// Slivers whose differences over a quad exceed the trace's fixed-point range.
     Saturated,
     /// None of these.
     Unexplained,
 }
 
-/// A cause of other levels or texels.
+/// A cause of different levels or texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum SampleCause {
     /// The driver's formula of the level of detail.
     Formula,
-    /// One derivative a quad in place of the fragment's own.
+    /// One derivative per quad instead of the fragment's own.
     Quad,
-    /// Both together.
+    /// Both.
     FormulaAndQuad,
-    /// Rounding, where a level or texel ends.
+    /// Rounding at a boundary of levels or texels.
     Rounding,
-    /// Coordinates that differ for a cause of their own.
+    /// Coordinates that differ, for a cause of their own.
     Coordinates,
     /// None of these.
     Unexplained,
@@ -63,9 +63,9 @@ impl UvCause {
         Self::Unexplained,
     ];
 
-    /// It in a few words.
+    /// Description for reports.
     #[must_use]
-    pub fn told(self) -> &'static str {
+    pub fn text(self) -> &'static str {
         match self {
             Self::Small => "within 1/64 texel",
             Self::NoCross => "quads without a cross term",
@@ -87,9 +87,9 @@ impl SampleCause {
         Self::Unexplained,
     ];
 
-    /// It in a few words.
+    /// Description for reports.
     #[must_use]
-    pub fn told(self) -> &'static str {
+    pub fn text(self) -> &'static str {
         match self {
             Self::Formula => "the LOD formula",
             Self::Quad => "one derivative a quad",
@@ -101,22 +101,23 @@ impl SampleCause {
     }
 }
 
-/// A fragment's coordinates in one group, captured and as they should be.
-pub struct Subject<'a> {
+/// A fragment's coordinates in one group, captured and expected.
+pub struct FragmentCoordinates<'a> {
     /// The primitive's coordinates.
     pub coordinates: &'a Coordinates<'a>,
     /// The fragment's pixel.
     pub pixel: [u32; 2],
     /// Texels of the group.
     pub extent: DVec2,
-    /// Pixels of the screen, at whose border drivers clip.
+    /// Size of the screen in pixels; drivers clip at its border.
     pub size_px: [u32; 2],
-    /// How the driver makes levels of detail, and which derivatives it takes.
+    /// The driver's formula of the level of detail and its choice of derivatives.
     pub formula: LodFormula,
 }
 
-impl Subject<'_> {
-    /// The cause of an error of the coordinates that a record has, `error` being these less the true ones, in repeats.
+impl FragmentCoordinates<'_> {
+    /// The cause of a difference between the coordinates of a record and the true ones; `error` is captured
+    /// minus true, in repeats.
     #[must_use]
     pub fn of_uv(&self, record: &QuadRecord, error: DVec2) -> UvCause {
         let texels = |uv: DVec2| (uv * self.extent).length();
@@ -133,7 +134,7 @@ impl Subject<'_> {
             single
         };
         if self.formula == LodFormula::Softpipe {
-            // From whichever lane the quad's coordinates come.
+            // The quad's coordinates may originate from any lane.
             let found = self.coordinates.at(center) + error;
             let near = |lane| texels(found - self.coordinates.without_cross(self.pixel, lane));
             if (0..4).any(|lane| near(lane) <= SMALL + single) {
@@ -154,9 +155,9 @@ impl Subject<'_> {
         UvCause::Unexplained
     }
 
-    /// The cause of other levels or texels than expected. `reads` tells whether given coordinates and a level of
-    /// detail would read what was captured; `lods` are the captured and the expected level. Against the
-    /// specification, the driver's formula and derivatives are causes.
+    /// The cause of different levels or texels than expected. `reads` returns whether given coordinates and a
+    /// level of detail would read what was captured; `lods` are the captured and the expected level. In
+    /// comparisons with the specification, the driver's formula and derivatives are causes.
     #[must_use]
     pub fn of_sample(
         &self,
@@ -195,7 +196,7 @@ impl Subject<'_> {
         }
     }
 
-    /// By how much something changes when the vertices move by what single precision makes of them.
+    /// Change of a value if the vertices move by their errors in single precision.
     fn by_single_precision(&self, of: impl Fn(&Sampled) -> DVec2) -> DVec2 {
         let piece = self.coordinates.piece();
         let here = of(&self.coordinates.in_quad(self.pixel, self.formula));

@@ -1,4 +1,4 @@
-//! Why a fragment is in the capture alone or in the reference alone.
+//! Causes of a fragment that only the capture or only the reference has.
 
 use super::geometry::{Geometry, SLIVER_PX};
 use super::piece::{Piece, center};
@@ -7,11 +7,11 @@ use raster::backend::Fragments;
 use raster::draws::DrawMode;
 use serde::Serialize;
 
-/// Distance to an edge within which the rounding of vertices to 1/256 pixel decides the coverage.
+/// Distance to an edge within which rounding the vertices to 1/256 pixel decides coverage.
 const EDGE_PX: f64 = 2.0 / 256.0;
-/// The same for primitives whose corners are cut off, and with them replaced.
+/// The same for clipped primitives, whose corners are replaced.
 const CLIPPED_PX: f64 = 16.0 / 256.0;
-/// Alpha so near to the cutoff that the filter's rounding and the level of detail decide.
+/// Difference of alpha from the cutoff within which the filter's rounding and the level of detail decide.
 const ALPHA: f64 = 1.0 / 16.0;
 
 /// A class of differences.
@@ -20,15 +20,15 @@ const ALPHA: f64 = 1.0 / 16.0;
 pub enum Class {
     /// The pixel's centre lies within 1/128 pixel of an edge of the primitive.
     Edge,
-    /// The primitive is so thin that rounding decides which way round it winds, or whether it has an area.
+    /// The primitive is so thin that rounding decides its winding or whether it has an area.
     Sliver,
     /// The near or far plane cuts the primitive, and its cut edges are within 1/16 pixel.
     Clipped,
-    /// Another fragment is as deep, but for what single precision makes of it.
+    /// Another fragment has the same depth within single precision.
     DepthTie,
-    /// It is in front or behind of an alpha-masked fragment whose alpha is within 1/16 of the cutoff.
+    /// It overlaps an alpha-masked fragment whose alpha is within 1/16 of the cutoff.
     AlphaBorder,
-    /// A nearer fragment is in one of the two alone, for one of the reasons above.
+    /// Only one side has a nearer fragment, for one of the reasons above.
     Hidden,
     /// None of these.
     Unexplained,
@@ -46,7 +46,7 @@ impl Class {
         Self::Unexplained,
     ];
 
-    /// Its cause in a few words.
+    /// Its cause, for reports.
     #[must_use]
     pub fn cause(self) -> &'static str {
         match self {
@@ -61,7 +61,7 @@ impl Class {
     }
 }
 
-/// The class of a primitive's fragment at a pixel of a tile that only one side has.
+/// The class of a fragment of a primitive at a pixel of a tile, which only one side has.
 #[must_use]
 pub fn classify(
     geometry: &Geometry<'_>,
@@ -93,14 +93,14 @@ pub fn classify(
         return Class::Unexplained;
     }
     let (depth, error) = (piece.depth(at), piece.depth_error(at));
-    // What an earlier fragment there does if it is there at all: hide this one or not.
+    // The effect of an earlier fragment at the pixel, if it exists: it hides this one or not.
     let mut class = Class::Unexplained;
     for (_, earlier) in geometry.of_tile(tile).filter(|(other, _)| *other < index) {
         let distance = earlier.distance_px(pixel);
-        let doubtful = distance.abs() <= if earlier.clipped { CLIPPED_PX } else { EDGE_PX }
+        let borderline = distance.abs() <= if earlier.clipped { CLIPPED_PX } else { EDGE_PX }
             || earlier.dropped
             || earlier.height_px() <= SLIVER_PX;
-        if own(earlier) || (distance < 0.0 && !doubtful) {
+        if own(earlier) || (distance < 0.0 && !borderline) {
             continue;
         }
         let mode = geometry.call(earlier).mode;
@@ -123,7 +123,7 @@ pub fn classify(
         }
         if margin.abs() <= ALPHA {
             class = Class::AlphaBorder;
-        } else if doubtful && class == Class::Unexplained {
+        } else if borderline && class == Class::Unexplained {
             class = Class::Hidden;
         }
     }

@@ -1,4 +1,4 @@
-//! The driver's filtered texels against those of the software sampler, at every visible pixel.
+//! Compares the driver's filtered texels with those of the software sampler, at every visible pixel.
 
 use super::compare::{Lane, captured_uv, key, lanes};
 use super::geometry::Geometry;
@@ -16,35 +16,35 @@ use scene::{Material, Scene};
 /// A step of 8 bits.
 const STEP: f64 = 1.0 / 255.0;
 
-/// By how far single precision may move coordinates on the way to the filter, texels.
+/// Distance in texels by which single precision may move coordinates before filtering.
 const MOVED_TEXELS: f64 = 1.0 / 64.0;
 
-/// Where to, in steps of that.
+/// Directions, in steps of that distance.
 const AROUND: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]];
 
-/// How the software sampler's colours differ from the driver's, in the channel that differs most.
+/// Differences of the software sampler's colours from the driver's, in the channel that differs most.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ColourErrors {
     /// Visible fragments that sample a texture.
     pub fragments: u64,
-    /// Those without a record of their primitive at their pixel.
+    /// Fragments without a record of their primitive at their pixel.
     pub unrecorded: u64,
-    /// Those that differ by no more than 1/255 as light.
+    /// Fragments that differ by at most 1/255 in linear light.
     pub within_as_light: u64,
-    /// Those that differ by no more than 1/255 as the texture encodes colour.
+    /// Fragments that differ by at most 1/255 in the texture's encoding.
     pub within_as_encoded: u64,
-    /// Beyond that only because the driver decodes blocks in 8 bits.
+    /// Fragments that differ by more only because the driver decodes blocks in 8 bits.
     pub by_decoding: u64,
-    /// Beyond that, but not with the driver's polynomial for sRGB as well.
+    /// Fragments that differ by more, unless the driver's polynomial for sRGB is used as well.
     pub by_srgb: u64,
-    /// Beyond that, but not for coordinates that lie 1/64 texel away: where texels differ much, the driver's single
-    /// precision shows.
+    /// Fragments that differ by more, unless the coordinates are moved by 1/64 texel: single precision is
+    /// visible where neighbouring texels differ much.
     pub by_coordinates: u64,
-    /// Sum of the differences as encoded.
+    /// Sum of the differences in the texture's encoding.
     pub sum: f64,
     /// Largest of them.
     pub max: f64,
-    /// Largest difference where blocks and sRGB are decoded as the driver does.
+    /// Largest difference if blocks and sRGB are decoded like in the driver.
     pub max_as_driver: f64,
 }
 
@@ -56,7 +56,7 @@ impl ColourErrors {
         self.max = self.max.max(encoded);
     }
 
-    /// Adds another tile's or pass's.
+    /// Adds the differences of another tile or pass.
     pub fn merge(&mut self, other: &Self) {
         self.fragments += other.fragments;
         self.unrecorded += other.unrecorded;
@@ -71,7 +71,7 @@ impl ColourErrors {
     }
 }
 
-/// Filters what the records of a tile say was sampled, and compares it with what the driver got.
+/// Filters the samples of a tile's records, and compares them with the driver's.
 pub struct ColourCheck<'a> {
     /// The scene, for its materials.
     pub scene: &'a Scene,
@@ -81,12 +81,12 @@ pub struct ColourCheck<'a> {
     pub tables: &'a Tables,
     /// The texture unit.
     pub sampler: &'a SoftwareSampler<'a>,
-    /// How the driver makes a level of detail of the derivatives.
+    /// The driver's formula of the level of detail.
     pub formula: LodFormula,
 }
 
 impl ColourCheck<'_> {
-    /// Compares the visible pixels of a tile, of which `texels` holds the textures in `slot`.
+    /// Compares the visible pixels of a tile; `texels` holds the driver's texels of the textures in `slot`.
     #[must_use]
     pub fn tile(
         &self,
@@ -146,7 +146,7 @@ impl ColourCheck<'_> {
         errors
     }
 
-    /// What the software sampler makes of a fragment's record, and whether the texture is sRGB.
+    /// The software sampler's colour for a fragment's record, and whether the texture is sRGB.
     fn filtered(
         &self,
         sampler: &SoftwareSampler<'_>,
@@ -192,7 +192,7 @@ impl ColourCheck<'_> {
     }
 }
 
-/// Colour as sRGB textures encode it; alpha as it is.
+/// Colour in sRGB encoding; alpha unchanged.
 fn encode(color: DVec4) -> DVec4 {
     let [r, g, b] = [color.x, color.y, color.z].map(srgb_of_linear);
     DVec4::new(r, g, b, color.w)

@@ -1,7 +1,7 @@
-//! How well the tiles of a captured pass agree with the reference.
+//! Compares the tiles of a captured pass with the reference.
 
 use super::agreement::{Agreement, Read, Side};
-use super::causes::{LARGEST_DIFFERENCE, SMALL, Subject, UvCause};
+use super::causes::{FragmentCoordinates, LARGEST_DIFFERENCE, SMALL, UvCause};
 use super::classes::classify;
 use super::geometry::Geometry;
 use super::lod::{clamped, level_of_detail, taps};
@@ -14,15 +14,15 @@ use formats::view::TILE_SIZE_PX;
 use glam::DVec2;
 use raster::backend::Fragments;
 
-/// What all tiles of a comparison share.
+/// Inputs that all tiles of a comparison share.
 pub struct Comparison<'a> {
     /// The trace's tables.
     pub tables: &'a Tables,
     /// The alpha test.
     pub alpha: &'a dyn AlphaTest,
-    /// Which fragments the trace holds.
+    /// The fragments that the trace holds.
     pub recorded: Fragments,
-    /// How the driver makes a level of detail of the derivatives; replays of the trace do the same.
+    /// The driver's formula of the level of detail; replays of the trace use the same.
     pub formula: LodFormula,
 }
 
@@ -141,7 +141,7 @@ impl Comparison<'_> {
         self.groups(geometry, fragment, lanes, result);
         for lane in lanes {
             let number = usize::from(lane.group);
-            // Look-ups of shadow maps have groups of their own behind the material's.
+            // Look-ups of shadow maps have their own groups after the material's.
             let Some(slots) = geometry.groups(piece).get(number) else {
                 result.shadow_lookups += u64::from(number < draw.groups.len());
                 continue;
@@ -155,7 +155,7 @@ impl Comparison<'_> {
             let record = &tile.records[lane.record as usize];
             let index = (fragment.pixel[0] & 1) | (fragment.pixel[1] & 1) << 1;
             let coordinates = geometry.coordinates(piece, &leader);
-            let subject = Subject {
+            let subject = FragmentCoordinates {
                 coordinates: &coordinates,
                 pixel: fragment.pixel,
                 extent: extent(group),
@@ -172,7 +172,7 @@ impl Comparison<'_> {
             let cause = subject.of_uv(record, error);
             result.uv_errors_texels.0.push(error_texels as f32);
             result.uv_causes[cause as usize] += 1;
-            // softpipe's lanes lack the cross term, which no bound of the arithmetic holds.
+            // softpipe's lanes lack the cross term, so the bounds do not apply to them.
             if cause != UvCause::Saturated && self.formula != LodFormula::Softpipe {
                 let place = (piece.draw, lane.group);
                 add_to_means(&subject, record, index, error, place, result);
@@ -181,7 +181,7 @@ impl Comparison<'_> {
         }
     }
 
-    /// Counts a fragment's groups that have no record, and records that should have a group.
+    /// Counts a fragment's groups that have no record, and unexpected records.
     fn groups(
         &self,
         geometry: &Geometry<'_>,
@@ -203,7 +203,7 @@ impl Comparison<'_> {
             if lanes.iter().any(|lane| usize::from(lane.group) == number) {
                 continue;
             }
-            // A capture has no record of coordinates that are no numbers.
+            // A capture has no record of coordinates that are not finite.
             let coordinates = geometry.coordinates(piece, &leader);
             let corner = |step| coordinates.single_precision(quad_center(fragment.pixel) + step);
             let corners = [DVec2::ZERO, DVec2::X, DVec2::Y, DVec2::ONE].map(corner);
@@ -217,7 +217,7 @@ impl Comparison<'_> {
         record: &QuadRecord,
         lane: u32,
         group: &UvGroup,
-        subject: &Subject<'_>,
+        subject: &FragmentCoordinates<'_>,
         uv: UvCause,
         result: &mut Agreement,
     ) {
@@ -270,10 +270,10 @@ impl Comparison<'_> {
     }
 }
 
-/// Adds a lane's error to the means of its draw and group, and with the first lane of a record those of its
-/// differences over the quad.
+/// Adds a lane's error to the means of its draw and group and, for the first lane of a record, the errors of
+/// the record's differences over the quad.
 fn add_to_means(
-    subject: &Subject<'_>,
+    subject: &FragmentCoordinates<'_>,
     record: &QuadRecord,
     lane: u32,
     error: DVec2,
@@ -284,7 +284,8 @@ fn add_to_means(
     let center = center(subject.pixel);
     let beyond = |error: DVec2, bound: DVec2| error.abs().cmpgt(bound).any();
     let mut bound = coordinates.single_precision(center) * extent + rounding_texels(lane);
-    // The bound of clipped triangles costs much more and is wider: it is taken where an error needs it.
+    // The bound of clipped triangles is wider and expensive to compute, so it is only computed if an error
+    // exceeds the other bound.
     if beyond(error * extent, bound) {
         let [cut] = coordinates.single_precision_cut(center, subject.size_px, [center]);
         bound = cut * extent + rounding_texels(lane);
@@ -308,7 +309,7 @@ fn add_to_means(
             bottom_right - bottom_left - (top_right - top_left),
         ),
     ];
-    // What each column is a difference of.
+    // The lanes that each column is a difference of.
     let bounds_of = |bounds: [DVec2; 4]| {
         let [top_left, top_right, bottom_left, bottom_right] = bounds.map(|bound| bound * extent);
         let all = top_left + top_right + bottom_left + bottom_right;
@@ -323,7 +324,7 @@ fn add_to_means(
     }
     for (column, ((found, expected), bound)) in columns.into_iter().zip(bounds).enumerate() {
         for axis in 0..2 {
-            // Beyond the fixed point a record's differences end, or lose pairs of repeats.
+            // Beyond the fixed-point range, a record's differences are clamped or lose pairs of repeats.
             let largest = f64::from(LARGEST_DIFFERENCE) / f64::from(SUBTEXELS);
             if found[axis].unsigned_abs() >= LARGEST_DIFFERENCE || expected[axis].abs() >= largest {
                 continue;
@@ -337,7 +338,7 @@ fn add_to_means(
     }
 }
 
-/// Coordinates of a lane as the trace has them.
+/// Coordinates of a lane in the trace.
 pub(super) fn captured_uv(record: &QuadRecord, lane: u32, group: &UvGroup) -> DVec2 {
     let [u, v] = record.lane_uv(lane).map(f64::from);
     DVec2::new(u, v) / (f64::from(SUBTEXELS) * extent(group))

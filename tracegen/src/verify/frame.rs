@@ -1,4 +1,4 @@
-//! A captured frame against the reference: its passes, all of their tiles or a sample of them.
+//! Verifies a captured frame: its passes, with all of their tiles or a sample of them.
 
 use super::agreement::Agreement;
 use super::alpha::SampledAlpha;
@@ -9,6 +9,7 @@ use super::sampler::SoftwareSampler;
 use super::write::reference_tile;
 use anyhow::{Context, ensure};
 use formats::footprint::LodFormula;
+use formats::random::Random;
 use formats::textrace::{Draw, EncodedTile, Pass, PassKind, Surfaces, Textrace, Tile, encode_tile};
 use formats::view::{Eye, FrameViews};
 use raster::backend::{Fragments, Texels};
@@ -17,11 +18,11 @@ use rayon::prelude::*;
 use scene::Scene;
 use textures::TextureSet;
 
-/// What is verified, and by what.
-pub struct Subject<'a> {
+/// The capture and its inputs.
+pub struct CaptureUnderTest<'a> {
     /// The capture.
     pub trace: &'a Textrace,
-    /// Its scene, posed as it was captured.
+    /// Its scene, in the pose of the capture.
     pub scene: &'a Scene,
     /// The scene's draws.
     pub draws: &'a DrawList,
@@ -34,16 +35,16 @@ pub struct Subject<'a> {
 pub enum TileChoice {
     /// Every tile of every pass.
     All,
-    /// So many tiles of all passes together, drawn with a seed.
+    /// A sample of the tiles of all passes.
     Some {
-        /// How many.
+        /// Number of tiles.
         count: usize,
-        /// Seed of the draw.
+        /// Seed of the sample.
         seed: u64,
     },
 }
 
-/// What came out.
+/// Results.
 #[derive(Clone, Debug, Default)]
 pub struct Verified {
     /// Views verified.
@@ -52,18 +53,18 @@ pub struct Verified {
     pub tiles: usize,
     /// Tiles of all passes.
     pub all_tiles: usize,
-    /// What contradicts the scene in the trace's tables.
+    /// Contradictions between the trace's tables and the scene.
     pub faults: Vec<String>,
-    /// Records against the reference.
+    /// Comparison of the records with the reference.
     pub agreement: Agreement,
-    /// Colours by slot of the materials' textures, where texels were given.
+    /// Comparison of colours by slot of the materials' textures, if texels are given.
     pub colours: Vec<ColourErrors>,
-    /// The reference as the trace's tiles, by pass and tile, where they were asked for.
+    /// The reference encoded as the trace's tiles, by pass and tile, if requested.
     pub reference: Vec<Vec<EncodedTile>>,
 }
 
-impl<'a> Subject<'a> {
-    /// Checks that the trace is one of the scene's draws, pass by pass pictures of eyes.
+impl<'a> CaptureUnderTest<'a> {
+    /// Checks that the passes of the trace are pictures of eyes with the scene's draws.
     ///
     /// # Errors
     /// The first contradiction.
@@ -128,7 +129,7 @@ impl<'a> Subject<'a> {
     /// The eyes' matrices of the trace's first frame.
     ///
     /// # Errors
-    /// Tables without them.
+    /// Tables without views.
     pub fn views(&self) -> anyhow::Result<&'a FrameViews> {
         let frame = self.passes().first().map(|(_, pass, _)| pass.frame);
         let mut views = self.trace.tables().meta.frames.iter();
@@ -137,8 +138,8 @@ impl<'a> Subject<'a> {
             .context("the trace has no frame with its eyes' matrices")
     }
 
-    /// Compares the chosen tiles of the first frame; `texels` are the driver's by pass and slot, or
-    /// empty. `keep` encodes the reference's tiles.
+    /// Compares the chosen tiles of the first frame; `texels` are the driver's by pass and slot, or empty.
+    /// `keep` requests the reference's encoded tiles.
     ///
     /// # Errors
     /// A damaged tile.
@@ -211,7 +212,7 @@ impl<'a> Subject<'a> {
                 .collect::<anyhow::Result<Vec<_>>>()?;
             result.tiles += found.len();
             let mut reference = Vec::new();
-            // In the order of the tiles, so that sums are the same whatever the threads.
+            // Summed in the order of the tiles, so that sums do not depend on the number of threads.
             for (agreement, colours, tile) in found {
                 result.agreement.merge(&agreement);
                 result
@@ -236,19 +237,18 @@ fn recorded(surfaces: Option<&Surfaces>) -> Fragments {
     }
 }
 
-/// Which tiles of passes with so many tiles are verified.
+/// Chooses the tiles to verify; `counts` are the numbers of tiles per pass.
 fn choose(choice: TileChoice, counts: &[usize]) -> Vec<Vec<bool>> {
     let all: usize = counts.iter().sum();
     let mut chosen = match choice {
         TileChoice::All => vec![true; all],
         TileChoice::Some { count, seed } => {
             // Selection sampling (Knuth, algorithm S).
-            let mut random = SplitMix(seed);
+            let mut random = Random(seed);
             let mut needed = count.min(all);
             (0..all)
                 .map(|tile| {
-                    let left = (all - tile) as u64;
-                    let take = random.below(left) < needed as u64;
+                    let take = random.below(all - tile) < needed;
                     needed -= usize::from(take);
                     take
                 })
@@ -260,21 +260,6 @@ fn choose(choice: TileChoice, counts: &[usize]) -> Vec<Vec<bool>> {
         .iter()
         .map(|&count| chosen.by_ref().take(count).collect())
         .collect()
-}
-
-/// Steele, Lea and Flood 2014.
-struct SplitMix(u64);
-
-impl SplitMix {
-    /// A number below `end`.
-    fn below(&mut self, end: u64) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^= z >> 31;
-        ((u128::from(z) * u128::from(end)) >> 64) as u64
-    }
 }
 
 #[cfg(test)]
@@ -291,7 +276,7 @@ mod tests {
         assert_eq!(total(&chosen), 40);
         assert_eq!(chosen, of(7));
         assert_ne!(chosen, of(8));
-        // Both passes are drawn from.
+        // Both passes have chosen tiles.
         assert!(chosen.iter().all(|pass| pass.iter().any(|c| *c)));
         assert_eq!(total(&choose(TileChoice::All, &counts)), 500);
         assert_eq!(

@@ -1,4 +1,4 @@
-//! The triangles of a view, and which of its tiles they may touch.
+//! The triangles of a view, sorted into its tiles.
 
 use super::piece::{Piece, center, pieces, quad_center};
 use super::precision::VertexError;
@@ -8,10 +8,10 @@ use glam::{DMat4, DVec2, DVec3, DVec4, Mat4};
 use raster::draws::{DrawCall, DrawList};
 use scene::{Material, Mesh, Scene, TextureRef};
 
-/// Height up to which the rounding of vertices decides which way round a triangle winds.
+/// Height below which rounding of the vertices decides a triangle's winding.
 pub(super) const SLIVER_PX: f64 = 4.0 / 256.0;
 
-/// Whole pixels that a triangle is looked for around it: rounding may put it into the next tile.
+/// Margin in whole pixels around a triangle, because rounding may move it into the next tile.
 const MARGIN_PX: u32 = 1;
 
 /// A view's triangles in submission order, by tile.
@@ -23,7 +23,7 @@ pub struct Geometry<'a> {
     /// Tile columns and rows.
     pub tiles: [u32; 2],
     pieces: Vec<Piece>,
-    /// By tile: the pieces that may touch it, ascending; empty for tiles that are not wanted.
+    /// Pieces that may touch each tile, ascending; empty for tiles that are not verified.
     bins: Vec<Vec<u32>>,
 }
 
@@ -71,7 +71,7 @@ impl<'a> Geometry<'a> {
             .collect();
         for (number, triangle) in (0_u32..).zip(mesh.indices.chunks_exact(3)) {
             let vertices = [0, 1, 2].map(|i| clip[triangle[i] as usize]);
-            // All corners beyond one side of the picture.
+            // All corners are beyond the same side of the picture.
             let beyond = |side: &dyn Fn(&DVec4) -> bool| vertices.iter().all(side);
             if beyond(&|v| v.x > v.w)
                 || beyond(&|v| v.x < -v.w)
@@ -89,7 +89,7 @@ impl<'a> Geometry<'a> {
                 VertexError::new(matrices, position.as_dvec3())
             });
             for piece in pieces(vertices, errors, self.size_px, draw, number, shows) {
-                // Of what is not drawn, only what another rounding might draw is of interest.
+                // Undrawn pieces are kept only if different rounding might draw them.
                 if !piece.dropped || piece.height_px() <= SLIVER_PX {
                     self.add(piece, wanted);
                 }
@@ -120,7 +120,7 @@ impl<'a> Geometry<'a> {
         }
     }
 
-    /// Pieces that may touch a tile, in submission order; those that are not drawn as well.
+    /// Pieces that may touch a tile, in submission order, including undrawn ones.
     pub fn of_tile(&self, tile: usize) -> impl Iterator<Item = (u32, &Piece)> {
         self.bins[tile]
             .iter()
@@ -157,7 +157,7 @@ impl<'a> Geometry<'a> {
         self.call(piece).first_primitive + piece.number
     }
 
-    /// The texture coordinates of a piece that `texture` is sampled at.
+    /// The texture coordinates of a piece for sampling `texture`.
     #[must_use]
     pub fn coordinates(&self, piece: &'a Piece, texture: &TextureRef) -> Coordinates<'a> {
         let mesh = &self.scene.meshes[self.call(piece).mesh];
@@ -210,7 +210,7 @@ fn corner(mesh: &Mesh, piece: &Piece, vertex: usize) -> usize {
 pub struct Coordinates<'a> {
     piece: &'a Piece,
     uv: [DVec2; 3],
-    /// As the vertices have them, and the texture's transform.
+    /// The vertices' coordinates, and the texture's transform.
     set: [DVec2; 3],
     rows: [DVec3; 2],
 }
@@ -260,8 +260,8 @@ impl Coordinates<'_> {
         }
     }
 
-    /// Coordinates at a pixel with the differences in its quad that drivers take for derivatives: those
-    /// of the left column and of the top row, or of the bottom row in softpipe, or a lane's own.
+    /// Coordinates at a pixel, with the differences in its quad that drivers use as derivatives: of the left
+    /// column and the top row (the bottom row in softpipe), or a lane's own.
     #[must_use]
     pub fn in_quad(&self, pixel: [u32; 2], formula: LodFormula) -> Sampled {
         let quad = quad_center(pixel);
@@ -278,8 +278,8 @@ impl Coordinates<'_> {
         }
     }
 
-    /// What a record of a quad says of a pixel where the driver's differences are the same for the whole quad, as
-    /// softpipe's are: on from the `first` lane that it covers.
+    /// Coordinates of a pixel according to its quad's record, if the driver uses the same differences for the
+    /// whole quad like softpipe: extrapolated from the `first` covered lane.
     #[must_use]
     pub fn without_cross(&self, pixel: [u32; 2], first: u32) -> DVec2 {
         let quad = self.in_quad(pixel, LodFormula::Softpipe);
@@ -288,8 +288,8 @@ impl Coordinates<'_> {
         self.at(start) + quad.dx * steps.x + quad.dy * steps.y
     }
 
-    /// What single precision may make of them at a point: a few units in the last place of the largest terms of
-    /// the equations of the planes that they are fractions of.
+    /// Error in single precision at a point: a few units in the last place of the largest terms of the plane
+    /// equations of numerator and denominator.
     #[must_use]
     pub fn interpolation_error(&self, p: DVec2) -> DVec2 {
         let (above, below) = self.fraction(p);
@@ -303,13 +303,13 @@ impl Coordinates<'_> {
         16.0 * f64::from(f32::EPSILON) * (terms + (above / below).abs() * term) / below.abs()
     }
 
-    /// What they are over.
+    /// The denominator.
     #[must_use]
     pub fn piece(&self) -> &Piece {
         self.piece
     }
 
-    /// The same coordinates of the vertices over another piece.
+    /// The same coordinates over another piece of the primitive.
     #[must_use]
     pub fn on<'p>(&self, piece: &'p Piece) -> Coordinates<'p> {
         Coordinates {

@@ -1,4 +1,4 @@
-//! Levels of detail and the texels of a sample, in double precision from the specification's text.
+//! Levels of detail and texels of a sample in double precision, from the specification.
 
 use super::geometry::Sampled;
 use formats::footprint::LodFormula;
@@ -10,8 +10,8 @@ fn size(texture: &Texture) -> DVec2 {
     DVec2::new(texture.size[0].into(), texture.size[1].into())
 }
 
-/// Level of detail before it is clamped, from derivatives in units of the texture: `log2(rho)`, rho being the
-/// longer of the two derivatives in texels, or what a driver makes of that.
+/// Level of detail before clamping, from derivatives in units of the texture: `log2(rho)`, where rho is the
+/// longer derivative in texels, or a driver's approximation.
 #[must_use]
 pub fn level_of_detail(at: &Sampled, texture: &Texture, formula: LodFormula) -> f64 {
     let (dx, dy) = (at.dx * size(texture), at.dy * size(texture));
@@ -30,10 +30,10 @@ pub fn level_of_detail(at: &Sampled, texture: &Texture, formula: LodFormula) -> 
     }
 }
 
-/// A level of detail within the texture's levels, where it makes a difference.
+/// A level of detail clamped to the texture's levels.
 #[must_use]
 pub fn clamped(lod: f64, texture: &Texture) -> f64 {
-    // Not a number where the derivatives are none.
+    // Not a number if the derivatives are not.
     lod.max(0.0)
         .min(f64::from(texture.levels.saturating_sub(1)))
 }
@@ -45,13 +45,13 @@ pub struct Tap {
     pub level: u32,
     /// Left and right column, upper and lower row, wrapped.
     pub texels: [[u32; 2]; 2],
-    /// How far the coordinates lie from the left column and the upper row to the next.
+    /// Weights of the right column and of the lower row.
     pub between: DVec2,
-    /// Share of this level in the result.
+    /// Weight of this level in the result.
     pub weight: f64,
 }
 
-/// The levels and texels that a sample at `uv` reads; none where the coordinates are no numbers.
+/// The levels and texels that a sample at `uv` reads; none if the coordinates are not finite.
 pub fn taps(
     uv: DVec2,
     lod: f64,
@@ -75,7 +75,8 @@ pub fn taps(
     let sizes = levels.map(|(level, _)| texture.level_size(level));
     let wrap = sampler.wrap;
     let finite = uv.is_finite();
-    // A level of weight zero is read too where the other is not the last: a driver does not look.
+    // A level of weight zero is read as well unless the other one is the last, because drivers do not check
+    // the weight.
     let reads_next = sampler.mip == MipFilter::Linear && lod > 0.0 && lod < f64::from(last);
     let count = if finite {
         1 + usize::from(reads_next)

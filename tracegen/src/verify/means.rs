@@ -1,7 +1,7 @@
-//! Signed means of errors, which show what is off by the same everywhere, however little.
+//! Signed means of errors, which reveal small systematic errors.
 //!
-//! Each error has a bound of its own, from the arithmetic. For any weights the weighted mean of the errors is
-//! within the weighted mean of the bounds; with 1/bound² lanes that are known well count most.
+//! Each error has its own bound, from the arithmetic. For any weights, the weighted mean of the errors is
+//! within the weighted mean of the bounds; with weights 1/bound², precise lanes count most.
 
 use formats::textrace::Tables;
 use serde::Serialize;
@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 /// A weighted mean of errors and the bound of its magnitude.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Mean {
-    /// Errors in it.
+    /// Number of errors.
     pub count: u64,
     weights: f64,
     errors: f64,
@@ -18,7 +18,7 @@ pub struct Mean {
 }
 
 impl Mean {
-    /// Adds an error whose magnitude is at most `bound`; without a bound it is left out.
+    /// Adds an error with the given bound; an error without a bound is ignored.
     pub fn add(&mut self, error: f64, bound: f64) {
         let weight = bound.powi(-2);
         if error.is_finite() && weight.is_finite() && weight > 0.0 {
@@ -29,7 +29,7 @@ impl Mean {
         }
     }
 
-    /// Adds another one, whose errors and bounds are `scale` times as large here.
+    /// Adds another mean whose errors and bounds are `scale` times as large in these units.
     fn merge(&mut self, other: &Self, scale: f64) {
         self.count += other.count;
         self.weights += other.weights / (scale * scale);
@@ -46,7 +46,7 @@ impl Mean {
     }
 }
 
-/// What means are taken of.
+/// The quantities that means are computed of.
 pub const COLUMNS: [&str; 8] = [
     "u",
     "v",
@@ -62,18 +62,18 @@ pub const COLUMNS: [&str; 8] = [
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Means(BTreeMap<(u32, u8), [Mean; COLUMNS.len()]>);
 
-/// A mean beyond its bound, or the one that is nearest to it.
+/// A mean that exceeds its bound, or the one closest to its bound.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Bias {
     /// The draw or the texture.
     pub of: String,
-    /// What it is a mean of.
+    /// The quantity.
     pub column: &'static str,
-    /// Errors in it.
+    /// Number of errors.
     pub count: u64,
-    /// Weighted mean of the captured value less the true one.
+    /// Weighted mean of captured minus true values.
     pub mean_texels: f64,
-    /// What arithmetic allows.
+    /// Bound from the arithmetic.
     pub bound_texels: f64,
 }
 
@@ -88,13 +88,13 @@ impl Bias {
         })
     }
 
-    /// Mean over bound.
+    /// Mean divided by its bound.
     #[must_use]
     pub fn share(&self) -> f64 {
         self.mean_texels.abs() / self.bound_texels
     }
 
-    /// The mean is beyond what arithmetic allows.
+    /// Whether the mean exceeds its bound.
     #[must_use]
     pub fn is_systematic(&self) -> bool {
         self.share() > 1.0
@@ -107,7 +107,7 @@ impl Means {
         self.0.entry((draw, group)).or_default()
     }
 
-    /// Adds another tile's or pass's.
+    /// Adds the means of another tile or pass.
     pub fn merge(&mut self, other: &Self) {
         for (&(draw, group), means) in &other.0 {
             for (sum, mean) in self.of(draw, group).iter_mut().zip(means) {

@@ -1,10 +1,10 @@
-//! An independent reference that captures are held against.
+//! An independent reference that captures are compared with.
 //!
-//! A rasteriser and a texture unit in double precision that share nothing with the drivers but their documented
-//! rules: vertices snapped to 1/256 pixel, the top-left rule, a depth test with `Less` in submission order,
-//! perspective-correct interpolation, levels of detail and filtering as the specification has them. With the
-//! capture they share the scene, the eyes' matrices, the list of draws and the compressed textures; with the
-//! trace's readers what a record means.
+//! A rasteriser and a texture unit in double precision that share only documented rules with the drivers:
+//! vertices snapped to 1/256 pixel, the top-left rule, a depth test with `Less` in submission order,
+//! perspective-correct interpolation, levels of detail and filtering according to the specification. They
+//! share the scene, the eyes' matrices, the list of draws and the compressed textures with the capture, and
+//! the meaning of records with the trace's readers.
 
 pub mod agreement;
 pub mod alpha;

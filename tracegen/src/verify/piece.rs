@@ -1,4 +1,4 @@
-//! A triangle on the screen: what it covers, how deep it lies, and where on its primitive a pixel is.
+//! A triangle on the screen: its coverage, depth, and barycentric coordinates.
 
 use super::precision::VertexError;
 use glam::{DVec2, DVec3, DVec4};
@@ -20,18 +20,18 @@ pub(super) struct ClipVertex {
 pub(super) struct Corner {
     /// Pixels, y down.
     pub at: DVec2,
-    /// How far single precision may move it, pixels.
+    /// Error in single precision, pixels.
     pub moves_px: DVec2,
     /// 1/256 pixels.
     snapped: [i64; 2],
     depth: f64,
     pub inverse_w: f64,
-    /// How far `inverse_w` may be off, as part of it.
+    /// Relative error of `inverse_w`.
     pub inverse_w_error: f64,
     pub weights: DVec3,
 }
 
-/// A primitive, or what clipping left of it, as a triangle that winds clockwise on the screen.
+/// A primitive, or a part of it after clipping, as a triangle that winds clockwise on the screen.
 #[derive(Clone, Copy, Debug)]
 pub struct Piece {
     corners: [Corner; 3],
@@ -41,11 +41,11 @@ pub struct Piece {
     pub number: u32,
     /// It crosses the near or the far plane.
     pub clipped: bool,
-    /// Its primitive faces away and is not drawn, or rounding left nothing of it.
+    /// Its primitive faces away and is not drawn, or has no area after rounding.
     pub dropped: bool,
 }
 
-/// What becomes of a primitive: up to three triangles where planes cut corners off.
+/// The pieces of a primitive: up to three triangles if planes cut corners off.
 pub(super) fn pieces(
     vertices: [DVec4; 3],
     errors: [VertexError; 3],
@@ -106,7 +106,7 @@ fn clip_to_depth_range(triangle: &[ClipVertex; 3]) -> Vec<ClipVertex> {
         }
         polygon = kept;
     }
-    // Vertices that are no numbers are on neither side.
+    // Vertices that are not finite are on neither side.
     polygon.retain(|v| v.clip.is_finite() && v.clip.w > 0.0);
     polygon
 }
@@ -137,10 +137,10 @@ fn clip_to_screen(triangle: &[Corner; 3], size_px: [u32; 2]) -> Vec<Corner> {
 }
 
 impl Corner {
-    /// The point at a share of the way to another corner on the screen.
+    /// The point at a fraction of the way to another corner on the screen.
     fn toward(&self, other: &Self, share: f64) -> Self {
         let inverse_w = self.inverse_w + share * (other.inverse_w - self.inverse_w);
-        // The same errors in clip space move a point more where w is smaller.
+        // The same errors in clip space move a point further if w is smaller.
         let moves = |of: &Self| of.moves_px * (inverse_w / of.inverse_w).max(1.0);
         let at = self.at.lerp(other.at, share);
         let over_w = (self.weights * self.inverse_w).lerp(other.weights * other.inverse_w, share);
@@ -203,7 +203,7 @@ impl Piece {
         &self.corners
     }
 
-    /// First and last column, then row, of the pixels that it may touch; `None` off the screen.
+    /// First and last column, then row, of the pixels that it may touch; `None` if off the screen.
     pub(super) fn span_px(&self, size_px: [u32; 2]) -> Option<[[u32; 2]; 2]> {
         let axis = |axis: usize| {
             let values = self.corners.map(|v| v.snapped[axis].div_euclid(256));
@@ -218,7 +218,7 @@ impl Piece {
         Some([axis(0)?, axis(1)?])
     }
 
-    /// The edges' values at a pixel's centre: all positive inside.
+    /// The edge functions at a pixel's centre: all positive inside.
     fn edges(&self, pixel: [u32; 2]) -> [(i128, [i64; 2]); 3] {
         let center = pixel.map(|v| i64::from(v) * 256 + 128);
         [0, 1, 2].map(|i| {
@@ -227,7 +227,7 @@ impl Piece {
         })
     }
 
-    /// A pixel's centre is covered, by the top-left rule.
+    /// Whether a pixel's centre is covered, by the top-left rule.
     #[must_use]
     pub fn covers(&self, pixel: [u32; 2]) -> bool {
         self.edges(pixel).into_iter().all(|(value, [x, y])| {
@@ -236,7 +236,7 @@ impl Piece {
         })
     }
 
-    /// Distance of a pixel's centre to the nearest edge's line, pixels, negative outside.
+    /// Distance in pixels of a pixel's centre to the nearest edge's line, negative outside.
     #[must_use]
     pub fn distance_px(&self, pixel: [u32; 2]) -> f64 {
         let distance = |(value, [x, y]): (i128, [i64; 2])| {
@@ -249,7 +249,7 @@ impl Piece {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Shortest height, pixels: below 1/256 the vertices' rounding decides what is left of it.
+    /// Shortest height in pixels; below 1/256, rounding of the vertices decides what is drawn.
     #[must_use]
     pub fn height_px(&self) -> f64 {
         let [a, b, c] = self.corners.map(|c| c.at);
@@ -257,14 +257,14 @@ impl Piece {
         ((b - a).perp_dot(c - a) / longest.max(f64::MIN_POSITIVE)).abs()
     }
 
-    /// Its corners' largest distance from the screen's upper left corner along an axis.
+    /// Largest distance of its corners from the screen's upper left corner along an axis.
     #[must_use]
     pub fn largest_px(&self) -> f64 {
         let largest = self.corners.map(|c| c.at.abs().max_element());
         largest.into_iter().fold(0.0, f64::max)
     }
 
-    /// It with a corner moved, as vertices that are rounded otherwise make it.
+    /// The piece with one corner moved, as if the vertex were rounded differently.
     #[must_use]
     pub fn moved(&self, corner: usize, by_px: DVec2) -> Self {
         let mut moved = *self;
@@ -280,8 +280,9 @@ impl Piece {
         [cross(b, c), cross(c, a), cross(a, b)].map(|w| w / total)
     }
 
-    /// The triangles that a driver may make of it where it crosses the screen's border: drivers clip there, and
-    /// each fans what is left in its own order. Those that may hold a point, to 1/128 pixel.
+    /// The triangles that a driver may draw instead of it at the screen's border: drivers clip there, and
+    /// each triangulates the rest in its own order. Only triangles that may contain a point, within 1/128
+    /// pixel.
     #[must_use]
     pub fn cut_at_border(&self, size_px: [u32; 2], p: DVec2) -> Vec<Self> {
         let polygon = clip_to_screen(&self.corners, size_px);
@@ -300,7 +301,7 @@ impl Piece {
         found
     }
 
-    /// A point is inside, or within 1/128 pixel of an edge.
+    /// Whether a point is inside, or within 1/128 pixel of an edge.
     fn may_hold(&self, p: DVec2) -> bool {
         let [a, b, c] = self.corners.map(|corner| corner.at);
         let inside = |a: DVec2, b: DVec2| (b - a).perp_dot(p - a) >= -(b - a).length() / 128.0;
@@ -318,8 +319,8 @@ impl Piece {
             .sum()
     }
 
-    /// What single precision may make of the depth there: a few units in the last place of the largest
-    /// term of the plane's equation.
+    /// Error in single precision of the depth at a point: a few units in the last place of the largest term
+    /// of the plane's equation.
     #[must_use]
     pub fn depth_error(&self, p: DVec2) -> f64 {
         let here = self.depth(p);
@@ -351,7 +352,7 @@ impl Piece {
 mod tests {
     use super::*;
 
-    /// A triangle from pixels, all at depth 0.5 and w 1 or as given.
+    /// A triangle from pixels, with depth 0.5 and w 1 or the given values.
     fn piece(corners: [[f64; 2]; 3], w: [f64; 3], size: u32) -> Piece {
         let vertex = |i: usize| {
             let [x, y] = corners[i].map(|v| v / f64::from(size) * 2.0 - 1.0);
@@ -386,7 +387,7 @@ mod tests {
 
     #[test]
     fn weights_are_perspective_correct() {
-        // Half way between depths of 1 and 3 lies the point of weight 3/4 of the nearer one.
+        // The point half way between depths of 1 and 3 has weight 3/4 of the nearer one.
         let t = piece([[0.0, 0.0], [8.0, 0.0], [0.0, 8.0]], [1.0, 3.0, 1.0], 8);
         let over_w = t.weights_over_w(DVec2::new(4.0, 0.0));
         let weights = over_w / over_w.element_sum();

@@ -1,6 +1,6 @@
-//! How far single precision may move what a capture records: bounds from the arithmetic, none of them fitted.
+//! Bounds of the errors of single precision in a capture, derived from the arithmetic; none is fitted.
 //!
-//! `UNIT` is what one rounding does to a term. A bound is the sum of the roundings on the way of a value, each
+//! `UNIT` is the relative error of one rounding. A bound is the sum of the roundings of a computation, each
 //! times the magnitude of its terms (Higham 2002, chapter 3); docs/use/verify.md derives them.
 
 use super::geometry::Coordinates;
@@ -8,14 +8,14 @@ use super::piece::Corner;
 use formats::textrace::SUBTEXELS;
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
-/// Half a unit in the last place of 1, what an operation in single precision may be off by.
+/// Half a unit in the last place of 1, the error of an operation in single precision.
 pub(super) const UNIT: f64 = f32::EPSILON as f64 / 2.0;
 
-/// Roundings of a clip-space coordinate: three products of a matrix with a vector or matrix, of four products and
-/// three sums each (12), and its place in a region of the picture (4).
+/// Roundings of a clip-space coordinate: three products of a matrix with a vector or matrix, of four products
+/// and three sums each (12), and its position in a region of the picture (4).
 const CLIP_ROUNDINGS: f64 = 16.0;
 
-/// What single precision may make of a vertex.
+/// Error of a vertex in single precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct VertexError {
     /// Sums of the magnitudes of the terms of its clip-space coordinates.
@@ -37,14 +37,14 @@ impl VertexError {
         }
     }
 
-    /// Of a point between two vertices: how far along is the same for its place and its coordinates.
+    /// Of a point between two vertices: the same fraction is used for its position and its coordinates.
     pub fn between(self, other: Self) -> Self {
         Self {
             terms: self.terms.max(other.terms),
         }
     }
 
-    /// How far it may move on the screen, pixels.
+    /// Error on the screen in pixels.
     pub fn moves_px(&self, clip: DVec4, size_px: [u32; 2], at: DVec2) -> DVec2 {
         let half = DVec2::new(size_px[0].into(), size_px[1].into()) / 2.0;
         let ndc = (clip.truncate().truncate() / clip.w).abs();
@@ -52,7 +52,7 @@ impl VertexError {
         UNIT * (half * (CLIP_ROUNDINGS * terms / clip.w.abs() + 3.0 * ndc) + at.abs())
     }
 
-    /// How far 1/w may be off, as part of it.
+    /// Relative error of 1/w.
     pub fn inverse_w(&self, clip: DVec4) -> f64 {
         UNIT * (CLIP_ROUNDINGS * self.terms.w / clip.w.abs() + 2.0)
     }
@@ -76,8 +76,8 @@ impl Plane {
         }
     }
 
-    /// Error of its value at a point, as drivers set planes up: gradients from two differences and the area's
-    /// inverse, a value at the screen's corner from the first corner's, and from there to the point.
+    /// Error of its value at a point, for the setup of planes in drivers: gradients from two differences and
+    /// the inverse area, a value at the screen's corner from the first corner's, and from there to the point.
     fn error(&self, corners: &[Corner; 3], p: DVec2) -> f64 {
         let [a, b, c] = corners.each_ref().map(|corner| corner.at);
         let (ab, ac) = (b - a, c - a);
@@ -108,8 +108,8 @@ impl Plane {
 }
 
 impl Coordinates<'_> {
-    /// The largest of the bounds of [`Self::single_precision`] at points around a fragment, over the triangles that
-    /// clipping at the screen's border may have made there: thin ones lose digits when their planes are set up.
+    /// The largest bound of [`Self::single_precision`] at points around a fragment, over the triangles that
+    /// clipping at the screen's border may have created: the planes of thin ones lose digits.
     #[must_use]
     pub fn single_precision_cut<const N: usize>(
         &self,
@@ -127,8 +127,8 @@ impl Coordinates<'_> {
         bounds
     }
 
-    /// How far coordinates at a point of the screen may be off in single precision, in repeats: moved vertices,
-    /// interpolation, the texture's transform, and the record's sums. Infinite where nothing can be said.
+    /// Error of coordinates at a point of the screen in single precision, in repeats: moved vertices,
+    /// interpolation, the texture's transform, and the record's sums. Infinite if there is no bound.
     #[must_use]
     pub fn single_precision(&self, p: DVec2) -> DVec2 {
         let corners = self.piece().corners();
@@ -173,7 +173,7 @@ impl Coordinates<'_> {
             let DVec3 { x, y, z } = rows[axis];
             let own = x.abs() * raw.x + y.abs() * raw.y;
             let value = x.abs() * here.x.abs() + y.abs() * here.y.abs() + z.abs();
-            // By how much they change over the quad.
+            // Their change over the quad.
             let gradient = (x * by[0] + y * by[1]).abs().element_sum();
             own + UNIT * (3.0 * value + 8.0 * (value + gradient))
         });
@@ -186,7 +186,7 @@ impl Coordinates<'_> {
     }
 }
 
-/// What rounding to the trace's steps may do to a lane of a record, texels of the group: half a step a term.
+/// Error of rounding to the trace's steps in a lane of a record, texels of the group: half a step per term.
 pub(super) fn rounding_texels(lane: u32) -> f64 {
     let terms = match lane {
         0 => 1.0,

@@ -1,4 +1,4 @@
-//! The reference rasteriser: a tile at a time, triangle by triangle, pixel by pixel.
+//! The reference rasteriser: one tile at a time, triangle by triangle, pixel by pixel.
 
 use super::geometry::Geometry;
 use super::piece::{Piece, center};
@@ -9,7 +9,7 @@ use raster::draws::DrawMode;
 
 const EDGE: usize = TILE_SIZE_PX as usize;
 
-/// By how much a fragment of an alpha-masked draw passes the test, negative where it is discarded.
+/// Margin by which a fragment of an alpha-masked draw passes the test, negative if it is discarded.
 pub trait AlphaTest: Sync {
     /// The margin at a pixel of a piece.
     fn margin(&self, geometry: &Geometry<'_>, piece: &Piece, pixel: [u32; 2]) -> f64;

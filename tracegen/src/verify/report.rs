@@ -1,4 +1,4 @@
-//! What `tracegen verify` prints.
+//! The report of `tracegen verify`.
 
 use super::agreement::{Agreement, SampleErrors, Side};
 use super::causes::{SampleCause, UvCause};
@@ -29,13 +29,13 @@ pub struct Report {
     size_px: [u32; 2],
     passes: usize,
     tiles: Tiles,
-    /// Why the capture is not the scene's; empty where everything has its cause.
+    /// Contradictions between the capture and the scene; empty if all differences have a cause.
     failures: Vec<String>,
     coverage: Coverage,
     uv_error_texels: UvError,
-    /// Against the same formula of the level of detail.
+    /// Compared with the same formula of the level of detail.
     capture_precision: Samples,
-    /// Against the exact logarithm of each fragment's own derivatives.
+    /// Compared with the exact logarithm of each fragment's own derivatives.
     specification: Samples,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     colour: Vec<Colour>,
@@ -77,22 +77,22 @@ struct UvError {
     differences_unexplained: u64,
     groups_missing: u64,
     groups_unexpected: u64,
-    /// How many signed means were held against their bounds.
+    /// Number of signed means that were compared with their bounds.
     means: usize,
-    /// The largest of them, as parts of their bounds.
+    /// The largest of them, relative to their bounds.
     largest_means: Vec<Bias>,
 }
 
-/// How many of the means are reported.
+/// Number of reported means.
 const LARGEST_MEANS: usize = 4;
 
-/// Means by how much of their bounds they are, the largest first.
+/// Means in descending order relative to their bounds.
 fn by_share(mut means: Vec<Bias>) -> Vec<Bias> {
     means.sort_by(|a, b| b.share().total_cmp(&a.share()));
     means
 }
 
-/// Everything that a correct capture does not have, with its place.
+/// All failures, with their place.
 fn failures(verified: &Verified, means: &[Bias]) -> Vec<String> {
     let agreement = &verified.agreement;
     let mut failures = verified.faults.clone();
@@ -153,7 +153,7 @@ fn failures(verified: &Verified, means: &[Bias]) -> Vec<String> {
     failures
 }
 
-/// How many differences have a cause.
+/// Number of differences by cause.
 #[derive(Serialize)]
 struct Count<C> {
     cause: C,
@@ -174,7 +174,7 @@ struct Samples {
     footprints_differ_share: f64,
     other_levels: u64,
     other_texels: u64,
-    /// Why levels or texels are others.
+    /// Causes of different levels or texels.
     causes: Vec<Count<SampleCause>>,
 }
 
@@ -191,7 +191,7 @@ struct Colour {
     beyond_unexplained: u64,
     mean: f64,
     max: f64,
-    /// With blocks and sRGB decoded as the driver does.
+    /// With blocks and sRGB decoded like in the driver.
     max_as_driver: f64,
 }
 
@@ -267,7 +267,7 @@ impl Report {
         }
     }
 
-    /// Everything that a correct capture does not have.
+    /// All differences that a correct capture does not have.
     #[must_use]
     pub fn failures(&self) -> &[String] {
         &self.failures
@@ -326,7 +326,7 @@ impl Report {
         );
         for Count { cause, count } in &self.uv_error_texels.causes {
             if *count > 0 {
-                line(&format!("  {}", cause.told()), count.to_string());
+                line(&format!("  {}", cause.text()), count.to_string());
             }
         }
         for mean in self.uv_error_texels.largest_means.iter().take(1) {
@@ -341,48 +341,12 @@ impl Report {
                 ),
             );
         }
-        for (name, samples) in [
-            ("same LOD formula", &self.capture_precision),
-            ("specification", &self.specification),
-        ] {
-            line(
-                &format!("{name}: LOD error, mean and max"),
-                format!(
-                    "{:.6}, {:.4}",
-                    samples.lod_error_mean, samples.lod_error_max
-                ),
-            );
-            line(
-                &format!("{name}: levels that differ"),
-                percent(samples.levels_differ_share),
-            );
-            line(
-                &format!("{name}: footprints that differ"),
-                percent(samples.footprints_differ_share),
-            );
-            for Count { cause, count } in &samples.causes {
-                if *count > 0 {
-                    line(&format!("  {}", cause.told()), count.to_string());
-                }
-            }
-        }
+        self.capture_precision.lines("same LOD formula", &mut line);
+        self.specification.lines("specification", &mut line);
         for colour in &self.colour {
             line(
                 &format!("{}: texels within 1/255", colour.texture),
-                format!(
-                    "{} of {} ({} as light; mean {:.5}, max {:.4}, {:.5} as the driver decodes; beyond: {} by blocks decoded in 8 bits, {} by a polynomial for sRGB, {} by 1/64 texel, {} unexplained, {} without a record)",
-                    percent(colour.within_1_255_share),
-                    colour.fragments,
-                    percent(colour.within_1_255_as_light_share),
-                    colour.mean,
-                    colour.max,
-                    colour.max_as_driver,
-                    colour.beyond_by_decoding,
-                    colour.beyond_by_srgb,
-                    colour.beyond_by_coordinates,
-                    colour.beyond_unexplained,
-                    colour.unrecorded
-                ),
+                colour.text(),
             );
         }
         text
@@ -394,6 +358,27 @@ fn percent(share: f64) -> String {
 }
 
 impl Samples {
+    /// Lines of the table: names and values.
+    fn lines(&self, name: &str, mut line: impl FnMut(&str, String)) {
+        line(
+            &format!("{name}: LOD error, mean and max"),
+            format!("{:.6}, {:.4}", self.lod_error_mean, self.lod_error_max),
+        );
+        line(
+            &format!("{name}: levels that differ"),
+            percent(self.levels_differ_share),
+        );
+        line(
+            &format!("{name}: footprints that differ"),
+            percent(self.footprints_differ_share),
+        );
+        for Count { cause, count } in &self.causes {
+            if *count > 0 {
+                line(&format!("  {}", cause.text()), count.to_string());
+            }
+        }
+    }
+
     fn new(errors: &SampleErrors) -> Self {
         Self {
             samples: errors.samples,
@@ -412,6 +397,23 @@ impl Samples {
 }
 
 impl Colour {
+    fn text(&self) -> String {
+        format!(
+            "{} of {} ({} as light; mean {:.5}, max {:.4}, {:.5} as the driver decodes; beyond: {} by blocks decoded in 8 bits, {} by a polynomial for sRGB, {} by 1/64 texel, {} unexplained, {} without a record)",
+            percent(self.within_1_255_share),
+            self.fragments,
+            percent(self.within_1_255_as_light_share),
+            self.mean,
+            self.max,
+            self.max_as_driver,
+            self.beyond_by_decoding,
+            self.beyond_by_srgb,
+            self.beyond_by_coordinates,
+            self.beyond_unexplained,
+            self.unrecorded
+        )
+    }
+
     fn new(texture: &'static str, errors: &ColourErrors) -> Self {
         let compared = errors.fragments - errors.unrecorded;
         Self {

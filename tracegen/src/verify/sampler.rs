@@ -15,14 +15,14 @@ pub struct SoftwareSampler<'a> {
     decoder: Decoder,
 }
 
-/// How blocks become light.
+/// Decoding of blocks to linear light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Decoder {
-    /// Without rounding, as the specification has it.
+    /// Without rounding, according to the specification.
     Exact,
-    /// Colours between a block's end points in 8 bits, as Mesa has them: see [`between`].
+    /// Colours between a block's end points in 8 bits, like Mesa: see [`between`].
     EightBits,
-    /// The same, and sRGB by the polynomial that llvmpipe takes for its curve: see [`polynomial_of_srgb`].
+    /// The same, with llvmpipe's polynomial for sRGB: see [`polynomial_of_srgb`].
     EightBitsAndPolynomial,
 }
 
@@ -36,7 +36,7 @@ impl<'a> SoftwareSampler<'a> {
         }
     }
 
-    /// The same with another decoder.
+    /// The same sampler with another decoder.
     #[must_use]
     pub fn with(self, decoder: Decoder) -> Self {
         Self { decoder, ..self }
@@ -74,7 +74,8 @@ impl<'a> SoftwareSampler<'a> {
     }
 }
 
-/// A decoded texel as light. Levels finer than those that were made are read from the finest of those.
+/// A decoded texel in linear light. Levels finer than the prepared ones are read from the finest prepared
+/// level.
 fn texel(of: &CompressedTexture, level: u32, at: [u32; 2], decoder: Decoder) -> DVec4 {
     let encoded = decoded(of, level.max(of.first_level), at, decoder).unwrap_or_default();
     if of.texture.color_space == ColorSpace::Srgb {
@@ -88,11 +89,11 @@ fn texel(of: &CompressedTexture, level: u32, at: [u32; 2], decoder: Decoder) -> 
     encoded
 }
 
-/// A texel of a level as its block encodes it; `None` where there are no such blocks.
+/// A texel of a level as its block encodes it; `None` if there are no such blocks.
 fn decoded(of: &CompressedTexture, level: u32, at: [u32; 2], decoder: Decoder) -> Option<DVec4> {
     let block_bytes = match of.texture.format {
         TexelFormat::Bc1 => 8,
-        // The only other format that textures are made in.
+        // Textures are prepared in no other format.
         _ => 16,
     };
     let blocks = |level| blocks_of(&of.texture, level);
@@ -111,15 +112,15 @@ fn decoded(of: &CompressedTexture, level: u32, at: [u32; 2], decoder: Decoder) -
         let exact = alpha_of(alpha, texel);
         match decoder {
             Decoder::Exact => exact,
-            // Whole steps are not always whole numbers of 1/255 in floating point.
+            // In floating point, whole steps are not always whole multiples of 1/255.
             _ => (exact * 255.0 + 1e-6).floor() / 255.0,
         }
     };
     Some(rgb.extend(alpha))
 }
 
-/// Colour of a texel of a BC1 block, and whether it is opaque: end points with 8 bits a channel, between which the
-/// specification interpolates without rounding.
+/// Colour of a texel of a BC1 block, and whether it is opaque: end points with 8 bits per channel; the
+/// specification interpolates between them without rounding.
 fn color_of(block: &[u8], texel: u32, may_be_transparent: bool, decoder: Decoder) -> (DVec3, bool) {
     let word = |at: usize| u32::from(block[at]) | u32::from(block[at + 1]) << 8;
     let ends = [word(0), word(2)];
@@ -145,7 +146,7 @@ fn color_of(block: &[u8], texel: u32, may_be_transparent: bool, decoder: Decoder
     (color, true)
 }
 
-/// A colour between end points. In 8 bits as gallivm has it, up to a step off: halves are rounded up, thirds are
+/// A colour between end points. In 8 bits like gallivm, up to one step off: halves are rounded up, thirds are
 /// 85/256 and 170/256 of the difference, rounded down.
 fn between(a: DVec3, b: DVec3, share: f64, decoder: Decoder) -> DVec3 {
     if decoder == Decoder::Exact {
@@ -195,7 +196,7 @@ fn linear_of_srgb(v: f64) -> f64 {
     }
 }
 
-/// What llvmpipe takes for it (gallivm's lp_bld_format_srgb.c): a cubic polynomial above 15/255.
+/// llvmpipe's approximation (gallivm's lp_bld_format_srgb.c): a cubic polynomial above 15/255.
 fn polynomial_of_srgb(v: f64) -> f64 {
     if v <= 15.0 / 255.0 {
         v / 12.6

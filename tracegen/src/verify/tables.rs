@@ -1,7 +1,7 @@
-//! A trace's tables against the scene's instances, materials and images.
+//! Compares a trace's tables with the scene's instances, materials and images.
 //!
-//! Everything is derived here from the loaded scene by FORMAT.md's rules. Nothing is taken from the
-//! list of draws or from the textures that the capture made, which wrote the tables.
+//! All expected values are derived here from the loaded scene by the rules of FORMAT.md, without the
+//! capture's list of draws and textures, which wrote the tables.
 
 use super::views::Views;
 use formats::textrace::{Draw, PassKind, Sample, Surfaces, Tables, UvGroup};
@@ -27,8 +27,8 @@ impl Faults {
     /// Adds a fault unless both values are the same.
     pub fn hold<T: PartialEq + Serialize>(&mut self, place: &str, expected: &T, found: &T) {
         if expected != found {
-            let told = |value| serde_json::to_string(value).unwrap_or_default();
-            let (expected, found) = (told(expected), told(found));
+            let json = |value| serde_json::to_string(value).unwrap_or_default();
+            let (expected, found) = (json(expected), json(found));
             self.add(place, &expected, &found);
         }
     }
@@ -38,7 +38,7 @@ impl Faults {
     }
 }
 
-/// What contradicts the scene in the tables of a trace of it.
+/// Contradictions between the tables of a trace and its scene.
 ///
 /// # Errors
 /// An image whose alpha decides a format and that cannot be read.
@@ -63,7 +63,7 @@ pub fn faults(scene: &Scene, tables: &Tables) -> Result<Vec<String>, SceneError>
     Ok(faults.0)
 }
 
-/// Images that the material of a placed mesh samples, ascending: each is a texture.
+/// Images that the materials of placed meshes sample, ascending: each is a texture.
 fn used_images(scene: &Scene) -> Vec<usize> {
     let placed = placed_materials(scene);
     let images: BTreeSet<usize> = (placed.into_iter())
@@ -83,7 +83,8 @@ fn placed_materials(scene: &Scene) -> BTreeSet<usize> {
         .collect()
 }
 
-/// The entry of an image: whole blocks, every mip level, BC3 where alpha is blended and not 1, else BC1.
+/// The expected entry of an image: whole blocks, every mip level, BC3 if alpha is blended and not 1, else
+/// BC1.
 fn texture(scene: &Scene, index: usize) -> Result<Texture, SceneError> {
     let image = &scene.images[index];
     let size = image.size.map(|edge| edge.div_ceil(BLOCK) * BLOCK);
@@ -155,7 +156,8 @@ fn hold_textures(mut expected: Vec<Texture>, cascades: u32, tables: &Tables, fau
     }
 }
 
-/// Every sampler must be one of a material, or the shadow maps'; draws are held against theirs by value.
+/// Every sampler must belong to a material or to the shadow maps; draws are compared by the values of their
+/// samplers.
 fn hold_samplers(scene: &Scene, cascades: u32, tables: &Tables, faults: &mut Faults) {
     let materials = scene
         .materials
@@ -211,7 +213,7 @@ fn hold_draws(scene: &Scene, used: &[usize], cascades: u32, tables: &Tables, fau
     }
 }
 
-/// A constant alpha below the cutoff leaves nothing.
+/// A constant alpha below the cutoff discards all fragments.
 fn is_seen(material: &Material) -> bool {
     match material.alpha {
         AlphaMode::Mask(cutoff) => {
@@ -221,7 +223,7 @@ fn is_seen(material: &Material) -> bool {
     }
 }
 
-/// The groups of a material: its textures by coordinates, then a group a cascade. Samplers by value.
+/// The groups of a material: its textures by coordinates, then one group per cascade. Samplers by value.
 fn groups(
     material: &Material,
     used: &[usize],
@@ -338,7 +340,7 @@ fn hold_description(scene: &Scene, tables: &Tables, faults: &mut Faults) {
     let triangles: u64 = scene.instances.iter().map(|i| of_mesh(i.mesh)).sum();
     faults.hold("scene_triangles", &triangles, &meta.scene_triangles);
     faults.hold("origin_m", &scene.origin.to_array(), &meta.origin_m);
-    // Nothing is random in a capture by a rasteriser.
+    // A capture by a rasteriser uses no random numbers.
     faults.hold("seed", &0, &meta.seed);
 }
 

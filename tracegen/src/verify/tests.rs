@@ -1,4 +1,4 @@
-//! The capture through lavapipe against the reference.
+//! Compares captures through lavapipe with the reference.
 
 use super::agreement::Agreement;
 use super::classes::Class;
@@ -14,9 +14,9 @@ use raster::backend::{CaptureBackend, Fragments, View, Work};
 use raster::capture::{CaptureJob, CapturedFrame};
 use raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
 use raster::error::RasterError;
+use raster::frame::Skipped;
 use raster::lavapipe::{Lavapipe, device};
 use raster::lighting::Lighting;
-use raster::skips::Skipped;
 use record::CaptureCounts;
 use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
 use std::collections::BTreeSet;

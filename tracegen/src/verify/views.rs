@@ -1,14 +1,14 @@
-//! The eyes' matrices of a trace against the figures of its display.
+//! Compares the eyes' matrices of a trace with the parameters of its display.
 
 use super::tables::Faults;
 use formats::view::{EyeView, FovTangents, FrameViews, Hmd};
 use glam::{DMat3, DMat4, DVec3, Mat4};
 
-/// Roundings that a matrix of a view has been through, at most: a pose, an inverse, a product. Each is half a
-/// unit in the last place of the largest term.
+/// Largest number of roundings of a view's matrix: a pose, an inverse, a product. Each is half a unit in the
+/// last place of the largest term.
 const ROUNDINGS: f64 = 64.0;
 
-/// What an error of one rounding is of a term.
+/// Relative error of one rounding.
 const UNIT: f64 = f32::EPSILON as f64 / 2.0;
 
 /// The views of a trace.
@@ -18,7 +18,7 @@ pub(super) struct Views<'a> {
 }
 
 impl Views<'_> {
-    /// Holds every frame's matrices against each other and against the display.
+    /// Compares every frame's matrices with each other and with the display.
     pub fn hold(&self, faults: &mut Faults) {
         for views in self.frames {
             for (eye, (view, fov)) in views.eyes.iter().zip(&self.hmd.fov).enumerate() {
@@ -30,8 +30,8 @@ impl Views<'_> {
         }
     }
 
-    /// From the right eye's space to the left's, which the distance between the eyes and their cant decide:
-    /// both turn outwards by it.
+    /// From the right eye's space to the left's. It depends on the distance between the eyes and on their
+    /// cant, by which both turn outwards.
     fn hold_eyes(&self, views: &FrameViews, faults: &mut Faults) {
         let cant = f64::from(self.hmd.cant_deg).to_radians();
         let turn = DMat3::from_rotation_y(-cant);
@@ -67,7 +67,7 @@ fn wide(matrix: &[[f32; 4]; 4]) -> DMat4 {
     Mat4::from_cols_array_2d(matrix).as_dmat4()
 }
 
-/// `eye_to_clip` follows from the tangents but for its near and far planes.
+/// Except for its near and far planes, `eye_to_clip` follows from the tangents.
 fn hold_projection(place: &str, view: &EyeView, fov: &FovTangents, faults: &mut Faults) {
     let [left, right, up, down] = [fov.left, fov.right, fov.up, fov.down].map(f64::from);
     let (width, height) = (left + right, up + down);
@@ -94,7 +94,7 @@ fn hold_projection(place: &str, view: &EyeView, fov: &FovTangents, faults: &mut 
             }
         }
     }
-    // Both planes lie ahead, the far one behind the near one.
+    // Both planes are in front of the eye, the far one behind the near one.
     let [scale, offset] = depth;
     if !(scale < -1.0 && offset < 0.0) {
         let expected = "planes of depth 0 and 1 ahead of the eye";
@@ -106,7 +106,7 @@ fn hold_projection(place: &str, view: &EyeView, fov: &FovTangents, faults: &mut 
     }
 }
 
-/// `world_to_eye` turns and moves, and `position` is what it takes to zero.
+/// `world_to_eye` rotates and translates, and maps `position` to zero.
 fn hold_position(place: &str, view: &EyeView, faults: &mut Faults) {
     let matrix = wide(&view.world_to_eye);
     let turn = DMat3::from_mat4(matrix);

@@ -1,4 +1,4 @@
-//! The reference's fragments as tiles of a trace.
+//! Converts the reference's fragments to tiles of a trace.
 
 use super::compare::lanes;
 use super::geometry::Geometry;
@@ -10,7 +10,7 @@ use formats::textrace::{
 use formats::view::TILE_SIZE_PX;
 use glam::DVec2;
 
-/// Largest fixed-point coordinate: sums of four stay in 32 bits.
+/// Largest fixed-point coordinate, such that sums of four fit in 32 bits.
 const LIMIT: f64 = (1 << 29) as f64;
 
 /// Lanes of one piece in one quad.
@@ -22,8 +22,8 @@ struct Quad {
     mask: u8,
 }
 
-/// The tile that a capture without rounding would have written. Look-ups of shadow maps, which the reference does
-/// not make, are those of the captured tile as far as both cover them.
+/// The tile that a capture without rounding would have written. Look-ups of shadow maps, which the reference
+/// does not make, are copied from the captured tile where both cover them.
 #[must_use]
 pub fn reference_tile(
     geometry: &Geometry<'_>,
@@ -137,7 +137,7 @@ fn quads(geometry: &Geometry<'_>, fragments: &[Fragment]) -> Vec<Quad> {
 /// A quad's coordinates at its four pixels in fixed point.
 fn record(empty: QuadRecord, corners: [DVec2; 4], group: &UvGroup) -> QuadRecord {
     let [top_left, top_right, bottom_left, bottom_right] = corners;
-    // What 32 bits do not hold loses pairs of repeats.
+    // Values that exceed 32 bits lose pairs of repeats.
     let fixed = |value: DVec2, limit: f64| {
         [0, 1].map(|axis: usize| {
             let scale = f64::from(SUBTEXELS) * f64::from(group.extent[axis]);

@@ -1,6 +1,6 @@
 //! Distance culling: draws that are too far or too small to matter are left out.
 
-use crate::settings::SettingsError;
+use crate::error::SettingsError;
 use formats::view::{FrameViews, Hmd};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -9,14 +9,14 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DistanceCull {
-    /// Those of which every point is farther than this.
+    /// Draws whose every point is farther than this.
     Metres(f32),
     /// Those whose bounding sphere would span fewer pixels in the middle of the picture.
     Pixels(f32),
 }
 
-/// The head of one frame. Both eyes leave out the same draws: what only one eye sees irritates more than what
-/// neither sees.
+/// The head of one frame. Both eyes leave out the same draws, because differences between the eyes are more
+/// irritating.
 #[derive(Clone, Copy, Debug)]
 pub struct Head {
     /// Between the eyes.
@@ -41,10 +41,10 @@ impl Head {
 }
 
 impl DistanceCull {
-    /// Whether something in world-space bounds is drawn.
+    /// Whether a draw with these world-space bounds is drawn.
     #[must_use]
     pub fn keeps(&self, head: &Head, [low, high]: [Vec3; 2]) -> bool {
-        // What is not a number is drawn.
+        // Bounds that are not finite are drawn.
         match *self {
             Self::Metres(farthest) => {
                 let nearest = head.position.clamp(low, high);
@@ -148,7 +148,7 @@ mod tests {
                 continue;
             }
             out += 1;
-            // Seen by an eye that turns to it, as in the middle of the picture.
+            // Its size in the picture of an eye that looks at it.
             let ahead = center.normalize();
             let side = ahead.any_orthonormal_vector();
             let up = ahead.cross(side);

@@ -6,12 +6,12 @@ use formats::view::{FovTangents, Hmd, Lens, TILE_SIZE_PX};
 use glam::{DVec2, DVec3};
 use std::sync::Arc;
 
-/// One eye's picture: its pixels as tangents, what the lens shows of it, and where the user looks.
+/// One eye's picture: its pixels as tangents, the visible part of the lens, and the gaze.
 #[derive(Clone, Debug)]
 pub(crate) struct EyePicture {
     pub size_px: [u32; 2],
     fov: FovTangents,
-    /// What the lens shows, where that matters.
+    /// The visible part of the lens, if it matters.
     pub lens: Option<Lens>,
     /// Pixels that the headset's own mesh leaves, in place of the lens's circle.
     left_by_mesh: Option<Arc<Mask>>,
@@ -31,7 +31,7 @@ impl EyePicture {
         }
     }
 
-    /// The same picture, of which a mesh in place of the lens's circle hides what the user cannot see.
+    /// The same picture, masked by a mesh instead of the lens's circle.
     pub fn hidden_by(self, mesh: &HiddenMesh, eye: usize) -> Self {
         Self {
             left_by_mesh: Some(Arc::new(mesh.shown(eye, self.size_px))),
@@ -61,7 +61,7 @@ impl EyePicture {
         [a.min(b), a.max(b)]
     }
 
-    /// Whether the lens shows a point of a rectangle of pixels, of which `high_px` is the end.
+    /// Whether a point of a rectangle of pixels, which ends at `high_px`, is visible through the lens.
     pub fn shows(&self, low_px: [u32; 2], high_px: [u32; 2]) -> bool {
         if let Some(left) = &self.left_by_mesh {
             let columns = || low_px[0]..high_px[0];
@@ -71,7 +71,7 @@ impl EyePicture {
         let [low, high] = self.rectangle(low_px, high_px);
         let center = DVec2::new(lens.center[0].into(), lens.center[1].into());
         let nearest = center.clamp(low, high);
-        // Within rounding of the lens's own test of a pixel's centre, which lies half a pixel inside.
+        // Within rounding of the lens's test of a pixel's centre, which is half a pixel inside.
         nearest.distance_squared(center) <= f64::from(lens.radius) * f64::from(lens.radius)
     }
 
@@ -127,7 +127,7 @@ impl EyePicture {
         self.size_px.map(|size| size.div_ceil(TILE_SIZE_PX))
     }
 
-    /// Pixels of a tile, cut off at the picture's edge: first and end.
+    /// Pixels of a tile, clipped at the picture's edge: first and end.
     pub fn tile_px(&self, tile: [u32; 2]) -> [[u32; 2]; 2] {
         let edge = |step: u32| {
             [0, 1].map(|axis: usize| ((tile[axis] + step) * TILE_SIZE_PX).min(self.size_px[axis]))

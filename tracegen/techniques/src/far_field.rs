@@ -1,4 +1,4 @@
-//! The monoscopic far field: one picture of what is far for both eyes.
+//! The monoscopic far field: one picture of distant geometry for both eyes.
 //!
 //! A camera between the eyes (or, alternating, in one of them) sees what lies beyond the split. An eye's
 //! picture takes from it what lies in the same direction, or (shifted) what would lie in the same place of a
@@ -24,9 +24,9 @@ use glam::{DMat3, DMat4, DVec2, DVec3, Mat3, Mat4};
 /// nearer for one camera than for the other, and one of both layers must hold it.
 pub const OVERLAP: f64 = 1.0 / 16.0;
 
-/// Pixels around what the eyes see of the far field, for filtering.
+/// Margin in pixels around the visible part of the far field, for filtering.
 const BORDER_PX: f64 = 2.0;
-/// What 32-bit matrices may be off by; the border has room for it.
+/// Error of 32-bit matrices, which the border must allow for.
 const ROUNDING_PX: f64 = 0.01;
 
 /// Eyes that no single far field serves.
@@ -35,7 +35,7 @@ const ROUNDING_PX: f64 = 0.01;
     "far field: expected eyes whose views one picture can hold (less than 180 degrees, at most {limit} pixels an edge), found {found}"
 )]
 pub struct FarFieldError {
-    /// What the picture would have to be.
+    /// The required size of the picture.
     found: String,
     /// Largest edge.
     limit: u32,
@@ -108,12 +108,12 @@ impl Eye {
     }
 }
 
-/// The far field of a frame, ready to be rendered and to be taken from.
+/// The far field of a frame, ready to be rendered and sampled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FarView {
     /// Distance ahead of the eyes from which on it shows what there is.
     pub split_m: f32,
-    /// Largest distance between a point's place in an eye's picture and its true place.
+    /// Largest distance between a point's position in an eye's picture and its true position.
     pub worst_shift_px: f32,
     /// Its camera; the near plane lies a little before the split.
     pub camera: EyeView,
@@ -212,7 +212,7 @@ impl Stereo {
         if self.shifted { 2.0 * split_m } else { split_m }
     }
 
-    /// Nearest and farthest distance ahead that the eyes see.
+    /// Nearest and farthest visible distance.
     #[must_use]
     pub fn range_m(&self) -> [f32; 2] {
         let [a, b] = &self.eyes;
@@ -222,7 +222,7 @@ impl Stereo {
     /// The far field beyond a split.
     ///
     /// # Errors
-    /// No picture of at most `limit_px` an edge holds what both eyes see beyond it.
+    /// No picture of at most `limit_px` per edge contains everything that both eyes see beyond the split.
     pub fn view(&self, split_m: f32, limit_px: u32) -> Result<FarView, FarFieldError> {
         let split = f64::from(split_m);
         let mut near = f64::INFINITY;
@@ -239,7 +239,7 @@ impl Stereo {
                 near = near.min(-begin.z);
                 far = far.max(-end.z).max(-begin.z);
                 for p in [begin, infinite] {
-                    // Beside the camera or behind it: in no picture.
+                    // Next to the camera or behind it: in no picture.
                     let ahead = if p.z < -1e-3 { -p.z } else { 1e-9 };
                     let tangents = p.truncate() / ahead;
                     (low, high) = (low.min(tangents), high.max(tangents));
@@ -321,7 +321,7 @@ impl Stereo {
         })
     }
 
-    /// Whether the camera looks elsewhere than the eyes.
+    /// Whether the camera's direction differs from the eyes'.
     fn is_turned(&self) -> bool {
         let turn = |eye: &Eye| {
             let between = self.world_from_camera.inverse() * eye.world_from_eye;

@@ -1,10 +1,10 @@
-//! Where the user looks.
+//! The direction of the gaze.
 
 use formats::view::Hmd;
 use glam::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// Where the user looks: degrees to the right and up of straight ahead, the same for both eyes.
+/// Gaze: degrees to the right and up from straight ahead, the same for both eyes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Gaze {
@@ -57,13 +57,13 @@ impl Gaze {
     }
 }
 
-/// Whether a direction is one, in degrees: less than 90 to either side.
+/// Whether the angles are a direction: less than 90 degrees to either side.
 pub(crate) fn is_ahead(deg: [f32; 2]) -> bool {
     deg.iter().all(|angle| (-89.9..=89.9).contains(angle))
 }
 
-/// Unit vector, in the coordinates of an eye (0 left, 1 right) that looks along -z, of the direction that lies so
-/// many degrees to the right of straight ahead seen from above, and so many up seen from the side.
+/// Unit vector of a direction in the coordinates of an eye (0 left, 1 right) that looks along -z. The angles
+/// are degrees to the right of straight ahead seen from above, and degrees up seen from the side.
 pub(crate) fn direction(hmd: &Hmd, eye: usize, deg: [f32; 2]) -> Vec3 {
     let [x, y] = deg.map(|angle| angle.to_radians().tan());
     // The left eye is turned to the left: a positive turn about +y.

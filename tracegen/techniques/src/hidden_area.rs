@@ -1,4 +1,4 @@
-//! Hidden-area mask: what the lens does not show is not drawn.
+//! Hidden-area mask: pixels outside the lens are not drawn.
 
 use crate::Mask;
 use crate::eye::EyePicture;

@@ -1,10 +1,10 @@
 //! A headset's hidden-area mesh: the triangles of each eye's picture that its lens does not show.
 
 use crate::Mask;
-use crate::settings::SettingsError;
+use crate::error::SettingsError;
 use serde::{Deserialize, Serialize};
 
-/// Most triangles of an eye: headsets' own meshes have fewer than 200.
+/// Largest number of triangles per eye: headsets' own meshes have fewer than 200.
 pub const MAX_TRIANGLES: usize = 100_000;
 
 /// Furthest coordinate: a mesh may reach beyond the picture, but not out of single precision.
@@ -13,7 +13,7 @@ const MAX_COORDINATE: f32 = 16.0;
 /// Corners in parts of the picture's width and height, from its left and lower edge.
 pub type Triangle = [[f32; 2]; 3];
 
-/// What the lenses hide.
+/// The hidden areas of both eyes.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct HiddenMesh {
@@ -30,8 +30,8 @@ impl HiddenMesh {
         [&self.left, &self.right][eye]
     }
 
-    /// Pixels of an eye's picture that the mesh leaves: as on a GPU that draws the mesh before the scene, a
-    /// pixel is hidden whose centre lies in a triangle or on its edge.
+    /// Visible pixels of an eye's picture: like on a GPU that draws the mesh before the scene, a pixel is
+    /// hidden if its centre is inside a triangle or on its edge.
     #[must_use]
     pub fn shown(&self, eye: usize, size_px: [u32; 2]) -> Mask {
         let [width, height] = size_px.map(|size| size as usize);
@@ -43,7 +43,7 @@ impl HiddenMesh {
                     (1.0 - f64::from(y)) * height as f64,
                 ]
             });
-            // Pixels of which the centre lies in the triangle's bounds.
+            // Pixels whose centre is within the triangle's bounds.
             let span = |axis: usize, size: usize| {
                 let along = corners.map(|corner| corner[axis]);
                 let (low, high) = along
@@ -66,7 +66,7 @@ impl HiddenMesh {
         Mask::new(size_px, |x, y| shown[y as usize * width + x as usize])
     }
 
-    /// Checks every corner, and that each eye sees something.
+    /// Checks every corner, and that some pixels of each eye remain visible.
     ///
     /// # Errors
     /// The first figure that cannot be.
@@ -107,7 +107,8 @@ impl HiddenMesh {
     }
 }
 
-/// Whether a point lies in a triangle of any winding, its edges included; one without an area holds nothing.
+/// Whether a point is inside a triangle of any winding, including its edges; a triangle without area contains
+/// no point.
 fn holds([a, b, c]: &[[f64; 2]; 3], at: [f64; 2]) -> bool {
     let side = |from: &[f64; 2], to: &[f64; 2]| {
         (to[0] - from[0]) * (at[1] - from[1]) - (to[1] - from[1]) * (at[0] - from[0])
@@ -152,7 +153,7 @@ mod tests {
         };
         assert_eq!(mesh.check(size_px), Ok(()));
         let shown = mesh.shown(0, size_px);
-        // The polygon's edges lie inside of the circle by no more than this.
+        // The polygon's edges are inside the circle by at most this distance.
         let sagitta = radius_px * (1.0 - (std::f64::consts::PI / 720.0).cos()) + 1e-3;
         let mut compared = 0;
         for y in 0..160 {

@@ -1,4 +1,4 @@
-//! What a frame is rendered as.
+//! Layers of a frame.
 
 use crate::Mask;
 use crate::start::Start;
@@ -9,19 +9,19 @@ use std::sync::Arc;
 /// One rendering of a part of one eye's picture, or of both eyes': a pass of the trace.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
-    /// The eye, or `None` for a layer that both pictures are made from.
+    /// The eye, or `None` for a layer that both pictures use.
     pub eye: Option<Eye>,
     /// Number among the frame's layers of that eye: left and right layers of the same number show the same part.
     pub number: u16,
     /// Matrices, with a narrowed, shifted or clipped projection.
     pub view: EyeView,
-    /// Its own size, smaller where it is coarser.
+    /// Its own size, smaller if it is coarser.
     pub size_px: [u32; 2],
-    /// Pixels that may be drawn; all of them where there is none.
+    /// Pixels that may be drawn; all if there is no mask.
     pub mask: Option<Arc<Mask>>,
     /// Which draws enter it.
     pub draws: Stage,
-    /// What it holds before them.
+    /// Initial contents.
     pub start: Start,
 }
 
@@ -53,7 +53,7 @@ impl Layer {
             * Mat4::from_cols_array_2d(&self.view.world_to_eye)
     }
 
-    /// World to a clip space that ends where nothing is drawn any more.
+    /// World to a clip space that ends at the far end of drawn geometry.
     #[must_use]
     pub fn drawn_from_world(&self) -> Mat4 {
         match self.start {
@@ -78,7 +78,7 @@ impl Layer {
         for corner in 0..8 {
             let pick = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
             let at = clip_from_world * Vec3::new(pick(0), pick(1), pick(2)).extend(1.0);
-            // Beside the eye or behind it, or not a number: it may be anywhere.
+            // Next to the eye or behind it, or not finite: it may be anywhere.
             if at.w.is_nan() || at.w < least_w || at.w <= 0.0 {
                 return true;
             }
@@ -118,7 +118,7 @@ pub enum Stage {
     Transparent,
 }
 
-/// What a technique promises of a frame, to be held against what is measured.
+/// Predictions of a technique for a frame, to be compared with measurements.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Predicted {
     /// Pixels that may be shaded, those that reconstruction needs besides included, in pixels of the
@@ -141,7 +141,7 @@ mod tests {
     use super::*;
     use glam::camera::rh::proj::directx::perspective;
 
-    /// A view along -z of which only the leftmost tiles may be drawn.
+    /// A view along -z in which only the leftmost tiles may be drawn.
     fn layer() -> Layer {
         let view = EyeView {
             eye_to_clip: perspective(1.0, 1.0, 0.1, 100.0).to_cols_array_2d(),
@@ -159,7 +159,7 @@ mod tests {
             let center = Vec3::new(x, 0.0, z);
             layer().may_draw([center - half, center + half])
         };
-        // At 10 m the picture is 10.9 m wide, a tile 2.7 m.
+        // At 10 m, the picture is 10.9 m wide and a tile 2.7 m.
         assert!(!may_draw(3.0, -10.0, 0.5));
         assert!(may_draw(-4.0, -10.0, 0.5));
         assert!(may_draw(0.0, -10.0, 4.0));

@@ -1,4 +1,4 @@
-//! The split of the far field at which a frame costs least.
+//! The split of the far field with the least cost of a frame.
 //!
 //! A stated model, not a measurement of the frame: draws and triangles cost alike wherever they lie, those
 //! nearer than the split twice (an eye each), those beyond it once, those on both sides three times. A
@@ -11,7 +11,7 @@
 use formats::view::EyeView;
 use glam::{Mat4, Vec2, Vec3};
 
-/// What the model knows of a draw that is visible in a frame.
+/// Properties of a visible draw that the model uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Object {
     /// Nearest distance ahead of the eyes.
@@ -44,7 +44,7 @@ impl Object {
                 let pick = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
                 let at = clip * Vec3::new(pick(0), pick(1), pick(2)).extend(1.0);
                 (near_m, far_m) = (near_m.min(at.w), far_m.max(at.w));
-                // Beside the eye or behind it: it may reach any edge.
+                // Next to the eye or behind it: it may reach any edge.
                 let ndc = if at.w > 1e-3 {
                     at.truncate().truncate() / at.w
                 } else {
@@ -74,7 +74,7 @@ impl Object {
     }
 }
 
-/// What things cost, in any one unit.
+/// Unit costs, in any one unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Costs {
     /// A draw.
@@ -116,7 +116,7 @@ pub fn least_work(
     costs: &Costs,
     nearest_m: f32,
 ) -> Option<f32> {
-    let mut frame = Frame::new(objects);
+    let mut frame = WorkSums::new(objects);
     // A depth at which a box begins or ends, and the box.
     let mut events: Vec<(f32, bool, &Object)> = objects
         .iter()
@@ -130,7 +130,7 @@ pub fn least_work(
     // At one depth what ends goes before what begins.
     events.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut least: Option<(f64, f32)> = None;
-    let mut consider = |frame: &Frame, split_m: f32| {
+    let mut consider = |frame: &WorkSums, split_m: f32| {
         let cost = frame.cost(split_m, pixels, costs);
         if least.is_none_or(|(known, _)| cost < known) {
             least = Some((cost, split_m));
@@ -161,7 +161,7 @@ pub fn least_work(
 }
 
 /// The sums of the model while the split moves away from the eyes.
-struct Frame {
+struct WorkSums {
     /// Draws and triangles, all of them.
     all: [f64; 2],
     /// Those that begin before the split.
@@ -174,7 +174,7 @@ struct Frame {
     beyond: [f64; 2],
 }
 
-impl Frame {
+impl WorkSums {
     fn new(objects: &[Object]) -> Self {
         let triangles = objects.iter().map(|o| f64::from(o.triangles)).sum();
         let all = [objects.len() as f64, triangles];
@@ -228,7 +228,7 @@ impl Frame {
     }
 }
 
-/// Where a box ends: a flat one a little behind its beginning.
+/// End of a box: for a flat one, slightly behind its start.
 fn end_m(object: &Object) -> f32 {
     object.far_m.max(object.near_m.next_up())
 }

@@ -1,8 +1,9 @@
-//! What a frame may leave out or do more coarsely, and the layers that it is then rendered as.
+//! Settings of techniques, and the layers of the frames that they produce.
 //!
 //! Knows displays and angles, and neither drivers nor scenes: a driver renders the [`layer::Layer`]s.
 
 pub mod distance;
+mod error;
 mod eye;
 pub mod far_field;
 mod foveation;
@@ -11,20 +12,21 @@ mod hidden_area;
 pub mod hidden_mesh;
 pub mod layer;
 pub mod least_work;
-pub mod mask;
+mod mask;
 mod patch;
 pub mod plan;
-pub mod planner;
+mod planner;
 pub mod settings;
 pub mod skips;
 pub mod start;
 pub mod timewarp;
 
+pub use error::SettingsError;
 pub use gaze::Gaze;
 pub use layer::{Layer, Stage};
 pub use mask::Mask;
 pub use plan::FramePlan;
 pub use planner::Planner;
-pub use settings::{Settings, SettingsError};
+pub use settings::Settings;
 pub use skips::Skips;
 pub use start::Start;

@@ -2,7 +2,7 @@
 
 use formats::view::TILE_SIZE_PX;
 
-/// A bit for each pixel of a layer: nothing may be drawn where it is not set.
+/// One bit per pixel of a layer; pixels without a set bit must not be drawn.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
     size_px: [u32; 2],
@@ -65,7 +65,7 @@ impl Mask {
         self.size_px
     }
 
-    /// Whether a pixel may be drawn; none outside the layer may.
+    /// Whether a pixel may be drawn; false outside the layer.
     #[must_use]
     pub fn get(&self, x: u32, y: u32) -> bool {
         x < self.size_px[0]
@@ -73,7 +73,7 @@ impl Mask {
             && self.drawn[y as usize * self.size_px[0] as usize + x as usize]
     }
 
-    /// Row by row, a flag a pixel.
+    /// Row by row, one flag per pixel.
     #[must_use]
     pub fn flags(&self) -> &[bool] {
         &self.drawn
@@ -99,7 +99,7 @@ impl Mask {
         self.tiles_in([left, top], [right, bottom]) > 0
     }
 
-    /// Tiles that have a pixel which may be drawn.
+    /// Tiles with a pixel that may be drawn.
     #[must_use]
     pub fn tile_count(&self) -> u32 {
         self.tiles_in([0, 0], self.size_px)

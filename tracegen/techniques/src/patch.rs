@@ -3,7 +3,7 @@
 use crate::Mask;
 use crate::eye::EyePicture;
 use crate::layer::{Layer, Stage};
-use crate::plan::{Filter, Part};
+use crate::plan::{Filter, PicturePart};
 use crate::start::Start;
 use formats::view::{Eye, EyeView, TILE_SIZE_PX};
 use glam::{DMat3, DMat4, DVec3, DVec4, Mat4};
@@ -15,18 +15,18 @@ pub(crate) struct Patch {
     pub number: u16,
     /// Left and top edge in pixels of the picture.
     pub origin_px: [u32; 2],
-    /// Columns and rows of the picture that a pixel covers.
+    /// Columns and rows of the picture per pixel.
     pub coarseness: [u32; 2],
     pub size_px: [u32; 2],
     pub mask: Option<Arc<Mask>>,
     /// Tiles of the picture that it fills.
     pub tiles: Option<Arc<Mask>>,
     pub filter: Filter,
-    /// Pixels of the picture to those of the layer where that is no matter of origin and coarseness.
+    /// Pixels of the picture to pixels of the layer, if origin and coarseness do not define the map.
     pub layer_from_px: Option<DMat3>,
 }
 
-/// What an eye's picture is made of.
+/// Layers and parts of an eye's picture.
 #[derive(Clone, Debug)]
 pub(crate) struct EyePatches {
     pub patches: Vec<Patch>,
@@ -37,12 +37,12 @@ pub(crate) struct EyePatches {
 }
 
 impl Patch {
-    /// Whether the mask leaves any pixel to be drawn.
+    /// Whether the mask has any pixel to draw.
     pub fn draws_something(&self) -> bool {
         self.mask.as_ref().is_none_or(|mask| mask.first().is_some())
     }
 
-    /// A whole picture, of which what `drawn` says may be drawn.
+    /// A whole picture, of which only the pixels of `drawn` may be drawn.
     pub fn whole(picture: &EyePicture, mask: Option<Arc<Mask>>) -> Self {
         Self {
             number: 0,
@@ -86,7 +86,7 @@ impl Patch {
         }
     }
 
-    /// Pixels of the picture that a pixel covers, cut off at the edge: first and end.
+    /// Pixels of the picture that a pixel covers, clipped at the edge: first and end.
     pub fn covered_px(&self, picture: &EyePicture, pixel: [u32; 2]) -> [[u32; 2]; 2] {
         let edge = |step: u32| {
             [0, 1].map(|axis: usize| {
@@ -116,8 +116,8 @@ impl Patch {
     }
 
     /// The part of the picture that it fills; `layer` is its position in the plan.
-    pub fn part(&self, layer: usize) -> Part {
-        Part {
+    pub fn part(&self, layer: usize) -> PicturePart {
+        PicturePart {
             layer,
             origin_px: self.origin_px,
             coarseness: self.coarseness,
@@ -154,7 +154,7 @@ fn narrowed(view: &EyeView, origin: [u32; 2], covers: [u32; 2], picture_px: [u32
     }
 }
 
-/// The view of a layer that a projective map of the picture's pixels leads to.
+/// The view of a layer defined by a projective map of the picture's pixels.
 fn mapped(
     view: &EyeView,
     layer_from_px: &DMat3,
@@ -171,7 +171,7 @@ fn mapped(
         )
     };
     let map = px_from_clip(layer_px).inverse() * *layer_from_px * px_from_clip(picture_px);
-    // Depth passes as it is: points of one direction keep their order, as w grows alike for all of them.
+    // Depth is unchanged: points of one direction keep their order, because their w grow by the same factor.
     let column = |c: DVec3| DVec4::new(c.x, c.y, 0.0, c.z);
     let map = DMat4::from_cols(
         column(map.x_axis),

@@ -6,34 +6,34 @@ use crate::start::Start;
 use glam::DMat3;
 use std::sync::Arc;
 
-/// How one frame is rendered.
+/// Plan of one frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FramePlan {
     /// The layers, in the order in which they are rendered and written as passes.
     pub layers: Vec<Layer>,
-    /// The pictures that they become: one an eye, in the order of the eyes asked for.
-    pub pictures: Vec<Picture>,
-    /// What the techniques promise of the frame.
+    /// The resulting pictures: one per eye, in the order of the requested eyes.
+    pub pictures: Vec<PictureSource>,
+    /// Predictions of the techniques for the frame.
     pub predicted: Predicted,
 }
 
-/// Where an eye's picture comes from.
+/// Source of an eye's picture.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Picture {
-    /// It is a layer, by its position in the plan.
+pub enum PictureSource {
+    /// A layer, by its position in the plan.
     Layer(usize),
     /// Parts of layers, each drawn over the ones before, on black.
     Composed {
         /// Width and height of the picture.
         size_px: [u32; 2],
         /// The parts.
-        parts: Vec<Part>,
+        parts: Vec<PicturePart>,
     },
 }
 
 /// A part of a picture that a layer fills.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Part {
+pub struct PicturePart {
     /// Position of the layer in the plan.
     pub layer: usize,
     /// Left and top edge of the layer, in pixels of the picture.
@@ -41,15 +41,15 @@ pub struct Part {
     /// Columns and rows of the picture that a pixel of the layer covers. The layer may reach beyond
     /// the picture's right and lower edge.
     pub coarseness: [u32; 2],
-    /// Tiles of the picture (16x16 pixels, a bit each) that the part fills; all where there is none.
+    /// Tiles of the picture (16x16 pixels, one bit each) that the part fills; all if there is no mask.
     pub tiles: Option<Arc<Mask>>,
-    /// How its pixels come of the layer's.
+    /// Filter from the layer's pixels to the picture's.
     pub filter: Filter,
-    /// Pixels of the picture to those of the layer, homogeneous, in place of origin and coarseness.
+    /// Homogeneous map from pixels of the picture to pixels of the layer, in place of origin and coarseness.
     pub layer_from_px: Option<DMat3>,
 }
 
-/// How a picture's pixels come of a layer's.
+/// Filter from a layer's pixels to a picture's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Filter {
     /// The layer has the picture's pixels: they are copied.
@@ -59,12 +59,12 @@ pub enum Filter {
     /// The layer's mask leaves out 2x2 quads: their pixels are the mean of the linear interpolations
     /// along row and column between the nearest pixels that are there, in linear light. The others are copied.
     FillQuads,
-    /// Linear between the four nearest pixels of a layer that the picture is mapped to by [`Part::layer_from_px`], in
+    /// Linear between the four nearest pixels of a layer that the picture is mapped to by [`PicturePart::layer_from_px`], in
     /// linear light.
     Projective,
 }
 
-/// Bytes of what a frame is rendered into.
+/// Bytes of the targets of a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TargetBytes {
     /// Colour of the layers, and of the pictures composed of them.
@@ -90,8 +90,8 @@ impl FramePlan {
             })
         };
         let composed = self.pictures.iter().map(|picture| match picture {
-            Picture::Composed { size_px, .. } => bytes(*size_px),
-            Picture::Layer(_) => 0,
+            PictureSource::Composed { size_px, .. } => bytes(*size_px),
+            PictureSource::Layer(_) => 0,
         });
         let layers = || self.layers.iter().enumerate();
         let (kept, shared): (Vec<_>, Vec<_>) =
@@ -107,9 +107,9 @@ impl FramePlan {
         }
     }
 
-    /// Whether a layer is the picture of an eye as it is.
+    /// Whether a layer is the unmodified picture of an eye.
     #[must_use]
     pub fn is_picture(&self, layer: usize) -> bool {
-        self.pictures.contains(&Picture::Layer(layer))
+        self.pictures.contains(&PictureSource::Layer(layer))
     }
 }

@@ -1,13 +1,14 @@
 //! From settings to plans.
 
+use crate::error::SettingsError;
 use crate::eye::EyePicture;
 use crate::far_field::{self, FarFieldError, FarView, Stereo};
 use crate::foveation::{lens_matched, multi_resolution, radial_density, rings};
 use crate::layer::Predicted;
 use crate::least_work::Object;
 use crate::patch::EyePatches;
-use crate::plan::{FramePlan, Picture};
-use crate::settings::{FoveationKind, SettingsError};
+use crate::plan::{FramePlan, PictureSource};
+use crate::settings::FoveationKind;
 use crate::{Settings, hidden_area};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
 use std::sync::{Arc, Mutex};
@@ -15,7 +16,7 @@ use std::sync::{Arc, Mutex};
 /// Largest edge of a layer.
 const MAX_LAYER_PX: u32 = 8192;
 
-/// What each eye's picture is made of.
+/// Patches of each eye's picture.
 type Patches = Arc<Vec<EyePatches>>;
 
 /// Plans frames of one display under the same settings.
@@ -26,7 +27,7 @@ pub struct Planner {
     lenses: [Lens; 2],
     eyes: Vec<Eye>,
     fps: f32,
-    /// What the last gaze needed: it stays where the gaze does.
+    /// Patches of the last gaze, reused while the gaze does not change.
     last: Mutex<Option<([f32; 2], Patches)>>,
 }
 
@@ -76,7 +77,7 @@ impl Planner {
         &self.eyes
     }
 
-    /// What is left out or done more coarsely.
+    /// The settings.
     #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
@@ -88,13 +89,13 @@ impl Planner {
         &self.hmd
     }
 
-    /// What the user sees of the left and right eye's picture.
+    /// Visible parts of the left and right eye's pictures.
     #[must_use]
     pub fn lenses(&self) -> &[Lens; 2] {
         &self.lenses
     }
 
-    /// Checks that the far field, if there is one, can be drawn for a frame's eyes.
+    /// Checks that the far field, if any, can be drawn for a frame's eyes.
     ///
     /// # Errors
     /// As [`Stereo::view`].
@@ -115,7 +116,7 @@ impl Planner {
         far_field.view(&stereo, MAX_LAYER_PX, objects)
     }
 
-    /// Plans a frame; `objects` tells what draws it has where a technique needs to know.
+    /// Plans a frame; `objects` returns its draws, for techniques that depend on them.
     ///
     /// # Errors
     /// As [`Self::check_views`].
@@ -155,8 +156,8 @@ impl Planner {
             own.map(|(layer, (_, patch))| (layer, *patch))
         };
         let picture = |(eye, made): (usize, &EyePatches)| match of_eye(eye).next() {
-            Some((layer, _)) if made.is_picture => Picture::Layer(layer),
-            _ => Picture::Composed {
+            Some((layer, _)) if made.is_picture => PictureSource::Layer(layer),
+            _ => PictureSource::Composed {
                 size_px: self.hmd.eye_size_px,
                 parts: (of_eye(eye))
                     .map(|(layer, patch)| made.patches[patch].part(layer))
@@ -181,7 +182,7 @@ impl Planner {
 
     /// The layers of each eye for a gaze.
     fn patches(&self, gaze_deg: [f32; 2]) -> Patches {
-        // A plan cannot fail half-way: what a panic left behind is whole.
+        // A plan cannot fail half-way, so its state is valid after a panic.
         let mut last = self.last.lock().unwrap_or_else(|e| e.into_inner());
         if let Some((_, patches)) = last.as_ref().filter(|(gaze, _)| *gaze == gaze_deg) {
             return Arc::clone(patches);

@@ -1,31 +1,32 @@
-//! What a capture leaves out or does more coarsely.
+//! Settings of techniques.
 
 use crate::distance::DistanceCull;
+use crate::error::SettingsError;
 use crate::gaze::{self, Gaze};
 use crate::hidden_mesh::HiddenMesh;
 use formats::view::Hmd;
 use serde::{Deserialize, Serialize};
 use visibility::Culling;
 
-/// What a capture leaves out or does more coarsely; the default is the baseline.
+/// Settings of techniques; the default is the baseline.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct Settings {
-    /// How the draws of each view are found.
+    /// How the visible draws of each view are found.
     pub culling: Culling,
-    /// Draws hidden behind what the last frame showed are left out.
+    /// Whether draws hidden behind the visible draws of the last frame are left out.
     pub occlusion: bool,
     /// Both eyes in one submission.
     pub multiview: bool,
     /// Nothing outside the lens is drawn.
     pub hidden_area_mask: bool,
-    /// What the headset's own mesh hides is not drawn.
+    /// Hidden-area mesh of the headset, inside which nothing is drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hidden_area_mesh: Option<HiddenMesh>,
-    /// What is too far or too small is not drawn.
+    /// Draws that are too far or too small are not drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_cull: Option<DistanceCull>,
-    /// Every other frame is made of the last one.
+    /// Whether every other frame is reprojected from the last one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub half_rate: Option<Reprojection>,
     /// Far geometry once for both eyes.
@@ -40,7 +41,7 @@ pub struct Settings {
 pub struct FarField {
     /// Where it begins.
     pub split: Split,
-    /// How the eyes get it.
+    /// How the picture is used for both eyes.
     #[serde(default)]
     pub variant: Variant,
 }
@@ -51,20 +52,20 @@ pub struct FarField {
 pub enum Split {
     /// At this distance.
     Metres(f32),
-    /// Where a point is off by at most so many pixels.
+    /// At the distance where a point is off by at most this number of pixels.
     Pixels(f32),
-    /// Where a frame costs least, no point being off by more than so many pixels.
+    /// At the distance of least cost, with points off by at most this number of pixels.
     LeastWork {
         /// As for `pixels`.
         within_px: f32,
     },
 }
 
-/// How both eyes get the picture of the far field.
+/// How the picture of the far field is used for both eyes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Variant {
-    /// As a camera between the eyes sees it.
+    /// As seen by a camera between the eyes.
     #[default]
     Plain,
     /// Shifted for each eye by the disparity at the split.
@@ -73,13 +74,13 @@ pub enum Variant {
     AlternateEye,
 }
 
-/// What a frame that is made of the last one follows.
+/// Motion that a reprojection follows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reprojection {
-    /// How the head has turned.
+    /// The rotation of the head.
     Rotation,
-    /// How it has turned and moved, by the last frame's depth.
+    /// The rotation and translation of the head, by the last frame's depth.
     Depth,
 }
 
@@ -89,10 +90,10 @@ pub enum Reprojection {
 pub struct Foveation {
     /// How.
     pub kind: FoveationKind,
-    /// Where the user looks.
+    /// Direction of the gaze.
     #[serde(default)]
     pub gaze: Gaze,
-    /// How much coarser at which angle.
+    /// Shading rates by angle.
     #[serde(default)]
     pub rates: Rates,
 }
@@ -127,26 +128,14 @@ impl Default for Rates {
     }
 }
 
-/// Settings that cannot be.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{what}: expected {expected}, found {found}")]
-pub struct SettingsError {
-    /// Which setting.
-    pub what: &'static str,
-    /// What it may be.
-    pub expected: String,
-    /// What it is.
-    pub found: String,
-}
-
 impl Settings {
-    /// Whether pixels that the user cannot see are left out, by the lens's circle or a mesh.
+    /// Whether invisible pixels are left out, by the lens's circle or a mesh.
     #[must_use]
     pub fn masks_hidden_area(&self) -> bool {
         self.hidden_area_mask || self.hidden_area_mesh.is_some()
     }
 
-    /// Whether a frame is made of the one before in place of being rendered.
+    /// Whether a frame is reprojected from the one before instead of rendered.
     #[must_use]
     pub fn reprojects(&self, frame: u32) -> bool {
         self.half_rate.is_some() && frame % 2 == 1
@@ -155,7 +144,7 @@ impl Settings {
     /// Checks every figure, and that no two techniques exclude each other.
     ///
     /// # Errors
-    /// The first setting that cannot be, and what it may be.
+    /// The first invalid setting, and its allowed values.
     pub fn check(&self, hmd: &Hmd) -> Result<(), SettingsError> {
         if let Some(mesh) = &self.hidden_area_mesh {
             mesh.check(hmd.eye_size_px)?;
@@ -233,7 +222,7 @@ impl Foveation {
     }
 }
 
-/// Whether an eye's frustum holds a direction.
+/// Whether an eye's frustum contains a direction.
 fn in_view(hmd: &Hmd, deg: [f32; 2]) -> bool {
     let sees = |eye: usize| {
         let fov = &hmd.fov[eye];

@@ -1,22 +1,22 @@
-//! What a capture leaves out because nobody can tell: on by default, and proven case by case.
+//! Skips of invisible work: on by default, and proven to change no output.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// What is left out. Pictures and traces are the same bit for bit with and without each.
+/// What is skipped. Pictures and traces are bit-identical with and without each skip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Skips {
     /// Texels of images that no view samples.
     pub images: bool,
     /// Mip levels finer than any that a view can sample.
     pub mip_levels: bool,
-    /// Shadow cascades in which nothing that is seen looks up its shadow.
+    /// Shadow cascades in which no visible surface looks up its shadow.
     pub cascades: bool,
-    /// Draws that do not touch the region of a view that is captured.
+    /// Draws that do not touch the captured region of a view.
     pub regions: bool,
 }
 
-/// Names for [`Skips::without`], what they stand for, and the switch.
+/// Names for [`Skips::without`], their meaning, and the switch.
 type Row = (&'static str, fn(&mut Skips) -> &mut bool);
 const ROWS: [Row; 4] = [
     ("images", |skips| &mut skips.images),
@@ -37,7 +37,7 @@ impl Default for Skips {
 }
 
 impl Skips {
-    /// Everything is prepared and drawn, whether anybody sees it or not.
+    /// Everything is prepared and drawn, visible or not.
     pub const NONE: Self = Self {
         images: false,
         mip_levels: false,
@@ -45,7 +45,7 @@ impl Skips {
         regions: false,
     };
 
-    /// All but those named.
+    /// All skips except the named ones.
     #[must_use]
     pub fn without(kept: &[Skip]) -> Self {
         let mut skips = Self::default();

@@ -1,8 +1,8 @@
-//! What a layer holds before its draws.
+//! Initial contents of a layer.
 
 use glam::{Mat3, Mat4};
 
-/// What a layer holds before its draws.
+/// Initial contents of a layer.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Start {
     /// The sky at the far plane.
@@ -29,11 +29,11 @@ pub struct Opening {
     pub end: f32,
     /// Pixels of this layer to pixels of the nearer one, homogeneous.
     pub nearer_from_px: Mat3,
-    /// Pixels of the nearer layer on each side to look at.
+    /// Margin in pixels of the nearer layer that is examined on each side.
     pub reach_px: u32,
 }
 
-/// How a layer is made of a nearer and a farther one.
+/// Composition of a nearer and a farther layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Composition {
     /// Position of the nearer layer in the plan.

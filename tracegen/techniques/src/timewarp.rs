@@ -1,4 +1,4 @@
-//! Timewarp: where a picture shows what an eye that has turned or moved since would see.
+//! Timewarp: maps a picture to an eye that has rotated or moved since it was rendered.
 //!
 //! Turning moves every pixel the same way whatever its depth, so a homography tells where a pixel was. What
 //! the head's translation moves takes the depth of the picture; what was hidden then is nowhere in it.
@@ -32,16 +32,16 @@ pub struct ByDepth<'a> {
     turned: DMat3,
     /// Clip space of the eye before to that of now.
     now_from_before: DMat4,
-    /// Row by row, 1 where there is nothing.
+    /// Row by row, 1 where nothing was drawn.
     depth: &'a [f32],
     size_px: [u32; 2],
 }
 
-/// Steps of the search for a pixel: each takes off what the one before was off by.
+/// Steps of the fixed-point search for a pixel; each corrects the error of the one before.
 const STEPS: u32 = 6;
 
 impl<'a> ByDepth<'a> {
-    /// Between two poses of an eye; `depth` is that of the picture before.
+    /// Between two poses of an eye; `depth` is that of the earlier picture.
     #[must_use]
     pub fn new(before: &EyeView, now: &EyeView, depth: &'a [f32], size_px: [u32; 2]) -> Self {
         let clip = |eye: &EyeView| wide(&eye.eye_to_clip) * wide(&eye.world_to_eye);
@@ -70,7 +70,8 @@ impl<'a> ByDepth<'a> {
         at
     }
 
-    /// Where the surface of a pixel before is now; none where there is none, or behind the eye.
+    /// Current position of the surface at a pixel of the earlier picture; none if there is none, or behind
+    /// the eye.
     fn now_px(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let [width, height] = self.size_px.map(f64::from);
         let column = x.clamp(0.0, width - 1.0) as usize;

@@ -25,7 +25,7 @@ pub struct BinnedDraw<'a> {
     pub indices: &'a [u32],
     /// Object to world.
     pub world_from_object: Affine3A,
-    /// Both faces are drawn; else those that wind counterclockwise alone.
+    /// Whether both faces are drawn; otherwise only counterclockwise ones.
     pub double_sided: bool,
     /// The transform mirrors, so that front faces wind clockwise.
     pub mirrored: bool,
@@ -147,7 +147,7 @@ fn tiles(polygon: &[DVec2], front: Option<f64>, size_px: [u32; 2], mut enters: i
             let centre = (DVec2::new(f64::from(column), f64::from(row)) + 0.5) * tile_px;
             let outside = edges().any(|(a, b)| {
                 let normal = (b - a).perp() * inward;
-                // How far the tile reaches towards the inner side of the edge.
+                // Extent of the tile towards the inner side of the edge.
                 let reach = (tile_px / 2.0) * (normal.x.abs() + normal.y.abs())
                     + MARGIN_PX * normal.length();
                 normal.dot(centre - a) + reach < 0.0

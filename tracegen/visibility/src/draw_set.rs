@@ -1,6 +1,6 @@
 //! A set of draws that is filled in any order and read in ascending order.
 
-/// A bit a draw, and a bit a word that has any, so that reading costs what is in it.
+/// One bit per draw, and one bit per non-empty word, so that the cost of reading depends on the contents.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DrawSet {
     words: Vec<u64>,
@@ -15,7 +15,7 @@ impl DrawSet {
         self.summary.resize(words.div_ceil(64), 0);
     }
 
-    /// Adds a draw that there is room for.
+    /// Adds a draw within the capacity.
     #[inline]
     pub fn insert(&mut self, draw: u32) {
         let word = draw as usize / 64;

@@ -1,4 +1,4 @@
-//! What a frustum cannot hold.
+//! Tests of frusta.
 
 use glam::{Mat4, Vec3, Vec4};
 

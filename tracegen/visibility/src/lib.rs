@@ -1,4 +1,4 @@
-//! Which draw enters which view or shadow cascade. One technique a file.
+//! Decides which draws enter which view or shadow cascade. One technique per file.
 //!
 //! ```text
 //! bounds -> Hierarchy (kept, refitted)
@@ -12,11 +12,11 @@ pub mod binning;
 pub mod culling;
 mod draw_set;
 pub mod frustum;
-pub mod hierarchy;
+mod hierarchy;
 pub mod magnification;
-pub mod occlusion;
+mod occlusion;
 pub mod receivers;
-pub mod rig;
+mod rig;
 #[cfg(test)]
 mod testing;
 pub mod triangles;

@@ -1,4 +1,4 @@
-//! How finely a view can sample a mesh's textures at most.
+//! Bounds how finely a view can sample a mesh's textures.
 //!
 //! The map from pixels to texture coordinates of a triangle is projective, so the three lanes of a
 //! quad that give both derivatives span, in texels, exactly
@@ -25,7 +25,7 @@ pub struct Pixels {
     pub clip_from_world: Mat4,
     /// Width and height.
     pub size_px: [u32; 2],
-    /// Least w of what is seen: the distance of a perspective's near plane, 1 for a parallel view.
+    /// Least w of visible geometry: the distance of a perspective's near plane, 1 for a parallel view.
     pub least_w: f32,
 }
 
@@ -49,7 +49,7 @@ pub fn least_derivative_squared(
             let c = (clip * p.extend(1.0)).as_dvec4();
             let w = c.w;
             let planes = [w + c.x, w - c.x, w + c.y, w - c.y, c.z, w - c.z];
-            // Room for a pixel around the view and for rounding.
+            // Margin of one pixel around the view, and for rounding.
             let margin =
                 (1.0 / half.min_element() + 1e-4) * (c.x.abs() + c.y.abs() + c.z.abs() + w.abs());
             let outside = (0..6).map(|i| u8::from(planes[i] < -margin) << i).sum();
@@ -68,7 +68,7 @@ pub fn least_derivative_squared(
         let [ua, ub, uc] = corners.map(|i| uv(i).as_dvec2());
         let area_uv = (ub - ua).perp_dot(uc - ua).abs();
         let bound = area_uv * spread([a.0, b.0, c.0], pixels.least_w.into());
-        // NaN says nothing either.
+        // NaN gives no bound either.
         least = if bound >= 0.0 { least.min(bound) } else { 0.0 };
         if least == 0.0 {
             break;

@@ -1,4 +1,4 @@
-//! Whether a volume of nested ones is ever looked up: a shadow cascade that nobody sees.
+//! Finds nested volumes that are never looked up, such as invisible shadow cascades.
 
 use crate::frustum::frustum_planes;
 use glam::{Affine3A, Mat4, Vec3, Vec4};
@@ -23,14 +23,14 @@ pub struct Receivers {
     sides: Vec<[Vec4; 4]>,
     /// What a point surely inside is inside of.
     insides: Vec<[Vec4; 5]>,
-    /// What has been found so far.
+    /// Volumes that were found so far.
     found: Vec<bool>,
 }
 
 /// Where a point lies: bit per plane of the view and of a volume that has it outside; bit per volume that
 /// surely has it inside.
 #[derive(Clone, Copy)]
-struct Place {
+struct PointCode {
     outside_view: u8,
     outside: u32,
     inside: u32,
@@ -70,7 +70,7 @@ impl Receivers {
         }
     }
 
-    /// Goes on with what another view sees.
+    /// Continues with another view.
     pub fn look(&mut self, clip_from_world: Mat4) {
         self.view = frustum_planes(clip_from_world);
     }
@@ -100,12 +100,12 @@ impl Receivers {
             let high_on = [i & 1 != 0, i & 2 != 0, i & 4 != 0];
             Vec3::select(high_on.into(), high, low)
         };
-        let places: Vec<Place> = (0..8).map(|i| self.place(corner(i), 0.0)).collect();
+        let places: Vec<PointCode> = (0..8).map(|i| self.place(corner(i), 0.0)).collect();
         if !self.is_new(&places) {
             return;
         }
         let m = &world_from_object.matrix3;
-        let places: Vec<Place> = positions
+        let places: Vec<PointCode> = positions
             .iter()
             .map(|p| {
                 // Rounding errors of the world position grow with the magnitude of its terms.
@@ -116,7 +116,7 @@ impl Receivers {
                 self.place(world_from_object.transform_point3(*p), terms.max_element())
             })
             .collect();
-        let anywhere = Place {
+        let anywhere = PointCode {
             outside_view: 0,
             outside: 0,
             inside: 0,
@@ -133,12 +133,12 @@ impl Receivers {
         }
     }
 
-    /// Whether the hull of `places` may be looked up in a volume that has not been found.
-    fn is_new(&self, places: &[Place]) -> bool {
+    /// Whether the hull of `places` may be looked up in a volume that was not found yet.
+    fn is_new(&self, places: &[PointCode]) -> bool {
         (self.looked_up(places) & self.missing()) != 0
     }
 
-    fn find(&mut self, places: &[Place]) {
+    fn find(&mut self, places: &[PointCode]) {
         let bits = self.looked_up(places);
         for (number, found) in self.found.iter_mut().enumerate() {
             *found |= bits >> number & 1 == 1;
@@ -153,7 +153,7 @@ impl Receivers {
     }
 
     /// Bit per volume in which the hull of `places` may be looked up.
-    fn looked_up(&self, places: &[Place]) -> u32 {
+    fn looked_up(&self, places: &[PointCode]) -> u32 {
         let outside_view = places.iter().fold(!0, |all, p| all & p.outside_view);
         if outside_view != 0 {
             return 0;
@@ -173,7 +173,7 @@ impl Receivers {
         bits
     }
 
-    fn place(&self, point: Vec3, terms: f32) -> Place {
+    fn place(&self, point: Vec3, terms: f32) -> PointCode {
         let distance = |plane: &Vec4| plane.truncate().dot(point) + plane.w;
         // For the rounding of these sums and of the shader's.
         let rounding = |plane: &Vec4| {
@@ -192,7 +192,7 @@ impl Receivers {
         };
         let inside =
             |planes: &[Vec4; 5]| planes.iter().all(|plane| distance(plane) > rounding(plane));
-        Place {
+        PointCode {
             outside_view: bits(&self.view) as u8,
             outside: (0..)
                 .zip(&self.sides)
@@ -270,7 +270,7 @@ mod tests {
         assert_eq!(found(&volumes, &at(-30.0)), [false, false, true]);
         // Within the margin of a side both may be.
         assert_eq!(found(&volumes, &at(-4.95)), [true, true, false]);
-        // Behind the viewer: seen by nobody.
+        // Behind the viewer, so invisible.
         assert_eq!(found(&volumes, &at(2.0)), [false; 3]);
         // Across all of them.
         let long = [

@@ -1,4 +1,4 @@
-//! The eyes of a frame, as culling sees them.
+//! The eyes of a frame for culling.
 
 use crate::volume::{Affine, Cone, HalfSpace, frustum, meeting_point};
 use formats::view::{EyeView, Lens};
@@ -9,7 +9,7 @@ use glam::{DMat4, DVec3, Mat4};
 pub struct Eye {
     /// Matrices.
     pub view: EyeView,
-    /// What the user sees of its picture.
+    /// Visible part of its picture.
     pub lens: Lens,
     /// Width and height of its picture.
     pub size_px: [u32; 2],
@@ -21,7 +21,7 @@ pub struct Rig {
     eyes: Vec<Eye>,
 }
 
-/// Eyes that look too far apart for one volume around both.
+/// The eyes' directions diverge too much for one volume around both.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "one volume around both eyes: expected a combined field of view below {limit} degrees, found {found}",
@@ -29,7 +29,7 @@ pub struct Rig {
     found = found_deg.map_or("eyes that look to opposite sides".to_owned(), |deg| format!("{deg:.1} degrees"))
 )]
 pub struct TooWide {
-    /// The combined field of view, where there is one.
+    /// The combined field of view, if there is one.
     pub found_deg: Option<f64>,
 }
 
@@ -52,7 +52,7 @@ impl Rig {
         &self.eyes
     }
 
-    /// The one eye whose turn it is in a frame: left in even ones, right in odd ones.
+    /// The eye that a frame culls by: left in even frames, right in odd ones.
     pub(crate) fn turn(&self, frame: u32) -> &Eye {
         &self.eyes[frame as usize % self.eyes.len()]
     }
@@ -65,7 +65,7 @@ impl Eye {
             * Mat4::from_cols_array_2d(&self.view.world_to_eye)
     }
 
-    /// Sides of what is drawn for it, of geometry whose coordinates are at most `extent`.
+    /// Sides of its drawn volume, for geometry whose coordinates are at most `extent`.
     pub(crate) fn frustum(&self, extent: DVec3) -> [HalfSpace; 6] {
         frustum(self.clip_from_world(), extent)
     }
@@ -86,14 +86,14 @@ impl Eye {
         matrix.inverse().w_axis.truncate()
     }
 
-    /// Radius of the lens and a pixel around it, for the rounding of vertices to the raster's grid.
+    /// Radius of the lens plus one pixel, for the rounding of vertices to the raster's grid.
     pub(crate) fn lens_radius(&self) -> f64 {
         let scale = &self.view.eye_to_clip;
         let pixel = |axis: usize| 2.0 / f64::from(scale[axis][axis] * self.size_px[axis] as f32);
         f64::from(self.lens.radius) + pixel(0).abs().max(pixel(1).abs())
     }
 
-    /// What the lens shows: its circle, as a cone from the eye.
+    /// The visible part of the lens: its circle, as a cone from the eye.
     pub(crate) fn lens_cone(&self) -> Cone {
         let [right, up, forward] = self.axes();
         let [x, y] = self.lens.center.map(f64::from);

@@ -1,11 +1,12 @@
 //! Eyes and random numbers for the tests.
 
 use crate::rig::{Eye, Rig};
+use formats::random::Random;
 use formats::view::{FovTangents, Hmd, Lens};
 use glam::Vec3;
 use scene::{Camera, cameras};
 
-/// Pixels of an eye's picture.
+/// Size of an eye's picture in pixels.
 pub const SIZE_PX: [u32; 2] = [1000, 1000];
 
 /// Eyes at the origin that look along -z, as the cameras make them; the lenses are the default
@@ -46,27 +47,14 @@ pub fn rig_of(camera: &Camera, hmd: &Hmd, lenses: [Lens; 2]) -> Rig {
     Rig::new(eyes.collect())
 }
 
-/// Numbers from 0 to 1 (SplitMix64).
-pub struct Random(pub u64);
+/// The next number from `low` to `high`.
+pub fn between(random: &mut Random, low: f32, high: f32) -> f32 {
+    low + (high - low) * random.unit_f32()
+}
 
-impl Random {
-    /// The next number.
-    pub fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / 16_777_216.0
-    }
-
-    /// The next number from `low` to `high`.
-    pub fn between(&mut self, low: f32, high: f32) -> f32 {
-        low + (high - low) * self.next()
-    }
-
-    /// A point of a box.
-    pub fn within(&mut self, [low, high]: [Vec3; 2]) -> Vec3 {
-        let t = Vec3::new(self.next(), self.next(), self.next());
-        // Rounding must not carry it out.
-        (low + (high - low) * t).clamp(low, high)
-    }
+/// A point of a box.
+pub fn within(random: &mut Random, [low, high]: [Vec3; 2]) -> Vec3 {
+    let t = Vec3::new(random.unit_f32(), random.unit_f32(), random.unit_f32());
+    // Rounding must not carry it out.
+    (low + (high - low) * t).clamp(low, high)
 }

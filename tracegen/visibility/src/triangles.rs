@@ -1,4 +1,4 @@
-//! Whether any triangle of a mesh may be seen.
+//! Tests whether any triangle of a mesh may be visible.
 
 use crate::frustum::frustum_planes;
 use glam::{Affine3A, Mat4, Vec3, Vec4};

@@ -75,14 +75,17 @@ fn a_thousand_sets_of_configurations_count_as_each_alone() {
         let trace = &traces[random.below(3) as usize];
         let orders: Vec<Order> = Order::all().chain(composed()).collect();
         let base = RunConfig {
-            order: random.of(&orders),
-            cores: random.of(&[1, 2, 2, 3]),
-            assign: random.of(&[Assign::FirstIdle, Assign::Static]),
+            order: random.pick(&orders),
+            cores: random.pick(&[1, 2, 2, 3]),
+            assign: random.pick(&[Assign::FirstIdle, Assign::Static]),
             ..functional(Order::MORTON)
         };
         let configs: Vec<RunConfig> = (0..=random.below(6))
             .map(|_| RunConfig {
-                level: Levels::two(random.cache(32), random.cache(256)),
+                level: Levels::two(
+                    random_cache(&mut random, 32),
+                    random_cache(&mut random, 256),
+                ),
                 tile_maps: random.below(3) == 0,
                 ..base
             })

@@ -371,26 +371,26 @@ fn the_first_miss_machine_agrees_with_the_plain_one_to_the_last_count() {
     for step in 0..machines(40) {
         let trace = &traces[random.below(2) as usize];
         let mut cache = |most_sets_log2: u64| {
-            let ways = random.of(&[1, 2, 4, 4]);
+            let ways = random.pick(&[1, 2, 4, 4]);
             LevelConfig {
                 ways,
                 ..LevelConfig::lru(u64::from(ways) << 4 << random.below(most_sets_log2))
             }
         };
         let mut level = Levels::two(cache(7), cache(10));
-        level.l2.hit_cycles = random.of(&[0, 1, 20, 20, 90]);
+        level.l2.hit_cycles = random.pick(&[0, 1, 20, 20, 90]);
         let config = RunConfig {
             mode: Mode::Timed,
-            order: random.of(&orders),
-            cores: random.of(&[1, 2, 2, 3]),
-            assign: random.of(&[Assign::FirstIdle, Assign::Static]),
+            order: random.pick(&orders),
+            cores: random.pick(&[1, 2, 2, 3]),
+            assign: random.pick(&[Assign::FirstIdle, Assign::Static]),
             level,
-            memory_cycles: random.of(&[0, 7, 200, 200]),
+            memory_cycles: random.pick(&[0, 7, 200, 200]),
             tmu: TmuConfig {
                 model: TmuModel::FirstMiss,
-                loop_cycles: random.of(&[1, 8, 24, 24, 300]),
-                threads: random.of(&[1, 4, 64, 64]),
-                allocation: random.of(&[Allocation::OnFill, Allocation::OnMiss]),
+                loop_cycles: random.pick(&[1, 8, 24, 24, 300]),
+                threads: random.pick(&[1, 4, 64, 64]),
+                allocation: random.pick(&[Allocation::OnFill, Allocation::OnMiss]),
                 ..TmuConfig::default()
             },
             tile_maps: true,

@@ -349,39 +349,42 @@ fn the_fast_machine_agrees_with_the_plain_one_cycle_by_cycle() {
     let mut loops = 0;
     for step in 0..machines(200) {
         let trace = &traces[random.below(2) as usize];
-        let (mut l1, mut l2) = (random.cache(32), random.cache(256));
+        let (mut l1, mut l2) = (
+            random_cache(&mut random, 32),
+            random_cache(&mut random, 256),
+        );
         if random.below(2) == 0 {
             (l1.ways, l2.ways) = (4, 4);
             (l1.size_bytes, l2.size_bytes) = (64 << random.below(6), 64 << random.below(9));
-            l1.replacement = random.of(&policies);
-            l2.replacement = random.of(&policies);
+            l1.replacement = random.pick(&policies);
+            l2.replacement = random.pick(&policies);
         }
         for cache in [&mut l1, &mut l2] {
-            cache.victim_lines = random.of(&[0, 0, 0, 2]);
-            cache.sectors = random.of(&[1, 1, 1, 4]);
+            cache.victim_lines = random.pick(&[0, 0, 0, 2]);
+            cache.sectors = random.pick(&[1, 1, 1, 4]);
             cache.size_bytes *= u64::from(cache.sectors);
         }
         let mut level = Levels::two(l1, l2);
-        level.l2.hit_cycles = random.of(&[0, 1, 20, 20, 300]);
-        level.l2.shared = random.of(&[true, true, false]);
+        level.l2.hit_cycles = random.pick(&[0, 1, 20, 20, 300]);
+        level.l2.shared = random.pick(&[true, true, false]);
         let config = RunConfig {
             mode: Mode::Timed,
-            order: random.of(&orders),
-            cores: random.of(&[1, 2, 2, 3, 5]),
-            assign: random.of(&[Assign::FirstIdle, Assign::Static]),
+            order: random.pick(&orders),
+            cores: random.pick(&[1, 2, 2, 3, 5]),
+            assign: random.pick(&[Assign::FirstIdle, Assign::Static]),
             level,
-            memory_cycles: random.of(&[0, 7, 200, 200, 9000]),
+            memory_cycles: random.pick(&[0, 7, 200, 200, 9000]),
             tmu: TmuConfig {
-                loop_cycles: random.of(&[1, 36, 64, 64, 5000]),
-                threads: random.of(&[1, 4, 64, 64, 300]),
-                retry_footprints: random.of(&[1, 4, 4, 5]),
-                fetches_per_trip: random.of(&[1, 2, 2, 64]),
-                allocation: random.of(&[
+                loop_cycles: random.pick(&[1, 36, 64, 64, 5000]),
+                threads: random.pick(&[1, 4, 64, 64, 300]),
+                retry_footprints: random.pick(&[1, 4, 4, 5]),
+                fetches_per_trip: random.pick(&[1, 2, 2, 64]),
+                allocation: random.pick(&[
                     Allocation::OnFill,
                     Allocation::OnFill,
                     Allocation::OnMiss,
                 ]),
-                l2_mshrs: random.of(&[0, 0, 1, 3, 16]),
+                l2_mshrs: random.pick(&[0, 0, 1, 3, 16]),
                 ..TmuConfig::default()
             },
             tile_maps: true,

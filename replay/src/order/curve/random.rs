@@ -8,17 +8,11 @@ use crate::order::cost::Cost;
 #[derive(Debug)]
 pub struct Random;
 
-/// Fisher-Yates with SplitMix64 (Steele, Lea, Flood 2014).
+/// Fisher-Yates.
 pub fn shuffle<T>(seed: u64, items: &mut [T]) {
-    let mut state = seed;
+    let mut random = formats::random::Random(seed);
     for last in (1..items.len()).rev() {
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = state;
-        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^= z >> 31;
-        let pick = (u128::from(z) * (last as u128 + 1)) >> 64;
-        items.swap(last, pick as usize);
+        items.swap(last, random.below(last + 1));
     }
 }
 

@@ -1,4 +1,4 @@
-//! What a layer and the loader tell each other: `vk_layer.h`.
+//! The interface between a layer and the loader: `vk_layer.h`.
 
 use ash::vk;
 use std::ffi::c_void;
@@ -10,7 +10,7 @@ pub struct NegotiateLayerInterface {
     pub s_type: i32,
     /// None.
     pub p_next: *mut c_void,
-    /// Version of the interface: asked, then answered.
+    /// Version of the interface: requested, then supported.
     pub version: u32,
     /// Ours.
     pub get_instance_proc_addr: Option<vk::PFN_vkGetInstanceProcAddr>,
@@ -20,7 +20,7 @@ pub struct NegotiateLayerInterface {
     pub get_physical_device_proc_addr: Option<unsafe extern "system" fn()>,
 }
 
-/// What a layer's instance calls next.
+/// The next layer's functions for an instance.
 #[repr(C)]
 pub(super) struct InstanceLink {
     next: *mut InstanceLink,
@@ -28,7 +28,7 @@ pub(super) struct InstanceLink {
     _get_physical_device_proc_addr: Option<unsafe extern "system" fn()>,
 }
 
-/// What a layer's device calls next.
+/// The next layer's functions for a device.
 #[repr(C)]
 pub(super) struct DeviceLink {
     next: *mut DeviceLink,
@@ -94,7 +94,7 @@ pub(super) unsafe fn take_link<'a, T: Link>(p_next: *const c_void) -> Option<&'a
 /// `p_next` is a valid chain.
 pub(super) unsafe fn find<'a, T: vk::TaggedStructure>(p_next: *const c_void) -> Option<&'a T> {
     let mut at = p_next.cast::<vk::BaseInStructure<'_>>();
-    // SAFETY: the structures of a chain begin alike, and a structure's type tells what it is.
+    // SAFETY: the structures of a chain have the same head, whose type identifies the structure.
     unsafe {
         while let Some(base) = at.as_ref() {
             if base.s_type == T::STRUCTURE_TYPE {
@@ -106,10 +106,10 @@ pub(super) unsafe fn find<'a, T: vk::TaggedStructure>(p_next: *const c_void) -> 
     None
 }
 
-/// Elements at a pointer that a program passes, none where it is null.
+/// Elements at a pointer from a program; none if it is null.
 ///
 /// # Safety
-/// `first` is null or points to so many elements.
+/// `first` is null or points to this number of elements.
 pub(super) unsafe fn slice<'a, T>(first: *const T, count: u32) -> &'a [T] {
     if first.is_null() || count == 0 {
         return &[];

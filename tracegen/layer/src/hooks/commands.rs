@@ -98,7 +98,7 @@ unsafe fn set(
 macro_rules! setters {
     ($($hook:ident ($($argument:ident: $kind:ty),*) $next:ident |$state:ident| $change:expr;)*) => { $(
         pub(super) unsafe extern "system" fn $hook(buffer: vk::CommandBuffer, $($argument: $kind),*) {
-            // SAFETY: a valid call of the command; its arrays are as long as it says.
+            // SAFETY: a valid call of the command; its arrays have the lengths in its arguments.
             unsafe {
                 let known = set(buffer, |$state| $change);
                 (known.next.$next)(buffer, $($argument),*);

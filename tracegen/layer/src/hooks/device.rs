@@ -23,18 +23,18 @@ pub(super) struct Device {
     pub get_device_proc_addr: vk::PFN_vkGetDeviceProcAddr,
     pub next: Next,
     pub capture: &'static Capture,
-    /// Where shaders record; none where nothing can be recorded, or is wanted.
+    /// Buffer that shaders record into; none if recording is impossible or was not requested.
     pub recorder: Option<DeviceRecorder>,
     pub queries: Option<Queries>,
     pub pictures: Option<Pictures>,
     tracker: Mutex<Tracker>,
-    /// Held while commands whose records are wanted are executed.
+    /// Held while commands with requested records are executed.
     pub submitting: Mutex<()>,
-    /// Swapchains, as they were asked for.
+    /// Swapchains, as the program created them.
     pub swapchains: Mutex<HashMap<u64, vk::SwapchainCreateInfoKHR<'static>>>,
 }
 
-/// What recording on a device needs.
+/// Resources for recording on a device.
 pub(super) struct DeviceRecorder {
     pub buffer: RecordBuffer,
     /// Offset of the draw's number among push constants.
@@ -122,7 +122,7 @@ impl Device {
 static OTHERS: LazyLock<RwLock<HashMap<usize, vk::PFN_vkGetDeviceProcAddr>>> =
     LazyLock::new(RwLock::default);
 
-/// What looks up functions for a device that is not followed.
+/// The function that looks up functions of a device that is not tracked.
 pub(super) unsafe fn other(handle: vk::Device) -> Option<vk::PFN_vkGetDeviceProcAddr> {
     // SAFETY: a valid device, as the caller promises.
     let key = unsafe { dispatch_key(handle) };
@@ -207,7 +207,7 @@ unsafe fn follow(
             .supported_stages
             .contains(vk::ShaderStageFlags::FRAGMENT)
         && (subgroups.supported_operations).contains(vk::SubgroupFeatureFlags::BALLOT);
-    // A record buffer is memory of the process: its address means something to lavapipe alone.
+    // A record buffer is memory of the process, whose address is valid only for lavapipe.
     let is_lavapipe = driver.driver_id == vk::DriverId::MESA_LLVMPIPE;
     let mut refused = (!is_lavapipe)
         .then(|| format!("{name} is not lavapipe, on which alone programs are recorded"));

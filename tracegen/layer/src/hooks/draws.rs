@@ -1,4 +1,4 @@
-//! Hooks of draws: each gets a number, and is recorded, where that is wanted.
+//! Hooks of draws: each is numbered, and recorded if requested.
 
 use super::api::slice;
 use super::device::Device;
@@ -6,7 +6,8 @@ use crate::track::{Call, CommandState, Dynamic, Pipeline};
 use ash::vk::{self, Handle};
 use std::sync::Arc;
 
-/// Draws of a command buffer may be wanted: it is executed in such a frame, or may be executed at any time.
+/// Whether draws of a command buffer may be requested: it is executed in a requested frame, or may be
+/// executed at any time.
 fn is_wanted(known: &Device, state: &CommandState) -> bool {
     let capture = known.capture;
     !capture.is_over() && (!state.one_time() || capture.may_want_commands())
@@ -17,14 +18,14 @@ pub(super) fn records(known: &Device, state: &CommandState) -> bool {
     known.recorder.is_some() && is_wanted(known, state)
 }
 
-/// How a draw is carried out.
+/// Parameters of a draw call.
 struct Plan {
     number: u32,
-    /// The program's pipeline as it is bound, and what it is known by.
+    /// The program's bound pipeline, and its handle.
     pipeline: Arc<Pipeline>,
     handle: vk::Pipeline,
     dynamic: Dynamic,
-    /// Recorded by a draw before the program's.
+    /// Recorded by an additional draw before the program's.
     twice: bool,
     /// Recorded by the program's draw.
     once: bool,
@@ -32,7 +33,7 @@ struct Plan {
     counted: bool,
 }
 
-/// Takes note of a draw; `None` where it is of no interest.
+/// Tracks the draw; `None` if it is not relevant.
 fn plan(known: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> {
     let tracker = &mut *known.tracker();
     let state = tracker.commands.get(buffer.as_raw())?;
@@ -65,7 +66,7 @@ fn plan(known: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> 
     Some(plan)
 }
 
-/// Carries out a draw.
+/// Submits a draw.
 ///
 /// # Safety
 /// A command buffer that is recorded; `draw` records the draw into it.

@@ -126,7 +126,7 @@ pub(super) unsafe extern "system" fn create_instance(
         };
         let create =
             std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateInstance>(create);
-        // Programs that ask for an early version would keep the capture from functions that it needs.
+        // Programs that request an early version would make functions unavailable that the capture requires.
         let mut application = (*info)
             .p_application_info
             .as_ref()
@@ -279,7 +279,7 @@ mod tests {
     #[test]
     fn the_draws_number_lies_behind_what_programs_are_told_of() {
         assert_eq!((draw_number_offset(256), visible_limit(256)), (252, 252));
-        // Nothing is left of the least that Vulkan promises.
+        // This uses up the minimum that Vulkan guarantees.
         assert_eq!((draw_number_offset(128), visible_limit(128)), (124, 128));
     }
 }

@@ -1,6 +1,6 @@
 //! The functions that a program calls in place of the driver's.
 //!
-//! Each calls the next layer's or the driver's function of its name, and tells the tracker what the program did.
+//! Each calls the function of the same name of the next layer or driver, and reports the call to the tracker.
 
 mod api;
 mod commands;
@@ -22,7 +22,7 @@ use api::NegotiateLayerInterface;
 use ash::vk::{self, Handle};
 use std::ffi::{CStr, c_char};
 
-/// What the loader knows the object behind a dispatchable handle by.
+/// The loader's key of the object behind a dispatchable handle.
 ///
 /// # Safety
 /// A valid dispatchable handle.
@@ -31,10 +31,10 @@ unsafe fn dispatch_key<H: Handle>(handle: H) -> usize {
     unsafe { *(handle.as_raw() as *const usize) }
 }
 
-/// Version of the interface between loader and layers that this layer knows.
+/// Version of the interface between loader and layers that this layer supports.
 const INTERFACE_VERSION: u32 = 2;
 
-/// The loader asks for the layer's entry points.
+/// Called by the loader to get the layer's entry points.
 ///
 /// # Safety
 /// A loader's call.
@@ -63,7 +63,7 @@ macro_rules! hooks {
                 $($function => $hook as *const (),)*
                 _ => return None,
             };
-            // SAFETY: whoever asks for a function by its name casts it to its own type.
+            // SAFETY: a caller that gets a function by its name casts it to its own type.
             Some(unsafe { std::mem::transmute::<*const (), unsafe extern "system" fn()>(hook) })
         }
     };

@@ -25,7 +25,7 @@ macro_rules! next_functions {
                 $(let $field = {
                     let names: &[&CStr] = &[$($name),+];
                     let found = names.iter().find_map(|name| get(name)).unwrap_or(missing);
-                    // SAFETY: the name tells the function's type.
+                    // SAFETY: the name determines the function's type.
                     unsafe { std::mem::transmute::<unsafe extern "system" fn(), vk::$kind>(found) }
                 };)*
                 Self { $($field),* }

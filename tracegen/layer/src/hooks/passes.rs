@@ -206,7 +206,7 @@ fn end(known: &Device, buffer: vk::CommandBuffer) -> Option<Arc<PassInfo>> {
     state.pass.take()
 }
 
-/// Keeps what a pass rendered, where that is wanted.
+/// Keeps a pass's picture, if requested.
 ///
 /// # Safety
 /// The pass has just ended in a command buffer that is recorded.

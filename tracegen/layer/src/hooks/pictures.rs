@@ -1,6 +1,6 @@
 //! Small pictures of what passes render, for lists of them.
 //!
-//! Lavapipe, on which alone they are made, executes commands one after the other and has no image layouts.
+//! Pictures are only made on lavapipe, which executes commands one after the other and ignores image layouts.
 
 use super::device::Device;
 use super::next::Next;
@@ -16,11 +16,11 @@ const SIDE_PX: u32 = 256;
 /// Pictures of a device.
 #[derive(Default)]
 pub(super) struct Pictures {
-    made: Mutex<Vec<Picture>>,
+    made: Mutex<Vec<PassReadback>>,
 }
 
 /// A picture of a pass.
-struct Picture {
+struct PassReadback {
     pass: u32,
     size: [u32; 2],
     format: vk::Format,
@@ -31,7 +31,7 @@ struct Picture {
     address: usize,
 }
 
-/// What is kept of a pass's target.
+/// Description of the kept picture of a pass's target.
 #[derive(Clone, Copy)]
 struct Kind {
     format: vk::Format,
@@ -129,7 +129,7 @@ impl Pictures {
         let size = full.map(side);
         // SAFETY: as the caller promises.
         unsafe {
-            let Some(picture) = Picture::new(known, pass.pass, size, kind) else {
+            let Some(picture) = PassReadback::new(known, pass.pass, size, kind) else {
                 return;
             };
             picture.record(known, buffer, from, view, full, kind.aspect);
@@ -174,7 +174,7 @@ impl Pictures {
     }
 }
 
-impl Picture {
+impl PassReadback {
     /// Sets memory aside; `None` where the driver refuses.
     ///
     /// # Safety

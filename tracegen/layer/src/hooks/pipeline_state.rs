@@ -1,4 +1,4 @@
-//! What a pipeline's description fixes, and descriptions that write nothing.
+//! State of a pipeline's description, and descriptions without writes.
 
 use super::api::slice;
 use crate::spool::DepthInfo;
@@ -92,7 +92,7 @@ pub(super) unsafe fn alpha_to_coverage(info: &vk::GraphicsPipelineCreateInfo<'_>
     multisampling.is_some_and(|state| state.alpha_to_coverage_enable != 0)
 }
 
-/// Dynamic states through which a draw writes depth, stencil or colours.
+/// Dynamic states that enable writes of depth, stencil or colours.
 const WRITING: [vk::DynamicState; 5] = [
     vk::DynamicState::DEPTH_WRITE_ENABLE,
     vk::DynamicState::STENCIL_OP,

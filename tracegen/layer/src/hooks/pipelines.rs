@@ -263,7 +263,7 @@ unsafe fn twin(
     unsafe {
         let words = match known.tracker().pipelines.module(stage.module) {
             Some(words) => words,
-            // A module that stands in the stage itself.
+            // A module given in the stage itself.
             None => match find::<vk::ShaderModuleCreateInfo<'_>>(stage.p_next) {
                 Some(inline) => slice(inline.p_code, (inline.code_size / 4) as u32).into(),
                 None => return Err("a shader whose module is not known".to_owned()),

@@ -17,7 +17,7 @@ pub(super) struct Queries {
 
 /// Draws that may wait for their results at once.
 const DRAWS: u32 = 1 << 15;
-/// Queries of a draw: one a view of a multiview pass, of which two are counted on.
+/// Queries of a draw: one per view of a multiview pass, at most two.
 const PER_DRAW: u32 = 2;
 
 impl Queries {
@@ -84,7 +84,7 @@ impl Queries {
         }
     }
 
-    /// What draws were counted.
+    /// The counted draws.
     ///
     /// # Safety
     /// They have been executed.

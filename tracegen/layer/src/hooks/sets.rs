@@ -126,7 +126,7 @@ pub(super) unsafe extern "system" fn destroy_pool(
 /// A valid `VkWriteDescriptorSet`.
 unsafe fn written(write: &vk::WriteDescriptorSet<'_>) -> Written {
     let images = match is_texture(write.descriptor_type) {
-        // SAFETY: of these kinds the array has so many elements.
+        // SAFETY: for these kinds, the array has this number of elements.
         true => unsafe { slice(write.p_image_info, write.descriptor_count) },
         false => &[],
     };
@@ -203,10 +203,8 @@ pub(super) unsafe extern "system" fn create_template(
                 offset: entry.offset,
                 stride: entry.stride,
             });
-            let pushes = info.template_type != vk::DescriptorUpdateTemplateType::DESCRIPTOR_SET;
             let of = Template {
                 entries: entries.collect(),
-                set: if pushes { info.set } else { 0 },
                 graphics: info.pipeline_bind_point == vk::PipelineBindPoint::GRAPHICS,
             };
             known.tracker().descriptors.create_template(*template, of);
@@ -228,7 +226,7 @@ pub(super) unsafe extern "system" fn destroy_template(
     }
 }
 
-/// What a template's entries write.
+/// The writes of a template's entries.
 ///
 /// # Safety
 /// `data` has what the template describes.

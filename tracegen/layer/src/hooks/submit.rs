@@ -48,7 +48,7 @@ pub(super) unsafe extern "system" fn queue_submit2(
     }
 }
 
-/// Submits commands and, in a frame that is wanted, waits for them and takes what they recorded.
+/// Submits commands and, in a requested frame, waits for them and drains their records.
 ///
 /// # Safety
 /// A valid submission.
@@ -88,7 +88,8 @@ unsafe fn submit_frame(
     if !capture.wants(frame) {
         // Commands that were recorded for any time record nothing now.
         if let Some(recorder) = known.recorder.as_ref().filter(|r| r.buffer.is_open()) {
-            // Another thread may have begun a wanted frame since, whose commands are still being executed.
+            // Another thread may have started a requested frame since, and its commands may still be
+            // executing.
             let _alone = lock(&known.submitting);
             if !capture.wants(capture.frame()) {
                 recorder.buffer.open(false);
@@ -111,7 +112,7 @@ unsafe fn submit_frame(
     // SAFETY: a queue of the device; nothing of the draws is being executed before they are submitted.
     unsafe {
         if let Some(recorder) = known.recorder.as_ref().filter(|r| !r.buffer.is_open()) {
-            // What is under way belongs to earlier frames.
+            // Commands in flight belong to earlier frames.
             let _ = (known.next.queue_wait_idle)(queue);
             recorder.buffer.open(true);
         }
@@ -136,7 +137,8 @@ unsafe fn submit_frame(
     }
 }
 
-/// Seconds that commands of a frame may take: some wait for others that the program has not submitted yet.
+/// Timeout in seconds for the commands of a frame, because some wait for others that the program has not
+/// submitted yet.
 const PATIENCE_S: u64 = 60;
 
 /// Waits until all that was submitted to a queue is done; false where that takes too long.

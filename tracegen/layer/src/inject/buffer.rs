@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 /// 0 while nothing is recorded.
 pub const COUNTER_BYTES: u64 = 64;
 
-/// What records are made of.
+/// Unit of records.
 pub type Unit = [u32; 4];
 
 /// Bytes of a unit.
@@ -27,7 +27,7 @@ pub(super) const FRAGMENT: u32 = 1 << 24;
 /// Units of a record of a fragment.
 pub(super) const FRAGMENT_UNITS: u32 = 4;
 
-/// What is recorded of one coordinate group.
+/// Record of one coordinate group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct RawSample {
@@ -42,7 +42,7 @@ pub struct RawSample {
     pub primitive: u32,
     /// Element of the binding's array.
     pub element: u32,
-    /// What the site's form says: see [`RawQuad`] and [`RawFragment`].
+    /// Data in the site's form: see [`RawQuad`] and [`RawFragment`].
     pub values: [f32; 11],
 }
 
@@ -131,7 +131,7 @@ pub struct RawFragment {
     pub lod: f32,
 }
 
-/// Takes records apart, coordinate group by coordinate group. False where they end within one.
+/// Splits records into coordinate groups. Returns false if they end within one.
 #[must_use]
 pub fn unpack(mut units: &[Unit], mut each: impl FnMut(RawSample)) -> bool {
     while let Some((&[header, draw, place, primitive], rest)) = units.split_first() {

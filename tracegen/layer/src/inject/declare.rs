@@ -1,4 +1,4 @@
-//! What a module declares so that it can record: capabilities, types, inputs, the draw's number.
+//! Declarations that a recording module needs: capabilities, types, inputs, the draw's number.
 
 use super::shader::Shader;
 use super::{InjectError, Target};
@@ -15,7 +15,7 @@ pub(super) fn literal(value: u32) -> Operand {
     Operand::LiteralBit32(value)
 }
 
-/// Types that records are made of.
+/// Types of the recording code.
 #[derive(Clone, Copy)]
 pub(super) struct Types {
     pub void: Word,
@@ -52,12 +52,12 @@ pub(super) struct Input {
     pub of: Word,
 }
 
-/// What a record tells of its fragment.
+/// Inputs that identify a fragment.
 pub(super) struct Inputs {
     pub frag_coord: Input,
     pub primitive: Input,
     pub view: Option<Input>,
-    /// Lane of the subgroup, where lanes tell each other who is there.
+    /// Lane of the subgroup, if lanes exchange their coverage.
     pub invocation: Option<Input>,
     /// The block of push constants, and the member that is the draw's number.
     pub draw: (Word, u32),
@@ -174,7 +174,7 @@ fn keep_entry_alone(module: &mut Module, entry: usize, main: Word) {
     // Another fragment entry point of the same function would share its modes.
 }
 
-/// Lets the module use device addresses; tells whether its memory model is Vulkan's.
+/// Enables device addresses; returns whether the module's memory model is Vulkan's.
 pub(super) fn use_addresses(builder: &mut Builder) -> Result<bool, InjectError> {
     let model = builder.module_mut().memory_model.as_mut();
     let model = model.ok_or(InjectError::Malformed("no memory model"))?;
@@ -218,7 +218,7 @@ fn draw_number(
         _ => return Err(InjectError::Malformed("several blocks of push constants")),
     };
     let Some(variable) = own else {
-        // A type of its own: see `writer`.
+        // A separate type: see `writer`.
         let block = builder.id();
         let definition = Instruction::new(Op::TypeStruct, None, Some(block), vec![id(u32_type)]);
         builder.module_mut().types_global_values.push(definition);

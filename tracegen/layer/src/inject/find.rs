@@ -21,7 +21,7 @@ pub(super) struct Found {
     pub element: Option<Word>,
 }
 
-/// What an instruction reads; `None` where it reads no texels.
+/// The read of an instruction; `None` if it reads no texels.
 pub(super) fn find(shader: &Shader, instruction: &Instruction) -> Option<Found> {
     let opcode = instruction.class.opcode;
     let kind = kind(opcode)?;
@@ -108,10 +108,10 @@ pub(super) fn find(shader: &Shader, instruction: &Instruction) -> Option<Found> 
     })
 }
 
-/// What an opcode does with an image.
+/// The operation of an opcode on an image.
 enum Kind {
     Known(Access),
-    /// Named, for it is left out.
+    /// Named, because it is left out.
     Other(&'static str),
 }
 
@@ -345,7 +345,7 @@ impl Resolved {
         }
     }
 
-    /// What all calls of a function pass for a parameter, where that is the same.
+    /// The value that all calls of a function pass for a parameter, if it is the same.
     fn through_calls(
         &mut self,
         shader: &Shader,

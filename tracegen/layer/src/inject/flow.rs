@@ -62,7 +62,7 @@ impl Flow<'_> {
                 Op::Branch | Op::BranchConditional | Op::Switch => {
                     open.extend(ids(last).iter().filter_map(|id| self.labels.get(id)));
                 }
-                // Discarded fragments are told by other means.
+                // Discarded fragments are detected by other means.
                 Op::Kill | Op::TerminateInvocation | Op::Unreachable => {}
                 _ => return true,
             }

@@ -25,12 +25,12 @@ pub(super) struct Functions {
 const FIND_LOWEST: u32 = 73;
 
 /// Where a fragment is.
-struct Place {
+struct FragmentPlace {
     /// Lane of the quad.
     lane: Word,
     /// Column and row of the quad, and view.
     packed: Word,
-    /// The lane alone, as a mask.
+    /// Mask of only this lane.
     own: Word,
 }
 
@@ -78,7 +78,7 @@ impl Functions {
         }
     }
 
-    /// `void quads(uint group, vec2 at[count])`: a record of the quad with so many coordinates.
+    /// `void quads(uint group, vec2 at[count])`: records a quad with this number of coordinates.
     pub fn quads(&self, builder: &mut Builder, count: u32) -> Result {
         let Types { u32, vec2, .. } = self.types;
         let mut parameters = vec![u32];
@@ -185,7 +185,7 @@ impl Functions {
     }
 
     /// Where the fragment is.
-    fn place(&self, w: &mut Writer<'_>) -> Place {
+    fn place(&self, w: &mut Writer<'_>) -> FragmentPlace {
         let Types { f32, vec4, .. } = self.types;
         let Input { variable, .. } = self.inputs.frag_coord;
         let at = w.pure(Op::Load, vec4, &[variable]);
@@ -206,11 +206,11 @@ impl Functions {
             packed = w.unsigned(Op::BitwiseOr, &[packed, view]);
         }
         let own = w.unsigned(Op::ShiftLeftLogical, &[one, lane]);
-        Place { lane, packed, own }
+        FragmentPlace { lane, packed, own }
     }
 
-    /// Lanes that come by: the lane itself where it cannot know the others.
-    fn lanes(&self, w: &mut Writer<'_>, place: &Place) -> Lanes {
+    /// Active lanes; only the lane itself if it cannot detect the others.
+    fn lanes(&self, w: &mut Writer<'_>, place: &FragmentPlace) -> Lanes {
         let Types {
             uvec4, bool, u32, ..
         } = self.types;
@@ -365,7 +365,7 @@ impl Functions {
     }
 }
 
-/// A way within a quad.
+/// A direction within a quad.
 struct Step {
     types: Types,
     right: Word,
@@ -384,7 +384,7 @@ impl Step {
             let change = w.pure(Op::VectorTimesScalar, vec2, &[slope, by]);
             found = w.pure(Op::FAdd, vec2, &[found, change]);
         }
-        // Exactly its own, whatever the slopes.
+        // Exactly its own coordinates, whatever the derivatives.
         let parts = [0, 1].map(|axis| {
             let [own, other] = [at, found].map(|of| w.extracted(of, axis, f32));
             w.pure(Op::Select, f32, &[self.is_none, own, other])

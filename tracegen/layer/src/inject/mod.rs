@@ -24,14 +24,14 @@ use rspirv::spirv::{BuiltIn, ExecutionMode, Op, StorageClass};
 use shader::Shader;
 use thiserror::Error;
 
-/// What a recording shader needs to know of the device and of its pipeline.
+/// Properties of the device and of the pipeline that a recording shader depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Target {
     /// Device address of the record buffer.
     pub address: u64,
     /// Offset of the draw's number among the push constants.
     pub push_constant_bytes: u32,
-    /// Lanes of a quad can tell each other who is there.
+    /// Whether lanes of a quad can exchange their coverage.
     pub ballots: bool,
     /// The pass renders several views at once.
     pub multiview: bool,
@@ -40,7 +40,7 @@ pub struct Target {
 /// Why a module is not rewritten.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum InjectError {
-    /// Not SPIR-V that the library knows.
+    /// Not SPIR-V that the library supports.
     #[error("SPIR-V that cannot be parsed: {0}")]
     Parse(String),
     /// Too many words.
@@ -86,7 +86,7 @@ pub struct Recording {
     pub tests: DepthTests,
 }
 
-/// What a fragment shader does, without rewriting it.
+/// Analyses a fragment shader without rewriting it.
 ///
 /// # Errors
 /// A module that cannot be read.

@@ -11,19 +11,19 @@ use std::collections::HashMap;
 /// Number of a value.
 pub(super) type Number = u32;
 
-/// What a number stands for.
+/// Definition of a value number.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum Key {
-    /// A value that only its id tells.
+    /// A value that is only identified by its id.
     Id(Word),
     /// An operation: opcode, type, and its operands.
-    Operation(Op, Word, Vec<Part>),
-    /// What a pointer pointed to since some time.
+    Operation(Op, Word, Vec<OperandKey>),
+    /// Memory behind a pointer since a point in the program.
     Memory(Number, u32),
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
-enum Part {
+enum OperandKey {
     Number(Number),
     Literal(u32),
 }
@@ -111,9 +111,9 @@ impl Numbers {
         let mut parts = Vec::with_capacity(instruction.operands.len());
         for operand in &instruction.operands {
             parts.push(match operand {
-                Operand::IdRef(id) => Part::Number(self.of(*id)),
+                Operand::IdRef(id) => OperandKey::Number(self.of(*id)),
                 Operand::LiteralBit32(value) | Operand::LiteralExtInstInteger(value) => {
-                    Part::Literal(*value)
+                    OperandKey::Literal(*value)
                 }
                 _ => return Key::Id(id),
             });
@@ -121,7 +121,7 @@ impl Numbers {
         Key::Operation(opcode, result_type, parts)
     }
 
-    /// What a pointer points to now; `None` where other fragments may change it.
+    /// Memory behind a pointer now; `None` if other fragments may change it.
     fn loaded(&mut self, shader: &Shader, pointer: Word) -> Option<Key> {
         let time = match memory(shader, pointer) {
             Memory::Constant => 0,
@@ -156,7 +156,7 @@ fn variable(shader: &Shader, pointer: Word) -> Option<Word> {
 
 /// Who changes what a pointer points to.
 enum Memory {
-    /// Nobody during a draw.
+    /// Constant during a draw.
     Constant,
     /// The fragment itself.
     Own,
@@ -200,7 +200,7 @@ fn changes_memory(instruction: &Instruction) -> bool {
     }
 }
 
-/// The result depends on the operands alone.
+/// Whether the result depends only on the operands.
 fn is_pure(opcode: Op) -> bool {
     use Op::*;
     matches!(

@@ -47,7 +47,7 @@ impl Recorder {
         self.builder.module()
     }
 
-    /// Records the lanes of a quad that come by, with coordinates.
+    /// Records the active lanes of a quad, with coordinates.
     pub fn record_quads(
         &mut self,
         group: u16,
@@ -124,7 +124,7 @@ impl Recorder {
         self.put(out, Op::FunctionCall, self.types.void, operands);
     }
 
-    /// Derivatives of coordinates, which the lanes of a quad tell each other.
+    /// Derivatives of coordinates, exchanged between the lanes of a quad.
     pub fn derivatives(&mut self, at: &[Word], out: &mut Vec<Instruction>) -> [Vec<Word>; 2] {
         [Op::DPdxFine, Op::DPdyFine].map(|opcode| {
             let f32 = self.types.f32;

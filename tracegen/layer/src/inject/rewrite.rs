@@ -20,7 +20,7 @@ pub(super) fn rewrite(
     let (functions, main) = (shader.functions.clone(), shader.main);
     let mut recorder = Recorder::new(&shader, target)?;
     if tests == DepthTests::Either || tests == DepthTests::EarlyLateWrite {
-        // The shader that discards is used by a draw of its own, which writes nothing.
+        // The discarding shader is used by an additional draw, which writes nothing.
         recorder
             .builder
             .execution_mode(main, ExecutionMode::EarlyFragmentTests, []);
@@ -120,7 +120,7 @@ fn record_fragment(
     recorder.record_fragment(group, element, &at, lod, gradients, out)
 }
 
-/// Appends an instruction with a result, and tells its id.
+/// Appends an instruction with a result, and returns its id.
 pub(super) fn put(
     builder: &mut rspirv::dr::Builder,
     out: &mut Vec<Instruction>,

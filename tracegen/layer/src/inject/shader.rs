@@ -15,7 +15,7 @@ pub(super) struct Shader {
     pub main: Word,
     /// Positions of the functions that it can reach, itself included.
     pub functions: Vec<usize>,
-    /// What defines each result.
+    /// Instruction that defines each result.
     definitions: HashMap<Word, Instruction>,
     /// Function and position of each parameter.
     parameters: HashMap<Word, (Word, usize)>,
@@ -154,12 +154,12 @@ impl Shader {
         Ok(found)
     }
 
-    /// What defines a result.
+    /// Instruction that defines a result.
     pub fn definition(&self, id: Word) -> Option<&Instruction> {
         self.definitions.get(&id)
     }
 
-    /// What defines the type of a result.
+    /// Instruction that defines the type of a result.
     pub fn type_of(&self, id: Word) -> Option<&Instruction> {
         self.definition(self.definition(id)?.result_type?)
     }
@@ -169,7 +169,7 @@ impl Shader {
         self.bindings.get(&variable).copied()
     }
 
-    /// What is passed for a parameter, call by call; `None` for what is no parameter.
+    /// Arguments of a parameter, call by call; `None` for other values.
     pub fn arguments(&self, parameter: Word) -> Option<Vec<Word>> {
         let (function, place) = self.parameters.get(&parameter)?;
         let calls = self.calls.get(function).map_or(&[][..], Vec::as_slice);

@@ -1,4 +1,4 @@
-//! What an instrumented shader records, and where.
+//! Sites of an instrumented shader, and their records.
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +13,7 @@ pub struct Binding {
     pub element: Option<u32>,
 }
 
-/// What an instruction does with a texture.
+/// Operation of an instruction on a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Access {
@@ -55,13 +55,13 @@ pub enum Lod {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {
-    /// One for the lanes of a quad that come by at once.
+    /// One for the lanes of a quad that are active together.
     Quad,
-    /// One for each fragment, with a third coordinate, a level and derivatives of its own.
+    /// One per fragment, with a third coordinate, a level and its own derivatives.
     Fragment,
 }
 
-/// What a site records.
+/// Record of a site.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum What {
@@ -78,7 +78,7 @@ pub enum What {
 /// An access of a texture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TextureSite {
-    /// What is done.
+    /// The operation.
     pub access: Access,
     /// Shape of the texture.
     pub shape: Shape,
@@ -95,7 +95,7 @@ pub struct TextureSite {
 /// A place in a shader that records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Site {
-    /// What it records.
+    /// Its record.
     pub what: What,
     /// Form of its records.
     pub form: Form,

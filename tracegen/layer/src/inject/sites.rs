@@ -30,7 +30,7 @@ pub(super) struct Sites {
     pub main: usize,
     /// By the instruction before which they are recorded.
     pub batches: HashMap<At, Batch>,
-    /// Group of every fragment that starts, where no other site tells, or where depths are needed.
+    /// Group of every started fragment, if no other site records it or if depths are needed.
     pub entry: Option<u16>,
     /// Group of every fragment that ends.
     pub end: Option<u16>,
@@ -58,7 +58,7 @@ impl Sites {
             batches,
             ..
         } = search;
-        // Groups are numbered batch by batch, so that the first one's number tells all.
+        // Groups are numbered batch by batch, so the first number determines all.
         let mut next = 0;
         let mut numbers = Vec::with_capacity(batches.len());
         for batch in &batches {
@@ -210,7 +210,7 @@ impl Search<'_> {
         });
     }
 
-    /// A new group: in the batch that the same lanes have begun, or in one of its own.
+    /// A new group: in the batch that the same lanes started, or in a new batch.
     fn group(&mut self, found: Found, at: At, joins: bool, lanes: &mut SameLanes) -> Group {
         let open = lanes.batch.filter(|_| joins);
         if let Some(number) = open

@@ -10,7 +10,7 @@ const TARGET: Target = Target {
     multiview: false,
 };
 
-/// What every shader here declares.
+/// Declarations of every shader in these tests.
 const HEAD: &str = "
 @group(0) @binding(0) var color: texture_2d<f32>;
 @group(0) @binding(1) var linear: sampler;
@@ -151,7 +151,7 @@ fn groups(recording: &Recording) -> Vec<u16> {
     recording.sites.iter().map(|site| site.group).collect()
 }
 
-/// Calls of functions in a module, where its program has none of its own.
+/// Calls of functions in a module whose program has no functions of its own.
 fn calls(recording: &Recording) -> usize {
     let module = rspirv::dr::load_words(&recording.words).expect("a module");
     let all = module.all_inst_iter();
@@ -169,7 +169,7 @@ fn lanes_that_stay_the_same_are_recorded_once_and_others_where_they_change() {
     };
     let branch = "if in.number > 1u { c += textureSampleLevel(color, linear, in.uv * 3.0, 0.0); }";
     let recording = instrumented(&text(branch));
-    // The branch has a record of its own; the rest is one of two groups.
+    // The branch has its own record; the rest is one of two groups.
     assert_eq!(groups(&recording), [0, 2, 1, 0]);
     assert_eq!(calls(&recording), 2);
     // After fragments were discarded, fewer sample: the start, two records, the end.
@@ -250,7 +250,7 @@ fn arrays_and_cubes_have_records_of_fragments_and_volumes_are_left_out_by_name()
     assert_eq!(shapes, [Shape::Array, Shape::Cube]);
     let left_out = What::LeftOut("three-dimensional textures".to_owned());
     assert_eq!(recording.sites[2].what, left_out);
-    // None of the three tells what a quad covers.
+    // None of the three records the coverage of a quad.
     assert_eq!(
         recording.sites.last().map(|site| &site.what),
         Some(&What::LeftOut("three-dimensional textures".to_owned()))

@@ -1,4 +1,4 @@
-//! Instructions of a function of its own: a cursor at the end of its last block.
+//! Builds the instructions of a separate function: a cursor at the end of its last block.
 
 use super::declare::{Input, Types, id, literal};
 use super::{COUNTER_BYTES, InjectError};

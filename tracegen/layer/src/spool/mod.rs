@@ -1,7 +1,8 @@
-//! What a captured program's process leaves behind for the launcher: events, one JSON object a line, and raw records.
+//! Files that a captured process leaves for the launcher: events, one JSON object per line, and raw records.
 //!
-//! Every process writes a pair of files of its own. A line is written whole, and a span of records before the event that
-//! names it, so that the files of a program that was killed are as good as those of one that ended.
+//! Every process writes its own pair of files. Lines are written whole, and a span of records is written
+//! before the event that refers to it, so the files of a killed program are as usable as those of one that
+//! ended.
 
 mod read;
 mod write;
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 /// Environment variable that names the folder; without it the layer does nothing.
 pub const FOLDER_VARIABLE: &str = "PARALLAX_CAPTURE_FOLDER";
-/// Name of the layer, as a loader knows it.
+/// Name of the layer for the loader.
 pub const LAYER_NAME: &str = "VK_LAYER_PARALLAX_capture";
 /// File of [`Settings`] in the folder.
 const SETTINGS_FILE: &str = "settings.json";
@@ -23,20 +24,20 @@ const SETTINGS_FILE: &str = "settings.json";
 const EVENTS: &str = "events";
 const RECORDS: &str = "records";
 
-/// What the launcher asks for.
+/// Settings from the launcher.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Settings {
-    /// Texture samples are recorded. Otherwise passes and draws are listed alone.
+    /// Whether texture samples are recorded. Otherwise only passes and draws are listed.
     pub records: bool,
     /// First frame, and the first one that is of no interest any more.
     pub frames: [u32; 2],
-    /// What tells frames apart.
+    /// How frames are counted.
     pub frames_by: FramesBy,
     /// Every draw is counted by an occlusion query as well.
     pub occlusion: bool,
     /// Bytes for the records of one submission.
     pub record_bytes: u64,
-    /// What passes render is kept as pictures.
+    /// Whether small pictures of passes are kept.
     #[serde(default)]
     pub pictures: bool,
     /// Folder for every module as the program gave it and as it records.
@@ -44,7 +45,7 @@ pub struct Settings {
     pub modules: Option<std::path::PathBuf>,
 }
 
-/// What tells frames apart.
+/// How frames are counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FramesBy {
@@ -129,7 +130,7 @@ pub enum Event {
         /// Samples that each draw's occlusion query counted: number of the draw and count.
         occlusion: Vec<(u32, u64)>,
     },
-    /// What a pass rendered, small: a file `PASS.rgba` beside the records' has its texels, row by row.
+    /// A small picture of a pass: a file `PASS.rgba` next to the records has its texels, row by row.
     Picture {
         /// Number of the pass.
         pass: u32,
@@ -221,12 +222,12 @@ pub struct SamplerInfo {
     pub unnormalized: bool,
 }
 
-/// What a pass renders into.
+/// Target of a pass.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PassInfo {
     /// Number.
     pub pass: u32,
-    /// Colour attachments; what is not written is left out.
+    /// Colour attachments; those without writes are left out.
     pub colors: Vec<ViewInfo>,
     /// Depth attachment.
     pub depth: Option<ViewInfo>,
@@ -253,7 +254,7 @@ pub struct TextureInfo {
     pub sampler: Option<SamplerInfo>,
 }
 
-/// How a draw tests depth.
+/// Depth test of a draw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct DepthInfo {
     /// Fragments are tested.
@@ -273,11 +274,11 @@ pub struct DrawInfo {
     pub draw: u32,
     /// Number of its pipeline.
     pub pipeline: u32,
-    /// Number of its recording shader; none where it does not record.
+    /// Number of its recording shader; none if it does not record.
     pub shader: Option<u32>,
     /// Why it does not record, where it should.
     pub unrecorded: Option<String>,
-    /// Recorded by a draw of its own before the program's, which writes nothing.
+    /// Recorded by an additional draw before the program's, which writes nothing.
     pub twice: bool,
     /// Left, top, width and height; a negative height is a picture upside down.
     pub viewport: [f32; 4],
@@ -291,13 +292,13 @@ pub struct DrawInfo {
     pub depth: DepthInfo,
     /// `VkPrimitiveTopology`.
     pub topology: i32,
-    /// Vertices or indices; 0 where the device knows alone.
+    /// Vertices or indices; 0 if only the device knows the number.
     pub vertices: u32,
     /// Instances, likewise.
     pub instances: u32,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// What makes its records less exact.
+    /// Reasons why its records are less exact.
     pub caveats: Vec<String>,
     /// Textures that its shader may read.
     pub textures: Vec<TextureInfo>,

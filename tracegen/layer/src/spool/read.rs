@@ -25,7 +25,7 @@ pub enum ReadError {
         file: String,
         /// Number from 1.
         line: usize,
-        /// What the parser says.
+        /// The parser's message.
         found: String,
     },
     /// Records that an event names are not there.
@@ -81,7 +81,7 @@ impl Process {
     /// All events, up to the line that a killed process did not finish.
     ///
     /// # Errors
-    /// A file that cannot be read, or a line that is no event.
+    /// A file that cannot be read, or a line that is not an event.
     pub fn events(&self) -> Result<Vec<Event>, ReadError> {
         let open = File::open(&self.events).map_err(|e| io_error(&self.events, e))?;
         let mut lines = BufReader::new(open);

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug)]
 pub struct Writer {
     folder: PathBuf,
-    /// Process that the files are of: a child process that starts as a copy of this one gets files of its own.
+    /// Process that owns the files: a forked child process gets its own files.
     pid: u32,
     events: File,
     records: File,
@@ -76,7 +76,7 @@ impl Writer {
         Ok(())
     }
 
-    /// Writes records and tells where they are.
+    /// Writes records and returns their place.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -101,7 +101,7 @@ impl Writer {
         self.event(&Event::Picture { pass, size })
     }
 
-    /// A process that was forked starts files of its own.
+    /// A forked process starts its own files.
     fn after_fork(&mut self) -> io::Result<()> {
         if std::process::id() != self.pid {
             *self = Self::create(&self.folder.clone())?;

@@ -13,11 +13,11 @@ const MOST_SETS: usize = 32;
 /// A draw command.
 #[derive(Clone, Debug, Default)]
 pub struct Call {
-    /// Vertices or indices; 0 where the device knows alone.
+    /// Vertices or indices; 0 if only the device knows the number.
     pub vertices: u32,
     /// Instances, likewise.
     pub instances: u32,
-    /// What makes its records less exact.
+    /// Reasons why its records are less exact.
     pub caveats: Vec<String>,
 }
 
@@ -63,7 +63,7 @@ pub struct Dynamic {
     pub color_enables: Option<Vec<vk::Bool32>>,
 }
 
-/// What is bound in a command buffer.
+/// Bound objects of a command buffer.
 #[derive(Debug)]
 pub struct CommandState {
     /// It is submitted once: what it records can be decided when it is recorded.
@@ -160,7 +160,7 @@ impl CommandState {
             .filter(|set| *set != 0)
     }
 
-    /// What was pushed to a set.
+    /// Descriptors pushed to a set.
     #[must_use]
     pub fn pushed(&self, number: u32) -> Option<&SetState> {
         self.pushed.get(&number)

@@ -5,7 +5,7 @@ use crate::spool::{SamplerInfo, ViewInfo};
 use ash::vk::{self, Handle};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-/// What a descriptor of a texture holds.
+/// Contents of a descriptor of a texture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slot {
     /// Its image.
@@ -49,8 +49,6 @@ pub struct TemplateEntry {
 pub struct Template {
     /// Its entries that are textures.
     pub entries: Vec<TemplateEntry>,
-    /// Set that it pushes.
-    pub set: u32,
     /// It is for graphics pipelines.
     pub graphics: bool,
 }
@@ -63,7 +61,7 @@ struct SetLayout {
 #[derive(Clone, Debug)]
 struct LayoutBinding {
     count: u32,
-    /// Samplers that stand in the layout.
+    /// Immutable samplers of the layout.
     immutable: Vec<Option<SamplerInfo>>,
 }
 

@@ -11,7 +11,7 @@ pub struct Images {
     /// Number of the first one.
     first: u32,
     images: HashMap<u64, Arc<ImageInfo>>,
-    /// By number, those that were destroyed too: a draw may be described later.
+    /// By number, including destroyed ones, because a draw may be described later.
     numbered: Vec<Arc<ImageInfo>>,
     views: HashMap<u64, ViewInfo>,
     samplers: HashMap<u64, SamplerInfo>,
@@ -86,12 +86,6 @@ impl Images {
         found.map(|(handle, _)| vk::Image::from_raw(*handle))
     }
 
-    /// An image by its handle.
-    #[must_use]
-    pub fn image(&self, image: vk::Image) -> Option<&Arc<ImageInfo>> {
-        self.images.get(&image.as_raw())
-    }
-
     /// A view was created.
     pub fn create_view(&mut self, view: vk::ImageView, info: &vk::ImageViewCreateInfo<'_>) {
         let Some(image) = self.images.get(&info.image.as_raw()) else {
@@ -142,7 +136,7 @@ impl Images {
 
     /// A sampler was created.
     pub fn create_sampler(&mut self, sampler: vk::Sampler, info: &vk::SamplerCreateInfo<'_>) {
-        // JSON knows finite numbers alone.
+        // JSON has only finite numbers.
         let finite = |value: f32| if value.is_finite() { value } else { 1000.0 };
         let of = SamplerInfo {
             filters: [info.mag_filter.as_raw(), info.min_filter.as_raw()],

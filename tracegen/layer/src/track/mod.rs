@@ -1,6 +1,7 @@
-//! What a program's Vulkan objects are, as far as a draw's texture samples depend on them.
+//! Tracks a program's Vulkan objects, as far as a draw's texture samples depend on them.
 //!
-//! Nothing here calls Vulkan: hooks tell what a program did, and ask at a draw what it reads and where it goes.
+//! This module does not call Vulkan: hooks report the program's calls, and query at a draw which textures and
+//! targets it uses.
 
 mod commands;
 mod descriptors;
@@ -9,7 +10,7 @@ mod passes;
 mod pipelines;
 
 pub use commands::{Call, CommandState, Commands, Dynamic, Executed, OpenPass};
-pub use descriptors::{Descriptors, Slot, Template, TemplateEntry, Written};
+pub use descriptors::{Descriptors, Template, TemplateEntry, Written};
 pub use images::Images;
 pub use passes::{Attachment, Passes, RenderPass, Subpass};
 pub use pipelines::{Layout, Pipeline, Pipelines, Recorded, State};
@@ -32,10 +33,10 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// Of the device with a number in its process: what it numbers has numbers of its own there, too.
+    /// Tracker of the device with a number in its process, which is part of the numbers of its objects.
     #[must_use]
     pub fn of_device(device: u32) -> Self {
-        // More than any program makes of one kind.
+        // More than any program creates of one kind.
         let first = device << 26;
         Self {
             images: Images::numbered_from(first),
@@ -46,7 +47,8 @@ impl Tracker {
         }
     }
 
-    /// What a draw of a command buffer is, with the next draw's number; `None` where no graphics pipeline is bound.
+    /// Description of a draw in a command buffer, with the next draw's number; `None` if no graphics pipeline
+    /// is bound.
     pub fn draw(&mut self, command_buffer: u64, call: &Call) -> Option<DrawInfo> {
         let textures = self.textures(command_buffer)?;
         self.commands.draw(command_buffer, call, textures)

@@ -14,7 +14,7 @@ pub struct Attachment {
     pub clears: bool,
 }
 
-/// What a subpass renders into: positions among the attachments.
+/// Targets of a subpass: positions among the attachments.
 #[derive(Clone, Debug, Default)]
 pub struct Subpass {
     /// Colours; `None` where one is not used.
@@ -121,7 +121,7 @@ impl Passes {
         self.info(colors, depth, area, of.view_mask)
     }
 
-    /// What a pass renders into, with the next pass's number.
+    /// Target of a pass, with the next pass's number.
     pub fn info(
         &mut self,
         colors: Vec<Attachment>,

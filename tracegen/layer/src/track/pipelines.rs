@@ -25,7 +25,7 @@ pub struct Recorded {
     pub fixed: Vec<vk::DynamicState>,
 }
 
-/// What a pipeline fixes of the state that draws are described by.
+/// State of a pipeline that describes draws.
 #[derive(Clone, Debug, Default)]
 pub struct State {
     /// States that commands set.
@@ -42,9 +42,9 @@ pub struct State {
     pub color_masks: Vec<u32>,
     /// Colours are blended.
     pub blends: bool,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// What makes records less exact.
+    /// Reasons why records are less exact.
     pub caveats: Vec<String>,
 }
 
@@ -123,7 +123,7 @@ impl Pipelines {
         self.layouts.get(&layout.as_raw()).copied()
     }
 
-    /// A program has no use for a layout any more; true if nobody has.
+    /// The program destroyed a layout; returns true if nothing uses it any more.
     pub fn destroy_layout(&mut self, layout: vk::PipelineLayout) -> bool {
         !self.used.contains(&layout.as_raw())
     }
@@ -144,7 +144,7 @@ impl Pipelines {
         self.pipelines.insert(handle.as_raw(), Arc::new(pipeline));
     }
 
-    /// A pipeline was destroyed; tells the one that recorded for it.
+    /// A pipeline was destroyed; returns the recording pipeline that belonged to it.
     pub fn destroy(&mut self, handle: vk::Pipeline) -> Option<vk::Pipeline> {
         let pipeline = self.pipelines.remove(&handle.as_raw())?;
         pipeline.recorded.as_ref().map(|recorded| recorded.handle)

@@ -1,3 +1,4 @@
+use super::descriptors::Slot;
 use super::*;
 use crate::spool::ViewInfo;
 use ash::vk::{self, Handle};

@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 pub struct Page {
     /// Address, or a file below `root`.
     pub address: String,
-    /// What stands behind a file's address: `?mode=stereo`.
+    /// Query string of a file's address: `?mode=stereo`.
     pub query: String,
     /// Folder whose files the page may use, for a local one.
     pub root: Option<PathBuf>,
@@ -49,7 +49,7 @@ pub struct Headset {
     pub position: [f64; 3],
 }
 
-/// What a page did in a frame.
+/// Results of a frame of a page.
 #[derive(Clone, Debug, Default, Deserialize)]
 pub struct Stepped {
     /// Callbacks of animation frames that were due.
@@ -60,7 +60,7 @@ pub struct Stepped {
     pub errors: Vec<String>,
     /// Eyes that a WebXR session drew for.
     pub views: Vec<StepView>,
-    /// The canvas as a PNG, if it was asked for.
+    /// The canvas as a PNG, if requested.
     pub picture: Option<String>,
 }
 
@@ -211,7 +211,7 @@ impl Tab {
             .map(drop)
     }
 
-    /// Opens the page and waits until nothing more is asked for.
+    /// Opens the page and waits until it makes no more requests.
     fn load(&mut self, page: &Page) -> Result<(), BrowserError> {
         let url = match page.root {
             Some(_) => format!("{}{}", serve::address(&page.address), page.query),
@@ -238,7 +238,7 @@ impl Tab {
                 "Page.loadEventFired" => loaded = true,
                 "Network.requestWillBeSent" => {
                     let url = event.params["request"]["url"].as_str().unwrap_or("");
-                    // What an address holds itself is not waited for.
+                    // Data URLs need no waiting.
                     if !url.starts_with("data:") && !url.starts_with("blob:") {
                         open.insert(event.params["requestId"].to_string());
                     }
@@ -267,7 +267,7 @@ impl Tab {
         }
     }
 
-    /// What pages draw with.
+    /// The renderer of pages.
     ///
     /// # Errors
     /// The browser ended.
@@ -309,5 +309,5 @@ impl Tab {
     }
 }
 
-/// A page that asks for nothing for so long, and is not loaded, never will be.
+/// A page without requests for this long that is not loaded never will be.
 const MOST_LOADING: Duration = Duration::from_secs(120);

@@ -27,7 +27,7 @@ pub enum BrowserError {
     /// It does not answer.
     #[error("the browser did not answer within {seconds} seconds while {doing}")]
     Silent {
-        /// What was asked.
+        /// The method that was called.
         doing: &'static str,
         /// How long.
         seconds: u64,
@@ -50,7 +50,7 @@ pub enum BrowserError {
 pub struct Event {
     /// Name.
     pub method: String,
-    /// What it tells.
+    /// The browser's message.
     pub params: Value,
 }
 

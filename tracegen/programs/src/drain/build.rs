@@ -33,22 +33,22 @@ pub enum Merged {
 }
 
 impl Merged {
-    /// The draws that it is made of, and the eye that a record of some view belongs to.
-    fn parts(&self) -> Vec<(Executed, Part)> {
+    /// Its draws, and the eye of the records of each view.
+    fn parts(&self) -> Vec<(Executed, RecordTarget)> {
         match *self {
-            Self::Shadow(draw) => vec![(draw, Part::Pass(draw.pass))],
-            Self::Mono(draw) => vec![(draw, Part::Both)],
-            Self::Multiview(draw, layers) => vec![(draw, Part::Layers(layers))],
+            Self::Shadow(draw) => vec![(draw, RecordTarget::Pass(draw.pass))],
+            Self::Mono(draw) => vec![(draw, RecordTarget::Both)],
+            Self::Multiview(draw, layers) => vec![(draw, RecordTarget::Layers(layers))],
             Self::Eyes(eyes) => (eyes.into_iter().zip([Eye::Left, Eye::Right]))
-                .filter_map(|(draw, eye)| Some((draw?, Part::Eye(eye))))
+                .filter_map(|(draw, eye)| Some((draw?, RecordTarget::Eye(eye))))
                 .collect(),
         }
     }
 }
 
-/// Where the records of a draw go.
+/// Destination of the records of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Part {
+enum RecordTarget {
     Eye(Eye),
     Both,
     Layers([u32; 2]),
@@ -143,7 +143,7 @@ impl<W: Write + Seek> Builder<W> {
         of[1] += fragments;
     }
 
-    /// Adds a frame. Tells its triangles.
+    /// Adds a frame. Returns its number of triangles.
     pub fn frame(
         &mut self,
         session: &Session,
@@ -207,7 +207,7 @@ impl<W: Write + Seek> Builder<W> {
         Ok(triangles)
     }
 
-    /// Adds a draw and its records. Tells its triangles.
+    /// Adds a draw and its records. Returns its number of triangles.
     fn draw(
         &mut self,
         session: &Session,
@@ -247,15 +247,17 @@ impl<W: Write + Seek> Builder<W> {
             let quads = self.quads(shader, &draws, of_part(executed));
             for (view, quad) in quads {
                 let (into, placement) = match *part {
-                    Part::Eye(Eye::Left) => (Into::Left, placements[0]),
-                    Part::Eye(Eye::Right) => (Into::Right, placements[1]),
-                    Part::Both => (Into::Both, placements[0]),
-                    Part::Layers(layers) => match layers.iter().position(|layer| *layer == view) {
-                        Some(0) => (Into::Left, placements[0]),
-                        Some(_) => (Into::Right, placements[1]),
-                        None => continue,
-                    },
-                    Part::Pass(pass) => match shadows.get(&pass) {
+                    RecordTarget::Eye(Eye::Left) => (Into::Left, placements[0]),
+                    RecordTarget::Eye(Eye::Right) => (Into::Right, placements[1]),
+                    RecordTarget::Both => (Into::Both, placements[0]),
+                    RecordTarget::Layers(layers) => {
+                        match layers.iter().position(|layer| *layer == view) {
+                            Some(0) => (Into::Left, placements[0]),
+                            Some(_) => (Into::Right, placements[1]),
+                            None => continue,
+                        }
+                    }
+                    RecordTarget::Pass(pass) => match shadows.get(&pass) {
                         Some((placement, _)) => (Into::Shadow(pass), *placement),
                         None => continue,
                     },
@@ -283,7 +285,7 @@ impl<W: Write + Seek> Builder<W> {
         }
     }
 
-    /// Declares the draws of the trace that a draw becomes: more than one if it has more groups than one can have.
+    /// Declares the trace's draws of a draw: more than one if it has more groups than one draw can have.
     fn declare(
         &mut self,
         session: &Session,
@@ -511,7 +513,7 @@ fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
     };
     let covered = lanes_of(sites.coverage);
     let mut records = Vec::new();
-    // Lanes that sample something in the first draw, whose records tell what is covered.
+    // Lanes that sample something in the first draw, whose records hold the coverage.
     let mut sampled = 0;
     let mut fragments: BTreeMap<GroupKey, Vec<(u8, &RawSample)>> = BTreeMap::new();
     for sample in of {
@@ -611,7 +613,7 @@ impl Quad {
     }
 }
 
-/// Primitives of a draw by its command; 0 where the device knew alone.
+/// Primitives of a draw by its command; 0 if only the device knew the number.
 fn primitives(info: &DrawInfo) -> u32 {
     use vk::PrimitiveTopology as Kind;
     let vertices = info.vertices;

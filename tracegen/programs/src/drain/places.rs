@@ -1,4 +1,4 @@
-//! From pixels of a target to pixels of an eye's picture.
+//! Maps pixels of a target to pixels of an eye's picture.
 
 use crate::views::View;
 

@@ -5,7 +5,7 @@ mod page;
 pub use page::page;
 
 use crate::drain::weight;
-use crate::session::{Frame, Session, SessionError};
+use crate::session::{ProgramFrame, Session, SessionError};
 use crate::texture::texture;
 use crate::views::{self, Role, View, Views, ViewsError, Wanted, viewport};
 use ash::vk;
@@ -16,7 +16,7 @@ use std::fmt::Write as _;
 
 /// A picture, small: red, green, blue and alpha, row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
+pub struct Thumbnail {
     /// Width and height.
     pub size: [u32; 2],
     /// Texels.
@@ -25,10 +25,10 @@ pub struct Picture {
 
 /// A pass of a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Row {
+pub struct PassRow {
     /// Number within the frame.
     pub number: usize,
-    /// What its draws show, each once.
+    /// Roles of its draws, each once.
     pub shows: Vec<Role>,
     /// Size and format of the target.
     pub target: String,
@@ -48,8 +48,8 @@ pub struct Row {
     pub textures: usize,
     /// Their bytes, all levels.
     pub texture_bytes: u64,
-    /// What it rendered.
-    pub picture: Option<Picture>,
+    /// Its picture.
+    pub picture: Option<Thumbnail>,
 }
 
 /// The passes of a frame.
@@ -57,10 +57,10 @@ pub struct Row {
 pub struct List {
     /// The frame's number.
     pub frame: u32,
-    /// Which rule told both eyes apart, or why none did.
+    /// The rule that identified both eyes, or why none did.
     pub eyes: Result<views::Rule, ViewsError>,
     /// Passes in the order of execution.
-    pub rows: Vec<Row>,
+    pub rows: Vec<PassRow>,
 }
 
 /// Lists a frame.
@@ -84,13 +84,13 @@ pub fn list(session: &mut Session, number: u32, wanted: &Wanted) -> Result<List,
 
 fn rows(
     session: &Session,
-    frame: &Frame,
+    frame: &ProgramFrame,
     weights: &[u64],
     records: &HashMap<u32, Vec<RawSample>>,
     views: Option<&Views>,
-) -> Vec<Row> {
+) -> Vec<PassRow> {
     let numbers = views::pass_numbers(frame);
-    let mut rows: Vec<Row> = Vec::new();
+    let mut rows: Vec<PassRow> = Vec::new();
     let mut textures: Vec<HashSet<ViewInfo>> = Vec::new();
     for (place, executed) in frame.draws.iter().enumerate() {
         let number = numbers[place];
@@ -140,7 +140,7 @@ fn add<T: PartialEq>(all: &mut Vec<T>, one: T) {
     }
 }
 
-fn empty_row(session: &Session, number: usize, pass: u32) -> Row {
+fn empty_row(session: &Session, number: usize, pass: u32) -> PassRow {
     let info = session.pass(pass).cloned().unwrap_or_default();
     let name = |view: &ViewInfo| {
         let size = session.image(view.image).map_or([0; 2], |image| {
@@ -155,12 +155,12 @@ fn empty_row(session: &Session, number: usize, pass: u32) -> Row {
         ([one], _) => name(one),
         ([first, rest @ ..], _) => format!("{} and {} more", name(first), rest.len()),
     };
-    Row {
+    PassRow {
         number,
         target,
         views: info.view_mask.count_ones(),
-        picture: (session.picture(pass)).map(|(size, texels)| Picture { size, texels }),
-        ..Row::default()
+        picture: (session.picture(pass)).map(|(size, texels)| Thumbnail { size, texels }),
+        ..PassRow::default()
     }
 }
 
@@ -180,12 +180,12 @@ fn samples(shader: &ShaderInfo, records: &[RawSample]) -> u64 {
 }
 
 /// Names of what a pass's draws show.
-fn shows(row: &Row) -> String {
+fn shows(row: &PassRow) -> String {
     let names: Vec<&str> = row.shows.iter().map(|role| role.name()).collect();
     names.join(" + ")
 }
 
-fn rectangles(row: &Row) -> String {
+fn rectangles(row: &PassRow) -> String {
     const MOST: usize = 3;
     let name = |view: &View| {
         let View {
@@ -215,7 +215,7 @@ const COLUMNS: [&str; 8] = [
     "textures",
 ];
 
-fn cells(row: &Row) -> [String; 8] {
+fn cells(row: &PassRow) -> [String; 8] {
     [
         row.number.to_string(),
         shows(row),
@@ -233,7 +233,7 @@ fn cells(row: &Row) -> [String; 8] {
 }
 
 impl List {
-    /// How both eyes were told apart.
+    /// How both eyes were identified.
     #[must_use]
     pub fn eyes_text(&self) -> String {
         match &self.eyes {

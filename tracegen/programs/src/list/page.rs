@@ -1,6 +1,6 @@
-//! The list as a page of its own.
+//! The list as an HTML page.
 
-use super::{COLUMNS, List, Picture, Row, cells};
+use super::{COLUMNS, List, PassRow, Thumbnail, cells};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use image::ImageEncoder;
@@ -38,7 +38,7 @@ pub fn page(program: &str, lists: &[List]) -> String {
     text
 }
 
-fn line(row: &Row, text: &mut String) {
+fn line(row: &PassRow, text: &mut String) {
     let picture = row
         .picture
         .as_ref()
@@ -66,7 +66,7 @@ fn line(row: &Row, text: &mut String) {
 }
 
 /// A picture as a PNG file, opaque.
-fn png(picture: &Picture) -> Option<Vec<u8>> {
+fn png(picture: &Thumbnail) -> Option<Vec<u8>> {
     let [width, height] = picture.size;
     let rgb: Vec<u8> = (picture.texels.chunks_exact(4))
         .flat_map(|texel| [texel[0], texel[1], texel[2]])
@@ -90,7 +90,7 @@ mod tests {
 
     #[test]
     fn a_page_shows_passes_and_their_pictures_and_escapes_names() {
-        let row = Row {
+        let row = PassRow {
             shows: vec![Role::Shadow],
             target: "64x64 D32_SFLOAT".to_owned(),
             viewports: vec![View {
@@ -99,11 +99,11 @@ mod tests {
             }],
             draws: 3,
             caveats: vec!["alpha to coverage".to_owned()],
-            picture: Some(Picture {
+            picture: Some(Thumbnail {
                 size: [1, 1],
                 texels: vec![255; 4],
             }),
-            ..Row::default()
+            ..PassRow::default()
         };
         let list = List {
             frame: 4,

@@ -36,7 +36,7 @@ pub enum FileError {
         /// Line and what was expected.
         reason: String,
     },
-    /// No rule shows an eye.
+    /// No rule assigns an eye.
     #[error(
         "{0}: expected a rule that shows \"left\", \"right\", \"both\" or \"views\", found none"
     )]
@@ -50,7 +50,7 @@ pub struct RuleFile {
     rule: Vec<FileRule>,
 }
 
-/// What a draw has to be, and what it shows then.
+/// Conditions of a draw, and its role.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct FileRule {
@@ -62,7 +62,7 @@ struct FileRule {
     viewport: Option<[i64; 4]>,
     /// `VkFormat` of the target.
     format: Option<i32>,
-    /// It writes depth alone.
+    /// Whether it writes only depth.
     depth_only: Option<bool>,
     /// Colour channels that it writes: `"r"`, `"gb"`.
     channels: Option<Channels>,

@@ -8,7 +8,7 @@ mod rules;
 pub use file::{FileError, RuleFile};
 pub use others::Other;
 
-use crate::session::{Frame, Session};
+use crate::session::{ProgramFrame, Session};
 use formats::view::Eye;
 use parallax_layer::spool::{DrawInfo, PassInfo, ViewInfo};
 use serde::{Deserialize, Serialize};
@@ -24,11 +24,11 @@ pub enum Rule {
     Halves,
     /// A target for each eye.
     Targets,
-    /// One target for both, one eye after the other, told apart by the channels that are written.
+    /// One target for both, one eye after the other, distinguished by the colour channels that are written.
     Channels,
     /// One target for both: the same draws twice.
     Twice,
-    /// One eye alone.
+    /// Only one eye.
     Mono,
     /// A file of rules.
     File,
@@ -59,7 +59,7 @@ impl Rule {
     }
 }
 
-/// What is to find the views.
+/// How the views are found.
 #[derive(Clone, Debug, Default)]
 pub enum Wanted {
     /// The first rule that fits.
@@ -80,12 +80,12 @@ pub struct View {
     pub size: [u32; 2],
 }
 
-/// What a draw shows.
+/// Role of a draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// A view of an eye; `None` for one that belongs to both.
     Seen(Option<Eye>),
-    /// Both eyes: the views of the draw tell which.
+    /// Both eyes, by the views of the draw.
     Multiview,
     /// Depth seen from a light.
     Shadow,
@@ -160,11 +160,11 @@ struct Drawn<'a> {
     pass: Option<&'a PassInfo>,
     /// Number of the pass within its frame.
     pass_number: usize,
-    /// Fragments that tell what the frame is about.
+    /// Fragments that decide the main target of a frame.
     weight: u64,
 }
 
-/// What makes a draw of one eye the same as one of the other.
+/// Key of draws that are the same for both eyes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct DrawKey {
     /// Pipeline.
@@ -219,7 +219,7 @@ impl Drawn<'_> {
     }
 }
 
-/// The rectangle that a draw's viewport covers.
+/// The rectangle of a draw's viewport.
 #[must_use]
 pub fn viewport(draw: &DrawInfo) -> View {
     let [x, y, width, height] = draw.viewport;
@@ -235,7 +235,7 @@ pub fn viewport(draw: &DrawInfo) -> View {
 
 /// Number of each draw's pass within its frame.
 #[must_use]
-pub fn pass_numbers(frame: &Frame) -> Vec<usize> {
+pub fn pass_numbers(frame: &ProgramFrame) -> Vec<usize> {
     let mut seen: Vec<u32> = Vec::new();
     let number = |draw: &crate::session::Executed| {
         let known = seen.iter().rposition(|pass| *pass == draw.pass);
@@ -253,7 +253,7 @@ pub fn pass_numbers(frame: &Frame) -> Vec<usize> {
 /// No rule fits.
 pub fn find(
     session: &Session,
-    frame: &Frame,
+    frame: &ProgramFrame,
     weights: &[u64],
     wanted: &Wanted,
 ) -> Result<Views, ViewsError> {
@@ -271,7 +271,7 @@ pub fn find(
         .collect();
     let of_scene = |draw: &Drawn<'_>| draw.is_of_scene() && draw.weight > 0;
     if draws.iter().any(of_scene) {
-        // What composes pictures, or works on them, covers more than what they are of.
+        // Draws that compose or process pictures cover more than the pictures' own draws.
         for draw in draws.iter_mut().filter(|draw| !draw.is_of_scene()) {
             draw.weight = 0;
         }
@@ -313,7 +313,7 @@ pub fn find(
     })
 }
 
-/// What a rule found.
+/// Result of a rule.
 struct Found {
     eyes: [View; 2],
     layers: [u32; 2],

@@ -1,18 +1,18 @@
-//! What draws are that no eye sees.
+//! Kinds of draws that belong to no eye.
 
 use super::{Drawn, Role, viewport};
 use std::collections::HashSet;
 
-/// What a draw is that no trace is of.
+/// A draw that the trace leaves out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Other {
     /// A scene that the eyes' draws read as a texture: a reflection, a probe, a screen.
     Reflection,
-    /// A picture made of earlier ones: it tests no depth and reads what the frame rendered.
+    /// A picture composed of earlier ones: it tests no depth and reads the frame's pictures.
     PostProcessing,
     /// Whatever else renders elsewhere.
     Elsewhere,
-    /// A file of rules says so.
+    /// Assigned by a file of rules.
     Ignored,
 }
 
@@ -46,7 +46,7 @@ pub(super) fn tell(draws: &[Drawn<'_>], roles: &mut [Role]) {
             continue;
         }
         roles[draw.place] = if draw.is_depth_alone() {
-            // Depth that an eye's picture is drawn on afterwards is that eye's.
+            // Depth that is used for an eye's picture afterwards belongs to that eye.
             let own = draws.iter().find(|seen| {
                 is_seen(roles[seen.place])
                     && seen.depth() == draw.depth()

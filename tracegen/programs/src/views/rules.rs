@@ -5,7 +5,7 @@ use crate::pairs::likeness;
 use parallax_layer::spool::ViewInfo;
 use std::collections::HashMap;
 
-/// What a rule finds, if it fits.
+/// Result of a rule, if it fits.
 pub(super) fn find(rule: Rule, draws: &[Drawn<'_>]) -> Option<Found> {
     match rule {
         Rule::Multiview => multiview(draws),
@@ -62,7 +62,7 @@ fn multiview(draws: &[Drawn<'_>]) -> Option<Found> {
     })
 }
 
-/// Two rectangles beside or above each other.
+/// Two rectangles side by side or above each other.
 fn are_halves(a: View, b: View) -> bool {
     if a.size != b.size || a.size.contains(&0) {
         return false;

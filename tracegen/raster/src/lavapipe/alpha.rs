@@ -1,4 +1,4 @@
-//! Copies of what alpha tests sample: a base colour's alpha alone, as floats.
+//! Copies of the alpha that alpha tests sample: only the alpha of a base colour, as floats.
 //!
 //! llvmpipe decodes four channels of compressed blocks, and the curve of three, for every texel that
 //! a filter reads. A masked draw that is captured needs one of them, twice. The driver itself makes the
@@ -145,7 +145,7 @@ mod tests {
 
     const SIDE_PX: u32 = 256;
     const PAIR: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
-    /// Alpha of the texture and of its copy, at places from far above one texel a pixel to far below.
+    /// Alpha of the texture and of its copy, from much more than one texel per pixel to much less.
     const BOTH: &str = "
 @group(0) @binding(0) var color: texture_2d<f32>;
 @group(0) @binding(1) var alpha: texture_2d<f32>;
@@ -164,7 +164,7 @@ fn fragment_both(@builtin(position) position: vec4<f32>) -> @location(0) vec2<f3
     return vec2(textureSample(color, linear, uv).a, textureSample(alpha, linear, uv).r);
 }";
 
-    /// A texture of `side` texels with all its levels, of whatever bytes.
+    /// A texture of `side` texels with all its levels, filled with noise.
     fn texture(gpu: &Gpu, format: wgpu::TextureFormat, side: u32) -> wgpu::TextureView {
         let block_bytes = format.block_copy_size(None).unwrap();
         let edge = format.block_dimensions().0;
@@ -197,7 +197,7 @@ fn fragment_both(@builtin(position) position: vec4<f32>) -> @location(0) vec2<f3
             .create_view(&Default::default())
     }
 
-    /// What a shader gets of a texture's alpha and of the copy's, pixel by pixel.
+    /// A shader's samples of a texture's alpha and of its copy, pixel by pixel.
     fn sampled(
         gpu: &Gpu,
         texture: wgpu::TextureView,

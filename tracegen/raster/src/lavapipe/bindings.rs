@@ -1,4 +1,4 @@
-//! What shaders read, binding by binding.
+//! Bindings of the shaders.
 
 use super::device::Gpu;
 
@@ -73,7 +73,7 @@ pub fn group<'a>(
     })
 }
 
-/// What pipelines with these groups are made with.
+/// Layout of pipelines with these groups.
 pub fn pipeline_layout(gpu: &Gpu, groups: &[&wgpu::BindGroupLayout]) -> wgpu::PipelineLayout {
     let groups: Vec<_> = groups.iter().map(|group| Some(*group)).collect();
     gpu.device

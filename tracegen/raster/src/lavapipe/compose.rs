@@ -1,4 +1,4 @@
-//! What is done with whole layers: masks before their draws, pictures of them after.
+//! Operations on whole layers: masks before their draws, pictures after them.
 
 use super::bindings;
 use super::device::Gpu;
@@ -8,7 +8,7 @@ use super::whole::{OverLayer, Whole};
 use crate::error::RasterError;
 use formats::view::TILE_SIZE_PX;
 use techniques::Mask;
-use techniques::plan::{Filter, Part};
+use techniques::plan::{Filter, PicturePart};
 use wgpu::util::DeviceExt;
 
 /// Pipelines that mask layers and compose pictures.
@@ -18,11 +18,11 @@ pub struct Composer {
     /// Writes the nearest depth wherever a layer's mask is not set.
     pub mask: OverLayer,
     filters: [(Filter, wgpu::RenderPipeline); 4],
-    /// Stands for the mask of a layer and the tiles of a part that have none.
+    /// Used as the mask of layers and the tiles of parts that have none.
     absent: wgpu::TextureView,
 }
 
-/// The shader's `Part`.
+/// The shader's `PicturePart`.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 struct PartData {
@@ -99,7 +99,7 @@ impl Composer {
         &self,
         gpu: &Gpu,
         picture: &ColorTarget,
-        parts: &[(&Part, &LayerTarget)],
+        parts: &[(&PicturePart, &LayerTarget)],
     ) -> Result<(), RasterError> {
         let unmasked = self.mask_bindings(gpu, &self.absent);
         gpu.checked("composing a picture", || {
@@ -144,7 +144,7 @@ impl Composer {
         })
     }
 
-    fn bind_part(&self, gpu: &Gpu, part: &Part, layer: &LayerTarget) -> wgpu::BindGroup {
+    fn bind_part(&self, gpu: &Gpu, part: &PicturePart, layer: &LayerTarget) -> wgpu::BindGroup {
         let data = PartData {
             origin: part.origin_px.map(|px| px as i32),
             coarseness: part.coarseness.map(|n| n as i32),
@@ -173,7 +173,7 @@ impl Composer {
     }
 }
 
-/// A texture of a byte a pixel: 1 where the mask is set.
+/// A texture with one byte per pixel: 1 where the mask is set.
 fn upload(gpu: &Gpu, mask: &Mask) -> wgpu::TextureView {
     let [width, height] = mask.size_px();
     let bytes: Vec<u8> = mask.flags().iter().map(|flag| u8::from(*flag)).collect();

@@ -17,9 +17,9 @@ pub struct Gpu {
     pub is_software: bool,
     /// It has a multiview, which need not be sound.
     pub has_multiview: bool,
-    /// What it lacks for captures; without it only pictures can be rendered.
+    /// Missing features for captures; such a device can only render pictures.
     pub no_capture: Option<String>,
-    /// Why fragments are recorded one by one and not quad by quad, where they are.
+    /// Why fragments are recorded one by one instead of quad by quad, if they are.
     pub by_fragment: Option<String>,
 }
 
@@ -27,11 +27,11 @@ pub struct Gpu {
 /// corrupts memory (Mesa 22.3), so with any other size fragments are recorded one by one.
 const SUBGROUP_LANES: u32 = 8;
 
-/// What the capture asks of a device.
+/// Features and limits that captures require.
 const CAPTURE_FEATURES: wgpu::Features = wgpu::Features::PRIMITIVE_INDEX
     .union(wgpu::Features::SHADER_EARLY_DEPTH_TEST)
     .union(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS);
-/// What every picture asks of it.
+/// Features and limits that every picture requires.
 const PICTURE_FEATURES: wgpu::Features = wgpu::Features::TEXTURE_COMPRESSION_BC;
 
 /// Opens an adapter: the first whose name contains `wanted`, whatever the case; llvmpipe, which
@@ -71,7 +71,7 @@ pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
     let driver = format!("{} {} ({})", info.driver, info.driver_info, info.name);
     let missing = (PICTURE_FEATURES | CAPTURE_FEATURES) - adapter.features();
     let by_fragment = no_ballots(adapter, info);
-    // Nothing but llvmpipe is known to find derivatives lane by lane, as fragments alone need them.
+    // Only llvmpipe is known to compute derivatives per lane, which recording single fragments requires.
     let no_capture = if missing.is_empty() {
         by_fragment.clone().filter(|_| !is_llvmpipe(info))
     } else {
@@ -119,7 +119,7 @@ fn is_llvmpipe(info: &wgpu::AdapterInfo) -> bool {
     info.device_type == wgpu::DeviceType::Cpu && info.name.contains("llvmpipe")
 }
 
-/// Why the lanes of a quad cannot tell each other what they cover, where they cannot.
+/// Why the lanes of a quad cannot exchange their coverage, if they cannot.
 fn no_ballots(adapter: &wgpu::Adapter, info: &wgpu::AdapterInfo) -> Option<String> {
     let lanes = [info.subgroup_min_size, info.subgroup_max_size];
     if !adapter.features().contains(wgpu::Features::SUBGROUP) {
@@ -134,7 +134,7 @@ fn no_ballots(adapter: &wgpu::Adapter, info: &wgpu::AdapterInfo) -> Option<Strin
     }
 }
 
-/// Position of the first name that contains `wanted`, whatever the case.
+/// Position of the first name that contains `wanted`, ignoring case.
 fn named(names: &[&str], wanted: &str) -> Option<usize> {
     let wanted = wanted.to_lowercase();
     (names.iter()).position(|name| name.to_lowercase().contains(&wanted))
@@ -150,7 +150,7 @@ impl Gpu {
         }
     }
 
-    /// Runs `work` and turns what the driver or the validation objects to into an error.
+    /// Runs `work` and returns objections of the driver or of the validation as an error.
     ///
     /// # Errors
     /// [`RasterError::Driver`].
@@ -204,7 +204,7 @@ impl Gpu {
         };
         let (sender, receiver) = std::sync::mpsc::channel();
         buffer.map_async(wgpu::MapMode::Read, bytes.clone(), move |result| {
-            // The receiver outlives the wait below; a failed send has nobody to tell.
+            // The receiver outlives the wait below, so a failed send can be ignored.
             let _ = sender.send(result);
         });
         self.wait("mapping a buffer")?;

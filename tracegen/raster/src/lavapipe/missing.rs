@@ -6,14 +6,14 @@ use std::path::{Path, PathBuf};
 /// Vulkan's loader.
 const LOADER: &str = "libvulkan.so.1";
 
-/// Folders where drivers say which library they are.
+/// Folders of files in which drivers name their library.
 const FOLDERS: [&str; 3] = [
     "/usr/local/share/vulkan/icd.d",
     "/etc/vulkan/icd.d",
     "/usr/share/vulkan/icd.d",
 ];
 
-/// Address space that lavapipe needs besides its libraries, about.
+/// Approximate address space that lavapipe needs in addition to its libraries.
 const NEEDED_BYTES: usize = 512 << 20;
 
 /// Why lavapipe, which is installed, does not start; `None` where it is not installed or nothing is known. The

@@ -39,7 +39,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use targets::{ColorTarget, LayerMask, LayerTarget, ShadowMaps};
 use techniques::Start;
-use techniques::plan::Picture;
+use techniques::plan::PictureSource;
 use techniques::start::Opening;
 use textures::TextureSet;
 use upload::SceneBuffers;
@@ -51,9 +51,9 @@ pub struct Lavapipe {
     pipelines: Pipelines,
     scene: SceneBuffers,
     buffers: RecordBuffers,
-    /// What each layer is rendered into, by its position in the frame's plan.
+    /// Target of each layer, by its position in the frame's plan.
     layers: Vec<Option<LayerTarget>>,
-    /// What each picture that is not a layer is composed into, by its number in the plan.
+    /// Target of each composed picture, by its number in the plan.
     composed: Vec<Option<ColorTarget>>,
     /// Made when a plan first needs it.
     composer: Option<Composer>,
@@ -61,12 +61,12 @@ pub struct Lavapipe {
     shadow_maps: ShadowMaps,
     /// Group 0 for the eyes.
     eye_bindings: wgpu::BindGroup,
-    /// How each material is drawn.
+    /// Bindings of each material.
     materials: Vec<MaterialState>,
-    /// Both views at once; made when it is first asked for.
+    /// Multiview; created on first use.
     multiview: Option<Multiview>,
     multiview_trust: Trust,
-    /// What layers start with that is not the sky; made when a layer does.
+    /// Initial contents of layers other than the sky; created on first use.
     starts: Option<Starts>,
     work: Work,
 }
@@ -162,13 +162,13 @@ impl Lavapipe {
         })
     }
 
-    /// The target of a layer that has been prepared.
+    /// The target of a prepared layer.
     fn target(&self, number: usize) -> Result<&LayerTarget, RasterError> {
         let target = self.layers.get(number).and_then(Option::as_ref);
         target.ok_or_else(|| RasterError::Scene(format!("layer {number} has not been rendered")))
     }
 
-    /// Makes the target of a layer unless the last frame's fits.
+    /// Creates the target of a layer unless the last frame's fits.
     fn prepare_target(&mut self, view: &View<'_>) -> Result<(), RasterError> {
         let size_px = view.layer.size_px;
         let gpu = &self.gpu;
@@ -237,7 +237,7 @@ impl Lavapipe {
         Ok(plan)
     }
 
-    /// What a layer starts with; nothing to draw where that is the sky alone.
+    /// Initial contents of a layer; nothing to draw if that is only the sky.
     fn start(&self, start: &Start) -> Result<Option<Drawn<'_>>, RasterError> {
         let Some(starts) = &self.starts else {
             return Ok(None);
@@ -259,7 +259,7 @@ impl Lavapipe {
         })
     }
 
-    /// Starts a pass over a region of a layer: what the layer holds before its draws, and its mask.
+    /// Starts a pass over a region of a layer: its initial contents and its mask.
     fn layer_pass<'e>(
         &self,
         encoder: &'e mut wgpu::CommandEncoder,
@@ -333,7 +333,7 @@ impl Lavapipe {
     }
 }
 
-/// What is set before a draw call.
+/// State that a draw call sets.
 #[derive(Clone, Copy)]
 struct State {
     key: PipelineKey,
@@ -403,7 +403,7 @@ impl CaptureBackend for Lavapipe {
         if lighting.cascades.is_empty() {
             return Ok(());
         }
-        // The map cannot be bound while it is rendered: the casters get a stand-in.
+        // The map cannot be bound while it is rendered, so a placeholder is bound for the casters.
         let stand_in = ShadowMaps::new(&self.gpu, 0);
         for (number, (cascade, visible)) in lighting.cascades.iter().zip(&frame.casters).enumerate()
         {
@@ -586,7 +586,7 @@ impl CaptureBackend for Lavapipe {
         let start = Instant::now();
         let mut composes = false;
         for (number, picture) in frame.plan.pictures.iter().enumerate() {
-            let Picture::Composed { size_px, parts } = picture else {
+            let PictureSource::Composed { size_px, parts } = picture else {
                 continue;
             };
             composes = true;
@@ -624,8 +624,8 @@ impl CaptureBackend for Lavapipe {
 
     fn picture(&mut self, frame: &Frame, number: usize) -> Result<Vec<u8>, RasterError> {
         let picture = match frame.plan.pictures[number] {
-            Picture::Layer(layer) => &self.target(layer)?.color,
-            Picture::Composed { .. } => (self.composed.get(number).and_then(Option::as_ref))
+            PictureSource::Layer(layer) => &self.target(layer)?.color,
+            PictureSource::Composed { .. } => (self.composed.get(number).and_then(Option::as_ref))
                 .ok_or_else(|| {
                     RasterError::Scene(format!("picture {number} has not been composed"))
                 })?,

@@ -21,7 +21,7 @@ const EDGE_PX: u32 = 64;
 /// Its triangles.
 const TRIANGLES: u32 = 96;
 
-/// What drawing for both eyes at once needs.
+/// Resources for drawing both eyes at once.
 pub struct Multiview {
     /// Pipelines for two views.
     pub pipelines: Pipelines,
@@ -31,7 +31,7 @@ pub struct Multiview {
     pub targets: Targets,
 }
 
-/// What is known of the driver's multiview.
+/// Test results of the driver's multiview.
 #[derive(Clone, Debug, Default)]
 pub enum Trust {
     /// Not tried yet.
@@ -46,7 +46,7 @@ pub enum Trust {
 }
 
 impl Lavapipe {
-    /// Draws the known scene both ways when first asked.
+    /// Draws the test scene both ways on first use.
     pub(super) fn find_multiview_defect(&mut self) -> Result<Option<String>, RasterError> {
         if let Trust::Unknown = self.multiview_trust {
             self.multiview_trust = if self.gpu.has_multiview {
@@ -138,7 +138,7 @@ impl Lavapipe {
             Some(made) if made.targets.size_px == size_px => made,
             _ => Multiview::new(&self.gpu, size_px)?,
         };
-        // The pipelines for two views stand in for those for one.
+        // The pipelines for two views are used in place of those for one.
         std::mem::swap(&mut self.pipelines, &mut multiview.pipelines);
         let drawn = self.submit_both(draws, views, &multiview, start);
         std::mem::swap(&mut self.pipelines, &mut multiview.pipelines);
@@ -216,7 +216,7 @@ fn union(a: &[u32], b: &[u32]) -> Vec<u32> {
 pub struct Targets {
     /// Pixels of a view.
     pub size_px: [u32; 2],
-    /// Colour, a layer a view.
+    /// Colour, one layer per view.
     pub color: wgpu::Texture,
     color_view: wgpu::TextureView,
     depth_view: wgpu::TextureView,
@@ -353,7 +353,7 @@ fn differing(a: &[u8], b: &[u8]) -> u32 {
     pairs.filter(|(a, b)| a != b).count() as u32
 }
 
-/// A draw a triangle: what a driver knows of one does not help it with the next.
+/// One draw per triangle, so that the driver cannot reuse results between triangles.
 fn draw_triangles(pass: &mut wgpu::RenderPass<'_>) {
     for triangle in 0..TRIANGLES {
         pass.draw(3 * triangle..3 * triangle + 3, 0..1);

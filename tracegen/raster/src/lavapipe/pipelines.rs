@@ -163,26 +163,7 @@ impl Pipelines {
         }
         let shadow = key.role.casts();
         let entry_point = key.role.fragment_entry_point();
-        let (format, blend) = match key.role {
-            Role::Blended => (COLOR_FORMAT, Some(wgpu::BlendState::ALPHA_BLENDING)),
-            Role::Count | Role::CountBlended => (wgpu::TextureFormat::R16Float, Some(ADDITIVE)),
-            Role::Texel | Role::TexelMasked => (TEXEL_FORMAT, None),
-            _ => (COLOR_FORMAT, None),
-        };
-        let mut targets = vec![Some(wgpu::ColorTargetState {
-            format,
-            blend,
-            write_mask: if key.role.keeps_color() {
-                wgpu::ColorWrites::empty()
-            } else {
-                wgpu::ColorWrites::ALL
-            },
-        })];
-        if key.role.writes_texels() {
-            targets.push(Some(PRIMITIVE_FORMAT.into()));
-        } else if key.colorless {
-            targets.clear();
-        }
+        let targets = color_targets(key);
         gpu.device
             .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: None,
@@ -272,4 +253,28 @@ fn material_bindings() -> impl Iterator<Item = (u32, wgpu::BindingType)> {
         .chain(textures.map(move |binding| (binding, texture)))
         .chain(samplers.map(move |binding| (binding, sampler)))
         .chain([(ALPHA_BINDING, texture)])
+}
+
+fn color_targets(key: &PipelineKey) -> Vec<Option<wgpu::ColorTargetState>> {
+    let (format, blend) = match key.role {
+        Role::Blended => (COLOR_FORMAT, Some(wgpu::BlendState::ALPHA_BLENDING)),
+        Role::Count | Role::CountBlended => (wgpu::TextureFormat::R16Float, Some(ADDITIVE)),
+        Role::Texel | Role::TexelMasked => (TEXEL_FORMAT, None),
+        _ => (COLOR_FORMAT, None),
+    };
+    let mut targets = vec![Some(wgpu::ColorTargetState {
+        format,
+        blend,
+        write_mask: if key.role.keeps_color() {
+            wgpu::ColorWrites::empty()
+        } else {
+            wgpu::ColorWrites::ALL
+        },
+    })];
+    if key.role.writes_texels() {
+        targets.push(Some(PRIMITIVE_FORMAT.into()));
+    } else if key.colorless {
+        targets.clear();
+    }
+    targets
 }

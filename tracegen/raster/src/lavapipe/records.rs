@@ -11,9 +11,9 @@ pub struct RecordBuffers {
     pub records: wgpu::Buffer,
     /// Raw depths, one a record.
     pub depths: wgpu::Buffer,
-    /// `depths` is as long as `records`; without masked draws it is a stand-in.
+    /// `depths` is as long as `records`; without masked draws it is a placeholder.
     pub has_depths: bool,
-    /// Records appended, those beyond the capacity counted too.
+    /// Number of appended records, including those beyond the capacity.
     pub counter: wgpu::Buffer,
     /// Records that fit.
     pub capacity: u32,
@@ -30,7 +30,7 @@ impl RecordBuffers {
     pub fn new(gpu: &Gpu, budget_bytes: u64, has_depths: bool) -> Result<Self, RasterError> {
         let limits = gpu.device.limits();
         let binding = u64::from(limits.max_storage_buffer_binding_size as u32);
-        // A device that cannot capture gets stand-ins.
+        // A device that cannot capture gets placeholders.
         let captures = gpu.no_capture.is_none();
         let budget_bytes = if captures { budget_bytes } else { 0 };
         let capacity =

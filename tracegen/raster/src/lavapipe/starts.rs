@@ -1,4 +1,4 @@
-//! What a layer holds before its draws, where that is not the sky.
+//! Initial contents of a layer, other than the sky.
 
 use super::bindings;
 use super::device::Gpu;
@@ -24,7 +24,7 @@ struct Pipeline {
     textures: Vec<u32>,
 }
 
-/// A start with what it is drawn with.
+/// Initial contents and the resources to draw them.
 pub struct Drawn<'a> {
     /// Over the whole target.
     pub pipeline: &'a OverLayer,
@@ -82,7 +82,7 @@ impl Starts {
         self.nearer.drawn(gpu, &data, &[], false)
     }
 
-    /// The sky where one of two layers, each given with its target, leaves it open.
+    /// The sky where both of two layers, each given with its target, are empty.
     pub fn behind(&self, gpu: &Gpu, openings: [(&Opening, &LayerTarget); 2]) -> Drawn<'_> {
         let [(left, left_target), (right, right_target)] = openings;
         let data = StartData {
@@ -148,7 +148,7 @@ impl Pipeline {
         }
     }
 
-    /// `textures` in the order in which [`Self::new`] was told of them.
+    /// `textures` in the order in which [`Self::new`] received them.
     fn drawn(
         &self,
         gpu: &Gpu,

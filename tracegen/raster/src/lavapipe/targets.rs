@@ -16,7 +16,7 @@ pub struct ColorTarget {
     pub view: wgpu::TextureView,
 }
 
-/// What a layer is rendered into.
+/// Target of a layer.
 pub struct LayerTarget {
     /// Its picture.
     pub color: ColorTarget,
@@ -110,7 +110,7 @@ impl LayerTarget {
         })
     }
 
-    /// Makes the picture black, as it stays where the mask lets nothing be drawn.
+    /// Makes the picture black, which remains where the mask prevents drawing.
     ///
     /// # Errors
     /// Driver errors.
@@ -173,7 +173,7 @@ impl ColorTarget {
     }
 }
 
-/// The shadow map array: one view to sample, one a layer to render.
+/// The shadow map array: one view to sample, and one per layer to render.
 pub struct ShadowMaps {
     /// All layers.
     pub sampled: wgpu::TextureView,
@@ -214,7 +214,7 @@ impl ShadowMaps {
     }
 }
 
-/// A texture of so many layers and levels that is rendered into.
+/// A render target with the given numbers of layers and levels.
 pub fn attachment(
     gpu: &Gpu,
     size_px: [u32; 2],

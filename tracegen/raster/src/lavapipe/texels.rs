@@ -1,4 +1,4 @@
-//! What visible fragments sample, as the driver's texture unit filters it: a check of the records.
+//! Samples of visible fragments, filtered by the driver's texture unit, to verify the records.
 
 use super::Lavapipe;
 use super::pipelines::{DEPTH_FORMAT, PRIMITIVE_FORMAT, TEXEL_FORMAT};

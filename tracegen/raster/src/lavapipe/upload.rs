@@ -20,7 +20,7 @@ use wgpu::util::DeviceExt;
 pub struct MeshBuffers {
     /// Interleaved vertices.
     pub vertices: wgpu::Buffer,
-    /// Vertex colours, where the mesh has them.
+    /// Vertex colours, if the mesh has them.
     pub colors: Option<wgpu::Buffer>,
     /// 32-bit indices.
     pub indices: wgpu::Buffer,
@@ -36,7 +36,7 @@ pub struct SceneBuffers {
     pub meshes: Vec<Option<MeshBuffers>>,
     /// Bind group 1 by the scene's material number.
     pub materials: Vec<wgpu::BindGroup>,
-    /// One row a draw.
+    /// One row per draw.
     pub instances: wgpu::Buffer,
     /// Draw numbers by instance, written before each pass.
     pub instance_draws: wgpu::Buffer,
@@ -109,7 +109,7 @@ impl SceneBuffers {
 }
 
 impl SceneBuffers {
-    /// Writes the rows of the draws that move, those of consecutive draws at once; tells the bytes.
+    /// Writes the rows of moving draws, consecutive ones at once; returns the number of bytes.
     pub fn pose(&self, gpu: &Gpu, draws: &DrawList) -> u64 {
         let mut bytes = 0;
         for run in draws.moving.chunk_by(|a, b| a + 1 == *b) {
@@ -230,14 +230,14 @@ fn upload_texture(
     })
 }
 
-/// What a material samples.
+/// Textures and samplers of a material.
 struct MaterialViews<'a> {
     textures: [&'a wgpu::TextureView; MATERIAL_TEXTURES],
     alpha: &'a wgpu::TextureView,
 }
 
 impl<'a> MaterialViews<'a> {
-    /// `absent` stands for what there is not.
+    /// `absent` is used for missing textures.
     fn new(
         material: &Material,
         set: &TextureSet,

@@ -1,4 +1,4 @@
-//! Depth alone, for occlusion culling, and which draws are visible, by drawing everything.
+//! Depth for occlusion culling, and the visibility of all draws, found by drawing everything.
 
 use super::pipelines::DEPTH_FORMAT;
 use super::targets::attachment;
@@ -25,7 +25,7 @@ impl Lavapipe {
         self.readback.texels(&self.gpu, &depth)
     }
 
-    /// What is visible of every draw, those left out of the view too.
+    /// Visibility of every draw, including draws that culling removed.
     pub(super) fn read_marks(
         &mut self,
         draws: &DrawList,
@@ -43,7 +43,7 @@ impl Lavapipe {
         (self.gpu.queue).write_buffer(&self.buffers.view_uniform, 0, bytemuck::bytes_of(&data));
         let depth = self.depth_texture(view);
         self.draw_alone(draws, &every, Purpose::Depth, &depth, None)?;
-        // Two words a draw; zero until a fragment of it is seen.
+        // Two words per draw; zero until a fragment of it is visible.
         let words = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("marks"),
             size: 8 * every.len().max(1) as u64,

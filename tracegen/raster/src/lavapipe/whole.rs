@@ -4,14 +4,14 @@ use super::device::Gpu;
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT};
 use std::num::NonZeroU32;
 
-/// What is drawn over a layer before its draws.
+/// A full-screen pass over a layer before its draws.
 pub struct OverLayer {
     pictured: wgpu::RenderPipeline,
     depth_alone: wgpu::RenderPipeline,
 }
 
 impl OverLayer {
-    /// The pipeline for passes with a picture, or for those of depth alone.
+    /// The pipeline for passes with colour, or for depth only.
     pub fn of(&self, picture: bool) -> &wgpu::RenderPipeline {
         if picture {
             &self.pictured
@@ -21,7 +21,7 @@ impl OverLayer {
     }
 }
 
-/// What such a pipeline is made of.
+/// Description of such a pipeline.
 pub struct Whole<'a> {
     /// The shader.
     pub module: &'a wgpu::ShaderModule,
@@ -34,7 +34,7 @@ pub struct Whole<'a> {
 }
 
 impl Whole<'_> {
-    /// A fragment entry point that writes depth, whatever is there, and colour where there is a picture.
+    /// A fragment entry point that writes depth unconditionally, and colour if there is a picture.
     pub fn over_layer(&self, gpu: &Gpu, fragment: &str) -> OverLayer {
         OverLayer {
             pictured: self.pipeline(gpu, fragment, Some(COLOR_FORMAT), true),
@@ -42,7 +42,7 @@ impl Whole<'_> {
         }
     }
 
-    /// A fragment entry point that writes colour alone.
+    /// A fragment entry point that writes only colour.
     pub fn over_picture(
         &self,
         gpu: &Gpu,

@@ -1,4 +1,4 @@
-//! The only place that calls the library: OpenGL through OSMesa, behind functions that are safe to call.
+//! The only module that calls the library: OpenGL through OSMesa, wrapped in safe functions.
 //!
 //! OpenGL checks names, sizes of buffers and of compressed images, and reports instead of acting
 //! ([`Gl::check`]). What it does not check is held here: the context is current on the one thread that can
@@ -18,7 +18,7 @@ pub use glow::{
     NativeTexture as Texture,
 };
 
-/// The library, by the name that the loader looks for.
+/// The library's name for the loader.
 const LIBRARY: &str = "libOSMesa.so.8";
 
 type CreateContext = unsafe extern "C" fn(*const c_int, *mut c_void) -> *mut c_void;
@@ -28,7 +28,7 @@ type DestroyContext = unsafe extern "C" fn(*mut c_void);
 type ClipControl = unsafe extern "C" fn(c_uint, c_uint);
 type ProvokingVertex = unsafe extern "C" fn(c_uint);
 
-/// What is asked of a context, as pairs of `osmesa.h`: RGBA, no depth of its own, core profile, OpenGL 4.5.
+/// Attributes of the context, as pairs of `osmesa.h`: RGBA, no depth buffer, core profile, OpenGL 4.5.
 const CONTEXT: [c_int; 13] = [
     0x22, 0x1908, 0x30, 0, 0x31, 0, 0x33, 0x34, 0x36, 4, 0x37, 5, 0,
 ];
@@ -67,7 +67,7 @@ pub struct Attribute {
     pub location: u32,
     /// Values.
     pub components: i32,
-    /// `FLOAT`, `UNSIGNED_SHORT` (0 to 1 in the shader) or `UNSIGNED_INT` (as it is).
+    /// `FLOAT`, `UNSIGNED_SHORT` (0 to 1 in the shader) or `UNSIGNED_INT` (unconverted).
     pub kind: u32,
     /// Bytes from one to the next.
     pub stride: u64,
@@ -81,12 +81,12 @@ pub struct Attribute {
 #[derive(Clone, Copy, Debug)]
 pub struct Vertices {
     name: glow::NativeVertexArray,
-    /// Vertices, all of which are drawn.
+    /// Number of vertices, all of which are drawn.
     pub count: u32,
     instances: u32,
 }
 
-/// How fragments meet what is there.
+/// Depth test and blending.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     /// Depth comparison.
@@ -224,7 +224,7 @@ impl Gl {
         limit.max(0) as u64
     }
 
-    /// What the driver has objected to since the last time.
+    /// The driver's errors since the last call.
     ///
     /// # Errors
     /// [`RasterError::Driver`].
@@ -254,7 +254,7 @@ impl Gl {
         Ok(buffer)
     }
 
-    /// A buffer of so many bytes.
+    /// A buffer with this number of bytes.
     ///
     /// # Errors
     /// Driver errors; more bytes than the driver counts.
@@ -297,12 +297,12 @@ impl Gl {
         }
     }
 
-    /// What a uniform block reads.
+    /// Binds a uniform block.
     pub fn bind_uniform(&self, binding: u32, buffer: Buffer) {
         self.bind_buffer(glow::UNIFORM_BUFFER, binding, buffer);
     }
 
-    /// What a storage block reads and writes.
+    /// Binds a storage block.
     pub fn bind_storage(&self, binding: u32, buffer: Buffer) {
         self.bind_buffer(glow::SHADER_STORAGE_BUFFER, binding, buffer);
     }
@@ -312,7 +312,7 @@ impl Gl {
         unsafe { self.gl.bind_buffer_base(target, binding, Some(buffer.name)) };
     }
 
-    /// A texture without contents; an array where there are `layers`.
+    /// A texture without contents; an array if `layers` is given.
     ///
     /// # Errors
     /// Driver errors.
@@ -406,7 +406,7 @@ impl Gl {
         Ok(sampler)
     }
 
-    /// What a texture unit samples, and how.
+    /// Binds a texture and a sampler to a unit.
     pub fn bind_texture(&self, unit: u32, is_array: bool, texture: Texture, sampler: Sampler) {
         // SAFETY: see the module.
         unsafe {
@@ -472,7 +472,7 @@ impl Gl {
         }
     }
 
-    /// Sets the depth of what is drawn into to the farthest.
+    /// Clears the depth of the current target to the farthest value.
     pub fn clear_depth(&self) {
         // SAFETY: see the module.
         unsafe {
@@ -518,10 +518,10 @@ impl Gl {
         depths
     }
 
-    /// Compiles and links a program; without a fragment shader it writes depth alone.
+    /// Compiles and links a program; without a fragment shader it writes only depth.
     ///
     /// # Errors
-    /// What the compiler says.
+    /// The compiler's message.
     pub fn program(&self, vertex: &str, fragment: Option<&str>) -> Result<Program, RasterError> {
         let stages = [
             (glow::VERTEX_SHADER, Some(vertex)),
@@ -601,7 +601,7 @@ impl Gl {
         })
     }
 
-    /// Sets how fragments meet what is there.
+    /// Sets depth test and blending.
     pub fn set(&self, state: &State) {
         let switch = |name, on: bool| {
             // SAFETY: see the module.

@@ -32,7 +32,7 @@ impl Module {
     /// Reads and checks the shader.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// The translator's message.
     pub fn new() -> Result<Self, RasterError> {
         let source = shader::source(Granularity::NumberedFragments, AlphaSource::Color);
         let module = naga::front::wgsl::parse_str(&source)
@@ -42,7 +42,7 @@ impl Module {
             .map_err(|e| failed("checking the shader", e.emit_to_string(&source)))?;
         let options = Options {
             version: Version::Desktop(450),
-            // Coordinates are those of WGSL already: see `gl`.
+            // Coordinates already follow WGSL's conventions; see `gl`.
             writer_flags: WriterFlags::empty(),
             binding_map: bindings(),
             zero_initialize_workgroup_memory: false,
@@ -57,7 +57,7 @@ impl Module {
     /// An entry point in GLSL 4.50, with overrides.
     ///
     /// # Errors
-    /// What GLSL cannot say.
+    /// Features that GLSL cannot express.
     pub fn translate(
         &self,
         stage: ShaderStage,

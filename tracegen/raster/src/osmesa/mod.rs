@@ -29,7 +29,7 @@ use scene::Scene;
 use std::time::Instant;
 use targets::{ShadowMaps, Target};
 use techniques::Start;
-use techniques::plan::Picture;
+use techniques::plan::PictureSource;
 use textures::TextureSet;
 use upload::SceneObjects;
 
@@ -42,10 +42,10 @@ pub struct Osmesa {
     /// Without attributes, for what needs none.
     nothing: Vertices,
     buffers: RecordBuffers,
-    /// What each layer is rendered into, by its position in the frame's plan.
+    /// Target of each layer, by its position in the frame's plan.
     layers: Vec<Option<Target>>,
     shadow_maps: ShadowMaps,
-    /// How each material is drawn.
+    /// Bindings of each material.
     materials: Vec<MaterialState>,
     work: Work,
 }
@@ -54,7 +54,7 @@ pub struct Osmesa {
 struct RecordBuffers {
     /// The layer's `View`.
     view: Buffer,
-    /// Records appended, those beyond the capacity counted too.
+    /// Number of appended records, including those beyond the capacity.
     counter: Buffer,
     records: Buffer,
     /// As long as `records` where draws are masked.
@@ -62,7 +62,7 @@ struct RecordBuffers {
     capacity: u32,
 }
 
-/// Draws of a pass: what they are drawn with, their material, their mesh.
+/// Draws of a pass: their pipeline, material and mesh.
 type Plan = Vec<(Batch, Pipeline)>;
 
 impl Osmesa {
@@ -109,7 +109,7 @@ impl Osmesa {
         })
     }
 
-    /// What this backend does not do.
+    /// A feature that this backend does not support.
     fn lacks<T>(&self, what: &str) -> Result<T, RasterError> {
         Err(RasterError::Unsupported {
             driver: format!("the OSMesa backend ({})", self.driver),
@@ -117,7 +117,7 @@ impl Osmesa {
         })
     }
 
-    /// The target of a layer, made unless the last frame's fits.
+    /// The target of a layer, created unless the last frame's fits.
     fn target(&mut self, number: usize, size_px: [u32; 2]) -> Result<Target, RasterError> {
         if self.layers.len() <= number {
             self.layers.resize(number + 1, None);
@@ -161,7 +161,7 @@ impl Osmesa {
         Ok(plan)
     }
 
-    /// Tells the shader what it reads and writes, the material left out.
+    /// Binds the shader's inputs and outputs, except for the material.
     fn bind(&self, view: &ViewData) {
         let gl = &self.gl;
         gl.write(self.buffers.view, 0, bytemuck::bytes_of(view));
@@ -204,13 +204,13 @@ impl Osmesa {
         }
     }
 
-    /// What a layer has been rendered into.
+    /// The target of a rendered layer.
     fn rendered(&self, layer: usize) -> Result<Target, RasterError> {
         (self.layers.get(layer).copied().flatten())
             .ok_or_else(|| RasterError::Scene(format!("layer {layer} has not been rendered")))
     }
 
-    /// Hands over what has been recorded.
+    /// Passes the records to the sink.
     fn hand_over(&self, recording: Recording<'_, '_>) -> Result<Captured, RasterError> {
         let mut counted = [0_u32];
         self.gl
@@ -360,7 +360,7 @@ impl CaptureBackend for Osmesa {
     }
 
     fn compose(&mut self, frame: &Frame) -> Result<(), RasterError> {
-        let is_layer = |picture: &Picture| matches!(picture, Picture::Layer(_));
+        let is_layer = |picture: &PictureSource| matches!(picture, PictureSource::Layer(_));
         if frame.plan.pictures.iter().all(is_layer) {
             return Ok(());
         }
@@ -375,7 +375,7 @@ impl CaptureBackend for Osmesa {
     }
 
     fn picture(&mut self, frame: &Frame, number: usize) -> Result<Vec<u8>, RasterError> {
-        let Picture::Layer(layer) = frame.plan.pictures[number] else {
+        let PictureSource::Layer(layer) = frame.plan.pictures[number] else {
             return self.lacks("pictures that are composed of layers");
         };
         let target = self.rendered(layer)?;

@@ -7,7 +7,7 @@ use crate::roles::{PipelineKey, Role};
 use naga::ShaderStage::{Fragment, Vertex};
 use std::collections::BTreeMap;
 
-/// A program and how its fragments meet what is there.
+/// A program with its depth test and blending.
 #[derive(Clone, Copy)]
 pub struct Pipeline {
     program: Program,
@@ -58,7 +58,7 @@ impl Programs {
         })
     }
 
-    /// The pipeline of `key`, made when it is first asked for.
+    /// The pipeline of `key`, created on first use.
     ///
     /// # Errors
     /// Driver and validation errors.
@@ -90,7 +90,7 @@ impl Programs {
     }
 }
 
-/// What a pipeline does with depth and colour, as lavapipe's have it.
+/// Depth test and blending of a pipeline, like lavapipe's.
 fn state(key: &PipelineKey) -> State {
     let role = key.role;
     State {

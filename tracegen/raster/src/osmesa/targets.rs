@@ -1,4 +1,4 @@
-//! What layers and shadow maps are rendered into.
+//! Targets of layers and shadow maps.
 
 use super::gl::{Framebuffer, Gl, Sampler, Texture};
 use crate::draws::SHADOW_SIZE;
@@ -7,7 +7,7 @@ use crate::error::RasterError;
 /// Most pixels along a view's edge: records hold 12 bits of quad column and row.
 const MAX_EDGE_PX: u64 = 8192;
 
-/// What a layer is rendered into.
+/// Target of a layer.
 #[derive(Clone, Copy)]
 pub struct Target {
     /// Width and height in pixels.

@@ -20,7 +20,7 @@ const RGBA_DXT5: u32 = 0x83F3;
 pub struct MaterialObjects {
     /// The shader's `Material`.
     pub uniform: Buffer,
-    /// What each of its units samples; white where it has no texture.
+    /// Texture of each unit; white if it has none.
     pub units: [(Texture, Sampler); MATERIAL_TEXTURES],
 }
 
@@ -30,7 +30,7 @@ pub struct SceneObjects {
     pub meshes: Vec<Option<Vertices>>,
     /// By the scene's material number.
     pub materials: Vec<MaterialObjects>,
-    /// One row a draw.
+    /// One row per draw.
     pub instances: Buffer,
     /// Draw numbers by instance, written before each pass.
     pub instance_draws: Buffer,
@@ -83,7 +83,7 @@ impl SceneObjects {
         })
     }
 
-    /// Writes the rows of the draws that move; tells the bytes.
+    /// Writes the rows of moving draws; returns the number of bytes.
     pub fn pose(&self, gl: &Gl, draws: &DrawList) -> u64 {
         let row_bytes = size_of::<InstanceData>() as u64;
         for &draw in &draws.moving {
@@ -98,7 +98,7 @@ impl SceneObjects {
     }
 }
 
-/// Uploads the corners of a mesh's triangles, three a triangle.
+/// Uploads the corners of a mesh's triangles, three per triangle.
 fn upload_mesh(gl: &Gl, mesh: &Mesh, draws: Buffer) -> Result<Vertices, RasterError> {
     let corners = &mesh.indices[..3 * mesh.triangles()];
     let shared = vertices::pack(mesh);
@@ -113,7 +113,7 @@ fn upload_mesh(gl: &Gl, mesh: &Mesh, draws: Buffer) -> Result<Vertices, RasterEr
         offset,
         per_instance: false,
     };
-    // What the shader numbers primitives by.
+    // Numbers of primitives for the shader.
     let numbers: Vec<u32> = (0..mesh.triangles() as u32).flat_map(|n| [n; 3]).collect();
     let number = |location, buffer, per_instance| Attribute {
         buffer,

@@ -85,7 +85,7 @@ impl Kernel for Avx2 {
                 _mm_fmadd_ps(planes, ray.scale2[a], ray.offset2[a])
             });
             let m = _mm_min_ps(_mm_min_ps(x, y), _mm_min_ps(z, ends));
-            // Exit minus entry: its sign says miss.
+            // Exit minus entry: a negative sign means a miss.
             let gap = _mm_add_ps(_mm_movehl_ps(m, m), m);
             let mask = !_mm_movemask_ps(gap) as u32 & 3;
             let second = _mm_shuffle_ps::<1>(m, m);

@@ -73,7 +73,7 @@ pub(super) fn build_binary(triangles: &[[[f32; 3]; 3]]) -> Bvh2 {
     tree
 }
 
-/// What laying out produces.
+/// Results of the layout.
 #[derive(Default)]
 pub(super) struct Layout {
     pub nodes2: Vec<Node2>,

@@ -1,4 +1,4 @@
-//! What a traversal notes about its work.
+//! Counters of a traversal's work.
 
 use formats::raytrace::Visit;
 

@@ -11,7 +11,7 @@ use crate::ray::PreparedRay;
 /// Box and triangle tests. Methods are inlined into a traversal that was compiled for the
 /// instructions they use.
 pub trait Kernel: Copy + Sized {
-    /// What the kernel keeps of a ray.
+    /// The kernel's data of a ray.
     type Ray: Copy;
     /// Lays a ray out for the kernel.
     fn load(ray: &PreparedRay) -> Self::Ray;

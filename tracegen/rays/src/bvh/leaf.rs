@@ -1,4 +1,4 @@
-//! What a ray does at a leaf: the nearest hit, or any hit.
+//! Leaf tests of a ray: the nearest hit, or any hit.
 
 use super::Bvh;
 use super::count::Counter;

@@ -137,7 +137,7 @@ impl Bvh {
         self
     }
 
-    /// What a trace says about the tree.
+    /// Summary of the tree for a trace.
     #[must_use]
     pub fn summary(&self, traversal: TraversalKind) -> BvhSummary {
         let (nodes, depth, bytes) = match traversal {

@@ -69,7 +69,7 @@ pub struct Node8 {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub struct Block {
-    /// By vertex and axis, one value a triangle; unused lanes repeat a NaN that no test passes.
+    /// By vertex and axis, one value per triangle; unused lanes repeat a NaN that fails every test.
     pub vertices: [[[f32; BLOCK]; 3]; 3],
     /// Primitive number with [`MASKED`] in the top bit.
     pub primitives: [u32; BLOCK],

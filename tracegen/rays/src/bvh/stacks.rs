@@ -64,7 +64,7 @@ impl Stacks {
                     .position(opaque)
                     .map_or(stack.len(), |at| at + 1);
                 let (kept, behind) = stack.split_at(end);
-                // What fits a leaf needs nobody to stand for it.
+                // A stack that fits a leaf needs no representative.
                 let not_built = if kept.len() > most { &kept[1..] } else { &[] };
                 for at in behind.iter().chain(not_built) {
                     left_out[*at as usize] = true;
@@ -148,7 +148,7 @@ mod tests {
 
     const ACROSS: Vertices = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
 
-    /// Transparent but for one triangle.
+    /// Transparent except for one triangle.
     struct Only(u32);
 
     impl AlphaTest for Only {
@@ -183,7 +183,7 @@ mod tests {
         let mut depths = Vec::new();
         for count in [16_000_u32, 64_000] {
             let mut triangles = vec![ACROSS; count as usize];
-            // Not of the stack: a triangle behind it.
+            // Not part of the stack: a triangle behind it.
             triangles.push(ACROSS.map(|[x, y, _]| [x, y, -1.0]));
             let masked = |number| number < count;
             let numbers: Vec<u32> = (0..count).map(|n| n | MASKED).chain([count]).collect();

@@ -1,6 +1,7 @@
 use super::count::Counts;
 use super::*;
 use crate::reference::{TestMesh, brute_force_f32};
+use formats::random::Random;
 use glam::{DVec3, Vec3};
 
 #[test]
@@ -16,16 +17,10 @@ fn both_trees_and_both_kernels_find_what_brute_force_finds() {
             .expect("builds")
             .with_instructions(Instructions::Scalar);
         let mut stack = TraversalStack::default();
-        let mut seed = 1u64;
-        let mut next = || {
-            seed = seed
-                .wrapping_mul(6364136223846793005)
-                .wrapping_add(1442695040888963407);
-            (seed >> 40) as f32 / (1u64 << 24) as f32
-        };
+        let mut random = Random(1);
         let mut hits = 0;
         for i in 0..4000 {
-            let mut point = || Vec3::new(next(), next(), next()) * 24.0 - 12.0;
+            let mut point = || Vec3::from([0; 3].map(|_| random.unit_f32())) * 24.0 - 12.0;
             let origin = point();
             let aim = match i % 3 {
                 0 => point(),

@@ -7,7 +7,7 @@ use super::leaf::{AlphaTest, AnyHit, Closest, LeafTest, RayHit};
 use super::node::Child;
 use crate::ray::{PreparedRay, Ray};
 
-/// Nodes to visit; kept between rays to spare the allocation.
+/// Nodes to visit; kept between rays to save the allocation.
 #[derive(Clone, Debug, Default)]
 pub struct TraversalStack {
     /// Entry distance in the upper half (its bits sort like the number, for it is not negative),
@@ -42,7 +42,7 @@ pub trait Width {
     /// registers then; the eight-wide one is not, and loses by the call.
     const LEAVES_APART: bool;
 
-    /// Visits an inner node: pushes its hit children but for the nearest, which it returns.
+    /// Visits an inner node: pushes its hit children except for the nearest, which it returns.
     fn visit<K: Kernel>(
         bvh: &Bvh,
         ray: &K::Ray,

@@ -1,4 +1,4 @@
-//! What every bay has: walls, roof, lamps, cable trays and walkways.
+//! Parts of every bay: walls, roof, lamps, cable trays and walkways.
 
 use super::parts::{BAY_M, NAVE_M, ROOF_M};
 use super::{ALONG, AROUND, Layout, RAIL_M};

@@ -1,11 +1,11 @@
-//! What is made, carried and stored on the other side of the aisle.
+//! Products and stores on the other side of the aisle.
 
 use super::parts::{BAY_M, NAVE_M};
 use super::{ALONG, LEFT, Layout, RIGHT};
 use crate::noise::{Rng, hash};
 
 impl Layout {
-    /// What is made and stored, on the other side of the aisle.
+    /// Products and stores on the other side of the aisle.
     pub(super) fn east(&mut self, x: f32, z: f32, nave: usize, bay: usize) {
         let kind = |bay: usize| hash(nave as i32, bay as i32 / 4, 97) % 4;
         match kind(bay) {
@@ -103,7 +103,7 @@ impl Layout {
         }
     }
 
-    /// Bins stacked in the hall's last bay until there are as many instances as asked for.
+    /// Bins stacked in the hall's last bay until the requested number of instances is reached.
     pub(super) fn stores(&mut self, naves: usize, bays: usize, instances: usize) {
         let z = bays as f32 * BAY_M / 2.0 - BAY_M + 1.6;
         let (columns, rows) = (26, 9);

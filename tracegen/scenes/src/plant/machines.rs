@@ -1,9 +1,9 @@
 //! What stands in the plant: tanks, pumps, machines, conveyors, racks and their loads, and the
 //! crane, each about its own origin on the floor.
 
-use super::materials::Kit;
+use super::materials::PlantMaterials;
 use super::parts::{NAVE_M, bar};
-use crate::mesh_builder::{MeshBuilder, sharp, smooth};
+use crate::mesh_builder::{MeshBuilder, lathed, sharp, smooth};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -59,8 +59,7 @@ fn boxes(list: &[([f32; 3], [f32; 3])], bevel: f32) -> MeshBuilder {
 
 /// An upright tank of radius 1.1 m from 0.7 m to 4.4 m above the floor.
 fn tank() -> MeshBuilder {
-    let mut m = MeshBuilder::new();
-    m.lathe(
+    lathed(
         &[
             smooth(0.0, 0.62),
             smooth(0.7, 0.7),
@@ -78,14 +77,12 @@ fn tank() -> MeshBuilder {
             sharp(0.0, 4.5),
         ],
         18,
-    );
-    m
+    )
 }
 
 /// A vessel of radius 0.6 m that lies along z from 0 to 4.2 m, its axis at the origin's height.
 fn vessel() -> MeshBuilder {
-    let mut upright = MeshBuilder::new();
-    upright.lathe(
+    let upright = lathed(
         &[
             smooth(0.0, 0.0),
             smooth(0.42, 0.08),
@@ -124,8 +121,7 @@ fn ladder() -> MeshBuilder {
 /// A centrifugal pump: shaft towards +z at 0.35 m, suction along -z, discharge up to 0.95 m.
 fn pump() -> MeshBuilder {
     let mut m = MeshBuilder::new();
-    let mut volute = MeshBuilder::new();
-    volute.lathe(
+    let volute = lathed(
         &[
             sharp(0.09, -0.42),
             sharp(0.16, -0.42),
@@ -143,8 +139,7 @@ fn pump() -> MeshBuilder {
     );
     let place = Affine3A::from_translation(Vec3::Y * 0.35) * Affine3A::from_rotation_x(FRAC_PI_2);
     m.merge(&volute, place);
-    let mut neck = MeshBuilder::new();
-    neck.lathe(
+    let neck = lathed(
         &[
             sharp(0.09, 0.4),
             sharp(0.09, 0.9),
@@ -201,8 +196,7 @@ fn mill() -> MeshBuilder {
     );
     // Spindle head above a table with a vice.
     m.block(vec3(-0.3, 1.5, 0.0), vec3(0.1, 2.1, 0.45), 0.0);
-    let mut spindle = MeshBuilder::new();
-    spindle.lathe(
+    let spindle = lathed(
         &[
             sharp(0.0, 1.1),
             sharp(0.03, 1.1),
@@ -230,8 +224,7 @@ fn press() -> MeshBuilder {
         ],
         0.02,
     );
-    let mut ram = MeshBuilder::new();
-    ram.lathe(&[sharp(0.18, 1.85), sharp(0.18, 2.6)], 12);
+    let ram = lathed(&[sharp(0.18, 1.85), sharp(0.18, 2.6)], 12);
     m.merge(&ram, Affine3A::IDENTITY);
     m
 }
@@ -250,8 +243,7 @@ fn pallet() -> MeshBuilder {
 }
 
 fn drum() -> MeshBuilder {
-    let mut m = MeshBuilder::new();
-    m.lathe(
+    lathed(
         &[
             sharp(0.29, 0.0),
             sharp(0.29, 0.28),
@@ -266,8 +258,7 @@ fn drum() -> MeshBuilder {
             sharp(0.0, 0.86),
         ],
         12,
-    );
-    m
+    )
 }
 
 /// Uprights of a pallet rack with their bracing, 1.1 m deep along x and 4.6 m high.
@@ -321,20 +312,23 @@ fn hook() -> MeshBuilder {
     m
 }
 
-/// Adds all of them.
-pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
-    let mut add = |name: &str, m: MeshBuilder, material| scene.mesh(name, m, material);
+fn tank_leg() -> MeshBuilder {
     let mut leg = MeshBuilder::new();
     leg.block(vec3(-0.06, 0.02, -0.06), vec3(0.06, 1.2, 0.06), 0.0);
     leg.block(vec3(-0.14, 0.0, -0.14), vec3(0.14, 0.02, 0.14), 0.0);
-    let mut signal = MeshBuilder::new();
-    signal.lathe(
+    leg
+}
+
+fn signal() -> MeshBuilder {
+    lathed(
         &[sharp(0.05, 0.0), sharp(0.05, 0.14), smooth(0.0, 0.17)],
         10,
-    );
+    )
+}
+
+fn roller() -> MeshBuilder {
     let mut roller = MeshBuilder::new();
-    let mut turned = MeshBuilder::new();
-    turned.lathe(
+    let turned = lathed(
         &[
             sharp(0.0, 0.0),
             sharp(0.035, 0.0),
@@ -347,6 +341,10 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
         &turned,
         Affine3A::from_translation(Vec3::X * 0.32) * Affine3A::from_rotation_z(FRAC_PI_2),
     );
+    roller
+}
+
+fn panel() -> MeshBuilder {
     let mut panel = MeshBuilder::new();
     panel.surface(1, 1, |s, t| {
         (
@@ -354,15 +352,21 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
             glam::vec2(s, 1.0 - t),
         )
     });
+    panel
+}
+
+fn rope() -> MeshBuilder {
     let mut rope = MeshBuilder::new();
     for (x, z) in [(-0.12, -0.05), (-0.12, 0.05), (0.12, -0.05), (0.12, 0.05)] {
         let at = vec3(x, 0.0, z);
         rope.tube(&[(at, 0.014), (at + Vec3::Y * 3.5, 0.014)], 5);
     }
-    let span = NAVE_M - 1.5;
+    rope
+}
+
+fn wheel() -> MeshBuilder {
     let mut wheel = MeshBuilder::new();
-    let mut tyre = MeshBuilder::new();
-    tyre.lathe(
+    let tyre = lathed(
         &[
             sharp(0.0, -0.05),
             sharp(0.14, -0.05),
@@ -372,15 +376,23 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
         12,
     );
     wheel.merge(&tyre, Affine3A::from_rotation_z(FRAC_PI_2));
-    // Rails and wheels of the trolley ride on the girders' tops at 0.9 m.
-    let girder = boxes(
+    wheel
+}
+
+/// A girder of the crane; rails and wheels of the trolley ride on its top at 0.9 m.
+fn girder() -> MeshBuilder {
+    let span = NAVE_M - 1.5;
+    boxes(
         &[
             ([-span / 2.0, 0.0, -0.22], [span / 2.0, 0.9, 0.22]),
             ([-span / 2.0, 0.9, -0.04], [span / 2.0, 0.96, 0.04]),
         ],
         0.0,
-    );
-    let trolley = boxes(
+    )
+}
+
+fn trolley() -> MeshBuilder {
+    boxes(
         &[
             ([-0.9, 0.2, -1.3], [0.9, 0.4, 1.3]),
             ([-0.5, 0.4, -0.5], [0.5, 1.15, 0.5]),
@@ -391,8 +403,11 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
             ([0.5, 0.0, 0.85], [0.9, 0.2, 1.15]),
         ],
         0.0,
-    );
-    let bench = boxes(
+    )
+}
+
+fn bench() -> MeshBuilder {
+    boxes(
         &[
             ([-1.0, 0.86, -0.4], [1.0, 0.92, 0.4]),
             ([-0.95, 0.0, -0.35], [-0.88, 0.86, 0.35]),
@@ -400,11 +415,16 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
             ([0.3, 0.35, -0.35], [0.88, 0.86, 0.3]),
         ],
         0.0,
-    );
+    )
+}
+
+/// Adds the machines.
+pub(super) fn machines(scene: &mut SceneBuilder, kit: &PlantMaterials) -> Machines {
+    let mut add = |name: &str, m: MeshBuilder, material| scene.mesh(name, m, material);
     Machines {
         tank: add("tank", tank(), kit.stainless),
         vessel: add("vessel", vessel(), kit.pipes[4]),
-        tank_leg: add("tank-leg", leg, kit.frame),
+        tank_leg: add("tank-leg", tank_leg(), kit.frame),
         saddle: add(
             "saddle",
             block([-0.55, 0.0, -0.12], [0.55, 0.7, 0.12], 0.0),
@@ -430,10 +450,10 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
             block([-0.5, 0.0, -0.25], [0.5, 2.0, 0.25], 0.02),
             kit.machine,
         ),
-        panel: add("panel", panel, kit.panel),
-        signal: std::array::from_fn(|i| add("signal", signal.clone(), kit.signals[i])),
+        panel: add("panel", panel(), kit.panel),
+        signal: std::array::from_fn(|i| add("signal", signal(), kit.signals[i])),
         conveyor: add("conveyor", conveyor(), kit.press),
-        roller: add("roller", roller, kit.zinc),
+        roller: add("roller", roller(), kit.zinc),
         upright: add("rack-upright", upright(), kit.rack),
         beam: add(
             "shelf-beam",
@@ -457,21 +477,21 @@ pub(super) fn machines(scene: &mut SceneBuilder, kit: &Kit) -> Machines {
             block([-0.18, 0.0, -0.2], [0.18, 0.26, 0.2], 0.01),
             kit.bin,
         ),
-        bench: add("bench", bench, kit.wood),
-        girder: add("crane-girder", girder, kit.crane),
+        bench: add("bench", bench(), kit.wood),
+        girder: add("crane-girder", girder(), kit.crane),
         end_truck: add(
             "crane-end-truck",
             block([-0.2, -0.1, -1.9], [0.2, 0.35, 1.9], 0.0),
             kit.crane,
         ),
-        trolley: add("crane-trolley", trolley, kit.hazard),
-        rope: add("crane-rope", rope, kit.rubber),
+        trolley: add("crane-trolley", trolley(), kit.hazard),
+        rope: add("crane-rope", rope(), kit.rubber),
         hook: add("crane-hook", hook(), kit.crane),
         cart: add(
             "cart",
             block([-0.45, 0.12, -0.75], [0.45, 0.35, 0.75], 0.03),
             kit.crane,
         ),
-        wheel: add("cart-wheel", wheel, kit.rubber),
+        wheel: add("cart-wheel", wheel(), kit.rubber),
     }
 }

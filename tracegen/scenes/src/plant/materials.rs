@@ -1,4 +1,4 @@
-//! What the plant is made of: concrete, cladding, painted and bare steel, gratings, signs.
+//! Materials of the plant: concrete, cladding, painted and bare steel, gratings, signs.
 
 use crate::noise::{bank, hash_unit, lerp, smoothstep};
 use crate::organic::{metal, planks};
@@ -11,7 +11,7 @@ use std::f32::consts::TAU;
 /// Services that pipes carry, by the colour of their paint.
 pub(super) const SERVICES: usize = 6;
 
-pub(super) struct Kit {
+pub(super) struct PlantMaterials {
     pub(super) floor: MaterialId,
     pub(super) wall: MaterialId,
     pub(super) roof: MaterialId,
@@ -45,144 +45,161 @@ pub(super) struct Kit {
     pub(super) lane: MaterialId,
 }
 
-pub(super) fn kit(scene: &mut SceneBuilder) -> Kit {
-    let mut textured = |name, size, maps, tile_m, surface| {
-        let recipe = Recipe {
-            name,
-            size,
-            maps,
-            tile_m,
-            surface,
-        };
-        let full = maps == Maps::Full;
-        scene.textured(recipe, |m| {
-            if !full {
-                m.roughness = 0.55;
-            }
-        })
-    };
-    use Maps::{ColorNormal, Full};
-    let pipe = |color| painted(rgb(color), 0.25);
-    let pipes = [
-        textured("pipe-water", 256, ColorNormal, 1.5, pipe(0x3f7a4c)),
-        textured("pipe-air", 256, ColorNormal, 1.5, pipe(0x4d7fa8)),
-        textured("pipe-gas", 256, ColorNormal, 1.5, pipe(0xc9a227)),
-        textured("pipe-fire", 256, ColorNormal, 1.5, pipe(0xa5281f)),
-        textured("pipe-steam", 512, Full, 1.5, lagging()),
-        textured("pipe-acid", 256, ColorNormal, 1.5, pipe(0x7d5a86)),
-    ];
-    let floor = textured("floor", 1024, Full, 6.0, concrete());
-    let wall = textured("cladding", 512, ColorNormal, 3.0, cladding(rgb(0xb9c2c6)));
-    let roof = textured("roof-deck", 256, ColorNormal, 3.0, cladding(rgb(0xd8dcdd)));
-    let frame = textured("steel-frame", 512, Full, 2.0, painted(rgb(0x5d7486), 0.35));
-    let crane = textured(
-        "crane-paint",
-        256,
-        ColorNormal,
-        2.0,
-        painted(rgb(0xe0a81c), 0.3),
-    );
-    let zinc = textured("zinc", 256, Full, 1.0, galvanised());
-    let stainless = textured(
-        "stainless",
-        512,
-        Full,
-        2.0,
-        metal(rgb(0xc6cacc), rgb(0x8a7a66), 0.15, 0.32),
-    );
-    let cast_iron = textured("cast-iron", 256, Full, 1.0, painted(rgb(0x3f6f86), 0.5));
-    let hazard = textured("hazard", 256, ColorNormal, 0.8, hazard_stripes());
-    let machine = textured("machine", 512, Full, 2.0, machine_paint(rgb(0xc8ccc4)));
-    let press = textured("press", 512, Full, 2.0, machine_paint(rgb(0x4f7d6a)));
-    let motor = textured("motor", 256, ColorNormal, 1.0, painted(rgb(0x3d5f94), 0.3));
-    let rack = textured(
-        "rack-upright",
-        256,
-        ColorNormal,
-        1.0,
-        perforated(rgb(0x2f5ea8)),
-    );
-    let beam = textured(
-        "rack-beam",
-        256,
-        ColorNormal,
-        1.0,
-        painted(rgb(0xd8701f), 0.25),
-    );
-    let panel = textured("panel", 512, Full, 1.0, control_panel());
-    let sign = textured("sign", 256, Maps::Color, 1.0, warning_sign());
-    let wood = textured(
-        "pallet-wood",
-        256,
-        ColorNormal,
-        1.2,
-        planks([rgb(0xb98d58), rgb(0x8d6638)], 6, 0.85),
-    );
-    let card = textured("cardboard", 256, ColorNormal, 0.8, cardboard());
-    let drum = textured("drum", 256, ColorNormal, 1.2, painted(rgb(0x27589a), 0.3));
-    let bin = textured("bin", 256, Maps::Color, 0.6, painted(rgb(0xb0352a), 0.05));
-    let grating = scene.textured(
-        Recipe {
-            name: "grating",
-            size: 256,
-            maps: Maps::Color,
-            tile_m: 1.0,
-            surface: grating_bars(),
-        },
-        |m| {
-            m.alpha = AlphaMode::Mask(0.5);
-            m.double_sided = true;
-            m.roughness = 0.6;
-        },
-    );
-    let guard = scene.plain("acrylic-guard", rgb(0xb8d8dc), 0.08, |m| {
+/// A textured material; without a roughness map, roughness is 0.55.
+fn textured(
+    scene: &mut SceneBuilder,
+    name: &'static str,
+    size: u32,
+    maps: Maps,
+    tile_m: f32,
+    surface: Surface,
+) -> MaterialId {
+    let recipe = Recipe::new(name, size, maps, tile_m, surface);
+    let full = maps == Maps::Full;
+    scene.textured(recipe, |m| {
+        if !full {
+            m.roughness = 0.55;
+        }
+    })
+}
+
+/// Small parts of painted steel.
+fn small_painted(
+    scene: &mut SceneBuilder,
+    name: &'static str,
+    tile_m: f32,
+    color: u32,
+    wear: f32,
+) -> MaterialId {
+    let surface = painted(rgb(color), wear);
+    textured(scene, name, 256, Maps::ColorNormal, tile_m, surface)
+}
+
+/// Pipes by service.
+fn pipes(scene: &mut SceneBuilder) -> [MaterialId; SERVICES] {
+    [
+        small_painted(scene, "pipe-water", 1.5, 0x3f7a4c, 0.25),
+        small_painted(scene, "pipe-air", 1.5, 0x4d7fa8, 0.25),
+        small_painted(scene, "pipe-gas", 1.5, 0xc9a227, 0.25),
+        small_painted(scene, "pipe-fire", 1.5, 0xa5281f, 0.25),
+        textured(scene, "pipe-steam", 512, Maps::Full, 1.5, lagging()),
+        small_painted(scene, "pipe-acid", 1.5, 0x7d5a86, 0.25),
+    ]
+}
+
+fn grating(scene: &mut SceneBuilder) -> MaterialId {
+    let recipe = Recipe::new("grating", 256, Maps::Color, 1.0, grating_bars());
+    scene.textured(recipe, |m| {
+        m.alpha = AlphaMode::Mask(0.5);
+        m.double_sided = true;
+        m.roughness = 0.6;
+    })
+}
+
+fn guard(scene: &mut SceneBuilder) -> MaterialId {
+    scene.plain("acrylic-guard", rgb(0xb8d8dc), 0.08, |m| {
         m.base_color.w = 0.28;
         m.alpha = AlphaMode::Blend;
         m.double_sided = true;
-    });
-    let mut plain = |name: &str, color: u32, roughness: f32, emissive: Vec3| {
-        scene.plain(name, rgb(color), roughness, |m| m.emissive = emissive)
-    };
+    })
+}
+
+fn plain(
+    scene: &mut SceneBuilder,
+    name: &str,
+    color: u32,
+    roughness: f32,
+    emissive: Vec3,
+) -> MaterialId {
+    scene.plain(name, rgb(color), roughness, |m| m.emissive = emissive)
+}
+
+pub(super) fn kit(scene: &mut SceneBuilder) -> PlantMaterials {
+    use Maps::{Color, ColorNormal, Full};
+    let stainless = metal(rgb(0xc6cacc), rgb(0x8a7a66), 0.15, 0.32);
+    let pallet_wood = planks([rgb(0xb98d58), rgb(0x8d6638)], 6, 0.85);
     let dark = Vec3::ZERO;
-    Kit {
-        floor,
-        wall,
-        roof,
-        frame,
-        crane,
-        zinc,
-        stainless,
-        cast_iron,
-        grating,
-        hazard,
-        pipes,
-        machine,
-        press,
-        motor,
-        rack,
-        beam,
-        panel,
-        sign,
-        wood,
-        card,
-        drum,
-        bin,
-        rubber: plain("rubber", 0x1d1d1f, 0.8, dark),
+    PlantMaterials {
+        pipes: pipes(scene),
+        floor: textured(scene, "floor", 1024, Full, 6.0, concrete()),
+        wall: textured(
+            scene,
+            "cladding",
+            512,
+            ColorNormal,
+            3.0,
+            cladding(rgb(0xb9c2c6)),
+        ),
+        roof: textured(
+            scene,
+            "roof-deck",
+            256,
+            ColorNormal,
+            3.0,
+            cladding(rgb(0xd8dcdd)),
+        ),
+        frame: textured(
+            scene,
+            "steel-frame",
+            512,
+            Full,
+            2.0,
+            painted(rgb(0x5d7486), 0.35),
+        ),
+        crane: small_painted(scene, "crane-paint", 2.0, 0xe0a81c, 0.3),
+        zinc: textured(scene, "zinc", 256, Full, 1.0, galvanised()),
+        stainless: textured(scene, "stainless", 512, Full, 2.0, stainless),
+        cast_iron: textured(
+            scene,
+            "cast-iron",
+            256,
+            Full,
+            1.0,
+            painted(rgb(0x3f6f86), 0.5),
+        ),
+        hazard: textured(scene, "hazard", 256, ColorNormal, 0.8, hazard_stripes()),
+        machine: textured(
+            scene,
+            "machine",
+            512,
+            Full,
+            2.0,
+            machine_paint(rgb(0xc8ccc4)),
+        ),
+        press: textured(scene, "press", 512, Full, 2.0, machine_paint(rgb(0x4f7d6a))),
+        motor: small_painted(scene, "motor", 1.0, 0x3d5f94, 0.3),
+        rack: textured(
+            scene,
+            "rack-upright",
+            256,
+            ColorNormal,
+            1.0,
+            perforated(rgb(0x2f5ea8)),
+        ),
+        beam: small_painted(scene, "rack-beam", 1.0, 0xd8701f, 0.25),
+        panel: textured(scene, "panel", 512, Full, 1.0, control_panel()),
+        sign: textured(scene, "sign", 256, Color, 1.0, warning_sign()),
+        wood: textured(scene, "pallet-wood", 256, ColorNormal, 1.2, pallet_wood),
+        card: textured(scene, "cardboard", 256, ColorNormal, 0.8, cardboard()),
+        drum: small_painted(scene, "drum", 1.2, 0x27589a, 0.3),
+        bin: textured(scene, "bin", 256, Color, 0.6, painted(rgb(0xb0352a), 0.05)),
+        grating: grating(scene),
+        guard: guard(scene),
+        rubber: plain(scene, "rubber", 0x1d1d1f, 0.8, dark),
         cables: [
-            plain("cable-black", 0x232326, 0.6, dark),
-            plain("cable-grey", 0x77797c, 0.6, dark),
-            plain("cable-orange", 0xc8581a, 0.6, dark),
+            plain(scene, "cable-black", 0x232326, 0.6, dark),
+            plain(scene, "cable-grey", 0x77797c, 0.6, dark),
+            plain(scene, "cable-orange", 0xc8581a, 0.6, dark),
         ],
-        valve: plain("handwheel", 0xb02418, 0.4, dark),
-        dial: plain("dial", 0xe9e9e2, 0.3, dark),
-        lamp: plain("lamp", 0xfff4e0, 0.5, vec3(5.0, 4.7, 4.2)),
-        sky_light: plain("sky-light", 0xeaf2f8, 0.5, vec3(1.5, 1.65, 1.8)),
+        valve: plain(scene, "handwheel", 0xb02418, 0.4, dark),
+        dial: plain(scene, "dial", 0xe9e9e2, 0.3, dark),
+        lamp: plain(scene, "lamp", 0xfff4e0, 0.5, vec3(5.0, 4.7, 4.2)),
+        sky_light: plain(scene, "sky-light", 0xeaf2f8, 0.5, vec3(1.5, 1.65, 1.8)),
         signals: [
-            plain("signal-green", 0x1e9c40, 0.4, vec3(0.05, 1.2, 0.25)),
-            plain("signal-red", 0xb02018, 0.4, vec3(1.6, 0.1, 0.06)),
+            plain(scene, "signal-green", 0x1e9c40, 0.4, vec3(0.05, 1.2, 0.25)),
+            plain(scene, "signal-red", 0xb02018, 0.4, vec3(1.6, 0.1, 0.06)),
         ],
-        guard,
-        lane: plain("lane-paint", 0xd9b120, 0.7, dark),
+        lane: plain(scene, "lane-paint", 0xd9b120, 0.7, dark),
     }
 }
 

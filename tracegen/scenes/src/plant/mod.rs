@@ -21,9 +21,9 @@ use parts::{BAY_M, NAVE_M, Parts, parts};
 use scene::{Movement, Scene};
 use std::ops::RangeInclusive;
 
-/// Instances where no number is asked for.
+/// Default number of instances.
 pub const DEFAULT_INSTANCES: u32 = 20_000;
-/// Instances that can be asked for.
+/// Allowed numbers of instances.
 pub const INSTANCES: RangeInclusive<u32> = 20_000..=100_000;
 
 /// Instances that a bay of a nave has at most.
@@ -47,7 +47,7 @@ const UP_LEFT: Mat3 = Mat3::from_cols(Vec3::NEG_Z, Vec3::NEG_X, Vec3::Y);
 /// z to +y, y to +z: a valve in a riser, its wheel to +z.
 const UP_WHEEL_OUT: Mat3 = Mat3::from_cols(Vec3::NEG_X, Vec3::Z, Vec3::Y);
 
-/// What is placed where, before it is sorted.
+/// Placements before they are sorted.
 struct Layout {
     placed: Vec<(usize, Affine3A, Option<usize>)>,
     motions: Vec<Vec<Movement>>,
@@ -55,13 +55,7 @@ struct Layout {
     m: Machines,
 }
 
-/// The scene with its usual number of instances.
-#[must_use]
-pub fn scene() -> Scene {
-    with_instances(DEFAULT_INSTANCES)
-}
-
-/// The scene with exactly so many instances, of [`INSTANCES`].
+/// The scene with exactly this number of instances, within [`INSTANCES`].
 #[must_use]
 pub fn with_instances(instances: u32) -> Scene {
     let instances = instances as usize;
@@ -167,7 +161,7 @@ impl Layout {
         }
     }
 
-    /// The building with all that stands in it, but for the stores.
+    /// The building with its contents, except for the stores.
     fn hall(&mut self, naves: usize, bays: usize) {
         let (x0, z0) = (-(naves as f32) * NAVE_M / 2.0, -(bays as f32) * BAY_M / 2.0);
         for bay in 0..bays {

@@ -1,4 +1,4 @@
-//! What moves: cranes, carts and fans.
+//! Moving parts: cranes, carts and fans.
 
 use super::parts::{BAY_M, NAVE_M};
 use super::{ALONG, Layout, RAIL_M, RIGHT};

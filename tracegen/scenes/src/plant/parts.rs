@@ -2,8 +2,8 @@
 //!
 //! Long parts run along +z from their origin; what stands on the floor has its origin there.
 
-use super::materials::{Kit, SERVICES};
-use crate::mesh_builder::{Frame, Knot, MeshBuilder, sharp, smooth};
+use super::materials::{PlantMaterials, SERVICES};
+use crate::mesh_builder::{Knot, MeshBuilder, SweepFrame, lathed, sharp, smooth};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -18,6 +18,9 @@ pub(super) const ROOF_M: f32 = 13.0;
 pub(super) const RADII_M: [f32; 3] = [0.045, 0.09, 0.19];
 /// Radius of a bend's centre line in radii of its pipe.
 pub(super) const BEND: f32 = 3.0;
+/// Sides and names of pipes by size.
+const SIDES: [usize; 3] = [6, 8, 12];
+const SIZES: [&str; 3] = ["s", "m", "l"];
 
 /// Mesh numbers.
 pub(super) struct Parts {
@@ -68,7 +71,7 @@ fn prism(outline: &[[f32; 2]], length: f32) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     let mut knots: Vec<Knot> = outline.iter().map(|p| sharp(p[0], p[1])).collect();
     knots.extend(knots.first().copied());
-    let frame = |z: f32| Frame {
+    let frame = |z: f32| SweepFrame {
         origin: Vec3::Z * z,
         right: Vec3::X,
         up: Vec3::Y,
@@ -124,14 +127,14 @@ pub(super) fn bar(m: &mut MeshBuilder, from: Vec3, to: Vec3, width: f32) {
     );
 }
 
-fn pipe(radius: f32, length: f32, sides: usize) -> MeshBuilder {
+fn straight_pipe(radius: f32, length: f32, sides: usize) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     m.tube(&[(Vec3::ZERO, radius), (Vec3::Z * length, radius)], sides);
     m
 }
 
 /// From the origin along +z, bent to +y.
-fn elbow(radius: f32, sides: usize) -> MeshBuilder {
+fn bent_pipe(radius: f32, sides: usize) -> MeshBuilder {
     let bend = BEND * radius;
     let mut m = MeshBuilder::new();
     let points: Vec<(Vec3, f32)> = (0..=5)
@@ -148,7 +151,7 @@ fn elbow(radius: f32, sides: usize) -> MeshBuilder {
 fn flange(radius: f32, sides: usize) -> MeshBuilder {
     let (r, h) = (1.55 * radius, 0.22 * radius + 0.012);
     let mut m = MeshBuilder::new();
-    let disc = lathe(
+    let disc = lathed(
         &[sharp(0.0, -h), sharp(r, -h), sharp(r, h), sharp(0.0, h)],
         sides,
     );
@@ -160,8 +163,7 @@ fn flange(radius: f32, sides: usize) -> MeshBuilder {
 fn valve() -> MeshBuilder {
     let r = RADII_M[1];
     let mut m = MeshBuilder::new();
-    let mut body = MeshBuilder::new();
-    body.lathe(
+    let body = lathed(
         &[
             sharp(r * 1.5, -0.2),
             sharp(r * 1.5, -0.17),
@@ -174,8 +176,7 @@ fn valve() -> MeshBuilder {
         10,
     );
     m.merge(&body, Affine3A::from_rotation_x(FRAC_PI_2));
-    let mut bonnet = MeshBuilder::new();
-    bonnet.lathe(
+    let bonnet = lathed(
         &[
             sharp(0.07, 0.08),
             sharp(0.06, 0.22),
@@ -201,11 +202,9 @@ fn valve() -> MeshBuilder {
 /// A pressure gauge on a stem, its face to +z.
 fn gauge() -> MeshBuilder {
     let mut m = MeshBuilder::new();
-    let mut stem = MeshBuilder::new();
-    stem.lathe(&[sharp(0.012, 0.0), sharp(0.012, 0.16)], 6);
+    let stem = lathed(&[sharp(0.012, 0.0), sharp(0.012, 0.16)], 6);
     m.merge(&stem, Affine3A::IDENTITY);
-    let mut can = MeshBuilder::new();
-    can.lathe(
+    let can = lathed(
         &[
             sharp(0.0, -0.02),
             sharp(0.06, -0.02),
@@ -307,8 +306,7 @@ fn fan_blades() -> MeshBuilder {
         blade.block(vec3(0.08, -0.11, -0.01), vec3(0.68, 0.11, 0.01), 0.0);
         m.merge(&blade, turn * Affine3A::from_rotation_x(0.5));
     }
-    let mut hub = MeshBuilder::new();
-    hub.lathe(
+    let hub = lathed(
         &[
             sharp(0.0, -0.08),
             sharp(0.11, -0.08),
@@ -322,8 +320,7 @@ fn fan_blades() -> MeshBuilder {
 }
 
 fn fan_ring() -> MeshBuilder {
-    let mut ring = MeshBuilder::new();
-    ring.lathe(
+    let ring = lathed(
         &[
             sharp(0.74, -0.15),
             sharp(0.82, -0.15),
@@ -339,14 +336,199 @@ fn fan_ring() -> MeshBuilder {
     m
 }
 
-fn lathe(profile: &[Knot], segments: usize) -> MeshBuilder {
-    let mut m = MeshBuilder::new();
-    m.lathe(profile, segments);
-    m
+fn column() -> MeshBuilder {
+    let mut column = upright(&i_beam(0.4, 0.4, 0.03), ROOF_M);
+    column.block(vec3(-0.35, 0.0, -0.35), vec3(0.35, 0.03, 0.35), 0.0);
+    column
 }
 
-/// Adds all parts.
-pub(super) fn parts(scene: &mut SceneBuilder, kit: &Kit) -> Parts {
+fn purlin() -> MeshBuilder {
+    prism(
+        &[[-0.03, 0.0], [0.03, 0.0], [0.03, 0.2], [-0.03, 0.2]],
+        BAY_M,
+    )
+}
+
+fn runway() -> MeshBuilder {
+    let mut runway = prism(&i_beam(0.3, 0.6, 0.025), BAY_M);
+    runway.block(vec3(-0.035, 0.3, 0.0), vec3(0.035, 0.36, BAY_M), 0.0);
+    runway
+}
+
+fn bracket() -> MeshBuilder {
+    let mut bracket = MeshBuilder::new();
+    bracket.block(vec3(0.0, 0.0, -0.15), vec3(0.75, 0.12, 0.15), 0.0);
+    bar(
+        &mut bracket,
+        vec3(0.02, -0.6, 0.0),
+        vec3(0.65, 0.05, 0.0),
+        0.12,
+    );
+    bracket
+}
+
+fn bolt() -> MeshBuilder {
+    lathed(
+        &[
+            sharp(0.024, 0.0),
+            sharp(0.024, 0.03),
+            sharp(0.012, 0.03),
+            sharp(0.012, 0.07),
+            sharp(0.0, 0.07),
+        ],
+        6,
+    )
+}
+
+fn lamp_shade() -> MeshBuilder {
+    lathed(
+        &[
+            sharp(0.32, 0.0),
+            smooth(0.3, 0.1),
+            smooth(0.12, 0.26),
+            sharp(0.1, 0.45),
+            sharp(0.012, 0.45),
+            sharp(0.012, 1.1),
+        ],
+        12,
+    )
+}
+
+fn lamp() -> MeshBuilder {
+    let mut lamp = lathed(&[sharp(0.0, 0.02), sharp(0.29, 0.06)], 12);
+    lamp.orient(|_| Vec3::NEG_Y);
+    lamp
+}
+
+fn pipe_shoe() -> MeshBuilder {
+    block([-0.05, 0.0, -0.1], [0.05, 0.06, 0.1])
+}
+
+fn rack_post() -> MeshBuilder {
+    let mut post = upright(&i_beam(0.22, 0.22, 0.02), 6.3);
+    post.block(vec3(-0.2, 0.0, -0.2), vec3(0.2, 0.02, 0.2), 0.0);
+    post
+}
+
+fn rack_beam() -> MeshBuilder {
+    let mut beam = MeshBuilder::new();
+    beam.merge(
+        &prism(&i_beam(0.14, 0.2, 0.02), 2.4),
+        Affine3A::from_rotation_y(FRAC_PI_2),
+    );
+    beam
+}
+
+fn tray() -> MeshBuilder {
+    let mut tray = MeshBuilder::new();
+    tray.block(vec3(-0.3, -0.01, 0.0), vec3(0.3, 0.0, BAY_M), 0.0);
+    for x in [-0.3, 0.29] {
+        tray.block(vec3(x, 0.0, 0.0), vec3(x + 0.01, 0.1, BAY_M), 0.0);
+    }
+    tray
+}
+
+/// Stands on the floor, 4.4 m below, and reaches past three trays to the duct.
+fn stand() -> MeshBuilder {
+    let mut stand = MeshBuilder::new();
+    for x in [-0.36, 0.32] {
+        stand.block(vec3(x, -4.4, -0.02), vec3(x + 0.04, 1.72, 0.02), 0.0);
+    }
+    for y in [0.0, 0.55, 1.1, 1.76] {
+        stand.block(
+            vec3(-0.36, y - 0.06, -0.025),
+            vec3(0.36, y - 0.01, 0.025),
+            0.0,
+        );
+    }
+    stand
+}
+
+fn duct() -> MeshBuilder {
+    let mut duct = straight_pipe(0.45, BAY_M, 14);
+    for z in [0.02, 2.0, 4.0] {
+        let ring = lathed(
+            &[
+                sharp(0.45, -0.03),
+                sharp(0.48, -0.03),
+                sharp(0.48, 0.03),
+                sharp(0.45, 0.03),
+            ],
+            14,
+        );
+        let place = Affine3A::from_translation(Vec3::Z * z) * Affine3A::from_rotation_x(FRAC_PI_2);
+        duct.merge(&ring, place);
+    }
+    duct
+}
+
+fn diffuser() -> MeshBuilder {
+    lathed(
+        &[
+            sharp(0.0, -0.75),
+            sharp(0.35, -0.75),
+            sharp(0.2, -0.6),
+            sharp(0.2, -0.4),
+        ],
+        12,
+    )
+}
+
+fn sprinkler() -> MeshBuilder {
+    lathed(
+        &[
+            sharp(0.0, -0.2),
+            sharp(0.035, -0.19),
+            sharp(0.012, -0.17),
+            sharp(0.012, 0.0),
+        ],
+        6,
+    )
+}
+
+fn grating() -> MeshBuilder {
+    let mut grating = MeshBuilder::new();
+    grating.quad(
+        vec3(-0.6, 0.0, 2.0),
+        Vec3::X * 1.2,
+        Vec3::Z * -2.0,
+        glam::Vec2::ZERO,
+    );
+    grating
+}
+
+fn stringer() -> MeshBuilder {
+    block([-0.05, -0.22, 0.0], [0.05, -0.01, 2.0])
+}
+
+fn leg() -> MeshBuilder {
+    let mut leg = upright(&i_beam(0.12, 0.12, 0.012), 3.3);
+    leg.block(vec3(-0.12, 0.0, -0.12), vec3(0.12, 0.015, 0.12), 0.0);
+    leg
+}
+
+fn bollard() -> MeshBuilder {
+    lathed(
+        &[
+            sharp(0.1, 0.0),
+            sharp(0.1, 0.9),
+            smooth(0.07, 0.98),
+            smooth(0.0, 1.0),
+        ],
+        10,
+    )
+}
+
+fn sign() -> MeshBuilder {
+    let mut sign = MeshBuilder::new();
+    sign.surface(1, 1, |s, t| {
+        (vec3(s - 0.5, t, 0.0) * 0.5, glam::vec2(s, 1.0 - t))
+    });
+    sign
+}
+
+/// Flat sheets: slab, lane, wall, window, roof deck and sky light.
+fn panels(scene: &mut SceneBuilder, kit: &PlantMaterials) -> [usize; 6] {
     let mut panel = |name: &str, corner: Vec3, right: Vec3, up: Vec3, material| {
         let mut m = MeshBuilder::new();
         m.panel(corner, right, up, 1, 1);
@@ -392,144 +574,37 @@ pub(super) fn parts(scene: &mut SceneBuilder, kit: &Kit) -> Parts {
         Vec3::Z * (b - 1.8),
         kit.sky_light,
     );
+    [slab, lane, wall, window, deck, sky_light]
+}
 
-    let h_outline = i_beam(0.4, 0.4, 0.03);
-    let mut column = upright(&h_outline, ROOF_M);
-    column.block(vec3(-0.35, 0.0, -0.35), vec3(0.35, 0.03, 0.35), 0.0);
-    let purlin = prism(
-        &[[-0.03, 0.0], [0.03, 0.0], [0.03, 0.2], [-0.03, 0.2]],
-        BAY_M,
-    );
-    let mut runway = prism(&i_beam(0.3, 0.6, 0.025), BAY_M);
-    runway.block(vec3(-0.035, 0.3, 0.0), vec3(0.035, 0.36, BAY_M), 0.0);
-    let mut bracket = MeshBuilder::new();
-    bracket.block(vec3(0.0, 0.0, -0.15), vec3(0.75, 0.12, 0.15), 0.0);
-    bar(
-        &mut bracket,
-        vec3(0.02, -0.6, 0.0),
-        vec3(0.65, 0.05, 0.0),
-        0.12,
-    );
-    let bolt = lathe(
-        &[
-            sharp(0.024, 0.0),
-            sharp(0.024, 0.03),
-            sharp(0.012, 0.03),
-            sharp(0.012, 0.07),
-            sharp(0.0, 0.07),
-        ],
-        6,
-    );
-    let shade = lathe(
-        &[
-            sharp(0.32, 0.0),
-            smooth(0.3, 0.1),
-            smooth(0.12, 0.26),
-            sharp(0.1, 0.45),
-            sharp(0.012, 0.45),
-            sharp(0.012, 1.1),
-        ],
-        12,
-    );
-    let mut lamp = lathe(&[sharp(0.0, 0.02), sharp(0.29, 0.06)], 12);
-    lamp.orient(|_| Vec3::NEG_Y);
-
-    let sides = [6, 8, 12];
-    let sizes = ["s", "m", "l"];
+/// Pipes, spools and elbows, each by size and service.
+fn pipes(scene: &mut SceneBuilder, kit: &PlantMaterials) -> [[[usize; SERVICES]; 3]; 3] {
     let services = ["water", "air", "gas", "fire", "steam", "acid"];
     let mut each = |what: &str, mesh: &dyn Fn(usize) -> MeshBuilder| {
         std::array::from_fn(|size| {
             std::array::from_fn(|service| {
-                let name = format!("{what}-{}-{}", sizes[size], services[service]);
+                let name = format!("{what}-{}-{}", SIZES[size], services[service]);
                 scene.mesh(&name, mesh(size), kit.pipes[service])
             })
         })
     };
-    let pipes = each("pipe", &|size| pipe(RADII_M[size], BAY_M, sides[size]));
-    let spool = each("spool", &|size| pipe(RADII_M[size], 2.0, sides[size]));
-    let elbow = each("elbow", &|size| elbow(RADII_M[size], sides[size]));
-    let flange = std::array::from_fn(|size| {
-        let name = format!("flange-{}", sizes[size]);
-        scene.mesh(&name, flange(RADII_M[size], sides[size] + 2), kit.cast_iron)
+    let pipe = each("pipe", &|size| {
+        straight_pipe(RADII_M[size], BAY_M, SIDES[size])
     });
-    let mut post = upright(&i_beam(0.22, 0.22, 0.02), 6.3);
-    post.block(vec3(-0.2, 0.0, -0.2), vec3(0.2, 0.02, 0.2), 0.0);
-    let mut cross = MeshBuilder::new();
-    cross.merge(
-        &prism(&i_beam(0.14, 0.2, 0.02), 2.4),
-        Affine3A::from_rotation_y(FRAC_PI_2),
-    );
-    let mut tray = MeshBuilder::new();
-    tray.block(vec3(-0.3, -0.01, 0.0), vec3(0.3, 0.0, BAY_M), 0.0);
-    for x in [-0.3, 0.29] {
-        tray.block(vec3(x, 0.0, 0.0), vec3(x + 0.01, 0.1, BAY_M), 0.0);
-    }
-    // Stands from the floor, 4.4 m below, past three trays to the duct.
-    let mut stand = MeshBuilder::new();
-    for x in [-0.36, 0.32] {
-        stand.block(vec3(x, -4.4, -0.02), vec3(x + 0.04, 1.72, 0.02), 0.0);
-    }
-    for y in [0.0, 0.55, 1.1, 1.76] {
-        stand.block(
-            vec3(-0.36, y - 0.06, -0.025),
-            vec3(0.36, y - 0.01, 0.025),
-            0.0,
-        );
-    }
-    let mut duct = pipe(0.45, BAY_M, 14);
-    for z in [0.02, 2.0, 4.0] {
-        let mut ring = MeshBuilder::new();
-        ring.lathe(
-            &[
-                sharp(0.45, -0.03),
-                sharp(0.48, -0.03),
-                sharp(0.48, 0.03),
-                sharp(0.45, 0.03),
-            ],
-            14,
-        );
-        let place = Affine3A::from_translation(Vec3::Z * z) * Affine3A::from_rotation_x(FRAC_PI_2);
-        duct.merge(&ring, place);
-    }
-    let diffuser = lathe(
-        &[
-            sharp(0.0, -0.75),
-            sharp(0.35, -0.75),
-            sharp(0.2, -0.6),
-            sharp(0.2, -0.4),
-        ],
-        12,
-    );
-    let sprinkler = lathe(
-        &[
-            sharp(0.0, -0.2),
-            sharp(0.035, -0.19),
-            sharp(0.012, -0.17),
-            sharp(0.012, 0.0),
-        ],
-        6,
-    );
-    let mut grating = MeshBuilder::new();
-    grating.quad(
-        vec3(-0.6, 0.0, 2.0),
-        Vec3::X * 1.2,
-        Vec3::Z * -2.0,
-        glam::Vec2::ZERO,
-    );
-    let mut leg = upright(&i_beam(0.12, 0.12, 0.012), 3.3);
-    leg.block(vec3(-0.12, 0.0, -0.12), vec3(0.12, 0.015, 0.12), 0.0);
-    let bollard = lathe(
-        &[
-            sharp(0.1, 0.0),
-            sharp(0.1, 0.9),
-            smooth(0.07, 0.98),
-            smooth(0.0, 1.0),
-        ],
-        10,
-    );
-    let mut sign = MeshBuilder::new();
-    sign.surface(1, 1, |s, t| {
-        (vec3(s - 0.5, t, 0.0) * 0.5, glam::vec2(s, 1.0 - t))
+    let spool = each("spool", &|size| {
+        straight_pipe(RADII_M[size], 2.0, SIDES[size])
+    });
+    let elbow = each("elbow", &|size| bent_pipe(RADII_M[size], SIDES[size]));
+    [pipe, spool, elbow]
+}
+
+/// Adds the parts.
+pub(super) fn parts(scene: &mut SceneBuilder, kit: &PlantMaterials) -> Parts {
+    let [slab, lane, wall, window, deck, sky_light] = panels(scene, kit);
+    let [pipe, spool, elbow] = pipes(scene, kit);
+    let flange = std::array::from_fn(|size| {
+        let name = format!("flange-{}", SIZES[size]);
+        scene.mesh(&name, flange(RADII_M[size], SIDES[size] + 2), kit.cast_iron)
     });
     let mut add = |name: &str, m: MeshBuilder, material| scene.mesh(name, m, material);
     Parts {
@@ -539,44 +614,36 @@ pub(super) fn parts(scene: &mut SceneBuilder, kit: &Kit) -> Parts {
         window,
         deck,
         sky_light,
-        column: add("column", column, kit.frame),
+        column: add("column", column(), kit.frame),
         truss: add("truss", truss(), kit.frame),
-        purlin: add("purlin", purlin, kit.zinc),
-        runway: add("runway", runway, kit.frame),
-        bracket: add("bracket", bracket, kit.frame),
-        bolt: add("bolt", bolt, kit.zinc),
-        lamp_shade: add("lamp-shade", shade, kit.zinc),
-        lamp: add("lamp", lamp, kit.lamp),
-        pipe: pipes,
+        purlin: add("purlin", purlin(), kit.zinc),
+        runway: add("runway", runway(), kit.frame),
+        bracket: add("bracket", bracket(), kit.frame),
+        bolt: add("bolt", bolt(), kit.zinc),
+        lamp_shade: add("lamp-shade", lamp_shade(), kit.zinc),
+        lamp: add("lamp", lamp(), kit.lamp),
+        pipe,
         spool,
         elbow,
         flange,
-        shoe: add(
-            "pipe-shoe",
-            block([-0.05, 0.0, -0.1], [0.05, 0.06, 0.1]),
-            kit.zinc,
-        ),
+        shoe: add("pipe-shoe", pipe_shoe(), kit.zinc),
         valve: add("valve", valve(), kit.valve),
         gauge: add("gauge", gauge(), kit.dial),
-        rack_post: add("rack-post", post, kit.frame),
-        rack_beam: add("rack-beam", cross, kit.frame),
-        tray: add("tray", tray, kit.zinc),
-        stand: add("stand", stand, kit.zinc),
+        rack_post: add("rack-post", rack_post(), kit.frame),
+        rack_beam: add("rack-beam", rack_beam(), kit.frame),
+        tray: add("tray", tray(), kit.zinc),
+        stand: add("stand", stand(), kit.zinc),
         cable: std::array::from_fn(|i| add("cable", cable(i), kit.cables[i])),
-        duct: add("duct", duct, kit.zinc),
-        diffuser: add("diffuser", diffuser, kit.zinc),
-        sprinkler: add("sprinkler", sprinkler, kit.stainless),
-        grating: add("grating", grating, kit.grating),
-        stringer: add(
-            "stringer",
-            block([-0.05, -0.22, 0.0], [0.05, -0.01, 2.0]),
-            kit.frame,
-        ),
+        duct: add("duct", duct(), kit.zinc),
+        diffuser: add("diffuser", diffuser(), kit.zinc),
+        sprinkler: add("sprinkler", sprinkler(), kit.stainless),
+        grating: add("grating", grating(), kit.grating),
+        stringer: add("stringer", stringer(), kit.frame),
         railing: add("railing", railing(), kit.crane),
-        leg: add("leg", leg, kit.frame),
+        leg: add("leg", leg(), kit.frame),
         stairs: add("stairs", stairs(), kit.frame),
-        bollard: add("bollard", bollard, kit.hazard),
-        sign: add("sign", sign, kit.sign),
+        bollard: add("bollard", bollard(), kit.hazard),
+        sign: add("sign", sign(), kit.sign),
         fan_ring: add("fan-ring", fan_ring(), kit.frame),
         fan_blades: add("fan-blades", fan_blades(), kit.cast_iron),
     }

@@ -1,4 +1,4 @@
-//! Pipes, and the process plant beside the pipe rack.
+//! Pipes, and the process plant next to the pipe rack.
 
 use super::materials::SERVICES;
 use super::parts::{BEND, RADII_M};
@@ -33,7 +33,7 @@ impl Layout {
         }
     }
 
-    /// Process plant beside the pipe rack.
+    /// Process plant next to the pipe rack.
     pub(super) fn west(&mut self, x: f32, z: f32, nave: usize, bay: usize) {
         match hash(nave as i32, bay as i32 / 3, 41) % 4 {
             0 => self.tanks(x, z, nave, bay),

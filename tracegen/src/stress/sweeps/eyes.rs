@@ -1,4 +1,4 @@
-//! Eyes: their distance, their turn, their asymmetry.
+//! Eyes: their distance, rotation and asymmetry.
 
 use super::super::probe::Capture;
 use super::super::shapes::Shape;

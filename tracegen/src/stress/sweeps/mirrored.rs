@@ -1,4 +1,4 @@
-//! A property: a mirrored scene gives mirrored eyes.
+//! A property: a mirrored scene results in mirrored pictures of the eyes.
 
 use super::super::probe::{Capture, Views};
 use super::super::shapes::Shape;
@@ -17,7 +17,7 @@ pub(super) const SWEEP: Sweep = Sweep {
 
 const SIZE_PX: u32 = 128;
 
-/// Eyes exchanged, columns from the other side.
+/// Eyes exchanged, columns mirrored.
 fn mirrored([left, right]: Views) -> Views {
     [right, left].map(|view| {
         let fragments = view.into_iter();

@@ -1,4 +1,4 @@
-//! The sweeps: a file and a row each.
+//! The sweeps: one file and one row each.
 
 mod eyes;
 mod fields;

@@ -1,4 +1,4 @@
-//! How large the scene is.
+//! Scale of the scene.
 
 use super::super::probe::Capture;
 use super::super::shapes::Shape;

@@ -1,4 +1,4 @@
-//! Where the scene stands.
+//! Distance of the scene from the origin.
 
 use super::super::probe::Capture;
 use super::super::shapes::Shape;

@@ -1,4 +1,4 @@
-//! Draws that let through what lies behind.
+//! Transparent draws.
 
 use super::super::probe::Capture;
 use super::super::shapes::Shape;

@@ -1,4 +1,4 @@
-//! Many triangles.
+//! Numbers of triangles.
 
 use super::super::probe::Capture;
 use super::super::shapes::Shape;

@@ -1,4 +1,4 @@
-//! Triangles that are hardly any: degenerate, huge, not numbers, one upon another.
+//! Special triangles: degenerate, huge, not finite, coincident.
 
 use super::super::probe::Capture;
 use super::super::shapes::Shape;

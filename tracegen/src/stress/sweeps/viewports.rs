@@ -19,7 +19,7 @@ fn run(points: &mut Points<'_>) -> anyhow::Result<()> {
     let clutter = points
         .probe
         .write("a.obj", Shape::clutter(300, 10.0).obj(Some("checker")))?;
-    // The reference visits pixel by pixel: one triangle is enough there.
+    // The reference visits every pixel, so one triangle is enough there.
     let few = points
         .probe
         .write("b.obj", Shape::clutter(4, 10.0).obj(Some("checker")))?;

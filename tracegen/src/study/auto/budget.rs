@@ -1,30 +1,30 @@
-//! `--auto`: what a combination of techniques must keep.
+//! `--auto`: the budget of a combination of techniques.
 
 use serde::Serialize;
 use std::fmt;
 use std::str::FromStr;
 
-/// What a combination of techniques must keep in every frame.
+/// A limit that a combination of techniques must keep in every frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Budget {
-    /// Mean FLIP inside the lens of the worse eye, against the baseline's picture, 0 (lossless) to 1.
+    /// Mean FLIP inside the lens of the worse eye, compared with the baseline's picture, 0 (lossless) to 1.
     Flip(f64),
-    /// Pixels between a point's place in the picture and its true place. Only techniques whose
-    /// error is such a shift may be used.
+    /// Distance in pixels between a point's place in the picture and its true place. Only techniques whose
+    /// error is such a shift are allowed.
     Pixels(f64),
-    /// Median time of a frame on the device as it is, milliseconds. The error is as small as that
-    /// allows.
-    BudgetMs(f64),
+    /// Median frame time on this device in milliseconds. The error is minimised within it.
+    #[serde(rename = "budget-ms")]
+    FrameMs(f64),
 }
 
 impl Budget {
-    /// The largest error of a frame, if errors are bounded.
+    /// The largest error of a frame, if the budget limits errors.
     #[must_use]
     pub fn error_limit(self) -> Option<f64> {
         match self {
             Self::Flip(limit) | Self::Pixels(limit) => Some(limit),
-            Self::BudgetMs(_) => None,
+            Self::FrameMs(_) => None,
         }
     }
 }
@@ -44,7 +44,7 @@ impl FromStr for Budget {
         match name {
             "flip" if (0.0..=1.0).contains(&value) => Ok(Self::Flip(value)),
             "pixels" if is_positive => Ok(Self::Pixels(value)),
-            "budget-ms" if is_positive => Ok(Self::BudgetMs(value)),
+            "budget-ms" if is_positive => Ok(Self::FrameMs(value)),
             _ => Err(known()),
         }
     }
@@ -55,7 +55,7 @@ impl fmt::Display for Budget {
         match self {
             Self::Flip(limit) => write!(f, "flip={limit}"),
             Self::Pixels(limit) => write!(f, "pixels={limit}"),
-            Self::BudgetMs(limit) => write!(f, "budget-ms={limit}"),
+            Self::FrameMs(limit) => write!(f, "budget-ms={limit}"),
         }
     }
 }

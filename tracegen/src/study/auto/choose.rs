@@ -1,6 +1,6 @@
-//! From a budget to what every frame of a path is rendered with.
+//! Chooses the techniques of every frame of a path under a budget.
 
-use super::{AutoRecord, Bench, Budget, Held, Known, Objective, hold, search};
+use super::{AutoRecord, Budget, Held, Known, Objective, SearchBench, hold, search};
 use crate::study::measure::{Extent, median_s};
 use crate::study::rows::{Part, Row};
 use crate::study::world::World;
@@ -13,41 +13,40 @@ use std::time::Duration;
 use techniques::{Planner, SettingsError};
 use visibility::Occlusion;
 
-/// Frames of a path that the search sees.
+/// Number of frames that the search measures.
 const SEARCH_FRAMES: u32 = 3;
-/// Times of each of them.
+/// Repetitions of each frame's timing.
 const SEARCH_REPEATS: u32 = 2;
 
-/// What was chosen, and what each frame of the path is rendered with.
+/// The chosen combination, and the techniques of each frame of the path.
 #[derive(Clone, Debug)]
 pub struct Choice {
-    /// What was chosen and why.
+    /// The choice and its reasons.
     pub record: AutoRecord,
-    /// By frame.
+    /// The combination of each frame.
     pub held: Held,
-    /// What this search and those before have seen.
+    /// Results of this search and of earlier ones.
     pub known: Known,
 }
 
 impl Choice {
-    /// Planners of the combinations that the frames are rendered with; frame `i` has
-    /// `[held.of_frame[i]]`.
+    /// Planners of the combinations; frame `i` uses `[held.of_frame[i]]`.
     ///
     /// # Errors
-    /// None that the search has not met.
+    /// A combination that the search has not rendered.
     pub fn planners(&self, world: &World) -> Result<Vec<Planner>, SettingsError> {
         let rows = self.held.chain.iter();
         rows.map(|row| world.planner(&row.settings)).collect()
     }
 }
 
-/// Searches for the best combination of techniques under a budget on a few frames of the path, and
-/// holds it on all of them: where a frame would break an error budget, it falls back to a safer
-/// combination; where the path's median frame breaks a time budget, that is an error. The search sees the frames
-/// of `runs`, which are runs of consecutive ones; `known` is what earlier searches have seen of them.
+/// Searches for the best combination of techniques under a budget on a few frames of the path, then checks it
+/// on all frames. A frame that would break an error budget falls back to a safer combination; a path whose
+/// median frame breaks a time budget is an error. `runs` are the frames of the search, as runs of consecutive
+/// frames; `known` holds the results of earlier searches on them.
 ///
 /// # Errors
-/// A budget that nothing meets, and driver errors.
+/// A budget that no combination keeps, or driver errors.
 pub fn choose(
     world: &mut World,
     backend: &mut Lavapipe,
@@ -65,7 +64,7 @@ pub fn choose(
         options.len() as u64 + 1,
         "techniques alone, and combinations",
     );
-    let mut bench = Bench {
+    let mut bench = SearchBench {
         is_software: backend.is_software(),
         world,
         backend,
@@ -99,7 +98,8 @@ pub fn choose(
     let held = match budget.error_limit() {
         Some(limit) => {
             let tried = &found.tried;
-            // Of the chosen combination; a safer one that takes its place in a frame starts anew.
+            // State of the chosen combination; a safer combination that replaces it in a frame starts without
+            // state.
             let mut memory = Occlusion::default();
             hold(chosen, tried, path_frames, limit, |row, frame| {
                 if row.settings == chosen.settings {
@@ -132,7 +132,7 @@ pub fn choose(
 }
 
 fn check_median(budget: Budget, chosen: &Row, median_s: f64) -> anyhow::Result<()> {
-    if let Budget::BudgetMs(limit_ms) = budget
+    if let Budget::FrameMs(limit_ms) = budget
         && median_s * 1e3 > limit_ms
     {
         bail!(
@@ -144,8 +144,8 @@ fn check_median(budget: Budget, chosen: &Row, median_s: f64) -> anyhow::Result<(
     Ok(())
 }
 
-/// Frames in the middle of equal parts of the path, alternately even and odd: some techniques tell
-/// them apart.
+/// Frames in the middle of equal parts of the path, alternately even and odd, because some techniques treat
+/// even and odd frames differently.
 #[must_use]
 pub fn search_frames(path_frames: u32) -> Vec<u32> {
     let count = SEARCH_FRAMES.min(path_frames);
@@ -161,7 +161,7 @@ pub fn search_frames(path_frames: u32) -> Vec<u32> {
     frames
 }
 
-/// What may be used under a budget.
+/// The techniques that a budget allows.
 fn options(budget: Budget, hmd: &Hmd) -> Vec<Part> {
     let baseline = Row::baseline();
     (Part::options(hmd).into_iter())
@@ -169,7 +169,7 @@ fn options(budget: Budget, hmd: &Hmd) -> Vec<Part> {
         .filter(|part| match budget {
             Budget::Pixels(_) => part.lossless || part.is_shift(),
             Budget::Flip(limit) => part.lossless || limit > 0.0,
-            Budget::BudgetMs(_) => true,
+            Budget::FrameMs(_) => true,
         })
         .collect()
 }
@@ -198,16 +198,16 @@ mod tests {
         };
         assert_eq!(lossy(Budget::Pixels(1.0)), 0);
         assert!(lossy(Budget::Flip(0.01)) > 0);
-        // No error is allowed, so nothing with one is tried.
+        // No error is allowed, so no lossy technique is tried.
         let options = options(Budget::Flip(0.0), &Hmd::default());
         assert!(!options.is_empty() && options.iter().all(|part| part.lossless));
     }
 
     #[test]
-    fn a_path_whose_median_frame_is_too_slow_is_told() {
+    fn a_path_whose_median_frame_is_too_slow_is_an_error() {
         let row = Row::baseline();
-        check_median(Budget::BudgetMs(11.0), &row, 0.010_9).unwrap();
-        let error = check_median(Budget::BudgetMs(11.0), &row, 0.012).unwrap_err();
+        check_median(Budget::FrameMs(11.0), &row, 0.010_9).unwrap();
+        let error = check_median(Budget::FrameMs(11.0), &row, 0.012).unwrap_err();
         assert!(error.to_string().contains("12.0 ms"), "{error}");
     }
 }

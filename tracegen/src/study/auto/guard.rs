@@ -1,21 +1,21 @@
-//! Holds the promise on frames that the search did not see.
+//! Checks an error budget on the frames that the search did not measure.
 
 use super::search::Tried;
 use crate::study::rows::{Part, Row};
 
-/// What every frame of the path is rendered with, and how far off it is.
+/// The combination of every frame of the path, and its error.
 #[derive(Clone, Debug)]
 pub struct Held {
     /// The chosen combination, then safer ones, down to the baseline.
     pub chain: Vec<Row>,
-    /// By frame of the path: position in `chain`.
+    /// Position in `chain` by frame of the path.
     pub of_frame: Vec<usize>,
-    /// By frame of the path: its error, in the budget's unit.
+    /// Error by frame of the path, in the budget's unit.
     pub errors: Vec<f64>,
 }
 
 impl Held {
-    /// Every frame with `row`, unchecked: where no error is bounded.
+    /// Every frame with `row`, unchecked, for budgets without an error limit.
     #[must_use]
     pub fn everywhere(row: Row, frames: usize) -> Self {
         Self {
@@ -25,13 +25,13 @@ impl Held {
         }
     }
 
-    /// What a frame is rendered with.
+    /// The combination of a frame.
     #[must_use]
     pub fn row(&self, frame: u32) -> &Row {
         &self.chain[self.of_frame[frame as usize]]
     }
 
-    /// Frames that the chosen combination was too coarse for.
+    /// Frames in which the chosen combination exceeded the budget.
     #[must_use]
     pub fn fallen_back(&self) -> Vec<u32> {
         let frames = (0_u32..).zip(&self.of_frame);
@@ -42,9 +42,10 @@ impl Held {
     }
 }
 
-/// Gives each of the path's `frames` frames the first combination of `chosen` and safer ones whose
-/// error is at most `limit`. `error` measures a combination's error in a frame; frames come in order.
-/// `tried` tells which technique alone errs how much: the worst is left out first.
+/// Assigns each of the path's `frames` frames the first combination among `chosen` and safer ones whose error
+/// is at most `limit`. `error` measures a combination's error in a frame and is called for frames in
+/// ascending order. `tried` holds the error of each single technique; the one with the largest error is
+/// removed first.
 ///
 /// # Errors
 /// Those of `error`.
@@ -64,7 +65,7 @@ pub fn hold<E>(
     for frame in 0..frames {
         let last = held.chain.len() - 1;
         for (position, row) in held.chain.iter().enumerate() {
-            // The baseline is what errors are measured against.
+            // Errors are measured against the baseline, so its own error is 0.
             let found = if position == last {
                 0.0
             } else {
@@ -80,7 +81,8 @@ pub fn hold<E>(
     Ok(held)
 }
 
-/// `chosen` with one lossy part fewer each time, the one that errs most alone first, then the baseline.
+/// `chosen` with one lossy part removed at a time, the one with the largest error alone first, and finally
+/// the baseline.
 fn chain(chosen: &Row, tried: &[Tried]) -> Vec<Row> {
     let error = |part: &Part| {
         let alone = tried.iter().find(|t| t.row.parts == [part.clone()]);

@@ -19,52 +19,52 @@ use std::time::Duration;
 use techniques::{Planner, Settings};
 use visibility::Occlusion;
 
-/// Times of each frame in the run-off: of so many one is hardly disturbed.
+/// Repetitions per frame in the final comparison: enough that one disturbed repetition hardly matters.
 const RUN_OFF_REPEATS: u32 = 6;
-/// Frames that the search did not see and on which its winner must win, too.
+/// Number of frames, unused by the search, on which its winner must win as well.
 const ELSEWHERE_FRAMES: u32 = 8;
 
-/// Errors and counts of combinations on the frames of a search: the same in every search of these frames, whatever its
-/// objective and budget. By kind of error, then the settings as JSON.
+/// Errors and counts of combinations on the frames of a search, which are the same in every search of these
+/// frames. The key is the kind of error and the settings as JSON.
 pub type Known = BTreeMap<String, Seen>;
 
-/// What the frames of a search show of a combination.
+/// Results of a combination on the frames of a search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Seen {
     /// The worst frame's error.
     pub error: f64,
-    /// All frames together; none where the error was beyond the budget.
+    /// Counts over all frames; none if the error exceeded the budget.
     pub counted: Option<Counted>,
 }
 
-/// Renders combinations and the baseline beside them.
-pub struct Bench<'a> {
+/// Renders combinations, and the baseline alternately.
+pub struct SearchBench<'a> {
     /// Scene and path.
     pub world: &'a mut World,
     /// The device.
     pub backend: &'a mut Lavapipe,
-    /// The device is the processor.
+    /// Whether the device is the processor.
     pub is_software: bool,
-    /// What errors are measured in.
+    /// The unit of errors.
     pub budget: Budget,
-    /// What is made as small as the budget allows.
+    /// The quantity to minimise.
     pub objective: Objective,
-    /// The baseline's cost a frame, once it is counted.
+    /// The baseline's cost per frame, once it is counted.
     pub baseline: Option<f64>,
-    /// Errors and counts on the frames of the search, of this search and those before.
+    /// Errors and counts on the frames of this search and of earlier ones.
     pub known: Known,
-    /// Frames and repeats of the search.
+    /// Frames and repetitions of the search.
     pub extent: Extent,
-    /// The baseline's pictures of the frames of the search, as far as they were asked for.
+    /// The baseline's pictures of the frames of the search that were needed so far.
     pub references: HashMap<u32, Vec<Reference>>,
     /// Planners made so far.
     pub planners: Vec<Arc<Planner>>,
-    /// How far it is.
+    /// Progress of the search.
     pub progress: &'a Progress,
 }
 
-impl Bench<'_> {
-    /// The error of a combination in a frame, in the budget's unit, after the frame before it.
+impl SearchBench<'_> {
+    /// The error of a combination in a frame, in the budget's unit, rendered after the frame before it.
     ///
     /// # Errors
     /// Driver errors.
@@ -74,7 +74,7 @@ impl Bench<'_> {
         self.error_of(&shot, frame)
     }
 
-    /// The error of a frame that was just rendered.
+    /// The error of the frame that was rendered last.
     fn error_of(&mut self, shot: &Shot, frame: u32) -> anyhow::Result<f64> {
         if let Budget::Pixels(_) = self.budget {
             let shift = shot.frame.plan.predicted.disparity_px;
@@ -91,14 +91,14 @@ impl Bench<'_> {
             let error = reference.error(&picture).context("comparing pictures")?;
             worst = worst.max(error.flip_mean);
         }
-        // Those of the whole path would take too much memory.
+        // The pictures of the whole path would take too much memory.
         if self.extent.frames().contains(&frame) {
             self.references.insert(frame, references);
         }
         Ok(worst)
     }
 
-    /// What a frame that was just rendered takes, counted by a capture of it.
+    /// Counts the frame that was rendered last, by a capture of it.
     fn count(&mut self, planner: &Planner, shot: &Shot, frame: u32) -> anyhow::Result<Counted> {
         if shot.reprojection.is_some() {
             return Ok(shot.counted(0));
@@ -109,11 +109,11 @@ impl Bench<'_> {
         let trace = Textrace::from_bytes(tracer.into_writer().into_bytes()?)?;
         Ok(Counted {
             texture_bytes: texture_bytes(&trace)?.iter().sum(),
-            ..shot.counted(captured.fragments)
+            ..shot.counted(captured.counts.fragments)
         })
     }
 
-    /// Error and counts on the frames of the search; no counts where the error is beyond the limit.
+    /// Error and counts on the frames of the search; no counts if the error exceeds the limit.
     fn see(&mut self, row: &Row, limit: f64) -> anyhow::Result<Seen> {
         let planner = self.planner(&row.settings)?;
         let (mut error, mut counted) = (0.0_f64, Counted::default());
@@ -121,7 +121,7 @@ impl Bench<'_> {
         let remembers = row.settings.occlusion || row.settings.half_rate.is_some();
         let rendered: Vec<(u32, bool)> = self.extent.rendered(remembers).collect();
         for (frame, measured) in rendered {
-            // Rendered later, it would take the place of what is captured.
+            // The baseline is rendered first, because it would overwrite the frame that is captured.
             let is_picture = !matches!(self.budget, Budget::Pixels(_));
             if measured && is_picture && !self.references.contains_key(&frame) {
                 let references = self.references(frame)?;
@@ -142,7 +142,7 @@ impl Bench<'_> {
         })
     }
 
-    /// The verdict by counts, of an earlier search where that saw the combination.
+    /// The verdict by counts, from an earlier search if that measured the combination.
     fn judge_by_counts(&mut self, row: &Row) -> anyhow::Result<Verdict> {
         let limit = match (row.lossless, self.budget.error_limit()) {
             (false, Some(limit)) => limit,
@@ -178,14 +178,15 @@ impl Bench<'_> {
         })
     }
 
-    /// Renders frames with each of the rows, the baseline first, in turns: each row's time over the baseline's,
-    /// repeat by repeat.
+    /// Renders frames with each of the rows alternately, the baseline first. Returns each row's time relative
+    /// to the baseline's, by repetition.
     fn race(&mut self, rows: &[&Row], extent: &Extent) -> anyhow::Result<Vec<Spread>> {
         let planners: Vec<Arc<Planner>> = (rows.iter())
             .map(|row| self.planner(&row.settings))
             .collect::<anyhow::Result<_>>()?;
         let mut times = vec![vec![Vec::new(); extent.frames().len()]; rows.len()];
-        // A processor's frame time is its work, which the machine's other work does not change.
+        // Processor time is used for software drivers, because other programs on the machine do not change
+        // it.
         let is_software = self.is_software;
         in_turns(
             self.world,
@@ -215,7 +216,7 @@ impl Bench<'_> {
             .collect())
     }
 
-    /// The planner of some settings: what it has worked out is kept.
+    /// The planner of some settings; planners are kept, with the results that they cache.
     fn planner(&mut self, settings: &Settings) -> anyhow::Result<Arc<Planner>> {
         if let Some(known) = self.planners.iter().find(|p| p.settings() == settings) {
             return Ok(Arc::clone(known));
@@ -242,11 +243,11 @@ impl Bench<'_> {
     }
 }
 
-impl Judge for Bench<'_> {
+impl Judge for SearchBench<'_> {
     type Error = anyhow::Error;
 
     fn can(&self, row: &Row) -> bool {
-        // A frame is made of the one before: frames that are searched alone have none.
+        // A reprojected frame needs the frame before it, and frames that are searched alone have none.
         let alone = self.extent.runs.iter().any(|run| run.len() < 2);
         !(row.settings.half_rate.is_some() && alone) && self.world.check(&row.settings).is_ok()
     }
@@ -318,7 +319,7 @@ impl Judge for Bench<'_> {
     }
 }
 
-/// Frames spread over the path, apart from those of the search and alternately even and odd.
+/// Frames spread over the path, disjoint from those of the search, alternately even and odd.
 fn elsewhere(path_frames: u32, searched: &[u32]) -> Vec<u32> {
     let count = ELSEWHERE_FRAMES.min(path_frames);
     let spread = (0..count).map(|i| {
@@ -331,7 +332,7 @@ fn elsewhere(path_frames: u32, searched: &[u32]) -> Vec<u32> {
     frames
 }
 
-/// A picture without its alpha.
+/// A picture without alpha.
 fn of_rgba(size_px: [u32; 2], rgba: &[u8]) -> Picture {
     Picture {
         size_px,

@@ -1,5 +1,5 @@
-//! Finds the techniques that are worth it: the cheapest combination inside an error budget, or the
-//! least error inside a time budget, and holds the promise on every frame of the path.
+//! Finds the best techniques: the cheapest combination within an error budget, or the least error within a
+//! time budget, checked on every frame of the path.
 
 mod budget;
 mod choose;
@@ -13,10 +13,10 @@ mod search;
 mod tests;
 
 pub use budget::Budget;
-pub use choose::{Choice, choose, search_frames};
+pub use choose::{choose, search_frames};
 pub use guard::{Held, hold};
-pub use judge::{Bench, Known};
+pub use judge::{Known, SearchBench};
 pub use objective::Objective;
 pub use record::AutoRecord;
 pub use schedule::Schedule;
-pub use search::{Cost, Elsewhere, Found, Infeasible, Judge, Spread, Verdict, search};
+use search::search;

@@ -1,14 +1,14 @@
-//! What `--auto` makes as small as a budget allows.
+//! The quantity that `--auto` minimises under a budget.
 
 use crate::study::counted::Counted;
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-/// The cost of a frame that is made as small as the budget allows.
+/// The cost of a frame that is minimised.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
 #[serde(rename_all = "kebab-case")]
 pub enum Objective {
-    /// Frame time on this device, which no two runs measure alike.
+    /// Frame time on this device, which varies between runs.
     Time,
     /// Shaded fragments, counted.
     Fragments,
@@ -42,7 +42,7 @@ impl Objective {
         }
     }
 
-    /// Cost of counts; none where the clock tells it.
+    /// Cost from counts; none for time.
     #[must_use]
     pub fn counted(self, counts: &Counted) -> Option<f64> {
         match self {

@@ -1,4 +1,4 @@
-//! What the manifest says of a search.
+//! The record of a search in the manifest.
 
 use super::budget::Budget;
 use super::guard::Held;
@@ -8,53 +8,53 @@ use super::search::{Elsewhere, Found, Tried, Verdict};
 use serde::{Deserialize, Serialize};
 use techniques::Settings;
 
-/// A search and what it chose.
+/// A search and its choice.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AutoRecord {
-    /// As asked for.
+    /// The budget as given.
     pub budget: String,
-    /// What was made as small as the budget allows.
+    /// The quantity that was minimised.
     pub objective: Objective,
     /// The chosen combination.
     pub chosen: Chosen,
-    /// Why, in words.
+    /// The reason in words.
     pub reason: String,
-    /// Frames that the search saw.
+    /// Frames that the search measured.
     pub search_frames: Vec<u32>,
-    /// Frames on which the promise was held and that the search did not see.
+    /// Frames on which the budget was checked and that the search did not measure.
     pub held_frames: Vec<u32>,
-    /// Frames that are rendered with a safer combination, and with which.
+    /// Frames that are rendered with a safer combination, and that combination.
     pub fallbacks: Vec<Fallback>,
-    /// The choice for every frame, as `tracegen raster --technique` takes it.
+    /// The choice for every frame, in the form of `tracegen raster --technique`.
     pub schedule: String,
-    /// The worst frame's error over the whole path, in the budget's unit.
+    /// The error of the worst frame of the whole path, in the budget's unit.
     pub worst_error: Option<f64>,
     /// The best single technique that keeps the budget.
     pub best_single: Chosen,
-    /// Both on frames that the search did not see, where the path has more than those.
+    /// Both on frames that the search did not measure, if the path has such frames.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub elsewhere: Option<Elsewhere>,
-    /// Everything that the search tried.
+    /// All combinations that the search tried.
     pub tried: Vec<Chosen>,
 }
 
-/// A combination and what the search measured of it.
+/// A combination and its results.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Chosen {
     /// Name.
     pub technique: String,
-    /// What it is captured with.
+    /// Settings of its capture.
     pub settings: Settings,
-    /// What it costs and shows on the frames of the search.
+    /// Cost and error on the frames of the search.
     pub verdict: Verdict,
 }
 
-/// A frame that the chosen combination was too coarse for.
+/// A frame in which the chosen combination exceeded the budget.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fallback {
-    /// Its number.
+    /// Number of the frame.
     pub frame: u32,
-    /// What it is rendered with.
+    /// The combination of the frame.
     pub technique: String,
 }
 
@@ -69,7 +69,7 @@ impl From<&Tried> for Chosen {
 }
 
 impl AutoRecord {
-    /// The record of a search over `search_frames` whose promise is held by `held`.
+    /// The record of a search over `search_frames`; `held` is its checked result.
     #[must_use]
     pub fn new(
         budget: Budget,
@@ -126,7 +126,7 @@ fn reason(budget: Budget, objective: Objective, found: &Found, held: &Held) -> S
     text += &match budget {
         Budget::Flip(_) => ", FLIP".to_owned(),
         Budget::Pixels(limit) => format!(" px; every shift is at most {limit} px by construction"),
-        Budget::BudgetMs(limit) => {
+        Budget::FrameMs(limit) => {
             format!(", FLIP: the least that fits {limit} ms on this device, not scaled")
         }
     };

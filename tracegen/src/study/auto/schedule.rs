@@ -1,4 +1,4 @@
-//! Which combination each frame of a path is rendered with: what `--auto` chose, or a user names.
+//! The combination of each frame of a path, chosen by `--auto` or named by the user.
 
 use super::guard::Held;
 use crate::study::rows::Row;
@@ -9,13 +9,13 @@ use std::str::FromStr;
 /// Combinations by frame: `ROW`, then exceptions, `FRAME:ROW` or `FIRST-LAST:ROW`, joined by commas.
 #[derive(Clone, Debug)]
 pub struct Schedule {
-    /// Where nothing else is said.
+    /// The combination of frames without an exception.
     row: Row,
     exceptions: Vec<(RangeInclusive<u32>, Row)>,
 }
 
 impl Schedule {
-    /// What a search holds its budget with.
+    /// The schedule of a checked search.
     #[must_use]
     pub fn of(held: &Held) -> Self {
         let mut exceptions: Vec<(RangeInclusive<u32>, usize)> = Vec::new();
@@ -42,7 +42,7 @@ impl Schedule {
         (self.exceptions.iter().find(of)).map_or(&self.row, |(_, row)| row)
     }
 
-    /// The last frame that is named.
+    /// The last frame with an exception.
     #[must_use]
     pub fn last_frame(&self) -> Option<u32> {
         let ends = self.exceptions.iter().map(|(frames, _)| *frames.end());

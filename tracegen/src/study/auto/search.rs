@@ -1,14 +1,14 @@
-//! The search: each option alone, then the best with one more, as long as that pays.
+//! The search: each option alone, then the best combination with one more option, as long as the cost falls.
 
 use super::{Budget, Objective};
 use crate::study::rows::{Part, Row, Setting};
 use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 
-/// What a combination costs and shows on the frames of the search.
+/// Cost and error of a combination on the frames of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
-    /// Its cost; none where its error is beyond the budget before anything was counted.
+    /// Its cost; none if its error exceeded the budget before anything was counted.
     pub cost: Option<Cost>,
     /// The worst frame's error, in the budget's unit.
     pub error: f64,
@@ -17,44 +17,45 @@ pub struct Verdict {
 /// A cost in the objective's unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
-    /// Over the baseline's; of times, over those measured beside it, each frame's shortest.
+    /// Relative to the baseline. Times are relative to baseline times measured alternately, by the shortest
+    /// time of each frame.
     pub ratio: f64,
-    /// Of a frame: the mean of counts, the median of times in seconds.
+    /// Per frame: the mean of counts, the median of times in seconds.
     pub per_frame: f64,
-    /// Of a time that was measured several times over.
+    /// The spread of a time that was measured repeatedly.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub spread: Option<Spread>,
 }
 
-/// Whoever renders.
+/// Renders and measures combinations.
 pub trait Judge {
-    /// Its errors.
+    /// Its error type.
     type Error;
 
-    /// Whether a combination can be rendered at all.
+    /// Whether a combination can be rendered.
     fn can(&self, row: &Row) -> bool;
 
     /// Measures a combination that can be rendered.
     ///
     /// # Errors
-    /// Its own.
+    /// Rendering failed.
     fn judge(&mut self, row: &Row) -> Result<Verdict, Self::Error>;
 
-    /// Times the baseline, which comes first, and combinations that were judged, in turns, more often and as
-    /// exactly as can be: the ratio of each one's frame time to the baseline's, with its spread.
+    /// Times the baseline, which is the first, and judged combinations alternately, with more repetitions.
+    /// Returns the ratio of each frame time to the baseline's, with its spread.
     ///
     /// # Errors
-    /// Its own.
+    /// Rendering failed.
     fn run_off(&mut self, rows: &[&Row]) -> Result<Vec<Spread>, Self::Error>;
 
-    /// The same on frames of the path that the search did not see; none where there are none.
+    /// The same on frames of the path that the search did not measure; none if there are no such frames.
     ///
     /// # Errors
-    /// Its own.
+    /// Rendering failed.
     fn run_off_elsewhere(&mut self, rows: &[&Row]) -> Result<Option<Vec<Spread>>, Self::Error>;
 }
 
-/// A ratio of times that was measured several times over.
+/// A ratio of times that was measured repeatedly.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// Lower quartile.
@@ -66,17 +67,17 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// The baseline over itself.
+    /// The baseline relative to itself.
     pub const ONE: Self = Self {
         q1: 1.0,
         median: 1.0,
         q3: 1.0,
     };
 
-    /// Of measured values.
+    /// Quartiles of measured values.
     ///
     /// # Panics
-    /// Where there are none.
+    /// Without values.
     #[must_use]
     pub fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
@@ -93,7 +94,7 @@ impl Spread {
         }
     }
 
-    /// It is less, and not by noise: the quartiles are apart.
+    /// Whether it is less beyond noise: the quartiles do not overlap.
     #[must_use]
     pub fn is_less(&self, other: &Self) -> bool {
         self.q3 < other.q1
@@ -105,24 +106,24 @@ impl Spread {
 pub struct Tried {
     /// The combination.
     pub row: Row,
-    /// What it costs and shows.
+    /// Cost and error.
     pub verdict: Verdict,
 }
 
 impl Tried {
-    /// Its cost over the baseline's; infinite where it was not counted.
+    /// Its cost relative to the baseline's; infinite if it was not counted.
     #[must_use]
     pub fn ratio(&self) -> f64 {
         self.verdict.cost.map_or(f64::INFINITY, |cost| cost.ratio)
     }
 
-    /// Its cost a frame; infinite where it was not counted.
+    /// Its cost per frame; infinite if it was not counted.
     #[must_use]
     pub fn per_frame(&self) -> f64 {
         (self.verdict.cost).map_or(f64::INFINITY, |cost| cost.per_frame)
     }
 
-    /// Counts rank exactly: the least cost, then the least error, then the fewest parts, then the name.
+    /// Ranks by counts, which are exact: the least cost, then the least error, the fewest parts, the name.
     fn by_count(&self, other: &Self) -> Ordering {
         let key = |tried: &Self| [tried.ratio(), tried.verdict.error];
         let [a, b] = [key(self), key(other)];
@@ -133,56 +134,59 @@ impl Tried {
     }
 }
 
-/// What the search found.
+/// Result of the search.
 #[derive(Clone, Debug)]
 pub struct Found {
     /// The best combination.
     pub chosen: Tried,
-    /// The best single technique that keeps the budget; the baseline where none is cheaper.
+    /// The best single technique that keeps the budget; the baseline if none is cheaper.
     pub best_single: Tried,
-    /// Everything tried, in its order.
+    /// All tried combinations, in order.
     pub tried: Vec<Tried>,
-    /// How many were timed again, in turns; their verdicts hold those times.
+    /// Number of combinations that were timed again, alternately; their verdicts hold those times.
     pub finalists: usize,
-    /// The chosen combination and the best single technique on frames that the search did not see.
+    /// The chosen combination and the best single technique on frames that the search did not measure.
     pub elsewhere: Option<Elsewhere>,
 }
 
-/// Frame times over the baseline's on frames that the search did not see, all three in turns.
+/// Frame times relative to the baseline's on frames that the search did not measure, all three timed
+/// alternately.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Elsewhere {
     /// Of the chosen combination.
     pub chosen: Spread,
     /// Of the best single technique.
     pub best_single: Spread,
-    /// What was cheapest on the frames of the search was not here, and something simpler took its place.
+    /// Whether the cheapest combination of the search was not the cheapest on these frames, so that a simpler
+    /// one was chosen.
     pub overruled: bool,
 }
 
-/// Nothing keeps the budget.
+/// No combination keeps the budget.
 #[derive(Clone, Debug)]
 pub struct Infeasible {
-    /// What comes closest.
+    /// The combination that comes closest.
     pub closest: Box<Tried>,
 }
 
-/// A combination must save this share of the frame time to take the place of a simpler one: less
-/// is noise.
+/// A combination must save this share of the frame time to replace a simpler one; smaller differences are
+/// noise.
 const LEAST_GAIN: f64 = 0.01;
-/// Single techniques and combinations that are timed again, each: what one timing tells apart is less
-/// than what separates the best.
+/// Number of single techniques and of combinations that are timed again, because one timing does not resolve
+/// the differences between the best.
 const FINALISTS: usize = 4;
-/// An option that alone costs more than this over the baseline is not tried with others.
+/// An option that alone costs more than this factor of the baseline is not combined with others.
 const WORST_ALONE: f64 = 1.10;
 
-/// The best combination of `options` under a budget: alone, as listed in `combinations`, then the cheapest with one
-/// more option (or another one of the same kind) as long as that saves. Counts decide at once. Times are noisy: the
-/// cheapest few single ones and combinations are timed again, in turns; what wins must win on frames that the search
-/// did not see, too, or gives way to the best single technique, and that to the baseline. Where time is bounded,
-/// errors are added only as long as the time is not kept.
+/// The best combination of `options` under a budget: each alone, then those of `combinations`, then the
+/// cheapest with one more option (or another one of the same kind) as long as the cost falls. Counts are
+/// exact and decide at once. Times are noisy: the cheapest few single techniques and combinations are timed
+/// again, alternately. The winner must also win on frames that the search did not measure; otherwise the best
+/// single technique is chosen, or else the baseline. Under a time budget, lossy options are added only while
+/// the time is too long.
 ///
 /// # Errors
-/// The judge's; the inner result tells where nothing keeps the budget.
+/// Rendering failed; the inner result is an error if no combination keeps the budget.
 pub fn search<J: Judge>(
     judge: &mut J,
     options: &[Part],
@@ -238,7 +242,7 @@ pub fn search<J: Judge>(
                 _ => Ok(Ok(search.least(best_single, fits_error))),
             }
         }
-        Budget::BudgetMs(limit_ms) => {
+        Budget::FrameMs(limit_ms) => {
             let limit_s = limit_ms / 1e3;
             let fits = |tried: &Tried| tried.per_frame() <= limit_s;
             let (free, lossy): (Vec<Tried>, Vec<Tried>) =
@@ -270,7 +274,7 @@ pub fn search<J: Judge>(
 struct Search<'a, J> {
     judge: &'a mut J,
     tried: Vec<Tried>,
-    /// Share of the cost that a combination must save to take the place of another.
+    /// Share of the cost that a combination must save to replace another.
     least_gain: f64,
 }
 
@@ -285,7 +289,8 @@ impl<J: Judge> Search<'_, J> {
         Ok(tried)
     }
 
-    /// Takes each option (cheapest alone first) that makes the best so far cheaper, until none does.
+    /// Adds each option (the cheapest alone first) that makes the best combination cheaper, until no option
+    /// does.
     fn descend(
         &mut self,
         mut best: Tried,
@@ -310,7 +315,7 @@ impl<J: Judge> Search<'_, J> {
         }
     }
 
-    /// The cheapest of what was tried and fits, by counts.
+    /// The cheapest of the tried combinations that keep the budget, by counts.
     fn least(self, best_single: Tried, fits: impl Fn(&Tried) -> bool) -> Found {
         let fitting = self.tried.iter().filter(|tried| fits(tried));
         let chosen = fitting.min_by(|a, b| a.by_count(b));
@@ -327,8 +332,8 @@ impl<J: Judge> Search<'_, J> {
         a.ratio() < b.ratio() * (1.0 - self.least_gain)
     }
 
-    /// Times the cheapest of what was tried and fits again, in turns: the cheapest is chosen, and of those
-    /// that are as cheap the one of fewest parts.
+    /// Times the cheapest of the tried combinations that keep the budget again, alternately. Chooses the
+    /// cheapest, or the one with the fewest parts among equally cheap ones.
     fn decide(mut self, fits: impl Fn(&Tried) -> bool) -> Result<Found, J::Error> {
         let baseline = Row::baseline().settings;
         let mut cheapest: Vec<usize> = (0..self.tried.len())
@@ -339,7 +344,7 @@ impl<J: Judge> Search<'_, J> {
         let (single, combined): (Vec<usize>, Vec<usize>) =
             (cheapest.into_iter()).partition(|&i| self.tried[i].row.parts.len() == 1);
         let few = |all: Vec<usize>| all.into_iter().take(FINALISTS);
-        // What was tried first is the baseline.
+        // The baseline is tried first.
         let finalists: Vec<usize> = [0]
             .into_iter()
             .chain(few(single))
@@ -354,7 +359,8 @@ impl<J: Judge> Search<'_, J> {
                 cost.spread = Some(*spread);
             }
         }
-        // Of those whose quartiles overlap with the fastest's none can be said to be faster: the simplest of them.
+        // Combinations whose quartiles overlap with the fastest one's are equally fast within noise, so the
+        // simplest of them is chosen.
         let best_of = |most_parts: usize| {
             let parts = |i: usize| match self.tried[i].row.settings == baseline {
                 true => 0,
@@ -406,8 +412,8 @@ impl<J: Judge> Search<'_, J> {
         })
     }
 
-    /// Adds the option that keeps the time with the least error, or, where none does, the one that
-    /// comes closest, and goes on from there.
+    /// Adds the option that keeps the time with the least error or, if none does, the option that comes
+    /// closest, and continues from there.
     fn least_error(
         &mut self,
         mut best: Tried,
@@ -454,12 +460,12 @@ impl<J: Judge> Search<'_, J> {
         Ok(best)
     }
 
-    /// `row` with more parts, in the place of those that they exclude; none where nothing changes or
-    /// it cannot be rendered.
+    /// `row` with more parts, which replace the parts that they exclude; none if nothing changes or it cannot
+    /// be rendered.
     fn with(&self, row: &Row, parts: &[Part]) -> Option<Row> {
         let replaced = |part: &&Part| parts.iter().any(|new| new.setting() == part.setting());
         let kept = row.parts.iter().filter(|part| !replaced(part));
-        // The baseline is what is there without any part.
+        // The baseline is the combination without parts.
         let baseline = Row::baseline().parts;
         let kept = kept.filter(|part| !baseline.contains(part)).cloned();
         let all: Vec<Part> = kept.chain(parts.iter().cloned()).collect();

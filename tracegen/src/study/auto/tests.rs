@@ -1,19 +1,19 @@
-//! The search and the guard against made-up costs and errors.
+//! The search and the guard with synthetic costs and errors.
 
-use super::search::Tried;
+use super::search::{Cost, Found, Infeasible, Judge, Spread, Tried, Verdict};
 use super::*;
 use crate::study::rows::{Part, Row};
 use formats::view::Hmd;
 use std::convert::Infallible;
 
-/// Costs and errors of parts multiply and add up.
+/// Costs of parts multiply, their errors add up.
 struct Made<'a> {
     parts: &'a [(&'a str, f64, f64)],
-    /// What a single timing is off by: name and factor.
+    /// Error of a single timing: name and factor.
     noise: &'a [(&'a str, f64)],
-    /// By what costs differ on frames that the search does not see.
+    /// Factor of costs on frames that the search does not measure.
     elsewhere: &'a [(&'a str, f64)],
-    /// Half of the distance of the quartiles of times that are measured again.
+    /// Half of the interquartile range of repeated timings.
     half_spread: f64,
     judged: usize,
     ran_off: Vec<String>,
@@ -144,7 +144,7 @@ fn the_cheapest_inside_the_error_budget_is_chosen_and_no_dearer_than_the_best_si
     assert_eq!(strict.best_single.row.name, "superfrustum");
     let loose = found(COSTS, Budget::Flip(0.03)).unwrap();
     assert_eq!(loose.chosen.row.name, "round-robin");
-    // The whole budget may be used: nothing cheaper inside it is passed over.
+    // The whole budget may be used: no cheaper combination within it exists.
     let tight = found(COSTS, Budget::Flip(0.02)).unwrap();
     assert_eq!(tight.chosen.row.name, "round-robin");
     for found in [strict, loose, tight] {
@@ -165,7 +165,7 @@ fn counts_choose_the_cheapest_of_all_that_fit_however_little_it_saves() {
     assert_eq!(found.chosen.row.parts.len(), 2, "{}", found.chosen.row.name);
     assert!((found.chosen.ratio() - 0.999 * 0.9).abs() < 1e-12);
     assert_eq!(found.best_single.row.name, "hidden-area-mask");
-    // Nothing that was tried and fits is cheaper, or as cheap with less error.
+    // No tried combination that keeps the budget is cheaper, or as cheap with less error.
     for limit in [0.0, 0.01, 0.02, 0.2, 0.3] {
         let found = found_by_counts(&costs, Budget::Flip(limit));
         let of = |tried: &Tried| [tried.ratio(), tried.verdict.error];
@@ -177,7 +177,7 @@ fn counts_choose_the_cheapest_of_all_that_fit_however_little_it_saves() {
             assert!(!(fits && better), "{limit}: {}", tried.row.name);
         }
     }
-    // Of equal costs, the one with less error, then the simpler one.
+    // Among equal costs, the one with less error, then the simpler one.
     let equal = [("far-field", 0.8, 0.02), ("superfrustum", 0.8, 0.0)];
     let found = found_by_counts(&equal[..], Budget::Flip(0.001));
     assert_eq!(found.chosen.row.name, "superfrustum");
@@ -185,7 +185,7 @@ fn counts_choose_the_cheapest_of_all_that_fit_however_little_it_saves() {
 
 #[test]
 fn what_a_single_timing_flatters_does_not_win() {
-    // Round robin is no cheaper than the baseline, and the mask is: one timing says otherwise.
+    // Round robin is no cheaper than the baseline, and the mask is; a single timing says the opposite.
     let costs = [
         ("round-robin", 1.0, 0.0),
         ("conical", 0.97, 0.0),
@@ -197,7 +197,7 @@ fn what_a_single_timing_flatters_does_not_win() {
     assert!((found.best_single.ratio() - 0.9).abs() < 1e-12);
     let cost = Tried::ratio;
     assert!(cost(&found.chosen) <= cost(&found.best_single));
-    // Times and their ratio stay together.
+    // Times and their ratio are consistent.
     assert!((found.best_single.per_frame() - 0.09).abs() < 1e-12);
 }
 
@@ -217,7 +217,7 @@ fn what_wins_on_the_frames_of_the_search_alone_gives_way_to_something_simpler() 
     let (single, here) = won(&[(&combination, 1.2)]);
     assert_eq!(single, "conical");
     assert!(here.overruled && here.chosen == here.best_single);
-    // A single technique that wins the search runs once, not against itself.
+    // If a single technique wins the search, it is not timed against itself.
     let (single, here) = won(&[(&combination, 1.2), ("conical", 0.9)]);
     assert_eq!(single, "conical");
     assert!(here.chosen.median < 0.8 && here.chosen == here.best_single);
@@ -249,7 +249,7 @@ fn times_whose_quartiles_overlap_tell_nothing_apart() {
     assert_eq!((fast.q1, fast.median, fast.q3), (0.8, 0.8, 0.85));
     assert!(fast.is_less(&slow) && !slow.is_less(&fast));
     assert!(!fast.is_less(&between) && !between.is_less(&slow));
-    // 0.5 % are less than the quartiles' distance of 0.8 %: the simpler one, and the baseline where that is it.
+    // 0.5 % are less than the interquartile range of 0.8 %, so the simpler one is chosen.
     let costs = [("conical", 0.8, 0.0), ("hidden-area-mask", 0.993, 0.0)];
     let found = found_in_noise(&costs, &[], &[], Budget::Flip(0.01)).unwrap();
     assert_eq!(found.chosen.row.name, "conical");
@@ -269,7 +269,7 @@ fn where_nothing_saves_time_the_baseline_stays() {
 #[test]
 fn a_time_budget_takes_no_error_it_does_not_need_and_tells_when_nothing_meets_it() {
     // The baseline takes 100 ms.
-    let chosen = |ms| found(COSTS, Budget::BudgetMs(ms)).map(|found| found.chosen.row.name);
+    let chosen = |ms| found(COSTS, Budget::FrameMs(ms)).map(|found| found.chosen.row.name);
     assert_eq!(chosen(95.0).unwrap(), "superfrustum");
     assert_eq!(chosen(80.0).unwrap(), "round-robin");
     let infeasible = chosen(50.0).unwrap_err();
@@ -292,12 +292,12 @@ fn a_frame_that_breaks_the_budget_falls_back_to_what_is_safer() {
 }
 
 #[test]
-fn budgets_are_read_and_nonsense_is_told() {
+fn budgets_are_read_and_nonsense_is_refused() {
     assert_eq!("flip=0.01".parse(), Ok(Budget::Flip(0.01)));
     assert_eq!("flip=0".parse(), Ok(Budget::Flip(0.0)));
     assert_eq!("flip=1".parse(), Ok(Budget::Flip(1.0)));
     assert_eq!("pixels=1".parse(), Ok(Budget::Pixels(1.0)));
-    assert_eq!("budget-ms=11".parse(), Ok(Budget::BudgetMs(11.0)));
+    assert_eq!("budget-ms=11".parse(), Ok(Budget::FrameMs(11.0)));
     for text in [
         "",
         "flip",

@@ -1,4 +1,4 @@
-//! One captured frame of a scene, and what it agrees with.
+//! One captured frame of a scene, and its agreement with the reference.
 
 use super::*;
 
@@ -33,7 +33,7 @@ pub(super) fn views(scene: &Scene, size_px: [u32; 2]) -> FrameViews {
         .remove(0)
 }
 
-/// The baseline of `eyes`.
+/// A planner of `eyes` without techniques.
 pub(super) fn baseline(size_px: [u32; 2], eyes: &[Eye]) -> Planner {
     planner(&Settings::default(), size_px, eyes)
 }
@@ -62,12 +62,12 @@ pub(super) fn job<'a>(
     }
 }
 
-/// Captures one stereo frame; fails, naming the packages, where there is no lavapipe.
+/// Captures one stereo frame; fails with the names of the packages if there is no lavapipe.
 pub(super) fn capture(scene: &Scene, size_px: [u32; 2], cascades: u32, budget: u64) -> Captured {
     try_capture(scene, size_px, cascades, budget, BOTH, true).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// Captures one frame of `eyes`, after a plain picture of it where one is wanted.
+/// Captures one frame of `eyes`, after a plain picture of it if `plain` is set.
 pub(super) fn try_capture(
     scene: &Scene,
     size_px: [u32; 2],
@@ -79,7 +79,7 @@ pub(super) fn try_capture(
     capture_as(&baseline(size_px, eyes), scene, cascades, budget, plain)
 }
 
-/// Captures one frame as planned, after a plain picture of it where one is wanted.
+/// Captures one planned frame, after a plain picture of it if `plain` is set.
 pub(super) fn capture_as(
     planner: &Planner,
     scene: &Scene,
@@ -92,7 +92,56 @@ pub(super) fn capture_as(
     Ok(capture_skipping(planner, scene, cascades, budget, plain, skips, tested)?.0)
 }
 
-/// As [`capture_as`], with the given skips and fragments; also what they left out of the textures and of the frame.
+/// The tables of a trace of one frame.
+fn tables(
+    job: &CaptureJob<'_>,
+    views: &FrameViews,
+    set: &TextureSet,
+    backend: &Lavapipe,
+) -> Tables {
+    let textures = job.draws.textures(set);
+    let (samplers, draw_table) = job.draws.tables(job.scene, set, &textures);
+    Tables {
+        meta: TraceMeta {
+            tool: "test".into(),
+            command_line: Vec::new(),
+            scene: "test".into(),
+            scene_triangles: job.scene.triangle_count(),
+            camera: "test".into(),
+            backend: "lavapipe".into(),
+            driver: backend.driver().into(),
+            seed: 0,
+            hmd: display(job.planner.hmd().eye_size_px),
+            frames: vec![views.clone()],
+            surfaces: Some(job.draws.surfaces(job.fragments)),
+            origin_m: [0.0; 3],
+            techniques: None,
+            program: None,
+        },
+        textures,
+        samplers,
+        draws: draw_table,
+        passes: job.passes(views).unwrap(),
+    }
+}
+
+fn tiles(trace: &Textrace) -> Vec<Vec<Tile>> {
+    let passes = &trace.tables().passes;
+    (0..passes.len())
+        .map(|pass| {
+            (0..passes[pass].tile_count() as usize)
+                .map(|index| {
+                    let mut tile = Tile::default();
+                    trace.decode_tile(pass, index, &mut tile).unwrap();
+                    tile
+                })
+                .collect()
+        })
+        .collect()
+}
+
+/// Like [`capture_as`], with the given skips and fragments; also returns what was skipped of textures and
+/// frame.
 pub(super) fn capture_skipping(
     planner: &Planner,
     scene: &Scene,
@@ -113,34 +162,11 @@ pub(super) fn capture_skipping(
     let finest = job.finest_levels(std::slice::from_ref(&views))?;
     let set = TextureSet::prepare(scene, |image| finest[image], None).unwrap();
     let mut backend = Lavapipe::new(scene, &draws, &set, size_px, budget)?;
-    let textures = draws.textures(&set);
-    let (samplers, draw_table) = draws.tables(scene, &set, &textures);
-    let tables = Tables {
-        meta: TraceMeta {
-            tool: "test".into(),
-            command_line: Vec::new(),
-            scene: "test".into(),
-            scene_triangles: scene.triangle_count(),
-            camera: "test".into(),
-            backend: "lavapipe".into(),
-            driver: backend.driver().into(),
-            seed: 0,
-            hmd: display(size_px),
-            frames: vec![views.clone()],
-            surfaces: Some(draws.surfaces(fragments)),
-            origin_m: [0.0; 3],
-            techniques: None,
-            program: None,
-        },
-        textures,
-        samplers,
-        draws: draw_table,
-        passes: job.passes(&views).unwrap(),
-    };
+    let tables = tables(&job, &views, &set, &backend);
     let frame = job.frame(&views)?;
     job.light(&mut backend, &frame)?;
     let plain = plain.then(|| job.plain_frame(&mut backend, &frame));
-    // Both views at once leave no depth of their own.
+    // Multiview leaves no depth per view.
     let compares = matches!(plain, Some(Ok(_))) && !planner.settings().multiview;
     let depths = compares.then(|| job.depths(&mut backend, &frame).unwrap());
     let mut writer = TextraceWriter::in_memory(&tables).unwrap();
@@ -154,7 +180,7 @@ pub(super) fn capture_skipping(
     if let Some(depths) = &depths {
         assert!(job.depths(&mut backend, &frame)? == *depths, "shaded");
     }
-    // Records do not depend on whether a picture is drawn as well, and depth neither.
+    // Neither records nor depth depend on whether a picture is drawn.
     let unshaded = CaptureJob {
         shaded: false,
         ..job
@@ -175,21 +201,10 @@ pub(super) fn capture_skipping(
         );
     }
     let reader = Textrace::from_bytes(trace.clone()).unwrap();
-    let tiles = (0..tables.passes.len())
-        .map(|pass| {
-            (0..tables.passes[pass].tile_count() as usize)
-                .map(|index| {
-                    let mut tile = Tile::default();
-                    reader.decode_tile(pass, index, &mut tile).unwrap();
-                    tile
-                })
-                .collect()
-        })
-        .collect();
     let captured = Captured {
         trace,
         tables,
-        tiles,
+        tiles: tiles(&reader),
         pictures_match: match plain {
             Some(plain) => Some(plain?.0) == pictures,
             None => true,

@@ -1,4 +1,4 @@
-//! Culling against the truth: everything drawn, on the driver.
+//! Compares culling with the visible draws, found by drawing everything.
 
 use super::{BOTH, BUDGET, checker, display, job, planner, random, scene, textured, triangles};
 use formats::view::{FrameViews, Hmd, Lens};
@@ -20,8 +20,8 @@ use visibility::{Culling, Occlusion};
 
 const SIZE_PX: [u32; 2] = [160, 144];
 
-/// The techniques that lose nothing, whose list is right for the whole picture, and those that are
-/// right inside the lens.
+/// The lossless techniques: those whose list is right for the whole picture, and those whose list is right
+/// inside the lens.
 const PICTURE: [Culling; 2] = [Culling::PER_EYE, Culling::SUPERFRUSTUM];
 const LENS: [Culling; 2] = [Culling::CONICAL, Culling::CONICAL_SUPERFRUSTUM];
 
@@ -33,12 +33,12 @@ fn settings(culling: Culling, occlusion: bool) -> Settings {
     }
 }
 
-/// Frames of the tests' display, culled in some way.
+/// Frames of the tests' display, culled with given settings.
 fn plans(culling: Culling, occlusion: bool) -> Planner {
     planner(&settings(culling, occlusion), SIZE_PX, BOTH)
 }
 
-/// Frames of a head that walks and turns, 3 degrees a frame.
+/// Frames of a head that walks and turns 3 degrees per frame.
 fn frames(camera: &Camera, hmd: &Hmd, count: u32) -> Vec<FrameViews> {
     let pose = |frame: u32| {
         let turn = Quat::from_axis_angle(camera.up, (3.0 * frame as f32).to_radians());
@@ -83,7 +83,7 @@ fn judged(frame: &Frame, truth: &[Vec<Marks>]) -> Vec<Judgement> {
         .collect()
 }
 
-/// Small meshes of every mode, before, behind, beside and around the eyes.
+/// Small meshes of every mode, in front of, behind, beside and around the eyes.
 fn small_scene() -> Scene {
     let materials = vec![
         textured(AlphaMode::Opaque, true),
@@ -152,11 +152,11 @@ fn every_mark_is_seen_in_the_depth_and_unmarked_draws_are_seen_nowhere() {
         };
         let seen = marked(|m| m.picture);
         let all = picture(&every);
-        // Nothing that changes a pixel is unmarked.
+        // Unmarked draws change no pixel.
         assert_eq!(picture(&seen), all);
         let in_lens = marked(|m| m.lens);
         let through_lens = picture(&in_lens);
-        // Without any one of the marked opaque draws, some pixel's depth is another.
+        // Without any one of the marked opaque draws, the depth of some pixel changes.
         let mut depth = |list: &[u32]| {
             let mut view = frame.view(number);
             view.visible = list;
@@ -168,7 +168,7 @@ fn every_mark_is_seen_in_the_depth_and_unmarked_draws_are_seen_nowhere() {
             let others: Vec<u32> = seen.iter().copied().filter(|d| d != draw).collect();
             assert!(depth(&others) != nearest, "draw {draw}");
         }
-        // In the lens: the same of its pixels.
+        // The same for the pixels inside the lens.
         let (fov, lens) = (hmd.fov[number], planner.lenses()[number]);
         let differs = |pixel: &u32| {
             let at = 4 * *pixel as usize..4 * *pixel as usize + 4;
@@ -232,7 +232,7 @@ fn pictures_are_the_same_whatever_is_culled_and_whatever_is_hidden() {
     }
 }
 
-/// A scene with what decides what is visible, and no more: textures of masked materials alone.
+/// A scene with only the textures that decide visibility: those of masked materials.
 fn load(spec: &str) -> Option<Scene> {
     let path = if spec.contains('/') {
         let folder = std::env::var_os("PARALLAX_SCENES").map_or_else(
@@ -241,7 +241,7 @@ fn load(spec: &str) -> Option<Scene> {
         );
         let path = folder.join(spec);
         if !path.exists() {
-            // Not `eprintln`, whose lines libtest keeps: `scripts/test.sh` lists this one.
+            // Not `eprintln`, because libtest captures its lines: `scripts/test.sh` lists this one.
             let _ = writeln!(
                 std::io::stderr(),
                 "SKIPPED: {} is absent (set PARALLAX_SCENES)",
@@ -271,7 +271,7 @@ fn canted() -> Hmd {
     hmd
 }
 
-/// Holds every technique against the truth over a few frames.
+/// Compares every technique with the visible draws over a few frames.
 fn judge_scene(spec: &str, camera: Option<&str>, count: u32) {
     let Some(scene) = load(spec) else { return };
     let mut draws = DrawList::new(&scene, 0).unwrap();
@@ -286,10 +286,10 @@ fn judge_scene(spec: &str, camera: Option<&str>, count: u32) {
     let mut remembered = [(); 2].map(|()| Occlusion::default());
     let mut tests = [0_u64; 2];
     let (mut kept, mut occluded, mut seen) = (0, 0, 0);
-    // Draws that round robin lost, by technique and eye: in the frame before, and in all.
+    // Draws that round robin lost, by technique and eye: in the frame before, and in all frames.
     let mut lost = [(); 4].map(|()| (BTreeSet::new(), 0_usize));
     for views in frames(camera, &hmd, count) {
-        // A second a frame: cranes get somewhere.
+        // One second per frame, so that cranes move far.
         draws.pose(&scene, views.frame as f32);
         backend.pose(&draws);
         let none = plans(Culling::NONE, false);

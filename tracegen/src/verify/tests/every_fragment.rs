@@ -1,4 +1,4 @@
-//! Captures without the depth test: all that the draws cover, and the same picture.
+//! Captures without the depth test: all covered fragments, and the same picture.
 
 use super::*;
 use std::collections::BTreeSet;
@@ -10,7 +10,7 @@ fn capture_all(planner: &Planner, scene: &Scene, cascades: u32, budget: u64) -> 
     captured.unwrap_or_else(|e| panic!("{e}")).0
 }
 
-/// Opaque, masked and blended draws through each other, the nearest in no order.
+/// Opaque, masked and blended draws that intersect, not sorted by depth.
 fn thicket() -> Scene {
     let meshes = (0..6)
         .map(|m| triangles(80, 111 + m as u32, m % 3))

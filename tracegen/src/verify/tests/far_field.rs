@@ -1,4 +1,4 @@
-//! The far field on pictures: no holes, exact near pixels, and shifts as predicted.
+//! Pictures with a far field: no holes, exact near pixels, and shifts as predicted.
 
 use super::*;
 use glam::{DMat4, DVec2, Mat4};
@@ -19,7 +19,7 @@ fn far(split: Split, variant: Variant) -> Settings {
     }
 }
 
-/// A corridor around the camera, closed at its end, and things in it: opaque, masked, blended.
+/// A corridor around the camera, closed at its end, with opaque, masked and blended objects.
 fn corridor() -> Scene {
     let quad = |corners: [[f32; 3]; 4], material| {
         let positions: Vec<Vec3> = corners.map(Vec3::from_array).into();
@@ -101,8 +101,8 @@ fn corridor() -> Scene {
     scene(meshes, materials, vec![checker()])
 }
 
-/// What one frame came to.
-struct Frame {
+/// A rendered frame.
+struct RenderedFrame {
     pictures: Vec<Vec<u8>>,
     /// Depths of each layer; none without a far field.
     depths: Vec<Vec<f32>>,
@@ -115,20 +115,20 @@ fn draw(
     draws: &DrawList,
     planner: &Planner,
     views: &FrameViews,
-) -> Frame {
+) -> RenderedFrame {
     let job = job(scene, draws, planner);
     let frame = job.frame(views).unwrap();
     job.light(backend, &frame).unwrap();
     let (pictures, _) = job.plain_frame(backend, &frame).unwrap();
     let layers = 0..frame.plan.layers.len();
-    Frame {
+    RenderedFrame {
         pictures,
         depths: layers.map(|layer| backend.depths(layer).unwrap()).collect(),
         plan: frame.plan,
     }
 }
 
-fn composition(frame: &Frame, eye: usize) -> &Composition {
+fn composition(frame: &RenderedFrame, eye: usize) -> &Composition {
     match &frame.plan.layers[3 + eye].start {
         Start::Composed(composition) => composition,
         other => panic!("layer {} starts with {other:?}", 3 + eye),
@@ -160,29 +160,32 @@ fn a_corridor_has_no_hole_at_the_split_and_is_exact_before_it() {
             views.frame = number;
             let planner = planner(&far(split, variant), SIZE_PX, BOTH);
             let frame = draw(&mut backend, &scene, &draws, &planner, &views);
-            let told = format!("{split:?} {variant:?}");
-            assert_eq!(frame.plan.layers.len(), 5, "{told}");
+            let variant_name = format!("{split:?} {variant:?}");
+            assert_eq!(frame.plan.layers.len(), 5, "{variant_name}");
             let (mut near, mut beyond) = (0, 0);
             for eye in 0..2 {
                 let end = composition(&frame, eye).end;
                 for (pixel, depth) in frame.depths[3 + eye].iter().enumerate() {
-                    // Everything is closed: the sky shows through a hole alone.
-                    assert!(*depth < 1.0, "{told}: a hole in pixel {pixel} of eye {eye}");
+                    // The corridor is closed, so the sky is only visible through holes.
+                    assert!(
+                        *depth < 1.0,
+                        "{variant_name}: a hole in pixel {pixel} of eye {eye}"
+                    );
                     let is_near = frame.depths[eye][pixel] < end;
                     near += u32::from(is_near);
                     beyond += u32::from(!is_near);
-                    // A blended draw may lie over either.
+                    // A blended draw may cover either.
                     let at = 4 * pixel..4 * pixel + 4;
                     let same = frame.pictures[eye][at.clone()] == whole.pictures[eye][at];
                     assert!(
                         same || !is_near,
-                        "{told}: pixel {pixel} of eye {eye} is near and differs"
+                        "{variant_name}: pixel {pixel} of eye {eye} is near and differs"
                     );
                 }
             }
             assert!(
                 near > 1000 && beyond > 100,
-                "{told}: {near} near, {beyond} beyond"
+                "{variant_name}: {near} near, {beyond} beyond"
             );
         }
     }
@@ -210,7 +213,7 @@ fn eyes_in_one_place_see_through_a_far_field_what_they_see_without() {
             let pairs = frame.pictures[eye]
                 .chunks_exact(4)
                 .zip(whole.pictures[eye].chunks_exact(4));
-            // Another projection rounds otherwise: edges of triangles and of texels may move a little.
+            // Another projection rounds differently, so edges of triangles and of texels may move slightly.
             let off = pairs
                 .filter(|(a, b)| (0..3).any(|c| a[c].abs_diff(b[c]) > 8))
                 .count();
@@ -241,14 +244,14 @@ fn a_far_field_is_captured_as_it_is_drawn_and_records_far_pixels_once() {
     let stereo = capture(&scene, SIZE_PX, 0, BUDGET);
     let fragments = [&captured, &stereo].map(|c| c.counts.fragments);
     assert!(fragments[0] < fragments[1] * 95 / 100, "{fragments:?}");
-    // In regions, too.
+    // In regions as well.
     let small = capture_as(&planner, &scene, 0, 1 << 17, true).unwrap();
     assert!(small.pictures_match && small.work.regions > captured.work.regions);
     assert_eq!(small.trace, captured.trace);
 }
 
-/// Distances between where far points are drawn and where they are, in pixels of the eyes, ascending.
-fn shifts(frame: &Frame, views: &FrameViews, size_px: [u32; 2]) -> Vec<f32> {
+/// Distances between drawn and true positions of far points, in pixels of the eyes, ascending.
+fn shifts(frame: &RenderedFrame, views: &FrameViews, size_px: [u32; 2]) -> Vec<f32> {
     let clip = |view: &formats::view::EyeView| -> DMat4 {
         let [projection, pose] = [view.eye_to_clip, view.world_to_eye];
         Mat4::from_cols_array_2d(&projection).as_dmat4()
@@ -286,7 +289,7 @@ fn shifts(frame: &Frame, views: &FrameViews, size_px: [u32; 2]) -> Vec<f32> {
     shifts
 }
 
-/// Shifts over frames of the walk through a real scene: at the median and the 99th percentile, and the largest.
+/// Shifts over frames of the walk through a real scene: the median, the 99th percentile and the largest.
 fn check_real_scene(file: &str, camera: &str, size_px: [u32; 2], frames: &[u32]) {
     let folder = std::env::var_os("PARALLAX_SCENES").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes"),
@@ -294,7 +297,7 @@ fn check_real_scene(file: &str, camera: &str, size_px: [u32; 2], frames: &[u32])
     );
     let path = folder.join(file);
     if !path.exists() {
-        // Not `eprintln`, whose lines libtest keeps: `scripts/test.sh` lists this one.
+        // Not `eprintln`, because libtest captures its lines: `scripts/test.sh` lists this one.
         let _ = writeln!(
             std::io::stderr(),
             "SKIPPED: {} is absent (set PARALLAX_SCENES)",
@@ -307,7 +310,7 @@ fn check_real_scene(file: &str, camera: &str, size_px: [u32; 2], frames: &[u32])
     let last = frames.iter().max().map_or(0, |last| last + 1);
     let heads = HeadPath::Head.poses(camera, &Moments::first(last)).unwrap();
     let draws = DrawList::new(&scene, 0).unwrap();
-    // Only depth counts here: no texels.
+    // Only depth matters here, so no texels are prepared.
     let set = TextureSet::prepare(&scene, |_| None, None).unwrap();
     let mut backend = Lavapipe::new(&scene, &draws, &set, size_px, BUDGET).unwrap();
     let mut measured = 0;

@@ -1,4 +1,4 @@
-//! Fragments, coordinates and levels against the reference.
+//! Compares fragments, coordinates and levels with the reference.
 
 use super::*;
 
@@ -15,7 +15,7 @@ fn coverage_depth_order_coordinates_and_levels_of_random_triangles_agree_with_th
         textured(AlphaMode::Blend, true),
     ];
     let mut scene = scene(meshes, materials, vec![checker()]);
-    // A mirrored instance turns the winding of the single-sided mesh round.
+    // A mirrored instance reverses the winding of the single-sided mesh.
     scene.instances.push(Instance {
         mesh: 1,
         transform: Affine3A::from_scale_rotation_translation(
@@ -140,7 +140,7 @@ fn vertex_colours_show_and_mask_as_the_same_base_colour_does() {
         ..Mesh::default()
     };
     let color = Vec4::new(0.75, 0.25, 0.5, 0.5);
-    // A cutoff that an opaque texel passes with alpha 1 and not with alpha 0.5.
+    // An opaque texel passes this cutoff with alpha 1 and fails with alpha 0.5.
     for alpha in [AlphaMode::Opaque, AlphaMode::Blend, AlphaMode::Mask(0.75)] {
         let material = |base_color| Material {
             base_color,

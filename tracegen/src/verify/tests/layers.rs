@@ -1,4 +1,4 @@
-//! Frames of several layers: masks, rings, viewports, left-out quads, and the pictures of them.
+//! Frames of several layers: masks, rings, viewports, left-out quads, and their composed pictures.
 
 use super::*;
 use formats::view::TILE_SIZE_PX;
@@ -38,7 +38,7 @@ fn capture_with(settings: &Settings, scene: &Scene, size_px: [u32; 2]) -> Captur
     captured
 }
 
-/// Draws of every kind, all over the picture, glowing in the checker's pattern.
+/// Draws of every kind all over the picture, emitting the checker's pattern.
 fn crowd() -> Scene {
     let meshes = (0..3).map(|m| triangles(120, 91 + m as u32, m)).collect();
     let modes = [AlphaMode::Opaque, AlphaMode::Mask(0.5), AlphaMode::Blend];
@@ -54,7 +54,7 @@ fn crowd() -> Scene {
     scene(meshes, materials, vec![checker()])
 }
 
-/// A wall across the whole view at 5 m, of a material for what lies left of `x` and one for the rest.
+/// A wall across the whole view at 5 m, with one material left of `x` and another one right of it.
 fn wall(x: f32, materials: [Material; 2]) -> Scene {
     let half = |left: f32, right: f32, material| Mesh {
         positions: [[left, -20.0], [right, -20.0], [right, 20.0], [left, 20.0]]
@@ -118,7 +118,7 @@ fn a_masked_picture_has_every_pixel_of_the_lens_and_no_tile_outside_it() {
             let inside = |[x, y]: &[u32; 2]| *x < SIZE_PX[0] && *y < SIZE_PX[1];
             let of_tile =
                 (0..16).flat_map(|y| (0..16).map(move |x| [corner[0] + x, corner[1] + y]));
-            // A pixel around it: the mask keeps pixels of which a corner is shown.
+            // The margin is one pixel, because the mask keeps pixels with a visible corner.
             let around = (0..18).flat_map(|y| {
                 (0..18).map(move |x| [(corner[0] + x).max(1) - 1, (corner[1] + y).max(1) - 1])
             });
@@ -181,7 +181,7 @@ fn tiles_at_full_rate_have_the_baselines_pixels() {
     let whole = capture(&scene, SIZE_PX, 0, BUDGET);
     for kind in KINDS {
         let foveated = capture_with(&foveated(kind, [20.0, 30.0, 40.0, 45.0]), &scene, SIZE_PX);
-        // The tiles in the middle, of 5 degrees each way.
+        // The tiles in the middle, 5 degrees to each side.
         let middle = |[x, y]: [u32; 2]| x.abs_diff(100) <= 8 && y.abs_diff(68) <= 4;
         for (a, b) in whole.pictures.iter().zip(&foveated.pictures) {
             for at in pixels().filter(|at| middle(*at)) {
@@ -219,7 +219,7 @@ fn an_edge_between_coarse_pixels_is_interpolated_in_linear_light_and_in_its_plac
         let (sharp, smooth) = (row(&whole), row(&coarse));
         let bright = |row: &[u8]| row.iter().take_while(|v| linear(**v) > 0.3).count();
         let edge = bright(&sharp);
-        // Coarse pixels whose middle is bright.
+        // Coarse pixels whose centre is bright.
         let first_dark = (edge + 1) / 4 * 4;
         let (light, dark) = (linear(smooth[edge - 12]), linear(smooth[edge + 12]));
         assert!(light > 0.5 && dark < 0.05, "{light} {dark}");
@@ -243,7 +243,7 @@ fn an_edge_between_coarse_pixels_is_interpolated_in_linear_light_and_in_its_plac
 
 #[test]
 fn left_out_quads_are_filled_so_that_a_slope_stays_a_slope() {
-    // Lit by the distance to the eye alone: smooth all over.
+    // Lit only by the distance to the eye, so the light is smooth everywhere.
     let scene = wall(0.3, [Material::default(), Material::default()]);
     let whole = capture(&scene, SIZE_PX, 0, BUDGET);
     for kind in KINDS {
@@ -280,7 +280,7 @@ fn layers_captured_in_parts_give_the_same_trace() {
 
 #[test]
 fn a_lens_matched_picture_is_the_baselines_but_for_its_resolution() {
-    // Light that changes slowly: what a coarser grid interpolates is what it was.
+    // Light that changes slowly, so that interpolation from a coarser grid is nearly exact.
     let scene = wall(20.0, [glowing(0.4), glowing(0.4)]);
     let whole = capture(&scene, SIZE_PX, 0, BUDGET);
     let matched = capture_with(
@@ -297,7 +297,7 @@ fn a_lens_matched_picture_is_the_baselines_but_for_its_resolution() {
             );
         }
     }
-    // An edge stays where it is: at most a coarse pixel off.
+    // The edge stays at its place within one coarse pixel.
     let edge = wall(0.3, [glowing(0.9), glowing(0.0)]);
     let (whole, matched) = (
         capture(&edge, SIZE_PX, 0, BUDGET),
@@ -325,7 +325,7 @@ fn what_is_beyond_the_cull_distance_is_not_there() {
         .iter_mut()
         .for_each(|at| at.z = -20.0);
     let mut only = both.clone();
-    // The nearer half alone.
+    // Only the nearer half.
     only.instances.remove(0);
     let culled = |limit| Settings {
         distance_cull: Some(limit),
@@ -337,7 +337,7 @@ fn what_is_beyond_the_cull_distance_is_not_there() {
     assert_eq!(far.pictures, expected.pictures);
     assert_eq!(far.counts.fragments, expected.counts.fragments);
     assert!(far.counts.fragments < all.counts.fragments);
-    // Both halves are larger than a pixel, and none is larger than the world.
+    // Both halves are larger than a pixel, and neither is larger than the scene.
     let kept = capture_with(&culled(DistanceCull::Pixels(1.0)), &both, SIZE_PX);
     assert_eq!(kept.pictures, all.pictures);
 }

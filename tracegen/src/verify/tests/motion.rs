@@ -1,4 +1,4 @@
-//! Draws that move, against a scene that stands where they have gone.
+//! Compares moving draws with a static scene in the same pose.
 
 use super::{BOTH, BUDGET, SIZE_PX, baseline, job, many_instances, views};
 use glam::Vec3;
@@ -9,7 +9,7 @@ use raster::lavapipe::Lavapipe;
 use scene::{AlphaMode, Motion, Movement, Scene};
 use textures::TextureSet;
 
-/// Every third instance slides, every seventh turns.
+/// Every third instance slides, every seventh rotates.
 fn moving_scene() -> Scene {
     let mut scene = many_instances(AlphaMode::Opaque);
     scene.light_if_unlit();
@@ -57,7 +57,7 @@ fn what_has_moved_looks_as_if_it_had_always_stood_there() {
         let before = moved.work().bytes_uploaded;
         draws.pose(&scene, time_s);
         moved.pose(&draws);
-        // 128 bytes a draw that moves, and nothing for the others.
+        // 128 bytes per moving draw, and none for the others.
         let uploaded = moved.work().bytes_uploaded - before;
         assert_eq!(uploaded, 128 * draws.moving.len() as u64);
         let mut there = scene.clone();

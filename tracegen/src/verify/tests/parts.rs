@@ -1,16 +1,11 @@
-//! What the tests' scenes are made of: coverage and alpha are known.
+//! Parts of the tests' scenes, with known coverage and alpha.
 
 use super::*;
 
-/// Deterministic numbers in 0..1.
+/// Reproducible numbers from 0 to 1.
 pub(super) fn random(seed: u32) -> impl FnMut() -> f32 {
-    let mut state = u64::from(seed) * 2 + 1;
-    move || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / (1 << 24) as f32
-    }
+    let mut random = formats::random::Random(u64::from(seed));
+    move || random.unit_f32()
 }
 
 /// An image of 4x4-texel cells, which BC1 holds exactly; `opaque` decides each cell's alpha.
@@ -29,7 +24,7 @@ pub(super) fn cells(cells: u32, opaque: impl Fn(u32, u32) -> bool) -> Image {
     Image::from_texels("cells", [edge; 2], ColorSpace::Srgb, rgba)
 }
 
-/// Triangles of random size, place and slant in front of the camera, some across the near plane.
+/// Triangles of random size, position and slant in front of the camera, some across the near plane.
 pub(super) fn triangles(count: usize, seed: u32, material: usize) -> Mesh {
     let mut next = random(seed);
     let mut mesh = Mesh {

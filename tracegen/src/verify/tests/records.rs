@@ -1,4 +1,4 @@
-//! How draws, regions and views become records: the same whatever the way.
+//! Records do not depend on how draws are grouped into calls, regions and views.
 
 use super::*;
 
@@ -49,7 +49,7 @@ fn a_region_after_an_overflow_draws_only_what_may_touch_it() {
     );
     assert_eq!(whole.work.regions, 2);
     assert!(regions >= 6, "{regions}");
-    // One view's draws in each region would be 96.
+    // Drawing one view's draws in each region would take 96.
     assert!(
         draws < 96 * regions * 3 / 4,
         "{draws} draws in {regions} regions"
@@ -82,13 +82,13 @@ fn work_that_a_frame_does_not_need_is_not_done() {
     let scene = scene(meshes, materials, vec![checker()]);
     let capture = |plain| try_capture(&scene, SIZE_PX, 2, BUDGET, BOTH, plain).unwrap();
     let (with, without) = (capture(true).work, capture(false).work);
-    // Rendered once for the plain pictures and the captured ones: one a cascade that is looked up,
-    // and nothing that is seen looks up the farther one.
+    // Rendered once for the plain and the captured pictures: one per cascade that is looked up; no visible
+    // surface looks up the farther one.
     assert_eq!(with.shadow_maps, 1);
-    // The textures' state and that of the slots without a texture.
+    // State of the textures, and of the slots without a texture.
     assert_eq!(with.samplers, 2);
-    // Two casters, the opaque draw, the masked draw's records and its colour; the plain opaque
-    // draw is a pipeline of its own.
+    // Two casters, the opaque draw, the masked draw's records and its colour; the plain opaque draw has its
+    // own pipeline.
     assert_eq!([without.pipelines, with.pipelines], [5, 6]);
     let captured = capture(false);
     assert!(captured.trace == capture(true).trace);
@@ -143,7 +143,7 @@ fn the_records_of_each_pixel_are_as_many_as_an_additive_counter_sees() {
 #[test]
 fn untextured_draws_record_their_quads_without_a_group() {
     let scene = scene(
-        vec![triangles(50, 41, 0)],
+        vec![triangles(200, 41, 0)],
         vec![Material::default()],
         Vec::new(),
     );

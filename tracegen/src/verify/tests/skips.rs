@@ -1,4 +1,4 @@
-//! What nobody sees is left out, and nobody can tell.
+//! Skipping invisible work changes no output.
 
 use super::*;
 use scene::Light;

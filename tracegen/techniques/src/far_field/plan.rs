@@ -3,7 +3,7 @@
 use super::FarView;
 use crate::Mask;
 use crate::layer::{Layer, Predicted, Stage};
-use crate::plan::{FramePlan, Picture};
+use crate::plan::{FramePlan, PictureSource};
 use crate::start::{Composition, Opening, Start};
 use formats::view::{Eye, FrameViews};
 use std::sync::Arc;
@@ -65,7 +65,7 @@ pub(crate) fn plan(
             over(Eye::Left),
             over(Eye::Right),
         ],
-        pictures: PICTURES.map(Picture::Layer).to_vec(),
+        pictures: PICTURES.map(PictureSource::Layer).to_vec(),
         predicted: Predicted {
             disparity_px: Some(far.worst_shift_px),
             split_m: Some(far.split_m),

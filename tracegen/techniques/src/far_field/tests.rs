@@ -1,27 +1,15 @@
 //! The closed forms against brute force: random points projected into both eyes and the camera between.
 
 use super::*;
+use formats::random::Random;
 use formats::view::FovTangents;
 use glam::{EulerRot, Vec2, Vec3};
 
-/// Numbers from a seed.
-struct Random(u64);
-
-impl Random {
-    fn unit(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
+fn between(random: &mut Random, low: f64, high: f64) -> f64 {
+    low + (high - low) * random.unit_f64()
 }
 
-/// Eyes `ipd_m` apart, turned outwards, of a head somewhere; `fov` is the left eye's.
+/// Eyes `ipd_m` apart, turned outwards, for a head at some pose; `fov` is the left eye's.
 fn eyes(fov: FovTangents, ipd_m: f64, cant_deg: f64, far_m: f64) -> [EyeView; 2] {
     let head = DMat4::from_translation(DVec3::new(3.0, 1.7, -2.0))
         * DMat4::from_euler(EulerRot::YXZ, 0.6, -0.2, 0.1);
@@ -76,8 +64,8 @@ fn displays() -> Vec<[EyeView; 2]> {
 /// A point of an eye's picture between the split and the far plane, and its pixel.
 fn point_beyond(stereo: &Stereo, eye: usize, split_m: f64, random: &mut Random) -> (DVec3, DVec2) {
     let e = &stereo.eyes[eye];
-    let ndc = DVec2::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0));
-    let depth = 1.0 / random.between(1.0 / (0.99 * e.far_m), 1.0 / split_m);
+    let ndc = DVec2::new(between(random, -1.0, 1.0), between(random, -1.0, 1.0));
+    let depth = 1.0 / between(random, 1.0 / (0.99 * e.far_m), 1.0 / split_m);
     let point = e
         .world_from_eye
         .transform_point3(e.tangents(ndc).extend(-1.0) * depth);
@@ -122,7 +110,7 @@ fn no_point_beyond_the_split_is_off_by_more_than_predicted_and_some_nearly_so() 
                     }
                     let bound = f64::from(budget_px);
                     let told = format!("display {display} {variant:?} {budget_px} px: {worst}");
-                    // Matrices of 32 bits are right to a hundredth of a pixel.
+                    // Matrices of 32 bits are accurate to a hundredth of a pixel.
                     assert!(worst <= bound + 0.01, "{told}");
                     // The far plane ends the depth shift before infinity.
                     assert!(
@@ -147,7 +135,7 @@ fn parallel_eyes_have_the_split_and_the_shift_of_the_published_formulae() {
             (split_m / expected - 1.0).abs() < 1e-4,
             "{split_m} {expected}"
         );
-        // From an eye instead of the middle, twice as far.
+        // From an eye instead of the midpoint, twice as far.
         let alternate = Stereo::new(&pair, [1024, 1024], Variant::AlternateEye, 1);
         assert!((alternate.split_m(budget_px) / expected - 2.0).abs() < 2e-4);
     }

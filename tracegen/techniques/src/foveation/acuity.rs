@@ -1,4 +1,4 @@
-//! The coarsest shading that the eye cannot tell from the display's own pixels.
+//! The coarsest shading that the eye cannot distinguish from the display's own pixels.
 //!
 //! The smallest cycle that the eye resolves grows linearly with the angle e from the gaze (Guenter et al.,
 //! Foveated 3D graphics, 2012): `m e + 1/48` degrees, m being 1.32 to 1.65 minutes of arc per degree. Shading

@@ -17,7 +17,8 @@ use std::sync::Arc;
 /// `(1 - 2/(1 + A) + 1/(1 + 2A)) / (2 A^2)` = 39.7 % of its pixels.
 pub const WARP: f64 = 0.4;
 
-/// A layer a quadrant. Viewports end at tiles, and have a border of a pixel beyond the cuts, from which the picture's pixels are interpolated.
+/// One layer per quadrant. Viewports end at tiles, and have a border of one pixel beyond the cuts, for the
+/// interpolation of the picture's pixels.
 pub(crate) fn patches(picture: &EyePicture) -> EyePatches {
     let ahead = picture.ahead_px();
     let cut = [0, 1].map(|axis: usize| {
@@ -50,7 +51,7 @@ pub(crate) fn patches(picture: &EyePicture) -> EyePatches {
     }
 }
 
-/// The layer of a quadrant, and the pixels that it has to shade but for its border.
+/// The layer of a quadrant, and the pixels to be shaded without its border.
 fn quadrant(
     picture: &EyePicture,
     number: u16,
@@ -61,7 +62,7 @@ fn quadrant(
     let length = [0, 1].map(|axis| f64::from(high[axis] - low[axis]));
     let inner = length.map(|length| (length / (1.0 + WARP)).ceil() as u32);
     let size_px = inner.map(|inner| inner + 1);
-    // The cut in pixels of the layer: behind a border of one, or before it.
+    // The cut in pixels of the layer: after a border of one pixel, or before it.
     let seam = [0, 1].map(|axis| {
         if after[axis] {
             1.0
@@ -148,7 +149,7 @@ mod tests {
         let drawn: u64 = (made.patches.iter())
             .map(|patch| patch.mask.as_ref().unwrap().count())
             .sum();
-        // Borders are a pixel wide.
+        // Borders are one pixel wide.
         let border = drawn as f64 / whole - share;
         assert!((0.0..0.01).contains(&border), "{border}");
     }

@@ -1,4 +1,4 @@
-//! Foveation: coarser away from the gaze. One technique a file.
+//! Foveation: coarser shading away from the gaze. One technique per file.
 //!
 //! Each renders layers of its own sizes, so that what a coarse pixel samples is what it would sample on a
 //! display with fewer pixels: its derivatives span more texels, and coarser mip levels follow by themselves.

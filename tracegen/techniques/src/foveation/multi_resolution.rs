@@ -10,7 +10,7 @@ use std::sync::Arc;
 /// Part of the picture's width and height that keeps its resolution. With the rest at half of it,
 /// (0.4 + 0.6 / 2)^2 = 49 % of the pixels are shaded.
 const CENTER_SHARE: f64 = 0.4;
-/// Columns or rows of the picture that a pixel of an outer viewport covers.
+/// Columns or rows of the picture per pixel of an outer viewport.
 const COARSE: u32 = 2;
 
 /// A layer a viewport, with a border of a pixel towards the others from which the picture's pixels

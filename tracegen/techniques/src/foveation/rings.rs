@@ -34,7 +34,7 @@ pub(crate) fn patches(picture: &EyePicture, rates: &Rates) -> EyePatches {
     }
 }
 
-/// The ring of each tile, row by row; `None` where the lens shows nothing of it.
+/// The ring of each tile, row by row; `None` for tiles outside the lens.
 fn rings(picture: &EyePicture, rates: &Rates) -> Vec<Option<usize>> {
     let [columns, rows] = picture.tiles();
     let tiles = (0..rows).flat_map(|y| (0..columns).map(move |x| [x, y]));

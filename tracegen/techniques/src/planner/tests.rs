@@ -3,7 +3,7 @@ use crate::Mask;
 use crate::gaze::Gaze;
 use crate::hidden_mesh::HiddenMesh;
 use crate::layer::Layer;
-use crate::plan::{Filter, Part};
+use crate::plan::{Filter, PicturePart};
 use crate::settings::{FarField, Foveation, Rates, Reprojection, Split, Variant};
 use formats::view::{EyeView, FovTangents};
 
@@ -66,8 +66,8 @@ fn all() -> Vec<Settings> {
     all
 }
 
-/// What the pixels of a layer are read for a pixel of the picture.
-fn taps(part: &Part, layer: &Layer, pixel: [u32; 2]) -> Vec<[u32; 2]> {
+/// Pixels of the layer that are read for a pixel of the picture.
+fn taps(part: &PicturePart, layer: &Layer, pixel: [u32; 2]) -> Vec<[u32; 2]> {
     let own = [0, 1].map(|axis: usize| pixel[axis] - part.origin_px[axis]);
     match part.filter {
         Filter::Projective => {
@@ -125,7 +125,7 @@ fn each_shown_pixel_comes_of_one_part_and_of_pixels_that_are_drawn() {
             let plan = plan(&settings, &hmd);
             for (eye, picture) in plan.pictures.iter().enumerate() {
                 let whole = match picture {
-                    Picture::Layer(layer) => vec![Part {
+                    PictureSource::Layer(layer) => vec![PicturePart {
                         layer: *layer,
                         origin_px: [0, 0],
                         coarseness: [1, 1],
@@ -133,7 +133,7 @@ fn each_shown_pixel_comes_of_one_part_and_of_pixels_that_are_drawn() {
                         filter: Filter::Copy,
                         layer_from_px: None,
                     }],
-                    Picture::Composed { parts, .. } => parts.clone(),
+                    PictureSource::Composed { parts, .. } => parts.clone(),
                 };
                 let lens = Lens::of(&hmd.fov[eye]);
                 for pixel in (0..size_px[1]).flat_map(|y| (0..size_px[0]).map(move |x| [x, y])) {
@@ -142,13 +142,13 @@ fn each_shown_pixel_comes_of_one_part_and_of_pixels_that_are_drawn() {
                     {
                         continue;
                     }
-                    let fills = |part: &&Part| {
+                    let fills = |part: &&PicturePart| {
                         let tile = pixel.map(|px| px / 16);
                         part.tiles
                             .as_ref()
                             .is_none_or(|tiles| tiles.get(tile[0], tile[1]))
                     };
-                    let filling: Vec<&Part> = whole.iter().filter(fills).collect();
+                    let filling: Vec<&PicturePart> = whole.iter().filter(fills).collect();
                     assert_eq!(filling.len(), 1, "{settings:?} {pixel:?}");
                     let part = filling[0];
                     let layer = &plan.layers[part.layer];
@@ -189,7 +189,7 @@ fn a_layers_pixels_look_where_the_pictures_pixels_that_they_cover_look() {
             .plan(&views, Vec::new)
             .unwrap();
         for picture in &plan.pictures {
-            let Picture::Composed { parts, .. } = picture else {
+            let PictureSource::Composed { parts, .. } = picture else {
                 continue;
             };
             for part in parts {
@@ -274,7 +274,7 @@ fn rings_around_the_gaze_have_the_shares_that_a_circle_has() {
     let share = plan(&settings, &hmd).predicted.rate_share.unwrap();
     let disc = std::f32::consts::PI * 20.0_f32.to_radians().tan().powi(2) / 2.3_f32.powi(2);
     let expected = disc + (1.0 - disc) / 16.0;
-    // Tiles that touch the disc belong to it: a ring of half a tile at most.
+    // Tiles that touch the disc belong to it: a ring of at most half a tile.
     assert!(
         share > expected && share < expected + 0.02,
         "{share} {expected}"
@@ -328,7 +328,7 @@ fn eyes_that_no_far_field_serves_are_an_error_of_the_plan() {
             .to_cols_array_2d(),
         ..EyeView::default()
     };
-    // Eyes that look apart: no picture of less than 180 degrees holds both views.
+    // Eyes with divergent directions: no picture of less than 180 degrees contains both views.
     let views = FrameViews {
         frame: 3,
         eyes: [view(-80.0), view(80.0)],
@@ -381,7 +381,10 @@ fn a_headsets_mesh_masks_a_picture_in_place_of_the_lens() {
         ..Settings::default()
     };
     let made = plan(&settings, &hmd);
-    assert_eq!(made.pictures, [Picture::Layer(0), Picture::Layer(1)]);
+    assert_eq!(
+        made.pictures,
+        [PictureSource::Layer(0), PictureSource::Layer(1)]
+    );
     for (layer, shown) in made.layers.iter().zip([
         (|x, _| x >= 64) as fn(u32, u32) -> bool,
         // Rows count downwards, the mesh upwards.
@@ -431,7 +434,7 @@ fn views_at_once_need_a_depth_buffer_each_and_passes_in_turn_share_one() {
     };
     assert_eq!(bytes(&baseline, false), (2 * view, view));
     assert_eq!(bytes(&baseline, true), (2 * view, 2 * view));
-    // Composed pictures are there beside their layers, and the largest layer lends its depth.
+    // Composed pictures exist in addition to their layers, and the largest layer's depth buffer is shared.
     let rings = plan(&foveated(FoveationKind::Rings, [0.0; 2], false), &hmd);
     let layers: u64 = (rings.layers.iter())
         .map(|layer| 4 * u64::from(layer.size_px[0]) * u64::from(layer.size_px[1]))

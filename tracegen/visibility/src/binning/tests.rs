@@ -70,7 +70,7 @@ fn a_triangle_enters_the_tiles_that_it_covers_and_no_other_of_its_box() {
         tiles_of([[-500.0, -500.0], [900.0, -500.0], [-500.0, 900.0]]).len(),
         35
     );
-    // A thin diagonal: each tile of the diagonal, and those beside whose corner it passes, of 4 x 4.
+    // A thin diagonal: each tile of the diagonal, and the adjacent ones whose corner it passes, of 4 x 4.
     let thin = tiles_of([[0.0, 0.2], [63.0, 63.2], [63.0, 63.9]]);
     assert_eq!(thin, [0, 7, 8, 15, 16, 23, 24]);
     // In the margin of the picture, beyond it, and on both sides of a border.

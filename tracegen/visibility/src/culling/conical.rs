@@ -1,13 +1,13 @@
 //! Conical culling: the part of each eye's frustum that its round lens shows.
 //!
-//! The frustum stays: where the lens is larger than the picture, the picture ends first.
+//! The frustum is still tested: if the lens is larger than the picture, the picture ends first.
 
-use super::{Frame, Volumes};
+use super::{CullInput, Volumes};
 use crate::rig::TooWide;
 use crate::volume::Volume;
 
 /// The frustum and lens cone of each eye.
-pub(super) fn volumes(frame: &Frame<'_>) -> Result<Volumes, TooWide> {
+pub(super) fn volumes(frame: &CullInput<'_>) -> Result<Volumes, TooWide> {
     let eyes = frame.rig.eyes().iter();
     Ok(Volumes::Any(
         eyes.map(|eye| Volume::new(eye.frustum(frame.extent), Some(eye.lens_cone())))

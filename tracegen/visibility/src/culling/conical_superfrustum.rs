@@ -4,7 +4,7 @@
 //! the same tangent, from a point `ipd / (2 r)` behind the eyes: as the superfrustum's.
 
 use super::superfrustum::Superfrustum;
-use super::{Frame, Volumes};
+use super::{CullInput, Volumes};
 use crate::rig::{Eye, MAX_COMBINED_DEG, Rig, TooWide};
 use crate::volume::{Affine, Cone, Volume};
 use glam::DVec3;
@@ -13,7 +13,7 @@ use glam::DVec3;
 const CORNERS: u32 = 64;
 
 /// The cone and the superfrustum.
-pub(super) fn volumes(frame: &Frame<'_>) -> Result<Volumes, TooWide> {
+pub(super) fn volumes(frame: &CullInput<'_>) -> Result<Volumes, TooWide> {
     let planes = Superfrustum::new(frame.rig, frame.extent)?.planes;
     let cone = cone(frame.rig, frame.extent)?;
     Ok(Volumes::Any(vec![Volume::new(planes, Some(cone))]))
@@ -61,7 +61,7 @@ fn cone(rig: &Rig, extent: DVec3) -> Result<Cone, TooWide> {
     })
 }
 
-/// Direction of the middle of an eye's lens.
+/// Direction of the centre of an eye's lens.
 fn lens_direction(eye: &Eye) -> DVec3 {
     let [right, up, forward] = eye.axes().map(|axis| axis.gradient);
     let [x, y] = eye.lens.center.map(f64::from);

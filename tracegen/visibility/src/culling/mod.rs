@@ -1,4 +1,4 @@
-//! Culling techniques: which volume each draws for a stereo frame. One technique a file.
+//! Culling techniques: the volumes of each for a stereo frame. One technique per file.
 //!
 //! A technique is a file with a function from a frame to volumes (its `mod` line below) and a row
 //! of the table in `registry.rs`.
@@ -22,8 +22,8 @@ use crate::rig::{Rig, TooWide};
 use crate::volume::{Prepared, Volume, frustum};
 use glam::{DVec3, Mat4};
 
-/// What the volumes of a frame follow from.
-pub(crate) struct Frame<'a> {
+/// Inputs that determine the volumes of a frame.
+pub(crate) struct CullInput<'a> {
     rig: &'a Rig,
     /// Frame number: its parity chooses the eye of round-robin techniques.
     number: u32,
@@ -31,7 +31,7 @@ pub(crate) struct Frame<'a> {
     extent: DVec3,
 }
 
-/// Where a draw may be seen.
+/// Volumes in which a draw may be visible.
 #[derive(Clone, Debug)]
 pub enum Volumes {
     /// Everywhere: nothing is tested.
@@ -46,7 +46,7 @@ impl Hierarchy {
     /// # Errors
     /// Eyes that the technique cannot lay one volume around.
     pub fn volumes(&self, rig: &Rig, culling: Culling, frame: u32) -> Result<Volumes, TooWide> {
-        culling.volumes(&Frame {
+        culling.volumes(&CullInput {
             rig,
             number: frame,
             extent: self.extent(),

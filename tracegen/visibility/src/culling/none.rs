@@ -1,9 +1,9 @@
 //! No culling: every draw, in both eyes.
 
-use super::{Frame, Volumes};
+use super::{CullInput, Volumes};
 use crate::rig::TooWide;
 
 /// All of space.
-pub(super) fn volumes(_: &Frame<'_>) -> Result<Volumes, TooWide> {
+pub(super) fn volumes(_: &CullInput<'_>) -> Result<Volumes, TooWide> {
     Ok(Volumes::Everything)
 }

@@ -1,11 +1,11 @@
 //! Per-eye frustum culling, the baseline: two frusta, their lists merged.
 
-use super::{Frame, Volumes};
+use super::{CullInput, Volumes};
 use crate::rig::TooWide;
 use crate::volume::Volume;
 
 /// The frustum of each eye.
-pub(super) fn volumes(frame: &Frame<'_>) -> Result<Volumes, TooWide> {
+pub(super) fn volumes(frame: &CullInput<'_>) -> Result<Volumes, TooWide> {
     let frusta = frame.rig.eyes().iter();
     Ok(Volumes::Any(
         frusta

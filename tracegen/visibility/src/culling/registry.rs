@@ -1,6 +1,6 @@
 //! The table of culling techniques. Flags, settings, help and error messages come from its rows.
 
-use super::{Frame, Volumes};
+use super::{CullInput, Volumes};
 use super::{
     conical, conical_round_robin, conical_superfrustum, none, per_eye, round_robin, superfrustum,
 };
@@ -16,7 +16,7 @@ pub struct Technique {
     title: &'static str,
     help: &'static str,
     lossless: bool,
-    volumes: fn(&Frame<'_>) -> Result<Volumes, TooWide>,
+    volumes: fn(&CullInput<'_>) -> Result<Volumes, TooWide>,
 }
 
 const fn row(
@@ -24,7 +24,7 @@ const fn row(
     title: &'static str,
     lossless: bool,
     help: &'static str,
-    volumes: fn(&Frame<'_>) -> Result<Volumes, TooWide>,
+    volumes: fn(&CullInput<'_>) -> Result<Volumes, TooWide>,
 ) -> Technique {
     Technique {
         name,
@@ -94,8 +94,8 @@ impl Culling {
         self.0.help
     }
 
-    /// Where it looks for draws.
-    pub(super) fn volumes(self, frame: &Frame<'_>) -> Result<Volumes, TooWide> {
+    /// The volumes in which it searches for draws.
+    pub(super) fn volumes(self, frame: &CullInput<'_>) -> Result<Volumes, TooWide> {
         (self.0.volumes)(frame)
     }
 

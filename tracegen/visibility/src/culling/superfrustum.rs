@@ -1,22 +1,22 @@
-//! Superfrustum culling: one frustum around both eyes', from a point behind them (Everitt).
+//! Superfrustum culling: one frustum around both eyes' frusta, from a point behind them (Everitt).
 //!
 //! For parallel eyes with outer tangents `tan_l` and `tan_r`, the side planes of the outer edges
 //! meet `ipd / (tan_l + tan_r)` behind the eyes, and the vertical tangents shrink to
 //! `tan_v * far / (far + recession)`. Here the planes are laid around the corners of both frusta,
 //! which gives the same for parallel eyes and holds for canted and asymmetric ones.
 
-use super::{Frame, Volumes};
+use super::{CullInput, Volumes};
 use crate::rig::{Eye, MAX_COMBINED_DEG, Rig, TooWide};
 use crate::volume::{HalfSpace, Volume};
 use glam::DVec3;
 
 /// The superfrustum.
-pub(super) fn volumes(frame: &Frame<'_>) -> Result<Volumes, TooWide> {
+pub(super) fn volumes(frame: &CullInput<'_>) -> Result<Volumes, TooWide> {
     let planes = Superfrustum::new(frame.rig, frame.extent)?.planes;
     Ok(Volumes::Any(vec![Volume::new(planes, None)]))
 }
 
-/// A frustum that holds those of all eyes.
+/// A frustum that contains those of all eyes.
 #[derive(Clone, Debug)]
 pub struct Superfrustum {
     /// Where its side planes meet, at the height of the eyes.
@@ -116,7 +116,7 @@ mod tests {
     use crate::testing;
     use formats::view::FovTangents;
 
-    /// The facts' figures: 90 degrees, 64 mm, hence 32 mm behind the eyes.
+    /// Known values: 90 degrees, 64 mm, hence 32 mm behind the eyes.
     #[test]
     fn the_recession_of_parallel_eyes_is_the_closed_form() {
         let (near, far) = (0.1, 50.0);

@@ -1,6 +1,7 @@
 use super::*;
 use crate::rig::Eye;
-use crate::testing::{Random, SIZE_PX, camera, rig_of};
+use crate::testing::{SIZE_PX, between, camera, rig_of, within};
+use formats::random::Random;
 use formats::view::{FovTangents, Hmd, Lens};
 use glam::Vec3;
 use scene::hmd;
@@ -13,9 +14,9 @@ fn objects(count: usize) -> Vec<[Vec3; 2]> {
     let mut random = Random(11);
     (0..count)
         .map(|_| {
-            let low = random.within(ROOM);
-            let size = 0.05 + 3.0 * random.next().powi(8);
-            let edges = Vec3::new(random.next(), random.next(), random.next());
+            let low = within(&mut random, ROOM);
+            let size = 0.05 + 3.0 * random.unit_f32().powi(8);
+            let edges = Vec3::new(random.unit_f32(), random.unit_f32(), random.unit_f32());
             [low, low + edges * size]
         })
         .collect()
@@ -25,7 +26,7 @@ fn objects(count: usize) -> Vec<[Vec3; 2]> {
 /// and that angle.
 fn random_hmd(random: &mut Random) -> (Hmd, f32) {
     loop {
-        let mut tangent = |low, high| random.between(low, high).to_radians().tan();
+        let mut tangent = |low, high| between(random, low, high).to_radians().tan();
         let fov = [(); 2].map(|()| FovTangents {
             left: tangent(-5.0, 80.0),
             right: tangent(10.0, 80.0),
@@ -35,8 +36,8 @@ fn random_hmd(random: &mut Random) -> (Hmd, f32) {
         let hmd = Hmd {
             eye_size_px: SIZE_PX,
             fov,
-            ipd_m: random.between(0.0, 0.2),
-            cant_deg: random.between(-15.0, 30.0),
+            ipd_m: between(random, 0.0, 0.2),
+            cant_deg: between(random, -15.0, 30.0),
             ..Hmd::default()
         };
         let [l, r] = fov;
@@ -54,18 +55,21 @@ fn random_hmd(random: &mut Random) -> (Hmd, f32) {
 fn random_rig(random: &mut Random) -> (Rig, f32) {
     loop {
         let (hmd, combined_deg) = random_hmd(random);
-        let eye = random.within(ROOM);
-        let direction = random.within([Vec3::new(-1.0, -0.7, -1.0), Vec3::new(1.0, 0.7, 1.0)]);
+        let eye = within(random, ROOM);
+        let direction = within(
+            random,
+            [Vec3::new(-1.0, -0.7, -1.0), Vec3::new(1.0, 0.7, 1.0)],
+        );
         if direction.length() < 0.1 {
             continue;
         }
-        let (near, far) = (random.between(0.01, 0.5), random.between(10.0, 200.0));
+        let (near, far) = (between(random, 0.01, 0.5), between(random, 10.0, 200.0));
         let lenses = hmd.fov.map(|fov| Lens {
             center: [
-                random.between(-0.2, 0.2) + (fov.right - fov.left) / 2.0,
-                random.between(-0.2, 0.2) + (fov.up - fov.down) / 2.0,
+                between(random, -0.2, 0.2) + (fov.right - fov.left) / 2.0,
+                between(random, -0.2, 0.2) + (fov.up - fov.down) / 2.0,
             ],
-            radius: random.between(0.1, 1.0) * Lens::of(&fov).radius,
+            radius: between(random, 0.1, 1.0) * Lens::of(&fov).radius,
         });
         let rig = rig_of(&camera(eye, direction, near, far), &hmd, lenses);
         let one_cone = Hierarchy::default().volumes(&rig, Culling::CONICAL_SUPERFRUSTUM, 0);
@@ -93,7 +97,7 @@ impl Watcher {
         rig.eyes().iter().map(watcher).collect()
     }
 
-    /// Whether a point is in the picture, and whether the lens shows it.
+    /// Whether a point is in the picture, and whether it is visible through the lens.
     fn sees(&self, point: Vec3) -> [bool; 2] {
         let c = self.clip_from_world * point.extend(1.0);
         if !(c.x.abs() <= c.w && c.y.abs() <= c.w && 0.0 <= c.z && c.z <= c.w) {
@@ -136,7 +140,7 @@ fn nothing_with_a_point_in_view_is_lost_by_the_exact_techniques() {
     let tree = Hierarchy::new(&objects);
     let mut random = Random(12);
     let points: Vec<[Vec3; POINTS]> = (objects.iter())
-        .map(|bounds| [(); POINTS].map(|()| random.within(*bounds)))
+        .map(|bounds| [(); POINTS].map(|()| within(&mut random, *bounds)))
         .collect();
     let points = &points;
     let threads = std::thread::available_parallelism()
@@ -187,7 +191,7 @@ fn nothing_with_a_point_in_view_is_lost_by_the_exact_techniques() {
     assert!(seen(0) > 1_000_000 && seen(1) > 100_000 && widest > 168.0);
 }
 
-/// Points on the edges of the frusta and on the circles of the lenses, where nothing is to spare.
+/// Points on the edges of the frusta and on the circles of the lenses, the tightest cases.
 #[test]
 fn the_edges_of_what_the_eyes_see_lie_in_the_exact_techniques_volumes() {
     let mut random = Random(77);
@@ -234,8 +238,8 @@ fn one_volume_takes_about_half_the_tests_of_two() {
         let mut random = Random(21);
         let (mut totals, mut kept) = ([0; 3], [0; 3]);
         for _ in 0..20 {
-            let direction = random.within([Vec3::NEG_ONE, Vec3::ONE]).with_y(0.1);
-            let eye = random.within(ROOM);
+            let direction = within(&mut random, [Vec3::NEG_ONE, Vec3::ONE]).with_y(0.1);
+            let eye = within(&mut random, ROOM);
             let lenses = hmd.fov.map(|fov| Lens::of(&fov));
             let rig = rig_of(&camera(eye, direction, 0.1, 200.0), &hmd, lenses);
             let techniques = [
@@ -256,7 +260,7 @@ fn one_volume_takes_about_half_the_tests_of_two() {
             one / two,
             turn / two
         );
-        // What the superfrustum keeps in vain is little.
+        // The superfrustum keeps few invisible draws.
         assert!(kept[1] >= kept[0] && kept[1] as f64 <= 1.02 * kept[0] as f64);
         assert!(one <= 0.55 * two, "{preset}: {one} of {two}");
         assert!(turn <= 0.51 * two, "{preset}: {turn} of {two}");
@@ -276,7 +280,7 @@ fn what_round_robin_misses_it_finds_in_the_next_frame() {
             let frames =
                 [0, 1, 2].map(|frame| Listed::of(&tree, &rig, culling, frame, &mut scratch).0);
             for (object, bounds) in objects.iter().enumerate() {
-                let point = random.within(*bounds);
+                let point = within(&mut random, *bounds);
                 if watchers.iter().any(|eye| eye.sees(point)[lens]) {
                     let listed = [0, 1, 2].map(|frame| frames[frame][object]);
                     assert!(

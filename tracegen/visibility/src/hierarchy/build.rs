@@ -1,4 +1,4 @@
-//! Builds the tree: groups of equal number, cut where the boxes around both parts are smallest.
+//! Builds the tree: groups of equal size, cut where the boxes around both parts are smallest.
 
 use super::{EMPTY, Hierarchy, NOWHERE, Node, WIDTH, is_finite, union};
 use glam::{Vec3, Vec4};
@@ -34,7 +34,7 @@ impl Hierarchy {
         tree
     }
 
-    /// Adds a node over `draws`, which stand from `begin` on in the order; tells its number.
+    /// Adds a node over `draws`, which start at `begin` in the order; returns its number.
     fn add(&mut self, draws: &mut [u32], begin: usize, bounds: &[[Vec3; 2]]) -> u32 {
         let number = self.nodes.len();
         self.nodes.push(Node {

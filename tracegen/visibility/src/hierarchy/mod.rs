@@ -18,12 +18,12 @@ use glam::{DVec3, Vec3, Vec4};
 /// Boxes of a node.
 const WIDTH: usize = 4;
 
-/// Four boxes and what is in each.
+/// Four boxes and their contents.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     /// Lower and upper corners: `[low or high][axis]`, a lane a box.
     corners: [[Vec4; 3]; 2],
-    /// Node of each box's parts, where it holds more than one draw.
+    /// Node of each box's parts, if it contains more than one draw.
     child: [u32; WIDTH],
     /// Draws of box `i`: `order[begin[i]..begin[i + 1]]`.
     begin: [u32; WIDTH + 1],
@@ -82,7 +82,7 @@ fn is_finite([low, high]: [Vec3; 2]) -> bool {
 }
 
 impl Hierarchy {
-    /// Draws, those without finite bounds among them.
+    /// Draws, including those without finite bounds.
     #[must_use]
     pub fn len(&self) -> usize {
         self.place.len()

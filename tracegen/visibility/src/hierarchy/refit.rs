@@ -1,4 +1,4 @@
-//! Follows draws that move: their boxes and those around them, and nothing else.
+//! Updates the boxes of moving draws and those around them.
 
 use super::{Hierarchy, NOWHERE, WIDTH, is_finite};
 use glam::Vec3;
@@ -26,7 +26,7 @@ impl Hierarchy {
                 parts.set_lane(lane, bounds);
                 stale.push(node);
             } else {
-                // Its old box stays: what it finds is found anyway.
+                // Its old box stays, because what it finds is found anyway.
                 *place = NOWHERE;
                 self.unbounded.push(draw);
             }

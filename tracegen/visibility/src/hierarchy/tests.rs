@@ -1,7 +1,8 @@
 use super::*;
 use crate::culling::Culling;
-use crate::testing::{Random, rig};
+use crate::testing::{between, rig, within};
 use crate::volume::{Prepared, Volume, frustum};
+use formats::random::Random;
 use formats::view::FovTangents;
 use glam::Mat4;
 use glam::camera::rh::proj::directx::perspective;
@@ -11,12 +12,12 @@ fn field(count: usize, seed: u64) -> Vec<[Vec3; 2]> {
     let room = [Vec3::splat(-50.0), Vec3::splat(50.0)];
     (0..count)
         .map(|_| {
-            let low = random.within(room);
+            let low = within(&mut random, room);
             // Few large ones among many small ones.
-            let size = 0.1 + 4.0 * random.next().powi(6);
+            let size = 0.1 + 4.0 * random.unit_f32().powi(6);
             [
                 low,
-                low + Vec3::new(random.next(), random.next(), random.next()) * size,
+                low + Vec3::new(random.unit_f32(), random.unit_f32(), random.unit_f32()) * size,
             ]
         })
         .collect()
@@ -45,11 +46,11 @@ fn one_by_one(bounds: &[[Vec3; 2]], prepared: &Prepared) -> Vec<u32> {
 fn views() -> impl Iterator<Item = Mat4> {
     let mut random = Random(5);
     (0..40).map(move |_| {
-        let eye = random.within([Vec3::splat(-60.0), Vec3::splat(60.0)]);
-        let direction = random.within([Vec3::NEG_ONE, Vec3::ONE]).normalize();
+        let eye = within(&mut random, [Vec3::splat(-60.0), Vec3::splat(60.0)]);
+        let direction = within(&mut random, [Vec3::NEG_ONE, Vec3::ONE]).normalize();
         perspective(
-            random.between(0.3, 2.4),
-            random.between(0.5, 2.0),
+            between(&mut random, 0.3, 2.4),
+            between(&mut random, 0.5, 2.0),
             0.1,
             80.0,
         ) * glam::camera::rh::view::look_at_mat4(eye, eye + direction, Vec3::Y)
@@ -82,9 +83,11 @@ fn a_refitted_tree_finds_what_one_built_anew_finds() {
     let mut tree = Hierarchy::new(&bounds);
     let mut random = Random(6);
     for (round, clip) in views().enumerate() {
-        let moved: Vec<u32> = (0..50).map(|_| (random.next() * 2999.0) as u32).collect();
+        let moved: Vec<u32> = (0..50)
+            .map(|_| (random.unit_f32() * 2999.0) as u32)
+            .collect();
         for &draw in &moved {
-            let by = random.within([Vec3::splat(-20.0), Vec3::splat(20.0)]);
+            let by = within(&mut random, [Vec3::splat(-20.0), Vec3::splat(20.0)]);
             bounds[draw as usize] = bounds[draw as usize].map(|corner| corner + by);
         }
         // The same draw twice: the last bounds count.
@@ -120,7 +123,7 @@ fn ten_times_the_draws_behind_the_viewer_cost_a_third_more_tests_at_most() {
     let mut boxes = |count: usize, room: [Vec3; 2]| {
         let around = |p: Vec3| [p - Vec3::splat(0.2), p + Vec3::splat(0.2)];
         (0..count)
-            .map(|_| around(random.within(room)))
+            .map(|_| around(within(&mut random, room)))
             .collect::<Vec<_>>()
     };
     let ahead = [Vec3::new(-30.0, -5.0, -60.0), Vec3::new(30.0, 5.0, 0.0)];

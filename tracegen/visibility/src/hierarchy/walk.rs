@@ -4,7 +4,7 @@ use super::{Hierarchy, Node, WIDTH};
 use crate::draw_set::DrawSet;
 use crate::volume::{Prepared, Sides};
 
-/// What a walk needs and the next one reuses.
+/// Memory that walks reuse.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     /// Nodes to visit, each with the sides of the volume that it is not known to be inside of.
@@ -51,13 +51,13 @@ impl Hierarchy {
                 lanes &= lanes - 1;
                 let left = tested.left(sides, lane);
                 match node.part(lane) {
-                    Part::Draws(child, _) if left != 0 => stack.push((child, left)),
-                    Part::Draws(_, [begin, end]) => {
+                    Subtree::Draws(child, _) if left != 0 => stack.push((child, left)),
+                    Subtree::Draws(_, [begin, end]) => {
                         for &draw in &self.order[begin as usize..end as usize] {
                             found.insert(draw);
                         }
                     }
-                    Part::Draw(slot) => found.insert(self.order[slot as usize]),
+                    Subtree::Draw(slot) => found.insert(self.order[slot as usize]),
                 }
             }
         }
@@ -65,8 +65,8 @@ impl Hierarchy {
     }
 }
 
-/// What a box holds.
-enum Part {
+/// Contents of a box.
+enum Subtree {
     /// One draw, by its place in the order.
     Draw(u32),
     /// Several: the node of their boxes, and their range in the order.
@@ -74,13 +74,13 @@ enum Part {
 }
 
 impl Node {
-    fn part(&self, lane: usize) -> Part {
+    fn part(&self, lane: usize) -> Subtree {
         debug_assert!(lane < WIDTH);
         let [begin, end] = [self.begin[lane], self.begin[lane + 1]];
         if end - begin == 1 {
-            Part::Draw(begin)
+            Subtree::Draw(begin)
         } else {
-            Part::Draws(self.child[lane], [begin, end])
+            Subtree::Draws(self.child[lane], [begin, end])
         }
     }
 }

@@ -21,7 +21,7 @@ const SLACK: f64 = 1.0 / 16.0;
 /// Rounding of a depth from 0 to 1 in the driver.
 const ROUNDING: f64 = 16.0 * (f32::EPSILON as f64) / 2.0;
 
-/// What was visible in the last frame, by view.
+/// Visible draws of the last frame, by view.
 #[derive(Clone, Debug, Default)]
 pub struct Occlusion {
     visible: Vec<Vec<u32>>,

@@ -1,5 +1,6 @@
 use super::*;
-use crate::testing::Random;
+use crate::testing::within;
+use formats::random::Random;
 use glam::camera::rh::proj::directx::perspective;
 
 const SIZE_PX: [u32; 2] = [67, 45];
@@ -8,11 +9,11 @@ const SIZE_PX: [u32; 2] = [67, 45];
 fn the_pyramid_is_never_nearer_than_any_pixel_of_the_rectangle() {
     let mut random = Random(3);
     let pixels = (SIZE_PX[0] * SIZE_PX[1]) as usize;
-    let depth: Vec<f32> = (0..pixels).map(|_| random.next()).collect();
+    let depth: Vec<f32> = (0..pixels).map(|_| random.unit_f32()).collect();
     let pyramid = Pyramid::new(SIZE_PX, depth.clone());
     for _ in 0..2000 {
         let mut ends = |axis: usize| {
-            let mut at = || (random.next() * SIZE_PX[axis] as f32) as u32;
+            let mut at = || (random.unit_f32() * SIZE_PX[axis] as f32) as u32;
             let (a, b) = (at(), at());
             [a.min(b), a.max(b)]
         };
@@ -63,10 +64,10 @@ fn a_box_with_a_point_before_the_depth_is_never_hidden() {
     let room = [Vec3::new(-20.0, -12.0, -40.0), Vec3::new(20.0, 12.0, 2.0)];
     let (mut seen, mut lost) = (0, 0);
     for _ in 0..20_000 {
-        let low = random.within(room);
-        let size = Vec3::new(random.next(), random.next(), random.next()) * 4.0;
+        let low = within(&mut random, room);
+        let size = Vec3::new(random.unit_f32(), random.unit_f32(), random.unit_f32()) * 4.0;
         let bounds = [low, low + size];
-        let point = random.within(bounds);
+        let point = within(&mut random, bounds);
         let p = clip * point.extend(1.0);
         let inside = p.x.abs() < p.w && p.y.abs() < p.w && 0.0 < p.z && p.z < p.w;
         let hides = hidden(bounds, &clip.as_dmat4(), &wall);

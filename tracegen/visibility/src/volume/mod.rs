@@ -29,7 +29,7 @@ const CONE: Sides = 1 << MAX_PLANES;
 pub struct Volume {
     /// Half-spaces, at most six.
     planes: [HalfSpace; MAX_PLANES],
-    /// Only what is in it, if there is one.
+    /// Restricts the volume to another one, if given.
     cone: Option<Cone>,
 }
 
@@ -61,7 +61,7 @@ pub(crate) struct Prepared {
     cone: Option<PreparedCone>,
 }
 
-/// What a test tells of four boxes.
+/// Result of a test of four boxes.
 pub(crate) struct Tested {
     /// Bit a box that is wholly outside.
     pub outside: u32,

@@ -55,7 +55,7 @@ impl HalfSpace {
     }
 }
 
-/// The one point of three planes, infinite or NaN where there is none.
+/// The intersection of three planes, infinite or NaN if there is none.
 pub(crate) fn meeting_point(planes: [HalfSpace; 3]) -> DVec3 {
     let [a, b, c] = planes.map(|plane| plane.normal);
     let [bc, ca, ab] = [b.cross(c), c.cross(a), a.cross(b)];

@@ -3,8 +3,8 @@
 //!
 //! The car points along +x, its middle at x = 0; z is to its right; measures in metres.
 
-use super::mesh_builder::MeshBuilder;
-use super::noise::smoothstep;
+use crate::mesh_builder::MeshBuilder;
+use crate::noise::smoothstep;
 use glam::{Vec2, Vec3, vec2, vec3};
 
 /// Front and rear axle.

@@ -1,15 +1,15 @@
 //! The music box's gear train, governor, bells and fittings.
 
-use super::gears::{Gear, placed, screw, worm};
-use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
-use super::music_box::{CYLINDER, CYLINDER_HALF, Kit, MODULE};
-use super::scene_builder::SceneBuilder;
+use super::{CYLINDER, CYLINDER_HALF, MODULE, MusicBoxMaterials};
+use crate::gears::{Gear, placed, screw, worm};
+use crate::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
+use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
 /// Spring barrel, great wheel, intermediate wheels and the governor.
-pub(super) fn train(scene: &mut SceneBuilder, kit: &Kit) {
-    // Gears stand in planes of constant x: their z axis turns to +x.
+pub(super) fn train(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
+    // Gears are in planes of constant x: their z axis turns to +x.
     let facing = Quat::from_rotation_y(FRAC_PI_2);
     let wheel = |teeth: u32, thickness: f32, spokes: u32| Gear {
         teeth,
@@ -59,8 +59,7 @@ pub(super) fn train(scene: &mut SceneBuilder, kit: &Kit) {
                 sharp(0.0007, 0.011),
                 sharp(0.0, 0.011),
             ];
-            let mut rod = MeshBuilder::new();
-            rod.lathe(&shaft, 20);
+            let rod = lathed(&shaft, 20);
             arbors.merge(
                 &rod,
                 Affine3A::from_rotation_translation(
@@ -81,8 +80,7 @@ pub(super) fn train(scene: &mut SceneBuilder, kit: &Kit) {
         scene.add("plate", plate, kit.polished);
         let mut jewels = MeshBuilder::new();
         for c in [center, c1, c2] {
-            let mut jewel = MeshBuilder::new();
-            jewel.lathe(
+            let jewel = lathed(
                 &curve(
                     &[
                         sharp(0.0017, 0.0),
@@ -105,7 +103,7 @@ pub(super) fn train(scene: &mut SceneBuilder, kit: &Kit) {
 }
 
 /// Worm and fan: an upright endless screw with two vanes.
-fn governor(scene: &mut SceneBuilder, kit: &Kit) {
+fn governor(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let foot = vec3(-0.071, 0.010, 0.022);
     let upright = Quat::from_rotation_x(-FRAC_PI_2);
     let thread = scene.mesh("worm", worm(0.0016, 0.014, 9.0, 18), kit.steel);
@@ -142,7 +140,7 @@ fn governor(scene: &mut SceneBuilder, kit: &Kit) {
 }
 
 /// Six bells on a rod behind the cylinder, largest on the left, each with its hammer.
-pub(super) fn bells(scene: &mut SceneBuilder, kit: &Kit) {
+pub(super) fn bells(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let mut bell = MeshBuilder::new();
     let skin = [
         sharp(0.0, 1.0),
@@ -157,12 +155,11 @@ pub(super) fn bells(scene: &mut SceneBuilder, kit: &Kit) {
         smooth(0.46, 0.80),
         smooth(0.0, 0.92),
     ];
-    // The outline runs from the crown down: turned round, it faces outwards.
+    // The outline runs from the crown down, so it is reversed to face outwards.
     let skin: Vec<_> = skin.into_iter().rev().collect();
     bell.lathe(&curve(&skin, 2), 32);
     let bell = scene.mesh("bell", bell, kit.polished);
-    let mut hammer = MeshBuilder::new();
-    hammer.lathe(
+    let mut hammer = lathed(
         &curve(
             &[
                 smooth(0.0, -0.0016),
@@ -219,8 +216,14 @@ pub(super) fn bells(scene: &mut SceneBuilder, kit: &Kit) {
     scene.add("bell-rod", rod, kit.brass);
 }
 
-/// Bedplate, its screws, spring barrel and the winding key.
-pub(super) fn fittings(scene: &mut SceneBuilder, kit: &Kit) {
+/// Bedplate, spring barrels and the winding key.
+pub(super) fn fittings(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
+    bedplate(scene, kit);
+    spring_barrels(scene, kit);
+    winding_key(scene, kit);
+}
+
+fn bedplate(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let mut bed = MeshBuilder::new();
     bed.block(
         vec3(-0.080, 0.0066, -0.042),
@@ -244,7 +247,10 @@ pub(super) fn fittings(scene: &mut SceneBuilder, kit: &Kit) {
             Affine3A::from_rotation_translation(turn, vec3(x, 0.0090, z)),
         );
     }
-    // Spring barrel behind the cylinder, its mainspring seen from above.
+}
+
+/// Barrels behind the cylinder, their mainsprings seen from above.
+fn spring_barrels(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let mut barrel = MeshBuilder::new();
     let (r, h) = (0.0085, 0.012);
     barrel.lathe(
@@ -295,9 +301,11 @@ pub(super) fn fittings(scene: &mut SceneBuilder, kit: &Kit) {
         scene.place(barrel_mesh, place);
         scene.place(spring, place);
     }
-    // Key in the front of the box.
-    let mut key = MeshBuilder::new();
-    key.lathe(
+}
+
+/// The key in the front of the box.
+fn winding_key(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
+    let mut key = lathed(
         &curve(
             &[
                 sharp(0.0, 0.0),

@@ -1,9 +1,9 @@
 //! The temple ruin of the jungle: a stepped platform, a gate, broken columns and stone idols.
 
-use super::atrium_parts::{Column, cornice, lion_medallion, moulding};
-use super::mesh_builder::MeshBuilder;
-use super::noise::Rng;
-use super::scene_builder::{MaterialId, SceneBuilder};
+use crate::atrium::parts::{Column, cornice, lion_medallion, moulding};
+use crate::mesh_builder::MeshBuilder;
+use crate::noise::Rng;
+use crate::scene_builder::{MaterialId, SceneBuilder};
 use glam::{Affine3A, Quat, Vec3, vec3};
 use std::f32::consts::FRAC_PI_2;
 
@@ -174,7 +174,7 @@ fn columns(scene: &mut SceneBuilder, center: Vec3, stones: &Stones, rng: &mut Rn
     let shaft = scene.mesh("ruin-column", whole.shaft(), stones.steps);
     let capital = scene.mesh("ruin-capital", whole.capital(), stones.idol);
     let mut drum = MeshBuilder::new();
-    use super::mesh_builder::sharp;
+    use crate::mesh_builder::sharp;
     drum.lathe(
         &[
             sharp(0.0, 0.0),

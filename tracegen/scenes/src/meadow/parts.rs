@@ -1,7 +1,7 @@
 //! Plants of the meadow in real geometry: lavender, grass, poppies, broad-leaved trees, cypresses.
 
-use super::mesh_builder::MeshBuilder;
-use super::noise::Rng;
+use crate::mesh_builder::MeshBuilder;
+use crate::noise::Rng;
 use glam::{Vec2, Vec3, vec2, vec3};
 use std::f32::consts::{PI, TAU};
 

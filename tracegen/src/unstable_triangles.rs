@@ -1,9 +1,8 @@
-//! Triangles of which rounding decides what is drawn: too thin for the rasteriser's grid, or too close
-//! upon another for the depth buffer.
+//! Finds triangles whose visibility depends on rounding: thinner than the rasteriser's grid, or closer
+//! together than the depth buffer resolves.
 //!
-//! Found on the screen, where the rasteriser decides: triangles of an eye's picture that no plane cuts and
-//! that may cover the middle of a pixel.
-//! Planes that lie upon one another but are divided into other triangles are not found.
+//! The search works on the screen: it considers triangles of an eye's picture that no clip plane cuts and
+//! that may cover a pixel's centre. Coplanar surfaces with different triangulations are not found.
 
 use formats::view::EyeView;
 use glam::{DMat4, DVec2, DVec3, Mat4};
@@ -11,31 +10,32 @@ use raster::draws::{DrawCall, DrawList, DrawMode};
 use scene::Scene;
 use std::collections::HashMap;
 
-/// Vertices are rounded to a grid of this many pixels before a triangle is drawn.
+/// Vertices are rounded to a grid of this size in pixels before rasterisation.
 const GRID_PX: f64 = 1.0 / 256.0;
 
-/// Depths that differ by no more steps of 32 bits change places by rounding: interpolation takes some.
+/// Depths that differ by at most this many steps of 32 bits may change their order, because interpolation
+/// rounds.
 const DEPTH_STEPS: f64 = 4.0;
 
-/// The last step of 32-bit depths before 1.
+/// The step of 32-bit depths just below 1.
 const DEPTH_STEP: f64 = 1.0 / (1 << 24) as f64;
 
-/// Fragments that may be wrong without a word, as a share of all: captures are off by as much at edges.
+/// Share of fragments that may be wrong without a warning. Captures have errors of this size at edges.
 const SHARE: f64 = 0.002;
 
-/// Vertices of triangles that may lie upon one another are less than this apart.
+/// Vertices of coincident triangles are closer together than this.
 const SAME_PLACE_PX: f64 = 1.0 / 16.0;
 
-/// Triangles of one place that another is held against. Foliage and decals lie a few deep; behind so many
-/// depths a further one goes unnoticed, where the time for a stack would grow with the square of its height.
+/// Number of depths at one place that a triangle is compared with. Foliage and decals are a few layers deep.
+/// Without a limit, time would grow with the square of the number of layers.
 const MOST_DEPTHS: usize = 64;
 
-/// What a view shows of a kind of doubtful triangles.
+/// A kind of unstable triangles in a view.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Kind {
     triangles: u64,
     area_px: f64,
-    /// The mesh of the first one.
+    /// The mesh of the first triangle.
     mesh: Option<usize>,
 }
 
@@ -47,21 +47,21 @@ impl Kind {
     }
 }
 
-/// Doubtful triangles of some views.
+/// Unstable triangles of some views.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Doubtful {
+pub struct UnstableTriangles {
     thin: Kind,
     coincident: Kind,
 }
 
-/// How a triangle lies to one at the same place on the screen.
+/// Relation of a triangle to another one at the same place on the screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Against {
-    /// Another place, or depth tells them apart.
+    /// At another place, or distinguishable by depth.
     Apart,
-    /// The same to the bit and wound alike: the first one is seen.
+    /// Identical vertices and winding: the first one is visible.
     Same,
-    /// Rounding decides which of both is seen.
+    /// Rounding decides which of the two is visible.
     Upon,
 }
 
@@ -73,8 +73,8 @@ struct Shown {
     double_sided: bool,
 }
 
-impl Doubtful {
-    /// Looks at a view.
+impl UnstableTriangles {
+    /// Adds the triangles of a view.
     pub fn look(&mut self, scene: &Scene, draws: &DrawList, view: &EyeView, size_px: [u32; 2]) {
         let wide = |m: &[[f32; 4]; 4]| Mat4::from_cols_array_2d(m).as_dmat4();
         let clip_from_world = wide(&view.eye_to_clip) * wide(&view.world_to_eye);
@@ -86,7 +86,7 @@ impl Doubtful {
                     self.thin.add(area_px, shown.mesh);
                     continue;
                 }
-                // What is blended hides nothing.
+                // Blended draws hide nothing.
                 if call.mode == DrawMode::Blended {
                     continue;
                 }
@@ -97,7 +97,7 @@ impl Doubtful {
         }
     }
 
-    /// Warnings of what was looked at, where it may spoil more than a share of its `fragments`.
+    /// Warnings, if unstable triangles may affect more than a share of the `fragments`.
     #[must_use]
     pub fn warnings(&self, scene: &Scene, fragments: u64) -> Vec<String> {
         let mut warnings = Vec::new();
@@ -129,7 +129,7 @@ impl Doubtful {
     }
 }
 
-/// The triangles of a draw that no plane of the view cuts or hides, with their pixels in the picture.
+/// The triangles of a draw that no clip plane cuts or hides, with their pixels inside the picture.
 fn on_screen(
     scene: &Scene,
     call: &DrawCall,
@@ -180,14 +180,14 @@ impl Shown {
         2.0 * self.signed_area_px().abs() / longest
     }
 
-    /// Whether the bounding box holds the middle of a pixel.
+    /// Whether the bounding box contains a pixel's centre.
     fn may_cover(&self) -> bool {
         let [a, b, c] = self.corners.map(|corner| corner.truncate() - 0.5);
         let (low, high) = (a.min(b).min(c).ceil(), a.max(b).max(c).floor());
         low.cmple(high).all()
     }
 
-    /// Share of the bounding box that lies in the picture, as an estimate for the triangle's.
+    /// Share of the bounding box that is inside the picture, as an estimate of the triangle's share.
     fn share_inside(&self, size: DVec2) -> f64 {
         let [a, b, c] = self.corners.map(DVec3::truncate);
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
@@ -211,9 +211,9 @@ impl Shown {
     }
 }
 
-/// A triangle among those of its place.
+/// A triangle at a place on the screen.
 struct Placed {
-    /// In an order that does not depend on where they start nor how they wind.
+    /// In an order that is independent of the first vertex and of the winding.
     corners: [DVec3; 3],
     wound_up: bool,
     double_sided: bool,
@@ -243,7 +243,7 @@ impl Placed {
 struct Places(HashMap<[[i32; 2]; 3], Vec<Placed>>);
 
 impl Places {
-    /// Adds a triangle: how it lies to those that are there.
+    /// Adds a triangle and returns its relation to the triangles at its place.
     fn add(&mut self, new: Placed) -> Against {
         let others = self.0.entry(new.place()).or_default();
         let against = others.iter().map(|other| new.against(other)).max();
@@ -317,18 +317,18 @@ mod tests {
     }
 
     #[test]
-    fn few_doubtful_pixels_are_no_warning() {
-        let mut doubtful = Doubtful::default();
-        doubtful.thin.add(1.0, 0);
+    fn few_unstable_pixels_are_no_warning() {
+        let mut unstable = UnstableTriangles::default();
+        unstable.thin.add(1.0, 0);
         let scene = Scene {
             meshes: vec![scene::Mesh::default()],
             ..Scene::default()
         };
-        assert!(doubtful.warnings(&scene, 1_000_000).is_empty());
-        let said = doubtful.warnings(&scene, 100);
+        assert!(unstable.warnings(&scene, 1_000_000).is_empty());
+        let warnings = unstable.warnings(&scene, 100);
         assert!(
-            said[0].contains("1 triangles are thinner than 1/256 pixel"),
-            "{said:?}"
+            warnings[0].contains("1 triangles are thinner than 1/256 pixel"),
+            "{warnings:?}"
         );
     }
 }

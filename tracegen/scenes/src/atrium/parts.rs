@@ -1,7 +1,7 @@
 //! Architectural parts of the atrium: columns, arches, vaults, drapes, reliefs, plants.
 
-use super::mesh_builder::{Frame, Knot, MeshBuilder, curve, sharp, smooth};
-use super::noise::{Rng, smoothstep};
+use crate::mesh_builder::{Knot, MeshBuilder, SweepFrame, curve, sharp, smooth};
+use crate::noise::{Rng, smoothstep};
 use glam::{Affine3A, Quat, Vec2, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -154,7 +154,7 @@ impl Bay {
                     .map(|p| m.vertex(p.extend(z), Vec3::Z * side, vec2(p.x * side + half, -p.y)));
                 m.indices.extend([v[0], v[1], v[2], v[0], v[2], v[3]]);
             }
-            // The strip beside the arch below its shoulder is level with the spring.
+            // The strip next to the arch below its shoulder is level with the spring.
         }
         m
     }
@@ -179,11 +179,11 @@ impl Bay {
             ];
             curve(&p, moulding_steps)
         };
-        let path: Vec<Frame> = (0..=self.segments)
+        let path: Vec<SweepFrame> = (0..=self.segments)
             .map(|i| {
                 let p = self.arch_point(self.radius, i);
                 let out = (p - vec2(0.0, self.spring)) / self.radius;
-                Frame {
+                SweepFrame {
                     origin: p.extend(0.0),
                     right: out.extend(0.0),
                     up: Vec3::Z,
@@ -247,11 +247,11 @@ pub fn rib(radius: f32, spring: f32, width: f32, depth: f32, segments: usize) ->
         sharp(0.3 * depth, -w),
         sharp(depth, -w),
     ];
-    let path: Vec<Frame> = (0..=segments)
+    let path: Vec<SweepFrame> = (0..=segments)
         .map(|i| {
             let (sin, cos) = (PI * (1.0 - i as f32 / segments as f32)).sin_cos();
             let out = vec3(cos, sin, 0.0);
-            Frame {
+            SweepFrame {
                 origin: vec3(0.0, spring, 0.0) + out * (radius - depth),
                 right: out,
                 up: Vec3::Z,
@@ -270,7 +270,7 @@ pub fn rib(radius: f32, spring: f32, width: f32, depth: f32, segments: usize) ->
 pub fn moulding(profile: &[Knot], length: f32, y: f32) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     // right x up = z x y = -x: travel backwards.
-    let path = [length, 0.0].map(|x| Frame {
+    let path = [length, 0.0].map(|x| SweepFrame {
         origin: vec3(x, y, 0.0),
         right: Vec3::Z,
         up: Vec3::Y,

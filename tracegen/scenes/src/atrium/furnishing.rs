@@ -1,10 +1,10 @@
-//! What makes the atrium lived in: drapes, plants, reliefs, lamps, a fountain.
+//! Furnishing of the atrium: drapes, plants, reliefs, lamps, a fountain.
 
-use super::atrium_materials::Palette;
-use super::atrium_parts::{arching_leaf, drape, lion_medallion, pot, rosette};
-use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
-use super::noise::Rng;
-use super::scene_builder::SceneBuilder;
+use super::materials::Palette;
+use super::parts::{arching_leaf, drape, lion_medallion, pot, rosette};
+use crate::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
+use crate::noise::Rng;
+use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -103,8 +103,7 @@ fn drapes(scene: &mut SceneBuilder, p: &Palette) {
 fn plants(scene: &mut SceneBuilder, p: &Palette) {
     let mut rng = Rng::new(77);
     let pot_mesh = scene.mesh("pot", pot(20, 1), p.pot);
-    let mut earth = MeshBuilder::new();
-    earth.lathe(
+    let earth = lathed(
         &[sharp(0.86, 0.88), smooth(0.4, 0.92), smooth(0.0, 0.93)],
         20,
     );

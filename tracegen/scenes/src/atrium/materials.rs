@@ -1,14 +1,14 @@
 //! Materials of the atrium: the rich palette and the plain one.
 
-use super::masonry::{
+use crate::masonry::{
     brick, carved_band, carved_stone, dressed_stone, octagon_tiles, plaster, roof_tiles, slabs,
 };
-use super::organic::{LeafShape, damask, leaf, metal, planks, soil, upright};
-use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, Surface, rgb};
+use crate::organic::{LeafShape, damask, leaf, metal, planks, soil, upright};
+use crate::scene_builder::{MaterialId, SceneBuilder};
+use crate::texture_synth::{Maps, Recipe, Surface, rgb};
 use scene::AlphaMode;
 
-/// The materials that the architecture asks for.
+/// The materials of the architecture.
 #[derive(Clone, Copy, Debug)]
 pub struct Palette {
     /// Slabs of the open court.
@@ -62,18 +62,11 @@ pub struct Palette {
 }
 
 fn recipe(name: &'static str, maps: Maps, tile_m: f32, surface: Surface) -> Recipe {
-    Recipe {
-        name,
-        size: 1024,
-        maps,
-        tile_m,
-        surface,
-    }
+    Recipe::new(name, 1024, maps, tile_m, surface)
 }
 
-/// Texture sets of the rich palette, in the order that [`rich`] consumes them.
-#[must_use]
-pub fn rich_textures() -> Vec<Recipe> {
+/// Texture sets of floors, walls and roofs, in the order of the [`Palette`].
+fn masonry_textures() -> Vec<Recipe> {
     use Maps::{Full, FullOcclusion};
     let sand = [rgb(0xcdb894), rgb(0xb39b74)];
     let cream = [rgb(0xd9cbb0), rgb(0xc2ae8c)];
@@ -149,6 +142,13 @@ pub fn rich_textures() -> Vec<Recipe> {
             2.6,
             roof_tiles([rgb(0xb5643e), rgb(0x8f4a30)]),
         ),
+    ]
+}
+
+/// Texture sets of what stands and hangs in the building, in the order of the [`Palette`].
+fn furnishing_textures() -> Vec<Recipe> {
+    use Maps::Full;
+    vec![
         recipe(
             "old-beams",
             Full,
@@ -219,8 +219,8 @@ pub fn rich_textures() -> Vec<Recipe> {
 }
 
 /// Every surface its own material.
-pub fn rich(scene: &mut SceneBuilder, sets: Vec<Recipe>) -> Palette {
-    let mut sets = sets.into_iter();
+pub fn rich(scene: &mut SceneBuilder) -> Palette {
+    let mut sets = masonry_textures().into_iter().chain(furnishing_textures());
     let mut next = |leafy: bool| {
         let Some(set) = sets.next() else {
             return scene.plain("missing", rgb(0xff_00ff), 0.8, |_| {});
@@ -263,13 +263,7 @@ pub fn rich(scene: &mut SceneBuilder, sets: Vec<Recipe>) -> Palette {
 
 /// Eight base-colour textures, shared widely; only the floor has a normal map.
 pub fn plain(scene: &mut SceneBuilder) -> Palette {
-    let simple = |name, size, maps, tile_m, surface| Recipe {
-        name,
-        size,
-        maps,
-        tile_m,
-        surface,
-    };
+    let simple = Recipe::new;
     let sand = [rgb(0xcdb894), rgb(0xb39b74)];
     let mut sets = [
         simple(

@@ -1,8 +1,8 @@
 //! Plants, rocks and trunks of the jungle, each a mesh to be instanced.
 
-use super::atrium_parts::arching_leaf;
-use super::mesh_builder::MeshBuilder;
-use super::noise::{Rng, bank};
+use crate::atrium::parts::arching_leaf;
+use crate::mesh_builder::MeshBuilder;
+use crate::noise::{Rng, bank};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
 

@@ -1,16 +1,32 @@
 //! The still: burner, retort, condenser, receiver and the stand that holds them.
 
-use super::glassware::{glass_tube, helix, round_flask, stopper};
-use super::lab::{Kit, Ware, at, vessel};
-use super::mesh_builder::{Knot, MeshBuilder, curve, sharp, smooth};
-use super::noise::smoothstep;
-use super::scene_builder::SceneBuilder;
+use super::{LabMaterials, Ware, at, vessel};
+use crate::glassware::{glass_tube, helix, round_flask, stopper};
+use crate::mesh_builder::{Knot, MeshBuilder, curve, lathed, sharp, smooth};
+use crate::noise::smoothstep;
+use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::TAU;
 
-pub(super) fn distillation(scene: &mut SceneBuilder, kit: &Kit) {
-    // Burner.
-    let (bx, bz) = (-0.02, 0.0);
+/// Axis of the burner and of the retort above it, metres.
+const AXIS_X: f32 = -0.02;
+const AXIS_Z: f32 = 0.0;
+/// Height of the retort's bottom, metres.
+const LIFT: f32 = 0.131;
+
+pub(super) fn distillation(scene: &mut SceneBuilder, kit: &LabMaterials) {
+    burner(scene, kit);
+    hose(scene, kit);
+    let neck_end = retort(scene, kit);
+    let outlet = condenser(scene, kit, neck_end);
+    receiver(scene, kit, outlet);
+    let mut metal = MeshBuilder::new();
+    stand(&mut metal);
+    tripod(&mut metal);
+    scene.add("stand", metal, kit.steel);
+}
+
+fn burner(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let mut burner = MeshBuilder::new();
     let body = [
         sharp(0.0, 0.0),
@@ -31,9 +47,8 @@ pub(super) fn distillation(scene: &mut SceneBuilder, kit: &Kit) {
     ];
     burner.lathe(&curve(&body, 3), 32);
     let burner = scene.mesh("burner", burner, kit.brass);
-    scene.place(burner, at(bx, 0.0, bz));
-    let mut flame = MeshBuilder::new();
-    flame.lathe(
+    scene.place(burner, at(AXIS_X, 0.0, AXIS_Z));
+    let flame = lathed(
         &curve(
             &[
                 smooth(0.0, 0.08),
@@ -47,15 +62,18 @@ pub(super) fn distillation(scene: &mut SceneBuilder, kit: &Kit) {
         20,
     );
     let flame = scene.mesh("flame", flame, kit.flame);
-    scene.place(flame, at(bx, 0.0, bz));
+    scene.place(flame, at(AXIS_X, 0.0, AXIS_Z));
+}
+
+fn hose(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let hose: Vec<(Vec3, f32)> = (0..=24)
         .map(|i| {
             let t = i as f32 / 24.0;
             (
                 vec3(
-                    bx - 0.03 - 0.33 * t,
+                    AXIS_X - 0.03 - 0.33 * t,
                     0.008 + 0.012 * (1.0 - t),
-                    bz - 0.02 - 0.14 * t * t + 0.03 * (9.0 * t).sin(),
+                    AXIS_Z - 0.02 - 0.14 * t * t + 0.03 * (9.0 * t).sin(),
                 ),
                 0.0055,
             )
@@ -64,45 +82,42 @@ pub(super) fn distillation(scene: &mut SceneBuilder, kit: &Kit) {
     let mut tube = MeshBuilder::new();
     tube.tube(&hose, 12);
     scene.add("hose", tube, kit.rubber);
+}
 
-    // Retort: a bulb whose neck bends over into the condenser.
+/// A bulb whose neck bends over into the condenser; returns the neck's end.
+fn retort(scene: &mut SceneBuilder, kit: &LabMaterials) -> Vec3 {
     let bulb = round_flask(0.045, 0.012, 1);
-    let lift = 0.131;
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &bulb,
-            wall: 0.0015,
-            segments: 47,
-            lip: 0.0,
-        },
+        &Ware::new(&bulb, 0.0015, 47, 0.0),
         Some((kit.liquids[2], 0.034)),
-        &[at(bx, lift, bz)],
+        &[at(AXIS_X, LIFT, AXIS_Z)],
     );
-    let mut plug = MeshBuilder::new();
-    plug.lathe(&stopper(0.0125), 24);
+    let plug = lathed(&stopper(0.0125), 24);
     let plug = scene.mesh("stopper", plug, kit.rubber);
-    scene.place(plug, at(bx, lift + 0.103, bz));
+    scene.place(plug, at(AXIS_X, LIFT + 0.103, AXIS_Z));
     let neck: Vec<(Vec3, f32)> = (0..=40)
         .map(|i| {
             let t = i as f32 / 40.0;
             let bend = smoothstep(0.0, 0.45, t);
-            let y = lift + 0.088 + 0.055 * (t * 3.2).sin().max(-1.0) * (1.0 - 0.3 * t)
+            let y = LIFT + 0.088 + 0.055 * (t * 3.2).sin().max(-1.0) * (1.0 - 0.3 * t)
                 - 0.03 * bend * t;
             (
-                vec3(bx + 0.02 + 0.165 * t.powf(0.9), y, bz - 0.003 * t),
+                vec3(AXIS_X + 0.02 + 0.165 * t.powf(0.9), y, AXIS_Z - 0.003 * t),
                 0.0125 - 0.0055 * t,
             )
         })
         .collect();
     scene.add("retort-neck", glass_tube(&neck, 0.82, 16), kit.glass);
+    neck.last().map_or(Vec3::ZERO, |n| n.0)
+}
 
-    // Condenser: jacket, coil, nozzles, hung at a slant from the neck's end.
-    let end = neck.last().map_or(Vec3::ZERO, |n| n.0);
+/// Jacket, coil and nozzles, at a slant below the neck's end; returns the point below the outlet.
+fn condenser(scene: &mut SceneBuilder, kit: &LabMaterials, neck_end: Vec3) -> Vec3 {
     let slant = Affine3A::from_rotation_translation(
         Quat::from_rotation_z(0.42),
-        end + vec3(0.022, -0.175, 0.0),
+        neck_end + vec3(0.022, -0.175, 0.0),
     );
     let jacket = curve(
         &[
@@ -124,8 +139,7 @@ pub(super) fn distillation(scene: &mut SceneBuilder, kit: &Kit) {
         sharp: k.sharp,
     }));
     walls.push(jacket[0]);
-    let mut m = MeshBuilder::new();
-    m.lathe(&walls, 32);
+    let m = lathed(&walls, 32);
     let jacket = scene.mesh("condenser", m, kit.glass);
     scene.place(jacket, slant);
     let mut coil = helix(0.0125, 0.0125, 9.0, 0.0032, 20);
@@ -143,24 +157,21 @@ pub(super) fn distillation(scene: &mut SceneBuilder, kit: &Kit) {
         let nozzle = scene.mesh("nozzle", glass_tube(&nozzle, 0.6, 16), kit.glass);
         scene.place(nozzle, slant);
     }
-    // Receiver.
-    let foot = slant.transform_point3(vec3(0.0, -0.002, 0.0));
-    let receiver = round_flask(0.031, 0.022, 1);
-    let low = (foot.y - 0.088).max(0.012);
+    slant.transform_point3(vec3(0.0, -0.002, 0.0))
+}
+
+/// The flask below the condenser, on a ring of cork.
+fn receiver(scene: &mut SceneBuilder, kit: &LabMaterials, outlet: Vec3) {
+    let flask = round_flask(0.031, 0.022, 1);
+    let low = (outlet.y - 0.088).max(0.012);
     vessel(
         scene,
         kit.glass,
-        &Ware {
-            outer: &receiver,
-            wall: 0.0014,
-            segments: 40,
-            lip: 0.0,
-        },
+        &Ware::new(&flask, 0.0014, 40, 0.0),
         Some((kit.liquids[0], 0.018)),
-        &[at(foot.x, low, foot.z)],
+        &[at(outlet.x, low, outlet.z)],
     );
-    let mut cork = MeshBuilder::new();
-    cork.lathe(
+    let cork = lathed(
         &curve(
             &[
                 sharp(0.019, 0.0),
@@ -176,50 +187,58 @@ pub(super) fn distillation(scene: &mut SceneBuilder, kit: &Kit) {
         36,
     );
     let ring = scene.mesh("cork-ring", cork, kit.wood);
-    scene.place(ring, at(foot.x, low - 0.012, foot.z));
+    scene.place(ring, at(outlet.x, low - 0.012, outlet.z));
+}
 
-    // Stand: plate, rod, two clamps; a tripod with gauze over the flame.
-    let mut stand = MeshBuilder::new();
+/// Plate, rod and the clamp around the retort's neck.
+fn stand(stand: &mut MeshBuilder) {
     stand.block(
-        vec3(bx - 0.12, 0.0, bz - 0.13),
-        vec3(bx + 0.05, 0.010, bz - 0.02),
+        vec3(AXIS_X - 0.12, 0.0, AXIS_Z - 0.13),
+        vec3(AXIS_X + 0.05, 0.010, AXIS_Z - 0.02),
         0.003,
     );
-    let rod_x = bx - 0.075;
+    let rod_x = AXIS_X - 0.075;
     stand.tube(
         &[
-            (vec3(rod_x, 0.008, bz - 0.075), 0.0048),
-            (vec3(rod_x, 0.36, bz - 0.075), 0.0048),
+            (vec3(rod_x, 0.008, AXIS_Z - 0.075), 0.0048),
+            (vec3(rod_x, 0.36, AXIS_Z - 0.075), 0.0048),
         ],
         20,
     );
-    let y = lift + 0.094;
+    let y = LIFT + 0.094;
     stand.block(
-        vec3(rod_x - 0.011, y - 0.011, bz - 0.087),
-        vec3(rod_x + 0.011, y + 0.011, bz - 0.062),
+        vec3(rod_x - 0.011, y - 0.011, AXIS_Z - 0.087),
+        vec3(rod_x + 0.011, y + 0.011, AXIS_Z - 0.062),
         0.003,
     );
     stand.tube(
         &[
-            (vec3(rod_x, y, bz - 0.07), 0.0034),
-            (vec3(bx - 0.03, y, bz - 0.035), 0.0034),
-            (vec3(bx - 0.014, y, bz - 0.012), 0.0034),
+            (vec3(rod_x, y, AXIS_Z - 0.07), 0.0034),
+            (vec3(AXIS_X - 0.03, y, AXIS_Z - 0.035), 0.0034),
+            (vec3(AXIS_X - 0.014, y, AXIS_Z - 0.012), 0.0034),
         ],
         14,
     );
     let ring: Vec<(Vec3, f32)> = (0..=32)
         .map(|i| {
             let (sin, cos) = (TAU * (i % 32) as f32 / 32.0).sin_cos();
-            (vec3(bx + 0.0165 * cos, y, bz + 0.0165 * sin), 0.0026)
+            (
+                vec3(AXIS_X + 0.0165 * cos, y, AXIS_Z + 0.0165 * sin),
+                0.0026,
+            )
         })
         .collect();
     stand.tube(&ring, 12);
+}
+
+/// A tripod with gauze over the flame.
+fn tripod(stand: &mut MeshBuilder) {
     let top = 0.1285;
     let ring: Vec<(Vec3, f32)> = (0..=40)
         .map(|i| {
             let (sin, cos) = (TAU * (i % 40) as f32 / 40.0).sin_cos();
             (
-                vec3(bx + 0.047 * cos, top - 0.004, bz + 0.047 * sin),
+                vec3(AXIS_X + 0.047 * cos, top - 0.004, AXIS_Z + 0.047 * sin),
                 0.0028,
             )
         })
@@ -230,10 +249,13 @@ pub(super) fn distillation(scene: &mut SceneBuilder, kit: &Kit) {
         stand.tube(
             &[
                 (
-                    vec3(bx + 0.047 * cos, top - 0.004, bz + 0.047 * sin),
+                    vec3(AXIS_X + 0.047 * cos, top - 0.004, AXIS_Z + 0.047 * sin),
                     0.0028,
                 ),
-                (vec3(bx + 0.072 * cos, 0.0, bz + 0.072 * sin), 0.0028),
+                (
+                    vec3(AXIS_X + 0.072 * cos, 0.0, AXIS_Z + 0.072 * sin),
+                    0.0028,
+                ),
             ],
             12,
         );
@@ -247,9 +269,8 @@ pub(super) fn distillation(scene: &mut SceneBuilder, kit: &Kit) {
             } else {
                 (vec3(-reach, 0.0007, o), vec3(reach, 0.0007, o))
             };
-            let c = vec3(bx, top, bz);
+            let c = vec3(AXIS_X, top, AXIS_Z);
             stand.tube(&[(c + a, 0.0005), (c + b, 0.0005)], 5);
         }
     }
-    scene.add("stand", stand, kit.steel);
 }

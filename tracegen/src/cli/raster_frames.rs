@@ -1,0 +1,322 @@
+//! `tracegen raster` with the techniques of its options: plans, prepares, captures, compares and prints.
+
+use super::capture_steps::{TraceOutput, load, prepare_textures, warn_of_multiview_defect};
+use super::raster::{RasterArgs, cascades, shadow_range_m, tables};
+use super::raster_summary::{Summary, worked_since};
+use super::scene_args::SceneSetup;
+use crate::study::processor;
+use crate::unstable_triangles::UnstableTriangles;
+use anyhow::ensure;
+use formats::textrace::Pass;
+use formats::view::FrameViews;
+use glam::Vec3;
+use raster::backend::{CaptureBackend, Fragments};
+use raster::capture::{CaptureJob, CapturedFrame, Pictures};
+use raster::draws::DrawList;
+use raster::drivers::Opened;
+use raster::frame::Frame;
+use raster::lighting::Lighting;
+use shell::{Output, Progress, note};
+use std::time::{Duration, Instant};
+use techniques::{Planner, Skips};
+use textures::TextureSet;
+
+/// What is captured of a scene.
+struct Session<'a> {
+    args: &'a RasterArgs,
+    setup: &'a SceneSetup,
+    draws: DrawList,
+    planner: Planner,
+    bounds: (Vec3, Vec3),
+}
+
+/// A frame as it is rendered without capture.
+struct PlainFrame {
+    pictures: Pictures,
+    /// Depth per view, where captures are compared by depth.
+    depths: Option<Vec<Vec<f32>>>,
+}
+
+/// Captures the frames of a path.
+///
+/// # Errors
+/// Unreadable input, no driver, or a file that cannot be written.
+pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
+    let started = Instant::now();
+    let cache = args.cache.open()?;
+    let progress = Progress::new("loading the scene", 0, "");
+    let setup = load(args, outputs)?;
+    let loaded = started.elapsed();
+    progress.stage("preparing textures and shaders", 0, "");
+    let mut session = Session::new(args, &setup)?;
+    let (passes, finest) = session.plan()?;
+    let searched = started.elapsed();
+    let textures = prepare_textures(&setup.scene, |image| finest[image], cache.as_ref())?;
+    let textured = started.elapsed();
+    let mut opened = session.open_driver(&textures)?;
+    let backend = opened.backend.as_mut();
+    let tables = tables(
+        &setup,
+        &args.scene.scene,
+        &session.draws,
+        &textures,
+        backend,
+        passes,
+        args.hsr,
+    );
+    let texels = texels_note(&textures, searched - loaded);
+    let counts = [textures.textures.len(), textures.cached, textures.unseen()];
+    drop(textures);
+    let mut summary = Summary::default();
+    let first = session.first_frame(backend, &mut summary)?;
+    if session.planner.settings().multiview {
+        warn_of_multiview_defect(backend)?;
+    }
+    let ready = started.elapsed();
+    note_ready(&args.scene.scene, counts, [loaded, textured, ready]);
+    progress.stage("capturing", setup.frames.len() as u64, "frames");
+    let mut output = TraceOutput::create(args, &tables, &setup.scene, &session.draws)?;
+    let mut first_pictures: Option<Pictures> = None;
+    let mut first = Some(first);
+    for views in &setup.frames {
+        let pictures = session.frame(backend, views, first.take(), &mut output, &mut summary)?;
+        first_pictures = first_pictures.or(pictures);
+        progress.advance(1);
+    }
+    drop(progress);
+    let size_px = setup.hmd.eye_size_px;
+    let start = Instant::now();
+    let file_bytes = output.finish(first_pictures.as_ref(), size_px)?;
+    summary.captured += start.elapsed();
+    if summary.counts.fragments == 0 {
+        super::scene_args::warn_of_nothing_seen(&setup.camera, session.bounds, setup.scene.origin);
+    }
+    let per_frame = summary.counts.fragments / setup.frames.len().max(1) as u64;
+    let unstable = summary.unstable.unwrap_or_default();
+    for warning in unstable.warnings(&setup.scene, per_frame) {
+        shell::warn(&warning);
+    }
+    note(&texels);
+    let views = [setup.frames.len(), args.views.len()];
+    summary.print(views, size_px, file_bytes, &backend.work());
+    Ok(())
+}
+
+impl<'a> Session<'a> {
+    fn new(args: &'a RasterArgs, setup: &'a SceneSetup) -> anyhow::Result<Self> {
+        let cascades = cascades(&setup.scene, args.shadows);
+        Ok(Self {
+            args,
+            setup,
+            draws: DrawList::new(&setup.scene, cascades)?,
+            planner: Planner::new(
+                &args.techniques.settings(&setup.hmd)?,
+                &setup.hmd,
+                args.techniques.lens.lenses(&setup.hmd)?,
+                args.views,
+                args.path.fps,
+            )?,
+            bounds: setup.scene.bounds().unwrap_or_default(),
+        })
+    }
+
+    /// Moves the draws to where they are in a frame.
+    fn pose(&mut self, frame: u32) {
+        let time_s = self.setup.moments.time_s(frame);
+        self.draws.pose(&self.setup.scene, time_s);
+    }
+
+    /// What to capture of the draws where they are.
+    fn job(&self) -> CaptureJob<'_> {
+        let args = self.args;
+        CaptureJob {
+            scene: &self.setup.scene,
+            draws: &self.draws,
+            lighting: Lighting::new(&self.setup.scene),
+            bounds: self.bounds,
+            shadow_range_m: shadow_range_m(self.setup, self.bounds),
+            planner: &self.planner,
+            skips: Skips::without(&args.no_skip),
+            fragments: args.hsr,
+            // Both views at once leave no depth to compare.
+            shaded: args.shade
+                || self.planner.settings().multiview
+                || args.no_plain && args.image.is_some(),
+        }
+    }
+
+    /// The passes of all frames, and the finest level of each image that a view samples. Draws are where
+    /// they start afterwards.
+    fn plan(&mut self) -> anyhow::Result<(Vec<Pass>, Vec<Option<u32>>)> {
+        let (mut passes, mut finest) = (Vec::new(), Vec::new());
+        for views in &self.setup.frames {
+            // The layers of a frame depend on where its draws are.
+            self.pose(views.frame);
+            let job = self.job();
+            passes.extend(job.passes(views)?);
+            job.add_finest_levels(views, &mut finest)?;
+        }
+        self.pose(self.setup.moments.frames.start);
+        Ok((passes, finest))
+    }
+
+    /// Opens the driver and prints what it replaces or lacks.
+    fn open_driver(&self, textures: &TextureSet) -> anyhow::Result<Opened> {
+        let size_px = self.setup.hmd.eye_size_px;
+        let budget = self.args.record_budget;
+        let driver = self.args.backend;
+        let opened = driver.open(&self.setup.scene, &self.draws, textures, size_px, budget)?;
+        let backend = &opened.backend;
+        if let Some(reason) = &opened.instead_of {
+            shell::warn(&format!("{reason}; {} captures instead", backend.name()));
+        }
+        if backend.name() == "osmesa" {
+            self.args.check_plain_frames()?;
+        }
+        if let Some(lacks) = backend.records_fragments_because() {
+            note(&format!(
+                "{} lacks {lacks}: fragments are recorded one by one and merged into quads",
+                backend.driver()
+            ));
+        }
+        Ok(opened)
+    }
+
+    /// Culls the first frame, renders its shadow maps and warms the driver up.
+    fn first_frame(
+        &self,
+        backend: &mut dyn CaptureBackend,
+        summary: &mut Summary,
+    ) -> anyhow::Result<Frame> {
+        let job = self.job();
+        let first = summary.look(&job, backend, &self.setup.frames[0])?;
+        summary.light(&job, backend, &first)?;
+        if !self.args.no_plain {
+            job.warm_up(backend, &first)?;
+        }
+        Ok(first)
+    }
+
+    /// Captures a frame, which `first` is if it has been culled before. Returns its pictures if any were
+    /// drawn.
+    fn frame(
+        &mut self,
+        backend: &mut dyn CaptureBackend,
+        views: &FrameViews,
+        first: Option<Frame>,
+        output: &mut TraceOutput<'_>,
+        summary: &mut Summary,
+    ) -> anyhow::Result<Option<Pictures>> {
+        self.pose(views.frame);
+        backend.pose(&self.draws);
+        if summary.unstable.is_none() {
+            let unstable = summary.unstable.insert(UnstableTriangles::default());
+            for eye in self.args.views {
+                unstable.look(
+                    &self.setup.scene,
+                    &self.draws,
+                    &views.eyes[*eye as usize],
+                    self.setup.hmd.eye_size_px,
+                );
+            }
+        }
+        let job = self.job();
+        let frame = match first {
+            Some(first) => first,
+            None => {
+                let frame = summary.look(&job, backend, views)?;
+                summary.light(&job, backend, &frame)?;
+                frame
+            }
+        };
+        let plain = match self.args.no_plain {
+            true => None,
+            false => Some(render_plain(&job, backend, &frame, summary)?),
+        };
+        let captured = capture(&job, backend, &frame, output, summary)?;
+        let Some(plain) = plain else {
+            return Ok(captured.pictures);
+        };
+        let compared = match (&captured.pictures, &plain.depths) {
+            (Some(drawn), _) => Some(("pictures", *drawn == plain.pictures)),
+            (_, Some(depths)) => Some(("depths", job.depths(backend, &frame)? == *depths)),
+            _ => None,
+        };
+        if let Some((what, same)) = compared {
+            ensure!(
+                same,
+                "frame {}: {what} with and without capture differ: the capture disturbed the rendering",
+                views.frame
+            );
+            summary.compared = Some(what);
+        }
+        Ok(Some(plain.pictures))
+    }
+}
+
+fn render_plain(
+    job: &CaptureJob<'_>,
+    backend: &mut dyn CaptureBackend,
+    frame: &Frame,
+    summary: &mut Summary,
+) -> anyhow::Result<PlainFrame> {
+    let (worked, before) = (processor::time(), backend.work());
+    let (pictures, time) = job.plain_frame(backend, frame)?;
+    summary.plain += time;
+    summary.plain_draws.add(before, backend.work());
+    summary.plain_work += worked_since(worked);
+    // A capture that draws no picture has only its depth in common with the plain frame.
+    let compares_depth = !job.shaded && job.fragments == Fragments::DepthTested;
+    let depths = compares_depth.then(|| job.depths(backend, frame));
+    Ok(PlainFrame {
+        pictures,
+        depths: depths.transpose()?,
+    })
+}
+
+fn capture(
+    job: &CaptureJob<'_>,
+    backend: &mut dyn CaptureBackend,
+    frame: &Frame,
+    output: &mut TraceOutput<'_>,
+    summary: &mut Summary,
+) -> anyhow::Result<CapturedFrame> {
+    let (start, worked, before) = (Instant::now(), processor::time(), backend.work());
+    let captured = output.tracer.capture(job, backend, frame)?;
+    summary.capture_draws.add(before, backend.work());
+    summary.sorting += captured.sorting;
+    summary.captured += start.elapsed();
+    summary.captured_work += worked_since(worked);
+    summary.counts += captured.counts;
+    summary.predicted.push(frame.plan.predicted);
+    Ok(captured)
+}
+
+/// Says which texels were prepared and which left out.
+fn texels_note(textures: &TextureSet, searched: Duration) -> String {
+    let mib = |bytes: usize| bytes as f64 / f64::from(1 << 20);
+    format!(
+        "{:.1} MiB of texels, {:.1} MiB left out ({} images and the finest levels of {} that no view samples, found in {:.2} s)",
+        mib(textures.bytes()),
+        mib(textures.skipped_bytes()),
+        textures.unseen(),
+        textures.shortened(),
+        searched.as_secs_f64()
+    )
+}
+
+/// Prints how long the preparation took, from the times at which its steps ended.
+fn note_ready(
+    scene: &str,
+    [textures, cached, unseen]: [usize; 3],
+    [loaded, textured, ready]: [Duration; 3],
+) {
+    note(&format!(
+        "{scene}: ready in {:.2} s (scene {:.2} s; textures {:.2} s: {} compressed, {cached} from the cache, {unseen} seen by no view; driver {:.2} s)",
+        ready.as_secs_f64(),
+        loaded.as_secs_f64(),
+        (textured - loaded).as_secs_f64(),
+        textures - cached - unseen,
+        (ready - textured).as_secs_f64(),
+    ));
+}
