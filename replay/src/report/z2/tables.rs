@@ -123,8 +123,8 @@ pub fn parts<'a>(
     for detail in details {
         for column in pick::<Part>(&["l1_miss_pct", "l2_miss_pct", "external_lines"]) {
             let order = detail.point.config.order.title();
-            let name = format!("{} {order}", column.heading.name);
-            columns.push(at(column, parts_of(detail), name));
+            let name = column.heading.name.to_string();
+            columns.push(at(column, parts_of(detail), name).group(order));
         }
     }
     Table::new(&columns, &busiest(first, most))
