@@ -200,7 +200,7 @@ mod tests {
         assert_eq!(distinct(&["a", "b"], 12), ["a", "b"]);
         assert_eq!(
             distinct(&["textures/curtain.png"], 13),
-            ["texture\u{2026}n.png"[..].replace("texture", "textur")]
+            ["textur\u{2026}in.png"]
         );
         assert_eq!(distinct(&["a", "a", "a"], 12), ["a", "a (2)", "a (3)"]);
         assert_eq!(distinct(&["", ""], 12), ["", " (2)"]);

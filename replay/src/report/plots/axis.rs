@@ -22,12 +22,19 @@ enum Scale {
     #[default]
     Linear,
     Doublings(Doublings),
-    /// Powers of ten from this one on; zero and smaller values have a place of their own below.
-    Decades(i32),
+    /// Powers of ten from the first to the last; zero and smaller values have a place of their own below.
+    Decades([i32; 2]),
 }
 
 /// Distance of the place of zero below the first decade, in decades.
 const ZERO_BELOW: f64 = 0.6;
+/// The same as a share of a long axis, so that the ticks do not touch.
+const ZERO_BELOW_SHARE: f64 = 0.08;
+
+/// The place of zero on an axis of these decades.
+fn zero_place([first, last]: [i32; 2]) -> f64 {
+    f64::from(first) - (ZERO_BELOW_SHARE * f64::from(last - first)).max(ZERO_BELOW)
+}
 
 /// An axis.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -75,7 +82,7 @@ impl Axis {
         match ends {
             Some((low, high)) if low < high / 20.0 => Self {
                 label: format!("{label}; logarithmic above 0"),
-                scale: Scale::Decades(low.log10().floor() as i32),
+                scale: Scale::Decades([low, high].map(|end| end.log10().floor() as i32)),
                 ..Self::default()
             },
             _ => Self::linear(label),
@@ -87,7 +94,7 @@ impl Axis {
         match self.scale {
             Scale::Doublings(_) => value.log2(),
             Scale::Linear => value,
-            Scale::Decades(first) if value <= 0.0 => f64::from(first) - ZERO_BELOW,
+            Scale::Decades(ends) if value <= 0.0 => zero_place(ends),
             Scale::Decades(_) => value.log10(),
         }
     }
@@ -146,8 +153,8 @@ impl Axis {
                 };
                 whole.map(|power| (f64::from(power), text(power))).collect()
             }
-            Scale::Decades(first) => {
-                let zero = f64::from(first) - ZERO_BELOW;
+            Scale::Decades([first, last]) => {
+                let zero = zero_place([first, last]);
                 let zero = range.contains(&zero).then(|| (zero, "0".to_owned()));
                 let above = f64::from(first).max(range.start)..range.end;
                 let decades = whole_numbers(&above, MOST_TICKS).into_iter();

@@ -195,9 +195,14 @@ pub(super) fn tick_format(range: &Range<f64>) -> impl Fn(&f64) -> String + use<>
         let tick = (value / step).round() * step + 0.0;
         if long {
             let digits = (tick.abs() / step).max(1.0).log10().ceil() as usize;
-            return match tick {
-                0.0 => "0".to_owned(),
-                tick => format!("{tick:.digits$e}", digits = digits.min(12)),
+            let text = format!("{tick:.digits$e}", digits = digits.min(12));
+            return match text.split_once('e') {
+                Some((mantissa, _)) if tick == 0.0 || mantissa.is_empty() => "0".to_owned(),
+                Some((mantissa, power)) if mantissa.contains('.') => {
+                    let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
+                    format!("{mantissa}e{power}")
+                }
+                _ => text,
             };
         }
         theme::group_thousands(&format!("{tick:.decimals$}"))
