@@ -1,9 +1,10 @@
 //! Run time against error (`replay.accuracy/3`): a table and a chart per study, the recommended choices,
 //! and the table of errors on reports.
 
+use super::answers;
 use super::columns::{Column, Record};
 use super::errors::KnownError;
-use super::html::{self, Section};
+use super::html::{self, Answer, Section};
 use super::plots::lines::Axis;
 use super::plots::scatter::{NamedPoint, ScatterChart};
 use super::plots::{PlotError, SeriesStyle};
@@ -124,7 +125,10 @@ impl Measured {
         Some(ScatterChart {
             title: self.study.title.to_owned(),
             x: Axis::linear(format!("time of {}, \u{d7}", self.study.time)),
-            y: Axis::linear(format!("{}{unit}{}, mean", error.name, error.unit)),
+            y: Axis::from_zero(
+                format!("{}{unit}{}, mean", error.name, error.unit),
+                at.iter().map(|at| at.1),
+            ),
             kinds: [
                 "not dominated".to_owned(),
                 "dominated: another is as good in both".to_owned(),
@@ -361,10 +365,28 @@ impl AccuracyReport {
         for measured in &self.studies {
             sections.push(Section::new(measured.study.title, section(measured)?));
         }
-        let lead = html! { p { "Run time and error of faster methods (" (TOOL) "), measured one after another on one thread." } };
+        let about = html! { p { "Run time and error of faster methods (" (TOOL) "), measured one after another on one thread." } };
+        let chart = match self.studies.iter().find_map(Measured::chart) {
+            Some(chart) => html::figure(&chart.svg()?, ""),
+            None => html! {},
+        };
+        let recommended: Vec<_> = (self.studies.iter())
+            .map(|measured| {
+                let study = measured.study;
+                let times = measured.of(study.recommended).filter_map(|c| c.time_ratio);
+                let time = mean_and_largest(times).map(|t| t.0);
+                let is_reference = study.recommended == study.reference;
+                (study.title.to_owned(), time, is_reference)
+            })
+            .collect();
+        let answer = Answer {
+            sentences: answers::recommended(&recommended),
+            chart,
+            about,
+        };
         Ok(html::page(
             "Parallax: run time against error",
-            &lead,
+            &answer,
             &sections,
         ))
     }

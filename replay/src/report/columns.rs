@@ -171,11 +171,24 @@ pub struct Heading {
     pub show: Show,
     /// Definition of the figure, for charts and for the page's notes; may be empty.
     pub about: &'static str,
+    /// Group of columns in tables of a page; may be empty.
+    pub group: Cow<'static, str>,
     /// Whether it holds published figures, which tables print in a lighter ink.
     pub published: bool,
 }
 
 impl Heading {
+    /// Name of the group of columns in tables of a page: the part of the key before the dot, unless one is
+    /// set.
+    #[must_use]
+    pub fn group_name(&self) -> String {
+        match (self.group.is_empty(), self.key.split_once('.')) {
+            (false, _) => self.group.to_string(),
+            (true, Some((first, _))) => first.replace('_', " "),
+            (true, None) => String::new(),
+        }
+    }
+
     /// Name in CSV and Parquet files.
     #[must_use]
     pub fn flat_key(&self) -> String {
@@ -213,6 +226,7 @@ impl<'a, R: ?Sized> Column<'a, R> {
                 kind: V::KIND,
                 show,
                 about: "",
+                group: Cow::Borrowed(""),
                 published: false,
             },
             value: Box::new(move |row| value(row).into()),
@@ -254,6 +268,13 @@ impl<'a, R: ?Sized> Column<'a, R> {
     #[must_use]
     pub fn about(mut self, about: &'static str) -> Self {
         self.heading.about = about;
+        self
+    }
+
+    /// Sets the group of columns in tables of a page.
+    #[must_use]
+    pub fn group(mut self, group: impl Into<Cow<'static, str>>) -> Self {
+        self.heading.group = group.into();
         self
     }
 

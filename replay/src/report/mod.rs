@@ -2,6 +2,7 @@
 
 pub mod accuracy;
 pub mod addresses;
+pub mod answers;
 pub mod calibration;
 pub mod columns;
 pub mod compare;

@@ -1,7 +1,7 @@
 //! Every reading of the SGRT paper's figure 3, beside the paper's values (`replay.readings/2`).
 
 use super::columns::Column;
-use super::html::{Section, figures, folded, page};
+use super::html::{Answer, Section, figure, figures, folded, page};
 use super::plots::lines::{Axis, LineChart, LineSeries, Mark};
 use super::plots::{PlotError, SeriesStyle};
 use super::table::Table;
@@ -236,16 +236,34 @@ impl ReadingsReport {
     }
 
     /// What was found, in sentences.
-    fn lead(&self) -> String {
+    fn sentences(&self) -> Vec<String> {
         let (count, scenes) = (self.fits.len(), self.scenes.len());
         let saving = self.fits.iter().filter(|f| f.relative_energy < 1.0).count();
-        let mut text = format!(
-            "Does reprojection save energy? In the mean over all scenes ({scenes}), it does under {saving} of {count} readings of the paper."
-        );
+        let readings = match count {
+            1 => "the only reading".to_owned(),
+            count => format!("the {count} readings"),
+        };
+        let of = match scenes {
+            1 => "On the only scene".to_owned(),
+            scenes => format!("In the mean over {scenes} scenes"),
+        };
+        let verdict = match saving {
+            0 => format!("none of {readings}")
+                .replace("none of the only reading", "not under the only reading"),
+            saving if saving == count => format!(
+                "under {}",
+                readings.replacen("the ", "all ", usize::from(count > 1))
+            ),
+            saving => format!("under {saving} of {readings}"),
+        };
+        let verdict = verdict.replacen("none of", "under none of", 1);
+        let mut text = vec![format!(
+            "{of}, reprojection saves energy {verdict} of the paper."
+        )];
         if let Some(fit) = self.chosen.and_then(|index| self.fits.get(index)) {
             let distance = |d: Option<f64>| d.map_or("-".to_owned(), |d| format!("{d:.3}"));
-            text += &format!(
-                " Closest to the paper's figure 3 on the scenes that calibrate is reading {}: {}, reuse of {}, rule {}, tested against {}, G-buffer by {} (RMS of ln(ours/paper) {}; on the test scenes {}).",
+            text.push(format!(
+                "Closest to the paper's figure 3 on the scenes that calibrate is reading {}: {}, reuse of {}, rule {}, tested against {}, G-buffer by {} (RMS of ln(ours/paper) {}; on the test scenes {}).",
                 fit.index + 1,
                 scope_name(fit.reading.scope),
                 super::sgrt::reuse_name(fit.reading.reuse),
@@ -254,7 +272,7 @@ impl ReadingsReport {
                 gbuffer_name(fit.reading.gbuffer),
                 distance(fit.calibration),
                 distance(fit.test),
-            );
+            ));
         }
         text
     }
@@ -262,7 +280,7 @@ impl ReadingsReport {
     /// The tables for a terminal.
     #[must_use]
     pub fn text(&self) -> String {
-        let mut out = self.lead() + "\n\nReadings\n" + &self.fits().text();
+        let mut out = self.sentences().join(" ") + "\n\nReadings\n" + &self.fits().text();
         if let Some(index) = self.chosen {
             out += "\nThe closest reading, scene by scene\n";
             out += &self.closest(index).text();
@@ -283,8 +301,7 @@ impl ReadingsReport {
     /// # Errors
     /// A chart that cannot be drawn.
     pub fn page(&self) -> Result<String, PlotError> {
-        let lead = html! {
-            p { (self.lead()) }
+        let about = html! {
             p {
                 "The paper (Lee et al., \u{201c}Fast Stereoscopic Rendering on Mobile Ray Tracing GPU for Virtual Reality "
                 "Applications\u{201d}) leaves open what its figure 3 measures and what a reused pixel takes over. Each reading "
@@ -307,7 +324,32 @@ impl ReadingsReport {
             "Configuration",
             folded("All parameters", &config),
         ));
-        Ok(page("Readings of the SGRT paper", &lead, &sections))
+        let answer = Answer {
+            sentences: self.sentences(),
+            chart: figure(
+                &self.trade().svg()?,
+                "A symbol for each reading and scene; hover names the reading's figures.",
+            ),
+            about,
+        };
+        Ok(page("Readings of the SGRT paper", &answer, &sections))
+    }
+
+    /// Energy against performance.
+    fn trade(&self) -> LineChart {
+        let series = |(number, scene): (usize, &SceneReadings)| LineSeries {
+            style: SeriesStyle::nth(&scene.label, number),
+            points: (scene.readings.iter())
+                .map(|(_, f)| (f.relative_performance, f.relative_energy))
+                .collect(),
+            mark: Mark::Dots,
+        };
+        LineChart {
+            title: "Energy against performance under every reading".to_owned(),
+            x: Axis::linear("frames per second over tracing both eyes"),
+            y: Axis::linear("energy over tracing both eyes"),
+            series: self.scenes.iter().enumerate().map(series).collect(),
+        }
     }
 
     fn charts(&self) -> Result<Markup, PlotError> {

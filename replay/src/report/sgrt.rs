@@ -4,8 +4,9 @@ mod charts;
 mod tables;
 
 use crate::paper::sgrt as paper;
+use crate::report::answers;
 use crate::report::errors::{self, KnownError, Of};
-use crate::report::html::{Section, folded, page as html_page};
+use crate::report::html::{Answer, Section, figure as html_figure, folded, page as html_page};
 use crate::report::plots::{PlotError, data_uri};
 use crate::sgrt::result::Report;
 use maud::{Markup, html};
@@ -45,7 +46,7 @@ pub struct Thumbnails {
 /// # Errors
 /// A chart that cannot be drawn.
 pub fn page(entries: &[Entry]) -> Result<String, PlotError> {
-    let lead = html! {
+    let about = html! {
         p {
             "The left image is traced in full. Its hits are reprojected into the right eye and "
             "reused unless error detection rejects them. Ratios compare with the same hardware "
@@ -53,11 +54,31 @@ pub fn page(entries: &[Entry]) -> Result<String, PlotError> {
             "Rendering on Mobile Ray Tracing GPU for Virtual Reality Applications\u{201d}."
         }
     };
+    let answer = Answer {
+        sentences: sentences(entries),
+        chart: html_figure(&charts::performance(entries).svg()?, ""),
+        about,
+    };
     Ok(html_page(
         "Stereo reprojection on a mobile ray-tracing GPU",
-        &lead,
+        &answer,
         &sections(entries)?,
     ))
+}
+
+fn sentences(entries: &[Entry]) -> Vec<String> {
+    let scene = |entry: &Entry| {
+        let (report, result) = (&entry.report, &entry.report.result);
+        answers::Reprojected {
+            scene: tables::scene_name(report),
+            performance: result.relative_performance,
+            energy: result.relative_energy,
+            reuse_pct: result.reuse_pct,
+            flip: result.flip_mean,
+            paper: (report.paper.as_ref()).map(|p| [p.relative_performance, p.relative_energy]),
+        }
+    };
+    answers::reprojected(&entries.iter().map(scene).collect::<Vec<_>>())
 }
 
 /// The sections, for a page with other sections.

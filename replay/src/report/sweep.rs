@@ -1,11 +1,13 @@
 //! A sweep's results: rows, table, CSV and page.
 
+use super::answers;
 use super::columns::{Column, Records};
 use super::config_columns;
 use super::figures::{Figure, figure, figures, number};
-use super::html::{self, Section, folded};
+use super::html::{self, Answer, Section, folded};
 use super::plots::bars::{BarChart, BarGroup};
 use super::plots::hbars::HBarChart;
+use super::plots::lines::{self, Doublings, LineChart, LineSeries, Mark};
 use super::plots::{PlotError, SeriesStyle};
 use super::table::Table;
 use super::theme;
@@ -174,14 +176,12 @@ impl<'a> SweepReport<'a> {
         for subject in subjects {
             let charts = Charts::new(self, &subject.label);
             if !self.file.one_at_a_time.is_empty() {
-                pictures.push((charts.changes().svg()?, String::new()));
+                pictures.push((charts.changes().svg()?, charts.fixed(None)));
             }
-            for chart in charts.axes() {
-                pictures.push((chart.svg()?, String::new()));
-            }
+            pictures.extend(charts.axes()?);
         }
         let base = toml::to_string(&self.file.base).unwrap_or_default();
-        let lead = html! {
+        let about = html! {
             p {
                 (self.rows.len()) " points over " (subjects.len()) @if subjects.len() == 1 { " trace. " } @else { " traces. " }
                 "The same numbers are in the JSON and CSV files next to this page. The folder points/ has the configuration and result of each point."
@@ -196,7 +196,64 @@ impl<'a> SweepReport<'a> {
             Section::new("Traces", traces),
             Section::new("Base configuration", folded("TOML", &base)),
         ];
-        Ok(html::page(title, &lead, &sections))
+        let chart = match pictures.first() {
+            Some((svg, caption)) => html::figure(svg, caption),
+            None => html! {},
+        };
+        let answer = Answer {
+            sentences: self.sentences(),
+            chart,
+            about,
+        };
+        Ok(html::page(title, &answer, &sections))
+    }
+}
+
+impl SweepReport<'_> {
+    fn sentences(&self) -> Vec<String> {
+        let several = self.outcome.subjects.len() > 1;
+        let point = |row: &ResultRow| {
+            let place = if several {
+                format!("{}: ", row.subject.label)
+            } else {
+                String::new()
+            };
+            Some((
+                format!("{place}{}", row.point.title()),
+                number(row, TRAFFIC)?,
+            ))
+        };
+        let points: Vec<(String, f64)> = self.rows.iter().filter_map(point).collect();
+        let effect = |(index, axis): (usize, &Axis)| {
+            let mean = |value: &Value| {
+                let own = self.rows.iter().filter(|row| {
+                    let own = row.point.settings.get(index).map(|(_, own)| own);
+                    row.point.change.is_none() && own == Some(value)
+                });
+                let all: Vec<f64> = own.filter_map(|row| number(row, TRAFFIC)).collect();
+                let mean = all.iter().sum::<f64>() / all.len() as f64;
+                (!all.is_empty()).then(|| (plain(value), mean))
+            };
+            (
+                axis.key.clone(),
+                axis.values.iter().filter_map(mean).collect(),
+            )
+        };
+        let effects: Vec<_> = self.file.axes.iter().enumerate().map(effect).collect();
+        answers::sweep(&points, &effects)
+    }
+}
+
+/// The number that an axis's value stands for, and whether it has a unit of bytes.
+fn numeric(value: &Value) -> Option<(f64, bool)> {
+    match value {
+        Value::Integer(number) => Some((*number as f64, false)),
+        Value::Float(number) => Some((*number, false)),
+        Value::String(text) => {
+            let bytes = crate::size::parse_bytes(text).ok()?;
+            Some((bytes as f64, true))
+        }
+        _ => None,
     }
 }
 
@@ -279,28 +336,87 @@ impl<'a> Charts<'a> {
         }
     }
 
-    /// A chart for each axis except the order, with the other axes at their first value.
-    fn axes(&self) -> Vec<BarChart> {
+    /// The settings that a chart of this axis holds fixed.
+    fn fixed(&self, axis: Option<&str>) -> String {
+        let varies = |key: &str| Some(key) == axis || (key == ORDER && !self.orders.is_empty());
+        let axes = self.report.file.axes.iter();
+        let fixed: Vec<String> = axes
+            .filter(|a| !varies(&a.key))
+            .filter_map(|a| Some(format!("{} = {}", a.key, plain(a.values.first()?))))
+            .collect();
+        match fixed.is_empty() {
+            true => "Held fixed: the base configuration.".to_owned(),
+            false => format!(
+                "Held fixed: {}; all else as in the base configuration.",
+                fixed.join(", ")
+            ),
+        }
+    }
+
+    /// A chart for each axis except the order, with the other axes at their first value: lines over
+    /// numbers, bars over names.
+    fn axes(&self) -> Result<Vec<(String, String)>, PlotError> {
         let axes = self.report.file.axes.iter();
         axes.filter(|a| a.key != ORDER && a.values.len() > 1)
-            .map(|axis| BarChart {
-                title: format!("{}: {}", self.scene, axis.key),
-                value_label: value_label(),
-                group_label: axis.key.clone(),
-                series: self.series(),
-                groups: axis
-                    .values
-                    .iter()
-                    .map(|v| BarGroup {
-                        label: plain(v),
-                        values: self.values(Some((&axis.key, v)), None),
-                        marks: Vec::new(),
-                    })
-                    .collect(),
-                decimals: Some(1),
-                ..BarChart::default()
+            .map(|axis| {
+                let numbers: Option<Vec<_>> = axis.values.iter().map(numeric).collect();
+                let svg = match numbers {
+                    Some(numbers) => self.lines(axis, &numbers).svg()?,
+                    None => self.bars(axis).svg()?,
+                };
+                Ok((svg, self.fixed(Some(&axis.key))))
             })
             .collect()
+    }
+
+    fn lines(&self, axis: &Axis, numbers: &[(f64, bool)]) -> LineChart {
+        let values: Vec<Vec<Option<f64>>> = (axis.values.iter())
+            .map(|v| self.values(Some((&axis.key, v)), None))
+            .collect();
+        let series = |(index, style): (usize, SeriesStyle)| {
+            let points = numbers.iter().zip(&values);
+            let mut points: Vec<(f64, f64)> = points
+                .filter_map(|((at, _), values)| Some((*at, values[index]?)))
+                .collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            LineSeries {
+                style,
+                points,
+                mark: Mark::Line,
+            }
+        };
+        let ends = |of: fn(f64, f64) -> f64| numbers.iter().map(|n| n.0).reduce(of).unwrap_or(0.0);
+        let (low, high) = (ends(f64::min), ends(f64::max));
+        let is_bytes = numbers.iter().all(|n| n.1) || axis.key.ends_with("_bytes");
+        let x = match (low > 0.0 && high >= 4.0 * low, is_bytes) {
+            (true, true) => lines::Axis::doublings(axis.key.clone(), Doublings::Bytes),
+            (true, false) => lines::Axis::doublings(axis.key.clone(), Doublings::Numbers),
+            (false, _) => lines::Axis::linear(axis.key.clone()),
+        };
+        LineChart {
+            title: format!("{}: {}", self.scene, axis.key),
+            x,
+            y: lines::Axis::linear(value_label()),
+            series: self.series().into_iter().enumerate().map(series).collect(),
+        }
+    }
+
+    fn bars(&self, axis: &Axis) -> BarChart {
+        BarChart {
+            title: format!("{}: {}", self.scene, axis.key),
+            value_label: value_label(),
+            group_label: axis.key.clone(),
+            series: self.series(),
+            groups: (axis.values.iter())
+                .map(|v| BarGroup {
+                    label: plain(v),
+                    values: self.values(Some((&axis.key, v)), None),
+                    marks: Vec::new(),
+                })
+                .collect(),
+            decimals: Some(2),
+            ..BarChart::default()
+        }
     }
 }
 

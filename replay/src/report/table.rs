@@ -4,6 +4,9 @@ use super::columns::{Column, Heading, Show, Value};
 use formats::text::printable;
 use maud::{Markup, html};
 
+/// Longer texts are wrapped on pages.
+const LONGEST_LINE_CHARS: usize = 60;
+
 /// Cells under headings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
@@ -131,7 +134,26 @@ impl Table {
         out
     }
 
-    /// As HTML in a scrolling box with fixed headings.
+    /// Groups of columns: those that share the group of their headings, or the part of their keys before
+    /// the dot. A group of one column has no name.
+    fn column_groups(&self) -> Vec<(String, std::ops::Range<usize>)> {
+        let mut start = 0;
+        let group = |run: &[Heading]| {
+            let range = start..start + run.len();
+            start = range.end;
+            let name = if run.len() > 1 {
+                run[0].group_name()
+            } else {
+                String::new()
+            };
+            (name, range)
+        };
+        let same = |a: &Heading, b: &Heading| a.group_name() == b.group_name();
+        self.headings.chunk_by(same).map(group).collect()
+    }
+
+    /// As HTML in a scrolling box with fixed headings and a fixed first column. The page's script adds
+    /// sorting, filtering and a choice of columns.
     #[must_use]
     pub fn markup(&self) -> Markup {
         let class = |heading: &Heading| match (heading.show == Show::Text, heading.published) {
@@ -140,29 +162,61 @@ impl Table {
             (true, true) => "paper",
             (true, false) => "",
         };
+        let cells = self.cells();
+        // Long texts wrap.
+        let wide: Vec<bool> = (0..self.headings.len())
+            .map(|column| {
+                let longest = cells.iter().map(|row| row[column].chars().count()).max();
+                self.headings[column].show == Show::Text && longest > Some(LONGEST_LINE_CHARS)
+            })
+            .collect();
+        let groups = self.column_groups();
+        let is_grouped = groups.iter().any(|(name, _)| !name.is_empty());
+        let starts = |column: usize| {
+            let of = groups.iter().find(|(_, range)| range.start == column);
+            is_grouped && column > 0 && of.is_some()
+        };
+        let class = |column: usize| {
+            let wide = if wide[column] { " wide" } else { "" };
+            let from = if starts(column) { " from" } else { "" };
+            format!("{}{wide}{from}", class(&self.headings[column]))
+                .trim()
+                .to_owned()
+        };
+        let class = |column: usize| {
+            let class = class(column);
+            (!class.is_empty()).then_some(class)
+        };
         html! {
-            div.scroll.tall {
+            div.table { div.scroll.tall tabindex="0" role="region" aria-label=(if self.caption.is_empty() { "table" } else { self.caption }) {
                 table {
                     @if !self.caption.is_empty() { caption { (self.caption) } }
-                    thead { tr {
-                        @for h in &self.headings {
-                            th class=(class(h)) scope="col" title=[(!h.about.is_empty()).then_some(h.about)] {
+                    thead {
+                    @if is_grouped { tr {
+                        @for (name, range) in &groups {
+                            th.group scope="colgroup" colspan=(range.len()) data-from=(range.start) data-to=(range.end) { (name) }
+                        }
+                    } }
+                    tr {
+                        @for (column, h) in self.headings.iter().enumerate() {
+                            th class=[class(column)] scope="col" title=[(!h.about.is_empty()).then_some(h.about)] {
                                 (h.name)
                                 @if !h.unit.is_empty() { small { (h.unit) } }
                             }
                         }
                     } }
                     tbody {
-                        @for (i, row) in self.cells().iter().enumerate() {
-                            tr class=(if self.begins_group(i) { "first" } else { "" }) {
-                                @for (cell, h) in row.iter().zip(&self.headings) {
-                                    td class=(class(h)) { (cell) }
+                        @for (i, row) in cells.iter().enumerate() {
+                            tr class=[self.begins_group(i).then_some("first")] {
+                                @for (column, cell) in row.iter().enumerate() {
+                                    @if column == 0 { th scope="row" class=[class(0)] { (cell) } }
+                                    @else { td class=[class(column)] { (cell) } }
                                 }
                             }
                         }
                     }
                 }
-            }
+            } }
         }
     }
 

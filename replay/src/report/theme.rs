@@ -64,6 +64,45 @@ pub fn text_width_px(text: &str, size_px: u32) -> f64 {
     em * f64::from(size_px)
 }
 
+/// Names of at most `most` characters that all differ. The middle of a long name is left out, and names
+/// that would read the same get a number.
+#[must_use]
+pub fn distinct<S: AsRef<str>>(names: &[S], most: usize) -> Vec<String> {
+    let mut out: Vec<String> = Vec::with_capacity(names.len());
+    // The part that differs should stay, so as much of the end is kept as of the start, then less and less.
+    for name in names {
+        let chars: Vec<char> = name.as_ref().chars().collect();
+        let candidate = |start: usize, mark: &str| -> String {
+            let room = most.saturating_sub(mark.chars().count());
+            if chars.len() <= room {
+                return chars.iter().copied().chain(mark.chars()).collect();
+            }
+            let end = room.saturating_sub(start + 1);
+            let head = chars[..start.min(room)].iter().copied();
+            let tail = chars[chars.len() - end..].iter().copied();
+            head.chain(['\u{2026}'])
+                .chain(tail)
+                .chain(mark.chars())
+                .collect()
+        };
+        let cuts = (0..most.saturating_sub(1)).map(|cut| {
+            // From the middle outwards.
+            let half = most / 2;
+            if cut % 2 == 0 {
+                half.saturating_sub(cut / 2)
+            } else {
+                half + cut / 2 + 1
+            }
+        });
+        let cuts = cuts.filter(|start| start + 1 < most);
+        let plain = cuts.map(|start| candidate(start, ""));
+        let numbered = (2..).map(|number| candidate(most / 2 - 2, &format!(" ({number})")));
+        let found = plain.chain(numbered).find(|name| !out.contains(name));
+        out.extend(found);
+    }
+    out
+}
+
 /// Moves label positions apart to at least `gap`, as close to `wishes` as possible (least squares), inside
 /// `low..=high`. The result is in the order of `wishes`.
 ///
@@ -154,6 +193,32 @@ mod tests {
     #[test]
     fn spread_centres_a_cluster_on_its_wishes() {
         assert_eq!(spread(&[50.0, 50.0], 10.0, 0.0, 100.0), [45.0, 55.0]);
+    }
+
+    #[test]
+    fn short_names_stay_and_long_ones_lose_their_middle() {
+        assert_eq!(distinct(&["a", "b"], 12), ["a", "b"]);
+        assert_eq!(
+            distinct(&["textures/curtain.png"], 13),
+            ["textur\u{2026}in.png"]
+        );
+        assert_eq!(distinct(&["a", "a", "a"], 12), ["a", "a (2)", "a (3)"]);
+        assert_eq!(distinct(&["", ""], 12), ["", " (2)"]);
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn shortened_names_differ_and_fit(
+            names in proptest::collection::vec("[ab]{0,40}", 0..20),
+            most in 10_usize..40,
+        ) {
+            let short = distinct(&names, most);
+            proptest::prop_assert_eq!(short.len(), names.len());
+            for (index, name) in short.iter().enumerate() {
+                proptest::prop_assert!(name.chars().count() <= most, "{}", name);
+                proptest::prop_assert!(!short[..index].contains(name), "{}", name);
+            }
+        }
     }
 
     #[test]

@@ -1,12 +1,30 @@
-//! The self-contained HTML page: inline styles and pictures, no script, no external resources.
+//! The self-contained HTML page: inline styles, script and pictures, no external resources.
 //!
-//! A page is a title, a few facts and a list of [`Section`]s. Every subcommand that writes a page builds
-//! sections and calls [`page`].
+//! A page is a title, its [`Answer`] and a list of [`Section`]s. Every subcommand that writes a page builds
+//! them and calls [`page`]. The script sorts and filters tables; the page is whole without it.
+
+mod words;
+
+pub use words::{change, count, list};
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// Inline style sheet. It recolours the plots' inks by attribute to follow the reader's colour scheme.
 const CSS: &str = include_str!("style.css");
+
+/// Sorting, filtering and choice of columns.
+const SCRIPT: &str = include_str!("script.js");
+
+/// The top of a page: what was found, in up to three sentences and one chart.
+#[derive(Clone, Debug)]
+pub struct Answer {
+    /// Sentences, computed from the figures.
+    pub sentences: Vec<String>,
+    /// The chart that shows it; empty if there is nothing to draw.
+    pub chart: Markup,
+    /// What was done, and where the figures are.
+    pub about: Markup,
+}
 
 /// One part of a page.
 #[derive(Clone, Debug)]
@@ -45,9 +63,9 @@ pub fn slug(title: &str) -> String {
     out.trim_end_matches('-').to_owned()
 }
 
-/// The whole page. `lead` is the paragraph under the title.
+/// The whole page.
 #[must_use]
-pub fn page(title: &str, lead: &Markup, sections: &[Section]) -> String {
+pub fn page(title: &str, answer: &Answer, sections: &[Section]) -> String {
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -59,7 +77,12 @@ pub fn page(title: &str, lead: &Markup, sections: &[Section]) -> String {
                 style { (PreEscaped(CSS)) }
             }
             body {
-                header { h1 { (title) } div.lead { (lead) } }
+                header {
+                    h1 { (title) }
+                    @if !answer.sentences.is_empty() { p.answer { (answer.sentences.join(" ")) } }
+                    (answer.chart)
+                    div.lead { (answer.about) }
+                }
                 nav aria-label="Contents" {
                     ol { @for s in sections { li { a href={ "#" (s.id) } { (s.title) } } } }
                 }
@@ -68,6 +91,7 @@ pub fn page(title: &str, lead: &Markup, sections: &[Section]) -> String {
                         section id=(s.id) { h2 { (s.title) } (s.body) }
                     }
                 }
+                script { (PreEscaped(SCRIPT)) }
             }
         }
     }
@@ -104,13 +128,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_page_loads_no_resources_and_runs_no_script() {
+    fn a_page_begins_with_its_answer_and_loads_no_resources() {
         let section = Section::new("Table 2: a & b", html! { p { "x" } });
         assert_eq!(section.id, "table-2-a-b");
-        let text = page("T", &html! { "lead" }, &[section]);
-        for forbidden in ["<script", "<link", "src=\"http", "url(", "@import"] {
+        let answer = Answer {
+            sentences: vec!["One.".into(), "Two.".into()],
+            chart: html! { "chart" },
+            about: html! { "about" },
+        };
+        let text = page("T", &answer, &[section]);
+        for forbidden in [
+            "<script src",
+            "<link",
+            "src=\"http",
+            "url(",
+            "@import",
+            "fetch(",
+        ] {
             assert!(!text.contains(forbidden), "{forbidden}");
         }
+        let place = |part: &str| text.find(part).expect("the part is on the page");
+        assert!(place("One. Two.") < place("chart") && place("chart") < place("<nav"));
         assert!(text.contains("href=\"#table-2-a-b\"") && text.contains("id=\"table-2-a-b\""));
         assert!(text.contains("Table 2: a &amp; b"));
     }

@@ -3,7 +3,8 @@
 use super::columns::Summary;
 use super::{LocalityReport, TraceFigures, plots};
 use crate::locality::Stream;
-use crate::report::html::{self, Section, figures};
+use crate::report::answers;
+use crate::report::html::{self, Answer, Section, figures};
 use crate::report::plots::PlotError;
 use crate::report::plots::stacked::StackedChart;
 use crate::report::table::Table;
@@ -69,7 +70,7 @@ impl LocalityReport {
         ));
         let names: Vec<&str> = self.traces.iter().map(|t| t.label.as_str()).collect();
         let rendered = self.traces.iter().any(TraceFigures::is_rendered);
-        let lead = html! {
+        let about = html! {
             p {
                 "Reuse distances of cache lines in " (names.join(", ")) @if rendered { ", in each tile order" }
                 ", and the resulting misses of caches of every size, without latencies. "
@@ -81,8 +82,47 @@ impl LocalityReport {
                 }
             }
         };
-        Ok(html::page("Parallax: locality", &lead, &sections))
+        let chart = match rows.chunk_by(same).next() {
+            Some(rows) => html::figure(&plots::miss_ratio(rows).svg()?, ""),
+            None => html! {},
+        };
+        let answer = Answer {
+            sentences: sentences(&rows),
+            chart,
+            about,
+        };
+        Ok(html::page("Parallax: locality", &answer, &sections))
     }
+}
+
+/// The misses of the first trace's streams, and its hits on the other eye's lines.
+fn sentences(rows: &[Summary]) -> Vec<String> {
+    let Some(first) = rows.first() else {
+        return Vec::new();
+    };
+    let own = rows.iter().filter(|row| row.of.trace == first.of.trace);
+    let own: Vec<&Summary> = own.collect();
+    let mut out = Vec::new();
+    for rows in own
+        .chunk_by(|a, b| a.of.stream.key() == b.of.stream.key())
+        .take(2)
+    {
+        let cache = format!(
+            "{}, {} of {}",
+            rows[0].of.trace,
+            rows[0].of.stream.title(),
+            format_bytes(rows[0].cache.size_bytes)
+        );
+        let misses = rows.iter().filter_map(|row| {
+            Some(answers::Misses {
+                order: row.of.order.title().to_owned(),
+                miss_pct: row.share_pct(row.figures.split.misses())?,
+                opt_pct: row.share_pct(row.opt_misses())?,
+            })
+        });
+        out.extend(answers::misses(&cache, &misses.collect::<Vec<_>>()));
+    }
+    out
 }
 
 /// A stream of a trace: its table and plots.

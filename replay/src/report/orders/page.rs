@@ -3,8 +3,11 @@
 use super::{Mean, OrdersReport, columns, means};
 use crate::order::{Known, View, WorkItem};
 use crate::orders_study::{BASELINE, Of, Row};
-use crate::report::html::{self, Section, figures};
+use crate::report::answers;
+use crate::report::html::{self, Answer, Section, figures};
 use crate::report::plots::PlotError;
+use crate::report::plots::SeriesStyle;
+use crate::report::plots::hbars::HBarChart;
 use crate::report::plots::paths::{PathPlot, Stop};
 use crate::report::table::Table;
 use maud::{Markup, html};
@@ -74,14 +77,20 @@ impl OrdersReport<'_> {
                 &toml::to_string(&self.config).unwrap_or_default(),
             ),
         ));
-        let lead = html! {
+        let about = html! {
             p {
                 "Bytes between the L2 and memory in each tile order, against those of " code { (BASELINE.name()) }
                 " with the same caches: geometric means over traces and caches. Bounds and searched orders know the frame's accesses in advance; no hardware can have them. "
                 "The JSON file beside this page has every figure, the CSV file every row."
             }
         };
-        Ok(html::page("Parallax: tile orders", &lead, &sections))
+        let means = self.means();
+        let answer = Answer {
+            sentences: sentences(&means),
+            chart: html::figure(&best_and_bounds(&means).svg()?, ""),
+            about,
+        };
+        Ok(html::page("Parallax: tile orders", &answer, &sections))
     }
 
     /// The path of each order over a small picture on the display of the first trace.
@@ -110,6 +119,55 @@ impl OrdersReport<'_> {
             p { "On pictures of " (PATH_TILES[0]) " by " (PATH_TILES[1]) " tiles with an L2 that holds a row of four columns; pairings as on the display of the first trace, at this size." }
             (figures(&pictures))
         })
+    }
+}
+
+/// Means over everything, for the first treatment of caches between frames.
+fn first_of<'m, 'a>(means: &'m [Mean<'a>]) -> impl Iterator<Item = &'m Mean<'a>> {
+    let between = means.first().map(|mean| mean.between);
+    means
+        .iter()
+        .filter(move |mean| Some(mean.between) == between)
+}
+
+fn is_buildable(mean: &Mean<'_>) -> bool {
+    mean.rows.first().is_some_and(|row| row.is_buildable())
+}
+
+fn sentences(means: &[Mean<'_>]) -> Vec<String> {
+    let orders = first_of(means).map(|mean| answers::Studied {
+        name: mean.name(),
+        change_pct: mean.change_pct().unwrap_or(0.0),
+        is_buildable: is_buildable(mean),
+    });
+    let rows = first_of(means).map(|mean| mean.rows.len()).max();
+    answers::studied(
+        BASELINE.name(),
+        &orders.collect::<Vec<_>>(),
+        rows.unwrap_or(0),
+    )
+}
+
+/// Bytes of every order and bound relative to the baseline.
+fn best_and_bounds(means: &[Mean<'_>]) -> HBarChart {
+    let row = |mean: &Mean<'_>| {
+        let value = mean.change_pct().map(|change| 100.0 + change);
+        let values = if is_buildable(mean) {
+            vec![value, None]
+        } else {
+            vec![None, value]
+        };
+        (mean.name(), values)
+    };
+    HBarChart {
+        title: "Bytes from memory by order".to_owned(),
+        value_label: format!("% of the bytes of {}", BASELINE.name()),
+        series: vec![
+            SeriesStyle::nth("hardware can follow it", 2),
+            SeriesStyle::nth("needs the future, or a bound", 7),
+        ],
+        rows: first_of(means).map(row).collect(),
+        decimals: Some(1),
     }
 }
 

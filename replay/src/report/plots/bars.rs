@@ -1,9 +1,9 @@
 //! Grouped bars with optional reference marks, such as a paper's values.
 
 use super::frame::{Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+use super::lines::exact;
 use super::{PlotError, SeriesStyle};
 use crate::report::theme;
-use plotters::prelude::{Color, PathElement, Rectangle};
 use plotters::style::text_anchor::HPos;
 
 /// One group of bars, such as a scene or a cache configuration.
@@ -87,7 +87,7 @@ impl BarChart {
                 LEFT_PX,
             ],
         };
-        frame.draw(|root, mut builder| {
+        frame.draw(|root, mut builder, marks| {
             // Group number `g` spans g to g + 1.
             let mut chart = builder.build_cartesian_2d(0.0..groups, values.clone())?;
             let mut mesh = chart.configure_mesh();
@@ -106,15 +106,18 @@ impl BarChart {
                     let Some(value) = *value else { continue };
                     let left = middle + bar * (s as f64 - bars / 2.0);
                     let right = left + bar;
-                    let corners = [(left, 0.0), (right, value)];
-                    let mut rectangle = Rectangle::new(corners, style.color.filled());
-                    rectangle.set_margin(0, 0, 1, 1);
-                    chart.plotting_area().draw(&rectangle)?;
+                    let [(x0, y0), (x1, y1)] =
+                        [(left, 0.0), (right, value)].map(|at| chart.backend_coord(&at));
                     let mark = group.marks.get(s).copied().flatten();
+                    let mut title = format!("{}, {}: {}", group.label, style.name, exact(value));
+                    if let (Some(mark), Some(name)) = (mark, &self.mark_name) {
+                        title += &format!(" ({name}: {})", exact(mark));
+                    }
+                    marks.rect([(x0 + 1, y0), (x1 - 1, y1)], style.color, &title);
                     if let Some(mark) = mark {
-                        let style = theme::INK.stroke_width(theme::LINE_PX);
-                        let line = PathElement::new([(left, mark), (right, mark)], style);
-                        chart.plotting_area().draw(&line)?;
+                        let y = chart.backend_coord(&(left, mark)).1;
+                        let width = f64::from(theme::LINE_PX);
+                        marks.line(&[(x0, y), (x1, y)], theme::INK, (width, ""));
                     }
                     if let Some(decimals) = self.decimals {
                         let (x, top) = chart.backend_coord(&(left + bar / 2.0, value));
@@ -130,10 +133,9 @@ impl BarChart {
                 }
             }
             if let Some(reference) = self.reference {
-                let line = [(0.0, reference), (groups, reference)];
-                chart
-                    .plotting_area()
-                    .draw(&PathElement::new(line, theme::AXIS))?;
+                let line =
+                    [(0.0, reference), (groups, reference)].map(|at| chart.backend_coord(&at));
+                marks.line(&line, theme::AXIS, (1.0, "4 2"));
             }
             Ok(())
         })

@@ -1,10 +1,11 @@
 //! Distributions as horizontal boxes, one per row: whiskers, quartiles and median.
 
+use super::axis::Axis;
 use super::frame::{AXIS_PX, Frame, text_style, themed, tick_format};
-use super::lines::Axis;
+use super::lines::exact;
 use super::{PlotError, SeriesStyle};
 use crate::report::theme;
-use plotters::prelude::{BindKeyPoints, Color, PathElement, Rectangle};
+use plotters::prelude::{BindKeyPoints, Color, PathElement};
 use plotters::style::text_anchor::HPos;
 
 /// A chart of boxes.
@@ -37,6 +38,7 @@ const TOP_PX: u32 = 50;
 const ROW_PX: i32 = 20;
 const BOX_PX: i32 = 10;
 const PLOT_WIDTH_PX: f64 = 420.0;
+const LONGEST_NAME_CHARS: usize = 48;
 
 impl BoxChart {
     /// The chart as SVG.
@@ -54,10 +56,15 @@ impl BoxChart {
         }
         let all = self.rows.iter().flat_map(|row| row.values);
         let x = self.x.fit(all.chain(self.reference));
-        let name_px = self
+        let names: Vec<&str> = self
             .rows
             .iter()
-            .map(|row| theme::text_width_px(&row.style.name, theme::TICK_PX));
+            .map(|row| row.style.name.as_str())
+            .collect();
+        let names = theme::distinct(&names, LONGEST_NAME_CHARS);
+        let name_px = names
+            .iter()
+            .map(|name| theme::text_width_px(name, theme::TICK_PX));
         let height_px = ROW_PX * self.rows.len().max(1) as i32;
         let frame = Frame {
             title: &self.title,
@@ -71,15 +78,17 @@ impl BoxChart {
                 name_px.fold(40.0, f64::max) as u32 + 16,
             ],
         };
-        frame.draw(|root, mut builder| {
+        frame.draw(|root, mut builder, marks| {
             let middles: Vec<i32> = (0..self.rows.len() as i32)
                 .map(|row| ROW_PX * row + ROW_PX / 2)
                 .collect();
             let rows = (height_px..0).with_key_points(middles);
             let mut chart = builder.build_cartesian_2d(x.clone(), rows)?;
             let name = |y: &i32| {
-                let row = self.rows.get((y / ROW_PX) as usize);
-                row.map(|row| row.style.name.clone()).unwrap_or_default()
+                names
+                    .get((y / ROW_PX) as usize)
+                    .cloned()
+                    .unwrap_or_default()
             };
             themed(&mut chart.configure_mesh())
                 .disable_y_mesh()
@@ -100,12 +109,13 @@ impl BoxChart {
                 let whiskers = [(low, y), (high, y)];
                 area.draw(&PathElement::new(whiskers, style.color.stroke_width(1)))?;
                 let corners = [(q1, y - BOX_PX / 2), (q3, y + BOX_PX / 2)];
-                area.draw(&Rectangle::new(corners, style.color.filled()))?;
+                let corners = corners.map(|at| chart.backend_coord(&at));
+                let [low, q1, middle, q3, high] = values.map(exact);
+                let title = format!("{}: {low}, {q1}, {middle}, {q3}, {high}", style.name);
+                marks.rect(corners, style.color, &title);
                 let mark = [(median, y - BOX_PX / 2 - 2), (median, y + BOX_PX / 2 + 2)];
-                area.draw(&PathElement::new(
-                    mark,
-                    theme::INK.stroke_width(theme::LINE_PX),
-                ))?;
+                let mark = mark.map(|at| chart.backend_coord(&at));
+                marks.line(&mark, theme::INK, (f64::from(theme::LINE_PX), ""));
                 let (right, y) = chart.backend_coord(&(x.end, y));
                 let text = format!("{median:.0$}", self.decimals);
                 root.draw_text(&text, &number, (right + 6, y))?;

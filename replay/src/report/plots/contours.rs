@@ -1,9 +1,11 @@
 //! A function of two miss rates as contour lines, with measured points.
 
-use super::frame::{AXIS_PX, DOT_PX, Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+use super::frame::{AXIS_PX, Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+use super::lines::exact;
+use super::marks::Shape;
 use super::{PlotError, SeriesStyle};
 use crate::report::theme;
-use plotters::prelude::{Circle, Color, IntoLogRange, PathElement};
+use plotters::prelude::{IntoLogRange, PathElement};
 use plotters::style::text_anchor::HPos;
 
 /// Points of one series.
@@ -65,11 +67,15 @@ impl ContourChart<'_> {
                 )));
             }
         }
-        let legend = self.series.iter().map(|s| LegendEntry {
-            name: &s.style.name,
-            color: s.style.color,
-            symbol: if s.hollow { Symbol::Ring } else { Symbol::Dot },
-        });
+        let legend = self
+            .series
+            .iter()
+            .enumerate()
+            .map(|(index, s)| LegendEntry {
+                name: &s.style.name,
+                color: s.style.color,
+                symbol: Symbol::Point(Shape::nth(index), !s.hollow),
+            });
         let frame = Frame {
             title: &self.title,
             value_label: &self.y_label,
@@ -77,7 +83,7 @@ impl ContourChart<'_> {
             plot_px: PLOT_PX,
             around_px: [TOP_PX, 26, AXIS_PX, LEFT_PX],
         };
-        frame.draw(|root, mut builder| {
+        frame.draw(|root, mut builder, marks| {
             let x = (low..high).log_scale().base(2.0);
             let mut chart = builder.build_cartesian_2d(x, 0.0..100.0)?;
             themed(&mut chart.configure_mesh())
@@ -88,6 +94,7 @@ impl ContourChart<'_> {
                 .y_label_formatter(&tick_format(&(0.0..100.0)))
                 .draw()?;
             let (levels, unit) = &self.levels;
+            let top = chart.plotting_area().get_pixel_range().1.start;
             let mut ends = Vec::new();
             for &level in levels {
                 let line: Vec<(f64, f64)> = (0..=96)
@@ -107,18 +114,16 @@ impl ContourChart<'_> {
             let placed = theme::spread(&wishes, 34.0, left, left + PLOT_PX.0);
             let name = text_style(theme::TICK_PX, theme::MUTED, HPos::Center);
             for ((level, _), x) in ends.iter().zip(placed) {
-                let at = (x.round() as i32, TOP_PX as i32 - 9);
+                let at = (x.round() as i32, top - 9);
                 root.draw_text(&format!("{level}{unit}"), &name, at)?;
             }
-            for series in &self.series {
-                let color = series.style.color;
-                let style = match series.hollow {
-                    true => color.stroke_width(1),
-                    false => color.filled(),
-                };
-                let dot =
-                    |&(x, y): &(f64, f64)| Circle::new((x.clamp(low, high), y), DOT_PX, style);
-                chart.draw_series(series.points.iter().map(dot))?;
+            for (index, series) in self.series.iter().enumerate() {
+                for &(x, y) in &series.points {
+                    let at = chart.backend_coord(&(x.clamp(low, high), y));
+                    let title = format!("{}: {} % at {} %", series.style.name, exact(y), exact(x));
+                    let style = (series.style.color, !series.hollow);
+                    marks.symbol(Shape::nth(index), at, style, &title);
+                }
             }
             Ok(())
         })

@@ -1,5 +1,6 @@
 //! The frame of every chart: heading, legend, axes and grid in the theme's style.
 
+use super::marks::{Marks, Shape};
 use super::{PlotError, escape};
 use crate::report::theme;
 use plotters::chart::{ChartBuilder, MeshStyle};
@@ -8,8 +9,7 @@ use plotters::coord::ranged1d::Ranged;
 use plotters::coord::types::RangedCoordf64;
 use plotters::drawing::{DrawingArea, DrawingAreaErrorKind};
 use plotters::prelude::{
-    Circle, Color, DrawingBackend, IntoDrawingArea, IntoFont, PathElement, RGBColor, Rectangle,
-    SVGBackend, ShapeStyle, TextStyle,
+    DrawingBackend, IntoDrawingArea, IntoFont, RGBColor, SVGBackend, TextStyle,
 };
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use std::ops::Range;
@@ -23,7 +23,11 @@ pub(super) type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
 pub(super) const DOT_PX: i32 = 4;
 /// Room for tick labels and an axis name below a plotting area, px.
 pub(super) const AXIS_PX: u32 = 44;
-const MOST_TICKS: usize = 7;
+pub(super) const MOST_TICKS: usize = 7;
+/// Height of a row of legend entries after the first, px.
+const LEGEND_ROW_PX: f64 = 18.0;
+/// A legend of several rows is at least this wide, px.
+const LEGEND_WIDTH_PX: f64 = 480.0;
 const LEGEND_SYMBOL_PX: f64 = 17.0;
 const LEGEND_GAP_PX: f64 = 17.0;
 
@@ -32,11 +36,11 @@ pub(super) struct Frame<'a> {
     pub title: &'a str,
     /// Name and unit of the values, below the title.
     pub value_label: &'a str,
-    /// Names in a row below the heading, for bars and point clouds, which have no line end to label.
+    /// Names in rows below the heading, for bars and point clouds, which have no line end to label.
     pub legend: Vec<LegendEntry<'a>>,
     /// Width and height of the plotting area.
     pub plot_px: (f64, f64),
-    /// Space above, right of, below and left of the plotting area.
+    /// Space above (with a legend of one row), right of, below and left of the plotting area.
     pub around_px: [u32; 4],
 }
 
@@ -52,8 +56,8 @@ pub(super) struct LegendEntry<'a> {
 pub(super) enum Symbol {
     Box,
     Stroke,
-    Dot,
-    Ring,
+    /// A symbol of points, filled or hollow.
+    Point(Shape, bool),
 }
 
 impl LegendEntry<'_> {
@@ -67,17 +71,26 @@ impl Frame<'_> {
     /// Returns the SVG's text, with the title as alternative text for screen readers.
     pub(super) fn draw(
         &self,
-        paint: impl FnOnce(&Area, ChartBuilder<SVGBackend>) -> Drawn,
+        paint: impl FnOnce(&Area, ChartBuilder<SVGBackend>, &mut Marks) -> Drawn,
     ) -> Result<String, PlotError> {
         let [top, right, below, left] = self.around_px;
-        let legend_px: f64 = self.legend.iter().map(LegendEntry::width_px).sum();
-        let width = (f64::from(left + right) + self.plot_px.0)
+        let plain_width = f64::from(left + right) + self.plot_px.0;
+        let room = (plain_width - f64::from(left)).max(LEGEND_WIDTH_PX);
+        let legend = self.legend_places(room);
+        let (legend_px, rows) = legend
+            .iter()
+            .zip(&self.legend)
+            .fold((0.0, 0), |most, (at, entry)| {
+                (f64::max(most.0, at.0 + entry.width_px()), most.1.max(at.1))
+            });
+        let top = top + (LEGEND_ROW_PX * f64::from(rows)) as u32;
+        let width = plain_width
             .max(f64::from(left) + legend_px)
             .max(theme::text_width_px(self.title, theme::TITLE_PX) + 16.0)
             .max(theme::text_width_px(self.value_label, theme::LABEL_PX) + 16.0)
             .ceil() as u32;
         let height = top + self.plot_px.1.ceil() as u32 + below;
-        let mut svg = String::new();
+        let (mut svg, mut marks) = (String::new(), Marks::default());
         {
             let root = SVGBackend::with_string(&mut svg, (width, height)).into_drawing_area();
             let mut chart = ChartBuilder::on(&root);
@@ -86,42 +99,59 @@ impl Frame<'_> {
                 .margin_right(f64::from(width - left) - self.plot_px.0)
                 .x_label_area_size(below)
                 .y_label_area_size(left);
-            self.heading(&root)
-                .and_then(|()| paint(&root, chart))
+            // Marks come before the first text, so the heading is drawn after the grid.
+            paint(&root, chart, &mut marks)
+                .and_then(|()| self.heading(&root, &legend, &mut marks))
                 .and_then(|()| root.present())
                 .map_err(|e| PlotError {
                     title: self.title.to_owned(),
                     problem: e.to_string(),
                 })?;
         }
-        let label = format!("<svg role=\"img\" aria-label=\"{}\" ", escape(self.title));
-        Ok(svg.replacen("<svg ", &label, 1))
+        // The font is the same for all texts, and opacity 1 is the default.
+        let family = format!("font-family=\"{}\" ", theme::FONT);
+        svg = svg.replace(&family, "").replace(" opacity=\"1\"", "");
+        let label = format!(
+            "<svg role=\"img\" aria-label=\"{}\" {family}",
+            escape(self.title)
+        );
+        Ok(marks.onto(svg.replacen("<svg ", &label, 1)))
     }
 
-    fn heading(&self, root: &Area) -> Drawn {
+    /// Distance of each legend entry from the left, and its row, in rows of at most `room` pixels.
+    fn legend_places(&self, room: f64) -> Vec<(f64, u32)> {
+        let (mut left, mut row) = (0.0, 0);
+        let place = |entry: &LegendEntry| {
+            if left > 0.0 && left + entry.width_px() > room {
+                (left, row) = (0.0, row + 1);
+            }
+            let at = (left, row);
+            left += entry.width_px();
+            at
+        };
+        self.legend.iter().map(place).collect()
+    }
+
+    fn heading(&self, root: &Area, legend: &[(f64, u32)], marks: &mut Marks) -> Drawn {
         let title = text_style(theme::TITLE_PX, theme::INK, HPos::Left);
         root.draw_text(self.title, &title, (8, 14))?;
         let value_label = text_style(theme::LABEL_PX, theme::MUTED, HPos::Left);
         root.draw_text(self.value_label, &value_label, (8, 33))?;
-        let (mut left, y) = (f64::from(self.around_px[3]), 54);
-        for entry in &self.legend {
-            let (x, color) = (left as i32, entry.color);
-            let dot = |style: ShapeStyle| root.draw(&Circle::new((x + 6, y), DOT_PX, style));
+        for (entry, (left, row)) in self.legend.iter().zip(legend) {
+            let x = (f64::from(self.around_px[3]) + left) as i32;
+            let y = 54 + (LEGEND_ROW_PX * f64::from(*row)) as i32;
             match entry.symbol {
-                Symbol::Box => {
-                    let corners = [(x, y - 5), (x + 12, y + 5)];
-                    root.draw(&Rectangle::new(corners, color.filled()))?;
-                }
+                Symbol::Box => marks.rect([(x, y - 5), (x + 12, y + 5)], entry.color, ""),
                 Symbol::Stroke => {
-                    let style = color.stroke_width(theme::LINE_PX);
-                    root.draw(&PathElement::new([(x, y), (x + 12, y)], style))?;
+                    let width = f64::from(theme::LINE_PX);
+                    marks.line(&[(x, y), (x + 12, y)], entry.color, (width, ""));
                 }
-                Symbol::Dot => dot(color.filled())?,
-                Symbol::Ring => dot(color.stroke_width(1))?,
+                Symbol::Point(shape, filled) => {
+                    marks.symbol(shape, (x + 6, y), (entry.color, filled), "");
+                }
             }
             let name = text_style(theme::LABEL_PX, theme::INK, HPos::Left);
             root.draw_text(entry.name, &name, (x + LEGEND_SYMBOL_PX as i32, y))?;
-            left += entry.width_px();
         }
         Ok(())
     }
@@ -152,17 +182,36 @@ pub(super) fn themed<'m, 'a, 'b, X: Ranged, Y: Ranged, DB: DrawingBackend>(
 
 /// Formats ticks over `range` with as many decimals as their step needs.
 pub(super) fn tick_format(range: &Range<f64>) -> impl Fn(&f64) -> String + use<> {
-    let ticks = RangedCoordf64::from(range.clone()).key_points(MOST_TICKS);
+    let ticks = linear_ticks(range, MOST_TICKS);
     let step = match ticks[..] {
         [first, second, ..] => second - first,
         _ => 1.0,
     };
     let decimals = (-(step.log10() + 1e-9).floor()).max(0.0) as usize;
+    // Numbers of many digits would touch each other.
+    let long = decimals > 5 || ticks.iter().any(|tick| tick.abs() >= 1e6);
     // Adding zero removes the sign of negative zero.
     move |value| {
         let tick = (value / step).round() * step + 0.0;
+        if long {
+            let digits = (tick.abs() / step).max(1.0).log10().ceil() as usize;
+            let text = format!("{tick:.digits$e}", digits = digits.min(12));
+            return match text.split_once('e') {
+                Some((mantissa, _)) if tick == 0.0 || mantissa.is_empty() => "0".to_owned(),
+                Some((mantissa, power)) if mantissa.contains('.') => {
+                    let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
+                    format!("{mantissa}e{power}")
+                }
+                _ => text,
+            };
+        }
         theme::group_thousands(&format!("{tick:.decimals$}"))
     }
+}
+
+/// Round numbers in `range`, at most `most`.
+pub(super) fn linear_ticks(range: &Range<f64>, most: usize) -> Vec<f64> {
+    RangedCoordf64::from(range.clone()).key_points(most)
 }
 
 #[cfg(test)]
@@ -175,5 +224,6 @@ mod tests {
         assert_eq!(tick_format(&(0.0..0.1))(&0.04), "0.04");
         assert_eq!(tick_format(&(-3.0..3.0))(&-1e-17), "0");
         assert_eq!(tick_format(&(0.0..50_000.0))(&20_000.0), "20\u{2009}000");
+        assert_eq!(tick_format(&(0.0..4e9))(&2e9), "2e9");
     }
 }

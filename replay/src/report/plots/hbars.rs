@@ -1,9 +1,10 @@
 //! Horizontal grouped bars, for long names.
 
 use super::frame::{Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+use super::lines::exact;
 use super::{PlotError, SeriesStyle};
 use crate::report::theme;
-use plotters::prelude::{BindKeyPoints, Color, Rectangle};
+use plotters::prelude::BindKeyPoints;
 use plotters::style::text_anchor::HPos;
 
 /// A chart of horizontal bars, one group per row.
@@ -47,7 +48,8 @@ impl HBarChart {
                 });
             }
         }
-        let names: Vec<String> = self.rows.iter().map(|(name, _)| shorten(name)).collect();
+        let names: Vec<&str> = self.rows.iter().map(|(name, _)| name.as_str()).collect();
+        let names = theme::distinct(&names, LONGEST_NAME_CHARS);
         let name_px = names
             .iter()
             .map(|n| theme::text_width_px(n, theme::TICK_PX))
@@ -76,7 +78,7 @@ impl HBarChart {
             plot_px: (PLOT_WIDTH_PX, f64::from(height_px)),
             around_px: [TOP_PX, right_px, 26, name_px as u32 + 16],
         };
-        frame.draw(|root, mut builder| {
+        frame.draw(|root, mut builder, marks| {
             // Positions are in pixels from the top, because numbers next to bars need a line of text.
             let middles: Vec<i32> = (0..names.len() as i32)
                 .map(|row| row_px * row + row_px / 2)
@@ -91,13 +93,14 @@ impl HBarChart {
                 .y_label_formatter(&|y| name(y).unwrap_or_default())
                 .draw()?;
             let number = text_style(theme::TICK_PX, theme::INK, HPos::Left);
-            for (row, (_, values)) in (0..).zip(&self.rows) {
+            for (row, (name, values)) in (0..).zip(&self.rows) {
                 for (bar, (value, style)) in (0..).zip(values.iter().zip(&self.series)) {
                     let Some(value) = *value else { continue };
                     let y = row_px * row + ROW_GAP_PX / 2 + bar_px * bar;
                     let corners = [(0.0, y), (value, y + bar_px - 1)];
-                    let bar = Rectangle::new(corners, style.color.filled());
-                    chart.plotting_area().draw(&bar)?;
+                    let corners = corners.map(|at| chart.backend_coord(&at));
+                    let title = format!("{name}, {}: {}", style.name, exact(value));
+                    marks.rect(corners, style.color, &title);
                     if let Some(decimals) = self.decimals {
                         let (x, y) = chart.backend_coord(&(value, y + bar_px / 2));
                         root.draw_text(&format!("{value:.decimals$}"), &number, (x + 4, y))?;
@@ -109,29 +112,9 @@ impl HBarChart {
     }
 }
 
-/// Shortens a long name (a path) at its start, because the end identifies it.
-fn shorten(name: &str) -> String {
-    let chars: Vec<char> = name.chars().collect();
-    if chars.len() <= LONGEST_NAME_CHARS {
-        return name.to_owned();
-    }
-    let tail: String = chars[chars.len() - LONGEST_NAME_CHARS + 1..]
-        .iter()
-        .collect();
-    format!("\u{2026}{tail}")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn long_names_keep_their_end() {
-        let name = "textures/very/long/folder/names/sponza_curtain_blue_diff.png";
-        let short = shorten(name);
-        assert!(short.starts_with('\u{2026}') && short.ends_with("curtain_blue_diff.png"));
-        assert_eq!(short.chars().count(), LONGEST_NAME_CHARS);
-    }
 
     #[test]
     fn the_same_numbers_give_the_same_bytes_and_the_unit_is_drawn() {

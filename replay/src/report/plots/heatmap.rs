@@ -98,7 +98,7 @@ impl HeatMap {
             plot_px: (x - 8.0 + BAR_PX + TICKS_PX, height),
             around_px: [TOP_PX as u32, 8, 12, 8],
         };
-        let mut svg = frame.draw(|root, _| {
+        let mut svg = frame.draw(|root, _, _| {
             let name = text_style(theme::LABEL_PX, theme::INK, HPos::Center);
             for (panel, (x, w, h)) in self.panels.iter().zip(&places) {
                 root.draw_text(

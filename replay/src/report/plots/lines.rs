@@ -1,20 +1,20 @@
-//! Line and scatter charts. Lines are labelled at their last point, with labels moved apart if they
-//! overlap. Point clouds are named in a row below the heading.
+//! Line and scatter charts. Lines differ in dashes and symbols as well as in colour. Their names stand in a
+//! column to the right of the axes, moved apart if they would overlap; a grey dotted leader joins a name to
+//! the height of its line's end. Point clouds are named in rows below the heading.
 
-use super::frame::{AXIS_PX, DOT_PX, Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+pub use super::axis::{Axis, Doublings};
+use super::frame::{AXIS_PX, Frame, LegendEntry, Symbol, text_style, themed};
+use super::marks::{Shape, dash};
 use super::{PlotError, SeriesStyle};
 use crate::report::theme;
-use crate::size::format_bytes;
-use plotters::prelude::{Circle, Color, PathElement};
 use plotters::style::text_anchor::HPos;
-use std::ops::Range;
 
 /// How a series' points are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mark {
     /// A thin line through the points, labelled at its end.
     Line,
-    /// A cloud of dots.
+    /// A cloud of symbols.
     Dots,
 }
 
@@ -25,74 +25,8 @@ pub struct LineSeries {
     pub style: SeriesStyle,
     /// Points, in drawing order.
     pub points: Vec<(f64, f64)>,
-    /// Line or dots.
+    /// Line or symbols.
     pub mark: Mark,
-}
-
-/// Unit of an axis of doublings, for its ticks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Doublings {
-    /// Sizes, with binary units.
-    Bytes,
-    /// Numbers.
-    Numbers,
-}
-
-/// An axis.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Axis {
-    /// What it shows, with its unit.
-    pub label: String,
-    /// Ends of the axis; `None` takes them from the data.
-    pub range: Option<(f64, f64)>,
-    /// The axis is logarithmic to base 2 with ticks in this unit; `None` for a linear axis.
-    pub doublings: Option<Doublings>,
-}
-
-impl Axis {
-    /// A linear axis that fits its data.
-    pub fn linear(label: impl Into<String>) -> Self {
-        Self {
-            label: label.into(),
-            ..Self::default()
-        }
-    }
-
-    /// An axis of doublings, for positive values.
-    pub fn doublings(label: impl Into<String>, of: Doublings) -> Self {
-        Self {
-            label: label.into(),
-            doublings: Some(of),
-            ..Self::default()
-        }
-    }
-
-    /// The coordinate of a value on the axis.
-    fn place(&self, value: f64) -> f64 {
-        match self.doublings {
-            Some(_) => value.log2(),
-            None => value,
-        }
-    }
-
-    /// Formats ticks. On an axis of doublings, only doublings have labels, unless the axis has few of them.
-    fn tick(&self, range: &Range<f64>) -> Box<dyn Fn(&f64) -> String> {
-        match self.doublings {
-            None => Box::new(tick_format(range)),
-            Some(Doublings::Numbers) if range.end - range.start < 3.0 => {
-                Box::new(|place| theme::group_thousands(&format!("{:.1}", place.exp2())))
-            }
-            Some(of) => Box::new(move |place| {
-                let whole = place.round();
-                let value = whole.exp2();
-                match of {
-                    _ if (place - whole).abs() > 1e-6 => String::new(),
-                    Doublings::Bytes => format_bytes(value as u64),
-                    Doublings::Numbers => theme::group_thousands(&value.to_string()),
-                }
-            }),
-        }
-    }
 }
 
 /// A line or scatter chart.
@@ -112,8 +46,12 @@ const LEFT_PX: u32 = 58;
 const TOP_PX: u32 = 72;
 const PLOT_PX: (f64, f64) = (430.0, 260.0);
 const LABEL_GAP_PX: f64 = 15.0;
-/// Distance from the plotting area to the labels at the lines' ends.
-const NAMES_PX: i32 = 22;
+/// Leader and sample of the line, between the axes and the names.
+const LEADER_PX: i32 = 16;
+const SAMPLE_PX: i32 = 26;
+const LONGEST_NAME_CHARS: usize = 34;
+/// A line with more points than this has symbols at some of them only.
+const MOST_SYMBOLS: usize = 14;
 
 impl LineChart {
     /// The chart as SVG.
@@ -138,95 +76,130 @@ impl LineChart {
         let points = || self.series.iter().flat_map(|s| s.points.iter().map(place));
         let x = self.x.fit(points().map(|p| p.0));
         let y = self.y.fit(points().map(|p| p.1));
-        let named = |mark| {
-            let series = self.series.iter();
-            series.filter(move |s| s.mark == mark && !s.style.name.is_empty())
+        let (x, y) = (self.x.ticked(x).thinned(PLOT_PX.0), self.y.ticked(y));
+        let names: Vec<&str> = self.series.iter().map(|s| s.style.name.as_str()).collect();
+        let names = theme::distinct(&names, LONGEST_NAME_CHARS);
+        let styled = || self.series.iter().zip(&names).enumerate();
+        let is_named = |(_, (s, _)): &(usize, (&LineSeries, &String)), mark| {
+            s.mark == mark && !s.style.name.is_empty() && !s.points.is_empty()
         };
-        let names_px = named(Mark::Line)
-            .map(|s| theme::text_width_px(&s.style.name, theme::LABEL_PX))
+        let lines: Vec<_> = styled().filter(|s| is_named(s, Mark::Line)).collect();
+        let names_px = lines
+            .iter()
+            .map(|(_, (_, name))| theme::text_width_px(name, theme::LABEL_PX))
             .fold(0.0, f64::max);
-        let legend = named(Mark::Dots).map(|s| LegendEntry {
-            name: &s.style.name,
+        let legend = styled().filter(|s| is_named(s, Mark::Dots));
+        let legend = legend.map(|(index, (s, name))| LegendEntry {
+            name,
             color: s.style.color,
-            symbol: Symbol::Dot,
+            symbol: Symbol::Point(Shape::nth(index), true),
         });
+        let right = if lines.is_empty() {
+            24
+        } else {
+            LEADER_PX + SAMPLE_PX + 16
+        };
+        // More names than the axes are high need a higher chart.
+        let height = PLOT_PX.1.max(LABEL_GAP_PX * lines.len() as f64);
         let frame = Frame {
             title: &self.title,
             value_label: &self.y.label,
             legend: legend.collect(),
-            plot_px: PLOT_PX,
+            plot_px: (PLOT_PX.0, height),
             around_px: [
                 TOP_PX,
-                NAMES_PX as u32 + 10 + names_px as u32,
+                right as u32 + names_px.ceil() as u32,
                 AXIS_PX,
-                LEFT_PX,
+                LEFT_PX.max(y.widest_px() as u32 + 16),
             ],
         };
-        frame.draw(|root, mut builder| {
+        frame.draw(|root, mut builder, marks| {
             let mut chart = builder.build_cartesian_2d(x.clone(), y.clone())?;
             themed(&mut chart.configure_mesh())
                 .disable_x_mesh()
                 .x_desc(&self.x.label)
-                .x_label_formatter(&self.x.tick(&x))
-                .y_label_formatter(&self.y.tick(&y))
+                .x_label_formatter(&|at| x.text(*at))
+                .y_label_formatter(&|at| y.text(*at))
                 .draw()?;
-            for LineSeries {
-                style,
-                points,
-                mark,
-            } in &self.series
+            let at_px = |point: &(f64, f64)| chart.backend_coord(&place(point));
+            for (
+                index,
+                (
+                    LineSeries {
+                        style,
+                        points,
+                        mark,
+                    },
+                    name,
+                ),
+            ) in styled()
             {
-                match mark {
-                    Mark::Line => {
-                        let line: Vec<_> = points.iter().map(place).collect();
-                        let line = PathElement::new(line, style.color);
-                        chart.plotting_area().draw(&line)?;
-                    }
-                    Mark::Dots => {
-                        let dot = |at| Circle::new(place(at), DOT_PX, style.color.filled());
-                        chart.draw_series(points.iter().map(dot))?;
+                let shape = Shape::nth(index);
+                let title = |(x, y): (f64, f64)| {
+                    let name = if name.is_empty() {
+                        ""
+                    } else {
+                        &format!("{name}: ")
+                    };
+                    format!("{name}{} at {}", exact(y), exact(x))
+                };
+                if *mark == Mark::Line {
+                    let line: Vec<(i32, i32)> = points.iter().map(at_px).collect();
+                    // A wider first line stays visible under others.
+                    let width = if index == 0 && lines.len() > 1 {
+                        2.5
+                    } else {
+                        1.5
+                    };
+                    marks.line(&line, style.color, (width, dash(index)));
+                }
+                // Lines without names are references. Symbols of merged lines alternate.
+                let every = match mark {
+                    Mark::Line if name.is_empty() => continue,
+                    Mark::Line => points.len().div_ceil(MOST_SYMBOLS),
+                    Mark::Dots => 1,
+                };
+                for (number, point) in points.iter().enumerate() {
+                    if number % every == index % every {
+                        let filled = *mark == Mark::Dots;
+                        marks.symbol(shape, at_px(point), (style.color, filled), &title(*point));
                     }
                 }
             }
+            let (across, down) = chart.plotting_area().get_pixel_range();
             let last = |s: &LineSeries| s.points.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0));
-            let ends: Vec<(&SeriesStyle, (i32, i32))> = named(Mark::Line)
-                .filter_map(|s| Some((&s.style, chart.backend_coord(&place(&last(s)?)))))
+            let ends: Vec<f64> = lines
+                .iter()
+                .filter_map(|(_, (s, _))| Some(f64::from(at_px(&last(s)?).1)))
                 .collect();
-            let wishes: Vec<f64> = ends.iter().map(|(_, (_, y))| f64::from(*y)).collect();
-            let top = f64::from(TOP_PX);
-            let placed = theme::spread(&wishes, LABEL_GAP_PX, top, top + PLOT_PX.1);
-            let x = LEFT_PX as i32 + PLOT_PX.0 as i32 + NAMES_PX;
-            for ((style, end), y) in ends.into_iter().zip(placed) {
-                let y = y.round() as i32;
-                let leader = [end, (x - 12, y), (x - 4, y)];
-                root.draw(&PathElement::new(leader, style.color))?;
-                let name = text_style(theme::LABEL_PX, theme::INK, HPos::Left);
-                root.draw_text(&style.name, &name, (x, y))?;
+            let (top, bottom) = (f64::from(down.start), f64::from(down.end));
+            let placed = theme::spread(&ends, LABEL_GAP_PX, top, bottom);
+            for ((&(index, (series, name)), end), y) in lines.iter().zip(ends).zip(placed) {
+                let (edge, y) = (across.end + 2, y.round() as i32);
+                let end = (end as i32).clamp(down.start, down.end);
+                marks.leader(&[(edge, end), (edge + LEADER_PX, y)]);
+                let (from, to) = (edge + LEADER_PX, edge + LEADER_PX + SAMPLE_PX);
+                let color = series.style.color;
+                marks.line(&[(from, y), (to, y)], color, (1.5, dash(index)));
+                let middle = (i32::midpoint(from, to), y);
+                marks.symbol(Shape::nth(index), middle, (color, false), "");
+                let style = text_style(theme::LABEL_PX, theme::INK, HPos::Left);
+                root.draw_text(name, &style, (to + 5, y))?;
             }
             Ok(())
         })
     }
 }
 
-impl Axis {
-    /// The ends of the axis for these values.
-    pub(super) fn fit(&self, values: impl Iterator<Item = f64>) -> Range<f64> {
-        if let Some((low, high)) = self.range {
-            return low..high;
-        }
-        let (low, high) = values
-            .fold(None, |range: Option<(f64, f64)>, v| {
-                Some(range.map_or((v, v), |(l, h)| (l.min(v), h.max(v))))
-            })
-            .unwrap_or((0.0, 1.0));
-        // Points keep a distance from the edges; an axis that comes near zero starts at zero.
-        let room = match 0.04 * (high - low) {
-            0.0 => (0.04 * high.abs()).max(0.5),
-            room => room,
-        };
-        let from_zero = self.doublings.is_none() && low >= 0.0 && low < 0.35 * high;
-        (if from_zero { 0.0 } else { low - room })..high + room
-    }
+/// A figure with enough digits to tell neighbours apart.
+pub(super) fn exact(value: f64) -> String {
+    let decimals = match value.abs() {
+        _ if value.fract() == 0.0 => 0,
+        size if size >= 1000.0 => 1,
+        size if size >= 1.0 => 3,
+        _ => 5,
+    };
+    theme::group_thousands(&format!("{value:.decimals$}"))
 }
 
 #[cfg(test)]
@@ -285,6 +258,45 @@ mod tests {
         assert!((at[1] - at[0] - (at[2] - at[1])).abs() <= 1.0, "{at:?}");
         chart.series[0].points[0].0 = 0.0;
         assert!(chart.svg().unwrap_err().to_string().contains("(0, 1)"));
+    }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(200))]
+        #[test]
+        fn texts_stay_apart_and_inside_and_leaders_outside_of_the_axes(
+            names in proptest::collection::vec("[a-z]{0,3}|[a-zA-Z ]{20,60}|same", 1..20),
+            count in 1_usize..30,
+            kind in 0..6,
+            seed in 0_u32..1000,
+            log in 0..3,
+        ) {
+            let value = |series: usize, point: usize| {
+                let noise = f64::from((seed + 31 * series as u32 + 17 * point as u32) * 7919 % 1009) / 1009.0;
+                match kind {
+                    0 => 0.0,
+                    1 => 42.0,
+                    2 => -100.0 * noise,
+                    3 => 10_f64.powf(24.0 * noise - 12.0),
+                    4 => 123_456.0 + 1e-3 * noise,
+                    _ => noise,
+                }
+            };
+            let series = names.iter().enumerate().map(|(s, name)| LineSeries {
+                style: SeriesStyle::nth(name, s),
+                points: (0..count).map(|p| ((p + 1) as f64 * 64.0, value(s, p))).collect(),
+                mark: Mark::Line,
+            });
+            let series: Vec<LineSeries> = series.collect();
+            let all = || series.iter().flat_map(|s| s.points.iter().map(|p| p.1));
+            let y = match log {
+                1 if all().all(|v| v > 0.0) => Axis::doublings("misses, %", Doublings::Numbers),
+                2 => Axis::from_zero("misses, %", all()),
+                _ => Axis::linear("misses, %"),
+            };
+            let x = if seed % 2 == 0 { Axis::doublings("size", Doublings::Bytes) } else { Axis::linear("frame") };
+            let svg = LineChart { title: "T".into(), x, y, series }.svg().unwrap();
+            super::super::testing::check_geometry(&svg)?;
+        }
     }
 
     #[test]

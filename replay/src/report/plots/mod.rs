@@ -1,5 +1,6 @@
 //! Charts as SVG text, drawn by plotters. Equal numbers give equal bytes.
 
+pub mod axis;
 pub mod bars;
 pub mod boxes;
 pub mod contours;
@@ -8,6 +9,7 @@ mod frame;
 pub mod hbars;
 pub mod heatmap;
 pub mod lines;
+mod marks;
 pub mod paths;
 pub mod scatter;
 pub mod spans;

@@ -66,7 +66,7 @@ impl PathPlot {
             plot_px: (2.0 * w + GAP_PX, h),
             around_px: [TOP_PX as u32, 10, 10, 8],
         };
-        frame.draw(|root, _| {
+        frame.draw(|root, _, _| {
             for (eye, name, x) in [(0, "left eye", 8.0), (1, "right eye", 8.0 + w + GAP_PX)] {
                 let style = text_style(theme::LABEL_PX, theme::MUTED, HPos::Center);
                 let middle = (x + w / 2.0) as i32;

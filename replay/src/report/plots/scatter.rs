@@ -1,11 +1,13 @@
 //! Named points with two costs, and the front of those that are not dominated. Each point's label is near
-//! it and covers no other label or point.
+//! it and covers no other label or point. With many points, the labels are numbers, and a list to the right
+//! of the axes has their names.
 
-use super::frame::{AXIS_PX, DOT_PX, Frame, LegendEntry, Symbol, text_style, themed, tick_format};
-use super::lines::Axis;
+use super::axis::Axis;
+use super::frame::{AXIS_PX, DOT_PX, Frame, LegendEntry, Symbol, text_style, themed};
+use super::lines::exact;
+use super::marks::Shape;
 use super::{PlotError, SeriesStyle};
 use crate::report::theme;
-use plotters::prelude::{Circle, Color, PathElement};
 use plotters::style::text_anchor::HPos;
 
 /// A chart of named points.
@@ -37,11 +39,15 @@ pub struct NamedPoint {
 const TOP_PX: u32 = 72;
 const LEFT_PX: u32 = 58;
 const RIGHT_PX: u32 = 120;
-const PLOT_PX: (f64, f64) = (720.0, 400.0);
+const PLOT_PX: (f64, f64) = (620.0, 380.0);
+/// With more points than this, names stand in a list.
+const MOST_NAMES: usize = 6;
+const LIST_GAP_PX: f64 = 15.0;
+const LONGEST_NAME_CHARS: usize = 40;
 const NAME_HEIGHT_PX: f64 = 14.0;
 /// Labels within this distance from their point need no leader line.
 const NEAR_PX: f64 = 16.0;
-const FARTHEST_PX: f64 = 230.0;
+const FARTHEST_PX: f64 = 400.0;
 
 impl ScatterChart {
     /// The chart as SVG.
@@ -56,97 +62,143 @@ impl ScatterChart {
                 problem: format!("point `{}` at {:?}", bad.style.name, bad.at),
             });
         }
-        let x = self.x.fit(self.points.iter().map(|p| p.at.0));
-        let mut y = self.y.fit(self.points.iter().map(|p| p.at.1));
+        let place_of = |p: &NamedPoint| (self.x.place(p.at.0), self.y.place(p.at.1));
+        let x = self.x.fit(self.points.iter().map(|p| place_of(p).0));
+        let mut y = self.y.fit(self.points.iter().map(|p| place_of(p).1));
         if y.start == 0.0 {
             // Points at zero are not clipped.
             y.start = -0.03 * y.end;
         }
+        let (x, y) = (self.x.ticked(x).thinned(PLOT_PX.0), self.y.ticked(y));
+        let names: Vec<&str> = self.points.iter().map(|p| p.style.name.as_str()).collect();
+        let names = theme::distinct(&names, LONGEST_NAME_CHARS);
+        let listed = names.len() > MOST_NAMES;
+        // Numbers go up from the front's first point.
+        let mut order: Vec<usize> = (0..names.len()).collect();
+        order.sort_by(|&a, &b| {
+            let key = |i: usize| self.points[i].at;
+            key(a)
+                .1
+                .total_cmp(&key(b).1)
+                .then(key(a).0.total_cmp(&key(b).0))
+                .then(a.cmp(&b))
+        });
+        let mut number = vec![0; names.len()];
+        for (place, &index) in (1..).zip(&order) {
+            number[index] = place;
+        }
+        let labels: Vec<String> = match listed {
+            true => number.iter().map(ToString::to_string).collect(),
+            false => names.clone(),
+        };
+        let list_names: Vec<String> = (1..)
+            .zip(&order)
+            .map(|(place, &index)| format!("{place}  {}", names[index]))
+            .collect();
+        let list_px = list_names
+            .iter()
+            .map(|name| theme::text_width_px(name, theme::TICK_PX))
+            .fold(0.0, f64::max);
+        let right = if listed {
+            list_px as u32 + 36
+        } else {
+            RIGHT_PX
+        };
+        let height = match listed {
+            true => PLOT_PX.1.max(LIST_GAP_PX * names.len() as f64),
+            false => PLOT_PX.1,
+        };
         let frame = Frame {
             title: &self.title,
             value_label: &self.y.label,
-            legend: vec![
-                LegendEntry {
-                    name: &self.kinds[0],
+            legend: [(0, true), (1, false)]
+                .map(|(kind, filled)| LegendEntry {
+                    name: &self.kinds[kind],
                     color: theme::INK,
-                    symbol: Symbol::Dot,
-                },
-                LegendEntry {
-                    name: &self.kinds[1],
-                    color: theme::INK,
-                    symbol: Symbol::Ring,
-                },
+                    symbol: Symbol::Point(Shape::Circle, filled),
+                })
+                .into(),
+            plot_px: (PLOT_PX.0, height),
+            around_px: [
+                TOP_PX,
+                right,
+                AXIS_PX,
+                LEFT_PX.max(y.widest_px() as u32 + 16),
             ],
-            plot_px: PLOT_PX,
-            around_px: [TOP_PX, RIGHT_PX, AXIS_PX, LEFT_PX],
         };
-        frame.draw(|root, mut builder| {
+        frame.draw(|root, mut builder, marks| {
             let mut chart = builder.build_cartesian_2d(x.clone(), y.clone())?;
             themed(&mut chart.configure_mesh())
                 .disable_x_mesh()
                 .x_desc(&self.x.label)
-                .x_label_formatter(&tick_format(&x))
-                .y_label_formatter(&tick_format(&y))
+                .x_label_formatter(&|at| x.text(*at))
+                .y_label_formatter(&|at| y.text(*at))
                 .draw()?;
-            let mut front: Vec<(f64, f64)> = self
-                .points
-                .iter()
-                .filter(|p| !p.dominated)
-                .map(|p| p.at)
-                .collect();
+            let in_px = |at: &(f64, f64)| {
+                let (x, y) = chart.backend_coord(at);
+                (f64::from(x), f64::from(y))
+            };
+            let whole = |points: &[(f64, f64)]| -> Vec<(i32, i32)> {
+                points.iter().map(|(x, y)| (*x as i32, *y as i32)).collect()
+            };
+            let dots: Vec<(f64, f64)> = self.points.iter().map(|p| in_px(&place_of(p))).collect();
+            let front = self.points.iter().zip(&dots).filter(|(p, _)| !p.dominated);
+            let mut front: Vec<(f64, f64)> = front.map(|(_, dot)| *dot).collect();
             front.sort_by(|a, b| a.0.total_cmp(&b.0));
             // Steps: a point dominates everything to the right of and above it.
             let corner = |pair: &[(f64, f64)]| [pair[0], (pair[1].0, pair[0].1)];
             let mut steps: Vec<(f64, f64)> = front.windows(2).flat_map(corner).collect();
             steps.extend(front.last());
-            let line = PathElement::new(steps.clone(), theme::AXIS.stroke_width(1));
-            chart.plotting_area().draw(&line)?;
-            let in_px = |at: &(f64, f64)| {
-                let (x, y) = chart.backend_coord(at);
-                (f64::from(x), f64::from(y))
-            };
-            let steps: Vec<(f64, f64)> = steps.iter().map(in_px).collect();
-            let dots: Vec<(f64, f64)> = self.points.iter().map(|p| in_px(&p.at)).collect();
-            let widths: Vec<f64> = self
-                .points
+            marks.line(&whole(&steps), theme::AXIS, (1.0, ""));
+            let widths: Vec<f64> = labels
                 .iter()
                 // Some fonts are wider than the estimate.
-                .map(|p| 1.07 * theme::text_width_px(&p.style.name, theme::TICK_PX))
+                .map(|label| 1.07 * theme::text_width_px(label, theme::TICK_PX))
                 .collect();
+            let (across, down) = chart.plotting_area().get_pixel_range();
+            let beyond = if listed { 0 } else { RIGHT_PX as i32 };
             let room = Rect {
-                left: f64::from(LEFT_PX) + 4.0,
-                top: f64::from(TOP_PX),
-                right: f64::from(LEFT_PX + RIGHT_PX) + PLOT_PX.0 - 2.0,
-                bottom: f64::from(TOP_PX) + PLOT_PX.1 - 2.0,
+                left: f64::from(across.start) + 4.0,
+                top: f64::from(down.start),
+                right: f64::from(across.end + beyond) - 2.0,
+                bottom: f64::from(down.end) - 2.0,
             };
             // Leader lines are below dots and labels.
-            let names = place(&dots, &widths, &steps, room);
-            for (dot, name) in dots.iter().zip(&names) {
-                let to = name.nearest(*dot);
+            let places = place(&dots, &widths, &steps, room);
+            for (dot, label) in dots.iter().zip(&places) {
+                let to = label.nearest(*dot);
                 if distance(*dot, to) > NEAR_PX {
-                    let line = [*dot, to].map(|(x, y)| (x as i32, y as i32));
-                    root.draw(&PathElement::new(line, theme::AXIS.stroke_width(1)))?;
+                    marks.leader(&whole(&[*dot, to]));
                 }
             }
-            for (point, (x, y)) in self.points.iter().zip(&dots) {
-                let color = point.style.color;
-                let style = if point.dominated {
-                    color.stroke_width(2)
-                } else {
-                    color.filled()
-                };
-                root.draw(&Circle::new((*x as i32, *y as i32), DOT_PX, style))?;
+            for (point, dot) in self.points.iter().zip(&dots) {
+                let title = format!(
+                    "{}: {} at {}",
+                    point.style.name,
+                    exact(point.at.1),
+                    exact(point.at.0)
+                );
+                let style = (point.style.color, !point.dominated);
+                marks.symbol(Shape::Circle, whole(&[*dot])[0], style, &title);
             }
-            for (point, name) in self.points.iter().zip(&names) {
-                let ink = if point.dominated {
-                    theme::MUTED
-                } else {
-                    theme::INK
-                };
-                let text = text_style(theme::TICK_PX, ink, HPos::Left);
-                let middle = f64::midpoint(name.top, name.bottom);
-                let at = (name.left as i32, middle as i32);
-                root.draw_text(&point.style.name, &text, at)?;
+            let ink = |point: &NamedPoint| match point.dominated {
+                true => theme::MUTED,
+                false => theme::INK,
+            };
+            for ((point, at), label) in self.points.iter().zip(&places).zip(&labels) {
+                let text = text_style(theme::TICK_PX, ink(point), HPos::Left);
+                let middle = f64::midpoint(at.top, at.bottom);
+                root.draw_text(label, &text, (at.left as i32, middle as i32))?;
+            }
+            if listed {
+                for (row, (&index, name)) in order.iter().zip(&list_names).enumerate() {
+                    let point = &self.points[index];
+                    let y = down.start + (LIST_GAP_PX * (row as f64 + 0.5)) as i32;
+                    let style = (point.style.color, !point.dominated);
+                    marks.symbol(Shape::Circle, (across.end + 16, y), style, "");
+                    let text = text_style(theme::TICK_PX, ink(point), HPos::Left);
+                    root.draw_text(name, &text, (across.end + 26, y))?;
+                }
             }
             Ok(())
         })
@@ -364,6 +416,33 @@ mod tests {
             name.bottom < 100.0 || name.top > 100.0 || name.right < 100.0,
             "{name:?}"
         );
+    }
+
+    proptest::proptest! {
+        #![proptest_config(proptest::test_runner::Config::with_cases(60))]
+        #[test]
+        fn labels_stay_apart_and_inside(
+            names in proptest::collection::vec("[a-z]{1,3}|[a-zA-Z+]{20,60}|same", 1..20),
+            kind in 0..4,
+            seed in 0_u32..1000,
+        ) {
+            let noise = |n: u32| f64::from((seed + 31 * n) * 7919 % 1009) / 1009.0;
+            let points = (0..).zip(&names).map(|(n, name)| NamedPoint {
+                style: SeriesStyle::nth(name, 0),
+                at: match kind {
+                    0 => (1.0, 0.0),
+                    1 => (0.8 + 0.01 * noise(n), if n % 4 == 0 { noise(n + 7) } else { 0.0 }),
+                    2 => (noise(n), 10_f64.powf(-9.0 * noise(n + 3))),
+                    _ => (-1e9 * noise(n), noise(n + 5)),
+                },
+                dominated: n % 3 == 0,
+            });
+            let points: Vec<NamedPoint> = points.collect();
+            let y = Axis::from_zero("error", points.iter().map(|p| p.at.1));
+            let kinds = ["best".into(), "dominated".into()];
+            let svg = ScatterChart { title: "T".into(), x: Axis::linear("time"), y, kinds, points }.svg().unwrap();
+            super::super::testing::check_texts(&svg)?;
+        }
     }
 
     #[test]

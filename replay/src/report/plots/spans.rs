@@ -68,7 +68,7 @@ impl SpanChart {
             plot_px: (PLOT_WIDTH_PX, f64::from(height_px)),
             around_px: [TOP_PX, 22, 26, name_px as u32 + 16],
         };
-        frame.draw(|root, mut builder| {
+        frame.draw(|root, mut builder, _| {
             let middles: Vec<i32> = (0..self.rows.len() as i32)
                 .map(|row| ROW_PX * row + ROW_PX / 2)
                 .collect();

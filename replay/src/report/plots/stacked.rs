@@ -2,9 +2,9 @@
 
 use super::bars::wrap;
 use super::frame::{Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+use super::lines::exact;
 use super::{PlotError, SeriesStyle};
 use crate::report::theme;
-use plotters::prelude::{Color, Rectangle};
 use plotters::style::text_anchor::HPos;
 
 /// A chart of stacked bars.
@@ -87,7 +87,7 @@ impl StackedChart {
                 LEFT_PX,
             ],
         };
-        frame.draw(|root, mut builder| {
+        frame.draw(|root, mut builder, marks| {
             let mut chart = builder.build_cartesian_2d(0.0..count, values.clone())?;
             let mut mesh = chart.configure_mesh();
             themed(&mut mesh)
@@ -97,15 +97,18 @@ impl StackedChart {
                 .y_label_formatter(&tick_format(&values))
                 .draw()?;
             let name_style = text_style(theme::TICK_PX, theme::INK, HPos::Center);
-            for (index, (((_, parts), lines), sum)) in
+            for (index, (((name, parts), lines), sum)) in
                 self.bars.iter().zip(&names).zip(sums).enumerate()
             {
                 let (left, right) = (index as f64 + GAP / 2.0, index as f64 + 1.0 - GAP / 2.0);
                 let mut below = 0.0;
                 for (part, style) in parts.iter().zip(&self.series) {
                     let corners = [(left, below), (right, below + part)];
-                    let rectangle = Rectangle::new(corners, style.color.filled());
-                    chart.plotting_area().draw(&rectangle)?;
+                    let corners = corners.map(|at| chart.backend_coord(&at));
+                    let title = format!("{name}, {}: {}", style.name, exact(*part));
+                    if *part > 0.0 {
+                        marks.rect(corners, style.color, &title);
+                    }
                     below += part;
                 }
                 if let Some(decimals) = self.decimals {

@@ -12,13 +12,7 @@ use maud::Markup;
 
 /// The paper's figure 3: relative performance and relative energy, with the published values as marks.
 pub fn ratios(entries: &[Entry]) -> Result<Markup, PlotError> {
-    let performance = chart(
-        entries,
-        "Relative performance",
-        "frames per second over tracing both eyes",
-        |o| o.relative_performance,
-        |p| p.relative_performance,
-    );
+    let performance = performance(entries);
     let energy = chart(
         entries,
         "Relative energy",
@@ -30,6 +24,17 @@ pub fn ratios(entries: &[Entry]) -> Result<Markup, PlotError> {
         (performance.svg()?, "Paper: figure 3, left.".to_owned()),
         (energy.svg()?, "Paper: figure 3, right.".to_owned()),
     ]))
+}
+
+/// Frames per second over those of tracing both eyes.
+pub fn performance(entries: &[Entry]) -> BarChart {
+    chart(
+        entries,
+        "Relative performance",
+        "frames per second over tracing both eyes",
+        |o| o.relative_performance,
+        |p| p.relative_performance,
+    )
 }
 
 fn chart(

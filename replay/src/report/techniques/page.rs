@@ -2,7 +2,8 @@
 
 use super::frusta::Frusta;
 use super::{TechniquesReport, plots};
-use crate::report::html::{self, Section, figures, slug};
+use crate::report::answers;
+use crate::report::html::{self, Answer, Section, figures, slug};
 use crate::report::picture::EmbeddedPicture;
 use crate::report::plots::PlotError;
 use crate::report::table::Table;
@@ -45,6 +46,8 @@ const SHOWN: [&str; 30] = [
     "dominated",
     "dominated_in",
 ];
+
+const PARETO_CAPTION: &str = "The line joins the techniques that are not dominated. A technique is dominated if another one is at least as good in time and error and better in one of them. Green: meant to be lossless; red: lossy; grey: baseline.";
 
 /// A scene's pictures.
 pub struct Scene {
@@ -141,7 +144,7 @@ impl TechniquesReport<'_> {
         ));
         let scenes: Vec<&str> = self.scenes.iter().map(|m| m.scene).collect();
         let software = self.manifests.iter().any(|m| m.software_driver);
-        let lead = html! {
+        let about = html! {
             p {
                 "Every technique on " (scenes.join(", ")) ", alone and combined, compared with the baseline: "
                 "frame time (measured in alternation with the baseline), image error inside the visible area, and texture cache traffic. "
@@ -151,9 +154,33 @@ impl TechniquesReport<'_> {
                 p { strong { "Frame times are a processor's" } ": the driver renders in software, so the cost of vertices, fragments and state changes differs from a GPU's. Counts, image errors and cache figures do not depend on that." }
             }
         };
+        let chart = match self.scenes.first() {
+            Some(measures) => html::figure(&plots::pareto(measures).svg()?, PARETO_CAPTION),
+            None => html! {},
+        };
+        let mut sentences = self.scenes.first().map_or_else(Vec::new, |measures| {
+            let others = measures.rows.iter().filter(|m| !m.is_baseline());
+            let timed = others.map(|m| answers::Timed {
+                name: m.row.technique.clone(),
+                time: m.timing.ratio.median,
+                flip: m.pictures.flip_mean,
+            });
+            answers::timed(measures.scene, &timed.collect::<Vec<_>>())
+        });
+        if software {
+            sentences.push(
+                "The driver renders in software, so frame times are a processor's, not a GPU's."
+                    .to_owned(),
+            );
+        }
+        let answer = Answer {
+            sentences,
+            chart,
+            about,
+        };
         Ok(html::page(
             "Parallax: techniques of stereo rendering",
-            &lead,
+            &answer,
             &sections,
         ))
     }
@@ -246,7 +273,7 @@ fn time_and_error(measures: &Measures, manifest: &Manifest) -> Result<Markup, Pl
         }
     }
     Ok(html! {
-        (html::figure(&plots::pareto(measures).svg()?, "The line joins the techniques that are not dominated. A technique is dominated if another one is at least as good in time and error and better in one of them."))
+        (html::figure(&plots::pareto(measures).svg()?, PARETO_CAPTION))
         (figures(&rows))
         @if manifest.frames.len() > 1 { p.note { "Lines along the path: the baseline and the techniques that are not dominated." } }
     })

@@ -9,19 +9,6 @@ use crate::techniques::{Measured, Measures, Spread};
 /// Largest number of lines that a chart can distinguish.
 const MOST_LINES: usize = 6;
 
-/// Longest name in a plot; tables have the full names.
-const LONGEST_NAME_CHARS: usize = 48;
-
-/// A technique's name, shortened for plots.
-fn name(measured: &Measured) -> String {
-    let name = &measured.row.technique;
-    if name.chars().count() <= LONGEST_NAME_CHARS {
-        return name.clone();
-    }
-    let start: String = name.chars().take(LONGEST_NAME_CHARS - 1).collect();
-    format!("{start}\u{2026}")
-}
-
 /// Colour by type of technique: lossless, lossy, or baseline.
 fn style(measured: &Measured) -> SeriesStyle {
     let index = match (measured.is_baseline(), measured.row.lossless) {
@@ -29,7 +16,7 @@ fn style(measured: &Measured) -> SeriesStyle {
         (false, true) => 3,
         (false, false) => 4,
     };
-    SeriesStyle::nth(name(measured), index)
+    SeriesStyle::nth(&measured.row.technique, index)
 }
 
 /// Run time against error.
@@ -38,8 +25,9 @@ pub fn pareto(measures: &Measures) -> ScatterChart {
     ScatterChart {
         title: format!("{}: run time against error", measures.scene),
         x: Axis::linear("frame time over the baseline's, median"),
-        y: Axis::linear(
-            "mean FLIP inside the lens; green: meant to be lossless, red: lossy, grey: baseline",
+        y: Axis::from_zero(
+            "mean FLIP inside the lens",
+            measures.rows.iter().map(|m| m.pictures.flip_mean),
         ),
         kinds: ["not dominated".to_owned(), "dominated".to_owned()],
         points: measures
@@ -82,7 +70,7 @@ fn chosen<'m, 'a>(measures: &'m Measures<'a>) -> Vec<(&'m Measured<'a>, SeriesSt
     let styled = |(index, m): (usize, &'m Measured<'a>)| {
         // The neutral colour is reserved for the baseline.
         let index = if m.is_baseline() { 7 } else { index - 1 };
-        (m, SeriesStyle::nth(name(m), index))
+        (m, SeriesStyle::nth(&m.row.technique, index))
     };
     let all = baseline.into_iter().chain(best);
     all.take(MOST_LINES).enumerate().map(styled).collect()

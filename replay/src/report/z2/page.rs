@@ -4,8 +4,9 @@ use super::model::{PaperReport, TraceInfo};
 use super::plots::{self, TileMeasure};
 use super::{cores, tables, whole_frame};
 use crate::config::{CountBy, Order};
+use crate::report::answers;
 use crate::report::errors::{self, Of};
-use crate::report::html::{self, Section, figures, folded};
+use crate::report::html::{self, Answer, Section, count, figures, folded};
 use crate::report::picture::EmbeddedPicture;
 use crate::report::plots::PlotError;
 use crate::report::table::Table;
@@ -71,7 +72,7 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
     sections.push(Section::new(by_part, parts(report)?));
     sections.extend(errors::section(Of::Textures));
     sections.push(Section::new("Configuration", configuration(report)));
-    let lead = html! {
+    let about = html! {
         p {
             "Stereo frames replayed through the caches and the texture unit of the Z\u{b2} paper's machine ("
             (report.config.cores) " cores, " (report.config.line_bytes) "-byte lines) in "
@@ -80,14 +81,58 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
         }
         (in_short(report))
     };
+    let chart = match report.traces.first() {
+        Some(info) => html::figure(&plots::bandwidth(report, &info.label).svg()?, ""),
+        None => html! {},
+    };
+    let answer = Answer {
+        sentences: sentences(report),
+        chart,
+        about,
+    };
     Ok(html::page(
         "Parallax: tile orders for stereo rendering",
-        &lead,
+        &answer,
         &sections,
     ))
 }
 
-/// The means over everything, as sentences.
+/// The answer: the best order in the mean over everything, and the paper's figure for it.
+fn sentences(report: &PaperReport) -> Vec<String> {
+    let last = report.averages.last();
+    let means: Vec<_> = (report.averages.iter())
+        .filter(|a| last.is_some_and(|last| last.scene == a.scene))
+        .collect();
+    let orders: Vec<(String, f64)> = (means.iter())
+        .map(|a| (a.order.title().to_owned(), a.reduction_pct))
+        .collect();
+    let caches = count(report.caches().len(), "cache configuration");
+    let over = match (last, report.traces.len()) {
+        (Some(last), 1) => format!("{}, mean over {caches}", last.scene),
+        (_, traces) => format!("mean over {} and {caches}", count(traces, "trace")),
+    };
+    let mut out = answers::tile_orders(Order::MORTON.title(), &over, &orders);
+    let best = means
+        .iter()
+        .max_by(|a, b| a.reduction_pct.total_cmp(&b.reduction_pct));
+    if let Some(best) = best {
+        if let Some(paper) = best.paper_reduction_pct {
+            let words = html::change(-paper, "less", "more", "as much");
+            let name = best.order.title();
+            out.push(format!(
+                "The paper's figures for {name} on these scenes give {words}."
+            ));
+        } else if let Some(ratio) = best.tmu_ratio {
+            let name = best.order.title();
+            out.push(format!(
+                "The texture units' utilisation in {name} is {ratio:.3} times that in Morton order."
+            ));
+        }
+    }
+    out
+}
+
+/// The means over everything.
 fn in_short(report: &PaperReport) -> Markup {
     let Some(last) = report.averages.last() else {
         return html! {};

@@ -205,14 +205,8 @@ pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
     }
     Some(LineChart {
         title: "Simulated TMU utilisation against the closed form".to_owned(),
-        x: Axis {
-            range: Some(ends),
-            ..Axis::linear("closed form of the measured miss rates, %")
-        },
-        y: Axis {
-            range: Some((ends.0 - 2.0, ends.1 + 2.0)),
-            ..Axis::linear("simulated, %")
-        },
+        x: Axis::linear("closed form of the measured miss rates, %").between(ends.0, ends.1),
+        y: Axis::linear("simulated, %").between(ends.0 - 2.0, ends.1 + 2.0),
         series,
     })
 }

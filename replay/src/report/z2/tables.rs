@@ -127,8 +127,8 @@ pub fn parts<'a>(
             "external_lines",
         ]) {
             let order = detail.point.config.order.title();
-            let name = format!("{} {order}", column.heading.name);
-            columns.push(at(column, parts_of(detail), name));
+            let name = column.heading.name.to_string();
+            columns.push(at(column, parts_of(detail), name).group(order));
         }
     }
     Table::new(&columns, &busiest(first, most))
