@@ -18,6 +18,7 @@ pub mod orders_study;
 mod palette;
 pub mod paper;
 pub mod preset;
+pub mod records;
 mod registry;
 pub mod report;
 pub mod result;
