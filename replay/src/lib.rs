@@ -10,6 +10,7 @@ pub mod config;
 pub mod engine;
 pub mod experiment;
 pub mod files;
+pub mod line_list;
 pub mod locality;
 pub mod memory;
 pub mod model_version;

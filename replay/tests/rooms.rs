@@ -19,7 +19,7 @@ const FLOORS: [&[&str]; 12] = [
     &["stream"],
     &["access"],
     &["engine"],
-    &["addresses", "compare", "locality"],
+    &["addresses", "compare", "line_list", "locality"],
     &["sgrt"],
     &["experiment"],
     &["accuracy", "orders_study", "techniques"],
