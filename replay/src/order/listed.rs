@@ -3,8 +3,9 @@
 
 use super::cost::{Cost, Knows};
 use super::parts::Parts;
-use super::{Order, OrderRow, View, WorkItem};
+use super::{Order, OrderRow, View, Views, WorkItem, views};
 use crate::palette::GREY;
+use formats::textrace::Pass;
 use std::sync::{Mutex, PoisonError};
 
 /// The orders that configurations accept by name.
@@ -112,6 +113,25 @@ impl Order {
         let order = Self::listed(name, parts, listed);
         named.push(order);
         order
+    }
+
+    /// Checks that a listed order visits every tile of every pair of views of these passes. Other orders do.
+    ///
+    /// # Errors
+    /// The first pair, by the index of its left pass, whose items do not.
+    pub fn check_for(self, passes: &[Pass]) -> Result<(), (u32, NotAnOrder)> {
+        if self.row().listed.is_none() {
+            return Ok(());
+        }
+        let mut frames: Vec<u32> = passes.iter().map(|pass| pass.frame).collect();
+        frames.dedup();
+        for phase in frames.into_iter().flat_map(|frame| views(passes, frame)) {
+            if let Views::Pair(left, right) = phase {
+                let items = self.listed_items(left).unwrap_or_default();
+                check_items(items, [left, right]).map_err(|fault| (left.pass, fault))?;
+            }
+        }
+        Ok(())
     }
 
     /// The listed items of a pair of views.
