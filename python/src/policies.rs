@@ -64,10 +64,10 @@ pub fn name_policy(name: String, class: Py<PyAny>) -> String {
 }
 
 /// Runs `job`, and raises the first exception of these classes instead of its result.
-pub fn watched<T>(
+pub fn watched<T: Send>(
     names: &[String],
     stop: &Stop,
-    job: impl FnOnce() -> Result<T>,
+    job: impl FnOnce() -> Result<T> + Send,
 ) -> Result<T, Failure> {
     if names.is_empty() {
         return Ok(job()?);
@@ -87,7 +87,10 @@ pub fn watched<T>(
     if stop.is_asked() {
         return Err(anyhow::anyhow!("interrupted").into());
     }
-    let outcome = job();
+    // Attaching a thread for each call takes longer than the call. One thread that stays attached lets other
+    // threads of the interpreter run whenever a method runs.
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let outcome = alone.install(|| Python::attach(|_| job()));
     let raised: Vec<PyErr> = slots
         .iter()
         .filter_map(|slot| slot.calls().error.take())

@@ -126,12 +126,12 @@ fn tile_name<E>(
 }
 
 /// Replays a plan, and passes its outcome to `of`.
-fn replayed<T>(
+fn replayed<T: Send>(
     paths: &[PathBuf],
     policies: &[String],
     plan: &Plan,
     stop: &jobs::Stop,
-    of: impl FnOnce(&Outcome<'_>) -> Result<T>,
+    of: impl FnOnce(&Outcome<'_>) -> Result<T> + Send,
 ) -> Result<T, Failure> {
     let traces = Traces::open(paths, stop)?;
     let subjects = traces.subjects();
