@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -84,7 +85,7 @@ def _tile(tile: Any) -> tuple[int, int, int]:
 
 
 def _number(part: Any) -> int:
-    number = part.__index__()
+    number = operator.index(part)
     if not 0 <= number < 1 << 32:
         raise ValueError(number)
     return number

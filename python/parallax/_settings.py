@@ -106,9 +106,10 @@ class Writer:
         title = getattr(policy, "__name__", type(policy).__name__)
         if not callable(policy):
             raise _native.ParallaxError(f"policy: expected a name or a class, found {title}")
-        if self.policies.get(title, policy) is not policy:
+        name = f"{title}@python"
+        if self.policies.get(name, policy) is not policy:
             raise _native.ParallaxError(f"policy: two classes are named {title}")
-        name = _native.name_policy(title, policy)
+        _native.name_policy(name, policy)
         self.policies[name] = policy
         return name
 

@@ -37,10 +37,20 @@ pub fn run<T: Send + 'static>(
     py: Python<'_>,
     job: impl FnOnce(Stop) -> Result<T, Failure> + Send + 'static,
 ) -> PyResult<T> {
+    run_and_wait(py, false, job)
+}
+
+/// Runs a job. If `waits`, it has ended when Ctrl-C ends the call: a job that calls Python must not outlive the
+/// interpreter.
+pub fn run_and_wait<T: Send + 'static>(
+    py: Python<'_>,
+    waits: bool,
+    job: impl FnOnce(Stop) -> Result<T, Failure> + Send + 'static,
+) -> PyResult<T> {
     let stop = Stop::default();
     let (send, receive) = channel();
     let its_stop = stop.clone();
-    std::thread::spawn(move || {
+    let thread = std::thread::spawn(move || {
         let outcome = catch_unwind(AssertUnwindSafe(|| job(its_stop)));
         // Nobody receives after Ctrl-C.
         let _ = send.send(outcome);
@@ -61,6 +71,9 @@ pub fn run<T: Send + 'static>(
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(interrupt) = py.check_signals() {
                     stop.ask();
+                    if waits {
+                        let _ = py.detach(|| thread.join());
+                    }
                     return Err(interrupt);
                 }
             }

@@ -42,10 +42,9 @@ static SLOTS: Mutex<Vec<(String, Slot)>> = Mutex::new(Vec::new());
 /// Held by a replay with policies in Python, because their exceptions are kept by class.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
-/// Gives a class a name that configurations accept.
+/// Makes a class a policy that configurations accept by this name.
 #[pyfunction]
-pub fn name_policy(name: String, class: Py<PyAny>) -> String {
-    let name = format!("{name}@python");
+pub fn name_policy(name: String, class: Py<PyAny>) {
     let slot = Slot::default();
     let mut slots = SLOTS.lock().unwrap_or_else(PoisonError::into_inner);
     slots.retain(|(other, _)| *other != name);
@@ -60,7 +59,7 @@ pub fn name_policy(name: String, class: Py<PyAny>) -> String {
             name: title.clone(),
         })
     };
-    Replacement::own(&name, Box::new(make)).name().to_owned()
+    let _ = Replacement::own(&name, Box::new(make));
 }
 
 /// Runs `job`, and raises the first exception of these classes instead of its result.

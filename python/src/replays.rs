@@ -31,6 +31,11 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// True if the replay calls Python.
+    fn calls_python(&self) -> bool {
+        !self.policies.is_empty()
+    }
+
     /// An error of the text, with the file or without a line.
     fn fault(&self, name: &str, error: PlanError) -> anyhow::Error {
         match (&self.file, error) {
@@ -151,7 +156,7 @@ fn rows(file: &ExperimentFile, outcome: &Outcome<'_>) -> Result<Vec<u8>> {
 /// The row of each trace replayed with a configuration.
 #[pyfunction]
 pub fn run(py: Python<'_>, paths: Vec<PathBuf>, settings: Settings) -> PyResult<Vec<u8>> {
-    jobs::run(py, move |stop| {
+    jobs::run_and_wait(py, settings.calls_python(), move |stop| {
         let config = settings.config()?;
         let plan = Plan::single(config, false)?;
         let file = ExperimentFile {
@@ -169,7 +174,7 @@ pub fn run(py: Python<'_>, paths: Vec<PathBuf>, settings: Settings) -> PyResult<
 /// What `replay run --json` prints.
 #[pyfunction]
 pub fn result(py: Python<'_>, path: PathBuf, settings: Settings) -> PyResult<String> {
-    jobs::run(py, move |stop| {
+    jobs::run_and_wait(py, settings.calls_python(), move |stop| {
         let plan = Plan::single(settings.config()?, false)?;
         replayed(&[path], &settings.policies, &plan, &stop, |outcome| {
             let rows = outcome.rows();
@@ -182,7 +187,7 @@ pub fn result(py: Python<'_>, path: PathBuf, settings: Settings) -> PyResult<Str
 /// The rows of an experiment file. Its traces are used if `paths` is empty.
 #[pyfunction]
 pub fn sweep(py: Python<'_>, paths: Vec<PathBuf>, settings: Settings) -> PyResult<Vec<u8>> {
-    jobs::run(py, move |stop| {
+    jobs::run_and_wait(py, settings.calls_python(), move |stop| {
         let fault = |error| settings.fault("experiment", error);
         let file = ExperimentFile::parse(&settings.text).map_err(fault)?;
         let plan = file.plan().map_err(fault)?;

@@ -83,7 +83,7 @@ def test_settings_in_files_have_the_errors_of_the_program(atrium, replay, tmp_pa
     for text in ["cores = 1\ncore = 2", "cores = ", "[l1]\nways = 0", "\udcff"]:
         file.write_bytes(text.encode("utf-8", "surrogateescape"))
         expected = printed(replay, "run", atrium, "--config", file)
-        assert refused("machine.toml", parallax.run, atrium, file) == expected
+        assert refused("", parallax.run, atrium, file) == expected
     absent = tmp_path / "absent.toml"
     expected = printed(replay, "run", atrium, "--config", absent)
     assert refused("absent.toml", parallax.run, atrium, absent) == expected
