@@ -50,9 +50,9 @@ def read_textrace(path: Any) -> pa.Table:
         ``group`` : uint8
             Index into the draw's groups of samples; 15 for a quad without samples.
         ``uv_u``, ``uv_v`` : int32
-            Coordinates of the top left pixel, in 1/256 texels of the group's extent.
+            Coordinates of the top left pixel, in 1/2048 of a texel of the group's extent.
         ``dx_u``, ``dx_v``, ``dy_u``, ``dy_v``, ``cross_u``, ``cross_v`` : int32
-            Their derivatives, in 1/256 texels per pixel.
+            Their derivatives, in the same unit per pixel.
 
     Raises
     ------

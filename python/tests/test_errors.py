@@ -197,7 +197,9 @@ def test_reprojections_that_are_none(traces, replay):
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT")
 def test_ctrl_c_ends_a_long_replay(atrium):
     code = f"""
-        import parallax, sys
+        import parallax, signal
+        # A parent that runs in the background may have left SIGINT ignored.
+        signal.signal(signal.SIGINT, signal.default_int_handler)
         class Slow:
             def __init__(self, sets, ways): pass
             def hit(self, set, way, line): sum(range(2000))

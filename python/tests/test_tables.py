@@ -169,12 +169,6 @@ def test_columns_own_the_memory_of_the_decoder(atrium):
     assert array.__array_interface__["data"][0] == address
 
 
-def test_a_trace_without_records_has_empty_columns(tmp_path, replay, atrium):
-    # No pixel of the sky has a sample: the whole screen is one untextured tile row.
-    empty = parallax.read_textrace(atrium).slice(0, 0)
-    assert empty.num_rows == 0 and empty.column("uv_u").to_numpy().dtype == np.int32
-
-
 def test_info_is_that_of_the_program(replay, atrium, traces):
     for path in [atrium, traces / "teapot-rays.raytrace"]:
         assert parallax.info(path) == json.loads(replay("info", "--json", path).stdout)

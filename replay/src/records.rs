@@ -134,6 +134,22 @@ mod tests {
     use crate::stream::synthetic::Synthetic;
 
     #[test]
+    fn a_trace_without_records_has_empty_columns_of_the_right_types() {
+        let mut memory = Synthetic::default().generate();
+        memory
+            .tiles
+            .iter_mut()
+            .flatten()
+            .for_each(|tile| *tile = Tile::default());
+        let file = crate::cli::testing::file_of(&memory);
+        let trace = Textrace::open(file.path()).unwrap();
+        let columns = columns::<RecordRow, _>(&trace).unwrap();
+        for (field, values) in RecordRow::FIELDS.iter().zip(columns) {
+            assert_eq!(values, field.get.values(&[]), "{}", field.name);
+        }
+    }
+
+    #[test]
     fn columns_hold_every_record_in_file_order() {
         let memory = Synthetic::default().generate();
         let file = crate::cli::testing::file_of(&memory);

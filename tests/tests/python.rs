@@ -27,7 +27,11 @@ fn the_package_passes_its_tests_and_the_notebooks_run() {
     }
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{text}\n{errors}");
-    for expected in [" passed", "an-own-order.ipynb: ", "where-the-misses-are.ipynb: "] {
+    for expected in [
+        " passed",
+        "an-own-order.ipynb: ",
+        "where-the-misses-are.ipynb: ",
+    ] {
         assert!(text.contains(expected), "{text}");
     }
 }
