@@ -8,7 +8,7 @@ use std::process::Command;
 fn the_package_passes_its_tests_and_the_notebooks_run() {
     let replay = program("replay");
     let replay = Path::new(replay.get_program());
-    let native = replay.with_file_name("lib_native.so");
+    let native = replay.with_file_name("deps/lib_native.so");
     assert!(native.exists(), "{} is not built", native.display());
     let out = tempfile::tempdir().expect("a temporary folder");
     let output = Command::new(root().join("scripts/notebooks.sh"))
