@@ -11,7 +11,7 @@ use replay::order::curve::Curve;
 use replay::order::parts::Parts;
 use replay::order::{self, Interleave, Known, Listed, TileRef, View, Views, WorkItem, views};
 use replay::stream::rendered;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Eye (0 left, 1 right), column and row.
 type Tile = (u32, u32, u32);
@@ -36,7 +36,7 @@ fn pairs_of(passes: &[Pass]) -> Vec<[View; 2]> {
 }
 
 /// The passes of a trace with tiles of this size.
-fn passes_of(path: &PathBuf, tile_px: u32) -> Result<Vec<Pass>> {
+fn passes_of(path: &Path, tile_px: u32) -> Result<Vec<Pass>> {
     let mut passes = Textrace::open(path)?.tables().passes.clone();
     for pass in &mut passes {
         pass.tiles = pass.size_px.map(|size| size.div_ceil(tile_px.max(1)));
