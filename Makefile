@@ -6,7 +6,7 @@
 CARGO ?= cargo
 OUT   ?= out
 
-.PHONY: demo apps techniques accuracy stress test fuzz faults bench lint build deps golden figures reproduce clean
+.PHONY: demo apps techniques accuracy stress notebooks test fuzz faults bench lint build deps golden figures reproduce clean
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
@@ -26,6 +26,10 @@ stress: deps build
 # Run time against error, from capture precision to techniques: a page in $(OUT)/accuracy.
 accuracy: deps build
 	@OUT="$(OUT)" scripts/accuracy.sh
+
+# The Python package and its notebooks in a fresh virtual environment, with packages from PyPI (docs/use/python.md).
+notebooks: build
+	@OUT="$(OUT)" scripts/notebooks.sh
 
 test:
 	@scripts/install-deps.sh test

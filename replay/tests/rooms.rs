@@ -6,13 +6,20 @@ use std::path::{Path, PathBuf};
 
 /// Modules by layer, from the bottom up. A module may use modules of lower layers and of its own layer.
 const FLOORS: [&[&str]; 12] = [
-    &["files", "model_version", "palette", "registry", "size"],
+    &[
+        "files",
+        "model_version",
+        "palette",
+        "records",
+        "registry",
+        "size",
+    ],
     &["config", "memory", "order", "result"],
     &["paper", "preset", "tmu"],
     &["stream"],
     &["access"],
     &["engine"],
-    &["addresses", "compare", "locality"],
+    &["addresses", "compare", "line_list", "locality"],
     &["sgrt"],
     &["experiment"],
     &["accuracy", "orders_study", "techniques"],

@@ -21,7 +21,7 @@ pub use formats::container::is_stdout;
 pub use memory::Allocator;
 pub use message::{error, note, print, stdout, warn};
 pub use outputs::{Output, check_folder, check_outputs};
-pub use program::{Common, VERSION, run};
+pub use program::{Common, VERSION, described, run};
 pub use progress::Progress;
 pub use settings::read_settings;
 pub use shards::{MOST_SHARDS, Piece, Shard, ShardArgs, balanced};

@@ -1,7 +1,7 @@
 //! Terminal output: results on stdout, everything else on stderr, with control characters replaced.
 
 use formats::text::printable_lines;
-use std::io::{self, BufWriter, IsTerminal, StdoutLock, Write};
+use std::io::{self, BufWriter, IsTerminal, Stdout, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Exit code of wrong use or unreadable input, also used by clap.
@@ -34,12 +34,12 @@ pub fn print(text: &str) -> anyhow::Result<()> {
 }
 
 /// Buffered standard output with errors that name it. The caller flushes it.
-pub fn stdout() -> impl Write {
-    BufWriter::new(Named(io::stdout().lock()))
+pub fn stdout() -> impl Write + Send {
+    BufWriter::new(Named(io::stdout()))
 }
 
 /// Standard output that adds its name to errors.
-struct Named(StdoutLock<'static>);
+struct Named(Stdout);
 
 impl Write for Named {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {

@@ -109,7 +109,8 @@ fn parse<C: Parser>() -> C {
 }
 
 /// An error and its causes in one line. Causes that the error's own text repeats are skipped.
-fn described(error: &anyhow::Error) -> String {
+#[must_use]
+pub fn described(error: &anyhow::Error) -> String {
     error.chain().fold(String::new(), |text, cause| {
         let cause = cause.to_string();
         match text.as_str() {

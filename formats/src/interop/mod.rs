@@ -1,16 +1,22 @@
 //! Accesses of textures and rays for other simulators: addresses only ([`plain`], which can also be read),
-//! CSV, JSON Lines.
+//! CSV, JSON Lines, and columns for NumPy and Parquet ([`columns`]).
 //!
 //! The accesses of a record are the ones that replay counts, in the order of [`crate::footprint`]. The
 //! caller determines the order of tiles and primitives.
 
+pub mod columns;
 mod csv;
 mod jsonl;
+mod npy;
 pub mod plain;
 mod rays;
 
+pub use columns::{
+    Field, Get, RayRow, RecordRow, SampleRow, Tabular, Values, ray_rows, record_rows,
+};
 pub use csv::CsvWriter;
 pub use jsonl::{JsonlWriter, record_to_json};
+pub use npy::NpyWriter;
 pub use rays::{Entry, RayAccess, RaySample, ray_samples};
 
 use crate::footprint::{SamplingOptions, record_footprints};

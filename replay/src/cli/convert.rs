@@ -10,7 +10,8 @@ use formats::Trace;
 use formats::container::{AtomicFile, is_stdout};
 use formats::interop::plain::{CompressedWriter, Compression, PlainAccess, PlainForm, PlainWriter};
 use formats::interop::{
-    AccessSink, CsvWriter, Expander, Granularity, JsonlWriter, Origin, RayAccess, ray_samples,
+    Access, AccessSink, CsvWriter, Expander, Granularity, JsonlWriter, Origin, RayAccess, RayRow,
+    RecordRow, ray_samples,
 };
 use formats::layout::Layout;
 use formats::raytrace::{RayTile, Raytrace, RaytraceWriter, encode_ray_tile};
@@ -41,6 +42,10 @@ pub enum Target {
     Csv,
     /// The columns of csv as JSON Lines
     Jsonl,
+    /// The columns of csv as an array of NumPy with named fields
+    Npy,
+    /// The columns of csv as Parquet
+    Parquet,
     /// Texture trace with its tiles encoded again
     Textrace,
     /// Ray trace with its tiles encoded again
@@ -58,7 +63,12 @@ impl Target {
             Self::Ramulator => PlainForm::Ramulator,
             Self::RamulatorO3 => PlainForm::RamulatorO3,
             Self::Champsim => PlainForm::Champsim,
-            Self::Csv | Self::Jsonl | Self::Textrace | Self::Raytrace => return None,
+            Self::Csv
+            | Self::Jsonl
+            | Self::Npy
+            | Self::Parquet
+            | Self::Textrace
+            | Self::Raytrace => return None,
         })
     }
 
@@ -67,7 +77,12 @@ impl Target {
     }
 
     fn is_text(self) -> bool {
-        !self.is_trace() && self.plain().is_none_or(PlainForm::is_text)
+        let lines = matches!(self, Self::Csv | Self::Jsonl);
+        lines || self.plain().is_some_and(PlainForm::is_text)
+    }
+
+    fn is_columns(self) -> bool {
+        matches!(self, Self::Npy | Self::Parquet)
     }
 }
 
@@ -102,6 +117,8 @@ pub enum GranularityName {
     /// distinct line of a visit
     #[default]
     Line,
+    /// With npy and parquet: no accesses, but every record or ray, with the columns of `replay dump --parquet`
+    Record,
 }
 
 /// Arguments of `replay convert`.
@@ -110,6 +127,8 @@ pub enum GranularityName {
   replay convert c.textrace --to din --order z2-sta | dineroIV -informat d ...
   replay convert c.textrace --to u32 --order morton -o c.u32.zst
   replay convert c.textrace --to csv --granularity texel -o c.csv
+  replay convert c.textrace --to npy --order z2-sta -o c.npy
+  replay convert c.textrace --to npy --granularity record -o records.npy
   replay convert c.textrace --to textrace --encoding raw -o raw.textrace
   replay convert r.raytrace --to csv | head
 Rays are written tile by tile, left eye first. Their accesses need a trace with visits
@@ -176,6 +195,15 @@ impl ConvertArgs {
             self.encoding.is_none() || self.to == Target::Textrace,
             "--encoding: only with --to textrace"
         );
+        if self.granularity == Some(GranularityName::Record) {
+            ensure!(
+                self.to.is_columns(),
+                "--granularity record: only with --to npy and --to parquet"
+            );
+            if let Some(flag) = self.machine.first_of_traces() {
+                bail!("{flag}: it has no effect on records, only on accesses");
+            }
+        }
         if self.to.is_trace() {
             ensure!(
                 self.granularity.is_none(),
@@ -229,8 +257,14 @@ fn write_accesses(
     trace: &Trace,
     config: &RunConfig,
     args: &ConvertArgs,
-    out: &mut impl Write,
+    out: &mut (impl Write + Send),
 ) -> Result<()> {
+    if args.granularity() == GranularityName::Record {
+        return match trace {
+            Trace::Texture(trace) => columns::records::<RecordRow, _>(&**trace, args.to, out),
+            Trace::Ray(trace) => columns::records::<RayRow, _>(&**trace, args.to, out),
+        };
+    }
     if let Trace::Ray(trace) = trace
         && !trace.tables().meta.has_visits
     {
@@ -247,6 +281,13 @@ fn write_accesses(
         (Trace::Texture(trace), None) if args.to == Target::Csv => {
             accesses(trace, config, args.granularity(), &mut CsvWriter::new(out)?)
         }
+        (Trace::Texture(trace), None) if args.to.is_columns() => columns::rows(
+            args.to,
+            out,
+            |sink: &mut dyn FnMut(Access) -> Result<()>| {
+                accesses(trace, config, args.granularity(), &mut columns::Sink(sink))
+            },
+        ),
         (Trace::Texture(trace), None) => {
             accesses(trace, config, args.granularity(), &mut JsonlWriter(out))
         }
@@ -260,6 +301,15 @@ fn write_accesses(
             writeln!(out, "{}", RayAccess::CSV_HEADER)?;
             ray_accesses(trace, config, args, |access| access.write_csv(out))
         }
+        (Trace::Ray(trace), None) if args.to.is_columns() => columns::rows(
+            args.to,
+            out,
+            |sink: &mut dyn FnMut(RayAccess) -> Result<()>| {
+                ray_accesses(trace, config, args, |access| {
+                    sink(*access).map_err(io::Error::other)
+                })
+            },
+        ),
         (Trace::Ray(trace), None) => ray_accesses(trace, config, args, |access| {
             writeln!(out, "{}", serde_json::to_string(access)?)
         }),
@@ -281,7 +331,7 @@ fn accesses(
         sampling: config.sampling,
         granularity: match granularity {
             GranularityName::Texel => Granularity::Texel,
-            GranularityName::Line => Granularity::Line,
+            GranularityName::Line | GranularityName::Record => Granularity::Line,
         },
         line_bytes: config.line_bytes,
     };
@@ -381,5 +431,6 @@ fn reencode(trace: &Trace, args: &ConvertArgs) -> Result<()> {
     Ok(())
 }
 
+mod columns;
 #[cfg(test)]
 mod tests;

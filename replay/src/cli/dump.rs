@@ -1,13 +1,20 @@
 //! `replay dump`: prints decoded records as JSON Lines.
 
 use super::tiles::{NumberRange, ray_tiles, tiles};
-use anyhow::{Result, bail};
+use crate::files;
+use crate::records::Rows;
+use crate::report::rows_parquet::RowsWriter;
+use anyhow::{Context, Result, bail, ensure};
 use formats::Trace;
-use formats::interop::{Origin, ray_samples, record_to_json};
+use formats::container::AtomicFile;
+use formats::interop::{
+    RayRow, RecordRow, SampleRow, Tabular, ray_samples, record_rows, record_to_json,
+};
 use formats::raytrace::{RayTile, Raytrace};
 use formats::textrace::{Textrace, Tile};
+use shell::Output;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Arguments of `replay dump`.
@@ -19,7 +26,8 @@ with its rays and, if the trace has them, their visits.
 Examples:
   replay dump c.textrace --pass 0 --tile 1200
   replay dump c.textrace --tile 40..48 | jq .primitive
-  replay dump r.raytrace --pass 1 --tile 7 | jq '.rays[].steps'"
+  replay dump r.raytrace --pass 1 --tile 7 | jq '.rays[].steps'
+  replay dump c.textrace --parquet records.parquet"
 )]
 pub struct DumpArgs {
     /// Trace, .textrace or .raytrace
@@ -33,6 +41,12 @@ pub struct DumpArgs {
     /// Print primitive lists instead of records: one line per tile of each view captured with --geometry
     #[arg(long, conflicts_with_all = ["pass", "tile"])]
     pub lists: bool,
+    /// Write a Parquet file instead: one row per record or, for ray traces, one row per ray
+    #[arg(long, value_name = "FILE", conflicts_with = "lists")]
+    pub parquet: Option<PathBuf>,
+    /// One row per sample of a pixel, with its hit and its colour, instead of one per ray
+    #[arg(long, requires = "parquet")]
+    pub samples: bool,
 }
 
 /// Runs the subcommand.
@@ -40,6 +54,11 @@ pub struct DumpArgs {
 /// # Errors
 /// The trace cannot be read, it does not have such a pass or tile, or the output cannot be written.
 pub fn run(args: &DumpArgs) -> Result<ExitCode> {
+    if let Some(path) = &args.parquet {
+        files::check_outputs(&[Output::binary("--parquet", path)], [args.trace.as_path()])?;
+        to_parquet(&Trace::open(&args.trace)?, args, path)?;
+        return Ok(ExitCode::SUCCESS);
+    }
     let trace = Trace::open(&args.trace)?;
     let mut out = shell::stdout();
     match (&trace, args.lists) {
@@ -54,26 +73,84 @@ pub fn run(args: &DumpArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn dump(trace: &Trace, args: &DumpArgs, out: &mut impl Write) -> Result<()> {
-    let chosen = |pass, tile| {
-        args.pass.is_none_or(|range| range.contains(pass))
-            && args.tile.is_none_or(|range| range.contains(tile))
-    };
-    let (any, passes, most) = match trace {
+impl DumpArgs {
+    /// Whether a tile of a pass is to be dumped.
+    fn has(&self, pass: usize, tile: usize) -> bool {
+        self.pass.is_none_or(|range| range.contains(pass))
+            && self.tile.is_none_or(|range| range.contains(tile))
+    }
+}
+
+/// Writes the chosen rows as Parquet.
+fn to_parquet(trace: &Trace, args: &DumpArgs, path: &Path) -> Result<()> {
+    ensure!(
+        !args.samples || matches!(trace, Trace::Ray(_)),
+        "--samples: expected a ray trace, found {}",
+        args.trace.display()
+    );
+    let write = |out: &mut (dyn Write + Send)| match trace {
         Trace::Texture(trace) => {
-            let passes = &trace.tables().passes;
-            let most = passes.iter().map(formats::textrace::Pass::tile_count).max();
-            (
-                records(trace, chosen, out)?,
-                passes.len(),
-                most.unwrap_or(0),
-            )
+            let chosen = |at: &(usize, usize)| args.has(at.0, at.1);
+            parquet_of::<RecordRow, _>(&**trace, chosen, out)
         }
-        Trace::Ray(trace) => (samples(trace, chosen, out)?, 2, trace.tables().tile_count()),
+        Trace::Ray(trace) => {
+            let chosen = |at: &(_, u32)| args.has(at.0 as usize, at.1 as usize);
+            if args.samples {
+                parquet_of::<SampleRow, _>(&**trace, chosen, out)
+            } else {
+                parquet_of::<RayRow, _>(&**trace, chosen, out)
+            }
+        }
     };
+    let name = || format!("cannot write {}", path.display());
+    let mut out = AtomicFile::create(path).with_context(name)?;
+    let any = write(&mut out).with_context(name)?;
+    check_any(any, trace, args)?;
+    out.persist().with_context(name)
+}
+
+/// Writes the rows of the chosen tiles; returns false if no tile matches.
+fn parquet_of<R: Tabular, T: Rows<R>>(
+    trace: &T,
+    chosen: impl Fn(&T::At) -> bool,
+    out: &mut (dyn Write + Send),
+) -> Result<bool> {
+    let mut writer = RowsWriter::new(out)?;
+    let (mut tile, mut rows) = (T::Tile::default(), Vec::new());
+    let mut any = false;
+    for at in trace.places().into_iter().filter(chosen) {
+        any = true;
+        trace.append(at, &mut tile, &mut rows)?;
+        for row in rows.drain(..) {
+            writer.write(row)?;
+        }
+    }
+    writer.finish()?;
+    Ok(any)
+}
+
+fn dump(trace: &Trace, args: &DumpArgs, out: &mut impl Write) -> Result<()> {
+    let chosen = |pass, tile| args.has(pass, tile);
+    let any = match trace {
+        Trace::Texture(trace) => records(trace, chosen, out)?,
+        Trace::Ray(trace) => samples(trace, chosen, out)?,
+    };
+    check_any(any, trace, args)
+}
+
+/// Fails if no tile matched.
+fn check_any(any: bool, trace: &Trace, args: &DumpArgs) -> Result<()> {
     if any {
         return Ok(());
     }
+    let (passes, most) = match trace {
+        Trace::Texture(trace) => {
+            let passes = &trace.tables().passes;
+            let most = passes.iter().map(formats::textrace::Pass::tile_count).max();
+            (passes.len(), most.unwrap_or(0))
+        }
+        Trace::Ray(trace) => (2, trace.tables().tile_count()),
+    };
     let first = |range: Option<NumberRange>| range.map_or(0, NumberRange::first);
     bail!(
         "{}: no pass {} tile {}; the trace has {passes} passes of at most {most} tiles",
@@ -103,17 +180,8 @@ fn records(
 
 /// The records of a tile as JSON Lines.
 pub fn record_lines(pass: usize, index: usize, tile: &Tile) -> impl Iterator<Item = String> {
-    tile.runs.iter().flat_map(move |run| {
-        let origin = Origin {
-            pass: pass as u32,
-            tile: index as u32,
-            draw: run.draw,
-            primitive: run.primitive,
-        };
-        let records = tile.records.iter().skip(run.first as usize);
-        let records = records.take(run.count as usize);
-        records.map(move |record| record_to_json(origin, record).to_string())
-    })
+    record_rows(pass as u32, index as u32, tile)
+        .map(|row| record_to_json(row.origin, &row.record).to_string())
 }
 
 /// Prints the primitives of each tile of each view.
@@ -159,6 +227,7 @@ mod tests {
     use super::*;
     use crate::cli::testing::{file_of, lines};
     use crate::stream::synthetic::Synthetic;
+    use parquet::file::reader::{FileReader, SerializedFileReader};
 
     #[test]
     fn a_dump_holds_every_record_of_the_chosen_tiles() {
@@ -170,6 +239,8 @@ mod tests {
             pass: Some("1".parse().unwrap()),
             tile: Some("2..5".parse().unwrap()),
             lists: false,
+            parquet: None,
+            samples: false,
         };
         let mut text = Vec::new();
         dump(&trace, &args, &mut text).unwrap();
@@ -182,6 +253,35 @@ mod tests {
     }
 
     #[test]
+    fn parquet_holds_the_chosen_rows_and_is_absent_after_an_error() {
+        let memory = Synthetic::default().generate();
+        let file = file_of(&memory);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("rows.parquet");
+        let args = |pass: &str, samples| DumpArgs {
+            trace: file.path().to_owned(),
+            pass: Some(pass.parse().unwrap()),
+            tile: Some("2..5".parse().unwrap()),
+            lists: false,
+            parquet: Some(path.clone()),
+            samples,
+        };
+        for (args, expected) in [
+            (args("9", false), "no pass 9 tile 2"),
+            (args("1", true), "--samples: expected a ray trace, found"),
+        ] {
+            let error = run(&args).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+            assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        }
+        run(&args("1", false)).unwrap();
+        let rows: usize = memory.tiles[1][2..5].iter().map(|t| t.records.len()).sum();
+        let reader = SerializedFileReader::new(std::fs::File::open(&path).unwrap()).unwrap();
+        let found = reader.metadata().file_metadata().num_rows();
+        assert_eq!(found, i64::try_from(rows).unwrap());
+    }
+
+    #[test]
     fn a_missing_pass_is_an_error() {
         let file = file_of(&Synthetic::default().generate());
         let trace = Trace::open(file.path()).unwrap();
@@ -190,6 +290,8 @@ mod tests {
             pass: Some("9".parse().unwrap()),
             tile: None,
             lists: false,
+            parquet: None,
+            samples: false,
         };
         let error = dump(&trace, &args, &mut Vec::new()).unwrap_err();
         assert!(error.to_string().contains("no pass 9"), "{error}");

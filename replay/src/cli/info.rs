@@ -49,7 +49,11 @@ pub fn run(args: &InfoArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn to_json(trace: &Trace) -> Result<Value> {
+/// The trace's tables and totals, as `--json` prints them.
+///
+/// # Errors
+/// An unreadable tile.
+pub fn to_json(trace: &Trace) -> Result<Value> {
     let container = trace.container();
     let mut value = json!({
         "schema": SCHEMA,

@@ -17,7 +17,7 @@ mod paper;
 mod parquet_arg;
 mod readings;
 mod report;
-mod reproject;
+pub mod reproject;
 mod run;
 mod subjects;
 mod sweep;

@@ -6,6 +6,7 @@ use crate::files::{self, write_atomically};
 use crate::model_version::MODEL_VERSION;
 use crate::paper::sgrt as paper;
 use crate::report::sgrt::{self as report, Entry, Thumbnails};
+use crate::report::table::Table;
 use crate::result::{TOOL, TraceId, scene_name};
 use crate::sgrt::compose::Reuse;
 use crate::sgrt::config::{DEFAULT_TOML, SgrtConfig};
@@ -148,6 +149,41 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
         super::print(&text)?;
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// The rows that `--parquet` writes. `arguments` are those of the command line, files first; `parameters` is
+/// the text of a `--config` file.
+///
+/// # Errors
+/// As [`run`].
+pub fn rows(arguments: &[String], parameters: Option<&str>) -> anyhow::Result<Table> {
+    #[derive(clap::Parser)]
+    struct Line {
+        #[command(flatten)]
+        args: ReprojectArgs,
+    }
+    let words = std::iter::once("reproject").chain(arguments.iter().map(String::as_str));
+    let Line { args } = clap::Parser::try_parse_from(words).map_err(|error| {
+        // Without the usage that follows on the command line.
+        let text = error.to_string();
+        let first = text.lines().take_while(|line| !line.is_empty());
+        let text = first.collect::<Vec<_>>().join("\n");
+        anyhow::anyhow!(text.trim_start_matches("error: ").to_owned())
+    })?;
+    let config = match parameters {
+        None => read_config(args.preset, args.config.as_deref())?,
+        Some(text) => {
+            let named = args.preset.map_or("", |preset| preset.parameters);
+            SgrtConfig::from_layers(&[named, text]).context("config")?
+        }
+    };
+    paper::values("", "", &args.paper_scenes)?;
+    let entries = args
+        .files
+        .iter()
+        .map(|path| report_on(path, &args, &config));
+    let entries: Vec<Entry> = entries.collect::<anyhow::Result<_>>()?;
+    Ok(report::rows(&entries))
 }
 
 /// Checks the outputs before the replays; returns true if the result is to be printed.

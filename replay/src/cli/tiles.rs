@@ -1,23 +1,6 @@
-//! Lists the tiles of a trace in file order, and parses ranges of them.
+//! Ranges of the tiles of a trace.
 
-use formats::raytrace::RaytraceTables;
-use formats::textrace::Pass;
-use formats::view::Eye;
-
-/// Pass and tile numbers of a trace, in file order.
-pub fn tiles(passes: &[Pass]) -> impl Iterator<Item = (usize, usize)> + use<'_> {
-    passes
-        .iter()
-        .enumerate()
-        .flat_map(|(pass, info)| (0..info.tile_count() as usize).map(move |tile| (pass, tile)))
-}
-
-/// Eye and tile number of every tile of a ray trace, in file order.
-pub fn ray_tiles(tables: &RaytraceTables) -> impl Iterator<Item = (Eye, u32)> + use<> {
-    let tiles = tables.tile_count();
-    let of_eye = move |eye| (0..tiles).map(move |tile| (eye, tile));
-    [Eye::Left, Eye::Right].into_iter().flat_map(of_eye)
-}
+pub use crate::records::{ray_tiles, tiles};
 
 /// A range of numbers on the command line: `7`, `3..8`, `5..` or `..8`; the end is exclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -26,7 +26,7 @@ pub use cache::{AnyCache, Cache};
 pub use fast::Forest;
 pub use hierarchy::{Answer, Caches, Found, Hierarchy, MissPath, OtherWork, SecondLevel};
 pub use in_flight::{AllocateOnMiss, Delay, DelayedFill, NOT_IN_FLIGHT};
-pub use policy::{AnyWays, FourWayLru, Lru, Replacement, WaysOf};
+pub use policy::{AnyWays, FourWayLru, Lru, MakePolicy, Policy, Replacement, WaysOf};
 pub use prefetch::Prefetching;
 
 use policy::EMPTY;

@@ -3,11 +3,66 @@
 
 use super::cost::{Cost, Information};
 use super::parts::Parts;
-use super::{Order, OrderRow, View, WorkItem};
+use super::{Order, OrderRow, View, Views, WorkItem, views};
 use crate::palette::GREY;
+use formats::textrace::Pass;
+use std::sync::{Mutex, PoisonError};
+
+/// The orders that configurations accept by name.
+static NAMED: Mutex<Vec<Order>> = Mutex::new(Vec::new());
+
+/// The order that was named so.
+pub(super) fn by_name(name: &str) -> Option<Order> {
+    let named = NAMED.lock().unwrap_or_else(PoisonError::into_inner);
+    named.iter().find(|order| order.name() == name).copied()
+}
+
+/// Items that do not visit every tile of both views exactly once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NotAnOrder {
+    /// Index of the item; the number of items if something is missing.
+    pub item: usize,
+    /// What was expected there.
+    pub expected: &'static str,
+    /// What was found: a tile as `PASS:TILE`, or a number of tiles.
+    pub found: String,
+}
+
+/// Checks that items visit every tile of two views exactly once.
+///
+/// # Errors
+/// The first item that does not.
+pub fn check_items(items: &[WorkItem], eyes: [View; 2]) -> Result<(), NotAnOrder> {
+    let mut seen = eyes.map(|view| vec![false; (view.tiles[0] * view.tiles[1]) as usize]);
+    for (item, of) in items.iter().enumerate() {
+        for at in of.tiles() {
+            let eye = eyes.iter().position(|view| view.pass == at.pass);
+            let is_seen = eye.and_then(|eye| seen[eye].get_mut(at.tile as usize));
+            match is_seen {
+                Some(is_seen) if !*is_seen => *is_seen = true,
+                _ => {
+                    return Err(NotAnOrder {
+                        item,
+                        expected: "a tile of these passes that was not listed yet",
+                        found: format!("{}:{}", at.pass, at.tile),
+                    });
+                }
+            }
+        }
+    }
+    let missing = seen.iter().flatten().filter(|seen| !**seen).count();
+    if missing == 0 {
+        return Ok(());
+    }
+    Err(NotAnOrder {
+        item: items.len(),
+        expected: "every tile of both passes",
+        found: format!("{missing} tiles not listed"),
+    })
+}
 
 /// The items of pairs of views, by the left view's pass.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Listed {
     /// The pass of the left view, and the items in order.
     pub pairs: Vec<(u32, Vec<WorkItem>)>,
@@ -42,6 +97,41 @@ impl Order {
             parts,
             listed: Some(Box::leak(Box::new(listed))),
         })))
+    }
+
+    /// A listed order that configurations accept by its name. An order with the same name and items is reused;
+    /// with other items, it is replaced. A name with `@` never equals the name of another kind of order.
+    #[must_use]
+    pub fn own(name: &str, parts: Parts, listed: Listed) -> Self {
+        let mut named = NAMED.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(at) = named.iter().position(|order| order.name() == name) {
+            if named[at].row().listed == Some(&listed) {
+                return named[at];
+            }
+            named.swap_remove(at);
+        }
+        let order = Self::listed(name, parts, listed);
+        named.push(order);
+        order
+    }
+
+    /// Checks that a listed order visits every tile of every pair of views of these passes. Other orders do.
+    ///
+    /// # Errors
+    /// The first pair, by the index of its left pass, whose items do not.
+    pub fn check_for(self, passes: &[Pass]) -> Result<(), (u32, NotAnOrder)> {
+        if self.row().listed.is_none() {
+            return Ok(());
+        }
+        let mut frames: Vec<u32> = passes.iter().map(|pass| pass.frame).collect();
+        frames.dedup();
+        for phase in frames.into_iter().flat_map(|frame| views(passes, frame)) {
+            if let Views::Pair(left, right) = phase {
+                let items = self.listed_items(left).unwrap_or_default();
+                check_items(items, [left, right]).map_err(|fault| (left.pass, fault))?;
+            }
+        }
+        Ok(())
     }
 
     /// The listed items of a pair of views.

@@ -19,7 +19,7 @@ mod plan;
 mod work;
 
 pub use known::{Counters, Known, ViewCounters};
-pub use listed::Listed;
+pub use listed::{Listed, NotAnOrder, check_items};
 pub use plan::{Phase, Views, plan, plan_frame, views};
 pub use work::{Interleave, TileRef, View, WorkItem};
 
@@ -77,8 +77,11 @@ const fn row(
     }
 }
 
-/// The order whose parts the name lists.
+/// The listed order of that name, or the order whose parts the name lists.
 fn composed_by_name(name: &str) -> Result<Order, Option<String>> {
+    if let Some(order) = listed::by_name(name) {
+        return Ok(order);
+    }
     match Parts::parse(name) {
         Ok(parts) => Ok(composed::order(parts)),
         Err(why) => Err(Some(why).filter(|_| Parts::is_composed(name))),

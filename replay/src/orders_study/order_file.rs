@@ -13,7 +13,7 @@
 //! An item is a tile, or two tiles whose triangles are rendered in turn. A tile is the index of its pass and
 //! its number. The items visit all tiles of both passes once.
 
-use crate::order::{Interleave, TileRef, Views, WorkItem, views};
+use crate::order::{Interleave, TileRef, Views, WorkItem, check_items, views};
 use formats::textrace::Tables;
 use std::fmt::Write as _;
 use thiserror::Error;
@@ -160,32 +160,8 @@ impl OrderFile {
                 &format!("{}:{}", first.pass, first.tile),
             );
         };
-        let mut seen = eyes.map(|view| vec![false; (view.tiles[0] * view.tiles[1]) as usize]);
-        for (line, item) in (6..).zip(&self.items) {
-            for at in item.tiles() {
-                let eye = eyes.iter().position(|view| view.pass == at.pass);
-                let is_seen = eye.and_then(|eye| seen[eye].get_mut(at.tile as usize));
-                match is_seen {
-                    Some(is_seen) if !*is_seen => *is_seen = true,
-                    _ => {
-                        return error(
-                            line,
-                            "a tile of these passes that was not listed yet",
-                            &format!("{}:{}", at.pass, at.tile),
-                        );
-                    }
-                }
-            }
-        }
-        let missing = seen.iter().flatten().filter(|seen| !**seen).count();
-        if missing > 0 {
-            let end = 6 + self.items.len();
-            return error(
-                end,
-                "every tile of both passes",
-                &format!("{missing} tiles not listed"),
-            );
-        }
+        check_items(&self.items, eyes)
+            .or_else(|fault| error(6 + fault.item, fault.expected, &fault.found))?;
         Ok(eyes[0].pass)
     }
 }

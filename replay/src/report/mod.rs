@@ -17,6 +17,7 @@ pub mod parquet;
 pub mod picture;
 pub mod plots;
 pub mod readings;
+pub mod rows_parquet;
 pub mod run;
 pub mod sgrt;
 pub mod sweep;

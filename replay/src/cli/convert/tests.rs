@@ -7,6 +7,8 @@ use crate::stream::synthetic::Synthetic;
 use clap::Parser;
 use formats::FormatError;
 use formats::interop::plain::{AddressFile, AddressForm, Block};
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::RowAccessor;
 use std::collections::HashSet;
 
 #[derive(Parser)]
@@ -113,6 +115,76 @@ fn csv_and_json_lines_have_one_line_per_access() {
         let mut text = Vec::new();
         write_accesses(&trace, &config, &parse(&["--to", target]), &mut text).unwrap();
         assert_eq!(lines(&text).len(), accesses + header, "{target}");
+    }
+}
+
+/// The rows of an NPY file without its header, and the number of rows that the header has.
+fn npy(bytes: &[u8]) -> (&[u8], usize) {
+    let length = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let header = std::str::from_utf8(&bytes[10..10 + length]).unwrap();
+    let (_, shape) = header.split_once("'shape': (").unwrap();
+    let (rows, _) = shape.split_once(',').unwrap();
+    (&bytes[10 + length..], rows.parse().unwrap())
+}
+
+#[test]
+fn npy_and_parquet_have_the_accesses_of_csv() {
+    let file = file_of(&small());
+    let trace = Trace::open(file.path()).unwrap();
+    let config = RunConfig::default();
+    let addresses = din(&trace, &config, "line");
+    let write = |arguments: &[&str]| {
+        let mut bytes = Vec::new();
+        write_accesses(&trace, &config, &parse(arguments), &mut bytes).unwrap();
+        bytes
+    };
+    let bytes = write(&["--to", "npy"]);
+    let (rows, count) = npy(&bytes);
+    let row_bytes = 8 + 6 * 4 + 2 + 3 + 4;
+    assert_eq!((count, rows.len()), (addresses.len(), count * row_bytes));
+    let found = rows
+        .chunks(row_bytes)
+        .map(|row| u64::from_le_bytes(row[..8].try_into().unwrap()));
+    assert!(found.eq(addresses.iter().copied()));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    std::fs::write(&path, write(&["--to", "parquet"])).unwrap();
+    let reader = SerializedFileReader::new(std::fs::File::open(&path).unwrap()).unwrap();
+    let found = reader.get_row_iter(None).unwrap();
+    let found = found.map(|row| row.unwrap().get_ulong(0).unwrap());
+    assert!(found.eq(addresses));
+}
+
+#[test]
+fn records_are_those_of_dump_and_take_no_flag_of_accesses() {
+    let memory = small();
+    let file = file_of(&memory);
+    let trace = Trace::open(file.path()).unwrap();
+    let mut bytes = Vec::new();
+    let args = parse(&["--to", "npy", "--granularity", "record"]);
+    write_accesses(&trace, &RunConfig::default(), &args, &mut bytes).unwrap();
+    let (rows, count) = npy(&bytes);
+    let records = memory.tiles.iter().flatten().map(|tile| tile.records.len());
+    assert_eq!(count, records.sum::<usize>());
+    assert_eq!(rows.len(), count * 52);
+    for (arguments, expected) in [
+        (
+            ["--to", "csv", "--granularity", "record", "--seed", "1"],
+            "--granularity record: only with --to npy and --to parquet",
+        ),
+        (
+            [
+                "--to",
+                "npy",
+                "--granularity",
+                "record",
+                "--order",
+                "morton",
+            ],
+            "--order: it has no effect on records, only on accesses",
+        ),
+    ] {
+        assert_eq!(parse(&arguments).check().unwrap_err().to_string(), expected);
     }
 }
 

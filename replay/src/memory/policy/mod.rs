@@ -3,6 +3,7 @@
 
 mod fifo;
 mod lru;
+mod own;
 mod random;
 mod rrip;
 mod ship;
@@ -10,6 +11,7 @@ mod tree_plru;
 
 pub use lru::{AnyWays, FourWayLru, Lru, WaysOf};
 pub(in crate::memory) use lru::{look_up, lru, take_out, to_front};
+pub use own::{MakePolicy, Policy};
 
 use super::cache::{AnyCache, Cache, boxed};
 use crate::registry::{Named, registry};
@@ -19,7 +21,7 @@ use rrip::{Insertion, Rrip};
 use ship::Ship;
 use tree_plru::TreePlru;
 
-registry! { PolicyRow:
+registry! { PolicyRow, other = own::by_name:
     // constant   name          help                    supported ways                                 constructor
     LRU =       row("lru",       "Least recently used", ANY_WAYS,                                      |g| lru(g.sets, g.ways));
     FIFO =      row("fifo",      "First in, first out", ANY_WAYS,                                      |g| boxed(Fifo::new(g.sets, g.ways)));
@@ -46,7 +48,24 @@ pub struct PolicyRow {
     name: &'static str,
     help: &'static str,
     ways: WaysRule,
-    build: fn(Geometry) -> AnyCache,
+    build: Build,
+}
+
+/// Where a policy's cache comes from.
+enum Build {
+    /// The table.
+    Table(fn(Geometry) -> AnyCache),
+    /// The caller of this library.
+    Own(&'static MakePolicy),
+}
+
+impl std::fmt::Debug for Build {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Table(_) => "Table",
+            Self::Own(_) => "Own",
+        })
+    }
 }
 
 /// The associativities that a policy supports, as text and as a test.
@@ -65,14 +84,17 @@ const fn row(
         name,
         help,
         ways,
-        build,
+        build: Build::Table(build),
     }
 }
 
 impl Replacement {
     /// An empty cache.
     pub(in crate::memory) fn build(self, geometry: Geometry) -> AnyCache {
-        (self.row().build)(geometry)
+        match &self.row().build {
+            Build::Table(build) => build(geometry),
+            Build::Own(make) => own::build(make, geometry),
+        }
     }
 
     /// The associativities that the policy supports.

@@ -1,0 +1,158 @@
+"""Replays as data frames."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from . import _native
+from ._settings import Writer, experiment_of, path_of, paths_of, settings_of, _read
+
+
+def _frame(rows: bytes) -> pd.DataFrame:
+    """The rows of a Parquet file of ``replay``. ``attrs["columns"]`` has units and meanings."""
+    table = pq.read_table(pa.BufferReader(rows))
+    frame = table.to_pandas()
+    columns = (table.schema.metadata or {}).get(b"parallax.columns")
+    if columns:
+        frame.attrs["columns"] = json.loads(columns)
+    return frame
+
+
+def run(traces: Any, config: Any = None, *, order: Any = None, policy: Any = None) -> pd.DataFrame:
+    """Replays traces through caches and texture units, like ``replay run``.
+
+    Parameters
+    ----------
+    traces : path or list of paths
+        Texture traces.
+    config : dict or path, optional
+        Keys of docs/use/configuration.md, nested or with dots (``{"l1.size_bytes": "16KiB"}``), or a TOML file
+        with them. The rest keeps its defaults.
+    order : str, callable or sequence, optional
+        Tile order, instead of the configuration's: a name such as ``"z2-sta"``; a function that gets a
+        :class:`Grid` and returns a sequence; or the sequence itself. Its items are ``(eye, column, row)``, eye 0
+        left and 1 right, or two such tiles that one core renders together, triangle by triangle. It must have
+        every tile of both eyes once. Passes of one eye alone are rendered in Morton order.
+    policy : str or class, optional
+        Replacement policy of L1 and L2, instead of the configuration's: a name such as ``"drrip"``, or a class
+        (see docs/use/python.md). A class is called for each look-up and is slow.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per trace. The columns are those of ``replay sweep --csv``; ``frame.attrs["columns"]`` has the unit
+        and the meaning of each.
+
+    Raises
+    ------
+    ParallaxError
+        A trace cannot be read, or a setting cannot be used. Exceptions of `order` and `policy` pass through.
+    KeyboardInterrupt
+        Ctrl-C. The replay ends in the background at its next frame.
+    """
+    paths = paths_of(traces)
+    return _frame(_native.run(paths, settings_of(config, paths, order, policy)))
+
+
+def result(
+    trace: Any, config: Any = None, *, order: Any = None, policy: Any = None, tiles: bool = False
+) -> dict:
+    """What ``replay run --json`` prints: all counts of one replay, by view, texture and level.
+
+    Parameters
+    ----------
+    trace : path
+        A texture trace.
+    config, order, policy
+        As in :func:`run`.
+    tiles : bool
+        Also count by tile, like ``--tiles``.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    ParallaxError
+        As :func:`run`.
+    """
+    path = path_of(trace)
+    settings = settings_of(config, [path], order, policy)
+    settings["tiles"] = bool(tiles)
+    return json.loads(_native.result(path, settings))
+
+
+def sweep(experiment: Any, traces: Any = ()) -> pd.DataFrame:
+    """Replays every point of an experiment, like ``replay sweep``. Points share work.
+
+    Parameters
+    ----------
+    experiment : dict or path
+        An experiment file, or a dict with its tables: ``base`` (keys of a configuration), ``axes`` (key to list of
+        values, crossed; the last one varies fastest) and ``one-at-a-time``. Values of ``order`` may be functions
+        or lists of tiles, values of ``l1.replacement`` and so on classes, as in :func:`run`.
+    traces : path or list of paths
+        Texture traces, instead of those of the experiment.
+
+    Returns
+    -------
+    pandas.DataFrame
+        One row per point and trace, with the columns of ``replay sweep --csv``.
+
+    Raises
+    ------
+    ParallaxError
+        As :func:`run`.
+    """
+    paths = paths_of(traces)
+    if not paths and hasattr(experiment, "get"):
+        paths = paths_of(experiment.get("traces", ()))
+    return _frame(_native.sweep(paths, experiment_of(experiment, paths)))
+
+
+def reproject(
+    traces: Any,
+    *,
+    preset: str | None = None,
+    rule: str | None = None,
+    reuse: str | None = None,
+    config: Any = None,
+) -> pd.DataFrame:
+    """Replays ray traces through a ray-tracing GPU that reuses left pixels, like ``replay reproject``.
+
+    Parameters
+    ----------
+    traces : path or list of paths
+        Ray traces.
+    preset, rule, reuse : str, optional
+        As the flags of the same names.
+    config : dict or path, optional
+        Parameters of the model, nested or with dots, or a TOML file with them.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Two rows per trace, one for the rule and one for plain reuse, with the columns of
+        ``replay reproject --csv``.
+
+    Raises
+    ------
+    ParallaxError
+        A trace cannot be read, or a setting cannot be used.
+    """
+    files = [str(path) for path in paths_of(traces)]
+    flags = {"--preset": preset, "--rule": rule, "--reuse": reuse}
+    arguments = [f"{flag}={value}" for flag, value in flags.items() if value is not None]
+    text = None
+    settings = _read(config, "config")
+    if settings is not None:
+        arguments.append(f"--config={settings['file']}")
+    elif config:
+        text = Writer([], 16).settings(config)["text"]
+    return _frame(_native.reproject([*arguments, "--", *files], text))

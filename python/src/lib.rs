@@ -1,0 +1,36 @@
+//! The extension module of the Python package `parallax`. It has the functions that need Rust; the package's
+//! own modules make tables and data frames of what they return, and document them.
+
+mod errors;
+mod jobs;
+mod lines;
+mod orders;
+mod policies;
+mod replays;
+mod tables;
+
+use pyo3::prelude::*;
+
+/// Functions of the package `parallax` that are written in Rust.
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::errors::ParallaxError;
+    #[pymodule_export]
+    use super::lines::lines;
+    #[pymodule_export]
+    use super::orders::{name_order, order_items, pairs};
+    #[pymodule_export]
+    use super::policies::name_policy;
+    #[pymodule_export]
+    use super::replays::{config_json, read_settings, reproject, result, run, sweep};
+    #[pymodule_export]
+    use super::tables::{info, raytrace, textrace};
+
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

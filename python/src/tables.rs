@@ -1,0 +1,69 @@
+//! Traces as columns. The vectors of the columns become NumPy arrays without a copy.
+
+use crate::{errors::Failure, jobs};
+use formats::Trace;
+use formats::interop::{RayRow, RecordRow, SampleRow, Tabular, Values};
+use formats::raytrace::Raytrace;
+use formats::textrace::Textrace;
+use numpy::PyArray1;
+use pyo3::prelude::*;
+use replay::records::{self, Rows};
+use std::path::PathBuf;
+
+/// Name, names of codes, and values of a column.
+type Column<'py> = (&'static str, Vec<&'static str>, Bound<'py, PyAny>);
+
+fn array(py: Python<'_>, values: Values) -> Bound<'_, PyAny> {
+    match values {
+        Values::U8(values) => PyArray1::from_vec(py, values).into_any(),
+        Values::U16(values) => PyArray1::from_vec(py, values).into_any(),
+        Values::U32(values) => PyArray1::from_vec(py, values).into_any(),
+        Values::U64(values) => PyArray1::from_vec(py, values).into_any(),
+        Values::I32(values) => PyArray1::from_vec(py, values).into_any(),
+        Values::F32(values) => PyArray1::from_vec(py, values).into_any(),
+    }
+}
+
+fn columns<'py, R: Tabular>(py: Python<'py>, columns: Vec<Values>) -> Vec<Column<'py>> {
+    let fields = R::FIELDS.iter().zip(columns);
+    fields
+        .map(|(field, values)| (field.name, field.codes.to_vec(), array(py, values)))
+        .collect()
+}
+
+/// The columns of all rows of a trace.
+fn read<R: Tabular, T: Rows<R> + Send + 'static>(
+    py: Python<'_>,
+    open: impl FnOnce() -> formats::Result<T> + Send + 'static,
+) -> PyResult<Vec<Values>> {
+    jobs::run(py, |_| Ok(records::columns::<R, T>(&open()?)?))
+}
+
+/// The records of a texture trace.
+#[pyfunction]
+pub fn textrace(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Column<'_>>> {
+    let values = read::<RecordRow, _>(py, move || Textrace::open(&path))?;
+    Ok(columns::<RecordRow>(py, values))
+}
+
+/// The rays or the samples of a ray trace.
+#[pyfunction]
+pub fn raytrace<'py>(py: Python<'py>, path: PathBuf, rows: &str) -> PyResult<Vec<Column<'py>>> {
+    let open = move || Raytrace::open(&path);
+    match rows {
+        "rays" => Ok(columns::<RayRow>(py, read::<RayRow, _>(py, open)?)),
+        "samples" => Ok(columns::<SampleRow>(py, read::<SampleRow, _>(py, open)?)),
+        _ => {
+            let text = format!("rows: expected rays or samples, found {rows:?}");
+            Err(Failure::Own(anyhow::anyhow!(text)).into())
+        }
+    }
+}
+
+/// What `replay info --json` prints.
+#[pyfunction]
+pub fn info(py: Python<'_>, path: PathBuf) -> PyResult<String> {
+    jobs::run(py, move |_| {
+        Ok(replay::cli::info::to_json(&Trace::open(&path)?)?.to_string())
+    })
+}

@@ -1,0 +1,171 @@
+//! Records, rays and samples of whole traces as columns, decoded in parallel.
+
+use formats::interop::{
+    RayRow, RecordRow, SampleRow, Tabular, Values, ray_rows, ray_samples, record_rows,
+};
+use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
+use formats::textrace::{Pass, Textrace, Tile};
+use formats::view::Eye;
+use rayon::prelude::*;
+
+/// Tiles that a thread decodes per task.
+const CHUNK: usize = 64;
+
+/// Pass and tile numbers of a trace, in file order.
+pub fn tiles(passes: &[Pass]) -> impl Iterator<Item = (usize, usize)> + use<'_> {
+    passes
+        .iter()
+        .enumerate()
+        .flat_map(|(pass, info)| (0..info.tile_count() as usize).map(move |tile| (pass, tile)))
+}
+
+/// Eye and tile number of every tile of a ray trace, in file order.
+pub fn ray_tiles(tables: &RaytraceTables) -> impl Iterator<Item = (Eye, u32)> + use<> {
+    let tiles = tables.tile_count();
+    let of_eye = move |eye| (0..tiles).map(move |tile| (eye, tile));
+    [Eye::Left, Eye::Right].into_iter().flat_map(of_eye)
+}
+
+/// A trace with rows of type `R`.
+pub trait Rows<R>: Sync {
+    /// Identifies a tile.
+    type At: Copy + Send + Sync;
+    /// A decoded tile.
+    type Tile: Default;
+
+    /// All tiles, in file order.
+    fn places(&self) -> Vec<Self::At>;
+
+    /// Appends the rows of a tile. `tile` is reused.
+    ///
+    /// # Errors
+    /// A damaged tile.
+    fn append(&self, at: Self::At, tile: &mut Self::Tile, rows: &mut Vec<R>)
+    -> formats::Result<()>;
+}
+
+impl Rows<RecordRow> for Textrace {
+    type At = (usize, usize);
+    type Tile = Tile;
+
+    fn places(&self) -> Vec<Self::At> {
+        tiles(&self.tables().passes).collect()
+    }
+
+    fn append(
+        &self,
+        (pass, index): Self::At,
+        tile: &mut Tile,
+        rows: &mut Vec<RecordRow>,
+    ) -> formats::Result<()> {
+        self.decode_tile(pass, index, tile)?;
+        rows.extend(record_rows(pass as u32, index as u32, tile));
+        Ok(())
+    }
+}
+
+/// Rows of a ray trace's samples.
+trait OfSample: Sized {
+    fn append(sample: &formats::interop::RaySample<'_>, rows: &mut Vec<Self>);
+}
+
+impl OfSample for RayRow {
+    fn append(sample: &formats::interop::RaySample<'_>, rows: &mut Vec<Self>) {
+        rows.extend(ray_rows(sample));
+    }
+}
+
+impl OfSample for SampleRow {
+    fn append(sample: &formats::interop::RaySample<'_>, rows: &mut Vec<Self>) {
+        rows.push(sample.into());
+    }
+}
+
+impl<R: OfSample> Rows<R> for Raytrace {
+    type At = (Eye, u32);
+    type Tile = RayTile;
+
+    fn places(&self) -> Vec<Self::At> {
+        ray_tiles(self.tables()).collect()
+    }
+
+    fn append(
+        &self,
+        (eye, index): Self::At,
+        tile: &mut RayTile,
+        rows: &mut Vec<R>,
+    ) -> formats::Result<()> {
+        self.decode_tile(eye, index, tile)?;
+        for sample in ray_samples(self.tables(), eye, index, tile) {
+            R::append(&sample, rows);
+        }
+        Ok(())
+    }
+}
+
+/// All rows of a trace, column by column in the order of [`Tabular::FIELDS`].
+///
+/// # Errors
+/// The first damaged tile.
+pub fn columns<R: Tabular, T: Rows<R>>(trace: &T) -> formats::Result<Vec<Values>> {
+    let of_chunk = |places: &[T::At]| -> formats::Result<Vec<Values>> {
+        let (mut tile, mut rows) = (T::Tile::default(), Vec::new());
+        for &at in places {
+            trace.append(at, &mut tile, &mut rows)?;
+        }
+        Ok(R::FIELDS
+            .iter()
+            .map(|field| field.get.values(&rows))
+            .collect())
+    };
+    let parts: Vec<formats::Result<Vec<Values>>> =
+        trace.places().par_chunks(CHUNK).map(of_chunk).collect();
+    let parts: Vec<Vec<Values>> = parts.into_iter().collect::<formats::Result<_>>()?;
+    let join = |column: usize| {
+        let of_column: Vec<&Values> = parts.iter().map(|part| &part[column]).collect();
+        Values::joined(&of_column).unwrap_or_else(|| R::FIELDS[column].get.values(&[]))
+    };
+    Ok((0..R::FIELDS.len()).into_par_iter().map(join).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::synthetic::Synthetic;
+
+    #[test]
+    fn a_trace_without_records_has_empty_columns_of_the_right_types() {
+        let mut memory = Synthetic::default().generate();
+        memory
+            .tiles
+            .iter_mut()
+            .flatten()
+            .for_each(|tile| *tile = Tile::default());
+        let file = crate::cli::testing::file_of(&memory);
+        let trace = Textrace::open(file.path()).unwrap();
+        let columns = columns::<RecordRow, _>(&trace).unwrap();
+        for (field, values) in RecordRow::FIELDS.iter().zip(columns) {
+            assert_eq!(values, field.get.values(&[]), "{}", field.name);
+        }
+    }
+
+    #[test]
+    fn columns_hold_every_record_in_file_order() {
+        let memory = Synthetic::default().generate();
+        let file = crate::cli::testing::file_of(&memory);
+        let trace = Textrace::open(file.path()).unwrap();
+        let columns = columns::<RecordRow, _>(&trace).unwrap();
+        let mut rows = Vec::new();
+        for (pass, tile) in tiles(&memory.tables.passes) {
+            rows.extend(record_rows(
+                pass as u32,
+                tile as u32,
+                &memory.tiles[pass][tile],
+            ));
+        }
+        assert!(rows.len() > 100);
+        for (field, values) in RecordRow::FIELDS.iter().zip(columns) {
+            assert_eq!(values, field.get.values(&rows), "{}", field.name);
+        }
+    }
+}

@@ -1,0 +1,37 @@
+//! The Python package: its own tests and its notebooks, in a fresh virtual environment.
+
+use parallax_tests::{program, root};
+use std::path::Path;
+use std::process::Command;
+
+#[test]
+fn the_package_passes_its_tests_and_the_notebooks_run() {
+    let replay = program("replay");
+    let replay = Path::new(replay.get_program());
+    let native = replay.with_file_name("deps/lib_native.so");
+    assert!(native.exists(), "{} is not built", native.display());
+    let out = tempfile::tempdir().expect("a temporary folder");
+    let output = Command::new(root().join("scripts/notebooks.sh"))
+        .env("OUT", out.path())
+        .env("PARALLAX_NATIVE", &native)
+        .env("PARALLAX_REPLAY", replay)
+        .env_remove("PARALLAX_TRACE")
+        .env_remove("UPDATE_NOTEBOOKS")
+        .output()
+        .expect("sh starts");
+    let text = String::from_utf8_lossy(&output.stdout);
+    if output.status.code() == Some(3) {
+        let reason = text.lines().find_map(|line| line.strip_prefix("SKIPPED: "));
+        parallax_tests::skipped!("{}", reason.unwrap_or("the Python package"));
+        return;
+    }
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{text}\n{errors}");
+    for expected in [
+        " passed",
+        "an-own-order.ipynb: ",
+        "where-the-misses-are.ipynb: ",
+    ] {
+        assert!(text.contains(expected), "{text}");
+    }
+}
