@@ -91,6 +91,7 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     let textures = LoadOptions {
         // Base colour, metallic-roughness and emissive: what rays look at.
         slots: [true, false, true, false, false, true],
+        ..LoadOptions::ALL
     };
     let setup = {
         let frames = args.frame..args.frame + 1;
