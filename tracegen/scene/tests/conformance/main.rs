@@ -38,7 +38,8 @@ fn every_feature_is_read_as_its_row_says() {
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../results/scene-features.csv");
     if std::env::var_os("UPDATE_FIGURES").is_some() {
-        std::fs::write(&path, &csv).unwrap();
+        let command = "UPDATE_FIGURES=1 cargo test --release -p scene --test conformance";
+        std::fs::write(&path, format!("# command: {command}\n{csv}")).unwrap();
     }
     let stored = std::fs::read_to_string(&path).unwrap_or_default();
     let lines = |text: &str| -> Vec<String> {
