@@ -431,7 +431,7 @@ fn ray_tile(tables: &RaytraceTables, eye: Eye, number: u32, random: &mut Random)
         let direction = camera.direction(sample_position_px(x, y, sample, samples));
         let hit = (random.below(4) > 0).then(|| {
             let triangle = &tables.triangles[random.below(20) as usize];
-            let code = [0; 2].map(|_| (random.below(65535) as i32 - 32767) as i16);
+            let code = [0; 2].map(|_| (random.below(65535) - 32767) as i16);
             let uv = match random.below(16) {
                 0 => [f32::NAN, f32::NEG_INFINITY],
                 _ => [random.below(1000) as f32 / 7.0, -1.5],

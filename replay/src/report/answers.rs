@@ -3,7 +3,7 @@
 use super::html::{change, count, list};
 
 /// Least and largest of named values; `None` if there are none.
-fn ends<'a, T>(rows: &'a [T], value: impl Fn(&T) -> f64) -> Option<(&'a T, &'a T)> {
+fn ends<T>(rows: &[T], value: impl Fn(&T) -> f64) -> Option<(&T, &T)> {
     let least = rows.iter().min_by(|a, b| value(a).total_cmp(&value(b)))?;
     let most = rows.iter().max_by(|a, b| value(a).total_cmp(&value(b)))?;
     Some((least, most))

@@ -1,6 +1,7 @@
 //! Images: what is known of one before its texels are made, and who makes them.
 
 use crate::SceneError;
+use crate::blocks::{ImageData, StoredBlocks};
 use formats::texture::ColorSpace;
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -16,6 +17,8 @@ pub struct Image {
     pub size: [u32; 2],
     /// Colour space of RGB.
     pub color_space: ColorSpace,
+    /// Blocks that the source holds and that are kept as they are.
+    pub stored: Option<StoredBlocks>,
     /// Makes the texels.
     pub source: Arc<dyn ImageSource>,
     /// Which of the source's images this is.
@@ -53,6 +56,18 @@ pub trait OpenSource {
     /// # Errors
     /// Damaged input.
     fn texels(&self, parts: &[usize]) -> Result<Vec<Vec<u8>>, SceneError>;
+
+    /// What each of `parts` holds: blocks where [`Image::stored`] names them, or else texels.
+    ///
+    /// # Errors
+    /// Damaged input.
+    fn data(&self, parts: &[usize]) -> Result<Vec<ImageData>, SceneError> {
+        Ok(self
+            .texels(parts)?
+            .into_iter()
+            .map(ImageData::Rgba8)
+            .collect())
+    }
 }
 
 /// Texels that are at hand.
@@ -88,6 +103,7 @@ impl Image {
             name: name.to_owned(),
             size,
             color_space,
+            stored: None,
             source: Arc::new(Texels(rgba.into())),
             part: 0,
         }

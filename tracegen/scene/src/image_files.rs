@@ -1,6 +1,8 @@
 //! Images in files: found when a scene is loaded, decoded when their texels are asked for.
 
 use crate::SceneError;
+use crate::blocks::{self, ImageData, StoredBlocks};
+use crate::containers::{self, Kind};
 use crate::files::{Origin, read_file, read_start};
 use crate::image::{Image, ImageSource, OpenSource};
 use formats::texture::ColorSpace;
@@ -17,7 +19,7 @@ pub const MAX_SIZE: u32 = 16384;
 
 /// What turns files into texels. A test holds the versions to Cargo.lock: another decoder may
 /// round differently, and prepared textures are kept under this name.
-const DECODERS: &str = "image 0.25.10, png 0.18.1, zune-jpeg 0.5.15";
+const DECODERS: &str = "image 0.25.10, png 0.18.1, zune-jpeg 0.5.15, image-webp 0.2.4, basisu 0.1.0, bcdec_rs 0.2.1, texture2ddecoder 0.1.2, ruzstd 0.9.1";
 
 /// Most bytes of an image's file: more than a PNG of [`MAX_SIZE`] squared takes.
 const MAX_FILE_BYTES: u64 = 1 << 31;
@@ -148,6 +150,7 @@ impl Requests {
                 Usage::Color | Usage::Masked(_) => ColorSpace::Srgb,
                 Usage::Data | Usage::AlphaFactor => ColorSpace::Linear,
             },
+            stored: header.stored,
             source: Arc::new(encoded),
             part: 0,
         };
@@ -163,6 +166,14 @@ struct Header {
     texel_bytes: u64,
     /// Encoded bytes of the image, and of the opacity map.
     encoded_bytes: (u64, u64),
+    /// Blocks that are kept as they are.
+    stored: Option<StoredBlocks>,
+}
+
+/// Size and blocks of an image, from its header.
+struct Described {
+    size: [u32; 2],
+    stored: Option<StoredBlocks>,
 }
 
 /// Refuses the image with which the texels of a scene exceed their bound.
@@ -225,33 +236,104 @@ impl Encoded {
 
     /// Sizes from the headers, of the image and of its opacity map.
     fn header(&self) -> Result<Header, SceneError> {
-        let of = |request: &Request| -> Result<([u32; 2], u64), SceneError> {
+        let of = |request: &Request| -> Result<(Described, u64), SceneError> {
             let bytes = self.read(request)?;
-            let (_, size) = self.decoder(request, &bytes)?;
-            Ok((size, bytes.len() as u64))
+            Ok((self.describe(request, &bytes)?, bytes.len() as u64))
         };
-        let (mask_size, mask_bytes) = self.mask.as_ref().map_or(Ok(([0; 2], 0)), of)?;
-        let (size, bytes) = of(&self.request)?;
+        let absent = Described {
+            size: [0; 2],
+            stored: None,
+        };
+        let (mask, mask_bytes) = self.mask.as_ref().map_or(Ok((absent, 0)), of)?;
+        let (image, bytes) = of(&self.request)?;
         let rgba_bytes = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height) * 4;
         Ok(Header {
-            size,
-            texel_bytes: rgba_bytes(size) + rgba_bytes(mask_size),
+            size: image.size,
+            texel_bytes: rgba_bytes(image.size) + rgba_bytes(mask.size),
             encoded_bytes: (bytes, mask_bytes),
+            stored: image.stored.filter(|stored| self.keeps(image.size, stored)),
         })
+    }
+
+    /// Whether the image's blocks are kept: where its channels are used as they are stored and level
+    /// 0 is whole blocks, which drivers ask for.
+    fn keeps(&self, size: [u32; 2], stored: &StoredBlocks) -> bool {
+        matches!(self.request.usage, Usage::Color | Usage::Data)
+            && blocks::is_whole_blocks(stored.format, size)
+    }
+
+    /// What the header of an image of any kind tells.
+    fn describe(&self, request: &Request, bytes: &[u8]) -> Result<Described, SceneError> {
+        match containers::of(bytes) {
+            Some(kind) => {
+                let header = (kind.header)(bytes).map_err(|e| self.fault(request, kind, e))?;
+                Ok(Described {
+                    size: header.size,
+                    stored: Some(header.stored),
+                })
+            }
+            None => Ok(Described {
+                size: self.decoder(request, bytes)?.1,
+                stored: None,
+            }),
+        }
+    }
+
+    /// The levels of an image that holds blocks, and its size.
+    fn stored(
+        &self,
+        request: &Request,
+        bytes: &[u8],
+        kind: &Kind,
+    ) -> Result<([u32; 2], blocks::Blocks), SceneError> {
+        let fault = |e| self.fault(request, kind, e);
+        let header = (kind.header)(bytes).map_err(fault)?;
+        let [width, height] = header.size;
+        self.check_expansion(
+            request,
+            bytes,
+            header.size,
+            u64::from(width) * u64::from(height) * 4,
+        )?;
+        Ok((header.size, (kind.blocks)(bytes).map_err(fault)?))
+    }
+
+    fn check_expansion(
+        &self,
+        request: &Request,
+        bytes: &[u8],
+        [width, height]: [u32; 2],
+        total_bytes: u64,
+    ) -> Result<(), SceneError> {
+        let most = bytes.len() as u64 * MAX_EXPANSION + SMALL_IMAGE_BYTES;
+        if total_bytes <= most {
+            return Ok(());
+        }
+        Err(self.invalid(
+            request,
+            &format!("at most {most} bytes of texels from {} bytes", bytes.len()),
+            format!("{width}x{height}, {total_bytes} bytes"),
+        ))
     }
 
     /// Size and RGBA8 texels.
     fn decode(&self, request: &Request, bytes: &[u8]) -> Result<([u32; 2], Vec<u8>), SceneError> {
-        let (decoder, size) = self.decoder(request, bytes)?;
-        let most = bytes.len() as u64 * MAX_EXPANSION + SMALL_IMAGE_BYTES;
-        if decoder.total_bytes() > most {
-            let [width, height] = size;
-            return Err(self.invalid(
-                request,
-                &format!("at most {most} bytes of texels from {} bytes", bytes.len()),
-                format!("{width}x{height}, {} bytes", decoder.total_bytes()),
-            ));
+        if let Some(kind) = containers::of(bytes) {
+            let (size, stored) = self.stored(request, bytes, kind)?;
+            let color_space = match request.usage {
+                Usage::Color | Usage::Masked(_) => ColorSpace::Srgb,
+                Usage::Data | Usage::AlphaFactor => ColorSpace::Linear,
+            };
+            let level = stored.levels.first().map_or(&[][..], Vec::as_slice);
+            let texels = blocks::decode(stored.format, size, color_space, level);
+            let texels = texels.ok_or_else(|| {
+                let expected = format!("blocks of {:?}", stored.format);
+                self.fault(request, kind, (expected, "others".into()))
+            })?;
+            return Ok((size, texels));
         }
+        let (decoder, size) = self.decoder(request, bytes)?;
+        self.check_expansion(request, bytes, size, decoder.total_bytes())?;
         let decoded = DynamicImage::from_decoder(decoder).map_err(|e| self.corrupt(request, &e))?;
         Ok((size, decoded.into_rgba8().into_raw()))
     }
@@ -286,7 +368,16 @@ impl Encoded {
     }
 
     fn corrupt(&self, request: &Request, error: &dyn std::fmt::Display) -> SceneError {
-        self.invalid(request, "a readable PNG or JPEG image", error.to_string())
+        self.invalid(
+            request,
+            "a readable PNG, JPEG, WebP, KTX2 or DDS image",
+            error.to_string(),
+        )
+    }
+
+    fn fault(&self, request: &Request, kind: &Kind, fault: containers::Fault) -> SceneError {
+        let (expected, found) = fault;
+        self.invalid(request, &expected, format!("{found} ({})", kind.name))
     }
 
     fn invalid(&self, request: &Request, expected: &str, found: String) -> SceneError {
@@ -338,13 +429,29 @@ impl OpenSource for Read<'_> {
         }
         Ok(vec![rgba; parts.len()])
     }
+
+    fn data(&self, parts: &[usize]) -> Result<Vec<ImageData>, SceneError> {
+        if let Some(kind) = containers::of(&self.image) {
+            let (size, blocks) = self.of.stored(&self.of.request, &self.image, kind)?;
+            let stored = StoredBlocks {
+                format: blocks.format,
+                levels: blocks.levels.len() as u32,
+            };
+            if self.of.keeps(size, &stored) {
+                return Ok(vec![ImageData::Blocks(blocks); parts.len()]);
+            }
+        }
+        let texels = self.texels(parts)?;
+        Ok(texels.into_iter().map(ImageData::Rgba8).collect())
+    }
 }
 
-/// Whether the file begins as a PNG or a JPEG; `None` where it cannot be read.
-pub(crate) fn is_png_or_jpeg(file: &Path) -> Option<bool> {
+/// Whether the file begins as an image that is read; `None` where it cannot be read.
+pub(crate) fn is_readable(file: &Path) -> Option<bool> {
     let (start, _) = read_start(file, "image", 16).ok()?;
     let format = image::guess_format(&start).ok();
-    Some(matches!(format, Some(ImageFormat::Png | ImageFormat::Jpeg)))
+    let pixels = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::WebP];
+    Some(containers::of(&start).is_some() || format.is_some_and(|f| pixels.contains(&f)))
 }
 
 fn spread_alpha(mut rgba: Vec<u8>) -> Vec<u8> {

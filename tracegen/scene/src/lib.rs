@@ -1,7 +1,9 @@
 //! The scene that every loader fills and every renderer reads: model, loaders, cameras, paths, displays.
 
+pub mod blocks;
 pub mod cameras;
 mod coarse;
+mod containers;
 mod error;
 mod files;
 pub mod geometry;

@@ -4,16 +4,21 @@ use crate::Scene;
 use std::path::PathBuf;
 
 /// What a loader reads besides geometry.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LoadOptions {
     /// Which of [`super::Material::textures`] to keep, in that order; the others become `None` and
     /// their images are not read.
     pub slots: [bool; 6],
+    /// The material variant to show (KHR_materials_variants), or the file's own materials.
+    pub variant: Option<String>,
 }
 
 impl LoadOptions {
     /// Everything.
-    pub const ALL: Self = Self { slots: [true; 6] };
+    pub const ALL: Self = Self {
+        slots: [true; 6],
+        variant: None,
+    };
 }
 
 impl Default for LoadOptions {

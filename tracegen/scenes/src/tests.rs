@@ -251,9 +251,15 @@ fn slots_that_are_left_out_take_their_images_with_them() {
     let mut slots = [true; 6];
     slots[1] = false;
     let whole = crate::load("teapot").unwrap();
-    let part = crate::load_with("teapot", &LoadOptions { slots })
-        .unwrap()
-        .scene;
+    let part = crate::load_with(
+        "teapot",
+        &LoadOptions {
+            slots,
+            ..LoadOptions::ALL
+        },
+    )
+    .unwrap()
+    .scene;
     let names =
         |scene: &Scene| -> Vec<String> { scene.images.iter().map(|i| i.name.clone()).collect() };
     let colors: Vec<String> = (names(&whole).into_iter())

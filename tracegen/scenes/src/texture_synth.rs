@@ -124,6 +124,7 @@ impl Map {
             name: format!("{}-{suffix}", recipe.name),
             size: [recipe.size; 2],
             color_space,
+            stored: None,
             source: Arc::clone(source) as Arc<dyn ImageSource>,
             part: self as usize,
         }

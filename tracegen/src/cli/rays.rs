@@ -99,6 +99,7 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     let textures = LoadOptions {
         // Base colour, metallic-roughness and emissive: the textures that rays sample.
         slots: [true, false, true, false, false, true],
+        ..LoadOptions::ALL
     };
     let setup = {
         let frames = args.frame..args.frame + 1;

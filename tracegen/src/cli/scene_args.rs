@@ -20,6 +20,9 @@ pub struct SceneArgs {
     /// files if that is more.
     #[arg(value_name = "SCENE")]
     pub scene: String,
+    /// Material variant of a glTF file to show (KHR_materials_variants).
+    #[arg(long, value_name = "NAME")]
+    pub variant: Option<String>,
     /// Camera flags.
     #[command(flatten)]
     pub camera: CameraArgs,
@@ -87,7 +90,11 @@ impl SceneArgs {
         self.camera.validate_alone()?;
         let path_file = path.file();
         let (path, moments) = path.open(frames)?;
-        let (scene, mut inputs) = load_scene(&self.scene, options)?;
+        let options = LoadOptions {
+            variant: self.variant.clone(),
+            ..options.clone()
+        };
+        let (scene, mut inputs) = load_scene(&self.scene, &options)?;
         inputs.extend(path_file);
         let path = path.relative_to(scene.origin);
         let camera = self.camera.resolve(&scene)?;

@@ -145,7 +145,10 @@ impl<'a> SceneSizes<'a> {
             Some(path) if Path::new(path).is_file() => path,
             _ => scene,
         };
-        let without_images = LoadOptions { slots: [false; 6] };
+        let without_images = LoadOptions {
+            slots: [false; 6],
+            ..LoadOptions::ALL
+        };
         let triangles = load_with(spec, &without_images)?.scene.triangle_count();
         self.triangles.insert(scene.to_owned(), triangles);
         Ok(triangles)

@@ -3,6 +3,7 @@
 use super::lod::taps;
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use glam::{DVec2, DVec3, DVec4};
+use scene::blocks::{decode, level_bytes};
 use textures::{CompressedTexture, TextureSet};
 
 /// Edge of a compressed block in texels.
@@ -93,8 +94,8 @@ fn texel(of: &CompressedTexture, level: u32, at: [u32; 2], decoder: Decoder) -> 
 fn decoded(of: &CompressedTexture, level: u32, at: [u32; 2], decoder: Decoder) -> Option<DVec4> {
     let block_bytes = match of.texture.format {
         TexelFormat::Bc1 => 8,
-        // Textures are prepared in no other format.
-        _ => 16,
+        TexelFormat::Bc3 => 16,
+        _ => return stored(of, level, at),
     };
     let blocks = |level| blocks_of(&of.texture, level);
     let before: usize = (of.first_level..level)
@@ -117,6 +118,26 @@ fn decoded(of: &CompressedTexture, level: u32, at: [u32; 2], decoder: Decoder) -
         }
     };
     Some(rgb.extend(alpha))
+}
+
+/// A texel of a format that is never made and only kept, by the decoder that the driver's copy was made
+/// with.
+fn stored(of: &CompressedTexture, level: u32, at: [u32; 2]) -> Option<DVec4> {
+    let format = of.texture.format;
+    let block = format.block();
+    let before: usize = (of.first_level..level)
+        .map(|l| level_bytes(format, of.texture.level_size(l)))
+        .sum();
+    let across = (of.texture.level_size(level)[0]).div_ceil(block.texels[0]) as usize;
+    let [column, row] = [0, 1].map(|axis| (at[axis] / block.texels[axis]) as usize);
+    let bytes = block.bytes as usize;
+    let offset = before + (row * across + column) * bytes;
+    let encoded = of.blocks.get(offset..offset + bytes)?;
+    let texels = decode(format, block.texels, of.texture.color_space, encoded)?;
+    let [x, y] = [0, 1].map(|axis| at[axis] % block.texels[axis]);
+    let texel = &texels[(y * block.texels[0] + x) as usize * 4..][..4];
+    let [r, g, b, a] = [0, 1, 2, 3].map(|channel| f64::from(texel[channel]) / 255.0);
+    Some(DVec4::new(r, g, b, a))
 }
 
 /// Colour of a texel of a BC1 block, and whether it is opaque: end points with 8 bits per channel; the

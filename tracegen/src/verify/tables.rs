@@ -83,10 +83,20 @@ fn placed_materials(scene: &Scene) -> BTreeSet<usize> {
         .collect()
 }
 
-/// The expected entry of an image: whole blocks, every mip level, BC3 if alpha is blended and not 1, else
-/// BC1.
+/// The expected entry of an image. Stored blocks keep their format and levels. Other images get whole blocks,
+/// every mip level, and BC3 if alpha is blended and not 1, else BC1.
 fn texture(scene: &Scene, index: usize) -> Result<Texture, SceneError> {
     let image = &scene.images[index];
+    if let Some(stored) = image.stored {
+        return Ok(Texture {
+            name: image.name.clone(),
+            size: image.size,
+            levels: stored.levels,
+            layers: 1,
+            format: stored.format,
+            color_space: image.color_space,
+        });
+    }
     let size = image.size.map(|edge| edge.div_ceil(BLOCK) * BLOCK);
     let mut levels = 1;
     while size.iter().any(|edge| edge >> levels > 0) {

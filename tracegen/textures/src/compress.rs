@@ -3,6 +3,7 @@
 use crate::mipmap::{self, Level};
 use crate::role::{Alpha, Role};
 use formats::texture::{ColorSpace, TexelFormat, Texture};
+use scene::blocks::level_bytes;
 use std::borrow::Cow;
 use texpresso::{Algorithm, COLOUR_WEIGHTS_PERCEPTUAL, COLOUR_WEIGHTS_UNIFORM, Format, Params};
 
@@ -36,19 +37,10 @@ pub fn first_level(size: [u32; 2], wanted: u32) -> u32 {
     }
 }
 
-/// Bytes of a compressed texture's levels from `first_level` on; `None` for a format that is not made
-/// here.
-pub fn chain_bytes(texture: &Texture, first_level: u32) -> Option<usize> {
-    let format = match texture.format {
-        TexelFormat::Bc1 => Format::Bc1,
-        TexelFormat::Bc3 => Format::Bc3,
-        _ => return None,
-    };
-    let bytes = |level| {
-        let [width, height] = texture.level_size(level).map(|e| e as usize);
-        format.compressed_size(width, height)
-    };
-    Some((first_level..texture.levels).map(bytes).sum())
+/// Bytes of a texture's levels from `first_level` on.
+pub fn chain_bytes(texture: &Texture, first_level: u32) -> usize {
+    let bytes = |level| level_bytes(texture.format, texture.level_size(level));
+    (first_level..texture.levels).map(bytes).sum()
 }
 
 /// Compresses RGBA8 texels of the given size; the blocks of the levels from `first_level` on follow

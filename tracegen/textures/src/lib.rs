@@ -4,6 +4,7 @@
 //! - Opaque images become BC1. So do those of alpha-masked materials, with BC1's one-bit alpha; a
 //!   transparent texel is then black, so the shader divides colour by alpha after filtering.
 //! - Images with smooth alpha that a blended material samples become BC3.
+//! - Images whose file holds compressed blocks keep them, with the levels that are there.
 //! - Only images that a placed mesh samples become textures.
 //! - Level sizes must be whole blocks at level 0: other sizes are resampled up to the next
 //!   multiple of four, with a note.
@@ -26,7 +27,9 @@ use cache::KeyHasher;
 use formats::texture::{ColorSpace, TexelFormat, Texture};
 use rayon::prelude::*;
 use role::{Alpha, Role};
+use scene::blocks::{self, ImageData};
 use scene::{Image, MAX_IMAGE_SIZE, Scene, SceneError};
+use std::borrow::Cow;
 
 /// A texture ready for upload.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -38,6 +41,39 @@ pub struct CompressedTexture {
     /// Blocks of the levels from there on, largest level first, each row by row from the top. Empty
     /// for a texture that no view sees.
     pub blocks: Vec<u8>,
+}
+
+impl CompressedTexture {
+    /// The texture as every driver samples it: BC1, BC3 and RGBA8 as they are, other blocks decoded
+    /// to RGBA8. Coordinates do not depend on it.
+    #[must_use]
+    pub fn for_driver(&self) -> Cow<'_, Self> {
+        let own = &self.texture;
+        if matches!(
+            own.format,
+            TexelFormat::Bc1 | TexelFormat::Bc3 | TexelFormat::Rgba8
+        ) {
+            return Cow::Borrowed(self);
+        }
+        let mut rest = self.blocks.as_slice();
+        let mut texels = Vec::new();
+        for level in self.first_level..own.levels {
+            let size = own.level_size(level);
+            let bytes = blocks::level_bytes(own.format, size).min(rest.len());
+            let (stored, others) = rest.split_at(bytes);
+            let decoded = blocks::decode(own.format, size, own.color_space, stored);
+            texels.extend(decoded.unwrap_or_default());
+            rest = others;
+        }
+        Cow::Owned(Self {
+            texture: Texture {
+                format: TexelFormat::Rgba8,
+                ..own.clone()
+            },
+            first_level: self.first_level,
+            blocks: texels,
+        })
+    }
 }
 
 /// The textures that a scene samples.
@@ -136,10 +172,9 @@ impl TextureSet {
     /// among them.
     #[must_use]
     pub fn skipped_bytes(&self) -> usize {
-        let whole = |t: &CompressedTexture| compress::chain_bytes(&t.texture, 0).unwrap_or(0);
         self.textures
             .iter()
-            .map(|t| whole(t) - t.blocks.len())
+            .map(|t| compress::chain_bytes(&t.texture, 0) - t.blocks.len())
             .sum()
     }
 
@@ -176,16 +211,25 @@ struct Made {
 impl Member<'_> {
     /// Finest level to make.
     fn first_level(&self) -> u32 {
+        if self.image.stored.is_some() {
+            return 0;
+        }
         let size = compress::whole_blocks(self.image.size);
         compress::first_level(size, self.finest.unwrap_or(0))
     }
 
     fn made(&self, format: TexelFormat, blocks: Vec<u8>, cached: bool) -> Made {
-        let size = compress::whole_blocks(self.image.size);
+        let (size, levels) = match self.image.stored {
+            Some(stored) => (self.image.size, stored.levels),
+            None => {
+                let size = compress::whole_blocks(self.image.size);
+                (size, compress::level_count(size))
+            }
+        };
         let texture = Texture {
             name: self.image.name.clone(),
             size,
-            levels: compress::level_count(size),
+            levels,
             layers: 1,
             format,
             color_space: self.image.color_space,
@@ -207,8 +251,8 @@ impl Member<'_> {
         let first_level = self.first_level();
         let of = |kept: u32| {
             let (format, mut blocks) = cache.load(self.key(source, kept))?;
-            let unneeded = self.bytes(format, kept)? - self.bytes(format, first_level)?;
-            let whole = blocks.len() == self.bytes(format, kept)?;
+            let unneeded = self.bytes(format, kept) - self.bytes(format, first_level);
+            let whole = blocks.len() == self.bytes(format, kept);
             blocks.drain(..unneeded.min(blocks.len()));
             whole.then(|| self.made(format, blocks, true))
         };
@@ -216,7 +260,7 @@ impl Member<'_> {
     }
 
     /// Bytes of the levels from one on.
-    fn bytes(&self, format: TexelFormat, first_level: u32) -> Option<usize> {
+    fn bytes(&self, format: TexelFormat, first_level: u32) -> usize {
         let made = self.made(format, Vec::new(), false);
         compress::chain_bytes(&made.texture.texture, first_level)
     }
@@ -233,6 +277,17 @@ impl Member<'_> {
             format!("a size from 1x1 to {MAX_IMAGE_SIZE}x{MAX_IMAGE_SIZE}"),
             format!("{width}x{height}"),
         ))
+    }
+
+    /// The texture of blocks that the image's file holds.
+    fn kept(&self, held: blocks::Blocks) -> Result<Made, TextureError> {
+        let expected = self.image.stored;
+        let found = (held.format, held.levels.len() as u32);
+        if expected.map(|stored| (stored.format, stored.levels)) == Some(found) {
+            return Ok(self.made(held.format, held.levels.concat(), false));
+        }
+        // The file changed after its header was read.
+        Err(self.error(format!("{expected:?}"), format!("{found:?}")))
     }
 
     fn check_texels(&self, rgba: &[u8]) -> Result<(), TextureError> {
@@ -287,6 +342,10 @@ fn prepare_source(
     let mut wanted = Vec::new();
     for member in members {
         member.check_size()?;
+        if let (Some(stored), None) = (member.image.stored, member.finest) {
+            made.push(member.made(stored.format, Vec::new(), false));
+            continue;
+        }
         // Only the texels tell whether smooth alpha is smooth, and so the format in the table.
         if member.finest.is_some() || member.role.alpha == Alpha::Smooth {
             wanted.push(member);
@@ -304,7 +363,11 @@ fn prepare_source(
         (cache, hasher)
     });
     if let Some((cache, hasher)) = &source_key {
-        wanted.retain(|member| match member.cached(cache, hasher) {
+        let cached = |member: &Member<'_>| {
+            let made_here = member.image.stored.is_none();
+            made_here.then(|| member.cached(cache, hasher)).flatten()
+        };
+        wanted.retain(|member| match cached(member) {
             Some(hit) => {
                 made.push(hit);
                 false
@@ -316,7 +379,14 @@ fn prepare_source(
     if parts.is_empty() {
         return Ok(made);
     }
-    for (member, rgba) in wanted.iter().zip(source.texels(&parts)?) {
+    for (member, data) in wanted.iter().zip(source.data(&parts)?) {
+        let rgba = match data {
+            ImageData::Rgba8(rgba) => rgba,
+            ImageData::Blocks(held) => {
+                made.push(member.kept(held)?);
+                continue;
+            }
+        };
         member.check_texels(&rgba)?;
         let Image {
             size, color_space, ..
@@ -334,6 +404,9 @@ fn prepare_source(
 
 /// What happens to an image that is not whole blocks.
 fn note(image: &Image) -> Option<String> {
+    if image.stored.is_some() {
+        return None;
+    }
     let ([width, height], size) = (image.size, compress::whole_blocks(image.size));
     (size != image.size).then(|| {
         format!(

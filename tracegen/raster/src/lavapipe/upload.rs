@@ -178,6 +178,7 @@ fn upload_texture(
     gpu: &Gpu,
     compressed: &CompressedTexture,
 ) -> Result<wgpu::TextureView, RasterError> {
+    let compressed = compressed.for_driver();
     let texture = &compressed.texture;
     let srgb = texture.color_space == ColorSpace::Srgb;
     let format = match texture.format {

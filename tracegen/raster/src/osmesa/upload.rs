@@ -149,6 +149,7 @@ fn upload_mesh(gl: &Gl, mesh: &Mesh, draws: Buffer) -> Result<Vertices, RasterEr
 }
 
 fn upload_texture(gl: &Gl, compressed: &CompressedTexture) -> Result<Texture, RasterError> {
+    let compressed = compressed.for_driver();
     let texture = &compressed.texture;
     let srgb = texture.color_space == ColorSpace::Srgb;
     let (format, block_bytes) = match texture.format {

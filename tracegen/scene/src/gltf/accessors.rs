@@ -1,11 +1,12 @@
 //! Range-checked reading of accessors.
 
+use super::meshopt;
 use crate::SceneError;
 use crate::files::Origin;
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell};
 
 /// Bytes of vertices, indices and instances that a byte of the file may stand for. Primitives that
 /// share accessors, accessors without a buffer view and meshes placed many times cost a file next
@@ -20,6 +21,8 @@ pub(super) struct Buffers<'a> {
     pub root: &'a Root,
     pub origin: &'a Origin,
     bytes: Vec<Vec<u8>>,
+    /// Views that were compressed, by number, once read.
+    decompressed: Vec<OnceCell<Vec<u8>>>,
     /// The file uses KHR_mesh_quantization.
     quantized: bool,
     /// Bytes of elements and instances that may still be made.
@@ -41,6 +44,7 @@ impl<'a> Buffers<'a> {
             root,
             origin,
             bytes,
+            decompressed: root.buffer_views.iter().map(|_| OnceCell::new()).collect(),
             quantized: (root.extensions_used.iter().chain(&root.extensions_required))
                 .any(|name| name == "KHR_mesh_quantization"),
             budget: Cell::new(budget),
@@ -73,13 +77,36 @@ impl<'a> Buffers<'a> {
                 index.to_string(),
             ));
         };
-        let buffer = view.buffer.value();
+        if let Some(compressed) = meshopt::of_view(view, &place(), self.origin)? {
+            if let Some(known) = self.decompressed[index].get() {
+                return Ok(known);
+            }
+            self.spend::<u8>(compressed.decoded_bytes(), place)?;
+            let stored = self.range(
+                &place(),
+                compressed.buffer,
+                compressed.byte_offset,
+                compressed.byte_length,
+            )?;
+            let decoded = compressed.decode(stored, &place(), self.origin)?;
+            return Ok(self.decompressed[index].get_or_init(|| decoded));
+        }
         let start = view.byte_offset.map_or(0, |o| o.0);
-        let length = view.byte_length.0;
+        self.range(&place(), view.buffer.value(), start, view.byte_length.0)
+    }
+
+    /// A range of a buffer, for `place`.
+    fn range(
+        &self,
+        place: &str,
+        buffer: usize,
+        start: u64,
+        length: u64,
+    ) -> Result<&[u8], SceneError> {
         let bytes = self.bytes.get(buffer).map_or(&[][..], Vec::as_slice);
         slice(bytes, start, length).ok_or_else(|| {
             self.origin.invalid(
-                place(),
+                place,
                 format!("a range inside buffers[{buffer}] of {} bytes", bytes.len()),
                 format!("{length} bytes at {start}"),
             )
@@ -142,6 +169,12 @@ impl<'a> Buffers<'a> {
         }
         let read = |bytes: &[u8]| read_index(bytes, component);
         self.elements(index, accessor, component.size(), 0, read)
+    }
+
+    /// Whether an accessor's integers stand for numbers from 0 or -1 to 1.
+    pub fn is_normalized(&self, index: Option<usize>) -> bool {
+        let accessor = index.and_then(|index| self.root.accessors.get(index));
+        accessor.is_some_and(|accessor| accessor.normalized)
     }
 
     /// The type of an accessor's elements.

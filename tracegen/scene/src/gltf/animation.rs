@@ -33,6 +33,7 @@ pub(crate) fn camera_track(
         document,
         transforms,
         blob,
+        ..
     } = parse(&origin, &bytes, &mut Warnings::default())?;
     let root = document.as_json();
     let buffers = read_buffers(&origin, root, blob, &mut warnings)?;

@@ -5,11 +5,15 @@ use crate::files::Origin;
 use crate::warnings::Warnings;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
+use serde_json::Value;
 use std::collections::{BTreeMap, HashSet};
 
 /// Extensions that are read (docs/use/scene-files.md).
-pub(super) const SUPPORTED: [&str; 10] = [
+pub(super) const SUPPORTED: [&str; 17] = [
     "EXT_mesh_gpu_instancing",
+    "EXT_meshopt_compression",
+    "EXT_texture_webp",
+    "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
@@ -17,8 +21,12 @@ pub(super) const SUPPORTED: [&str; 10] = [
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    "KHR_materials_variants",
     "KHR_mesh_quantization",
+    "KHR_meshopt_compression",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
+    "MSFT_texture_dds",
 ];
 
 /// The part of the JSON that says what is needed to read the rest.
@@ -47,18 +55,14 @@ struct Asset {
 
 #[derive(Deserialize)]
 struct Texture {
-    source: Option<IgnoredAny>,
+    source: Option<usize>,
     #[serde(default)]
-    extensions: BTreeMap<String, IgnoredAny>,
+    extensions: BTreeMap<String, Value>,
 }
 
-/// Extensions that hold a texture's image in another format, and that format.
-const IMAGE_FORMATS: [(&str, &str); 4] = [
-    ("EXT_texture_avif", "AVIF"),
-    ("EXT_texture_webp", "WebP"),
-    ("KHR_texture_basisu", "KTX2"),
-    ("MSFT_texture_dds", "DDS"),
-];
+/// Extensions that hold a texture's image in another format, those first that are taken first:
+/// compressed blocks, then what the encoder made smallest.
+const IMAGE_EXTENSIONS: [&str; 3] = ["KHR_texture_basisu", "MSFT_texture_dds", "EXT_texture_webp"];
 
 /// Refuses versions that are not read: another major version than 2, or a minor one that the file needs.
 fn check_version(asset: &Asset, origin: &Origin) -> Result<(), SceneError> {
@@ -76,32 +80,45 @@ fn check_version(asset: &Asset, origin: &Origin) -> Result<(), SceneError> {
     }
 }
 
-/// Refuses a texture whose only image is in a format that is not read.
-fn check_textures(textures: &[Texture], origin: &Origin) -> Result<(), SceneError> {
-    for (index, texture) in textures.iter().enumerate() {
-        let only = IMAGE_FORMATS.iter().find(|(extension, _)| {
-            texture.source.is_none() && texture.extensions.contains_key(*extension)
-        });
-        if let Some((extension, format)) = only {
-            return Err(origin.invalid(
-                format!("textures[{index}]"),
-                "a PNG or JPEG image as its source",
-                format!("{format} alone ({extension}), unsupported"),
-            ));
+/// The image of each texture: of the first extension that is read, or else its own; `None` for a
+/// texture without any.
+fn sources(textures: &[Texture], origin: &Origin) -> Result<Vec<Option<usize>>, SceneError> {
+    let source = |(number, texture): (usize, &Texture)| {
+        let place = || format!("textures[{number}]");
+        let extension = (IMAGE_EXTENSIONS.iter())
+            .find_map(|name| Some((*name, texture.extensions.get(*name)?)));
+        if let Some((name, value)) = extension {
+            let source = value.get("source").and_then(Value::as_u64);
+            let source = source.and_then(|source| usize::try_from(source).ok());
+            let missing = || {
+                let place = format!("{}.extensions.{name}.source", place());
+                origin.invalid(place, "the index of an image", "none")
+            };
+            return source.map(Some).ok_or_else(missing);
         }
-    }
-    Ok(())
+        let other = texture
+            .extensions
+            .keys()
+            .find(|name| name.contains("texture_"));
+        if let (None, Some(name)) = (texture.source, other) {
+            let expected = "a PNG, JPEG, WebP, KTX2 or DDS image as its source";
+            let found = format!("{name} alone, unsupported");
+            return Err(origin.invalid(place(), expected, found));
+        }
+        Ok(texture.source)
+    };
+    textures.iter().enumerate().map(source).collect()
 }
 
-/// Refuses a file that requires what is not supported, and tells what is left out of others.
+/// Refuses a file that requires what is not supported, and tells what is left out of others. Returns
+/// the image of each texture.
 pub(super) fn check(
     json: &[u8],
     origin: &Origin,
     warnings: &mut Warnings,
-) -> Result<(), SceneError> {
+) -> Result<Vec<Option<usize>>, SceneError> {
     let asked: Asked = serde_json::from_slice(json).map_err(|e| not_gltf(origin, &e))?;
     check_version(&asked.asset, origin)?;
-    check_textures(&asked.textures, origin)?;
     let required = unsupported(&asked.extensions_required);
     if !required.is_empty() {
         return Err(origin.invalid(
@@ -130,7 +147,7 @@ pub(super) fn check(
             warnings.say(&format!("{count} {what}"));
         }
     }
-    Ok(())
+    sources(&asked.textures, origin)
 }
 
 /// Each unsupported name once, in the file's order.
@@ -154,8 +171,14 @@ mod tests {
     #[test]
     fn the_page_on_scene_files_names_every_supported_extension_and_no_other() {
         let page = include_str!("../../../../docs/use/scene-files.md");
+        // The table of features below it names refused ones, too.
+        let page = page.split("<!-- figures").next().unwrap_or_default();
         let words = page.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
-        let is_extension = |word: &&str| word.starts_with("KHR_") || word.starts_with("EXT_");
+        let is_extension = |word: &&str| {
+            ["KHR_", "EXT_", "MSFT_"]
+                .iter()
+                .any(|vendor| word.starts_with(vendor))
+        };
         let mut named: Vec<&str> = words.filter(is_extension).collect();
         named.sort_unstable();
         assert_eq!(named, SUPPORTED);

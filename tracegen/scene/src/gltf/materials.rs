@@ -42,6 +42,8 @@ pub(super) struct Table<'a> {
     buffers: &'a Buffers<'a>,
     origin: &'a Origin,
     options: &'a LoadOptions,
+    /// The image of each texture.
+    texture_images: &'a [Option<usize>],
     /// The scene's index of each used glTF material (`None` is glTF's default material) and what it
     /// needs.
     used: HashMap<Option<usize>, (usize, Uses)>,
@@ -74,12 +76,14 @@ impl<'a> Table<'a> {
         buffers: &'a Buffers<'a>,
         origin: &'a Origin,
         options: &'a LoadOptions,
+        texture_images: &'a [Option<usize>],
     ) -> Self {
         Self {
             document,
             buffers,
             origin,
             options,
+            texture_images,
             used: HashMap::new(),
             sources: HashMap::new(),
             materials: Vec::new(),
@@ -291,7 +295,17 @@ impl<'a> Table<'a> {
             });
             return Ok(None);
         }
-        let request = self.request(texture.source().index(), usage)?;
+        let Some(image) = self.texture_images.get(texture.index()).copied().flatten() else {
+            self.warnings.count("no image", || {
+                format!(
+                    "{} uses textures[{}], which has no image; left out",
+                    self.place,
+                    texture.index()
+                )
+            });
+            return Ok(None);
+        };
+        let request = self.request(image, usage)?;
         let uv_transform = transform.map_or(TextureRef::IDENTITY, |t| matrix(&t));
         if !uv_transform.as_flattened().iter().all(|v| v.is_finite()) {
             return Err(self.origin.invalid(
@@ -318,7 +332,8 @@ impl<'a> Table<'a> {
                 read
             }
         };
-        let given = self.buffers.root.images[index].name.clone();
+        let given = self.buffers.root.images.get(index);
+        let given = given.and_then(|image| image.name.clone());
         let given = given.filter(|name| !name.is_empty());
         Ok(Request {
             source,
@@ -337,7 +352,13 @@ impl<'a> Table<'a> {
                 bytes,
             })
         };
-        let json = &self.buffers.root.images[index];
+        let Some(json) = self.buffers.root.images.get(index) else {
+            return Err(origin.invalid(
+                place,
+                format!("one of {} images", self.buffers.root.images.len()),
+                index.to_string(),
+            ));
+        };
         match (&json.uri, &json.buffer_view) {
             (Some(uri), _) => match uri::parse(uri) {
                 Ok(Uri::Path(path)) => {

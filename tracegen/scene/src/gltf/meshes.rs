@@ -1,7 +1,9 @@
 //! Primitives to meshes: attributes, indices, and what the file left out.
 
 use super::accessors::Buffers;
+use super::draco::{self, Compressed};
 use super::materials::Table;
+use super::variants;
 use crate::Mesh;
 use crate::SceneError;
 use crate::files::shown;
@@ -15,6 +17,7 @@ use gltf::json::validation::Checked;
 /// Reads every triangle primitive of a glTF mesh.
 pub(super) fn read(
     index: usize,
+    variant: Option<u32>,
     buffers: &Buffers<'_>,
     materials: &mut Table<'_>,
     warnings: &mut Warnings,
@@ -23,14 +26,17 @@ pub(super) fn read(
     let given = mesh.name.as_deref().map(shown);
     let mut meshes = Vec::with_capacity(mesh.primitives.len());
     for (number, primitive) in mesh.primitives.iter().enumerate() {
-        let reader = Reader {
+        let mut reader = Reader {
             buffers,
             primitive,
+            variant,
+            draco: None,
             place: match &given {
                 Some(name) => format!("meshes[{index}] '{name}'.primitives[{number}]"),
                 None => format!("meshes[{index}].primitives[{number}]"),
             },
         };
+        reader.draco = draco::of_primitive(primitive, &reader.place, buffers)?;
         if let Some(mut read) = reader.read(materials, warnings)? {
             let name = given.clone().unwrap_or_else(|| format!("mesh-{index}"));
             read.name = if mesh.primitives.len() > 1 {
@@ -47,6 +53,10 @@ pub(super) fn read(
 struct Reader<'a> {
     buffers: &'a Buffers<'a>,
     primitive: &'a Primitive,
+    /// The material variant to show.
+    variant: Option<u32>,
+    /// The primitive's compressed geometry.
+    draco: Option<Compressed>,
     /// For errors.
     place: String,
 }
@@ -93,7 +103,8 @@ impl Reader<'_> {
             return Ok(None);
         }
 
-        let (material, uses) = materials.index(self.primitive.material.map(|m| m.value()))?;
+        let material = variants::material(self.primitive, self.variant);
+        let (material, uses) = materials.index(material)?;
         let count = positions.len();
         let uv0 = self.texture_coordinates(0, count, warnings)?;
         if uv0.is_none() && uses.uv0 {
@@ -150,7 +161,14 @@ impl Reader<'_> {
         semantic: &Semantic,
         expected: &str,
     ) -> Result<Option<Vec<[f32; N]>>, SceneError> {
-        self.accessor(semantic)
+        let accessor = self.accessor(semantic);
+        if let Some(draco) = &self.draco
+            && let Some(values) =
+                draco.floats::<N>(semantic, accessor, &self.place, self.buffers)?
+        {
+            return Ok(Some(values));
+        }
+        accessor
             .map(|accessor| self.buffers.floats::<N>(accessor, expected))
             .transpose()
     }
@@ -245,9 +263,10 @@ impl Reader<'_> {
         warnings: &mut Warnings,
     ) -> Result<Vec<u32>, SceneError> {
         let accessor = self.primitive.indices.map(|i| i.value());
-        let indices = match accessor {
-            Some(accessor) => self.buffers.indices(accessor)?,
-            None => (0..u32::try_from(vertices).unwrap_or(u32::MAX)).collect(),
+        let indices = match (&self.draco, accessor) {
+            (Some(draco), _) => draco.indices(),
+            (None, Some(accessor)) => self.buffers.indices(accessor)?,
+            (None, None) => (0..u32::try_from(vertices).unwrap_or(u32::MAX)).collect(),
         };
         if let Some(at) = indices.iter().position(|&i| i as usize >= vertices) {
             return Err(self.buffers.origin.invalid(
@@ -261,6 +280,8 @@ impl Reader<'_> {
             ));
         }
         Ok(match mode {
+            // Compressed geometry is a list of triangles whatever the primitive's mode.
+            _ if self.draco.is_some() => indices,
             Mode::TriangleStrip => triangulate_strip(&indices),
             Mode::TriangleFan => triangulate_fan(&indices),
             _ => {

@@ -12,14 +12,17 @@ mod animation;
 #[cfg(test)]
 mod animation_tests;
 mod binary;
+mod draco;
 mod features;
 mod instancing;
 mod materials;
 mod meshes;
+mod meshopt;
 mod nodes;
 #[cfg(test)]
 mod tests;
 mod transforms;
+mod variants;
 
 use super::files::{Origin, read_file, read_start};
 use super::origin;
@@ -48,6 +51,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     let Parsed {
         document,
         transforms,
+        texture_images,
         blob,
     } = parse(&origin, &bytes, &mut warnings)?;
     let json_bytes = bytes.len();
@@ -61,7 +65,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     // Meshes with their places in the world.
     let mut in_world: Vec<(usize, DAffine3)> = Vec::new();
 
-    let mut materials = materials::Table::new(&document, &buffers, &origin, options);
+    let variant = variants::chosen(root, options.variant.as_deref(), &origin)?;
+    let mut materials =
+        materials::Table::new(&document, &buffers, &origin, options, &texture_images);
     // The scene's meshes of each glTF mesh (one a primitive), filled on first use.
     let mut loaded: Vec<Option<Range<usize>>> = vec![None; root.meshes.len()];
     for (node, transform) in placed.meshes {
@@ -74,7 +80,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
             Some(primitives) => primitives.clone(),
             None => {
                 let first = scene.meshes.len();
-                let read = meshes::read(mesh, &buffers, &mut materials, &mut warnings)?;
+                let read = meshes::read(mesh, variant, &buffers, &mut materials, &mut warnings)?;
                 scene.meshes.extend(read);
                 let primitives = first..scene.meshes.len();
                 loaded[mesh] = Some(primitives.clone());
@@ -127,6 +133,8 @@ struct Parsed {
     document: gltf::Document,
     /// Where its nodes stand.
     transforms: Vec<Local>,
+    /// The image of each texture.
+    texture_images: Vec<Option<usize>>,
     /// The GLB's BIN chunk.
     blob: Option<Vec<u8>>,
 }
@@ -148,11 +156,12 @@ fn parse(origin: &Origin, bytes: &[u8], warnings: &mut Warnings) -> Result<Parse
         (bytes.into(), None)
     };
     let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&json);
-    features::check(json, origin, warnings)?;
+    let texture_images = features::check(json, origin, warnings)?;
     let root = Root::from_slice(json).map_err(|e| features::not_gltf(origin, &e))?;
     validate(origin, &root)?;
     Ok(Parsed {
         transforms: transforms::read(json, origin)?,
+        texture_images,
         document: gltf::Document::from_json_without_validation(root),
         blob: blob.map(Cow::into_owned),
     })
@@ -186,8 +195,11 @@ fn validate(origin: &Origin, root: &Root) -> Result<(), SceneError> {
         }
         let path = path().to_string();
         // Bounds of positions are computed here, so files that leave them out are welcome.
-        let unneeded =
-            fault == Fault::Missing && (path.ends_with(".min") || path.ends_with(".max"));
+        // An accessor without a view holds zeros, or what Draco decodes to.
+        let unneeded = fault == Fault::Missing
+            && [".min", ".max", ".bufferView"]
+                .iter()
+                .any(|end| path.ends_with(end));
         if !unneeded {
             first = Some((path, fault));
         }
@@ -225,6 +237,11 @@ fn read_buffers(
                 whole(blob.take().unwrap_or_default()),
                 "the GLB's BIN chunk".to_owned(),
             ),
+            // Nothing but compressed views reads it.
+            None if meshopt::is_fallback(buffer) => {
+                buffers.push(Vec::new());
+                continue;
+            }
             None => {
                 return Err(origin.invalid(place, "a uri or the GLB's BIN chunk", "neither"));
             }

@@ -6,7 +6,7 @@
 use super::library::{Entry, Map};
 use super::lookup::{Found, Lookup};
 use crate::files::Origin;
-use crate::image_files::{Request, Requests, Source, Usage, is_png_or_jpeg};
+use crate::image_files::{Request, Requests, Source, Usage, is_readable};
 use crate::warnings::Warnings;
 use crate::{AlphaMode, LoadOptions, Material, TextureRef};
 use formats::texture::Wrap;
@@ -145,7 +145,7 @@ impl Maker<'_> {
         (folders.iter()).find_map(|folder| self.lookup.find(folder, &map.names))
     }
 
-    /// `None`, with a warning, for a file that is not there or is neither PNG nor JPEG.
+    /// `None`, with a warning, for a file that is not there or in no format that is read.
     fn request(&mut self, entry: &Entry, map: &Map, usage: Usage) -> Option<Request> {
         let name = &map.names[0];
         let place = place(self.library, entry);
@@ -161,9 +161,9 @@ impl Maker<'_> {
                 format!("{place}: texture '{name}' is taken from {file}")
             });
         }
-        if is_png_or_jpeg(&found.path) == Some(false) {
+        if is_readable(&found.path) == Some(false) {
             self.warnings.count("image format", || {
-                format!("{place}: {file} is neither PNG nor JPEG; left out")
+                format!("{place}: {file} is no PNG, JPEG, WebP, KTX2 or DDS image; left out")
             });
             return None;
         }

@@ -416,7 +416,7 @@ fn missing_textures_and_other_formats_cost_one_warning_each() {
         &loaded,
         "texture 'gone.png' is not there; left out (and 2 more like this)",
     );
-    warns(&loaded, "t.tga is neither PNG nor JPEG");
+    warns(&loaded, "t.tga is no PNG, JPEG, WebP, KTX2 or DDS image");
     let material = &loaded.scene.materials[0];
     assert_eq!(material.textures(), [None; 6]);
     assert_eq!(material.alpha, AlphaMode::Opaque);

@@ -59,7 +59,7 @@ pub struct CameraTrack {
 }
 
 impl Curve {
-    fn at(&self, time_s: f64, is_rotation: bool) -> DVec4 {
+    pub(crate) fn at(&self, time_s: f64, is_rotation: bool) -> DVec4 {
         let (key, t) = bracket(&self.times_s, time_s);
         let last = self.times_s.len() - 1;
         let next = (key + 1).min(last);
@@ -90,7 +90,7 @@ impl Curve {
 }
 
 impl Joint {
-    fn transform(&self, time_s: f64) -> DAffine3 {
+    pub(crate) fn transform(&self, time_s: f64) -> DAffine3 {
         if self.curves.is_empty() {
             return self.rest;
         }

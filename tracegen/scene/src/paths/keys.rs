@@ -2,7 +2,7 @@
 
 /// The key at or before `time` and how far on the way to the next one it is, 0 to 1. Times outside
 /// the keys are taken to their ends. There is at least one key.
-pub(super) fn bracket(times: &[f64], time: f64) -> (usize, f64) {
+pub(crate) fn bracket(times: &[f64], time: f64) -> (usize, f64) {
     let after = times.partition_point(|&key| key <= time);
     let Some(key) = after.checked_sub(1) else {
         return (0, 0.0);

@@ -9,12 +9,29 @@ pub struct Seed {
     pub weights: Vec<usize>,
 }
 
-pub fn all() -> [Seed; 4] {
+pub fn all() -> [Seed; 5] {
     let (png, jpeg) = (image("png"), image("jpeg"));
     let bytes = buffer();
     let text = gltf(json!("mesh.bin"));
     let inside = gltf(json!(data_uri(&bytes)));
+    let mut blocks = gltf(json!("mesh.bin"));
+    blocks["images"] = json!([{"uri": "a.ktx2"}, {"uri": "b.ktx2"}]);
     [
+        Seed {
+            files: vec![
+                ("blocks.gltf", blocks.to_string().into()),
+                ("mesh.bin", bytes.clone()),
+                (
+                    "a.ktx2",
+                    include_bytes!("../images/etc1s-alpha.ktx2").to_vec(),
+                ),
+                (
+                    "b.ktx2",
+                    include_bytes!("../images/uastc-zstd.ktx2").to_vec(),
+                ),
+            ],
+            weights: vec![1, 1, 5, 5],
+        },
         Seed {
             files: vec![
                 ("scene.gltf", text.to_string().into()),

@@ -213,7 +213,7 @@ fn missing_corrupt_and_empty_images_are_told() {
     let good = png([4, 4], [1, 2, 3, 255]);
     for bytes in [&b""[..], b"not an image", &good[..good.len() / 2]] {
         files.write("my image.png", bytes);
-        files.fails_with(&["my image.png", "PNG or JPEG"]);
+        files.fails_with(&["my image.png", "PNG, JPEG"]);
     }
     // The width in the header of a PNG, which has a checksum: 0x4.
     let mut empty = good.clone();
@@ -244,8 +244,8 @@ fn required_extensions_that_are_not_supported_are_named_before_all_else() {
         .unwrap()
         .remove("bufferView");
     for (name, json) in [
-        ("KHR_draco_mesh_compression", draco.clone()),
-        ("EXT_meshopt_compression", draco),
+        ("EXT_mesh_features", draco.clone()),
+        ("FOO_geometry_compression", draco),
     ] {
         let required = json!(["KHR_texture_transform", name, name]);
         let files = Files::new(&with(json, "/extensionsRequired", required));
@@ -354,12 +354,17 @@ fn versions_other_than_two_are_refused() {
 
 #[test]
 fn a_texture_in_another_format_alone_is_told_with_its_number_and_extension() {
-    for (extension, format) in [("KHR_texture_basisu", "KTX2"), ("EXT_texture_webp", "WebP")] {
+    for extension in ["EXT_texture_avif", "VENDOR_texture_new"] {
         let texture = json!({"extensions": {extension: {"source": 0}}});
         let json = with(textured(), "/textures", json!([texture]));
         for list in ["/extensionsUsed", "/extensionsRequired"] {
             let json = with(json.clone(), list, json!([extension]));
-            Files::new(&json).fails_with(&["textures[0]", extension, format, "PNG or JPEG"]);
+            let place = if list.ends_with("Used") {
+                "textures[0]"
+            } else {
+                extension
+            };
+            Files::new(&json).fails_with(&[place, extension]);
         }
         // With a fallback the file is read.
         let texture = json!({"source": 0, "extensions": {extension: {"source": 0}}});

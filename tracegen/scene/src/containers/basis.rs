@@ -1,0 +1,46 @@
+//! Basis Universal in KTX2: transcoded to the block format that keeps most of it.
+//!
+//! UASTC becomes BC7. ETC1S becomes BC1, or BC3 where it has alpha: its quality is no better, and a
+//! driver's choice on desktops. No texel is decoded and compressed anew.
+
+use super::{Fault, Header, level};
+use crate::blocks::Blocks;
+use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
+use formats::texture::TexelFormat;
+
+fn fault(found: impl Into<String>) -> Fault {
+    (
+        "a readable Basis Universal image (ETC1S or UASTC)".to_owned(),
+        found.into(),
+    )
+}
+
+fn open(bytes: &[u8]) -> Result<(Transcoder<'_>, TexelFormat, TargetFormat), Fault> {
+    let transcoder = Transcoder::new(bytes).map_err(|e| fault(format!("{e:?}")))?;
+    let (format, target) = match (transcoder.source_format(), transcoder.has_alpha()) {
+        (SourceFormat::UastcLdr, _) => (TexelFormat::Bc7, TargetFormat::Bc7Rgba),
+        (SourceFormat::Etc1s, false) => (TexelFormat::Bc1, TargetFormat::Bc1Rgb),
+        (SourceFormat::Etc1s, true) => (TexelFormat::Bc3, TargetFormat::Bc3Rgba),
+        (other, _) => return Err(fault(format!("{other:?}"))),
+    };
+    Ok((transcoder, format, target))
+}
+
+/// The format that a file becomes.
+pub(super) fn format(bytes: &[u8]) -> Result<TexelFormat, Fault> {
+    open(bytes).map(|(_, format, _)| format)
+}
+
+/// Transcodes all levels.
+pub(super) fn blocks(bytes: &[u8], header: &Header) -> Result<Blocks, Fault> {
+    let (transcoder, format, target) = open(bytes)?;
+    let levels = (0..header.stored.levels)
+        .map(|number| {
+            let transcoded = transcoder
+                .transcode(number, target, DecodeFlags::NONE)
+                .map_err(|e| fault(format!("{e:?} in level {number}")))?;
+            level(header, number, &transcoded)
+        })
+        .collect::<Result<_, _>>()?;
+    Ok(Blocks { format, levels })
+}

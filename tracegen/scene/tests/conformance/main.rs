@@ -1,0 +1,58 @@
+//! What is read of a scene file, feature by feature: each row writes its file, loads it and checks
+//! what renderers get. The table of docs/use/scene-files.md is made of the rows.
+//!
+//! `UPDATE_FIGURES=1` rewrites results/scene-features.csv.
+
+mod files;
+mod geometry;
+mod images;
+mod rows;
+
+use rows::{Row, Status};
+use std::path::Path;
+
+fn all() -> Vec<Row> {
+    [geometry::ROWS, images::ROWS].concat()
+}
+
+#[test]
+fn every_feature_is_read_as_its_row_says() {
+    let mut csv = String::from("feature,read as,how,test\n");
+    for row in all() {
+        let folder = tempfile::tempdir().unwrap();
+        let loaded = (row.load)(folder.path());
+        match (row.status, loaded) {
+            (Status::Refused, Err(error)) => {
+                let text = error.to_string();
+                assert!(text.contains(row.how), "{}: {text}", row.feature);
+            }
+            (Status::Refused, Ok(_)) => panic!("{} is read", row.feature),
+            (_, loaded) => {
+                let loaded = loaded.unwrap_or_else(|e| panic!("{}: {e}", row.feature));
+                (row.check)(&loaded, row.feature);
+            }
+        }
+        let fields = [row.feature, row.status.name(), row.how, row.test];
+        csv += &fields.map(quoted).join(",");
+        csv.push('\n');
+    }
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../results/scene-features.csv");
+    if std::env::var_os("UPDATE_FIGURES").is_some() {
+        let command = "UPDATE_FIGURES=1 cargo test --release -p scene --test conformance";
+        std::fs::write(&path, format!("# command: {command}\n{csv}")).unwrap();
+    }
+    let stored = std::fs::read_to_string(&path).unwrap_or_default();
+    let lines = |text: &str| -> Vec<String> {
+        let kept = text.lines().filter(|line| !line.starts_with('#'));
+        kept.map(str::to_owned).collect()
+    };
+    assert_eq!(lines(&stored), lines(&csv), "UPDATE_FIGURES=1 rewrites it");
+}
+
+fn quoted(field: &str) -> String {
+    if field.contains([',', '"']) {
+        format!("\"{}\"", field.replace('"', "\"\""))
+    } else {
+        field.to_owned()
+    }
+}
