@@ -328,7 +328,7 @@ impl ReadingsReport {
             sentences: self.sentences(),
             chart: figure(
                 &self.trade().svg()?,
-                "A symbol for each reading and scene; hover names the reading's figures.",
+                "A symbol for each reading and scene; hover shows its figures.",
             ),
             about,
         };

@@ -175,10 +175,10 @@ impl<'a> SweepReport<'a> {
         let mut pictures = Vec::new();
         for subject in subjects {
             let charts = Charts::new(self, &subject.label);
+            pictures.extend(charts.axes()?);
             if !self.file.one_at_a_time.is_empty() {
                 pictures.push((charts.changes().svg()?, charts.fixed(None)));
             }
-            pictures.extend(charts.axes()?);
         }
         let base = toml::to_string(&self.file.base).unwrap_or_default();
         let about = html! {

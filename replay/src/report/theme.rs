@@ -61,7 +61,7 @@ pub fn text_width_px(text: &str, size_px: u32) -> f64 {
             _ => 0.58,
         })
         .sum();
-    em * f64::from(size_px)
+    1.07 * em * f64::from(size_px)
 }
 
 /// Names of at most `most` characters that all differ. The middle of a long name is left out, and names

@@ -135,8 +135,22 @@ impl Axis {
                 ticks.map(|tick| (tick, write(&tick))).collect()
             }
             Scale::Doublings(Doublings::Numbers) if range.end - range.start < 3.0 => {
-                let ticks = linear_ticks(range, MOST_TICKS).into_iter();
-                ticks.map(|tick| (tick, short(tick.exp2()))).collect()
+                // Round numbers, because few doublings are in the range.
+                let first = (range.start * 2_f64.log10()).floor() as i32;
+                let steps = [1.0, 1.5, 2.0, 3.0, 5.0, 7.0];
+                let round = (first..first + 3)
+                    .flat_map(|power| steps.map(|step| step * 10_f64.powi(power)));
+                let ticks: Vec<f64> = round.map(f64::log2).filter(|t| range.contains(t)).collect();
+                // A narrow range may hold none of them.
+                let ticks = if ticks.len() < 2 {
+                    linear_ticks(range, MOST_TICKS)
+                } else {
+                    ticks
+                };
+                ticks
+                    .into_iter()
+                    .map(|tick| (tick, short(tick.exp2())))
+                    .collect()
             }
             Scale::Doublings(of) => {
                 let whole = whole_numbers(range, MOST_TICKS + 2).into_iter();

@@ -295,8 +295,8 @@ mod tests {
         long.groups.push(second);
         let svg = long.svg().unwrap();
         let centre = |word: &str| text_at(&svg, word).0;
-        let apart = centre("sampling.helper_lanes =") - centre("layout.base_align_bytes =");
-        let widest = theme::text_width_px("layout.base_align_bytes =", theme::LABEL_PX);
+        let apart = centre("sampling.helper_lanes =") - centre("layout.base_align_bytes");
+        let widest = theme::text_width_px("layout.base_align_bytes", theme::LABEL_PX);
         assert!(apart >= widest, "{apart} < {widest}");
     }
 

@@ -144,12 +144,14 @@ impl Marks {
         self.close("path", title);
     }
 
-    /// The chart with its marks. They come before its texts, which stay readable.
+    /// The chart with its marks. They come after the grid and before the texts that are drawn over it.
     pub fn onto(self, mut svg: String) -> String {
-        let at = svg
-            .find("<text")
-            .or_else(|| svg.rfind("</svg>"))
-            .unwrap_or(svg.len());
+        let after_grid = svg.rfind(&format!("stroke=\"{}\"", hex(theme::GRID)));
+        let after_grid = after_grid.and_then(|at| Some(at + svg[at..].find("/>")? + 2));
+        let at = after_grid
+            .or_else(|| svg.find("<text"))
+            .or_else(|| svg.rfind("</svg>"));
+        let at = at.unwrap_or(svg.len());
         svg.insert_str(at, &self.0);
         svg
     }
@@ -173,12 +175,17 @@ mod tests {
     fn a_mark_has_its_figure_as_a_title() {
         let mut marks = Marks::default();
         marks.rect([(1, 9), (5, 2)], theme::INK, "a < b: 3 %");
-        let svg = marks.onto("<svg><line/><text>t</text></svg>".to_owned());
+        let svg = "<svg><text>tick</text><line stroke=\"#DDE1E6\"/><text>t</text></svg>";
+        let svg = marks.onto(svg.to_owned());
         assert!(
             svg.contains("x=\"1\" y=\"2\" width=\"4\" height=\"7\""),
             "{svg}"
         );
         assert!(svg.contains("<title>a &lt; b: 3 %</title></rect>"), "{svg}");
-        assert!(svg.find("<rect").unwrap() < svg.find("<text").unwrap());
+        let place = |part: &str| svg.find(part).expect("the part is drawn");
+        assert!(
+            place("<line") < place("<rect") && place("<rect") < place(">t<"),
+            "{svg}"
+        );
     }
 }

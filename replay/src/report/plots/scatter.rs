@@ -142,9 +142,16 @@ impl ScatterChart {
                 points.iter().map(|(x, y)| (*x as i32, *y as i32)).collect()
             };
             let dots: Vec<(f64, f64)> = self.points.iter().map(|p| in_px(&place_of(p))).collect();
-            let front = self.points.iter().zip(&dots).filter(|(p, _)| !p.dominated);
-            let mut front: Vec<(f64, f64)> = front.map(|(_, dot)| *dot).collect();
-            front.sort_by(|a, b| a.0.total_cmp(&b.0));
+            // The points with less error than all that are faster. A point whose lead is too small to
+            // count as dominating may lie above the line without being marked as dominated.
+            let mut front = dots.clone();
+            front.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
+            let mut lowest = f64::MIN;
+            front.retain(|dot| {
+                let is_lower = dot.1 > lowest;
+                lowest = lowest.max(dot.1);
+                is_lower
+            });
             // Steps: a point dominates everything to the right of and above it.
             let corner = |pair: &[(f64, f64)]| [pair[0], (pair[1].0, pair[0].1)];
             let mut steps: Vec<(f64, f64)> = front.windows(2).flat_map(corner).collect();
@@ -152,8 +159,7 @@ impl ScatterChart {
             marks.line(&whole(&steps), theme::AXIS, (1.0, ""));
             let widths: Vec<f64> = labels
                 .iter()
-                // Some fonts are wider than the estimate.
-                .map(|label| 1.07 * theme::text_width_px(label, theme::TICK_PX))
+                .map(|label| theme::text_width_px(label, theme::TICK_PX))
                 .collect();
             let (across, down) = chart.plotting_area().get_pixel_range();
             let beyond = if listed { 0 } else { RIGHT_PX as i32 };

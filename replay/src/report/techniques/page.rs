@@ -47,7 +47,7 @@ const SHOWN: [&str; 30] = [
     "dominated_in",
 ];
 
-const PARETO_CAPTION: &str = "The line joins the techniques that are not dominated. A technique is dominated if another one is at least as good in time and error and better in one of them. Green: meant to be lossless; red: lossy; grey: baseline.";
+const PARETO_CAPTION: &str = "The line joins the techniques with less error than every faster one. A technique is dominated if another one has at most its error and takes less time, with disjoint interquartile ranges. Green: meant to be lossless; red: lossy; grey: baseline.";
 
 /// A scene's pictures.
 pub struct Scene {

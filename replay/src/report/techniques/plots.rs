@@ -2,7 +2,7 @@
 
 use crate::report::plots::SeriesStyle;
 use crate::report::plots::boxes::{BoxChart, BoxRow};
-use crate::report::plots::lines::{Axis, LineChart, LineSeries, Mark};
+use crate::report::plots::lines::{Axis, Doublings, LineChart, LineSeries, Mark};
 use crate::report::plots::scatter::{NamedPoint, ScatterChart};
 use crate::techniques::{Measured, Measures, Spread};
 
@@ -22,9 +22,17 @@ fn style(measured: &Measured) -> SeriesStyle {
 /// Run time against error.
 #[must_use]
 pub fn pareto(measures: &Measures) -> ScatterChart {
+    let label = "median frame time, \u{d7} the baseline's";
+    let times = |of: fn(f64, f64) -> f64| {
+        let all = measures.rows.iter().map(|m| m.timing.ratio.median);
+        all.reduce(of).unwrap_or(1.0)
+    };
     ScatterChart {
         title: format!("{}: run time against error", measures.scene),
-        x: Axis::linear("frame time over the baseline's, median"),
+        x: match times(f64::max) > 2.0 * times(f64::min) {
+            true => Axis::doublings(label, Doublings::Numbers),
+            false => Axis::linear(label),
+        },
         y: Axis::from_zero(
             "mean FLIP inside the lens",
             measures.rows.iter().map(|m| m.pictures.flip_mean),
