@@ -6,7 +6,7 @@
 CARGO ?= cargo
 OUT   ?= out
 
-.PHONY: demo apps techniques accuracy stress notebooks test fuzz faults bench lint build deps golden figures reproduce clean
+.PHONY: demo apps techniques accuracy stress notebooks test fuzz faults bench lint build deps golden figures reproduce clean screenshots
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
@@ -66,6 +66,10 @@ golden: deps build
 # Rewrites the tables of the documents from results/, and the outputs of the tutorial; review the diff.
 figures: build
 	UPDATE_FIGURES=1 $(CARGO) test --release --locked -p parallax-tests --test figures --test tutorial
+
+# Every page from small inputs, with screenshots and a check of their layout: out/screenshots.
+screenshots: deps build
+	scripts/screenshots.sh
 
 # Measures the tables of the documents again and prints what moved (docs/use/real-scenes.md):
 #   make reproduce SCENES=folder SCRIPTS="policies levels"
