@@ -411,9 +411,15 @@ mod tests {
             assert_eq!(charts.len(), 6);
             for chart in charts {
                 assert!(
-                    ["%", "MB/frame", "1000 lines"]
-                        .iter()
-                        .any(|u| chart.value_label.ends_with(u)),
+                    [
+                        "%",
+                        "% of footprints",
+                        "% of lines",
+                        "MB/frame",
+                        "1000 lines"
+                    ]
+                    .iter()
+                    .any(|u| chart.value_label.ends_with(&format!(", {u}"))),
                     "{}",
                     chart.value_label
                 );
