@@ -165,7 +165,7 @@ def test_exceptions_of_orders_and_policies_pass_through(atrium):
     with pytest.raises(AttributeError, match="hit"):
         parallax.run(atrium, SMALL, policy=NoMethods)
     # A class that failed does not spoil the next replay.
-    assert parallax.run(atrium, SMALL, policy=LRU)["l1_miss_pct"][0] > 0
+    assert parallax.run(atrium, SMALL, policy=LRU)["l1_footprint_miss_pct"][0] > 0
 
 
 @pytest.mark.parametrize("way", [4, -1, None, "0", 1 << 70, 0.5])

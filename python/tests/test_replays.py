@@ -9,7 +9,7 @@ import parallax
 import pytest
 
 SMALL = {"mode": "functional", "l1.size_bytes": "4KiB", "l2.size_bytes": "32KiB"}
-COUNTS = ["footprints", "l1_miss_pct", "l2_miss_pct", "external_bytes", "unique_lines"]
+COUNTS = ["footprints", "l1_footprint_miss_pct", "l2_line_miss_pct", "external_bytes", "unique_lines"]
 
 
 class LRU:
@@ -47,7 +47,7 @@ def test_run_has_the_figures_of_the_program(atrium, replay, order, mode):
     row = frame.iloc[0]
     assert len(frame) == 1 and row["order"] == order and row["checksum"] == "091376a5"
     assert row["external_bytes"] == printed["result"]["external_bytes"]
-    assert row["l1_miss_pct"] == pytest.approx(100 * printed["result"]["l1"]["footprint_misses"]
+    assert row["l1_footprint_miss_pct"] == pytest.approx(100 * printed["result"]["l1"]["footprint_misses"]
                                                / printed["result"]["l1"]["footprints"], rel=1e-12)
     if mode == "timed":
         assert row["cycles"] == printed["result"]["cycles"]
@@ -80,7 +80,7 @@ layout.block_order = ["morton"]
         "one-at-a-time": {"layout": {"block_order": ["morton"]}},
     }
     assert parallax.sweep(as_dict, both).equals(frame)
-    assert frame.attrs["columns"]["l1_miss_pct"]["unit"] == "%"
+    assert frame.attrs["columns"]["l1_footprint_miss_pct"]["unit"] == "% of footprints"
 
 
 def test_reproject_has_the_rows_of_the_program(traces, replay):

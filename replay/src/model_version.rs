@@ -13,6 +13,8 @@ pub const HISTORY: &[&str] = &[
     "Ray tracing: traffic goes by lines and waiting by visits, whether misses come from rates or from addresses; curves go by addresses, too.",
     // 4
     "Ray tracing: with reuse of shadow outcomes, a re-tested pixel is shaded at its exact hit. Functional mode: each core has its own L2 if the L2 is not shared.",
+    // 5
+    "The same counts under other keys: miss rates name what they divide by.",
 ];
 
 /// The version of the models, recorded with every result and part of every point's key.

@@ -44,6 +44,14 @@ fn compare(place: &str, python: &Value, replay: &Value, exact: bool) {
                 compare(&format!("{place}.{key}"), value, other, exact);
             }
         }
+        // The file has pairs, replay prints an object.
+        (Value::Array(pairs), Value::Object(b)) if place.ends_with(".settings") => {
+            assert_eq!(pairs.len(), b.len(), "{place}: {python}\n{replay}");
+            for pair in pairs {
+                let name = pair[0].as_str().expect("a name");
+                assert_eq!(b.get(name), Some(&pair[1]), "{place}.{name}");
+            }
+        }
         (Value::Array(a), Value::Array(b)) => {
             assert_eq!(a.len(), b.len(), "{place}: {python}\n{replay}");
             for (index, (value, other)) in a.iter().zip(b).enumerate() {
