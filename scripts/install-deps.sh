@@ -1,9 +1,8 @@
 #!/bin/sh
 # Installs what Cargo cannot, where it is missing and apt can be used; otherwise says what to
-# install. Always lavapipe (a Vulkan driver that needs no GPU); with `test` also OSMesa, where there is a
-# package of it (the tests that need it are skipped without), a C++ compiler,
-# which the reference implementation of FLIP in the tests needs, and Python for the independent
-# trace readers and Slurm for sweeps on a cluster, whose tests are skipped where they cannot be had.
+# install. Always lavapipe (a Vulkan driver that needs no GPU) and a C++ compiler, which the decoder of
+# meshopt needs; with `test` also OSMesa, where there is a package of it (the tests that need it are skipped
+# without), and Python for the independent trace readers and Slurm for sweeps on a cluster, whose tests are skipped where they cannot be had.
 # With `apps` also Chromium, npm and Python, which scripts/apps.sh captures pages with.
 set -eu
 
@@ -20,7 +19,7 @@ packages=""
 if ! has_lavapipe || ! has_loader; then
     packages=" mesa-vulkan-drivers libvulkan1"
 fi
-if [ "${1:-}" = test ] && ! command -v "${CXX:-c++}" >/dev/null 2>&1; then
+if ! command -v "${CXX:-c++}" >/dev/null 2>&1; then
     packages="$packages g++"
 fi
 if [ "${1:-}" = apps ]; then
