@@ -129,18 +129,27 @@ pub fn sections(entries: &[Entry]) -> Result<Vec<Section>, PlotError> {
     Ok(out)
 }
 
+/// The JSON object.
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct ReprojectJson<'a> {
+    #[serde(flatten)]
+    report: &'a Report,
+    /// What is known of the figures' errors.
+    errors: Vec<&'static KnownError>,
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<ReprojectJson<'_>>(crate::sgrt::result::SCHEMA)
+}
+
 /// A report as JSON; the known errors of the figures come last.
 ///
 /// # Errors
 /// A figure that is not finite.
 pub fn json(report: &Report, pretty: bool) -> serde_json::Result<String> {
-    #[derive(Serialize)]
-    #[cfg_attr(test, derive(schemars::JsonSchema))]
-    struct ReprojectJson<'a> {
-        #[serde(flatten)]
-        report: &'a Report,
-        errors: Vec<&'static KnownError>,
-    }
     let document = ReprojectJson {
         report,
         errors: errors::known(Of::Rays),

@@ -6,7 +6,7 @@ mod types;
 pub(crate) use types::{Layout, Meta, Sampling};
 
 use crate::report::columns::{Heading, Kind};
-use crate::{experiment, report, sgrt};
+use crate::{experiment, report};
 use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
@@ -98,7 +98,7 @@ fn all() -> Vec<Published> {
         report::techniques::schema(),
         report::accuracy::schema(),
         report::calibration::schema(),
-        Published::of::<sgrt::result::Report>(sgrt::result::SCHEMA),
+        report::sgrt::schema(),
         report::readings::schema(),
     ]
 }
