@@ -34,7 +34,7 @@ use crate::experiment::Plan;
 use crate::preset::Preset;
 use crate::result::TraceId;
 use anyhow::Result;
-use clap::{Parser, Subcommand};
+use clap::{Arg, Parser, Subcommand};
 use formats::textrace::Textrace;
 use shell::{Common, Documents};
 use std::path::Path;
@@ -74,10 +74,12 @@ enum Command {
     /// Print the first difference between two traces.
     Diff(diff::DiffArgs),
     /// Compare two captures of the same views, fragment by fragment and by cache misses.
+    #[command(mut_args(without(&["order"])))]
     Compare(Box<compare::Args>),
     /// Write a trace's accesses for other simulators, or the trace in another encoding.
     Convert(Box<convert::ConvertArgs>),
     /// Replay the Z2 paper's experiment and compare it with the published figures.
+    #[command(mut_args(without(&["order", "l1", "l2"])))]
     Paper(Box<paper::Args>),
     /// Measure the run time and the error of faster methods.
     Accuracy(Box<accuracy::Args>),
@@ -86,12 +88,15 @@ enum Command {
     /// Replay every point of an experiment file; an interrupted sweep continues.
     Sweep(sweep::Args),
     /// Write the Z2 paper's experiment as a self-contained page, with JSON and CSV files.
+    #[command(mut_args(without(&["order", "l1", "l2"])))]
     Report(Box<report::Args>),
     /// Compare stereo rendering techniques: frame time, image error, cache misses.
     Techniques(Box<techniques::Args>),
     /// Compare tile orders with each other and with lower bounds, with their hardware costs.
+    #[command(mut_args(without(&["order", "l1", "l2"])))]
     Orders(Box<orders::Args>),
     /// Analyse reuse distances, working sets, miss-ratio curves, OPT and 3C misses, by order.
+    #[command(mut_args(without(&["order", "l3", "prefetch", "dram", "frame"])))]
     Locality(Box<locality::Args>),
     /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
     Reproject(Box<reproject::ReprojectArgs>),
@@ -99,6 +104,14 @@ enum Command {
     Readings(Box<readings::ReadingsArgs>),
     #[command(flatten)]
     Documents(Documents),
+}
+
+/// Hides the machine's flags that a command refuses.
+fn without(refused: &'static [&'static str]) -> impl Fn(Arg) -> Arg {
+    move |arg| {
+        let refused = refused.contains(&arg.get_id().as_str());
+        if refused { arg.hide(true) } else { arg }
+    }
 }
 
 /// Parses the arguments, runs the subcommand and turns its outcome into an exit code.

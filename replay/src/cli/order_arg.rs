@@ -70,7 +70,8 @@ pub fn parse_orders(text: &str) -> Result<Vec<Order>> {
                 let hint =
                     similar.map_or(String::new(), |o| format!("; did you mean `{}`?", o.name()));
                 bail!(
-                    "--orders: expected `all` or some of {}, found `{name}`{hint}",
+                    "--orders: expected `all`, names, or parts as in zig-zag+sta+offset (docs/models/orders.md); the names are {}; \
+                     found `{name}`{hint}",
                     known.join(", ")
                 );
             }
@@ -99,7 +100,8 @@ mod tests {
         assert_eq!(
             parse_orders("morton,spiral").unwrap_err().to_string(),
             format!(
-                "--orders: expected `all` or some of {}, found `spiral`",
+                "--orders: expected `all`, names, or parts as in zig-zag+sta+offset (docs/models/orders.md); the names are {}; \
+                 found `spiral`",
                 known.join(", ")
             )
         );
