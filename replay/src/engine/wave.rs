@@ -64,22 +64,7 @@ impl<'a> Wave<'a> {
                     (self.report_stage)(Stage::LastReplayStarted);
                 }
                 let config = *pass.config();
-                let mut machine = match pass.machine.take() {
-                    Some(mut machine) => {
-                        match config.between_frames {
-                            BetweenFrames::Keep => {}
-                            BetweenFrames::Flush => machine.flush(),
-                            BetweenFrames::Lose(percent) => {
-                                machine.lose(OtherWork::after(index, percent, &config));
-                            }
-                        }
-                        machine
-                    }
-                    None => {
-                        pass.build_clients(self.job.trace, &expander)?;
-                        pass.build(&expander)?
-                    }
-                };
+                let mut machine = self.machine(pass, &expander, index)?;
                 let mut cores = Cores::new(frame, config.cores as usize);
                 if let Some(clients) = &mut pass.clients {
                     clients.start_frame(number)?;
@@ -132,6 +117,28 @@ impl<'a> Wave<'a> {
             )?;
         }
         Ok(())
+    }
+
+    /// The machine of a group at the start of a frame: a new one, or the last frame's with what remains in its caches.
+    fn machine(
+        &self,
+        pass: &mut Pass<'a>,
+        expander: &Expander,
+        index: usize,
+    ) -> Result<Box<dyn Machine>, ReplayError> {
+        let Some(mut machine) = pass.machine.take() else {
+            pass.build_clients(self.job.trace, expander)?;
+            return pass.build(expander);
+        };
+        let config = pass.config();
+        match config.between_frames {
+            BetweenFrames::Keep => {}
+            BetweenFrames::Flush => machine.flush(),
+            BetweenFrames::Lose(percent) => {
+                machine.lose(OtherWork::after(index, percent, config));
+            }
+        }
+        Ok(machine)
     }
 
     fn finish(

@@ -85,6 +85,15 @@ pub struct OrderFigures {
     pub streams: Vec<(Stream, Figures)>,
 }
 
+fn check_tiles(tiles: usize) -> Result<(), StreamError> {
+    let most = Place::MOST_TILES;
+    if tiles <= most as usize {
+        return Ok(());
+    }
+    let problem = format!("passes have {tiles} tiles: expected at most {most}");
+    Err(StreamError::Tables(problem))
+}
+
 /// Analyses a trace in every order, in parallel. Order and latencies of `config` are not used. `done` is
 /// called for every frame of every order.
 ///
@@ -115,14 +124,7 @@ pub fn analyse(
     let mut figures = Vec::new();
     for orders in orders.chunks(together.max(1)) {
         let expander = Expander::new(&rendered, config)?;
-        let tiles = expander.bins().tiles();
-        if tiles > Place::MOST_TILES as usize {
-            return Err(StreamError::Tables(format!(
-                "passes have {tiles} tiles: expected at most {}",
-                Place::MOST_TILES
-            ))
-            .into());
-        }
+        check_tiles(expander.bins().tiles())?;
         let mut counts = TraceCounts::new(expander.bins());
         let analyses: Result<Vec<Option<Analysis>>, ConfigError> = orders
             .iter()

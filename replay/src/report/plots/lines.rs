@@ -54,24 +54,28 @@ const LONGEST_NAME_CHARS: usize = 34;
 const MOST_SYMBOLS: usize = 14;
 
 impl LineChart {
+    /// Refuses points that are not finite.
+    fn check(&self) -> Result<(), PlotError> {
+        for series in &self.series {
+            let is_finite =
+                |&(x, y): &(f64, f64)| self.x.place(x).is_finite() && self.y.place(y).is_finite();
+            if let Some((x, y)) = series.points.iter().find(|point| !is_finite(point)) {
+                let name = &series.style.name;
+                return Err(PlotError {
+                    title: self.title.clone(),
+                    problem: format!("series `{name}` has a point at ({x}, {y})"),
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// The chart as SVG.
     ///
     /// # Errors
     /// A point that is not finite.
     pub fn svg(&self) -> Result<String, PlotError> {
-        for series in &self.series {
-            for &(x, y) in &series.points {
-                if !self.x.place(x).is_finite() || !self.y.place(y).is_finite() {
-                    return Err(PlotError {
-                        title: self.title.clone(),
-                        problem: format!(
-                            "series `{}` has a point at ({x}, {y})",
-                            series.style.name
-                        ),
-                    });
-                }
-            }
-        }
+        self.check()?;
         let place = |&(x, y): &(f64, f64)| (self.x.place(x), self.y.place(y));
         let points = || self.series.iter().flat_map(|s| s.points.iter().map(place));
         let x = self.x.fit(points().map(|p| p.0));
@@ -94,11 +98,8 @@ impl LineChart {
             color: s.style.color,
             symbol: Symbol::Point(Shape::nth(index), true),
         });
-        let right = if lines.is_empty() {
-            24
-        } else {
-            LEADER_PX + SAMPLE_PX + 16
-        };
+        let beside_names = LEADER_PX + SAMPLE_PX + 16;
+        let right = if lines.is_empty() { 24 } else { beside_names };
         // More names than the axes are high need a higher chart.
         let height = PLOT_PX.1.max(LABEL_GAP_PX * lines.len() as f64);
         let frame = Frame {
@@ -122,35 +123,16 @@ impl LineChart {
                 .y_label_formatter(&|at| y.text(*at))
                 .draw()?;
             let at_px = |point: &(f64, f64)| chart.backend_coord(&place(point));
-            for (
-                index,
-                (
-                    LineSeries {
-                        style,
-                        points,
-                        mark,
-                    },
-                    name,
-                ),
-            ) in styled()
-            {
+            for (index, (series, name)) in styled() {
+                #[rustfmt::skip]
+                let LineSeries { style, points, mark } = series;
                 let shape = Shape::nth(index);
-                let title = |(x, y): (f64, f64)| {
-                    let name = if name.is_empty() {
-                        ""
-                    } else {
-                        &format!("{name}: ")
-                    };
-                    format!("{name}{} at {}", exact(y), exact(x))
-                };
+                let title = |(x, y): (f64, f64)| title(name, x, y);
                 if *mark == Mark::Line {
                     let line: Vec<(i32, i32)> = points.iter().map(at_px).collect();
                     // A wider first line stays visible under others.
-                    let width = if index == 0 && lines.len() > 1 {
-                        2.5
-                    } else {
-                        1.5
-                    };
+                    let is_under_others = index == 0 && lines.len() > 1;
+                    let width = if is_under_others { 2.5 } else { 1.5 };
                     marks.line(&line, style.color, (width, dash(index)));
                 }
                 // Lines without names are references. Symbols of merged lines alternate.
@@ -189,6 +171,12 @@ impl LineChart {
             Ok(())
         })
     }
+}
+
+/// What a point shows when the pointer is over it.
+fn title(name: &str, x: f64, y: f64) -> String {
+    let separator = if name.is_empty() { "" } else { ": " };
+    format!("{name}{separator}{} at {}", exact(y), exact(x))
 }
 
 /// A figure with enough digits to tell neighbours apart.

@@ -49,7 +49,71 @@ const NAME_HEIGHT_PX: f64 = 14.0;
 const NEAR_PX: f64 = 16.0;
 const FARTHEST_PX: f64 = 400.0;
 
+/// The texts of a chart.
+struct Labels {
+    /// The points in the order of their numbers.
+    order: Vec<usize>,
+    /// Whether points have numbers and a list names them.
+    listed: bool,
+    /// Text beside each point.
+    labels: Vec<String>,
+    /// Lines of the list.
+    list_names: Vec<String>,
+}
+
+/// The front as steps: the points with less error than all that are faster. A point whose lead is too small to
+/// count as dominating may lie above the line without being marked as dominated.
+fn steps(dots: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut front = dots.to_vec();
+    front.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
+    let mut lowest = f64::MIN;
+    front.retain(|dot| {
+        let is_lower = dot.1 > lowest;
+        lowest = lowest.max(dot.1);
+        is_lower
+    });
+    // A point dominates everything to the right of and above it.
+    let corner = |pair: &[(f64, f64)]| [pair[0], (pair[1].0, pair[0].1)];
+    let mut steps: Vec<(f64, f64)> = front.windows(2).flat_map(corner).collect();
+    steps.extend(front.last());
+    steps
+}
+
 impl ScatterChart {
+    /// The points in the order of their numbers, which go up from the front's first point.
+    fn numbered(&self) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..self.points.len()).collect();
+        let key = |index: usize| self.points[index].at;
+        order.sort_by(|&a, &b| {
+            let by_error = key(a).1.total_cmp(&key(b).1);
+            by_error.then(key(a).0.total_cmp(&key(b).0)).then(a.cmp(&b))
+        });
+        order
+    }
+
+    fn labels(&self) -> Labels {
+        let names: Vec<&str> = self.points.iter().map(|p| p.style.name.as_str()).collect();
+        let names = theme::distinct(&names, LONGEST_NAME_CHARS);
+        let listed = names.len() > MOST_NAMES;
+        let order = self.numbered();
+        let mut number = vec![0; names.len()];
+        for (place, &index) in (1..).zip(&order) {
+            number[index] = place;
+        }
+        let numbered = (1..).zip(&order);
+        Labels {
+            list_names: numbered
+                .map(|(place, &index)| format!("{place}  {}", names[index]))
+                .collect(),
+            labels: match listed {
+                true => number.iter().map(ToString::to_string).collect(),
+                false => names,
+            },
+            order,
+            listed,
+        }
+    }
+
     /// The chart as SVG.
     ///
     /// # Errors
@@ -70,43 +134,22 @@ impl ScatterChart {
             y.start = -0.03 * y.end;
         }
         let (x, y) = (self.x.ticked(x).thinned(PLOT_PX.0), self.y.ticked(y));
-        let names: Vec<&str> = self.points.iter().map(|p| p.style.name.as_str()).collect();
-        let names = theme::distinct(&names, LONGEST_NAME_CHARS);
-        let listed = names.len() > MOST_NAMES;
-        // Numbers go up from the front's first point.
-        let mut order: Vec<usize> = (0..names.len()).collect();
-        order.sort_by(|&a, &b| {
-            let key = |i: usize| self.points[i].at;
-            key(a)
-                .1
-                .total_cmp(&key(b).1)
-                .then(key(a).0.total_cmp(&key(b).0))
-                .then(a.cmp(&b))
-        });
-        let mut number = vec![0; names.len()];
-        for (place, &index) in (1..).zip(&order) {
-            number[index] = place;
-        }
-        let labels: Vec<String> = match listed {
-            true => number.iter().map(ToString::to_string).collect(),
-            false => names.clone(),
-        };
-        let list_names: Vec<String> = (1..)
-            .zip(&order)
-            .map(|(place, &index)| format!("{place}  {}", names[index]))
-            .collect();
+        let Labels {
+            order,
+            listed,
+            labels,
+            list_names,
+        } = self.labels();
         let list_px = list_names
             .iter()
             .map(|name| theme::text_width_px(name, theme::TICK_PX))
             .fold(0.0, f64::max);
-        let right = if listed {
-            list_px as u32 + 36
-        } else {
-            RIGHT_PX
-        };
-        let height = match listed {
-            true => PLOT_PX.1.max(LIST_GAP_PX * names.len() as f64),
-            false => PLOT_PX.1,
+        let (right, height) = match listed {
+            true => {
+                let list_height = LIST_GAP_PX * labels.len() as f64;
+                (list_px as u32 + 36, PLOT_PX.1.max(list_height))
+            }
+            false => (RIGHT_PX, PLOT_PX.1),
         };
         let frame = Frame {
             title: &self.title,
@@ -142,20 +185,7 @@ impl ScatterChart {
                 points.iter().map(|(x, y)| (*x as i32, *y as i32)).collect()
             };
             let dots: Vec<(f64, f64)> = self.points.iter().map(|p| in_px(&place_of(p))).collect();
-            // The points with less error than all that are faster. A point whose lead is too small to
-            // count as dominating may lie above the line without being marked as dominated.
-            let mut front = dots.clone();
-            front.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
-            let mut lowest = f64::MIN;
-            front.retain(|dot| {
-                let is_lower = dot.1 > lowest;
-                lowest = lowest.max(dot.1);
-                is_lower
-            });
-            // Steps: a point dominates everything to the right of and above it.
-            let corner = |pair: &[(f64, f64)]| [pair[0], (pair[1].0, pair[0].1)];
-            let mut steps: Vec<(f64, f64)> = front.windows(2).flat_map(corner).collect();
-            steps.extend(front.last());
+            let steps = steps(&dots);
             marks.line(&whole(&steps), theme::AXIS, (1.0, ""));
             let widths: Vec<f64> = labels
                 .iter()
@@ -264,6 +294,19 @@ fn cross(a: [(f64, f64); 2], b: [(f64, f64); 2]) -> bool {
     side(a, b[0]) * side(a, b[1]) < 0.0 && side(b, a[0]) * side(b, a[1]) < 0.0
 }
 
+/// Number of points of a leader line that lie on labels. Such a line would look like the other label's.
+fn points_on_labels(leader: [(f64, f64); 2], labels: &[Rect]) -> usize {
+    let [from, to] = leader;
+    let steps = (distance(from, to) / 4.0) as usize;
+    let is_on_label = |step: &usize| {
+        let t = *step as f64 / steps.max(1) as f64;
+        let lerp = |a: f64, b: f64| a + t * (b - a);
+        let on = Rect::around((lerp(from.0, to.0), lerp(from.1, to.1)), 1.0);
+        labels.iter().any(|label| label.overlap(&on) > 0.0)
+    };
+    (0..=steps).filter(is_on_label).count()
+}
+
 /// A rectangle for the label of each dot: the closest place around it that covers no placed label, no dot
 /// and none of the front's `steps`, and whose leader line crosses none.
 fn place(dots: &[(f64, f64)], widths: &[f64], steps: &[(f64, f64)], room: Rect) -> Vec<Rect> {
@@ -296,25 +339,9 @@ fn place(dots: &[(f64, f64)], widths: &[f64], steps: &[(f64, f64)], room: Rect) 
                 .iter()
                 .filter(|other| cross(**other, leader))
                 .count();
-            let through = if away > NEAR_PX {
-                // A leader line through another label would look like that label's.
-                let steps = (away / 4.0) as usize;
-                let on = |t: usize| {
-                    let t = t as f64 / steps.max(1) as f64;
-                    let lerp = |a: f64, b: f64| a + t * (b - a);
-                    Rect::around(
-                        (
-                            lerp(leader[0].0, leader[1].0),
-                            lerp(leader[0].1, leader[1].1),
-                        ),
-                        1.0,
-                    )
-                };
-                (0..=steps)
-                    .filter(|t| placed.iter().any(|name| name.overlap(&on(*t)) > 0.0))
-                    .count()
-            } else {
-                0
+            let through = match away > NEAR_PX {
+                true => points_on_labels(leader, &placed),
+                false => 0,
             };
             // A label at the height of its dot is easiest to read.
             let aside = (f64::midpoint(place.top, place.bottom) - dot.1).abs();

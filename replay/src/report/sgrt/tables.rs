@@ -99,170 +99,227 @@ fn rule_rows(entries: &[Entry]) -> Vec<RuleRow<'_>> {
     entries.iter().flat_map(|e| both(&e.report)).collect()
 }
 
+fn pct<'a>(
+    key: &'static str,
+    name: &'static str,
+    decimals: usize,
+    value: fn(&Outcome) -> f64,
+) -> Column<'static, RuleRow<'a>> {
+    Column::real(key, name, "%", decimals, move |r: &RuleRow| {
+        value(r.outcome)
+    })
+}
+
+fn ratio<'a>(
+    key: &'static str,
+    name: &'static str,
+    value: fn(&Outcome) -> f64,
+) -> Column<'static, RuleRow<'a>> {
+    Column::real(key, name, "ratio", 3, move |r: &RuleRow| value(r.outcome))
+}
+
+fn millions<'a>(
+    key: &'static str,
+    name: &'static str,
+    unit: &'static str,
+    value: fn(&Outcome) -> u64,
+) -> Column<'static, RuleRow<'a>> {
+    let show = Show::Millions(2);
+    Column::new(key, name, unit, show, move |r: &RuleRow| value(r.outcome))
+}
+
+fn text<'a>(
+    key: &'static str,
+    name: &'static str,
+    value: fn(&RuleRow) -> String,
+) -> Column<'static, RuleRow<'a>> {
+    Column::text(key, name, move |r: &RuleRow| value(r))
+}
+
+/// What a row is about.
+fn identity<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
+    vec![
+        text("scene", "scene", |r| scene_name(r.report)),
+        text("trace", "trace", |r| r.report.trace.name.clone()),
+        text("checksum", "checksum", |r| r.report.trace.checksum.clone()),
+        text("camera", "camera", |r| r.report.trace.camera.clone()),
+        text("display", "display", |r| r.report.trace.display.clone()),
+        Column::text("width_px", "width", |r: &RuleRow| {
+            u64::from(r.report.eye_size_px[0])
+        }),
+        Column::text("height_px", "height", |r: &RuleRow| {
+            u64::from(r.report.eye_size_px[1])
+        }),
+        Column::text("model_version", "model", |r: &RuleRow| {
+            u64::from(r.report.model_version)
+        }),
+        text("cache_misses", "cache misses from", |r| {
+            r.report.config.cache_misses.clone()
+        }),
+        text("run", "rule", |r| r.run.to_owned()),
+        text("rule", "rule", |r| match r.run {
+            "chosen" => r.report.config.rule.to_string(),
+            _ => "none".to_owned(),
+        }),
+        text("reuse", "reused", |r| {
+            reuse_name(r.report.config.reuse).to_owned()
+        }),
+    ]
+}
+
+/// Reused hits and their errors.
+fn hits<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
+    vec![
+        pct("reuse_pct", "reuse", 2, |o| o.reuse_pct),
+        pct("wrong_object_pct", "wrong object", 3, |o| {
+            o.wrong_object_pct
+        }),
+        pct("wrong_primitive_pct", "wrong triangle", 3, |o| {
+            o.wrong_primitive_pct
+        }),
+        pct("position_over_1px_pct", "off > 1 px", 3, |o| {
+            o.position_over_1px_pct
+        }),
+        pct("position_over_2px_pct", "off > 2 px", 3, |o| {
+            o.position_over_2px_pct
+        }),
+    ]
+}
+
+/// Performance and energy relative to tracing both eyes completely.
+fn ratios<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
+    vec![
+        ratio("relative_performance", "performance", |o| {
+            o.relative_performance
+        }),
+        ratio("tni_relative_performance", "units alone", |o| {
+            o.tni_relative_performance
+        }),
+        Column::real(
+            "paper_relative_performance",
+            "paper",
+            "ratio",
+            2,
+            |r: &RuleRow| r.report.paper.as_ref().map(|p| p.relative_performance),
+        )
+        .published(),
+        ratio("relative_energy", "energy", |o| o.relative_energy),
+        Column::real(
+            "paper_relative_energy",
+            "paper",
+            "ratio",
+            2,
+            |r: &RuleRow| r.report.paper.as_ref().map(|p| p.relative_energy),
+        )
+        .published(),
+        pct("primary_steps_pct", "primary steps", 1, |o| {
+            o.primary_steps_pct
+        }),
+        pct("tni_reduction_pct", "unit cycles saved", 1, |o| {
+            o.tni_reduction_pct
+        }),
+        pct("right_tni_reduction_pct", "of the right eye's", 1, |o| {
+            o.right_tni_reduction_pct
+        }),
+        pct("srp_overhead_pct", "core cycles added", 1, |o| {
+            o.srp_overhead_pct
+        }),
+    ]
+}
+
+/// Cycles, rays and steps.
+fn cycles<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
+    vec![
+        millions("tni_cycles", "unit cycles", "M", |o| o.tni_cycles),
+        millions("reference_tni_cycles", "both eyes in full", "M", |o| {
+            o.reference_tni_cycles
+        }),
+        millions("srp_cycles", "core cycles", "M", |o| o.srp_cycles),
+        millions("reference_srp_cycles", "both eyes in full", "M", |o| {
+            o.reference_srp_cycles
+        }),
+        text("tni_bottleneck", "unit bottleneck", |r| {
+            r.outcome.tni_bottleneck.clone()
+        }),
+        millions("rays", "rays", "M", |o| o.work.rays),
+        millions("reference_rays", "both eyes in full", "M", |o| {
+            o.reference_work.rays
+        }),
+        millions("steps", "steps", "M", |o| o.work.steps),
+        millions("reference_steps", "both eyes in full", "M", |o| {
+            o.reference_work.steps
+        }),
+        millions("retests", "re-tests", "M", |o| o.work.retests),
+    ]
+}
+
+/// Differences between the pictures.
+fn image_error<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
+    vec![
+        Column::real("flip_mean", "FLIP mean", "", 5, |r: &RuleRow| {
+            r.outcome.flip_mean
+        }),
+        Column::real("flip_p99", "FLIP p99", "", 4, |r: &RuleRow| {
+            r.outcome.flip_p99
+        }),
+        Column::real("pixels_per_degree", "ppd", "px/deg", 1, |r: &RuleRow| {
+            r.outcome.pixels_per_degree
+        }),
+        Column::real("psnr_db", "PSNR", "dB", 1, |r: &RuleRow| r.outcome.psnr_db),
+        Column::real("ssim", "SSIM", "", 4, |r: &RuleRow| r.outcome.ssim),
+    ]
+}
+
+/// Reads of the detection, buffers and DRAM traffic.
+fn bytes<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
+    vec![
+        Column::new("detection_bytes", "detection reads", "B/px", Show::Whole, {
+            |r: &RuleRow| {
+                let reads = r.outcome.detection_reads;
+                reads.pixel_bytes(&r.report.config.model.gbuffer)
+            }
+        }),
+        Column::real(
+            "detection_sram_kib",
+            "row buffers",
+            "KiB",
+            0,
+            |r: &RuleRow| r.outcome.detection_sram_bytes as f64 / 1024.0,
+        ),
+        millions("on_chip_bytes", "tile buffers", "MB", |o| o.on_chip_bytes),
+        millions("gbuffer_dram_bytes", "G-buffer in DRAM", "MB", |o| {
+            o.dram.gbuffer_bytes
+        }),
+        millions("dram_bytes", "all DRAM", "MB", |o| o.dram.total()),
+        millions("reference_dram_bytes", "both eyes in full", "MB", |o| {
+            o.reference_dram.total()
+        }),
+        millions("whole_screen_dram_bytes", "whole screen: DRAM", "MB", |o| {
+            o.whole_screen.dram.total()
+        }),
+        ratio("whole_screen_relative_performance", "performance", |o| {
+            o.whole_screen.relative_performance
+        }),
+        ratio("whole_screen_relative_energy", "energy", |o| {
+            o.whole_screen.relative_energy
+        }),
+        text("row_test_applies", "row test applies", |r| {
+            r.report.rows.row_test_applies.to_string()
+        }),
+    ]
+}
+
 impl Row for RuleRow<'_> {
     fn columns() -> Vec<Column<'static, Self>> {
-        fn pct<'a>(
-            key: &'static str,
-            name: &'static str,
-            decimals: usize,
-            value: fn(&Outcome) -> f64,
-        ) -> Column<'static, RuleRow<'a>> {
-            Column::real(key, name, "%", decimals, move |r: &RuleRow| {
-                value(r.outcome)
-            })
-        }
-        fn ratio<'a>(
-            key: &'static str,
-            name: &'static str,
-            value: fn(&Outcome) -> f64,
-        ) -> Column<'static, RuleRow<'a>> {
-            Column::real(key, name, "ratio", 3, move |r: &RuleRow| value(r.outcome))
-        }
-        fn millions<'a>(
-            key: &'static str,
-            name: &'static str,
-            unit: &'static str,
-            value: fn(&Outcome) -> u64,
-        ) -> Column<'static, RuleRow<'a>> {
-            let show = Show::Millions(2);
-            Column::new(key, name, unit, show, move |r: &RuleRow| value(r.outcome))
-        }
-        fn text<'a>(
-            key: &'static str,
-            name: &'static str,
-            value: fn(&RuleRow) -> String,
-        ) -> Column<'static, RuleRow<'a>> {
-            Column::text(key, name, move |r: &RuleRow| value(r))
-        }
-        vec![
-            text("scene", "scene", |r| scene_name(r.report)),
-            text("trace", "trace", |r| r.report.trace.name.clone()),
-            text("checksum", "checksum", |r| r.report.trace.checksum.clone()),
-            text("camera", "camera", |r| r.report.trace.camera.clone()),
-            text("display", "display", |r| r.report.trace.display.clone()),
-            Column::text("width_px", "width", |r: &RuleRow| {
-                u64::from(r.report.eye_size_px[0])
-            }),
-            Column::text("height_px", "height", |r: &RuleRow| {
-                u64::from(r.report.eye_size_px[1])
-            }),
-            Column::text("model_version", "model", |r: &RuleRow| {
-                u64::from(r.report.model_version)
-            }),
-            text("cache_misses", "cache misses from", |r| {
-                r.report.config.cache_misses.clone()
-            }),
-            text("run", "rule", |r| r.run.to_owned()),
-            text("rule", "rule", |r| match r.run {
-                "chosen" => r.report.config.rule.to_string(),
-                _ => "none".to_owned(),
-            }),
-            text("reuse", "reused", |r| {
-                reuse_name(r.report.config.reuse).to_owned()
-            }),
-            pct("reuse_pct", "reuse", 2, |o| o.reuse_pct),
-            pct("wrong_object_pct", "wrong object", 3, |o| {
-                o.wrong_object_pct
-            }),
-            pct("wrong_primitive_pct", "wrong triangle", 3, |o| {
-                o.wrong_primitive_pct
-            }),
-            pct("position_over_1px_pct", "off > 1 px", 3, |o| {
-                o.position_over_1px_pct
-            }),
-            pct("position_over_2px_pct", "off > 2 px", 3, |o| {
-                o.position_over_2px_pct
-            }),
-            ratio("relative_performance", "performance", |o| {
-                o.relative_performance
-            }),
-            ratio("tni_relative_performance", "units alone", |o| {
-                o.tni_relative_performance
-            }),
-            Column::real(
-                "paper_relative_performance",
-                "paper",
-                "ratio",
-                2,
-                |r: &Self| r.report.paper.as_ref().map(|p| p.relative_performance),
-            )
-            .published(),
-            ratio("relative_energy", "energy", |o| o.relative_energy),
-            Column::real("paper_relative_energy", "paper", "ratio", 2, |r: &Self| {
-                r.report.paper.as_ref().map(|p| p.relative_energy)
-            })
-            .published(),
-            pct("primary_steps_pct", "primary steps", 1, |o| {
-                o.primary_steps_pct
-            }),
-            pct("tni_reduction_pct", "unit cycles saved", 1, |o| {
-                o.tni_reduction_pct
-            }),
-            pct("right_tni_reduction_pct", "of the right eye's", 1, |o| {
-                o.right_tni_reduction_pct
-            }),
-            pct("srp_overhead_pct", "core cycles added", 1, |o| {
-                o.srp_overhead_pct
-            }),
-            millions("tni_cycles", "unit cycles", "M", |o| o.tni_cycles),
-            millions("reference_tni_cycles", "both eyes in full", "M", |o| {
-                o.reference_tni_cycles
-            }),
-            millions("srp_cycles", "core cycles", "M", |o| o.srp_cycles),
-            millions("reference_srp_cycles", "both eyes in full", "M", |o| {
-                o.reference_srp_cycles
-            }),
-            text("tni_bottleneck", "unit bottleneck", |r| {
-                r.outcome.tni_bottleneck.clone()
-            }),
-            millions("rays", "rays", "M", |o| o.work.rays),
-            millions("reference_rays", "both eyes in full", "M", |o| {
-                o.reference_work.rays
-            }),
-            millions("steps", "steps", "M", |o| o.work.steps),
-            millions("reference_steps", "both eyes in full", "M", |o| {
-                o.reference_work.steps
-            }),
-            millions("retests", "re-tests", "M", |o| o.work.retests),
-            Column::real("flip_mean", "FLIP mean", "", 5, |r: &Self| {
-                r.outcome.flip_mean
-            }),
-            Column::real("flip_p99", "FLIP p99", "", 4, |r: &Self| r.outcome.flip_p99),
-            Column::real("pixels_per_degree", "ppd", "px/deg", 1, |r: &Self| {
-                r.outcome.pixels_per_degree
-            }),
-            Column::real("psnr_db", "PSNR", "dB", 1, |r: &Self| r.outcome.psnr_db),
-            Column::real("ssim", "SSIM", "", 4, |r: &Self| r.outcome.ssim),
-            Column::new("detection_bytes", "detection reads", "B/px", Show::Whole, {
-                |r: &Self| {
-                    let reads = r.outcome.detection_reads;
-                    reads.pixel_bytes(&r.report.config.model.gbuffer)
-                }
-            }),
-            Column::real("detection_sram_kib", "row buffers", "KiB", 0, |r: &Self| {
-                r.outcome.detection_sram_bytes as f64 / 1024.0
-            }),
-            millions("on_chip_bytes", "tile buffers", "MB", |o| o.on_chip_bytes),
-            millions("gbuffer_dram_bytes", "G-buffer in DRAM", "MB", |o| {
-                o.dram.gbuffer_bytes
-            }),
-            millions("dram_bytes", "all DRAM", "MB", |o| o.dram.total()),
-            millions("reference_dram_bytes", "both eyes in full", "MB", |o| {
-                o.reference_dram.total()
-            }),
-            millions("whole_screen_dram_bytes", "whole screen: DRAM", "MB", |o| {
-                o.whole_screen.dram.total()
-            }),
-            ratio("whole_screen_relative_performance", "performance", |o| {
-                o.whole_screen.relative_performance
-            }),
-            ratio("whole_screen_relative_energy", "energy", |o| {
-                o.whole_screen.relative_energy
-            }),
-            text("row_test_applies", "row test applies", |r| {
-                r.report.rows.row_test_applies.to_string()
-            }),
-        ]
+        let groups = [
+            identity(),
+            hits(),
+            ratios(),
+            cycles(),
+            image_error(),
+            bytes(),
+        ];
+        groups.into_iter().flatten().collect()
     }
 }
 

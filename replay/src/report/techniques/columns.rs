@@ -56,12 +56,10 @@ fn ratio<'a>(key: &'static str, name: &'static str, of: Count) -> Figure<'a> {
     })
 }
 
-/// Every figure of these techniques. Stages and predictions have the names that the captures give them.
-/// `order` is the order of the cache figures.
-#[must_use]
+/// What a row is about.
 #[rustfmt::skip]
-pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
-    let mut columns = vec![
+fn identity<'a>() -> Vec<Figure<'a>> {
+    vec![
         Figure::text("scene", "scene", |m| m.scene),
         Figure::text("trace", "trace", |m| m.row.trace.as_deref().map(|file| file.trim_end_matches(".textrace")))
             .about("name of the technique's trace without folder and extension"),
@@ -84,7 +82,13 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
             .about("another technique has no more error and takes less time (the interquartile ranges do not overlap)"),
         Figure::text("dominated_in", "dominated in", |m| m.dominated_in.join(" "))
             .about("counts in which another technique is at least as good, with at most the same error in its worst picture, and better in one of both"),
+    ]
+}
 
+/// Times relative to the baseline, and frame times.
+#[rustfmt::skip]
+fn times<'a>() -> Vec<Figure<'a>> {
+    vec![
         Figure::real("frame_time_ratio", "time", "\u{d7} baseline", 3, |m| m.timing.ratio.median)
             .about("frame time over that of the baseline measured next to it: median over all frames and repeats"),
         Figure::real("frame_time_ratio_q1", "lower quartile", "\u{d7} baseline", 3, |m| m.timing.ratio.q1),
@@ -105,7 +109,13 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
             .about("frames longer than 13.9 ms, with times scaled to a median of 11.1 ms for the baseline"),
         Figure::real("cull_ms", "culling", "ms", 3, |m| m.timing.cull_ms)
             .about("median culling time per frame"),
-    ];
+    ]
+}
+
+/// Frames that miss a display's refresh, by rate.
+#[rustfmt::skip]
+fn pacing<'a>() -> Vec<Figure<'a>> {
+    let mut columns: Vec<Figure<'a>> = Vec::new();
     columns.extend((0..RATES_HZ.len()).map(|at| {
         let hz = RATES_HZ[at];
         Figure::real(format!("missed_pct_{hz}hz"), format!("missed at {hz} Hz"), "%", 1, move |m| Some(m.timing.pacing.get(at)?.missed_pct))
@@ -116,21 +126,32 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
         Figure::real(format!("steps_{hz}hz"), format!("steps at {hz} Hz"), "refreshes", 2, move |m| Some(m.timing.pacing.get(at)?.steps))
             .about("mean number of refresh intervals per frame, 1 if no frame is late; the display rate divided by it is the frame rate")
     }));
+    columns
+}
+
+/// Times of the stages, under the names that the captures give them.
+fn stages<'a>(rows: &[&'a Measured<'a>]) -> Vec<Figure<'a>> {
     let mut stages: Vec<&str> = Vec::new();
     for (stage, _) in rows.iter().flat_map(|m| &m.timing.stages_ms) {
         if !stages.contains(&stage.as_str()) {
             stages.push(stage);
         }
     }
-    columns.extend(stages.into_iter().map(str::to_owned).map(|stage| {
+    let figures = stages.into_iter().map(str::to_owned).map(|stage| {
         let heading = (format!("stages_ms.{stage}"), stage.clone());
         Figure::real(heading.0, heading.1, "ms", 3, move |m| {
             let found = m.timing.stages_ms.iter().find(|(name, _)| *name == stage);
             found.map(|(_, ms)| *ms)
         })
         .about("median time of the stage")
-    }));
-    columns.extend([
+    });
+    figures.collect()
+}
+
+/// Counts per frame, and memory.
+#[rustfmt::skip]
+fn counts<'a>() -> Vec<Figure<'a>> {
+    vec![
         Figure::new("cull_tests", "tests", "all frames", Show::Whole, |m| m.total(|f| Some(f.cull_tests)))
             .about("bounds tested against a frustum"),
         ratio("cull_tests_ratio", "tests", |f| Some(f.cull_tests)),
@@ -162,7 +183,13 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
             .about("texels of the scene, stored once for both eyes"),
         Figure::new("peak_memory_bytes", "memory", "MB", Show::Millions(0), |m| m.row.peak_memory_bytes)
             .about("peak memory of the capturing process"),
+    ]
+}
 
+/// Differences from the baseline's pictures.
+#[rustfmt::skip]
+fn image_error<'a>() -> Vec<Figure<'a>> {
+    vec![
         Figure::real("flip_mean", "FLIP", "", 5, |m| m.pictures.flip_mean)
             .about("mean FLIP inside the visible area of the lens"),
         Figure::real("flip_p99", "FLIP 99 %", "", 5, |m| m.pictures.flip_p99)
@@ -180,19 +207,36 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
             .about("temporal change of the picture minus that of the baseline, 0 to 1, along the baseline's motion"),
         Figure::real("identical_pct", "identical", "% of pictures", 1, |m| m.pictures.identical_pct)
             .about("pictures whose visible pixels equal the baseline's bit for bit"),
-    ]);
+    ]
+}
+
+/// Means of the techniques' own predictions.
+fn predictions<'a>(rows: &[&'a Measured<'a>]) -> Vec<Figure<'a>> {
     let mut predictions: Vec<&str> = Vec::new();
-    for (key, _) in rows.iter().flat_map(|m| &m.row.frames).flat_map(|f| &f.predicted) {
+    for (key, _) in rows
+        .iter()
+        .flat_map(|m| &m.row.frames)
+        .flat_map(|f| &f.predicted)
+    {
         if !predictions.contains(&key.as_str()) {
             predictions.push(key);
         }
     }
-    columns.extend(predictions.into_iter().map(str::to_owned).map(|key| {
-        let heading = (format!("predicted.{key}"), format!("predicted {}", key.replace('_', " ")));
+    let figures = predictions.into_iter().map(str::to_owned).map(|key| {
+        let heading = (
+            format!("predicted.{key}"),
+            format!("predicted {}", key.replace('_', " ")),
+        );
         Figure::real(heading.0, heading.1, "", 3, move |m| m.predicted(&key))
             .about("mean of the technique's own prediction")
-    }));
-    columns.extend([
+    });
+    figures.collect()
+}
+
+/// Cache figures in an order.
+#[rustfmt::skip]
+fn caches<'a>(order: Order) -> Vec<Figure<'a>> {
+    vec![
         Figure::new("footprints", "footprints", "", Show::Whole, move |m| Some(m.caches_in(order)?.footprints))
             .about("bilinear footprints of the trace"),
         Figure::real("l1_footprint_miss_pct", "L1 miss", "% of footprints", 2, move |m| Some(m.caches_in(order)?.l1_footprint_miss_pct)),
@@ -201,8 +245,24 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
             .about("line misses of the L2 times the line size, all frames of the trace"),
         Figure::real("external_mb_per_frame", "external", "MB/frame", 3, move |m| m.caches_in(order).map(CacheFigures::external_mb_per_frame))
             .about("external texture traffic"),
-    ]);
-    columns
+    ]
+}
+
+/// Every figure of these techniques. Stages and predictions have the names that the captures give them.
+/// `order` is the order of the cache figures.
+#[must_use]
+pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
+    let groups = [
+        identity(),
+        times(),
+        pacing(),
+        stages(rows),
+        counts(),
+        image_error(),
+        predictions(rows),
+        caches(order),
+    ];
+    groups.into_iter().flatten().collect()
 }
 
 /// A column of an order's saving with a technique.

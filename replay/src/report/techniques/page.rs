@@ -61,6 +61,40 @@ impl TechniquesReport<'_> {
     /// # Errors
     /// A plot that cannot be drawn.
     pub fn page(&self, pictures: &[Scene]) -> Result<String, PlotError> {
+        let mut sections = self.scene_sections(pictures)?;
+        let orders = self.order_table();
+        if !orders.rows.is_empty() {
+            sections.push(Section::new(
+                "Tile orders with and without each technique",
+                self.orders_section(&orders),
+            ));
+        }
+        let claims = self.claim_table();
+        if !claims.rows.is_empty() {
+            sections.push(Section::new(
+                "Published and measured savings",
+                html! {
+                    (claims.markup())
+                    p.note { "Device and scenes differ from those of the published figure. The image error of the technique is in the same row." }
+                },
+            ));
+        }
+        sections.push(Section::new(
+            "Machine of the caches",
+            html::folded(
+                "configuration (TOML)",
+                &toml::to_string(&self.config).unwrap_or_default(),
+            ),
+        ));
+        Ok(html::page(
+            "Parallax: techniques of stereo rendering",
+            &self.answer()?,
+            &sections,
+        ))
+    }
+
+    /// The sections of each scene.
+    fn scene_sections(&self, pictures: &[Scene]) -> Result<Vec<Section>, PlotError> {
         let mut sections = Vec::new();
         let table = self.table();
         for ((measures, manifest), scene) in self.scenes.iter().zip(&self.manifests).zip(pictures) {
@@ -118,30 +152,11 @@ impl TechniquesReport<'_> {
                 ));
             }
         }
-        let orders = self.order_table();
-        if !orders.rows.is_empty() {
-            sections.push(Section::new(
-                "Tile orders with and without each technique",
-                self.orders_section(&orders),
-            ));
-        }
-        let claims = self.claim_table();
-        if !claims.rows.is_empty() {
-            sections.push(Section::new(
-                "Published and measured savings",
-                html! {
-                    (claims.markup())
-                    p.note { "Device and scenes differ from those of the published figure. The image error of the technique is in the same row." }
-                },
-            ));
-        }
-        sections.push(Section::new(
-            "Machine of the caches",
-            html::folded(
-                "configuration (TOML)",
-                &toml::to_string(&self.config).unwrap_or_default(),
-            ),
-        ));
+        Ok(sections)
+    }
+
+    /// The top of the page: what was found, in sentences and a chart.
+    fn answer(&self) -> Result<Answer, PlotError> {
         let scenes: Vec<&str> = self.scenes.iter().map(|m| m.scene).collect();
         let software = self.manifests.iter().any(|m| m.software_driver);
         let about = html! {
@@ -173,16 +188,11 @@ impl TechniquesReport<'_> {
                     .to_owned(),
             );
         }
-        let answer = Answer {
+        Ok(Answer {
             sentences,
             chart,
             about,
-        };
-        Ok(html::page(
-            "Parallax: techniques of stereo rendering",
-            &answer,
-            &sections,
-        ))
+        })
     }
 
     /// The times of the stages, if the capture has them.
