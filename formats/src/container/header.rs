@@ -28,6 +28,14 @@ pub(super) struct Header {
     pub directory_crc32: u32,
 }
 
+/// What to do with a file that is not a trace.
+fn hint(magic: &[u8]) -> &'static str {
+    match magic.starts_with(b"glTF") {
+        true => ", which begins a scene; capture it first: tracegen raster SCENE -o FILE.textrace",
+        false => "",
+    }
+}
+
 impl Header {
     pub(super) fn new(kind: Kind) -> Self {
         Self {
@@ -65,7 +73,7 @@ impl Header {
             file,
             magic == MAGIC,
             || "the magic PLXTRACE".to_owned(),
-            format_args!("\"{}\"", magic.escape_ascii()),
+            format_args!("\"{}\"{}", magic.escape_ascii(), hint(magic)),
         )?;
         let at_version = rest;
         let (rest, version_major) = context("a major version", le_u16).parse(rest)?;

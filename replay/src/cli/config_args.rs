@@ -10,7 +10,7 @@ use crate::experiment::parse_config;
 use crate::memory::dram::DramPreset;
 use crate::preset::Preset;
 use crate::registry::most_similar;
-use crate::size::parse_bytes;
+use crate::size::{format_bytes, parse_bytes};
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use formats::texture::TexelFormat;
@@ -262,6 +262,14 @@ impl ConfigArgs {
         };
         self.apply(&mut config)?;
         config.validate()?;
+        let [l1, l2] = [config.level.l1, config.level.l2].map(|level| level.size_bytes);
+        if (self.l1.is_some() || self.l2.is_some()) && l2 < l1 {
+            shell::warn(&format!(
+                "the L2 ({}) is smaller than an L1 ({}); sizes without a unit are bytes",
+                format_bytes(l2),
+                format_bytes(l1)
+            ));
+        }
         Ok(config)
     }
 

@@ -10,6 +10,7 @@ use crate::paper::{self, z2};
 use crate::report::picture::EmbeddedPicture;
 use crate::report::z2::model::PaperReport;
 use crate::report::z2::page;
+use crate::size::parse_bytes;
 use anyhow::{Context, Result, bail, ensure};
 use rayon::prelude::*;
 use shell::{Output, Progress, is_stdout};
@@ -195,28 +196,29 @@ pub fn write_page(path: &Path, page: &str, json: &str, csv: &str) -> Result<()> 
     write_atomically(path, page.as_bytes())
 }
 
-/// Parses L1 and L2 sizes in KiB, such as `8/128,16/256`, to bytes.
+/// Parses L1 and L2 sizes, such as `8/128,16KiB/1MiB`, to bytes. Numbers without a unit are KiB.
 ///
 /// # Errors
 /// Any other syntax.
 pub fn parse_caches(text: &str) -> Result<Vec<(u64, u64)>> {
-    let kib = |number: &str| {
-        number
-            .trim()
-            .parse::<u64>()
-            .ok()
-            .filter(|n| (1..=1 << 20).contains(n))
+    let bytes = |size: &str| {
+        let size = size.trim();
+        let bytes = match size.parse::<u64>() {
+            Ok(kib) => kib.checked_mul(1 << 10),
+            Err(_) => parse_bytes(size).ok(),
+        };
+        bytes.filter(|bytes| (1..=1 << 30).contains(bytes))
     };
     text.split(',')
         .map(|pair| {
             let sizes = pair
                 .split_once('/')
-                .and_then(|(l1, l2)| Some((kib(l1)? << 10, kib(l2)? << 10)));
+                .and_then(|(l1, l2)| Some((bytes(l1)?, bytes(l2)?)));
             sizes.with_context(|| {
                 let usual = z2::CACHES_KIB
                     .map(|(l1, l2)| format!("{l1}/{l2}"))
                     .join(",");
-                format!("--caches: expected L1/L2 in KiB as in {usual}, found `{pair}`")
+                format!("--caches: expected L1/L2 as in {usual} (KiB) or 8KiB/1MiB, found `{pair}`")
             })
         })
         .collect()
@@ -227,14 +229,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cache_sizes_are_in_kib() {
+    fn cache_sizes_are_in_kib_or_have_a_unit() {
         assert_eq!(
             parse_caches("8/128, 16/256").unwrap(),
             [(8192, 131_072), (16_384, 262_144)]
         );
         assert_eq!(
+            parse_caches("4KiB/1MiB, 512B/8").unwrap(),
+            [(4096, 1 << 20), (512, 8192)]
+        );
+        assert_eq!(
             parse_caches("8-128").unwrap_err().to_string(),
-            "--caches: expected L1/L2 in KiB as in 8/128,16/128,8/256,16/256, found `8-128`"
+            "--caches: expected L1/L2 as in 8/128,16/128,8/256,16/256 (KiB) or 8KiB/1MiB, found `8-128`"
         );
     }
 }

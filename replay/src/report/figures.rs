@@ -76,7 +76,7 @@ pub fn figures<'a>() -> Vec<Figure<'a>> {
         Figure::real("frame_mb_per_frame", "all traffic", "MB/frame", 2, |r| Some(r.mb_per_frame(whole(r.result, ClientTraffic::bytes)?)))
             .about("traffic of all memory clients"),
         Figure::real("frame_energy_mj_per_frame", "all traffic", "mJ/frame", 3, |r| Some(r.per_frame(whole_mj(r.result)?)))
-            .about("DRAM energy of the traffic of all clients"),
+            .about("DRAM energy of the traffic of all clients, at a constant energy per byte"),
         Figure::real("texture_share_pct", "texture", "% of all", 1, |r| Some(100.0 * r.result.external_bytes as f64 / whole(r.result, ClientTraffic::bytes)? as f64))
             .about("texture reads as a share of the traffic of all clients"),
         Figure::real("frame_reduction_pct", "saved of all", "% of Morton", 1, |r| whole_saved_pct(r))

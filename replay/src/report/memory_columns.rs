@@ -35,6 +35,6 @@ pub fn columns() -> Vec<Column<'static, MemoryResult>> {
         Column::real("dram_latency_p99_ns", "latency, 99 %", "ns", 1, |r: &MemoryResult| Some(r.dram.as_ref()?.latency_p99_ns))
             .about("99th percentile of the time of a DRAM read"),
         Column::real("dram_energy_mj", "DRAM energy", "mJ", 4, |r: &MemoryResult| Some(r.dram.as_ref()?.energy_mj))
-            .about("energy of activates, reads, refreshes and standby"),
+            .about("energy of activates, reads, writes, refreshes and standby"),
     ]
 }

@@ -47,7 +47,9 @@ pub enum SessionError {
         ended: String,
     },
     /// A frame without a draw.
-    #[error("frame {0}: nothing was drawn")]
+    #[error(
+        "frame {0}: nothing was drawn; a page must start its session itself, because nothing clicks its buttons"
+    )]
     NotDrawn(u32),
     /// Records were lost.
     #[error(
