@@ -17,6 +17,7 @@ use raster::drivers::Opened;
 use raster::frame::Frame;
 use raster::lighting::Lighting;
 use shell::{Output, Progress, note};
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 use techniques::{Planner, Skips};
 use textures::TextureSet;
@@ -73,7 +74,8 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
         warn_of_multiview_defect(backend)?;
     }
     let ready = started.elapsed();
-    note_ready(&args.scene.scene, counts, [loaded, textured, ready]);
+    let scene = format!("{}, camera {}", args.scene.scene, setup.camera.name);
+    note_ready(&scene, counts, [loaded, textured, ready]);
     progress.stage("capturing", setup.frames.len() as u64, "frames");
     let mut output = TraceOutput::create(args, &tables, &setup.scene, &session.draws)?;
     let mut first_pictures: Option<Pictures> = None;
@@ -295,9 +297,14 @@ fn capture(
 /// Says which texels were prepared and which left out.
 fn texels_note(textures: &TextureSet, searched: Duration) -> String {
     let mib = |bytes: usize| bytes as f64 / f64::from(1 << 20);
+    let formats: BTreeSet<String> = (textures.textures.iter())
+        .map(|texture| format!("{:?}", texture.texture.format).to_uppercase())
+        .collect();
+    let formats: Vec<String> = formats.into_iter().collect();
     format!(
-        "{:.1} MiB of texels, {:.1} MiB left out ({} images and the finest levels of {} that no view samples, found in {:.2} s)",
+        "{:.1} MiB of texels in {}, {:.1} MiB left out ({} images and the finest levels of {} that no view samples, found in {:.2} s)",
         mib(textures.bytes()),
+        formats.join(", "),
         mib(textures.skipped_bytes()),
         textures.unseen(),
         textures.shortened(),

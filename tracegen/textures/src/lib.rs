@@ -151,14 +151,16 @@ impl TextureSet {
             by_image[index] = Some(made);
         }
         let mut set = Self::default();
+        let mut resampled = Vec::new();
         for made in by_image {
             set.of_image.push(made.as_ref().map(|_| set.textures.len()));
             if let Some(made) = made {
-                set.notes.extend(note(&scene.images[made.index]));
+                resampled.extend(resampling(&scene.images[made.index]));
                 set.cached += usize::from(made.cached);
                 set.textures.push(made.texture);
             }
         }
+        set.notes.extend(note(&resampled));
         Ok(set)
     }
 
@@ -402,15 +404,26 @@ fn prepare_source(
     Ok(made)
 }
 
+/// One note for all resampled images.
+fn note(resampled: &[String]) -> Option<String> {
+    let first = resampled.first()?;
+    Some(match resampled.len() {
+        1 => format!("image resampled to whole blocks of 4x4 texels: {first}"),
+        count => {
+            format!("{count} images resampled to whole blocks of 4x4 texels, the first one {first}")
+        }
+    })
+}
+
 /// What happens to an image that is not whole blocks.
-fn note(image: &Image) -> Option<String> {
+fn resampling(image: &Image) -> Option<String> {
     if image.stored.is_some() {
         return None;
     }
     let ([width, height], size) = (image.size, compress::whole_blocks(image.size));
     (size != image.size).then(|| {
         format!(
-            "image '{}' resampled from {width}x{height} to {}x{}, whole blocks of 4x4",
+            "'{}' from {width}x{height} to {}x{}",
             image.name, size[0], size[1]
         )
     })

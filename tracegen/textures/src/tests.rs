@@ -322,3 +322,18 @@ fn the_encoder_named_in_keys_makes_these_bytes() {
         "Key(53964728629684028245313165242808893593)"
     );
 }
+
+#[test]
+fn resampled_images_share_one_note() {
+    let mut scene = scene_of([30, 17], picture([30, 17]), AlphaMode::Opaque);
+    scene.images.push(Image::from_texels(
+        "other",
+        [30, 17],
+        ColorSpace::Linear,
+        picture([30, 17]),
+    ));
+    scene.materials[0].normal_texture = Some(TextureRef::new(1));
+    let set = TextureSet::compress(&scene).unwrap();
+    let expected = "2 images resampled to whole blocks of 4x4 texels, the first one 'test' from 30x17 to 32x20";
+    assert_eq!(set.notes, [expected]);
+}

@@ -213,10 +213,11 @@ impl Tab {
 
     /// Opens the page and waits until it makes no more requests.
     fn load(&mut self, page: &Page) -> Result<(), BrowserError> {
-        let url = match page.root {
-            Some(_) => format!("{}{}", serve::address(&page.address), page.query),
+        let address = match page.root {
+            Some(_) => serve::address(&page.address),
             None => page.address.clone(),
         };
+        let url = format!("{address}{}", page.query);
         let opened = self.call("Page.navigate", json!({ "url": url }))?;
         if let Some(reason) = opened["errorText"].as_str() {
             return Err(BrowserError::Page(format!("{}: {reason}", page.address)));
