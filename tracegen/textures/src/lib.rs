@@ -278,7 +278,7 @@ impl Member<'_> {
     }
 
     /// The texture for the compressed blocks of the image's file.
-    fn from_blocks(&self, held: blocks::Blocks) -> Result<Made, TextureError> {
+    fn with_stored_blocks(&self, held: blocks::Blocks) -> Result<Made, TextureError> {
         let expected = self.image.stored;
         let found = (held.format, held.levels.len() as u32);
         if expected.map(|stored| (stored.format, stored.levels)) == Some(found) {
@@ -382,7 +382,7 @@ fn prepare_source(
         let rgba = match data {
             ImageData::Rgba8(rgba) => rgba,
             ImageData::Blocks(held) => {
-                made.push(member.from_blocks(held)?);
+                made.push(member.with_stored_blocks(held)?);
                 continue;
             }
         };
