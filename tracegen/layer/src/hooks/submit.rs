@@ -20,7 +20,7 @@ pub(super) unsafe extern "system" fn queue_submit(
         let known = Device::of(queue);
         let buffers = buffers_of(slice(submits, count));
         let submit = || (known.next.queue_submit)(queue, count, submits, fence);
-        submit_and_record(&known, queue, &buffers, submit)
+        submit_and_read(&known, queue, &buffers, submit)
     }
 }
 
@@ -44,7 +44,7 @@ pub(super) unsafe extern "system" fn queue_submit2(
             .map(|info| info.command_buffer);
         let buffers: Vec<vk::CommandBuffer> = buffers.collect();
         let submit = || (known.next.queue_submit2)(queue, count, submits, fence);
-        submit_and_record(&known, queue, &buffers, submit)
+        submit_and_read(&known, queue, &buffers, submit)
     }
 }
 
@@ -52,7 +52,7 @@ pub(super) unsafe extern "system" fn queue_submit2(
 ///
 /// # Safety
 /// A valid submission.
-unsafe fn submit_and_record(
+unsafe fn submit_and_read(
     known: &Device,
     queue: vk::Queue,
     buffers: &[vk::CommandBuffer],

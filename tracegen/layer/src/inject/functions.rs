@@ -260,7 +260,7 @@ impl Functions {
     }
 
     /// Reserves space for records of `units` units: one per quad, or one per lane. Returns the index of the
-    /// first unit, and whether there was space.
+    /// first word, and whether there was space.
     fn reserve(
         &self,
         w: &mut Writer<'_>,
