@@ -417,7 +417,7 @@ pub fn pot(segments: usize, steps: usize) -> MeshBuilder {
     m
 }
 
-/// One arching leaf from the origin along +x, rising: `length` x `width`, texture shown once.
+/// One arching leaf from the origin along +x, rising: `length` x `width`, covered by the texture once.
 #[must_use]
 pub fn arching_leaf(
     length: f32,
