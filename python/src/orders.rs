@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use replay::config::{Order, RunConfig};
 use replay::order::curve::Curve;
 use replay::order::parts::Parts;
-use replay::order::{self, Interleave, Known, Listed, TileRef, View, Views, WorkItem, views};
+use replay::order::{self, Interleave, Listed, PlanInputs, TileRef, View, Views, WorkItem, views};
 use replay::stream::rendered;
 use std::path::{Path, PathBuf};
 
@@ -142,8 +142,8 @@ fn listed(
     passes: &[Pass],
     meta: &formats::textrace::TraceMeta,
 ) -> Result<Vec<Vec<Item>>, Failure> {
-    let known = Known::new(config, meta);
-    let phases = order::plan(config.order, &known, passes);
+    let inputs = PlanInputs::new(config, meta);
+    let phases = order::plan(config.order, &inputs, passes);
     let mut lists = Vec::new();
     for [left, right] in pairs_of(passes) {
         let place = |at: TileRef| {

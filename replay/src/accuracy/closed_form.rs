@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_form_is_more_accurate_at_the_rates_it_was_made_for() {
+    fn the_closed_form_is_more_accurate_at_the_rates_it_was_fitted_to() {
         let trace = small_trace();
         let choices = forms(&inputs(&trace)).unwrap();
         let [first, functional] = &choices[..] else {

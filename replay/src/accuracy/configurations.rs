@@ -188,7 +188,7 @@ mod tests {
     use crate::engine::replay;
 
     #[test]
-    fn a_variant_that_is_its_reference_has_no_error_and_another_one_has_its_own() {
+    fn the_reference_has_no_error_and_another_variant_has_one() {
         let trace = small_trace();
         let inputs = inputs(&trace);
         let same = measured(&inputs, timed, &[variant("itself", None, timed)]).unwrap();

@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_encoding_replays_alike_and_is_smaller_than_raw() {
+    fn every_encoding_has_the_same_replay_and_is_smaller_than_raw() {
         let trace = small_trace();
         let choices = encodings(&inputs(&trace)).unwrap();
         assert_eq!(choices.len(), Encoding::ALL.len() - 1);

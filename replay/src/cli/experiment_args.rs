@@ -121,7 +121,9 @@ impl ExperimentArgs {
             );
         }
         for subject in subjects {
-            if let Some(scene) = paper::asked(&self.stand_ins, &subject.label, &z2::SCENES)? {
+            if let Some(scene) =
+                paper::assigned_scene(&self.stand_ins, &subject.label, &z2::SCENES)?
+            {
                 subject.stand_in_for = scene;
             }
         }

@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn one_picture_of_several_files_is_refused() {
+    fn a_single_picture_for_several_files_is_refused() {
         let error = run(args(&["a", "b", "--image", "c.png"])).unwrap_err();
         assert_eq!(error.to_string(), "--image: expected one FILE, found 2");
     }

@@ -48,7 +48,7 @@ pub struct FootprintMisses {
 impl FootprintMisses {
     /// Counts the L2's answer to a request at `now`, and returns the line's arrival.
     #[inline(always)]
-    pub fn ask_l2(&mut self, answer: Answer, now: u64) -> u64 {
+    pub fn count_l2_answer(&mut self, answer: Answer, now: u64) -> u64 {
         match answer {
             Answer::Hit => now,
             Answer::Miss(arrival) => {

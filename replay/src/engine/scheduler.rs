@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_starts_without_room_and_everything_is_done() {
+    fn items_start_only_with_room_and_all_are_completed() {
         for threads in [1, 2, 8] {
             // Each takes more than half of the memory, so they run one at a time, even if one exceeds the limit.
             assert_eq!(most_taken(&[60; 40], 100, 1, threads), 60);

@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_without_a_distance_that_another_has_is_named() {
+    fn a_scene_without_a_distance_of_another_scene_is_reported() {
         for (traces, message) in [
             (
                 &[("atrium", 0.064), ("atrium", 0.5), ("jungle", 0.5)][..],

@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_count_that_does_not_fit_is_named() {
+    fn the_error_for_a_count_that_does_not_fit_names_it() {
         let error = bytes(&table(&[("a", None, 1 << 63, true)])).unwrap_err();
         assert_eq!(
             error.to_string(),

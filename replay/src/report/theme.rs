@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn spread_centres_a_cluster_on_its_wishes() {
+    fn spread_centres_a_cluster_on_its_wanted_positions() {
         assert_eq!(spread(&[50.0, 50.0], 10.0, 0.0, 100.0), [45.0, 55.0]);
     }
 
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn thousands_are_set_apart_only_in_long_numbers() {
+    fn thousands_are_separated_only_in_long_numbers() {
         assert_eq!(group_thousands("1234"), "1234");
         assert_eq!(
             group_thousands("-1234567.25"),

@@ -166,7 +166,7 @@ mod tests {
 
     /// With caches too small for any reuse, hit rates of 0 must give the counts of addresses.
     #[test]
-    fn rates_and_addresses_count_lines_and_visits_alike() {
+    fn rates_and_addresses_count_lines_and_visits_equally() {
         for (node_bytes, triangle_bytes) in [(64, 48), (256, 48), (80, 36), (32, 64), (100, 7)] {
             let bvh = BvhSummary {
                 bytes_per_node: node_bytes,

@@ -51,7 +51,7 @@ mod tests {
 
     /// A miss at a texel prefetches the lines of that texel halved, quartered, ... on the existing coarser levels.
     #[test]
-    fn a_miss_fetches_the_same_place_of_the_coarser_levels() {
+    fn a_miss_prefetches_the_same_place_in_coarser_levels() {
         let texture = Texture {
             name: "t".to_owned(),
             size: [64, 32],

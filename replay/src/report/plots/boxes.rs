@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_stand_apart_and_medians_are_written() {
+    fn rows_do_not_overlap_and_medians_are_printed() {
         let svg = chart([0.7, 0.8, 0.875, 0.9, 1.3]).svg().unwrap();
         assert!(text_at(&svg, "occlusion").1 - text_at(&svg, "conical").1 >= 15.0);
         assert!(svg.contains("\n0.88\n") && svg.contains("over the baseline"));

@@ -4,7 +4,7 @@ use super::model::{PaperReport, TraceInfo};
 use super::tables::busiest;
 use crate::config::Order;
 use crate::experiment::ResultRow;
-use crate::order::{Known, WorkItem};
+use crate::order::{PlanInputs, WorkItem};
 use crate::paper::z2;
 use crate::report::columns::{Column, pick};
 use crate::report::figures::{figure, number};
@@ -352,11 +352,11 @@ pub fn heat_map(info: &TraceInfo, detail: &ResultRow, measure: TileMeasure) -> O
 /// An order's path over both eyes' grids of `tiles`.
 #[must_use]
 pub fn path(order: Order, seed: u64, tiles: [u32; 2]) -> PathPlot {
-    let known = Known {
+    let inputs = PlanInputs {
         seed,
-        ..Known::default()
+        ..PlanInputs::default()
     };
-    let items = order.stereo(tiles, &known);
+    let items = order.stereo(tiles, &inputs);
     let mut stops = Vec::with_capacity(2 * tiles[0] as usize * tiles[1] as usize);
     for item in &items {
         for (i, tile) in item.tiles().enumerate() {
@@ -390,7 +390,7 @@ mod tests {
     use crate::report::plots::testing::text_at;
 
     #[test]
-    fn marks_are_the_papers_ratios_times_the_measured_morton_traffic() {
+    fn marks_equal_the_papers_ratios_times_the_measured_morton_traffic() {
         with_report(|report| {
             let chart = bandwidth(report, "crytek-sponza");
             let group = &chart.groups[3];

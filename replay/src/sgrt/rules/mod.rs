@@ -231,7 +231,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_rule_prints_as_it_is_written() {
+    fn a_rule_prints_in_the_form_that_it_is_parsed_from() {
         for text in [
             "none",
             "depth=0.05+object",
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn every_rule_stands_in_the_help_and_in_the_documentation() {
+    fn every_rule_is_in_the_help_and_in_the_documentation() {
         let page = include_str!("../../../../docs/models/reprojection-rules.md");
         for kind in RULES {
             assert!(help().contains(kind.title), "{}", kind.name);
