@@ -9,7 +9,7 @@ use crate::tmu::closed_form;
 
 const FIGURES: [Figure; 1] = [figure("tmu_util_pct", "TMU utilisation", "points")];
 
-pub const CLOSED_FORM: Study = Study {
+pub(super) const CLOSED_FORM: Study = Study {
     key: "closed-form",
     title: "Closed form instead of a cycle model",
     about: "Utilisation from the surface through the paper's table: at the rates of first look-ups, as the paper counts, and at the rates of a functional replay. Errors are against the first-miss model.",

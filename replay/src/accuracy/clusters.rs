@@ -127,7 +127,7 @@ pub fn counts(
 }
 
 /// Number of clusters: the sets of the smaller level.
-pub fn cluster_count(config: &RunConfig) -> Result<u32, ConfigError> {
+pub(super) fn cluster_count(config: &RunConfig) -> Result<u32, ConfigError> {
     let l1 = config.level.l1.sets("L1", config.line_bytes)?;
     let l2 = config.level.l2.sets("L2", config.line_bytes)?;
     Ok(l1.min(l2))

@@ -12,7 +12,7 @@ const FIGURES: [Figure; 2] = [
     figure("file_pct", "file", "% of raw"),
 ];
 
-pub const ENCODING: Study = Study {
+pub(super) const ENCODING: Study = Study {
     key: "encoding",
     title: "Encoding of the trace",
     about: "Tiles written again in each encoding and replayed in functional mode; every encoding is lossless. Errors are against raw records.",

@@ -45,7 +45,7 @@ pub fn interval(sample: &[f64], whole: usize) -> (f64, f64) {
 
 /// Quality of a kind of sample, percent.
 #[derive(Clone, Copy, Debug)]
-pub struct Judged {
+pub(super) struct Judged {
     /// Root mean square error.
     pub error_pct: f64,
     /// Mean error, which does not shrink with larger samples.

@@ -10,7 +10,7 @@ use std::ffi::OsStr;
 
 /// Parses an order. Help and completions show the table.
 #[derive(Clone, Debug)]
-pub struct OrderParser;
+pub(super) struct OrderParser;
 
 impl TypedValueParser for OrderParser {
     type Value = Order;
@@ -54,7 +54,7 @@ impl TypedValueParser for OrderParser {
 ///
 /// # Errors
 /// An unknown order.
-pub fn parse_orders(text: &str) -> Result<Vec<Order>> {
+pub(super) fn parse_orders(text: &str) -> Result<Vec<Order>> {
     if text == "all" {
         let others = Order::all().filter(|o| !z2::ORDERS.contains(o));
         return Ok(z2::ORDERS.into_iter().chain(others).collect());

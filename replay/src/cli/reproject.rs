@@ -203,7 +203,7 @@ fn check_outputs(args: &ReprojectArgs) -> anyhow::Result<bool> {
 }
 
 /// The parameters: the defaults, the preset's over them, the file's over both.
-pub fn read_config(
+pub(super) fn read_config(
     preset: Option<&'static Preset>,
     path: Option<&Path>,
 ) -> anyhow::Result<SgrtConfig> {

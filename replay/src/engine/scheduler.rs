@@ -29,7 +29,7 @@ pub enum Stage {
 /// Runs `work` for all items. `work` reports stages through the function it receives. The next item starts
 /// when all earlier items are loaded and `room` returns true, or when the last replays of all earlier items
 /// have started. Items load concurrently while their total weight is less than `enough`.
-pub fn run_within_memory<T: Send>(
+pub(super) fn run_within_memory<T: Send>(
     items: Vec<(usize, T)>,
     enough: usize,
     room: impl Fn() -> bool + Sync,

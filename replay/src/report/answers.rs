@@ -16,7 +16,7 @@ fn traffic(pct: f64) -> String {
 /// Orders against a baseline: names, and the percentage of the baseline's traffic that each saves. `over`
 /// says what the means are taken over.
 #[must_use]
-pub fn tile_orders(baseline: &str, over: &str, orders: &[(String, f64)]) -> Vec<String> {
+pub(super) fn tile_orders(baseline: &str, over: &str, orders: &[(String, f64)]) -> Vec<String> {
     let Some((worst, best)) = ends(orders, |o| o.1) else {
         return vec![format!(
             "Only {baseline} was replayed, so no order is compared with another."
@@ -152,7 +152,7 @@ pub fn misses(cache: &str, rows: &[Misses]) -> Option<String> {
 }
 
 /// An order of a study.
-pub struct Studied {
+pub(super) struct Studied {
     /// Name.
     pub name: String,
     /// Change of the bytes against the baseline, percent.
@@ -163,7 +163,7 @@ pub struct Studied {
 
 /// A study of orders and bounds against a baseline, over `rows` pairs of trace and caches.
 #[must_use]
-pub fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<String> {
+pub(super) fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<String> {
     let compare = |order: &Studied| match traffic(order.change_pct).as_str() {
         "as much" => format!("{} reads as much from memory as {baseline}", order.name),
         words => format!("{} reads {words} from memory than {baseline}", order.name),

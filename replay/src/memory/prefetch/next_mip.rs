@@ -6,7 +6,7 @@ use formats::layout::Layout;
 use std::sync::Arc;
 
 /// Fetches lines of this many coarser levels.
-pub struct NextMip {
+pub(super) struct NextMip {
     pub levels: u32,
     /// None if lines do not belong to textures.
     pub layout: Option<Arc<Layout>>,

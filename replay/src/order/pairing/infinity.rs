@@ -8,7 +8,7 @@ use crate::order::{PlanInputs, View};
 
 /// Pairs by direction, on the grid of a picture that faces straight ahead of the head.
 #[derive(Debug)]
-pub struct Infinity;
+pub(super) struct Infinity;
 
 impl Rule for Infinity {
     /// A right tile shares the cell of the left tile whose centre falls into it. Other tiles get the cell of

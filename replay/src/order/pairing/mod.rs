@@ -26,7 +26,7 @@ registry! { PairingRow:
 }
 
 /// A pairing by name.
-pub type Pairing = Named<PairingRow>;
+pub(super) type Pairing = Named<PairingRow>;
 
 /// A row of the table of pairings.
 #[derive(Debug)]

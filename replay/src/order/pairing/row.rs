@@ -14,7 +14,7 @@ pub struct Row {
 }
 
 /// Compares primitives.
-pub const PRIMITIVES: Row = Row {
+pub(super) const PRIMITIVES: Row = Row {
     shifts: |of| &of.primitive_shift,
 };
 

@@ -10,7 +10,7 @@ use plotters::style::text_anchor::HPos;
 
 /// A chart of boxes.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct BoxChart {
+pub(crate) struct BoxChart {
     /// Heading.
     pub title: String,
     /// Definition of whiskers, boxes and marks.
@@ -27,7 +27,7 @@ pub struct BoxChart {
 
 /// One distribution.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BoxRow {
+pub(crate) struct BoxRow {
     /// Name and colour.
     pub style: SeriesStyle,
     /// Lower whisker, lower quartile, median, upper quartile, upper whisker.

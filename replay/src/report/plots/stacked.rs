@@ -9,7 +9,7 @@ use plotters::style::text_anchor::HPos;
 
 /// A chart of stacked bars.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct StackedChart {
+pub(crate) struct StackedChart {
     /// Heading.
     pub title: String,
     /// What the bars show, with its unit.

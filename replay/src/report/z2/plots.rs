@@ -244,7 +244,7 @@ pub fn by_level(details: &[&ResultRow]) -> Vec<BarChart> {
 
 /// The textures or draws with the most external traffic.
 #[must_use]
-pub fn by_part(details: &[&ResultRow], most: usize) -> Vec<HBarChart> {
+pub(super) fn by_part(details: &[&ResultRow], most: usize) -> Vec<HBarChart> {
     let Some(first) = details.first() else {
         return Vec::new();
     };
@@ -277,7 +277,7 @@ pub fn by_part(details: &[&ResultRow], most: usize) -> Vec<HBarChart> {
 
 /// Quantities of a tile map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TileMeasure {
+pub(super) enum TileMeasure {
     /// Covered lanes per pixel.
     Overdraw,
     /// Footprints.
@@ -318,7 +318,11 @@ impl TileMeasure {
 
 /// Both eyes' tiles of one run; `None` if the run has no maps of both eyes.
 #[must_use]
-pub fn heat_map(info: &TraceInfo, detail: &ResultRow, measure: TileMeasure) -> Option<HeatMap> {
+pub(super) fn heat_map(
+    info: &TraceInfo,
+    detail: &ResultRow,
+    measure: TileMeasure,
+) -> Option<HeatMap> {
     let (title, value_label) = measure.titles();
     let panels: Vec<Panel> = info
         .eye_passes

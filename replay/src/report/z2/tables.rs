@@ -137,7 +137,7 @@ pub fn parts<'a>(
 /// Indices of the `most` parts with the most external traffic, or all parts in their own order if there are
 /// no more.
 #[must_use]
-pub fn busiest(parts: &[Part], most: usize) -> Vec<usize> {
+pub(crate) fn busiest(parts: &[Part], most: usize) -> Vec<usize> {
     let mut index: Vec<usize> = (0..parts.len()).collect();
     if parts.len() > most {
         index.sort_by_key(|&i| (std::cmp::Reverse(parts[i].l2.line_misses), i));

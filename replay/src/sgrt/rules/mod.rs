@@ -35,7 +35,7 @@ pub static RULES: [&RuleKind; 8] = [
 ];
 
 /// Creates the test of a frame from its arrivals and the rule's share.
-pub type MakeTest = for<'a> fn(&'a Frame, &'a Reprojection, f32) -> Box<dyn Test + 'a>;
+pub(super) type MakeTest = for<'a> fn(&'a Frame, &'a Reprojection, f32) -> Box<dyn Test + 'a>;
 
 /// A rule of the registry.
 pub struct RuleKind {
@@ -69,7 +69,7 @@ pub trait Test: Sync {
 }
 
 /// Default depth share of rules that take one.
-pub const DEFAULT_DEPTH_SHARE: f32 = 0.02;
+pub(super) const DEFAULT_DEPTH_SHARE: f32 = 0.02;
 
 /// The rules of error detection: a combination of [`RULES`], each at most once. The empty one
 /// reuses every arrival.

@@ -17,7 +17,7 @@ pub struct Absent {
 
 /// Requests of a thread so far, a limited number per trip.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Trips {
+pub(super) struct Trips {
     fetches: u32,
     full_trips: u32,
 }
