@@ -1,11 +1,10 @@
 //! Materials and the textures that they sample.
 //!
-//! Properties for the ray tracer, which traces mirror reflections and refractions but no glossy
-//! ones:
+//! For the ray tracer, which follows mirror reflections and refractions but no glossy ones:
 //! - `transmission` is KHR_materials_transmission's factor. Without it, a blended material without
-//! a base colour texture counts as glass that transmits `1 - alpha`.
+//!   a base colour texture counts as glass that transmits `1 - alpha`.
 //! - `mirror` is 0, because glTF has no such factor. The reflectance of a smooth metal follows from
-//! its metalness and roughness where it is hit.
+//!   its metalness and roughness where it is hit.
 //!
 //! KHR_materials_pbrSpecularGlossiness becomes base colour, specular colour and
 //! roughness = 1 - glossiness; the glossiness channel of its texture is not used.
