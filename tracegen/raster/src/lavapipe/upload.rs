@@ -71,7 +71,7 @@ impl SceneBuffers {
             .textures
             .iter()
             .map(|t| match t.blocks.as_slice() {
-                // Seen by no view, and so never sampled.
+                // No view can see it, so it is never sampled.
                 [] => Ok(absent.clone()),
                 _ => upload_texture(gpu, t),
             })
@@ -109,7 +109,7 @@ impl SceneBuffers {
 }
 
 impl SceneBuffers {
-    /// Writes the rows of moving draws, consecutive ones at once; returns the number of bytes.
+    /// Writes the rows of moving draws, consecutive ones together. Returns the number of bytes.
     pub fn pose(&self, gpu: &Gpu, draws: &DrawList) -> u64 {
         let mut bytes = 0;
         for run in draws.moving.chunk_by(|a, b| a + 1 == *b) {
@@ -144,7 +144,7 @@ fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, Raster
                 usage,
             })
     };
-    // A trailing partial triangle would be no primitive: leave it out of the index range.
+    // A trailing partial triangle is not a primitive and is left out of the index range.
     Ok(MeshBuffers {
         vertices: buffer(bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
         colors: (!colors.is_empty())
@@ -158,7 +158,7 @@ fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, Raster
     })
 }
 
-/// Stands for the textures that a material lacks; the pipelines never sample it.
+/// Replaces the textures that a material lacks. The pipelines never sample it.
 fn white() -> CompressedTexture {
     CompressedTexture {
         texture: Texture {
@@ -203,8 +203,8 @@ fn upload_texture(
             limit: limit.into(),
         });
     }
-    // Without the levels that are never sampled, the coarser ones are sampled alike: see the crate
-    // textures.
+    // Leaving out levels that are never sampled does not change the sampling of coarser ones. See
+    // the crate textures.
     let [width, height] = texture.level_size(compressed.first_level);
     gpu.checked("uploading a texture", || {
         gpu.device
@@ -287,7 +287,7 @@ impl<'a> MaterialViews<'a> {
     }
 }
 
-/// The samplers made so far, one a state.
+/// The samplers created so far, one per state.
 #[derive(Default)]
 struct Samplers {
     made: Vec<(Sampler, wgpu::Sampler)>,
@@ -326,7 +326,7 @@ fn sampler_descriptor(state: &Sampler) -> wgpu::SamplerDescriptor<'static> {
             MipFilter::None | MipFilter::Nearest => wgpu::MipmapFilterMode::Nearest,
             MipFilter::Linear => wgpu::MipmapFilterMode::Linear,
         },
-        // Vulkan has no sampler without levels; a quarter of a level above 0 never reaches 1.
+        // Vulkan has no sampler without levels, but a limit of 0.25 never selects level 1.
         lod_max_clamp: if state.mip == MipFilter::None {
             0.25
         } else {

@@ -1,7 +1,7 @@
 //! Animations that move a camera: the channels of its node and of the nodes above it.
 //!
-//! Channels of all animations count, since exporters write one animation an object; a property
-//! that two of them move is refused, because a file does not say which one plays.
+//! Channels of all animations are combined, because exporters write one animation per object. A
+//! property with two channels is an error, because the file does not say which animation plays.
 
 use super::accessors::{Buffers, at};
 use super::{Parsed, nodes, parse, read_buffers};
@@ -19,8 +19,8 @@ use std::path::Path;
 /// The curves of one file by node.
 type Curves = HashMap<usize, Vec<(Channel, Curve)>>;
 
-/// Reads the path of an animated camera: the one of that name (its node's or its own, with or
-/// without `cam_`), or else the first one that an animation moves. Also tells what is odd.
+/// Reads the path of an animated camera: the one with that name (its node's or its own, with or
+/// without `cam_`), or else the first one that an animation moves. Also returns warnings.
 pub(crate) fn camera_track(
     path: &Path,
     camera: Option<&str>,
@@ -28,7 +28,7 @@ pub(crate) fn camera_track(
     let origin = Origin::new(path);
     let bytes = read_file(path, "path", u64::MAX)?;
     let mut warnings = Warnings::default();
-    // What the loader of scenes warns of concerns the scene, not the path.
+    // The scene loader's warnings do not concern the path.
     let Parsed {
         document,
         transforms,
@@ -122,7 +122,7 @@ fn parents(root: &Root, origin: &Origin) -> Result<Vec<Option<usize>>, SceneErro
     let mut parents = vec![None; root.nodes.len()];
     for (parent, node) in root.nodes.iter().enumerate() {
         for child in node.children.iter().flatten().map(at) {
-            // The indices have been checked.
+            // The indices were checked on loading.
             if parents[child].replace(parent).is_some() {
                 return Err(origin.invalid(
                     format!("nodes[{child}]"),
@@ -151,22 +151,22 @@ fn moved(
         let children = root.nodes[node].children.iter().flatten();
         stack.extend(children.map(|child| (at(child), here)));
     }
-    // With one parent each, what no root reaches goes round in circles.
+    // Every node has one parent, so a node that no root reaches is part of a cycle.
     let reached = |(node, moved): (usize, Option<bool>)| {
         moved.ok_or_else(|| origin.invalid(format!("nodes[{node}]"), "a tree", "a cycle"))
     };
     moved.into_iter().enumerate().map(reached).collect()
 }
 
-/// A node and those above it.
+/// A node and its ancestors.
 fn chain(parents: &[Option<usize>], node: usize) -> impl Iterator<Item = usize> {
     std::iter::successors(Some(node), |&node| parents[node])
 }
 
-/// What moves each node: the property, the channel's place in the file and its sampler.
+/// The animated properties of each node, with the channel's place in the file and its sampler.
 type Targets<'a> = HashMap<usize, Vec<(Channel, String, &'a Sampler)>>;
 
-/// Finds what moves each node.
+/// Finds the animated properties of each node.
 fn targets<'a>(root: &'a Root, origin: &Origin) -> Result<Targets<'a>, SceneError> {
     let mut targets = Targets::new();
     for (a, animation) in root.animations.iter().enumerate() {
@@ -179,7 +179,7 @@ fn targets<'a>(root: &'a Root, origin: &Origin) -> Result<Targets<'a>, SceneErro
                 Checked::Valid(Property::MorphTargetWeights) | Checked::Invalid => continue,
             };
             let node = at(&channel.target.node);
-            // The crate checks a channel's sampler and leaves its target unchecked.
+            // The crate checks a channel's sampler but not its target.
             let (Some(sampler), true) = (
                 animation.samplers.get(at(&channel.sampler)),
                 node < root.nodes.len(),
@@ -264,7 +264,7 @@ fn curve(
             format!("{} at {key}", values[key]),
         );
     }
-    // The values of a cubic curve stand between their tangents.
+    // Each value of a cubic curve is stored between its two tangents.
     let keys = || values.iter().skip(a_key / 2).step_by(a_key);
     let unit = |q: &&DVec4| (q.length() - 1.0).abs() <= 1e-2;
     if channel == Channel::Rotation && keys().count() != keys().filter(unit).count() {

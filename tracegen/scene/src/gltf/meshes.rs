@@ -1,4 +1,4 @@
-//! Primitives to meshes: attributes, indices, and what the file left out.
+//! Primitives to meshes: attributes, indices, and computed values for missing attributes.
 
 use super::accessors::Buffers;
 use super::draco::{self, Compressed};
@@ -57,12 +57,12 @@ struct Reader<'a> {
     variant: Option<u32>,
     /// The primitive's compressed geometry.
     draco: Option<Compressed>,
-    /// For errors.
+    /// The primitive, named in errors.
     place: String,
 }
 
 impl Reader<'_> {
-    /// `None` for what holds no triangles.
+    /// `None` for a primitive without triangles.
     fn read(
         &self,
         materials: &mut Table<'_>,
@@ -134,7 +134,7 @@ impl Reader<'_> {
             material,
             ..Mesh::default()
         };
-        // What is not there, or empty, is made.
+        // Missing or empty attributes are computed.
         let given = [
             ("NORMAL", mesh.normals.len()),
             ("TANGENT", mesh.tangents.len()),
@@ -173,7 +173,7 @@ impl Reader<'_> {
             .transpose()
     }
 
-    /// Linear colours, white where they are no numbers; empty without COLOR_0.
+    /// Linear colours, white where they are not numbers. Empty without COLOR_0.
     fn colors(&self) -> Result<Vec<Vec4>, SceneError> {
         let semantic = Semantic::Colors(0);
         let expected = "colours: Vec3 or Vec4 of F32 or normalized U8 or U16";
@@ -209,7 +209,7 @@ impl Reader<'_> {
         ))
     }
 
-    /// An attribute must have one value a position.
+    /// Checks that an attribute has one value per position.
     fn check_length(&self, what: &str, found: usize, count: usize) -> Result<(), SceneError> {
         if found == count {
             return Ok(());
@@ -255,7 +255,7 @@ impl Reader<'_> {
         Ok(Some(uv))
     }
 
-    /// Three indices a triangle, all inside the vertices.
+    /// Three indices per triangle, all within the vertices.
     fn indices(
         &self,
         mode: Mode,
@@ -280,7 +280,7 @@ impl Reader<'_> {
             ));
         }
         Ok(match mode {
-            // Compressed geometry is a list of triangles whatever the primitive's mode.
+            // Compressed geometry is always a triangle list, whatever the primitive's mode.
             _ if self.draco.is_some() => indices,
             Mode::TriangleStrip => triangulate_strip(&indices),
             Mode::TriangleFan => triangulate_fan(&indices),
@@ -302,8 +302,8 @@ impl Reader<'_> {
     }
 }
 
-/// Drops vertices that no triangle uses, where that is at least half of them: files that share
-/// one vertex buffer among many primitives would otherwise be held once a primitive.
+/// Drops unused vertices if they are at least half of all. Otherwise files whose primitives share
+/// one vertex buffer would store it once per primitive.
 fn compact(mesh: &mut Mesh, indices: &mut [u32]) {
     let count = mesh.positions.len();
     let mut used = vec![false; count];
@@ -336,7 +336,7 @@ fn compact(mesh: &mut Mesh, indices: &mut [u32]) {
     keep(&mut mesh.colors, &used);
 }
 
-/// Fills normals and tangents, and replaces those that are not unit vectors.
+/// Computes missing normals and tangents, and replaces those that are not unit vectors.
 fn complete(mesh: &mut Mesh, normal_map_uv: Option<u32>) {
     if mesh.normals.is_empty() {
         mesh.normals = vertex_normals(&mesh.positions, &mesh.indices);
@@ -358,7 +358,7 @@ fn complete(mesh: &mut Mesh, normal_map_uv: Option<u32>) {
                 vertex_tangents(&mesh.positions, &mesh.normals, &mesh.uv1, &mesh.indices)
             }
             Some(_) => vertex_tangents(&mesh.positions, &mesh.normals, &mesh.uv0, &mesh.indices),
-            // Nothing reads them: any perpendicular will do.
+            // No texture reads these tangents, so any perpendicular will do.
             None => (mesh.normals.iter())
                 .map(|n| n.any_orthonormal_vector().extend(1.0))
                 .collect(),
@@ -366,7 +366,7 @@ fn complete(mesh: &mut Mesh, normal_map_uv: Option<u32>) {
     }
 }
 
-/// Long enough to have a direction, and not too long to be measured.
+/// True if a vector is long enough to have a direction and short enough to be measured.
 fn is_direction(v: Vec3) -> bool {
     let length_squared = v.length_squared();
     length_squared > 1e-12 && length_squared.is_finite()

@@ -1,4 +1,4 @@
-//! The node graph: where meshes, cameras and lights are in the world.
+//! The node graph: transforms of meshes, cameras and lights to the world.
 
 use super::accessors::Buffers;
 use super::transforms::Local;
@@ -14,11 +14,11 @@ use gltf::json::validation::Checked;
 /// Far plane of a camera whose projection is infinite, metres.
 const DEFAULT_FAR_M: f32 = 1000.0;
 
-/// From here on a step of single precision is a fair part of a millimetre: of a camera's direction
-/// if its target is a metre ahead.
+/// Distance from zero beyond which one step of single precision, relative to a target one metre
+/// ahead, visibly changes a camera's direction.
 const FAR_OUT: f32 = 1024.0;
 
-/// What the nodes place, in depth-first order, with transforms to the world.
+/// The placed nodes in depth-first order, with transforms to the world.
 #[derive(Default)]
 pub(super) struct Placed {
     /// Nodes with a mesh.
@@ -42,7 +42,7 @@ pub(super) fn walk(
     };
     let mut placed = Placed::default();
     let mut seen = vec![false; root.nodes.len()];
-    // An explicit stack: a long chain of nodes must not overflow ours.
+    // An explicit stack, so that a long chain of nodes does not overflow the call stack.
     let mut stack: Vec<(usize, DAffine3)> = roots
         .into_iter()
         .rev()
@@ -85,7 +85,7 @@ pub(super) fn walk(
     Ok(placed)
 }
 
-/// Where the mesh of a node stands: once, or once per instance (EXT_mesh_gpu_instancing).
+/// The transforms of a node's mesh: one, or one per instance (EXT_mesh_gpu_instancing).
 pub(super) fn mesh_transforms(
     index: usize,
     local: &Local,
@@ -102,7 +102,7 @@ pub(super) fn mesh_transforms(
                 .collect()
         }
     };
-    // Neither 0 nor so small or large that normals could not be transformed.
+    // The determinant must be neither 0 nor too small or large to transform normals.
     let has_scale = |t: &DAffine3| t.as_affine3a().matrix3.determinant().is_normal();
     transforms.retain(|transform| {
         let keeps = has_scale(transform);
@@ -134,8 +134,8 @@ pub(super) fn camera_name(node: &Node, camera: &gltf::json::Camera, index: usize
         .unwrap_or_else(|| format!("camera-{index}"))
 }
 
-/// A camera node looks along its -z; the target is one metre ahead, or further for an eye so far
-/// out that a metre has few steps there.
+/// A camera node looks along its -z. The target is one metre ahead, or further for an eye so far
+/// from zero that single precision has few steps in a metre.
 pub(super) fn camera(
     root: &Root,
     index: usize,
@@ -182,7 +182,7 @@ pub(super) fn camera(
     })
 }
 
-/// Punctual lights with their photometric intensity as it stands; a spot light lights all round.
+/// Punctual lights with unchanged photometric intensity. A spot light becomes a point light.
 pub(super) fn light(
     root: &Root,
     index: usize,

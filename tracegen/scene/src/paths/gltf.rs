@@ -1,4 +1,4 @@
-//! A camera that a glTF file's animation moves.
+//! A camera animated by a glTF file.
 
 use super::keys::bracket;
 use crate::SceneError;
@@ -6,14 +6,14 @@ use crate::files::Origin;
 use glam::{DAffine3, DMat3, DQuat, DVec3, DVec4};
 use std::path::{Path, PathBuf};
 
-/// How values between keys come about.
+/// Interpolation between keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Interpolation {
     /// Linear, rotations along the shorter arc.
     Linear,
-    /// The key before.
+    /// The value of the previous key.
     Step,
-    /// Hermite splines; each key has a tangent before, a value and a tangent after.
+    /// Hermite splines. Each key has an incoming tangent, a value and an outgoing tangent.
     Cubic,
 }
 
@@ -23,7 +23,7 @@ pub(crate) struct Curve {
     pub interpolation: Interpolation,
     /// Seconds, ascending; at least one.
     pub times_s: Vec<f64>,
-    /// One a key, three with [`Interpolation::Cubic`].
+    /// One per key, or three with [`Interpolation::Cubic`].
     pub values: Vec<DVec4>,
 }
 
@@ -35,12 +35,12 @@ pub(crate) enum Channel {
     Scale,
 }
 
-/// A node on the way from the root to the camera.
+/// A node on the path from the root to the camera.
 #[derive(Clone, Debug)]
 pub struct Joint {
-    /// Its transform where nothing moves it.
+    /// Its transform without animation.
     pub(crate) rest: DAffine3,
-    /// Translation, rotation and scale where nothing moves them.
+    /// Translation, rotation and scale without animation.
     pub(crate) parts: (DVec3, DQuat, DVec3),
     pub(crate) curves: Vec<(Channel, Curve)>,
 }
@@ -50,7 +50,7 @@ pub struct Joint {
 pub struct CameraTrack {
     pub(crate) file: PathBuf,
     pub(crate) camera: String,
-    /// What poses are relative to.
+    /// The point that poses are relative to.
     pub(crate) origin: DVec3,
     /// From the root down to the camera's node.
     pub(crate) joints: Vec<Joint>,
@@ -108,7 +108,7 @@ impl Joint {
 }
 
 impl CameraTrack {
-    /// The file it came from.
+    /// The file of the track.
     #[must_use]
     pub fn file(&self) -> &Path {
         &self.file
@@ -123,7 +123,7 @@ impl CameraTrack {
     /// The camera's pose `time_s` after the first key, without scale.
     ///
     /// # Errors
-    /// A camera that looks nowhere at that time, as one that is scaled to nothing.
+    /// The camera has no viewing direction at that time, for example because its scale is zero.
     pub fn pose(&self, time_s: f64) -> Result<DAffine3, SceneError> {
         let time_s = self.span_s[0] + time_s;
         let world = (self.joints.iter()).fold(DAffine3::IDENTITY, |parent, joint| {
