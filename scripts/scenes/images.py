@@ -49,6 +49,12 @@ class Images:
         image.save(path, **options)
         return f"textures/{path.name}"
 
+    def once(self, name, make, **options):
+        """The image that `make` returns, made and saved the first time that its name is asked for."""
+        if name not in self.made:
+            self.made[name] = self.save(make(), name, **options)
+        return self.made[name]
+
     def free(self, name):
         """A path of that name; with a number before it if another folder's image has the name already."""
         path, number = self.folder / name, 0
