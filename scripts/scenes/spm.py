@@ -5,6 +5,9 @@ buffers. A vertex is position, [normal], [colour], [UV, [second UV], [tangent]],
 """
 
 import struct
+from ctypes import c_float
+from functools import cache
+from math import sqrt
 from typing import NamedTuple
 
 ANIMATED = 1
@@ -41,11 +44,16 @@ class Reader:
         return self.take(f"{length}s").decode() if (length := self.take("B")) else ""
 
 
+def single(value):
+    return c_float(value).value
+
+
+@cache
 def unpack_normal(packed):
-    """Three signed 10-bit components; z is negated."""
+    """Three signed 10-bit components; z is negated. In single precision, as the scenes of the results have it."""
     parts = [(packed >> shift) & 1023 for shift in (0, 10, 20)]
-    x, y, z = ((part - 1024 if part > 511 else part) / 511.0 for part in parts)
-    length = (x * x + y * y + z * z) ** 0.5 or 1.0
+    x, y, z = (single((part - 1024 if part > 511 else part) / 511.0) for part in parts)
+    length = single(sqrt(single(single(single(x * x) + single(y * y)) + single(z * z)))) or 1.0
     return x / length, y / length, -z / length
 
 
