@@ -1,8 +1,9 @@
-"""Makes the real scenes of the results (docs/use/real-scenes.md): `make.py FOLDER [SCENE...]`.
+"""Makes the real scenes of the results (docs/use/real-scenes.md), a line each.
 
-One line a scene. Exit code 0, also if scenes are skipped; 2 if a file is not the one of sources.csv.
+Exit code 0, also if scenes are skipped; 2 if a file is not the one of sources.csv.
 """
 
+import argparse
 import csv
 import shutil
 import sys
@@ -74,27 +75,32 @@ def make(row, out, work):
     except ModuleNotFoundError as error:
         return f"skipped: {scene}: the Python package {error.name} is absent (Debian: python3-pil)"
     addresses = [source["address"] for source in table("sources.csv") if source["source"] == row["source"]]
-    (part / "SOURCE.txt").write_text("\n".join(["From:", *addresses, f"Licence: {row['licence']}", ""]))
+    lines = ["From:", *addresses, f"Licence: {row['licence']}", "Changed: converted to glTF 2.0 by scripts/scenes of Parallax"]
+    (part / "SOURCE.txt").write_text("\n".join([*lines, ""]))
     part.rename(out / scene)
     return f"made: {out / scene / row['file']}.gltf"
 
 
-def main(out, *scenes):
-    out = Path(out)
-    out.mkdir(parents=True, exist_ok=True)
+def main():
+    parser = argparse.ArgumentParser(prog="scripts/scenes/make.py", description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("scene", nargs="*", help="all by default")
+    wanted = parser.parse_args()
     rows = table("scenes.csv")
     names = [row["scene"] for row in rows]
-    if unknown := set(scenes) - set(names):
-        raise ValueError(f"expected some of: {', '.join(names)}; found '{unknown.pop()}'")
-    with tempfile.TemporaryDirectory(dir=out) as work:
+    for scene in wanted.scene:
+        if scene not in names:
+            raise ValueError(f"expected some of: {', '.join(names)}; found '{scene}'")
+    wanted.folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=wanted.folder) as work:
         for row in rows:
-            if not scenes or row["scene"] in scenes:
-                print(make(row, out, Path(work)), flush=True)
+            if not wanted.scene or row["scene"] in wanted.scene:
+                print(make(row, wanted.folder, Path(work)), flush=True)
 
 
 if __name__ == "__main__":
     try:
-        main(*sys.argv[1:])
+        main()
     except (download.WrongFile, ValueError, OSError) as error:
         print(f"scripts/scenes/make.py: {error}", file=sys.stderr)
         sys.exit(2)
