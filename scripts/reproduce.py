@@ -26,10 +26,10 @@ def differs(old, new, tolerance):
 
 
 def matched(old_rows, rows):
-    """Pairs of rows. Rows of absent scenes are left out, then the first two columns tell which row is which."""
+    """Pairs of rows. Where rows of absent scenes are left out, the first column tells which row is which."""
     if len(rows) == len(old_rows):
         return list(zip(old_rows, rows))
-    keys = [[tuple(row[:2]) for row in table] for table in (old_rows, rows)]
+    keys = [[row[0] for row in table] for table in (old_rows, rows)]
     blocks = SequenceMatcher(None, *keys, autojunk=False).get_matching_blocks()
     return [(old_rows[block.a + i], rows[block.b + i]) for block in blocks for i in range(block.size)]
 
