@@ -5,6 +5,7 @@ import hashlib
 import urllib.request
 from pathlib import Path
 
+SOURCES = Path(__file__).with_name("sources.csv")
 CHUNK = 1 << 20
 TIMEOUT_S = 30
 
@@ -34,7 +35,7 @@ def copy(address, path):
         raise Unreachable(f"{address}: {getattr(error, 'reason', error)}") from error
 
 
-def source(name, folder, table=Path(__file__).with_name("sources.csv")):
+def source(name, folder, table=SOURCES):
     """The folder with the files of a source. A file that is there already is only checked."""
     folder = folder / name
     folder.mkdir(parents=True, exist_ok=True)
