@@ -1,17 +1,21 @@
 """Measures captures of unmodified programs: `apps.py BIN OUT TABLE.csv`, called by apps.sh.
 
-For each program: draws whose records equal the driver's occlusion query, times of frames with and without the layer (in
-turns, medians), and what the Z2 orders save against Morton order in the trace.
+For each program: draws whose records equal the driver's occlusion query, whether pictures are the same with and without
+the layer, times of frames with and without the layer (in turns, medians), peak memory, and what the Z2 orders save against
+Morton order in the trace.
 """
 
 import csv
 import json
 import os
+import hashlib
 import platform
 import re
+import shutil
 import statistics
 import subprocess
 import sys
+import tempfile
 
 TURNS = int(os.environ.get("TURNS", "3"))
 FIRST, COUNT = 10, 6
@@ -28,18 +32,36 @@ PAGES = [
     ("Babylon.js VR camera, lens pass", "babylon.html", "?mode=lens", []),
 ]
 ORDERS = ["morton", "z2-lrta", "z2-sta"]
+# A game of OpenGL in anaglyph stereo. `apitrace` keeps its calls, so that every replay renders the same frames.
+GAME = "OpenArena (OpenGL, apitrace)"
+GAME_PROGRAM = "/usr/games/openarena"
+GAME_SETTINGS = (
+    "+set r_fullscreen 0 +set r_mode -1 +set r_customwidth 640 +set r_customheight 480 +set s_initsound 0 "
+    "+set r_anaglyphMode 1 +set com_maxfps 30 +set timedemo 1 +map oa_dm1 +wait 150 +quit"
+).split()
+ZINK = {"GALLIUM_DRIVER": "zink", "MESA_LOADER_DRIVER_OVERRIDE": "zink", "LIBGL_ALWAYS_SOFTWARE": "1"}
 COLUMNS = [
     "program", "eyes by", "pixels per eye", "draws", "draws equal to their query", "draws that differ", "draws not compared",
     "fragments", "plain ms per frame", "with the layer, not recorded", "recorded", "recorded over plain",
-    "not recorded over plain", "texture MB, Morton", "Z2 LRTA saves %", "Z2 STA saves %", "left out",
+    "not recorded over plain", "pictures", "plain peak MB", "recorded peak MB", "texture MB, Morton", "Z2 LRTA saves %",
+    "Z2 STA saves %", "left out",
 ]
 
 
-def run(command, allowed=(0,)):
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode not in allowed:
-        sys.exit(f"{' '.join(command)}: exit code {done.returncode}\n{done.stderr}")
-    return done
+def run(command, allowed=(0,), environment=None):
+    """Output, standard error, and the peak memory in MB of the largest process."""
+    streams = [tempfile.TemporaryFile(mode="w+") for _ in range(2)]
+    started = subprocess.Popen(command, stdout=streams[0], stderr=streams[1], env={**os.environ, **(environment or {})})
+    _, status, usage = os.wait4(started.pid, 0)
+    started.returncode = os.waitstatus_to_exitcode(status)
+    texts = []
+    for stream in streams:
+        stream.seek(0)
+        texts.append(stream.read())
+        stream.close()
+    if started.returncode not in allowed:
+        sys.exit(f"{' '.join(command)}: exit code {started.returncode}\n{texts[1]}")
+    return texts[0], texts[1], usage.ru_maxrss / 1e3
 
 
 def found(pattern, text):
@@ -49,29 +71,97 @@ def found(pattern, text):
     return match.groups()
 
 
-def page_times(options):
+def note_times(text):
     """Milliseconds of a frame before the recorded ones, and of one of these."""
-    text = run([f"{BIN}/tracegen", "page", *options]).stderr
-    before, captured = found(r"milliseconds per frame: ([\d.]+) before, ([\d.]+) captured", text)
-    return float(before), float(captured)
+    return [float(time) for time in found(r"milliseconds per frame: ([\d.]+) before, ([\d.]+) captured", text)]
 
 
-def measure_page(page, query, more):
-    base = [f"{SITE}/{page}", "--query", query, *more]
-    window = ["--frames", f"{FIRST}..{FIRST + COUNT}", "-o", f"{OUT}/timed.textrace"]
-    plain, idle, recorded = [], [], []
+def measure(plain_frame, capture):
+    """Medians over turns: ms of a plain frame, of one with the layer, of a recorded one; peak MB plain and recorded.
+
+    `plain_frame` returns milliseconds and peak memory, `capture` what `run` does.
+    """
+    turns = []
     for _ in range(TURNS):
-        plain.append(page_times([*base, *window, "--plain"])[1])
-        before, captured = page_times([*base, *window])
-        idle.append(before)
-        recorded.append(captured)
-    return [statistics.median(times) for times in (plain, idle, recorded)]
+        plain, plain_peak = plain_frame()
+        _, said, peak = capture()
+        turns.append([plain, *note_times(said), plain_peak, peak])
+    return [statistics.median(column) for column in zip(*turns)]
 
 
-def describe(name, options, times):
-    trace = f"{OUT}/{re.sub('[^a-z0-9]+', '-', name.lower())}.textrace"
-    # Exit code 1 where a draw differs, which the table then tells.
-    said = run([f"{BIN}/tracegen", "page", *options, "--check", "-o", trace], allowed=(0, 1)).stderr
+def digest(path):
+    with open(path, "rb") as file:
+        return hashlib.sha256(file.read()).hexdigest()
+
+
+def describe_page(name, page, query, more):
+    base = [f"{BIN}/tracegen", "page", f"{SITE}/{page}", "--query", query, *more]
+    window = ["--frames", f"{FIRST}..{FIRST + COUNT}", "-o", f"{OUT}/timed.textrace"]
+
+    def plain_frame():
+        _, said, peak = run([*base, *window, "--plain"])
+        return note_times(said)[1], peak
+
+    measured = measure(plain_frame, lambda: run([*base, *window]))
+    plain = []
+    for number in range(2):
+        picture = f"{OUT}/plain-{number}.png"
+        run([*base, "--plain", "--image", picture, "-o", f"{OUT}/timed.textrace"])
+        plain.append(digest(picture))
+        os.remove(picture)
+    trace, picture = trace_of(name), f"{OUT}/captured.png"
+    # Exit code 1 if a draw differs, which the table then shows.
+    _, said, _ = run([*base, "--check", "--image", picture, "-o", trace], allowed=(0, 1))
+    same = "equal" if digest(picture) in plain else "different"
+    pictures = same if plain[0] == plain[1] else f"{same}; two plain runs differ"
+    return row(name, trace, said, measured, pictures)
+
+
+def frame_times(text):
+    """Milliseconds between the ends of a replay's frames, from glretrace's profile."""
+    ends = [int(end) / 1e6 for end in re.findall(r"^rendering_finished (\d+)", text, re.M)]
+    return [b - a for a, b in zip(ends, ends[1:])]
+
+
+def describe_game():
+    calls = f"{OUT}/openarena.trace"
+    screen = ["xvfb-run", "-a"]
+    missing = [program for program in ("xvfb-run", "apitrace", GAME_PROGRAM) if not shutil.which(program)]
+    if missing:
+        print(f"SKIPPED: {GAME}: {', '.join(missing)} is absent", file=sys.stderr)
+        return None
+    if not os.path.exists(calls):
+        run([*screen, "apitrace", "trace", "-o", calls + ".new", GAME_PROGRAM, *GAME_SETTINGS])
+        os.replace(calls + ".new", calls)
+    listed, _, _ = run(["apitrace", "dump", "--calls=frame", "--color=never", calls])
+    frames = len(re.findall("SwapBuffers", listed))
+    first = frames - 2 * COUNT
+    replay = ["glretrace", calls]
+    base = [*screen, f"{BIN}/tracegen", "app"]
+
+    def plain_frame():
+        profile, _, peak = run([*screen, "glretrace", "--pframe-times", calls], environment=ZINK)
+        return statistics.median(frame_times(profile)[first : first + COUNT]), peak
+
+    window = ["--frames", f"{first}..{first + COUNT}", "-o", f"{OUT}/timed.textrace", "--apitrace", calls]
+    measured = measure(plain_frame, lambda: run([*base, *window]))
+    hashes = ["-b", "-s", "-", "--snapshot-format=MD5"]
+    plain, _, _ = run([*screen, "glretrace", *hashes, calls], environment=ZINK)
+    every = ["--gl", "--to-end", "--frames", f"{first}..{first + COUNT}", "-o", f"{OUT}/timed.textrace", "--"]
+    captured, _, _ = run([*base, *every, "glretrace", *hashes, calls])
+    pairs = list(zip(*(re.findall("^[0-9A-F]{32}$", text, re.M) for text in (plain, captured))))
+    pictures = f"{sum(a == b for a, b in pairs)} of {len(pairs)} equal"
+    trace = trace_of(GAME)
+    one = ["--check", "--frames", str(first), "-o", trace, "--apitrace", calls]
+    _, said, _ = run([*base, *one], allowed=(0, 1))
+    return row(GAME, trace, said, measured, pictures)
+
+
+def trace_of(name):
+    return f"{OUT}/{re.sub('[^a-z0-9]+', '-', name.lower()).strip('-')}.textrace"
+
+
+def row(name, trace, said, measured, pictures):
     equal, different = found(r"occlusion queries: (\d+) draws equal, (\d+) different", said)
     apart = re.findall(r"not compared: (.*) \((\d+) draws\)", said)
     width, height, rule, draws = found(r"of (\d+)x(\d+) px per eye by (.*): (\d+) draws", said)
@@ -79,14 +169,15 @@ def describe(name, options, times):
     left_out = re.findall(r"not in the trace, or less exactly: (.*)", said)
     bytes_of = {}
     for order in ORDERS:
-        text = run([f"{BIN}/replay", "run", trace, "--order", order, "--json"]).stdout
+        text, _, _ = run([f"{BIN}/replay", "run", trace, "--order", order, "--json"])
         bytes_of[order] = json.loads(text)["result"]["external_bytes"]
     saved = [100 * (1 - bytes_of[order] / bytes_of["morton"]) for order in ORDERS[1:]]
-    plain, idle, recorded = times
+    plain, idle, recorded, plain_peak, peak = measured
     return [
         name, rule, f"{width}x{height}", draws, equal, different, "; ".join(f"{n}: {why}" for why, n in apart) or "0",
         fragments, f"{plain:.1f}", f"{idle:.1f}", f"{recorded:.1f}", f"{recorded / plain:.2f}", f"{idle / plain:.2f}",
-        f"{bytes_of['morton'] / 1e6:.2f}", *(f"{value:.1f}" for value in saved), "; ".join(left_out) or "nothing",
+        pictures, f"{plain_peak:.0f}", f"{peak:.0f}", f"{bytes_of['morton'] / 1e6:.2f}",
+        *(f"{value:.1f}" for value in saved), "; ".join(left_out) or "nothing",
     ]
 
 
@@ -97,10 +188,11 @@ def version(command):
 
 def main():
     rows = []
-    for name, page, query, more in PAGES:
-        print(f"measuring {name}", file=sys.stderr)
-        options = [f"{SITE}/{page}", "--query", query, *more]
-        rows.append(describe(name, options, measure_page(page, query, more)))
+    for page in PAGES:
+        print(f"measuring {page[0]}", file=sys.stderr)
+        rows.append(describe_page(*page))
+    print(f"measuring {GAME}", file=sys.stderr)
+    rows += [game for game in [describe_game()] if game]
     os.remove(f"{OUT}/timed.textrace")
     with open(TABLE + ".new", "w", newline="") as file:
         file.write("# command: RESULTS=1 scripts/apps.sh\n")

@@ -31,6 +31,10 @@ wanted="$packages"
 if [ "${1:-}" = test ] && ! command -v python3 >/dev/null 2>&1; then
     packages="$packages python3"
 fi
+# OpenGL on Vulkan, for the tests of `tracegen app --gl`.
+if [ "${1:-}" = test ] && ! ls /usr/lib/*/dri/zink_dri.so >/dev/null 2>&1; then
+    packages="$packages libegl1 libgl1-mesa-dri"
+fi
 # Mesa 25.1 dropped it.
 if [ "${1:-}" = test ] && ! ldconfig -p 2>/dev/null | grep -q 'libOSMesa\.so\.8' &&
     apt-cache show libosmesa6 >/dev/null 2>&1; then

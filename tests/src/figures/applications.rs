@@ -20,6 +20,7 @@ pub fn records(results: &Results) -> String {
             "draws equal to their query",
             "draws that differ",
             "draws not compared",
+            "pictures",
             "left out",
         ],
     )
@@ -36,6 +37,8 @@ pub fn times(results: &Results) -> String {
             "recorded",
             "not recorded over plain",
             "recorded over plain",
+            "plain peak MB",
+            "recorded peak MB",
         ],
     )
 }

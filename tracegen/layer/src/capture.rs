@@ -3,8 +3,9 @@
 use crate::control::Control;
 use crate::spool::{Event, FOLDER_VARIABLE, FramesBy, Settings, Writer};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::Instant;
 
 /// Settings and state of the capture in this process.
 #[derive(Debug)]
@@ -18,6 +19,9 @@ pub(crate) struct Capture {
     counted: AtomicU32,
     /// Number of frames whose end has been written.
     ended: AtomicU32,
+    started: Instant,
+    /// Time of the last frame's end, microseconds after `started`.
+    ended_us: AtomicU64,
     /// Whether the program has a swapchain.
     presents: AtomicBool,
     /// Set after a write error; nothing more is written.
@@ -53,6 +57,8 @@ impl Capture {
             writer: Mutex::new(None),
             counted: AtomicU32::new(0),
             ended: AtomicU32::new(0),
+            started: Instant::now(),
+            ended_us: AtomicU64::new(0),
             presents: AtomicBool::new(false),
             failed: AtomicBool::new(false),
         })
@@ -114,13 +120,25 @@ impl Capture {
         self.note_frames();
     }
 
-    /// Writes the events of frames that have ended.
+    /// Writes the events of frames that have ended, up to the last requested one.
     pub fn note_frames(&self) {
         let frame = self.frame();
         let before = self.ended.swap(frame, Ordering::SeqCst);
-        for ended in (before..frame).filter(|ended| self.wants(*ended)) {
-            self.event(&Event::Frame { frame: ended });
-            self.control.count_ended();
+        let new = before..frame.min(self.settings.frames[1]);
+        if new.is_empty() {
+            return;
+        }
+        let now_us = self.started.elapsed().as_micros() as u64;
+        let last_us = self.ended_us.swap(now_us, Ordering::SeqCst);
+        let took_us = now_us.saturating_sub(last_us);
+        for ended in new {
+            self.event(&Event::Frame {
+                frame: ended,
+                took_us,
+            });
+            if self.wants(ended) {
+                self.control.count_ended();
+            }
         }
     }
 

@@ -89,6 +89,8 @@ pub struct ProgramFrame {
     pub lost_bytes: u64,
     /// Whether the program ended the frame.
     pub ended: bool,
+    /// Microseconds since the end of the previous frame.
+    pub took_us: u64,
 }
 
 /// A process of a captured program.
@@ -106,6 +108,8 @@ pub struct Session {
     pub troubles: Vec<String>,
     /// Frames by number.
     pub frames: BTreeMap<u32, ProgramFrame>,
+    /// Microseconds of each frame that was not recorded.
+    pub before_us: Vec<u64>,
     draws: HashMap<u32, DrawInfo>,
     passes: HashMap<u32, PassInfo>,
     images: HashMap<u32, ImageInfo>,
@@ -199,11 +203,10 @@ impl Session {
                         occlusion: counted.get(&draw).copied(),
                     }));
             }
-            Event::Frame { frame } => {
-                if let Some(of) = self.frames.get_mut(&frame) {
-                    of.ended = true;
-                }
-            }
+            Event::Frame { frame, took_us } => match self.frames.get_mut(&frame) {
+                Some(of) => (of.ended, of.took_us) = (true, took_us),
+                None => self.before_us.push(took_us),
+            },
             Event::Picture { pass, size } => drop(self.pictures.insert(pass, size)),
             Event::Trouble { what } => self.troubles.push(what),
             Event::Closed => {}

@@ -1,17 +1,18 @@
 //! `tracegen app`.
 
 use super::choice::choice;
-use super::program_args::ProgramArgs;
-use anyhow::{Context, bail};
+use super::program_args::{ProgramArgs, note_frame_times};
+use anyhow::{Context, anyhow, bail, ensure};
 use clap::Args;
 use clap::builder::TypedValueParser;
 use parallax_layer::spool::FramesBy;
 use programs::{Launch, Session, SessionError};
 use shell::{Ended, run_child_until, warn};
 use std::collections::BTreeMap;
-use std::ffi::OsString;
-use std::path::Path;
-use std::process::{Command, ExitCode};
+use std::ffi::{OsStr, OsString};
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
 
 /// Arguments of `tracegen app`.
@@ -25,6 +26,10 @@ pub struct AppArgs {
     /// The program uses OpenGL: run it on Mesa's zink, an OpenGL implementation on Vulkan.
     #[arg(long)]
     gl: bool,
+    /// Replay a file of OpenGL calls, which `apitrace trace` records, instead of running a program. The
+    /// replay renders the same frames every time.
+    #[arg(long, value_name = "FILE.trace", conflicts_with_all = ["program", "gl"])]
+    apitrace: Option<PathBuf>,
     /// Let the program run to its end. By default it is terminated after the last frame.
     #[arg(long)]
     to_end: bool,
@@ -32,7 +37,11 @@ pub struct AppArgs {
     #[arg(long, value_name = "SECONDS", default_value_t = 600)]
     timeout: u64,
     /// The program and its arguments.
-    #[arg(last = true, required = true, value_name = "PROGRAM")]
+    #[arg(
+        last = true,
+        required_unless_present = "apitrace",
+        value_name = "PROGRAM"
+    )]
     program: Vec<OsString>,
 }
 
@@ -65,9 +74,11 @@ pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
     let settings = args.capture.settings(args.frames_by)?;
     let tool = std::env::current_exe().context("cannot find this program's own file")?;
     let launch = Launch::new(&std::env::temp_dir(), &tool, &settings)?;
-    let program = program_name(&args.program);
+    let program = args.name()?;
     let ended = run_program(args, &launch, &program)?;
-    let mut session = Session::of_capture(launch.folder(), &program)?;
+    let mut session = Session::of_capture(launch.folder(), &program)
+        .map_err(|error| with_replay_error(error, &launch))?;
+    let milliseconds = |us: u64| us as f64 / 1e3;
     let wanted = args.capture.frames.clone();
     let is_complete = |frame: u32| session.frames.get(&frame).is_some_and(|frame| frame.ended);
     if !wanted.clone().all(is_complete) {
@@ -78,29 +89,72 @@ pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
             counted: launch.control.counted(),
             ended: how_it_ended(&ended),
         };
-        return Err(error.into());
+        return Err(with_replay_error(error, &launch));
     }
+    let before: Vec<f64> = (session.before_us.iter().copied())
+        .map(milliseconds)
+        .collect();
+    let captured: Vec<f64> = (session.frames.values())
+        .map(|frame| milliseconds(frame.took_us))
+        .collect();
+    note_frame_times(&before, &captured);
     args.capture
         .finish(&mut session, program, &settings, BTreeMap::new())
 }
 
-/// Name of a program in messages: its file name.
-fn program_name(program: &[OsString]) -> String {
-    let path = program
-        .first()
-        .map_or(Path::new(""), |first| Path::new(first));
-    let name = path.file_name().unwrap_or(path.as_os_str());
-    name.to_string_lossy().into_owned()
+/// Program of apitrace that replays files.
+const REPLAYER: &str = "glretrace";
+
+/// File with the standard error of the replay.
+const REPLAY_LOG: &str = "replay.log";
+
+impl AppArgs {
+    /// File name of the program or of the replayed file, for messages.
+    ///
+    /// # Errors
+    /// A file that cannot be replayed.
+    fn name(&self) -> anyhow::Result<String> {
+        let path = match (&self.apitrace, self.program.first()) {
+            (Some(file), _) => {
+                let place = || format!("cannot read {}", file.display());
+                let kind = std::fs::metadata(file).with_context(place)?;
+                ensure!(
+                    kind.is_file(),
+                    "{}: expected a file of apitrace, found no regular file",
+                    file.display()
+                );
+                file
+            }
+            (None, Some(first)) => Path::new(first),
+            (None, None) => bail!("expected a program, found none"),
+        };
+        let name = path.file_name().unwrap_or(path.as_os_str());
+        Ok(name.to_string_lossy().into_owned())
+    }
+
+    /// The command that renders the frames.
+    fn command(&self) -> Command {
+        if let Some(file) = &self.apitrace {
+            let mut command = Command::new(REPLAYER);
+            command.arg(file).stdout(Stdio::null());
+            return command;
+        }
+        let (first, rest) = self.program.split_first().unzip();
+        let mut command = Command::new(first.map_or(OsStr::new(""), OsString::as_os_str));
+        command.args(rest.unwrap_or_default());
+        command
+    }
 }
 
 /// Runs the program until it has rendered its frames or ends.
 fn run_program(args: &AppArgs, launch: &Launch, program: &str) -> anyhow::Result<Ended> {
-    let Some((first, rest)) = args.program.split_first() else {
-        bail!("expected a program, found none");
-    };
-    let mut command = Command::new(first);
-    command.args(rest);
-    launch.prepare(&mut command, args.gl);
+    let mut command = args.command();
+    launch.prepare(&mut command, args.gl || args.apitrace.is_some());
+    if args.apitrace.is_some() {
+        // A replay that is terminated prints its call stack.
+        let log = File::create(launch.folder().join(REPLAY_LOG));
+        command.stderr(log.context("cannot write the log of the replay")?);
+    }
     let wanted = args.capture.frames.len() as u32;
     let deadline = Instant::now() + Duration::from_secs(args.timeout);
     let mut late = false;
@@ -108,7 +162,13 @@ fn run_program(args: &AppArgs, launch: &Launch, program: &str) -> anyhow::Result
         late = Instant::now() >= deadline;
         late || (!args.to_end && launch.control.ended() >= wanted)
     });
-    let ended = ended.with_context(|| format!("cannot run {}", first.to_string_lossy()))?;
+    let ended = ended.with_context(|| {
+        let name = command.get_program().to_string_lossy().into_owned();
+        match args.apitrace {
+            Some(_) => format!("cannot run {name}, which the package apitrace has"),
+            None => format!("cannot run {name}"),
+        }
+    })?;
     if late {
         warn(&format!(
             "{program} was ended after {} seconds",
@@ -116,6 +176,16 @@ fn run_program(args: &AppArgs, launch: &Launch, program: &str) -> anyhow::Result
         ));
     }
     Ok(ended)
+}
+
+/// Adds the first error of the replay of a file.
+fn with_replay_error(error: SessionError, launch: &Launch) -> anyhow::Error {
+    let log = std::fs::read(launch.folder().join(REPLAY_LOG)).unwrap_or_default();
+    let log = String::from_utf8_lossy(&log);
+    match log.lines().find(|line| line.contains("error")) {
+        Some(line) => anyhow!("{error}; {REPLAYER}: {}", line.trim()),
+        None => error.into(),
+    }
 }
 
 fn how_it_ended(ended: &Ended) -> String {

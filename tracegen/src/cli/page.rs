@@ -1,6 +1,6 @@
 //! `tracegen page`.
 
-use super::program_args::ProgramArgs;
+use super::program_args::{ProgramArgs, note_frame_times};
 use super::scene_args::parse_size;
 use anyhow::{Context, bail, ensure};
 use base64::Engine;
@@ -223,24 +223,8 @@ fn draw(args: &PageArgs, launch: &Launch, page: &Page) -> anyhow::Result<Drawn> 
         note(&format!("drawn by {renderer}"));
     }
     tab.close();
-    // The first frames create textures and shaders, so they are not timed.
-    let settled = before_ms.get(before_ms.len() / 2..).unwrap_or_default();
-    note(&format!(
-        "milliseconds per frame: {} before, {} captured",
-        median(settled),
-        median(&captured_ms)
-    ));
+    note_frame_times(&before_ms, &captured_ms);
     Ok((cameras, picture))
-}
-
-/// The median of some times as text.
-fn median(times_ms: &[f64]) -> String {
-    let mut sorted = times_ms.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    match sorted.get(sorted.len() / 2) {
-        Some(middle) => format!("{middle:.1}"),
-        None => "none".to_owned(),
-    }
 }
 
 /// Writes a picture that the page returned as a data URL to a temporary file.

@@ -96,6 +96,27 @@ fn parse_frames(text: &str) -> Result<Range<u32>, String> {
     Ok(range)
 }
 
+/// Prints the median times of the frames before the capture and of the captured ones.
+pub fn note_frame_times(before_ms: &[f64], captured_ms: &[f64]) {
+    // The first frames create textures and shaders, so they are not timed.
+    let settled = before_ms.get(before_ms.len() / 2..).unwrap_or_default();
+    note(&format!(
+        "milliseconds per frame: {} before, {} captured",
+        median(settled),
+        median(captured_ms)
+    ));
+}
+
+/// The median of some times as text.
+fn median(times_ms: &[f64]) -> String {
+    let mut sorted = times_ms.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    match sorted.get(sorted.len() / 2) {
+        Some(middle) => format!("{middle:.1}"),
+        None => "none".to_owned(),
+    }
+}
+
 impl ProgramArgs {
     /// Refuses outputs that cannot be written.
     ///

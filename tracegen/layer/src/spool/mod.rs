@@ -141,6 +141,8 @@ pub enum Event {
     Frame {
         /// Its number.
         frame: u32,
+        /// Microseconds since the end of the previous frame.
+        took_us: u64,
     },
     /// The device was destroyed.
     Closed,

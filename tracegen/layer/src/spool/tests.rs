@@ -21,7 +21,12 @@ fn events_and_records_are_read_as_written_and_descriptions_once() {
         };
         writer.describe("pass", 7, pass).unwrap();
     }
-    writer.event(&Event::Frame { frame: 3 }).unwrap();
+    writer
+        .event(&Event::Frame {
+            frame: 3,
+            took_us: 9,
+        })
+        .unwrap();
     let [process] = &Process::all(folder.path()).unwrap()[..] else {
         panic!("one process");
     };
@@ -29,7 +34,13 @@ fn events_and_records_are_read_as_written_and_descriptions_once() {
     let process_event =
         matches!(&events[0], Event::Process { pid, .. } if *pid == std::process::id());
     assert!(process_event && events.len() == 3, "{events:?}");
-    assert_eq!(events[2], Event::Frame { frame: 3 });
+    assert_eq!(
+        events[2],
+        Event::Frame {
+            frame: 3,
+            took_us: 9,
+        }
+    );
     let mut reader = process.records().unwrap();
     let mut draws = Vec::new();
     for span in [spans[1], spans[0]] {
