@@ -1,5 +1,6 @@
 //! The scene that every loader fills and every renderer reads: model, loaders, cameras, paths, displays.
 
+mod animation;
 pub mod blocks;
 pub mod cameras;
 mod coarse;
@@ -22,9 +23,11 @@ pub mod paths;
 #[cfg(test)]
 mod real_scenes;
 pub mod srgb;
+mod suggest;
 mod uri;
 mod warnings;
 
+pub use animation::Animation;
 pub use error::SceneError;
 pub use image::Image;
 pub use image_files::MAX_SIZE as MAX_IMAGE_SIZE;

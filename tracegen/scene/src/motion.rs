@@ -71,6 +71,12 @@ impl Motion {
 }
 
 impl Scene {
+    /// Whether anything of it moves.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        !self.motions.is_empty() || self.animation.is_some()
+    }
+
     /// The instances that move, each with its object-to-world transform at a time. At time 0 all
     /// stand as [`Scene::instances`] has them.
     pub fn moved(&self, time_s: f32) -> impl Iterator<Item = (usize, Affine3A)> + '_ {

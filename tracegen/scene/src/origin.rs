@@ -46,12 +46,20 @@ pub(crate) fn relative_transform(mut transform: DAffine3, origin: DVec3) -> Affi
     transform.as_affine3a()
 }
 
+/// What [`place`] decides.
+pub(crate) struct Placed {
+    pub origin: DVec3,
+    pub instances: Vec<Instance>,
+    /// By which each mesh's positions have been moved.
+    pub own: Vec<DVec3>,
+}
+
 /// Chooses the origin of placed meshes (each a mesh and its transform to the world) and makes
 /// instances relative to it.
 ///
 /// Meshes of a scene that is moved are moved as well where they stand far from their own zero,
 /// which rounds nothing: large numbers in vertices would meet large ones in the transform.
-pub(crate) fn place(meshes: &mut [Mesh], placed: &[(usize, DAffine3)]) -> (DVec3, Vec<Instance>) {
+pub(crate) fn place(meshes: &mut [Mesh], placed: &[(usize, DAffine3)]) -> Placed {
     let boxes: Vec<[DVec3; 2]> = (meshes.iter())
         .map(|mesh| mesh.bounds().map(|corner| corner.as_dvec3()))
         .collect();
@@ -77,10 +85,15 @@ pub(crate) fn place(meshes: &mut [Mesh], placed: &[(usize, DAffine3)]) -> (DVec3
             transform: relative_transform(transform, origin),
         }
     };
-    (origin, placed.iter().map(instance).collect())
+    Placed {
+        origin,
+        instances: placed.iter().map(instance).collect(),
+        own,
+    }
 }
 
-fn corners([low, high]: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
+/// The corners of a box.
+pub(crate) fn corners([low, high]: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
     (0..8).map(move |corner| {
         let pick = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
         DVec3::new(pick(0), pick(1), pick(2))
@@ -145,7 +158,9 @@ mod tests {
         let mut meshes = [mesh(far), mesh(Vec3::ZERO)];
         let baked = DAffine3::IDENTITY;
         let moved = DAffine3::from_translation(far.as_dvec3());
-        let (origin, instances) = place(&mut meshes, &[(0, baked), (1, moved)]);
+        let Placed {
+            origin, instances, ..
+        } = place(&mut meshes, &[(0, baked), (1, moved)]);
         assert_eq!(origin, far.as_dvec3());
         assert_eq!(meshes[1].positions, triangle);
         for instance in &instances {
@@ -157,8 +172,8 @@ mod tests {
         }
         // At zero nothing is touched, whatever the mesh's own place.
         let mut meshes = [mesh(Vec3::splat(64.0)), mesh(Vec3::ZERO)];
-        let (origin, _) = place(&mut meshes, &[(0, baked), (1, baked)]);
-        assert_eq!(origin, DVec3::ZERO);
+        let placed = place(&mut meshes, &[(0, baked), (1, baked)]);
+        assert_eq!(placed.origin, DVec3::ZERO);
         assert_eq!(meshes[0].positions[1], Vec3::X + 64.0);
     }
 }

@@ -40,6 +40,12 @@ pub struct StudySetup {
     pub frames: Vec<u32>,
     /// Frames per second along the path.
     pub fps: f32,
+    /// Time of the path's first frame in what moves in the scene.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub time_s: f64,
+    /// Animation that plays, as given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub animation: Option<String>,
     /// Width and height of an eye's picture.
     pub size_px: [u32; 2],
     /// The display.
@@ -66,6 +72,11 @@ pub struct StudySetup {
     pub shadow_cascades: u32,
     /// Checksum of the files that scene and path are read from.
     pub input_checksum: String,
+}
+
+/// Manifests of scenes at their start are as they were before `--time`.
+fn is_zero(time_s: &f64) -> bool {
+    *time_s == 0.0
 }
 
 /// A measured row.

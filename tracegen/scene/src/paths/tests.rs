@@ -81,6 +81,7 @@ fn the_model_of_a_head_starts_at_the_camera_and_keeps_its_figures() {
     let moments = Moments {
         frames: 0..MAX_FRAMES,
         fps,
+        scene_start_s: 0.0,
     };
     let poses: Vec<Affine3A> = [0, 1, 2, 3, 4, 5]
         .iter()
@@ -147,6 +148,7 @@ fn recorded_poses_are_taken_at_the_frames_times() {
     let moments = Moments {
         frames: 0..5,
         fps: 4.0,
+        scene_start_s: 0.0,
     };
     let poses = path.poses(&camera(), &moments).unwrap();
     for (k, pose) in (0u8..).zip(&poses) {
@@ -177,6 +179,7 @@ fn a_path_from_the_camera_takes_its_place_and_heading_and_keeps_its_pitch() {
     let moments = Moments {
         frames: 0..2,
         fps: 1.0,
+        scene_start_s: 0.0,
     };
     let poses = path.poses(&camera, &moments).unwrap();
     close(poses[0].translation, camera.eye);
@@ -200,6 +203,7 @@ fn a_path_far_out_has_the_poses_of_one_at_zero_in_a_scene_that_is_as_far_out() {
     let moments = Moments {
         frames: 0..5,
         fps: 4.0,
+        scene_start_s: 0.0,
     };
     for origin in [PathOrigin::World, PathOrigin::Camera] {
         let [near, far] = [0.0, 1e7].map(|far| {

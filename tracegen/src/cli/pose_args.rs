@@ -1,0 +1,56 @@
+//! Flags for the time and the animation of a scene.
+
+use clap::Args;
+use scene::LoadOptions;
+
+/// Longest time, seconds: a year, whose milliseconds double precision has.
+const MAX_TIME_S: f64 = 365.0 * 86_400.0;
+
+/// The pose of a scene that moves.
+#[derive(Args, Clone, Debug)]
+pub struct PoseArgs {
+    /// Time of the first frame in what moves in the scene, in seconds; later frames follow at their rate.
+    ///
+    /// An animation of a glTF file repeats after its last key.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = parse_time)]
+    pub time: f64,
+    /// Animation of a glTF file to play, by its name or number; `none` shows the nodes at rest [default: the
+    /// first one].
+    #[arg(long, value_name = "NAME|NUMBER|all|none")]
+    pub animation: Option<String>,
+}
+
+impl PoseArgs {
+    /// The same options for a scene in this pose.
+    #[must_use]
+    pub fn applied_to(&self, options: &LoadOptions) -> LoadOptions {
+        LoadOptions {
+            animation: self.animation.clone(),
+            time_s: self.time,
+            ..options.clone()
+        }
+    }
+}
+
+fn parse_time(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(time_s) if (0.0..=MAX_TIME_S).contains(&time_s) => Ok(time_s),
+        _ => Err(format!(
+            "expected 0 to {MAX_TIME_S} seconds, found '{text}'"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parse_time;
+
+    #[test]
+    fn times_are_finite_and_not_negative() {
+        assert_eq!(parse_time("1.5"), Ok(1.5));
+        for bad in ["-1", "nan", "inf", "1e9", "soon"] {
+            let error = parse_time(bad).unwrap_err();
+            assert!(error.contains("0 to 31536000 seconds"), "{error}");
+        }
+    }
+}
