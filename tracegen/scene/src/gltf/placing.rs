@@ -11,16 +11,20 @@ use crate::animation::{Animation, Follows, MovingInstance, MovingMesh, WeightCur
 use crate::warnings::Warnings;
 use crate::{Instance, Mesh, Scene, SceneError, origin};
 use glam::{DAffine3, DVec3};
+use gltf::json::Root;
 use std::collections::HashMap;
 
 /// A rig and what follows it.
 pub(super) struct PlacedRig {
-    pub rig: Rig,
-    pub animation: Animation,
+    animation: Animation,
+    /// Nodes that stand elsewhere at some time.
+    moved: Vec<bool>,
+    /// Curves of the weights of morph targets, by node.
+    weights: HashMap<usize, WeightCurve>,
     /// Seconds, within the animation.
     time_s: f64,
     /// Transforms to the world at that time.
-    pub worlds: Vec<DAffine3>,
+    worlds: Vec<DAffine3>,
     /// Index of each skin that is in use, by its number in the file.
     skins: HashMap<usize, usize>,
 }
@@ -29,9 +33,9 @@ impl PlacedRig {
     pub fn new(rig: Rig, time_s: f64, buffers: &Buffers<'_>) -> Self {
         let animation = Animation {
             file: buffers.origin.file.clone(),
-            name: rig.name.clone(),
+            name: rig.name,
             duration_s: rig.duration_s,
-            skeleton: rig.skeleton.clone(),
+            skeleton: rig.skeleton,
             skins: Vec::new(),
             meshes: Vec::new(),
             instances: Vec::new(),
@@ -42,8 +46,9 @@ impl PlacedRig {
         let time_s = animation.within(time_s);
         Self {
             time_s,
-            worlds: rig.skeleton.worlds(time_s),
-            rig,
+            worlds: animation.skeleton.worlds(time_s),
+            moved: rig.moved,
+            weights: rig.weights,
             animation,
             skins: HashMap::new(),
         }
@@ -51,17 +56,22 @@ impl PlacedRig {
 
     /// A node's transform to its parent.
     pub fn local(&self, node: usize) -> DAffine3 {
-        self.rig.skeleton.joints[node].transform(self.time_s)
+        self.animation.skeleton.joints[node].transform(self.time_s)
     }
 
     /// The animation of a scene with cameras and lights at these nodes, if anything moves.
     pub fn into_animation(mut self, of: ViewNodes) -> Option<Animation> {
         let moved = |nodes: Vec<usize>| {
             let numbered = nodes.into_iter().enumerate();
-            numbered.filter(|(_, node)| self.rig.moved[*node]).collect()
+            numbered.filter(|(_, node)| self.moved[*node]).collect()
         };
         (self.animation.cameras, self.animation.lights) = (moved(of.cameras), moved(of.lights));
         self.animation.moving()
+    }
+
+    /// Whether a skin is not the same at all times.
+    fn skin_moves(&self, root: &Root, skin: usize) -> bool {
+        (root.skins[skin].joints.iter()).any(|joint| self.moved[at(joint)])
     }
 
     /// The index of a skin, which is read on first use.
@@ -126,10 +136,7 @@ impl Placing<'_> {
             Some(deformation) => self.read_moving(mesh, deformation, materials, warnings)?,
             None => self.read_still(mesh, materials, warnings)?,
         };
-        let node_moves = self
-            .rig
-            .as_ref()
-            .is_some_and(|placed| placed.rig.moved[node]);
+        let node_moves = self.rig.as_ref().is_some_and(|placed| placed.moved[node]);
         let local = &self.transforms[node];
         let place = (transform, node_moves);
         let instances = match primitives.iter().any(|p| p.skin.is_none()) {
@@ -187,10 +194,10 @@ impl Placing<'_> {
         };
         let root = self.buffers.root;
         let weights = morphs::weights(root, node, warnings);
-        let curve = placed.rig.weights.remove(&node);
+        let curve = placed.weights.remove(&node);
         let skin = match root.nodes[node].skin.as_ref().map(at) {
             Some(number) => {
-                let moves = placed.rig.skin_moves(root, number);
+                let moves = placed.skin_moves(root, number);
                 Some((placed.skin(number, self.buffers)?, moves))
             }
             None => None,

@@ -1,6 +1,6 @@
 //! The nodes of a file with what moves them: the animation that plays.
 
-use super::accessors::{Buffers, at};
+use super::accessors::Buffers;
 use super::channels::{self, Moved};
 use super::transforms::Local;
 use super::{morphs, tree};
@@ -157,11 +157,4 @@ pub(super) fn joint(
         parts: local.parts(),
         curves,
     })
-}
-
-impl Rig {
-    /// Whether the skin that a node's mesh follows is not the same at all times.
-    pub fn skin_moves(&self, root: &Root, skin: usize) -> bool {
-        (root.skins[skin].joints.iter()).any(|joint| self.moved[at(joint)])
-    }
 }
