@@ -12,7 +12,8 @@ pub struct PoseArgs {
     /// Time of the first frame in what moves in the scene, in seconds; later frames follow at their rate.
     ///
     /// An animation of a glTF file repeats after its last key.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = parse_time)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = parse_time,
+          allow_negative_numbers = true)]
     pub time: f64,
     /// Animation of a glTF file to play, by its name or number; `none` shows the nodes at rest [default: the
     /// first one].

@@ -88,7 +88,12 @@ impl Reader<'_> {
                 influences.weights.extend(weights[vertex]);
             }
         }
-        self.check_influences(&influences, joints, indices)?;
+        let used = self.check_influences(&influences, joints, indices)?;
+        // What no triangle has may hold anything.
+        let weights = influences.weights.chunks_exact_mut(influences.a_vertex);
+        for (weights, _) in weights.zip(used).filter(|(_, used)| !used) {
+            weights.fill(0.0);
+        }
         Ok(Some(influences))
     }
 
@@ -113,12 +118,13 @@ impl Reader<'_> {
         self.buffers.joints(accessor).map(Some)
     }
 
+    /// Checks the vertices that indices name; tells which these are.
     fn check_influences(
         &self,
         influences: &Influences,
         joints: usize,
         indices: &[u32],
-    ) -> Result<(), SceneError> {
+    ) -> Result<Vec<bool>, SceneError> {
         let mut checked = vec![false; influences.joints.len() / influences.a_vertex];
         for vertex in indices.iter().map(|&index| index as usize) {
             if std::mem::replace(&mut checked[vertex], true) {
@@ -144,6 +150,6 @@ impl Reader<'_> {
                 return invalid("WEIGHTS", expected, "none".into());
             }
         }
-        Ok(())
+        Ok(checked)
     }
 }

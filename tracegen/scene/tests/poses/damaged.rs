@@ -90,6 +90,27 @@ fn damaged_skins_are_refused() {
 }
 
 #[test]
+fn a_vertex_that_no_triangle_has_may_have_any_joints_and_weights() {
+    let mut figure = Figure::new();
+    figure.joints[0][5] = [9; 4];
+    figure.weights[0][5] = [f32::NAN, 1.0, -1.0, 1.0];
+    let mut file = figure.file();
+    let primitive = &file.json["meshes"][0]["primitives"][0];
+    let indices = primitive["indices"].as_u64().unwrap() as usize;
+    // All but the last triangle, the only one with vertex 5.
+    file.json["accessors"][indices]["count"] = json!(9);
+    let folder = tempfile::tempdir().unwrap();
+    let scene = file.load(folder.path()).unwrap().scene;
+    let positions = scene.meshes.iter().flat_map(|mesh| &mesh.positions);
+    assert!(positions.into_iter().all(|p| p.is_finite()));
+    refused(
+        figure.file(),
+        &LoadOptions::ALL,
+        &["vertex 5", "weights of at least 0, found NaN"],
+    );
+}
+
+#[test]
 fn damaged_morph_targets_are_refused() {
     let mut file = Figure::new().file();
     let indices = file.json["meshes"][0]["primitives"][0]["indices"].clone();
