@@ -6,7 +6,7 @@ use super::transforms::Local;
 use super::{morphs, tree};
 use crate::SceneError;
 use crate::animation::{Channel, Curve, Joint, Skeleton, WeightCurve};
-use crate::files::Origin;
+use crate::files::{Origin, shown};
 use crate::suggest::did_you_mean;
 use crate::warnings::Warnings;
 use gltf::json::Root;
@@ -90,7 +90,7 @@ pub(super) fn read(
     }
     let name = match playing.as_slice() {
         [] => "nodes at rest".to_owned(),
-        [index] => format!("animations[{index}] '{}'", names[*index]),
+        [index] => format!("animations[{index}] '{}'", shown(&names[*index])),
         _ => "animations".to_owned(),
     };
     let tree = tree::read(root, buffers.origin)?;
