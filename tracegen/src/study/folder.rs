@@ -450,6 +450,8 @@ mod tests {
             path_frames: 72,
             frames: frames.to_vec(),
             fps: 72.0,
+            time_s: 0.0,
+            animation: None,
             size_px: [4, 4],
             hmd: Hmd::default(),
             lens: [Lens {

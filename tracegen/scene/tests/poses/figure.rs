@@ -21,14 +21,17 @@ pub const HAT: usize = 6;
 /// The joints of the skin, in another order than the nodes.
 const JOINTS: [usize; 3] = [KNEE, FOOT, HIP];
 
+/// Displacements of positions and of normals.
+type Displacements = (Vec<[f32; 3]>, Vec<[f32; 3]>);
+
 /// The figure. What the file says is made of it and so is what must come out.
 #[derive(Clone)]
 pub struct Figure {
     pub nodes: Vec<Node>,
     pub positions: Vec<[f32; 3]>,
     pub normals: Vec<[f32; 3]>,
-    /// Displacements of positions and normals by target.
-    pub targets: Vec<(Vec<[f32; 3]>, Vec<[f32; 3]>)>,
+    /// By target.
+    pub targets: Vec<Displacements>,
     pub inverse_binds: Vec<[f32; 16]>,
     /// Two sets of joints and weights.
     pub joints: [Vec<[u8; 4]>; 2],

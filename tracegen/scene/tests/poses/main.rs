@@ -3,6 +3,8 @@
 
 mod damaged;
 mod figure;
+// The table of features builds files with images as well.
+#[allow(dead_code)]
 #[path = "../conformance/files.rs"]
 mod files;
 mod naive;
