@@ -5,8 +5,10 @@
 
 CARGO ?= cargo
 OUT   ?= out
+# Folder of the real scenes (docs/use/real-scenes.md).
+SCENES ?= $(OUT)/scenes
 
-.PHONY: demo apps techniques accuracy stress notebooks test fuzz faults bench lint build deps golden figures reproduce clean screenshots
+.PHONY: demo apps techniques accuracy stress notebooks test fuzz faults bench lint build deps golden figures reproduce clean screenshots scenes
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
@@ -70,6 +72,10 @@ figures: build
 # Every page from small inputs, with screenshots and a check of their layout: out/screenshots.
 screenshots: deps build
 	scripts/screenshots.sh
+
+# Fetches and converts the real scenes that may be had by address, into $(SCENES).
+scenes:
+	@scripts/scenes.sh "$(SCENES)"
 
 # Measures the tables of the documents again and prints what moved (docs/use/real-scenes.md):
 #   make reproduce SCENES=folder SCRIPTS="policies levels"

@@ -3,6 +3,7 @@
 # OSMesa's llvmpipe, softpipe, and as the reference in double precision has them.
 set -eu
 . "$(dirname "$0")/captures.sh"
+needs crytek-sponza/sponza.gltf stk-cocoa-temple/stk-cocoa-temple.gltf
 for scene in "$scenes/crytek-sponza/sponza.gltf" "$scenes/stk-cocoa-temple/stk-cocoa-temple.gltf" atrium jungle; do
     name=$(basename "$scene" .gltf)
     "$bin/tracegen" raster "$scene" --size 512x512 --quiet -o "$name.lavapipe.textrace"

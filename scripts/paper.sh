@@ -6,8 +6,10 @@
 #   results/open-choices.csv    Crytek Sponza: where textures begin, and the bias of the level of detail
 set -eu
 . "$(dirname "$0")/captures.sh"
+needs crytek-sponza/sponza.gltf
 capture() {
     name=$1 scene=$2
+    case $scene in *.gltf) present "${scene#"$scenes/"}" || return 0 ;; esac
     shift 2
     "$bin/tracegen" raster "$scene" --no-plain --quiet "$@" -o "$name.textrace"
 }
@@ -22,7 +24,9 @@ capture jungle jungle
 mkdir dk2
 capture dk2/crytek-sponza "$scenes/crytek-sponza/sponza.gltf" --hmd dk2
 "$bin/replay" paper ./*.textrace --csv morton.csv >/dev/null 2>&1
-"$bin/replay" paper dabrovic-sponza-shadows.textrace atrium-shadows.textrace jungle.textrace --shadow-map-order linear --csv linear.csv >/dev/null 2>&1
+set -- atrium-shadows.textrace jungle.textrace
+[ ! -f dabrovic-sponza-shadows.textrace ] || set -- dabrovic-sponza-shadows.textrace "$@"
+"$bin/replay" paper "$@" --shadow-map-order linear --csv linear.csv >/dev/null 2>&1
 "$bin/replay" paper dk2/crytek-sponza.textrace --preset z2-paper --base-align 64KiB --csv preset.csv >/dev/null 2>&1
 for choice in "64 0" "64KiB 0" "64KiB -1" "64KiB -2"; do
     set -- $choice

@@ -3,8 +3,11 @@
 Usage: screenshots.py CHROMIUM PAGES OUT
 """
 
+import html
 import json
 import pathlib
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -51,6 +54,18 @@ def check(program, profile, page, folder, width):
     return json.loads(text.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
 
 
+def stranded(page, pdf):
+    """Headings that end a printed page, where `pdftotext` (poppler-utils) is installed."""
+    if not shutil.which("pdftotext"):
+        print("  headings of the printed page: not checked without pdftotext")
+        return []
+    titles = re.findall(r"<h2[^>]*>(.*?)</h2>", page.read_text())
+    headings = {html.unescape(re.sub(r"<[^>]+>", "", title)).strip() for title in titles}
+    text = subprocess.run(["pdftotext", "-layout", pdf, "-"], capture_output=True, text=True, check=True).stdout
+    lasts = [sheet.strip().splitlines()[-1].strip() for sheet in text.split("\f") if sheet.strip()]
+    return [f"heading at the end of a printed page: {last}" for last in lasts if last in headings]
+
+
 def main():
     program, pages, out = sys.argv[1], pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
     out.mkdir(parents=True, exist_ok=True)
@@ -72,6 +87,10 @@ def main():
                 chromium(program, profile, f"--window-size={width},{height}", f"--screenshot={shot}", page.resolve().as_uri())
             pdf = (out / f"{page.stem}.pdf").resolve()
             chromium(program, profile, "--no-pdf-header-footer", f"--print-to-pdf={pdf}", page.resolve().as_uri())
+            problems = stranded(page, pdf)
+            for problem in problems:
+                print(f"  {problem}")
+            bad += len(problems)
     print(f"{bad} problems")
     sys.exit(1 if bad else 0)
 

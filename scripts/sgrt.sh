@@ -5,6 +5,7 @@
 set -eu
 size=${SIZE:-1024x1024}
 . "$(dirname "$0")/captures.sh"
+needs crytek-sponza/sponza.gltf
 built_in="teapot chess car lab music-box meadow"
 rules="none depth row object opaque silhouette triangle triangles depth+row+object+opaque+triangles"
 files="utah-teapot/teapot_16k chess-openchessset/chess_42k bmw27/bmw_55k stk-black-forest/stk-black-forest crytek-sponza/sponza"
@@ -13,13 +14,19 @@ for scene in $built_in; do
     "$bin/tracegen" rays "$scene" --size "$size" --quiet -o "$scene.raytrace"
     set -- "$@" "$scene.raytrace"
 done
+stand_ins=""
 for file in $files; do
+    present "$file.gltf" || continue
     name=$(basename "$file")
     [ "$name" != sponza ] || name=crytek-sponza
     "$bin/tracegen" rays "$scenes/$file.gltf" --size "$size" --quiet -o "$name.raytrace"
     set -- "$@" "$name.raytrace"
+    case $name in
+    *_*k) stand_ins="$stand_ins --as $name=${name%_*}" ;;
+    esac
 done
-"$bin/replay" reproject "$@" --as teapot_16k=teapot --as chess_42k=chess --as bmw_55k=bmw --csv --quiet >all.csv
+# shellcheck disable=SC2086 # options, split on purpose
+"$bin/replay" reproject "$@" $stand_ins --csv --quiet >all.csv
 for rule in $rules; do
     "$bin/replay" reproject crytek-sponza.raytrace --rule "$rule" --csv --quiet >"rule,$rule.csv"
 done

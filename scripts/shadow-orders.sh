@@ -4,6 +4,7 @@
 set -eu
 . "$(dirname "$0")/captures.sh"
 for scene in "$scenes/crytek-sponza/sponza.gltf" "$scenes/dabrovic-sponza/sponza.gltf" "$scenes/stk-black-forest/stk-black-forest.gltf" jungle; do
+    [ "$scene" = jungle ] || present "${scene#"$scenes/"}" || continue
     name=$(basename "${scene%/sponza.gltf}" .gltf)
     "$bin/tracegen" raster "$scene" --hmd dk2 --shadows --no-plain --quiet -o "$name.textrace"
     for order in morton z2-sta; do
@@ -11,10 +12,12 @@ for scene in "$scenes/crytek-sponza/sponza.gltf" "$scenes/dabrovic-sponza/sponza
     done
 done
 python3 - "$results" <<'PYTHON'
-import csv, json, sys
+import csv, json, os, sys
 
 rows = []
 for scene in ("crytek-sponza", "dabrovic-sponza", "stk-black-forest", "jungle"):
+    if not os.path.exists(f"{scene},morton.json"):
+        continue
     parts = []
     for order in ("morton", "z2-sta"):
         found = json.load(open(f"{scene},{order}.json"))["result"]["by_texture"]

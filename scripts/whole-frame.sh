@@ -3,6 +3,7 @@
 # forest and jungle as the DK2 shows them, with shadow cascades, four frames of a head's path, on three machines.
 set -eu
 . "$(dirname "$0")/captures.sh"
+needs crytek-sponza/sponza.gltf stk-black-forest/stk-black-forest.gltf
 for scene in "$scenes/crytek-sponza/sponza.gltf" "$scenes/stk-black-forest/stk-black-forest.gltf" jungle; do
     name=$(basename "${scene%/sponza.gltf}" .gltf)
     "$bin/tracegen" raster "$scene" --hmd dk2 --shadows --path head --frames 4 --geometry --no-plain --quiet --image "$name.png" -o "$name.textrace"

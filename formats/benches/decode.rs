@@ -33,7 +33,7 @@ impl Plane {
 
 /// A tile of a finely tessellated surface: cells of `cell` pixels with two triangles each. The planes of
 /// the triangles differ slightly.
-fn made_up_tile(random: &mut Random, cell: f64) -> Tile {
+fn generated_tile(random: &mut Random, cell: f64) -> Tile {
     let base = Plane {
         numerators: [0, 1].map(|_| {
             let slope = |r: &mut Random| between(r, -0.002, 0.002);
@@ -107,7 +107,7 @@ fn record(plane: &Plane, x: u8, y: u8, mask: u8) -> QuadRecord {
 }
 
 /// A trace of generated tiles, half of them with small triangles.
-fn made_up_trace() -> Textrace {
+fn generated_trace() -> Textrace {
     let mut meta = TraceMeta::default();
     meta.frames.push(FrameViews::default());
     meta.hmd.eye_size_px = [512; 2];
@@ -142,7 +142,7 @@ fn made_up_trace() -> Textrace {
     let mut writer = TextraceWriter::in_memory(&tables).expect("the tables are well formed");
     for index in 0..32 * 32 {
         let cell = if index % 2 == 0 { 4.5 } else { 9.0 };
-        let tile = made_up_tile(&mut random, cell);
+        let tile = generated_tile(&mut random, cell);
         writer
             .write_tile(0, index, &tile)
             .expect("the tile is well formed");
@@ -173,7 +173,7 @@ fn reencoded(trace: &Textrace, encoding: Encoding) -> Textrace {
 }
 
 fn main() {
-    let source = std::env::var_os("TEXTRACE").map_or_else(made_up_trace, |path| {
+    let source = std::env::var_os("TEXTRACE").map_or_else(generated_trace, |path| {
         Textrace::open(Path::new(&path)).expect("TEXTRACE names a readable trace")
     });
     let mut criterion = Criterion::default().sample_size(10).configure_from_args();

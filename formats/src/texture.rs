@@ -71,13 +71,13 @@ pub enum TexelFormat {
 }
 
 impl TexelFormat {
-    /// Depth: a shadow map.
+    /// Whether the format holds depth: a shadow map.
     #[must_use]
     pub const fn is_depth(self) -> bool {
         matches!(self, Self::R32f | Self::D16)
     }
 
-    /// Texels that another colour format could hold: neither depth nor more than 8 bits a channel.
+    /// Whether texels can be stored in another colour format: neither depth nor more than 8 bits per channel.
     #[must_use]
     pub const fn is_ordinary_color(self) -> bool {
         !matches!(
@@ -94,7 +94,7 @@ impl TexelFormat {
         )
     }
 
-    /// A trace of version 1 can name it.
+    /// Whether version 1 of the trace has the format.
     #[must_use]
     pub(crate) const fn is_in_version_1(self) -> bool {
         matches!(
@@ -125,14 +125,14 @@ pub enum Wrap {
     MirroredRepeat = 1,
     /// Clamp to the edge texel.
     ClampToEdge = 2,
-    /// Texels outside have the border's colour: they are not read.
+    /// Texels outside have the border's colour and are not read.
     ClampToBorder = 3,
     /// Mirrored once, then clamped to the edge texel.
     MirrorClampToEdge = 4,
 }
 
 impl Wrap {
-    /// Coordinates that differ by two whole units name the same texel.
+    /// Whether coordinates that differ by two whole units select the same texel.
     #[must_use]
     pub const fn is_periodic(self) -> bool {
         matches!(self, Self::Repeat | Self::MirroredRepeat)
@@ -174,7 +174,7 @@ pub struct Sampler {
     pub min: Filter,
     /// Filter between levels.
     pub mip: MipFilter,
-    /// What becomes of a level of detail before it chooses levels.
+    /// Bias and bounds of the level of detail, applied before levels are chosen.
     #[serde(default, skip_serializing_if = "LodRange::is_whole")]
     pub lod: LodRange,
 }
@@ -197,20 +197,20 @@ impl Default for LodRange {
 }
 
 impl LodRange {
-    /// Leaves every level of detail as it is.
+    /// No bias and no bounds.
     pub const WHOLE: Self = Self {
         bias_256ths: 0,
         min_256ths: i16::MIN,
         max_256ths: i16::MAX,
     };
 
-    /// Nothing is added, and nothing bounds what a texture's levels do not bound.
+    /// Whether there is no bias, and no bound other than the texture's levels.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         *self == Self::WHOLE
     }
 
-    /// The level of detail that a sampler makes of one.
+    /// The level of detail after bias and bounds.
     #[must_use]
     #[inline]
     pub fn apply(&self, lod: f32) -> f32 {
@@ -221,7 +221,7 @@ impl LodRange {
 }
 
 impl Sampler {
-    /// A trace of version 1 can hold it.
+    /// Whether version 1 of the trace can represent the sampler.
     #[must_use]
     pub(crate) fn is_in_version_1(&self) -> bool {
         let known = |wrap: &Wrap| (*wrap as u8) <= Wrap::ClampToEdge as u8;

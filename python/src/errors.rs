@@ -1,4 +1,4 @@
-//! Errors as Python exceptions with the texts of the command line.
+//! Errors as Python exceptions with the same texts as on the command line.
 
 use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
@@ -11,7 +11,7 @@ create_exception!(
     "A trace that cannot be read, or a setting that cannot be used. The text is that of the command line."
 );
 
-/// Why a job failed.
+/// The reason why a job failed.
 pub enum Failure {
     /// An error of Parallax.
     Own(anyhow::Error),

@@ -1,4 +1,5 @@
-//! Runs long work on a thread of its own, so that Ctrl-C ends the call at once and no panic reaches Python.
+//! Runs long work on a separate thread, so that Ctrl-C ends the call at once and no panic reaches
+//! Python.
 
 use crate::errors::Failure;
 use formats::textrace::geometry::{Geometry, TileLists};
@@ -17,7 +18,7 @@ use std::time::Duration;
 /// Time between two checks for Ctrl-C.
 const CHECK: Duration = Duration::from_millis(50);
 
-/// Asks a job to end.
+/// Signals a job to end.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<AtomicBool>);
 
@@ -26,13 +27,14 @@ impl Stop {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// True if the job is to end.
+    /// True if the job must end.
     pub fn is_asked(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
 }
 
-/// Runs a job without the interpreter's lock. On Ctrl-C it is asked to stop and left alone.
+/// Runs a job without the interpreter's lock. On Ctrl-C it is signalled to stop and the call
+/// returns without waiting for it.
 pub fn run<T: Send + 'static>(
     py: Python<'_>,
     job: impl FnOnce(Stop) -> Result<T, Failure> + Send + 'static,
@@ -40,8 +42,8 @@ pub fn run<T: Send + 'static>(
     run_and_wait(py, false, job)
 }
 
-/// Runs a job. If `waits`, it has ended when Ctrl-C ends the call: a job that calls Python must not outlive the
-/// interpreter.
+/// Runs a job. If `waits` is set, Ctrl-C ends the call only after the job has ended: a job that
+/// calls Python must not outlive the interpreter.
 pub fn run_and_wait<T: Send + 'static>(
     py: Python<'_>,
     waits: bool,
@@ -52,10 +54,10 @@ pub fn run_and_wait<T: Send + 'static>(
     let its_stop = stop.clone();
     let thread = std::thread::spawn(move || {
         let outcome = catch_unwind(AssertUnwindSafe(|| job(its_stop)));
-        // Nobody receives after Ctrl-C.
+        // After Ctrl-C the receiver is gone.
         let _ = send.send(outcome);
     });
-    // mpsc receivers are not `Sync`, which detaching asks for.
+    // mpsc receivers are not `Sync`, which detaching requires.
     let receive = std::sync::Mutex::new(receive);
     loop {
         let received = py.detach(|| match receive.lock() {
@@ -81,7 +83,7 @@ pub fn run_and_wait<T: Send + 'static>(
     }
 }
 
-/// A trace that cannot be read any more once its job is to stop.
+/// A trace that returns an error once its job must stop.
 struct Stoppable {
     trace: Textrace,
     stop: Stop,
@@ -135,7 +137,7 @@ impl Traces {
             .map(Self)
     }
 
-    /// The traces as the command line labels them.
+    /// The traces with the labels of the command line.
     pub fn subjects(&self) -> Vec<Subject<'_>> {
         let opened = self.0.iter();
         let named: Vec<_> = opened

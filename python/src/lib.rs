@@ -1,5 +1,5 @@
-//! The extension module of the Python package `parallax`. It has the functions that need Rust; the package's
-//! own modules make tables and data frames of what they return, and document them.
+//! The extension module of the Python package `parallax`. It contains the functions that need Rust.
+//! The package's Python modules convert their results to tables and data frames, and document them.
 
 mod errors;
 mod jobs;
@@ -11,7 +11,7 @@ mod tables;
 
 use pyo3::prelude::*;
 
-/// Functions of the package `parallax` that are written in Rust.
+/// Functions of the package `parallax` written in Rust.
 #[pymodule]
 mod _native {
     #[pymodule_export]

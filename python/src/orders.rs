@@ -1,4 +1,4 @@
-//! Tile orders that Python code gives as lists of tiles.
+//! Tile orders given by Python code as lists of tiles.
 
 use crate::errors::Failure;
 use crate::jobs::{self, Stop, Traces};
@@ -9,20 +9,20 @@ use pyo3::prelude::*;
 use replay::config::{Order, RunConfig};
 use replay::order::curve::Curve;
 use replay::order::parts::Parts;
-use replay::order::{self, Interleave, Known, Listed, TileRef, View, Views, WorkItem, views};
+use replay::order::{self, Interleave, Listed, PlanInputs, TileRef, View, Views, WorkItem, views};
 use replay::stream::rendered;
 use std::path::{Path, PathBuf};
 
 /// Eye (0 left, 1 right), column and row.
 type Tile = (u32, u32, u32);
 
-/// One tile, or two and how their primitives are interleaved.
+/// One tile, or two tiles and how their primitives are interleaved.
 type Item = (Tile, Option<(Tile, String)>);
 
 /// Frame, layer, index of the left pass, tile columns and rows.
 type Pair = (u32, u32, u32, u32, u32);
 
-/// The pairs of views of a trace whose tiles have this size.
+/// The pairs of views of a trace with tiles of this size.
 fn pairs_of(passes: &[Pass]) -> Vec<[View; 2]> {
     let mut frames: Vec<u32> = passes.iter().map(|pass| pass.frame).collect();
     frames.dedup();
@@ -35,7 +35,7 @@ fn pairs_of(passes: &[Pass]) -> Vec<[View; 2]> {
         .collect()
 }
 
-/// The passes of a trace with tiles of this size.
+/// The render passes of a trace with tiles of this size.
 fn passes_of(path: &Path, tile_px: u32) -> Result<Vec<Pass>> {
     let mut passes = Textrace::open(path)?.tables().passes.clone();
     for pass in &mut passes {
@@ -81,7 +81,8 @@ fn item(eyes: [View; 2], (first, second): &Item) -> Result<WorkItem> {
     Ok(WorkItem::Pair(first, place(*second)?, interleave))
 }
 
-/// Gives an order, one list of items per pair of views, a name that configurations accept.
+/// Registers an order, one list of items per pair of views, under a name that configurations
+/// accept.
 #[pyfunction]
 pub fn name_order(
     py: Python<'_>,
@@ -141,8 +142,8 @@ fn listed(
     passes: &[Pass],
     meta: &formats::textrace::TraceMeta,
 ) -> Result<Vec<Vec<Item>>, Failure> {
-    let known = Known::new(config, meta);
-    let phases = order::plan(config.order, &known, passes);
+    let inputs = PlanInputs::new(config, meta);
+    let phases = order::plan(config.order, &inputs, passes);
     let mut lists = Vec::new();
     for [left, right] in pairs_of(passes) {
         let place = |at: TileRef| {

@@ -1,4 +1,5 @@
-//! Replacement policies that are Python classes. A call into Python costs far more than a look-up.
+//! Replacement policies implemented as Python classes. A call into Python costs far more than a
+//! look-up.
 
 use crate::errors::{Failure, ParallaxError};
 use crate::jobs::Stop;
@@ -7,7 +8,7 @@ use pyo3::prelude::*;
 use replay::memory::{Policy, Replacement};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// The first exception of a class, after which its methods are not called any more.
+/// The first exception of a class. After it, the class's methods are not called any more.
 #[derive(Clone, Default)]
 struct Slot(Arc<Mutex<Calls>>);
 
@@ -36,13 +37,13 @@ impl Slot {
     }
 }
 
-/// The slots of all named classes.
+/// The slots of all registered classes.
 static SLOTS: Mutex<Vec<(String, Slot)>> = Mutex::new(Vec::new());
 
-/// Held by a replay with policies in Python, because their exceptions are kept by class.
+/// Held by a replay with policies in Python, because exceptions are stored per class.
 static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
 
-/// Makes a class a policy that configurations accept by this name.
+/// Registers a class as a policy under this name, which configurations then accept.
 #[pyfunction]
 pub fn name_policy(name: String, class: Py<PyAny>) {
     let slot = Slot::default();
@@ -86,8 +87,8 @@ pub fn watched<T: Send>(
     if stop.is_asked() {
         return Err(anyhow::anyhow!("interrupted").into());
     }
-    // Attaching a thread for each call takes longer than the call. One thread that stays attached lets other
-    // threads of the interpreter run whenever a method runs.
+    // Attaching a thread for each call takes longer than the call. Therefore one thread stays
+    // attached; other threads of the interpreter run whenever a method runs.
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let outcome = alone.install(|| Python::attach(|_| job()));
     let raised: Vec<PyErr> = slots
@@ -100,7 +101,7 @@ pub fn watched<T: Send>(
     }
 }
 
-/// A policy object of a cache.
+/// A cache's policy object.
 struct InPython {
     /// None if the class cannot be instantiated.
     methods: Option<Methods>,

@@ -12,17 +12,17 @@ use replay::report::sweep::SweepReport;
 use replay::report::{parquet, run as report};
 use std::path::PathBuf;
 
-/// Text of settings and where it comes from, and what replaces some of them.
+/// The text of settings, its source, and the settings that replace some of them.
 #[derive(Clone, FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Settings {
     /// TOML.
     text: String,
-    /// A file, whose lines errors name.
+    /// The file that errors name.
     file: Option<PathBuf>,
-    /// The tile order, if it is not that of the text.
+    /// The tile order, if it replaces that of the text.
     order: Option<String>,
-    /// The policy of L1 and L2, likewise.
+    /// The policy of L1 and L2, if it replaces that of the text.
     policy: Option<String>,
     /// Names of the caller's own policies in use.
     policies: Vec<String>,
@@ -36,7 +36,7 @@ impl Settings {
         !self.policies.is_empty()
     }
 
-    /// An error of the text, with the file or without a line.
+    /// An error of the text, with the file's name or without a line number.
     fn fault(&self, name: &str, error: PlanError) -> anyhow::Error {
         match (&self.file, error) {
             (Some(file), error) => anyhow!("{}: {error}", file.display()),
@@ -66,7 +66,7 @@ impl Settings {
     }
 }
 
-/// The order of a name, or the command line's error.
+/// The order with a name, or the command line's error.
 fn order(name: &str) -> Result<Order> {
     Order::by_name(name).map_err(|why| {
         let known: Vec<&str> = Order::all().map(Order::name).collect();
@@ -86,7 +86,7 @@ fn order(name: &str) -> Result<Order> {
     })
 }
 
-/// Checks that listed orders are orders of this trace.
+/// Checks that listed orders fit this trace.
 pub fn check_orders<'a>(
     configs: impl IntoIterator<Item = &'a RunConfig>,
     subject: &Subject<'_>,
@@ -113,7 +113,7 @@ pub fn check_orders<'a>(
     Ok(())
 }
 
-/// A tile of a pass as Python code writes it: eye, column, row.
+/// A tile of a render pass in Python's notation: eye, column, row.
 fn tile_name<E>(
     passes: &[formats::textrace::Pass],
     pass: Result<u32, E>,
@@ -171,7 +171,7 @@ pub fn run(py: Python<'_>, paths: Vec<PathBuf>, settings: Settings) -> PyResult<
     })
 }
 
-/// What `replay run --json` prints.
+/// The output of `replay run --json`.
 #[pyfunction]
 pub fn result(py: Python<'_>, path: PathBuf, settings: Settings) -> PyResult<String> {
     jobs::run_and_wait(py, settings.calls_python(), move |stop| {

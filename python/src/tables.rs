@@ -1,4 +1,4 @@
-//! Traces as columns. The vectors of the columns become NumPy arrays without a copy.
+//! Traces as columns. The vectors of the columns become NumPy arrays without copying.
 
 use crate::{errors::Failure, jobs};
 use formats::Trace;
@@ -60,7 +60,7 @@ pub fn raytrace<'py>(py: Python<'py>, path: PathBuf, rows: &str) -> PyResult<Vec
     }
 }
 
-/// What `replay info --json` prints.
+/// The output of `replay info --json`.
 #[pyfunction]
 pub fn info(py: Python<'_>, path: PathBuf) -> PyResult<String> {
     jobs::run(py, move |_| {

@@ -317,7 +317,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_default_is_the_papers_machine_and_valid() {
+    fn the_default_is_valid_and_is_the_papers_machine() {
         let config = RunConfig::default();
         config.validate().unwrap();
         assert_eq!(config.level.l1.sets("L1", config.line_bytes), Ok(128));
@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn sets_that_are_no_power_of_two_are_named() {
+    fn numbers_of_sets_that_are_not_powers_of_two_are_refused() {
         let config = RunConfig {
             level: Levels::two(LevelConfig::lru(6 << 10), LevelConfig::lru(128 << 10)),
             ..RunConfig::default()
@@ -379,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn ways_that_a_policy_cannot_have_are_refused_at_planning() {
+    fn unsupported_numbers_of_ways_are_refused_at_planning() {
         for (replacement, ways, expected) in [
             (
                 Replacement::TREE_PLRU,
@@ -423,7 +423,7 @@ mod tests {
     }
 
     #[test]
-    fn a_printed_configuration_reads_back_the_same() {
+    fn a_printed_configuration_parses_to_the_same_configuration() {
         let config = RunConfig {
             order: Order::Z2_STA_MERGE,
             seed: 9,

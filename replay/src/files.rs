@@ -42,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_replaced_whole_and_no_other_file_is_left() {
+    fn a_file_is_replaced_atomically_without_leaving_another_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("new/report.html");
         write_atomically(&path, b"one").unwrap();
@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_cannot_be_made_is_named() {
+    fn the_error_for_a_folder_that_cannot_be_created_names_it() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
         std::fs::write(&file, b"").unwrap();

@@ -4,7 +4,7 @@
 //! look-ups per core in the same order, but other interleavings of the cores.
 
 use crate::config::{CountBy, RunConfig};
-use crate::order::{self, Known, TileRef};
+use crate::order::{self, PlanInputs, TileRef};
 use crate::stream::{
     Bins, Consumer, Cores, Expander, LineMemory, QuadLines, StreamError, TileSource, TraceCounts,
     interleave, rendered,
@@ -57,17 +57,17 @@ pub fn line_list(source: &dyn TileSource, config: &RunConfig) -> Result<LineList
     for number in frames {
         let frame = expander.frame(number, &memory, &mut counts)?;
         collector.reserve(&counts);
-        let known = Known::new(config, &tables.meta);
+        let inputs = PlanInputs::new(config, &tables.meta);
         let counted = match config.order.parts().needs_counters() {
-            true => Some(frame.counters(&tables.passes, number, &known)?),
+            true => Some(frame.counters(&tables.passes, number, &inputs)?),
             false => None,
         };
         let last = counters.take().or_else(|| counted.clone());
-        let known = Known {
+        let inputs = PlanInputs {
             last: last.as_ref(),
-            ..known
+            ..inputs
         };
-        let phases = order::plan_frame(config.order, &known, &tables.passes, number);
+        let phases = order::plan_frame(config.order, &inputs, &tables.passes, number);
         let mut cores = Cores::new(&frame, config.cores as usize);
         interleave(&mut cores, &phases, config.dispatch(), &mut collector)?;
         counters = counted;
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn the_list_misses_in_plain_caches_as_the_replay_does() {
+    fn plain_caches_have_the_replays_misses_for_the_line_list() {
         let trace = Synthetic {
             size_px: [72, 56],
             layers: 2,

@@ -17,10 +17,10 @@ pub trait Row: fmt::Debug + Sized + 'static {
     fn table() -> &'static [Named<Self>];
     /// The table's names, in the same order.
     fn names() -> &'static [&'static str];
-    /// What a name stands for that no row has.
+    /// The meaning of a name that is not in the table.
     ///
     /// # Errors
-    /// Nothing; none where names are those of the table alone.
+    /// A name without a meaning. Tables that allow only their own names always fail.
     fn other(_name: &str) -> Result<Named<Self>, Option<String>> {
         Err(None)
     }
@@ -60,10 +60,10 @@ impl<R: Row> Named<R> {
         Self::by_name(name).ok()
     }
 
-    /// The row of that name, or what else it stands for.
+    /// The row with this name, or the meaning of a name that is not in the table.
     ///
     /// # Errors
-    /// An unknown name: why, where there is more to say than that no row has it.
+    /// An unknown name, with the reason if there is more to report than that.
     pub fn by_name(name: &str) -> Result<Self, Option<String>> {
         let row = Self::all().find(|row| row.name() == name);
         row.map_or_else(|| R::other(name), Ok)
@@ -136,7 +136,7 @@ impl<R: Row> clap::ValueEnum for Named<R> {
 }
 
 /// Implements [`Row`] for a type with the fields `name` and `help`, and defines one constant per row.
-/// `other = FUNCTION` gives the meaning of names that no row has.
+/// `other = FUNCTION` gives the meaning of names that are not in the table.
 macro_rules! registry {
     ($row:ty $(, other = $other:path)?: $($(#[$only:meta])* $id:ident = $value:expr;)+) => {
         impl $crate::registry::Named<$row> {

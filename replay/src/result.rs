@@ -484,7 +484,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_is_named_by_its_stem_unless_its_folder_says_more() {
+    fn a_file_is_labelled_with_its_stem_or_else_with_its_folder() {
         for (scene, name) in [
             ("atrium-plain", "atrium-plain"),
             ("../scenes/crytek-sponza/sponza.gltf", "crytek-sponza"),

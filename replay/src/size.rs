@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_refused_by_name() {
+    fn invalid_sizes_are_refused_with_their_text() {
         for text in [
             "",
             "KiB",

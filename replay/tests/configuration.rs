@@ -286,7 +286,7 @@ fn page() -> String {
 }
 
 #[test]
-fn the_page_of_keys_matches_the_code() {
+fn the_documentation_of_keys_matches_the_code() {
     let path = root().join("docs/use/configuration.md");
     let page = page();
     if std::env::var_os("UPDATE_DOCS").is_some() {
@@ -300,7 +300,7 @@ fn the_page_of_keys_matches_the_code() {
 }
 
 #[test]
-fn every_key_has_a_line_with_its_meaning() {
+fn every_key_is_documented_on_one_line() {
     fn count(table: &Table) -> usize {
         let inner = |value: &Value| match value {
             Value::Array(tables) => tables[0].as_table().map_or(1, count),

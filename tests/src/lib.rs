@@ -102,7 +102,7 @@ macro_rules! skipped {
     };
 }
 
-/// False, with a line on stderr, where no lavapipe is installed.
+/// Whether lavapipe is installed; prints a line on stderr if not.
 #[must_use]
 pub fn has_lavapipe() -> bool {
     let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
@@ -119,8 +119,8 @@ pub fn has_lavapipe() -> bool {
     found
 }
 
-/// Folder of the real test scenes (`PARALLAX_SCENES`, or `../shared/scenes` beside the checkout),
-/// or `None`, with a line on stderr that says so.
+/// Folder of the real test scenes (`PARALLAX_SCENES`, or `../shared/scenes` beside the checkout). Prints a
+/// line on stderr and returns `None` if the scene is absent.
 #[must_use]
 pub fn real_scene(relative: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("PARALLAX_SCENES")

@@ -14,7 +14,7 @@ pub struct Parts {
     pub kind: Kind,
     /// Major version.
     pub major: u16,
-    /// Minor version that it needs.
+    /// Minor version.
     pub minor: u16,
     /// Tag and bytes of each chunk.
     pub chunks: Vec<([u8; 4], Vec<u8>)>,

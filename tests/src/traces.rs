@@ -142,7 +142,7 @@ pub fn texture_tables() -> Tables {
     }
 }
 
-/// Tables of a program's trace: the same, with what scenes do not have.
+/// Tables of a trace of a program: the same, with features that scenes do not have.
 #[must_use]
 pub fn program_tables() -> Tables {
     let mut tables = texture_tables();
@@ -239,7 +239,8 @@ fn texture_tile(tables: &Tables, random: &mut Random) -> Tile {
     tile
 }
 
-/// The records with operands before those that ask for some, and no others.
+/// Keeps each record of operands that directly precedes its record, and removes all other records of
+/// operands.
 fn paired(draw: &Draw, records: &[QuadRecord]) -> Vec<QuadRecord> {
     let mut pairs = Vec::new();
     for record in records {
@@ -250,8 +251,8 @@ fn paired(draw: &Draw, records: &[QuadRecord]) -> Vec<QuadRecord> {
             },
             false => *record,
         };
-        let asks = draw.groups.get(usize::from(record.group));
-        if asks.is_some_and(UvGroup::has_operands) {
+        let group = draw.groups.get(usize::from(record.group));
+        if group.is_some_and(UvGroup::has_operands) {
             pairs.push(QuadRecord {
                 group: record.group - 1,
                 uv: [record.uv[0] % 20_000, record.uv[1] % 20_000],

@@ -183,7 +183,7 @@ pub fn write_inputs(inputs: &Path) {
 ///
 /// # Panics
 /// The writer fails.
-pub fn run_to_the_end(mut command: Command) {
+pub fn run_to_completion(mut command: Command) {
     run_ok(command.stdout(Stdio::null()));
 }
 

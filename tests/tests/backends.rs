@@ -18,12 +18,12 @@ fn capture(folder: &Path, backend: &str, driver: &str, arguments: &[&str]) -> Op
         .env("GALLIUM_DRIVER", driver)
         .output()
         .expect("the program starts");
-    let told = String::from_utf8_lossy(&output.stderr);
-    if told.contains("apt-get install libosmesa6") {
+    let message = String::from_utf8_lossy(&output.stderr);
+    if message.contains("apt-get install libosmesa6") {
         parallax_tests::skipped!("libOSMesa.so.8 is absent (apt-get install libosmesa6)");
         return None;
     }
-    assert!(output.status.success(), "{told}");
+    assert!(output.status.success(), "{message}");
     Some(trace)
 }
 
@@ -67,7 +67,7 @@ fn mesa(driver: &str) -> &str {
 
 /// Compares OSMesa's llvmpipe with lavapipe's: every lane has bit-identical samples if both are from the
 /// same version of Mesa.
-fn hold_llvmpipe(arguments: &[&str]) {
+fn check_llvmpipe(arguments: &[&str]) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let Some(ours) = capture(folder.path(), "osmesa", "llvmpipe", arguments) else {
         return;
@@ -89,10 +89,10 @@ fn hold_llvmpipe(arguments: &[&str]) {
 }
 
 #[test]
-fn osmesa_samples_what_lavapipe_samples_to_the_last_bit() {
+fn osmesa_records_are_bit_identical_to_those_of_lavapipe() {
     // A record buffer that overflows; shadow cascades. The plain picture is compared as well.
-    hold_llvmpipe(&["teapot", "--size", "96x80", "--record-budget", "64KiB"]);
-    hold_llvmpipe(&["atrium-shadows", "--size", "96x80", "--views", "left"]);
+    check_llvmpipe(&["teapot", "--size", "96x80", "--record-budget", "64KiB"]);
+    check_llvmpipe(&["atrium-shadows", "--size", "96x80", "--views", "left"]);
 }
 
 /// Writes a slanted floor whose texture is rotated, scaled and moved by KHR_texture_transform.
@@ -150,7 +150,7 @@ fn write_turned_floor(folder: &Path) -> PathBuf {
 }
 
 #[test]
-fn osmesa_samples_what_lavapipe_samples_where_a_texture_is_turned() {
+fn osmesa_records_equal_those_of_lavapipe_for_a_texture_transform() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scene = write_turned_floor(folder.path());
     let view = [
@@ -161,16 +161,16 @@ fn osmesa_samples_what_lavapipe_samples_where_a_texture_is_turned() {
         "--size",
         "128x128",
     ];
-    hold_llvmpipe(&[&[scene.to_str().expect("UTF-8")][..], &view].concat());
+    check_llvmpipe(&[&[scene.to_str().expect("UTF-8")][..], &view].concat());
 }
 
 #[test]
-fn osmesa_samples_what_lavapipe_samples_in_a_real_scene() {
+fn osmesa_records_equal_those_of_lavapipe_in_a_real_scene() {
     let Some(scene) = real_scene("stk-cocoa-temple/stk-cocoa-temple.gltf") else {
         return;
     };
-    // Its grass lies on its ground, so the last bit decides between equal depths.
-    hold_llvmpipe(&[&scene.to_string_lossy(), "--size", "128x128"]);
+    // Its grass is coplanar with its ground, so the last bit decides the order of equal depths.
+    check_llvmpipe(&[&scene.to_string_lossy(), "--size", "128x128"]);
 }
 
 #[test]
@@ -233,7 +233,7 @@ fn osmesa_refuses_techniques() {
 }
 
 #[test]
-fn without_the_library_its_file_and_package_are_named() {
+fn a_missing_library_is_reported_with_its_file_and_package() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     // The loader takes the first file with that name, and this one is not a library.
     std::fs::write(folder.path().join("libOSMesa.so.8"), "").expect("a file");

@@ -56,17 +56,17 @@ impl Captures {
 }
 
 #[test]
-fn shards_make_the_same_captures_as_the_command_line_and_only_once() {
+fn shards_make_each_capture_once_and_equal_to_the_command_line() {
     let captures = Captures::new(MANIFEST);
-    let told = captures.run("out", &["--shard", "2/2"]);
+    let summary = captures.run("out", &["--shard", "2/2"]);
     assert!(
-        told.ends_with("1 captures: 1 made, 0 there with the same recipe"),
-        "the chess set has three times the teapot's triangles: {told}"
+        summary.ends_with("1 captures: 1 made, 0 there with the same recipe"),
+        "the chess set has three times the teapot's triangles: {summary}"
     );
-    let told = captures.run("out", &[]);
+    let summary = captures.run("out", &[]);
     assert!(
-        told.ends_with("4 captures: 3 made, 1 there with the same recipe"),
-        "{told}"
+        summary.ends_with("4 captures: 3 made, 1 there with the same recipe"),
+        "{summary}"
     );
     let names: Vec<String> = ["chess-quest2", "chess-vive", "teapot-quest2", "teapot-vive"]
         .iter()
@@ -74,7 +74,7 @@ fn shards_make_the_same_captures_as_the_command_line_and_only_once() {
         .collect();
     assert_eq!(captures.names("out"), names);
 
-    // The recipe of a trace makes the same trace by hand.
+    // The command in the recipe makes the same trace.
     let recipe = captures.path("out/chess-vive.raytrace.recipe");
     let recipe = fs::read_to_string(recipe).expect("a recipe");
     let (recipe, checksum) = recipe.split_once('\n').expect("two lines");
@@ -91,8 +91,8 @@ fn shards_make_the_same_captures_as_the_command_line_and_only_once() {
     assert!(a == b);
     let info = run_ok(program("replay").args(["info", "--json"]).arg(&by_hand)).stdout;
     let info: serde_json::Value = serde_json::from_slice(&info).expect("JSON");
-    let told = info["checksum"].as_str().expect("a checksum");
-    assert_eq!(checksum, format!("# content checksum {told}\n"));
+    let content = info["checksum"].as_str().expect("a checksum");
+    assert_eq!(checksum, format!("# content checksum {content}\n"));
 
     // A changed recipe and a missing recipe cause a new capture.
     fs::write(captures.path("m.toml"), MANIFEST.replace("16x24", "24x16")).expect("temporary file");
@@ -124,8 +124,8 @@ fn changed_settings_of_rays_recapture_only_the_rays() {
     ] {
         let before = trace(kept);
         fs::write(captures.path("m.toml"), manifest(raster, rays)).expect("temporary file");
-        let told = captures.run("out", &[]);
-        assert!(told.contains("1 made, 1 there"), "{told}");
+        let summary = captures.run("out", &[]);
+        assert!(summary.contains("1 made, 1 there"), "{summary}");
         assert_eq!(trace(kept), before);
     }
 }
@@ -143,8 +143,8 @@ fn a_truncated_or_foreign_trace_with_a_recipe_is_captured_again() {
     let done = plan["captures"].as_array().expect("captures").iter();
     let done: Vec<&serde_json::Value> = done.map(|c| &c["done"]).collect();
     assert_eq!(done, [false, true, true, false]);
-    let told = captures.run("out", &[]);
-    assert!(told.contains("2 made, 2 there"), "{told}");
+    let summary = captures.run("out", &[]);
+    assert!(summary.contains("2 made, 2 there"), "{summary}");
     assert!(fs::read(path("teapot-vive")).expect("a trace") == whole);
 }
 
@@ -193,8 +193,8 @@ fn the_plan_lists_recipes_costs_and_finished_captures() {
         text.starts_with("teapot-vive.raytrace: rays teapot --hmd vive --size 16x24\n"),
         "{text}"
     );
-    let told = captures.run("out", &["--shard", "1/4"]);
-    assert!(told.contains("2 made"), "both teapots: {told}");
+    let summary = captures.run("out", &["--shard", "1/4"]);
+    assert!(summary.contains("2 made"), "both teapots: {summary}");
     let plan = run_ok(&mut captures.command("out", &["--plan", "--json"])).stdout;
     let plan: serde_json::Value = serde_json::from_slice(&plan).expect("JSON");
     assert_eq!(plan["schema"], "tracegen.plan/1");

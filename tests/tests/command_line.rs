@@ -25,7 +25,7 @@ fn subcommands(name: &str) -> Vec<String> {
     names
 }
 
-/// Commands of a program that the page of commands names: the word after the program's in `code`.
+/// Commands of a program that the page of commands names: the second word in `code`.
 fn commands_of_the_page(page: &str, name: &str) -> BTreeSet<String> {
     let codes = page.split('`').skip(1).step_by(2);
     let of_program = codes.filter_map(|code| code.strip_prefix(name)?.strip_prefix(' '));
@@ -36,7 +36,7 @@ fn commands_of_the_page(page: &str, name: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn the_page_of_commands_lists_those_of_both_programs_and_no_other() {
+fn the_page_of_commands_lists_exactly_the_subcommands_of_both_programs() {
     let page = root().join("docs/use/commands.md");
     let page = std::fs::read_to_string(page).expect("the page");
     for name in PROGRAMS {
@@ -126,9 +126,9 @@ fn an_error_is_printed_once() {
 fn quiet_prints_only_the_result() {
     let trace = root().join("traces/atrium-shadows.textrace");
     let run = |quiet: &[&str]| run_ok(program("replay").arg("run").arg(&trace).args(quiet));
-    let (told, quiet) = (run(&[]), run(&["--quiet"]));
-    assert!(!told.stderr.is_empty() && quiet.stderr.is_empty());
-    assert_eq!(told.stdout, quiet.stdout);
+    let (verbose, quiet) = (run(&[]), run(&["--quiet"]));
+    assert!(!verbose.stderr.is_empty() && quiet.stderr.is_empty());
+    assert_eq!(verbose.stdout, quiet.stdout);
     let mut rays = program("tracegen");
     rays.args(["-q", "rays", "teapot", "--size", "32x32", "-o", "-"]);
     assert!(run_ok(&mut rays).stderr.is_empty());
@@ -148,10 +148,13 @@ fn an_unwritable_log_is_ignored_and_an_unwritable_result_is_an_error() {
         command.args(arguments).arg(&trace);
         command
     };
-    let told = run_ok(&mut run(&["run"]));
-    assert!(!told.stderr.is_empty(), "it prints figures about the run");
-    let untold = run_ok(run(&["run"]).stderr(full()));
-    assert_eq!(untold.stdout, told.stdout);
+    let verbose = run_ok(&mut run(&["run"]));
+    assert!(
+        !verbose.stderr.is_empty(),
+        "it prints figures about the run"
+    );
+    let without_log = run_ok(run(&["run"]).stderr(full()));
+    assert_eq!(without_log.stdout, verbose.stdout);
     for arguments in [&["run", "no-such"][..], &["run", "--no\u{7}-such"]] {
         let output = program("replay").args(arguments).stderr(full()).output();
         assert_eq!(output.expect("it starts").status.code(), Some(2));

@@ -56,8 +56,8 @@ fn fragments_recorded_one_by_one_give_the_same_traces_as_quads() {
             // tracegen makes the same choice for narrow vectors.
             command.env("GALLIUM_OVERRIDE_CPU_CAPS", "sse4.1");
             let output = run_ok(command.env("LP_NATIVE_VECTOR_WIDTH", bits));
-            let told = String::from_utf8_lossy(&output.stderr).contains("recorded one by one");
-            assert_eq!(told, bits == "128");
+            let has_note = String::from_utf8_lossy(&output.stderr).contains("recorded one by one");
+            assert_eq!(has_note, bits == "128");
             let bytes = fs::read(&path).expect("a trace");
             let mut chunks = Parts::of(&bytes).chunks;
             // The description names the driver.

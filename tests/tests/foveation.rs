@@ -112,13 +112,13 @@ fn measure(scene: &str, all: bool) {
     assert_eq!(masked, PictureError::NONE, "the lens shows no difference");
     let uniform = |name, edges| row(name, &["--foveate", "rings", "--rates", edges]);
     let mut rates = Vec::new();
-    for (name, edges, tells_most) in [
+    for (name, edges, is_default) in [
         ("1/2 everywhere", "0,180,180,180", false),
         ("1/4 everywhere", "0,0,180,180", true),
         ("1/8 everywhere", "0,0,0,180", false),
         ("1/16 everywhere", "0,0,0,0", true),
     ] {
-        if all || tells_most {
+        if all || is_default {
             rates.push(uniform(name, edges));
         }
     }

@@ -4,7 +4,7 @@
 //! `make faults` tries every writer at many sizes (`STEPS=n`); `make test` tries a few at some sizes.
 #![cfg(unix)]
 
-use parallax_tests::writers::{self, Files, Writer, run_to_the_end};
+use parallax_tests::writers::{self, Files, Writer, run_to_completion};
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
@@ -66,14 +66,14 @@ fn fails(mut command: Command, reasons: &[&str], place: &str) {
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{place}: {message}");
     assert!(!message.contains("panicked"), "{place}: {message}");
-    let told = reasons.iter().any(|reason| message.contains(reason));
-    assert!(told, "{place}: none of {reasons:?} in {message}");
+    let has_reason = reasons.iter().any(|reason| message.contains(reason));
+    assert!(has_reason, "{place}: none of {reasons:?} in {message}");
 }
 
 /// The files that each writer writes on a large disk.
 fn whole(writer: &Writer, inputs: &Path) -> Files {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    run_to_the_end((writer.command)(inputs, folder.path()));
+    run_to_completion((writer.command)(inputs, folder.path()));
     Files::below(folder.path())
 }
 

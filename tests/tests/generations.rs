@@ -58,7 +58,7 @@ fn without_meta(tables: &Tables) -> Tables {
     }
 }
 
-fn hold(scene: &str, second: &Driver) {
+fn check_same_records(scene: &str, second: &Driver) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let first = capture(folder.path(), scene, None);
     let second = capture(folder.path(), scene, Some(second));
@@ -86,14 +86,14 @@ fn hold(scene: &str, second: &Driver) {
 fn two_generations_of_mesa_capture_the_same_records() {
     let Some(second) = second() else { return };
     // Shadow maps; masked and instanced foliage.
-    hold("atrium-shadows", &second);
-    hold("jungle", &second);
+    check_same_records("atrium-shadows", &second);
+    check_same_records("jungle", &second);
     for scene in [
         "crytek-sponza/sponza.gltf",
         "stk-cocoa-temple/stk-cocoa-temple.gltf",
     ] {
         if let Some(scene) = real_scene(scene) {
-            hold(&scene.to_string_lossy(), &second);
+            check_same_records(&scene.to_string_lossy(), &second);
         }
     }
 }

@@ -249,7 +249,7 @@ fn every_golden_trace_replays_to_its_golden_result() {
 
 /// All orders of `replay orders`, functional and, without what is slow, timed.
 #[test]
-fn every_order_replays_every_golden_trace_to_its_golden_row() {
+fn each_golden_trace_has_its_golden_row_for_each_order() {
     for trace in golden_traces("textrace") {
         for (name, options) in [
             ("orders-functional", &["--caches", "8/64,16/256"][..]),

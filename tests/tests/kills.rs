@@ -6,7 +6,7 @@
 #![cfg(unix)]
 
 use parallax_tests::traces::Random;
-use parallax_tests::writers::{self, Files, Writer, run_to_the_end};
+use parallax_tests::writers::{self, Files, Writer, run_to_completion};
 use std::fs;
 use std::io::Read;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
@@ -54,7 +54,7 @@ impl<'a> Undisturbed<'a> {
     fn of(writer: &'a Writer, inputs: &Path) -> Self {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let start = Instant::now();
-        run_to_the_end((writer.command)(inputs, folder.path()));
+        run_to_completion((writer.command)(inputs, folder.path()));
         let time = start.elapsed();
         let files = Files::below(folder.path());
         assert_eq!(files.unfinished, [""; 0], "{}", writer.name);
@@ -115,7 +115,7 @@ fn killed_writers_leave_nothing_incomplete_and_complete_with_the_same_bytes_the_
                     assert_eq!(left.unfinished, [""; 0], "{place}");
                 }
             }
-            run_to_the_end((writer.command)(inputs.path(), folder.path()));
+            run_to_completion((writer.command)(inputs.path(), folder.path()));
             let end = Files::below(folder.path());
             end.assert_part_of(files, writer, writer.name);
             let names = |files: &Files| files.finished.keys().cloned().collect::<Vec<_>>();
@@ -144,7 +144,7 @@ fn a_sharded_sweep_with_a_killed_worker_merges_to_the_bytes_of_one_machine() {
     };
     let whole = tempfile::tempdir().expect("a temporary folder");
     let start_of_whole = Instant::now();
-    run_to_the_end(sweep(whole.path(), &[]));
+    run_to_completion(sweep(whole.path(), &[]));
     let time = start_of_whole.elapsed();
     let whole = Files::below(whole.path());
     let mut random = Random(7);
@@ -161,8 +161,8 @@ fn a_sharded_sweep_with_a_killed_worker_merges_to_the_bytes_of_one_machine() {
             let status = worker.wait().expect("it ends");
             assert!(status.success() || number == victim, "worker {number}");
         }
-        run_to_the_end(sweep(folder.path(), &["--shard", shards[victim]]));
-        run_to_the_end(sweep(folder.path(), &["--merge-only"]));
+        run_to_completion(sweep(folder.path(), &["--shard", shards[victim]]));
+        run_to_completion(sweep(folder.path(), &["--merge-only"]));
         let merged = Files::below(folder.path());
         assert!(merged.finished == whole.finished, "the merge differs");
         fs::remove_dir_all(folder.path()).expect("removable");

@@ -23,7 +23,7 @@ fn names(folder: &Path) -> Vec<String> {
 }
 
 /// Runs a command that writes into the folder with each limit; returns whether one of them was too low.
-fn tell(command: &Command, folder: &Path, limits_mib: &[u32]) -> bool {
+fn fails_with_message(command: &Command, folder: &Path, limits_mib: &[u32]) -> bool {
     let mut refused = false;
     for limit_mib in limits_mib {
         let output = limited(command, *limit_mib).output().expect("sh starts");
@@ -60,7 +60,7 @@ fn a_replay_without_memory_ends_with_a_message() {
             _ => &mut command,
         };
         assert!(
-            tell(&command, folder.path(), &[24, 32, 40, 50, 60]),
+            fails_with_message(&command, folder.path(), &[24, 32, 40, 50, 60]),
             "{name}"
         );
     }
@@ -79,6 +79,9 @@ fn a_capture_without_memory_ends_with_a_message() {
         if name != "verify" {
             command.arg("-o").arg(folder.path().join("trace"));
         }
-        assert!(tell(&command, folder.path(), limits_mib), "{name}");
+        assert!(
+            fails_with_message(&command, folder.path(), limits_mib),
+            "{name}"
+        );
     }
 }

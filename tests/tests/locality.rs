@@ -62,7 +62,7 @@ struct Level {
     own: Lru,
     full: Lru,
     seen: HashSet<u64>,
-    /// Compulsory, capacity and conflict misses, and avoided misses (`avoided`).
+    /// Compulsory, capacity, conflict and avoided misses.
     counts: [u64; 4],
 }
 

@@ -56,7 +56,7 @@ impl Lru {
 
 /// Uses one core, and orders that differ in every part.
 #[test]
-fn bytes_are_those_of_plain_caches_fed_with_din() {
+fn bytes_equal_those_of_plain_caches_with_din_input() {
     let names = [
         "gilbert+sta",
         "zig-zag+halves+offset",
@@ -93,7 +93,7 @@ fn bytes_are_those_of_plain_caches_fed_with_din() {
 }
 
 #[test]
-fn rows_say_what_an_order_is_and_what_it_needs() {
+fn rows_describe_their_order_and_its_requirements() {
     let json = orders(&[
         "--orders",
         "zig-zag+sta+offset+boustro",
@@ -140,7 +140,7 @@ fn rows_say_what_an_order_is_and_what_it_needs() {
 }
 
 #[test]
-fn searched_orders_come_from_files_and_replay_to_the_same_bytes() {
+fn searched_orders_from_files_replay_to_the_same_bytes() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().to_str().expect("a name");
     let usual = ["--orders", "z2-sta", "--caches", "8/32"];
@@ -199,9 +199,9 @@ fn searched_orders_come_from_files_and_replay_to_the_same_bytes() {
     );
 }
 
-/// Two frames: caches between them, and the learner.
+/// Replays two frames with caches kept or emptied between them, and with the learner.
 #[test]
-fn caches_between_frames_are_an_axis_and_a_learner_is_held_against_fixed_orders() {
+fn rows_cover_kept_and_emptied_caches_and_compare_the_learner_with_fixed_orders() {
     let trace = root().join("traces/jungle.textrace");
     let json = orders_of(
         &trace,
@@ -249,7 +249,7 @@ fn caches_between_frames_are_an_axis_and_a_learner_is_held_against_fixed_orders(
 }
 
 #[test]
-fn the_same_bytes_whatever_the_threads() {
+fn output_does_not_depend_on_the_number_of_threads() {
     let run = |threads: &str, html: &Path| {
         let mut command = program("replay");
         command.arg("orders").arg(trace()).args([
@@ -271,7 +271,7 @@ fn the_same_bytes_whatever_the_threads() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
+fn contradicting_options_are_refused() {
     let refused = |arguments: &[&str], expected: &[&str]| {
         let mut command = program("replay");
         refuse(command.arg("orders").arg(trace()).args(arguments), expected);

@@ -1,5 +1,6 @@
-//! `tracegen app` on a Vulkan program of our own, whose texels tell their coordinates: records equal occlusion queries in
-//! every draw, each pixel shows a texel that its last record reads, and the picture is the same without the layer.
+//! Tests of `tracegen app` on a Vulkan program of this package whose texels hold their coordinates. In every
+//! draw, the number of recorded fragments equals that of an occlusion query. Each pixel shows a texel that
+//! its last record reads. The picture is the same without the layer.
 
 use formats::footprint::{Footprint, SamplingOptions, record_footprints};
 use formats::textrace::{NO_GROUP, QuadRecord, Sample, Tables, Textrace, Tile};
@@ -11,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const SIZE_PX: [usize; 2] = [240, 200];
-/// The program's objects, in the order in which it makes their pipelines.
+/// The program's objects, in the order in which it creates their pipelines.
 const OBJECTS: [&str; 18] = [
     "plain",
     "pair",
@@ -41,11 +42,12 @@ struct Captured {
     trace: PathBuf,
     /// Left and right picture, row by row.
     pictures: [Vec<[u8; 4]>; 2],
-    /// What the command said.
-    said: String,
+    /// Standard error of the command.
+    message: String,
 }
 
-/// Captures the last frame of the program, with its picture, and holds both against the program alone.
+/// Captures the last frame of the program with its picture. Compares the pictures of the program with and
+/// without the layer.
 fn capture(folder: &Path, stereo: &str, more: &[&str]) -> Captured {
     let pictures = [folder.join("plain.raw"), folder.join("captured.raw")];
     let arguments = ["--stereo", stereo, "--frames", "3", "--picture"];
@@ -63,7 +65,7 @@ fn capture(folder: &Path, stereo: &str, more: &[&str]) -> Captured {
         .args(arguments)
         .arg(&pictures[1]);
     let output = run_ok(&mut command);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
     let [plain, captured] = pictures.map(|path| std::fs::read(path).expect("a picture"));
     assert!(plain == captured, "{stereo}: the layer changes the picture");
     let (left, right) = captured.split_at(captured.len() / 2);
@@ -76,12 +78,12 @@ fn capture(folder: &Path, stereo: &str, more: &[&str]) -> Captured {
     Captured {
         trace,
         pictures: [pixels(left), pixels(right)],
-        said,
+        message,
     }
 }
 
-/// Texel, level and layer that a pixel tells; `None` of a pixel that shows none.
-fn told([x, y, level, layer]: [u8; 4]) -> Option<[u32; 4]> {
+/// Texel, level and layer that the colour of a pixel encodes; `None` for the background.
+fn texel_of_color([x, y, level, layer]: [u8; 4]) -> Option<[u32; 4]> {
     let level = u32::from(level.checked_sub(1)?);
     assert_eq!(level % 30, 0, "no colour of a texel");
     Some([
@@ -92,7 +94,7 @@ fn told([x, y, level, layer]: [u8; 4]) -> Option<[u32; 4]> {
     ])
 }
 
-/// A record of one lane, with its operands, and its draw.
+/// A record of one lane with its operands and its draw.
 #[derive(Clone, Copy)]
 struct Last {
     draw: u32,
@@ -100,7 +102,7 @@ struct Last {
     operands: Option<QuadRecord>,
 }
 
-/// All records of each pixel of an eye's picture, in the order of the trace.
+/// All records of each pixel of an eye's picture, in trace order.
 fn records(trace: &Textrace, eye: Eye) -> HashMap<[usize; 2], Vec<Last>> {
     let mut found: HashMap<[usize; 2], Vec<Last>> = HashMap::new();
     let mut tile = Tile::default();
@@ -136,7 +138,7 @@ fn records(trace: &Textrace, eye: Eye) -> HashMap<[usize; 2], Vec<Last>> {
     found
 }
 
-/// What a record's lane reads, its coordinates moved by some steps of 1/2048 texel.
+/// Footprints of a record whose coordinates are moved by some steps of 1/2048 texel.
 fn reads(tables: &Tables, last: &Last, by: [i32; 2]) -> Vec<(Sample, Footprint)> {
     let mut record = last.record;
     record.uv = [0, 1].map(|axis| record.uv[axis] + by[axis]);
@@ -154,26 +156,26 @@ fn reads(tables: &Tables, last: &Last, by: [i32; 2]) -> Vec<(Sample, Footprint)>
     found
 }
 
-/// The pixel shows what a record reads. Coordinates are rounded to 1/2048 texel, so a texel's edge may lie on either
-/// side; a level likewise.
-fn explains(tables: &Tables, last: &Last, object: &str, pixel: [u8; 4]) -> bool {
+/// Whether the pixel shows a texel that the record reads. Coordinates are rounded to 1/2048 texel, so a
+/// coordinate near a texel's edge may be on either side; so may a level.
+fn explains_pixel(tables: &Tables, last: &Last, object: &str, pixel: [u8; 4]) -> bool {
     const STEPS: [i32; 3] = [0, -2, 2];
     let moves = STEPS
         .iter()
         .flat_map(|u| STEPS.iter().map(move |v| [*u, *v]));
     let mut all = moves.map(|by| reads(tables, last, by));
     match object {
-        // The components are the columns of the four texels, from the lower left one on.
+        // The components are the columns of the four texels, starting at the lower left one.
         "gather" => all.any(|reads| {
             reads.iter().any(|(_, f)| {
                 let columns = [f.i[0], f.i[1], f.i[1], f.i[0]].map(|i| i as u8);
                 columns == pixel
             })
         }),
-        // Texels of a border are black.
+        // Texels of the border are black.
         "border" if pixel == [0; 4] => all.any(|reads| reads.is_empty()),
         _ => {
-            let Some([x, y, level, layer]) = told(pixel) else {
+            let Some([x, y, level, layer]) = texel_of_color(pixel) else {
                 return last.record.group == NO_GROUP;
             };
             all.any(|reads| {
@@ -194,8 +196,8 @@ fn object(tables: &Tables, draw: u32) -> &'static str {
     OBJECTS[number.parse::<usize>().expect("a pipeline's number")]
 }
 
-/// Holds every pixel against its records. Tells how many each object explains.
-fn explain(captured: &Captured) -> HashMap<&'static str, u64> {
+/// Checks every pixel against its records. Returns the number of explained pixels of each object.
+fn check_pixels(captured: &Captured) -> HashMap<&'static str, u64> {
     let trace = Textrace::open(&captured.trace).expect("a trace");
     let tables = trace.tables();
     for sampler in &tables.samplers {
@@ -207,37 +209,42 @@ fn explain(captured: &Captured) -> HashMap<&'static str, u64> {
         let mut records = records(&trace, eye);
         for (number, &pixel) in picture.iter().enumerate() {
             let at = [number % SIZE_PX[0], number / SIZE_PX[0]];
-            let of_pixel = records.remove(&at).unwrap_or_default();
-            let Some(top) = of_pixel.last() else {
+            let pixel_records = records.remove(&at).unwrap_or_default();
+            let Some(top) = pixel_records.last() else {
                 assert_eq!(pixel, [0; 4], "{eye} {at:?} is lit without a record");
                 continue;
             };
-            // What was discarded shows what lies behind.
+            // Behind a discarded fragment, the pixel shows the fragment below.
             let primitive_of = |last: &Last| object(tables, last.draw);
-            let seen = of_pixel.iter().rev().find(|last| {
+            let seen = pixel_records.iter().rev().find(|last| {
                 let name = primitive_of(last);
-                name == "volume" || explains(tables, last, name, pixel)
+                name == "volume" || explains_pixel(tables, last, name, pixel)
             });
             let name = primitive_of(top);
             let is_discarding = |last: &&Last| primitive_of(last) == "discard";
-            let above = of_pixel.iter().rev().take_while(is_discarding).count();
+            let above = pixel_records.iter().rev().take_while(is_discarding).count();
             let depth = seen.and_then(|seen| {
-                of_pixel
+                pixel_records
                     .iter()
                     .rev()
                     .position(|last| std::ptr::eq(last, seen))
             });
-            // A loop's last iteration, or a branch's only one, comes last; groups of a pair in any order.
+            // The last iteration of a loop, or the executed branch, comes last. The groups of a pair have no
+            // order.
             let same_draw = depth.is_some_and(|depth| {
-                depth <= above || primitive_of(&of_pixel[of_pixel.len() - 1 - depth]) == name
+                depth <= above
+                    || primitive_of(&pixel_records[pixel_records.len() - 1 - depth]) == name
             });
-            if same_draw || (pixel == [0; 4] && above == of_pixel.len()) {
+            if same_draw || (pixel == [0; 4] && above == pixel_records.len()) {
                 *explained.entry(name).or_default() += 1;
             } else {
                 let reads = reads(tables, top, [0; 2]);
                 let of = wrong.entry(name).or_default();
                 of.0 += 1;
-                of.1 = format!("{eye} {at:?} shows {:?}, reads {reads:?}", told(pixel));
+                of.1 = format!(
+                    "{eye} {at:?} shows {:?}, reads {reads:?}",
+                    texel_of_color(pixel)
+                );
             }
         }
     }
@@ -246,7 +253,7 @@ fn explain(captured: &Captured) -> HashMap<&'static str, u64> {
 }
 
 #[test]
-fn every_pixel_shows_a_texel_of_its_last_record_however_eyes_are_rendered() {
+fn every_pixel_shows_a_texel_of_its_last_record_in_every_stereo_mode() {
     if !has_lavapipe() {
         return;
     }
@@ -258,11 +265,15 @@ fn every_pixel_shows_a_texel_of_its_last_record_however_eyes_are_rendered() {
     ] {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let captured = capture(folder.path(), stereo, &[]);
-        assert!(captured.said.contains(rule), "{}", captured.said);
-        assert!(captured.said.contains("0 different"), "{}", captured.said);
+        assert!(captured.message.contains(rule), "{}", captured.message);
+        assert!(
+            captured.message.contains("0 different"),
+            "{}",
+            captured.message
+        );
         let left_out = "three-dimensional textures (1 draws,";
-        assert!(captured.said.contains(left_out), "{}", captured.said);
-        let explained = explain(&captured);
+        assert!(captured.message.contains(left_out), "{}", captured.message);
+        let explained = check_pixels(&captured);
         println!("{stereo}: pixels explained: {explained:?}");
         for object in OBJECTS {
             let least = if object == "plain" { 10_000 } else { 100 };
@@ -319,7 +330,7 @@ fn the_same_program_gives_the_same_trace() {
     assert!(traces[0] == traces[1]);
 }
 
-/// A capture of the program that has to fail, and leaves no trace.
+/// Runs a capture that must fail and must not leave a trace.
 fn refused(options: &[&str], program_options: &[&str], expected: &[&str]) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let trace = folder.path().join("a.textrace");
@@ -380,8 +391,14 @@ fn programs_that_end_too_early_or_never_end_a_frame_leave_no_trace() {
     );
 }
 
-/// What `tracegen app` records of the program, with arguments of both, into a trace of this name.
-fn captured_by(folder: &Path, name: &str, options: &[&str], program_arguments: &[&str]) -> PathBuf {
+/// Captures the program with options of `tracegen app` and arguments of the program; returns the path of the
+/// trace.
+fn capture_program(
+    folder: &Path,
+    name: &str,
+    options: &[&str],
+    program_arguments: &[&str],
+) -> PathBuf {
     let trace = folder.join(name).with_extension("textrace");
     let mut command = program("tracegen");
     command.args(["app", "-o"]).arg(&trace).args(options);
@@ -393,28 +410,31 @@ fn captured_by(folder: &Path, name: &str, options: &[&str], program_arguments: &
     trace
 }
 
-/// Two traces have the same tables and tiles; they may tell of different commands.
+/// Checks that two traces have the same tables and tiles. Their descriptions of the command may differ.
 fn assert_same(a: &Path, b: &Path) {
-    const APART: [&str; 3] = ["meta.command_line", "meta.scene", "meta.program.views_by"];
+    const MAY_DIFFER: [&str; 3] = ["meta.command_line", "meta.scene", "meta.program.views_by"];
     let output = program("replay").arg("diff").args([a, b]).output();
     let text = String::from_utf8(output.expect("replay starts").stdout).expect("text");
     let differ: Vec<&str> = text
         .lines()
         .filter(|line| !line.starts_with(['<', '>']))
         .collect();
-    let is_apart = |line: &&str| APART.iter().any(|name| line.starts_with(name));
-    assert!(!differ.is_empty() && differ.iter().all(is_apart), "{text}");
+    let may_differ = |line: &&str| MAY_DIFFER.iter().any(|name| line.starts_with(name));
+    assert!(
+        !differ.is_empty() && differ.iter().all(may_differ),
+        "{text}"
+    );
 }
 
 #[test]
-fn programs_that_fork_or_are_started_by_scripts_are_captured_alike() {
+fn programs_that_fork_or_are_started_by_scripts_give_the_same_trace() {
     if !has_lavapipe() {
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let frames = ["--frames", "2"];
-    let plain = captured_by(folder.path(), "plain", &frames, &[]);
-    let forks = captured_by(folder.path(), "forks", &frames, &["--end", "fork"]);
+    let plain = capture_program(folder.path(), "plain", &frames, &[]);
+    let forks = capture_program(folder.path(), "forks", &frames, &["--end", "fork"]);
     assert_same(&plain, &forks);
     // The script has ended before its program renders.
     let started = folder.path().join("started.textrace");
@@ -426,7 +446,7 @@ fn programs_that_fork_or_are_started_by_scripts_are_captured_alike() {
 }
 
 #[test]
-fn a_program_that_never_renders_is_ended_after_a_time_that_the_user_chooses() {
+fn a_program_that_never_renders_is_ended_after_the_timeout() {
     if !has_lavapipe() {
         return;
     }
@@ -440,15 +460,15 @@ fn a_program_that_never_renders_is_ended_after_a_time_that_the_user_chooses() {
     );
 }
 
-/// A range of frames is each of its frames, one after the other.
+/// Compares the trace of several frames with the traces of the single frames.
 #[test]
-fn several_frames_are_those_that_are_captured_one_by_one() {
+fn a_capture_of_several_frames_equals_captures_of_single_frames() {
     if !has_lavapipe() {
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let arguments = ["--frames", "5"];
-    let all = captured_by(folder.path(), "all", &["--frames", "1..4"], &arguments);
+    let all = capture_program(folder.path(), "all", &["--frames", "1..4"], &arguments);
     let all = Textrace::open(&all).expect("a trace");
     let counts = |trace: &Textrace, frame: u32| -> u64 {
         let mut tile = Tile::default();
@@ -465,7 +485,7 @@ fn several_frames_are_those_that_are_captured_one_by_one() {
     };
     for frame in 1..4_u32 {
         let text = frame.to_string();
-        let one = captured_by(folder.path(), &text, &["--frames", &text], &arguments);
+        let one = capture_program(folder.path(), &text, &["--frames", &text], &arguments);
         let one = Textrace::open(&one).expect("a trace");
         let expected = counts(&one, frame);
         assert!(expected > 10_000);
@@ -474,7 +494,7 @@ fn several_frames_are_those_that_are_captured_one_by_one() {
 }
 
 #[test]
-fn a_list_names_every_pass_and_shows_its_picture() {
+fn a_list_has_every_render_pass_with_its_picture() {
     if !has_lavapipe() {
         return;
     }
@@ -517,7 +537,7 @@ fn a_list_names_every_pass_and_shows_its_picture() {
         "pictures of one colour"
     );
     assert!(list("mono", &[]).contains("no two eyes were found"));
-    // Without a page nothing but the table is made.
+    // Without the option for a page, the command prints only the table.
     assert_eq!(
         std::fs::read_dir(folder.path())
             .expect("the folder")
@@ -527,7 +547,7 @@ fn a_list_names_every_pass_and_shows_its_picture() {
 }
 
 #[test]
-fn a_file_of_rules_tells_the_eyes_where_asked() {
+fn a_file_of_rules_assigns_draws_to_eyes() {
     if !has_lavapipe() {
         return;
     }
@@ -537,9 +557,9 @@ fn a_file_of_rules_tells_the_eyes_where_asked() {
     std::fs::write(&rules, text).expect("a file");
     let by_file = ["--frames", "2", "--rules", rules.to_str().expect("a path")];
     let arguments = ["--stereo", "targets"];
-    let told = captured_by(folder.path(), "told", &by_file, &arguments);
-    let found = captured_by(folder.path(), "found", &["--frames", "2"], &arguments);
-    assert_same(&told, &found);
+    let by_rules = capture_program(folder.path(), "rules", &by_file, &arguments);
+    let detected = capture_program(folder.path(), "detected", &["--frames", "2"], &arguments);
+    assert_same(&by_rules, &detected);
     for (text, expected) in [
         (
             "[[rule]]\nshows = \"ignored\"\n",
@@ -556,7 +576,7 @@ fn a_file_of_rules_tells_the_eyes_where_asked() {
     }
 }
 
-/// Every module that the layer hands to the driver, and every one that the program gave.
+/// Validates every module of the program before and after the layer rewrites it.
 #[test]
 fn spirv_val_accepts_the_rewritten_modules_of_a_program() {
     if !has_lavapipe() {
@@ -575,7 +595,7 @@ fn spirv_val_accepts_the_rewritten_modules_of_a_program() {
             "--modules",
             modules.to_str().expect("a path"),
         ];
-        captured_by(folder.path(), stereo, &options, &["--stereo", stereo]);
+        capture_program(folder.path(), stereo, &options, &["--stereo", stereo]);
         let mut valid = 0;
         for entry in std::fs::read_dir(&modules).expect("the modules") {
             let path = entry.expect("an entry").path();
@@ -586,13 +606,13 @@ fn spirv_val_accepts_the_rewritten_modules_of_a_program() {
             );
             valid += 1;
         }
-        // As the program gave them and as they record.
+        // Each module as the program passes it and as the layer rewrites it.
         assert_eq!(valid, 2 * OBJECTS.len(), "{stereo}");
     }
 }
 
 #[test]
-fn programs_without_vulkan_and_programs_that_are_not_there_are_named() {
+fn programs_without_vulkan_and_missing_programs_are_reported() {
     if !has_lavapipe() {
         return;
     }

@@ -7,7 +7,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::process::{Output, Stdio};
 
-fn made_up(folder: &tempfile::TempDir, name: &str, seed: u64) -> PathBuf {
+fn write_generated_trace(folder: &tempfile::TempDir, name: &str, seed: u64) -> PathBuf {
     let path = folder.path().join(name);
     fs::write(&path, traces::ray_trace(1, true, seed)).expect("temporary file");
     path
@@ -66,8 +66,8 @@ fn info_prints_the_hierarchy_and_the_rays_by_kind() {
 fn the_first_different_sample_of_two_ray_traces_is_shown() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (a, b) = (
-        made_up(&folder, "a.raytrace", 7),
-        made_up(&folder, "b.raytrace", 8),
+        write_generated_trace(&folder, "a.raytrace", 7),
+        write_generated_trace(&folder, "b.raytrace", 8),
     );
     run_ok(program("replay").arg("diff").args([&a, &a]));
     let output = program("replay").arg("diff").args([&a, &b]).output();
@@ -98,7 +98,7 @@ fn a_ray_trace_encoded_again_has_the_same_bytes() {
 #[test]
 fn visits_are_converted_to_addresses_in_every_text_format() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let path = made_up(&folder, "a.raytrace", 7);
+    let path = write_generated_trace(&folder, "a.raytrace", 7);
     let dumped = text(run_ok(program("replay").arg("dump").arg(&path)));
     let mut addresses = Vec::new();
     for line in dumped.lines() {

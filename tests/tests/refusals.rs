@@ -437,12 +437,12 @@ fn validate_refuses_textures_that_run_cannot_address() {
     refuse(program("replay").arg("run").arg(&path), &[why]);
     let output = program("replay").arg("validate").arg(&path).output();
     let output = output.expect("replay starts");
-    let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert_eq!(output.status.code(), Some(1), "{told}");
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(1), "{message}");
     let file = path.display().to_string();
     assert!(
-        told.contains(&file) && told.contains("chunk TEXS") && told.contains(why),
-        "{told}"
+        message.contains(&file) && message.contains("chunk TEXS") && message.contains(why),
+        "{message}"
     );
 }
 

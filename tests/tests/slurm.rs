@@ -20,7 +20,7 @@ const PROGRAMS: [&str; 7] = [
 ];
 
 /// Longest wait for anything.
-const PATIENCE: Duration = Duration::from_secs(100);
+const LONGEST_WAIT: Duration = Duration::from_secs(100);
 
 fn find(program: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH").unwrap_or_default();
@@ -30,7 +30,7 @@ fn find(program: &str) -> Option<PathBuf> {
 }
 
 /// The reason why no cluster can run here, if any.
-fn hindrance() -> Option<String> {
+fn missing_requirement() -> Option<String> {
     if let Some(program) = PROGRAMS.iter().find(|program| find(program).is_none()) {
         return Some(format!("{program} is absent"));
     }
@@ -39,9 +39,9 @@ fn hindrance() -> Option<String> {
     (!is_root).then(|| "slurmd needs root".to_owned())
 }
 
-/// Waits until a condition holds; returns false after [`PATIENCE`].
+/// Waits until a condition holds; returns false after [`LONGEST_WAIT`].
 fn wait_for(mut holds: impl FnMut() -> bool) -> bool {
-    let deadline = Instant::now() + PATIENCE;
+    let deadline = Instant::now() + LONGEST_WAIT;
     while !holds() {
         if Instant::now() > deadline {
             return false;
@@ -100,7 +100,7 @@ impl Cluster {
         }
         let idle = || {
             cluster
-                .ask("sinfo", &["-h", "-t", "idle", "-o", "%D"])
+                .output_of("sinfo", &["-h", "-t", "idle", "-o", "%D"])
                 .trim()
                 == "2"
         };
@@ -180,7 +180,7 @@ impl Cluster {
     }
 
     /// Output of a command; empty if it fails.
-    fn ask(&self, program: &str, arguments: &[&str]) -> String {
+    fn output_of(&self, program: &str, arguments: &[&str]) -> String {
         let output = self.command(program).args(arguments).output();
         output.map_or_else(
             |_| String::new(),
@@ -189,7 +189,7 @@ impl Cluster {
     }
 
     fn jobs(&self) -> String {
-        self.ask("squeue", &["--noheader", "--array", "--format", "%i %T"])
+        self.output_of("squeue", &["--noheader", "--array", "--format", "%i %T"])
     }
 
     /// Submits a script with `sh`; returns its output.
@@ -247,7 +247,7 @@ impl Drop for Cluster {
     fn drop(&mut self) {
         // Jobs first, because their processes are not children of this one.
         if !self.jobs().trim().is_empty() {
-            self.ask("scancel", &["--full", "--user", "root"]);
+            self.output_of("scancel", &["--full", "--user", "root"]);
             wait_for(|| self.jobs().trim().is_empty());
         }
         for mut daemon in self.daemons.drain(..).rev() {
@@ -272,8 +272,8 @@ l2.replacement = [\"lru\", \"fifo\"]
 
 #[test]
 fn a_job_array_on_two_nodes_has_the_bytes_of_one_machine_also_after_a_task_was_killed() {
-    if let Some(hindrance) = hindrance() {
-        parallax_tests::skipped!("{hindrance}");
+    if let Some(missing_requirement) = missing_requirement() {
+        parallax_tests::skipped!("{missing_requirement}");
         return;
     }
     let cluster = Cluster::start();
@@ -311,10 +311,10 @@ fn a_job_array_on_two_nodes_has_the_bytes_of_one_machine_also_after_a_task_was_k
         fs::write(&path, text).expect("a script");
         path
     };
-    let told = cluster.submit(&script("array"));
+    let submitted = cluster.submit(&script("array"));
     assert!(
-        told.starts_with("job ") && told.contains("the merge after them"),
-        "{told}"
+        submitted.starts_with("job ") && submitted.contains("the merge after them"),
+        "{submitted}"
     );
     cluster.wait_for_jobs();
     same("array");
@@ -322,19 +322,22 @@ fn a_job_array_on_two_nodes_has_the_bytes_of_one_machine_also_after_a_task_was_k
     // A task is killed as the kernel does when memory is exhausted; the merge after it lists what is
     // missing. A task that had already written its shard causes no missing points, so another sweep is
     // tried.
-    let (out, path, told) = (0..5)
+    let (out, path, submitted) = (0..5)
         .find_map(|attempt| {
             let out = format!("killed-{attempt}");
             let path = script(&out);
-            let told = cluster.submit(&path);
-            kill_a_task(&cluster, &told);
+            let submitted = cluster.submit(&path);
+            kill_a_task(&cluster, &submitted);
             cluster.wait_for_jobs();
             read(&out, "results.json")
                 .is_err()
-                .then_some((out, path, told))
+                .then_some((out, path, submitted))
         })
         .expect("a task killed before its shard was written");
-    let after: Vec<&str> = told.lines().filter_map(|l| l.split(':').next()).collect();
+    let after: Vec<&str> = submitted
+        .lines()
+        .filter_map(|l| l.split(':').next())
+        .collect();
     let after = after.last().and_then(|job| job.strip_prefix("job "));
     let log = cluster.path(&format!("slurm-{}_0.out", after.unwrap_or_default()));
     let log = fs::read_to_string(log).expect("the merge's log");
@@ -343,10 +346,10 @@ fn a_job_array_on_two_nodes_has_the_bytes_of_one_machine_also_after_a_task_was_k
         .arg("--merge-only")
         .output()
         .expect("replay starts");
-    let told = String::from_utf8_lossy(&merge.stderr).into_owned();
+    let message = String::from_utf8_lossy(&merge.stderr).into_owned();
     assert!(
-        merge.status.code() == Some(2) && told.contains("of 18 points are missing"),
-        "{told}"
+        merge.status.code() == Some(2) && message.contains("of 18 points are missing"),
+        "{message}"
     );
     // The same script replays the missing points.
     cluster.submit(&path);
@@ -354,15 +357,15 @@ fn a_job_array_on_two_nodes_has_the_bytes_of_one_machine_also_after_a_task_was_k
     same(&out);
 }
 
-/// Kills the processes of a running task of the array named in `told`.
-fn kill_a_task(cluster: &Cluster, told: &str) {
-    let array: String = told
+/// Kills the processes of a running task of the array that `submitted` names.
+fn kill_a_task(cluster: &Cluster, submitted: &str) {
+    let array: String = submitted
         .chars()
         .skip_while(|c| !c.is_ascii_digit())
         .take_while(char::is_ascii_digit)
         .collect();
     let killed = wait_for(|| {
-        let pids = cluster.ask(
+        let pids = cluster.output_of(
             "squeue",
             &[
                 "--noheader",

@@ -181,7 +181,7 @@ fn a_merge_lists_missing_damaged_and_outdated_points() {
     let rows = sweep.rows("out");
     let name = path.display().to_string();
     let put = |rows: &[String]| fs::write(path, rows.join("\n")).expect("rows");
-    // A changed digit in one row, a missing row, and a truncated last row.
+    // One row with a changed digit, a missing row, and a truncated last row.
     let mut damaged = rows[1..].to_vec();
     let digit = damaged[1]
         .rfind(|c: char| c.is_ascii_digit())
@@ -222,7 +222,7 @@ fn a_merge_lists_missing_damaged_and_outdated_points() {
         ],
     );
     put(&damaged);
-    // The same shards repair it.
+    // The same shards replace them.
     for shard in ["1/3", "2/3", "3/3"] {
         run_ok(&mut sweep.command("out", &["--shard", shard]));
     }

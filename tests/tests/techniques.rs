@@ -79,11 +79,12 @@ fn a_study_reports_draws_pictures_and_times_of_every_technique() {
     let manifest = manifest(&folder);
     // Either the driver's multiview renders the same pictures (see below), or a message says that it is not
     // used.
-    let said = String::from_utf8_lossy(&output.stderr).contains("multiview cannot be trusted");
-    assert_eq!(said, manifest.get("multiview_defect").is_some());
+    let unreliable =
+        String::from_utf8_lossy(&output.stderr).contains("multiview cannot be trusted");
+    assert_eq!(unreliable, manifest.get("multiview_defect").is_some());
     let replayed = run_ok(program("replay").arg("techniques").arg(&folder)).stdout;
-    let told = String::from_utf8_lossy(&replayed).contains("timed as separate views");
-    assert_eq!(told, said);
+    let timed_separately = String::from_utf8_lossy(&replayed).contains("timed as separate views");
+    assert_eq!(timed_separately, unreliable);
     assert_eq!(manifest["schema"], "tracegen.techniques/1");
     assert_eq!(manifest["frames"], serde_json::json!([0, 1, 4]));
     let rows = manifest["rows"].as_array().expect("rows");
@@ -244,8 +245,11 @@ fn truncated_or_swapped_files_of_a_study_are_refused_and_measured_again() {
     let mut again = program("tracegen");
     again.args(measure.get_args().filter(|argument| *argument != "--quiet"));
     let output = run_ok(&mut again);
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert!(told.contains("1 of 3 rows were there already"), "{told}");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        message.contains("1 of 3 rows were there already"),
+        "{message}"
+    );
     assert!(files(&folder) == before);
 
     // A complete trace of another scene.
@@ -395,8 +399,8 @@ fn a_choice_by_counts_has_the_same_bytes_twice_and_can_be_captured_again_by_name
     let root = tempfile::tempdir().expect("a temporary folder");
     let [first, second, named] =
         ["first", "second", "named"].map(|name| root.path().join(name).with_extension("textrace"));
-    let said = capture(&first, &["--auto", "flip=0.02"]);
-    assert!(said.contains("--objective energy"), "{said}");
+    let summary = capture(&first, &["--auto", "flip=0.02"]);
+    assert!(summary.contains("--objective energy"), "{summary}");
     capture(&second, &["--auto", "flip=0.02", "--threads", "1"]);
     let [a, b] = [&first, &second].map(|trace| info(trace));
     assert_eq!(a["checksum"], b["checksum"]);
@@ -473,11 +477,11 @@ fn a_capture_with_a_budget_is_a_trace_of_the_path_with_the_chosen_techniques() {
         .arg(&trace)
         .arg("--image")
         .arg(&picture);
-    let said = String::from_utf8(run_ok(&mut command).stdout).expect("UTF-8");
+    let summary = String::from_utf8(run_ok(&mut command).stdout).expect("UTF-8");
     assert!(
-        said.contains("--auto pixels=1 --objective energy: of ")
-            && said.contains("at most 1 px by construction"),
-        "{said}"
+        summary.contains("--auto pixels=1 --objective energy: of ")
+            && summary.contains("at most 1 px by construction"),
+        "{summary}"
     );
     run_ok(program("replay").arg("validate").arg(&trace));
     let frames = info(&trace)["meta"]["frames"].as_array().map(Vec::len);
@@ -491,7 +495,11 @@ fn a_budget_that_no_technique_meets_is_reported() {
     let mut command = study(root.path(), "none");
     refuse(
         command.args(["--auto", "budget-ms=0.0001"]),
-        &["nothing meets --auto budget-ms=0.0001", "ms a frame"],
+        &[
+            "no combination meets --auto budget-ms=0.0001",
+            "ms per frame",
+            "the baseline",
+        ],
     );
 }
 

@@ -39,7 +39,7 @@ fn the_file_holds_every_item_and_does_not_depend_on_threads() {
     });
     assert!(pairs.count() > 100);
 
-    // It can replace the result on standard output.
+    // The file can replace the result on standard output.
     let output = run(&[text(&trace), "--order", "z2-sta", "--timeline", "-"]);
     assert_eq!(String::from_utf8_lossy(&output.stdout), one);
 }

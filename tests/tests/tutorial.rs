@@ -1,13 +1,14 @@
-//! The commands of the tutorial and of pages that go on with its trace print what the pages show.
+//! Checks that the commands of the tutorial, and of pages that use its trace, print what the pages show.
 //!
-//! `UPDATE_FIGURES=1` replaces the lines of a block that differs by those of the output that are most like them; review the diff.
+//! `UPDATE_FIGURES=1` replaces the lines of a differing block by the most similar lines of the output; review
+//! the diff.
 
 use formats::textrace::Textrace;
 use parallax_tests::{program, root, run_ok};
 use std::fs;
 use std::path::Path;
 
-/// Lines left out.
+/// Stands for omitted lines.
 const GAP: &str = "...";
 
 /// A fenced block: its language and its text.
@@ -32,7 +33,7 @@ fn output(folder: &Path, line: &str) -> String {
         .concat()
 }
 
-/// The first line of a block that is not in the output where it should be.
+/// The first line of a block that is missing in the output, in order.
 fn missing<'a>(shown: &'a str, output: &str) -> Option<&'a str> {
     let mut lines = output.lines();
     let mut is_gap = false;
@@ -54,25 +55,25 @@ fn missing<'a>(shown: &'a str, output: &str) -> Option<&'a str> {
     None
 }
 
-/// How alike two lines are, from 0 to 100: words in common over all words.
-fn likeness(a: &str, b: &str) -> usize {
+/// Similarity of two lines, from 0 to 100: words in common over all words.
+fn similarity(a: &str, b: &str) -> usize {
     let [a, b] = [a, b].map(|line| line.split_whitespace().collect::<Vec<_>>());
     let common = a.iter().filter(|word| b.contains(word)).count();
     200 * common / (a.len() + b.len()).max(1)
 }
 
-/// The block with each line replaced by a line of the output: in order, and as alike as possible in sum.
+/// The block with each line replaced by a line of the output, in order, with the largest sum of similarities.
 fn rewritten(shown: &str, output: &str) -> String {
     let shown: Vec<&str> = shown.lines().collect();
     let output: Vec<&str> = output.lines().collect();
-    // The largest sum from a shown line and an output line on.
+    // The largest sum from a line of the block and a line of the output onwards.
     let mut best = vec![vec![0; output.len() + 1]; shown.len() + 1];
     for i in (0..shown.len()).rev() {
         for j in (0..=output.len()).rev() {
             best[i][j] = if shown[i] == GAP || j == output.len() {
                 best[i + 1][j]
             } else {
-                let taken = best[i + 1][j + 1] + likeness(shown[i], output[j]);
+                let taken = best[i + 1][j + 1] + similarity(shown[i], output[j]);
                 taken.max(best[i][j + 1])
             };
         }
@@ -99,8 +100,9 @@ fn driver(trace: &Path) -> String {
     trace.tables().meta.driver.clone()
 }
 
-/// Runs the commands of a page in `folder` and compares the blocks of text. False if another driver makes other captures.
-fn holds(page: &str, folder: &Path) -> bool {
+/// Runs the commands of a page in `folder` and compares the blocks of text. Returns false if the trace was
+/// captured with another driver, whose output differs.
+fn check_page(page: &str, folder: &Path) -> bool {
     let file = root().join(page);
     let text = fs::read_to_string(&file).expect("the page");
     let is_command = |line: &&str| line.starts_with("tracegen ") || line.starts_with("replay ");
@@ -143,9 +145,9 @@ fn holds(page: &str, folder: &Path) -> bool {
 #[test]
 fn pages_show_what_their_commands_print() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    // The first page makes the trace of the others.
+    // The first page creates the trace that the others use.
     for page in ["docs/use/tutorial.md", "docs/use/breakdowns.md"] {
-        if !holds(page, folder.path()) {
+        if !check_page(page, folder.path()) {
             parallax_tests::skipped!("this driver's captures are not those of {page}");
             return;
         }
@@ -153,7 +155,7 @@ fn pages_show_what_their_commands_print() {
 }
 
 #[test]
-fn a_changed_digit_is_missed_and_a_rewritten_block_has_it() {
+fn a_changed_digit_is_reported_and_rewriting_corrects_it() {
     let printed = "a 1\nb 2 x\nc 3 y\n";
     assert_eq!(missing("a 1\n...\nc 3 y\n", printed), None);
     assert_eq!(missing("a 1\nc 3 y\n", printed), Some("c 3 y"));

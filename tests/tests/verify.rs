@@ -36,7 +36,7 @@ fn path(path: &Path) -> &str {
 }
 
 /// Checks that every coordinate and every footprint that differs has a cause.
-fn hold_causes(report: &Value) {
+fn check_causes(report: &Value) {
     assert_eq!(report["failures"], serde_json::json!([]), "{report:#}");
     for place in ["uv_error_texels", "capture_precision", "specification"] {
         let causes = report[place]["causes"].as_array().expect("causes");
@@ -96,7 +96,7 @@ fn a_capture_agrees_with_the_reference_and_so_does_the_reference() {
             "{of_texture:#}"
         );
     }
-    hold_causes(&report);
+    check_causes(&report);
     // The reference's own trace has exactly its fragments, except for the rounding of coordinates.
     let own = verify(&["atrium", "--trace", path(&reference)]);
     assert_eq!(number(&own, "/coverage/iou"), 1.0);
@@ -234,5 +234,5 @@ fn triangles_that_drivers_clip_at_the_border_are_explained() {
     let Some(scene) = real_scene("stk-cocoa-temple/stk-cocoa-temple.gltf") else {
         return;
     };
-    hold_causes(&verify(&[path(&scene), "--size", "512x512"]));
+    check_causes(&verify(&[path(&scene), "--size", "512x512"]));
 }

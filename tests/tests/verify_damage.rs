@@ -50,7 +50,7 @@ impl Trace {
         writer.finish().expect("a file");
     }
 
-    /// Changes every record of a material's group.
+    /// Changes every record of a group of a material.
     fn each(&mut self, change: impl Fn(&mut QuadRecord)) {
         let groups = |draw: u32, tables: &Tables| tables.draws[draw as usize].groups.len() - 4;
         for tile in self.tiles.iter_mut().flatten() {
@@ -387,7 +387,7 @@ fn of_description() -> Vec<Damage> {
     ]
 }
 
-/// Fields that nothing in a scene contradicts.
+/// Fields that are not checked against the scene.
 const FREE: [(&str, &str); 6] = [
     (
         "META: tool, command_line",
@@ -513,7 +513,7 @@ fn each_damage_is_reported() {
         let row = [field, "any", "-", &format!("not verified: {why}")].map(quoted);
         writeln!(csv, "{}", row.join(",")).expect("a string");
     }
-    hold(&committed, &csv);
+    compare_or_update(&committed, &csv);
 }
 
 /// Quotes a field of a CSV file.
@@ -526,7 +526,7 @@ fn quoted(text: &str) -> String {
 }
 
 /// Compares a file with its expected content, or writes it.
-fn hold(file: &Path, whole: &str) {
+fn compare_or_update(file: &Path, whole: &str) {
     let found = std::fs::read_to_string(file).unwrap_or_default();
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         let folder = file.parent().expect("a folder");

@@ -318,7 +318,7 @@ fn dram_reads_and_writes_equal_those_of_the_clients() {
     }
 }
 
-/// Larger tiles have fewer list entries; written pictures do not change.
+/// Larger tiles have fewer list entries. Written pictures do not change.
 #[test]
 fn larger_tiles_have_shorter_lists_and_the_same_pictures() {
     let folder = tempfile::tempdir().expect("a temporary folder");

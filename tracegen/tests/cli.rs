@@ -21,7 +21,7 @@ fn version_names_the_program_and_the_trace_formats() {
 }
 
 #[test]
-fn wrong_use_exits_with_two_and_prints_nothing_on_stdout() {
+fn wrong_usage_exits_with_code_2_and_empty_stdout() {
     for arguments in [
         &["no-such-command"][..],
         &["raster"],

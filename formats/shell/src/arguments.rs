@@ -34,8 +34,8 @@ impl Threads {
     }
 }
 
-/// Options with a value that say where and how, not what.
-const PASSING_OPTIONS: [&str; 6] = [
+/// Options with a value that do not affect the content of a trace.
+const OPTIONS_WITHOUT_EFFECT: [&str; 6] = [
     "--no-skip",
     "--output",
     "--image",
@@ -43,8 +43,8 @@ const PASSING_OPTIONS: [&str; 6] = [
     "--threads",
     "--record-budget",
 ];
-/// Switches that do not affect it either.
-const PASSING_SWITCHES: [&str; 3] = ["--no-plain", "--no-cache", "--quiet"];
+/// Switches that do not affect the content of a trace.
+const SWITCHES_WITHOUT_EFFECT: [&str; 3] = ["--no-plain", "--no-cache", "--quiet"];
 
 /// The arguments that affect the content of a trace. Output paths and options without effect on it are
 /// removed, so that equal captures have equal bytes.
@@ -55,7 +55,7 @@ pub fn lasting_arguments(arguments: impl IntoIterator<Item = OsString>) -> Vec<S
         .map(|argument| argument.to_string_lossy().into_owned());
     while let Some(argument) = arguments.next() {
         if argument == "--" {
-            // What follows is not this program's.
+            // Arguments after this one belong to another program.
             kept.push(argument);
             kept.extend(arguments);
             break;
@@ -64,12 +64,12 @@ pub fn lasting_arguments(arguments: impl IntoIterator<Item = OsString>) -> Vec<S
             Some((name, value)) => (name, Some(value)),
             None => (argument.as_str(), None),
         };
-        // `-o`, with its value attached or not, possibly after a `-q`.
+        // `-o`, with its value attached or separate, possibly after a `-q`.
         let output = argument
             .strip_prefix('-')
             .map(|letters| letters.trim_start_matches('q'))
             .and_then(|letters| letters.strip_prefix('o'));
-        if PASSING_OPTIONS.contains(&name) {
+        if OPTIONS_WITHOUT_EFFECT.contains(&name) {
             if value.is_none() {
                 arguments.next();
             }
@@ -77,7 +77,7 @@ pub fn lasting_arguments(arguments: impl IntoIterator<Item = OsString>) -> Vec<S
             if attached.is_empty() {
                 arguments.next();
             }
-        } else if !PASSING_SWITCHES.contains(&name) && argument != "-q" {
+        } else if !SWITCHES_WITHOUT_EFFECT.contains(&name) && argument != "-q" {
             kept.push(argument);
         }
     }
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn output_paths_and_how_a_trace_was_made_are_not_recorded() {
+    fn arguments_that_do_not_affect_the_trace_are_not_recorded() {
         for line in [
             "raster s.gltf -o a --shadows --image=b.png --camera -x",
             "raster s.gltf --output=a --shadows --threads 2 --no-skip all --no-plain --camera -x --record-budget 4MiB -ob",

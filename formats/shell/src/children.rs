@@ -1,4 +1,4 @@
-//! Runs other programs. A signal that ends this program ends them first.
+//! Runs child processes. If a signal ends this program, its children are ended first.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -6,22 +6,22 @@ use std::process::{Command, ExitStatus};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Time after a signal until a child that has not ended is left running.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// Time between a signal and the moment when a child that is still running is given up.
+const TERMINATION_TIMEOUT: Duration = Duration::from_secs(5);
 
 struct Children {
-    /// Each child's number, and whom a signal to it reaches.
+    /// By process ID: the processes that a signal to the child must reach.
     running: BTreeMap<u32, Reach>,
-    /// The program is ending: nothing more is started.
+    /// Set when the program is ending; no child is started from then on.
     ending: bool,
 }
 
-/// Whom a signal reaches.
+/// The processes that receive a signal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Reach {
     /// The child.
     Child,
-    /// The child and what it started, unless that left the child's process group.
+    /// The child and its descendants in the same process group.
     Group,
 }
 
@@ -35,8 +35,8 @@ fn children() -> MutexGuard<'static, Children> {
     CHILDREN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Runs a program to its end. Does not return if a signal ends this program, because the child's failure is
-/// then not an error.
+/// Runs a program to its end. If a signal ends this program, the function does not return, because the
+/// child's failure is then not an error.
 ///
 /// # Errors
 /// The program cannot be started or waited for.
@@ -44,7 +44,7 @@ pub fn run_child(command: &mut Command) -> io::Result<ExitStatus> {
     let mut now = children();
     if now.ending {
         drop(now);
-        wait_for_the_end();
+        wait_forever();
     }
     let mut child = command.spawn()?;
     now.running.insert(child.id(), Reach::Child);
@@ -55,28 +55,29 @@ pub fn run_child(command: &mut Command) -> io::Result<ExitStatus> {
     ONE_ENDED.notify_all();
     if now.ending {
         drop(now);
-        wait_for_the_end();
+        wait_forever();
     }
     status
 }
 
-/// How a program that was watched ended.
+/// Result of [`run_child_until`].
 #[derive(Clone, Copy, Debug)]
 pub struct Ended {
-    /// Its status.
+    /// Exit status of the program.
     pub status: ExitStatus,
-    /// It was asked to end before it did by itself.
+    /// Whether `enough` ended the program.
     pub stopped: bool,
 }
 
-/// How often a program is looked at.
-const GLANCE: Duration = Duration::from_millis(20);
+/// Interval between two checks of a running program.
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Runs a program, and what it starts in turn, to its end, or until `enough` says so: then it is asked to end, and made
-/// to if it does not. Does not return when a signal ends this program.
+/// Runs a program and its descendants until all have ended or `enough` returns true. In the second case they
+/// get SIGTERM, and SIGKILL if they keep running. If a signal ends this program, the function does not
+/// return.
 ///
 /// # Errors
-/// It cannot be started or waited for.
+/// The program cannot be started or waited for.
 pub fn run_child_until(
     command: &mut Command,
     mut enough: impl FnMut() -> bool,
@@ -84,7 +85,7 @@ pub fn run_child_until(
     let mut now = children();
     if now.ending {
         drop(now);
-        wait_for_the_end();
+        wait_forever();
     }
     // Wrapper scripts do not pass signals on, so a signal goes to the whole group.
     #[cfg(unix)]
@@ -99,7 +100,7 @@ pub fn run_child_until(
         if status.is_none() {
             status = child.try_wait()?;
         }
-        if let Some(status) = status.filter(|_| !group_lives(group)) {
+        if let Some(status) = status.filter(|_| !is_group_running(group)) {
             break status;
         }
         match stopped {
@@ -107,11 +108,11 @@ pub fn run_child_until(
                 send(group, Reach::Group, TERMINATE);
                 stopped = Some(Instant::now());
             }
-            Some(since) if since.elapsed() > PATIENCE => {
+            Some(since) if since.elapsed() > TERMINATION_TIMEOUT => {
                 send(group, Reach::Group, KILL);
                 break child.wait()?;
             }
-            _ => std::thread::sleep(GLANCE),
+            _ => std::thread::sleep(POLL_INTERVAL),
         }
     };
     let mut now = children();
@@ -119,7 +120,7 @@ pub fn run_child_until(
     ONE_ENDED.notify_all();
     if now.ending {
         drop(now);
-        wait_for_the_end();
+        wait_forever();
     }
     Ok(Ended {
         status,
@@ -127,10 +128,11 @@ pub fn run_child_until(
     })
 }
 
-/// A process of the group is running. One that has ended and is yet to be waited for is not.
+/// Whether a process of the group is running. Zombies do not count.
 #[cfg(target_os = "linux")]
-fn group_lives(group: u32) -> bool {
-    // State, parent and group come after the name, which is in parentheses and may hold spaces and more of these.
+fn is_group_running(group: u32) -> bool {
+    // State, parent and group follow the name, which is in parentheses and may itself contain spaces and
+    // parentheses.
     let runs = |stat: String| {
         let (_, fields) = stat.rsplit_once(')')?;
         let mut fields = fields.split_whitespace();
@@ -147,20 +149,20 @@ fn group_lives(group: u32) -> bool {
 }
 
 #[cfg(not(target_os = "linux"))]
-fn group_lives(_group: u32) -> bool {
+fn is_group_running(_group: u32) -> bool {
     false
 }
 
-/// The signal that asks a program to end.
+/// Signal that a program may handle.
 const TERMINATE: i32 = signal_hook::consts::SIGTERM;
-/// The signal that no program survives.
+/// Signal that a program cannot handle.
 #[cfg(unix)]
 const KILL: i32 = signal_hook::consts::SIGKILL;
 #[cfg(not(unix))]
 const KILL: i32 = TERMINATE;
 
 /// The thread that received the signal ends the program.
-fn wait_for_the_end() -> ! {
+fn wait_forever() -> ! {
     loop {
         std::thread::park();
     }
@@ -173,7 +175,8 @@ pub(crate) fn end_with(signal: i32) {
     for (&child, &reach) in &now.running {
         send(child, reach, signal);
     }
-    let _ended = ONE_ENDED.wait_timeout_while(now, PATIENCE, |now| !now.running.is_empty());
+    let _ended =
+        ONE_ENDED.wait_timeout_while(now, TERMINATION_TIMEOUT, |now| !now.running.is_empty());
 }
 
 #[cfg(unix)]
@@ -181,7 +184,7 @@ fn send(child: u32, reach: Reach, signal: i32) {
     use rustix::process::{Pid, Signal, kill_process, kill_process_group};
     let pid = i32::try_from(child).ok().and_then(Pid::from_raw);
     if let (Some(pid), Some(signal)) = (pid, Signal::from_named_raw(signal)) {
-        // One that has ended by itself needs no signal.
+        // A child that has already ended needs no signal.
         let _gone = match reach {
             Reach::Child => kill_process(pid, signal),
             Reach::Group => kill_process_group(pid, signal),
@@ -203,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_program_starts_is_part_of_it() {
+    fn run_child_until_waits_for_descendants() {
         let folder = tempfile::tempdir().unwrap();
         let mark = folder.path().join("mark");
         let script = format!("(sleep 0.3; : > '{}') & exit 5", mark.display());
@@ -213,11 +216,11 @@ mod tests {
     }
 
     #[test]
-    fn a_program_that_is_asked_to_end_ends_with_what_it_started() {
+    fn stopping_a_program_ends_its_descendants() {
         let started = Instant::now();
         let mut child = shell("sleep 100 & sleep 100; wait");
         let ended = run_child_until(&mut child, || started.elapsed().as_millis() > 200).unwrap();
         assert!(ended.stopped && !ended.status.success());
-        assert!(started.elapsed() < PATIENCE);
+        assert!(started.elapsed() < TERMINATION_TIMEOUT);
     }
 }

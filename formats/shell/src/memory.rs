@@ -15,7 +15,7 @@ static FAILED_BYTES: AtomicUsize = AtomicUsize::new(0);
 #[derive(Clone, Copy, Debug)]
 pub struct Allocator;
 
-fn noted(pointer: *mut u8, bytes: usize) -> *mut u8 {
+fn record_failure(pointer: *mut u8, bytes: usize) -> *mut u8 {
     if pointer.is_null() {
         FAILED_BYTES.store(bytes, Ordering::Relaxed);
     }
@@ -26,17 +26,17 @@ fn noted(pointer: *mut u8, bytes: usize) -> *mut u8 {
 unsafe impl GlobalAlloc for Allocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller keeps the contract of `alloc`.
-        noted(unsafe { System.alloc(layout) }, layout.size())
+        record_failure(unsafe { System.alloc(layout) }, layout.size())
     }
 
     unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller keeps the contract of `alloc_zeroed`.
-        noted(unsafe { System.alloc_zeroed(layout) }, layout.size())
+        record_failure(unsafe { System.alloc_zeroed(layout) }, layout.size())
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, bytes: usize) -> *mut u8 {
         // SAFETY: the caller keeps the contract of `realloc`.
-        noted(unsafe { System.realloc(pointer, layout, bytes) }, bytes)
+        record_failure(unsafe { System.realloc(pointer, layout, bytes) }, bytes)
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
@@ -58,7 +58,7 @@ pub(crate) fn explain_aborts() -> anyhow::Result<()> {
         signal_hook::low_level::register(signal_hook::consts::SIGABRT, || {
             let bytes = FAILED_BYTES.load(Ordering::Relaxed);
             if bytes > 0 {
-                tell_and_leave(bytes);
+                report_and_exit(bytes);
             }
         })
     };
@@ -68,7 +68,7 @@ pub(crate) fn explain_aborts() -> anyhow::Result<()> {
         let bytes = FAILED_BYTES.load(Ordering::Relaxed);
         // An earlier failure may have been handled, so check whether memory is exhausted now.
         if bytes > 0 && Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
-            tell_and_leave(bytes);
+            report_and_exit(bytes);
         }
         default_hook(info);
     }));
@@ -77,7 +77,7 @@ pub(crate) fn explain_aborts() -> anyhow::Result<()> {
 
 /// Prints the message and ends the program without an allocation.
 #[cfg(unix)]
-fn tell_and_leave(bytes: usize) {
+fn report_and_exit(bytes: usize) {
     let mut text = [0; 160];
     let left = write_message(&mut text, bytes);
     let length = text.len() - left;

@@ -61,21 +61,21 @@ fn named(error: io::Error) -> io::Error {
 /// Prints a figure about the run on stderr. Such figures vary between runs and are not results.
 pub fn note(message: &str) {
     if !is_quiet() {
-        tell("", message);
+        print_message("", message);
     }
 }
 
 /// Prints a warning on stderr; the command continues.
 pub fn warn(message: &str) {
-    tell("\u{1b}[1;33mwarning\u{1b}[0m: ", message);
+    print_message("\u{1b}[1;33mwarning\u{1b}[0m: ", message);
 }
 
 /// Prints on stderr why a check failed or the command ended.
 pub fn error(message: &str) {
-    tell("\u{1b}[1;31merror\u{1b}[0m: ", message);
+    print_message("\u{1b}[1;31merror\u{1b}[0m: ", message);
 }
 
-fn tell(label: &str, message: &str) {
+fn print_message(label: &str, message: &str) {
     // A message starts on a new line instead of inside a progress bar.
     let clear = if io::stderr().is_terminal() {
         "\r\u{1b}[K"

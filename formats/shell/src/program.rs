@@ -54,7 +54,8 @@ pub fn run<C: Parser>(
     }
 }
 
-/// The command line of a program, for its help and its manual: with the footer, and with short help that fits on a screen.
+/// Definition of a program's command line for its help and its manual, with the footer, and with a short help
+/// that fits on a screen.
 pub(crate) fn command<C: CommandFactory>() -> clap::Command {
     let mut command = C::command();
     let names: Vec<String> = (command.get_subcommands())

@@ -57,7 +57,7 @@ impl Progress {
         let stage = Arc::new(Mutex::new(stage));
         let (stop, stopped) = channel();
         let shown = Arc::clone(&stage);
-        let thread = out.filter(|_| memory_for_a_thread()).and_then(|mut out| {
+        let thread = out.filter(|_| has_memory_for_thread()).and_then(|mut out| {
             let (start, started) = channel::<()>();
             let show = move || {
                 drop(start);
@@ -102,7 +102,7 @@ impl Progress {
 
 /// Whether memory for a thread's stack and signal stack is available. Without progress, a command needs
 /// less memory.
-fn memory_for_a_thread() -> bool {
+fn has_memory_for_thread() -> bool {
     const NEEDED_BYTES: usize = 4 << 20;
     Vec::<u8>::new().try_reserve_exact(NEEDED_BYTES).is_ok()
 }

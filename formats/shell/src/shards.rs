@@ -65,8 +65,8 @@ impl Shard {
     /// The shard of a task in a Slurm job array, whose numbers may start anywhere and have a step.
     ///
     /// # Errors
-    /// A variable that is missing or not a number, or an array whose numbers have gaps, because the
-    /// environment does not tell which shard such a task has.
+    /// A variable that is missing or not a number, or an array whose numbers have gaps, because the shard of
+    /// such a task cannot be computed from the environment.
     pub fn from_slurm(variable: impl Fn(&str) -> Option<String>) -> Result<Self, String> {
         let number = |name: &str| -> Result<Option<u32>, String> {
             let Some(text) = variable(name) else {
@@ -217,8 +217,8 @@ impl<'a> Line<'a> {
         ends.max(first + 1).min(self.pieces.len())
     }
 
-    /// Shards that the pieces from each index on need within the bound; more than there are pieces if a
-    /// single piece exceeds it.
+    /// Number of shards that the pieces from each index on need within the bound; larger than the number of
+    /// pieces if a single piece exceeds the bound.
     fn shards_needed(&self, bound: u64) -> Vec<u32> {
         let end = self.pieces.len();
         let mut needed = vec![0u32; end + 1];
@@ -239,7 +239,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_shard_is_one_of_several() {
+    fn shard_arguments_are_parsed_and_checked() {
         let shard: Shard = "3/4".parse().unwrap();
         assert_eq!((shard.number, shard.count), (3, 4));
         for text in [
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn no_division_is_better() {
+    fn balanced_shards_have_the_smallest_possible_maximum_cost() {
         let mut seed = 1u64;
         let mut random = |below: u64| {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);

@@ -32,9 +32,8 @@ pub struct Needs {
 }
 
 /// Submits as many arrays as the cluster's MaxArraySize requires. Task numbers stay below it, and each
-/// array gets the number of shards before its first one as its argument. The default of MaxArraySize is
-/// Slurm's 1001. The job that follows starts when all arrays have ended, even if they failed, and lists
-/// missing results.
+/// array's argument is the number of shards before its first one. The default of MaxArraySize is Slurm's
+/// 1001. The last job starts when all arrays have ended, even if they failed, and lists missing results.
 const SUBMIT: &str = r#"    [ -f "$0" ] || { echo "save the script, then run: sh FILE" >&2; exit 2; }
     most=$(scontrol show config 2>/dev/null | sed -n 's/^MaxArraySize *= *\([0-9][0-9]*\).*/\1/p')
     most=$((${most:-1001} - 1))
@@ -50,7 +49,7 @@ const SUBMIT: &str = r#"    [ -f "$0" ] || { echo "save the script, then run: sh
     done
 "#;
 
-/// Submits the job that follows.
+/// Submits the last job.
 const SUBMIT_AFTER: &str = r#"    after=$(sbatch --parsable "$@" --array=0 --dependency="afterany$arrays" "$0")
     echo "job ${after%%;*}: the merge after them; its log lists what is missing"
 "#;
@@ -147,8 +146,8 @@ mod tests {
 
     const ODD: &str = "a b'c\"$(id)`id`\\\n*%;&|<é";
 
-    /// Output of the script run by `sh` as a task, with `printf` as the program.
-    fn told(script: &str, task: &str) -> String {
+    /// Output of the script when `sh` runs it as a task, with `printf` as the program.
+    fn output_of(script: &str, task: &str) -> String {
         let mut shell = Command::new("sh");
         shell.args(["-c", script]).env("SLURM_CPUS_ON_NODE", "3");
         let output = shell.env("SLURM_ARRAY_TASK_ID", task).output().unwrap();
@@ -172,11 +171,11 @@ mod tests {
         };
         let script = array.script();
         assert_eq!(
-            told(&script, "5"),
+            output_of(&script, "5"),
             format!("[{ODD}][][--shard][5/7][--threads][3]")
         );
         assert_eq!(
-            told(&script, "0"),
+            output_of(&script, "0"),
             format!("[{ODD}][][--merge-only][--threads][3]")
         );
         assert!(
@@ -232,7 +231,7 @@ mod tests {
             command: vec!["printf".to_owned(), "[%s]".to_owned()],
             then: vec!["--merge-only".to_owned()],
         };
-        let (told, calls) = submitted(&array(2000), "exit 1");
+        let (output, calls) = submitted(&array(2000), "exit 1");
         assert_eq!(
             calls,
             [
@@ -242,10 +241,10 @@ mod tests {
             ]
         );
         assert!(
-            told.contains("job 2: shards 1001 to 2000 of 2000\n"),
-            "{told}"
+            output.contains("job 2: shards 1001 to 2000 of 2000\n"),
+            "{output}"
         );
-        assert!(told.contains("job 3: the merge"), "{told}");
+        assert!(output.contains("job 3: the merge"), "{output}");
         let most = "echo 'MaxArraySize            = 4'";
         let (_, calls) = submitted(&array(7), most);
         let numbers = |call: &String| call.split_once("--array=").map(|(_, rest)| rest.to_owned());
@@ -263,8 +262,8 @@ mod tests {
         let mut shell = Command::new("sh");
         shell.args(["-c", &array(7).script(), "job", "3"]);
         let output = shell.env("SLURM_ARRAY_TASK_ID", "2").output().unwrap();
-        let told = String::from_utf8(output.stdout).unwrap();
-        assert_eq!(told, "[--shard][5/7][--threads][1]");
+        let printed = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(printed, "[--shard][5/7][--threads][1]");
     }
 
     #[test]

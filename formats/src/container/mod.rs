@@ -25,12 +25,13 @@ use std::fmt;
 
 /// First eight bytes of every trace file.
 pub const MAGIC: [u8; 8] = *b"PLXTRACE";
-/// Latest minor version of each major version that readers know. A file says the earliest that has all that is in it;
-/// readers accept a later minor version, which may only add, and refuse another major one.
+/// Latest minor version of each major version that readers support. A file declares the earliest version that
+/// has all of its features. Readers accept a later minor version, which may only add features, and refuse
+/// another major version.
 pub const VERSIONS: [(u16, u16); 2] = [(1, 2), (2, 0)];
-/// Major version of scenes' traces.
+/// Major version of traces of scenes.
 pub(crate) const MAJOR_1: u16 = 1;
-/// Major version of `.textrace` files with their tables behind the tiles: programs' traces.
+/// Major version of `.textrace` files whose tables come after the tiles: traces of programs.
 pub(crate) const MAJOR_2: u16 = 2;
 /// Chunks start at multiples of this many bytes.
 pub const CHUNK_ALIGNMENT_BYTES: u64 = 8;

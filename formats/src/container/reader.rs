@@ -27,7 +27,7 @@ impl Bytes {
     }
 }
 
-/// Largest trace that can be read from a pipe, which cannot be mapped.
+/// Largest trace that can be read from a pipe. Pipes cannot be mapped.
 const MAX_STREAM_BYTES: u64 = 1 << 30;
 
 /// Reads a trace from a pipe: first the header, which has the file size, then the rest.

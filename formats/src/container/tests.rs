@@ -171,7 +171,7 @@ fn an_unfinished_file_leaves_nothing_behind() {
 }
 
 #[test]
-fn a_file_holds_the_same_bytes_as_memory() {
+fn a_file_has_the_same_bytes_as_a_trace_in_memory() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.textrace");
     let mut writer = ContainerWriter::create(&path, Kind::Textrace).unwrap();

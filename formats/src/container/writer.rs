@@ -77,17 +77,17 @@ impl<W: Write + Seek> ContainerWriter<W> {
         Ok(writer)
     }
 
-    /// Says in the header that readers need a major version.
+    /// Declares in the header that readers need a major version.
     pub(crate) fn require_major(&mut self, major: u16) {
         self.header.version_major = self.header.version_major.max(major);
     }
 
-    /// Major version that the header says.
+    /// Major version declared in the header.
     pub(crate) fn major(&self) -> u16 {
         self.header.version_major
     }
 
-    /// Says in the header that readers need a minor version.
+    /// Declares in the header that readers need a minor version.
     pub(crate) fn require_minor(&mut self, minor: u16) {
         self.header.version_minor = self.header.version_minor.max(minor);
     }

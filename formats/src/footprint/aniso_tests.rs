@@ -210,7 +210,12 @@ fn with_a_level_per_lane_each_lane_reads_the_same_as_alone() {
 
 /// Number of probes, their level and their positions in floating point, from the text of the Vulkan
 /// specification; with `rounded`, the level from the example of `EXT_texture_filter_anisotropic`.
-fn by_the_text(dx: [f64; 2], dy: [f64; 2], most: u32, rounded: bool) -> (u32, f64, Vec<[f64; 2]>) {
+fn by_specification(
+    dx: [f64; 2],
+    dy: [f64; 2],
+    most: u32,
+    rounded: bool,
+) -> (u32, f64, Vec<[f64; 2]>) {
     let (px, py) = (dx[0].hypot(dx[1]), dy[0].hypot(dy[1]));
     let (p_max, p_min) = (px.max(py), px.min(py));
     let ratio = (p_max / p_min).min(f64::from(most));
@@ -223,13 +228,13 @@ fn by_the_text(dx: [f64; 2], dy: [f64; 2], most: u32, rounded: bool) -> (u32, f6
 
 proptest! {
     #[test]
-    fn probes_are_where_the_text_says(
+    fn probes_are_at_the_specified_positions(
         d in prop::array::uniform4(-300.0_f64..300.0),
         most in 2_u32..=16,
         rounded in any::<bool>(),
     ) {
         let (dx, dy) = ([d[0], d[1]], [d[2], d[3]]);
-        let (count, lod, places) = by_the_text(dx, dy, most, rounded);
+        let (count, lod, places) = by_specification(dx, dy, most, rounded);
         let (px, py) = (dx[0].hypot(dx[1]), dy[0].hypot(dy[1]));
         let ratio = px.max(py) / px.min(py);
         // Near an integer, the result depends on rounding.

@@ -1,11 +1,11 @@
 //! Computes the texels that a quad record reads. This is the reference for tests of faster engines, so it
 //! is written for readability.
 //!
-//! Footprints come in a fixed order: record by record, sample by sample in shader order, the
-//! finer mip level before the coarser one, probe by probe where there are several, then lane by lane;
-//! those of an ellipse lane by lane, then row by row. Where each lane has levels of its own, a level's footprints
-//! are those of the lanes that read it. A lane whose texels all lie outside a texture with a border has no footprint. Everything that counts or writes
-//! accesses follows it.
+//! Footprints have a fixed order: by record, by sample in shader order, by mip level with the finer one
+//! first, by probe if there are several, and by lane. The footprints of an ellipse come lane by lane, then
+//! row by row. If each lane has its own levels, a level has footprints of only the lanes that read it. A lane
+//! whose texels all lie in the border of a texture has no footprint. All code that counts or writes accesses
+//! uses this order.
 
 mod aniso;
 mod lanes;
@@ -62,7 +62,7 @@ pub struct LevelSelection {
 }
 
 impl LevelSelection {
-    /// A level is one of them.
+    /// Whether a level is one of the selected levels.
     #[must_use]
     pub fn contains(&self, level: u32) -> bool {
         (self.first..self.first + self.count).contains(&level)
@@ -119,7 +119,7 @@ fn fetch(coordinate: i32, size: u32, extent: u32, filter: Filter) -> [i64; 2] {
     }
 }
 
-/// Brings a texel coordinate into `0..size`; `None` where the border is read instead.
+/// Maps a texel coordinate into `0..size`; `None` if the border is read.
 #[must_use]
 pub fn wrap_texel(texel: i64, size: u32, wrap: Wrap) -> Option<u32> {
     let size = i64::from(size);
@@ -137,7 +137,8 @@ pub fn wrap_texel(texel: i64, size: u32, wrap: Wrap) -> Option<u32> {
     Some(wrapped as u32)
 }
 
-/// Both texels of a fetch along one axis after wrapping, equal where only one of them is read; `None` where none is.
+/// Both texels of a fetch along one axis after wrapping. They are equal if only one is read; `None` if
+/// neither is.
 fn wrap_pair(texels: [i64; 2], size: u32, wrap: Wrap) -> Option<[u32; 2]> {
     match texels.map(|texel| wrap_texel(texel, size, wrap)) {
         [Some(a), Some(b)] => Some([a, b]),
@@ -146,8 +147,8 @@ fn wrap_pair(texels: [i64; 2], size: u32, wrap: Wrap) -> Option<[u32; 2]> {
     }
 }
 
-/// Yields the footprints of one sample of a quad record, in the order of the module's description. `operands` is the
-/// record before it, which counts where the sample asks for operands.
+/// Yields the footprints of one sample of a quad record, in the order of the module's description. `operands`
+/// is the preceding record; it is used only if the sample has operands.
 #[allow(clippy::too_many_arguments)]
 pub fn footprints(
     record: &QuadRecord,
@@ -189,13 +190,13 @@ pub fn footprints(
     };
     if sample.level.rule == LodRule::Explicit || sample.level.operands {
         let operands = operands.filter(|_| sample.level.operands);
-        return at_given_levels(&quad, sample, operands, visit_in);
+        return visit_specified_levels(&quad, sample, operands, visit_in);
     }
     quad.options.lod_bias += sample.level.lod();
     let visit = |lane: u32, level: u32, texels| visit_in(lane, level, sample.layer, texels);
     match options.lod {
-        LodFormula::PerLane => at_levels_per_lane(&quad, visit),
-        _ => at_levels_of_the_quad(&quad, visit),
+        LodFormula::PerLane => visit_levels_per_lane(&quad, visit),
+        _ => visit_quad_levels(&quad, visit),
     }
 }
 
@@ -206,7 +207,7 @@ struct Quad<'a> {
     texture: &'a Texture,
     sampler: Sampler,
     options: SamplingOptions,
-    /// A bit per lane that samples.
+    /// One bit per lane that samples.
     mask: u8,
 }
 
@@ -217,8 +218,8 @@ impl Quad<'_> {
     }
 }
 
-/// Levels that the sample or its operands give.
-fn at_given_levels(
+/// Visits the levels that the sample or its operands specify.
+fn visit_specified_levels(
     quad: &Quad<'_>,
     sample: &Sample,
     operands: Option<&QuadRecord>,
@@ -257,8 +258,8 @@ fn at_given_levels(
     }
 }
 
-/// Levels from the derivatives of each lane.
-fn at_levels_per_lane(quad: &Quad<'_>, mut visit: impl FnMut(u32, u32, [[i64; 2]; 2])) {
+/// Visits the levels that follow from each lane's derivatives.
+fn visit_levels_per_lane(quad: &Quad<'_>, mut visit: impl FnMut(u32, u32, [[i64; 2]; 2])) {
     let Quad {
         record,
         extent,
@@ -301,8 +302,8 @@ fn at_levels_per_lane(quad: &Quad<'_>, mut visit: impl FnMut(u32, u32, [[i64; 2]
     }
 }
 
-/// One level of detail for all lanes.
-fn at_levels_of_the_quad(quad: &Quad<'_>, mut visit: impl FnMut(u32, u32, [[i64; 2]; 2])) {
+/// Visits the levels that follow from one level of detail for all lanes.
+fn visit_quad_levels(quad: &Quad<'_>, mut visit: impl FnMut(u32, u32, [[i64; 2]; 2])) {
     let Quad {
         record,
         extent,
@@ -353,10 +354,10 @@ fn at_levels_of_the_quad(quad: &Quad<'_>, mut visit: impl FnMut(u32, u32, [[i64;
     }
 }
 
-/// Yields every footprint of a record of `draw`, sample by sample, with the sample it belongs to. `operands` is the
-/// record before it in its run, if any: see [`crate::textrace::with_operands`].
+/// Yields every footprint of a record of `draw`, sample by sample, with its sample. `operands` is the
+/// preceding record in the run, if any: see [`crate::textrace::with_operands`].
 ///
-/// A record without a group, or with indices that the tables do not have, reads nothing.
+/// A record without a group, or with indices that the tables do not have, reads no texels.
 pub fn record_footprints(
     tables: &Tables,
     draw: u32,

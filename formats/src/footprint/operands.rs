@@ -1,10 +1,10 @@
-//! Level of detail and layer of a lane whose shader names them.
+//! Level of detail and layer of a lane whose shader specifies them.
 
 use super::{LevelSelection, select_levels};
 use crate::textrace::{LodRule, QuadRecord, Sample, SampleLevel};
 use crate::texture::{Sampler, Texture};
 
-/// What one lane reads of a sample.
+/// Level of detail and layer that one lane reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LaneLevel {
     /// Level of detail, before the sampler's bias and bounds.
@@ -14,7 +14,7 @@ pub struct LaneLevel {
 }
 
 impl SampleLevel {
-    /// The bias or level of every fragment.
+    /// The bias or level that applies to every fragment.
     #[must_use]
     pub fn lod(&self) -> f32 {
         f32::from(self.lod_256ths) / 256.0
@@ -22,7 +22,8 @@ impl SampleLevel {
 }
 
 impl LaneLevel {
-    /// From a lane's operands, where it has any; `derived` tells the level of detail that follows from the derivatives.
+    /// Level and layer from a lane's operands, if it has any. `derived` computes the level of detail from the
+    /// derivatives.
     #[must_use]
     pub fn of(
         sample: &Sample,
@@ -45,7 +46,7 @@ impl LaneLevel {
         }
     }
 
-    /// The levels that it reads.
+    /// The levels that the lane reads.
     #[must_use]
     pub fn levels(&self, sampler: &Sampler, levels: u32) -> LevelSelection {
         select_levels(self.lod, sampler, levels)

@@ -1,4 +1,4 @@
-//! What replay may change about sampling.
+//! Properties of sampling that a replay can change.
 
 use super::aniso::AnisotropyModel;
 use crate::texture::{Filter, MipFilter, Sampler};
@@ -20,7 +20,7 @@ pub enum FilterOverride {
 }
 
 impl FilterOverride {
-    /// The sampler that results; wrap modes and bounds of the level of detail stay.
+    /// The sampler after the override; wrap modes and bounds of the level of detail are unchanged.
     #[must_use]
     pub fn apply(self, sampler: &Sampler) -> Sampler {
         let (filter, mip) = match self {
@@ -86,7 +86,7 @@ impl Default for SamplingOptions {
     }
 }
 
-// What is not used is not written: results from before there was anisotropy stay the same.
+// Defaults are not written, so results from before anisotropy existed are unchanged.
 fn is_one(value: &u32) -> bool {
     *value == 1
 }

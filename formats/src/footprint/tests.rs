@@ -301,7 +301,7 @@ fn operands_choose_level_and_layer_of_each_lane() {
         found
     };
     let on = |level| [(level, 0, 1), (level, 1, 2), (level, 2, 3), (level, 3, 3)];
-    // Four texels a pixel: level 2 by the derivatives.
+    // Four texels per pixel: level 2 by the derivatives.
     assert_eq!(levels(LodRule::Derivatives, 0, true, 4.0), on(2));
     assert_eq!(levels(LodRule::Bias, 512, true, 4.0), on(6));
     assert_eq!(levels(LodRule::Explicit, 0, true, 4.0), on(2));

@@ -287,12 +287,12 @@ pub struct SampleRow {
 }
 
 impl SampleRow {
-    /// A measure of the hit; NaN without a hit.
+    /// A floating-point value of the hit; NaN without a hit.
     fn measure(&self, of: impl Fn(&Hit) -> f32) -> f32 {
         self.record.hit.as_ref().map_or(f32::NAN, of)
     }
 
-    /// A number of the hit; the largest one without a hit.
+    /// An integer of the hit; the largest value without a hit.
     fn number(&self, of: impl Fn(&Hit) -> u32) -> u32 {
         self.record.hit.as_ref().map_or(u32::MAX, of)
     }
@@ -307,7 +307,7 @@ impl From<&RaySample<'_>> for SampleRow {
     }
 }
 
-/// Columns with one measure of the hit each.
+/// Columns with one floating-point value of the hit each.
 macro_rules! hit_fields {
     ($($name:literal: $hit:ident => $value:expr;)*) => {
         [$(field($name, Get::F32(|r: &SampleRow| r.measure(|$hit| $value)))),*]
@@ -447,7 +447,7 @@ mod tests {
     }
 
     #[test]
-    fn codes_name_what_json_names() {
+    fn codes_have_the_names_used_in_json() {
         let text = |value: serde_json::Value| value.as_str().unwrap().to_owned();
         for eye in [Eye::Left, Eye::Right] {
             assert_eq!(EYES[usize::from(eye_code(eye))], eye.to_string());

@@ -97,8 +97,8 @@ pub struct Expander<'a> {
 }
 
 impl Expander<'_> {
-    /// Calls `visit` for each access of a record; `operands` is the record before it in its run, if any. Stops at the
-    /// first error.
+    /// Calls `visit` for each access of a record. `operands` is the preceding record in the run, if any.
+    /// Stops at the first error.
     ///
     /// # Errors
     /// Errors of `visit`.

@@ -25,7 +25,7 @@ pub enum BlockOrder {
     Tiled,
 }
 
-/// Order in which textures are given their places.
+/// Order in which textures are placed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TextureOrder {
@@ -274,8 +274,8 @@ fn too_large(index: usize, texture: &Texture) -> LayoutError {
     }
 }
 
-/// Format in memory: the override is for ordinary colour. Depth and channels of more than 8 bits cannot be
-/// stored in its blocks.
+/// Format in memory. The override applies only to ordinary colour: its blocks cannot hold depth or channels
+/// of more than 8 bits.
 fn memory_format(texture: &Texture, config: &LayoutConfig) -> TexelFormat {
     config
         .texel_format

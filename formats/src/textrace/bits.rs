@@ -76,7 +76,7 @@ impl<'a> BitReader<'a> {
         self.bit += count as usize;
     }
 
-    /// The bytes of which no bit was read.
+    /// The bytes without a read bit.
     pub(in crate::textrace) fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.bytes_read()..).unwrap_or_default()
     }

@@ -114,7 +114,7 @@ fn check_records(draw: &Draw, first: u32, records: &[QuadRecord]) -> Result<(), 
     Ok(())
 }
 
-/// Operands and the record that they belong to stand in pairs, at one position and with one mask.
+/// Checks that each record of operands directly precedes its record, with the same position and mask.
 fn check_operands(draw: &Draw, first: u32, records: &[QuadRecord]) -> Result<(), Broken> {
     let mut operands: Option<&QuadRecord> = None;
     let paired = |operands: &QuadRecord, record: &QuadRecord| {

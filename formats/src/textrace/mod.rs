@@ -107,32 +107,32 @@ pub struct TraceMeta {
     /// Techniques of the frames, if they were chosen automatically or given by name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub techniques: Option<ChosenTechniques>,
-    /// Present where a program was captured and not a scene.
+    /// Set for the capture of a program; absent for that of a scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub program: Option<ProgramCapture>,
 }
 
-/// How a program that nothing was known of became a trace.
+/// How the capture of a program was divided into frames and eyes.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ProgramCapture {
-    /// The eyes' matrices and frusta are the program's. Otherwise they are placeholders.
+    /// Whether the eyes' matrices and frusta are the program's. Otherwise they are placeholders.
     pub cameras_known: bool,
-    /// What told its frames apart.
+    /// Rule that separated the frames.
     pub frames_by: String,
-    /// What told its eyes apart.
+    /// Rule that separated the eyes.
     pub views_by: String,
-    /// Texture accesses of recorded fragments that the trace lacks.
+    /// Texture accesses of recorded fragments that are not in the trace.
     pub left_out: Vec<LeftOut>,
 }
 
-/// A kind of texture access that a trace lacks.
+/// A kind of texture access that is not in the trace.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LeftOut {
-    /// What it is.
+    /// Description of the access.
     pub what: String,
-    /// Draws that have some.
+    /// Number of draws with such accesses.
     pub draws: u64,
-    /// Fragments that did it.
+    /// Number of fragments with such accesses.
     pub fragments: u64,
 }
 
@@ -281,7 +281,7 @@ impl Pass {
     }
 }
 
-/// Where a sample's level of detail comes from.
+/// Source of a sample's level of detail.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
@@ -289,33 +289,34 @@ pub enum LodRule {
     /// The derivatives of the coordinates.
     #[default]
     Derivatives = 0,
-    /// These, and a bias.
+    /// The derivatives and a bias.
     Bias = 1,
-    /// The shader names it.
+    /// A level specified by the shader.
     Explicit = 2,
 }
 
-/// What decides a sample's level of detail and layer beside its coordinates.
+/// Source of a sample's level of detail and layer in addition to its coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct SampleLevel {
-    /// Where the level comes from.
+    /// Source of the level.
     pub rule: LodRule,
-    /// The bias or the level of every fragment, in 1/256 of a level. 0 where the derivatives decide alone.
+    /// The bias or level that applies to every fragment, in 1/256 of a level. 0 if only the derivatives
+    /// determine it.
     pub lod_256ths: i16,
-    /// Each fragment adds a level (in u) and a layer (in v) of its own. The record right before that of the sample's
-    /// group has them: see [`QuadRecord::lane_operands`].
+    /// Whether each fragment adds its own level (in u) and layer (in v). The record directly before that of
+    /// the sample's group has them: see [`QuadRecord::lane_operands`].
     pub operands: bool,
 }
 
 impl SampleLevel {
-    /// The derivatives decide alone, and the layer is the sample's.
+    /// Level from the derivatives only; layer of the sample.
     pub const DERIVED: Self = Self {
         rule: LodRule::Derivatives,
         lod_256ths: 0,
         operands: false,
     };
 
-    /// The derivatives decide alone, and the layer is the sample's.
+    /// Whether only the derivatives determine the level, and the layer is the sample's.
     #[must_use]
     pub fn is_default(&self) -> bool {
         *self == Self::default()
@@ -333,7 +334,7 @@ pub struct Sample {
     pub layer: u16,
     /// Texel offset at the sampled level (the taps of percentage-closer filtering).
     pub offset: [i8; 2],
-    /// What decides level of detail and layer beside the coordinates.
+    /// Source of level of detail and layer in addition to the coordinates.
     #[serde(default, skip_serializing_if = "SampleLevel::is_default")]
     pub level: SampleLevel,
 }
@@ -349,7 +350,7 @@ pub struct UvGroup {
 }
 
 impl UvGroup {
-    /// Each record of the group follows on its operands: a record of the group before it.
+    /// Whether each record of the group follows a record of operands, which belongs to the group before it.
     #[must_use]
     pub fn has_operands(&self) -> bool {
         self.samples.iter().any(|sample| sample.level.operands)
@@ -357,7 +358,7 @@ impl UvGroup {
 }
 
 impl Draw {
-    /// Records of a group are operands of the group after it.
+    /// Whether records of a group are operands of the group after it.
     #[must_use]
     pub fn is_operands(&self, group: u8) -> bool {
         let next = self.groups.get(usize::from(group) + 1);
@@ -425,7 +426,8 @@ impl QuadRecord {
         [axis(0), axis(1)]
     }
 
-    /// Operands of a lane in a record of operands: its level of detail, and its layer rounded to the nearest.
+    /// A lane's values in a record of operands: its level of detail, and its layer rounded to the nearest
+    /// integer.
     #[must_use]
     pub fn lane_operands(&self, lane: u32) -> (f32, i32) {
         let [lod, layer] = self.lane_uv(lane);
@@ -437,7 +439,7 @@ impl QuadRecord {
     }
 }
 
-/// Each record of some, with the record before it, which has its operands where its group asks for any.
+/// Each record with its predecessor, which has its operands if its group needs them.
 pub fn with_operands(
     records: &[QuadRecord],
 ) -> impl Iterator<Item = (&QuadRecord, Option<&QuadRecord>)> {
@@ -493,7 +495,7 @@ pub struct Tables {
 }
 
 impl Tables {
-    /// They hold what a trace of version 1 cannot say.
+    /// Whether the tables have features that version 1 lacks.
     #[must_use]
     pub fn need_version_2(&self) -> bool {
         self.meta.program.is_some()

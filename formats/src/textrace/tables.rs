@@ -65,12 +65,12 @@ const NO_EYE: u8 = 255;
 pub(super) enum Version {
     /// Tables before the tiles.
     One,
-    /// Tables behind the tiles; levels of detail, formats and wrap modes of programs.
+    /// Tables after the tiles, with the levels of detail, formats and wrap modes of programs.
     Two,
 }
 
 impl Version {
-    /// The version that tables need, where all of them are known.
+    /// The version that complete tables need.
     pub(super) fn of(tables: &Tables) -> Self {
         if tables.need_version_2() {
             Self::Two
@@ -107,7 +107,7 @@ pub(super) fn write<W: Write + Seek>(
     container.chunk(PASSES, &table(&tables.passes, write_pass)?)
 }
 
-/// Checks tables that are written later.
+/// Checks tables before the work that precedes writing them.
 pub(super) fn check_writable(tables: &Tables) -> Result<()> {
     check(tables).map_err(|(_, broken)| broken.unwritable())
 }

@@ -194,7 +194,7 @@ fn small(encoding: Encoding) -> Vec<u8> {
     write(encoding, &[(0, 0, tile.clone()), (1, 3, tile)])
 }
 
-/// The same tables with what version 1 cannot say: draw 0 samples a layer and a level of each fragment.
+/// The same tables with features that version 1 lacks: in draw 0, each fragment has its own layer and level.
 fn program_tables() -> Tables {
     let mut tables = tables();
     tables.meta.surfaces = None;
@@ -224,7 +224,7 @@ fn program_tables() -> Tables {
     tables
 }
 
-/// A tile of [`program_tables`]: a loop that samples the group with operands twice in one quad.
+/// A tile of [`program_tables`] with a loop that samples the group with operands twice in one quad.
 fn program_tile() -> Tile {
     let record = |group, uv| QuadRecord {
         x: 2,
@@ -260,7 +260,7 @@ fn program_trace(encoding: Encoding) -> Vec<u8> {
 }
 
 #[test]
-fn a_trace_whose_tables_grow_is_the_one_whose_tables_were_known() {
+fn growing_tables_give_the_same_trace_as_complete_tables() {
     let tables = program_tables();
     let mut writer = TextraceWriter::growing_in_memory().unwrap();
     for (index, pass) in tables.passes.iter().enumerate() {
@@ -290,7 +290,7 @@ fn a_trace_whose_tables_grow_is_the_one_whose_tables_were_known() {
 }
 
 #[test]
-fn tables_that_have_been_written_do_not_grow() {
+fn growing_written_tables_is_an_error() {
     let tables = tables();
     let mut writer = TextraceWriter::in_memory(&tables).unwrap();
     let errors = [
@@ -369,7 +369,7 @@ fn every_truncation_is_refused() {
 }
 
 #[test]
-fn every_flipped_bit_is_noticed() {
+fn every_flipped_bit_is_detected() {
     for whole in small_traces() {
         for bit in 0..whole.len() * 8 {
             let mut bytes = whole.clone();

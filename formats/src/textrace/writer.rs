@@ -74,8 +74,8 @@ pub fn encode_tile_as(encoding: Encoding, tables: &Tables, tile: &Tile) -> Resul
 
 /// Writes a trace, tiles in ascending order of pass and tile.
 ///
-/// The tables come first where all of them are known before the first tile and version 1 can say what they hold.
-/// Otherwise they come last, and may grow in between.
+/// The tables come before the tiles if they are complete before the first tile and version 1 has all their
+/// features. Otherwise they come after the tiles and can grow until then.
 #[derive(Debug)]
 pub struct TextraceWriter<W = AtomicFile> {
     container: ContainerWriter<W>,
@@ -98,10 +98,11 @@ impl TextraceWriter<AtomicFile> {
         Self::start(ContainerWriter::create(path, Kind::Textrace)?, tables)
     }
 
-    /// Starts a trace without tables, which [`Self::finish`] renames to `path`: they are added as they become known.
+    /// Starts a trace with empty tables, which grow while tiles are written. [`Self::finish`] renames it to
+    /// `path`.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// The file cannot be written.
     pub fn create_growing(path: &Path) -> Result<Self> {
         let container = ContainerWriter::create(path, Kind::Textrace)?;
         Self::start_version(Version::Two, container, &Tables::default())
@@ -128,7 +129,7 @@ impl TextraceWriter<Cursor<Vec<u8>>> {
     /// Starts a trace in memory without tables: see [`TextraceWriter::create_growing`].
     ///
     /// # Errors
-    /// None in practice; the signature is that of the file's.
+    /// None in practice; the signature matches that for files.
     pub fn growing_in_memory() -> Result<Self> {
         let container = ContainerWriter::in_memory(Kind::Textrace)?;
         Self::start_version(Version::Two, container, &Tables::default())
@@ -155,7 +156,7 @@ impl<W: Write + Seek> TextraceWriter<W> {
     ) -> Result<Self> {
         match version {
             Version::One => tables::write(version, tables, &mut container)?,
-            // An error of the tables should come before the work. A trace that grows has none yet.
+            // Report errors of the tables before the work. A growing trace has no tables yet.
             Version::Two if *tables != Tables::default() => tables::check_writable(tables)?,
             Version::Two => {}
         }
@@ -174,13 +175,14 @@ impl<W: Write + Seek> TextraceWriter<W> {
         })
     }
 
-    /// The tables as far as they are known.
+    /// The current tables.
     #[must_use]
     pub fn tables(&self) -> &Tables {
         &self.tables
     }
 
-    /// Adds to the tables of a trace whose tables come last. They are checked when the trace is completed.
+    /// The tables of a trace whose tables come last, to be extended. They are checked when the trace is
+    /// completed.
     ///
     /// # Errors
     /// The tables have been written.
@@ -204,7 +206,7 @@ impl<W: Write + Seek> TextraceWriter<W> {
         Ok(())
     }
 
-    /// Adds a texture and tells its index.
+    /// Adds a texture and returns its index.
     ///
     /// # Errors
     /// The tables have been written, or there are too many.
@@ -214,7 +216,7 @@ impl<W: Write + Seek> TextraceWriter<W> {
         index_of_last("texture", textures.len())
     }
 
-    /// Adds a sampler and tells its index.
+    /// Adds a sampler and returns its index.
     ///
     /// # Errors
     /// The tables have been written, or there are too many.
@@ -224,7 +226,7 @@ impl<W: Write + Seek> TextraceWriter<W> {
         index_of_last("sampler", samplers.len())
     }
 
-    /// Adds a draw and tells its index.
+    /// Adds a draw and returns its index.
     ///
     /// # Errors
     /// The tables have been written, or there are too many.
@@ -234,7 +236,7 @@ impl<W: Write + Seek> TextraceWriter<W> {
         index_of_last("draw", draws.len())
     }
 
-    /// Adds a pass and tells its index.
+    /// Adds a pass and returns its index.
     ///
     /// # Errors
     /// The tables have been written, or the pass has too many tiles.

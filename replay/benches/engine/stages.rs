@@ -6,7 +6,7 @@ use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as
 use replay::config::{LevelConfig, Levels, Mode, Order, RunConfig};
 use replay::engine::replay_all;
 use replay::memory::AnyCache;
-use replay::order::{self, Known, Phase, WorkItem};
+use replay::order::{self, Phase, PlanInputs, WorkItem};
 use replay::stream::{
     Consumer, Cores, Expander, Frame, LineMemory, QuadLines, TraceCounts, interleave,
 };
@@ -89,8 +89,8 @@ pub fn measure(trace: &Textrace) -> Vec<Row> {
     });
     let frame = expander.frame(number, &memory, &mut counts);
     let frame = frame.expect("an undamaged trace");
-    let known = Known::default();
-    let phases = order::plan_frame(Order::MORTON, &known, &trace.tables().passes, number);
+    let inputs = PlanInputs::default();
+    let phases = order::plan_frame(Order::MORTON, &inputs, &trace.tables().passes, number);
     let mut lines = Lines(Vec::new());
     pass(&frame, &phases, &mut lines);
     let lines = lines.0;
@@ -191,9 +191,9 @@ fn decode(trace: &Textrace, encoding: Encoding) -> Row {
 /// Lists the work items of all orders for a frame.
 fn orders(trace: &Textrace, frame: u32) -> Row {
     let passes = &trace.tables().passes;
-    let known = Known::default();
+    let inputs = PlanInputs::default();
     let plan = || -> usize {
-        let plans = Order::all().map(|order| order::plan_frame(order, &known, passes, frame));
+        let plans = Order::all().map(|order| order::plan_frame(order, &inputs, passes, frame));
         plans.flatten().map(|phase| phase.len()).sum()
     };
     let items = plan() as u64;

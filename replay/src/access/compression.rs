@@ -64,7 +64,7 @@ mod tests {
     use super::permille;
 
     #[test]
-    fn one_colour_leaves_a_header_and_minima_and_noise_its_three_channels() {
+    fn one_colour_shrinks_to_header_and_minima_and_noise_to_three_channels() {
         // 16 blocks of 6 bytes and the header: 112 bytes in two lines of 64, of 1024.
         assert_eq!(permille(&[90; 3 * 32 * 16], 32, 16, 64), 125);
         let noise: Vec<u8> = (0..3 * 32 * 16_u32)
@@ -75,12 +75,12 @@ mod tests {
             .collect();
         // 16 blocks of 48 bits and 16 x 3 x 8 bits, and the header: 880 bytes in 14 lines. The fourth channel is constant.
         assert_eq!(permille(&noise, 32, 16, 64), 875);
-        // One block would need two lines instead of one: it is stored as it is.
+        // Compression would need two lines instead of one, so the block is stored uncompressed.
         assert_eq!(permille(&noise[..3 * 4 * 4], 4, 16, 64), 1000);
     }
 
     #[test]
-    fn a_ramp_needs_the_bits_of_its_steps_within_a_block() {
+    fn a_ramp_takes_the_bits_of_its_range_within_a_block() {
         // Red grows by one per pixel. Values 0 to 3 take two bits: 16 x 2 bits per block in addition to the
         // 48 of its minima.
         let ramp: Vec<u8> = (0..16_u8)

@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_larger_tile_has_each_primitive_of_its_tiles_once() {
+    fn a_larger_tile_lists_each_primitive_of_its_tiles_once() {
         // Three columns, two rows; primitive 7 is everywhere.
         let mut recorded = TileLists {
             draws: vec![0],

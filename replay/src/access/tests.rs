@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::config::Order;
-use crate::order::Known;
+use crate::order::PlanInputs;
 use crate::stream::MemoryTrace;
 use crate::stream::synthetic::Synthetic;
 use formats::textrace::geometry::{GeometryView, MeshGeometry, TileLists};
@@ -103,11 +103,11 @@ fn traffic(
 ) -> Result<WholeFrame, StreamError> {
     let mut of = FrameClients::new(source, config, *machine, 1 << 20)?;
     let tables = source.tables();
-    let known = Known::new(config, &tables.meta);
+    let inputs = PlanInputs::new(config, &tables.meta);
     let mut sums = [[0; 2]; Client::ALL.len()];
     for frame in [0] {
         of.start_frame(frame)?;
-        let phases = crate::order::plan_frame(config.order, &known, &tables.passes, frame);
+        let phases = crate::order::plan_frame(config.order, &inputs, &tables.passes, frame);
         for (number, item) in phases.iter().flatten().enumerate() {
             of.start_item(number % config.cores as usize, item)?;
         }
@@ -151,7 +151,7 @@ fn of(whole: &WholeFrame, client: Client) -> [u64; 2] {
 }
 
 #[test]
-fn a_cleared_frame_writes_its_colour_once_and_nothing_else() {
+fn a_cleared_frame_writes_only_its_colour_and_only_once() {
     // Cut tiles: 40 x 20 pixels.
     let empty = trace([40, 20], strip(0), |_| Vec::new());
     for machine in [FrameMachine::TileBased, FrameMachine::Immediate] {

@@ -198,7 +198,7 @@ impl Shader {
         self.recent.clear();
     }
 
-    /// Returns the vertex's index in the queue, and whether it had to be shaded.
+    /// Returns the vertex's index in the queue, and whether it was shaded now.
     fn shade(&mut self, vertex: u32) -> (usize, bool) {
         if let Some(entry) = self.recent.iter().position(|(recent, _)| *recent == vertex) {
             return (entry, false);

@@ -63,7 +63,7 @@ mod tests {
 
     /// Compares with a cache that uses time stamps.
     #[test]
-    fn accesses_do_what_a_plain_list_of_lines_does() {
+    fn accesses_have_the_effects_of_a_plain_list_of_lines() {
         let mut cache = WriteBack::new(16);
         let mut plain: HashMap<u64, (u64, bool)> = HashMap::new();
         let mut state = 1_u64;

@@ -9,7 +9,7 @@ use crate::tmu::closed_form;
 
 const FIGURES: [Figure; 1] = [figure("tmu_util_pct", "TMU utilisation", "points")];
 
-pub const CLOSED_FORM: Study = Study {
+pub(super) const CLOSED_FORM: Study = Study {
     key: "closed-form",
     title: "Closed form instead of a cycle model",
     about: "Utilisation from the surface through the paper's table: at the rates of first look-ups, as the paper counts, and at the rates of a functional replay. Errors are against the first-miss model.",
@@ -59,7 +59,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_form_is_more_accurate_at_the_rates_it_was_made_for() {
+    fn the_closed_form_is_more_accurate_at_the_rates_it_was_fitted_to() {
         let trace = small_trace();
         let choices = forms(&inputs(&trace)).unwrap();
         let [first, functional] = &choices[..] else {

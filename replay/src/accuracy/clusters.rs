@@ -5,7 +5,7 @@
 use crate::config::{ConfigError, Order, RunConfig};
 use crate::engine::ReplayError;
 use crate::memory::{Cache, Found, Hierarchy};
-use crate::order::{self, Known, Phase};
+use crate::order::{self, Phase, PlanInputs};
 use crate::stream::{
     Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, TraceCounts, interleave, rendered,
 };
@@ -95,7 +95,7 @@ pub fn counts(
         },
     };
     let passes = &rendered.tables().passes;
-    let known = Known::new(config, &rendered.tables().meta);
+    let inputs = PlanInputs::new(config, &rendered.tables().meta);
     let mut index = 0;
     for &number in part.frames {
         let memory = LineMemory::new(LineMemory::USUAL_BYTES);
@@ -110,7 +110,7 @@ pub fn counts(
             });
             kept.collect()
         };
-        let plan = order::plan_frame(order, &known, passes, number);
+        let plan = order::plan_frame(order, &inputs, passes, number);
         let phases: Vec<Phase> = plan.into_iter().map(&mut keep).collect();
         let before: u64 = counting.counts.by_cluster.iter().sum();
         let mut cores = Cores::new(&frame, config.cores as usize);
@@ -127,7 +127,7 @@ pub fn counts(
 }
 
 /// Number of clusters: the sets of the smaller level.
-pub fn cluster_count(config: &RunConfig) -> Result<u32, ConfigError> {
+pub(super) fn cluster_count(config: &RunConfig) -> Result<u32, ConfigError> {
     let l1 = config.level.l1.sets("L1", config.line_bytes)?;
     let l2 = config.level.l2.sets("L2", config.line_bytes)?;
     Ok(l1.min(l2))

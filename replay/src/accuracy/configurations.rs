@@ -75,7 +75,7 @@ pub(super) fn looping(mut config: RunConfig, model: TmuModel, cycles: u32) -> Ru
 
 const REPLAY_TIME: &str = "replay, over the reference's";
 
-pub const MODE: Study = Study {
+pub(super) const MODE: Study = Study {
     key: "mode",
     title: "Functional or timed",
     about: "Caches without latencies instead of the cycle model. Errors are against the timed replay.",
@@ -120,7 +120,7 @@ pub const LOD: Study = Study {
 };
 
 /// The range of loop lengths that docs/models/texture-unit.md allows.
-pub const LOOP: Study = Study {
+pub(super) const LOOP: Study = Study {
     key: "loop",
     title: "Calibrated loop of the cycle model",
     about: "Cycles until a thread that missed tries again, at both ends of the calibrated range. Errors are against 64 cycles.",
@@ -162,7 +162,7 @@ pub const MODEL: Study = Study {
 };
 
 /// The range of loop lengths that docs/models/z2.md allows.
-pub const FIRST_MISS_LOOP: Study = Study {
+pub(super) const FIRST_MISS_LOOP: Study = Study {
     key: "first-miss-loop",
     title: "Calibrated loop of the first-miss model",
     about: "The same for threads that stop at their first miss. Errors are against 24 cycles.",
@@ -188,7 +188,7 @@ mod tests {
     use crate::engine::replay;
 
     #[test]
-    fn a_variant_that_is_its_reference_has_no_error_and_another_one_has_its_own() {
+    fn the_reference_has_no_error_and_another_variant_has_one() {
         let trace = small_trace();
         let inputs = inputs(&trace);
         let same = measured(&inputs, timed, &[variant("itself", None, timed)]).unwrap();

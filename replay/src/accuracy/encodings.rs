@@ -12,7 +12,7 @@ const FIGURES: [Figure; 2] = [
     figure("file_pct", "file", "% of raw"),
 ];
 
-pub const ENCODING: Study = Study {
+pub(super) const ENCODING: Study = Study {
     key: "encoding",
     title: "Encoding of the trace",
     about: "Tiles written again in each encoding and replayed in functional mode; every encoding is lossless. Errors are against raw records.",
@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_encoding_replays_alike_and_is_smaller_than_raw() {
+    fn every_encoding_has_the_same_replay_and_is_smaller_than_raw() {
         let trace = small_trace();
         let choices = encodings(&inputs(&trace)).unwrap();
         assert_eq!(choices.len(), Encoding::ALL.len() - 1);

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// Headline figures of texture traces.
-pub const TEXTURE_FIGURES: [Figure; 6] = [
+pub(super) const TEXTURE_FIGURES: [Figure; 6] = [
     figure("external_bytes", "external bytes", "%"),
     figure("l1_footprint_miss_pct", "L1 miss rate", "points"),
     figure("l2_line_miss_pct", "L2 miss rate", "points"),

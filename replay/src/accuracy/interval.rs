@@ -45,7 +45,7 @@ pub fn interval(sample: &[f64], whole: usize) -> (f64, f64) {
 
 /// Quality of a kind of sample, percent.
 #[derive(Clone, Copy, Debug)]
-pub struct Judged {
+pub(super) struct Judged {
     /// Root mean square error.
     pub error_pct: f64,
     /// Mean error, which does not shrink with larger samples.
@@ -100,7 +100,7 @@ mod tests {
     /// For values that differ only by noise, intervals contain the true value about as often as their level
     /// says.
     #[test]
-    fn intervals_hold_where_values_are_alike_and_lie_where_few_have_it_all() {
+    fn intervals_contain_the_mean_of_similar_values_and_miss_that_of_skewed_ones() {
         let mut random = Random(5);
         let mut value = || 1000.0 + (random.bits() % 200) as f64;
         let alike: Vec<f64> = (0..128).map(|_| value()).collect();
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_of_everything_is_the_truth() {
+    fn a_sample_of_all_values_has_no_error() {
         let all = of(&[5.0, 9.0, 1.0, 40.0], 1);
         assert_eq!((all.interval_pct, all.holds_pct), (0.0, 100.0));
         assert!(all.error_pct < 1e-9);

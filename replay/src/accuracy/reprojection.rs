@@ -58,7 +58,7 @@ fn rules(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
     Ok(choices)
 }
 
-pub const REUSED: Study = Study {
+pub(super) const REUSED: Study = Study {
     key: "reuse",
     title: "Errors of the share of reused pixels",
     about: "Effect of thresholds and rounding on the share of right pixels that are reused. Errors are against the default rule on the unchanged trace.",

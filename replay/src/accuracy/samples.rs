@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn set_samples_have_no_bias_and_tile_samples_have() {
+    fn set_samples_have_no_bias_and_tile_samples_have_one() {
         let trace = small_trace();
         let inputs = inputs(&trace);
         let bias = |choices: Vec<Choice>| choices[0].values[1].unwrap();
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn repeated_frames_are_estimated_by_any_warmed_one_and_overestimated_by_cold_ones() {
+    fn warmed_frames_estimate_repeated_frames_and_cold_ones_overestimate_them() {
         let trace = repeated(&small_trace(), 8);
         let mut inputs = inputs(&trace);
         // The whole frame fits in the caches.

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 /// A running measurement. The work must stay on the thread that started it.
-pub struct Stopwatch {
+pub(super) struct Stopwatch {
     started: Instant,
     worked: Option<Duration>,
 }

@@ -9,7 +9,7 @@ use crate::stream::synthetic::Synthetic;
 use crate::stream::{MemoryTrace, TileSource};
 
 /// A trace that fits in no cache of [`inputs`].
-pub fn small_trace() -> MemoryTrace {
+pub(super) fn small_trace() -> MemoryTrace {
     Synthetic {
         size_px: [96, 96],
         patch_px: 24,

@@ -12,7 +12,7 @@ const FIGURES: [Figure; 2] = [
     ),
 ];
 
-pub const TRAVERSAL: Study = Study {
+pub(super) const TRAVERSAL: Study = Study {
     key: "traversal",
     title: "Precision of the ray traversal",
     about: "A sphere of 20,480 triangles at some distance from the origin, traced by a plain program in three arithmetics, and by the capturing tracer. Errors are against signed volumes in double precision. Rays whose result depends on the rounding of vertices do not count.",

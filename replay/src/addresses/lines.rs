@@ -117,13 +117,13 @@ impl<V: FnMut(LineBlock<'_>)> Lines<V> {
             self.lines.push(self.names.name(line)?);
             self.line_kinds.push(access.kind);
             if self.lines.len() == BLOCK {
-                self.hand_over();
+                self.flush_block();
             }
         }
         Some(())
     }
 
-    fn hand_over(&mut self) {
+    fn flush_block(&mut self) {
         (self.visit)(LineBlock {
             lines: &self.lines,
             kinds: &self.line_kinds,
@@ -166,7 +166,7 @@ pub fn for_line_blocks(
         })
     })?;
     if !lines.line_kinds.is_empty() {
-        lines.hand_over();
+        lines.flush_block();
     }
     let totals = Totals {
         other_packets: found.other_packets,

@@ -67,7 +67,7 @@ pub fn replay(
     let line_bytes = configs.iter().map(|c| c.line_bytes).max().unwrap_or(16);
     let mut caches = LineReplay::new(configs)?;
     let (mut repeats, mut touched) = (Repeats::new(caches.skips_repeats()), Touched::default());
-    let least_lines = names_keep(configs)?;
+    let least_lines = consecutive_lines(configs)?;
     let totals = for_line_blocks(file, line_bytes, least_lines, kinds, |block| {
         let (lines, tags) = repeats.drop_from(&block);
         touched.insert_all(caches.access(lines, tags));
@@ -81,7 +81,7 @@ pub fn replay(
 }
 
 /// Number of consecutive lines that stay consecutive when lines are renumbered with 32 bits.
-fn names_keep(configs: &[RunConfig]) -> Result<u32, ConfigError> {
+fn consecutive_lines(configs: &[RunConfig]) -> Result<u32, ConfigError> {
     /// If the order of misses matters below the L2, prefetchers and DRAM rows see true neighbours within
     /// this many lines, as if an operating system placed pages of this size.
     const PAGE_LINES: u32 = 1 << 20;

@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_keep_low_bits_and_tell_lines_apart() {
+    fn renumbered_lines_keep_low_bits_and_stay_distinct() {
         let mut names = Names::new(1 << 14);
         let lines: Vec<u64> = (0..4000_u64)
             .map(|i| i.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 4)
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn more_ranges_than_names_are_refused() {
+    fn more_ranges_than_numbers_are_refused() {
         let mut names = Names::new(1 << 24);
         assert_eq!(names.most_ranges(), 255);
         assert!((0..255).all(|range| names.name(range << 24 | 0xff_ffff).is_some()));

@@ -5,7 +5,7 @@ use crate::stream::Tag;
 use formats::interop::plain::AccessKind;
 
 /// Drops repeats, also across blocks.
-pub struct Repeats {
+pub(super) struct Repeats {
     /// The previous line, or `u32::MAX` for none.
     last: u32,
     drops: bool,

@@ -118,7 +118,7 @@ fn plainly(accesses: &[PlainAccess], config: &RunConfig) -> (Point, u64) {
 }
 
 #[test]
-fn one_configuration_counts_as_plain_lists_do() {
+fn counts_of_one_configuration_equal_those_of_plain_lists() {
     let all = accesses(30_000);
     for (line_bytes, l1, l2, policy) in [
         (16, (2048, 4), (16 << 10, 4), Replacement::LRU),
@@ -137,7 +137,7 @@ fn one_configuration_counts_as_plain_lists_do() {
 }
 
 #[test]
-fn many_configurations_in_one_pass_count_as_each_alone() {
+fn configurations_in_one_pass_have_the_counts_of_separate_replays() {
     let all = accesses(30_000);
     let mut configs = Vec::new();
     for l1 in [(1024, 4), (2048, 4), (2048, 2), (512, 1), (1024, 8)] {
@@ -185,7 +185,7 @@ fn kinds_that_are_not_selected_are_skipped_and_counted() {
 }
 
 #[test]
-fn lines_are_passed_on_with_all_repeats() {
+fn lines_are_passed_to_the_caller_with_all_repeats() {
     let all = accesses(10_000);
     let (mut lines, mut blocks) = (Vec::new(), 0);
     let totals = for_lines(file(&all), 64, 1 << 12, |block| {
@@ -221,7 +221,7 @@ fn lines_are_passed_on_with_all_repeats() {
 }
 
 #[test]
-fn too_many_ranges_are_refused_by_their_number() {
+fn too_many_ranges_are_refused_with_the_limit() {
     let spread: Vec<PlainAccess> = (0..300).map(|i| PlainAccess::read(i << 40, 1)).collect();
     let config = config(16, (16 << 24, 1), (16 << 24, 1), Replacement::LRU);
     let error = replay(file(&spread), &[config], KindSet::ALL).unwrap_err();

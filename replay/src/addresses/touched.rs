@@ -5,7 +5,7 @@ const PAGE_LINES: usize = 1 << 15;
 
 /// A set of lines, stored in pages of 4 KiB for 32,768 neighbouring lines.
 #[derive(Default)]
-pub struct Touched {
+pub(super) struct Touched {
     pages: Vec<Option<Box<[u64; PAGE_LINES / 64]>>>,
     count: u64,
 }

@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_of_another_schema_is_refused_by_name() {
+    fn a_file_of_another_schema_is_refused_with_the_schemas_name() {
         let folder = tempfile::tempdir().unwrap();
         let text = ROWS.replace("precision/1", "precision/9");
         let error = run_on(folder.path(), &text).unwrap_err().to_string();

@@ -38,7 +38,7 @@ enum KindName {
 /// Plain addresses as input instead of a trace.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Plain addresses")]
-pub struct AddressInput {
+pub(super) struct AddressInput {
     /// File with plain addresses instead of a trace, uncompressed, gzip or zstd; - is standard input
     #[arg(long, value_name = "FILE")]
     addresses: Option<PathBuf>,
@@ -126,7 +126,7 @@ fn only_with_addresses(flags: &[(&str, bool)]) -> Result<()> {
 ///
 /// # Errors
 /// The configuration has `[prefetch]`, `[[level]]`, `[dram]`, `[frame]`, sectors, a victim cache or an inclusion.
-pub fn two_levels_only(config: &RunConfig, place: &str) -> Result<()> {
+pub(super) fn two_levels_only(config: &RunConfig, place: &str) -> Result<()> {
     ensure!(
         !config.follows_l2_misses() && config.frame.is_none(),
         "{place}: expected an L1 and an L2 only, found [prefetch], [[level]], [dram], [frame] or l2.inclusion"
@@ -149,7 +149,7 @@ pub fn name_of(path: &Path) -> String {
 /// Arguments of `replay run --addresses`.
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "Plain addresses")]
-pub struct AddressArgs {
+pub(super) struct AddressArgs {
     #[command(flatten)]
     input: AddressInput,
     /// L1/L2 sizes in KiB, comma-separated; LRU sizes are replayed in one pass

@@ -164,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn values_are_read_as_what_they_look_like() {
+    fn values_are_parsed_as_numbers_booleans_or_text() {
         let axis = axis("sampling.lod_bias=0,-0.5,true,softpipe").unwrap();
         assert_eq!(axis.key, "sampling.lod_bias");
         let values: Vec<String> = axis.values.iter().map(Value::to_string).collect();
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_tried_is_refused() {
+    fn invalid_trials_are_refused() {
         for (text, message) in [
             ("loop", "--try loop: expected KEY=V1,V2,..."),
             (
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn every_second_scene_is_held_out_unless_said_otherwise() {
+    fn every_second_scene_is_held_out_by_default() {
         let labels = ["a", "b", "c"];
         assert_eq!(held_out(None, &labels).unwrap(), [false, true, false]);
         assert_eq!(held_out(Some("a,c"), &labels).unwrap(), [true, false, true]);

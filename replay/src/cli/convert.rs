@@ -3,7 +3,7 @@
 use super::ConfigArgs;
 use super::tiles::{ray_tiles, tiles};
 use crate::config::RunConfig;
-use crate::order::{self, Known};
+use crate::order::{self, PlanInputs};
 use crate::stream::{for_quads, rendered};
 use anyhow::{Context, Result, bail, ensure};
 use formats::Trace;
@@ -336,8 +336,8 @@ fn accesses(
         line_bytes: config.line_bytes,
     };
     let source = rendered(trace, config)?;
-    let known = Known::new(config, &tables.meta);
-    for item in order::plan(config.order, &known, &tables.passes)
+    let inputs = PlanInputs::new(config, &tables.meta);
+    for item in order::plan(config.order, &inputs, &tables.passes)
         .iter()
         .flatten()
     {

@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn what_comes_after_a_different_description_is_compared_as_well() {
+    fn content_after_a_different_description_is_also_compared() {
         let found = compare(|memory| {
             memory.tables.meta.driver = "another driver".to_owned();
             memory.tables.meta.hmd.ipd_m = 0.07;

@@ -179,7 +179,7 @@ fn records(
 }
 
 /// The records of a tile as JSON Lines.
-pub fn record_lines(pass: usize, index: usize, tile: &Tile) -> impl Iterator<Item = String> {
+pub(super) fn record_lines(pass: usize, index: usize, tile: &Tile) -> impl Iterator<Item = String> {
     record_rows(pass as u32, index as u32, tile)
         .map(|row| record_to_json(row.origin, &row.record).to_string())
 }

@@ -19,7 +19,7 @@ use std::process::ExitCode;
 
 /// Arguments of the Z2 paper's experiment.
 #[derive(Debug, clap::Args)]
-pub struct ExperimentArgs {
+pub(super) struct ExperimentArgs {
     /// Texture traces
     #[arg(required = true, value_name = "TRACE")]
     traces: Vec<PathBuf>,
@@ -121,7 +121,9 @@ impl ExperimentArgs {
             );
         }
         for subject in subjects {
-            if let Some(scene) = paper::asked(&self.stand_ins, &subject.label, &z2::SCENES)? {
+            if let Some(scene) =
+                paper::assigned_scene(&self.stand_ins, &subject.label, &z2::SCENES)?
+            {
                 subject.stand_in_for = scene;
             }
         }
@@ -169,14 +171,18 @@ impl ExperimentArgs {
 ///
 /// # Errors
 /// A plot that cannot be drawn, or a file that cannot be written.
-pub fn write_report(report: &PaperReport, pictures: &[EmbeddedPicture], path: &Path) -> Result<()> {
+pub(super) fn write_report(
+    report: &PaperReport,
+    pictures: &[EmbeddedPicture],
+    path: &Path,
+) -> Result<()> {
     let html = page::page(report, pictures)?;
     write_page(path, &html, &report.json()?, &report.csv())
 }
 
 /// The page at `path`, and JSON and CSV files with the same numbers; for standard output, only the page.
 #[must_use]
-pub fn page_outputs(flag: &'static str, path: &Path) -> Vec<Output> {
+pub(super) fn page_outputs(flag: &'static str, path: &Path) -> Vec<Output> {
     let mut outputs = vec![Output::text(flag, path)];
     if !is_stdout(path) {
         outputs.extend(["json", "csv"].map(|e| Output::text(flag, &path.with_extension(e))));
@@ -188,7 +194,7 @@ pub fn page_outputs(flag: &'static str, path: &Path) -> Vec<Output> {
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn write_page(path: &Path, page: &str, json: &str, csv: &str) -> Result<()> {
+pub(super) fn write_page(path: &Path, page: &str, json: &str, csv: &str) -> Result<()> {
     if !is_stdout(path) {
         write_atomically(&path.with_extension("json"), format!("{json}\n").as_bytes())?;
         write_atomically(&path.with_extension("csv"), csv.as_bytes())?;
@@ -200,7 +206,7 @@ pub fn write_page(path: &Path, page: &str, json: &str, csv: &str) -> Result<()> 
 ///
 /// # Errors
 /// Any other syntax.
-pub fn parse_caches(text: &str) -> Result<Vec<(u64, u64)>> {
+pub(super) fn parse_caches(text: &str) -> Result<Vec<(u64, u64)>> {
     let bytes = |size: &str| {
         let size = size.trim();
         let bytes = match size.parse::<u64>() {

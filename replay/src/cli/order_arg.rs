@@ -10,7 +10,7 @@ use std::ffi::OsStr;
 
 /// Parses an order. Help and completions show the table.
 #[derive(Clone, Debug)]
-pub struct OrderParser;
+pub(super) struct OrderParser;
 
 impl TypedValueParser for OrderParser {
     type Value = Order;
@@ -54,7 +54,7 @@ impl TypedValueParser for OrderParser {
 ///
 /// # Errors
 /// An unknown order.
-pub fn parse_orders(text: &str) -> Result<Vec<Order>> {
+pub(super) fn parse_orders(text: &str) -> Result<Vec<Order>> {
     if text == "all" {
         let others = Order::all().filter(|o| !z2::ORDERS.contains(o));
         return Ok(z2::ORDERS.into_iter().chain(others).collect());
@@ -88,14 +88,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_orders_begin_with_the_papers() {
+    fn all_orders_start_with_those_of_the_paper() {
         let orders = parse_orders("all").unwrap();
         assert_eq!(orders[..3], z2::ORDERS);
         assert_eq!(orders.len(), Order::all().len());
     }
 
     #[test]
-    fn an_unknown_order_is_named_with_the_known_ones() {
+    fn the_error_for_an_unknown_order_lists_the_known_ones() {
         let known: Vec<&str> = Order::all().map(Order::name).collect();
         assert_eq!(
             parse_orders("morton,spiral").unwrap_err().to_string(),
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn an_order_may_be_named_by_its_parts() {
+    fn an_order_is_found_by_its_parts() {
         let orders = parse_orders("z2-sta,morton+sta,strip4+sta+boustro").unwrap();
         let names: Vec<&str> = orders.iter().map(|order| order.name()).collect();
         assert_eq!(names, ["z2-sta", "strip4+sta+boustro"]);

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 
 /// The flag.
 #[derive(Clone, Debug, Default, clap::Args)]
-pub struct ParquetArg {
+pub(super) struct ParquetArg {
     /// Also write the rows as Parquet: typed columns with the names of the CSV's columns
     #[arg(long = "parquet", value_name = "FILE")]
     pub path: Option<PathBuf>,

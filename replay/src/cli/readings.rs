@@ -18,7 +18,7 @@ use std::process::ExitCode;
 #[command(after_help = "Examples:
   replay readings teapot.raytrace chess.raytrace car.raytrace
   replay readings *.raytrace --calibrate teapot,chess,car --html readings.html")]
-pub struct ReadingsArgs {
+pub(super) struct ReadingsArgs {
     /// Ray traces.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,

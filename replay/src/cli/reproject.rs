@@ -203,7 +203,7 @@ fn check_outputs(args: &ReprojectArgs) -> anyhow::Result<bool> {
 }
 
 /// The parameters: the defaults, the preset's over them, the file's over both.
-pub fn read_config(
+pub(super) fn read_config(
     preset: Option<&'static Preset>,
     path: Option<&Path>,
 ) -> anyhow::Result<SgrtConfig> {
@@ -365,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn one_picture_of_several_files_is_refused() {
+    fn a_single_picture_for_several_files_is_refused() {
         let error = run(args(&["a", "b", "--image", "c.png"])).unwrap_err();
         assert_eq!(error.to_string(), "--image: expected one FILE, found 2");
     }

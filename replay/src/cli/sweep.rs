@@ -94,7 +94,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let sweep = Sweep::open(args, file, plan)?;
     if !args.merge_only {
-        sweep.tell_damages();
+        sweep.report_damages();
     }
     let subjects = sweep.traces.subjects();
     if let Some(shards) = args.shards.emit_slurm {
@@ -164,7 +164,7 @@ impl<'a> Sweep<'a> {
     }
 
     /// Prints a note for each damaged stored row; a merge lists only those that leave a point missing.
-    fn tell_damages(&self) {
+    fn report_damages(&self) {
         for damage in self.store.damages() {
             shell::note(&format!("damaged row is replayed again: {damage}"));
         }

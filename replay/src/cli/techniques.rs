@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_by_two_names_is_the_same_folder() {
+    fn a_folder_given_under_two_names_is_recognised() {
         let folder = tempfile::tempdir().unwrap();
         let (one, other) = (folder.path().join("a"), folder.path().join("b"));
         for path in [&one, &other] {
@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_becomes_rows_a_page_and_the_same_bytes_again() {
+    fn rows_and_page_of_a_folder_are_written_reproducibly() {
         let root = tempfile::tempdir().unwrap();
         let folder = root.path().join("plant");
         testing::folder(&folder);
@@ -408,7 +408,7 @@ mod tests {
     }
 
     #[test]
-    fn an_output_that_a_folder_holds_is_refused() {
+    fn an_output_inside_an_input_folder_is_refused() {
         let root = tempfile::tempdir().unwrap();
         let folder = root.path().join("plant");
         testing::folder(&folder);
@@ -432,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn folders_of_one_scene_go_by_their_names() {
+    fn folders_of_one_scene_are_labelled_with_their_names() {
         let root = tempfile::tempdir().unwrap();
         let paths = ["one", "two"].map(|name| root.path().join(name));
         for path in &paths {

@@ -5,7 +5,7 @@ use formats::textrace::{Draw, Pass, Tables, UvGroup};
 use formats::texture::Sampler;
 
 /// The draws of both captures, matched by their primitives.
-pub struct Partners<'a> {
+pub(super) struct Partners<'a> {
     tables: [&'a Tables; 2],
     /// First primitive and index of each draw, ascending, by capture.
     starts: [Vec<(u32, u32)>; 2],

@@ -137,7 +137,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn nothing_compared_is_no_difference() {
+    fn an_empty_distribution_has_no_difference() {
         let spread = Spread::new(4);
         assert_eq!(
             (spread.mean(), spread.percentile(99.0), spread.largest()),
@@ -147,7 +147,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_spread_is_that_of_the_sorted_list(
+        fn a_spread_equals_that_of_the_sorted_list(
             values in prop::collection::vec(prop_oneof![Just(0_u64), 1_u64..9000, 1_u64..1 << 40], 1..300),
         ) {
             let (mut spread, mut other) = (Spread::new(8), Spread::new(8));

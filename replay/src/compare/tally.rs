@@ -5,7 +5,7 @@ use formats::textrace::SUBTEXELS;
 use serde::Serialize;
 
 /// Steps per level of detail.
-pub const LOD_STEPS: u32 = 1 << 16;
+pub(super) const LOD_STEPS: u32 = 1 << 16;
 
 /// Differences in a class of fragments.
 #[derive(Clone, Debug, PartialEq, Serialize)]

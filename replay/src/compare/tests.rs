@@ -66,7 +66,7 @@ fn a_capture_does_not_differ_from_itself() {
 }
 
 #[test]
-fn fragments_are_those_that_a_replay_with_the_same_removal_shades() {
+fn compared_fragments_equal_those_shaded_by_a_replay_with_the_same_removal() {
     let mut trace = small();
     trace.tables.meta.surfaces = Some(Surfaces {
         depth_tested: true,
@@ -110,7 +110,7 @@ fn hidden_quad(trace: &MemoryTrace) -> (usize, usize) {
 }
 
 #[test]
-fn lanes_that_one_capture_lacks_are_counted_on_its_side() {
+fn lanes_missing_in_one_capture_are_counted_for_that_capture() {
     let a = small();
     let mut b = a.clone();
     let (tile, record) = full_quad(&b);
@@ -141,7 +141,7 @@ fn lanes_that_one_capture_lacks_are_counted_on_its_side() {
 }
 
 #[test]
-fn two_records_of_a_quad_are_what_one_with_all_their_lanes_is() {
+fn two_records_of_a_quad_equal_one_record_with_all_their_lanes() {
     let a = small();
     let mut b = a.clone();
     let (tile, record) = full_quad(&b);
@@ -172,7 +172,7 @@ fn two_records_of_a_quad_are_what_one_with_all_their_lanes_is() {
 }
 
 #[test]
-fn a_primitive_that_one_capture_lacks_takes_its_fragments_along() {
+fn fragments_of_a_primitive_missing_in_one_capture_are_counted_as_missing() {
     let a = small();
     let mut b = a.clone();
     let tile = b.tiles[0].iter().position(|t| !t.runs.is_empty()).unwrap();
@@ -203,7 +203,7 @@ fn moved_coordinates_are_measured_in_texels() {
 }
 
 #[test]
-fn doubled_derivatives_are_a_level_of_detail() {
+fn doubled_derivatives_change_the_level_of_detail_by_one() {
     let a = small();
     let mut b = a.clone();
     let (tile, record) = full_quad(&b);
@@ -216,7 +216,7 @@ fn doubled_derivatives_are_a_level_of_detail() {
 }
 
 #[test]
-fn draws_in_another_order_are_the_same_fragments() {
+fn draws_in_another_order_have_the_same_fragments() {
     let a = small();
     let mut b = a.clone();
     b.tables.draws.swap(0, 1);
@@ -235,7 +235,7 @@ fn draws_in_another_order_are_the_same_fragments() {
 }
 
 #[test]
-fn another_texture_is_another_sample() {
+fn another_texture_makes_samples_differ() {
     let a = small();
     let mut b = a.clone();
     for draw in &mut b.tables.draws {
@@ -247,7 +247,7 @@ fn another_texture_is_another_sample() {
 }
 
 #[test]
-fn captures_of_different_views_are_refused_by_property() {
+fn captures_of_different_views_are_refused_with_the_property() {
     let text = refused(|b| b.tables.passes[1].size_px = [1, 1]);
     assert_eq!(
         text,

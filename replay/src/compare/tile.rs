@@ -15,7 +15,7 @@ use std::cmp::Ordering;
 const LEAST_LOD: f32 = -16.0;
 
 /// Compares tiles.
-pub struct Comparer<'a> {
+pub(super) struct Comparer<'a> {
     traces: [&'a dyn TileSource; 2],
     partners: &'a Partners<'a>,
     sampling: &'a SamplingConfig,

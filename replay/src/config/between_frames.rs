@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_read_as_they_are_written() {
+    fn names_parse_to_the_values_that_print_them() {
         for name in ["keep", "flush", "lose-1", "lose-50", "lose-100"] {
             let found: BetweenFrames = name.parse().unwrap();
             assert_eq!(found.to_string(), name);

@@ -181,15 +181,15 @@ pub fn replay_jobs(
     // All threads expand the tiles of a stream. A stream with fewer tiles leaves some threads idle.
     let enough = Expander::CHUNK * rayon::current_num_threads();
     let failed = Mutex::new(Vec::new());
-    let run = |(index, job, passes): (usize, usize, Vec<Pass<'_>>),
+    let run = |(index, job, groups): (usize, usize, Vec<Group<'_>>),
                report_stage: &(dyn Fn(Stage) + Sync)| {
-        let first = passes[0].points[0];
+        let first = groups[0].points[0];
         let wave = Wave {
             job: jobs[job],
             memory,
             report_stage,
         };
-        if let Err(error) = wave.run(passes) {
+        if let Err(error) = wave.run(groups) {
             let mut failed = failed.lock().unwrap_or_else(PoisonError::into_inner);
             failed.push((index, job, first, error));
         }
@@ -219,15 +219,15 @@ fn checked(job: &Job<'_>) -> Result<Work, (usize, ReplayError)> {
 }
 
 /// The groups of a job, by wave.
-fn of_job<'a>(job: &Job<'a>) -> Vec<Vec<Pass<'a>>> {
+fn of_job<'a>(job: &Job<'a>) -> Vec<Vec<Group<'a>>> {
     let configs = job.configs;
     let streams = grouped(0..configs.len(), |&index| stream_key(&configs[index]));
     let waves = |stream| {
-        let mut passes = passes(configs, stream);
+        let mut groups = groups(configs, stream);
         let mut waves = Vec::new();
-        while !passes.is_empty() {
-            let rest = passes.split_off(passes.len().min(WAVE));
-            waves.push(std::mem::replace(&mut passes, rest));
+        while !groups.is_empty() {
+            let rest = groups.split_off(groups.len().min(WAVE));
+            waves.push(std::mem::replace(&mut groups, rest));
         }
         waves
     };
@@ -247,7 +247,11 @@ fn tiles_of_a_frame(trace: &dyn TileSource) -> usize {
 #[must_use]
 pub fn sharing(configs: &[RunConfig]) -> Vec<Vec<Vec<usize>>> {
     let streams = grouped(0..configs.len(), |&index| stream_key(&configs[index]));
-    let points = |stream| passes(configs, stream).into_iter().map(|pass| pass.points);
+    let points = |stream| {
+        groups(configs, stream)
+            .into_iter()
+            .map(|group| group.points)
+    };
     streams
         .into_iter()
         .map(|stream| points(stream).collect())
@@ -286,12 +290,12 @@ fn stream_key(config: &RunConfig) -> RunConfig {
         prefetch: None,
         dram: None,
         tmu: TmuConfig { model, ..usual.tmu },
-        ..pass_key(config)
+        ..group_key(config)
     }
 }
 
 /// The configuration reduced to the settings that must agree within a group.
-fn pass_key(config: &RunConfig) -> RunConfig {
+fn group_key(config: &RunConfig) -> RunConfig {
     let usual = RunConfig::default();
     let mut level = usual.level;
     if config.between_frames.lost_percent().is_some() {
@@ -311,7 +315,7 @@ fn pass_key(config: &RunConfig) -> RunConfig {
 }
 
 /// A group of configurations that one machine simulates.
-pub(super) struct Pass<'a> {
+pub(super) struct Group<'a> {
     pub(super) points: Vec<usize>,
     configs: &'a [RunConfig],
     /// Built on first use.
@@ -321,29 +325,29 @@ pub(super) struct Pass<'a> {
 }
 
 /// Divides the configurations of a stream into groups.
-pub(super) fn passes(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Pass<'_>> {
+pub(super) fn groups(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Group<'_>> {
     let shared = |index: &usize| {
         let config = &configs[*index];
         shares_passes(config) && geometry(config).is_some()
     };
     let (together, alone): (Vec<usize>, Vec<usize>) = stream.into_iter().partition(shared);
-    let mut groups: Vec<Vec<usize>> = alone.into_iter().map(|index| vec![index]).collect();
-    for mut group in grouped(together, |&index| pass_key(&configs[index])) {
+    let mut members: Vec<Vec<usize>> = alone.into_iter().map(|index| vec![index]).collect();
+    for mut group in grouped(together, |&index| group_key(&configs[index])) {
         // Similar geometries share most work.
         group.sort_by_key(|&index| geometry(&configs[index]));
-        groups.extend(group.chunks(MOST_TOGETHER).map(<[usize]>::to_vec));
+        members.extend(group.chunks(MOST_TOGETHER).map(<[usize]>::to_vec));
     }
-    groups.sort_by_key(|points| points.iter().copied().min());
-    let pass = |points| Pass {
+    members.sort_by_key(|points| points.iter().copied().min());
+    let group = |points| Group {
         points,
         configs,
         machine: None,
         clients: None,
     };
-    groups.into_iter().map(pass).collect()
+    members.into_iter().map(group).collect()
 }
 
-impl<'a> Pass<'a> {
+impl<'a> Group<'a> {
     /// The settings that all configurations of the group share.
     pub(super) fn config(&self) -> &RunConfig {
         &self.configs[self.points[0]]

@@ -16,7 +16,7 @@ pub struct Misses {
 
 /// Misses of both levels. L1 misses are the L2's look-ups.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CellMisses {
+pub(super) struct CellMisses {
     /// First level.
     pub l1: Misses,
     /// Second level.
@@ -34,7 +34,7 @@ pub struct TileMisses {
 
 /// Misses among the lines of one footprint.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct FootprintMisses {
+pub(super) struct FootprintMisses {
     /// Lines that the L1 fetched.
     pub l1_lines: u32,
     /// Lines in flight into the L1.
@@ -48,7 +48,7 @@ pub struct FootprintMisses {
 impl FootprintMisses {
     /// Counts the L2's answer to a request at `now`, and returns the line's arrival.
     #[inline(always)]
-    pub fn ask_l2(&mut self, answer: Answer, now: u64) -> u64 {
+    pub fn count_l2_answer(&mut self, answer: Answer, now: u64) -> u64 {
         match answer {
             Answer::Hit => now,
             Answer::Miss(arrival) => {
@@ -65,7 +65,7 @@ impl FootprintMisses {
 
 /// All misses of a replay.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct CacheCounts {
+pub(super) struct CacheCounts {
     /// By cell (see [`Bins`]).
     pub cells: Vec<CellMisses>,
     /// By tile; empty unless requested.

@@ -1,7 +1,7 @@
 //! Replays plain addresses, without tiles and time, through the caches of many configurations.
 
 use super::AtOnce;
-use super::batch::{Pass, passes};
+use super::batch::{Group, groups};
 use super::counts::Misses;
 use crate::config::{ConfigError, Mode, PrefetchConfig, RunConfig, accept};
 use crate::result::MemoryResult;
@@ -54,14 +54,14 @@ impl LineReplay {
             )?;
         }
         let bins = Bins::of_kinds();
-        let built = |pass: Pass<'_>| {
-            let machine = match pass.points.len() {
-                1 => pass.build_alone(&bins, None)?,
-                _ => pass.build_at_once(&bins, None)?,
+        let built = |group: Group<'_>| {
+            let machine = match group.points.len() {
+                1 => group.build_alone(&bins, None)?,
+                _ => group.build_at_once(&bins, None)?,
             };
-            Ok((pass.points, machine))
+            Ok((group.points, machine))
         };
-        let machines = passes(&configs, (0..configs.len()).collect());
+        let machines = groups(&configs, (0..configs.len()).collect());
         Ok(Self {
             machines: (machines.into_iter().map(built)).collect::<Result<_, ConfigError>>()?,
             skips_repeats: !configs.iter().any(|c| c.level.depend_on_evictions()),

@@ -29,7 +29,7 @@ pub enum Stage {
 /// Runs `work` for all items. `work` reports stages through the function it receives. The next item starts
 /// when all earlier items are loaded and `room` returns true, or when the last replays of all earlier items
 /// have started. Items load concurrently while their total weight is less than `enough`.
-pub fn run_within_memory<T: Send>(
+pub(super) fn run_within_memory<T: Send>(
     items: Vec<(usize, T)>,
     enough: usize,
     room: impl Fn() -> bool + Sync,
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_starts_without_room_and_everything_is_done() {
+    fn items_start_only_with_room_and_all_are_completed() {
         for threads in [1, 2, 8] {
             // Each takes more than half of the memory, so they run one at a time, even if one exceeds the limit.
             assert_eq!(most_taken(&[60; 40], 100, 1, threads), 60);

@@ -6,7 +6,7 @@ use crate::config::{
     BetweenFrames, CountBy, Inclusion, LevelConfig, Levels, Mode, Order, Replacement, TmuModel,
 };
 use crate::memory::Hierarchy;
-use crate::order::{self, Known, WorkItem};
+use crate::order::{self, PlanInputs, WorkItem};
 use crate::result::LevelCounters;
 use crate::stream::synthetic::Synthetic;
 use crate::stream::testing::repeated;
@@ -93,8 +93,8 @@ fn twin(trace: &MemoryTrace, config: &RunConfig) -> (LevelCounters, LevelCounter
     );
     let mut seen = HashSet::new();
     let layout = Layout::new(&trace.tables.textures, &config.layout).unwrap();
-    let known = Known::new(config, &trace.tables.meta);
-    let phases = order::plan(config.order, &known, &trace.tables.passes);
+    let inputs = PlanInputs::new(config, &trace.tables.meta);
+    let phases = order::plan(config.order, &inputs, &trace.tables.passes);
     for item in phases.iter().flatten() {
         let WorkItem::Tile(at) = item else {
             panic!("single-view orders only")
@@ -164,7 +164,7 @@ fn one_core_equals_a_brute_force_replay() {
 }
 
 #[test]
-fn lines_that_memory_has_no_room_for_are_expanded_again() {
+fn lines_without_room_in_memory_are_expanded_again() {
     let trace = small();
     for order in [Order::MORTON, Order::Z2_STA_MERGE] {
         for mode in [Mode::Functional, Mode::Timed] {
@@ -318,7 +318,7 @@ fn tile_overdraw_counts_pixels_inside_the_image_only() {
 }
 
 #[test]
-fn misses_in_flight_are_merged_and_counted_apart() {
+fn misses_in_flight_are_merged_and_counted_separately() {
     // Two quads at the same place: the second needs the lines that the first has in flight.
     let trace = MemoryTrace {
         tables: testing::tables(&[[64, 64]]),
@@ -398,8 +398,8 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     let memory = LineMemory::new(1 << 30);
     let mut counts = TraceCounts::new(expander.bins());
     let frame = expander.frame(0, &memory, &mut counts).unwrap();
-    let known = Known::new(config, &trace.tables.meta);
-    let phases = order::plan(config.order, &known, &trace.tables.passes);
+    let inputs = PlanInputs::new(config, &trace.tables.meta);
+    let phases = order::plan(config.order, &inputs, &trace.tables.passes);
     let mut cores = Cores::new(&frame, config.cores as usize);
     machine
         .run(&mut cores, &phases, config.dispatch(), None)
@@ -472,8 +472,8 @@ fn sent(trace: &MemoryTrace, config: &RunConfig) -> Vec<Sent> {
     );
     let mut counts = TraceCounts::new(expander.bins());
     let frame = expander.frame(0, &memory, &mut counts).unwrap();
-    let known = Known::new(config, &trace.tables.meta);
-    let phases = order::plan(config.order, &known, &trace.tables.passes);
+    let inputs = PlanInputs::new(config, &trace.tables.meta);
+    let phases = order::plan(config.order, &inputs, &trace.tables.passes);
     let mut recorder = Recorder::default();
     let mut cores = Cores::new(&frame, config.cores as usize);
     interleave(&mut cores, &phases, config.dispatch(), &mut recorder).unwrap();
@@ -516,7 +516,7 @@ fn several_cores_equal_brute_force_caches_on_the_recorded_stream() {
 }
 
 #[test]
-fn unique_lines_are_those_of_the_stream_whatever_the_caches() {
+fn unique_lines_do_not_depend_on_the_caches() {
     let trace = small();
     let touched = LineSet::new(1 << 24);
     let sent = sent(&trace, &functional(Order::SCANLINE));
@@ -537,7 +537,7 @@ fn unique_lines_are_those_of_the_stream_whatever_the_caches() {
 }
 
 #[test]
-fn caches_take_lines_that_no_trace_sent() {
+fn caches_accept_lines_outside_a_trace() {
     let config = functional(Order::MORTON);
     let bins = Bins::new(&testing::tables(&[[64, 64]]), CountBy::Texture).unwrap();
     let hierarchy = Hierarchy::build(&config).unwrap();
@@ -569,7 +569,7 @@ mod prefetch_fifo;
 mod timeline;
 
 #[test]
-fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
+fn with_a_flush_between_frames_each_frame_has_the_misses_of_a_separate_replay() {
     let (one, three) = (small(), repeated(&small(), 3));
     for policy in Replacement::all() {
         for mode in [Mode::Functional, Mode::Timed] {
@@ -619,7 +619,7 @@ fn flushed_between_frames_each_frame_misses_what_it_misses_alone() {
 
 /// Part of the L2 is lost between frames, compared with plain lists: in a shared pass, alone, and with caches of other types.
 #[test]
-fn other_work_between_frames_takes_its_share_of_the_l2() {
+fn other_work_between_frames_evicts_its_share_of_the_l2() {
     let (one, three) = (small(), repeated(&small(), 3));
     let mut of_size = Vec::new();
     for (percent, l2_bytes, ways) in [
@@ -692,7 +692,7 @@ fn other_work_between_frames_takes_its_share_of_the_l2() {
 
 /// A machine with DRAM is simulated line by line, others in a shared pass. Misses are the same.
 #[test]
-fn an_l2_per_core_misses_as_often_with_and_without_dram() {
+fn dram_does_not_change_the_misses_of_an_l2_per_core() {
     let trace = small();
     let misses = |shared, dram| {
         let mut config = functional(Order::Z2_LRTA);
@@ -709,7 +709,7 @@ fn an_l2_per_core_misses_as_often_with_and_without_dram() {
 
 /// Other work takes its share of each lower level too, whatever the inclusion, the sharing and the time.
 #[test]
-fn other_work_between_frames_takes_its_share_of_lower_levels() {
+fn other_work_between_frames_evicts_its_share_of_lower_levels() {
     let three = repeated(&small(), 3);
     for time in [AT_ONCE, LOOPING] {
         for (inclusion, shared) in [
@@ -748,7 +748,7 @@ fn other_work_between_frames_takes_its_share_of_lower_levels() {
 }
 
 #[test]
-fn a_part_is_not_lost_of_levels_with_more_lines_than_other_work_has() {
+fn partial_loss_is_refused_for_levels_with_more_lines_than_other_work() {
     let mut config = functional(Order::MORTON);
     config.between_frames = BetweenFrames::Lose(50);
     config.validate().unwrap();
@@ -769,7 +769,7 @@ fn a_part_is_not_lost_of_levels_with_more_lines_than_other_work_has() {
 
 /// Each material of the trace has its own textures, so counts by draw are sums of counts by texture.
 #[test]
-fn counts_by_draw_are_those_of_its_textures() {
+fn counts_by_draw_equal_those_of_its_textures() {
     let trace = small();
     for time in [AT_ONCE, LOOPING, FIRST_MISS] {
         let config = in_time(time, functional(Order::Z2_STA));

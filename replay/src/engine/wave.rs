@@ -1,13 +1,13 @@
 //! Runs the groups of a stream, frame by frame.
 
-use super::batch::{Job, Pass};
+use super::batch::{Group, Job};
 use super::scheduler::Stage;
 use super::summary::summary;
 use super::{Machine, ReplayError, check_other_work};
 use crate::config::{BetweenFrames, Order, RunConfig, TmuModel};
 use crate::memory::OtherWork;
 use crate::order::parts::Eyes;
-use crate::order::{self, Counters, Interleave, Known, Phase};
+use crate::order::{self, Counters, Interleave, Phase, PlanInputs};
 use crate::result::RunResult;
 use crate::stream::{Cores, Expander, Frame, LineMemory, TileSource, TraceCounts, rendered};
 use formats::textrace::TraceMeta;
@@ -25,19 +25,19 @@ pub(super) struct Wave<'a> {
 
 impl<'a> Wave<'a> {
     /// Runs at least one group. While a frame is replayed, the next one is expanded if there is memory for it.
-    pub(super) fn run(&self, mut passes: Vec<Pass<'a>>) -> Result<(), ReplayError> {
-        let rendered = rendered(self.job.trace, passes[0].config())?;
+    pub(super) fn run(&self, mut groups: Vec<Group<'a>>) -> Result<(), ReplayError> {
+        let rendered = rendered(self.job.trace, groups[0].config())?;
         let trace_passes = &rendered.tables().passes;
-        let expander = expander_for(Expander::new(&rendered, passes[0].config())?, &passes);
-        let lost = |pass: &Pass<'_>| pass.config().between_frames.lost_percent();
-        if passes.iter().filter_map(lost).next().is_some() {
+        let expander = expander_for(Expander::new(&rendered, groups[0].config())?, &groups);
+        let lost = |group: &Group<'_>| group.config().between_frames.lost_percent();
+        if groups.iter().filter_map(lost).next().is_some() {
             check_other_work(expander.lines())?;
         }
         let mut counts = TraceCounts::new(expander.bins());
         let mut frames: Vec<u32> = trace_passes.iter().map(|pass| pass.frame).collect();
         frames.sort_unstable();
         frames.dedup();
-        let orders = Orders::of(&passes);
+        let orders = Orders::of(&groups);
         let meta = &rendered.tables().meta;
         let mut counters = None;
         let mut ahead = None;
@@ -49,30 +49,35 @@ impl<'a> Wave<'a> {
             (self.report_stage)(Stage::Loaded);
             let counted = match orders.need_counters() {
                 true => {
-                    let known = Known::new(passes[0].config(), meta);
-                    Some(frame.counters(trace_passes, number, &known)?)
+                    let inputs = PlanInputs::new(groups[0].config(), meta);
+                    Some(frame.counters(trace_passes, number, &inputs)?)
                 }
                 false => None,
             };
             let last = counters.take().or_else(|| counted.clone());
             let plans = orders.plans(trace_passes, number, meta, last.as_ref());
             counters = counted;
-            let waiting = AtomicUsize::new(passes.len());
+            let waiting = AtomicUsize::new(groups.len());
             let is_last = index + 1 == frames.len();
-            let replay = |pass: &mut Pass<'a>, frame: &Frame<'_>| {
+            let replay = |group: &mut Group<'a>, frame: &Frame<'_>| {
                 if waiting.fetch_sub(1, Ordering::Relaxed) == 1 && is_last {
                     (self.report_stage)(Stage::LastReplayStarted);
                 }
-                let config = *pass.config();
-                let mut machine = self.machine(pass, &expander, index)?;
+                let config = *group.config();
+                let mut machine = self.machine(group, &expander, index)?;
                 let mut cores = Cores::new(frame, config.cores as usize);
-                if let Some(clients) = &mut pass.clients {
+                if let Some(clients) = &mut group.clients {
                     clients.start_frame(number)?;
                     machine.client_accesses(clients);
                 }
                 let phases = orders.plan(&plans, &config);
-                machine.run(&mut cores, phases, config.dispatch(), pass.clients.as_mut())?;
-                if let Some(clients) = &mut pass.clients {
+                machine.run(
+                    &mut cores,
+                    phases,
+                    config.dispatch(),
+                    group.clients.as_mut(),
+                )?;
+                if let Some(clients) = &mut group.clients {
                     clients.end_frame();
                     machine.client_accesses(clients);
                 }
@@ -80,21 +85,21 @@ impl<'a> Wave<'a> {
             };
             // The last group to finish frees the frame's memory, even while this thread is busy.
             let frame = Arc::new(frame);
-            let share = |pass| (pass, Arc::clone(&frame));
-            let all: Vec<_> = passes.iter_mut().map(share).collect();
+            let share = |group| (group, Arc::clone(&frame));
+            let all: Vec<_> = groups.iter_mut().map(share).collect();
             drop(frame);
             // Started in order as threads become free, because the first groups take longest.
             let all = all.into_iter().par_bridge();
             let Some(&next) = frames.get(index + 1) else {
-                return all.try_for_each(|(pass, frame)| {
-                    let machine = replay(pass, &frame)?;
+                return all.try_for_each(|(group, frame)| {
+                    let machine = replay(group, &frame)?;
                     drop(frame);
-                    self.finish(pass, &*machine, &rendered, &expander, &counts)
+                    self.finish(group, &*machine, &rendered, &expander, &counts)
                 });
             };
             let keep = || {
-                all.try_for_each(|(pass, frame)| {
-                    pass.machine = Some(replay(pass, &frame)?);
+                all.try_for_each(|(group, frame)| {
+                    group.machine = Some(replay(group, &frame)?);
                     Ok::<(), ReplayError>(())
                 })
             };
@@ -107,10 +112,10 @@ impl<'a> Wave<'a> {
             ahead = expanded.transpose()?;
         }
         // The trace has no frames.
-        for pass in &passes {
+        for group in &groups {
             self.finish(
-                pass,
-                &*pass.build(&expander)?,
+                group,
+                &*group.build(&expander)?,
                 &rendered,
                 &expander,
                 &counts,
@@ -122,15 +127,15 @@ impl<'a> Wave<'a> {
     /// The machine of a group at the start of a frame: a new one, or the last frame's with what remains in its caches.
     fn machine(
         &self,
-        pass: &mut Pass<'a>,
+        group: &mut Group<'a>,
         expander: &Expander,
         index: usize,
     ) -> Result<Box<dyn Machine>, ReplayError> {
-        let Some(mut machine) = pass.machine.take() else {
-            pass.build_clients(self.job.trace, expander)?;
-            return pass.build(expander);
+        let Some(mut machine) = group.machine.take() else {
+            group.build_clients(self.job.trace, expander)?;
+            return group.build(expander);
         };
-        let config = pass.config();
+        let config = group.config();
         match config.between_frames {
             BetweenFrames::Keep => {}
             BetweenFrames::Flush => machine.flush(),
@@ -143,14 +148,14 @@ impl<'a> Wave<'a> {
 
     fn finish(
         &self,
-        pass: &Pass<'_>,
+        group: &Group<'_>,
         machine: &dyn Machine,
         rendered: &dyn TileSource,
         expander: &Expander<'_>,
         counts: &TraceCounts,
     ) -> Result<(), ReplayError> {
         let tables = rendered.tables();
-        for &index in &pass.points {
+        for &index in &group.points {
             let config = &self.job.configs[index];
             let outcome = machine.outcome(config);
             let (tmu, cycles) = (outcome.tmu, outcome.cycles);
@@ -164,7 +169,7 @@ impl<'a> Wave<'a> {
             let l2_misses = result.l2.counters.line_misses;
             result.external_bytes = outcome.memory.external_bytes(l2_misses, config.line_bytes);
             result.memory = outcome.memory;
-            if let Some(clients) = &pass.clients {
+            if let Some(clients) = &group.clients {
                 let (traffic, geometry) = clients.result(result.external_bytes);
                 (result.clients, result.geometry) = (traffic, Some(geometry));
             }
@@ -175,19 +180,19 @@ impl<'a> Wave<'a> {
 }
 
 /// Configures the expander to list what the groups read.
-fn expander_for<'a>(expander: Expander<'a>, passes: &[Pass<'_>]) -> Expander<'a> {
+fn expander_for<'a>(expander: Expander<'a>, groups: &[Group<'_>]) -> Expander<'a> {
     let in_halves =
-        |pass: &Pass<'_>| pass.config().order.parts().eyes == Eyes::OneCore(Interleave::Halves);
-    let expander = expander.in_halves(passes.iter().any(in_halves));
-    let at_once = |pass: &Pass<'_>| pass.config().misses_change_caches_at_once();
-    match passes[0].config().tmu_model() {
-        None => match passes.iter().map(Pass::least_sets).min() {
+        |group: &Group<'_>| group.config().order.parts().eyes == Eyes::OneCore(Interleave::Halves);
+    let expander = expander.in_halves(groups.iter().any(in_halves));
+    let at_once = |group: &Group<'_>| group.config().misses_change_caches_at_once();
+    match groups[0].config().tmu_model() {
+        None => match groups.iter().map(Group::least_sets).min() {
             Some(Some(sets)) => expander.without_idle_accesses(sets),
             _ => expander,
         },
         Some(TmuModel::FirstMiss | TmuModel::PrefetchFifo) => expander,
         // If a miss fills the cache immediately, the timed machine looks footprints up one by one.
-        Some(TmuModel::Looping) if passes.iter().any(at_once) => expander.with_distinct_lines(true),
+        Some(TmuModel::Looping) if groups.iter().any(at_once) => expander.with_distinct_lines(true),
         Some(TmuModel::Looping) => expander.only_distinct_lines(),
     }
 }
@@ -202,12 +207,12 @@ impl Orders {
         (order, config.seed, config.cores)
     }
 
-    fn of(passes: &[Pass<'_>]) -> Self {
+    fn of(groups: &[Group<'_>]) -> Self {
         let mut orders: Vec<RunConfig> = Vec::new();
-        for pass in passes {
-            let key = Self::key(pass.config());
+        for group in groups {
+            let key = Self::key(group.config());
             if !orders.iter().any(|other| Self::key(other) == key) {
-                orders.push(*pass.config());
+                orders.push(*group.config());
             }
         }
         Self(orders)
@@ -227,11 +232,11 @@ impl Orders {
         last: Option<&Counters>,
     ) -> Vec<Vec<Phase>> {
         let plan = |config: &RunConfig| {
-            let known = Known {
+            let inputs = PlanInputs {
                 last,
-                ..Known::new(config, meta)
+                ..PlanInputs::new(config, meta)
             };
-            order::plan_frame(config.order, &known, trace_passes, frame)
+            order::plan_frame(config.order, &inputs, trace_passes, frame)
         };
         self.0.par_iter().map(plan).collect()
     }

@@ -59,7 +59,7 @@ fn as_map<S: Serializer>(settings: &[Setting], serializer: S) -> Result<S::Ok, S
 pub const ROWS: usize = z2::CACHES_KIB.len() * z2::ORDERS.len();
 
 /// Key of the IPD among a trial's settings.
-pub const IPD_KEY: &str = "capture.ipd_m";
+pub(super) const IPD_KEY: &str = "capture.ipd_m";
 
 /// A scene with its captures.
 #[derive(Clone, Debug, PartialEq)]
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_without_a_distance_that_another_has_is_named() {
+    fn a_scene_without_a_distance_of_another_scene_is_reported() {
         for (traces, message) in [
             (
                 &[("atrium", 0.064), ("atrium", 0.5), ("jungle", 0.5)][..],

@@ -89,7 +89,7 @@ fn ten_thousand_damaged_files_are_read_or_refused() {
 }
 
 #[test]
-fn files_made_to_explode_do_not() {
+fn files_that_expand_enormously_are_refused() {
     let list = |n: usize| (0..n).map(|i| i.to_string()).collect::<Vec<_>>().join(",");
     let deep = |open: &str, close: &str| {
         format!(

@@ -43,6 +43,12 @@ pub struct Point {
 }
 
 impl Point {
+    /// Whether the point changes no setting of the base configuration.
+    #[must_use]
+    pub fn is_base(&self) -> bool {
+        self.settings.is_empty() && self.change.is_none()
+    }
+
     /// `order=z2-sta l1.size_bytes=8KiB`, followed by the change.
     #[must_use]
     pub fn title(&self) -> String {

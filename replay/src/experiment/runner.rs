@@ -16,12 +16,10 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// The replay failed.
-    #[error("{label}, {point}: {source}")]
+    #[error("{name}: {source}")]
     Replay {
-        /// The trace's label.
-        label: String,
-        /// The point's settings.
-        point: String,
+        /// The trace's label, and the point's settings if it changes any.
+        name: String,
         /// The error.
         source: Box<ReplayError>,
     },
@@ -263,10 +261,16 @@ impl<'p> Part<'p> {
         self,
         replayed: Result<Work, (usize, ReplayError)>,
     ) -> Result<(Vec<RunResult>, Work), RunError> {
-        let work = replayed.map_err(|(index, error)| RunError::Replay {
-            label: self.subject.label.clone(),
-            point: self.plan.points[self.groups[self.missing[index]][0]].title(),
-            source: Box::new(error),
+        let work = replayed.map_err(|(index, error)| {
+            let point = &self.plan.points[self.groups[self.missing[index]][0]];
+            let label = &self.subject.label;
+            RunError::Replay {
+                name: match point.is_base() {
+                    true => label.clone(),
+                    false => format!("{label}, {}", point.title()),
+                },
+                source: Box::new(error),
+            }
         })?;
         if let Some(error) = locked(&self.unkept).take() {
             return Err(RunError::Store(error));

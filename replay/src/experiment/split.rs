@@ -177,7 +177,7 @@ mod tests {
                         [one-at-a-time]\nmode = [\"functional\"]\ncores = [4]\nlayout.block_order = [\"morton\"]\nseed = [1]\n";
 
     #[test]
-    fn every_point_of_every_trace_is_in_one_shard_whatever_their_number() {
+    fn every_point_of_every_trace_is_in_exactly_one_shard() {
         let (plan, split) = split(FILE, &[1000, 50, 0]);
         // Changing the seed to its own value adds no points.
         let distinct = plan.points.len() - 9;
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_longer_trace_takes_longer_and_more_shards_take_less() {
+    fn estimates_grow_with_the_trace_and_shrink_with_more_shards() {
         let file = "[axes]\nseed = [1, 2, 3, 4, 5, 6, 7, 8]\n";
         let minutes = |records, count| split(file, &[records]).1.minutes(count);
         assert_eq!(minutes(1000, 1), 10);
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_large_trace_is_given_more_machines_than_a_small_one() {
+    fn a_large_trace_gets_more_machines_than_a_small_one() {
         let (_, split) = split("[axes]\nseed = [1, 2, 3, 4, 5, 6, 7, 8]\n", &[900, 100]);
         let small = shards(&split, 5)
             .iter()

@@ -363,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn kept_points_come_back_from_one_file_a_process() {
+    fn stored_points_are_read_back_from_one_file_per_process() {
         let folder = tempfile::tempdir().unwrap();
         let configs: Vec<RunConfig> = (1..=20)
             .map(|seed| RunConfig {
@@ -387,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn every_row_after_a_failed_one_names_the_first_reason() {
+    fn every_row_after_a_failed_write_reports_the_first_error() {
         let folder = tempfile::tempdir().unwrap();
         let store = open(&folder);
         let path = folder.path().join("rows");
@@ -437,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn another_model_version_and_two_results_of_one_point_are_not_taken() {
+    fn rows_of_another_model_version_and_conflicting_rows_are_not_used() {
         let folder = tempfile::tempdir().unwrap();
         let config = RunConfig::default();
         let store = open(&folder);
@@ -461,7 +461,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_under_another_points_key_is_not_taken() {
+    fn a_row_under_another_points_key_is_not_used() {
         let folder = tempfile::tempdir().unwrap();
         let config = RunConfig::default();
         let store = open(&folder);

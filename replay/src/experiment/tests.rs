@@ -36,7 +36,7 @@ fn refusal(file: &str) -> String {
 const FILE: &str = "traces = [\"a.textrace\"]\n\n[base]\nmode = \"functional\"\n\n[axes]\norder = [\"morton\", \"z2-sta\"]\nl1.size_bytes = [\"8KiB\", \"16KiB\"]\n\n[one-at-a-time]\nlayout.block_order = [\"morton\"]\n";
 
 #[test]
-fn axes_are_crossed_and_changes_come_alone() {
+fn axes_are_crossed_and_changes_are_made_one_at_a_time() {
     let points = plan(FILE).points;
     let titles: Vec<String> = points.iter().map(Point::title).collect();
     assert_eq!(titles.len(), 8);
@@ -52,7 +52,7 @@ fn axes_are_crossed_and_changes_come_alone() {
 }
 
 #[test]
-fn levels_below_the_l2_are_axes_too() {
+fn levels_below_the_l2_can_be_axes() {
     let sizes = |file: &str| -> Vec<Vec<u64>> {
         let points = plan(file).points.into_iter();
         let sizes = points.map(|p| p.config.level.lower().map(|l| l.size_bytes).collect());
@@ -144,7 +144,7 @@ fn an_impossible_point_is_refused_at_planning() {
 }
 
 #[test]
-fn millions_of_points_are_refused_before_they_are_made() {
+fn millions_of_points_are_refused_before_they_are_created() {
     let values: Vec<String> = (1..=400).map(|i| i.to_string()).collect();
     let file = format!(
         "[axes]\nseed = [{0}]\ntmu.threads = [{0}]\n",
@@ -198,7 +198,7 @@ fn equal_configurations_are_replayed_once() {
 }
 
 #[test]
-fn rows_know_the_points_they_are_held_against() {
+fn rows_refer_to_the_points_they_are_compared_with() {
     let trace = empty("empty");
     let subjects = [Subject::new(&trace, id("1"), "empty".into())];
     let orders = [Order::MORTON, Order::Z2_STA];
@@ -223,7 +223,7 @@ fn rows_know_the_points_they_are_held_against() {
 }
 
 #[test]
-fn traces_of_one_scene_go_by_their_files_names() {
+fn traces_of_one_scene_are_labelled_with_their_file_names() {
     let (atrium, other) = (empty("atrium"), empty("jungle"));
     let (one, two) = (id("11111111"), id("22222222"));
     let named = |list: &[(&MemoryTrace, &TraceId, &str)]| {

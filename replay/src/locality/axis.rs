@@ -236,7 +236,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn the_last_member_until_a_time_is_that_of_a_sorted_set() {
+    fn the_last_member_up_to_a_time_equals_that_of_a_sorted_set() {
         for times in [1, 64, 65, 5000, 300_000] {
             let (mut set, mut plain) = (TimeSet::new(times), BTreeSet::new());
             let mut random = Random(u64::from(times));
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn members_that_are_passed_on_the_way_to_the_end_are_counted() {
+    fn members_after_a_time_are_counted() {
         let times = 40_000;
         let (mut set, mut plain) = (CountedTimes::new(times), BTreeSet::new());
         let (mut random, mut now) = (Random(1), 0);
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn new_numbers_keep_the_order() {
+    fn renumbering_keeps_the_order() {
         let mut counted = CountedTimes::new(300);
         let mut other = TimeSet::new(300);
         for time in [3, 64, 200] {

@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bins_double_and_hold_every_reuse() {
+    fn bins_double_in_width_and_contain_every_reuse() {
         let mut distances = Distances::default();
         for distance in 0..10 {
             distances.count(distance, (distance % 4) as usize, 2);
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn a_curve_says_at_every_size_what_one_size_does() {
+    fn each_point_of_a_curve_equals_the_result_for_its_size() {
         let mut distances = Distances::default();
         for (distance, origin) in [(0, 0), (3, 1), (3, 2), (9, 3)] {
             distances.count(distance, origin, 1);

@@ -71,7 +71,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn misses_are_those_of_beladys_rule(
+        fn misses_equal_those_of_beladys_rule(
             stream in prop::collection::vec(0_u32..40, 0..200), sets in 0_u32..3, ways in 1_u32..5,
         ) {
             let sets = 1 << sets;

@@ -5,7 +5,7 @@ use super::place::Place;
 use super::profile::{Profile, StreamCache, check_size};
 use crate::config::{ConfigError, LevelConfig, Order, RunConfig};
 use crate::engine::ReplayError;
-use crate::order::{self, Counters, Known, Phase};
+use crate::order::{self, Counters, Phase, PlanInputs};
 use crate::stream::{
     Consumer, Cores, Expander, LineMemory, QuadLines, StreamError, TileSource, TraceCounts,
     interleave, rendered,
@@ -143,8 +143,8 @@ pub fn analyse(
             let last = frames.last() == Some(&number);
             let counted = match need_counters {
                 true => {
-                    let known = Known::new(config, &trace.tables().meta);
-                    Some(frame.counters(passes, number, &known)?)
+                    let inputs = PlanInputs::new(config, &trace.tables().meta);
+                    Some(frame.counters(passes, number, &inputs)?)
                 }
                 false => None,
             };
@@ -153,11 +153,11 @@ pub fn analyse(
                 (&Order, &mut Option<Analysis>),
                 &mut Option<OrderFigures>,
             )| {
-                let known = Known {
+                let inputs = PlanInputs {
                     last: counters.as_ref(),
-                    ..Known::new(config, &trace.tables().meta)
+                    ..PlanInputs::new(config, &trace.tables().meta)
                 };
-                let phases = order::plan_frame(order, &known, passes, number);
+                let phases = order::plan_frame(order, &inputs, passes, number);
                 let mut analysis = match kept.take() {
                     Some(analysis) => analysis,
                     None => Analysis::new(config, merged)?,

@@ -127,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn an_earlier_frame_counts_before_the_other_eye_and_that_before_another_tile() {
+    fn origins_rank_earlier_frame_before_other_eye_before_other_tile() {
         let (left, right) = (Some(Eye::Left), Some(Eye::Right));
         let now = tile(7, right);
         for (before, in_this_frame, expected) in [
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn indexes_follow_the_list() {
+    fn indexes_equal_positions_in_the_list() {
         for (index, origin) in Origin::ALL.into_iter().enumerate() {
             assert_eq!(origin.index(), index);
         }

@@ -104,7 +104,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(100))]
 
     #[test]
-    fn every_figure_is_that_of_a_plain_twin(stream in streams(), cache in geometries()) {
+    fn every_figure_equals_that_of_a_plain_twin(stream in streams(), cache in geometries()) {
         let figures = analysed(&stream, &cache);
         let lines: Vec<u32> = stream.iter().map(|access| access.line).collect();
         let origins = plain::origins(&stream);
@@ -175,7 +175,7 @@ proptest! {
 
 /// Both levels have the misses of a replay in every order, for every policy and number of cores.
 #[test]
-fn misses_are_those_of_a_replay() {
+fn misses_equal_those_of_a_replay() {
     let trace = Synthetic {
         size_px: [96, 80],
         patch_px: 48,
@@ -242,7 +242,7 @@ fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {
 }
 
 #[test]
-fn caches_that_are_emptied_between_frames_find_in_each_frame_what_they_find_in_it_alone() {
+fn with_a_flush_between_frames_each_frame_has_the_figures_of_a_separate_analysis() {
     let one = Synthetic {
         size_px: [64, 48],
         patch_px: 16,

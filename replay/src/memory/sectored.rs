@@ -5,7 +5,7 @@ use super::{Cache, EMPTY};
 use std::collections::HashMap;
 
 /// A cache whose tags each cover several lines.
-pub struct Sectored {
+pub(super) struct Sectored {
     /// Holds group numbers: line numbers over the number of sectors.
     tags: Box<dyn Cache>,
     /// Valid sectors of each group in `tags`, one bit each.

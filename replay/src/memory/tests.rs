@@ -192,7 +192,7 @@ proptest! {
     /// `fill` reports the line that leaves, `remove` makes a line absent, and the next fill of that
     /// set evicts nothing.
     #[test]
-    fn a_cache_holds_what_was_filled_less_what_was_evicted_and_removed(
+    fn a_cache_holds_the_filled_lines_that_were_not_evicted_or_removed(
         trace in trace(),
         removed in prop::collection::vec(0_u32..40, 1..20),
     ) {
@@ -327,7 +327,7 @@ proptest! {
     }
 
     #[test]
-    fn a_forest_counts_as_each_of_its_caches(
+    fn a_forest_has_the_counts_of_each_of_its_caches(
         trace in trace(),
         shapes in prop::collection::btree_map(0_u32..7, 1_u32..9, 1..5),
     ) {
@@ -355,7 +355,7 @@ proptest! {
     }
 
     #[test]
-    fn a_larger_lru_cache_with_the_same_sets_holds_whatever_the_smaller_holds(trace in trace()) {
+    fn a_larger_lru_cache_with_the_same_sets_includes_the_smaller_one(trace in trace()) {
         let (mut small, mut large) = (cache(16, 2, Replacement::LRU), cache(32, 4, Replacement::LRU));
         for &line in &trace {
             let hit = small.access(line);

@@ -7,7 +7,7 @@
 use super::{Cache, EMPTY};
 
 /// A cache and its victim cache.
-pub struct WithVictimCache {
+pub(super) struct WithVictimCache {
     cache: Box<dyn Cache>,
     /// Least recently evicted first.
     victims: Vec<u32>,

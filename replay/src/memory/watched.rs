@@ -3,7 +3,7 @@
 use super::{Cache, EMPTY};
 
 /// A cache and its recorded evictions.
-pub struct Watched {
+pub(super) struct Watched {
     cache: Box<dyn Cache>,
     evicted: Vec<u32>,
 }

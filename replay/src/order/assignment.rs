@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn both_sides_of_a_groups_edge_are_one_cores() {
+    fn both_sides_of_a_group_boundary_belong_to_one_core() {
         // Core 0 has columns 0, 3, 4 and 7. Core 1 has columns 1, 2, 5 and 6.
         assert_eq!(dealt(Assignment::Quads, 2, 0..8), [0, 1, 3, 2, 4, 5, 7, 6]);
         let cores: Vec<usize> = (0..4).map(|x| core_at([x, 1], 4)).collect();

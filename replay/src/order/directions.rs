@@ -172,7 +172,7 @@ mod tests {
     const AHEAD: [f32; 2] = [0.0, 1.0];
 
     #[test]
-    fn infinity_of_symmetric_eyes_is_at_the_same_place() {
+    fn symmetric_eyes_show_infinity_at_the_same_place() {
         let symmetric = || eye(AHEAD, [1.0; 4]);
         let directions = directions(symmetric(), symmetric());
         assert_eq!(directions.offset(), [0, 0]);
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn matrices_that_are_no_eyes_are_told_apart() {
+    fn matrices_that_are_not_eyes_are_rejected() {
         let flat = EyeView {
             world_to_eye: [[0.0; 4]; 4],
             ..EyeView::default()

@@ -11,16 +11,16 @@ mod composed;
 pub mod cost;
 pub mod curve;
 mod directions;
-mod known;
 mod listed;
 pub mod pairing;
 pub mod parts;
 mod plan;
+mod plan_inputs;
 mod work;
 
-pub use known::{Counters, Known, ViewCounters};
 pub use listed::{Listed, NotAnOrder, check_items};
 pub use plan::{Phase, Views, plan, plan_frame, views};
+pub use plan_inputs::{Counters, PlanInputs, ViewCounters};
 pub use work::{Interleave, TileRef, View, WorkItem};
 
 use crate::config::Assign;
@@ -131,9 +131,9 @@ impl Order {
 
     /// The work for the pictures of two eyes, passes 0 and 1, which consist of whole tiles.
     #[must_use]
-    pub fn stereo(self, tiles: [u32; 2], known: &Known<'_>) -> Vec<WorkItem> {
+    pub fn stereo(self, tiles: [u32; 2], inputs: &PlanInputs<'_>) -> Vec<WorkItem> {
         let [left, right] = [0, 1].map(|pass| View::grid(pass, tiles));
-        self.parts().stereo(left, right, known)
+        self.parts().stereo(left, right, inputs)
     }
 
     /// The hardware cost for views of `tiles`.

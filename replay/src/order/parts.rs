@@ -4,7 +4,7 @@ use super::assignment::Assignment;
 use super::cost::Cost;
 use super::curve::{Curve, Ground, shuffle};
 use super::pairing::{Pairing, Placement, tiles};
-use super::{Interleave, Known, TileRef, View, WorkItem};
+use super::{Interleave, PlanInputs, TileRef, View, WorkItem};
 use std::fmt;
 
 /// How an order combines the tiles of both eyes along the curve.
@@ -222,35 +222,35 @@ impl Parts {
     }
 
     /// The grid of cells for a view, or for a left view and its partner.
-    fn ground(&self, grid: [u32; 2], view: View, known: &Known<'_>) -> Ground {
+    fn ground(&self, grid: [u32; 2], view: View, inputs: &PlanInputs<'_>) -> Ground {
         Ground {
             grid,
             size: self
                 .size
-                .unwrap_or_else(|| self.curve.usual_size(known.l2_bytes)),
-            seed: known.seed,
-            frame_bytes: known.counted(view).map(|of| of.bytes),
+                .unwrap_or_else(|| self.curve.usual_size(inputs.l2_bytes)),
+            seed: inputs.seed,
+            frame_bytes: inputs.counted(view).map(|of| of.bytes),
         }
     }
 
     /// The work of a single view.
-    pub(super) fn mono(&self, view: View, known: &Known<'_>) -> Vec<WorkItem> {
+    pub(super) fn mono(&self, view: View, inputs: &PlanInputs<'_>) -> Vec<WorkItem> {
         let cells = self
             .curve
             .path()
-            .cells(&self.ground(view.tiles, view, known));
+            .cells(&self.ground(view.tiles, view, inputs));
         let tile = |at| view.tile(at).map(WorkItem::Tile);
         cells.into_iter().filter_map(tile).collect()
     }
 
     /// The work of a stereo pair. A tile without a partner is an item of its own.
     #[must_use]
-    pub fn stereo(&self, left: View, right: View, known: &Known<'_>) -> Vec<WorkItem> {
+    pub fn stereo(&self, left: View, right: View, inputs: &PlanInputs<'_>) -> Vec<WorkItem> {
         if self.eyes == Eyes::ViewByView {
-            return self.view_by_view(left, right, known);
+            return self.view_by_view(left, right, inputs);
         }
-        let placement = self.pairing.rule().place([left, right], known);
-        let ground = self.ground(placement.grid, left, known);
+        let placement = self.pairing.rule().place([left, right], inputs);
+        let ground = self.ground(placement.grid, left, inputs);
         let cells = self.curve.path().cells(&ground);
         let mut items = Vec::with_capacity(cells.len());
         for [left, right] in by_cell(&placement, &cells, [left, right]) {
@@ -268,16 +268,16 @@ impl Parts {
         items
     }
 
-    fn view_by_view(&self, left: View, right: View, known: &Known<'_>) -> Vec<WorkItem> {
+    fn view_by_view(&self, left: View, right: View, inputs: &PlanInputs<'_>) -> Vec<WorkItem> {
         if self.curve == Curve::RANDOM {
             let all = [left, right].into_iter().flat_map(|view| {
                 tiles(view).filter_map(move |at| view.tile(at).map(WorkItem::Tile))
             });
             let mut items: Vec<WorkItem> = all.collect();
-            shuffle(known.seed, &mut items);
+            shuffle(inputs.seed, &mut items);
             return items;
         }
-        let (left, mut right) = (self.mono(left, known), self.mono(right, known));
+        let (left, mut right) = (self.mono(left, inputs), self.mono(right, inputs));
         if self.direction == Direction::RightReversed {
             right.reverse();
         }

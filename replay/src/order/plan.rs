@@ -4,7 +4,7 @@
 //! visits every tile of every pass exactly once.
 
 use super::parts::Direction;
-use super::{Known, Order, View, WorkItem};
+use super::{Order, PlanInputs, View, WorkItem};
 use formats::textrace::{Pass, PassKind};
 use formats::view::Eye;
 
@@ -13,26 +13,31 @@ use formats::view::Eye;
 pub type Phase = Vec<WorkItem>;
 
 /// All work of a trace: frame after frame, monoscopic passes before the stereo pair. All frames use the
-/// counters in `known`.
+/// counters in `inputs`.
 #[must_use]
-pub fn plan(order: Order, known: &Known<'_>, passes: &[Pass]) -> Vec<Phase> {
+pub fn plan(order: Order, inputs: &PlanInputs<'_>, passes: &[Pass]) -> Vec<Phase> {
     let mut frames: Vec<u32> = passes.iter().map(|p| p.frame).collect();
     frames.sort_unstable();
     frames.dedup();
-    let plan = |frame| plan_frame(order, known, passes, frame);
+    let plan = |frame| plan_frame(order, inputs, passes, frame);
     frames.into_iter().flat_map(plan).collect()
 }
 
 /// The work of one frame.
 #[must_use]
-pub fn plan_frame(order: Order, known: &Known<'_>, passes: &[Pass], frame: u32) -> Vec<Phase> {
+pub fn plan_frame(
+    order: Order,
+    inputs: &PlanInputs<'_>,
+    passes: &[Pass],
+    frame: u32,
+) -> Vec<Phase> {
     let parts = order.parts();
     let mut phases: Vec<Phase> = (views(passes, frame).into_iter())
         .map(|phase| match phase {
-            Views::One(view) => parts.mono(view, known),
+            Views::One(view) => parts.mono(view, inputs),
             Views::Pair(left, right) => match order.listed_items(left) {
                 Some(items) => items.to_vec(),
-                None => parts.stereo(left, right, known),
+                None => parts.stereo(left, right, inputs),
             },
         })
         .collect();
@@ -43,7 +48,7 @@ pub fn plan_frame(order: Order, known: &Known<'_>, passes: &[Pass], frame: u32) 
         return phases;
     };
     let columns = |pass: u32| passes.get(pass as usize).map_or(1, |pass| pass.tiles[0]);
-    let deal = |phase| assignment.deal(phase, known.cores, &columns);
+    let deal = |phase| assignment.deal(phase, inputs.cores, &columns);
     phases.into_iter().map(deal).collect()
 }
 

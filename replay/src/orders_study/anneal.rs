@@ -275,7 +275,7 @@ mod tests {
 
         /// Uses enough items for many blocks. Compares every difference with a replay of the whole order.
         #[test]
-        fn moves_are_judged_as_a_replay_of_the_whole_order_does(
+        fn judged_moves_have_the_misses_of_a_whole_replay(
             parts in prop::collection::vec(accesses(), 8..12), seed in any::<u64>(),
         ) {
             let items = Items::new(&parts.concat());
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn annealing_finds_lines_that_lie_apart_and_is_never_worse_than_its_start() {
+    fn annealing_brings_shared_lines_together_and_is_never_worse_than_its_start() {
         // Items i and i + 32 use the same lines. The cache holds the lines of four items.
         let accesses: Vec<Vec<u32>> = (0..64_u32)
             .map(|i| (0..4).map(|n| i % 32 * 4 + n).collect())

@@ -15,7 +15,7 @@ use super::stream::l2_stream;
 use crate::config::{Order, RunConfig};
 use crate::engine::ReplayError;
 use crate::locality::{OptMisses, opt_misses};
-use crate::order::{self, Known};
+use crate::order::{self, PlanInputs};
 use crate::stream::{Expander, LineMemory, TileSource, TraceCounts, rendered};
 
 /// The minimum number of lines that any order of the items fetches into a cache of this many lines, by windows.
@@ -60,7 +60,8 @@ pub fn opt(
         let known =
             |(bytes, of, _): &&(u64, Order, Vec<u32>)| (*bytes, *of) == (l1_bytes, resolved);
         if streams.iter().find(known).is_none() {
-            let phases = order::plan_frame(order, &Known::new(config, &tables.meta), passes, frame);
+            let phases =
+                order::plan_frame(order, &PlanInputs::new(config, &tables.meta), passes, frame);
             let config = RunConfig { order, ..*config };
             streams.push((l1_bytes, resolved, l2_stream(&expanded, &phases, &config)?));
         }
@@ -82,7 +83,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn no_order_misses_less_than_the_windows_say(accesses in accesses(), order in any::<u64>()) {
+        fn no_order_has_fewer_misses_than_the_window_bound(accesses in accesses(), order in any::<u64>()) {
             let items = Items::new(&accesses);
             let mut permuted: Vec<u32> = (0..items.len() as u32).collect();
             permuted.sort_unstable_by_key(|&item| u64::from(item).wrapping_mul(order | 1));
@@ -94,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn items_that_share_nothing_need_a_stretch_for_each_cache_of_lines() {
+    fn items_without_shared_lines_need_one_window_per_cache_size() {
         let accesses: Vec<Vec<u32>> = (0..10_u32)
             .map(|i| (0..4).map(|n| 4 * i + n).collect())
             .collect();

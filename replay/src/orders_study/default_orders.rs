@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_name_is_an_orders_and_no_order_comes_twice() {
+    fn every_name_is_an_order_and_no_order_is_repeated() {
         let orders = default_orders();
         // Morton with STA is in the table of orders.
         assert_eq!(

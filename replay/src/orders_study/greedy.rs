@@ -59,7 +59,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn what_is_in_the_cache_comes_before_what_is_not() {
+    fn items_with_lines_in_the_cache_come_first() {
         // Items 0 and 3 have the same lines, and so do items 1 and 2. The cache holds the lines of one item.
         let set = |first: u32| (first..first + 4).collect::<Vec<u32>>();
         let items = Items::new(&[set(0), set(8), set(8), set(0), vec![]]);

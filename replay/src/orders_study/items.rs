@@ -132,7 +132,7 @@ pub(super) mod tests {
 
     proptest! {
         #[test]
-        fn misses_are_those_of_plain_lists(accesses in accesses(), sets in 0_u32..3, ways in 1_u32..5) {
+        fn misses_equal_those_of_plain_lists(accesses in accesses(), sets in 0_u32..3, ways in 1_u32..5) {
             let sets = 1 << sets;
             let items = Items::new(&accesses);
             let order: Vec<u32> = (0..items.len() as u32).rev().collect();

@@ -7,7 +7,7 @@
 use super::stream::Counting;
 use crate::config::{Order, RunConfig};
 use crate::engine::{ReplayError, check_other_work};
-use crate::order::{self, Counters, Known};
+use crate::order::{self, Counters, PlanInputs};
 use crate::stream::{
     Cores, Expander, Frame, LineMemory, TileSource, TraceCounts, interleave, rendered,
 };
@@ -189,21 +189,21 @@ pub fn learn(
         let frame = expander.frame(number, &memory, &mut counts)?;
         let counted = match need_counters {
             true => {
-                let known = Known::new(config, &tables.meta);
-                Some(frame.counters(&tables.passes, number, &known)?)
+                let inputs = PlanInputs::new(config, &tables.meta);
+                Some(frame.counters(&tables.passes, number, &inputs)?)
             }
             false => None,
         };
         let of_last = last.take().or_else(|| counted.clone());
-        let known = Known {
+        let inputs = PlanInputs {
             last: of_last.as_ref(),
-            ..Known::new(config, &tables.meta)
+            ..PlanInputs::new(config, &tables.meta)
         };
         let render = |run: &mut Run| {
             if !run.fetched.is_empty() {
                 run.caches.between(config, run.fetched.len());
             }
-            run.frame(&frame, orders, &known, &tables.passes, number, config)
+            run.frame(&frame, orders, &inputs, &tables.passes, number, config)
         };
         runs.par_iter_mut().try_for_each(render)?;
         last = counted;
@@ -226,14 +226,14 @@ impl Run {
         &mut self,
         frame: &Frame<'_>,
         orders: &[Order],
-        known: &Known<'_>,
+        inputs: &PlanInputs<'_>,
         passes: &[formats::textrace::Pass],
         number: u32,
         config: &RunConfig,
     ) -> Result<(), ReplayError> {
         let chosen = self.learner.as_mut().map_or(self.order, Learner::choose);
         let order = orders[chosen];
-        let phases = order::plan_frame(order, known, passes, number);
+        let phases = order::plan_frame(order, inputs, passes, number);
         let before = self.caches.fetched;
         let mut cores = Cores::new(frame, config.cores as usize);
         interleave(
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn each_order_is_tried_and_the_best_one_kept_but_for_a_try_now_and_then() {
+    fn each_order_is_tried_and_the_best_one_is_used_except_for_occasional_trials() {
         let (_, chosen) = run(3, 33, |_, order| [30, 10, 20][order]);
         assert_eq!(chosen[..8], [0, 1, 2, 1, 1, 1, 1, 1]);
         assert_eq!(
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn one_order_is_never_tried_against_another() {
+    fn a_single_order_is_never_replaced() {
         let (total, _) = run(1, 40, |_, _| 7);
         assert_eq!(total, 280);
         assert_eq!(Learner::state_bytes(4), 19);

@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_read_as_it_was_written() {
+    fn a_written_file_reads_back_the_same() {
         let text = file().text();
         assert_eq!(text.lines().nth(5), Some("0:1 1:0"));
         assert_eq!(OrderFile::parse(&text), Ok(file()));
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_order_is_refused_with_its_line() {
+    fn an_invalid_order_file_is_refused_with_the_line() {
         let text = file().text();
         for (from, to, expected) in [
             (
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn an_order_that_is_no_permutation_of_the_trace_is_refused() {
+    fn an_order_that_is_not_a_permutation_of_the_tiles_is_refused() {
         let check = |change: fn(&mut Vec<WorkItem>)| {
             let mut file = file();
             change(&mut file.items);

@@ -7,7 +7,7 @@ use super::stream::lines_of_items;
 use super::{Items, OrderFile};
 use crate::config::{Order, RunConfig};
 use crate::engine::ReplayError;
-use crate::order::{self, Known, Phase, Views, WorkItem, views};
+use crate::order::{self, Phase, PlanInputs, Views, WorkItem, views};
 use crate::stream::{Expander, LineMemory, TileSource, TraceCounts, rendered};
 use std::collections::HashMap;
 
@@ -83,8 +83,8 @@ impl Ground {
         else {
             return Ok(None);
         };
-        let known = Known::new(config, &trace.tables().meta);
-        let items: Phase = order::plan_frame(start, &known, passes, frame).swap_remove(pair);
+        let inputs = PlanInputs::new(config, &trace.tables().meta);
+        let items: Phase = order::plan_frame(start, &inputs, passes, frame).swap_remove(pair);
         let expander = Expander::new(&rendered, config)?;
         let mut counts = TraceCounts::new(expander.bins());
         let memory = LineMemory::new(LineMemory::USUAL_BYTES);

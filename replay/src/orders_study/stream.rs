@@ -17,7 +17,7 @@ impl Consumer for Lines {
 }
 
 /// The distinct lines of each item in order of first access.
-pub fn lines_of_items(
+pub(super) fn lines_of_items(
     frame: &Frame<'_>,
     items: &[WorkItem],
     config: &RunConfig,
@@ -54,7 +54,7 @@ impl Consumer for Misses {
 }
 
 /// The requests that reach the L2, in order.
-pub fn l2_stream(
+pub(super) fn l2_stream(
     frame: &Frame<'_>,
     phases: &[Phase],
     config: &RunConfig,

@@ -6,7 +6,7 @@ use super::{OrderFile, OrderFileError, bounds};
 use crate::config::{BetweenFrames, Order, RunConfig};
 use crate::engine::{ReplayError, Work};
 use crate::experiment::{self, Plan, Point, RunError, Subject, frame_count};
-use crate::order::{Known, Listed, Views, views};
+use crate::order::{Listed, PlanInputs, Views, views};
 use formats::view::TILE_SIZE_PX;
 use rayon::prelude::*;
 use thiserror::Error;
@@ -360,14 +360,14 @@ fn first_frame(subject: &Subject<'_>) -> u32 {
 /// Columns by which points at infinity are shifted between the eyes of the first frame.
 fn offset(subject: &Subject<'_>, config: &RunConfig) -> i32 {
     let tables = subject.source.tables();
-    let known = Known {
+    let inputs = PlanInputs {
         tile_px: TILE_SIZE_PX,
-        ..Known::new(config, &tables.meta)
+        ..PlanInputs::new(config, &tables.meta)
     };
     let pairs = views(&tables.passes, first_frame(subject)).into_iter();
     let pair = pairs.into_iter().find_map(|phase| match phase {
         Views::Pair(left, right) => Some([left, right]),
         Views::One(_) => None,
     });
-    pair.map_or(0, |eyes| known.offset(eyes)[0])
+    pair.map_or(0, |eyes| inputs.offset(eyes)[0])
 }

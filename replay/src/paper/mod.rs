@@ -30,7 +30,7 @@ pub struct UnknownScene {
 ///
 /// # Errors
 /// A scene that is not among `scenes`.
-pub fn asked<'a>(
+pub fn assigned_scene<'a>(
     values: &[String],
     label: &str,
     scenes: &[&'a str],
@@ -68,9 +68,9 @@ mod tests {
     }
 
     #[test]
-    fn a_papers_scene_can_be_given_for_one_label_or_for_all() {
+    fn a_scene_of_the_paper_can_be_assigned_to_one_label_or_to_all() {
         let values = ["sponza".to_owned(), "b=none".to_owned()];
-        let of = |values: &[String], label| asked(values, label, &["t-rex", "sponza"]);
+        let of = |values: &[String], label| assigned_scene(values, label, &["t-rex", "sponza"]);
         assert_eq!(of(&values, "a"), Ok(Some(Some("sponza"))));
         assert_eq!(of(&values, "b"), Ok(Some(None)));
         assert_eq!(of(&[], "a"), Ok(None));

@@ -214,7 +214,7 @@ mod tests {
 
     /// The table's slopes: T-Rex .58 to .63, Crytek 16 KB .62 to .70 and 8 KB .10 to .13.
     #[test]
-    fn slopes_are_those_of_the_table() {
+    fn slopes_equal_those_of_the_table() {
         let slopes = |scene| Parts::of(&scene_rows(scene)).slopes;
         let [small, large] = slopes("crytek-sponza")[..] else {
             panic!("two sizes")

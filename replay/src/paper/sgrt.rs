@@ -80,11 +80,11 @@ const STAND_INS: [(&str, &str); 3] = [
 pub fn values(
     scene: &str,
     label: &str,
-    asked: &[String],
+    assignments: &[String],
 ) -> Result<Option<PaperValues>, super::UnknownScene> {
     let ids = SCENES.map(|s| s.id);
     let named = || super::stand_in(scene, &ids.map(|id| (id, id))).copied();
-    let id = super::asked(asked, label, &ids)?
+    let id = super::assigned_scene(assignments, label, &ids)?
         .unwrap_or_else(|| super::stand_in(scene, &STAND_INS).copied().or_else(named));
     let found = SCENES.iter().find(|s| Some(s.id) == id);
     Ok(found.map(|s| PaperValues {
@@ -101,9 +101,9 @@ mod tests {
 
     #[test]
     fn only_scenes_with_the_exact_name_or_requested_ones_are_compared() {
-        let found = |scene, label, asked: &[&str]| {
-            let asked: Vec<String> = asked.iter().map(|&a| a.to_owned()).collect();
-            let values = values(scene, label, &asked).expect("known scenes");
+        let found = |scene, label, assignments: &[&str]| {
+            let assignments: Vec<String> = assignments.iter().map(|&a| a.to_owned()).collect();
+            let values = values(scene, label, &assignments).expect("known scenes");
             values.map(|v| v.scene)
         };
         assert_eq!(found("car", "car", &[]).as_deref(), Some("BMW"));
@@ -114,8 +114,8 @@ mod tests {
         for other in ["scarf.gltf", "labyrinth.obj", "cars/car.gltf", "teapot_16k"] {
             assert_eq!(found(other, other, &[]), None, "{other}");
         }
-        let asked = found("a/bmw_55k.gltf", "bmw_55k", &["bmw_55k=bmw"]);
-        assert_eq!(asked.as_deref(), Some("BMW"));
+        let assigned = found("a/bmw_55k.gltf", "bmw_55k", &["bmw_55k=bmw"]);
+        assert_eq!(assigned.as_deref(), Some("BMW"));
         assert_eq!(found("chess", "chess", &["none"]), None);
     }
 }

@@ -139,7 +139,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn a_claim_goes_with_the_settings_of_its_technique() {
+    fn a_claim_is_listed_with_the_settings_of_its_technique() {
         let settings = json!({ "culling": "per-eye", "hidden-area-mask": true, "foveation": { "kind": "rings" } });
         let about: Vec<&str> = CLAIMS
             .iter()

@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_stands_in_by_its_exact_name() {
+    fn a_stand_in_scene_is_found_by_its_exact_name() {
         let path = "../scenes/crytek-sponza/sponza.gltf";
         assert_eq!(stand_in(path, false), Some("crytek-sponza"));
         assert_eq!(stand_in("atrium", false), Some("crytek-sponza"));

@@ -450,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn times_are_on_the_page_and_in_their_table_and_not_in_the_results() {
+    fn times_are_on_the_page_and_in_a_separate_table_but_not_in_the_results() {
         let report = report();
         // The mean over both scenes of the recommended choice's times.
         assert_eq!(report.advice(true).cells()[0][2], "0.30");

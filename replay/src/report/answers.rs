@@ -16,7 +16,7 @@ fn traffic(pct: f64) -> String {
 /// Orders against a baseline: names, and the percentage of the baseline's traffic that each saves. `over`
 /// says what the means are taken over.
 #[must_use]
-pub fn tile_orders(baseline: &str, over: &str, orders: &[(String, f64)]) -> Vec<String> {
+pub(super) fn tile_orders(baseline: &str, over: &str, orders: &[(String, f64)]) -> Vec<String> {
     let Some((worst, best)) = ends(orders, |o| o.1) else {
         return vec![format!(
             "Only {baseline} was replayed, so no order is compared with another."
@@ -152,7 +152,7 @@ pub fn misses(cache: &str, rows: &[Misses]) -> Option<String> {
 }
 
 /// An order of a study.
-pub struct Studied {
+pub(super) struct Studied {
     /// Name.
     pub name: String,
     /// Change of the bytes against the baseline, percent.
@@ -163,7 +163,7 @@ pub struct Studied {
 
 /// A study of orders and bounds against a baseline, over `rows` pairs of trace and caches.
 #[must_use]
-pub fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<String> {
+pub(super) fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<String> {
     let compare = |order: &Studied| match traffic(order.change_pct).as_str() {
         "as much" => format!("{} reads as much from memory as {baseline}", order.name),
         words => format!("{} reads {words} from memory than {baseline}", order.name),
@@ -376,7 +376,7 @@ mod tests {
     }
 
     #[test]
-    fn orders_that_save_that_cost_and_that_are_alone() {
+    fn the_answer_covers_orders_that_save_or_cost_and_a_single_order() {
         let text =
             |saved: &[f64]| tile_orders("Morton", "mean of atrium", &orders(saved)).join(" ");
         assert_eq!(
@@ -405,7 +405,7 @@ mod tests {
     }
 
     #[test]
-    fn sweeps_of_no_one_equal_and_several_points() {
+    fn the_answer_covers_sweeps_of_zero_one_equal_and_several_points() {
         let point = |name: &str, mb| (name.to_owned(), mb);
         assert_eq!(sweep(&[], &[]), ["No point was replayed."]);
         assert_eq!(
@@ -429,7 +429,7 @@ mod tests {
     }
 
     #[test]
-    fn misses_of_one_order_of_equal_orders_and_of_others() {
+    fn the_answer_covers_misses_of_one_order_equal_orders_and_different_orders() {
         let row = |order: &str, miss_pct| Misses {
             order: order.to_owned(),
             miss_pct,
@@ -451,7 +451,7 @@ mod tests {
     }
 
     #[test]
-    fn studies_where_nothing_can_be_built_or_saved() {
+    fn the_answer_covers_studies_without_buildable_orders_or_savings() {
         let order = |name: &str, change_pct, is_buildable| Studied {
             name: name.to_owned(),
             change_pct,
@@ -478,7 +478,7 @@ mod tests {
     }
 
     #[test]
-    fn reprojection_that_saves_no_energy_says_so() {
+    fn the_answer_reports_reprojection_that_saves_no_energy() {
         let scene = |energy, paper| Reprojected {
             scene: "chess".to_owned(),
             performance: 1.5,
@@ -506,7 +506,7 @@ mod tests {
     }
 
     #[test]
-    fn techniques_that_are_slower_alone_or_lossless() {
+    fn the_answer_covers_slower_single_and_lossless_techniques() {
         let technique = |name: &str, time, flip| Timed {
             name: name.to_owned(),
             time,

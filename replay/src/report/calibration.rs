@@ -10,7 +10,7 @@ use crate::result::TOOL;
 use serde::Serialize;
 
 /// Schema of the object that `replay calibrate --json` prints.
-pub const CALIBRATION_SCHEMA: &str = "replay.calibration/2";
+pub(super) const CALIBRATION_SCHEMA: &str = "replay.calibration/2";
 
 /// A calibration: every trial, and the index of the chosen one.
 #[derive(Serialize)]
@@ -138,7 +138,8 @@ mod tests {
     }
 
     #[test]
-    fn the_best_trial_on_the_choosing_scenes_is_chosen_and_the_best_on_the_others_is_printed() {
+    fn the_best_trial_on_the_calibration_scenes_is_chosen_and_the_best_on_the_held_out_scenes_is_printed()
+     {
         let trials = vec![trial(20, 2.0, 1.0), trial(24, 1.5, 3.0)];
         let report = CalibrationReport::new(RunConfig::default(), Objective::Surface, trials);
         assert_eq!(report.chosen, Some(1));

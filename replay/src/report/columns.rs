@@ -423,14 +423,14 @@ mod tests {
     }
 
     #[test]
-    fn columns_are_picked_in_the_order_asked_for() {
+    fn columns_are_selected_in_the_requested_order() {
         let picked = pick::<Point>(&["paper.half", "misses"]);
         let names: Vec<_> = picked.iter().map(|c| c.heading.name.as_ref()).collect();
         assert_eq!(names, ["half", "misses"]);
     }
 
     #[test]
-    fn a_table_rounds_and_what_rounds_to_zero_has_no_sign() {
+    fn a_table_rounds_values_and_prints_zero_without_a_sign() {
         assert_eq!(Show::Decimals(1).write(&Value::Real(-0.04)), "0.0");
         assert_eq!(Show::Decimals(1).write(&Value::Real(-0.06)), "-0.1");
         assert_eq!(Show::Millions(2).write(&Value::Whole(1_234_567)), "1.23");

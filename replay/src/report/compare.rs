@@ -10,7 +10,7 @@ use formats::textrace::TraceMeta;
 use serde::Serialize;
 
 /// Schema of the object that `replay compare --json` prints.
-pub const COMPARE_SCHEMA: &str = "replay.compare/2";
+pub(super) const COMPARE_SCHEMA: &str = "replay.compare/2";
 
 /// Materials that the terminal's table shows.
 const MATERIALS: usize = 12;

@@ -106,7 +106,7 @@ fn whole(result: &RunResult, of: impl Fn(&ClientTraffic) -> u64) -> Option<u64> 
 }
 
 /// DRAM energy of all clients over all frames, millijoules.
-pub fn whole_mj(result: &RunResult) -> Option<f64> {
+pub(super) fn whole_mj(result: &RunResult) -> Option<f64> {
     let clients = &result.clients;
     (!clients.is_empty()).then(|| clients.iter().map(|c| c.energy_mj).sum())
 }

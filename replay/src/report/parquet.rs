@@ -17,7 +17,7 @@ use thiserror::Error;
 
 /// Key of the file's metadata with a JSON object: unit and definition by column. Most readers do not show
 /// metadata of columns.
-pub const COLUMNS_KEY: &str = "parallax.columns";
+pub(super) const COLUMNS_KEY: &str = "parallax.columns";
 
 /// Error for a table that cannot be written as Parquet.
 #[derive(Debug, Error)]
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_count_that_does_not_fit_is_named() {
+    fn the_error_for_a_count_that_does_not_fit_names_it() {
         let error = bytes(&table(&[("a", None, 1 << 63, true)])).unwrap_err();
         assert_eq!(
             error.to_string(),

@@ -7,7 +7,7 @@ use crate::palette::{self, Rgb};
 use plotters::style::RGBColor;
 
 /// Series colours; the last one is neutral.
-pub const SERIES: [RGBColor; 8] = [
+pub(super) const SERIES: [RGBColor; 8] = [
     color(palette::ORANGE),
     color(palette::SKY_BLUE),
     color(palette::BLUE),
@@ -25,32 +25,32 @@ pub const fn color([red, green, blue]: Rgb) -> RGBColor {
 }
 
 /// Text.
-pub const INK: RGBColor = RGBColor(0x1F, 0x23, 0x28);
+pub(super) const INK: RGBColor = RGBColor(0x1F, 0x23, 0x28);
 /// Background of text that covers lines.
-pub const PAPER: RGBColor = RGBColor(0xFF, 0xFF, 0xFF);
+pub(super) const PAPER: RGBColor = RGBColor(0xFF, 0xFF, 0xFF);
 /// Secondary text: tick labels, notes.
-pub const MUTED: RGBColor = RGBColor(0x5B, 0x63, 0x6C);
+pub(super) const MUTED: RGBColor = RGBColor(0x5B, 0x63, 0x6C);
 /// Horizontal grid lines.
 pub const GRID: RGBColor = RGBColor(0xDD, 0xE1, 0xE6);
 /// The zero line and frames.
-pub const AXIS: RGBColor = RGBColor(0x9A, 0xA2, 0xAB);
+pub(super) const AXIS: RGBColor = RGBColor(0x9A, 0xA2, 0xAB);
 
 /// System font stack; nothing is fetched or embedded.
-pub const FONT: &str = "system-ui, sans-serif";
+pub(super) const FONT: &str = "system-ui, sans-serif";
 /// Plot titles, px.
-pub const TITLE_PX: u32 = 15;
+pub(super) const TITLE_PX: u32 = 15;
 /// Axis and series labels, px.
-pub const LABEL_PX: u32 = 12;
+pub(super) const LABEL_PX: u32 = 12;
 /// Tick labels and value labels, px.
-pub const TICK_PX: u32 = 11;
+pub(super) const TICK_PX: u32 = 11;
 /// Series strokes, px.
-pub const LINE_PX: u32 = 2;
+pub(super) const LINE_PX: u32 = 2;
 
 /// Upper estimate of the width of `text` at `size_px`, in pixels.
 ///
 /// The viewer's font is unknown; these advance widths bound those of common system fonts.
 #[must_use]
-pub fn text_width_px(text: &str, size_px: u32) -> f64 {
+pub(super) fn text_width_px(text: &str, size_px: u32) -> f64 {
     let em: f64 = text
         .chars()
         .map(|c| match c {
@@ -144,7 +144,7 @@ pub fn spread(wishes: &[f64], gap: f64, low: f64, high: f64) -> Vec<f64> {
 
 /// Puts a thin space between groups of three digits before the point.
 #[must_use]
-pub fn group_thousands(number: &str) -> String {
+pub(super) fn group_thousands(number: &str) -> String {
     let (sign, rest) = match number.strip_prefix('-') {
         Some(rest) => ("-", rest),
         None => ("", number),
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn spread_centres_a_cluster_on_its_wishes() {
+    fn spread_centres_a_cluster_on_its_wanted_positions() {
         assert_eq!(spread(&[50.0, 50.0], 10.0, 0.0, 100.0), [45.0, 55.0]);
     }
 
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn thousands_are_set_apart_only_in_long_numbers() {
+    fn thousands_are_separated_only_in_long_numbers() {
         assert_eq!(group_thousands("1234"), "1234");
         assert_eq!(
             group_thousands("-1234567.25"),

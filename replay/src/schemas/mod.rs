@@ -113,7 +113,7 @@ fn file(name: &str) -> String {
 }
 
 #[test]
-fn published_schemas_are_those_of_the_types() {
+fn published_schemas_equal_those_of_the_types() {
     let update = env::var_os("UPDATE_SCHEMAS").is_some();
     let mut expected: Vec<String> = Vec::new();
     for Published { name, schema } in all() {

@@ -24,7 +24,7 @@ pub struct ClassCounts {
 }
 
 /// Limits of the position error, in pixels.
-pub const POSITION_LIMITS_PX: [f32; 2] = [1.0, 2.0];
+pub(super) const POSITION_LIMITS_PX: [f32; 2] = [1.0, 2.0];
 
 /// Counts of all classes, and the position error of reused hits on the right object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -77,7 +77,7 @@ impl Accuracy {
 /// Distance between the reused and the true hit, over the pixel's width at the true hit's depth, in pixels.
 /// Grazing surfaces increase it. It is zero between sky and sky, and infinite between sky and surface.
 #[must_use]
-pub fn position_error_px(
+pub(super) fn position_error_px(
     eye: &EyeCamera,
     decision: &Decision,
     left: &Sample,
@@ -97,7 +97,7 @@ pub fn position_error_px(
 
 /// Counts decisions by class, and compares reused hits with traced ones.
 #[must_use]
-pub fn count_errors(frame: &Frame, decisions: &[Decision]) -> Accuracy {
+pub(super) fn count_errors(frame: &Frame, decisions: &[Decision]) -> Accuracy {
     let eye = frame.tables.camera(Eye::Right);
     let mut accuracy = Accuracy::default();
     // NaN marks samples without a position error.

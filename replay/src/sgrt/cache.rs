@@ -42,7 +42,7 @@ impl Misses {
 /// starts at a multiple of `g = gcd(b, line)`, all multiples equally often, and touches `1 + (b - g) /
 /// line` lines on average.
 #[must_use]
-pub fn lines_per_record(record_bytes: u32, line_bytes: u64) -> f64 {
+pub(super) fn lines_per_record(record_bytes: u32, line_bytes: u64) -> f64 {
     let bytes = u64::from(record_bytes).max(1);
     let (mut divisor, mut rest) = (bytes, line_bytes);
     while rest > 0 {
@@ -54,7 +54,7 @@ pub fn lines_per_record(record_bytes: u32, line_bytes: u64) -> f64 {
 /// Misses of a batch by the configured hit rates, which apply per visit: all lines of a visit hit, or all
 /// miss. Re-tests count as primary accesses.
 #[must_use]
-pub fn by_rates(work: &BatchWork, bvh: &BvhSummary, config: &SgrtConfig) -> Misses {
+pub(super) fn by_rates(work: &BatchWork, bvh: &BvhSummary, config: &SgrtConfig) -> Misses {
     let cache = &config.cache;
     let rate = |rates: &HitRates, class: RayClass| match class {
         RayClass::Primary => rates.primary,
@@ -92,7 +92,7 @@ fn lru(bytes: u64, ways: u32, line_bytes: u64) -> Box<dyn Cache> {
 }
 
 /// The caches of the whole device, simulated by addresses.
-pub struct DeviceCaches {
+pub(super) struct DeviceCaches {
     /// Per unit, the node cache and then the triangle cache.
     caches: Hierarchy<Box<dyn Cache>>,
     units: usize,
@@ -166,7 +166,7 @@ mod tests {
 
     /// With caches too small for any reuse, hit rates of 0 must give the counts of addresses.
     #[test]
-    fn rates_and_addresses_count_lines_and_visits_alike() {
+    fn rates_and_addresses_count_lines_and_visits_equally() {
         for (node_bytes, triangle_bytes) in [(64, 48), (256, 48), (80, 36), (32, 64), (100, 7)] {
             let bvh = BvhSummary {
                 bytes_per_node: node_bytes,

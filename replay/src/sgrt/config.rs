@@ -383,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_may_name_only_what_it_changes() {
+    fn a_file_can_contain_only_the_changed_keys() {
         let config = SgrtConfig::from_overrides("[tni]\nunits = 8\nclock_mhz = 700\n").expect("ok");
         assert_eq!(config.tni.units, 8);
         assert_eq!(config.tni.clock_mhz, 700.0);
@@ -391,13 +391,13 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_key_is_refused_by_name() {
+    fn an_unknown_key_is_refused_with_its_name() {
         let error = SgrtConfig::from_overrides("[tni]\ncolour = 8\n").unwrap_err();
         assert!(error.to_string().contains("colour"), "{error}");
     }
 
     #[test]
-    fn a_value_out_of_range_says_key_expected_and_found() {
+    fn the_error_for_a_value_out_of_range_has_key_expected_and_found() {
         let error = SgrtConfig::from_overrides("[memory]\nlatency_ns = -1.0\n").unwrap_err();
         assert_eq!(
             error.to_string(),
@@ -412,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn scaling_keeps_counts_whole_and_rates_rates() {
+    fn scaling_gives_whole_counts_and_valid_rates() {
         let base = SgrtConfig::default();
         assert_eq!(
             base.scaled("tni.ist_pipelines", 0.5)

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use std::error::Error;
 
 /// Object and primitive number of a sky pixel.
-pub const SKY: u32 = u32::MAX;
+pub(super) const SKY: u32 = u32::MAX;
 
 /// A source of ray trace tiles.
 pub trait RaySource: Sync {

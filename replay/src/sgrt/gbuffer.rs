@@ -22,7 +22,7 @@ pub struct Traffic {
 
 /// Where G-buffer records are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Keeping {
+pub(super) enum Keeping {
     /// One tile on chip.
     Tile,
     /// The whole screen in DRAM.
@@ -31,7 +31,7 @@ pub enum Keeping {
 
 /// Pixels of a right tile processed by the kernels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct RightTile {
+pub(super) struct RightTile {
     /// Pixels tested.
     pub tested: u64,
     /// Pixels reused.
@@ -45,7 +45,7 @@ pub struct RightTile {
 /// Traffic of a left tile: shading writes its records, the reproject kernel reads the fields that detection
 /// needs, and these are written to DRAM.
 #[must_use]
-pub fn left_tile(pixels: u64, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Traffic {
+pub(super) fn left_tile(pixels: u64, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Traffic {
     let record = pixels * reads.record_bytes(g);
     let row = pixels * reads.pixel_bytes(g);
     match keeping {
@@ -67,7 +67,7 @@ pub fn left_tile(pixels: u64, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Tr
 /// Traffic of a right tile: rows are fetched and searched by detection, reuse reads left records, and the
 /// tile's own records are written.
 #[must_use]
-pub fn right_tile(tile: &RightTile, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Traffic {
+pub(super) fn right_tile(tile: &RightTile, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Traffic {
     let records = (tile.reused + tile.tested) * reads.record_bytes(g);
     let searched = tile.row_read_bytes + tile.tested * reads.looked_up_bytes(g);
     let rows_on_chip = tile.fetched_bytes + searched;

@@ -105,7 +105,7 @@ pub struct TileWork {
 
 /// The work of each tile, for given decisions and reuse, by tile number.
 #[must_use]
-pub fn tile_work(frame: &Frame, decisions: &[Decision], reuse: Reuse) -> Vec<TileWork> {
+pub(super) fn tile_work(frame: &Frame, decisions: &[Decision], reuse: Reuse) -> Vec<TileWork> {
     (0..frame.tables.tile_count())
         .into_par_iter()
         .map(|tile| {
@@ -183,7 +183,11 @@ pub struct TileMisses {
 
 /// Misses by the configured hit rates, by tile number.
 #[must_use]
-pub fn misses_by_rates(work: &[TileWork], frame: &Frame, config: &SgrtConfig) -> Vec<TileMisses> {
+pub(super) fn misses_by_rates(
+    work: &[TileWork],
+    frame: &Frame,
+    config: &SgrtConfig,
+) -> Vec<TileMisses> {
     let of = |batch: &BatchWork| cache::by_rates(batch, &frame.tables.bvh, config);
     let tile = |work: &TileWork| {
         let left = of(&work.left);
@@ -203,7 +207,7 @@ pub fn misses_by_rates(work: &[TileWork], frame: &Frame, config: &SgrtConfig) ->
 ///
 /// # Errors
 /// [`FrameError`] for an unreadable tile.
-pub fn misses_by_addresses(
+pub(super) fn misses_by_addresses(
     source: &dyn RaySource,
     frame: &Frame,
     decisions: &[Decision],

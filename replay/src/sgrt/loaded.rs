@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn several_samples_a_pixel_are_refused_with_the_reason() {
+    fn several_samples_per_pixel_are_refused_with_the_reason() {
         let view = View {
             samples_per_px: 4,
             ..View::default()
@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sky_is_reused_wherever_the_scene_lies() {
+    fn sky_reuse_does_not_depend_on_the_scenes_position() {
         let view = View {
             center: [1e6, -3e6, 2e6],
             ..View::default()
@@ -272,7 +272,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(40))]
         #[test]
-        fn without_eye_separation_all_is_reused_and_the_image_is_the_traced_one(
+        fn without_eye_separation_all_is_reused_and_the_image_equals_the_traced_one(
             scene in placed(),
             size_px in prop::array::uniform2(1u32..70),
             right_of_center in -5.0f32..5.0,

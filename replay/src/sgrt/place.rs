@@ -7,9 +7,9 @@ use super::reproject::{Candidate, Reprojection};
 pub type Offset = (i32, i32);
 
 /// Neighbours that share an edge.
-pub const FOUR: [Offset; 4] = [(0, -1), (-1, 0), (1, 0), (0, 1)];
+pub(super) const FOUR: [Offset; 4] = [(0, -1), (-1, 0), (1, 0), (0, 1)];
 /// Neighbours that share an edge or a corner.
-pub const EIGHT: [Offset; 8] = [
+pub(super) const EIGHT: [Offset; 8] = [
     (0, -1),
     (-1, 0),
     (1, 0),

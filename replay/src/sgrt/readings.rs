@@ -76,7 +76,7 @@ pub struct Figures {
 
 /// Lane cycles of a test against one left pixel of the row: a subtraction, a comparison and a minimum, with the
 /// address arithmetic in a second issue slot.
-pub const ROW_TEST_CYCLES: f64 = 4.0;
+pub(super) const ROW_TEST_CYCLES: f64 = 4.0;
 
 /// All readings, in a fixed order: 2 rules x 4 levels of reuse x 6 scopes, row tests and places of the G-buffer.
 #[must_use]
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reading_of_the_frame_is_what_a_run_of_its_rule_gives() {
+    fn a_reading_of_the_frame_equals_a_run_of_its_rule() {
         loaded(|loaded, config| {
             for (reading, figures) in loaded.readings(config).expect("runs") {
                 if reading.scope != Scope::Frame {
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn more_reuse_never_costs_the_units_more() {
+    fn more_reuse_never_increases_unit_cost() {
         loaded(|loaded, config| {
             let readings = loaded.readings(config).expect("runs");
             assert_eq!(readings.len(), all().len());
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn the_distance_to_published_ratios_is_that_of_their_logarithms() {
+    fn the_distance_to_published_ratios_is_computed_from_logarithms() {
         let ours = Figures {
             relative_performance: 1.1,
             relative_energy: 0.9,

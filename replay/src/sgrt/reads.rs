@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn tests_that_run_together_read_a_pixel_once() {
+    fn concurrent_tests_read_a_pixel_once() {
         let g = SgrtConfig::default().gbuffer;
         assert_eq!(reads("depth+row").looked_up_bytes(&g), 5 * 12 + 2 * 4);
         assert_eq!(reads("none").looked_up_bytes(&g), 12);

@@ -179,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frustum_shifted_by_whole_rows_needs_no_more_of_them() {
+    fn a_frustum_shifted_by_whole_rows_needs_no_additional_rows() {
         // A tangent of 1.2 spans 40 rows, so 0.06 spans two.
         let (_, needs) = needs(View {
             right_tilt: 0.06,

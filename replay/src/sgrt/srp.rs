@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn kernels_cost_their_items_times_their_cycles_over_all_lanes() {
+    fn kernel_time_is_items_times_cycles_over_lanes() {
         let config = SgrtConfig::default();
         let work = BatchWork {
             shaded: 10,

@@ -15,9 +15,9 @@ use glam::Vec3;
 use std::error::Error;
 
 /// Index of the diffuse material.
-pub const DIFFUSE: u32 = 0;
+pub(super) const DIFFUSE: u32 = 0;
 /// Index of the mirror material.
-pub const MIRROR: u32 = 1;
+pub(super) const MIRROR: u32 = 1;
 /// Index of a diffuse material with holes.
 pub const LEAF: u32 = 2;
 

@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn costs_that_both_ways_pay_alike_move_the_ratios_towards_one() {
+    fn equal_costs_with_and_without_reuse_move_the_ratios_towards_one() {
         let source = scene();
         let loaded = LoadedTrace::load(&source).expect("loads");
         let config = SgrtConfig::default();

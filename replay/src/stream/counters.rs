@@ -2,7 +2,7 @@
 
 use super::expand::Work;
 use super::{Frame, StreamError, TileLines};
-use crate::order::{Counters, Known, TileRef, View, ViewCounters, Views, views};
+use crate::order::{Counters, PlanInputs, TileRef, View, ViewCounters, Views, views};
 use formats::textrace::Pass;
 
 /// Maximum distance in columns between a row's best shift and the shift of infinity.
@@ -71,14 +71,14 @@ impl Frame<'_> {
         &self,
         passes: &[Pass],
         number: u32,
-        known: &Known<'_>,
+        inputs: &PlanInputs<'_>,
     ) -> Result<Counters, StreamError> {
         let mut work = self.expander().work();
         let mut counted = Vec::new();
         for phase in views(passes, number) {
             counted.push(match phase {
-                Views::One(view) => self.count_view(view, known, &mut work)?,
-                Views::Pair(left, right) => self.count_pair([left, right], known, &mut work)?,
+                Views::One(view) => self.count_view(view, inputs, &mut work)?,
+                Views::Pair(left, right) => self.count_pair([left, right], inputs, &mut work)?,
             });
         }
         Ok(Counters { views: counted })
@@ -87,13 +87,13 @@ impl Frame<'_> {
     fn count_view(
         &self,
         view: View,
-        known: &Known<'_>,
+        inputs: &PlanInputs<'_>,
         work: &mut Work,
     ) -> Result<ViewCounters, StreamError> {
         let mut counted = nothing(view);
         for y in 0..view.tiles[1] {
             let lines = lines_of(&self.row(view, Some(y), work)?);
-            counted.bytes += u64::from(lines) * u64::from(known.line_bytes);
+            counted.bytes += u64::from(lines) * u64::from(inputs.line_bytes);
         }
         Ok(counted)
     }
@@ -101,10 +101,10 @@ impl Frame<'_> {
     fn count_pair(
         &self,
         eyes: [View; 2],
-        known: &Known<'_>,
+        inputs: &PlanInputs<'_>,
         work: &mut Work,
     ) -> Result<ViewCounters, StreamError> {
-        let offset = known.offset(eyes);
+        let offset = inputs.offset(eyes);
         let rows = eyes[0].tiles[1];
         let mut counted = nothing(eyes[0]);
         for y in 0..rows {
@@ -130,7 +130,7 @@ impl Frame<'_> {
             };
             let both = lines_of(&left) + lines_of(&right);
             let lines = both - agreement(offset[0], |own| &own.lines);
-            counted.bytes += u64::from(lines) * u64::from(known.line_bytes);
+            counted.bytes += u64::from(lines) * u64::from(inputs.line_bytes);
             counted.line_shift.push(best(|own| &own.lines));
             counted.primitive_shift.push(best(|own| &own.primitives));
         }

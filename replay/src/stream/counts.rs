@@ -25,7 +25,7 @@ pub struct Bins {
 
 /// The bins of a tile: first cell of its view, and tile number.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct TileBins {
+pub(super) struct TileBins {
     pub(super) first_cell: u32,
     pub(super) tile: u32,
 }

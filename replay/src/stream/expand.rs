@@ -57,7 +57,7 @@ impl LineMemory {
         taken.then(|| lines.clone())
     }
 
-    fn give_back(&self, bytes: u64) {
+    fn release(&self, bytes: u64) {
         self.left_bytes.fetch_add(bytes, Ordering::Relaxed);
     }
 }
@@ -433,7 +433,7 @@ impl<'e> Frame<'e> {
             && let Err(copy) = slot.set(copy)
         {
             // Another core has stored the tile already.
-            self.memory.give_back(copy.bytes());
+            self.memory.release(copy.bytes());
         }
     }
 
@@ -452,7 +452,7 @@ impl<'e> Frame<'e> {
 impl Drop for Frame<'_> {
     fn drop(&mut self) {
         let kept = self.kept.iter().flatten().filter_map(OnceLock::get);
-        self.memory.give_back(kept.map(TileLines::bytes).sum());
+        self.memory.release(kept.map(TileLines::bytes).sum());
     }
 }
 
@@ -464,7 +464,7 @@ mod tests {
     use crate::stream::{Cores, MemoryTrace};
 
     #[test]
-    fn tiles_without_room_are_kept_once_there_is_room() {
+    fn tiles_are_stored_once_there_is_room() {
         let trace = MemoryTrace {
             tables: tables(&[[64, 64]]),
             tiles: vec![vec![tile(&[(0, 9), (1, 20)])], vec![tile(&[(0, 7)])]],
@@ -513,7 +513,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quad_of_more_footprints_than_a_thread_may_have_is_refused() {
+    fn a_quad_with_more_footprints_than_a_thread_supports_is_refused() {
         let at = TileRef { pass: 3, tile: 17 };
         assert!(checked_quad(at, Pending::MOST).is_ok());
         let error = checked_quad(at, Pending::MOST + 1).unwrap_err().to_string();
@@ -522,7 +522,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_whose_counters_would_wrap_is_refused() {
+    fn a_tile_whose_counters_would_overflow_is_refused() {
         let at = TileRef { pass: 3, tile: 17 };
         let most = u64::from(u32::MAX);
         let full = TileSums {

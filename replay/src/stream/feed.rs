@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn alternating_lists_take_a_triangle_of_each_in_turn() {
+    fn alternate_interleaving_alternates_the_triangles_of_both_lists() {
         assert_eq!(
             order(WorkItem::Pair(LEFT, RIGHT, Interleave::Alternate)),
             [0, 0, 1, 0, 1, 0]
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn merged_lists_put_the_same_triangle_side_by_side() {
+    fn merged_lists_place_equal_triangles_next_to_each_other() {
         assert_eq!(
             order(WorkItem::Pair(LEFT, RIGHT, Interleave::Merge)),
             [0, 0, 0, 1, 1, 0]
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn halves_take_the_upper_quads_of_both_tiles_in_turn_then_the_lower_ones() {
+    fn halves_alternate_the_upper_quads_of_both_tiles_then_the_lower_ones() {
         let trace = MemoryTrace {
             tables: tables(&[[64, 64]]),
             tiles: vec![

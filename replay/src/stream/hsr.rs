@@ -239,7 +239,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn remaining_fragments_are_those_that_each_pixel_shows(list in primitives()) {
+        fn remaining_fragments_are_the_visible_ones_of_each_pixel(list in primitives()) {
             for opaque in [[true, true, true], [true, false, true], [false, false, false]] {
                 let mut found = tile(&list);
                 defer(&mut found, &opaque);
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn a_trace_is_refused_for_what_it_does_not_hold() {
+    fn a_trace_without_the_needed_fragments_is_refused() {
         let surfaces = |depth_tested| {
             Some(Surfaces {
                 depth_tested,

@@ -110,7 +110,7 @@ mod tests {
     use super::furthest_behind;
 
     #[test]
-    fn the_first_of_the_lowest_clocks_has_the_turn_until_another_is_behind() {
+    fn the_core_with_the_lowest_clock_runs_until_another_is_behind() {
         assert_eq!(furthest_behind(&[5, 5]), Some((0, 5)));
         assert_eq!(furthest_behind(&[6, 5]), Some((1, 5)));
         assert_eq!(furthest_behind(&[9, 5, 7]), Some((1, 7)));

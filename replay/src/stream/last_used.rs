@@ -49,7 +49,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_line_is_idle_where_it_was_the_last_of_its_set_in_the_run(
+        fn a_line_is_idle_if_it_was_the_last_of_its_set_in_the_run(
             runs in prop::collection::vec(prop::collection::vec(0_u32..24, 0..40), 1..5),
         ) {
             // Starts near the largest run number, so that numbers wrap around.

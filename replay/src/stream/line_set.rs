@@ -53,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_count_once_and_untouched_blocks_take_no_memory() {
+    fn lines_count_once_and_unused_blocks_take_no_memory() {
         let set = LineSet::new(u64::from(u32::MAX) + 1);
         for line in [0, 1, 63, 64, 65_535, 65_536, u32::MAX, 1, u32::MAX] {
             set.insert(line);

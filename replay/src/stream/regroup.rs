@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn every_size_holds_the_same_records_in_the_order_of_a_capture() {
+    fn tiles_of_every_size_have_the_same_records_in_capture_order() {
         let trace = trace();
         let expected = records(&trace, 16);
         for tile_px in [8, 16, 32, 64] {
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quad_outside_the_picture_is_refused_rather_than_lost() {
+    fn a_quad_outside_the_picture_is_refused() {
         let mut trace = trace();
         for pass in &mut trace.tables.passes {
             pass.size_px = [156, 80];
@@ -303,7 +303,7 @@ mod tests {
 
     /// The samples do not depend on the tile size; only the misses do.
     #[test]
-    fn replays_of_every_size_shade_the_same() {
+    fn replays_with_every_tile_size_shade_the_same_fragments() {
         let trace = trace();
         let recorded = replay(&trace, &config(16)).unwrap();
         let mut misses = vec![recorded.l1.counters.line_misses];

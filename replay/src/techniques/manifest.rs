@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 /// Schema of the manifest.
-pub const MANIFEST_SCHEMA: &str = "tracegen.techniques/1";
+pub(super) const MANIFEST_SCHEMA: &str = "tracegen.techniques/1";
 
 /// The whole manifest.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_frame_takes_as_many_refreshes_as_its_time_covers() {
+    fn a_frame_takes_the_refreshes_that_its_time_spans() {
         // Periods of 10, 8.33 and 12.5 ms: frames of 9 and 10 ms miss the middle one.
         let pacing = |hz| Pacing::of(hz, &[9.0, 10.0, 21.0, 4.0]).unwrap();
         let at_100 = pacing(100);

@@ -34,7 +34,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_points_that_another_one_beats_are_dominated() {
+    fn only_points_worse_than_another_are_dominated() {
         let points = [
             (1.0, 0.0),
             (0.8, 0.1),
@@ -47,7 +47,7 @@ mod tests {
     }
 
     #[test]
-    fn times_whose_quartiles_overlap_dominate_nothing() {
+    fn times_with_overlapping_quartiles_do_not_dominate() {
         let around = |median: f64, half: f64| Spread {
             p1: median - 2.0 * half,
             q1: median - half,

@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn eyes_that_see_the_same_texels_share_every_line_and_others_none() {
+    fn eyes_share_all_lines_of_equal_texels_and_none_of_different_ones() {
         let config = RunConfig::default();
         let shared = |texels| sharing(&trace(texels), &config).unwrap().shared_pct();
         assert_eq!(shared([0, 0]), Some(100.0));
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn the_eyes_lines_are_those_of_traces_with_one_eye() {
+    fn lines_per_eye_equal_those_of_single_eye_traces() {
         let trace = Synthetic {
             size_px: [64, 64],
             patch_px: 16,

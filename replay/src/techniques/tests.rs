@@ -208,7 +208,7 @@ fn pipes_and_devices_in_a_folder_are_refused_instead_of_read() {
 }
 
 #[test]
-fn a_manifest_cut_anywhere_is_refused_without_a_panic() {
+fn a_truncated_manifest_is_refused_without_a_panic() {
     let root = tempfile::tempdir().unwrap();
     let text = manifest().to_string();
     for end in (0..text.len()).step_by(97) {
@@ -244,7 +244,7 @@ fn a_picture_that_is_missing_damaged_or_of_another_size_is_named() {
 }
 
 #[test]
-fn errors_count_where_pictures_differ_and_nowhere_else() {
+fn errors_are_counted_only_where_pictures_differ() {
     let root = tempfile::tempdir().unwrap();
     folder(root.path());
     let figures = picture_figures(&Folder::open(root.path()).unwrap(), &|_| ()).unwrap();
@@ -273,7 +273,7 @@ fn errors_count_where_pictures_differ_and_nowhere_else() {
 }
 
 #[test]
-fn frames_that_do_not_follow_each_other_have_no_flicker() {
+fn nonconsecutive_frames_have_no_flicker() {
     let root = tempfile::tempdir().unwrap();
     let mut text = manifest();
     text["frames"] = json!([0, 5, 10]);

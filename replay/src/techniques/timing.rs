@@ -133,7 +133,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn quartiles_of_one_to_five_are_the_values_between() {
+    fn quartiles_of_one_to_five_are_two_three_and_four() {
         let spread = Spread::of([5.0, 1.0, 4.0, 2.0, 3.0]).unwrap();
         assert_eq!((spread.q1, spread.median, spread.q3), (2.0, 3.0, 4.0));
         assert!((spread.p1 - 1.04).abs() < 1e-12 && (spread.p99 - 4.96).abs() < 1e-12);
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn pacing_counts_frames_beyond_the_baselines_median_and_a_quarter_more() {
+    fn pacing_counts_frames_longer_than_the_baselines_median_plus_a_quarter() {
         // Scaled, the baseline takes 11.1 ms: 1.0 is on time, 1.1 is late for 90 Hz, 1.3 also for 72 Hz.
         let mut row = row("a", 4);
         for (frame, time) in row.frames.iter_mut().zip([1.0, 1.1, 1.3, 0.5]) {

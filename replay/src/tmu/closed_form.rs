@@ -17,7 +17,7 @@ mod tests {
     use super::closed_form;
 
     #[test]
-    fn the_papers_rows_lie_on_the_surface() {
+    fn the_closed_form_matches_the_papers_rows() {
         // Z2 paper table 2: L1 miss, L2 miss and utilisation in percent.
         for (l1, l2, utilization) in [
             (7.65, 52.07, 76.75),

@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn threads_that_hit_take_a_cycle_a_footprint() {
+    fn threads_that_hit_take_one_cycle_per_footprint() {
         let (cycles, stats) = run(CONFIG, &[(16, &[]), (24, &[])]);
         assert_eq!(
             (cycles, stats.useful, stats.wasted, stats.idle),
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn an_l2_miss_loops_until_memory_has_answered() {
+    fn an_l2_miss_loops_until_the_line_is_filled() {
         let (cycles, stats) = run(CONFIG, &[(12, &[220; 4])]);
         // The thread returns at cycles 36, 72 ... 252, the first after 220. Each failed trip costs a slot.
         assert_eq!((stats.loops, stats.wasted), (7, 7));
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn footprints_with_arrived_lines_are_not_tried_again() {
+    fn footprints_with_filled_lines_are_not_retried() {
         let (cycles, stats) = run(CONFIG, &[(0, &[20, 20, 20, 20, 220, 220, 220, 220])]);
         assert_eq!((stats.loops, stats.wasted), (7, 2 + 6));
         assert_eq!(cycles, 252 + 4);
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn a_core_holds_no_more_threads_than_configured() {
+    fn a_core_has_at_most_the_configured_number_of_threads() {
         let config = TmuConfig {
             threads: 1,
             ..CONFIG

@@ -8,7 +8,7 @@ fn columns(results: &Results, columns: &[&str]) -> String {
     markdown(columns, rows)
 }
 
-/// Records against occlusion queries.
+/// Records compared with occlusion queries.
 pub fn records(results: &Results) -> String {
     columns(
         results,
@@ -25,7 +25,7 @@ pub fn records(results: &Results) -> String {
     )
 }
 
-/// Times of frames.
+/// Time per frame.
 pub fn times(results: &Results) -> String {
     columns(
         results,
@@ -40,7 +40,7 @@ pub fn times(results: &Results) -> String {
     )
 }
 
-/// What tile orders save.
+/// Savings by tile order.
 pub fn orders(results: &Results) -> String {
     columns(
         results,

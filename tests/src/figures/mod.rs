@@ -63,7 +63,7 @@ pub fn with_tables(document: &str, folder: &Path) -> Result<(String, Vec<String>
         let (_, after) = (after.split_once(END)).ok_or_else(|| format!("{name}: no {END}"))?;
         let (results, view) = match VIEWS.iter().find(|(known, ..)| *known == name) {
             Some((_, results, view)) => (*results, *view),
-            None => (name, Results::as_it_stands as View),
+            None => (name, Results::full_table as View),
         };
         let results = Results::read(&folder.join(results).with_extension("csv"))?;
         text += &format!("{before}{BEGIN}{name} -->\n{}{END}", view(&results));

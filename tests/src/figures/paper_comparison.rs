@@ -6,7 +6,7 @@ use replay::paper::z2;
 const CACHES_KIB: [[&str; 2]; 4] = [["8", "128"], ["16", "128"], ["8", "256"], ["16", "256"]];
 const ORDERS: [&str; 3] = ["morton", "z2-lrta", "z2-sta"];
 
-/// The paper's scenes, and the scene and layout of shadow maps that stand for each.
+/// The paper's scenes. For each one, the scene used in its place, and that scene's layout of shadow maps.
 const TABLE_2: [[&str; 3]; 4] = [
     ["GFXBench T-Rex", "cocoa-temple", "morton"],
     ["Crytek Sponza", "crytek-sponza", "morton"],
@@ -14,7 +14,7 @@ const TABLE_2: [[&str; 3]; 4] = [
     ["L-Bench, shadows", "dabrovic-sponza-shadows", "linear"],
 ];
 
-/// Each row of the paper's Table 2 with what a replay of its scene, or of the one that stands for it, gives.
+/// Each row of the paper's Table 2 with the result of a replay of its scene or of its stand-in scene.
 pub fn table_2(results: &Results) -> String {
     let headings = [
         "paper's scene",

@@ -58,7 +58,7 @@ impl Results {
 
     /// Every column and row.
     #[must_use]
-    pub fn as_it_stands(&self) -> String {
+    pub fn full_table(&self) -> String {
         let cells = |row: &Row| self.columns.iter().map(|c| row[c].clone()).collect();
         let headings: Vec<&str> = self.columns.iter().map(String::as_str).collect();
         markdown(&headings, self.rows.iter().map(cells))

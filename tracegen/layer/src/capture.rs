@@ -1,4 +1,4 @@
-//! The capture that this process takes part in.
+//! The capture that this process belongs to.
 
 use crate::control::Control;
 use crate::spool::{Event, FOLDER_VARIABLE, FramesBy, Settings, Writer};
@@ -6,21 +6,21 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 
-/// The launcher's settings for this process.
+/// Settings and state of the capture in this process.
 #[derive(Debug)]
 pub(crate) struct Capture {
     pub settings: Settings,
     folder: PathBuf,
     control: Control,
-    /// The process's files, once there is something to write.
+    /// The files of the process; created at the first write.
     writer: Mutex<Option<Writer>>,
-    /// Frames that the process counted itself.
+    /// Number of frames that this process counted.
     counted: AtomicU32,
-    /// Frames whose end has been written.
+    /// Number of frames whose end has been written.
     ended: AtomicU32,
-    /// The program has a swapchain.
+    /// Whether the program has a swapchain.
     presents: AtomicBool,
-    /// The files cannot be written any more.
+    /// Set after a write error; nothing more is written.
     failed: AtomicBool,
 }
 
@@ -58,7 +58,7 @@ impl Capture {
         })
     }
 
-    /// The frame that is under way.
+    /// Number of the current frame.
     pub fn frame(&self) -> u32 {
         match self.settings.frames_by {
             FramesBy::Launcher => self.control.frame(),
@@ -66,37 +66,37 @@ impl Capture {
         }
     }
 
-    /// Whether the launcher requested the current frame.
+    /// Whether the launcher requested a frame.
     pub fn wants(&self, frame: u32) -> bool {
         let [first, end] = self.settings.frames;
         (first..end).contains(&frame)
     }
 
-    /// Commands recorded now may belong to a frame that the launcher wants: this one or the next, as a program may be
-    /// ahead of what it has submitted.
+    /// Whether commands recorded now may be executed in a requested frame. Programs may record commands of
+    /// the next frame before they submit those of the current one.
     pub fn may_want_commands(&self) -> bool {
         let frame = self.frame();
         self.wants(frame) || self.wants(frame.saturating_add(1))
     }
 
-    /// Whether all requested frames are over.
+    /// Whether all requested frames have ended.
     pub fn is_over(&self) -> bool {
         self.frame() >= self.settings.frames[1]
     }
 
-    /// The program has a swapchain.
+    /// Notes that the program has a swapchain.
     pub fn note_swapchain(&self) {
         self.presents.store(true, Ordering::Relaxed);
     }
 
-    /// The program presented an image.
+    /// Notes that the program presented an image.
     pub fn note_present(&self) {
         if matches!(self.settings.frames_by, FramesBy::Present | FramesBy::Auto) {
             self.end_frame();
         }
     }
 
-    /// The program copied an image to a buffer.
+    /// Notes that the program copied an image to a buffer.
     pub fn note_readback(&self) {
         let counts = match self.settings.frames_by {
             FramesBy::Readback => true,
@@ -114,7 +114,7 @@ impl Capture {
         self.note_frames();
     }
 
-    /// Writes the ends of the frames that are over.
+    /// Writes the events of frames that have ended.
     pub fn note_frames(&self) {
         let frame = self.frame();
         let before = self.ended.swap(frame, Ordering::SeqCst);
@@ -153,7 +153,7 @@ impl Capture {
     }
 }
 
-/// Locks what no panic can leave half changed.
+/// Locks a mutex and ignores poisoning. A panic leaves no data in this crate half changed.
 pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

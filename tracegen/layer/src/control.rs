@@ -1,4 +1,4 @@
-//! A page of memory that the launcher and the captured processes share.
+//! A page of memory shared by the launcher and the captured processes.
 
 use memmap2::MmapMut;
 use std::fs::OpenOptions;
@@ -6,19 +6,19 @@ use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// File of the page in the capture's folder.
+/// Name of the page's file in the capture's folder.
 const FILE: &str = "control";
-/// Bytes of the page.
+/// Size of the page in bytes.
 const BYTES: u64 = 4096;
 
 /// Words of the page.
 #[derive(Clone, Copy, Debug)]
 enum Word {
-    /// Number of the frame, where the launcher counts.
+    /// Number of the frame, if the launcher counts frames.
     Frame = 0,
-    /// Frames of interest that have ended.
+    /// Number of requested frames that have ended.
     Ended = 1,
-    /// Frames that programs ended.
+    /// Number of frames that programs ended.
     Counted = 2,
 }
 
@@ -29,10 +29,10 @@ pub struct Control {
 }
 
 impl Control {
-    /// Makes the page of a capture.
+    /// Creates the page of a capture.
     ///
     /// # Errors
-    /// A file that cannot be made or mapped.
+    /// The file cannot be created or mapped.
     pub fn create(folder: &Path) -> io::Result<Self> {
         std::fs::write(folder.join(FILE), vec![0; BYTES as usize])?;
         Self::open(folder)
@@ -41,7 +41,7 @@ impl Control {
     /// Maps the page of a capture.
     ///
     /// # Errors
-    /// A file that cannot be mapped.
+    /// The file cannot be mapped.
     pub fn open(folder: &Path) -> io::Result<Self> {
         let path = folder.join(FILE);
         let file = OpenOptions::new().read(true).write(true).open(path)?;
@@ -54,43 +54,43 @@ impl Control {
         Ok(Self { map })
     }
 
-    /// The frame that the launcher counts.
+    /// Number of the frame that the launcher set.
     #[must_use]
     pub fn frame(&self) -> u32 {
         self.word(Word::Frame).load(Ordering::SeqCst)
     }
 
-    /// Counts a frame.
+    /// Sets the number of the frame.
     pub fn set_frame(&self, frame: u32) {
         self.word(Word::Frame).store(frame, Ordering::SeqCst);
     }
 
-    /// Frames that programs ended, of all processes.
+    /// Number of frames that the programs of all processes ended.
     #[must_use]
     pub fn counted(&self) -> u32 {
         self.word(Word::Counted).load(Ordering::SeqCst)
     }
 
-    /// A program ended a frame.
+    /// Counts a frame that a program ended.
     pub fn count(&self) {
         self.word(Word::Counted).fetch_add(1, Ordering::SeqCst);
     }
 
-    /// Frames of interest that have ended, of all processes.
+    /// Number of requested frames that have ended, of all processes.
     #[must_use]
     pub fn ended(&self) -> u32 {
         self.word(Word::Ended).load(Ordering::SeqCst)
     }
 
-    /// Another frame of interest ended.
+    /// Counts a requested frame that has ended.
     pub fn count_ended(&self) {
         self.word(Word::Ended).fetch_add(1, Ordering::SeqCst);
     }
 
     fn word(&self, word: Word) -> &AtomicU32 {
         let words: *const AtomicU32 = self.map.as_ptr().cast();
-        // SAFETY: the page is mapped as long as `self` lives, is aligned, has more words than `Word` names, and is
-        // never accessed but through these atomics.
+        // SAFETY: the page is mapped as long as `self` lives, is aligned, has more words than `Word` has
+        // variants, and is accessed only through these atomics.
         unsafe { &*words.add(word as usize) }
     }
 }
@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_maps_of_a_page_see_each_other() {
+    fn two_maps_of_a_page_share_its_words() {
         let folder = tempfile::tempdir().unwrap();
         let launcher = Control::create(folder.path()).unwrap();
         let layer = Control::open(folder.path()).unwrap();

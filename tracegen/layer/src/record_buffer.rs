@@ -1,7 +1,7 @@
-//! The memory that shaders append records to.
+//! The memory to which shaders append records.
 //!
-//! It is memory of the process: a device address of lavapipe is an address of the process, and what is not touched
-//! costs nothing.
+//! It is host memory, because a device address of lavapipe is an address in the process. Untouched pages take
+//! no memory.
 
 use crate::inject::{COUNTER_BYTES, UNIT_BYTES, Unit};
 use memmap2::{MmapMut, MmapOptions};
@@ -12,17 +12,17 @@ use std::sync::atomic::{AtomicU32, Ordering};
 #[derive(Debug)]
 pub(crate) struct RecordBuffer {
     map: MmapMut,
-    /// In units.
+    /// Capacity in units.
     capacity: u32,
 }
 
-/// Word of the buffer that counts units.
+/// Word of the buffer with the number of appended units.
 const COUNT: usize = 0;
 /// Word of the buffer with its capacity, for shaders.
 const CAPACITY: usize = 1;
 
 impl RecordBuffer {
-    /// Reserves this number of bytes for records.
+    /// Reserves `bytes` bytes for records.
     pub fn new(bytes: u64) -> io::Result<Self> {
         let capacity = u32::try_from(bytes / UNIT_BYTES).unwrap_or(u32::MAX);
         let bytes = COUNTER_BYTES + u64::from(capacity) * UNIT_BYTES;
@@ -31,24 +31,24 @@ impl RecordBuffer {
         Ok(Self { map, capacity })
     }
 
-    /// Address that shaders use.
+    /// Device address for shaders.
     pub fn address(&self) -> u64 {
         self.map.as_ptr() as u64
     }
 
-    /// Lets shaders append records, or not.
+    /// Enables or disables recording.
     pub fn open(&self, open: bool) {
         let capacity = if open { self.capacity } else { 0 };
         self.word(CAPACITY).store(capacity, Ordering::SeqCst);
     }
 
-    /// Shaders may append records.
+    /// Whether recording is enabled.
     pub fn is_open(&self) -> bool {
         self.word(CAPACITY).load(Ordering::SeqCst) != 0
     }
 
-    /// Takes the records and the bytes that found no room; where there are any, there are no records. No shader may be
-    /// running.
+    /// Passes the records to `take` with the number of bytes that did not fit, and resets the buffer. If some
+    /// did not fit, no records are passed. No shader may be running.
     pub fn take<T>(&self, take: impl FnOnce(&[Unit], u64) -> T) -> T {
         let count = self.word(COUNT).load(Ordering::SeqCst);
         let lost = count.saturating_sub(self.capacity);
@@ -62,8 +62,8 @@ impl RecordBuffer {
 
     fn word(&self, place: usize) -> &AtomicU32 {
         let words: *const AtomicU32 = self.map.as_ptr().cast();
-        // SAFETY: the counter's bytes are mapped as long as `self` lives and hold more words than are named; whoever
-        // else accesses them does so atomically.
+        // SAFETY: the counter's bytes are mapped as long as `self` lives and contain both words. All other
+        // accesses are also atomic.
         unsafe { &*words.add(place) }
     }
 }
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn records_are_taken_once_and_those_without_room_counted() {
+    fn records_are_taken_once_and_an_overflow_is_counted() {
         let buffer = RecordBuffer::new(3 * UNIT_BYTES).unwrap();
         assert!(!buffer.is_open());
         buffer.open(true);

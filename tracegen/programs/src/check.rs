@@ -1,40 +1,40 @@
-//! Records of draws against occlusion queries of the driver.
+//! Compares the records of draws with occlusion queries of the driver.
 
 use crate::session::{Session, coverage_group, survival_group};
 use parallax_layer::inject::{DepthTests, RawSample};
 use parallax_layer::spool::ReadError;
 use std::collections::{BTreeMap, HashMap};
 
-/// How the records of frames compare with what the driver counted.
+/// Result of the comparison of recorded fragments with the driver's counts.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Check {
-    /// Draws with as many fragments as the driver counted.
+    /// Number of draws for which both counts are equal.
     pub equal: u64,
-    /// Draws with another number.
+    /// Number of draws for which they differ.
     pub different: u64,
-    /// The first of them.
+    /// The first draw with a difference.
     pub first: Option<Difference>,
-    /// Draws that were not compared, by reason.
+    /// Number of draws that could not be compared, by reason.
     pub apart: BTreeMap<String, u64>,
 }
 
-/// A draw whose records differ from its query.
+/// A draw whose records and query differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Difference {
     /// Frame.
     pub frame: u32,
     /// Number of the draw.
     pub draw: u32,
-    /// Fragments by its records.
+    /// Number of fragments in the records.
     pub recorded: u64,
-    /// Samples by the driver.
+    /// Number of samples counted by the driver.
     pub counted: u64,
 }
 
 /// Compares the draws of frames.
 ///
 /// # Errors
-/// Records that cannot be read.
+/// The records cannot be read.
 pub fn check(session: &mut Session, frames: &[u32]) -> Result<Check, ReadError> {
     let mut check = Check::default();
     for &number in frames {
@@ -66,8 +66,8 @@ pub fn check(session: &mut Session, frames: &[u32]) -> Result<Check, ReadError> 
     Ok(check)
 }
 
-/// Fragments of a draw by its records: those that started, and those that were not discarded. Of a draw that tests depth
-/// before its shader, Mesa 22.3 counts the latter and Mesa 25 the former.
+/// Number of fragments in a draw's records: those that started, and those that were not discarded. If depth
+/// is tested before the shader, Mesa 22.3 counts the second kind and Mesa 25 the first kind.
 fn recorded(
     session: &Session,
     draw: u32,

@@ -1,4 +1,4 @@
-//! Frames of a session into a trace.
+//! Converts frames of a session to a trace.
 
 mod build;
 mod places;
@@ -19,52 +19,52 @@ use std::collections::{BTreeMap, HashMap};
 use std::io::{Seek, Write};
 use thiserror::Error;
 
-/// Options for draining a session.
+/// Options for converting a session.
 pub struct Job<'a> {
-    /// Frames to take, ascending.
+    /// Requested frames, ascending.
     pub frames: &'a [u32],
-    /// How both eyes are identified.
+    /// How the eyes are identified.
     pub eyes: &'a Wanted,
     /// How frames were counted.
     pub frames_by: FramesBy,
-    /// Eyes of frames, if the program reported them.
+    /// Eyes by frame, if the program reported them.
     pub cameras: BTreeMap<u32, [EyeView; 2]>,
     /// Name of the program.
     pub program: String,
     /// Tool and version.
     pub tool: String,
-    /// Its arguments without outputs.
+    /// Arguments of the tool, without outputs.
     pub command_line: Vec<String>,
-    /// Bytes of room for the records of one submission.
+    /// Size of the record buffer in bytes, which holds the records of one submission.
     pub record_bytes: u64,
 }
 
-/// The resulting trace.
+/// Summary of the resulting trace.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drained {
-    /// Frames.
+    /// Number of frames.
     pub frames: usize,
-    /// Rule that identified both eyes.
+    /// Rule that identified the eyes.
     pub rule: Option<Rule>,
     /// Size of an eye's picture in pixels.
     pub size_px: [u32; 2],
-    /// Draws of the trace.
+    /// Number of draws in the trace.
     pub draws: usize,
-    /// Textures of the trace.
+    /// Number of textures in the trace.
     pub textures: usize,
     /// Counts of the records.
     pub counts: CaptureCounts,
-    /// What the trace lacks.
+    /// Texture accesses that are not in the trace.
     pub left_out: Vec<LeftOut>,
 }
 
-/// Why no trace was made.
+/// Reasons why no trace was made.
 #[derive(Debug, Error)]
 pub enum DrainError {
-    /// Of the session.
+    /// An error of the session.
     #[error(transparent)]
     Session(#[from] SessionError),
-    /// No eyes.
+    /// The eyes could not be identified.
     #[error(transparent)]
     Views(#[from] ViewsError),
     /// The frames have pictures of different sizes.
@@ -74,17 +74,17 @@ pub enum DrainError {
     Size {
         /// Frame.
         frame: u32,
-        /// Width and height before.
+        /// Size in the earlier frames.
         expected: [u32; 2],
-        /// Width and height.
+        /// Size in this frame.
         found: [u32; 2],
     },
-    /// The eyes were found, and none of their draws has a record.
+    /// No draw of the identified eyes has a record.
     #[error(
         "no draw of either eye was recorded; --check compares the draws with queries, --list names the passes"
     )]
     Nothing,
-    /// Of the trace.
+    /// An error while writing the trace.
     #[error(transparent)]
     Record(#[from] RecordError),
 }
@@ -95,10 +95,10 @@ impl From<parallax_layer::spool::ReadError> for DrainError {
     }
 }
 
-/// Takes frames of a session into a trace, which is yet to be finished.
+/// Converts frames of a session to a trace, which the caller must finish.
 ///
 /// # Errors
-/// Frames without two eyes, records that were lost, and errors of reading and writing.
+/// The eyes cannot be identified, records were lost, or reading or writing failed.
 pub fn drain<W: Write + Seek>(
     session: &mut Session,
     job: &Job<'_>,
@@ -123,7 +123,7 @@ pub fn drain<W: Write + Seek>(
             .iter()
             .map(|draw| weight(session, draw, &records))
             .collect();
-        // Every frame uses the rule that fitted the first one.
+        // All frames use the rule that matched the first one.
         let known = drained
             .rule
             .filter(|rule| *rule != Rule::File)
@@ -170,7 +170,7 @@ pub fn drain<W: Write + Seek>(
     Ok((writer, drained))
 }
 
-/// Fragments of an executed draw.
+/// Number of fragments of an executed draw.
 pub(crate) fn weight(
     session: &Session,
     executed: &Executed,
@@ -189,13 +189,13 @@ pub(crate) fn weight(
     }
 }
 
-/// Key of draws that are the same for a trace, including their textures.
+/// Key that is equal for draws that are the same draw of the trace, with their textures.
 fn key(session: &Session, draw: u32) -> Option<(DrawKey, String)> {
     let info = session.draw(draw)?;
     Some((DrawKey::of(info), format!("{:?}", info.textures)))
 }
 
-/// The draws of a frame, joined over both eyes, in an order that agrees with each eye's.
+/// Merges the draws of both eyes in a frame. The result keeps the order of each eye.
 fn merge(session: &Session, draws: &[Executed], views: &Views) -> Vec<Merged> {
     let with = |wanted: Role| -> Vec<Executed> {
         let both = draws.iter().zip(&views.roles);
@@ -238,7 +238,7 @@ fn meta(
     let first = job.frames.first().and_then(|frame| job.cameras.get(frame));
     let (fov, ipd_m) = match first.filter(|_| cameras_known) {
         Some(eyes) => (eyes.map(|eye| fov(&eye)), distance_m(eyes)),
-        None => ([STRAIGHT; 2], 0.0),
+        None => ([PLACEHOLDER_FOV; 2], 0.0),
     };
     let frames_by = match job.frames_by {
         FramesBy::Auto | FramesBy::Present => "presents",
@@ -283,15 +283,15 @@ fn meta(
     }
 }
 
-/// A field of view where nothing is known of it.
-const STRAIGHT: FovTangents = FovTangents {
+/// Field of view for eyes whose projection is unknown.
+const PLACEHOLDER_FOV: FovTangents = FovTangents {
     left: 1.0,
     right: 1.0,
     up: 1.0,
     down: 1.0,
 };
 
-/// Tangents to the edges of a projection's picture.
+/// Tangents of the edges of a projection.
 fn fov(eye: &EyeView) -> FovTangents {
     let m = &eye.eye_to_clip;
     let edge = |axis: usize, side: f32| (1.0 + side * m[2][axis]) / m[axis][axis];
@@ -303,7 +303,7 @@ fn fov(eye: &EyeView) -> FovTangents {
     }
 }
 
-/// Distance between two eyes.
+/// Distance between two eyes in metres.
 fn distance_m(eyes: &[EyeView; 2]) -> f32 {
     let [a, b] = [eyes[0].position, eyes[1].position];
     let squared: f32 = (0..3)
@@ -312,7 +312,7 @@ fn distance_m(eyes: &[EyeView; 2]) -> f32 {
     squared.sqrt()
 }
 
-/// A pass of a trace.
+/// A render pass of the trace.
 pub(crate) fn pass(frame: u32, kind: PassKind, eye: Option<Eye>, size_px: [u32; 2]) -> Pass {
     Pass {
         frame,

@@ -1,46 +1,46 @@
-//! The uv groups of a draw: which sites share records, and what they sample.
+//! The uv groups of a draw: the sites that share records, and their samples.
 
 use crate::lanes::{LaneSample, lod, on_cube};
 use formats::textrace::{LodRule, Sample, SampleLevel, UvGroup};
 use parallax_layer::inject::{Access, Form, Lod, RawFragment, RawQuad, Shape, TextureSite, What};
 use parallax_layer::spool::ShaderInfo;
 
-/// A texture of the trace, and the sampler that a site uses.
+/// A texture and a sampler of the trace that a site uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bound {
     /// Index of the texture.
     pub texture: u32,
     /// Index of the sampler.
     pub sampler: u16,
-    /// Texels of level 0.
+    /// Size of level 0 in texels.
     pub size: [u32; 2],
-    /// Coordinates are texels.
+    /// Whether coordinates are in texels.
     pub unnormalized: bool,
 }
 
-/// Sources of a group's records.
+/// A uv group of a draw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Group {
-    /// Element of the binding's array, where fragments choose it.
+    /// Element of the binding's array, if it varies between fragments.
     pub element: Option<u32>,
-    /// Number among the draw's groups; the operands' is one less.
+    /// Number among the draw's groups. The group with its operands has the number before it.
     pub number: u8,
-    /// Records come after operands.
+    /// Whether records of operands precede its records.
     pub operands: bool,
     kind: TextureSite,
-    /// The first texture, whose size makes texels of coordinates.
+    /// Size of the first texture, which converts coordinates to texels.
     size: [u32; 2],
     unnormalized: bool,
 }
 
-/// Why a site is in no group.
+/// Reason why a site has no group.
 pub type LeftOut = String;
 
 impl Group {
-    /// Builds the group of the sites of a shader's coordinate group. `bound` returns the texture of a site.
+    /// Builds the group for the sites of a coordinate group. `bound` returns the texture of a site.
     ///
     /// # Errors
-    /// A property that its records cannot have.
+    /// A property of a site that records of the group cannot represent.
     pub fn new(
         shader: &ShaderInfo,
         coordinates: u16,
@@ -94,7 +94,7 @@ impl Group {
         Ok((group, groups))
     }
 
-    /// A quad's coordinates as a trace has them.
+    /// Converts the coordinates of a quad to those of a trace.
     #[must_use]
     pub fn quad(&self, raw: RawQuad) -> RawQuad {
         let Some((size, shift)) = self.texels(self.constant_level()) else {
@@ -109,7 +109,7 @@ impl Group {
         }
     }
 
-    /// Samples of a fragment.
+    /// Converts a record of a fragment to a lane's sample.
     #[must_use]
     pub fn fragment(&self, raw: &RawFragment) -> LaneSample {
         let own_lod = match self.kind.lod {
@@ -146,14 +146,14 @@ impl Group {
             (uv, slope) = (scaled(uv.map(|v| v + shift)), slope.map(scaled));
         }
         if !matches!(self.kind.lod, Lod::Derivatives | Lod::Bias(_)) {
-            // Gradients in an instruction do not depend on neighbouring lanes.
+            // Explicit gradients are not differences to neighbouring lanes.
             slope = [[0.0; 2]; 2];
         }
         LaneSample {
             uv,
             lod: gradient,
             layer: match self.kind.shape {
-                // To the nearest, ties to even (Vulkan 1.3, "Integer Texel Coordinate Operations").
+                // Round to nearest, ties to even (Vulkan 1.3, "Integer Texel Coordinate Operations").
                 Shape::Array => raw.at[2].round_ties_even().max(0.0),
                 _ => 0.0,
             },
@@ -161,7 +161,8 @@ impl Group {
         }
     }
 
-    /// Lanes of different layers have records of their own: their coordinates lie on different faces.
+    /// Whether lanes with different layers need separate records. On cube maps, their coordinates are on
+    /// different faces.
     #[must_use]
     pub fn by_layer(&self) -> bool {
         self.kind.shape == Shape::Cube
@@ -174,8 +175,8 @@ impl Group {
         }
     }
 
-    /// Size of the level that coordinates in texels are of, and how far a texel's coordinate is from its middle; `None`
-    /// where coordinates are those of the whole texture.
+    /// Size of the level to which coordinates in texels refer, and the offset from a texel's coordinate to
+    /// its centre; `None` for normalised coordinates.
     fn texels(&self, level: f32) -> Option<([u32; 2], f32)> {
         if self.kind.access == Access::Fetch {
             let level = level.clamp(0.0, 31.0) as u32;
@@ -185,7 +186,7 @@ impl Group {
     }
 }
 
-/// A site's records have a level or a layer of their own.
+/// Whether each fragment has its own level or layer.
 fn needs_operands(texture: &TextureSite, form: Form) -> bool {
     let own_level = matches!(
         texture.lod,
@@ -197,7 +198,7 @@ fn needs_operands(texture: &TextureSite, form: Form) -> bool {
 fn level(texture: &TextureSite, operands: bool) -> SampleLevel {
     let fixed = |lod: f32| (256.0 * lod).round().clamp(-32768.0, 32767.0) as i16;
     let (rule, lod_256ths) = match (texture.shape, texture.lod) {
-        // Its derivatives cross faces: the level is an operand.
+        // Derivatives are wrong where a quad crosses faces, so the level is an operand.
         (Shape::Cube, Lod::Explicit(Some(level))) => (LodRule::Explicit, fixed(level)),
         (Shape::Cube, _) => (LodRule::Explicit, 0),
         (_, Lod::Derivatives) => (LodRule::Derivatives, 0),
@@ -260,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn sites_that_follow_share_the_group_and_its_extent() {
+    fn sites_of_a_coordinate_group_share_the_uv_group_and_its_extent() {
         let flat = |group| {
             site(
                 Form::Quad,
@@ -284,7 +285,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_or_layer_of_its_own_takes_operands_before_it() {
+    fn sites_with_a_level_or_layer_per_fragment_have_operands() {
         let array = site(
             Form::Fragment,
             0,
@@ -305,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fetched_texel_is_the_middle_of_its_coordinates_at_its_level() {
+    fn a_fetch_is_at_the_centre_of_its_texel_on_its_level() {
         let fetch = site(
             Form::Quad,
             0,
@@ -329,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_of_a_cube_follows_from_its_faces_or_is_named() {
+    fn the_level_of_a_cube_follows_from_face_coordinates_or_is_explicit() {
         let sky = |lod| {
             made(vec![site(
                 Form::Fragment,
@@ -346,7 +347,7 @@ mod tests {
             lod: 7.0,
             ..RawFragment::default()
         };
-        // An eighth of 64 texels.
+        // The derivatives span an eighth of 64 texels.
         assert_eq!(sky(Lod::Derivatives).fragment(&raw).lod, 3.0);
         assert_eq!(sky(Lod::Bias(Some(1.0))).fragment(&raw).lod, 4.0);
         assert_eq!(sky(Lod::Explicit(None)).fragment(&raw).lod, 7.0);

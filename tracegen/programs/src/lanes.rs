@@ -1,4 +1,4 @@
-//! From the records of single fragments to those of quads.
+//! Combines records of single fragments into records of quads.
 
 use formats::footprint::fast_log2;
 use parallax_layer::inject::{RawFragment, RawQuad};
@@ -12,14 +12,15 @@ pub struct LaneSample {
     pub lod: f32,
     /// Array layer or face.
     pub layer: f32,
-    /// Change of the coordinates to the right and downwards, where lanes that are not there are guessed by it.
+    /// Changes of the coordinates to the right and downwards, from which coordinates of missing lanes are
+    /// extrapolated.
     pub slope: [[f32; 2]; 2],
 }
 
-/// Lanes of a quad that sample together.
+/// Lanes of a quad that execute a site together.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Visit {
-    /// Which lanes.
+    /// Mask of the lanes.
     pub mask: u8,
     /// Coordinates of all lanes.
     pub uv: RawQuad,
@@ -27,8 +28,8 @@ pub struct Visit {
     pub operands: RawQuad,
 }
 
-/// Joins the fragments of a quad, in the order in which they were recorded: lanes ascend within a visit, and only those
-/// of the same face share one.
+/// Groups the fragments of a quad, in recording order, into visits. Within a visit the lanes ascend, and,
+/// with `by_layer`, all lanes have the same layer.
 #[must_use]
 pub fn visits(lanes: &[(u8, LaneSample)], by_layer: bool) -> Vec<Visit> {
     let mut open: Vec<(u8, LaneSample)> = Vec::with_capacity(4);
@@ -51,7 +52,7 @@ fn close(open: &mut Vec<(u8, LaneSample)>, by_layer: bool, found: &mut Vec<Visit
     }
 }
 
-/// A visit of some lanes, at least one.
+/// A visit of one or more lanes.
 fn visit<'a>(lanes: impl Iterator<Item = &'a (u8, LaneSample)>) -> Visit {
     let mut of = [None; 4];
     for (lane, sample) in lanes {
@@ -63,8 +64,8 @@ fn visit<'a>(lanes: impl Iterator<Item = &'a (u8, LaneSample)>) -> Visit {
         .sum();
     let first = (of.iter().position(Option::is_some)).unwrap_or(0);
     let known = of[first].unwrap_or_default();
-    // A missing lane's coordinates are extrapolated from the first one's by its derivatives, and it has its
-    // operands.
+    // The coordinates of a missing lane are extrapolated from those of the first lane. Its operands are those
+    // of the first lane.
     let at = |lane: usize| {
         of[lane].unwrap_or_else(|| {
             let [right, down] =
@@ -88,7 +89,7 @@ fn visit<'a>(lanes: impl Iterator<Item = &'a (u8, LaneSample)>) -> Visit {
 pub fn on_cube(fragment: &RawFragment) -> (u32, [f32; 2], [[f32; 2]; 2]) {
     let [x, y, z] = fragment.at;
     let [ax, ay, az] = fragment.at.map(f32::abs);
-    // Axis of s, of t, and the major one, with their signs (Vulkan 1.3, "Cube Map Face Selection").
+    // Axes of s and t and the major axis, with their signs (Vulkan 1.3, "Cube Map Face Selection").
     let (face, [s, t, major]) = if az >= ax && az >= ay {
         if z >= 0.0 {
             (4, [(0, 1.0), (1, -1.0), (2, 1.0)])
@@ -119,7 +120,7 @@ pub fn on_cube(fragment: &RawFragment) -> (u32, [f32; 2], [[f32; 2]; 2]) {
     (face, at, [slope(fragment.dx), slope(fragment.dy)])
 }
 
-/// Level of detail of a texture of a size, as lavapipe finds it from changes of the coordinates.
+/// Level of detail for a texture of this size, computed from the changes of the coordinates as lavapipe does.
 #[must_use]
 pub fn lod(slopes: [[f32; 2]; 2], size: [u32; 2]) -> f32 {
     let squared = |d: [f32; 2]| {
@@ -148,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn lanes_of_a_quad_are_one_visit_whatever_their_coordinates() {
+    fn ascending_lanes_of_a_quad_are_one_visit() {
         let lanes = [
             (0, sample(0.0, 0.0)),
             (1, sample(3.0, 1.0)),
@@ -163,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn lanes_that_are_not_there_are_guessed_by_the_first_ones_slopes() {
+    fn missing_lanes_are_extrapolated_from_the_first_lane() {
         let [visit] = &visits(&[(3, sample(1.0, 2.0))], false)[..] else {
             panic!("one visit");
         };
@@ -172,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lane_that_comes_again_is_another_visit_and_so_is_another_face() {
+    fn a_repeated_lane_and_another_face_start_another_visit() {
         let lanes = [0, 2, 1, 3, 3].map(|lane| (lane, sample(0.0, 0.0)));
         let masks = |lanes: &[(u8, LaneSample)], by_layer| -> Vec<u8> {
             visits(lanes, by_layer)
@@ -190,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn directions_meet_their_face_and_its_middle_lies_on_the_axis() {
+    fn directions_select_their_face_with_its_centre_on_the_axis() {
         let axes = [
             [2.0, 0.0, 0.0],
             [-2.0, 0.0, 0.0],

@@ -1,4 +1,4 @@
-//! Programs under the layer: what has to stand where, and in which environment variables.
+//! Sets up the environment in which programs run with the layer.
 
 use formats::container::ScratchFolder;
 use parallax_layer::control::Control;
@@ -9,30 +9,30 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use thiserror::Error;
 
-/// Why a program cannot be launched.
+/// Reasons why a program cannot be launched.
 #[derive(Debug, Error)]
 pub enum LaunchError {
-    /// The layer's library is not where it belongs.
+    /// The layer's library is missing.
     #[error("{0} is missing: it is built with tracegen and belongs beside it")]
     NoLayer(String),
-    /// The folder of the capture.
+    /// The capture's folder cannot be written.
     #[error("cannot set up the capture in {folder}: {source}")]
     Folder {
-        /// The folder.
+        /// Path of the folder.
         folder: String,
-        /// The system's reason.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// No lavapipe.
+    /// Lavapipe is not installed.
     #[error(
         "no Vulkan driver file of lavapipe was found; install mesa-vulkan-drivers, or name one by VK_DRIVER_FILES"
     )]
     NoDriver,
 }
 
-/// Name of the layer's library.
+/// File name of the layer's library.
 const LIBRARY: &str = "libparallax_layer.so";
-/// File by which the loader finds it.
+/// File that registers the layer with the loader.
 const MANIFEST: &str = "parallax_layer.json";
 
 /// Folders in which drivers register with the loader.
@@ -42,21 +42,21 @@ const DRIVER_FOLDERS: [&str; 3] = [
     "/usr/local/share/vulkan/icd.d",
 ];
 
-/// A capture under way: its folder, which goes with it, and the page that is shared with the programs.
+/// A capture: its folder, which is removed at the end, and the page of memory shared with the programs.
 #[derive(Debug)]
 pub struct Launch {
     folder: ScratchFolder,
-    /// Shared with the programs.
+    /// Page of memory shared with the programs.
     pub control: Control,
     library: PathBuf,
     driver: Option<PathBuf>,
 }
 
 impl Launch {
-    /// Sets a capture up inside `parent`, for programs on lavapipe. `tool` is this program's own file.
+    /// Prepares a capture inside `parent` for programs on lavapipe. `tool` is the path of this program.
     ///
     /// # Errors
-    /// A layer or a driver that is missing, or a folder that cannot be written.
+    /// The layer or the driver is missing, or the folder cannot be written.
     pub fn new(parent: &Path, tool: &Path, settings: &Settings) -> Result<Self, LaunchError> {
         let library = library(tool)?;
         let driver =
@@ -83,19 +83,19 @@ impl Launch {
         })
     }
 
-    /// Folder that programs write into.
+    /// Folder of the programs' files.
     #[must_use]
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
 
-    /// The layer's library.
+    /// Path of the layer's library.
     #[must_use]
     pub fn library(&self) -> &Path {
         &self.library
     }
 
-    /// Lets a program run on lavapipe, without the layer.
+    /// Makes a program use lavapipe, without the layer.
     pub fn prepare_driver(&self, command: &mut Command) {
         if let Some(driver) = &self.driver {
             command
@@ -104,28 +104,31 @@ impl Launch {
         }
     }
 
-    /// Runs a program under the layer; OpenGL through Mesa's zink if requested.
+    /// Makes a program use the layer, and Mesa's zink for OpenGL if requested.
     pub fn prepare(&self, command: &mut Command, opengl: bool) {
         command
             .env(FOLDER_VARIABLE, self.folder())
             .env(
                 "VK_INSTANCE_LAYERS",
-                with("VK_INSTANCE_LAYERS", LAYER_NAME.into()),
+                prepended("VK_INSTANCE_LAYERS", LAYER_NAME.into()),
             )
-            .env("VK_LAYER_PATH", with("VK_LAYER_PATH", self.folder().into()));
+            .env(
+                "VK_LAYER_PATH",
+                prepended("VK_LAYER_PATH", self.folder().into()),
+            );
         self.prepare_driver(command);
         if opengl {
             command
                 .env("GALLIUM_DRIVER", "zink")
                 .env("MESA_LOADER_DRIVER_OVERRIDE", "zink")
-                // Else zink finds no device.
+                // Otherwise zink finds no device.
                 .env("LIBGL_ALWAYS_SOFTWARE", "1");
         }
     }
 }
 
-/// A variable's list with an entry before it.
-fn with(variable: &str, entry: OsString) -> OsString {
+/// Value of a variable with a list, after an entry is prepended.
+fn prepended(variable: &str, entry: OsString) -> OsString {
     let mut list = entry;
     if let Some(old) = std::env::var_os(variable).filter(|old| !old.is_empty()) {
         list.push(":");
@@ -134,7 +137,7 @@ fn with(variable: &str, entry: OsString) -> OsString {
     list
 }
 
-/// The layer's library, next to a program or among Cargo's build outputs.
+/// Finds the layer's library next to a program or among Cargo's build outputs.
 fn library(tool: &Path) -> Result<PathBuf, LaunchError> {
     let folder = tool.parent().unwrap_or(Path::new("."));
     let places = [folder.join(LIBRARY), folder.join("deps").join(LIBRARY)];
@@ -162,7 +165,7 @@ fn lavapipe() -> Option<PathBuf> {
 }
 
 fn manifest(library: &Path) -> String {
-    // A path in JSON.
+    // Escape the path for JSON.
     let library = library
         .display()
         .to_string()
@@ -189,7 +192,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_library_is_found_beside_the_tool_or_among_its_parts() {
+    fn the_library_is_found_next_to_the_tool_or_in_deps() {
         let folder = tempfile::tempdir().unwrap();
         let tool = folder.path().join("tracegen");
         let text = library(&tool).unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! From a program to a trace.
+//! Captures a program and converts the capture to a trace.
 //!
 //! ```text
 //! launch: the program under the layer -> a folder of events and records (layer::spool)

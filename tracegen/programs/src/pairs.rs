@@ -1,12 +1,12 @@
-//! Which draw of the right eye is which of the left eye.
+//! Pairs the draws of the left eye with those of the right eye.
 
 use std::hash::Hash;
 
-/// A draw of both eyes, or of one: positions in the two sequences.
+/// Indices of a draw in the sequences of the left and the right eye.
 pub type Pair = (Option<usize>, Option<usize>);
 
-/// Merges two sequences so that the order of both is kept. Equal entries meet: the first that comes in the other
-/// sequence after the last ones that met. What one sequence has alone stands between them.
+/// Merges two sequences and keeps the order of both. Where the sequences differ, both skip entries until the
+/// nearest pair of equal entries. Skipped entries remain without a partner.
 #[must_use]
 pub fn pair<K: Eq + Hash>(left: &[K], right: &[K]) -> Vec<Pair> {
     let mut pairs = Vec::with_capacity(left.len().max(right.len()));
@@ -17,7 +17,7 @@ pub fn pair<K: Eq + Hash>(left: &[K], right: &[K]) -> Vec<Pair> {
             (l, r) = (l + 1, r + 1);
             continue;
         }
-        // The nearer of both ways to meet again.
+        // Find the nearest pair of equal entries.
         let ahead = |in_left: usize, in_right: usize| -> Option<(usize, usize)> {
             let a = left.get(l + in_left)?;
             let b = right.get(r + in_right)?;
@@ -35,9 +35,9 @@ pub fn pair<K: Eq + Hash>(left: &[K], right: &[K]) -> Vec<Pair> {
     pairs
 }
 
-/// Share of the entries of two sequences that meet, 0 to 1.
+/// Share of the entries that have a partner, 0 to 1.
 #[must_use]
-pub fn likeness<K: Eq + Hash>(left: &[K], right: &[K]) -> f64 {
+pub fn matched_share<K: Eq + Hash>(left: &[K], right: &[K]) -> f64 {
     let longer = left.len().max(right.len());
     if longer == 0 {
         return 0.0;
@@ -55,15 +55,15 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn equal_sequences_meet_everywhere() {
+    fn all_entries_of_equal_sequences_are_paired() {
         let all: Vec<Pair> = (0..4).map(|i| (Some(i), Some(i))).collect();
         assert_eq!(pair(b"abca", b"abca"), all);
-        assert_eq!(likeness(b"abca", b"abca"), 1.0);
-        assert_eq!(likeness::<u8>(b"", b""), 0.0);
+        assert_eq!(matched_share(b"abca", b"abca"), 1.0);
+        assert_eq!(matched_share::<u8>(b"", b""), 0.0);
     }
 
     #[test]
-    fn a_draw_that_one_eye_lacks_stands_alone() {
+    fn a_draw_of_only_one_eye_has_no_partner() {
         let expected = [
             (Some(0), Some(0)),
             (Some(1), None),
@@ -75,7 +75,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_entry_comes_once_and_in_order(
+        fn every_entry_occurs_once_and_in_order(
             left in prop::collection::vec(0..4_u8, 0..12),
             right in prop::collection::vec(0..4_u8, 0..12),
         ) {

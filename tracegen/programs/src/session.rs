@@ -1,4 +1,4 @@
-//! Frames, passes and draws of a captured program.
+//! Frames, render passes and draws of a captured program.
 
 use parallax_layer::inject::{Form, RawSample, Site, What};
 use parallax_layer::spool::{
@@ -8,45 +8,45 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::Path;
 use thiserror::Error;
 
-/// Why a capture has nothing to make a trace of.
+/// Reasons why a capture has no data for a trace.
 #[derive(Debug, Error)]
 pub enum SessionError {
-    /// Files that cannot be read.
+    /// The files cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// The layer was never loaded.
+    /// The program did not load the layer.
     #[error(
         "{0} never used Vulkan through the layer: is it a program of Vulkan, or of OpenGL on zink (--gl)?"
     )]
     NoProcess(String),
-    /// No device was opened.
+    /// The program opened no device.
     #[error("{0} opened no Vulkan device")]
     NoDevice(String),
-    /// The device cannot be recorded on.
+    /// Recording is not possible on the device.
     #[error("{program}: {why}")]
     Refused {
-        /// The program.
+        /// Name of the program.
         program: String,
         /// The layer's message.
         why: String,
     },
-    /// None of the frames was rendered.
+    /// None of the requested frames was rendered.
     #[error(
         "{program}: frames {first} to {last} were asked for, and it ended {counted} frames (--frames, --frames-by); {ended}"
     )]
     TooFew {
-        /// The program.
+        /// Name of the program.
         program: String,
         /// First requested frame.
         first: u32,
-        /// Last one.
+        /// Last requested frame.
         last: u32,
-        /// Frames that it ended.
+        /// Number of frames that the program ended.
         counted: u32,
-        /// How it ended itself.
+        /// How the program ended.
         ended: String,
     },
-    /// A frame without a draw.
+    /// A frame without draws.
     #[error(
         "frame {0}: nothing was drawn; a page must start its session itself, because nothing clicks its buttons"
     )]
@@ -58,51 +58,51 @@ pub enum SessionError {
     Lost {
         /// Frame.
         frame: u32,
-        /// Bytes without room.
+        /// Number of bytes that were lost.
         lost: u64,
-        /// Bytes of room.
+        /// Size of the record buffer in bytes.
         room: u64,
     },
 }
 
-/// A draw as it was executed.
+/// An executed draw.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Executed {
     /// Number of the draw.
     pub draw: u32,
-    /// Number of its pass.
+    /// Number of its render pass.
     pub pass: u32,
-    /// Fragments that a query of the driver counted.
+    /// Number of fragments counted by an occlusion query.
     pub occlusion: Option<u64>,
 }
 
-/// A frame.
+/// A frame of a program.
 #[derive(Clone, Debug, Default)]
 pub struct ProgramFrame {
     /// Number.
     pub frame: u32,
     /// Draws in the order of execution.
     pub draws: Vec<Executed>,
-    /// Where its records are.
+    /// Spans of its records.
     spans: Vec<Span>,
-    /// Records that found no room.
+    /// Number of bytes of records that did not fit the buffer.
     pub lost_bytes: u64,
-    /// The program went on to the next frame.
+    /// Whether the program ended the frame.
     pub ended: bool,
 }
 
-/// One process of a program.
+/// A process of a captured program.
 #[derive(Debug, Default)]
 pub struct Session {
-    /// The process's command line.
+    /// Command line of the process.
     pub command: Vec<String>,
     /// Name of the device.
     pub device: String,
     /// Driver and version.
     pub driver: String,
-    /// Why the device cannot be recorded on.
+    /// Reason why recording is not possible on the device, if any.
     pub refused: Option<String>,
-    /// Reasons why the capture is incomplete.
+    /// Problems that make the capture incomplete.
     pub troubles: Vec<String>,
     /// Frames by number.
     pub frames: BTreeMap<u32, ProgramFrame>,
@@ -110,17 +110,17 @@ pub struct Session {
     passes: HashMap<u32, PassInfo>,
     images: HashMap<u32, ImageInfo>,
     shaders: HashMap<u32, ShaderInfo>,
-    /// Size of the picture of each pass that has one.
+    /// Size of the picture of each render pass that has one.
     pictures: HashMap<u32, [u32; 2]>,
     process: Option<Process>,
     records: Option<Reader>,
 }
 
 impl Session {
-    /// Files of a process.
+    /// Reads the files of a process.
     ///
     /// # Errors
-    /// Files that cannot be read.
+    /// The files cannot be read.
     pub fn read(process: &Process) -> Result<Self, ReadError> {
         let mut session = Self {
             records: Some(process.records()?),
@@ -133,10 +133,10 @@ impl Session {
         Ok(session)
     }
 
-    /// The process of a capture that rendered most.
+    /// The process of a capture that rendered the most draws.
     ///
     /// # Errors
-    /// Files that cannot be read, or no process with a device.
+    /// The files cannot be read, or no process opened a device.
     pub fn of_capture(folder: &Path, program: &str) -> Result<Self, SessionError> {
         let mut sessions = Vec::new();
         for process in Process::all(folder)? {
@@ -171,7 +171,7 @@ impl Session {
                 refused,
                 ..
             } => {
-                // A program may have opened others before and after the one that it renders on.
+                // The program may have opened other devices without rendering on them.
                 if self.device.is_empty() || self.refused.is_some() {
                     (self.device, self.driver, self.refused) = (name, driver, refused);
                 }
@@ -210,32 +210,32 @@ impl Session {
         }
     }
 
-    /// A draw.
+    /// The draw with a number.
     #[must_use]
     pub fn draw(&self, number: u32) -> Option<&DrawInfo> {
         self.draws.get(&number)
     }
 
-    /// A pass.
+    /// The render pass with a number.
     #[must_use]
     pub fn pass(&self, number: u32) -> Option<&PassInfo> {
         self.passes.get(&number)
     }
 
-    /// Size and texels, red, green, blue and alpha, of the picture of a pass.
+    /// Size and RGBA texels of the picture of a render pass.
     #[must_use]
     pub fn picture(&self, pass: u32) -> Option<([u32; 2], Vec<u8>)> {
         let size = *self.pictures.get(&pass)?;
         Some((size, self.process.as_ref()?.picture(pass).ok()?))
     }
 
-    /// An image.
+    /// The image with a number.
     #[must_use]
     pub fn image(&self, number: u32) -> Option<&ImageInfo> {
         self.images.get(&number)
     }
 
-    /// A recording shader.
+    /// The recording shader with a number.
     #[must_use]
     pub fn shader(&self, number: u32) -> Option<&ShaderInfo> {
         self.shaders.get(&number)
@@ -247,10 +247,10 @@ impl Session {
         self.shader(draw.shader?)
     }
 
-    /// Records of a frame, by draw, in the order in which they were written.
+    /// Records of a frame by draw, in recording order.
     ///
     /// # Errors
-    /// Records that cannot be read.
+    /// The records cannot be read.
     pub fn records(&mut self, frame: u32) -> Result<HashMap<u32, Vec<RawSample>>, ReadError> {
         let mut by_draw: HashMap<u32, Vec<RawSample>> = HashMap::new();
         let spans = self
@@ -274,7 +274,7 @@ impl Session {
 pub fn coverage_group(shader: &ShaderInfo) -> Option<u16> {
     let covers = |site: &&Site| site.unconditional && site.form == Form::Quad;
     let sites = &shader.sites;
-    // The site that was made for it has the depth as well.
+    // A separate coverage site also has the depth.
     let own = sites.iter().find(|site| site.what == What::Coverage);
     let found = own.or_else(|| sites.iter().find(covers));
     found.map(|site| site.group)

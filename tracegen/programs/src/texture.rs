@@ -1,4 +1,4 @@
-//! Vulkan's formats and samplers in the terms of a trace.
+//! Converts Vulkan formats and samplers to those of a trace.
 
 use ash::vk::{self, Format as F};
 use formats::texture::{
@@ -6,7 +6,7 @@ use formats::texture::{
 };
 use parallax_layer::spool::{ImageInfo, SamplerInfo, ViewInfo};
 
-/// Format and colour space of a trace; `None` for formats that no texture has.
+/// Format and colour space in a trace; `None` for formats that textures cannot have.
 #[must_use]
 pub fn texel_format(format: i32) -> Option<(TexelFormat, ColorSpace)> {
     use ColorSpace::{Linear, Srgb};
@@ -51,7 +51,7 @@ pub fn texel_format(format: i32) -> Option<(TexelFormat, ColorSpace)> {
         F::R32G32_UINT | F::R32G32_SINT | F::R32G32_SFLOAT => (T::Rg32, Linear),
         F::R32G32B32A32_UINT | F::R32G32B32A32_SINT | F::R32G32B32A32_SFLOAT => (T::Rgba32, Linear),
         F::D16_UNORM => (T::D16, Linear),
-        // Depth takes four bytes of these; the stencil lies elsewhere.
+        // Depth takes four bytes in these formats. The stencil is stored separately.
         F::D32_SFLOAT | F::X8_D24_UNORM_PACK32 | F::D24_UNORM_S8_UINT | F::D32_SFLOAT_S8_UINT => {
             (T::R32f, Linear)
         }
@@ -84,7 +84,8 @@ pub fn texel_format(format: i32) -> Option<(TexelFormat, ColorSpace)> {
     })
 }
 
-/// The part of an image in a view, as a texture of a trace; `None` if the trace has no such format.
+/// Converts the part of an image in a view to a texture of a trace; `None` if a trace does not have the
+/// format.
 #[must_use]
 pub fn texture(view: &ViewInfo, image: &ImageInfo) -> Option<Texture> {
     let (format, color_space) = texel_format(view.format)?;
@@ -108,7 +109,7 @@ pub fn texture(view: &ViewInfo, image: &ImageInfo) -> Option<Texture> {
     })
 }
 
-/// A sampler of a trace.
+/// Converts a sampler.
 #[must_use]
 pub fn sampler(info: &SamplerInfo) -> Sampler {
     let filter = |raw: i32| match vk::Filter::from_raw(raw) {
@@ -124,14 +125,14 @@ pub fn sampler(info: &SamplerInfo) -> Sampler {
     };
     let [bias, min, max] = info.lod;
     let fixed = |lod: f32| (256.0 * lod).round().clamp(-32768.0, 32767.0) as i16;
-    // OpenGL's filters without levels: no level but the first can be reached.
+    // Filters of OpenGL without mip levels are expressed by a maximum that allows only the first level.
     let is_flat = max <= 0.25;
     let mip = match vk::SamplerMipmapMode::from_raw(info.mip) {
         _ if is_flat => MipFilter::None,
         vk::SamplerMipmapMode::NEAREST => MipFilter::Nearest,
         _ => MipFilter::Linear,
     };
-    // A bound that no level of a texture reaches is none. Below level 0 nothing changes.
+    // A maximum above all levels of a texture is no bound, and a minimum below level 0 has no effect.
     let max_256ths = if max >= 127.0 { i16::MAX } else { fixed(max) };
     let min_256ths = if min <= 0.0 { i16::MIN } else { fixed(min) };
     Sampler {
@@ -147,7 +148,7 @@ pub fn sampler(info: &SamplerInfo) -> Sampler {
     }
 }
 
-/// The sampler of a fetch of one texel by its integer coordinates.
+/// The sampler of a fetch at integer coordinates.
 pub const FETCH: Sampler = Sampler {
     wrap: [Wrap::ClampToEdge; 2],
     mag: Filter::Nearest,
@@ -156,7 +157,7 @@ pub const FETCH: Sampler = Sampler {
     lod: LodRange::WHOLE,
 };
 
-/// The sampler of a gather: the four texels of a bilinear footprint, independent of the filter.
+/// The sampler of a gather, which reads the four texels of a bilinear footprint independently of the filter.
 #[must_use]
 pub fn gathering(sampler: Sampler) -> Sampler {
     Sampler {
@@ -181,7 +182,7 @@ mod tests {
     };
 
     #[test]
-    fn a_samplers_numbers_become_those_of_a_trace() {
+    fn samplers_are_converted_to_those_of_a_trace() {
         let found = sampler(&INFO);
         assert_eq!(found.wrap, [Wrap::Repeat, Wrap::ClampToBorder]);
         assert_eq!((found.min, found.mip), (Filter::Linear, MipFilter::Linear));
@@ -193,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn filters_of_opengl_without_levels_are_told_by_the_largest_level() {
+    fn opengl_filters_without_levels_are_recognised_by_the_maximum_level() {
         let flat = SamplerInfo {
             mip: 0,
             lod: [0.0, 0.0, 0.25],
@@ -204,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn a_view_of_some_levels_is_a_texture_of_its_own() {
+    fn a_view_of_some_levels_is_a_separate_texture() {
         let image = ImageInfo {
             image: 3,
             format: F::BC7_SRGB_BLOCK.as_raw(),

@@ -1,4 +1,4 @@
-//! The joint between the capture and the drivers that it runs on.
+//! The interface between the capture and the drivers.
 
 use super::draws::DrawList;
 use super::error::RasterError;
@@ -11,24 +11,24 @@ use std::time::Duration;
 
 /// What is recorded of a region, and the sink of the records.
 pub struct Recording<'s, 't> {
-    /// Which fragments.
+    /// Which fragments are recorded.
     pub fragments: Fragments,
-    /// Draws the picture as well, as without recording; else the layer's colour stays as it is.
+    /// Draws the picture as well. Otherwise the layer's colour is unchanged.
     pub picture: bool,
     /// Receives every record of the region (see [`record::Capturer::capture`]).
     pub sink: &'s mut Sink<'t>,
 }
 
-/// Where a draw is visible.
+/// Visibility of a draw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Marks {
-    /// Anywhere in the picture.
+    /// A fragment is visible in the picture.
     pub picture: bool,
-    /// At a pixel whose centre is visible through the lens.
+    /// A fragment is visible at a pixel whose centre is visible through the lens.
     pub lens: bool,
 }
 
-/// What the visible fragments of a view sampled of one texture of their materials, row by row.
+/// The samples of one texture slot of the materials by the visible fragments of a view, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Texels {
     /// Filtered colour as the shader gets it: linear red, green, blue, and alpha.
@@ -38,7 +38,7 @@ pub struct Texels {
 }
 
 impl Texels {
-    /// Nothing is visible, or something whose material has no such texture.
+    /// Nothing is visible, or the visible material has no such texture.
     pub const NO_PRIMITIVE: u32 = u32::MAX;
 }
 
@@ -47,9 +47,9 @@ impl Texels {
 pub struct Work {
     /// Rendered regions of layers, including those that overflowed.
     pub regions: u64,
-    /// Draws of all passes.
+    /// Draws of all render passes.
     pub draws: u64,
-    /// Draw calls that they took.
+    /// Draw calls for these draws.
     pub calls: u64,
     /// Pipelines, materials and meshes set before draw calls.
     pub state_changes: u64,
@@ -57,15 +57,15 @@ pub struct Work {
     pub vertices: u64,
     /// Triangles of the draws.
     pub triangles: u64,
-    /// Bytes written to the driver for views, lists of draws, and what moves.
+    /// Bytes written to the driver for views, lists of draws, moving draws and moving vertices.
     pub bytes_uploaded: u64,
-    /// Time of batching, encoding and submitting views, pictures with their records left out.
+    /// Time spent on batching, encoding and submitting views, excluding pictures with records.
     pub submitting: Duration,
-    /// Time of waiting for their pictures.
+    /// Time spent waiting for these views.
     pub waiting: Duration,
-    /// Time of composing pictures from layers.
+    /// Time spent on composing pictures from layers.
     pub composing: Duration,
-    /// Shadow maps rendered, one a cascade.
+    /// Shadow maps rendered, one per cascade.
     pub shadow_maps: u64,
     /// Pipelines made.
     pub pipelines: u64,
@@ -96,30 +96,30 @@ impl std::ops::Sub for Work {
     }
 }
 
-/// A driver that renders a scene and hands over what its fragments sampled.
+/// A driver that renders a scene and returns what its fragments sampled.
 ///
 /// A backend owns the uploaded scene. It renders one region of one layer at a time, so that the
-/// memory for records stays bounded however large the frame; regions of a layer may be rendered in
-/// any order and need not be disjoint in time. Each layer of a frame has a target of its own, from
-/// which the pictures are composed.
+/// memory for records stays bounded for any frame size. Regions of a layer may be rendered in any
+/// order. Each layer of a frame has its own target, and the pictures are composed from these.
 pub trait CaptureBackend {
     /// `lavapipe` or `osmesa`.
     fn name(&self) -> &'static str;
 
-    /// Driver string as it names itself.
+    /// The driver's own name and version string.
     fn driver(&self) -> &str;
 
-    /// Records that one region may produce.
+    /// Largest number of records of one region.
     fn record_capacity(&self) -> u64;
 
-    /// What the driver lacks to record quads as wholes, where it does: fragments are then recorded one
-    /// by one and merged, for the same records.
+    /// The missing driver feature because of which fragments are recorded one by one and merged;
+    /// `None` if quads are recorded as wholes. The records are the same either way.
     fn records_fragments_because(&self) -> Option<&str>;
 
     /// The work done so far.
     fn work(&self) -> Work;
 
-    /// Updates the positions of moving draws and of moving vertices; the others stay as they were uploaded.
+    /// Updates the positions of moving draws and of moving vertices. The others stay as they were
+    /// uploaded.
     fn pose(&mut self, scene: &Scene, draws: &DrawList);
 
     /// Renders the shadow maps of a frame, if its lighting has any.
@@ -128,9 +128,9 @@ pub trait CaptureBackend {
     /// Driver errors.
     fn render_shadows(&mut self, draws: &DrawList, frame: &Frame) -> Result<(), RasterError>;
 
-    /// Renders a region of a layer into the layer's target, and records it where that is asked
-    /// for. Depth is the same either way, and the picture if the recording has one; without a picture
-    /// nothing of [`Fragments::All`] writes depth.
+    /// Renders a region of a layer into the layer's target, and records it if requested. Depth is
+    /// the same either way, and so is the picture if the recording has one. Without a picture,
+    /// [`Fragments::All`] writes no depth.
     ///
     /// # Errors
     /// Driver errors, and what the recording's sink returns.
@@ -142,15 +142,16 @@ pub trait CaptureBackend {
         recording: Option<Recording<'_, '_>>,
     ) -> Result<Captured, RasterError>;
 
-    /// Renders the depth of a view's opaque and masked draws alone, and reads it: row by row, 1 where
-    /// there is nothing.
+    /// Renders only the depth of a view's opaque and masked draws and reads it: row by row, 1 where
+    /// nothing was drawn.
     ///
     /// # Errors
     /// Driver errors.
     fn depth(&mut self, draws: &DrawList, view: &View<'_>) -> Result<Vec<f32>, RasterError>;
 
-    /// Draws everything, culled or not, and tells for each draw whether it is visible in a view: a
-    /// fragment of it passes the depth test against the final depth (and its alpha test).
+    /// Draws everything, culled or not, and returns for each draw whether it is visible in a view.
+    /// A draw is visible if one of its fragments passes the depth test against the final depth (and
+    /// its alpha test).
     ///
     /// # Errors
     /// Driver errors, and a device that cannot capture.
@@ -184,23 +185,22 @@ pub trait CaptureBackend {
     /// Driver errors.
     fn multiview_defect(&mut self) -> Result<Option<String>, RasterError>;
 
-    /// Renders the left and the right layer, whole and of one size, with one list of draws for both:
-    /// in one submission where the driver's multiview can be trusted, else one by one. [`Work`]
+    /// Renders the left and the right layer, whole and of equal size, with one list of draws for
+    /// both: in one submission if the driver's multiview is sound, or else one by one. [`Work`]
     /// counts one submission either way.
     ///
     /// # Errors
     /// Driver errors.
     fn render_both(&mut self, draws: &DrawList, views: [&View<'_>; 2]) -> Result<(), RasterError>;
 
-    /// Makes what the frame's layers are rendered into, as far as the last frame's does not fit: memory
-    /// and masks that stay from frame to frame as long as the techniques do.
-    ///
+    /// Creates the targets of the frame's layers that differ from the last frame's. The same
+    /// techniques reuse memory and masks from frame to frame.
     /// # Errors
     /// Driver errors.
     fn prepare(&mut self, frame: &Frame) -> Result<(), RasterError>;
 
-    /// Makes the frame's pictures from its layers, all of whose regions have been rendered; those
-    /// that are layers are there already.
+    /// Composes the frame's pictures from its layers, all of whose regions have been rendered.
+    /// Pictures that are single layers need no composition.
     ///
     /// # Errors
     /// Driver errors.

@@ -1,4 +1,4 @@
-//! Draws that one instanced draw call covers.
+//! Draws that share one instanced draw call.
 
 use crate::draws::DrawList;
 use crate::roles::{Purpose, roles};
@@ -13,11 +13,11 @@ pub(crate) struct Batch {
     pub range: Range<u32>,
 }
 
-/// Cuts `visible` (indices into the draw list) into batches; draws without a role are left out.
+/// Splits `visible` (indices into the draw list) into batches. Draws without a role are left out.
 ///
-/// The order stays, and instances are drawn in order, so that depth test and blending see what
-/// they would see draw by draw. A draw with two roles stands alone: its second role writes the
-/// depth that the next draw's first role is tested against.
+/// The order is kept and instances are drawn in order, so that depth test and blending have the
+/// same result as draw by draw. A draw with two roles has its own batch, because its second role
+/// writes the depth against which the next draw's first role is tested.
 pub(crate) fn batches(draws: &DrawList, visible: &[u32], purpose: Purpose) -> Vec<Batch> {
     let mut found: Vec<Batch> = Vec::new();
     for (position, &draw) in (0..).zip(visible) {
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn consecutive_instances_of_a_mesh_are_one_batch_whatever_is_culled_between_them() {
+    fn consecutive_instances_of_a_mesh_are_one_batch_across_culled_draws() {
         let meshes = [1, 1, 1, 2, 1, 8, 9];
         let of = |visible: &[u32]| ranges(&meshes, DrawMode::Opaque, visible, Purpose::Capture);
         assert_eq!(
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn masked_draws_stand_alone_where_they_are_recorded_and_nowhere_else() {
+    fn recorded_masked_draws_are_not_batched_and_others_are() {
         let of = |purpose| ranges(&[1, 1, 1], DrawMode::Masked, &[0, 1, 2], purpose);
         assert_eq!(of(Purpose::Capture), [(0, 1), (1, 2), (2, 3)]);
         assert_eq!(of(Purpose::Plain), [(0, 3)]);

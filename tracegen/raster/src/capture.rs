@@ -17,25 +17,25 @@ use techniques::least_work::Object;
 use techniques::{FramePlan, Planner, Skips, Start};
 use visibility::Rig;
 
-/// Inputs of a capture, the same for plain rendering and for the capture.
+/// Inputs shared by plain rendering and capture.
 pub struct CaptureJob<'a> {
     /// The scene.
     pub scene: &'a Scene,
     /// Its draws.
     pub draws: &'a DrawList,
-    /// Lights; cascades are fitted per frame.
+    /// Lights. Cascades are fitted per frame.
     pub lighting: Lighting,
     /// World-space bounds of the scene.
     pub bounds: (glam::Vec3, glam::Vec3),
     /// Distances from the head that the cascades span, metres.
     pub shadow_range_m: [f32; 2],
-    /// Which layers the frames have.
+    /// Determines the layers of the frames.
     pub planner: &'a Planner,
     /// Invisible work that is skipped.
     pub skips: Skips,
     /// Which fragments are recorded.
     pub fragments: Fragments,
-    /// Captured frames have pictures as well.
+    /// Captured frames also have pictures.
     pub shaded: bool,
 }
 
@@ -45,7 +45,7 @@ pub struct CapturedFrame {
     pub pictures: Option<Pictures>,
     /// Counts of the records.
     pub counts: CaptureCounts,
-    /// Time of sorting, encoding and writing.
+    /// Time spent on sorting, encoding and writing.
     pub sorting: Duration,
 }
 
@@ -53,10 +53,10 @@ pub struct CapturedFrame {
 pub type Pictures = Vec<Vec<u8>>;
 
 impl CaptureJob<'_> {
-    /// How a frame is rendered.
+    /// The plan of a frame: its layers and pictures.
     ///
     /// # Errors
-    /// Eyes that no far field serves.
+    /// Eyes for which no far field can be made.
     pub fn plan(&self, views: &FrameViews) -> Result<FramePlan, RasterError> {
         let objects = || {
             let size_px = self.planner.hmd().eye_size_px;
@@ -69,8 +69,8 @@ impl CaptureJob<'_> {
         Ok(self.planner.plan(views, objects)?)
     }
 
-    /// Passes of a frame in the order in which [`Self::capture_frame`] writes them. Where draws move, they have
-    /// to stand where they are in that frame.
+    /// Render passes of a frame, in the order in which [`Self::capture_frame`] writes them. Moving
+    /// draws must have their positions of that frame.
     ///
     /// # Errors
     /// As [`Self::plan`].
@@ -80,7 +80,7 @@ impl CaptureJob<'_> {
         Ok((0..plan.layers.len()).map(pass).collect())
     }
 
-    /// The recorder of this job's passes; `tables` are the trace's.
+    /// The recorder of this job's render passes. `tables` are the trace's.
     #[must_use]
     pub fn recorder<'t>(&self, tables: &'t Tables) -> Recorder<'t> {
         let replay = |call: &DrawCall| {
@@ -94,11 +94,11 @@ impl CaptureJob<'_> {
         Recorder::new(tables, self.draws.calls.iter().map(replay).collect())
     }
 
-    /// Fits the frame's shadow cascades to both eyes, whichever are captured, and finds what each
-    /// layer may see.
+    /// Fits the frame's shadow cascades to both eyes, whichever are captured, and finds the draws
+    /// that each layer may see.
     ///
     /// # Errors
-    /// Eyes that the culling technique is not made for.
+    /// Eyes that the culling technique does not support.
     pub fn frame(&self, views: &FrameViews) -> Result<Frame, RasterError> {
         let mut frame = self.boxes_seen(views)?;
         self.cull_distant(&mut frame, views);
@@ -106,7 +106,7 @@ impl CaptureJob<'_> {
         Ok(frame)
     }
 
-    /// The frame as the boxes of its draws tell it.
+    /// The frame according to the bounding boxes of its draws.
     pub(crate) fn boxes_seen(&self, views: &FrameViews) -> Result<Frame, RasterError> {
         let mut lighting = self.lighting.clone();
         let [near, far] = self.shadow_range_m;
@@ -136,7 +136,7 @@ impl CaptureJob<'_> {
         Rig::new(self.planner.eyes().iter().map(eye).collect())
     }
 
-    /// Renders the frame's shadow maps: once for all its pictures.
+    /// Renders the frame's shadow maps, once for all its pictures.
     ///
     /// # Errors
     /// Driver errors.
@@ -150,9 +150,8 @@ impl CaptureJob<'_> {
         Ok(start.elapsed())
     }
 
-    /// Makes the driver compile every shader that the frame's plain and captured pictures use, by
-    /// rendering a tile of each layer, so that neither's time includes it.
-    ///
+    /// Makes the driver compile every shader of the frame's plain and captured pictures by
+    /// rendering a tile of each layer. Measured times then exclude compilation.
     /// # Errors
     /// Driver errors.
     pub fn warm_up(
@@ -182,14 +181,15 @@ impl CaptureJob<'_> {
             backend.render(self.draws, &view, tile, Some(recording))?;
         }
         if self.planner.settings().multiview {
-            // Finds out whether the driver can be trusted.
+            // Tests whether the driver's multiview is sound.
             self.render_layers(backend, frame)?;
         }
         backend.compose(frame)
     }
 
-    /// Renders every layer of a frame without capture; both eyes' in one submission where multiview asks
-    /// for that and they are nothing but their pictures. The frame's shadow maps have been rendered.
+    /// Renders every layer of a frame without capture. With multiview, both eyes are rendered in
+    /// one submission if their pictures are plain layers. The frame's shadow maps have been
+    /// rendered.
     ///
     /// # Errors
     /// Driver errors.
@@ -212,7 +212,8 @@ impl CaptureJob<'_> {
         Ok(())
     }
 
-    /// One draw makes both eyes' pictures: multiview, where these are plain layers.
+    /// True if one draw call renders both eyes' pictures: with multiview, if these are plain
+    /// layers.
     #[must_use]
     pub fn draws_both_at_once(&self, frame: &Frame) -> bool {
         let layers = &frame.plan.layers;
@@ -221,8 +222,8 @@ impl CaptureJob<'_> {
             && layers.iter().all(techniques::Layer::is_plain)
     }
 
-    /// Renders a frame without capture: every layer, pictures composed and read back. The frame's
-    /// shadow maps have been rendered.
+    /// Renders a frame without capture: renders every layer, then composes and reads the pictures.
+    /// The frame's shadow maps have been rendered.
     ///
     /// # Errors
     /// Driver errors.
@@ -237,11 +238,11 @@ impl CaptureJob<'_> {
         Ok((pictures, start.elapsed()))
     }
 
-    /// Renders a frame with capture and appends its tiles to the trace; `first_pass` is the
-    /// number of the first layer's pass. The frame's shadow maps have been rendered.
+    /// Renders a frame with capture and appends its tiles to the trace; `first_pass` is the number
+    /// of the first layer's render pass. The frame's shadow maps have been rendered.
     ///
     /// # Errors
-    /// Driver errors, a record budget that one tile overflows, and errors of writing.
+    /// Driver errors, a tile whose records exceed the budget, and errors of writing.
     pub fn capture_frame<W: Write + Seek>(
         &self,
         backend: &mut dyn CaptureBackend,
@@ -285,7 +286,7 @@ impl CaptureJob<'_> {
         })
     }
 
-    /// Refuses a frame whose layers differ from those that its passes were written for.
+    /// Refuses a frame whose layers differ from those for which its render passes were written.
     fn check_passes(
         &self,
         frame: &Frame,
@@ -305,7 +306,7 @@ impl CaptureJob<'_> {
         )))
     }
 
-    /// Depth of the frame's layers as they were rendered last.
+    /// Depth of the frame's layers from their latest rendering.
     ///
     /// # Errors
     /// A layer that has not been rendered, and driver errors.
@@ -320,7 +321,7 @@ impl CaptureJob<'_> {
     }
 }
 
-/// The pass that a layer of a frame is written as.
+/// The render pass of a layer of a frame.
 fn pass(frame: u32, plan: &FramePlan, number: usize) -> Pass {
     let layer = &plan.layers[number];
     let whole = plan.is_picture(number) && layer.start == Start::Sky;
@@ -347,7 +348,7 @@ fn pictures(backend: &mut dyn CaptureBackend, frame: &Frame) -> Result<Pictures,
         .collect()
 }
 
-/// One layer on a backend.
+/// Captures one layer on a backend.
 struct ViewCapturer<'a> {
     backend: &'a mut dyn CaptureBackend,
     draws: &'a DrawList,
@@ -365,7 +366,7 @@ impl Capturer for ViewCapturer<'_> {
     }
 
     fn capture(&mut self, region: Region, sink: &mut Sink<'_>) -> Result<Captured, RasterError> {
-        // A part of the layer needs only the draws that may touch it.
+        // For a part of the layer, only the draws that may touch it are needed.
         let touching = if self.skip_regions {
             self.draws.touching(&self.view, region)
         } else {

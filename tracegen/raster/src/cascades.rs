@@ -2,9 +2,9 @@
 //!
 //! Both eyes share one set of cascades, fitted to the union of their frusta, so that a world point
 //! is shadowed from the same texels in both views. Each cascade is a square around the bounding
-//! sphere of a slice of that union, snapped to its texel grid: it keeps its size under head
-//! rotation and its texels stay put in the world, which keeps shadow edges still from frame to
-//! frame.
+//! sphere of a slice of that union, snapped to its texel grid. It keeps its size when the head
+//! turns, and its texels keep their positions in the world, so shadow edges are stable from frame
+//! to frame.
 
 use formats::view::EyeView;
 use glam::camera::rh::{proj::directx::orthographic, view::look_at_mat4};
@@ -17,7 +17,7 @@ pub const SHADOW_SIZE: u32 = 2048;
 /// scheme).
 const LOG_WEIGHT: f32 = 0.75;
 
-/// Part of the cascade's radius kept free for the taps of the filter.
+/// Radius of a cascade relative to its sphere, which leaves room for the taps of the filter.
 const MARGIN: f32 = 1.01;
 
 /// One cascade.
@@ -30,7 +30,7 @@ pub struct Cascade {
 }
 
 /// Fits `count` cascades along `to_sun` to the frusta of `eyes` between `near_m` and `far_m` from
-/// the head; `bounds` are the scene's, so that every caster lies within the depth range.
+/// the head. `bounds` are the scene's, so that every caster lies within the depth range.
 #[must_use]
 pub fn fit(
     eyes: &[EyeView],
@@ -59,7 +59,7 @@ pub fn fit(
             let texel = 2.0 * half / SHADOW_SIZE as f32;
             let c = light.transform_point3(center);
             let [x, y] = [c.x, c.y].map(|v| (v / texel).floor() * texel);
-            // A flat scene that faces the sun has no depth at all.
+            // A flat scene that faces the sun has no depth.
             let range = (depth_hi - depth_lo).max(1e-5 * far_m);
             let projection = orthographic(
                 x - half,
@@ -85,8 +85,8 @@ fn split(edge: u32, count: u32, near_m: f32, far_m: f32) -> f32 {
     LOG_WEIGHT * log + (1.0 - LOG_WEIGHT) * uniform
 }
 
-/// What radii of cascades are multiples of, metres: 1/16, or what is that to a scene much smaller or
-/// much larger than a building, whose cascades end at `far_m`.
+/// Radii of cascades are multiples of this, metres: 1/16 for a scene the size of a building, and in
+/// proportion to `far_m` for much smaller or larger scenes.
 fn radius_step_m(far_m: f32) -> f32 {
     let least = (far_m / 16384.0).log2().ceil().exp2();
     let most = (far_m / 32.0).log2().floor().exp2();

@@ -6,8 +6,8 @@ use formats::view::FrameViews;
 use techniques::distance::Head;
 
 impl CaptureJob<'_> {
-    /// Leaves out of every layer the draws that are too far or too small. Shadow maps keep them: a shadow that
-    /// ends at the limit would be seen where its caster is not.
+    /// Removes from every layer the draws that are too far away or too small. Shadow maps keep
+    /// them, because a shadow that ends at the limit would be visible where its caster is not.
     pub(crate) fn cull_distant(&self, frame: &mut Frame, views: &FrameViews) {
         let Some(limit) = self.planner.settings().distance_cull else {
             return;

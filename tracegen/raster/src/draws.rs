@@ -18,7 +18,7 @@ use visibility::{Hierarchy, frustum};
 /// footprints tile a 4x4 neighbourhood without overlap.
 pub const SHADOW_TAPS: [[i8; 2]; 4] = [[-1, -1], [1, -1], [-1, 1], [1, 1]];
 
-/// How a draw treats alpha. If alpha is constant, it is tested here instead of at every pixel.
+/// How a draw treats alpha. A constant alpha is tested once here instead of at every pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum DrawMode {
     /// Every fragment is kept.
@@ -41,7 +41,7 @@ impl DrawMode {
     }
 }
 
-/// Properties that all draws of a mesh share.
+/// Properties shared by all draws of a mesh.
 struct ShownMesh {
     mode: DrawMode,
     object_box: [Vec3; 2],
@@ -92,11 +92,11 @@ pub struct DrawCall {
     pub mode: DrawMode,
     /// Object to world.
     pub transform: Affine3A,
-    /// The transform mirrors: front faces wind the other way round.
+    /// The transform mirrors, so front faces have reversed winding.
     pub mirrored: bool,
     /// Number of its first primitive.
     pub first_primitive: u32,
-    /// Its vertices have colours.
+    /// The vertices have colours.
     pub colored: bool,
     /// World-space bounds of the instance.
     pub bounds: [Vec3; 2],
@@ -113,7 +113,7 @@ pub struct DrawList {
     pub groups: Vec<MaterialGroups>,
     /// Shadow cascades that lit draws sample, 0 to 4.
     pub cascades: u32,
-    /// The tree over the draws' bounds.
+    /// Hierarchy of the draws' bounds.
     pub hierarchy: Hierarchy,
 }
 
@@ -127,8 +127,8 @@ impl DrawList {
         }
     }
 
-    /// Orders the scene's instances: opaque and masked ones in the scene's order, then blended
-    /// ones in the scene's order. Instances that show nothing are left out.
+    /// Orders the scene's instances: opaque and masked ones in the scene's order, then blended ones
+    /// in the scene's order. Invisible instances are left out.
     ///
     /// # Errors
     /// More primitives than 32 bits number, or an index out of range.
@@ -184,8 +184,8 @@ impl DrawList {
         })
     }
 
-    /// Puts the draws that move where they are at a time, transforms and bounds. `scene` is the one
-    /// that the list was made of, with its instances as they were or where its animation has them.
+    /// Moves the transforms and bounds of moving draws to a time. `scene` is the one from which the
+    /// list was created; its instances are unchanged or posed by its animation at that time.
     pub fn pose(&mut self, scene: &Scene, time_s: f32) {
         if self.moving.is_empty() {
             return;
@@ -205,13 +205,13 @@ impl DrawList {
         self.hierarchy.refit(self.moving.iter().map(bounds));
     }
 
-    /// Indices of the draws that a view or a shadow cascade may see, ascending.
+    /// Indices of the draws that may be visible in a view or shadow cascade, ascending.
     #[must_use]
     pub fn visible(&self, clip_from_world: Mat4) -> Vec<u32> {
         self.hierarchy.entering(clip_from_world)
     }
 
-    /// Those of `list` that a view may see.
+    /// The draws of `list` that may be visible in a view.
     #[must_use]
     pub(crate) fn visible_of(&self, list: &[u32], clip_from_world: Mat4) -> Vec<u32> {
         let bounds = list.iter().map(|&draw| self.calls[draw as usize].bounds);
@@ -249,8 +249,8 @@ impl DrawList {
         textures
     }
 
-    /// Sampler and draw tables of the trace; `textures` is [`DrawList::textures`]' result for the
-    /// same `set`.
+    /// Sampler and draw tables of the trace. `textures` is the result of [`DrawList::textures`] for
+    /// the same `set`.
     #[must_use]
     pub fn tables(
         &self,
@@ -343,10 +343,11 @@ fn intern(samplers: &mut Vec<Sampler>, sampler: Sampler) -> u16 {
     index as u16
 }
 
-/// World-space bounds of a mesh, rounding of its vertices on the way through any driver included;
-/// `object_box` is its box in object space.
+/// World-space bounds of a mesh, including the rounding of its vertices in any driver. `object_box`
+/// is its box in object space.
 fn world_box(positions: &[Vec3], object_box: [Vec3; 2], transform: &Affine3A) -> [Vec3; 2] {
-    // Parts of the magnitude of the sums that a coordinate comes from: 8 units in the last place.
+    // Relative to the magnitude of the sums from which a coordinate is computed: 8 units in the
+    // last place.
     const ROUNDING: f32 = 8.0 * f32::EPSILON / 2.0;
     let m = &transform.matrix3;
     let p = object_box[0].abs().max(object_box[1].abs());
@@ -411,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn blended_draws_come_last_and_primitives_are_numbered_through() {
+    fn blended_draws_come_last_and_primitives_are_numbered_consecutively() {
         let materials = vec![
             material(AlphaMode::Blend, true),
             material(AlphaMode::Opaque, true),
@@ -433,7 +434,7 @@ mod tests {
     }
 
     #[test]
-    fn a_constant_alpha_is_tested_once_for_the_draw() {
+    fn a_constant_alpha_is_tested_once_per_draw() {
         let materials = vec![
             material(AlphaMode::Mask(0.5), false),
             material(AlphaMode::Mask(0.3), false),
@@ -458,7 +459,7 @@ mod tests {
     }
 
     #[test]
-    fn draws_that_move_take_their_bounds_along_and_come_back() {
+    fn bounds_follow_moving_draws_and_return_to_their_start() {
         let mut scene = scene(vec![material(AlphaMode::Opaque, false); 3], &[1, 1, 1]);
         scene.materials[0].alpha = AlphaMode::Blend;
         scene.motions = vec![Motion {

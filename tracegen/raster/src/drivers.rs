@@ -1,4 +1,4 @@
-//! Which driver captures.
+//! Selection of the driver that captures.
 
 use crate::backend::CaptureBackend;
 use crate::draws::DrawList;
@@ -8,21 +8,21 @@ use crate::osmesa::Osmesa;
 use scene::Scene;
 use textures::TextureSet;
 
-/// A driver by name, or whichever is there.
+/// A driver by name, or the first one available.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Driver {
     /// Mesa's Vulkan driver on the processor.
     #[default]
     Lavapipe,
-    /// Mesa's OpenGL without a window, which captures plain frames only.
+    /// Mesa's OpenGL without a window, which captures only plain frames.
     Osmesa,
     /// Lavapipe if it is installed and can capture, else OSMesa.
     Auto,
 }
 
 impl Driver {
-    /// Opens the driver and uploads the scene for views of `view_size_px`. Regions may produce
-    /// `record_budget_bytes` of raw records before they are split.
+    /// Opens the driver and uploads the scene for views of `view_size_px`. A region is split if its
+    /// raw records exceed `record_budget_bytes`.
     ///
     /// # Errors
     /// No driver, driver errors, sizes beyond its limits.
@@ -55,7 +55,7 @@ impl Driver {
     }
 }
 
-/// A driver that was opened.
+/// An opened driver.
 pub struct Opened {
     /// The driver.
     pub backend: Box<dyn CaptureBackend>,
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn a_driver_that_lacks_a_feature_gives_way_to_the_next_and_both_reasons_are_named() {
+    fn the_second_driver_replaces_one_that_lacks_a_feature_and_both_reasons_are_reported() {
         let both = either::<()>(Err(lacking()), || {
             Err(RasterError::NoLibrary("libOSMesa.so.8", "absent".into()))
         });

@@ -23,7 +23,7 @@ pub enum RasterError {
         "no lavapipe (Mesa's CPU Vulkan driver) found{0}; install it with: apt-get install mesa-vulkan-drivers libvulkan1"
     )]
     NoDriver(String),
-    /// A driver that is installed and does not start: why.
+    /// A driver that is installed but does not start, with the reason.
     #[error("lavapipe (Mesa's CPU Vulkan driver) is installed and does not start: {0}")]
     NotLoaded(String),
     /// OSMesa is missing: the name of the file, and the loader's message.
@@ -31,18 +31,18 @@ pub enum RasterError {
         "{0} (OSMesa, Mesa without a window) cannot be loaded: {1}; install it with: apt-get install libosmesa6 (Mesa 25.1 and later have none)"
     )]
     NoLibrary(&'static str, String),
-    /// Neither of the drivers that capture.
+    /// Neither of the drivers that can capture is available.
     #[error("{0}; nor OSMesa: {1}")]
     NoBackend(Box<RasterError>, Box<RasterError>),
-    /// No adapter of that name.
+    /// No adapter with that name.
     #[error("no adapter '{wanted}': expected a part of one of these names: {known}")]
     NoAdapter {
         /// The name as given.
         wanted: String,
-        /// Those present.
+        /// Names of the available adapters.
         known: String,
     },
-    /// A driver that lacks what the capture needs.
+    /// A driver without a feature that the capture needs.
     #[error("{driver} lacks {what}")]
     Unsupported {
         /// Driver string.
@@ -55,10 +55,10 @@ pub enum RasterError {
     Driver {
         /// The failed operation.
         doing: &'static str,
-        /// Its message.
+        /// The driver's message.
         message: String,
     },
-    /// Something is larger than the driver takes.
+    /// A quantity beyond the driver's limit.
     #[error("{what}: {found} exceeds the limit of {limit}")]
     TooLarge {
         /// The quantity that is too large.
@@ -71,13 +71,13 @@ pub enum RasterError {
     /// Inconsistent input.
     #[error("{0}")]
     Scene(String),
-    /// Eyes that the culling technique is not made for.
+    /// Eyes that the culling technique does not support.
     #[error(transparent)]
     Culling(#[from] TooWide),
-    /// Eyes that no far field serves.
+    /// Eyes for which no far field can be made.
     #[error(transparent)]
     FarField(#[from] FarFieldError),
-    /// The records could not become a trace.
+    /// The records could not be written as a trace.
     #[error(transparent)]
     Record(#[from] RecordError),
 }

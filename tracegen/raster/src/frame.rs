@@ -15,17 +15,17 @@ pub struct Frame {
     pub lighting: Lighting,
     /// Draws that may be visible in each shadow cascade.
     pub casters: Vec<Vec<u32>>,
-    /// Which shadow cascades may be looked up; the others need not be rendered.
+    /// Which shadow cascades may be looked up. The others need not be rendered.
     pub cascades_seen: Vec<bool>,
-    /// The layers, and how the pictures come of them.
+    /// The layers, and the composition of the pictures from them.
     pub plan: FramePlan,
-    /// Boxes that were tested to find the draws of the eyes' pictures.
+    /// Boxes tested to find the draws of the eyes' pictures.
     pub cull_tests: u64,
-    /// Boxes that were tested for occlusion.
+    /// Boxes tested for occlusion.
     pub occlusion_tests: u64,
-    /// Draws of layers that others hide.
+    /// Draws of layers that are hidden by others.
     pub occluded: u64,
-    /// Time that all this took.
+    /// Time for culling.
     pub cull_time: Duration,
     /// The eyes.
     pub rig: Rig,
@@ -36,11 +36,11 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// Finds the draws that each of the plan's layers and each of the lighting's cascades may see:
-    /// of frame `number` of the eyes of `rig`.
+    /// Finds the draws that may be visible in each of the plan's layers and each of the lighting's
+    /// cascades, for frame `number` of the eyes of `rig`.
     ///
     /// # Errors
-    /// Eyes that the culling technique is not made for.
+    /// Eyes that the culling technique does not support.
     pub fn new(
         draws: &DrawList,
         lighting: Lighting,
@@ -59,8 +59,8 @@ impl Frame {
             .collect();
         let visible = (plan.layers.iter())
             .map(|layer| {
-                // An eye's own picture gets the technique's list, a part of it or another view what
-                // the list has for it.
+                // An eye's own picture gets the technique's list. A part of it or another view gets
+                // the draws of the list that it may see.
                 let whole = rig.eyes().iter().any(|eye| eye.view == layer.view)
                     && !matches!(layer.start, Start::Nearer { .. });
                 let mut visible = if whole {

@@ -42,8 +42,8 @@ fn stored(mesh: &Mesh) -> MeshGeometry {
     }
 }
 
-/// The views of a frame in the order in which they are rendered, each with its lists: shadow maps, then layers, whose
-/// first one is pass `first_pass` of the trace.
+/// The views of a frame in the order in which they are rendered, each with its lists: shadow maps,
+/// then layers. The first layer is render pass `first_pass` of the trace.
 pub(crate) fn views<'a>(
     scene: &'a Scene,
     draws: &'a DrawList,
@@ -93,8 +93,8 @@ pub(crate) fn views<'a>(
     shadow_maps.chain(layers)
 }
 
-/// Sorts the primitives of some draws into the tiles of a view. Faces that turn away are kept of double-sided materials,
-/// and where all faces are asked for.
+/// Sorts the primitives of the given draws into the tiles of a view. Back faces are kept for
+/// double-sided materials, and if all faces are requested.
 fn lists(
     scene: &Scene,
     draws: &DrawList,

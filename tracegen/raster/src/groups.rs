@@ -1,4 +1,4 @@
-//! Which textures of a material share texture coordinates.
+//! Groups of a material's textures that share texture coordinates.
 
 use scene::{Material, TextureRef};
 
@@ -6,7 +6,7 @@ use scene::{Material, TextureRef};
 /// occlusion, emissive.
 pub const MATERIAL_TEXTURES: usize = SLOTS.len();
 
-/// The slots of [`Material::textures`] by the shader's names for them.
+/// The shader's names of the slots of [`Material::textures`].
 pub(crate) const SLOTS: [&str; 6] = [
     "BASE_COLOR",
     "NORMAL",
@@ -21,9 +21,9 @@ pub(crate) const SLOTS: [&str; 6] = [
 pub struct MaterialGroups {
     /// Slots (0 to 5) of each group; groups in the order of their first slot.
     pub groups: Vec<Vec<usize>>,
-    /// Bit per slot that has a texture.
+    /// One bit per slot, set if it has a texture.
     pub present: u32,
-    /// Bit per slot that is the first of its group.
+    /// One bit per slot, set if it is the first of its group.
     pub leaders: u32,
 }
 

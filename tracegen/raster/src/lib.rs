@@ -5,8 +5,8 @@
 //!       -> binning by tile -> in-order alpha-test replay -> fixed point -> encoded tiles -> file
 //! ```
 //!
-//! Draws keep the file's order, opaque and alpha-masked ones first, then the blended ones (also in
-//! file order: a trace should not depend on a sort by distance, which differs between the eyes).
+//! Draws keep the file's order, opaque and alpha-masked ones first, then blended ones. A trace must
+//! not depend on a sort by distance, which differs between the eyes.
 
 pub mod backend;
 mod batches;

@@ -5,7 +5,7 @@ use glam::Vec3;
 use scene::light::Sky;
 use scene::{Light, Scene};
 
-/// Point lights that the shader evaluates; the brightest are kept.
+/// Largest number of point lights in the shader. The brightest are kept.
 pub const MAX_POINT_LIGHTS: usize = 8;
 
 /// Sun, sky, point lights and shadow cascades of one frame, shared by both eyes.

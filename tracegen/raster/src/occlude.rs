@@ -1,4 +1,4 @@
-//! Occlusion culling of a frame: the two phases on a backend.
+//! The two phases of occlusion culling on a backend.
 
 use super::backend::CaptureBackend;
 use super::capture::CaptureJob;
@@ -8,10 +8,10 @@ use std::time::Instant;
 use visibility::{Occlusion, Pyramid};
 
 impl CaptureJob<'_> {
-    /// Takes from each layer of a frame the draws that others hide: no pixel changes.
+    /// Removes from each layer of a frame the draws that others hide. No pixel changes.
     ///
-    /// `occlusion` remembers what the frame before showed; any frame may come before any other.
-    /// The time counts towards the frame's culling.
+    /// `occlusion` stores what the previous frame showed; frames may be in any order. The time is
+    /// added to the frame's culling time.
     ///
     /// # Errors
     /// Driver errors.

@@ -1,4 +1,4 @@
-//! Roles of a draw in each pass, and the keys of their pipelines.
+//! Roles of a draw in each render pass, and the keys of their pipelines.
 
 use crate::backend::Fragments;
 use crate::backend::Recording;
@@ -6,7 +6,7 @@ use crate::draws::{DrawCall, DrawMode};
 use crate::groups::MaterialGroups;
 use scene::Material;
 
-/// Role of a draw in a pass.
+/// Role of a draw in a render pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Role {
     /// Colour and depth with forced early depth test.
@@ -19,15 +19,15 @@ pub(crate) enum Role {
     MaskedRecord,
     /// Records and early depth of an opaque draw.
     OpaqueRecord,
-    /// Records of what lies before the depth there; writes no depth.
+    /// Records of fragments in front of the stored depth. Writes no depth.
     Record,
     /// Depth of a shadow caster.
     Shadow,
     /// Depth of an alpha-masked shadow caster.
     ShadowMasked,
-    /// Fragments of an opaque draw, added up.
+    /// Additive count of the fragments of an opaque draw.
     Count,
-    /// Fragments of a blended draw, added up.
+    /// Additive count of the fragments of a blended draw.
     CountBlended,
     /// Only depth.
     Depth,
@@ -35,11 +35,11 @@ pub(crate) enum Role {
     DepthMasked,
     /// Marks the draw if a fragment is not farther than the stored depth.
     Mark,
-    /// The same of an alpha-masked draw.
+    /// Like `Mark`, for an alpha-masked draw.
     MarkMasked,
     /// Records the samples of one texture of the material, and the primitive.
     Texel,
-    /// The same of an alpha-masked draw.
+    /// Like `Texel`, for an alpha-masked draw.
     TexelMasked,
 }
 
@@ -61,12 +61,12 @@ impl Role {
         }
     }
 
-    /// It renders into a shadow map.
+    /// Whether it renders into a shadow map.
     pub fn casts(self) -> bool {
         matches!(self, Self::Shadow | Self::ShadowMasked)
     }
 
-    /// There is never a colour attachment.
+    /// Whether it never has a colour attachment.
     fn colorless(self) -> bool {
         let alone = [Self::Depth, Self::DepthMasked, Self::Mark, Self::MarkMasked];
         self.casts() || alone.contains(&self)
@@ -77,12 +77,12 @@ impl Role {
         self == Self::MaskedRecord
     }
 
-    /// It writes texels and primitives in place of the picture.
+    /// Whether it writes texels and primitives instead of the picture.
     pub fn writes_texels(self) -> bool {
         matches!(self, Self::Texel | Self::TexelMasked)
     }
 
-    /// It marks draws: fragments as far as the depth count as well.
+    /// Whether it marks draws. Fragments at the stored depth count as well.
     pub fn marks(self) -> bool {
         matches!(self, Self::Mark | Self::MarkMasked)
     }
@@ -95,7 +95,7 @@ impl Role {
         )
     }
 
-    /// Depth is tested and stays.
+    /// Whether depth is tested and not written.
     pub fn keeps_depth(self) -> bool {
         matches!(
             self,
@@ -109,14 +109,14 @@ impl Role {
     }
 }
 
-/// Purpose of a pass.
+/// Purpose of a render pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Purpose {
     /// Only the picture.
     Plain,
     /// The picture and the records.
     Capture,
-    /// The records of what passes the depth test when it is drawn, and depth: no picture.
+    /// The records of fragments that pass the depth test when drawn, and depth, without a picture.
     Trace,
     /// Only the records of fragments in front of the layer's initial depth.
     Record,
@@ -126,14 +126,14 @@ pub(crate) enum Purpose {
     Count,
     /// Depth, for occlusion culling and for marks.
     Depth,
-    /// Which draws are visible.
+    /// Visibility marks of draws.
     Mark,
-    /// Samples of visible fragments of one texture of their materials.
+    /// Samples of one texture slot of the materials by visible fragments.
     Texel,
 }
 
 impl Purpose {
-    /// The passes over a region, one after the other.
+    /// The render passes over a region, in order.
     pub fn of(recording: Option<&Recording<'_, '_>>) -> &'static [Self] {
         match recording.map(|recording| (recording.fragments, recording.picture)) {
             None => &[Self::Plain],
@@ -145,8 +145,9 @@ impl Purpose {
         }
     }
 
-    /// There is a picture to draw. A pass without one has no colour attachment: llvmpipe would load,
-    /// convert and store the colour of every pixel even of draws that leave it alone.
+    /// Whether a picture is drawn. A render pass without one has no colour attachment, because
+    /// llvmpipe would load, convert and store the colour of every pixel even if draws do not change
+    /// it.
     pub fn has_picture(self) -> bool {
         matches!(self, Self::Plain | Self::Capture)
     }
@@ -172,14 +173,14 @@ pub(crate) fn roles(mode: DrawMode, purpose: Purpose) -> &'static [Role] {
         (DrawMode::Masked, Purpose::Mark) => &[Role::MarkMasked],
         (DrawMode::Opaque, Purpose::Texel) => &[Role::Texel],
         (DrawMode::Masked, Purpose::Texel) => &[Role::TexelMasked],
-        // Blended draws cast no shadow and write no depth, and an alpha test cannot be counted
-        // without the replay.
+        // Blended draws cast no shadow and write no depth. Alpha tests cannot be counted without
+        // the alpha-test replay.
         (DrawMode::Blended, Purpose::Shadow | Purpose::Depth | Purpose::Texel)
         | (DrawMode::Masked, Purpose::Count) => &[],
     }
 }
 
-/// How a material is drawn.
+/// Draw state of a material.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MaterialState {
     double_sided: bool,
@@ -204,11 +205,11 @@ pub(crate) struct PipelineKey {
     pub role: Role,
     /// Records are written.
     pub capture: bool,
-    /// There is no colour attachment.
+    /// True without a colour attachment.
     pub colorless: bool,
-    /// Bit per texture.
+    /// One bit per texture.
     pub textures: u32,
-    /// Bit per texture that leads its uv group.
+    /// One bit per texture that is the first of its uv group.
     pub leaders: u32,
     /// Shadow cascades.
     pub cascades: u32,

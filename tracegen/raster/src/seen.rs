@@ -1,4 +1,4 @@
-//! Finds the mip levels of the scene's images that a capture's views can sample, because only those need
+//! Finds the mip levels of the scene's images that a capture's views can sample. Only those need
 //! texels.
 
 use super::capture::CaptureJob;
@@ -12,19 +12,19 @@ use scene::{Mesh, Scene, TextureRef};
 use visibility::magnification::{Pixels, least_derivative_squared};
 use visibility::triangles;
 
-/// Levels by which a driver's level of detail may lie below the exact one: llvmpipe's logarithm is off by
-/// at most 0.044.
+/// Largest number of levels by which a driver's level of detail lies below the exact one. The error
+/// of llvmpipe's logarithm is at most 0.044.
 const DRIVER_LEVELS: f64 = 0.1;
-/// Texture coordinates beyond this are too coarse in 32 bits for a promise about their derivatives.
+/// Texture coordinates beyond this are too coarse in 32 bits for a bound on their derivatives.
 const LARGEST_UV: f32 = 256.0;
 
 impl CaptureJob<'_> {
-    /// For each image of the scene, the finest mip level that may be sampled: by a draw that a view of
-    /// any frame may see, or by a masked caster that a shadow cascade may see. `None` for an image that
-    /// nothing samples.
+    /// For each image of the scene, the finest mip level that may be sampled by a draw that may be
+    /// visible in any frame, or by a masked caster that may be visible in a shadow cascade. `None`
+    /// for an image that is never sampled.
     ///
     /// # Errors
-    /// Eyes that the culling technique is not made for.
+    /// Eyes that the culling technique does not support.
     pub fn finest_levels(&self, frames: &[FrameViews]) -> Result<Vec<Option<u32>>, RasterError> {
         let mut finest = Vec::new();
         for views in frames {
@@ -33,7 +33,7 @@ impl CaptureJob<'_> {
         Ok(finest)
     }
 
-    /// [`Self::finest_levels`] of one frame, added to those of others; an empty list has none yet.
+    /// Adds the result of [`Self::finest_levels`] for one frame to `finest`, which may be empty.
     ///
     /// # Errors
     /// As [`Self::finest_levels`].
@@ -48,7 +48,8 @@ impl CaptureJob<'_> {
             return Ok(());
         }
         finest.resize(scene.images.len(), None);
-        // Moving draws are elsewhere in every frame, and few, so all their levels are prepared.
+        // Moving draws have other positions in every frame and are few, so all their levels are
+        // prepared.
         for &draw in &self.draws.moving {
             let material = &scene.materials[self.draws.calls[draw as usize].material];
             for texture in material.textures().iter().flatten() {
@@ -126,8 +127,8 @@ impl CaptureJob<'_> {
     }
 }
 
-/// Squared length of the least derivative of a mesh's texture coordinates by pixel. A coordinate larger
-/// than `largest` leaves none.
+/// Squared length of the smallest derivative of a mesh's texture coordinates per pixel; 0 if a
+/// coordinate is larger than `largest`.
 fn derivative_squared(
     call: &DrawCall,
     mesh: &Mesh,
@@ -147,20 +148,20 @@ fn derivative_squared(
     least_derivative_squared(&mesh.positions, &mesh.indices, uv, &call.transform, pixels)
 }
 
-/// Whether more of a texture's image may be needed than was found so far.
+/// Whether a finer level of a texture's image may be needed than found so far.
 fn is_new(texture: &TextureRef, finest: &[Option<u32>]) -> bool {
     finest
         .get(texture.image)
         .is_some_and(|level| *level != Some(0))
 }
 
-/// By how much a texture's transform may enlarge a coordinate.
+/// Largest factor by which a texture's transform scales a coordinate.
 fn scale(texture: &TextureRef) -> f32 {
     let sum = |row: [f32; 3]| row.map(f32::abs).iter().sum::<f32>();
     sum(texture.uv_transform[0]).max(sum(texture.uv_transform[1]))
 }
 
-/// The finest level of an image of `size` texels that is sampled where the square of the least
+/// The finest level of an image of `size` texels that is sampled if the square of the smallest
 /// derivative of the coordinates is `derivative_squared`.
 fn least_level(texture: &TextureRef, size: [u32; 2], derivative_squared: f64) -> u32 {
     if texture.sampler.mip == MipFilter::None {
@@ -169,6 +170,6 @@ fn least_level(texture: &TextureRef, size: [u32; 2], derivative_squared: f64) ->
     let [[a, b, _], [c, d, _]] = texture.uv_transform.map(|row| row.map(f64::from));
     let texels = f64::from(size[0]) * f64::from(size[1]) * (a * d - b * c).abs();
     let level = (derivative_squared * texels).log2() / 2.0 - DRIVER_LEVELS;
-    // The conversion saturates: nothing known is level 0.
+    // The conversion saturates, so an unknown level becomes 0.
     level as u32
 }

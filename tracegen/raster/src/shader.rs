@@ -1,4 +1,4 @@
-//! The shader's source: constants that it shares with the host, then the WGSL files.
+//! The shader's source: constants shared with the host, followed by the WGSL files.
 
 use crate::draws::{SHADOW_SIZE, SHADOW_TAPS};
 use crate::groups::{MATERIAL_TEXTURES, SLOTS};
@@ -47,18 +47,18 @@ impl AlphaSource {
 /// How fragments are recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Granularity {
-    /// Not at all, on devices that cannot capture.
+    /// Not recorded, on devices that cannot capture.
     None,
     /// Quad by quad.
     Quads,
-    /// One by one, to be merged into quads: see [`record::Merged`].
+    /// One by one, for merging into quads: see [`record::Merged`].
     Fragments,
-    /// The same, with primitives numbered by vertices that they do not share.
+    /// One by one, with primitives numbered by unshared vertices.
     NumberedFragments,
 }
 
 impl Granularity {
-    /// The part of the text that records.
+    /// The parts of the source that record.
     fn parts(self) -> &'static [&'static str] {
         const BY_BALLOT: &str = include_str!("shaders/by_ballot.wgsl");
         const BY_FRAGMENT: &str = include_str!("shaders/by_fragment.wgsl");
@@ -79,13 +79,13 @@ impl Granularity {
         }
     }
 
-    /// The driver numbers the primitives.
+    /// Whether the driver numbers the primitives.
     fn by_index(self) -> bool {
         matches!(self, Self::Quads | Self::Fragments)
     }
 }
 
-/// The whole WGSL module, with what records.
+/// The whole WGSL module, with the recording code.
 pub(crate) fn source(granularity: Granularity, alpha: AlphaSource) -> String {
     let mut text = String::new();
     if granularity.by_index() {
@@ -125,8 +125,8 @@ pub(crate) fn source(granularity: Granularity, alpha: AlphaSource) -> String {
     text
 }
 
-/// The module for pictures of two views at once: the view is one of two, by the number that each entry
-/// point is told.
+/// The module for pictures of two views. The view is selected by the view index that each entry
+/// point receives.
 pub(crate) fn of_two_views() -> String {
     let one = source(Granularity::None, AlphaSource::Color);
     let declaration = "var<uniform> view: View;";
@@ -142,7 +142,7 @@ pub(crate) fn of_two_views() -> String {
         .filter_map(|s| rest.find(s))
         .min()
     {
-        // `fn name(parameters) -> result {`, perhaps over several lines.
+        // `fn name(parameters) -> result {`, possibly over several lines.
         let opening = rest[stage..]
             .find("fn ")
             .and_then(|f| Some(stage + f + rest[stage + f..].find('(')? + 1));
@@ -164,7 +164,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_entry_point_for_two_views_is_told_its_view() {
+    fn every_entry_point_for_two_views_receives_its_view_index() {
         let (one, two) = (
             source(Granularity::None, AlphaSource::Color),
             of_two_views(),

@@ -6,8 +6,8 @@ use super::frame::Frame;
 use glam::Mat4;
 use visibility::receivers::{Receivers, Volume};
 
-/// Texels of a cascade's edge that its lookup leaves free, and by which it moves a point off its surface,
-/// as in the shader; rounded up.
+/// Width of the border that the shader's look-up leaves unused at a cascade's edge, plus the
+/// distance by which it offsets a point from its surface, in texels, rounded up.
 const LOOKUP_TEXELS: f32 = 2.0 + 1.6 + 0.4;
 
 impl CaptureJob<'_> {

@@ -7,12 +7,12 @@ use super::frame::Frame;
 use std::ops::AddAssign;
 use techniques::Layer;
 
-/// Wrong decisions about the draws of an eye.
+/// Numbers of wrong culling decisions about the draws of an eye.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wrong {
-    /// Visible and left out.
+    /// Visible but not drawn.
     pub negatives: u64,
-    /// Drawn and not visible.
+    /// Drawn but not visible.
     pub positives: u64,
 }
 
@@ -26,11 +26,11 @@ impl AddAssign for Wrong {
 /// Errors of culling in an eye's picture.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Judgement {
-    /// Against everything in the picture.
+    /// Compared with everything visible in the picture.
     pub picture: Wrong,
     /// Compared with what is visible through the lens.
     pub lens: Wrong,
-    /// Draws that the lens shows and that are left out, ascending.
+    /// Draws visible through the lens but not drawn, ascending.
     pub lost: Vec<u32>,
 }
 
@@ -57,8 +57,9 @@ impl Judgement {
 }
 
 impl CaptureJob<'_> {
-    /// Which draws each eye's picture shows in truth, in the order of the job's eyes: a draw is
-    /// visible where a fragment of it passes against the final depth of everything.
+    /// The true visibility of the draws in each eye's picture, in the order of the job's eyes. A
+    /// draw is visible if one of its fragments passes the depth test against the final depth of
+    /// everything.
     ///
     /// # Errors
     /// Driver errors, and a device that cannot capture.
@@ -77,8 +78,8 @@ impl CaptureJob<'_> {
             .collect()
     }
 
-    /// Errors of the frame's lists, in the order of the job's eyes: an eye's list is that of
-    /// all layers that its picture is made of.
+    /// Errors of the frame's lists, in the order of the job's eyes. An eye's list is that of all
+    /// layers of its picture.
     ///
     /// # Errors
     /// Driver errors, and a device that cannot capture.
@@ -113,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_lost_and_what_is_drawn_in_vain_are_counted_apart() {
+    fn lost_draws_and_unnecessary_draws_are_counted_separately() {
         let marks = |picture, lens| Marks { picture, lens };
         let visible = [
             marks(true, true),

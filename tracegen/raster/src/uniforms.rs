@@ -7,7 +7,7 @@ use crate::lighting::{Lighting, MAX_POINT_LIGHTS};
 use glam::{Mat4, Vec3, Vec4};
 use scene::{AlphaMode, Material};
 
-/// Shadow cascades that the shader holds.
+/// Number of shadow cascades in the shader.
 pub(crate) const MAX_CASCADES: usize = 4;
 
 /// The shader's `View`.
@@ -29,7 +29,7 @@ pub(crate) struct ViewData {
 }
 
 impl ViewData {
-    /// A view of an eye; the record buffer holds `capacity` records.
+    /// The view of an eye. The record buffer holds `capacity` records.
     pub fn of_eye(view: &View<'_>, capacity: u32) -> Self {
         Self::new(
             view.clip_from_world(),
@@ -39,7 +39,7 @@ impl ViewData {
         )
     }
 
-    /// Marks count inside the lens as well.
+    /// Adds a lens, inside which marks are counted separately.
     pub fn with_lens(self, lens_px: [f32; 4]) -> Self {
         Self {
             lens: lens_px,
@@ -47,7 +47,7 @@ impl ViewData {
         }
     }
 
-    /// Texels are those of the materials' textures in `slot`.
+    /// Selects the texture slot of the materials.
     pub fn with_texture_slot(mut self, slot: u32) -> Self {
         self.counts[2] = slot;
         self
@@ -81,7 +81,7 @@ impl ViewData {
     }
 }
 
-/// Clip space (y up) to texture coordinates (v down); depth stays.
+/// Clip space (y up) to texture coordinates (v down). Depth is unchanged.
 fn clip_to_uv() -> Mat4 {
     Mat4::from_cols(
         Vec4::new(0.5, 0.0, 0.0, 0.0),

@@ -1,4 +1,4 @@
-//! Vertices and instances as the shader reads them.
+//! Vertices and instances in the layout that the shader reads.
 
 use crate::draws::{DrawCall, DrawList};
 use glam::{Mat4, Vec4};
@@ -30,7 +30,7 @@ impl InstanceData {
     pub fn new(draw: u32, call: &DrawCall) -> Self {
         let matrix = glam::Mat3::from(call.transform.matrix3);
         let inverse = matrix.inverse().transpose();
-        // A flattened instance has no inverse; its normals keep the object's direction.
+        // A flattened instance has no inverse. Its normals keep the object's direction.
         let normal = if inverse.is_finite() { inverse } else { matrix };
         let mut normal_from_object = Mat4::from_mat3(normal);
         normal_from_object.w_axis = Vec4::new(
@@ -46,7 +46,7 @@ impl InstanceData {
     }
 }
 
-/// Interleaves a mesh's vertices; missing attributes get defaults.
+/// Interleaves a mesh's vertices. Missing attributes get defaults.
 pub(crate) fn pack(mesh: &Mesh) -> Vec<VertexData> {
     let at2 = |set: &[glam::Vec2], i: usize| set.get(i).copied().unwrap_or_default();
     mesh.positions
@@ -74,7 +74,7 @@ pub(crate) fn pack(mesh: &Mesh) -> Vec<VertexData> {
         .collect()
 }
 
-/// Colour of a vertex, 16 bits a channel.
+/// Colour of a vertex, 16 bits per channel.
 pub(crate) type ColorData = [u16; 4];
 
 /// Bytes between two colours.

@@ -1,4 +1,4 @@
-//! A layer to render, and which of its fragments count.
+//! A layer to render, and which of its fragments are recorded.
 
 use super::lighting::Lighting;
 use glam::Mat4;
@@ -7,7 +7,7 @@ use techniques::layer::Layer;
 /// One layer to render: its camera, its light and its draws.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
-    /// Position of the layer in the frame's plan: the target that it is rendered into.
+    /// Position of the layer in the frame's plan, which selects its target.
     pub target: usize,
     /// Matrices, size and mask.
     pub layer: &'a Layer,
@@ -28,10 +28,10 @@ impl View<'_> {
 /// Which fragments of a layer are recorded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Fragments {
-    /// Those that pass the depth test when they are drawn.
+    /// Fragments that pass the depth test when they are drawn.
     #[default]
     DepthTested,
-    /// All covered fragments, even behind other draws. The initial contents of a layer
-    /// (the far plane, its mask) still bounds them.
+    /// All covered fragments, even behind other draws. The initial contents of a layer (the far
+    /// plane, its mask) still limit them.
     All,
 }

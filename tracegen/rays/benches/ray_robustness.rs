@@ -1,7 +1,8 @@
-//! The traversal against brute force at full length:
-//! `cargo bench -p tracegen --bench ray_robustness [-- RAYS]`, a million rays a mesh and place.
+//! Checks the traversal against brute force with many rays:
+//! `cargo bench -p tracegen --bench ray_robustness [-- RAYS]`, by default a million rays per mesh
+//! and place.
 //!
-//! Exit code 1 where anything is wrong.
+//! The exit code is 1 if a check fails.
 
 use glam::DVec3;
 use rayon::prelude::*;

@@ -1,10 +1,10 @@
 //! Speed of the counting traversal: `cargo bench -p tracegen --bench rays -- SCENE [--dump DIR]`.
 //!
-//! Four streams of single rays (primary, shadow, mirror, diffuse) over a scene's triangles, walked
-//! by both trees with and without counters, by one thread and by two. The cost of counting is
-//! measured in slices at which the variants take turns: a rate is that of every slice's best round,
-//! so that a busy moment costs one slice of one round. The gain of two threads is that of whole
-//! streams, best round against best round. `--dump` writes triangles and rays as plain
+//! Four streams of single rays (primary, shadow, mirror, diffuse) over a scene's triangles are
+//! traversed in both trees with and without counters, by one thread and by two. The cost of
+//! counting is measured in slices, in which the variants alternate. A rate uses the best round of
+//! every slice, so that a disturbance affects only one slice of one round. The gain of two threads
+//! compares the best rounds of whole streams. `--dump` writes triangles and rays as plain
 //! little-endian floats for scripts/embree_compare.py.
 
 use formats::raytrace::{EyeCamera, TraversalKind};
@@ -66,7 +66,7 @@ fn options() -> anyhow::Result<Options> {
             "--rounds" => options.rounds = value()?.parse()?,
             "--size" => options.size_px = value()?.parse()?,
             "--json" => options.json = true,
-            // Cargo passes this one.
+            // Cargo passes this option.
             "--bench" => {}
             other if !other.starts_with('-') => options.scene = other.to_owned(),
             other => anyhow::bail!("unknown argument {other}"),
@@ -78,7 +78,7 @@ fn options() -> anyhow::Result<Options> {
 fn run() -> anyhow::Result<()> {
     let options = options()?;
     let mut loaded = scenes::load(&options.scene)?;
-    // Timed without textures.
+    // The benchmark does not use textures.
     loaded.images.clear();
     let soup = Soup::new(&loaded);
     let start = Instant::now();
@@ -113,7 +113,7 @@ fn run() -> anyhow::Result<()> {
     let pools = [pool(1)?, pool(2)?];
     for stream in &streams {
         if options.json {
-            // Whole streams, as the other program runs them.
+            // Whole streams, as in the other program.
             let f = measure(
                 &bvh,
                 stream,
@@ -166,7 +166,7 @@ const VARIANTS: [Variant; 4] = [
     Variant::EightPlain,
 ];
 
-/// Rays in a slice: some milliseconds.
+/// Rays per slice: a few milliseconds of work.
 const SLICE: usize = 1 << 15;
 
 struct Figures {
@@ -178,7 +178,7 @@ struct Figures {
 }
 
 impl Figures {
-    /// Million rays a second.
+    /// Million rays per second.
     fn rate(&self, variant: Variant) -> f64 {
         self.rays as f64 / self.best_s[variant as usize] / 1e6
     }
@@ -209,7 +209,7 @@ fn measure(
         (figures.counts2, figures.counts8) = ((0, 0), (0, 0));
         for (slice, best_s) in slices.iter().zip(&mut best_s) {
             for turn in 0..variants.len() {
-                // The second to walk a slice finds its nodes cached: each is second in its turn.
+                // The second variant on a slice finds its nodes cached, so the variants alternate.
                 let variant = variants[if round % 2 == 0 {
                     turn
                 } else {
@@ -233,7 +233,7 @@ fn measure(
     figures
 }
 
-/// How many times faster two threads walk a stream than one.
+/// Ratio of the time of one thread to that of two for a stream.
 fn gain(
     bvh: &Bvh,
     tree: TraversalKind,
@@ -256,7 +256,7 @@ fn add(total: &mut (u64, u64), more: (u64, u64)) {
     *total = (total.0 + more.0, total.1 + more.1);
 }
 
-/// Walks the rays; the number of hits keeps the work from being optimised away.
+/// Traverses the rays. The number of hits keeps the work from being optimised away.
 fn walk<C: Counter + Default>(
     bvh: &Bvh,
     tree: TraversalKind,
@@ -314,7 +314,7 @@ fn walk_in(pool: &ThreadPool, bvh: &Bvh, tree: TraversalKind, stream: &Stream) {
     std::hint::black_box(steps);
 }
 
-/// Rays of both eyes' pixels and what their hits spawn.
+/// Rays of both eyes' pixels and the rays that their hits spawn.
 fn streams(scene: &scene::Scene, soup: &Soup, bvh: &Bvh, size: u32) -> anyhow::Result<Vec<Stream>> {
     let size_px = [size, size];
     let mut display = hmd::preset("symmetric-100")?;

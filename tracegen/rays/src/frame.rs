@@ -1,4 +1,4 @@
-//! A whole stereo frame: tiles traced in parallel, written in order.
+//! A stereo frame: tiles are traced in parallel and written in order.
 
 use super::scene::TraceScene;
 use super::tracer::{TraceSettings, Tracer, triangle};
@@ -12,8 +12,8 @@ use rayon::prelude::*;
 use std::io::{Seek, Write};
 use std::ops::Range;
 
-/// Tiles traced before they are written: enough to keep all threads busy, few enough that the
-/// memory for encoded tiles stays small.
+/// Number of tiles traced before they are written: enough to keep all threads busy, and few enough
+/// to keep the memory for encoded tiles small.
 const TILES_AT_ONCE: u32 = 256;
 
 /// Linear pixels of one eye, row by row.
@@ -79,7 +79,7 @@ pub struct RayFrame {
     pub stats: FrameStats,
 }
 
-/// A worker's results of a tile.
+/// Results of tracing one tile.
 struct TileResult {
     encoded: Result<EncodedRayTile>,
     origin_px: [u32; 2],
@@ -89,12 +89,12 @@ struct TileResult {
     stats: FrameStats,
 }
 
-/// Traces the tiles of both eyes and appends them to a trace; one batch is written while the next
-/// is traced. The result does not depend on the number of threads. `progress` is called with the tiles
-/// traced after each batch.
+/// Traces the tiles of both eyes and appends them to a trace. One batch is written while the next
+/// is traced. The result does not depend on the number of threads. After each batch, `progress` is
+/// called with the number of traced tiles.
 ///
 /// # Errors
-/// When writing fails.
+/// Errors of writing.
 pub fn trace_frame<W: Write + Seek + Send>(
     scene: &TraceScene,
     settings: TraceSettings,

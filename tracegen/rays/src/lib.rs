@@ -1,4 +1,4 @@
-//! Ray tracing: a scene seen by both eyes, with every ray's work in the hierarchy recorded.
+//! Ray tracing: renders a scene for both eyes and records every ray's work in the hierarchy.
 
 pub mod bvh;
 pub mod frame;

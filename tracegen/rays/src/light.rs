@@ -14,7 +14,7 @@ pub struct Incident {
     pub irradiance: Vec3,
 }
 
-/// The light at a point, or `None` where the point is at the light.
+/// The light at a point, or `None` if the point coincides with the light.
 #[must_use]
 pub fn incident(light: &RayLight, at: Vec3) -> Option<Incident> {
     match *light {
@@ -43,8 +43,8 @@ pub fn schlick(normal_incidence: Vec3, cosine: f32) -> Vec3 {
     normal_incidence + (Vec3::ONE - normal_incidence) * f5
 }
 
-/// Reflectance of a dielectric boundary for unpolarised light (Fresnel's equations). `eta` is
-/// the ratio of the indices, incident over transmitted.
+/// Reflectance of a dielectric boundary for unpolarised light (Fresnel's equations). `eta` is the
+/// ratio of the refractive indices, incident over transmitted.
 #[must_use]
 pub fn dielectric(cosine: f32, eta: f32) -> f32 {
     let sine2 = eta * eta * (1.0 - cosine * cosine);
@@ -57,7 +57,7 @@ pub fn dielectric(cosine: f32, eta: f32) -> f32 {
     0.5 * (perpendicular * perpendicular + parallel * parallel)
 }
 
-/// Direction behind a boundary (Snell's law), `None` at total internal reflection. The normal
+/// Direction of the refracted ray (Snell's law); `None` at total internal reflection. The normal
 /// faces the incident side.
 #[must_use]
 pub fn refract(direction: Vec3, normal: Vec3, eta: f32) -> Option<Vec3> {
@@ -66,7 +66,7 @@ pub fn refract(direction: Vec3, normal: Vec3, eta: f32) -> Option<Vec3> {
     (k > 0.0).then(|| (eta * direction + (eta * cosine - k.sqrt()) * normal).normalize())
 }
 
-/// Mirror direction.
+/// Direction of the mirrored ray.
 #[must_use]
 pub fn reflect(direction: Vec3, normal: Vec3) -> Vec3 {
     (direction - 2.0 * direction.dot(normal) * normal).normalize()
@@ -83,7 +83,7 @@ pub fn blinn_phong(normal: Vec3, to_light: Vec3, to_eye: Vec3, exponent: u32) ->
         return 0.0;
     }
     let n = exponent as f32;
-    // 2^(-n/2), negligible from n = 60 on.
+    // 2^(-n/2), negligible for n >= 60.
     let tail = 0.5f32.powi(exponent.min(120) as i32).sqrt();
     let scale = (n + 2.0) * (n + 4.0) / (8.0 * std::f32::consts::PI * (tail + n));
     scale * n_h.powi(exponent as i32) * n_l
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn a_highlight_reflects_what_it_receives_at_normal_incidence() {
+    fn a_highlight_reflects_all_light_at_normal_incidence() {
         for exponent in [1, 6, 16, 64, 1024] {
             // Albedo of the lobe at normal incidence, by midpoint rule over the hemisphere.
             let steps = 400;

@@ -7,15 +7,15 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use scene::{AlphaMode, Material, Scene, SceneError, TextureRef};
 
-/// Smoother dielectrics get a highlight.
+/// Dielectrics below this roughness get a highlight.
 const GLOSSY_ROUGHNESS: f32 = 0.7;
-/// Smoother metals mirror their surroundings.
+/// Metals below this roughness mirror their surroundings.
 const MIRROR_ROUGHNESS: f32 = 0.35;
 
-/// Alpha from which a blended surface stops a ray that looks for its closest hit.
+/// Alpha from which a blended surface stops a closest-hit ray.
 const BLEND_STOPS_FROM: f32 = 1.0 / 255.0;
 
-/// Smoother dielectrics do, as far as Fresnel's law goes.
+/// Dielectrics below this roughness mirror their surroundings, with Fresnel's reflectance.
 const POLISHED_ROUGHNESS: f32 = 0.15;
 
 /// The sampled properties of a material at a hit.
@@ -25,17 +25,17 @@ pub struct Surface {
     pub albedo: Vec3,
     /// Reflectance at normal incidence, linear.
     pub specular: Vec3,
-    /// Fraction mirrored beyond what Fresnel's law gives.
+    /// Fraction mirrored in addition to Fresnel's reflectance.
     pub mirror: f32,
     /// Colour of that fraction.
     pub mirror_tint: Vec3,
-    /// True where the surface is smooth enough to see a picture in it.
+    /// True if the surface is smooth enough to show a mirror image.
     pub polished: bool,
     /// Blinn-Phong exponent, 0 for no highlight.
     pub exponent: u32,
-    /// Fraction of light that passes, refracted.
+    /// Fraction of light that is transmitted, refracted.
     pub transmission: f32,
-    /// Colour of the passing light.
+    /// Colour of the transmitted light.
     pub tint: Vec3,
     /// Index of refraction.
     pub ior: f32,
@@ -56,7 +56,7 @@ pub struct Materials {
 }
 
 impl Materials {
-    /// Makes the pyramids of the images that rays sample.
+    /// Creates the pyramids of the images that rays sample.
     ///
     /// # Errors
     /// Images that cannot be read or decoded.
@@ -79,7 +79,7 @@ impl Materials {
         })
     }
 
-    /// The table of a trace.
+    /// The material table of a trace.
     #[must_use]
     pub fn table(&self) -> Vec<RayMaterial> {
         self.materials.iter().map(describe).collect()
@@ -130,7 +130,7 @@ impl Materials {
             let uv = soup.uv(scene, primitive, bary, t.uv_set);
             Some(pyramid.sample(t, uv, 0.0, self.srgb).w)
         });
-        // As in the raster capture, where a mask without a texture is decided once per draw.
+        // As in the raster capture, a mask without a texture is tested once per draw.
         let constant = texel.is_none() && material.alpha != AlphaMode::Blend;
         let vertex = if constant {
             1.0
@@ -140,7 +140,7 @@ impl Materials {
         material.base_color.w * vertex * texel.unwrap_or(1.0)
     }
 
-    /// True where the surface stops a ray that looks for its closest hit.
+    /// True if the surface stops a closest-hit ray.
     #[must_use]
     pub fn stops(&self, scene: &Scene, soup: &Soup, primitive: u32, bary: [f32; 2]) -> bool {
         let material = &self.materials[soup.material(scene, primitive)];
@@ -152,7 +152,7 @@ impl Materials {
         }
     }
 
-    /// True where the surface shades what lies behind: glass and thin veils do not.
+    /// True if the surface casts a shadow. Glass and nearly transparent surfaces do not.
     #[must_use]
     pub fn shades(&self, scene: &Scene, soup: &Soup, primitive: u32, bary: [f32; 2]) -> bool {
         let material = &self.materials[soup.material(scene, primitive)];
@@ -184,13 +184,13 @@ impl Materials {
     }
 }
 
-/// True where rays must look at alpha or may pass unhindered.
+/// True if rays must test alpha or may pass through the material.
 #[must_use]
 pub fn needs_alpha_test(m: &Material) -> bool {
     m.alpha != AlphaMode::Opaque || m.transmission > 0.0
 }
 
-/// The textures that rays read of a material.
+/// The textures of a material that rays sample.
 fn ray_textures(m: &Material) -> impl Iterator<Item = TextureRef> {
     [
         m.base_color_texture,
@@ -212,7 +212,7 @@ fn highlight_exponent(roughness: f32) -> u32 {
 
 fn describe(m: &Material) -> RayMaterial {
     let glass = m.transmission > 0.0 || m.alpha == AlphaMode::Blend;
-    // Textures scale both factors down: a smoother texel or a metal one can be anywhere.
+    // Textures reduce both factors, so any texel may be smoother or less metallic.
     let may_be_smooth = m.metallic_roughness_texture.is_some() || m.roughness < MIRROR_ROUGHNESS;
     let metal = m.metallic > 0.0 && may_be_smooth;
     let polished = m.metallic_roughness_texture.is_some() || m.roughness < POLISHED_ROUGHNESS;
@@ -241,7 +241,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_blended_texture_may_let_a_ray_pass_as_a_mask_may() {
+    fn blended_textures_and_masks_need_an_alpha_test() {
         let masked = |alpha, alpha_factor: f32, textured: bool| {
             let material = Material {
                 alpha,
@@ -254,7 +254,7 @@ mod tests {
         assert!(masked(AlphaMode::Blend, 1.0, true));
         assert!(masked(AlphaMode::Blend, 0.001, false));
         assert!(masked(AlphaMode::Mask(0.5), 1.0, true));
-        // An even veil stops every ray.
+        // A surface of constant alpha stops every ray.
         assert!(!masked(AlphaMode::Blend, 0.5, false));
         assert!(!masked(AlphaMode::Opaque, 1.0, true));
     }

@@ -7,7 +7,7 @@ use std::io::Write;
 
 /// Writes both eyes side by side as a PNG.
 ///
-/// # Errors
+/// Errors of writing.
 /// When writing fails.
 pub fn write_png(images: &[EyeImage; 2], to: impl Write) -> image::ImageResult<()> {
     let [left, right] = images;
@@ -22,7 +22,7 @@ pub fn write_png(images: &[EyeImage; 2], to: impl Write) -> image::ImageResult<(
     PngEncoder::new(to).write_image(&rgb, 2 * width, height, ExtendedColorType::Rgb8)
 }
 
-/// Radiance as sRGB bytes: the ACES filmic curve (Narkowicz 2015) that the raster path uses.
+/// Radiance as sRGB bytes, with the same ACES filmic curve (Narkowicz 2015) as in the raster path.
 #[must_use]
 pub fn displayed(radiance: Vec3) -> [u8; 3] {
     let c = radiance.max(Vec3::ZERO);

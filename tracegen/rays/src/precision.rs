@@ -1,8 +1,8 @@
-//! One plain ray tracer in single and in double precision, to see what precision costs and gains; and
-//! the one of this crate beside it.
+//! Compares the precision and speed of a simple ray tracer in single and double precision with this
+//! crate's ray tracer.
 //!
-//! A tree of boxes split at medians, a slab test, and signed volumes of the ray with a triangle's
-//! edges, each edge calculated alike for both of its triangles.
+//! The simple ray tracer uses a tree of boxes split at medians, a slab test, and signed volumes of
+//! the ray with a triangle's edges. Each edge is calculated identically for both of its triangles.
 
 use super::bvh::count::NoCounter;
 use super::bvh::{AllOpaque, Bvh, TraversalStack};
@@ -25,7 +25,7 @@ trait Real:
 {
     const ZERO: Self;
     const MAX: Self;
-    /// Relative margin of a box's exit for rounding.
+    /// Relative margin of a box's exit, for rounding.
     const PADDED: Self;
     fn of(value: f64) -> Self;
     fn to_f64(self) -> f64;
@@ -77,7 +77,7 @@ struct Node<T> {
     high: V<T>,
     /// A leaf's triangles, or nothing.
     triangles: std::ops::Range<usize>,
-    /// An inner node's second child; the first one follows it.
+    /// An inner node's second child. The first child directly follows the node.
     second: usize,
 }
 
@@ -88,7 +88,7 @@ struct Tree<T> {
 }
 
 impl<T: Real> Tree<T> {
-    /// Of a mesh with vertices rounded as they are given.
+    /// Builds the tree of a mesh whose vertices are rounded as given.
     fn new(mesh: &TestMesh) -> Self {
         let mut tree = Self {
             vertices: mesh.vertices.iter().map(|v| rounded(*v)).collect(),
@@ -149,7 +149,7 @@ impl<T: Real> Tree<T> {
         index
     }
 
-    /// Distance of the nearest hit in lengths of the direction.
+    /// Distance of the nearest hit, in units of the direction's length.
     fn closest(&self, origin: V<T>, direction: V<T>, stack: &mut Vec<usize>) -> Option<T> {
         let mut nearest = T::MAX;
         stack.clear();
@@ -218,24 +218,24 @@ impl<T: Real> Node<T> {
     }
 }
 
-/// An arithmetic at a place.
+/// Results of one arithmetic at one place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Precision {
     /// The arithmetic.
     pub arithmetic: &'static str,
     /// Distance from the origin on the diagonal's axes, metres.
     pub at_m: f64,
-    /// Rays whose answer is known.
+    /// Rays whose answer is certain.
     pub rays: u64,
-    /// Of these, percent that hit where they should miss or the other way round.
+    /// Percentage of these that hit instead of missing, or miss instead of hitting.
     pub wrong_pct: f64,
-    /// 99th percentile of the error of the distance over the distance, parts per million.
+    /// 99th percentile of the relative error of the distance, parts per million.
     pub distance_ppm: f64,
-    /// Time over double precision's.
+    /// Time relative to double precision.
     pub time_ratio: f64,
 }
 
-/// Names of the arithmetics; times are over the first one's.
+/// Names of the arithmetics. Times are relative to the first.
 pub const ARITHMETICS: [&str; 4] = [
     "double precision",
     "single precision",
@@ -243,10 +243,10 @@ pub const ARITHMETICS: [&str; 4] = [
     "tracegen rays (single, recentred)",
 ];
 
-/// Traces `count` rays at a mesh whose centre is at `(at_m, 0.7 at_m, -0.9 at_m)`.
+/// Traces `count` rays against a mesh whose centre is at `(at_m, 0.7 at_m, -0.9 at_m)`.
 ///
 /// # Panics
-/// When the mesh has too many triangles for a hierarchy.
+/// If the mesh has too many triangles for a hierarchy.
 #[must_use]
 pub fn measure(mesh: &TestMesh, at_m: f64, count: usize) -> [Precision; 4] {
     /// Displacement that rounding to single precision may cause, as in [`super::robustness`].
@@ -254,7 +254,7 @@ pub fn measure(mesh: &TestMesh, at_m: f64, count: usize) -> [Precision; 4] {
     let place = DVec3::new(1.0, 0.7, -0.9) * at_m;
     let mut random = Random(11);
     let reference = Reference::new(mesh);
-    // From outside, at anything, at vertices and at edges; what is given in double precision.
+    // Rays from outside, at random points, at vertices and at edges, in double precision.
     let rays: Vec<(DVec3, DVec3)> = (0..count)
         .map(|i| {
             let origin =
@@ -283,7 +283,7 @@ pub fn measure(mesh: &TestMesh, at_m: f64, count: usize) -> [Precision; 4] {
             &rays,
             place - moved.center(),
         ),
-        of_this_crate(&moved, &rays, place),
+        traced_by_this_crate(&moved, &rays, place),
     ];
     let reference_time = answers[0].1.as_secs_f64().max(1e-9);
     std::array::from_fn(|index| {
@@ -314,10 +314,10 @@ pub fn measure(mesh: &TestMesh, at_m: f64, count: usize) -> [Precision; 4] {
     })
 }
 
-/// Distances by ray, and the quickest of five passes.
+/// Distances by ray, and the time of the fastest of five passes.
 type Answers = (Vec<Option<f64>>, Duration);
 
-fn quickest(mut pass: impl FnMut() -> Vec<Option<f64>>) -> Answers {
+fn fastest(mut pass: impl FnMut() -> Vec<Option<f64>>) -> Answers {
     let mut best = Duration::MAX;
     let mut found = Vec::new();
     for _ in 0..5 {
@@ -334,7 +334,7 @@ fn traced<T: Real>(mesh: &TestMesh, rays: &[(DVec3, DVec3)], place: DVec3) -> An
         .map(|(origin, direction)| (rounded(*origin + place), rounded(*direction)))
         .collect();
     let mut stack = Vec::new();
-    quickest(|| {
+    fastest(|| {
         let hits = rays.iter().map(|(origin, direction)| {
             Some(tree.closest(*origin, *direction, &mut stack)?.to_f64())
         });
@@ -342,8 +342,8 @@ fn traced<T: Real>(mesh: &TestMesh, rays: &[(DVec3, DVec3)], place: DVec3) -> An
     })
 }
 
-/// The ray tracer that captures use, on a mesh recentred as scenes are.
-fn of_this_crate(mesh: &TestMesh, rays: &[(DVec3, DVec3)], place: DVec3) -> Answers {
+/// This crate's ray tracer, on a mesh recentred in the same way as scenes.
+fn traced_by_this_crate(mesh: &TestMesh, rays: &[(DVec3, DVec3)], place: DVec3) -> Answers {
     let center = mesh.center();
     let bvh = Bvh::build(&mesh.rounded(center), |_| false).expect("a test mesh is small");
     let rays: Vec<Ray> = (rays.iter())
@@ -352,7 +352,7 @@ fn of_this_crate(mesh: &TestMesh, rays: &[(DVec3, DVec3)], place: DVec3) -> Answ
         })
         .collect();
     let mut stack = TraversalStack::default();
-    quickest(|| {
+    fastest(|| {
         let hits = rays.iter().map(|ray| {
             let hit = bvh.closest(
                 TraversalKind::Bvh2,
@@ -372,7 +372,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn double_precision_and_recentred_single_are_right_anywhere_and_plain_single_is_not() {
+    fn double_and_recentred_single_precision_are_correct_at_any_distance_and_plain_single_is_not() {
         let mesh = TestMesh::sphere(3);
         for at_m in [0.0, 1e6] {
             let [double, single, recentred, rays] = measure(&mesh, at_m, 600);

@@ -1,23 +1,24 @@
-//! A ray and what traversal derives from it once: the shear of the watertight triangle test and
-//! padded slabs (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT 2013).
+//! A ray, and the values that traversal precomputes from it: the shear of the watertight triangle
+//! test and padded slabs (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT
+//! 2013).
 
 use glam::{DVec3, Vec3};
 
-/// A ray segment; `direction` need not have unit length, `t` is in its units.
+/// A ray segment. `direction` need not have unit length, and `t` is in units of its length.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// Start.
     pub origin: Vec3,
     /// Direction, not zero.
     pub direction: Vec3,
-    /// Hits lie beyond this.
+    /// Minimum t of hits, exclusive.
     pub t_min: f32,
-    /// Hits lie up to this.
+    /// Maximum t of hits, inclusive.
     pub t_max: f32,
 }
 
 impl Ray {
-    /// A ray without an end.
+    /// A ray of unlimited length.
     #[must_use]
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Self {
@@ -28,11 +29,11 @@ impl Ray {
         }
     }
 
-    /// False where a coordinate is not finite, the direction is zero or the origin lies beyond
-    /// [`LARGEST_COORDINATE`]: such a ray hits nothing.
+    /// False if a coordinate is not finite, the direction is zero, or the origin lies beyond
+    /// [`LARGEST_COORDINATE`]. Such a ray hits nothing.
     #[must_use]
     pub fn is_valid(&self) -> bool {
-        // Not by the largest element, which passes over a NaN.
+        // Not by the largest element, because that ignores NaN.
         self.origin
             .abs()
             .cmple(Vec3::splat(LARGEST_COORDINATE))
@@ -43,22 +44,22 @@ impl Ray {
     }
 }
 
-/// Triangles and rays that reach farther are left out: up to here no slab distance overflows.
+/// Triangles and rays beyond this coordinate are left out, so that no slab distance overflows.
 pub const LARGEST_COORDINATE: f32 = 1e18;
 
-/// Relative error of the sheared coordinates that a slab must cover (section 3.3 of the paper).
+/// Relative error of the sheared coordinates, which a slab must cover (section 3.3 of the paper).
 const SLAB_EPSILON: f32 = 5.0 / (1 << 24) as f32;
 
-/// Directions are taken to be at least this long on each axis, so that no slab distance is NaN.
-/// Over a kilometre such a ray strays by 1e-15 m, far less than the slabs' padding.
+/// Smallest magnitude of a direction's component, so that no slab distance is NaN. Over a
+/// kilometre, the ray deviates by 1e-15 m, far less than the slabs' padding.
 const LEAST_DIRECTION: f32 = 1e-18;
 
-/// A ray ready for traversal.
+/// A ray prepared for traversal.
 #[derive(Clone, Copy, Debug)]
 pub struct PreparedRay {
     /// The ray.
     pub ray: Ray,
-    /// Axes of the sheared space; the direction is longest along the last.
+    /// Axes of the sheared space. The direction is longest along the last.
     pub axes: [usize; 3],
     /// Shear constants of the first two axes.
     pub shear: [f32; 2],
@@ -68,10 +69,10 @@ pub struct PreparedRay {
     pub near_reciprocal: [f32; 3],
     /// Reciprocal direction, rounded towards a later exit.
     pub far_reciprocal: [f32; 3],
-    /// Origin, moved so that slabs start earlier, times the near reciprocal: a near plane's
-    /// distance is `plane * near_reciprocal - near_offset`.
+    /// Origin, shifted so that slabs start earlier, times the near reciprocal. The distance of a
+    /// near plane is `plane * near_reciprocal - near_offset`.
     pub near_offset: [f32; 3],
-    /// Origin, moved so that slabs end later, times the far reciprocal.
+    /// Origin, shifted so that slabs end later, times the far reciprocal.
     pub far_offset: [f32; 3],
 }
 
@@ -109,7 +110,7 @@ impl PreparedRay {
             far_offset: [0.0; 3],
         };
         for axis in 0..3 {
-            // Twice the paper's bound, and what the moved origin and its product lose by rounding.
+            // Twice the paper's bound, plus the rounding of the shifted origin and its product.
             let pad = 2.0 * SLAB_EPSILON * (reach.to_array()[axis] + reach_z)
                 + 2.0 * f32::EPSILON * origin[axis].abs();
             let direction = if d[axis].abs() < LEAST_DIRECTION {
@@ -130,23 +131,24 @@ impl PreparedRay {
         prepared
     }
 
-    /// Distance at which a box's near plane on this axis is passed, never too late.
+    /// Distance to a box's near plane on this axis, rounded towards an earlier entry.
     #[must_use]
     #[inline(always)]
     pub fn near_distance(&self, axis: usize, plane: f32) -> f32 {
         plane.mul_add(self.near_reciprocal[axis], -self.near_offset[axis])
     }
 
-    /// Distance at which a box's far plane on this axis is passed, never too early.
+    /// Distance to a box's far plane on this axis, rounded towards a later exit.
     #[must_use]
     #[inline(always)]
     pub fn far_distance(&self, axis: usize, plane: f32) -> f32 {
         plane.mul_add(self.far_reciprocal[axis], -self.far_offset[axis])
     }
 
-    /// Entry and exit of a box along the whole line; entry is later than exit where it misses.
+    /// Entry and exit of a box along the whole line. Entry is later than exit if the line misses.
     ///
-    /// Every operation is monotonic, so a box inside another never enters earlier or leaves later.
+    /// Every operation is monotonic, so a box inside another never has an earlier entry or a later
+    /// exit.
     #[must_use]
     #[inline(always)]
     pub fn slab(&self, min: [f32; 3], max: [f32; 3]) -> (f32, f32) {
@@ -164,9 +166,9 @@ impl PreparedRay {
         (near, far)
     }
 
-    /// True where the line passes through the triangle, its edges and vertices included.
+    /// True if the line passes through the triangle, including its edges and vertices.
     ///
-    /// Neighbours see a shared edge with the same vertices, hence with the same sign: no ray
+    /// Neighbours evaluate a shared edge with the same vertices and get the same sign, so no ray
     /// passes between them.
     #[must_use]
     #[inline]
@@ -187,11 +189,11 @@ impl PreparedRay {
         (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0)
     }
 
-    /// Distance to a triangle whose line test passed, or `None` where it is outside the segment.
+    /// Distance to a triangle whose line test passed, or `None` if it is outside the segment.
     ///
-    /// The plane equation in `f64` gives it to within rounding, where the sheared z of the 2013
-    /// paper is off by more than 1e-4 for some rays. It is then held within the triangle's own
-    /// slabs: no enclosing box can start behind it, so every traversal order and tree finds the
+    /// The plane equation in `f64` is exact to within rounding, whereas the error of the sheared z
+    /// in the 2013 paper exceeds 1e-4 for some rays. The result is then clamped to the triangle's
+    /// own slabs. No enclosing box can start behind it, so every traversal order and tree finds the
     /// same nearest triangle, bit for bit.
     #[must_use]
     #[inline(always)]
@@ -218,8 +220,8 @@ fn to_f64(p: [f32; 3]) -> DVec3 {
     DVec3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]))
 }
 
-/// The edge test where an edge function vanished in `f32`: products of two `f32` are exact in
-/// `f64`, so each sign is that of the true difference.
+/// The edge test if an edge function is zero in `f32`. Products of two `f32` are exact in `f64`, so
+/// each sign is that of the exact difference.
 #[must_use]
 #[cold]
 pub fn line_hits_sheared_f64(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> bool {
@@ -231,7 +233,7 @@ pub fn line_hits_sheared_f64(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> bool {
     !outside && u + v + w != 0.0
 }
 
-/// Weights of the second and third vertex where a line meets a triangle, within 0..1.
+/// Weights of the second and third vertex at the point where a line meets a triangle, within 0..1.
 #[must_use]
 pub fn barycentrics(ray: &Ray, v: &[[f32; 3]; 3]) -> [f32; 2] {
     let o = ray.origin.as_dvec3();
@@ -248,7 +250,7 @@ pub fn barycentrics(ray: &Ray, v: &[[f32; 3]; 3]) -> [f32; 2] {
     ]
 }
 
-/// A point on a triangle by its weights, accurate to the vertices' rounding.
+/// A point on a triangle, given by weights, accurate to the rounding of the vertices.
 #[must_use]
 pub fn point_at(v: &[[f32; 3]; 3], bary: [f32; 2]) -> Vec3 {
     let [v0, v1, v2] = [to_f64(v[0]), to_f64(v[1]), to_f64(v[2])];
@@ -256,9 +258,9 @@ pub fn point_at(v: &[[f32; 3]; 3], bary: [f32; 2]) -> Vec3 {
     (v0 + (v1 - v0) * b + (v2 - v0) * c).as_vec3()
 }
 
-/// Moves a point off its surface along the normal by a few units in the last place (Waechter and
-/// Binder, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing Gems 2019): far
-/// enough to clear the rounding of the point at any distance from the origin, and no farther.
+/// Offsets a point from its surface along the normal by a few units in the last place (Waechter and
+/// Binder, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing Gems 2019). The
+/// offset just exceeds the rounding error of the point at any distance from the origin.
 #[must_use]
 pub fn offset(point: Vec3, normal: Vec3) -> Vec3 {
     const NEAR_ORIGIN: f32 = 1.0 / 32.0;

@@ -1,9 +1,9 @@
-//! Independent answers for the traversal: closed test meshes and brute force.
+//! Independent results for checking the traversal: closed test meshes and brute force.
 //!
-//! The `f64` reference shares no code with the traversal. Whether a line passes through a triangle
-//! is decided by signed volumes in double precision on the mesh as given (before it is recentred
-//! and rounded to `f32`), so its answers are exact but for rays that graze a silhouette closer
-//! than the rounding of the `f32` mesh; those it calls [`Verdict::Borderline`].
+//! The `f64` reference shares no code with the traversal. It decides with signed volumes in double
+//! precision whether a line passes through a triangle, on the mesh as given (before it is recentred
+//! and rounded to `f32`). Its answers are exact except for rays that graze a silhouette more
+//! closely than the rounding of the `f32` mesh, which are [`Verdict::Borderline`].
 
 use super::ray::{PreparedRay, Ray};
 use glam::{DVec3, Vec3};
@@ -154,7 +154,7 @@ impl TestMesh {
         }
     }
 
-    /// The same mesh elsewhere.
+    /// The mesh, translated.
     #[must_use]
     pub fn translated(&self, by: DVec3) -> Self {
         Self {
@@ -170,7 +170,7 @@ impl TestMesh {
         self.triangles[triangle].map(|v| self.vertices[v as usize])
     }
 
-    /// Midpoint of the bounds: where the mesh is recentred to.
+    /// Midpoint of the bounds, about which the mesh is recentred.
     #[must_use]
     pub fn center(&self) -> DVec3 {
         let lo = self.vertices.iter().copied().reduce(DVec3::min);
@@ -178,7 +178,7 @@ impl TestMesh {
         (lo.unwrap_or_default() + hi.unwrap_or_default()) / 2.0
     }
 
-    /// The mesh as the traversal gets it: relative to `origin` and rounded.
+    /// The mesh in the traversal's input format: relative to `origin` and rounded.
     #[must_use]
     pub fn rounded(&self, origin: DVec3) -> Vec<[[f32; 3]; 3]> {
         (0..self.triangles.len())
@@ -190,16 +190,16 @@ impl TestMesh {
 /// The reference's answer for a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
-    /// Hits at this distance give or take what rounding the mesh may shift it, or at an unsure
-    /// one where a nearer triangle is only grazed.
+    /// Hits at this distance, within the tolerance that follows from rounding the mesh. The
+    /// distance is `None` if a nearer triangle is only grazed.
     Hit(Option<(f64, f64)>),
-    /// Misses.
+    /// Misses all triangles.
     Miss,
-    /// The answer hangs on less than the `f32` mesh's rounding.
+    /// The answer depends on less than the `f32` mesh's rounding.
     Borderline,
 }
 
-/// The triangles of a mesh that a line may pass, each within a sphere.
+/// The triangles of a mesh with their bounding spheres, to find those near a line.
 pub struct Reference<'a> {
     mesh: &'a TestMesh,
     spheres: Vec<(DVec3, f64)>,
@@ -220,7 +220,7 @@ impl<'a> Reference<'a> {
         Self { mesh, spheres }
     }
 
-    /// The answer for a ray without an end.
+    /// The answer for a ray of unlimited length.
     ///
     /// `tolerance` is the displacement, in the mesh's units, that rounding may cause.
     #[must_use]
@@ -228,7 +228,7 @@ impl<'a> Reference<'a> {
         let near = self.near(origin, direction.normalize(), tolerance);
         let nearest = near.hits().min_by(f64::total_cmp);
         match nearest {
-            // A hit that only grazes: covered here, but the rounded mesh may shrink away from it.
+            // A hit that only grazes the mesh: the rounded mesh may miss it.
             Some(_) if near.grazes_silhouette() => {
                 if near.hits_inside() {
                     Verdict::Hit(None)
@@ -247,7 +247,7 @@ impl<'a> Reference<'a> {
             let to = *center - origin;
             let reach = radius * 1.000_001 + tolerance;
             let along = to.dot(direction);
-            // The difference of squares loses at most about 1e-13 of them.
+            // The relative error of the difference of squares is at most about 1e-13.
             to.length_squared() * (1.0 - 1e-12) - along * along <= reach * reach
         };
         let triangles = self
@@ -276,13 +276,13 @@ struct Candidate {
     volumes: [f64; 3],
     /// Cosine between normal and line.
     slope: f64,
-    /// Where the line meets the plane.
+    /// Distance at which the line meets the plane.
     distance: f64,
 }
 
 impl Candidate {
     fn new(index: [u32; 3], corners: [DVec3; 3], direction: DVec3) -> Self {
-        // With the vertices in ascending order: neighbours get the same bits.
+        // In ascending order of vertices, so that neighbours get identical bits.
         let volumes = [(1, 2), (2, 0), (0, 1)].map(|(p, q)| {
             if index[p] < index[q] {
                 corners[p].cross(corners[q]).dot(direction)
@@ -302,20 +302,21 @@ impl Candidate {
         }
     }
 
-    /// True where the line passes through, edges included.
+    /// True if the line passes through the triangle, including its edges.
     fn covers(&self) -> bool {
         let v = &self.volumes;
         (v.iter().all(|x| *x >= 0.0) || v.iter().all(|x| *x <= 0.0)) && self.slope != 0.0
     }
 
-    /// How far the ray's origin is from the plane, negative where the plane lies behind it.
+    /// Distance of the ray's origin from the plane, negative if the plane lies behind it.
     fn height(&self) -> f64 {
         self.distance * self.slope.abs()
     }
 
-    /// True where the line passes an edge within the tolerance.
+    /// True if the line passes an edge within the tolerance.
     fn edge_near(&self, direction: DVec3, tolerance: f64) -> bool {
-        // Seen along the line, the line is a point: its distance from each edge.
+        // Projected along the line, the line becomes a point. This gives its distance from each
+        // edge.
         let flat = self.corners.map(|p| p - direction * p.dot(direction));
         (0..3).any(|i| {
             let (p, q) = (flat[i], flat[(i + 1) % 3]);
@@ -346,7 +347,7 @@ impl Near {
             .map(|t| t.distance)
     }
 
-    /// Whether the ray starts on a triangle, or passes just outside of one in front of it.
+    /// Whether the ray starts on a triangle, or passes just outside a triangle in front of it.
     fn is_borderline(&self) -> bool {
         self.triangles.iter().any(|t| {
             if t.covers() {
@@ -357,8 +358,8 @@ impl Near {
         })
     }
 
-    /// How far a hit moves along the line when its triangle moves by the tolerance: that over the
-    /// cosine, of the most slanted triangle that the line may be on.
+    /// Shift of a hit along the line if its triangle moves by the tolerance: the tolerance divided
+    /// by the cosine of the most slanted triangle that the line may hit.
     fn shift(&self) -> f64 {
         self.triangles
             .iter()
@@ -367,7 +368,7 @@ impl Near {
             .fold(0.0, f64::max)
     }
 
-    /// True where the line passes within the tolerance of an edge between a front and a back face.
+    /// True if the line passes within the tolerance of an edge between a front and a back face.
     fn grazes_silhouette(&self) -> bool {
         let mut facing = std::collections::BTreeMap::<_, Vec<f64>>::new();
         let edge_near = |t: &&Candidate| t.edge_near(self.direction, self.tolerance);
@@ -385,7 +386,8 @@ impl Near {
             .any(|s| s.len() == 2 && (s[0] * s[1] <= 0.0 || s[0].abs().min(s[1].abs()) < 1e-6))
     }
 
-    /// Whether the line passes through a triangle at more than the tolerance from its edges.
+    /// Whether the line passes through a triangle at a distance of more than the tolerance from its
+    /// edges.
     fn hits_inside(&self) -> bool {
         self.triangles.iter().any(|t| {
             let clear = !t.edge_near(self.direction, self.tolerance);
@@ -394,7 +396,7 @@ impl Near {
     }
 }
 
-/// The traversal's answer without a tree: every triangle by the traversal's own tests.
+/// The traversal's answer without a tree: every triangle is tested with the traversal's own tests.
 #[must_use]
 pub fn brute_force_f32(
     triangles: &[[[f32; 3]; 3]],

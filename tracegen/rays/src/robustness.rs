@@ -1,4 +1,4 @@
-//! Holds the traversal against brute force: no leak, no false hit, no self-hit.
+//! Checks the traversal against brute force: no leak, no false hit, no self-hit.
 
 use super::bvh::count::NoCounter;
 use super::bvh::{AllOpaque, Bvh, TraversalStack};
@@ -7,8 +7,8 @@ use super::reference::{Reference, TestMesh, Verdict, brute_force_f32};
 use formats::raytrace::TraversalKind;
 use glam::{DVec3, Vec3};
 
-/// Displacement that rounding to `f32` may cause on a mesh of radius 10 seen from up to 40 away:
-/// half a unit in the last place of each coordinate and of the shear, a few times over.
+/// Displacement that rounding to `f32` may cause on a mesh of radius 10 seen from a distance of up
+/// to 40: half a unit in the last place of each coordinate and of the shear, times a small factor.
 const TOLERANCE: f64 = 1e-5;
 
 /// Results of a check.
@@ -16,25 +16,25 @@ const TOLERANCE: f64 = 1e-5;
 pub struct Findings {
     /// Rays checked.
     pub rays: u64,
-    /// Rays that hit, by the reference.
+    /// Rays that hit according to the reference.
     pub hits: u64,
-    /// Rays whose result depends on less than the rounding of the mesh; they are not counted as errors.
+    /// Rays whose result depends on less than the rounding of the mesh. They are not counted as
+    /// errors.
     pub borderline: u64,
-    /// Closest-hit or any-hit, in either tree, that says hit where the reference says miss or the
-    /// other way round.
+    /// Closest-hit or any-hit results, in either tree, that contradict the reference.
     pub disagreements: u64,
-    /// Closest hits that differ in a bit from trying every triangle.
+    /// Closest hits that differ in any bit from testing every triangle.
     pub not_brute_force: u64,
-    /// Distances off by more than 1e-4 relative beyond what rounding the mesh explains.
+    /// Distances whose relative error exceeds 1e-4 plus the effect of rounding the mesh.
     pub wrong_distances: u64,
     /// Rays that leave a convex solid and hit it again.
     pub self_hits: u64,
-    /// Rays that enter a closed solid and, other than by the reference, come out nowhere.
+    /// Rays that enter a closed solid and never leave it although they do in the reference.
     pub leaks: u64,
 }
 
 impl Findings {
-    /// True where nothing is wrong.
+    /// True if no check failed.
     #[must_use]
     pub fn clean(&self) -> bool {
         self.disagreements == 0
@@ -44,7 +44,7 @@ impl Findings {
             && self.leaks == 0
     }
 
-    /// Sums of both.
+    /// The sum of both.
     #[must_use]
     pub fn plus(&self, other: &Self) -> Self {
         Self {
@@ -60,22 +60,23 @@ impl Findings {
     }
 }
 
-/// A mesh as the traversal sees it, ready for checks from many threads.
+/// A mesh with its hierarchy, for checks from many threads.
 pub struct MeshUnderTest {
     /// Relative to the centre, not rounded.
     mesh: TestMesh,
     rounded: Vec<[[f32; 3]; 3]>,
     bounds: (Vec3, Vec3),
     bvh: Bvh,
-    /// A ray that leaves its surface never returns.
+    /// True if a ray that leaves the surface never returns.
     convex: bool,
 }
 
 impl MeshUnderTest {
-    /// A closed test mesh, moved away from the world's origin and recentred as scenes are.
+    /// A closed test mesh, translated away from the world's origin and recentred in the same way as
+    /// scenes.
     ///
     /// # Panics
-    /// When the mesh has too many triangles.
+    /// If the mesh has too many triangles.
     #[must_use]
     pub fn new(mesh: &TestMesh, translation: DVec3) -> Self {
         let moved = mesh.translated(translation);
@@ -93,8 +94,8 @@ impl MeshUnderTest {
         }
     }
 
-    /// Checks `count` rays: aimed at random, at vertices and at points of edges, from outside and
-    /// from inside.
+    /// Checks `count` rays from outside and inside, aimed at random points, at vertices and at
+    /// edges.
     #[must_use]
     pub fn check(&self, count: u64, seed: u64) -> Findings {
         let mut random = Random(seed.wrapping_mul(2_862_933_555_777_941_757) | 1);
@@ -113,7 +114,7 @@ impl MeshUnderTest {
         let origin = if inside && self.convex {
             random.in_ball() * 5.0
         } else if inside {
-            // The middle of the torus's tube.
+            // The centre line of the torus's tube.
             let flat = random.in_ball() * Vec3::new(1.0, 0.0, 1.0);
             flat.normalize_or(Vec3::X) * 7.0 + random.in_ball()
         } else {
@@ -169,7 +170,7 @@ impl MeshUnderTest {
         }
     }
 
-    /// From the hit, a ray away from the solid and one into it.
+    /// Checks two rays that start at the hit, one away from the solid and one into it.
     fn check_spawned(
         &self,
         ray: &Ray,
@@ -186,7 +187,7 @@ impl MeshUnderTest {
         let [a, b, c] = hit.vertices.map(Vec3::from);
         let outward = (b - a).cross(c - a).normalize_or_zero();
         let point = point_at(&hit.vertices, barycentrics(ray, &hit.vertices));
-        // Directions up to half a degree from the surface.
+        // Directions at up to half a degree from the surface.
         let tangent = random.in_ball().cross(outward).normalize_or_zero();
         let slope = 0.01 + random.unit();
         let away = (tangent + outward * slope).normalize_or(outward);
@@ -198,7 +199,8 @@ impl MeshUnderTest {
         if self.convex && hits(offset(point, outward), away) {
             findings.self_hits += 1;
         }
-        // A point on an edge may leave at once through the adjacent face, so the reference decides.
+        // A ray from a point on an edge may leave at once through the adjacent face, so the
+        // reference decides.
         let within = offset(point, -outward);
         let exits = reference.verdict(within.as_dvec3(), -away.as_dvec3(), TOLERANCE);
         if !hits(within, -away) && matches!(exits, Verdict::Hit(_)) {
@@ -207,7 +209,7 @@ impl MeshUnderTest {
     }
 }
 
-/// A small generator with a seed.
+/// A small seeded generator.
 pub(crate) struct Random(pub(crate) u64);
 
 impl Random {
@@ -233,7 +235,7 @@ impl Random {
     }
 }
 
-/// The meshes that the traversal is held to.
+/// The meshes for checking the traversal.
 #[must_use]
 pub fn meshes() -> [TestMesh; 3] {
     [

@@ -1,4 +1,4 @@
-//! Everything that rays need of a scene, prepared once and shared by all threads.
+//! Scene data for ray tracing, prepared once and shared by all threads.
 
 use super::bvh::{AlphaTest, Bvh, BvhError};
 use super::material::Materials;
@@ -7,7 +7,7 @@ use formats::raytrace::RayLight;
 use scene::light::Sky;
 use scene::{Light, Scene, SceneError};
 
-/// A scene ready to be traced.
+/// A scene prepared for tracing.
 pub struct TraceScene {
     /// The scene without its images.
     pub scene: Scene,
@@ -23,13 +23,13 @@ pub struct TraceScene {
     pub sky: Sky,
 }
 
-/// Why a scene cannot be traced.
+/// The reason why a scene cannot be traced.
 #[derive(Debug, thiserror::Error)]
 pub enum PrepareError {
-    /// No hierarchy.
+    /// The hierarchy cannot be built.
     #[error(transparent)]
     Bvh(#[from] BvhError),
-    /// No textures.
+    /// Textures cannot be read.
     #[error(transparent)]
     Images(#[from] SceneError),
 }
@@ -84,20 +84,20 @@ impl TraceScene {
         })
     }
 
-    /// The test of rays that look for their closest hit.
+    /// The alpha test of closest-hit rays.
     #[must_use]
     pub fn stopping(&self) -> Stopping<'_> {
         Stopping(self)
     }
 
-    /// The test of shadow rays.
+    /// The alpha test of shadow rays.
     #[must_use]
     pub fn shading(&self) -> Shading<'_> {
         Shading(self)
     }
 }
 
-/// Masked-out texels let rays through.
+/// Alpha test that lets rays through masked-out texels.
 #[derive(Clone, Copy)]
 pub struct Stopping<'a>(&'a TraceScene);
 
@@ -108,7 +108,7 @@ impl AlphaTest for Stopping<'_> {
     }
 }
 
-/// Masked-out texels and glass let light through.
+/// Alpha test that lets light through masked-out texels and glass.
 #[derive(Clone, Copy)]
 pub struct Shading<'a>(&'a TraceScene);
 

@@ -1,12 +1,12 @@
-//! A scene as one list of world-space triangles, with a way back to the mesh of each.
+//! A scene as one list of world-space triangles, with the mesh of each.
 
 use glam::{DAffine3, DVec3, Mat3, Vec2, Vec3, Vec4};
 use scene::{Mesh, Scene};
 
 /// All triangles of all instances, in submission order, relative to `origin`.
 pub struct Soup {
-    /// World position that the triangles are relative to: the middle of the scene's bounds, so
-    /// that rounding to `f32` is as fine as it can be.
+    /// World position that the triangles are relative to: the middle of the scene's bounds, which
+    /// minimises rounding to `f32`.
     pub origin: DVec3,
     /// Vertices, counter-clockwise from the front.
     pub triangles: Vec<[[f32; 3]; 3]>,
@@ -16,22 +16,22 @@ pub struct Soup {
     first_of_object: Vec<u32>,
     /// Inverse transpose of each object's transform.
     normal_matrices: Vec<Mat3>,
-    /// Objects whose transform turns the winding round.
+    /// Objects whose transform reverses the winding.
     mirrored: Vec<bool>,
 }
 
 /// Attributes at a point of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attributes {
-    /// Unit normal on the triangle's front side, from the vertices.
+    /// Unit normal of the triangle's front side, computed from its vertices.
     pub geometric_normal: Vec3,
-    /// Unit interpolated normal; the geometric one where the mesh has none of use.
+    /// Unit interpolated normal, or the geometric one if the mesh has no valid normal.
     pub shading_normal: Vec3,
     /// Texture coordinates of both sets.
     pub uv: [Vec2; 2],
     /// Linear vertex colour with alpha; white where the mesh has none.
     pub color: Vec4,
-    /// Areas of the triangle in each texture set per area in the world.
+    /// Area of the triangle in each texture set divided by its area in the world.
     pub uv_density: [f32; 2],
 }
 
@@ -128,7 +128,7 @@ impl Soup {
         }
     }
 
-    /// Texture coordinates only: all that an alpha test needs.
+    /// Only the texture coordinates, for an alpha test.
     #[must_use]
     pub fn uv(&self, scene: &Scene, primitive: u32, bary: [f32; 2], set: u32) -> Vec2 {
         let object = self.objects[primitive as usize] as usize;
@@ -161,7 +161,7 @@ impl Soup {
     }
 }
 
-/// Vertex numbers of a triangle, counter-clockwise from its front in the world.
+/// Vertex numbers of a triangle, counter-clockwise seen from its front in the world.
 fn corners(mesh: &Mesh, triangle: usize, mirrored: bool) -> [usize; 3] {
     let at = |i: usize| mesh.indices[triangle * 3 + i] as usize;
     if mirrored {
@@ -171,7 +171,7 @@ fn corners(mesh: &Mesh, triangle: usize, mirrored: bool) -> [usize; 3] {
     }
 }
 
-/// The vertex colours of three corners, weighted.
+/// The weighted mean of the vertex colours of three corners.
 fn color(mesh: &Mesh, corners: [usize; 3], weights: [f32; 3]) -> Vec4 {
     if mesh.colors.is_empty() {
         return Vec4::ONE;

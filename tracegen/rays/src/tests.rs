@@ -58,7 +58,7 @@ fn floor(material: usize) -> Mesh {
     }
 }
 
-/// A floor with four balls: diffuse, mirror, glass and a veil.
+/// A floor with four balls: diffuse, mirror, glass and nearly transparent.
 fn scene() -> Scene {
     let at = |mesh, x: f32, z: f32| Instance {
         mesh,
@@ -184,7 +184,7 @@ fn trace(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> (Ray
 const SIZE_PX: [u32; 2] = [72, 56];
 
 #[test]
-fn what_is_read_back_is_what_was_traced() {
+fn a_trace_that_is_read_back_equals_the_traced_frame() {
     let scene = TraceScene::new(scene()).expect("small");
     for samples_per_px in [1, 3] {
         let settings = TraceSettings {
@@ -222,7 +222,7 @@ fn the_bytes_do_not_depend_on_threads_or_run() {
 }
 
 #[test]
-fn both_trees_make_the_same_picture_and_the_same_rays() {
+fn both_trees_give_the_same_picture_and_the_same_rays() {
     let scene = TraceScene::new(scene()).expect("small");
     let (two, two_bytes) = trace(&scene, settings(TraversalKind::Bvh2), SIZE_PX);
     let (eight, eight_bytes) = trace(&scene, settings(TraversalKind::Bvh8), SIZE_PX);
@@ -274,7 +274,7 @@ fn each_material_spawns_its_kind_of_ray() {
 }
 
 #[test]
-fn primary_hits_on_the_floor_are_where_geometry_says() {
+fn primary_hits_on_the_floor_match_the_computed_intersections() {
     let scene = TraceScene::new(scene()).expect("small");
     let settings = settings(TraversalKind::Bvh2);
     let (_, bytes) = trace(&scene, settings, [160, 120]);
@@ -302,7 +302,7 @@ fn primary_hits_on_the_floor_are_where_geometry_says() {
 
 #[test]
 fn a_white_room_without_lights_is_as_bright_as_its_sky() {
-    // Albedo 1 under an even sky and ground: every pixel must show that radiance, no more.
+    // With albedo 1 and a uniform sky and ground, every pixel must show exactly that radiance.
     let mut scene = scene();
     scene.lights.clear();
     scene.sky = Vec3::ONE;

@@ -1,4 +1,4 @@
-//! Textures as rays sample them: a pyramid of box-filtered levels, trilinear.
+//! Textures for rays: a pyramid of box-filtered levels, sampled trilinearly.
 
 use formats::texture::{ColorSpace, Filter, Wrap};
 use glam::{Vec2, Vec4};
@@ -16,7 +16,7 @@ struct Level {
 }
 
 impl Pyramid {
-    /// The levels of an image above its texels, or `None` where those are too few.
+    /// The pyramid of an image, or `None` if there are too few texels.
     #[must_use]
     pub fn new(image: &Image, rgba: Vec<u8>) -> Option<Self> {
         let [width, height] = image.size;
@@ -105,7 +105,7 @@ impl Pyramid {
 }
 
 impl Level {
-    /// The next level: means of two by two texels, of colours in linear light.
+    /// The next level: means of two by two texels, computed in linear light for colours.
     fn halved(&self, color_space: ColorSpace) -> Option<Self> {
         let [width, height] = self.size;
         if width <= 1 && height <= 1 {
@@ -151,7 +151,7 @@ fn wrapped(x: f32, size: u32, wrap: Wrap) -> u32 {
     at as u32
 }
 
-/// Base-2 logarithm from exponent and mantissa, exact at powers of two and the same everywhere.
+/// Base-2 logarithm from exponent and mantissa, exact at powers of two and equal on all platforms.
 #[must_use]
 pub fn fast_log2(x: f32) -> f32 {
     if x <= 0.0 {
@@ -167,7 +167,7 @@ pub fn fast_log2(x: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// The same averages as `textures::mipmap`, which `tracegen raster` samples.
+    /// Uses the same averages as `textures::mipmap`, which `tracegen raster` samples.
     #[test]
     fn black_and_white_average_to_188_in_srgb_and_128_in_data() {
         let rgba = [[0, 0, 0, 255], [255; 4], [255; 4], [0, 0, 0, 255]].concat();

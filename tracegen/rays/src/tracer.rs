@@ -1,5 +1,5 @@
-//! Whitted-style tracing of one tile: primary rays, shadows, reflection and refraction, with each
-//! ray and its work noted as it is cast.
+//! Whitted-style tracing of one tile: primary rays, shadows, reflection and refraction. Each ray
+//! and its work are recorded when it is cast.
 
 use super::bvh::count::{Counts, Visits};
 use super::bvh::{RayHit, TraversalStack};
@@ -14,9 +14,9 @@ use formats::raytrace::{
 };
 use glam::Vec3;
 
-/// Rays that would change a pixel by less than this fraction are not cast.
+/// Rays that contribute less than this fraction of a pixel are not cast.
 const LEAST_WEIGHT: f32 = 0.01;
-/// Nor are shadow rays for less than this radiance.
+/// Shadow rays for less than this radiance are not cast.
 const LEAST_RADIANCE: f32 = 1.0 / 1024.0;
 
 /// Settings of tracing and recording.
@@ -28,11 +28,11 @@ pub struct TraceSettings {
     pub samples_per_px: u32,
     /// Record every visited node and triangle.
     pub visits: bool,
-    /// Tree that is walked.
+    /// Tree to traverse.
     pub traversal: TraversalKind,
 }
 
-/// Radiance split by whether it changes with the viewpoint.
+/// Radiance, split into parts that depend on the viewpoint and parts that do not.
 #[derive(Clone, Copy, Debug, Default)]
 struct Radiance {
     view_independent: Vec3,
@@ -45,7 +45,7 @@ impl Radiance {
     }
 }
 
-/// A ray on its way, with what its ancestors did.
+/// A ray to cast, with the state inherited from its ancestors.
 #[derive(Clone, Copy)]
 struct Path {
     ray: Ray,
@@ -65,7 +65,7 @@ pub struct Tracer<'a> {
     stack: TraversalStack,
     /// Width of a pixel at distance 1.
     px_spread: f32,
-    /// First ray of the pixel at work.
+    /// First ray of the current pixel.
     first_ray: usize,
 }
 
@@ -141,7 +141,7 @@ impl<'a> Tracer<'a> {
         triangle(self.scene, primitive)
     }
 
-    /// Casts a closest-hit ray and notes it; the number is its own among the pixel's.
+    /// Casts a closest-hit ray and records it. The number is its index among the pixel's rays.
     fn cast(&mut self, path: &Path, out: &mut RayTile) -> (Option<RayHit>, u32) {
         let number = (out.rays.len() - self.first_ray) as u32;
         let tree = self.settings.traversal;
@@ -168,7 +168,7 @@ impl<'a> Tracer<'a> {
         (hit, number)
     }
 
-    /// Casts a shadow ray and notes it; true where the light is blocked.
+    /// Casts a shadow ray and records it. Returns true if the light is blocked.
     fn cast_shadow(&mut self, ray: &Ray, depth: u32, parent: u32, out: &mut RayTile) -> bool {
         let tree = self.settings.traversal;
         let (bvh, alpha) = (&self.scene.bvh, self.scene.shading());
@@ -202,8 +202,8 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// Radiance that leaves a hit towards the ray's origin, the normal that it was shaded with
-    /// and the texture coordinates.
+    /// Returns the radiance that leaves a hit towards the ray's origin, the shading normal and the
+    /// texture coordinates.
     fn shade(
         &mut self,
         path: &Path,
@@ -227,7 +227,8 @@ impl<'a> Tracer<'a> {
         let shading = facing_shading_normal(at.shading_normal, geometric);
         let length = path.length + hit.t;
         let cosine = (-direction.dot(shading)).clamp(0.0, 1.0);
-        // The footprint stretches as the surface turns away; half of that is a fair mean width.
+        // The footprint lengthens as the surface turns away. The square root is a mean of its two
+        // widths.
         let footprint = length * self.px_spread / cosine.max(0.1).sqrt();
         let surface = materials.surface(soup.material(source, hit.primitive), &at, footprint);
         let place = ShadedPoint {
@@ -256,7 +257,7 @@ impl<'a> Tracer<'a> {
         (radiance, shading, at.uv[0].to_array())
     }
 
-    /// Light straight from the lights, each behind a shadow ray.
+    /// Light directly from the light sources, each tested with a shadow ray.
     fn direct(
         &mut self,
         path: &Path,
@@ -301,7 +302,8 @@ impl<'a> Tracer<'a> {
         radiance
     }
 
-    /// Reflection of an opaque surface: a ray if it is polished, else the sky's mean.
+    /// Reflection of an opaque surface: a ray if it is polished, or else the mean radiance of the
+    /// sky.
     fn reflection(
         &mut self,
         path: &Path,
@@ -334,7 +336,8 @@ impl<'a> Tracer<'a> {
         if path.depth >= self.settings.max_depth || weight < LEAST_WEIGHT {
             return self.scene.sky.ambient(mirrored);
         }
-        // A shading normal can mirror into the surface: then the geometric one decides.
+        // With a shading normal, the mirrored ray can point into the surface. Then the geometric
+        // normal is used.
         let direction = if mirrored.dot(place.geometric) > 0.0 {
             mirrored
         } else {
@@ -351,7 +354,7 @@ impl<'a> Tracer<'a> {
         self.follow(&next, out)
     }
 
-    /// Glass: Fresnel's equations part the light between a mirrored and a refracted ray.
+    /// Glass: Fresnel's equations divide the light between a mirrored and a refracted ray.
     fn glass(
         &mut self,
         path: &Path,
@@ -377,7 +380,7 @@ impl<'a> Tracer<'a> {
             light += reflectance * self.mirror_ray(path, place, mirrored, weight, out);
         }
         if let Some(direction) = refracted {
-            // Colour is taken once, on the way in.
+            // The colour is applied once, on entry.
             let tint = if front { surface.tint } else { Vec3::ONE };
             let passing = tint * (surface.transmission * (1.0 - reflectance));
             light += passing * self.through(path, place, direction, passing.max_element(), out);
@@ -385,7 +388,7 @@ impl<'a> Tracer<'a> {
         light
     }
 
-    /// The surface behind a blended surface: the ray continues straight.
+    /// The radiance behind a blended surface: the ray continues straight.
     fn behind(
         &mut self,
         path: &Path,
@@ -427,11 +430,11 @@ struct ShadedPoint {
     geometric: Vec3,
     shading: Vec3,
     to_eye: Vec3,
-    /// Between shading normal and ray.
+    /// Cosine of the angle between shading normal and ray.
     cosine: f32,
     /// Distance travelled from the eye.
     length: f32,
-    /// The ray's number among its pixel's.
+    /// The ray's index among the pixel's rays.
     number: u32,
 }
 

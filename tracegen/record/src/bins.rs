@@ -1,7 +1,7 @@
 //! Sorts the records of a region by tile, primitive, quad and group.
 //!
-//! Records arrive in the driver's order, which depends on its threads. The sort key names every
-//! record of a region uniquely, so the result does not.
+//! Records arrive in the driver's order, which depends on its threads. Each record of a region has a unique
+//! sort key, so the result does not depend on that order.
 
 use super::raw::RawRecord;
 use super::regions::TileRect;
@@ -18,14 +18,13 @@ pub(crate) struct Bins {
 }
 
 struct Chunk {
-    /// Where each tile's entries start; one more than there are tiles.
+    /// Start of each tile's entries; has one element more than there are tiles.
     starts: Vec<u32>,
     entries: Vec<Entry>,
 }
 
 impl Bins {
-    /// Counting sort by tile, in parallel over chunks of the records. Records outside `rect` are
-    /// left out.
+    /// Counting sort by tile, in parallel over chunks of the records. Records outside `rect` are left out.
     pub fn new(records: &[RawRecord], rect: &TileRect) -> Self {
         let chunk_len = records
             .len()
@@ -39,14 +38,14 @@ impl Bins {
         Self { chunks }
     }
 
-    /// Puts the entries of a tile into `order`, sorted.
+    /// Writes the sorted entries of a tile to `order`.
     pub fn sorted(&self, tile: usize, order: &mut Vec<Entry>) {
         order.clear();
         for chunk in &self.chunks {
             order.extend_from_slice(&chunk.entries[chunk.range(tile)]);
         }
-        // A driver that draws a tile in one thread hands over its primitives in order: then only the quads
-        // of each are left to be sorted.
+        // If the driver draws a tile in one thread, its primitives are already in order, and only the quads
+        // of each primitive must be sorted.
         let primitive = |entry: &Entry| entry.0 >> 32;
         if order.is_sorted_by_key(primitive) {
             for quads in order.chunk_by_mut(|a, b| primitive(a) == primitive(b)) {
@@ -61,7 +60,7 @@ impl Bins {
 impl Chunk {
     fn new(records: &[RawRecord], first: u32, rect: &TileRect) -> Self {
         let mut starts = vec![0_u32; rect.count() + 1];
-        // Four bytes a record: what lies outside has the number after the last tile's.
+        // Tile index per record, four bytes each. Records outside have the index after the last tile.
         let outside = rect.count() as u32;
         let tile = |r: &RawRecord| rect.index(r).map_or(outside, |tile| tile as u32);
         let tiles: Vec<u32> = records.iter().map(tile).collect();
@@ -88,9 +87,9 @@ impl Chunk {
     }
 }
 
-/// Sort key within a tile: primitive, Morton position of the quad, group, mask. A primitive that
-/// was clipped into several triangles may cover one quad twice, with disjoint masks. Operands have the group of
-/// the record after them, so that both stay together: of equal keys the earlier record comes first.
+/// Sort key within a tile: primitive, Morton position of the quad, group, mask. A primitive that was clipped
+/// into several triangles may cover a quad twice, with disjoint masks. Operands have the group of the record
+/// after them. Entries with equal keys are sorted by index, so operands stay directly before their record.
 fn sort_key(record: &RawRecord) -> u64 {
     let morton = quad_morton((record.qx() & 7) as u8, (record.qy() & 7) as u8);
     let group = record.group() + u8::from(record.is_operands());
@@ -119,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn every_record_lies_in_its_tile_once() {
+    fn every_record_is_in_its_tile_once() {
         let records = records(20_000);
         let rect = TileRect {
             origin: [0, 0],

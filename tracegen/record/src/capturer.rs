@@ -1,4 +1,4 @@
-//! The contract of a capturer, through which another driver can be added.
+//! The interface of capturers. Implement it to add another driver.
 
 use crate::{RawRecords, RecordError};
 
@@ -14,34 +14,34 @@ pub struct Region {
 /// Result of capturing a region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Captured {
-    /// The region is complete, and its records were handed over.
+    /// The region is complete, and the sink has received its records.
     Complete,
-    /// The capturer's memory was too small. Nothing was handed over; the region will be asked for
-    /// again in parts.
+    /// The capturer's memory was too small, and the sink was not called. The region will be captured again in
+    /// parts.
     Overflow {
-        /// Records that the region produces.
+        /// Number of records of the region.
         needed: u64,
     },
 }
 
-/// Takes the records of one region.
+/// Receives the records of one region.
 pub type Sink<'a> = dyn FnMut(RawRecords<'_>) -> Result<(), RecordError> + 'a;
 
-/// Renders one view, region by region, and hands over what its fragments sampled.
+/// Renders one view, region by region, and passes its records to a sink.
 ///
-/// Records may come in any order, and so may primitives, those of alpha-masked draws too. Regions
-/// may be asked for in any order.
+/// Records may have any order, and so may primitives, including those of alpha-masked draws. Regions may be
+/// requested in any order.
 pub trait Capturer {
-    /// Its errors, including those of the sink.
+    /// Errors of the capturer, which include those of the sink.
     type Error: From<RecordError>;
 
-    /// Records that one region may produce.
+    /// Maximum number of records of a region.
     fn record_capacity(&self) -> u64;
 
-    /// Renders a region and calls `sink` once with all its records, or not at all where there
-    /// are none or too many.
+    /// Renders a region and calls `sink` once with all its records. `sink` is not called if there are none,
+    /// or too many.
     ///
     /// # Errors
-    /// Its own, and what `sink` returns.
+    /// The capturer's errors and those of `sink`.
     fn capture(&mut self, region: Region, sink: &mut Sink<'_>) -> Result<Captured, Self::Error>;
 }

@@ -1,4 +1,4 @@
-//! From a region's raw records to encoded tiles in the trace.
+//! Converts a region's raw records to encoded tiles of the trace.
 
 use crate::bins::Bins;
 use crate::regions::TileRect;
@@ -15,9 +15,9 @@ use std::time::{Duration, Instant};
 pub struct Recorded {
     /// Counts of the records.
     pub counts: CaptureCounts,
-    /// Regions in which the view was captured, without those that overflowed.
+    /// Number of regions in which the view was captured, without those that overflowed.
     pub regions: u32,
-    /// Time of sorting, encoding and writing.
+    /// Time for sorting, encoding and writing.
     pub sorting: Duration,
 }
 
@@ -29,8 +29,8 @@ impl AddAssign for Recorded {
     }
 }
 
-/// Bins, sorts, filters, quantises and encodes a region's records, tiles in parallel, and appends its tiles to the
-/// trace. The records are all that the region has.
+/// Bins, sorts, filters, quantises and encodes the records of a complete region, with tiles in parallel, and
+/// appends its tiles to the trace.
 pub(crate) fn write_region<W: Write + Seek>(
     rules: &TileRules,
     pass: usize,

@@ -1,12 +1,12 @@
-//! Why records could not become a trace.
+//! Errors of converting records to a trace.
 
 use crate::RECORD_BYTES;
 use formats::FormatError;
 
-/// Why records could not become a trace.
+/// Errors of converting records to a trace.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
-    /// The smallest part of a view does not fit the capturer's memory.
+    /// The records of a single tile do not fit the capturer's memory.
     #[error(
         "tile ({tx}, {ty}) alone needs {needed} records of {RECORD_BYTES} bytes, the record budget holds {capacity}; raise the record budget"
     )]
@@ -15,12 +15,12 @@ pub enum RecordError {
         tx: u32,
         /// Tile row.
         ty: u32,
-        /// Records that the tile produces.
+        /// Number of records of the tile.
         needed: u64,
-        /// Records that fit.
+        /// Number of records that fit.
         capacity: u64,
     },
-    /// The capturer broke its contract.
+    /// The capturer violated its contract.
     #[error("a raw record: expected {expected}, found {found}")]
     Invalid {
         /// What the tables allow.
@@ -28,15 +28,15 @@ pub enum RecordError {
         /// What was found.
         found: String,
     },
-    /// An event of a [`crate::Recording`] came at the wrong time.
+    /// A method of [`crate::Recording`] was called at the wrong time.
     #[error("an event of a recording: expected {expected}, found {found}")]
     Event {
-        /// What must come first.
+        /// The call that must come first.
         expected: String,
         /// What was found.
         found: String,
     },
-    /// The trace could not be written.
+    /// Writing the trace failed.
     #[error("writing the trace: {0}")]
     Write(#[from] FormatError),
 }

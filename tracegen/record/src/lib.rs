@@ -6,9 +6,9 @@
 //!                                           -> encoded tiles -> TextraceWriter
 //! ```
 //!
-//! This crate depends on no driver and no scene. A capturer that can draw a region again implements
-//! [`Capturer`] and fills `formats::textrace::Tables` first; a capturer that observes a program pushes its
-//! events into a [`Recording`].
+//! This crate depends neither on a driver nor on a scene. A capturer that can render a region again
+//! implements [`Capturer`], with `formats::textrace::Tables` known in advance. A capturer that observes a
+//! program passes its events to a [`Recording`].
 
 mod bins;
 mod capturer;

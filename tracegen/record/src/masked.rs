@@ -1,30 +1,30 @@
-//! Replays the depth test inside a draw whose fragments may discard.
+//! Repeats the depth test between the primitives of a draw whose fragments may be discarded.
 //!
-//! A masked draw is captured with a forced early test against the depth of the draws before it
-//! (see `fragment_masked_record`), so the driver has not tested its primitives against each other.
-//! An in-order GPU with early test and late write would have: a lane survives if it passes the depth test against
-//! every earlier primitive of the draw whose alpha passed at that pixel.
+//! A masked draw is captured with an early depth test against the depth of earlier draws (see
+//! `fragment_masked_record`), so the driver has not tested its primitives against each other. An in-order GPU
+//! with early test and late write would have done so. There, a lane survives if it passes the depth test
+//! against all earlier primitives of the draw whose alpha test passed at that pixel.
 
 use super::raw::{RawDepth, RawRecord};
 
-/// The depth test among the primitives of a draw.
+/// Depth test between the primitives of a draw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum DepthReplay {
-    /// None: the driver has done it, or no primitive of the draw hides another.
+    /// No test: the driver has done it, or no primitive of the draw hides another.
     #[default]
     None,
-    /// The nearer fragment passes, as depth test *less*.
+    /// Depth test *less*: the nearer fragment passes.
     Less,
-    /// *Less or equal*.
+    /// Depth test *less or equal*.
     LessOrEqual,
-    /// *Greater*.
+    /// Depth test *greater*.
     Greater,
-    /// *Greater or equal*.
+    /// Depth test *greater or equal*.
     GreaterOrEqual,
 }
 
 impl DepthReplay {
-    /// A fragment at `depth` passes where `written` has been written.
+    /// Whether a fragment at `depth` passes against the depth `written`.
     fn passes(self, depth: f32, written: f32) -> bool {
         match self {
             Self::None => true,
@@ -35,8 +35,8 @@ impl DepthReplay {
         }
     }
 
-    /// The initial value, with which every fragment passes.
-    fn nothing(self) -> f32 {
+    /// The initial depth, against which every fragment passes.
+    fn initial(self) -> f32 {
         match self {
             Self::Greater | Self::GreaterOrEqual => f32::NEG_INFINITY,
             _ => f32::INFINITY,
@@ -44,14 +44,14 @@ impl DepthReplay {
     }
 }
 
-/// Quads along the edge of a tile.
+/// Number of quads along the edge of a tile.
 const EDGE: usize = formats::textrace::TILE_QUADS as usize;
 
-/// Depth that one masked draw has written so far in one tile.
+/// Depth that a masked draw has written in a tile so far.
 #[derive(Clone, Debug)]
 pub(crate) struct MaskedDepth {
     draw: Option<u32>,
-    /// Four lanes per quad, quads row by row.
+    /// Depth of the four lanes of each quad, quads row by row.
     nearest: [[f32; 4]; EDGE * EDGE],
 }
 
@@ -65,16 +65,16 @@ impl Default for MaskedDepth {
 }
 
 impl MaskedDepth {
-    /// Forgets everything, for the next tile.
+    /// Resets all depths for the next tile.
     pub fn clear(&mut self) {
         self.draw = None;
     }
 
-    /// Covered lanes of a quad that survive; quads must come in submission order.
+    /// Covered lanes of a quad that survive. Quads must come in submission order.
     pub fn survivors(&mut self, test: DepthReplay, quad: &RawRecord, depth: &RawDepth) -> u8 {
         let (x, y) = ((quad.qx() & 7) as usize, (quad.qy() & 7) as usize);
         if self.draw.replace(quad.draw) != Some(quad.draw) {
-            self.nearest.fill([test.nothing(); 4]);
+            self.nearest.fill([test.initial(); 4]);
         }
         let nearest = &mut self.nearest[y * EDGE + x];
         let nearer = (nearest.iter().zip(&depth.depth).enumerate())
@@ -98,7 +98,7 @@ impl MaskedDepth {
 mod tests {
     use super::*;
 
-    /// Survivors of quad `[x, y]` of a tile, with its covered and its passing lanes.
+    /// Survivors of the quad at `[x, y]` of a tile with these covered and passing lanes.
     fn survivors(
         nearest: &mut MaskedDepth,
         draw: u32,
@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn each_depth_test_lets_its_own_fragments_pass() {
+    fn each_depth_test_passes_the_specified_fragments() {
         use DepthReplay::{Greater, GreaterOrEqual, Less, LessOrEqual};
         let cases = [
             (Less, [0b0010, 0b0000]),
@@ -124,7 +124,7 @@ mod tests {
             (Greater, [0b0100, 0b0100]),
             (GreaterOrEqual, [0b0101, 0b0101]),
         ];
-        // Second quad: equal, nearer and farther; third: the same once more.
+        // The second quad has equal, nearer and farther lanes; the third is the same again.
         for (test, expected) in cases {
             let mut nearest = MaskedDepth::default();
             let mut lanes = |depth| {

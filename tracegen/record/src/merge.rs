@@ -1,16 +1,15 @@
-//! Records of single fragments become records of quads.
+//! Merges records of single fragments into records of quads.
 //!
-//! A driver whose lanes cannot tell each other what they cover records every fragment alone: the
-//! record that its quad would get if it were the quad's only covered lane. The quad's coordinates
-//! and depths are those of its first covered lane, as they are where the lanes agree among
-//! themselves, so that the trace has the same bytes either way.
+//! A driver whose lanes cannot exchange their coverage records every fragment separately, as if it were the
+//! only covered lane of its quad. The coordinates and depths of the merged quad are those of its first
+//! covered lane, as on a driver with exchange. The trace is therefore the same in both cases.
 
 use super::raw::{RawDepth, RawRecord, RawRecords};
 use rayon::prelude::*;
 
-/// Bits of [`RawRecord::passing`] that tell of lanes. A record of a fragment has a tag above them:
-/// the same for all fragments of a quad, and another (but for chance) for each of the quads that a
-/// clipped primitive may have at one place.
+/// Bits of [`RawRecord::passing`] for lanes. In a record of a fragment, the bits above hold a tag. All
+/// fragments of a quad have the same tag. If a clipped primitive covers a quad twice, the tags of both parts
+/// differ, except by accident.
 const LANES: u32 = 15;
 
 /// Quads merged from fragments.
@@ -24,7 +23,7 @@ impl Merged {
     /// Merges the fragments of a region.
     ///
     /// # Panics
-    /// Where there are depths, but fewer than records.
+    /// Depths are present, but fewer than records.
     #[must_use]
     pub fn new(fragments: RawRecords<'_>) -> Self {
         let mut order: Vec<(u64, u32)> = (fragments.quads.par_iter().enumerate())
@@ -38,7 +37,7 @@ impl Merged {
         merged
     }
 
-    /// The quads, in no particular order.
+    /// The merged quads, in no particular order.
     #[must_use]
     pub fn records(&self) -> RawRecords<'_> {
         RawRecords {
@@ -47,7 +46,7 @@ impl Merged {
         }
     }
 
-    /// Adds the fragments of one primitive and group in one quad, lanes ascending.
+    /// Adds the fragments of one primitive and group in a quad, by ascending lane.
     fn add(&mut self, fragments: RawRecords<'_>, place: &[(u64, u32)]) {
         let first = self.quads.len();
         for &(_, index) in place {
@@ -70,10 +69,10 @@ impl Merged {
     }
 }
 
-/// Bits of a [`key`] that identify the lane.
+/// Bits of the lane in a [`key`].
 const LANE_BITS: u32 = 2;
 
-/// Primitive, position of the quad, group, lane.
+/// Sort key: primitive, position of the quad, group, lane.
 fn key(fragment: &RawRecord) -> u64 {
     let place = fragment.qx() | fragment.qy() << 12;
     let lane = u64::from(fragment.mask().trailing_zeros() & 3);
@@ -98,7 +97,7 @@ mod tests {
         }
     }
 
-    /// The fragments of a quad; all but the first have coordinates and depths of their own.
+    /// The fragments of a quad. All except the first have different coordinates and depths.
     fn fragments(quad: &RawRecord, tag: u32) -> Vec<(RawRecord, RawDepth)> {
         let first = quad.mask().trailing_zeros();
         (0..4)
@@ -124,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn fragments_in_any_order_become_the_quads_that_they_came_from() {
+    fn fragments_in_any_order_are_merged_into_their_quads() {
         let mut quads = Vec::new();
         for number in 0..400_u32 {
             let mask = (number % 15 + 1) as u8;
@@ -151,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn two_parts_of_a_clipped_primitive_in_one_quad_stay_two() {
+    fn two_parts_of_a_clipped_primitive_in_one_quad_are_not_merged() {
         let [left, mut right] = [[0b0101, 0], [0b1010, 0]].map(|lanes| quad([3, 4], 5, lanes, 0));
         right.uv = [9.0; 2];
         let all = [fragments(&left, 1), fragments(&right, 2)].concat();
@@ -159,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn without_depths_there_are_none_afterwards() {
+    fn records_without_depths_are_merged_without_depths() {
         let record = quad([0, 0], 0, [1, 0], 0);
         let merged = Merged::new(RawRecords {
             quads: &[record],

@@ -1,26 +1,26 @@
-//! From the shader's floats to the trace's fixed point.
+//! Converts the shader's floats to the trace's fixed point.
 
 use super::raw::RawRecord;
 use formats::textrace::{SUBTEXELS, UvGroup};
 use formats::texture::Sampler;
 
-/// Coordinates stay below this, derivatives below half of it, so that no sum of a lane's terms
-/// (`uv + dx + dy + cross`) leaves 32 bits.
+/// Limit of coordinates; derivatives stay below half of it. The sum of a lane's terms
+/// (`uv + dx + dy + cross`) then fits 32 bits.
 const LIMIT: f64 = (1 << 29) as f64;
 
-/// Fixed-point rule of one uv group.
+/// Conversion of the coordinates of a uv group.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GroupScale {
     /// Steps per unit of u and v.
     scale: [f64; 2],
-    /// Every sampler of the group repeats along the axis, so whole periods may be removed.
+    /// Whether all samplers of the group repeat along each axis, so that whole periods may be removed.
     periodic: [bool; 2],
 }
 
 impl GroupScale {
-    /// The rule of `group`.
+    /// The conversion for `group`.
     pub fn new(group: &UvGroup, samplers: &[Sampler]) -> Self {
-        // Operands have no samples, and no period either.
+        // Operands have no samples and are not periodic.
         let periodic = |axis: usize| {
             let mut samplers = group
                 .samples
@@ -48,10 +48,10 @@ pub(crate) struct FixedUv {
     pub cross: [i32; 2],
 }
 
-/// Quantises the records of one primitive in one group.
+/// Converts the coordinates of one primitive in one group to fixed point.
 ///
-/// Coordinates too large for 32 bits lose a multiple of two repeats (two, for mirrored wrap); the
-/// same multiple for neighbouring quads, so that a primitive stays continuous.
+/// Coordinates too large for 32 bits are reduced by a multiple of two repeats (two, because of mirrored
+/// wrap). Neighbouring quads are reduced by the same multiple, so that a primitive stays continuous.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Quantiser {
     shift: [f64; 2],
@@ -81,10 +81,10 @@ impl Quantiser {
     }
 }
 
-/// Nearest integer, ties to even, clamped to `limit` below 2^31.
+/// Rounds to the nearest integer, ties to even, and clamps to `limit`, which is below 2^31.
 ///
-/// Adding 1.5 * 2^52 leaves the integer in the low mantissa bits; several times faster than
-/// `round` on targets without a rounding instruction.
+/// Adding 1.5 * 2^52 leaves the integer in the low mantissa bits. This is several times faster than `round`
+/// on targets without a rounding instruction.
 fn round(value: f64, limit: f64) -> i32 {
     const MAGIC: f64 = 6_755_399_441_055_744.0;
     (value.clamp(-limit, limit) + MAGIC).to_bits() as u32 as i32
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn rounding_agrees_with_the_library() {
+    fn rounding_equals_that_of_the_standard_library() {
         for value in [0.0, 0.5, 1.5, -0.5, -2.5, 2.4999, 1e8 + 0.3, -536_870_911.7] {
             assert_eq!(
                 round(value, LIMIT),
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn moderate_coordinates_keep_their_value() {
+    fn moderate_coordinates_are_not_reduced() {
         let fixed = Quantiser::default()
             .quantise(&rule(1024, Wrap::Repeat), &at(3.5))
             .unwrap();
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn huge_coordinates_lose_whole_pairs_of_repeats_and_stay_continuous() {
+    fn huge_coordinates_are_reduced_by_pairs_of_repeats_and_stay_continuous() {
         let rule = rule(1024, Wrap::MirroredRepeat);
         let mut quantiser = Quantiser::default();
         let first = quantiser.quantise(&rule, &at(100_001.5)).unwrap();
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn clamped_coordinates_stay_outside_however_large() {
+    fn clamped_coordinates_of_any_size_stay_outside() {
         let fixed = Quantiser::default()
             .quantise(&rule(1024, Wrap::ClampToEdge), &at(1e9))
             .unwrap();

@@ -1,23 +1,24 @@
 //! Raw records of a capturer.
 
-/// Bytes of one raw record.
+/// Size of a raw record in bytes.
 pub const RECORD_BYTES: u64 = size_of::<RawRecord>() as u64;
 
-/// Bytes of one raw depth.
+/// Size of a raw depth in bytes.
 pub const DEPTH_BYTES: u64 = size_of::<RawDepth>() as u64;
 
 /// One covered quad in one uv group as the instrumented shader writes it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct RawRecord {
-    /// `qx:12 | qy:12 << 12 | mask:4 << 24 | group:4 << 28`, quads of the whole view.
+    /// `qx:12 | qy:12 << 12 | mask:4 << 24 | group:4 << 28`; the position is in quads of the whole view.
     pub header: u32,
     /// Global primitive number.
     pub primitive: u32,
     /// Index into the draw table.
     pub draw: u32,
-    /// Covered lanes whose alpha passes the test, like [`Self::mask`]; of masked draws alone. Above them flags of
-    /// records that are pushed: [`Self::HAS_DEPTH`] and [`Self::OPERANDS`].
+    /// Covered lanes whose alpha passes the test, in the form of [`Self::mask`]; only used for masked draws.
+    /// The bits above are flags of records for a [`crate::Recording`]: [`Self::HAS_DEPTH`] and
+    /// [`Self::OPERANDS`].
     pub passing: u32,
     /// Coordinates of the top-left lane, covered or not.
     pub uv: [f32; 2],
@@ -33,10 +34,11 @@ impl RawRecord {
     /// Flag of [`Self::passing`]: the depths next to the record are those of its quad (see
     /// [`crate::DepthReplay`]).
     pub const HAS_DEPTH: u32 = 1 << 31;
-    /// Flag of [`Self::passing`]: the coordinates are operands of the next record, whose group is the next one.
+    /// Flag of [`Self::passing`]: the coordinates are operands of the next record, which belongs to the next
+    /// group.
     pub const OPERANDS: u32 = 1 << 30;
 
-    /// The record's coordinates are operands of the next record.
+    /// Whether the coordinates are operands of the next record.
     #[must_use]
     pub fn is_operands(&self) -> bool {
         self.passing & Self::OPERANDS != 0
@@ -54,7 +56,7 @@ impl RawRecord {
         self.header >> 12 & 0xfff
     }
 
-    /// Covered lanes, bit 0 top left, 1 top right, 2 bottom left, 3 bottom right.
+    /// Covered lanes: bit 0 top left, 1 top right, 2 bottom left, 3 bottom right.
     #[must_use]
     pub fn mask(&self) -> u8 {
         (self.header >> 24 & 15) as u8
@@ -73,7 +75,7 @@ impl RawRecord {
     }
 }
 
-/// Data of a quad for the in-order replay of an alpha-masked draw, in addition to its record.
+/// Depths of a quad, for the repeated depth test of a masked draw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct RawDepth {
@@ -84,9 +86,9 @@ pub struct RawDepth {
 /// The raw records of one region, in no particular order.
 #[derive(Clone, Copy, Debug)]
 pub struct RawRecords<'a> {
-    /// One per quad and uv group.
+    /// One record per quad and uv group.
     pub quads: &'a [RawRecord],
-    /// `depths[i]` belongs to `quads[i]` where that is group 0 of a masked draw or has [`RawRecord::HAS_DEPTH`], and
-    /// means nothing elsewhere; empty where no draw is masked.
+    /// `depths[i]` belongs to `quads[i]` if that record is in group 0 of a masked draw or has
+    /// [`RawRecord::HAS_DEPTH`]; otherwise it is unused. Empty if no draw is masked.
     pub depths: &'a [RawDepth],
 }

@@ -1,4 +1,4 @@
-//! Captured views into a trace whose tables are known, for capturers that can draw a region again.
+//! Writes captured views to a trace with known tables, for capturers that can render a region again.
 
 use crate::encode::{Recorded, write_region};
 use crate::masked::DepthReplay;
@@ -8,24 +8,24 @@ use crate::{Capturer, RawRecords, RecordError};
 use formats::textrace::{Tables, TextraceWriter};
 use std::io::{Seek, Write};
 
-/// Turns what capturers hand over into the tiles of one trace. A region that overflows the capturer's memory is asked
-/// for again in parts.
+/// Converts the records of capturers to tiles of a trace. If a region overflows the capturer's memory, it is
+/// captured again in parts.
 pub struct Recorder<'a> {
     tables: &'a Tables,
     rules: TileRules,
-    /// Regions that the last view needed.
+    /// Number of regions that the last view needed.
     parts: u32,
 }
 
 impl<'a> Recorder<'a> {
-    /// The trace's tables.
+    /// Tables of the trace.
     #[must_use]
     pub const fn tables(&self) -> &'a Tables {
         self.tables
     }
 
-    /// For a trace with these tables; `replays` tells of each draw which depth test its primitives are held to among
-    /// themselves. The capturer hands over depths for those of them that are.
+    /// A recorder for a trace with these tables. `replays` has the depth test between the primitives of each
+    /// draw. For draws with such a test, the capturer must provide depths.
     #[must_use]
     pub fn new(tables: &'a Tables, replays: Vec<DepthReplay>) -> Self {
         Self {
@@ -35,10 +35,10 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Captures a view as pass `pass` of the trace, in as many regions as its records require.
+    /// Captures a view as pass `pass` of the trace, in as many regions as its records need.
     ///
-    /// # Errors
-    /// The capturer's errors, a tile that overflows alone, records that contradict the tables,
+    /// Errors of the capturer, a tile that overflows alone, records that contradict the tables, and errors of
+    /// writing.
     /// and errors of writing.
     pub fn record_pass<C: Capturer, W: Write + Seek>(
         &mut self,

@@ -1,4 +1,4 @@
-//! Writes a trace from events in their order, for capturers that do not know passes, draws or textures in
+//! Writes a trace from a sequence of events, for capturers that do not know passes, draws or textures in
 //! advance.
 
 use crate::encode::{Recorded, write_region};
@@ -11,10 +11,10 @@ use formats::texture::{Sampler, Texture};
 use std::collections::HashMap;
 use std::io::{Seek, Write};
 
-/// Takes textures, samplers, draws, passes and their records, in the order in which they come, and writes the trace.
+/// Receives textures, samplers, draws, passes and their records in order, and writes the trace.
 ///
-/// A draw comes before its records, and its textures and samplers before it. The records of a pass are kept until it
-/// ends, as any tile may get more of them.
+/// Textures and samplers must be added before the draws that use them, and draws before their records. The
+/// records of a pass are kept in memory until it ends, because any tile may still get more records.
 pub struct Recording<W: Write + Seek> {
     writer: TextraceWriter<W>,
     rules: TileRules,
@@ -26,7 +26,7 @@ struct OpenPass {
     number: usize,
     tiles: [u32; 2],
     quads: Vec<RawRecord>,
-    /// As long as `quads` as soon as any record came with depths.
+    /// Has the length of `quads` once records with depths were added.
     depths: Vec<RawDepth>,
 }
 
@@ -46,15 +46,15 @@ impl<W: Write + Seek> Recording<W> {
     /// Adds a texture and returns its index.
     ///
     /// # Errors
-    /// A full table.
+    /// The table is full.
     pub fn texture(&mut self, texture: Texture) -> Result<u32, RecordError> {
         Ok(self.writer.add_texture(texture)?)
     }
 
-    /// Adds a sampler, unless the trace has it, and returns its index.
+    /// Adds a sampler, unless the trace already has it, and returns its index.
     ///
     /// # Errors
-    /// A full table.
+    /// The table is full.
     pub fn sampler(&mut self, sampler: Sampler) -> Result<u16, RecordError> {
         if let Some(&index) = self.samplers.get(&sampler) {
             return Ok(index);
@@ -64,11 +64,11 @@ impl<W: Write + Seek> Recording<W> {
         Ok(index)
     }
 
-    /// Adds a draw and tells its index. Its quads are held to the depth test `replay` among themselves; then their
-    /// records come with depths.
+    /// Adds a draw and returns its index. With a depth test `replay` between its quads, its records must have
+    /// depths.
     ///
     /// # Errors
-    /// A full table.
+    /// The table is full.
     pub fn draw(&mut self, draw: Draw, replay: DepthReplay) -> Result<u32, RecordError> {
         self.rules
             .add_draw(&draw, &self.writer.tables().samplers, replay);
@@ -78,7 +78,7 @@ impl<W: Write + Seek> Recording<W> {
     /// Starts a pass and returns its index.
     ///
     /// # Errors
-    /// A pass that is open, or one with too many tiles.
+    /// Another pass is open, or the pass has too many tiles.
     pub fn begin_pass(&mut self, pass: Pass) -> Result<usize, RecordError> {
         if let Some(open) = &self.open {
             return Err(RecordError::Event {
@@ -99,7 +99,7 @@ impl<W: Write + Seek> Recording<W> {
     /// Adds records to the open pass, in any order.
     ///
     /// # Errors
-    /// No open pass, or depths of another number than the records.
+    /// No pass is open, or the numbers of depths and records differ.
     pub fn records(&mut self, records: RawRecords<'_>) -> Result<(), RecordError> {
         let open = self.open.as_mut().ok_or_else(no_pass)?;
         let (quads, depths) = (records.quads.len(), records.depths.len());
@@ -123,7 +123,7 @@ impl<W: Write + Seek> Recording<W> {
     /// Ends the open pass and writes its tiles.
     ///
     /// # Errors
-    /// No open pass, records that contradict the tables, and errors of writing.
+    /// No pass is open, records contradict the tables, or writing failed.
     pub fn end_pass(&mut self) -> Result<Recorded, RecordError> {
         let open = self.open.take().ok_or_else(no_pass)?;
         let whole = TileRect {
@@ -137,10 +137,10 @@ impl<W: Write + Seek> Recording<W> {
         write_region(&self.rules, open.number, &whole, records, &mut self.writer)
     }
 
-    /// The writer, to be finished, with the trace's description.
+    /// Sets the description and returns the writer, which the caller must finish.
     ///
     /// # Errors
-    /// An open pass.
+    /// A pass is open.
     pub fn finish(mut self, meta: TraceMeta) -> Result<TextraceWriter<W>, RecordError> {
         if let Some(open) = self.open {
             return Err(RecordError::Event {

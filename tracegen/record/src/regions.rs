@@ -1,17 +1,17 @@
-//! A view in regions whose records fit the capturer's memory.
+//! Divides a view into regions whose records fit the capturer's memory.
 //!
-//! Pixels of different tiles do not depend on each other, so an overflowing region is captured
-//! again in parts, each with a scissor rectangle of its own: first bands of tile rows, then parts
-//! of a row. Memory stays bounded by one region's records however large the frame, and each
-//! region's tiles are complete, so they can be written at once.
+//! An overflowing region is captured again in parts, each with its own scissor rectangle. This is possible
+//! because pixels of different tiles do not depend on each other. A region is first divided into bands of
+//! tile rows, then into parts of a row. Memory is limited to the records of one region for frames of any
+//! size. The tiles of each region are complete, so they can be written at once.
 
 use super::capturer::{Captured, Capturer, Region};
 use super::error::RecordError;
 use super::raw::{RawRecord, RawRecords};
 use formats::view::TILE_SIZE_PX;
 
-/// Tiles along an edge of the squares that llvmpipe draws one after the other, and so hands over the
-/// records of: a square's records stay in the processor's cache while its tiles are built.
+/// Edge in tiles of the squares that llvmpipe draws one after the other, so that their records are
+/// consecutive. Building tiles in this order keeps a square's records in the CPU's cache.
 const BLOCK_TILES: u32 = 64 / TILE_SIZE_PX;
 
 /// A rectangle of tiles.
@@ -38,7 +38,7 @@ impl TileRect {
         ]
     }
 
-    /// All tiles, ordered by squares of [`BLOCK_TILES`].
+    /// Indices of all tiles, square by square of [`BLOCK_TILES`].
     pub fn by_blocks(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.count()).collect();
         order.sort_by_key(|&index| {
@@ -48,7 +48,7 @@ impl TileRect {
         order
     }
 
-    /// Position of the tile that contains a record's quad, or `None` if it is outside.
+    /// Index of the tile with a record's quad; `None` if it is outside.
     pub fn index(&self, record: &RawRecord) -> Option<usize> {
         let column = (record.qx() / 8)
             .checked_sub(self.origin[0])
@@ -60,13 +60,12 @@ impl TileRect {
     }
 }
 
-/// Captures a whole view of `size_px`; `sink` gets each region's tiles with its records, tiles in
-/// ascending order over the calls. `parts` is the number of bands to start with; the number of
-/// regions that were needed is returned, as a first guess for the next view.
+/// Captures a whole view of `size_px`. `sink` is called with the tiles of each region and its records; tiles
+/// ascend over all calls. `parts` is the initial number of bands. Returns the number of regions that were
+/// needed, which is a good start for the next view.
 ///
 /// # Errors
-/// [`RecordError::Budget`] where a single tile overflows, the capturer's errors, and what `sink`
-/// returns.
+/// [`RecordError::Budget`] if a single tile overflows, errors of the capturer, and errors of `sink`.
 pub(crate) fn capture_view<C: Capturer>(
     capturer: &mut C,
     size_px: [u32; 2],
@@ -78,7 +77,7 @@ pub(crate) fn capture_view<C: Capturer>(
         size: size_px.map(|s| s.div_ceil(TILE_SIZE_PX)),
     };
     let capacity = capturer.record_capacity();
-    // A stack, the next region on top.
+    // A stack with the next region on top.
     let mut open = split(&whole, parts);
     let mut captured = 0;
     while let Some(rect) = open.pop() {
@@ -94,7 +93,8 @@ pub(crate) fn capture_view<C: Capturer>(
                 }));
             }
             Captured::Overflow { needed } => {
-                // Records are spread unevenly: a quarter more parts than an even spread needs.
+                // Records are unevenly distributed, so use a quarter more parts than for an even
+                // distribution.
                 let parts = (needed.saturating_mul(5) / 4)
                     .div_ceil(capacity.max(1))
                     .max(2);
@@ -105,8 +105,8 @@ pub(crate) fn capture_view<C: Capturer>(
     Ok(captured)
 }
 
-/// Cuts a rectangle into up to `parts` bands of whole rows, or a single row into runs of tiles;
-/// the first part comes last.
+/// Divides a rectangle into up to `parts` bands of whole rows, or a single row into runs of tiles. The first
+/// part is last in the result.
 fn split(rect: &TileRect, parts: u32) -> Vec<TileRect> {
     let axis = usize::from(rect.size[1] > 1);
     let length = rect.size[axis];
@@ -123,7 +123,7 @@ fn split(rect: &TileRect, parts: u32) -> Vec<TileRect> {
         .collect()
 }
 
-/// Pixels of a rectangle of tiles, cut off at the view's edge.
+/// Pixels of a rectangle of tiles, clipped at the edge of the view.
 fn region(rect: &TileRect, size_px: [u32; 2]) -> Region {
     let origin_px = rect.origin.map(|t| t * TILE_SIZE_PX);
     let size = [0, 1]
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_hold_every_tile_once_and_squares_together() {
+    fn tiles_by_blocks_are_complete_and_squares_consecutive() {
         let rect = TileRect {
             origin: [3, 4],
             size: [6, 5],
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_tiles_are_cut_off_at_the_edge_of_the_view() {
+    fn the_last_tiles_are_clipped_at_the_edge_of_the_view() {
         let rect = TileRect {
             origin: [1, 2],
             size: [2, 1],

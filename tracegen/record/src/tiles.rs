@@ -1,4 +1,4 @@
-//! Converts a tile's raw records to the trace's `Tile`.
+//! Converts raw records of a tile to the trace's `Tile`.
 
 use super::bins::{Bins, Entry};
 use super::error::RecordError;
@@ -12,19 +12,19 @@ use std::ops::AddAssign;
 /// Counts of a capture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CaptureCounts {
-    /// Covered quads with a record in the trace, counted once for all their uv groups.
+    /// Covered quads with a record in the trace. A quad with several uv groups is counted once.
     pub quads: u64,
-    /// Covered lanes of those quads that have a record in the trace.
+    /// Covered lanes of these quads that have a record in the trace.
     pub fragments: u64,
     /// Records in the trace.
     pub records: u64,
-    /// Lanes of masked draws that the in-order depth test killed.
+    /// Lanes of masked draws that the repeated depth test removed.
     pub masked_lanes_killed: u64,
     /// Records left out because a coordinate was not finite.
     pub not_finite: u64,
     /// Bytes of the encoded tiles.
     pub tile_bytes: u64,
-    /// Tiles that nothing covers: they cost an entry in the index.
+    /// Uncovered tiles. Each takes only an entry in the index.
     pub empty_tiles: u64,
 }
 
@@ -40,26 +40,26 @@ impl AddAssign for CaptureCounts {
     }
 }
 
-/// Properties of the draws that building tiles depends on.
+/// Properties of the draws that determine their tiles.
 pub(crate) struct TileRules {
     /// By draw and group.
     scales: Vec<Vec<GroupScale>>,
-    /// By draw: the depth test that its quads, which carry depths, are held to.
+    /// Depth test between the quads of each draw.
     replays: Vec<DepthReplay>,
 }
 
-/// Memory that is reused between tiles.
+/// Memory that is reused for all tiles.
 #[derive(Default)]
 pub(crate) struct Scratch {
     order: Vec<Entry>,
     depth: MaskedDepth,
     quantisers: [Quantiser; 16],
-    /// The last tile built.
+    /// The tile built last.
     pub tile: Tile,
 }
 
 impl TileRules {
-    /// Rules for the draws of `tables`; `replays` holds each draw's depth test among its quads.
+    /// Rules for the draws of `tables`. `replays` has the depth test between the quads of each draw.
     pub fn new(tables: &Tables, replays: Vec<DepthReplay>) -> Self {
         let scales = |draw| scales(draw, &tables.samplers);
         Self {
@@ -77,7 +77,7 @@ impl TileRules {
     /// Builds tile `tile` of the bins into `scratch.tile`.
     ///
     /// # Errors
-    /// A record whose draw or group the tables lack.
+    /// A record has a draw or group that is not in the tables.
     pub fn build(
         &self,
         records: RawRecords<'_>,
@@ -133,7 +133,7 @@ impl TileRules {
             }
         }
         let mut lanes = 0;
-        // Operands wait for the record that they belong to.
+        // Operands are kept until the record to which they belong.
         let mut operands: Option<Option<QuadRecord>> = None;
         for record in quad.iter().map(of) {
             let mask = record.mask() & alive;
@@ -195,7 +195,7 @@ impl TileRules {
         })
     }
 
-    /// Starts the run of the record's primitive unless it is the one under way.
+    /// Starts a run for the record's primitive, unless it is the current one.
     fn open_run(&self, record: &RawRecord, scratch: &mut Scratch) {
         let tile = &mut scratch.tile;
         if tile
@@ -203,7 +203,7 @@ impl TileRules {
             .last()
             .is_none_or(|run| run.primitive != record.primitive)
         {
-            // A run whose records were all left out makes room for the next.
+            // Remove a run without records before the next one starts.
             if tile.runs.last().is_some_and(|run| run.count == 0) {
                 tile.runs.pop();
             }

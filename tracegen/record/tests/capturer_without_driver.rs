@@ -1,10 +1,10 @@
-//! Another capturer can take tracegen's place: this one has no driver. It computes the quads of
-//! an analytic scene and hands them over out of order.
+//! Tests the crate with a capturer without a driver. It computes the quads of an analytic scene and passes
+//! them on out of order.
 //!
-//! The view has 64x96 pixels. Draw 0 is an opaque triangle over the pixels with `x + y < 40`.
-//! Draw 1 is alpha-masked and covers the tile in column 1, row 0 twice: primitive 1 in front,
-//! whose alpha passes in even columns, and primitive 2 behind it. Texture coordinates are the
-//! pixel's centre over 64, so one pixel is one texel.
+//! The view has 64x96 pixels. Draw 0 is an opaque triangle over the pixels with `x + y < 40`. Draw 1 is
+//! alpha-masked and covers the tile in column 1, row 0 twice: primitive 1, whose alpha passes in even
+//! columns, is in front of primitive 2. Texture coordinates are the pixel's centre divided by 64, so a pixel
+//! is as large as a texel.
 
 use formats::textrace::{
     Draw, LodRule, Pass, PassKind, SUBTEXELS, Sample, SampleLevel, Tables, Textrace,
@@ -19,7 +19,7 @@ use record::{
 use std::collections::BTreeMap;
 
 const SIZE_PX: [u32; 2] = [64, 96];
-/// Texels along the texture's edge.
+/// Size of the texture in texels.
 const EDGE: u32 = 64;
 
 fn tables() -> Tables {
@@ -103,12 +103,12 @@ fn tables() -> Tables {
     }
 }
 
-/// Primitive, draw and covered lanes of the quad at column `x` and row `y`, as a driver reports them.
+/// Primitive, draw and covered lanes of the quad at column `x` and row `y`.
 fn covered(x: u32, y: u32) -> Vec<(u32, u32, u8)> {
     let mut found = Vec::new();
     match x + y {
         0..=18 => found.push((0, 0, 0b1111)),
-        // Of the diagonal's quads, all but the bottom right lane.
+        // Quads on the diagonal lack the bottom right lane.
         19 => found.push((0, 0, 0b0111)),
         _ => {}
     }
@@ -118,12 +118,12 @@ fn covered(x: u32, y: u32) -> Vec<(u32, u32, u8)> {
     found
 }
 
-/// Computes its records instead of rendering.
+/// A capturer that computes its records instead of rendering.
 struct Analytic {
     capacity: u64,
-    /// Hands the last quad over first.
+    /// Whether the last quad is passed on first.
     backwards: bool,
-    /// Primitive whose coordinates are no numbers.
+    /// Primitive whose coordinates are NaN.
     not_finite: Option<u32>,
     asked: Vec<Region>,
     empty: usize,
@@ -213,7 +213,7 @@ fn trace(capturer: &mut Analytic) -> Result<Vec<u8>, RecordError> {
 }
 
 #[test]
-fn a_capturer_without_a_driver_writes_a_valid_trace_of_the_records_that_it_computed() {
+fn a_capturer_without_a_driver_writes_a_trace_with_exactly_its_records() {
     let mut capturer = Analytic::new(200, true);
     let bytes = trace(&mut capturer).unwrap();
     assert!(capturer.overflowed > 0, "no region overflowed");
@@ -222,7 +222,7 @@ fn a_capturer_without_a_driver_writes_a_valid_trace_of_the_records_that_it_compu
     let mut expected = BTreeMap::new();
     for (x, y) in (0..48).flat_map(|y| (0..32).map(move |x| (x, y))) {
         for (primitive, draw, mask) in covered(x, y) {
-            // Primitive 1 hides primitive 2 where its alpha passes: in even columns.
+            // Primitive 1 hides primitive 2 in even columns, where its alpha passes.
             let mask = if primitive == 2 { 0b1010 } else { mask };
             expected.insert((x, y, primitive), (draw, mask));
         }
@@ -237,7 +237,7 @@ fn a_capturer_without_a_driver_writes_a_valid_trace_of_the_records_that_it_compu
                 let y = index / 4 * 8 + u32::from(record.y);
                 let found = expected.remove(&(x, y, run.primitive));
                 assert_eq!(found, Some((run.draw, record.mask)), "quad ({x}, {y})");
-                // Half a texel, to the pixel's centre.
+                // The centre of a pixel is half a texel from its edge.
                 let texels = [x, y].map(|q| (2 * q as i32) * SUBTEXELS + SUBTEXELS / 2);
                 assert_eq!(record.uv, texels);
                 assert_eq!((record.dx, record.dy), ([SUBTEXELS, 0], [0, SUBTEXELS]));
@@ -249,7 +249,7 @@ fn a_capturer_without_a_driver_writes_a_valid_trace_of_the_records_that_it_compu
 }
 
 #[test]
-fn fragments_whose_coordinates_are_no_numbers_are_not_counted() {
+fn fragments_with_nan_coordinates_are_not_counted() {
     let counts = |not_finite: Option<u32>| {
         let tables = tables();
         let mut writer = TextraceWriter::in_memory(&tables).unwrap();
@@ -264,7 +264,7 @@ fn fragments_whose_coordinates_are_no_numbers_are_not_counted() {
         (counts, trace.records())
     };
     let (all, _) = counts(None);
-    // Only primitive 0: its quads and lanes.
+    // Only the quads and lanes of primitive 0.
     let of_first = (0..48).flat_map(|y| (0..32).flat_map(move |x| covered(x, y)));
     let of_first: Vec<u8> = (of_first.filter(|(primitive, ..)| *primitive == 0))
         .map(|(.., mask)| mask)
@@ -278,7 +278,7 @@ fn fragments_whose_coordinates_are_no_numbers_are_not_counted() {
 }
 
 #[test]
-fn neither_the_order_of_the_records_nor_the_size_of_the_buffer_reaches_the_trace() {
+fn the_trace_does_not_depend_on_the_order_of_records_or_the_size_of_the_buffer() {
     let whole = trace(&mut Analytic::new(100_000, false)).unwrap();
     for capacity in [190, 200, 300, 100_000] {
         let mut capturer = Analytic::new(capacity, true);
@@ -307,7 +307,7 @@ fn regions_after_an_overflow_cover_the_view_once() {
 }
 
 #[test]
-fn a_buffer_below_one_tile_is_refused_by_name() {
+fn a_buffer_too_small_for_a_tile_is_refused() {
     let message = trace(&mut Analytic::new(100, false))
         .unwrap_err()
         .to_string();
@@ -351,7 +351,7 @@ fn records_that_contradict_the_tables_are_refused() {
     }
 }
 
-/// Texture, sampler and draws of the analytic scene as events; a pass is open afterwards.
+/// The texture, sampler and draws of the analytic scene as events, followed by the start of a pass.
 fn begun() -> Recording<std::io::Cursor<Vec<u8>>> {
     let tables = tables();
     let mut recording = Recording::new(TextraceWriter::growing_in_memory().unwrap());
@@ -367,7 +367,7 @@ fn begun() -> Recording<std::io::Cursor<Vec<u8>>> {
 
 const REPLAYS: [DepthReplay; 2] = [DepthReplay::None, DepthReplay::Less];
 
-/// All records of the analytic scene, with its depths.
+/// All records of the analytic scene and their depths.
 fn all_records() -> (Vec<RawRecord>, Vec<RawDepth>) {
     let mut all = (Vec::new(), Vec::new());
     let whole = Region {
@@ -394,13 +394,13 @@ fn tiles(trace: &Textrace) -> Vec<Tile> {
 }
 
 #[test]
-fn pushed_records_become_the_tiles_of_a_capturer_that_was_asked_for_them() {
+fn a_recording_gives_the_same_tiles_as_a_recorder() {
     let asked = trace(&mut Analytic::new(1 << 20, false)).unwrap();
     let asked = Textrace::from_bytes(asked).unwrap();
     let (quads, depths) = all_records();
     for part in [1, 7, quads.len()] {
         let mut recording = begun();
-        // The first parts have no masked draw, and no depths.
+        // The first parts have no masked draw and therefore no depths.
         for (quads, depths) in quads.chunks(part).zip(depths.chunks(part)) {
             let masked = quads.iter().any(|quad| quad.draw == 1);
             let depths = if masked { depths } else { &[] };
@@ -420,7 +420,7 @@ fn pushed_records_become_the_tiles_of_a_capturer_that_was_asked_for_them() {
 }
 
 #[test]
-fn operands_stay_with_their_record_through_loops_and_what_is_not_finite() {
+fn operands_stay_with_their_record_in_loops_and_with_values_that_are_not_finite() {
     let mut recording = Recording::new(TextraceWriter::growing_in_memory().unwrap());
     let tables = tables();
     recording.texture(tables.textures[0].clone()).unwrap();
@@ -452,7 +452,7 @@ fn operands_stay_with_their_record_through_loops_and_what_is_not_finite() {
         };
         [operands, record]
     };
-    // Four iterations of a loop; one has no coordinate, one no level.
+    // Four iterations of a loop. The coordinate of one and the level of another are not finite.
     let quads = [
         pair(3.0, 0.25),
         pair(2.0, f32::NAN),
@@ -484,7 +484,7 @@ fn operands_stay_with_their_record_through_loops_and_what_is_not_finite() {
 }
 
 #[test]
-fn events_at_the_wrong_time_are_refused() {
+fn calls_at_the_wrong_time_are_refused() {
     let none = RawRecords {
         quads: &[],
         depths: &[],

@@ -1,9 +1,9 @@
-//! Texels that are already compressed, as a file holds them, and their decoding.
+//! Texels that a file already holds compressed, and their decoding.
 
 use crate::srgb;
 use formats::texture::{ColorSpace, TexelFormat};
 
-/// What an image is made of.
+/// Contents of an image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ImageData {
     /// RGBA8 texels of level 0, row by row from the top (v = 0).
@@ -50,7 +50,7 @@ pub fn level_bytes(format: TexelFormat, size: [u32; 2]) -> usize {
     across(0) * across(1) * block.bytes as usize
 }
 
-/// True where level 0 consists of whole blocks, which drivers ask of compressed textures.
+/// True where level 0 consists of whole blocks, as drivers require of compressed textures.
 #[must_use]
 pub fn is_whole_blocks(format: TexelFormat, size: [u32; 2]) -> bool {
     let block = format.block().texels;
@@ -59,8 +59,9 @@ pub fn is_whole_blocks(format: TexelFormat, size: [u32; 2]) -> bool {
 
 /// The RGBA8 texels of a level; `None` for a format that is not decoded here or too few bytes.
 ///
-/// A missing channel is 0 and a missing alpha 255, as texture units read them; the third channel of
-/// two (BC5, EAC RG11) completes a unit normal. Half-float texels (BC6H) are clamped to 0..1.
+/// A missing channel is 0 and a missing alpha 255, as texture units read them. The third channel of
+/// a two-channel format (BC5, EAC RG11) completes a unit normal. Half-float texels (BC6H) are
+/// clamped to 0..1.
 #[must_use]
 pub fn decode(
     format: TexelFormat,

@@ -1,13 +1,13 @@
-//! Texture coordinates that single precision is too coarse for.
+//! Texture coordinates for which single precision is too coarse.
 
 use crate::{Mesh, Scene, TextureRef};
 use glam::Vec2;
 
-/// Steps of a coordinate may be this large, in texels: filtering weighs texels by 1/256 of one, and
-/// interpolation adds a few steps.
+/// Largest allowed rounding step of a coordinate, in texels. Filtering weighs texels in steps of
+/// 1/256, and interpolation adds a few rounding errors.
 const STEP_TEXELS: f32 = 1.0 / 16.0;
 
-/// What is too coarse in a scene, as a warning.
+/// A warning about coordinates that are too coarse.
 pub(crate) fn warning(scene: &Scene) -> Option<String> {
     let steps = (scene.meshes.iter()).map(|mesh| (largest_step(scene, mesh), mesh));
     let coarse: Vec<_> = steps.filter(|(step, _)| *step > STEP_TEXELS).collect();
@@ -20,7 +20,7 @@ pub(crate) fn warning(scene: &Scene) -> Option<String> {
     ))
 }
 
-/// The largest step of a mesh's coordinates, in texels of the textures that they are for.
+/// The largest rounding step of a mesh's coordinates, in texels of the textures that use them.
 fn largest_step(scene: &Scene, mesh: &Mesh) -> f32 {
     let Some(material) = scene.materials.get(mesh.material) else {
         return 0.0;

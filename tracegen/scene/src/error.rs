@@ -6,20 +6,20 @@ use std::path::{Path, PathBuf};
 /// Why a scene could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
-    /// A name without a known extension that is no built-in scene's.
+    /// A name that has no known extension and is not a built-in scene.
     #[error("unknown scene '{spec}': expected a .gltf, .glb or .obj file{or_built_in}")]
     Unknown {
-        /// As given.
+        /// The name as given.
         spec: String,
-        /// Names the built-in scenes, or is empty where they are not meant.
+        /// Names of the built-in scenes; empty where they are not allowed.
         or_built_in: String,
     },
-    /// A built-in scene with a parameter that it cannot have.
+    /// A built-in scene with an invalid parameter.
     #[error("scene '{spec}': expected {expected}")]
     Parameter {
-        /// As given.
+        /// The name as given.
         spec: String,
-        /// What can be asked for.
+        /// The valid parameters.
         expected: String,
     },
     /// A file that cannot be read.
@@ -27,26 +27,26 @@ pub enum SceneError {
     Io {
         /// The file.
         file: PathBuf,
-        /// What refers to it.
+        /// The place that refers to it.
         place: String,
         /// The system's error.
         reason: std::io::Error,
     },
-    /// A file that is not what it claims to be.
+    /// A file with invalid contents.
     #[error("{}: {place}: expected {expected}, found {found}", path(file))]
     Invalid {
         /// The file.
         file: PathBuf,
-        /// Where in it.
+        /// The place in the file.
         place: String,
-        /// What should be there.
+        /// What is expected.
         expected: String,
-        /// What is there.
+        /// What was found.
         found: String,
     },
 }
 
-/// A path as a message shows it: a scene file may name paths with anything in them.
+/// A path as shown in a message. A scene file may name paths with any characters in them.
 fn path(file: &Path) -> String {
     printable(&file.to_string_lossy()).into_owned()
 }

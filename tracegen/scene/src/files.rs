@@ -49,7 +49,7 @@ impl Origin {
 /// Most characters of a file's text that a message quotes.
 const QUOTED: usize = 300;
 
-/// Text from a file as a message shows it: fit for a terminal and not endless.
+/// Text from a file as shown in a message: printable in a terminal and of bounded length.
 pub(crate) fn shown(text: &str) -> String {
     match text.char_indices().nth(QUOTED) {
         Some((end, _)) => format!("{}...", printable(&text[..end])),
@@ -57,7 +57,7 @@ pub(crate) fn shown(text: &str) -> String {
     }
 }
 
-/// Reads a whole regular file of at most `max_bytes`, saying what refers to it.
+/// Reads a whole regular file of at most `max_bytes`. Errors name `place`, which refers to it.
 pub(crate) fn read_file(file: &Path, place: &str, max_bytes: u64) -> Result<Vec<u8>, SceneError> {
     let length = check_regular(file, place)?.len();
     if length > max_bytes {
@@ -70,7 +70,8 @@ pub(crate) fn read_file(file: &Path, place: &str, max_bytes: u64) -> Result<Vec<
     read(file, place, length)
 }
 
-/// Reads the first `wanted` bytes of a regular file, or all where it is shorter; tells its length.
+/// Reads the first `wanted` bytes of a regular file, or all of a shorter one. Also returns its
+/// length.
 pub(crate) fn read_start(
     file: &Path,
     place: &str,
@@ -80,7 +81,7 @@ pub(crate) fn read_start(
     Ok((read(file, place, length.min(wanted))?, length))
 }
 
-/// The file's metadata, looked up before it is opened: opening a FIFO would wait for a writer.
+/// The file's metadata, read before the file is opened: opening a FIFO would wait for a writer.
 pub(crate) fn check_regular(file: &Path, place: &str) -> Result<Metadata, SceneError> {
     let metadata = std::fs::metadata(file).map_err(|e| cannot_read(file, place, e))?;
     if metadata.is_file() {

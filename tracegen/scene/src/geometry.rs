@@ -1,4 +1,5 @@
-//! What a file leaves out of a mesh: normals, tangents, the triangles of strips and fans; and boxes.
+//! Geometry that a file leaves out of a mesh (normals, tangents, the triangles of strips and fans),
+//! and bounding boxes.
 
 use crate::Mesh;
 use glam::{Affine3A, Vec2, Vec3, Vec4};
@@ -11,7 +12,7 @@ pub fn vertex_normals(positions: &[Vec3], indices: &[u32]) -> Vec<Vec3> {
     let mut normals = vec![Vec3::ZERO; positions.len()];
     for t in indices.chunks_exact(3) {
         let [a, b, c] = [t[0], t[1], t[2]].map(|i| positions[i as usize]);
-        // The cross product's length is twice the area: the weight comes for free.
+        // The cross product's length is twice the area, so the sum is area-weighted.
         let weighted = (b - a).cross(c - a);
         for &i in t {
             normals[i as usize] += weighted;
@@ -23,7 +24,7 @@ pub fn vertex_normals(positions: &[Vec3], indices: &[u32]) -> Vec<Vec3> {
     normals
 }
 
-/// Fills normals and tangents, and replaces those that are not unit vectors.
+/// Computes missing normals and tangents, and replaces those that are not unit vectors.
 pub(crate) fn complete_vertices(mesh: &mut Mesh, normal_map_uv: Option<u32>) {
     if mesh.normals.is_empty() {
         mesh.normals = vertex_normals(&mesh.positions, &mesh.indices);
@@ -45,7 +46,7 @@ pub(crate) fn complete_vertices(mesh: &mut Mesh, normal_map_uv: Option<u32>) {
                 vertex_tangents(&mesh.positions, &mesh.normals, &mesh.uv1, &mesh.indices)
             }
             Some(_) => vertex_tangents(&mesh.positions, &mesh.normals, &mesh.uv0, &mesh.indices),
-            // Nothing reads them: any perpendicular will do.
+            // No texture reads these tangents, so any perpendicular will do.
             None => (mesh.normals.iter())
                 .map(|n| n.any_orthonormal_vector().extend(1.0))
                 .collect(),
@@ -53,13 +54,13 @@ pub(crate) fn complete_vertices(mesh: &mut Mesh, normal_map_uv: Option<u32>) {
     }
 }
 
-/// Long enough to have a direction, and not too long to be measured.
+/// True if a vector is long enough to have a direction and short enough to be measured.
 fn is_direction(v: Vec3) -> bool {
     let length_squared = v.length_squared();
     length_squared > 1e-12 && length_squared.is_finite()
 }
 
-/// Lowest and highest coordinates, infinite inside out where there are no points.
+/// Lowest and highest coordinates. Without points, the box is inverted and infinite.
 #[must_use]
 pub fn bounding_box(points: impl IntoIterator<Item = Vec3>) -> [Vec3; 2] {
     let empty = [Vec3::splat(f32::INFINITY), Vec3::splat(f32::NEG_INFINITY)];
@@ -68,11 +69,11 @@ pub fn bounding_box(points: impl IntoIterator<Item = Vec3>) -> [Vec3; 2] {
         .fold(empty, |[low, high], p| [low.min(p), high.max(p)])
 }
 
-/// [`bounding_box`] of transformed points; `object_box` is that of the points as they are.
+/// [`bounding_box`] of transformed points. `object_box` is the box of the untransformed points.
 ///
-/// It is the same to the last bit whether points or, where the transform takes axes to axes, only
-/// the box's corners are looked at: a sum with zeros rounds like its other terms, and scaling and
-/// adding keep the order of numbers.
+/// If the transform maps axes to axes, only the box's corners are transformed. The result is the
+/// same to the last bit, because adding zeros changes no rounding, and scaling and adding keep the
+/// order of numbers.
 #[must_use]
 pub fn transformed_box(points: &[Vec3], object_box: [Vec3; 2], transform: &Affine3A) -> [Vec3; 2] {
     let m = &transform.matrix3;
@@ -84,7 +85,7 @@ pub fn transformed_box(points: &[Vec3], object_box: [Vec3; 2], transform: &Affin
     bounding_box(points.iter().map(|p| transform.transform_point3(*p)))
 }
 
-/// The direction of `v`, also where its length squared is beyond `f32`; `fallback` where it has none.
+/// The direction of `v`, even if its squared length overflows `f32`; `fallback` if it has none.
 #[must_use]
 pub fn unit_or(v: Vec3, fallback: Vec3) -> Vec3 {
     if v.length_squared().is_normal() {
@@ -99,7 +100,8 @@ pub fn unit_or(v: Vec3, fallback: Vec3) -> Vec3 {
 /// glTF's normal maps have +y up in the image while v grows downwards, so the bitangent points
 /// against dP/dv and w is +1 where the image is not mirrored.
 ///
-/// Where the texture coordinates say nothing, the tangent is some perpendicular of the normal.
+/// Where the texture coordinates define no direction, the tangent is an arbitrary perpendicular of
+/// the normal.
 #[must_use]
 pub fn vertex_tangents(
     positions: &[Vec3],
@@ -142,7 +144,7 @@ pub fn vertex_tangents(
         .collect()
 }
 
-/// Three indices a triangle from a strip; every other triangle is turned to keep the winding.
+/// Three indices per triangle of a strip. Every other triangle is reversed to keep the winding.
 #[must_use]
 pub fn triangulate_strip(strip: &[u32]) -> Vec<u32> {
     strip
@@ -155,7 +157,7 @@ pub fn triangulate_strip(strip: &[u32]) -> Vec<u32> {
         .collect()
 }
 
-/// Three indices a triangle from a fan.
+/// Three indices per triangle of a fan.
 #[must_use]
 pub fn triangulate_fan(fan: &[u32]) -> Vec<u32> {
     let Some((&centre, rim)) = fan.split_first() else {
@@ -203,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tangent_follows_u_and_its_sign_tells_mirrored_coordinates() {
+    fn the_tangent_follows_u_and_its_sign_marks_mirrored_coordinates() {
         let positions = [Vec3::ZERO, Vec3::X, Vec3::Y];
         let normals = [Vec3::Z; 3];
         let uv = [Vec2::Y, Vec2::ONE, Vec2::ZERO];
@@ -234,7 +236,7 @@ mod tests {
                 .map(|_| Vec3::new(random(), random(), random()))
                 .collect();
             let matrix = match i % 3 {
-                // Axes to axes, scaled and mirrored; or to one plane; or anywhere.
+                // Axes map to axes, scaled and mirrored; or all to one plane; or arbitrarily.
                 0 => {
                     let [a, b] = [axes[i % 6], axes[(i + 1) % 6]];
                     glam::Mat3::from_cols(a * random(), b * random(), a.cross(b) * random())

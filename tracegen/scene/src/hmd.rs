@@ -1,4 +1,4 @@
-//! Head-mounted displays: presets, and the frusta that flags ask for.
+//! Head-mounted displays: presets, and frusta given by flags.
 
 mod presets;
 
@@ -17,7 +17,7 @@ pub enum HmdError {
     /// No preset of that name.
     #[error("unknown display '{name}': expected one of {known}")]
     Unknown {
-        /// As asked.
+        /// The requested name.
         name: String,
         /// Preset names.
         known: String,
@@ -25,11 +25,11 @@ pub enum HmdError {
     /// A figure out of range.
     #[error("{what}: expected {expected}, found {found}")]
     Invalid {
-        /// Which figure.
+        /// Name of the figure.
         what: &'static str,
-        /// The range.
+        /// The valid range.
         expected: String,
-        /// The figure.
+        /// The value found.
         found: String,
     },
 }
@@ -80,7 +80,7 @@ pub fn preset(name: &str) -> Result<Hmd, HmdError> {
     })
 }
 
-/// The other eye's frustum of a display that is its own mirror image.
+/// The other eye's frustum of a mirror-symmetric display.
 #[must_use]
 pub fn mirrored(fov: &FovTangents) -> FovTangents {
     FovTangents {
@@ -176,7 +176,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_preset_is_valid_and_tells_its_source() {
+    fn every_preset_is_valid_and_names_its_source() {
         for name in PRESETS {
             let hmd = preset(name).unwrap();
             assert_eq!(validate(&hmd), Ok(()));
@@ -186,10 +186,11 @@ mod tests {
         assert!(error.contains("'rift'") && error.contains("dk2"), "{error}");
     }
 
-    /// The half-angles that the sources print beside the tangents, those to the sides in the head's
-    /// coordinates, after the cant: a mistyped tangent shows. None where they are those of the lens's mesh.
+    /// The half-angles that the sources print beside the tangents, in the head's coordinates (after
+    /// the cant) for the sides. They reveal a mistyped tangent. None where the source gives the
+    /// angles of the lens's mesh instead.
     #[test]
-    fn headsets_see_as_far_as_their_sources_say() {
+    fn half_angles_of_presets_match_their_sources() {
         let published = [
             (
                 "rift-s",

@@ -1,4 +1,4 @@
-//! Images: what is known of one before its texels are made, and who makes them.
+//! Images: their properties, known before decoding, and the sources that produce their texels.
 
 use crate::SceneError;
 use crate::blocks::{ImageData, StoredBlocks};
@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use std::fmt;
 use std::sync::Arc;
 
-/// An image of a scene. Loading a scene makes no texels; whoever needs them asks for them.
+/// An image of a scene. Loading a scene decodes no texels; they are decoded on request.
 #[derive(Clone)]
 pub struct Image {
     /// File name, or the built-in texture's name.
@@ -17,9 +17,9 @@ pub struct Image {
     pub size: [u32; 2],
     /// Colour space of RGB.
     pub color_space: ColorSpace,
-    /// Blocks that the source holds and that are kept as they are.
+    /// Blocks that the source holds and that are kept unchanged.
     pub stored: Option<StoredBlocks>,
-    /// Makes the texels.
+    /// Produces the texels.
     pub source: Arc<dyn ImageSource>,
     /// Which of the source's images this is.
     pub part: usize,
@@ -36,19 +36,18 @@ impl fmt::Debug for Image {
     }
 }
 
-/// Makes images: a file makes one, a generator makes all maps of a material in one go.
+/// Produces images. A file produces one; a generator produces all maps of a material together.
 pub trait ImageSource: Send + Sync {
-    /// Reads what the texels are made from.
+    /// Reads the source's input.
     ///
     /// # Errors
     /// An unreadable file.
     fn open(&self) -> Result<Box<dyn OpenSource + '_>, SceneError>;
 }
 
-/// A source that has been read and has made nothing yet.
+/// A source whose input has been read and not yet decoded.
 pub trait OpenSource {
-    /// Hands `sink` every byte that decides the texels: what hands over the same bytes makes the
-    /// same texels.
+    /// Passes `sink` every byte that determines the texels. Equal bytes mean equal texels.
     fn identify(&self, sink: &mut dyn FnMut(&[u8]));
 
     /// The texels of each of `parts`: RGBA8, row by row from the top (v = 0).
@@ -57,7 +56,7 @@ pub trait OpenSource {
     /// Damaged input.
     fn texels(&self, parts: &[usize]) -> Result<Vec<Vec<u8>>, SceneError>;
 
-    /// What each of `parts` holds: blocks where [`Image::stored`] names them, or else texels.
+    /// The contents of each of `parts`: blocks where [`Image::stored`] names them, or else texels.
     ///
     /// # Errors
     /// Damaged input.
@@ -70,7 +69,7 @@ pub trait OpenSource {
     }
 }
 
-/// Texels that are at hand.
+/// Texels in memory.
 struct Texels(Vec<u8>);
 
 impl ImageSource for Texels {
@@ -91,7 +90,7 @@ impl OpenSource for &Texels {
 }
 
 impl Image {
-    /// An image whose texels (RGBA8, row by row from the top) are at hand.
+    /// An image from texels in memory (RGBA8, row by row from the top).
     #[must_use]
     pub fn from_texels(
         name: &str,
@@ -110,7 +109,7 @@ impl Image {
     }
 }
 
-/// The indices of the `wanted` images, those of one source together.
+/// The indices of the `wanted` images, grouped by source.
 #[must_use]
 pub fn by_source(images: &[Image], wanted: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
@@ -126,7 +125,7 @@ pub fn by_source(images: &[Image], wanted: impl Fn(usize) -> bool) -> Vec<Vec<us
     groups
 }
 
-/// The texels of the `wanted` images, made on all cores; `None` for the others.
+/// The texels of the `wanted` images, produced on all cores; `None` for the others.
 ///
 /// # Errors
 /// Unreadable or damaged files.

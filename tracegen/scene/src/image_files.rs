@@ -1,4 +1,4 @@
-//! Images in files: found when a scene is loaded, decoded when their texels are asked for.
+//! Images in files: located when a scene is loaded, decoded when their texels are requested.
 
 use crate::SceneError;
 use crate::blocks::{self, ImageData, StoredBlocks};
@@ -14,31 +14,32 @@ use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Largest image edge in texels: what a Vulkan texture may have on the drivers used.
+/// Largest image edge in texels: the limit of a Vulkan texture in the drivers used.
 pub const MAX_SIZE: u32 = 16384;
 
-/// What turns files into texels. A test holds the versions to Cargo.lock: another decoder may
-/// round differently, and prepared textures are kept under this name.
+/// The decoders and their versions, part of the key under which prepared textures are cached:
+/// another version may round differently. A test compares the versions with Cargo.lock.
 const DECODERS: &str = "image 0.25.10, png 0.18.1, zune-jpeg 0.5.15, image-webp 0.2.4, basisu 0.1.0, bcdec_rs 0.2.1, texture2ddecoder 0.1.2, ruzstd 0.9.1";
 
-/// Most bytes of an image's file: more than a PNG of [`MAX_SIZE`] squared takes.
+/// Largest size of an image file in bytes: more than a PNG of [`MAX_SIZE`] squared takes.
 const MAX_FILE_BYTES: u64 = 1 << 31;
 
-/// Most bytes of texels that a byte of an encoded image stands for: deflate reaches 1,032, a JPEG
-/// of one colour about as much. Larger images cannot be whole, and would cost a small file nothing.
+/// Most bytes of texels per byte of an encoded image. Deflate reaches 1,032, and a JPEG of one
+/// colour about as much. A larger image is damaged, or a small file meant to exhaust memory.
 const MAX_EXPANSION: u64 = 2048;
 
-/// Bytes of texels that any image may have.
+/// Bytes of texels that any image may have, however small its file is.
 const SMALL_IMAGE_BYTES: u64 = 1 << 20;
 
-/// Bytes of RGBA8 texels that the images of any scene may have together.
+/// Bytes of RGBA8 texels that the images of any scene may have together, however small the files
+/// are.
 const SMALL_SCENE_BYTES: u64 = 512 << 20;
 
-/// Most bytes of RGBA8 texels that a byte of a scene's images stands for, beyond
-/// [`SMALL_SCENE_BYTES`]. Scenes that people made reach 25.
+/// Most bytes of RGBA8 texels per byte of a scene's images, beyond [`SMALL_SCENE_BYTES`]. Authored
+/// scenes reach 25.
 const MAX_SCENE_EXPANSION: u64 = 128;
 
-/// Encoded bytes of an image, or where they are.
+/// Encoded bytes of an image, or the file that holds them.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Source {
     /// A file.
@@ -47,7 +48,7 @@ pub(crate) enum Source {
     Bytes(Embedded),
 }
 
-/// An image inside the scene file. Two are the same where their numbers are.
+/// An image inside the scene file. Two are equal if their numbers are.
 #[derive(Clone, Debug)]
 pub(crate) struct Embedded {
     pub number: usize,
@@ -68,7 +69,7 @@ impl Hash for Embedded {
     }
 }
 
-/// How a material reads an image, which decides its colour space and channels.
+/// How a material reads an image, which determines its colour space and channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum Usage {
     /// sRGB colour.
@@ -77,8 +78,8 @@ pub(crate) enum Usage {
     Data,
     /// A factor in the alpha channel (specularTexture), spread over RGB as linear data.
     AlphaFactor,
-    /// Colour with an alpha that another image's luminance gives (OBJ's `map_d`), at that index of
-    /// the requests' `masks`.
+    /// Colour whose alpha is the luminance of another image (OBJ's `map_d`), at that index of the
+    /// requests' `masks`.
     Masked(usize),
 }
 
@@ -89,15 +90,15 @@ pub(crate) struct Request {
     pub usage: Usage,
     /// Name for reports.
     pub name: String,
-    /// Who refers to it, for errors.
+    /// The place that refers to it, named in errors.
     pub place: String,
 }
 
-/// The images of a scene, each source and usage once.
+/// The images of a scene, once per source and usage.
 #[derive(Debug, Default)]
 pub(crate) struct Requests {
     list: Vec<Request>,
-    /// Where each source and usage stands in `list`.
+    /// Position of each source and usage in `list`.
     known: HashMap<(Source, Usage), usize>,
     /// Opacity maps of `Usage::Masked`.
     masks: Vec<Request>,
@@ -105,7 +106,7 @@ pub(crate) struct Requests {
 }
 
 impl Requests {
-    /// The index of the image in the scene's table, added where it is new.
+    /// The index of the image in the scene's table. A new image is added.
     pub fn index(&mut self, request: Request) -> usize {
         let key = (request.source.clone(), request.usage);
         *self.known.entry(key).or_insert_with(|| {
@@ -123,10 +124,10 @@ impl Requests {
         })
     }
 
-    /// The images, their sizes read from the files' headers on all cores, in order.
+    /// The images in order. Their sizes are read from the files' headers on all cores.
     ///
-    /// All of them together must stay within the bound on a scene's texels: a renderer may keep
-    /// every one decoded, and no image alone tells that there are thousands.
+    /// All of them together must stay within the bound on a scene's texels, because a renderer may
+    /// keep every one decoded. A check per image would accept thousands of them.
     pub fn images(&self, origin: &Origin) -> Result<Vec<Image>, SceneError> {
         let encoded: Vec<(Encoded, Header)> = (self.list.par_iter())
             .map(|request| {
@@ -158,15 +159,15 @@ impl Requests {
     }
 }
 
-/// What the headers of an image and of its opacity map tell.
+/// Contents of the headers of an image and of its opacity map.
 struct Header {
-    /// Of the image.
+    /// Size of the image.
     size: [u32; 2],
-    /// Bytes of RGBA8 that both decode to.
+    /// Bytes of RGBA8 texels of both.
     texel_bytes: u64,
     /// Encoded bytes of the image, and of the opacity map.
     encoded_bytes: (u64, u64),
-    /// Blocks that are kept as they are.
+    /// Blocks that are kept unchanged.
     stored: Option<StoredBlocks>,
 }
 
@@ -176,9 +177,9 @@ struct Described {
     stored: Option<StoredBlocks>,
 }
 
-/// Refuses the image with which the texels of a scene exceed their bound.
+/// Refuses the first image with which the texels of a scene exceed their bound.
 fn check_total(images: &[(Encoded, Header)]) -> Result<(), SceneError> {
-    // A file that several images are made from counts once.
+    // A file from which several images are made counts once.
     let mut files: HashMap<&Source, u64> = HashMap::new();
     for (encoded, header) in images {
         let (image, mask) = header.encoded_bytes;
@@ -211,15 +212,15 @@ fn check_total(images: &[(Encoded, Header)]) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// An image and its opacity map as files hold them.
+/// An encoded image and its opacity map.
 struct Encoded {
     request: Request,
     mask: Option<Request>,
-    /// Named in errors about images that the scene file itself holds.
+    /// The scene file, named in errors about images embedded in it.
     scene_file: PathBuf,
 }
 
-/// The encoded bytes of both.
+/// The encoded bytes of the image and its opacity map.
 struct Read<'a> {
     of: &'a Encoded,
     image: Arc<[u8]>,
@@ -255,14 +256,14 @@ impl Encoded {
         })
     }
 
-    /// Whether the image's blocks are kept: where its channels are used as they are stored and level
-    /// 0 is whole blocks, which drivers ask for.
+    /// Whether the image's blocks are kept: its channels must be used as stored, and level 0 must
+    /// consist of whole blocks, as drivers require.
     fn keeps(&self, size: [u32; 2], stored: &StoredBlocks) -> bool {
         matches!(self.request.usage, Usage::Color | Usage::Data)
             && blocks::is_whole_blocks(stored.format, size)
     }
 
-    /// What the header of an image of any kind tells.
+    /// Reads the header of an image in any format.
     fn describe(&self, request: &Request, bytes: &[u8]) -> Result<Described, SceneError> {
         match containers::of(bytes) {
             Some(kind) => {
@@ -338,7 +339,7 @@ impl Encoded {
         Ok((size, decoded.into_rgba8().into_raw()))
     }
 
-    /// A decoder that has read the header, and the size that this tells.
+    /// A decoder that has read the header, and the size in that header.
     fn decoder<'a>(
         &self,
         request: &Request,
@@ -350,7 +351,7 @@ impl Encoded {
         let mut limits = Limits::no_limits();
         limits.max_image_width = Some(MAX_SIZE);
         limits.max_image_height = Some(MAX_SIZE);
-        // Eight bytes a texel of the largest image: 16-bit RGBA before it becomes RGBA8.
+        // Eight bytes per texel of the largest image: 16-bit RGBA before it is converted to RGBA8.
         limits.max_alloc = Some(u64::from(MAX_SIZE) * u64::from(MAX_SIZE) * 8);
         reader.limits(limits);
         let decoder = reader
@@ -410,7 +411,7 @@ impl OpenSource for Read<'_> {
             Usage::AlphaFactor => b"alpha",
             Usage::Masked(_) => b"masked",
         });
-        // The length tells where the image ends and its opacity map starts.
+        // The length separates the image from its opacity map.
         sink(&(self.image.len() as u64).to_le_bytes());
         sink(&self.image);
         if let Some(mask) = &self.mask {
@@ -446,7 +447,7 @@ impl OpenSource for Read<'_> {
     }
 }
 
-/// Whether the file begins as an image that is read; `None` where it cannot be read.
+/// Whether the file begins like a supported image; `None` if it cannot be read.
 pub(crate) fn is_readable(file: &Path) -> Option<bool> {
     let (start, _) = read_start(file, "image", 16).ok()?;
     let format = image::guess_format(&start).ok();
@@ -462,8 +463,8 @@ fn spread_alpha(mut rgba: Vec<u8>) -> Vec<u8> {
     rgba
 }
 
-/// Puts the mask's red channel (or its alpha, where it has one) into alpha, sampling the nearest
-/// texel where the sizes differ.
+/// Copies the mask's red channel (or its alpha, if it has one) into alpha. Samples the nearest
+/// texel if the sizes differ.
 fn with_mask(mut rgba: Vec<u8>, size: [u32; 2], mask: &[u8], mask_size: [u32; 2]) -> Vec<u8> {
     let alpha_map = mask.chunks_exact(4).any(|t| t[3] != 255);
     let channel = if alpha_map { 3 } else { 0 };
@@ -482,7 +483,7 @@ mod tests {
     use super::DECODERS;
 
     #[test]
-    fn the_decoders_named_in_keys_are_those_of_the_lock_file() {
+    fn decoder_versions_in_cache_keys_match_the_lock_file() {
         let lock = include_str!("../../../Cargo.lock");
         for decoder in DECODERS.split(", ") {
             let (name, version) = decoder.split_once(' ').unwrap_or_default();

@@ -1,4 +1,5 @@
-//! The scene that every loader fills and every renderer reads: model, loaders, cameras, paths, displays.
+//! The scene model, filled by every loader and read by every renderer: model, loaders, cameras,
+//! paths, displays.
 
 mod animation;
 pub mod blocks;

@@ -1,17 +1,17 @@
-//! What lights a scene, for every renderer alike: the sun and sky of a file without lights, and
-//! the two hemispheres around a scene.
+//! Lighting shared by all renderers: the sun and sky of a file without lights, and the two
+//! hemispheres around a scene.
 
 use crate::{Light, Scene};
 use glam::Vec3;
 
-/// Sky radiance of a scene whose file has no lights: a clear day, dimmer than the sun by far.
+/// Sky radiance of a scene whose file has no lights: a clear day, much dimmer than the sun.
 const DEFAULT_SKY: Vec3 = Vec3::new(0.38, 0.47, 0.62);
 
-/// Part of the light that the ground throws back.
+/// Fraction of the light that the ground reflects.
 const GROUND_ALBEDO: f32 = 0.3;
 
 impl Scene {
-    /// Lights a scene without lights with a sun and, where it is black, a sky.
+    /// Adds a sun to a scene without lights and, if its sky is black, a sky.
     ///
     /// The sun stands at 72 degrees of elevation, so that it reaches the floor of a narrow atrium
     /// with an open roof and still shows relief, and off both horizontal axes, so that no
@@ -40,7 +40,7 @@ impl Scene {
     }
 }
 
-/// Background and ambient light: a sky over a ground that throws light back.
+/// Background and ambient light: a sky over a ground that reflects light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sky {
     /// Radiance of the upper hemisphere, linear RGB.
@@ -60,7 +60,7 @@ impl Sky {
         }
     }
 
-    /// What a ray that leaves the scene sees. The capture shader's `background` is the same.
+    /// Radiance along a ray that leaves the scene. The capture shader's `background` is the same.
     #[must_use]
     pub fn background(&self, direction: Vec3) -> Vec3 {
         let zenith = self.sky * Vec3::new(0.75, 0.85, 1.0);

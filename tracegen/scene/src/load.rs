@@ -5,13 +5,14 @@ use crate::files::{check_regular, shown};
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// Largest extent of a scene along an axis, metres: cubes of lengths must stay within single precision.
+/// Largest extent of a scene along an axis, metres. Cubes of lengths must stay within the range of
+/// single precision.
 const MAX_EXTENT_M: f32 = 1e12;
 
 /// Loads a glTF or OBJ file and completes it as [`complete`] does.
 ///
 /// # Errors
-/// See [`SceneError`]; nothing in a file makes this panic.
+/// See [`SceneError`]. No file contents cause a panic.
 pub fn load_file(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     let extension = path
         .extension()
@@ -20,7 +21,7 @@ pub fn load_file(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneErro
         Some("gltf" | "glb") => gltf::load(path, options)?,
         Some("obj") => obj::load(path, options)?,
         _ => {
-            // A pipe has no name that tells its format.
+            // The format follows from the name, which a pipe does not have.
             if path.exists() {
                 check_regular(path, "scene")?;
             }
@@ -44,7 +45,7 @@ pub fn load_file(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneErro
     }
     let bounds = loaded.scene.bounds();
     let extent_m = bounds.map_or(0.0, |(low, high)| (high - low).max_element());
-    // Not a number where both ends are infinite.
+    // NaN if both ends are infinite.
     if extent_m.is_nan() || extent_m > MAX_EXTENT_M {
         return Err(SceneError::Invalid {
             file: path.to_owned(),
@@ -59,7 +60,7 @@ pub fn load_file(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneErro
     Ok(loaded)
 }
 
-/// Gives a scene what its source lacks: a camera, and the sun with a sky.
+/// Adds the parts that a scene's source lacks: a camera, and a sun with a sky.
 pub fn complete(scene: &mut Scene) {
     if scene.cameras.is_empty() {
         scene.cameras.push(cameras::default_camera(scene));
@@ -71,7 +72,7 @@ pub fn complete(scene: &mut Scene) {
 /// `name`, `name-2`, `name-3`, ... so that `--camera` can choose any of them.
 fn make_names_unique(cameras: &mut [Camera]) {
     let mut taken = HashSet::new();
-    // The number to try next, by name: a file may use one name a million times.
+    // The next number to try, by name: a file may use one name a million times.
     let mut next: HashMap<String, u64> = HashMap::new();
     for camera in cameras {
         let base = camera.name.clone();
@@ -83,7 +84,7 @@ fn make_names_unique(cameras: &mut [Camera]) {
     }
 }
 
-/// Makes every name that comes from the file fit for a terminal, and none endless.
+/// Makes every name from the file printable in a terminal and limits its length.
 fn make_names_printable(scene: &mut Scene) {
     let names = std::iter::once(&mut scene.name)
         .chain(scene.meshes.iter_mut().map(|mesh| &mut mesh.name))
@@ -119,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn cameras_of_one_name_are_numbered() {
+    fn cameras_of_equal_name_are_numbered() {
         let names = ["a", "a", "a-2", "b", "a", "a-2"];
         let mut cameras = names.map(|name| Camera {
             name: name.into(),

@@ -1,4 +1,4 @@
-//! The scene model that every loader fills and every renderer reads.
+//! The scene model, filled by every loader and read by every renderer.
 //!
 //! World space is right-handed, y up, metres. Front faces wind counter-clockwise. Coordinates are
 //! relative to [`Scene::origin`], in single precision.
@@ -13,7 +13,7 @@ use glam::{Affine3A, DVec3, Mat3, Vec2, Vec3, Vec4};
 pub struct Scene {
     /// Name for reports: the built-in's name or the file's stem.
     pub name: String,
-    /// World position that all coordinates are relative to: zero but for a scene far from zero.
+    /// World position that all coordinates are relative to: zero except for a scene far from zero.
     pub origin: DVec3,
     /// Triangle meshes, each with one material.
     pub meshes: Vec<Mesh>,
@@ -46,18 +46,19 @@ pub struct Mesh {
     pub name: String,
     /// Positions, object space.
     pub positions: Vec<Vec3>,
-    /// Unit normals, one a position.
+    /// Unit normals, one per position.
     pub normals: Vec<Vec3>,
-    /// Tangents with the bitangent's sign in w, one a position (computed where the file has none).
+    /// Tangents with the bitangent's sign in w, one per position (computed where the file has
+    /// none).
     pub tangents: Vec<Vec4>,
-    /// Texture coordinates set 0, one a position (zero where the file has none).
+    /// Texture coordinates set 0, one per position (zero where the file has none).
     pub uv0: Vec<Vec2>,
     /// Texture coordinates set 1, empty where no material of the mesh uses it.
     pub uv1: Vec<Vec2>,
-    /// Linear colours with alpha that multiply the base colour, one a position; empty where the
+    /// Linear colours with alpha that multiply the base colour, one per position; empty where the
     /// file has none.
     pub colors: Vec<Vec4>,
-    /// Three indices a triangle.
+    /// Three indices per triangle.
     pub indices: Vec<u32>,
     /// Index into the scene's materials.
     pub material: usize,
@@ -70,7 +71,7 @@ impl Mesh {
         self.indices.len() / 3
     }
 
-    /// Object-space bounds, infinite inside out for a mesh without vertices.
+    /// Object-space bounds. Inverted and infinite for a mesh without vertices.
     #[must_use]
     pub fn bounds(&self) -> [Vec3; 2] {
         bounding_box(self.positions.iter().copied())
@@ -87,7 +88,7 @@ pub struct Instance {
 }
 
 impl Instance {
-    /// True where the transform mirrors, which turns the winding round.
+    /// True where the transform mirrors, which reverses the winding.
     #[must_use]
     pub fn mirrored(&self) -> bool {
         self.transform.matrix3.determinant() < 0.0
@@ -110,7 +111,7 @@ pub enum AlphaMode {
     Opaque,
     /// Fragments whose alpha is below the cutoff are discarded.
     Mask(f32),
-    /// Blended over what is behind, depth tested and not written.
+    /// Blended over what is behind. Depth is tested and not written.
     Blend,
 }
 
@@ -128,7 +129,7 @@ pub struct TextureRef {
 }
 
 impl TextureRef {
-    /// The transform that changes nothing.
+    /// The identity transform.
     pub const IDENTITY: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
     /// Set 0, repeat, trilinear.
@@ -143,7 +144,7 @@ impl TextureRef {
     }
 }
 
-/// A metallic-roughness material with what Whitted-style ray tracing adds.
+/// A metallic-roughness material with additional parameters for Whitted-style ray tracing.
 #[derive(Clone, Debug)]
 pub struct Material {
     /// Name for reports.
@@ -181,7 +182,7 @@ pub struct Material {
     /// Index of refraction. Ray tracing only.
     pub ior: f32,
     /// Fraction mirrored at normal incidence beyond Fresnel's (chrome, polished floors), 0 to 1.
-    /// Ray tracing only, which has smooth metals mirror without it.
+    /// Used by ray tracing only, where smooth metals reflect even if it is 0.
     pub mirror: f32,
 }
 
@@ -225,7 +226,7 @@ impl Material {
         ]
     }
 
-    /// The slots of [`Self::textures`].
+    /// Mutable references to the slots of [`Self::textures`].
     fn textures_mut(&mut self) -> [&mut Option<TextureRef>; 6] {
         [
             &mut self.base_color_texture,
@@ -251,9 +252,9 @@ pub struct Camera {
     pub up: Vec3,
     /// The file's vertical field of view in degrees, used with `--vfov file` only.
     pub vfov_deg: f32,
-    /// Near plane, metres.
+    /// Distance of the near plane, metres.
     pub near: f32,
-    /// Far plane, metres.
+    /// Distance of the far plane, metres.
     pub far: f32,
 }
 
@@ -277,8 +278,8 @@ pub enum Light {
 }
 
 impl Scene {
-    /// Leaves out the textures of the slots (in the order of [`Material::textures`]) that are not
-    /// to be kept, and the images that only they sample.
+    /// Removes the textures of the slots (in the order of [`Material::textures`]) that `keep`
+    /// excludes, and the images that only they sample.
     pub fn keep_texture_slots(&mut self, keep: [bool; 6]) {
         let mut new_index = vec![None; self.images.len()];
         let mut kept = Vec::new();
@@ -298,7 +299,7 @@ impl Scene {
         self.images = kept;
     }
 
-    /// Triangles with instances counted.
+    /// Number of triangles over all instances.
     #[must_use]
     pub fn triangle_count(&self) -> u64 {
         self.instances

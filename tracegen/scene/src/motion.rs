@@ -1,4 +1,4 @@
-//! Instances that move: pure functions of time, nothing displaced at time 0.
+//! Instances that move: pure functions of time, with no displacement at time 0.
 
 use crate::Scene;
 use glam::{Affine3A, Quat, Vec3};
@@ -9,35 +9,35 @@ use std::f32::consts::TAU;
 pub struct Motion {
     /// Indices into the scene's instances; an instance belongs to one motion at most.
     pub instances: Vec<usize>,
-    /// What carries them, outermost first: a crane's bridge, then the trolley on it.
+    /// The movements that apply to them, outermost first: a crane's bridge, then the trolley on it.
     pub movements: Vec<Movement>,
 }
 
 /// A movement in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Movement {
-    /// To and fro, slowing down at both ends.
+    /// Back and forth, slowing down at both ends.
     Shuttle {
-        /// From one end to the other, metres.
+        /// Displacement from one end to the other, metres.
         by: Vec3,
-        /// Seconds there and back.
+        /// Seconds per round trip.
         period_s: f32,
-        /// Where it is at time 0: 0 at one end, 0.5 at the other, 1 back again.
+        /// Position at time 0: 0 at one end, 0.5 at the other, 1 back at the first.
         phase: f32,
     },
-    /// Turning about an axis.
+    /// Rotation about an axis.
     Turn {
-        /// A point of the axis where the movements around this one are at time 0, metres.
+        /// A point of the axis at time 0, in the frame of the outer movements, metres.
         pivot: Vec3,
-        /// Direction, unit length; positive turns follow the right hand.
+        /// Direction, unit length. Positive rotation follows the right hand.
         axis: Vec3,
-        /// Turns a second.
+        /// Turns per second.
         turns_per_s: f32,
     },
 }
 
 impl Movement {
-    /// Displacement against time 0.
+    /// Displacement relative to time 0.
     #[must_use]
     pub fn transform(&self, time_s: f32) -> Affine3A {
         match *self {
@@ -62,7 +62,7 @@ impl Movement {
 }
 
 impl Motion {
-    /// Displacement of its instances against time 0, world space.
+    /// Displacement of its instances relative to time 0, world space.
     #[must_use]
     pub fn transform(&self, time_s: f32) -> Affine3A {
         let product = |outer, movement: &Movement| outer * movement.transform(time_s);
@@ -71,14 +71,14 @@ impl Motion {
 }
 
 impl Scene {
-    /// Whether anything of it moves.
+    /// Whether any part of the scene moves.
     #[must_use]
     pub fn moves(&self) -> bool {
         !self.motions.is_empty() || self.animation.is_some()
     }
 
-    /// The instances that move, each with its object-to-world transform at a time. At time 0 all
-    /// stand as [`Scene::instances`] has them.
+    /// The moving instances, each with its object-to-world transform at a time. At time 0 it equals
+    /// the transform in [`Scene::instances`].
     pub fn moved(&self, time_s: f32) -> impl Iterator<Item = (usize, Affine3A)> + '_ {
         self.motions.iter().flat_map(move |motion| {
             let moved = motion.transform(time_s);
@@ -88,7 +88,7 @@ impl Scene {
         })
     }
 
-    /// Puts the instances that move where they are at a time.
+    /// Applies the transforms of a time to the moving instances.
     pub fn pose(&mut self, time_s: f32) {
         let moved: Vec<(usize, Affine3A)> = self.moved(time_s).collect();
         for (index, transform) in moved {
@@ -118,13 +118,13 @@ mod tests {
         close(at(0.0, 1.0), Vec3::X * 5.0);
         close(at(0.0, 2.0), Vec3::X * 10.0);
         close(at(0.0, 4.0), Vec3::ZERO);
-        // From the far end it goes back.
+        // From the far end it returns.
         close(at(0.5, 0.0), Vec3::ZERO);
         close(at(0.5, 2.0), Vec3::X * -10.0);
     }
 
     #[test]
-    fn what_is_carried_turns_about_an_axis_that_moves() {
+    fn an_inner_movement_turns_about_an_axis_that_the_outer_one_moves() {
         let scene = Scene {
             instances: vec![
                 Instance {
@@ -155,7 +155,8 @@ mod tests {
             scene.moved(t).map(place).collect()
         };
         assert_eq!(at(0.0), [(1, Vec3::new(2.0, 0.0, 0.0))]);
-        // A quarter turn about (1, 0, 0) takes (2, 0, 0) to (1, 0, -1); the carrier is 8 m on.
+        // A quarter turn about (1, 0, 0) takes (2, 0, 0) to (1, 0, -1). The outer movement adds 8
+        // m.
         close(at(1.0)[0].1, Vec3::new(1.0, 0.0, 7.0));
         let mut posed = scene.clone();
         posed.pose(1.0);

@@ -1,9 +1,9 @@
-//! What a loader is asked for and what it hands over.
+//! Options and results of a loader.
 
 use crate::Scene;
 use std::path::PathBuf;
 
-/// What a loader reads besides geometry.
+/// Options of a loader.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadOptions {
     /// Which of [`super::Material::textures`] to keep, in that order; the others become `None` and
@@ -18,7 +18,7 @@ pub struct LoadOptions {
 }
 
 impl LoadOptions {
-    /// Everything.
+    /// All textures.
     pub const ALL: Self = Self {
         slots: [true; 6],
         variant: None,
@@ -42,14 +42,14 @@ impl Default for LoadOptions {
     }
 }
 
-/// A scene and what was odd about its file.
+/// A scene, and warnings about its file.
 #[derive(Debug)]
 pub struct Loaded {
     /// The scene.
     pub scene: Scene,
-    /// One sentence each; nothing here stops the scene from being used.
+    /// One sentence each. None of them prevents the scene from being used.
     pub warnings: Vec<String>,
-    /// Every file that the scene refers to, read or not, its own first; none for a built-in scene.
+    /// Every file that the scene refers to, read or not, its own first. Empty for a built-in scene.
     pub files: Vec<PathBuf>,
     /// Names of the file's animations.
     pub animations: Vec<String>,

@@ -1,21 +1,22 @@
 //! The point that a scene's coordinates are relative to.
 //!
 //! Renderers calculate in single precision, whose steps grow with the distance from zero: a metre
-//! at 10^7 m. Loaders therefore read places in double precision and subtract a point near the
-//! scene before anything is rounded. A scene near zero keeps zero, and so its bits.
+//! at 10^7 m. Loaders therefore read positions in double precision and subtract a point near the
+//! scene before rounding. A scene near zero keeps the origin zero, so its coordinates are
+//! unchanged.
 
 use crate::{Instance, Mesh};
 use glam::{Affine3A, DAffine3, DVec3, Vec3};
 
-/// A scene whose middle is further from zero than this many of its own half extents is moved: at
-/// most five bits of single precision go to where it stands.
+/// A scene is moved if its middle is further from zero than this many of its half extents. At most
+/// five bits of single precision are then lost to its position.
 const FAR: f64 = 16.0;
 
-/// The origin for what lies within `[low, high]`: zero, or the middle where that is far out.
+/// The origin for points within `[low, high]`: zero, or the middle if that is far from zero.
 ///
-/// It lies on a grid of powers of two as wide as half of the extent. A scene that is moved by
-/// multiples of that grid therefore gets the very same coordinates wherever it stands, and
-/// subtracting it from 32-bit numbers rounds none.
+/// It lies on a grid of powers of two with a spacing of half of the extent. A scene moved by
+/// multiples of that spacing therefore gets identical coordinates at every position, and
+/// subtracting the origin from 32-bit numbers is exact.
 pub(crate) fn of([low, high]: [DVec3; 2]) -> DVec3 {
     let half = (high - low).max_element() / 2.0;
     let middle = (low + high) / 2.0;
@@ -33,13 +34,13 @@ fn power_of_two_above(value: f64) -> f64 {
     f64::from_bits((value.to_bits() & EXPONENT) + (1 << 52))
 }
 
-/// A point relative to the origin, rounded last.
+/// A point relative to the origin, rounded only at the end.
 #[must_use]
 pub(crate) fn relative(point: DVec3, origin: DVec3) -> Vec3 {
     (point - origin).as_vec3()
 }
 
-/// A transform to the world as one to coordinates relative to the origin, rounded last.
+/// A transform to the world, made relative to the origin and rounded only at the end.
 #[must_use]
 pub(crate) fn relative_transform(mut transform: DAffine3, origin: DVec3) -> Affine3A {
     transform.translation -= origin;
@@ -57,8 +58,8 @@ pub(crate) struct Placed {
 /// Chooses the origin of placed meshes (each a mesh and its transform to the world) and makes
 /// instances relative to it.
 ///
-/// Meshes of a scene that is moved are moved as well where they stand far from their own zero,
-/// which rounds nothing: large numbers in vertices would meet large ones in the transform.
+/// If the scene is moved, meshes whose vertices are far from their own zero are moved as well.
+/// Otherwise large vertex coordinates would combine with large translations. Moving them is exact.
 pub(crate) fn place(meshes: &mut [Mesh], placed: &[(usize, DAffine3)]) -> Placed {
     let boxes: Vec<[DVec3; 2]> = (meshes.iter())
         .map(|mesh| mesh.bounds().map(|corner| corner.as_dvec3()))
@@ -135,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_far_out_has_its_origin_in_its_middle_at_any_scale() {
+    fn a_scene_far_from_zero_has_its_origin_in_its_middle_at_any_scale() {
         for exponent in [-40, -20, 0, 20, 40] {
             let scale = 2f64.powi(exponent);
             for far in [1e3, 1e5, 1e6, 1e7, -1e7] {
@@ -147,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_that_is_moved_by_its_vertices_and_one_that_is_moved_by_its_node_are_the_same() {
+    fn meshes_moved_by_their_vertices_or_by_their_node_are_equal() {
         let triangle = [Vec3::new(-1.0, 0.0, 0.5), Vec3::X, Vec3::Y];
         let far = Vec3::new(1e5, -1e5, 3e5);
         let mesh = |offset: Vec3| Mesh {
@@ -170,7 +171,7 @@ mod tests {
                 .collect();
             assert_eq!(placed, triangle);
         }
-        // At zero nothing is touched, whatever the mesh's own place.
+        // At zero nothing changes, wherever the mesh's vertices are.
         let mut meshes = [mesh(Vec3::splat(64.0)), mesh(Vec3::ZERO)];
         let placed = place(&mut meshes, &[(0, baked), (1, baked)]);
         assert_eq!(placed.origin, DVec3::ZERO);

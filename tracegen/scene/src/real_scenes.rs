@@ -1,4 +1,4 @@
-//! The shared test scenes: counts as their README says. Skipped, and said so, where absent.
+//! The shared test scenes: counts against their README. Skipped with a message if they are absent.
 
 use super::{LoadOptions, load_file};
 use std::io::Write;
@@ -62,7 +62,7 @@ fn real_scenes_have_the_counts_and_cameras_of_their_readme() {
     for (file, triangles, materials, images, cameras) in SCENES {
         let path = folder().join(file);
         if !path.exists() {
-            // Not `eprintln`, whose lines libtest keeps: `scripts/test.sh` lists this one.
+            // Not `eprintln`, whose output libtest captures: `scripts/test.sh` lists this line.
             let _ = writeln!(
                 std::io::stderr(),
                 "SKIPPED: {} is absent (set PARALLAX_SCENES)",

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 pub static LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| decode(byte as f64 / 255.0) as f32));
 
-/// Linear value of an encoded one, both 0 to 1.
+/// Linear value of an encoded value, both 0 to 1.
 #[must_use]
 pub fn decode(encoded: f64) -> f64 {
     if encoded <= 0.04045 {
@@ -16,8 +16,8 @@ pub fn decode(encoded: f64) -> f64 {
     }
 }
 
-/// [`decode`] in single precision throughout, whose last bit differs here and there: golden ray
-/// traces hold what material factors decoded like this give.
+/// [`decode`] in single precision throughout. Its last bit differs for some values; golden ray
+/// traces depend on material factors decoded this way.
 #[must_use]
 pub fn decode_f32(encoded: f32) -> f32 {
     if encoded <= 0.04045 {
@@ -27,7 +27,7 @@ pub fn decode_f32(encoded: f32) -> f32 {
     }
 }
 
-/// Encoded value of a linear one, both 0 to 1.
+/// Encoded value of a linear value, both 0 to 1.
 #[must_use]
 pub fn encode(linear: f64) -> f64 {
     if linear <= 0.003_130_8 {
@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_byte_survives_the_way_to_linear_light_and_back() {
+    fn every_byte_survives_decoding_and_encoding() {
         for byte in 0..=255u8 {
             let linear = LINEAR[usize::from(byte)];
             assert_eq!((encode(linear.into()) * 255.0).round() as u8, byte);

@@ -1,6 +1,6 @@
 //! glTF URIs: data URIs and percent-encoded relative paths (RFC 3986, RFC 2397).
 
-/// Where a URI points.
+/// Target of a URI.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum Uri {
     /// Bytes inside the URI.
@@ -9,7 +9,7 @@ pub(crate) enum Uri {
     Path(String),
 }
 
-/// Parses a URI; the error says what is wrong with it.
+/// Parses a URI. The error states what is wrong with it.
 pub(crate) fn parse(uri: &str) -> Result<Uri, String> {
     if let Some(rest) = uri.strip_prefix("data:") {
         let (header, body) = rest
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_is_named() {
+    fn unreadable_uris_are_refused_with_the_reason() {
         for (uri, part) in [
             ("http://x/y.bin", "scheme 'http'"),
             ("a%2", "percent escape"),

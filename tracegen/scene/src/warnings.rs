@@ -1,8 +1,8 @@
-//! What is odd about a file: one line a kind, however often it occurs.
+//! Warnings about a file: one line per kind, however often it occurs.
 
 use crate::files::shown;
 
-/// Collects warnings; text from the file comes out fit for a terminal.
+/// Collects warnings. Text from the file is made printable in a terminal.
 #[derive(Debug, Default)]
 pub(crate) struct Warnings {
     /// Kind, the first occurrence's sentence, and how many there were.
@@ -18,17 +18,17 @@ impl Warnings {
         }
     }
 
-    /// Adds a sentence of its own.
+    /// Adds an uncounted sentence.
     pub fn say(&mut self, sentence: &str) {
         self.kinds.push(("", shown(sentence), 1));
     }
 
-    /// Adds what another part of the file gave cause for.
+    /// Appends the warnings of another part of the file.
     pub fn append(&mut self, other: Self) {
         self.kinds.extend(other.kinds);
     }
 
-    /// One sentence a kind, in order of first occurrence.
+    /// One sentence per kind, in order of first occurrence.
     pub fn into_sentences(self) -> Vec<String> {
         self.kinds
             .into_iter()

@@ -26,7 +26,7 @@ const FLOOR2: f32 = 5.6;
 const SPRING2: f32 = FLOOR2 + 2.4;
 const EAVES: f32 = 10.0;
 
-/// How finely the architecture is modelled.
+/// Modelling detail of the architecture.
 #[derive(Clone, Copy, Debug)]
 struct Detail {
     column: Column,
@@ -99,7 +99,7 @@ const PLAIN: Detail = Detail {
     furnished: false,
 };
 
-/// Crytek Sponza's stand-in: many textures a material.
+/// Stand-in for Crytek Sponza: many textures per material.
 #[must_use]
 pub fn rich() -> Scene {
     let mut scene = SceneBuilder::new("atrium");
@@ -108,7 +108,7 @@ pub fn rich() -> Scene {
     scene.finish(vec3(0.62, 0.74, 0.92), 0)
 }
 
-/// The L-Bench Sponza's stand-in: few simple textures.
+/// Stand-in for the L-Bench Sponza: few simple textures.
 #[must_use]
 pub fn plain() -> Scene {
     simple("atrium-plain", 0)
@@ -127,12 +127,12 @@ fn simple(name: &str, cascades: u32) -> Scene {
     scene.finish(vec3(0.62, 0.74, 0.92), cascades)
 }
 
-/// A turn about the vertical, then a move.
+/// A rotation about the vertical, then a translation.
 fn at(position: Vec3, turn: f32) -> Affine3A {
     Affine3A::from_rotation_translation(Quat::from_rotation_y(turn), position)
 }
 
-/// One side of the court: centres of its bays and the turn that makes +z face the court.
+/// One side of the court: centres of its bays and the rotation that makes +z face the court.
 struct Side {
     bays: Vec<Vec3>,
     turn: f32,

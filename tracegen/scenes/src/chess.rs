@@ -15,7 +15,7 @@ const SQUARE: f32 = 0.057;
 /// Segments around a piece.
 const SEGMENTS: usize = 16;
 
-/// The foot that all pieces share, up to `height`, with radius `r`.
+/// The foot shared by all pieces, up to `height`, with radius `r`.
 fn foot(r: f32) -> Vec<Knot> {
     vec![
         sharp(0.0, 0.0),
@@ -110,7 +110,7 @@ fn bishop() -> MeshBuilder {
         smooth(0.0, 0.0872),
     ]);
     let mut m = MeshBuilder::new();
-    // The mitre's cut: a notch that climbs round one side.
+    // The mitre's cut: a notch that rises along one side.
     m.lathe_shaped(&curve(&knots, 2), SEGMENTS + 5, |angle, y| {
         let turn = (angle + PI).rem_euclid(TAU) - PI;
         let cut = (-((y - 0.0700 - 0.004 * turn) / 0.0016).powi(2)).exp();
@@ -187,7 +187,7 @@ fn spline<const N: usize>(values: &[[f32; 4]; N], t: f32) -> [f32; 4] {
     })
 }
 
-/// The horse: an oval swept from the chest over the poll down to the muzzle.
+/// The knight: an oval swept from the chest over the poll down to the muzzle.
 fn knight() -> MeshBuilder {
     let upper = [
         smooth(0.0145, 0.0195),
@@ -195,7 +195,7 @@ fn knight() -> MeshBuilder {
         sharp(0.0, 0.0225),
     ];
     let mut m = turned(0.0195, &upper);
-    // Forward, height, half depth in the plane, half width; millimetres.
+    // Forward, height, half depth in the plane, half width, all in millimetres.
     let spine: [[f32; 4]; 10] = [
         [-0.5, 20.0, 12.8, 11.0],
         [-1.5, 28.0, 12.2, 9.4],
@@ -215,7 +215,7 @@ fn knight() -> MeshBuilder {
         let along = vec2(ahead[0] - behind[0], ahead[1] - behind[1]).normalize_or_zero();
         let out = vec2(along.y, -along.x);
         let (sin, cos) = (TAU * s).sin_cos();
-        // The mane stands up along the back in waves; jaw and cheek swell at the head.
+        // The mane rises along the back in waves. Jaw and cheek bulge at the head.
         let back =
             smoothstep(0.55, 1.0, -cos) * smoothstep(0.04, 0.2, t) * smoothstep(0.72, 0.55, t);
         let mane = back * (1.6 + 0.9 * (t * 62.0).sin());

@@ -1,4 +1,4 @@
-//! A tyrannosaur: ovals swept along the lines of its body, neck, tail, legs and arms.
+//! A tyrannosaur: ovals swept along the centre lines of body, neck, tail, legs and arms.
 
 use super::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
 use super::noise::{bank, smoothstep};
@@ -62,7 +62,7 @@ fn limb(rings: &[Ring], cells: [usize; 2], swell: impl Fn(f32, f32) -> f32) -> M
         let here = catmull(rings, t);
         let along =
             (catmull(rings, t + 0.01).at - catmull(rings, t - 0.01).at).normalize_or(Vec3::X);
-        // Across stays level; the oval's other axis is upright to both.
+        // `across` stays level. The oval's other axis is perpendicular to it and to the sweep.
         let across = along.cross(Vec3::Y).normalize_or(Vec3::Z);
         let up = across.cross(along);
         let (sin, cos) = (TAU * (s - s.floor())).sin_cos();
@@ -148,7 +148,7 @@ impl Creature {
             .merge(&limb(&body, [28, 84], spines), Affine3A::IDENTITY);
     }
 
-    /// Skull and upper jaw, and the lower jaw hanging open.
+    /// Skull and upper jaw, and the open lower jaw.
     fn head(&mut self) {
         let skull = [
             ring(2.30, 3.46, 0.08, 0.24, 0.28),
@@ -211,7 +211,7 @@ impl Creature {
         );
     }
 
-    /// Thigh, shank and foot; the far leg strides.
+    /// Thigh, shank and foot. The far leg is in mid-stride.
     fn hind_leg(&mut self, side: f32) {
         let step = if side > 0.0 { 0.35 } else { -0.45 };
         let leg = [

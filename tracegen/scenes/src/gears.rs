@@ -12,7 +12,7 @@ const FLANK: usize = 6;
 pub struct Gear {
     /// Number of teeth.
     pub teeth: u32,
-    /// Pitch diameter a tooth, metres: gears of one module mesh.
+    /// Module: pitch diameter per tooth, metres. Gears of equal module mesh.
     pub module: f32,
     /// Thickness along z, metres.
     pub thickness: f32,
@@ -23,14 +23,14 @@ pub struct Gear {
 }
 
 impl Gear {
-    /// Radius at which gears roll on one another.
+    /// Radius of the pitch circle, on which gears roll on one another.
     #[must_use]
     pub fn pitch_radius(&self) -> f32 {
         0.5 * self.module * self.teeth as f32
     }
 
-    /// The turn that makes this gear, at `direction` (an angle) from a driver turned by
-    /// `driver_turn`, mesh with it: its gap meets the driver's tooth.
+    /// The rotation with which this gear meshes with a driver rotated by `driver_turn`, if it is at
+    /// `direction` (an angle) from the driver: its gap meets the driver's tooth.
     #[must_use]
     pub fn mesh_turn(&self, driver: &Self, driver_turn: f32, direction: f32) -> f32 {
         let phase = (direction - driver_turn) * driver.teeth as f32 / TAU;
@@ -46,7 +46,8 @@ impl Gear {
             let a = (base / r.max(base)).acos();
             a.tan() - a
         };
-        // Half the tooth's angle at radius r: a quarter pitch at the pitch circle, less clearance.
+        // Half the tooth's angle at radius r: a quarter of the pitch at the pitch circle, minus
+        // clearance.
         let half = |r: f32| 0.94 * PI / (2.0 * self.teeth as f32) + involute(pitch) - involute(r);
         let low = root.max(base);
         let mut points = Vec::new();
@@ -235,8 +236,8 @@ pub fn screw(radius: f32) -> MeshBuilder {
 
 /// A worm about the z axis: a thread of `turns` around a shaft.
 #[must_use]
-pub fn worm(radius: f32, length: f32, turns: f32, steps_a_turn: usize) -> MeshBuilder {
-    let steps = (turns * steps_a_turn as f32) as usize;
+pub fn worm(radius: f32, length: f32, turns: f32, steps_per_turn: usize) -> MeshBuilder {
+    let steps = (turns * steps_per_turn as f32) as usize;
     let mut m = MeshBuilder::new();
     let points: Vec<(Vec3, f32)> = (0..=steps)
         .map(|i| {

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3, vec2, vec3};
 use std::f32::consts::TAU;
 
 /// The profile of a vessel: `outer` from the axis at the bottom to the rim, then back down inside
-/// at `wall` metres from it.
+/// at a distance of `wall` metres.
 #[must_use]
 pub fn shell(outer: &[Knot], wall: f32) -> Vec<Knot> {
     let mut knots = outer.to_vec();
@@ -36,13 +36,13 @@ pub fn shell(outer: &[Knot], wall: f32) -> Vec<Knot> {
     knots
 }
 
-/// What fills a vessel up to `level`: its inner skin, drawn in by `gap` so that glass and liquid
-/// do not share a surface, closed on top with a meniscus.
+/// The contents of a vessel up to `level`: its inner skin reduced by `gap`, so that glass and
+/// liquid do not share a surface, closed on top with a meniscus.
 #[must_use]
 pub fn filling(outer: &[Knot], wall: f32, gap: f32, level: f32) -> Vec<Knot> {
     let full = shell(outer, wall + gap);
     let mut inside: Vec<Knot> = full[outer.len()..].iter().rev().copied().collect();
-    // Keep what is below the level and cut the last stretch at it.
+    // Keep the part below the level and cut the last segment there.
     let cut = inside
         .iter()
         .position(|k| k.at.y > level)
@@ -66,7 +66,7 @@ pub fn filling(outer: &[Knot], wall: f32, gap: f32, level: f32) -> Vec<Knot> {
     inside
 }
 
-/// A conical flask of height 1 (times `h`).
+/// A conical flask of height `h`.
 #[must_use]
 pub fn erlenmeyer(h: f32, steps: usize) -> Vec<Knot> {
     curve(

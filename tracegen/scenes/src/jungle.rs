@@ -1,6 +1,6 @@
 //! A jungle clearing with a temple ruin: a stand-in for GFXBench's T-Rex.
 //!
-//! A winding path leads to the ruin; foliage with alpha masks is instanced from few meshes.
+//! A winding path leads to the ruin. Foliage with alpha masks is instanced from few meshes.
 
 pub(crate) mod plants;
 mod temple;
@@ -21,10 +21,10 @@ const HALF: f32 = 34.0;
 /// Centre of the temple's platform.
 const TEMPLE: Vec3 = vec3(15.0, 0.0, 0.0);
 
-/// Where the creature stands.
+/// Position of the creature.
 const CREATURE: Vec3 = vec3(1.4, 0.0, -3.6);
 
-/// Where the path runs: z as a function of x.
+/// The path: z as a function of x.
 fn path_z(x: f32) -> f32 {
     1.6 * (0.16 * x + 2.2).sin() * smoothstep(12.0, 2.0, x)
 }
@@ -309,7 +309,7 @@ fn terrain(scene: &mut SceneBuilder, solids: &Solids) {
         let x = -HALF + t * (HALF + 8.5);
         let ragged = 1.15 + 0.35 * (bank().mottle.smooth(x / 16.0, 0.5 + s.round() * 0.2) - 0.5);
         let z = path_z(x) + ragged * (2.0 * s - 1.0);
-        // Just above the floor in the middle, below it at the rims.
+        // Just above the ground in the middle, below it at the edges.
         let lift = 0.045 - 0.12 * (2.0 * s - 1.0).powi(4);
         (vec3(x, ground(x, z) + lift, z), vec2(x, z))
     });
@@ -317,7 +317,8 @@ fn terrain(scene: &mut SceneBuilder, solids: &Solids) {
     scene.add("path", path, solids.path);
 }
 
-/// Whether a plant that keeps `clear` metres from the path would be inside the creature or in front of it.
+/// Whether a plant that keeps `clear` metres from the path would be inside or in front of the
+/// creature.
 fn hides_creature(x: f32, z: f32, clear: f32) -> bool {
     let eye = vec2(-8.5, path_z(-8.5));
     let (to, at) = (vec2(CREATURE.x, CREATURE.z) - eye, vec2(x, z) - eye);
@@ -383,7 +384,7 @@ fn trees(scene: &mut SceneBuilder, leaves: &Leaves, solids: &Solids, rng: &mut R
             0..14 => spot(rng, 3.2, 22.0, 10.0),
             14..34 => spot(rng, 5.0, 22.0, 10.0),
             _ => {
-                // A wall of trees behind the ruin closes the view.
+                // A wall of trees behind the ruin blocks the view.
                 let (sin, cos) = (0.16 * (i as f32 - 41.5) + rng.jitter(0.05)).sin_cos();
                 let (x, z) = (4.0 + 27.0 * cos, 25.0 * sin);
                 vec3(x, ground(x, z), z)

@@ -115,7 +115,7 @@ pub(super) fn at(x: f32, y: f32, z: f32) -> Affine3A {
     Affine3A::from_translation(vec3(x, y, z))
 }
 
-/// How a vessel is blown.
+/// Parameters of a vessel.
 pub(super) struct Ware<'a> {
     /// Outline of the outer skin from the axis to the rim.
     pub(super) outer: &'a [Knot],
@@ -123,7 +123,7 @@ pub(super) struct Ware<'a> {
     pub(super) wall: f32,
     /// Segments around.
     pub(super) segments: usize,
-    /// How far the rim is pulled out into a spout, as a fraction of its radius.
+    /// Distance by which the rim is pulled out into a spout, as a fraction of its radius.
     pub(super) lip: f32,
 }
 
@@ -138,7 +138,7 @@ impl<'a> Ware<'a> {
     }
 }
 
-/// A turned vessel and what is in it (liquid and its level), placed together.
+/// A turned vessel and its contents (liquid and its level), placed together.
 pub(super) fn vessel(
     scene: &mut SceneBuilder,
     glass: MaterialId,
@@ -210,7 +210,7 @@ fn furniture(scene: &mut SceneBuilder, kit: &LabMaterials) {
     scene.add("wall", wall, kit.tiles);
 }
 
-/// Conical flasks and beakers with what they hold; a rod, a dish and a funnel.
+/// Conical flasks and beakers with their contents, a rod, a dish and a funnel.
 fn flasks(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let flask = erlenmeyer(0.145, 3);
     vessel(
@@ -245,7 +245,7 @@ fn flasks(scene: &mut SceneBuilder, kit: &LabMaterials) {
         &[at(-0.24, 0.0, 0.19)],
     );
     graduated_cylinder(scene, kit);
-    // A stirring rod in the beaker and a petri dish before it.
+    // A stirring rod in the beaker and a petri dish in front of it.
     let rod = glass_tube(
         &[
             (vec3(0.052, 0.006, 0.15), 0.003),
@@ -349,7 +349,7 @@ fn rack(scene: &mut SceneBuilder, kit: &LabMaterials) {
             0.002,
         );
     }
-    // The shelf is drilled: a plate around each hole.
+    // The shelf has drilled holes: a plate around each.
     for i in 0..6 {
         let c = x0 + 0.0165 + 0.0335 * i as f32;
         for y in [0.062, 0.104] {

@@ -23,15 +23,14 @@ use scene::{LoadOptions, Loaded, Scene, SceneError};
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-/// A built-in scene. What the table says of it is held true by a test, so that listing the scenes
-/// builds none.
+/// A built-in scene. A test compares this table with the scenes, so that listing them builds none.
 #[derive(Clone, Debug)]
 pub struct Builtin {
     /// Name on the command line.
     pub name: &'static str,
-    /// What it shows, and which scene it is a stand-in for.
+    /// What it shows, and the scene for which it is a stand-in.
     pub description: &'static str,
-    /// Triangles with instances counted.
+    /// Number of triangles over all instances.
     pub triangles: u64,
     /// Its cameras; the first is the default.
     pub cameras: &'static [&'static str],
@@ -40,12 +39,12 @@ pub struct Builtin {
     builder: Builder,
 }
 
-/// How a scene is built.
+/// The function that builds a scene.
 #[derive(Clone, Copy, Debug)]
 enum Builder {
-    /// Always the same.
+    /// A scene without parameters.
     Fixed(fn() -> Scene),
-    /// With a number of instances; the usual one first.
+    /// A scene with a number of instances; the default number comes first.
     Sized(u32, fn(u32) -> Scene),
 }
 
@@ -141,11 +140,11 @@ pub const BUILTINS: &[Builtin] = &[
     },
 ];
 
-/// Builds a built-in scene; `None` if there is none of that name. The same name gives the same
-/// scene, bit for bit, whatever the number of threads.
+/// Builds a built-in scene; `None` if no scene has that name. The same name gives the same scene,
+/// bit for bit, for any number of threads.
 ///
 /// # Errors
-/// A number of instances (`name:NUMBER`) that the scene cannot have.
+/// A number of instances (`name:NUMBER`) that the scene does not allow.
 pub fn build(spec: &str) -> Result<Option<Scene>, SceneError> {
     let (name, number) = match spec.split_once(':') {
         Some((name, number)) => (name, Some(number)),
@@ -174,12 +173,12 @@ pub fn build(spec: &str) -> Result<Option<Scene>, SceneError> {
 /// Loads a built-in scene by name, or a glTF or OBJ file by path, with all its images.
 ///
 /// # Errors
-/// See [`SceneError`]; nothing in a file makes this panic.
+/// See [`SceneError`]. No file contents cause a panic.
 pub fn load(spec: &str) -> Result<Scene, SceneError> {
     load_with(spec, &LoadOptions::ALL).map(|loaded| loaded.scene)
 }
 
-/// [`load`] with a choice of images, telling the warnings.
+/// [`load`] with a choice of images. Also returns the warnings.
 ///
 /// # Errors
 /// See [`SceneError`].

@@ -26,7 +26,7 @@ pub fn courses(u: f32, v: f32, columns: i32, rows: i32, shift: f32) -> Cell {
     }
 }
 
-/// Ashlar: courses whose blocks are of uneven length.
+/// Ashlar: courses of blocks with uneven lengths.
 #[must_use]
 pub fn ashlar(u: f32, v: f32, columns: i32, rows: i32) -> Cell {
     let y = v * rows as f32;
@@ -70,10 +70,10 @@ pub fn inset_tiles(u: f32, v: f32, count: i32, inset: f32) -> Cell {
     }
 }
 
-/// How blocks look.
+/// Appearance of blocks.
 #[derive(Clone, Copy, Debug)]
 pub struct Masonry {
-    /// Colours that blocks range between.
+    /// The range of block colours.
     pub stones: [Rgb; 2],
     /// Colour of the joints.
     pub mortar: Rgb,
@@ -225,7 +225,7 @@ pub fn carved_stone(stones: [Rgb; 2], veins: f32, pitting: f32, rough: f32) -> S
     })
 }
 
-/// Painted or bare plaster with trowel marks, stains and places where it has come off.
+/// Painted or bare plaster with trowel marks, stains and peeled patches.
 #[must_use]
 pub fn plaster(paint: Rgb, under: Rgb, peeling: f32) -> Surface {
     Box::new(move |u, v| {
@@ -235,7 +235,7 @@ pub fn plaster(paint: Rgb, under: Rgb, peeling: f32) -> Surface {
             noise.mottle.at(u, v),
             noise.grain.at(u, v),
         );
-        // Columns of noise stretched downwards read as rain streaks.
+        // Columns of noise stretched downwards look like rain streaks.
         let streak = noise.mottle.at(u * 2.0, v * 0.0 + 0.3) * noise.cloud.at(u, v * 0.5 + 0.25);
         let off = peeling * smoothstep(0.66, 0.70, cloud + 0.12 * (mottle - 0.5));
         let wall = shade(
@@ -304,7 +304,7 @@ pub fn roof_tiles(stones: [Rgb; 2]) -> Surface {
     })
 }
 
-/// Polished tiles in two alternating stones, `count` (even) a side.
+/// Polished tiles in two alternating stones, `count` (even) per side.
 #[must_use]
 pub fn checker(stones: [Rgb; 2], count: i32) -> Surface {
     let surfaces = stones.map(|s| carved_stone([s, mix(s, rgb(0x8f8a84), 0.35)], 0.5, 0.0, 0.2));

@@ -1,4 +1,4 @@
-//! Lavender rows before a farm house, after Provence: 600 K triangles.
+//! Lavender rows in front of a farm house, modelled on Provence: 600 K triangles.
 
 mod house;
 mod parts;
@@ -14,9 +14,9 @@ use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::TAU;
 
-/// Triangles that the scene is filled up to.
+/// Number of triangles up to which grass fills the scene.
 const TRIANGLES: u64 = 600_000;
-/// Where the farm house stands.
+/// Position of the farm house.
 pub(super) const HOUSE: Vec3 = vec3(7.5, 0.0, -27.0);
 /// Distance between rows in metres.
 const ROW: f32 = 1.7;
@@ -187,7 +187,7 @@ pub fn scene() -> Scene {
 fn land(scene: &mut SceneBuilder, kit: &MeadowMaterials) {
     let mut far = MeshBuilder::new();
     far.surface(96, 96, |s, t| {
-        // Cells widen with distance.
+        // Cell size grows with distance.
         let spread = |a: f32| (2.0 * a - 1.0).abs().powf(1.7) * (2.0 * a - 1.0).signum();
         let (x, z) = (125.0 * spread(s), -10.0 - 125.0 * spread(t));
         (vec3(x, ground(x, z) - 0.05, z), vec2(x, z + 10.0))
@@ -362,7 +362,7 @@ fn grass_and_poppies(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut 
     let left = TRIANGLES.saturating_sub(scene.triangles()) / (3 * blades as u64);
     for i in 0..left {
         let (x, z) = match i % 5 {
-            // Before the field, along its sides, in the yard, and between the rows.
+            // In front of the field, along its sides, in the yard, and between the rows.
             0 | 4 => (rng.jitter(8.0), rng.range(4.6, 8.2)),
             1 => (
                 (17.2 + rng.range(0.0, 9.0)) * rng.jitter(1.0).signum(),

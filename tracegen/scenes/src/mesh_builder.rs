@@ -1,7 +1,7 @@
 //! Triangle meshes from parametric surfaces, lathes, sweeps and boxes.
 //!
-//! Texture coordinates are written in metres (u to the right, v downwards as seen from outside)
-//! and scaled by the material's tile when the mesh is finished.
+//! Texture coordinates are in metres (u to the right, v downwards as seen from outside).
+//! [`MeshBuilder::finish`] scales them by the material's tile size.
 
 use glam::{Affine3A, Vec2, Vec3, vec2, vec3};
 use scene::Mesh;
@@ -62,7 +62,7 @@ pub fn curve(knots: &[Knot], steps: usize) -> Vec<Knot> {
     let mut out = Vec::with_capacity(knots.len() * steps);
     for i in 0..knots.len().saturating_sub(1) {
         let (b, c) = (knots[i], knots[i + 1]);
-        // A sharp knot ends the curve: its outer neighbour is mirrored through it.
+        // A sharp knot ends the curve, so its outer neighbour is mirrored at it.
         let a = if i == 0 || b.sharp {
             b.at * 2.0 - c.at
         } else {
@@ -90,7 +90,7 @@ pub fn curve(knots: &[Knot], steps: usize) -> Vec<Knot> {
     out
 }
 
-/// A profile cut into runs between sharp knots, each point with its outward normal: for a profile
+/// A profile split into runs between sharp knots, each point with its outward normal. For a profile
 /// that goes up, outward is to the right.
 fn smooth_runs(profile: &[Knot]) -> Vec<Vec<(Vec2, Vec2)>> {
     let normal = |a: Vec2, b: Vec2| {
@@ -150,8 +150,8 @@ impl MeshBuilder {
         }
     }
 
-    /// A parametric surface over `nu` x `nv` cells of 0..1²: `surface` gives position and uv.
-    /// Outside is where d/ds x d/dt points.
+    /// A parametric surface over `nu` x `nv` cells of 0..1²; `surface` returns position and uv. The
+    /// outside is where d/ds x d/dt points.
     pub fn surface(&mut self, nu: usize, nv: usize, surface: impl Fn(f32, f32) -> (Vec3, Vec2)) {
         let first = self.positions.len() as u32;
         let step = 2e-3;
@@ -165,7 +165,7 @@ impl MeshBuilder {
                     let dt = surface(s, t1).0 - surface(s, t0).0;
                     ds.cross(dt).try_normalize()
                 };
-                // At a pole one derivative vanishes, so the normal next to it is used.
+                // At a pole one derivative vanishes, so a nearby normal is used.
                 let inward = |x: f32| x + (0.5 - x).signum() * 4.0 * step;
                 let normal = slope(s, t)
                     .or_else(|| slope(s, inward(t)))
@@ -189,7 +189,7 @@ impl MeshBuilder {
         self.indices.extend([a, b, c, a, c, d]);
     }
 
-    /// [`Self::quad`] cut into `nu` x `nv` cells, as a modeller cuts floors and walls.
+    /// [`Self::quad`] divided into `nu` x `nv` cells, as modellers divide floors and walls.
     pub fn panel(&mut self, corner: Vec3, right: Vec3, up: Vec3, nu: usize, nv: usize) {
         let normal = right.cross(up).normalize_or_zero();
         let (w, h) = (right.length(), up.length());
@@ -221,7 +221,7 @@ impl MeshBuilder {
                 ((n + 1) % 3, (n + 2) % 3)
             };
             for sign in [-1.0, 1.0] {
-                // On the sides, up is y, so that bricks lie flat.
+                // On the sides, up is y, so that bricks are horizontal.
                 let (right, up) = if n == 1 {
                     (axes[b] * sign, -axes[a])
                 } else {
@@ -277,7 +277,7 @@ impl MeshBuilder {
         }
     }
 
-    /// Turns `profile` (radius, height; outside to its right when it goes up) about the y axis.
+    /// Rotates `profile` (radius, height; outside to its right when it goes up) about the y axis.
     /// Points on the axis close the ends.
     pub fn lathe(&mut self, profile: &[Knot], segments: usize) {
         self.lathe_shaped(profile, segments, |_, _| 1.0);
@@ -291,7 +291,8 @@ impl MeshBuilder {
         shape: impl Fn(f32, f32) -> f32,
     ) {
         let widest = profile.iter().map(|k| k.at.x).fold(0.0, f32::max);
-        // Whole metres around keep the texture's density; it need not close at the seam's back.
+        // Whole metres around keep the texture's density. It need not be continuous at the seam in
+        // the back.
         let around = TAU * widest;
         let mut length = 0.0;
         for run in smooth_runs(profile) {
@@ -362,7 +363,7 @@ impl MeshBuilder {
         let frames = SweepFrame::along(points);
         let before = self.positions.len();
         self.sweep(&circle, &frames);
-        // The sweep sees an open outline; around a circle the normals are the radii.
+        // The sweep assumes an open outline. Around a circle the normals are the radii.
         for (i, normal) in self.normals[before..].iter_mut().enumerate() {
             let (frame, c) = (&frames[i / (sides + 1)], circle[i % (sides + 1)].at);
             *normal = frame.right * c.x + frame.up * c.y;
@@ -397,7 +398,7 @@ impl MeshBuilder {
         }
     }
 
-    /// The same surface seen from its other side.
+    /// Reverses the surface so that it faces the other way.
     pub fn flip(&mut self) {
         for t in self.indices.chunks_exact_mut(3) {
             t.swap(1, 2);
@@ -407,7 +408,7 @@ impl MeshBuilder {
         }
     }
 
-    /// Turns the mesh round if its normals, on the whole, point against `outside(position)`.
+    /// Reverses the mesh if its normals, on the whole, point against `outside(position)`.
     pub fn orient(&mut self, outside: impl Fn(Vec3) -> Vec3) {
         let agreement: f32 = self
             .positions
@@ -446,7 +447,8 @@ impl MeshBuilder {
                 .length_squared()
                 .max((c - b).length_squared())
                 .max((a - c).length_squared());
-            // Slivers below a ten-thousandth of their length would only feed NaN to the maths.
+            // Slivers whose area is below a ten-thousandth of their squared length would only
+            // produce NaN.
             if (b - a).cross(c - a).length() > 1e-4 * longest {
                 indices.extend_from_slice(t);
             }
@@ -467,10 +469,10 @@ impl MeshBuilder {
     }
 }
 
-/// A place along a sweep.
+/// A position along a sweep.
 #[derive(Clone, Copy, Debug)]
 pub struct SweepFrame {
-    /// Where the profile's origin goes.
+    /// Position of the profile's origin.
     pub origin: Vec3,
     /// Direction of the profile's x.
     pub right: Vec3,
@@ -481,7 +483,7 @@ pub struct SweepFrame {
 }
 
 impl SweepFrame {
-    /// Frames along a polyline that twist as little as possible.
+    /// Frames along a polyline with minimal twist.
     #[must_use]
     pub fn along(points: &[(Vec3, f32)]) -> Vec<Self> {
         let direction = |i: usize| {

@@ -118,7 +118,7 @@ pub fn scene() -> Scene {
     scene.finish(vec3(0.36, 0.39, 0.43), 0)
 }
 
-/// Box with an open lid, lined with velvet, on a table.
+/// A box with an open, velvet-lined lid, on a table.
 fn casket(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let (w, d, h, t) = (0.092, 0.062, 0.052, 0.007);
     let mut wood = MeshBuilder::new();
@@ -152,7 +152,7 @@ fn casket(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         }
     }
     scene.add("casket", wood, kit.wood);
-    // The lid leans back on its hinges.
+    // The lid leans back at its hinges.
     let hinge = Affine3A::from_rotation_translation(Quat::from_rotation_x(-1.95), vec3(0.0, h, -d));
     let mut lid = MeshBuilder::new();
     lid.block(vec3(-w, 0.0, 0.0), vec3(w, 0.006, 2.0 * d), 0.002);
@@ -264,7 +264,7 @@ fn cylinder(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     scene.add("pins", pins, kit.steel);
 }
 
-/// Where a tine (and its track of pins) sits along x.
+/// Position of a tine (and its track of pins) along x.
 fn tine_x(tine: usize) -> f32 {
     let half = CYLINDER_HALF - 0.004;
     CYLINDER.x + half * (2.0 * (tine as f32 + 0.5) / TINES as f32 - 1.0)

@@ -1,7 +1,7 @@
 //! Seeded randomness and periodic noise fields.
 //!
-//! Textures of a scene share a handful of precomputed fields: looking one up costs a few
-//! nanoseconds where evaluating six octaves would cost fifty, and a scene has some 70 M texels.
+//! Textures of a scene share a few precomputed fields. A look-up takes a few nanoseconds,
+//! evaluating six octaves about fifty, and a scene has some 70 M texels.
 
 use formats::random::Random;
 use std::io;
@@ -9,10 +9,10 @@ use std::panic::resume_unwind;
 use std::sync::OnceLock;
 use std::thread::{Builder, ScopedJoinHandle};
 
-/// Edge of the shared noise fields in samples; a power of two, so that wrapping is a mask.
+/// Edge of the shared noise fields in samples: a power of two, so that wrapping is a bit mask.
 pub const FIELD_SIZE: usize = 1024;
 
-/// Pseudo-random numbers for placing and shaping things.
+/// Pseudo-random numbers for placing and shaping objects.
 #[derive(Clone, Debug)]
 pub struct Rng(Random);
 
@@ -95,7 +95,7 @@ impl Field {
         Self(samples)
     }
 
-    /// Value noise summed over octaves from `cells` cells a side upwards, in 0..1.
+    /// Value noise summed over octaves, starting with `cells` cells per side, in 0..1.
     fn fbm(cells: usize, octaves: u32, gain: f32, seed: u32) -> Self {
         let mut samples = vec![0.0f32; FIELD_SIZE * FIELD_SIZE];
         let (mut total, mut amplitude) = (0.0, 1.0);
@@ -125,14 +125,14 @@ impl Field {
             total += amplitude;
             amplitude *= gain;
         }
-        // Sums of octaves crowd around one half; stretching restores the contrast.
+        // Sums of octaves concentrate around one half. Stretching restores the contrast.
         for s in &mut samples {
             *s = ((*s / total - 0.5) * 1.7 + 0.5).clamp(0.0, 1.0);
         }
         Self(samples)
     }
 
-    /// Distance to the nearest of one jittered point a cell, in cells.
+    /// Distance to the nearest point, with one jittered point per cell, in cells.
     fn cells(cells: usize, seed: u32) -> Self {
         let wrap = |c: i32| c.rem_euclid(cells as i32);
         Self::build(|x, y| {
@@ -179,15 +179,15 @@ impl Field {
     }
 }
 
-/// The fields that every texture recipe draws on.
+/// The noise fields used by every texture recipe.
 pub struct NoiseBank {
-    /// Clouds: 4 cells a side, 7 octaves.
+    /// Clouds: 4 cells per side, 7 octaves.
     pub cloud: Field,
-    /// Mottling: 16 cells a side, 5 octaves.
+    /// Mottling: 16 cells per side, 5 octaves.
     pub mottle: Field,
-    /// Grain: 128 cells a side, 3 octaves.
+    /// Grain: 128 cells per side, 3 octaves.
     pub grain: Field,
-    /// Distance to scattered points, 24 cells a side.
+    /// Distance to scattered points, 24 cells per side.
     pub pebble: Field,
 }
 
@@ -196,8 +196,8 @@ pub struct NoiseBank {
 pub fn bank() -> &'static NoiseBank {
     static BANK: OnceLock<NoiseBank> = OnceLock::new();
     BANK.get_or_init(|| {
-        // On threads of their own: a worker of the pool that waits for others' shares takes up
-        // other work meanwhile, which may ask for this bank and would wait for itself.
+        // On separate threads. A worker of the pool that waits for other work may run a job that
+        // needs this bank, and would then wait for itself.
         std::thread::scope(|scope| {
             let start = |field: fn() -> Field| (field, Builder::new().spawn_scoped(scope, field));
             let mottle = start(|| Field::fbm(16, 5, 0.6, 23));
@@ -207,7 +207,7 @@ pub fn bank() -> &'static NoiseBank {
             let join = |(field, thread): (fn() -> Field, io::Result<ScopedJoinHandle<'_, _>>)| {
                 match thread {
                     Ok(thread) => thread.join().unwrap_or_else(|panic| resume_unwind(panic)),
-                    // Too little memory is left for another thread.
+                    // Not enough memory for another thread.
                     Err(_) => field(),
                 }
             };

@@ -4,7 +4,7 @@ use super::noise::{bank, hash_unit, lerp, smoothstep};
 use super::texture_synth::{Rgb, Surface, Texel, mix, rgb, shade};
 use std::f32::consts::{PI, TAU};
 
-/// Planks whose grain runs along u.
+/// Planks with the grain along u.
 #[must_use]
 pub fn planks(woods: [Rgb; 2], rows: i32, rough: f32) -> Surface {
     Box::new(move |u, v| {
@@ -36,7 +36,7 @@ pub fn planks(woods: [Rgb; 2], rows: i32, rough: f32) -> Surface {
     })
 }
 
-/// A surface whose grain runs along v instead of u.
+/// A surface with the grain along v instead of u.
 #[must_use]
 pub fn upright(surface: Surface) -> Surface {
     Box::new(move |u, v| surface(v, u))
@@ -60,7 +60,7 @@ pub fn polished_wood(woods: [Rgb; 2], rough: f32) -> Surface {
     })
 }
 
-/// Fissured bark whose ridges run along v.
+/// Fissured bark with ridges along v.
 #[must_use]
 pub fn bark(colors: [Rgb; 2], moss: f32) -> Surface {
     Box::new(move |u, v| {
@@ -132,8 +132,8 @@ pub fn leaf(shape: LeafShape, colors: [Rgb; 2]) -> Surface {
     })
 }
 
-/// Signed distance-like inside measure (positive inside) and strength of veins, for x in -1..1
-/// and y from the stalk (0) to the tip (1).
+/// A signed measure of the inside (positive inside, similar to a distance) and the strength of
+/// veins, for x in -1..1 and y from the stalk (0) to the tip (1).
 fn leaf_outline(shape: LeafShape, x: f32, y: f32) -> (f32, f32) {
     match shape {
         LeafShape::Blade => blade(x, y, 0.78),
@@ -173,7 +173,7 @@ fn frond(x: f32, y: f32) -> (f32, f32) {
     let pairs = 15.0;
     let envelope = 0.96 * (PI * (0.06 + 0.94 * y)).sin().powf(0.6) * (1.0 - 0.25 * y);
     let stem = 0.018 - x.abs();
-    // Leaflets sweep forwards: a leaflet's axis is a line of constant y - 0.35 |x|.
+    // Leaflets point forwards: a leaflet's axis is a line of constant y - 0.35 |x|.
     let s = (y - 0.38 * x.abs()) * pairs;
     let within = (s - s.floor() - 0.5).abs();
     let reach = (x.abs() / envelope.max(0.02)).clamp(0.0, 1.2);
@@ -221,7 +221,7 @@ fn spray(x: f32, y: f32) -> (f32, f32) {
         let (sin, cos) = angle.sin_cos();
         let (dx, dy) = (x - 0.06 * (base * 7.0).sin(), (y - base) * 2.0);
         let (lx, ly) = (dx * cos - dy * sin, dx * sin + dy * cos);
-        // Most texels are far from most leaves: skip the powers.
+        // Most texels are far from most leaves, so the powers are skipped.
         if !(-0.1..1.4).contains(&ly) || lx.abs() > 0.4 {
             continue;
         }
@@ -287,7 +287,7 @@ pub fn soil(colors: [Rgb; 2], litter: Option<Rgb>, stones: f32) -> Surface {
     })
 }
 
-/// Rock with cracks, strata and moss on what faces up in the texture.
+/// Rock with cracks, strata, and moss on parts that face up in the texture.
 #[must_use]
 pub fn rock(colors: [Rgb; 2], moss: f32) -> Surface {
     Box::new(move |u, v| {
@@ -328,7 +328,7 @@ pub fn rock(colors: [Rgb; 2], moss: f32) -> Surface {
     })
 }
 
-/// Woven cloth with a damask pattern; `pattern` repeats of it a texture.
+/// Woven cloth with a damask pattern that repeats `pattern` times per texture.
 #[must_use]
 pub fn damask(ground: Rgb, figure: Rgb, pattern: f32) -> Surface {
     Box::new(move |u, v| {

@@ -1,4 +1,4 @@
-//! Puts materials, meshes, instances, cameras and lights together into a scene.
+//! Assembles materials, meshes, instances, cameras and lights into a scene.
 
 use super::mesh_builder::MeshBuilder;
 use super::texture_synth::{Map, Recipe, Rgb, linear};
@@ -41,7 +41,8 @@ impl SceneBuilder {
         }
     }
 
-    /// Adds an untextured material: sRGB colour, roughness, then what `adjust` changes.
+    /// Adds an untextured material with an sRGB colour and a roughness. `adjust` can change the
+    /// rest.
     pub fn plain(
         &mut self,
         name: &str,
@@ -59,7 +60,7 @@ impl SceneBuilder {
         self.material(material, 1.0)
     }
 
-    /// Adds a material with its textures, then what `adjust` changes.
+    /// Adds a material with its textures. `adjust` can change the rest.
     pub fn textured(&mut self, recipe: Recipe, adjust: impl FnOnce(&mut Material)) -> MaterialId {
         let (name, tile_m, maps) = (recipe.name, recipe.tile_m, recipe.maps);
         let source = recipe.into_source(&self.scene.name);
@@ -109,7 +110,7 @@ impl SceneBuilder {
         self.scene.instances.push(Instance { mesh, transform });
     }
 
-    /// Lets instances move, by their numbers in the order in which they were placed.
+    /// Makes instances move. They are numbered in the order in which they were placed.
     pub fn motion(&mut self, instances: Vec<usize>, movements: Vec<Movement>) {
         self.scene.motions.push(Motion {
             instances,
@@ -117,7 +118,7 @@ impl SceneBuilder {
         });
     }
 
-    /// Adds a mesh that stands where it was modelled.
+    /// Adds a mesh and places it without a transform.
     pub fn add(&mut self, name: &str, mesh: MeshBuilder, material: MaterialId) {
         let mesh = self.mesh(name, mesh, material);
         self.place(mesh, Affine3A::IDENTITY);

@@ -11,9 +11,9 @@ use glam::{Affine3A, Vec3, vec2, vec3};
 use patches::PATCHES;
 use scene::Scene;
 
-/// Cells along a patch's edge: 32 patches of 2 x 15² triangles, less those at the poles.
+/// Cells along a patch's edge: 32 patches of 2 x 15² triangles, minus those at the poles.
 const CELLS: usize = 15;
-/// Metres a unit of Newell's model.
+/// Metres per unit of Newell's model.
 const SCALE_M: f32 = 0.08;
 
 /// A point of a bicubic Bezier patch.

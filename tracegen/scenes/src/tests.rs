@@ -48,7 +48,7 @@ fn corners(mesh: &Mesh) -> impl Iterator<Item = [usize; 3]> {
 }
 
 #[test]
-fn the_table_tells_the_triangles_and_cameras_of_every_scene() {
+fn the_table_has_the_triangles_and_cameras_of_every_scene() {
     for listed in BUILTINS {
         let Some(built) = scene(listed.name) else {
             panic!("{} cannot be built under its name", listed.name);
@@ -61,7 +61,7 @@ fn the_table_tells_the_triangles_and_cameras_of_every_scene() {
 }
 
 #[test]
-fn the_same_scene_comes_out_with_one_thread_as_with_all() {
+fn scenes_do_not_depend_on_the_number_of_threads() {
     for name in BUILTINS.iter().map(|b| b.name) {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         let alone = pool.map(|pool| pool.install(|| build(name).ok().flatten()));
@@ -173,7 +173,7 @@ fn every_scene_has_a_default_camera_inside_its_far_plane_and_a_light() {
 }
 
 #[test]
-fn atriums_differ_in_textures_and_shadows_only_where_they_should() {
+fn atriums_differ_only_in_their_declared_textures_and_shadows() {
     let textures = |name: &str| scene(name).map_or(0, |s| s.images.len());
     assert!(textures("atrium") >= 60);
     assert!((6..=9).contains(&textures("atrium-plain")));
@@ -183,7 +183,7 @@ fn atriums_differ_in_textures_and_shadows_only_where_they_should() {
 }
 
 #[test]
-fn a_plant_has_as_many_instances_as_asked_for_and_a_mesh_s_follow_each_other() {
+fn a_plant_has_the_requested_number_of_instances_sorted_by_mesh() {
     for (spec, instances) in [
         ("plant", 20_000),
         ("plant:54321", 54_321),
@@ -197,7 +197,7 @@ fn a_plant_has_as_many_instances_as_asked_for_and_a_mesh_s_follow_each_other() {
             "{}",
             built.meshes.len()
         );
-        // Nothing lies outside the hall or below its floor, except for foundations.
+        // Everything is within the hall and above its floor, except for foundations.
         let (low, high) = built.bounds().unwrap();
         assert!(low.y > -3.0 && high.y < 13.5, "{low} {high}");
     }
@@ -221,7 +221,7 @@ fn a_plant_has_as_many_instances_as_asked_for_and_a_mesh_s_follow_each_other() {
 }
 
 #[test]
-fn what_moves_in_the_plant_stays_inside_and_starts_where_it_stands() {
+fn moving_parts_of_the_plant_start_in_place_and_stay_inside() {
     let plant = scene("plant").unwrap();
     let moving: Vec<usize> = (plant.motions.iter())
         .flat_map(|motion| motion.instances.iter().copied())
@@ -247,7 +247,7 @@ fn what_moves_in_the_plant_stays_inside_and_starts_where_it_stands() {
 }
 
 #[test]
-fn slots_that_are_left_out_take_their_images_with_them() {
+fn removing_texture_slots_removes_their_images() {
     let mut slots = [true; 6];
     slots[1] = false;
     let whole = crate::load("teapot").unwrap();

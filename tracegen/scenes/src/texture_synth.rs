@@ -1,4 +1,4 @@
-//! From a surface's description, texel by texel, to the images of a material.
+//! Computes the images of a material from a description of its surface, texel by texel.
 
 use super::noise::lerp;
 use formats::texture::ColorSpace;
@@ -7,10 +7,10 @@ use scene::image::{Image, ImageSource, OpenSource};
 use scene::{SceneError, srgb};
 use std::sync::Arc;
 
-/// A colour as an artist picks it: sRGB-encoded, 0 to 1.
+/// An sRGB-encoded colour, 0 to 1.
 pub type Rgb = [f32; 3];
 
-/// The colour 0xRRGGBB.
+/// The colour with the code 0xRRGGBB.
 #[must_use]
 pub fn rgb(hex: u32) -> Rgb {
     [hex >> 16, hex >> 8, hex].map(|c| (c & 255) as f32 / 255.0)
@@ -82,7 +82,7 @@ pub enum Maps {
 /// A surface over the unit torus, (u, v) from the top left.
 pub type Surface = Box<dyn Fn(f32, f32) -> Texel + Send + Sync>;
 
-/// A material's textures, yet to be computed.
+/// A material's textures, not yet computed.
 pub struct Recipe {
     /// Name of the material.
     pub name: &'static str,
@@ -110,7 +110,7 @@ pub enum Map {
 }
 
 impl Map {
-    /// This map of a recipe.
+    /// The image of this map of a recipe.
     #[must_use]
     pub fn image(self, source: &Arc<RecipeSource>) -> Image {
         let (suffix, color_space) = match self {
@@ -148,7 +148,7 @@ fn byte(x: f32) -> u8 {
     (x.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }
 
-/// A recipe as a source of images. Within a scene, its name identifies it.
+/// A recipe as a source of images. Its name identifies it within a scene.
 pub struct RecipeSource {
     recipe: Recipe,
     scene: String,
@@ -180,7 +180,7 @@ impl Recipe {
     fn synthesize(&self, parts: &[usize]) -> Vec<Vec<u8>> {
         let n = self.size as usize;
         let wants = |map: Map| parts.contains(&(map as usize));
-        // An unused map has rows of one texel, so that the loop stays the same.
+        // An unused map gets rows of one texel, so that the loop needs no special case.
         let row_bytes = |map| if wants(map) { 4 * n } else { 4 };
         let buffer = |map| vec![255u8; row_bytes(map) * n];
         let (mut color, mut mr, mut ao) = (
@@ -236,7 +236,7 @@ impl ImageSource for RecipeSource {
 }
 
 impl OpenSource for &RecipeSource {
-    /// A surface is code, so the text of this crate identifies it.
+    /// A surface is code, so the source text of this crate identifies it.
     fn identify(&self, sink: &mut dyn FnMut(&[u8])) {
         for text in SOURCE_TEXT {
             sink(text.as_bytes());
@@ -269,7 +269,7 @@ fn normal_map(height: &[f32], n: usize) -> Vec<u8> {
     rgba
 }
 
-/// The text of every file of this crate that may take part in a texture.
+/// The source text of every file of this crate that may affect a texture.
 const SOURCE_TEXT: &[&str] = &[
     include_str!("atrium.rs"),
     include_str!("atrium/furnishing.rs"),
@@ -316,7 +316,7 @@ mod tests {
     use std::path::PathBuf;
 
     #[test]
-    fn the_keys_of_textures_cover_every_file_of_this_crate() {
+    fn texture_cache_keys_cover_every_file_of_this_crate() {
         let mut open = vec![PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("src")];
         while let Some(path) = open.pop() {
             if path.is_dir() {
@@ -325,7 +325,7 @@ mod tests {
                 continue;
             }
             let name = path.file_name().unwrap_or_default();
-            // The table and the tests make no texture.
+            // The table and the tests do not affect textures.
             if name != "lib.rs" && name != "tests.rs" {
                 let text = std::fs::read_to_string(&path).unwrap();
                 assert!(SOURCE_TEXT.contains(&text.as_str()), "{}", path.display());

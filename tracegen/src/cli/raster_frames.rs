@@ -18,6 +18,7 @@ use raster::drivers::Opened;
 use raster::frame::Frame;
 use raster::lighting::Lighting;
 use shell::{Output, Progress, note};
+use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 use techniques::{Planner, Skips};
 use textures::TextureSet;
@@ -75,7 +76,8 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
         warn_of_multiview_defect(backend)?;
     }
     let ready = started.elapsed();
-    note_ready(&args.scene.scene, counts, [loaded, textured, ready]);
+    let scene = format!("{}, camera {}", args.scene.scene, session.setup.camera.name);
+    note_ready(&scene, counts, [loaded, textured, ready]);
     let frames = session.setup.frames.clone();
     progress.stage("capturing", frames.len() as u64, "frames");
     let mut output = TraceOutput::create(args, &tables, &session.setup.scene, &session.draws)?;
@@ -305,9 +307,14 @@ fn capture(
 /// Says which texels were prepared and which left out.
 fn texels_note(textures: &TextureSet, searched: Duration) -> String {
     let mib = |bytes: usize| bytes as f64 / f64::from(1 << 20);
+    let formats: BTreeSet<String> = (textures.textures.iter())
+        .map(|texture| format!("{:?}", texture.texture.format).to_uppercase())
+        .collect();
+    let formats: Vec<String> = formats.into_iter().collect();
     format!(
-        "{:.1} MiB of texels, {:.1} MiB left out ({} images and the finest levels of {} that no view samples, found in {:.2} s)",
+        "{:.1} MiB of texels in {}, {:.1} MiB left out ({} images and the finest levels of {} that no view samples, found in {:.2} s)",
         mib(textures.bytes()),
+        formats.join(", "),
         mib(textures.skipped_bytes()),
         textures.unseen(),
         textures.shortened(),

@@ -1,17 +1,17 @@
-//! Distance culling: draws that are too far or too small to matter are left out.
+//! Distance culling: draws that are too far away or too small are not drawn.
 
 use crate::error::SettingsError;
 use formats::view::{FrameViews, Hmd};
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-/// Which draws are left out.
+/// Condition for draws that are not drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DistanceCull {
-    /// Draws whose every point is farther than this.
+    /// Draws whose nearest point is farther away than this.
     Metres(f32),
-    /// Those whose bounding sphere would span fewer pixels in the middle of the picture.
+    /// Draws whose bounding sphere would span fewer pixels in the middle of the picture.
     Pixels(f32),
 }
 
@@ -19,9 +19,9 @@ pub enum DistanceCull {
 /// irritating.
 #[derive(Clone, Copy, Debug)]
 pub struct Head {
-    /// Between the eyes.
+    /// Point between the eyes.
     position: Vec3,
-    /// Pixels that a tangent of 1 spans, along the denser axis of the denser eye.
+    /// Pixels per unit of tangent, along the denser axis of the denser eye.
     px_per_tangent: f32,
 }
 
@@ -44,7 +44,7 @@ impl DistanceCull {
     /// Whether a draw with these world-space bounds is drawn.
     #[must_use]
     pub fn keeps(&self, head: &Head, [low, high]: [Vec3; 2]) -> bool {
-        // Bounds that are not finite are drawn.
+        // Draws without finite bounds are drawn.
         match *self {
             Self::Metres(farthest) => {
                 let nearest = head.position.clamp(low, high);
@@ -54,7 +54,7 @@ impl DistanceCull {
             Self::Pixels(least) => {
                 let distance = low.midpoint(high).distance(head.position);
                 let radius = low.distance(high) / 2.0;
-                // Seen under an angle whose half has the sine radius / distance.
+                // The sine of half the angle under which it is seen is radius / distance.
                 let tangent = radius / (distance * distance - radius * radius).sqrt();
                 let px = 2.0 * tangent * head.px_per_tangent;
                 distance <= radius || px >= least || px.is_nan()
@@ -107,32 +107,32 @@ mod tests {
     }
 
     #[test]
-    fn a_box_is_as_far_as_its_nearest_point() {
+    fn the_distance_of_a_box_is_that_of_its_nearest_point() {
         let cull = DistanceCull::Metres(5.0);
         let at = |z: f32| [Vec3::new(-1.0, -1.0, -z - 3.0), Vec3::new(1.0, 1.0, -z)];
         assert!(cull.keeps(&head(), at(4.99)) && !cull.keeps(&head(), at(5.01)));
-        // Beside the axis it is the edge that counts: 3-4-5.
+        // Off the axis, the nearest edge counts: 3-4-5.
         let corner = |x: f32| [Vec3::new(x, 0.0, -5.0), Vec3::new(9.0, 1.0, -4.0)];
         assert!(cull.keeps(&head(), corner(2.99)) && !cull.keeps(&head(), corner(3.01)));
         assert!(cull.keeps(&head(), [Vec3::NAN, Vec3::NAN]));
     }
 
     #[test]
-    fn a_sphere_of_one_metre_is_as_large_as_its_silhouette() {
-        // 200 pixels a tangent; a cube whose corners lie on a sphere of radius 1 at 10 m.
+    fn the_size_of_a_sphere_is_that_of_its_silhouette() {
+        // 200 pixels per unit of tangent, and a cube whose corners lie on a sphere of radius 1 at 10 m.
         let half = 1.0 / 3_f32.sqrt();
         let center = Vec3::new(0.0, 6.0, -8.0);
         let bounds = [center - half, center + half];
         let px = 2.0 * 200.0 / 99_f32.sqrt();
         assert!(DistanceCull::Pixels(px - 0.01).keeps(&head(), bounds));
         assert!(!DistanceCull::Pixels(px + 0.01).keeps(&head(), bounds));
-        // Around the head.
+        // A box around the head.
         assert!(DistanceCull::Pixels(1e6).keeps(&head(), [Vec3::NEG_ONE, Vec3::ONE]));
         assert!(DistanceCull::Pixels(1.0).keeps(&head(), [Vec3::NAN, Vec3::NAN]));
     }
 
     #[test]
-    fn no_box_is_left_out_of_which_two_corners_are_further_apart_in_the_picture() {
+    fn culled_boxes_are_smaller_than_the_limit_in_the_picture() {
         let mut state = 5_u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -148,7 +148,7 @@ mod tests {
                 continue;
             }
             out += 1;
-            // Its size in the picture of an eye that looks at it.
+            // Size of the box in the picture of an eye that looks at it.
             let ahead = center.normalize();
             let side = ahead.any_orthonormal_vector();
             let up = ahead.cross(side);

@@ -1,10 +1,10 @@
 //! Settings that contradict each other or do not suit the display.
 
-/// Settings that cannot be.
+/// A setting with an invalid value.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{what}: expected {expected}, found {found}")]
 pub struct SettingsError {
-    /// Which setting.
+    /// Name of the setting.
     pub what: &'static str,
     /// The expected value.
     pub expected: String,

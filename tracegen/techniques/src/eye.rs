@@ -1,4 +1,4 @@
-//! The pixels of an eye's picture as directions.
+//! Converts pixels of an eye's picture to directions.
 
 use crate::hidden_mesh::HiddenMesh;
 use crate::{Mask, gaze};
@@ -11,16 +11,17 @@ use std::sync::Arc;
 pub(crate) struct EyePicture {
     pub size_px: [u32; 2],
     fov: FovTangents,
-    /// The visible part of the lens, if it matters.
+    /// Visible part of the lens; `None` if it has no effect.
     pub lens: Option<Lens>,
-    /// Pixels that the headset's own mesh leaves, in place of the lens's circle.
+    /// Pixels outside the headset's hidden-area mesh, if it replaces the lens's circle.
     left_by_mesh: Option<Arc<Mask>>,
-    /// Direction of the gaze, the eye looking along -z.
+    /// Direction of the gaze; the eye looks along -z.
     gaze: DVec3,
 }
 
 impl EyePicture {
-    /// Eye 0 (left) or 1 (right) of a display; the gaze is in degrees right and up of straight ahead.
+    /// The picture of eye 0 (left) or 1 (right) of a display. The gaze is in degrees to the right and up from
+    /// straight ahead.
     pub fn new(hmd: &Hmd, eye: usize, lens: Option<Lens>, gaze_deg: [f32; 2]) -> Self {
         Self {
             size_px: hmd.eye_size_px,
@@ -54,7 +55,7 @@ impl EyePicture {
         )
     }
 
-    /// A rectangle as tangents: its left and lower, and its right and upper edge.
+    /// Tangents of the left and lower edge, and of the right and upper edge, of a rectangle.
     fn rectangle(&self, low_px: [u32; 2], high_px: [u32; 2]) -> [DVec2; 2] {
         let at = |px: [u32; 2]| self.tangents(DVec2::new(px[0].into(), px[1].into()));
         let (a, b) = (at(low_px), at(high_px));
@@ -71,12 +72,13 @@ impl EyePicture {
         let [low, high] = self.rectangle(low_px, high_px);
         let center = DVec2::new(lens.center[0].into(), lens.center[1].into());
         let nearest = center.clamp(low, high);
-        // Within rounding of the lens's test of a pixel's centre, which is half a pixel inside.
+        // The rounding error of this test is much smaller than half a pixel, the distance of a pixel's centre
+        // from the pixel's edge.
         nearest.distance_squared(center) <= f64::from(lens.radius) * f64::from(lens.radius)
     }
 
-    /// Degrees between the gaze and the point nearest to it of a rectangle of pixels: the nearest in
-    /// the plane of the picture, or a corner.
+    /// Smallest angle in degrees between the gaze and a rectangle of pixels. The nearest point is the one
+    /// nearest in the plane of the picture, or a corner.
     pub fn least_angle_deg(&self, low_px: [u32; 2], high_px: [u32; 2]) -> f64 {
         let [low, high] = self.rectangle(low_px, high_px);
         let corners = [
@@ -95,15 +97,15 @@ impl EyePicture {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// Where straight ahead is in the picture, in pixels from the top left.
+    /// Position of the straight-ahead direction in the picture, in pixels from the top left.
     pub fn ahead_px(&self) -> [f64; 2] {
         let [low, high] = self.rectangle([0, 0], self.size_px);
         let part = DVec2::new(-low.x, high.y) / (high - low);
         [0, 1].map(|axis| part[axis] * f64::from(self.size_px[axis]))
     }
 
-    /// Where the gaze meets the picture, in pixels from the top left; straight ahead where it does
-    /// not meet its plane.
+    /// Position of the gaze in the picture, in pixels from the top left. If the gaze does not meet the
+    /// picture's plane, the position of the straight-ahead direction.
     pub fn gaze_px(&self) -> [f64; 2] {
         let at = if self.gaze.z < -1e-6 {
             self.gaze.truncate() / -self.gaze.z

@@ -1,18 +1,20 @@
 //! The monoscopic far field: one picture of distant geometry for both eyes.
 //!
-//! A camera between the eyes (or, alternating, in one of them) sees what lies beyond the split. An eye's
-//! picture takes from it what lies in the same direction, or (shifted) what would lie in the same place of a
-//! plane at twice the split. A point at depth z of an eye is then off by
+//! A camera between the eyes (or, alternating, in one of them) renders geometry beyond the split. An eye's
+//! picture takes a pixel from this picture in the same direction. With depth shift, it takes the pixel in the
+//! direction of the same point of a plane at twice the split. The error of a point at depth z of an eye is
+//! then
 //!
 //! ```text
 //! same direction:  K / (z - c_z)                            at most K / (D - c_z), at the split D
 //! depth shift:     K / (P - c_z) * |z - P| / z, P = 2 D     at most K / (2 D - c_z), at the split and at infinity
 //! ```
 //!
-//! where c is the camera in the eye's coordinates (x right, y up, z ahead) and K, in pixels times metres, is
-//! the largest |c_xy - t c_z| over the tangents t of the eye's view. K is convex in t, so the corners tell.
-//! No other plane has as small a largest error. Beyond 4 D the same direction errs less than the shift.
-//! Parallel eyes of W pixels and h degrees, camera in the middle: K = W IPD / (4 tan(h/2)), c_z = 0.
+//! where c is the camera's position in the eye's coordinates (x right, y up, z ahead). K, in pixels times
+//! metres, is the largest |c_xy - t c_z| over the tangents t of the eye's view. K is convex in t, so only the
+//! corners must be evaluated. No other plane has a smaller largest error. Beyond 4 D, the same direction has
+//! a smaller error than the shift. For parallel eyes of W pixels and h degrees and a camera in the middle,
+//! K = W IPD / (4 tan(h/2)) and c_z = 0.
 
 use crate::least_work::{Costs, Object, Pixels, least_work};
 use crate::settings::{FarField, Split, Variant};
@@ -20,8 +22,8 @@ use formats::view::EyeView;
 use glam::dcamera::rh::proj::directx::frustum;
 use glam::{DMat3, DMat4, DVec2, DVec3, Mat3, Mat4};
 
-/// Part of the split by which the far field begins before it: a surface seen at a slant crosses the split
-/// nearer for one camera than for the other, and one of both layers must hold it.
+/// Part of the split by which the far field starts before it. A slanted surface crosses the split at
+/// different depths for the two cameras, and at least one of both layers must contain it.
 pub const OVERLAP: f64 = 1.0 / 16.0;
 
 /// Margin in pixels around the visible part of the far field, for filtering.
@@ -29,7 +31,7 @@ const BORDER_PX: f64 = 2.0;
 /// Error of 32-bit matrices, which the border must allow for.
 const ROUNDING_PX: f64 = 0.01;
 
-/// Eyes that no single far field serves.
+/// Eyes for which a single far field is impossible.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "far field: expected eyes whose views one picture can hold (less than 180 degrees, at most {limit} pixels an edge), found {found}"
@@ -50,7 +52,7 @@ pub struct Stereo {
     shifted: bool,
 }
 
-/// An eye: its pose and its projection's terms.
+/// An eye: its pose and the terms of its projection.
 #[derive(Clone, Copy, Debug)]
 struct Eye {
     clip_from_eye: DMat4,
@@ -72,31 +74,31 @@ impl Eye {
             far_m: if scale < -1.0 - 1e-9 {
                 offset / (scale + 1.0)
             } else {
-                // Where depth in single precision has no steps left.
+                // Distance beyond which depths in single precision are equal.
                 1e7 * offset / scale
             },
         }
     }
 
-    /// Tangents to the right and up at a place of clip space.
+    /// Tangents to the right and up at a position in clip space.
     fn tangents(&self, ndc: DVec2) -> DVec2 {
         let p = &self.clip_from_eye;
         (ndc + DVec2::new(p.z_axis.x, p.z_axis.y)) / DVec2::new(p.x_axis.x, p.y_axis.y)
     }
 
-    /// Directions of the picture's corners.
+    /// Directions of the corners of the picture.
     fn corners(&self) -> [DVec3; 4] {
         [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]]
             .map(|ndc| self.tangents(DVec2::from_array(ndc)).extend(-1.0))
     }
 
-    /// Pixels a tangent.
+    /// Pixels per unit of tangent.
     fn px_per_tangent(&self, size_px: [f64; 2]) -> DVec2 {
         let p = &self.clip_from_eye;
         DVec2::new(p.x_axis.x * size_px[0], p.y_axis.y * size_px[1]) / 2.0
     }
 
-    /// Pixels (y down) to directions.
+    /// Matrix from pixels (y down) to directions.
     fn direction_from_px(&self, size_px: [f64; 2]) -> DMat3 {
         let scale = 1.0 / self.px_per_tangent(size_px);
         let corner = self.tangents(DVec2::new(-1.0, 1.0));
@@ -108,35 +110,36 @@ impl Eye {
     }
 }
 
-/// The far field of a frame, ready to be rendered and sampled.
+/// The far field of a frame, with the matrices to render and sample it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FarView {
-    /// Distance ahead of the eyes from which on it shows what there is.
+    /// Distance ahead of the eyes at which the far field starts.
     pub split_m: f32,
     /// Largest distance between a point's position in an eye's picture and its true position.
     pub worst_shift_px: f32,
-    /// Its camera; the near plane lies a little before the split.
+    /// Camera of the far field. Its near plane is slightly before the split.
     pub camera: EyeView,
-    /// Its size; as many pixels an angle as the eyes have.
+    /// Size of the picture, with at least as many pixels per angle as the eyes' pictures.
     pub size_px: [u32; 2],
-    /// Pixels of the eyes' pictures to pixels of this one, homogeneous.
+    /// Homogeneous maps from pixels of the eyes' pictures to pixels of this one.
     pub far_from_eye_px: [Mat3; 2],
-    /// The inverse.
+    /// Inverse of `far_from_eye_px`.
     pub eye_from_far_px: [Mat3; 2],
     /// Clip space of this picture to clip space of the eyes.
     pub eye_from_far_clip: [Mat4; 2],
     /// Depth of the split in the eyes' clip space.
     pub split_depth: [f32; 2],
-    /// Pixels of the eyes around the place of a pixel of this picture that may take from it.
+    /// Radius in pixels of the eyes' pictures around the position of a pixel of this picture. Only these
+    /// pixels may sample it.
     pub reach_px: u32,
 }
 
 impl FarField {
-    /// The far field of a frame: `None` where everything is nearer than its split, or where a frame costs
-    /// least without one. `objects` are the frame's visible draws.
+    /// The far field of a frame. `None` if everything is nearer than the split, or if a frame without a far
+    /// field costs least. `objects` are the visible draws of the frame.
     ///
     /// # Errors
-    /// As [`Stereo::view`].
+    /// See [`Stereo::view`].
     pub fn view(
         &self,
         stereo: &Stereo,
@@ -167,7 +170,7 @@ impl FarField {
 }
 
 impl Stereo {
-    /// The camera of the far field for two eyes with pictures of `size_px` in a frame.
+    /// The far field's camera for two eyes with pictures of `size_px` in a frame.
     #[must_use]
     pub fn new(eyes: &[EyeView; 2], size_px: [u32; 2], variant: Variant, frame: u32) -> Self {
         let eyes = [Eye::new(&eyes[0]), Eye::new(&eyes[1])];
@@ -183,7 +186,7 @@ impl Stereo {
         }
     }
 
-    /// The largest shift, in pixels, of anything beyond a split at `split_m`.
+    /// Largest shift in pixels of a point beyond a split at `split_m`.
     #[must_use]
     pub fn worst_shift_px(&self, split_m: f32) -> f32 {
         let shift = |eye: &Eye| {
@@ -197,17 +200,17 @@ impl Stereo {
         shift(&self.eyes[0]).max(shift(&self.eyes[1])) as f32
     }
 
-    /// The nearest split beyond which nothing is off by more than `shift_px`.
+    /// Nearest split for which no point beyond it is shifted by more than `shift_px`.
     #[must_use]
     pub fn split_m(&self, shift_px: f32) -> f32 {
         let plane = |eye: &Eye| self.camera_in(eye).z + self.shift_px_m(eye) / f64::from(shift_px);
         let exact = plane(&self.eyes[0]).max(plane(&self.eyes[1])) / self.plane_m(1.0);
-        // Rounded up, so that the promise holds.
+        // Round up, because a nearer split would exceed the limit.
         (exact as f32).next_up()
     }
 
-    /// Depth at which the error for `split_m` is as large as any beyond the split: the split, or the plane of the
-    /// depth shift, whose error at infinity is what one in the same direction has there.
+    /// Depth P for which K / (P - c_z) is the largest error beyond the split: the split itself or, with depth
+    /// shift, the depth of its plane.
     fn plane_m(&self, split_m: f64) -> f64 {
         if self.shifted { 2.0 * split_m } else { split_m }
     }
@@ -219,10 +222,11 @@ impl Stereo {
         [a.near_m.min(b.near_m) as f32, a.far_m.max(b.far_m) as f32]
     }
 
-    /// The far field beyond a split.
+    /// The far field for a split.
     ///
     /// # Errors
-    /// No picture of at most `limit_px` per edge contains everything that both eyes see beyond the split.
+    /// A picture that contains everything that both eyes see beyond the split would be larger than `limit_px`
+    /// per edge.
     pub fn view(&self, split_m: f32, limit_px: u32) -> Result<FarView, FarFieldError> {
         let split = f64::from(split_m);
         let mut near = f64::INFINITY;
@@ -231,15 +235,15 @@ impl Stereo {
         for eye in &self.eyes {
             let camera_from_eye = self.world_from_camera.inverse() * eye.world_from_eye;
             for corner in eye.corners() {
-                // What the eye sees beyond the split lies between these, and what they show moves
-                // along a line.
+                // Each visible point beyond the split is between these two, and its image is on the line
+                // between theirs.
                 let begin = camera_from_eye.transform_point3(split * corner);
                 let end = camera_from_eye.transform_point3(eye.far_m.max(split) * corner);
                 let infinite = camera_from_eye.transform_vector3(corner);
                 near = near.min(-begin.z);
                 far = far.max(-end.z).max(-begin.z);
                 for p in [begin, infinite] {
-                    // Next to the camera or behind it: in no picture.
+                    // Points next to or behind the camera are in no picture.
                     let ahead = if p.z < -1e-3 { -p.z } else { 1e-9 };
                     let tangents = p.truncate() / ahead;
                     (low, high) = (low.min(tangents), high.max(tangents));
@@ -247,7 +251,7 @@ impl Stereo {
             }
         }
         let scale = self.px_per_tangent();
-        // On the left eye's grid of pixels, which parallel eyes share with the camera.
+        // Align the picture with the left eye's pixel grid. The camera of parallel eyes has the same grid.
         let edge = self.eyes[0].tangents(DVec2::new(-1.0, 1.0));
         let origin = DVec2::new(low.x - edge.x, edge.y - high.y) * scale;
         let origin = (origin + ROUNDING_PX).floor() - BORDER_PX;
@@ -316,13 +320,13 @@ impl Stereo {
             eye_from_far_px: far_from_eye_px.map(|m| normalised(m.inverse()).as_mat3()),
             eye_from_far_clip,
             split_depth,
-            // A pixel of turned eyes may be smaller at the edge.
-            reach_px: if self.is_turned() { 2 } else { 1 },
+            // At the edge, a pixel of a rotated eye may be smaller.
+            reach_px: if self.is_rotated() { 2 } else { 1 },
         })
     }
 
-    /// Whether the camera's direction differs from the eyes'.
-    fn is_turned(&self) -> bool {
+    /// Whether the directions of camera and eyes differ.
+    fn is_rotated(&self) -> bool {
         let turn = |eye: &Eye| {
             let between = self.world_from_camera.inverse() * eye.world_from_eye;
             1.0 - between.z_axis.z
@@ -330,14 +334,14 @@ impl Stereo {
         turn(&self.eyes[0]).max(turn(&self.eyes[1])) > 1e-6
     }
 
-    /// The camera in an eye's coordinates, z ahead.
+    /// Position of the camera in an eye's coordinates, z ahead.
     fn camera_in(&self, eye: &Eye) -> DVec3 {
         let position = self.world_from_camera.w_axis.truncate();
         let inside = eye.world_from_eye.inverse().transform_point3(position);
         inside * DVec3::new(1.0, 1.0, -1.0)
     }
 
-    /// K: pixels of shift times metres of depth.
+    /// K: shift in pixels times depth in metres.
     fn shift_px_m(&self, eye: &Eye) -> f64 {
         let camera = self.camera_in(eye);
         let scale = eye.px_per_tangent(self.size_px);
@@ -346,13 +350,13 @@ impl Stereo {
         eye.corners().map(at).into_iter().fold(0.0, f64::max)
     }
 
-    /// Pixels a tangent of the camera, so that ahead of each eye there are at least as many an angle
-    /// as the eye has.
+    /// Pixels per unit of the camera's tangent. Straight ahead of each eye, the camera has at least as many
+    /// pixels per angle as the eye.
     fn px_per_tangent(&self) -> DVec2 {
         let scale = |eye: &Eye| {
             let r = DMat3::from_mat4(self.world_from_camera.inverse() * eye.world_from_eye);
             let (ahead, x, y) = (r.z_axis, r.x_axis, r.y_axis);
-            // Derivatives of the camera's tangents by the eye's, ahead of the eye.
+            // Derivatives of the camera's tangents with respect to the eye's, straight ahead of the eye.
             let slope = DVec2::new(x.x * ahead.z - ahead.x * x.z, y.y * ahead.z - ahead.y * y.z)
                 / (ahead.z * ahead.z);
             eye.px_per_tangent(self.size_px) / slope.abs()
@@ -361,7 +365,7 @@ impl Stereo {
     }
 }
 
-/// The pose between both eyes': in the middle, with the mean of their axes.
+/// The pose in the middle between two eyes, with the mean of their axes.
 fn between(eyes: &[Eye; 2]) -> DMat4 {
     let [a, b] = eyes.map(|eye| eye.world_from_eye);
     let back = (a.z_axis + b.z_axis)
@@ -378,7 +382,7 @@ fn between(eyes: &[Eye; 2]) -> DMat4 {
     )
 }
 
-/// A homogeneous map, scaled so that it survives rounding to 32 bits best.
+/// Scales a homogeneous map to lose the least precision when it is rounded to 32 bits.
 fn normalised(m: DMat3) -> DMat3 {
     m * (1.0 / m.z_axis.z)
 }

@@ -4,13 +4,13 @@ use formats::view::Hmd;
 use glam::{Mat3, Vec3};
 use serde::{Deserialize, Serialize};
 
-/// Gaze: degrees to the right and up from straight ahead, the same for both eyes.
+/// Direction of the gaze in degrees to the right and up from straight ahead, the same for both eyes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Gaze {
     /// The same in every frame.
     Fixed([f32; 2]),
-    /// Samples by ascending time; linear in between, held before the first and after the last.
+    /// Samples by ascending time; interpolated linearly, and constant before the first and after the last.
     Path(Vec<GazeSample>),
 }
 
@@ -48,8 +48,8 @@ impl Gaze {
         }
     }
 
-    /// The directions that it is given by.
-    pub(crate) fn given(&self) -> Vec<[f32; 2]> {
+    /// All directions that define it.
+    pub(crate) fn directions(&self) -> Vec<[f32; 2]> {
         match self {
             Self::Fixed(deg) => vec![*deg],
             Self::Path(samples) => samples.iter().map(|sample| sample.deg).collect(),
@@ -57,16 +57,16 @@ impl Gaze {
     }
 }
 
-/// Whether the angles are a direction: less than 90 degrees to either side.
+/// Whether the angles are valid: less than 90 degrees to each side.
 pub(crate) fn is_ahead(deg: [f32; 2]) -> bool {
     deg.iter().all(|angle| (-89.9..=89.9).contains(angle))
 }
 
 /// Unit vector of a direction in the coordinates of an eye (0 left, 1 right) that looks along -z. The angles
-/// are degrees to the right of straight ahead seen from above, and degrees up seen from the side.
+/// are in degrees: to the right from straight ahead, seen from above, and up, seen from the side.
 pub(crate) fn direction(hmd: &Hmd, eye: usize, deg: [f32; 2]) -> Vec3 {
     let [x, y] = deg.map(|angle| angle.to_radians().tan());
-    // The left eye is turned to the left: a positive turn about +y.
+    // The left eye is rotated to the left, a positive angle about +y.
     let side = if eye == 0 { 1.0 } else { -1.0 };
     (Mat3::from_rotation_y(-side * hmd.cant_deg.to_radians()) * Vec3::new(x, y, -1.0)).normalize()
 }

@@ -5,8 +5,8 @@ use crate::eye::EyePicture;
 use crate::patch::{EyePatches, Patch};
 use std::sync::Arc;
 
-/// The picture with every pixel masked that the lens shows nothing of: a pixel of whose square any
-/// point lies in the circle is drawn.
+/// The picture with a mask of the pixels that the lens shows. A pixel is drawn if any point of its square is
+/// inside the circle.
 pub(crate) fn patches(picture: &EyePicture) -> EyePatches {
     let all = f64::from(picture.size_px[0]) * f64::from(picture.size_px[1]);
     let mask = picture.lens.map(|_| {

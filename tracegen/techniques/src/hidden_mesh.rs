@@ -1,16 +1,17 @@
-//! A headset's hidden-area mesh: the triangles of each eye's picture that its lens does not show.
+//! A headset's hidden-area mesh: triangles that cover the part of each eye's picture that the lens does not
+//! show.
 
 use crate::Mask;
 use crate::error::SettingsError;
 use serde::{Deserialize, Serialize};
 
-/// Largest number of triangles per eye: headsets' own meshes have fewer than 200.
+/// Maximum number of triangles per eye. Meshes of headsets have fewer than 200.
 pub const MAX_TRIANGLES: usize = 100_000;
 
-/// Furthest coordinate: a mesh may reach beyond the picture, but not out of single precision.
+/// Largest coordinate. A mesh may extend beyond the picture.
 const MAX_COORDINATE: f32 = 16.0;
 
-/// Corners in parts of the picture's width and height, from its left and lower edge.
+/// Corners as fractions of the picture's width and height, from its left and lower edge.
 pub type Triangle = [[f32; 2]; 3];
 
 /// The hidden areas of both eyes.
@@ -19,7 +20,7 @@ pub type Triangle = [[f32; 2]; 3];
 pub struct HiddenMesh {
     /// Hidden triangles of the left eye's picture.
     pub left: Vec<Triangle>,
-    /// Of the right eye's.
+    /// Hidden triangles of the right eye's picture.
     pub right: Vec<Triangle>,
 }
 
@@ -30,8 +31,8 @@ impl HiddenMesh {
         [&self.left, &self.right][eye]
     }
 
-    /// Visible pixels of an eye's picture: like on a GPU that draws the mesh before the scene, a pixel is
-    /// hidden if its centre is inside a triangle or on its edge.
+    /// Visible pixels of an eye's picture. A pixel is hidden if its centre is inside a triangle or on its
+    /// edge, as on a GPU that draws the mesh before the scene.
     #[must_use]
     pub fn shown(&self, eye: usize, size_px: [u32; 2]) -> Mask {
         let [width, height] = size_px.map(|size| size as usize);
@@ -57,7 +58,7 @@ impl HiddenMesh {
             };
             for y in span(1, height) {
                 for x in span(0, width) {
-                    if holds(&corners, [x as f64 + 0.5, y as f64 + 0.5]) {
+                    if contains(&corners, [x as f64 + 0.5, y as f64 + 0.5]) {
                         shown[y * width + x] = false;
                     }
                 }
@@ -69,7 +70,7 @@ impl HiddenMesh {
     /// Checks every corner, and that some pixels of each eye remain visible.
     ///
     /// # Errors
-    /// The first figure that cannot be.
+    /// The first invalid value.
     pub(crate) fn check(&self, size_px: [u32; 2]) -> Result<(), SettingsError> {
         let refuse = |expected: String, found: String| SettingsError {
             what: "hidden-area mesh",
@@ -109,7 +110,7 @@ impl HiddenMesh {
 
 /// Whether a point is inside a triangle of any winding, including its edges; a triangle without area contains
 /// no point.
-fn holds([a, b, c]: &[[f64; 2]; 3], at: [f64; 2]) -> bool {
+fn contains([a, b, c]: &[[f64; 2]; 3], at: [f64; 2]) -> bool {
     let side = |from: &[f64; 2], to: &[f64; 2]| {
         (to[0] - from[0]) * (at[1] - from[1]) - (to[1] - from[1]) * (at[0] - from[0])
     };
@@ -122,7 +123,7 @@ fn holds([a, b, c]: &[[f64; 2]; 3], at: [f64; 2]) -> bool {
 mod tests {
     use super::*;
 
-    /// All but a circle: a ring of triangles from it to far outside.
+    /// A ring of triangles from a circle to far outside.
     fn all_but_circle(center: [f64; 2], radius: [f64; 2], segments: u32) -> Vec<Triangle> {
         let at = |segment: u32, scale: f64| {
             let angle = std::f64::consts::TAU * f64::from(segment) / f64::from(segments);
@@ -141,9 +142,9 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_around_a_circle_hides_what_lies_outside_of_it() {
+    fn a_mesh_around_a_circle_hides_the_pixels_outside() {
         let size_px = [200, 160];
-        // 70 pixels around a point right of the middle and below it; v counts upwards.
+        // 70 pixels around a point on the right of the middle and below it; v counts upwards.
         let (center_px, radius_px) = ([110.0, 90.0], 70.0);
         let part = [radius_px / 200.0, radius_px / 160.0];
         let hidden = all_but_circle([110.0 / 200.0, 1.0 - 90.0 / 160.0], part, 720);
@@ -177,14 +178,14 @@ mod tests {
     }
 
     #[test]
-    fn windings_and_shared_edges_make_no_difference() {
+    fn windings_and_shared_edges_have_no_effect() {
         let (a, b, c, d) = ([0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]);
         for halves in [[[a, b, c], [a, c, d]], [[c, b, a], [d, c, a]]] {
             let mesh = HiddenMesh {
                 left: halves.into(),
                 right: halves.into(),
             };
-            // The diagonal goes through pixels' centres.
+            // The diagonal passes through the centres of pixels.
             assert_eq!(mesh.shown(0, [64, 64]).count(), 0);
             let error = mesh.check([64, 64]).unwrap_err().to_string();
             assert!(error.contains("hides all of the left eye's"), "{error}");
@@ -197,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn corners_that_are_no_places_are_refused() {
+    fn invalid_corners_are_refused() {
         for bad in [f32::NAN, f32::INFINITY, 17.0] {
             let mesh = HiddenMesh {
                 left: Vec::new(),

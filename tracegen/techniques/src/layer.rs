@@ -6,20 +6,21 @@ use formats::view::{Eye, EyeView};
 use glam::{Mat4, Vec2, Vec3, Vec4};
 use std::sync::Arc;
 
-/// One rendering of a part of one eye's picture, or of both eyes': a pass of the trace.
+/// One rendering of a part of one or both eyes' pictures: a render pass of the trace.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
-    /// The eye, or `None` for a layer that both pictures use.
+    /// The eye; `None` for a layer that both pictures use.
     pub eye: Option<Eye>,
-    /// Number among the frame's layers of that eye: left and right layers of the same number show the same part.
+    /// Number among the frame's layers of that eye. Left and right layers with the same number show the same
+    /// part.
     pub number: u16,
     /// Matrices, with a narrowed, shifted or clipped projection.
     pub view: EyeView,
-    /// Its own size, smaller if it is coarser.
+    /// Size of the layer in pixels, smaller than the part of the picture if it is coarser.
     pub size_px: [u32; 2],
     /// Pixels that may be drawn; all if there is no mask.
     pub mask: Option<Arc<Mask>>,
-    /// Which draws enter it.
+    /// The draws that are drawn into it.
     pub draws: Stage,
     /// Initial contents.
     pub start: Start,
@@ -40,7 +41,7 @@ impl Layer {
         }
     }
 
-    /// All draws over the sky, without a mask.
+    /// Whether it has all draws, the sky and no mask.
     #[must_use]
     pub fn is_plain(&self) -> bool {
         self.mask.is_none() && self.start == Start::Sky && self.draws == Stage::All
@@ -53,7 +54,7 @@ impl Layer {
             * Mat4::from_cols_array_2d(&self.view.world_to_eye)
     }
 
-    /// World to a clip space that ends at the far end of drawn geometry.
+    /// World to a clip space whose far end is the end of the drawn geometry.
     #[must_use]
     pub fn drawn_from_world(&self) -> Mat4 {
         match self.start {
@@ -65,8 +66,7 @@ impl Layer {
         }
     }
 
-    /// Whether something in world-space bounds may reach a pixel that may be drawn. Errs on the
-    /// side of drawing.
+    /// Whether a draw with these world-space bounds may touch a pixel that may be drawn. True in doubt.
     #[must_use]
     pub fn may_draw(&self, [low, high]: [Vec3; 2]) -> bool {
         let Some(mask) = &self.mask else { return true };
@@ -78,7 +78,7 @@ impl Layer {
         for corner in 0..8 {
             let pick = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
             let at = clip_from_world * Vec3::new(pick(0), pick(1), pick(2)).extend(1.0);
-            // Next to the eye or behind it, or not finite: it may be anywhere.
+            // Bounds next to or behind the eye, or that are not finite, may be anywhere.
             if at.w.is_nan() || at.w < least_w || at.w <= 0.0 {
                 return true;
             }
@@ -87,7 +87,7 @@ impl Layer {
         }
         let size = Vec2::new(self.size_px[0] as f32, self.size_px[1] as f32);
         let px = |ndc: Vec2| (ndc + 1.0) / 2.0 * size;
-        // A pixel around it for the rounding of vertices to the raster's grid.
+        // One more pixel, because vertices are rounded to the rasteriser's grid.
         let (first, last) = (px(first) - 1.0, px(last) + 1.0);
         if first.is_nan() || last.is_nan() {
             return true;
@@ -98,7 +98,7 @@ impl Layer {
         )
     }
 
-    /// Pixels that may be drawn.
+    /// Number of pixels that may be drawn.
     #[must_use]
     pub fn drawn_px(&self) -> u64 {
         let all = u64::from(self.size_px[0]) * u64::from(self.size_px[1]);
@@ -121,17 +121,17 @@ pub enum Stage {
 /// Predictions of a technique for a frame, to be compared with measurements.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Predicted {
-    /// Pixels that may be shaded, those that reconstruction needs besides included, in pixels of the
-    /// pictures.
+    /// Share of pixels that may be shaded, including those that only reconstruction needs, relative to the
+    /// pixels of the pictures.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shaded_share: Option<f32>,
-    /// The same without what only reconstruction needs: the mean rate of the pictures' pixels.
+    /// The same without pixels that only reconstruction needs: the mean shading rate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rate_share: Option<f32>,
-    /// Largest distance between a far point's place in the picture and its true place.
+    /// Largest shift of a far point in the picture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disparity_px: Option<f32>,
-    /// Distance from which on there is one picture for both eyes.
+    /// Distance from which both eyes share one picture.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub split_m: Option<f32>,
 }
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_behind_the_mask_are_not_drawn_and_those_that_reach_out_are() {
+    fn only_bounds_that_touch_drawn_tiles_are_drawn() {
         let may_draw = |x: f32, z: f32, half: f32| {
             let center = Vec3::new(x, 0.0, z);
             layer().may_draw([center - half, center + half])
@@ -163,13 +163,13 @@ mod tests {
         assert!(!may_draw(3.0, -10.0, 0.5));
         assert!(may_draw(-4.0, -10.0, 0.5));
         assert!(may_draw(0.0, -10.0, 4.0));
-        // Around the eye.
+        // Bounds around the eye.
         assert!(may_draw(3.0, -1.0, 4.0));
         assert!(may_draw(f32::NAN, -10.0, 0.5));
     }
 
     #[test]
-    fn no_bounds_with_a_point_in_a_drawn_pixel_are_left_out() {
+    fn bounds_with_a_point_in_a_drawn_pixel_are_drawn() {
         let layer = layer();
         let clip = layer.clip_from_world();
         let mut state = 7_u32;

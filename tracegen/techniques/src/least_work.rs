@@ -1,12 +1,12 @@
-//! The split of the far field with the least cost of a frame.
+//! Chooses the split of the far field for which a frame costs least.
 //!
-//! A stated model, not a measurement of the frame: draws and triangles cost alike wherever they lie, those
-//! nearer than the split twice (an eye each), those beyond it once, those on both sides three times. A
-//! pixel is shaded about once (depth is tested early), and belongs to the far field in proportion to the
-//! areas of the objects' boxes beyond the split; a box counts as spread evenly over its range of depth.
-//! The far field's own pictures cost a little for each of their pixels, whatever they show. Between the
-//! depths at which a box begins or ends the cost is linear in the split, so the best split is one of
-//! those, or the nearest one allowed.
+//! The costs follow from a model, not from a measurement of the frame. All draws and all triangles cost the
+//! same. Those nearer than the split count twice (once per eye), those beyond it once, and those on both
+//! sides three times. A pixel is shaded about once, because depth is tested early. The share of pixels that
+//! belongs to the far field is the share of the area of the objects' boxes beyond the split; the area of a
+//! box counts as spread evenly over its range of depths. Each pixel of the far field's pictures has a small
+//! additional cost. Between the depths at which a box starts or ends, the cost is linear in the split. The
+//! best split is therefore one of these depths, or the nearest allowed split.
 
 use formats::view::EyeView;
 use glam::{Mat4, Vec2, Vec3};
@@ -20,13 +20,13 @@ pub struct Object {
     pub far_m: f32,
     /// Triangles.
     pub triangles: u32,
-    /// Area that its bounds take up in a view.
+    /// Area of its bounds in an eye's picture.
     pub area_px: f32,
 }
 
 impl Object {
-    /// A draw with the given world-space bounds, as two eyes with pictures of `size_px` see it; `None`
-    /// where neither does.
+    /// A draw with these world-space bounds, seen by two eyes with pictures of `size_px`; `None` if neither
+    /// eye sees it.
     #[must_use]
     pub fn of_bounds(
         [low, high]: [Vec3; 2],
@@ -44,7 +44,7 @@ impl Object {
                 let pick = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
                 let at = clip * Vec3::new(pick(0), pick(1), pick(2)).extend(1.0);
                 (near_m, far_m) = (near_m.min(at.w), far_m.max(at.w));
-                // Next to the eye or behind it: it may reach any edge.
+                // Next to or behind the eye, it may extend to any edge.
                 let ndc = if at.w > 1e-3 {
                     at.truncate().truncate() / at.w
                 } else {
@@ -74,22 +74,22 @@ impl Object {
     }
 }
 
-/// Unit costs, in any one unit.
+/// Costs per item, in the same unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Costs {
-    /// A draw.
+    /// Cost of a draw.
     pub draw: f64,
-    /// A triangle.
+    /// Cost of a triangle.
     pub triangle: f64,
-    /// A shaded pixel.
+    /// Cost of a shaded pixel.
     pub shaded_px: f64,
-    /// A pixel that is masked in the far field or composed into an eye's picture.
+    /// Cost of a pixel that is masked in the far field or composed into an eye's picture.
     pub composed_px: f64,
 }
 
 impl Costs {
-    /// Nanoseconds, assumed for a software driver: round numbers that say how the terms relate, and
-    /// fitted to no measurement.
+    /// Nanoseconds, assumed for a software driver. Only their ratios matter. The numbers are round and not
+    /// fitted to measurements.
     pub const LAVAPIPE: Self = Self {
         draw: 6000.0,
         triangle: 90.0,
@@ -98,17 +98,17 @@ impl Costs {
     };
 }
 
-/// Pixels of an eye's picture and of the far field's.
+/// Number of pixels of an eye's picture and of the far field's picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pixels {
-    /// One eye's.
+    /// Pixels of one eye's picture.
     pub eye: f64,
-    /// The far field's.
+    /// Pixels of the far field's picture.
     pub far: f64,
 }
 
-/// The split, at least `nearest_m`, at which a frame of `objects` costs least; `None` where it costs
-/// least without a far field.
+/// The split, at least `nearest_m`, with the least cost for a frame of `objects`; `None` if a frame without a
+/// far field costs least.
 #[must_use]
 pub fn least_work(
     objects: &[Object],
@@ -117,7 +117,7 @@ pub fn least_work(
     nearest_m: f32,
 ) -> Option<f32> {
     let mut frame = WorkSums::new(objects);
-    // A depth at which a box begins or ends, and the box.
+    // Depth at which a box starts or ends, whether it starts, and the box.
     let mut events: Vec<(f32, bool, &Object)> = objects
         .iter()
         .flat_map(|object| {
@@ -127,7 +127,7 @@ pub fn least_work(
             ]
         })
         .collect();
-    // At one depth what ends goes before what begins.
+    // At equal depth, ends come before starts.
     events.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut least: Option<(f64, f32)> = None;
     let mut consider = |frame: &WorkSums, split_m: f32| {
@@ -143,7 +143,7 @@ pub fn least_work(
             consider(&frame, nearest_m);
         }
         if begins {
-            // An object that begins at the split is beyond it.
+            // An object that starts at the split is beyond it.
             if begun {
                 consider(&frame, depth_m);
             }
@@ -156,19 +156,19 @@ pub fn least_work(
         }
     }
     least
-        .filter(|(cost, _)| *cost < frame.without(pixels, costs))
+        .filter(|(cost, _)| *cost < frame.cost_without_far_field(pixels, costs))
         .map(|(_, split_m)| split_m)
 }
 
-/// The sums of the model while the split moves away from the eyes.
+/// Sums of the model while the split moves away from the eyes.
 struct WorkSums {
-    /// Draws and triangles, all of them.
+    /// Number of all draws and triangles.
     all: [f64; 2],
-    /// Those that begin before the split.
+    /// Number of those that start before the split.
     near: [f64; 2],
-    /// Those that end beyond it.
+    /// Number of those that end beyond it.
     far: [f64; 2],
-    /// Area of all boxes.
+    /// Total area of all boxes.
     area: f64,
     /// Area beyond the split: `beyond[0] + split * beyond[1]`.
     beyond: [f64; 2],
@@ -188,7 +188,7 @@ impl WorkSums {
         }
     }
 
-    /// The split passes the beginning of a box.
+    /// Moves the split past the start of a box.
     fn begin(&mut self, object: &Object) {
         self.near[0] += 1.0;
         self.near[1] += f64::from(object.triangles);
@@ -197,7 +197,7 @@ impl WorkSums {
         self.beyond[1] += part[1];
     }
 
-    /// The split passes the end of a box.
+    /// Moves the split past the end of a box.
     fn end(&mut self, object: &Object) {
         self.far[0] -= 1.0;
         self.far[1] -= f64::from(object.triangles);
@@ -221,19 +221,19 @@ impl WorkSums {
             + (pixels.far + 2.0 * pixels.eye) * costs.composed_px
     }
 
-    fn without(&self, pixels: Pixels, costs: &Costs) -> f64 {
+    fn cost_without_far_field(&self, pixels: Pixels, costs: &Costs) -> f64 {
         2.0 * (self.all[0] * costs.draw
             + self.all[1] * costs.triangle
             + pixels.eye * costs.shaded_px)
     }
 }
 
-/// End of a box: for a flat one, slightly behind its start.
+/// Depth of the end of a box. For a flat box, it is slightly behind the start.
 fn end_m(object: &Object) -> f32 {
     object.far_m.max(object.near_m.next_up())
 }
 
-/// The area of a box, and the terms of its area beyond a split inside it.
+/// The area of a box, and the coefficients of its area beyond a split inside it.
 fn areas(object: &Object) -> (f64, [f64; 2]) {
     let area = f64::from(object.area_px);
     let [near_m, far_m] = [object.near_m, end_m(object)].map(f64::from);
@@ -259,7 +259,7 @@ mod tests {
         }
     }
 
-    /// The model's cost, straight from its words.
+    /// The model's cost, computed directly from its description.
     fn cost(objects: &[Object], split_m: f32, costs: &Costs) -> f64 {
         let submitted = |o: &Object| costs.draw + f64::from(o.triangles) * costs.triangle;
         let near: f64 = objects
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn no_split_on_a_fine_grid_costs_less_and_none_is_nearer_than_allowed() {
+    fn no_allowed_split_on_a_fine_grid_costs_less() {
         let mut state = 7_u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -363,7 +363,7 @@ mod tests {
         let of = |low: Vec3, high: Vec3| Object::of_bounds([low, high], 7, &[eye; 2], [100, 200]);
         let seen = of(Vec3::new(-1.0, -1.0, -8.0), Vec3::new(1.0, 1.0, -4.0)).unwrap();
         assert!((seen.near_m - 4.0).abs() < 1e-5 && (seen.far_m - 8.0).abs() < 1e-5);
-        // 2 m of 8 m at 4 m, both ways.
+        // 2 m of 8 m at 4 m, on both axes.
         assert!(
             (seen.area_px - 100.0 * 200.0 / 16.0).abs() < 1.0,
             "{seen:?}"
@@ -379,12 +379,12 @@ mod tests {
     }
 
     #[test]
-    fn near_content_gets_no_far_field_and_far_content_begins_at_the_nearest_split() {
+    fn near_content_has_no_far_field_and_far_content_has_the_nearest_split() {
         let of = |objects: &[Object]| least_work(objects, PIXELS, &Costs::LAVAPIPE, 3.0);
         assert_eq!(of(&[object(1.0, 2.5)]), None);
         assert_eq!(of(&[]), None);
         assert_eq!(of(&vec![object(5.0, 9.0); 100]), Some(3.0));
-        // Behind an object that lies across the nearest split, when that is the greater part.
+        // The best split is behind an object that spans the nearest split, if most of the work is beyond it.
         let mut mixed = vec![object(10.0, 20.0); 40];
         mixed.push(Object {
             triangles: 100_000,

@@ -1,6 +1,7 @@
 //! Settings of techniques, and the layers of the frames that they produce.
 //!
-//! Knows displays and angles, and neither drivers nor scenes: a driver renders the [`layer::Layer`]s.
+//! This crate depends only on displays and angles, not on drivers and scenes. A driver renders the
+//! [`layer::Layer`]s.
 
 pub mod distance;
 mod error;

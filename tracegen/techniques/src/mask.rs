@@ -1,15 +1,15 @@
-//! Pixels of a layer that may be drawn.
+//! Masks of the pixels of a layer that may be drawn.
 
 use formats::view::TILE_SIZE_PX;
 
-/// One bit per pixel of a layer; pixels without a set bit must not be drawn.
+/// One bit per pixel of a layer; only pixels with a set bit may be drawn.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
     size_px: [u32; 2],
     /// Row by row.
     drawn: Vec<bool>,
-    /// Tiles that have a pixel which may be drawn, as a summed-area table: of all tiles above and
-    /// to the left of a corner, one more column and row than there are tiles.
+    /// Summed-area table of the tiles with a pixel that may be drawn: for each corner, the number of such
+    /// tiles above and to the left. It has one more column and row than there are tiles.
     tiles: Vec<u32>,
 }
 
@@ -46,7 +46,7 @@ impl Mask {
         }
     }
 
-    /// The same with every pixel that lies up to `by` columns and rows from one of them.
+    /// The mask extended by all pixels at a distance of at most `by` columns and rows.
     #[must_use]
     pub fn grown(&self, by: [u32; 2]) -> Self {
         let [width, height] = self.size_px;
@@ -73,7 +73,7 @@ impl Mask {
             && self.drawn[y as usize * self.size_px[0] as usize + x as usize]
     }
 
-    /// Row by row, one flag per pixel.
+    /// One flag per pixel, row by row.
     #[must_use]
     pub fn flags(&self) -> &[bool] {
         &self.drawn
@@ -86,20 +86,20 @@ impl Mask {
         Some([at % self.size_px[0], at / self.size_px[0]])
     }
 
-    /// Pixels that may be drawn.
+    /// Number of pixels that may be drawn.
     #[must_use]
     pub fn count(&self) -> u64 {
         self.drawn.iter().filter(|drawn| **drawn).count() as u64
     }
 
-    /// Whether a tile (16x16 pixels) that a rectangle touches has a pixel that may be drawn; the
-    /// rectangle's end is not part of it.
+    /// Whether a tile (16x16 pixels) that touches a rectangle has a pixel that may be drawn; the end of the
+    /// rectangle is exclusive.
     #[must_use]
     pub fn any_in(&self, [left, top]: [u32; 2], [right, bottom]: [u32; 2]) -> bool {
         self.tiles_in([left, top], [right, bottom]) > 0
     }
 
-    /// Tiles with a pixel that may be drawn.
+    /// Number of tiles with a pixel that may be drawn.
     #[must_use]
     pub fn tile_count(&self) -> u32 {
         self.tiles_in([0, 0], self.size_px)
@@ -116,8 +116,8 @@ impl Mask {
         sum(high[0], high[1]) + sum(low[0], low[1]) - sum(low[0], high[1]) - sum(high[0], low[1])
     }
 
-    /// The smallest rectangle of whole tiles, cut off at the edge, that holds every pixel that may
-    /// be drawn: its origin and its size; `None` where none may be.
+    /// Origin and size of the smallest rectangle of whole tiles, clipped at the edge, that contains all
+    /// pixels that may be drawn; `None` if there are none.
     #[must_use]
     pub fn bounds_px(&self) -> Option<[[u32; 2]; 2]> {
         if self.tile_count() == 0 {
@@ -161,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_are_those_of_the_tiles_that_are_drawn() {
+    fn bounds_contain_exactly_the_drawn_tiles() {
         let mask = Mask::new([70, 50], |x, y| (x, y) == (20, 33) || (x, y) == (69, 40));
         assert_eq!(mask.bounds_px(), Some([[16, 32], [54, 16]]));
         assert_eq!(mask.tile_count(), 2);
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn a_grown_mask_has_the_neighbours_too() {
+    fn a_grown_mask_includes_the_neighbours() {
         let mask = Mask::new([9, 9], |x, y| (x, y) == (0, 4)).grown([2, 1]);
         let expected = Mask::new([9, 9], |x, y| x <= 2 && (3..=5).contains(&y));
         assert_eq!(mask, expected);

@@ -1,4 +1,4 @@
-//! The layers of one eye before they have a pose: the same for every frame with the same gaze.
+//! The layers of one eye without its pose. They are the same for all frames with the same gaze.
 
 use crate::Mask;
 use crate::eye::EyePicture;
@@ -13,26 +13,27 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub(crate) struct Patch {
     pub number: u16,
-    /// Left and top edge in pixels of the picture.
+    /// Left and top edge in the picture, in pixels.
     pub origin_px: [u32; 2],
     /// Columns and rows of the picture per pixel.
     pub coarseness: [u32; 2],
     pub size_px: [u32; 2],
     pub mask: Option<Arc<Mask>>,
-    /// Tiles of the picture that it fills.
+    /// Tiles of the picture that the layer fills.
     pub tiles: Option<Arc<Mask>>,
     pub filter: Filter,
-    /// Pixels of the picture to pixels of the layer, if origin and coarseness do not define the map.
+    /// Map from pixels of the picture to pixels of the layer, if it does not follow from origin and
+    /// coarseness.
     pub layer_from_px: Option<DMat3>,
 }
 
-/// Layers and parts of an eye's picture.
+/// The layers of an eye's picture.
 #[derive(Clone, Debug)]
 pub(crate) struct EyePatches {
     pub patches: Vec<Patch>,
-    /// The only patch is the picture.
+    /// Whether the only layer is the picture itself.
     pub is_picture: bool,
-    /// Pixels to shade, had each pixel of the picture its rate.
+    /// Number of shaded pixels if each pixel of the picture had exactly its rate.
     pub rate_px: f64,
 }
 
@@ -42,7 +43,7 @@ impl Patch {
         self.mask.as_ref().is_none_or(|mask| mask.first().is_some())
     }
 
-    /// A whole picture, of which only the pixels of `drawn` may be drawn.
+    /// A whole picture in which only the pixels of `mask` may be drawn.
     pub fn whole(picture: &EyePicture, mask: Option<Arc<Mask>>) -> Self {
         Self {
             number: 0,
@@ -56,8 +57,8 @@ impl Patch {
         }
     }
 
-    /// Fills the tiles of a picture that `owned` holds from a layer over the whole of it: pixels
-    /// that the lens shows, and those around them from which the picture's are interpolated.
+    /// A layer over the whole picture that fills the tiles in `owned`. Its mask has the pixels that the lens
+    /// shows and those from which the picture's pixels are interpolated.
     pub fn of_tiles(picture: &EyePicture, number: u16, coarseness: [u32; 2], owned: Mask) -> Self {
         let cover = Patch {
             number,
@@ -86,7 +87,7 @@ impl Patch {
         }
     }
 
-    /// Pixels of the picture that a pixel covers, clipped at the edge: first and end.
+    /// Pixels of the picture that a pixel covers, clipped at the edge: first pixel and exclusive end.
     pub fn covered_px(&self, picture: &EyePicture, pixel: [u32; 2]) -> [[u32; 2]; 2] {
         let edge = |step: u32| {
             [0, 1].map(|axis: usize| {
@@ -97,7 +98,7 @@ impl Patch {
         [edge(0), edge(1)]
     }
 
-    /// The layer for an eye's pose.
+    /// The layer for an eye with a pose.
     pub fn layer(&self, eye: Eye, view: &EyeView, picture_px: [u32; 2]) -> Layer {
         let covers = [0, 1].map(|axis| self.size_px[axis] * self.coarseness[axis]);
         let view = match &self.layer_from_px {
@@ -115,7 +116,7 @@ impl Patch {
         }
     }
 
-    /// The part of the picture that it fills; `layer` is its position in the plan.
+    /// The part of the picture that it fills; `layer` is its index in the plan.
     pub fn part(&self, layer: usize) -> PicturePart {
         PicturePart {
             layer,
@@ -128,19 +129,19 @@ impl Patch {
     }
 }
 
-/// The view through a rectangle of an eye's picture, which may reach beyond it.
+/// The view through a rectangle of an eye's picture; the rectangle may extend beyond the picture.
 fn narrowed(view: &EyeView, origin: [u32; 2], covers: [u32; 2], picture_px: [u32; 2]) -> EyeView {
     if origin == [0, 0] && covers == picture_px {
         return *view;
     }
-    // Scale and shift of clip space along an axis, by the rectangle's edges in it.
+    // Scale and offset of clip space along an axis, from the edges of the rectangle.
     let axis = |axis: usize| {
         let ndc = |px: u32| 2.0 * f64::from(px) / f64::from(picture_px[axis]) - 1.0;
         let (low, high) = (ndc(origin[axis]), ndc(origin[axis] + covers[axis]));
         (2.0 / (high - low), -(high + low) / (high - low))
     };
     let ((x_scale, x_shift), (y_scale, y_shift)) = (axis(0), axis(1));
-    // Rows of pixels count downwards, clip space upwards.
+    // Rows of pixels are numbered downwards; clip space points upwards.
     let narrow = DMat4::from_cols(
         DVec4::new(x_scale, 0.0, 0.0, 0.0),
         DVec4::new(0.0, y_scale, 0.0, 0.0),
@@ -161,7 +162,7 @@ fn mapped(
     picture_px: [u32; 2],
     layer_px: [u32; 2],
 ) -> EyeView {
-    // Homogeneous clip space (x, y, w) to pixels; rows count downwards.
+    // Homogeneous clip space (x, y, w) to pixels; rows are numbered downwards.
     let px_from_clip = |size_px: [u32; 2]| {
         let [x, y] = size_px.map(|size| f64::from(size) / 2.0);
         DMat3::from_cols(
@@ -171,7 +172,7 @@ fn mapped(
         )
     };
     let map = px_from_clip(layer_px).inverse() * *layer_from_px * px_from_clip(picture_px);
-    // Depth is unchanged: points of one direction keep their order, because their w grow by the same factor.
+    // Depth is unchanged: points in one direction keep their order, because the same factor scales their w.
     let column = |c: DVec3| DVec4::new(c.x, c.y, 0.0, c.z);
     let map = DMat4::from_cols(
         column(map.x_axis),

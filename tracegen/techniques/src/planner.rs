@@ -1,4 +1,4 @@
-//! From settings to plans.
+//! Plans frames according to settings.
 
 use crate::error::SettingsError;
 use crate::eye::EyePicture;
@@ -13,10 +13,10 @@ use crate::{Settings, hidden_area};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
 use std::sync::{Arc, Mutex};
 
-/// Largest edge of a layer.
+/// Largest width or height of a layer.
 const MAX_LAYER_PX: u32 = 8192;
 
-/// Patches of each eye's picture.
+/// Layers of each eye's picture.
 type Patches = Arc<Vec<EyePatches>>;
 
 /// Plans frames of one display under the same settings.
@@ -27,14 +27,15 @@ pub struct Planner {
     lenses: [Lens; 2],
     eyes: Vec<Eye>,
     fps: f32,
-    /// Patches of the last gaze, reused while the gaze does not change.
+    /// Layers for the last gaze, reused while the gaze does not change.
     last: Mutex<Option<([f32; 2], Patches)>>,
 }
 
 impl Planner {
-    /// For frames with the pictures of `eyes`, in their order, seen through `lenses`, `fps` a second.
+    /// Plans frames with the pictures of `eyes`, in this order, with `fps` frames per second. `lenses` are
+    /// the visible parts of the pictures.
     ///
-    /// # Errors
+    /// See [`Settings::check`].
     /// [`Settings::check`].
     pub fn new(
         settings: &Settings,
@@ -71,7 +72,7 @@ impl Planner {
         })
     }
 
-    /// The eyes whose pictures the frames have.
+    /// The eyes of the frames.
     #[must_use]
     pub fn eyes(&self) -> &[Eye] {
         &self.eyes
@@ -89,7 +90,7 @@ impl Planner {
         &self.hmd
     }
 
-    /// Visible parts of the left and right eye's pictures.
+    /// Visible parts of the left and right eye's picture.
     #[must_use]
     pub fn lenses(&self) -> &[Lens; 2] {
         &self.lenses
@@ -97,7 +98,7 @@ impl Planner {
 
     /// Checks that the far field, if any, can be drawn for a frame's eyes.
     ///
-    /// # Errors
+    /// See [`Stereo::view`].
     /// As [`Stereo::view`].
     pub fn check_views(&self, views: &FrameViews) -> Result<(), FarFieldError> {
         self.far_view(views, Vec::new).map(|_| ())
@@ -119,7 +120,7 @@ impl Planner {
     /// Plans a frame; `objects` returns its draws, for techniques that depend on them.
     ///
     /// # Errors
-    /// As [`Self::check_views`].
+    /// See [`Self::check_views`].
     pub fn plan(
         &self,
         views: &FrameViews,
@@ -142,7 +143,7 @@ impl Planner {
         let mut numbered: Vec<_> = (0..eyes.len())
             .flat_map(|eye| (0..eyes[eye].patches.len()).map(move |patch| (eye, patch)))
             .collect();
-        // Left and right layers of a number follow each other.
+        // Left and right layers with the same number are consecutive.
         numbered.sort_by_key(|&(eye, patch)| (eyes[eye].patches[patch].number, eye));
         let layers: Vec<_> = (numbered.iter())
             .map(|&(eye, patch)| {
@@ -182,7 +183,7 @@ impl Planner {
 
     /// The layers of each eye for a gaze.
     fn patches(&self, gaze_deg: [f32; 2]) -> Patches {
-        // A plan cannot fail half-way, so its state is valid after a panic.
+        // A plan is only stored when complete, so the state is valid after a panic.
         let mut last = self.last.lock().unwrap_or_else(|e| e.into_inner());
         if let Some((_, patches)) = last.as_ref().filter(|(gaze, _)| *gaze == gaze_deg) {
             return Arc::clone(patches);
@@ -205,7 +206,7 @@ impl Planner {
                     }
                 },
             };
-            // A rate that no tile has needs no layer.
+            // A rate without tiles needs no layer.
             made.patches.retain(|patch| patch.draws_something());
             made
         };

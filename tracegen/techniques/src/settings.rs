@@ -12,26 +12,26 @@ use visibility::Culling;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields, default)]
 pub struct Settings {
-    /// How the visible draws of each view are found.
+    /// Culling technique for the visible draws of each view.
     pub culling: Culling,
-    /// Whether draws hidden behind the visible draws of the last frame are left out.
+    /// Whether draws hidden behind the visible draws of the last frame are not drawn.
     pub occlusion: bool,
-    /// Both eyes in one submission.
+    /// Whether both eyes are rendered in one submission.
     pub multiview: bool,
-    /// Nothing outside the lens is drawn.
+    /// Whether pixels outside the lens are not drawn.
     pub hidden_area_mask: bool,
-    /// Hidden-area mesh of the headset, inside which nothing is drawn.
+    /// The headset's hidden-area mesh; pixels inside are not drawn.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hidden_area_mesh: Option<HiddenMesh>,
-    /// Draws that are too far or too small are not drawn.
+    /// Condition for draws that are too far away or too small.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub distance_cull: Option<DistanceCull>,
     /// Whether every other frame is reprojected from the last one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub half_rate: Option<Reprojection>,
-    /// Far geometry once for both eyes.
+    /// One picture of far geometry for both eyes.
     pub far_field: Option<FarField>,
-    /// The periphery more coarsely.
+    /// Coarser shading in the periphery.
     pub foveation: Option<Foveation>,
 }
 
@@ -39,24 +39,24 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct FarField {
-    /// Where it begins.
+    /// Distance at which the far field starts.
     pub split: Split,
     /// How the picture is used for both eyes.
     #[serde(default)]
     pub variant: Variant,
 }
 
-/// Where the far field begins.
+/// Distance at which the far field starts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", rename_all_fields = "kebab-case")]
 pub enum Split {
-    /// At this distance.
+    /// This distance.
     Metres(f32),
-    /// At the distance where a point is off by at most this number of pixels.
+    /// The distance at which a point is shifted by at most this number of pixels.
     Pixels(f32),
-    /// At the distance of least cost, with points off by at most this number of pixels.
+    /// The distance with the least cost, with points shifted by at most this number of pixels.
     LeastWork {
-        /// As for `pixels`.
+        /// Maximum shift in pixels.
         within_px: f32,
     },
 }
@@ -65,22 +65,22 @@ pub enum Split {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Variant {
-    /// As seen by a camera between the eyes.
+    /// From a camera between the eyes.
     #[default]
     Plain,
-    /// Shifted for each eye by the disparity at the split.
+    /// From a camera between the eyes, shifted for each eye by the disparity at the split.
     DepthShift,
     /// From the left eye in even frames, from the right eye in odd ones.
     AlternateEye,
 }
 
-/// Motion that a reprojection follows.
+/// Motion that a reprojection compensates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reprojection {
     /// The rotation of the head.
     Rotation,
-    /// The rotation and translation of the head, by the last frame's depth.
+    /// The rotation and translation of the head, using the last frame's depth.
     Depth,
 }
 
@@ -88,7 +88,7 @@ pub enum Reprojection {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Foveation {
-    /// How.
+    /// Foveation technique.
     pub kind: FoveationKind,
     /// Direction of the gaze.
     #[serde(default)]
@@ -98,15 +98,15 @@ pub struct Foveation {
     pub rates: Rates,
 }
 
-/// How the periphery is shaded more coarsely.
+/// Foveation techniques.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FoveationKind {
-    /// A rate for each tile, by its angle from the gaze.
+    /// One rate per tile, by its angle from the gaze.
     Rings,
     /// 3x3 viewports, the outer ones at half the resolution.
     MultiResolution,
-    /// Every other 2x2 quad, from the first angle of the rates on.
+    /// Every other 2x2 quad beyond the first angle of the rates.
     RadialDensity,
     /// 2x2 viewports, coarser towards the edges by a projective map.
     LensMatched,
@@ -129,22 +129,22 @@ impl Default for Rates {
 }
 
 impl Settings {
-    /// Whether invisible pixels are left out, by the lens's circle or a mesh.
+    /// Whether invisible pixels are masked, by the lens's circle or by a mesh.
     #[must_use]
     pub fn masks_hidden_area(&self) -> bool {
         self.hidden_area_mask || self.hidden_area_mesh.is_some()
     }
 
-    /// Whether a frame is reprojected from the one before instead of rendered.
+    /// Whether a frame is reprojected from the previous one instead of rendered.
     #[must_use]
     pub fn reprojects(&self, frame: u32) -> bool {
         self.half_rate.is_some() && frame % 2 == 1
     }
 
-    /// Checks every figure, and that no two techniques exclude each other.
+    /// Checks every value, and that the techniques are compatible.
     ///
     /// # Errors
-    /// The first invalid setting, and its allowed values.
+    /// The first invalid setting, and its valid values.
     pub fn check(&self, hmd: &Hmd) -> Result<(), SettingsError> {
         if let Some(mesh) = &self.hidden_area_mesh {
             mesh.check(hmd.eye_size_px)?;
@@ -209,7 +209,7 @@ impl Foveation {
                 found: format!("{edges:?}"),
             });
         }
-        for deg in self.gaze.given() {
+        for deg in self.gaze.directions() {
             if !in_view(hmd, deg) {
                 return Err(SettingsError {
                     what: "gaze",
@@ -222,7 +222,7 @@ impl Foveation {
     }
 }
 
-/// Whether an eye's frustum contains a direction.
+/// Whether a direction is in an eye's frustum.
 fn in_view(hmd: &Hmd, deg: [f32; 2]) -> bool {
     let sees = |eye: usize| {
         let fov = &hmd.fov[eye];
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn the_baseline_and_every_setting_survive_json() {
+    fn settings_are_read_from_json_as_written() {
         for settings in [Settings::default(), looking([3.0, -4.0])] {
             let text = serde_json::to_string(&settings).unwrap();
             assert_eq!(
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gaze_that_one_eye_sees_is_taken_and_one_that_none_sees_is_refused() {
+    fn a_gaze_must_be_in_the_view_of_at_least_one_eye() {
         // The left eye's view ends at 38.7 degrees to the right, the right eye's at 50.2.
         for deg in [[0.0, 0.0], [45.0, 0.0], [-45.0, 44.0]] {
             assert_eq!(looking(deg).check(&hmd()), Ok(()));

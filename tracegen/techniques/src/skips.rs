@@ -1,9 +1,9 @@
-//! Skips of invisible work: on by default, and proven to change no output.
+//! Skips of invisible work, on by default. They do not change any output.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// What is skipped. Pictures and traces are bit-identical with and without each skip.
+/// Enabled skips. Pictures and traces are bit-identical with and without each of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Skips {
     /// Texels of images that no view samples.
@@ -16,7 +16,7 @@ pub struct Skips {
     pub regions: bool,
 }
 
-/// Names for [`Skips::without`], their meaning, and the switch.
+/// Name, and access to the flag of [`Skips`].
 type Row = (&'static str, fn(&mut Skips) -> &mut bool);
 const ROWS: [Row; 4] = [
     ("images", |skips| &mut skips.images),
@@ -37,7 +37,7 @@ impl Default for Skips {
 }
 
 impl Skips {
-    /// Everything is prepared and drawn, visible or not.
+    /// No skips: everything is prepared and drawn, visible or not.
     pub const NONE: Self = Self {
         images: false,
         mip_levels: false,
@@ -59,7 +59,7 @@ impl Skips {
     }
 }
 
-/// One of them by its name, or `all`.
+/// A skip selected by its name, or all of them by `all`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Skip(usize);
 
@@ -75,7 +75,7 @@ impl FromStr for Skip {
     }
 }
 
-/// No skip of that name.
+/// Error for an unknown name of a skip.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownSkip(String);
 

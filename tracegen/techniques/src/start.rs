@@ -8,41 +8,41 @@ pub enum Start {
     /// The sky at the far plane.
     #[default]
     Sky,
-    /// Nothing; and nothing is drawn from a depth on.
+    /// Nothing is drawn at and beyond a depth.
     Nearer {
         /// The depth, in the layer's clip space.
         end: f32,
     },
-    /// The sky, where nearer layers leave it open; nothing is drawn elsewhere.
+    /// The sky in pixels that the nearer layers leave open; nothing is drawn in the others.
     Behind([Opening; 2]),
-    /// A nearer layer of the same view, and what is behind it from a layer of another one.
+    /// A nearer layer of the same view over a farther layer of another view.
     Composed(Composition),
 }
 
-/// What a nearer layer leaves open of a farther one: pixels without a draw, and those around them from
-/// which they are interpolated.
+/// Pixels of a farther layer that a nearer layer leaves open: those without a draw, and the pixels around
+/// them that are used for interpolation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Opening {
-    /// Position of the nearer layer in the plan.
+    /// Index of the nearer layer in the plan.
     pub nearer: usize,
-    /// Depth of its pixels without a draw.
+    /// Depth of the nearer layer's pixels without a draw.
     pub end: f32,
-    /// Pixels of this layer to pixels of the nearer one, homogeneous.
+    /// Homogeneous map from pixels of this layer to pixels of the nearer one.
     pub nearer_from_px: Mat3,
-    /// Margin in pixels of the nearer layer that is examined on each side.
+    /// Radius of the pixels of the nearer layer that are examined.
     pub reach_px: u32,
 }
 
 /// Composition of a nearer and a farther layer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Composition {
-    /// Position of the nearer layer in the plan.
+    /// Index of the nearer layer in the plan.
     pub nearer: usize,
-    /// Depth of its pixels without a draw.
+    /// Depth of the nearer layer's pixels without a draw.
     pub end: f32,
-    /// Position of the farther layer in the plan.
+    /// Index of the farther layer in the plan.
     pub farther: usize,
-    /// Pixels of this layer to pixels of the farther one, homogeneous.
+    /// Homogeneous map from pixels of this layer to pixels of the farther one.
     pub farther_from_px: Mat3,
     /// Clip space of the farther layer to that of this one.
     pub from_farther_clip: Mat4,

@@ -1,17 +1,17 @@
 //! Timewarp: maps a picture to an eye that has rotated or moved since it was rendered.
 //!
-//! Turning moves every pixel the same way whatever its depth, so a homography tells where a pixel was. What
-//! the head's translation moves takes the depth of the picture; what was hidden then is nowhere in it.
+//! A rotation moves each pixel independently of its depth, so a homography describes it. A translation
+//! requires the depth of the picture. Surfaces that were hidden in the picture cannot be recovered.
 
 use formats::view::EyeView;
 use glam::{DMat3, DMat4, DVec3, DVec4};
 
-/// From pixels of an eye's picture `now` to those of the picture that it showed `before`, homogeneous. A third
-/// coordinate of 0 or less means that the direction lay behind that eye.
+/// Homogeneous map from pixels of an eye's current picture to pixels of its picture `before`. If the third
+/// coordinate is 0 or less, the direction was behind the eye.
 #[must_use]
 pub fn before_from_now_px(before: &EyeView, now: &EyeView, size_px: [u32; 2]) -> DMat3 {
     let [width, height] = size_px.map(f64::from);
-    // Homogeneous clip space (x, y, w) to pixels; rows count downwards.
+    // Homogeneous clip space (x, y, w) to pixels; rows are numbered downwards.
     let px_from_clip = DMat3::from_cols(
         DVec3::new(width / 2.0, 0.0, 0.0),
         DVec3::new(0.0, -height / 2.0, 0.0),
@@ -19,7 +19,7 @@ pub fn before_from_now_px(before: &EyeView, now: &EyeView, size_px: [u32; 2]) ->
     );
     let px_from_direction = |eye: &EyeView| {
         let clip = wide(&eye.eye_to_clip);
-        // A direction has no translation; its depth does not matter.
+        // A rotation does not depend on depth, so the translation is omitted.
         let column = |axis: usize| DVec3::new(clip.col(axis).x, clip.col(axis).y, clip.col(axis).w);
         let clip_from_eye = DMat3::from_cols(column(0), column(1), column(2));
         px_from_clip * clip_from_eye * DMat3::from_mat4(wide(&eye.world_to_eye))
@@ -27,21 +27,21 @@ pub fn before_from_now_px(before: &EyeView, now: &EyeView, size_px: [u32; 2]) ->
     px_from_direction(before) * px_from_direction(now).inverse()
 }
 
-/// Looks for pixels by the depth of the picture that was shown before.
+/// Maps pixels by the depth of the earlier picture.
 pub struct ByDepth<'a> {
     turned: DMat3,
-    /// Clip space of the eye before to that of now.
+    /// Map from the earlier clip space to the current one.
     now_from_before: DMat4,
-    /// Row by row, 1 where nothing was drawn.
+    /// Row by row; 1 in pixels without a draw.
     depth: &'a [f32],
     size_px: [u32; 2],
 }
 
-/// Steps of the fixed-point search for a pixel; each corrects the error of the one before.
+/// Number of steps of the fixed-point iteration. Each corrects the error of the step before.
 const STEPS: u32 = 6;
 
 impl<'a> ByDepth<'a> {
-    /// Between two poses of an eye; `depth` is that of the earlier picture.
+    /// Maps between two poses of an eye; `depth` is that of the earlier picture.
     #[must_use]
     pub fn new(before: &EyeView, now: &EyeView, depth: &'a [f32], size_px: [u32; 2]) -> Self {
         let clip = |eye: &EyeView| wide(&eye.eye_to_clip) * wide(&eye.world_to_eye);
@@ -53,9 +53,10 @@ impl<'a> ByDepth<'a> {
         }
     }
 
-    /// Where in the picture before the surface was that is at a place of the picture now, in pixels. Beginning where
-    /// a surface without end would have been, the surface there is projected into the picture now, and the search
-    /// goes on by what it is off. Where nothing was, the turned place stays.
+    /// Position in the earlier picture, in pixels, of the surface at a position in the current picture. The
+    /// iteration starts at the position for infinite distance. Each step projects the surface found there
+    /// into the current picture and corrects the position by the difference. If there is no surface, the
+    /// result is the start position.
     #[must_use]
     pub fn before_px(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let turned = self.turned * DVec3::new(x, y, 1.0);
@@ -70,8 +71,8 @@ impl<'a> ByDepth<'a> {
         at
     }
 
-    /// Current position of the surface at a pixel of the earlier picture; none if there is none, or behind
-    /// the eye.
+    /// Current position of the surface at a pixel of the earlier picture; `None` if there is no surface or if
+    /// it is behind the eye.
     fn now_px(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let [width, height] = self.size_px.map(f64::from);
         let column = x.clamp(0.0, width - 1.0) as usize;
@@ -121,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn what_an_eye_that_only_turned_sees_comes_from_where_it_was() {
+    fn rotation_maps_each_direction_to_its_earlier_pixel() {
         let here = Vec3::new(1.0, 2.0, 3.0);
         let (before, now) = (eye(0.3, 0.1, here), eye(0.22, 0.16, here));
         let warp = before_from_now_px(&before, &now, SIZE_PX);
@@ -138,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_head_that_moves_sideways_leaves_the_parallax_of_a_point() {
+    fn sideways_motion_gives_the_parallax_of_a_point() {
         // A centimetre at 2 m: f / z * 0.01 pixels, with f = height / (2 tan(fov / 2)).
         let (before, now) = (eye(0.0, 0.0, Vec3::ZERO), eye(0.0, 0.0, 0.01 * Vec3::X));
         let warp = before_from_now_px(&before, &now, SIZE_PX);
@@ -150,8 +151,8 @@ mod tests {
     }
 
     #[test]
-    fn by_depth_a_wall_is_found_where_it_was_however_the_head_moved() {
-        // A wall across the view at 2 m, and nothing at all in the right half of the picture before.
+    fn with_depth_a_wall_is_mapped_exactly_for_any_motion() {
+        // A wall in 2 m distance in the left half of the earlier picture, and nothing in the right half.
         let (before, now) = (
             eye(0.0, 0.0, Vec3::ZERO),
             eye(0.03, 0.02, Vec3::new(0.02, 0.01, -0.05)),

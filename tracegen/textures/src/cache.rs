@@ -1,15 +1,15 @@
-//! Prepared textures kept between runs, in a folder of one file each.
+//! A cache of prepared textures between runs: a folder with one file per texture.
 //!
-//! A file is named by its key: XXH3-128 over everything that decides its bytes. Nobody is
-//! defended against here, since the folder is the user's own, so that a fast hash does; at 128
-//! bits, chance meets no collision. Each file carries its key and a checksum of everything in it:
-//! whatever is not whole and in place counts as absent, is made anew and replaced.
+//! The name of a file is its key: an XXH3-128 hash of everything that determines its bytes. A fast hash is
+//! sufficient, because the folder belongs to the user and accidental collisions of 128 bits do not occur.
+//! Each file contains its key and a checksum of its content. A damaged or misplaced file counts as missing
+//! and is replaced.
 //!
-//! Files appear whole, by renaming, and are never changed: any number of processes share the
-//! folder without a lock. Using a file sets its modification time. A file for which there is no
-//! room makes the least recently used ones go until an eighth of the bound is free.
+//! Files are written under a temporary name, renamed, and never changed, so any number of processes can share
+//! the folder without a lock. Reading a file sets its modification time. When a new file exceeds the size
+//! limit, the least recently used files are removed until an eighth of the limit is free.
 //!
-//! Nothing here fails: a folder that cannot be read or written is an empty one.
+//! The cache has no errors: a folder that cannot be read or written is treated as empty.
 
 use formats::container::{AtomicFile, open_regular};
 use formats::texture::TexelFormat;
@@ -21,22 +21,22 @@ use std::time::{Duration, SystemTime};
 use xxhash_rust::xxh3::Xxh3;
 
 const MAGIC: [u8; 8] = *b"PLXTEX\x00\x01";
-/// Magic, key, checksum, length of the blocks, format.
+/// Magic number, key, checksum, length of the blocks, format.
 const HEADER_BYTES: usize = 8 + 16 + 16 + 8 + 4;
 const EXTENSION: &str = "texture";
-/// A run that was killed may leave an unfinished file; older ones than this are nobody's.
+/// Age after which an unfinished file counts as left behind by a killed run.
 const ABANDONED: Duration = Duration::from_secs(24 * 3600);
 
-/// Names a prepared texture: a hash of all that decides its bytes.
+/// Key of a prepared texture: a hash of everything that determines its bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Key(u128);
 
-/// Collects what decides a texture's bytes.
+/// Hashes what determines a texture's bytes.
 #[derive(Clone)]
 pub(crate) struct KeyHasher(Xxh3);
 
 impl KeyHasher {
-    /// Starts with what every key depends on.
+    /// Starts with the properties that all keys depend on.
     pub fn new(version: &str) -> Self {
         let mut hasher = Self(Xxh3::new());
         hasher.add(&MAGIC);
@@ -53,17 +53,17 @@ impl KeyHasher {
     }
 }
 
-/// A folder of prepared textures.
+/// A cache of prepared textures in a folder.
 #[derive(Debug)]
 pub struct Cache {
     folder: PathBuf,
     limit_bytes: u64,
-    /// Bytes in the folder as far as this process knows, `None` before it has looked.
+    /// Size of the folder's files in bytes as far as this process knows; `None` before the first check.
     used_bytes: Mutex<Option<u64>>,
 }
 
 impl Cache {
-    /// A cache of at most `limit_bytes` in `folder`, which is made when the first file is.
+    /// A cache of at most `limit_bytes` bytes in `folder`, which is created with the first file.
     #[must_use]
     pub fn new(folder: PathBuf, limit_bytes: u64) -> Self {
         Self {
@@ -77,14 +77,14 @@ impl Cache {
         self.folder.join(format!("{:032x}.{EXTENSION}", key.0))
     }
 
-    /// Format and blocks of a texture, if a whole file of that key is there.
+    /// Format and blocks of a texture, if the cache has a valid file with this key.
     pub(crate) fn load(&self, key: Key) -> Option<(TexelFormat, Vec<u8>)> {
         let mut file = open_regular(&self.path(key)).ok()?;
         let metadata = file.metadata().ok()?;
         let mut header = [0; HEADER_BYTES];
         file.read_exact(&mut header).ok()?;
         let length = u64::from_le_bytes(header[40..48].try_into().ok()?);
-        // Before anything is allocated: the length is that of the file.
+        // Check before allocation that the length is that of the file.
         if !metadata.is_file() || length.checked_add(HEADER_BYTES as u64)? != metadata.len() {
             return None;
         }
@@ -98,12 +98,12 @@ impl Cache {
         if header != self::header(key, format, &blocks)? {
             return None;
         }
-        // Only eviction looks at this time; failing to set it makes no difference here.
+        // Only eviction uses this time, so a failure has no effect here.
         let _ = file.set_modified(SystemTime::now());
         Some((format, blocks))
     }
 
-    /// Keeps a texture, or does not where that is impossible.
+    /// Stores a texture. A failure is ignored.
     pub(crate) fn store(&self, key: Key, format: TexelFormat, blocks: &[u8]) {
         let Some(header) = header(key, format, blocks) else {
             return;
@@ -124,8 +124,8 @@ impl Cache {
         }
     }
 
-    /// Removes the least recently used files if `needed_bytes` more would exceed the bound, until
-    /// an eighth of it is free as well. Tells the bytes that are left.
+    /// If `needed_bytes` more would exceed the limit, removes the least recently used files until an eighth
+    /// of the limit is also free. Returns the size of the remaining files.
     fn make_room(&self, needed_bytes: u64) -> u64 {
         let now = SystemTime::now();
         let mut files = Vec::new();
@@ -163,7 +163,7 @@ impl Cache {
     }
 }
 
-/// The header of a file with these blocks; `None` for a format that is not kept.
+/// The header of a file with these blocks; `None` for a format that is not cached.
 fn header(key: Key, format: TexelFormat, blocks: &[u8]) -> Option<[u8; HEADER_BYTES]> {
     let format: u32 = match format {
         TexelFormat::Bc1 => 1,
@@ -175,7 +175,7 @@ fn header(key: Key, format: TexelFormat, blocks: &[u8]) -> Option<[u8; HEADER_BY
     header[8..24].copy_from_slice(&key.0.to_le_bytes());
     header[40..48].copy_from_slice(&(blocks.len() as u64).to_le_bytes());
     header[48..].copy_from_slice(&format.to_le_bytes());
-    // Over the header, the checksum's own place zero, and the blocks.
+    // The checksum covers the header, with zeros in place of the checksum, and the blocks.
     let mut hasher = Xxh3::new();
     hasher.update(&header);
     hasher.update(blocks);

@@ -1,4 +1,4 @@
-//! One image to a block-compressed mip chain.
+//! Compresses an image to blocks of all mip levels.
 
 use crate::mipmap::{self, Level};
 use crate::role::{Alpha, Role};
@@ -7,27 +7,26 @@ use scene::blocks::level_bytes;
 use std::borrow::Cow;
 use texpresso::{Algorithm, COLOUR_WEIGHTS_PERCEPTUAL, COLOUR_WEIGHTS_UNIFORM, Format, Params};
 
-/// What turns texels into blocks: the encoder's version, and the version of this crate's own part,
-/// which grows whenever that makes other bytes of the same texels. Prepared textures are kept
-/// under this name; tests hold both.
+/// Version of the encoder, and version of this crate's part, which must be increased when the same texels
+/// give different bytes. It is part of the keys of cached textures. Tests check both versions.
 pub const ENCODER: &str = "texpresso 2.0.2, mip chain 1";
 
 /// Edge of a compressed block in texels.
 const BLOCK: u32 = 4;
 
-/// Size of level 0: whole blocks.
+/// Size of level 0, rounded up to whole blocks.
 pub fn whole_blocks(size: [u32; 2]) -> [u32; 2] {
     size.map(|e| e.next_multiple_of(BLOCK))
 }
 
-/// Levels of a whole mip chain.
+/// Number of levels of a complete mip chain.
 pub fn level_count([width, height]: [u32; 2]) -> u32 {
     width.max(height).ilog2() + 1
 }
 
-/// The finest level that has to be there where no finer one than `wanted` is sampled. A texture of the
-/// coarser levels alone must be sampled as the whole one is: its base must be whole blocks, and each
-/// level exactly half of the one before.
+/// The finest level to store if no level finer than `wanted` is sampled. A texture without the finer levels
+/// must be sampled like the complete one. Its base must therefore consist of whole blocks, and each level
+/// must have exactly half the size of the one before.
 pub fn first_level(size: [u32; 2], wanted: u32) -> u32 {
     if size.iter().all(|extent| extent.is_power_of_two()) {
         let halvings = (size[0].min(size[1]) / BLOCK).max(1).ilog2();
@@ -37,14 +36,14 @@ pub fn first_level(size: [u32; 2], wanted: u32) -> u32 {
     }
 }
 
-/// Bytes of a texture's levels from `first_level` on.
+/// Size of a texture's levels from `first_level` on, in bytes.
 pub fn chain_bytes(texture: &Texture, first_level: u32) -> usize {
     let bytes = |level| level_bytes(texture.format, texture.level_size(level));
     (first_level..texture.levels).map(bytes).sum()
 }
 
-/// Compresses RGBA8 texels of the given size; the blocks of the levels from `first_level` on follow
-/// each other, largest level first.
+/// Compresses RGBA8 texels of the given size. The result has the blocks of the levels from `first_level` on,
+/// in order.
 pub fn compress(
     rgba: &[u8],
     size: [u32; 2],
@@ -87,8 +86,8 @@ pub fn compress(
     let mut level: Option<Level> = None;
     for index in 0..level_count(base_size) {
         if index > 0 {
-            // Level 1 comes straight from the bytes: level 0 in floats would be the largest
-            // allocation of the whole capture.
+            // Compute level 1 directly from the bytes. Level 0 in floats would be the largest allocation of
+            // the whole capture.
             let next = match level {
                 None => Level::half_of(&base, base_size, kind, weigh_by_alpha),
                 Some(level) => level.half(kind),

@@ -1,15 +1,15 @@
-//! Images to block-compressed textures with full mip chains: what is uploaded is what the trace
-//! says was sampled.
+//! Converts images to block-compressed textures with complete mip chains. The uploaded textures are those in
+//! the trace's texture table.
 //!
-//! - Opaque images become BC1. So do those of alpha-masked materials, with BC1's one-bit alpha; a
+//! - Opaque images become BC1. Images of alpha-masked materials also become BC1, with its one-bit alpha. A
 //!   transparent texel is then black, so the shader divides colour by alpha after filtering.
-//! - Images with smooth alpha that a blended material samples become BC3.
-//! - Images whose file holds compressed blocks keep them, with the levels that are there.
+//! - Images with smooth alpha of blended materials become BC3.
+//! - Images whose file has compressed blocks keep these blocks and their levels.
 //! - Only images that a placed mesh samples become textures.
-//! - Level sizes must be whole blocks at level 0: other sizes are resampled up to the next
-//!   multiple of four, with a note.
-//! - A texture that no view sees gets its entry in the trace's table and no blocks.
-//! - Blocks are kept between runs, see [`Cache`].
+//! - Level 0 must consist of whole blocks. Other images are resampled to the next multiple of four, with a
+//!   note.
+//! - A texture that is not visible in any view has an entry in the trace's table, but no blocks.
+//! - Blocks are cached between runs, see [`Cache`].
 //!
 //! The encoder is texpresso's range fit with fixed weights (perceptual for colour, uniform for
 //! data). It works block by block, so the bytes do not depend on the number of threads.
@@ -34,18 +34,18 @@ use std::borrow::Cow;
 /// A texture ready for upload.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CompressedTexture {
-    /// Its entry in the trace's texture table.
+    /// Entry in the trace's texture table.
     pub texture: Texture,
-    /// Finest level that there are blocks of: finer ones are never sampled.
+    /// Finest level with blocks. Finer levels are never sampled.
     pub first_level: u32,
-    /// Blocks of the levels from there on, largest level first, each row by row from the top. Empty
-    /// for a texture that no view sees.
+    /// Blocks of the levels from `first_level` on, in order, each level row by row from the top. Empty for a
+    /// texture that is not visible in any view.
     pub blocks: Vec<u8>,
 }
 
 impl CompressedTexture {
-    /// The texture as every driver samples it: BC1, BC3 and RGBA8 as they are, other blocks decoded
-    /// to RGBA8. Coordinates do not depend on it.
+    /// The texture in a format that every driver supports: BC1, BC3 and RGBA8 unchanged, other blocks decoded
+    /// to RGBA8. Texture coordinates do not depend on the format.
     #[must_use]
     pub fn for_driver(&self) -> Cow<'_, Self> {
         let own = &self.texture;
@@ -83,26 +83,26 @@ pub struct TextureSet {
     pub textures: Vec<CompressedTexture>,
     /// Texture of each image of the scene; `None` for images that no placed mesh samples.
     pub of_image: Vec<Option<usize>>,
-    /// What was changed on the way, one sentence each.
+    /// Changes to images, one sentence each.
     pub notes: Vec<String>,
-    /// Textures whose blocks the cache held.
+    /// Number of textures whose blocks were in the cache.
     pub cached: usize,
 }
 
-/// Why an image cannot become a texture.
+/// Reasons why an image cannot become a texture.
 #[derive(Debug, thiserror::Error)]
 pub enum TextureError {
-    /// Its size or its texels are out of range.
+    /// An invalid size or invalid texels.
     #[error("image '{image}': expected {expected}, found {found}")]
     Image {
         /// Image name.
         image: String,
-        /// What should be there.
+        /// The expected value.
         expected: String,
-        /// What is there.
+        /// The value found.
         found: String,
     },
-    /// Its texels cannot be made.
+    /// The image cannot be read or decoded.
     #[error(transparent)]
     Source(#[from] SceneError),
 }
@@ -111,17 +111,17 @@ impl TextureSet {
     /// Compresses all images that the scene samples, on all cores.
     ///
     /// # Errors
-    /// As [`Self::prepare`].
+    /// See [`Self::prepare`].
     pub fn compress(scene: &Scene) -> Result<Self, TextureError> {
         Self::prepare(scene, |_| Some(0), None)
     }
 
-    /// Makes the textures of all images that the scene samples, on all cores. `finest` tells of an
-    /// image that is seen the finest level that may be sampled; blocks of that and of coarser ones are
-    /// made, and taken from the cache where it has them.
+    /// Prepares the textures of all images that the scene samples, on all cores. `finest` returns the finest
+    /// level of an image that may be sampled, or `None` if the image is not visible. Only blocks of this
+    /// level and of coarser ones are created or taken from the cache.
     ///
     /// # Errors
-    /// An image that cannot be read or decoded, of no size or of more than 16384 texels an edge.
+    /// An image that cannot be read or decoded, that has no texels, or whose edge exceeds 16384 texels.
     pub fn prepare(
         scene: &Scene,
         finest: impl Fn(usize) -> Option<u32> + Sync,
@@ -131,7 +131,7 @@ impl TextureSet {
         let groups = scene::image::by_source(&scene.images, |i| roles[i].is_some());
         let made: Vec<Vec<Made>> = groups
             .into_par_iter()
-            // One source at a time to each thread, so that as few as possible are in flight.
+            // Each thread takes one source at a time, so that as few as possible are in memory.
             .with_max_len(1)
             .map(|group| {
                 let members = group.into_iter().filter_map(|index| {
@@ -151,25 +151,26 @@ impl TextureSet {
             by_image[index] = Some(made);
         }
         let mut set = Self::default();
+        let mut resampled = Vec::new();
         for made in by_image {
             set.of_image.push(made.as_ref().map(|_| set.textures.len()));
             if let Some(made) = made {
-                set.notes.extend(note(&scene.images[made.index]));
+                resampled.extend(resampling(&scene.images[made.index]));
                 set.cached += usize::from(made.cached);
                 set.textures.push(made.texture);
             }
         }
+        set.notes.extend(note(&resampled));
         Ok(set)
     }
 
-    /// Bytes of all blocks.
+    /// Size of all blocks in bytes.
     #[must_use]
     pub fn bytes(&self) -> usize {
         self.textures.iter().map(|t| t.blocks.len()).sum()
     }
 
-    /// Bytes that the levels would have that are never sampled, those of textures that no view sees
-    /// among them.
+    /// Size of the levels that are never sampled, including those of invisible textures, in bytes.
     #[must_use]
     pub fn skipped_bytes(&self) -> usize {
         self.textures
@@ -178,21 +179,21 @@ impl TextureSet {
             .sum()
     }
 
-    /// Textures whose finest levels are never sampled.
+    /// Number of textures without their finest levels, which are never sampled.
     #[must_use]
     pub fn shortened(&self) -> usize {
         let shortened = |t: &&CompressedTexture| t.first_level > 0 && !t.blocks.is_empty();
         self.textures.iter().filter(shortened).count()
     }
 
-    /// Textures that no view sees.
+    /// Number of textures that are not visible in any view.
     #[must_use]
     pub fn unseen(&self) -> usize {
         self.textures.iter().filter(|t| t.blocks.is_empty()).count()
     }
 }
 
-/// An image that is to become a texture.
+/// An image of a source, with its role and the finest level that is sampled.
 #[derive(Clone, Copy)]
 struct Member<'a> {
     index: usize,
@@ -201,7 +202,7 @@ struct Member<'a> {
     finest: Option<u32>,
 }
 
-/// What became of it.
+/// Result of preparing an image.
 struct Made {
     index: usize,
     texture: CompressedTexture,
@@ -209,7 +210,7 @@ struct Made {
 }
 
 impl Member<'_> {
-    /// Finest level to make.
+    /// Finest level to create.
     fn first_level(&self) -> u32 {
         if self.image.stored.is_some() {
             return 0;
@@ -245,8 +246,7 @@ impl Member<'_> {
         }
     }
 
-    /// The cached texture, whole or without the levels that are not needed, if it is one of this
-    /// image's size.
+    /// The cached texture, either complete or without the unneeded levels, if its size is that of this image.
     fn cached(&self, cache: &Cache, source: &KeyHasher) -> Option<Made> {
         let first_level = self.first_level();
         let of = |kept: u32| {
@@ -259,7 +259,7 @@ impl Member<'_> {
         of(0).or_else(|| (first_level > 0).then(|| of(first_level))?)
     }
 
-    /// Bytes of the levels from one on.
+    /// Size of the levels from `first_level` on, in bytes.
     fn bytes(&self, format: TexelFormat, first_level: u32) -> usize {
         let made = self.made(format, Vec::new(), false);
         compress::chain_bytes(&made.texture.texture, first_level)
@@ -279,14 +279,14 @@ impl Member<'_> {
         ))
     }
 
-    /// The texture of blocks that the image's file holds.
-    fn kept(&self, held: blocks::Blocks) -> Result<Made, TextureError> {
+    /// The texture for the compressed blocks of the image's file.
+    fn with_stored_blocks(&self, held: blocks::Blocks) -> Result<Made, TextureError> {
         let expected = self.image.stored;
         let found = (held.format, held.levels.len() as u32);
         if expected.map(|stored| (stored.format, stored.levels)) == Some(found) {
             return Ok(self.made(held.format, held.levels.concat(), false));
         }
-        // The file changed after its header was read.
+        // The file was changed after its header was read.
         Err(self.error(format!("{expected:?}"), format!("{found:?}")))
     }
 
@@ -310,7 +310,7 @@ impl Member<'_> {
         }
     }
 
-    /// The key of the texture with its levels from `first_level` on, from the key of its source.
+    /// Key of the texture with levels from `first_level` on, computed from the key of its source.
     fn key(&self, source: &KeyHasher, first_level: u32) -> cache::Key {
         let mut hasher = source.clone();
         let [width, height] = self.image.size;
@@ -333,7 +333,7 @@ impl Member<'_> {
     }
 }
 
-/// The textures of images that one source makes.
+/// Prepares the textures of all images of one source.
 fn prepare_source(
     members: Vec<Member<'_>>,
     cache: Option<&Cache>,
@@ -346,7 +346,8 @@ fn prepare_source(
             made.push(member.made(stored.format, Vec::new(), false));
             continue;
         }
-        // Only the texels tell whether smooth alpha is smooth, and so the format in the table.
+        // Whether smooth alpha is really smooth, and therefore the format in the table, depends on the
+        // texels.
         if member.finest.is_some() || member.role.alpha == Alpha::Smooth {
             wanted.push(member);
         } else {
@@ -383,7 +384,7 @@ fn prepare_source(
         let rgba = match data {
             ImageData::Rgba8(rgba) => rgba,
             ImageData::Blocks(held) => {
-                made.push(member.kept(held)?);
+                made.push(member.with_stored_blocks(held)?);
                 continue;
             }
         };
@@ -402,15 +403,26 @@ fn prepare_source(
     Ok(made)
 }
 
-/// What happens to an image that is not whole blocks.
-fn note(image: &Image) -> Option<String> {
+/// One note for all resampled images.
+fn note(resampled: &[String]) -> Option<String> {
+    let first = resampled.first()?;
+    Some(match resampled.len() {
+        1 => format!("image resampled to whole blocks of 4x4 texels: {first}"),
+        count => {
+            format!("{count} images resampled to whole blocks of 4x4 texels, the first one {first}")
+        }
+    })
+}
+
+/// The change of size of an image that must be resampled.
+fn resampling(image: &Image) -> Option<String> {
     if image.stored.is_some() {
         return None;
     }
     let ([width, height], size) = (image.size, compress::whole_blocks(image.size));
     (size != image.size).then(|| {
         format!(
-            "image '{}' resampled from {width}x{height} to {}x{}, whole blocks of 4x4",
+            "'{}' from {width}x{height} to {}x{}",
             image.name, size[0], size[1]
         )
     })

@@ -1,19 +1,19 @@
-//! Mip levels: area averages in linear light, with unit normals and kept alpha coverage.
+//! Computes mip levels: area averages in linear light, with normalised normals and constant alpha coverage.
 
 use glam::{Vec3, Vec4};
 use scene::srgb;
 
-/// What the texels mean.
+/// Meaning of the texels.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Kind {
-    /// RGB is sRGB-encoded and averaged in linear light.
+    /// Whether RGB is sRGB-encoded, so that it is averaged in linear light.
     pub srgb: bool,
-    /// RGB is a unit vector and stays one.
+    /// Whether RGB is a unit vector, which must be normalised after averaging.
     pub normal_map: bool,
 }
 
-/// A level in linear floats; colour is multiplied by alpha where alpha counts, so that the colour
-/// of transparent texels does not bleed into their neighbours.
+/// A level in linear floats. If alpha is used, colour is multiplied by it, so that transparent texels do not
+/// affect the colour of their neighbours.
 pub(super) struct Level {
     size: [usize; 2],
     texels: Vec<Vec4>,
@@ -36,7 +36,7 @@ fn decode_texel(texel: &[u8], kind: Kind, premultiply: bool) -> Vec4 {
             f32::from(texel[2]),
         ) / 255.0
     };
-    // A weight of 1/1024 keeps the colour of wholly transparent areas.
+    // A weight of 1/1024 preserves the colour of completely transparent areas.
     let weight = if premultiply {
         alpha.max(1.0 / 1024.0)
     } else {
@@ -46,7 +46,7 @@ fn decode_texel(texel: &[u8], kind: Kind, premultiply: bool) -> Vec4 {
 }
 
 impl Level {
-    /// Level 0 in floats.
+    /// Decodes level 0 to floats.
     pub fn decode(rgba: &[u8], size: [u32; 2], kind: Kind, premultiplied: bool) -> Self {
         let texels = rgba
             .chunks_exact(4)
@@ -59,7 +59,7 @@ impl Level {
         }
     }
 
-    /// Level 1 from the bytes of level 0.
+    /// Computes level 1 from the bytes of level 0.
     pub fn half_of(rgba: &[u8], size: [u32; 2], kind: Kind, premultiplied: bool) -> Self {
         let size = size.map(|e| e as usize);
         let texel = |x: usize, y: usize| {
@@ -72,7 +72,7 @@ impl Level {
         }
     }
 
-    /// The next level.
+    /// Computes the next level.
     pub fn half(&self, kind: Kind) -> Self {
         let texel = |x: usize, y: usize| self.texels[y * self.size[0] + x];
         Self {
@@ -81,7 +81,7 @@ impl Level {
         }
     }
 
-    /// Bilinear resampling, for sizes that are not whole blocks.
+    /// Resamples bilinearly, for sizes that are not whole blocks.
     pub fn resize(&self, size: [u32; 2]) -> Self {
         let [width, height] = size.map(|e| e as usize);
         let tap = |i: usize, to: usize, from: usize| {
@@ -108,7 +108,7 @@ impl Level {
         }
     }
 
-    /// RGBA8.
+    /// Encodes the level as RGBA8.
     pub fn encode(&self, kind: Kind) -> Vec<u8> {
         let byte = |v: f32| (v * 255.0 + 0.5) as u8;
         let mut rgba = Vec::with_capacity(self.texels.len() * 4);
@@ -131,7 +131,7 @@ impl Level {
     }
 }
 
-/// Halves both axes (rounding down, at least 1) by averaging the area under each new texel.
+/// Halves both axes (rounded down, at least 1). Each new texel is the average of the area that it covers.
 fn average(size: [usize; 2], kind: Kind, texel: impl Fn(usize, usize) -> Vec4) -> Level {
     let [width, height] = size.map(|e| (e / 2).max(1));
     let mut texels = Vec::with_capacity(width * height);
@@ -170,7 +170,7 @@ fn average(size: [usize; 2], kind: Kind, texel: impl Fn(usize, usize) -> Vec4) -
     }
 }
 
-/// Old texels under each new one along an axis, with weights that add up to 1.
+/// For each new texel along an axis, the old texels that it covers, with weights that add up to 1.
 fn spans(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
     let scale = from as f64 / to as f64;
     (0..to)
@@ -186,14 +186,14 @@ fn spans(from: usize, to: usize) -> Vec<Vec<(usize, f32)>> {
         .collect()
 }
 
-/// Fraction of texels whose alpha is at least `cutoff`.
+/// Share of texels whose alpha is at least `cutoff`.
 pub(super) fn coverage(rgba: &[u8], cutoff: u8) -> f64 {
     let passing = rgba.chunks_exact(4).filter(|t| t[3] >= cutoff).count();
     passing as f64 / (rgba.len() / 4) as f64
 }
 
-/// The cutoff that lets closest to `coverage` of the texels pass: averaging alone makes foliage
-/// thinner or thicker with distance (Castano, "Computing alpha mipmaps", 2010).
+/// The cutoff for which the share of passing texels is closest to `coverage`. With averaging alone, foliage
+/// would become thinner or thicker with distance (Castano, "Computing alpha mipmaps", 2010).
 pub(super) fn cutoff_for_coverage(rgba: &[u8], coverage: f64) -> u8 {
     let mut histogram = [0u64; 256];
     for texel in rgba.chunks_exact(4) {
@@ -211,14 +211,14 @@ pub(super) fn cutoff_for_coverage(rgba: &[u8], coverage: f64) -> u8 {
     best
 }
 
-/// Alpha becomes 255 from `cutoff` on and 0 below.
+/// Sets alpha to 255 if it is at least `cutoff`, else to 0.
 pub(super) fn binarise(rgba: &mut [u8], cutoff: u8) {
     for texel in rgba.chunks_exact_mut(4) {
         texel[3] = if texel[3] >= cutoff { 255 } else { 0 };
     }
 }
 
-/// Alpha becomes 255.
+/// Sets alpha to 255.
 pub(super) fn make_opaque(rgba: &mut [u8]) {
     for texel in rgba.chunks_exact_mut(4) {
         texel[3] = 255;
@@ -239,7 +239,7 @@ mod tests {
     };
 
     #[test]
-    fn bytes_survive_the_way_to_linear_light_and_back() {
+    fn bytes_are_unchanged_by_decoding_and_encoding() {
         let rgba: Vec<u8> = (0..=255).flat_map(|v| [v, v, v, 255]).collect();
         for kind in [COLOR, DATA] {
             assert_eq!(
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_sizes_weigh_every_texel_alike() {
+    fn at_odd_sizes_all_texels_have_the_same_weight() {
         let rgba: Vec<u8> = [0u8, 30, 60, 90, 120]
             .iter()
             .flat_map(|&v| [v, v, v, 255])
@@ -291,7 +291,7 @@ mod tests {
 
     #[test]
     fn the_cutoff_of_a_level_keeps_the_coverage_of_level_0() {
-        // A tenth of the texels opaque at random: averages rarely reach one half.
+        // A random tenth of the texels is opaque, so averages rarely reach one half.
         let mut state = 1u32;
         let rgba: Vec<u8> = (0..64 * 64)
             .flat_map(|_| {
@@ -306,7 +306,7 @@ mod tests {
             coverage(&half, 128) < full * 0.7,
             "the plain cutoff loses coverage"
         );
-        // Alpha has only five values here, so the nearest choice is still coarse.
+        // Alpha has only five values here, so the best cutoff is still inexact.
         assert!((kept - full).abs() <= (coverage(&half, 128) - full).abs());
     }
 }

@@ -1,29 +1,29 @@
-//! What each image is used for, which decides how it is filtered and compressed.
+//! The role of each image, which determines its filtering and compression.
 
 use scene::{AlphaMode, Scene};
 
-/// How a texture's alpha is used.
+/// Use of a texture's alpha.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Alpha {
-    /// Not at all.
+    /// Alpha is not used.
     Ignored,
-    /// Compared with a cutoff (0 to 255).
+    /// Alpha is compared with a cutoff (0 to 255).
     Mask(u8),
-    /// Blended.
+    /// Alpha is blended.
     Smooth,
 }
 
-/// What an image is used for by all materials together.
+/// Combined use of an image by all materials.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Role {
     pub alpha: Alpha,
     pub normal_map: bool,
 }
 
-/// The role of each image, `None` for those that no placed mesh samples.
+/// The role of each image; `None` for images that no placed mesh samples.
 ///
-/// An image that materials use in several ways gets the alpha that keeps most of it, and the
-/// lowest cutoff.
+/// If several materials use an image in different ways, its alpha gets the use that preserves most of it, and
+/// the lowest cutoff.
 pub(super) fn of_images(scene: &Scene) -> Vec<Option<Role>> {
     let mut used = vec![false; scene.materials.len()];
     for instance in &scene.instances {
@@ -43,7 +43,7 @@ pub(super) fn of_images(scene: &Scene) -> Vec<Option<Role>> {
             let alpha = match material.alpha {
                 AlphaMode::Mask(cutoff) if slot == 0 => {
                     let on_texture = cutoff / material.base_color.w.max(1e-6);
-                    // At least 1: a fully transparent texel never passes in BC1.
+                    // At least 1, because a completely transparent texel never passes in BC1.
                     Alpha::Mask((on_texture * 255.0).ceil().clamp(1.0, 255.0) as u8)
                 }
                 AlphaMode::Blend if slot == 0 => Alpha::Smooth,

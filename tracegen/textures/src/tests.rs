@@ -1,4 +1,4 @@
-//! Quality against an independent decoder, determinism, and what each material makes of an image.
+//! Tests of quality with an independent decoder, of determinism, and of formats by material.
 
 use super::*;
 use crate::compress::{ENCODER, compress};
@@ -88,7 +88,7 @@ fn bc1_keeps_a_smooth_picture_above_36_db() {
 }
 
 #[test]
-fn levels_are_a_whole_chain_of_whole_blocks() {
+fn levels_are_a_complete_chain_of_whole_blocks() {
     let set = TextureSet::compress(&scene_of([64, 16], picture([64, 16]), AlphaMode::Opaque));
     let texture = &set.unwrap().textures[0];
     // 64x16, 32x8, 16x4, 8x2, 4x1, 2x1, 1x1 in 4x4 blocks of 8 bytes.
@@ -175,7 +175,7 @@ fn images_that_no_placed_mesh_samples_are_left_out() {
 }
 
 #[test]
-fn a_cached_texture_is_the_one_that_compressing_gives() {
+fn a_cached_texture_equals_the_compressed_one() {
     let folder = tempfile::tempdir().unwrap();
     let cache = Cache::new(folder.path().to_owned(), 1 << 30);
     for alpha in [AlphaMode::Opaque, AlphaMode::Mask(0.3), AlphaMode::Blend] {
@@ -191,7 +191,7 @@ fn a_cached_texture_is_the_one_that_compressing_gives() {
 }
 
 #[test]
-fn levels_finer_than_what_is_sampled_are_left_out_and_the_others_stay_the_same() {
+fn levels_that_are_not_sampled_are_left_out_and_the_others_are_unchanged() {
     for (size, wanted, first) in [
         ([64, 32], 0, 0),
         ([64, 32], 2, 2),
@@ -219,7 +219,7 @@ fn levels_finer_than_what_is_sampled_are_left_out_and_the_others_stay_the_same()
             assert!(whole.blocks.ends_with(&texture.blocks));
             assert_eq!(first > 0, texture.blocks.len() < whole.blocks.len());
             assert!(first == 0 || (width % 4, height % 4) == (0, 0));
-            // Kept under a key of its own, and taken from a whole texture where that is kept.
+            // The shorter texture has its own key. It is also taken from a complete texture in the cache.
             assert_eq!(shorter(Some(&cache)), (texture.clone(), 0));
             assert_eq!(shorter(Some(&cache)), (texture.clone(), 1));
             let full = TextureSet::prepare(&scene, |_| Some(0), Some(&cache)).unwrap();
@@ -230,7 +230,7 @@ fn levels_finer_than_what_is_sampled_are_left_out_and_the_others_stay_the_same()
 }
 
 #[test]
-fn a_damaged_cache_is_made_anew() {
+fn damaged_cache_files_are_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let cache = Cache::new(folder.path().to_owned(), 1 << 30);
     let scene = scene_of([16, 16], picture([16, 16]), AlphaMode::Opaque);
@@ -248,7 +248,7 @@ fn a_damaged_cache_is_made_anew() {
 }
 
 #[test]
-fn whatever_decides_the_blocks_decides_the_key() {
+fn the_key_depends_on_everything_that_determines_the_blocks() {
     let folder = tempfile::tempdir().unwrap();
     let cache = Cache::new(folder.path().to_owned(), 1 << 30);
     let mut scenes = vec![
@@ -281,7 +281,7 @@ impl scene::image::ImageSource for Unreadable {
 }
 
 #[test]
-fn what_no_view_sees_keeps_its_table_entry_and_is_not_read() {
+fn an_invisible_image_has_a_table_entry_and_is_not_read() {
     for alpha in [AlphaMode::Opaque, AlphaMode::Mask(0.3), AlphaMode::Blend] {
         let mut scene = scene_of([30, 16], picture([30, 16]), alpha);
         let seen = TextureSet::compress(&scene).unwrap();
@@ -299,7 +299,7 @@ fn what_no_view_sees_keeps_its_table_entry_and_is_not_read() {
 }
 
 #[test]
-fn the_encoder_named_in_keys_makes_these_bytes() {
+fn the_bytes_of_a_texture_change_only_with_the_encoder_version() {
     let (name, version) = ENCODER.split_once(", ").unwrap().0.split_once(' ').unwrap();
     let entry = format!("name = \"{name}\"\nversion = \"{version}\"\n");
     assert!(
@@ -316,9 +316,24 @@ fn the_encoder_named_in_keys_makes_these_bytes() {
             }
         }
     }
-    // Where this changes, ENCODER must change with it: caches hold textures under its name.
+    // If this changes, ENCODER must change with it, because it is part of the keys of cached textures.
     assert_eq!(
         format!("{:?}", hasher.finish()),
         "Key(53964728629684028245313165242808893593)"
     );
+}
+
+#[test]
+fn resampled_images_share_one_note() {
+    let mut scene = scene_of([30, 17], picture([30, 17]), AlphaMode::Opaque);
+    scene.images.push(Image::from_texels(
+        "other",
+        [30, 17],
+        ColorSpace::Linear,
+        picture([30, 17]),
+    ));
+    scene.materials[0].normal_texture = Some(TextureRef::new(1));
+    let set = TextureSet::compress(&scene).unwrap();
+    let expected = "2 images resampled to whole blocks of 4x4 texels, the first one 'test' from 30x17 to 32x20";
+    assert_eq!(set.notes, [expected]);
 }

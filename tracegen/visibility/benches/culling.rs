@@ -16,7 +16,7 @@ const BEHIND: [Vec3; 2] = [
     Vec3::new(100.0, 12.0, 2000.0),
 ];
 
-/// Boxes of 0.1 to 2 m, most of them small, anywhere in a room.
+/// Randomly placed boxes of 0.1 to 2 m, most of them small, in a room.
 fn boxes(count: usize, [low, high]: [Vec3; 2]) -> Vec<[Vec3; 2]> {
     let mut state = 1_u64;
     let mut random = || {

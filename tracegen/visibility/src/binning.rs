@@ -1,13 +1,14 @@
-//! Which primitives enter which tile of a view, before any depth test: the primitive lists of a tile-based renderer.
+//! Finds the tiles that each primitive enters before any depth test, for the primitive lists of a tile-based
+//! renderer.
 
 use formats::view::TILE_SIZE_PX;
 use glam::{Affine3A, DMat4, DVec2, DVec4, Mat4, Vec3};
 
-/// Distance from tiles and pixel centres within which a primitive counts as touching them: drivers snap vertices to
-/// 1/256 pixel and compute in single precision.
+/// Margin of tiles and pixel centres within which a primitive counts as touching them. Drivers round vertices
+/// to 1/256 pixel and compute in single precision.
 const MARGIN_PX: f64 = 1.0 / 64.0;
 
-/// A view to sort primitives into the tiles of.
+/// A view whose tiles primitives are assigned to.
 #[derive(Clone, Copy, Debug)]
 pub struct BinnedView {
     /// World to clip space; depth 0 to 1, y up.
@@ -27,14 +28,14 @@ pub struct BinnedDraw<'a> {
     pub world_from_object: Affine3A,
     /// Whether both faces are drawn; otherwise only counterclockwise ones.
     pub double_sided: bool,
-    /// The transform mirrors, so that front faces wind clockwise.
+    /// Whether the transform mirrors, so that front faces are clockwise.
     pub mirrored: bool,
     /// Number of the first primitive.
     pub first_primitive: u32,
 }
 
-/// Appends (tile, primitive) for each tile that each triangle of a draw enters; primitives ascend, and so do the
-/// tiles of each.
+/// Appends (tile, primitive) for each tile that each triangle of a draw enters. Primitives ascend, and so do
+/// the tiles of each primitive.
 pub fn bin(view: &BinnedView, draw: &BinnedDraw<'_>, out: &mut Vec<(u32, u32)>) {
     let world = DMat4::from_cols_array(
         &Mat4::from(draw.world_from_object)
@@ -57,7 +58,7 @@ pub fn bin(view: &BinnedView, draw: &BinnedDraw<'_>, out: &mut Vec<(u32, u32)>) 
     }
 }
 
-/// A triangle cut at the near plane: up to four corners in clip space.
+/// A triangle clipped at the near plane: up to four corners in clip space.
 struct Clipped {
     corners: [DVec4; 4],
     len: usize,
@@ -94,30 +95,30 @@ impl Clipped {
     }
 
     fn push(&mut self, corner: DVec4) {
-        // A triangle cut by one plane has four corners at most.
+        // A triangle clipped by one plane has at most four corners.
         if let Some(place) = self.corners.get_mut(self.len) {
             *place = corner;
             self.len += 1;
         }
     }
 
-    /// Pixels from the top left.
+    /// Corners in pixels from the top left.
     fn on_screen(&self, size_px: [u32; 2]) -> [DVec2; 4] {
         let half = DVec2::new(f64::from(size_px[0]), f64::from(size_px[1])) / 2.0;
-        // Orthographic views have w = 1; at the near plane of the others it is positive.
+        // w is 1 in orthographic views. In other views, it is positive at the near plane.
         self.corners
             .map(|c| DVec2::new(1.0 + c.x / c.w, 1.0 - c.y / c.w) * half)
     }
 }
 
-/// Calls `enters` for each tile that a convex polygon enters. `front` is the sign of the area of faces that are kept,
-/// counterclockwise on the screen being positive.
-fn tiles(polygon: &[DVec2], front: Option<f64>, size_px: [u32; 2], mut enters: impl FnMut(u32)) {
+/// Calls `visit` for each tile that a convex polygon enters. `front` is the sign of the area of faces that
+/// are kept; counterclockwise faces on the screen are positive.
+fn tiles(polygon: &[DVec2], front: Option<f64>, size_px: [u32; 2], mut visit: impl FnMut(u32)) {
     if polygon.len() < 3 {
         return;
     }
     let edges = || (0..polygon.len()).map(|i| (polygon[i], polygon[(i + 1) % polygon.len()]));
-    // Positive where corners wind counterclockwise as seen, with y down.
+    // Positive if the corners are counterclockwise on the screen, where y points down.
     let area: f64 = -edges().map(|(a, b)| a.perp_dot(b)).sum::<f64>();
     let is_kept = front.map_or(area != 0.0, |front| area * front > 0.0);
     if !is_kept || !area.is_finite() {
@@ -147,13 +148,13 @@ fn tiles(polygon: &[DVec2], front: Option<f64>, size_px: [u32; 2], mut enters: i
             let centre = (DVec2::new(f64::from(column), f64::from(row)) + 0.5) * tile_px;
             let outside = edges().any(|(a, b)| {
                 let normal = (b - a).perp() * inward;
-                // Extent of the tile towards the inner side of the edge.
+                // Extent of the tile towards the inside of the edge.
                 let reach = (tile_px / 2.0) * (normal.x.abs() + normal.y.abs())
                     + MARGIN_PX * normal.length();
                 normal.dot(centre - a) + reach < 0.0
             });
             if !outside {
-                enters(row * row_tiles + column);
+                visit(row * row_tiles + column);
             }
         }
     }

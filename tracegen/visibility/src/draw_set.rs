@@ -1,6 +1,7 @@
 //! A set of draws that is filled in any order and read in ascending order.
 
-/// One bit per draw, and one bit per non-empty word, so that the cost of reading depends on the contents.
+/// One bit per draw, and one bit per non-empty word, so that the time for reading depends on the number of
+/// elements.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DrawSet {
     words: Vec<u64>,
@@ -23,7 +24,7 @@ impl DrawSet {
         self.summary[word / 64] |= 1 << (word % 64);
     }
 
-    /// Appends the draws, ascending, and forgets them.
+    /// Appends the draws in ascending order and empties the set.
     pub fn drain_into(&mut self, list: &mut Vec<u32>) {
         for (group, summary) in self.summary.iter_mut().enumerate() {
             let mut words = std::mem::take(summary);
@@ -45,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn draws_come_out_once_in_ascending_order_and_leave_nothing_behind() {
+    fn draws_are_read_once_in_ascending_order_and_removed() {
         let mut set = DrawSet::default();
         set.reserve(10_000);
         let mut list = vec![];

@@ -2,9 +2,9 @@
 
 use glam::{Mat4, Vec3, Vec4};
 
-/// Indices of the world-space bounds that are not wholly outside one plane of the frustum.
+/// Indices of the world-space bounds that are not completely outside one plane of the frustum.
 ///
-/// The test errs on the side of drawing; bounds with NaN are drawn.
+/// The test is conservative: invisible bounds may be included, as are bounds with NaN.
 #[must_use]
 pub fn visible(bounds: impl IntoIterator<Item = [Vec3; 2]>, clip_from_world: Mat4) -> Vec<u32> {
     let planes = frustum_planes(clip_from_world);
@@ -15,8 +15,8 @@ pub fn visible(bounds: impl IntoIterator<Item = [Vec3; 2]>, clip_from_world: Mat
         .collect()
 }
 
-/// Narrows clip space to a region of a view of `size_px`: `crop(..) * clip_from_world` is the clip
-/// matrix of the region and a pixel around it, for the rounding of vertices to the raster's grid.
+/// Restricts clip space to a region of a view of `size_px`. `crop(..) * clip_from_world` is the clip matrix
+/// of the region enlarged by one pixel, because vertices are rounded to the rasteriser's grid.
 #[must_use]
 pub fn crop(origin_px: [u32; 2], region_px: [u32; 2], size_px: [u32; 2]) -> Mat4 {
     let axis = |axis: usize| {
@@ -26,7 +26,7 @@ pub fn crop(origin_px: [u32; 2], region_px: [u32; 2], size_px: [u32; 2]) -> Mat4
         [2.0 / (high - low), -(high + low) / (high - low)]
     };
     let ([x_scale, x_shift], [y_scale, y_shift]) = (axis(0), axis(1));
-    // Rows of pixels count downwards, clip space upwards.
+    // Rows of pixels are numbered downwards; clip space points upwards.
     Mat4::from_cols(
         Vec4::new(x_scale, 0.0, 0.0, 0.0),
         Vec4::new(0.0, y_scale, 0.0, 0.0),
@@ -52,7 +52,7 @@ fn outside(plane: Vec4, [lo, hi]: [Vec3; 2]) -> bool {
     let normal = plane.truncate();
     let nearest = Vec3::select(normal.cmpge(Vec3::ZERO), hi, lo);
     let terms = normal * nearest;
-    // A margin for the rounding of this sum and of the vertex shader's.
+    // A margin for rounding of this sum and in the vertex shader.
     let margin = 1e-5 * (terms.abs().element_sum() + plane.w.abs());
     terms.element_sum() + plane.w < -margin
 }
@@ -76,7 +76,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_in_a_region_is_seen_by_the_region_and_not_by_one_far_from_it() {
+    fn a_point_is_visible_in_its_region_and_not_in_a_distant_one() {
         let clip = glam::camera::rh::proj::directx::perspective(1.2, 1.5, 0.1, 50.0);
         let size_px = [300, 200];
         let mut state = 5_u32;

@@ -1,37 +1,37 @@
-//! Bounds how finely a view can sample a mesh's textures.
+//! Computes a lower bound of the texture derivatives of a mesh in a view.
 //!
-//! The map from pixels to texture coordinates of a triangle is projective, so the three lanes of a
-//! quad that give both derivatives span, in texels, exactly
+//! The map from pixels to texture coordinates of a triangle is projective. The three lanes of a quad that
+//! determine both derivatives therefore span the area, in texels,
 //!
 //! ```text
 //! |du x dv| = A_uv / |det V| * w_a w_b w_c
 //! ```
 //!
-//! where A_uv is twice the triangle's area in texels, V holds the vertices' clip x, y (in pixels) and
-//! w as rows, and w_a, w_b, w_c are w on the triangle's plane at the lanes. The longer derivative is at
-//! least the root of that, whatever norm a driver takes, and w is least where the triangle is nearest:
-//! so the level of detail has a lower bound before anything is drawn.
+//! where A_uv is twice the triangle's area in texels, V is a matrix with the vertices' clip x, y (in pixels)
+//! and w as rows, and w_a, w_b, w_c are w on the triangle's plane at the lanes. The longer derivative is at
+//! least the square root of this area in any norm. It is smallest where w is smallest, at the nearest point
+//! of the triangle. This gives a lower bound for the level of detail before anything is drawn.
 
 use glam::{Affine3A, DMat3, DVec2, DVec3, Mat4, Vec2, Vec3};
 
-/// Lanes of a quad lie at most this many pixels beside the covered one, with room for the raster's
-/// grid.
+/// Maximum distance in pixels from a covered lane to the other lanes of its quad, with a margin for the
+/// rasteriser's grid.
 const LANE_PX: f64 = 1.1;
 
-/// A view and its pixels.
+/// A view and its size in pixels.
 #[derive(Clone, Copy, Debug)]
 pub struct Pixels {
     /// World to clip space.
     pub clip_from_world: Mat4,
     /// Width and height.
     pub size_px: [u32; 2],
-    /// Least w of visible geometry: the distance of a perspective's near plane, 1 for a parallel view.
+    /// Smallest w of visible geometry: the distance of the near plane in perspective, 1 in a parallel view.
     pub least_w: f32,
 }
 
-/// A lower bound of the squared length, in units of `uv` by pixel, of the longer derivative wherever the
-/// view may sample the mesh; infinity where it never does. Multiplied by the texels of a texture (its
-/// width times its height) it is that in texels. 0 where nothing can be said.
+/// A lower bound of the squared length of the longer derivative, in units of `uv` per pixel, over all pixels
+/// in which the view may sample the mesh. Infinity if there are none; 0 if no bound is known. Multiply it by
+/// the number of texels of a texture (width times height) to get the bound in texels.
 #[must_use]
 pub fn least_derivative_squared(
     positions: &[Vec3],
@@ -42,14 +42,14 @@ pub fn least_derivative_squared(
 ) -> f64 {
     let clip = pixels.clip_from_world * Mat4::from(*world_from_object);
     let half = DVec2::new(pixels.size_px[0].into(), pixels.size_px[1].into()) / 2.0;
-    // Clip x and y in pixels, w, and the bits of the planes that have the vertex outside.
+    // Clip x and y in pixels, w, and one bit for each plane that the vertex is outside of.
     let vertices: Vec<(DVec3, u8)> = positions
         .iter()
         .map(|p| {
             let c = (clip * p.extend(1.0)).as_dvec4();
             let w = c.w;
             let planes = [w + c.x, w - c.x, w + c.y, w - c.y, c.z, w - c.z];
-            // Margin of one pixel around the view, and for rounding.
+            // Margin of one pixel around the view, plus a margin for rounding.
             let margin =
                 (1.0 / half.min_element() + 1e-4) * (c.x.abs() + c.y.abs() + c.z.abs() + w.abs());
             let outside = (0..6).map(|i| u8::from(planes[i] < -margin) << i).sum();
@@ -68,7 +68,7 @@ pub fn least_derivative_squared(
         let [ua, ub, uc] = corners.map(|i| uv(i).as_dvec2());
         let area_uv = (ub - ua).perp_dot(uc - ua).abs();
         let bound = area_uv * spread([a.0, b.0, c.0], pixels.least_w.into());
-        // NaN gives no bound either.
+        // NaN also means that no bound is known.
         least = if bound >= 0.0 { least.min(bound) } else { 0.0 };
         if least == 0.0 {
             break;
@@ -77,15 +77,15 @@ pub fn least_derivative_squared(
     least
 }
 
-/// Least `w_a w_b w_c / |det V|` of a triangle's quads.
+/// Smallest `w_a w_b w_c / |det V|` of a triangle's quads.
 fn spread(vertices: [DVec3; 3], least_w: f64) -> f64 {
     let v = DMat3::from_cols_array_2d(&vertices.map(|v| v.to_array()));
     let det = v.determinant().abs();
     if det == 0.0 {
-        // Seen edge on: it covers nothing.
+        // A triangle that is seen edge-on covers no pixels.
         return f64::INFINITY;
     }
-    // 1/w is linear in the picture: its slopes, and its largest value where the triangle is seen.
+    // 1/w is linear in the picture. Compute its slopes, and its largest value where the triangle is visible.
     let slopes = v.inverse().transpose() * DVec3::ONE;
     let nearest = vertices
         .iter()
@@ -104,7 +104,7 @@ mod tests {
         view::look_at_mat4,
     };
 
-    /// Texture coordinates where the ray through a pixel meets a triangle's plane, or none.
+    /// Texture coordinates where the ray through a pixel meets a triangle's plane; `None` if it does not.
     fn uv_at(
         view: &Pixels,
         triangle: &[Vec3; 3],
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn no_quad_of_a_random_triangle_has_shorter_derivatives_and_many_come_near() {
+    fn the_bound_is_below_the_derivatives_of_random_triangles_and_often_close() {
         let mut state = 11_u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -194,13 +194,13 @@ mod tests {
     }
 
     #[test]
-    fn a_wall_ahead_is_sampled_as_its_distance_says() {
+    fn the_bound_of_a_wall_follows_from_its_distance() {
         let view = Pixels {
             clip_from_world: perspective(std::f32::consts::FRAC_PI_2, 1.0, 0.1, 50.0),
             size_px: [100, 100],
             least_w: 0.1,
         };
-        // 50 pixels a metre at 1 m; coordinates of 1 a metre.
+        // 50 pixels per metre at 1 m; one unit of texture coordinates per metre.
         for distance in [2.0_f32, 4.0, 8.0] {
             let wall =
                 [[-0.5, -0.5], [0.5, -0.5], [0.0, 0.5]].map(|[x, y]| Vec3::new(x, y, -distance));
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_texture_that_does_not_move_over_a_triangle_may_be_sampled_anywhere() {
+    fn constant_texture_coordinates_have_a_bound_of_zero() {
         let view = Pixels {
             clip_from_world: Mat4::IDENTITY,
             size_px: [64, 64],

@@ -1,34 +1,35 @@
-//! Finds nested volumes that are never looked up, such as invisible shadow cascades.
+//! Finds out which of several nested volumes are looked up, to skip invisible shadow cascades.
 
 use crate::frustum::frustum_planes;
 use glam::{Affine3A, Mat4, Vec3, Vec4};
 
-/// A volume around the head that a lookup at a point takes if no finer one holds the point.
+/// A volume around the head. A look-up at a point uses the finest volume that contains the point.
 #[derive(Clone, Copy, Debug)]
 pub struct Volume {
-    /// World to its clip space.
+    /// World to the volume's clip space.
     pub clip_from_world: Mat4,
-    /// A point this far inside each of its sides, in clip space, ...
+    /// Distance from the side planes, in clip space, ...
     pub margin: f32,
-    /// ... and this far before its far end is surely looked up here or in a finer volume.
+    /// ... and from the far plane. A point inside by these distances is certainly looked up in this volume or
+    /// in a finer one.
     pub end_margin: f32,
 }
 
-/// Tells of each of `volumes`, the finest first, whether a triangle may be looked up in it that
-/// `clip_from_world` may see. Errs on the side of true, as for coordinates with NaN.
+/// Determines for each of `volumes`, the finest first, whether it may be looked up at a triangle that is
+/// visible in `clip_from_world`. True in doubt, as for coordinates with NaN.
 #[derive(Clone, Debug)]
 pub struct Receivers {
     view: [Vec4; 6],
-    /// The sides of each volume.
+    /// Side planes of each volume.
     sides: Vec<[Vec4; 4]>,
-    /// What a point surely inside is inside of.
+    /// For each volume, the planes of the space in which points are certainly inside.
     insides: Vec<[Vec4; 5]>,
-    /// Volumes that were found so far.
+    /// Whether each volume was found so far.
     found: Vec<bool>,
 }
 
-/// Where a point lies: bit per plane of the view and of a volume that has it outside; bit per volume that
-/// surely has it inside.
+/// Position of a point: for the view and for each volume, one bit per plane that the point is outside of; one
+/// bit per volume that certainly contains it.
 #[derive(Clone, Copy)]
 struct PointCode {
     outside_view: u8,
@@ -36,11 +37,11 @@ struct PointCode {
     inside: u32,
 }
 
-/// Most volumes.
+/// Maximum number of volumes.
 const MAX_VOLUMES: usize = 8;
 
 impl Receivers {
-    /// Nothing found yet.
+    /// Starts with no volume found.
     ///
     /// # Panics
     /// More than 8 volumes.
@@ -52,7 +53,7 @@ impl Receivers {
         );
         let planes = |volume: &Volume| frustum_planes(volume.clip_from_world);
         let inner = |volume: &Volume| {
-            // The planes of an orthographic clip space, moved inwards.
+            // Planes of an orthographic clip space, moved inwards.
             let [left, right, bottom, top, _, far] = planes(volume);
             let sides = [left, right, bottom, top].map(|plane| plane - Vec4::W * volume.margin);
             let [left, right, bottom, top] = sides;
@@ -75,13 +76,13 @@ impl Receivers {
         self.view = frustum_planes(clip_from_world);
     }
 
-    /// Every volume has been found.
+    /// Whether every volume has been found.
     #[must_use]
     pub fn all(&self) -> bool {
         self.found.iter().all(|found| *found)
     }
 
-    /// The volumes found so far.
+    /// Whether each volume has been found so far.
     #[must_use]
     pub fn found(&self) -> &[bool] {
         &self.found
@@ -108,7 +109,7 @@ impl Receivers {
         let places: Vec<PointCode> = positions
             .iter()
             .map(|p| {
-                // Rounding errors of the world position grow with the magnitude of its terms.
+                // Rounding errors of the world position are proportional to the magnitude of its terms.
                 let terms = Vec3::from(m.x_axis.abs()) * p.x.abs()
                     + Vec3::from(m.y_axis.abs()) * p.y.abs()
                     + Vec3::from(m.z_axis.abs()) * p.z.abs()
@@ -133,7 +134,7 @@ impl Receivers {
         }
     }
 
-    /// Whether the hull of `places` may be looked up in a volume that was not found yet.
+    /// Whether the hull of `places` may be looked up in a volume that has not been found.
     fn is_new(&self, places: &[PointCode]) -> bool {
         (self.looked_up(places) & self.missing()) != 0
     }
@@ -152,7 +153,7 @@ impl Receivers {
             .sum()
     }
 
-    /// Bit per volume in which the hull of `places` may be looked up.
+    /// One bit per volume in which the hull of `places` may be looked up.
     fn looked_up(&self, places: &[PointCode]) -> u32 {
         let outside_view = places.iter().fold(!0, |all, p| all & p.outside_view);
         if outside_view != 0 {
@@ -166,7 +167,7 @@ impl Receivers {
                 bits |= 1 << number;
             }
             if inside >> number & 1 == 1 {
-                // Everything of it is looked up here at the latest.
+                // All points are looked up in this volume or a finer one.
                 break;
             }
         }
@@ -175,7 +176,7 @@ impl Receivers {
 
     fn place(&self, point: Vec3, terms: f32) -> PointCode {
         let distance = |plane: &Vec4| plane.truncate().dot(point) + plane.w;
-        // For the rounding of these sums and of the shader's.
+        // For rounding of these sums and in the shader.
         let rounding = |plane: &Vec4| {
             let magnitude = plane
                 .truncate()
@@ -216,7 +217,7 @@ mod tests {
 
     const MARGIN: f32 = 0.05;
 
-    /// Squares of the given half widths around points ahead, seen from above.
+    /// Nested squares with these half widths and distances ahead, seen from above.
     fn volumes(squares: &[(f32, f32)]) -> Vec<Volume> {
         let light = look_at_mat4(Vec3::ZERO, Vec3::NEG_Y, Vec3::Z);
         let volume = |&(z, half): &(f32, f32)| {
@@ -256,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_far_volume_is_looked_up_only_where_no_nearer_one_holds_what_is_seen() {
+    fn a_far_volume_is_looked_up_only_where_no_finer_one_contains_the_visible_point() {
         let volumes = volumes(&[(-2.0, 3.0), (-8.0, 10.0), (-30.0, 40.0)]);
         let at = |z: f32| {
             [
@@ -268,11 +269,11 @@ mod tests {
         assert_eq!(found(&volumes, &at(-2.0)), [true, false, false]);
         assert_eq!(found(&volumes, &at(-9.0)), [false, true, false]);
         assert_eq!(found(&volumes, &at(-30.0)), [false, false, true]);
-        // Within the margin of a side both may be.
+        // Within the margin of a side plane, both may be looked up.
         assert_eq!(found(&volumes, &at(-4.95)), [true, true, false]);
-        // Behind the viewer, so invisible.
+        // Points behind the viewer are invisible.
         assert_eq!(found(&volumes, &at(2.0)), [false; 3]);
-        // Across all of them.
+        // A triangle across all volumes.
         let long = [
             Vec3::new(0.0, 0.9, -1.0),
             Vec3::new(0.2, 0.9, -1.0),
@@ -283,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn every_point_seen_is_looked_up_in_a_volume_that_was_found() {
+    fn every_visible_point_is_looked_up_in_a_found_volume() {
         let mut state = 3_u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -319,8 +320,8 @@ mod tests {
                 {
                     continue;
                 }
-                // A lookup takes the finest volume that holds the point, wherever within the margin
-                // it draws the line.
+                // A look-up uses the finest volume that contains the point. The boundary may be anywhere
+                // within the margin.
                 let line = 1.0 - MARGIN * random();
                 let holds = |v: &Volume| {
                     let q = v.clip_from_world.project_point3(p);

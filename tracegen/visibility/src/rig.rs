@@ -21,7 +21,7 @@ pub struct Rig {
     eyes: Vec<Eye>,
 }
 
-/// The eyes' directions diverge too much for one volume around both.
+/// Error for eyes whose directions diverge too much for one volume around both.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error(
     "one volume around both eyes: expected a combined field of view below {limit} degrees, found {found}",
@@ -29,17 +29,17 @@ pub struct Rig {
     found = found_deg.map_or("eyes that look to opposite sides".to_owned(), |deg| format!("{deg:.1} degrees"))
 )]
 pub struct TooWide {
-    /// The combined field of view, if there is one.
+    /// The combined field of view; `None` if it is not defined.
     pub found_deg: Option<f64>,
 }
 
-/// Widest combined field of view that one volume is made around, degrees: at 180 there is none, and
-/// close to it, it holds almost everything.
+/// Largest combined field of view of one volume in degrees. At 180 degrees no such volume exists, and close
+/// to it, the volume contains almost everything.
 pub const MAX_COMBINED_DEG: f64 = 179.0;
 
 impl Rig {
     /// # Panics
-    /// Without eyes.
+    /// There are no eyes.
     #[must_use]
     pub fn new(eyes: Vec<Eye>) -> Self {
         assert!(!eyes.is_empty(), "somebody has to look");
@@ -52,25 +52,25 @@ impl Rig {
         &self.eyes
     }
 
-    /// The eye that a frame culls by: left in even frames, right in odd ones.
-    pub(crate) fn turn(&self, frame: u32) -> &Eye {
+    /// The eye that a frame uses for culling: left in even frames, right in odd ones.
+    pub(crate) fn frame_eye(&self, frame: u32) -> &Eye {
         &self.eyes[frame as usize % self.eyes.len()]
     }
 }
 
 impl Eye {
-    /// World to clip space, as the driver gets it.
+    /// World to clip space, as passed to the driver.
     pub(crate) fn clip_from_world(&self) -> Mat4 {
         Mat4::from_cols_array_2d(&self.view.eye_to_clip)
             * Mat4::from_cols_array_2d(&self.view.world_to_eye)
     }
 
-    /// Sides of its drawn volume, for geometry whose coordinates are at most `extent`.
+    /// Planes of the drawn volume, for geometry whose coordinates are at most `extent`.
     pub(crate) fn frustum(&self, extent: DVec3) -> [HalfSpace; 6] {
         frustum(self.clip_from_world(), extent)
     }
 
-    /// Right, up and forward coordinate of world space as seen from the eye, metres.
+    /// Right, up and forward coordinates relative to the eye as functions of world space, in metres.
     pub(crate) fn axes(&self) -> [Affine; 3] {
         let matrix: DMat4 = Mat4::from_cols_array_2d(&self.view.world_to_eye).as_dmat4();
         let axis = |row: usize, sign: f64| Affine {
@@ -86,14 +86,14 @@ impl Eye {
         matrix.inverse().w_axis.truncate()
     }
 
-    /// Radius of the lens plus one pixel, for the rounding of vertices to the raster's grid.
+    /// Radius of the lens plus one pixel, because vertices are rounded to the rasteriser's grid.
     pub(crate) fn lens_radius(&self) -> f64 {
         let scale = &self.view.eye_to_clip;
         let pixel = |axis: usize| 2.0 / f64::from(scale[axis][axis] * self.size_px[axis] as f32);
         f64::from(self.lens.radius) + pixel(0).abs().max(pixel(1).abs())
     }
 
-    /// The visible part of the lens: its circle, as a cone from the eye.
+    /// Cone from the eye through the visible circle of the lens.
     pub(crate) fn lens_cone(&self) -> Cone {
         let [right, up, forward] = self.axes();
         let [x, y] = self.lens.center.map(f64::from);
@@ -104,8 +104,8 @@ impl Eye {
         }
     }
 
-    /// Corners of the frustum: near and far end of each of its four edges. The far end is at the
-    /// far plane, or where geometry whose coordinates are at most `extent` ends, if that is nearer.
+    /// Near and far ends of the four edges of the frustum. The far end is at the far plane, or at the end of
+    /// geometry whose coordinates are at most `extent`, if that is nearer.
     pub(crate) fn edges(&self, extent: DVec3) -> [[DVec3; 2]; 4] {
         let [left, right, bottom, top, near, far] = self.frustum(extent);
         let forward = near.normal;

@@ -9,8 +9,7 @@ use scene::{Camera, cameras};
 /// Size of an eye's picture in pixels.
 pub const SIZE_PX: [u32; 2] = [1000, 1000];
 
-/// Eyes at the origin that look along -z, as the cameras make them; the lenses are the default
-/// ones.
+/// Eyes at the origin that look along -z, with the matrices of a camera and default lenses.
 pub fn rig(fov: [FovTangents; 2], ipd_m: f32, cant_deg: f32, near: f32, far: f32) -> Rig {
     let hmd = Hmd {
         eye_size_px: SIZE_PX,
@@ -47,14 +46,14 @@ pub fn rig_of(camera: &Camera, hmd: &Hmd, lenses: [Lens; 2]) -> Rig {
     Rig::new(eyes.collect())
 }
 
-/// The next number from `low` to `high`.
+/// A random number from `low` to `high`.
 pub fn between(random: &mut Random, low: f32, high: f32) -> f32 {
     low + (high - low) * random.unit_f32()
 }
 
-/// A point of a box.
+/// A random point in a box.
 pub fn within(random: &mut Random, [low, high]: [Vec3; 2]) -> Vec3 {
     let t = Vec3::new(random.unit_f32(), random.unit_f32(), random.unit_f32());
-    // Rounding must not carry it out.
+    // Clamp, because rounding may move it out of the box.
     (low + (high - low) * t).clamp(low, high)
 }

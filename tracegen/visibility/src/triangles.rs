@@ -3,8 +3,8 @@
 use crate::frustum::frustum_planes;
 use glam::{Affine3A, Mat4, Vec3, Vec4};
 
-/// True unless each triangle lies wholly outside one plane of the frustum: finer than a box
-/// around a mesh that spans the scene. Errs on the side of true, as for coordinates with NaN.
+/// False only if each triangle is completely outside one plane of the frustum. This is more exact than
+/// testing the box around a mesh that spans the scene. True in doubt, as for coordinates with NaN.
 #[must_use]
 pub fn any_inside(
     positions: &[Vec3],
@@ -20,11 +20,11 @@ pub fn any_inside(
     (indices.chunks_exact(3)).any(|t| at(t[0]) & at(t[1]) & at(t[2]) == 0)
 }
 
-/// Bit per plane that has the point on its outer side.
+/// One bit per plane that the point is outside of.
 fn planes_outside(planes: &[Vec4; 6], world_from_object: &Affine3A, p: Vec3) -> u8 {
     let m = &world_from_object.matrix3;
     let world = world_from_object.transform_point3(p);
-    // Magnitude of the sums that `world` comes from: their rounding errors grow with it.
+    // Magnitude of the terms of `world`, to which the rounding errors are proportional.
     let terms = Vec3::from(m.x_axis.abs()) * p.x.abs()
         + Vec3::from(m.y_axis.abs()) * p.y.abs()
         + Vec3::from(m.z_axis.abs()) * p.z.abs()
@@ -32,7 +32,7 @@ fn planes_outside(planes: &[Vec4; 6], world_from_object: &Affine3A, p: Vec3) -> 
     let mut bits = 0;
     for (bit, plane) in planes.iter().enumerate() {
         let normal = plane.truncate();
-        // A margin for the rounding of these sums and of the vertex shader's.
+        // A margin for rounding of these sums and in the vertex shader.
         let margin = 1e-5 * (normal.abs().dot(terms) + plane.w.abs());
         bits |= u8::from(normal.dot(world) + plane.w < -margin) << bit;
     }
@@ -50,7 +50,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_around_the_frustum_with_no_triangle_in_it_is_not_seen() {
+    fn a_mesh_around_the_frustum_without_a_triangle_inside_is_invisible() {
         let far_left = [
             Vec3::new(-90.0, 0.0, 0.0),
             Vec3::new(-90.0, 1.0, 0.0),
@@ -59,14 +59,14 @@ mod tests {
         let far_right = far_left.map(|p| p + Vec3::X * 180.0);
         let positions = [far_left, far_right].concat();
         let seen = |indices: &[u32]| any_inside(&positions, indices, &Affine3A::IDENTITY, clip());
-        // The box around both holds the whole view.
+        // The box around both triangles contains the whole view.
         assert!(!seen(&[0, 1, 2, 3, 4, 5]));
-        // One triangle across the view.
+        // A triangle across the view.
         assert!(seen(&[0, 1, 3]));
     }
 
     #[test]
-    fn what_has_a_point_in_view_or_no_place_at_all_is_seen() {
+    fn meshes_with_a_point_in_view_or_nan_coordinates_are_visible() {
         let mut state = 1_u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -95,11 +95,11 @@ impl<R: BufRead> Read for ZstdReader<R> {
             }
             if self.frame.is_finished() {
                 self.in_frame = false;
-                let (told, counted) = (
+                let (stored, counted) = (
                     self.frame.get_checksum_from_data(),
                     self.frame.get_calculated_checksum(),
                 );
-                if told.is_some() && told != counted {
+                if stored.is_some() && stored != counted {
                     return Err(invalid("the checksum of a frame is wrong"));
                 }
                 continue;

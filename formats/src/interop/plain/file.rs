@@ -89,7 +89,7 @@ impl AddressFile<'static> {
         // read. This program writes under a temporary name and renames.
         let map = unsafe { Mmap::map(&file) }.map_err(io("map"))?;
         let head = map.get(..HEAD_BYTES).unwrap_or(&map);
-        let form = told(&name, form, head, map.len() <= HEAD_BYTES)?;
+        let form = detect_form(&name, form, head, map.len() <= HEAD_BYTES)?;
         Ok(Self {
             name,
             form,
@@ -118,7 +118,7 @@ impl<'a> AddressFile<'a> {
         };
         let read = |(source, at)| unreadable(&name, compression, at, source);
         let (head, stream) = head_of(stream, HEAD_BYTES).map_err(read)?;
-        let form = told(&name, form, &head, head.len() < HEAD_BYTES)?;
+        let form = detect_form(&name, form, &head, head.len() < HEAD_BYTES)?;
         Ok(Self {
             name,
             form,
@@ -259,8 +259,8 @@ fn head_of<R: Read>(mut stream: R, count: usize) -> Result<(Vec<u8>, impl Read),
     Ok((head.clone(), Cursor::new(head).chain(stream)))
 }
 
-/// The form: the given one, or that of the name, or that of the first bytes.
-fn told(
+/// The given form, or else that of the name, or else that of the first bytes.
+fn detect_form(
     name: &str,
     given: Option<AddressForm>,
     head: &[u8],

@@ -125,7 +125,7 @@ fn every_form_is_read_as_written() {
 }
 
 #[test]
-fn many_frames_hold_what_was_written() {
+fn many_frames_are_read_as_written() {
     let bytes: Vec<u8> = (0..3_000_000_u32).flat_map(u32::to_le_bytes).collect();
     let (back, _) = read(
         &compressed(Compression::Zstd, &bytes),
@@ -137,25 +137,25 @@ fn many_frames_hold_what_was_written() {
 
 #[test]
 fn forms_are_detected_by_name_and_content() {
-    let told = |name: &str, bytes: &[u8]| {
+    let detect_form = |name: &str, bytes: &[u8]| {
         AddressFile::of_stream(name.to_owned(), None, bytes).map(|file| file.form())
     };
     let gem5 = written(PlainForm::Gem5, &accesses());
     let din = written(PlainForm::Din, &accesses());
-    assert_eq!(told("a", &gem5).unwrap(), AddressForm::Gem5);
-    assert_eq!(told("a", &din).unwrap(), AddressForm::Din);
-    assert_eq!(told("a", b"r 7f00 8").unwrap(), AddressForm::Din);
-    assert_eq!(told("a.u64", &din).unwrap(), AddressForm::U64);
-    assert_eq!(told("a.u32.zst", &din).unwrap(), AddressForm::U32);
+    assert_eq!(detect_form("a", &gem5).unwrap(), AddressForm::Gem5);
+    assert_eq!(detect_form("a", &din).unwrap(), AddressForm::Din);
+    assert_eq!(detect_form("a", b"r 7f00 8").unwrap(), AddressForm::Din);
+    assert_eq!(detect_form("a.u64", &din).unwrap(), AddressForm::U64);
+    assert_eq!(detect_form("a.u32.zst", &din).unwrap(), AddressForm::U32);
     assert_eq!(
-        told("a.gz", &compressed(Compression::Gzip, &gem5)).unwrap(),
+        detect_form("a.gz", &compressed(Compression::Gzip, &gem5)).unwrap(),
         AddressForm::Gem5
     );
     let words = written(PlainForm::U32, &[PlainAccess::read(7, 1)]);
-    let error = told("a.bin", &words).unwrap_err().to_string();
+    let error = detect_form("a.bin", &words).unwrap_err().to_string();
     assert!(error.contains("--address-form"), "{error}");
     assert!(
-        told("a", b"")
+        detect_form("a", b"")
             .unwrap_err()
             .to_string()
             .contains("found nothing")
@@ -391,7 +391,7 @@ fn forms_of_other_simulators_match_their_documentation() {
 
 proptest! {
     #[test]
-    fn no_bytes_make_a_reader_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300), form in 0..4_usize) {
+    fn arbitrary_bytes_never_panic_a_reader(bytes in proptest::collection::vec(any::<u8>(), 0..300), form in 0..4_usize) {
         let form = AddressForm::ALL[form];
         let _ = read(&bytes, Some(form));
         let _ = read(&[b"gem5".as_slice(), &bytes].concat(), Some(form));

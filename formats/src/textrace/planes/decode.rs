@@ -79,9 +79,9 @@ impl<'a> Decoder<'a> {
                 count,
             });
             places.start_run(&mut last, draw);
-            let tells_regular = places.tells_regular();
-            last.regular = tells_regular & (bits >> power & 1 == 1);
-            self.front.skip(power + u32::from(tells_regular));
+            let codes_regular = places.codes_regular();
+            last.regular = codes_regular & (bits >> power & 1 == 1);
+            self.front.skip(power + u32::from(codes_regular));
             last = self.run(&mut places, last, count, &mut tile.records)?;
             first += count;
             next_primitive = u64::from(primitive) + 1;
@@ -372,7 +372,7 @@ fn later<const PLAIN: bool>(
         if classes.is_special() {
             let (after, instead, [uv, dx, dy, cross]) = special(*back, codes, classes)?;
             (*back, classes) = (after, instead);
-            // Corrects the record that was pushed, so that the common case need not wait.
+            // Correct the record after it was pushed, so that the common case need not wait.
             if let Some(record) = records.last_mut() {
                 record.uv = sum(record.uv, uv);
                 record.dx = sum(record.dx, dx);

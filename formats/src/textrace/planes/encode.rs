@@ -98,7 +98,7 @@ impl<'a, S: Sink> Encoder<'a, S> {
             next_primitive = u64::from(run.primitive) + 1;
             let records = &tile.records[run.first as usize..][..run.count as usize];
             places.start_run(&mut last, run.draw);
-            if places.tells_regular() {
+            if places.codes_regular() {
                 let regular = places.is_regular(last, records.iter().map(place_of));
                 self.front.bits(regular.into(), 1);
                 last.regular = regular;

@@ -138,9 +138,9 @@ impl Places {
         last.regular = false;
     }
 
-    /// Whether runs code if they are regular: only if some group is followed by another one in the same
-    /// quad.
-    pub fn tells_regular(&self) -> bool {
+    /// Whether each run has a bit for regularity. It has one only if some group is followed by another one in
+    /// the same quad.
+    pub fn codes_regular(&self) -> bool {
         self.follows.iter().any(|follow| follow.same_quad)
     }
 

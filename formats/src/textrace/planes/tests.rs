@@ -65,7 +65,7 @@ fn decoded(tile: &Tile, bytes: &[u8]) -> Option<Tile> {
     decode(runs, records, bytes, &mut out).ok().map(|_| out)
 }
 
-fn bytes_a_record(tile: &Tile) -> f64 {
+fn bytes_per_record(tile: &Tile) -> f64 {
     let bytes = encode(tile);
     assert_eq!(decoded(tile, &bytes).as_ref(), Some(tile));
     bytes.len() as f64 / tile.records.len() as f64
@@ -73,19 +73,19 @@ fn bytes_a_record(tile: &Tile) -> f64 {
 
 #[test]
 fn a_plane_in_perspective_takes_less_than_two_bytes_per_quad() {
-    let bytes = bytes_a_record(&covered(1, 0.0));
+    let bytes = bytes_per_record(&covered(1, 0.0));
     assert!(bytes < 1.6, "{bytes} bytes per record");
 }
 
 #[test]
 fn a_second_group_of_the_same_quads_takes_no_bits_for_places() {
-    let bytes = bytes_a_record(&covered(2, 0.0));
+    let bytes = bytes_per_record(&covered(2, 0.0));
     assert!(bytes < 1.5, "{bytes} bytes per record");
 }
 
 #[test]
 fn a_curved_surface_is_predicted() {
-    let bytes = bytes_a_record(&covered(1, 0.5));
+    let bytes = bytes_per_record(&covered(1, 0.5));
     assert!(bytes < 4.0, "{bytes} bytes per record");
 }
 

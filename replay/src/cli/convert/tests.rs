@@ -58,7 +58,7 @@ fn din(trace: &Trace, config: &RunConfig, granularity: &str) -> Vec<u64> {
 }
 
 #[test]
-fn din_holds_the_look_ups_that_run_counts() {
+fn din_output_has_the_look_ups_that_run_counts() {
     let memory = small();
     let file = file_of(&memory);
     let trace = Trace::open(file.path()).unwrap();
@@ -156,7 +156,7 @@ fn npy_and_parquet_have_the_accesses_of_csv() {
 }
 
 #[test]
-fn records_are_those_of_dump_and_take_no_flag_of_accesses() {
+fn records_equal_those_of_dump_and_refuse_flags_for_accesses() {
     let memory = small();
     let file = file_of(&memory);
     let trace = Trace::open(file.path()).unwrap();
@@ -189,7 +189,7 @@ fn records_are_those_of_dump_and_take_no_flag_of_accesses() {
 }
 
 #[test]
-fn encoding_back_and_forth_restores_the_file() {
+fn encoding_and_decoding_restores_the_file() {
     let file = file_of(&small());
     let folder = tempfile::tempdir().unwrap();
     let convert = |from: &std::path::Path, name: &str, encoding: &str| {

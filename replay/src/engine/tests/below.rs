@@ -77,7 +77,7 @@ fn a_prefetcher_that_fetches_nothing_changes_nothing() {
 }
 
 #[test]
-fn a_prefetcher_trades_bytes_for_misses() {
+fn a_prefetcher_reduces_misses_and_adds_traffic() {
     let trace = small();
     for time in TIMES {
         // Large enough that prefetches evict no line that is used again.
@@ -113,7 +113,7 @@ fn a_faster_l3_shortens_a_replay_whose_l2_is_small() {
 }
 
 #[test]
-fn a_batch_gives_what_each_replay_gives_alone() {
+fn a_batch_has_the_results_of_separate_replays() {
     let trace = small();
     let long = LevelConfig {
         line_bytes: Some(64),
@@ -155,7 +155,7 @@ fn a_batch_gives_what_each_replay_gives_alone() {
 }
 
 #[test]
-fn inclusion_matters_where_a_level_evicts_what_others_hold() {
+fn inclusion_has_an_effect_if_a_level_evicts_lines_of_other_levels() {
     let trace = small();
     for time in TIMES {
         let of = |size_bytes, inclusion| {

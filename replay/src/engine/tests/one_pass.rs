@@ -57,7 +57,7 @@ fn twin(sent: &[Sent], config: &RunConfig) -> (LevelCounters, LevelCounters) {
 }
 
 #[test]
-fn a_thousand_sets_of_configurations_count_as_each_alone() {
+fn a_thousand_sets_of_configurations_have_the_counts_of_separate_replays() {
     let traces = [1, 2, 3].map(|seed| {
         Synthetic {
             size_px: [36, 28],

@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::config::{Allocation, Assign, TmuConfig};
-use crate::order::{Known, Phase};
+use crate::order::{Phase, PlanInputs};
 use crate::result::{FirstLookups, TmuResult};
 use crate::stream::for_quads;
 use std::collections::VecDeque;
@@ -177,8 +177,8 @@ impl<'a> PlainFirstMiss<'a> {
     }
 
     fn run(mut self) -> PlainCounts {
-        let known = Known::new(&self.config, &self.trace.tables.meta);
-        for phase in order::plan(self.config.order, &known, &self.trace.tables.passes) {
+        let inputs = PlanInputs::new(&self.config, &self.trace.tables.meta);
+        for phase in order::plan(self.config.order, &inputs, &self.trace.tables.passes) {
             self.phase(&phase);
         }
         let first = self.counts.first.over(self.useful);
@@ -278,14 +278,14 @@ impl<'a> PlainFirstMiss<'a> {
         self.counts.tmu.wasted_issues += 1;
         let missing = lines.iter().zip(&there).filter(|(_, there)| !**there);
         let missing: Vec<u64> = missing.map(|(line, _)| *line).collect();
-        self.ask(core, &missing, &mut thread);
+        self.request(core, &missing, &mut thread);
         let back = thread.began + u64::from(self.config.tmu.loop_cycles);
         self.cores[core]
             .waiting
             .push_back((back.max(now + 1), thread));
     }
 
-    fn ask(&mut self, core: usize, missing: &[u64], thread: &mut PlainThread) {
+    fn request(&mut self, core: usize, missing: &[u64], thread: &mut PlainThread) {
         let now = self.now;
         let first = !thread.tried;
         thread.tried = true;
@@ -353,7 +353,7 @@ fn first_miss(trace: &MemoryTrace, config: &RunConfig) -> PlainCounts {
 }
 
 #[test]
-fn the_first_miss_machine_agrees_with_the_plain_one_to_the_last_count() {
+fn all_counts_of_the_first_miss_machine_equal_the_plain_one() {
     let traces = [6, 7].map(|seed| {
         Synthetic {
             size_px: [40, 24],
@@ -410,7 +410,7 @@ fn the_first_miss_machine_agrees_with_the_plain_one_to_the_last_count() {
 
 /// One quad that requests an absent line: the slots that it occupies follow from the rules.
 #[test]
-fn a_thread_that_waits_for_memory_is_back_every_loop_until_the_line_is_there() {
+fn a_thread_waiting_for_memory_retries_every_loop_until_the_line_is_filled() {
     let mut tables = testing::tables(&[[4, 4]]);
     tables.textures[0].levels = 1;
     let trace = MemoryTrace {

@@ -19,7 +19,7 @@ fn config(fifo_footprints: u32, cores: u32) -> RunConfig {
 /// With a FIFO of one footprint, nothing is in flight at the next look-up, so one core has exactly the
 /// misses of functional mode. With a longer FIFO, a line evicted in flight is not requested again.
 #[test]
-fn one_core_misses_what_functional_mode_misses() {
+fn one_core_has_the_misses_of_functional_mode() {
     let trace = small();
     let without_latencies = RunConfig {
         mode: Mode::Functional,

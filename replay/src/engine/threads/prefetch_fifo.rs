@@ -80,7 +80,8 @@ impl<D: DelayedFill> PrefetchFifo<D> {
             let arrival = match l1.look_up(line, now) {
                 NOT_IN_FLIGHT => {
                     misses.l1_lines += 1;
-                    let arrival = misses.ask_l2(l2.request(core, line, now), now) + *l2_cycles;
+                    let arrival =
+                        misses.count_l2_answer(l2.request(core, line, now), now) + *l2_cycles;
                     l1.enter(line, now, arrival);
                     arrival
                 }

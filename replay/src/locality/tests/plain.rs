@@ -28,7 +28,7 @@ pub fn origins(stream: &[Access]) -> Vec<Option<Origin>> {
 }
 
 /// The accesses marked in `which`, by location of the previous use.
-pub fn by_origin(origins: &[Option<Origin>], which: &[bool]) -> ByOrigin {
+pub(super) fn by_origin(origins: &[Option<Origin>], which: &[bool]) -> ByOrigin {
     let mut counts = ByOrigin::default();
     for (origin, _) in origins.iter().zip(which).filter(|(_, which)| **which) {
         counts[origin.expect("a first use cannot hit").index()] += 1;

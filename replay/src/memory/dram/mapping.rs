@@ -22,7 +22,7 @@ pub enum Mapping {
 
 /// Location of a burst.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BurstAddress {
+pub(super) struct BurstAddress {
     /// Channel.
     pub channel: u32,
     /// Bank group.
@@ -35,7 +35,7 @@ pub struct BurstAddress {
 
 /// Number of bits of each part.
 #[derive(Clone, Copy, Debug)]
-pub struct Mapper {
+pub(super) struct Mapper {
     mapping: Mapping,
     channel_bits: u32,
     bank_bits: u32,

@@ -173,7 +173,7 @@ fn four_activates_fit_a_window() {
 }
 
 #[test]
-fn a_closed_page_has_no_hits_of_reads_that_come_one_by_one() {
+fn isolated_reads_have_no_row_hits_with_closed_pages() {
     for preset in ALL {
         let closed = DramConfig {
             page_policy: PagePolicy::Closed,
@@ -241,7 +241,7 @@ fn every_request_is_answered_once_in_no_less_than_the_least_time() {
 }
 
 #[test]
-fn every_burst_has_a_place_of_its_own() {
+fn every_burst_has_a_distinct_place() {
     for preset in ALL {
         let device = preset.device();
         for mapping in [
@@ -277,7 +277,7 @@ fn mixed(config: &DramConfig, bursts: impl Iterator<Item = (u32, bool)>) -> Dram
 }
 
 #[test]
-fn writes_alone_saturate_the_bus_as_reads_do() {
+fn writes_saturate_the_bus_like_reads() {
     for preset in ALL {
         let [reads, writes] =
             [false, true].map(|write| mixed(&config(preset), (0..20_000).map(|b| (b, write))));
@@ -291,7 +291,7 @@ fn writes_alone_saturate_the_bus_as_reads_do() {
 
 /// A read that follows a write of an open row waits for the write's data and the bus turnaround.
 #[test]
-fn a_read_after_a_write_waits_for_its_data_and_the_turn_of_the_bus() {
+fn a_read_after_a_write_waits_for_its_data_and_the_bus_turnaround() {
     for preset in ALL {
         let device = preset.device();
         let mapper = Mapper::new(Mapping::default(), 1, &device);
@@ -311,7 +311,7 @@ fn a_read_after_a_write_waits_for_its_data_and_the_turn_of_the_bus() {
 
 /// A written row must be restored before it is closed.
 #[test]
-fn another_row_waits_until_what_was_written_is_restored() {
+fn another_row_waits_for_write_recovery() {
     for preset in ALL {
         let device = preset.device();
         let row = device.row_bytes / device.burst_bytes * device.banks();
@@ -339,7 +339,7 @@ fn another_row_waits_until_what_was_written_is_restored() {
 }
 
 #[test]
-fn every_request_is_answered_once_whatever_the_mixture() {
+fn every_request_of_a_random_mixture_is_answered_once() {
     for preset in ALL {
         for queue in [1, 8, 32] {
             let config = DramConfig {

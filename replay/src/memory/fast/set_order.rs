@@ -249,7 +249,7 @@ mod tests {
 
         /// Compares sets with many lines in flight: equal arrivals, zero latencies, arrivals out of order.
         #[test]
-        fn sets_filled_one_by_one_equal_a_cache_filled_in_the_order_of_time(
+        fn sets_filled_one_by_one_equal_a_cache_filled_in_time_order(
             steps in prop::collection::vec(
                 (0_u64..30, prop::collection::vec(0_u32..60, 1..6),
                 prop_oneof![Just(0_u64), Just(20), 1_u64..300]),

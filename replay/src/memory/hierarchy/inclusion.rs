@@ -5,7 +5,7 @@ use super::below::Below;
 use crate::config::{Inclusion, RunConfig};
 
 /// Evictions that affect other levels.
-pub struct Evictions {
+pub(super) struct Evictions {
     is_l2_inclusive: bool,
     /// L2 evictions since the last call of [`Self::follow`].
     pub evicted: Vec<u32>,

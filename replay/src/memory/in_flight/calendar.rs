@@ -294,7 +294,7 @@ mod tests {
 
         /// Latencies within and far beyond the calendar, and lines that share chains.
         #[test]
-        fn arrivals_are_those_of_a_sorted_list(
+        fn arrivals_equal_those_of_a_sorted_list(
             steps in prop::collection::vec((0_u64..90, prop_oneof![1_u64..40, 1_u64..900]), 1..200),
         ) {
             let mut in_flight = InFlight::new(60);

@@ -83,7 +83,7 @@ mod tests {
     proptest! {
         /// Compares with a queue with one slot per MSHR: each miss takes the slot that is free first.
         #[test]
-        fn misses_start_as_in_a_queue_with_so_many_servers(
+        fn misses_start_as_in_a_queue_with_one_server_per_mshr(
             most in 1_u32..6,
             misses in prop::collection::vec((0_u64..60, 1_u64..200), 1..200),
         ) {

@@ -3,7 +3,7 @@
 use super::{Cache, EMPTY};
 
 /// A FIFO cache.
-pub struct Fifo {
+pub(super) struct Fifo {
     tags: Vec<u32>,
     /// The next victim's way, by set.
     oldest: Vec<u8>,

@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn lru_by_time_stamps_counts_what_lru_counts() {
+    fn lru_by_time_stamps_has_the_counts_of_lru() {
         let own = Replacement::own(
             "Stamps@test",
             Box::new(|sets, ways| {

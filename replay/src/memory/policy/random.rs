@@ -3,7 +3,7 @@
 use super::{Cache, EMPTY, empty_way};
 
 /// A cache with random replacement; empty ways are used first.
-pub struct RandomReplacement {
+pub(super) struct RandomReplacement {
     tags: Vec<u32>,
     ways: usize,
     set_mask: u32,

@@ -129,7 +129,7 @@ pub enum Insertion {
 }
 
 /// A cache with re-reference interval prediction.
-pub struct Rrip {
+pub(super) struct Rrip {
     sets: Sets,
     insertion: Insertion,
     /// Bimodal fills so far.

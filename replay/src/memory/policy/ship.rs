@@ -15,7 +15,7 @@ const MOST_COUNTED: u8 = 7;
 const UNTRAINED: u8 = 1;
 
 /// A cache with hit prediction per region.
-pub struct Ship {
+pub(super) struct Ship {
     sets: Sets,
     /// Whether the line at each place was used again.
     is_reused: Vec<bool>,

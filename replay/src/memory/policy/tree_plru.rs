@@ -3,7 +3,7 @@
 use super::{Cache, EMPTY, empty_way};
 
 /// A tree-PLRU cache.
-pub struct TreePlru {
+pub(super) struct TreePlru {
     tags: Vec<u32>,
     /// Tree bits by set: node 1 is the root, node `n` has the children `2n` and `2n + 1`.
     trees: Vec<u64>,
@@ -12,7 +12,7 @@ pub struct TreePlru {
 }
 
 /// A tree of 64 bits has at most 64 leaves.
-pub fn accepts_ways(ways: u32) -> bool {
+pub(super) fn accepts_ways(ways: u32) -> bool {
     ways.is_power_of_two() && ways <= 64
 }
 

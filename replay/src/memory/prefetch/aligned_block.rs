@@ -4,7 +4,7 @@
 use super::{Demand, Prefetcher};
 
 /// Lines per block, a power of two.
-pub struct AlignedBlock {
+pub(super) struct AlignedBlock {
     pub lines: u32,
 }
 

@@ -4,7 +4,7 @@
 use super::{Demand, Prefetcher};
 
 /// Fetches this many following lines.
-pub struct NextLine {
+pub(super) struct NextLine {
     pub lines: u32,
 }
 

@@ -6,7 +6,7 @@ use formats::layout::Layout;
 use std::sync::Arc;
 
 /// Fetches lines of this many coarser levels.
-pub struct NextMip {
+pub(super) struct NextMip {
     pub levels: u32,
     /// None if lines do not belong to textures.
     pub layout: Option<Arc<Layout>>,
@@ -51,7 +51,7 @@ mod tests {
 
     /// A miss at a texel prefetches the lines of that texel halved, quartered, ... on the existing coarser levels.
     #[test]
-    fn a_miss_fetches_the_same_place_of_the_coarser_levels() {
+    fn a_miss_prefetches_the_same_place_in_coarser_levels() {
         let texture = Texture {
             name: "t".to_owned(),
             size: [64, 32],

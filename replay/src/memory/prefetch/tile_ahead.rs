@@ -5,7 +5,7 @@
 use super::{Demand, Prefetcher};
 
 /// Fetches up to this many lines of the next item, in order of first use.
-pub struct TileAhead {
+pub(super) struct TileAhead {
     pub lines: u32,
 }
 

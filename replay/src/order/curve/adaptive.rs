@@ -18,7 +18,7 @@ pub(super) fn l2_kib(l2_bytes: u64) -> u32 {
 
 /// Rows or bands. Rows if no counters of a last frame are known.
 #[derive(Debug)]
-pub struct Adaptive;
+pub(super) struct Adaptive;
 
 impl Path for Adaptive {
     fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {

@@ -9,7 +9,7 @@ pub(super) const USUAL_ROWS: u32 = 4;
 
 /// Bands with the number of rows in the curve's name. The last band may have fewer.
 #[derive(Debug)]
-pub struct Band;
+pub(super) struct Band;
 
 impl Path for Band {
     fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {

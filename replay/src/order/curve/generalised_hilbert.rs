@@ -7,7 +7,7 @@ use crate::order::cost::Cost;
 
 /// The generalised Hilbert curve.
 #[derive(Debug)]
-pub struct GeneralisedHilbert;
+pub(super) struct GeneralisedHilbert;
 
 impl Path for GeneralisedHilbert {
     fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {

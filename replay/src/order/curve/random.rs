@@ -9,7 +9,7 @@ use crate::order::cost::Cost;
 pub struct Random;
 
 /// Fisher-Yates.
-pub fn shuffle<T>(seed: u64, items: &mut [T]) {
+pub(crate) fn shuffle<T>(seed: u64, items: &mut [T]) {
     let mut random = formats::random::Random(seed);
     for last in (1..items.len()).rev() {
         items.swap(last, random.below(last + 1));

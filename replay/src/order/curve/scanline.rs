@@ -5,7 +5,7 @@ use crate::order::cost::Cost;
 
 /// Scanline order.
 #[derive(Debug)]
-pub struct Scanline;
+pub(crate) struct Scanline;
 
 impl Path for Scanline {
     fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {

@@ -20,7 +20,7 @@ pub(super) fn columns(l2_bytes: u64) -> u32 {
 /// equal, so that no strip ends in the middle of the picture, because textures left and right of the middle are
 /// often the same.
 #[derive(Debug)]
-pub struct Strip;
+pub(super) struct Strip;
 
 impl Path for Strip {
     fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {

@@ -6,7 +6,7 @@ use crate::order::cost::Cost;
 
 /// Zig-zag order.
 #[derive(Debug)]
-pub struct ZigZag;
+pub(super) struct ZigZag;
 
 impl Path for ZigZag {
     fn cells(&self, ground: &Ground) -> Vec<[u32; 2]> {

@@ -2,14 +2,14 @@
 
 use super::{Placement, Rule, tiles};
 use crate::order::cost::Cost;
-use crate::order::{Known, View};
+use crate::order::{PlanInputs, View};
 
 /// Pairs by column and row.
 #[derive(Debug)]
 pub struct Index;
 
 impl Rule for Index {
-    fn place(&self, eyes: [View; 2], _known: &Known<'_>) -> Placement {
+    fn place(&self, eyes: [View; 2], _inputs: &PlanInputs<'_>) -> Placement {
         Placement {
             grid: [0, 1].map(|axis: usize| eyes[0].tiles[axis].max(eyes[1].tiles[axis])),
             cells: eyes.map(|view| tiles(view).collect()),

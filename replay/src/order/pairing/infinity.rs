@@ -4,18 +4,18 @@
 use super::offset::Offset;
 use super::{Placement, Rule, tiles};
 use crate::order::cost::{Cost, Information};
-use crate::order::{Known, View};
+use crate::order::{PlanInputs, View};
 
 /// Pairs by direction, on the grid of a picture that faces straight ahead of the head.
 #[derive(Debug)]
-pub struct Infinity;
+pub(super) struct Infinity;
 
 impl Rule for Infinity {
     /// A right tile shares the cell of the left tile whose centre falls into it. Other tiles get the cell of
     /// their own direction.
-    fn place(&self, eyes: [View; 2], known: &Known<'_>) -> Placement {
-        let Some(directions) = known.directions(eyes) else {
-            return Offset.place(eyes, known);
+    fn place(&self, eyes: [View; 2], inputs: &PlanInputs<'_>) -> Placement {
+        let Some(directions) = inputs.directions(eyes) else {
+            return Offset.place(eyes, inputs);
         };
         let left: Vec<[i32; 2]> =
             (tiles(eyes[0]).map(|tile| directions.in_head(0, tile))).collect();

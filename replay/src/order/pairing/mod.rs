@@ -9,7 +9,7 @@ mod offset;
 mod row;
 
 use super::cost::Cost;
-use super::{Known, View};
+use super::{PlanInputs, View};
 use crate::registry::{Named, registry};
 use index::Index;
 use infinity::Infinity;
@@ -26,7 +26,7 @@ registry! { PairingRow:
 }
 
 /// A pairing by name.
-pub type Pairing = Named<PairingRow>;
+pub(super) type Pairing = Named<PairingRow>;
 
 /// A row of the table of pairings.
 #[derive(Debug)]
@@ -88,7 +88,7 @@ pub(super) fn tiles(view: View) -> impl Iterator<Item = [u32; 2]> {
 /// A rule that pairs tiles.
 pub trait Rule: std::fmt::Debug {
     /// Places the tiles of a left and a right view on one grid.
-    fn place(&self, eyes: [View; 2], known: &Known<'_>) -> Placement;
+    fn place(&self, eyes: [View; 2], inputs: &PlanInputs<'_>) -> Placement;
 
     /// Its hardware cost.
     fn cost(&self, grid: [u32; 2]) -> Cost;

@@ -2,15 +2,15 @@
 
 use super::{Placement, Rule, tiles};
 use crate::order::cost::{Cost, Information};
-use crate::order::{Known, View};
+use crate::order::{PlanInputs, View};
 
 /// Pairs with a constant shift.
 #[derive(Debug)]
 pub struct Offset;
 
 impl Rule for Offset {
-    fn place(&self, eyes: [View; 2], known: &Known<'_>) -> Placement {
-        let offset = known.offset(eyes);
+    fn place(&self, eyes: [View; 2], inputs: &PlanInputs<'_>) -> Placement {
+        let offset = inputs.offset(eyes);
         Placement::new([0, 1].map(|eye: usize| {
             let cell = |tile: [u32; 2]| {
                 let at = tile.map(|n| n as i32);

@@ -4,8 +4,8 @@
 use super::offset::Offset;
 use super::{Placement, Rule, tiles};
 use crate::order::cost::{Cost, Information};
-use crate::order::known::ViewCounters;
-use crate::order::{Known, View};
+use crate::order::plan_inputs::ViewCounters;
+use crate::order::{PlanInputs, View};
 
 /// Pairs with one shift per row.
 #[derive(Debug)]
@@ -14,7 +14,7 @@ pub struct Row {
 }
 
 /// Compares primitives.
-pub const PRIMITIVES: Row = Row {
+pub(super) const PRIMITIVES: Row = Row {
     shifts: |of| &of.primitive_shift,
 };
 
@@ -24,9 +24,9 @@ pub const LINES: Row = Row {
 };
 
 impl Rule for Row {
-    fn place(&self, eyes: [View; 2], known: &Known<'_>) -> Placement {
-        let Some(counted) = known.counted(eyes[0]) else {
-            return Offset.place(eyes, known);
+    fn place(&self, eyes: [View; 2], inputs: &PlanInputs<'_>) -> Placement {
+        let Some(counted) = inputs.counted(eyes[0]) else {
+            return Offset.place(eyes, inputs);
         };
         let shifts = (self.shifts)(counted);
         let cells = |eye: usize| -> Vec<[i32; 2]> {

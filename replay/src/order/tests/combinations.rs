@@ -47,7 +47,7 @@ fn all(size: u32) -> Vec<Order> {
 }
 
 #[test]
-fn there_are_as_many_orders_as_parts_make_and_each_has_a_name_of_its_own() {
+fn all_combinations_of_parts_are_orders_with_distinct_names() {
     let orders = all(3);
     // Curves, with and without a number; view by view three directions, else two and all pairings; six assignments.
     let curves = Curve::all().len() + 3;
@@ -132,9 +132,9 @@ proptest! {
             }],
         };
         let meta = canted(angle);
-        let known = Known { cores, meta: Some(&meta), last: Some(&last), l2_bytes: 16 << 10, ..KNOWN };
+        let inputs = PlanInputs { cores, meta: Some(&meta), last: Some(&last), l2_bytes: 16 << 10, ..INPUTS };
         for order in all(size) {
-            let phases = plan(order, &known, &passes);
+            let phases = plan(order, &inputs, &passes);
             let mut found: Vec<TileRef> = phases.iter().flatten().flat_map(WorkItem::tiles).collect();
             found.sort_unstable();
             prop_assert_eq!(&found, &expected, "{}", order.name());

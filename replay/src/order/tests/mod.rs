@@ -22,7 +22,7 @@ fn pass(kind: PassKind, frame: u32, eye: Option<Eye>, tiles: [u32; 2]) -> Pass {
     }
 }
 
-const KNOWN: Known<'_> = Known {
+const INPUTS: PlanInputs<'_> = PlanInputs {
     seed: 7,
     cores: 2,
     tile_px: 16,
@@ -33,7 +33,7 @@ const KNOWN: Known<'_> = Known {
 };
 
 fn visited(order: Order, passes: &[Pass]) -> Vec<TileRef> {
-    plan(order, &KNOWN, passes)
+    plan(order, &INPUTS, passes)
         .iter()
         .flatten()
         .flat_map(WorkItem::tiles)
@@ -54,7 +54,7 @@ fn order(name: &str) -> Order {
 }
 
 #[test]
-fn morton_draws_a_z_and_skips_what_lies_outside() {
+fn morton_follows_a_z_and_skips_cells_outside_the_grid() {
     assert_eq!(
         cells_of(Curve::MORTON, [3, 2], 0),
         [[0, 0], [1, 0], [0, 1], [1, 1], [2, 0], [2, 1]]
@@ -85,7 +85,7 @@ fn far_steps(cells: &[[u32; 2]]) -> usize {
 }
 
 #[test]
-fn the_generalised_hilbert_curve_steps_to_neighbours_on_any_grid_but_for_one_diagonal() {
+fn the_generalised_hilbert_curve_steps_to_neighbours_except_for_one_diagonal() {
     for columns in 1..40 {
         for rows in 1..40 {
             let cells = cells_of(Curve::GILBERT, [columns, rows], 0);
@@ -98,7 +98,7 @@ fn the_generalised_hilbert_curve_steps_to_neighbours_on_any_grid_but_for_one_dia
 }
 
 #[test]
-fn strips_are_an_odd_number_and_every_other_one_runs_upwards() {
+fn the_number_of_strips_is_odd_and_every_other_strip_runs_upwards() {
     // Four columns with two columns per strip are three strips with one, one and two columns.
     assert_eq!(
         cells_of(Curve::STRIP, [4, 2], 2),
@@ -120,7 +120,7 @@ fn strips_are_an_odd_number_and_every_other_one_runs_upwards() {
 }
 
 #[test]
-fn bands_run_column_by_column_to_and_fro() {
+fn bands_run_column_by_column_in_alternating_directions() {
     assert_eq!(
         cells_of(Curve::BAND, [2, 3], 2),
         [[0, 0], [0, 1], [1, 1], [1, 0], [1, 2], [0, 2]]
@@ -132,7 +132,7 @@ fn bands_run_column_by_column_to_and_fro() {
 }
 
 #[test]
-fn rows_that_the_l2_does_not_hold_become_bands_the_lower_the_more_lines_there_are() {
+fn rows_that_exceed_the_l2_become_bands_whose_height_falls_with_the_lines() {
     let path = Curve::ADAPTIVE.path();
     let rows_of_first_columns = |frame_kib: Option<u64>| -> Vec<u32> {
         let cells = path.cells(&Ground {
@@ -162,10 +162,10 @@ fn pair_of(tiles: [u32; 2]) -> [Pass; 2] {
 }
 
 #[test]
-fn lrta_takes_left_and_right_tiles_in_turn() {
+fn lrta_alternates_left_and_right_tiles() {
     let tile = |pass, tile| WorkItem::Tile(TileRef { pass, tile });
     assert_eq!(
-        plan(Order::Z2_LRTA, &KNOWN, &pair_of([2, 1])),
+        plan(Order::Z2_LRTA, &INPUTS, &pair_of([2, 1])),
         [[tile(0, 0), tile(1, 0), tile(0, 1), tile(1, 1)]]
     );
 }
@@ -184,11 +184,11 @@ fn shifted_by(pixels: f32) -> TraceMeta {
 }
 
 #[test]
-fn tiles_pair_where_infinity_falls_and_those_without_a_partner_keep_their_place() {
+fn tiles_pair_at_infinity_and_tiles_without_a_partner_keep_their_place() {
     let meta = shifted_by(17.0);
-    let known = Known {
+    let inputs = PlanInputs {
         meta: Some(&meta),
-        ..KNOWN
+        ..INPUTS
     };
     let passes = pair_of([4, 1]);
     let tile = |pass, tile| TileRef { pass, tile };
@@ -202,7 +202,7 @@ fn tiles_pair_where_infinity_falls_and_those_without_a_partner_keep_their_place(
     ];
     for name in ["zig-zag+sta+offset", "zig-zag+sta+infinity"] {
         assert_eq!(
-            plan(order(name), &known, &passes),
+            plan(order(name), &inputs, &passes),
             std::slice::from_ref(&expected),
             "{name}"
         );
@@ -213,12 +213,12 @@ fn tiles_pair_where_infinity_falls_and_those_without_a_partner_keep_their_place(
         ..pass
     });
     let plans =
-        ["zig-zag+sta+offset", "zig-zag+sta"].map(|name| plan(order(name), &known, &layers));
+        ["zig-zag+sta+offset", "zig-zag+sta"].map(|name| plan(order(name), &inputs, &layers));
     assert_eq!(plans[0], plans[1]);
 }
 
 #[test]
-fn rows_pair_at_the_shifts_that_the_last_frame_had() {
+fn rows_pair_at_the_shifts_of_the_last_frame() {
     let last = Counters {
         views: vec![ViewCounters {
             view: View::grid(0, [2, 2]),
@@ -227,12 +227,12 @@ fn rows_pair_at_the_shifts_that_the_last_frame_had() {
             line_shift: vec![1, 0],
         }],
     };
-    let known = Known {
+    let inputs = PlanInputs {
         last: Some(&last),
-        ..KNOWN
+        ..INPUTS
     };
     let pairs = |name| -> Vec<(u32, u32)> {
-        let phases = plan(order(name), &known, &pair_of([2, 2]));
+        let phases = plan(order(name), &inputs, &pair_of([2, 2]));
         let pair = |item: &WorkItem| match *item {
             WorkItem::Pair(left, right, _) => Some((left.tile, right.tile)),
             WorkItem::Tile(_) => None,
@@ -308,7 +308,7 @@ fn single_view_orders_finish_the_left_view_first() {
 }
 
 #[test]
-fn left_and_right_layers_of_a_number_and_size_pair_and_others_run_alone() {
+fn left_and_right_layers_with_equal_number_and_size_are_paired() {
     let layer = |layer, eye, tiles| Pass {
         layer,
         ..pass(PassKind::Layer, 0, eye, tiles)
@@ -334,7 +334,7 @@ fn left_and_right_layers_of_a_number_and_size_pair_and_others_run_alone() {
         vec![WorkItem::Tile(tile(5, 0))],
         vec![WorkItem::Tile(tile(6, 0)), WorkItem::Tile(tile(6, 1))],
     ];
-    assert_eq!(plan(Order::Z2_STA, &KNOWN, &passes), expected);
+    assert_eq!(plan(Order::Z2_STA, &INPUTS, &passes), expected);
 }
 
 #[test]
@@ -354,13 +354,13 @@ fn monoscopic_passes_come_before_the_stereo_pair_of_their_frame() {
 
 #[test]
 fn the_random_order_follows_its_seed() {
-    let tiles = |seed| Order::RANDOM.stereo([9, 9], &Known { seed, ..KNOWN });
+    let tiles = |seed| Order::RANDOM.stereo([9, 9], &PlanInputs { seed, ..INPUTS });
     assert_eq!(tiles(1), tiles(1));
     assert_ne!(tiles(1), tiles(2));
 }
 
 #[test]
-fn a_file_and_a_row_are_all_that_an_order_takes() {
+fn a_new_order_needs_only_a_file_and_a_row() {
     let order = Order::COLUMNS;
     assert_eq!(order.parts().curve, Curve::COLUMNS);
     assert_eq!(serde_json::to_value(order).unwrap(), "test-columns");
@@ -387,7 +387,7 @@ fn a_file_and_a_row_are_all_that_an_order_takes() {
 }
 
 #[test]
-fn an_unknown_order_is_named_with_the_known_ones() {
+fn the_error_for_an_unknown_order_lists_the_known_ones() {
     let error = toml::from_str::<RunConfig>("order = \"spiral\"").unwrap_err();
     let known: Vec<String> = Order::all().map(|o| format!("`{}`", o.name())).collect();
     let expected = format!(

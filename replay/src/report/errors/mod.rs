@@ -143,7 +143,7 @@ mod tests {
     use crate::report::columns::Value;
 
     #[test]
-    fn every_line_reads_and_names_a_figure_its_source_and_a_unit() {
+    fn every_line_is_valid_and_has_a_figure_a_source_and_a_unit() {
         let lines = include_str!("measured.csv").lines().count();
         assert_eq!(ERRORS.len(), lines - 1);
         for error in ERRORS.iter() {

@@ -51,7 +51,7 @@ impl Section {
 
 /// Lower-case letters and digits of a title, joined by hyphens.
 #[must_use]
-pub fn slug(title: &str) -> String {
+pub(super) fn slug(title: &str) -> String {
     let mut out = String::new();
     for c in title.chars() {
         if c.is_ascii_alphanumeric() {

@@ -61,7 +61,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_that_rounds_to_zero_is_none() {
+    fn a_change_that_rounds_to_zero_is_reported_as_none() {
         let words = |pct| change(pct, "less", "more", "as much");
         assert_eq!(words(-12.34), "12.3 % less");
         assert_eq!(words(0.4), "0.4 % more");

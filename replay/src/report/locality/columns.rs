@@ -45,7 +45,7 @@ pub struct CurvePoint<'a> {
 
 /// Reuses within a range of distances.
 #[derive(Clone, Copy, Debug)]
-pub struct Reuses<'a> {
+pub(super) struct Reuses<'a> {
     /// The stream.
     pub of: Subject<'a>,
     /// First and last distance.

@@ -55,7 +55,7 @@ fn full_lru<'a>(row: &Summary<'a>) -> impl Iterator<Item = CurvePoint<'a>> {
 
 /// Misses of fully associative LRU caches of every size.
 #[must_use]
-pub fn miss_ratio(rows: &[Summary]) -> LineChart {
+pub(super) fn miss_ratio(rows: &[Summary]) -> LineChart {
     let y = Axis::doublings("misses, % of line accesses", Doublings::Numbers);
     over_sizes(
         rows,
@@ -87,7 +87,7 @@ pub fn other_eye(rows: &[Summary]) -> LineChart {
 
 /// LRU misses over OPT misses.
 #[must_use]
-pub fn above_opt(rows: &[Summary]) -> LineChart {
+pub(super) fn above_opt(rows: &[Summary]) -> LineChart {
     let y = Axis::linear("LRU misses over OPT misses");
     over_sizes(
         rows,
@@ -108,7 +108,7 @@ pub fn above_opt(rows: &[Summary]) -> LineChart {
 
 /// Miss ratio by size, a line for each associativity.
 #[must_use]
-pub fn associativity(row: &Summary) -> LineChart {
+pub(super) fn associativity(row: &Summary) -> LineChart {
     let curve = LocalityReport::curve(row);
     let lru = || curve.iter().filter(|p| p.policy == "lru");
     let mut ways: Vec<u32> = lru().filter_map(|p| p.cache.ways).collect();
@@ -211,7 +211,7 @@ fn short(number: u64) -> String {
 
 /// Reuses at smaller distances, percent of the line accesses. `from` is 1 or the start of a bin.
 #[must_use]
-pub fn nearer_pct(row: &Summary, from: u64) -> Option<f64> {
+pub(super) fn nearer_pct(row: &Summary, from: u64) -> Option<f64> {
     row.share_pct(row.figures.distances.hits(from).iter().sum())
 }
 
@@ -242,7 +242,7 @@ pub fn working_sets(rows: &[Summary]) -> LineChart {
 
 /// Share of a working set that both eyes use.
 #[must_use]
-pub fn shared_working_sets(rows: &[Summary]) -> LineChart {
+pub(super) fn shared_working_sets(rows: &[Summary]) -> LineChart {
     let series = |row: &Summary| {
         let points = LocalityReport::working_sets(row).into_iter().map(|window| {
             let shared = window.set.lines_of_both() as f64 / window.set.lines.max(1) as f64;

@@ -7,7 +7,7 @@ use crate::orders_study::{Of, Row};
 use crate::report::columns::{Column, Show, Value};
 
 /// Keys of the means for a terminal.
-pub const SHORT_MEANS: [&str; 13] = [
+pub(super) const SHORT_MEANS: [&str; 13] = [
     "between_frames",
     "order",
     "buildable",
@@ -150,7 +150,7 @@ pub struct LearnedTrace<'a> {
 }
 
 /// A fixed order, or the learner.
-pub struct LearnedRow<'a> {
+pub(super) struct LearnedRow<'a> {
     of: &'a LearnedTrace<'a>,
     /// Index of the order; none for the learner.
     order: Option<usize>,

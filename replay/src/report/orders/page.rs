@@ -1,7 +1,7 @@
 //! The HTML page: means and bounds by display, hardware costs, and a picture of each order's path.
 
 use super::{Mean, OrdersReport, columns, means};
-use crate::order::{Known, View, WorkItem};
+use crate::order::{PlanInputs, View, WorkItem};
 use crate::orders_study::{BASELINE, Of, Row};
 use crate::report::answers;
 use crate::report::html::{self, Answer, Section, figures};
@@ -104,10 +104,10 @@ impl OrdersReport<'_> {
                 continue;
             }
             let meta = &row.subject.source.tables().meta;
-            let seen = Known {
+            let seen = PlanInputs {
                 l2_bytes: PATH_L2_BYTES,
                 tile_px: small_tile_px(row),
-                ..Known::new(&row.config, meta)
+                ..PlanInputs::new(&row.config, meta)
             };
             let [left, right] = small_views(row);
             let items = order.parts().stereo(left, right, &seen);

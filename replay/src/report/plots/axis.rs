@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn values_near_zero_get_a_logarithmic_axis_with_a_place_for_zero() {
+    fn values_including_zero_get_a_logarithmic_axis_with_a_place_for_zero() {
         let values = [0.0, 0.0, 0.0003, 0.002, 0.4];
         let axis = Axis::from_zero("error", values.into_iter());
         assert!(axis.label.contains("logarithmic"));
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn doublings_have_units_and_long_ones_powers() {
+    fn axes_of_doublings_show_units_and_long_ones_show_powers() {
         let axis = Axis::doublings("size", Doublings::Bytes);
         assert_eq!(
             texts(&axis, 9.5..13.0),

@@ -10,7 +10,7 @@ use plotters::style::text_anchor::HPos;
 
 /// A chart of boxes.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct BoxChart {
+pub(crate) struct BoxChart {
     /// Heading.
     pub title: String,
     /// Definition of whiskers, boxes and marks.
@@ -27,7 +27,7 @@ pub struct BoxChart {
 
 /// One distribution.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BoxRow {
+pub(crate) struct BoxRow {
     /// Name and colour.
     pub style: SeriesStyle,
     /// Lower whisker, lower quartile, median, upper quartile, upper whisker.
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_stand_apart_and_medians_are_written() {
+    fn rows_do_not_overlap_and_medians_are_printed() {
         let svg = chart([0.7, 0.8, 0.875, 0.9, 1.3]).svg().unwrap();
         assert!(text_at(&svg, "occlusion").1 - text_at(&svg, "conical").1 >= 15.0);
         assert!(svg.contains("\n0.88\n") && svg.contains("over the baseline"));

@@ -10,7 +10,7 @@ use plotters::style::text_anchor::HPos;
 
 /// Points of one series.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PointSeries {
+pub(crate) struct PointSeries {
     /// Name and colour.
     pub style: SeriesStyle,
     /// Points.
@@ -20,7 +20,7 @@ pub struct PointSeries {
 }
 
 /// A contour chart over `x` (logarithmic to base 2) and `y` (0 to 100), both in percent.
-pub struct ContourChart<'a> {
+pub(crate) struct ContourChart<'a> {
     /// Heading.
     pub title: String,
     /// Horizontal axis with its unit.

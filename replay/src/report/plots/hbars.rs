@@ -9,7 +9,7 @@ use plotters::style::text_anchor::HPos;
 
 /// A chart of horizontal bars, one group per row.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct HBarChart {
+pub(crate) struct HBarChart {
     /// Heading.
     pub title: String,
     /// What the bars show, with its unit.

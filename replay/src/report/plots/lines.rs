@@ -251,7 +251,7 @@ mod tests {
     proptest::proptest! {
         #![proptest_config(proptest::test_runner::Config::with_cases(200))]
         #[test]
-        fn texts_stay_apart_and_inside_and_leaders_outside_of_the_axes(
+        fn texts_do_not_overlap_and_leaders_stay_outside_the_axes(
             names in proptest::collection::vec("[a-z]{0,3}|[a-zA-Z ]{20,60}|same", 1..20),
             count in 1_usize..30,
             kind in 0..6,

@@ -2,13 +2,15 @@
 //! it and covers no other label or point. With many points, the labels are numbers, and a list to the right
 //! of the axes has their names.
 
-use super::axis::Axis;
-use super::frame::{AXIS_PX, DOT_PX, Frame, LegendEntry, Symbol, text_style, themed};
+use super::axis::{Axis, Ticked};
+use super::frame::{AXIS_PX, Area, DOT_PX, Drawn, Frame, LegendEntry, Symbol, text_style, themed};
 use super::lines::exact;
-use super::marks::Shape;
+use super::marks::{Marks, Shape};
 use super::{PlotError, SeriesStyle};
 use crate::report::theme;
+use plotters::style::TextStyle;
 use plotters::style::text_anchor::HPos;
+use std::ops::Range;
 
 /// A chart of named points.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -119,42 +121,76 @@ impl ScatterChart {
     /// # Errors
     /// A point that is not finite.
     pub fn svg(&self) -> Result<String, PlotError> {
-        let finite = |p: &&NamedPoint| !(p.at.0.is_finite() && p.at.1.is_finite());
-        if let Some(bad) = self.points.iter().find(finite) {
-            return Err(PlotError {
+        self.check()?;
+        let (x, y) = self.axes();
+        let labels = self.labels();
+        self.frame(&labels, &y).draw(|root, mut builder, marks| {
+            let mut chart = builder.build_cartesian_2d(x.clone(), y.clone())?;
+            themed(&mut chart.configure_mesh())
+                .disable_x_mesh()
+                .x_desc(&self.x.label)
+                .x_label_formatter(&|at| x.text(*at))
+                .y_label_formatter(&|at| y.text(*at))
+                .draw()?;
+            let in_px = |point: &NamedPoint| {
+                let (x, y) = chart.backend_coord(&self.place_of(point));
+                (f64::from(x), f64::from(y))
+            };
+            let dots: Vec<(f64, f64)> = self.points.iter().map(in_px).collect();
+            let area = chart.plotting_area().get_pixel_range();
+            self.draw_points(&dots, &labels, &area, (root, marks))?;
+            match labels.listed {
+                true => self.draw_list(&labels, &area, (root, marks)),
+                false => Ok(()),
+            }
+        })
+    }
+
+    /// Checks that all points are finite.
+    fn check(&self) -> Result<(), PlotError> {
+        let is_bad = |p: &&NamedPoint| !(p.at.0.is_finite() && p.at.1.is_finite());
+        match self.points.iter().find(is_bad) {
+            Some(bad) => Err(PlotError {
                 title: self.title.clone(),
                 problem: format!("point `{}` at {:?}", bad.style.name, bad.at),
-            });
+            }),
+            None => Ok(()),
         }
-        let place_of = |p: &NamedPoint| (self.x.place(p.at.0), self.y.place(p.at.1));
-        let x = self.x.fit(self.points.iter().map(|p| place_of(p).0));
-        let mut y = self.y.fit(self.points.iter().map(|p| place_of(p).1));
+    }
+
+    /// Position of a point on the axes.
+    fn place_of(&self, point: &NamedPoint) -> (f64, f64) {
+        (self.x.place(point.at.0), self.y.place(point.at.1))
+    }
+
+    /// The axes with their ticks.
+    fn axes(&self) -> (Ticked, Ticked) {
+        let x = self.x.fit(self.points.iter().map(|p| self.place_of(p).0));
+        let mut y = self.y.fit(self.points.iter().map(|p| self.place_of(p).1));
         if y.start == 0.0 {
             // Points at zero are not clipped.
             y.start = -0.03 * y.end;
         }
-        let (x, y) = (self.x.ticked(x).thinned(PLOT_PX.0), self.y.ticked(y));
-        let Labels {
-            order,
-            listed,
-            labels,
-            list_names,
-        } = self.labels();
-        let list_px = list_names
-            .iter()
-            .map(|name| theme::text_width_px(name, theme::TICK_PX))
-            .fold(0.0, f64::max);
-        let (right, height) = match listed {
+        (self.x.ticked(x).thinned(PLOT_PX.0), self.y.ticked(y))
+    }
+
+    /// The frame, with room for the list of names if there is one.
+    fn frame(&self, labels: &Labels, y: &Ticked) -> Frame<'_> {
+        let (right, height) = match labels.listed {
             true => {
-                let list_height = LIST_GAP_PX * labels.len() as f64;
+                let list_height = LIST_GAP_PX * labels.labels.len() as f64;
+                let list_px = (labels.list_names.iter())
+                    .map(|name| theme::text_width_px(name, theme::TICK_PX))
+                    .fold(0.0, f64::max);
                 (list_px as u32 + 36, PLOT_PX.1.max(list_height))
             }
             false => (RIGHT_PX, PLOT_PX.1),
         };
-        let frame = Frame {
+        let kinds = [(0, true), (1, false)];
+        Frame {
             title: &self.title,
             value_label: &self.y.label,
-            legend: [(0, true), (1, false)]
+            legend: kinds
                 .map(|(kind, filled)| LegendEntry {
                     name: &self.kinds[kind],
                     color: theme::INK,
@@ -168,77 +204,91 @@ impl ScatterChart {
                 AXIS_PX,
                 LEFT_PX.max(y.widest_px() as u32 + 16),
             ],
-        };
-        frame.draw(|root, mut builder, marks| {
-            let mut chart = builder.build_cartesian_2d(x.clone(), y.clone())?;
-            themed(&mut chart.configure_mesh())
-                .disable_x_mesh()
-                .x_desc(&self.x.label)
-                .x_label_formatter(&|at| x.text(*at))
-                .y_label_formatter(&|at| y.text(*at))
-                .draw()?;
-            let in_px = |at: &(f64, f64)| {
-                let (x, y) = chart.backend_coord(at);
-                (f64::from(x), f64::from(y))
-            };
-            let whole = |points: &[(f64, f64)]| -> Vec<(i32, i32)> {
-                points.iter().map(|(x, y)| (*x as i32, *y as i32)).collect()
-            };
-            let dots: Vec<(f64, f64)> = self.points.iter().map(|p| in_px(&place_of(p))).collect();
-            let steps = steps(&dots);
-            marks.line(&whole(&steps), theme::AXIS, (1.0, ""));
-            let widths: Vec<f64> = labels
-                .iter()
-                .map(|label| theme::text_width_px(label, theme::TICK_PX))
-                .collect();
-            let (across, down) = chart.plotting_area().get_pixel_range();
-            let beyond = if listed { 0 } else { RIGHT_PX as i32 };
-            let room = Rect {
-                left: f64::from(across.start) + 4.0,
-                top: f64::from(down.start),
-                right: f64::from(across.end + beyond) - 2.0,
-                bottom: f64::from(down.end) - 2.0,
-            };
-            // Leader lines are below dots and labels.
-            let places = place(&dots, &widths, &steps, room);
-            for (dot, label) in dots.iter().zip(&places) {
-                let to = label.nearest(*dot);
-                if distance(*dot, to) > NEAR_PX {
-                    marks.leader(&whole(&[*dot, to]));
-                }
-            }
-            for (point, dot) in self.points.iter().zip(&dots) {
-                let title = format!(
-                    "{}: {} at {}",
-                    point.style.name,
-                    exact(point.at.1),
-                    exact(point.at.0)
-                );
-                let style = (point.style.color, !point.dominated);
-                marks.symbol(Shape::Circle, whole(&[*dot])[0], style, &title);
-            }
-            let ink = |point: &NamedPoint| match point.dominated {
-                true => theme::MUTED,
-                false => theme::INK,
-            };
-            for ((point, at), label) in self.points.iter().zip(&places).zip(&labels) {
-                let text = text_style(theme::TICK_PX, ink(point), HPos::Left);
-                let middle = f64::midpoint(at.top, at.bottom);
-                root.draw_text(label, &text, (at.left as i32, middle as i32))?;
-            }
-            if listed {
-                for (row, (&index, name)) in order.iter().zip(&list_names).enumerate() {
-                    let point = &self.points[index];
-                    let y = down.start + (LIST_GAP_PX * (row as f64 + 0.5)) as i32;
-                    let style = (point.style.color, !point.dominated);
-                    marks.symbol(Shape::Circle, (across.end + 16, y), style, "");
-                    let text = text_style(theme::TICK_PX, ink(point), HPos::Left);
-                    root.draw_text(name, &text, (across.end + 26, y))?;
-                }
-            }
-            Ok(())
-        })
+        }
     }
+
+    /// Draws the front, the points at `dots`, and a label for each.
+    fn draw_points(
+        &self,
+        dots: &[(f64, f64)],
+        labels: &Labels,
+        (across, down): &PixelRanges,
+        (root, marks): (&Area, &mut Marks),
+    ) -> Drawn {
+        let steps = steps(dots);
+        marks.line(&whole(&steps), theme::AXIS, (1.0, ""));
+        let widths: Vec<f64> = (labels.labels.iter())
+            .map(|label| theme::text_width_px(label, theme::TICK_PX))
+            .collect();
+        let beyond = if labels.listed { 0 } else { RIGHT_PX as i32 };
+        let room = Rect {
+            left: f64::from(across.start) + 4.0,
+            top: f64::from(down.start),
+            right: f64::from(across.end + beyond) - 2.0,
+            bottom: f64::from(down.end) - 2.0,
+        };
+        // Leader lines are below dots and labels.
+        let places = place(dots, &widths, &steps, room);
+        for (dot, label) in dots.iter().zip(&places) {
+            let to = label.nearest(*dot);
+            if distance(*dot, to) > NEAR_PX {
+                marks.leader(&whole(&[*dot, to]));
+            }
+        }
+        for (point, dot) in self.points.iter().zip(dots) {
+            let title = format!(
+                "{}: {} at {}",
+                point.style.name,
+                exact(point.at.1),
+                exact(point.at.0)
+            );
+            point.draw_symbol(whole(&[*dot])[0], &title, marks);
+        }
+        for ((point, at), label) in self.points.iter().zip(&places).zip(&labels.labels) {
+            let middle = f64::midpoint(at.top, at.bottom);
+            root.draw_text(label, &point.text_style(), (at.left as i32, middle as i32))?;
+        }
+        Ok(())
+    }
+
+    /// Draws the list of names to the right of the axes.
+    fn draw_list(
+        &self,
+        labels: &Labels,
+        (across, down): &PixelRanges,
+        (root, marks): (&Area, &mut Marks),
+    ) -> Drawn {
+        for (row, (&index, name)) in labels.order.iter().zip(&labels.list_names).enumerate() {
+            let point = &self.points[index];
+            let y = down.start + (LIST_GAP_PX * (row as f64 + 0.5)) as i32;
+            point.draw_symbol((across.end + 16, y), "", marks);
+            root.draw_text(name, &point.text_style(), (across.end + 26, y))?;
+        }
+        Ok(())
+    }
+}
+
+impl NamedPoint {
+    fn draw_symbol(&self, at: (i32, i32), title: &str, marks: &mut Marks) {
+        let style = (self.style.color, !self.dominated);
+        marks.symbol(Shape::Circle, at, style, title);
+    }
+
+    fn text_style(&self) -> TextStyle<'static> {
+        let ink = match self.dominated {
+            true => theme::MUTED,
+            false => theme::INK,
+        };
+        text_style(theme::TICK_PX, ink, HPos::Left)
+    }
+}
+
+/// Horizontal and vertical extent of an area in pixels.
+type PixelRanges = (Range<i32>, Range<i32>);
+
+/// Positions in whole pixels.
+fn whole(points: &[(f64, f64)]) -> Vec<(i32, i32)> {
+    points.iter().map(|(x, y)| (*x as i32, *y as i32)).collect()
 }
 
 /// A rectangle in pixels, y down.
@@ -407,7 +457,7 @@ mod tests {
     };
 
     #[test]
-    fn names_of_crowded_points_cover_neither_each_other_nor_a_point() {
+    fn labels_of_crowded_points_overlap_neither_each_other_nor_a_point() {
         // Ten techniques without error and with similar times, such as lossless ones.
         let dots: Vec<(f64, f64)> = (0..10)
             .map(|i| (300.0 + 9.0 * f64::from(i), 390.0))
@@ -441,7 +491,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_keeps_off_the_line_that_leaves_its_point() {
+    fn a_label_does_not_cover_the_line_from_its_point() {
         let steps = [(100.0, 100.0), (300.0, 100.0)];
         let names = place(&[(100.0, 100.0)], &[50.0], &steps, ROOM);
         let name = names[0];
@@ -454,7 +504,7 @@ mod tests {
     proptest::proptest! {
         #![proptest_config(proptest::test_runner::Config::with_cases(60))]
         #[test]
-        fn labels_stay_apart_and_inside(
+        fn labels_do_not_overlap_and_stay_inside_the_plot(
             names in proptest::collection::vec("[a-z]{1,3}|[a-zA-Z+]{20,60}|same", 1..20),
             kind in 0..4,
             seed in 0_u32..1000,

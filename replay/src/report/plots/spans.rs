@@ -9,7 +9,7 @@ use std::ops::Range;
 
 /// A chart of spans.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct SpanChart {
+pub(crate) struct SpanChart {
     /// Heading.
     pub title: String,
     /// What the axis shows, with its unit.

@@ -9,7 +9,7 @@ use plotters::style::text_anchor::HPos;
 
 /// A chart of stacked bars.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct StackedChart {
+pub(crate) struct StackedChart {
     /// Heading.
     pub title: String,
     /// What the bars show, with its unit.
@@ -160,14 +160,14 @@ mod tests {
     }
 
     #[test]
-    fn parts_stand_on_each_other_and_the_sum_above_them() {
+    fn parts_are_stacked_with_the_sum_above_them() {
         let svg = chart().svg().unwrap();
         assert_eq!(svg, chart().svg().unwrap());
         assert!(svg.contains("\n4.0\n") && svg.contains("\n2.5\n"), "sums");
     }
 
     #[test]
-    fn parts_that_are_no_parts_are_refused() {
+    fn invalid_parts_are_refused() {
         let mut bad = chart();
         bad.bars[1].1[0] = -1.0;
         let error = bad.svg().unwrap_err().to_string();

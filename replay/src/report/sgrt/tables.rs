@@ -15,7 +15,7 @@ pub fn scene_name(report: &Report) -> String {
 
 /// Describes the rule and level of reuse of the rows named "chosen".
 #[must_use]
-pub fn rule_line(entries: &[Entry]) -> String {
+pub(super) fn rule_line(entries: &[Entry]) -> String {
     entries.first().map_or_else(String::new, |entry| {
         let config = &entry.report.config;
         format!(
@@ -28,7 +28,7 @@ pub fn rule_line(entries: &[Entry]) -> String {
 
 /// Mean reuse over the traces that correspond to a scene of the paper, for both rules.
 #[must_use]
-pub fn mean_reuse_line(entries: &[Entry]) -> Option<String> {
+pub(super) fn mean_reuse_line(entries: &[Entry]) -> Option<String> {
     let of_paper: Vec<&Report> = entries
         .iter()
         .map(|e| &e.report)
@@ -50,7 +50,7 @@ pub fn mean_reuse_line(entries: &[Entry]) -> Option<String> {
 
 /// Notes on traces whose eyes do not meet the conditions of the paper's row test.
 #[must_use]
-pub fn row_notes(entries: &[Entry]) -> Vec<String> {
+pub(super) fn row_notes(entries: &[Entry]) -> Vec<String> {
     let reports = entries.iter().map(|e| &e.report);
     reports
         .filter(|report| !report.rows.row_test_applies)

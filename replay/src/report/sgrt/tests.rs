@@ -113,7 +113,7 @@ fn json_holds_the_agreed_fields() {
 }
 
 #[test]
-fn eyes_that_do_not_fit_the_row_test_are_named_everywhere() {
+fn eyes_unsuitable_for_the_row_test_are_reported_in_every_output() {
     let canted = entry_of(View {
         cant_deg: 10.0,
         ..View::default()

@@ -34,7 +34,7 @@ pub const SHORT: [&str; 20] = [
 
 /// Keys of the table of pacing.
 #[must_use]
-pub fn pacing_keys() -> Vec<String> {
+pub(super) fn pacing_keys() -> Vec<String> {
     let rates = |name: &'static str| RATES_HZ.map(|hz| format!("{name}_{hz}hz"));
     let start = ["scene", "technique", "frame_ms"].map(str::to_owned);
     (start.into_iter())
@@ -266,12 +266,12 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
 }
 
 /// A column of an order's saving with a technique.
-pub type GainFigure<'a> = Column<'a, OrderGain<'a>>;
+pub(super) type GainFigure<'a> = Column<'a, OrderGain<'a>>;
 
 /// The table of orders with and without each technique. It shows the saving of `gain` over `against`.
 #[must_use]
 #[rustfmt::skip]
-pub fn order_columns<'a>(orders: &[Order], gain: Order, against: Order) -> Vec<GainFigure<'a>> {
+pub(super) fn order_columns<'a>(orders: &[Order], gain: Order, against: Order) -> Vec<GainFigure<'a>> {
     let mut columns = vec![
         GainFigure::text("scene", "scene", |g| g.measured.scene),
         GainFigure::text("technique", "technique", |g| g.measured.row.technique.as_str()),

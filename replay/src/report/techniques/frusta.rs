@@ -18,7 +18,7 @@ const FAR_M: f64 = 10.0;
 const LINE_PX: f64 = 15.0;
 
 /// Input of the drawing.
-pub struct Frusta<'a> {
+pub(super) struct Frusta<'a> {
     /// Heading.
     pub title: String,
     /// The display.

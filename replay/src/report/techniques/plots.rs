@@ -108,7 +108,7 @@ fn over_frames(
 
 /// Frame times along the path.
 #[must_use]
-pub fn frame_times(measures: &Measures) -> LineChart {
+pub(super) fn frame_times(measures: &Measures) -> LineChart {
     over_frames(
         measures,
         "frame time along the path",

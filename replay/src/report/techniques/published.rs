@@ -5,7 +5,7 @@ use crate::report::columns::Column;
 use crate::techniques::{Measured, Measures};
 
 /// A published saving, and the measured one on a scene.
-pub struct ClaimRow<'a> {
+pub(super) struct ClaimRow<'a> {
     claim: &'static Claim,
     measured: &'a Measured<'a>,
 }
@@ -35,7 +35,7 @@ impl ClaimRow<'_> {
 
 /// The table of published savings.
 #[rustfmt::skip]
-pub fn claim_columns<'a>() -> Vec<Column<'static, ClaimRow<'a>>> {
+pub(super) fn claim_columns<'a>() -> Vec<Column<'static, ClaimRow<'a>>> {
     vec![
         Column::text("technique", "technique", |r: &ClaimRow| {
             r.measured.row.technique.as_str()

@@ -13,7 +13,7 @@ use formats::textrace::TraceMeta;
 use serde::Serialize;
 
 /// Schema of the object that `replay paper --json` prints.
-pub const PAPER_SCHEMA: &str = "replay.paper/3";
+pub(super) const PAPER_SCHEMA: &str = "replay.paper/3";
 
 /// A trace of the experiment.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -434,7 +434,7 @@ mod tests {
     }
 
     #[test]
-    fn an_order_that_replays_other_accesses_is_named() {
+    fn an_order_that_replays_other_accesses_is_reported() {
         let check = |edit: fn(usize) -> bool| {
             super::super::testing::with_edited(
                 |point, result| {
@@ -454,7 +454,7 @@ mod tests {
     }
 
     #[test]
-    fn the_json_names_its_schema_and_keeps_every_row_with_the_papers_beside_it() {
+    fn the_json_has_its_schema_and_every_row_with_the_papers_values() {
         with_report(|report| {
             let json: serde_json::Value = serde_json::from_str(&report.json().unwrap()).unwrap();
             assert_eq!(json["schema"], "replay.paper/3");

@@ -396,7 +396,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_page_holds_every_part_and_is_the_same_every_time() {
+    fn the_page_has_every_part_and_is_reproducible() {
         with_report(|report| {
             let text = page(report, &[]).unwrap();
             assert_eq!(text, page(report, &[]).unwrap());

@@ -4,7 +4,7 @@ use super::model::{PaperReport, TraceInfo};
 use super::tables::busiest;
 use crate::config::Order;
 use crate::experiment::ResultRow;
-use crate::order::{Known, WorkItem};
+use crate::order::{PlanInputs, WorkItem};
 use crate::paper::z2;
 use crate::report::columns::{Column, pick};
 use crate::report::figures::{figure, number};
@@ -244,7 +244,7 @@ pub fn by_level(details: &[&ResultRow]) -> Vec<BarChart> {
 
 /// The textures or draws with the most external traffic.
 #[must_use]
-pub fn by_part(details: &[&ResultRow], most: usize) -> Vec<HBarChart> {
+pub(super) fn by_part(details: &[&ResultRow], most: usize) -> Vec<HBarChart> {
     let Some(first) = details.first() else {
         return Vec::new();
     };
@@ -277,7 +277,7 @@ pub fn by_part(details: &[&ResultRow], most: usize) -> Vec<HBarChart> {
 
 /// Quantities of a tile map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TileMeasure {
+pub(super) enum TileMeasure {
     /// Covered lanes per pixel.
     Overdraw,
     /// Footprints.
@@ -318,7 +318,11 @@ impl TileMeasure {
 
 /// Both eyes' tiles of one run; `None` if the run has no maps of both eyes.
 #[must_use]
-pub fn heat_map(info: &TraceInfo, detail: &ResultRow, measure: TileMeasure) -> Option<HeatMap> {
+pub(super) fn heat_map(
+    info: &TraceInfo,
+    detail: &ResultRow,
+    measure: TileMeasure,
+) -> Option<HeatMap> {
     let (title, value_label) = measure.titles();
     let panels: Vec<Panel> = info
         .eye_passes
@@ -352,11 +356,11 @@ pub fn heat_map(info: &TraceInfo, detail: &ResultRow, measure: TileMeasure) -> O
 /// An order's path over both eyes' grids of `tiles`.
 #[must_use]
 pub fn path(order: Order, seed: u64, tiles: [u32; 2]) -> PathPlot {
-    let known = Known {
+    let inputs = PlanInputs {
         seed,
-        ..Known::default()
+        ..PlanInputs::default()
     };
-    let items = order.stereo(tiles, &known);
+    let items = order.stereo(tiles, &inputs);
     let mut stops = Vec::with_capacity(2 * tiles[0] as usize * tiles[1] as usize);
     for item in &items {
         for (i, tile) in item.tiles().enumerate() {
@@ -390,7 +394,7 @@ mod tests {
     use crate::report::plots::testing::text_at;
 
     #[test]
-    fn marks_are_the_papers_ratios_times_the_measured_morton_traffic() {
+    fn marks_equal_the_papers_ratios_times_the_measured_morton_traffic() {
         with_report(|report| {
             let chart = bandwidth(report, "crytek-sponza");
             let group = &chart.groups[3];

@@ -137,7 +137,7 @@ pub fn parts<'a>(
 /// Indices of the `most` parts with the most external traffic, or all parts in their own order if there are
 /// no more.
 #[must_use]
-pub fn busiest(parts: &[Part], most: usize) -> Vec<usize> {
+pub(crate) fn busiest(parts: &[Part], most: usize) -> Vec<usize> {
     let mut index: Vec<usize> = (0..parts.len()).collect();
     if parts.len() > most {
         index.sort_by_key(|&i| (std::cmp::Reverse(parts[i].l2.line_misses), i));
@@ -152,7 +152,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn table_2_of_fixed_inputs_reads_as_the_paper_has_it() {
+    fn table_2_of_fixed_inputs_matches_the_papers_layout() {
         with_report(|report| {
             let text = table_2(report).text();
             let lines: Vec<&str> = text.lines().collect();
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn the_parts_with_most_traffic_come_first_and_few_parts_keep_their_order() {
+    fn parts_are_sorted_by_traffic_unless_they_are_few() {
         with_report(|report| {
             let result = report.rows[0].result;
             assert_eq!(busiest(&result.by_texture, 20).len(), 20);

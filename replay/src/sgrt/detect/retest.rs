@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_behind_or_beside_is_missed() {
+    fn triangles_behind_or_beside_the_ray_are_missed() {
         assert_eq!(intersect([0.2, 0.2, 0.0], [0.0, 0.0, 1.0], &TRIANGLE), None);
         assert_eq!(
             intersect([0.6, 0.6, 0.0], [0.0, 0.0, -1.0], &TRIANGLE),

@@ -19,7 +19,7 @@ fn room() -> Vec<Placed> {
 }
 
 #[test]
-fn a_plane_across_the_view_has_no_wrong_pixel_under_any_rule() {
+fn a_plane_that_fills_the_view_has_no_wrong_pixel_under_any_rule() {
     for depth in [0.5, 2.0, 7.3] {
         let frame = frame(&wall(depth, [50.0, 50.0], 0.0, 1), View::default());
         for rule in ["none", "depth", "row", "object", "triangle", DEFAULT] {
@@ -111,7 +111,7 @@ fn without_eye_separation_all_is_reused_without_error() {
 }
 
 #[test]
-fn traced_pixels_are_the_truth_bit_for_bit() {
+fn traced_pixels_equal_the_reference_bit_for_bit() {
     let frame = frame(&room(), View::default());
     for rule in ["none", "object", DEFAULT] {
         let decisions = decided(&frame, rule);
@@ -131,7 +131,7 @@ fn traced_pixels_are_the_truth_bit_for_bit() {
 }
 
 #[test]
-fn a_retested_hit_is_the_traced_hit_unless_something_hides_it() {
+fn a_retested_hit_equals_the_traced_hit_unless_it_is_hidden() {
     let frame = frame(&room(), View::default());
     let decisions = decided(&frame, "triangles");
     let mut exact = 0;
@@ -148,7 +148,7 @@ fn a_retested_hit_is_the_traced_hit_unless_something_hides_it() {
 }
 
 #[test]
-fn stricter_rules_reuse_less_and_wrong_less() {
+fn stricter_rules_reuse_less_and_make_fewer_errors() {
     let frame = frame(&room(), View::default());
     let of = |rule: &str| {
         let accuracy = count_errors(&frame, &decided(&frame, rule));
@@ -162,7 +162,7 @@ fn stricter_rules_reuse_less_and_wrong_less() {
 }
 
 #[test]
-fn a_near_surface_stretched_in_the_right_eye_hides_what_is_behind_it() {
+fn a_near_surface_wider_in_the_right_eye_hides_surfaces_behind_it() {
     // A slanted rectangle in front of a wall that appears wider to the right eye.
     let mut scene = wall(9.0, [40.0, 40.0], 0.0, 1);
     let (near, far) = (-0.4, -1.6);
@@ -194,7 +194,7 @@ fn a_near_surface_stretched_in_the_right_eye_hides_what_is_behind_it() {
 }
 
 #[test]
-fn mirrored_scenes_reuse_alike_from_the_mirrored_eye() {
+fn mirrored_scenes_have_mirrored_reuse() {
     // Mirroring the scene and swapping the eyes must mirror the decisions.
     let scene = room();
     let mirrored: Vec<Placed> = scene
@@ -245,7 +245,7 @@ fn a_material_with_holes_is_never_reused_under_opaque() {
 }
 
 #[test]
-fn tests_against_whole_rows_find_the_arrivals_of_parallel_eyes() {
+fn tests_against_whole_rows_find_all_candidates_of_parallel_eyes() {
     let frame = frame(&room(), View::default());
     let arrived = reproject(&frame);
     let width = frame.size_px[0] as usize;

@@ -44,7 +44,7 @@ fn room() -> Vec<Placed> {
 }
 
 #[test]
-fn with_all_reused_the_units_trace_the_left_eye_only() {
+fn with_full_reuse_the_units_trace_only_the_left_eye() {
     let frame = all_reused();
     let config = SgrtConfig::default();
     let e = compared(&frame, "none", Reuse::Shadow, &config);
@@ -57,7 +57,7 @@ fn with_all_reused_the_units_trace_the_left_eye_only() {
 }
 
 #[test]
-fn without_added_kernels_half_the_rays_are_twice_the_performance() {
+fn without_added_kernels_half_the_rays_double_the_performance() {
     let frame = all_reused();
     let mut config = SgrtConfig::default();
     config.srp.reproject_cycles = 0.0;
@@ -84,7 +84,7 @@ fn a_core_bound_frame_gains_nothing_from_fewer_rays_in_the_units() {
 }
 
 #[test]
-fn nothing_reused_costs_the_reference_and_the_added_kernels() {
+fn without_reuse_the_cost_is_the_reference_plus_the_added_kernels() {
     let frame = frame(&room(), View::default());
     let config = SgrtConfig::default();
     let mut decisions = decisions(&frame, "none");
@@ -99,7 +99,7 @@ fn nothing_reused_costs_the_reference_and_the_added_kernels() {
 }
 
 #[test]
-fn each_level_of_reuse_leaves_less_to_do() {
+fn each_level_of_reuse_reduces_the_work() {
     let frame = frame(&room(), View::default());
     let config = SgrtConfig::default();
     let runs = Reuse::ALL.map(|reuse| compared(&frame, "none", reuse, &config).reprojected);
@@ -118,7 +118,7 @@ fn the_tile_buffer_saves_dram_traffic_and_energy() {
 }
 
 #[test]
-fn detection_moves_the_bytes_that_its_rule_reads() {
+fn detection_traffic_equals_the_bytes_that_its_rule_reads() {
     let frame = frame(&room(), View::default());
     let of = |rule| {
         let e = compared(&frame, rule, Reuse::Primary, &SgrtConfig::default());
@@ -137,7 +137,7 @@ fn detection_moves_the_bytes_that_its_rule_reads() {
 }
 
 #[test]
-fn without_bandwidth_time_is_the_bytes_that_energy_is_charged_for() {
+fn a_bandwidth_bound_frame_takes_the_time_of_its_dram_bytes() {
     let frame = frame(&room(), View::default());
     let mut config = SgrtConfig::default();
     config.memory.bandwidth_gb_s = 0.001;
@@ -170,7 +170,7 @@ fn a_wide_node_is_not_charged_as_a_step_of_two_boxes() {
 }
 
 #[test]
-fn eyes_that_need_more_rows_pay_for_them() {
+fn eyes_that_need_more_rows_have_more_traffic() {
     let of = |cant_deg| {
         let view = View {
             cant_deg,

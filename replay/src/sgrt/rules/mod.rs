@@ -35,7 +35,7 @@ pub static RULES: [&RuleKind; 8] = [
 ];
 
 /// Creates the test of a frame from its arrivals and the rule's share.
-pub type MakeTest = for<'a> fn(&'a Frame, &'a Reprojection, f32) -> Box<dyn Test + 'a>;
+pub(super) type MakeTest = for<'a> fn(&'a Frame, &'a Reprojection, f32) -> Box<dyn Test + 'a>;
 
 /// A rule of the registry.
 pub struct RuleKind {
@@ -69,7 +69,7 @@ pub trait Test: Sync {
 }
 
 /// Default depth share of rules that take one.
-pub const DEFAULT_DEPTH_SHARE: f32 = 0.02;
+pub(super) const DEFAULT_DEPTH_SHARE: f32 = 0.02;
 
 /// The rules of error detection: a combination of [`RULES`], each at most once. The empty one
 /// reuses every arrival.
@@ -231,7 +231,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_rule_prints_as_it_is_written() {
+    fn a_rule_prints_in_the_form_that_it_is_parsed_from() {
         for text in [
             "none",
             "depth=0.05+object",
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn every_rule_stands_in_the_help_and_in_the_documentation() {
+    fn every_rule_is_in_the_help_and_in_the_documentation() {
         let page = include_str!("../../../../docs/models/reprojection-rules.md");
         for kind in RULES {
             assert!(help().contains(kind.title), "{}", kind.name);

@@ -17,7 +17,7 @@ fn batch(rays: u64, steps: u64, tests: u64) -> BatchWork {
 }
 
 #[test]
-fn steps_over_pipelines_is_the_time_of_a_traversal_bound_batch() {
+fn a_traversal_bound_batch_takes_steps_over_pipelines() {
     let config = SgrtConfig::default();
     let c = cycles(&batch(100, 64_000, 100), &Misses::default(), &config);
     let pipelines = f64::from(config.tni.units * config.tni.trv_pipelines);
@@ -42,7 +42,7 @@ fn twice_the_units_halve_everything() {
 }
 
 #[test]
-fn a_wide_step_takes_its_own_cycles() {
+fn a_wide_step_takes_its_configured_cycles() {
     let config = SgrtConfig::default();
     let of = |tree| super::cycles(&batch(10, 64_000, 0), &Misses::default(), tree, &config);
     let (narrow, wide) = (of(TraversalKind::Bvh2), of(TraversalKind::Bvh8));

@@ -242,7 +242,7 @@ mod tests {
 
         /// Lines are shared within bundles and between bundles of equal and different cells.
         #[test]
-        fn segments_say_of_each_line_who_uses_it_and_in_which_order(
+        fn segments_list_the_users_of_each_line_in_order(
             quads in prop::collection::vec(bundles(), 1..4),
         ) {
             // Starts near the largest merge number, so that numbers wrap around.

@@ -156,7 +156,7 @@ mod tests {
 
     /// Compares texels of any size with those of a division, including coordinates at the ends of the range.
     #[test]
-    fn shifts_are_divisions_whatever_the_extent() {
+    fn shifts_equal_divisions_for_every_extent() {
         let bytes: Vec<u32> = (0..8).collect();
         let coordinates = [i32::MIN, -1_234_567_891, -1, 0];
         for bits in 3..46 {

@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn only_equal_neighbours_are_repeats() {
+    fn only_equal_consecutive_footprints_are_repeats() {
         let footprints = [[1, 2, 1, 2], [1, 2, 1, 2], [2, 1, 2, 1], [1, 2, 1, 2]];
         for (count, runs) in [
             (0, &[][..]),

@@ -6,7 +6,7 @@ use formats::footprint::{Footprint, footprints};
 use formats::textrace::{LodRule, QuadRecord, Sample};
 use formats::texture::{Sampler, Texture, Wrap};
 
-/// What the reference needs to know of a sample.
+/// Properties of a sample that the reference needs.
 #[derive(Debug)]
 pub(super) struct General {
     pub texture: Texture,
@@ -16,7 +16,7 @@ pub(super) struct General {
 }
 
 impl General {
-    /// The fast path does not know such samples.
+    /// True for samples that the fast path does not support.
     pub fn is_needed(sample: &Sample, sampler: &Sampler) -> bool {
         sample.level.rule != LodRule::Derivatives
             || sample.level.operands
@@ -43,7 +43,7 @@ impl Footprints {
             let base = layer + u64::from(level.base_bytes + kind.skew_bytes);
             let ([x0, x1], [y0, y1]) =
                 (level.u.bytes_of(footprint.i), level.v.bytes_of(footprint.j));
-            // Fewer than 2^32 lines were made sure of.
+            // The layout has fewer than 2^32 lines, as checked before.
             let line = |x: u32, y: u32| ((base + u64::from(x + y)) >> self.line_shift) as u32;
             // A bundle holds ascending lanes of one level.
             let fits = out.last().is_some_and(|bundle| {

@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 /// The texture of a footprint.
 #[derive(Clone, Copy, Debug)]
-pub struct SampleRef {
+pub(super) struct SampleRef {
     /// Origin of the relative lines.
     pub base_line: u32,
     /// Index into the texture table.

@@ -31,7 +31,7 @@ struct Counted {
     latency: f64,
 }
 
-/// Xorshift64*, which gives the same streams on every machine.
+/// Xorshift64*: the streams are the same on every machine.
 struct Random(u64);
 
 impl Random {
@@ -47,19 +47,19 @@ impl Random {
 const BURSTS: u32 = 1 << 24;
 
 /// Sequential bursts, one read every `clocks` clocks.
-fn follow(clocks: u64) -> Vec<Request> {
+fn sequential_reads(clocks: u64) -> Vec<Request> {
     (0..READS as u32)
         .map(|i| (i, clocks * u64::from(i), false))
         .collect()
 }
 
 fn sequential() -> Vec<Request> {
-    follow(10)
+    sequential_reads(10)
 }
 
 /// Close to the 6 clocks between reads of a bank group, so the queue after a refresh takes long to drain.
 fn backlog() -> Vec<Request> {
-    follow(8)
+    sequential_reads(8)
 }
 
 /// Random bursts, one read every 16 clocks.
@@ -112,7 +112,7 @@ fn random_writes() -> Vec<Request> {
         .collect()
 }
 
-fn ours(reads: &[Request]) -> Counted {
+fn simulate_parallax(reads: &[Request]) -> Counted {
     let config = DramConfig {
         preset: DramPreset::Ddr4,
         channels: 1,
@@ -136,7 +136,7 @@ fn ours(reads: &[Request]) -> Counted {
     }
 }
 
-fn theirs(reads: &[Request], name: &str) -> Counted {
+fn simulate_ramulator(reads: &[Request], name: &str) -> Counted {
     let folder = std::env::temp_dir().join(format!("ramulator-peer-{}-{name}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a temporary folder");
     let (config, stats) = (folder.join("ddr4.cfg"), folder.join("stats"));
@@ -200,7 +200,7 @@ const UNBOUND: &str = "backlog";
 
 /// Runs the peer in its own process, because its statistics are global and a second simulation would
 /// overwrite them.
-fn theirs_apart(name: &str) -> Counted {
+fn run_peer_process(name: &str) -> Counted {
     let program = std::env::current_exe().expect("this program's path");
     let output = Command::new(program).arg(name).output().expect("a process");
     let text = String::from_utf8_lossy(&output.stdout);
@@ -219,7 +219,7 @@ fn theirs_apart(name: &str) -> Counted {
 fn main() -> ExitCode {
     if let Some(wanted) = std::env::args().nth(1) {
         for (name, stream) in STREAMS.iter().filter(|(name, _)| *name == wanted) {
-            let found = theirs(&stream(), name);
+            let found = simulate_ramulator(&stream(), name);
             println!("{} {}", found.row_hits, found.latency);
         }
         return ExitCode::SUCCESS;
@@ -231,7 +231,7 @@ fn main() -> ExitCode {
     let mut is_held = true;
     for (name, stream) in STREAMS {
         let reads = stream();
-        let (ours, theirs) = (ours(&reads), theirs_apart(name));
+        let (ours, theirs) = (simulate_parallax(&reads), run_peer_process(name));
         let hits_apart = 100.0 * (ours.row_hits - theirs.row_hits) / reads.len() as f64;
         let latency_apart = 100.0 * (ours.latency / theirs.latency - 1.0);
         is_held &= name == UNBOUND || (hits_apart.abs() <= 1.0 && latency_apart.abs() <= 3.0);

@@ -1,11 +1,11 @@
-//! A Vulkan device, and the least that is needed to make buffers and images on it.
+//! A Vulkan device with the functions that the program needs for buffers and images.
 
 use ash::{Device, Entry, Instance, vk};
 
-/// What everything here can fail with.
+/// Result with the error as text.
 pub type Result<T> = std::result::Result<T, String>;
 
-/// Turns the driver's error into text.
+/// Converts the driver's error to text.
 pub fn checked<T>(what: &str, result: ash::prelude::VkResult<T>) -> Result<T> {
     result.map_err(|error| format!("{what}: {error}"))
 }
@@ -19,21 +19,21 @@ pub struct Gpu {
     memory: vk::PhysicalDeviceMemoryProperties,
 }
 
-/// A buffer that the processor writes and reads.
+/// A buffer that the CPU writes and reads.
 pub struct Buffer {
     pub handle: vk::Buffer,
     pub memory: vk::DeviceMemory,
     pub bytes: u64,
 }
 
-/// An image and a view of all of it.
+/// An image and a view of the whole image.
 #[derive(Clone, Copy)]
 pub struct Image {
     pub handle: vk::Image,
     pub view: vk::ImageView,
 }
 
-/// What an image is for.
+/// Properties of an image.
 pub struct ImageKind {
     pub format: vk::Format,
     pub size: [u32; 3],
@@ -106,7 +106,7 @@ impl Gpu {
         })
     }
 
-    /// Makes a buffer.
+    /// Creates a buffer.
     pub fn buffer(&self, bytes: u64, usage: vk::BufferUsageFlags) -> Result<Buffer> {
         let info = vk::BufferCreateInfo::default().size(bytes).usage(usage);
         // SAFETY: the device is open, and the memory is the buffer's alone.
@@ -128,7 +128,7 @@ impl Gpu {
         }
     }
 
-    /// Makes a buffer that holds some bytes.
+    /// Creates a buffer with this content.
     pub fn buffer_of(&self, content: &[u8], usage: vk::BufferUsageFlags) -> Result<Buffer> {
         let buffer = self.buffer(content.len() as u64, usage)?;
         self.write(&buffer, content)?;
@@ -157,7 +157,7 @@ impl Gpu {
         }
     }
 
-    /// Makes an image.
+    /// Creates an image.
     pub fn image(&self, kind: &ImageKind) -> Result<Image> {
         let [width, height, depth] = kind.size;
         let cube = kind.view == vk::ImageViewType::CUBE;
@@ -231,7 +231,7 @@ impl Gpu {
     }
 }
 
-/// All levels and layers of an image.
+/// The subresource range of all levels and layers of an image.
 pub fn all_of(format: vk::Format) -> vk::ImageSubresourceRange {
     let aspect_mask = match format {
         vk::Format::D32_SFLOAT => vk::ImageAspectFlags::DEPTH,

@@ -1,7 +1,7 @@
 //! A small Vulkan program that renders a stereo picture, for the tests of `tracegen app`.
 //!
-//! Every texel holds its own coordinates, level and layer, and the filter is nearest: so the picture tells of each pixel
-//! which texel it shows. Objects differ in how their shaders sample.
+//! Every texel holds its own coordinates, level and layer, and the filter is nearest, so the colour of each
+//! pixel identifies the texel that it shows. The objects differ in how their shaders sample.
 //!
 //!     vulkan_program [--stereo halves|targets|twice|multiview|mono] [--objects NAME,NAME...] [--frames N]
 //!         [--size WIDTHxHEIGHT] [--picture FILE] [--end crash|early|fork|hang]
@@ -21,19 +21,19 @@ use std::process::ExitCode;
 /// How both eyes are rendered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stereo {
-    /// Into the halves of one picture, in one pass.
+    /// Into the halves of one picture, in one render pass.
     Halves,
-    /// Into a target each.
+    /// Into one target per eye.
     Targets,
     /// Into one target, one after the other.
     Twice,
     /// Into two layers by one draw.
     Multiview,
-    /// One eye alone.
+    /// Only one eye.
     Mono,
 }
 
-/// What the program does.
+/// Command-line options.
 pub struct Options {
     stereo: Stereo,
     objects: Vec<&'static objects::Object>,

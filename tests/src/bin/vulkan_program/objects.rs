@@ -1,4 +1,4 @@
-//! The objects, by how their shaders sample.
+//! The objects, which differ in how their shaders sample.
 
 /// An object: a box or the floor, and the body of its fragment shader.
 pub struct Object {
@@ -16,7 +16,7 @@ const fn object(name: &'static str, body: &'static str) -> Object {
 pub const OBJECTS: &[Object] = &[
     object("plain", "return textureSample(flat, nearest, in.uv);"),
     object(
-        // Two textures at the same coordinates; the second one shows.
+        // Two textures at the same coordinates; only the second one is visible.
         "pair",
         "let unseen = textureSample(other, nearest, in.uv);
         return textureSample(flat, nearest, in.uv) + unseen * 0.0;",
@@ -62,7 +62,7 @@ pub const OBJECTS: &[Object] = &[
         return color;",
     ),
     object(
-        // The last iteration shows.
+        // Only the last iteration is visible.
         "loop",
         "var color = vec4(0.0);
         for (var i = 0; i < 1 + i32(3.0 * fract(in.uv.x)); i++) {

@@ -1,4 +1,4 @@
-//! Pipelines, one an object.
+//! Pipelines, one per object.
 
 use crate::gpu::{Gpu, Result, checked};
 use crate::scene::Vertex;
@@ -13,7 +13,7 @@ pub fn pipeline(
 ) -> Result<vk::Pipeline> {
     let device = &gpu.device;
     let info = vk::ShaderModuleCreateInfo::default().code(words);
-    // SAFETY: the device is open; the module is needed until the pipeline is made.
+    // SAFETY: the device is open, and the module exists until the pipeline is created.
     unsafe {
         let module = checked("a shader module", device.create_shader_module(&info, None))?;
         let stage = |stage, name| {

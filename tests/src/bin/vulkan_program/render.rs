@@ -7,14 +7,14 @@ use crate::targets::{Target, render_pass, targets};
 use crate::{Options, Stereo, scene, shaders};
 use ash::{Device, vk};
 
-/// What one object needs.
+/// Pipeline and vertices of an object.
 struct Draw {
     pipeline: vk::Pipeline,
     vertices: Buffer,
     count: u32,
 }
 
-/// Renders the frames that are asked for.
+/// Renders the requested frames.
 pub fn run(options: &Options) -> Result<()> {
     if options.end.as_deref() == Some("hang") {
         // A program that never renders.
@@ -49,7 +49,7 @@ pub fn run(options: &Options) -> Result<()> {
             }
         })?;
         if let Some(end) = options.end.as_deref().filter(|_| frame == 1) {
-            end_otherwise(end);
+            end_abnormally(end);
         }
     }
     if let Some(path) = &options.picture {
@@ -60,8 +60,8 @@ pub fn run(options: &Options) -> Result<()> {
     Ok(())
 }
 
-/// Ends as programs should not.
-fn end_otherwise(how: &str) {
+/// Ends the program in one of several wrong ways.
+fn end_abnormally(how: &str) {
     match how {
         "crash" => std::process::abort(),
         "early" => std::process::exit(3),
@@ -75,7 +75,7 @@ unsafe extern "C" {
     fn _exit(status: i32) -> !;
 }
 
-/// Starts a copy of this process that ends at once, as programs do that look for others.
+/// Starts a copy of this process that ends at once. Some programs start copies to look for other programs.
 fn fork_once() {
     // SAFETY: the copy calls nothing but `_exit`, which is allowed after a fork of a process with threads.
     unsafe {
@@ -154,7 +154,7 @@ fn draw_target(
     }
 }
 
-/// Copies what a target shows to where the pictures of its views stand: row by row, the left picture first.
+/// Copies a target into the buffer of pictures, row by row, with the left picture first.
 fn copy(
     device: &Device,
     options: &Options,
@@ -192,7 +192,7 @@ fn copy(
         Stereo::Mono => vec![region(0, 0, 0)],
     };
     let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
-    // The next pass may render into the same image.
+    // The next render pass may render into the same image.
     let barrier = vk::MemoryBarrier::default()
         .src_access_mask(vk::AccessFlags::TRANSFER_READ)
         .dst_access_mask(vk::AccessFlags::COLOR_ATTACHMENT_WRITE);

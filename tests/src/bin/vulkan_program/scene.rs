@@ -1,6 +1,6 @@
-//! Where the objects are, and the eyes.
+//! Positions of the objects and of the eyes.
 
-/// Place, texture coordinates and direction of a vertex.
+/// Position, texture coordinates and direction of a vertex.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Vertex {
@@ -9,8 +9,8 @@ pub struct Vertex {
     direction: [f32; 3],
 }
 
-/// Triangles of the object at a position among so many: a floor for the first one, boxes for the others, which stand on
-/// it in two rows and overlap.
+/// Triangles of the object at a position of `count` positions. The first object is a floor. The others are
+/// boxes, which stand on it in two rows and overlap.
 pub fn triangles(position: usize, count: usize) -> Vec<Vertex> {
     if position == 0 {
         let corner = |x: f32, z: f32| Vertex {
@@ -37,7 +37,7 @@ pub fn triangles(position: usize, count: usize) -> Vec<Vertex> {
                 at[axis] = side;
                 at[(axis + 1) % 3] = u;
                 at[(axis + 2) % 3] = v;
-                // Turned a little, so that three sides show.
+                // Rotated, so that three sides are visible.
                 let (sin, cos) = 0.6_f32.sin_cos();
                 let turned = [at[0] * cos + at[2] * sin, at[1], at[2] * cos - at[0] * sin];
                 Vertex {
@@ -54,7 +54,8 @@ pub fn triangles(position: usize, count: usize) -> Vec<Vertex> {
     vertices
 }
 
-/// Clip from world of the left and the right eye in a frame, column by column: the head moves a little.
+/// World-to-clip matrix of the left and the right eye in a frame, column by column. The head moves a little
+/// from frame to frame.
 pub fn eyes(frame: u32, aspect: f32) -> [[[f32; 4]; 4]; 2] {
     [-0.1_f32, 0.1].map(|x| {
         let (near, far) = (0.1_f32, 50.0_f32);

@@ -5,7 +5,7 @@ use crate::targets::COLOR;
 use crate::textures::{EDGE, LAYERS, LEVELS, texels};
 use ash::vk;
 
-/// The eye's number and a scale.
+/// Size of the push constants: the eye's number and a scale.
 pub const CONSTANT_BYTES: u32 = 8;
 
 /// Descriptor sets and the layout of all pipelines.
@@ -124,12 +124,12 @@ fn write(gpu: &Gpu, sets: [vk::DescriptorSet; 2], eyes: &Buffer) -> Result<()> {
             .image_info(info);
         writes.push(write);
     }
-    // SAFETY: the sets are in use nowhere.
+    // SAFETY: the sets are not in use.
     unsafe { device.update_descriptor_sets(&writes, &[]) };
     Ok(())
 }
 
-/// The textures: flat, another one, an array, a cube and a volume.
+/// Creates the textures: two flat ones, an array, a cube and a volume.
 fn images(gpu: &Gpu) -> Result<[Image; 5]> {
     let kind = |view, layers, depth, levels| ImageKind {
         format: COLOR,
@@ -194,7 +194,7 @@ fn upload(gpu: &Gpu, kind: &ImageKind) -> Result<Image> {
         let (none, write) = (vk::AccessFlags::empty(), vk::AccessFlags::TRANSFER_WRITE);
         let filled = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
         barrier(vk::ImageLayout::UNDEFINED, filled, none, write);
-        // SAFETY: likewise; the buffer holds what the regions say.
+        // SAFETY: as above, and the buffer holds the data of all regions.
         unsafe {
             device.cmd_copy_buffer_to_image(buffer, from.handle, image.handle, filled, &regions);
         }

@@ -1,9 +1,9 @@
-//! Shaders: WGSL to SPIR-V.
+//! Compiles the shaders from WGSL to SPIR-V.
 
 use crate::Stereo;
 use crate::objects::Object;
 
-/// Inputs, and what every fragment shader may sample.
+/// Inputs and textures of every fragment shader.
 const HEAD: &str = "
 struct Eyes { clip_from_world: array<mat4x4<f32>, 2> }
 @group(0) @binding(0) var<uniform> eyes: Eyes;
@@ -23,7 +23,7 @@ struct Fragment {
 }
 ";
 
-/// SPIR-V of the vertex shader and of an object's fragment shader, entry points `vertex` and `fragment`.
+/// SPIR-V of an object's vertex and fragment shader, with entry points `vertex` and `fragment`.
 pub fn words(object: &Object, stereo: Stereo) -> Result<Vec<u32>, String> {
     let eye = match stereo {
         Stereo::Multiview => "@builtin(view_index) eye: i32",

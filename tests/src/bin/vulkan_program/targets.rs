@@ -1,4 +1,4 @@
-//! What is rendered into.
+//! Render targets.
 
 use crate::gpu::{Gpu, Image, ImageKind, Result, checked};
 use crate::{Options, Stereo};
@@ -7,7 +7,7 @@ use ash::vk;
 pub const COLOR: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 
-/// A target and what is rendered into it.
+/// A target and its views.
 pub struct Target {
     pub framebuffer: vk::Framebuffer,
     pub color: Image,

@@ -6,17 +6,17 @@ use std::ffi::c_void;
 /// `VkNegotiateLayerInterface`.
 #[repr(C)]
 pub struct NegotiateLayerInterface {
-    /// 1: this structure.
+    /// Type of this structure, 1.
     pub s_type: i32,
-    /// None.
+    /// Null.
     pub p_next: *mut c_void,
     /// Version of the interface: requested, then supported.
     pub version: u32,
-    /// Ours.
+    /// This layer's function.
     pub get_instance_proc_addr: Option<vk::PFN_vkGetInstanceProcAddr>,
-    /// Ours.
+    /// This layer's function.
     pub get_device_proc_addr: Option<vk::PFN_vkGetDeviceProcAddr>,
-    /// None.
+    /// Null.
     pub get_physical_device_proc_addr: Option<unsafe extern "system" fn()>,
 }
 
@@ -41,16 +41,16 @@ pub(super) struct DeviceLink {
 struct LayerCreateInfo<T> {
     s_type: vk::StructureType,
     p_next: *mut c_void,
-    /// 0: a link follows.
+    /// 0 if a link follows.
     function: i32,
     link: *mut T,
 }
 
-/// A link of a chain, with the next one.
+/// A link of a chain of creation structures.
 pub(super) trait Link {
-    /// Type of the structure that holds it.
+    /// Type of the structure that contains the link.
     const S_TYPE: vk::StructureType;
-    /// The next layer's link.
+    /// The link of the next layer.
     fn next(&self) -> *mut Self;
 }
 
@@ -68,7 +68,7 @@ impl Link for DeviceLink {
     }
 }
 
-/// Takes this layer's link out of a creation's chain.
+/// Removes this layer's link from the chain of a creation call and returns it.
 ///
 /// # Safety
 /// `p_next` is the chain that a loader passes to a layer.
@@ -88,7 +88,7 @@ pub(super) unsafe fn take_link<'a, T: Link>(p_next: *const c_void) -> Option<&'a
     }
 }
 
-/// A structure of a chain.
+/// Finds a structure in a chain by its type.
 ///
 /// # Safety
 /// `p_next` is a valid chain.
@@ -106,7 +106,7 @@ pub(super) unsafe fn find<'a, T: vk::TaggedStructure>(p_next: *const c_void) -> 
     None
 }
 
-/// Elements at a pointer from a program; none if it is null.
+/// Elements at a pointer from a program; empty if the pointer is null.
 ///
 /// # Safety
 /// `first` is null or points to this number of elements.

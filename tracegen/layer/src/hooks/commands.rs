@@ -1,4 +1,4 @@
-//! Hooks of command buffers: what is bound, dynamic state, queries.
+//! Hooks of command buffers for bound objects, dynamic state and queries.
 
 use super::api::slice;
 use super::device::Device;
@@ -41,7 +41,7 @@ pub(super) unsafe extern "system" fn cmd_bind_pipeline(
     point: vk::PipelineBindPoint,
     pipeline: vk::Pipeline,
 ) {
-    // SAFETY: a valid call of vkCmdBindPipeline. A recording twin has the same dynamic states.
+    // SAFETY: a valid call of vkCmdBindPipeline. The recording pipeline has the same dynamic states.
     unsafe {
         let known = Device::of(buffer);
         let mut bound = pipeline;
@@ -80,10 +80,10 @@ pub(super) unsafe extern "system" fn cmd_execute_commands(
     }
 }
 
-/// Changes what a command buffer is known to have set.
+/// Changes the tracked state of a command buffer.
 ///
 /// # Safety
-/// A command buffer that is recorded.
+/// The command buffer is being recorded.
 unsafe fn set(
     buffer: vk::CommandBuffer,
     change: impl FnOnce(&mut CommandState),
@@ -94,7 +94,7 @@ unsafe fn set(
     known
 }
 
-/// Hooks of commands that set a state: what they change, and the function that comes next.
+/// Hooks of commands that set a state: the change of the tracked state, and the next function.
 macro_rules! setters {
     ($($hook:ident ($($argument:ident: $kind:ty),*) $next:ident |$state:ident| $change:expr;)*) => { $(
         pub(super) unsafe extern "system" fn $hook(buffer: vk::CommandBuffer, $($argument: $kind),*) {

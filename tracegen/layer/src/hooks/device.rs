@@ -1,4 +1,4 @@
-//! Devices: what a capture keeps for each.
+//! The data that a capture keeps for each device.
 
 use super::api::{DeviceLink, take_link};
 use super::dispatch_key;
@@ -17,37 +17,37 @@ use std::ffi::CStr;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, RwLock};
 
-/// A device that is followed.
+/// A tracked device.
 pub(super) struct Device {
     pub handle: vk::Device,
     pub get_device_proc_addr: vk::PFN_vkGetDeviceProcAddr,
     pub next: Next,
     pub capture: &'static Capture,
-    /// Buffer that shaders record into; none if recording is impossible or was not requested.
+    /// Buffer that shaders record into; `None` if recording is impossible or was not requested.
     pub recorder: Option<DeviceRecorder>,
     pub queries: Option<Queries>,
     pub pictures: Option<Pictures>,
     tracker: Mutex<Tracker>,
-    /// Held while commands with requested records are executed.
+    /// Held while commands of requested frames are executed.
     pub submitting: Mutex<()>,
-    /// Swapchains, as the program created them.
+    /// Creation parameters of the program's swapchains.
     pub swapchains: Mutex<HashMap<u64, vk::SwapchainCreateInfoKHR<'static>>>,
 }
 
 /// Resources for recording on a device.
 pub(super) struct DeviceRecorder {
     pub buffer: RecordBuffer,
-    /// Offset of the draw's number among push constants.
+    /// Offset of the draw's number in the push constants.
     pub push_constant_bytes: u32,
     pub ballots: bool,
-    /// Recording shaders by module's words, entry point and number of views.
+    /// Recording shaders.
     pub shaders: Mutex<HashMap<ShaderKey, Result<RecordingShader, String>>>,
 }
 
-/// A module's words, its entry point, and whether it is for several views.
+/// Words of a module, name of its entry point, and whether it renders several views.
 pub(super) type ShaderKey = (Arc<[u32]>, String, bool);
 
-/// A shader that records.
+/// A recording shader and its module.
 #[derive(Clone)]
 pub(super) struct RecordingShader {
     pub words: Arc<[u32]>,
@@ -65,36 +65,37 @@ impl DeviceRecorder {
     }
 }
 
-// SAFETY: the swapchains' descriptions have pointers, which are never followed.
+// SAFETY: the pointers in the swapchains' descriptions are never dereferenced.
 unsafe impl Send for Device {}
-// SAFETY: likewise; all that changes is behind locks.
+// SAFETY: as above; all mutable data are behind locks.
 unsafe impl Sync for Device {}
 
-/// Devices of the process so far.
+/// Number of devices that the process has created.
 static NUMBER: AtomicU32 = AtomicU32::new(0);
 
 static DEVICES: LazyLock<RwLock<HashMap<usize, Arc<Device>>>> = LazyLock::new(RwLock::default);
 
-/// Lanes of a subgroup at which ballots are known to be sound. With shorter vectors those of Mesa 22.3 corrupt memory.
+/// Smallest number of lanes in a subgroup at which ballots are reliable. With narrower vectors, ballots of
+/// Mesa 22.3 corrupt memory.
 const SUBGROUP_LANES: u32 = 8;
 
 impl Device {
     /// The device of a dispatchable handle.
     ///
     /// # Safety
-    /// A device, queue or command buffer that is valid and of a device that is followed.
+    /// A valid device, queue or command buffer of a tracked device.
     pub unsafe fn of<H: vk::Handle>(handle: H) -> Arc<Self> {
         // SAFETY: as the caller promises.
         let key = unsafe { dispatch_key(handle) };
         let found = DEVICES.read().ok().and_then(|all| all.get(&key).cloned());
         found.unwrap_or_else(|| {
-            // A hook is only handed out for devices that are followed.
+            // The loader gets hooks only for tracked devices.
             eprintln!("parallax: an unknown Vulkan device");
             std::process::abort()
         })
     }
 
-    /// The device of a handle, if it is followed.
+    /// The device of a handle, if it is tracked.
     ///
     /// # Safety
     /// A valid dispatchable handle.
@@ -118,11 +119,11 @@ impl Device {
     }
 }
 
-/// Functions of devices that are not followed.
+/// Functions of untracked devices.
 static OTHERS: LazyLock<RwLock<HashMap<usize, vk::PFN_vkGetDeviceProcAddr>>> =
     LazyLock::new(RwLock::default);
 
-/// The function that looks up functions of a device that is not tracked.
+/// The function that looks up functions of an untracked device.
 pub(super) unsafe fn other(handle: vk::Device) -> Option<vk::PFN_vkGetDeviceProcAddr> {
     // SAFETY: a valid device, as the caller promises.
     let key = unsafe { dispatch_key(handle) };
@@ -158,7 +159,7 @@ pub(super) unsafe extern "system" fn create_device(
         match capture() {
             Some(capture) => {
                 let next = Next::load(|name: &CStr| get_device(handle, name.as_ptr()));
-                let followed = follow(capture, &instance, physical, handle, get_device, next);
+                let followed = track(capture, &instance, physical, handle, get_device, next);
                 if let Ok(mut all) = DEVICES.write() {
                     all.insert(key, Arc::new(followed));
                 }
@@ -173,11 +174,11 @@ pub(super) unsafe extern "system" fn create_device(
     }
 }
 
-/// Starts to follow a device.
+/// Starts to track a device.
 ///
 /// # Safety
-/// A device that was just created.
-unsafe fn follow(
+/// The device was just created.
+unsafe fn track(
     capture: &'static Capture,
     instance: &Instance,
     physical: vk::PhysicalDevice,
@@ -207,7 +208,7 @@ unsafe fn follow(
             .supported_stages
             .contains(vk::ShaderStageFlags::FRAGMENT)
         && (subgroups.supported_operations).contains(vk::SubgroupFeatureFlags::BALLOT);
-    // A record buffer is memory of the process, whose address is valid only for lavapipe.
+    // A record buffer is memory of the process. Only on lavapipe is its address a device address.
     let is_lavapipe = driver.driver_id == vk::DriverId::MESA_LLVMPIPE;
     let mut refused = (!is_lavapipe)
         .then(|| format!("{name} is not lavapipe, on which alone programs are recorded"));
@@ -234,7 +235,7 @@ unsafe fn follow(
         ballots,
     });
     let queries = (capture.settings.occlusion)
-        // SAFETY: the device is new.
+        // SAFETY: the device was just created.
         .then(|| unsafe { Queries::new(handle, &next) })
         .flatten();
     Device {

@@ -1,4 +1,4 @@
-//! Hooks of draws: each is numbered, and recorded if requested.
+//! Hooks of draws. Each draw gets a number and is recorded if requested.
 
 use super::api::slice;
 use super::device::Device;
@@ -6,34 +6,34 @@ use crate::track::{Call, CommandState, Dynamic, Pipeline};
 use ash::vk::{self, Handle};
 use std::sync::Arc;
 
-/// Whether draws of a command buffer may be requested: it is executed in a requested frame, or may be
-/// executed at any time.
+/// Whether draws of a command buffer may belong to a requested frame. A command buffer that may be submitted
+/// several times can be executed in any later frame.
 fn is_wanted(known: &Device, state: &CommandState) -> bool {
     let capture = known.capture;
     !capture.is_over() && (!state.one_time() || capture.may_want_commands())
 }
 
-/// Draws of a command buffer record.
+/// Whether draws of a command buffer are recorded.
 pub(super) fn records(known: &Device, state: &CommandState) -> bool {
     known.recorder.is_some() && is_wanted(known, state)
 }
 
-/// Parameters of a draw call.
+/// How a draw is recorded and counted.
 struct Plan {
     number: u32,
-    /// The program's bound pipeline, and its handle.
+    /// Pipeline that the program has bound, and its handle.
     pipeline: Arc<Pipeline>,
     handle: vk::Pipeline,
     dynamic: Dynamic,
-    /// Recorded by an additional draw before the program's.
+    /// Whether an additional draw before the program's records it.
     twice: bool,
-    /// Recorded by the program's draw.
+    /// Whether the program's own draw records it.
     once: bool,
-    /// Counted by a query.
+    /// Whether a query counts its samples.
     counted: bool,
 }
 
-/// Tracks the draw; `None` if it is not relevant.
+/// Tracks the draw; `None` if it is not recorded or listed.
 fn plan(known: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> {
     let tracker = &mut *known.tracker();
     let state = tracker.commands.get(buffer.as_raw())?;
@@ -43,7 +43,7 @@ fn plan(known: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> 
     let pipeline = Arc::clone(state.pipeline()?);
     let handle = state.pipeline_handle();
     let dynamic = state.dynamic.clone();
-    // A draw that comes twice would be counted twice by the program itself.
+    // The program's own query would also count the additional draw.
     let counts_itself = state.active_queries > 0;
     let mut info = tracker.draw(buffer.as_raw(), call)?;
     let twin = pipeline.recorded.as_ref();
@@ -66,11 +66,11 @@ fn plan(known: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> 
     Some(plan)
 }
 
-/// Submits a draw.
+/// Submits a draw, with an additional one if needed.
 ///
 /// # Safety
-/// A command buffer that is recorded; `draw` records the draw into it.
-unsafe fn carry_out(buffer: vk::CommandBuffer, call: &Call, draw: impl Fn(&Device)) {
+/// The command buffer is being recorded, and `draw` records the draw into it.
+unsafe fn submit_draw(buffer: vk::CommandBuffer, call: &Call, draw: impl Fn(&Device)) {
     // SAFETY: as the caller promises.
     let known = &*unsafe { Device::of(buffer) };
     let Some(plan) = plan(known, buffer, call) else {
@@ -78,8 +78,9 @@ unsafe fn carry_out(buffer: vk::CommandBuffer, call: &Call, draw: impl Fn(&Devic
         return;
     };
     let next = &known.next;
-    // SAFETY: the program's draw is valid where it stands; the recording pipeline differs in its fragment shader and in
-    // what it writes, and the program's pipeline is bound again with the dynamic states that the other one fixed.
+    // SAFETY: the program's draw is valid at this point. The recording pipeline differs only in its fragment
+    // shader and its writes. Afterwards the program's pipeline is bound again, with the dynamic states that
+    // the recording pipeline fixed.
     unsafe {
         let begin = || {
             if let Some(queries) = known.queries.as_ref().filter(|_| plan.counted) {
@@ -111,15 +112,15 @@ unsafe fn carry_out(buffer: vk::CommandBuffer, call: &Call, draw: impl Fn(&Devic
     }
 }
 
-/// Tells the shader the draw's number.
+/// Sets the push constant with the draw's number.
 ///
 /// # Safety
-/// A command buffer that is recorded.
+/// The command buffer is being recorded.
 unsafe fn push_number(known: &Device, buffer: vk::CommandBuffer, plan: &Plan) {
     let Some(recorder) = &known.recorder else {
         return;
     };
-    // SAFETY: the layout has room for the number at this offset, and lives as long as its pipelines.
+    // SAFETY: the layout has room for the number at this offset and lives as long as its pipelines.
     unsafe {
         (known.next.cmd_push_constants)(
             buffer,
@@ -132,10 +133,10 @@ unsafe fn push_number(known: &Device, buffer: vk::CommandBuffer, plan: &Plan) {
     }
 }
 
-/// Sets dynamic states again that a pipeline fixed.
+/// Sets the dynamic states that the recording pipeline fixed.
 ///
 /// # Safety
-/// A command buffer that is recorded.
+/// The command buffer is being recorded.
 unsafe fn restore(
     known: &Device,
     buffer: vk::CommandBuffer,
@@ -143,7 +144,7 @@ unsafe fn restore(
     fixed: &[vk::DynamicState],
 ) {
     let next = &known.next;
-    // SAFETY: the program set these states itself before.
+    // SAFETY: the program has set these states with the same values.
     unsafe {
         for state in fixed {
             match *state {
@@ -181,9 +182,9 @@ unsafe fn restore(
     }
 }
 
-/// Instances of a draw share the numbers of its primitives.
+/// Caveat for a draw with several instances.
 const INSTANCES: &str = "instances share the numbers of primitives";
-/// Draws of one command share them, too.
+/// Caveat for an indirect draw command, whose draws share one number.
 const INDIRECT: &str = "draws that the device chooses share a number";
 
 fn direct(vertices: u32, instances: u32) -> Call {
@@ -209,7 +210,7 @@ macro_rules! draws {
         pub(super) unsafe extern "system" fn $hook(buffer: vk::CommandBuffer, $($argument: $kind),*) {
             // SAFETY: a valid call of the draw command.
             unsafe {
-                carry_out(buffer, &$call, |known| (known.next.$hook)(buffer, $($argument),*));
+                submit_draw(buffer, &$call, |known| (known.next.$hook)(buffer, $($argument),*));
             }
         }
     )* };
@@ -227,10 +228,10 @@ draws! {
     cmd_draw_indirect_byte_count(instances: u32, first_instance: u32, counts: vk::Buffer, count_at: vk::DeviceSize, counter_offset: u32, stride: u32) indirect();
 }
 
-/// Reads the `number`th entry of a list with a distance between entries.
+/// Reads entry `number` of a list with a stride.
 ///
 /// # Safety
-/// The list has it.
+/// The list has this entry.
 unsafe fn entry<T: Copy>(first: *const T, number: u32, stride: u32) -> T {
     let at = number as usize * stride as usize;
     // SAFETY: as the caller promises; entries need not be aligned.
@@ -248,11 +249,12 @@ pub(super) unsafe extern "system" fn cmd_draw_multi(
     // SAFETY: a valid call of vkCmdDrawMultiEXT.
     unsafe {
         let multi = Device::of(buffer).next.cmd_draw_multi;
-        // One by one, so that each has a number; a shader sees the number of the draw in the command as 0.
+        // One draw per entry, so that each has a number. Shaders therefore see 0 as the number of the draw in
+        // the command.
         for number in 0..count {
             let draw = entry(draws, number, stride);
             let call = direct(draw.vertex_count, instances);
-            carry_out(buffer, &call, |_| {
+            submit_draw(buffer, &call, |_| {
                 multi(buffer, 1, &draw, instances, first_instance, stride);
             });
         }
@@ -274,7 +276,7 @@ pub(super) unsafe extern "system" fn cmd_draw_multi_indexed(
         for number in 0..count {
             let draw = entry(draws, number, stride);
             let call = direct(draw.index_count, instances);
-            carry_out(buffer, &call, |_| {
+            submit_draw(buffer, &call, |_| {
                 multi(buffer, 1, &draw, instances, first_instance, stride, offset);
             });
         }

@@ -8,8 +8,8 @@ use std::collections::HashMap;
 use std::ffi::{CStr, c_char};
 use std::sync::{Arc, LazyLock, Mutex};
 
-/// The functions of an instance that come after this layer. They are looked up when it is created: later the loader
-/// hands out this layer's own.
+/// The next layer's functions for an instance. They are looked up when the instance is created, because the
+/// loader returns this layer's own functions later.
 pub(super) struct Instance {
     pub handle: vk::Instance,
     pub get_instance_proc_addr: vk::PFN_vkGetInstanceProcAddr,
@@ -21,7 +21,7 @@ pub(super) struct Instance {
 
 static INSTANCES: LazyLock<Mutex<HashMap<usize, Arc<Instance>>>> = LazyLock::new(Mutex::default);
 
-/// Extensions whose objects are not followed. Programs do without.
+/// Extensions with objects that the layer does not track. They are hidden from programs.
 const HIDDEN: [&CStr; 11] = [
     c"VK_EXT_graphics_pipeline_library",
     c"VK_KHR_pipeline_library",
@@ -36,17 +36,17 @@ const HIDDEN: [&CStr; 11] = [
     c"VK_EXT_attachment_feedback_loop_dynamic_state",
 ];
 
-/// Newest version whose functions are followed.
+/// Newest Vulkan version whose functions are tracked.
 const NEWEST: u32 = vk::API_VERSION_1_3;
 
-/// Oldest version that the capture itself needs.
+/// Oldest Vulkan version with the functions that the capture calls.
 const NEEDED: u32 = vk::API_VERSION_1_2;
 
-/// Bytes of push constants that every device has.
+/// Size of push constants that Vulkan guarantees, in bytes.
 const LEAST_PUSH_CONSTANTS: u32 = 128;
 
 impl Instance {
-    /// The instance that a handle, or one of its physical devices, belongs to.
+    /// The instance of a handle, which is an instance or one of its physical devices.
     ///
     /// # Safety
     /// A valid dispatchable handle.
@@ -56,7 +56,7 @@ impl Instance {
         lock(&INSTANCES).get(&key).cloned()
     }
 
-    /// Properties of a device, as they are.
+    /// Unchanged properties of a device.
     ///
     /// # Safety
     /// A device of this instance.
@@ -99,14 +99,14 @@ impl Instance {
     }
 }
 
-/// Offset of the draw's number among push constants of a device.
+/// Offset of the draw's number in the push constants of a device.
 pub(super) fn draw_number_offset(real_limit: u32) -> u32 {
     real_limit.saturating_sub(4)
 }
 
-/// The limit of push constants that programs see.
+/// Limit of push constants that is reported to programs.
 fn visible_limit(real_limit: u32) -> u32 {
-    // No device may have fewer than the least.
+    // No device may report less than the guaranteed size.
     draw_number_offset(real_limit).max(LEAST_PUSH_CONSTANTS)
 }
 
@@ -126,7 +126,7 @@ pub(super) unsafe extern "system" fn create_instance(
         };
         let create =
             std::mem::transmute::<unsafe extern "system" fn(), vk::PFN_vkCreateInstance>(create);
-        // Programs that request an early version would make functions unavailable that the capture requires.
+        // If the program requests an early version, functions that the capture calls would be unavailable.
         let mut application = (*info)
             .p_application_info
             .as_ref()
@@ -277,9 +277,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_draws_number_lies_behind_what_programs_are_told_of() {
+    fn the_draws_number_is_after_the_reported_push_constants() {
         assert_eq!((draw_number_offset(256), visible_limit(256)), (252, 252));
-        // This uses up the minimum that Vulkan guarantees.
+        // The number takes the last bytes of the minimum that Vulkan guarantees.
         assert_eq!((draw_number_offset(128), visible_limit(128)), (124, 128));
     }
 }

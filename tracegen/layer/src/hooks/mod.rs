@@ -1,6 +1,7 @@
-//! The functions that a program calls in place of the driver's.
+//! The functions that a program calls instead of the driver's.
 //!
-//! Each calls the function of the same name of the next layer or driver, and reports the call to the tracker.
+//! Each hook calls the function of the same name in the next layer or the driver, and reports the call to the
+//! tracker.
 
 mod api;
 mod commands;
@@ -22,12 +23,12 @@ use api::NegotiateLayerInterface;
 use ash::vk::{self, Handle};
 use std::ffi::{CStr, c_char};
 
-/// The loader's key of the object behind a dispatchable handle.
+/// Pointer that the loader stores in the object of a dispatchable handle.
 ///
 /// # Safety
 /// A valid dispatchable handle.
 unsafe fn dispatch_key<H: Handle>(handle: H) -> usize {
-    // SAFETY: such a handle points to an object that begins with the loader's pointer.
+    // SAFETY: such a handle points to an object that starts with the loader's pointer.
     unsafe { *(handle.as_raw() as *const usize) }
 }
 
@@ -37,7 +38,7 @@ const INTERFACE_VERSION: u32 = 2;
 /// Called by the loader to get the layer's entry points.
 ///
 /// # Safety
-/// A loader's call.
+/// The loader makes the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "system" fn vkNegotiateLoaderLayerInterfaceVersion(
     negotiate: *mut NegotiateLayerInterface,
@@ -63,7 +64,7 @@ macro_rules! hooks {
                 $($function => $hook as *const (),)*
                 _ => return None,
             };
-            // SAFETY: a caller that gets a function by its name casts it to its own type.
+            // SAFETY: the caller casts the function to the type of its name.
             Some(unsafe { std::mem::transmute::<*const (), unsafe extern "system" fn()>(hook) })
         }
     };
@@ -77,7 +78,7 @@ hooks! { instance_hook:
     b"vkCreateDevice" => device::create_device;
 }
 
-// Reported properties of devices change only during a capture.
+// Properties of devices are changed only during a capture.
 hooks! { physical_device_hook:
     b"vkEnumerateDeviceExtensionProperties" => instance::enumerate_device_extension_properties;
     b"vkGetPhysicalDeviceProperties" => instance::get_physical_device_properties;
@@ -208,7 +209,7 @@ unsafe extern "system" fn get_instance_proc_addr(
         if capture().is_none() {
             return next;
         }
-        // A function that is not there stays away.
+        // A function that the next layer does not have has no hook.
         let hook = physical_device_hook(function).or_else(|| device_hook(function));
         next.and(hook).or(next)
     }

@@ -1,10 +1,10 @@
-//! The functions that come after this layer.
+//! Functions of the next layer or the driver.
 
 use ash::vk;
 use std::ffi::CStr;
 
-/// What stands for a function that the next layer or driver does not have: it is never called, as a hook is only handed
-/// out in place of a function that is there.
+/// Placeholder for a function that the next layer or driver does not have. It is never called, because such a
+/// function has no hook.
 unsafe extern "system" fn missing() {
     eprintln!("parallax: a Vulkan function is missing");
     std::process::abort();
@@ -17,10 +17,10 @@ macro_rules! next_functions {
         pub(super) struct Next { $(pub $field: vk::$kind),* }
 
         impl Next {
-            /// Looks them up, each by the first of its names that is known.
+            /// Looks up the functions, each by the first of its names that exists.
             ///
             /// # Safety
-            /// `get` yields the functions of their names.
+            /// `get` returns the function of a name.
             pub unsafe fn load(get: impl Fn(&CStr) -> vk::PFN_vkVoidFunction) -> Self {
                 $(let $field = {
                     let names: &[&CStr] = &[$($name),+];

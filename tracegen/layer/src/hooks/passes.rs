@@ -147,7 +147,7 @@ pub(super) unsafe extern "system" fn destroy_framebuffer(
     }
 }
 
-/// A render pass begins.
+/// Begins to track a render pass.
 ///
 /// # Safety
 /// A valid description.
@@ -175,7 +175,7 @@ unsafe fn begin(known: &Device, buffer: vk::CommandBuffer, info: &vk::RenderPass
     enter(tracker, buffer, open);
 }
 
-/// Enters a subpass.
+/// Starts to track a subpass.
 fn enter(tracker: &mut crate::track::Tracker, buffer: vk::CommandBuffer, open: OpenPass) {
     let pass = tracker.passes.begin(
         open.pass,
@@ -198,7 +198,7 @@ fn next_subpass(known: &Device, buffer: vk::CommandBuffer) {
     }
 }
 
-/// A pass ends. Tells what it was.
+/// Ends a render pass and returns its description.
 fn end(known: &Device, buffer: vk::CommandBuffer) -> Option<Arc<PassInfo>> {
     let mut tracker = known.tracker();
     let state = tracker.commands.get_mut(buffer.as_raw());
@@ -206,10 +206,10 @@ fn end(known: &Device, buffer: vk::CommandBuffer) -> Option<Arc<PassInfo>> {
     state.pass.take()
 }
 
-/// Keeps a pass's picture, if requested.
+/// Copies the picture of a render pass, if requested.
 ///
 /// # Safety
-/// The pass has just ended in a command buffer that is recorded.
+/// The render pass has just ended, and the command buffer is being recorded.
 unsafe fn keep(known: &Device, buffer: vk::CommandBuffer, pass: Option<Arc<PassInfo>>) {
     if let (Some(pictures), Some(pass)) = (&known.pictures, pass)
         && known.capture.may_want_commands()
@@ -311,7 +311,7 @@ pub(super) unsafe extern "system" fn cmd_begin_rendering(
             let colors = slice(info.p_color_attachments, info.color_attachment_count).iter();
             let colors = colors.filter_map(attachment).collect();
             let depth = info.p_depth_attachment.as_ref().and_then(attachment);
-            // A pass that was suspended goes on.
+            // A suspended render pass continues.
             let resumes = info.flags.contains(vk::RenderingFlags::RESUMING);
             let state = tracker.commands.get_mut(buffer.as_raw());
             if !resumes || state.pass.is_none() {

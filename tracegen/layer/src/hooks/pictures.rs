@@ -1,6 +1,6 @@
-//! Small pictures of what passes render, for lists of them.
+//! Small pictures of the targets of render passes, for the list of passes.
 //!
-//! Pictures are only made on lavapipe, which executes commands one after the other and ignores image layouts.
+//! Only supported on lavapipe, which executes commands one after the other and ignores image layouts.
 
 use super::device::Device;
 use super::next::Next;
@@ -10,16 +10,16 @@ use ash::vk;
 use std::collections::HashSet;
 use std::sync::Mutex;
 
-/// Longest side.
+/// Longest side of a picture.
 const SIDE_PX: u32 = 256;
 
-/// Pictures of a device.
+/// The pictures of a device.
 #[derive(Default)]
 pub(super) struct Pictures {
     made: Mutex<Vec<PassReadback>>,
 }
 
-/// A picture of a pass.
+/// The image and the buffer for the picture of a render pass.
 struct PassReadback {
     pass: u32,
     size: [u32; 2],
@@ -27,11 +27,11 @@ struct PassReadback {
     image: vk::Image,
     buffer: vk::Buffer,
     memory: Vec<vk::DeviceMemory>,
-    /// Address of the buffer's bytes.
+    /// Address of the buffer's mapped memory.
     address: usize,
 }
 
-/// Description of the kept picture of a pass's target.
+/// Format and aspect of a picture.
 #[derive(Clone, Copy)]
 struct Kind {
     format: vk::Format,
@@ -39,7 +39,8 @@ struct Kind {
 }
 
 impl Kind {
-    /// Of a colour: what a page shows, encoded for screens unless it already is; of integers there is no picture.
+    /// Kind of a colour target's picture: sRGB-encoded unless the target already is. `None` for integer
+    /// formats.
     fn color(view: &ViewInfo) -> Option<Self> {
         let name = format!("{:?}", vk::Format::from_raw(view.format));
         if name.contains("INT") {
@@ -64,7 +65,7 @@ impl Kind {
     }
 }
 
-/// Grey of depths: the nearest black, the farthest white.
+/// Depths as grey, from the nearest in black to the farthest in white.
 fn grey(depths: &[f32]) -> Vec<u8> {
     let low = depths.iter().copied().fold(f32::INFINITY, f32::min);
     let high = depths.iter().copied().fold(f32::NEG_INFINITY, f32::max);
@@ -80,7 +81,7 @@ fn grey(depths: &[f32]) -> Vec<u8> {
     depths.iter().flat_map(texel).collect()
 }
 
-/// Depths as copies to buffers have them (Vulkan 1.3, "Copying Data Between Buffers and Images").
+/// Decodes depths as copied to buffers (Vulkan 1.3, "Copying Data Between Buffers and Images").
 fn depths(format: vk::Format, bytes: &[u8]) -> Vec<f32> {
     let words = || {
         bytes
@@ -99,10 +100,10 @@ fn depths(format: vk::Format, bytes: &[u8]) -> Vec<f32> {
 }
 
 impl Pictures {
-    /// Copies what a pass rendered, once the commands are executed.
+    /// Records commands that copy the target of a render pass.
     ///
     /// # Safety
-    /// A command buffer that is recorded, outside a pass.
+    /// The command buffer is being recorded, outside a render pass.
     pub unsafe fn take(&self, known: &Device, buffer: vk::CommandBuffer, pass: &PassInfo) {
         let (view, kind) = match (pass.colors.first(), &pass.depth) {
             (Some(color), _) => (color, Kind::color(color)),
@@ -137,10 +138,10 @@ impl Pictures {
         }
     }
 
-    /// Writes the pictures of passes.
+    /// Writes the pictures of render passes.
     ///
     /// # Safety
-    /// They have been executed.
+    /// The passes have been executed.
     pub unsafe fn write(&self, known: &Device, passes: &HashSet<u32>) {
         let made = lock(&self.made);
         for picture in made.iter().filter(|picture| passes.contains(&picture.pass)) {
@@ -162,10 +163,10 @@ impl Pictures {
         }
     }
 
-    /// Ends with the device.
+    /// Destroys the pictures with their device.
     ///
     /// # Safety
-    /// Nothing is being executed.
+    /// No commands are being executed.
     pub unsafe fn destroy(&self, device: vk::Device, next: &Next) {
         for picture in lock(&self.made).drain(..) {
             // SAFETY: as the caller promises.
@@ -175,10 +176,10 @@ impl Pictures {
 }
 
 impl PassReadback {
-    /// Sets memory aside; `None` where the driver refuses.
+    /// Creates the image and the buffer; `None` if the driver refuses.
     ///
     /// # Safety
-    /// A device that is open.
+    /// The device is open.
     unsafe fn new(known: &Device, pass: u32, size: [u32; 2], kind: Kind) -> Option<Self> {
         let (device, next) = (known.handle, &known.next);
         let mut picture = Self {
@@ -206,7 +207,7 @@ impl PassReadback {
         let buffer = vk::BufferCreateInfo::default()
             .size(picture.bytes())
             .usage(vk::BufferUsageFlags::TRANSFER_DST);
-        // SAFETY: as the caller promises; what was made before an error is destroyed.
+        // SAFETY: as the caller promises. After an error, the created objects are destroyed.
         unsafe {
             let none = std::ptr::null();
             let success = vk::Result::SUCCESS;
@@ -221,10 +222,10 @@ impl PassReadback {
         Some(picture)
     }
 
-    /// Gives memory to the image and to the buffer; false where the driver refuses.
+    /// Allocates and binds memory of the image and the buffer; returns false if the driver refuses.
     ///
     /// # Safety
-    /// Both were just made.
+    /// Both were just created.
     unsafe fn bind(&mut self, known: &Device) -> bool {
         let (device, next) = (known.handle, &known.next);
         let success = vk::Result::SUCCESS;
@@ -234,7 +235,7 @@ impl PassReadback {
             (next.image_requirements)(device, self.image, &mut needs[0]);
             (next.buffer_requirements)(device, self.buffer, &mut needs[1]);
             for of in needs {
-                // Lavapipe's only kind of memory is the process's own.
+                // Lavapipe has a single memory type, which is host memory.
                 let info = vk::MemoryAllocateInfo::default()
                     .allocation_size(of.size)
                     .memory_type_index(of.memory_type_bits.trailing_zeros());
@@ -256,15 +257,15 @@ impl PassReadback {
         }
     }
 
-    /// Bytes of the buffer: no texel of a picture has more than four.
+    /// Size of the buffer. A texel of a picture has at most four bytes.
     fn bytes(&self) -> u64 {
         4 * u64::from(self.size[0]) * u64::from(self.size[1])
     }
 
-    /// Scales the target down and copies it.
+    /// Records commands that scale the target down and copy it.
     ///
     /// # Safety
-    /// A command buffer that is recorded, outside a pass.
+    /// The command buffer is being recorded, outside a render pass.
     unsafe fn record(
         &self,
         known: &Device,
@@ -316,10 +317,10 @@ impl PassReadback {
         }
     }
 
-    /// Lets what follows see what came before.
+    /// Records a barrier between all commands before it and all after it.
     ///
     /// # Safety
-    /// A command buffer that is recorded, outside a pass.
+    /// The command buffer is being recorded, outside a render pass.
     unsafe fn wait(&self, buffer: vk::CommandBuffer, next: &Next) {
         let all = vk::PipelineStageFlags::ALL_COMMANDS;
         let memory = vk::MemoryBarrier::default()
@@ -334,7 +335,7 @@ impl PassReadback {
     }
 
     /// # Safety
-    /// Nothing that uses it is being executed.
+    /// No commands that use the picture are being executed.
     unsafe fn destroy(&self, device: vk::Device, next: &Next) {
         // SAFETY: as the caller promises; null handles are ignored.
         unsafe {

@@ -1,4 +1,4 @@
-//! State of a pipeline's description, and descriptions without writes.
+//! State in the description of a pipeline, and changed descriptions.
 
 use super::api::slice;
 use crate::spool::DepthInfo;
@@ -10,7 +10,7 @@ use ash::vk;
 /// # Safety
 /// A valid description.
 pub(super) unsafe fn of(info: &vk::GraphicsPipelineCreateInfo<'_>) -> State {
-    // SAFETY: as the caller promises. Structures that a pipeline does not need may be missing.
+    // SAFETY: as the caller promises. Structures that the pipeline does not use may be missing.
     unsafe {
         let mut state = State {
             samples: 1,
@@ -21,7 +21,7 @@ pub(super) unsafe fn of(info: &vk::GraphicsPipelineCreateInfo<'_>) -> State {
             state.dynamic = states.iter().map(|s| s.as_raw()).collect();
         }
         if let Some(viewports) = info.p_viewport_state.as_ref() {
-            // The arrays are ignored, and may be anything, where commands set them.
+            // The arrays of dynamic states are ignored, so their pointers may be invalid.
             let fixed = |a, b| !state.is_dynamic(a) && !state.is_dynamic(b);
             let viewport = fixed(
                 vk::DynamicState::VIEWPORT,
@@ -82,7 +82,7 @@ pub(super) unsafe fn of(info: &vk::GraphicsPipelineCreateInfo<'_>) -> State {
     }
 }
 
-/// Fragments lose samples by their alpha after they were shaded.
+/// Whether alpha-to-coverage removes samples after shading.
 ///
 /// # Safety
 /// A valid description.
@@ -101,7 +101,7 @@ const WRITING: [vk::DynamicState; 5] = [
     vk::DynamicState::COLOR_WRITE_ENABLE_EXT,
 ];
 
-/// A description with another fragment shader.
+/// A description with another fragment shader and without writes.
 pub(super) struct Changed<'a> {
     info: vk::GraphicsPipelineCreateInfo<'a>,
     _stages: Vec<vk::PipelineShaderStageCreateInfo<'a>>,
@@ -114,14 +114,14 @@ pub(super) struct Changed<'a> {
 }
 
 impl<'a> Changed<'a> {
-    /// The description with these stages.
+    /// Copies a description with other stages.
     pub fn new(
         info: &vk::GraphicsPipelineCreateInfo<'a>,
         stages: Vec<vk::PipelineShaderStageCreateInfo<'a>>,
     ) -> Self {
         let mut info = *info;
         info.p_stages = stages.as_ptr();
-        // The twin is no parent of others, and has no other parent.
+        // The recording pipeline takes no part in derivation.
         info.flags &= !(vk::PipelineCreateFlags::DERIVATIVE
             | vk::PipelineCreateFlags::ALLOW_DERIVATIVES
             | vk::PipelineCreateFlags::FAIL_ON_PIPELINE_COMPILE_REQUIRED);
@@ -138,10 +138,10 @@ impl<'a> Changed<'a> {
         }
     }
 
-    /// Makes it test as before, but write neither depth nor stencil nor colours.
+    /// Disables writes of depth, stencil and colours. Tests are unchanged.
     ///
     /// # Safety
-    /// The description that this was made from is valid.
+    /// The description that this was made from is still valid.
     pub unsafe fn write_nothing(&mut self) {
         // SAFETY: as the caller promises.
         unsafe {
@@ -180,12 +180,12 @@ impl<'a> Changed<'a> {
         }
     }
 
-    /// The description.
+    /// The changed description.
     pub fn info(&self) -> &vk::GraphicsPipelineCreateInfo<'a> {
         &self.info
     }
 
-    /// Dynamic states that it fixes.
+    /// Dynamic states that the changed description fixes.
     pub fn fixed(&self) -> Vec<vk::DynamicState> {
         self.fixed.clone()
     }

@@ -61,7 +61,7 @@ pub(super) unsafe extern "system" fn create_pipeline_layout(
         let room = known
             .recorder
             .as_ref()
-            .and_then(|r| with_room(ranges, r.push_constant_bytes));
+            .and_then(|r| extended_ranges(ranges, r.push_constant_bytes));
         let Some((ranges, stages)) = room else {
             let result = (known.next.create_pipeline_layout)(device, info, allocator, layout);
             if result == vk::Result::SUCCESS {
@@ -88,9 +88,9 @@ pub(super) unsafe extern "system" fn create_pipeline_layout(
     }
 }
 
-/// The ranges with room for the draw's number at an offset, and the stages that see it; `None` where the program uses
-/// the place itself.
-fn with_room(
+/// Push constant ranges extended by the draw's number at an offset, and the stages that see it; `None` if the
+/// program uses these bytes itself.
+fn extended_ranges(
     ranges: &[vk::PushConstantRange],
     offset: u32,
 ) -> Option<(Vec<vk::PushConstantRange>, vk::ShaderStageFlags)> {
@@ -100,7 +100,7 @@ fn with_room(
         return None;
     }
     let mut ranges = ranges.to_vec();
-    // No two ranges may name a stage.
+    // A stage must not be in two ranges.
     let fragment = vk::ShaderStageFlags::FRAGMENT;
     match ranges
         .iter_mut()
@@ -125,7 +125,7 @@ pub(super) unsafe extern "system" fn destroy_pipeline_layout(
     layout: vk::PipelineLayout,
     allocator: Allocator,
 ) {
-    // SAFETY: a valid call of vkDestroyPipelineLayout. A layout that draws still need lives on.
+    // SAFETY: a valid call of vkDestroyPipelineLayout. A layout that draws still need is not destroyed.
     unsafe {
         let known = Device::of(device);
         let unused = known.tracker().pipelines.destroy_layout(layout);
@@ -140,12 +140,12 @@ pub(super) unsafe extern "system" fn destroy_pipeline(
     pipeline: vk::Pipeline,
     allocator: Allocator,
 ) {
-    // SAFETY: a valid call of vkDestroyPipeline; its recording twin is this layer's.
+    // SAFETY: a valid call of vkDestroyPipeline. The recording pipeline belongs to this layer.
     unsafe {
         let known = Device::of(device);
-        let twin = known.tracker().pipelines.destroy(pipeline);
-        if let Some(twin) = twin {
-            (known.next.destroy_pipeline)(device, twin, std::ptr::null());
+        let recording_pipeline = known.tracker().pipelines.destroy(pipeline);
+        if let Some(recording_pipeline) = recording_pipeline {
+            (known.next.destroy_pipeline)(device, recording_pipeline, std::ptr::null());
         }
         (known.next.destroy_pipeline)(device, pipeline, allocator);
     }
@@ -174,7 +174,7 @@ pub(super) unsafe extern "system" fn create_graphics_pipelines(
     }
 }
 
-/// A pipeline of the program, with its recording twin.
+/// Describes a pipeline of the program and creates its recording pipeline.
 ///
 /// # Safety
 /// A valid description.
@@ -207,8 +207,8 @@ unsafe fn describe(known: &Device, info: &vk::GraphicsPipelineCreateInfo<'_>) ->
         return pipeline;
     }
     // SAFETY: as the caller promises.
-    let twin = unsafe { twin(known, recorder, info, place, &stage) };
-    match twin {
+    let recording_pipeline = unsafe { recording_pipeline(known, recorder, info, place, &stage) };
+    match recording_pipeline {
         Ok(recorded) => {
             let mut bindings: Vec<(u32, u32)> = Vec::new();
             for site in &recorded.shader.sites {
@@ -227,7 +227,7 @@ unsafe fn describe(known: &Device, info: &vk::GraphicsPipelineCreateInfo<'_>) ->
     pipeline
 }
 
-/// Position of the fragment stage, and the stage.
+/// Index of the fragment stage, and the stage.
 ///
 /// # Safety
 /// A valid description.
@@ -248,22 +248,22 @@ unsafe fn fragment_stage<'a>(
     }
 }
 
-/// Makes the pipeline that records for another.
+/// Creates the recording pipeline for a pipeline.
 ///
 /// # Safety
-/// A valid description, whose fragment stage stands at `place`.
-unsafe fn twin(
+/// A valid description with its fragment stage at index `place`.
+unsafe fn recording_pipeline(
     known: &Device,
     recorder: &DeviceRecorder,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     place: usize,
     stage: &vk::PipelineShaderStageCreateInfo<'_>,
 ) -> Result<Recorded, String> {
-    // SAFETY: as the caller promises; what is made from the description lives until the call's end.
+    // SAFETY: as the caller promises. Objects derived from the description live until the end of the call.
     unsafe {
         let words = match known.tracker().pipelines.module(stage.module) {
             Some(words) => words,
-            // A module given in the stage itself.
+            // The stage may contain its module.
             None => match find::<vk::ShaderModuleCreateInfo<'_>>(stage.p_next) {
                 Some(inline) => slice(inline.p_code, (inline.code_size / 4) as u32).into(),
                 None => return Err("a shader whose module is not known".to_owned()),
@@ -324,20 +324,21 @@ unsafe fn twin(
     }
 }
 
-/// A stage's chain without a module in it, which would count more than the stage's own.
+/// The chain of a stage, without a module in it. Such a module would take precedence over the stage's new
+/// module.
 ///
 /// # Safety
 /// A valid chain.
 unsafe fn without_module(p_next: *const std::ffi::c_void) -> *const std::ffi::c_void {
     // SAFETY: as the caller promises.
     match unsafe { find::<vk::ShaderModuleCreateInfo<'_>>(p_next) } {
-        // Whatever else the chain has is not needed to record.
+        // Recording does not need the other structures of the chain.
         Some(_) => std::ptr::null(),
         None => p_next,
     }
 }
 
-/// Views that the pipeline's draws are broadcast to.
+/// View mask of the draws of a pipeline.
 ///
 /// # Safety
 /// A valid description.
@@ -353,7 +354,7 @@ unsafe fn view_mask(known: &Device, info: &vk::GraphicsPipelineCreateInfo<'_>) -
     dynamic.map_or(0, |rendering| rendering.view_mask)
 }
 
-/// The recording shader of an entry point, made once.
+/// The recording shader of an entry point, created once.
 fn recording_shader(
     known: &Device,
     recorder: &DeviceRecorder,
@@ -389,7 +390,7 @@ fn recording_shader(
     made
 }
 
-/// Writes a module to the folder that the launcher named, if any.
+/// Writes a module to the folder for modules, if the launcher set one.
 fn keep_module(shader: u32, of: &str, words: &[u32]) {
     let folder = capture().and_then(|capture| capture.settings.modules.as_ref());
     if let Some(folder) = folder {
@@ -416,8 +417,8 @@ mod tests {
     }
 
     #[test]
-    fn ranges_get_room_for_a_number_without_naming_a_stage_twice() {
-        let (ranges, stages) = with_room(&[], 252).unwrap();
+    fn ranges_are_extended_by_a_number_and_have_each_stage_once() {
+        let (ranges, stages) = extended_ranges(&[], 252).unwrap();
         assert_eq!(
             (ranges.len(), ranges[0].offset, ranges[0].size),
             (1, 252, 4)
@@ -425,12 +426,12 @@ mod tests {
         assert_eq!(stages, Stages::FRAGMENT);
         let vertex = range(Stages::VERTEX, 0, 64);
         let both = range(Stages::GEOMETRY | Stages::FRAGMENT, 64, 16);
-        let (ranges, stages) = with_room(&[vertex, both], 252).unwrap();
+        let (ranges, stages) = extended_ranges(&[vertex, both], 252).unwrap();
         assert_eq!(
             (ranges.len(), ranges[1].offset, ranges[1].size),
             (2, 64, 192)
         );
         assert_eq!(stages, Stages::GEOMETRY | Stages::FRAGMENT);
-        assert!(with_room(&[range(Stages::VERTEX, 250, 4)], 252).is_none());
+        assert!(extended_ranges(&[range(Stages::VERTEX, 250, 4)], 252).is_none());
     }
 }

@@ -1,4 +1,4 @@
-//! Occlusion queries around draws: a count of their fragments by the driver itself.
+//! Occlusion queries around draws, with which the driver counts fragments independently.
 
 use super::next::Next;
 use crate::capture::lock;
@@ -7,24 +7,24 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Queries of a device, and the draws that they count.
+/// Occlusion queries of a device and the draws that they count.
 pub(super) struct Queries {
     pool: vk::QueryPool,
     next: AtomicU32,
-    /// Query by draw.
+    /// Index of the query of each draw.
     of_draws: Mutex<HashMap<u32, u32>>,
 }
 
-/// Draws that may wait for their results at once.
+/// Maximum number of draws with pending results.
 const DRAWS: u32 = 1 << 15;
-/// Queries of a draw: one per view of a multiview pass, at most two.
+/// Queries per draw: one per view of a multiview pass, at most two.
 const PER_DRAW: u32 = 2;
 
 impl Queries {
-    /// Makes the queries; `None` where the driver refuses.
+    /// Creates the queries; `None` if the driver refuses.
     ///
     /// # Safety
-    /// A device that is open.
+    /// The device is open.
     pub unsafe fn new(device: vk::Device, next: &Next) -> Option<Self> {
         let info = vk::QueryPoolCreateInfo {
             query_type: vk::QueryType::OCCLUSION,
@@ -47,10 +47,10 @@ impl Queries {
         })
     }
 
-    /// Begins to count a draw.
+    /// Begins the query of a draw.
     ///
     /// # Safety
-    /// A command buffer that is recorded, in a pass.
+    /// The command buffer is being recorded, inside a render pass.
     pub unsafe fn begin(&self, buffer: vk::CommandBuffer, draw: u32, next: &Next) {
         let place = self.next.fetch_add(1, Ordering::Relaxed) % DRAWS;
         let mut of_draws = lock(&self.of_draws);
@@ -61,10 +61,10 @@ impl Queries {
         unsafe { (next.cmd_begin_query)(buffer, self.pool, place * PER_DRAW, flags) };
     }
 
-    /// Ends counting.
+    /// Ends the query of a draw.
     ///
     /// # Safety
-    /// After [`Self::begin`] of the same draw.
+    /// [`Self::begin`] was called for the same draw.
     pub unsafe fn end(&self, buffer: vk::CommandBuffer, draw: u32, next: &Next) {
         if let Some(query) = lock(&self.of_draws).get(&draw).copied() {
             // SAFETY: as the caller promises.
@@ -72,10 +72,10 @@ impl Queries {
         }
     }
 
-    /// Makes the queries of draws ready to be executed, perhaps again.
+    /// Resets the queries of draws before they are executed.
     ///
     /// # Safety
-    /// None of them is being executed.
+    /// None of the draws is being executed.
     pub unsafe fn reset(&self, device: vk::Device, draws: &[u32], next: &Next) {
         let of_draws = lock(&self.of_draws);
         for query in draws.iter().filter_map(|draw| of_draws.get(draw)) {
@@ -84,10 +84,10 @@ impl Queries {
         }
     }
 
-    /// The counted draws.
+    /// Counts of the draws.
     ///
     /// # Safety
-    /// They have been executed.
+    /// The draws have been executed.
     pub unsafe fn results(
         &self,
         device: vk::Device,
@@ -103,7 +103,7 @@ impl Queries {
             let mut count = [0_u64; PER_DRAW as usize];
             let mut sum = None;
             for (place, one) in (query..).zip(&mut count) {
-                // SAFETY: the query's result fits the number.
+                // SAFETY: the result has the size of the number.
                 let result = unsafe {
                     (next.get_query_results)(
                         device,
@@ -125,10 +125,10 @@ impl Queries {
         found
     }
 
-    /// Ends with the device.
+    /// Destroys the queries with their device.
     ///
     /// # Safety
-    /// Nothing is being executed.
+    /// No commands are being executed.
     pub unsafe fn destroy(&self, device: vk::Device, next: &Next) {
         // SAFETY: as the caller promises.
         unsafe { (next.destroy_query_pool)(device, self.pool, std::ptr::null()) };

@@ -108,7 +108,7 @@ pub(super) unsafe extern "system" fn create_swapchain(
         let known = Device::of(device);
         let result = (known.next.create_swapchain)(device, info, allocator, swapchain);
         if result == vk::Result::SUCCESS {
-            // The chain and its arrays end with the call.
+            // The chain and its arrays are valid only during the call.
             let kept = vk::SwapchainCreateInfoKHR {
                 image_format: (*info).image_format,
                 image_extent: (*info).image_extent,

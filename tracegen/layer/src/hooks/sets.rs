@@ -27,7 +27,7 @@ pub(super) unsafe extern "system" fn create_set_layout(
                     vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
                 ]
                 .contains(&binding.descriptor_type);
-                // The pointer is ignored for other kinds and may then be anything.
+                // For other kinds of descriptors the pointer is ignored and may be invalid.
                 let samplers = match has_samplers {
                     true => slice(binding.p_immutable_samplers, count).to_vec(),
                     false => Vec::new(),
@@ -120,7 +120,7 @@ pub(super) unsafe extern "system" fn destroy_pool(
     }
 }
 
-/// A write of descriptors that may be textures.
+/// Describes a write of descriptors, with its images if they are textures.
 ///
 /// # Safety
 /// A valid `VkWriteDescriptorSet`.
@@ -226,10 +226,10 @@ pub(super) unsafe extern "system" fn destroy_template(
     }
 }
 
-/// The writes of a template's entries.
+/// The writes that a template describes.
 ///
 /// # Safety
-/// `data` has what the template describes.
+/// `data` has the layout of the template.
 unsafe fn from_template(template: &Template, data: *const c_void) -> Vec<Written> {
     let read = |entry: &TemplateEntry| Written {
         binding: entry.binding,
@@ -304,7 +304,7 @@ pub(super) unsafe extern "system" fn cmd_bind_sets(
     }
 }
 
-/// Pushes descriptors to a set of a command buffer.
+/// Tracks descriptors that are pushed to a set.
 fn push(known: &Device, buffer: vk::CommandBuffer, set: u32, writes: &[Written]) {
     let tracker = &mut *known.tracker();
     let state = tracker.commands.get_mut(buffer.as_raw());

@@ -1,4 +1,4 @@
-//! Hooks of queues: records are taken when the commands that wrote them are done.
+//! Hooks of queues. Records are read when the commands that wrote them have ended.
 
 use super::api::slice;
 use super::device::Device;
@@ -20,7 +20,7 @@ pub(super) unsafe extern "system" fn queue_submit(
         let known = Device::of(queue);
         let buffers = buffers_of(slice(submits, count));
         let submit = || (known.next.queue_submit)(queue, count, submits, fence);
-        submit_and_take(&known, queue, &buffers, submit)
+        submit_and_read(&known, queue, &buffers, submit)
     }
 }
 
@@ -44,15 +44,15 @@ pub(super) unsafe extern "system" fn queue_submit2(
             .map(|info| info.command_buffer);
         let buffers: Vec<vk::CommandBuffer> = buffers.collect();
         let submit = || (known.next.queue_submit2)(queue, count, submits, fence);
-        submit_and_take(&known, queue, &buffers, submit)
+        submit_and_read(&known, queue, &buffers, submit)
     }
 }
 
-/// Submits commands and, in a requested frame, waits for them and drains their records.
+/// Submits commands. In a requested frame, waits for them and reads their records.
 ///
 /// # Safety
 /// A valid submission.
-unsafe fn submit_and_take(
+unsafe fn submit_and_read(
     known: &Device,
     queue: vk::Queue,
     buffers: &[vk::CommandBuffer],
@@ -72,7 +72,7 @@ unsafe fn submit_and_take(
     result
 }
 
-/// Submits commands of the frame that is under way.
+/// Submits commands of the current frame.
 ///
 /// # Safety
 /// A valid submission.
@@ -86,10 +86,10 @@ unsafe fn submit_frame(
     capture.note_frames();
     let frame = capture.frame();
     if !capture.wants(frame) {
-        // Commands that were recorded for any time record nothing now.
+        // Reusable command buffers must not record outside requested frames.
         if let Some(recorder) = known.recorder.as_ref().filter(|r| r.buffer.is_open()) {
-            // Another thread may have started a requested frame since, and its commands may still be
-            // executing.
+            // Another thread may have started a requested frame in the meantime, and its commands may still
+            // be executing.
             let _alone = lock(&known.submitting);
             if !capture.wants(capture.frame()) {
                 recorder.buffer.open(false);
@@ -109,7 +109,7 @@ unsafe fn submit_frame(
     }
     let _alone = lock(&known.submitting);
     let numbers: Vec<u32> = items.iter().map(|item| item.draw.draw).collect();
-    // SAFETY: a queue of the device; nothing of the draws is being executed before they are submitted.
+    // SAFETY: a queue of the device. The draws are not being executed before they are submitted.
     unsafe {
         if let Some(recorder) = known.recorder.as_ref().filter(|r| !r.buffer.is_open()) {
             // Commands in flight belong to earlier frames.
@@ -124,31 +124,33 @@ unsafe fn submit_frame(
             return result;
         }
         if wait(known, queue) {
-            take(known, frame, &items, &numbers);
+            write_records(known, frame, &items, &numbers);
         } else {
             if let Some(recorder) = &known.recorder {
                 recorder.buffer.open(false);
             }
             capture.event(&Event::Trouble {
-                what: format!("commands of frame {frame} did not end within {PATIENCE_S} seconds"),
+                what: format!(
+                    "commands of frame {frame} did not end within {WAIT_TIMEOUT_S} seconds"
+                ),
             });
         }
         result
     }
 }
 
-/// Timeout in seconds for the commands of a frame, because some wait for others that the program has not
+/// Timeout in seconds for the commands of a frame. Some commands wait for others that the program has not
 /// submitted yet.
-const PATIENCE_S: u64 = 60;
+const WAIT_TIMEOUT_S: u64 = 60;
 
-/// Waits until all that was submitted to a queue is done; false where that takes too long.
+/// Waits until all submitted commands of a queue have ended; returns false after the timeout.
 ///
 /// # Safety
 /// A queue of the device.
 unsafe fn wait(known: &Device, queue: vk::Queue) -> bool {
     let next = &known.next;
     let mut fence = vk::Fence::null();
-    // SAFETY: as the caller promises; a fence that is still waited for is never used again.
+    // SAFETY: as the caller promises. A fence that may still be signalled is not used again.
     unsafe {
         let info = vk::FenceCreateInfo::default();
         let made = (next.create_fence)(known.handle, &info, std::ptr::null(), &mut fence);
@@ -162,7 +164,7 @@ unsafe fn wait(known: &Device, queue: vk::Queue) -> bool {
                 1,
                 &fence,
                 vk::TRUE,
-                PATIENCE_S * 1_000_000_000,
+                WAIT_TIMEOUT_S * 1_000_000_000,
             ) == vk::Result::SUCCESS;
         if done {
             (next.destroy_fence)(known.handle, fence, std::ptr::null());
@@ -171,11 +173,11 @@ unsafe fn wait(known: &Device, queue: vk::Queue) -> bool {
     }
 }
 
-/// Takes what draws recorded.
+/// Writes the records of executed draws.
 ///
 /// # Safety
-/// They have been executed.
-unsafe fn take(known: &Device, frame: u32, items: &[Executed], numbers: &[u32]) {
+/// The draws have been executed.
+unsafe fn write_records(known: &Device, frame: u32, items: &[Executed], numbers: &[u32]) {
     let capture = known.capture;
     describe(known, items);
     // SAFETY: as the caller promises.
@@ -213,7 +215,7 @@ unsafe fn take(known: &Device, frame: u32, items: &[Executed], numbers: &[u32]) 
     });
 }
 
-/// Describes draws, their passes, shaders and images, unless that has been done.
+/// Describes draws, their render passes, shaders and images, each once.
 fn describe(known: &Device, items: &[Executed]) {
     let capture = known.capture;
     for item in items {

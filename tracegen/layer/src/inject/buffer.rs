@@ -1,59 +1,59 @@
-//! The record buffer as shaders write it: a counter, then records of whole units.
+//! The record buffer as shaders write it: a counter, then records that consist of 16-byte units.
 //!
-//! The first unit of a record is its header, the number of the draw, the place of the quad and the number of the
-//! primitive. A record of a quad goes on with two units for each of its coordinate groups: u and v of its four lanes. A
-//! record of a fragment goes on with three units: see [`RawFragment`].
+//! The first unit of a record has its header, the number of the draw, the place of the quad and the number of
+//! the primitive. In the record of a quad, two units follow for each coordinate group: u and v of the four
+//! lanes. In the record of a fragment, three units follow: see [`RawFragment`].
 
 use bytemuck::{Pod, Zeroable};
 
-/// Bytes before the first record. The first word counts units, those beyond the capacity too; the second is the capacity,
-/// 0 while nothing is recorded.
+/// Bytes before the first record. The first word is the number of appended units, including those beyond the
+/// capacity. The second word is the capacity, or 0 while recording is off.
 pub const COUNTER_BYTES: u64 = 64;
 
-/// Unit of records.
+/// Unit of the buffer.
 pub type Unit = [u32; 4];
 
-/// Bytes of a unit.
+/// Size of a unit.
 pub const UNIT_BYTES: u64 = size_of::<Unit>() as u64;
 
-/// First bit of the lanes in a header, above the number of the coordinate group.
+/// Lowest bit of the lanes in a header, above the number of the coordinate group.
 pub(super) const LANES_SHIFT: u32 = 16;
-/// First bit of the number of coordinate groups.
+/// Lowest bit of the number of coordinate groups.
 pub(super) const GROUPS_SHIFT: u32 = 20;
-/// Most coordinate groups of a record.
+/// Maximum number of coordinate groups in a record.
 pub(super) const MOST_GROUPS: usize = 8;
-/// Set in the header of a record of a fragment.
+/// Header bit of a record of a fragment.
 pub(super) const FRAGMENT: u32 = 1 << 24;
-/// Units of a record of a fragment.
+/// Number of units of a record of a fragment.
 pub(super) const FRAGMENT_UNITS: u32 = 4;
 
-/// Record of one coordinate group.
+/// The part of a record for one coordinate group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct RawSample {
-    /// Number of the coordinate group in the low 16 bits, lanes of the quad in the next four: bit 0 top left, 1 top right,
-    /// 2 bottom left, 3 bottom right.
+    /// Number of the coordinate group in the low 16 bits; above it, four bits for the lanes of the quad: bit
+    /// 0 top left, 1 top right, 2 bottom left, 3 bottom right.
     pub header: u32,
     /// Number of the draw.
     pub draw: u32,
-    /// Column and row of the quad in the target, 13 bits each, and the view above them.
+    /// Column and row of the quad in the target, 13 bits each, and the view in the bits above.
     pub place: u32,
     /// Number of the primitive within the draw.
     pub primitive: u32,
     /// Element of the binding's array.
     pub element: u32,
-    /// Data in the site's form: see [`RawQuad`] and [`RawFragment`].
+    /// Data of a quad or of a fragment: see [`RawQuad`] and [`RawFragment`].
     pub values: [f32; 11],
 }
 
 impl RawSample {
-    /// Coordinate group of its shader.
+    /// Number of the coordinate group in its shader.
     #[must_use]
     pub fn group(&self) -> u16 {
         self.header as u16
     }
 
-    /// Lanes of the quad.
+    /// Lanes of the quad, one bit each.
     #[must_use]
     pub fn lanes(&self) -> u8 {
         (self.header >> LANES_SHIFT & 15) as u8
@@ -65,20 +65,20 @@ impl RawSample {
         [self.place & 0x1fff, self.place >> 13 & 0x1fff]
     }
 
-    /// View of a pass of several.
+    /// View in a multiview pass.
     #[must_use]
     pub fn view(&self) -> u32 {
         self.place >> 26
     }
 
-    /// As a record of a quad.
+    /// Interprets the data as those of a quad.
     #[must_use]
     pub fn as_quad(&self) -> RawQuad {
         let lane = |number: usize| [self.values[2 * number], self.values[2 * number + 1]];
         RawQuad::of([0, 1, 2, 3].map(lane))
     }
 
-    /// As a record of a fragment.
+    /// Interprets the data as those of a fragment.
     #[must_use]
     pub fn as_fragment(&self) -> RawFragment {
         let v = &self.values;
@@ -91,21 +91,21 @@ impl RawSample {
     }
 }
 
-/// Coordinates of a quad: of lane (i, j) `uv + i*dx + j*dy + i*j*cross`.
+/// Coordinates of a quad. Those of lane (i, j) are `uv + i*dx + j*dy + i*j*cross`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RawQuad {
-    /// Of the top-left lane.
+    /// Coordinates of the top-left lane.
     pub uv: [f32; 2],
-    /// Difference to the lane right of it.
+    /// Difference to the lane on its right.
     pub dx: [f32; 2],
-    /// Difference to the lane below it.
+    /// Difference to the lane below.
     pub dy: [f32; 2],
     /// Change of `dx` from the top row to the bottom row.
     pub cross: [f32; 2],
 }
 
 impl RawQuad {
-    /// Of the coordinates of four lanes.
+    /// Computes the differences from the coordinates of four lanes.
     #[must_use]
     pub fn of([a, b, c, d]: [[f32; 2]; 4]) -> Self {
         let pair = |of: &dyn Fn(usize) -> f32| [of(0), of(1)];
@@ -121,17 +121,17 @@ impl RawQuad {
 /// Coordinates of a fragment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RawFragment {
-    /// Coordinates; the third is a layer or part of a direction.
+    /// Coordinates; the third one is a layer or part of a direction.
     pub at: [f32; 3],
-    /// Change to the right, or the gradient that the instruction names.
+    /// Change to the right, or the instruction's explicit gradient.
     pub dx: [f32; 3],
-    /// Change downwards, likewise.
+    /// Change downwards, or the instruction's explicit gradient.
     pub dy: [f32; 3],
-    /// Bias or level, where the instruction names one.
+    /// The instruction's bias or level, if any.
     pub lod: f32,
 }
 
-/// Splits records into coordinate groups. Returns false if they end within one.
+/// Splits records into coordinate groups. Returns false if the last record is incomplete.
 #[must_use]
 pub fn unpack(mut units: &[Unit], mut each: impl FnMut(RawSample)) -> bool {
     while let Some((&[header, draw, place, primitive], rest)) = units.split_first() {
@@ -227,7 +227,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn any_units_are_taken_apart(units in proptest::collection::vec(any::<Unit>(), 0..40)) {
+        fn arbitrary_units_are_unpacked_without_a_panic(units in proptest::collection::vec(any::<Unit>(), 0..40)) {
             let (found, _) = all(&units);
             prop_assert!(found.len() <= units.len());
         }

@@ -1,4 +1,4 @@
-//! Declarations that a recording module needs: capabilities, types, inputs, the draw's number.
+//! Declarations of a recording module: capabilities, types, inputs, the draw's number.
 
 use super::shader::Shader;
 use super::{InjectError, Target};
@@ -15,7 +15,7 @@ pub(super) fn literal(value: u32) -> Operand {
     Operand::LiteralBit32(value)
 }
 
-/// Types of the recording code.
+/// Types of the recording functions.
 #[derive(Clone, Copy)]
 pub(super) struct Types {
     pub void: Word,
@@ -45,7 +45,7 @@ impl Types {
     }
 }
 
-/// A variable and the type of what it holds.
+/// An input variable and the type of its value.
 #[derive(Clone, Copy)]
 pub(super) struct Input {
     pub variable: Word,
@@ -57,14 +57,14 @@ pub(super) struct Inputs {
     pub frag_coord: Input,
     pub primitive: Input,
     pub view: Option<Input>,
-    /// Lane of the subgroup, if lanes exchange their coverage.
+    /// Index of the lane in the subgroup, if ballots are used.
     pub invocation: Option<Input>,
-    /// The block of push constants, and the member that is the draw's number.
+    /// The block of push constants, and the index of the member with the draw's number.
     pub draw: (Word, u32),
 }
 
 impl Inputs {
-    /// Finds or declares them.
+    /// Finds or declares the inputs.
     pub fn new(
         builder: &mut Builder,
         shader: &Shader,
@@ -109,20 +109,20 @@ fn existing_input(shader: &Shader, builtin: BuiltIn) -> Option<Input> {
     Some(Input { variable, of })
 }
 
-/// The module with one entry point and the capabilities of recording.
+/// The module, reduced to one entry point, with the capabilities that recording needs.
 pub(super) fn builder(shader: &Shader, target: &Target) -> Builder {
     let mut module = shader.module.clone();
     keep_entry_alone(&mut module, shader.entry, shader.main);
     let version = module.header.as_ref().map_or((1, 0), |h| h.version());
     let mut builder = Builder::new_from_module(module);
     if version < (1, 3) {
-        // Ballots need it. Everything that 1.0 allows is allowed in it.
+        // Ballots need version 1.3, which is a superset of 1.0.
         builder.set_version(1, 3);
     }
     let mut wanted = vec![
         Capability::PhysicalStorageBufferAddresses,
         Capability::Int64,
-        // For the number of the primitive.
+        // Needed for the number of the primitive.
         Capability::Geometry,
         Capability::DerivativeControl,
     ];
@@ -159,7 +159,7 @@ pub(super) fn builder(shader: &Shader, target: &Target) -> Builder {
     builder
 }
 
-/// Drops the other entry points, whose stages could not execute what is added.
+/// Removes the other entry points. Their stages could not execute the added instructions.
 fn keep_entry_alone(module: &mut Module, entry: usize, main: Word) {
     let kept = module.entry_points.swap_remove(entry);
     let dropped = std::mem::replace(&mut module.entry_points, vec![kept]);
@@ -174,7 +174,7 @@ fn keep_entry_alone(module: &mut Module, entry: usize, main: Word) {
     // Another fragment entry point of the same function would share its modes.
 }
 
-/// Enables device addresses; returns whether the module's memory model is Vulkan's.
+/// Enables device addresses. Returns whether the module uses the Vulkan memory model.
 pub(super) fn use_addresses(builder: &mut Builder) -> Result<bool, InjectError> {
     let model = builder.module_mut().memory_model.as_mut();
     let model = model.ok_or(InjectError::Malformed("no memory model"))?;
@@ -184,8 +184,8 @@ pub(super) fn use_addresses(builder: &mut Builder) -> Result<bool, InjectError> 
     Ok(model.operands.get(1) == Some(&Operand::MemoryModel(MemoryModel::Vulkan)))
 }
 
-/// The block of push constants with the draw's number in it, and the number's member: a member more in the
-/// shader's own block, or a block of its own.
+/// Declares the draw's number in the block of push constants: as an additional member of the shader's block,
+/// or in a new block. Returns the variable and the index of the member.
 fn draw_number(
     builder: &mut Builder,
     shader: &Shader,
@@ -203,8 +203,8 @@ fn draw_number(
         })
         .filter_map(|global| global.result_id)
         .collect();
-    // An entry point uses one block at most; a module of several entry points may have more. Drivers accept but one in
-    // an entry point's list, used or not.
+    // An entry point uses at most one block, but a module of several entry points may have more. Drivers
+    // accept only one in the list of an entry point, whether it is used or not.
     let listed = |variable: &Word| {
         let entry = shader.module.entry_points[shader.entry].operands.iter();
         entry.skip(3).any(|of| of.id_ref_any() == Some(*variable))
@@ -226,7 +226,7 @@ fn draw_number(
         builder.member_decorate(block, 0, Decoration::Offset, [offset]);
         let pointer = builder.type_pointer(None, StorageClass::PushConstant, block);
         let variable = builder.variable(pointer, None, StorageClass::PushConstant, None);
-        // From version 1.4 on an entry point lists all its variables.
+        // From version 1.4 on, an entry point lists all its variables.
         if shader
             .module
             .header
@@ -246,7 +246,7 @@ fn draw_number(
     if last >= target.push_constant_bytes {
         return Err(InjectError::PushConstants(target.push_constant_bytes));
     }
-    // The member's type has to stand before the block.
+    // The member's type must be declared before the block.
     let globals = &mut builder.module_mut().types_global_values;
     let of_type = globals
         .iter()
@@ -266,7 +266,7 @@ fn draw_number(
     Ok((variable, member))
 }
 
-/// The entry point's functions name a variable.
+/// Whether the functions of the entry point use a variable.
 fn is_used(shader: &Shader, variable: Word) -> bool {
     let names = |operand: &Operand| operand.id_ref_any() == Some(variable);
     shader

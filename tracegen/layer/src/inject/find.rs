@@ -1,27 +1,27 @@
-//! Which image instructions read texels, and what they read.
+//! Finds image instructions that read texels, and the operands that are recorded.
 
 use super::shader::{Shader, ids};
 use super::site::{Access, Binding, Form, Lod, Shape, TextureSite, What};
 use rspirv::dr::{Instruction, Operand};
 use rspirv::spirv::{Dim, ImageOperands, Op, Word};
 
-/// An image instruction that records, and what it records of its operands.
+/// An image instruction that reads texels, and its recorded operands.
 pub(super) struct Found {
     pub what: What,
     pub form: Form,
     /// Id of the coordinate.
     pub coordinate: Word,
-    /// Component of the coordinate that divides the others.
+    /// Index of the component of the coordinate that divides the others.
     pub divisor: Option<u32>,
-    /// Id of a level or bias that differs from fragment to fragment.
+    /// Id of a level or bias that varies between fragments.
     pub lod: Option<Word>,
-    /// Ids of the derivatives that the instruction names.
+    /// Ids of explicit derivatives.
     pub gradients: Option<[Word; 2]>,
-    /// Id of the element of the binding's array, where fragments choose it.
+    /// Id of the element of the binding's array, if it varies between fragments.
     pub element: Option<Word>,
 }
 
-/// The read of an instruction; `None` if it reads no texels.
+/// The texel read of an instruction; `None` if it reads no texels.
 pub(super) fn find(shader: &Shader, instruction: &Instruction) -> Option<Found> {
     let opcode = instruction.class.opcode;
     let kind = kind(opcode)?;
@@ -111,7 +111,7 @@ pub(super) fn find(shader: &Shader, instruction: &Instruction) -> Option<Found> 
 /// The operation of an opcode on an image.
 enum Kind {
     Known(Access),
-    /// Named, because it is left out.
+    /// Not recorded, with its name for the report.
     Other(&'static str),
 }
 
@@ -270,12 +270,12 @@ fn constant_offset(shader: &Shader, id: Word) -> Result<[i8; 2], &'static str> {
 struct Resolved {
     image: Option<Binding>,
     sampler: Option<Binding>,
-    /// Id of the element that fragments choose.
+    /// Id of an element that varies between fragments.
     element: Option<Word>,
 }
 
 impl Resolved {
-    /// Follows an image or sampled image to its descriptors; false where that is not one.
+    /// Traces an image or sampled image back to its descriptors; returns false if that fails.
     fn image(&mut self, shader: &Shader, id: Word, steps: u32) -> bool {
         let Some(definition) = shader.definition(id).filter(|_| shader.may_step(steps)) else {
             return false;
@@ -303,7 +303,7 @@ impl Resolved {
         }
     }
 
-    /// The descriptor that a value is loaded from, or a pointer points to.
+    /// The descriptor that a value is loaded from or a pointer points to.
     fn descriptor(&mut self, shader: &Shader, id: Word, steps: u32) -> Option<Binding> {
         let definition = shader.definition(id).filter(|_| shader.may_step(steps))?;
         if let Some((set, binding)) = shader.binding(id) {
@@ -345,7 +345,7 @@ impl Resolved {
         }
     }
 
-    /// The value that all calls of a function pass for a parameter, if it is the same.
+    /// Evaluates the argument for a parameter, if all calls of the function agree.
     fn through_calls(
         &mut self,
         shader: &Shader,

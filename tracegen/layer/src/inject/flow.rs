@@ -1,12 +1,13 @@
-//! Which blocks of an entry point every fragment executes once.
+//! Finds the blocks of an entry point that every fragment executes once.
 
 use super::shader::ids;
 use rspirv::dr::{Block, Function};
 use rspirv::spirv::{Op, Word};
 use std::collections::{HashMap, HashSet};
 
-/// Positions of the blocks that every fragment executes once, unless it is discarded or returns before: the first one,
-/// what follows it without a condition, and where branches and loops that do not return end.
+/// Indices of the blocks that every fragment executes exactly once, unless it is discarded or returns
+/// earlier: the first block, its unconditional successors, and the merge blocks of branches and loops that do
+/// not return.
 pub(super) fn unconditional(function: &Function) -> HashSet<usize> {
     let labels: HashMap<Word, usize> = (function.blocks.iter().enumerate())
         .filter_map(|(place, block)| Some((block.label.as_ref()?.result_id?, place)))
@@ -41,13 +42,13 @@ impl Flow<'_> {
         }
         let last = instructions.last()?;
         let target = *self.labels.get(ids(last).first()?)?;
-        // A loop's first block is executed again.
+        // The header of a loop is executed several times.
         let is_loop = self.blocks[target].instructions.iter();
         let is_loop = is_loop.clone().any(|i| i.class.opcode == Op::LoopMerge);
         (last.class.opcode == Op::Branch && !is_loop).then_some(target)
     }
 
-    /// A block between a header and its merge block returns.
+    /// Whether a block between a header and its merge block returns.
     fn returns(&self, header: usize, end: usize) -> bool {
         let mut seen = HashSet::from([end]);
         let mut open = vec![header];
@@ -62,7 +63,7 @@ impl Flow<'_> {
                 Op::Branch | Op::BranchConditional | Op::Switch => {
                     open.extend(ids(last).iter().filter_map(|id| self.labels.get(id)));
                 }
-                // Discarded fragments are detected by other means.
+                // Discarded fragments are detected in another way.
                 Op::Kill | Op::TerminateInvocation | Op::Unreachable => {}
                 _ => return true,
             }

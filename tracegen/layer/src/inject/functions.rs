@@ -1,8 +1,8 @@
 //! The functions that append records.
 //!
-//! A subgroup takes room for all its records at once. Then each lane stores its own coordinates; those of lanes that are
-//! not there, which derivatives need, are stored by the first lane of the quad that is. Stores of one lane after the
-//! other are what recording costs on a processor.
+//! A subgroup reserves space for all its records with one atomic operation. Then each lane stores its own
+//! coordinates. Derivatives also need the coordinates of lanes that are not active; the first active lane of
+//! the quad stores them. On a CPU, the consecutive stores of each lane are the main cost of recording.
 
 use super::declare::{Input, Inputs, Types, id};
 use super::writer::{BufferTypes, Result, Writer};
@@ -17,28 +17,28 @@ pub(super) struct Functions {
     buffer: BufferTypes,
     address: Word,
     scope: Scope,
-    /// The instructions of GLSL.
+    /// Id of the GLSL instruction set.
     extended: Word,
 }
 
-/// `FindILsb` of GLSL's instructions.
+/// `FindILsb` of the GLSL instruction set.
 const FIND_LOWEST: u32 = 73;
 
-/// Where a fragment is.
+/// Position of a fragment.
 struct FragmentPlace {
     /// Lane of the quad.
     lane: Word,
-    /// Column and row of the quad, and view.
+    /// Column and row of the quad, and the view, packed into a word.
     packed: Word,
-    /// Mask of only this lane.
+    /// Mask with only the bit of this lane.
     own: Word,
 }
 
-/// Lanes that come by.
+/// The active lanes at a site.
 struct Lanes {
-    /// Lanes of the quad.
+    /// Active lanes of the quad.
     quad: Word,
-    /// Of the subgroup: one bit for each, and those below the first lane of the quad, and of the lane.
+    /// Active lanes of the subgroup, if ballots are used.
     subgroup: Option<Subgroup>,
 }
 
@@ -48,7 +48,7 @@ struct Subgroup {
     below_lane: Word,
 }
 
-/// The record buffer.
+/// Pointer to the record buffer, and its capacity.
 #[derive(Clone, Copy)]
 struct Buffer {
     pointer: Word,
@@ -86,7 +86,7 @@ impl Functions {
         let (mut w, function, parameters) = Writer::begin(builder, self.types, &parameters)?;
         let w = &mut w;
         let (&group, at) = parameters.split_first().ok_or(NO_PARAMETERS)?;
-        // Before anything else: derivatives need all lanes of the quad.
+        // Derivatives need all lanes of the quad, so they come first.
         let slopes: Vec<[Word; 3]> = (at.iter())
             .map(|at| {
                 let [right, down] =
@@ -101,22 +101,22 @@ impl Functions {
         let lanes = self.lanes(w, &place);
         let header = self.header(w, group, lanes.quad, count << buffer::GROUPS_SHIFT);
         let units = 1 + 2 * count;
-        let (first_word, fits) = self.room(w, &lanes, buffer, units, true)?;
+        let (first_word, fits) = self.reserve(w, &lanes, buffer, units, true)?;
         let fits = w.guard(fits)?;
         let draw = self.draw(w);
         let primitive = w.loaded(self.inputs.primitive);
         let [zero, all] = [0, 15].map(|v| w.constant(v));
-        // The first lane of the quad stores for those that are not there.
+        // The first lane of the quad also stores the coordinates of inactive lanes.
         let absent = w.unsigned(Op::BitwiseXor, &[lanes.quad, all]);
         let is_first = is_lowest(w, lanes.quad, place.own);
         let absent = w.unsigned(Op::Select, &[is_first, absent, zero]);
         let [next_slot, next_left] = [0; 2].map(|_| w.builder.id());
         let (turn, of_turn) = w.turn(&[(place.lane, next_slot), (absent, next_left)])?;
         let (slot, left) = (of_turn[0], of_turn[1]);
-        let of_header = self.chosen(w, slot, [header, draw, place.packed, primitive]);
+        let of_header = self.select(w, slot, [header, draw, place.packed, primitive]);
         let to = w.unsigned(Op::IAdd, &[first_word, slot]);
         self.store(w, buffer, to, of_header)?;
-        let step = self.step(w, slot, place.lane);
+        let step = self.offset_between(w, slot, place.lane);
         let twice = w.unsigned(Op::IAdd, &[slot, slot]);
         let of_slot = w.unsigned(Op::IAdd, &[first_word, twice]);
         for (number, (at, slopes)) in at.iter().zip(&slopes).enumerate() {
@@ -161,7 +161,7 @@ impl Functions {
         let place = self.place(w);
         let lanes = self.lanes(w, &place);
         let header = self.header(w, group, place.own, buffer::FRAGMENT);
-        let (first_word, fits) = self.room(w, &lanes, buffer, buffer::FRAGMENT_UNITS, false)?;
+        let (first_word, fits) = self.reserve(w, &lanes, buffer, buffer::FRAGMENT_UNITS, false)?;
         let fits = w.guard(fits)?;
         let draw = self.draw(w);
         let primitive = w.loaded(self.inputs.primitive);
@@ -184,7 +184,7 @@ impl Functions {
         Ok(function)
     }
 
-    /// Where the fragment is.
+    /// Position of the fragment.
     fn place(&self, w: &mut Writer<'_>) -> FragmentPlace {
         let Types { f32, vec4, .. } = self.types;
         let Input { variable, .. } = self.inputs.frag_coord;
@@ -209,7 +209,7 @@ impl Functions {
         FragmentPlace { lane, packed, own }
     }
 
-    /// Active lanes; only the lane itself if it cannot detect the others.
+    /// The active lanes. Without ballots, only the lane itself.
     fn lanes(&self, w: &mut Writer<'_>, place: &FragmentPlace) -> Lanes {
         let Types {
             uvec4, bool, u32, ..
@@ -221,7 +221,7 @@ impl Functions {
             };
         };
         let invocation = w.loaded(invocation);
-        // Helper lanes do not vote.
+        // Helper lanes do not take part in ballots.
         let present = w.builder.constant_true(bool);
         let votes = w.of_subgroup(Op::GroupNonUniformBallot, uvec4, &[present]);
         let votes = w.extracted(votes, 0, u32);
@@ -250,7 +250,7 @@ impl Functions {
         w.unsigned(Op::BitwiseOr, &[header, kind])
     }
 
-    /// The record buffer and its capacity.
+    /// Pointer to the record buffer, and its capacity.
     fn buffer(&self, w: &mut Writer<'_>) -> Result<Buffer> {
         let one = w.constant(1);
         let pointer = w.pure(Op::ConvertUToPtr, self.buffer.buffer, &[self.address]);
@@ -259,9 +259,9 @@ impl Functions {
         Ok(Buffer { pointer, capacity })
     }
 
-    /// Takes room for a record of so many units: one of each quad, or one of each lane. Tells its first word, and whether
-    /// there was room.
-    fn room(
+    /// Reserves space for records of `units` units: one per quad, or one per lane. Returns the index of the
+    /// first word, and whether there was space.
+    fn reserve(
         &self,
         w: &mut Writer<'_>,
         lanes: &Lanes,
@@ -298,7 +298,7 @@ impl Functions {
                     let count = w.unsigned(Op::BitCount, &[of]);
                     w.unsigned(Op::IMul, &[count, units])
                 });
-                // One lane takes it for all.
+                // One lane reserves the space for all.
                 let elected = w.of_subgroup(Op::GroupNonUniformElect, bool, &[]);
                 let guard = w.guard(elected)?;
                 let taken = take(w, all);
@@ -320,7 +320,7 @@ impl Functions {
         w.store_word(to, value)
     }
 
-    /// Number of the draw.
+    /// Loads the number of the draw.
     fn draw(&self, w: &mut Writer<'_>) -> Word {
         let u32 = self.types.u32;
         let (block, member) = self.inputs.draw;
@@ -330,8 +330,8 @@ impl Functions {
         w.unsigned(Op::Load, &[draw])
     }
 
-    /// One of four values.
-    fn chosen(&self, w: &mut Writer<'_>, place: Word, values: [Word; 4]) -> Word {
+    /// Selects one of four values.
+    fn select(&self, w: &mut Writer<'_>, place: Word, values: [Word; 4]) -> Word {
         let [first, rest @ ..] = values;
         let mut chosen = first;
         for (number, value) in (1..).zip(rest) {
@@ -342,8 +342,8 @@ impl Functions {
         chosen
     }
 
-    /// The way from a lane to another one of its quad.
-    fn step(&self, w: &mut Writer<'_>, to: Word, from: Word) -> Step {
+    /// Offset from a lane to another lane of its quad.
+    fn offset_between(&self, w: &mut Writer<'_>, to: Word, from: Word) -> LaneOffset {
         let Types { f32, bool, .. } = self.types;
         let one = w.constant(1);
         let [right, down] = [0, 1].map(|bit| {
@@ -355,7 +355,7 @@ impl Functions {
             });
             w.pure(Op::FSub, f32, &[to, from])
         });
-        Step {
+        LaneOffset {
             types: self.types,
             right,
             down,
@@ -365,8 +365,8 @@ impl Functions {
     }
 }
 
-/// A direction within a quad.
-struct Step {
+/// Offset between two lanes of a quad.
+struct LaneOffset {
     types: Types,
     right: Word,
     down: Word,
@@ -374,9 +374,9 @@ struct Step {
     is_none: Word,
 }
 
-impl Step {
-    /// Coordinates at the end of the way, by their slopes at its start: to the right, downwards, and how the one changes
-    /// along the other.
+impl LaneOffset {
+    /// Coordinates at the end of the offset. `slopes` are the change to the right, the change downwards, and
+    /// the change of the first along the second.
     fn coordinates(&self, w: &mut Writer<'_>, at: Word, slopes: [Word; 3]) -> Word {
         let Types { vec2, f32, .. } = self.types;
         let mut found = at;
@@ -384,7 +384,7 @@ impl Step {
             let change = w.pure(Op::VectorTimesScalar, vec2, &[slope, by]);
             found = w.pure(Op::FAdd, vec2, &[found, change]);
         }
-        // Exactly its own coordinates, whatever the derivatives.
+        // At offset zero, use the exact coordinates instead of extrapolated ones, which may be NaN.
         let parts = [0, 1].map(|axis| {
             let [own, other] = [at, found].map(|of| w.extracted(of, axis, f32));
             w.pure(Op::Select, f32, &[self.is_none, own, other])
@@ -400,7 +400,7 @@ fn is_not_zero(w: &mut Writer<'_>, value: Word) -> Word {
     w.pure(Op::INotEqual, w.types.bool, &[value, zero])
 }
 
-/// A bit is in a mask, and the lowest one.
+/// Whether a bit is the lowest one in a mask.
 fn is_lowest(w: &mut Writer<'_>, mask: Word, bit: Word) -> Word {
     let zero = w.constant(0);
     let negative = w.unsigned(Op::ISub, &[zero, mask]);
@@ -408,7 +408,7 @@ fn is_lowest(w: &mut Writer<'_>, mask: Word, bit: Word) -> Word {
     w.pure(Op::IEqual, w.types.bool, &[lowest, bit])
 }
 
-/// One bit of each quad that has any.
+/// Mask with the first bit of each quad that has active lanes.
 fn quads_of(w: &mut Writer<'_>, votes: Word) -> Word {
     let mut any = votes;
     for by in [1, 2] {
@@ -420,7 +420,7 @@ fn quads_of(w: &mut Writer<'_>, votes: Word) -> Word {
     w.unsigned(Op::BitwiseAnd, &[any, firsts])
 }
 
-/// The instructions of GLSL, which most modules import.
+/// Id of the GLSL instruction set, which most modules import.
 fn extended_instructions(builder: &mut Builder) -> Word {
     const NAME: &str = "GLSL.std.450";
     let imports = &builder.module_ref().ext_inst_imports;

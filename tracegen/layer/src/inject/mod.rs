@@ -1,8 +1,9 @@
-//! SPIR-V words in, recording SPIR-V words out.
+//! Rewrites SPIR-V modules so that their fragment shaders record.
 //!
-//! Before instructions that read texels a fragment shader calls a function that appends a record to a buffer: where the
-//! quad is, what it belongs to, its coordinates at one or several of them. The buffer's address is a constant of the shader, so that neither
-//! descriptor sets nor their layouts change. The number of the draw is a push constant.
+//! Before instructions that read texels, the rewritten shader calls a function that appends a record to a
+//! buffer: the place of the quad, its draw and primitive, and the coordinates of one or several coordinate
+//! groups. The buffer's address is a constant in the shader, so descriptor sets and their layouts do not
+//! change. The number of the draw is a push constant.
 
 mod buffer;
 mod declare;
@@ -24,72 +25,72 @@ use rspirv::spirv::{BuiltIn, ExecutionMode, Op, StorageClass};
 use shader::Shader;
 use thiserror::Error;
 
-/// Properties of the device and of the pipeline that a recording shader depends on.
+/// Properties of the device and the pipeline that a recording shader depends on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Target {
     /// Device address of the record buffer.
     pub address: u64,
-    /// Offset of the draw's number among the push constants.
+    /// Offset of the draw's number in the push constants.
     pub push_constant_bytes: u32,
-    /// Whether lanes of a quad can exchange their coverage.
+    /// Whether ballots can determine the active lanes of a quad.
     pub ballots: bool,
-    /// The pass renders several views at once.
+    /// Whether the render pass has several views.
     pub multiview: bool,
 }
 
-/// Why a module is not rewritten.
+/// Reasons why a module is not rewritten.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum InjectError {
-    /// Not SPIR-V that the library supports.
+    /// SPIR-V that the library does not support.
     #[error("SPIR-V that cannot be parsed: {0}")]
     Parse(String),
-    /// Too many words.
+    /// A module that is too large.
     #[error("a module of {0} words")]
     TooLarge(usize),
-    /// No such fragment shader.
+    /// A module without the requested fragment shader.
     #[error("no fragment entry point")]
     NoFragmentEntry,
-    /// It breaks a rule of SPIR-V that the rewriting relies on.
+    /// A violation of a rule of SPIR-V that the rewriting relies on.
     #[error("malformed SPIR-V: {0}")]
     Malformed(&'static str),
-    /// It has more instructions than records can name.
+    /// More image instructions than the numbers in records can represent.
     #[error("{0} instructions that read texels: more than 65536")]
     TooManySites(usize),
-    /// It uses what it would have to be told of by the same means.
+    /// Push constants of the program at the place of the draw's number.
     #[error("push constants at byte {0} and above")]
     PushConstants(u32),
 }
 
-/// When fragments of a shader are tested for depth, as far as its own text decides.
+/// Order of depth test and shading, as far as the shader determines it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DepthTests {
-    /// Before or after it, without a difference: it neither discards nor writes anything but colours.
+    /// The order has no effect: the shader neither discards nor writes anything except colours.
     #[default]
     Either,
-    /// Before it: it says so.
+    /// The test comes first, because the shader declares it.
     Early,
-    /// Before it, but the depth is written after it: it discards.
+    /// The test comes first, but the depth is written after shading, because the shader discards.
     EarlyLateWrite,
-    /// After it: it writes depth, sample mask or memory.
+    /// The test comes last, because the shader writes depth, sample mask or memory.
     Late,
 }
 
-/// A fragment shader that records.
+/// A recording fragment shader.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recording {
     /// The module.
     pub words: Vec<u32>,
-    /// What it records.
+    /// The sites where it records.
     pub sites: Vec<Site>,
-    /// When its fragments are tested for depth.
+    /// Order of depth test and shading.
     pub tests: DepthTests,
 }
 
 /// Analyses a fragment shader without rewriting it.
 ///
 /// # Errors
-/// A module that cannot be read.
+/// The module cannot be parsed.
 pub fn depth_tests(words: &[u32], entry: Option<&str>) -> Result<DepthTests, InjectError> {
     Ok(tests_of(&Shader::parse(words, entry)?))
 }
@@ -97,7 +98,7 @@ pub fn depth_tests(words: &[u32], entry: Option<&str>) -> Result<DepthTests, Inj
 /// Rewrites the fragment shader `entry` of a module, or its only one, so that it records.
 ///
 /// # Errors
-/// A module that cannot be rewritten.
+/// The module cannot be rewritten.
 pub fn instrument(
     words: &[u32],
     entry: Option<&str>,
@@ -134,7 +135,7 @@ fn tests_of(shader: &Shader) -> DepthTests {
     }
 }
 
-/// An instruction changes what others may read.
+/// Whether an instruction writes memory that other fragments may read.
 fn writes_memory(shader: &Shader) -> impl Fn(&rspirv::dr::Instruction) -> bool {
     use rspirv::dr::Operand;
     let has_buffer_blocks = shader.module.annotations.iter().any(|a| {

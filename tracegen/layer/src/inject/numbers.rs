@@ -1,7 +1,8 @@
-//! Which values of a block are the same, so that one record can serve all instructions that sample there.
+//! Finds equal values in a block, so that one record can serve several image instructions.
 //!
-//! Value numbering: two results have the same number if the same pure operation made them of the same numbers. What is
-//! loaded from inputs and uniforms never changes; what is loaded from a shader's own variable is what was stored last.
+//! Value numbering: two results have the same number if the same pure operation computes them from operands
+//! with the same numbers. Values loaded from inputs and uniforms are constant. A value loaded from a variable
+//! of the shader is the value last stored to it.
 
 use super::shader::{Shader, ids};
 use rspirv::dr::{Instruction, Operand};
@@ -14,11 +15,11 @@ pub(super) type Number = u32;
 /// Definition of a value number.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 enum Key {
-    /// A value that is only identified by its id.
+    /// A value identified by its id.
     Id(Word),
-    /// An operation: opcode, type, and its operands.
+    /// A pure operation: opcode, type and operands.
     Operation(Op, Word, Vec<OperandKey>),
-    /// Memory behind a pointer since a point in the program.
+    /// Memory behind a pointer, unchanged since a point in time.
     Memory(Number, u32),
 }
 
@@ -34,16 +35,16 @@ pub(super) struct Numbers {
     numbers: HashMap<Key, Number>,
     of_ids: HashMap<Word, Number>,
     next: Number,
-    /// Counts changes of memory.
+    /// Number of memory changes so far.
     time: u32,
-    /// When all of a shader's own variables may have changed last.
+    /// Time of the last change that may have affected all variables of the shader.
     all_changed: u32,
-    /// When one of them did.
+    /// Time of the last change of a single variable.
     changed: HashMap<Word, u32>,
 }
 
 impl Numbers {
-    /// Takes the next instruction of the function, block by block.
+    /// Processes the next instruction of the function, in order.
     pub fn take(&mut self, shader: &Shader, instruction: &Instruction) {
         match instruction.class.opcode {
             Op::Store => self.store(shader, &ids(instruction)),
@@ -57,7 +58,8 @@ impl Numbers {
         }
     }
 
-    /// Any variable may have changed: another block begins, which may be reached from elsewhere.
+    /// Assumes that all variables have changed. Called at the start of a block, which may have several
+    /// predecessors.
     pub fn forget(&mut self) {
         self.time += 1;
         self.all_changed = self.time;
@@ -121,14 +123,14 @@ impl Numbers {
         Key::Operation(opcode, result_type, parts)
     }
 
-    /// Memory behind a pointer now; `None` if other fragments may change it.
+    /// Current memory behind a pointer; `None` if other fragments may change it.
     fn loaded(&mut self, shader: &Shader, pointer: Word) -> Option<Key> {
         let time = match memory(shader, pointer) {
             Memory::Constant => 0,
             Memory::Own => {
                 let variable = variable(shader, pointer)?;
                 let changed = self.changed.get(&variable).copied();
-                // Never the time of what is constant.
+                // Starts at 1, because 0 is the time of constants.
                 1 + changed.unwrap_or(0).max(self.all_changed)
             }
             Memory::Shared => return None,
@@ -137,10 +139,10 @@ impl Numbers {
     }
 }
 
-/// The variable that a pointer points into.
+/// The variable that contains the pointer's target.
 fn variable(shader: &Shader, pointer: Word) -> Option<Word> {
     let mut at = pointer;
-    // Longer chains than any compiler makes.
+    // No compiler creates longer chains.
     for _ in 0..8 {
         let definition = shader.definition(at)?;
         match definition.class.opcode {
@@ -154,11 +156,11 @@ fn variable(shader: &Shader, pointer: Word) -> Option<Word> {
     None
 }
 
-/// Who changes what a pointer points to.
+/// Which fragments can change the target of a pointer.
 enum Memory {
     /// Constant during a draw.
     Constant,
-    /// The fragment itself.
+    /// Only the fragment itself.
     Own,
     /// Any fragment.
     Shared,
@@ -171,7 +173,7 @@ fn memory(shader: &Shader, pointer: Word) -> Memory {
             StorageClass::Input | StorageClass::UniformConstant | StorageClass::PushConstant => {
                 Memory::Constant
             }
-            // In old modules storage buffers have this class, too.
+            // In old modules, storage buffers also have this class.
             StorageClass::Uniform if has_buffer_blocks(shader) => Memory::Shared,
             StorageClass::Uniform => Memory::Constant,
             StorageClass::Function | StorageClass::Private => Memory::Own,
@@ -187,7 +189,7 @@ fn has_buffer_blocks(shader: &Shader) -> bool {
     annotations.iter().any(|a| a.operands.get(1) == decoration)
 }
 
-/// `Modf` and `Frexp` of GLSL's instructions store through a pointer.
+/// `Modf` and `Frexp` of the GLSL instruction set, which store through a pointer.
 const STORING_EXTENDED: [u32; 2] = [35, 51];
 
 fn changes_memory(instruction: &Instruction) -> bool {

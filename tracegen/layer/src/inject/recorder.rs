@@ -1,4 +1,4 @@
-//! Calls of the functions that append records, with what they are called with.
+//! Generates calls of the recording functions with their arguments.
 
 use super::declare::{self, Input, Inputs, Types, id, literal};
 use super::functions::Functions;
@@ -9,7 +9,7 @@ use rspirv::dr::{Builder, Instruction, Module, Operand};
 use rspirv::spirv::{Op, Word};
 use std::collections::HashMap;
 
-/// Adds to a module what its calls need.
+/// Generates calls in a module.
 pub(super) struct Recorder {
     pub builder: Builder,
     types: Types,
@@ -17,14 +17,14 @@ pub(super) struct Recorder {
     zero: Word,
     uzero: Word,
     functions: Functions,
-    /// `void quads(uint group, vec2 at[n])` by the number of coordinates.
+    /// `void quads(uint group, vec2 at[n])`, by n.
     quads: HashMap<usize, Word>,
     /// `void fragment(uint group, uint element, vec3 at, float lod, vec3 dx, vec3 dy)`
     fragment: Option<Word>,
 }
 
 impl Recorder {
-    /// Declares what functions that record need.
+    /// Declares what the recording functions need.
     pub fn new(shader: &Shader, target: &Target) -> Result<Self, InjectError> {
         let mut builder = declare::builder(shader, target);
         let vulkan_memory = declare::use_addresses(&mut builder)?;
@@ -47,7 +47,7 @@ impl Recorder {
         self.builder.module()
     }
 
-    /// Records the active lanes of a quad, with coordinates.
+    /// Records the active lanes of a quad and their coordinates.
     pub fn record_quads(
         &mut self,
         group: u16,
@@ -71,7 +71,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Records lanes, with their depth as coordinate u.
+    /// Records the active lanes and their depth as coordinate u.
     pub fn record_depth(
         &mut self,
         group: u16,
@@ -83,7 +83,7 @@ impl Recorder {
         self.record_quads(group, &[vec![depth]], out)
     }
 
-    /// Records that lanes come by.
+    /// Records the active lanes without coordinates.
     pub fn record_presence(
         &mut self,
         group: u16,
@@ -92,7 +92,7 @@ impl Recorder {
         self.record_quads(group, &[], out)
     }
 
-    /// Records the coordinates of a fragment, with level and derivatives where it has any.
+    /// Records the coordinates of a fragment, with its level and derivatives if it has any.
     pub fn record_fragment(
         &mut self,
         group: u16,
@@ -124,7 +124,7 @@ impl Recorder {
         self.put(out, Op::FunctionCall, self.types.void, operands);
     }
 
-    /// Derivatives of coordinates, exchanged between the lanes of a quad.
+    /// Derivatives of coordinates over the quad.
     pub fn derivatives(&mut self, at: &[Word], out: &mut Vec<Instruction>) -> [Vec<Word>; 2] {
         [Op::DPdxFine, Op::DPdyFine].map(|opcode| {
             let f32 = self.types.f32;
@@ -174,7 +174,7 @@ impl Recorder {
         }
     }
 
-    /// A quotient.
+    /// Divides two floats.
     pub fn divided(&mut self, a: Word, b: Word, out: &mut Vec<Instruction>) -> Word {
         self.put(out, Op::FDiv, self.types.f32, vec![id(a), id(b)])
     }

@@ -1,4 +1,4 @@
-//! Inserts the calls that record, and the declarations that they need.
+//! Inserts calls of the recording functions and the declarations that they need.
 
 use super::find::Found;
 use super::recorder::Recorder;
@@ -10,7 +10,7 @@ use rspirv::binary::Assemble;
 use rspirv::dr::{Instruction, Operand};
 use rspirv::spirv::{ExecutionMode, Op, Word};
 
-/// The recording module, and its sites.
+/// Rewrites a module. Returns its words and its sites.
 pub(super) fn rewrite(
     shader: Shader,
     tests: DepthTests,
@@ -20,7 +20,7 @@ pub(super) fn rewrite(
     let (functions, main) = (shader.functions.clone(), shader.main);
     let mut recorder = Recorder::new(&shader, target)?;
     if tests == DepthTests::Either || tests == DepthTests::EarlyLateWrite {
-        // The discarding shader is used by an additional draw, which writes nothing.
+        // The rewritten discarding shader is used by an additional draw, which writes nothing.
         recorder
             .builder
             .execution_mode(main, ExecutionMode::EarlyFragmentTests, []);
@@ -58,7 +58,7 @@ pub(super) fn rewrite(
     Ok((recorder.finish().assemble(), sites.sites))
 }
 
-/// Records coordinate groups before an instruction is executed.
+/// Inserts the recording of coordinate groups before an instruction.
 fn record(
     recorder: &mut Recorder,
     shader: &Shader,
@@ -81,7 +81,7 @@ fn record(
     }
 }
 
-/// Coordinates as 32-bit floats, divided where the instruction does so.
+/// Coordinates as 32-bit floats, divided if the instruction divides them.
 fn coordinates(
     recorder: &mut Recorder,
     shader: &Shader,
@@ -120,7 +120,7 @@ fn record_fragment(
     recorder.record_fragment(group, element, &at, lod, gradients, out)
 }
 
-/// Appends an instruction with a result, and returns its id.
+/// Appends an instruction with a result, and returns the id of the result.
 pub(super) fn put(
     builder: &mut rspirv::dr::Builder,
     out: &mut Vec<Instruction>,

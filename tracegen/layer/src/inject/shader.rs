@@ -1,4 +1,4 @@
-//! A parsed module and one of its entry points: definitions, types, descriptors, and the functions that can be reached.
+//! A parsed module and one of its entry points: definitions, types, descriptors, and the reachable functions.
 
 use super::InjectError;
 use rspirv::dr::{Instruction, Module, Operand};
@@ -6,32 +6,32 @@ use rspirv::spirv::{BuiltIn, Decoration, ExecutionMode, ExecutionModel, Op, Stor
 use std::cell::Cell;
 use std::collections::{HashMap, HashSet};
 
-/// A fragment shader within its module.
+/// A fragment shader in its module.
 pub(super) struct Shader {
     pub module: Module,
-    /// Position of its entry point in the module.
+    /// Index of its entry point in the module.
     pub entry: usize,
     /// Function of the entry point.
     pub main: Word,
-    /// Positions of the functions that it can reach, itself included.
+    /// Indices of the functions that it can reach, including itself.
     pub functions: Vec<usize>,
     /// Instruction that defines each result.
     definitions: HashMap<Word, Instruction>,
-    /// Function and position of each parameter.
+    /// Function and index of each parameter.
     parameters: HashMap<Word, (Word, usize)>,
     /// Arguments of every call of a function.
     calls: HashMap<Word, Vec<Vec<Word>>>,
-    /// Set and binding of each variable that has them.
+    /// Set and binding of the variables that have them.
     bindings: HashMap<Word, (u32, u32)>,
-    /// Definitions that may still be followed in the search for a descriptor.
+    /// Number of definitions that the current search may still visit.
     steps_left: Cell<u32>,
 }
 
-/// Deepest chain of copies and parameters that is followed, and definitions looked at in all: a malformed module
-/// may have functions that call themselves.
+/// Limits of a search for a descriptor: depth, and number of visited definitions. In a malformed module,
+/// functions may call themselves.
 const MOST_STEPS: (u32, u32) = (16, 1000);
 
-/// Largest number of words of a module that is rewritten: programs' are a hundredth of that.
+/// Largest number of words of a module that is rewritten, about a hundred times that of usual modules.
 const MOST_WORDS: usize = 1 << 22;
 
 impl Shader {
@@ -169,7 +169,7 @@ impl Shader {
         self.bindings.get(&variable).copied()
     }
 
-    /// Arguments of a parameter, call by call; `None` for other values.
+    /// Arguments for a parameter, by call; `None` for other values.
     pub fn arguments(&self, parameter: Word) -> Option<Vec<Word>> {
         let (function, place) = self.parameters.get(&parameter)?;
         let calls = self.calls.get(function).map_or(&[][..], Vec::as_slice);
@@ -181,14 +181,14 @@ impl Shader {
         self.steps_left.set(MOST_STEPS.1);
     }
 
-    /// Takes a step of the search, unless it went too far.
+    /// Counts a step of the search. Returns false if a limit is exceeded.
     pub fn may_step(&self, depth: u32) -> bool {
         let left = self.steps_left.get();
         self.steps_left.set(left.saturating_sub(1));
         left > 0 && depth < MOST_STEPS.0
     }
 
-    /// Value of a constant, bits of a float too. Those that can be specialised are none.
+    /// Value of a constant, or the bits of a float; `None` for specialisation constants.
     pub fn constant(&self, id: Word) -> Option<u32> {
         let definition = self.definition(id)?;
         match (definition.class.opcode, definition.operands.first()) {
@@ -198,7 +198,7 @@ impl Shader {
         }
     }
 
-    /// Instructions of the functions that the entry point reaches.
+    /// Instructions of the functions that the entry point can reach.
     pub fn instructions(&self) -> impl Iterator<Item = &Instruction> {
         let functions = self.functions.iter().map(|f| &self.module.functions[*f]);
         functions
@@ -206,7 +206,7 @@ impl Shader {
             .flat_map(|block| &block.instructions)
     }
 
-    /// The entry point has an execution mode.
+    /// Whether the entry point has an execution mode.
     pub fn has_mode(&self, wanted: ExecutionMode) -> bool {
         self.module.execution_modes.iter().any(|mode| {
             mode.operands.first() == Some(&Operand::IdRef(self.main))
@@ -214,7 +214,7 @@ impl Shader {
         })
     }
 
-    /// The variable of the entry point's interface that is a built-in.
+    /// The interface variable of the entry point for a built-in.
     pub fn builtin(&self, wanted: BuiltIn, class: StorageClass) -> Option<Word> {
         let interface = self.module.entry_points[self.entry].operands.get(3..)?;
         let is_wanted = |id: &Word| {
@@ -233,7 +233,7 @@ impl Shader {
     }
 }
 
-/// Refuses instructions that reach beyond the module: the parser relies on that.
+/// Rejects instructions that extend beyond the module, because the parser does not check this.
 fn check_lengths(words: &[u32]) -> Result<(), InjectError> {
     const HEADER_WORDS: usize = 5;
     let mut rest = words.get(HEADER_WORDS..).unwrap_or_default();
@@ -245,7 +245,7 @@ fn check_lengths(words: &[u32]) -> Result<(), InjectError> {
     Ok(())
 }
 
-/// The ids among an instruction's operands.
+/// The ids in an instruction's operands.
 pub(super) fn ids(instruction: &Instruction) -> Vec<Word> {
     let operands = instruction.operands.iter();
     operands.filter_map(Operand::id_ref_any).collect()

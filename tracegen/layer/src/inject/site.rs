@@ -1,27 +1,27 @@
-//! Sites of an instrumented shader, and their records.
+//! Sites of a recording shader: the places where it records.
 
 use serde::{Deserialize, Serialize};
 
-/// A descriptor that an instruction reads through.
+/// Descriptor that an instruction reads through.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Binding {
     /// Descriptor set.
     pub set: u32,
     /// Binding in the set.
     pub binding: u32,
-    /// Element of the binding's array; `None` where each fragment chooses it.
+    /// Element of the binding's array; `None` if it varies between fragments.
     pub element: Option<u32>,
 }
 
-/// Operation of an instruction on a texture.
+/// Operation of an image instruction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Access {
-    /// Filters texels.
+    /// Filtered texels.
     Sample,
-    /// Takes four texels of a bilinear footprint.
+    /// Four texels of a bilinear footprint.
     Gather,
-    /// Takes one texel by its integer coordinates.
+    /// One texel at integer coordinates.
     Fetch,
 }
 
@@ -31,51 +31,51 @@ pub enum Access {
 pub enum Shape {
     /// Two-dimensional.
     Flat,
-    /// Layers of two-dimensional ones; the last coordinate chooses.
+    /// Layers of two-dimensional textures; the last coordinate selects the layer.
     Array,
     /// Six faces; the coordinate is a direction.
     Cube,
 }
 
-/// Where the level of detail comes from.
+/// Source of the level of detail.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Lod {
     /// Derivatives of the coordinates.
     Derivatives,
-    /// These, and a bias: the same for all fragments or, if `None`, in the record.
+    /// The derivatives and a bias, which is the same for all fragments or, if `None`, in the record.
     Bias(Option<f32>),
-    /// The instruction names it, likewise.
+    /// A level specified by the instruction; the same for all fragments or, if `None`, in the record.
     Explicit(Option<f32>),
-    /// Derivatives that the instruction names; they are in the record.
+    /// Explicit derivatives, which are in the record.
     Gradients,
 }
 
-/// Form of a site's records.
+/// Form of the records of a site.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Form {
-    /// One for the lanes of a quad that are active together.
+    /// One record for the active lanes of a quad.
     Quad,
-    /// One per fragment, with a third coordinate, a level and its own derivatives.
+    /// One record per fragment, with a third coordinate, a level and derivatives.
     Fragment,
 }
 
-/// Record of a site.
+/// What a site records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum What {
-    /// An access of a texture.
+    /// A texture access.
     Texture(TextureSite),
-    /// A fragment that starts, with its depth as coordinate u.
+    /// The start of a fragment, with its depth as coordinate u.
     Coverage,
-    /// A fragment that ends without having been discarded.
+    /// The end of a fragment that was not discarded.
     Survival,
-    /// An access that no trace can hold, by its name.
+    /// An access that a trace cannot represent, with its name.
     LeftOut(String),
 }
 
-/// An access of a texture.
+/// A texture access.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TextureSite {
     /// The operation.
@@ -84,9 +84,9 @@ pub struct TextureSite {
     pub shape: Shape,
     /// The image.
     pub image: Binding,
-    /// The sampler, if any: the image's own binding where both are one.
+    /// Binding of the sampler, if any. For a combined image sampler, it equals that of the image.
     pub sampler: Option<Binding>,
-    /// Where the level comes from.
+    /// Source of the level of detail.
     pub lod: Lod,
     /// Texel offset.
     pub offset: [i8; 2],
@@ -95,12 +95,12 @@ pub struct TextureSite {
 /// A place in a shader that records.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Site {
-    /// Its record.
+    /// What it records.
     pub what: What,
     /// Form of its records.
     pub form: Form,
-    /// Coordinate group, which sites with the same coordinates in the same lanes share.
+    /// Number of the coordinate group. Sites with the same coordinates in the same lanes share a group.
     pub group: u16,
-    /// Every fragment comes by, before any is discarded.
+    /// Whether every fragment reaches the site before any is discarded.
     pub unconditional: bool,
 }

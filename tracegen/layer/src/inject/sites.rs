@@ -1,4 +1,4 @@
-//! The sites of a shader, their coordinate groups, and the places where groups are recorded together.
+//! Finds the sites of a shader, their coordinate groups, and the places where groups are recorded together.
 
 use super::buffer::MOST_GROUPS;
 use super::find::{Found, find};
@@ -11,28 +11,28 @@ use rspirv::dr::{Function, Instruction};
 use rspirv::spirv::Op;
 use std::collections::{HashMap, HashSet};
 
-/// Function, block and instruction.
+/// Indices of function, block and instruction.
 pub(super) type At = (usize, usize, usize);
 
-/// A record: coordinate groups with consecutive numbers that the same lanes record at once, before an instruction.
+/// Coordinate groups with consecutive numbers that the same lanes record together, before an instruction.
 pub(super) struct Batch {
     /// Number of the first group.
     pub group: u16,
-    /// An instruction of each group.
+    /// One instruction per group.
     pub of: Vec<Found>,
     at: At,
 }
 
-/// The sites of a shader, and where they record.
+/// The sites of a shader and their batches.
 pub(super) struct Sites {
     pub sites: Vec<Site>,
-    /// Position of the entry point's function.
+    /// Index of the entry point's function.
     pub main: usize,
-    /// By the instruction before which they are recorded.
+    /// Batches by the instruction that they precede.
     pub batches: HashMap<At, Batch>,
-    /// Group of every started fragment, if no other site records it or if depths are needed.
+    /// Group for the start of each fragment, if no other site records it or if depths are needed.
     pub entry: Option<u16>,
-    /// Group of every fragment that ends.
+    /// Group for the end of each fragment.
     pub end: Option<u16>,
 }
 
@@ -58,7 +58,7 @@ impl Sites {
             batches,
             ..
         } = search;
-        // Groups are numbered batch by batch, so the first number determines all.
+        // Groups are numbered batch by batch, so the first number of a batch determines the others.
         let mut next = 0;
         let mut numbers = Vec::with_capacity(batches.len());
         for batch in &batches {
@@ -109,7 +109,7 @@ impl Sites {
     }
 }
 
-/// Fragments may end, or become helpers.
+/// Whether an instruction may end fragments or turn them into helper invocations.
 fn discards(opcode: Op) -> bool {
     matches!(
         opcode,
@@ -117,7 +117,7 @@ fn discards(opcode: Op) -> bool {
     )
 }
 
-/// Place of a coordinate group while batches still grow.
+/// Place of a coordinate group. Its number is not known until all batches are complete.
 #[derive(Clone, Copy)]
 struct Group {
     batch: usize,
@@ -138,7 +138,7 @@ struct Search<'a> {
     batches: Vec<Batch>,
 }
 
-/// Lanes that are the same: coordinates that they have recorded, and the batch that may still grow.
+/// Code that the same lanes execute: the coordinates recorded so far, and the batch that may still grow.
 #[derive(Default)]
 struct SameLanes {
     groups: HashMap<Number, Group>,
@@ -154,7 +154,8 @@ impl Search<'_> {
             HashSet::new()
         };
         let mut demoted = false;
-        // Lanes are the same within a block and, unless some are discarded, in all blocks that every fragment executes.
+        // The same lanes execute all of a block and, unless some are discarded, all blocks that every
+        // fragment executes.
         let mut of_all = SameLanes::default();
         for (block, body) in function.blocks.iter().enumerate() {
             numbers.forget();
@@ -191,7 +192,7 @@ impl Search<'_> {
     ) {
         let is_texture = matches!(found.what, What::Texture(_));
         let is_quad = is_texture && found.form == Form::Quad;
-        // All that is recorded of it is its coordinates.
+        // The record has only the coordinates, so that other instructions can share it.
         let is_plain = is_quad && found.divisor.is_none();
         let (what, form) = (found.what.clone(), found.form);
         let known = lanes.groups.get(&coordinate).copied().filter(|_| is_plain);
@@ -210,7 +211,7 @@ impl Search<'_> {
         });
     }
 
-    /// A new group: in the batch that the same lanes started, or in a new batch.
+    /// Adds a group to the batch of the same lanes, or to a new batch.
     fn group(&mut self, found: Found, at: At, joins: bool, lanes: &mut SameLanes) -> Group {
         let open = lanes.batch.filter(|_| joins);
         if let Some(number) = open
@@ -237,7 +238,7 @@ impl Search<'_> {
     }
 }
 
-/// Instructions that have to stay first in a block.
+/// Whether an instruction must stay at the start of its block.
 pub(super) fn stays_first(instruction: &Instruction) -> bool {
     matches!(
         instruction.class.opcode,

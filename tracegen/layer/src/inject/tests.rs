@@ -10,7 +10,7 @@ const TARGET: Target = Target {
     multiview: false,
 };
 
-/// Declarations of every shader in these tests.
+/// Declarations of all shaders in these tests.
 const HEAD: &str = "
 @group(0) @binding(0) var color: texture_2d<f32>;
 @group(0) @binding(1) var linear: sampler;
@@ -46,7 +46,7 @@ fn module(text: &str) -> Vec<u32> {
     naga::back::spv::write_vec(&module, &info, &options, None).expect("SPIR-V")
 }
 
-/// Rewrites a shader for every target and holds the result to `spirv-val`, where that is installed.
+/// Rewrites a shader for every target, and validates the results with `spirv-val` if it is installed.
 fn instrumented(words: &[u32]) -> Recording {
     for (ballots, multiview) in [(false, false), (false, true), (true, true)] {
         let target = Target {
@@ -151,7 +151,7 @@ fn groups(recording: &Recording) -> Vec<u16> {
     recording.sites.iter().map(|site| site.group).collect()
 }
 
-/// Calls of functions in a module whose program has no functions of its own.
+/// Number of calls in a module that had none before it was rewritten.
 fn calls(recording: &Recording) -> usize {
     let module = rspirv::dr::load_words(&recording.words).expect("a module");
     let all = module.all_inst_iter();
@@ -159,7 +159,7 @@ fn calls(recording: &Recording) -> usize {
 }
 
 #[test]
-fn lanes_that_stay_the_same_are_recorded_once_and_others_where_they_change() {
+fn unchanged_lanes_are_recorded_once_and_changed_lanes_again() {
     let text = |between: &str| {
         shader(&format!(
             "var c = textureSample(color, linear, in.uv);
@@ -169,10 +169,10 @@ fn lanes_that_stay_the_same_are_recorded_once_and_others_where_they_change() {
     };
     let branch = "if in.number > 1u { c += textureSampleLevel(color, linear, in.uv * 3.0, 0.0); }";
     let recording = instrumented(&text(branch));
-    // The branch has its own record; the rest is one of two groups.
+    // The branch has its own record; the others are in one record of two groups.
     assert_eq!(groups(&recording), [0, 2, 1, 0]);
     assert_eq!(calls(&recording), 2);
-    // After fragments were discarded, fewer sample: the start, two records, the end.
+    // After a discard fewer lanes are active: the start, two records, the end.
     let recording = instrumented(&text("if c.x > 0.5 { discard; }"));
     assert_eq!(groups(&recording)[..3], [0, 1, 2]);
     assert_eq!(calls(&recording), 4);
@@ -193,7 +193,7 @@ fn a_record_has_eight_groups_at_most() {
 }
 
 #[test]
-fn every_way_of_choosing_a_level_is_told() {
+fn every_source_of_a_level_of_detail_is_recognised() {
     let recording = instrumented(&shader(
         "var c = textureSampleBias(color, linear, in.uv, -1.5);
         c += textureSampleBias(color, linear, in.uv, in.normal.x);
@@ -250,7 +250,7 @@ fn arrays_and_cubes_have_records_of_fragments_and_volumes_are_left_out_by_name()
     assert_eq!(shapes, [Shape::Array, Shape::Cube]);
     let left_out = What::LeftOut("three-dimensional textures".to_owned());
     assert_eq!(recording.sites[2].what, left_out);
-    // None of the three records the coverage of a quad.
+    // None of the three records determines the coverage of a quad.
     assert_eq!(
         recording.sites.last().map(|site| &site.what),
         Some(&What::LeftOut("three-dimensional textures".to_owned()))
@@ -283,7 +283,7 @@ fn samples_of_a_branch_do_not_cover_the_quad() {
 }
 
 #[test]
-fn a_shader_that_discards_records_what_starts_and_what_survives() {
+fn a_shader_that_discards_records_started_and_surviving_fragments() {
     let recording = instrumented(&shader(
         "let c = textureSample(color, linear, in.uv);
         if c.a < 0.5 { discard; }
@@ -313,7 +313,7 @@ fn shaders_that_write_depth_or_memory_are_tested_late() {
 }
 
 #[test]
-fn push_constants_of_the_shader_stay_where_they_are() {
+fn push_constants_of_the_shader_keep_their_offsets() {
     let text = |size: u32| {
         format!(
             "struct Constants {{ scale: array<vec4<f32>, {size}> }}
@@ -329,7 +329,7 @@ fn push_constants_of_the_shader_stay_where_they_are() {
     assert_eq!(push_constants(&recording.words), 1);
 }
 
-/// Blocks of push constants: drivers refuse a second one.
+/// Number of push constant blocks. Drivers refuse a second one.
 fn push_constants(words: &[u32]) -> usize {
     use rspirv::{dr::Operand, spirv::StorageClass};
     let class = Some(&Operand::StorageClass(StorageClass::PushConstant));
@@ -340,7 +340,7 @@ fn push_constants(words: &[u32]) -> usize {
 }
 
 #[test]
-fn push_constants_that_the_shader_does_not_use_get_the_number_too() {
+fn unused_push_constant_blocks_also_get_the_number() {
     let unused = "struct Constants { scale: vec4<f32> }
         var<immediate> constants: Constants;
         @vertex fn vertex() -> @builtin(position) vec4<f32> { return constants.scale; }
@@ -388,14 +388,14 @@ fn textures_reached_through_functions_are_found_if_all_calls_agree() {
 }
 
 #[test]
-fn what_is_no_spirv_is_refused() {
+fn invalid_spirv_is_refused() {
     for words in [&[][..], &[0x0723_0203], &[1, 2, 3, 4, 5]] {
         let error = instrument(words, None, &TARGET).expect_err("refused");
         assert!(matches!(error, InjectError::Parse(_)), "{error}");
     }
 }
 
-/// A shader with most of what is rewritten.
+/// A shader with most of the constructs that are rewritten.
 fn rich() -> Vec<u32> {
     shader(
         "var c = textureSample(color, linear, in.uv);

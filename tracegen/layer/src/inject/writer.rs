@@ -1,4 +1,4 @@
-//! Builds the instructions of a separate function: a cursor at the end of its last block.
+//! Builds the instructions of a function, at the end of its last block.
 
 use super::declare::{Input, Types, id, literal};
 use super::{COUNTER_BYTES, InjectError};
@@ -10,19 +10,20 @@ use rspirv::spirv::{
 
 pub(super) type Result<T = Word> = std::result::Result<T, InjectError>;
 
-/// Pointers into the record buffer.
+/// Pointer types for the record buffer.
 #[derive(Clone, Copy)]
 pub(super) struct BufferTypes {
-    /// To the buffer.
+    /// Pointer to the buffer.
     pub buffer: Word,
-    /// To one of its words.
+    /// Pointer to a word of the buffer.
     pub word: Word,
 }
 
 impl BufferTypes {
     /// `struct Buffer { uint count; uint capacity; uint words[]; }`
     pub fn new(builder: &mut Builder, types: Types) -> Self {
-        // Types of their own: a decoration may not meet a type of the shader's that looks the same.
+        // New types instead of existing equal ones, because the decorations must not apply to types of the
+        // shader.
         let mut declare = |opcode: Op, operands: &[Word]| {
             let result = builder.id();
             let operands = operands.iter().copied().map(id).collect();
@@ -46,21 +47,21 @@ impl BufferTypes {
     }
 }
 
-/// A function that is being written.
+/// A function under construction.
 pub(super) struct Writer<'a> {
     pub builder: &'a mut Builder,
     pub types: Types,
-    /// Label of the block under way.
+    /// Label of the current block.
     block: Word,
 }
 
-/// A branch that was taken: its header, and the block where both ways meet.
+/// A conditional branch: its header and its merge block.
 pub(super) struct Guard {
     header: Word,
     end: Word,
 }
 
-/// A loop: its header, where it goes on and where it ends.
+/// A loop: its header, continue target and merge block.
 pub(super) struct Loop {
     header: Word,
     next: Word,
@@ -68,7 +69,7 @@ pub(super) struct Loop {
 }
 
 impl<'a> Writer<'a> {
-    /// Begins a function without a result. Tells its id and those of its parameters.
+    /// Begins a function without a result. Returns its id and those of its parameters.
     pub fn begin(
         builder: &'a mut Builder,
         types: Types,
@@ -103,7 +104,7 @@ impl<'a> Writer<'a> {
         started.map(drop).map_err(builder_error)
     }
 
-    /// Goes on where a condition holds.
+    /// Starts a block that is executed only if a condition holds.
     pub fn guard(&mut self, condition: Word) -> Result<Guard> {
         let [yes, end] = [self.builder.id(), self.builder.id()];
         let header = self.block;
@@ -114,13 +115,13 @@ impl<'a> Writer<'a> {
         Ok(Guard { header, end })
     }
 
-    /// Goes on where both ways of a guard meet.
+    /// Starts the merge block of a guard.
     pub fn merge(&mut self, guard: &Guard) -> Result<()> {
         self.builder.branch(guard.end).map_err(builder_error)?;
         self.start(guard.end)
     }
 
-    /// Likewise, with a value of the guarded way, and another one where the condition does not hold.
+    /// Starts the merge block of a guard. Returns `value` if the condition held, and `other` if not.
     pub fn merge_value(&mut self, guard: &Guard, value: Word, other: Word) -> Result {
         let from = self.block;
         self.merge(guard)?;
@@ -128,8 +129,8 @@ impl<'a> Writer<'a> {
         Ok(self.pure(Op::Phi, self.types.u32, &pairs))
     }
 
-    /// Begins a loop that is executed at least once, with values that change from turn to turn: their first ones, and
-    /// ids of the next ones, which have yet to be defined.
+    /// Starts a loop that is executed at least once. Each pair in `values` has the value for the first
+    /// iteration, and the id of the value for the next iteration, which is defined later.
     pub fn turn(&mut self, values: &[(Word, Word)]) -> Result<(Loop, Vec<Word>)> {
         let [header, body, next, end] = [0; 4].map(|_| self.builder.id());
         let before = self.block;
@@ -148,7 +149,7 @@ impl<'a> Writer<'a> {
         Ok((Loop { header, next, end }, of_turn))
     }
 
-    /// Takes another turn where a condition holds.
+    /// Repeats a loop if a condition holds.
     pub fn again(&mut self, turn: &Loop, condition: Word) -> Result<()> {
         self.builder.branch(turn.next).map_err(builder_error)?;
         self.start(turn.next)?;
@@ -160,7 +161,7 @@ impl<'a> Writer<'a> {
         self.start(turn.end)
     }
 
-    /// An input as an unsigned number.
+    /// Loads an input as an unsigned number.
     pub fn loaded(&mut self, input: Input) -> Word {
         let value = self.pure(Op::Load, input.of, &[input.variable]);
         if input.of == self.types.u32 {
@@ -169,21 +170,21 @@ impl<'a> Writer<'a> {
         self.pure(Op::Bitcast, self.types.u32, &[value])
     }
 
-    /// Loads from the record buffer.
+    /// Loads a word from the record buffer.
     pub fn load_word(&mut self, pointer: Word) -> Result {
         let aligned = Some(MemoryAccess::ALIGNED);
         let loaded = (self.builder).load(self.types.u32, None, pointer, aligned, [literal(4)]);
         loaded.map_err(builder_error)
     }
 
-    /// Stores to the record buffer.
+    /// Stores a word to the record buffer.
     pub fn store_word(&mut self, pointer: Word, value: Word) -> Result<()> {
         let aligned = Some(MemoryAccess::ALIGNED);
         let stored = self.builder.store(pointer, value, aligned, [literal(4)]);
         stored.map_err(builder_error)
     }
 
-    /// A component.
+    /// Extracts a component.
     pub fn extracted(&mut self, of: Word, place: u32, part_type: Word) -> Word {
         self.add(
             Op::CompositeExtract,
@@ -192,44 +193,44 @@ impl<'a> Writer<'a> {
         )
     }
 
-    /// An unsigned number.
+    /// An unsigned constant.
     pub fn constant(&mut self, value: u32) -> Word {
         self.builder.constant_bit32(self.types.u32, value)
     }
 
-    /// An operation on unsigned numbers.
+    /// Adds an operation on unsigned numbers.
     pub fn unsigned(&mut self, opcode: Op, operands: &[Word]) -> Word {
         self.pure(opcode, self.types.u32, operands)
     }
 
-    /// Bits of a float.
+    /// The bits of a float.
     pub fn bits(&mut self, float: Word) -> Word {
         self.unsigned(Op::Bitcast, &[float])
     }
 
-    /// An operation on a subgroup.
+    /// Adds an operation on a subgroup.
     pub fn of_subgroup(&mut self, opcode: Op, of: Word, operands: &[Word]) -> Word {
         let mut all = vec![self.constant(Scope::Subgroup as u32)];
         all.extend(operands);
         self.pure(opcode, of, &all)
     }
 
-    /// An operation whose operands are ids.
+    /// Adds an operation whose operands are ids.
     pub fn pure(&mut self, opcode: Op, of: Word, operands: &[Word]) -> Word {
         self.add(opcode, of, operands.iter().copied().map(id).collect())
     }
 
-    /// An operation.
+    /// Adds an operation.
     pub fn add(&mut self, opcode: Op, of: Word, operands: Vec<Operand>) -> Word {
         let result = self.builder.id();
         self.add_named(result, opcode, of, operands);
         result
     }
 
-    /// An operation whose id is already used.
+    /// Adds an operation whose result id is already in use.
     pub fn add_named(&mut self, result: Word, opcode: Op, of: Word, operands: Vec<Operand>) {
         let instruction = Instruction::new(opcode, Some(of), Some(result), operands);
-        // A block is open wherever this is called.
+        // Every caller has an open block.
         let _ = (self.builder).insert_into_block(InsertPoint::End, instruction);
     }
 }

@@ -1,8 +1,7 @@
-//! Files that a captured process leaves for the launcher: events, one JSON object per line, and raw records.
+//! Files that a captured process writes for the launcher: events, one JSON object per line, and raw records.
 //!
-//! Every process writes its own pair of files. Lines are written whole, and a span of records is written
-//! before the event that refers to it, so the files of a killed program are as usable as those of one that
-//! ended.
+//! Every process has its own pair of files. Lines are written whole, and records are written before the event
+//! that refers to them. The files are therefore usable even if the program was killed.
 
 mod read;
 mod write;
@@ -14,7 +13,7 @@ use crate::inject::{DepthTests, Site};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// Environment variable that names the folder; without it the layer does nothing.
+/// Environment variable with the name of the folder; without it, the layer is inactive.
 pub const FOLDER_VARIABLE: &str = "PARALLAX_CAPTURE_FOLDER";
 /// Name of the layer for the loader.
 pub const LAYER_NAME: &str = "VK_LAYER_PARALLAX_capture";
@@ -27,20 +26,20 @@ const RECORDS: &str = "records";
 /// Settings from the launcher.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Settings {
-    /// Whether texture samples are recorded. Otherwise only passes and draws are listed.
+    /// Whether texture samples are recorded. Otherwise only render passes and draws are listed.
     pub records: bool,
-    /// First frame, and the first one that is of no interest any more.
+    /// First requested frame, and the frame after the last one.
     pub frames: [u32; 2],
     /// How frames are counted.
     pub frames_by: FramesBy,
-    /// Every draw is counted by an occlusion query as well.
+    /// Whether an occlusion query counts the samples of each draw.
     pub occlusion: bool,
-    /// Bytes for the records of one submission.
+    /// Size of the record buffer in bytes. It holds the records of one submission.
     pub record_bytes: u64,
-    /// Whether small pictures of passes are kept.
+    /// Whether small pictures of render passes are written.
     #[serde(default)]
     pub pictures: bool,
-    /// Folder for every module as the program gave it and as it records.
+    /// Folder for every module, before and after it is rewritten.
     #[serde(default)]
     pub modules: Option<std::path::PathBuf>,
 }
@@ -49,36 +48,36 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FramesBy {
-    /// Presents, or readbacks of a program that has no swapchain.
+    /// Presents, or readbacks if the program has no swapchain.
     Auto,
-    /// The program presents an image of a swapchain.
+    /// A frame ends when the program presents an image of a swapchain.
     Present,
-    /// The program copies an image to a buffer.
+    /// A frame ends when the program copies an image to a buffer.
     Readback,
-    /// The launcher counts, through [`crate::control`].
+    /// The launcher counts frames, through [`crate::control`].
     Launcher,
 }
 
 impl Settings {
-    /// Writes them into a capture's folder.
+    /// Writes the settings into a capture's folder.
     ///
     /// # Errors
-    /// A folder that cannot be written.
+    /// The folder cannot be written.
     pub fn save(&self, folder: &Path) -> std::io::Result<()> {
         std::fs::write(folder.join(SETTINGS_FILE), serde_json::to_vec(self)?)
     }
 
-    /// Reads a capture's settings.
+    /// Reads the settings of a capture.
     ///
     /// # Errors
-    /// A file that cannot be read.
+    /// The file cannot be read.
     pub fn load(folder: &Path) -> std::io::Result<Self> {
         let bytes = std::fs::read(folder.join(SETTINGS_FILE))?;
         Ok(serde_json::from_slice(&bytes)?)
     }
 }
 
-/// File of the picture of a pass.
+/// File with the picture of a render pass.
 fn picture(folder: &Path, process: &str, pass: u32) -> PathBuf {
     folder.join(format!("{process}-{pass}.rgba"))
 }
@@ -87,52 +86,53 @@ fn file(folder: &Path, name: &str, extension: &str) -> PathBuf {
     folder.join(format!("{name}.{extension}"))
 }
 
-/// One thing that happened.
+/// An event in a captured process.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum Event {
-    /// A process begins to use Vulkan.
+    /// A process started to use Vulkan.
     Process {
-        /// Its id.
+        /// Process ID.
         pid: u32,
-        /// Its program and arguments.
+        /// Program and arguments.
         command: Vec<String>,
     },
     /// A device was opened.
     Device {
-        /// As it names itself.
+        /// Name of the device.
         name: String,
-        /// Driver and version, likewise.
+        /// Name and version of the driver.
         driver: String,
-        /// Why nothing is recorded on it, if so.
+        /// Reason why nothing is recorded on the device, if any.
         refused: Option<String>,
-        /// Records are those of quads.
+        /// Whether one record holds all lanes of a quad.
         ballots: bool,
     },
-    /// A shader that records.
+    /// A recording shader was created.
     Shader(ShaderInfo),
-    /// An image.
+    /// Description of an image.
     Image(ImageInfo),
-    /// A render pass, as far as draws need it.
+    /// Description of a render pass.
     Pass(PassInfo),
-    /// A draw.
+    /// Description of a draw.
     Draw(DrawInfo),
     /// Command buffers were executed.
     Submit {
         /// Frame.
         frame: u32,
-        /// Number and pass of each draw in the order of execution.
+        /// Number and render pass of each draw, in order of execution.
         draws: Vec<[u32; 2]>,
-        /// Records of these draws, in the records' file.
+        /// The records of these draws in the file of records.
         records: Span,
-        /// Bytes of records that found no room.
+        /// Number of bytes of records that did not fit the buffer.
         lost_bytes: u64,
-        /// Samples that each draw's occlusion query counted: number of the draw and count.
+        /// Samples counted by the occlusion query of each draw: number of the draw, and count.
         occlusion: Vec<(u32, u64)>,
     },
-    /// A small picture of a pass: a file `PASS.rgba` next to the records has its texels, row by row.
+    /// The small picture of a render pass. Its texels are in the file `PASS.rgba` next to the records, row by
+    /// row.
     Picture {
-        /// Number of the pass.
+        /// Number of the render pass.
         pass: u32,
         /// Width and height.
         size: [u32; 2],
@@ -142,39 +142,39 @@ pub enum Event {
         /// Its number.
         frame: u32,
     },
-    /// The device was closed: nothing follows from it.
+    /// The device was destroyed.
     Closed,
-    /// Something made the capture worth less.
+    /// A problem that makes the capture incomplete.
     Trouble {
-        /// What it was.
+        /// Description of the problem.
         what: String,
     },
 }
 
-/// A run of records in the records' file.
+/// A range of the file of records.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Span {
-    /// Its first unit of [`crate::inject::UNIT_BYTES`].
+    /// First unit, of [`crate::inject::UNIT_BYTES`] bytes.
     pub first: u64,
-    /// How many units.
+    /// Number of units.
     pub count: u64,
 }
 
-/// A fragment shader of a pipeline that records.
+/// Fragment shader of a recording pipeline.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShaderInfo {
     /// Number.
     pub shader: u32,
-    /// When its fragments are tested.
+    /// Order of depth test and shading.
     pub tests: DepthTests,
-    /// What it records.
+    /// The sites where it records.
     pub sites: Vec<Site>,
 }
 
 /// An image.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ImageInfo {
-    /// Number, in the order of creation: handles are used again.
+    /// Number, in the order of creation. Handles are reused, so they are not unique.
     pub image: u32,
     /// `VkFormat`.
     pub format: i32,
@@ -184,9 +184,9 @@ pub struct ImageInfo {
     pub levels: u32,
     /// Array layers.
     pub layers: u32,
-    /// Samples a texel.
+    /// Samples per texel.
     pub samples: u32,
-    /// An image of a swapchain.
+    /// Whether the image belongs to a swapchain.
     pub presented: bool,
 }
 
@@ -205,7 +205,7 @@ pub struct ViewInfo {
     pub layers: [u32; 2],
 }
 
-/// A sampler, as far as it decides which texels are read.
+/// The part of a sampler's state that determines which texels are read.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SamplerInfo {
     /// `VkFilter` for magnification and minification.
@@ -214,28 +214,28 @@ pub struct SamplerInfo {
     pub mip: i32,
     /// `VkSamplerAddressMode` in u and v.
     pub wrap: [i32; 2],
-    /// Bias, least and largest level of detail.
+    /// Bias, minimum and maximum of the level of detail.
     pub lod: [f32; 3],
-    /// Largest anisotropy; 1 without.
+    /// Maximum anisotropy; 1 if disabled.
     pub anisotropy: f32,
-    /// Coordinates are texels.
+    /// Whether coordinates are in texels.
     pub unnormalized: bool,
 }
 
-/// Target of a pass.
+/// Targets of a render pass.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PassInfo {
     /// Number.
     pub pass: u32,
-    /// Colour attachments; those without writes are left out.
+    /// Colour attachments, without unwritten ones.
     pub colors: Vec<ViewInfo>,
     /// Depth attachment.
     pub depth: Option<ViewInfo>,
     /// Left, top, width and height of the rendered area.
     pub area: [i32; 4],
-    /// Views that each draw is broadcast to; 0 without multiview.
+    /// View mask; 0 without multiview.
     pub view_mask: u32,
-    /// Colours or depth are cleared, and not those of an earlier pass.
+    /// Whether colours or depth are cleared at the start.
     pub clears: bool,
 }
 
@@ -248,22 +248,22 @@ pub struct TextureInfo {
     pub binding: u32,
     /// Element of the binding's array.
     pub element: u32,
-    /// The image, where there is one.
+    /// The image, if one is bound.
     pub view: Option<ViewInfo>,
-    /// The sampler, where there is one.
+    /// The sampler, if one is bound.
     pub sampler: Option<SamplerInfo>,
 }
 
 /// Depth test of a draw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct DepthInfo {
-    /// Fragments are tested.
+    /// Whether the depth test is enabled.
     pub tests: bool,
-    /// Those that pass write their depth.
+    /// Whether fragments that pass write their depth.
     pub writes: bool,
     /// `VkCompareOp`.
     pub compare: i32,
-    /// Stencil is tested, too.
+    /// Whether the stencil test is enabled.
     pub stencil: bool,
 }
 
@@ -274,27 +274,27 @@ pub struct DrawInfo {
     pub draw: u32,
     /// Number of its pipeline.
     pub pipeline: u32,
-    /// Number of its recording shader; none if it does not record.
+    /// Number of its recording shader; `None` if it is not recorded.
     pub shader: Option<u32>,
-    /// Why it does not record, where it should.
+    /// Reason why it is not recorded although records were requested.
     pub unrecorded: Option<String>,
-    /// Recorded by an additional draw before the program's, which writes nothing.
+    /// Whether it is recorded by an additional draw before the program's, which writes nothing.
     pub twice: bool,
-    /// Left, top, width and height; a negative height is a picture upside down.
+    /// Left, top, width and height. If the height is negative, the picture is upside down.
     pub viewport: [f32; 4],
     /// Left, top, width and height.
     pub scissor: [i32; 4],
-    /// Channels written of each colour attachment, `VkColorComponentFlags`.
+    /// Written channels of each colour attachment, `VkColorComponentFlags`.
     pub color_masks: Vec<u32>,
-    /// Colours are blended with those that are there.
+    /// Whether colours are blended with those in the target.
     pub blends: bool,
     /// Depth test.
     pub depth: DepthInfo,
     /// `VkPrimitiveTopology`.
     pub topology: i32,
-    /// Vertices or indices; 0 if only the device knows the number.
+    /// Number of vertices or indices; 0 for indirect draws.
     pub vertices: u32,
-    /// Instances, likewise.
+    /// Number of instances; 0 for indirect draws.
     pub instances: u32,
     /// Samples per pixel.
     pub samples: u32,

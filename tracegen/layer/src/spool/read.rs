@@ -1,4 +1,4 @@
-//! Reading what the processes of a captured program left behind.
+//! Reads the files of the processes of a captured program.
 
 use super::{EVENTS, Event, RECORDS, Span, file, picture};
 use crate::inject::{RawSample, UNIT_BYTES, Unit, unpack};
@@ -7,43 +7,43 @@ use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Why a capture's files cannot be read.
+/// Reasons why a capture's files cannot be read.
 #[derive(Debug, Error)]
 pub enum ReadError {
-    /// The system refuses.
+    /// An error of the system.
     #[error("{file}: {source}")]
     Io {
         /// The file.
         file: String,
-        /// Its reason.
+        /// Error of the system.
         source: std::io::Error,
     },
-    /// A line that is no event.
+    /// A line that is not an event.
     #[error("{file}: line {line}: expected an event, found {found}")]
     Event {
         /// The file.
         file: String,
-        /// Number from 1.
+        /// Number of the line, from 1.
         line: usize,
         /// The parser's message.
         found: String,
     },
-    /// Records that an event names are not there.
+    /// Records that are in an event but not in the file.
     #[error("{file}: expected records up to byte {end}, found {found} bytes")]
     Short {
         /// The file.
         file: String,
-        /// End of what is named.
+        /// End of the span in bytes.
         end: u64,
         /// End of the file.
         found: u64,
     },
-    /// The last record does not end where the span does.
+    /// A span that ends in the middle of a record.
     #[error("{file}: expected the end of a record at byte {end}, found the middle of one")]
     Split {
         /// The file.
         file: String,
-        /// End of what is named.
+        /// End of the span in bytes.
         end: u64,
     },
 }
@@ -59,7 +59,7 @@ impl Process {
     /// The processes of a capture, by the names of their files.
     ///
     /// # Errors
-    /// A folder that cannot be read.
+    /// The folder cannot be read.
     pub fn all(folder: &Path) -> Result<Vec<Self>, ReadError> {
         let io = |source| io_error(folder, source);
         let mut found = Vec::new();
@@ -78,10 +78,10 @@ impl Process {
         Ok(found)
     }
 
-    /// All events, up to the line that a killed process did not finish.
+    /// All events. An incomplete last line of a killed process is ignored.
     ///
     /// # Errors
-    /// A file that cannot be read, or a line that is not an event.
+    /// The file cannot be read, or a line is not an event.
     pub fn events(&self) -> Result<Vec<Event>, ReadError> {
         let open = File::open(&self.events).map_err(|e| io_error(&self.events, e))?;
         let mut lines = BufReader::new(open);
@@ -102,10 +102,10 @@ impl Process {
         }
     }
 
-    /// Texels of the picture of a pass.
+    /// Texels of the picture of a render pass.
     ///
     /// # Errors
-    /// A file that cannot be read.
+    /// The file cannot be read.
     pub fn picture(&self, pass: u32) -> Result<Vec<u8>, ReadError> {
         let folder = self.events.parent().unwrap_or(Path::new("."));
         let name = (self.events.file_stem()).map(|name| name.to_string_lossy().into_owned());
@@ -113,10 +113,10 @@ impl Process {
         fs::read(&path).map_err(|e| io_error(&path, e))
     }
 
-    /// Its records.
+    /// Opens the file of records.
     ///
     /// # Errors
-    /// A file that cannot be opened.
+    /// The file cannot be opened.
     pub fn records(&self) -> Result<Reader, ReadError> {
         let file = File::open(&self.records).map_err(|e| io_error(&self.records, e))?;
         Ok(Reader {
@@ -134,10 +134,10 @@ pub struct Reader {
 }
 
 impl Reader {
-    /// The records of a span, coordinate group by coordinate group.
+    /// Reads the records of a span, coordinate group by coordinate group.
     ///
     /// # Errors
-    /// Records that are not there, or not whole.
+    /// The records are missing or incomplete.
     pub fn read(&mut self, span: Span, each: impl FnMut(RawSample)) -> Result<(), ReadError> {
         let file = || self.name.display().to_string();
         let io = |e| io_error(&self.name, e);

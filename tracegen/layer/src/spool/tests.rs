@@ -8,7 +8,7 @@ fn record(draw: u32) -> Unit {
 }
 
 #[test]
-fn events_and_records_come_back_and_descriptions_once() {
+fn events_and_records_are_read_as_written_and_descriptions_once() {
     let folder = tempfile::tempdir().unwrap();
     let mut writer = Writer::create(folder.path()).unwrap();
     let spans = [&[record(1), record(2)][..], &[record(3)]].map(|r| writer.records(r).unwrap());
@@ -39,14 +39,14 @@ fn events_and_records_come_back_and_descriptions_once() {
     let beyond = Span { first: 2, count: 2 };
     let text = reader.read(beyond, drop).unwrap_err().to_string();
     assert!(text.contains("up to byte 64, found 48"), "{text}");
-    // A header that announces coordinates that are not there.
+    // The header announces coordinates that do not follow.
     let span = writer.records(&[[1 << 20, 0, 0, 0]]).unwrap();
     let text = reader.read(span, drop).unwrap_err().to_string();
     assert!(text.contains("the middle of one"), "{text}");
 }
 
 #[test]
-fn a_line_that_was_not_finished_is_left_out_and_one_that_is_no_event_refused() {
+fn an_incomplete_last_line_is_ignored_and_an_invalid_line_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let mut writer = Writer::create(folder.path()).unwrap();
     writer.event(&Event::Closed).unwrap();
@@ -68,7 +68,7 @@ fn a_line_that_was_not_finished_is_left_out_and_one_that_is_no_event_refused() {
 }
 
 #[test]
-fn settings_come_back() {
+fn settings_are_read_as_written() {
     let folder = tempfile::tempdir().unwrap();
     let settings = Settings {
         records: true,

@@ -1,4 +1,4 @@
-//! Writing a process's files.
+//! Writes the files of a process.
 
 use super::{EVENTS, Event, RECORDS, Span, file, picture};
 use crate::inject::Unit;
@@ -7,24 +7,24 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// Appends events and records of one process.
+/// Appends events and records of a process.
 #[derive(Debug)]
 pub struct Writer {
     folder: PathBuf,
-    /// Process that owns the files: a forked child process gets its own files.
+    /// Process that owns the files. A forked child gets its own files.
     pid: u32,
     events: File,
     records: File,
     written: u64,
-    /// Kinds and numbers of what has been described.
+    /// Kinds and numbers of the objects that have been described.
     described: HashSet<(&'static str, u32)>,
 }
 
 impl Writer {
-    /// Starts the files of this process in a folder.
+    /// Creates the files of this process in a folder.
     ///
     /// # Errors
-    /// Files that cannot be created.
+    /// The files cannot be created.
     pub fn create(folder: &Path) -> io::Result<Self> {
         let pid = std::process::id();
         let open = |extension| {
@@ -50,7 +50,7 @@ impl Writer {
     /// Writes an event.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// The file cannot be written.
     pub fn event(&mut self, event: &Event) -> io::Result<()> {
         self.after_fork()?;
         let mut line = serde_json::to_vec(event)?;
@@ -58,10 +58,10 @@ impl Writer {
         self.events.write_all(&line)
     }
 
-    /// Writes an event that describes something, unless it has been written.
+    /// Writes the event that describes an object, once.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// The file cannot be written.
     pub fn describe(
         &mut self,
         kind: &'static str,
@@ -79,7 +79,7 @@ impl Writer {
     /// Writes records and returns their place.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// The file cannot be written.
     pub fn records(&mut self, records: &[Unit]) -> io::Result<Span> {
         self.after_fork()?;
         self.records.write_all(bytemuck::cast_slice(records))?;
@@ -91,17 +91,17 @@ impl Writer {
         Ok(span)
     }
 
-    /// Writes the picture of a pass, and its event.
+    /// Writes the picture of a render pass and its event.
     ///
     /// # Errors
-    /// A file that cannot be written.
+    /// The file cannot be written.
     pub fn picture(&mut self, pass: u32, size: [u32; 2], texels: &[u8]) -> io::Result<()> {
         self.after_fork()?;
         std::fs::write(picture(&self.folder, &self.pid.to_string(), pass), texels)?;
         self.event(&Event::Picture { pass, size })
     }
 
-    /// A forked process starts its own files.
+    /// Creates new files after a fork.
     fn after_fork(&mut self) -> io::Result<()> {
         if std::process::id() != self.pid {
             *self = Self::create(&self.folder.clone())?;

@@ -1,4 +1,4 @@
-//! Command buffers: what is bound, and the draws that were recorded into them.
+//! Command buffers: bound objects, and recorded draws.
 
 use super::descriptors::SetState;
 use super::pipelines::Pipeline;
@@ -7,47 +7,47 @@ use ash::vk;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Descriptor sets that may be bound at once.
+/// Maximum number of bound descriptor sets.
 const MOST_SETS: usize = 32;
 
-/// A draw command.
+/// Parameters of a draw command.
 #[derive(Clone, Debug, Default)]
 pub struct Call {
-    /// Vertices or indices; 0 if only the device knows the number.
+    /// Number of vertices or indices; 0 for indirect draws.
     pub vertices: u32,
-    /// Instances, likewise.
+    /// Number of instances; 0 for indirect draws.
     pub instances: u32,
     /// Reasons why its records are less exact.
     pub caveats: Vec<String>,
 }
 
-/// A draw that executing a command buffer makes, and its pass.
+/// A draw of an executed command buffer, and its render pass.
 #[derive(Clone, Debug)]
 pub struct Executed {
     /// The draw.
     pub draw: Arc<DrawInfo>,
-    /// Its pass; none in a secondary command buffer before it is executed.
+    /// Its render pass; `None` in a secondary command buffer before it is executed.
     pub pass: Option<Arc<PassInfo>>,
 }
 
-/// State that commands set.
+/// Dynamic state of a command buffer.
 #[derive(Clone, Debug, Default)]
 pub struct Dynamic {
     /// First viewport.
     pub viewport: Option<vk::Viewport>,
     /// First scissor rectangle.
     pub scissor: Option<vk::Rect2D>,
-    /// Kind of primitives.
+    /// Topology of primitives.
     pub topology: Option<vk::PrimitiveTopology>,
-    /// Depth is tested.
+    /// Whether the depth test is enabled.
     pub depth_test: Option<bool>,
-    /// Depth is written.
+    /// Whether depth writes are enabled.
     pub depth_write: Option<bool>,
     /// Comparison of depths.
     pub depth_compare: Option<vk::CompareOp>,
-    /// Stencil is tested.
+    /// Whether the stencil test is enabled.
     pub stencil_test: Option<bool>,
-    /// Operations on the stencil, as they were set: faces, fail, pass, depth fail, comparison.
+    /// Stencil operations in the order of the commands: faces, fail, pass, depth fail, comparison.
     pub stencil_ops: Vec<(
         vk::StencilFaceFlags,
         vk::StencilOp,
@@ -55,44 +55,44 @@ pub struct Dynamic {
         vk::StencilOp,
         vk::CompareOp,
     )>,
-    /// Bits of the stencil that are written, of each face.
+    /// Stencil write masks in the order of the commands, with their faces.
     pub stencil_write_masks: Vec<(vk::StencilFaceFlags, u32)>,
-    /// Channels written, from the first attachment that was named.
+    /// Written channels, starting at the first set attachment.
     pub color_masks: Option<(u32, Vec<vk::ColorComponentFlags>)>,
-    /// Attachments that are written at all.
+    /// Whether writes to each attachment are enabled.
     pub color_enables: Option<Vec<vk::Bool32>>,
 }
 
-/// Bound objects of a command buffer.
+/// State of a command buffer under recording.
 #[derive(Debug)]
 pub struct CommandState {
-    /// It is submitted once: what it records can be decided when it is recorded.
+    /// Whether it is submitted only once, so that its frame is known when it is recorded.
     one_time: bool,
     handle: vk::Pipeline,
     pipeline: Option<Arc<Pipeline>>,
     sets: [u64; MOST_SETS],
     pushed: HashMap<u32, SetState>,
-    /// State that commands set.
+    /// Dynamic state.
     pub dynamic: Dynamic,
-    /// The pass that is open.
+    /// The current render pass.
     pub pass: Option<Arc<PassInfo>>,
-    /// Render pass, framebuffer's views and subpass of it, where it is not a dynamic one.
+    /// The current subpass; `None` with dynamic rendering.
     pub open: Option<OpenPass>,
-    /// Queries and transform feedback of the program that are active.
+    /// Number of active queries and transform feedbacks of the program.
     pub active_queries: u32,
-    /// It copies an image to a buffer.
+    /// Whether it copies an image to a buffer.
     pub reads_back: bool,
     items: Vec<Executed>,
 }
 
-/// A render pass under way.
+/// A render pass that has begun and not ended.
 #[derive(Clone, Debug)]
 pub struct OpenPass {
     /// The render pass.
     pub pass: vk::RenderPass,
     /// Its framebuffer.
     pub framebuffer: vk::Framebuffer,
-    /// Views of a framebuffer without images.
+    /// Views of an imageless framebuffer.
     pub views: Option<Vec<Option<crate::spool::ViewInfo>>>,
     /// Rendered area.
     pub area: vk::Rect2D,
@@ -117,19 +117,19 @@ impl CommandState {
         }
     }
 
-    /// It is submitted once.
+    /// Whether it is submitted only once.
     #[must_use]
     pub fn one_time(&self) -> bool {
         self.one_time
     }
 
-    /// The graphics pipeline.
+    /// The bound graphics pipeline.
     #[must_use]
     pub fn pipeline(&self) -> Option<&Arc<Pipeline>> {
         self.pipeline.as_ref()
     }
 
-    /// The graphics pipeline's handle.
+    /// Handle of the bound graphics pipeline.
     #[must_use]
     pub fn pipeline_handle(&self) -> vk::Pipeline {
         self.handle
@@ -151,7 +151,7 @@ impl CommandState {
         }
     }
 
-    /// The set bound at a number.
+    /// Handle of the descriptor set with this number.
     #[must_use]
     pub fn set(&self, number: u32) -> Option<u64> {
         self.sets
@@ -160,18 +160,18 @@ impl CommandState {
             .filter(|set| *set != 0)
     }
 
-    /// Descriptors pushed to a set.
+    /// Pushed descriptors of a set.
     #[must_use]
     pub fn pushed(&self, number: u32) -> Option<&SetState> {
         self.pushed.get(&number)
     }
 
-    /// The set that is pushed to, made by `empty` if nothing was pushed before.
+    /// The pushed descriptors of a set; created by `empty` if nothing was pushed before.
     pub fn push(&mut self, number: u32, empty: impl FnOnce() -> SetState) -> &mut SetState {
         self.pushed.entry(number).or_insert_with(empty)
     }
 
-    /// Takes over the draws of a secondary command buffer.
+    /// Appends the draws of a secondary command buffer.
     fn execute(&mut self, items: &[Executed]) {
         for item in items {
             self.items.push(Executed {
@@ -273,7 +273,7 @@ impl CommandState {
     }
 }
 
-/// Command buffers by handle, and the draws of all.
+/// Command buffers by handle, and the numbering of draws.
 #[derive(Debug, Default)]
 pub struct Commands {
     buffers: HashMap<u64, CommandState>,
@@ -288,30 +288,30 @@ impl Commands {
         }
     }
 
-    /// Recording begins.
+    /// Starts the recording of a command buffer.
     pub fn begin(&mut self, buffer: u64, one_time: bool) {
         self.buffers.insert(buffer, CommandState::new(one_time));
     }
 
-    /// A command buffer was freed.
+    /// Removes a freed command buffer.
     pub fn free(&mut self, buffer: u64) {
         self.buffers.remove(&buffer);
     }
 
-    /// A command buffer.
+    /// State of a command buffer.
     #[must_use]
     pub fn get(&self, buffer: u64) -> Option<&CommandState> {
         self.buffers.get(&buffer)
     }
 
-    /// A command buffer, to be changed.
+    /// Mutable state of a command buffer.
     pub fn get_mut(&mut self, buffer: u64) -> &mut CommandState {
         self.buffers
             .entry(buffer)
             .or_insert_with(|| CommandState::new(false))
     }
 
-    /// Adds a draw and describes it.
+    /// Numbers and describes a draw.
     pub(super) fn draw(
         &mut self,
         buffer: u64,
@@ -325,7 +325,7 @@ impl Commands {
         Some(info)
     }
 
-    /// Adds a draw that is executed with the command buffer.
+    /// Adds a draw to a command buffer.
     pub fn add(&mut self, buffer: u64, draw: DrawInfo) {
         let state = self.get_mut(buffer);
         let pass = state.pass.clone();
@@ -335,7 +335,7 @@ impl Commands {
         });
     }
 
-    /// A command buffer executes another.
+    /// Executes a secondary command buffer.
     pub fn execute(&mut self, buffer: u64, secondary: u64) {
         let items = match self.buffers.get(&secondary) {
             Some(of) => of.items.clone(),
@@ -344,7 +344,7 @@ impl Commands {
         self.get_mut(buffer).execute(&items);
     }
 
-    /// A command buffer copies an image to a buffer.
+    /// Whether a command buffer copies an image to a buffer.
     #[must_use]
     pub fn reads_back(&self, buffer: u64) -> bool {
         self.buffers
@@ -352,7 +352,7 @@ impl Commands {
             .is_some_and(|state| state.reads_back)
     }
 
-    /// Draws of a command buffer in the order of execution.
+    /// Draws of a command buffer, in order of execution.
     #[must_use]
     pub fn items(&self, buffer: u64) -> &[Executed] {
         self.buffers.get(&buffer).map_or(&[], |state| &state.items)

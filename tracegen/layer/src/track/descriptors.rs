@@ -1,27 +1,27 @@
-//! Descriptor sets: which image and sampler stand where.
+//! Descriptor sets: the image and sampler of each descriptor.
 
 use super::Images;
 use crate::spool::{SamplerInfo, ViewInfo};
 use ash::vk::{self, Handle};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
-/// Contents of a descriptor of a texture.
+/// Content of a texture descriptor.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slot {
-    /// Its image.
+    /// The image.
     pub view: Option<ViewInfo>,
-    /// Its sampler.
+    /// The sampler.
     pub sampler: Option<SamplerInfo>,
 }
 
-/// Part of a set that is written.
+/// A write of consecutive descriptors.
 #[derive(Clone, Debug)]
 pub struct Written {
     /// First binding.
     pub binding: u32,
-    /// First element of it; elements beyond its last one are the next binding's.
+    /// First element of the binding. Elements after its last one belong to the next binding.
     pub element: u32,
-    /// Kind of descriptors.
+    /// Descriptor type.
     pub kind: vk::DescriptorType,
     /// Image and sampler of each descriptor; empty for buffers.
     pub images: Vec<vk::DescriptorImageInfo>,
@@ -32,24 +32,24 @@ pub struct Written {
 pub struct TemplateEntry {
     /// First binding.
     pub binding: u32,
-    /// First element of it.
+    /// First element of the binding.
     pub element: u32,
-    /// Descriptors.
+    /// Number of descriptors.
     pub count: u32,
-    /// Kind of descriptors.
+    /// Descriptor type.
     pub kind: vk::DescriptorType,
-    /// Place of the first one in the data.
+    /// Offset of the first descriptor in the data.
     pub offset: usize,
-    /// Distance between them.
+    /// Distance between descriptors in the data.
     pub stride: usize,
 }
 
 /// An update template.
 #[derive(Clone, Debug, Default)]
 pub struct Template {
-    /// Its entries that are textures.
+    /// Entries that are textures.
     pub entries: Vec<TemplateEntry>,
-    /// It is for graphics pipelines.
+    /// Whether the template is for graphics pipelines.
     pub graphics: bool,
 }
 
@@ -61,11 +61,11 @@ struct SetLayout {
 #[derive(Clone, Debug)]
 struct LayoutBinding {
     count: u32,
-    /// Immutable samplers of the layout.
+    /// Immutable samplers of the binding.
     immutable: Vec<Option<SamplerInfo>>,
 }
 
-/// A descriptor set's textures.
+/// The texture descriptors of a set.
 #[derive(Clone, Debug, Default)]
 pub struct SetState {
     layout: SetLayout,
@@ -90,14 +90,14 @@ impl SetState {
         }
     }
 
-    /// Elements of a binding that have been written.
+    /// The written elements of a binding.
     #[must_use]
     pub fn binding(&self, binding: u32) -> Vec<(u32, Slot)> {
         let all = self.slots.range((binding, 0)..=(binding, u32::MAX));
         all.map(|((_, element), slot)| (*element, *slot)).collect()
     }
 
-    /// The binding and element that come `step` descriptors after one.
+    /// Binding and element at `step` descriptors after another one.
     fn place(&self, binding: u32, element: u32, step: u32) -> (u32, u32) {
         let mut rest = element.saturating_add(step);
         for (&number, of) in self.layout.bindings.range(binding..) {
@@ -106,11 +106,11 @@ impl SetState {
             }
             rest -= of.count;
         }
-        // A layout that is not known.
+        // The layout is unknown.
         (binding, element.saturating_add(step))
     }
 
-    /// Takes over what is written.
+    /// Applies a write.
     pub fn write(&mut self, written: &Written, images: &Images) {
         use vk::DescriptorType as Type;
         for (step, image) in (0..).zip(&written.images) {
@@ -141,7 +141,7 @@ impl SetState {
     }
 }
 
-/// Descriptor sets, their layouts and update templates by handle.
+/// Descriptor sets, layouts and update templates by handle.
 #[derive(Debug, Default)]
 pub struct Descriptors {
     layouts: HashMap<u64, SetLayout>,
@@ -151,7 +151,7 @@ pub struct Descriptors {
 }
 
 impl Descriptors {
-    /// A set layout was created: binding, number of descriptors and immutable samplers of each entry.
+    /// Adds a layout, with binding, number of descriptors and immutable samplers of each entry.
     pub fn create_layout(
         &mut self,
         layout: vk::DescriptorSetLayout,
@@ -166,12 +166,12 @@ impl Descriptors {
         self.layouts.insert(layout.as_raw(), SetLayout { bindings });
     }
 
-    /// A set layout was destroyed.
+    /// Removes a layout.
     pub fn destroy_layout(&mut self, layout: vk::DescriptorSetLayout) {
         self.layouts.remove(&layout.as_raw());
     }
 
-    /// A set was allocated.
+    /// Adds a descriptor set.
     pub fn allocate(
         &mut self,
         pool: vk::DescriptorPool,
@@ -186,7 +186,7 @@ impl Descriptors {
             .insert(set.as_raw());
     }
 
-    /// A set of a layout that nothing has been written to.
+    /// An unwritten set of a layout.
     #[must_use]
     pub fn empty_set(&self, layout: u64) -> SetState {
         self.layouts
@@ -194,7 +194,7 @@ impl Descriptors {
             .map_or_else(SetState::default, SetState::new)
     }
 
-    /// Sets were freed.
+    /// Removes sets.
     pub fn free(&mut self, pool: vk::DescriptorPool, sets: &[vk::DescriptorSet]) {
         for set in sets {
             self.sets.remove(&set.as_raw());
@@ -204,26 +204,26 @@ impl Descriptors {
         }
     }
 
-    /// All sets of a pool were freed.
+    /// Removes all sets of a pool.
     pub fn reset_pool(&mut self, pool: vk::DescriptorPool) {
         for set in self.pools.remove(&pool.as_raw()).unwrap_or_default() {
             self.sets.remove(&set);
         }
     }
 
-    /// A set's textures.
+    /// The texture descriptors of a set.
     #[must_use]
     pub fn set(&self, set: u64) -> Option<&SetState> {
         self.sets.get(&set)
     }
 
-    /// Descriptors of a set were written.
+    /// Applies a write to a set.
     pub fn write(&mut self, set: vk::DescriptorSet, written: &Written, images: &Images) {
         let state = self.sets.entry(set.as_raw()).or_default();
         state.write(written, images);
     }
 
-    /// Descriptors were copied.
+    /// Applies a copy between sets.
     pub fn copy(&mut self, copy: &vk::CopyDescriptorSet<'_>) {
         let Some(from) = self.sets.get(&copy.src_set.as_raw()) else {
             return;
@@ -245,17 +245,17 @@ impl Descriptors {
         }
     }
 
-    /// An update template was created.
+    /// Adds an update template.
     pub fn create_template(&mut self, template: vk::DescriptorUpdateTemplate, of: Template) {
         self.templates.insert(template.as_raw(), of);
     }
 
-    /// An update template was destroyed.
+    /// Removes an update template.
     pub fn destroy_template(&mut self, template: vk::DescriptorUpdateTemplate) {
         self.templates.remove(&template.as_raw());
     }
 
-    /// An update template.
+    /// The update template of a handle.
     #[must_use]
     pub fn template(&self, template: vk::DescriptorUpdateTemplate) -> Option<&Template> {
         self.templates.get(&template.as_raw())

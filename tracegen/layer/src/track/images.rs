@@ -1,17 +1,17 @@
-//! Images, their views, and samplers.
+//! Images, image views and samplers.
 
 use crate::spool::{ImageInfo, SamplerInfo, ViewInfo};
 use ash::vk::{self, Handle};
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// Images, views and samplers by handle. Handles are used again, so images have numbers of their own.
+/// Images, views and samplers by handle. Handles are reused, so images also have unique numbers.
 #[derive(Debug, Default)]
 pub struct Images {
-    /// Number of the first one.
+    /// Number of the first image.
     first: u32,
     images: HashMap<u64, Arc<ImageInfo>>,
-    /// By number, including destroyed ones, because a draw may be described later.
+    /// By number. Destroyed images stay, because a draw may be described later.
     numbered: Vec<Arc<ImageInfo>>,
     views: HashMap<u64, ViewInfo>,
     samplers: HashMap<u64, SamplerInfo>,
@@ -25,7 +25,7 @@ impl Images {
         }
     }
 
-    /// An image was created.
+    /// Adds an image.
     pub fn create(&mut self, image: vk::Image, info: &vk::ImageCreateInfo<'_>) {
         let size = [info.extent.width, info.extent.height, info.extent.depth];
         self.add(image, |number| ImageInfo {
@@ -39,7 +39,7 @@ impl Images {
         });
     }
 
-    /// An image of a swapchain was handed out, perhaps not for the first time.
+    /// Adds an image of a swapchain, unless it is known.
     pub fn of_swapchain(&mut self, image: vk::Image, info: &vk::SwapchainCreateInfoKHR<'_>) {
         if self
             .images
@@ -66,19 +66,19 @@ impl Images {
         self.images.insert(image.as_raw(), info);
     }
 
-    /// An image was destroyed.
+    /// Removes the handle of a destroyed image.
     pub fn destroy(&mut self, image: vk::Image) {
         self.images.remove(&image.as_raw());
     }
 
-    /// An image by its number.
+    /// The image with a number.
     #[must_use]
     pub fn numbered(&self, number: u32) -> Option<&Arc<ImageInfo>> {
         let place = number.checked_sub(self.first)?;
         self.numbered.get(place as usize)
     }
 
-    /// Handle of an image that was not destroyed.
+    /// Handle of an image, unless it was destroyed.
     #[must_use]
     pub fn handle(&self, number: u32) -> Option<vk::Image> {
         let mut all = self.images.iter();
@@ -86,7 +86,7 @@ impl Images {
         found.map(|(handle, _)| vk::Image::from_raw(*handle))
     }
 
-    /// A view was created.
+    /// Adds an image view.
     pub fn create_view(&mut self, view: vk::ImageView, info: &vk::ImageViewCreateInfo<'_>) {
         let Some(image) = self.images.get(&info.image.as_raw()) else {
             return;
@@ -123,20 +123,20 @@ impl Images {
         self.views.insert(view.as_raw(), of);
     }
 
-    /// A view was destroyed.
+    /// Removes an image view.
     pub fn destroy_view(&mut self, view: vk::ImageView) {
         self.views.remove(&view.as_raw());
     }
 
-    /// A view.
+    /// The image view of a handle.
     #[must_use]
     pub fn view(&self, view: vk::ImageView) -> Option<ViewInfo> {
         self.views.get(&view.as_raw()).copied()
     }
 
-    /// A sampler was created.
+    /// Adds a sampler.
     pub fn create_sampler(&mut self, sampler: vk::Sampler, info: &vk::SamplerCreateInfo<'_>) {
-        // JSON has only finite numbers.
+        // JSON cannot represent infinity.
         let finite = |value: f32| if value.is_finite() { value } else { 1000.0 };
         let of = SamplerInfo {
             filters: [info.mag_filter.as_raw(), info.min_filter.as_raw()],
@@ -152,12 +152,12 @@ impl Images {
         self.samplers.insert(sampler.as_raw(), of);
     }
 
-    /// A sampler was destroyed.
+    /// Removes a sampler.
     pub fn destroy_sampler(&mut self, sampler: vk::Sampler) {
         self.samplers.remove(&sampler.as_raw());
     }
 
-    /// A sampler.
+    /// The sampler of a handle.
     #[must_use]
     pub fn sampler(&self, sampler: vk::Sampler) -> Option<SamplerInfo> {
         self.samplers.get(&sampler.as_raw()).copied()

@@ -1,7 +1,7 @@
-//! Tracks a program's Vulkan objects, as far as a draw's texture samples depend on them.
+//! Tracks those Vulkan objects of a program that affect the texture samples of draws.
 //!
-//! This module does not call Vulkan: hooks report the program's calls, and query at a draw which textures and
-//! targets it uses.
+//! This module does not call Vulkan. Hooks report the program's calls. At a draw, they query the textures and
+//! targets that it uses.
 
 mod commands;
 mod descriptors;
@@ -17,7 +17,7 @@ pub use pipelines::{Layout, Pipeline, Pipelines, Recorded, State};
 
 use crate::spool::{DrawInfo, TextureInfo};
 
-/// All objects of a device.
+/// All tracked objects of a device.
 #[derive(Debug, Default)]
 pub struct Tracker {
     /// Images, views and samplers.
@@ -33,10 +33,10 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// Tracker of the device with a number in its process, which is part of the numbers of its objects.
+    /// Tracker of a device. The number of the device is part of the numbers of its objects.
     #[must_use]
     pub fn of_device(device: u32) -> Self {
-        // More than any program creates of one kind.
+        // No program creates more objects of one kind.
         let first = device << 26;
         Self {
             images: Images::numbered_from(first),
@@ -47,8 +47,8 @@ impl Tracker {
         }
     }
 
-    /// Description of a draw in a command buffer, with the next draw's number; `None` if no graphics pipeline
-    /// is bound.
+    /// Description of a draw in a command buffer, with the next number; `None` if no graphics pipeline is
+    /// bound.
     pub fn draw(&mut self, command_buffer: u64, call: &Call) -> Option<DrawInfo> {
         let textures = self.textures(command_buffer)?;
         self.commands.draw(command_buffer, call, textures)

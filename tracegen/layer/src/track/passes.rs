@@ -1,40 +1,40 @@
-//! Render passes, framebuffers and what a pass renders into.
+//! Render passes, framebuffers and render targets.
 
 use super::Images;
 use crate::spool::{PassInfo, ViewInfo};
 use ash::vk::{self, Handle};
 use std::collections::HashMap;
 
-/// An attachment that a pass writes, and whether the pass clears it.
+/// An attachment that a subpass writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Attachment {
     /// Part of an image.
     pub view: ViewInfo,
-    /// It is cleared.
+    /// Whether the subpass clears it.
     pub clears: bool,
 }
 
-/// Targets of a subpass: positions among the attachments.
+/// Targets of a subpass, as indices of attachments.
 #[derive(Clone, Debug, Default)]
 pub struct Subpass {
-    /// Colours; `None` where one is not used.
+    /// Colour attachments; `None` if unused.
     pub colors: Vec<Option<u32>>,
-    /// Depth.
+    /// Depth attachment.
     pub depth: Option<u32>,
-    /// Views that each draw is broadcast to.
+    /// View mask.
     pub view_mask: u32,
 }
 
 /// A render pass.
 #[derive(Clone, Debug, Default)]
 pub struct RenderPass {
-    /// Of each attachment whether it is cleared.
+    /// Whether each attachment is cleared.
     pub clears: Vec<bool>,
-    /// Its parts.
+    /// The subpasses.
     pub subpasses: Vec<Subpass>,
 }
 
-/// Render passes and framebuffers by handle, and the number of the last pass that was begun.
+/// Render passes and framebuffers by handle, and the number of the last begun pass.
 #[derive(Debug, Default)]
 pub struct Passes {
     passes: HashMap<u64, RenderPass>,
@@ -50,17 +50,17 @@ impl Passes {
         }
     }
 
-    /// A render pass was created.
+    /// Adds a render pass.
     pub fn create(&mut self, handle: vk::RenderPass, pass: RenderPass) {
         self.passes.insert(handle.as_raw(), pass);
     }
 
-    /// A render pass was destroyed.
+    /// Removes a render pass.
     pub fn destroy(&mut self, handle: vk::RenderPass) {
         self.passes.remove(&handle.as_raw());
     }
 
-    /// Views of a subpass.
+    /// View mask of a subpass.
     #[must_use]
     pub fn view_mask(&self, handle: vk::RenderPass, subpass: u32) -> u32 {
         let pass = self.passes.get(&handle.as_raw());
@@ -68,7 +68,7 @@ impl Passes {
         subpass.map_or(0, |subpass| subpass.view_mask)
     }
 
-    /// A framebuffer was created.
+    /// Adds a framebuffer.
     pub fn create_framebuffer(
         &mut self,
         handle: vk::Framebuffer,
@@ -79,12 +79,12 @@ impl Passes {
         self.framebuffers.insert(handle.as_raw(), views);
     }
 
-    /// A framebuffer was destroyed.
+    /// Removes a framebuffer.
     pub fn destroy_framebuffer(&mut self, handle: vk::Framebuffer) {
         self.framebuffers.remove(&handle.as_raw());
     }
 
-    /// A subpass begins; `views` are those of a framebuffer without images.
+    /// Begins a subpass. `views` are those of an imageless framebuffer.
     pub fn begin(
         &mut self,
         handle: vk::RenderPass,
@@ -108,7 +108,7 @@ impl Passes {
             .unwrap_or_default();
         let attachment = |place: u32| {
             let view = views.get(place as usize).copied().flatten()?;
-            // Later subpasses find what the earlier ones left.
+            // Later subpasses keep the content of earlier ones.
             let clears = subpass == 0 && pass.clears.get(place as usize) == Some(&true);
             Some(Attachment { view, clears })
         };
@@ -121,7 +121,7 @@ impl Passes {
         self.info(colors, depth, area, of.view_mask)
     }
 
-    /// Target of a pass, with the next pass's number.
+    /// Describes the targets of a render pass, with the next number.
     pub fn info(
         &mut self,
         colors: Vec<Attachment>,

@@ -8,39 +8,39 @@ use std::sync::Arc;
 /// A pipeline layout.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Layout {
-    /// Stages of the ranges that hold the draw's number; empty where there is no room for it.
+    /// Stages of the ranges with the draw's number; empty if there is no room for it.
     pub stages: vk::ShaderStageFlags,
 }
 
-/// A pipeline that records in place of a program's, or before it.
+/// The recording pipeline of a program's pipeline.
 #[derive(Clone, Debug)]
 pub struct Recorded {
-    /// The pipeline.
+    /// Handle of the recording pipeline.
     pub handle: vk::Pipeline,
-    /// Its shader.
+    /// Its recording shader.
     pub shader: Arc<ShaderInfo>,
-    /// It writes nothing and is drawn before the program's.
+    /// Whether it writes nothing and is drawn before the program's pipeline.
     pub twice: bool,
-    /// Dynamic states of the program's pipeline that it has not.
+    /// Dynamic states of the program's pipeline that it fixes.
     pub fixed: Vec<vk::DynamicState>,
 }
 
-/// State of a pipeline that describes draws.
+/// State of a pipeline that the description of draws needs.
 #[derive(Clone, Debug, Default)]
 pub struct State {
-    /// States that commands set.
+    /// Dynamic states.
     pub dynamic: HashSet<i32>,
     /// First viewport.
     pub viewport: Option<vk::Viewport>,
     /// First scissor rectangle.
     pub scissor: Option<vk::Rect2D>,
-    /// Kind of primitives.
+    /// Topology of primitives.
     pub topology: vk::PrimitiveTopology,
     /// Depth test.
     pub depth: DepthInfo,
-    /// Channels written of each colour attachment.
+    /// Written channels of each colour attachment.
     pub color_masks: Vec<u32>,
-    /// Colours are blended.
+    /// Whether colours are blended.
     pub blends: bool,
     /// Samples per pixel.
     pub samples: u32,
@@ -49,7 +49,7 @@ pub struct State {
 }
 
 impl State {
-    /// Commands set a state.
+    /// Whether a state is dynamic.
     #[must_use]
     pub fn is_dynamic(&self, state: vk::DynamicState) -> bool {
         self.dynamic.contains(&state.as_raw())
@@ -61,13 +61,13 @@ impl State {
 pub struct Pipeline {
     /// Number, in the order of creation.
     pub number: u32,
-    /// Its layout.
+    /// Its pipeline layout.
     pub layout: vk::PipelineLayout,
-    /// Stages of the draw's number.
+    /// Stages with the draw's number.
     pub stages: vk::ShaderStageFlags,
-    /// Records, if it does.
+    /// Its recording pipeline, if any.
     pub recorded: Option<Recorded>,
-    /// Why it does not.
+    /// Reason why it is not recorded.
     pub unrecorded: Option<String>,
     /// Set and binding of the textures that its fragment shader may read.
     pub bindings: Vec<(u32, u32)>,
@@ -80,7 +80,8 @@ pub struct Pipeline {
 pub struct Pipelines {
     modules: HashMap<u64, Arc<[u32]>>,
     layouts: HashMap<u64, Layout>,
-    /// Layouts that pipelines use: draws need them longer than the program does.
+    /// Layouts that pipelines use. They are kept after the program destroys them, because draws still need
+    /// them.
     used: HashSet<u64>,
     pipelines: HashMap<u64, Arc<Pipeline>>,
     created: u32,
@@ -96,45 +97,45 @@ impl Pipelines {
         }
     }
 
-    /// A shader module was created.
+    /// Adds a shader module.
     pub fn create_module(&mut self, module: vk::ShaderModule, words: &[u32]) {
         self.modules.insert(module.as_raw(), words.into());
     }
 
-    /// A shader module was destroyed.
+    /// Removes a shader module.
     pub fn destroy_module(&mut self, module: vk::ShaderModule) {
         self.modules.remove(&module.as_raw());
     }
 
-    /// Words of a module.
+    /// Words of a shader module.
     #[must_use]
     pub fn module(&self, module: vk::ShaderModule) -> Option<Arc<[u32]>> {
         self.modules.get(&module.as_raw()).cloned()
     }
 
-    /// A pipeline layout was created.
+    /// Adds a pipeline layout.
     pub fn create_layout(&mut self, layout: vk::PipelineLayout, of: Layout) {
         self.layouts.insert(layout.as_raw(), of);
     }
 
-    /// A pipeline layout.
+    /// The pipeline layout of a handle.
     #[must_use]
     pub fn layout(&self, layout: vk::PipelineLayout) -> Option<Layout> {
         self.layouts.get(&layout.as_raw()).copied()
     }
 
-    /// The program destroyed a layout; returns true if nothing uses it any more.
+    /// Handles the destruction of a layout by the program. Returns true if no pipeline uses the layout.
     pub fn destroy_layout(&mut self, layout: vk::PipelineLayout) -> bool {
         !self.used.contains(&layout.as_raw())
     }
 
-    /// Number for the next recording shader.
+    /// Number of the next recording shader.
     pub fn next_shader(&mut self) -> u32 {
         self.shaders += 1;
         self.shaders - 1
     }
 
-    /// A graphics pipeline was created; it gets its number.
+    /// Adds a graphics pipeline and sets its number.
     pub fn create(&mut self, handle: vk::Pipeline, mut pipeline: Pipeline) {
         pipeline.number = self.created;
         self.created += 1;
@@ -144,13 +145,13 @@ impl Pipelines {
         self.pipelines.insert(handle.as_raw(), Arc::new(pipeline));
     }
 
-    /// A pipeline was destroyed; returns the recording pipeline that belonged to it.
+    /// Removes a pipeline. Returns the handle of its recording pipeline.
     pub fn destroy(&mut self, handle: vk::Pipeline) -> Option<vk::Pipeline> {
         let pipeline = self.pipelines.remove(&handle.as_raw())?;
         pipeline.recorded.as_ref().map(|recorded| recorded.handle)
     }
 
-    /// A graphics pipeline.
+    /// The graphics pipeline of a handle.
     #[must_use]
     pub fn get(&self, handle: vk::Pipeline) -> Option<&Arc<Pipeline>> {
         self.pipelines.get(&handle.as_raw())

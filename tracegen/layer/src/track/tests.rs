@@ -52,7 +52,7 @@ fn images_of(slots: &[(u32, Slot)]) -> Vec<(u32, u32)> {
 }
 
 #[test]
-fn a_view_is_the_part_of_its_image_that_is_left_and_handles_get_new_numbers() {
+fn views_have_the_remaining_levels_and_layers_and_reused_handles_get_new_numbers() {
     let mut images = Images::default();
     let first = image_view(&mut images, 7, 64);
     let of_first = images.view(first).unwrap();
@@ -95,7 +95,7 @@ fn writes_beyond_a_bindings_last_element_go_to_the_next_one() {
 }
 
 #[test]
-fn samplers_of_the_layout_are_those_of_every_set() {
+fn immutable_samplers_of_a_layout_are_in_every_set() {
     let mut images = Images::default();
     let [fixed, other] = [1, 2].map(vk::Sampler::from_raw);
     for (sampler, bias) in [(fixed, 1.0), (other, f32::NAN)] {
@@ -155,7 +155,7 @@ fn tracker(dynamic: &[vk::DynamicState]) -> Tracker {
 }
 
 #[test]
-fn a_draw_has_the_state_that_its_pipeline_leaves_to_commands() {
+fn a_draw_has_the_dynamic_state_of_its_command_buffer() {
     let wide = vk::Viewport {
         width: 7.0,
         ..Default::default()
@@ -188,7 +188,7 @@ fn a_draw_has_the_state_that_its_pipeline_leaves_to_commands() {
 }
 
 #[test]
-fn pushed_descriptors_hide_the_set_that_was_bound_until_another_is() {
+fn pushed_descriptors_replace_the_bound_set_until_another_is_bound() {
     let mut tracker = tracker(&[]);
     let [bound, pushed] = [1, 2].map(|n| image_view(&mut tracker.images, n, 8));
     let set = vk::DescriptorSet::from_raw(9);
@@ -212,7 +212,7 @@ fn pushed_descriptors_hide_the_set_that_was_bound_until_another_is() {
 }
 
 #[test]
-fn subpasses_write_their_own_attachments_and_only_the_first_one_clears() {
+fn subpasses_have_their_own_attachments_and_only_the_first_one_clears() {
     let mut tracker = Tracker::default();
     let views = [1, 2].map(|n| image_view(&mut tracker.images, n, 8));
     let framebuffer = vk::Framebuffer::from_raw(1);
@@ -248,7 +248,7 @@ fn subpasses_write_their_own_attachments_and_only_the_first_one_clears() {
 }
 
 #[test]
-fn draws_of_a_secondary_command_buffer_belong_to_the_pass_that_executes_it() {
+fn draws_of_a_secondary_command_buffer_belong_to_the_executing_pass() {
     let mut tracker = tracker(&[]);
     let draw = tracker.draw(1, &Call::default()).unwrap();
     tracker.commands.add(1, draw);

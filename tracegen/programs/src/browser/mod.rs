@@ -1,4 +1,4 @@
-//! A page of the web in Chromium, drawn frame by frame through ANGLE on Vulkan.
+//! Opens a web page in Chromium and draws it frame by frame through ANGLE on Vulkan.
 
 mod protocol;
 mod serve;
@@ -15,14 +15,14 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
-/// What is drawn, and how.
+/// A page and its settings.
 #[derive(Clone, Debug)]
 pub struct Page {
-    /// Address, or a file below `root`.
+    /// Web address, or a file below `root`.
     pub address: String,
-    /// Query string of a file's address: `?mode=stereo`.
+    /// Query string added to the address of a file: `?mode=stereo`.
     pub query: String,
-    /// Folder whose files the page may use, for a local one.
+    /// Folder with the files of a local page.
     pub root: Option<PathBuf>,
     /// Width and height of the window in pixels.
     pub size_px: [u32; 2],
@@ -32,11 +32,11 @@ pub struct Page {
     pub frame_ms: f64,
     /// Seconds without a request after which a page counts as loaded.
     pub settle_s: f64,
-    /// A WebXR headset that pages find.
+    /// Emulated WebXR headset, if any.
     pub headset: Option<Headset>,
 }
 
-/// An emulated headset.
+/// An emulated WebXR headset.
 #[derive(Clone, Debug)]
 pub struct Headset {
     /// Script of the emulator.
@@ -45,20 +45,20 @@ pub struct Headset {
     pub ipd_m: f64,
     /// Vertical field of view in radians.
     pub fovy: f64,
-    /// Where the head is.
+    /// Position of the head.
     pub position: [f64; 3],
 }
 
-/// Results of a frame of a page.
+/// Result of drawing a frame of a page.
 #[derive(Clone, Debug, Default, Deserialize)]
 pub struct Stepped {
-    /// Callbacks of animation frames that were due.
+    /// Number of animation frame callbacks that were called.
     pub callbacks: u32,
-    /// Time that drawing took.
+    /// Time for drawing.
     pub took_ms: f64,
     /// Errors of the page's scripts.
     pub errors: Vec<String>,
-    /// Eyes that a WebXR session drew for.
+    /// Eyes that a WebXR session drew.
     pub views: Vec<StepView>,
     /// The canvas as a PNG, if requested.
     pub picture: Option<String>,
@@ -69,16 +69,16 @@ pub struct Stepped {
 pub struct StepView {
     /// `left` or `right`.
     pub eye: String,
-    /// Clip from eye space, column by column; depth -1 to 1.
+    /// Eye space to clip space, column by column; depth -1 to 1.
     pub projection: [f32; 16],
-    /// Eye from world space, column by column.
+    /// World space to eye space, column by column.
     pub world_to_eye: [f32; 16],
-    /// Place of the eye in the world.
+    /// Position of the eye in world space.
     pub position: [f32; 3],
 }
 
 impl StepView {
-    /// The eye as a trace has it: depth 0 to 1.
+    /// The eye in the form of a trace, with depth 0 to 1.
     #[must_use]
     pub fn eye_view(&self) -> EyeView {
         let column = |of: &[f32; 16], c: usize| [0, 1, 2, 3].map(|row| of[4 * c + row]);
@@ -103,18 +103,18 @@ impl Stepped {
     }
 }
 
-/// Options of Chromium, and why.
+/// Command-line options of Chromium.
 const ARGUMENTS: [&str; 15] = [
     "--headless",
-    // Drivers live outside of what its sandbox allows.
+    // The sandbox blocks the files of the drivers.
     "--no-sandbox",
     "--disable-gpu-sandbox",
     "--ignore-gpu-blocklist",
     "--use-gl=angle",
     "--use-angle=vulkan",
-    // One process, so that no other one is waited for.
+    // Avoids waiting for a GPU process.
     "--in-process-gpu",
-    // Else llvmpipe has no WebGL 2.
+    // Without this, llvmpipe has no WebGL 2.
     "--disable-gpu-driver-bug-workarounds",
     "--disable-gpu-watchdog",
     "--disable-background-networking",
@@ -125,12 +125,12 @@ const ARGUMENTS: [&str; 15] = [
     "--disable-features=Translate,OptimizationHints",
 ];
 
-/// A page that is open.
+/// An open page.
 pub struct Tab {
     browser: Browser,
     root: Option<PathBuf>,
     frame_ms: f64,
-    /// Requests that the browser could not have answered.
+    /// Failed requests of the page.
     pub missing: Vec<String>,
 }
 
@@ -138,7 +138,7 @@ impl Tab {
     /// Starts a browser, opens a page and waits until it has loaded.
     ///
     /// # Errors
-    /// A browser that cannot be started, or a page that cannot be loaded.
+    /// The browser cannot be started, or the page cannot be loaded.
     pub fn open(
         program: &Path,
         profile: &Path,
@@ -213,10 +213,11 @@ impl Tab {
 
     /// Opens the page and waits until it makes no more requests.
     fn load(&mut self, page: &Page) -> Result<(), BrowserError> {
-        let url = match page.root {
-            Some(_) => format!("{}{}", serve::address(&page.address), page.query),
+        let address = match page.root {
+            Some(_) => serve::address(&page.address),
             None => page.address.clone(),
         };
+        let url = format!("{address}{}", page.query);
         let opened = self.call("Page.navigate", json!({ "url": url }))?;
         if let Some(reason) = opened["errorText"].as_str() {
             return Err(BrowserError::Page(format!("{}: {reason}", page.address)));
@@ -226,10 +227,10 @@ impl Tab {
         let mut last = Instant::now();
         while !loaded || !open.is_empty() || last.elapsed() < settle {
             let Some(event) = self.browser.event(Duration::from_millis(50))? else {
-                if last.elapsed() > MOST_LOADING {
+                if last.elapsed() > LOADING_TIMEOUT {
                     return Err(BrowserError::Silent {
                         doing: "loading the page",
-                        seconds: MOST_LOADING.as_secs(),
+                        seconds: LOADING_TIMEOUT.as_secs(),
                     });
                 }
                 continue;
@@ -238,7 +239,7 @@ impl Tab {
                 "Page.loadEventFired" => loaded = true,
                 "Network.requestWillBeSent" => {
                     let url = event.params["request"]["url"].as_str().unwrap_or("");
-                    // Data URLs need no waiting.
+                    // Data URLs are not requested from a server.
                     if !url.starts_with("data:") && !url.starts_with("blob:") {
                         open.insert(event.params["requestId"].to_string());
                     }
@@ -267,7 +268,7 @@ impl Tab {
         }
     }
 
-    /// The renderer of pages.
+    /// Names of the renderers of the page's WebGL contexts.
     ///
     /// # Errors
     /// The browser ended.
@@ -279,7 +280,7 @@ impl Tab {
     /// Draws a frame.
     ///
     /// # Errors
-    /// The browser ended, or the page's own errors.
+    /// The browser ended, or the page has an error.
     pub fn step(&mut self, frame: u32, picture: bool) -> Result<Stepped, BrowserError> {
         let time_ms = self.frame_ms * (f64::from(frame) + 1.0);
         let value = self.evaluate(&format!("parallax.step({time_ms}, {picture})"))?;
@@ -297,7 +298,7 @@ impl Tab {
         Ok(result["result"]["value"].clone())
     }
 
-    /// Process of the browser.
+    /// Process ID of the browser.
     #[must_use]
     pub fn pid(&self) -> u32 {
         self.browser.pid()
@@ -309,5 +310,5 @@ impl Tab {
     }
 }
 
-/// A page without requests for this long that is not loaded never will be.
-const MOST_LOADING: Duration = Duration::from_secs(120);
+/// A page that has not loaded is given up after this time without a request.
+const LOADING_TIMEOUT: Duration = Duration::from_secs(120);

@@ -1,4 +1,4 @@
-//! Chromium's DevTools protocol, over a pair of pipes.
+//! Speaks Chromium's DevTools protocol over a pair of pipes.
 
 use serde_json::{Value, json};
 use std::collections::VecDeque;
@@ -10,37 +10,37 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
-/// Why a page cannot be driven.
+/// Reasons why a page cannot be controlled.
 #[derive(Debug, Error)]
 pub enum BrowserError {
-    /// It could not be started.
+    /// The browser could not be started.
     #[error("cannot start {program}: {source}")]
     Start {
-        /// The browser.
+        /// Program of the browser.
         program: String,
-        /// The system's reason.
+        /// Error of the system.
         source: io::Error,
     },
-    /// It ended, or does not answer.
+    /// The browser ended.
     #[error("the browser ended while {0}")]
     Ended(&'static str),
-    /// It does not answer.
+    /// The browser does not answer.
     #[error("the browser did not answer within {seconds} seconds while {doing}")]
     Silent {
         /// The method that was called.
         doing: &'static str,
-        /// How long.
+        /// The time limit.
         seconds: u64,
     },
-    /// It refuses a command.
+    /// The browser rejected a command.
     #[error("the browser refuses {method}: {reason}")]
     Refused {
-        /// The command.
+        /// Name of the command.
         method: &'static str,
-        /// Its words.
+        /// Message of the browser.
         reason: String,
     },
-    /// The page's own.
+    /// An error of the page.
     #[error("the page: {0}")]
     Page(String),
 }
@@ -50,29 +50,29 @@ pub enum BrowserError {
 pub struct Event {
     /// Name.
     pub method: String,
-    /// The browser's message.
+    /// Parameters of the event.
     pub params: Value,
 }
 
-/// A browser under way.
+/// A running browser.
 pub struct Browser {
     child: Child,
     to: Option<ChildStdin>,
     from: Receiver<Value>,
     next: u64,
-    /// Session of the page; none before it is attached to.
+    /// Session of the page; `None` before the page is attached.
     pub session: Option<String>,
     events: VecDeque<Event>,
 }
 
-/// A command that has not been answered for so long never will be.
-const PATIENCE: Duration = Duration::from_secs(300);
+/// Time limit for the answer to a command.
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(300);
 
 impl Browser {
     /// Starts a browser with arguments; `prepare` adds environment variables.
     ///
     /// # Errors
-    /// It cannot be started.
+    /// The browser cannot be started.
     pub fn start(
         program: &Path,
         arguments: &[OsString],
@@ -123,7 +123,7 @@ impl Browser {
         })
     }
 
-    /// Process of the browser.
+    /// Process ID of the browser.
     #[must_use]
     pub fn pid(&self) -> u32 {
         self.child.id()
@@ -144,18 +144,19 @@ impl Browser {
         Ok(id)
     }
 
-    /// Sends a command and does not wait for its answer.
+    /// Sends a command without waiting for its answer.
     ///
     /// # Errors
     /// The browser ended.
-    pub fn tell(&mut self, method: &'static str, params: Value) -> Result<(), BrowserError> {
+    pub fn notify(&mut self, method: &'static str, params: Value) -> Result<(), BrowserError> {
         self.send(method, params).map(drop)
     }
 
-    /// Sends a command and waits for its result. `serve` handles what comes in between; what it does not handle is kept.
+    /// Sends a command and waits for its result. `serve` handles events that arrive before it; events that it
+    /// does not handle are kept.
     ///
     /// # Errors
-    /// The browser ended, does not answer, or refuses.
+    /// The browser ended, does not answer, or rejects the command.
     pub fn call(
         &mut self,
         method: &'static str,
@@ -163,13 +164,13 @@ impl Browser {
         serve: &mut dyn FnMut(&mut Self, &Event) -> Result<bool, BrowserError>,
     ) -> Result<Value, BrowserError> {
         let id = self.send(method, params)?;
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + ANSWER_TIMEOUT;
         loop {
             let rest = deadline.saturating_duration_since(Instant::now());
             let Some(message) = self.receive(rest, method)? else {
                 return Err(BrowserError::Silent {
                     doing: method,
-                    seconds: PATIENCE.as_secs(),
+                    seconds: ANSWER_TIMEOUT.as_secs(),
                 });
             };
             if message["id"].as_u64() == Some(id) {
@@ -189,7 +190,7 @@ impl Browser {
         }
     }
 
-    /// The next event within a time.
+    /// The next event, if one arrives within a time.
     ///
     /// # Errors
     /// The browser ended.
@@ -240,7 +241,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // One that ended by itself is gone already.
+        // The browser may have ended already.
         let _gone = self.child.kill();
         let _status = self.child.wait();
     }

@@ -1,4 +1,4 @@
-//! Files of a page, handed to the browser in place of a server's.
+//! Serves the files of a local page to the browser, in place of a web server.
 
 use super::protocol::{Browser, BrowserError, Event};
 use base64::Engine;
@@ -6,10 +6,10 @@ use base64::engine::general_purpose::STANDARD;
 use serde_json::{Value, json};
 use std::path::{Component, Path, PathBuf};
 
-/// Origin of local pages: a secure one, so that they have all that pages of the web have.
+/// Origin of local pages. It is secure, so that all web features are available.
 pub const ORIGIN: &str = "https://page.parallax.test";
 
-/// Answers a request that the browser holds back; false for other events.
+/// Answers a request that the browser has paused; returns false for other events.
 ///
 /// # Errors
 /// The browser ended.
@@ -29,11 +29,11 @@ pub fn serve(browser: &mut Browser, root: &Path, event: &Event) -> Result<bool, 
         }),
         None => json!({ "requestId": id, "responseCode": 404, "responsePhrase": "Not Found" }),
     };
-    browser.tell("Fetch.fulfillRequest", answer)?;
+    browser.notify("Fetch.fulfillRequest", answer)?;
     Ok(true)
 }
 
-/// File below `root` that an address names.
+/// The file below `root` at an address.
 fn path_of(root: &Path, url: &str) -> Option<PathBuf> {
     let rest = url.strip_prefix(ORIGIN)?;
     let path = rest.split(['?', '#']).next()?;
@@ -43,7 +43,7 @@ fn path_of(root: &Path, url: &str) -> Option<PathBuf> {
         match part {
             Component::Normal(part) => found.push(part),
             Component::CurDir => {}
-            // Nothing outside is a page's.
+            // Files outside the root are not served.
             _ => return None,
         }
     }
@@ -54,7 +54,7 @@ fn path_of(root: &Path, url: &str) -> Option<PathBuf> {
     })
 }
 
-/// An address without percent signs.
+/// Decodes the percent signs in an address.
 fn decoded(text: &str) -> Option<String> {
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.bytes();
@@ -70,7 +70,7 @@ fn decoded(text: &str) -> Option<String> {
     String::from_utf8(bytes).ok()
 }
 
-/// An address of a file below the root.
+/// Address of a file below the root.
 #[must_use]
 pub fn address(file: &str) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"/-_.~".contains(&b);
@@ -109,7 +109,7 @@ fn headers(path: &Path) -> Value {
     json!([
         { "name": "content-type", "value": kind },
         { "name": "access-control-allow-origin", "value": "*" },
-        // For shared memory in threads.
+        // Required for memory that threads share.
         { "name": "cross-origin-opener-policy", "value": "same-origin" },
         { "name": "cross-origin-embedder-policy", "value": "credentialless" },
     ])

@@ -1,4 +1,4 @@
-//! The draws of a frame: their groups, and the records of each eye.
+//! Builds the draws of a frame, their groups, and the records of each eye.
 
 use super::DrainError;
 use super::pass;
@@ -19,21 +19,21 @@ use record::{CaptureCounts, DepthReplay, RawDepth, RawRecord, RawRecords, Record
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::{Seek, Write};
 
-/// A draw of the trace.
+/// A draw of the trace and the executed draws that it consists of.
 #[derive(Clone, Copy, Debug)]
 pub enum Merged {
-    /// Of a shadow map.
+    /// A draw into a shadow map.
     Shadow(Executed),
-    /// Of one picture that belongs to both eyes.
+    /// A draw into a picture that both eyes use.
     Mono(Executed),
-    /// Of both eyes at once, which are these views.
+    /// A draw for both eyes at once, with the numbers of their views.
     Multiview(Executed, [u32; 2]),
-    /// Of the left and the right eye.
+    /// Draws for the left and the right eye.
     Eyes([Option<Executed>; 2]),
 }
 
 impl Merged {
-    /// Its draws, and the eye of the records of each view.
+    /// The executed draws, and the targets of their records.
     fn parts(&self) -> Vec<(Executed, RecordTarget)> {
         match *self {
             Self::Shadow(draw) => vec![(draw, RecordTarget::Pass(draw.pass))],
@@ -55,35 +55,35 @@ enum RecordTarget {
     Pass(u32),
 }
 
-/// A pass of the trace: pictures of eyes, then shadow maps by their pass in the program.
+/// A render pass of the trace: the picture of an eye, or a shadow map by its pass in the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Into {
+enum TargetPass {
     Shadow(u32),
     Left,
     Right,
     Both,
 }
 
-/// Records of one pass.
+/// Records of one render pass.
 #[derive(Default)]
 struct Records {
     quads: Vec<RawRecord>,
     depths: Vec<RawDepth>,
 }
 
-/// Makes a trace, frame by frame.
+/// Builds a trace frame by frame.
 pub struct Builder<W: Write + Seek> {
     recording: Recording<W>,
     pub counts: CaptureCounts,
     textures: HashMap<ViewInfo, Option<u32>>,
     next_primitive: u32,
-    /// Of each draw whether all its fragments hide what lies behind.
+    /// Whether all fragments of each draw hide those behind them.
     opaque: Vec<bool>,
     left_out: BTreeMap<String, [u64; 2]>,
 }
 
 impl<W: Write + Seek> Builder<W> {
-    /// An empty trace.
+    /// Starts an empty trace.
     pub fn new(recording: Recording<W>) -> Self {
         Self {
             recording,
@@ -95,7 +95,7 @@ impl<W: Write + Seek> Builder<W> {
         }
     }
 
-    /// What the trace lacks so far.
+    /// Texture accesses that are not in the trace so far.
     pub fn left_out(&self) -> Vec<LeftOut> {
         let of = |(what, [draws, fragments]): (&String, &[u64; 2])| LeftOut {
             what: what.clone(),
@@ -105,17 +105,17 @@ impl<W: Write + Seek> Builder<W> {
         self.left_out.iter().map(of).collect()
     }
 
-    /// Draws that are not opaque.
+    /// Ranges of draws that are not opaque.
     pub fn not_opaque(&self) -> Vec<[u32; 2]> {
         Surfaces::ranges(self.opaque.iter().copied())
     }
 
-    /// The trace with its description.
+    /// Completes the trace with its description.
     pub fn finish(self, meta: TraceMeta) -> Result<TextraceWriter<W>, DrainError> {
         Ok(self.recording.finish(meta)?)
     }
 
-    /// Takes note of the draws that no pass of the trace has.
+    /// Counts draws that are in no render pass of the trace, and draws with caveats.
     pub fn count_ignored(
         &mut self,
         session: &Session,
@@ -153,10 +153,12 @@ impl<W: Write + Seek> Builder<W> {
         placements: [Placement; 2],
         size_px: [u32; 2],
     ) -> Result<u64, DrainError> {
-        let mut passes: BTreeMap<Into, Records> = BTreeMap::new();
+        let mut passes: BTreeMap<TargetPass, Records> = BTreeMap::new();
         let eyes = match merged {
-            _ if merged.iter().any(|draw| matches!(draw, Merged::Mono(_))) => &[Into::Both][..],
-            _ => &[Into::Left, Into::Right],
+            _ if merged.iter().any(|draw| matches!(draw, Merged::Mono(_))) => {
+                &[TargetPass::Both][..]
+            }
+            _ => &[TargetPass::Left, TargetPass::Right],
         };
         for eye in eyes {
             passes.insert(*eye, Records::default());
@@ -185,10 +187,10 @@ impl<W: Write + Seek> Builder<W> {
         }
         for (into, of) in passes {
             let (kind, eye, size_px) = match into {
-                Into::Left => (PassKind::Main, Some(Eye::Left), size_px),
-                Into::Right => (PassKind::Main, Some(Eye::Right), size_px),
-                Into::Both => (PassKind::Main, None, size_px),
-                Into::Shadow(pass) => {
+                TargetPass::Left => (PassKind::Main, Some(Eye::Left), size_px),
+                TargetPass::Right => (PassKind::Main, Some(Eye::Right), size_px),
+                TargetPass::Both => (PassKind::Main, None, size_px),
+                TargetPass::Shadow(pass) => {
                     let size = shadow_sizes.get(&pass).map_or(size_px, |(_, size)| *size);
                     (PassKind::Shadow, None, size)
                 }
@@ -215,7 +217,7 @@ impl<W: Write + Seek> Builder<W> {
         records: &HashMap<u32, Vec<RawSample>>,
         placements: [Placement; 2],
         shadows: &HashMap<u32, (Placement, [u32; 2])>,
-        passes: &mut BTreeMap<Into, Records>,
+        passes: &mut BTreeMap<TargetPass, Records>,
     ) -> Result<u64, DrainError> {
         let parts = merged.parts();
         let Some((info, shader)) = parts.iter().find_map(|(executed, _)| {
@@ -247,18 +249,18 @@ impl<W: Write + Seek> Builder<W> {
             let quads = self.quads(shader, &draws, of_part(executed));
             for (view, quad) in quads {
                 let (into, placement) = match *part {
-                    RecordTarget::Eye(Eye::Left) => (Into::Left, placements[0]),
-                    RecordTarget::Eye(Eye::Right) => (Into::Right, placements[1]),
-                    RecordTarget::Both => (Into::Both, placements[0]),
+                    RecordTarget::Eye(Eye::Left) => (TargetPass::Left, placements[0]),
+                    RecordTarget::Eye(Eye::Right) => (TargetPass::Right, placements[1]),
+                    RecordTarget::Both => (TargetPass::Both, placements[0]),
                     RecordTarget::Layers(layers) => {
                         match layers.iter().position(|layer| *layer == view) {
-                            Some(0) => (Into::Left, placements[0]),
-                            Some(_) => (Into::Right, placements[1]),
+                            Some(0) => (TargetPass::Left, placements[0]),
+                            Some(_) => (TargetPass::Right, placements[1]),
                             None => continue,
                         }
                     }
                     RecordTarget::Pass(pass) => match shadows.get(&pass) {
-                        Some((placement, _)) => (Into::Shadow(pass), *placement),
+                        Some((placement, _)) => (TargetPass::Shadow(pass), *placement),
                         None => continue,
                     },
                 };
@@ -268,7 +270,7 @@ impl<W: Write + Seek> Builder<W> {
         Ok(triangles.into())
     }
 
-    /// Counts what sites do that no trace can hold.
+    /// Counts texture accesses that a trace cannot represent.
     fn count_left_out<'r>(
         &mut self,
         shader: &ShaderInfo,
@@ -285,7 +287,7 @@ impl<W: Write + Seek> Builder<W> {
         }
     }
 
-    /// Declares the trace's draws of a draw: more than one if it has more groups than one draw can have.
+    /// Adds the draws for a draw of the program. There are several if it has more groups than fit one draw.
     fn declare(
         &mut self,
         session: &Session,
@@ -421,7 +423,7 @@ impl<W: Write + Seek> Builder<W> {
         })
     }
 
-    /// The quads of a draw's records, by view, primitive and place.
+    /// Groups the records of a draw by view, primitive and quad.
     fn quads(
         &self,
         shader: &ShaderInfo,
@@ -431,7 +433,7 @@ impl<W: Write + Seek> Builder<W> {
         let mut order: Vec<(u64, u32)> = (records.iter().enumerate())
             .map(|(index, record)| (place(record), index as u32))
             .collect();
-        // Of one place in the order in which they were recorded.
+        // Within a quad, the records stay in the order in which they were recorded.
         order.par_sort_unstable();
         let sites = Sites {
             coverage: coverage_group(shader),
@@ -452,12 +454,12 @@ impl<W: Write + Seek> Builder<W> {
     }
 }
 
-/// View, primitive and quad of a record.
+/// Sort key of a record: view, primitive and quad.
 fn place(record: &RawSample) -> u64 {
     u64::from(record.primitive) << 32 | u64::from(record.place)
 }
 
-/// A coordinate group, and the element of its binding's array where fragments choose it.
+/// A coordinate group, and the element of its binding's array if it varies between fragments.
 type GroupKey = (u16, Option<u32>);
 
 /// The first site of a coordinate group that reads a texture.
@@ -469,11 +471,11 @@ fn texture_of(shader: &ShaderInfo, group: u16) -> Option<(&Site, &TextureSite)> 
     })
 }
 
-/// The trace's draws of a draw.
+/// Draws of the trace for a draw of the program.
 struct Declared {
-    /// Index and first primitive.
+    /// Index and first primitive of each draw.
     draws: Vec<(u32, u32)>,
-    /// Which of the draws, and the group.
+    /// Position in `draws`, and the group.
     groups: HashMap<GroupKey, (usize, Group)>,
     replay: DepthReplay,
 }
@@ -484,7 +486,7 @@ struct Sites<'a> {
     shader: &'a ShaderInfo,
 }
 
-/// Records of one quad of one primitive.
+/// Records of one quad of a primitive.
 struct Quad {
     at: [u32; 2],
     records: Vec<RawRecord>,
@@ -504,7 +506,7 @@ fn record(draw: (u32, u32), primitive: u32, mask: u8, group: u8, at: &RawQuad) -
     }
 }
 
-/// Joins the records of a quad of a primitive.
+/// Combines the records of a quad of a primitive.
 fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
     let primitive = of[0].primitive;
     let lanes_of = |group: Option<u16>| {
@@ -513,7 +515,7 @@ fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
     };
     let covered = lanes_of(sites.coverage);
     let mut records = Vec::new();
-    // Lanes that sample something in the first draw, whose records hold the coverage.
+    // Lanes that sample a texture in the first draw, which must have records of all covered lanes.
     let mut sampled = 0;
     let mut fragments: BTreeMap<GroupKey, Vec<(u8, &RawSample)>> = BTreeMap::new();
     for sample in of {
@@ -566,7 +568,7 @@ fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
             depth,
         };
     }
-    // Every covered lane is held to the depth of those that survived before.
+    // The depth test compares all covered lanes with those that survived earlier.
     let survived = lanes_of(sites.survival);
     let depths = of
         .iter()
@@ -595,7 +597,7 @@ fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
 }
 
 impl Quad {
-    /// Adds the records of the lanes that are in a picture.
+    /// Adds the records of the lanes inside a picture.
     fn place(self, placement: Placement, replay: DepthReplay, into: &mut Records) {
         let has_depths = replay != DepthReplay::None;
         for mut record in self.records {
@@ -613,7 +615,7 @@ impl Quad {
     }
 }
 
-/// Primitives of a draw by its command; 0 if only the device knew the number.
+/// Number of primitives of a draw call; 0 for indirect draws.
 fn primitives(info: &DrawInfo) -> u32 {
     use vk::PrimitiveTopology as Kind;
     let vertices = info.vertices;
@@ -627,8 +629,8 @@ fn primitives(info: &DrawInfo) -> u32 {
     }
 }
 
-/// The depth test that primitives of a draw are held to among themselves: the driver has not done it where fragments may
-/// be discarded.
+/// Depth test between the primitives of a draw that must be repeated. If fragments may be discarded, the
+/// recording draw writes no depth, so the driver has not tested its primitives against each other.
 fn replay(info: &DrawInfo) -> DepthReplay {
     if !info.twice || !info.depth.tests || !info.depth.writes {
         return DepthReplay::None;
@@ -638,7 +640,7 @@ fn replay(info: &DrawInfo) -> DepthReplay {
         vk::CompareOp::LESS_OR_EQUAL => DepthReplay::LessOrEqual,
         vk::CompareOp::GREATER => DepthReplay::Greater,
         vk::CompareOp::GREATER_OR_EQUAL => DepthReplay::GreaterOrEqual,
-        // Nothing that is written changes what passes.
+        // With these comparisons, written depths do not affect the test.
         _ => DepthReplay::None,
     }
 }

@@ -2,15 +2,15 @@
 
 use crate::views::View;
 
-/// Where an eye's picture lies in its target. It begins at an even column and row, as quads do: a picture that begins
-/// at an odd one gets a column or row more.
+/// Position of an eye's picture in its target. It starts at an even column and row, because quads do. If the
+/// view starts at an odd column or row, the picture has one more column or row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Placement {
     /// First column and row of quads.
     first: [i32; 2],
     /// Width and height in pixels.
     size: [u32; 2],
-    /// Left and top edge of what is seen.
+    /// Left and top edge of the visible part.
     seen: [i32; 2],
 }
 
@@ -27,7 +27,7 @@ impl Placement {
         }
     }
 
-    /// Column and row of a quad in the picture, and those of its lanes that are in it.
+    /// Column and row of a quad in the picture, and the lanes that are inside.
     #[must_use]
     pub fn quad(&self, quad: [u32; 2], lanes: u8) -> Option<([u32; 2], u8)> {
         let at = [0, 1].map(|axis| i64::from(quad[axis]) - i64::from(self.first[axis]));
@@ -46,7 +46,7 @@ impl Placement {
     }
 }
 
-/// Size of a picture that holds either eye's.
+/// Size of a picture that can hold either eye.
 #[must_use]
 pub fn both(placements: [Placement; 2]) -> [u32; 2] {
     let [a, b] = placements.map(|placement| placement.size);
@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn quads_of_a_right_half_count_from_its_edge() {
+    fn quads_of_a_right_half_are_numbered_from_its_edge() {
         let right = at([20, 0]);
         assert_eq!(right.quad([10, 0], 15), Some(([0, 0], 15)));
         assert_eq!(right.quad([14, 2], 15), Some(([4, 2], 15)));
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_that_begins_at_an_odd_pixel_is_wider_and_has_half_a_quad_first() {
+    fn a_view_at_an_odd_pixel_has_a_wider_picture_that_starts_with_half_a_quad() {
         let odd = at([5, 1]);
         assert_eq!(both([odd, at([0, 0])]), [11, 7]);
         assert_eq!(odd.quad([2, 0], 15), Some(([0, 0], 0b1000)));

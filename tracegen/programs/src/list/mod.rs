@@ -1,4 +1,4 @@
-//! The passes of a frame, as a table and as a page with pictures.
+//! Lists the render passes of a frame, as a table and as a page with pictures.
 
 mod page;
 
@@ -14,7 +14,7 @@ use parallax_layer::spool::{ShaderInfo, ViewInfo};
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write as _;
 
-/// A picture, small: red, green, blue and alpha, row by row.
+/// A small picture: red, green, blue and alpha, row by row.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Thumbnail {
     /// Width and height.
@@ -23,50 +23,50 @@ pub struct Thumbnail {
     pub texels: Vec<u8>,
 }
 
-/// A pass of a frame.
+/// A render pass of a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PassRow {
     /// Number within the frame.
     pub number: usize,
-    /// Roles of its draws, each once.
+    /// Distinct roles of its draws.
     pub shows: Vec<Role>,
     /// Size and format of the target.
     pub target: String,
-    /// Rectangles that are rendered, each once.
+    /// Distinct viewports.
     pub viewports: Vec<View>,
-    /// Views that draws are broadcast to.
+    /// View mask.
     pub views: u32,
-    /// Draws.
+    /// Number of draws.
     pub draws: u64,
-    /// Draws that are not recorded, or less exactly: why, each once.
+    /// Distinct reasons why draws are not recorded or are recorded less exactly.
     pub caveats: Vec<String>,
-    /// Fragments.
+    /// Number of fragments.
     pub fragments: u64,
-    /// Texture samples of fragments.
+    /// Number of texture samples.
     pub samples: u64,
-    /// Textures that were read.
+    /// Number of distinct textures that were read.
     pub textures: usize,
-    /// Their bytes, all levels.
+    /// Size of these textures in bytes, with all levels.
     pub texture_bytes: u64,
-    /// Its picture.
+    /// Picture of the target.
     pub picture: Option<Thumbnail>,
 }
 
-/// The passes of a frame.
+/// The render passes of a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct List {
-    /// The frame's number.
+    /// Number of the frame.
     pub frame: u32,
-    /// The rule that identified both eyes, or why none did.
+    /// Rule that identified the eyes, or the reason why none did.
     pub eyes: Result<views::Rule, ViewsError>,
-    /// Passes in the order of execution.
+    /// Render passes in the order of execution.
     pub rows: Vec<PassRow>,
 }
 
 /// Lists a frame.
 ///
 /// # Errors
-/// A frame that was not drawn, or records that cannot be read.
+/// The frame has no draws, or the records cannot be read.
 pub fn list(session: &mut Session, number: u32, wanted: &Wanted) -> Result<List, SessionError> {
     let frame = session.frames.get(&number).cloned();
     let frame = frame.ok_or(SessionError::NotDrawn(number))?;
@@ -102,14 +102,14 @@ fn rows(
         row.draws += 1;
         row.fragments += weights[place];
         if let Some(views) = views {
-            add(&mut row.shows, views.roles[place]);
+            add_once(&mut row.shows, views.roles[place]);
         }
         let Some(info) = session.draw(executed.draw) else {
             continue;
         };
-        add(&mut row.viewports, viewport(info));
+        add_once(&mut row.viewports, viewport(info));
         for caveat in info.unrecorded.iter().chain(&info.caveats) {
-            add(&mut row.caveats, caveat.clone());
+            add_once(&mut row.caveats, caveat.clone());
         }
         if let (Some(shader), Some(of)) = (session.shader_of(info), records.get(&executed.draw)) {
             row.samples += samples(shader, of);
@@ -133,8 +133,8 @@ fn rows(
     rows
 }
 
-/// Adds what is not there yet.
-fn add<T: PartialEq>(all: &mut Vec<T>, one: T) {
+/// Adds an element unless it is present.
+fn add_once<T: PartialEq>(all: &mut Vec<T>, one: T) {
     if !all.contains(&one) {
         all.push(one);
     }
@@ -164,7 +164,7 @@ fn empty_row(session: &Session, number: usize, pass: u32) -> PassRow {
     }
 }
 
-/// Texture samples of records.
+/// Number of texture samples in records.
 fn samples(shader: &ShaderInfo, records: &[RawSample]) -> u64 {
     let mut of_groups: HashMap<u16, u64> = HashMap::new();
     for site in &shader.sites {
@@ -179,7 +179,7 @@ fn samples(shader: &ShaderInfo, records: &[RawSample]) -> u64 {
     records.iter().map(of).sum()
 }
 
-/// Names of what a pass's draws show.
+/// Names of the roles of the draws.
 fn shows(row: &PassRow) -> String {
     let names: Vec<&str> = row.shows.iter().map(|role| role.name()).collect();
     names.join(" + ")
@@ -233,7 +233,7 @@ fn cells(row: &PassRow) -> [String; 8] {
 }
 
 impl List {
-    /// How both eyes were identified.
+    /// Text about how the eyes were identified.
     #[must_use]
     pub fn eyes_text(&self) -> String {
         match &self.eyes {
@@ -242,7 +242,7 @@ impl List {
         }
     }
 
-    /// As lines of text.
+    /// The list as text.
     #[must_use]
     pub fn table(&self) -> String {
         let mut lines = vec![COLUMNS.map(str::to_owned)];

@@ -12,7 +12,7 @@ const STYLE: &str =
 th, td { border: 1px solid #ccc; padding: 4px 8px; text-align: left; vertical-align: top; }
 img { max-width: 256px; max-height: 256px; background: #888; } .why { color: #a30; }";
 
-/// The page of some frames of a program.
+/// The page with lists of frames of a program.
 #[must_use]
 pub fn page(program: &str, lists: &[List]) -> String {
     let title = escaped(program);
@@ -65,7 +65,7 @@ fn line(row: &PassRow, text: &mut String) {
     }
 }
 
-/// A picture as a PNG file, opaque.
+/// Encodes a picture as PNG, without its alpha.
 fn png(picture: &Thumbnail) -> Option<Vec<u8>> {
     let [width, height] = picture.size;
     let rgb: Vec<u8> = (picture.texels.chunks_exact(4))

@@ -1,7 +1,7 @@
-//! Files of rules for programs that none of the tool's own rules fits.
+//! Files of rules, for programs that no built-in rule fits.
 //!
 //! ```toml
-//! # The first rule whose conditions a draw meets tells what it shows.
+//! # The first rule whose conditions a draw satisfies determines what it shows.
 //! [[rule]]
 //! size = [1440, 1600]     # of the target
 //! viewport = [0, 0, 1440, 1600]
@@ -17,56 +17,56 @@ use serde::Deserialize;
 use std::path::Path;
 use thiserror::Error;
 
-/// Why a file of rules cannot be used.
+/// Reasons why a file of rules cannot be used.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum FileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("{file}: {reason}")]
     Io {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// The system's reason.
+        /// Error of the system.
         reason: String,
     },
-    /// It is not what such a file is.
+    /// The content is not a list of rules.
     #[error("{file}: {reason}")]
     Parse {
-        /// The file.
+        /// Name of the file.
         file: String,
-        /// Line and what was expected.
+        /// Line, and what was expected there.
         reason: String,
     },
-    /// No rule assigns an eye.
+    /// No rule assigns a draw to an eye.
     #[error(
         "{0}: expected a rule that shows \"left\", \"right\", \"both\" or \"views\", found none"
     )]
     NoEye(String),
 }
 
-/// Rules of a file.
+/// The rules of a file.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RuleFile {
     rule: Vec<FileRule>,
 }
 
-/// Conditions of a draw, and its role.
+/// A rule: conditions on a draw, and its role.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 struct FileRule {
-    /// Number of its pass in the frame.
+    /// Number of the render pass in the frame.
     pass: Option<usize>,
-    /// Width and height of what its viewport and area are part of.
+    /// Width and height of the render area.
     size: Option<[u32; 2]>,
     /// Left, top, width and height.
     viewport: Option<[i64; 4]>,
     /// `VkFormat` of the target.
     format: Option<i32>,
-    /// Whether it writes only depth.
+    /// Whether the draw writes only depth.
     depth_only: Option<bool>,
-    /// Colour channels that it writes: `"r"`, `"gb"`.
+    /// Colour channels that the draw writes: `"r"`, `"gb"`.
     channels: Option<Channels>,
-    /// Views that its pass is broadcast to: 0 without multiview.
+    /// View mask of the render pass; 0 without multiview.
     view_mask: Option<u32>,
     shows: Shows,
 }
@@ -94,7 +94,7 @@ impl TryFrom<String> for Channels {
 enum Shows {
     Left,
     Right,
-    /// One picture for both.
+    /// One picture for both eyes.
     Both,
     /// The views of a multiview pass.
     Views,
@@ -123,7 +123,7 @@ impl RuleFile {
     /// Reads a file.
     ///
     /// # Errors
-    /// A file that cannot be read, or is none of rules.
+    /// The file cannot be read, or its content is not a list of rules.
     pub fn load(path: &Path) -> Result<Self, FileError> {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|error| FileError::Io {
@@ -133,10 +133,10 @@ impl RuleFile {
         Self::parse(&file, &text)
     }
 
-    /// Rules of a text.
+    /// Parses rules.
     ///
     /// # Errors
-    /// A text that has none.
+    /// The text is not a list of rules.
     pub fn parse(file: &str, text: &str) -> Result<Self, FileError> {
         let rules: Self = toml::from_str(text).map_err(|error| FileError::Parse {
             file: file.to_owned(),

@@ -1,5 +1,5 @@
-//! Which draws show which eye: rules for how programs render stereo pictures, and files of rules for those that no rule
-//! fits.
+//! Finds out which draws show which eye. There are rules for common ways of stereo rendering, and files of
+//! rules for other programs.
 
 mod file;
 mod others;
@@ -24,9 +24,9 @@ pub enum Rule {
     Halves,
     /// A target for each eye.
     Targets,
-    /// One target for both, one eye after the other, distinguished by the colour channels that are written.
+    /// One target for both eyes, one after the other, distinguished by the written colour channels.
     Channels,
-    /// One target for both: the same draws twice.
+    /// One target for both eyes: the same draws twice.
     Twice,
     /// Only one eye.
     Mono,
@@ -35,7 +35,7 @@ pub enum Rule {
 }
 
 impl Rule {
-    /// Every rule that finds two eyes, in the order in which they are tried.
+    /// The rules that can identify two eyes, in the order in which they are tried.
     pub const ALL: [Self; 5] = [
         Self::Multiview,
         Self::Halves,
@@ -44,7 +44,7 @@ impl Rule {
         Self::Twice,
     ];
 
-    /// In words.
+    /// Name in messages.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -59,15 +59,15 @@ impl Rule {
     }
 }
 
-/// How the views are found.
+/// How the eyes are to be identified.
 #[derive(Clone, Debug, Default)]
 pub enum Wanted {
-    /// The first rule that fits.
+    /// By the first rule that fits.
     #[default]
     First,
-    /// A rule.
+    /// By a certain rule.
     Rule(Rule),
-    /// A file of rules.
+    /// By a file of rules.
     File(RuleFile),
 }
 
@@ -80,21 +80,21 @@ pub struct View {
     pub size: [u32; 2],
 }
 
-/// Role of a draw.
+/// Role of a draw in a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// A view of an eye; `None` for one that belongs to both.
+    /// Renders the picture of an eye; `None` for a picture that both eyes use.
     Seen(Option<Eye>),
-    /// Both eyes, by the views of the draw.
+    /// Renders both eyes by multiview.
     Multiview,
-    /// Depth seen from a light.
+    /// Renders a shadow map.
     Shadow,
-    /// Nothing that a trace is of.
+    /// Not part of a trace.
     Other(Other),
 }
 
 impl Role {
-    /// In words.
+    /// Name in messages.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -108,29 +108,29 @@ impl Role {
     }
 }
 
-/// The views of a frame.
+/// The eyes of a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Views {
-    /// The rule that found them.
+    /// Rule that identified the eyes.
     pub rule: Rule,
-    /// Rectangle of the left and the right eye in its target.
+    /// Rectangles of the left and the right eye in their targets.
     pub eyes: [View; 2],
-    /// Views of a multiview pass that are the left and the right eye.
+    /// Numbers of the left and the right eye's view in a multiview pass.
     pub layers: [u32; 2],
-    /// Of each executed draw of the frame.
+    /// Role of each executed draw.
     pub roles: Vec<Role>,
 }
 
-/// No rule fits.
+/// The eyes of a frame cannot be identified.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum ViewsError {
-    /// None of the rules.
+    /// No rule fits.
     #[error(
         "frame {0}: no two eyes were found, by none of: multiview, viewport halves, a target per eye, colour channels, equal draws \
          twice; --list shows the frame's passes, --eyes names a rule, --eyes mono takes the largest target alone, --rules a file"
     )]
     NoStereo(u32),
-    /// The rule that was named.
+    /// The requested rule does not fit.
     #[error("frame {frame}: no two eyes were found by the rule {rule}")]
     NotBy {
         /// Frame.
@@ -138,7 +138,7 @@ pub enum ViewsError {
         /// Rule.
         rule: &'static str,
     },
-    /// Nothing was drawn.
+    /// The frame has no draws.
     #[error("frame {0}: nothing was drawn into a colour target")]
     Empty(u32),
     /// The eyes of a file's rules have different sizes.
@@ -146,37 +146,37 @@ pub enum ViewsError {
     Sizes {
         /// Frame.
         frame: u32,
-        /// Of the left eye.
+        /// Size of the left eye.
         left: [u32; 2],
-        /// Of the right eye.
+        /// Size of the right eye.
         right: [u32; 2],
     },
 }
 
-/// A draw with what rules look at.
+/// A draw with the properties that rules use.
 struct Drawn<'a> {
     place: usize,
     info: &'a DrawInfo,
     pass: Option<&'a PassInfo>,
-    /// Number of the pass within its frame.
+    /// Number of its render pass in the frame.
     pass_number: usize,
-    /// Fragments that decide the main target of a frame.
+    /// Number of fragments, used to find the main target of a frame.
     weight: u64,
 }
 
-/// Key of draws that are the same for both eyes.
+/// Key that is equal for the draws of both eyes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct DrawKey {
     /// Pipeline.
     pub pipeline: u32,
-    /// Vertices or indices.
+    /// Number of vertices or indices.
     pub vertices: u32,
-    /// Instances.
+    /// Number of instances.
     pub instances: u32,
 }
 
 impl DrawKey {
-    /// A draw's.
+    /// The key of a draw.
     #[must_use]
     pub fn of(draw: &DrawInfo) -> Self {
         Self {
@@ -188,7 +188,7 @@ impl DrawKey {
 }
 
 impl Drawn<'_> {
-    /// First colour attachment that is written.
+    /// First colour attachment that the draw writes.
     fn target(&self) -> Option<ViewInfo> {
         let pass = self.pass?;
         let written = |(place, _): &(usize, &ViewInfo)| {
@@ -209,7 +209,7 @@ impl Drawn<'_> {
         self.depth().is_some() && self.target().is_none()
     }
 
-    /// Whatever is seen of a scene hides what lies behind.
+    /// Whether the draw is part of a 3D scene. Such draws test depth.
     fn is_of_scene(&self) -> bool {
         self.info.depth.tests && self.depth().is_some() && self.target().is_some()
     }
@@ -223,7 +223,7 @@ impl Drawn<'_> {
 #[must_use]
 pub fn viewport(draw: &DrawInfo) -> View {
     let [x, y, width, height] = draw.viewport;
-    // Upside down: the corner is the lower one.
+    // With a negative height, the origin is the lower left corner.
     let top = if height < 0.0 { y + height } else { y };
     let whole = |v: f32| v.round() as i32;
     let size = |v: f32| v.abs().round() as u32;
@@ -233,7 +233,7 @@ pub fn viewport(draw: &DrawInfo) -> View {
     }
 }
 
-/// Number of each draw's pass within its frame.
+/// Number of each draw's render pass in the frame.
 #[must_use]
 pub fn pass_numbers(frame: &ProgramFrame) -> Vec<usize> {
     let mut seen: Vec<u32> = Vec::new();
@@ -247,7 +247,7 @@ pub fn pass_numbers(frame: &ProgramFrame) -> Vec<usize> {
     frame.draws.iter().map(number).collect()
 }
 
-/// Finds the views of a frame. `weights` are the fragments of each executed draw.
+/// Identifies the eyes of a frame. `weights` are the numbers of fragments of the executed draws.
 ///
 /// # Errors
 /// No rule fits.
@@ -271,7 +271,7 @@ pub fn find(
         .collect();
     let of_scene = |draw: &Drawn<'_>| draw.is_of_scene() && draw.weight > 0;
     if draws.iter().any(of_scene) {
-        // Draws that compose or process pictures cover more than the pictures' own draws.
+        // Draws that compose or process pictures may cover more pixels than the pictures' own draws.
         for draw in draws.iter_mut().filter(|draw| !draw.is_of_scene()) {
             draw.weight = 0;
         }
@@ -303,7 +303,7 @@ pub fn find(
         roles[*place] = *role;
     }
     if rule != Rule::File {
-        others::tell(&draws, &mut roles);
+        others::classify(&draws, &mut roles);
     }
     Ok(Views {
         rule,
@@ -313,13 +313,13 @@ pub fn find(
     })
 }
 
-/// Result of a rule.
+/// Eyes that a rule has identified.
 struct Found {
     eyes: [View; 2],
     layers: [u32; 2],
-    /// Of draws by their place.
+    /// Roles of draws by index.
     roles: Vec<(usize, Role)>,
-    /// Fragments that it explains.
+    /// Number of fragments in draws with a role.
     weight: u64,
 }
 

@@ -1,23 +1,23 @@
-//! Kinds of draws that belong to no eye.
+//! Kinds of draws that do not belong to an eye.
 
 use super::{Drawn, Role, viewport};
 use std::collections::HashSet;
 
-/// A draw that the trace leaves out.
+/// A draw that is not in the trace.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Other {
-    /// A scene that the eyes' draws read as a texture: a reflection, a probe, a screen.
+    /// Renders a picture that the eyes' draws read as a texture: a reflection, a probe, a screen.
     Reflection,
-    /// A picture composed of earlier ones: it tests no depth and reads the frame's pictures.
+    /// Processes earlier pictures: tests no depth and reads a picture of the frame.
     PostProcessing,
-    /// Whatever else renders elsewhere.
+    /// Renders into another target for an unknown purpose.
     Elsewhere,
     /// Assigned by a file of rules.
     Ignored,
 }
 
 impl Other {
-    /// In words.
+    /// Name in messages.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -29,8 +29,8 @@ impl Other {
     }
 }
 
-/// Tells the roles of draws that no eye sees, in which `roles` has [`Other::Elsewhere`].
-pub(super) fn tell(draws: &[Drawn<'_>], roles: &mut [Role]) {
+/// Classifies the draws whose role is still [`Other::Elsewhere`].
+pub(super) fn classify(draws: &[Drawn<'_>], roles: &mut [Role]) {
     let open = Role::Other(Other::Elsewhere);
     let is_seen = |role: Role| matches!(role, Role::Seen(_) | Role::Multiview);
     let (mut read, mut rendered) = (HashSet::new(), HashSet::new());
@@ -46,7 +46,7 @@ pub(super) fn tell(draws: &[Drawn<'_>], roles: &mut [Role]) {
             continue;
         }
         roles[draw.place] = if draw.is_depth_alone() {
-            // Depth that is used for an eye's picture afterwards belongs to that eye.
+            // Depth that an eye's picture uses later belongs to that eye.
             let own = draws.iter().find(|seen| {
                 is_seen(roles[seen.place])
                     && seen.depth() == draw.depth()

@@ -1,11 +1,11 @@
-//! The rules for how programs render for two eyes.
+//! Rules for common ways of rendering for two eyes.
 
 use super::{DrawKey, Drawn, Found, LEFT, RIGHT, Role, Rule, View, viewport};
-use crate::pairs::likeness;
+use crate::pairs::matched_share;
 use parallax_layer::spool::ViewInfo;
 use std::collections::HashMap;
 
-/// Result of a rule, if it fits.
+/// Applies a rule. `None` if it does not fit.
 pub(super) fn find(rule: Rule, draws: &[Drawn<'_>]) -> Option<Found> {
     match rule {
         Rule::Multiview => multiview(draws),
@@ -18,8 +18,8 @@ pub(super) fn find(rule: Rule, draws: &[Drawn<'_>]) -> Option<Found> {
     }
 }
 
-/// Largest number by a key.
-fn largest<K: Copy + Eq + std::hash::Hash>(
+/// Sums the fragments of draws by a key; the sums_by_key sum comes first.
+fn sums_by_key<K: Copy + Eq + std::hash::Hash>(
     draws: &[&Drawn<'_>],
     key: impl Fn(&Drawn<'_>) -> Option<K>,
 ) -> Vec<(K, u64)> {
@@ -34,7 +34,7 @@ fn largest<K: Copy + Eq + std::hash::Hash>(
         }
     }
     let mut found: Vec<(K, u64)> = order.into_iter().map(|key| (key, sums[&key])).collect();
-    // Equal ones stay in the order in which they were drawn.
+    // Keys with equal sums stay in drawing order.
     found.sort_by_key(|(_, weight)| std::cmp::Reverse(*weight));
     found
 }
@@ -49,7 +49,7 @@ fn multiview(draws: &[Drawn<'_>]) -> Option<Found> {
         let target = draw.target()?;
         (mask.count_ones() == 2).then_some((target.image, mask, viewport(draw.info)))
     };
-    let ((image, mask, view), weight) = *largest(&all(draws), broadcast).first()?;
+    let ((image, mask, view), weight) = *sums_by_key(&all(draws), broadcast).first()?;
     let of = draws
         .iter()
         .filter(|draw| broadcast(draw).is_some_and(|(other, of, _)| (other, of) == (image, mask)));
@@ -62,14 +62,14 @@ fn multiview(draws: &[Drawn<'_>]) -> Option<Found> {
     })
 }
 
-/// Two rectangles side by side or above each other.
+/// Whether two rectangles are side by side or one above the other.
 fn are_halves(a: View, b: View) -> bool {
     if a.size != b.size || a.size.contains(&0) {
         return false;
     }
     let [dx, dy] = [0, 1].map(|axis| (a.origin[axis] - b.origin[axis]).unsigned_abs());
     let [width, height] = a.size;
-    // A gap between them may be as wide as a tenth.
+    // The gap between them may be up to a tenth of their size.
     let beside = dy == 0 && dx >= width && dx - width <= width / 10;
     let above = dx == 0 && dy >= height && dy - height <= height / 10;
     beside || above
@@ -77,7 +77,7 @@ fn are_halves(a: View, b: View) -> bool {
 
 fn halves(draws: &[Drawn<'_>]) -> Option<Found> {
     let place = |draw: &Drawn<'_>| Some((draw.target()?, viewport(draw.info)));
-    let places = largest(&all(draws), place);
+    let places = sums_by_key(&all(draws), place);
     for ((target, view), weight) in &places {
         let other = places
             .iter()
@@ -102,12 +102,12 @@ fn halves(draws: &[Drawn<'_>]) -> Option<Found> {
     None
 }
 
-/// How alike the draws of two eyes have to be.
-const LIKENESS: f64 = 0.7;
+/// Required share of draws that both eyes have in common.
+const LEAST_MATCHED_SHARE: f64 = 0.7;
 
 fn targets(draws: &[Drawn<'_>]) -> Option<Found> {
     let on = |draw: &Drawn<'_>| draw.target();
-    let places = largest(&all(draws), on);
+    let places = sums_by_key(&all(draws), on);
     let keys = |target: ViewInfo| -> Vec<DrawKey> {
         let of = draws.iter().filter(|draw| on(draw) == Some(target));
         of.map(|draw| DrawKey::of(draw.info)).collect()
@@ -117,7 +117,7 @@ fn targets(draws: &[Drawn<'_>]) -> Option<Found> {
             .iter()
             .filter(|draw| on(draw) == Some(target))
             .collect();
-        largest(&of, |draw| Some(viewport(draw.info)))
+        sums_by_key(&of, |draw| Some(viewport(draw.info)))
             .first()
             .map(|(view, _)| *view)
     };
@@ -128,7 +128,7 @@ fn targets(draws: &[Drawn<'_>]) -> Option<Found> {
             };
             let alike = a.format == b.format
                 && of_a.size == of_b.size
-                && likeness(&keys(*a), &keys(*b)) >= LIKENESS;
+                && matched_share(&keys(*a), &keys(*b)) >= LEAST_MATCHED_SHARE;
             if !alike || *other_weight * 4 < *weight {
                 continue;
             }
@@ -154,14 +154,14 @@ fn targets(draws: &[Drawn<'_>]) -> Option<Found> {
     None
 }
 
-/// The draws into the largest target, and its main view.
+/// The draws into the target with the most fragments, and their main viewport.
 fn main_target<'a, 'b>(draws: &'b [Drawn<'a>]) -> Option<(Vec<&'b Drawn<'a>>, View, u64)> {
-    let (target, weight) = *largest(&all(draws), |draw| draw.target()).first()?;
+    let (target, weight) = *sums_by_key(&all(draws), |draw| draw.target()).first()?;
     let of: Vec<&Drawn<'_>> = draws
         .iter()
         .filter(|draw| draw.target() == Some(target))
         .collect();
-    let (view, _) = *largest(&of, |draw| Some(viewport(draw.info))).first()?;
+    let (view, _) = *sums_by_key(&of, |draw| Some(viewport(draw.info))).first()?;
     Some((of, view, weight))
 }
 
@@ -193,12 +193,12 @@ fn channels(draws: &[Drawn<'_>]) -> Option<Found> {
 fn twice(draws: &[Drawn<'_>]) -> Option<Found> {
     let (of, view, weight) = main_target(draws)?;
     let keys: Vec<DrawKey> = of.iter().map(|draw| DrawKey::of(draw.info)).collect();
-    // The second eye begins where a pass does.
+    // The second eye starts with a render pass.
     let starts = (1..of.len())
         .filter(|at| of[*at].pass.map(|pass| pass.pass) != of[*at - 1].pass.map(|pass| pass.pass));
-    let alike = starts.map(|at| (at, likeness(&keys[..at], &keys[at..])));
+    let alike = starts.map(|at| (at, matched_share(&keys[..at], &keys[at..])));
     let best = alike.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let (middle, _) = Some(best).filter(|(_, likeness)| *likeness >= LIKENESS)?;
+    let (middle, _) = Some(best).filter(|(_, share)| *share >= LEAST_MATCHED_SHARE)?;
     let roles = of.iter().enumerate().map(|(number, draw)| {
         let eye = if number < middle { LEFT } else { RIGHT };
         (draw.place, eye)

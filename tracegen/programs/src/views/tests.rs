@@ -13,7 +13,7 @@ fn target(image: u32) -> ViewInfo {
     }
 }
 
-/// A session of one frame, pass by pass.
+/// Builds a session of one frame.
 #[derive(Default)]
 struct Build {
     session: Session,
@@ -23,7 +23,7 @@ struct Build {
 }
 
 impl Build {
-    /// A pass with a colour target and a depth target.
+    /// Adds a render pass with a colour and a depth target.
     fn pass(&mut self, color: Option<u32>, depth: Option<u32>) -> u32 {
         self.multiview(color, depth, 0)
     }
@@ -42,7 +42,7 @@ impl Build {
         pass
     }
 
-    /// A draw of a pipeline into some columns.
+    /// Adds a draw with a pipeline into a range of columns.
     fn draw(&mut self, pass: u32, pipeline: u32, columns: [u32; 2], weight: u64) {
         self.draw_with(pass, pipeline, columns, weight, |_| ());
     }
@@ -105,7 +105,7 @@ fn reads(image: u32) -> impl FnOnce(&mut DrawInfo) {
 }
 
 #[test]
-fn halves_are_eyes_whatever_covers_more_without_depth() {
+fn halves_are_eyes_even_if_draws_without_depth_cover_more() {
     let mut build = Build::default();
     let composed = build.pass(Some(9), None);
     build.draw(composed, 5, [0, 64], 9000);
@@ -123,7 +123,7 @@ fn halves_are_eyes_whatever_covers_more_without_depth() {
 }
 
 #[test]
-fn the_target_that_is_drawn_first_is_the_left_eye() {
+fn the_first_of_two_targets_is_the_left_eye() {
     let mut build = Build::default();
     for color in [7, 3] {
         let pass = build.pass(Some(color), Some(2));
@@ -137,7 +137,7 @@ fn the_target_that_is_drawn_first_is_the_left_eye() {
 }
 
 #[test]
-fn layers_of_a_multiview_pass_are_the_bits_of_its_mask() {
+fn multiview_eyes_are_the_bits_of_the_view_mask() {
     let mut build = Build::default();
     let pass = build.multiview(Some(1), Some(2), 0b1010);
     build.draw(pass, 1, [0, 64], 500);
@@ -147,7 +147,7 @@ fn layers_of_a_multiview_pass_are_the_bits_of_its_mask() {
 }
 
 #[test]
-fn channels_and_equal_sequences_tell_eyes_of_one_target() {
+fn eyes_in_one_target_are_identified_by_channels_or_equal_sequences() {
     let mut build = Build::default();
     for mask in [1, 6] {
         let pass = build.pass(Some(1), Some(2));
@@ -171,7 +171,7 @@ fn channels_and_equal_sequences_tell_eyes_of_one_target() {
 }
 
 #[test]
-fn one_picture_is_no_stereo_unless_one_eye_is_asked_for() {
+fn a_single_picture_is_accepted_only_by_the_mono_rule() {
     let mono = || {
         let mut build = Build::default();
         let pass = build.pass(Some(1), Some(2));
@@ -188,7 +188,7 @@ fn one_picture_is_no_stereo_unless_one_eye_is_asked_for() {
 }
 
 #[test]
-fn what_no_eye_sees_is_told_by_what_reads_it() {
+fn draws_outside_the_eyes_are_classified_by_their_readers() {
     let mut build = Build::default();
     let shadow = build.pass(None, Some(10));
     build.draw(shadow, 8, [0, 64], 700);
@@ -218,7 +218,7 @@ fn what_no_eye_sees_is_told_by_what_reads_it() {
 }
 
 #[test]
-fn a_file_of_rules_tells_what_no_rule_finds() {
+fn a_file_of_rules_assigns_eyes_where_no_rule_fits() {
     let build = || {
         let mut build = Build::default();
         for color in [1, 2, 3] {
@@ -252,7 +252,7 @@ fn a_file_of_rules_tells_what_no_rule_finds() {
 }
 
 #[test]
-fn files_that_are_none_of_rules_are_refused_by_name_and_place() {
+fn invalid_files_of_rules_are_refused_with_name_and_place() {
     let cases = [
         ("[[rule]]\nshows = \"up\"", "line 2"),
         ("[[rule]]\nshown = \"left\"", "unknown field"),

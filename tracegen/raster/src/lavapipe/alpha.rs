@@ -1,9 +1,9 @@
 //! Copies of the alpha that alpha tests sample: only the alpha of a base colour, as floats.
 //!
-//! llvmpipe decodes four channels of compressed blocks, and the curve of three, for every texel that
-//! a filter reads. A masked draw that is captured needs one of them, twice. The driver itself makes the
-//! copies, texel by texel, and filters them by the same code, in floats, as it does sRGB: the alpha
-//! that a shader gets is the same to the last bit.
+//! For every texel that a filter reads, llvmpipe decodes four channels of compressed blocks and the
+//! sRGB curve of three. A captured masked draw needs only alpha, but twice. The driver itself makes
+//! the copies texel by texel and filters them with the same float code as sRGB, so the shader gets
+//! bit-identical alpha.
 
 use super::bindings;
 use super::device::Gpu;
@@ -19,7 +19,7 @@ use textures::TextureSet;
 /// Format of the copies.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Float;
 
-/// Copies that would take more are not made.
+/// Largest total size of the copies. Beyond it, none are made.
 const BUDGET_BYTES: u64 = 256 << 20;
 
 /// The texture that a material's alpha test samples, by its number in `set`.
@@ -30,7 +30,7 @@ pub fn of_material(material: &Material, set: &TextureSet) -> Option<usize> {
     })
 }
 
-/// The textures to be copied, by their numbers in `set`: all that alpha-masked draws sample, or none.
+/// The textures to copy, by their numbers in `set`: all that alpha-masked draws sample, or none.
 pub fn planned(gpu: &Gpu, scene: &Scene, draws: &DrawList, set: &TextureSet) -> BTreeSet<usize> {
     let masked = draws.calls.iter().filter(|c| c.mode == DrawMode::Masked);
     let sampled: BTreeSet<usize> = masked
@@ -46,7 +46,7 @@ pub fn planned(gpu: &Gpu, scene: &Scene, draws: &DrawList, set: &TextureSet) -> 
             .map(level_bytes)
             .sum::<u64>()
     });
-    // llvmpipe filters linear colours of 8 bits in fixed point, and so not as floats.
+    // llvmpipe filters linear 8-bit colours in fixed point, not as floats.
     let by_floats = |texture: &Texture| texture.color_space == ColorSpace::Srgb;
     let possible = gpu.no_capture.is_none()
         && (gpu.device.features()).contains(wgpu::Features::FLOAT32_FILTERABLE)
@@ -145,7 +145,8 @@ mod tests {
 
     const SIDE_PX: u32 = 256;
     const PAIR: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
-    /// Alpha of the texture and of its copy, from much more than one texel per pixel to much less.
+    /// Alpha of the texture and of its copy, at scales from many texels per pixel to much less than
+    /// one.
     const BOTH: &str = "
 @group(0) @binding(0) var color: texture_2d<f32>;
 @group(0) @binding(1) var alpha: texture_2d<f32>;
@@ -247,7 +248,7 @@ fn fragment_both(@builtin(position) position: vec4<f32>) -> @location(0) vec2<f3
     }
 
     #[test]
-    fn a_copy_is_sampled_as_the_alpha_that_it_was_made_of_bit_for_bit() {
+    fn samples_of_a_copy_equal_samples_of_the_original_alpha_bit_for_bit() {
         let gpu = device::open(None).unwrap_or_else(|e| panic!("{e}"));
         assert!((gpu.device.features()).contains(wgpu::Features::FLOAT32_FILTERABLE));
         use wgpu::{AddressMode, FilterMode, MipmapFilterMode};

@@ -2,7 +2,7 @@
 
 use super::device::Gpu;
 
-/// A whole buffer.
+/// Binding type of a whole buffer.
 pub fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
     wgpu::BindingType::Buffer {
         ty,
@@ -11,12 +11,12 @@ pub fn buffer(ty: wgpu::BufferBindingType) -> wgpu::BindingType {
     }
 }
 
-/// A uniform buffer.
+/// Binding type of a uniform buffer.
 pub fn uniform() -> wgpu::BindingType {
     buffer(wgpu::BufferBindingType::Uniform)
 }
 
-/// A texture of one layer.
+/// Binding type of a texture of one layer.
 pub fn texture(sample_type: wgpu::TextureSampleType) -> wgpu::BindingType {
     wgpu::BindingType::Texture {
         sample_type,
@@ -25,7 +25,7 @@ pub fn texture(sample_type: wgpu::TextureSampleType) -> wgpu::BindingType {
     }
 }
 
-/// A group of what each stage reads: numbers, stages and kinds of its bindings.
+/// Layout of a group: numbers, stages and types of its bindings.
 pub fn layout(
     gpu: &Gpu,
     label: &str,
@@ -46,7 +46,7 @@ pub fn layout(
         })
 }
 
-/// A group of what fragments read.
+/// Layout of a group that fragments read.
 pub fn fragment_layout(
     gpu: &Gpu,
     label: &str,
@@ -56,7 +56,7 @@ pub fn fragment_layout(
     layout(gpu, label, bindings.into_iter().map(read))
 }
 
-/// Resources in the group that a layout describes, by the numbers of their bindings.
+/// The resources of a group with this layout, by the numbers of their bindings.
 pub fn group<'a>(
     gpu: &Gpu,
     label: &str,

@@ -1,4 +1,4 @@
-//! Operations on whole layers: masks before their draws, pictures after them.
+//! Operations on whole layers: masks before their draws, composition of pictures after them.
 
 use super::bindings;
 use super::device::Gpu;
@@ -18,7 +18,7 @@ pub struct Composer {
     /// Writes the nearest depth wherever a layer's mask is not set.
     pub mask: OverLayer,
     filters: [(Filter, wgpu::RenderPipeline); 4],
-    /// Used as the mask of layers and the tiles of parts that have none.
+    /// Replaces the mask of layers, and the tiles of parts, that have none.
     absent: wgpu::TextureView,
 }
 
@@ -29,7 +29,7 @@ struct PartData {
     origin: [i32; 2],
     coarseness: [i32; 2],
     some_tiles: [u32; 4],
-    /// Columns, each with a float of padding.
+    /// Columns, each padded with one float.
     layer_from_px: [[f32; 4]; 3],
 }
 
@@ -81,7 +81,7 @@ impl Composer {
         })
     }
 
-    /// Uploads a layer's mask: what [`Self::mask`] is drawn with.
+    /// Uploads a layer's mask and creates the bindings for [`Self::mask`].
     pub fn bind_mask(&self, gpu: &Gpu, mask: &Mask) -> wgpu::BindGroup {
         self.mask_bindings(gpu, &upload(gpu, mask))
     }
@@ -91,7 +91,7 @@ impl Composer {
         bindings::group(gpu, "mask", &self.mask_layout, [(0, flags)])
     }
 
-    /// Makes a picture of parts of layers.
+    /// Composes a picture from parts of layers.
     ///
     /// # Errors
     /// Driver errors.

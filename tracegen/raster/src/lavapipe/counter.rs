@@ -1,5 +1,5 @@
-//! Counts fragments per pixel by additive blending: a check of the capture that shares neither
-//! ballots nor atomics nor post-processing with it.
+//! Counts fragments per pixel by additive blending. This check is independent of the capture: it
+//! uses neither ballots nor atomics nor post-processing.
 
 use super::Lavapipe;
 use super::pipelines::DEPTH_FORMAT;
@@ -11,13 +11,14 @@ use crate::roles::Purpose;
 use crate::uniforms::ViewData;
 
 impl Lavapipe {
-    /// Fragments of all opaque and blended draws that pass the early depth test, by pixel.
+    /// Number of fragments of all opaque and blended draws that pass the early depth test, per
+    /// pixel.
     ///
     /// # Errors
     /// Driver errors.
     ///
     /// # Panics
-    /// Where a draw is alpha-masked.
+    /// If a draw is alpha-masked.
     pub fn count_fragments(
         &mut self,
         draws: &DrawList,

@@ -1,4 +1,4 @@
-//! Finds a Vulkan device and opens it: Mesa's CPU driver, which captures, or one by name.
+//! Finds and opens a Vulkan device: Mesa's CPU driver, which can capture, or a device by name.
 
 use crate::error::RasterError;
 use crate::shader::Granularity;
@@ -11,15 +11,15 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     /// Name of the device.
     pub adapter: String,
-    /// Driver string as it names itself.
+    /// The driver's own name and version string.
     pub driver: String,
-    /// It runs on the processor.
+    /// The device runs on the processor.
     pub is_software: bool,
-    /// It has a multiview, which need not be sound.
+    /// The device has a multiview, which may be defective.
     pub has_multiview: bool,
-    /// Missing features for captures; such a device can only render pictures.
+    /// Missing features for captures. Such a device can only render pictures.
     pub no_capture: Option<String>,
-    /// Why fragments are recorded one by one instead of quad by quad, if they are.
+    /// Reason for recording fragments one by one instead of quad by quad, if they are.
     pub by_fragment: Option<String>,
 }
 
@@ -34,12 +34,13 @@ const CAPTURE_FEATURES: wgpu::Features = wgpu::Features::PRIMITIVE_INDEX
 /// Features and limits that every picture requires.
 const PICTURE_FEATURES: wgpu::Features = wgpu::Features::TEXTURE_COMPRESSION_BC;
 
-/// Opens an adapter: the first whose name contains `wanted`, whatever the case; llvmpipe, which
-/// has to be able to capture, where none is asked for.
+/// Opens an adapter: the first whose name contains `wanted`, ignoring case, or else llvmpipe, which
+/// must be able to capture.
 ///
 /// # Errors
-/// [`RasterError::NoDriver`] with the packages to install, [`RasterError::NotLoaded`] where they are, [`RasterError::NoAdapter`] with the
-/// names of those present, or [`RasterError::Unsupported`].
+/// [`RasterError::NoDriver`] with the packages to install, [`RasterError::NotLoaded`] if they are
+/// installed, [`RasterError::NoAdapter`] with the names of the available adapters, or
+/// [`RasterError::Unsupported`].
 pub fn open(wanted: Option<&str>) -> Result<Gpu, RasterError> {
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
         backends: wgpu::Backends::VULKAN,
@@ -119,7 +120,7 @@ fn is_llvmpipe(info: &wgpu::AdapterInfo) -> bool {
     info.device_type == wgpu::DeviceType::Cpu && info.name.contains("llvmpipe")
 }
 
-/// Why the lanes of a quad cannot exchange their coverage, if they cannot.
+/// Reason why the lanes of a quad cannot exchange their coverage, if they cannot.
 fn no_ballots(adapter: &wgpu::Adapter, info: &wgpu::AdapterInfo) -> Option<String> {
     let lanes = [info.subgroup_min_size, info.subgroup_max_size];
     if !adapter.features().contains(wgpu::Features::SUBGROUP) {
@@ -150,7 +151,7 @@ impl Gpu {
         }
     }
 
-    /// Runs `work` and returns objections of the driver or of the validation as an error.
+    /// Runs `work`. Errors of the driver or of the validation are returned.
     ///
     /// # Errors
     /// [`RasterError::Driver`].
@@ -174,7 +175,7 @@ impl Gpu {
         Ok(result)
     }
 
-    /// Waits for everything submitted.
+    /// Waits for all submitted work.
     ///
     /// # Errors
     /// [`RasterError::Driver`].
@@ -228,7 +229,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_adapter_is_found_by_a_part_of_its_name_whatever_the_case() {
+    fn an_adapter_is_found_by_a_part_of_its_name_ignoring_case() {
         let names = ["NVIDIA H200", "llvmpipe (LLVM 15.0.6, 256 bits)"];
         assert_eq!(named(&names, "nvidia"), Some(0));
         assert_eq!(named(&names, "LLVM"), Some(1));
@@ -236,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn an_absent_adapter_is_told_with_those_present() {
+    fn the_error_for_an_absent_adapter_lists_those_present() {
         let Err(error) = open(Some("no such adapter")) else {
             panic!("opened an adapter that does not exist");
         };

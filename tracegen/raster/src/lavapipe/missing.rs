@@ -1,12 +1,12 @@
-//! Why Vulkan lists no device although its driver may be installed.
+//! Finds out why Vulkan lists no device although a driver may be installed.
 
 use libloading::Library;
 use std::path::{Path, PathBuf};
 
-/// Vulkan's loader.
+/// Library of Vulkan's loader.
 const LOADER: &str = "libvulkan.so.1";
 
-/// Folders of files in which drivers name their library.
+/// Folders of the files in which drivers name their library.
 const FOLDERS: [&str; 3] = [
     "/usr/local/share/vulkan/icd.d",
     "/etc/vulkan/icd.d",
@@ -16,8 +16,9 @@ const FOLDERS: [&str; 3] = [
 /// Approximate address space that lavapipe needs in addition to its libraries.
 const NEEDED_BYTES: usize = 512 << 20;
 
-/// Why lavapipe, which is installed, does not start; `None` where it is not installed or nothing is known. The
-/// loader silently skips a driver that it cannot load, for example when memory runs out.
+/// Reason why an installed lavapipe does not start; `None` if it is not installed or the reason is
+/// unknown. The loader silently skips a driver that it cannot load, for example when memory runs
+/// out.
 pub(super) fn reason() -> Option<String> {
     let libraries = installed();
     if libraries.is_empty() {
@@ -29,7 +30,7 @@ pub(super) fn reason() -> Option<String> {
         .or_else(little_memory)
 }
 
-/// Lavapipe's libraries as its description files name them.
+/// Lavapipe's libraries, read from its description files.
 fn installed() -> Vec<PathBuf> {
     let folders = FOLDERS.iter().filter_map(|f| std::fs::read_dir(f).ok());
     let files = folders.flatten().flatten().map(|entry| entry.path());
@@ -74,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_driver_names_its_library_and_one_that_cannot_be_loaded_is_told_in_the_loaders_words() {
+    fn an_unloadable_driver_library_is_reported_with_the_loaders_message() {
         let text = r#"{ "ICD": { "api_version": "1.1.230", "library_path" : "/lib/libx.so" } }"#;
         assert_eq!(library_of(text), Some(PathBuf::from("/lib/libx.so")));
         assert_eq!(library_of("{}"), None);

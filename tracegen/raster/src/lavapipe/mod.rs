@@ -55,7 +55,7 @@ pub struct Lavapipe {
     layers: Vec<Option<LayerTarget>>,
     /// Target of each composed picture, by its number in the plan.
     composed: Vec<Option<ColorTarget>>,
-    /// Made when a plan first needs it.
+    /// Created when a plan first needs it.
     composer: Option<Composer>,
     readback: Readback,
     shadow_maps: ShadowMaps,
@@ -63,10 +63,10 @@ pub struct Lavapipe {
     eye_bindings: wgpu::BindGroup,
     /// Bindings of each material.
     materials: Vec<MaterialState>,
-    /// Multiview; created on first use.
+    /// Multiview. Created on first use.
     multiview: Option<Multiview>,
     multiview_trust: Trust,
-    /// Initial contents of layers other than the sky; created on first use.
+    /// Initial contents of layers other than the sky. Created on first use.
     starts: Option<Starts>,
     work: Work,
 }
@@ -100,8 +100,8 @@ impl Lavapipe {
         )
     }
 
-    /// Uploads the scene to an opened device. Regions may produce `record_budget_bytes` of raw
-    /// records before they are split, capped by the driver's limit of 128 MiB.
+    /// Uploads the scene to an opened device. A region is split if its raw records exceed
+    /// `record_budget_bytes`, capped by the driver's limit of 128 MiB.
     ///
     /// # Errors
     /// Driver errors, sizes beyond the device's limits.
@@ -168,7 +168,7 @@ impl Lavapipe {
         target.ok_or_else(|| RasterError::Scene(format!("layer {number} has not been rendered")))
     }
 
-    /// Creates the target of a layer unless the last frame's fits.
+    /// Creates the target of a layer unless the last frame's target fits.
     fn prepare_target(&mut self, view: &View<'_>) -> Result<(), RasterError> {
         let size_px = view.layer.size_px;
         let gpu = &self.gpu;
@@ -205,8 +205,8 @@ impl Lavapipe {
         target.clear(gpu)
     }
 
-    /// Batches a list of draws and makes the pipelines that they need and that are not there yet.
-    /// The list stays in the instance buffer until the next plan's submission.
+    /// Batches a list of draws and creates the missing pipelines. The list stays in the instance
+    /// buffer until the next plan's submission.
     fn plan(
         &mut self,
         draws: &DrawList,
@@ -237,7 +237,7 @@ impl Lavapipe {
         Ok(plan)
     }
 
-    /// Initial contents of a layer; nothing to draw if that is only the sky.
+    /// Initial contents of a layer; `None` if that is only the sky.
     fn start(&self, start: &Start) -> Result<Option<Drawn<'_>>, RasterError> {
         let Some(starts) = &self.starts else {
             return Ok(None);
@@ -259,7 +259,7 @@ impl Lavapipe {
         })
     }
 
-    /// Starts a pass over a region of a layer: its initial contents and its mask.
+    /// Begins a render pass over a region of a layer with its initial contents and its mask.
     fn layer_pass<'e>(
         &self,
         encoder: &'e mut wgpu::CommandEncoder,
@@ -297,7 +297,7 @@ impl Lavapipe {
         pass
     }
 
-    /// Issues a plan, setting only the state that changes.
+    /// Encodes a plan and sets only the state that changes.
     fn issue(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
@@ -311,7 +311,7 @@ impl Lavapipe {
             let (Some(mesh), Some(pipeline)) =
                 (&self.scene.meshes[state.mesh], self.pipelines.get(key))
             else {
-                // Every draw's mesh is uploaded, and a plan prepares its pipelines.
+                // Unreachable: every draw's mesh is uploaded, and a plan prepares its pipelines.
                 continue;
             };
             let [new_pipeline, new_material, new_mesh] = state.changes(last.replace(state));
@@ -333,7 +333,7 @@ impl Lavapipe {
     }
 }
 
-/// State that a draw call sets.
+/// State set by a draw call.
 #[derive(Clone, Copy)]
 struct State {
     key: PipelineKey,
@@ -351,7 +351,7 @@ impl State {
         }
     }
 
-    /// Whether pipeline, material and mesh differ from those of the call before.
+    /// Whether pipeline, material and mesh differ from those of the previous call.
     fn changes(&self, last: Option<Self>) -> [bool; 3] {
         last.map_or([true; 3], |last| {
             [
@@ -363,7 +363,7 @@ impl State {
     }
 }
 
-/// State changes of a plan.
+/// Number of state changes of a plan.
 fn state_changes(draws: &DrawList, plan: &[(Batch, PipelineKey)]) -> u64 {
     let mut last = None;
     let changes = plan.iter().map(|(batch, key)| {
@@ -466,7 +466,7 @@ impl CaptureBackend for Lavapipe {
         }
         let start = Instant::now();
         self.prepare_target(view)?;
-        // Tiles in which nothing may be drawn are not rasterised.
+        // Tiles without pixels to draw are not rasterised.
         let Some(region) = self.target(view.target)?.open_part(region) else {
             return Ok(Captured::Complete);
         };
@@ -515,7 +515,7 @@ impl CaptureBackend for Lavapipe {
             return Ok(Captured::Overflow { needed });
         }
         if needed > 0 {
-            // Without the depth test, that of masked draws is not replayed either.
+            // Without the depth test, the alpha-test replay of masked draws is not needed either.
             let depths = if buffers.has_depths && fragments == Fragments::DepthTested {
                 needed * DEPTH_BYTES
             } else {

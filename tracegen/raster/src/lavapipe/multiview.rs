@@ -1,7 +1,7 @@
-//! Both eyes in one submission, and whether the driver can be trusted with it.
+//! Both eyes in one submission, and tests of the driver's multiview.
 //!
-//! lavapipe of Mesa 22.3 drops triangles across an edge of clip space in view 1. So a small scene of such
-//! triangles is drawn both ways first, and then the first frame.
+//! lavapipe of Mesa 22.3 drops triangles across an edge of clip space in view 1. Therefore a small
+//! scene of such triangles is drawn with and without multiview first, and then the first frame.
 
 use super::device::Gpu;
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT, Pipelines, VIEW_COUNT, VIEWS};
@@ -16,16 +16,16 @@ use crate::uniforms::ViewData;
 use record::Region;
 use std::time::Instant;
 
-/// Pixels along an edge of the known scene.
+/// Pixels along an edge of the test scene.
 const EDGE_PX: u32 = 64;
-/// Its triangles.
+/// Triangles of the test scene.
 const TRIANGLES: u32 = 96;
 
 /// Resources for drawing both eyes at once.
 pub struct Multiview {
     /// Pipelines for two views.
     pub pipelines: Pipelines,
-    /// Both `View`s.
+    /// The `View` of each eye.
     pub uniform: wgpu::Buffer,
     /// Attachments of two layers.
     pub targets: Targets,
@@ -37,16 +37,16 @@ pub enum Trust {
     /// Not tried yet.
     #[default]
     Unknown,
-    /// Both ways give the same picture of the known scene.
+    /// Both methods give the same picture of the test scene.
     Likely,
-    /// And of a frame.
+    /// Both methods also give the same picture of a frame.
     Sound,
-    /// They do not, or there is none.
+    /// The pictures differ, or the driver has no multiview.
     Defect(String),
 }
 
 impl Lavapipe {
-    /// Draws the test scene both ways on first use.
+    /// Draws the test scene with both methods on first use.
     pub(super) fn find_multiview_defect(&mut self) -> Result<Option<String>, RasterError> {
         if let Trust::Unknown = self.multiview_trust {
             self.multiview_trust = if self.gpu.has_multiview {
@@ -96,7 +96,7 @@ impl Lavapipe {
             self.render(draws, view, whole, None)?;
         }
         if let Some((at_once, counted)) = at_once {
-            // The first frame is the other scene that both ways must agree on.
+            // The first frame is the second test: both methods must agree on it.
             let differing = differing(&at_once, &self.both_pictures(&both)?);
             self.multiview_trust = match differing {
                 0 => Trust::Sound,
@@ -108,7 +108,7 @@ impl Lavapipe {
             self.work = counted;
             return Ok(());
         }
-        // Counted as the one submission that it would be.
+        // Counted as one submission.
         self.work.draws = before.draws;
         self.work.calls = before.calls;
         self.work.vertices = before.vertices;
@@ -138,7 +138,7 @@ impl Lavapipe {
             Some(made) if made.targets.size_px == size_px => made,
             _ => Multiview::new(&self.gpu, size_px)?,
         };
-        // The pipelines for two views are used in place of those for one.
+        // The pipelines for two views temporarily replace those for one.
         std::mem::swap(&mut self.pipelines, &mut multiview.pipelines);
         let drawn = self.submit_both(draws, views, &multiview, start);
         std::mem::swap(&mut self.pipelines, &mut multiview.pipelines);
@@ -204,7 +204,7 @@ impl Lavapipe {
     }
 }
 
-/// Both ascending lists in one, ascending.
+/// Merges two ascending lists.
 fn union(a: &[u32], b: &[u32]) -> Vec<u32> {
     let mut merged = [a, b].concat();
     merged.sort_unstable();
@@ -223,7 +223,7 @@ pub struct Targets {
 }
 
 impl Multiview {
-    /// Compiles the shader for two views; pictures have `size_px`.
+    /// Compiles the shader for two views of `size_px`.
     ///
     /// # Errors
     /// Driver and validation errors.
@@ -264,7 +264,7 @@ impl Targets {
         }
     }
 
-    /// A pass over both views.
+    /// A render pass over both views.
     pub fn pass<'e>(&self, encoder: &'e mut wgpu::CommandEncoder) -> wgpu::RenderPass<'e> {
         pass(encoder, &self.color_view, &self.depth_view, Some(VIEWS))
     }
@@ -299,7 +299,7 @@ fn pass<'e>(
     })
 }
 
-/// Pixels of the known scene that the driver draws otherwise for both views at once than view by view.
+/// Number of pixels of the test scene that differ between multiview and separate views.
 ///
 /// # Errors
 /// Driver errors.
@@ -347,7 +347,7 @@ pub fn differing_px(gpu: &Gpu) -> Result<u32, RasterError> {
     Ok(differing(&read(&both)?, &read(&alone)?))
 }
 
-/// Pixels in which two pictures differ.
+/// Number of pixels in which two pictures differ.
 fn differing(a: &[u8], b: &[u8]) -> u32 {
     let pairs = a.chunks_exact(4).zip(b.chunks_exact(4));
     pairs.filter(|(a, b)| a != b).count() as u32

@@ -1,4 +1,4 @@
-//! The pipelines that a scene's draws need, all from one shader source.
+//! The pipelines for a scene's draws, all from one shader source.
 
 use super::bindings;
 use super::device::Gpu;
@@ -17,14 +17,14 @@ pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrg
 /// Format of depth and shadow maps.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
-/// Format of texels as a shader gets them.
+/// Format of sampled texels.
 pub const TEXEL_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
-/// Format of the primitives beside them.
+/// Format of the primitive numbers that accompany texels.
 pub const PRIMITIVE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R32Uint;
 
 /// The views that [`Pipelines::for_both_views`] draws at once.
 pub const VIEWS: NonZeroU32 = NonZeroU32::new(0b11).unwrap();
-/// How many they are.
+/// Number of these views.
 pub const VIEW_COUNT: u32 = VIEWS.get().count_ones();
 
 const ADDITIVE: wgpu::BlendState = {
@@ -47,7 +47,7 @@ pub struct Layouts {
     pub material: wgpu::BindGroupLayout,
 }
 
-/// The shader and the pipelines made from it so far.
+/// The shader and the pipelines created from it so far.
 pub struct Pipelines {
     /// Bind group layouts.
     pub layouts: Layouts,
@@ -68,7 +68,7 @@ impl Pipelines {
         Self::compile(gpu, &shader::source(gpu.granularity(), alpha), None)
     }
 
-    /// Compiles the shader for pictures of two views at once.
+    /// Compiles the shader for pictures of two views.
     ///
     /// # Errors
     /// Driver and validation errors.
@@ -111,7 +111,7 @@ impl Pipelines {
         })
     }
 
-    /// Makes the pipeline for `key` unless it is there.
+    /// Creates the pipeline for `key` unless it exists.
     ///
     /// # Errors
     /// Driver and validation errors.
@@ -128,7 +128,7 @@ impl Pipelines {
         self.made.get(key)
     }
 
-    /// Pipelines made.
+    /// Number of pipelines created.
     pub fn count(&self) -> u64 {
         self.made.len() as u64
     }

@@ -1,16 +1,16 @@
-//! Textures on their way back to the host.
+//! Readback of textures.
 
 use super::device::Gpu;
 use crate::error::RasterError;
 use std::cell::RefCell;
 
-/// Reads textures, through a buffer that is kept between them.
+/// Reads textures through a reused buffer.
 #[derive(Default)]
 pub struct Readback(RefCell<Option<wgpu::Buffer>>);
 
 impl Readback {
     /// All texels of a texture's first level: layer by layer, row by row, without padding. A texel
-    /// is one `T` or several.
+    /// consists of one or several `T`.
     ///
     /// # Errors
     /// Driver errors.
@@ -20,7 +20,7 @@ impl Readback {
         texture: &wgpu::Texture,
     ) -> Result<Vec<T>, RasterError> {
         let size = texture.size();
-        // Every format that is read has one block size.
+        // Every format read here has one block size.
         let texel_bytes = texture.format().block_copy_size(None).unwrap_or(0);
         let packed_bytes = (size.width * texel_bytes) as usize;
         let row_bytes =

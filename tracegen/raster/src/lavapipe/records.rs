@@ -1,29 +1,29 @@
-//! Buffers that every layer's render shares: records on their way to the host, and the view's data.
+//! Buffers shared by the rendering of all layers: records for readback, and the view's data.
 
 use super::device::Gpu;
 use crate::error::RasterError;
 use crate::uniforms::ViewData;
 use record::{DEPTH_BYTES, RECORD_BYTES};
 
-/// Record buffers, and the uniform of the layer that is rendered.
+/// Record buffers, and the uniform of the current layer.
 pub struct RecordBuffers {
     /// Raw records.
     pub records: wgpu::Buffer,
-    /// Raw depths, one a record.
+    /// Raw depths, one per record.
     pub depths: wgpu::Buffer,
-    /// `depths` is as long as `records`; without masked draws it is a placeholder.
+    /// True if `depths` is as long as `records`. Without masked draws it is a placeholder.
     pub has_depths: bool,
     /// Number of appended records, including those beyond the capacity.
     pub counter: wgpu::Buffer,
-    /// Records that fit.
+    /// Number of records that fit.
     pub capacity: u32,
     /// The layer's `View`.
     pub view_uniform: wgpu::Buffer,
 }
 
 impl RecordBuffers {
-    /// Makes a record buffer of at most `budget_bytes`, within the device's limit for one binding,
-    /// with depths beside them if `has_depths`.
+    /// Creates a record buffer of at most `budget_bytes`, within the device's limit for one
+    /// binding, and a depth buffer if `has_depths`.
     ///
     /// # Errors
     /// Driver errors.

@@ -9,7 +9,7 @@ use glam::{Mat3, Mat4};
 use techniques::start::{Composition, Opening};
 use wgpu::util::DeviceExt;
 
-/// Pipelines that draw what layers start with.
+/// Pipelines that draw the initial contents of layers.
 pub struct Starts {
     nearer: Pipeline,
     behind: Pipeline,
@@ -26,11 +26,11 @@ struct Pipeline {
 
 /// Initial contents and the resources to draw them.
 pub struct Drawn<'a> {
-    /// Over the whole target.
+    /// A pipeline over the whole target.
     pub pipeline: &'a OverLayer,
-    /// Its group 0.
+    /// Group 0 of the pipeline.
     pub bindings: wgpu::BindGroup,
-    /// The sky is drawn before it.
+    /// The sky is drawn first.
     pub over_sky: bool,
 }
 
@@ -73,7 +73,7 @@ impl Starts {
         })
     }
 
-    /// Nothing, and nothing from a depth on.
+    /// Initially empty, with depth limited to `end`.
     pub fn nearer(&self, gpu: &Gpu, end: f32) -> Drawn<'_> {
         let data = StartData {
             ends: [end, 0.0, 0.0, 0.0],

@@ -1,4 +1,4 @@
-//! Attachments that layers, pictures and shadow maps are rendered into.
+//! Attachments of layers, pictures and shadow maps.
 
 use super::device::Gpu;
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT};
@@ -8,7 +8,7 @@ use record::Region;
 use std::sync::Arc;
 use techniques::Mask;
 
-/// Colour that is rendered into, sampled and read back.
+/// A colour attachment that can be sampled and read back.
 pub struct ColorTarget {
     /// Width and height in pixels.
     pub size_px: [u32; 2],
@@ -22,17 +22,17 @@ pub struct LayerTarget {
     pub color: ColorTarget,
     /// View of its depth buffer.
     pub depth_view: wgpu::TextureView,
-    /// Pixels that may be drawn.
+    /// Mask of the pixels that may be drawn.
     pub mask: Option<LayerMask>,
 }
 
 /// A layer's mask in the driver's memory.
 pub struct LayerMask {
-    /// What was uploaded.
+    /// The uploaded mask.
     pub mask: Arc<Mask>,
-    /// It, bound for the shader of the layers.
+    /// Bindings of the mask for the layers' shader.
     pub bindings: wgpu::BindGroup,
-    /// Tiles with pixels that may be drawn, if there are any.
+    /// Tiles with pixels that may be drawn; `None` without any.
     pub bounds: Option<Region>,
 }
 
@@ -79,8 +79,8 @@ impl LayerTarget {
         })
     }
 
-    /// Starts a pass into the depth, and the picture if it is asked for. Regions add up to a layer:
-    /// everything is loaded.
+    /// Begins a render pass into depth, and into the picture if requested. The regions of a layer
+    /// accumulate, so existing contents are loaded.
     pub fn pass<'e>(
         &self,
         encoder: &'e mut wgpu::CommandEncoder,
@@ -110,7 +110,7 @@ impl LayerTarget {
         })
     }
 
-    /// Makes the picture black, which remains where the mask prevents drawing.
+    /// Clears the picture to black, which remains where the mask prevents drawing.
     ///
     /// # Errors
     /// Driver errors.
@@ -155,7 +155,7 @@ pub fn check_size(gpu: &Gpu, size_px: [u32; 2]) -> Result<(), RasterError> {
 }
 
 impl ColorTarget {
-    /// A picture of `size_px`, which [`check_size`] has passed.
+    /// A picture of `size_px`, which [`check_size`] has accepted.
     ///
     /// # Errors
     /// Driver errors.

@@ -1,4 +1,4 @@
-//! Samples of visible fragments, filtered by the driver's texture unit, to verify the records.
+//! Samples of visible fragments, filtered by the driver's texture unit, for verifying the records.
 
 use super::Lavapipe;
 use super::pipelines::{DEPTH_FORMAT, PRIMITIVE_FORMAT, TEXEL_FORMAT};

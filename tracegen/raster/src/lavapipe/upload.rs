@@ -71,7 +71,7 @@ impl SceneBuffers {
             .textures
             .iter()
             .map(|t| match t.blocks.as_slice() {
-                // Seen by no view, and so never sampled.
+                // No view can see it, so it is never sampled.
                 [] => Ok(absent.clone()),
                 _ => upload_texture(gpu, t),
             })
@@ -109,8 +109,8 @@ impl SceneBuffers {
 }
 
 impl SceneBuffers {
-    /// Writes the rows of moving draws, consecutive ones at once, and the vertices that move; returns the
-    /// number of bytes.
+    /// Writes the rows of moving draws, consecutive ones together, and the moving vertices. Returns
+    /// the number of bytes.
     pub fn pose(&self, gpu: &Gpu, scene: &Scene, draws: &DrawList) -> u64 {
         let mut bytes = 0;
         for mesh in scene.animation.iter().flat_map(Animation::moving_meshes) {
@@ -154,7 +154,7 @@ fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, Raster
                 usage,
             })
     };
-    // A trailing partial triangle would be no primitive: leave it out of the index range.
+    // A trailing partial triangle is not a primitive and is left out of the index range.
     Ok(MeshBuffers {
         // Vertices may move.
         vertices: buffer(
@@ -172,7 +172,7 @@ fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, Raster
     })
 }
 
-/// Stands for the textures that a material lacks; the pipelines never sample it.
+/// Replaces the textures that a material lacks. The pipelines never sample it.
 fn white() -> CompressedTexture {
     CompressedTexture {
         texture: Texture {
@@ -217,8 +217,8 @@ fn upload_texture(
             limit: limit.into(),
         });
     }
-    // Without the levels that are never sampled, the coarser ones are sampled alike: see the crate
-    // textures.
+    // Leaving out levels that are never sampled does not change the sampling of coarser ones. See
+    // the crate textures.
     let [width, height] = texture.level_size(compressed.first_level);
     gpu.checked("uploading a texture", || {
         gpu.device
@@ -301,7 +301,7 @@ impl<'a> MaterialViews<'a> {
     }
 }
 
-/// The samplers made so far, one a state.
+/// The samplers created so far, one per state.
 #[derive(Default)]
 struct Samplers {
     made: Vec<(Sampler, wgpu::Sampler)>,
@@ -340,7 +340,7 @@ fn sampler_descriptor(state: &Sampler) -> wgpu::SamplerDescriptor<'static> {
             MipFilter::None | MipFilter::Nearest => wgpu::MipmapFilterMode::Nearest,
             MipFilter::Linear => wgpu::MipmapFilterMode::Linear,
         },
-        // Vulkan has no sampler without levels; a quarter of a level above 0 never reaches 1.
+        // Vulkan has no sampler without levels, but a limit of 0.25 never selects level 1.
         lod_max_clamp: if state.mip == MipFilter::None {
             0.25
         } else {

@@ -43,7 +43,7 @@ impl Lavapipe {
         (self.gpu.queue).write_buffer(&self.buffers.view_uniform, 0, bytemuck::bytes_of(&data));
         let depth = self.depth_texture(view);
         self.draw_alone(draws, &every, Purpose::Depth, &depth, None)?;
-        // Two words per draw; zero until a fragment of it is visible.
+        // Two words per draw, zero until one of its fragments is visible.
         let words = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("marks"),
             size: 8 * every.len().max(1) as u64,
@@ -74,8 +74,8 @@ impl Lavapipe {
         attachment(&self.gpu, view.layer.size_px, 1, 1, DEPTH_FORMAT, usage)
     }
 
-    /// Draws without colour: depth is cleared first, unless there are marks to be made against it,
-    /// for which group 0 is `marking`.
+    /// Draws without colour. Depth is cleared first, unless marks are made against it; group 0 is
+    /// then `marking`.
     fn draw_alone(
         &mut self,
         draws: &DrawList,
@@ -110,7 +110,7 @@ impl Lavapipe {
     }
 }
 
-/// A lens in pixels of a view: centre, and inverse radii.
+/// A lens in pixels of a view: centre and inverse radii.
 fn lens_px(lens: &Lens, view: &View<'_>) -> [f32; 4] {
     let projection = Mat4::from_cols_array_2d(&view.layer.view.eye_to_clip);
     let [width, height] = view.layer.size_px.map(|extent| extent as f32 / 2.0);

@@ -21,15 +21,15 @@ impl OverLayer {
     }
 }
 
-/// Description of such a pipeline.
+/// Description of a full-screen pipeline.
 pub struct Whole<'a> {
     /// The shader.
     pub module: &'a wgpu::ShaderModule,
-    /// Its groups.
+    /// Layout of its groups.
     pub layout: &'a wgpu::PipelineLayout,
-    /// The entry point that makes the triangle.
+    /// The entry point that creates the triangle.
     pub vertex: &'a str,
-    /// Views that are drawn at once.
+    /// Views drawn with multiview.
     pub multiview_mask: Option<NonZeroU32>,
 }
 

@@ -1,9 +1,10 @@
-//! The only module that calls the library: OpenGL through OSMesa, wrapped in safe functions.
+//! The only module that calls the library: safe functions for OpenGL through OSMesa.
 //!
-//! OpenGL checks names, sizes of buffers and of compressed images, and reports instead of acting
-//! ([`Gl::check`]). What it does not check is held here: the context is current on the one thread that can
-//! reach a [`Gl`] (it is neither `Send` nor `Sync`, and a thread has one at a time), slices are as long as
-//! the texels that they are said to hold, and draws stay within their vertex buffers.
+//! OpenGL checks names and the sizes of buffers and compressed images, and reports an error instead
+//! of acting ([`Gl::check`]). This module ensures the rest: the context is current on the one
+//! thread that can reach a [`Gl`] (which is neither `Send` nor `Sync`, and a thread has at most
+//! one), slices are as long as the texels that they must hold, and draws stay within their vertex
+//! buffers.
 
 use crate::error::RasterError;
 use glow::HasContext;
@@ -18,7 +19,7 @@ pub use glow::{
     NativeTexture as Texture,
 };
 
-/// The library's name for the loader.
+/// The library's file name.
 const LIBRARY: &str = "libOSMesa.so.8";
 
 type CreateContext = unsafe extern "C" fn(*const c_int, *mut c_void) -> *mut c_void;
@@ -28,11 +29,12 @@ type DestroyContext = unsafe extern "C" fn(*mut c_void);
 type ClipControl = unsafe extern "C" fn(c_uint, c_uint);
 type ProvokingVertex = unsafe extern "C" fn(c_uint);
 
-/// Attributes of the context, as pairs of `osmesa.h`: RGBA, no depth buffer, core profile, OpenGL 4.5.
+/// Attributes of the context, as pairs of `osmesa.h`: RGBA, no depth buffer, core profile, OpenGL
+/// 4.5.
 const CONTEXT: [c_int; 13] = [
     0x22, 0x1908, 0x30, 0, 0x31, 0, 0x33, 0x34, 0x36, 4, 0x37, 5, 0,
 ];
-/// Edge of the surface that a context needs and nothing is drawn into.
+/// Edge of the surface that a context requires. Nothing is drawn into it.
 const SURFACE_PX: usize = 16;
 
 thread_local! {
@@ -46,7 +48,7 @@ pub struct Gl {
     destroy: DestroyContext,
     /// The context draws into it until it has a framebuffer.
     _surface: Box<[u8]>,
-    /// Last, since everything above is code or memory of it.
+    /// Dropped last, because everything above uses its code or memory.
     _library: Library,
 }
 
@@ -54,34 +56,34 @@ pub struct Gl {
 #[derive(Clone, Copy, Debug)]
 pub struct Buffer {
     name: glow::NativeBuffer,
-    /// Bytes.
+    /// Length in bytes.
     pub bytes: u64,
 }
 
 /// A vertex attribute.
 #[derive(Clone, Copy, Debug)]
 pub struct Attribute {
-    /// Where it is.
+    /// Buffer that holds it.
     pub buffer: Buffer,
-    /// Number in the shader.
+    /// Location in the shader.
     pub location: u32,
-    /// Values.
+    /// Number of components per value.
     pub components: i32,
     /// `FLOAT`, `UNSIGNED_SHORT` (0 to 1 in the shader) or `UNSIGNED_INT` (unconverted).
     pub kind: u32,
-    /// Bytes from one to the next.
+    /// Bytes from one value to the next.
     pub stride: u64,
-    /// Bytes before the first.
+    /// Bytes before the first value.
     pub offset: u64,
-    /// One an instance, not one a vertex.
+    /// One value per instance instead of one per vertex.
     pub per_instance: bool,
 }
 
-/// Vertices to draw from.
+/// A vertex array.
 #[derive(Clone, Copy, Debug)]
 pub struct Vertices {
     name: glow::NativeVertexArray,
-    /// Number of vertices, all of which are drawn.
+    /// Number of vertices. All of them are drawn.
     pub count: u32,
     instances: u32,
 }
@@ -97,7 +99,7 @@ pub struct State {
     pub writes_color: bool,
     /// Colour is blended by its alpha.
     pub blends: bool,
-    /// Back faces are left out.
+    /// Back faces are culled.
     pub culls: bool,
     /// Front faces wind clockwise on a screen with y up.
     pub clockwise: bool,
@@ -109,9 +111,9 @@ impl Gl {
     /// Loads the library and makes a context current on this thread.
     ///
     /// # Errors
-    /// No library, a library without OpenGL 4.5, a thread that has a context.
+    /// No library, a library without OpenGL 4.5, or a thread that already has a context.
     pub fn open() -> Result<Self, RasterError> {
-        // SAFETY: loading runs the initialisers of Mesa and LLVM and nothing else.
+        // SAFETY: loading runs only the initialisers of Mesa and LLVM.
         let library = unsafe { Library::new(LIBRARY) }
             .map_err(|e| RasterError::NoLibrary(LIBRARY, e.to_string()))?;
         let lacks = |what: &str| RasterError::Unsupported {
@@ -146,7 +148,7 @@ impl Gl {
         })?;
         let mut surface = vec![0; 4 * SURFACE_PX * SURFACE_PX].into_boxed_slice();
         let edge = SURFACE_PX as c_int;
-        // SAFETY: the surface has four bytes a pixel and lives as long as the context.
+        // SAFETY: the surface has four bytes per pixel and lives as long as the context.
         let is_current = unsafe {
             make_current(
                 context.as_ptr(),
@@ -183,13 +185,14 @@ impl Gl {
         let provoking_vertex = function(c"glProvokingVertex")?;
         // SAFETY: as above; functions of OpenGL 4.5, which the context has, with the types of its specification.
         unsafe {
-            // Depth from 0 to 1, as the other APIs have it. The shader turns the rows (conventions_opengl.wgsl).
+            // Depth from 0 to 1, as in the other APIs. The shader reverses the rows
+            // (conventions_opengl.wgsl).
             std::mem::transmute::<*const c_void, ClipControl>(clip_control)(
                 glow::LOWER_LEFT,
                 glow::ZERO_TO_ONE,
             );
-            // The first vertex, as the other APIs have it: llvmpipe interpolates from it on, so that another one
-            // changes the last bits of coordinates and depths.
+            // The first vertex, as in the other APIs. llvmpipe interpolates starting there, so
+            // another one changes the last bits of coordinates and depths.
             std::mem::transmute::<*const c_void, ProvokingVertex>(provoking_vertex)(
                 glow::FIRST_VERTEX_CONVENTION,
             );
@@ -209,7 +212,7 @@ impl Gl {
         Ok(gl)
     }
 
-    /// Renderer and version as the driver names them.
+    /// Renderer and version strings of the driver.
     pub fn driver(&self) -> String {
         // SAFETY: see the module.
         let [renderer, version] = [glow::RENDERER, glow::VERSION]
@@ -243,7 +246,7 @@ impl Gl {
         Err(RasterError::Driver { doing, message })
     }
 
-    /// A buffer with contents.
+    /// Creates a buffer with contents.
     ///
     /// # Errors
     /// Driver errors.
@@ -254,10 +257,10 @@ impl Gl {
         Ok(buffer)
     }
 
-    /// A buffer with this number of bytes.
+    /// Creates a buffer of this size.
     ///
     /// # Errors
-    /// Driver errors; more bytes than the driver counts.
+    /// Driver errors, and sizes beyond the driver's integer type.
     pub fn empty_buffer(&self, bytes: u64) -> Result<Buffer, RasterError> {
         let size = i32::try_from(bytes).map_err(|_| RasterError::TooLarge {
             what: "bytes of a buffer".into(),
@@ -278,7 +281,7 @@ impl Gl {
 
     /// Writes into a buffer.
     pub fn write(&self, buffer: Buffer, offset: u64, bytes: &[u8]) {
-        // SAFETY: see the module; what would lie beyond the end is refused by the driver.
+        // SAFETY: see the module. The driver refuses writes beyond the end.
         unsafe {
             self.gl
                 .bind_buffer(glow::COPY_WRITE_BUFFER, Some(buffer.name));
@@ -286,9 +289,9 @@ impl Gl {
         }
     }
 
-    /// Reads the start of a buffer, after everything drawn has written it.
+    /// Reads the start of a buffer after all draws have written it.
     pub fn read(&self, buffer: Buffer, into: &mut [u8]) {
-        // SAFETY: see the module; what would lie beyond the end is refused by the driver.
+        // SAFETY: see the module. The driver refuses reads beyond the end.
         unsafe {
             self.gl.memory_barrier(glow::BUFFER_UPDATE_BARRIER_BIT);
             self.gl
@@ -308,11 +311,11 @@ impl Gl {
     }
 
     fn bind_buffer(&self, target: u32, binding: u32, buffer: Buffer) {
-        // SAFETY: see the module; Mesa holds shaders to the ends of buffers.
+        // SAFETY: see the module. Mesa bounds-checks buffer accesses of shaders.
         unsafe { self.gl.bind_buffer_base(target, binding, Some(buffer.name)) };
     }
 
-    /// A texture without contents; an array if `layers` is given.
+    /// Creates a texture without contents, an array if `layers` is given.
     ///
     /// # Errors
     /// Driver errors.
@@ -346,10 +349,10 @@ impl Gl {
     /// Fills a level of a texture, row by row: RGBA8, or blocks of a compressed `format`.
     ///
     /// # Errors
-    /// Driver errors, compressed blocks of another size.
+    /// Driver errors, and compressed blocks whose size does not match.
     ///
     /// # Panics
-    /// Where RGBA8 texels are not as many as the size tells.
+    /// If the number of RGBA8 texels does not match the size.
     pub fn fill(
         &self,
         texture: Texture,
@@ -359,7 +362,7 @@ impl Gl {
         texels: &[u8],
     ) -> Result<(), RasterError> {
         let (at, w, h) = (level as i32, width as i32, height as i32);
-        // SAFETY: see the module; the driver knows how long compressed levels are.
+        // SAFETY: see the module. The driver checks the length of compressed levels.
         unsafe {
             self.gl.bind_texture(glow::TEXTURE_2D, Some(texture));
             if let Some(format) = compressed {
@@ -387,7 +390,7 @@ impl Gl {
         self.check("uploading a texture")
     }
 
-    /// A sampler with parameters of whole numbers, and the highest level that it reads.
+    /// Creates a sampler with integer parameters and the highest level that it reads.
     ///
     /// # Errors
     /// Driver errors.
@@ -416,7 +419,7 @@ impl Gl {
         }
     }
 
-    /// A framebuffer of a colour texture, if any, and a depth texture, or a layer of one.
+    /// Creates a framebuffer from an optional colour texture and a depth texture or a layer of one.
     ///
     /// # Errors
     /// Driver errors.
@@ -460,7 +463,7 @@ impl Gl {
         Err(made("a framebuffer")(format!("status {status:#x}")))
     }
 
-    /// Draws into a framebuffer of a size from now on, within a rectangle of it.
+    /// Sets the framebuffer, its size, and the rectangle for later draws.
     pub fn target(&self, framebuffer: Framebuffer, size_px: [u32; 2], scissor: [[u32; 2]; 2]) {
         let [[x, y], [width, height]] = scissor.map(|pair| pair.map(|px| px as i32));
         // SAFETY: see the module.
@@ -486,7 +489,7 @@ impl Gl {
         let mut pixels = vec![0; 4 * width as usize * height as usize];
         let into = glow::PixelPackData::Slice(Some(&mut pixels));
         let (width, height) = (width as i32, height as i32);
-        // SAFETY: see the module; the vector has four bytes a pixel.
+        // SAFETY: see the module. The vector has four bytes per pixel.
         unsafe {
             self.gl
                 .bind_framebuffer(glow::FRAMEBUFFER, Some(framebuffer));
@@ -501,7 +504,7 @@ impl Gl {
         let mut depths = vec![0.0_f32; width as usize * height as usize];
         let into = glow::PixelPackData::Slice(Some(bytemuck::cast_slice_mut(&mut depths)));
         let (width, height) = (width as i32, height as i32);
-        // SAFETY: see the module; the vector has a float a pixel.
+        // SAFETY: see the module. The vector has one float per pixel.
         unsafe {
             self.gl
                 .bind_framebuffer(glow::FRAMEBUFFER, Some(framebuffer));
@@ -518,7 +521,7 @@ impl Gl {
         depths
     }
 
-    /// Compiles and links a program; without a fragment shader it writes only depth.
+    /// Compiles and links a program. Without a fragment shader it writes only depth.
     ///
     /// # Errors
     /// The compiler's message.
@@ -548,7 +551,7 @@ impl Gl {
         }
     }
 
-    /// Vertices with their attributes; as many as all of them hold.
+    /// Creates a vertex array with as many vertices as all attributes hold.
     ///
     /// # Errors
     /// Driver errors.
@@ -586,7 +589,7 @@ impl Gl {
             name
         };
         self.check("describing vertices")?;
-        // Whole strides: an attribute's last value ends within its stride.
+        // Only whole strides count: an attribute's last value ends within its stride.
         let held = |per_instance: bool| {
             let of_kind = attributes.iter().filter(|a| a.per_instance == per_instance);
             of_kind
@@ -622,27 +625,27 @@ impl Gl {
             self.gl.depth_func(state.depth);
             self.gl.depth_mask(state.writes_depth);
             self.gl.color_mask(color, color, color, color);
-            // The other way round, since rows are turned.
+            // Reversed, because rows are reversed.
             self.gl
                 .front_face(if state.clockwise { glow::CCW } else { glow::CW });
             self.gl.polygon_offset(state.offset[0], state.offset[1]);
         }
     }
 
-    /// Draws with a program from now on.
+    /// Sets the program for later draws.
     pub fn use_program(&self, program: Program) {
         // SAFETY: see the module.
         unsafe { self.gl.use_program(Some(program)) };
     }
 
-    /// Draws triangles of all the vertices, once for each of a range of instances.
+    /// Draws triangles from all vertices, once per instance of the range.
     ///
     /// # Panics
-    /// Where there are not so many instances.
+    /// If there are fewer instances.
     pub fn draw(&self, vertices: &Vertices, instances: Range<u32>) {
         assert!(instances.end <= vertices.instances, "{instances:?}");
         let (count, number) = (vertices.count as i32, instances.len() as i32);
-        // SAFETY: see the module; the attributes hold all of them.
+        // SAFETY: see the module. The attributes hold all of them.
         unsafe {
             self.gl.bind_vertex_array(Some(vertices.name));
             (self.gl).draw_arrays_instanced_base_instance(
@@ -657,7 +660,7 @@ impl Gl {
 
     /// Draws one triangle whose shader needs no vertices.
     pub fn draw_whole(&self, nothing: &Vertices) {
-        // SAFETY: see the module; without attributes nothing is read.
+        // SAFETY: see the module. Without attributes nothing is read.
         unsafe {
             self.gl.bind_vertex_array(Some(nothing.name));
             self.gl.draw_arrays(glow::TRIANGLES, 0, 3);
@@ -673,7 +676,7 @@ impl Gl {
 
 impl Drop for Gl {
     fn drop(&mut self) {
-        // SAFETY: the context was made by the library and is used no more.
+        // SAFETY: the library created the context, and it is not used any more.
         unsafe { (self.destroy)(self.context.as_ptr()) };
         HAS_CONTEXT.set(false);
     }
@@ -687,7 +690,7 @@ fn target(is_array: bool) -> u32 {
     }
 }
 
-/// The error of something that could not be made.
+/// The error for an object that could not be created.
 fn made(what: &'static str) -> impl Fn(String) -> RasterError {
     move |message| RasterError::Driver {
         doing: match what {

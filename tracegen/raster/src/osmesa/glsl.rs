@@ -1,4 +1,4 @@
-//! The shader in the driver's language, entry point by entry point.
+//! The shader in GLSL, entry point by entry point.
 
 use crate::error::RasterError;
 use crate::groups::MATERIAL_TEXTURES;
@@ -21,7 +21,7 @@ pub const MATERIAL_UNITS: u32 = 0;
 /// Texture unit of the shadow maps.
 pub const SHADOW_UNIT: u32 = MATERIAL_TEXTURES as u32;
 
-/// The checked shader.
+/// The validated shader.
 pub struct Module {
     module: naga::Module,
     info: ModuleInfo,
@@ -29,7 +29,7 @@ pub struct Module {
 }
 
 impl Module {
-    /// Reads and checks the shader.
+    /// Parses and validates the shader.
     ///
     /// # Errors
     /// The translator's message.
@@ -97,13 +97,13 @@ impl Module {
     }
 }
 
-/// Which block or unit each of the shader's bindings is. A sampler goes with its texture.
+/// The block or unit of each of the shader's bindings. A sampler shares its texture's unit.
 fn bindings() -> BTreeMap<naga::ResourceBinding, u8> {
     let of_view = (0_u32..).zip(VIEW_BINDINGS).map(|(binding, name)| {
         let place = match name {
             "VIEW" => VIEW_BLOCK,
             "SHADOW_MAP" | "SHADOW_SAMPLER" => SHADOW_UNIT,
-            // Storage blocks are numbered as the bindings are.
+            // Storage blocks have the numbers of their bindings.
             _ => binding,
         };
         (0, binding, place)

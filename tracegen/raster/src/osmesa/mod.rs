@@ -1,9 +1,9 @@
-//! Capture through OSMesa, Mesa's OpenGL without a window: llvmpipe again, or softpipe, a rasteriser that
-//! shares little with it.
+//! Capture through OSMesa, Mesa's OpenGL without a window, on llvmpipe or on softpipe, a rasteriser
+//! that shares little code with it.
 //!
-//! Plain frames alone: no layers but the eyes' own pictures. Fragments are recorded one by one, since the
-//! language has no ballots here, and primitives are numbered by their vertices, since softpipe loses draws
-//! that ask for the number.
+//! Only plain frames are supported, whose layers are the eyes' own pictures. Fragments are recorded
+//! one by one, because GLSL has no ballots here. Primitives are numbered by their vertices, because
+//! softpipe loses draws that read the primitive number.
 
 mod gl;
 mod glsl;
@@ -39,7 +39,7 @@ pub struct Osmesa {
     driver: String,
     programs: Programs,
     scene: SceneObjects,
-    /// Without attributes, for what needs none.
+    /// A vertex array without attributes.
     nothing: Vertices,
     buffers: RecordBuffers,
     /// Target of each layer, by its position in the frame's plan.
@@ -50,24 +50,24 @@ pub struct Osmesa {
     work: Work,
 }
 
-/// Buffers that every layer's render shares.
+/// Buffers shared by the rendering of all layers.
 struct RecordBuffers {
     /// The layer's `View`.
     view: Buffer,
     /// Number of appended records, including those beyond the capacity.
     counter: Buffer,
     records: Buffer,
-    /// As long as `records` where draws are masked.
+    /// As long as `records` if draws are masked.
     depths: Buffer,
     capacity: u32,
 }
 
-/// Draws of a pass: their pipeline, material and mesh.
+/// Draws of a render pass: their pipeline, material and mesh.
 type Plan = Vec<(Batch, Pipeline)>;
 
 impl Osmesa {
-    /// Loads the library and uploads the scene. Regions may produce `record_budget_bytes` of raw records
-    /// before they are split, capped by the driver's limit of a storage block.
+    /// Loads the library and uploads the scene. A region is split if its raw records exceed
+    /// `record_budget_bytes`, capped by the driver's limit of a storage block.
     ///
     /// # Errors
     /// No library, driver errors, sizes beyond the driver's limits.
@@ -109,7 +109,7 @@ impl Osmesa {
         })
     }
 
-    /// A feature that this backend does not support.
+    /// The error for a feature that this backend does not support.
     fn lacks<T>(&self, what: &str) -> Result<T, RasterError> {
         Err(RasterError::Unsupported {
             driver: format!("the OSMesa backend ({})", self.driver),
@@ -117,7 +117,7 @@ impl Osmesa {
         })
     }
 
-    /// The target of a layer, created unless the last frame's fits.
+    /// The target of a layer, created unless the last frame's target fits.
     fn target(&mut self, number: usize, size_px: [u32; 2]) -> Result<Target, RasterError> {
         if self.layers.len() <= number {
             self.layers.resize(number + 1, None);
@@ -130,7 +130,7 @@ impl Osmesa {
         }
     }
 
-    /// Batches a list of draws and makes the programs that they need. The list stays in the instance
+    /// Batches a list of draws and creates the missing programs. The list stays in the instance
     /// buffer until the next plan.
     fn plan(
         &mut self,
@@ -182,13 +182,13 @@ impl Osmesa {
         gl.bind_texture(glsl::SHADOW_UNIT, true, maps.texture, maps.sampler);
     }
 
-    /// Issues a plan.
+    /// Draws a plan.
     fn issue(&mut self, draws: &DrawList, plan: &Plan) {
         let mut material = None;
         for (batch, pipeline) in plan {
             let call = &draws.calls[batch.draw as usize];
             let Some(mesh) = &self.scene.meshes[call.mesh] else {
-                // Every draw's mesh is uploaded.
+                // Unreachable: every draw's mesh is uploaded.
                 continue;
             };
             pipeline.set(&self.gl);
@@ -228,7 +228,7 @@ impl Osmesa {
         let mut quads = vec![RawRecord::default(); needed as usize];
         self.gl
             .read(self.buffers.records, bytemuck::cast_slice_mut(&mut quads));
-        // Without the depth test, that of masked draws is not replayed either.
+        // Without the depth test, the alpha-test replay of masked draws is not needed either.
         let is_replayed = recording.fragments == Fragments::DepthTested
             && self.buffers.depths.bytes >= u64::from(needed) * DEPTH_BYTES;
         let depths = if is_replayed { needed as usize } else { 0 };

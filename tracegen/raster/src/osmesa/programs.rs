@@ -1,4 +1,4 @@
-//! The programs that a scene's draws need, all from one shader source.
+//! The programs for a scene's draws, all from one shader source.
 
 use super::gl::{Gl, Program, State};
 use super::glsl::Module;
@@ -15,14 +15,14 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// Draws with it from now on.
+    /// Sets the program and the state for later draws.
     pub fn set(&self, gl: &Gl) {
         gl.use_program(self.program);
         gl.set(&self.state);
     }
 }
 
-/// The shader and the programs made from it so far.
+/// The shader and the programs created from it so far.
 pub struct Programs {
     /// Draws the background and clears the region's depth.
     pub background: Pipeline,
@@ -31,7 +31,7 @@ pub struct Programs {
 }
 
 impl Programs {
-    /// Reads the shader.
+    /// Translates the shader.
     ///
     /// # Errors
     /// Driver and validation errors.
@@ -84,7 +84,7 @@ impl Programs {
         Ok(pipeline)
     }
 
-    /// Programs made.
+    /// Number of programs created.
     pub fn count(&self) -> u64 {
         self.made.len() as u64
     }

@@ -1,4 +1,5 @@
-//! The scene in the driver's memory: vertices that no triangles share, textures, materials, instances.
+//! The scene in the driver's memory: vertices that triangles do not share, textures, materials,
+//! instances.
 
 use super::gl::{Attribute, Buffer, Gl, Sampler, Texture, Vertices};
 use crate::draws::DrawList;
@@ -10,7 +11,7 @@ use formats::texture::{self, ColorSpace, Filter, MipFilter, TexelFormat, Wrap};
 use scene::{Animation, Material, Mesh, Scene};
 use textures::{CompressedTexture, TextureSet};
 
-/// S3TC with sRGB, which the bindings do not name.
+/// S3TC with sRGB, missing in the bindings.
 const SRGB_ALPHA_DXT1: u32 = 0x8C4D;
 const SRGB_ALPHA_DXT5: u32 = 0x8C4F;
 const RGBA_DXT1: u32 = 0x83F1;
@@ -73,7 +74,7 @@ impl SceneObjects {
         gl.fill(white, 0, [1, 1], None, &[255; 4])?;
         let uploaded = (textures.textures.iter())
             .map(|t| match t.blocks.as_slice() {
-                // Seen by no view, and so never sampled.
+                // No view can see it, so it is never sampled.
                 [] => Ok(white),
                 _ => upload_texture(gl, t),
             })
@@ -91,7 +92,7 @@ impl SceneObjects {
         })
     }
 
-    /// Writes the rows of moving draws and the vertices that move; returns the number of bytes.
+    /// Writes the rows of moving draws and the moving vertices. Returns the number of bytes.
     pub fn pose(&self, gl: &Gl, scene: &Scene, draws: &DrawList) -> u64 {
         let mut bytes = 0;
         for mesh in scene.animation.iter().flat_map(Animation::moving_meshes) {
@@ -136,7 +137,7 @@ fn upload_mesh(gl: &Gl, mesh: &Mesh, draws: Buffer) -> Result<MeshObjects, Raste
         offset,
         per_instance: false,
     };
-    // Numbers of primitives for the shader.
+    // Primitive numbers for the shader.
     let numbers: Vec<u32> = (0..mesh.triangles() as u32).flat_map(|n| [n; 3]).collect();
     let number = |location, buffer, per_instance| Attribute {
         buffer,
@@ -204,8 +205,8 @@ fn upload_texture(gl: &Gl, compressed: &CompressedTexture) -> Result<Texture, Ra
             limit,
         });
     }
-    // Without the levels that are never sampled, the coarser ones are sampled alike: see the crate
-    // textures.
+    // Leaving out levels that are never sampled does not change the sampling of coarser ones. See
+    // the crate textures.
     let levels = compressed.first_level..texture.levels;
     let size = texture.level_size(levels.start);
     let made = gl.texture(format, size, levels.len() as u32, None)?;
@@ -235,7 +236,7 @@ fn upload_texture(gl: &Gl, compressed: &CompressedTexture) -> Result<Texture, Ra
     Ok(made)
 }
 
-/// The samplers made so far, one a state.
+/// The samplers created so far, one per state.
 type Samplers = Vec<(texture::Sampler, Sampler)>;
 
 fn material(
@@ -289,7 +290,7 @@ fn sampler(gl: &Gl, state: &texture::Sampler, made: &mut Samplers) -> Result<Sam
         (glow::TEXTURE_MIN_FILTER, min),
         (glow::TEXTURE_MAG_FILTER, mag),
     ];
-    // Without levels as lavapipe has it: a quarter of a level above 0 never reaches 1.
+    // As in lavapipe, a limit of 0.25 stands for no levels: it never selects level 1.
     let max_lod = if state.mip == MipFilter::None {
         0.25
     } else {

@@ -1,4 +1,5 @@
-//! Boxes and triangles by AVX2 and FMA: the same operations in the same order as the plain kernel.
+//! Box and triangle tests with AVX2 and FMA: the same operations in the same order as the plain
+//! kernel.
 
 use super::count::Counter;
 use super::kernel::{Kernel, Lanes8};
@@ -7,27 +8,27 @@ use super::node::{Block, Child, Node2, Node8};
 use crate::ray::{PreparedRay, line_hits_sheared_f64};
 use std::arch::x86_64::*;
 
-/// AVX2 and FMA. Use only where the processor has it: `Avx2::available`.
+/// AVX2 and FMA. Requires a processor with both: see `Avx2::available`.
 #[derive(Clone, Copy)]
 pub struct Avx2;
 
 impl Avx2 {
-    /// True where this processor can run the kernel.
+    /// True if this processor can run the kernel.
     #[must_use]
     pub fn available() -> bool {
         is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
     }
 }
 
-/// The ray broadcast into registers.
+/// The ray, broadcast into registers.
 #[derive(Clone, Copy)]
 pub struct Ray {
-    /// By axis, for two boxes: minus the near reciprocal twice, the far reciprocal twice. With
+    /// By axis, for two boxes: minus the near reciprocal twice, then the far reciprocal twice. With
     /// entries negated, one minimum serves both ends.
     scale2: [__m128; 3],
     /// Added to the scaled planes.
     offset2: [__m128; 3],
-    /// Puts near planes before far planes.
+    /// Permutation that puts near planes before far planes.
     order2: [__m128i; 3],
     t_min: f32,
     near_reciprocal: [__m256; 3],
@@ -49,7 +50,7 @@ impl Kernel for Avx2 {
         let o = ray.ray.origin.to_array();
         let (nr, fr) = (ray.near_reciprocal, ray.far_reciprocal);
         let (no, fo) = (ray.near_offset, ray.far_offset);
-        // SAFETY: dispatch makes sure of AVX2.
+        // SAFETY: dispatch ensures AVX2.
         unsafe {
             Ray {
                 scale2: std::array::from_fn(|a| _mm_setr_ps(-nr[a], -nr[a], fr[a], fr[a])),
@@ -76,7 +77,7 @@ impl Kernel for Avx2 {
 
     #[inline(always)]
     fn step2(ray: &Ray, node: &Node2, t_max: f32) -> ([f32; 2], u32) {
-        // SAFETY: dispatch makes sure of AVX2; loads are of whole arrays.
+        // SAFETY: dispatch ensures AVX2. Loads are of whole arrays.
         unsafe {
             let ends = _mm_setr_ps(-ray.t_min, -ray.t_min, t_max, t_max);
             let [x, y, z] = std::array::from_fn(|a| {
@@ -95,7 +96,7 @@ impl Kernel for Avx2 {
 
     #[inline(always)]
     fn step8(ray: &Ray, node: &Node8, t_max: f32, near: &mut Lanes8) -> u32 {
-        // SAFETY: dispatch makes sure of AVX2; loads and stores are of whole arrays.
+        // SAFETY: dispatch ensures AVX2. Loads and stores are of whole arrays.
         unsafe {
             let mut enter = _mm256_set1_ps(ray.t_min);
             let mut leave = _mm256_set1_ps(t_max);
@@ -116,7 +117,7 @@ impl Kernel for Avx2 {
     #[inline(always)]
     fn lines_hit(ray: &Ray, _: &PreparedRay, block: &Block) -> u32 {
         let [kx, ky, kz] = ray.axes;
-        // SAFETY: dispatch makes sure of AVX2; loads are of whole arrays.
+        // SAFETY: dispatch ensures AVX2. Loads are of whole arrays.
         unsafe {
             let sheared = |vertex: usize| {
                 let v = &block.vertices[vertex];
@@ -141,7 +142,7 @@ impl Kernel for Avx2 {
             let most = _mm_max_ps(_mm_max_ps(u, v), w);
             let all = _mm_or_ps(_mm_cmpgt_ps(least, zero), _mm_cmplt_ps(most, zero));
             let mut mask = _mm_movemask_ps(all) as u32;
-            // A lane whose product is zero has a vanishing edge: exact signs decide.
+            // A lane whose product is zero has a zero edge function, which is evaluated exactly.
             let on_edge = _mm_or_ps(
                 _mm_or_ps(_mm_cmpeq_ps(u, zero), _mm_cmpeq_ps(v, zero)),
                 _mm_cmpeq_ps(w, zero),
@@ -164,20 +165,20 @@ impl Kernel for Avx2 {
     }
 
     #[inline(always)]
-    fn leaf_apart<C: Counter, L: LeafTest<Self, C>>(
+    fn leaf_out_of_line<C: Counter, L: LeafTest<Self, C>>(
         test: &mut L,
         ray: &Ray,
         counter: &mut C,
         leaf: Child,
     ) -> Option<f32> {
-        // SAFETY: dispatch makes sure of AVX2.
-        unsafe { leaf_apart(test, ray, counter, leaf) }
+        // SAFETY: dispatch ensures AVX2.
+        unsafe { leaf_out_of_line(test, ray, counter, leaf) }
     }
 }
 
 #[target_feature(enable = "avx2,fma")]
 #[inline(never)]
-fn leaf_apart<C: Counter, L: LeafTest<Avx2, C>>(
+fn leaf_out_of_line<C: Counter, L: LeafTest<Avx2, C>>(
     test: &mut L,
     ray: &Ray,
     counter: &mut C,

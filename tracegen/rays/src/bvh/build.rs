@@ -11,9 +11,9 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocSearchDistance, SortPrecision};
 use std::time::Duration;
 
-/// Pinned settings: counts of two traces are only comparable when the builder is the same. The
-/// presets limit PLOC's search near the leaves, which makes trees of regular tessellations four
-/// times as costly. Leaves are made by [`collapse`], not by obvhs.
+/// Fixed settings: counts of two traces are comparable only with the same builder. The presets
+/// limit PLOC's search near the leaves, which makes trees of regular tessellations four times as
+/// costly. [`collapse`] creates the leaves, not obvhs.
 const SETTINGS: BvhBuildParams = BvhBuildParams {
     pre_split: false,
     ploc_search_distance: PlocSearchDistance::Medium,
@@ -25,8 +25,8 @@ const SETTINGS: BvhBuildParams = BvhBuildParams {
     collapse_traversal_cost: 1.0,
 };
 
-/// Rounds of reinsertion over the collapsed tree, each of every node: they take a twentieth off
-/// the steps on the meadow, and further rounds a hundredth.
+/// Rounds of reinsertion over the collapsed tree, each over every node. They save 5 % of the steps
+/// on the meadow; further rounds save 1 %.
 const REINSERTIONS_AFTER_COLLAPSE: u32 = 2;
 
 /// The settings by name, for the trace.
@@ -56,7 +56,7 @@ pub fn settings() -> Vec<(String, String)> {
     .to_vec()
 }
 
-/// A tree in obvhs's form: every inner node's children are next to each other.
+/// A tree in obvhs's format, in which the children of every inner node are adjacent.
 pub(super) fn build_binary(triangles: &[[[f32; 3]; 3]]) -> Bvh2 {
     let boxes: Vec<Aabb> = triangles
         .iter()
@@ -85,7 +85,7 @@ pub(super) struct Layout {
     pub sah_cost: f64,
 }
 
-/// Lays out the trees depth first, so that a node's near relatives share pages.
+/// Lays out the trees depth first, so that related nodes share pages.
 ///
 /// `numbers[i]` is the primitive number (with its mask flag) of triangle `i`.
 pub(super) fn lay_out(tree: &Bvh2, triangles: &[[[f32; 3]; 3]], numbers: &[u32]) -> Layout {
@@ -100,7 +100,7 @@ pub(super) fn lay_out(tree: &Bvh2, triangles: &[[[f32; 3]; 3]], numbers: &[u32])
     out
 }
 
-/// Blocks of every leaf in depth-first order; the result maps a tree node to its leaf.
+/// Places the blocks of every leaf in depth-first order. The result maps a tree node to its leaf.
 fn place_leaves(
     tree: &Bvh2,
     triangles: &[[[f32; 3]; 3]],
@@ -164,7 +164,7 @@ fn corners(tree: &Bvh2, node: u32) -> ([f32; 3], [f32; 3]) {
 }
 
 fn emit2(tree: &Bvh2, leaves: &[Child], out: &mut Layout) {
-    // A tree of one leaf still gets an inner node, so that traversal always starts at one.
+    // A tree with one leaf still gets an inner node, so that traversal always starts at one.
     let root_is_leaf = tree.nodes[0].is_leaf();
     let mut stack = vec![(0u32, None, 1u32)];
     while let Some((at, parent, depth)) = stack.pop() {
@@ -179,7 +179,7 @@ fn emit2(tree: &Bvh2, leaves: &[Child], out: &mut Layout) {
             children: [Child::NONE; 2],
         };
         let first = tree.nodes[at as usize].first_index;
-        // The larger child, likelier to be visited, is laid out right behind its parent.
+        // The larger child, which is visited more often, directly follows its parent.
         let area = |side: u32| tree.nodes[(first + side) as usize].aabb().half_area();
         let order = if !root_is_leaf && area(1) > area(0) {
             [0u32, 1]
@@ -239,7 +239,7 @@ fn emit8(tree: &Bvh2, leaves: &[Child], out: &mut Layout) {
     }
 }
 
-/// Up to eight descendants that stand for a node: the child of the largest area is opened until
+/// Up to eight descendants that replace a node: the child with the largest area is opened until
 /// there are eight (Wald et al. 2008).
 fn open_eight(tree: &Bvh2, node: u32) -> Vec<u32> {
     let mut open = vec![node];

@@ -1,4 +1,4 @@
-//! Merges subtrees into leaves where that lowers the surface-area cost, paying by the block.
+//! Merges subtrees into leaves where that lowers the surface-area cost, counted per block.
 
 use super::node::BLOCK;
 use obvhs::bvh2::Bvh2;
@@ -6,11 +6,11 @@ use obvhs::bvh2::node::Bvh2Node;
 
 /// Most triangles in a leaf: two blocks.
 pub(super) const MAX_TRIANGLES: u32 = 2 * BLOCK as u32;
-/// Cost of testing a block, in steps. Four triangles are tested at the price of one, so a leaf
-/// pays by the block; obvhs's own collapse would have it pay by the triangle.
+/// Cost of testing a block, in steps. Testing four triangles costs as much as testing one, so a
+/// leaf's cost is per block. The collapse in obvhs counts it per triangle.
 pub(super) const BLOCK_COST: f32 = 1.0;
 
-/// The tree with its cheap subtrees turned into leaves.
+/// The tree with cheap subtrees replaced by leaves.
 pub(super) fn collapse(tree: &Bvh2) -> Bvh2 {
     let Some(root) = tree.nodes.first() else {
         return Bvh2::default();
@@ -54,7 +54,7 @@ fn parents_first(tree: &Bvh2) -> Vec<usize> {
     order
 }
 
-/// Bottom up, the cheaper of keeping a node and making it a leaf.
+/// Chooses bottom up whether keeping a node or making it a leaf is cheaper.
 fn choose_leaves(tree: &Bvh2, parents_first: &[usize]) -> Vec<bool> {
     let mut triangles = vec![0u32; tree.nodes.len()];
     let mut cost = vec![0.0f32; tree.nodes.len()];

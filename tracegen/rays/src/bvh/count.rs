@@ -6,13 +6,13 @@ use formats::raytrace::Visit;
 pub trait Counter {
     /// A step at an inner node.
     fn step(&mut self, node: u32);
-    /// Tests of `count` triangles from a slot on.
+    /// Tests of `count` triangles, starting at a slot.
     fn triangles(&mut self, first_slot: u32, count: u32);
     /// A look-up of a triangle's alpha.
     fn alpha(&mut self);
 }
 
-/// Notes nothing: the yardstick for the cost of counting.
+/// Counts nothing: the baseline for the cost of counting.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoCounter;
 
@@ -25,7 +25,7 @@ impl Counter for NoCounter {
     fn alpha(&mut self) {}
 }
 
-/// Counts. Aligned for one store to clear them, which saves a short ray 2 % of its time.
+/// Counts. The alignment lets one store clear them, which saves 2 % of a short ray's time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(align(16))]
 pub struct Counts {
@@ -52,12 +52,12 @@ impl Counter for Counts {
     }
 }
 
-/// Counts and lists every visit.
+/// Counts and records every visit.
 #[derive(Debug)]
 pub struct Visits<'a> {
     /// Totals.
     pub counts: Counts,
-    /// Visits in order, appended.
+    /// Visits in order. New ones are appended.
     pub list: &'a mut Vec<Visit>,
 }
 

@@ -1,30 +1,30 @@
-//! The two inner loops of traversal, boxes and triangles, for plain Rust and for AVX2.
+//! The two inner loops of traversal, box and triangle tests, in plain Rust and with AVX2.
 //!
-//! Both do the same operations in the same order on every lane, so their results are equal to
-//! the bit and a trace does not depend on the processor.
+//! Both perform the same operations in the same order on every lane. Their results are
+//! bit-identical, so a trace does not depend on the processor.
 
 use super::count::Counter;
 use super::leaf::LeafTest;
 use super::node::{BLOCK, Block, Child, Node2, Node8};
 use crate::ray::PreparedRay;
 
-/// Box and triangle tests. Methods are inlined into a traversal that was compiled for the
-/// instructions they use.
+/// Box and triangle tests. Methods are inlined into a traversal that is compiled for their
+/// instructions.
 pub trait Kernel: Copy + Sized {
     /// The kernel's data of a ray.
     type Ray: Copy;
-    /// Lays a ray out for the kernel.
+    /// Prepares a ray for the kernel.
     fn load(ray: &PreparedRay) -> Self::Ray;
     /// The two-box test: minus the entry distances, and a bit for each child that is hit before
-    /// `t_max`. Negated entries let one minimum serve entries and exits.
+    /// `t_max`. With negated entries, one minimum serves entries and exits.
     fn step2(ray: &Self::Ray, node: &Node2, t_max: f32) -> ([f32; 2], u32);
-    /// Eight boxes: entry distances into `near` and a bit for each child that is hit.
+    /// The eight-box test: entry distances into `near`, and a bit for each child that is hit.
     fn step8(ray: &Self::Ray, node: &Node8, t_max: f32, near: &mut Lanes8) -> u32;
-    /// Bit by bit the triangles of a block that the line passes through.
+    /// A bit mask of a block's triangles through which the line passes.
     fn lines_hit(ray: &Self::Ray, prepared: &PreparedRay, block: &Block) -> u32;
-    /// Calls a leaf test as a function of its own, so that a small loop around it keeps its
+    /// Calls a leaf test as a separate function, so that a small loop around it keeps its
     /// registers.
-    fn leaf_apart<C: Counter, L: LeafTest<Self, C>>(
+    fn leaf_out_of_line<C: Counter, L: LeafTest<Self, C>>(
         test: &mut L,
         ray: &Self::Ray,
         counter: &mut C,
@@ -39,7 +39,7 @@ pub trait Kernel: Copy + Sized {
 #[repr(align(32))]
 pub struct Lanes8(pub [f32; 8]);
 
-/// Plain Rust: the specification, and the fallback where AVX2 is missing.
+/// Plain Rust: the reference, and the fallback for processors without AVX2.
 #[derive(Clone, Copy)]
 pub struct Scalar;
 
@@ -91,7 +91,7 @@ impl Kernel for Scalar {
     }
 }
 
-/// The processor's minimum: the second operand where neither is smaller.
+/// The processor's minimum: the second operand if neither is smaller.
 #[inline]
 fn least(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }

@@ -6,7 +6,7 @@ use super::kernel::Kernel;
 use super::node::{BLOCK, Child, MASKED};
 use crate::ray::{PreparedRay, barycentrics};
 
-/// Where a ray meets a triangle.
+/// The hit of a ray on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
     /// Distance in units of the ray's direction.
@@ -17,13 +17,13 @@ pub struct RayHit {
     pub vertices: [[f32; 3]; 3],
 }
 
-/// Decides at a masked triangle whether a ray stops there.
+/// Decides at a masked triangle whether a ray stops.
 pub trait AlphaTest {
-    /// True where the triangle is opaque at these weights of its second and third vertex.
+    /// True if the triangle is opaque at these weights of its second and third vertex.
     fn opaque(&self, primitive: u32, bary: [f32; 2]) -> bool;
 }
 
-/// Every triangle stops every ray.
+/// Treats every triangle as opaque.
 #[derive(Clone, Copy, Debug)]
 pub struct AllOpaque;
 
@@ -34,8 +34,8 @@ impl AlphaTest for AllOpaque {
     }
 }
 
-/// What happens at a leaf. Methods rather than closures: a closure that is not inlined would be
-/// compiled without the instructions of its traversal.
+/// The test at a leaf. It is a trait rather than a closure, because a closure that is not inlined
+/// would be compiled without the instructions of its traversal.
 pub trait LeafTest<K: Kernel, C: Counter> {
     /// Tests a leaf and returns the new `t_max`, or `None` to stop.
     fn test(&mut self, ray: &K::Ray, counter: &mut C, leaf: Child) -> Option<f32>;

@@ -1,8 +1,8 @@
-//! The bounding volume hierarchy: built by a library, walked and counted here.
+//! The bounding volume hierarchy: built by a library, traversed and counted here.
 //!
-//! One build gives two trees over the same leaves: a binary one whose step tests both children's
-//! boxes, the unit in which T&I unit 2.0 works and in which traces count, and an eight-wide one
-//! for speed. Both find the same hits, bit for bit.
+//! One build gives two trees over the same leaves. A step in the binary tree tests both children's
+//! boxes; this is the unit in which T&I unit 2.0 works and in which traces count. The eight-wide
+//! tree is faster. Both find bit-identical hits.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
@@ -29,7 +29,7 @@ use stacks::Stacks;
 pub use traverse::TraversalStack;
 use traverse::{Eight, Two, Width, closest, occluded};
 
-/// A triangle that cannot be put into the hierarchy.
+/// A set of triangles for which no hierarchy can be built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BvhError {
     /// More triangles than node references can number.
@@ -42,7 +42,7 @@ pub enum BvhError {
     },
 }
 
-/// Instructions that traversal runs on.
+/// Instruction set of the traversal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Instructions {
     /// Plain Rust.
@@ -52,7 +52,7 @@ pub enum Instructions {
 }
 
 impl Instructions {
-    /// The fastest that this processor has.
+    /// The fastest that this processor supports.
     #[must_use]
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
@@ -78,8 +78,9 @@ pub struct Bvh {
 }
 
 impl Bvh {
-    /// Builds the trees. Triangles with a coordinate that is not finite, or beyond
-    /// [`LARGEST_COORDINATE`], are left out; they can't be hit. `masked` says of a triangle's number whether its material has an alpha mask.
+    /// Builds the trees. Triangles with a coordinate that is not finite or exceeds
+    /// [`LARGEST_COORDINATE`] are left out and can't be hit. `masked` returns whether the material
+    /// of a triangle number has an alpha mask.
     ///
     /// # Errors
     /// There are more triangles than node references can number.
@@ -128,7 +129,7 @@ impl Bvh {
         })
     }
 
-    /// Chooses the instructions; a processor without AVX2 stays with plain Rust.
+    /// Selects the instructions. A processor without AVX2 keeps plain Rust.
     #[must_use]
     pub fn with_instructions(mut self, instructions: Instructions) -> Self {
         if instructions == Instructions::Scalar || Instructions::best() == instructions {
@@ -163,7 +164,7 @@ impl Bvh {
         (self.depth2 as usize).max(self.depth8 as usize * 7) + 8
     }
 
-    /// The nearest triangle that a ray hits; of equally near ones the lowest number.
+    /// The nearest triangle that a ray hits. Of equally near ones, the lowest number.
     pub fn closest<C: Counter, A: AlphaTest>(
         &self,
         tree: TraversalKind,
@@ -178,7 +179,7 @@ impl Bvh {
         }
     }
 
-    /// True where any triangle lies on the ray's segment.
+    /// True if any triangle lies on the ray's segment.
     pub fn occluded<C: Counter, A: AlphaTest>(
         &self,
         tree: TraversalKind,
@@ -207,7 +208,7 @@ impl Bvh {
         match self.instructions {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx2 => {
-                // SAFETY: `instructions` is Avx2 only where the processor has it.
+                // SAFETY: `instructions` is Avx2 only if the processor has it.
                 unsafe { closest_avx2::<W, C, A>(self, ray, stack, counter, alpha) }
             }
             _ => closest_with::<Scalar, W, C, A>(self, ray, stack, counter, alpha),
@@ -228,7 +229,7 @@ impl Bvh {
         match self.instructions {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx2 => {
-                // SAFETY: `instructions` is Avx2 only where the processor has it.
+                // SAFETY: `instructions` is Avx2 only if the processor has it.
                 unsafe { occluded_avx2::<W, C, A>(self, ray, stack, counter, alpha) }
             }
             _ => occluded::<Scalar, W, C, A>(self, ray, stack, counter, alpha),
@@ -246,7 +247,8 @@ fn closest_with<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
     closest::<K, W, C, A>(bvh, ray, stack, counter, alpha)
 }
 
-/// The traversal compiled for AVX2: built for the baseline it runs at an eighth of the speed.
+/// The traversal compiled for AVX2. Compiled for the baseline instruction set, the kernel runs at
+/// an eighth of the speed.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 fn closest_avx2<W: Width, C: Counter, A: AlphaTest>(

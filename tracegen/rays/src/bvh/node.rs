@@ -5,7 +5,7 @@ pub const BLOCK: usize = 4;
 
 /// A child: an inner node's index, or a leaf.
 ///
-/// A leaf has bit 31 set, its triangle count less 1 in bits 27 to 30 and its first block below.
+/// A leaf has bit 31 set, its triangle count minus 1 in bits 27 to 30, and its first block below.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(transparent)]
 pub struct Child(pub u32);
@@ -20,7 +20,7 @@ impl Child {
     /// No child.
     pub const NONE: Self = Self(u32::MAX);
 
-    /// A leaf of `count` triangles from `block` on.
+    /// A leaf of `count` triangles, starting at `block`.
     #[must_use]
     pub fn leaf(block: u32, count: u32) -> Self {
         debug_assert!(block < Self::MAX_BLOCKS && (1..=Self::MAX_LEAF).contains(&count));
@@ -45,7 +45,8 @@ impl Child {
     }
 }
 
-/// An inner node of the binary tree: both children's boxes, so that one step reads one node.
+/// An inner node of the binary tree. It holds both children's boxes, so that one step reads one
+/// node.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub struct Node2 {
@@ -59,17 +60,17 @@ pub struct Node2 {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub struct Node8 {
-    /// Minimum then maximum, by axis, of each child; a missing child's box is inside out.
+    /// Minimum then maximum, by axis, of each child. A missing child's box is inverted.
     pub bounds: [[[f32; 8]; 3]; 2],
     /// Children, [`Child::NONE`] where missing.
     pub children: [Child; 8],
 }
 
-/// Four triangles of a leaf, coordinates side by side.
+/// Four triangles of a leaf, in structure-of-arrays layout.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(16))]
 pub struct Block {
-    /// By vertex and axis, one value per triangle; unused lanes repeat a NaN that fails every test.
+    /// By vertex and axis, one value per triangle. Unused lanes hold a NaN, which fails every test.
     pub vertices: [[[f32; BLOCK]; 3]; 3],
     /// Primitive number with [`MASKED`] in the top bit.
     pub primitives: [u32; BLOCK],
@@ -81,7 +82,7 @@ pub struct Block {
 pub const MASKED: u32 = 1 << 31;
 
 impl Block {
-    /// A triangle's vertices.
+    /// The vertices of a triangle.
     #[must_use]
     #[inline]
     pub fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
@@ -89,5 +90,5 @@ impl Block {
     }
 }
 
-/// Bytes of a triangle as a ray-tracing unit would read it: nine coordinates and its number.
+/// Bytes of a triangle in a ray-tracing unit's memory: nine coordinates and its number.
 pub const TRIANGLE_BYTES: u32 = 40;

@@ -1,9 +1,10 @@
 //! Stacks: many triangles with the same vertices.
 //!
-//! The builder merges nearest neighbours. Within a stack all distances are equal, and its time grows
-//! with the square of the stack. A stack that no leaf holds is therefore built as one triangle,
-//! which becomes a balanced subtree afterwards. Triangles behind the first opaque one of a stack are
-//! left out: of equally near hits the lowest number counts, so no ray can end at them.
+//! The builder merges nearest neighbours. Within a stack all distances are equal, and its time
+//! grows with the square of the stack's size. A stack too large for one leaf is therefore built as
+//! one triangle and replaced by a balanced subtree afterwards. Triangles behind the first opaque
+//! one of a stack are left out: of equally near hits the lowest number counts, so no ray can end at
+//! them.
 
 use super::collapse::MAX_TRIANGLES;
 use super::node::MASKED;
@@ -14,16 +15,16 @@ use obvhs::bvh2::node::Bvh2Node;
 
 type Vertices = [[f32; 3]; 3];
 
-/// The triangles that are built.
+/// The triangles to build.
 pub(super) struct Stacks {
     /// Position of each built triangle in the list of all.
     pub built: Vec<u32>,
-    /// Stacks that no leaf holds: which built triangle stands for them, ascending, and the positions of
-    /// all triangles of the stack that a ray can end at.
+    /// Stacks too large for a leaf: the built triangle that represents each, ascending, and the
+    /// positions of all triangles of the stack at which a ray can end.
     stacks: Vec<(u32, Vec<u32>)>,
 }
 
-/// The bits of a triangle's vertices.
+/// The bits of a triangle's coordinates.
 fn bits(triangle: &Vertices) -> [[u32; 3]; 3] {
     triangle.map(|vertex| vertex.map(f32::to_bits))
 }
@@ -40,7 +41,7 @@ fn hash(triangle: &Vertices) -> u64 {
 }
 
 impl Stacks {
-    /// Finds the stacks; `numbers` are primitive numbers, ascending, with their mask flags.
+    /// Finds the stacks. `numbers` are primitive numbers, ascending, with their mask flags.
     pub fn find(triangles: &[Vertices], numbers: &[u32]) -> Self {
         let most = MAX_TRIANGLES as usize;
         let mut hashes: Vec<(u64, u32)> = triangles.iter().map(hash).zip(0..).collect();
@@ -64,7 +65,7 @@ impl Stacks {
                     .position(opaque)
                     .map_or(stack.len(), |at| at + 1);
                 let (kept, behind) = stack.split_at(end);
-                // A stack that fits a leaf needs no representative.
+                // A stack that fits into a leaf needs no representative.
                 let not_built = if kept.len() > most { &kept[1..] } else { &[] };
                 for at in behind.iter().chain(not_built) {
                     left_out[*at as usize] = true;
@@ -83,7 +84,7 @@ impl Stacks {
         Self { built, stacks }
     }
 
-    /// Turns a tree over the built triangles into one over all that a ray can end at.
+    /// Converts a tree over the built triangles into one over all triangles at which a ray can end.
     pub fn expand(&self, tree: &mut Bvh2, triangles: &[Vertices]) {
         if self.built.len() == triangles.len() {
             return;
@@ -110,7 +111,7 @@ impl Stacks {
     }
 }
 
-/// Puts members below a node, in halves until a leaf holds them.
+/// Places members below a node, halved until they fit into a leaf.
 fn subtree(tree: &mut Bvh2, at: usize, members: &[u32], triangles: &[Vertices]) {
     if members.len() <= MAX_TRIANGLES as usize {
         let first = tree.primitive_indices.len();
@@ -148,7 +149,7 @@ mod tests {
 
     const ACROSS: Vertices = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, 1.0, 0.0]];
 
-    /// Transparent except for one triangle.
+    /// An alpha test in which only one triangle is opaque.
     struct Only(u32);
 
     impl AlphaTest for Only {
@@ -165,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stack_is_built_as_one_triangle_and_costs_what_its_first_opaque_one_costs() {
+    fn a_stack_costs_as_much_as_its_first_opaque_triangle() {
         for count in [16_000, 64_000] {
             let triangles = vec![ACROSS; count];
             let numbers: Vec<u32> = (0..count as u32).collect();
@@ -179,11 +180,11 @@ mod tests {
     }
 
     #[test]
-    fn masked_triangles_stay_in_a_tree_as_deep_as_a_logarithm() {
+    fn a_stack_of_masked_triangles_gives_a_tree_of_logarithmic_depth() {
         let mut depths = Vec::new();
         for count in [16_000_u32, 64_000] {
             let mut triangles = vec![ACROSS; count as usize];
-            // Not part of the stack: a triangle behind it.
+            // A triangle behind the stack, not part of it.
             triangles.push(ACROSS.map(|[x, y, _]| [x, y, -1.0]));
             let masked = |number| number < count;
             let numbers: Vec<u32> = (0..count).map(|n| n | MASKED).chain([count]).collect();
@@ -204,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn triangles_behind_the_first_opaque_one_are_left_out_and_those_before_it_are_not() {
+    fn only_triangles_behind_the_first_opaque_one_are_left_out() {
         let triangles = [ACROSS; 20];
         let bvh = Bvh::build(&triangles, |number| number != 2).unwrap();
         assert_eq!(bvh.summary(TraversalKind::Bvh2).triangles, 3);
@@ -215,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_leaf_holds_is_no_stack() {
+    fn triangles_that_fit_into_a_leaf_are_not_a_stack() {
         let numbers: Vec<u32> = (0..8).collect();
         assert_eq!(Stacks::find(&[ACROSS; 8], &numbers).built, numbers);
     }

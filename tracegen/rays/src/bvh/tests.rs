@@ -5,7 +5,7 @@ use formats::random::Random;
 use glam::{DVec3, Vec3};
 
 #[test]
-fn both_trees_and_both_kernels_find_what_brute_force_finds() {
+fn hits_of_both_trees_and_both_kernels_equal_brute_force() {
     for mesh in [
         TestMesh::sphere(2),
         TestMesh::grid_box(6),
@@ -73,7 +73,7 @@ fn the_tree_does_not_depend_on_threads() {
 }
 
 #[test]
-fn leaves_hold_every_triangle_once_in_full_blocks_where_that_pays() {
+fn leaves_hold_every_triangle_once_and_fill_their_blocks() {
     let triangles = TestMesh::grid_box(24).rounded(DVec3::ZERO);
     let bvh = Bvh::build(&triangles, |_| false).expect("builds");
     let mut seen: Vec<u32> = bvh
@@ -84,13 +84,13 @@ fn leaves_hold_every_triangle_once_in_full_blocks_where_that_pays() {
         .collect();
     seen.sort_unstable();
     assert!(seen.iter().copied().eq(0..triangles.len() as u32));
-    // A regular grid fills its blocks: leaves of three would leave a quarter empty.
+    // A regular grid fills its blocks. Leaves of three triangles would leave a quarter empty.
     let fill = triangles.len() as f64 / (bvh.blocks.len() * node::BLOCK) as f64;
     assert!(fill > 0.85, "{fill}");
 }
 
 #[test]
-fn what_reaches_too_far_is_left_out() {
+fn triangles_beyond_the_largest_coordinate_are_left_out() {
     let far = [[1e19, 0.0, 5.0], [-1e19, 1.0, 5.0], [0.0, -1e19, 5.0]];
     let near = [[-1.0, -1.0, 9.0], [1.0, -1.0, 9.0], [0.0, 1.0, 9.0]];
     let bvh = Bvh::build(&[far, near], |_| false).expect("builds");

@@ -15,7 +15,7 @@ pub fn default_camera(scene: &Scene) -> Camera {
     let (low, high) = scene.bounds().unwrap_or((-Vec3::ONE, Vec3::ONE));
     let target = (low + high) / 2.0;
     let half = (high - low).length() / 2.0;
-    // All may be in one point.
+    // All points may coincide.
     let radius = if half > 0.0 { half } else { 1e-3 };
     Camera {
         name: "default".into(),
@@ -34,9 +34,9 @@ pub enum CameraError {
     /// No camera of that name.
     #[error("no camera '{name}': expected one of {known}{suggestion}")]
     Unknown {
-        /// As asked.
+        /// The requested name.
         name: String,
-        /// The scene's cameras.
+        /// Names of the scene's cameras.
         known: String,
         /// A similar name, or nothing.
         suggestion: String,
@@ -54,11 +54,11 @@ pub enum CameraError {
     /// A pose without a direction, or planes in the wrong order.
     #[error("camera '{camera}': expected {expected}, found {found}")]
     Invalid {
-        /// Name.
+        /// Name of the camera.
         camera: String,
-        /// What should be there.
+        /// What is expected.
         expected: &'static str,
-        /// What is there.
+        /// What was found.
         found: String,
     },
 }
@@ -120,8 +120,9 @@ pub fn validate(camera: &Camera) -> Result<(), CameraError> {
     Ok(())
 }
 
-/// Checks that an eye looks somewhere: that its target is more than `steps` of its distance from
-/// zero away, which is what rounding may do to it. Tells what is expected and found otherwise.
+/// Checks that an eye has a viewing direction: the distance to its target must exceed the rounding
+/// error, `steps` times the eye's distance from zero. Otherwise returns what was expected and what
+/// was found.
 fn check_direction(
     eye: DVec3,
     target: DVec3,
@@ -133,7 +134,7 @@ fn check_direction(
         return Err(("finite coordinates", found));
     }
     let forward = target - eye;
-    // In single precision, so that its square is a number.
+    // The square must be representable in single precision.
     let least = f64::from(f32::MIN_POSITIVE).sqrt();
     if forward.length() < (steps * eye.length()).max(least) {
         let found = format!("eye {eye}, target {target}");
@@ -172,7 +173,7 @@ pub(crate) fn look_of_node(place: &Affine3A) -> Option<(Vec3, Vec3, Vec3)> {
 /// and far planes are those of `like`, a camera of the scene: they fit its scale.
 ///
 /// # Errors
-/// [`CameraError::Invalid`] for a pose that looks nowhere.
+/// [`CameraError::Invalid`] for a pose without a viewing direction.
 pub fn posed(
     eye: DVec3,
     target: DVec3,
@@ -187,7 +188,7 @@ pub fn posed(
         up,
         ..like.clone()
     };
-    // As the user wrote it, before rounding may make one of two points.
+    // Checked before rounding, which may make the two points equal.
     check_direction(eye, target, up, 16.0 * f64::EPSILON).map_err(|(expected, found)| {
         CameraError::Invalid {
             camera: camera.name.clone(),
@@ -234,7 +235,7 @@ pub fn eye_views(camera: &Camera, hmd: &Hmd) -> [EyeView; 2] {
 /// Both eyes' matrices for a head pose; near and far planes are the camera's.
 fn views_of_head(head: Affine3A, camera: &Camera, hmd: &Hmd) -> [EyeView; 2] {
     [-1.0f32, 1.0].map(|side| {
-        // Outwards is left for the left eye: a positive turn about +y.
+        // Outward is to the left for the left eye: a positive rotation about +y.
         let turn = Mat3::from_rotation_y(-side * hmd.cant_deg.to_radians());
         let eye_in_head =
             Affine3A::from_mat3_translation(turn, Vec3::new(side * hmd.ipd_m / 2.0, 0.0, 0.0));

@@ -118,7 +118,7 @@ fn canted_eyes_turn_outwards() {
 }
 
 #[test]
-fn cameras_that_look_nowhere_are_refused() {
+fn cameras_without_a_direction_are_refused() {
     let looks_at_itself = Camera {
         target: camera().eye,
         ..camera()

@@ -1,7 +1,7 @@
 //! Basis Universal in KTX2: transcoded to the block format that keeps most of it.
 //!
-//! UASTC becomes BC7. ETC1S becomes BC1, or BC3 where it has alpha: its quality is no better, and a
-//! driver's choice on desktops. No texel is decoded and compressed anew.
+//! UASTC becomes BC7. ETC1S becomes BC1, or BC3 if it has alpha, because its quality is no better
+//! and desktop drivers choose the same. No texel is decoded and compressed again.
 
 use super::{Fault, Header, level};
 use crate::blocks::Blocks;
@@ -26,7 +26,7 @@ fn open(bytes: &[u8]) -> Result<(Transcoder<'_>, TexelFormat, TargetFormat), Fau
     Ok((transcoder, format, target))
 }
 
-/// The format that a file becomes.
+/// The block format into which a file is transcoded.
 pub(super) fn format(bytes: &[u8]) -> Result<TexelFormat, Fault> {
     open(bytes).map(|(_, format, _)| format)
 }

@@ -15,7 +15,7 @@ pub(super) const KIND: Kind = Kind {
 /// Header and position of the first level.
 fn read(bytes: &[u8]) -> Result<(Header, usize), Fault> {
     let fault = |found: String| ("a DDS image of BC1 to BC7".to_owned(), found);
-    // Only the headers: the crate copies whatever follows.
+    // Pass only the headers, because the crate copies everything after them.
     let start = &bytes[..bytes.len().min(HEADERS_BYTES)];
     let dds = Dds::read(start).map_err(|e| fault(e.to_string()))?;
     let format = format(&dds).ok_or_else(|| {
@@ -38,7 +38,7 @@ fn read(bytes: &[u8]) -> Result<(Header, usize), Fault> {
     Ok((header, data))
 }
 
-/// Magic, header and the header of DirectX 10.
+/// Bytes of the magic number, the header and the DirectX 10 header.
 const HEADERS_BYTES: usize = 148;
 
 fn format(dds: &Dds) -> Option<TexelFormat> {

@@ -1,4 +1,4 @@
-//! Image files that hold compressed blocks: a file and a row each.
+//! Image files that hold compressed blocks: one module and one row per format.
 
 mod basis;
 mod dds;
@@ -8,39 +8,39 @@ use crate::blocks::{Blocks, StoredBlocks, level_bytes, level_size, whole_chain};
 use crate::image_files::MAX_SIZE;
 use formats::texture::TexelFormat;
 
-/// What is wrong with a file: what was expected and what was found.
+/// A fault in a file: what was expected and what was found.
 pub(crate) type Fault = (String, String);
 
-/// One kind of file.
+/// A file format.
 pub(crate) struct Kind {
-    /// Its name.
+    /// Name of the format.
     pub name: &'static str,
-    /// Its first bytes.
+    /// First bytes of a file of this format.
     magic: &'static [u8],
     /// Reads the header.
     pub header: fn(&[u8]) -> Result<Header, Fault>,
-    /// Reads the levels of a file whose header was read without fault.
+    /// Reads the levels of a file whose header is valid.
     pub blocks: fn(&[u8]) -> Result<Blocks, Fault>,
 }
 
-/// What a header tells.
+/// Contents of a header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Header {
     /// Size of level 0 in texels.
     pub size: [u32; 2],
-    /// Its blocks.
+    /// Format and number of the stored levels.
     pub stored: StoredBlocks,
 }
 
 const KINDS: [Kind; 2] = [ktx2::KIND, dds::KIND];
 
-/// The kind of a file by its first bytes.
+/// The format of a file, found by its first bytes.
 pub(crate) fn of(bytes: &[u8]) -> Option<&'static Kind> {
     static ALL: [Kind; 2] = KINDS;
     ALL.iter().find(|kind| bytes.starts_with(kind.magic))
 }
 
-/// Checks sizes and levels; a chain that is longer than a whole one is read as far as that.
+/// Checks sizes and levels. Levels beyond a whole chain are ignored.
 fn header(format: TexelFormat, size: [u32; 2], levels: u32) -> Result<Header, Fault> {
     if !size.iter().all(|extent| (1..=MAX_SIZE).contains(extent)) {
         let [width, height] = size;
@@ -58,7 +58,7 @@ fn header(format: TexelFormat, size: [u32; 2], levels: u32) -> Result<Header, Fa
     })
 }
 
-/// Takes exactly the bytes of a level from those stored for it.
+/// Returns exactly the bytes of a level from the bytes stored for it.
 fn level(header: &Header, level: u32, bytes: &[u8]) -> Result<Vec<u8>, Fault> {
     let size = level_size(header.size, level);
     let needed = level_bytes(header.stored.format, size);

@@ -8,12 +8,12 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 use std::cell::{Cell, OnceCell};
 
-/// Bytes of vertices, indices and instances that a byte of the file may stand for. Primitives that
-/// share accessors, accessors without a buffer view and meshes placed many times cost a file next
-/// to nothing; real scenes stay far below this.
+/// Most bytes of vertices, indices and instances created per byte of the file. Shared accessors,
+/// accessors without a buffer view and meshes that are placed many times take almost no space in a
+/// file. Real scenes stay far below this limit.
 const MADE_PER_BYTE: u64 = 1024;
 
-/// Bytes that any file may stand for.
+/// Bytes that any file may create, however small it is.
 const SMALL_FILE_MADE: u64 = 1 << 26;
 
 /// The JSON tables and the bytes that they describe.
@@ -21,11 +21,11 @@ pub(super) struct Buffers<'a> {
     pub root: &'a Root,
     pub origin: &'a Origin,
     bytes: Vec<Vec<u8>>,
-    /// Views that were compressed, by number, once read.
+    /// Decompressed views, by number, filled on first use.
     decompressed: Vec<OnceCell<Vec<u8>>>,
     /// The file uses KHR_mesh_quantization.
     quantized: bool,
-    /// Bytes of elements and instances that may still be made.
+    /// Bytes of elements and instances that may still be created.
     budget: Cell<u64>,
 }
 
@@ -51,7 +51,7 @@ impl<'a> Buffers<'a> {
         }
     }
 
-    /// Takes `count` values of type `T` off what the file's size justifies.
+    /// Deducts `count` values of type `T` from the budget that the file's size allows.
     pub fn spend<T>(&self, count: u64, place: impl FnOnce() -> String) -> Result<(), SceneError> {
         let left = self.budget.get();
         let rest = (count.checked_mul(size_of::<T>() as u64))
@@ -113,7 +113,7 @@ impl<'a> Buffers<'a> {
         })
     }
 
-    /// Elements of `N` floats; integers are converted. Those that are not normalized take
+    /// Elements of `N` floats; integers are converted. Integers that are not normalized require
     /// KHR_mesh_quantization.
     pub fn floats<const N: usize>(
         &self,
@@ -199,7 +199,7 @@ impl<'a> Buffers<'a> {
         self.elements(index, accessor, component.size(), 0, read)
     }
 
-    /// Whether an accessor's integers stand for numbers from 0 or -1 to 1.
+    /// Whether an accessor's integers represent numbers from 0 or -1 to 1.
     pub fn is_normalized(&self, index: Option<usize>) -> bool {
         let accessor = index.and_then(|index| self.root.accessors.get(index));
         accessor.is_some_and(|accessor| accessor.normalized)
@@ -325,12 +325,12 @@ impl<'a> Elements<'a> {
     }
 }
 
-/// The index's table position.
+/// An index as a position in its table.
 pub(super) fn at<T>(index: &Index<T>) -> usize {
     index.value()
 }
 
-/// A type as glTF spells it.
+/// A type by its glTF name.
 fn type_name(type_: &Checked<Type>) -> &'static str {
     match valid(type_) {
         None => "no valid type",

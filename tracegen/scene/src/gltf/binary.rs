@@ -1,4 +1,4 @@
-//! The binary container: GLB header and chunks, before the crate that parses them sees them.
+//! The binary container: checks of the GLB header and chunks, made before the crate parses them.
 
 use crate::SceneError;
 use crate::files::Origin;
@@ -7,7 +7,7 @@ const HEADER_BYTES: usize = 12;
 const CHUNK_HEADER_BYTES: usize = 8;
 const JSON: &[u8] = b"JSON";
 
-/// Checks every length of a GLB and that its first chunk is JSON. Returns its bytes without what follows the
+/// Checks every length of a GLB and that its first chunk is JSON. Returns its bytes up to the
 /// length that the header states.
 pub(super) fn check<'a>(bytes: &'a [u8], origin: &Origin) -> Result<&'a [u8], SceneError> {
     let number = |at: usize| {

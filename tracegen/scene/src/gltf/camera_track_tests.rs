@@ -1,4 +1,4 @@
-//! Animated cameras against hand computations, and what is said of damaged ones.
+//! Animated cameras against hand computations, and the errors for damaged ones.
 
 use super::camera_track::camera_track;
 use crate::paths::CameraTrack;
@@ -6,8 +6,9 @@ use glam::{Quat, Vec3};
 use serde_json::{Value, json};
 use std::f32::consts::FRAC_1_SQRT_2;
 
-/// Times 1, 2, 3; translations 0, x, x + 2 y; rotations none, a quarter turn to the left, that;
-/// cubic translations 0 and 4 x between times 1 and 2 with tangents of 8 x out of the first key.
+/// Times 1, 2, 3. Translations 0, x, x + 2 y. Rotations: none, a quarter turn to the left, the same
+/// turn. Cubic translations 0 and 4 x at times 1 and 2, with an outgoing tangent of 8 x at the
+/// first key.
 fn buffer() -> Vec<u8> {
     let h = FRAC_1_SQRT_2;
     let cubic = [
@@ -78,7 +79,7 @@ fn check(track: &CameraTrack, time_s: f64, eye: Vec3, forward: Vec3) {
 
 #[test]
 fn a_camera_follows_the_curves_of_the_nodes_above_it() {
-    // The first camera that anything moves is `head`.
+    // The first animated camera is `head`.
     let track = read(&file(), None).unwrap();
     assert_eq!(track.duration_s(), 2.0);
     let up = Vec3::Y * 10.0;
@@ -118,7 +119,7 @@ fn steps_hold_and_cubic_curves_obey_their_tangents() {
 }
 
 #[test]
-fn what_is_no_animated_camera_is_refused() {
+fn invalid_animated_cameras_are_refused() {
     type Change = fn(&mut Value);
     let cases: [(Option<&str>, Change, [&str; 2]); 12] = [
         (

@@ -10,14 +10,14 @@ use std::collections::BTreeMap;
 
 const NAME: &str = "KHR_draco_mesh_compression";
 
-/// Most points and triangles that a compressed byte stands for. Encoders reach about two points a
-/// byte; a mesh of equal values can be made far smaller, but nobody draws that.
+/// Most points and triangles per compressed byte. Encoders reach about two points per byte. Only a
+/// mesh of equal values compresses further, and such a mesh has no use.
 const MAX_POINTS_PER_BYTE: u64 = 256;
 
-/// Points and triangles that any primitive may have.
+/// Points and triangles that any primitive may have, however small the file is.
 const SMALL_MESH_POINTS: u64 = 1 << 16;
 
-/// Bytes of an attribute of a point: sixteen floats.
+/// Bytes of one point's attribute: sixteen floats.
 const MAX_POINT_BYTES: u64 = 64 * 16;
 
 #[derive(Deserialize)]
@@ -30,11 +30,11 @@ struct Extension {
 /// A decoded primitive.
 pub(super) struct Compressed {
     mesh: Mesh,
-    /// Draco's number of each attribute.
+    /// Draco's id of each attribute.
     attributes: BTreeMap<String, u32>,
 }
 
-/// Decodes the geometry of a primitive that is compressed.
+/// Decodes the geometry of a compressed primitive.
 pub(super) fn of_primitive(
     primitive: &Primitive,
     place: &str,
@@ -67,14 +67,14 @@ pub(super) fn of_primitive(
 }
 
 impl Compressed {
-    /// Three indices a triangle.
+    /// Three indices per triangle.
     pub fn indices(&self) -> Vec<u32> {
         let corners = self.mesh.faces().iter().flatten();
         corners.map(|point| point.0).collect()
     }
 
-    /// The values of an attribute, one a point; `None` for one that is not compressed. Integers are
-    /// read as the accessor says: normalized or not.
+    /// The values of an attribute, one per point; `None` if the attribute is not compressed. The
+    /// accessor determines whether integers are normalized.
     pub fn floats<const N: usize>(
         &self,
         semantic: &Semantic,

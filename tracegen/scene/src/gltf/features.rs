@@ -1,4 +1,5 @@
-//! What a glTF file asks for, read before anything else: extensions, and what is left out here.
+//! Features that a glTF file requires, checked before anything else is read: supported extensions,
+//! and warnings about ignored ones.
 
 use crate::error::SceneError;
 use crate::files::Origin;
@@ -7,7 +8,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, HashSet};
 
-/// Extensions that are read (docs/use/scene-files.md).
+/// Supported extensions (docs/use/scene-files.md).
 pub(super) const SUPPORTED: [&str; 17] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
@@ -28,7 +29,7 @@ pub(super) const SUPPORTED: [&str; 17] = [
     "MSFT_texture_dds",
 ];
 
-/// The part of the JSON that says what is needed to read the rest.
+/// The part of the JSON that states which features are needed to read the rest.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Asked {
@@ -55,11 +56,12 @@ struct Texture {
     extensions: BTreeMap<String, Value>,
 }
 
-/// Extensions that hold a texture's image in another format, those first that are taken first:
-/// compressed blocks, then what the encoder made smallest.
+/// Extensions that hold a texture's image in another format, in order of preference: compressed
+/// blocks first, then the smallest encoding.
 const IMAGE_EXTENSIONS: [&str; 3] = ["KHR_texture_basisu", "MSFT_texture_dds", "EXT_texture_webp"];
 
-/// Refuses versions that are not read: another major version than 2, or a minor one that the file needs.
+/// Refuses unsupported versions: a major version other than 2, or a minor version that the file
+/// requires.
 fn check_version(asset: &Asset, origin: &Origin) -> Result<(), SceneError> {
     let parts = |version: &str| -> Option<(u32, u32)> {
         let (major, minor) = version.split_once('.')?;
@@ -75,7 +77,7 @@ fn check_version(asset: &Asset, origin: &Origin) -> Result<(), SceneError> {
     }
 }
 
-/// The image of each texture: of the first extension that is read, or else its own; `None` for a
+/// The image of each texture: that of the first supported extension, or else its own. `None` for a
 /// texture without any.
 fn sources(textures: &[Texture], origin: &Origin) -> Result<Vec<Option<usize>>, SceneError> {
     let source = |(number, texture): (usize, &Texture)| {
@@ -105,8 +107,8 @@ fn sources(textures: &[Texture], origin: &Origin) -> Result<Vec<Option<usize>>, 
     textures.iter().enumerate().map(source).collect()
 }
 
-/// Refuses a file that requires what is not supported, and tells what is left out of others. Returns
-/// the image of each texture.
+/// Refuses a file that requires unsupported features, and warns about optional ones. Returns the
+/// image of each texture.
 pub(super) fn check(
     json: &[u8],
     origin: &Origin,
@@ -142,7 +144,7 @@ fn unsupported(names: &[String]) -> Vec<&str> {
         .collect()
 }
 
-/// The error of JSON that is none, or not what glTF says.
+/// The error for invalid JSON, or for JSON that is not glTF.
 pub(super) fn not_gltf(origin: &Origin, error: &serde_json::Error) -> SceneError {
     origin.invalid("JSON", "a glTF 2.0 asset", error.to_string())
 }
@@ -154,7 +156,7 @@ mod tests {
     #[test]
     fn the_page_on_scene_files_names_every_supported_extension_and_no_other() {
         let page = include_str!("../../../../docs/use/scene-files.md");
-        // The table of features below it names refused ones, too.
+        // The later table of features also names unsupported extensions.
         let page = page.split("<!-- figures").next().unwrap_or_default();
         let words = page.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
         let is_extension = |word: &&str| {

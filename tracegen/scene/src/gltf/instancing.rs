@@ -1,4 +1,4 @@
-//! EXT_mesh_gpu_instancing: a node's mesh at many places.
+//! EXT_mesh_gpu_instancing: several instances of a node's mesh.
 
 use super::accessors::Buffers;
 use crate::SceneError;
@@ -22,8 +22,8 @@ pub(super) struct Instancing {
 }
 
 impl Instancing {
-    /// One transform per instance, to the space of node `node`. Attributes that are left out are the
-    /// identity; without any there is one instance.
+    /// One transform per instance, to the space of node `node`. A missing attribute is the
+    /// identity. Without any attribute there is one instance.
     pub fn transforms(
         &self,
         node: usize,

@@ -1,10 +1,10 @@
 //! Materials and the textures that they sample.
 //!
-//! For the ray tracer, which follows mirror and glass paths and no glossy ones:
-//! - `transmission` is KHR_materials_transmission's factor; without it, a blended material without
-//!   a base colour texture counts as glass that lets `1 - alpha` through;
-//! - `mirror` is 0: glTF has no such factor, and how far a smooth metal mirrors follows from its
-//!   metalness and roughness where it is hit.
+//! For the ray tracer, which follows mirror reflections and refractions but no glossy ones:
+//! - `transmission` is KHR_materials_transmission's factor. Without it, a blended material without
+//!   a base colour texture counts as glass that transmits `1 - alpha`.
+//! - `mirror` is 0, because glTF has no such factor. The reflectance of a smooth metal follows from
+//!   its metalness and roughness where it is hit.
 //!
 //! KHR_materials_pbrSpecularGlossiness becomes base colour, specular colour and
 //! roughness = 1 - glossiness; the glossiness channel of its texture is not used.
@@ -27,7 +27,7 @@ use std::sync::Arc;
 
 const TRANSFORM: &str = "KHR_texture_transform";
 
-/// What a mesh must have for its material.
+/// Attributes that a mesh needs for its material.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Uses {
     pub uv0: bool,
@@ -36,7 +36,7 @@ pub(super) struct Uses {
     pub normal_map_uv: Option<u32>,
 }
 
-/// The materials that placed meshes use, in order of first use; others are not read.
+/// The materials that placed meshes use, in order of first use. Others are not read.
 pub(super) struct Table<'a> {
     document: &'a gltf::Document,
     buffers: &'a Buffers<'a>,
@@ -44,18 +44,18 @@ pub(super) struct Table<'a> {
     options: &'a LoadOptions,
     /// The image of each texture.
     texture_images: &'a [Option<usize>],
-    /// The scene's index of each used glTF material (`None` is glTF's default material) and what it
-    /// needs.
+    /// The scene's index of each used glTF material (`None` is glTF's default material) and the
+    /// attributes that it needs.
     used: HashMap<Option<usize>, (usize, Uses)>,
-    /// Source and name of each glTF image that was asked for.
+    /// Source and name of each requested glTF image.
     sources: HashMap<usize, (Source, Option<String>)>,
     /// The used materials.
     pub materials: Vec<Material>,
-    /// The images that they sample.
+    /// The images that these materials sample.
     pub requests: Requests,
-    /// What was odd about them.
+    /// Warnings about these materials.
     pub warnings: Warnings,
-    /// The material being read, for errors.
+    /// The current material, named in errors.
     place: String,
 }
 
@@ -93,14 +93,14 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The scene's index of a glTF material and what it needs of a mesh.
+    /// The scene's index of a glTF material, and the attributes that it needs.
     pub fn index(&mut self, material: Option<usize>) -> Result<(usize, Uses), SceneError> {
         if let Some(known) = self.used.get(&material) {
             return Ok(*known);
         }
         let read = match material.and_then(|m| self.document.materials().nth(m)) {
             Some(json) => self.build(&json)?,
-            // glTF's default material is fully metallic; a dielectric shows its shape better.
+            // glTF's default material is fully metallic. A dielectric shows its shape better.
             None => Material {
                 name: "default".into(),
                 ..Material::default()
@@ -188,7 +188,7 @@ impl<'a> Table<'a> {
             )?;
         }
         if json.unlit() {
-            // Shown as it is: emitted, and nothing reflected.
+            // The colour is shown unchanged: it is emitted and nothing is reflected.
             material.emissive = material.base_color.truncate();
             material.emissive_texture = material.base_color_texture;
             material.base_color = Vec3::ZERO.extend(material.base_color.w);
@@ -206,7 +206,7 @@ impl<'a> Table<'a> {
         Ok(material)
     }
 
-    /// Brings factors into their ranges; NaN becomes the default.
+    /// Clamps factors to their ranges. NaN becomes the default.
     fn check_factors(&mut self, material: &mut Material) {
         let defaults = Material::default();
         let mut bad = false;
@@ -343,7 +343,7 @@ impl<'a> Table<'a> {
         })
     }
 
-    /// Where an image is, and its file's name.
+    /// The source of an image, and its file's name.
     fn source(&self, index: usize, place: &str) -> Result<(Source, Option<String>), SceneError> {
         let origin = self.origin;
         let embedded = |bytes: Arc<[u8]>| {
@@ -380,11 +380,11 @@ impl<'a> Table<'a> {
 fn matrix(transform: &TextureTransform) -> [[f32; 3]; 2] {
     let ([tx, ty], [sx, sy]) = (transform.offset.0, transform.scale.0);
     let (sin, cos) = transform.rotation.0.sin_cos();
-    // The extension turns counter-clockwise with v growing downwards.
+    // The extension rotates counter-clockwise with v growing downwards.
     [[cos * sx, sin * sy, tx], [-sin * sx, cos * sy, ty]]
 }
 
-/// What a glTF sampler leaves out is trilinear.
+/// A mode that a glTF sampler leaves out is trilinear.
 fn sampler(json: &gltf::texture::Sampler<'_>) -> Sampler {
     let wrap = |mode| match mode {
         WrappingMode::ClampToEdge => Wrap::ClampToEdge,

@@ -1,4 +1,4 @@
-//! Primitives to meshes: attributes, indices, and what the file left out.
+//! Primitives to meshes: attributes, indices, and computed values for missing attributes.
 
 use super::accessors::Buffers;
 use super::draco::{self, Compressed};
@@ -71,12 +71,12 @@ pub(super) struct Reader<'a> {
     moving: Moving,
     /// The primitive's compressed geometry.
     pub draco: Option<Compressed>,
-    /// For errors.
+    /// The primitive, named in errors.
     pub place: String,
 }
 
 impl Reader<'_> {
-    /// `None` for what holds no triangles.
+    /// `None` for a primitive without triangles.
     fn read(
         &self,
         materials: &mut Table<'_>,
@@ -143,7 +143,7 @@ impl Reader<'_> {
             material,
             ..Mesh::default()
         };
-        // What is not there, or empty, is made.
+        // Missing or empty attributes are computed.
         let given = [
             ("NORMAL", mesh.normals.len()),
             ("TANGENT", mesh.tangents.len()),
@@ -210,7 +210,7 @@ impl Reader<'_> {
             .transpose()
     }
 
-    /// Linear colours, white where they are no numbers; empty without COLOR_0.
+    /// Linear colours, white where they are not numbers. Empty without COLOR_0.
     fn colors(&self) -> Result<Vec<Vec4>, SceneError> {
         let semantic = Semantic::Colors(0);
         let expected = "colours: Vec3 or Vec4 of F32 or normalized U8 or U16";
@@ -246,7 +246,7 @@ impl Reader<'_> {
         ))
     }
 
-    /// An attribute must have one value a position.
+    /// Checks that an attribute has one value per position.
     pub fn check_length(&self, what: &str, found: usize, count: usize) -> Result<(), SceneError> {
         if found == count {
             return Ok(());
@@ -292,7 +292,7 @@ impl Reader<'_> {
         Ok(Some(uv))
     }
 
-    /// Three indices a triangle, all inside the vertices.
+    /// Three indices per triangle, all within the vertices.
     fn indices(
         &self,
         mode: Mode,
@@ -317,7 +317,7 @@ impl Reader<'_> {
             ));
         }
         Ok(match mode {
-            // Compressed geometry is a list of triangles whatever the primitive's mode.
+            // Compressed geometry is always a triangle list, whatever the primitive's mode.
             _ if self.draco.is_some() => indices,
             Mode::TriangleStrip => triangulate_strip(&indices),
             Mode::TriangleFan => triangulate_fan(&indices),
@@ -339,8 +339,8 @@ impl Reader<'_> {
     }
 }
 
-/// Drops vertices that no triangle uses, where that is at least half of them: files that share
-/// one vertex buffer among many primitives would otherwise be held once a primitive.
+/// Drops unused vertices if they are at least half of all. Otherwise files whose primitives share
+/// one vertex buffer would store it once per primitive.
 fn compact(mesh: &mut Mesh, movers: Option<&mut Movers>, indices: &mut [u32]) {
     let count = mesh.positions.len();
     let mut used = vec![false; count];

@@ -8,8 +8,8 @@ use serde_json::Value;
 
 const NAMES: [&str; 2] = ["KHR_meshopt_compression", "EXT_meshopt_compression"];
 
-/// Most bytes that a compressed byte stands for: a run of equal vertices costs next to nothing, but
-/// no more than sixteen vertices of 256 bytes share a byte of header.
+/// Most decoded bytes per compressed byte. A run of equal vertices is nearly free, but each header
+/// byte describes at most sixteen vertices of 256 bytes.
 const MAX_EXPANSION: u64 = 4096 * 16;
 
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
@@ -94,19 +94,19 @@ fn object(others: &serde_json::Map<String, Value>) -> Option<(&'static str, &Val
         .find_map(|name| Some((name, others.get(name)?)))
 }
 
-/// A buffer without bytes that stands for what compressed views decode to.
+/// True for a buffer without bytes that only reserves space for decoded views.
 pub(super) fn is_fallback(buffer: &Buffer) -> bool {
     let named = buffer.extensions.as_ref().and_then(|e| object(&e.others));
     named.is_some_and(|(_, value)| value.get("fallback") == Some(&Value::Bool(true)))
 }
 
 impl Compressed {
-    /// Bytes that it decodes to.
+    /// Size of the decoded view in bytes.
     pub fn decoded_bytes(&self) -> u64 {
         self.count.saturating_mul(self.byte_stride as u64)
     }
 
-    /// The view's bytes.
+    /// Decodes the view.
     pub fn decode(
         &self,
         stored: &[u8],
@@ -122,13 +122,13 @@ impl Compressed {
             return invalid(format!("at most {most} bytes"), format!("{bytes} bytes"));
         }
         let (count, stride) = (self.count as usize, self.byte_stride);
-        // Aligned for every filter.
+        // 64-bit words satisfy every filter's alignment.
         let mut words = vec![0_u64; (bytes as usize).div_ceil(8)];
         let to = words.as_mut_ptr().cast();
         let (from, length) = (stored.as_ptr(), stored.len());
-        // SAFETY: `to` holds `count * stride` bytes, the strides and counts are those that the
-        // functions ask for (checked in `of_view`), and the decoders read no more than `length`
-        // bytes whatever these are.
+        // SAFETY: `to` holds `count * stride` bytes. `of_view` has checked the strides and counts
+        // that the functions require. The decoders read at most `length` bytes, whatever the bytes
+        // are.
         let code = unsafe {
             match self.mode {
                 Mode::Attributes => {

@@ -1,11 +1,11 @@
 //! glTF 2.0, text and binary.
 //!
-//! The `gltf` crate parses the JSON and checks that indices point into their tables; everything
-//! that touches bytes is read here with its own range checks, because the crate's readers panic
-//! on accessors that lie about their buffers.
+//! The `gltf` crate parses the JSON and checks that indices are within their tables. Bytes are read
+//! here with separate range checks, because the crate's readers panic on accessors that exceed
+//! their buffers.
 //!
-//! docs/use/scene-files.md says what is read and what is left out. Degenerate triangles are kept: they
-//! cost a primitive number and cover nothing.
+//! docs/use/scene-files.md lists the supported and the ignored features. Degenerate triangles are
+//! kept: they take a primitive number and cover nothing.
 
 mod accessors;
 mod binary;
@@ -109,13 +109,13 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     })
 }
 
-/// Nodes of a scene's cameras and of its lights, in their order.
+/// The nodes of a scene's cameras and lights, in the scene's order.
 struct ViewNodes {
     cameras: Vec<usize>,
     lights: Vec<usize>,
 }
 
-/// Fills a scene with cameras and lights; its origin is known.
+/// Adds cameras and lights to a scene. Its origin is already set.
 fn place_views(
     root: &Root,
     placed: &nodes::Placed,
@@ -147,7 +147,7 @@ fn place_views(
     of
 }
 
-/// The file itself and all that its URIs name.
+/// The file itself and every file that its URIs name.
 fn referenced_files(origin: &Origin, root: &Root) -> Vec<PathBuf> {
     let buffers = root
         .buffers
@@ -166,7 +166,7 @@ fn referenced_files(origin: &Origin, root: &Root) -> Vec<PathBuf> {
 /// A file without its buffers.
 struct Parsed {
     document: gltf::Document,
-    /// Where its nodes stand.
+    /// The nodes' transforms.
     transforms: Vec<Local>,
     /// The image of each texture.
     texture_images: Vec<Option<usize>>,
@@ -203,7 +203,7 @@ fn parse(origin: &Origin, bytes: &[u8], warnings: &mut Warnings) -> Result<Parse
 }
 
 fn validate(origin: &Origin, root: &Root) -> Result<(), SceneError> {
-    // The crate's own check of positions looks these accessors up before checking the index.
+    // The crate's check of positions uses these accessors before it checks the index.
     for (m, mesh) in root.meshes.iter().enumerate() {
         for (p, primitive) in mesh.primitives.iter().enumerate() {
             let accessors = primitive.attributes.values();
@@ -224,13 +224,13 @@ fn validate(origin: &Origin, root: &Root) -> Result<(), SceneError> {
     }
     let mut first: Option<(String, Fault)> = None;
     root.validate(root, JsonPath::new, &mut |path, fault| {
-        // The crate knows fewer extensions than are read here.
+        // The crate supports fewer extensions than this loader.
         if first.is_some() || fault == Fault::Unsupported {
             return;
         }
         let path = path().to_string();
-        // Bounds of positions are computed here, so files that leave them out are welcome.
-        // An accessor without a view holds zeros, or what Draco decodes to.
+        // Bounds of positions are computed here, so files may leave them out. An accessor without a
+        // view holds zeros or Draco's decoded values.
         let unneeded = fault == Fault::Missing
             && [".min", ".max", ".bufferView"]
                 .iter()
@@ -252,7 +252,7 @@ fn validate(origin: &Origin, root: &Root) -> Result<(), SceneError> {
     Err(origin.invalid(place, expected, found))
 }
 
-/// Reads of every buffer as many bytes as the file says, which must be there.
+/// Reads from every buffer as many bytes as the file states. Fewer bytes are an error.
 fn read_buffers(
     origin: &Origin,
     root: &Root,
@@ -272,7 +272,7 @@ fn read_buffers(
                 whole(blob.take().unwrap_or_default()),
                 "the GLB's BIN chunk".to_owned(),
             ),
-            // Nothing but compressed views reads it.
+            // Only compressed views refer to it.
             None if meshopt::is_fallback(buffer) => {
                 buffers.push(Vec::new());
                 continue;

@@ -1,4 +1,4 @@
-//! The node graph: where meshes, cameras and lights are in the world.
+//! The node graph: transforms of meshes, cameras and lights to the world.
 
 use super::accessors::Buffers;
 use super::transforms::Local;
@@ -16,7 +16,7 @@ use gltf::json::validation::Checked;
 /// Far plane of a camera whose projection is infinite, metres.
 const DEFAULT_FAR_M: f32 = 1000.0;
 
-/// What the nodes place, in depth-first order, with transforms to the world.
+/// The placed nodes in depth-first order, with transforms to the world.
 #[derive(Default)]
 pub(super) struct Placed {
     /// Nodes with a mesh.
@@ -42,7 +42,7 @@ pub(super) fn walk(
     };
     let mut placed = Placed::default();
     let mut seen = vec![false; root.nodes.len()];
-    // An explicit stack: a long chain of nodes must not overflow ours.
+    // An explicit stack, so that a long chain of nodes does not overflow the call stack.
     let mut stack: Vec<(usize, DAffine3)> = roots
         .into_iter()
         .rev()
@@ -94,8 +94,8 @@ pub(super) struct NodeInstance {
     pub transform: DAffine3,
 }
 
-/// Where the mesh of a node stands: once, or once per instance (EXT_mesh_gpu_instancing). What is scaled to
-/// nothing is left out unless its node `moves`.
+/// The transforms of a node's mesh: one, or one per instance (EXT_mesh_gpu_instancing). An instance
+/// without scale is left out unless its node `moves`.
 pub(super) fn mesh_transforms(
     index: usize,
     local: &Local,
@@ -148,14 +148,14 @@ pub(super) fn camera_name(node: &Node, camera: &gltf::json::Camera, index: usize
         .unwrap_or_else(|| format!("camera-{index}"))
 }
 
-/// A camera of the scene, or why a node's camera is none.
+/// The camera of a node.
 pub(super) enum Seen {
     Perspective(Camera),
-    /// Its name.
+    /// Not supported; its name.
     Orthographic(String),
 }
 
-/// The camera of a node; `None` without a direction.
+/// A camera node looks along its -z. Returns `None` if the node has no direction.
 pub(super) fn camera(
     root: &Root,
     index: usize,
@@ -197,7 +197,7 @@ pub(super) fn camera(
     }))
 }
 
-/// Punctual lights with their photometric intensity as it stands; a spot light lights all round.
+/// Punctual lights with unchanged photometric intensity. A spot light becomes a point light.
 pub(super) fn light(
     root: &Root,
     index: usize,

@@ -1,4 +1,4 @@
-//! Small generated files: what is read from them, and what is said about broken ones.
+//! Small generated files: how they are read, and the errors for broken ones.
 
 mod bad_input;
 mod reading;
@@ -70,8 +70,8 @@ impl Files {
         load_file(&self.path("scene.gltf"), &LoadOptions::ALL)
     }
 
-    /// The text of the error, which loading or decoding the images gives, must name the file and
-    /// hold every part.
+    /// Checks that loading, or decoding the images, fails. The error must name the file and contain
+    /// every part.
     fn fails_with(&self, parts: &[&str]) {
         let texels = |loaded: Loaded| crate::image::texels(&loaded.scene.images, |_| true);
         let error = self

@@ -1,4 +1,4 @@
-//! Where nodes stand, in double precision: the crate that parses the rest rounds to single.
+//! The nodes' transforms in double precision. The crate that parses the rest rounds to single.
 
 use super::features::not_gltf;
 use super::instancing::Instancing;
@@ -37,7 +37,7 @@ pub(super) fn read(json: &[u8], origin: &Origin) -> Result<Vec<Local>, SceneErro
 }
 
 impl Local {
-    /// Where the instances of the node's mesh stand, if there are several.
+    /// The transforms of the instances of the node's mesh, if it has several.
     pub fn instancing(&self) -> Option<Instancing> {
         self.extensions.instancing
     }

@@ -1,11 +1,11 @@
-//! KHR_materials_variants: another set of materials by name.
+//! KHR_materials_variants: selection of another set of materials by name.
 
 use crate::SceneError;
 use crate::files::Origin;
 use gltf::json::Root;
 use gltf::json::mesh::Primitive;
 
-/// The number of the variant of that name.
+/// The number of the variant with that name.
 pub(super) fn chosen(
     root: &Root,
     wanted: Option<&str>,
@@ -29,7 +29,7 @@ pub(super) fn chosen(
     })
 }
 
-/// The material of a primitive in a variant; without a mapping its own.
+/// The material of a primitive in a variant. Without a mapping it is the primitive's own.
 pub(super) fn material(primitive: &Primitive, variant: Option<u32>) -> Option<usize> {
     let own = || primitive.material.map(|material| material.value());
     let Some(variant) = variant else {

@@ -1,8 +1,9 @@
-//! The displays by name: a row each, with the source of its figures.
+//! Displays by name, one row each, with the source of their figures.
 //!
-//! Rows that cite the HMD Geometry Database (<https://risa2000.github.io/hmdgdb/>) hold what the headset's
-//! own runtime reported to the tool hmdq, both eyes as recorded. Sizes are the panel's pixels an eye; runtimes
-//! ask for larger pictures, from which the lens warp samples. The distance between the eyes is a user's setting and not part of a row.
+//! Rows that cite the HMD Geometry Database (<https://risa2000.github.io/hmdgdb/>) hold the values
+//! that the headset's runtime reported to the tool hmdq, both eyes as recorded. Sizes are the
+//! panel's pixels per eye. Runtimes request larger images, from which the lens warp samples. The
+//! distance between the eyes is a user's setting and not part of a row.
 
 use formats::view::FovTangents;
 
@@ -16,15 +17,15 @@ pub(super) struct Preset {
     pub source: &'static str,
 }
 
-/// How a source states the frusta.
+/// The form in which a source states the frusta.
 pub(super) enum Fov {
-    /// On-axis with square pixels, as wide as this.
+    /// Horizontal field of view of an on-axis frustum with square pixels.
     SymmetricDeg(f32),
     /// Half-angles of the left eye: left, right, up, down; the right eye mirrors them.
     LeftDeg([f32; 4]),
     /// Tangents of the left eye; the right eye mirrors them.
     Left(FovTangents),
-    /// Tangents of each eye, which differ by more than the mirror.
+    /// Tangents of each eye, where they are not mirror images.
     Both([FovTangents; 2]),
 }
 

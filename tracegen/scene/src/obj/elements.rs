@@ -1,4 +1,4 @@
-//! The OBJ file's statements: vertices, faces, and which object and material a face belongs to.
+//! The OBJ file's statements: vertices, faces, and the object and material of each face.
 
 use super::statements::{Statement, for_each};
 use crate::error::SceneError;
@@ -8,7 +8,7 @@ use glam::{DVec3, DVec4, Vec2, Vec3, Vec4};
 use std::ops::Range;
 use std::rc::Rc;
 
-/// An index that a face leaves out.
+/// A missing index of a face.
 pub(super) const NONE: u32 = u32::MAX;
 
 /// The object of faces before any `o` or `g`.
@@ -22,34 +22,34 @@ pub(super) struct Corner {
     pub normal: u32,
 }
 
-/// A face: where its corners begin, and its line for errors.
+/// A face: its first corner, and its line for errors.
 #[derive(Clone, Copy, Debug)]
 struct Face {
     first_corner: usize,
     line: u32,
 }
 
-/// Faces in a row that share object and material.
+/// Consecutive faces with the same object and material.
 #[derive(Clone, Debug)]
 pub(super) struct Run {
     /// Name of the object or group.
     pub object: Rc<str>,
-    /// True where the run before belongs to another object or group, even one of the same name.
+    /// True if the previous run belongs to another object or group, even one of the same name.
     pub starts_object: bool,
-    /// The material's name, as the file writes it.
+    /// The material's name as written in the file.
     pub material: Option<Rc<str>>,
     pub faces: Range<usize>,
 }
 
-/// What an OBJ file holds.
+/// Contents of an OBJ file.
 #[derive(Debug, Default)]
 pub(super) struct Elements {
     positions: Vec<DVec3>,
     /// World position that [`Self::position`] is relative to.
     pub origin: DVec3,
-    /// sRGB colours with alpha of the first positions; NaN for what the file leaves out.
+    /// sRGB colours with alpha of the first positions. NaN marks missing values.
     pub colors: Vec<Vec4>,
-    /// True where the file's colours go from 0 to 255; `colors` goes to 1 all the same.
+    /// True if the file's colours range from 0 to 255. `colors` ranges to 1 in any case.
     pub colors_of_bytes: bool,
     pub uvs: Vec<Vec2>,
     pub normals: Vec<Vec3>,
@@ -57,9 +57,9 @@ pub(super) struct Elements {
     corners: Vec<Corner>,
     faces: Vec<Face>,
     pub runs: Vec<Run>,
-    /// What follows `mtllib`, by line.
+    /// Arguments of `mtllib`, by line.
     pub libraries: Vec<(usize, String)>,
-    /// Points, lines and faces of less than three corners.
+    /// Points, lines and faces with fewer than three corners.
     pub not_faces: u64,
     /// Statements of curves and surfaces.
     pub free_form: u64,
@@ -69,7 +69,7 @@ impl Elements {
     /// Reads every statement and checks every index.
     ///
     /// # Errors
-    /// Numbers and indices that are none or point outside the file, with their line.
+    /// Invalid numbers and indices, and indices outside the file, with their line.
     pub fn read(text: &str, file: &Origin) -> Result<Self, SceneError> {
         let mut elements = Self::default();
         elements.runs.push(Run {
@@ -139,7 +139,7 @@ impl Elements {
             }
             "p" | "l" => self.not_faces += 1,
             "vp" | "cstype" | "curv" | "curv2" | "surf" => self.free_form += 1,
-            // Smoothing groups, display attributes and what is not known change no shape here.
+            // Smoothing groups, display attributes and unknown statements do not change the shape.
             _ => {}
         }
         Ok(())
@@ -198,7 +198,7 @@ impl Elements {
         Ok(())
     }
 
-    /// Starts a run that differs from the current one; a run without faces is changed in place.
+    /// Starts a run that differs from the current one. A run without faces is changed in place.
     fn start_run(&mut self, change: impl FnOnce(&mut Run)) {
         let here = self.faces.len();
         self.finish_run();
@@ -223,8 +223,8 @@ impl Elements {
         }
     }
 
-    /// Checks what faces refer to; texture coordinates and normals of a file that has none are
-    /// taken out.
+    /// Checks the references of faces. Removes texture coordinates and normals from the corners if
+    /// the file has none.
     fn check(&mut self, origin: &Origin) -> Result<(), SceneError> {
         let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
         for face in 0..self.faces.len() {
@@ -263,8 +263,8 @@ impl Elements {
     }
 }
 
-/// `v`, `v/vt`, `v//vn` or `v/vt/vn`; `counts` are the elements so far. `None` for anything else,
-/// indices before the first element included.
+/// Parses `v`, `v/vt`, `v//vn` or `v/vt/vn`; `counts` are the numbers of elements so far. `None`
+/// for anything else, including indices before the first element.
 fn corner(word: &str, counts: [i64; 3]) -> Option<Corner> {
     let mut indices = [NONE; 3];
     for (at, part) in word.split('/').enumerate() {
@@ -287,7 +287,7 @@ fn corner(word: &str, counts: [i64; 3]) -> Option<Corner> {
     })
 }
 
-/// The statement's numbers, of which there must be enough.
+/// The statement's numbers. Too few are an error.
 fn numbers(
     statement: &Statement<'_>,
     origin: &Origin,

@@ -1,4 +1,5 @@
-//! MTL statements. One that cannot be read costs a warning: it is a colour, not a shape.
+//! MTL statements. An unreadable one causes only a warning, because it affects a colour and not a
+//! shape.
 
 use super::statements::{Statement, for_each, number, without_comment};
 use crate::files::Origin;
@@ -6,7 +7,7 @@ use crate::warnings::Warnings;
 use glam::{DVec3, Vec2, Vec3};
 use std::convert::Infallible;
 
-/// A material as the library describes it; `None` for what it leaves out.
+/// A material as the library describes it; `None` for missing properties.
 #[derive(Debug, Default)]
 pub(super) struct Entry {
     pub name: String,
@@ -43,9 +44,9 @@ pub(super) struct Entry {
 /// A texture as a map statement names it.
 #[derive(Debug, PartialEq)]
 pub(super) struct Map {
-    /// File names that the statement may mean, the likeliest first.
+    /// File names that the statement may refer to, the most likely first.
     pub names: Vec<String>,
-    /// `-s`, of texture coordinates that grow upwards.
+    /// `-s`, for texture coordinates that grow upwards.
     pub scale: Vec2,
     /// `-o`
     pub offset: Vec2,
@@ -84,8 +85,7 @@ pub(super) fn read(text: &str, origin: &Origin, warnings: &mut Warnings) -> Vec<
 }
 
 impl Entry {
-    /// Takes over one statement; those that are not known are left out. The error says what is
-    /// expected.
+    /// Applies one statement. Unknown statements are ignored. The error states what is expected.
     fn set(&mut self, statement: &Statement<'_>) -> Result<(), &'static str> {
         match &*statement.keyword.to_ascii_lowercase() {
             "kd" => self.diffuse = Some(color(statement)?),
@@ -121,7 +121,7 @@ fn color(statement: &Statement<'_>) -> Result<Vec3, &'static str> {
     .ok_or("1 or 3 numbers (spectral files and CIE XYZ are not read)")
 }
 
-/// One number, of which `d -halo 0.5` has an option before it.
+/// One number, which an option may precede (`d -halo 0.5`).
 fn scalar(statement: &Statement<'_>) -> Result<f32, &'static str> {
     (statement.words().find(|word| *word != "-halo"))
         .and_then(number)
@@ -178,8 +178,8 @@ fn word(text: &str) -> Option<(&str, &str)> {
     (end > 0).then(|| text.split_at(end))
 }
 
-/// From `least` to `most` words: those after the least only where they are numbers and a file name
-/// is left after them.
+/// From `least` to `most` words. Words beyond the least count only if they are numbers and a file
+/// name follows.
 fn values(text: &str, least: usize, most: usize) -> Option<(Vec<&str>, &str)> {
     let (mut values, mut rest) = (Vec::new(), text);
     while values.len() < most {
@@ -195,7 +195,7 @@ fn values(text: &str, least: usize, most: usize) -> Option<(Vec<&str>, &str)> {
     (values.len() >= least).then_some((values, rest))
 }
 
-/// What a statement's text may mean as a file name: all of it, all of it before a comment.
+/// File names that a statement's text may mean: all of it, or all of it before a comment.
 pub(super) fn file_names(text: &str) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     for name in [text, without_comment(text)] {

@@ -1,30 +1,30 @@
-//! Finding the files that OBJ and MTL files name, whichever system wrote the names.
+//! Look-up of the files that OBJ and MTL files name, whichever system wrote the names.
 
 use super::statements::latin1;
 use std::collections::{BTreeSet, HashMap};
 use std::ffi::OsString;
 use std::path::{Component, Path, PathBuf};
 
-/// A file that was found, and what had to be overlooked for that.
+/// A file that was found, and whether its name matches exactly.
 #[derive(Debug, PartialEq)]
 pub(super) struct Found {
     pub path: PathBuf,
-    /// True where letter case, encoding or the folder differ from what the file says.
+    /// True if letter case, encoding or folder differ from the name in the file.
     pub inexact: bool,
 }
 
-/// Looks names up; folders are listed once.
+/// Looks names up. Each folder is listed once.
 #[derive(Debug, Default)]
 pub(super) struct Lookup {
-    /// By folder: its names by how they read in lower case.
+    /// The names in each folder, by their lower-case text.
     listings: HashMap<PathBuf, HashMap<String, OsString>>,
-    /// What was found so far.
+    /// All files found so far.
     found: BTreeSet<PathBuf>,
 }
 
 impl Lookup {
-    /// The first of `names` that is there: as it stands, else in another letter case, else without
-    /// its first folders. Backslashes separate folders.
+    /// The first of `names` that exists: as written, else in another letter case, else without its
+    /// first folders. Backslashes separate folders.
     pub fn find(&mut self, folder: &Path, names: &[String]) -> Option<Found> {
         let found = self.search(folder, names)?;
         self.found.insert(found.path.clone());
@@ -51,7 +51,7 @@ impl Lookup {
         }
         let mut any_case =
             |path: &PathBuf| self.walk(folder, path).filter(|path| is_no_folder(path));
-        // The folders of another machine are left off, one by one.
+        // The folders of another machine are removed one by one.
         let path = (paths.iter().flat_map(|path| endings(path))).find_map(|ending| {
             exact(std::slice::from_ref(&ending)).or_else(|| any_case(&ending))
         })?;
@@ -59,7 +59,7 @@ impl Lookup {
         Some(Found { path, inexact })
     }
 
-    /// Goes down the path part by part, in any letter case.
+    /// Follows the path part by part, in any letter case.
     fn walk(&mut self, folder: &Path, path: &Path) -> Option<PathBuf> {
         path.components()
             .try_fold(folder.to_owned(), |at, part| match part {
@@ -77,7 +77,7 @@ impl Lookup {
     }
 }
 
-/// The path without its first parts, from all of it to the last one.
+/// The path without its first parts, from the whole path to the last part.
 fn endings(path: &Path) -> impl Iterator<Item = PathBuf> {
     let mut parts = path.components();
     std::iter::once(path.to_owned()).chain(std::iter::from_fn(move || {
@@ -90,7 +90,7 @@ fn is_no_folder(path: &Path) -> bool {
     path.metadata().is_ok_and(|metadata| !metadata.is_dir())
 }
 
-/// The folder's names by how they read in lower case; of several the first in byte order.
+/// The folder's names, by their lower-case text. Of several equal ones, the first in byte order.
 fn list(folder: &Path) -> HashMap<String, OsString> {
     let folder = if folder.as_os_str().is_empty() {
         Path::new(".")
@@ -105,7 +105,7 @@ fn list(folder: &Path) -> HashMap<String, OsString> {
         .collect()
 }
 
-/// A file name as text: one that is no UTF-8 comes from a system that wrote Latin-1.
+/// A file name as text. A name that is not UTF-8 comes from a system that wrote Latin-1.
 fn text(name: &OsString) -> String {
     match name.to_str() {
         Some(name) => name.to_owned(),

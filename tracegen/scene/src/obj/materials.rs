@@ -1,7 +1,8 @@
-//! A library's entries to materials, and the images that they sample.
+//! Conversion of a library's entries to materials, and the images that they sample.
 //!
-//! For the ray tracer: `illum` 3, 5 and 8 mirror as much as `Ks` says; 4, 6, 7, 9 and untextured
-//! materials with `d` below 1 let `1 - d` through.
+//! Properties for the ray tracer: with `illum` 3, 5 and 8 a material reflects as much as `Ks`
+//! states. With `illum` 4, 6, 7 and 9, and for untextured materials with `d` below 1, it transmits
+//! `1 - d`.
 
 use super::library::{Entry, Map};
 use super::lookup::{Found, Lookup};
@@ -17,11 +18,11 @@ const MIRRORS: [u8; 3] = [3, 5, 8];
 /// `illum` models that refract: 4, 6, 7, 9.
 const GLASSES: [u8; 4] = [4, 6, 7, 9];
 
-/// What materials are made with.
+/// Inputs for the materials.
 pub(super) struct Maker<'a> {
     /// The library, whose folder its textures are relative to.
     pub library: &'a Origin,
-    /// The OBJ file, beside which textures are looked for next.
+    /// The OBJ file. Textures that are not beside the library are looked up beside it.
     pub scene: &'a Origin,
     pub options: &'a LoadOptions,
     pub lookup: &'a mut Lookup,
@@ -30,7 +31,7 @@ pub(super) struct Maker<'a> {
 }
 
 impl Maker<'_> {
-    /// The entry as a material.
+    /// Converts the entry to a material.
     pub fn material(&mut self, entry: &Entry) -> Material {
         let unit = |value: f32| {
             if value.is_nan() {
@@ -84,7 +85,7 @@ impl Maker<'_> {
         result
     }
 
-    /// `d`, and where it is missing `1 - Tr`. `Tr 1` alone would hide everything: exporters that
+    /// `d`, or `1 - Tr` if `d` is missing. A lone `Tr 1` would hide the material; exporters that
     /// write it mean opaque.
     fn dissolve(&mut self, entry: &Entry) -> f32 {
         match (entry.dissolve, entry.transparency) {
@@ -101,7 +102,7 @@ impl Maker<'_> {
         }
     }
 
-    /// The colour map, into whose alpha an opacity map goes; the material becomes alpha-masked.
+    /// The colour map, with the opacity map in its alpha. The material becomes alpha-masked.
     fn add_base_color(&mut self, entry: &Entry, result: &mut Material) {
         let opacity =
             (entry.opacity_map.as_ref()).and_then(|map| self.request(entry, map, Usage::Data));
@@ -115,7 +116,7 @@ impl Maker<'_> {
         };
         let color = entry.diffuse_map.as_ref();
         result.base_color_texture = self.texture(0, entry, color, usage).or_else(|| {
-            // An opacity map without a colour map serves as both; `Kd` still colours it.
+            // An opacity map without a colour map serves as both. `Kd` still colours it.
             let both = Request { usage, ..opacity? };
             let image = self.requests.index(both);
             Some(reference(image, entry.opacity_map.as_ref()?))
@@ -131,7 +132,7 @@ impl Maker<'_> {
     ) -> Option<TextureRef> {
         let map = map?;
         if !self.options.slots[slot] {
-            // The scene refers to the file all the same: no output may replace it.
+            // The scene still refers to the file, so no output may overwrite it.
             self.find(map);
             return None;
         }
@@ -145,7 +146,7 @@ impl Maker<'_> {
         (folders.iter()).find_map(|folder| self.lookup.find(folder, &map.names))
     }
 
-    /// `None`, with a warning, for a file that is not there or in no format that is read.
+    /// `None`, with a warning, if the file does not exist or its format is not supported.
     fn request(&mut self, entry: &Entry, map: &Map, usage: Usage) -> Option<Request> {
         let name = &map.names[0];
         let place = place(self.library, entry);
@@ -181,7 +182,7 @@ fn place(library: &Origin, entry: &Entry) -> String {
     format!("{}: material '{}'", library.file.display(), entry.name)
 }
 
-/// The image with the map's options. They speak of a v that grows upwards, so
+/// The image with the map's options. They assume a v that grows upwards, so
 /// `1 - v' = s (1 - v) + o`.
 fn reference(image: usize, map: &Map) -> TextureRef {
     let mut reference = TextureRef::new(image);

@@ -1,4 +1,4 @@
-//! Faces to meshes: one a stretch of an object with the same material.
+//! Faces to meshes: one mesh per run of faces with the same object and material.
 
 use super::elements::{Corner, Elements, NONE, Run};
 use super::polygon::triangulate;
@@ -7,7 +7,7 @@ use crate::{Mesh, srgb};
 use glam::{Vec2, Vec3, Vec4};
 use std::collections::HashMap;
 
-/// The meshes of the file, in its order, each with its material as `material_of` says.
+/// The meshes of the file in order, each with the material from `material_of`.
 pub(super) fn build(
     elements: &Elements,
     mut material_of: impl FnMut(&Run) -> Option<usize>,
@@ -34,7 +34,7 @@ pub(super) fn build(
         .collect()
 }
 
-/// A mesh in the making.
+/// A mesh under construction.
 struct Part<'a> {
     elements: &'a Elements,
     /// Corners in order of first use, each once: the mesh's vertices.
@@ -129,7 +129,7 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Colours of OBJ files are those of pictures: sRGB. NaN stands for what the file leaves out.
+/// Colours of OBJ files are sRGB. NaN marks missing values.
 fn linear(color: Vec4) -> Vec4 {
     let unit = |value: f32| {
         if value.is_nan() {

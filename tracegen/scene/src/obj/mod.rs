@@ -1,4 +1,4 @@
-//! Wavefront OBJ with MTL materials, as the world writes them (docs/use/scene-files.md).
+//! Wavefront OBJ with MTL materials, including common deviations (docs/use/scene-files.md).
 
 mod elements;
 mod library;
@@ -39,7 +39,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     let text = decode(read_file(path, "scene", u64::MAX)?, &origin)?;
     let elements = Elements::read(&text, &origin)?;
     drop(text);
-    tell_ignored(&elements, &mut warnings);
+    warn_of_ignored(&elements, &mut warnings);
 
     let mut lookup = Lookup::default();
     let mut requests = Requests::default();
@@ -47,9 +47,9 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
         origin: elements.origin,
         ..Scene::default()
     };
-    // The last material of a name counts.
+    // The last material of a name wins.
     let mut by_name: HashMap<String, usize> = HashMap::new();
-    // Names may hold ` #`, which may as well begin a comment.
+    // Names may contain ` #`, which may also begin a comment.
     let mut by_start: HashMap<String, usize> = HashMap::new();
     let libraries = libraries(&elements, &origin, &mut lookup, &mut warnings);
     for file in &libraries {
@@ -85,7 +85,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     for (mut mesh, material) in meshes {
         mesh.material = material.unwrap_or(from_file);
         if mesh.material == scene.materials.len() {
-            // One for all faces without a material.
+            // One material for all faces without a material.
             scene.materials.push(Material {
                 name: "default".into(),
                 ..Material::default()
@@ -107,7 +107,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     })
 }
 
-fn tell_ignored(elements: &Elements, warnings: &mut Warnings) {
+fn warn_of_ignored(elements: &Elements, warnings: &mut Warnings) {
     for (count, what) in [
         (elements.not_faces, "points, lines and faces of two corners"),
         (elements.free_form, "statements of curves and surfaces"),
@@ -121,7 +121,7 @@ fn tell_ignored(elements: &Elements, warnings: &mut Warnings) {
     }
 }
 
-/// The libraries that are there, each once; a missing one costs colours, not shapes.
+/// The libraries that exist, each once. A missing one affects colours, not shapes.
 fn libraries(
     elements: &Elements,
     origin: &Origin,
@@ -134,7 +134,7 @@ fn libraries(
         if !seen.insert(text) {
             continue;
         }
-        // Either one name, which may hold spaces, or several.
+        // Either one name, which may contain spaces, or several names.
         let whole = library::file_names(text);
         let names = match lookup.find(origin.folder(), &whole) {
             Some(_) => vec![whole],
@@ -168,7 +168,7 @@ fn libraries(
     libraries
 }
 
-/// Names in a row, each of which ends with `.mtl` and may hold spaces.
+/// Consecutive names, each of which ends with `.mtl` and may contain spaces.
 fn split_names(text: &str) -> Vec<Vec<String>> {
     let mut names = Vec::new();
     let mut name = String::new();

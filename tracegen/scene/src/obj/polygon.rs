@@ -1,15 +1,15 @@
-//! Polygons to triangles.
+//! Triangulation of polygons.
 
 use glam::{DVec2, Vec3};
 
-/// Most corners of a polygon that ears are cut from, which takes time in the square of them;
-/// larger ones become fans.
+/// Most corners of a polygon for ear cutting, whose time is quadratic. Larger polygons become fans.
 const MAX_EARS: usize = 256;
 
-/// Three corners a triangle, as numbers into `polygon`, in the polygon's winding.
+/// Three corners per triangle, as indices into `polygon`, in the polygon's winding.
 ///
-/// A polygon for which a fan from its first corner turns no triangle over (every convex one)
-/// becomes that fan. From others ears are cut; one that crosses itself may come out folded.
+/// A polygon for which a fan from its first corner reverses no triangle (every convex one) becomes
+/// that fan. Others are triangulated by ear cutting. A polygon that crosses itself may give
+/// overlapping triangles.
 pub(super) fn triangulate(polygon: &[Vec3]) -> Vec<[usize; 3]> {
     let fan = || (2..polygon.len()).map(|i| [0, i - 1, i]).collect();
     if polygon.len() == 3 || polygon.len() > MAX_EARS {
@@ -22,9 +22,9 @@ pub(super) fn triangulate(polygon: &[Vec3]) -> Vec<[usize; 3]> {
     Ears::new(flat).cut()
 }
 
-/// The polygon seen from where it winds counter-clockwise.
+/// The polygon in 2D, seen from the side on which it winds counter-clockwise.
 fn flatten(polygon: &[Vec3]) -> Vec<DVec2> {
-    // Newell's normal, which needs no three corners in general position.
+    // Newell's normal, which allows collinear corners.
     let around = polygon.iter().zip(polygon.iter().cycle().skip(1));
     let normal: glam::DVec3 = around
         .map(|(a, b)| {
@@ -48,7 +48,7 @@ fn turn(a: DVec2, b: DVec2, c: DVec2) -> f64 {
     (b - a).perp_dot(c - a)
 }
 
-/// What is left of a polygon, as a ring.
+/// The remaining polygon, as a ring.
 struct Ears {
     points: Vec<DVec2>,
     next: Vec<usize>,
@@ -76,7 +76,8 @@ impl Ears {
             while !ears[at] {
                 at = self.next[at];
                 if at == from {
-                    // No ear: the polygon crosses itself. Cutting on ends it all the same.
+                    // Without an ear, the polygon crosses itself. Cutting any corner still
+                    // terminates.
                     break;
                 }
             }
@@ -94,7 +95,7 @@ impl Ears {
         triangles
     }
 
-    /// True where the triangle with both neighbours winds as the polygon does and holds no other
+    /// True if the triangle with both neighbours winds like the polygon and contains no other
     /// corner.
     fn is_ear(&self, at: usize) -> bool {
         let (before, after) = (self.previous[at], self.next[at]);
@@ -106,7 +107,7 @@ impl Ears {
         while other != before {
             let p = self.points[other];
             let inside = turn(a, b, p) >= 0.0 && turn(b, c, p) >= 0.0 && turn(c, a, p) >= 0.0;
-            // Corners that coincide with the triangle's own touch it and are not in the way.
+            // Corners that coincide with the triangle's own only touch it.
             if inside && p != a && p != b && p != c {
                 return false;
             }
@@ -145,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn concave_polygons_are_covered_once_from_whichever_corner_they_start() {
+    fn concave_polygons_are_covered_once_from_any_first_corner() {
         let arrow: &[[f32; 2]] = &[[0.0, 0.0], [2.0, -2.0], [0.0, 3.0], [-2.0, -2.0]];
         let star: Vec<[f32; 2]> = (0..10)
             .map(|i| ((i as f32 * 36.0).to_radians(), [3.0, 1.0][i % 2]))
@@ -180,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn polygons_that_cross_themselves_or_have_no_area_still_come_out() {
+    fn polygons_that_cross_themselves_or_have_no_area_are_triangulated() {
         let mut crossing = ground(&[[0.0, 0.0], [1.0, 1.0], [1.0, 0.0], [0.0, 1.0], [0.3, 2.0]]);
         for _ in 0..crossing.len() {
             crossing.rotate_left(1);

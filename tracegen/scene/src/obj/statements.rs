@@ -4,11 +4,11 @@ use crate::error::SceneError;
 use crate::files::Origin;
 use std::borrow::Cow;
 
-/// The file as text: UTF-8 with or without a byte order mark, and otherwise Latin-1, in which
-/// every byte is a character.
+/// The file as text: UTF-8 with or without a byte order mark, or else Latin-1, in which every byte
+/// is a character.
 ///
 /// # Errors
-/// UTF-16, told by its byte order mark.
+/// UTF-16, detected by its byte order mark.
 pub(super) fn decode(bytes: Vec<u8>, origin: &Origin) -> Result<String, SceneError> {
     if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
         return Err(origin.invalid("byte 0", "text in UTF-8 or Latin-1", "UTF-16"));
@@ -25,14 +25,15 @@ pub(super) fn latin1(bytes: &[u8]) -> String {
     bytes.iter().map(|&b| char::from(b)).collect()
 }
 
-/// One statement: a line, joined with those that continue it.
+/// One statement: a line with its continuation lines.
 #[derive(Debug, PartialEq)]
 pub(super) struct Statement<'a> {
     /// Number of its first line, from 1.
     pub line: usize,
     /// Its first word.
     pub keyword: &'a str,
-    /// What follows the keyword, trimmed. Names may hold spaces and `#`, so comments are still in.
+    /// The text after the keyword, trimmed. It includes comments, because names may contain spaces
+    /// and `#`.
     pub rest: &'a str,
 }
 
@@ -42,7 +43,7 @@ impl Statement<'_> {
         without_comment(self.rest).split_ascii_whitespace()
     }
 
-    /// The numbers before any comment; the word that is none is the error.
+    /// The numbers before any comment. The first invalid word is the error.
     pub fn numbers(&self) -> Result<Vec<f64>, &str> {
         self.words().map(|w| number(w).ok_or(w)).collect()
     }
@@ -55,14 +56,14 @@ pub(super) fn without_comment(text: &str) -> &str {
     text[..comment.map_or(text.len(), |(at, _)| at)].trim_end()
 }
 
-/// What a line holds before the backslash with which it goes on. A backslash that ends a comment is
-/// part of a drawing or of a path.
+/// The part of a line before a backslash that continues it. A backslash at the end of a comment is
+/// part of a drawing or a path.
 fn continued(line: &str) -> Option<&str> {
     let open = line.trim_end().strip_suffix('\\')?;
     (without_comment(open).len() == open.trim_end().len()).then_some(open)
 }
 
-/// A number, with the not-a-numbers that C libraries print.
+/// A number, including the not-a-numbers that C libraries print.
 pub(super) fn number(word: &str) -> Option<f64> {
     word.parse().ok().or_else(|| {
         let lower = word.to_ascii_lowercase();
@@ -71,7 +72,7 @@ pub(super) fn number(word: &str) -> Option<f64> {
     })
 }
 
-/// Calls `each` with every statement of the text; blank lines and comment lines are none.
+/// Calls `each` with every statement of the text, without blank and comment lines.
 ///
 /// # Errors
 /// The first that `each` returns.

@@ -25,7 +25,7 @@ fn save_png(folder: &Path, name: &str, texel: [u8; 4]) {
 }
 
 #[test]
-fn a_quad_becomes_two_triangles_with_v_turned_over() {
+fn a_quad_becomes_two_triangles_with_v_reversed() {
     let folder = tempfile::tempdir().unwrap();
     let scene = load(folder.path(), QUAD, Some("newmtl brick\nKd 0.5 0.25 1\n"))
         .unwrap()
@@ -43,13 +43,13 @@ fn a_quad_becomes_two_triangles_with_v_turned_over() {
 }
 
 #[test]
-fn positions_far_out_keep_the_digits_that_the_file_has() {
+fn positions_far_from_zero_keep_the_digits_of_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let at = |far: f64| {
         let point = |x: f64, y: f64| format!("v {} {} {far}\n", far + x, y - 2.0 * far);
         let corners = [[-1.0, 0.0], [0.75, 0.0], [0.5, 1.0 / 1024.0]];
         let corners = corners.map(|[x, y]| point(x, y)).concat();
-        // A point that no face uses says nothing of where the scene is.
+        // A point that no face uses does not affect the origin.
         let text = format!("{corners}v 1e20 0 0\nf 1 2 3\n");
         load(folder.path(), &text, None).unwrap().scene
     };
@@ -80,7 +80,7 @@ fn an_opacity_map_becomes_the_colour_maps_alpha() {
 }
 
 #[test]
-fn a_missing_material_library_costs_a_warning() {
+fn a_missing_material_library_causes_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     let loaded = load(folder.path(), QUAD, None).unwrap();
     assert!(
@@ -92,7 +92,7 @@ fn a_missing_material_library_costs_a_warning() {
 }
 
 #[test]
-fn broken_files_are_told_with_their_line() {
+fn broken_files_are_refused_with_the_line_number() {
     let folder = tempfile::tempdir().unwrap();
     for (obj, place, expected, found) in [
         (
@@ -151,9 +151,9 @@ fn broken_files_are_told_with_their_line() {
     assert!(error.to_string().contains("UTF-16"), "{error}");
 }
 
-/// A triangle in one statement each, written in ways that exporters have.
+/// A triangle, with each statement in a form that exporters write.
 #[test]
-fn text_is_read_as_the_world_writes_it() {
+fn statements_are_read_in_the_forms_that_exporters_write() {
     let folder = tempfile::tempdir().unwrap();
     let plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
     let texts: [Vec<u8>; 9] = [
@@ -191,7 +191,7 @@ fn a_name_in_latin_1_is_read_and_one_with_escapes_is_made_printable() {
 }
 
 #[test]
-fn corners_with_and_without_coordinates_and_normals_may_be_mixed() {
+fn corners_with_and_without_coordinates_and_normals_can_be_mixed() {
     let folder = tempfile::tempdir().unwrap();
     let obj = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.5\nvt 0.25 0.75 9\nvn 1 0 0\nvn nan 1.#QNAN 0\n\
                f 1/2 2//1 3/1/2\nf 1 2/1/ 3//\n";
@@ -216,7 +216,7 @@ fn corners_with_and_without_coordinates_and_normals_may_be_mixed() {
 #[test]
 fn concave_polygons_are_covered_once() {
     let folder = tempfile::tempdir().unwrap();
-    // An L, which a fan from its first corner would leave.
+    // An L-shape, which a fan from its first corner would not cover.
     let obj = "v 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\nv 2 0 0\nf 1 2 3 4 5 6\n";
     let mesh = load(folder.path(), obj, None)
         .unwrap()
@@ -285,7 +285,7 @@ fn objects_groups_and_materials_split_meshes_and_a_repeated_material_does_not() 
 }
 
 #[test]
-fn libraries_are_found_however_they_are_named() {
+fn libraries_are_found_by_quoted_and_unquoted_names() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("my Lib.mtl"), "newmtl brick\nKd 0 1 0\n").unwrap();
     std::fs::write(folder.path().join("b.MTL"), "newmtl other\n").unwrap();
@@ -312,7 +312,7 @@ fn libraries_are_found_however_they_are_named() {
 }
 
 #[test]
-fn material_names_may_hold_a_hash_and_be_followed_by_a_comment() {
+fn material_names_with_a_hash_and_with_a_comment_are_found() {
     let folder = tempfile::tempdir().unwrap();
     let mtl = "newmtl brick # red\nnewmtl brick #2\nnewmtl wood\n";
     for (name, expected) in [
@@ -329,7 +329,7 @@ fn material_names_may_hold_a_hash_and_be_followed_by_a_comment() {
 }
 
 #[test]
-fn a_library_statement_that_cannot_be_read_costs_a_warning() {
+fn an_unreadable_library_statement_causes_a_warning() {
     let folder = tempfile::tempdir().unwrap();
     let mtl = "Kd 9\nnewmtl brick\nKd 0.8 0.8\nKs spectral file.rfl\nNs\nillum glass\nd -halo 0.5\n\
                map_Kd\nmap_Ks -s\nKd 0.5\nKe xyz 1 1\nNi 1.25 # glass\n";
@@ -342,7 +342,7 @@ fn a_library_statement_that_cannot_be_read_costs_a_warning() {
 }
 
 #[test]
-fn transparency_is_one_minus_dissolve_and_dissolve_wins() {
+fn transparency_is_one_minus_dissolve_and_dissolve_takes_precedence() {
     let folder = tempfile::tempdir().unwrap();
     for (mtl, alpha) in [
         ("Tr 0.25", 0.75),
@@ -407,7 +407,7 @@ fn options_scale_move_and_clamp_a_texture_whose_v_grows_upwards() {
 }
 
 #[test]
-fn missing_textures_and_other_formats_cost_one_warning_each() {
+fn missing_textures_and_unsupported_formats_cause_one_warning_each() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("t.tga"), [0, 0, 2, 0, 0]).unwrap();
     let mtl = "newmtl brick\nmap_Kd none.png\nmap_Ks gone.png\nbump t.tga\nmap_d lost.png\n";

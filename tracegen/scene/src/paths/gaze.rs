@@ -8,10 +8,10 @@ use std::path::Path;
 /// The header of a file of gazes: degrees to the right of and above straight ahead.
 const COLUMNS: [&str; 3] = ["time_s", "x_deg", "y_deg"];
 
-/// Nobody looks further aside than this.
+/// Largest angle from straight ahead that a gaze can have.
 const MAX_DEG: f64 = 90.0;
 
-/// Where the eyes look at one time.
+/// The gaze direction at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GazeRow {
     /// Seconds from the first row, ascending.
@@ -25,7 +25,7 @@ pub struct GazeRow {
 /// Reads a CSV file with the header `time_s,x_deg,y_deg`; there is at least one row.
 ///
 /// # Errors
-/// A file that cannot be read, and the first line and column that is not as it should be.
+/// A file that cannot be read; otherwise the first invalid line and column.
 pub fn read_gazes(file: &Path) -> Result<Vec<GazeRow>, SceneError> {
     let rows = table::read(file, COLUMNS)?;
     let start_s = rows.first().map_or(0.0, |row| row.values[0]);

@@ -1,4 +1,4 @@
-//! A camera that a glTF file's animation moves.
+//! A camera animated by a glTF file.
 
 use crate::SceneError;
 use crate::animation::Joint;
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 pub struct CameraTrack {
     pub(crate) file: PathBuf,
     pub(crate) camera: String,
-    /// What poses are relative to.
+    /// The point that poses are relative to.
     pub(crate) origin: DVec3,
     /// From the root down to the camera's node.
     pub(crate) joints: Vec<Joint>,
@@ -20,7 +20,7 @@ pub struct CameraTrack {
 }
 
 impl CameraTrack {
-    /// The file it came from.
+    /// The file of the track.
     #[must_use]
     pub fn file(&self) -> &Path {
         &self.file
@@ -35,7 +35,7 @@ impl CameraTrack {
     /// The camera's pose `time_s` after the first key, without scale.
     ///
     /// # Errors
-    /// A camera that looks nowhere at that time, as one that is scaled to nothing.
+    /// The camera has no viewing direction at that time, for example because its scale is zero.
     pub fn pose(&self, time_s: f64) -> Result<DAffine3, SceneError> {
         let time_s = self.span_s[0] + time_s;
         let world = (self.joints.iter()).fold(DAffine3::IDENTITY, |parent, joint| {

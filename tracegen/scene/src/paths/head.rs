@@ -1,13 +1,13 @@
 //! A model of the head of a standing person who looks around.
 //!
 //! Each angle and each axis of the neck's sway is a sum of sinusoids whose frequencies have no
-//! common period, so that no two seconds are alike; the same time always gives the same pose. The
-//! head turns about a pivot in the neck, below and behind the eyes, which adds the translation
-//! that turning brings.
+//! common period, so the motion does not repeat. The same time always gives the same pose. The head
+//! turns about a pivot in the neck, below and behind the eyes, so that turning also translates the
+//! eyes.
 //!
-//! It is a model and not a recording. Its figures over a minute (the tests hold them): yaw stays
-//! within 38 degrees of where the camera looks, pitch within 18, roll within 7; the head turns at
-//! up to 120 degrees a second, half of the time faster than 40; the eyes move at up to 0.5 m/s
+//! This is a model, not a recording. Its figures over a minute, which the tests check: yaw stays
+//! within 38 degrees of the camera's direction, pitch within 18, roll within 7. The head turns at
+//! up to 120 degrees per second, half of the time faster than 40. The eyes move at up to 0.5 m/s
 //! and stay within 15 cm.
 
 use crate::Camera;
@@ -18,7 +18,7 @@ use std::f32::consts::TAU;
 /// A sinusoid: amplitude, frequency in Hz, phase in turns.
 pub(super) type Wave = [f32; 3];
 
-/// Turn to the left about the vertical, degrees.
+/// Rotation to the left about the vertical, degrees.
 pub(super) const YAW: [Wave; 3] = [[24.0, 0.31, 0.0], [9.0, 0.71, 0.02], [2.0, 1.87, 0.35]];
 /// Looking up, degrees.
 pub(super) const PITCH: [Wave; 3] = [[7.0, 0.43, 0.08], [3.5, 1.13, 0.31], [0.8, 2.3, 0.6]];
@@ -34,7 +34,7 @@ const BACK: [Wave; 2] = [[0.04, 0.29, 0.5], [0.01, 1.03, 0.15]];
 /// From the pivot in the neck to the point between the eyes, head space, metres.
 const EYES_FROM_NECK_M: Vec3 = Vec3::new(0.0, 0.12, -0.10);
 
-/// The sum of waves, less what it is at the start: frame 0 is the camera itself.
+/// The sum of waves minus its value at time 0, so that frame 0 is the camera itself.
 pub(super) fn sum(waves: &[Wave], t: f32) -> f32 {
     let wave = |[amplitude, hz, phase]: &Wave| {
         amplitude * ((TAU * (hz * t + phase)).sin() - (TAU * phase).sin())
@@ -42,7 +42,7 @@ pub(super) fn sum(waves: &[Wave], t: f32) -> f32 {
     waves.iter().map(wave).sum()
 }
 
-/// The head `t` seconds after it left the camera's pose.
+/// The head's pose `t` seconds after the camera's pose.
 pub(super) fn pose_at(camera: &Camera, t: f32) -> Affine3A {
     let start = head_pose(camera);
     let angle = |waves: &[Wave]| sum(waves, t).to_radians();

@@ -1,7 +1,7 @@
-//! Where a time lies among ascending key times.
+//! Position of a time among ascending key times.
 
-/// The key at or before `time` and how far on the way to the next one it is, 0 to 1. Times outside
-/// the keys are taken to their ends. There is at least one key.
+/// The key at or before `time`, and the fraction of the way to the next key, 0 to 1. Times outside
+/// the keys are clamped. There is at least one key.
 pub(crate) fn bracket(times: &[f64], time: f64) -> (usize, f64) {
     let after = times.partition_point(|&key| key <= time);
     let Some(key) = after.checked_sub(1) else {

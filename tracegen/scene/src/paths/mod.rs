@@ -1,6 +1,6 @@
-//! Where the head goes: named models of a moving head, and paths and gazes from files.
+//! Head paths: named models of a moving head, and paths and gazes from files.
 //!
-//! A path gives the head's pose as a function of time; frame k is seen at k / fps seconds from the
+//! A path gives the head's pose as a function of time. Frame k is seen at k / fps seconds from the
 //! path's start. Head space is right-handed: x right, y up, looking down -z.
 
 mod gaze;
@@ -28,13 +28,13 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// Frames a second where nothing else is asked for.
+/// Frames per second unless given otherwise.
 pub const DEFAULT_FPS: f32 = 72.0;
 
 /// Most frames of a path.
 pub const MAX_FRAMES: u32 = 10_000;
 
-/// A path as it is asked for.
+/// A path as specified by the user.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum PathSpec {
     /// `walk`, see [`HeadPath::Walk`].
@@ -44,7 +44,7 @@ pub enum PathSpec {
     Head,
     /// A CSV file of poses.
     Poses(PathBuf),
-    /// A glTF file with an animated camera, and which of its cameras.
+    /// A glTF file with an animated camera, and the name of the camera.
     Gltf(PathBuf, Option<String>),
 }
 
@@ -85,17 +85,17 @@ impl fmt::Display for PathSpec {
     }
 }
 
-/// What the poses of a file are relative to.
+/// The frame of reference of a file's poses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PathOrigin {
     /// The camera: the path is moved and turned about the vertical so that its first pose has the
     /// camera's place and heading. Pitch and roll stay as recorded.
     Camera,
-    /// The world: poses stand as they are.
+    /// The world: poses are used unchanged.
     World,
 }
 
-/// A path ready to be followed.
+/// A path that can be evaluated.
 #[derive(Clone, Debug)]
 pub enum HeadPath {
     /// A slow straight walk from the camera, see [`walk`](self::walk).
@@ -108,19 +108,19 @@ pub enum HeadPath {
     Gltf(CameraTrack, PathOrigin),
 }
 
-/// Which moments of a path are seen.
+/// The frames to evaluate, and their rate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moments {
     /// Frame numbers.
     pub frames: Range<u32>,
-    /// Frames a second.
+    /// Frames per second.
     pub fps: f32,
     /// Time of frame 0 in what moves in the scene, seconds.
     pub scene_start_s: f64,
 }
 
 impl Moments {
-    /// The first `frames` frames at the usual rate.
+    /// The first `frames` frames at the default rate.
     #[must_use]
     pub fn first(frames: u32) -> Self {
         Self {
@@ -144,11 +144,11 @@ impl Moments {
 }
 
 impl HeadPath {
-    /// Reads what `spec` names. Poses of a CSV start at the camera and an animated camera stands
-    /// in the world where `origin` says nothing else. Also tells what is odd about the file.
+    /// Reads what `spec` names. Unless `origin` says otherwise, poses of a CSV file start at the
+    /// camera and an animated camera is placed in the world. Also returns warnings about the file.
     ///
     /// # Errors
-    /// A file that cannot be read or is no path.
+    /// A file that cannot be read or is not a path.
     pub fn open(
         spec: &PathSpec,
         origin: Option<PathOrigin>,
@@ -188,7 +188,7 @@ impl HeadPath {
     /// at `camera`.
     ///
     /// # Errors
-    /// A frame after the end of a file's path, or a camera that is scaled to nothing.
+    /// A frame after the end of a file's path, or a camera whose scale is zero.
     pub fn poses(&self, camera: &Camera, moments: &Moments) -> Result<Vec<Affine3A>, SceneError> {
         self.check(moments)?;
         let frames = moments.frames.clone();
@@ -214,10 +214,10 @@ impl HeadPath {
         }
     }
 
-    /// The camera that the path leaves from: `camera`, or where a path in the world starts.
+    /// The camera at which the path starts: `camera`, or the start of a path in the world.
     ///
     /// # Errors
-    /// A camera that is scaled to nothing.
+    /// A camera whose scale is zero.
     pub fn start(&self, camera: &Camera) -> Result<Camera, SceneError> {
         let first = match self {
             Self::Poses(track, PathOrigin::World) => track.pose(0.0),
@@ -239,17 +239,17 @@ impl HeadPath {
         })
     }
 
-    /// Checks that a file's path lasts for all frames.
+    /// Checks that a file's path covers all frames.
     ///
     /// # Errors
-    /// It does not.
+    /// The path is too short.
     pub fn check(&self, moments: &Moments) -> Result<(), SceneError> {
         let (file, duration_s) = match self {
             Self::Walk | Self::Head => return Ok(()),
             Self::Poses(track, _) => (track.file(), track.duration_s()),
             Self::Gltf(track, _) => (track.file(), track.duration_s()),
         };
-        // A path of whole frames must not lose its last one to rounding.
+        // Rounding must not remove the last frame of a path of whole frames.
         let frames = (duration_s * f64::from(moments.fps) + 1e-3).floor() + 1.0;
         if f64::from(moments.frames.end) <= frames {
             return Ok(());
@@ -265,12 +265,12 @@ impl HeadPath {
     }
 }
 
-/// Exact where the rate is: times of recorded poses may be large.
+/// Double precision, because times of recorded poses may be large.
 fn seconds(moments: &Moments, frame: u32) -> f64 {
     f64::from(frame) / f64::from(moments.fps)
 }
 
-/// What moves a path that starts at `first` to where it belongs.
+/// The transform that moves a path from its first pose `first` to its origin.
 fn align(first: DAffine3, origin: PathOrigin, camera: &Camera) -> DAffine3 {
     if origin == PathOrigin::World {
         return DAffine3::IDENTITY;
@@ -281,9 +281,8 @@ fn align(first: DAffine3, origin: PathOrigin, camera: &Camera) -> DAffine3 {
     DAffine3::from_mat3_translation(turn, wanted.translation - turn * first.translation)
 }
 
-/// Angle about +y from -z to where a pose looks, radians; a pose that looks straight up or down
-/// heads where the chin or the top of
-/// the head points.
+/// Angle of a pose's direction about +y from -z, radians. For a pose that looks straight up or
+/// down, the direction of the chin or of the top of the head.
 fn heading(pose: &DAffine3) -> f64 {
     let back = pose.matrix3.z_axis;
     let level = |v: DVec3| v.x.hypot(v.z);

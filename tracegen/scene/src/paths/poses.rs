@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 /// quaternion, turns head space (x right, y up, looking down -z) to the world's axes.
 const COLUMNS: [&str; 8] = ["time_s", "x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"];
 
-/// How far from 1 the length of a quaternion may be: six decimals are written far better.
+/// Tolerance of a quaternion's length: six decimals are far more accurate.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
-/// Positions further out have steps of more than a tenth of a micrometre in 64 bits.
+/// Largest coordinate of a position. Beyond it, 64-bit steps exceed a tenth of a micrometre.
 const MAX_POSITION_M: f64 = 1e9;
 
 /// Head poses by time.
@@ -30,7 +30,7 @@ impl PoseTrack {
     /// Reads a CSV file with the header `time_s,x_m,y_m,z_m,qx,qy,qz,qw`.
     ///
     /// # Errors
-    /// A file that cannot be read, and the first line and column that is not as it should be.
+    /// A file that cannot be read; otherwise the first invalid line and column.
     pub fn read(file: &Path) -> Result<Self, SceneError> {
         let origin = Origin::new(file);
         let rows = table::read(file, COLUMNS)?;
@@ -64,7 +64,7 @@ impl PoseTrack {
         Ok(track)
     }
 
-    /// The file it came from.
+    /// The file of the track.
     #[must_use]
     pub fn file(&self) -> &Path {
         &self.file

@@ -1,4 +1,4 @@
-//! Strict CSV: a header that is known, and finite numbers in ascending order of time.
+//! Strict CSV: a known header, and finite numbers in ascending order of time.
 
 use crate::SceneError;
 use crate::files::Origin;
@@ -9,7 +9,7 @@ use std::path::Path;
 /// Most bytes of a file: some 200,000 poses, or 46 minutes at 72 Hz.
 pub(super) const MAX_BYTES: u64 = 16 << 20;
 
-/// Times further from 0 leave no digits for milliseconds.
+/// Largest distance of a time from 0. Beyond it, milliseconds are not representable.
 const MAX_TIME_S: f64 = 1e12;
 
 /// One line of the file.
@@ -20,9 +20,9 @@ pub(super) struct Row<const N: usize> {
     pub values: [f64; N],
 }
 
-/// Reads a file whose first line is exactly `columns` and whose other lines are as many finite
-/// numbers; times ascend. Byte order mark, CRLF and blank lines at the end are let pass. There is
-/// at least one row.
+/// Reads a file whose first line is exactly `columns`. Every other line must have as many finite
+/// numbers, and times must ascend. A byte order mark, CRLF and trailing blank lines are accepted.
+/// There is at least one row.
 pub(super) fn read<const N: usize>(
     file: &Path,
     columns: [&str; N],
@@ -61,7 +61,7 @@ pub(super) fn read<const N: usize>(
     Ok(rows)
 }
 
-/// The text of a file of at most [`MAX_BYTES`]; pipes are read too.
+/// The text of a file of at most [`MAX_BYTES`]. Pipes are read as well.
 fn read_text(file: &Path, origin: &Origin) -> Result<String, SceneError> {
     let failed = |reason| SceneError::Io {
         file: file.to_owned(),

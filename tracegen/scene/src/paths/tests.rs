@@ -1,4 +1,4 @@
-//! Paths against hand computations, and what is said of files that are none.
+//! Paths against hand computations, and the errors for invalid files.
 
 use super::head::{PITCH, ROLL, YAW, sum};
 use super::*;
@@ -25,7 +25,7 @@ fn looking(eye: Vec3, direction: Vec3) -> Camera {
     }
 }
 
-/// A file that lives as long as its folder.
+/// A file that exists as long as its folder.
 fn file(name: &str, text: &str) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(name);
@@ -58,7 +58,7 @@ fn the_walk_starts_at_the_camera_and_goes_ahead() {
 }
 
 #[test]
-fn a_path_is_named_by_a_model_or_a_file() {
+fn a_path_is_a_models_name_or_a_file() {
     let of = |text: &str| text.parse::<PathSpec>().unwrap();
     assert_eq!(of("walk"), PathSpec::Walk);
     assert_eq!(of("head"), PathSpec::Head);
@@ -75,7 +75,7 @@ fn a_path_is_named_by_a_model_or_a_file() {
 }
 
 #[test]
-fn the_model_of_a_head_starts_at_the_camera_and_keeps_its_figures() {
+fn the_head_model_starts_at_the_camera_and_stays_within_its_figures() {
     let camera = looking(Vec3::new(4.0, 1.7, -2.0), Vec3::new(0.3, -0.2, 1.0));
     let fps = 1000.0;
     let moments = Moments {
@@ -122,7 +122,7 @@ fn the_model_of_a_head_starts_at_the_camera_and_keeps_its_figures() {
     speeds.sort_by(f64::total_cmp);
     let (median, peak) = (speeds[speeds.len() / 2], speeds[speeds.len() - 1]);
     println!("{median} {peak} deg/s, {fastest_m_per_s} m/s, {widest:?} deg, {reach_m} m");
-    // What the module says of itself.
+    // The figures of the module's documentation.
     assert!((100.0..=120.0).contains(&peak), "{peak}");
     assert!((40.0..50.0).contains(&median), "{median}");
     assert!(
@@ -136,8 +136,9 @@ fn the_model_of_a_head_starts_at_the_camera_and_keeps_its_figures() {
 }
 
 #[test]
-fn recorded_poses_are_taken_at_the_frames_times() {
-    // A quarter turn to the left in one second while it moves 2 m along x; times start anywhere.
+fn recorded_poses_are_interpolated_at_the_frames_times() {
+    // A quarter turn to the left in one second while the head moves 2 m along x. Times start at an
+    // arbitrary value.
     let half = FRAC_PI_4;
     let text = format!(
         "\u{feff}{HEADER}100.0,0,0,0,0,0,0,1\r\n101.0, 2,0,0, 0,{},0,{}\r\n\r\n",
@@ -170,7 +171,7 @@ fn recorded_poses_are_taken_at_the_frames_times() {
 
 #[test]
 fn a_path_from_the_camera_takes_its_place_and_heading_and_keeps_its_pitch() {
-    // Looks along -x and down by 30 degrees; then moves a metre that way.
+    // Looks along -x and down by 30 degrees, then moves a metre in that direction.
     let q = Quat::from_rotation_y(FRAC_PI_2) * Quat::from_rotation_x(-30f32.to_radians());
     let [x, y, z, w] = q.to_array();
     let text = format!("{HEADER}0,5,1,5,{x},{y},{z},{w}\n1,4,1,5,{x},{y},{z},{w}\n");
@@ -195,7 +196,7 @@ fn a_path_from_the_camera_takes_its_place_and_heading_and_keeps_its_pitch() {
 }
 
 #[test]
-fn a_path_far_out_has_the_poses_of_one_at_zero_in_a_scene_that_is_as_far_out() {
+fn a_path_and_scene_far_from_zero_give_the_poses_of_those_at_zero() {
     let text = |far: f64| {
         let row = |t: f64, x: f64| format!("{t},{},{},{far},0,0.6,0,0.8\n", far + x, far - 0.25);
         format!("{HEADER}{}{}", row(0.0, 0.5), row(1.0, 0.75))
@@ -215,9 +216,9 @@ fn a_path_far_out_has_the_poses_of_one_at_zero_in_a_scene_that_is_as_far_out() {
 }
 
 #[test]
-fn a_head_that_looks_straight_up_or_down_still_has_a_heading() {
+fn a_head_that_looks_straight_up_or_down_has_a_heading() {
     for (direction, up) in [(Vec3::Y, Vec3::Z), (Vec3::NEG_Y, Vec3::NEG_Z)] {
-        // Both have bent away from looking along -z.
+        // Both are bent away from looking along -z.
         let pose = head_pose(&Camera {
             up,
             ..looking(Vec3::ZERO, direction)
@@ -247,7 +248,7 @@ fn frames_after_the_end_of_a_file_are_refused() {
 }
 
 #[test]
-fn a_file_that_is_no_path_is_refused_with_line_and_column() {
+fn an_invalid_path_file_is_refused_with_line_and_column() {
     let good = "0,0,0,0,0,0,0,1\n";
     for (text, parts) in [
         (
@@ -337,7 +338,7 @@ fn a_file_that_is_no_path_is_refused_with_line_and_column() {
 }
 
 #[test]
-fn gazes_are_read_and_bounded() {
+fn gazes_are_read_and_their_range_is_checked() {
     let (_folder, path) = file("gaze.csv", "time_s,x_deg,y_deg\n3,0,10\n4,20,-10.5\n");
     let rows = read_gazes(&path).unwrap();
     let last = GazeRow {

@@ -1,10 +1,10 @@
-//! Builds glTF files.
+//! Builder of glTF files.
 
 use scene::{LoadOptions, Loaded, SceneError, load_file};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// A glTF file in the making: JSON, and the bytes of its buffer.
+/// A glTF file under construction: JSON, and the bytes of its buffer.
 pub struct File {
     pub json: Value,
     pub bytes: Vec<u8>,
@@ -50,7 +50,7 @@ impl File {
         }
     }
 
-    /// Appends a row to a table of the JSON; tells its index.
+    /// Appends a row to a table of the JSON. Returns its index.
     pub fn push(&mut self, table: &str, row: Value) -> usize {
         let rows = self.json.as_object_mut().unwrap();
         let rows = rows.entry(table).or_insert_with(|| json!([]));
@@ -93,7 +93,7 @@ impl File {
         self.accessor(view, 5123, "SCALAR", values.len())
     }
 
-    /// Gives the material a base colour texture with this image, which an extension may hold.
+    /// Gives the material a base colour texture with this image, optionally through an extension.
     pub fn with_image(mut self, folder: &Path, extension: &str, name: &str, bytes: &[u8]) -> Self {
         std::fs::write(folder.join(name), bytes).unwrap();
         self.json["images"] = json!([{"uri": name}]);

@@ -1,4 +1,4 @@
-//! Ways to store geometry: each must give the corners of a unit quad.
+//! Ways to store geometry. Each must produce the corners of a unit quad.
 
 use super::files::{File, INDICES, QUAD};
 use super::rows::{Row, Status};
@@ -176,7 +176,7 @@ fn corners(loaded: &Loaded, feature: &str, tolerance: f32) {
             assert!(QUAD.iter().any(of_quad), "{feature}: {corner}");
         }
     }
-    // Both triangles, wound as the file has them.
+    // Both triangles must have the file's winding.
     assert!((area - Vec3::Z).length() < 1e-2, "{feature}: {area}");
 }
 

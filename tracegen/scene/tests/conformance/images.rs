@@ -1,4 +1,4 @@
-//! Kinds of images: what they hold, against the texels that they were made of.
+//! Image formats, compared with the texels from which the images were made.
 
 use super::files::File;
 use super::rows::{Row, Status};
@@ -238,7 +238,7 @@ pub const ROWS: &[Row] = &[
     },
 ];
 
-/// The image that all are made of: red along x, green along y; alpha falls along x where it counts.
+/// The source of all images: red along x, green along y. Alpha decreases along x if it is used.
 fn texel(x: u32, y: u32, alpha: bool) -> [u8; 4] {
     let a = if alpha { 255 - x * 12 } else { 255 };
     [x as u8 * 16, y as u8 * 16, 64, a as u8]
@@ -255,7 +255,7 @@ fn pixels(format: &str) -> Vec<u8> {
     bytes.into_inner()
 }
 
-/// Level 0 of the only image is the image that it was made of, to `tolerance` a channel.
+/// Level 0 of the only image equals the source image to `tolerance` per channel.
 fn near(loaded: &Loaded, feature: &str, tolerance: u8, alpha: bool) {
     let image = &loaded.scene.images[0];
     assert_eq!(image.size, [SIZE; 2], "{feature}");
@@ -291,7 +291,7 @@ fn stored(loaded: &Loaded, feature: &str, format: TexelFormat, levels: usize) ->
     blocks.levels
 }
 
-/// Bytes that no encoder made: what is kept must be these.
+/// Arbitrary bytes that no encoder produces, to check that blocks are kept unchanged.
 fn level(format: TexelFormat, number: u32) -> Vec<u8> {
     let bytes = level_bytes(format, level_size([SIZE; 2], number));
     (0..bytes).map(|i| (i as u32 * 7 + number) as u8).collect()

@@ -1,5 +1,5 @@
-//! What is read of a scene file, feature by feature: each row writes its file, loads it and checks
-//! what renderers get. The table of docs/use/scene-files.md is made of the rows.
+//! Supported features of scene files, one by one: each row writes its file, loads it and checks the
+//! scene that renderers get. The table in docs/use/scene-files.md is generated from these rows.
 //!
 //! `UPDATE_FIGURES=1` rewrites results/scene-features.csv.
 

@@ -3,12 +3,12 @@
 use scene::{Loaded, SceneError};
 use std::path::Path;
 
-/// What becomes of a feature.
+/// Support of a feature.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
-    /// As its specification says.
+    /// Supported as specified.
     Drawn,
-    /// Simplified, as the row says how.
+    /// Simplified, as the row describes.
     Approximated,
     /// The file is refused with the feature's name.
     Refused,
@@ -29,12 +29,12 @@ impl Status {
 pub struct Row {
     pub feature: &'static str,
     pub status: Status,
-    /// How it is read; of a refused one, what the error says.
+    /// Description of the support. For a refused feature, part of the error.
     pub how: &'static str,
     /// Writes the test file and loads it.
     pub load: fn(&Path) -> Result<Loaded, SceneError>,
     /// Checks the scene.
     pub check: fn(&Loaded, &str),
-    /// File of the test, and of the check of values where that is another.
+    /// File of the test, or of the check of values if that is another one.
     pub test: &'static str,
 }

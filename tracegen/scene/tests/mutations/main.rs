@@ -1,6 +1,6 @@
-//! Thousands of damaged files of scenes and paths: each is read or refused, quickly and within bounds.
+//! Thousands of damaged scene and path files. Each is read or refused, quickly and within bounds.
 //!
-//! The cases are the same every time. `MUTATIONS=n` tries n a seed instead.
+//! The cases are deterministic. `MUTATIONS=n` sets the number of cases per seed.
 
 mod memory;
 mod mutate;
@@ -64,7 +64,7 @@ fn no_damaged_file_panics_takes_long_or_takes_a_gigabyte() {
         }
     }
     println!("{read} read, {refused} refused; at most {longest:?} and {largest} bytes");
-    // Mutations that all fail, or that all change nothing of weight, would test little.
+    // If nearly all mutations failed, or nearly all had no effect, the test would prove little.
     let all = read + refused;
     assert!(read > all / 10 && refused > all / 10, "{read} {refused}");
 }
@@ -79,7 +79,7 @@ fn read_all(file: &Path) -> Result<(Loaded, Texels), SceneError> {
     Ok((loaded, texels))
 }
 
-/// What every renderer relies on.
+/// Checks the invariants that every renderer relies on.
 fn check(scene: &Scene, texels: &Texels, at: &str) {
     for mesh in &scene.meshes {
         let count = mesh.positions.len();

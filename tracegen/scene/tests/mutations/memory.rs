@@ -1,4 +1,4 @@
-//! Counts what is allocated, so that a test can hold its peak.
+//! Counts allocations so that a test can check the peak.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
@@ -13,7 +13,7 @@ static START: AtomicUsize = AtomicUsize::new(0);
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-// SAFETY: every call goes on to the system's allocator unchanged.
+// SAFETY: every call is forwarded to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let now = NOW.fetch_add(layout.size(), Relaxed) + layout.size();
@@ -36,7 +36,7 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
-/// Keeps the other tests waiting: what they allocate would count.
+/// Excludes the other tests, whose allocations would count as well.
 pub fn alone() -> MutexGuard<'static, ()> {
     static ALONE: Mutex<()> = Mutex::new(());
     ALONE.lock().unwrap_or_else(PoisonError::into_inner)
@@ -49,7 +49,7 @@ pub fn start() {
     PEAK.store(now, Relaxed);
 }
 
-/// Most bytes held at one time since the start, beyond those held at the start.
+/// Most bytes held at one time since the start, minus the bytes held at the start.
 pub fn peak() -> usize {
     PEAK.load(Relaxed).saturating_sub(START.load(Relaxed))
 }

@@ -1,4 +1,4 @@
-//! Damage: bytes, pieces, numbers and parts of the JSON.
+//! Damages files: bytes, pieces, numbers and parts of the JSON.
 
 use serde_json::Value;
 
@@ -26,7 +26,7 @@ impl Random {
         items[self.below(items.len())]
     }
 
-    /// An index, as often as its weight says.
+    /// A random index with the given weights.
     pub fn weighted(&mut self, weights: &[usize]) -> usize {
         let mut at = self.below(weights.iter().sum());
         let hit = weights.iter().position(|&weight| {
@@ -106,7 +106,7 @@ fn flip(mut bytes: Vec<u8>, random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-/// Copies a piece over another place or in between.
+/// Copies a piece over another place or inserts it there.
 fn splice(mut bytes: Vec<u8>, random: &mut Random) -> Vec<u8> {
     let from = random.below(bytes.len());
     let piece = bytes[from..].iter().take(1 + random.below(64)).copied();
@@ -147,7 +147,7 @@ fn number(mut bytes: Vec<u8>, random: &mut Random) -> Vec<u8> {
     bytes
 }
 
-/// Changes a place in the JSON; other text is damaged otherwise.
+/// Changes a value in the JSON. Other text gets a byte-level mutation.
 fn json(bytes: Vec<u8>, random: &mut Random) -> Vec<u8> {
     let Ok(mut value) = serde_json::from_slice::<Value>(&bytes) else {
         return number(bytes, random);
@@ -157,7 +157,7 @@ fn json(bytes: Vec<u8>, random: &mut Random) -> Vec<u8> {
     value.to_string().into_bytes()
 }
 
-/// Some value in the tree.
+/// A random value in the tree.
 fn pick<'a>(value: &'a Value, random: &mut Random) -> &'a Value {
     let inner = match value {
         Value::Array(items) if !items.is_empty() => &items[random.below(items.len())],

@@ -1,4 +1,4 @@
-//! Damaged paths of the head and of the gaze.
+//! Damaged files of head paths and gazes.
 
 use crate::memory;
 use crate::mutate::{Random, mutate};
@@ -16,7 +16,7 @@ const POSES: &str = "time_s,x_m,y_m,z_m,qx,qy,qz,qw\n0,0,1.7,0,0,0,0,1\n\
 0.5,0.1,1.7,-0.2,0,0.6,0,0.8\n1.25,0.2,1.6,-0.3,0.6,0,0,-0.8\n";
 const GAZES: &str = "time_s,x_deg,y_deg\n0,0,0\n0.25,10.5,-3\n0.5,-20,1e1\n";
 
-/// A camera that turns linearly and slides along a cubic curve, below a node that steps.
+/// A camera that rotates linearly and moves along a cubic curve, below a node that moves in steps.
 fn gltf() -> String {
     let floats: &[f32] = &[
         0.0, 0.5, 1.0, // times
@@ -51,7 +51,7 @@ fn gltf() -> String {
     .to_string()
 }
 
-/// Follows a path for a second from both origins; every pose is a place and a rotation.
+/// Follows a path for a second from both origins. Every pose must be finite and a rotation.
 fn follow(spec: &PathSpec) -> Result<(), SceneError> {
     let camera = cameras::default_camera(&Scene::default());
     for origin in [PathOrigin::Camera, PathOrigin::World] {
@@ -127,7 +127,7 @@ fn no_damaged_path_panics_takes_long_or_takes_much_memory() {
                         "{name}, case {case}: {text:?}"
                     );
                     assert!(text.len() < 4000, "{name}, case {case}: {text}");
-                    // A glTF file may name another one, which the error then names.
+                    // A glTF file may refer to another file, which the error then names.
                     let names = text.contains(name) || name.ends_with("gltf");
                     assert!(names, "{name}, case {case}: {text}");
                     refused += 1;

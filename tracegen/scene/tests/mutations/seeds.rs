@@ -1,9 +1,9 @@
-//! Small whole scenes in every form that is read.
+//! Small complete scenes in every supported form.
 
 use serde_json::{Value, json};
 use std::io::Cursor;
 
-/// A scene's files, the one to load first, and how often each is damaged.
+/// A scene's files, the one to load first, and the weight of each for mutation.
 pub struct Seed {
     pub files: Vec<(&'static str, Vec<u8>)>,
     pub weights: Vec<usize>,
@@ -158,7 +158,7 @@ fn gltf(uri: Value) -> Value {
     })
 }
 
-/// A skinned and morphed triangle below a node that moves, and its buffer.
+/// A skinned and morphed triangle below a moving node, and its buffer.
 fn animated() -> (Value, Vec<u8>) {
     let (mut bytes, mut views, mut accessors) = (Vec::new(), Vec::new(), Vec::new());
     let mut add = |of: &str, kind: u32, count: usize, row: &[u8]| {
@@ -207,7 +207,7 @@ fn animated() -> (Value, Vec<u8>) {
     (json, bytes)
 }
 
-/// The same scene with everything inside.
+/// The same scene with everything in one file.
 fn glb(bytes: &[u8], png: &[u8]) -> Vec<u8> {
     let mut json = gltf(Value::Null);
     json["buffers"] = json!([{"byteLength": bytes.len() + png.len()}]);

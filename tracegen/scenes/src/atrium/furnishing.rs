@@ -55,7 +55,7 @@ fn drapes(scene: &mut SceneBuilder, p: &Palette) {
             scene.place(rod, place);
         }
     }
-    // Carpets aired over the balustrade.
+    // Carpets hung over the balustrade.
     for (i, (bay, side)) in [(-2, -1.0f32), (1, -1.0), (-1, 1.0), (2, 1.0)]
         .into_iter()
         .enumerate()
@@ -63,7 +63,7 @@ fn drapes(scene: &mut SceneBuilder, p: &Palette) {
         let mut carpet = MeshBuilder::new();
         let wave = 0.012;
         carpet.surface(24, 20, |s, t| {
-            // From the hem in front, up, over the rail and down behind.
+            // From the hem in front, up, over the rail and down behind it.
             let length = t * 2.3;
             let (y, z) = if length < 1.5 {
                 (length - 1.5, 0.20 + 0.02 * (1.5 - length))

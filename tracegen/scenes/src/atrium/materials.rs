@@ -17,7 +17,7 @@ pub struct Palette {
     pub arcade_floor: MaterialId,
     /// Outer wall of the ground floor.
     pub wall_low: MaterialId,
-    /// Its stone base.
+    /// Stone base of the outer wall.
     pub dado: MaterialId,
     /// Outer wall of the upper floor.
     pub wall_high: MaterialId,
@@ -145,7 +145,7 @@ fn masonry_textures() -> Vec<Recipe> {
     ]
 }
 
-/// Texture sets of what stands and hangs in the building, in the order of the [`Palette`].
+/// Texture sets of the furnishing, in the order of the [`Palette`].
 fn furnishing_textures() -> Vec<Recipe> {
     use Maps::Full;
     vec![
@@ -218,7 +218,7 @@ fn furnishing_textures() -> Vec<Recipe> {
     ]
 }
 
-/// Every surface its own material.
+/// The rich palette: a separate material for every surface.
 pub fn rich(scene: &mut SceneBuilder) -> Palette {
     let mut sets = masonry_textures().into_iter().chain(furnishing_textures());
     let mut next = |leafy: bool| {
@@ -261,7 +261,7 @@ pub fn rich(scene: &mut SceneBuilder) -> Palette {
     }
 }
 
-/// Eight base-colour textures, shared widely; only the floor has a normal map.
+/// The plain palette: eight shared base-colour textures. Only the floor has a normal map.
 pub fn plain(scene: &mut SceneBuilder) -> Palette {
     let simple = Recipe::new;
     let sand = [rgb(0xcdb894), rgb(0xb39b74)];

@@ -5,14 +5,14 @@ use crate::noise::{Rng, smoothstep};
 use glam::{Affine3A, Quat, Vec2, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-/// A column's measures in metres.
+/// Dimensions of a column, metres.
 #[derive(Clone, Copy, Debug)]
 pub struct Column {
     /// Radius at the foot of the shaft.
     pub radius: f32,
     /// Height from the floor to the top of the abacus.
     pub height: f32,
-    /// Segments around.
+    /// Segments around the axis.
     pub segments: usize,
     /// Rows of cells up the shaft.
     pub rows: usize,
@@ -23,7 +23,7 @@ pub struct Column {
 }
 
 impl Column {
-    /// Base and shaft.
+    /// Mesh of the base and the shaft.
     #[must_use]
     pub fn shaft(&self) -> MeshBuilder {
         let (r, top) = (self.radius, self.height - 2.0 * self.radius);
@@ -56,7 +56,7 @@ impl Column {
         m
     }
 
-    /// Neck ring, fluted bell with leaves curling outwards, abacus.
+    /// Mesh of the neck ring, the fluted bell with leaves curling outwards, and the abacus.
     #[must_use]
     pub fn capital(&self) -> MeshBuilder {
         let (r, top) = (self.radius * 0.87, self.height - 2.0 * self.radius);
@@ -83,7 +83,7 @@ impl Column {
             self.segments * if self.flutes > 0 { 2 } else { 1 },
             |angle, y| {
                 let t = (y - top) / h;
-                // Two tiers of leaves: the upper one stands between the leaves of the lower.
+                // Two tiers of leaves, the upper one offset by half a leaf.
                 let tier = if t > 0.42 { PI } else { 0.0 };
                 let leaf = 0.5 + 0.5 * (angle * flutes + tier).cos();
                 let curl = 1.0 + 0.2 * smoothstep(0.28, 0.4, t) * (1.0 - smoothstep(0.4, 0.44, t));
@@ -159,7 +159,7 @@ impl Bay {
         m
     }
 
-    /// The arch's underside and the moulded voussoirs on both faces.
+    /// The arch's underside, and the moulded voussoirs on both faces.
     #[must_use]
     pub fn archivolt(&self, moulding_steps: usize) -> MeshBuilder {
         let mut m = MeshBuilder::new();
@@ -200,7 +200,8 @@ impl Bay {
     }
 }
 
-/// Where an arch's surface at `p` should face: outwards on its faces, down into the opening below.
+/// Direction in which an arch's surface at `p` faces: outwards on its faces, down into the opening
+/// below.
 fn towards_opening(p: Vec3, spring: f32, half_thickness: f32) -> Vec3 {
     if p.z.abs() > half_thickness {
         Vec3::Z * p.z.signum()
@@ -225,7 +226,7 @@ pub fn groin_vault(half: Vec2, spring: f32, rise: f32, cells: usize) -> MeshBuil
             };
             let y = spring + rise * (1.0 - b * b).max(0.0).sqrt();
             let p = vec3(half.x * x, y, half.y * z);
-            // Around the barrel, and along it.
+            // Texture coordinates around the barrel and along it.
             let around = (b.asin() / FRAC_PI_2) * 0.5 * PI * half.x;
             (p, vec2(around, a * half.y))
         });
@@ -269,7 +270,7 @@ pub fn rib(radius: f32, spring: f32, width: f32, depth: f32, segments: usize) ->
 #[must_use]
 pub fn moulding(profile: &[Knot], length: f32, y: f32) -> MeshBuilder {
     let mut m = MeshBuilder::new();
-    // right x up = z x y = -x: travel backwards.
+    // right x up = z x y = -x, so the sweep runs backwards.
     let path = [length, 0.0].map(|x| SweepFrame {
         origin: vec3(x, y, 0.0),
         right: Vec3::Z,
@@ -361,7 +362,7 @@ pub fn lion_medallion(cells: usize, relief: f32) -> MeshBuilder {
         let angle = x.atan2(y);
         let ax = x.abs();
         let rim = smoothstep(0.86, 0.89, r) - smoothstep(0.97, 1.0, r);
-        // Mane: three rings of locks, each turned against the last.
+        // Mane: three rings of locks, each rotated against the previous one.
         let ring = ((r - 0.34) / 0.16).floor();
         let lock = (angle * (13.0 + 3.0 * ring) + ring * 2.0 + 5.0 * r)
             .sin()
@@ -385,7 +386,7 @@ pub fn lion_medallion(cells: usize, relief: f32) -> MeshBuilder {
         mane.max(face).max(mane + ear) + 0.24 * rim
     };
     m.surface(cells, cells, |s, t| {
-        // Square to disc, so that the lattice's rows bend with the rim.
+        // Maps the square to a disc, so that the lattice's rows follow the rim.
         let (a, b) = (2.0 * s - 1.0, 2.0 * t - 1.0);
         let x = a * (1.0 - 0.5 * b * b).sqrt();
         let y = b * (1.0 - 0.5 * a * a).sqrt();
@@ -416,7 +417,7 @@ pub fn pot(segments: usize, steps: usize) -> MeshBuilder {
     m
 }
 
-/// One arching leaf from the origin along +x, rising: `length` x `width`, texture shown once.
+/// One arching leaf from the origin along +x, rising: `length` x `width`, covered by the texture once.
 #[must_use]
 pub fn arching_leaf(
     length: f32,
@@ -438,7 +439,7 @@ pub fn arching_leaf(
     m
 }
 
-/// Leaves around the y axis: `count` of them in whorls from low and wide to high and steep.
+/// Leaves around the y axis: `count` of them in whorls, from low and wide to high and steep.
 #[must_use]
 pub fn rosette(
     count: usize,

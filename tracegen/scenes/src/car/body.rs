@@ -1,7 +1,7 @@
-//! A sports car's skin: one smooth function for the body and one for the cabin; panels are parts
-//! of them, so they meet without gaps.
+//! The skin of a sports car. One smooth function defines the body and one the cabin. Panels are
+//! parts of them, so they meet without gaps.
 //!
-//! The car points along +x, its middle at x = 0; z is to its right; measures in metres.
+//! The car points along +x with its middle at x = 0, and z is to its right. Units are metres.
 
 use crate::mesh_builder::MeshBuilder;
 use crate::noise::smoothstep;
@@ -30,7 +30,8 @@ fn through(points: &[Vec2], x: f32) -> f32 {
     let (a, b, c, d) = (at(-1), at(0), at(1), at(2));
     let h = c.x - b.x;
     let t = ((x - b.x) / h).clamp(0.0, 1.0);
-    // Hermite with slopes limited as in a monotone spline, so that bumps do not overshoot.
+    // Hermite interpolation with slopes limited as in a monotone spline, so that it does not
+    // overshoot.
     let slope = |p: Vec2, q: Vec2, r: Vec2| {
         let (left, right) = (
             (q.y - p.y) / (q.x - p.x).max(1e-6),
@@ -142,7 +143,8 @@ pub fn body(x: f32, t: f32) -> Vec3 {
             points[(j as usize).min(points.len() - 1)]
         }
     };
-    // A uniform cubic B-spline: curvature runs on from panel to panel, which reflections show.
+    // A uniform cubic B-spline: curvature is continuous across panels, as reflections reveal
+    // breaks.
     let (a, b, c, d) = (at(-1), at(0), at(1), at(2));
     let g = 1.0 - f;
     let spline = (a * (g * g * g)
@@ -189,14 +191,14 @@ pub fn cabin(s: f32, t: f32) -> Vec3 {
         ],
         x,
     );
-    // Tumblehome: an oval of high order, narrower at the roof.
+    // Tumblehome: a high-order oval, narrower at the roof.
     let a = t.clamp(-1.0, 1.0) * std::f32::consts::FRAC_PI_2;
     let (sin, cos) = a.sin_cos();
     let z = w * sin.abs().powf(0.62) * sin.signum() * (1.0 - 0.16 * cos.max(0.0) * lift / 0.45);
     vec3(x, base + lift * cos.max(0.0).powf(0.55), z)
 }
 
-/// Which panel a place of the cabin belongs to.
+/// The panel to which a point of the cabin belongs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Panel {
     /// Painted steel.
@@ -282,7 +284,7 @@ pub fn end_cap(nt: usize, front: bool) -> MeshBuilder {
         (p, vec2(p.z, -p.y))
     });
     m.orient(|_| Vec3::X * out);
-    // Below the middle the outline is open: a curtain closes it.
+    // Below the middle the outline is open. A curtain closes it.
     let mut under = MeshBuilder::new();
     under.surface(12, 3, |a, b| {
         let z = 0.7 * half_width(x) * (2.0 * a - 1.0);

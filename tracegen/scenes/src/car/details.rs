@@ -7,7 +7,7 @@ use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-/// Half the width of a tyre, metres. Wheels turn about y; their outside is at +y.
+/// Half the width of a tyre, metres. Wheels rotate about y, and their outside is at +y.
 const HALF_WIDTH: f32 = 0.118;
 
 pub(super) fn wheels(scene: &mut SceneBuilder, kit: &CarMaterials) {
@@ -183,7 +183,7 @@ fn caliper() -> MeshBuilder {
     caliper
 }
 
-/// A strip that follows the body at constant `t`, lifted a hair off the skin.
+/// A strip that follows the body at constant `t`, lifted slightly off the skin.
 fn seam(points: &[(f32, f32)], width: f32) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     let line: Vec<(Vec3, f32)> = points
@@ -251,7 +251,7 @@ fn panel_gaps() -> MeshBuilder {
     gaps
 }
 
-/// The small parts, by material.
+/// Meshes of the small parts, by material.
 #[derive(Default)]
 struct Details {
     chrome: MeshBuilder,

@@ -1,4 +1,4 @@
-//! Plants, rocks and trunks of the jungle, each a mesh to be instanced.
+//! Plants, rocks and trunks of the jungle, one mesh each, for instancing.
 
 use crate::atrium::parts::arching_leaf;
 use crate::mesh_builder::MeshBuilder;
@@ -6,7 +6,7 @@ use crate::noise::{Rng, bank};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
-/// Adds a leaf that starts at `root`, turned about the vertical and tipped up by `pitch`.
+/// Adds a leaf that starts at `root`, rotated about the vertical and raised by `pitch`.
 fn attach(m: &mut MeshBuilder, leaf: &MeshBuilder, root: Vec3, turn: f32, pitch: f32, roll: f32) {
     let rotation =
         Quat::from_rotation_y(turn) * Quat::from_rotation_z(pitch) * Quat::from_rotation_x(roll);
@@ -123,7 +123,7 @@ pub fn buttressed_trunk(
     let noise = bank();
     let mut m = MeshBuilder::new();
     m.surface(cells[0], cells[1], |s, t| {
-        // Rows crowd towards the foot, where the shape is.
+        // Rows are denser towards the foot, where the shape varies most.
         let y = -0.3 + (height + 0.3) * t.powf(1.7);
         let angle = TAU * (s - s.floor());
         let foot = (-(y + 0.3).max(0.0) / (1.5 * radius + 0.35)).exp();
@@ -196,7 +196,7 @@ pub fn boughs(height: f32, radius: f32, count: usize, thick: f32, rng: &mut Rng)
     m
 }
 
-/// A palm's ringed, curved trunk; the crown sits where it ends.
+/// A palm's ringed, curved trunk, and the point at its end for the crown.
 #[must_use]
 pub fn palm_trunk(height: f32, bend: f32) -> (MeshBuilder, Vec3) {
     let center = |t: f32| vec3(bend * t * t, height * t - 0.2 * (1.0 - t), 0.0);
@@ -299,7 +299,7 @@ pub fn boulder(cells: [usize; 2], seed: u64) -> MeshBuilder {
         let (sin, cos) = (TAU * (s - s.floor())).sin_cos();
         let (low, high) = (std::f32::consts::PI * (t - 0.5)).sin_cos();
         let d = vec3(high * cos, low, -high * sin);
-        // Cut by planes, as frost splits rock.
+        // Cut by planes, like rock split by frost.
         let mut r = 1.0f32;
         for (n, distance) in &planes {
             let facing = d.dot(*n);

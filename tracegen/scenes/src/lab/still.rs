@@ -84,7 +84,7 @@ fn hose(scene: &mut SceneBuilder, kit: &LabMaterials) {
     scene.add("hose", tube, kit.rubber);
 }
 
-/// A bulb whose neck bends over into the condenser; returns the neck's end.
+/// A bulb whose neck bends over into the condenser. Returns the neck's end.
 fn retort(scene: &mut SceneBuilder, kit: &LabMaterials) -> Vec3 {
     let bulb = round_flask(0.045, 0.012, 1);
     vessel(
@@ -113,7 +113,7 @@ fn retort(scene: &mut SceneBuilder, kit: &LabMaterials) -> Vec3 {
     neck.last().map_or(Vec3::ZERO, |n| n.0)
 }
 
-/// Jacket, coil and nozzles, at a slant below the neck's end; returns the point below the outlet.
+/// Jacket, coil and nozzles, at a slant below the neck's end. Returns the point below the outlet.
 fn condenser(scene: &mut SceneBuilder, kit: &LabMaterials, neck_end: Vec3) -> Vec3 {
     let slant = Affine3A::from_rotation_translation(
         Quat::from_rotation_z(0.42),

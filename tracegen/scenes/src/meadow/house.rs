@@ -7,8 +7,8 @@ use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::FRAC_PI_2;
 
-/// A wall of thickness 0.5 m in the x-y plane from (0, 0) to `size`, with rectangular openings
-/// (x, y, width, height); outside is +z.
+/// A wall of thickness 0.5 m in the x-y plane from (0, 0) to `size`, with rectangular openings (x,
+/// y, width, height). The outside is +z.
 fn wall(size: glam::Vec2, openings: &[[f32; 4]]) -> MeshBuilder {
     let mut cuts_x = vec![0.0, size.x];
     let mut cuts_y = vec![0.0, size.y];
@@ -114,7 +114,7 @@ fn barn() -> MeshBuilder {
     barn
 }
 
-/// The house by material.
+/// Meshes of the house, by material.
 #[derive(Default)]
 struct House {
     walls: MeshBuilder,
@@ -180,7 +180,7 @@ impl House {
         }
     }
 
-    /// The lintel, which all openings have.
+    /// The lintel of any opening.
     fn lintel(&mut self, [x, y, ow, oh]: [f32; 4], place: Affine3A) {
         let mut f = MeshBuilder::new();
         f.block(

@@ -1,4 +1,5 @@
-//! Plants of the meadow in real geometry: lavender, grass, poppies, broad-leaved trees, cypresses.
+//! Plants of the meadow as geometry without alpha masks: lavender, grass, poppies, broad-leaved
+//! trees, cypresses.
 
 use crate::mesh_builder::MeshBuilder;
 use crate::noise::Rng;
@@ -10,7 +11,7 @@ fn compass(angle: f32) -> Vec3 {
     vec3(cos, 0.0, -sin)
 }
 
-/// A flat blade from `root` to `tip`, bent over, of two quads' width ending in a point: 3 triangles.
+/// A flat, bent blade from `root` to `tip`: a quad and a pointed triangle, 3 triangles in all.
 fn blade(m: &mut MeshBuilder, root: Vec3, tip: Vec3, sag: Vec3, half: Vec3) {
     let mid = root.lerp(tip, 0.55) + sag;
     let normal = half.cross(tip - root).normalize_or(Vec3::Y);
@@ -26,7 +27,7 @@ fn blade(m: &mut MeshBuilder, root: Vec3, tip: Vec3, sag: Vec3, half: Vec3) {
         .extend([v[0], v[1], v[2], v[0], v[2], v[3], v[3], v[2], v[4]]);
 }
 
-/// A spindle of three sides about a line: 6 triangles.
+/// A three-sided spindle about a line: 6 triangles.
 fn spindle(m: &mut MeshBuilder, base: Vec3, top: Vec3, radius: f32, turn: f32) {
     let axis = (top - base).normalize_or(Vec3::Y);
     let right = axis.any_orthonormal_vector();
@@ -50,7 +51,8 @@ fn spindle(m: &mut MeshBuilder, base: Vec3, top: Vec3, radius: f32, turn: f32) {
     }
 }
 
-/// A lavender bush: stems and leaves, and the flower spikes, `spike` metres in radius. 5 + 6 triangles a stalk.
+/// A lavender bush: stems and leaves, and the flower spikes with a radius of `spike` metres. 5 + 6
+/// triangles per stalk.
 #[must_use]
 pub fn lavender(stalks: usize, radius: f32, spike: f32, rng: &mut Rng) -> [MeshBuilder; 2] {
     let (mut green, mut purple) = (MeshBuilder::new(), MeshBuilder::new());
@@ -62,7 +64,7 @@ pub fn lavender(stalks: usize, radius: f32, spike: f32, rng: &mut Rng) -> [MeshB
         let length = radius * rng.range(0.95, 1.25);
         let top = root + (out * lean + Vec3::Y * (1.25 - 0.45 * lean)) * length;
         let side = out.cross(Vec3::Y) * 0.006;
-        // The stem's face is the one that looks outwards.
+        // The face of the stem that points outwards.
         let normal = (side * 2.0).cross(top - root + side).normalize_or(out);
         let side = if normal.dot(out) < 0.0 { -side } else { side };
         let normal = if normal.dot(out) < 0.0 {

@@ -9,7 +9,7 @@ use std::f32::consts::{FRAC_PI_2, TAU};
 
 /// Spring barrel, great wheel, intermediate wheels and the governor.
 pub(super) fn train(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
-    // Gears are in planes of constant x: their z axis turns to +x.
+    // Gears are in planes of constant x: their z axis points to +x.
     let facing = Quat::from_rotation_y(FRAC_PI_2);
     let wheel = |teeth: u32, thickness: f32, spokes: u32| Gear {
         teeth,
@@ -102,7 +102,7 @@ pub(super) fn train(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     governor(scene, kit);
 }
 
-/// Worm and fan: an upright endless screw with two vanes.
+/// Worm and fan: an upright worm with two vanes.
 fn governor(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let foot = vec3(-0.071, 0.010, 0.022);
     let upright = Quat::from_rotation_x(-FRAC_PI_2);
@@ -155,7 +155,7 @@ pub(super) fn bells(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         smooth(0.46, 0.80),
         smooth(0.0, 0.92),
     ];
-    // The outline runs from the crown down, so it is reversed to face outwards.
+    // The outline runs from the crown down and is reversed to face outwards.
     let skin: Vec<_> = skin.into_iter().rev().collect();
     bell.lathe(&curve(&skin, 2), 32);
     let bell = scene.mesh("bell", bell, kit.polished);

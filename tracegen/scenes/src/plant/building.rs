@@ -69,7 +69,7 @@ impl Layout {
         self.put(self.p.diffuser, ALONG, x + 22.4, 6.6, z + 3.0);
     }
 
-    /// Three trays with cables along the nave's other side, on stands that carry the duct, too.
+    /// Three trays with cables along the nave's other side, on stands that also carry the duct.
     pub(super) fn cable_trays(&mut self, x: f32, z: f32) {
         let x = x + 22.4;
         for k in 0..2 {

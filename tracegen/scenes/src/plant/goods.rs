@@ -19,7 +19,7 @@ impl Layout {
         }
     }
 
-    /// Shelves of pallets with what lies on them; the last bay of a row closes it.
+    /// Shelves of pallets with their loads. The last bay of a row closes it.
     fn pallet_racks(&mut self, x: f32, z: f32, nave: usize, bay: usize, last: bool) {
         let mut rng = Rng::new(u64::from(hash(nave as i32, bay as i32, 5)));
         for rx in [x + 14.4, x + 17.2] {
@@ -64,7 +64,7 @@ impl Layout {
         }
     }
 
-    /// Roller conveyors with what they carry, and a press between them.
+    /// Roller conveyors with their loads, and a press between them.
     fn conveyors(&mut self, x: f32, z: f32, nave: usize, bay: usize) {
         let mut rng = Rng::new(u64::from(hash(nave as i32, bay as i32, 6)));
         for dx in [14.2, 17.9] {

@@ -1,5 +1,5 @@
-//! What stands in the plant: tanks, pumps, machines, conveyors, racks and their loads, and the
-//! crane, each about its own origin on the floor.
+//! Objects in the plant: tanks, pumps, machines, conveyors, racks and their loads, and the crane.
+//! Each is modelled about its own origin on the floor.
 
 use super::materials::PlantMaterials;
 use super::parts::{NAVE_M, bar};
@@ -80,7 +80,7 @@ fn tank() -> MeshBuilder {
     )
 }
 
-/// A vessel of radius 0.6 m that lies along z from 0 to 4.2 m, its axis at the origin's height.
+/// A vessel of radius 0.6 m along z from 0 to 4.2 m, its axis at the origin's height.
 fn vessel() -> MeshBuilder {
     let upright = lathed(
         &[
@@ -379,7 +379,7 @@ fn wheel() -> MeshBuilder {
     wheel
 }
 
-/// A girder of the crane; rails and wheels of the trolley ride on its top at 0.9 m.
+/// A girder of the crane. The trolley's rails and wheels are on its top at 0.9 m.
 fn girder() -> MeshBuilder {
     let span = NAVE_M - 1.5;
     boxes(

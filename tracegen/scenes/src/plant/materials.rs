@@ -8,7 +8,7 @@ use glam::{Vec3, vec3};
 use scene::AlphaMode;
 use std::f32::consts::TAU;
 
-/// Services that pipes carry, by the colour of their paint.
+/// Number of services that pipes carry. Each has its own colour of paint.
 pub(super) const SERVICES: usize = 6;
 
 pub(super) struct PlantMaterials {
@@ -203,7 +203,7 @@ pub(super) fn kit(scene: &mut SceneBuilder) -> PlantMaterials {
     }
 }
 
-/// Paint on steel: dirt in clouds, chips down to rust.
+/// Painted steel: clouds of dirt, chips down to rust.
 fn painted(color: Rgb, wear: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -262,7 +262,7 @@ fn concrete() -> Surface {
     })
 }
 
-/// Trapezoidal sheet: ribs along v, laps once a texture, streaks below the screws.
+/// Trapezoidal sheet: ribs along v, one lap per texture, streaks below the screws.
 fn cladding(color: Rgb) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -325,7 +325,7 @@ fn lagging() -> Surface {
     })
 }
 
-/// Bearing bars and cross rods; more than half is steel, so that far mip levels stay whole.
+/// Bearing bars and cross rods. More than half is steel, so that distant mip levels stay opaque.
 fn grating_bars() -> Surface {
     Box::new(|u, v| {
         let noise = bank();

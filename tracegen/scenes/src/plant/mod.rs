@@ -1,9 +1,10 @@
-//! An industrial hall of very many objects: naves of pipe racks, tanks, pumps, machines, stores and
-//! walkways under travelling cranes. It stands for the data of a factory's planners.
+//! An industrial hall with a very large number of objects: naves of pipe racks, tanks, pumps,
+//! machines, stores and walkways under travelling cranes. It is a stand-in for factory planning
+//! data.
 //!
-//! The hall is laid out bay by bay, then sorted by mesh, so that the instances of a mesh follow each
-//! other and make one draw call. Directions are quarter turns throughout: their matrices hold
-//! zeros and ones, which keeps boxes tight and cheap.
+//! The hall is laid out bay by bay and then sorted by mesh, so that the instances of a mesh are
+//! consecutive and make one draw call. All directions are quarter turns: their matrices contain
+//! only zeros and ones, which keeps boxes tight and cheap to compute.
 
 mod building;
 mod goods;
@@ -26,12 +27,12 @@ pub const DEFAULT_INSTANCES: u32 = 20_000;
 /// Allowed numbers of instances.
 pub const INSTANCES: RangeInclusive<u32> = 20_000..=100_000;
 
-/// Instances that a bay of a nave has at most.
+/// Largest number of instances in a bay of a nave.
 const BAY_INSTANCES: usize = 460;
-/// Foot of the cranes' rails, metres.
+/// Height of the foot of the cranes' rails, metres.
 const RAIL_M: f32 = 7.8;
 
-/// Quarter turns: where x, y and z point.
+/// Quarter turns, given by the directions of x, y and z.
 const ALONG: Mat3 = Mat3::IDENTITY;
 const AROUND: Mat3 = Mat3::from_cols(Vec3::NEG_X, Vec3::Y, Vec3::NEG_Z);
 /// z to +x.
@@ -68,7 +69,7 @@ pub fn with_instances(instances: u32) -> Scene {
         p,
         m,
     };
-    // A hall some three times as long as wide; its last bay holds the stores.
+    // The hall is about three times as long as wide. Its last bay holds the stores.
     let cells = instances as f32 / 390.0;
     let naves = ((cells * BAY_M / (3.0 * NAVE_M)).sqrt().round() as usize).max(1);
     let mut bays = instances / (naves * BAY_INSTANCES / 2);
@@ -135,7 +136,7 @@ impl Layout {
         self.placed.push((mesh, place, None));
     }
 
-    /// Puts a part of what moves together.
+    /// Places a part of a moving group.
     fn put_moving(&mut self, motion: usize, mesh: usize, turn: Mat3, at: Vec3) {
         let place = Affine3A::from_mat3_translation(turn, at);
         self.placed.push((mesh, place, Some(motion)));
@@ -146,7 +147,7 @@ impl Layout {
         self.motions.len() - 1
     }
 
-    /// Instances of a mesh follow each other, in the order in which they were placed.
+    /// Sorts instances by mesh, and keeps the order in which those of a mesh were placed.
     fn finish(mut self, scene: &mut SceneBuilder) {
         self.placed.sort_by_key(|(mesh, ..)| *mesh);
         let mut groups = vec![Vec::new(); self.motions.len()];
@@ -210,7 +211,7 @@ impl Layout {
     }
 
     fn cabinet(&mut self, x: f32, z: f32, turn: Mat3, panel: bool) {
-        // The door is at -z: it faces against the turned z axis.
+        // The door is at -z, so it faces against the rotated z axis.
         let turn = turn * AROUND;
         self.put(self.m.cabinet, turn, x, 0.0, z);
         if panel {
@@ -226,7 +227,7 @@ impl Layout {
     }
 
     fn mill(&mut self, x: f32, z: f32, turn: Mat3, number: usize) {
-        // The door looks along the turned z axis.
+        // The door faces along the rotated z axis.
         let turn = turn * AROUND;
         let side = |along: f32, out: f32| turn * vec3(along, 0.0, -out);
         self.put(self.m.mill, turn, x, 0.0, z);

@@ -9,7 +9,7 @@ impl Layout {
     /// A crane that travels the nave, its trolley and its hook.
     pub(super) fn crane(&mut self, x: f32, z0: f32, bays: usize, seed: usize) {
         let run = (bays as f32 * BAY_M - 12.0).min(60.0);
-        // Near the end where the cameras are.
+        // Near the end at which the cameras are.
         let z = z0 + bays as f32 * BAY_M - 8.0 - 2.0 * seed as f32;
         let travel = Movement::Shuttle {
             by: Vec3::Z * -(run - 8.0),

@@ -1,6 +1,6 @@
 //! The plant's building, pipework, cables and walkways: small meshes that are placed many times.
 //!
-//! Long parts run along +z from their origin; what stands on the floor has its origin there.
+//! Long parts run along +z from their origin. Parts on the floor have their origin there.
 
 use super::materials::{PlantMaterials, SERVICES};
 use crate::mesh_builder::{Knot, MeshBuilder, SweepFrame, lathed, sharp, smooth};
@@ -8,11 +8,11 @@ use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
-/// Length of a bay, of pipes and of all else that runs through, metres.
+/// Length of a bay, of pipes and of other continuous parts, metres.
 pub(super) const BAY_M: f32 = 6.0;
 /// Width of a nave, metres.
 pub(super) const NAVE_M: f32 = 24.0;
-/// Underside of the roof, metres.
+/// Height of the underside of the roof, metres.
 pub(super) const ROOF_M: f32 = 13.0;
 /// Radii of pipes, metres.
 pub(super) const RADII_M: [f32; 3] = [0.045, 0.09, 0.19];
@@ -38,9 +38,9 @@ pub(super) struct Parts {
     pub(super) bolt: usize,
     pub(super) lamp_shade: usize,
     pub(super) lamp: usize,
-    /// Of bay length, by size and service.
+    /// Pipes of bay length, by size and service.
     pub(super) pipe: [[usize; SERVICES]; 3],
-    /// 2 m long, by size and service.
+    /// Pipes of 2 m length, by size and service.
     pub(super) spool: [[usize; SERVICES]; 3],
     pub(super) elbow: [[usize; SERVICES]; 3],
     pub(super) flange: [usize; 3],
@@ -116,7 +116,7 @@ fn block(low: [f32; 3], high: [f32; 3]) -> MeshBuilder {
     m
 }
 
-/// A box between two points, `width` thick both ways.
+/// A box between two points, `width` thick in both directions.
 pub(super) fn bar(m: &mut MeshBuilder, from: Vec3, to: Vec3, width: f32) {
     let length = from.distance(to);
     let h = width / 2.0;
@@ -147,7 +147,7 @@ fn bent_pipe(radius: f32, sides: usize) -> MeshBuilder {
     m
 }
 
-/// A disc about the z axis: the joint of two pipes, or the blind end of one.
+/// A disc about the z axis: the joint of two pipes, or the closed end of one.
 fn flange(radius: f32, sides: usize) -> MeshBuilder {
     let (r, h) = (1.55 * radius, 0.22 * radius + 0.012);
     let mut m = MeshBuilder::new();
@@ -289,7 +289,7 @@ fn cable(number: usize) -> MeshBuilder {
     let points: Vec<(Vec3, f32)> = (0..=8)
         .map(|i| {
             let t = i as f32 / 8.0;
-            // Ends meet the next bay's cable.
+            // Cables of adjacent bays meet.
             let x = 0.02 * ((TAU * t + phase).sin() - phase.sin());
             (vec3(x, 0.0, BAY_M * t), 0.016)
         })
@@ -428,7 +428,7 @@ fn tray() -> MeshBuilder {
     tray
 }
 
-/// Stands on the floor, 4.4 m below, and reaches past three trays to the duct.
+/// Starts on the floor, 4.4 m below, and reaches past three trays to the duct.
 fn stand() -> MeshBuilder {
     let mut stand = MeshBuilder::new();
     for x in [-0.36, 0.32] {
@@ -549,7 +549,7 @@ fn panels(scene: &mut SceneBuilder, kit: &PlantMaterials) -> [usize; 6] {
         Vec3::Z * -b,
         kit.lane,
     );
-    // Walls face +x and are half as high as the hall, so that bands of windows fit between.
+    // Walls face +x and are half as high as the hall, with room for bands of windows between them.
     let wall = panel(
         "wall",
         vec3(0.0, 0.0, b),

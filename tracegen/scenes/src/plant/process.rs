@@ -65,7 +65,7 @@ impl Layout {
         let valve = y - bend - 2.0 - 0.2;
         self.put(self.p.valve, UP, end, valve, z);
         self.put(self.p.flange[1], UP, end, valve - 0.2, z);
-        // On into the floor.
+        // Continues into the floor.
         self.put(self.p.spool[1][service], UP, end, valve - 2.2, z);
     }
 

@@ -1,6 +1,8 @@
 //! Chooses the techniques of every frame of a path under a budget.
 
+use super::search::Infeasible;
 use super::{AutoRecord, Budget, Held, Known, Objective, SearchBench, hold, search};
+
 use crate::study::measure::{Extent, median_s};
 use crate::study::rows::{Part, Row};
 use crate::study::world::World;
@@ -85,11 +87,12 @@ pub fn choose(
     let found = match search(&mut bench, &options, &combinations, budget, objective)? {
         Ok(found) => found,
         Err(infeasible) => {
-            let closest = infeasible.closest;
+            let Infeasible { closest, baseline } = infeasible;
             bail!(
-                "nothing meets --auto {budget}: the fastest found, {}, takes {:.1} ms a frame on this device",
+                "no combination meets --auto {budget}: the fastest one found, {}, takes {:.1} ms per frame on this device, the baseline {:.1} ms",
                 closest.row.name,
-                closest.per_frame() * 1e3
+                closest.per_frame() * 1e3,
+                baseline.per_frame() * 1e3
             );
         }
     };

@@ -167,6 +167,8 @@ pub struct Elsewhere {
 pub struct Infeasible {
     /// The combination that comes closest.
     pub closest: Box<Tried>,
+    /// The baseline.
+    pub baseline: Box<Tried>,
 }
 
 /// A combination must save this share of the frame time to replace a simpler one; smaller differences are
@@ -254,6 +256,7 @@ pub fn search<J: Judge>(
             if !fits(&chosen) {
                 return Ok(Err(Infeasible {
                     closest: Box::new(chosen),
+                    baseline: Box::new(search.tried[0].clone()),
                 }));
             }
             let lossless = chosen.row.lossless || !fits(&best_single);

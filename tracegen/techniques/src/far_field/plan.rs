@@ -8,13 +8,13 @@ use crate::start::{Composition, Opening, Start};
 use formats::view::{Eye, FrameViews};
 use std::sync::Arc;
 
-/// Positions of the layers.
+/// Indices of the layers.
 const NEARER: [usize; 2] = [0, 1];
 const FARTHER: usize = 2;
 const PICTURES: [usize; 2] = [3, 4];
 
-/// Opaque draws up to the split for each eye, those beyond it once where an eye sees through to them, and
-/// over both the blended draws of each eye.
+/// Plans three kinds of layers: opaque draws up to the split for each eye, draws beyond it once where the
+/// first ones leave pixels open, and the blended draws of each eye over both.
 pub(crate) fn plan(
     far: &FarView,
     views: &FrameViews,

@@ -1,4 +1,5 @@
-//! The closed forms against brute force: random points projected into both eyes and the camera between.
+//! Compares the closed forms with random points, which are projected into both eyes and into the camera
+//! between them.
 
 use super::*;
 use formats::random::Random;
@@ -9,7 +10,8 @@ fn between(random: &mut Random, low: f64, high: f64) -> f64 {
     low + (high - low) * random.unit_f64()
 }
 
-/// Eyes `ipd_m` apart, turned outwards, for a head at some pose; `fov` is the left eye's.
+/// Eyes at a distance of `ipd_m` and rotated outwards, for a head in an arbitrary pose; `fov` is the left
+/// eye's.
 fn eyes(fov: FovTangents, ipd_m: f64, cant_deg: f64, far_m: f64) -> [EyeView; 2] {
     let head = DMat4::from_translation(DVec3::new(3.0, 1.7, -2.0))
         * DMat4::from_euler(EulerRot::YXZ, 0.6, -0.2, 0.1);
@@ -61,7 +63,7 @@ fn displays() -> Vec<[EyeView; 2]> {
     ]
 }
 
-/// A point of an eye's picture between the split and the far plane, and its pixel.
+/// A random point in an eye's picture between the split and the far plane, and its pixel.
 fn point_beyond(stereo: &Stereo, eye: usize, split_m: f64, random: &mut Random) -> (DVec3, DVec2) {
     let e = &stereo.eyes[eye];
     let ndc = DVec2::new(between(random, -1.0, 1.0), between(random, -1.0, 1.0));
@@ -73,7 +75,7 @@ fn point_beyond(stereo: &Stereo, eye: usize, split_m: f64, random: &mut Random) 
     (point, px)
 }
 
-/// Where the camera of the far field has a point, in its pixels.
+/// Position of a point in the far field's picture, in pixels.
 fn far_px(view: &FarView, point: DVec3) -> DVec3 {
     let clip = Mat4::from_cols_array_2d(&view.camera.eye_to_clip).as_dmat4()
         * Mat4::from_cols_array_2d(&view.camera.world_to_eye).as_dmat4();
@@ -90,7 +92,7 @@ fn through(map: &Mat3, px: DVec2) -> DVec2 {
 const VARIANTS: [Variant; 3] = [Variant::Plain, Variant::DepthShift, Variant::AlternateEye];
 
 #[test]
-fn no_point_beyond_the_split_is_off_by_more_than_predicted_and_some_nearly_so() {
+fn the_largest_shift_beyond_the_split_is_close_to_the_prediction_and_not_above() {
     let mut random = Random(1);
     for (display, eyes) in displays().iter().enumerate() {
         for variant in VARIANTS {
@@ -109,13 +111,13 @@ fn no_point_beyond_the_split_is_off_by_more_than_predicted_and_some_nearly_so() 
                         worst = worst.max(drawn.distance(px));
                     }
                     let bound = f64::from(budget_px);
-                    let told = format!("display {display} {variant:?} {budget_px} px: {worst}");
+                    let place = format!("display {display} {variant:?} {budget_px} px: {worst}");
                     // Matrices of 32 bits are accurate to a hundredth of a pixel.
-                    assert!(worst <= bound + 0.01, "{told}");
+                    assert!(worst <= bound + 0.01, "{place}");
                     // The far plane ends the depth shift before infinity.
                     assert!(
                         worst >= 0.8 * bound * (1.0 - f64::from(split_m) / 200.0),
-                        "{told}"
+                        "{place}"
                     );
                 }
             }
@@ -124,7 +126,7 @@ fn no_point_beyond_the_split_is_off_by_more_than_predicted_and_some_nearly_so() 
 }
 
 #[test]
-fn parallel_eyes_have_the_split_and_the_shift_of_the_published_formulae() {
+fn parallel_eyes_have_the_published_split_and_shift() {
     let (width, tangent, ipd_m) = (1024.0_f32, 1.0_f32, 0.064_f32);
     let pair = eyes(fov(tangent, tangent, 1.0, 1.0), ipd_m.into(), 0.0, 1000.0);
     let plain = Stereo::new(&pair, [1024, 1024], Variant::Plain, 0);
@@ -135,7 +137,7 @@ fn parallel_eyes_have_the_split_and_the_shift_of_the_published_formulae() {
             (split_m / expected - 1.0).abs() < 1e-4,
             "{split_m} {expected}"
         );
-        // From an eye instead of the midpoint, twice as far.
+        // The distance from the eye is twice that from the midpoint.
         let alternate = Stereo::new(&pair, [1024, 1024], Variant::AlternateEye, 1);
         assert!((alternate.split_m(budget_px) / expected - 2.0).abs() < 2e-4);
     }
@@ -146,7 +148,7 @@ fn parallel_eyes_have_the_split_and_the_shift_of_the_published_formulae() {
         .view(split_m, 8192)
         .unwrap();
     let unshifted = plain.view(split_m, 8192).unwrap();
-    // The plane of the shift lies at twice the split, which halves both the split and the largest error.
+    // The plane of the shift is at twice the split, so both the split and the largest error are halved.
     let ndc_shift = 1.0 / tangent * (ipd_m / 2.0) / (2.0 * split_m);
     let of_shift = Stereo::new(&pair, [1024, 1024], Variant::DepthShift, 0);
     assert!((of_shift.split_m(1.0) / plain.split_m(1.0) - 0.5).abs() < 1e-6);
@@ -164,7 +166,7 @@ fn parallel_eyes_have_the_split_and_the_shift_of_the_published_formulae() {
 }
 
 #[test]
-fn the_camera_holds_all_that_either_eye_sees_beyond_the_split_in_its_depth_range() {
+fn the_camera_contains_everything_visible_beyond_the_split() {
     let mut random = Random(2);
     for eyes in displays() {
         for variant in VARIANTS {
@@ -192,7 +194,7 @@ fn the_camera_holds_all_that_either_eye_sees_beyond_the_split_in_its_depth_range
 }
 
 #[test]
-fn parallel_eyes_with_equal_views_take_whole_pixels() {
+fn parallel_eyes_with_equal_views_map_to_whole_pixels() {
     let [pair, ..] = &displays()[..] else {
         unreachable!()
     };
@@ -204,13 +206,13 @@ fn parallel_eyes_with_equal_views_take_whole_pixels() {
         assert!((px - px.round()).length() < 1e-3, "{px}");
         assert!((through(&map, DVec2::new(701.5, 900.5)) - 0.5 - px - DVec2::X).length() < 1e-4);
     }
-    // The eyes' pictures and a margin for the disparity at the split.
+    // The size of the eyes' pictures, plus a margin for the disparity at the split.
     assert!((964..975).contains(&view.size_px[0]), "{:?}", view.size_px);
     assert_eq!(view.size_px[1], 1084);
 }
 
 #[test]
-fn ahead_of_an_eye_the_camera_has_as_many_pixels_an_angle() {
+fn the_camera_has_at_least_as_many_pixels_per_angle_as_an_eye() {
     for (eyes, limit) in displays().iter().zip([1.001, 1.001, 1.1, 1.1]) {
         let view = Stereo::new(eyes, SIZE_PX, Variant::Plain, 0)
             .view(8.0, 8192)
@@ -227,7 +229,7 @@ fn ahead_of_an_eye_the_camera_has_as_many_pixels_an_angle() {
 }
 
 #[test]
-fn both_maps_between_pixels_undo_each_other_and_depth_comes_with_them() {
+fn maps_between_pixels_are_inverse_and_depth_is_converted() {
     let mut random = Random(3);
     for eyes in displays() {
         let stereo = Stereo::new(&eyes, SIZE_PX, Variant::DepthShift, 0);
@@ -268,7 +270,7 @@ fn eyes_that_look_away_from_each_other_have_no_far_field() {
 }
 
 #[test]
-fn without_a_distance_between_the_eyes_everything_may_be_far() {
+fn eyes_at_one_place_have_a_split_at_zero_and_no_shift() {
     let pair = eyes(fov(1.0, 1.0, 1.0, 1.0), 0.0, 0.0, 100.0);
     let stereo = Stereo::new(&pair, SIZE_PX, Variant::Plain, 0);
     assert!(stereo.split_m(1.0) < 1e-5);
@@ -276,7 +278,7 @@ fn without_a_distance_between_the_eyes_everything_may_be_far() {
 }
 
 #[test]
-fn a_split_beyond_all_that_is_seen_leaves_no_far_field_and_least_work_keeps_its_budget() {
+fn a_split_beyond_the_far_plane_gives_no_far_field_and_least_work_keeps_its_budget() {
     let [pair, ..] = &displays()[..] else {
         unreachable!()
     };
@@ -304,7 +306,7 @@ fn a_split_beyond_all_that_is_seen_leaves_no_far_field_and_least_work_keeps_its_
     assert_eq!(one_px, stereo.split_m(1.0));
     let least = Split::LeastWork { within_px: 1.0 };
     assert_eq!(view(least, 50.0).unwrap().split_m, one_px);
-    // Boxes from 10 m on: as much across the split as beyond it.
+    // For boxes from 10 m on, the area across the split equals that beyond it.
     let split_m = view(least, 10.0).map_or(f32::INFINITY, |view| view.split_m);
     assert!(split_m >= one_px, "{split_m}");
     assert_eq!(view(least, 1.0), None);

@@ -1,21 +1,22 @@
-//! The coarsest shading that the eye cannot distinguish from the display's own pixels.
+//! The coarsest shading that an eye cannot distinguish from full resolution.
 //!
 //! The smallest cycle that the eye resolves grows linearly with the angle e from the gaze (Guenter et al.,
-//! Foveated 3D graphics, 2012): `m e + 1/48` degrees, m being 1.32 to 1.65 minutes of arc per degree. Shading
-//! every n-th pixel shows cycles of 2 n pixels; where those are no larger, nothing is lost.
+//! Foveated 3D graphics, 2012): `m e + 1/48` degrees, with m from 1.32 to 1.65 minutes of arc per degree.
+//! Shading every n-th pixel shows cycles of 2 n pixels. If these are not larger than the smallest cycle, the
+//! loss is invisible.
 
 use super::rings::COARSENESS;
 use crate::settings::Rates;
 use formats::view::Hmd;
 
-/// The cautious end of the published slopes, degrees per degree.
+/// The lowest published slope, which is the conservative choice, in degrees per degree.
 const SLOPE: f64 = 1.32 / 60.0;
 /// Smallest cycle at the gaze, degrees.
 const SMALLEST_CYCLE_DEG: f64 = 1.0 / 48.0;
 
 impl Rates {
-    /// The angles from which on each rate loses nothing that the eye resolves, for a display's pixels straight
-    /// ahead, where they span the largest angle.
+    /// The angles from which each rate has no visible loss. They are computed for the display's pixels
+    /// straight ahead, which span the largest angle.
     #[must_use]
     pub fn of_acuity(hmd: &Hmd) -> Self {
         let pixel_deg = |axis: usize| {
@@ -45,7 +46,7 @@ mod tests {
     use formats::view::FovTangents;
 
     #[test]
-    fn the_rates_begin_where_their_cycles_are_as_small_as_the_eye_resolves() {
+    fn rates_start_where_their_cycles_equal_the_smallest_visible_ones() {
         let fov = FovTangents {
             left: 1.191_753_6,
             right: 1.191_753_6,
@@ -57,7 +58,7 @@ mod tests {
             fov: [fov; 2],
             ..Hmd::default()
         };
-        // 7.03 pixels a degree: cycles of 4 and 8 pixels are 0.569 and 1.138 degrees.
+        // 7.03 pixels per degree: cycles of 4 and 8 pixels are 0.569 and 1.138 degrees.
         let edges = Rates::of_acuity(&hmd).edges_deg;
         for (edge, cycle_deg) in edges.into_iter().zip([0.569, 0.569, 1.138, 1.138]) {
             let resolved = 1.32 / 60.0 * edge + 1.0 / 48.0;

@@ -1,9 +1,9 @@
-//! Lens-matched shading: four viewports an eye that meet straight ahead, each with the w of its clip space
-//! grown towards the edges: `w' = w + A |x| + A |y|`, x and y being 0 straight ahead and w at the edge.
+//! Lens-matched shading: four viewports per eye that meet straight ahead. In each, the w of clip space grows
+//! towards the edges: `w' = w + A |x| + A |y|`, where x and y are 0 straight ahead and w at the edge.
 //!
-//! That is a projective map of the picture: straight ahead it keeps the pixels, towards the edges, where a lens
-//! squeezes the picture, it shades fewer of them. Points of one direction keep the order of their depths, and triangles stay triangles,
-//! so a viewport is a layer with another projection.
+//! This is a projective map of the picture. It keeps the pixels straight ahead and shades fewer towards the
+//! edges, where the lens compresses the picture. Points in one direction keep the order of their depths, and
+//! triangles remain triangles. A viewport is therefore a layer with another projection.
 
 use crate::Mask;
 use crate::eye::EyePicture;
@@ -13,12 +13,12 @@ use formats::view::TILE_SIZE_PX;
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
-/// The coefficient A along both axes: edges have 1/(1 + A)^2 of the pixels across, and the whole picture
+/// The coefficient A for both axes. Edges have 1/(1 + A)^2 of the pixels per axis, and the whole picture has
 /// `(1 - 2/(1 + A) + 1/(1 + 2A)) / (2 A^2)` = 39.7 % of its pixels.
 pub const WARP: f64 = 0.4;
 
-/// One layer per quadrant. Viewports end at tiles, and have a border of one pixel beyond the cuts, for the
-/// interpolation of the picture's pixels.
+/// One layer per quadrant. Viewports end at tiles and have a border of one pixel beyond the cuts, from which
+/// the picture's pixels are interpolated.
 pub(crate) fn patches(picture: &EyePicture) -> EyePatches {
     let ahead = picture.ahead_px();
     let cut = [0, 1].map(|axis: usize| {
@@ -51,7 +51,7 @@ pub(crate) fn patches(picture: &EyePicture) -> EyePatches {
     }
 }
 
-/// The layer of a quadrant, and the pixels to be shaded without its border.
+/// The layer of a quadrant, and the number of pixels to be shaded without its border.
 fn quadrant(
     picture: &EyePicture,
     number: u16,
@@ -62,7 +62,7 @@ fn quadrant(
     let length = [0, 1].map(|axis| f64::from(high[axis] - low[axis]));
     let inner = length.map(|length| (length / (1.0 + WARP)).ceil() as u32);
     let size_px = inner.map(|inner| inner + 1);
-    // The cut in pixels of the layer: after a border of one pixel, or before it.
+    // Position of the cut in pixels of the layer: after or before a border of one pixel.
     let seam = [0, 1].map(|axis| {
         if after[axis] {
             1.0
@@ -86,7 +86,7 @@ fn quadrant(
                 continue;
             }
             let at = layer_from_px * DVec3::new(f64::from(x) + 0.5, f64::from(y) + 0.5, 1.0);
-            // The map keeps areas straight ahead, so its determinant is 1 there.
+            // The map keeps areas straight ahead, so its determinant there is 1.
             rate += at.z.powi(-3);
             let first = [at.x, at.y].map(|along| (along / at.z - 0.5).floor());
             let tap = |axis: usize, step: f64| {
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_shades_the_share_of_its_pixels_that_the_integral_says() {
+    fn the_share_of_shaded_pixels_is_that_of_the_integral() {
         let made = patches(&picture([1024, 1024]));
         let whole = 1024.0 * 1024.0;
         let a = WARP;
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn the_projection_puts_a_point_where_the_picture_looks_for_it() {
+    fn the_projection_and_the_map_of_pixels_agree() {
         let picture = picture([320, 192]);
         let view = EyeView::default();
         for patch in patches(&picture).patches {
@@ -187,7 +187,7 @@ mod tests {
                     assert!(off.abs() < 1e-3, "{x} {y}: {at:?} {expected:?}");
                     assert!((0.0..=layer.size_px[axis] as f32).contains(&at[axis]));
                 }
-                // Nearer stays nearer, and nothing new is clipped.
+                // The order of depths is kept, and nothing additional is clipped.
                 assert!(clip.w >= 3.0 && clip.z == 1.0);
             }
         }

@@ -1,7 +1,7 @@
 //! Foveation: coarser shading away from the gaze. One technique per file.
 //!
-//! Each renders layers of its own sizes, so that what a coarse pixel samples is what it would sample on a
-//! display with fewer pixels: its derivatives span more texels, and coarser mip levels follow by themselves.
+//! Each technique renders layers of lower resolution. A coarse pixel therefore samples as on a display with
+//! fewer pixels: its derivatives span more texels, which selects coarser mip levels.
 
 pub(crate) mod acuity;
 pub mod lens_matched;

@@ -1,4 +1,4 @@
-//! Multi-resolution shading: 3x3 viewports, the outer ones at half the resolution across.
+//! Multi-resolution shading: 3x3 viewports, of which the outer ones have half the resolution per axis.
 
 use crate::Mask;
 use crate::eye::EyePicture;
@@ -7,14 +7,14 @@ use crate::plan::Filter;
 use formats::view::TILE_SIZE_PX;
 use std::sync::Arc;
 
-/// Part of the picture's width and height that keeps its resolution. With the rest at half of it,
-/// (0.4 + 0.6 / 2)^2 = 49 % of the pixels are shaded.
+/// Share of the picture's width and height with full resolution. With half resolution in the rest, (0.4 + 0.6
+/// / 2)^2 = 49 % of the pixels are shaded.
 const CENTER_SHARE: f64 = 0.4;
 /// Columns or rows of the picture per pixel of an outer viewport.
 const COARSE: u32 = 2;
 
-/// A layer a viewport, with a border of a pixel towards the others from which the picture's pixels
-/// are interpolated. Viewports end at tiles.
+/// One layer per viewport, with a border of one pixel towards the other viewports, from which the picture's
+/// pixels are interpolated. Viewports end at tiles.
 pub(crate) fn patches(picture: &EyePicture) -> EyePatches {
     let gaze = picture.gaze_px();
     let cuts = [0, 1].map(|axis: usize| cuts(picture.size_px[axis], gaze[axis]));
@@ -43,7 +43,7 @@ pub(crate) fn patches(picture: &EyePicture) -> EyePatches {
     }
 }
 
-/// Edges of the three parts of an axis: the middle one has [`CENTER_SHARE`] of it around the gaze.
+/// Edges of the three parts of an axis. The middle part, around the gaze, has a share of [`CENTER_SHARE`].
 fn cuts(size_px: u32, gaze_px: f64) -> [u32; 4] {
     let tile = f64::from(TILE_SIZE_PX);
     let tiles = f64::from(size_px.div_ceil(TILE_SIZE_PX));
@@ -57,7 +57,7 @@ fn cuts(size_px: u32, gaze_px: f64) -> [u32; 4] {
     [0, edge(first), edge(first + length), size_px]
 }
 
-/// The viewport over a rectangle of the picture, `high` being its end.
+/// The viewport for a rectangle of the picture; `high` is its end.
 fn viewport(
     picture: &EyePicture,
     number: u16,
@@ -70,10 +70,10 @@ fn viewport(
         (0..2).all(|axis| (low[axis]..high[axis]).contains(&first[axis]))
     });
     if coarseness == [1, 1] {
-        // With the eye's own projection: one that is narrowed rounds otherwise, which moves edges.
+        // Use the eye's own projection, because a narrowed one rounds differently, which moves edges.
         return Patch::of_tiles(picture, number, coarseness, owned);
     }
-    // A whole pixel of the layer beyond each edge at which it is interpolated and has a neighbour.
+    // A border of one pixel of the layer at each edge where pixels are interpolated and a neighbour exists.
     let border = coarseness.map(|n| if n > 1 { n } else { 0 });
     let origin_px = [0, 1].map(|axis: usize| low[axis].saturating_sub(border[axis]));
     let end = [0, 1].map(|axis: usize| (high[axis] + border[axis]).min(picture.size_px[axis]));

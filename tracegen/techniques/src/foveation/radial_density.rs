@@ -1,4 +1,4 @@
-//! Radial density masking: in the periphery every other 2x2 quad is left out, and filled from the
+//! Radial density masking: in the periphery, every other 2x2 quad is left out and filled in from its
 //! neighbours.
 
 use crate::Mask;
@@ -9,7 +9,8 @@ use crate::settings::Rates;
 use formats::view::TILE_SIZE_PX;
 use std::sync::Arc;
 
-/// One layer at full size: all of the tiles up to the first edge of the rates, a checkerboard of quads beyond.
+/// One layer of full size: all pixels of the tiles within the first angle of the rates, and a checkerboard of
+/// quads beyond.
 pub(crate) fn patches(picture: &EyePicture, rates: &Rates) -> EyePatches {
     let [columns, rows] = picture.tiles();
     let tiles = (0..rows).flat_map(|y| (0..columns).map(move |x| [x, y]));

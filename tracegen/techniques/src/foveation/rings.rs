@@ -5,10 +5,10 @@ use crate::eye::EyePicture;
 use crate::patch::{EyePatches, Patch};
 use crate::settings::Rates;
 
-/// Columns and rows of a picture that a shaded pixel covers, by ring: rates 1, 1/2, 1/4, 1/8, 1/16.
+/// Columns and rows of the picture per shaded pixel, by ring: rates 1, 1/2, 1/4, 1/8, 1/16.
 pub(crate) const COARSENESS: [[u32; 2]; 5] = [[1, 1], [2, 1], [2, 2], [4, 2], [4, 4]];
 
-/// A layer a rate, each over the whole picture and masked to its tiles.
+/// One layer per rate. Each covers the whole picture and is masked to its tiles.
 pub(crate) fn patches(picture: &EyePicture, rates: &Rates) -> EyePatches {
     let rings = rings(picture, rates);
     let columns = picture.tiles()[0];

@@ -42,7 +42,7 @@ fn plan(settings: &Settings, hmd: &Hmd) -> FramePlan {
     planner.plan(&FrameViews::default(), Vec::new).unwrap()
 }
 
-/// Every setting that makes layers, with a gaze ahead and one at a corner.
+/// All settings that result in layers, each with a gaze straight ahead and one in a corner.
 fn all() -> Vec<Settings> {
     let mut all = vec![
         Settings::default(),
@@ -100,7 +100,7 @@ fn taps(part: &PicturePart, layer: &Layer, pixel: [u32; 2]) -> Vec<[u32; 2]> {
                 let n = f64::from(part.coarseness[axis]);
                 let at = (f64::from(own[axis]) + 0.5) / n - 0.5;
                 let last = f64::from(layer.size_px[axis] - 1);
-                // A tap without weight is not read.
+                // A tap with weight zero is not read.
                 let next = if at.fract() == 0.0 {
                     at
                 } else {
@@ -118,7 +118,7 @@ fn taps(part: &PicturePart, layer: &Layer, pixel: [u32; 2]) -> Vec<[u32; 2]> {
 }
 
 #[test]
-fn each_shown_pixel_comes_of_one_part_and_of_pixels_that_are_drawn() {
+fn each_visible_pixel_has_one_part_and_reads_only_drawn_pixels() {
     for size_px in [[120, 104], [131, 97]] {
         let hmd = hmd(size_px);
         for settings in all() {
@@ -171,7 +171,7 @@ fn each_shown_pixel_comes_of_one_part_and_of_pixels_that_are_drawn() {
 }
 
 #[test]
-fn a_layers_pixels_look_where_the_pictures_pixels_that_they_cover_look() {
+fn pixels_of_a_layer_have_the_directions_of_the_pictures_pixels() {
     let hmd = hmd([131, 97]);
     let eye_to_clip = glam::camera::rh::proj::directx::perspective(1.4, 1.2, 0.1, 90.0);
     let view = EyeView {
@@ -195,7 +195,7 @@ fn a_layers_pixels_look_where_the_pictures_pixels_that_they_cover_look() {
             for part in parts {
                 let layer = &plan.layers[part.layer];
                 for corner in [[0, 0], layer.size_px] {
-                    // A point in the picture's pixels, and the same in the layer's.
+                    // A point in pixels of the picture, and the same point in pixels of the layer.
                     let px = match &part.layer_from_px {
                         None => [0, 1].map(|axis: usize| {
                             f64::from(part.origin_px[axis] + corner[axis] * part.coarseness[axis])
@@ -225,7 +225,7 @@ fn a_layers_pixels_look_where_the_pictures_pixels_that_they_cover_look() {
 }
 
 #[test]
-fn shares_are_those_of_the_rates_and_the_borders_cost_little() {
+fn shaded_shares_match_the_rates_and_borders_are_small() {
     let hmd = hmd([960, 1080]);
     let shares = |settings: &Settings| {
         let predicted = plan(settings, &hmd).predicted;
@@ -234,7 +234,7 @@ fn shares_are_those_of_the_rates_and_the_borders_cost_little() {
             predicted.shaded_share.unwrap(),
         )
     };
-    // The viewports end at tiles, so that the share is not exactly 49 %.
+    // The viewports end at tiles, so the share is not exactly 49 %.
     let (rate, shaded) = shares(&foveated(FoveationKind::MultiResolution, [0.0, 0.0], false));
     assert!(
         (rate - 0.49).abs() < 0.02 && shaded > rate && shaded < rate + 0.01,
@@ -248,7 +248,7 @@ fn shares_are_those_of_the_rates_and_the_borders_cost_little() {
         hidden_area_mask: true,
         ..Settings::default()
     };
-    // A circle that touches the left and right edges, by the vertical tangents' span.
+    // The share of a circle that touches the left and right edges, for this vertical span of tangents.
     let (rate, shaded) = shares(&masked);
     let expected = std::f32::consts::PI * 1.15 * 1.15 / (2.3 * 2.1);
     assert!(
@@ -258,8 +258,8 @@ fn shares_are_those_of_the_rates_and_the_borders_cost_little() {
 }
 
 #[test]
-fn rings_around_the_gaze_have_the_shares_that_a_circle_has() {
-    // One rate beyond 20 degrees: a disc of tan(20) in a square picture of tangent 1.15.
+fn rings_around_the_gaze_have_the_share_of_a_circle() {
+    // One rate beyond 20 degrees: a disc of tan(20) in a square picture with a tangent of 1.15.
     let mut hmd = hmd([1600, 1600]);
     hmd.fov = [FovTangents {
         left: 1.15,
@@ -274,7 +274,7 @@ fn rings_around_the_gaze_have_the_shares_that_a_circle_has() {
     let share = plan(&settings, &hmd).predicted.rate_share.unwrap();
     let disc = std::f32::consts::PI * 20.0_f32.to_radians().tan().powi(2) / 2.3_f32.powi(2);
     let expected = disc + (1.0 - disc) / 16.0;
-    // Tiles that touch the disc belong to it: a ring of at most half a tile.
+    // Tiles that touch the disc belong to it, which adds a ring of at most half a tile.
     assert!(
         share > expected && share < expected + 0.02,
         "{share} {expected}"
@@ -282,7 +282,7 @@ fn rings_around_the_gaze_have_the_shares_that_a_circle_has() {
 }
 
 #[test]
-fn left_and_right_layers_of_a_number_follow_each_other() {
+fn left_and_right_layers_with_the_same_number_are_consecutive() {
     for settings in all() {
         let plan = plan(&settings, &hmd([131, 97]));
         let keys: Vec<_> = plan
@@ -295,10 +295,10 @@ fn left_and_right_layers_of_a_number_follow_each_other() {
 }
 
 #[test]
-fn a_rate_that_no_tile_has_makes_no_layer() {
+fn a_rate_without_tiles_has_no_layer() {
     let hmd = hmd([320, 320]);
     let mut settings = foveated(FoveationKind::Rings, [0.0; 2], true);
-    // The second ring has no width, and the last begins beyond the display's corners.
+    // The second ring has no width, and the last one starts beyond the display's corners.
     let rates = Rates {
         edges_deg: [10.0, 10.0, 20.0, 120.0],
     };
@@ -311,7 +311,7 @@ fn a_rate_that_no_tile_has_makes_no_layer() {
 }
 
 #[test]
-fn eyes_that_no_far_field_serves_are_an_error_of_the_plan() {
+fn eyes_without_a_possible_far_field_are_an_error_of_the_plan() {
     let hmd = hmd([64, 64]);
     let settings = Settings {
         far_field: Some(FarField {
@@ -328,7 +328,7 @@ fn eyes_that_no_far_field_serves_are_an_error_of_the_plan() {
             .to_cols_array_2d(),
         ..EyeView::default()
     };
-    // Eyes with divergent directions: no picture of less than 180 degrees contains both views.
+    // The directions of these eyes diverge: no picture of less than 180 degrees contains both views.
     let views = FrameViews {
         frame: 3,
         eyes: [view(-80.0), view(80.0)],
@@ -337,7 +337,7 @@ fn eyes_that_no_far_field_serves_are_an_error_of_the_plan() {
 }
 
 #[test]
-fn the_layers_of_a_gaze_that_stays_are_made_once() {
+fn layers_are_reused_while_the_gaze_is_unchanged() {
     let hmd = hmd([131, 97]);
     let lenses = hmd.fov.map(|fov| Lens::of(&fov));
     let settings = foveated(FoveationKind::Rings, [3.0, 4.0], true);
@@ -366,7 +366,7 @@ fn the_layers_of_a_gaze_that_stays_are_made_once() {
 }
 
 #[test]
-fn a_headsets_mesh_masks_a_picture_in_place_of_the_lens() {
+fn a_hidden_area_mesh_replaces_the_mask_of_the_lens() {
     let hmd = hmd([128, 96]);
     // The left half of the left eye's picture, and the lower half of the right eye's.
     let rectangle = |x: f32, y: f32| {
@@ -387,7 +387,7 @@ fn a_headsets_mesh_masks_a_picture_in_place_of_the_lens() {
     );
     for (layer, shown) in made.layers.iter().zip([
         (|x, _| x >= 64) as fn(u32, u32) -> bool,
-        // Rows count downwards, the mesh upwards.
+        // Rows of pixels are numbered downwards; the mesh's coordinates point upwards.
         |_, y| y < 48,
     ]) {
         let expected = Mask::new([128, 96], shown);
@@ -424,7 +424,7 @@ fn at_half_rate_every_other_frame_has_no_layers() {
 }
 
 #[test]
-fn views_at_once_need_a_depth_buffer_each_and_passes_in_turn_share_one() {
+fn views_at_once_have_separate_depth_buffers_and_consecutive_passes_share_one() {
     let hmd = hmd([100, 80]);
     let view = 4 * 100 * 80;
     let baseline = plan(&Settings::default(), &hmd);
@@ -434,7 +434,8 @@ fn views_at_once_need_a_depth_buffer_each_and_passes_in_turn_share_one() {
     };
     assert_eq!(bytes(&baseline, false), (2 * view, view));
     assert_eq!(bytes(&baseline, true), (2 * view, 2 * view));
-    // Composed pictures exist in addition to their layers, and the largest layer's depth buffer is shared.
+    // Composed pictures are additional targets, and the layers share a depth buffer of the largest layer's
+    // size.
     let rings = plan(&foveated(FoveationKind::Rings, [0.0; 2], false), &hmd);
     let layers: u64 = (rings.layers.iter())
         .map(|layer| 4 * u64::from(layer.size_px[0]) * u64::from(layer.size_px[1]))

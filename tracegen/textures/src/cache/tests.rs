@@ -1,4 +1,4 @@
-//! Hits, damage, sharing and bounds.
+//! Tests of hits, damage, sharing and limits.
 
 use super::*;
 use std::fs::File;
@@ -23,7 +23,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn what_was_stored_is_loaded_by_another_process_s_cache() {
+fn stored_textures_are_loaded_by_another_cache_of_the_folder() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a/b");
     for (n, format) in [(1, TexelFormat::Bc1), (2, TexelFormat::Bc3)] {
@@ -48,7 +48,7 @@ fn keys_differ_with_the_version_and_with_every_byte() {
 }
 
 #[test]
-fn a_file_damaged_or_cut_anywhere_is_absent_and_is_replaced() {
+fn a_damaged_or_truncated_file_counts_as_missing_and_is_replaced() {
     let folder = tempfile::tempdir().unwrap();
     let cache = Cache::new(folder.path().to_owned(), 1 << 20);
     let stored = blocks(7, 300);
@@ -66,7 +66,7 @@ fn a_file_damaged_or_cut_anywhere_is_absent_and_is_replaced() {
     bad.extend((0..whole.len()).map(|length| whole[..length].to_vec()));
     bad.push([&whole[..], &[0]].concat());
     bad.push(vec![0; whole.len()]);
-    // A length that no memory holds.
+    // A length that exceeds any memory.
     let mut endless = whole.clone();
     endless[40..48].fill(0xff);
     bad.push(endless);
@@ -79,7 +79,7 @@ fn a_file_damaged_or_cut_anywhere_is_absent_and_is_replaced() {
 }
 
 #[test]
-fn a_whole_file_under_another_s_name_is_absent() {
+fn a_valid_file_with_another_key_counts_as_missing() {
     let folder = tempfile::tempdir().unwrap();
     let cache = Cache::new(folder.path().to_owned(), 1 << 20);
     cache.store(key(1), TexelFormat::Bc1, &blocks(1, 64));
@@ -88,9 +88,9 @@ fn a_whole_file_under_another_s_name_is_absent() {
 }
 
 #[test]
-fn writers_and_readers_at_once_see_whole_textures_only() {
+fn concurrent_writers_and_readers_see_only_complete_textures() {
     let folder = tempfile::tempdir().unwrap();
-    // Room for about six of the ten: eviction takes part.
+    // The limit holds about six of the ten textures, so some are evicted.
     let limit = 6 * (HEADER_BYTES as u64 + 5000);
     std::thread::scope(|scope| {
         for thread in 0..8u8 {
@@ -116,7 +116,7 @@ fn writers_and_readers_at_once_see_whole_textures_only() {
 }
 
 #[test]
-fn the_least_recently_used_go_when_the_bound_is_reached() {
+fn the_least_recently_used_textures_are_evicted_at_the_limit() {
     let folder = tempfile::tempdir().unwrap();
     let file_bytes = HEADER_BYTES as u64 + 1000;
     let cache = Cache::new(folder.path().to_owned(), 8 * file_bytes);
@@ -127,11 +127,11 @@ fn the_least_recently_used_go_when_the_bound_is_reached() {
         file.set_modified(long_ago + Duration::from_secs(n.into()))
             .unwrap();
     }
-    // The oldest is used once more, so that the second oldest is now the first to go.
+    // Using the oldest texture makes the second oldest the next one to be evicted.
     assert!(cache.load(key(0)).is_some());
     cache.store(key(8), TexelFormat::Bc1, &blocks(8, 1000));
     let there: Vec<u8> = (0..9).filter(|&n| cache.path(key(n)).exists()).collect();
-    // One for the new file and one more for the free eighth.
+    // One is evicted for the new file and one more for the free eighth.
     assert_eq!(there, [0, 3, 4, 5, 6, 7, 8]);
     let too_large = blocks(9, 9000);
     cache.store(key(9), TexelFormat::Bc1, &too_large);
@@ -139,7 +139,7 @@ fn the_least_recently_used_go_when_the_bound_is_reached() {
 }
 
 #[test]
-fn unfinished_files_of_killed_runs_are_cleared_after_a_day() {
+fn unfinished_files_of_killed_runs_are_removed_after_a_day() {
     let folder = tempfile::tempdir().unwrap();
     let (old, new) = (folder.path().join(".a.part"), folder.path().join(".b.part"));
     for path in [&old, &new] {
@@ -161,7 +161,7 @@ fn a_folder_that_cannot_be_used_is_an_empty_cache() {
     cache.store(key(1), TexelFormat::Bc1, &[1; 8]);
     assert_eq!(cache.load(key(1)), None);
 
-    // Read-only (root writes all the same): what is there still serves.
+    // Existing files of a read-only folder can still be used. (Root can also write to it.)
     let closed = folder.path().join("closed");
     let cache = Cache::new(closed.clone(), 1 << 20);
     cache.store(key(1), TexelFormat::Bc1, &[1; 8]);
@@ -170,7 +170,7 @@ fn a_folder_that_cannot_be_used_is_an_empty_cache() {
     assert_eq!(cache.load(key(1)), Some((TexelFormat::Bc1, vec![1; 8])));
     fs::set_permissions(&closed, fs::Permissions::from_mode(0o755)).unwrap();
 
-    // A folder under the file's name.
+    // A folder with the name of the file.
     fs::create_dir(cache.path(key(5))).unwrap();
     cache.store(key(5), TexelFormat::Bc1, &[5; 8]);
     assert_eq!(cache.load(key(5)), None);

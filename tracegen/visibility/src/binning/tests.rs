@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 const SIZE_PX: [u32; 2] = [100, 70];
 
-/// Pixels from the top left to clip space.
+/// A view that maps pixels from the top left to clip space.
 fn pixels() -> BinnedView {
     let [width, height] = SIZE_PX.map(|size| size as f32);
     BinnedView {
@@ -63,17 +63,17 @@ fn tiles_of(points: [[f32; 2]; 3]) -> Vec<u32> {
 }
 
 #[test]
-fn a_triangle_enters_the_tiles_that_it_covers_and_no_other_of_its_box() {
+fn a_triangle_enters_only_the_tiles_that_it_covers() {
     assert_eq!(tiles_of([[1.0, 1.0], [5.0, 1.0], [1.0, 5.0]]), [0]);
     // The whole picture: 7 x 5 tiles.
     assert_eq!(
         tiles_of([[-500.0, -500.0], [900.0, -500.0], [-500.0, 900.0]]).len(),
         35
     );
-    // A thin diagonal: each tile of the diagonal, and the adjacent ones whose corner it passes, of 4 x 4.
+    // A thin diagonal in 4 x 4 tiles: the tiles of the diagonal, and adjacent ones whose corner it passes.
     let thin = tiles_of([[0.0, 0.2], [63.0, 63.2], [63.0, 63.9]]);
     assert_eq!(thin, [0, 7, 8, 15, 16, 23, 24]);
-    // In the margin of the picture, beyond it, and on both sides of a border.
+    // Triangles in the margin of the picture, beyond it, and on both sides of a border.
     assert_eq!(tiles_of([[99.0, 60.0], [140.0, 60.0], [140.0, 69.0]]), [27]);
     assert!(tiles_of([[101.0, 60.0], [140.0, 60.0], [140.0, 69.0]]).is_empty());
     assert_eq!(tiles_of([[14.0, 2.0], [18.0, 2.0], [14.0, 5.0]]), [0, 1]);
@@ -88,8 +88,8 @@ fn triangles_without_area_or_pixel_centre_enter_no_tile() {
 }
 
 #[test]
-fn faces_that_turn_away_are_dropped_unless_both_are_drawn() {
-    // Counterclockwise as seen, y being down.
+fn back_faces_are_dropped_unless_the_draw_is_double_sided() {
+    // Counterclockwise on the screen, where y points down.
     let front = on_screen([[1.0, 1.0], [1.0, 9.0], [9.0, 1.0]]);
     let back = [front[0], front[2], front[1]];
     let both = [front, back];
@@ -98,10 +98,10 @@ fn faces_that_turn_away_are_dropped_unless_both_are_drawn() {
     assert_eq!(binned(&pixels(), &both, true, false), [(0, 10), (0, 11)]);
 }
 
-/// Random triangles before, across and behind the near plane: each pixel centre that a ray finds a triangle at lies in
-/// one of its tiles, and few tiles have none.
+/// Tests random triangles in front of, across and behind the near plane. Each pixel centre whose ray meets a
+/// triangle must be in one of its tiles, and few tiles may have no such pixel.
 #[test]
-fn every_pixel_of_a_triangle_lies_in_its_tiles() {
+fn every_pixel_of_a_triangle_is_in_its_tiles() {
     let view = BinnedView {
         clip_from_world: perspective(1.2, 100.0 / 70.0, 0.5, 50.0)
             * look_at_mat4(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, Vec3::Y),
@@ -142,7 +142,7 @@ fn every_pixel_of_a_triangle_lies_in_its_tiles() {
     assert!(listed < covered + covered / 10, "{listed} {covered}");
 }
 
-/// Moeller and Trumbore: whether the line from `a` to `b` crosses a triangle.
+/// Whether the line from `a` to `b` meets a triangle (Moeller and Trumbore).
 fn crosses(a: glam::DVec3, b: glam::DVec3, [p, q, r]: [glam::DVec3; 3]) -> bool {
     let (along, u, v) = (b - a, q - p, r - p);
     let normal = along.cross(v);

@@ -1,6 +1,6 @@
-//! Conical culling: the part of each eye's frustum that its round lens shows.
+//! Conical culling: the part of each eye's frustum that is visible through its round lens.
 //!
-//! The frustum is still tested: if the lens is larger than the picture, the picture ends first.
+//! The frustum is also tested, because the lens may extend beyond the picture.
 
 use super::{CullInput, Volumes};
 use crate::rig::TooWide;

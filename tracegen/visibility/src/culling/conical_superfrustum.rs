@@ -1,7 +1,7 @@
-//! Conical superfrustum culling: one cone around what both lenses show, within the superfrustum.
+//! Conical superfrustum culling: one cone around the visible part of both lenses, inside the superfrustum.
 //!
-//! For parallel eyes whose lenses show a circle of tangent `r` around straight ahead, the cone has
-//! the same tangent, from a point `ipd / (2 r)` behind the eyes: as the superfrustum's.
+//! For parallel eyes whose lenses show a circle of tangent `r` around straight ahead, the cone has the same
+//! tangent. Its apex is `ipd / (2 r)` behind the eyes, as in the superfrustum.
 
 use super::superfrustum::Superfrustum;
 use super::{CullInput, Volumes};
@@ -9,7 +9,7 @@ use crate::rig::{Eye, MAX_COMBINED_DEG, Rig, TooWide};
 use crate::volume::{Affine, Cone, Volume};
 use glam::DVec3;
 
-/// Corners of the polygon around a lens's circle.
+/// Number of corners of the polygon around a lens's circle.
 const CORNERS: u32 = 64;
 
 /// The cone and the superfrustum.
@@ -19,8 +19,7 @@ pub(super) fn volumes(frame: &CullInput<'_>) -> Result<Volumes, TooWide> {
     Ok(Volumes::Any(vec![Volume::new(planes, Some(cone))]))
 }
 
-/// A circular cone around what the lenses of `rig` show of geometry whose coordinates are at most
-/// `extent`.
+/// A circular cone around what the lenses of `rig` show of geometry whose coordinates are at most `extent`.
 fn cone(rig: &Rig, extent: DVec3) -> Result<Cone, TooWide> {
     let eyes = rig.eyes();
     let axis = (eyes.iter().map(lens_direction).sum::<DVec3>()).normalize();
@@ -28,7 +27,7 @@ fn cone(rig: &Rig, extent: DVec3) -> Result<Cone, TooWide> {
     let edges: Vec<[DVec3; 2]> = (eyes.iter())
         .flat_map(|eye| lens_edges(eye, extent))
         .collect();
-    // Along the axis and across it.
+    // Components along the axis and perpendicular to it.
     let split = |v: DVec3| {
         let along = v.dot(axis);
         (along, (v - axis * along).length())
@@ -45,7 +44,7 @@ fn cone(rig: &Rig, extent: DVec3) -> Result<Cone, TooWide> {
         return Err(TooWide { found_deg });
     }
     let tangent = widest.tan();
-    // Far enough back for every end of every edge.
+    // The apex must be far enough back for both ends of every edge.
     let back_m = (edges.iter().flatten())
         .map(|end| {
             let (along, across) = split(*end - center);
@@ -68,7 +67,7 @@ fn lens_direction(eye: &Eye) -> DVec3 {
     (right * x + up * y + forward).normalize()
 }
 
-/// Near and far ends of edges around an eye's lens cone.
+/// Near and far ends of the edges around an eye's lens cone.
 fn lens_edges(eye: &Eye, extent: DVec3) -> impl Iterator<Item = [DVec3; 2]> {
     let [right, up, forward] = eye.axes().map(|axis| axis.gradient);
     let position = eye.position();
@@ -79,7 +78,7 @@ fn lens_edges(eye: &Eye, extent: DVec3) -> impl Iterator<Item = [DVec3; 2]> {
     };
     let [x, y] = eye.lens.center.map(f64::from);
     let step = std::f64::consts::TAU / f64::from(CORNERS);
-    // The polygon's sides touch the circle.
+    // The sides of the polygon touch the circle.
     let radius = eye.lens_radius() / (step / 2.0).cos();
     (0..CORNERS).map(move |corner| {
         let (sin, cos) = (f64::from(corner) * step).sin_cos();
@@ -104,9 +103,9 @@ mod tests {
         };
         let rig = testing::rig([fov; 2], 0.064, 0.0, 0.1, 50.0);
         let cone = cone(&rig, DVec3::splat(60.0)).unwrap();
-        // A pixel of the picture of 1000 and the polygon's corners widen it.
+        // The radius is enlarged by one pixel of 1000, and by the corners of the polygon.
         let expected = 0.064 / 2.0 / 1.2;
-        // The apex: on the axis through the origin, where the radius is 0.
+        // The apex is on the axis through the origin, where the radius is 0.
         let apex = cone.radius.constant / cone.radius.gradient.length();
         assert!((apex - expected).abs() < 2e-4, "{apex} {expected}");
         let tangent = cone.radius.gradient.length();

@@ -1,7 +1,8 @@
-//! Culling techniques: the volumes of each for a stereo frame. One technique per file.
+//! Culling techniques, one per file. Each computes the volumes in which draws of a stereo frame may be
+//! visible.
 //!
-//! A technique is a file with a function from a frame to volumes (its `mod` line below) and a row
-//! of the table in `registry.rs`.
+//! To add a technique, add a file with a function from a frame to volumes, its `mod` line below, and a row of
+//! the table in `registry.rs`.
 
 mod conical;
 mod conical_round_robin;
@@ -25,7 +26,7 @@ use glam::{DVec3, Mat4};
 /// Inputs that determine the volumes of a frame.
 pub(crate) struct CullInput<'a> {
     rig: &'a Rig,
-    /// Frame number: its parity chooses the eye of round-robin techniques.
+    /// Frame number, whose parity selects the eye of round-robin techniques.
     number: u32,
     /// Largest absolute coordinates of the draws, metres.
     extent: DVec3,
@@ -34,9 +35,9 @@ pub(crate) struct CullInput<'a> {
 /// Volumes in which a draw may be visible.
 #[derive(Clone, Debug)]
 pub enum Volumes {
-    /// Everywhere: nothing is tested.
+    /// All of space; nothing is tested.
     Everything,
-    /// In any of these.
+    /// The union of these volumes.
     Any(Vec<Volume>),
 }
 
@@ -44,7 +45,7 @@ impl Hierarchy {
     /// The volumes of a frame of `rig`.
     ///
     /// # Errors
-    /// Eyes that the technique cannot lay one volume around.
+    /// The technique needs a single volume around both eyes, and there is none.
     pub fn volumes(&self, rig: &Rig, culling: Culling, frame: u32) -> Result<Volumes, TooWide> {
         culling.volumes(&CullInput {
             rig,
@@ -53,11 +54,11 @@ impl Hierarchy {
         })
     }
 
-    /// Replaces `list` by the draws that the technique keeps, ascending, for both eyes alike, and
-    /// tells how many boxes were tested: one test is one box against one volume.
+    /// Writes the draws that the technique keeps to `list`, ascending and for both eyes together. Returns the
+    /// number of tests of one box against one volume.
     ///
     /// # Errors
-    /// Eyes that the technique cannot lay one volume around.
+    /// The technique needs a single volume around both eyes, and there is none.
     pub fn cull(
         &self,
         rig: &Rig,
@@ -83,8 +84,8 @@ impl Hierarchy {
         }
     }
 
-    /// The draws that may enter the frustum of a clip matrix (depth 0 to 1), ascending: those of one
-    /// view or of a shadow cascade.
+    /// The draws that may be in the frustum of a clip matrix (depth 0 to 1), ascending. Used for single views
+    /// and shadow cascades.
     #[must_use]
     pub fn entering(&self, clip_from_world: Mat4) -> Vec<u32> {
         let extent = self.extent();

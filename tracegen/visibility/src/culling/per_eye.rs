@@ -1,4 +1,4 @@
-//! Per-eye frustum culling, the baseline: two frusta, their lists merged.
+//! Per-eye frustum culling, the baseline: two frusta, with their lists merged.
 
 use super::{CullInput, Volumes};
 use crate::rig::TooWide;

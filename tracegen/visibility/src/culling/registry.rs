@@ -1,4 +1,4 @@
-//! The table of culling techniques. Flags, settings, help and error messages come from its rows.
+//! The table of culling techniques, from which flags, settings, help and error messages are generated.
 
 use super::{CullInput, Volumes};
 use super::{
@@ -60,7 +60,7 @@ techniques! {
     CONICAL_SUPERFRUSTUM = row("conical-superfrustum", "Conical superfrustum culling",    true,  "What enters one cone around what both lenses show", conical_superfrustum::volumes);
 }
 
-/// A culling technique, by reference to its row. Written and read by its name.
+/// A culling technique: a reference to its row. It is serialised as its name.
 #[derive(Clone, Copy, Debug)]
 pub struct Culling(&'static Technique);
 
@@ -76,7 +76,7 @@ impl Culling {
         NAMES
     }
 
-    /// Name as in flags, settings and results.
+    /// Name in flags, settings and results.
     #[must_use]
     pub fn name(self) -> &'static str {
         self.0.name
@@ -94,12 +94,12 @@ impl Culling {
         self.0.help
     }
 
-    /// The volumes in which it searches for draws.
+    /// The volumes in which draws may be visible.
     pub(super) fn volumes(self, frame: &CullInput<'_>) -> Result<Volumes, TooWide> {
         (self.0.volumes)(frame)
     }
 
-    /// Whatever is visible inside the lens is kept: no false negatives.
+    /// Whether all draws visible inside the lens are kept.
     #[must_use]
     pub fn is_lossless(self) -> bool {
         self.0.lossless
@@ -127,7 +127,7 @@ impl fmt::Display for Culling {
     }
 }
 
-/// A name that no technique has.
+/// Error for an unknown name of a technique.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown culling '{0}': expected one of {known}", known = NAMES.join(", "))]
 pub struct UnknownCulling(String);

@@ -1,9 +1,9 @@
-//! Superfrustum culling: one frustum around both eyes' frusta, from a point behind them (Everitt).
+//! Superfrustum culling: one frustum around both eyes' frusta, with its apex behind them (Everitt).
 //!
-//! For parallel eyes with outer tangents `tan_l` and `tan_r`, the side planes of the outer edges
-//! meet `ipd / (tan_l + tan_r)` behind the eyes, and the vertical tangents shrink to
-//! `tan_v * far / (far + recession)`. Here the planes are laid around the corners of both frusta,
-//! which gives the same for parallel eyes and holds for canted and asymmetric ones.
+//! For parallel eyes with outer tangents `tan_l` and `tan_r`, the side planes of the outer edges meet
+//! `ipd / (tan_l + tan_r)` behind the eyes, and the vertical tangents shrink to `tan_v * far / (far + recession)`.
+//! This implementation places the planes around the corners of both frusta. The result is the same for
+//! parallel eyes, and also valid for canted and asymmetric ones.
 
 use super::{CullInput, Volumes};
 use crate::rig::{Eye, MAX_COMBINED_DEG, Rig, TooWide};
@@ -19,18 +19,18 @@ pub(super) fn volumes(frame: &CullInput<'_>) -> Result<Volumes, TooWide> {
 /// A frustum that contains those of all eyes.
 #[derive(Clone, Debug)]
 pub struct Superfrustum {
-    /// Where its side planes meet, at the height of the eyes.
+    /// Intersection of the side planes, at the height of the eyes.
     pub apex: DVec3,
-    /// Distance of the apex behind the point between the eyes, metres.
+    /// Distance from the point between the eyes back to the apex, in metres.
     pub recession_m: f64,
-    /// Tangents of its half-angles from the apex: to each side, up and down.
+    /// Tangents of the half-angles at the apex: to each side, up and down.
     pub tangents: [f64; 3],
-    /// Left, right, bottom, top, near and far side.
+    /// Left, right, bottom, top, near and far planes.
     pub(crate) planes: [HalfSpace; 6],
 }
 
 impl Superfrustum {
-    /// Around the frusta of `rig`, of geometry whose coordinates are at most `extent`.
+    /// A frustum around the frusta of `rig`, for geometry whose coordinates are at most `extent`.
     ///
     /// # Errors
     /// [`TooWide`].
@@ -40,7 +40,7 @@ impl Superfrustum {
             .collect();
         let corners = || edges.iter().flatten().copied();
         let Head { up, forward, right } = Head::of(rig.eyes());
-        // Angle of each edge to the right of straight ahead, in the plane across `up`.
+        // Angle of each edge to the right of straight ahead, in the plane perpendicular to `up`.
         let azimuths = edges.iter().map(|[near, far]| {
             let along = *far - *near;
             along.dot(right).atan2(along.dot(forward))
@@ -49,7 +49,7 @@ impl Superfrustum {
             (l.min(a), m.max(a))
         });
         let combined_deg = (most - least).to_degrees();
-        // NaN, from poses that are none, is too wide as well.
+        // NaN, the result of invalid poses, is also too wide.
         if combined_deg.is_nan() || combined_deg >= MAX_COMBINED_DEG {
             let found_deg = Some(combined_deg).filter(|deg| deg.is_finite());
             return Err(TooWide { found_deg });
@@ -63,7 +63,8 @@ impl Superfrustum {
 
         let eyes = rig.eyes().iter().map(Eye::position);
         let center = eyes.sum::<DVec3>() / rig.eyes().len() as f64;
-        // The apex in the two directions across `up`, from the sides' heights above the center.
+        // Coordinates of the apex in the two directions perpendicular to `up`, from the distances of `center`
+        // to the side planes.
         let [l, r] = [left_side, right_side].map(|side| side.height(center));
         let back_m = (l + r) / (2.0 * half.sin());
         let apex = center - ahead * back_m + aside * ((r - l) / (2.0 * half.cos()));
@@ -92,7 +93,7 @@ impl Superfrustum {
     }
 }
 
-/// Directions of the head between the eyes.
+/// Directions of the head.
 struct Head {
     up: DVec3,
     forward: DVec3,
@@ -116,7 +117,7 @@ mod tests {
     use crate::testing;
     use formats::view::FovTangents;
 
-    /// Known values: 90 degrees, 64 mm, hence 32 mm behind the eyes.
+    /// Known values: for 90 degrees and 64 mm, the apex is 32 mm behind the eyes.
     #[test]
     fn the_recession_of_parallel_eyes_is_the_closed_form() {
         let (near, far) = (0.1, 50.0);
@@ -136,7 +137,7 @@ mod tests {
             let level = vertical * far / (far + recession_m);
             let expected = [recession_m, outer, level, level];
             let [side, up, down] = found.tangents;
-            // Within a millimetre: the planes hold what rounding in the driver may let in.
+            // Within a millimetre, because the planes include a margin for rounding in the driver.
             for (found, expected) in [found.recession_m, side, up, down].iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-3, "{found} {expected}");
             }
@@ -144,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn eyes_that_look_to_both_sides_of_everything_are_refused() {
+    fn eyes_whose_directions_diverge_too_much_are_refused() {
         let fov = |outer: f32| FovTangents {
             left: outer,
             right: outer,

@@ -22,8 +22,7 @@ fn objects(count: usize) -> Vec<[Vec3; 2]> {
         .collect()
 }
 
-/// A display with up to 170 degrees from the left edge of one eye to the right edge of the other,
-/// and that angle.
+/// A display and its angle from the left edge of one eye to the right edge of the other, up to 170 degrees.
 fn random_hmd(random: &mut Random) -> (Hmd, f32) {
     loop {
         let mut tangent = |low, high| between(random, low, high).to_radians().tan();
@@ -50,8 +49,8 @@ fn random_hmd(random: &mut Random) -> (Hmd, f32) {
     }
 }
 
-/// A head somewhere in the room with a random display and lenses that reach anywhere in its
-/// pictures, but not to 85 degrees from the direction that one cone around both would have.
+/// A head in the room with a random display and random lenses inside its pictures. The lenses stay within 85
+/// degrees of the direction of a cone around both.
 fn random_rig(random: &mut Random) -> (Rig, f32) {
     loop {
         let (hmd, combined_deg) = random_hmd(random);
@@ -79,8 +78,7 @@ fn random_rig(random: &mut Random) -> (Rig, f32) {
     }
 }
 
-/// What an eye sees: through the matrices, as the driver transforms points, and the quotient of the
-/// tangents.
+/// What an eye sees, computed as a driver transforms points, and from the quotients for the tangents.
 struct Watcher {
     clip_from_world: Mat4,
     eye_from_world: Mat4,
@@ -129,13 +127,13 @@ impl Listed {
     }
 }
 
-/// Points of each object that the displays take in turn.
+/// Number of points of each object, which the displays use in turn.
 const POINTS: usize = 8;
 
-/// A random point of each of 100,000 objects under each of 1,000 displays: where an eye sees it, the
-/// object is listed.
+/// Uses a random point of each of 100,000 objects with each of 1,000 displays. If an eye sees the point, the
+/// object must be listed.
 #[test]
-fn nothing_with_a_point_in_view_is_lost_by_the_exact_techniques() {
+fn lossless_techniques_keep_all_objects_with_a_visible_point() {
     let objects = objects(OBJECTS);
     let tree = Hierarchy::new(&objects);
     let mut random = Random(12);
@@ -191,11 +189,12 @@ fn nothing_with_a_point_in_view_is_lost_by_the_exact_techniques() {
     assert!(seen(0) > 1_000_000 && seen(1) > 100_000 && widest > 168.0);
 }
 
-/// Points on the edges of the frusta and on the circles of the lenses, the tightest cases.
+/// Tests points on the edges of the frusta and on the circles of the lenses, which are the most critical
+/// ones.
 #[test]
-fn the_edges_of_what_the_eyes_see_lie_in_the_exact_techniques_volumes() {
+fn the_edges_of_the_visible_space_are_in_the_volumes_of_lossless_techniques() {
     let mut random = Random(77);
-    // Beyond the draws, volumes hold nothing: these reach far beyond the points below.
+    // Volumes end at the bounds of the draws, which are therefore far beyond the points below.
     let tree = Hierarchy::new(&[ROOM.map(|corner| corner * 10.0)]);
     for number in 0..HMDS as u32 {
         let (rig, _) = random_rig(&mut random);
@@ -210,7 +209,7 @@ fn the_edges_of_what_the_eyes_see_lie_in_the_exact_techniques_volumes() {
             let [right, up, forward] = eye.axes().map(|axis| axis.gradient);
             for step in 0..8_u32 {
                 let corner = |bit: u32| if step & bit == 0 { -1.0 } else { 1.0 };
-                // Depth 0.9 is ten times the near plane, where the scene is.
+                // At depth 0.9, the distance is ten times that of the near plane.
                 let depth = if step & 4 == 0 { 0.0 } else { 0.9 };
                 let point = from_clip.project_point3(DVec3::new(corner(1), corner(2), depth));
                 assert!(within(Culling::PER_EYE, point), "{number}");
@@ -230,7 +229,7 @@ fn the_edges_of_what_the_eyes_see_lie_in_the_exact_techniques_volumes() {
 }
 
 #[test]
-fn one_volume_takes_about_half_the_tests_of_two() {
+fn one_volume_needs_about_half_the_tests_of_two() {
     let tree = Hierarchy::new(&objects(OBJECTS));
     let (mut scratch, mut list) = (Scratch::default(), Vec::new());
     for preset in hmd::PRESETS {
@@ -268,7 +267,7 @@ fn one_volume_takes_about_half_the_tests_of_two() {
 }
 
 #[test]
-fn what_round_robin_misses_it_finds_in_the_next_frame() {
+fn round_robin_finds_missed_draws_in_the_next_frame() {
     let objects = objects(20_000);
     let tree = Hierarchy::new(&objects);
     let mut random = Random(31);

@@ -1,4 +1,4 @@
-//! Builds the tree: groups of equal size, cut where the boxes around both parts are smallest.
+//! Builds the tree: divides draws into groups of equal size where the boxes around both parts are smallest.
 
 use super::{EMPTY, Hierarchy, NOWHERE, Node, WIDTH, is_finite, union};
 use glam::{Vec3, Vec4};
@@ -7,8 +7,8 @@ use std::ops::Range;
 impl Hierarchy {
     /// A tree over the bounds (low and high corner) of draws `0..bounds.len()`.
     ///
-    /// The result depends on nothing but the bounds. Draws whose bounds are not finite are kept
-    /// apart: they are always drawn.
+    /// The result depends only on the bounds. Draws whose bounds are not finite are kept outside the tree and
+    /// are always drawn.
     ///
     /// # Panics
     /// More than 2^30 draws.
@@ -34,7 +34,7 @@ impl Hierarchy {
         tree
     }
 
-    /// Adds a node over `draws`, which start at `begin` in the order; returns its number.
+    /// Adds a node for `draws`, which start at `begin` in the order. Returns its index.
     fn add(&mut self, draws: &mut [u32], begin: usize, bounds: &[[Vec3; 2]]) -> u32 {
         let number = self.nodes.len();
         self.nodes.push(Node {
@@ -44,7 +44,7 @@ impl Hierarchy {
             count: 0,
         });
         self.parent.push(0);
-        // All boxes but the last hold full trees, so that no node but the last of a level has gaps.
+        // All boxes except the last have complete trees, so that only the last node of a level has gaps.
         let mut unit = 1;
         while unit * WIDTH < draws.len() {
             unit *= WIDTH;
@@ -75,8 +75,8 @@ impl Hierarchy {
     }
 }
 
-/// Cuts `draws` into groups of `unit` (the last may be smaller), about half of the groups at a
-/// time, and appends their ranges; `start` is the place of `draws` in the node's.
+/// Divides `draws` into groups of `unit` (the last may be smaller) by repeated halving, and appends their
+/// ranges. `start` is the position of `draws` in the node's draws.
 fn cut(
     draws: &mut [u32],
     start: usize,

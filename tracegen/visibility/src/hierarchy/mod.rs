@@ -1,9 +1,8 @@
-//! A kept tree over the world-space bounds of a scene's draws.
+//! A tree over the world-space bounds of a scene's draws, which is kept between frames.
 //!
-//! Four boxes a node, one array a coordinate, so that a volume is tested against four boxes at a
-//! time. The draws below any box are a range of one array: a box wholly inside a volume is accepted
-//! as that range without another test. What is outside costs one test for the largest box that
-//! holds it.
+//! A node has four boxes, with one array per coordinate, so that a volume is tested against four boxes at a
+//! time. The draws below any box are a range of one array. A box completely inside a volume is accepted as
+//! that range without further tests. A box completely outside is rejected with one test.
 
 mod build;
 mod refit;
@@ -15,19 +14,19 @@ pub use walk::Scratch;
 
 use glam::{DVec3, Vec3, Vec4};
 
-/// Boxes of a node.
+/// Number of boxes per node.
 const WIDTH: usize = 4;
 
 /// Four boxes and their contents.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    /// Lower and upper corners: `[low or high][axis]`, a lane a box.
+    /// Lower and upper corners: `[low or high][axis]`, one lane per box.
     corners: [[Vec4; 3]; 2],
-    /// Node of each box's parts, if it contains more than one draw.
+    /// Node with the parts of each box, if it contains more than one draw.
     child: [u32; WIDTH],
     /// Draws of box `i`: `order[begin[i]..begin[i + 1]]`.
     begin: [u32; WIDTH + 1],
-    /// Boxes that are there, the first ones.
+    /// Number of used boxes, which are the first ones.
     count: u32,
 }
 
@@ -45,7 +44,7 @@ impl Node {
         }
     }
 
-    /// The box around the node's boxes.
+    /// Bounding box of the node.
     fn bounds(&self) -> [Vec3; 2] {
         (0..self.count as usize)
             .map(|lane| self.lane(lane))
@@ -58,13 +57,13 @@ impl Node {
 pub struct Hierarchy {
     /// Parents before children, the root first.
     nodes: Vec<Node>,
-    /// Draws by their place in the tree.
+    /// Draws in the order of the tree.
     order: Vec<u32>,
-    /// Node and lane (`WIDTH * node + lane`) that hold each node's bounds; the root's is unused.
+    /// Node and lane (`WIDTH * node + lane`) with each node's bounds; unused for the root.
     parent: Vec<u32>,
     /// Node and lane of each draw, or [`NOWHERE`].
     place: Vec<u32>,
-    /// Draws without finite bounds: always drawn.
+    /// Draws without finite bounds, which are always drawn.
     unbounded: Vec<u32>,
 }
 
@@ -82,19 +81,19 @@ fn is_finite([low, high]: [Vec3; 2]) -> bool {
 }
 
 impl Hierarchy {
-    /// Draws, including those without finite bounds.
+    /// Number of draws, including those without finite bounds.
     #[must_use]
     pub fn len(&self) -> usize {
         self.place.len()
     }
 
-    /// No draws at all.
+    /// Whether there are no draws.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.place.is_empty()
     }
 
-    /// Largest absolute coordinate of any finite bounds, by axis: what rounding errors grow with.
+    /// Largest absolute coordinate of all finite bounds, by axis. Rounding errors are proportional to it.
     #[must_use]
     pub fn extent(&self) -> DVec3 {
         let Some(root) = self.nodes.first() else {

@@ -1,17 +1,18 @@
-//! Updates the boxes of moving draws and those around them.
+//! Updates the boxes of moving draws and the boxes around them.
 
 use super::{Hierarchy, NOWHERE, WIDTH, is_finite};
 use glam::Vec3;
 use std::collections::BinaryHeap;
 
 impl Hierarchy {
-    /// Gives draws new bounds. The tree keeps its shape: it stays correct however far they move,
-    /// and stays good while they move about where they were when it was built.
-    ///
-    /// Draws that had no finite bounds stay so; one that gets such bounds is drawn always from
+    /// Changes the bounds of draws without changing the structure of the tree. The tree remains correct for
+    /// any motion. It remains efficient if draws stay near their original positions.
+    /// A draw without finite bounds stays outside the tree. A draw whose bounds are no longer finite is
+    /// always drawn from then on.
     /// then on.
     pub fn refit(&mut self, moved: impl IntoIterator<Item = (u32, [Vec3; 2])>) {
-        // Children have larger numbers than their parents: the largest is always ready.
+        // Children have larger indices than their parents, so the node with the largest index can be updated
+        // next.
         let mut stale = BinaryHeap::new();
         for (draw, bounds) in moved {
             let Some(place) = self.place.get_mut(draw as usize) else {
@@ -26,7 +27,7 @@ impl Hierarchy {
                 parts.set_lane(lane, bounds);
                 stale.push(node);
             } else {
-                // Its old box stays, because what it finds is found anyway.
+                // The old box can remain, because the draw is always drawn.
                 *place = NOWHERE;
                 self.unbounded.push(draw);
             }

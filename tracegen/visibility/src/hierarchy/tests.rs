@@ -13,7 +13,7 @@ fn field(count: usize, seed: u64) -> Vec<[Vec3; 2]> {
     (0..count)
         .map(|_| {
             let low = within(&mut random, room);
-            // Few large ones among many small ones.
+            // A few large boxes and many small ones.
             let size = 0.1 + 4.0 * random.unit_f32().powi(6);
             [
                 low,
@@ -30,7 +30,7 @@ fn list(tree: &Hierarchy, volume: &Volume) -> (Vec<u32>, u64) {
     (list, tests)
 }
 
-/// Every box by itself.
+/// Tests every box separately.
 fn one_by_one(bounds: &[[Vec3; 2]], prepared: &Prepared) -> Vec<u32> {
     let kept = |bounds: &[Vec3; 2]| {
         let corners = bounds.map(|corner| corner.to_array().map(Vec4::splat));
@@ -58,7 +58,7 @@ fn views() -> impl Iterator<Item = Mat4> {
 }
 
 #[test]
-fn the_tree_finds_what_testing_every_box_finds() {
+fn the_tree_finds_the_same_draws_as_testing_every_box() {
     for count in [0, 1, 2, 3, 4, 5, 17, 64, 1000, 5000] {
         let bounds = field(count, 1);
         let tree = Hierarchy::new(&bounds);
@@ -68,7 +68,7 @@ fn the_tree_finds_what_testing_every_box_finds() {
             let expected = one_by_one(&bounds, &volume.prepare(tree.extent()));
             let (found, tests) = list(&tree, &volume);
             assert_eq!(found, expected);
-            // Boxes of boxes come on top, a third of the draws in a tree of four.
+            // The tree also tests the boxes of its nodes, which are a third of the draws.
             assert!(
                 tests as usize <= count + count / 2 + 4,
                 "{tests} of {count}"
@@ -78,7 +78,7 @@ fn the_tree_finds_what_testing_every_box_finds() {
 }
 
 #[test]
-fn a_refitted_tree_finds_what_one_built_anew_finds() {
+fn a_refitted_tree_finds_the_same_draws_as_a_new_one() {
     let mut bounds = field(3000, 2);
     let mut tree = Hierarchy::new(&bounds);
     let mut random = Random(6);
@@ -90,7 +90,7 @@ fn a_refitted_tree_finds_what_one_built_anew_finds() {
             let by = within(&mut random, [Vec3::splat(-20.0), Vec3::splat(20.0)]);
             bounds[draw as usize] = bounds[draw as usize].map(|corner| corner + by);
         }
-        // The same draw twice: the last bounds count.
+        // The same draw twice: the last bounds apply.
         tree.refit(moved.iter().map(|&draw| (draw, bounds[draw as usize])));
         let anew = Hierarchy::new(&bounds);
         assert_eq!(tree.extent(), anew.extent(), "round {round}");
@@ -118,7 +118,7 @@ fn draws_without_finite_bounds_are_always_found() {
 }
 
 #[test]
-fn ten_times_the_draws_behind_the_viewer_cost_a_third_more_tests_at_most() {
+fn ten_times_as_many_draws_behind_the_viewer_add_at_most_a_third_of_the_tests() {
     let mut random = Random(8);
     let mut boxes = |count: usize, room: [Vec3; 2]| {
         let around = |p: Vec3| [p - Vec3::splat(0.2), p + Vec3::splat(0.2)];

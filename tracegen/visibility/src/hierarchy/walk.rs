@@ -1,22 +1,22 @@
-//! Finds the draws that enter a volume.
+//! Finds the draws that may be in a volume.
 
 use super::{Hierarchy, Node, WIDTH};
 use crate::draw_set::DrawSet;
 use crate::volume::{Prepared, Sides};
 
-/// Memory that walks reuse.
+/// Memory that is reused between walks.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
-    /// Nodes to visit, each with the sides of the volume that it is not known to be inside of.
+    /// Nodes to visit, each with those planes of the volume that it may cross.
     stack: Vec<(u32, Sides)>,
     found: DrawSet,
 }
 
 impl Hierarchy {
-    /// Replaces `list` by the draws that may enter any of the volumes, ascending, and tells how
-    /// many boxes were tested: one test is one box against one volume.
+    /// Writes the draws that may be in any of the volumes to `list`, ascending. Returns the number of tests
+    /// of one box against one volume.
     ///
-    /// The tests err on the side of drawing.
+    /// The tests are conservative: draws outside may be included.
     pub(crate) fn collect(
         &self,
         volumes: &[Prepared],
@@ -67,9 +67,9 @@ impl Hierarchy {
 
 /// Contents of a box.
 enum Subtree {
-    /// One draw, by its place in the order.
+    /// One draw, by its index in the order.
     Draw(u32),
-    /// Several: the node of their boxes, and their range in the order.
+    /// Several draws: the node with their boxes, and their range in the order.
     Draws(u32, [u32; 2]),
 }
 

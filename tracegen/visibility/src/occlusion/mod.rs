@@ -1,11 +1,10 @@
-//! Occlusion culling in two phases, with nothing visible lost.
+//! Occlusion culling in two phases without loss of visible draws.
 //!
-//! First the draws that the last frame found visible are drawn for their depth alone. Then every
-//! draw that is left to judge is held against that depth: it is hidden where the nearest point of
-//! its box lies behind the farthest depth of all pixels that the box may cover. The depth holds
-//! this frame's poses and only draws that are truly there, so whatever it hides, it hides rightly;
-//! what the last frame found decides how much is hidden, and nothing else. The first frame draws
-//! nothing first, and so hides nothing.
+//! In the first phase, the draws that were visible in the last frame are drawn to get their depth. In the
+//! second phase, the other draws are tested against this depth. A draw is hidden if the nearest point of its
+//! box is behind the farthest depth of all pixels that the box may cover. The depth is that of existing draws
+//! in their current poses, so no visible draw is lost. The result for the last frame affects only how many
+//! draws are hidden. In the first frame, nothing is drawn in the first phase, so nothing is hidden.
 
 mod pyramid;
 #[cfg(test)]
@@ -15,8 +14,8 @@ pub use pyramid::Pyramid;
 
 use glam::{DMat4, DVec4, Mat4, Vec3};
 
-/// Part of a box's range of depths that a driver may be off by within it: a triangle is drawn on a
-/// grid of 1/256 pixel, and its depth extrapolated by as much.
+/// Share of a box's depth range by which a driver's depth may differ. Vertices are rounded to 1/256 pixel,
+/// and depth is extrapolated over that distance.
 const SLACK: f64 = 1.0 / 16.0;
 /// Rounding of a depth from 0 to 1 in the driver.
 const ROUNDING: f64 = 16.0 * (f32::EPSILON as f64) / 2.0;
@@ -28,7 +27,7 @@ pub struct Occlusion {
 }
 
 impl Occlusion {
-    /// Draws of `kept` (ascending) that the last frame found visible in a view: to be drawn first.
+    /// Draws of `kept` (ascending) that were visible in a view in the last frame. They must be drawn first.
     #[must_use]
     pub fn first(&self, view: usize, kept: &[u32]) -> Vec<u32> {
         let Some(visible) = self.visible.get(view) else {
@@ -39,8 +38,8 @@ impl Occlusion {
         first
     }
 
-    /// Leaves those draws of `kept` (ascending) that the depth of the first ones does not hide, and
-    /// remembers them for the next frame. Tells how many boxes were tested.
+    /// The draws of `kept` (ascending) that are not hidden by the depth of the first phase. They are stored
+    /// for the next frame. Also returns the number of tested boxes.
     pub fn second(
         &mut self,
         view: usize,
@@ -60,8 +59,8 @@ impl Occlusion {
     }
 }
 
-/// Whether nothing within the bounds can be seen: everything lies behind the depth of the pixels
-/// that it may cover. False in doubt, as for bounds that cross the near plane or are not finite.
+/// Whether nothing within the bounds is visible, because everything is behind the depth of the pixels that it
+/// may cover. False in doubt, as for bounds that cross the near plane or are not finite.
 fn hidden([low, high]: [Vec3; 2], clip_from_world: &DMat4, depth: &Pyramid) -> bool {
     let [low, high] = [low, high].map(Vec3::as_dvec3);
     let size_px = depth.size_px().map(f64::from);
@@ -75,7 +74,7 @@ fn hidden([low, high]: [Vec3; 2], clip_from_world: &DMat4, depth: &Pyramid) -> b
             }
         };
         let clip = *clip_from_world * DVec4::new(along(0), along(1), along(2), 1.0);
-        // Before the near plane, or nowhere: written so that NaN is.
+        // In front of the near plane, or NaN: the condition is false for NaN.
         if !(clip.z > 0.0 && clip.w > 0.0) {
             return false;
         }
@@ -90,14 +89,14 @@ fn hidden([low, high]: [Vec3; 2], clip_from_world: &DMat4, depth: &Pyramid) -> b
             most[axis] = most[axis].max(place[axis]);
         }
     }
-    // A pixel around it, for the rounding of vertices to the raster's grid.
+    // One more pixel on each side, because vertices are rounded to the rasteriser's grid.
     let range = |axis: usize| {
         let [first, last] = [least[axis] - 1.0, most[axis] + 1.0].map(f64::floor);
         (last >= 0.0 && first < size_px[axis])
             .then(|| [first.max(0.0) as u32, last.min(size_px[axis] - 1.0) as u32])
     };
     let (Some(columns), Some(rows)) = (range(0), range(1)) else {
-        // Beside the picture: for culling to judge.
+        // Outside the picture. Culling handles this case.
         return false;
     };
     let nearest = least[2] - SLACK * (most[2] - least[2]) - ROUNDING;

@@ -1,9 +1,9 @@
-//! The farthest depth of blocks of pixels.
+//! A pyramid of the farthest depths of blocks of pixels.
 
-/// Depth of a picture, and the farthest of each 2x2, 4x4, ... pixels of it.
+/// The depth of a picture, and the farthest depth of each block of 2x2, 4x4, ... pixels.
 #[derive(Clone, Debug)]
 pub struct Pyramid {
-    /// Finest first; each half the size of the one before, rounded up.
+    /// Finest level first; each level has half the size of the one before, rounded up.
     levels: Vec<Level>,
 }
 
@@ -15,10 +15,10 @@ struct Level {
 }
 
 impl Pyramid {
-    /// Of a picture's depth, row by row from the top; 1 is farthest.
+    /// Builds the pyramid from the depth of a picture, row by row from the top; 1 is farthest.
     ///
     /// # Panics
-    /// Where `depth` is not as many as the pixels, at least one.
+    /// The length of `depth` differs from the number of pixels, or is zero.
     #[must_use]
     pub fn new(size_px: [u32; 2], depth: Vec<f32>) -> Self {
         let size = size_px.map(|extent| extent as usize);
@@ -36,11 +36,11 @@ impl Pyramid {
         self.levels[0].size.map(|extent| extent as u32)
     }
 
-    /// Farthest depth of a rectangle of pixels, or of a few more around it: first and last column
-    /// and row, within the picture.
+    /// Farthest depth of a rectangle of pixels within the picture, given by its first and last column and
+    /// row. May include a few pixels around the rectangle.
     #[must_use]
     pub fn farthest(&self, columns: [u32; 2], rows: [u32; 2]) -> f32 {
-        // The finest level that the rectangle covers at most 4x4 texels of.
+        // The finest level in which the rectangle covers at most 4x4 texels.
         let few = |[first, last]: [u32; 2], level: usize| (last >> level) - (first >> level) < 4;
         let level = (0..self.levels.len() - 1)
             .find(|&level| few(columns, level) && few(rows, level))
@@ -54,7 +54,7 @@ impl Pyramid {
 }
 
 impl Level {
-    /// The next coarser level, unless this is a single texel.
+    /// The next coarser level; `None` for a level of one texel.
     fn halved(&self) -> Option<Self> {
         if self.size == [1, 1] {
             return None;

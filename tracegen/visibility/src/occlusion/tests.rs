@@ -24,14 +24,14 @@ fn the_pyramid_is_never_nearer_than_any_pixel_of_the_rectangle() {
             .fold(0.0, f32::max);
         let found = pyramid.farthest(columns, rows);
         assert!(found >= exact, "{columns:?} {rows:?}");
-        // Up to four texels each way are exact.
+        // The result is exact for up to four texels per axis.
         if columns[1] - columns[0] < 4 && rows[1] - rows[0] < 4 {
             assert_eq!(found, exact);
         }
     }
 }
 
-/// A wall 10 m ahead over the left half of the picture.
+/// Depth of a wall 10 m ahead in the left half of the picture.
 fn wall(clip: Mat4) -> Pyramid {
     let at = clip.project_point3(Vec3::new(0.0, 0.0, -10.0)).z;
     let [width, height] = SIZE_PX;
@@ -40,7 +40,7 @@ fn wall(clip: Mat4) -> Pyramid {
 }
 
 #[test]
-fn what_lies_behind_the_wall_is_hidden_and_nothing_else() {
+fn only_boxes_behind_the_wall_are_hidden() {
     let clip = perspective(1.2, 67.0 / 45.0, 0.1, 100.0);
     let wall = wall(clip);
     let hidden = |center: Vec3, half: f32| {
@@ -57,7 +57,7 @@ fn what_lies_behind_the_wall_is_hidden_and_nothing_else() {
 }
 
 #[test]
-fn a_box_with_a_point_before_the_depth_is_never_hidden() {
+fn a_box_with_a_point_in_front_of_the_depth_is_never_hidden() {
     let clip = perspective(1.2, 67.0 / 45.0, 0.1, 100.0);
     let wall = wall(clip);
     let mut random = Random(4);
@@ -86,7 +86,7 @@ fn a_box_with_a_point_before_the_depth_is_never_hidden() {
 }
 
 #[test]
-fn the_first_frame_hides_nothing_and_the_second_draws_first_what_it_found() {
+fn the_first_frame_hides_nothing_and_its_visible_draws_come_first_in_the_second() {
     let clip = perspective(1.2, 67.0 / 45.0, 0.1, 100.0);
     let behind = [Vec3::new(-9.0, -1.0, -21.0), Vec3::new(-7.0, 1.0, -19.0)];
     let before = behind.map(|corner| corner + Vec3::Z * 12.0);

@@ -1,4 +1,4 @@
-//! Circular cones, oblique ones too.
+//! Circular and oblique cones.
 
 use super::ROUNDING;
 use glam::{DVec3, Vec3, Vec4};
@@ -38,7 +38,7 @@ impl Affine {
         }
     }
 
-    /// Largest sum of the magnitudes of its terms.
+    /// Largest possible sum of the magnitudes of its terms.
     fn magnitude(&self, extent: DVec3) -> f64 {
         self.gradient.abs().dot(extent) + self.constant.abs()
     }
@@ -51,7 +51,7 @@ impl Affine {
     }
 }
 
-/// The points where `(x, y)` is no longer than `radius`, which grows along the cone.
+/// The points at which `(x, y)` is not longer than `radius`, which grows along the cone.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cone {
     pub x: Affine,
@@ -73,7 +73,7 @@ impl Cone {
             x: self.x.prepare(),
             y: self.y.prepare(),
             radius: self.radius.prepare(),
-            // Twice: the box's centre and half size are rounded, and then the sums with them.
+            // Counted twice, because the box's centre and half size are rounded, and then the sums with them.
             margin: (2.0 * ROUNDING * magnitude) as f32,
         }
     }
@@ -91,7 +91,7 @@ impl PreparedAffine {
         x * g.x + y * g.y + z * g.z + Vec4::splat(self.constant)
     }
 
-    /// Largest change from a box's centre to its corners, given half its size.
+    /// Largest change from a box's centre to its corners; the argument is half the box's size.
     fn reach(&self, [x, y, z]: [Vec4; 3]) -> Vec4 {
         let g = self.gradient.abs();
         x * g.x + y * g.y + z * g.z
@@ -108,11 +108,11 @@ pub(crate) struct PreparedCone {
 }
 
 impl PreparedCone {
-    /// Bits of boxes that a plane parts from the cone, and of boxes wholly inside.
+    /// Bits of boxes that are separated from the cone by a plane, and of boxes completely inside.
     ///
-    /// The plane touches the cone along the line nearest to the box's centre. For a sphere that is
-    /// the test `rho <= z tan + r / cos`. It keeps a few large boxes near the cone's apex too many,
-    /// and never loses one.
+    /// The plane touches the cone along the line nearest to the box's centre. For a sphere this is the test
+    /// `rho <= z tan + r / cos`. It keeps a few large boxes near the cone's apex that are outside, but never
+    /// rejects a box that is not.
     #[inline]
     pub fn test(&self, [low, high]: &[[Vec4; 3]; 2]) -> [u32; 2] {
         let half = Vec4::splat(0.5);
@@ -126,7 +126,7 @@ impl PreparedCone {
             squared.z.sqrt(),
             squared.w.sqrt(),
         );
-        // Any direction would do: a plane of no direction at all is no plane of the cone's.
+        // Without a direction, there is no plane that touches the cone.
         let away = distance.cmpgt(Vec4::splat(f32::MIN_POSITIVE));
         let cos = Vec4::select(away, x / distance, Vec4::ONE);
         let sin = Vec4::select(away, y / distance, Vec4::ZERO);
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_outside_inside_and_across_are_told_apart() {
+    fn boxes_outside_inside_and_across_are_distinguished() {
         let cube = |center: Vec3, half: f32| test(0.5, center - half, center + half);
         assert_eq!(cube(Vec3::new(0.0, 0.0, -10.0), 1.0), [false, true]);
         assert_eq!(cube(Vec3::new(5.0, 0.0, -10.0), 1.0), [false, false]);
@@ -177,10 +177,10 @@ mod tests {
         assert_eq!(test(0.5, Vec3::NAN, Vec3::NAN), [false, false]);
     }
 
-    /// The facts' closed form: a sphere is kept when `rho <= z tan + r / cos`. For a box whose
-    /// half diagonal is the sphere's radius it must not be stricter than the box's own test.
+    /// Closed form: a sphere is kept if `rho <= z tan + r / cos`. A box must be rejected if its bounding
+    /// sphere is, and kept if the largest sphere inside it is.
     #[test]
-    fn a_box_is_lost_only_where_the_sphere_around_it_is_near_the_cone_or_outside() {
+    fn boxes_are_classified_between_their_outer_and_inner_spheres() {
         let mut state = 3_u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -194,7 +194,7 @@ mod tests {
             let cos = 1.0 / (1.0 + tangent * tangent).sqrt();
             let rho = f64::from(center.truncate().length());
             let sphere = f64::from(half.length()) / cos - f64::from(center.z) * tangent;
-            // The largest sphere in the box: where that is kept, so is the box.
+            // The largest sphere inside the box.
             let within = f64::from(half.min_element()) / cos - f64::from(center.z) * tangent;
             let [outside, _] = test(tangent, center - half, center + half);
             if rho > sphere + 1e-3 {
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn no_box_with_a_point_in_the_cone_is_outside_and_none_with_one_outside_is_inside() {
+    fn boxes_with_points_inside_and_outside_are_classified_correctly() {
         let mut state = 9_u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

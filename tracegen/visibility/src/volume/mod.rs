@@ -1,8 +1,8 @@
-//! Convex volumes, and boxes tested against them four at a time.
+//! Convex volumes, and tests of four boxes at a time against them.
 //!
-//! Volumes are made in double precision and already hold what rounding in the driver may let in.
-//! For the tests they are prepared in single precision, with a margin for the tests' own rounding:
-//! a box is outside only if it would be for any exact arithmetic.
+//! Volumes are computed in double precision and include a margin for rounding in the driver. For the tests
+//! they are converted to single precision, with a margin for the rounding of the tests. A box is only outside
+//! if it would also be outside with exact arithmetic.
 
 mod cone;
 mod planes;
@@ -14,22 +14,22 @@ use cone::PreparedCone;
 use glam::{DVec3, Vec4};
 use planes::PreparedPlane;
 
-/// Rounding errors of a sum of four products, and of products of two matrices before it, in parts
-/// of the sum of the terms' magnitudes: 16 units in the last place of single precision.
+/// Relative rounding error of a sum of four products, including the preceding products of two matrices: 16
+/// units in the last place of single precision, relative to the sum of the magnitudes of the terms.
 pub(crate) const ROUNDING: f64 = 16.0 * (f32::EPSILON as f64) / 2.0;
 
-/// Bit a side of a volume: its planes, then its cone.
+/// One bit per side of a volume: its planes, then its cone.
 pub(crate) type Sides = u8;
 
 const MAX_PLANES: usize = 6;
 const CONE: Sides = 1 << MAX_PLANES;
 
-/// The points inside of all half-spaces and of the cone.
+/// The points inside all half-spaces and inside the cone.
 #[derive(Clone, Debug)]
 pub struct Volume {
     /// Half-spaces, at most six.
     planes: [HalfSpace; MAX_PLANES],
-    /// Restricts the volume to another one, if given.
+    /// Cone that restricts the volume, if any.
     cone: Option<Cone>,
 }
 
@@ -38,14 +38,14 @@ impl Volume {
         Self { planes, cone }
     }
 
-    /// Whether a point of world space is inside.
+    /// Whether a point in world space is inside.
     #[must_use]
     pub fn contains(&self, point: DVec3) -> bool {
         self.planes.iter().all(|plane| plane.height(point) >= 0.0)
             && self.cone.as_ref().is_none_or(|cone| cone.contains(point))
     }
 
-    /// For tests of boxes whose coordinates are at most `extent`.
+    /// Prepares the volume for tests of boxes whose coordinates are at most `extent`.
     pub(crate) fn prepare(&self, extent: DVec3) -> Prepared {
         Prepared {
             planes: self.planes.map(|plane| plane.prepare(extent)),
@@ -63,9 +63,9 @@ pub(crate) struct Prepared {
 
 /// Result of a test of four boxes.
 pub(crate) struct Tested {
-    /// Bit a box that is wholly outside.
+    /// One bit per box that is completely outside.
     pub outside: u32,
-    /// Byte a box: sides that it is wholly inside of.
+    /// One byte per box: the sides that it is completely inside of.
     inside: u32,
 }
 
@@ -76,7 +76,7 @@ impl Tested {
     }
 }
 
-/// Low bits of four bytes from four bits.
+/// Maps four bits to the low bits of four bytes.
 const SPREAD: [u32; 16] = {
     let mut table = [0; 16];
     let mut bits = 0;

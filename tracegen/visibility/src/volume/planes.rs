@@ -3,29 +3,29 @@
 use super::ROUNDING;
 use glam::{DMat4, DVec3, Mat4, Vec3, Vec4};
 
-/// The points with `normal . p + offset >= 0`; the normal has unit length, or is zero for all of
-/// space.
+/// The points with `normal . p + offset >= 0`. The normal has unit length, or is zero if the half-space is
+/// all of space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct HalfSpace {
     pub normal: DVec3,
-    /// Metres.
+    /// Offset in metres.
     pub offset: f64,
 }
 
 impl HalfSpace {
-    /// Every point.
+    /// All of space.
     pub const EVERYWHERE: Self = Self {
         normal: DVec3::ZERO,
         offset: 1.0,
     };
 
-    /// Across `normal`, around all of `points`.
+    /// The smallest half-space with this normal that contains all `points`.
     pub fn around(normal: DVec3, points: impl Iterator<Item = DVec3>) -> Self {
         let lowest = points.map(|p| normal.dot(p)).fold(f64::INFINITY, f64::min);
         Self::scaled(normal, -lowest, 0.0)
     }
 
-    /// From a plane of any scale, moved outwards by `margin` in that scale.
+    /// A half-space from a plane of any scale, moved outwards by `margin` in that scale.
     pub fn scaled(normal: DVec3, offset: f64, margin: f64) -> Self {
         let length = normal.length();
         let plane = Self {
@@ -39,7 +39,7 @@ impl HalfSpace {
         }
     }
 
-    /// Distance of a point from the plane, positive inside, metres.
+    /// Distance of a point from the plane in metres, positive inside.
     pub fn height(&self, point: DVec3) -> f64 {
         self.normal.dot(point) + self.offset
     }
@@ -62,12 +62,12 @@ pub(crate) fn meeting_point(planes: [HalfSpace; 3]) -> DVec3 {
     -(bc * planes[0].offset + ca * planes[1].offset + ab * planes[2].offset) / a.dot(bc)
 }
 
-/// Left, right, bottom, top, near and far side of what a driver may draw through a clip matrix
-/// (depth 0 to 1), of geometry whose coordinates are at most `extent` (Gribb and Hartmann 2001).
+/// Left, right, bottom, top, near and far planes of the space that a driver may draw with a clip matrix
+/// (depth 0 to 1), for geometry whose coordinates are at most `extent` (Gribb and Hartmann 2001).
 ///
-/// A driver computes each clip coordinate in single precision and compares two of them: each plane
-/// is moved outwards by what both may be off. That matters for the far plane, whose two
-/// coordinates almost cancel.
+/// A driver computes each clip coordinate in single precision and compares two of them. Each plane is moved
+/// outwards by the rounding errors of both. This is relevant for the far plane, whose two coordinates almost
+/// cancel.
 pub(crate) fn frustum(clip_from_world: Mat4, extent: DVec3) -> [HalfSpace; 6] {
     let matrix: DMat4 = clip_from_world.as_dmat4();
     let row = |i: usize| matrix.row(i);
@@ -98,12 +98,12 @@ pub(crate) struct PreparedPlane {
     normal: Vec3,
     offset: f32,
     margin: f32,
-    /// Which corner of a box is highest above the plane: low or high, by axis.
+    /// The corner of a box that is highest above the plane: low or high, by axis.
     highest: [usize; 3],
 }
 
 impl PreparedPlane {
-    /// Bits of the boxes wholly outside, and of those wholly inside.
+    /// Bits of the boxes completely outside, and of those completely inside.
     #[inline]
     pub fn test(&self, corners: &[[Vec4; 3]; 2]) -> [u32; 2] {
         let height = |x: Vec4, y: Vec4, z: Vec4| {
@@ -112,7 +112,7 @@ impl PreparedPlane {
         let [x, y, z] = self.highest;
         let highest = height(corners[x][0], corners[y][1], corners[z][2]);
         let lowest = height(corners[1 - x][0], corners[1 - y][1], corners[1 - z][2]);
-        // Comparisons with NaN are false: such a box is neither outside nor inside.
+        // Comparisons with NaN are false, so such a box is neither outside nor inside.
         [
             highest.cmplt(Vec4::splat(-self.margin)).bitmask(),
             lowest.cmpge(Vec4::splat(self.margin)).bitmask(),

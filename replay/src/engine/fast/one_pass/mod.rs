@@ -25,7 +25,7 @@ use crate::stream::{Bins, Consumer, Cores, QuadLines, StreamError, Tag, interlea
 pub type Geometry = (u32, u32);
 
 /// Geometry of both levels.
-pub type LevelGeometry = (Geometry, Geometry);
+pub(crate) type LevelGeometry = (Geometry, Geometry);
 
 /// The geometry of a configuration with a shared L2 whose caches are all plain LRU.
 pub fn geometry(config: &RunConfig) -> Option<LevelGeometry> {
@@ -41,7 +41,7 @@ pub fn geometry(config: &RunConfig) -> Option<LevelGeometry> {
 }
 
 /// A set of LRU hierarchies.
-pub struct OnePass {
+pub(crate) struct OnePass {
     l1: Level,
     /// One per core.
     forests: Vec<Forest>,

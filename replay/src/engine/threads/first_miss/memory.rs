@@ -13,7 +13,7 @@ use crate::result::{FirstLookups, MemoryResult};
 pub enum Seen {
     /// All lines are resident.
     All,
-    /// Some lines are missing; [`Memory::ask`] requests them.
+    /// Some lines are missing; [`Memory::request`] requests them.
     NotAll,
 }
 
@@ -88,7 +88,7 @@ impl<D: DelayedFill> Memory<D> {
     }
 
     /// Requests the missing lines of the last footprint looked up, except those in flight.
-    pub fn ask(&mut self, core: usize, now: u64, thread: &mut Thread) {
+    pub fn request(&mut self, core: usize, now: u64, thread: &mut Thread) {
         let Some(footprint) = thread.footprint() else {
             return;
         };

@@ -104,7 +104,7 @@ impl<D: DelayedFill> FirstMiss<D> {
                 unit.running = Some((began, thread));
                 return false;
             } else {
-                self.memory.ask(core, now, &mut thread);
+                self.memory.request(core, now, &mut thread);
                 unit.stats.wasted += 1;
                 unit.clock += 1;
                 let back = began + u64::from(self.tmu.loop_cycles);

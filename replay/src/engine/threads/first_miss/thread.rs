@@ -6,11 +6,11 @@ use crate::stream::QuadLines;
 ///
 /// With delayed fills, threads can evict each other's lines from a set forever, each fill evicting the line
 /// that the other thread needs next. After this many attempts a thread takes its data from the fill itself.
-pub const FETCHES_UNTIL_KEPT: u32 = 8;
+pub(super) const FETCHES_UNTIL_KEPT: u32 = 8;
 
 /// A thread's footprints and its progress.
 #[derive(Debug, Default)]
-pub struct Thread {
+pub(crate) struct Thread {
     lines: Vec<u32>,
     footprints: Vec<Listed>,
     tile: usize,

@@ -7,7 +7,7 @@
 //! line was missing.
 
 use super::super::Shared;
-use super::asking::{Absent, Asking, Trips};
+use super::requests::{Absent, Requests, Trips};
 use crate::config::{RunConfig, TmuConfig};
 use crate::engine::counts::CacheCounts;
 use crate::memory::{Caches, Delay, DelayedFill, MissPath, NOT_IN_FLIGHT, SecondLevel};
@@ -98,7 +98,7 @@ impl<D: DelayedFill> Memory<D> {
     }
 
     /// Looks up all lines of a thread that enters at `now` in the core's L1. If lines are neither resident
-    /// nor in flight, the caller must call [`Self::ask`].
+    /// nor in flight, the caller must call [`Self::request`].
     #[inline(always)]
     pub fn look_up(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> Found {
         let LookedUp {
@@ -109,7 +109,7 @@ impl<D: DelayedFill> Memory<D> {
         waiting.clear();
         absent.clear();
         if self.misses_change_caches_at_once || quad.distinct.is_empty() {
-            // Distinct lines are not listed; `ask` looks footprints up one by one.
+            // Distinct lines are not listed; `request` looks footprints up one by one.
             return Found::NotAll;
         }
         let (cache, counts) = (&mut self.shared.l1[core], &mut self.shared.counts);
@@ -152,7 +152,7 @@ impl<D: DelayedFill> Memory<D> {
 
     /// Requests the absent lines when the core has access to the L2. Returns the arrivals that the footprints wait for.
     #[inline(never)]
-    pub fn ask(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> &mut Waiting {
+    pub fn request(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> &mut Waiting {
         let first = &mut self.threads[core];
         let Shared {
             l1,
@@ -160,7 +160,7 @@ impl<D: DelayedFill> Memory<D> {
             l2_cycles,
             counts,
         } = &mut self.shared;
-        let mut asking = Asking {
+        let mut requests = Requests {
             core,
             l1: &mut l1[core],
             l2,
@@ -174,13 +174,13 @@ impl<D: DelayedFill> Memory<D> {
             trips: Trips::default(),
         };
         if first.absent.is_empty() {
-            asking.one_by_one(quad);
+            requests.one_by_one(quad);
         } else if quad.is_one_segment() {
-            asking.segment(quad, &first.absent, 0, &mut self.by_first_use);
+            requests.segment(quad, &first.absent, 0, &mut self.by_first_use);
         } else {
             let mut start = 0;
             for (segment, &end) in (0..).zip(&first.segments) {
-                asking.segment(
+                requests.segment(
                     quad,
                     &first.absent[start..end],
                     segment,

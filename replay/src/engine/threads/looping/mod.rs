@@ -1,8 +1,8 @@
 //! A thread requests all missing lines of its footprints and loops through the pipeline until they are
 //! filled ("looping for the next chance").
 
-mod asking;
 mod memory;
+mod requests;
 mod timeline;
 
 use super::{Items, Shared, ThreadModel, start_item};
@@ -20,7 +20,7 @@ pub struct Looping<D> {
     memory: Memory<D>,
     units: Vec<Pipeline>,
     /// Per core, whether its thread has been looked up and has requests for the L2.
-    asking: Vec<bool>,
+    is_requesting: Vec<bool>,
     /// Records the timeline, if requested.
     recorder: Option<Recorder>,
 }
@@ -37,7 +37,7 @@ impl<D: DelayedFill> Looping<D> {
         Self {
             memory: Memory::new(caches, config, counts, path),
             units: vec![Pipeline::new(config.tmu); cores],
-            asking: vec![false; cores],
+            is_requesting: vec![false; cores],
             recorder: config.timeline.then(|| Recorder::new(cores)),
         }
     }
@@ -66,10 +66,10 @@ impl<D: DelayedFill> ThreadModel for Looping<D> {
         items: &mut Items<'_, '_>,
     ) -> Result<u64, StreamError> {
         let unit = &mut self.units[core];
-        if std::mem::take(&mut self.asking[core])
+        if std::mem::take(&mut self.is_requesting[core])
             && let Some(quad) = work.quad(core)
         {
-            let waiting = self.memory.ask(core, unit.clock(), &quad);
+            let waiting = self.memory.request(core, unit.clock(), &quad);
             unit.start(quad.footprints, waiting);
         }
         loop {
@@ -87,11 +87,11 @@ impl<D: DelayedFill> ThreadModel for Looping<D> {
                                 unit.start(quad.footprints, self.memory.waiting(core));
                             }
                             Found::NotAll if now > until => {
-                                self.asking[core] = true;
+                                self.is_requesting[core] = true;
                                 return Ok(now);
                             }
                             Found::NotAll => {
-                                let waiting = self.memory.ask(core, now, &quad);
+                                let waiting = self.memory.request(core, now, &quad);
                                 unit.start(quad.footprints, waiting);
                             }
                         }

@@ -123,7 +123,7 @@ proptest! {
 
     /// Compares the cache that fills set by set with the one that fills in order of time.
     #[test]
-    fn both_kinds_of_timed_cache_answer_alike(
+    fn both_kinds_of_timed_cache_give_equal_answers(
         block in any::<bool>(),
         log_lines in 0_u32..4,
         l3 in any::<bool>(),
@@ -202,7 +202,7 @@ fn a_prefetched_line_arrives_after_the_latency_of_its_own_fetch() {
 }
 
 #[test]
-fn a_cache_that_allocates_on_a_miss_holds_what_it_prefetched() {
+fn a_cache_that_allocates_on_a_miss_keeps_prefetched_lines() {
     let config = config(prefetch(Prefetching::ALIGNED_BLOCK, 4));
     let reserved = AllocateOnMiss(cache(&config).into_box()).delayed(200);
     let mut level = SecondLevel::new(vec![reserved], MissPath::build(&config, None).unwrap());

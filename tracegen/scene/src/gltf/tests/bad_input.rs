@@ -1,4 +1,4 @@
-//! What is said about broken files.
+//! Errors for broken files.
 
 use super::*;
 
@@ -10,14 +10,14 @@ fn a_missing_file_is_named() {
 }
 
 #[test]
-fn a_cut_buffer_is_told_with_both_lengths() {
+fn a_cut_buffer_is_refused_with_both_lengths() {
     let files = Files::new(&base());
     files.write("mesh.bin", &[0; 40]);
     files.fails_with(&["buffers[0]", "42 bytes", "40 bytes"]);
 }
 
 #[test]
-fn cut_or_foreign_json_is_an_error() {
+fn truncated_json_and_json_that_is_not_gltf_are_refused() {
     let files = Files::new(&base());
     let text = base().to_string();
     for cut in [0, 1, text.len() / 2, text.len() - 1] {
@@ -35,7 +35,7 @@ fn cut_or_foreign_json_is_an_error() {
 }
 
 #[test]
-fn ranges_outside_their_buffer_are_told() {
+fn ranges_outside_their_buffer_are_refused() {
     for (pointer, value, place) in [
         ("/accessors/0/count", json!(4), "accessors[0]"),
         ("/accessors/0/byteOffset", json!(1), "accessors[0]"),
@@ -52,7 +52,7 @@ fn ranges_outside_their_buffer_are_told() {
 }
 
 #[test]
-fn indices_outside_their_table_are_told() {
+fn indices_outside_their_table_are_refused() {
     for (pointer, value) in [
         ("/nodes/0/mesh", json!(7)),
         ("/meshes/0/primitives/0/material", json!(3)),
@@ -66,7 +66,7 @@ fn indices_outside_their_table_are_told() {
 }
 
 #[test]
-fn a_vertex_index_past_the_vertices_is_told() {
+fn a_vertex_index_past_the_vertices_is_refused() {
     let files = Files::new(&base());
     files.write("mesh.bin", &triangle_bytes(CORNERS, [0, 1, 3]));
     files.fails_with(&[
@@ -93,7 +93,7 @@ fn a_position_that_is_not_finite_names_mesh_accessor_and_vertex() {
 }
 
 #[test]
-fn accessors_of_the_wrong_type_are_told() {
+fn accessors_of_the_wrong_type_are_refused() {
     for (pointer, value) in [
         ("/accessors/0/type", json!("VEC2")),
         ("/accessors/0/componentType", json!(5125)),
@@ -105,7 +105,7 @@ fn accessors_of_the_wrong_type_are_told() {
 }
 
 #[test]
-fn cycles_and_nodes_with_two_parents_are_told() {
+fn cycles_and_nodes_with_two_parents_are_refused() {
     let cycle = json!([{"children": [1]}, {"mesh": 0, "children": [0]}]);
     Files::new(&with(base(), "/nodes", cycle)).fails_with(&["nodes[0]", "cycle"]);
     let own_child = json!([{"mesh": 0, "children": [0]}]);
@@ -125,7 +125,7 @@ fn a_chain_of_a_hundred_thousand_nodes_does_not_overflow_the_stack() {
 }
 
 #[test]
-fn elements_beyond_what_the_file_can_hold_are_refused_before_they_are_made() {
+fn elements_beyond_the_files_budget_are_refused_before_allocation() {
     let sparse = json!({"count": 1,
         "indices": {"bufferView": 1, "componentType": 5123},
         "values": {"bufferView": 0}});
@@ -146,7 +146,7 @@ fn elements_beyond_what_the_file_can_hold_are_refused_before_they_are_made() {
 }
 
 #[test]
-fn a_mesh_of_many_primitives_placed_many_times_is_refused_before_it_explodes() {
+fn a_mesh_of_many_primitives_placed_many_times_is_refused_before_allocation() {
     let primitive = json!({"attributes": {"POSITION": 0}});
     let json = with(
         base(),
@@ -160,7 +160,7 @@ fn a_mesh_of_many_primitives_placed_many_times_is_refused_before_it_explodes() {
 }
 
 #[test]
-fn a_stride_below_the_elements_size_is_told() {
+fn a_stride_below_the_elements_size_is_refused() {
     for stride in [4, 8] {
         let json = with(base(), "/bufferViews/0/byteStride", json!(stride));
         Files::new(&json).fails_with(&[
@@ -207,7 +207,7 @@ fn names_and_paths_with_terminal_escapes_are_shown_escaped() {
 }
 
 #[test]
-fn missing_corrupt_and_empty_images_are_told() {
+fn missing_corrupt_and_empty_images_are_refused() {
     let files = Files::new(&textured());
     files.fails_with(&["my image.png", "images[0], used by materials[0] 'paint'"]);
     let good = png([4, 4], [1, 2, 3, 255]);
@@ -236,8 +236,8 @@ fn a_huge_image_is_refused_before_it_is_decoded() {
 }
 
 #[test]
-fn required_extensions_that_are_not_supported_are_named_before_all_else() {
-    // As such files are: accessors that only the extension fills.
+fn unsupported_required_extensions_are_reported_before_other_errors() {
+    // Accessors that only the extension fills, as in real files.
     let mut draco = base();
     draco["accessors"][0]
         .as_object_mut()
@@ -257,7 +257,7 @@ fn required_extensions_that_are_not_supported_are_named_before_all_else() {
 fn a_huge_image_in_a_small_file_is_refused_before_it_is_decoded() {
     let files = Files::new(&textured());
     let mut huge = png([1, 1], [0; 4]);
-    // Width and height of the header, with its checksum made good.
+    // Width and height of the header, with a corrected checksum.
     huge[16..24].copy_from_slice(&[0, 0, 0x40, 0, 0, 0, 0x40, 0]);
     let checksum = crc(&huge[12..29]);
     huge[29..33].copy_from_slice(&checksum.to_be_bytes());
@@ -267,7 +267,7 @@ fn a_huge_image_in_a_small_file_is_refused_before_it_is_decoded() {
 
 #[test]
 fn many_small_images_are_refused_before_one_is_decoded() {
-    // 1024x1024 in 1-bit grey, of which the header alone is there: 4 MiB of texels each.
+    // 1024x1024 in 1-bit grey, with only the header present: 4 MiB of texels each.
     let mut image = png([1, 1], [0; 4]);
     image[16..24].copy_from_slice(&[0, 0, 4, 0, 0, 0, 4, 0]);
     image[24..26].copy_from_slice(&[1, 0]);
@@ -302,7 +302,7 @@ fn many_small_images_are_refused_before_one_is_decoded() {
     ]);
 }
 
-/// CRC-32 as PNG has it.
+/// CRC-32 as PNG defines it.
 fn crc(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(!0u32, |crc, &byte| {
         (0..8).fold(crc ^ u32::from(byte), |crc, _| {
@@ -330,7 +330,7 @@ fn no_single_changed_byte_of_the_json_panics() {
             b'1'
         };
         files.write("scene.gltf", &changed);
-        // Either outcome will do: what counts is that there is one.
+        // Success and failure are both fine. Only a panic fails the test.
         let _ = files.load();
     }
 }
@@ -353,7 +353,7 @@ fn versions_other_than_two_are_refused() {
 }
 
 #[test]
-fn a_texture_in_another_format_alone_is_told_with_its_number_and_extension() {
+fn a_texture_only_in_an_unsupported_format_is_refused_with_its_number_and_extension() {
     for extension in ["EXT_texture_avif", "VENDOR_texture_new"] {
         let texture = json!({"extensions": {extension: {"source": 0}}});
         let json = with(textured(), "/textures", json!([texture]));
@@ -376,7 +376,7 @@ fn a_texture_in_another_format_alone_is_told_with_its_number_and_extension() {
 }
 
 #[test]
-fn lengths_of_a_glb_that_do_not_fit_are_told_and_what_follows_is_left_out_with_a_warning() {
+fn invalid_glb_lengths_are_refused_and_trailing_bytes_are_ignored_with_a_warning() {
     let glb = |length: i32, json_length: i32, kind: &[u8; 4]| {
         let mut json = base();
         json["buffers"] = json!([{"byteLength": 42}]);

@@ -1,4 +1,4 @@
-//! What is read.
+//! Contents read from valid files.
 
 use super::*;
 use glam::DVec3;
@@ -46,7 +46,7 @@ fn the_same_scene_comes_from_gltf_data_uris_and_glb() {
 }
 
 #[test]
-fn a_scene_far_out_has_the_coordinates_of_one_at_zero() {
+fn a_scene_far_from_zero_has_the_coordinates_of_one_at_zero() {
     let at = |far: f64| {
         let json = with(
             base(),
@@ -67,7 +67,7 @@ fn a_scene_far_out_has_the_coordinates_of_one_at_zero() {
         let scene = at(far);
         let moved = DVec3::new(far, -far, 2.0 * far);
         let origin = scene.origin - moved;
-        // On a grid as wide as half of the scene: a metre.
+        // The grid's spacing is half of the scene's extent: one metre.
         assert_eq!(origin, origin.round());
         let [a, b] = [&near, &scene].map(|scene| scene.instances[0].transform);
         assert_eq!(a.matrix3, b.matrix3);
@@ -82,7 +82,7 @@ fn a_scene_far_out_has_the_coordinates_of_one_at_zero() {
 }
 
 #[test]
-fn transforms_multiply_down_the_tree_and_mirrors_are_told() {
+fn transforms_multiply_down_the_tree_and_mirroring_is_detected() {
     let json = with(
         base(),
         "/nodes",
@@ -116,7 +116,7 @@ fn a_camera_node_looks_along_its_minus_z() {
             {"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.5, "zfar": 50.0}}
         ]),
     );
-    // Turned by 90 degrees about y: -z becomes -x.
+    // Rotated by 90 degrees about y: -z becomes -x.
     let turned = json!([
         0.0, 0.0, -1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0, 1.0
     ]);
@@ -157,7 +157,7 @@ fn an_image_in_both_colour_spaces_is_listed_twice_and_otherwise_once() {
 }
 
 #[test]
-fn images_are_decoded_when_their_texels_are_asked_for() {
+fn images_are_decoded_when_their_texels_are_requested() {
     let files = Files::new(&textured());
     let whole = png([6, 3], [0; 4]);
     files.write("my image.png", &whole[..whole.len() - 20]);
@@ -193,7 +193,7 @@ fn materials_keep_their_alpha_mode_transmission_and_ior() {
 }
 
 #[test]
-fn a_texture_transform_turns_as_the_extension_says() {
+fn a_texture_transform_rotates_as_the_extension_specifies() {
     let transform = json!({"offset": [0.5, 0.25], "rotation": std::f32::consts::FRAC_PI_2,
                            "scale": [2.0, 3.0]});
     let texture = json!({"index": 0, "extensions": {"KHR_texture_transform": transform}});
@@ -208,7 +208,7 @@ fn a_texture_transform_turns_as_the_extension_says() {
     let material = files.load().unwrap().scene.materials.remove(0);
     let rows = material.base_color_texture.unwrap().uv_transform;
     assert_eq!(rows, material.normal_texture.unwrap().uv_transform);
-    // (1, 0) scales to (2, 0), turns to (0, -2), moves to (0.5, -1.75).
+    // (1, 0) scales to (2, 0), rotates to (0, -2), moves to (0.5, -1.75).
     let u = rows[0][0] + rows[0][2];
     let v = rows[1][0] + rows[1][2];
     assert!(
@@ -263,7 +263,7 @@ fn points_and_lines_are_skipped_with_a_warning() {
 }
 
 #[test]
-fn what_is_left_out_is_told_once_with_its_count() {
+fn ignored_features_are_reported_once_with_their_count() {
     let mut json = base();
     json["extensionsUsed"] = json!(["FOO_a", "KHR_texture_transform", "FOO_b"]);
     let points = json!({"attributes": {"POSITION": 0}, "mode": 0});
@@ -282,7 +282,7 @@ fn what_is_left_out_is_told_once_with_its_count() {
 }
 
 #[test]
-fn a_buffer_longer_than_it_says_is_read_as_far_as_it_says() {
+fn a_buffer_longer_than_its_stated_length_is_read_up_to_that_length() {
     let files = Files::new(&base());
     let mut bytes = triangle_bytes(CORNERS, [0, 1, 2]);
     bytes.resize(100_000, 7);
@@ -353,7 +353,7 @@ fn vertex_colours_of_every_type_are_read() {
 }
 
 #[test]
-fn quantised_positions_are_read_where_the_extension_is_used() {
+fn quantised_positions_are_read_if_the_extension_is_used() {
     let positions = [0u16, 0, 0, 0, 4, 0, 0, 0, 0, 4, 0, 0];
     let mut bytes: Vec<u8> = positions.iter().flat_map(|v| v.to_le_bytes()).collect();
     bytes.resize(36, 0);
@@ -426,8 +426,8 @@ fn instanced(rotation_component: u32, rotations: &[u8]) -> Files {
 }
 
 #[test]
-fn instances_of_the_extension_stand_where_it_says_whether_it_is_required_or_not() {
-    // The third is turned by 180 degrees about y.
+fn instances_have_the_extensions_transforms_whether_it_is_required_or_not() {
+    // The third is rotated by 180 degrees about y.
     let float: Vec<u8> = [
         [0.0_f32, 0.0, 0.0, 1.0],
         [0.0, 0.0, 0.0, 1.0],

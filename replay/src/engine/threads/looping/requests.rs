@@ -17,13 +17,13 @@ pub struct Absent {
 
 /// Requests of a thread so far, a limited number per trip.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Trips {
+pub(super) struct Trips {
     fetches: u32,
     full_trips: u32,
 }
 
-/// A thread that requests its lines.
-pub struct Asking<'m, D> {
+/// The requests of a thread for its lines.
+pub struct Requests<'m, D> {
     pub core: usize,
     pub l1: &'m mut D,
     pub l2: &'m mut SecondLevel<D>,
@@ -38,7 +38,7 @@ pub struct Asking<'m, D> {
     pub trips: Trips,
 }
 
-impl<D: DelayedFill> Asking<'_, D> {
+impl<D: DelayedFill> Requests<'_, D> {
     /// Requests the `absent` lines of a segment in the order of their first use.
     #[inline(always)]
     pub fn segment(
@@ -55,7 +55,7 @@ impl<D: DelayedFill> Asking<'_, D> {
             first_uses[first / 64] |= 1 << (first % 64);
             by_first_use[first] = *one;
         }
-        let mut asking = 0;
+        let mut last_user = 0;
         // Whether the requesting footprint has fetched a line, and one from memory.
         let mut missed = [false; 2];
         for (by_first_use, mut rest) in by_first_use.chunks_exact(64).zip(first_uses) {
@@ -64,8 +64,8 @@ impl<D: DelayedFill> Asking<'_, D> {
                 rest &= rest - 1;
                 let users = of.footprints();
                 let first_user = users & users.wrapping_neg();
-                missed = missed.map(|missed| missed & (first_user == asking));
-                asking = first_user;
+                missed = missed.map(|missed| missed & (first_user == last_user));
+                last_user = first_user;
                 // Another segment or cell of the quad may have requested the line in this cycle.
                 let known = match of.may_be_listed() {
                     true => self.l1.arrival(line, self.now),
@@ -134,7 +134,7 @@ impl<D: DelayedFill> Asking<'_, D> {
         } else {
             u64::from(trip) * u64::from(self.tmu.loop_cycles)
         };
-        let in_l2 = misses.ask_l2(self.l2.request(self.core, line, now), now);
+        let in_l2 = misses.count_l2_answer(self.l2.request(self.core, line, now), now);
         let in_l1 = in_l2 + self.l2_cycles + wait;
         self.l1.enter(line, now, in_l1);
         in_l1

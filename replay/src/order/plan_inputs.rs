@@ -7,7 +7,7 @@ use formats::textrace::{PassKind, TraceMeta};
 
 /// The information available besides the grids.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Known<'a> {
+pub struct PlanInputs<'a> {
     /// Seed of the random curve.
     pub seed: u64,
     /// Number of cores.
@@ -25,7 +25,7 @@ pub struct Known<'a> {
     pub last: Option<&'a Counters>,
 }
 
-impl<'a> Known<'a> {
+impl<'a> PlanInputs<'a> {
     /// The information available before the first frame of a trace.
     #[must_use]
     pub fn new(config: &RunConfig, meta: &'a TraceMeta) -> Self {
