@@ -1,5 +1,5 @@
-//! Animated scenes, from the command line to the trace: each pose gives the trace of a static file that has its
-//! vertices where the pose has them.
+//! End-to-end tests of animated scenes: the trace of each pose equals the trace of a static file with
+//! the posed vertices.
 
 use formats::Trace;
 use formats::textrace::{Textrace, Tile};
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
 
-/// Corners of a board of two quads, one above the other, and their texture coordinates.
+/// Corners of a board of two stacked quads, and their texture coordinates.
 const CORNERS: [[f32; 3]; 6] = [
     [-1.0, 0.0, 0.0],
     [1.0, 0.0, 0.0],
@@ -22,7 +22,7 @@ const INDICES: [u16; 12] = [0, 1, 2, 2, 1, 3, 2, 3, 4, 4, 3, 5];
 /// Displacements of the board's morph target.
 const TARGET: [[f32; 3]; 6] = [[0.0, 0.0, 0.5]; 6];
 
-/// Heights of its rows decide how much of the upper joint moves a corner.
+/// Weight of the upper joint per corner: it grows with the height of the row.
 const WEIGHTS: [[f32; 4]; 6] = [
     [1.0, 0.0, 0.0, 0.0],
     [1.0, 0.0, 0.0, 0.0],
@@ -32,7 +32,7 @@ const WEIGHTS: [[f32; 4]; 6] = [
     [0.0, 1.0, 0.0, 0.0],
 ];
 
-/// A glTF file in the making.
+/// Builder of a glTF file.
 struct File {
     json: Value,
     bytes: Vec<u8>,
@@ -110,8 +110,8 @@ impl File {
     }
 }
 
-/// The time of the last key of what moves, seconds. All values between are sums of few powers of two, so that
-/// no evaluation rounds them.
+/// The time of the last key, seconds. All values in between are sums of few powers of two, so that
+/// every evaluation of them is exact.
 const END_S: f32 = 1.0;
 
 /// A board on a moving node, a skinned one and a morphed one, all moving at a constant rate.
@@ -125,7 +125,7 @@ fn animated(folder: &Path) -> String {
     );
     file.push("nodes", json!({"translation": [0, 0, 0]}));
     file.json["nodes"][1]["skin"] = json!(0);
-    // A skinned mesh stands where its joints are.
+    // The joints place a skinned mesh.
     file.json["nodes"][1]["translation"] = json!([9, 9, 9]);
     let joints = file.accessor(&[0, 1, 0, 0].repeat(6), 5121, "VEC4", 6);
     let weights = file.floats("VEC4", &WEIGHTS);
@@ -189,7 +189,7 @@ fn content(folder: &Path, command: &str, scene: &str, flags: &[&str]) -> u32 {
 }
 
 #[test]
-fn a_pose_gives_the_trace_of_a_static_file_that_has_it() {
+fn a_pose_has_the_trace_of_a_static_file_in_that_pose() {
     if !has_lavapipe() {
         return;
     }
@@ -212,7 +212,7 @@ fn a_pose_gives_the_trace_of_a_static_file_that_has_it() {
         different.sort_unstable();
         different.dedup();
         assert_eq!(different.len(), times.len(), "{command}");
-        // The start is the default, and the animation repeats after its end.
+        // Time 0 is the default, and the animation repeats after its end.
         assert_eq!(of(&scene, &[]), times[0]);
         assert_eq!(of(&scene, &["--time", "3.25"]), times[1]);
         for threads in ["1", "2", "5"] {
@@ -225,7 +225,7 @@ fn a_pose_gives_the_trace_of_a_static_file_that_has_it() {
 }
 
 #[test]
-fn time_goes_on_from_frame_to_frame() {
+fn scene_time_advances_per_frame() {
     if !has_lavapipe() {
         return;
     }

@@ -21,7 +21,7 @@ pub struct Scene {
     pub instances: Vec<Instance>,
     /// Which instances of a built-in scene move, and how.
     pub motions: Vec<Motion>,
-    /// What the animation of a file moves; `None` where everything stands still.
+    /// The animation of a file, or `None` if nothing moves.
     pub animation: Option<Animation>,
     /// Materials.
     pub materials: Vec<Material>,
@@ -94,7 +94,7 @@ impl Instance {
         self.transform.matrix3.determinant() < 0.0
     }
 
-    /// Inverse transpose for normals. An instance that is scaled to nothing has none: its own matrix.
+    /// Inverse transpose for normals. An instance with a scale of zero uses its own matrix.
     #[must_use]
     pub fn normal_matrix(&self) -> Mat3 {
         let matrix = Mat3::from(self.transform.matrix3);

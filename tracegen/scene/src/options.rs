@@ -11,7 +11,7 @@ pub struct LoadOptions {
     pub slots: [bool; 6],
     /// The material variant to show (KHR_materials_variants), or the file's own materials.
     pub variant: Option<String>,
-    /// The animation to play: a name, an index, `all` or `none`; the file's first one where it is left out.
+    /// The animation to play: a name, an index, `all` or `none`. The default is the file's first one.
     pub animation: Option<String>,
     /// The time of the pose, seconds from the start of the animation.
     pub time_s: f64,
@@ -28,7 +28,7 @@ impl LoadOptions {
 }
 
 impl LoadOptions {
-    /// The animation asked for by its name or index, which a scene without animations cannot have.
+    /// The animation chosen by name or index. A scene without animations has none.
     #[must_use]
     pub fn named_animation(&self) -> Option<&str> {
         let named = self.animation.as_deref();

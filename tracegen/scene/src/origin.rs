@@ -47,11 +47,11 @@ pub(crate) fn relative_transform(mut transform: DAffine3, origin: DVec3) -> Affi
     transform.as_affine3a()
 }
 
-/// What [`place`] decides.
+/// The result of [`place`].
 pub(crate) struct Placed {
     pub origin: DVec3,
     pub instances: Vec<Instance>,
-    /// By which each mesh's positions have been moved.
+    /// The offset by which each mesh's positions were moved.
     pub own: Vec<DVec3>,
 }
 

@@ -19,7 +19,7 @@ mod tests {
     use super::did_you_mean;
 
     #[test]
-    fn the_most_similar_name_is_suggested_and_nothing_where_none_is_similar() {
+    fn only_a_similar_name_is_suggested() {
         let names = ["atrium", "Gallery", "galley-2"];
         assert_eq!(did_you_mean("galery", names), "; did you mean 'Gallery'?");
         assert_eq!(did_you_mean("xyz", names), "");

@@ -3,20 +3,20 @@
 use clap::Args;
 use scene::LoadOptions;
 
-/// Longest time, seconds: a year, whose milliseconds double precision has.
+/// Longest time, seconds: one year, for which double precision still resolves milliseconds.
 const MAX_TIME_S: f64 = 365.0 * 86_400.0;
 
-/// The pose of a scene that moves.
+/// The pose of an animated scene.
 #[derive(Args, Clone, Debug)]
 pub struct PoseArgs {
-    /// Time of the first frame in what moves in the scene, in seconds; later frames follow at their rate.
+    /// Scene time of the first frame, in seconds. Later frames follow at the frame rate.
     ///
     /// An animation of a glTF file repeats after its last key.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, value_parser = parse_time,
           allow_negative_numbers = true)]
     pub time: f64,
-    /// Animation of a glTF file to play, by its name or number; `none` shows the nodes at rest [default: the
-    /// first one].
+    /// Animation of a glTF file to play: its name, its number, `all` or `none` [default: the first
+    /// one].
     #[arg(long, value_name = "NAME|NUMBER|all|none")]
     pub animation: Option<String>,
 }

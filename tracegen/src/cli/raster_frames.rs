@@ -126,7 +126,7 @@ impl<'a> Session<'a> {
         })
     }
 
-    /// Moves the scene and its draws to where they are in a frame.
+    /// Poses the scene and its draws for a frame.
     fn pose(&mut self, frame: u32) -> anyhow::Result<()> {
         let time_s = self.setup.moments.scene_time_s(frame);
         let scene = &mut self.setup.scene;

@@ -40,10 +40,10 @@ pub struct StudySetup {
     pub frames: Vec<u32>,
     /// Frames per second along the path.
     pub fps: f32,
-    /// Time of the path's first frame in what moves in the scene.
+    /// Scene time of the path's first frame.
     #[serde(skip_serializing_if = "is_zero")]
     pub time_s: f64,
-    /// Animation that plays, as given.
+    /// The animation that plays, as given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub animation: Option<String>,
     /// Width and height of an eye's picture.
@@ -74,7 +74,7 @@ pub struct StudySetup {
     pub input_checksum: String,
 }
 
-/// Manifests of scenes at their start are as they were before `--time`.
+/// Omits a time of zero from manifests.
 fn is_zero(time_s: &f64) -> bool {
     *time_s == 0.0
 }

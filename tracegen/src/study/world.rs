@@ -39,7 +39,7 @@ pub struct World {
     pub lens: [Lens; 2],
     /// Frames per second along the path.
     pub fps: f32,
-    /// Time of frame 0 in what moves in the scene.
+    /// Scene time of frame 0.
     pub start_s: f64,
     /// The pose at the start of the path.
     pub camera: Camera,
@@ -158,10 +158,10 @@ impl World {
         Ok(())
     }
 
-    /// Puts what moves where it is in a frame.
+    /// Poses the scene for a frame.
     ///
     /// # Errors
-    /// Something that leaves the range of coordinates.
+    /// A coordinate exceeds the supported range.
     fn pose(&mut self, number: u32) -> Result<(), RasterError> {
         let time_s = self.start_s + f64::from(number) / f64::from(self.fps);
         let scene = &mut self.scene;

@@ -3,20 +3,20 @@
 use crate::paths::bracket;
 use glam::{DAffine3, DQuat, DVec3, DVec4};
 
-/// How values between keys come about.
+/// Interpolation between keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Interpolation {
     /// Linear, rotations along the shorter arc.
     Linear,
-    /// The key before.
+    /// The value of the previous key.
     Step,
-    /// Hermite splines; each key has a tangent before, a value and a tangent after.
+    /// Hermite splines. Each key has an incoming tangent, a value and an outgoing tangent.
     Cubic,
 }
 
 impl Interpolation {
-    /// Values of a key.
-    pub fn values_a_key(self) -> usize {
+    /// Number of values per key.
+    pub fn values_per_key(self) -> usize {
         match self {
             Self::Cubic => 3,
             Self::Linear | Self::Step => 1,
@@ -24,8 +24,8 @@ impl Interpolation {
     }
 }
 
-/// Factors of a key's value and of the tangent after it, then of the tangent before the next key and of its
-/// value, at a part `t` of the `step` seconds between both. Tangents are per second.
+/// Weights of a key's value, its outgoing tangent, the next key's incoming tangent and the next key's
+/// value at the fraction `t` of the `step` seconds between the keys. Tangents are per second.
 fn hermite(t: f64, step: f64) -> [f64; 4] {
     let (t2, t3) = (t * t, t * t * t);
     [
@@ -42,12 +42,12 @@ pub(crate) struct Curve {
     pub interpolation: Interpolation,
     /// Seconds, ascending; at least one.
     pub times_s: Vec<f64>,
-    /// One a key, three with [`Interpolation::Cubic`].
+    /// One per key, or three with [`Interpolation::Cubic`].
     pub values: Vec<DVec4>,
 }
 
 impl Curve {
-    /// The value at a time; before the first key and after the last one it is theirs.
+    /// The value at a time, clamped to the first and the last key.
     pub fn at(&self, time_s: f64, is_rotation: bool) -> DVec4 {
         let (key, t) = bracket(&self.times_s, time_s);
         let next = (key + 1).min(self.times_s.len() - 1);
@@ -80,13 +80,13 @@ pub(crate) struct WeightCurve {
     pub interpolation: Interpolation,
     /// Seconds, ascending; at least one.
     pub times_s: Vec<f64>,
-    /// One a target, and as many rows of them as [`Curve::values`] has values.
+    /// Rows of one weight per target; as many rows as [`Curve::values`] has values.
     pub values: Vec<f64>,
     pub targets: usize,
 }
 
 impl WeightCurve {
-    /// The weights at a time, one a target.
+    /// The weights at a time, one per target.
     pub fn at(&self, time_s: f64) -> Vec<f64> {
         let (key, t) = bracket(&self.times_s, time_s);
         let next = (key + 1).min(self.times_s.len() - 1);
@@ -117,7 +117,7 @@ impl WeightCurve {
     }
 }
 
-/// The property that a curve moves.
+/// The property that a curve animates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Channel {
     Translation,
@@ -125,18 +125,18 @@ pub(crate) enum Channel {
     Scale,
 }
 
-/// A node and what moves it.
+/// A node and its animation curves.
 #[derive(Clone, Debug)]
 pub struct Joint {
-    /// Its transform where nothing moves it.
+    /// Its transform without animation.
     pub(crate) rest: DAffine3,
-    /// Translation, rotation and scale where nothing moves them.
+    /// Translation, rotation and scale without animation.
     pub(crate) parts: (DVec3, DQuat, DVec3),
     pub(crate) curves: Vec<(Channel, Curve)>,
 }
 
 impl Joint {
-    /// To the parent's space.
+    /// The transform to the parent's space.
     pub(crate) fn transform(&self, time_s: f64) -> DAffine3 {
         if self.curves.is_empty() {
             return self.rest;

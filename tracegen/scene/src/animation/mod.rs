@@ -1,7 +1,8 @@
-//! What a file's animation moves: nodes, and the vertices of skinned and morphed meshes.
+//! A file's animation: moving nodes, and the vertices of skinned and morphed meshes.
 //!
-//! A pose is computed on the processor, in double precision and rounded last, into the plain meshes and
-//! instances of the [`Scene`]: renderers, rays, culling and shadow cascades know nothing of animations.
+//! A pose is computed on the CPU in double precision, rounded once at the end, and written into the
+//! plain meshes and instances of the [`Scene`]. Renderers, rays, culling and shadow cascades therefore
+//! need no code for animations.
 
 mod curve;
 mod morph;
@@ -22,13 +23,13 @@ use crate::{Light, Mesh, Scene, SceneError};
 use glam::{Affine3A, DAffine3, DMat3, DVec3, Vec3};
 use std::path::PathBuf;
 
-/// Largest coordinate of what moves, metres; see the limit on a scene's extent.
+/// Largest coordinate of a moving vertex, metres. A scene's extent has the same limit.
 const MAX_COORDINATE_M: f64 = 1e12;
 
-/// What moves in a scene, and how.
+/// The moving parts of a scene.
 #[derive(Clone, Debug)]
 pub struct Animation {
-    /// For errors.
+    /// The file, named in errors.
     pub(crate) file: PathBuf,
     pub(crate) name: String,
     /// The last key's time.
@@ -41,7 +42,7 @@ pub struct Animation {
     pub(crate) cameras: Vec<(usize, usize)>,
     /// Indices of lights and of their nodes.
     pub(crate) lights: Vec<(usize, usize)>,
-    /// What the scene's coordinates are relative to.
+    /// The point that the scene's coordinates are relative to.
     pub(crate) origin: DVec3,
 }
 
@@ -51,48 +52,48 @@ pub(crate) struct MovingMesh {
     /// Index into the scene's meshes.
     pub mesh: usize,
     pub shape: Shape,
-    /// Weights of the morph targets where no curve has them.
+    /// Weights of the morph targets if no curve animates them.
     pub weights: Vec<f64>,
     pub curve: Option<WeightCurve>,
     /// Index into the animation's skins.
     pub skin: Option<usize>,
-    /// What its positions are relative to.
+    /// The point that its positions are relative to.
     pub own: DVec3,
-    /// It is not the same at all times.
+    /// True if it changes over time.
     pub moves: bool,
 }
 
-/// What an instance follows.
+/// The object that places an instance.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Follows {
     /// A node.
     Node {
         node: usize,
-        /// From the instance to the node.
+        /// Transform from the instance to the node.
         offset: DAffine3,
     },
-    /// A skin, by its index.
+    /// A skin, by index.
     Skin(usize),
 }
 
-/// An instance that moves, or whose mesh does.
+/// An instance that moves, or whose mesh moves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MovingInstance {
     /// Index into the scene's instances.
     pub instance: usize,
     pub follows: Follows,
-    /// What its mesh's positions are relative to.
+    /// The point that its mesh's positions are relative to.
     pub own: DVec3,
-    /// It or its mesh is not the same at all times.
+    /// True if it or its mesh changes over time.
     pub moves: bool,
 }
 
 impl Scene {
-    /// Puts what a file's animation moves where it is at a time: meshes, instances, cameras and lights. A
-    /// longer time than the animation's repeats it. A scene without animation stays as it is.
+    /// Poses the meshes, instances, cameras and lights of the scene at a time. The animation repeats
+    /// after its last key. A scene without animation does not change.
     ///
     /// # Errors
-    /// Something that leaves the range of coordinates.
+    /// A coordinate exceeds the supported range.
     pub fn animate(&mut self, time_s: f64) -> Result<(), SceneError> {
         let Some(animation) = self.animation.take() else {
             return Ok(());
@@ -104,7 +105,7 @@ impl Scene {
 }
 
 impl Animation {
-    /// Name of what plays, for readers.
+    /// Display name of the animation that plays.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -116,7 +117,7 @@ impl Animation {
         self.duration_s
     }
 
-    /// Instances that move or whose meshes do.
+    /// Instances that move or whose meshes move.
     pub fn moving_instances(&self) -> impl Iterator<Item = usize> + '_ {
         self.instances.iter().map(|moving| moving.instance)
     }
@@ -126,7 +127,7 @@ impl Animation {
         self.meshes.iter().map(|moving| moving.mesh)
     }
 
-    /// The time within the animation, whose end is its last key.
+    /// The time within the animation, which ends at its last key.
     pub(crate) fn within(&self, time_s: f64) -> f64 {
         if time_s > self.duration_s && self.duration_s > 0.0 {
             time_s % self.duration_s
@@ -151,7 +152,7 @@ impl Animation {
         let place = |node: usize| relative_transform(worlds[node], self.origin);
         for &(camera, node) in &self.cameras {
             let camera = scene.cameras.get_mut(camera);
-            // A camera without a direction keeps the one that it had.
+            // A camera without a direction keeps its previous one.
             if let (Some(camera), Some(look)) = (camera, look_of_node(&place(node))) {
                 (camera.eye, camera.target, camera.up) = look;
             }
@@ -164,7 +165,7 @@ impl Animation {
         Ok(())
     }
 
-    /// Drops what is the same at all times; `None` if nothing is left.
+    /// Drops the parts that never change. Returns `None` if nothing is left.
     pub(crate) fn moving(mut self) -> Option<Self> {
         self.meshes.retain(|moving| moving.moves);
         self.instances.retain(|moving| moving.moves);
@@ -183,7 +184,7 @@ impl Animation {
             .collect()
     }
 
-    /// Moves the vertices of meshes; the time is within the animation.
+    /// Moves the vertices of meshes. The time must be within the animation.
     pub(crate) fn pose_meshes(&self, meshes: &mut [Mesh], skins: &[PosedSkin], time_s: f64) {
         for moving in &self.meshes {
             let animated = moving.curve.as_ref().map(|curve| curve.at(time_s));
@@ -194,7 +195,7 @@ impl Animation {
         }
     }
 
-    /// Object to world, relative to the origin.
+    /// The object-to-world transform, relative to the origin.
     pub(crate) fn transform(
         &self,
         moving: &MovingInstance,
@@ -210,14 +211,14 @@ impl Animation {
                 if has_scale(&rounded) {
                     return rounded;
                 }
-                // What is scaled to nothing covers nothing; one axis left would have no normals.
+                // Without a usable scale, the instance covers nothing and needs no normals.
                 transform.matrix3 = DMat3::ZERO;
                 relative_transform(transform, self.origin)
             }
         }
     }
 
-    /// Checks that a moved instance is where scenes may be.
+    /// Checks that a moved instance stays within the supported coordinates.
     fn check(&self, mesh: &Mesh, transform: &Affine3A, time_s: f64) -> Result<(), SceneError> {
         let bounds = mesh.bounds().map(|corner| corner.as_dvec3());
         let transform = DAffine3 {
@@ -243,12 +244,12 @@ impl Animation {
     }
 }
 
-/// Neither 0 nor so small or large that normals could not be transformed.
+/// True if the determinant is neither 0 nor too small or large to transform normals.
 pub(crate) fn has_scale(transform: &Affine3A) -> bool {
     transform.matrix3.determinant().is_normal()
 }
 
-/// Puts a light where its node is; a parallel one without a direction keeps the one that it had.
+/// Moves a light to its node. A directional light without a direction keeps its previous one.
 fn move_light(light: &mut Light, place: &Affine3A) {
     match light {
         Light::Directional { direction, .. } => {

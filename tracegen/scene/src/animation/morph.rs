@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-/// A morph target: displacements, one a vertex, or none at all.
+/// A morph target: one displacement per vertex, or none at all.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Target {
     pub positions: Vec<Vec3>,
@@ -11,7 +11,7 @@ pub(crate) struct Target {
 }
 
 impl Target {
-    /// Drops the vertices without a flag.
+    /// Drops the vertices that are not `used`.
     pub fn keep(&mut self, used: &[bool]) {
         for values in [&mut self.positions, &mut self.normals, &mut self.tangents] {
             let mut flags = used.iter();
@@ -20,7 +20,7 @@ impl Target {
     }
 }
 
-/// A value of a vertex with the targets' displacements of one of its attributes.
+/// One attribute of a vertex, displaced by the weighted targets.
 pub(crate) fn morphed(
     rest: DVec3,
     targets: &[Target],

@@ -1,4 +1,4 @@
-//! A mesh whose vertices move: at rest, and at a time.
+//! A mesh whose vertices move: its rest shape, and its shape at a time.
 
 use super::morph::{Target, morphed};
 use super::skin::{Influences, PosedSkin, normal_matrix};
@@ -7,10 +7,10 @@ use crate::geometry::complete_vertices;
 use glam::{DMat3, DVec3, Vec3, Vec4};
 use rayon::prelude::*;
 
-/// Vertices that one task moves at least.
-const VERTICES_A_TASK: usize = 1024;
+/// Least number of vertices per parallel task.
+const MIN_VERTICES_PER_TASK: usize = 1024;
 
-/// What moves the vertices of a mesh.
+/// The morph targets and skin that move the vertices of a mesh.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Movers {
     pub targets: Vec<Target>,
@@ -18,7 +18,7 @@ pub(crate) struct Movers {
 }
 
 impl Movers {
-    /// Drops the vertices without a flag.
+    /// Drops the vertices that are not `used`.
     pub fn keep(&mut self, used: &[bool]) {
         for target in &mut self.targets {
             target.keep(used);
@@ -29,20 +29,20 @@ impl Movers {
     }
 }
 
-/// A mesh as its file has it.
+/// The rest shape of a mesh.
 #[derive(Clone, Debug)]
 pub(crate) struct Shape {
     positions: Vec<Vec3>,
-    /// Empty where the file has none: they follow from each pose.
+    /// Empty if the file has none. They are then computed for each pose.
     normals: Vec<Vec3>,
-    /// As `normals`.
+    /// Empty if the file has none, as for `normals`.
     tangents: Vec<Vec4>,
     movers: Movers,
     /// Texture coordinates of the normal map, if the material has one.
     normal_map_uv: Option<u32>,
 }
 
-/// A vertex at a time; zero for what the file does not have.
+/// A vertex at a time. Attributes that the file lacks are zero.
 struct Vertex {
     position: Vec3,
     normal: Vec3,
@@ -50,7 +50,7 @@ struct Vertex {
 }
 
 impl Shape {
-    /// The shape of a mesh that holds what its file has and nothing else.
+    /// The rest shape of a mesh that has only the attributes of its file.
     pub fn new(mesh: &Mesh, movers: Movers, normal_map_uv: Option<u32>) -> Self {
         Self {
             positions: mesh.positions.clone(),
@@ -61,17 +61,16 @@ impl Shape {
         }
     }
 
-    /// Whether a skin moves its vertices.
+    /// True if a skin moves its vertices.
     pub fn is_skinned(&self) -> bool {
         self.movers.influences.is_some()
     }
 
-    /// Moves the vertices of `mesh` to where they are with these weights of the morph targets and this skin,
-    /// relative to `own`.
+    /// Moves the vertices of `mesh` as these morph weights and this skin require, relative to `own`.
     pub fn pose(&self, mesh: &mut Mesh, weights: &[f64], skin: Option<&PosedSkin>, own: DVec3) {
         let vertices: Vec<Vertex> = (0..self.positions.len())
             .into_par_iter()
-            .with_min_len(VERTICES_A_TASK)
+            .with_min_len(MIN_VERTICES_PER_TASK)
             .map(|vertex| self.vertex(vertex, weights, skin, own))
             .collect();
         mesh.positions = vertices.iter().map(|v| v.position).collect();
@@ -112,7 +111,7 @@ impl Shape {
         if let (Some(influences), Some(skin)) = (influences, skin) {
             let blend = influences.blend(vertex, skin);
             position = blend.transform_point3(position);
-            // The direction alone counts, and single precision may not hold the length.
+            // Only the direction matters. Normalising in double precision avoids overflow.
             let unit = |m: DMat3, v: DVec3| (m * v).normalize_or_zero();
             normal = unit(normal_matrix(&blend.matrix3), normal);
             tangent = unit(blend.matrix3, tangent);

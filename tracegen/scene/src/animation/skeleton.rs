@@ -1,30 +1,30 @@
-//! The nodes of a file as a tree, and where they stand at a time.
+//! The nodes of a file as a tree, and their transforms at a time.
 
 use super::Joint;
 use glam::DAffine3;
 
-/// The nodes of a file, by their numbers there.
+/// The nodes of a file, by their index in it.
 #[derive(Clone, Debug)]
 pub(crate) struct Skeleton {
     pub joints: Vec<Joint>,
     pub tree: Tree,
 }
 
-/// Which node stands on which.
+/// The hierarchy of the nodes.
 #[derive(Clone, Debug)]
 pub(crate) struct Tree {
     pub parents: Vec<Option<usize>>,
-    /// All nodes, each after its parent.
+    /// All nodes; parents come first.
     pub order: Vec<usize>,
 }
 
 impl Tree {
-    /// A node and those above it.
+    /// A node and its ancestors.
     pub fn chain(&self, node: usize) -> impl Iterator<Item = usize> {
         std::iter::successors(Some(node), |&node| self.parents[node])
     }
 
-    /// Whether each node or one above it is one of those.
+    /// For each node, whether it or one of its ancestors satisfies `is_one`.
     pub fn below(&self, is_one: impl Fn(usize) -> bool) -> Vec<bool> {
         let mut below = vec![false; self.parents.len()];
         for &node in &self.order {
@@ -35,7 +35,7 @@ impl Tree {
 }
 
 impl Skeleton {
-    /// To the world, by node.
+    /// The transforms to the world, by node.
     pub fn worlds(&self, time_s: f64) -> Vec<DAffine3> {
         let mut worlds = vec![DAffine3::IDENTITY; self.joints.len()];
         for &node in &self.tree.order {

@@ -7,22 +7,22 @@ use glam::{DAffine3, DMat3, DVec3};
 pub(crate) struct Skin {
     /// Their nodes.
     pub joints: Vec<usize>,
-    /// From the mesh's space to each joint's, as long as `joints`.
+    /// The transforms from the mesh's space to each joint's; same length as `joints`.
     pub inverse_binds: Vec<DAffine3>,
 }
 
 /// A skin at a time.
 #[derive(Clone, Debug)]
 pub(crate) struct PosedSkin {
-    /// From the mesh's space to its instance's, by joint.
+    /// The transforms from the mesh's space to its instance's, by joint.
     matrices: Vec<DAffine3>,
-    /// The joints turn triangles inside out. The instance mirrors then and the matrices do not, because
-    /// renderers tell the front of a triangle by the instance.
+    /// True if the joints mirror the mesh. Then the instance mirrors instead of the matrices, because
+    /// renderers derive the front side of a triangle from the instance.
     pub mirrored: bool,
 }
 
 impl Skin {
-    /// The joints' matrices relative to `origin`; the nodes' transforms to the world are `worlds`.
+    /// The joints' matrices relative to `origin`. `worlds` holds the nodes' transforms to the world.
     pub fn pose(&self, worlds: &[DAffine3], origin: DVec3) -> PosedSkin {
         let mut matrices: Vec<DAffine3> = (self.joints.iter().zip(&self.inverse_binds))
             .map(|(&joint, inverse_bind)| {
@@ -42,13 +42,13 @@ impl Skin {
 }
 
 impl PosedSkin {
-    /// Negates x, which rounds nothing.
+    /// Negates x, which is exact.
     const MIRROR: DAffine3 = DAffine3 {
         matrix3: DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0)),
         translation: DVec3::ZERO,
     };
 
-    /// The transform of the skinned instance: its vertices are in the world already.
+    /// The transform of the skinned instance, whose vertices are already in the world's space.
     pub fn instance(&self) -> DAffine3 {
         if self.mirrored {
             Self::MIRROR
@@ -61,32 +61,32 @@ impl PosedSkin {
 /// The joints of each vertex and their weights.
 #[derive(Clone, Debug)]
 pub(crate) struct Influences {
-    /// Of a vertex: four a set.
-    pub a_vertex: usize,
-    /// Numbers in the skin's list.
+    /// Influences per vertex: four per set.
+    pub per_vertex: usize,
+    /// Indices into the skin's list of joints.
     pub joints: Vec<u16>,
-    /// As long as `joints`. They need not add up to 1.
+    /// Same length as `joints`. The sum need not be 1.
     pub weights: Vec<f32>,
 }
 
 impl Influences {
-    /// Drops the vertices without a flag.
+    /// Drops the vertices that are not `used`.
     pub fn keep(&mut self, used: &[bool]) {
-        fn kept<T: Copy>(values: &[T], a_vertex: usize, used: &[bool]) -> Vec<T> {
-            let vertices = values.chunks_exact(a_vertex).zip(used);
+        fn kept<T: Copy>(values: &[T], per_vertex: usize, used: &[bool]) -> Vec<T> {
+            let vertices = values.chunks_exact(per_vertex).zip(used);
             vertices
                 .filter(|(_, used)| **used)
                 .flat_map(|(values, _)| values)
                 .copied()
                 .collect()
         }
-        self.joints = kept(&self.joints, self.a_vertex, used);
-        self.weights = kept(&self.weights, self.a_vertex, used);
+        self.joints = kept(&self.joints, self.per_vertex, used);
+        self.weights = kept(&self.weights, self.per_vertex, used);
     }
 
-    /// The joint numbers and weights of a vertex, and the sum of the weights.
+    /// The joint indices and weights of a vertex, and the sum of the weights.
     pub fn of(&self, vertex: usize) -> (impl Iterator<Item = (u16, f64)>, f64) {
-        let of_vertex = vertex * self.a_vertex..(vertex + 1) * self.a_vertex;
+        let of_vertex = vertex * self.per_vertex..(vertex + 1) * self.per_vertex;
         let weights = &self.weights[of_vertex.clone()];
         let pairs = self.joints[of_vertex]
             .iter()
@@ -95,8 +95,8 @@ impl Influences {
         (pairs, weights.iter().map(|&w| f64::from(w)).sum())
     }
 
-    /// The weighted mean of a vertex's joints. A vertex without weights, which no triangle has, follows the
-    /// first joint.
+    /// The weighted mean of a vertex's joints. A vertex without weights follows the first joint; no
+    /// triangle uses such a vertex.
     pub fn blend(&self, vertex: usize, skin: &PosedSkin) -> DAffine3 {
         let (pairs, sum) = self.of(vertex);
         if sum == 0.0 {
@@ -115,7 +115,7 @@ impl Influences {
     }
 }
 
-/// The cofactor matrix: the direction of its product with a normal is that of the inverse transpose's, and it
+/// The cofactor matrix. It transforms normals to the same direction as the inverse transpose, and it
 /// exists for every matrix.
 pub(crate) fn normal_matrix(m: &DMat3) -> DMat3 {
     DMat3::from_cols(

@@ -38,10 +38,10 @@ pub enum CameraError {
         name: String,
         /// Names of the scene's cameras.
         known: String,
-        /// A similar name, or nothing.
+        /// A similar name, or empty.
         suggestion: String,
     },
-    /// A camera without perspective.
+    /// An orthographic camera.
     #[error(
         "camera '{name}': expected a perspective camera ({known}), found an orthographic one, unsupported"
     )]
@@ -151,12 +151,13 @@ fn check_direction(
     Ok(())
 }
 
-/// From here on a step of single precision is a fair part of a millimetre: of a camera's direction
-/// if its target is a metre ahead.
+/// Distance from zero beyond which one step of single precision, relative to a target one metre
+/// ahead, visibly changes a camera's direction.
 const FAR_OUT: f32 = 1024.0;
 
-/// Eye, target and up direction of a node, which looks along its -z; the target is one metre ahead, or
-/// further for an eye so far out that a metre has few steps there. `None` without a direction.
+/// Eye, target and up direction of a camera node, which looks along its -z. The target is one metre
+/// ahead, or further for an eye so far from zero that single precision has few steps in a metre.
+/// Returns `None` if the node has no direction.
 pub(crate) fn look_of_node(place: &Affine3A) -> Option<(Vec3, Vec3, Vec3)> {
     let eye = Vec3::from(place.translation);
     let forward = Vec3::from(-place.matrix3.z_axis).normalize_or_zero();

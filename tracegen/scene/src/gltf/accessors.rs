@@ -150,7 +150,7 @@ impl<'a> Buffers<'a> {
         self.elements(index, accessor, N * component.size(), [0.0; N], read)
     }
 
-    /// Four numbers of joints a vertex.
+    /// Four joint indices per vertex.
     pub fn joints(&self, index: usize) -> Result<Vec<[u16; 4]>, SceneError> {
         let (accessor, component) = self.accessor(index)?;
         let unsigned = matches!(component, ComponentType::U8 | ComponentType::U16);

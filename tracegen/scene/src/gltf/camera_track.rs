@@ -1,7 +1,7 @@
-//! Animations that move a camera: the channels of its node and of the nodes above it.
+//! Animations that move a camera: the channels of its node and of its ancestors.
 //!
-//! Channels of all animations count, since exporters write one animation an object; a property
-//! that two of them move is refused, because a file does not say which one plays.
+//! Channels of all animations are combined, because exporters write one animation per object. A
+//! property with two channels is an error, because the file does not say which animation plays.
 
 use super::accessors::{Buffers, at};
 use super::channels::{self, Moved};
@@ -19,8 +19,8 @@ use std::path::Path;
 /// The curves of one file by node.
 type Curves = HashMap<usize, Vec<(Channel, Curve)>>;
 
-/// Reads the path of an animated camera: the one of that name (its node's or its own, with or
-/// without `cam_`), or else the first one that an animation moves. Also tells what is odd.
+/// Reads the path of an animated camera: the one with that name (its node's or its own, with or
+/// without `cam_`), or else the first one that an animation moves. Also returns warnings.
 pub(crate) fn camera_track(
     path: &Path,
     camera: Option<&str>,
@@ -28,7 +28,7 @@ pub(crate) fn camera_track(
     let origin = Origin::new(path);
     let bytes = read_file(path, "path", u64::MAX)?;
     let mut warnings = Warnings::default();
-    // What the loader of scenes warns of concerns the scene, not the path.
+    // The scene loader's warnings do not concern the path.
     let Parsed {
         document,
         transforms,
@@ -101,7 +101,7 @@ pub(crate) fn camera_track(
     Ok((track, warnings.into_sentences()))
 }
 
-/// Nodes with a camera, and its name.
+/// The nodes with a camera, and the camera's name.
 fn cameras(root: &Root) -> Vec<(usize, String)> {
     let named = |(index, node): (usize, &gltf::json::scene::Node)| {
         let camera = root.cameras.get(at(node.camera.as_ref()?))?;

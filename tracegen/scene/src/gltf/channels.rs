@@ -1,4 +1,4 @@
-//! The channels of animations: what they move, and their curves.
+//! The channels of animations: their targets and their curves.
 
 use super::accessors::{Buffers, at};
 use crate::SceneError;
@@ -10,10 +10,10 @@ use gltf::json::animation::{Interpolation as JsonInterpolation, Property, Sample
 use gltf::json::validation::Checked;
 use std::collections::HashMap;
 
-/// What a channel moves of its node.
+/// The property of a node that a channel animates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Moved {
-    /// Where it stands.
+    /// A part of its transform.
     Joint(Channel),
     /// The weights of its mesh's morph targets.
     Weights,
@@ -38,7 +38,7 @@ pub(super) struct Target<'a> {
     pub sampler: &'a Sampler,
 }
 
-/// What moves each node in some animations.
+/// The channels of each node in the given animations.
 pub(super) fn targets<'a>(
     root: &'a Root,
     animations: impl IntoIterator<Item = usize>,
@@ -57,7 +57,7 @@ pub(super) fn targets<'a>(
                 Checked::Invalid => continue,
             };
             let node = at(&channel.target.node);
-            // The crate checks a channel's sampler and leaves its target unchecked.
+            // The crate checks a channel's sampler but not its target.
             let (Some(sampler), true) = (
                 animation.samplers.get(at(&channel.sampler)),
                 node < root.nodes.len(),
@@ -86,7 +86,7 @@ pub(super) fn targets<'a>(
     Ok(targets)
 }
 
-/// The errors of a channel's sampler.
+/// The place of a channel's sampler, for errors.
 struct Place<'a> {
     origin: &'a Origin,
     channel: &'a str,
@@ -98,7 +98,7 @@ impl Place<'_> {
         Err(self.origin.invalid(place, expected, found))
     }
 
-    /// There must be as many values as the keys need.
+    /// Checks the number of values against the number of keys.
     fn check_count(
         &self,
         found: usize,
@@ -106,7 +106,7 @@ impl Place<'_> {
         interpolation: Interpolation,
         times_s: &[f64],
     ) -> Result<(), SceneError> {
-        let expected = times_s.len() * of_key * interpolation.values_a_key();
+        let expected = times_s.len() * of_key * interpolation.values_per_key();
         if found == expected {
             return Ok(());
         }
@@ -115,7 +115,7 @@ impl Place<'_> {
     }
 }
 
-/// How values between keys come about, and the keys' times.
+/// The interpolation and times of the keys.
 fn keys(
     buffers: &Buffers<'_>,
     place: &Place<'_>,
@@ -142,7 +142,7 @@ fn keys(
     Ok((interpolation, times_s))
 }
 
-/// The curve of a channel that moves a node.
+/// Reads the curve of a channel that moves a node.
 pub(super) fn curve(
     buffers: &Buffers<'_>,
     place: &str,
@@ -172,8 +172,8 @@ pub(super) fn curve(
             format!("{} at {key}", values[key]),
         );
     }
-    // The values of a cubic curve stand between their tangents.
-    let a_key = interpolation.values_a_key();
+    // Each value of a cubic curve is stored between its two tangents.
+    let a_key = interpolation.values_per_key();
     let keys = || values.iter().skip(a_key / 2).step_by(a_key);
     let unit = |q: &&DVec4| (q.length() - 1.0).abs() <= 1e-2;
     if channel == Channel::Rotation && keys().count() != keys().filter(unit).count() {
@@ -189,7 +189,7 @@ pub(super) fn curve(
     })
 }
 
-/// The curve of a channel that moves the weights of morph targets.
+/// Reads the curve of a channel that animates the weights of morph targets.
 pub(super) fn weight_curve(
     buffers: &Buffers<'_>,
     place: &str,

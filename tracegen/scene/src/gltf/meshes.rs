@@ -15,12 +15,12 @@ use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
-/// What moves the vertices of a mesh.
+/// The morph targets and skin that move the vertices of a mesh.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Moving {
     /// Number of joints of its skin.
     pub joints: Option<usize>,
-    /// Its morph targets have weights.
+    /// True if its morph targets have weights.
     pub morphs: bool,
 }
 
@@ -62,7 +62,7 @@ pub(super) fn read(
     Ok(meshes)
 }
 
-/// A primitive that is read.
+/// Reader of one primitive.
 pub(super) struct Reader<'a> {
     pub buffers: &'a Buffers<'a>,
     pub primitive: &'a Primitive,
@@ -160,7 +160,7 @@ impl Reader<'_> {
         Ok(Some((mesh, shape)))
     }
 
-    /// What moves the `count` vertices, if anything does.
+    /// The morph targets and skin of the `count` vertices, if any.
     fn movers(
         &self,
         count: usize,
@@ -178,7 +178,7 @@ impl Reader<'_> {
         if targets.is_empty() && influences.is_none() {
             return Ok(None);
         }
-        // The vertices at rest are kept beside those of the pose.
+        // The vertices at rest are stored in addition to those of the pose.
         (self.buffers).spend::<[f32; 10]>(count as u64, || self.place.clone())?;
         Ok(Some(Movers {
             targets,

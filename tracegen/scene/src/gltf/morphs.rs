@@ -17,13 +17,13 @@ fn count(mesh: &Mesh) -> usize {
     targets.map(Vec::len).max().unwrap_or(0)
 }
 
-/// Number of morph targets of the mesh of a node.
+/// Number of morph targets of a node's mesh.
 pub(super) fn count_of_node(root: &Root, node: usize) -> usize {
     let mesh = root.nodes[node].mesh.as_ref();
     mesh.map_or(0, |mesh| count(&root.meshes[at(mesh)]))
 }
 
-/// The weights of a node's morph targets where no animation has them: its own, or its mesh's, or zeros.
+/// The weights of a node's morph targets without animation: its own, or its mesh's, or zeros.
 pub(super) fn weights(root: &Root, node: usize, warnings: &mut Warnings) -> Vec<f64> {
     let count = count_of_node(root, node);
     let of_node = root.nodes[node].weights.as_ref();

@@ -90,7 +90,7 @@ pub(super) fn walk(
 pub(super) struct NodeInstance {
     /// To the node.
     pub offset: DAffine3,
-    /// To the world.
+    /// The transform of a node to the world.
     pub transform: DAffine3,
 }
 

@@ -1,4 +1,4 @@
-//! Meshes at their nodes: read once or, where vertices move, once a node.
+//! Places meshes at their nodes. A mesh is read once, or once per node if its vertices move.
 
 use super::accessors::{Buffers, at};
 use super::materials::Table;
@@ -14,10 +14,10 @@ use glam::{DAffine3, DVec3};
 use gltf::json::Root;
 use std::collections::HashMap;
 
-/// A rig and what follows it.
+/// A rig, and the meshes and instances that it moves.
 pub(super) struct PlacedRig {
     animation: Animation,
-    /// Nodes that stand elsewhere at some time.
+    /// True for each node that an animation moves.
     moved: Vec<bool>,
     /// Curves of the weights of morph targets, by node.
     weights: HashMap<usize, WeightCurve>,
@@ -25,7 +25,7 @@ pub(super) struct PlacedRig {
     time_s: f64,
     /// Transforms to the world at that time.
     worlds: Vec<DAffine3>,
-    /// Index of each skin that is in use, by its number in the file.
+    /// Index of each used skin, by its index in the file.
     skins: HashMap<usize, usize>,
 }
 
@@ -59,7 +59,7 @@ impl PlacedRig {
         self.animation.skeleton.joints[node].transform(self.time_s)
     }
 
-    /// The animation of a scene with cameras and lights at these nodes, if anything moves.
+    /// The animation of a scene with cameras and lights at these nodes, or `None` if nothing moves.
     pub fn into_animation(mut self, of: ViewNodes) -> Option<Animation> {
         let moved = |nodes: Vec<usize>| {
             let numbered = nodes.into_iter().enumerate();
@@ -69,12 +69,12 @@ impl PlacedRig {
         self.animation.moving()
     }
 
-    /// Whether a skin is not the same at all times.
+    /// True if a skin changes over time.
     fn skin_moves(&self, root: &Root, skin: usize) -> bool {
         (root.skins[skin].joints.iter()).any(|joint| self.moved[at(joint)])
     }
 
-    /// The index of a skin, which is read on first use.
+    /// The index of a skin. A skin is read on first use.
     fn skin(&mut self, number: usize, buffers: &Buffers<'_>) -> Result<usize, SceneError> {
         if let Some(&index) = self.skins.get(&number) {
             return Ok(index);
@@ -86,22 +86,22 @@ impl PlacedRig {
     }
 }
 
-/// What moves the vertices of a node's mesh.
+/// The skin and weights that move the vertices of a node's mesh.
 struct Deformation {
-    /// Index of its skin, and whether that is not the same at all times.
+    /// Index of its skin, and true if the skin changes over time.
     skin: Option<(usize, bool)>,
     weights: Vec<f64>,
     curve: Option<WeightCurve>,
 }
 
-/// A primitive that has been read.
+/// A loaded primitive.
 #[derive(Clone)]
 pub(super) struct Primitive {
     /// Index into the scene's meshes.
     mesh: usize,
-    /// Index of the skin that it follows.
+    /// Index of its skin.
     skin: Option<usize>,
-    /// A skin or weights move its vertices, and whether they are not the same at all times.
+    /// `Some` if a skin or weights move its vertices: true if they change over time.
     deforms: Option<bool>,
 }
 
@@ -111,12 +111,12 @@ pub(super) struct Placing<'a> {
     pub transforms: &'a [Local],
     /// The material variant to show.
     pub variant: Option<u32>,
-    /// What may move.
+    /// The nodes and curves that may move.
     pub rig: Option<PlacedRig>,
     pub meshes: Vec<Mesh>,
-    /// Meshes with their places in the world.
+    /// Meshes with their transforms to the world.
     pub in_world: Vec<(usize, DAffine3)>,
-    /// The primitives of each glTF mesh whose vertices stay, filled on first use.
+    /// The primitives of each glTF mesh with fixed vertices, filled on first use.
     pub loaded: HashMap<usize, Vec<Primitive>>,
 }
 
@@ -157,7 +157,7 @@ impl Placing<'_> {
                 self.in_world.push((primitive.mesh, instance.transform));
             }
         }
-        // Joints alone place a skinned mesh.
+        // Only its joints place a skinned mesh, not its node.
         for primitive in &primitives {
             let Some(skin) = primitive.skin else { continue };
             if local.instancing().is_some() {
@@ -171,7 +171,7 @@ impl Placing<'_> {
         Ok(())
     }
 
-    /// Notes what the next instance follows.
+    /// Records the object that places the next instance.
     fn follow(&mut self, follows: Follows, moves: bool) {
         if let Some(placed) = &mut self.rig {
             placed.animation.instances.push(MovingInstance {
@@ -183,7 +183,7 @@ impl Placing<'_> {
         }
     }
 
-    /// What moves the vertices of a node's mesh, if anything does.
+    /// The skin and weights of a node's mesh, if it has any.
     fn deformation(
         &mut self,
         node: usize,
@@ -211,7 +211,7 @@ impl Placing<'_> {
         }))
     }
 
-    /// Reads a mesh whose vertices stay.
+    /// Reads a mesh with fixed vertices.
     fn read_still(
         &mut self,
         mesh: usize,
@@ -236,7 +236,7 @@ impl Placing<'_> {
         Ok(primitives)
     }
 
-    /// Reads a mesh of its own for a node that moves the vertices.
+    /// Reads a separate mesh for a node that moves its vertices.
     fn read_moving(
         &mut self,
         mesh: usize,
@@ -291,7 +291,7 @@ impl Placing<'_> {
         Ok(primitives)
     }
 
-    /// Poses the meshes and puts all into a scene, relative to its origin.
+    /// Poses the meshes and adds all instances to a scene, relative to its origin.
     pub fn finish(self) -> Result<(Scene, Option<PlacedRig>), SceneError> {
         let Self {
             mut rig,
@@ -300,7 +300,7 @@ impl Placing<'_> {
             ..
         } = self;
         if let Some(placed) = &rig {
-            // Where the scene's origin is depends on where its vertices are.
+            // The scene's origin depends on the positions of its vertices.
             let skins = placed.animation.pose_skins(&placed.worlds);
             (placed.animation).pose_meshes(&mut meshes, &skins, placed.time_s);
             for moving in &placed.animation.instances {
@@ -320,7 +320,7 @@ impl Placing<'_> {
             let animation = &mut placed.animation;
             animation.origin = places.origin;
             for moving in &mut animation.meshes {
-                // A skin puts its vertices relative to the scene's origin.
+                // Skinned vertices are relative to the scene's origin.
                 if moving.skin.is_none() {
                     moving.own = places.own[moving.mesh];
                 }

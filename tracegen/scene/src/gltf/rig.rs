@@ -1,4 +1,4 @@
-//! The nodes of a file with what moves them: the animation that plays.
+//! The nodes of a file and the animation that plays.
 
 use super::accessors::Buffers;
 use super::channels::{self, Moved};
@@ -15,11 +15,11 @@ use std::collections::HashMap;
 /// Nodes and the curves that move them.
 pub(super) struct Rig {
     pub skeleton: Skeleton,
-    /// Nodes that stand elsewhere at some time.
+    /// True for each node that an animation moves.
     pub moved: Vec<bool>,
     /// Curves of the weights of morph targets, by node.
     pub weights: HashMap<usize, WeightCurve>,
-    /// The animation that plays, for readers.
+    /// Display name of the animation that plays.
     pub name: String,
     /// The last key's time.
     pub duration_s: f64,
@@ -34,7 +34,7 @@ pub(super) fn names(root: &Root) -> Vec<String> {
     root.animations.iter().enumerate().map(name).collect()
 }
 
-/// The animations that play: the one of a name or an index, `all`, `none`, or the first one.
+/// The animations that play: the one with a name or an index, `all`, `none`, or the first one.
 fn chosen(
     names: &[String],
     wanted: Option<&str>,
@@ -72,8 +72,8 @@ fn chosen(
     }
 }
 
-/// Reads the nodes and the curves of what plays; `None` for a file where nothing moves and no vertex follows
-/// a skin or a morph target.
+/// Reads the nodes and the curves of the animations that play. Returns `None` for a file without
+/// moving nodes, skins and morph targets.
 pub(super) fn read(
     root: &Root,
     transforms: &[Local],

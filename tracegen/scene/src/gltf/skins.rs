@@ -47,8 +47,8 @@ pub(super) fn read(index: usize, buffers: &Buffers<'_>) -> Result<Skin, SceneErr
 }
 
 impl Reader<'_> {
-    /// The joints of each of `count` vertices, of a skin with `joints` joints; `None` without any. Vertices
-    /// that no index names may lack weights.
+    /// The influences of `count` vertices by a skin with `joints` joints, or `None` if the primitive
+    /// has none. Vertices that no triangle uses may lack weights.
     pub fn influences(
         &self,
         joints: usize,
@@ -78,7 +78,7 @@ impl Reader<'_> {
             return Ok(None);
         }
         let mut influences = Influences {
-            a_vertex: 4 * sets.len(),
+            per_vertex: 4 * sets.len(),
             joints: Vec::with_capacity(4 * sets.len() * count),
             weights: Vec::with_capacity(4 * sets.len() * count),
         };
@@ -89,15 +89,15 @@ impl Reader<'_> {
             }
         }
         let used = self.check_influences(&influences, joints, indices)?;
-        // What no triangle has may hold anything.
-        let weights = influences.weights.chunks_exact_mut(influences.a_vertex);
+        // Vertices that no triangle uses may hold anything.
+        let weights = influences.weights.chunks_exact_mut(influences.per_vertex);
         for (weights, _) in weights.zip(used).filter(|(_, used)| !used) {
             weights.fill(0.0);
         }
         Ok(Some(influences))
     }
 
-    /// The numbers of a set of joints.
+    /// The joint indices of a set.
     fn joints(&self, set: u32) -> Result<Option<Vec<[u16; 4]>>, SceneError> {
         let semantic = Semantic::Joints(set);
         let Some(accessor) = self.accessor(&semantic) else {
@@ -107,7 +107,7 @@ impl Reader<'_> {
             && let Some(values) =
                 draco.floats::<4>(&semantic, Some(accessor), &self.place, self.buffers)?
         {
-            // Exact: 16 bits at most, and what lies outside is no joint.
+            // Exact: values have at most 16 bits, and larger ones are not joints.
             return Ok(Some(
                 values
                     .into_iter()
@@ -118,14 +118,14 @@ impl Reader<'_> {
         self.buffers.joints(accessor).map(Some)
     }
 
-    /// Checks the vertices that indices name; tells which these are.
+    /// Checks the vertices that triangles use, and returns a flag per vertex.
     fn check_influences(
         &self,
         influences: &Influences,
         joints: usize,
         indices: &[u32],
     ) -> Result<Vec<bool>, SceneError> {
-        let mut checked = vec![false; influences.joints.len() / influences.a_vertex];
+        let mut checked = vec![false; influences.joints.len() / influences.per_vertex];
         for vertex in indices.iter().map(|&index| index as usize) {
             if std::mem::replace(&mut checked[vertex], true) {
                 continue;

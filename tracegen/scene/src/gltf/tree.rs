@@ -11,7 +11,7 @@ pub(super) fn read(root: &Root, origin: &Origin) -> Result<Tree, SceneError> {
     let mut parents = vec![None; root.nodes.len()];
     for (parent, node) in root.nodes.iter().enumerate() {
         for child in node.children.iter().flatten().map(at) {
-            // The indices have been checked.
+            // The indices were checked on loading.
             if parents[child].replace(parent).is_some() {
                 return Err(origin.invalid(
                     format!("nodes[{child}]"),
@@ -29,7 +29,7 @@ pub(super) fn read(root: &Root, origin: &Origin) -> Result<Tree, SceneError> {
         order.extend(root.nodes[node].children.iter().flatten().map(at));
         next += 1;
     }
-    // With one parent each, what no root reaches goes round in circles.
+    // Every node has one parent, so a node that no root reaches is part of a cycle.
     if order.len() < parents.len() {
         let mut reached = vec![false; parents.len()];
         for &node in &order {

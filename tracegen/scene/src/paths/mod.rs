@@ -115,7 +115,7 @@ pub struct Moments {
     pub frames: Range<u32>,
     /// Frames per second.
     pub fps: f32,
-    /// Time of frame 0 in what moves in the scene, seconds.
+    /// Scene time of frame 0, seconds.
     pub scene_start_s: f64,
 }
 
@@ -136,7 +136,7 @@ impl Moments {
         frame as f32 / self.fps
     }
 
-    /// Time of a frame in what moves in the scene, seconds.
+    /// Scene time of a frame, seconds.
     #[must_use]
     pub fn scene_time_s(&self, frame: u32) -> f64 {
         self.scene_start_s + seconds(self, frame)

@@ -1,4 +1,4 @@
-//! What moves: nodes and vertices at a time. `scene/tests/poses` checks values against a second evaluator.
+//! Moving nodes and vertices at a time. `scene/tests/poses` checks values against a second evaluator.
 
 use super::files::{File, QUAD};
 use super::rows::{Row, Status};
@@ -187,7 +187,7 @@ fn at(file: File, time_s: f64, folder: &Path) -> Result<Loaded, SceneError> {
     file.load_with(folder, &options)
 }
 
-/// A quad whose node an animation moves in one second.
+/// A quad whose node moves during one second.
 fn animated<const N: usize>(
     path: &str,
     of: &str,
@@ -219,8 +219,8 @@ fn attributes(file: &mut File) -> &mut Value {
     &mut file.json["meshes"][0]["primitives"][0]["attributes"]
 }
 
-/// A quad half of whose weights follow joint 0, which moves by 2 m in a second, and half joint 1; with two sets,
-/// the second one names both once more.
+/// A quad with equal weights for joint 0, which moves by 2 m in a second, and joint 1. A second set
+/// repeats both joints.
 fn skinned(sets: usize) -> File {
     let mut file = animated(
         "translation",
@@ -253,7 +253,7 @@ fn morphed() -> File {
     file
 }
 
-/// The corners of the quad must be where `expected` puts them.
+/// Checks that the corners of the quad are where `expected` puts them.
 fn placed(loaded: &Loaded, feature: &str, expected: Affine3A) {
     let (mesh, transform) = (
         &loaded.scene.meshes[0],
@@ -269,7 +269,7 @@ fn placed(loaded: &Loaded, feature: &str, expected: Affine3A) {
     }
 }
 
-/// The third corner of the quad, (1, 1, 0), must be there.
+/// Checks the position of the quad's third corner, (1, 1, 0).
 fn corner(loaded: &Loaded, feature: &str, expected: Vec3) {
     let (mesh, transform) = (
         &loaded.scene.meshes[0],

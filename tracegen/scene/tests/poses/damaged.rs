@@ -1,5 +1,5 @@
-//! Damaged skins, morph targets and animations: each error names the place, what was expected and what was
-//! found.
+//! Damaged skins, morph targets and animations. Each error names the place, the expected value and
+//! the found one.
 
 use super::figure::Figure;
 use super::files::File;
@@ -97,7 +97,7 @@ fn a_vertex_that_no_triangle_has_may_have_any_joints_and_weights() {
     let mut file = figure.file();
     let primitive = &file.json["meshes"][0]["primitives"][0];
     let indices = primitive["indices"].as_u64().unwrap() as usize;
-    // All but the last triangle, the only one with vertex 5.
+    // Without the last triangle, which is the only one that uses vertex 5.
     file.json["accessors"][indices]["count"] = json!(9);
     let folder = tempfile::tempdir().unwrap();
     let scene = file.load(folder.path()).unwrap().scene;
@@ -162,7 +162,7 @@ fn damaged_animations_are_refused() {
         &LoadOptions::ALL,
         &["animations[0] 'walk' at 0 s", "at most 1e12 m"],
     );
-    // What a later frame meets is an error as well.
+    // A later frame reports the error as well.
     let mut huge = Figure::new();
     let keys = huge.nodes[super::figure::HIP]
         .translations

@@ -1,5 +1,5 @@
-//! An animated figure as a test writes it: a skinned and morphed leg, a morphed face on a moving node, and a
-//! rigid hat.
+//! The figure of the tests: a skinned and morphed leg, a morphed face on a moving node, and a rigid
+//! hat.
 
 use super::files::File;
 use super::naive::{
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 pub const VERTICES: usize = 6;
 const INDICES: [u16; 12] = [0, 1, 2, 2, 1, 3, 2, 3, 4, 4, 3, 5];
 
-/// Nodes by number: the root, hip, knee and foot, and those of the three meshes.
+/// Node indices of the root, hip, knee and foot, and of the three meshes.
 pub const ROOT: usize = 0;
 pub const HIP: usize = 1;
 pub const KNEE: usize = 2;
@@ -24,7 +24,7 @@ const JOINTS: [usize; 3] = [KNEE, FOOT, HIP];
 /// Displacements of positions and of normals.
 type Displacements = (Vec<[f32; 3]>, Vec<[f32; 3]>);
 
-/// The figure. What the file says is made of it and so is what must come out.
+/// The figure. Both the file and the expected result are derived from it.
 #[derive(Clone)]
 pub struct Figure {
     pub nodes: Vec<Node>,
@@ -41,7 +41,7 @@ pub struct Figure {
     pub face_weights: Keys<2>,
 }
 
-/// Numbers that repeat and look like nothing.
+/// Deterministic pseudo-random numbers.
 fn noise(seed: usize) -> f32 {
     let mixed = (seed as u32).wrapping_mul(2_654_435_761) >> 8;
     (mixed % 2000) as f32 / 1000.0 - 1.0
@@ -107,7 +107,7 @@ impl Figure {
             rotations: Some(keys(Between::Cubic, &[0.0, 1.25, 2.0], quaternions(9, 23))),
             ..Node::default()
         };
-        // Nothing of a skinned mesh's own node counts.
+        // The transform of a skinned mesh's own node has no effect.
         nodes[LEG] = Node {
             translation: [100.0, 200.0, 300.0],
             scale: Some([7.0, 8.0, 9.0]),

@@ -1,5 +1,5 @@
-//! Skinned, morphed and animated vertices against a second evaluator in double precision, and what is said of
-//! skins and animations that are damaged.
+//! Skinned, morphed and animated vertices against a second evaluator in double precision, and the
+//! errors of damaged skins and animations.
 
 mod damaged;
 mod figure;
@@ -14,7 +14,7 @@ use glam::{DVec3, Vec3};
 use naive::Vector;
 use scene::{LoadOptions, Scene};
 
-/// Times before, at, between and after keys, and after the last one of all, which is at 3 s.
+/// Times before, at, between and after keys. The last key of all is at 3 s.
 const TIMES_S: [f64; 12] = [
     0.0, 0.125, 0.25, 0.5, 0.7, 1.0, 1.3, 1.5, 1.99, 2.6, 3.0, 3.5,
 ];
@@ -42,8 +42,9 @@ const ORDER: [usize; 3] = [FACE, HAT, LEG];
 
 /// Checks every vertex of a scene against the second evaluator.
 ///
-/// Positions may be off by 2^-22 of the sum of the magnitudes that they are added up of: the mesh's and the
-/// instance's coordinates are rounded once each, by 2^-24 of themselves, and the test adds in doubles.
+/// The tolerance of a position is 2^-22 of the sum of the magnitudes of its terms. The coordinates of
+/// the mesh and of the instance are each rounded once, by 2^-24 of their value, and the test adds in
+/// double precision.
 fn check(scene: &Scene, figure: &Figure, time_s: f64) {
     assert_eq!(scene.instances.len(), 3);
     for (instance, node) in scene.instances.iter().zip(ORDER) {
@@ -78,19 +79,19 @@ fn check(scene: &Scene, figure: &Figure, time_s: f64) {
 }
 
 #[test]
-fn poses_are_those_of_a_second_evaluator() {
+fn poses_match_a_second_evaluator() {
     let figure = Figure::new();
     let mut scene = load(&figure, 0.0);
     for time_s in TIMES_S {
         check(&load(&figure, time_s), &figure, time_s);
-        // The same of one scene that moves from time to time.
+        // One scene that is posed repeatedly gives the same result.
         scene.animate(time_s).unwrap();
         check(&scene, &figure, time_s);
     }
 }
 
 #[test]
-fn every_vertex_moves_and_a_scene_comes_back_to_the_bit() {
+fn every_vertex_moves_and_returns_bit_exactly() {
     let figure = Figure::new();
     let first = load(&figure, 0.3);
     let mut scene = first.clone();
@@ -122,7 +123,7 @@ fn every_vertex_moves_and_a_scene_comes_back_to_the_bit() {
 }
 
 #[test]
-fn a_figure_far_from_zero_is_as_exact_as_near_zero() {
+fn a_figure_far_from_zero_is_as_accurate_as_near_zero() {
     let mut figure = Figure::new();
     figure.nodes[ROOT].translation = [3e6, -1e6, 7e5];
     let scene = load(&figure, 0.7);
@@ -134,7 +135,7 @@ fn a_figure_far_from_zero_is_as_exact_as_near_zero() {
 }
 
 #[test]
-fn joints_that_mirror_turn_the_instance_round() {
+fn mirroring_joints_mirror_the_instance() {
     let mut figure = Figure::new();
     assert!(!load(&figure, 0.7).instances[2].mirrored());
     figure.nodes[ROOT].scale = Some([-1.5, 0.5, 2.0]);
@@ -145,7 +146,7 @@ fn joints_that_mirror_turn_the_instance_round() {
 }
 
 #[test]
-fn without_an_animation_skins_and_weights_still_count() {
+fn skins_and_weights_apply_without_an_animation() {
     let figure = Figure::new();
     let folder = tempfile::tempdir().unwrap();
     let options = LoadOptions {
@@ -163,9 +164,9 @@ fn without_an_animation_skins_and_weights_still_count() {
 }
 
 #[test]
-fn what_does_not_move_is_not_kept() {
+fn parts_that_do_not_move_are_dropped() {
     let mut file = Figure::new().file();
-    // Only the face's weights are left to move, and nothing reads them but the face.
+    // Only the face's weights still move.
     let channels = file.json["animations"][0]["channels"]
         .as_array_mut()
         .unwrap();
@@ -179,7 +180,7 @@ fn what_does_not_move_is_not_kept() {
 }
 
 #[test]
-fn a_node_that_is_scaled_to_nothing_for_a_while_covers_nothing_then() {
+fn a_node_with_zero_scale_covers_nothing_at_that_time() {
     let mut figure = Figure::new();
     figure.nodes[HAT].scales = Some(naive::Keys {
         between: naive::Between::Step,

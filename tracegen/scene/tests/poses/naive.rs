@@ -1,10 +1,10 @@
-//! A second evaluator of poses, in plain arrays of doubles, which shares nothing with the loader: it evaluates
-//! what a test wrote, not what the loader read.
+//! A second evaluator of poses, in plain arrays of doubles. It shares no code with the loader, and it
+//! evaluates the test's own data, not the data that the loader read.
 
 pub type Vector = [f64; 3];
 pub type Matrix = [[f64; 4]; 4];
 
-/// How values between keys come about.
+/// Interpolation between keys.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Between {
     Linear,
@@ -20,7 +20,7 @@ pub struct Keys<const N: usize> {
     pub values: Vec<[f32; N]>,
 }
 
-/// A node: its parent, what it is at rest, and what moves it.
+/// A node: its parent, its rest transform, and its curves.
 #[derive(Clone, Default)]
 pub struct Node {
     pub parent: Option<usize>,
@@ -104,7 +104,7 @@ pub fn product(a: &Matrix, b: &Matrix) -> Matrix {
     result
 }
 
-/// From the columns that a file has.
+/// A matrix from the columns of a file.
 pub fn matrix(columns: [f32; 16]) -> Matrix {
     let mut result = [[0.0; 4]; 4];
     for (i, value) in columns.iter().enumerate() {
@@ -184,7 +184,7 @@ fn local(node: &Node, time: f64) -> Matrix {
     result
 }
 
-/// To the world.
+/// The transform of a node to the world.
 pub fn world(nodes: &[Node], node: usize, time: f64) -> Matrix {
     let own = local(&nodes[node], time);
     match nodes[node].parent {
