@@ -37,12 +37,16 @@ pub fn run(bytes: &[u8]) {
 
 /// Loads a scene with its texels and builds its triangles and a hierarchy.
 pub fn load(file: &Path) {
-    let loaded = match load_file(file, &LoadOptions::ALL) {
+    let mut loaded = match load_file(file, &LoadOptions::ALL) {
         Ok(loaded) => loaded,
         Err(error) => return crate::paths::printable(&error),
     };
     for text in &loaded.warnings {
         assert!(!text.contains(char::is_control), "{text:?}");
+    }
+    check(&loaded.scene);
+    if let Err(error) = loaded.scene.animate(0.625) {
+        return crate::paths::printable(&error);
     }
     let scene = &loaded.scene;
     check(scene);

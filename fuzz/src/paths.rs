@@ -37,6 +37,7 @@ pub fn follow(spec: &PathSpec) -> Result<(), SceneError> {
         let moments = Moments {
             frames: 0..3,
             fps: 2.0,
+            scene_start_s: 0.0,
         };
         for pose in path.poses(&camera, &moments)? {
             assert!(pose.is_finite(), "{pose}");

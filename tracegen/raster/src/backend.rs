@@ -6,6 +6,7 @@ use super::frame::Frame;
 pub use super::view::{Fragments, View};
 use formats::view::Lens;
 use record::{Captured, Region, Sink};
+use scene::Scene;
 use std::time::Duration;
 
 /// What is recorded of a region, and the sink of the records.
@@ -56,7 +57,7 @@ pub struct Work {
     pub vertices: u64,
     /// Triangles of the draws.
     pub triangles: u64,
-    /// Bytes written to the driver for views, lists of draws and moving draws.
+    /// Bytes written to the driver for views, lists of draws, moving draws and moving vertices.
     pub bytes_uploaded: u64,
     /// Time spent on batching, encoding and submitting views, excluding pictures with records.
     pub submitting: Duration,
@@ -117,8 +118,9 @@ pub trait CaptureBackend {
     /// The work done so far.
     fn work(&self) -> Work;
 
-    /// Updates the positions of moving draws. The others stay as they were uploaded.
-    fn pose(&mut self, draws: &DrawList);
+    /// Updates the positions of moving draws and of moving vertices. The others stay as they were
+    /// uploaded.
+    fn pose(&mut self, scene: &Scene, draws: &DrawList);
 
     /// Renders the shadow maps of a frame, if its lighting has any.
     ///

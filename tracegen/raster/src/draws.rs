@@ -9,7 +9,7 @@ use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use glam::{Affine3A, Mat4, Vec3};
 use record::Region;
 use scene::geometry::transformed_box;
-use scene::{AlphaMode, Instance, Material, Mesh, Scene};
+use scene::{AlphaMode, Animation, Instance, Material, Mesh, Scene};
 use std::collections::{HashMap, HashSet};
 use textures::TextureSet;
 use visibility::{Hierarchy, frustum};
@@ -185,7 +185,7 @@ impl DrawList {
     }
 
     /// Moves the transforms and bounds of moving draws to a time. `scene` is the one from which the
-    /// list was created, with unchanged instances.
+    /// list was created; its instances are unchanged or posed by its animation at that time.
     pub fn pose(&mut self, scene: &Scene, time_s: f32) {
         if self.moving.is_empty() {
             return;
@@ -193,10 +193,12 @@ impl DrawList {
         let moved: HashMap<usize, Affine3A> = scene.moved(time_s).collect();
         for &draw in &self.moving {
             let call = &mut self.calls[draw as usize];
-            if let Some(transform) = moved.get(&call.instance) {
+            let animated = || scene.instances.get(call.instance).map(|i| i.transform);
+            if let Some(transform) = moved.get(&call.instance).copied().or_else(animated) {
                 let mesh = &scene.meshes[call.mesh];
-                call.transform = *transform;
-                call.bounds = world_box(&mesh.positions, mesh.bounds(), transform);
+                call.transform = transform;
+                call.mirrored = transform.matrix3.determinant() < 0.0;
+                call.bounds = world_box(&mesh.positions, mesh.bounds(), &transform);
             }
         }
         let bounds = |&draw: &u32| (draw, self.calls[draw as usize].bounds);
@@ -356,13 +358,15 @@ fn world_box(positions: &[Vec3], object_box: [Vec3; 2], transform: &Affine3A) ->
     [low - margin, high + margin]
 }
 
-/// The draws whose instances move.
+/// The draws whose instances or vertices move.
 fn moving(scene: &Scene, calls: &[DrawCall]) -> Vec<u32> {
-    if scene.motions.is_empty() {
+    if scene.motions.is_empty() && scene.animation.is_none() {
         return Vec::new();
     }
+    let animated = scene.animation.iter().flat_map(Animation::moving_instances);
     let moving: HashSet<usize> = (scene.motions.iter())
         .flat_map(|motion| motion.instances.iter().copied())
+        .chain(animated)
         .collect();
     (0_u32..)
         .zip(calls)

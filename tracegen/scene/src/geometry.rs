@@ -1,6 +1,7 @@
 //! Geometry that a file leaves out of a mesh (normals, tangents, the triangles of strips and fans),
 //! and bounding boxes.
 
+use crate::Mesh;
 use glam::{Affine3A, Vec2, Vec3, Vec4};
 
 /// Area-weighted vertex normals.
@@ -21,6 +22,42 @@ pub fn vertex_normals(positions: &[Vec3], indices: &[u32]) -> Vec<Vec3> {
         *n = unit_or(*n, Vec3::Y);
     }
     normals
+}
+
+/// Computes missing normals and tangents, and replaces those that are not unit vectors.
+pub(crate) fn complete_vertices(mesh: &mut Mesh, normal_map_uv: Option<u32>) {
+    if mesh.normals.is_empty() {
+        mesh.normals = vertex_normals(&mesh.positions, &mesh.indices);
+    } else if !mesh.normals.iter().all(|n| is_direction(*n)) {
+        let computed = vertex_normals(&mesh.positions, &mesh.indices);
+        for (n, computed) in mesh.normals.iter_mut().zip(computed) {
+            if !is_direction(*n) {
+                *n = computed;
+            }
+        }
+    }
+    for n in &mut mesh.normals {
+        *n = n.normalize();
+    }
+    let usable = |t: &Vec4| t.is_finite() && is_direction(t.truncate());
+    if mesh.tangents.is_empty() || !mesh.tangents.iter().all(usable) {
+        mesh.tangents = match normal_map_uv {
+            Some(1) if !mesh.uv1.is_empty() => {
+                vertex_tangents(&mesh.positions, &mesh.normals, &mesh.uv1, &mesh.indices)
+            }
+            Some(_) => vertex_tangents(&mesh.positions, &mesh.normals, &mesh.uv0, &mesh.indices),
+            // No texture reads these tangents, so any perpendicular will do.
+            None => (mesh.normals.iter())
+                .map(|n| n.any_orthonormal_vector().extend(1.0))
+                .collect(),
+        };
+    }
+}
+
+/// True if a vector is long enough to have a direction and short enough to be measured.
+fn is_direction(v: Vec3) -> bool {
+    let length_squared = v.length_squared();
+    length_squared > 1e-12 && length_squared.is_finite()
 }
 
 /// Lowest and highest coordinates. Without points, the box is inverted and infinite.

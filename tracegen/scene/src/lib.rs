@@ -1,6 +1,7 @@
 //! The scene model, filled by every loader and read by every renderer: model, loaders, cameras,
 //! paths, displays.
 
+mod animation;
 pub mod blocks;
 pub mod cameras;
 mod coarse;
@@ -23,9 +24,11 @@ pub mod paths;
 #[cfg(test)]
 mod real_scenes;
 pub mod srgb;
+mod suggest;
 mod uri;
 mod warnings;
 
+pub use animation::Animation;
 pub use error::SceneError;
 pub use image::Image;
 pub use image_files::MAX_SIZE as MAX_IMAGE_SIZE;

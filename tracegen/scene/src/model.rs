@@ -4,7 +4,7 @@
 //! relative to [`Scene::origin`], in single precision.
 
 use crate::geometry::{bounding_box, transformed_box};
-use crate::{Image, Motion};
+use crate::{Animation, Image, Motion};
 use formats::texture::Sampler;
 use glam::{Affine3A, DVec3, Mat3, Vec2, Vec3, Vec4};
 
@@ -19,14 +19,18 @@ pub struct Scene {
     pub meshes: Vec<Mesh>,
     /// Meshes placed in the world, in submission order.
     pub instances: Vec<Instance>,
-    /// Which instances move, and how.
+    /// Which instances of a built-in scene move, and how.
     pub motions: Vec<Motion>,
+    /// The animation of a file, or `None` if nothing moves.
+    pub animation: Option<Animation>,
     /// Materials.
     pub materials: Vec<Material>,
     /// Images with their colour space (an image used in both spaces is listed twice).
     pub images: Vec<Image>,
     /// Named cameras; never empty once loaded (`cameras::default_camera` fills it).
     pub cameras: Vec<Camera>,
+    /// Names of the file's orthographic cameras, which are not supported.
+    pub orthographic_cameras: Vec<String>,
     /// Lights.
     pub lights: Vec<Light>,
     /// Background and ambient radiance, linear RGB.
@@ -90,10 +94,12 @@ impl Instance {
         self.transform.matrix3.determinant() < 0.0
     }
 
-    /// Inverse transpose for normals.
+    /// Inverse transpose for normals. An instance with a scale of zero uses its own matrix.
     #[must_use]
     pub fn normal_matrix(&self) -> Mat3 {
-        Mat3::from(self.transform.matrix3).inverse().transpose()
+        let matrix = Mat3::from(self.transform.matrix3);
+        let inverse = matrix.inverse().transpose();
+        if inverse.is_finite() { inverse } else { matrix }
     }
 }
 

@@ -71,6 +71,12 @@ impl Motion {
 }
 
 impl Scene {
+    /// Whether any part of the scene moves.
+    #[must_use]
+    pub fn moves(&self) -> bool {
+        !self.motions.is_empty() || self.animation.is_some()
+    }
+
     /// The moving instances, each with its object-to-world transform at a time. At time 0 it equals
     /// the transform in [`Scene::instances`].
     pub fn moved(&self, time_s: f32) -> impl Iterator<Item = (usize, Affine3A)> + '_ {

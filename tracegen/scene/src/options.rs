@@ -4,13 +4,17 @@ use crate::Scene;
 use std::path::PathBuf;
 
 /// Options of a loader.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LoadOptions {
     /// Which of [`super::Material::textures`] to keep, in that order; the others become `None` and
     /// their images are not read.
     pub slots: [bool; 6],
     /// The material variant to show (KHR_materials_variants), or the file's own materials.
     pub variant: Option<String>,
+    /// The animation to play: a name, an index, `all` or `none`. The default is the file's first one.
+    pub animation: Option<String>,
+    /// The time of the pose, seconds from the start of the animation.
+    pub time_s: f64,
 }
 
 impl LoadOptions {
@@ -18,7 +22,18 @@ impl LoadOptions {
     pub const ALL: Self = Self {
         slots: [true; 6],
         variant: None,
+        animation: None,
+        time_s: 0.0,
     };
+}
+
+impl LoadOptions {
+    /// The animation chosen by name or index. A scene without animations has none.
+    #[must_use]
+    pub fn named_animation(&self) -> Option<&str> {
+        let named = self.animation.as_deref();
+        named.filter(|name| !["all", "none"].contains(name))
+    }
 }
 
 impl Default for LoadOptions {
@@ -36,4 +51,6 @@ pub struct Loaded {
     pub warnings: Vec<String>,
     /// Every file that the scene refers to, read or not, its own first. Empty for a built-in scene.
     pub files: Vec<PathBuf>,
+    /// Names of the file's animations.
+    pub animations: Vec<String>,
 }

@@ -47,12 +47,20 @@ pub(crate) fn relative_transform(mut transform: DAffine3, origin: DVec3) -> Affi
     transform.as_affine3a()
 }
 
+/// The result of [`place`].
+pub(crate) struct Placed {
+    pub origin: DVec3,
+    pub instances: Vec<Instance>,
+    /// The offset by which each mesh's positions were moved.
+    pub own: Vec<DVec3>,
+}
+
 /// Chooses the origin of placed meshes (each a mesh and its transform to the world) and makes
 /// instances relative to it.
 ///
 /// If the scene is moved, meshes whose vertices are far from their own zero are moved as well.
 /// Otherwise large vertex coordinates would combine with large translations. Moving them is exact.
-pub(crate) fn place(meshes: &mut [Mesh], placed: &[(usize, DAffine3)]) -> (DVec3, Vec<Instance>) {
+pub(crate) fn place(meshes: &mut [Mesh], placed: &[(usize, DAffine3)]) -> Placed {
     let boxes: Vec<[DVec3; 2]> = (meshes.iter())
         .map(|mesh| mesh.bounds().map(|corner| corner.as_dvec3()))
         .collect();
@@ -78,10 +86,15 @@ pub(crate) fn place(meshes: &mut [Mesh], placed: &[(usize, DAffine3)]) -> (DVec3
             transform: relative_transform(transform, origin),
         }
     };
-    (origin, placed.iter().map(instance).collect())
+    Placed {
+        origin,
+        instances: placed.iter().map(instance).collect(),
+        own,
+    }
 }
 
-fn corners([low, high]: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
+/// The corners of a box.
+pub(crate) fn corners([low, high]: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
     (0..8).map(move |corner| {
         let pick = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
         DVec3::new(pick(0), pick(1), pick(2))
@@ -146,7 +159,9 @@ mod tests {
         let mut meshes = [mesh(far), mesh(Vec3::ZERO)];
         let baked = DAffine3::IDENTITY;
         let moved = DAffine3::from_translation(far.as_dvec3());
-        let (origin, instances) = place(&mut meshes, &[(0, baked), (1, moved)]);
+        let Placed {
+            origin, instances, ..
+        } = place(&mut meshes, &[(0, baked), (1, moved)]);
         assert_eq!(origin, far.as_dvec3());
         assert_eq!(meshes[1].positions, triangle);
         for instance in &instances {
@@ -158,8 +173,8 @@ mod tests {
         }
         // At zero nothing changes, wherever the mesh's vertices are.
         let mut meshes = [mesh(Vec3::splat(64.0)), mesh(Vec3::ZERO)];
-        let (origin, _) = place(&mut meshes, &[(0, baked), (1, baked)]);
-        assert_eq!(origin, DVec3::ZERO);
+        let placed = place(&mut meshes, &[(0, baked), (1, baked)]);
+        assert_eq!(placed.origin, DVec3::ZERO);
         assert_eq!(meshes[0].positions[1], Vec3::X + 64.0);
     }
 }

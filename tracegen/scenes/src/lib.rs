@@ -184,6 +184,12 @@ pub fn load(spec: &str) -> Result<Scene, SceneError> {
 /// See [`SceneError`].
 pub fn load_with(spec: &str, options: &LoadOptions) -> Result<Loaded, SceneError> {
     if let Some(mut scene) = build(spec)? {
+        if let Some(name) = options.named_animation() {
+            return Err(SceneError::Parameter {
+                spec: spec.to_owned(),
+                expected: format!("a glTF file with animations, found animation '{name}'"),
+            });
+        }
         scene::complete(&mut scene);
         if options.slots != LoadOptions::ALL.slots {
             scene.keep_texture_slots(options.slots);
@@ -192,6 +198,7 @@ pub fn load_with(spec: &str, options: &LoadOptions) -> Result<Loaded, SceneError
             scene,
             warnings: Vec::new(),
             files: Vec::new(),
+            animations: Vec::new(),
         });
     }
     scene::load_file(Path::new(spec), options).map_err(|error| match error {

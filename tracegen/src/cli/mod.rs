@@ -8,6 +8,7 @@ pub mod lens_args;
 mod objective_args;
 pub mod page;
 mod path_args;
+mod pose_args;
 pub mod precision;
 mod prepared;
 mod program_args;

@@ -74,6 +74,7 @@ impl PathArgs {
         let moments = Moments {
             frames,
             fps: self.fps,
+            scene_start_s: 0.0,
         };
         path.check(&moments)?;
         Ok((path, moments))

@@ -4,7 +4,7 @@ use super::cache_args::CacheArgs;
 use super::capture_steps::prepare_textures;
 use super::raster;
 use super::scene_args::SceneSetup;
-use crate::study::world::World;
+use crate::study::world::{World, shadow_range_m};
 use ::raster::backend::Fragments;
 use ::raster::draws::DrawList;
 use ::raster::lavapipe::{Lavapipe, device::Gpu};
@@ -60,10 +60,12 @@ pub fn prepare(of: Preparation<'_>, setup: SceneSetup, gpu: Gpu) -> anyhow::Resu
         draws,
         lighting: Lighting::new(scene),
         bounds,
-        shadow_range_m: raster::shadow_range_m(&setup, bounds),
+        shadow_range_m: shadow_range_m(&setup.camera, bounds),
         lens: of.lens,
         tables,
         fps: of.fps,
+        start_s: setup.moments.scene_start_s,
+        camera: setup.camera,
         hmd: setup.hmd,
         views: setup.frames,
         scene: setup.scene,

@@ -243,18 +243,6 @@ pub(super) fn cascades(scene: &Scene, shadows: bool) -> u32 {
     }
 }
 
-/// Near and far end of the cascades: from the near plane to where the scene ends.
-pub(super) fn shadow_range_m(setup: &SceneSetup, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f32; 2] {
-    let farthest = (setup.camera.eye - lo)
-        .abs()
-        .max((setup.camera.eye - hi).abs())
-        .length();
-    // Nothing nearer than 5 cm needs shadows of its own, nor anything nearer than a twentieth of a small
-    // scene.
-    let near = setup.camera.near.max(farthest.min(1.0) * 0.05);
-    [near, farthest.min(setup.camera.far).max(2.0 * near)]
-}
-
 /// The tables of a trace of the scene's frames that records `fragments`.
 pub(super) fn tables(
     setup: &SceneSetup,

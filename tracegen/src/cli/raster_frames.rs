@@ -1,10 +1,11 @@
 //! `tracegen raster` with the techniques of its options: plans, prepares, captures, compares and prints.
 
 use super::capture_steps::{TraceOutput, load, prepare_textures, warn_of_multiview_defect};
-use super::raster::{RasterArgs, cascades, shadow_range_m, tables};
+use super::raster::{RasterArgs, cascades, tables};
 use super::raster_summary::{Summary, worked_since};
 use super::scene_args::SceneSetup;
 use crate::study::processor;
+use crate::study::world::shadow_range_m;
 use crate::unstable_triangles::UnstableTriangles;
 use anyhow::ensure;
 use formats::textrace::Pass;
@@ -25,7 +26,7 @@ use textures::TextureSet;
 /// What is captured of a scene.
 struct Session<'a> {
     args: &'a RasterArgs,
-    setup: &'a SceneSetup,
+    setup: SceneSetup,
     draws: DrawList,
     planner: Planner,
     bounds: (Vec3, Vec3),
@@ -49,15 +50,16 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
     let setup = load(args, outputs)?;
     let loaded = started.elapsed();
     progress.stage("preparing textures and shaders", 0, "");
-    let mut session = Session::new(args, &setup)?;
+    let mut session = Session::new(args, setup)?;
     let (passes, finest) = session.plan()?;
     let searched = started.elapsed();
-    let textures = prepare_textures(&setup.scene, |image| finest[image], cache.as_ref())?;
+    let scene = &session.setup.scene;
+    let textures = prepare_textures(scene, |image| finest[image], cache.as_ref())?;
     let textured = started.elapsed();
     let mut opened = session.open_driver(&textures)?;
     let backend = opened.backend.as_mut();
     let tables = tables(
-        &setup,
+        &session.setup,
         &args.scene.scene,
         &session.draws,
         &textures,
@@ -74,18 +76,20 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
         warn_of_multiview_defect(backend)?;
     }
     let ready = started.elapsed();
-    let scene = format!("{}, camera {}", args.scene.scene, setup.camera.name);
+    let scene = format!("{}, camera {}", args.scene.scene, session.setup.camera.name);
     note_ready(&scene, counts, [loaded, textured, ready]);
-    progress.stage("capturing", setup.frames.len() as u64, "frames");
-    let mut output = TraceOutput::create(args, &tables, &setup.scene, &session.draws)?;
+    let frames = session.setup.frames.clone();
+    progress.stage("capturing", frames.len() as u64, "frames");
+    let mut output = TraceOutput::create(args, &tables, &session.setup.scene, &session.draws)?;
     let mut first_pictures: Option<Pictures> = None;
     let mut first = Some(first);
-    for views in &setup.frames {
+    for views in &frames {
         let pictures = session.frame(backend, views, first.take(), &mut output, &mut summary)?;
         first_pictures = first_pictures.or(pictures);
         progress.advance(1);
     }
     drop(progress);
+    let setup = &session.setup;
     let size_px = setup.hmd.eye_size_px;
     let start = Instant::now();
     let file_bytes = output.finish(first_pictures.as_ref(), size_px)?;
@@ -93,23 +97,22 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
     if summary.counts.fragments == 0 {
         super::scene_args::warn_of_nothing_seen(&setup.camera, session.bounds, setup.scene.origin);
     }
-    let per_frame = summary.counts.fragments / setup.frames.len().max(1) as u64;
+    let per_frame = summary.counts.fragments / frames.len().max(1) as u64;
     let unstable = summary.unstable.unwrap_or_default();
     for warning in unstable.warnings(&setup.scene, per_frame) {
         shell::warn(&warning);
     }
     note(&texels);
-    let views = [setup.frames.len(), args.views.len()];
+    let views = [frames.len(), args.views.len()];
     summary.print(views, size_px, file_bytes, &backend.work());
     Ok(())
 }
 
 impl<'a> Session<'a> {
-    fn new(args: &'a RasterArgs, setup: &'a SceneSetup) -> anyhow::Result<Self> {
+    fn new(args: &'a RasterArgs, setup: SceneSetup) -> anyhow::Result<Self> {
         let cascades = cascades(&setup.scene, args.shadows);
         Ok(Self {
             args,
-            setup,
             draws: DrawList::new(&setup.scene, cascades)?,
             planner: Planner::new(
                 &args.techniques.settings(&setup.hmd)?,
@@ -119,13 +122,20 @@ impl<'a> Session<'a> {
                 args.path.fps,
             )?,
             bounds: setup.scene.bounds().unwrap_or_default(),
+            setup,
         })
     }
 
-    /// Moves the draws to where they are in a frame.
-    fn pose(&mut self, frame: u32) {
-        let time_s = self.setup.moments.time_s(frame);
-        self.draws.pose(&self.setup.scene, time_s);
+    /// Poses the scene and its draws for a frame.
+    fn pose(&mut self, frame: u32) -> anyhow::Result<()> {
+        let time_s = self.setup.moments.scene_time_s(frame);
+        let scene = &mut self.setup.scene;
+        scene.animate(time_s)?;
+        if scene.animation.is_some() {
+            self.bounds = scene.bounds().unwrap_or_default();
+        }
+        self.draws.pose(scene, time_s as f32);
+        Ok(())
     }
 
     /// What to capture of the draws where they are.
@@ -136,7 +146,7 @@ impl<'a> Session<'a> {
             draws: &self.draws,
             lighting: Lighting::new(&self.setup.scene),
             bounds: self.bounds,
-            shadow_range_m: shadow_range_m(self.setup, self.bounds),
+            shadow_range_m: shadow_range_m(&self.setup.camera, self.bounds),
             planner: &self.planner,
             skips: Skips::without(&args.no_skip),
             fragments: args.hsr,
@@ -151,14 +161,14 @@ impl<'a> Session<'a> {
     /// they start afterwards.
     fn plan(&mut self) -> anyhow::Result<(Vec<Pass>, Vec<Option<u32>>)> {
         let (mut passes, mut finest) = (Vec::new(), Vec::new());
-        for views in &self.setup.frames {
+        for number in 0..self.setup.frames.len() {
             // The layers of a frame depend on where its draws are.
-            self.pose(views.frame);
-            let job = self.job();
+            self.pose(self.setup.frames[number].frame)?;
+            let (job, views) = (self.job(), &self.setup.frames[number]);
             passes.extend(job.passes(views)?);
             job.add_finest_levels(views, &mut finest)?;
         }
-        self.pose(self.setup.moments.frames.start);
+        self.pose(self.setup.moments.frames.start)?;
         Ok((passes, finest))
     }
 
@@ -209,8 +219,8 @@ impl<'a> Session<'a> {
         output: &mut TraceOutput<'_>,
         summary: &mut Summary,
     ) -> anyhow::Result<Option<Pictures>> {
-        self.pose(views.frame);
-        backend.pose(&self.draws);
+        self.pose(views.frame)?;
+        backend.pose(&self.setup.scene, &self.draws);
         if summary.unstable.is_none() {
             let unstable = summary.unstable.insert(UnstableTriangles::default());
             for eye in self.args.views {

@@ -143,7 +143,9 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
         moments,
         ..
     } = setup;
-    scene.pose(moments.time_s(moments.frames.start));
+    let time_s = moments.scene_time_s(moments.frames.start);
+    scene.animate(time_s)?;
+    scene.pose(time_s as f32);
     let (scene_triangles, scene_origin) = (scene.triangle_count(), scene.origin);
     let scene = TraceScene::new(scene)?;
     let traversal = args.bvh;

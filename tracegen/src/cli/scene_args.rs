@@ -1,6 +1,7 @@
 //! Flags for the scene, the camera and the display.
 
 use super::path_args::PathArgs;
+use super::pose_args::PoseArgs;
 use clap::Args;
 use formats::view::{FovTangents, FrameViews, Hmd};
 use glam::{DVec3, Vec3};
@@ -23,6 +24,9 @@ pub struct SceneArgs {
     /// Material variant of a glTF file to show (KHR_materials_variants).
     #[arg(long, value_name = "NAME")]
     pub variant: Option<String>,
+    /// Time and animation.
+    #[command(flatten)]
+    pub pose: PoseArgs,
     /// Camera flags.
     #[command(flatten)]
     pub camera: CameraArgs,
@@ -89,12 +93,17 @@ impl SceneArgs {
         self.hmd.resolve(default_size_px, None)?;
         self.camera.validate_alone()?;
         let path_file = path.file();
-        let (path, moments) = path.open(frames)?;
+        let (path, mut moments) = path.open(frames)?;
+        moments.scene_start_s = self.pose.time;
         let options = LoadOptions {
             variant: self.variant.clone(),
-            ..options.clone()
+            ..self.pose.applied_to(options)
         };
-        let (scene, mut inputs) = load_scene(&self.scene, &options)?;
+        let Loaded {
+            scene,
+            files: mut inputs,
+            ..
+        } = load_scene(&self.scene, &options)?;
         inputs.extend(path_file);
         let path = path.relative_to(scene.origin);
         let camera = self.camera.resolve(&scene)?;
@@ -145,20 +154,16 @@ fn warn_of_coarse_places(camera: &Camera, frames: &[FrameViews], origin: DVec3) 
     }
 }
 
-/// Loads a scene and its files, and prints its warnings on stderr.
+/// Loads a scene, and prints its warnings on stderr.
 ///
 /// # Errors
 /// An unreadable scene.
-pub fn load_scene(spec: &str, options: &LoadOptions) -> anyhow::Result<(Scene, Vec<PathBuf>)> {
-    let Loaded {
-        scene,
-        warnings,
-        files,
-    } = load_with(spec, options)?;
-    for warning in &warnings {
+pub fn load_scene(spec: &str, options: &LoadOptions) -> anyhow::Result<Loaded> {
+    let loaded = load_with(spec, options)?;
+    for warning in &loaded.warnings {
         shell::warn(&format!("{spec}: {warning}"));
     }
-    Ok((scene, files))
+    Ok(loaded)
 }
 
 /// Warns that no part of the scene is in the picture; coordinates are relative to `origin`.

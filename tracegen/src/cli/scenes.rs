@@ -1,11 +1,12 @@
 //! `tracegen scenes`: lists the built-in scenes, or describes a scene.
 
 use super::cache_args::CacheArgs;
+use super::pose_args::PoseArgs;
 use super::scene_args::load_scene;
 use ::scenes::BUILTINS;
 use clap::Args;
 use glam::Vec3;
-use scene::{LoadOptions, Scene};
+use scene::{LoadOptions, Loaded, Scene};
 use serde::Serialize;
 use std::time::Instant;
 use textures::{Cache, TextureSet};
@@ -19,6 +20,8 @@ pub struct ScenesArgs {
     /// Also read and compress the images as a capture does, and print their size.
     #[arg(long, requires = "scene")]
     textures: bool,
+    #[command(flatten)]
+    pose: PoseArgs,
     #[command(flatten)]
     cache: CacheArgs,
     /// Print JSON.
@@ -56,6 +59,8 @@ struct Description {
     lights: usize,
     bounds_m: Option<[[f64; 3]; 2]>,
     cameras: Vec<CameraEntry>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    animations: Vec<String>,
 }
 
 #[derive(Serialize)]
@@ -85,13 +90,12 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
     let text = match args.scene {
         None => list(args.json)?,
         Some(spec) => {
+            let options = args.pose.applied_to(&LoadOptions::ALL);
             let description = if args.textures {
-                {
-                    let cache = args.cache.open()?;
-                    read_textures(&spec, cache.as_ref())?
-                }
+                let cache = args.cache.open()?;
+                read_textures(&spec, &options, cache.as_ref())?
             } else {
-                describe(&load_scene(&spec, &LoadOptions::ALL)?.0)
+                describe(&load_scene(&spec, &options)?)
             };
             if args.json {
                 json(&description)?
@@ -104,11 +108,15 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
 }
 
 /// Loads and compresses everything, and prints the time on stderr.
-fn read_textures(spec: &str, cache: Option<&Cache>) -> anyhow::Result<Description> {
+fn read_textures(
+    spec: &str,
+    options: &LoadOptions,
+    cache: Option<&Cache>,
+) -> anyhow::Result<Description> {
     let start = Instant::now();
-    let (scene, _) = load_scene(spec, &LoadOptions::ALL)?;
+    let scene = load_scene(spec, options)?;
     let loaded = start.elapsed();
-    let set = TextureSet::prepare(&scene, |_| Some(0), cache)?;
+    let set = TextureSet::prepare(&scene.scene, |_| Some(0), cache)?;
     for note in &set.notes {
         shell::warn(note);
     }
@@ -158,7 +166,8 @@ fn list(as_json: bool) -> anyhow::Result<String> {
         .collect())
 }
 
-fn describe(scene: &Scene) -> Description {
+fn describe(loaded: &Loaded) -> Description {
+    let scene = &loaded.scene;
     Description {
         schema: "tracegen.scene/1",
         name: scene.name.clone(),
@@ -194,6 +203,7 @@ fn describe(scene: &Scene) -> Description {
                 far_m: c.far,
             })
             .collect(),
+        animations: loaded.animations.clone(),
     }
 }
 
@@ -244,6 +254,12 @@ fn table(d: &Description) -> String {
             c.near_m,
             c.far_m,
         );
+    }
+    if !d.animations.is_empty() {
+        text += "animations\n";
+    }
+    for name in &d.animations {
+        text += &format!("  {name}\n");
     }
     text
 }

@@ -282,6 +282,8 @@ impl TechniquesArgs {
             path_frames: self.path_frames,
             frames: extent.frames(),
             fps: self.path.fps,
+            time_s: self.scene.pose.time,
+            animation: self.scene.pose.animation.clone(),
             size_px: setup.hmd.eye_size_px,
             hmd: setup.hmd.clone(),
             lens: self.lens.lenses(&setup.hmd)?,

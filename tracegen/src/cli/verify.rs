@@ -2,8 +2,10 @@
 
 use super::cache_args::CacheArgs;
 use super::path_args::PathArgs;
-use super::raster::{cascades, prepare_environment, shadow_range_m, tables};
+use super::raster::{cascades, prepare_environment, tables};
+
 use super::scene_args::{SceneArgs, SceneSetup};
+use crate::study::world::shadow_range_m;
 use crate::verify::frame::{CaptureUnderTest, TileChoice, Verified};
 use crate::verify::report::{Report, SLOTS};
 use anyhow::{Context, ensure};
@@ -117,7 +119,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         shadow_cascades = 0;
     }
     let mut draws = DrawList::new(&setup.scene, shadow_cascades)?;
-    draws.pose(&setup.scene, setup.moments.time_s(0));
+    draws.pose(&setup.scene, setup.moments.scene_time_s(0) as f32);
     let planner = plain_planner(&setup)?;
     let bounds = setup.scene.bounds().unwrap_or_default();
     let job = CaptureJob {
@@ -125,7 +127,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         draws: &draws,
         lighting: Lighting::new(&setup.scene),
         bounds,
-        shadow_range_m: shadow_range_m(&setup, bounds),
+        shadow_range_m: shadow_range_m(&setup.camera, bounds),
         planner: &planner,
         skips: Skips::default(),
         fragments: Fragments::DepthTested,
@@ -267,7 +269,7 @@ fn look_as(trace: &Textrace, file: &Path, setup: &mut SceneSetup) -> anyhow::Res
         .first()
         .with_context(|| format!("{}: the trace has no frames", file.display()))?;
     ensure!(
-        setup.scene.motions.is_empty() || first.frame == 0,
+        !setup.scene.moves() || first.frame == 0,
         "{}: expected frame 0 of a scene that moves, found frame {}",
         file.display(),
         first.frame

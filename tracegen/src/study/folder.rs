@@ -40,6 +40,12 @@ pub struct StudySetup {
     pub frames: Vec<u32>,
     /// Frames per second along the path.
     pub fps: f32,
+    /// Scene time of the path's first frame.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub time_s: f64,
+    /// The animation that plays, as given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub animation: Option<String>,
     /// Width and height of an eye's picture.
     pub size_px: [u32; 2],
     /// The display.
@@ -66,6 +72,11 @@ pub struct StudySetup {
     pub shadow_cascades: u32,
     /// Checksum of the files that scene and path are read from.
     pub input_checksum: String,
+}
+
+/// Omits a time of zero from manifests.
+fn is_zero(time_s: &f64) -> bool {
+    *time_s == 0.0
 }
 
 /// A measured row.
@@ -439,6 +450,8 @@ mod tests {
             path_frames: 72,
             frames: frames.to_vec(),
             fps: 72.0,
+            time_s: 0.0,
+            animation: None,
             size_px: [4, 4],
             hmd: Hmd::default(),
             lens: [Lens {

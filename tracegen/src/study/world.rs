@@ -11,7 +11,7 @@ use raster::error::RasterError;
 use raster::frame::Frame;
 use raster::lighting::Lighting;
 use record::Recorder;
-use scene::Scene;
+use scene::{Camera, Scene};
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
 use techniques::settings::Reprojection;
@@ -39,6 +39,10 @@ pub struct World {
     pub lens: [Lens; 2],
     /// Frames per second along the path.
     pub fps: f32,
+    /// Scene time of frame 0.
+    pub start_s: f64,
+    /// The pose at the start of the path.
+    pub camera: Camera,
     /// The path, by frame number.
     pub views: Vec<FrameViews>,
     /// Tables of the traces, without frames and passes.
@@ -154,6 +158,23 @@ impl World {
         Ok(())
     }
 
+    /// Poses the scene for a frame.
+    ///
+    /// # Errors
+    /// A coordinate exceeds the supported range.
+    fn pose(&mut self, number: u32) -> Result<(), RasterError> {
+        let time_s = self.start_s + f64::from(number) / f64::from(self.fps);
+        let scene = &mut self.scene;
+        (scene.animate(time_s)).map_err(|error| RasterError::Scene(error.to_string()))?;
+        if scene.animation.is_some() {
+            self.bounds = scene.bounds().unwrap_or_default();
+            self.shadow_range_m = shadow_range_m(&self.camera, self.bounds);
+            self.lighting = Lighting::new(scene);
+        }
+        self.draws.pose(&self.scene, time_s as f32);
+        Ok(())
+    }
+
     /// Renders a frame of the path without capture, and leaves its pictures on the device. `memory` is the
     /// state of occlusion culling from the frame before.
     ///
@@ -173,8 +194,8 @@ impl World {
         }
         let before = backend.work();
         let start = Instant::now();
-        self.draws.pose(&self.scene, number as f32 / self.fps);
-        backend.pose(&self.draws);
+        self.pose(number)?;
+        backend.pose(&self.scene, &self.draws);
         let posed = backend.work() - before;
         let job = self.job(planner);
         let mut frame = job.frame(&self.views[number as usize])?;
@@ -278,12 +299,25 @@ impl World {
             .collect();
         for views in &tables.meta.frames {
             // The layers of a frame depend on where its draws are.
-            self.draws.pose(&self.scene, views.frame as f32 / self.fps);
+            self.pose(views.frame)?;
             let passes = self.job(planner(views.frame)).passes(views)?;
             tables.passes.extend(passes);
         }
         Ok(tables)
     }
+}
+
+/// Near and far end of the cascades: from the near plane to where the scene ends.
+#[must_use]
+pub fn shadow_range_m(camera: &Camera, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f32; 2] {
+    let farthest = (camera.eye - lo)
+        .abs()
+        .max((camera.eye - hi).abs())
+        .length();
+    // Nothing nearer than 5 cm needs shadows of its own, nor anything nearer than a twentieth of a small
+    // scene.
+    let near = camera.near.max(farthest.min(1.0) * 0.05);
+    [near, farthest.min(camera.far).max(2.0 * near)]
 }
 
 /// Appends frames to a trace, one after the other.

@@ -394,8 +394,8 @@ impl CaptureBackend for Lavapipe {
         }
     }
 
-    fn pose(&mut self, draws: &DrawList) {
-        self.work.bytes_uploaded += self.scene.pose(&self.gpu, draws);
+    fn pose(&mut self, scene: &Scene, draws: &DrawList) {
+        self.work.bytes_uploaded += self.scene.pose(&self.gpu, scene, draws);
     }
 
     fn render_shadows(&mut self, draws: &DrawList, frame: &Frame) -> Result<(), RasterError> {

@@ -11,7 +11,7 @@ use crate::shader::{ALPHA_BINDING, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_
 use crate::uniforms::MaterialData;
 use crate::vertices::{self, InstanceData, VERTEX_STRIDE};
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
-use scene::{Material, Mesh, Scene, TextureRef};
+use scene::{Animation, Material, Mesh, Scene, TextureRef};
 use std::collections::{BTreeMap, BTreeSet};
 use textures::{CompressedTexture, TextureSet};
 use wgpu::util::DeviceExt;
@@ -109,9 +109,19 @@ impl SceneBuffers {
 }
 
 impl SceneBuffers {
-    /// Writes the rows of moving draws, consecutive ones together. Returns the number of bytes.
-    pub fn pose(&self, gpu: &Gpu, draws: &DrawList) -> u64 {
+    /// Writes the rows of moving draws, consecutive ones together, and the moving vertices. Returns
+    /// the number of bytes.
+    pub fn pose(&self, gpu: &Gpu, scene: &Scene, draws: &DrawList) -> u64 {
         let mut bytes = 0;
+        for mesh in scene.animation.iter().flat_map(Animation::moving_meshes) {
+            let Some(buffers) = &self.meshes[mesh] else {
+                continue;
+            };
+            let vertices = vertices::pack(&scene.meshes[mesh]);
+            let contents: &[u8] = bytemuck::cast_slice(&vertices);
+            gpu.queue.write_buffer(&buffers.vertices, 0, contents);
+            bytes += contents.len() as u64;
+        }
         for run in draws.moving.chunk_by(|a, b| a + 1 == *b) {
             let rows: Vec<InstanceData> = (run.iter())
                 .map(|&draw| InstanceData::new(draw, &draws.calls[draw as usize]))
@@ -146,7 +156,11 @@ fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, Raster
     };
     // A trailing partial triangle is not a primitive and is left out of the index range.
     Ok(MeshBuffers {
-        vertices: buffer(bytemuck::cast_slice(&vertices), wgpu::BufferUsages::VERTEX),
+        // Vertices may move.
+        vertices: buffer(
+            bytemuck::cast_slice(&vertices),
+            wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+        ),
         colors: (!colors.is_empty())
             .then(|| buffer(bytemuck::cast_slice(&colors), wgpu::BufferUsages::VERTEX)),
         indices: buffer(

@@ -147,8 +147,9 @@ impl Osmesa {
                 let key = PipelineKey::new(call, material, role, purpose, draws.cascades);
                 let pipeline = self.programs.get(&self.gl, &key)?;
                 if let Some(mesh) = &self.scene.meshes[call.mesh] {
-                    self.work.vertices += instances * u64::from(mesh.count);
-                    self.work.triangles += instances * u64::from(mesh.count / 3);
+                    let count = mesh.vertices.count;
+                    self.work.vertices += instances * u64::from(count);
+                    self.work.triangles += instances * u64::from(count / 3);
                 }
                 self.work.draws += instances;
                 self.work.calls += 1;
@@ -200,7 +201,7 @@ impl Osmesa {
                 }
                 self.work.state_changes += 1;
             }
-            self.gl.draw(mesh, batch.range.clone());
+            self.gl.draw(&mesh.vertices, batch.range.clone());
         }
     }
 
@@ -270,8 +271,8 @@ impl CaptureBackend for Osmesa {
         }
     }
 
-    fn pose(&mut self, draws: &DrawList) {
-        self.work.bytes_uploaded += self.scene.pose(&self.gl, draws);
+    fn pose(&mut self, scene: &Scene, draws: &DrawList) {
+        self.work.bytes_uploaded += self.scene.pose(&self.gl, scene, draws);
     }
 
     fn render_shadows(&mut self, draws: &DrawList, frame: &Frame) -> Result<(), RasterError> {

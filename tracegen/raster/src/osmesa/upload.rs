@@ -6,9 +6,9 @@ use crate::draws::DrawList;
 use crate::error::RasterError;
 use crate::groups::MATERIAL_TEXTURES;
 use crate::uniforms::MaterialData;
-use crate::vertices::{self, COLOR_STRIDE, InstanceData, VERTEX_STRIDE};
+use crate::vertices::{self, COLOR_STRIDE, InstanceData, VERTEX_STRIDE, VertexData};
 use formats::texture::{self, ColorSpace, Filter, MipFilter, TexelFormat, Wrap};
-use scene::{Material, Mesh, Scene};
+use scene::{Animation, Material, Mesh, Scene};
 use textures::{CompressedTexture, TextureSet};
 
 /// S3TC with sRGB, missing in the bindings.
@@ -25,10 +25,18 @@ pub struct MaterialObjects {
     pub units: [(Texture, Sampler); MATERIAL_TEXTURES],
 }
 
+/// A mesh in the driver's memory.
+pub struct MeshObjects {
+    /// The attributes of its vertices.
+    pub vertices: Vertices,
+    /// Their interleaved part.
+    interleaved: Buffer,
+}
+
 /// The uploaded scene.
 pub struct SceneObjects {
     /// By the scene's mesh number; `None` for a mesh that no draw uses.
-    pub meshes: Vec<Option<Vertices>>,
+    pub meshes: Vec<Option<MeshObjects>>,
     /// By the scene's material number.
     pub materials: Vec<MaterialObjects>,
     /// One row per draw.
@@ -84,8 +92,18 @@ impl SceneObjects {
         })
     }
 
-    /// Writes the rows of moving draws. Returns the number of bytes.
-    pub fn pose(&self, gl: &Gl, draws: &DrawList) -> u64 {
+    /// Writes the rows of moving draws and the moving vertices. Returns the number of bytes.
+    pub fn pose(&self, gl: &Gl, scene: &Scene, draws: &DrawList) -> u64 {
+        let mut bytes = 0;
+        for mesh in scene.animation.iter().flat_map(Animation::moving_meshes) {
+            let Some(objects) = &self.meshes[mesh] else {
+                continue;
+            };
+            let corners = corners(&scene.meshes[mesh]);
+            let contents: &[u8] = bytemuck::cast_slice(&corners);
+            gl.write(objects.interleaved, 0, contents);
+            bytes += contents.len() as u64;
+        }
         let row_bytes = size_of::<InstanceData>() as u64;
         for &draw in &draws.moving {
             let row = InstanceData::new(draw, &draws.calls[draw as usize]);
@@ -95,16 +113,21 @@ impl SceneObjects {
                 bytemuck::bytes_of(&row),
             );
         }
-        draws.moving.len() as u64 * row_bytes
+        bytes + draws.moving.len() as u64 * row_bytes
     }
 }
 
-/// Uploads the corners of a mesh's triangles, three per triangle.
-fn upload_mesh(gl: &Gl, mesh: &Mesh, draws: Buffer) -> Result<Vertices, RasterError> {
-    let corners = &mesh.indices[..3 * mesh.triangles()];
+/// The corners of a mesh's triangles, three per triangle.
+fn corners(mesh: &Mesh) -> Vec<VertexData> {
     let shared = vertices::pack(mesh);
-    let own: Vec<_> = corners.iter().map(|&i| shared[i as usize]).collect();
-    let vertices = gl.buffer(bytemuck::cast_slice(&own))?;
+    let corners = &mesh.indices[..3 * mesh.triangles()];
+    corners.iter().map(|&i| shared[i as usize]).collect()
+}
+
+/// Uploads the corners of a mesh's triangles.
+fn upload_mesh(gl: &Gl, mesh: &Mesh, draws: Buffer) -> Result<MeshObjects, RasterError> {
+    let vertices = gl.buffer(bytemuck::cast_slice(&corners(mesh)))?;
+    let corners = &mesh.indices[..3 * mesh.triangles()];
     let interleaved = |location, components, offset| Attribute {
         buffer: vertices,
         location,
@@ -146,7 +169,10 @@ fn upload_mesh(gl: &Gl, mesh: &Mesh, draws: Buffer) -> Result<Vertices, RasterEr
             per_instance: false,
         });
     }
-    gl.vertices(&attributes)
+    Ok(MeshObjects {
+        vertices: gl.vertices(&attributes)?,
+        interleaved: vertices,
+    })
 }
 
 fn upload_texture(gl: &Gl, compressed: &CompressedTexture) -> Result<Texture, RasterError> {

@@ -5,6 +5,7 @@
 
 use super::{Camera, Scene};
 use crate::origin::relative;
+use crate::suggest::did_you_mean;
 use formats::view::{EyeView, FovTangents, FrameViews, Hmd};
 use glam::{Affine3A, DVec3, Mat3, Mat4, Vec3, Vec4};
 
@@ -31,11 +32,23 @@ pub fn default_camera(scene: &Scene) -> Camera {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CameraError {
     /// No camera of that name.
-    #[error("no camera '{name}': expected one of {known}")]
+    #[error("no camera '{name}': expected one of {known}{suggestion}")]
     Unknown {
         /// The requested name.
         name: String,
         /// Names of the scene's cameras.
+        known: String,
+        /// A similar name, or empty.
+        suggestion: String,
+    },
+    /// An orthographic camera.
+    #[error(
+        "camera '{name}': expected a perspective camera ({known}), found an orthographic one, unsupported"
+    )]
+    Orthographic {
+        /// Its name.
+        name: String,
+        /// The scene's other cameras.
         known: String,
     },
     /// A pose without a direction, or planes in the wrong order.
@@ -63,11 +76,24 @@ pub fn find<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a Camera, Came
         Some(_) => (scene.cameras.iter().find(|c| c.name == wanted))
             .or_else(|| scene.cameras.iter().find(matches)),
     };
-    found.ok_or_else(|| CameraError::Unknown {
-        name: wanted.to_owned(),
-        known: (scene.cameras.iter().map(|c| c.name.as_str()))
-            .collect::<Vec<_>>()
-            .join(", "),
+    found.ok_or_else(|| {
+        let names: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
+        let known = names.join(", ");
+        let is_wanted =
+            |name: &&String| *name == wanted || name.strip_prefix("cam_") == Some(wanted);
+        if let Some(name) = scene.orthographic_cameras.iter().find(is_wanted) {
+            return CameraError::Orthographic {
+                name: name.clone(),
+                known,
+            };
+        }
+        let short = names.iter().filter_map(|name| name.strip_prefix("cam_"));
+        let suggestion = did_you_mean(wanted, names.iter().copied().chain(short));
+        CameraError::Unknown {
+            name: wanted.to_owned(),
+            known,
+            suggestion,
+        }
     })
 }
 
@@ -123,6 +149,25 @@ fn check_direction(
         ));
     }
     Ok(())
+}
+
+/// Distance from zero beyond which one step of single precision, relative to a target one metre
+/// ahead, visibly changes a camera's direction.
+const FAR_OUT: f32 = 1024.0;
+
+/// Eye, target and up direction of a camera node, which looks along its -z. The target is one metre
+/// ahead, or further for an eye so far from zero that single precision has few steps in a metre.
+/// Returns `None` if the node has no direction.
+pub(crate) fn look_of_node(place: &Affine3A) -> Option<(Vec3, Vec3, Vec3)> {
+    let eye = Vec3::from(place.translation);
+    let forward = Vec3::from(-place.matrix3.z_axis).normalize_or_zero();
+    let up = Vec3::from(place.matrix3.y_axis).normalize_or_zero();
+    if forward.cross(up).length() < 1e-4 {
+        return None;
+    }
+    let out = eye.abs().max_element();
+    let ahead = if out > FAR_OUT { out } else { 1.0 };
+    Some((eye, eye + forward * ahead, up))
 }
 
 /// A camera of this pose in the world, for a scene whose coordinates are relative to `origin`. Near

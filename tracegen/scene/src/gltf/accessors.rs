@@ -125,6 +125,7 @@ impl<'a> Buffers<'a> {
             1 => Type::Scalar,
             2 => Type::Vec2,
             3 => Type::Vec3,
+            16 => Type::Mat4,
             _ => Type::Vec4,
         };
         let normalized = accessor.normalized;
@@ -147,6 +148,33 @@ impl<'a> Buffers<'a> {
             })
         };
         self.elements(index, accessor, N * component.size(), [0.0; N], read)
+    }
+
+    /// Four joint indices per vertex.
+    pub fn joints(&self, index: usize) -> Result<Vec<[u16; 4]>, SceneError> {
+        let (accessor, component) = self.accessor(index)?;
+        let unsigned = matches!(component, ComponentType::U8 | ComponentType::U16);
+        if accessor.type_ != Checked::Valid(Type::Vec4) || !unsigned || accessor.normalized {
+            return Err(self.origin.invalid(
+                format!("accessors[{index}]"),
+                "joints: Vec4 of U8 or U16, not normalized",
+                format!(
+                    "{} of {}{}",
+                    type_name(&accessor.type_),
+                    if accessor.normalized {
+                        "normalized "
+                    } else {
+                        ""
+                    },
+                    component_name(component)
+                ),
+            ));
+        }
+        let size = component.size();
+        let read = |bytes: &[u8]| {
+            std::array::from_fn(|i| read_index(&bytes[i * size..], component) as u16)
+        };
+        self.elements(index, accessor, 4 * size, [0; 4], read)
     }
 
     /// Unsigned scalars.

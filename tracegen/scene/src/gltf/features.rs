@@ -5,7 +5,6 @@ use crate::error::SceneError;
 use crate::files::Origin;
 use crate::warnings::Warnings;
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 use serde_json::Value;
 use std::collections::{BTreeMap, HashSet};
 
@@ -41,10 +40,6 @@ struct Asked {
     extensions_required: Vec<String>,
     #[serde(default)]
     extensions_used: Vec<String>,
-    #[serde(default)]
-    animations: Vec<IgnoredAny>,
-    #[serde(default)]
-    skins: Vec<IgnoredAny>,
 }
 
 #[derive(Deserialize)]
@@ -130,24 +125,12 @@ pub(super) fn check(
         ));
     }
     let used = unsupported(&asked.extensions_used);
-    let left_out = [
-        (
-            asked.animations.len(),
-            "animations are left out: nodes stand as they are stored".to_owned(),
-        ),
-        (
-            asked.skins.len(),
-            "skins are left out: meshes stand as they are stored".to_owned(),
-        ),
-        (
+    if !used.is_empty() {
+        warnings.say(&format!(
+            "{} unsupported extensions are left out: {}",
             used.len(),
-            format!("unsupported extensions are left out: {}", used.join(", ")),
-        ),
-    ];
-    for (count, what) in left_out {
-        if count > 0 {
-            warnings.say(&format!("{count} {what}"));
-        }
+            used.join(", ")
+        ));
     }
     sources(&asked.textures, origin)
 }

@@ -6,22 +6,33 @@ use super::materials::Table;
 use super::variants;
 use crate::Mesh;
 use crate::SceneError;
+use crate::animation::{Movers, Shape};
 use crate::files::shown;
-use crate::geometry::{triangulate_fan, triangulate_strip, vertex_normals, vertex_tangents};
+use crate::geometry::{complete_vertices, triangulate_fan, triangulate_strip};
 use crate::warnings::Warnings;
 use glam::{Vec2, Vec3, Vec4};
 use gltf::json::accessor::Type;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
-/// Reads every triangle primitive of a glTF mesh.
+/// The morph targets and skin that move the vertices of a mesh.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Moving {
+    /// Number of joints of its skin.
+    pub joints: Option<usize>,
+    /// True if its morph targets have weights.
+    pub morphs: bool,
+}
+
+/// Reads every triangle primitive of a glTF mesh, with the shapes of those whose vertices move.
 pub(super) fn read(
     index: usize,
     variant: Option<u32>,
+    moving: Moving,
     buffers: &Buffers<'_>,
     materials: &mut Table<'_>,
     warnings: &mut Warnings,
-) -> Result<Vec<Mesh>, SceneError> {
+) -> Result<Vec<(Mesh, Option<Shape>)>, SceneError> {
     let mesh = &buffers.root.meshes[index];
     let given = mesh.name.as_deref().map(shown);
     let mut meshes = Vec::with_capacity(mesh.primitives.len());
@@ -30,6 +41,7 @@ pub(super) fn read(
             buffers,
             primitive,
             variant,
+            moving,
             draco: None,
             place: match &given {
                 Some(name) => format!("meshes[{index}] '{name}'.primitives[{number}]"),
@@ -37,28 +49,30 @@ pub(super) fn read(
             },
         };
         reader.draco = draco::of_primitive(primitive, &reader.place, buffers)?;
-        if let Some(mut read) = reader.read(materials, warnings)? {
+        if let Some((mut read, shape)) = reader.read(materials, warnings)? {
             let name = given.clone().unwrap_or_else(|| format!("mesh-{index}"));
             read.name = if mesh.primitives.len() > 1 {
                 format!("{name}.{number}")
             } else {
                 name
             };
-            meshes.push(read);
+            meshes.push((read, shape));
         }
     }
     Ok(meshes)
 }
 
-struct Reader<'a> {
-    buffers: &'a Buffers<'a>,
-    primitive: &'a Primitive,
+/// Reader of one primitive.
+pub(super) struct Reader<'a> {
+    pub buffers: &'a Buffers<'a>,
+    pub primitive: &'a Primitive,
     /// The material variant to show.
     variant: Option<u32>,
+    moving: Moving,
     /// The primitive's compressed geometry.
-    draco: Option<Compressed>,
+    pub draco: Option<Compressed>,
     /// The primitive, named in errors.
-    place: String,
+    pub place: String,
 }
 
 impl Reader<'_> {
@@ -67,7 +81,7 @@ impl Reader<'_> {
         &self,
         materials: &mut Table<'_>,
         warnings: &mut Warnings,
-    ) -> Result<Option<Mesh>, SceneError> {
+    ) -> Result<Option<(Mesh, Option<Shape>)>, SceneError> {
         let place = &self.place;
         let mode = match self.primitive.mode {
             Checked::Valid(mode) => mode,
@@ -81,11 +95,6 @@ impl Reader<'_> {
                 format!("{place} holds {}, not triangles; skipped", mode_name(mode))
             });
             return Ok(None);
-        }
-        if self.primitive.targets.is_some() {
-            warnings.count("morph targets", || {
-                format!("{place} has morph targets; it is shown at rest")
-            });
         }
         let Some(positions) = self.vectors(&Semantic::Positions, "positions: Vec3 of F32")? else {
             warnings.count("no positions", || {
@@ -143,20 +152,48 @@ impl Reader<'_> {
         for (what, found) in given.into_iter().filter(|(_, found)| *found > 0) {
             self.check_length(what, found, count)?;
         }
-        compact(&mut mesh, &mut indices);
+        let mut movers = self.movers(count, &indices, warnings)?;
+        compact(&mut mesh, movers.as_mut(), &mut indices);
         mesh.indices = indices;
-        complete(&mut mesh, uses.normal_map_uv);
-        Ok(Some(mesh))
+        let shape = movers.map(|movers| Shape::new(&mesh, movers, uses.normal_map_uv));
+        complete_vertices(&mut mesh, uses.normal_map_uv);
+        Ok(Some((mesh, shape)))
     }
 
-    fn accessor(&self, semantic: &Semantic) -> Option<usize> {
+    /// The morph targets and skin of the `count` vertices, if any.
+    fn movers(
+        &self,
+        count: usize,
+        indices: &[u32],
+        warnings: &mut Warnings,
+    ) -> Result<Option<Movers>, SceneError> {
+        let targets = match self.moving.morphs {
+            true => self.targets(count)?,
+            false => Vec::new(),
+        };
+        let influences = match self.moving.joints {
+            Some(joints) => self.influences(joints, count, indices, warnings)?,
+            None => None,
+        };
+        if targets.is_empty() && influences.is_none() {
+            return Ok(None);
+        }
+        // The vertices at rest are stored in addition to those of the pose.
+        (self.buffers).spend::<[f32; 10]>(count as u64, || self.place.clone())?;
+        Ok(Some(Movers {
+            targets,
+            influences,
+        }))
+    }
+
+    pub fn accessor(&self, semantic: &Semantic) -> Option<usize> {
         let attributes = &self.primitive.attributes;
         (attributes.iter())
             .find(|(key, _)| matches!(key, Checked::Valid(s) if s == semantic))
             .map(|(_, accessor)| accessor.value())
     }
 
-    fn vectors<const N: usize>(
+    pub fn vectors<const N: usize>(
         &self,
         semantic: &Semantic,
         expected: &str,
@@ -210,7 +247,7 @@ impl Reader<'_> {
     }
 
     /// Checks that an attribute has one value per position.
-    fn check_length(&self, what: &str, found: usize, count: usize) -> Result<(), SceneError> {
+    pub fn check_length(&self, what: &str, found: usize, count: usize) -> Result<(), SceneError> {
         if found == count {
             return Ok(());
         }
@@ -304,7 +341,7 @@ impl Reader<'_> {
 
 /// Drops unused vertices if they are at least half of all. Otherwise files whose primitives share
 /// one vertex buffer would store it once per primitive.
-fn compact(mesh: &mut Mesh, indices: &mut [u32]) {
+fn compact(mesh: &mut Mesh, movers: Option<&mut Movers>, indices: &mut [u32]) {
     let count = mesh.positions.len();
     let mut used = vec![false; count];
     for &i in indices.iter() {
@@ -334,42 +371,9 @@ fn compact(mesh: &mut Mesh, indices: &mut [u32]) {
     keep(&mut mesh.uv0, &used);
     keep(&mut mesh.uv1, &used);
     keep(&mut mesh.colors, &used);
-}
-
-/// Computes missing normals and tangents, and replaces those that are not unit vectors.
-fn complete(mesh: &mut Mesh, normal_map_uv: Option<u32>) {
-    if mesh.normals.is_empty() {
-        mesh.normals = vertex_normals(&mesh.positions, &mesh.indices);
-    } else if !mesh.normals.iter().all(|n| is_direction(*n)) {
-        let computed = vertex_normals(&mesh.positions, &mesh.indices);
-        for (n, computed) in mesh.normals.iter_mut().zip(computed) {
-            if !is_direction(*n) {
-                *n = computed;
-            }
-        }
+    if let Some(movers) = movers {
+        movers.keep(&used);
     }
-    for n in &mut mesh.normals {
-        *n = n.normalize();
-    }
-    let usable = |t: &Vec4| t.is_finite() && is_direction(t.truncate());
-    if mesh.tangents.is_empty() || !mesh.tangents.iter().all(usable) {
-        mesh.tangents = match normal_map_uv {
-            Some(1) if !mesh.uv1.is_empty() => {
-                vertex_tangents(&mesh.positions, &mesh.normals, &mesh.uv1, &mesh.indices)
-            }
-            Some(_) => vertex_tangents(&mesh.positions, &mesh.normals, &mesh.uv0, &mesh.indices),
-            // No texture reads these tangents, so any perpendicular will do.
-            None => (mesh.normals.iter())
-                .map(|n| n.any_orthonormal_vector().extend(1.0))
-                .collect(),
-        };
-    }
-}
-
-/// True if a vector is long enough to have a direction and short enough to be measured.
-fn is_direction(v: Vec3) -> bool {
-    let length_squared = v.length_squared();
-    length_squared > 1e-12 && length_squared.is_finite()
 }
 
 /// Primitives of a mode, in words.

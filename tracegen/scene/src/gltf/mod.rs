@@ -8,35 +8,42 @@
 //! kept: they take a primitive number and cover nothing.
 
 mod accessors;
-mod animation;
-#[cfg(test)]
-mod animation_tests;
 mod binary;
+mod camera_track;
+#[cfg(test)]
+mod camera_track_tests;
+mod channels;
 mod draco;
 mod features;
 mod instancing;
 mod materials;
 mod meshes;
 mod meshopt;
+mod morphs;
 mod nodes;
+mod placing;
+mod rig;
+mod skins;
 #[cfg(test)]
 mod tests;
 mod transforms;
+mod tree;
 mod variants;
 
-use super::files::{Origin, read_file, read_start};
+use super::files::{Origin, read_file, read_start, shown};
 use super::origin;
 use super::uri::{self, Uri};
 use super::warnings::Warnings;
-use super::{Instance, LoadOptions, Loaded, Scene, SceneError};
+use super::{LoadOptions, Loaded, Scene, SceneError};
 use accessors::Buffers;
-pub(crate) use animation::camera_track;
-use glam::DAffine3;
+pub(crate) use camera_track::camera_track;
 use gltf::binary::Glb;
 use gltf::json::validation::{Error as Fault, Validate};
 use gltf::json::{Path as JsonPath, Root};
+use nodes::Seen;
+use placing::{PlacedRig, Placing};
 use std::borrow::Cow;
-use std::ops::Range;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use transforms::Local;
 
@@ -60,48 +67,37 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     let buffers = read_buffers(&origin, root, blob, &mut warnings)?;
     let buffers = Buffers::new(root, buffers, &origin, json_bytes);
 
-    let placed = nodes::walk(root, &transforms, &origin)?;
-    let mut scene = Scene::default();
-    // Meshes with their places in the world.
-    let mut in_world: Vec<(usize, DAffine3)> = Vec::new();
-
+    let rig = rig::read(
+        root,
+        &transforms,
+        &buffers,
+        options.animation.as_deref(),
+        &mut warnings,
+    )?;
+    let rig = rig.map(|rig| PlacedRig::new(rig, options.time_s, &buffers));
+    let local = |node: usize| match &rig {
+        Some(placed) => placed.local(node),
+        None => transforms[node].transform(),
+    };
+    let placed = nodes::walk(root, local, &origin)?;
     let variant = variants::chosen(root, options.variant.as_deref(), &origin)?;
     let mut materials =
         materials::Table::new(&document, &buffers, &origin, options, &texture_images);
-    // The scene's meshes of each glTF mesh (one per primitive), filled on first use.
-    let mut loaded: Vec<Option<Range<usize>>> = vec![None; root.meshes.len()];
-    for (node, transform) in placed.meshes {
-        let Some(mesh) = root.nodes[node].mesh.map(|mesh| mesh.value()) else {
-            continue;
-        };
-        let instances =
-            nodes::mesh_transforms(node, &transforms[node], transform, &buffers, &mut warnings)?;
-        let primitives = match &loaded[mesh] {
-            Some(primitives) => primitives.clone(),
-            None => {
-                let first = scene.meshes.len();
-                let read = meshes::read(mesh, variant, &buffers, &mut materials, &mut warnings)?;
-                scene.meshes.extend(read);
-                let primitives = first..scene.meshes.len();
-                loaded[mesh] = Some(primitives.clone());
-                primitives
-            }
-        };
-        let made = primitives.len() as u64 * instances.len() as u64;
-        buffers.spend::<Instance>(made, || format!("instances of meshes[{mesh}]"))?;
-        for transform in instances {
-            in_world.extend(primitives.clone().map(|mesh| (mesh, transform)));
-        }
+    let mut placing = Placing {
+        buffers: &buffers,
+        transforms: &transforms,
+        variant,
+        rig,
+        meshes: Vec::new(),
+        in_world: Vec::new(),
+        loaded: HashMap::new(),
+    };
+    for (node, transform) in &placed.meshes {
+        placing.add(*node, *transform, &mut materials, &mut warnings)?;
     }
-    (scene.origin, scene.instances) = origin::place(&mut scene.meshes, &in_world);
-    let transform = |(node, transform)| (node, origin::relative_transform(transform, scene.origin));
-    let (cameras, lights) = (placed.cameras.into_iter(), placed.lights.into_iter());
-    scene.cameras = (cameras.map(transform))
-        .filter_map(|(node, transform)| nodes::camera(root, node, transform, &mut warnings))
-        .collect();
-    scene.lights = (lights.map(transform))
-        .filter_map(|(node, transform)| nodes::light(root, node, transform, &mut warnings))
-        .collect();
+    let (mut scene, rig) = placing.finish()?;
+    let moved = place_views(root, &placed, &mut scene, &mut warnings);
+    scene.animation = rig.and_then(|placed| placed.into_animation(moved));
     warnings.append(materials.warnings);
     scene.images = materials.requests.images(&origin)?;
     scene.materials = materials.materials;
@@ -109,7 +105,46 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
         scene,
         warnings: warnings.into_sentences(),
         files: referenced_files(&origin, root),
+        animations: rig::names(root).iter().map(|name| shown(name)).collect(),
     })
+}
+
+/// The nodes of a scene's cameras and lights, in the scene's order.
+struct ViewNodes {
+    cameras: Vec<usize>,
+    lights: Vec<usize>,
+}
+
+/// Adds cameras and lights to a scene. Its origin is already set.
+fn place_views(
+    root: &Root,
+    placed: &nodes::Placed,
+    scene: &mut Scene,
+    warnings: &mut Warnings,
+) -> ViewNodes {
+    let mut of = ViewNodes {
+        cameras: Vec::new(),
+        lights: Vec::new(),
+    };
+    for &(node, transform) in &placed.cameras {
+        let place = origin::relative_transform(transform, scene.origin);
+        match nodes::camera(root, node, place, warnings) {
+            Some(Seen::Perspective(camera)) => {
+                scene.cameras.push(camera);
+                of.cameras.push(node);
+            }
+            Some(Seen::Orthographic(name)) => scene.orthographic_cameras.push(name),
+            None => {}
+        }
+    }
+    for &(node, transform) in &placed.lights {
+        let place = origin::relative_transform(transform, scene.origin);
+        if let Some(light) = nodes::light(root, node, place, warnings) {
+            scene.lights.push(light);
+            of.lights.push(node);
+        }
+    }
+    of
 }
 
 /// The file itself and every file that its URIs name.

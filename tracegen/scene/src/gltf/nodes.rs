@@ -2,6 +2,8 @@
 
 use super::accessors::Buffers;
 use super::transforms::Local;
+use crate::animation::has_scale;
+use crate::cameras::look_of_node;
 use crate::files::Origin;
 use crate::warnings::Warnings;
 use crate::{Camera, Light, SceneError};
@@ -13,10 +15,6 @@ use gltf::json::validation::Checked;
 
 /// Far plane of a camera whose projection is infinite, metres.
 const DEFAULT_FAR_M: f32 = 1000.0;
-
-/// Distance from zero beyond which one step of single precision, relative to a target one metre
-/// ahead, visibly changes a camera's direction.
-const FAR_OUT: f32 = 1024.0;
 
 /// The placed nodes in depth-first order, with transforms to the world.
 #[derive(Default)]
@@ -30,9 +28,11 @@ pub(super) struct Placed {
 }
 
 /// Visits the default scene (the first one, or every root node, where the file names none).
+///
+/// `local` gives a node's transform to its parent.
 pub(super) fn walk(
     root: &Root,
-    transforms: &[Local],
+    local: impl Fn(usize) -> DAffine3,
     origin: &Origin,
 ) -> Result<Placed, SceneError> {
     let scene = root.scene.map_or(0, |s| s.value());
@@ -57,7 +57,7 @@ pub(super) fn walk(
                 "a cycle or a node with two parents",
             ));
         }
-        let transform = parent * transforms[index].transform();
+        let transform = parent * local(index);
         let rounded = transform.as_affine3a();
         if !rounded.is_finite() {
             return Err(origin.invalid(
@@ -85,27 +85,41 @@ pub(super) fn walk(
     Ok(placed)
 }
 
-/// The transforms of a node's mesh: one, or one per instance (EXT_mesh_gpu_instancing).
+/// An instance of a node's mesh.
+#[derive(Clone, Copy)]
+pub(super) struct NodeInstance {
+    /// To the node.
+    pub offset: DAffine3,
+    /// The transform of a node to the world.
+    pub transform: DAffine3,
+}
+
+/// The transforms of a node's mesh: one, or one per instance (EXT_mesh_gpu_instancing). An instance
+/// without scale is left out unless its node `moves`.
 pub(super) fn mesh_transforms(
     index: usize,
     local: &Local,
-    transform: DAffine3,
+    (transform, moves): (DAffine3, bool),
     buffers: &Buffers<'_>,
     warnings: &mut Warnings,
-) -> Result<Vec<DAffine3>, SceneError> {
-    let mut transforms = match local.instancing() {
-        None => vec![transform],
+) -> Result<Vec<NodeInstance>, SceneError> {
+    let mut instances = match local.instancing() {
+        None => vec![NodeInstance {
+            offset: DAffine3::IDENTITY,
+            transform,
+        }],
         Some(instancing) => {
             let relative = instancing.transforms(index, buffers)?;
             (relative.into_iter())
-                .map(|instance| transform * instance)
+                .map(|offset| NodeInstance {
+                    offset,
+                    transform: transform * offset,
+                })
                 .collect()
         }
     };
-    // The determinant must be neither 0 nor too small or large to transform normals.
-    let has_scale = |t: &DAffine3| t.as_affine3a().matrix3.determinant().is_normal();
-    transforms.retain(|transform| {
-        let keeps = has_scale(transform);
+    instances.retain(|instance| {
+        let keeps = moves || has_scale(&instance.transform.as_affine3a());
         if !keeps {
             warnings.count("no scale", || {
                 format!("nodes[{index}] is scaled to nothing or beyond measure; skipped")
@@ -113,7 +127,7 @@ pub(super) fn mesh_transforms(
         }
         keeps
     });
-    Ok(transforms)
+    Ok(instances)
 }
 
 fn parentless(root: &Root) -> Vec<usize> {
@@ -134,14 +148,20 @@ pub(super) fn camera_name(node: &Node, camera: &gltf::json::Camera, index: usize
         .unwrap_or_else(|| format!("camera-{index}"))
 }
 
-/// A camera node looks along its -z. The target is one metre ahead, or further for an eye so far
-/// from zero that single precision has few steps in a metre.
+/// The camera of a node.
+pub(super) enum Seen {
+    Perspective(Camera),
+    /// Not supported; its name.
+    Orthographic(String),
+}
+
+/// A camera node looks along its -z. Returns `None` if the node has no direction.
 pub(super) fn camera(
     root: &Root,
     index: usize,
     transform: Affine3A,
     warnings: &mut Warnings,
-) -> Option<Camera> {
+) -> Option<Seen> {
     let node = &root.nodes[index];
     let camera = root.cameras.get(node.camera?.value())?;
     let name = camera_name(node, camera, index);
@@ -149,19 +169,14 @@ pub(super) fn camera(
         warnings.count("orthographic", || {
             format!("camera '{name}' is orthographic; skipped")
         });
-        return None;
+        return Some(Seen::Orthographic(name));
     };
-    let eye = Vec3::from(transform.translation);
-    let forward = Vec3::from(-transform.matrix3.z_axis).normalize_or_zero();
-    let up = Vec3::from(transform.matrix3.y_axis).normalize_or_zero();
-    if forward.cross(up).length() < 1e-4 {
+    let Some((eye, target, up)) = look_of_node(&transform) else {
         warnings.count("no direction", || {
             format!("camera '{name}' has no direction; skipped")
         });
         return None;
-    }
-    let out = eye.abs().max_element();
-    let ahead = if out > FAR_OUT { out } else { 1.0 };
+    };
     let (mut near, mut far) = (perspective.znear, perspective.zfar.unwrap_or(DEFAULT_FAR_M));
     if !(near > 0.0 && far > near && far.is_finite()) {
         warnings.count("planes", || {
@@ -171,15 +186,15 @@ pub(super) fn camera(
         });
         (near, far) = (0.05, DEFAULT_FAR_M);
     }
-    Some(Camera {
+    Some(Seen::Perspective(Camera {
         name,
         eye,
-        target: eye + forward * ahead,
+        target,
         up,
         vfov_deg: perspective.yfov.to_degrees(),
         near,
         far,
-    })
+    }))
 }
 
 /// Punctual lights with unchanged photometric intensity. A spot light becomes a point light.

@@ -31,6 +31,10 @@ const MAX_LIBRARY_BYTES: u64 = 1 << 28;
 /// See [`SceneError`].
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     let origin = Origin::new(path);
+    if let Some(name) = options.named_animation() {
+        let expected = "a glTF file with animations";
+        return Err(origin.invalid("animations", expected, format!("'{name}'")));
+    }
     let mut warnings = Warnings::default();
     let text = decode(read_file(path, "scene", u64::MAX)?, &origin)?;
     let elements = Elements::read(&text, &origin)?;
@@ -99,6 +103,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
         scene,
         warnings: warnings.into_sentences(),
         files: files.collect(),
+        animations: Vec::new(),
     })
 }
 

@@ -15,8 +15,8 @@ mod walk;
 mod tests;
 
 pub use gaze::{GazeRow, read_gazes};
-pub use gltf::{CameraTrack, Joint};
-pub(crate) use gltf::{Channel, Curve, Interpolation};
+pub use gltf::CameraTrack;
+pub(crate) use keys::bracket;
 pub use poses::PoseTrack;
 
 use crate::cameras::head_pose;
@@ -115,6 +115,8 @@ pub struct Moments {
     pub frames: Range<u32>,
     /// Frames per second.
     pub fps: f32,
+    /// Scene time of frame 0, seconds.
+    pub scene_start_s: f64,
 }
 
 impl Moments {
@@ -124,6 +126,7 @@ impl Moments {
         Self {
             frames: 0..frames,
             fps: DEFAULT_FPS,
+            scene_start_s: 0.0,
         }
     }
 
@@ -131,6 +134,12 @@ impl Moments {
     #[must_use]
     pub fn time_s(&self, frame: u32) -> f32 {
         frame as f32 / self.fps
+    }
+
+    /// Scene time of a frame, seconds.
+    #[must_use]
+    pub fn scene_time_s(&self, frame: u32) -> f64 {
+        self.scene_start_s + seconds(self, frame)
     }
 }
 

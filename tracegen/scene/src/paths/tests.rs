@@ -81,6 +81,7 @@ fn the_head_model_starts_at_the_camera_and_stays_within_its_figures() {
     let moments = Moments {
         frames: 0..MAX_FRAMES,
         fps,
+        scene_start_s: 0.0,
     };
     let poses: Vec<Affine3A> = [0, 1, 2, 3, 4, 5]
         .iter()
@@ -148,6 +149,7 @@ fn recorded_poses_are_interpolated_at_the_frames_times() {
     let moments = Moments {
         frames: 0..5,
         fps: 4.0,
+        scene_start_s: 0.0,
     };
     let poses = path.poses(&camera(), &moments).unwrap();
     for (k, pose) in (0u8..).zip(&poses) {
@@ -178,6 +180,7 @@ fn a_path_from_the_camera_takes_its_place_and_heading_and_keeps_its_pitch() {
     let moments = Moments {
         frames: 0..2,
         fps: 1.0,
+        scene_start_s: 0.0,
     };
     let poses = path.poses(&camera, &moments).unwrap();
     close(poses[0].translation, camera.eye);
@@ -201,6 +204,7 @@ fn a_path_and_scene_far_from_zero_give_the_poses_of_those_at_zero() {
     let moments = Moments {
         frames: 0..5,
         fps: 4.0,
+        scene_start_s: 0.0,
     };
     for origin in [PathOrigin::World, PathOrigin::Camera] {
         let [near, far] = [0.0, 1e7].map(|far| {

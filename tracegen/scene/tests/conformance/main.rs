@@ -6,13 +6,14 @@
 mod files;
 mod geometry;
 mod images;
+mod motion;
 mod rows;
 
 use rows::{Row, Status};
 use std::path::Path;
 
 fn all() -> Vec<Row> {
-    [geometry::ROWS, images::ROWS].concat()
+    [geometry::ROWS, motion::ROWS, images::ROWS].concat()
 }
 
 #[test]

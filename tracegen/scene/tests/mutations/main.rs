@@ -71,9 +71,10 @@ fn no_damaged_file_panics_takes_long_or_takes_a_gigabyte() {
 
 type Texels = Vec<Option<Vec<u8>>>;
 
-/// The scene and the texels of all its images.
+/// The scene posed at another time than it was loaded for, and the texels of all its images.
 fn read_all(file: &Path) -> Result<(Loaded, Texels), SceneError> {
-    let loaded = load_file(file, &LoadOptions::ALL)?;
+    let mut loaded = load_file(file, &LoadOptions::ALL)?;
+    loaded.scene.animate(0.625)?;
     let texels = scene::image::texels(&loaded.scene.images, |_| true)?;
     Ok((loaded, texels))
 }

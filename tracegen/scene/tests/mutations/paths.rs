@@ -61,6 +61,7 @@ fn follow(spec: &PathSpec) -> Result<(), SceneError> {
             &Moments {
                 frames: 0..2,
                 fps: 1.0,
+                scene_start_s: 0.0,
             },
         )? {
             assert!(pose.is_finite(), "{pose}");

@@ -9,14 +9,22 @@ pub struct Seed {
     pub weights: Vec<usize>,
 }
 
-pub fn all() -> [Seed; 5] {
+pub fn all() -> [Seed; 6] {
     let (png, jpeg) = (image("png"), image("jpeg"));
     let bytes = buffer();
     let text = gltf(json!("mesh.bin"));
     let inside = gltf(json!(data_uri(&bytes)));
     let mut blocks = gltf(json!("mesh.bin"));
     blocks["images"] = json!([{"uri": "a.ktx2"}, {"uri": "b.ktx2"}]);
+    let (moving, numbers) = animated();
     [
+        Seed {
+            files: vec![
+                ("moving.gltf", moving.to_string().into()),
+                ("numbers.bin", numbers),
+            ],
+            weights: vec![7, 3],
+        },
         Seed {
             files: vec![
                 ("blocks.gltf", blocks.to_string().into()),
@@ -148,6 +156,55 @@ fn gltf(uri: Value) -> Value {
         ],
         "buffers": [{"uri": uri, "byteLength": 236}]
     })
+}
+
+/// A skinned and morphed triangle below a moving node, and its buffer.
+fn animated() -> (Value, Vec<u8>) {
+    let (mut bytes, mut views, mut accessors) = (Vec::new(), Vec::new(), Vec::new());
+    let mut add = |of: &str, kind: u32, count: usize, row: &[u8]| {
+        views.push(json!({"buffer": 0, "byteOffset": bytes.len(), "byteLength": row.len()}));
+        accessors.push(json!({"bufferView": views.len() - 1, "componentType": kind, "type": of, "count": count}));
+        bytes.extend(row);
+        accessors.len() - 1
+    };
+    let floats =
+        |values: &[f32]| -> Vec<u8> { values.iter().flat_map(|v| v.to_le_bytes()).collect() };
+    let corners = floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]);
+    let position = add("VEC3", 5126, 3, &corners);
+    let target = add("VEC3", 5126, 3, &corners);
+    let joints = add("VEC4", 5121, 3, &[0, 1, 0, 0].repeat(3));
+    let weights = add("VEC4", 5126, 3, &floats(&[0.5, 0.5, 0.0, 0.0].repeat(3)));
+    let mut identity = [0.0_f32; 16];
+    identity.iter_mut().step_by(5).for_each(|v| *v = 1.0);
+    let binds = add("MAT4", 5126, 2, &floats(&identity.repeat(2)));
+    let times = add("SCALAR", 5126, 2, &floats(&[0.0, 1.0]));
+    let places = add("VEC3", 5126, 2, &floats(&[0.0, 0.0, 0.0, 1.0, 2.0, 3.0]));
+    let turns = [0.0, 0.0, 0.0, 1.0, 0.0, 0.6, 0.0, 0.8];
+    let turns = add("VEC4", 5126, 6, &floats(&[turns; 3].concat()));
+    let amounts = add("SCALAR", 5126, 2, &floats(&[0.0, 1.0]));
+    let mesh = json!({"primitives": [{"attributes": {"POSITION": position, "JOINTS_0": joints, "WEIGHTS_0": weights},
+        "targets": [{"POSITION": target}]}], "weights": [0.5]});
+    let json = json!({
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0, 2, 3]}],
+        "nodes": [{"children": [1]}, {"translation": [0, 1, 0]}, {"mesh": 0, "skin": 0}, {"mesh": 0, "camera": 0}],
+        "cameras": [{"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}}],
+        "meshes": [mesh],
+        "skins": [{"joints": [0, 1], "inverseBindMatrices": binds}],
+        "animations": [{"samplers": [
+            {"input": times, "output": places}, {"input": times, "output": turns, "interpolation": "CUBICSPLINE"},
+            {"input": times, "output": amounts, "interpolation": "STEP"}, {"input": times, "output": places}
+        ], "channels": [
+            {"sampler": 0, "target": {"node": 1, "path": "translation"}},
+            {"sampler": 1, "target": {"node": 0, "path": "rotation"}},
+            {"sampler": 2, "target": {"node": 2, "path": "weights"}},
+            {"sampler": 3, "target": {"node": 3, "path": "scale"}}
+        ]}],
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"uri": "numbers.bin", "byteLength": bytes.len()}]
+    });
+    (json, bytes)
 }
 
 /// The same scene with everything in one file.

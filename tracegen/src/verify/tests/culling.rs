@@ -291,7 +291,7 @@ fn judge_scene(spec: &str, camera: Option<&str>, count: u32) {
     for views in frames(camera, &hmd, count) {
         // One second per frame, so that cranes move far.
         draws.pose(&scene, views.frame as f32);
-        backend.pose(&draws);
+        backend.pose(&scene, &draws);
         let none = plans(Culling::NONE, false);
         let everything = job(&scene, &draws, &none);
         let truth = {

@@ -56,7 +56,7 @@ fn what_has_moved_looks_as_if_it_had_always_stood_there() {
     for time_s in [0.0, 0.4, 1.3, 0.0] {
         let before = moved.work().bytes_uploaded;
         draws.pose(&scene, time_s);
-        moved.pose(&draws);
+        moved.pose(&scene, &draws);
         // 128 bytes per moving draw, and none for the others.
         let uploaded = moved.work().bytes_uploaded - before;
         assert_eq!(uploaded, 128 * draws.moving.len() as u64);
@@ -80,6 +80,6 @@ fn nothing_is_uploaded_of_a_scene_that_stands_still() {
     let mut draws = DrawList::new(&scene, 0).unwrap();
     let mut backend = backend(&scene, &draws);
     draws.pose(&scene, 1.0);
-    backend.pose(&draws);
+    backend.pose(&scene, &draws);
     assert_eq!(backend.work().bytes_uploaded, 0);
 }
