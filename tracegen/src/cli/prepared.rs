@@ -1,8 +1,7 @@
 //! Prepares a scene for [`crate::study`]: its world, and a device with the uploaded scene.
 
 use super::cache_args::CacheArgs;
-use super::capture_steps::prepare_textures;
-use super::raster;
+use super::capture_steps::{self, prepare_textures};
 use super::scene_args::SceneSetup;
 use crate::study::world::World;
 use ::raster::backend::Fragments;
@@ -42,11 +41,11 @@ pub struct Preparation<'a> {
 /// Unreadable textures, driver errors.
 pub fn prepare(of: Preparation<'_>, setup: SceneSetup, gpu: Gpu) -> anyhow::Result<Prepared> {
     let scene = &setup.scene;
-    let draws = DrawList::new(scene, raster::cascades(scene, of.shadows))?;
+    let draws = DrawList::new(scene, capture_steps::cascades(scene, of.shadows))?;
     let uploads = prepare_textures(scene, |_| Some(0), of.cache.open()?.as_ref())?;
     let size_px = setup.hmd.eye_size_px;
     let backend = Lavapipe::on(gpu, scene, &draws, &uploads, size_px, of.record_budget)?;
-    let tables = raster::tables(
+    let tables = capture_steps::tables(
         &setup,
         of.scene,
         &draws,
@@ -60,7 +59,7 @@ pub fn prepare(of: Preparation<'_>, setup: SceneSetup, gpu: Gpu) -> anyhow::Resu
         draws,
         lighting: Lighting::new(scene),
         bounds,
-        shadow_range_m: raster::shadow_range_m(&setup, bounds),
+        shadow_range_m: capture_steps::shadow_range_m(&setup, bounds),
         lens: of.lens,
         tables,
         fps: of.fps,

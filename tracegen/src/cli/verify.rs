@@ -1,8 +1,8 @@
 //! `tracegen verify`.
 
 use super::cache_args::CacheArgs;
+use super::capture_steps::{cascades, prepare_environment, shadow_range_m, tables};
 use super::path_args::PathArgs;
-use super::raster::{cascades, prepare_environment, shadow_range_m, tables};
 use super::scene_args::{SceneArgs, SceneSetup};
 use crate::verify::frame::{CaptureUnderTest, TileChoice, Verified};
 use crate::verify::report::{Report, SLOTS};
