@@ -17,6 +17,8 @@ l1.size_bytes = ["4KiB"]
 """
 
 COMMANDS = {
+    "info": ["info", "{trace}"],
+    "info, rays": ["info", "{rays}"],
     "run": ["run", "{trace}"],
     "run, all parts": ["run", "{trace}", "--tiles", "--dram", "lpddr4", "--l3", "512KiB", "--prefetch", "next-line"],
     "run, by draw": ["run", "{trace}", "--count-by", "draw", "--mode", "functional"],

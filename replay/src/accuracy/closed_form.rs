@@ -1,8 +1,9 @@
 //! Utilisation from a formula instead of a cycle model.
 
 use super::configurations::{functional, looping};
+use super::figure::{Figure, figure};
 use super::inputs::{Inputs, time_ratio};
-use super::study::{Choice, Figure, Study, StudyError, figure};
+use super::study::{Choice, Study, StudyError};
 use crate::config::TmuModel;
 use crate::result::RunResult;
 use crate::tmu::closed_form;

@@ -1,8 +1,9 @@
 //! Size and time of the tile encodings; they have no effect on accuracy.
 
+use super::figure::{Figure, figure};
 use super::headline::Replayed;
 use super::inputs::{Inputs, time_ratio};
-use super::study::{Choice, Figure, Study, StudyError, figure};
+use super::study::{Choice, Study, StudyError};
 use crate::config::{Mode, RunConfig};
 use crate::stream::TileSource;
 use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as};

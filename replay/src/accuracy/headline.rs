@@ -1,7 +1,7 @@
 //! The headline figures, and the error of one replay's figures against another's.
 
+use super::figure::{Figure, figure};
 use super::stopwatch::Stopwatch;
-use super::study::{Figure, figure};
 use crate::config::{Order, RunConfig};
 use crate::engine::{ReplayError, replay};
 use crate::experiment::Subject;

@@ -8,6 +8,7 @@ mod closed_form;
 mod clusters;
 mod configurations;
 mod encodings;
+mod figure;
 mod headline;
 mod inputs;
 mod interval;
@@ -20,9 +21,10 @@ mod techniques;
 mod testing;
 mod traversal;
 
+pub use figure::Figure;
 pub use headline::{REUSE, Replays, headline_figures};
 pub use inputs::{Inputs, Rays, TraversalRow};
-pub use study::{Choice, Contribution, Figure, Study, StudyError};
+pub use study::{Choice, Contribution, Study, StudyError};
 
 /// Every study, in the order of the page.
 pub static STUDIES: [Study; 15] = [

@@ -1,8 +1,9 @@
 //! Studies of reprojection rules and their thresholds: reuse and image error.
 
+use super::figure::{Figure, figure};
 use super::headline::REUSE;
 use super::inputs::{Inputs, Rays};
-use super::study::{Choice, Contribution, Figure, Study, StudyError, figure};
+use super::study::{Choice, Contribution, Study, StudyError};
 use crate::sgrt::DEFAULT_RULE;
 use crate::sgrt::compose::Reuse;
 use crate::sgrt::config::SgrtConfig;

@@ -1,10 +1,11 @@
 //! Studies of estimating external traffic from some sets, tiles or frames, and of the confidence intervals.
 
 use super::clusters::{Counts, Part, cluster_count, counts, frames};
+use super::figure::{Figure, figure};
 use super::inputs::{Inputs, time_ratio};
 use super::interval::{Judged, drawn, interval, judged, some};
 use super::stopwatch::Stopwatch;
-use super::study::{Choice, Figure, Study, StudyError, figure};
+use super::study::{Choice, Study, StudyError};
 use crate::config::{Mode, Order, RunConfig};
 use crate::experiment::Subject;
 use formats::random::Random;

@@ -1,26 +1,11 @@
 //! Types of a study: choices, each with its time and its error against a reference.
 
+use super::figure::Figure;
 use super::inputs::Inputs;
 use std::error::Error;
 
 /// Reason why a study failed.
 pub type StudyError = Box<dyn Error + Send + Sync>;
-
-/// A figure of a choice.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Figure {
-    /// Key in JSON and CSV.
-    pub key: &'static str,
-    /// Its name.
-    pub name: &'static str,
-    /// Its unit.
-    pub unit: &'static str,
-}
-
-/// Makes a figure.
-pub const fn figure(key: &'static str, name: &'static str, unit: &'static str) -> Figure {
-    Figure { key, name, unit }
-}
 
 /// Source of a headline figure's error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,7 +1,8 @@
 //! Study of rendering techniques, from the measurements of `tracegen techniques`.
 
+use super::figure::{Figure, figure};
 use super::inputs::Inputs;
-use super::study::{Choice, Figure, Study, StudyError, figure};
+use super::study::{Choice, Study, StudyError};
 use crate::result::scene_name;
 use crate::techniques::{Timing, picture_figures};
 

@@ -1,7 +1,8 @@
 //! Study of the precision of the ray traversal, from the measurements of `tracegen precision`.
 
+use super::figure::{Figure, figure};
 use super::inputs::Inputs;
-use super::study::{Choice, Figure, Study, StudyError, figure};
+use super::study::{Choice, Study, StudyError};
 
 const FIGURES: [Figure; 2] = [
     figure("wrong_pct", "rays that hit or miss wrongly", "%"),

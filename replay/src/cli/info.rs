@@ -1,22 +1,22 @@
 //! `replay info`: prints a summary of a trace.
 
-use super::tiles::{ray_tiles, tiles};
+mod json;
+
+#[cfg(test)]
+pub(crate) use json::schema;
+pub use json::to_json;
+
 use crate::report::columns::{Column, Show};
 use crate::report::table::Table;
 use anyhow::Result;
 use formats::Trace;
 use formats::container::Container;
-use formats::raytrace::{RayKind, RayTile, Raytrace, RaytraceTables};
-use formats::textrace::{ChosenTechniques, Encoding, Pass, PassKind, Textrace, TraceMeta};
+use formats::raytrace::{Raytrace, RaytraceTables};
+use formats::textrace::{ChosenTechniques, PassKind, Textrace, TraceMeta};
 use formats::texture::Texture;
-use formats::view::Eye;
-use rayon::prelude::*;
-use serde_json::{Value, json};
+use json::{PassJson, RAY_KINDS, RayCounts, Totals, lower, passes, ray_counts, version};
 use std::path::PathBuf;
 use std::process::ExitCode;
-
-/// Schema of the object that `replay info --json` prints.
-const SCHEMA: &str = "replay.info/2";
 
 /// Arguments of `replay info`.
 #[derive(Clone, Debug, clap::Args)]
@@ -37,136 +37,12 @@ pub struct InfoArgs {
 /// The trace cannot be read.
 pub fn run(args: &InfoArgs) -> Result<ExitCode> {
     let trace = Trace::open(&args.trace)?;
-    let value = to_json(&trace)?;
-    super::print(&if args.json {
-        serde_json::to_string_pretty(&value)?
-    } else {
-        match &trace {
-            Trace::Texture(trace) => texture_text(trace, &value),
-            Trace::Ray(trace) => ray_text(trace)?,
-        }
+    super::print(&match &trace {
+        _ if args.json => serde_json::to_string_pretty(&to_json(&trace)?)?,
+        Trace::Texture(trace) => texture_text(trace)?,
+        Trace::Ray(trace) => ray_text(trace)?,
     })?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// The trace's tables and totals, as `--json` prints them.
-///
-/// # Errors
-/// An unreadable tile.
-pub fn to_json(trace: &Trace) -> Result<Value> {
-    let container = trace.container();
-    let mut value = json!({
-        "schema": SCHEMA,
-        "kind": container.kind().to_string(),
-        "version": version(container),
-        "checksum": format!("{:08x}", trace.content_checksum()),
-        "file_checksum": format!("{:08x}", container.file_checksum()),
-        "file_bytes": container.file_bytes(),
-        "chunks": chunks(container),
-    });
-    match trace {
-        Trace::Texture(trace) => {
-            let tables = trace.tables();
-            value["meta"] = serde_json::to_value(&tables.meta)?;
-            value["totals"] = totals(trace)?;
-            value["passes"] = passes(trace)?;
-            value["textures"] = serde_json::to_value(&tables.textures)?;
-            value["samplers"] = serde_json::to_value(&tables.samplers)?;
-            value["draws"] = serde_json::to_value(&tables.draws)?;
-        }
-        Trace::Ray(trace) => {
-            let tables = trace.tables();
-            let [left, right] = ray_counts(trace)?;
-            value["meta"] = serde_json::to_value(&tables.meta)?;
-            value["totals"] = json!({ "left": left.to_json(), "right": right.to_json() });
-            value["hierarchy"] = serde_json::to_value(&tables.bvh)?;
-            let settings = tables.bvh.settings.iter();
-            value["hierarchy"]["settings"] = settings.map(|(k, v)| (k.clone(), json!(v))).collect();
-            value["materials"] = serde_json::to_value(&tables.materials)?;
-            value["lights"] = serde_json::to_value(&tables.lights)?;
-            value["triangles"] = serde_json::to_value(&tables.triangles)?;
-        }
-    }
-    Ok(value)
-}
-
-fn version(container: &Container) -> String {
-    let (major, minor) = container.version();
-    format!("{major}.{minor}")
-}
-
-fn chunks(container: &Container) -> Vec<Value> {
-    let chunk = |entry: &formats::container::ChunkEntry| {
-        json!({
-            "tag": entry.tag.to_string(),
-            "offset_bytes": entry.offset_bytes,
-            "length_bytes": entry.length_bytes,
-            "crc32": format!("{:08x}", entry.crc32),
-        })
-    };
-    container.directory().iter().map(chunk).collect()
-}
-
-/// Counts of some tiles, read from the index only.
-#[derive(Default)]
-struct Counts {
-    tiles: u64,
-    touched_tiles: u64,
-    records: u64,
-    runs: u64,
-    bytes: u64,
-}
-
-impl Counts {
-    fn of(trace: &Textrace, tiles: impl Iterator<Item = (usize, usize)>) -> Self {
-        let mut counts = Self::default();
-        for (pass, tile) in tiles {
-            let stats = trace.tile_stats(pass, tile);
-            counts.tiles += 1;
-            counts.touched_tiles += u64::from(stats.records > 0);
-            counts.records += u64::from(stats.records);
-            counts.runs += u64::from(stats.runs);
-            counts.bytes += u64::from(stats.bytes);
-        }
-        counts
-    }
-
-    fn to_json(&self) -> Value {
-        json!({
-            "tiles": self.tiles,
-            "touched_tiles": self.touched_tiles,
-            "records": self.records,
-            "runs": self.runs,
-            "tile_bytes": self.bytes,
-            "bytes_per_record": self.bytes as f64 / self.records.max(1) as f64,
-        })
-    }
-}
-
-fn totals(trace: &Textrace) -> Result<Value> {
-    let passes = &trace.tables().passes;
-    let mut value = Counts::of(trace, tiles(passes)).to_json();
-    for encoding in Encoding::ALL {
-        let mut count = 0u64;
-        for (pass, tile) in tiles(passes) {
-            let used = trace.tile_stats(pass, tile).records > 0;
-            count += u64::from(used && trace.tile_encoding(pass, tile)? == encoding);
-        }
-        let name = serde_json::to_value(encoding)?;
-        value["tiles_by_encoding"][name.as_str().unwrap_or_default()] = count.into();
-    }
-    Ok(value)
-}
-
-fn passes(trace: &Textrace) -> Result<Value> {
-    let mut all = Vec::new();
-    for (index, pass) in trace.tables().passes.iter().enumerate() {
-        let mut value = serde_json::to_value(pass)?;
-        let of_pass = (0..pass.tile_count() as usize).map(|tile| (index, tile));
-        value["counts"] = Counts::of(trace, of_pass).to_json();
-        all.push(value);
-    }
-    Ok(all.into())
 }
 
 /// The first lines of the text, for any kind of trace.
@@ -195,8 +71,8 @@ fn heading(container: &Container, meta: &TraceMeta, checksum: u32) -> String {
     )
 }
 
-fn texture_text(trace: &Textrace, value: &Value) -> String {
-    let totals = &value["totals"];
+fn texture_text(trace: &Textrace) -> Result<String> {
+    let totals = Totals::of(trace)?.counts;
     let mut text = heading(
         trace.container(),
         &trace.tables().meta,
@@ -212,11 +88,11 @@ fn texture_text(trace: &Textrace, value: &Value) -> String {
         "\n{} draws, {} samplers; {} records in {} tile bytes, {:.2} bytes per record\n",
         trace.tables().draws.len(),
         trace.tables().samplers.len(),
-        totals["records"],
-        totals["tile_bytes"],
-        totals["bytes_per_record"].as_f64().unwrap_or(0.0),
+        totals.records,
+        totals.tile_bytes,
+        totals.bytes_per_record,
     );
-    text
+    Ok(text)
 }
 
 /// The techniques that the frames were rendered with, and why they were chosen.
@@ -237,33 +113,27 @@ fn count<'a, R>(name: &'static str, value: impl Fn(&R) -> u64 + 'a) -> Column<'a
 }
 
 fn pass_table(trace: &Textrace) -> String {
-    let passes = trace.tables().passes.iter().enumerate();
-    let rows: Vec<(usize, &Pass, Counts)> = passes
-        .map(|(index, pass)| {
-            let of_pass = (0..pass.tile_count() as usize).map(|tile| (index, tile));
-            (index, pass, Counts::of(trace, of_pass))
-        })
-        .collect();
-    type PassRow<'a> = (usize, &'a Pass, Counts);
+    let rows: Vec<(usize, PassJson<'_>)> = passes(trace).into_iter().enumerate().collect();
+    type PassRow<'a> = (usize, PassJson<'a>);
     let columns = [
         count("pass", |r: &PassRow| r.0 as u64),
-        count("frame", |r: &PassRow| r.1.frame.into()),
-        Column::text("kind", "kind", |r: &PassRow| match r.1.kind {
-            PassKind::Layer => format!("layer {}", r.1.layer),
+        count("frame", |r: &PassRow| r.1.pass.frame.into()),
+        Column::text("kind", "kind", |r: &PassRow| match r.1.pass.kind {
+            PassKind::Layer => format!("layer {}", r.1.pass.layer),
             kind => lower(&kind),
         }),
         Column::text("eye", "eye", |r: &PassRow| {
-            r.1.eye.map_or("both".to_owned(), |eye| lower(&eye))
+            r.1.pass.eye.map_or("both".to_owned(), |eye| lower(&eye))
         }),
         Column::text("px", "px", |r: &PassRow| {
-            format!("{}x{}", r.1.size_px[0], r.1.size_px[1])
+            format!("{}x{}", r.1.pass.size_px[0], r.1.pass.size_px[1])
         }),
         Column::text("tiles", "tiles", |r: &PassRow| {
-            format!("{} of {}", r.2.touched_tiles, r.2.tiles)
+            format!("{} of {}", r.1.counts.touched_tiles, r.1.counts.tiles)
         }),
-        count("records", |r: &PassRow| r.2.records),
-        count("runs", |r: &PassRow| r.2.runs),
-        count("bytes", |r: &PassRow| r.2.bytes),
+        count("records", |r: &PassRow| r.1.counts.records),
+        count("runs", |r: &PassRow| r.1.counts.runs),
+        count("bytes", |r: &PassRow| r.1.counts.tile_bytes),
     ];
     Table::new(&columns, &rows).text()
 }
@@ -284,97 +154,6 @@ fn texture_table(textures: &[Texture]) -> String {
         }),
     ];
     Table::new(&columns, &rows).text()
-}
-
-/// Ray and traversal counts of one eye.
-#[derive(Clone, Copy, Default)]
-struct RayCounts {
-    samples: u64,
-    hits: u64,
-    /// By [`RayKind`].
-    rays: [u64; 4],
-    steps: u64,
-    triangle_tests: u64,
-    alpha_tests: u64,
-    visits: u64,
-}
-
-const RAY_KINDS: [RayKind; 4] = [
-    RayKind::Primary,
-    RayKind::Shadow,
-    RayKind::Reflection,
-    RayKind::Refraction,
-];
-
-impl RayCounts {
-    fn of(tile: &RayTile) -> Self {
-        let mut counts = Self {
-            samples: tile.pixels.len() as u64,
-            hits: tile.pixels.iter().filter(|p| p.hit.is_some()).count() as u64,
-            visits: tile.visits.len() as u64,
-            ..Self::default()
-        };
-        for ray in &tile.rays {
-            counts.rays[ray.kind as usize] += 1;
-            counts.steps += u64::from(ray.steps);
-            counts.triangle_tests += u64::from(ray.triangle_tests);
-            counts.alpha_tests += u64::from(ray.alpha_tests);
-        }
-        counts
-    }
-
-    fn add(mut self, other: Self) -> Self {
-        self.samples += other.samples;
-        self.hits += other.hits;
-        self.rays = std::array::from_fn(|kind| self.rays[kind] + other.rays[kind]);
-        self.steps += other.steps;
-        self.triangle_tests += other.triangle_tests;
-        self.alpha_tests += other.alpha_tests;
-        self.visits += other.visits;
-        self
-    }
-
-    fn to_json(self) -> Value {
-        let by_kind = RAY_KINDS.map(|kind| (kind_name(kind), self.rays[kind as usize].into()));
-        json!({
-            "samples": self.samples,
-            "hits": self.hits,
-            "rays": serde_json::Map::from_iter(by_kind),
-            "steps": self.steps,
-            "triangle_tests": self.triangle_tests,
-            "alpha_tests": self.alpha_tests,
-            "visits": self.visits,
-        })
-    }
-}
-
-fn kind_name(kind: RayKind) -> String {
-    lower(&kind)
-}
-
-/// Name of a variant as the tables write it.
-fn lower(variant: &impl std::fmt::Debug) -> String {
-    format!("{variant:?}").to_lowercase()
-}
-
-/// Counts of the left and of the right eye; decodes every tile.
-fn ray_counts(trace: &Raytrace) -> Result<[RayCounts; 2]> {
-    let tiles: Vec<(Eye, u32)> = ray_tiles(trace.tables()).collect();
-    let of_tiles: Vec<RayCounts> = tiles
-        .par_iter()
-        .map_init(RayTile::default, |tile, (eye, index)| {
-            trace.decode_tile(*eye, *index, tile)?;
-            Ok(RayCounts::of(tile))
-        })
-        .collect::<formats::Result<_>>()?;
-    let of_eye = |wanted| {
-        let own = tiles
-            .iter()
-            .zip(&of_tiles)
-            .filter(|((eye, _), _)| *eye == wanted);
-        own.fold(RayCounts::default(), |sum, (_, counts)| sum.add(*counts))
-    };
-    Ok([Eye::Left, Eye::Right].map(of_eye))
 }
 
 fn ray_text(trace: &Raytrace) -> Result<String> {
@@ -416,8 +195,8 @@ fn ray_text(trace: &Raytrace) -> Result<String> {
     for kind in RAY_KINDS {
         let rays = move |r: &EyeRow| r.1.rays[kind as usize];
         columns.push(Column::new(
-            kind_name(kind),
-            kind_name(kind),
+            lower(&kind),
+            lower(&kind),
             "",
             Show::Whole,
             rays,
@@ -471,7 +250,7 @@ mod tests {
         let Trace::Texture(textures) = &trace else {
             panic!("a texture trace");
         };
-        let text = texture_text(textures, &to_json(&trace).unwrap());
+        let text = texture_text(textures).unwrap();
         for texture in &memory.tables.textures {
             assert!(text.contains(&texture.name), "{text}");
         }

@@ -1,8 +1,8 @@
 //! Caches of any policy without latencies: a miss fills immediately.
 
-use super::batch::Outcome;
 use super::counts::{CacheCounts, FootprintMisses};
-use super::{AtOnce, Machine};
+use super::machine::{AtOnce, Machine};
+use super::outcome::Outcome;
 use crate::access::FrameClients;
 use crate::config::{Assign, RunConfig};
 use crate::memory::{Cache, Hierarchy, OtherWork};

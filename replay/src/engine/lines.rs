@@ -1,8 +1,8 @@
 //! Replays plain addresses, without tiles and time, through the caches of many configurations.
 
-use super::AtOnce;
-use super::batch::{Group, groups};
 use super::counts::Misses;
+use super::group::{Group, groups};
+use super::machine::AtOnce;
 use crate::config::{ConfigError, Mode, PrefetchConfig, RunConfig, accept};
 use crate::result::MemoryResult;
 use crate::stream::{Bins, Tag};

@@ -1,9 +1,10 @@
 //! Runs the groups of a stream, frame by frame.
 
-use super::batch::{Group, Job};
+use super::error::{ReplayError, check_other_work};
+use super::group::Group;
+use super::machine::Machine;
 use super::scheduler::Stage;
 use super::summary::summary;
-use super::{Machine, ReplayError, check_other_work};
 use crate::config::{BetweenFrames, Order, RunConfig, TmuModel};
 use crate::memory::OtherWork;
 use crate::order::parts::Eyes;
@@ -14,6 +15,17 @@ use formats::textrace::TraceMeta;
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A trace and the configurations to replay it with.
+#[derive(Clone, Copy)]
+pub struct Job<'a> {
+    /// The trace.
+    pub trace: &'a dyn TileSource,
+    /// The configurations.
+    pub configs: &'a [RunConfig],
+    /// Called with the index of a configuration and its result as soon as that is complete.
+    pub finished: &'a (dyn Fn(usize, RunResult) + Sync),
+}
 
 /// Groups that read the same lines, and what they need.
 pub(super) struct Wave<'a> {

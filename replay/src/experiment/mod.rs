@@ -7,6 +7,7 @@
 
 mod calibration;
 mod file;
+mod keys;
 mod outcome;
 mod plan;
 mod rows;

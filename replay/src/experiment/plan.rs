@@ -1,6 +1,6 @@
 //! Points, and where they come from.
 
-use super::file::{parsed, set};
+use super::keys::{parsed, set};
 use crate::config::{Mode, Order, RunConfig};
 use crate::preset::Preset;
 use serde::{Deserialize, Serialize};

@@ -1,14 +1,11 @@
-//! The interface of all caches, and caches of any policy and organisation.
+//! The interface of all caches.
 //!
 //! Lines are identified by number (address over line size). An access takes two steps, because a
 //! missing line is filled only after the miss penalty: [`Cache::lookup`] when it is requested,
 //! [`Cache::fill`] when it arrives.
 
-use super::policy::{FourWayLru, Geometry, lru};
-use super::sectored::Sectored;
-use super::victim::WithVictimCache;
-use super::watched::Watched;
-use crate::config::{ConfigError, LevelConfig};
+/// Tag of an empty way; no line has this number.
+pub(super) const EMPTY: u32 = u32::MAX;
 
 /// A cache of whole lines. Its state after a series of look-ups depends only on the order of the
 /// last look-up of each resident line, so earlier look-ups need no simulation.
@@ -90,62 +87,9 @@ impl Cache for Box<dyn Cache> {
     }
 }
 
-/// A cache of any policy. The most common kind keeps its concrete type, so that replays can be compiled for it.
-pub enum AnyCache {
-    /// Four-way LRU.
-    FourWayLru(FourWayLru),
-    /// Any other cache.
-    Other(Box<dyn Cache>),
-}
-
-pub(super) fn boxed(cache: impl Cache + 'static) -> AnyCache {
-    AnyCache::Other(Box::new(cache))
-}
-
-impl AnyCache {
-    /// An empty LRU cache; `sets` is a power of two.
-    #[must_use]
-    pub fn lru(sets: u32, ways: u32) -> Self {
-        lru(sets, ways)
-    }
-
-    /// Builds a cache.
-    ///
-    /// # Errors
-    /// An impossible geometry, reported with `level`.
-    pub fn build(
-        config: &LevelConfig,
-        level: &'static str,
-        line_bytes: u32,
-        seed: u64,
-    ) -> Result<Self, ConfigError> {
-        let geometry = Geometry {
-            sets: config.sets(level, line_bytes)?,
-            ways: config.ways,
-            seed,
-        };
-        let mut cache = config.replacement.build(geometry);
-        if config.victim_lines > 0 {
-            cache = boxed(WithVictimCache::new(cache.into_box(), config.victim_lines));
-        }
-        if config.sectors > 1 {
-            cache = boxed(Sectored::new(cache.into_box(), config.sectors));
-        }
-        Ok(cache)
-    }
-
-    /// Wraps the cache so that it records the lines it evicts.
-    #[must_use]
-    pub(super) fn watched(self) -> Self {
-        boxed(Watched::new(self.into_box()))
-    }
-
-    /// Boxes the cache, whatever its kind.
-    #[must_use]
-    pub fn into_box(self) -> Box<dyn Cache> {
-        match self {
-            Self::FourWayLru(cache) => Box::new(cache),
-            Self::Other(cache) => cache,
-        }
-    }
+/// Empties the way that holds a line, and returns its index.
+pub(super) fn empty_way(tags: &mut [u32], line: u32) -> Option<usize> {
+    let way = tags.iter().position(|&tag| tag == line)?;
+    tags[way] = EMPTY;
+    Some(way)
 }

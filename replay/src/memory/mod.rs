@@ -10,6 +10,7 @@
 //! | `fast/` | accelerated LRU caches, which tests hold equal to the plain ones |
 
 mod access;
+mod build;
 mod cache;
 pub mod dram;
 mod fast;
@@ -22,14 +23,12 @@ mod victim;
 mod watched;
 
 pub use access::{Access, Client};
-pub use cache::{AnyCache, Cache};
+pub use cache::Cache;
 pub use fast::Forest;
 pub use hierarchy::{Answer, Caches, Found, Hierarchy, MissPath, OtherWork, SecondLevel};
 pub use in_flight::{AllocateOnMiss, Delay, DelayedFill, NOT_IN_FLIGHT};
-pub use policy::{AnyWays, FourWayLru, Lru, MakePolicy, Policy, Replacement, WaysOf};
+pub use policy::{AnyCache, AnyWays, FourWayLru, Lru, MakePolicy, Policy, Replacement, WaysOf};
 pub use prefetch::Prefetching;
-
-use policy::EMPTY;
 
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 //! A sectored cache: a tag covers an aligned group of lines (sectors), and a miss fetches one of
 //! them. It needs fewer tags for the same capacity, but unused sectors waste space.
 
-use super::{Cache, EMPTY};
+use super::cache::{Cache, EMPTY};
 use std::collections::HashMap;
 
 /// A cache whose tags each cover several lines.

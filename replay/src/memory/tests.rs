@@ -1,3 +1,4 @@
+use super::cache::EMPTY;
 use super::*;
 use crate::config::{Inclusion, LevelConfig, Levels, RunConfig};
 use proptest::prelude::*;

@@ -4,7 +4,7 @@
 //! The swap is delayed until the next fill. Until then the line stays where it is, so that only the
 //! last of several look-ups of a line matters, as for every cache here.
 
-use super::{Cache, EMPTY};
+use super::cache::{Cache, EMPTY};
 
 /// A cache and its victim cache.
 pub(super) struct WithVictimCache {

@@ -1,6 +1,6 @@
 //! A cache that records the lines it evicts, for levels that depend on them.
 
-use super::{Cache, EMPTY};
+use super::cache::{Cache, EMPTY};
 
 /// A cache and its recorded evictions.
 pub(super) struct Watched {

@@ -3,6 +3,7 @@
 //! A row type lists its columns once ([`Row`]); the terminal table, the page's table and CSV
 //! ([`Table`](super::table::Table)) and the JSON object ([`Record`]) walk that list.
 
+use crate::experiment::ResultRow;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use std::borrow::Cow;
 
@@ -378,6 +379,14 @@ pub(crate) fn headings<R>(columns: &[Column<'_, R>]) -> Vec<Heading> {
         .iter()
         .map(|column| column.heading.clone())
         .collect()
+}
+
+/// A column of point results.
+pub type Figure<'a> = Column<'static, ResultRow<'a>>;
+
+/// `part / whole`, or `None` if the whole is zero.
+pub(super) fn over(part: u64, whole: u64) -> Option<f64> {
+    (whole > 0).then(|| part as f64 / whole as f64)
 }
 
 #[cfg(test)]

@@ -1,8 +1,7 @@
 //! Columns that identify a row in any file: trace, image size, and every configuration key. Rows of several
 //! files can be joined by them.
 
-use super::columns::Value;
-use super::figures::Figure;
+use super::columns::{Figure, Value};
 use crate::config::{LevelConfig, RunConfig};
 use crate::experiment::{ResultRow, plain, scene_label};
 use crate::model_version::MODEL_VERSION;

@@ -1,15 +1,12 @@
 //! The figures of a replayed point, one per line. Every table, file and chart takes them from here.
 
-use super::columns::{Column, Row, Show, pick};
+use super::columns::{Column, Figure, Row, Show, over, pick};
 use super::{config_columns, memory_columns};
 use crate::experiment::ResultRow;
 use crate::result::ClientTraffic;
 use crate::result::{Part, RunResult};
 use crate::tmu::closed_form;
 use formats::texture::TexelFormat;
-
-/// A column of point results.
-pub type Figure<'a> = Column<'static, ResultRow<'a>>;
 
 /// Columns that identify a point: the trace, the axes of the Z2 paper's experiment, and the whole
 /// configuration.
@@ -243,11 +240,6 @@ fn product_saved_pct(row: &ResultRow) -> Option<f64> {
 fn saved_pct(result: &RunResult, morton: &RunResult) -> Option<f64> {
     let rest = over(result.external_bytes, morton.external_bytes)?;
     Some(100.0 * (1.0 - rest))
-}
-
-/// `part / whole`, or `None` if the whole is zero.
-pub(super) fn over(part: u64, whole: u64) -> Option<f64> {
-    (whole > 0).then(|| part as f64 / whole as f64)
 }
 
 #[cfg(test)]

@@ -1,7 +1,6 @@
 //! Columns of the prefetcher, the MSHRs, the levels below the L2 and DRAM.
 
-use super::columns::Column;
-use super::figures::over;
+use super::columns::{Column, over};
 use crate::result::MemoryResult;
 
 /// Every figure of the memory system. Figures of parts that a configuration lacks are empty.

@@ -1,9 +1,9 @@
 //! A sweep's results: rows, table, CSV and page.
 
 use super::answers;
-use super::columns::{Column, Records};
+use super::columns::{Column, Figure, Records};
 use super::config_columns;
-use super::figures::{Figure, figure, figures, number};
+use super::figures::{figure, figures, number};
 use super::html::{self, Answer, Section, folded};
 use super::plots::bars::{BarChart, BarGroup};
 use super::plots::hbars::HBarChart;

@@ -1,40 +1,17 @@
 //! The JSON Schemas in `schemas/`, derived from the types that the commands print. `UPDATE_SCHEMAS=1 cargo test -p
 //! replay schemas` rewrites the files.
 
+mod published;
 mod types;
 
+pub(crate) use published::Published;
 pub(crate) use types::{Layout, Meta, Sampling};
 
 use crate::report::columns::{Heading, Kind};
-use crate::{experiment, report};
-use schemars::generate::SchemaSettings;
-use schemars::{JsonSchema, Schema};
+use crate::{cli, experiment, report};
 use serde_json::{Map, Value, json};
-use std::path::{Path, PathBuf};
-use std::{env, fs};
-
-/// A document with its schema.
-pub(crate) struct Published {
-    /// Name and version, as in the document's key `schema`.
-    name: &'static str,
-    schema: Schema,
-}
 
 impl Published {
-    /// The schema of a type.
-    pub(crate) fn of<T: JsonSchema>(name: &'static str) -> Self {
-        let settings = SchemaSettings::draft2020_12().for_serialize();
-        let mut schema = settings.into_generator().into_root_schema_for::<T>();
-        schema.insert("title".to_owned(), name.into());
-        schema.remove("description");
-        schema.insert("properties".to_owned(), {
-            let mut properties = schema.get("properties").cloned().unwrap_or_default();
-            properties["schema"] = json!({ "const": name });
-            properties
-        });
-        Self { name, schema }
-    }
-
     /// Describes the rows of an array by their columns.
     pub(crate) fn rows(mut self, key: &str, headings: &[Heading]) -> Self {
         let properties = self.schema.get_mut("properties").expect("an object");
@@ -85,6 +62,7 @@ fn row(headings: &[Heading]) -> Value {
 
 fn all() -> Vec<Published> {
     vec![
+        cli::info::schema(),
         report::run::schema(),
         report::run::modes_schema(),
         report::addresses::schema(),
@@ -103,47 +81,7 @@ fn all() -> Vec<Published> {
     ]
 }
 
-fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../schemas")
-}
-
-/// `replay.run/2` is in `schemas/replay.run-2.json`.
-fn file(name: &str) -> String {
-    format!("{}.json", name.replace('/', "-"))
-}
-
 #[test]
 fn published_schemas_equal_those_of_the_types() {
-    let update = env::var_os("UPDATE_SCHEMAS").is_some();
-    let mut expected: Vec<String> = Vec::new();
-    for Published { name, schema } in all() {
-        let path = folder().join(file(name));
-        let text = serde_json::to_string_pretty(&schema).unwrap() + "\n";
-        if update {
-            fs::write(&path, &text).unwrap();
-        }
-        let found = fs::read_to_string(&path).unwrap_or_default();
-        assert!(
-            found == text,
-            "{} differs from the types: run with UPDATE_SCHEMAS=1 and raise the version if a key changed",
-            path.display()
-        );
-        expected.push(file(name));
-    }
-    let found = fs::read_dir(folder()).unwrap();
-    for entry in found {
-        let name = entry.unwrap().file_name().into_string().unwrap();
-        assert!(
-            !name.starts_with("replay.") || expected.contains(&name),
-            "schemas/{name}: no document has this schema"
-        );
-    }
-}
-
-#[test]
-fn names_are_unique() {
-    let mut names: Vec<&str> = all().iter().map(|p| p.name).collect();
-    names.sort_unstable();
-    names.dedup();
-    assert_eq!(names.len(), all().len());
+    published::assert_published("replay", &all());
 }

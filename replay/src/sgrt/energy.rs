@@ -1,35 +1,8 @@
 //! Energy of a frame by component. Only ratios between two runs of this model are meaningful.
 
 use super::config::SgrtConfig;
-use super::hardware::Run;
+use super::run::{EnergyPj, Run};
 use formats::raytrace::BvhSummary;
-use serde::{Deserialize, Serialize};
-
-/// Energy by component in picojoules.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct EnergyPj {
-    /// Steps, tests and ray transfers of the fixed-function units.
-    pub tni_pj: f64,
-    /// Kernels.
-    pub srp_pj: f64,
-    /// Node and triangle caches.
-    pub caches_pj: f64,
-    /// Tile buffers.
-    pub sram_pj: f64,
-    /// External memory.
-    pub dram_pj: f64,
-    /// Static power over the frame's time.
-    pub static_pj: f64,
-}
-
-impl EnergyPj {
-    /// Sum of all components.
-    #[must_use]
-    pub fn total(&self) -> f64 {
-        self.tni_pj + self.srp_pj + self.caches_pj + self.sram_pj + self.dram_pj + self.static_pj
-    }
-}
 
 /// Energy of a run.
 #[must_use]

@@ -9,42 +9,18 @@ use super::compose::Reuse;
 use super::config::SgrtConfig;
 use super::detect::Decision;
 use super::dram::DramBytes;
-use super::energy::{self, EnergyPj};
+use super::energy;
 use super::frame::{Frame, FrameError, RaySource};
 use super::gbuffer::{self, Keeping, RightTile, Traffic};
 use super::reads::Reads;
 use super::rows::RowNeeds;
-use super::srp::{self, SrpCycles};
-use super::tni::{self, TniCycles};
+use super::run::Run;
+use super::srp;
+use super::tni;
 use super::work::{BatchWork, RayClass};
 use formats::raytrace::{RayTile, Visit};
 use formats::view::Eye;
 use rayon::prelude::*;
-
-/// One way of rendering the frame.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Run {
-    /// Work of all batches.
-    pub work: BatchWork,
-    /// Misses of all batches.
-    pub misses: Misses,
-    /// Unit cycles by resource, summed over batches.
-    pub tni: TniCycles,
-    /// Unit cycles: those of the scarcest resource of each batch, summed.
-    pub tni_cycles: f64,
-    /// Kernel cycles.
-    pub srp: SrpCycles,
-    /// Bytes read from and written to the tile buffers.
-    pub on_chip_bytes: u64,
-    /// Bytes read from and written to external memory.
-    pub dram: DramBytes,
-    /// Time of the frame.
-    pub time_ns: f64,
-    /// Time during which batches wait for external memory.
-    pub memory_bound_ns: f64,
-    /// Energy by component.
-    pub energy: EnergyPj,
-}
 
 /// The frame rendered in three ways, with the right eye's share.
 #[derive(Clone, Copy, Debug, Default)]
@@ -59,20 +35,6 @@ pub struct Comparison {
     pub right_full_tni_cycles: f64,
     /// Unit cycles of the right eye with reprojection.
     pub right_tni_cycles: f64,
-}
-
-impl Run {
-    /// Frames per second relative to another run.
-    #[must_use]
-    pub fn performance_over(&self, reference: &Self) -> f64 {
-        reference.time_ns / self.time_ns
-    }
-
-    /// Energy relative to another run.
-    #[must_use]
-    pub fn energy_over(&self, reference: &Self) -> f64 {
-        self.energy.total() / reference.energy.total()
-    }
 }
 
 impl Comparison {

@@ -31,6 +31,7 @@ pub mod reproject;
 pub mod result;
 pub mod rows;
 pub mod rules;
+pub mod run;
 pub mod srp;
 pub mod tni;
 pub mod variations;

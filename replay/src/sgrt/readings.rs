@@ -6,9 +6,10 @@ use super::compose::Reuse;
 use super::config::SgrtConfig;
 use super::detect::decide;
 use super::frame::FrameError;
-use super::hardware::{Comparison, Run, tile_work};
+use super::hardware::{Comparison, tile_work};
 use super::loaded::LoadedTrace;
 use super::rules::Rule;
+use super::run::Run;
 use serde::Serialize;
 
 /// What performance and energy are measured of ("for the T&I unit", section IV).

@@ -1,6 +1,7 @@
 //! Counts of a trace's accesses, which are the same for every order and every cache.
 
-use super::{StreamError, Tag};
+use super::StreamError;
+use super::tag::Tag;
 use crate::config::CountBy;
 use crate::order::TileRef;
 use formats::textrace::Tables;

@@ -8,7 +8,8 @@
 use super::distinct::Distinct;
 use super::footprint::{Bundle, Footprints, SampleRef, Scratch};
 use super::last_used::LastUsed;
-use super::lines::{QuadEnd, QuadRun, Tag, TileLines};
+use super::lines::{QuadEnd, QuadRun, TileLines};
+use super::tag::Tag;
 use super::{Bins, LineSet, StreamError, TileAccesses, TileSource, TraceCounts, feed};
 use crate::config::RunConfig;
 use crate::order::TileRef;

@@ -1,58 +1,8 @@
 //! The quads of a tile as lines, which every order, cache and clock reads instead of the trace.
 
 use super::counts::TileBins;
-use super::distinct::Use;
+use super::tag::{FOOTPRINTS, Tag, Use};
 use crate::order::Interleave;
-
-/// The owner of a line: its footprint's cell within the view and, on a footprint's first line, the number
-/// of repeats that follow. It fits one word, so that lines and tags are two plain lists.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Tag(u32);
-
-impl Tag {
-    /// Number of cells per view that a tag can address.
-    pub const CELLS: usize = 1 << 29;
-    const FIRST: u32 = 1 << 31;
-    const REPEATS_SHIFT: u32 = 29;
-
-    /// Tags of a footprint's first line and of its other lines.
-    #[inline(always)]
-    pub(super) fn of_footprint(cell: u32, repeats: u32) -> [Self; 2] {
-        let other = cell & (Self::CELLS as u32 - 1);
-        [
-            Self(other | repeats << Self::REPEATS_SHIFT | Self::FIRST),
-            Self(other),
-        ]
-    }
-
-    /// The tag of a footprint of one line.
-    #[must_use]
-    pub fn of_line(cell: u32) -> Self {
-        let [first, _] = Self::of_footprint(cell, 0);
-        first
-    }
-
-    /// True for a footprint's first line.
-    #[inline(always)]
-    #[must_use]
-    pub fn is_first(self) -> bool {
-        self.0 & Self::FIRST != 0
-    }
-
-    /// On a footprint's first line: how often the same lines are looked up again (0 to 3).
-    #[inline(always)]
-    #[must_use]
-    pub fn repeats(self) -> u32 {
-        (self.0 & !Self::FIRST) >> Self::REPEATS_SHIFT
-    }
-
-    /// Cell within the view.
-    #[inline(always)]
-    #[must_use]
-    pub fn cell(self) -> u32 {
-        self.0 & (Self::CELLS as u32 - 1)
-    }
-}
 
 /// A primitive's quads in a tile: from the end of the previous primitive to `end`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -334,6 +284,29 @@ impl<'a> QuadLines<'a> {
             end += 1;
         }
         end
+    }
+
+    /// True if all footprints fit into one segment.
+    #[inline(always)]
+    #[must_use]
+    pub fn is_one_segment(&self) -> bool {
+        self.footprints <= FOOTPRINTS
+    }
+
+    /// End of each segment's distinct lines.
+    #[inline(always)]
+    pub fn segments(self) -> impl Iterator<Item = usize> + use<'a> {
+        let mut start = 0;
+        std::iter::from_fn(move || {
+            let uses = &self.uses[start..];
+            start += if self.is_one_segment() && !uses.is_empty() {
+                // All footprints fit into one segment.
+                uses.len()
+            } else {
+                1 + uses.iter().position(|of| of.ends_segment())?
+            };
+            Some(start)
+        })
     }
 
     /// The listed footprints, in order.

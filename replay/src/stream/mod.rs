@@ -21,18 +21,19 @@ mod lines;
 mod regroup;
 mod source;
 pub mod synthetic;
+mod tag;
 #[cfg(test)]
 pub mod testing;
 
 pub use cores::Cores;
 pub use counts::{Bins, Cell, CellAccesses, TileAccesses, TraceCounts};
-pub use distinct::Use;
 pub use error::StreamError;
 pub use expand::{Expander, Frame, LineMemory};
 pub use feed::{Quad, for_quads};
 pub use hsr::{Shaded, shaded};
 pub use interleave::{Consumer, furthest_behind, interleave};
 pub use line_set::LineSet;
-pub use lines::{Footprint, ListEntry, Listed, QuadLines, Tag, TileLines, interleaved};
+pub use lines::{Footprint, ListEntry, Listed, QuadLines, TileLines, interleaved};
 pub use regroup::{Rendered, rendered};
 pub use source::{MemoryTrace, TileSource};
+pub use tag::{Tag, Use};

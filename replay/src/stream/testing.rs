@@ -2,7 +2,8 @@
 
 use super::MemoryTrace;
 use super::counts::TileBins;
-use super::lines::{QuadEnd, Tag, TileLines};
+use super::lines::{QuadEnd, TileLines};
+use super::tag::Tag;
 use formats::textrace::{
     Draw, Pass, PassKind, PrimitiveRun, QuadRecord, SUBTEXELS, Sample, Tables, Tile, TraceMeta,
     UvGroup,

@@ -26,7 +26,7 @@ impl CacheArgs {
     pub fn open(self) -> anyhow::Result<Option<Cache>> {
         let limit = match env::var("PARALLAX_CACHE_SIZE") {
             Ok(text) if text == "0" => 0,
-            Ok(text) => super::raster::parse_bytes(&text)
+            Ok(text) => super::values::parse_bytes(&text)
                 .map_err(anyhow::Error::msg)
                 .context("PARALLAX_CACHE_SIZE")?,
             Err(_) => DEFAULT_BYTES,

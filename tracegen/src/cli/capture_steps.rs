@@ -1,20 +1,23 @@
 //! Steps that several commands take to capture a scene.
 
-use super::raster::RasterArgs;
+use super::raster_args::RasterArgs;
 use super::scene_args::SceneSetup;
 use crate::picture;
 use crate::study::world::Tracer;
 use anyhow::Context;
 use formats::container::AtomicFile;
-use formats::textrace::{Tables, TextraceWriter};
-use raster::backend::CaptureBackend;
+use formats::textrace::{Pass, Tables, TextraceWriter, TraceMeta};
+use raster::backend::{CaptureBackend, Fragments};
 use raster::capture::Pictures;
 use raster::draws::DrawList;
 use raster::geometry::geometry;
 use scene::{LoadOptions, Scene};
-use shell::Output;
+use shell::{Output, lasting_arguments};
 use std::path::Path;
 use textures::{Cache, TextureSet};
+
+/// Cascades that `--shadows` adds (Z2 paper section 4.1).
+const CASCADES: u32 = 4;
 
 /// Loads the scene and the path of `tracegen raster`.
 pub fn load(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<SceneSetup> {
@@ -91,5 +94,74 @@ impl<'a> TraceOutput<'a> {
             image.persist().with_context(|| cannot_write(path))?;
         }
         Ok(file_bytes)
+    }
+}
+
+/// Shadow cascades of a scene, or the cascades that `--shadows` adds.
+pub(super) fn cascades(scene: &Scene, shadows: bool) -> u32 {
+    if shadows {
+        CASCADES
+    } else {
+        scene.shadow_cascades.min(CASCADES)
+    }
+}
+
+/// The tables of a trace of the scene's frames that records `fragments`.
+pub(super) fn tables(
+    setup: &SceneSetup,
+    spec: &str,
+    draws: &DrawList,
+    uploads: &TextureSet,
+    backend: &dyn CaptureBackend,
+    passes: Vec<Pass>,
+    fragments: Fragments,
+) -> Tables {
+    let textures = draws.textures(uploads);
+    let (samplers, draw_table) = draws.tables(&setup.scene, uploads, &textures);
+    Tables {
+        meta: TraceMeta {
+            tool: super::tool(),
+            command_line: lasting_arguments(std::env::args_os().skip(1)),
+            scene: spec.into(),
+            scene_triangles: setup.scene.triangle_count(),
+            camera: setup.camera.name.clone(),
+            backend: backend.name().into(),
+            driver: backend.driver().into(),
+            seed: 0,
+            hmd: setup.hmd.clone(),
+            frames: setup.frames.clone(),
+            surfaces: Some(draws.surfaces(fragments)),
+            origin_m: setup.scene.origin.to_array(),
+            techniques: None,
+            program: None,
+        },
+        textures,
+        samplers,
+        draws: draw_table,
+        passes,
+    }
+}
+
+/// Sets the environment variables that Mesa reads.
+pub(super) fn prepare_environment(threads: Option<u16>) {
+    // SAFETY: the only other thread waits for signals; nothing reads the environment meanwhile.
+    unsafe {
+        // Mesa's device selection tries to connect to a display server, and prints errors if there is none.
+        std::env::set_var("NODEVICE_SELECT", "1");
+        // At narrow vectors Mesa 22.3 corrupts memory where the processor has AVX2, and on some that have AVX.
+        let set = |name: &str| std::env::var_os(name);
+        if set("LP_NATIVE_VECTOR_WIDTH").is_some_and(|bits| bits == "128")
+            && set("GALLIUM_OVERRIDE_CPU_CAPS").is_none()
+        {
+            std::env::set_var("GALLIUM_OVERRIDE_CPU_CAPS", "sse4.1");
+        }
+        // softpipe provides all features of OpenGL 4.5 that the capture needs, as extensions of 3.3.
+        if set("GALLIUM_DRIVER").is_some_and(|driver| driver == "softpipe") {
+            std::env::set_var("MESA_GL_VERSION_OVERRIDE", "4.5");
+            std::env::set_var("MESA_GLSL_VERSION_OVERRIDE", "450");
+        }
+        if let Some(threads) = threads {
+            std::env::set_var("LP_NUM_THREADS", threads.to_string());
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Flags for the lenses.
 
-use super::technique_args::numbers;
+use super::values::numbers;
 use anyhow::{bail, ensure};
 use clap::Args;
 use formats::view::{Hmd, Lens};

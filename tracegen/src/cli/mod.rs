@@ -13,6 +13,7 @@ pub mod precision;
 mod prepared;
 mod program_args;
 pub mod raster;
+mod raster_args;
 mod raster_auto;
 mod raster_frames;
 mod raster_summary;
@@ -23,6 +24,7 @@ pub mod stress;
 pub mod sweep;
 mod technique_args;
 pub mod techniques;
+mod values;
 pub mod verify;
 
 use clap::{Parser, Subcommand};
@@ -56,7 +58,7 @@ enum Command {
     /// List the built-in scenes, or the cameras and contents of a file.
     Scenes(scenes::ScenesArgs),
     /// Render a stereo frame and capture its texture samples into a .textrace file.
-    Raster(Box<raster::RasterArgs>),
+    Raster(Box<raster_args::RasterArgs>),
     /// Capture the texture samples of an unmodified Vulkan or OpenGL program into a .textrace file.
     App(Box<app::AppArgs>),
     /// Capture the texture samples of a page of WebGL or WebXR in Chromium into a .textrace file.

@@ -2,7 +2,6 @@
 
 use super::cache_args::CacheArgs;
 use super::capture_steps::prepare_textures;
-use super::raster;
 use super::scene_args::SceneSetup;
 use crate::study::world::{World, shadow_range_m};
 use ::raster::backend::Fragments;
@@ -42,11 +41,11 @@ pub struct Preparation<'a> {
 /// Unreadable textures, driver errors.
 pub fn prepare(of: Preparation<'_>, setup: SceneSetup, gpu: Gpu) -> anyhow::Result<Prepared> {
     let scene = &setup.scene;
-    let draws = DrawList::new(scene, raster::cascades(scene, of.shadows))?;
+    let draws = DrawList::new(scene, capture_steps::cascades(scene, of.shadows))?;
     let uploads = prepare_textures(scene, |_| Some(0), of.cache.open()?.as_ref())?;
     let size_px = setup.hmd.eye_size_px;
     let backend = Lavapipe::on(gpu, scene, &draws, &uploads, size_px, of.record_budget)?;
-    let tables = raster::tables(
+    let tables = capture_steps::tables(
         &setup,
         of.scene,
         &draws,

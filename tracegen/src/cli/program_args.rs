@@ -1,7 +1,7 @@
 //! Options and steps that `app` and `page` share.
 
 use super::choice::choice;
-use super::raster::{encoding_parser, parse_bytes};
+use super::values::{encoding_parser, parse_bytes};
 use anyhow::Context;
 use clap::Args;
 use clap::builder::TypedValueParser;

@@ -3,7 +3,7 @@
 
 use super::capture_steps::{TraceOutput, load, warn_of_multiview_defect};
 use super::prepared::{Preparation, Prepared, prepare};
-use super::raster::RasterArgs;
+use super::raster_args::RasterArgs;
 use super::scene_args::warn_of_nothing_seen;
 use crate::study::auto::{Budget, Known, Objective, Schedule, choose, search_frames};
 use crate::study::world::World;

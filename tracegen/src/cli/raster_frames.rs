@@ -1,7 +1,9 @@
 //! `tracegen raster` with the techniques of its options: plans, prepares, captures, compares and prints.
 
-use super::capture_steps::{TraceOutput, load, prepare_textures, warn_of_multiview_defect};
-use super::raster::{RasterArgs, cascades, tables};
+use super::capture_steps::{
+    TraceOutput, cascades, load, prepare_textures, tables, warn_of_multiview_defect,
+};
+use super::raster_args::RasterArgs;
 use super::raster_summary::{Summary, worked_since};
 use super::scene_args::SceneSetup;
 use crate::study::processor;

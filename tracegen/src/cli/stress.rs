@@ -31,7 +31,7 @@ fn names() -> clap::builder::PossibleValuesParser {
 /// # Errors
 /// A folder that cannot be written.
 pub fn run(args: &StressArgs) -> anyhow::Result<ExitCode> {
-    super::raster::prepare_environment(None);
+    super::capture_steps::prepare_environment(None);
     shell::Threads::default().start()?;
     shell::check_folder("--output", &args.output)?;
     let [json_file, markdown_file] = ["stress.json", "stress.md"].map(|f| args.output.join(f));

@@ -2,6 +2,7 @@
 
 use super::choice::choice;
 use super::lens_args::LensArgs;
+use super::values::numbers;
 use crate::hidden_mesh;
 use anyhow::ensure;
 use clap::Args;
@@ -269,12 +270,6 @@ fn gaze(text: &str) -> anyhow::Result<Gaze> {
     };
     let rows = read_gazes(Path::new(text))?;
     Ok(Gaze::Path(rows.into_iter().map(sample).collect()))
-}
-
-/// Exactly N numbers separated by commas.
-pub(super) fn numbers<const N: usize>(text: &str) -> Option<[f32; N]> {
-    let numbers: Option<Vec<f32>> = text.split(',').map(|n| n.trim().parse().ok()).collect();
-    numbers?.try_into().ok()
 }
 
 #[cfg(test)]

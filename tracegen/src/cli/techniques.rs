@@ -1,18 +1,19 @@
 //! `tracegen techniques`.
 
 use super::cache_args::CacheArgs;
-use super::capture_steps::warn_of_multiview_defect;
+use super::capture_steps::{self, warn_of_multiview_defect};
 use super::lens_args::LensArgs;
 use super::objective_args::ObjectiveArgs;
 use super::path_args::PathArgs;
 use super::prepared::{Preparation, Prepared, prepare};
-use super::raster::{self, encoding_parser};
 use super::scene_args::{SceneArgs, SceneSetup};
+use super::values::encoding_parser;
 use crate::study::auto::{AutoRecord, Budget, Objective, choose};
 use crate::study::folder::{self, Folder, RowRecord, StudySetup};
 use crate::study::frames;
-use crate::study::measure::{Bench, Extent};
+use crate::study::measure::Bench;
 use crate::study::rows::Row;
+use crate::study::timing::Extent;
 use crate::study::world::World;
 use ::raster::lavapipe::device::{self, Gpu};
 use anyhow::{Context, ensure};
@@ -91,7 +92,7 @@ pub struct TechniquesArgs {
 /// # Errors
 /// Unreadable input, no driver, or a folder that cannot be written.
 pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
-    raster::prepare_environment(args.threads.count);
+    capture_steps::prepare_environment(args.threads.count);
     args.threads.start()?;
     let rows = match &args.only {
         Some(list) => Row::parse_list(list).context("--only")?,
@@ -295,7 +296,7 @@ impl TechniquesArgs {
             repeats: self.repeats,
             trace_frames,
             trace_encoding: self.encoding,
-            shadow_cascades: raster::cascades(&setup.scene, self.shadows),
+            shadow_cascades: capture_steps::cascades(&setup.scene, self.shadows),
             input_checksum: checksum(&setup.inputs)?,
         })
     }

@@ -1,9 +1,8 @@
 //! `tracegen verify`.
 
 use super::cache_args::CacheArgs;
+use super::capture_steps::{cascades, prepare_environment, tables};
 use super::path_args::PathArgs;
-use super::raster::{cascades, prepare_environment, tables};
-
 use super::scene_args::{SceneArgs, SceneSetup};
 use crate::study::world::shadow_range_m;
 use crate::verify::frame::{CaptureUnderTest, TileChoice, Verified};

@@ -10,4 +10,5 @@ pub mod memory;
 pub mod processor;
 pub mod rows;
 pub mod timewarp;
+pub mod timing;
 pub mod world;

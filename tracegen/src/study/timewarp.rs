@@ -1,14 +1,35 @@
 //! Timewarp of a frame's pictures: what a runtime shows if no new frame is ready.
 
-use super::world::{Reprojected, Shown};
 use formats::view::FrameViews;
 use glam::DVec3;
 use image_error::color::{linear_from_srgb, srgb8_from_linear};
 use raster::capture::Pictures;
 use rayon::prelude::*;
 use std::sync::LazyLock;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use techniques::timewarp::{ByDepth, before_from_now_px};
+
+/// What a frame leaves for the next one at half rate.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// Its number.
+    pub number: u32,
+    /// Its pictures.
+    pub pictures: Pictures,
+    /// Their depth, if it is needed.
+    pub depths: Option<Vec<Vec<f32>>>,
+}
+
+/// A frame that was reprojected from the one before.
+#[derive(Debug)]
+pub struct Reprojected {
+    /// Its pictures.
+    pub pictures: Pictures,
+    /// Bytes of pictures and depth that were read and written for it.
+    pub bytes: u64,
+    /// Its time.
+    pub took: Duration,
+}
 
 /// Linear light of each sRGB code.
 static LINEAR: LazyLock<[f32; 256]> =

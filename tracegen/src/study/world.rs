@@ -1,7 +1,7 @@
 //! What all rows of a study share: the scene, the path through it, and rendering a frame.
 
 use super::counted::Counted;
-use super::timewarp;
+use super::timewarp::{self, Reprojected, Shown};
 use formats::textrace::{Tables, TextraceWriter};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
 use raster::backend::{CaptureBackend, Fragments, Work};
@@ -51,28 +51,6 @@ pub struct World {
     pub texture_bytes: u64,
     /// The last rendered frame, at half rate.
     pub shown: Option<Shown>,
-}
-
-/// What a frame leaves for the next one at half rate.
-#[derive(Clone, Debug)]
-pub struct Shown {
-    /// Its number.
-    pub number: u32,
-    /// Its pictures.
-    pub pictures: Pictures,
-    /// Their depth, if it is needed.
-    pub depths: Option<Vec<Vec<f32>>>,
-}
-
-/// A frame that was reprojected from the one before.
-#[derive(Debug)]
-pub struct Reprojected {
-    /// Its pictures.
-    pub pictures: Pictures,
-    /// Bytes of pictures and depth that were read and written for it.
-    pub bytes: u64,
-    /// Its time.
-    pub took: Duration,
 }
 
 /// A frame that was rendered without capture, and its cost.

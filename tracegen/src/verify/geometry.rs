@@ -1,7 +1,7 @@
 //! The triangles of a view, sorted into its tiles.
 
 use super::piece::{Piece, center, pieces, quad_center};
-use super::precision::VertexError;
+use super::vertex_error::VertexError;
 use formats::footprint::LodFormula;
 use formats::view::{EyeView, TILE_SIZE_PX};
 use glam::{DMat4, DVec2, DVec3, DVec4, Mat4};

@@ -12,6 +12,7 @@ pub mod causes;
 pub mod classes;
 pub mod colour;
 pub mod compare;
+mod faults;
 pub mod frame;
 pub mod geometry;
 pub mod lod;
@@ -22,6 +23,7 @@ pub mod reference;
 pub mod report;
 pub mod sampler;
 pub mod tables;
+mod vertex_error;
 mod views;
 pub mod write;
 

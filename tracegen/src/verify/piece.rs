@@ -1,6 +1,6 @@
 //! A triangle on the screen: its coverage, depth, and barycentric coordinates.
 
-use super::precision::VertexError;
+use super::vertex_error::VertexError;
 use glam::{DVec2, DVec3, DVec4};
 
 /// Steps per pixel to which vertices are snapped; every driver here has 8 bits.

@@ -1,62 +1,13 @@
 //! Bounds of the errors of single precision in a capture, derived from the arithmetic; none is fitted.
 //!
-//! `UNIT` is the relative error of one rounding. A bound is the sum of the roundings of a computation, each
+//! [`UNIT`] is the relative error of one rounding. A bound is the sum of the roundings of a computation, each
 //! times the magnitude of its terms (Higham 2002, chapter 3); docs/use/verify.md derives them.
 
 use super::geometry::Coordinates;
 use super::piece::Corner;
+use super::vertex_error::UNIT;
 use formats::textrace::SUBTEXELS;
-use glam::{DMat4, DVec2, DVec3, DVec4};
-
-/// Half a unit in the last place of 1, the error of an operation in single precision.
-pub(super) const UNIT: f64 = f32::EPSILON as f64 / 2.0;
-
-/// Roundings of a clip-space coordinate: three products of a matrix with a vector or matrix, of four products
-/// and three sums each (12), and its position in a region of the picture (4).
-const CLIP_ROUNDINGS: f64 = 16.0;
-
-/// Error of a vertex in single precision.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct VertexError {
-    /// Sums of the magnitudes of the terms of its clip-space coordinates.
-    pub terms: DVec4,
-}
-
-impl VertexError {
-    /// Of a vertex that three matrices transform.
-    pub fn new(matrices: &[DMat4; 3], position: DVec3) -> Self {
-        let magnitudes = |m: &DMat4, v: DVec4| {
-            let columns = [m.x_axis, m.y_axis, m.z_axis, m.w_axis];
-            let terms = columns.into_iter().zip(v.to_array());
-            terms.map(|(column, v)| column.abs() * v).sum::<DVec4>()
-        };
-        let [clip, eye, world] = matrices;
-        let start = position.abs().extend(1.0);
-        Self {
-            terms: magnitudes(clip, magnitudes(eye, magnitudes(world, start))),
-        }
-    }
-
-    /// Of a point between two vertices: the same fraction is used for its position and its coordinates.
-    pub fn between(self, other: Self) -> Self {
-        Self {
-            terms: self.terms.max(other.terms),
-        }
-    }
-
-    /// Error on the screen in pixels.
-    pub fn moves_px(&self, clip: DVec4, size_px: [u32; 2], at: DVec2) -> DVec2 {
-        let half = DVec2::new(size_px[0].into(), size_px[1].into()) / 2.0;
-        let ndc = (clip.truncate().truncate() / clip.w).abs();
-        let terms = self.terms.truncate().truncate() + ndc * self.terms.w;
-        UNIT * (half * (CLIP_ROUNDINGS * terms / clip.w.abs() + 3.0 * ndc) + at.abs())
-    }
-
-    /// Relative error of 1/w.
-    pub fn inverse_w(&self, clip: DVec4) -> f64 {
-        UNIT * (CLIP_ROUNDINGS * self.terms.w / clip.w.abs() + 2.0)
-    }
-}
+use glam::{DVec2, DVec3};
 
 /// A plane over the screen that passes through the values of three corners.
 struct Plane {

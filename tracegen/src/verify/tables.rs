@@ -3,11 +3,11 @@
 //! All expected values are derived here from the loaded scene by the rules of FORMAT.md, without the
 //! capture's list of draws and textures, which wrote the tables.
 
+use super::faults::Faults;
 use super::views::Views;
 use formats::textrace::{Draw, PassKind, Sample, Surfaces, Tables, UvGroup};
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use scene::{AlphaMode, Material, Scene, SceneError, TextureRef};
-use serde::Serialize;
 use std::collections::BTreeSet;
 
 /// Edge of the blocks that textures are compressed in, texels.
@@ -18,25 +18,6 @@ const SHADOW_SIZE: u32 = 2048;
 const MOST_CASCADES: u32 = 4;
 /// Texel offsets of the taps of a shadow look-up.
 const SHADOW_TAPS: [[i8; 2]; 4] = [[-1, -1], [1, -1], [-1, 1], [1, 1]];
-
-/// Contradictions between a trace's tables and its scene.
-#[derive(Default)]
-pub(super) struct Faults(pub Vec<String>);
-
-impl Faults {
-    /// Adds a fault unless both values are the same.
-    pub fn hold<T: PartialEq + Serialize>(&mut self, place: &str, expected: &T, found: &T) {
-        if expected != found {
-            let json = |value| serde_json::to_string(value).unwrap_or_default();
-            let (expected, found) = (json(expected), json(found));
-            self.add(place, &expected, &found);
-        }
-    }
-
-    pub fn add(&mut self, place: &str, expected: &str, found: &str) {
-        (self.0).push(format!("{place}: expected {expected}, found {found}"));
-    }
-}
 
 /// Contradictions between the tables of a trace and its scene.
 ///

@@ -1,6 +1,6 @@
 //! Compares the eyes' matrices of a trace with the parameters of its display.
 
-use super::tables::Faults;
+use super::faults::Faults;
 use formats::view::{EyeView, FovTangents, FrameViews, Hmd};
 use glam::{DMat3, DMat4, DVec3, Mat4};
 

@@ -2,10 +2,10 @@
 //! per thread, and one look-up per footprint. The fast machine must agree cycle by cycle.
 
 use super::*;
+use crate::access::FrameClients;
 use crate::config::{Allocation, Replacement, TmuConfig};
-use crate::engine::OtherWork;
 use crate::engine::counts::FootprintMisses;
-use crate::memory::{AnyCache, Cache, Caches};
+use crate::memory::{AnyCache, Cache, Caches, OtherWork};
 use crate::result::{MemoryResult, MshrResult, TmuResult};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
@@ -303,7 +303,7 @@ impl Machine for PlainTimed {
         }
     }
 
-    fn outcome(&self, _config: &RunConfig) -> batch::Outcome {
+    fn outcome(&self, _config: &RunConfig) -> Outcome {
         let sum = |of: fn(&PlainUnit) -> u64| self.units.iter().map(of).sum::<u64>();
         let (useful, wasted) = (sum(|unit| unit.useful), sum(|unit| unit.wasted));
         let cycles = useful + wasted + sum(|unit| unit.idle);
@@ -311,7 +311,7 @@ impl Machine for PlainTimed {
             0 => 0.0,
             _ => useful as f64 / cycles as f64,
         };
-        batch::Outcome {
+        Outcome {
             counts: self.counts.clone(),
             tmu: Some(TmuResult {
                 utilization,

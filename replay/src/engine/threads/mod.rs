@@ -9,9 +9,9 @@ mod items;
 mod looping;
 mod prefetch_fifo;
 
-use super::Machine;
-use super::batch::Outcome;
 use super::counts::CacheCounts;
+use super::machine::Machine;
+use super::outcome::Outcome;
 use crate::access::FrameClients;
 use crate::config::{Allocation, Assign, ConfigError, RunConfig, TmuModel};
 use crate::memory::{Caches, Delay, DelayedFill, MissPath, OtherWork, SecondLevel};

@@ -7,8 +7,8 @@
 use super::first_miss::Thread;
 use super::{Items, Shared, ThreadModel, start_item};
 use crate::config::{RunConfig, TmuConfig};
-use crate::engine::batch::Outcome;
 use crate::engine::counts::{CacheCounts, FootprintMisses};
+use crate::engine::outcome::Outcome;
 use crate::memory::{Caches, Delay, DelayedFill, MissPath, NOT_IN_FLIGHT};
 use crate::stream::{Cores, StreamError};
 use crate::tmu::PipelineStats;

@@ -6,7 +6,8 @@
 //! that was the most recent in its set also was with more sets. The search ends there, with nothing
 //! to move (Hill & Smith 1989).
 
-use crate::memory::policy::{EMPTY, to_front};
+use crate::memory::cache::EMPTY;
+use crate::memory::policy::to_front;
 use std::hint::select_unpredictable;
 
 /// The stacks for one number of sets.

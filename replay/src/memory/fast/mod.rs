@@ -4,4 +4,3 @@ mod forest;
 mod set_order;
 
 pub use forest::Forest;
-pub(super) use set_order::SetOrder;

@@ -3,8 +3,9 @@
 //! A fill affects only its own set, so it can wait until the set is next accessed. Each set keeps
 //! its own lines in flight, and no calendar is needed.
 
-use crate::memory::in_flight::{DelayedFill, Mshrs, NOT_IN_FLIGHT};
-use crate::memory::policy::{EMPTY, look_up, take_out};
+use crate::memory::cache::EMPTY;
+use crate::memory::in_flight::{Delay, DelayedFill, Mshrs, NOT_IN_FLIGHT};
+use crate::memory::policy::{FourWayLru, look_up, take_out};
 
 /// A line in flight.
 #[derive(Clone, Copy, Debug)]
@@ -94,6 +95,15 @@ impl Later {
     fn clear(&mut self) {
         self.arrivals.clear();
         self.gone = 0;
+    }
+}
+
+/// Sets are independent, so each fills when it is next accessed.
+impl Delay for FourWayLru {
+    type Delayed = SetOrder;
+
+    fn delayed(self, _usual_cycles: u64) -> SetOrder {
+        SetOrder::new(self.sets())
     }
 }
 

@@ -3,9 +3,9 @@
 use super::caches::of_core;
 use super::other_work::OtherWork;
 use crate::config::{ConfigError, Inclusion, RunConfig};
+use crate::memory::cache::EMPTY;
 use crate::memory::dram::{Dram, DramResult};
 use crate::memory::in_flight::{Mshrs, NOT_IN_FLIGHT};
-use crate::memory::policy::EMPTY;
 use crate::memory::{Access, AnyCache, Cache};
 use crate::result::LowerLevelResult;
 use std::ops::RangeInclusive;

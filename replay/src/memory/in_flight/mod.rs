@@ -13,8 +13,7 @@ pub use allocate_on_miss::AllocateOnMiss;
 pub use limited_mshrs::LimitedMshrs;
 pub use table::Mshrs;
 
-use super::fast::SetOrder;
-use super::{Cache, FourWayLru};
+use super::Cache;
 use calendar::InFlight;
 
 /// The arrival of a line that is not in flight.
@@ -68,15 +67,6 @@ impl Delay for Box<dyn Cache> {
             cache: self,
             in_flight: InFlight::new(usual_cycles),
         }
-    }
-}
-
-/// Sets are independent, so each fills when it is next accessed.
-impl Delay for FourWayLru {
-    type Delayed = SetOrder;
-
-    fn delayed(self, _usual_cycles: u64) -> SetOrder {
-        SetOrder::new(self.sets())
     }
 }
 

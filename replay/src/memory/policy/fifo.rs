@@ -1,6 +1,6 @@
 //! First in, first out: a hit changes nothing, and the oldest line is evicted.
 
-use super::{Cache, EMPTY};
+use crate::memory::cache::{Cache, EMPTY};
 
 /// A FIFO cache.
 pub(super) struct Fifo {

@@ -4,7 +4,7 @@
 //! as fast as SIMD compares. Repeated accesses, which dominate texture traffic, end at the first
 //! compare.
 
-use super::{AnyCache, Cache, EMPTY, boxed, empty_way};
+use crate::memory::cache::{Cache, EMPTY, empty_way};
 
 /// Associativity, fixed at compile time where speed matters.
 pub trait Ways: Copy + Send {
@@ -44,7 +44,7 @@ pub trait Line: Copy + Eq {
 }
 
 impl Line for u32 {
-    const EMPTY: Self = super::EMPTY;
+    const EMPTY: Self = EMPTY;
 
     #[inline(always)]
     fn set(self, mask: u32) -> usize {
@@ -71,17 +71,6 @@ pub struct Lru<W: Ways, L: Line = u32> {
 
 /// The cache of nearly all replays.
 pub type FourWayLru = Lru<WaysOf<4>>;
-
-/// An LRU cache of any associativity; `sets` is a power of two.
-pub(in crate::memory) fn lru(sets: u32, ways: u32) -> AnyCache {
-    match ways {
-        1 => boxed(Lru::new(sets, WaysOf::<1>)),
-        2 => boxed(Lru::new(sets, WaysOf::<2>)),
-        4 => AnyCache::FourWayLru(Lru::new(sets, WaysOf)),
-        8 => boxed(Lru::new(sets, WaysOf::<8>)),
-        _ => boxed(Lru::new(sets, AnyWays(ways as usize))),
-    }
-}
 
 impl<W: Ways, L: Line> Lru<W, L> {
     /// An empty cache; `sets` is a power of two.

@@ -1,6 +1,7 @@
-//! Replacement policies, one per file. A new policy is a file with a [`Cache`] (its `mod` line
+//! Replacement policies, one per file. A new policy is a file with a [`Cache`](super::Cache) (its `mod` line
 //! below) and a row of the table.
 
+mod any_cache;
 mod fifo;
 mod lru;
 mod own;
@@ -9,11 +10,12 @@ mod rrip;
 mod ship;
 mod tree_plru;
 
+pub use any_cache::AnyCache;
+pub(in crate::memory) use any_cache::boxed;
 pub use lru::{AnyWays, FourWayLru, Lru, WaysOf};
-pub(in crate::memory) use lru::{look_up, lru, take_out, to_front};
+pub(in crate::memory) use lru::{look_up, take_out, to_front};
 pub use own::{MakePolicy, Policy};
 
-use super::cache::{AnyCache, Cache, boxed};
 use crate::registry::{Named, registry};
 use fifo::Fifo;
 use random::RandomReplacement;
@@ -23,7 +25,7 @@ use tree_plru::TreePlru;
 
 registry! { PolicyRow, other = own::by_name:
     // constant   name          help                    supported ways                                 constructor
-    LRU =       row("lru",       "Least recently used", ANY_WAYS,                                      |g| lru(g.sets, g.ways));
+    LRU =       row("lru",       "Least recently used", ANY_WAYS,                                      |g| AnyCache::lru(g.sets, g.ways));
     FIFO =      row("fifo",      "First in, first out", ANY_WAYS,                                      |g| boxed(Fifo::new(g.sets, g.ways)));
     TREE_PLRU = row("tree-plru", "Tree pseudo-LRU",     ("1, 2, 4 ... 64", tree_plru::accepts_ways),   |g| boxed(TreePlru::new(g.sets, g.ways)));
     RANDOM =    row("random",    "Seeded random",       ANY_WAYS,                                      |g| boxed(RandomReplacement::new(g.sets, g.ways, g.seed)));
@@ -110,14 +112,4 @@ pub(in crate::memory) struct Geometry {
     pub(in crate::memory) sets: u32,
     pub(in crate::memory) ways: u32,
     pub(in crate::memory) seed: u64,
-}
-
-/// Tag of an empty way; no line has this number.
-pub(in crate::memory) const EMPTY: u32 = u32::MAX;
-
-/// Empties the way that holds a line, and returns its index.
-fn empty_way(tags: &mut [u32], line: u32) -> Option<usize> {
-    let way = tags.iter().position(|&tag| tag == line)?;
-    tags[way] = EMPTY;
-    Some(way)
 }

@@ -1,9 +1,9 @@
 //! Replacement policies that the caller of this library implements. The cache keeps the tags, the policy
 //! only chooses ways.
 
-use super::{
-    ANY_WAYS, AnyCache, Build, Cache, EMPTY, Geometry, PolicyRow, Replacement, boxed, empty_way,
-};
+use super::any_cache::{AnyCache, boxed};
+use super::{ANY_WAYS, Build, Geometry, PolicyRow, Replacement};
+use crate::memory::cache::{Cache, EMPTY, empty_way};
 use std::sync::{Mutex, PoisonError};
 
 /// A policy for all sets of a cache.

@@ -1,6 +1,6 @@
 //! Random replacement, seeded.
 
-use super::{Cache, EMPTY, empty_way};
+use crate::memory::cache::{Cache, EMPTY, empty_way};
 
 /// A cache with random replacement; empty ways are used first.
 pub(super) struct RandomReplacement {

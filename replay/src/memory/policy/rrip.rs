@@ -5,7 +5,7 @@
 //! belong to the quads that fetched the line and count as one access: all policies here rely on
 //! repeated accesses changing nothing.
 
-use super::{Cache, EMPTY, empty_way};
+use crate::memory::cache::{Cache, EMPTY, empty_way};
 
 /// A distant re-reference: the next victim.
 pub(super) const DISTANT: u8 = 3;

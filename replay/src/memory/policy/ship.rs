@@ -4,7 +4,7 @@
 //! regions without reuse are inserted as the next victims.
 
 use super::rrip::{DISTANT, LONG, Sets};
-use super::{Cache, EMPTY};
+use crate::memory::cache::{Cache, EMPTY};
 
 /// Lines of a region: 4 KiB at 16 bytes per line, 16 KiB at 64.
 const REGION_LINES: u32 = 256;

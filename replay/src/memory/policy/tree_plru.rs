@@ -1,6 +1,6 @@
 //! Tree pseudo-LRU: one bit per node of a binary tree over the ways points to the half that was not used last.
 
-use super::{Cache, EMPTY, empty_way};
+use crate::memory::cache::{Cache, EMPTY, empty_way};
 
 /// A tree-PLRU cache.
 pub(super) struct TreePlru {

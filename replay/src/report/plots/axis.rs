@@ -1,10 +1,14 @@
 //! Axes: linear, in doublings, or logarithmic with a place for zero; their ends and their ticks.
 
-use super::frame::{MOST_TICKS, linear_ticks, tick_format};
+use super::frame::{MOST_TICKS, linear_ticks, themed, tick_format};
 use crate::report::theme;
 use crate::size::format_bytes;
+use plotters::chart::ChartContext;
+use plotters::coord::cartesian::Cartesian2d;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::coord::types::RangedCoordf64;
+use plotters::drawing::DrawingAreaErrorKind;
+use plotters::prelude::DrawingBackend;
 use std::ops::Range;
 
 /// Unit of an axis of doublings, for its ticks.
@@ -181,6 +185,20 @@ impl Axis {
             }
         }
     }
+}
+
+/// Draws two axes with their ticks, and the horizontal grid.
+pub(super) fn draw_axes<DB: DrawingBackend>(
+    chart: &mut ChartContext<'_, DB, Cartesian2d<Ticked, Ticked>>,
+    x_label: &str,
+    [x, y]: [&Ticked; 2],
+) -> Result<(), DrawingAreaErrorKind<DB::ErrorType>> {
+    themed(&mut chart.configure_mesh())
+        .disable_x_mesh()
+        .x_desc(x_label)
+        .x_label_formatter(&|at| x.text(*at))
+        .y_label_formatter(&|at| y.text(*at))
+        .draw()
 }
 
 /// An axis with fixed ticks.

@@ -2,8 +2,9 @@
 //! column to the right of the axes, moved apart if they would overlap; a grey dotted leader joins a name to
 //! the height of its line's end. Point clouds are named in rows below the heading.
 
+use super::axis::draw_axes;
 pub use super::axis::{Axis, Doublings};
-use super::frame::{AXIS_PX, Frame, LegendEntry, Symbol, text_style, themed};
+use super::frame::{AXIS_PX, Frame, LegendEntry, Symbol, text_style};
 use super::marks::{Shape, dash};
 use super::{PlotError, SeriesStyle};
 use crate::report::theme;
@@ -116,12 +117,7 @@ impl LineChart {
         };
         frame.draw(|root, mut builder, marks| {
             let mut chart = builder.build_cartesian_2d(x.clone(), y.clone())?;
-            themed(&mut chart.configure_mesh())
-                .disable_x_mesh()
-                .x_desc(&self.x.label)
-                .x_label_formatter(&|at| x.text(*at))
-                .y_label_formatter(&|at| y.text(*at))
-                .draw()?;
+            draw_axes(&mut chart, &self.x.label, [&x, &y])?;
             let at_px = |point: &(f64, f64)| chart.backend_coord(&place(point));
             for (index, (series, name)) in styled() {
                 #[rustfmt::skip]

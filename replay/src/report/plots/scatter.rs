@@ -2,8 +2,8 @@
 //! it and covers no other label or point. With many points, the labels are numbers, and a list to the right
 //! of the axes has their names.
 
-use super::axis::{Axis, Ticked};
-use super::frame::{AXIS_PX, Area, DOT_PX, Drawn, Frame, LegendEntry, Symbol, text_style, themed};
+use super::axis::{Axis, Ticked, draw_axes};
+use super::frame::{AXIS_PX, Area, DOT_PX, Drawn, Frame, LegendEntry, Symbol, text_style};
 use super::lines::exact;
 use super::marks::{Marks, Shape};
 use super::{PlotError, SeriesStyle};
@@ -126,12 +126,7 @@ impl ScatterChart {
         let labels = self.labels();
         self.frame(&labels, &y).draw(|root, mut builder, marks| {
             let mut chart = builder.build_cartesian_2d(x.clone(), y.clone())?;
-            themed(&mut chart.configure_mesh())
-                .disable_x_mesh()
-                .x_desc(&self.x.label)
-                .x_label_formatter(&|at| x.text(*at))
-                .y_label_formatter(&|at| y.text(*at))
-                .draw()?;
+            draw_axes(&mut chart, &self.x.label, [&x, &y])?;
             let in_px = |point: &NamedPoint| {
                 let (x, y) = chart.backend_coord(&self.place_of(point));
                 (f64::from(x), f64::from(y))

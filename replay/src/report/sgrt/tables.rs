@@ -1,12 +1,13 @@
 //! Tables of reprojection results.
 
 use super::Entry;
+use crate::paper::sgrt::PaperValues;
 use crate::report::columns::{Column, Row, Show, pick};
 use crate::report::table::Table;
 use crate::sgrt::accuracy::{Accuracy, ClassCounts};
 use crate::sgrt::compose::Reuse;
-use crate::sgrt::energy::EnergyPj;
 use crate::sgrt::result::{CurvePoint, Outcome, Report, Sensitivity};
+use crate::sgrt::run::EnergyPj;
 
 /// The name of a trace in tables.
 pub fn scene_name(report: &Report) -> String {
@@ -118,6 +119,12 @@ fn ratio<'a>(
     Column::real(key, name, "ratio", 3, move |r: &RuleRow| value(r.outcome))
 }
 
+/// The paper's ratio.
+fn paper<'a>(key: &'static str, value: fn(&PaperValues) -> f64) -> Column<'static, RuleRow<'a>> {
+    let of = move |r: &RuleRow| r.report.paper.as_ref().map(value);
+    Column::real(key, "paper", "ratio", 2, of).published()
+}
+
 fn millions<'a>(
     key: &'static str,
     name: &'static str,
@@ -168,87 +175,46 @@ fn identity<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
 }
 
 /// Reused hits and their errors.
+#[rustfmt::skip]
 fn hits<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
     vec![
         pct("reuse_pct", "reuse", 2, |o| o.reuse_pct),
-        pct("wrong_object_pct", "wrong object", 3, |o| {
-            o.wrong_object_pct
-        }),
-        pct("wrong_primitive_pct", "wrong triangle", 3, |o| {
-            o.wrong_primitive_pct
-        }),
-        pct("position_over_1px_pct", "off > 1 px", 3, |o| {
-            o.position_over_1px_pct
-        }),
-        pct("position_over_2px_pct", "off > 2 px", 3, |o| {
-            o.position_over_2px_pct
-        }),
+        pct("wrong_object_pct", "wrong object", 3, |o| o.wrong_object_pct),
+        pct("wrong_primitive_pct", "wrong triangle", 3, |o| o.wrong_primitive_pct),
+        pct("position_over_1px_pct", "off > 1 px", 3, |o| o.position_over_1px_pct),
+        pct("position_over_2px_pct", "off > 2 px", 3, |o| o.position_over_2px_pct),
     ]
 }
 
 /// Performance and energy relative to tracing both eyes completely.
+#[rustfmt::skip]
 fn ratios<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
     vec![
-        ratio("relative_performance", "performance", |o| {
-            o.relative_performance
-        }),
-        ratio("tni_relative_performance", "units alone", |o| {
-            o.tni_relative_performance
-        }),
-        Column::real(
-            "paper_relative_performance",
-            "paper",
-            "ratio",
-            2,
-            |r: &RuleRow| r.report.paper.as_ref().map(|p| p.relative_performance),
-        )
-        .published(),
+        ratio("relative_performance", "performance", |o| o.relative_performance),
+        ratio("tni_relative_performance", "units alone", |o| o.tni_relative_performance),
+        paper("paper_relative_performance", |p| p.relative_performance),
         ratio("relative_energy", "energy", |o| o.relative_energy),
-        Column::real(
-            "paper_relative_energy",
-            "paper",
-            "ratio",
-            2,
-            |r: &RuleRow| r.report.paper.as_ref().map(|p| p.relative_energy),
-        )
-        .published(),
-        pct("primary_steps_pct", "primary steps", 1, |o| {
-            o.primary_steps_pct
-        }),
-        pct("tni_reduction_pct", "unit cycles saved", 1, |o| {
-            o.tni_reduction_pct
-        }),
-        pct("right_tni_reduction_pct", "of the right eye's", 1, |o| {
-            o.right_tni_reduction_pct
-        }),
-        pct("srp_overhead_pct", "core cycles added", 1, |o| {
-            o.srp_overhead_pct
-        }),
+        paper("paper_relative_energy", |p| p.relative_energy),
+        pct("primary_steps_pct", "primary steps", 1, |o| o.primary_steps_pct),
+        pct("tni_reduction_pct", "unit cycles saved", 1, |o| o.tni_reduction_pct),
+        pct("right_tni_reduction_pct", "of the right eye's", 1, |o| o.right_tni_reduction_pct),
+        pct("srp_overhead_pct", "core cycles added", 1, |o| o.srp_overhead_pct),
     ]
 }
 
 /// Cycles, rays and steps.
+#[rustfmt::skip]
 fn cycles<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
     vec![
         millions("tni_cycles", "unit cycles", "M", |o| o.tni_cycles),
-        millions("reference_tni_cycles", "both eyes in full", "M", |o| {
-            o.reference_tni_cycles
-        }),
+        millions("reference_tni_cycles", "both eyes in full", "M", |o| o.reference_tni_cycles),
         millions("srp_cycles", "core cycles", "M", |o| o.srp_cycles),
-        millions("reference_srp_cycles", "both eyes in full", "M", |o| {
-            o.reference_srp_cycles
-        }),
-        text("tni_bottleneck", "unit bottleneck", |r| {
-            r.outcome.tni_bottleneck.clone()
-        }),
+        millions("reference_srp_cycles", "both eyes in full", "M", |o| o.reference_srp_cycles),
+        text("tni_bottleneck", "unit bottleneck", |r| r.outcome.tni_bottleneck.clone()),
         millions("rays", "rays", "M", |o| o.work.rays),
-        millions("reference_rays", "both eyes in full", "M", |o| {
-            o.reference_work.rays
-        }),
+        millions("reference_rays", "both eyes in full", "M", |o| o.reference_work.rays),
         millions("steps", "steps", "M", |o| o.work.steps),
-        millions("reference_steps", "both eyes in full", "M", |o| {
-            o.reference_work.steps
-        }),
+        millions("reference_steps", "both eyes in full", "M", |o| o.reference_work.steps),
         millions("retests", "re-tests", "M", |o| o.work.retests),
     ]
 }

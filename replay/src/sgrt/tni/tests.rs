@@ -164,7 +164,7 @@ fn a_visit_waits_once_for_all_its_lines_and_energy_pays_for_each() {
     let [a, b] = [narrow, wide].map(|misses| cycles(&work, &misses, &config).latency);
     assert_eq!(a, b);
     let energy = |misses| {
-        let run = crate::sgrt::hardware::Run {
+        let run = crate::sgrt::run::Run {
             work,
             misses,
             ..Default::default()

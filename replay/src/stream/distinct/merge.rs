@@ -1,6 +1,6 @@
 //! Merges lines that occur in several bundles of a quad.
 
-use super::Use;
+use crate::stream::tag::Use;
 use std::hint::select_unpredictable;
 
 /// Buckets of the hash table, a power of two much larger than the lines of a segment.

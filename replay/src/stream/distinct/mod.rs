@@ -6,97 +6,9 @@
 
 mod merge;
 
-use super::QuadLines;
 use super::footprint::Bundle;
-use super::lines::Tag;
-use crate::tmu::Pending;
+use super::tag::{FOOTPRINTS, Use};
 use merge::Merge;
-
-/// Maximum footprints per segment, repeats included: four lanes of three trilinear textures.
-const FOOTPRINTS: u32 = Pending::SEGMENT;
-
-/// The users of a distinct line.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Use {
-    bits: u32,
-    /// Cell within the view, and a flag.
-    cell: u32,
-}
-
-impl Use {
-    const LAST: u32 = 1 << 31;
-
-    /// Upper limit of first-line indices.
-    pub const FIRST_LINES: usize = 1 << (31 - FOOTPRINTS);
-
-    /// Flag in `cell`, outside the bits of a cell.
-    const LISTED: u32 = Tag::CELLS as u32;
-
-    fn new(footprints: u32, first_line: u32, cell: u32) -> Self {
-        Self {
-            bits: footprints | first_line << FOOTPRINTS,
-            cell,
-        }
-    }
-
-    /// Cell within the view.
-    #[inline(always)]
-    pub(super) fn cell(self) -> u32 {
-        self.cell & (Self::LISTED - 1)
-    }
-
-    /// True if the quad may already have listed the line, for another cell or in another segment.
-    #[inline(always)]
-    #[must_use]
-    pub fn may_be_listed(self) -> bool {
-        self.cell & Self::LISTED != 0
-    }
-
-    /// One bit per footprint of the segment, repeats included.
-    #[inline(always)]
-    #[must_use]
-    pub fn footprints(self) -> u32 {
-        self.bits & ((1 << FOOTPRINTS) - 1)
-    }
-
-    /// Index of its first occurrence among the segment's lines.
-    #[inline(always)]
-    #[must_use]
-    pub fn first_line(self) -> usize {
-        ((self.bits & !Self::LAST) >> FOOTPRINTS) as usize
-    }
-
-    /// True for the last distinct line of a segment.
-    #[inline(always)]
-    fn ends_segment(self) -> bool {
-        self.bits & Self::LAST != 0
-    }
-}
-
-impl<'a> QuadLines<'a> {
-    /// True if all footprints fit into one segment.
-    #[inline(always)]
-    #[must_use]
-    pub fn is_one_segment(&self) -> bool {
-        self.footprints <= FOOTPRINTS
-    }
-
-    /// End of each segment's distinct lines.
-    #[inline(always)]
-    pub fn segments(self) -> impl Iterator<Item = usize> + use<'a> {
-        let mut start = 0;
-        std::iter::from_fn(move || {
-            let uses = &self.uses[start..];
-            start += if self.is_one_segment() && !uses.is_empty() {
-                // All footprints fit into one segment.
-                uses.len()
-            } else {
-                1 + uses.iter().position(|of| of.ends_segment())?
-            };
-            Some(start)
-        })
-    }
-}
 
 /// Finds the distinct lines of quads.
 ///
@@ -227,6 +139,7 @@ impl Span {
 mod tests {
     use super::*;
     use crate::stream::lines::{QuadEnd, TileLines};
+    use crate::stream::tag::Tag;
     use proptest::prelude::*;
     use std::collections::HashMap;
 

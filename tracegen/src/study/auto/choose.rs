@@ -3,8 +3,8 @@
 use super::search::Infeasible;
 use super::{AutoRecord, Budget, Held, Known, Objective, SearchBench, hold, search};
 
-use crate::study::measure::{Extent, median_s};
 use crate::study::rows::{Part, Row};
+use crate::study::timing::{Extent, median_s};
 use crate::study::world::World;
 use anyhow::bail;
 use formats::view::Hmd;

@@ -9,8 +9,8 @@ mod thread;
 
 use super::{Items, Shared, ThreadModel, start_item};
 use crate::config::{RunConfig, TmuConfig};
-use crate::engine::batch::Outcome;
 use crate::engine::counts::CacheCounts;
+use crate::engine::outcome::Outcome;
 use crate::memory::{Caches, Delay, DelayedFill, MissPath};
 use crate::stream::{Cores, StreamError};
 use crate::tmu::PipelineStats;

@@ -7,8 +7,8 @@ mod timeline;
 
 use super::{Items, Shared, ThreadModel, start_item};
 use crate::config::RunConfig;
-use crate::engine::batch::Outcome;
 use crate::engine::counts::CacheCounts;
+use crate::engine::outcome::Outcome;
 use crate::memory::{Caches, Delay, DelayedFill, MissPath};
 use crate::stream::{Cores, StreamError};
 use crate::tmu::{Pipeline, Turn};

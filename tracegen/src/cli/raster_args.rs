@@ -1,0 +1,190 @@
+//! Arguments of `tracegen raster`.
+
+use super::cache_args::CacheArgs;
+use super::choice::choice;
+use super::objective_args::ObjectiveArgs;
+use super::path_args::{PathArgs, frame_count};
+use super::scene_args::SceneArgs;
+use super::technique_args::TechniqueArgs;
+use super::values::{encoding_parser, parse_bytes};
+use crate::study::auto::{Budget, Schedule};
+use anyhow::{bail, ensure};
+use clap::Args;
+use clap::builder::TypedValueParser;
+use formats::textrace::Encoding;
+use formats::view::Eye;
+use raster::backend::Fragments;
+use raster::drivers::Driver;
+use shell::Threads;
+use std::path::PathBuf;
+use techniques::skips::Skip;
+
+/// Arguments of `tracegen raster`.
+#[derive(Args, Debug)]
+pub struct RasterArgs {
+    #[command(flatten)]
+    pub(super) scene: SceneArgs,
+    /// Trace to write.
+    #[arg(short, long, value_name = "FILE.textrace")]
+    pub(super) output: PathBuf,
+    /// Picture of all views side by side.
+    #[arg(long, value_name = "FILE.png")]
+    pub(super) image: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) path: PathArgs,
+    /// Frames along the path.
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Camera",
+          value_parser = frame_count())]
+    pub(super) frames: u32,
+    /// Light the scene through 4 shadow cascades of 2048x2048.
+    #[arg(long)]
+    pub(super) shadows: bool,
+    /// Views of each frame.
+    #[arg(long, value_parser = views_parser(), default_value = "stereo", help_heading = "Camera")]
+    pub(super) views: &'static [Eye],
+    /// Driver that captures; osmesa captures plain frames alone, without techniques.
+    #[arg(long, value_parser = driver_parser(), default_value = "lavapipe", value_name = "NAME")]
+    pub(super) backend: Driver,
+    /// Skip the render without capture, which times and depths are compared with.
+    #[arg(long)]
+    pub(super) no_plain: bool,
+    /// Also draw the picture while capturing, and compare it with the picture without capture.
+    #[arg(long)]
+    pub(super) shade: bool,
+    /// Hidden-surface removal of the renderer whose texture accesses are captured.
+    #[arg(long, value_parser = hsr_parser(), default_value = "early-z")]
+    pub(super) hsr: Fragments,
+    /// Memory for raw records; a frame that needs more is captured in parts. The driver's limit is
+    /// 128MiB.
+    #[arg(long, value_name = "SIZE", default_value = "128MiB", value_parser = parse_bytes)]
+    pub(super) record_budget: u64,
+    /// How the trace's tiles are packed.
+    #[arg(long, value_parser = encoding_parser(), default_value = "delta", value_name = "NAME")]
+    pub(super) encoding: Encoding,
+    /// Add the data that vertex processing reads and the primitives per tile, for `replay run --frame`.
+    #[arg(long)]
+    pub(super) geometry: bool,
+    /// Draw or prepare invisible things as well: images, mip-levels, cascades, regions or all of them.
+    /// Pictures and trace stay the same.
+    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    pub(super) no_skip: Vec<Skip>,
+    /// Choose the techniques of each frame under a budget: `flip=ERROR` (mean FLIP inside the lens; 0 allows
+    /// only lossless techniques) or `pixels=PX` choose the least cost within that error; `budget-ms=MS`
+    /// chooses the least error whose median frame time stays within the budget.
+    #[arg(long, value_name = "BUDGET", help_heading = "Techniques",
+          conflicts_with_all = ["cull", "occlusion", "multiview", "hidden_area_mask", "hidden_area_mesh",
+                                "cull_distance", "cull_px", "far_field", "foveate",
+                                "views", "no_plain", "shade", "no_skip"])]
+    pub(super) auto: Option<Budget>,
+    #[command(flatten)]
+    pub(super) objective: ObjectiveArgs,
+    /// Render with techniques by name: `TECHNIQUE` as in `tracegen techniques --only`, joined by `+`,
+    /// followed by exceptions for single frames, `,FRAME:TECHNIQUE` or `,FIRST-LAST:TECHNIQUE`. `--auto`
+    /// prints its choice in this form.
+    #[arg(long, value_name = "TECHNIQUE", help_heading = "Techniques",
+          conflicts_with_all = ["auto", "cull", "occlusion", "multiview", "hidden_area_mask", "far_field", "foveate",
+                                "views", "no_plain", "shade", "no_skip"])]
+    pub(super) technique: Option<Schedule>,
+    #[command(flatten)]
+    pub(super) techniques: TechniqueArgs,
+    #[command(flatten)]
+    pub(super) cache: CacheArgs,
+    #[command(flatten)]
+    pub(super) threads: Threads,
+}
+
+impl RasterArgs {
+    /// Pixels of all frames, as far as they are known without the scene.
+    ///
+    /// # Errors
+    /// An invalid display.
+    pub(super) fn pixels(&self) -> anyhow::Result<u64> {
+        let [width, height] = self
+            .scene
+            .hmd
+            .resolve(None, None)?
+            .eye_size_px
+            .map(u64::from);
+        let views = self.views.len() as u64;
+        Ok(width * height * views * u64::from(self.frames))
+    }
+}
+
+fn driver_parser() -> impl TypedValueParser<Value = Driver> {
+    choice([
+        (
+            "lavapipe",
+            Driver::Lavapipe,
+            "Mesa's Vulkan driver on the processor",
+        ),
+        (
+            "osmesa",
+            Driver::Osmesa,
+            "OpenGL without a window, through llvmpipe or (GALLIUM_DRIVER=softpipe) softpipe",
+        ),
+        (
+            "auto",
+            Driver::Auto,
+            "lavapipe where it is found, else OSMesa",
+        ),
+    ])
+}
+
+fn views_parser() -> impl TypedValueParser<Value = &'static [Eye]> {
+    const BOTH: &[Eye] = &[Eye::Left, Eye::Right];
+    choice([
+        ("stereo", BOTH, "Both eyes, left before right"),
+        ("left", &BOTH[..1], "The left eye alone"),
+        ("right", &BOTH[1..], "The right eye alone"),
+    ])
+}
+
+/// Names as in `replay run --hsr`.
+fn hsr_parser() -> impl TypedValueParser<Value = Fragments> {
+    choice([
+        (
+            "none",
+            Fragments::All,
+            "Every fragment that a draw covers, whatever lies before it; for `replay run --hsr none`",
+        ),
+        (
+            "early-z",
+            Fragments::DepthTested,
+            "Fragments that pass the depth test when they are drawn; for `--hsr early-z` and `deferred`",
+        ),
+    ])
+}
+
+impl RasterArgs {
+    /// Refuses options that the OSMesa backend does not support.
+    pub(super) fn check_plain_frames(&self) -> anyhow::Result<()> {
+        let auto = self.auto.map(|_| "--auto");
+        let named = self.technique.as_ref().map(|_| "--technique");
+        if let Some(flag) = auto
+            .or(named)
+            .or_else(|| self.techniques.beyond_plain_frames())
+        {
+            bail!(
+                "{flag}: expected with --backend lavapipe, found with osmesa, which captures plain frames alone"
+            );
+        }
+        Ok(())
+    }
+
+    /// Refuses options that depend on the depth test.
+    pub(super) fn check_without_depth_test(&self) -> anyhow::Result<()> {
+        ensure!(
+            !self.techniques.has_far_field(),
+            "--hsr none: expected every fragment to be drawn, found --far-field, whose layers hold only what the depth of others leaves open"
+        );
+        ensure!(
+            self.auto.is_none(),
+            "--hsr none: expected techniques by their own options, found --auto, which measures frames with the depth test"
+        );
+        ensure!(
+            self.technique.is_none(),
+            "--hsr none: expected techniques by their own options, found --technique, which captures with the depth test"
+        );
+        Ok(())
+    }
+}
