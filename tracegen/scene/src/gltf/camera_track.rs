@@ -72,7 +72,8 @@ pub(crate) fn camera_track(
     for &node in &nodes {
         for target in targets.remove(&node).unwrap_or_default() {
             if let Moved::Joint(channel) = target.moved {
-                let curve = channels::curve(&buffers, &target.place, channel, target.sampler)?;
+                let (place, sampler) = (&target.place, target.sampler);
+                let curve = channels::curve(&buffers, place, channel, sampler, &mut warnings)?;
                 curves.entry(node).or_default().push((channel, curve));
             }
         }
