@@ -15,6 +15,7 @@ pub mod image;
 mod image_files;
 pub mod light;
 mod load;
+mod lookup;
 mod model;
 mod motion;
 mod obj;

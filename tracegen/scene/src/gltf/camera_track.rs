@@ -9,6 +9,7 @@ use super::{Parsed, nodes, parse, read_buffers, rig, tree};
 use crate::SceneError;
 use crate::animation::{Channel, Curve};
 use crate::files::{Origin, read_file, shown};
+use crate::lookup::Lookup;
 use crate::paths::CameraTrack;
 use crate::warnings::Warnings;
 use glam::DVec3;
@@ -36,7 +37,7 @@ pub(crate) fn camera_track(
         ..
     } = parse(&origin, &bytes, &mut Warnings::default())?;
     let root = document.as_json();
-    let buffers = read_buffers(&origin, root, blob, &mut warnings)?;
+    let buffers = read_buffers(&origin, root, blob, &mut Lookup::default(), &mut warnings)?;
     let buffers = Buffers::new(root, buffers, &origin, bytes.len());
     let mut targets = channels::targets(root, 0..root.animations.len(), &origin)?;
     let tree = tree::read(root, &origin)?;

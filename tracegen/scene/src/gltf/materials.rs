@@ -10,8 +10,10 @@
 //! roughness = 1 - glossiness; the glossiness channel of its texture is not used.
 
 use super::accessors::Buffers;
+use super::find_file;
 use crate::files::{Origin, shown};
 use crate::image_files::{Embedded, Request, Requests, Source, Usage};
+use crate::lookup::Lookup;
 use crate::uri::{self, Uri};
 use crate::warnings::Warnings;
 use crate::{AlphaMode, LoadOptions, Material, SceneError, TextureRef};
@@ -22,7 +24,6 @@ use gltf::material::AlphaMode as JsonAlphaMode;
 use gltf::texture::{Info, MagFilter, MinFilter, Texture, WrappingMode};
 use serde::Deserialize;
 use std::collections::HashMap;
-use std::path::Path;
 use std::sync::Arc;
 
 const TRANSFORM: &str = "KHR_texture_transform";
@@ -44,6 +45,7 @@ pub(super) struct Table<'a> {
     options: &'a LoadOptions,
     /// The image of each texture.
     texture_images: &'a [Option<usize>],
+    lookup: &'a mut Lookup,
     /// The scene's index of each used glTF material (`None` is glTF's default material) and the
     /// attributes that it needs.
     used: HashMap<Option<usize>, (usize, Uses)>,
@@ -77,6 +79,7 @@ impl<'a> Table<'a> {
         origin: &'a Origin,
         options: &'a LoadOptions,
         texture_images: &'a [Option<usize>],
+        lookup: &'a mut Lookup,
     ) -> Self {
         Self {
             document,
@@ -84,6 +87,7 @@ impl<'a> Table<'a> {
             origin,
             options,
             texture_images,
+            lookup,
             used: HashMap::new(),
             sources: HashMap::new(),
             materials: Vec::new(),
@@ -344,7 +348,7 @@ impl<'a> Table<'a> {
     }
 
     /// The source of an image, and its file's name.
-    fn source(&self, index: usize, place: &str) -> Result<(Source, Option<String>), SceneError> {
+    fn source(&mut self, index: usize, place: &str) -> Result<(Source, Option<String>), SceneError> {
         let origin = self.origin;
         let embedded = |bytes: Arc<[u8]>| {
             Source::Bytes(Embedded {
@@ -362,8 +366,9 @@ impl<'a> Table<'a> {
         match (&json.uri, &json.buffer_view) {
             (Some(uri), _) => match uri::parse(uri) {
                 Ok(Uri::Path(path)) => {
-                    let file = origin.sibling(Path::new(&path));
-                    let name = Path::new(&path).file_name();
+                    let (lookup, warnings) = (&mut *self.lookup, &mut self.warnings);
+                    let file = find_file(origin, uri, path, place, lookup, warnings);
+                    let name = file.file_name();
                     let name = name.map(|n| n.to_string_lossy().into_owned());
                     Ok((Source::File(file), name))
                 }

@@ -71,6 +71,28 @@ pub const ROWS: &[Row] = &[
         },
         test: TEST,
     },
+    Row {
+        feature: "points or lines alone",
+        status: Status::Refused,
+        how: "holds points, not triangles",
+        load: |f| mode(0, &[0, 1, 2, 3]).load(f),
+        check: |_, _| {},
+        test: TEST,
+    },
+    Row {
+        feature: "glTF 1.0",
+        status: Status::Refused,
+        how: "expected 2.0, found '1.0'",
+        load: |f| {
+            let mut file = File::quad();
+            file.json["asset"]["version"] = json!("1.0");
+            // Version 1.0 has objects where 2.0 has lists.
+            file.json["materials"] = json!({"paint": {}});
+            file.load(f)
+        },
+        check: |_, _| {},
+        test: TEST,
+    },
     drawn(
         "sparse accessors",
         "as stored",

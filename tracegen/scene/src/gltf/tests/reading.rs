@@ -263,6 +263,46 @@ fn points_and_lines_are_skipped_with_a_warning() {
 }
 
 #[test]
+fn files_are_found_as_other_systems_and_tools_name_them() {
+    for (uri, on_disk, warns) in [
+        ("my%20image.png", "my image.png", false),
+        ("my image.png", "my image.png", false),
+        ("./my%20image.png", "my image.png", false),
+        ("my%20image.png", "my%20image.png", true),
+        ("MY%20Image.PNG", "my image.png", true),
+        ("maps\\my%20image.png", "maps/my image.png", true),
+        ("../work/maps/my image.png", "my image.png", true),
+    ] {
+        let json = with(textured(), "/images/0/uri", json!(uri));
+        let files = Files::new(&json);
+        std::fs::create_dir(files.path("maps")).unwrap();
+        files.write(on_disk, &png([4, 4], [1, 2, 3, 255]));
+        let loaded = files.load().unwrap();
+        let texels = crate::image::texels(&loaded.scene.images, |_| true).unwrap();
+        assert_eq!(texels.len(), 1, "{uri}");
+        assert!(loaded.files.contains(&files.path(on_disk)), "{uri}");
+        let name = on_disk.trim_start_matches("maps/");
+        assert_eq!(loaded.scene.images[0].name, name);
+        let told = format!("images[0], used by materials[0] 'paint': '{uri}' is taken from");
+        let told = loaded.warnings.iter().any(|w| w.starts_with(&told));
+        assert_eq!(told, warns, "{uri}: {:?}", loaded.warnings);
+    }
+    let files = Files::new(&with(base(), "/buffers/0/uri", json!("Mesh.BIN")));
+    let loaded = files.load().unwrap();
+    assert!(loaded.files.contains(&files.path("mesh.bin")));
+    let told = &loaded.warnings[0];
+    assert!(
+        told.starts_with("buffers[0]: 'Mesh.BIN' is taken from"),
+        "{told}"
+    );
+    let json = with(base(), "/materials", textured()["materials"].clone());
+    let mut json = with(json, "/textures", json!([{"source": 0}]));
+    json["images"] = json!([{"uri": "nowhere/absent.png"}]);
+    json["meshes"][0]["primitives"][0]["material"] = json!(0);
+    Files::new(&json).fails_with(&["absent.png", "images[0]", "cannot read"]);
+}
+
+#[test]
 fn ignored_features_are_reported_once_with_their_count() {
     let mut json = base();
     json["extensionsUsed"] = json!(["FOO_a", "KHR_texture_transform", "FOO_b"]);
