@@ -26,6 +26,7 @@ pub mod paths;
 mod real_scenes;
 pub mod srgb;
 mod suggest;
+pub mod units;
 mod uri;
 mod warnings;
 
