@@ -8,7 +8,7 @@ OUT   ?= out
 # Folder of the real scenes (docs/use/real-scenes.md).
 SCENES ?= $(OUT)/scenes
 
-.PHONY: demo apps techniques accuracy stress notebooks test fuzz faults bench lint build deps golden figures reproduce clean screenshots scenes
+.PHONY: demo apps techniques accuracy stress notebooks test fuzz faults bench lint build deps golden figures reproduce clean screenshots scenes scene-files
 
 demo: deps build
 	@OUT="$(OUT)" scripts/demo.sh
@@ -76,6 +76,10 @@ screenshots: deps build
 # Fetches and converts the real scenes that may be had by address, into $(SCENES).
 scenes:
 	@scripts/scenes.sh "$(SCENES)"
+
+# Draws the glTF files of published packages and writes results/scene-files.csv, about ten minutes (docs/use/scene-files.md).
+scene-files: deps build
+	@python3 -B scripts/scene_files.py "$${CARGO_TARGET_DIR:-target}/release/tracegen" "$(OUT)/scene-files" results/scene-files.csv
 
 # Measures the tables of the documents again and prints what moved (docs/use/real-scenes.md):
 #   make reproduce SCENES=folder SCRIPTS="policies levels"

@@ -20,7 +20,7 @@ def unpack(package, folder, wanted):
 
 
 def unpack_tar(file, folder, wanted):
-    with tarfile.open(fileobj=file, mode="r|xz") as archive:
+    with tarfile.open(fileobj=file, mode="r|*") as archive:
         for member in archive:
             path = member.name.removeprefix("./")
             if member.isfile() and path.startswith(wanted) and ".." not in path.split("/"):

@@ -7,6 +7,7 @@
 mod applications;
 mod paper_comparison;
 mod reprojection;
+mod scene_files;
 mod shards;
 mod view;
 
@@ -37,6 +38,7 @@ const VIEWS: &[(&str, &str, View)] = &[
         paper_comparison::crytek_500mm,
     ),
     ("reprojection", "reprojection", reprojection::table),
+    ("scene-files", "scene-files", scene_files::table),
     (
         "shadow-map-layout",
         "shadow-map-layout",

@@ -57,6 +57,11 @@ pub(crate) fn shown(text: &str) -> String {
     }
 }
 
+/// Every byte as the character of the same number.
+pub(crate) fn latin1(bytes: &[u8]) -> String {
+    bytes.iter().map(|&b| char::from(b)).collect()
+}
+
 /// Reads a whole regular file of at most `max_bytes`. Errors name `place`, which refers to it.
 pub(crate) fn read_file(file: &Path, place: &str, max_bytes: u64) -> Result<Vec<u8>, SceneError> {
     let length = check_regular(file, place)?.len();

@@ -15,6 +15,7 @@ pub mod image;
 mod image_files;
 pub mod light;
 mod load;
+mod lookup;
 mod model;
 mod motion;
 mod obj;
@@ -25,6 +26,7 @@ pub mod paths;
 mod real_scenes;
 pub mod srgb;
 mod suggest;
+pub mod units;
 mod uri;
 mod warnings;
 

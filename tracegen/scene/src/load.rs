@@ -36,11 +36,16 @@ pub fn load_file(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneErro
         .map(|s| s.to_string_lossy().into_owned())
         .unwrap_or_default();
     if loaded.scene.triangle_count() == 0 {
+        // The warnings say what was left out.
+        let why = match loaded.warnings.as_slice() {
+            [] => String::new(),
+            warnings => format!(" ({})", warnings.join("; ")),
+        };
         return Err(SceneError::Invalid {
             file: path.to_owned(),
             place: "scene".into(),
             expected: "at least one triangle".into(),
-            found: "none".into(),
+            found: format!("none{why}"),
         });
     }
     let bounds = loaded.scene.bounds();

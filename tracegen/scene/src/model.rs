@@ -227,7 +227,7 @@ impl Material {
     }
 
     /// Mutable references to the slots of [`Self::textures`].
-    fn textures_mut(&mut self) -> [&mut Option<TextureRef>; 6] {
+    pub(crate) fn textures_mut(&mut self) -> [&mut Option<TextureRef>; 6] {
         [
             &mut self.base_color_texture,
             &mut self.normal_texture,

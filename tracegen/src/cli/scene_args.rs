@@ -6,7 +6,7 @@ use clap::Args;
 use formats::view::{FovTangents, FrameViews, Hmd};
 use glam::{DVec3, Vec3};
 use scene::paths::Moments;
-use scene::{Camera, LoadOptions, Loaded, Scene, cameras, hmd};
+use scene::{Camera, LoadOptions, Loaded, Scene, cameras, hmd, units};
 use scenes::load_with;
 use shell::Output;
 use std::ops::Range;
@@ -113,6 +113,11 @@ impl SceneArgs {
             None => None,
         };
         let hmd = self.hmd.resolve(default_size_px, vfov_deg)?;
+        if self.hmd.ipd.is_none()
+            && let Some(warning) = units::warning(&scene, &camera, hmd.ipd_m)
+        {
+            shell::warn(&format!("{}: {warning}", self.scene));
+        }
         let heads = path.poses(&camera, &moments)?;
         let camera = path.start(&camera)?;
         let frames = cameras::frame_views(&camera, &hmd, moments.frames.start, &heads);

@@ -40,7 +40,7 @@ fn hermite(t: f64, step: f64) -> [f64; 4] {
 #[derive(Clone, Debug)]
 pub(crate) struct Curve {
     pub interpolation: Interpolation,
-    /// Seconds, ascending; at least one.
+    /// Seconds, ascending or equal; at least one.
     pub times_s: Vec<f64>,
     /// One per key, or three with [`Interpolation::Cubic`].
     pub values: Vec<DVec4>,
@@ -78,7 +78,7 @@ impl Curve {
 #[derive(Clone, Debug)]
 pub(crate) struct WeightCurve {
     pub interpolation: Interpolation,
-    /// Seconds, ascending; at least one.
+    /// Seconds, ascending or equal; at least one.
     pub times_s: Vec<f64>,
     /// Rows of one weight per target; as many rows as [`Curve::values`] has values.
     pub values: Vec<f64>,

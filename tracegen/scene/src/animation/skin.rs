@@ -95,8 +95,8 @@ impl Influences {
         (pairs, weights.iter().map(|&w| f64::from(w)).sum())
     }
 
-    /// The weighted mean of a vertex's joints. A vertex without weights follows the first joint; no
-    /// triangle uses such a vertex.
+    /// The weighted mean of a vertex's joints. No triangle uses a vertex without weights;
+    /// such a vertex follows the skin's first joint.
     pub fn blend(&self, vertex: usize, skin: &PosedSkin) -> DAffine3 {
         let (pairs, sum) = self.of(vertex);
         if sum == 0.0 {

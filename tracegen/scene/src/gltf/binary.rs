@@ -7,13 +7,16 @@ const HEADER_BYTES: usize = 12;
 const CHUNK_HEADER_BYTES: usize = 8;
 const JSON: &[u8] = b"JSON";
 
-/// Checks every length of a GLB and that its first chunk is JSON. Returns its bytes up to the
+/// Checks the version and every length of a GLB, and that its first chunk is JSON. Returns its bytes up to the
 /// length that the header states.
 pub(super) fn check<'a>(bytes: &'a [u8], origin: &Origin) -> Result<&'a [u8], SceneError> {
     let number = |at: usize| {
         let four = bytes.get(at..at + 4).and_then(|b| b.try_into().ok());
         four.map(u32::from_le_bytes)
     };
+    if let Some(version) = number(4).filter(|version| *version != 2) {
+        return Err(origin.invalid("GLB header, byte 4", "version 2", version.to_string()));
+    }
     let length = number(8).unwrap_or(0) as usize;
     if length < HEADER_BYTES + CHUNK_HEADER_BYTES || length > bytes.len() {
         return Err(origin.invalid(

@@ -9,6 +9,7 @@ use super::{Parsed, nodes, parse, read_buffers, rig, tree};
 use crate::SceneError;
 use crate::animation::{Channel, Curve};
 use crate::files::{Origin, read_file, shown};
+use crate::lookup::Lookup;
 use crate::paths::CameraTrack;
 use crate::warnings::Warnings;
 use glam::DVec3;
@@ -36,7 +37,7 @@ pub(crate) fn camera_track(
         ..
     } = parse(&origin, &bytes, &mut Warnings::default())?;
     let root = document.as_json();
-    let buffers = read_buffers(&origin, root, blob, &mut warnings)?;
+    let buffers = read_buffers(&origin, root, blob, &mut Lookup::default(), &mut warnings)?;
     let buffers = Buffers::new(root, buffers, &origin, bytes.len());
     let mut targets = channels::targets(root, 0..root.animations.len(), &origin)?;
     let tree = tree::read(root, &origin)?;
@@ -72,7 +73,8 @@ pub(crate) fn camera_track(
     for &node in &nodes {
         for target in targets.remove(&node).unwrap_or_default() {
             if let Moved::Joint(channel) = target.moved {
-                let curve = channels::curve(&buffers, &target.place, channel, target.sampler)?;
+                let (place, sampler) = (&target.place, target.sampler);
+                let curve = channels::curve(&buffers, place, channel, sampler, &mut warnings)?;
                 curves.entry(node).or_default().push((channel, curve));
             }
         }

@@ -4,6 +4,7 @@ use super::accessors::{Buffers, at};
 use crate::SceneError;
 use crate::animation::{Channel, Curve, Interpolation, WeightCurve};
 use crate::files::Origin;
+use crate::warnings::Warnings;
 use glam::{DVec3, DVec4};
 use gltf::json::Root;
 use gltf::json::animation::{Interpolation as JsonInterpolation, Property, Sampler};
@@ -120,6 +121,7 @@ fn keys(
     buffers: &Buffers<'_>,
     place: &Place<'_>,
     sampler: &Sampler,
+    warnings: &mut Warnings,
 ) -> Result<(Interpolation, Vec<f64>), SceneError> {
     let interpolation = match sampler.interpolation {
         Checked::Valid(JsonInterpolation::Linear) => Interpolation::Linear,
@@ -132,12 +134,19 @@ fn keys(
     };
     let times = buffers.floats::<1>(at(&sampler.input), "times: scalar floats")?;
     let times_s: Vec<f64> = times.iter().map(|[time]| f64::from(*time)).collect();
-    let ascending = times_s.is_sorted_by(|a, b| a < b) && times_s.iter().all(|t| t.is_finite());
+    let ascending = times_s.is_sorted() && times_s.iter().all(|t| t.is_finite());
     if times_s.is_empty() || !ascending {
         return place.invalid(
             "at least one time, finite and ascending".to_owned(),
             format!("{} times that are not", times_s.len()),
         );
+    }
+    let equal = times_s.windows(2).filter(|pair| pair[0] == pair[1]).count();
+    if equal > 0 {
+        warnings.count("equal times", || {
+            let channel = place.channel;
+            format!("{channel}: {equal} keys have the time of the key before; the last one counts from then on")
+        });
     }
     Ok((interpolation, times_s))
 }
@@ -148,12 +157,13 @@ pub(super) fn curve(
     place: &str,
     channel: Channel,
     sampler: &Sampler,
+    warnings: &mut Warnings,
 ) -> Result<Curve, SceneError> {
     let place = Place {
         origin: buffers.origin,
         channel: place,
     };
-    let (interpolation, times_s) = keys(buffers, &place, sampler)?;
+    let (interpolation, times_s) = keys(buffers, &place, sampler, warnings)?;
     let values: Vec<DVec4> = if channel == Channel::Rotation {
         let values = buffers.floats::<4>(at(&sampler.output), "rotations: vectors of 4 floats")?;
         values
@@ -195,12 +205,13 @@ pub(super) fn weight_curve(
     place: &str,
     targets: usize,
     sampler: &Sampler,
+    warnings: &mut Warnings,
 ) -> Result<WeightCurve, SceneError> {
     let place = Place {
         origin: buffers.origin,
         channel: place,
     };
-    let (interpolation, times_s) = keys(buffers, &place, sampler)?;
+    let (interpolation, times_s) = keys(buffers, &place, sampler, warnings)?;
     let values = buffers.floats::<1>(at(&sampler.output), "weights: scalar floats")?;
     let values: Vec<f64> = values.iter().map(|[weight]| f64::from(*weight)).collect();
     place.check_count(values.len(), targets, interpolation, &times_s)?;

@@ -29,11 +29,16 @@ pub(super) const SUPPORTED: [&str; 17] = [
     "MSFT_texture_dds",
 ];
 
+/// The part of the JSON that is the same in all versions of glTF.
+#[derive(Deserialize)]
+struct Versioned {
+    asset: Asset,
+}
+
 /// The part of the JSON that states which features are needed to read the rest.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Asked {
-    asset: Asset,
     #[serde(default)]
     textures: Vec<Texture>,
     #[serde(default)]
@@ -45,7 +50,8 @@ struct Asked {
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Asset {
-    version: String,
+    /// A string, and in files of glTF 1.0 also a number.
+    version: Value,
     min_version: Option<String>,
 }
 
@@ -67,8 +73,11 @@ fn check_version(asset: &Asset, origin: &Origin) -> Result<(), SceneError> {
         let (major, minor) = version.split_once('.')?;
         Some((major.parse().ok()?, minor.parse().ok()?))
     };
-    let version = &asset.version;
-    if !matches!(parts(version), Some((2, _))) {
+    let version = match &asset.version {
+        Value::String(version) => version.clone(),
+        other => other.to_string(),
+    };
+    if !matches!(parts(&version), Some((2, _))) {
         return Err(origin.invalid("asset.version", "2.0", format!("'{version}'")));
     }
     match asset.min_version.as_deref() {
@@ -114,8 +123,9 @@ pub(super) fn check(
     origin: &Origin,
     warnings: &mut Warnings,
 ) -> Result<Vec<Option<usize>>, SceneError> {
+    let versioned: Versioned = serde_json::from_slice(json).map_err(|e| not_gltf(origin, &e))?;
+    check_version(&versioned.asset, origin)?;
     let asked: Asked = serde_json::from_slice(json).map_err(|e| not_gltf(origin, &e))?;
-    check_version(&asked.asset, origin)?;
     let required = unsupported(&asked.extensions_required);
     if !required.is_empty() {
         return Err(origin.invalid(

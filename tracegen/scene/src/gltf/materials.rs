@@ -10,8 +10,10 @@
 //! roughness = 1 - glossiness; the glossiness channel of its texture is not used.
 
 use super::accessors::Buffers;
+use super::find_file;
 use crate::files::{Origin, shown};
 use crate::image_files::{Embedded, Request, Requests, Source, Usage};
+use crate::lookup::Lookup;
 use crate::uri::{self, Uri};
 use crate::warnings::Warnings;
 use crate::{AlphaMode, LoadOptions, Material, SceneError, TextureRef};
@@ -22,7 +24,6 @@ use gltf::material::AlphaMode as JsonAlphaMode;
 use gltf::texture::{Info, MagFilter, MinFilter, Texture, WrappingMode};
 use serde::Deserialize;
 use std::collections::HashMap;
-use std::path::Path;
 use std::sync::Arc;
 
 const TRANSFORM: &str = "KHR_texture_transform";
@@ -30,10 +31,32 @@ const TRANSFORM: &str = "KHR_texture_transform";
 /// Attributes that a mesh needs for its material.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Uses {
-    pub uv0: bool,
-    pub uv1: bool,
-    /// The normal map's texture coordinate set.
+    /// The file's set of texture coordinates for each set of a mesh, and whether a texture samples it.
+    pub sets: [(u32, bool); 2],
+    /// The normal map's set, of those of a mesh.
     pub normal_map_uv: Option<u32>,
+}
+
+impl Uses {
+    /// Chooses the sets of a mesh for the (at most two) sets that a material samples. Sets 0 and 1 keep
+    /// their places.
+    fn new(sampled: &[u32]) -> Self {
+        let mut sets = [0, 1].map(|set| (set, sampled.contains(&set)));
+        for &set in sampled.iter().filter(|&&set| set > 1) {
+            if let Some(free) = sets.iter_mut().rev().find(|(_, used)| !used) {
+                *free = (set, true);
+            }
+        }
+        Self {
+            sets,
+            normal_map_uv: None,
+        }
+    }
+
+    /// The set of a mesh for a set of the file.
+    fn of_mesh(&self, set: u32) -> u32 {
+        u32::from(self.sets[1].0 == set)
+    }
 }
 
 /// The materials that placed meshes use, in order of first use. Others are not read.
@@ -44,6 +67,7 @@ pub(super) struct Table<'a> {
     options: &'a LoadOptions,
     /// The image of each texture.
     texture_images: &'a [Option<usize>],
+    lookup: &'a mut Lookup,
     /// The scene's index of each used glTF material (`None` is glTF's default material) and the
     /// attributes that it needs.
     used: HashMap<Option<usize>, (usize, Uses)>,
@@ -57,6 +81,8 @@ pub(super) struct Table<'a> {
     pub warnings: Warnings,
     /// The current material, named in errors.
     place: String,
+    /// The sets of texture coordinates that the current material samples.
+    sets: Vec<u32>,
 }
 
 /// One slot of a material, in the order of [`Material::textures`].
@@ -77,6 +103,7 @@ impl<'a> Table<'a> {
         origin: &'a Origin,
         options: &'a LoadOptions,
         texture_images: &'a [Option<usize>],
+        lookup: &'a mut Lookup,
     ) -> Self {
         Self {
             document,
@@ -84,12 +111,14 @@ impl<'a> Table<'a> {
             origin,
             options,
             texture_images,
+            lookup,
             used: HashMap::new(),
             sources: HashMap::new(),
             materials: Vec::new(),
             requests: Requests::default(),
             warnings: Warnings::default(),
             place: String::new(),
+            sets: Vec::new(),
         }
     }
 
@@ -98,7 +127,8 @@ impl<'a> Table<'a> {
         if let Some(known) = self.used.get(&material) {
             return Ok(*known);
         }
-        let read = match material.and_then(|m| self.document.materials().nth(m)) {
+        self.sets.clear();
+        let mut read = match material.and_then(|m| self.document.materials().nth(m)) {
             Some(json) => self.build(&json)?,
             // glTF's default material is fully metallic. A dielectric shows its shape better.
             None => Material {
@@ -107,11 +137,12 @@ impl<'a> Table<'a> {
             },
         };
         let textures = || read.textures().into_iter().flatten();
-        let uses = Uses {
-            uv0: textures().any(|t| t.uv_set == 0),
-            uv1: textures().any(|t| t.uv_set == 1),
-            normal_map_uv: read.normal_texture.map(|t| t.uv_set),
-        };
+        self.sets.retain(|set| textures().any(|t| t.uv_set == *set));
+        let mut uses = Uses::new(&self.sets);
+        for texture in read.textures_mut().into_iter().flatten() {
+            texture.uv_set = uses.of_mesh(texture.uv_set);
+        }
+        uses.normal_map_uv = read.normal_texture.map(|t| t.uv_set);
         let known = (self.materials.len(), uses);
         self.used.insert(material, known);
         self.materials.push(read);
@@ -286,15 +317,6 @@ impl<'a> Table<'a> {
             .as_ref()
             .and_then(|t| t.tex_coord)
             .unwrap_or(uv_set);
-        if uv_set > 1 {
-            self.warnings.count("uv set", || {
-                format!(
-                    "{} uses TEXCOORD_{uv_set}; only 0 and 1 are read, the texture is left out",
-                    self.place
-                )
-            });
-            return Ok(None);
-        }
         let Some(image) = self.texture_images.get(texture.index()).copied().flatten() else {
             self.warnings.count("no image", || {
                 format!(
@@ -305,6 +327,18 @@ impl<'a> Table<'a> {
             });
             return Ok(None);
         };
+        if !self.sets.contains(&uv_set) {
+            if let [a, b] = self.sets[..] {
+                self.warnings.count("uv set", || {
+                    format!(
+                        "{} uses TEXCOORD_{a}, TEXCOORD_{b} and TEXCOORD_{uv_set}; a material has at most two sets, the texture of the last one is left out",
+                        self.place
+                    )
+                });
+                return Ok(None);
+            }
+            self.sets.push(uv_set);
+        }
         let request = self.request(image, usage)?;
         let uv_transform = transform.map_or(TextureRef::IDENTITY, |t| matrix(&t));
         if !uv_transform.as_flattened().iter().all(|v| v.is_finite()) {
@@ -344,7 +378,11 @@ impl<'a> Table<'a> {
     }
 
     /// The source of an image, and its file's name.
-    fn source(&self, index: usize, place: &str) -> Result<(Source, Option<String>), SceneError> {
+    fn source(
+        &mut self,
+        index: usize,
+        place: &str,
+    ) -> Result<(Source, Option<String>), SceneError> {
         let origin = self.origin;
         let embedded = |bytes: Arc<[u8]>| {
             Source::Bytes(Embedded {
@@ -362,8 +400,9 @@ impl<'a> Table<'a> {
         match (&json.uri, &json.buffer_view) {
             (Some(uri), _) => match uri::parse(uri) {
                 Ok(Uri::Path(path)) => {
-                    let file = origin.sibling(Path::new(&path));
-                    let name = Path::new(&path).file_name();
+                    let (lookup, warnings) = (&mut *self.lookup, &mut self.warnings);
+                    let file = find_file(origin, uri, path, place, lookup, warnings);
+                    let name = file.file_name();
                     let name = name.map(|n| n.to_string_lossy().into_owned());
                     Ok((Source::File(file), name))
                 }

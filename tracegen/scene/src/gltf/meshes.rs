@@ -115,17 +115,23 @@ impl Reader<'_> {
         let material = variants::material(self.primitive, self.variant);
         let (material, uses) = materials.index(material)?;
         let count = positions.len();
-        let uv0 = self.texture_coordinates(0, count, warnings)?;
-        if uv0.is_none() && uses.uv0 {
-            warnings.count("no TEXCOORD_0", || {
-                format!("{place} has a textured material and no TEXCOORD_0; (0, 0) is used")
-            });
-        }
-        let uv1 = if uses.uv1 {
-            self.texture_coordinates(1, count, warnings)?
+        let [(set0, uses0), (set1, uses1)] = uses.sets;
+        let uv0 = self.texture_coordinates(set0, count, warnings)?;
+        let uv1 = if uses1 {
+            self.texture_coordinates(set1, count, warnings)?
         } else {
             None
         };
+        for (set, missing) in [
+            (set0, uses0 && uv0.is_none()),
+            (set1, uses1 && uv1.is_none()),
+        ] {
+            if missing {
+                warnings.count("no coordinates", || {
+                    format!("{place} has a textured material and no TEXCOORD_{set}; (0, 0) is used")
+                });
+            }
+        }
         let normals = self.vectors(&Semantic::Normals, "normals: Vec3 of F32")?;
         let tangents = self.vectors(&Semantic::Tangents, "tangents: Vec4 of F32")?;
 

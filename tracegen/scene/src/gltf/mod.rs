@@ -31,6 +31,7 @@ mod tree;
 mod variants;
 
 use super::files::{Origin, read_file, read_start, shown};
+use super::lookup::Lookup;
 use super::origin;
 use super::uri::{self, Uri};
 use super::warnings::Warnings;
@@ -64,7 +65,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     let json_bytes = bytes.len();
     drop(bytes);
     let root = document.as_json();
-    let buffers = read_buffers(&origin, root, blob, &mut warnings)?;
+    let mut lookup = Lookup::default();
+    let buffers = read_buffers(&origin, root, blob, &mut lookup, &mut warnings)?;
     let buffers = Buffers::new(root, buffers, &origin, json_bytes);
 
     let rig = rig::read(
@@ -81,8 +83,14 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     };
     let placed = nodes::walk(root, local, &origin)?;
     let variant = variants::chosen(root, options.variant.as_deref(), &origin)?;
-    let mut materials =
-        materials::Table::new(&document, &buffers, &origin, options, &texture_images);
+    let mut materials = materials::Table::new(
+        &document,
+        &buffers,
+        &origin,
+        options,
+        &texture_images,
+        &mut lookup,
+    );
     let mut placing = Placing {
         buffers: &buffers,
         transforms: &transforms,
@@ -104,7 +112,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     Ok(Loaded {
         scene,
         warnings: warnings.into_sentences(),
-        files: referenced_files(&origin, root),
+        files: referenced_files(&origin, root, &mut lookup),
         animations: rig::names(root).iter().map(|name| shown(name)).collect(),
     })
 }
@@ -147,8 +155,36 @@ fn place_views(
     of
 }
 
+/// The file that a URI names: as written, or else as another system or tool would write it.
+fn named_file(origin: &Origin, uri: &str, path: String, lookup: &mut Lookup) -> PathBuf {
+    let names = [path, uri.to_owned()];
+    match lookup.find(origin.folder(), &names) {
+        Some(found) => found.path,
+        None => origin.sibling(Path::new(&names[0])),
+    }
+}
+
+/// The file that a URI names, with a warning if its name is another one.
+fn find_file(
+    origin: &Origin,
+    uri: &str,
+    path: String,
+    place: &str,
+    lookup: &mut Lookup,
+    warnings: &mut Warnings,
+) -> PathBuf {
+    let exact = origin.sibling(Path::new(&path));
+    let file = named_file(origin, uri, path, lookup);
+    if file != exact {
+        warnings.count("inexact name", || {
+            format!("{place}: '{uri}' is taken from {}", file.display())
+        });
+    }
+    file
+}
+
 /// The file itself and every file that its URIs name.
-fn referenced_files(origin: &Origin, root: &Root) -> Vec<PathBuf> {
+fn referenced_files(origin: &Origin, root: &Root, lookup: &mut Lookup) -> Vec<PathBuf> {
     let buffers = root
         .buffers
         .iter()
@@ -157,7 +193,7 @@ fn referenced_files(origin: &Origin, root: &Root) -> Vec<PathBuf> {
     let named = buffers
         .chain(images)
         .filter_map(|uri| match uri::parse(uri) {
-            Ok(Uri::Path(path)) => Some(origin.sibling(Path::new(&path))),
+            Ok(Uri::Path(path)) => Some(named_file(origin, uri, path, lookup)),
             Ok(Uri::Data(_)) | Err(_) => None,
         });
     std::iter::once(origin.file.clone()).chain(named).collect()
@@ -257,6 +293,7 @@ fn read_buffers(
     origin: &Origin,
     root: &Root,
     mut blob: Option<Vec<u8>>,
+    lookup: &mut Lookup,
     warnings: &mut Warnings,
 ) -> Result<Vec<Vec<u8>>, SceneError> {
     let mut buffers = Vec::with_capacity(root.buffers.len());
@@ -283,7 +320,7 @@ fn read_buffers(
             Some(uri) => match uri::parse(uri) {
                 Ok(Uri::Data(bytes)) => (whole(bytes), "the data URI".to_owned()),
                 Ok(Uri::Path(path)) => {
-                    let file = origin.sibling(Path::new(&path));
+                    let file = find_file(origin, uri, path, &place, lookup, warnings);
                     let read = read_start(&file, &place, wanted)?;
                     (read, file.display().to_string())
                 }

@@ -103,7 +103,8 @@ pub(super) fn read(
             let (place, sampler) = (&target.place, target.sampler);
             match target.moved {
                 Moved::Joint(channel) => {
-                    curves.push((channel, channels::curve(buffers, place, channel, sampler)?));
+                    let curve = channels::curve(buffers, place, channel, sampler, warnings)?;
+                    curves.push((channel, curve));
                 }
                 Moved::Weights => match morphs::count_of_node(root, node) {
                     0 => warnings.count("weights of nothing", || {
@@ -112,7 +113,8 @@ pub(super) fn read(
                         )
                     }),
                     count => {
-                        let curve = channels::weight_curve(buffers, place, count, sampler)?;
+                        let curve =
+                            channels::weight_curve(buffers, place, count, sampler, warnings)?;
                         weights.insert(node, curve);
                     }
                 },

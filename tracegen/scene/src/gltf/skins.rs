@@ -88,7 +88,7 @@ impl Reader<'_> {
                 influences.weights.extend(weights[vertex]);
             }
         }
-        let used = self.check_influences(&influences, joints, indices)?;
+        let used = self.check_influences(&mut influences, joints, indices, warnings)?;
         // Vertices that no triangle uses may hold anything.
         let weights = influences.weights.chunks_exact_mut(influences.per_vertex);
         for (weights, _) in weights.zip(used).filter(|(_, used)| !used) {
@@ -118,12 +118,14 @@ impl Reader<'_> {
         self.buffers.joints(accessor).map(Some)
     }
 
-    /// Checks the vertices that triangles use, and returns a flag per vertex.
+    /// Checks the vertices that triangles use, and returns a flag per vertex. A used vertex without
+    /// weights gets one for its first joint, as in three.js.
     fn check_influences(
         &self,
-        influences: &Influences,
+        influences: &mut Influences,
         joints: usize,
         indices: &[u32],
+        warnings: &mut Warnings,
     ) -> Result<Vec<bool>, SceneError> {
         let mut checked = vec![false; influences.joints.len() / influences.per_vertex];
         for vertex in indices.iter().map(|&index| index as usize) {
@@ -134,6 +136,10 @@ impl Reader<'_> {
                 let place = format!("{}.{of}, vertex {vertex}", self.place);
                 Err(self.buffers.origin.invalid(place, expected, found))
             };
+            let not_a_joint = |joint: u16| {
+                let expected = format!("one of the {joints} joints of its skin");
+                invalid("JOINTS", expected, format!("joint {joint}"))
+            };
             let (pairs, sum) = influences.of(vertex);
             for (joint, weight) in pairs {
                 if !(weight >= 0.0 && weight.is_finite()) {
@@ -141,13 +147,19 @@ impl Reader<'_> {
                     return invalid("WEIGHTS", expected, weight.to_string());
                 }
                 if weight > 0.0 && usize::from(joint) >= joints {
-                    let expected = format!("one of the {joints} joints of its skin");
-                    return invalid("JOINTS", expected, format!("joint {joint}"));
+                    return not_a_joint(joint);
                 }
             }
             if sum == 0.0 {
-                let expected = "a weight above 0".to_owned();
-                return invalid("WEIGHTS", expected, "none".into());
+                let first = vertex * influences.per_vertex;
+                if usize::from(influences.joints[first]) >= joints {
+                    return not_a_joint(influences.joints[first]);
+                }
+                influences.weights[first] = 1.0;
+                warnings.count("no weights", || {
+                    let place = &self.place;
+                    format!("{place}.WEIGHTS, vertex {vertex} has no weight above 0; it follows its first joint")
+                });
             }
         }
         Ok(checked)

@@ -5,9 +5,9 @@
 //! `1 - d`.
 
 use super::library::{Entry, Map};
-use super::lookup::{Found, Lookup};
 use crate::files::Origin;
 use crate::image_files::{Request, Requests, Source, Usage, is_readable};
+use crate::lookup::{Found, Lookup};
 use crate::warnings::Warnings;
 use crate::{AlphaMode, LoadOptions, Material, TextureRef};
 use formats::texture::Wrap;

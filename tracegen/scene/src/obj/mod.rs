@@ -2,7 +2,6 @@
 
 mod elements;
 mod library;
-mod lookup;
 mod materials;
 mod meshes;
 mod polygon;
@@ -13,11 +12,11 @@ mod tests;
 use crate::error::SceneError;
 use crate::files::{Origin, read_file};
 use crate::image_files::Requests;
+use crate::lookup::Lookup;
 use crate::warnings::Warnings;
 use crate::{Instance, LoadOptions, Loaded, Material, Scene};
 use elements::Elements;
 use glam::Affine3A;
-use lookup::Lookup;
 use statements::{decode, without_comment};
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};

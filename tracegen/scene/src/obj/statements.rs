@@ -1,7 +1,7 @@
 //! OBJ and MTL text: encoding, continued lines, comments and numbers.
 
 use crate::error::SceneError;
-use crate::files::Origin;
+use crate::files::{Origin, latin1};
 use std::borrow::Cow;
 
 /// The file as text: UTF-8 with or without a byte order mark, or else Latin-1, in which every byte
@@ -18,11 +18,6 @@ pub(super) fn decode(bytes: Vec<u8>, origin: &Origin) -> Result<String, SceneErr
         text.drain(..'\u{feff}'.len_utf8());
     }
     Ok(text)
-}
-
-/// Every byte as the character of the same number.
-pub(super) fn latin1(bytes: &[u8]) -> String {
-    bytes.iter().map(|&b| char::from(b)).collect()
 }
 
 /// One statement: a line with its continuation lines.

@@ -6,7 +6,7 @@ use draco_core::{
     DataType, EncoderBuffer, EncoderOptions, GeometryAttributeType, Mesh, MeshEncoder,
     PointAttribute,
 };
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use scene::{LoadOptions, Loaded};
 use serde_json::json;
 
@@ -65,6 +65,57 @@ pub const ROWS: &[Row] = &[
             corners(l, f, 0.0);
             assert!(
                 l.warnings.iter().any(|w| w.contains("lines")),
+                "{:?}",
+                l.warnings
+            );
+        },
+        test: TEST,
+    },
+    Row {
+        feature: "points or lines alone",
+        status: Status::Refused,
+        how: "holds points, not triangles",
+        load: |f| mode(0, &[0, 1, 2, 3]).load(f),
+        check: |_, _| {},
+        test: TEST,
+    },
+    Row {
+        feature: "glTF 1.0",
+        status: Status::Refused,
+        how: "expected 2.0, found '1.0'",
+        load: |f| {
+            let mut file = File::quad();
+            file.json["asset"]["version"] = json!("1.0");
+            // Version 1.0 has objects where 2.0 has lists.
+            file.json["materials"] = json!({"paint": {}});
+            file.load(f)
+        },
+        check: |_, _| {},
+        test: TEST,
+    },
+    drawn(
+        "TEXCOORD_2 and up",
+        "any two sets per material",
+        |f| coordinates(&[0, 3]).load(f),
+        |l, f| {
+            let material = &l.scene.materials[0];
+            let sets = [material.base_color_texture, material.normal_texture];
+            assert_eq!(sets.map(|t| t.unwrap().uv_set), [0, 1], "{f}");
+            assert_eq!(l.scene.meshes[0].uv1, [Vec2::splat(3.0); 4], "{f}");
+            assert!(l.warnings.is_empty(), "{:?}", l.warnings);
+        },
+    ),
+    Row {
+        feature: "three sets of texture coordinates in a material",
+        status: Status::Approximated,
+        how: "the texture of the third set is left out, with a warning",
+        load: |f| coordinates(&[0, 3, 1]).load(f),
+        check: |l, f| {
+            let material = &l.scene.materials[0];
+            assert!(material.normal_texture.is_some(), "{f}");
+            assert!(material.occlusion_texture.is_none(), "{f}");
+            assert!(
+                l.warnings[0].contains("TEXCOORD_0, TEXCOORD_3 and TEXCOORD_1"),
                 "{:?}",
                 l.warnings
             );
@@ -186,6 +237,27 @@ fn mode(mode: u32, indices: &[u16]) -> File {
     let primitive = &mut file.json["meshes"][0]["primitives"][0];
     primitive["mode"] = json!(mode);
     primitive["indices"] = json!(indices);
+    file
+}
+
+/// A quad with textures of base colour, normals and occlusion in these sets of texture coordinates. Each set but
+/// the first one has one value.
+fn coordinates(sets: &[u32]) -> File {
+    const PIXEL: &str = "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8z8BQDwAEhQGAhKmMIQAAAABJRU5ErkJggg==";
+    let mut file = File::quad();
+    for &set in &sets[1..] {
+        let uv = file.floats("VEC2", &[[set as f32; 2]; 4]);
+        file.json["meshes"][0]["primitives"][0]["attributes"][format!("TEXCOORD_{set}")] =
+            json!(uv);
+    }
+    file.json["images"] = json!([{"uri": PIXEL}]);
+    file.json["textures"] = json!([{"source": 0}]);
+    let material = &mut file.json["materials"][0];
+    material["pbrMetallicRoughness"] =
+        json!({"baseColorTexture": {"index": 0, "texCoord": sets[0]}});
+    for (texture, set) in ["normalTexture", "occlusionTexture"].iter().zip(&sets[1..]) {
+        material[texture] = json!({"index": 0, "texCoord": set});
+    }
     file
 }
 

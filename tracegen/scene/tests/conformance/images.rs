@@ -45,6 +45,23 @@ pub const ROWS: &[Row] = &[
         pixels("jpeg"),
         |l, f| near(l, f, 40, false)
     ),
+    Row {
+        feature: "image files in other letter case or with backslashes",
+        status: Status::Drawn,
+        how: "found, with a warning; buffers as well",
+        load: |folder| {
+            std::fs::create_dir(folder.join("maps")).unwrap();
+            let mut file = File::quad().with_image(folder, "", "maps/Paint.png", &pixels("png"));
+            file.json["images"][0]["uri"] = "MAPS\\paint.PNG".into();
+            file.load(folder)
+        },
+        check: |l, f| {
+            near(l, f, 0, false);
+            assert_eq!(l.scene.images[0].name, "Paint.png", "{f}");
+            assert!(l.warnings[0].contains("is taken from"), "{:?}", l.warnings);
+        },
+        test: TEST,
+    },
     row!(
         "EXT_texture_webp",
         "RGBA8",

@@ -81,6 +81,18 @@ pub const ROWS: &[Row] = &[
         |l, f| placed(l, f, Affine3A::from_translation(Vec3::X * 3.0)),
     ),
     drawn(
+        "animation: keys with equal times",
+        "the last one counts, with a warning",
+        |f| {
+            let places = [[0.0; 3], [4.0, 0.0, 0.0]];
+            let mut file = animated("translation", "VEC3", "LINEAR", &places);
+            let times = file.floats("SCALAR", &[[0.0], [0.0]]);
+            file.json["animations"][0]["samplers"][0]["input"] = json!(times);
+            at(file, 0.0, f)
+        },
+        |l, f| placed(l, f, Affine3A::from_translation(Vec3::X * 4.0)),
+    ),
+    drawn(
         "animations by name",
         "`--animation NAME`; the first one plays",
         |f| {
@@ -110,6 +122,17 @@ pub const ROWS: &[Row] = &[
         "any number of sets",
         |f| at(skinned(2), 0.5, f),
         |l, f| corner(l, f, Vec3::new(2.0, 1.0, 0.0)),
+    ),
+    drawn(
+        "skins: vertices without weights",
+        "follow their first joint, with a warning",
+        |f| {
+            let mut file = skinned(1);
+            let weights = file.floats("VEC4", &[[0.0; 4]; 4]);
+            attributes(&mut file)["WEIGHTS_0"] = json!(weights);
+            at(file, 0.5, f)
+        },
+        |l, f| corner(l, f, Vec3::new(3.0, 1.0, 0.0)),
     ),
     drawn(
         "morph targets: weights of mesh and node",

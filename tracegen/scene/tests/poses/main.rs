@@ -9,7 +9,7 @@ mod figure;
 mod files;
 mod naive;
 
-use figure::{FACE, Figure, HAT, LEG, ROOT, VERTICES};
+use figure::{FACE, Figure, HAT, KNEE, LEG, ROOT, VERTICES};
 use glam::{DVec3, Vec3};
 use naive::Vector;
 use scene::{LoadOptions, Scene};
@@ -25,13 +25,18 @@ fn within(time_s: f64) -> f64 {
 }
 
 fn load(figure: &Figure, time_s: f64) -> Scene {
+    load_with_warnings(figure, time_s, &[])
+}
+
+/// Loads a figure whose file gets these warnings.
+fn load_with_warnings(figure: &Figure, time_s: f64, warnings: &[&str]) -> Scene {
     let folder = tempfile::tempdir().unwrap();
     let options = LoadOptions {
         time_s,
         ..LoadOptions::ALL
     };
     let loaded = figure.file().load_with(folder.path(), &options).unwrap();
-    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+    assert_eq!(loaded.warnings, warnings);
     assert_eq!(loaded.animations, ["walk"]);
     loaded.scene
 }
@@ -161,6 +166,38 @@ fn skins_and_weights_apply_without_an_animation() {
     }
     at_rest.face_weights.values = vec![[0.0; 2]; 9];
     check(&loaded.scene, &at_rest, 0.0);
+}
+
+#[test]
+fn vertices_without_weights_follow_their_first_joints() {
+    let mut figure = Figure::new();
+    for vertex in [1, 2] {
+        (figure.weights[0][vertex], figure.weights[1][vertex]) = ([0.0; 4], [0.0; 4]);
+    }
+    let warning = "meshes[0].primitives[0].WEIGHTS, vertex 1 has no weight above 0; it follows its first joint (and 1 more like this)";
+    for time_s in [0.25, 1.3] {
+        check(
+            &load_with_warnings(&figure, time_s, &[warning]),
+            &figure,
+            time_s,
+        );
+    }
+}
+
+#[test]
+fn of_keys_with_equal_times_the_last_one_counts_from_then_on() {
+    let mut figure = Figure::new();
+    let keys = figure.nodes[KNEE].rotations.as_mut().unwrap();
+    keys.times[2] = keys.times[1];
+    assert_eq!(keys.times[1], 0.75);
+    let warning = "animations[0].channels[2]: 1 keys have the time of the key before; the last one counts from then on";
+    for time_s in [0.5, 0.75, 1.0, 2.6] {
+        check(
+            &load_with_warnings(&figure, time_s, &[warning]),
+            &figure,
+            time_s,
+        );
+    }
 }
 
 #[test]

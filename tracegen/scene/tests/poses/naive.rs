@@ -193,9 +193,13 @@ pub fn world(nodes: &[Node], node: usize, time: f64) -> Matrix {
     }
 }
 
-/// The weighted sum of the joints' matrices, with weights that add up to 1.
+/// The weighted sum of the joints' matrices, with weights that add up to 1. Without weights, the matrix of
+/// the first joint.
 pub fn blend(joints: &[Matrix], of_vertex: &[(usize, f64)]) -> Matrix {
     let sum: f64 = of_vertex.iter().map(|(_, weight)| weight).sum();
+    if sum == 0.0 {
+        return joints[of_vertex[0].0];
+    }
     let mut result = [[0.0; 4]; 4];
     for (joint, weight) in of_vertex {
         for row in 0..4 {

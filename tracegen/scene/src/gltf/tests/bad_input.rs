@@ -314,7 +314,9 @@ fn crc(bytes: &[u8]) -> u32 {
 #[test]
 fn a_scene_without_triangles_is_an_error() {
     let files = Files::new(&with(base(), "/meshes/0/primitives/0/mode", json!(0)));
-    files.fails_with(&["at least one triangle"]);
+    files.fails_with(&[
+        "scene: expected at least one triangle, found none (meshes[0] 'tri'.primitives[0] holds points",
+    ]);
 }
 
 #[test]
@@ -341,6 +343,8 @@ fn versions_other_than_two_are_refused() {
         (json!({"version": "9.9"}), "asset.version"),
         (json!({"version": "1.0"}), "asset.version"),
         (json!({"version": "two"}), "asset.version"),
+        (json!({"version": 1}), "asset.version"),
+        (json!({"version": 0.8}), "asset.version"),
         (
             json!({"version": "2.1", "minVersion": "2.1"}),
             "asset.minVersion",
@@ -348,6 +352,13 @@ fn versions_other_than_two_are_refused() {
     ] {
         Files::new(&with(base(), "/asset", asset)).fails_with(&[place, "expected 2.0"]);
     }
+    // glTF 1.0 holds objects where 2.0 holds lists.
+    let first = with(base(), "/asset", json!({"version": "1.0"}));
+    let first = with(first, "/textures", json!({"paint": {"source": "image"}}));
+    Files::new(&first).fails_with(&["asset.version: expected 2.0, found '1.0'"]);
+    let files = Files::new(&base());
+    files.write("scene.gltf", b"glTF\x01\0\0\0\xff\0\0\0");
+    files.fails_with(&["GLB header, byte 4: expected version 2, found 1"]);
     let later = json!({"version": "2.1", "minVersion": "2.0"});
     Files::new(&with(base(), "/asset", later)).load().unwrap();
 }

@@ -1,7 +1,7 @@
 //! Contents read from valid files.
 
 use super::*;
-use glam::DVec3;
+use glam::{DVec3, Vec2};
 
 #[test]
 fn a_file_without_normals_camera_or_lights_gets_them() {
@@ -260,6 +260,135 @@ fn points_and_lines_are_skipped_with_a_warning() {
         "{:?}",
         loaded.warnings
     );
+}
+
+#[test]
+fn files_are_found_as_other_systems_and_tools_name_them() {
+    for (uri, on_disk, warns) in [
+        ("my%20image.png", "my image.png", false),
+        ("my image.png", "my image.png", false),
+        ("./my%20image.png", "my image.png", false),
+        ("my%20image.png", "my%20image.png", true),
+        ("MY%20Image.PNG", "my image.png", true),
+        ("maps\\my%20image.png", "maps/my image.png", true),
+        ("../work/maps/my image.png", "my image.png", true),
+    ] {
+        let json = with(textured(), "/images/0/uri", json!(uri));
+        let files = Files::new(&json);
+        std::fs::create_dir(files.path("maps")).unwrap();
+        files.write(on_disk, &png([4, 4], [1, 2, 3, 255]));
+        let loaded = files.load().unwrap();
+        let texels = crate::image::texels(&loaded.scene.images, |_| true).unwrap();
+        assert_eq!(texels.len(), 1, "{uri}");
+        assert!(loaded.files.contains(&files.path(on_disk)), "{uri}");
+        let name = on_disk.trim_start_matches("maps/");
+        assert_eq!(loaded.scene.images[0].name, name);
+        let told = format!("images[0], used by materials[0] 'paint': '{uri}' is taken from");
+        let told = loaded.warnings.iter().any(|w| w.starts_with(&told));
+        assert_eq!(told, warns, "{uri}: {:?}", loaded.warnings);
+    }
+    let files = Files::new(&with(base(), "/buffers/0/uri", json!("Mesh.BIN")));
+    let loaded = files.load().unwrap();
+    assert!(loaded.files.contains(&files.path("mesh.bin")));
+    let told = &loaded.warnings[0];
+    assert!(
+        told.starts_with("buffers[0]: 'Mesh.BIN' is taken from"),
+        "{told}"
+    );
+    let json = with(base(), "/materials", textured()["materials"].clone());
+    let mut json = with(json, "/textures", json!([{"source": 0}]));
+    json["images"] = json!([{"uri": "nowhere/absent.png"}]);
+    json["meshes"][0]["primitives"][0]["material"] = json!(0);
+    Files::new(&json).fails_with(&["absent.png", "images[0]", "cannot read"]);
+}
+
+/// A triangle with these sets of texture coordinates, each of one value, whose material has base
+/// colour, normal and occlusion textures in three sets.
+fn sets_of_coordinates(given: &[u32], sampled: [u32; 3]) -> Loaded {
+    let mut json = textured();
+    let mut bytes = triangle_bytes(CORNERS, [0, 1, 2]);
+    bytes.resize(44, 0);
+    for &set in given {
+        let offset = bytes.len();
+        bytes.extend([set as f32; 6].iter().flat_map(|v| v.to_le_bytes()));
+        let views = json["bufferViews"].as_array_mut().unwrap();
+        views.push(json!({"buffer": 0, "byteOffset": offset, "byteLength": 24}));
+        let view = views.len() - 1;
+        let accessors = json["accessors"].as_array_mut().unwrap();
+        accessors
+            .push(json!({"bufferView": view, "componentType": 5126, "count": 3, "type": "VEC2"}));
+        let accessor = accessors.len() - 1;
+        json["meshes"][0]["primitives"][0]["attributes"][format!("TEXCOORD_{set}")] =
+            json!(accessor);
+    }
+    json["buffers"][0]["byteLength"] = json!(bytes.len());
+    let texture = |set: u32| json!({"index": 0, "texCoord": set});
+    let material = &mut json["materials"][0];
+    material["pbrMetallicRoughness"]["baseColorTexture"] = texture(sampled[0]);
+    material["normalTexture"] = texture(sampled[1]);
+    // The transform's set takes precedence.
+    material["occlusionTexture"] = json!({"index": 0, "texCoord": 0,
+        "extensions": {"KHR_texture_transform": {"texCoord": sampled[2]}}});
+    let files = Files::new(&json);
+    files.write("mesh.bin", &bytes);
+    files.write("my image.png", &png([4, 4], [1, 2, 3, 255]));
+    files.load().unwrap()
+}
+
+#[test]
+fn a_material_may_sample_any_two_sets_of_texture_coordinates() {
+    for sampled in [
+        [0, 0, 0],
+        [1, 1, 1],
+        [0, 1, 0],
+        [1, 0, 1],
+        [2, 2, 2],
+        [0, 2, 2],
+        [3, 1, 3],
+        [3, 0, 0],
+        [5, 3, 5],
+        [3, 5, 5],
+    ] {
+        let Loaded {
+            scene, warnings, ..
+        } = sets_of_coordinates(&[0, 1, 2, 3, 5], sampled);
+        assert!(warnings.is_empty(), "{sampled:?}: {warnings:?}");
+        let (mesh, material) = (&scene.meshes[0], &scene.materials[0]);
+        let textures = [
+            material.base_color_texture,
+            material.normal_texture,
+            material.occlusion_texture,
+        ];
+        for (texture, set) in textures.into_iter().zip(sampled) {
+            let coordinates = match texture.unwrap().uv_set {
+                0 => &mesh.uv0,
+                1 => &mesh.uv1,
+                other => panic!("set {other}"),
+            };
+            assert_eq!(coordinates[..], [Vec2::splat(set as f32); 3], "{sampled:?}");
+        }
+    }
+}
+
+#[test]
+fn a_third_set_and_a_missing_set_of_texture_coordinates_are_reported() {
+    let loaded = sets_of_coordinates(&[0, 1, 4], [4, 0, 1]);
+    let material = &loaded.scene.materials[0];
+    assert!(material.base_color_texture.is_some() && material.normal_texture.is_some());
+    assert_eq!(material.occlusion_texture, None);
+    assert_eq!(
+        loaded.warnings,
+        [
+            "materials[0] 'paint' uses TEXCOORD_4, TEXCOORD_0 and TEXCOORD_1; a material has at most two sets, the texture of the last one is left out"
+        ]
+    );
+    for (sampled, set) in [([0, 0, 0], 0), ([4, 4, 4], 4)] {
+        let loaded = sets_of_coordinates(&[1], sampled);
+        let warning = format!(
+            "meshes[0] 'tri'.primitives[0] has a textured material and no TEXCOORD_{set}; (0, 0) is used"
+        );
+        assert_eq!(loaded.warnings, [warning]);
+    }
 }
 
 #[test]

@@ -1,13 +1,16 @@
-//! Look-up of the files that OBJ and MTL files name, whichever system wrote the names.
+//! Look-up of the files that scene files name, whichever system wrote the names.
 
-use super::statements::latin1;
+use crate::files::latin1;
 use std::collections::{BTreeSet, HashMap};
 use std::ffi::OsString;
 use std::path::{Component, Path, PathBuf};
 
+/// Longest name that is looked for in other folders and letter cases.
+const MAX_PATH_BYTES: usize = 4096;
+
 /// A file that was found, and whether its name matches exactly.
 #[derive(Debug, PartialEq)]
-pub(super) struct Found {
+pub(crate) struct Found {
     pub path: PathBuf,
     /// True if letter case, encoding or folder differ from the name in the file.
     pub inexact: bool,
@@ -15,7 +18,7 @@ pub(super) struct Found {
 
 /// Looks names up. Each folder is listed once.
 #[derive(Debug, Default)]
-pub(super) struct Lookup {
+pub(crate) struct Lookup {
     /// The names in each folder, by their lower-case text.
     listings: HashMap<PathBuf, HashMap<String, OsString>>,
     /// All files found so far.
@@ -51,8 +54,12 @@ impl Lookup {
         }
         let mut any_case =
             |path: &PathBuf| self.walk(folder, path).filter(|path| is_no_folder(path));
-        // The folders of another machine are removed one by one.
-        let path = (paths.iter().flat_map(|path| endings(path))).find_map(|ending| {
+        // The folders of another machine are removed one by one. No system has longer paths, and each
+        // ending of one is a copy.
+        let short = paths
+            .iter()
+            .filter(|p| p.as_os_str().len() <= MAX_PATH_BYTES);
+        let path = short.flat_map(|path| endings(path)).find_map(|ending| {
             exact(std::slice::from_ref(&ending)).or_else(|| any_case(&ending))
         })?;
         let inexact = true;
