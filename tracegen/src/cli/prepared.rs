@@ -1,7 +1,7 @@
 //! Prepares a scene for [`crate::study`]: its world, and a device with the uploaded scene.
 
 use super::cache_args::CacheArgs;
-use super::capture_steps::prepare_textures;
+use super::capture_steps::{self, prepare_textures};
 use super::scene_args::SceneSetup;
 use crate::study::world::{World, shadow_range_m};
 use ::raster::backend::Fragments;
