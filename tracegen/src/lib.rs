@@ -5,6 +5,8 @@ mod captures;
 pub mod cli;
 mod hidden_mesh;
 mod picture;
+#[cfg(test)]
+mod schemas;
 mod stress;
 mod study;
 mod unstable_triangles;

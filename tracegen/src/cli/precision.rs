@@ -5,7 +5,7 @@ use clap::Args;
 use formats::container::AtomicFile;
 use rays::precision::{Precision, measure};
 use rays::reference::TestMesh;
-use serde_json::{Value, json};
+use serde::Serialize;
 use shell::{Output, Progress};
 use std::path::PathBuf;
 
@@ -26,6 +26,54 @@ pub struct PrecisionArgs {
 /// Distances from the origin, metres.
 const PLACES_M: [f64; 5] = [0.0, 1e3, 1e5, 1e6, 1e7];
 
+/// Schema of the JSON.
+const SCHEMA: &str = "tracegen.precision/1";
+
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct PrecisionDocument {
+    schema: &'static str,
+    tool: String,
+    /// The traced mesh.
+    mesh: String,
+    rows: Vec<PrecisionRow>,
+}
+
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct PrecisionRow {
+    arithmetic: &'static str,
+    /// Distance from the origin in metres.
+    at_m: f64,
+    /// Rays whose answer is certain.
+    rays: u64,
+    /// Percentage of these that hit instead of missing, or miss instead of hitting.
+    wrong_pct: f64,
+    /// 99th percentile of the relative error of the distance, parts per million.
+    distance_ppm: f64,
+    /// Time relative to double precision.
+    time_ratio: f64,
+}
+
+impl From<Precision> for PrecisionRow {
+    fn from(row: Precision) -> Self {
+        Self {
+            arithmetic: row.arithmetic,
+            at_m: row.at_m,
+            rays: row.rays,
+            wrong_pct: row.wrong_pct,
+            distance_ppm: row.distance_ppm,
+            time_ratio: row.time_ratio,
+        }
+    }
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<PrecisionDocument>(SCHEMA)
+}
+
 /// Runs `tracegen precision`.
 ///
 /// # Errors
@@ -38,31 +86,20 @@ pub fn run(args: &PrecisionArgs) -> anyhow::Result<()> {
     let mesh = TestMesh::sphere(5);
     let mut rows = Vec::new();
     for at_m in PLACES_M {
-        rows.extend(measure(&mesh, at_m, args.rays as usize).map(|row| written(&row)));
+        rows.extend(measure(&mesh, at_m, args.rays as usize).map(PrecisionRow::from));
         progress.advance(1);
     }
     drop(progress);
-    let document = json!({
-        "schema": "tracegen.precision/1",
-        "tool": super::tool(),
-        "mesh": format!("a sphere of 10 m, {} triangles", mesh.triangles.len()),
-        "rows": rows,
-    });
+    let document = PrecisionDocument {
+        schema: SCHEMA,
+        tool: super::tool(),
+        mesh: format!("a sphere of 10 m, {} triangles", mesh.triangles.len()),
+        rows,
+    };
     let text = serde_json::to_string_pretty(&document)? + "\n";
     match &args.output {
         Some(path) => AtomicFile::write_whole(path, text.as_bytes())
             .with_context(|| format!("cannot write {}", path.display())),
         None => shell::print(&text),
     }
-}
-
-fn written(row: &Precision) -> Value {
-    json!({
-        "arithmetic": row.arithmetic,
-        "at_m": row.at_m,
-        "rays": row.rays,
-        "wrong_pct": row.wrong_pct,
-        "distance_ppm": row.distance_ppm,
-        "time_ratio": row.time_ratio,
-    })
 }

@@ -3,6 +3,8 @@
 use super::cache_args::CacheArgs;
 use super::pose_args::PoseArgs;
 use super::scene_args::load_scene;
+#[cfg(test)]
+use crate::schemas::Published;
 use ::scenes::BUILTINS;
 use clap::Args;
 use glam::Vec3;
@@ -29,14 +31,22 @@ pub struct ScenesArgs {
     json: bool,
 }
 
+/// Schema of the list of built-in scenes.
+const LIST_SCHEMA: &str = "tracegen.scenes/1";
+
+/// Schema of one scene.
+const SCENE_SCHEMA: &str = "tracegen.scene/1";
+
 /// JSON of the list of built-in scenes.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct BuiltinList {
     schema: &'static str,
     scenes: Vec<Builtin>,
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Builtin {
     name: &'static str,
     description: &'static str,
@@ -46,6 +56,7 @@ struct Builtin {
 
 /// JSON of one scene.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Description {
     schema: &'static str,
     name: String,
@@ -64,13 +75,16 @@ struct Description {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct ImageEntry {
     name: String,
     size: [u32; 2],
+    #[cfg_attr(test, schemars(with = "String"))]
     color_space: formats::texture::ColorSpace,
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct CameraEntry {
     name: String,
     eye: [f64; 3],
@@ -148,8 +162,10 @@ fn list(as_json: bool) -> anyhow::Result<String> {
                 cameras: b.cameras,
             })
             .collect();
-        let schema = "tracegen.scenes/1";
-        return Ok(json(&BuiltinList { schema, scenes })?);
+        return Ok(json(&BuiltinList {
+            schema: LIST_SCHEMA,
+            scenes,
+        })?);
     }
     let width = BUILTINS.iter().map(|b| b.name.len()).max().unwrap_or(0);
     Ok(BUILTINS
@@ -169,7 +185,7 @@ fn list(as_json: bool) -> anyhow::Result<String> {
 fn describe(loaded: &Loaded) -> Description {
     let scene = &loaded.scene;
     Description {
-        schema: "tracegen.scene/1",
+        schema: SCENE_SCHEMA,
         name: scene.name.clone(),
         triangles: scene.triangle_count(),
         unique_triangles: scene.meshes.iter().map(|m| m.triangles() as u64).sum(),
@@ -205,6 +221,15 @@ fn describe(loaded: &Loaded) -> Description {
             .collect(),
         animations: loaded.animations.clone(),
     }
+}
+
+/// The schemas of both JSON objects.
+#[cfg(test)]
+pub(crate) fn schemas() -> [Published; 2] {
+    [
+        Published::of::<BuiltinList>(LIST_SCHEMA),
+        Published::of::<Description>(SCENE_SCHEMA),
+    ]
 }
 
 /// World coordinates of a point, with the digits that single precision has.

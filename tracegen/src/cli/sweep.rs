@@ -64,6 +64,7 @@ struct Planned {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct PlanDocument<'a> {
     schema: &'a str,
     tool: String,
@@ -71,11 +72,18 @@ struct PlanDocument<'a> {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct PlannedCapture<'a> {
     file: &'a str,
     recipe: String,
     cost: u64,
     done: bool,
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<PlanDocument<'_>>(PLAN_SCHEMA)
 }
 
 /// Runs `tracegen sweep`.

@@ -6,7 +6,7 @@
 
 mod lanes;
 mod probe;
-mod report;
+pub(crate) mod report;
 mod shapes;
 mod sweeps;
 
@@ -32,6 +32,7 @@ pub struct Sweep {
 
 /// Largest errors that a sweep's points may have without a warning.
 #[derive(Clone, Copy, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Bounds {
     /// Fragments that only the capture or only the reference has, in percent of all.
     pub fragments_pct: f64,
@@ -41,6 +42,7 @@ pub struct Bounds {
 
 /// Differences of a capture from its reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Error {
     /// Fragments (pixel and primitive) in either of them.
     pub fragments: u64,
@@ -52,6 +54,7 @@ pub struct Error {
 
 /// Result of a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Outcome {
     /// Captured within the bounds.
@@ -86,6 +89,7 @@ impl Outcome {
 
 /// A point of a sweep.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Point {
     /// Value of the parameter.
     pub at: String,

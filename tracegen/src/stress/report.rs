@@ -4,14 +4,19 @@ use super::{Bounds, Outcome, Point, Sweep};
 use serde::Serialize;
 use std::fmt::Write;
 
+/// Schema of the table.
+const SCHEMA: &str = "tracegen.stress/1";
+
 /// All sweeps.
 #[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Report {
     schema: &'static str,
     sweeps: Vec<SweepRow>,
 }
 
 #[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct SweepRow {
     name: &'static str,
     about: &'static str,
@@ -19,10 +24,16 @@ struct SweepRow {
     points: Vec<Point>,
 }
 
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<Report>(SCHEMA)
+}
+
 impl Default for Report {
     fn default() -> Self {
         Self {
-            schema: "tracegen.stress/1",
+            schema: SCHEMA,
             sweeps: Vec::new(),
         }
     }

@@ -27,6 +27,7 @@ const VERTEX_MULTIPLY_ADDS: f64 = 41.0;
 
 /// Counts of a frame, both eyes and all layers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Counted {
     /// Shaded fragments.
     pub fragments: u64,

@@ -21,6 +21,7 @@ const SCHEMA: &str = "tracegen.techniques/1";
 
 /// Configuration of a study: the manifest without rows. Stored rows are reused as long as it stays the same.
 #[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct StudySetup {
     /// Program and version.
     pub tool: String,
@@ -49,8 +50,13 @@ pub struct StudySetup {
     /// Width and height of an eye's picture.
     pub size_px: [u32; 2],
     /// The display.
+    #[cfg_attr(test, schemars(with = "serde_json::Map<String, serde_json::Value>"))]
     pub hmd: Hmd,
     /// Visible parts of the left and right eye's pictures.
+    #[cfg_attr(
+        test,
+        schemars(with = "[serde_json::Map<String, serde_json::Value>; 2]")
+    )]
     pub lens: [Lens; 2],
     /// At the centre of an eye's picture.
     pub pixels_per_degree: f32,
@@ -67,6 +73,7 @@ pub struct StudySetup {
     /// Frames of each row's trace.
     pub trace_frames: Vec<u32>,
     /// How the tiles of the traces are packed.
+    #[cfg_attr(test, schemars(with = "String"))]
     pub trace_encoding: Encoding,
     /// Shadow cascades.
     pub shadow_cascades: u32,
@@ -81,12 +88,14 @@ fn is_zero(time_s: &f64) -> bool {
 
 /// A measured row.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct RowRecord {
     /// Name, see [`super::rows`].
     pub technique: String,
     /// Title for readers.
     pub title: String,
     /// Settings of its capture.
+    #[cfg_attr(test, schemars(with = "serde_json::Map<String, serde_json::Value>"))]
     pub settings: Settings,
     /// Techniques that it consists of.
     pub parts: Vec<String>,
@@ -109,6 +118,7 @@ pub struct RowRecord {
 
 /// A frame of a row. Names with `_s` are times, which differ from run to run; nothing else does.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct FrameRecord {
     /// Number.
     pub frame: u32,
@@ -171,10 +181,12 @@ pub struct FrameRecord {
     /// CRC-32 of their files.
     pub image_checksums: [String; 2],
     /// Errors that the techniques predict.
+    #[cfg_attr(test, schemars(with = "serde_json::Map<String, serde_json::Value>"))]
     pub predicted: Predicted,
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Manifest<'a> {
     schema: &'static str,
     #[serde(flatten)]
@@ -184,6 +196,12 @@ struct Manifest<'a> {
     auto: Option<&'a AutoRecord>,
     #[serde(skip_serializing_if = "Option::is_none")]
     multiview_defect: Option<&'a str>,
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<Manifest<'_>>(SCHEMA)
 }
 
 /// A finished row with the key of its study.

@@ -21,6 +21,7 @@ pub(super) const LARGEST_DIFFERENCE: u32 = 1 << 28;
 
 /// A cause of an error of coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum UvCause {
     /// At most 1/64 texel.
@@ -37,6 +38,7 @@ pub enum UvCause {
 
 /// A cause of different levels or texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum SampleCause {
     /// The driver's formula of the level of detail.

@@ -16,6 +16,7 @@ const ALPHA: f64 = 1.0 / 16.0;
 
 /// A class of differences.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Class {
     /// The pixel's centre lies within 1/128 pixel of an edge of the primitive.

@@ -64,6 +64,7 @@ pub struct Means(BTreeMap<(u32, u8), [Mean; COLUMNS.len()]>);
 
 /// A mean that exceeds its bound, or the one closest to its bound.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Bias {
     /// The draw or the texture.
     pub of: String,

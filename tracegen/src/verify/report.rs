@@ -19,8 +19,12 @@ pub const SLOTS: [&str; 6] = [
     "emissive",
 ];
 
+/// Schema of the report.
+const SCHEMA: &str = "tracegen.verify/1";
+
 /// JSON of a verified frame.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Report {
     schema: &'static str,
     scene: String,
@@ -42,6 +46,7 @@ pub struct Report {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Tiles {
     verified: usize,
     of: usize,
@@ -49,6 +54,7 @@ struct Tiles {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Coverage {
     both: u64,
     only_reference: u64,
@@ -59,6 +65,7 @@ struct Coverage {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Difference {
     class: Class,
     only_reference: u64,
@@ -66,6 +73,7 @@ struct Difference {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct UvError {
     coordinates: u64,
     mean: f64,
@@ -155,6 +163,7 @@ fn failures(verified: &Verified, means: &[Bias]) -> Vec<String> {
 
 /// Number of differences by cause.
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Count<C> {
     cause: C,
     count: u64,
@@ -166,6 +175,7 @@ fn counts<C: Copy>(causes: &[C], counts: &[u64]) -> Vec<Count<C>> {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Samples {
     samples: u64,
     lod_error_mean: f64,
@@ -179,6 +189,7 @@ struct Samples {
 }
 
 #[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 struct Colour {
     texture: &'static str,
     fragments: u64,
@@ -193,6 +204,12 @@ struct Colour {
     max: f64,
     /// With blocks and sRGB decoded like in the driver.
     max_as_driver: f64,
+}
+
+/// The schema of the JSON object.
+#[cfg(test)]
+pub(crate) fn schema() -> crate::schemas::Published {
+    crate::schemas::Published::of::<Report>(SCHEMA)
 }
 
 fn share(part: u64, whole: u64) -> f64 {
@@ -224,7 +241,7 @@ impl Report {
             only_capture: agreement.only[Side::Capture as usize][class as usize],
         };
         Self {
-            schema: "tracegen.verify/1",
+            schema: SCHEMA,
             scene: scene.to_owned(),
             backend: meta.backend.clone(),
             driver: meta.driver.clone(),

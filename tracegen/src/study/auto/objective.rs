@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 /// The cost of a frame that is minimised.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ValueEnum)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
 pub enum Objective {
     /// Frame time on this device, which varies between runs.

@@ -10,6 +10,7 @@ use techniques::Settings;
 
 /// A search and its choice.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct AutoRecord {
     /// The budget as given.
     pub budget: String,
@@ -40,10 +41,12 @@ pub struct AutoRecord {
 
 /// A combination and its results.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Chosen {
     /// Name.
     pub technique: String,
     /// Settings of its capture.
+    #[cfg_attr(test, schemars(with = "serde_json::Map<String, serde_json::Value>"))]
     pub settings: Settings,
     /// Cost and error on the frames of the search.
     pub verdict: Verdict,
@@ -51,6 +54,7 @@ pub struct Chosen {
 
 /// A frame in which the chosen combination exceeded the budget.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Fallback {
     /// Number of the frame.
     pub frame: u32,

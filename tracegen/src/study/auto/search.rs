@@ -7,6 +7,7 @@ use std::cmp::Ordering;
 
 /// Cost and error of a combination on the frames of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Verdict {
     /// Its cost; none if its error exceeded the budget before anything was counted.
     pub cost: Option<Cost>,
@@ -16,6 +17,7 @@ pub struct Verdict {
 
 /// A cost in the objective's unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Cost {
     /// Relative to the baseline. Times are relative to baseline times measured alternately, by the shortest
     /// time of each frame.
@@ -57,6 +59,7 @@ pub trait Judge {
 
 /// A ratio of times that was measured repeatedly.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Spread {
     /// Lower quartile.
     pub q1: f64,
@@ -152,6 +155,7 @@ pub struct Found {
 /// Frame times relative to the baseline's on frames that the search did not measure, all three timed
 /// alternately.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Elsewhere {
     /// Of the chosen combination.
     pub chosen: Spread,
