@@ -31,7 +31,10 @@ fn line(names: [&str; 2], files: &[&Row]) -> Vec<String> {
     let count = |outcome| files.iter().filter(|row| row["outcome"] == outcome).count();
     let mut reasons: Vec<(&str, usize)> = Vec::new();
     for row in files.iter().filter(|row| row["outcome"] == "refused") {
-        match reasons.iter_mut().find(|(reason, _)| *reason == row["reason"]) {
+        match reasons
+            .iter_mut()
+            .find(|(reason, _)| *reason == row["reason"])
+        {
             Some((_, count)) => *count += 1,
             None => reasons.push((&row["reason"], 1)),
         }
