@@ -29,7 +29,7 @@ CLIENTS = {
 }
 # Part of a refusal, and the name of the feature or fault that the table shows.
 REASONS = [
-    (r"(?:asset\.version|GLB header, byte 4): expected 2", "glTF 1.0"),
+    (r"asset\.version: expected 2|GLB header, byte 4: expected version 2", "glTF 1.0"),
     (r"extensionsRequired: .* found (.*), unsupported", r"requires \1"),
     (r"at least one triangle, found none.* holds (?:points|a? ?line)", "points or lines alone"),
     (r"at least one triangle, found none", "no triangles"),
@@ -37,6 +37,7 @@ REASONS = [
     (r"a finite position", "damaged: infinite positions"),
     (r"expected a vertex below|an index inside its table", "damaged: an index outside its table"),
     (r"cannot read: No such file", "damaged: a missing file"),
+    (r"JSON: .* missing field `nodes`", "a scene without nodes"),
     (r"JSON: expected a glTF 2.0 asset, found (?:invalid type|missing field)", "damaged: JSON of another type"),
     (r"\.(?:min|max): expected a value that glTF 2.0 allows", "damaged: invalid bounds"),
 ]
