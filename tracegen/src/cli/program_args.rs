@@ -48,6 +48,11 @@ pub struct ProgramArgs {
     /// differ.
     #[arg(long)]
     check: bool,
+    /// Also record render passes without depth, such as the passes in which a browser composes its window. By
+    /// default they are skipped if the program renders scenes with depth elsewhere. `--check`, `--list` and
+    /// `--rules` record all passes.
+    #[arg(long)]
+    all_passes: bool,
     /// Size limit of the records of one submission. Unused memory is not allocated.
     #[arg(long, value_name = "SIZE", default_value = "768MiB", value_parser = parse_bytes)]
     records: u64,
@@ -144,6 +149,7 @@ impl ProgramArgs {
             frames: [self.frames.start, self.frames.end],
             frames_by,
             occlusion: self.check || self.list,
+            all_passes: self.all_passes || self.check || self.list || self.rules.is_some(),
             record_bytes: self.records,
             pictures: self.list_page.is_some(),
             modules: self.modules.as_ref().map(absolute).transpose()?,
@@ -255,9 +261,13 @@ fn report(session: &Session, drained: &Drained, bytes: u64) {
         ));
     }
     for left_out in &drained.left_out {
+        let fragments = match left_out.fragments {
+            0 => String::new(),
+            some => format!(", {some} fragments"),
+        };
         note(&format!(
-            "not in the trace, or less exactly: {} ({} draws, {} fragments)",
-            left_out.what, left_out.draws, left_out.fragments
+            "not in the trace, or less exactly: {} ({} draws{fragments})",
+            left_out.what, left_out.draws
         ));
     }
     note(&format!("driver: {}", session.driver));

@@ -17,6 +17,9 @@ use std::ffi::CStr;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, RwLock};
 
+/// Size of the part of the file of records that is allocated in advance.
+const RESERVED_BYTES: u64 = 64 << 20;
+
 /// A tracked device.
 pub(super) struct Device {
     pub handle: vk::Device,
@@ -234,6 +237,11 @@ unsafe fn track(
         refused,
         ballots,
     });
+    if recorder.is_some() {
+        // Without the space, recording is only slower.
+        let bytes = RESERVED_BYTES.min(capture.settings.record_bytes);
+        capture.write(|writer| Ok(drop(writer.reserve_records(bytes))));
+    }
     let queries = (capture.settings.occlusion)
         // SAFETY: the device was just created.
         .then(|| unsafe { Queries::new(handle, &next) })

@@ -11,6 +11,7 @@ fn record(draw: u32) -> Unit {
 fn events_and_records_are_read_as_written_and_descriptions_once() {
     let folder = tempfile::tempdir().unwrap();
     let mut writer = Writer::create(folder.path()).unwrap();
+    writer.reserve_records(100).unwrap();
     let spans = [&[record(1), record(2)][..], &[record(3)]].map(|r| writer.records(r).unwrap());
     for _ in 0..2 {
         let pass = || {
@@ -47,7 +48,16 @@ fn events_and_records_are_read_as_written_and_descriptions_once() {
         reader.read(span, |record| draws.push(record.draw)).unwrap();
     }
     assert_eq!(draws, [3, 1, 2]);
-    let beyond = Span { first: 2, count: 2 };
+    // Reserving again would overwrite records.
+    writer.reserve_records(100).unwrap();
+    reader
+        .read(spans[0], |record| draws.push(record.draw))
+        .unwrap();
+    assert_eq!(draws, [3, 1, 2, 1, 2]);
+    let beyond = Span {
+        first: 1 << 12,
+        count: 2,
+    };
     let text = reader.read(beyond, drop).unwrap_err().to_string();
     assert!(text.contains("up to byte 64, found 48"), "{text}");
     // The header announces coordinates that do not follow.

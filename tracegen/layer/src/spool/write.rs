@@ -1,10 +1,11 @@
 //! Writes the files of a process.
 
 use super::{EVENTS, Event, RECORDS, Span, file, picture};
-use crate::inject::Unit;
+use crate::inject::{UNIT_BYTES, Unit};
 use std::collections::HashSet;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 
 /// Appends events and records of a process.
@@ -16,6 +17,8 @@ pub struct Writer {
     events: File,
     records: File,
     written: u64,
+    /// Whether zeros were written where records will follow.
+    reserved: bool,
     /// Kinds and numbers of the objects that have been described.
     described: HashSet<(&'static str, u32)>,
 }
@@ -29,7 +32,7 @@ impl Writer {
         let pid = std::process::id();
         let open = |extension| {
             let path = file(folder, &pid.to_string(), extension);
-            OpenOptions::new().create_new(true).append(true).open(path)
+            OpenOptions::new().create_new(true).write(true).open(path)
         };
         let mut writer = Self {
             folder: folder.to_owned(),
@@ -37,6 +40,7 @@ impl Writer {
             events: open(EVENTS)?,
             records: open(RECORDS)?,
             written: 0,
+            reserved: false,
             described: HashSet::new(),
         };
         let command = std::env::args_os().map(|a| a.to_string_lossy().into_owned());
@@ -76,13 +80,31 @@ impl Writer {
         Ok(())
     }
 
+    /// Writes zeros where records will follow. The system allocates memory for a new part of a file much more
+    /// slowly than it overwrites a part, and this moves the cost out of the recorded frames.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn reserve_records(&mut self, bytes: u64) -> io::Result<()> {
+        const CHUNK: [u8; 1 << 16] = [0; 1 << 16];
+        if std::mem::replace(&mut self.reserved, true) || self.written > 0 {
+            return Ok(());
+        }
+        for at in (0..bytes).step_by(CHUNK.len()) {
+            self.records.write_all_at(&CHUNK, at)?;
+        }
+        Ok(())
+    }
+
     /// Writes records and returns their place.
     ///
     /// # Errors
     /// The file cannot be written.
     pub fn records(&mut self, records: &[Unit]) -> io::Result<Span> {
         self.after_fork()?;
-        self.records.write_all(bytemuck::cast_slice(records))?;
+        let at = self.written * UNIT_BYTES;
+        self.records
+            .write_all_at(bytemuck::cast_slice(records), at)?;
         let span = Span {
             first: self.written,
             count: records.len() as u64,

@@ -181,6 +181,18 @@ impl CommandState {
         }
     }
 
+    /// Whether the bound pipeline tests depth.
+    pub(super) fn tests_depth(&self) -> bool {
+        let Some(pipeline) = &self.pipeline else {
+            return false;
+        };
+        let dynamic = pipeline
+            .state
+            .is_dynamic(vk::DynamicState::DEPTH_TEST_ENABLE);
+        let set = self.dynamic.depth_test.filter(|_| dynamic);
+        set.unwrap_or(pipeline.state.depth.tests)
+    }
+
     fn info(&self, draw: u32, call: &Call, textures: Vec<TextureInfo>) -> Option<DrawInfo> {
         let pipeline = self.pipeline.as_ref()?;
         let (state, set) = (&pipeline.state, &self.dynamic);
@@ -196,12 +208,8 @@ impl CommandState {
             false => state.scissor,
         };
         let mut depth = state.depth;
+        depth.tests = self.tests_depth();
         let flags = [
-            (
-                vk::DynamicState::DEPTH_TEST_ENABLE,
-                set.depth_test,
-                &mut depth.tests,
-            ),
             (
                 vk::DynamicState::DEPTH_WRITE_ENABLE,
                 set.depth_write,

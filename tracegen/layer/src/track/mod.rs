@@ -16,6 +16,7 @@ pub use passes::{Attachment, Passes, RenderPass, Subpass};
 pub use pipelines::{Layout, Pipeline, Pipelines, Recorded, State};
 
 use crate::spool::{DrawInfo, TextureInfo};
+use std::collections::HashSet;
 
 /// All tracked objects of a device.
 #[derive(Debug, Default)]
@@ -30,6 +31,8 @@ pub struct Tracker {
     pub passes: Passes,
     /// Command buffers.
     pub commands: Commands,
+    /// Images into which draws that test depth have rendered colours.
+    scene_images: HashSet<u32>,
 }
 
 impl Tracker {
@@ -45,6 +48,35 @@ impl Tracker {
             commands: Commands::numbered_from(first),
             ..Self::default()
         }
+    }
+
+    /// Notes the targets of a draw that tests depth. Such a draw is part of a 3D scene.
+    pub fn note_scene(&mut self, command_buffer: u64) {
+        let Some(state) = self.commands.get(command_buffer) else {
+            return;
+        };
+        if let Some(pass) = state.pass.as_ref().filter(|pass| pass.depth.is_some())
+            && state.tests_depth()
+        {
+            self.scene_images
+                .extend(pass.colors.iter().map(|view| view.image));
+        }
+    }
+
+    /// Whether a command buffer is in a render pass without depth whose targets are no pictures of a scene,
+    /// while the program has rendered scenes elsewhere. Browsers and desktops compose their windows in such
+    /// passes.
+    #[must_use]
+    pub fn is_outside_scenes(&self, command_buffer: u64) -> bool {
+        let pass = self.commands.get(command_buffer);
+        let Some(pass) = pass.and_then(|state| state.pass.as_ref()) else {
+            return false;
+        };
+        let is_scene = |image: u32| self.scene_images.contains(&image);
+        let mut colors = pass.colors.iter();
+        !self.scene_images.is_empty()
+            && pass.depth.is_none()
+            && !colors.any(|view| is_scene(view.image))
     }
 
     /// Description of a draw in a command buffer, with the next number; `None` if no graphics pipeline is

@@ -267,3 +267,34 @@ fn draws_of_a_secondary_command_buffer_belong_to_the_executing_pass() {
     assert_eq!(found, [(0, Some(0)), (0, Some(0))]);
     assert!(tracker.commands.items(1)[0].pass.is_none());
 }
+
+#[test]
+fn passes_without_depth_are_outside_scenes_once_a_scene_was_rendered_elsewhere() {
+    let mut tracker = tracker(&[vk::DynamicState::DEPTH_TEST_ENABLE]);
+    let targets = [1, 2, 3].map(|n| {
+        let view = image_view(&mut tracker.images, n, 8);
+        let view = tracker.images.view(view).unwrap();
+        Attachment {
+            view,
+            clears: false,
+        }
+    });
+    let [scene, window, depth] = targets;
+    let begin = |tracker: &mut Tracker, color, depth| {
+        let area = vk::Rect2D::default();
+        let pass = tracker.passes.info(vec![color], depth, area, 0);
+        tracker.commands.get_mut(1).pass = Some(Arc::new(pass));
+        tracker.is_outside_scenes(1)
+    };
+    assert!(!begin(&mut tracker, window, None), "no scene yet");
+    // Without the depth test, a draw is not part of a scene.
+    assert!(!begin(&mut tracker, scene, Some(depth)));
+    tracker.note_scene(1);
+    assert!(!begin(&mut tracker, window, None));
+    begin(&mut tracker, scene, Some(depth));
+    tracker.commands.get_mut(1).dynamic.depth_test = Some(true);
+    tracker.note_scene(1);
+    assert!(begin(&mut tracker, window, None));
+    assert!(!begin(&mut tracker, window, Some(depth)), "it has depth");
+    assert!(!begin(&mut tracker, scene, None), "a scene's picture");
+}

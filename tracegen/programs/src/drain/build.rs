@@ -13,7 +13,7 @@ use formats::textrace::{Draw, LeftOut, NO_GROUP, PassKind, Surfaces, TraceMeta, 
 use formats::textrace::{TextraceWriter, tables::MAX_GROUPS};
 use formats::view::Eye;
 use parallax_layer::inject::{Access, Form, RawQuad, RawSample, Site, TextureSite, What};
-use parallax_layer::spool::{DrawInfo, ShaderInfo, ViewInfo};
+use parallax_layer::spool::{DrawInfo, OUTSIDE_SCENES, ShaderInfo, ViewInfo};
 use rayon::prelude::*;
 use record::{CaptureCounts, DepthReplay, RawDepth, RawRecord, RawRecords, Recording};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -125,7 +125,11 @@ impl<W: Write + Seek> Builder<W> {
     ) {
         for ((executed, role), weight) in draws.iter().zip(&views.roles).zip(weights) {
             let info = session.draw(executed.draw);
-            if let Role::Other(other) = role {
+            let skipped =
+                info.is_some_and(|info| info.unrecorded.as_deref() == Some(OUTSIDE_SCENES));
+            if let (Role::Other(other), true) = (role, skipped) {
+                self.leave_out(&format!("{}, not recorded", other.name()), 1, 0);
+            } else if let Role::Other(other) = role {
                 self.leave_out(other.name(), 1, *weight);
             } else if let Some(why) = info.and_then(|info| info.unrecorded.as_ref()) {
                 self.leave_out(why, 1, *weight);
