@@ -1,6 +1,6 @@
 //! Byte sizes in text: `8KiB`, `128 KiB`, `4096`.
 
-use serde::{Deserializer, Serializer, de};
+use serde::{Deserializer, de};
 
 /// Parses a byte count with an optional unit (`B`, `KiB`, `MiB`). `K` and `KB` mean KiB, because
 /// cache sizes are always binary.
@@ -38,18 +38,10 @@ pub fn format_bytes(bytes: u64) -> String {
     }
 }
 
-/// For `#[serde(with = "crate::size::serde_bytes")]`: writes a number; reads a number or a text with a unit.
+/// For `#[serde(deserialize_with = "crate::size::serde_bytes::deserialize")]`.
 pub mod serde_bytes {
-    use super::{Deserializer, Serializer, de, parse_bytes};
+    use super::{Deserializer, de, parse_bytes};
     use std::fmt;
-
-    /// Writes the number.
-    ///
-    /// # Errors
-    /// Any error of the serializer.
-    pub fn serialize<S: Serializer>(bytes: &u64, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_u64(*bytes)
-    }
 
     /// Reads a number or a text such as `8KiB`.
     ///
@@ -116,7 +108,7 @@ mod tests {
     fn an_invalid_size_in_a_file_is_refused_with_the_accepted_forms() {
         #[derive(Debug, serde::Deserialize)]
         struct File {
-            #[serde(with = "serde_bytes")]
+            #[serde(deserialize_with = "serde_bytes::deserialize")]
             size: u64,
         }
         let read = |value: &str| toml::from_str::<File>(&format!("size = {value}"));

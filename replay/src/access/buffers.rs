@@ -44,7 +44,7 @@ impl Buffers {
     }
 
     /// Frees the buffers of the previous frame.
-    pub fn start_frame(&mut self) {
+    pub(super) fn start_frame(&mut self) {
         self.next = self.first_of_frame;
     }
 

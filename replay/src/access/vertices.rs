@@ -49,7 +49,12 @@ pub(super) struct Stage<'a> {
 
 impl Stage<'_> {
     /// Shades the draws of a view, in order.
-    pub fn shade(&mut self, view: GeometryView, lists: TileLists, reuse: &Reuse<'_>) -> ShadedView {
+    pub(super) fn shade(
+        &mut self,
+        view: GeometryView,
+        lists: TileLists,
+        reuse: &Reuse<'_>,
+    ) -> ShadedView {
         let mut kept = lists.primitives.clone();
         kept.sort_unstable();
         kept.dedup();
@@ -159,7 +164,7 @@ impl ShadedView {
     }
 
     /// First byte of a tile's list.
-    pub fn list_address(&self, tile: usize) -> u64 {
+    pub(super) fn list_address(&self, tile: usize) -> u64 {
         self.list_addresses.get(tile).copied().unwrap_or(0)
     }
 
@@ -172,7 +177,7 @@ impl ShadedView {
     }
 
     /// Shaded vertices of a primitive of the lists.
-    pub fn vertices_of(&self, primitive: u32) -> Option<[u32; 3]> {
+    pub(super) fn vertices_of(&self, primitive: u32) -> Option<[u32; 3]> {
         let place = self.kept.binary_search(&primitive).ok()?;
         self.vertices.get(place).copied()
     }

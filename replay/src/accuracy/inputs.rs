@@ -55,7 +55,7 @@ pub struct Inputs<'a> {
 
 impl<'a> Inputs<'a> {
     /// Traces of a single frame, used by every study except that of frames.
-    pub fn stills(&self) -> impl Iterator<Item = &Subject<'a>> {
+    pub(super) fn stills(&self) -> impl Iterator<Item = &Subject<'a>> {
         let still = |s: &&Subject<'a>| frame_count(s.source.tables()) == 1;
         self.subjects.iter().filter(still)
     }

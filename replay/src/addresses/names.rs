@@ -31,12 +31,12 @@ impl Names {
     }
 
     /// Maximum number of ranges. The last number is reserved, because it contains `u32::MAX`.
-    pub fn most_ranges(&self) -> u64 {
+    pub(super) fn most_ranges(&self) -> u64 {
         (1 << (32 - self.kept_bits)) - 1
     }
 
     /// Lines per range.
-    pub fn range_lines(&self) -> u64 {
+    pub(super) fn range_lines(&self) -> u64 {
         1 << self.kept_bits
     }
 

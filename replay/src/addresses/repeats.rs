@@ -29,7 +29,7 @@ impl Repeats {
 
     /// The remaining lines of a block, each with a tag for its kind of access.
     #[inline(always)]
-    pub fn drop_from<'a>(&'a mut self, block: &LineBlock<'a>) -> (&'a [u32], &'a [Tag]) {
+    pub(super) fn drop_from<'a>(&'a mut self, block: &LineBlock<'a>) -> (&'a [u32], &'a [Tag]) {
         self.tags.clear();
         if !self.drops {
             self.tags.extend(block.kinds.iter().map(|&kind| tag(kind)));

@@ -12,7 +12,7 @@ pub(super) struct Touched {
 
 impl Touched {
     /// Adds lines.
-    pub fn insert_all(&mut self, lines: &[u32]) {
+    pub(super) fn insert_all(&mut self, lines: &[u32]) {
         for &line in lines {
             let (page, within) = (line as usize / PAGE_LINES, line as usize % PAGE_LINES);
             if page >= self.pages.len() {

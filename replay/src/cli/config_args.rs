@@ -235,7 +235,7 @@ impl ConfigArgs {
     ///
     /// # Errors
     /// See [`Self::resolve`].
-    pub fn resolve_over(&self, defaults: RunConfig) -> Result<RunConfig> {
+    pub(super) fn resolve_over(&self, defaults: RunConfig) -> Result<RunConfig> {
         let preset = |config| self.preset.map_or(config, |preset| preset.over(config));
         self.resolve_file_over(preset(defaults))
     }
@@ -244,7 +244,7 @@ impl ConfigArgs {
     ///
     /// # Errors
     /// See [`Self::resolve`].
-    pub fn resolve_without_preset(&self) -> Result<RunConfig> {
+    pub(super) fn resolve_without_preset(&self) -> Result<RunConfig> {
         self.resolve_file_over(RunConfig::default())
     }
 
@@ -276,7 +276,7 @@ impl ConfigArgs {
     /// The first flag given that applies only to tiles, textures or the texture unit, and so not to plain
     /// addresses.
     #[must_use]
-    pub fn first_of_traces(&self) -> Option<&'static str> {
+    pub(super) fn first_of_traces(&self) -> Option<&'static str> {
         let flags = [
             ("--preset", self.preset.is_some()),
             ("--order", self.order.is_some()),

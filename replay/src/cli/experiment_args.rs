@@ -132,7 +132,7 @@ impl ExperimentArgs {
 
     /// True if the page shows pictures.
     #[must_use]
-    pub fn has_pictures(&self) -> bool {
+    pub(super) fn has_pictures(&self) -> bool {
         !self.images.is_empty()
     }
 

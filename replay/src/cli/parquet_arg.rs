@@ -25,7 +25,7 @@ impl ParquetArg {
 
     /// Whether it writes to standard output instead of the command's result.
     #[must_use]
-    pub fn takes_stdout(&self) -> bool {
+    pub(super) fn takes_stdout(&self) -> bool {
         self.path.as_deref().is_some_and(is_stdout)
     }
 

@@ -42,7 +42,7 @@ impl Traces {
 
     /// Size of all files.
     #[must_use]
-    pub fn file_bytes(&self) -> u64 {
+    pub(super) fn file_bytes(&self) -> u64 {
         let files = self.0.iter();
         files
             .map(|(trace, ..)| trace.container().file_bytes())
@@ -51,7 +51,7 @@ impl Traces {
 
     /// The traces, labelled with their file names.
     #[must_use]
-    pub fn subjects_by_file(&self) -> Vec<Subject<'_>> {
+    pub(super) fn subjects_by_file(&self) -> Vec<Subject<'_>> {
         let opened = self.0.iter();
         opened
             .map(|(trace, id, stem)| Subject::new(trace, id.clone(), stem.clone()))

@@ -82,7 +82,7 @@ impl<'a> Partners<'a> {
     }
 
     /// Whether a draw is opaque, if the capture records it.
-    pub fn opacity(&self, draw: usize) -> Option<&'static str> {
+    pub(super) fn opacity(&self, draw: usize) -> Option<&'static str> {
         let opaque = self.opaque.as_ref()?.get(draw)?;
         Some(if *opaque {
             "opaque"
@@ -92,7 +92,7 @@ impl<'a> Partners<'a> {
     }
 
     /// The draw of the first capture that contains a primitive.
-    pub fn draw_of(&self, primitive: u32) -> usize {
+    pub(super) fn draw_of(&self, primitive: u32) -> usize {
         let starts = &self.starts[0];
         let after = starts.partition_point(|(first, _)| *first <= primitive);
         let at = after.checked_sub(1).and_then(|at| starts.get(at));

@@ -61,7 +61,7 @@ impl Tally {
 
     /// Fragments in at least one capture.
     #[must_use]
-    pub fn fragments_in_either(&self) -> u64 {
+    fn fragments_in_either(&self) -> u64 {
         self.fragments_in_both + self.fragments_only_in_a + self.fragments_only_in_b
     }
 

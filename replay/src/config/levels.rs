@@ -21,7 +21,7 @@ pub struct Levels {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct LevelTable {
-    #[serde(with = "serde_bytes")]
+    #[serde(deserialize_with = "serde_bytes::deserialize")]
     size_bytes: u64,
     ways: Option<u32>,
     #[serde(default)]
@@ -119,7 +119,7 @@ impl Levels {
 
     /// True with levels below the L2.
     #[must_use]
-    pub const fn has_lower(&self) -> bool {
+    pub(super) const fn has_lower(&self) -> bool {
         self.lower[0].is_some()
     }
 

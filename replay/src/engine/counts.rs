@@ -48,7 +48,7 @@ pub(super) struct FootprintMisses {
 impl FootprintMisses {
     /// Counts the L2's answer to a request at `now`, and returns the line's arrival.
     #[inline(always)]
-    pub fn count_l2_answer(&mut self, answer: Answer, now: u64) -> u64 {
+    pub(super) fn count_l2_answer(&mut self, answer: Answer, now: u64) -> u64 {
         match answer {
             Answer::Hit => now,
             Answer::Miss(arrival) => {
@@ -85,7 +85,7 @@ impl CacheCounts {
 
     /// Counts look-ups of lines in flight into the L1.
     #[inline]
-    pub fn secondary(&mut self, cell: usize, lines: u32) {
+    pub(super) fn secondary(&mut self, cell: usize, lines: u32) {
         self.cells[cell].l1.secondary += u64::from(lines);
     }
 

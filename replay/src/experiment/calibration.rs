@@ -59,7 +59,7 @@ fn as_map<S: Serializer>(settings: &[Setting], serializer: S) -> Result<S::Ok, S
 pub const ROWS: usize = z2::CACHES_KIB.len() * z2::ORDERS.len();
 
 /// Key of the IPD among a trial's settings.
-pub(super) const IPD_KEY: &str = "capture.ipd_m";
+const IPD_KEY: &str = "capture.ipd_m";
 
 /// A scene with its captures.
 #[derive(Clone, Debug, PartialEq)]

@@ -45,7 +45,7 @@ pub struct Point {
 impl Point {
     /// Whether the point changes no setting of the base configuration.
     #[must_use]
-    pub fn is_base(&self) -> bool {
+    pub(super) fn is_base(&self) -> bool {
         self.settings.is_empty() && self.change.is_none()
     }
 

@@ -41,7 +41,7 @@ impl Distances {
 
     /// All reuses.
     #[must_use]
-    pub fn total(&self) -> ByOrigin {
+    pub(super) fn total(&self) -> ByOrigin {
         self.below(self.0.len())
     }
 

@@ -174,7 +174,7 @@ impl Profile {
     }
 
     /// Starts a frame. Caches keep their lines.
-    pub fn begin_frame(&mut self) {
+    pub(super) fn begin_frame(&mut self) {
         self.frame_start = self.now;
         self.frame_first = Span::new(self.tiles + 1, 1);
         self.item = None;

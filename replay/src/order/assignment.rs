@@ -50,7 +50,7 @@ impl Assignment {
 
     /// The rule of the configuration that distributes the permuted items.
     #[must_use]
-    pub const fn dispatch(self) -> Assign {
+    pub(super) const fn dispatch(self) -> Assign {
         match self {
             Self::FirstIdle => Assign::FirstIdle,
             Self::Static | Self::Affinity | Self::Quads | Self::Runs => Assign::Static,

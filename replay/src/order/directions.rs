@@ -109,13 +109,13 @@ impl Directions {
     }
 
     /// The position of the centre of one eye's tile in the picture of the other eye, in tiles.
-    pub fn in_other_eye(&self, eye: usize, tile: [u32; 2]) -> Option<[f64; 2]> {
+    pub(super) fn in_other_eye(&self, eye: usize, tile: [u32; 2]) -> Option<[f64; 2]> {
         self.eyes[1 - eye].tile(self.middle(eye, tile))
     }
 
     /// The cell in the picture of the head, whose cells are as large as the left eye's tiles. Columns count to
     /// the right and rows downwards from straight ahead.
-    pub fn in_head(&self, eye: usize, tile: [u32; 2]) -> [i32; 2] {
+    pub(super) fn in_head(&self, eye: usize, tile: [u32; 2]) -> [i32; 2] {
         let direction = self.middle(eye, tile);
         let [right, up, back] = self.head.map(|axis| dot(axis, direction));
         let tangent = |x: f64| {

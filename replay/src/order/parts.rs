@@ -147,7 +147,7 @@ impl Parts {
 
     /// True for a name with several parts, and for a curve with or without a number.
     #[must_use]
-    pub fn is_composed(name: &str) -> bool {
+    pub(super) fn is_composed(name: &str) -> bool {
         let curve = name.trim_end_matches(|c: char| c.is_ascii_digit());
         name.contains('+') || Curve::find(curve).is_some()
     }
@@ -191,7 +191,7 @@ impl Parts {
 
     /// These parts with the curve's default number for this L2, unless they contain a number.
     #[must_use]
-    pub fn resolved(self, l2_bytes: u64) -> Self {
+    pub(super) fn resolved(self, l2_bytes: u64) -> Self {
         let usual = || self.curve.usual_size(l2_bytes);
         let size = self
             .curve

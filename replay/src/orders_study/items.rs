@@ -52,8 +52,8 @@ impl Items {
     }
 
     /// Number of distinct lines of all items.
-    #[must_use]
-    pub fn distinct_lines(&self) -> u64 {
+    #[cfg(test)]
+    pub(super) fn distinct_lines(&self) -> u64 {
         self.addresses.len() as u64
     }
 

@@ -49,7 +49,7 @@ impl Learner {
     }
 
     /// The order of the next frame.
-    pub fn choose(&mut self) -> usize {
+    fn choose(&mut self) -> usize {
         let unknown = self.fetched.iter().position(Option::is_none);
         let tries = self.fetched.len() > 1 && self.frames.is_multiple_of(TRY_EVERY);
         self.current = match unknown {
@@ -69,7 +69,7 @@ impl Learner {
     }
 
     /// Records the lines that the frame fetched.
-    pub fn observe(&mut self, fetched: u64) {
+    fn observe(&mut self, fetched: u64) {
         if let Some(of_order) = self.fetched.get_mut(self.current) {
             *of_order = Some(fetched);
         }

@@ -29,7 +29,7 @@ impl PublishedRow {
     /// DRAM traffic in lines per footprint (L1 times L2 miss rate). This is Fig. 5 except for its scale,
     /// which the paper does not give in numbers.
     #[must_use]
-    pub fn external_lines_per_footprint(&self) -> f64 {
+    fn external_lines_per_footprint(&self) -> f64 {
         self.l1_footprint_miss_pct * self.l2_line_miss_pct / 1e4
     }
 

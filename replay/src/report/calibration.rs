@@ -10,7 +10,7 @@ use crate::result::TOOL;
 use serde::Serialize;
 
 /// Schema of the object that `replay calibrate --json` prints.
-pub(super) const CALIBRATION_SCHEMA: &str = "replay.calibration/2";
+const CALIBRATION_SCHEMA: &str = "replay.calibration/2";
 
 /// A calibration: every trial, and the index of the chosen one.
 #[derive(Serialize)]

@@ -182,7 +182,7 @@ impl Heading {
     /// Name of the group of columns in tables of a page: the part of the key before the dot, unless one is
     /// set.
     #[must_use]
-    pub fn group_name(&self) -> String {
+    pub(super) fn group_name(&self) -> String {
         match (self.group.is_empty(), self.key.split_once('.')) {
             (false, _) => self.group.to_string(),
             (true, Some((first, _))) => first.replace('_', " "),
@@ -192,13 +192,13 @@ impl Heading {
 
     /// Name in CSV and Parquet files.
     #[must_use]
-    pub fn flat_key(&self) -> String {
+    pub(super) fn flat_key(&self) -> String {
         self.key.replace('.', "_")
     }
 
     /// Definition and unit, for the axis of a chart.
     #[must_use]
-    pub fn axis_label(&self) -> String {
+    pub(super) fn axis_label(&self) -> String {
         format!("{}, {}", self.about, self.unit)
     }
 }

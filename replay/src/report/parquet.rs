@@ -17,7 +17,7 @@ use thiserror::Error;
 
 /// Key of the file's metadata with a JSON object: unit and definition by column. Most readers do not show
 /// metadata of columns.
-pub(super) const COLUMNS_KEY: &str = "parallax.columns";
+const COLUMNS_KEY: &str = "parallax.columns";
 
 /// Error for a table that cannot be written as Parquet.
 #[derive(Debug, Error)]

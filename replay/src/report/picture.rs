@@ -82,7 +82,7 @@ impl EmbeddedPicture {
 
     /// The picture as a `data:` address.
     #[must_use]
-    pub fn data_uri(&self) -> String {
+    pub(super) fn data_uri(&self) -> String {
         data_uri::jpeg(&self.jpeg)
     }
 }

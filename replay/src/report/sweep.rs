@@ -23,7 +23,7 @@ use serde::Serialize;
 use toml::Value;
 
 /// Schema of a sweep's JSON.
-pub(super) const SWEEP_SCHEMA: &str = "replay.sweep/3";
+const SWEEP_SCHEMA: &str = "replay.sweep/3";
 
 const ORDER: &str = "order";
 const TRAFFIC: &str = "external_mb_per_frame";

@@ -38,14 +38,14 @@ impl Table {
 
     /// Separates rows where one of the first `cells` cells changes.
     #[must_use]
-    pub fn grouped_by(mut self, cells: usize) -> Self {
+    pub(super) fn grouped_by(mut self, cells: usize) -> Self {
         self.groups = cells;
         self
     }
 
     /// The columns with these keys, in the order of `keys`. Skips unknown keys.
     #[must_use]
-    pub fn picked<'k>(&self, keys: impl IntoIterator<Item = &'k str>) -> Self {
+    pub(super) fn picked<'k>(&self, keys: impl IntoIterator<Item = &'k str>) -> Self {
         let at = |key: &str| self.headings.iter().position(|h| h.key == key);
         let columns: Vec<usize> = keys.into_iter().filter_map(at).collect();
         let pick = |row: &Vec<Value>| columns.iter().map(|&c| row[c].clone()).collect();
@@ -70,7 +70,7 @@ impl Table {
 
     /// Removes the columns without any value.
     #[must_use]
-    pub fn without_empty_columns(mut self) -> Self {
+    pub(super) fn without_empty_columns(mut self) -> Self {
         let used: Vec<bool> = (0..self.headings.len())
             .map(|i| self.rows.iter().any(|row| row[i] != Value::None))
             .collect();
@@ -155,7 +155,7 @@ impl Table {
     /// As HTML in a scrolling box with fixed headings and a fixed first column. The page's script adds
     /// sorting, filtering and a choice of columns.
     #[must_use]
-    pub fn markup(&self) -> Markup {
+    pub(super) fn markup(&self) -> Markup {
         let class = |heading: &Heading| match (heading.show == Show::Text, heading.published) {
             (false, true) => "num paper",
             (false, false) => "num",

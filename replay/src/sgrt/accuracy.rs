@@ -24,7 +24,7 @@ pub struct ClassCounts {
 }
 
 /// Limits of the position error, in pixels.
-pub(super) const POSITION_LIMITS_PX: [f32; 2] = [1.0, 2.0];
+const POSITION_LIMITS_PX: [f32; 2] = [1.0, 2.0];
 
 /// Counts of all classes, and the position error of reused hits on the right object.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -47,13 +47,13 @@ pub struct Accuracy {
 impl Accuracy {
     /// Number of right samples.
     #[must_use]
-    pub fn total(&self) -> u64 {
+    pub(super) fn total(&self) -> u64 {
         self.reused.pixels + self.overlapped.pixels + self.missing.pixels + self.bad.pixels
     }
 
     /// Counts of all reused samples, overlapped ones included.
     #[must_use]
-    pub fn all_reused(&self) -> ClassCounts {
+    pub(super) fn all_reused(&self) -> ClassCounts {
         let (a, b) = (&self.reused, &self.overlapped);
         ClassCounts {
             pixels: a.pixels + b.pixels,

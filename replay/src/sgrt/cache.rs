@@ -33,7 +33,7 @@ impl Misses {
 
     /// Bytes fetched by the L2.
     #[must_use]
-    pub fn dram_bytes(&self, line_bytes: u64) -> f64 {
+    pub(super) fn dram_bytes(&self, line_bytes: u64) -> f64 {
         self.l2_lines * line_bytes as f64
     }
 }
@@ -42,7 +42,7 @@ impl Misses {
 /// starts at a multiple of `g = gcd(b, line)`, all multiples equally often, and touches `1 + (b - g) /
 /// line` lines on average.
 #[must_use]
-pub(super) fn lines_per_record(record_bytes: u32, line_bytes: u64) -> f64 {
+fn lines_per_record(record_bytes: u32, line_bytes: u64) -> f64 {
     let bytes = u64::from(record_bytes).max(1);
     let (mut divisor, mut rest) = (bytes, line_bytes);
     while rest > 0 {

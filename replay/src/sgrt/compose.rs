@@ -55,7 +55,7 @@ impl Reuse {
 }
 
 /// Maximum distance between the reused and the true hit to count as the same spot, in pixels.
-pub(super) const SAME_SPOT_PX: f32 = 1.0;
+const SAME_SPOT_PX: f32 = 1.0;
 
 /// Colours of the right samples, linear RGB.
 #[must_use]

@@ -28,7 +28,7 @@ pub enum PixelClass {
 impl PixelClass {
     /// True for the reused classes.
     #[must_use]
-    pub fn is_reused(self) -> bool {
+    pub(super) fn is_reused(self) -> bool {
         matches!(self, Self::Reused | Self::Overlapped)
     }
 }

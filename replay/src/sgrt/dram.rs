@@ -34,7 +34,7 @@ impl DramBytes {
 
     /// Transfer time at full bandwidth (1 GB/s is 1 byte/ns).
     #[must_use]
-    pub fn time_ns(&self, config: &SgrtConfig) -> f64 {
+    pub(super) fn time_ns(&self, config: &SgrtConfig) -> f64 {
         self.total() as f64 / config.memory.bandwidth_gb_s
     }
 }

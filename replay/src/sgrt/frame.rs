@@ -115,7 +115,7 @@ pub struct Sample {
 impl Sample {
     /// True if nothing was hit.
     #[must_use]
-    pub fn is_sky(&self) -> bool {
+    pub(super) fn is_sky(&self) -> bool {
         self.primitive == SKY
     }
 
@@ -190,12 +190,12 @@ impl Frame {
 
     /// Samples per eye, one per pixel.
     #[must_use]
-    pub fn sample_count(&self) -> usize {
+    pub(super) fn sample_count(&self) -> usize {
         self.size_px[0] as usize * self.size_px[1] as usize
     }
 
     /// Sample indices of a tile's pixels, row by row.
-    pub fn tile_samples(&self, tile: u32) -> impl Iterator<Item = usize> + use<> {
+    pub(super) fn tile_samples(&self, tile: u32) -> impl Iterator<Item = usize> + use<> {
         let ([x, y], [w, h]) = self.tables.tile_rect(tile);
         let width = self.size_px[0] as usize;
         (y..y + h).flat_map(move |row| {
@@ -206,7 +206,7 @@ impl Frame {
 
     /// Image position of a sample of either eye, in pixels from the top left.
     #[must_use]
-    pub fn position_px(&self, sample: usize) -> [f32; 2] {
+    pub(super) fn position_px(&self, sample: usize) -> [f32; 2] {
         let (x, y) = (
             sample as u32 % self.size_px[0],
             sample as u32 / self.size_px[0],

@@ -4,7 +4,7 @@ use super::detect::Decision;
 use image_error::Picture;
 
 /// Colour of traced pixels, missing or rejected.
-pub(super) const BAD_PIXEL: [u8; 3] = [255, 230, 0];
+const BAD_PIXEL: [u8; 3] = [255, 230, 0];
 
 /// The picture with every traced pixel yellow.
 #[must_use]

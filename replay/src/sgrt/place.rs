@@ -34,7 +34,7 @@ pub struct RightSample<'a> {
 impl<'a> RightSample<'a> {
     /// The arrival here.
     #[must_use]
-    pub fn candidate(&self) -> &'a Candidate {
+    pub(super) fn candidate(&self) -> &'a Candidate {
         &self.arrived.candidates[self.index]
     }
 
@@ -45,7 +45,7 @@ impl<'a> RightSample<'a> {
     }
 
     /// Neighbouring pixels inside the image.
-    pub fn neighbours(self, offsets: &'static [Offset]) -> impl Iterator<Item = Self> {
+    pub(super) fn neighbours(self, offsets: &'static [Offset]) -> impl Iterator<Item = Self> {
         let [width, height] = self.frame.size_px.map(|s| s as i32);
         let index = self.index as i32;
         offsets.iter().filter_map(move |(dx, dy)| {
@@ -59,7 +59,10 @@ impl<'a> RightSample<'a> {
     }
 
     /// Neighbouring pixels with an arrival.
-    pub fn arrived_neighbours(self, offsets: &'static [Offset]) -> impl Iterator<Item = Self> {
+    pub(super) fn arrived_neighbours(
+        self,
+        offsets: &'static [Offset],
+    ) -> impl Iterator<Item = Self> {
         self.neighbours(offsets)
             .filter(|place| !place.candidate().is_missing())
     }

@@ -77,7 +77,7 @@ pub struct Figures {
 
 /// Lane cycles of a test against one left pixel of the row: a subtraction, a comparison and a minimum, with the
 /// address arithmetic in a second issue slot.
-pub(super) const ROW_TEST_CYCLES: f64 = 4.0;
+const ROW_TEST_CYCLES: f64 = 4.0;
 
 /// All readings, in a fixed order: 2 rules x 4 levels of reuse x 6 scopes, row tests and places of the G-buffer.
 #[must_use]

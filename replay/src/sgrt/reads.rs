@@ -34,7 +34,7 @@ impl Around {
 
     /// True if the rows above and below are read as well.
     #[must_use]
-    pub fn has_neighbour_rows(self) -> bool {
+    fn has_neighbour_rows(self) -> bool {
         self >= Self::Cross
     }
 }
@@ -100,7 +100,7 @@ impl Reads {
 
     /// True if detection reads rows above and below a pixel's.
     #[must_use]
-    pub fn has_neighbour_rows(self) -> bool {
+    pub(super) fn has_neighbour_rows(self) -> bool {
         let all = [self.position, self.object, self.triangle, self.shadow];
         all.into_iter().flatten().any(Around::has_neighbour_rows)
     }
@@ -108,7 +108,13 @@ impl Reads {
     /// Bytes that DMA fetches for a band of rows. The band's arrivals come from `rows` left rows, and those
     /// of the band and its adjacent rows from `with_neighbours`, of `row_px` pixels each.
     #[must_use]
-    pub fn fetched_bytes(self, g: &Gbuffer, rows: u64, with_neighbours: u64, row_px: u64) -> u64 {
+    pub(super) fn fetched_bytes(
+        self,
+        g: &Gbuffer,
+        rows: u64,
+        with_neighbours: u64,
+        row_px: u64,
+    ) -> u64 {
         self.fields(g)
             .map(|(bytes, around)| {
                 let rows = if around.has_neighbour_rows() {
@@ -123,7 +129,7 @@ impl Reads {
 
     /// Bytes read from the row buffers per tested right pixel.
     #[must_use]
-    pub fn looked_up_bytes(self, g: &Gbuffer) -> u64 {
+    pub(super) fn looked_up_bytes(self, g: &Gbuffer) -> u64 {
         self.fields(g)
             .map(|(bytes, around)| bytes * around.pixels())
             .sum()
@@ -131,7 +137,7 @@ impl Reads {
 
     /// Bytes per G-buffer record: the paper's fields, and the numbers that detection reads.
     #[must_use]
-    pub fn record_bytes(self, g: &Gbuffer) -> u64 {
+    pub(super) fn record_bytes(self, g: &Gbuffer) -> u64 {
         let numbers = [
             (g.object_bytes, self.object),
             (g.triangle_bytes, self.triangle),

@@ -30,7 +30,7 @@ impl Candidate {
 
     /// True without arrivals.
     #[must_use]
-    pub fn is_missing(&self) -> bool {
+    pub(super) fn is_missing(&self) -> bool {
         self.source == NONE
     }
 }

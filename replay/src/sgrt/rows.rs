@@ -113,7 +113,7 @@ impl RowNeeds {
 
     /// Bytes of the largest band of rows that detection fetches, of `row_px` pixels each.
     #[must_use]
-    pub fn largest_band(&self, reads: Reads, g: &Gbuffer, row_px: u64) -> u64 {
+    pub(super) fn largest_band(&self, reads: Reads, g: &Gbuffer, row_px: u64) -> u64 {
         let bands = self.band.iter().zip(&self.band_and_beside);
         let bytes = bands.map(|(&band, &beside)| reads.fetched_bytes(g, band, beside, row_px));
         bytes.max().unwrap_or(0)
@@ -122,7 +122,7 @@ impl RowNeeds {
     /// Left rows alive at most if they stay on chip and bands of left and right tiles alternate: a band of right tiles
     /// follows the last band of left tiles that it needs, and keeps every row that it or a later band needs.
     #[must_use]
-    pub fn rows_on_chip(&self, with_adjacent_rows: bool) -> u64 {
+    pub(super) fn rows_on_chip(&self, with_adjacent_rows: bool) -> u64 {
         let tile = u64::from(TILE_SIZE_PX);
         let mut most = 0;
         // By band: the oldest row that it or a later one needs.

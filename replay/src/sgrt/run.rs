@@ -35,13 +35,13 @@ pub struct Run {
 impl Run {
     /// Frames per second relative to another run.
     #[must_use]
-    pub fn performance_over(&self, reference: &Self) -> f64 {
+    pub(super) fn performance_over(&self, reference: &Self) -> f64 {
         reference.time_ns / self.time_ns
     }
 
     /// Energy relative to another run.
     #[must_use]
-    pub fn energy_over(&self, reference: &Self) -> f64 {
+    pub(super) fn energy_over(&self, reference: &Self) -> f64 {
         self.energy.total() / reference.energy.total()
     }
 }

@@ -23,19 +23,19 @@ pub struct SrpCycles {
 impl SrpCycles {
     /// Lane cycles of all kernels.
     #[must_use]
-    pub fn lane_cycles(&self) -> f64 {
+    pub(super) fn lane_cycles(&self) -> f64 {
         self.generation + self.shading + self.added_lane_cycles()
     }
 
     /// Lane cycles of the three kernels that reprojection adds.
     #[must_use]
-    pub fn added_lane_cycles(&self) -> f64 {
+    pub(super) fn added_lane_cycles(&self) -> f64 {
         self.reproject + self.detect + self.reuse
     }
 
     /// Cycles of the cores with all lanes busy.
     #[must_use]
-    pub fn total(&self) -> f64 {
+    pub(super) fn total(&self) -> f64 {
         if self.lanes > 0.0 {
             self.lane_cycles() / self.lanes
         } else {

@@ -221,7 +221,7 @@ pub fn trace(scene: &[Placed], view: View) -> Synthetic {
 
 impl Synthetic {
     /// Adds addresses: the rays of each pixel visit a path that neighbours partly share.
-    pub fn with_visits(mut self) -> Self {
+    pub(super) fn with_visits(mut self) -> Self {
         self.tables.meta.has_visits = true;
         for tile in self.tiles.iter_mut().flatten() {
             let mut visits = Vec::new();

@@ -32,7 +32,7 @@ pub struct TniCycles {
 impl TniCycles {
     /// Cycles of the batch, which the scarcest resource determines.
     #[must_use]
-    pub fn total(&self) -> f64 {
+    pub(super) fn total(&self) -> f64 {
         [
             self.traversal,
             self.intersection,
@@ -45,7 +45,7 @@ impl TniCycles {
 
     /// Name of the scarcest resource.
     #[must_use]
-    pub fn bottleneck(&self) -> &'static str {
+    pub(super) fn bottleneck(&self) -> &'static str {
         let all = [
             ("traversal", self.traversal),
             ("intersection", self.intersection),

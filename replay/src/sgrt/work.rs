@@ -90,7 +90,7 @@ impl PixelWork {
 
     /// Outcomes of the primary hit's shadow rays, and their number.
     #[must_use]
-    pub fn shadow_outcomes(&self) -> (u64, u32) {
+    pub(super) fn shadow_outcomes(&self) -> (u64, u32) {
         let rays = self.by_class[RayClass::Shadow as usize].rays;
         (self.shadows_blocked, rays)
     }
@@ -123,7 +123,7 @@ pub struct BatchWork {
 
 impl BatchWork {
     /// Adds a pixel whose ray tree is completely traced.
-    pub fn add_traced(&mut self, pixel: &PixelWork) {
+    pub(super) fn add_traced(&mut self, pixel: &PixelWork) {
         for class in RayClass::ALL {
             self.add_class(pixel, class);
         }
@@ -131,7 +131,7 @@ impl BatchWork {
     }
 
     /// Adds the rays of one class of a pixel's ray tree.
-    pub fn add_class(&mut self, pixel: &PixelWork, class: RayClass) {
+    pub(super) fn add_class(&mut self, pixel: &PixelWork, class: RayClass) {
         self.by_class[class as usize].add(&pixel.by_class[class as usize]);
     }
 
@@ -155,7 +155,7 @@ impl BatchWork {
     }
 
     /// Adds the idle lanes of a warp with these numbers of traced and reused pixels.
-    pub fn add_warp(&mut self, traced: u64, reused: u64) {
+    pub(super) fn add_warp(&mut self, traced: u64, reused: u64) {
         if traced > 0 && reused > 0 {
             self.idle_traced_lanes += reused;
             self.idle_reused_lanes += traced;

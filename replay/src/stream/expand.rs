@@ -443,8 +443,8 @@ impl<'e> Frame<'e> {
     }
 
     /// Number of tiles that are expanded again when a core needs them.
-    #[must_use]
-    pub fn not_kept(&self) -> usize {
+    #[cfg(test)]
+    fn not_kept(&self) -> usize {
         let slots = self.kept.iter().flatten();
         slots.filter(|slot| slot.get().is_none()).count()
     }

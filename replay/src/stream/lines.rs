@@ -89,7 +89,7 @@ impl TileLines {
 
     /// Number of quads.
     #[must_use]
-    pub fn quad_count(&self) -> usize {
+    pub(super) fn quad_count(&self) -> usize {
         self.quads.len()
     }
 

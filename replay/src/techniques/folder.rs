@@ -121,7 +121,7 @@ impl Folder {
     ///
     /// # Errors
     /// The file cannot be read, or is not the one that the study wrote.
-    pub fn picture_file(
+    pub(super) fn picture_file(
         &self,
         row: usize,
         frame: usize,

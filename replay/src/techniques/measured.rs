@@ -66,7 +66,7 @@ pub struct Measured<'a> {
 pub type Cost = fn(&Frame) -> Option<f64>;
 
 /// The counts by which techniques are ranked; they are the same in every run.
-pub(super) const OBJECTIVES: [(&str, Cost); 3] = [
+const OBJECTIVES: [(&str, Cost); 3] = [
     ("fragments", |frame| Some(frame.fragments? as f64)),
     ("bytes", |frame| Some(frame.memory_bytes? as f64)),
     ("energy", |frame| frame.energy_mj),

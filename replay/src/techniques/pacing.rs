@@ -33,12 +33,6 @@ impl Pacing {
             steps: times_ms.iter().map(steps).sum::<f64>() / count,
         })
     }
-
-    /// Frames shown per second.
-    #[must_use]
-    pub fn shown_hz(&self) -> f64 {
-        f64::from(self.rate_hz) / self.steps
-    }
 }
 
 #[cfg(test)]
@@ -51,7 +45,6 @@ mod tests {
         let pacing = |hz| Pacing::of(hz, &[9.0, 10.0, 21.0, 4.0]).unwrap();
         let at_100 = pacing(100);
         assert_eq!((at_100.missed_pct, at_100.steps), (25.0, 1.5));
-        assert!((at_100.shown_hz() - 100.0 / 1.5).abs() < 1e-9);
         let at_120 = pacing(120);
         assert_eq!((at_120.missed_pct, at_120.steps), (75.0, 2.0));
         let at_80 = pacing(80);

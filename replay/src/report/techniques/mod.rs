@@ -74,7 +74,7 @@ struct SceneFacts<'a> {
 impl<'a> TechniquesReport<'a> {
     /// The order whose saving is shown, and the order that it is compared with.
     #[must_use]
-    pub fn gain_orders(&self) -> (Order, Order) {
+    fn gain_orders(&self) -> (Order, Order) {
         let own = self.config.order;
         let other = if own == Order::MORTON {
             Order::Z2_STA
@@ -104,7 +104,7 @@ impl<'a> TechniquesReport<'a> {
 
     /// The figures for a terminal.
     #[must_use]
-    pub fn short_table(&self) -> Table {
+    fn short_table(&self) -> Table {
         let one = self.scenes.len() == 1;
         let columns = columns::SHORT
             .into_iter()
@@ -115,7 +115,7 @@ impl<'a> TechniquesReport<'a> {
 
     /// Late frames at the refresh rates of displays.
     #[must_use]
-    pub fn pacing_table(&self) -> Table {
+    fn pacing_table(&self) -> Table {
         let one = self.scenes.len() == 1;
         let keys = columns::pacing_keys();
         let keys = keys.iter().map(String::as_str);
@@ -127,7 +127,7 @@ impl<'a> TechniquesReport<'a> {
 
     /// Saving of an order with and without each technique.
     #[must_use]
-    pub fn order_table(&self) -> Table {
+    fn order_table(&self) -> Table {
         let (order, against) = self.gain_orders();
         let columns = order_columns(&self.orders, order, against);
         Table::new(&columns, &self.gains()).grouped_by(1)
@@ -135,7 +135,7 @@ impl<'a> TechniquesReport<'a> {
 
     /// Published savings and the measured ones.
     #[must_use]
-    pub fn claim_table(&self) -> Table {
+    fn claim_table(&self) -> Table {
         Table::new(&claim_columns(), &claims(self.scenes)).without_empty_columns()
     }
 

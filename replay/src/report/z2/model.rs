@@ -13,7 +13,7 @@ use formats::textrace::TraceMeta;
 use serde::Serialize;
 
 /// Schema of the object that `replay paper --json` prints.
-pub(super) const PAPER_SCHEMA: &str = "replay.paper/3";
+const PAPER_SCHEMA: &str = "replay.paper/3";
 
 /// A trace of the experiment.
 #[derive(Clone, Debug, PartialEq, Serialize)]

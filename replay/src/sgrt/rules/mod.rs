@@ -69,7 +69,7 @@ pub trait Test: Sync {
 }
 
 /// Default depth share of rules that take one.
-pub(super) const DEFAULT_DEPTH_SHARE: f32 = 0.02;
+const DEFAULT_DEPTH_SHARE: f32 = 0.02;
 
 /// The rules of error detection: a combination of [`RULES`], each at most once. The empty one
 /// reuses every arrival.
