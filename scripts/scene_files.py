@@ -22,7 +22,7 @@ TIMEOUT_S = 120
 DRAW = ["--size", "48x48", "--no-plain"]
 COLUMNS = ["registry", "package", "version", "file", "outcome", "reason", "triangles", "quads", "fragments", "records", "warnings"]
 CLIENTS = {
-    "npm": ["npm", "pack", "--silent", "{name}@{version}"],
+    "npm": ["npm", "pack", "--loglevel", "error", "{name}@{version}"],
     "Debian": ["apt-get", "download", "{name}={version}"],
     "PyPI": [sys.executable, "-m", "pip", "download", "--quiet", "--no-deps", "--only-binary", ":all:", "{name}=={version}"],
     "crates.io": ["cargo", "info", "{name}@{version}"],

@@ -159,6 +159,16 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_name_of_a_million_folders_is_not_searched_for() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("wood.png"), "").unwrap();
+        let long = "a/".repeat(1 << 20) + "wood.png";
+        assert_eq!(find(folder.path(), &long), None);
+        let short = "a/".repeat(1 << 10) + "wood.png";
+        assert_eq!(find(folder.path(), &short), Some(("wood.png".into(), true)));
+    }
+
     #[cfg(target_os = "linux")]
     #[test]
     fn a_name_on_disk_in_latin_1_is_found() {

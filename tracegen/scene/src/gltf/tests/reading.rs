@@ -302,15 +302,26 @@ fn files_are_found_as_other_systems_and_tools_name_them() {
     Files::new(&json).fails_with(&["absent.png", "images[0]", "cannot read"]);
 }
 
-/// A triangle with these sets of texture coordinates, each of one value, whose material has base
-/// colour, normal and occlusion textures in three sets.
+/// The texture coordinates of a set at the triangle's corners: u grows along x in even sets and along y in
+/// odd ones.
+fn coordinates(set: u32) -> [Vec2; 3] {
+    let (along_x, along_y) = match set % 2 {
+        0 => (Vec2::X, Vec2::Y),
+        _ => (Vec2::Y, Vec2::X),
+    };
+    [Vec2::ZERO, along_x, along_y].map(|corner| corner + set as f32)
+}
+
+/// A triangle with these sets of texture coordinates, whose material has base colour, normal and
+/// occlusion textures in three sets.
 fn sets_of_coordinates(given: &[u32], sampled: [u32; 3]) -> Loaded {
     let mut json = textured();
     let mut bytes = triangle_bytes(CORNERS, [0, 1, 2]);
     bytes.resize(44, 0);
     for &set in given {
         let offset = bytes.len();
-        bytes.extend([set as f32; 6].iter().flat_map(|v| v.to_le_bytes()));
+        let corners = coordinates(set).map(|corner| corner.to_array());
+        bytes.extend(corners.as_flattened().iter().flat_map(|v| v.to_le_bytes()));
         let views = json["bufferViews"].as_array_mut().unwrap();
         views.push(json!({"buffer": 0, "byteOffset": offset, "byteLength": 24}));
         let view = views.len() - 1;
@@ -360,13 +371,16 @@ fn a_material_may_sample_any_two_sets_of_texture_coordinates() {
             material.occlusion_texture,
         ];
         for (texture, set) in textures.into_iter().zip(sampled) {
-            let coordinates = match texture.unwrap().uv_set {
+            let found = match texture.unwrap().uv_set {
                 0 => &mesh.uv0,
                 1 => &mesh.uv1,
                 other => panic!("set {other}"),
             };
-            assert_eq!(coordinates[..], [Vec2::splat(set as f32); 3], "{sampled:?}");
+            assert_eq!(found[..], coordinates(set), "{sampled:?}");
         }
+        // Tangents follow the normal map's set.
+        let tangent = [Vec3::X, Vec3::Y][sampled[1] as usize % 2];
+        assert_eq!(mesh.tangents[0].truncate(), tangent, "{sampled:?}");
     }
 }
 
