@@ -2,8 +2,8 @@
 //!
 //! Configurations with the same sampling, layout and mode form a *stream*: each frame is expanded to lines
 //! once for all of them. In a stream, LRU caches without latencies that use the same order form a *group*,
-//! which is simulated in a single pass ([`OnePass`](super::fast::one_pass::OnePass)). Every other configuration (another policy, timed) is
-//! a group of its own.
+//! which is simulated in a single pass (`OnePass`). Every other configuration (another policy, timed) is a group
+//! of its own.
 
 use super::error::ReplayError;
 use super::group::{Group, grouped, groups, stream_key};
