@@ -252,6 +252,27 @@ fn a_capture_without_visible_triangles_warns_with_bounds_and_camera() {
 }
 
 #[test]
+fn a_scene_whose_size_suggests_another_unit_gets_a_distance_between_the_eyes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scene = folder.path().join("large.obj");
+    let triangle = "v 0 0 0\nv 500 0 0\nv 0 500 0\nf 1 2 3\n";
+    std::fs::write(&scene, triangle).expect("writable");
+    let said = |flags: &str| {
+        let mut rays = program("tracegen");
+        rays.arg("rays").arg(&scene).args(flags.split(' '));
+        let output = run_ok(rays.args(["--size", "32x32", "-q", "-o", "-"]));
+        String::from_utf8(output.stderr).expect("UTF-8")
+    };
+    let warning =
+        "the scene is 500 m large: if its unit is the centimetre, --ipd 6400 stands for 64 mm";
+    assert!(said("--fps 72").contains(warning));
+    for flags in ["--ipd 6400", "--eye 0,0,900 --target 0,0,0"] {
+        let text = said(flags);
+        assert!(!text.contains("--ipd"), "{flags}: {text}");
+    }
+}
+
+#[test]
 fn frames_are_listed_if_a_trace_has_several() {
     refuse(
         program("tracegen").args(["rays", "teapot", "--frames", "2", "-o", "-"]),

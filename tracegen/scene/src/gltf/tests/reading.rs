@@ -385,6 +385,24 @@ fn a_material_may_sample_any_two_sets_of_texture_coordinates() {
 }
 
 #[test]
+fn a_texture_that_an_extension_replaces_needs_no_coordinates() {
+    let mut json = textured();
+    let material = &mut json["materials"][0];
+    material["pbrMetallicRoughness"]["baseColorTexture"]["texCoord"] = json!(2);
+    let load = |json: &Value| {
+        let files = Files::new(json);
+        files.write("my image.png", &png([4, 4], [1, 2, 3, 255]));
+        files.load().unwrap()
+    };
+    assert!(load(&json).warnings[0].contains("no TEXCOORD_2"));
+    json["materials"][0]["extensions"] =
+        json!({"KHR_materials_pbrSpecularGlossiness": {"glossinessFactor": 0.5}});
+    let loaded = load(&json);
+    assert_eq!(loaded.scene.materials[0].base_color_texture, None);
+    assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
+}
+
+#[test]
 fn a_third_set_and_a_missing_set_of_texture_coordinates_are_reported() {
     let loaded = sets_of_coordinates(&[0, 1, 4], [4, 0, 1]);
     let material = &loaded.scene.materials[0];
