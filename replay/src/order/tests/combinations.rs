@@ -99,7 +99,7 @@ proptest! {
     }
 
     #[test]
-    fn every_combination_is_a_permutation_of_the_tiles_of_all_passes(
+    fn every_combination_is_a_permutation_of_the_tiles_of_all_draws(
         columns in 1_u32..24, rows in 1_u32..24, other in 1_u32..24, shadow in 1_u32..8, size in 1_u32..12,
         cores in 1_u32..9, angle in 0.0_f32..1.2, shifts in prop::collection::vec(-9_i32..9, 24),
         bytes in 0_u64..4 << 20,

@@ -42,7 +42,7 @@ fn plan(known: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> 
         return None;
     }
     let tracker = &mut *known.tracker();
-    let outside = !known.capture.settings.all_passes && tracker.is_outside_scenes(buffer.as_raw());
+    let outside = !known.capture.settings.all_draws && tracker.is_outside_scenes(buffer.as_raw());
     tracker.note_scene(buffer.as_raw());
     let state = tracker.commands.get(buffer.as_raw())?;
     if !is_wanted(known, state) {

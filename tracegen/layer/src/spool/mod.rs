@@ -17,9 +17,8 @@ use std::path::{Path, PathBuf};
 pub const FOLDER_VARIABLE: &str = "PARALLAX_CAPTURE_FOLDER";
 /// Name of the layer for the loader.
 pub const LAYER_NAME: &str = "VK_LAYER_PARALLAX_capture";
-/// Reason why a draw in a pass without depth was not recorded; see [`Settings::all_passes`].
-pub const OUTSIDE_SCENES: &str =
-    "a pass without depth, outside the pictures of scenes (--all-passes)";
+/// Reason why a draw outside the pictures of scenes was not recorded; see [`Settings::all_draws`].
+pub const OUTSIDE_SCENES: &str = "no depth test, and outside the pictures of scenes (--all-draws)";
 /// File of [`Settings`] in the folder.
 const SETTINGS_FILE: &str = "settings.json";
 /// Extensions of a process's files.
@@ -37,9 +36,9 @@ pub struct Settings {
     pub frames_by: FramesBy,
     /// Whether an occlusion query counts the samples of each draw.
     pub occlusion: bool,
-    /// Whether render passes without depth are recorded even if the program renders scenes elsewhere.
+    /// Whether draws without a depth test are recorded even if the program renders scenes into other images.
     #[serde(default)]
-    pub all_passes: bool,
+    pub all_draws: bool,
     /// Size of the record buffer in bytes. It holds the records of one submission.
     pub record_bytes: u64,
     /// Whether small pictures of render passes are written.

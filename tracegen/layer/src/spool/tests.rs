@@ -59,7 +59,7 @@ fn events_and_records_are_read_as_written_and_descriptions_once() {
         count: 2,
     };
     let text = reader.read(beyond, drop).unwrap_err().to_string();
-    assert!(text.contains("up to byte 64, found 48"), "{text}");
+    assert!(text.contains("up to byte 65568, found 65536"), "{text}");
     // The header announces coordinates that do not follow.
     let span = writer.records(&[[1 << 20, 0, 0, 0]]).unwrap();
     let text = reader.read(span, drop).unwrap_err().to_string();
@@ -96,7 +96,7 @@ fn settings_are_read_as_written() {
         frames: [10, 13],
         frames_by: FramesBy::Present,
         occlusion: true,
-        all_passes: false,
+        all_draws: false,
         record_bytes: 1 << 20,
         pictures: false,
         modules: None,

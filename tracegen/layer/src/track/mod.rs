@@ -63,20 +63,20 @@ impl Tracker {
         }
     }
 
-    /// Whether a command buffer is in a render pass without depth whose targets are no pictures of a scene,
-    /// while the program has rendered scenes elsewhere. Browsers and desktops compose their windows in such
-    /// passes.
+    /// Whether a draw tests no depth and its targets are no pictures of a scene, while the program has rendered
+    /// scenes into other images. Browsers and desktops compose their windows by such draws.
     #[must_use]
     pub fn is_outside_scenes(&self, command_buffer: u64) -> bool {
-        let pass = self.commands.get(command_buffer);
-        let Some(pass) = pass.and_then(|state| state.pass.as_ref()) else {
+        let state = self.commands.get(command_buffer);
+        let Some((state, pass)) = state.and_then(|state| Some((state, state.pass.as_ref()?)))
+        else {
             return false;
         };
         let is_scene = |image: u32| self.scene_images.contains(&image);
-        let mut colors = pass.colors.iter();
         !self.scene_images.is_empty()
-            && pass.depth.is_none()
-            && !colors.any(|view| is_scene(view.image))
+            && !pass.colors.is_empty()
+            && !pass.colors.iter().any(|view| is_scene(view.image))
+            && !(pass.depth.is_some() && state.tests_depth())
     }
 
     /// Description of a draw in a command buffer, with the next number; `None` if no graphics pipeline is

@@ -269,7 +269,7 @@ fn draws_of_a_secondary_command_buffer_belong_to_the_executing_pass() {
 }
 
 #[test]
-fn passes_without_depth_are_outside_scenes_once_a_scene_was_rendered_elsewhere() {
+fn draws_without_a_depth_test_are_outside_scenes_once_a_scene_was_rendered_elsewhere() {
     let mut tracker = tracker(&[vk::DynamicState::DEPTH_TEST_ENABLE]);
     let targets = [1, 2, 3].map(|n| {
         let view = image_view(&mut tracker.images, n, 8);
@@ -291,10 +291,15 @@ fn passes_without_depth_are_outside_scenes_once_a_scene_was_rendered_elsewhere()
     assert!(!begin(&mut tracker, scene, Some(depth)));
     tracker.note_scene(1);
     assert!(!begin(&mut tracker, window, None));
+    let test_depth = |tracker: &mut Tracker, test| {
+        tracker.commands.get_mut(1).dynamic.depth_test = Some(test);
+    };
     begin(&mut tracker, scene, Some(depth));
-    tracker.commands.get_mut(1).dynamic.depth_test = Some(true);
+    test_depth(&mut tracker, true);
     tracker.note_scene(1);
-    assert!(begin(&mut tracker, window, None));
-    assert!(!begin(&mut tracker, window, Some(depth)), "it has depth");
+    assert!(begin(&mut tracker, window, None), "there is no depth");
+    assert!(!begin(&mut tracker, window, Some(depth)), "it tests depth");
+    test_depth(&mut tracker, false);
+    assert!(begin(&mut tracker, window, Some(depth)));
     assert!(!begin(&mut tracker, scene, None), "a scene's picture");
 }
