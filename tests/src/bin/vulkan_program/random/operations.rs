@@ -603,7 +603,8 @@ pub fn picture(world: &mut World, random: &mut Generator) -> Result<Vec<u8>> {
     let place = match old.filter(|_| random.once_in(2)) {
         Some(place) => place,
         None => {
-            let recorded = primary(world, random, random.once_in(2), true)?;
+            let once = random.once_in(2);
+            let recorded = primary(world, random, once, true)?;
             world.primaries.push(recorded);
             world.primaries.len() - 1
         }
