@@ -2,9 +2,9 @@
 
 use crate::gpu::Result;
 
-/// Offsets of the fragment shader's push constants. The last one ends at the last byte that the layer leaves
-/// to programs.
-pub const OFFSETS: [u32; 4] = [16, 64, 128, 236];
+/// Offsets of the fragment shader's push constants. The layer has no room for its number with the last one,
+/// which ends at the last byte that every device has.
+pub const OFFSETS: [u32; 4] = [16, 64, 108, 112];
 
 /// Bodies of fragment shaders.
 pub const BODIES: [&str; 10] = [
@@ -56,9 +56,9 @@ pub fn vertex() -> Result<Vec<u32>> {
 
 /// SPIR-V of a fragment shader, with entry point `fragment`. Its push constant is at one of the offsets.
 pub fn fragment(body: usize, offset: usize) -> Result<Vec<u32>> {
-    crate::shaders::compile(&format!(
+    let mut words = crate::shaders::compile(&format!(
         "{VARYING}
-        struct Constants {{ @size({}) before: f32, r: f32, g: f32, b: f32, a: f32 }}
+        struct Constants {{ r: f32, g: f32, b: f32, a: f32 }}
         var<immediate> constants: Constants;
         @group(0) @binding(0) var first: texture_2d<f32>;
         @group(0) @binding(1) var first_sampler: sampler;
@@ -68,6 +68,32 @@ pub fn fragment(body: usize, offset: usize) -> Result<Vec<u32>> {
             let tint = vec4(constants.r, constants.g, constants.b, constants.a);
             {}
         }}",
-        OFFSETS[offset], BODIES[body]
-    ))
+        BODIES[body]
+    ))?;
+    move_members(&mut words, OFFSETS[offset]);
+    Ok(words)
+}
+
+/// Moves the members of the only block of a module.
+fn move_members(words: &mut [u32], by: u32) {
+    const DECORATE: u32 = 71;
+    const MEMBER_DECORATE: u32 = 72;
+    const BLOCK: u32 = 2;
+    const OFFSET: u32 = 35;
+    let mut starts = vec![5];
+    while let Some(&at) = starts.last().filter(|at| **at < words.len()) {
+        starts.push(at + (words[at] >> 16).max(1) as usize);
+    }
+    starts.pop();
+    let is = |words: &[u32], at: usize, opcode| words[at] & 0xffff == opcode;
+    let block = starts
+        .iter()
+        .find(|at| is(words, **at, DECORATE) && words[**at + 2] == BLOCK)
+        .map(|at| words[*at + 1]);
+    for at in starts {
+        if is(words, at, MEMBER_DECORATE) && Some(words[at + 1]) == block && words[at + 3] == OFFSET
+        {
+            words[at + 4] += by;
+        }
+    }
 }

@@ -90,7 +90,6 @@ pub struct Pipeline {
     pub class: Class,
     /// Whether it is for dynamic rendering.
     pub dynamic: bool,
-    pub blends: bool,
 }
 
 /// A render target, with a render pass and a framebuffer.
@@ -750,7 +749,6 @@ impl World {
                 layout,
                 class,
                 dynamic,
-                blends,
             })
         }
     }
