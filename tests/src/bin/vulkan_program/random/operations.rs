@@ -218,6 +218,8 @@ fn replace_layout(world: &mut World, random: &mut Generator) -> Result<()> {
     let new = world.layout(old.kinds.clone(), old.offset)?;
     let old = std::mem::replace(&mut world.layouts[place], new);
     world.idle()?;
+    // Recorded commands may outlive a layout, but Mesa 22.3 reads it when it executes them.
+    world.forget(old.handle.as_raw());
     world.destroy_layout(&old);
     Ok(())
 }

@@ -467,6 +467,7 @@ impl<'w> Recorder<'w> {
         self.bind(pipeline);
         let set = &self.world.pools[0].sets[0];
         let layout = &self.world.layouts[pipeline.layout];
+        self.contents.uses.insert(layout.handle.as_raw());
         self.contents.uses.insert(set.handle.as_raw());
         self.constants(pipeline, [1.0, 1.0, 0.0, 0.0]);
         self.bind_vertices();
@@ -483,6 +484,7 @@ impl<'w> Recorder<'w> {
 
     fn constants(&mut self, pipeline: &Pipeline, place: [f32; 4]) {
         let layout = &self.world.layouts[pipeline.layout];
+        self.contents.uses.insert(layout.handle.as_raw());
         let tint = [
             0.4 + 0.6 * self.random.unit(),
             0.8,
@@ -514,6 +516,7 @@ impl<'w> Recorder<'w> {
     fn bind_sets(&mut self, pipeline: &Pipeline, inside: Inside) -> Option<Vec<[u32; 2]>> {
         let world = self.world;
         let layout = &world.layouts[pipeline.layout];
+        self.contents.uses.insert(layout.handle.as_raw());
         let mut sizes = Vec::new();
         let allowed = |view: &View| view.image != inside.image;
         let (device, buffer) = (self.device(), self.buffer);
