@@ -1,6 +1,6 @@
 //! Compares the records of draws with occlusion queries of the driver.
 
-use crate::session::{Session, coverage_group, survival_group};
+use crate::session::{REPEATED, Session, coverage_group, survival_group};
 use parallax_layer::inject::{DepthTests, RawSample};
 use parallax_layer::spool::ReadError;
 use std::collections::{BTreeMap, HashMap};
@@ -43,7 +43,10 @@ pub fn check(session: &mut Session, frames: &[u32]) -> Result<Check, ReadError> 
         };
         let records = session.records(number)?;
         for executed in &frame.draws {
-            let recorded = recorded(session, executed.draw, &records);
+            let recorded = match executed.repeated {
+                true => Err(REPEATED.to_owned()),
+                false => recorded(session, executed.draw, &records),
+            };
             match (recorded, executed.occlusion) {
                 (Err(why), _) => *check.apart.entry(why).or_default() += 1,
                 (Ok(_), None) => {

@@ -4,7 +4,7 @@ use parallax_layer::inject::{Form, RawSample, Site, What};
 use parallax_layer::spool::{
     DrawInfo, Event, ImageInfo, PassInfo, Process, ReadError, Reader, ShaderInfo, Span,
 };
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 use thiserror::Error;
 
@@ -74,6 +74,8 @@ pub struct Executed {
     pub pass: u32,
     /// Number of fragments counted by an occlusion query.
     pub occlusion: Option<u64>,
+    /// Whether a submission executed it several times, so that its records are those of all executions.
+    pub repeated: bool,
 }
 
 /// A frame of a program.
@@ -83,8 +85,10 @@ pub struct ProgramFrame {
     pub frame: u32,
     /// Draws in the order of execution.
     pub draws: Vec<Executed>,
-    /// Spans of its records.
-    spans: Vec<Span>,
+    /// Spans of its records, each with the new numbers of draws that were executed before.
+    spans: Vec<(Span, HashMap<u32, u32>)>,
+    /// Numbers of its draws.
+    numbers: HashSet<u32>,
     /// Number of bytes of records that did not fit the buffer.
     pub lost_bytes: u64,
     /// Whether the program ended the frame.
@@ -118,6 +122,8 @@ pub struct Session {
     pictures: HashMap<u32, [u32; 2]>,
     process: Option<Process>,
     records: Option<Reader>,
+    /// Number of draws with new numbers.
+    renumbered: u32,
 }
 
 impl Session {
@@ -191,17 +197,8 @@ impl Session {
                 lost_bytes,
                 occlusion,
             } => {
-                let counted: HashMap<u32, u64> = occlusion.into_iter().collect();
-                let of = self.frames.entry(frame).or_default();
-                of.frame = frame;
-                of.lost_bytes += lost_bytes;
-                of.spans.push(records);
-                of.draws
-                    .extend(draws.into_iter().map(|[draw, pass]| Executed {
-                        draw,
-                        pass,
-                        occlusion: counted.get(&draw).copied(),
-                    }));
+                self.submission(frame, &draws, &occlusion.into_iter().collect(), records);
+                self.frames.entry(frame).or_default().lost_bytes += lost_bytes;
             }
             Event::Frame { frame, took_us } => match self.frames.get_mut(&frame) {
                 Some(of) => (of.ended, of.took_us) = (true, took_us),
@@ -211,6 +208,64 @@ impl Session {
             Event::Trouble { what } => self.troubles.push(what),
             Event::Closed => {}
         }
+    }
+
+    /// Adds the draws of a submission. A command buffer may be executed several times: each further execution
+    /// in a frame is a draw with a new number. Those in one submission share their records.
+    fn submission(
+        &mut self,
+        frame: u32,
+        draws: &[[u32; 2]],
+        counted: &HashMap<u32, u64>,
+        records: Span,
+    ) {
+        let mut passes: HashMap<u32, Vec<u32>> = HashMap::new();
+        for [draw, pass] in draws {
+            passes.entry(*draw).or_default().push(*pass);
+        }
+        let mut new_numbers: HashMap<u32, u32> = HashMap::new();
+        for &[draw, pass] in draws {
+            let of = &passes[&draw];
+            let repeated = of.len() > 1;
+            let in_one_pass = of.iter().all(|other| *other == pass);
+            if repeated && in_one_pass && new_numbers.contains_key(&draw) {
+                continue;
+            }
+            let mut number = draw;
+            if repeated
+                || self
+                    .frames
+                    .get(&frame)
+                    .is_some_and(|f| f.numbers.contains(&draw))
+            {
+                // The layer numbers draws from 0.
+                number = u32::MAX - self.renumbered;
+                self.renumbered += 1;
+                new_numbers.insert(draw, number);
+                if let Some(mut info) = self.draws.get(&draw).cloned() {
+                    info.draw = number;
+                    if repeated && in_one_pass {
+                        info.caveats.push(REPEATED.to_owned());
+                    } else if repeated && info.unrecorded.is_none() {
+                        // The records do not tell the passes apart.
+                        info.unrecorded = Some(REPEATED.to_owned());
+                        info.shader = None;
+                    }
+                    self.draws.insert(number, info);
+                }
+            }
+            let of = self.frames.entry(frame).or_default();
+            of.numbers.insert(number);
+            of.draws.push(Executed {
+                draw: number,
+                pass,
+                occlusion: counted.get(&draw).copied(),
+                repeated,
+            });
+        }
+        let of = self.frames.entry(frame).or_default();
+        of.frame = frame;
+        of.spans.push((records, new_numbers));
     }
 
     /// The draw with a number.
@@ -263,14 +318,18 @@ impl Session {
         let Some(reader) = &mut self.records else {
             return Ok(by_draw);
         };
-        for span in spans {
-            reader.read(*span, |record| {
+        for (span, new_numbers) in spans {
+            reader.read(*span, |mut record| {
+                record.draw = *new_numbers.get(&record.draw).unwrap_or(&record.draw);
                 by_draw.entry(record.draw).or_default().push(record);
             })?;
         }
         Ok(by_draw)
     }
 }
+
+/// Reason why the records of a draw are less exact, or missing if its passes differ.
+pub const REPEATED: &str = "a submission executed the draw several times";
 
 /// Coordinate group whose records contain every started fragment of a shader.
 #[must_use]

@@ -1,6 +1,7 @@
 //! A Vulkan device with the functions that the program needs for buffers and images.
 
 use ash::{Device, Entry, Instance, vk};
+use std::ffi::CStr;
 
 /// Result with the error as text.
 pub type Result<T> = std::result::Result<T, String>;
@@ -13,9 +14,11 @@ pub fn checked<T>(what: &str, result: ash::prelude::VkResult<T>) -> Result<T> {
 /// An opened device.
 pub struct Gpu {
     _entry: Entry,
-    instance: Instance,
+    pub instance: Instance,
     pub device: Device,
     pub queue: vk::Queue,
+    /// Family of the queue.
+    pub family: u32,
     memory: vk::PhysicalDeviceMemoryProperties,
 }
 
@@ -31,6 +34,7 @@ pub struct Buffer {
 pub struct Image {
     pub handle: vk::Image,
     pub view: vk::ImageView,
+    pub memory: vk::DeviceMemory,
 }
 
 /// Properties of an image.
@@ -46,10 +50,19 @@ pub struct ImageKind {
 impl Gpu {
     /// Opens the first device.
     pub fn open() -> Result<Self> {
+        Self::open_with(vk::API_VERSION_1_2, &[], None)
+    }
+
+    /// Opens the first device with extensions and features.
+    pub fn open_with(
+        version: u32,
+        extensions: &[&CStr],
+        features: Option<&mut vk::PhysicalDeviceFeatures2<'_>>,
+    ) -> Result<Self> {
         // SAFETY: the loader is a Vulkan loader; what is created lives until the program ends.
         unsafe {
             let entry = Entry::load().map_err(|e| format!("no Vulkan loader: {e}"))?;
-            let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_2);
+            let application = vk::ApplicationInfo::default().api_version(version);
             let info = vk::InstanceCreateInfo::default().application_info(&application);
             let instance = checked("an instance", entry.create_instance(&info, None))?;
             let devices = checked("devices", instance.enumerate_physical_devices())?;
@@ -65,10 +78,15 @@ impl Gpu {
             let queue = [vk::DeviceQueueCreateInfo::default()
                 .queue_family_index(family as u32)
                 .queue_priorities(&priorities)];
-            let mut features = vk::PhysicalDeviceVulkan11Features::default().multiview(true);
-            let info = vk::DeviceCreateInfo::default()
+            let mut multiview = vk::PhysicalDeviceVulkan11Features::default().multiview(true);
+            let names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
+            let mut info = vk::DeviceCreateInfo::default()
                 .queue_create_infos(&queue)
-                .push_next(&mut features);
+                .enabled_extension_names(&names)
+                .push_next(&mut multiview);
+            if let Some(features) = features {
+                info = info.push_next(features);
+            }
             let device = checked("a device", instance.create_device(physical, &info, None))?;
             let queue = device.get_device_queue(family as u32, 0);
             let memory = instance.get_physical_device_memory_properties(physical);
@@ -77,6 +95,7 @@ impl Gpu {
                 instance,
                 device,
                 queue,
+                family: family as u32,
                 memory,
             })
         }
@@ -192,7 +211,11 @@ impl Gpu {
                 .format(kind.format)
                 .subresource_range(all_of(kind.format));
             let view = checked("a view", self.device.create_image_view(&view, None))?;
-            Ok(Image { handle, view })
+            Ok(Image {
+                handle,
+                view,
+                memory,
+            })
         }
     }
 

@@ -5,10 +5,14 @@
 //!
 //!     vulkan_program [--stereo halves|targets|twice|multiview|mono] [--objects NAME,NAME...] [--frames N]
 //!         [--size WIDTHxHEIGHT] [--picture FILE] [--end crash|early|fork|hang]
+//!     vulkan_program --random SEED [--calls N] [--frames N] [--picture FILE]
+//!
+//! With `--random`, it makes random calls instead: see `random`.
 
 mod gpu;
 mod objects;
 mod pipeline;
+mod random;
 mod render;
 mod scene;
 mod sets;
@@ -41,6 +45,10 @@ pub struct Options {
     size_px: [u32; 2],
     picture: Option<String>,
     end: Option<String>,
+    /// Seed of random calls.
+    random: Option<u64>,
+    /// Number of random operations.
+    calls: u32,
 }
 
 fn options() -> Result<Options, String> {
@@ -51,6 +59,8 @@ fn options() -> Result<Options, String> {
         size_px: [240, 200],
         picture: None,
         end: None,
+        random: None,
+        calls: 100,
     };
     let mut arguments = std::env::args().skip(1);
     while let Some(name) = arguments.next() {
@@ -84,6 +94,8 @@ fn options() -> Result<Options, String> {
             }
             "--picture" => options.picture = Some(value),
             "--end" => options.end = Some(value),
+            "--random" => options.random = Some(number(&value)?.into()),
+            "--calls" => options.calls = number(&value)?,
             _ => return Err(format!("{name} is no option")),
         }
     }
@@ -91,7 +103,13 @@ fn options() -> Result<Options, String> {
 }
 
 fn main() -> ExitCode {
-    let outcome = options().and_then(|options| render::run(&options));
+    let outcome = options().and_then(|options| match options.random {
+        Some(seed) => {
+            let (calls, frames) = (options.calls, options.frames);
+            random::run(seed, calls, frames, options.picture.as_deref())
+        }
+        None => render::run(&options),
+    });
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

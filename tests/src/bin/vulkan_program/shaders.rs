@@ -52,12 +52,17 @@ pub fn words(object: &Object, stereo: Stereo) -> Result<Vec<u32>, String> {
     } else {
         text
     };
-    let module = naga::front::wgsl::parse_str(&text).map_err(|e| e.emit_to_string(&text))?;
+    compile(&text)
+}
+
+/// Compiles WGSL to SPIR-V.
+pub fn compile(text: &str) -> Result<Vec<u32>, String> {
+    let module = naga::front::wgsl::parse_str(text).map_err(|e| e.emit_to_string(text))?;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
     let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
     let info = validator
         .validate(&module)
-        .map_err(|e| e.emit_to_string(&text))?;
+        .map_err(|e| e.emit_to_string(text))?;
     let options = naga::back::spv::Options::default();
     naga::back::spv::write_vec(&module, &info, &options, None).map_err(|e| e.to_string())
 }

@@ -9,13 +9,15 @@ use std::sync::Arc;
 
 /// Whether draws of a command buffer may belong to a requested frame. A command buffer that may be submitted
 /// several times can be executed in any later frame.
-fn is_wanted(known: &Device, state: &CommandState) -> bool {
+fn is_wanted(known: &Device, state: &mut CommandState) -> bool {
     let capture = known.capture;
-    !capture.is_over() && (!state.one_time() || capture.may_want_commands())
+    let one_time = state.one_time();
+    *(state.wanted)
+        .get_or_insert_with(|| !capture.is_over() && (!one_time || capture.may_want_commands()))
 }
 
 /// Whether draws of a command buffer are recorded.
-pub(super) fn records(known: &Device, state: &CommandState) -> bool {
+pub(super) fn records(known: &Device, state: &mut CommandState) -> bool {
     known.recorder.is_some() && is_wanted(known, state)
 }
 
@@ -44,7 +46,7 @@ fn plan(known: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> 
     let tracker = &mut *known.tracker();
     let outside = !known.capture.settings.all_draws && tracker.is_outside_scenes(buffer.as_raw());
     tracker.note_scene(buffer.as_raw());
-    let state = tracker.commands.get(buffer.as_raw())?;
+    let state = tracker.commands.get_mut(buffer.as_raw());
     if !is_wanted(known, state) {
         return None;
     }

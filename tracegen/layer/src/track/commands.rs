@@ -82,6 +82,9 @@ pub struct CommandState {
     pub active_queries: u32,
     /// Whether it copies an image to a buffer.
     pub reads_back: bool,
+    /// Whether its draws may belong to a requested frame; decided once, at its first pipeline or draw. The
+    /// frame may change while it is recorded.
+    pub wanted: Option<bool>,
     items: Vec<Executed>,
 }
 
@@ -113,6 +116,7 @@ impl CommandState {
             open: None,
             active_queries: 0,
             reads_back: false,
+            wanted: None,
             items: Vec::new(),
         }
     }
@@ -171,8 +175,9 @@ impl CommandState {
         self.pushed.entry(number).or_insert_with(empty)
     }
 
-    /// Appends the draws of a secondary command buffer.
-    fn execute(&mut self, items: &[Executed]) {
+    /// Appends the draws of a secondary command buffer, and whether it copies an image to a buffer.
+    fn execute(&mut self, items: &[Executed], reads_back: bool) {
+        self.reads_back |= reads_back;
         for item in items {
             self.items.push(Executed {
                 draw: Arc::clone(&item.draw),
@@ -345,11 +350,11 @@ impl Commands {
 
     /// Executes a secondary command buffer.
     pub fn execute(&mut self, buffer: u64, secondary: u64) {
-        let items = match self.buffers.get(&secondary) {
-            Some(of) => of.items.clone(),
+        let (items, reads_back) = match self.buffers.get(&secondary) {
+            Some(of) => (of.items.clone(), of.reads_back),
             None => return,
         };
-        self.get_mut(buffer).execute(&items);
+        self.get_mut(buffer).execute(&items, reads_back);
     }
 
     /// Whether a command buffer copies an image to a buffer.

@@ -110,16 +110,18 @@ impl SetState {
         (binding, element.saturating_add(step))
     }
 
+    /// The immutable sampler of a binding's element.
+    fn immutable(&self, (binding, element): (u32, u32)) -> Option<SamplerInfo> {
+        let of = self.layout.bindings.get(&binding)?;
+        *of.immutable.get(element as usize)?
+    }
+
     /// Applies a write.
     pub fn write(&mut self, written: &Written, images: &Images) {
         use vk::DescriptorType as Type;
         for (step, image) in (0..).zip(&written.images) {
             let place = self.place(written.binding, written.element, step);
-            let immutable = self
-                .layout
-                .bindings
-                .get(&place.0)
-                .and_then(|of| *of.immutable.get(place.1 as usize)?);
+            let immutable = self.immutable(place);
             let sampler = || immutable.or_else(|| images.sampler(image.sampler));
             let slot = match written.kind {
                 Type::SAMPLER => Slot {
@@ -239,7 +241,8 @@ impl Descriptors {
         };
         for (step, slot) in (0..).zip(slots) {
             let place = to.place(copy.dst_binding, copy.dst_array_element, step);
-            if let Some(slot) = slot {
+            if let Some(mut slot) = slot {
+                slot.sampler = to.immutable(place).or(slot.sampler);
                 to.slots.insert(place, slot);
             }
         }

@@ -1,0 +1,1217 @@
+//! The Vulkan objects of the random program, and their creation and destruction.
+//!
+//! All images are in layout `GENERAL`. Nothing is destroyed or changed while commands are being executed.
+//! Command buffers that use a destroyed or changed object are freed.
+
+use super::generator::Generator;
+use super::shaders;
+use crate::gpu::{Buffer, Gpu, Image, ImageKind, Result, all_of, checked};
+use ash::vk::{self, Handle};
+use std::collections::BTreeSet;
+
+pub const FORMATS: [vk::Format; 2] = [vk::Format::R8G8B8A8_UNORM, vk::Format::B8G8R8A8_UNORM];
+const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
+/// Size of the target of the frames' pictures. Other images are smaller.
+pub const MAIN_PX: [u32; 2] = [160, 120];
+/// Queries of a pool.
+pub const QUERIES: u32 = 8;
+
+/// Format of the colour target, and whether there is depth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Class {
+    pub format: usize,
+    pub depth: bool,
+}
+
+/// A view of one layer of a texture.
+#[derive(Clone, Copy)]
+pub struct View {
+    pub handle: vk::ImageView,
+    pub image: vk::Image,
+    pub format: usize,
+    /// Size of its first level.
+    pub size: [u32; 2],
+    /// Size of the image, which identifies it.
+    pub of: [u32; 2],
+    pub levels: u32,
+}
+
+pub struct Texture {
+    pub image: Image,
+    pub format: usize,
+    pub size: [u32; 2],
+    pub levels: u32,
+    pub layers: u32,
+    pub views: Vec<View>,
+}
+
+/// Descriptor type of both bindings, and whether they have immutable samplers.
+pub type SetKind = [(vk::DescriptorType, bool); 2];
+const IMAGE: vk::DescriptorType = vk::DescriptorType::SAMPLED_IMAGE;
+const SAMPLER: vk::DescriptorType = vk::DescriptorType::SAMPLER;
+const BOTH: vk::DescriptorType = vk::DescriptorType::COMBINED_IMAGE_SAMPLER;
+/// Kinds of sets. The last one is pushed.
+pub const SET_KINDS: [SetKind; 5] = [
+    [(IMAGE, false), (SAMPLER, false)],
+    [(IMAGE, false), (SAMPLER, true)],
+    [(BOTH, false), (BOTH, false)],
+    [(BOTH, true), (BOTH, true)],
+    [(IMAGE, false), (SAMPLER, false)],
+];
+pub const PUSHED: usize = 4;
+
+/// A descriptor set and what was written to it.
+pub struct Set {
+    pub handle: vk::DescriptorSet,
+    pub kind: usize,
+    pub written: Option<(View, vk::Sampler)>,
+}
+
+pub struct Pool {
+    pub handle: vk::DescriptorPool,
+    pub frees: bool,
+    pub sets: Vec<Set>,
+}
+/// Sets of a pool.
+const POOL_SETS: usize = 6;
+
+/// A pipeline layout: the kinds of its sets, and the offset of the fragment shader's constants.
+pub struct Layout {
+    pub handle: vk::PipelineLayout,
+    pub kinds: Vec<usize>,
+    pub offset: usize,
+    /// Template for a pushed set.
+    pub template: Option<vk::DescriptorUpdateTemplate>,
+}
+
+pub struct Pipeline {
+    pub handle: vk::Pipeline,
+    pub layout: usize,
+    pub class: Class,
+    /// Whether it is for dynamic rendering.
+    pub dynamic: bool,
+}
+
+/// A render target, with a render pass and a framebuffer.
+pub struct Target {
+    pub pass: vk::RenderPass,
+    pub framebuffer: vk::Framebuffer,
+    pub class: Class,
+    pub view: View,
+    pub clears: bool,
+}
+
+/// A recorded command buffer.
+pub struct Recorded {
+    pub buffer: vk::CommandBuffer,
+    pub pool: vk::CommandPool,
+    /// Whether it may be executed several times at once.
+    pub simultaneous: bool,
+    /// Whether it was submitted since the device was idle.
+    pub pending: bool,
+    /// Whether it is submitted once.
+    pub once: bool,
+    /// Whether it ends with the frame's picture.
+    pub picture: bool,
+    /// Class, kind of rendering and smallest target of a secondary command buffer.
+    pub inside: Option<(Class, bool, [u32; 2])>,
+    pub contents: Contents,
+}
+
+/// What a command buffer uses and draws.
+#[derive(Clone, Default)]
+pub struct Contents {
+    /// Handles of the used objects.
+    pub uses: BTreeSet<u64>,
+    /// The draws into the main target: sizes of the textures that they read.
+    pub draws: Vec<Vec<[u32; 2]>>,
+}
+
+pub struct World {
+    pub gpu: Gpu,
+    pub push: ash::khr::push_descriptor::Device,
+    pub multi: ash::ext::multi_draw::Device,
+    pub geometry: Buffer,
+    pub readback: Buffer,
+    pub depth: Image,
+    pub set_layouts: Vec<vk::DescriptorSetLayout>,
+    pub templates: Vec<vk::DescriptorUpdateTemplate>,
+    immutable: [vk::Sampler; 2],
+    vertex: vk::ShaderModule,
+    pub queries: vk::QueryPool,
+    pub statistics: vk::QueryPool,
+    pub events: Vec<vk::Event>,
+    pub fence: vk::Fence,
+    pub semaphores: Vec<vk::Semaphore>,
+    /// Whether a semaphore is signalled and not waited for.
+    pub signalled: Option<vk::Semaphore>,
+    pub timeline: vk::Semaphore,
+    pub timeline_value: u64,
+    pub commands: vk::CommandPool,
+    /// Pools that are destroyed when the device is idle.
+    pub retired: Vec<vk::CommandPool>,
+    pub main: Texture,
+    pub home: Texture,
+    pub textures: Vec<Texture>,
+    pub samplers: Vec<vk::Sampler>,
+    pub pools: Vec<Pool>,
+    pub layouts: Vec<Layout>,
+    pub pipelines: Vec<Pipeline>,
+    pub targets: Vec<Target>,
+    pub primaries: Vec<Recorded>,
+    pub secondaries: Vec<Recorded>,
+    /// The submitted draws into the frame's picture: sizes of the textures that they read.
+    pub log: Vec<Vec<[u32; 2]>>,
+    /// Number of created textures, from which their unique sizes follow.
+    created: u32,
+    is_idle: bool,
+}
+
+/// Vertices, indices and indirect draws in the buffer of geometry.
+pub const INDICES_AT: u64 = 512;
+pub const INDIRECT_AT: u64 = 768;
+pub const INDEXED_AT: u64 = 1024;
+pub const COUNTS_AT: u64 = 1280;
+/// First vertex and number of vertices of each shape: the whole target, half of it, some triangles.
+pub const SHAPES: [(u32, u32); 4] = [(0, 6), (6, 6), (12, 3), (12, 12)];
+
+fn geometry(gpu: &Gpu) -> Result<Buffer> {
+    let mut bytes = vec![0; 2048];
+    let quad = [
+        [-1.0, -1.0],
+        [1.0, -1.0],
+        [-1.0, 1.0],
+        [1.0, -1.0],
+        [1.0, 1.0],
+        [-1.0, 1.0_f32],
+    ];
+    let some = (0..12).map(|i| {
+        let angle = 2.3 * i as f32;
+        [0.9 * angle.sin(), 0.9 * (1.7 * angle).cos()]
+    });
+    let half = quad.map(|at| at.map(|v| 0.5 * v));
+    let all = quad.into_iter().chain(half).chain(some);
+    let vertices: Vec<[f32; 4]> = all
+        .map(|[x, y]| [x, y, 0.5 + 0.5 * x, 0.5 + 0.5 * y])
+        .collect();
+    let mut put = |at: u64, of: &[u8]| bytes[at as usize..][..of.len()].copy_from_slice(of);
+    put(0, bytemuck::cast_slice(&vertices));
+    // The indices take the triangles in the opposite order.
+    let indices: Vec<u16> = (0..24).map(|i| 23 - i).collect();
+    put(INDICES_AT, bytemuck::cast_slice(&indices));
+    let indirect: [[u32; 4]; 3] = [[6, 1, 0, 0], [3, 2, 12, 0], [12, 1, 12, 3]];
+    put(INDIRECT_AT, bytemuck::cast_slice(&indirect));
+    let indexed: [[u32; 5]; 3] = [[6, 1, 12, 0, 0], [9, 1, 0, 0, 0], [3, 3, 6, 0, 1]];
+    put(INDEXED_AT, bytemuck::cast_slice(&indexed));
+    put(COUNTS_AT, bytemuck::cast_slice(&[2_u32, 0, 3]));
+    use vk::BufferUsageFlags as Usage;
+    let usage = Usage::VERTEX_BUFFER | Usage::INDEX_BUFFER | Usage::INDIRECT_BUFFER;
+    gpu.buffer_of(&bytes, usage | Usage::TRANSFER_SRC)
+}
+
+fn open() -> Result<Gpu> {
+    let mut of_12 = vk::PhysicalDeviceVulkan12Features::default()
+        .host_query_reset(true)
+        .timeline_semaphore(true)
+        .draw_indirect_count(true);
+    let mut of_13 = vk::PhysicalDeviceVulkan13Features::default()
+        .dynamic_rendering(true)
+        .synchronization2(true);
+    let mut multi = vk::PhysicalDeviceMultiDrawFeaturesEXT::default().multi_draw(true);
+    let features = vk::PhysicalDeviceFeatures::default()
+        .multi_draw_indirect(true)
+        .draw_indirect_first_instance(true)
+        .occlusion_query_precise(true)
+        .pipeline_statistics_query(true);
+    let mut features = vk::PhysicalDeviceFeatures2::default()
+        .features(features)
+        .push_next(&mut of_12)
+        .push_next(&mut of_13)
+        .push_next(&mut multi);
+    let extensions = [ash::khr::push_descriptor::NAME, ash::ext::multi_draw::NAME];
+    Gpu::open_with(vk::API_VERSION_1_3, &extensions, Some(&mut features))
+}
+
+impl World {
+    /// Opens a device. `first` is the number of the first texture.
+    pub fn new(random: &mut Generator, first: u32) -> Result<Self> {
+        let gpu = open()?;
+        let device = gpu.device.clone();
+        let push = ash::khr::push_descriptor::Device::new(&gpu.instance, &device);
+        let multi = ash::ext::multi_draw::Device::new(&gpu.instance, &device);
+        let readback = vk::BufferUsageFlags::TRANSFER_DST;
+        let readback = gpu.buffer(4 * u64::from(MAIN_PX[0] * MAIN_PX[1]), readback)?;
+        let depth = gpu.image(&ImageKind {
+            format: DEPTH,
+            size: [MAIN_PX[0], MAIN_PX[1], 1],
+            levels: 1,
+            layers: 1,
+            view: vk::ImageViewType::TYPE_2D,
+            usage: vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT
+                | vk::ImageUsageFlags::TRANSFER_DST,
+        })?;
+        to_general(&gpu, depth.handle, DEPTH)?;
+        let words = shaders::vertex()?;
+        // SAFETY: the device is open, and the descriptions are valid during their calls.
+        unsafe {
+            let module = vk::ShaderModuleCreateInfo::default().code(&words);
+            let vertex = checked("a module", device.create_shader_module(&module, None))?;
+            let immutable = [sampler(&gpu, random)?, sampler(&gpu, random)?];
+            let set_layouts = set_layouts(&gpu, immutable)?;
+            let queries = |kind, statistics| {
+                let info = vk::QueryPoolCreateInfo::default()
+                    .query_type(kind)
+                    .query_count(QUERIES)
+                    .pipeline_statistics(statistics);
+                let pool = checked("queries", device.create_query_pool(&info, None))?;
+                device.reset_query_pool(pool, 0, QUERIES);
+                Ok::<_, String>(pool)
+            };
+            use vk::QueryPipelineStatisticFlags as Statistics;
+            let statistics =
+                Statistics::INPUT_ASSEMBLY_PRIMITIVES | Statistics::CLIPPING_PRIMITIVES;
+            let info = vk::EventCreateInfo::default();
+            let event = || checked("an event", device.create_event(&info, None));
+            let events = vec![event()?, event()?];
+            let fence = vk::FenceCreateInfo::default();
+            let fence = checked("a fence", device.create_fence(&fence, None))?;
+            let info = vk::SemaphoreCreateInfo::default();
+            let semaphore = || checked("a semaphore", device.create_semaphore(&info, None));
+            let semaphores = vec![semaphore()?, semaphore()?];
+            let mut kind =
+                vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+            let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+            let timeline = checked("a semaphore", device.create_semaphore(&info, None))?;
+            let templates: Result<Vec<_>> = (0..PUSHED)
+                .map(|kind| template(&gpu, kind, set_layouts[kind], None))
+                .collect();
+            let main = texture(&gpu, random, 0, MAIN_PX, 1, 1)?;
+            let home = texture(&gpu, random, 0, [16, 15], 1, 1)?;
+            let mut world = Self {
+                geometry: geometry(&gpu)?,
+                readback,
+                push,
+                multi,
+                depth,
+                templates: templates?,
+                set_layouts,
+                immutable,
+                vertex,
+                queries: queries(vk::QueryType::OCCLUSION, Statistics::empty())?,
+                statistics: queries(vk::QueryType::PIPELINE_STATISTICS, statistics)?,
+                events,
+                fence,
+                semaphores,
+                signalled: None,
+                timeline,
+                timeline_value: 0,
+                commands: command_pool(&gpu)?,
+                retired: Vec::new(),
+                main,
+                home,
+                textures: Vec::new(),
+                samplers: vec![sampler(&gpu, random)?],
+                pools: Vec::new(),
+                layouts: Vec::new(),
+                pipelines: Vec::new(),
+                targets: Vec::new(),
+                primaries: Vec::new(),
+                secondaries: Vec::new(),
+                log: Vec::new(),
+                created: first,
+                is_idle: true,
+                gpu,
+            };
+            world.start(random)?;
+            Ok(world)
+        }
+    }
+
+    /// Creates the objects that are never destroyed: two pipelines, a set and two targets for the frames'
+    /// pictures.
+    fn start(&mut self, random: &mut Generator) -> Result<()> {
+        self.layouts.push(self.layout(vec![0], 0)?);
+        self.layouts.push(self.layout(vec![PUSHED, 2], 1)?);
+        let class = Class {
+            format: 0,
+            depth: true,
+        };
+        for dynamic in [false, true] {
+            self.pipelines
+                .push(self.pipeline(class, dynamic, 0, 0, false)?);
+        }
+        self.create_pool(random)?;
+        let set = self.set(&self.pools[0], 0)?;
+        self.pools[0].sets.push(set);
+        let (view, sampler) = (self.home.views[0], self.samplers[0]);
+        self.write(0, 0, view, sampler, random);
+        for clears in [true, false] {
+            self.targets
+                .push(self.target(self.main.views[0], true, clears)?);
+        }
+        Ok(())
+    }
+
+    /// The textures that draws read, with the one that always exists.
+    pub fn views(&self) -> Vec<View> {
+        let all = self.textures.iter().chain([&self.home]);
+        all.flat_map(|texture| &texture.views).copied().collect()
+    }
+
+    /// Waits until nothing is being executed.
+    pub fn idle(&mut self) -> Result<()> {
+        if self.is_idle {
+            return Ok(());
+        }
+        // SAFETY: the device is open, and what is destroyed is not used after the wait.
+        unsafe {
+            checked("the device", self.gpu.device.device_wait_idle())?;
+            let (gone, kept): (Vec<_>, _) = std::mem::take(&mut self.primaries)
+                .into_iter()
+                .partition(|of| of.once && of.pending);
+            self.primaries = kept;
+            // The destruction of a pool frees its buffers.
+            let retired = std::mem::take(&mut self.retired);
+            self.free(
+                gone.into_iter()
+                    .filter(|of| !retired.contains(&of.pool))
+                    .collect(),
+            );
+            for pool in retired {
+                self.gpu.device.destroy_command_pool(pool, None);
+            }
+        }
+        for of in &mut self.primaries {
+            of.pending = false;
+        }
+        self.is_idle = true;
+        Ok(())
+    }
+
+    /// Notes a submission.
+    pub fn note_submission(&mut self) {
+        self.is_idle = false;
+    }
+
+    fn free(&self, gone: Vec<Recorded>) {
+        for of in gone {
+            // SAFETY: the command buffer is not being executed.
+            unsafe { self.gpu.device.free_command_buffers(of.pool, &[of.buffer]) };
+        }
+    }
+
+    /// Frees all command buffers. The device is idle.
+    pub fn free_all(&mut self) {
+        let primaries = std::mem::take(&mut self.primaries);
+        self.free(primaries);
+        let secondaries = std::mem::take(&mut self.secondaries);
+        self.free(secondaries);
+    }
+
+    /// Frees the command buffers that use an object. The device is idle.
+    pub fn forget(&mut self, handle: u64) {
+        let uses = |of: &Recorded| of.contents.uses.contains(&handle);
+        let (gone, kept): (Vec<_>, _) = std::mem::take(&mut self.secondaries)
+            .into_iter()
+            .partition(uses);
+        self.secondaries = kept;
+        for of in &gone {
+            self.forget(of.buffer.as_raw());
+        }
+        self.free(gone);
+        let (gone, kept) = std::mem::take(&mut self.primaries)
+            .into_iter()
+            .partition(uses);
+        self.primaries = kept;
+        self.free(gone);
+    }
+
+    /// Creates a texture of a unique size.
+    pub fn create_texture(&mut self, random: &mut Generator) -> Result<()> {
+        let number = self.created;
+        self.created += 1;
+        let size = [17 + number % 40, 17 + number / 40 % 40];
+        let levels = 1 + random.below(4) as u32;
+        let layers = 1 + random.below(3) as u32;
+        let format = random.below(FORMATS.len());
+        let made = texture(&self.gpu, random, format, size, levels, layers)?;
+        self.textures.push(made);
+        Ok(())
+    }
+
+    /// Number of the next texture.
+    pub fn created(&self) -> u32 {
+        self.created
+    }
+
+    /// Creates a view of a texture.
+    pub fn create_view(&mut self, random: &mut Generator) -> Result<()> {
+        if self.textures.is_empty() {
+            return Ok(());
+        }
+        let place = random.below(self.textures.len());
+        let made = view(&self.gpu, &self.textures[place], random)?;
+        self.textures[place].views.push(made);
+        Ok(())
+    }
+
+    pub fn destroy_view(&mut self, view: View) {
+        let gone = self
+            .targets
+            .iter()
+            .filter(|t| t.view.handle == view.handle)
+            .count();
+        debug_assert!(gone == 0 || view.handle != self.main.views[0].handle);
+        while let Some(place) = self
+            .targets
+            .iter()
+            .position(|t| t.view.handle == view.handle)
+        {
+            let target = self.targets.swap_remove(place);
+            self.destroy_target(&target);
+        }
+        self.forget(view.handle.as_raw());
+        self.unwrite(|of, _| of.handle == view.handle);
+        // SAFETY: nothing uses the view any more.
+        unsafe { self.gpu.device.destroy_image_view(view.handle, None) };
+    }
+
+    /// Marks the sets with an object as not written.
+    fn unwrite(&mut self, has: impl Fn(&View, vk::Sampler) -> bool) {
+        for set in self.pools.iter_mut().flat_map(|pool| &mut pool.sets) {
+            set.written = set.written.filter(|(view, sampler)| !has(view, *sampler));
+        }
+    }
+
+    pub fn destroy_texture(&mut self, place: usize) {
+        let texture = self.textures.swap_remove(place);
+        self.forget(texture.image.handle.as_raw());
+        for view in &texture.views {
+            self.destroy_view(*view);
+        }
+        destroy_image(&self.gpu, texture.image);
+    }
+
+    pub fn create_sampler(&mut self, random: &mut Generator) -> Result<()> {
+        self.samplers.push(sampler(&self.gpu, random)?);
+        Ok(())
+    }
+
+    pub fn destroy_sampler(&mut self, place: usize) {
+        let sampler = self.samplers.swap_remove(place);
+        self.forget(sampler.as_raw());
+        self.unwrite(|_, of| of == sampler);
+        // SAFETY: nothing uses the sampler any more.
+        unsafe { self.gpu.device.destroy_sampler(sampler, None) };
+    }
+
+    pub fn create_pool(&mut self, random: &mut Generator) -> Result<()> {
+        let frees = random.once_in(2);
+        let count = 2 * POOL_SETS as u32;
+        let sizes = [IMAGE, SAMPLER, BOTH].map(|ty| vk::DescriptorPoolSize {
+            ty,
+            descriptor_count: count,
+        });
+        let mut info = vk::DescriptorPoolCreateInfo::default()
+            .max_sets(POOL_SETS as u32)
+            .pool_sizes(&sizes);
+        if frees {
+            info = info.flags(vk::DescriptorPoolCreateFlags::FREE_DESCRIPTOR_SET);
+        }
+        // SAFETY: the device is open.
+        let made = unsafe { self.gpu.device.create_descriptor_pool(&info, None) };
+        let handle = checked("a descriptor pool", made)?;
+        self.pools.push(Pool {
+            handle,
+            frees,
+            sets: Vec::new(),
+        });
+        Ok(())
+    }
+
+    /// Removes the sets of a pool from what uses them.
+    pub fn forget_sets(&mut self, pool: usize) {
+        for set in std::mem::take(&mut self.pools[pool].sets) {
+            self.forget(set.handle.as_raw());
+        }
+    }
+
+    /// Whether a pool has room for a set.
+    pub fn has_room(pool: &Pool) -> bool {
+        pool.sets.len() < POOL_SETS
+    }
+
+    /// Allocates a set.
+    pub fn set(&self, pool: &Pool, kind: usize) -> Result<Set> {
+        let layouts = [self.set_layouts[kind]];
+        let info = vk::DescriptorSetAllocateInfo::default()
+            .descriptor_pool(pool.handle)
+            .set_layouts(&layouts);
+        // SAFETY: the pool has room.
+        let made = unsafe { self.gpu.device.allocate_descriptor_sets(&info) };
+        let handle = checked("a descriptor set", made)?[0];
+        Ok(Set {
+            handle,
+            kind,
+            written: None,
+        })
+    }
+
+    /// Writes a set, by a template or by writes.
+    pub fn write(
+        &mut self,
+        pool: usize,
+        set: usize,
+        view: View,
+        sampler: vk::Sampler,
+        random: &mut Generator,
+    ) {
+        let of = &mut self.pools[pool].sets[set];
+        of.written = Some((view, sampler));
+        let (handle, kind) = (of.handle, of.kind);
+        let device = &self.gpu.device;
+        // SAFETY: the set is not used by commands, and its content exists.
+        unsafe {
+            if random.once_in(2) {
+                let data = [info_of(view, sampler); 2];
+                device.update_descriptor_set_with_template(
+                    handle,
+                    self.templates[kind],
+                    data.as_ptr().cast(),
+                );
+            } else {
+                let info = [info_of(view, sampler)];
+                let writes: Vec<_> = writes(kind, &info).map(|w| w.dst_set(handle)).collect();
+                device.update_descriptor_sets(&writes, &[]);
+            }
+        }
+    }
+
+    /// Copies a set to another one of the same kind.
+    pub fn copy(&mut self, from: (usize, usize), to: (usize, usize)) {
+        let (source, kind) = {
+            let set = &self.pools[from.0].sets[from.1];
+            (set.handle, set.kind)
+        };
+        let written = self.pools[from.0].sets[from.1].written;
+        let target = &mut self.pools[to.0].sets[to.1];
+        target.written = written;
+        let copies: Vec<_> = bindings(kind)
+            .map(|(binding, _)| {
+                vk::CopyDescriptorSet::default()
+                    .src_set(source)
+                    .src_binding(binding)
+                    .dst_set(target.handle)
+                    .dst_binding(binding)
+                    .descriptor_count(1)
+            })
+            .collect();
+        // SAFETY: neither set is used by commands.
+        unsafe { self.gpu.device.update_descriptor_sets(&[], &copies) };
+    }
+
+    /// Creates a pipeline layout.
+    pub fn layout(&self, kinds: Vec<usize>, offset: usize) -> Result<Layout> {
+        let sets: Vec<_> = kinds.iter().map(|kind| self.set_layouts[*kind]).collect();
+        let (vertex, fragment) = (vk::ShaderStageFlags::VERTEX, vk::ShaderStageFlags::FRAGMENT);
+        let range = |stage_flags, offset, size| vk::PushConstantRange {
+            stage_flags,
+            offset,
+            size,
+        };
+        let ranges = [
+            range(vertex, 0, 16),
+            range(fragment, shaders::OFFSETS[offset], 16),
+        ];
+        let info = vk::PipelineLayoutCreateInfo::default()
+            .set_layouts(&sets)
+            .push_constant_ranges(&ranges);
+        // SAFETY: the device is open.
+        let made = unsafe { self.gpu.device.create_pipeline_layout(&info, None) };
+        let handle = checked("a pipeline layout", made)?;
+        let template = match kinds[0] {
+            PUSHED => Some(template(
+                &self.gpu,
+                PUSHED,
+                self.set_layouts[PUSHED],
+                Some(handle),
+            )?),
+            _ => None,
+        };
+        Ok(Layout {
+            handle,
+            kinds,
+            offset,
+            template,
+        })
+    }
+
+    pub fn destroy_layout(&self, layout: &Layout) {
+        // SAFETY: no command buffer that uses the layout is being recorded.
+        unsafe {
+            if let Some(template) = layout.template {
+                self.gpu
+                    .device
+                    .destroy_descriptor_update_template(template, None);
+            }
+            self.gpu.device.destroy_pipeline_layout(layout.handle, None);
+        }
+    }
+
+    /// Creates a pipeline.
+    pub fn pipeline(
+        &self,
+        class: Class,
+        dynamic: bool,
+        layout: usize,
+        body: usize,
+        blends: bool,
+    ) -> Result<Pipeline> {
+        let device = &self.gpu.device;
+        let words = shaders::fragment(body, self.layouts[layout].offset)?;
+        // SAFETY: the device is open; the module and the render pass exist until the pipeline is created.
+        unsafe {
+            let module = vk::ShaderModuleCreateInfo::default().code(&words);
+            let module = checked("a module", device.create_shader_module(&module, None))?;
+            let stage = |stage, module, name| {
+                let info = vk::PipelineShaderStageCreateInfo::default();
+                info.stage(stage).module(module).name(name)
+            };
+            let stages = [
+                stage(vk::ShaderStageFlags::VERTEX, self.vertex, c"vertex"),
+                stage(vk::ShaderStageFlags::FRAGMENT, module, c"fragment"),
+            ];
+            let bindings = [vk::VertexInputBindingDescription {
+                binding: 0,
+                stride: 16,
+                input_rate: vk::VertexInputRate::VERTEX,
+            }];
+            let attribute = |location, offset| vk::VertexInputAttributeDescription {
+                location,
+                binding: 0,
+                format: vk::Format::R32G32_SFLOAT,
+                offset,
+            };
+            let attributes = [attribute(0, 0), attribute(1, 8)];
+            let input = vk::PipelineVertexInputStateCreateInfo::default()
+                .vertex_binding_descriptions(&bindings)
+                .vertex_attribute_descriptions(&attributes);
+            let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
+                .topology(vk::PrimitiveTopology::TRIANGLE_LIST);
+            let viewports = vk::PipelineViewportStateCreateInfo::default()
+                .viewport_count(1)
+                .scissor_count(1);
+            let rasterization = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
+            let samples = vk::PipelineMultisampleStateCreateInfo::default()
+                .rasterization_samples(vk::SampleCountFlags::TYPE_1);
+            let depth = vk::PipelineDepthStencilStateCreateInfo::default()
+                .depth_test_enable(class.depth)
+                .depth_write_enable(class.depth)
+                .depth_compare_op(vk::CompareOp::LESS_OR_EQUAL);
+            let mut attachment = vk::PipelineColorBlendAttachmentState::default()
+                .color_write_mask(vk::ColorComponentFlags::RGBA);
+            if blends {
+                attachment = attachment
+                    .blend_enable(true)
+                    .src_color_blend_factor(vk::BlendFactor::ONE)
+                    .dst_color_blend_factor(vk::BlendFactor::SRC_COLOR);
+            }
+            let attachments = [attachment];
+            let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
+            let states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+            let states = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&states);
+            let formats = [FORMATS[class.format]];
+            let mut rendering = rendering(class, &formats);
+            let mut info = vk::GraphicsPipelineCreateInfo::default()
+                .stages(&stages)
+                .vertex_input_state(&input)
+                .input_assembly_state(&assembly)
+                .viewport_state(&viewports)
+                .rasterization_state(&rasterization)
+                .multisample_state(&samples)
+                .depth_stencil_state(&depth)
+                .color_blend_state(&blend)
+                .dynamic_state(&states)
+                .layout(self.layouts[layout].handle);
+            let mut pass = vk::RenderPass::null();
+            if dynamic {
+                info = info.push_next(&mut rendering);
+            } else {
+                pass = self.render_pass(class, true)?;
+                info = info.render_pass(pass);
+            }
+            let made = device.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None);
+            device.destroy_shader_module(module, None);
+            device.destroy_render_pass(pass, None);
+            let handle = made.map_err(|(_, error)| format!("a pipeline: {error}"))?[0];
+            Ok(Pipeline {
+                handle,
+                layout,
+                class,
+                dynamic,
+            })
+        }
+    }
+
+    pub fn destroy_pipeline(&mut self, place: usize) {
+        let pipeline = self.pipelines.swap_remove(place);
+        self.forget(pipeline.handle.as_raw());
+        // SAFETY: nothing uses the pipeline any more.
+        unsafe { self.gpu.device.destroy_pipeline(pipeline.handle, None) };
+    }
+
+    fn render_pass(&self, class: Class, clears: bool) -> Result<vk::RenderPass> {
+        let load = if clears {
+            vk::AttachmentLoadOp::CLEAR
+        } else {
+            vk::AttachmentLoadOp::LOAD
+        };
+        let general = vk::ImageLayout::GENERAL;
+        let attachment = |format| {
+            vk::AttachmentDescription::default()
+                .format(format)
+                .samples(vk::SampleCountFlags::TYPE_1)
+                .load_op(load)
+                .store_op(vk::AttachmentStoreOp::STORE)
+                .initial_layout(general)
+                .final_layout(general)
+        };
+        let mut attachments = vec![attachment(FORMATS[class.format])];
+        let reference = |attachment| vk::AttachmentReference {
+            attachment,
+            layout: general,
+        };
+        let (colors, depth) = ([reference(0)], reference(1));
+        let mut subpass = vk::SubpassDescription::default().color_attachments(&colors);
+        if class.depth {
+            attachments.push(attachment(DEPTH));
+            subpass = subpass.depth_stencil_attachment(&depth);
+        }
+        let subpasses = [subpass];
+        let info = vk::RenderPassCreateInfo::default()
+            .attachments(&attachments)
+            .subpasses(&subpasses);
+        // SAFETY: the device is open.
+        let made = unsafe { self.gpu.device.create_render_pass(&info, None) };
+        checked("a render pass", made)
+    }
+
+    /// Creates a target for a view of one level.
+    pub fn target(&self, view: View, depth: bool, clears: bool) -> Result<Target> {
+        let class = Class {
+            format: view.format,
+            depth,
+        };
+        let pass = self.render_pass(class, clears)?;
+        let views = [view.handle, self.depth.view];
+        let info = vk::FramebufferCreateInfo::default()
+            .render_pass(pass)
+            .attachments(&views[..if depth { 2 } else { 1 }])
+            .width(view.size[0])
+            .height(view.size[1])
+            .layers(1);
+        // SAFETY: the device is open.
+        let made = unsafe { self.gpu.device.create_framebuffer(&info, None) };
+        let framebuffer = checked("a framebuffer", made)?;
+        Ok(Target {
+            pass,
+            framebuffer,
+            class,
+            view,
+            clears,
+        })
+    }
+
+    pub fn destroy_target(&mut self, target: &Target) {
+        self.forget(target.framebuffer.as_raw());
+        // SAFETY: nothing uses the framebuffer any more, and the render pass is used with it alone.
+        unsafe {
+            self.gpu
+                .device
+                .destroy_framebuffer(target.framebuffer, None);
+            self.gpu.device.destroy_render_pass(target.pass, None);
+        }
+    }
+
+    /// Reads the results of the queries.
+    pub fn results(&self) -> Vec<u64> {
+        let mut all = Vec::new();
+        for (pool, values) in [(self.queries, 1), (self.statistics, 2)] {
+            // The values of a query, and whether it has ended.
+            let mut found = vec![0_u64; QUERIES as usize * (values + 1)];
+            let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
+            let stride = values + 1;
+            let rows: &mut [[u64; 2]] =
+                bytemuck::cast_slice_mut(&mut found[..2 * QUERIES as usize]);
+            // SAFETY: the device is idle, and the slice has room for all values.
+            let result = unsafe {
+                match values {
+                    1 => self.gpu.device.get_query_pool_results(pool, 0, rows, flags),
+                    _ => {
+                        let rows: &mut [[u64; 3]] = bytemuck::cast_slice_mut(&mut found);
+                        self.gpu.device.get_query_pool_results(pool, 0, rows, flags)
+                    }
+                }
+            };
+            if result.is_ok() || result == Err(vk::Result::NOT_READY) {
+                let ended = found.chunks(stride).filter(|row| row[stride - 1] != 0);
+                all.extend(ended.flatten());
+            }
+        }
+        all
+    }
+
+    /// Destroys everything and closes the device.
+    pub fn close(mut self) -> Result<()> {
+        self.idle()?;
+        self.free_all();
+        while let Some(target) = self.targets.pop() {
+            self.destroy_target(&target);
+        }
+        while !self.pipelines.is_empty() {
+            self.destroy_pipeline(0);
+        }
+        while !self.textures.is_empty() {
+            self.destroy_texture(0);
+        }
+        let device = self.gpu.device.clone();
+        // SAFETY: the device is idle, and every handle is destroyed once.
+        unsafe {
+            for texture in [&self.main, &self.home] {
+                for view in &texture.views {
+                    device.destroy_image_view(view.handle, None);
+                }
+                destroy_image(&self.gpu, texture.image);
+            }
+            destroy_image(&self.gpu, self.depth);
+            for buffer in [&self.geometry, &self.readback] {
+                device.destroy_buffer(buffer.handle, None);
+                device.free_memory(buffer.memory, None);
+            }
+            for layout in &self.layouts {
+                self.destroy_layout(layout);
+            }
+            for pool in &self.pools {
+                device.destroy_descriptor_pool(pool.handle, None);
+            }
+            for template in &self.templates {
+                device.destroy_descriptor_update_template(*template, None);
+            }
+            for layout in &self.set_layouts {
+                device.destroy_descriptor_set_layout(*layout, None);
+            }
+            for sampler in self.samplers.iter().chain(&self.immutable) {
+                device.destroy_sampler(*sampler, None);
+            }
+            device.destroy_shader_module(self.vertex, None);
+            device.destroy_query_pool(self.queries, None);
+            device.destroy_query_pool(self.statistics, None);
+            for event in &self.events {
+                device.destroy_event(*event, None);
+            }
+            device.destroy_fence(self.fence, None);
+            for semaphore in self.semaphores.iter().chain([&self.timeline]) {
+                device.destroy_semaphore(*semaphore, None);
+            }
+            device.destroy_command_pool(self.commands, None);
+        }
+        self.gpu.close();
+        Ok(())
+    }
+}
+
+/// Formats of the targets of a class.
+pub fn rendering(class: Class, formats: &[vk::Format; 1]) -> vk::PipelineRenderingCreateInfo<'_> {
+    let info = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(formats);
+    info.depth_attachment_format(if class.depth {
+        DEPTH
+    } else {
+        vk::Format::UNDEFINED
+    })
+}
+
+/// Creates a command pool whose buffers may be reset.
+pub fn command_pool(gpu: &Gpu) -> Result<vk::CommandPool> {
+    let info = vk::CommandPoolCreateInfo::default()
+        .flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER)
+        .queue_family_index(gpu.family);
+    // SAFETY: the device is open.
+    checked("a command pool", unsafe {
+        gpu.device.create_command_pool(&info, None)
+    })
+}
+
+fn info_of(view: View, sampler: vk::Sampler) -> vk::DescriptorImageInfo {
+    vk::DescriptorImageInfo {
+        sampler,
+        image_view: view.handle,
+        image_layout: vk::ImageLayout::GENERAL,
+    }
+}
+
+/// Bindings of a kind of sets that programs write: an immutable sampler alone is not written.
+fn bindings(kind: usize) -> impl Iterator<Item = (u32, vk::DescriptorType)> {
+    let all = (0..).zip(SET_KINDS[kind]);
+    all.filter(|(_, of)| *of != (SAMPLER, true))
+        .map(|(binding, of)| (binding, of.0))
+}
+
+/// Writes of both bindings of a set of a kind.
+fn writes(
+    kind: usize,
+    info: &[vk::DescriptorImageInfo; 1],
+) -> impl Iterator<Item = vk::WriteDescriptorSet<'_>> {
+    bindings(kind).map(|(binding, of)| {
+        let write = vk::WriteDescriptorSet::default().dst_binding(binding);
+        write.descriptor_type(of).image_info(info)
+    })
+}
+
+/// The writes of a pushed set.
+pub fn pushed(view: View, sampler: vk::Sampler, push: impl FnOnce(&[vk::WriteDescriptorSet<'_>])) {
+    let info = [info_of(view, sampler)];
+    let all: Vec<_> = writes(PUSHED, &info).collect();
+    push(&all);
+}
+
+/// The data of a template.
+pub fn template_data(view: View, sampler: vk::Sampler) -> [vk::DescriptorImageInfo; 2] {
+    [info_of(view, sampler); 2]
+}
+
+fn template(
+    gpu: &Gpu,
+    kind: usize,
+    set_layout: vk::DescriptorSetLayout,
+    pushed: Option<vk::PipelineLayout>,
+) -> Result<vk::DescriptorUpdateTemplate> {
+    let bytes = size_of::<vk::DescriptorImageInfo>();
+    let entries: Vec<_> = bindings(kind)
+        .map(|(binding, of)| {
+            vk::DescriptorUpdateTemplateEntry::default()
+                .dst_binding(binding)
+                .descriptor_count(1)
+                .descriptor_type(of)
+                .offset(binding as usize * bytes)
+                .stride(bytes)
+        })
+        .collect();
+    let mut info = vk::DescriptorUpdateTemplateCreateInfo::default()
+        .descriptor_update_entries(&entries)
+        .descriptor_set_layout(set_layout);
+    if let Some(layout) = pushed {
+        info = info
+            .template_type(vk::DescriptorUpdateTemplateType::PUSH_DESCRIPTORS_KHR)
+            .pipeline_bind_point(vk::PipelineBindPoint::GRAPHICS)
+            .pipeline_layout(layout)
+            .set(0);
+    }
+    // SAFETY: the device is open.
+    let made = unsafe { gpu.device.create_descriptor_update_template(&info, None) };
+    checked("a template", made)
+}
+
+fn set_layouts(gpu: &Gpu, immutable: [vk::Sampler; 2]) -> Result<Vec<vk::DescriptorSetLayout>> {
+    let make = |(number, kind): (usize, &SetKind)| {
+        let bindings: Vec<_> = (0..)
+            .zip(kind)
+            .map(|(binding, (of, fixed))| {
+                let info = vk::DescriptorSetLayoutBinding::default()
+                    .binding(binding)
+                    .descriptor_type(*of)
+                    .descriptor_count(1)
+                    .stage_flags(vk::ShaderStageFlags::FRAGMENT);
+                let place = binding as usize;
+                if *fixed {
+                    info.immutable_samplers(&immutable[place..=place])
+                } else {
+                    info
+                }
+            })
+            .collect();
+        let mut info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        if number == PUSHED {
+            info = info.flags(vk::DescriptorSetLayoutCreateFlags::PUSH_DESCRIPTOR_KHR);
+        }
+        // SAFETY: the device is open.
+        let made = unsafe { gpu.device.create_descriptor_set_layout(&info, None) };
+        checked("a set layout", made)
+    };
+    SET_KINDS.iter().enumerate().map(make).collect()
+}
+
+fn sampler(gpu: &Gpu, random: &mut Generator) -> Result<vk::Sampler> {
+    let filters = [vk::Filter::NEAREST, vk::Filter::LINEAR];
+    let modes = [
+        vk::SamplerAddressMode::REPEAT,
+        vk::SamplerAddressMode::CLAMP_TO_EDGE,
+        vk::SamplerAddressMode::MIRRORED_REPEAT,
+    ];
+    let mips = [
+        vk::SamplerMipmapMode::NEAREST,
+        vk::SamplerMipmapMode::LINEAR,
+    ];
+    let info = vk::SamplerCreateInfo::default()
+        .mag_filter(filters[random.below(2)])
+        .min_filter(filters[random.below(2)])
+        .mipmap_mode(mips[random.below(2)])
+        .address_mode_u(modes[random.below(3)])
+        .address_mode_v(modes[random.below(3)])
+        .mip_lod_bias(random.unit() - 0.5)
+        .max_lod(vk::LOD_CLAMP_NONE);
+    // SAFETY: the device is open.
+    checked("a sampler", unsafe {
+        gpu.device.create_sampler(&info, None)
+    })
+}
+
+fn destroy_image(gpu: &Gpu, image: Image) {
+    // SAFETY: nothing uses the image any more.
+    unsafe {
+        gpu.device.destroy_image_view(image.view, None);
+        gpu.device.destroy_image(image.handle, None);
+        gpu.device.free_memory(image.memory, None);
+    }
+}
+
+fn to_general(gpu: &Gpu, image: vk::Image, format: vk::Format) -> Result<()> {
+    gpu.execute(|device, buffer| {
+        let barrier = |old, to| {
+            let barrier = vk::ImageMemoryBarrier::default()
+                .old_layout(old)
+                .new_layout(to)
+                .src_access_mask(vk::AccessFlags::MEMORY_WRITE)
+                .dst_access_mask(vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)
+                .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+                .image(image)
+                .subresource_range(all_of(format));
+            let (all, none) = (
+                vk::PipelineStageFlags::ALL_COMMANDS,
+                vk::DependencyFlags::empty(),
+            );
+            // SAFETY: the command buffer is being recorded, and the image is the device's.
+            unsafe { device.cmd_pipeline_barrier(buffer, all, all, none, &[], &[], &[barrier]) };
+        };
+        let general = vk::ImageLayout::GENERAL;
+        barrier(vk::ImageLayout::UNDEFINED, general);
+        let ranges = [all_of(format)];
+        // SAFETY: as above.
+        unsafe {
+            if format == DEPTH {
+                let far = vk::ClearDepthStencilValue {
+                    depth: 1.0,
+                    stencil: 0,
+                };
+                device.cmd_clear_depth_stencil_image(buffer, image, general, &far, &ranges);
+            } else {
+                let color = vk::ClearColorValue {
+                    float32: [0.25, 0.5, 0.75, 1.0],
+                };
+                device.cmd_clear_color_image(buffer, image, general, &color, &ranges);
+            }
+        }
+        barrier(general, general);
+    })
+}
+
+fn texture(
+    gpu: &Gpu,
+    random: &mut Generator,
+    format: usize,
+    size: [u32; 2],
+    levels: u32,
+    layers: u32,
+) -> Result<Texture> {
+    use vk::ImageUsageFlags as Usage;
+    let image = gpu.image(&ImageKind {
+        format: FORMATS[format],
+        size: [size[0], size[1], 1],
+        levels,
+        layers,
+        view: match layers {
+            1 => vk::ImageViewType::TYPE_2D,
+            _ => vk::ImageViewType::TYPE_2D_ARRAY,
+        },
+        usage: Usage::SAMPLED | Usage::TRANSFER_SRC | Usage::TRANSFER_DST | Usage::COLOR_ATTACHMENT,
+    })?;
+    to_general(gpu, image.handle, FORMATS[format])?;
+    // Level 0 of every layer has random texels.
+    let texels = size[0] * size[1] * layers;
+    let bytes: Vec<u8> = (0..4 * texels).map(|_| random.below(256) as u8).collect();
+    let from = gpu.buffer_of(&bytes, vk::BufferUsageFlags::TRANSFER_SRC)?;
+    gpu.execute(|device, buffer| {
+        let region = vk::BufferImageCopy {
+            image_subresource: vk::ImageSubresourceLayers {
+                aspect_mask: vk::ImageAspectFlags::COLOR,
+                mip_level: 0,
+                base_array_layer: 0,
+                layer_count: layers,
+            },
+            image_extent: vk::Extent3D {
+                width: size[0],
+                height: size[1],
+                depth: 1,
+            },
+            ..Default::default()
+        };
+        let general = vk::ImageLayout::GENERAL;
+        // SAFETY: the command buffer is being recorded, and the buffer has the texels of all layers.
+        unsafe {
+            device.cmd_copy_buffer_to_image(buffer, from.handle, image.handle, general, &[region]);
+        }
+    })?;
+    // SAFETY: the copy has ended.
+    unsafe {
+        gpu.device.destroy_buffer(from.handle, None);
+        gpu.device.free_memory(from.memory, None);
+    }
+    let mut made = Texture {
+        image,
+        format,
+        size,
+        levels,
+        layers,
+        views: Vec::new(),
+    };
+    let first = view(gpu, &made, random)?;
+    made.views.push(first);
+    Ok(made)
+}
+
+/// Creates a view of a random layer and of one level or all levels.
+fn view(gpu: &Gpu, texture: &Texture, random: &mut Generator) -> Result<View> {
+    let all = random.once_in(2);
+    let level = if all {
+        0
+    } else {
+        random.below(texture.levels as usize) as u32
+    };
+    let levels = if all { texture.levels } else { 1 };
+    let range = vk::ImageSubresourceRange {
+        aspect_mask: vk::ImageAspectFlags::COLOR,
+        base_mip_level: level,
+        level_count: if all && random.once_in(2) {
+            vk::REMAINING_MIP_LEVELS
+        } else {
+            levels
+        },
+        base_array_layer: random.below(texture.layers as usize) as u32,
+        layer_count: 1,
+    };
+    let info = vk::ImageViewCreateInfo::default()
+        .image(texture.image.handle)
+        .view_type(vk::ImageViewType::TYPE_2D)
+        .format(FORMATS[texture.format])
+        .subresource_range(range);
+    // SAFETY: the device is open.
+    let made = unsafe { gpu.device.create_image_view(&info, None) };
+    Ok(View {
+        handle: checked("a view", made)?,
+        image: texture.image.handle,
+        format: texture.format,
+        size: texture.size.map(|side| (side >> level).max(1)),
+        of: texture.size,
+        levels,
+    })
+}
