@@ -9,8 +9,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Seeds that are run by default. They contain those of the faults that were found:
-/// 1, 2, 5, 6: the draws of a command buffer that was submitted twice in a frame had the records of both
-/// executions. 8, 10: after a program destroyed its instance and created another one, the loader loaded the
+/// 1, 5, 6, 9: the draws of a command buffer that was submitted twice in a frame had the records of both
+/// executions. 2, 4: after a program destroyed its instance and created another one, the loader loaded the
 /// layer again, and the capture ended.
 const SEEDS: u64 = 20;
 
