@@ -4,6 +4,7 @@
 
 mod opengl;
 mod pixels;
+mod random;
 
 use formats::textrace::{Tables, Textrace, Tile};
 use formats::texture::Filter;

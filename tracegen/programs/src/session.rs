@@ -350,3 +350,60 @@ pub fn survival_group(shader: &ShaderInfo) -> Option<u16> {
     let found = sites.find(|site| site.what == What::Survival);
     found.map(|site| site.group)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn submit(session: &mut Session, draws: &[[u32; 2]]) {
+        session.take(Event::Submit {
+            frame: 0,
+            draws: draws.to_vec(),
+            records: Span::default(),
+            lost_bytes: 0,
+            occlusion: Vec::new(),
+        });
+    }
+
+    #[test]
+    fn further_executions_of_a_draw_in_a_frame_are_draws_of_their_own() {
+        let mut session = Session::default();
+        let shader = Some(0);
+        session.take(Event::Draw(DrawInfo {
+            draw: 7,
+            shader,
+            ..DrawInfo::default()
+        }));
+        // Twice in two submissions; twice in one pass of a submission; in two passes of a submission.
+        submit(&mut session, &[[7, 0]]);
+        submit(&mut session, &[[7, 0]]);
+        submit(&mut session, &[[7, 1], [7, 1]]);
+        submit(&mut session, &[[7, 2], [7, 3]]);
+        let draws = &session.frames[&0].draws;
+        let found: Vec<_> = draws
+            .iter()
+            .map(|draw| (draw.pass, draw.repeated))
+            .collect();
+        assert_eq!(
+            found,
+            [(0, false), (0, false), (1, true), (2, true), (3, true)]
+        );
+        let mut numbers: Vec<u32> = draws.iter().map(|draw| draw.draw).collect();
+        let infos: Vec<_> = numbers
+            .iter()
+            .map(|number| session.draw(*number).unwrap())
+            .collect();
+        assert!(
+            infos
+                .iter()
+                .zip(&numbers)
+                .all(|(info, number)| info.draw == *number)
+        );
+        let recorded: Vec<_> = infos.iter().map(|info| info.shader.is_some()).collect();
+        assert_eq!(recorded, [true, true, true, false, false]);
+        assert_eq!(infos[2].caveats, [REPEATED]);
+        numbers.sort_unstable();
+        numbers.dedup();
+        assert_eq!(numbers.len(), 5);
+    }
+}

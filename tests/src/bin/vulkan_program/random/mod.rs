@@ -34,6 +34,8 @@ pub fn run(seed: u64, operations: u32, frames: u32, file: Option<&str>) -> Resul
         .collect();
     let (mut bytes, mut draws) = (Vec::new(), String::new());
     for frame in 0..frames {
+        // The first device renders the pictures.
+        worlds[0].shows = true;
         for _ in 0..operations / frames.max(1) {
             let place = random.below(worlds.len());
             let operation = table[random.below(table.len())];

@@ -98,8 +98,11 @@ impl<'w> Recorder<'w> {
                 2 => self.copy(),
                 _ => {
                     // The second target adds to the frame's picture.
-                    let place = 1 + self.random.below(self.world.targets.len() - 1);
-                    self.pass(&self.world.targets[place], place == 1);
+                    let first = if self.world.shows { 1 } else { 2 };
+                    if let Some(count) = self.world.targets.len().checked_sub(first + 1) {
+                        let place = first + self.random.below(count + 1);
+                        self.pass(&self.world.targets[place], place == 1);
+                    }
                 }
             }
         }

@@ -160,6 +160,8 @@ pub struct World {
     pub targets: Vec<Target>,
     pub primaries: Vec<Recorded>,
     pub secondaries: Vec<Recorded>,
+    /// Whether it renders the frames' pictures.
+    pub shows: bool,
     /// The submitted draws into the frame's picture: sizes of the textures that they read.
     pub log: Vec<Vec<[u32; 2]>>,
     /// Number of created textures, from which their unique sizes follow.
@@ -317,6 +319,7 @@ impl World {
                 targets: Vec::new(),
                 primaries: Vec::new(),
                 secondaries: Vec::new(),
+                shows: false,
                 log: Vec::new(),
                 created: first,
                 is_idle: true,
