@@ -177,14 +177,36 @@ fn main() -> Result<(), Box<dyn Error>> {
             Some(target),
             0,
         );
+        let depth = gl.create_renderbuffer()?;
+        gl.bind_renderbuffer(glow::RENDERBUFFER, Some(depth));
+        gl.renderbuffer_storage(glow::RENDERBUFFER, glow::DEPTH_COMPONENT24, width, height);
+        gl.framebuffer_renderbuffer(
+            glow::FRAMEBUFFER,
+            glow::DEPTH_ATTACHMENT,
+            glow::RENDERBUFFER,
+            Some(depth),
+        );
+        let window = texture(&gl, None, [width, height])?;
+        let window_framebuffer = gl.create_framebuffer()?;
+        gl.bind_framebuffer(glow::FRAMEBUFFER, Some(window_framebuffer));
+        gl.framebuffer_texture_2d(
+            glow::FRAMEBUFFER,
+            glow::COLOR_ATTACHMENT0,
+            glow::TEXTURE_2D,
+            Some(window),
+            0,
+        );
         let color = |texel: i32| [(texel % TEXELS) as u8, (texel / TEXELS) as u8, 1, 255];
         let texels: Vec<u8> = (0..TEXELS * TEXELS).flat_map(color).collect();
-        texture(&gl, Some(&texels), [TEXELS; 2])?;
+        let texels = texture(&gl, Some(&texels), [TEXELS; 2])?;
         let place = gl.get_uniform_location(program, "place");
         gl.bind_vertex_array(Some(gl.create_vertex_array()?));
         for frame in 0..frames {
+            gl.bind_framebuffer(glow::FRAMEBUFFER, Some(framebuffer));
+            gl.bind_texture(glow::TEXTURE_2D, Some(texels));
+            gl.enable(glow::DEPTH_TEST);
             gl.clear_color(0.0, 0.0, 0.0, 0.0);
-            gl.clear(glow::COLOR_BUFFER_BIT);
+            gl.clear(glow::COLOR_BUFFER_BIT | glow::DEPTH_BUFFER_BIT);
             for eye in 0..2 {
                 gl.viewport(eye * EYE_PX[0], 0, EYE_PX[0], EYE_PX[1]);
                 let shift = 0.05 * (eye as f32 - 0.5) + 0.01 * frame as f32;
@@ -194,6 +216,13 @@ fn main() -> Result<(), Box<dyn Error>> {
                     gl.draw_arrays(glow::TRIANGLE_STRIP, 0, 4);
                 }
             }
+            // As a browser does, copy the picture to a window by a draw without a depth test.
+            gl.bind_framebuffer(glow::DRAW_FRAMEBUFFER, Some(window_framebuffer));
+            gl.bind_texture(glow::TEXTURE_2D, Some(target));
+            gl.disable(glow::DEPTH_TEST);
+            gl.viewport(0, 0, width, height);
+            gl.uniform_4_f32(place.as_ref(), 0.0, 0.0, 1.0, 0.0);
+            gl.draw_arrays(glow::TRIANGLE_STRIP, 0, 4);
             let into = glow::PixelPackData::Slice(Some(&mut pixels));
             gl.read_pixels(0, 0, width, height, glow::RGBA, glow::UNSIGNED_BYTE, into);
         }

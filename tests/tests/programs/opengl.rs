@@ -30,6 +30,48 @@ fn has_zink(folder: &Path) -> bool {
     true
 }
 
+/// Captures `gl_program` and returns the messages.
+fn capture(trace: &Path, picture: &Path, flag: &str) -> String {
+    let mut capture = program("tracegen");
+    capture
+        .args(["app", "--gl", "--frames", "2", "--to-end", flag, "-o"])
+        .arg(trace)
+        .arg("--")
+        .arg(env!("CARGO_BIN_EXE_gl_program"))
+        .arg("3")
+        .arg(picture);
+    String::from_utf8_lossy(&run_ok(&mut capture).stderr).into_owned()
+}
+
+#[test]
+fn draws_outside_the_pictures_of_scenes_are_recorded_only_on_request() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    if !has_lavapipe() || !has_zink(folder.path()) {
+        return;
+    }
+    let [trace, picture] = ["gl.textrace", "picture"].map(|name| folder.path().join(name));
+    let [skipped, all] = ["--eyes=halves", "--all-draws"].map(|flag| {
+        let said = capture(&trace, &picture, flag);
+        let line = |part: &str| {
+            let line = said.lines().find(|line| line.contains(part));
+            line.unwrap_or_default().to_owned()
+        };
+        let counts = line(" quads, ").split(';').next().map(str::to_owned);
+        (
+            counts,
+            line("post-processing"),
+            std::fs::read(&picture).expect("a picture"),
+        )
+    });
+    assert_eq!((&skipped.0, &skipped.2), (&all.0, &all.2));
+    assert!(
+        skipped.1.ends_with("not recorded (1 draws)"),
+        "{}",
+        skipped.1
+    );
+    assert!(all.1.contains("(1 draws, "), "{}", all.1);
+}
+
 #[test]
 fn every_pixel_of_an_opengl_program_shows_a_texel_of_its_last_record() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -37,18 +79,9 @@ fn every_pixel_of_an_opengl_program_shows_a_texel_of_its_last_record() {
         return;
     }
     let [trace, picture] = ["gl.textrace", "picture"].map(|name| folder.path().join(name));
-    let mut capture = program("tracegen");
-    capture
-        .args(["app", "--gl", "--frames", "2", "--to-end", "--check", "-o"])
-        .arg(&trace)
-        .arg("--")
-        .arg(env!("CARGO_BIN_EXE_gl_program"))
-        .arg("3")
-        .arg(&picture);
-    let said = run_ok(&mut capture);
-    let said = String::from_utf8_lossy(&said.stderr);
+    let said = capture(&trace, &picture, "--check");
     assert!(said.contains("by viewport halves: 2 draws"), "{said}");
-    assert!(said.contains("4 draws equal, 0 different"), "{said}");
+    assert!(said.contains("5 draws equal, 0 different"), "{said}");
     let trace = Textrace::open(&trace).expect("a trace");
     let picture = std::fs::read(picture).expect("a picture");
     let mut explained = 0;

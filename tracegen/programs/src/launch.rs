@@ -137,12 +137,15 @@ fn prepended(variable: &str, entry: OsString) -> OsString {
     list
 }
 
-/// Finds the layer's library next to a program or among Cargo's build outputs.
+/// Finds the layer's library next to a program or among Cargo's build outputs, which may be newer.
 fn library(tool: &Path) -> Result<PathBuf, LaunchError> {
     let folder = tool.parent().unwrap_or(Path::new("."));
-    let places = [folder.join(LIBRARY), folder.join("deps").join(LIBRARY)];
-    let found = places.iter().find(|place| place.is_file()).cloned();
-    found.ok_or_else(|| LaunchError::NoLayer(places[0].display().to_string()))
+    let places = [folder.join("deps").join(LIBRARY), folder.join(LIBRARY)];
+    let files = places.iter().filter(|place| place.is_file());
+    let found = files.max_by_key(|place| fs::metadata(place).and_then(|of| of.modified()).ok());
+    found
+        .cloned()
+        .ok_or_else(|| LaunchError::NoLayer(places[1].display().to_string()))
 }
 
 fn lavapipe() -> Option<PathBuf> {
