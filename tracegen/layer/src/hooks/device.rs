@@ -240,7 +240,7 @@ unsafe fn track(
     if recorder.is_some() {
         // Without the space, recording is only slower.
         let bytes = RESERVED_BYTES.min(capture.settings.record_bytes);
-        capture.write(|writer| Ok(drop(writer.reserve_records(bytes))));
+        capture.write(|writer| Ok(writer.reserve_records(bytes).is_ok()));
     }
     let queries = (capture.settings.occlusion)
         // SAFETY: the device was just created.

@@ -86,7 +86,7 @@ impl Writer {
     /// # Errors
     /// The file cannot be written.
     pub fn reserve_records(&mut self, bytes: u64) -> io::Result<()> {
-        const CHUNK: [u8; 1 << 16] = [0; 1 << 16];
+        static CHUNK: [u8; 1 << 16] = [0; 1 << 16];
         if std::mem::replace(&mut self.reserved, true) || self.written > 0 {
             return Ok(());
         }

@@ -15,7 +15,7 @@ pub use images::Images;
 pub use passes::{Attachment, Passes, RenderPass, Subpass};
 pub use pipelines::{Layout, Pipeline, Pipelines, Recorded, State};
 
-use crate::spool::{DrawInfo, TextureInfo};
+use crate::spool::{DrawInfo, TextureInfo, ViewInfo};
 use std::collections::HashSet;
 
 /// All tracked objects of a device.
@@ -72,11 +72,12 @@ impl Tracker {
         else {
             return false;
         };
-        let is_scene = |image: u32| self.scene_images.contains(&image);
-        !self.scene_images.is_empty()
-            && !pass.colors.is_empty()
-            && !pass.colors.iter().any(|view| is_scene(view.image))
-            && !(pass.depth.is_some() && state.tests_depth())
+        if self.scene_images.is_empty() || pass.colors.is_empty() {
+            return false;
+        }
+        let tests_depth = pass.depth.is_some() && state.tests_depth();
+        let is_scene = |view: &ViewInfo| self.scene_images.contains(&view.image);
+        !tests_depth && !pass.colors.iter().any(is_scene)
     }
 
     /// Description of a draw in a command buffer, with the next number; `None` if no graphics pipeline is
