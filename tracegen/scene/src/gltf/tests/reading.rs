@@ -271,7 +271,7 @@ fn files_are_found_as_other_systems_and_tools_name_them() {
         ("my%20image.png", "my%20image.png", true),
         ("MY%20Image.PNG", "my image.png", true),
         ("maps\\my%20image.png", "maps/my image.png", true),
-        ("../work/maps/my image.png", "my image.png", true),
+        ("../textures/maps/my image.png", "my image.png", true),
     ] {
         let json = with(textured(), "/images/0/uri", json!(uri));
         let files = Files::new(&json);
