@@ -17,8 +17,10 @@ use std::ffi::CStr;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, RwLock};
 
-/// Size of the part of the file of records that is allocated in advance.
-const RESERVED_BYTES: u64 = 64 << 20;
+/// Size of the part of the file of records that is allocated in advance for each requested frame.
+const RESERVED_BYTES_PER_FRAME: u64 = 64 << 20;
+/// Maximum size of that part. It occupies the system's file cache, not the program's memory.
+const MOST_RESERVED_BYTES: u64 = 512 << 20;
 
 /// A tracked device.
 pub(super) struct Device {
@@ -239,7 +241,9 @@ unsafe fn track(
     });
     if recorder.is_some() {
         // Without the space, recording is only slower.
-        let bytes = RESERVED_BYTES.min(capture.settings.record_bytes);
+        let [first, end] = capture.settings.frames;
+        let frames = u64::from(end.saturating_sub(first));
+        let bytes = (frames.saturating_mul(RESERVED_BYTES_PER_FRAME)).min(MOST_RESERVED_BYTES);
         capture.write(|writer| Ok(writer.reserve_records(bytes).is_ok()));
     }
     let queries = (capture.settings.occlusion)
