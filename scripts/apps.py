@@ -40,6 +40,13 @@ GAME_SETTINGS = (
     "+set r_anaglyphMode 1 +set com_maxfps 30 +set timedemo 1 +map oa_dm1 +wait 150 +quit"
 ).split()
 ZINK = {"GALLIUM_DRIVER": "zink", "MESA_LOADER_DRIVER_OVERRIDE": "zink", "LIBGL_ALWAYS_SOFTWARE": "1"}
+# A native Vulkan program with its levels of detail, effects and menus. It has no stereo mode, and does not repeat its frames.
+KART = "SuperTuxKart (Vulkan, one eye)"
+KART_PROGRAM = "/usr/games/supertuxkart"
+KART_SETTINGS = (
+    "--render-driver=vulkan --windowed --screensize=640x480 -N --track=cocoa_temple --numkarts=2 --no-sound --profile-time=600"
+).split()
+KART_FIRST = 100
 COLUMNS = [
     "program", "eyes by", "pixels per eye", "draws", "draws equal to their query", "draws that differ", "draws not compared",
     "fragments", "plain ms per frame", "with the layer, not recorded", "recorded", "recorded over plain",
@@ -157,6 +164,29 @@ def describe_game():
     return row(GAME, trace, said, measured, pictures)
 
 
+def describe_kart():
+    missing = [program for program in ("xvfb-run", KART_PROGRAM) if not shutil.which(program)]
+    if missing:
+        print(f"SKIPPED: {KART}: {', '.join(missing)} is absent", file=sys.stderr)
+        return None
+    home = tempfile.mkdtemp()
+    os.environ.update({"HOME": home, "XDG_CONFIG_HOME": home, "XDG_RUNTIME_DIR": home})
+    base = ["xvfb-run", "-a", f"{BIN}/tracegen", "app", "--eyes", "mono"]
+    program = ["--", KART_PROGRAM, *KART_SETTINGS]
+    window = [f"{KART_FIRST}..{KART_FIRST + COUNT}", "-o", f"{OUT}/timed.textrace"]
+    # Without the layer there is no time per frame. The largest memory without records is that of a run that lists a frame.
+    _, _, plain_peak = run([*base, "--list", "--frames", f"{KART_FIRST}..{KART_FIRST + 1}", *program])
+    turns = []
+    for _ in range(TURNS):
+        _, said, peak = run([*base, "--frames", *window, *program])
+        turns.append([*note_times(said), plain_peak, peak])
+    measured = [None, *(statistics.median(column) for column in zip(*turns))]
+    trace = trace_of(KART)
+    _, said, _ = run([*base, "--check", "--frames", f"{KART_FIRST}..{KART_FIRST + 1}", "-o", trace, *program], allowed=(0, 1))
+    shutil.rmtree(home)
+    return row(KART, trace, said, measured, "not compared")
+
+
 def trace_of(name):
     return f"{OUT}/{re.sub('[^a-z0-9]+', '-', name.lower()).strip('-')}.textrace"
 
@@ -173,9 +203,10 @@ def row(name, trace, said, measured, pictures):
         bytes_of[order] = json.loads(text)["result"]["external_bytes"]
     saved = [100 * (1 - bytes_of[order] / bytes_of["morton"]) for order in ORDERS[1:]]
     plain, idle, recorded, plain_peak, peak = measured
+    over_plain = [f"{time / plain:.2f}" if plain else "-" for time in (recorded, idle)]
     return [
         name, rule, f"{width}x{height}", draws, equal, different, "; ".join(f"{n}: {why}" for why, n in apart) or "0",
-        fragments, f"{plain:.1f}", f"{idle:.1f}", f"{recorded:.1f}", f"{recorded / plain:.2f}", f"{idle / plain:.2f}",
+        fragments, f"{plain:.1f}" if plain else "-", f"{idle:.1f}", f"{recorded:.1f}", *over_plain,
         pictures, f"{plain_peak:.0f}", f"{peak:.0f}", f"{bytes_of['morton'] / 1e6:.2f}",
         *(f"{value:.1f}" for value in saved), "; ".join(left_out) or "nothing",
     ]
@@ -191,8 +222,9 @@ def main():
     for page in PAGES:
         print(f"measuring {page[0]}", file=sys.stderr)
         rows.append(describe_page(*page))
-    print(f"measuring {GAME}", file=sys.stderr)
-    rows += [game for game in [describe_game()] if game]
+    for name, describe in ((GAME, describe_game), (KART, describe_kart)):
+        print(f"measuring {name}", file=sys.stderr)
+        rows += [described for described in [describe()] if described]
     os.remove(f"{OUT}/timed.textrace")
     with open(TABLE + ".new", "w", newline="") as file:
         file.write("# command: RESULTS=1 scripts/apps.sh\n")
