@@ -239,8 +239,12 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
     let in_file = || path.display().to_string();
     let loaded = LoadedTrace::load(&file).with_context(in_file)?;
     let (rule, reuse) = (args.rule()?, args.reuse());
+    let traced = match args.timing {
+        Timing::ClosedForm => None,
+        Timing::Cycle => Some(loaded.traced_timing(config).with_context(in_file)?),
+    };
     let run = |rule: &Rule| {
-        let run = loaded.run_timed(rule, reuse, config, args.timing);
+        let run = loaded.run_timed(rule, reuse, config, traced.as_ref());
         run.with_context(in_file)
     };
     let (ours, plain) = (run(&rule)?, run(&Rule::default())?);

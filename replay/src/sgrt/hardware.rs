@@ -7,7 +7,7 @@ use super::detect::Decision;
 use super::frame::{Frame, FrameError, RaySource};
 use super::run::Run;
 use super::work::{BatchWork, RayClass};
-use formats::raytrace::{BvhSummary, RayTile, Visit};
+use formats::raytrace::{BvhSummary, RayRecord, RayTile, Visit};
 use formats::view::Eye;
 use rayon::prelude::*;
 
@@ -150,6 +150,37 @@ pub(super) fn misses_by_rates(
         }
     };
     work.par_iter().map(tile).collect()
+}
+
+/// Misses of one eye, completely traced on its own, by tile number.
+///
+/// # Errors
+/// [`FrameError`] for an unreadable tile.
+pub(super) fn misses_of_eye(
+    source: &dyn RaySource,
+    frame: &Frame,
+    eye: Eye,
+    config: &SgrtConfig,
+) -> Result<Vec<Misses>, FrameError> {
+    let bvh = &frame.tables.bvh;
+    check_lines(bvh, config)?;
+    let mut caches = DeviceCaches::new(config);
+    let mut data = RayTile::default();
+    let mut out = vec![Misses::default(); frame.tables.tile_count() as usize];
+    for (tile, misses) in (0u32..).zip(&mut out) {
+        source
+            .tile(eye, tile, &mut data)
+            .map_err(|source| FrameError::Tile { eye, tile, source })?;
+        let mut visits = data.visits.iter();
+        for (turn, pixel) in data.pixels.iter().enumerate() {
+            let rays = data.rays_of(pixel).iter();
+            let count: u64 = rays.map(RayRecord::visit_count).sum();
+            for &visit in visits.by_ref().take(count as usize) {
+                caches.visit(turn, visit, bvh, misses);
+            }
+        }
+    }
+    Ok(out)
 }
 
 /// Checks that the lines of a hierarchy can be numbered.

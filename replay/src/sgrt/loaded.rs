@@ -13,8 +13,7 @@ use super::reproject::{Reprojection, reproject};
 use super::result::{ImageError, Outcome};
 use super::rows::RowNeeds;
 use super::rules::Rule;
-use super::timed;
-use super::timing::Timing;
+use super::timed::{self, TracedTiming};
 use super::ways::{Model, compare};
 use formats::view::Eye;
 use image_error::flip::{FlipMap, Prepared};
@@ -108,37 +107,51 @@ impl<'a> LoadedTrace<'a> {
         reuse: Reuse,
         config: &SgrtConfig,
     ) -> Result<RuleRun, FrameError> {
-        self.run_timed(rule, reuse, config, Timing::ClosedForm)
+        self.run_timed(rule, reuse, config, None)
     }
 
-    /// Runs a rule and a level of reuse with a model of the units' time.
+    /// Simulates the units cycle by cycle without reprojection, for [`Self::run_timed`] with the same `config`.
     ///
     /// # Errors
-    /// [`FrameError`] for a tile whose addresses cannot be read, or for a trace without visits if the model needs them.
+    /// [`FrameError`] for a trace without visits or for a tile whose addresses cannot be read.
+    pub fn traced_timing(&self, config: &SgrtConfig) -> Result<TracedTiming, FrameError> {
+        let decisions = decide(&self.frame, &self.arrived, &Rule::default());
+        let work = tile_work(&self.frame, &decisions, Reuse::Primary);
+        TracedTiming::new(self.source, &self.model(Reads::NOTHING, config), &work)
+    }
+
+    fn model<'b>(&'b self, reads: Reads, config: &'b SgrtConfig) -> Model<'b> {
+        Model {
+            frame: &self.frame,
+            reads,
+            rows: &self.rows,
+            config,
+        }
+    }
+
+    /// Runs a rule and a level of reuse: with `traced` by the cycle-level model, without by the closed form.
+    ///
+    /// # Errors
+    /// [`FrameError`] for a tile whose addresses cannot be read.
     pub fn run_timed(
         &self,
         rule: &Rule,
         reuse: Reuse,
         config: &SgrtConfig,
-        timing: Timing,
+        traced: Option<&TracedTiming>,
     ) -> Result<RuleRun, FrameError> {
         let decisions = decide(&self.frame, &self.arrived, rule);
         let accuracy = count_errors(&self.frame, &decisions);
         let work = tile_work(&self.frame, &decisions, reuse);
         let misses = self.misses(&work, &decisions, reuse, config)?;
         let reads = rule.reads();
-        let (comparison, cycles) = match timing {
-            Timing::ClosedForm => (self.compare(&work, &misses, reads, config), None),
-            Timing::Cycle => {
-                let model = Model {
-                    frame: &self.frame,
-                    reads,
-                    rows: &self.rows,
-                    config,
-                };
+        let (comparison, cycles) = match traced {
+            None => (self.compare(&work, &misses, reads, config), None),
+            Some(traced) => {
+                let model = self.model(reads, config);
                 let decided = (decisions.as_slice(), reuse);
                 let (comparison, cycles) =
-                    timed::compare(self.source, &model, decided, &work, &misses)?;
+                    timed::compare(self.source, &model, decided, &work, &misses, traced)?;
                 (comparison, Some(cycles))
             }
         };

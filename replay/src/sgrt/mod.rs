@@ -36,7 +36,7 @@ pub mod rows;
 pub mod rules;
 pub mod run;
 pub mod srp;
-mod timed;
+pub mod timed;
 pub mod timing;
 pub mod tni;
 pub mod variations;

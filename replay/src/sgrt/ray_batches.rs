@@ -12,46 +12,64 @@ use formats::raytrace::{BvhSummary, RayTile, Visit};
 use formats::view::Eye;
 use std::ops::Range;
 
-/// The batches of a frame in one way: tiles in order, left before right, pixels assigned to the units round robin.
+/// The batches of one or both eyes in one way: tiles in order, left before right, pixels assigned to the units round
+/// robin.
 ///
 /// A warp consists of rays of one class and unit. The rays of a tile are all available at once, as in the closed form:
 /// a shadow ray does not wait for the shading of its parent's hit.
 pub(super) struct RayBatches<'a> {
-    pub source: &'a dyn RaySource,
-    pub model: &'a Model<'a>,
-    pub way: Way,
-    pub decisions: &'a [Decision],
-    pub reuse: Reuse,
-    pub work: &'a [TileWork],
-    pub machine: &'a Machine,
-    /// Tile and eye of the next batch.
-    next: (u32, Eye),
+    source: &'a dyn RaySource,
+    model: &'a Model<'a>,
+    way: Way,
+    /// Of every right sample; not used for the reference.
+    decisions: &'a [Decision],
+    reuse: Reuse,
+    work: &'a [TileWork],
+    machine: &'a Machine,
+    eyes: &'a [Eye],
+    /// Number of the next batch.
+    next: usize,
     tile: RayTile,
     /// Rays of the batch by unit and class, as ranges of its requests.
     rays: Vec<[Vec<Range<usize>>; 3]>,
 }
 
 impl<'a> RayBatches<'a> {
-    /// All batches.
-    pub fn new(
+    /// The batches of the reference.
+    pub(super) fn reference(
         source: &'a dyn RaySource,
         model: &'a Model<'a>,
-        way: Way,
-        (decisions, reuse): (&'a [Decision], Reuse),
         work: &'a [TileWork],
         machine: &'a Machine,
+        eyes: &'a [Eye],
     ) -> Self {
         Self {
             source,
             model,
+            way: Way::Reference,
+            decisions: &[],
+            reuse: Reuse::Primary,
+            work,
+            machine,
+            eyes,
+            next: 0,
+            tile: RayTile::default(),
+            rays: vec![Default::default(); machine.units],
+        }
+    }
+
+    /// The batches of both eyes in a way that reprojects.
+    pub(super) fn reprojected(
+        self,
+        way: Way,
+        decisions: &'a [Decision],
+        reuse: Reuse,
+    ) -> RayBatches<'a> {
+        Self {
             way,
             decisions,
             reuse,
-            work,
-            machine,
-            next: (0, Eye::Left),
-            tile: RayTile::default(),
-            rays: vec![Default::default(); machine.units],
+            ..self
         }
     }
 
@@ -64,9 +82,11 @@ impl<'a> RayBatches<'a> {
         let mut at = 0usize;
         let pixels = self.tile.pixels.iter().zip(frame.tile_samples(tile));
         for (turn, (pixel, sample)) in pixels.enumerate() {
-            let decision = &self.decisions[sample];
+            let decision = self.decisions.get(sample).filter(|_| !is_complete);
             let rays = &mut self.rays[turn % self.machine.units];
-            if !is_complete && decision.tests > 0 {
+            if let Some(decision) = decision
+                && decision.tests > 0
+            {
                 let first = batch.requests.len();
                 for test in 0..u32::from(decision.tests) {
                     batch.requests.push(retest(decision, test, bvh, line_bytes));
@@ -78,7 +98,7 @@ impl<'a> RayBatches<'a> {
                 let visits = self.tile.visits.get(at..end).unwrap_or(&[]);
                 at = end;
                 let class = RayClass::of(ray);
-                if is_complete || is_traced(decision, class, self.reuse) {
+                if decision.is_none_or(|decision| is_traced(decision, class, self.reuse)) {
                     let first = batch.requests.len();
                     let requests = visits.iter().map(|visit| request(*visit, bvh, line_bytes));
                     batch.requests.extend(requests);
@@ -128,14 +148,12 @@ impl BatchSource for RayBatches<'_> {
     type Error = FrameError;
 
     fn next(&mut self, batch: &mut Batch) -> Result<bool, FrameError> {
-        let (tile, eye) = self.next;
-        let Some(work) = self.work.get(tile as usize) else {
+        let (tile, eye) = (self.next / self.eyes.len(), self.next % self.eyes.len());
+        let Some(work) = self.work.get(tile) else {
             return Ok(false);
         };
-        self.next = match eye {
-            Eye::Left => (tile, Eye::Right),
-            Eye::Right => (tile + 1, Eye::Left),
-        };
+        let (tile, eye) = (tile as u32, self.eyes[eye]);
+        self.next += 1;
         self.source
             .tile(eye, tile, &mut self.tile)
             .map_err(|source| FrameError::Tile { eye, tile, source })?;

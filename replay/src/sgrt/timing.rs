@@ -29,24 +29,34 @@ impl Timing {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct CycleTiming {
-    /// With reprojection.
+    /// Both eyes with reprojection.
     pub reprojected: FrameTiming,
     /// Both eyes completely traced.
     pub reference: FrameTiming,
+    /// The left eye alone, completely traced.
+    pub left: FrameTiming,
+    /// The right eye alone, completely traced.
+    pub right: FrameTiming,
     /// Relative performance by the closed form.
     pub closed_form_relative_performance: f64,
     /// Relative energy by the closed form.
     pub closed_form_relative_energy: f64,
 }
 
-/// A frame in the cycle-level model.
+/// One or both eyes in the cycle-level model.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct FrameTiming {
-    /// Tiles of the left eye.
-    pub left: EyeTiming,
-    /// Tiles of the right eye.
-    pub right: EyeTiming,
+    /// Unit cycles in which tiles are traced, without waits for a tile buffer.
+    pub cycles: u64,
+    /// The same by the closed form.
+    pub closed_form_cycles: u64,
+    /// By the closed form with the misses of this simulation.
+    pub closed_form_cycles_same_misses: u64,
+    /// Deviation of `closed_form_cycles` from `cycles`.
+    pub closed_form_error_pct: f64,
+    /// The scarcest resource by the closed form.
+    pub closed_form_bottleneck: String,
     /// Unit cycles until the last ray has returned, including waits for a tile buffer.
     pub unit_cycles: u64,
     /// Unit cycles until the last tile is shaded and transferred.
@@ -61,32 +71,13 @@ pub struct FrameTiming {
     pub requests: u64,
     /// Requests whose data reached a pipeline.
     pub answers: u64,
-}
-
-/// All tiles of an eye in the cycle-level model. Rays of successive tiles overlap, so counts at their borders may belong
-/// to the previous tile.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct EyeTiming {
-    /// Rays returned.
-    pub rays: u64,
-    /// Unit cycles in which the tiles are traced, without waits for a tile buffer.
-    pub cycles: u64,
-    /// The same by the closed form.
-    pub closed_form_cycles: u64,
-    /// By the closed form with the misses of this simulation.
-    pub closed_form_cycles_same_misses: u64,
-    /// Deviation of `closed_form_cycles` from `cycles`.
-    pub closed_form_error_pct: f64,
-    /// The scarcest resource by the closed form.
-    pub closed_form_bottleneck: String,
     /// Occupied share of the traversal pipelines' cycles.
     pub traversal_utilisation_pct: f64,
     /// Occupied share of the intersection pipelines' cycles.
     pub intersection_utilisation_pct: f64,
     /// Shares of the units' cycles in which no pipeline is occupied, by cause.
     pub idle: IdlePct,
-    /// Mean cycles from a ray's acceptance to its return.
+    /// Mean cycles from the acceptance of a ray to its return.
     pub mean_ray_cycles: f64,
     /// Share of node cache look-ups without a fetch; merging with a fetch in flight counts as such.
     pub node_l1_hit_pct: f64,

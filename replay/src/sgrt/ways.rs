@@ -51,10 +51,8 @@ pub(super) struct Batch {
 pub(super) struct WayRun {
     /// Cost of the frame.
     pub run: Run,
-    /// Unit cycles by eye and resource.
-    pub tni: [TniCycles; 2],
-    /// Unit cycles by eye.
-    pub tni_cycles: [f64; 2],
+    /// Unit cycles of the right eye.
+    pub right_tni_cycles: f64,
 }
 
 /// The inputs that all batches share.
@@ -123,12 +121,26 @@ impl Model<'_> {
             let batches = self.batches(way, tile as u32, work);
             for (eye, (batch, misses)) in batches.iter().zip(misses(tile)).enumerate() {
                 let tni = self.add(&mut out.run, batch, &misses);
-                out.tni[eye].add(&tni);
-                out.tni_cycles[eye] += tni.total();
+                if eye == Eye::Right as usize {
+                    out.right_tni_cycles += tni.total();
+                }
             }
         }
         out.run.energy = energy::energy(&out.run, &self.frame.tables.bvh, self.config);
         out
+    }
+
+    /// Unit cycles of an eye, completely traced, by resource and in all. `misses` by tile.
+    pub(super) fn eye(&self, eye: Eye, work: &[TileWork], misses: &[Misses]) -> (TniCycles, f64) {
+        let tree = self.frame.tables.bvh.traversal;
+        let (mut sum, mut total) = (TniCycles::default(), 0.0);
+        for (tile, (work, misses)) in (0u32..).zip(work.iter().zip(misses)) {
+            let batch = self.batches(Way::Reference, tile, work)[eye as usize];
+            let cycles = tni::cycles(&batch.work, misses, tree, self.config);
+            sum.add(&cycles);
+            total += cycles.total();
+        }
+        (sum, total)
     }
 
     /// Adds a batch to a run, and returns its unit cycles.
@@ -192,12 +204,11 @@ pub fn compare(
 
 /// The comparison of the three ways, in the order of [`Way::ALL`].
 pub(super) fn comparison([reference, reprojected, whole_screen]: &[WayRun; 3]) -> Comparison {
-    let right = Eye::Right as usize;
     Comparison {
         reference: reference.run,
         reprojected: reprojected.run,
         whole_screen: whole_screen.run,
-        right_full_tni_cycles: reference.tni_cycles[right],
-        right_tni_cycles: reprojected.tni_cycles[right],
+        right_full_tni_cycles: reference.right_tni_cycles,
+        right_tni_cycles: reprojected.right_tni_cycles,
     }
 }
