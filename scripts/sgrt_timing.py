@@ -1,11 +1,11 @@
-"""Tables of docs/results/sgrt-timing.md from what scripts/sgrt-timing.sh measured: sgrt_timing.py RESULTS SCENE..."""
+"""Tables of docs/results/sgrt-timing.md from what scripts/sgrt-timing.sh measured: sgrt_timing.py RESULTS SCENES_BEYOND SCENE..."""
 
 import csv
 import json
 import sys
 from pathlib import Path
 
-results, scenes = sys.argv[1], sys.argv[2:]
+results, beyond, scenes = sys.argv[1], sys.argv[2].split(), sys.argv[3:]
 
 
 def read(name):
@@ -55,17 +55,11 @@ write("sgrt-timing-performance", "replay reproject --timing cycle --json",
 
 table = []
 for name in ["default", *Path("variants").read_text().splitlines()]:
-    reports = default if name == "default" else {scene: read(f"variant,{name},{scene}.json") for scene in scenes}
-    pairs = [(report["plain"]["cycles"][eye], f"{scene}, {eye}") for scene, report in reports.items() for eye in ("left", "right")]
-    errors = [(pair["closed_form_error_pct"], label) for pair, label in pairs]
-    worst = max(errors, key=lambda pair: abs(pair[0]))
-    mean = lambda value: sum(map(value, (pair for pair, _ in pairs))) / len(pairs)
-    table.append([name, one(sum(error for error, _ in errors) / len(errors)), f"{worst[0]:.1f} ({worst[1]})", sum(abs(error) > 10 for error, _ in errors),
-                  len(errors), one(mean(lambda p: p["traversal_utilisation_pct"])), one(mean(lambda p: p["idle"]["no_ray"])),
-                  millions(sum(pair["cycles"] for pair, _ in pairs)), millions(sum(pair["requests"] for pair, _ in pairs))])
-write("sgrt-timing-causes", "replay reproject --rule none --timing cycle --config FILE --json",
-      ["machine", "closed form off by %, mean", "worst pair", "pairs beyond 10 %", "of", "traversal used %", "idle %: no ray", "unit cycles of all pairs M",
-       "requests M"], table)
+    reports = {scene: default[scene] if name == "default" else read(f"variant,{name},{scene}.json") for scene in beyond}
+    pairs = [report["result"]["cycles"][eye] for report in reports.values() for eye in ("left", "right")]
+    table.append([name, *(one(pair["closed_form_error_pct"]) for pair in pairs)])
+write("sgrt-timing-causes", "replay reproject --timing cycle --config FILE --json",
+      ["machine: closed form off by %", *(f"{scene}, {eye}" for scene in beyond for eye in ("left", "right"))], table)
 
 table = []
 for line in Path("times").read_text().splitlines():

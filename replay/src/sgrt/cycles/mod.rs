@@ -25,8 +25,8 @@
 //! 5. Each unit accepts rays into its lowest free slots.
 //!
 //! A ray that continues requests all lines of its next node or triangle. If all are in the L1, it queues for a pipeline.
-//! Otherwise it waits, outside the pipelines, for the last line (Lee et al., "SGRT", HPG 2013, call the buffer of
-//! these rays the ray accumulation unit), and then queues. A ray whose miss finds all MSHRs in use waits for a free one.
+//! Otherwise it waits, outside the pipelines, for the last line (the ray accumulation unit of Nah et al., "T&I
+//! Engine", SIGGRAPH Asia 2011), and then queues. A ray whose miss finds all MSHRs in use waits for a free one.
 
 mod batch;
 mod calendar;
