@@ -63,12 +63,12 @@ write("sgrt-timing-causes", "replay reproject --timing cycle --config FILE --jso
 
 table = []
 for line in Path("times").read_text().splitlines():
-    scene, milliseconds = line.split()
+    scene, seconds = line.split()
+    seconds = float(seconds)
     runs, plain = default[scene]["result"]["cycles"], default[scene]["plain"]["cycles"]
     # The reference and each eye alone once; per rule, reprojection with both kinds of G-buffer.
     simulated = [runs["reference"], runs["left"], runs["right"], *[runs["reprojected"]] * 2, *[plain["reprojected"]] * 2]
     rays, requests = (sum(run[key] for run in simulated) for key in ("rays_left", "requests"))
-    seconds = int(milliseconds) / 1e3
     table.append([scene, millions(rays), one(requests / rays), f"{seconds:.1f}", f"{rays / seconds / 1e6:.2f}", f"{seconds / rays * 1e6:.2f}"])
 write("sgrt-timing-speed", "replay reproject --timing cycle --threads 1 --json, the whole command",
-      ["scene", "rays simulated M", "requests per ray", "seconds", "M rays per second", "seconds per million rays"], table)
+      ["scene", "rays simulated M", "requests per ray", "processor seconds", "M rays per second", "seconds per million rays"], table)
