@@ -92,6 +92,11 @@ SGRT = {
     "energy.sram_pj_per_byte": ("energy per byte, tile G-buffer", "45 nm, 8 KB SRAM"),
     "energy.dram_pj_per_byte": ("energy per byte, DRAM", "45 nm: 1.3 nJ per 64 bits, the lower end"),
     "energy.static_mw": ("leakage and clocks, mW", PLACEHOLDER),
+    "cycles.warp_rays": ("rays in lock step, only for `--timing cycle`; 1: single rays", "MIMD units (paper, reference 8)"),
+    "cycles.l1_mshrs": ("lines in flight per node or triangle cache, only for `--timing cycle`", PLACEHOLDER),
+    "cycles.l2_mshrs": ("lines in flight into the L2, only for `--timing cycle`", PLACEHOLDER),
+    "cycles.tile_buffers": ("tiles from dispatch to the end of shading, only for `--timing cycle`", PLACEHOLDER),
+    "cycles.in_order_return": ("a unit returns rays in order of dispatch, only for `--timing cycle`", PLACEHOLDER),
 }
 
 

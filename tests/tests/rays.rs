@@ -1,6 +1,6 @@
 //! Ray traces from end to end: scene -> `tracegen rays` -> `.raytrace` -> `replay reproject`.
 
-use parallax_tests::{program, real_scene, root, run_ok};
+use parallax_tests::{program, real_scene, refuse, root, run_ok};
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
@@ -66,6 +66,69 @@ fn a_reprojection_prints_the_same_bytes_over_threads() {
     let golden = root().join("traces/teapot-rays.raytrace");
     let [one, two] = ["1", "2"].map(|n| reproject_json(&golden, &["--threads", n]));
     assert!(one == two);
+}
+
+/// The built-in teapot with the addresses that its rays visit.
+fn teapot_with_visits(folder: &tempfile::TempDir) -> std::path::PathBuf {
+    let path = folder.path().join("teapot.raytrace");
+    let mut command = program("tracegen");
+    command.args(["rays", "teapot", "--size", "96x96", "--visits", "-o"]);
+    run_ok(command.arg(&path));
+    path
+}
+
+#[test]
+fn the_cycle_level_model_conserves_rays_and_requests_and_is_compared_with_the_closed_form() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = teapot_with_visits(&folder);
+    let closed = reproject(&path, &[]);
+    let timed = reproject(&path, &["--timing", "cycle"]);
+    assert_eq!(closed["config"]["timing"], "closed-form");
+    assert_eq!(timed["config"]["timing"], "cycle");
+    assert!(closed["result"].get("cycles").is_none());
+    let cycles = &timed["result"]["cycles"];
+    let count = |run: &str, name: &str| {
+        let value = cycles[run][name].as_u64();
+        value.unwrap_or_else(|| panic!("cycles.{run}.{name} is missing"))
+    };
+    for run in ["left", "right", "reference", "reprojected"] {
+        assert!(count(run, "rays_entered") > 9000, "{run}");
+        assert_eq!(count(run, "rays_entered"), count(run, "rays_left"), "{run}");
+        assert_eq!(count(run, "requests"), count(run, "answers"), "{run}");
+        let ratio = count(run, "closed_form_cycles") as f64 / count(run, "cycles") as f64;
+        assert!((0.5..1.5).contains(&ratio), "{run}: {ratio}");
+    }
+    let reference = &timed["result"]["reference_work"];
+    let visits = ["steps", "triangle_tests"].map(|name| reference[name].as_u64().expect("a count"));
+    assert_eq!(count("reference", "requests"), visits[0] + visits[1]);
+    assert_eq!(
+        cycles["closed_form_relative_performance"],
+        closed["result"]["relative_performance"]
+    );
+    assert_eq!(timed["result"]["flip_mean"], closed["result"]["flip_mean"]);
+}
+
+#[test]
+fn the_cycle_level_model_prints_the_same_bytes_over_threads() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = teapot_with_visits(&folder);
+    let [one, two, eight] = ["1", "2", "8"]
+        .map(|n| reproject_json(&path, &["--timing", "cycle", "--threads", n]));
+    assert!(one == two && one == eight);
+}
+
+#[test]
+fn the_cycle_level_model_refuses_what_it_does_not_support() {
+    let golden = root().join("traces/teapot-rays.raytrace");
+    let with = |options: &[&str]| {
+        let mut command = program("replay");
+        command.arg("reproject").arg(&golden);
+        command.args(["--timing", "cycle"]).args(options);
+        command
+    };
+    refuse(&mut with(&[]), &["teapot-rays.raytrace", "--visits"]);
+    refuse(&mut with(&["--curve"]), &["--curve", "closed-form"]);
+    refuse(&mut with(&["--sensitivity"]), &["--sensitivity", "closed-form"]);
 }
 
 #[test]

@@ -14,6 +14,7 @@ use crate::sgrt::loaded::{LoadedTrace, RuleRun};
 use crate::sgrt::presets::{self, Preset};
 use crate::sgrt::result::{Config, Report, SCHEMA};
 use crate::sgrt::rules::{self, Rule};
+use crate::sgrt::timing::Timing;
 use crate::sgrt::variations::curve_rules;
 use crate::sgrt::{DEFAULT_RULE, picture};
 use anyhow::{Context, ensure};
@@ -30,6 +31,7 @@ use std::process::ExitCode;
   replay reproject teapot.raytrace
   replay reproject teapot.raytrace --preset sgrt-paper
   replay reproject teapot.raytrace --rule none --image plain.png --json
+  replay reproject teapot.raytrace --timing cycle
   replay reproject *.raytrace --html out/reprojection.html
   replay reproject chess.raytrace --curve --sensitivity --html chess.html")]
 pub struct ReprojectArgs {
@@ -43,6 +45,9 @@ pub struct ReprojectArgs {
     /// Values that a reprojected pixel reuses [default: primary]
     #[arg(long, value_enum)]
     reuse: Option<Reuse>,
+    /// Model of the units' time
+    #[arg(long, value_enum, default_value_t)]
+    timing: Timing,
     /// TOML file with model parameters; others keep their defaults
     #[arg(long, value_name = "TOML")]
     config: Option<PathBuf>,
@@ -121,6 +126,7 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
         "--image: expected one FILE, found {}",
         args.files.len()
     );
+    check_timing(&args)?;
     // Report a wrong --as before the replays.
     paper::values("", "", &args.paper_scenes)?;
     let prints = check_outputs(&args)?;
@@ -177,6 +183,7 @@ pub fn rows(arguments: &[String], parameters: Option<&str>) -> anyhow::Result<Ta
             SgrtConfig::from_layers(&[named, text]).context("config")?
         }
     };
+    check_timing(&args)?;
     paper::values("", "", &args.paper_scenes)?;
     let entries = args
         .files
@@ -184,6 +191,18 @@ pub fn rows(arguments: &[String], parameters: Option<&str>) -> anyhow::Result<Ta
         .map(|path| report_on(path, &args, &config));
     let entries: Vec<Entry> = entries.collect::<anyhow::Result<_>>()?;
     Ok(report::rows(&entries))
+}
+
+/// Refuses options that only the closed form supports.
+fn check_timing(args: &ReprojectArgs) -> anyhow::Result<()> {
+    for (option, is_given) in [("--curve", args.curve), ("--sensitivity", args.sensitivity)] {
+        ensure!(
+            !is_given || args.timing == Timing::ClosedForm,
+            "{option}: expected --timing closed-form, found --timing {}",
+            args.timing.name()
+        );
+    }
+    Ok(())
 }
 
 /// Checks the outputs before the replays; returns true if the result is to be printed.
@@ -220,10 +239,15 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
     let in_file = || path.display().to_string();
     let loaded = LoadedTrace::load(&file).with_context(in_file)?;
     let (rule, reuse) = (args.rule()?, args.reuse());
-    let ours = loaded.run(&rule, reuse, config).with_context(in_file)?;
-    let plain = loaded
-        .run(&Rule::default(), reuse, config)
-        .with_context(in_file)?;
+    let traced = match args.timing {
+        Timing::ClosedForm => None,
+        Timing::Cycle => Some(loaded.traced_timing(config).with_context(in_file)?),
+    };
+    let run = |rule: &Rule| {
+        let run = loaded.run_timed(rule, reuse, config, traced.as_ref());
+        run.with_context(in_file)
+    };
+    let (ours, plain) = (run(&rule)?, run(&Rule::default())?);
     if let Some(image) = &args.image {
         write_atomically(image, &png::encode(&triptych(&ours))?)?;
     }
@@ -241,6 +265,7 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
             rule,
             reuse,
             cache_misses: loaded.cache_misses().to_owned(),
+            timing: args.timing,
             model: config.clone(),
         },
         paper: paper::values(scene, scene_name(scene), &args.paper_scenes)?,

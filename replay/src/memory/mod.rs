@@ -26,7 +26,7 @@ pub use access::{Access, Client};
 pub use cache::Cache;
 pub use fast::Forest;
 pub use hierarchy::{Answer, Caches, Found, Hierarchy, MissPath, OtherWork, SecondLevel};
-pub use in_flight::{AllocateOnMiss, Delay, DelayedFill, NOT_IN_FLIGHT};
+pub use in_flight::{AllocateOnMiss, Delay, DelayedFill, LimitedMshrs, NOT_IN_FLIGHT};
 pub use policy::{AnyCache, AnyWays, FourWayLru, Lru, MakePolicy, Policy, Replacement, WaysOf};
 pub use prefetch::Prefetching;
 

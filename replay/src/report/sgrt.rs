@@ -1,6 +1,7 @@
 //! Tables, charts, CSV and page of stereo reprojection on a ray-tracing GPU.
 
 mod charts;
+mod cycle_table;
 mod tables;
 
 use crate::paper::sgrt as paper;
@@ -184,6 +185,9 @@ pub fn text(entries: &[Entry]) -> String {
     part("Reuse and image error", tables::accuracy(entries).text());
     part("Right pixels by class", tables::classes(entries).text());
     part("Bytes moved", tables::traffic(entries).text());
+    if let Some(table) = cycle_table::units(entries) {
+        part(cycle_table::TITLE, table.text());
+    }
     for entry in entries {
         let scene = tables::scene_name(&entry.report);
         if !entry.report.curve.is_empty() {
@@ -234,6 +238,7 @@ fn accuracy(entries: &[Entry]) -> Markup {
 fn hardware(entries: &[Entry]) -> Markup {
     html! {
         (tables::work(entries).markup())
+        @if let Some(table) = cycle_table::units(entries) { (table.markup()) }
         (tables::traffic(entries).markup())
         (tables::energy(entries).markup())
     }

@@ -23,6 +23,8 @@ pub struct SgrtConfig {
     pub gbuffer: Gbuffer,
     /// Energy per operation.
     pub energy: Energy,
+    /// What only the cycle-level model of the units uses.
+    pub cycles: Cycles,
 }
 
 /// Fixed-function traversal and intersection.
@@ -174,6 +176,24 @@ pub enum RowStorage {
     Dram,
     /// On chip: the left eye's bands of tiles alternate with the right eye's, so that only the rows of a few bands are alive.
     Chip,
+}
+
+/// Parameters that only the cycle-level model of the units uses (`--timing cycle`).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[serde(deny_unknown_fields)]
+pub struct Cycles {
+    /// Rays that advance in lock step; 1 for single rays.
+    pub warp_rays: u32,
+    /// Lines that each node or triangle cache can have in flight.
+    pub l1_mshrs: u32,
+    /// Lines that the L2 can have in flight.
+    pub l2_mshrs: u32,
+    /// Tiles that are between the dispatch of their first ray and the end of their shading.
+    pub tile_buffers: u32,
+    /// True if a unit returns its rays in order of dispatch; a finished ray then keeps its slot until all earlier ones
+    /// have returned.
+    pub in_order_return: bool,
 }
 
 /// Energy per operation and per byte.

@@ -1,5 +1,6 @@
 //! A stereo frame of a ray trace: the hit of each pixel and the cost of its rays.
 
+use super::cycles::Unbalanced;
 use super::work::PixelWork;
 use formats::raytrace::camera::sample_position_px;
 use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
@@ -63,6 +64,14 @@ pub enum FrameError {
         /// Lines of all nodes and triangles.
         lines: u64,
     },
+    /// The cycle-level model needs the addresses that rays visit.
+    #[error(
+        "--timing cycle: expected a trace with the visits of its rays (tracegen rays --visits), found a trace without"
+    )]
+    NoVisits,
+    /// A defect of the cycle-level model.
+    #[error(transparent)]
+    Unbalanced(#[from] Unbalanced),
     /// A tile with a wrong number of pixel records.
     #[error("{eye} eye, tile {tile}: expected {expected} pixel records, found {found}")]
     Pixels {

@@ -1,24 +1,13 @@
-//! The hardware model: a frame with both eyes completely traced, and with reprojection.
-//!
-//! Units, cores and memory form a pipeline over tiles: while the units trace a tile, the cores shade the
-//! previous one and DMA fetches the rows of the next. A batch (a tile of one eye) therefore takes the
-//! maximum of the three, and a frame the sum over its batches.
+//! The work and the cache misses of each tile, with both eyes completely traced and with reprojection.
 
 use super::cache::{self, DeviceCaches, Misses};
 use super::compose::Reuse;
 use super::config::SgrtConfig;
 use super::detect::Decision;
-use super::dram::DramBytes;
-use super::energy;
 use super::frame::{Frame, FrameError, RaySource};
-use super::gbuffer::{self, Keeping, RightTile, Traffic};
-use super::reads::Reads;
-use super::rows::RowNeeds;
 use super::run::Run;
-use super::srp;
-use super::tni;
 use super::work::{BatchWork, RayClass};
-use formats::raytrace::{RayTile, Visit};
+use formats::raytrace::{BvhSummary, RayRecord, RayTile, Visit};
 use formats::view::Eye;
 use rayon::prelude::*;
 
@@ -120,7 +109,7 @@ fn add_right(frame: &Frame, decision: &Decision, i: usize, reuse: Reuse, batch: 
 }
 
 /// True if rays of a class are traced for a right sample.
-fn is_traced(decision: &Decision, class: RayClass, reuse: Reuse) -> bool {
+pub(super) fn is_traced(decision: &Decision, class: RayClass, reuse: Reuse) -> bool {
     match class {
         _ if !decision.class.is_reused() => true,
         RayClass::Primary => false,
@@ -163,6 +152,48 @@ pub(super) fn misses_by_rates(
     work.par_iter().map(tile).collect()
 }
 
+/// Misses of one eye, completely traced on its own, by tile number.
+///
+/// # Errors
+/// [`FrameError`] for an unreadable tile.
+pub(super) fn misses_of_eye(
+    source: &dyn RaySource,
+    frame: &Frame,
+    eye: Eye,
+    config: &SgrtConfig,
+) -> Result<Vec<Misses>, FrameError> {
+    let bvh = &frame.tables.bvh;
+    check_lines(bvh, config)?;
+    let mut caches = DeviceCaches::new(config);
+    let mut data = RayTile::default();
+    let mut out = vec![Misses::default(); frame.tables.tile_count() as usize];
+    for (tile, misses) in (0u32..).zip(&mut out) {
+        source
+            .tile(eye, tile, &mut data)
+            .map_err(|source| FrameError::Tile { eye, tile, source })?;
+        let mut visits = data.visits.iter();
+        for (turn, pixel) in data.pixels.iter().enumerate() {
+            let rays = data.rays_of(pixel).iter();
+            let count: u64 = rays.map(RayRecord::visit_count).sum();
+            for &visit in visits.by_ref().take(count as usize) {
+                caches.visit(turn, visit, bvh, misses);
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// Checks that the lines of a hierarchy can be numbered.
+pub(super) fn check_lines(bvh: &BvhSummary, config: &SgrtConfig) -> Result<(), FrameError> {
+    let last = bvh.triangles.checked_sub(1);
+    let end = last.map_or(0, |last| bvh.address(Visit::Triangle(last as u32)));
+    let lines = (end + u64::from(bvh.bytes_per_triangle)) / config.cache.line_bytes;
+    if lines >= DeviceCaches::MOST_LINES {
+        return Err(FrameError::Lines { lines });
+    }
+    Ok(())
+}
+
 /// Misses of the addresses in the trace, simulated in the configured caches: tiles in order, left before
 /// right, pixels assigned to the units round robin. The triangle of a re-test counts by hit rate, because
 /// its address is not in the trace.
@@ -178,12 +209,7 @@ pub(super) fn misses_by_addresses(
     config: &SgrtConfig,
 ) -> Result<Vec<TileMisses>, FrameError> {
     let bvh = &frame.tables.bvh;
-    let last = bvh.triangles.checked_sub(1);
-    let end = last.map_or(0, |last| bvh.address(Visit::Triangle(last as u32)));
-    let lines = (end + u64::from(bvh.bytes_per_triangle)) / config.cache.line_bytes;
-    if lines >= DeviceCaches::MOST_LINES {
-        return Err(FrameError::Lines { lines });
-    }
+    check_lines(bvh, config)?;
     let [mut reference, mut reprojected] = [(); 2].map(|()| DeviceCaches::new(config));
     let mut tile_data = RayTile::default();
     let mut out = vec![TileMisses::default(); work.len()];
@@ -221,119 +247,6 @@ pub(super) fn misses_by_addresses(
         misses.right.add(&cache::by_rates(&retests, bvh, config));
     }
     Ok(out)
-}
-
-/// Runs the three ways through the models of units, cores, memory and energy.
-#[must_use]
-pub fn compare(
-    frame: &Frame,
-    work: &[TileWork],
-    misses: &[TileMisses],
-    reads: Reads,
-    rows: &RowNeeds,
-    config: &SgrtConfig,
-) -> Comparison {
-    let model = Model { frame, config };
-    let g = &config.gbuffer;
-    let [mut reference, mut reprojected, mut whole_screen] = [Run::default(); 3];
-    let (mut right_full, mut right) = (0.0, 0.0);
-    for ((tile, work), misses) in (0u32..).zip(work).zip(misses) {
-        let (_, [width, height]) = frame.tables.tile_rect(tile);
-        let pixels = u64::from(width) * u64::from(height);
-        let [band, band_and_beside] = rows.of_tile(frame, tile);
-        let right_tile = RightTile {
-            tested: work.right.detected,
-            reused: work.right.reused,
-            fetched_bytes: reads.fetched_bytes(g, band, band_and_beside, u64::from(width)),
-            row_read_bytes: row_read_bytes(&work.right, config),
-        };
-        let plain_left = BatchWork {
-            reprojected: 0,
-            ..work.left
-        };
-        let batch = |run: &mut Run, work: &BatchWork, misses: &Misses, traffic| {
-            model.add(run, work, misses, traffic, pixels)
-        };
-        let none = Traffic::default();
-        batch(&mut reference, &plain_left, &misses.left_full, none);
-        right_full += batch(&mut reference, &work.right_full, &misses.right_full, none);
-        for (run, keeping) in [
-            (&mut whole_screen, Keeping::Screen),
-            (&mut reprojected, Keeping::Tile),
-        ] {
-            let left = gbuffer::left_tile(work.left.reprojected, keeping, reads, g);
-            batch(run, &work.left, &misses.left, left);
-            let traffic = gbuffer::right_tile(&right_tile, keeping, reads, g);
-            let cycles = batch(run, &work.right, &misses.right, traffic);
-            if keeping == Keeping::Tile {
-                right += cycles;
-            }
-        }
-    }
-    let [reference, reprojected, whole_screen] =
-        [reference, reprojected, whole_screen].map(|run| Run {
-            energy: energy::energy(&run, &frame.tables.bvh, config),
-            ..run
-        });
-    Comparison {
-        reference,
-        reprojected,
-        whole_screen,
-        right_full_tni_cycles: right_full,
-        right_tni_cycles: right,
-    }
-}
-
-/// Bytes that tests against whole rows read from the row buffers: a warp reads each left pixel once for all its lanes.
-fn row_read_bytes(work: &BatchWork, config: &SgrtConfig) -> u64 {
-    if config.srp.row_test_cycles > 0.0 {
-        work.row_tests * u64::from(config.gbuffer.detect_position_bytes)
-            / u64::from(config.srp.lanes_per_core)
-    } else {
-        0
-    }
-}
-
-struct Model<'a> {
-    frame: &'a Frame,
-    config: &'a SgrtConfig,
-}
-
-impl Model<'_> {
-    /// Adds a batch of `pixels` finished pixels to a run, and returns its unit cycles.
-    fn add(
-        &self,
-        run: &mut Run,
-        work: &BatchWork,
-        misses: &Misses,
-        gbuffer: Traffic,
-        pixels: u64,
-    ) -> f64 {
-        let config = self.config;
-        let tni = tni::cycles(work, misses, self.frame.tables.bvh.traversal, config);
-        let srp = srp::cycles(work, config);
-        let dram = DramBytes {
-            hierarchy_bytes: misses.dram_bytes(config.cache.line_bytes).round() as u64,
-            gbuffer_bytes: gbuffer.dram_bytes,
-            shading_bytes: (work.shaded as f64 * config.memory.shading_bytes).round() as u64,
-            frame_buffer_bytes: pixels * u64::from(config.memory.frame_buffer_bytes),
-        };
-        run.work.add(work);
-        run.misses.add(misses);
-        run.tni.add(&tni);
-        run.tni_cycles += tni.total();
-        run.srp.add(&srp);
-        run.on_chip_bytes += gbuffer.on_chip_bytes;
-        run.dram.add(&dram);
-        let tni_ns = tni.total() * 1e3 / config.tni.clock_mhz;
-        let srp_ns = srp.total() * 1e3 / config.srp.clock_mhz;
-        let dram_ns = dram.time_ns(config);
-        run.time_ns += tni_ns.max(srp_ns).max(dram_ns);
-        if dram_ns > tni_ns.max(srp_ns) {
-            run.memory_bound_ns += dram_ns;
-        }
-        tni.total()
-    }
 }
 
 #[cfg(test)]

@@ -6,13 +6,15 @@ use super::config::{RowStorage, SgrtConfig};
 use super::detect::{Decision, decide};
 use super::frame::{Frame, FrameError, RaySource};
 use super::hardware::{
-    Comparison, TileMisses, TileWork, compare, misses_by_addresses, misses_by_rates, tile_work,
+    Comparison, TileMisses, TileWork, misses_by_addresses, misses_by_rates, tile_work,
 };
 use super::reads::Reads;
 use super::reproject::{Reprojection, reproject};
 use super::result::{ImageError, Outcome};
 use super::rows::RowNeeds;
 use super::rules::Rule;
+use super::timed::{self, TracedTiming};
+use super::ways::{Model, compare};
 use formats::view::Eye;
 use image_error::flip::{FlipMap, Prepared};
 use image_error::{Picture, pixels_per_degree, psnr, ssim};
@@ -95,7 +97,7 @@ impl<'a> LoadedTrace<'a> {
         }
     }
 
-    /// Runs the model with a rule and a level of reuse.
+    /// Runs the closed form with a rule and a level of reuse.
     ///
     /// # Errors
     /// [`FrameError`] for a tile whose addresses cannot be read.
@@ -105,12 +107,54 @@ impl<'a> LoadedTrace<'a> {
         reuse: Reuse,
         config: &SgrtConfig,
     ) -> Result<RuleRun, FrameError> {
+        self.run_timed(rule, reuse, config, None)
+    }
+
+    /// Simulates the units cycle by cycle without reprojection, for [`Self::run_timed`] with the same `config`.
+    ///
+    /// # Errors
+    /// [`FrameError`] for a trace without visits or for a tile whose addresses cannot be read.
+    pub fn traced_timing(&self, config: &SgrtConfig) -> Result<TracedTiming, FrameError> {
+        let decisions = decide(&self.frame, &self.arrived, &Rule::default());
+        let work = tile_work(&self.frame, &decisions, Reuse::Primary);
+        TracedTiming::new(self.source, &self.model(Reads::NOTHING, config), &work)
+    }
+
+    fn model<'b>(&'b self, reads: Reads, config: &'b SgrtConfig) -> Model<'b> {
+        Model {
+            frame: &self.frame,
+            reads,
+            rows: &self.rows,
+            config,
+        }
+    }
+
+    /// Runs a rule and a level of reuse: with `traced` by the cycle-level model, without by the closed form.
+    ///
+    /// # Errors
+    /// [`FrameError`] for a tile whose addresses cannot be read.
+    pub fn run_timed(
+        &self,
+        rule: &Rule,
+        reuse: Reuse,
+        config: &SgrtConfig,
+        traced: Option<&TracedTiming>,
+    ) -> Result<RuleRun, FrameError> {
         let decisions = decide(&self.frame, &self.arrived, rule);
         let accuracy = count_errors(&self.frame, &decisions);
         let work = tile_work(&self.frame, &decisions, reuse);
         let misses = self.misses(&work, &decisions, reuse, config)?;
         let reads = rule.reads();
-        let comparison = self.compare(&work, &misses, reads, config);
+        let (comparison, cycles) = match traced {
+            None => (self.compare(&work, &misses, reads, config), None),
+            Some(traced) => {
+                let model = self.model(reads, config);
+                let decided = (decisions.as_slice(), reuse);
+                let (comparison, cycles) =
+                    timed::compare(self.source, &model, decided, &work, &misses, traced)?;
+                (comparison, Some(cycles))
+            }
+        };
         let picture = self.picture(&decisions, reuse);
         let flip = self.flip(&picture);
         let error = ImageError {
@@ -120,14 +164,15 @@ impl<'a> LoadedTrace<'a> {
             psnr_db: psnr::psnr_db(&self.truth, &picture),
             ssim: ssim::ssim(&self.truth, &picture),
         };
+        let outcome = Outcome::new(
+            &accuracy,
+            &comparison,
+            &error,
+            reads,
+            self.detection_sram_bytes(reads, config),
+        );
         Ok(RuleRun {
-            outcome: Outcome::new(
-                &accuracy,
-                &comparison,
-                &error,
-                reads,
-                self.detection_sram_bytes(reads, config),
-            ),
+            outcome: Outcome { cycles, ..outcome },
             decisions,
             picture,
             flip,

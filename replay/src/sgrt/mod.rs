@@ -6,8 +6,9 @@
 //! [`rules`]). The others are reused, and the rest is traced ([`compose`]).
 //!
 //! The trace holds both eyes completely traced, so reuse can be compared with the truth ([`accuracy`]), and
-//! the saved work is known for each ray. [`hardware`] combines cycles ([`tni`], [`srp`]), bytes ([`dram`])
-//! and energy ([`energy`]). The share of [`gbuffer`] follows from the fields that a rule [`reads`] and from
+//! the saved work is known for each ray. [`hardware`] sums up work and misses; the module `ways` combines cycles
+//! ([`tni`], [`srp`]), bytes ([`dram`]) and energy ([`energy`]) by the closed form. With [`timing::Timing::Cycle`],
+//! [`cycles`] simulates the units cycle by cycle instead (`ray_batches`: its input; `timed`: its use). The share of [`gbuffer`] follows from the fields that a rule [`reads`] and from
 //! the [`rows`] that hold them. [`loaded`] runs one rule on a trace, [`variations`] many rules or
 //! parameters, [`readings`] every reading of the paper. [`presets`] name whole settings.
 
@@ -15,6 +16,7 @@ pub mod accuracy;
 pub mod cache;
 pub mod compose;
 pub mod config;
+pub mod cycles;
 pub mod detect;
 pub mod dram;
 pub mod energy;
@@ -25,6 +27,7 @@ pub mod loaded;
 pub mod picture;
 pub mod place;
 pub mod presets;
+mod ray_batches;
 pub mod readings;
 pub mod reads;
 pub mod reproject;
@@ -33,8 +36,11 @@ pub mod rows;
 pub mod rules;
 pub mod run;
 pub mod srp;
+pub mod timed;
+pub mod timing;
 pub mod tni;
 pub mod variations;
+mod ways;
 pub mod work;
 
 #[cfg(test)]

@@ -9,6 +9,7 @@ use super::reads::Reads;
 use super::rows::RowSummary;
 use super::rules::Rule;
 use super::run::{EnergyPj, Run};
+use super::timing::{CycleTiming, Timing};
 use crate::paper::sgrt::PaperValues;
 use crate::result::TraceId;
 use serde::{Deserialize, Serialize};
@@ -60,6 +61,9 @@ pub struct Config {
     pub reuse: Reuse,
     /// Source of cache misses: `addresses` of the trace or hit `rates`.
     pub cache_misses: String,
+    /// Model of the units' time.
+    #[serde(default)]
+    pub timing: Timing,
     /// The hardware.
     pub model: SgrtConfig,
 }
@@ -144,6 +148,9 @@ pub struct Outcome {
     pub energy: EnergyPj,
     /// The same with both eyes completely traced.
     pub reference_energy: EnergyPj,
+    /// The cycle-level model, if it was used.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cycles: Option<CycleTiming>,
 }
 
 /// Reprojection without tiles: the whole screen's G-buffer in DRAM.
@@ -312,6 +319,7 @@ impl Outcome {
             },
             energy: run.energy,
             reference_energy: reference.energy,
+            cycles: None,
         }
     }
 }

@@ -35,6 +35,11 @@ impl LimitedMshrs {
         self.free_at.len() >= self.most
     }
 
+    /// The cycle at which the first MSHR in use becomes free.
+    pub fn next_free(&self) -> Option<u64> {
+        self.free_at.peek().map(|&Reverse(at)| at)
+    }
+
     /// The cycle at which a miss at `now` gets an MSHR. Times of successive misses must not
     /// decrease; the returned times do not either.
     pub fn start(&mut self, now: u64) -> u64 {

@@ -8,6 +8,7 @@ use crate::sgrt::accuracy::{Accuracy, ClassCounts};
 use crate::sgrt::compose::Reuse;
 use crate::sgrt::result::{CurvePoint, Outcome, Report, Sensitivity};
 use crate::sgrt::run::EnergyPj;
+use crate::sgrt::timing::Timing;
 
 /// The name of a trace in tables.
 pub fn scene_name(report: &Report) -> String {
@@ -19,8 +20,12 @@ pub fn scene_name(report: &Report) -> String {
 pub(super) fn rule_line(entries: &[Entry]) -> String {
     entries.first().map_or_else(String::new, |entry| {
         let config = &entry.report.config;
+        let timing = match config.timing {
+            Timing::ClosedForm => "",
+            Timing::Cycle => "; units simulated cycle by cycle",
+        };
         format!(
-            "chosen: rule {}, reuse of {}; plain: rule none, every reprojected hit is reused",
+            "chosen: rule {}, reuse of {}; plain: rule none, every reprojected hit is reused{timing}",
             config.rule,
             reuse_name(config.reuse)
         )
@@ -162,6 +167,9 @@ fn identity<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
         }),
         text("cache_misses", "cache misses from", |r| {
             r.report.config.cache_misses.clone()
+        }),
+        text("timing", "timing", |r| {
+            r.report.config.timing.name().to_owned()
         }),
         text("run", "rule", |r| r.run.to_owned()),
         text("rule", "rule", |r| match r.run {

@@ -53,6 +53,7 @@ fn entry_of(view: View) -> Entry {
                 rule,
                 reuse: Reuse::Primary,
                 cache_misses: "rates".to_owned(),
+                timing: Default::default(),
                 model,
             },
             result: ours.outcome,

@@ -1,8 +1,10 @@
 use super::*;
 use crate::sgrt::detect::{PixelClass, decide};
 use crate::sgrt::reproject::reproject;
+use crate::sgrt::rows::RowNeeds;
 use crate::sgrt::rules::Rule;
 use crate::sgrt::synthetic::{Placed, View, frame, wall};
+use crate::sgrt::ways::compare;
 use formats::raytrace::TraversalKind;
 
 fn decisions(frame: &Frame, rule: &str) -> Vec<Decision> {
