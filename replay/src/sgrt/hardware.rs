@@ -4,6 +4,7 @@ use super::cache::{self, DeviceCaches, Misses};
 use super::compose::Reuse;
 use super::config::SgrtConfig;
 use super::detect::Decision;
+use super::energy_bounds::relative_bounds;
 use super::frame::{Frame, FrameError, RaySource};
 use super::run::Run;
 use super::work::{BatchWork, RayClass};
@@ -37,6 +38,12 @@ impl Comparison {
     #[must_use]
     pub fn relative_energy(&self) -> f64 {
         self.reprojected.energy_over(&self.reference)
+    }
+
+    /// Least and most relative energy, if the energies are scaled to 14 nm.
+    #[must_use]
+    pub(super) fn relative_energy_bounds(&self) -> [f64; 2] {
+        relative_bounds(&self.reprojected.energy, &self.reference.energy)
     }
 }
 

@@ -20,6 +20,7 @@ pub mod cycles;
 pub mod detect;
 pub mod dram;
 pub mod energy;
+mod energy_bounds;
 pub mod frame;
 pub mod gbuffer;
 pub mod hardware;

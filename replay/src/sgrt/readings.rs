@@ -5,11 +5,12 @@
 use super::compose::Reuse;
 use super::config::SgrtConfig;
 use super::detect::decide;
+use super::energy_bounds::relative_bounds;
 use super::frame::FrameError;
 use super::hardware::{Comparison, tile_work};
 use super::loaded::LoadedTrace;
 use super::rules::Rule;
-use super::run::Run;
+use super::run::{EnergyPj, Run};
 use serde::Serialize;
 
 /// What performance and energy are measured of ("for the T&I unit", section IV).
@@ -71,6 +72,8 @@ pub struct Figures {
     pub relative_performance: f64,
     /// Energy relative to tracing both eyes completely.
     pub relative_energy: f64,
+    /// Least and most relative energy, if the energies are scaled to 14 nm.
+    pub relative_energy_bounds: [f64; 2],
     /// Frames per second with reprojection.
     pub frames_per_second: f64,
 }
@@ -168,11 +171,12 @@ fn measure(
         GbufferPlace::Screen => &compared.whole_screen,
     };
     let reference = &compared.reference;
-    let energy = |run: &Run| energy_pj(run, scope, config);
+    let energy = |run: &Run| energy_of(run, scope, config);
     let time = |run: &Run| time_ns(run, scope, config);
     Figures {
         relative_performance: time(reference) / time(run),
-        relative_energy: energy(run) / energy(reference),
+        relative_energy: energy(run).total() / energy(reference).total(),
+        relative_energy_bounds: relative_bounds(&energy(run), &energy(reference)),
         frames_per_second: 1e9 / time(run),
     }
 }
@@ -184,14 +188,19 @@ fn time_ns(run: &Run, scope: Scope, config: &SgrtConfig) -> f64 {
     }
 }
 
-fn energy_pj(run: &Run, scope: Scope, config: &SgrtConfig) -> f64 {
-    let units = run.energy.tni_pj + run.energy.caches_pj;
+fn energy_of(run: &Run, scope: Scope, config: &SgrtConfig) -> EnergyPj {
+    let units = EnergyPj {
+        tni_pj: run.energy.tni_pj,
+        caches_pj: run.energy.caches_pj,
+        ..EnergyPj::default()
+    };
     match scope {
         Scope::Units => units,
-        Scope::UnitsAndMemory => {
-            units + run.dram.hierarchy_bytes as f64 * config.energy.dram_pj_per_byte
-        }
-        Scope::Frame => run.energy.total(),
+        Scope::UnitsAndMemory => EnergyPj {
+            dram_pj: run.dram.hierarchy_bytes as f64 * config.energy.dram_pj_per_byte,
+            ..units
+        },
+        Scope::Frame => run.energy,
     }
 }
 
@@ -271,6 +280,7 @@ mod tests {
         let ours = Figures {
             relative_performance: 1.1,
             relative_energy: 0.9,
+            relative_energy_bounds: [0.8, 1.0],
             frames_per_second: 1.0,
         };
         let far = rms_log([(ours, [1.0, 0.9])]).expect("a pair");

@@ -86,6 +86,9 @@ pub struct Outcome {
     pub relative_performance: f64,
     /// Energy relative to tracing both eyes completely.
     pub relative_energy: f64,
+    /// Least and most relative energy, if the energies are scaled to 14 nm.
+    #[serde(default)]
+    pub relative_energy_bounds: [f64; 2],
     /// Unit cycles of tracing both eyes completely over those with reprojection: the relative performance
     /// if the units were always the bottleneck.
     pub tni_relative_performance: f64,
@@ -281,6 +284,7 @@ impl Outcome {
             position_over_2px_pct: accuracy.pct(reused.position_over_2px),
             relative_performance: comparison.relative_performance(),
             relative_energy: comparison.relative_energy(),
+            relative_energy_bounds: comparison.relative_energy_bounds(),
             tni_relative_performance: reference.tni_cycles / run.tni_cycles,
             primary_steps_pct: 100.0 * reference.work.by_class[0].steps as f64
                 / reference.work.steps().max(1) as f64,
