@@ -17,7 +17,10 @@ pub mod normal;
 mod predict;
 mod relations;
 pub mod tables;
+mod write;
 
+#[cfg(test)]
+mod column_tests;
 #[cfg(test)]
 mod tests;
 
@@ -25,15 +28,15 @@ use crate::textrace::TraceMeta;
 use crate::view::{Eye, TILE_SIZE_PX};
 pub use camera::EyeCamera;
 pub use file::{
-    EncodedRayTile, GEOMETRY_INDEX, GEOMETRY_INDEX_ENTRY_BYTES, GEOMETRY_TILES, NODES, RAY_INDEX,
-    RAY_INDEX_ENTRY_BYTES, RAY_TILES, Raytrace, RaytraceWriter, SLOTS, encode_ray_tile,
-    encode_ray_tile_with_geometry,
+    GEOMETRY_INDEX, GEOMETRY_INDEX_ENTRY_BYTES, GEOMETRY_TILES, NODES, RAY_INDEX,
+    RAY_INDEX_ENTRY_BYTES, RAY_TILES, Raytrace, SLOTS,
 };
 pub use geometry::{RayGeometry, SlotHit};
 use glam::Vec3;
 pub use hierarchy::{ChildKind, Hierarchy, HierarchyChild, HierarchyTriangle, Parents};
 pub use relations::check_relations;
 use serde::{Deserialize, Serialize};
+pub use write::{EncodedRayTile, RaytraceWriter, encode_ray_tile, encode_ray_tile_with_geometry};
 
 /// Description of the whole trace.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,5 +1,7 @@
 //! The tracer on a small scene with every kind of material.
 
+mod columns;
+
 use super::frame::{RayFrame, trace_frame};
 use super::material::Materials;
 use super::scene::TraceScene;

@@ -170,7 +170,7 @@ fn records_equal_those_of_dump_and_refuse_flags_for_accesses() {
     for (arguments, expected) in [
         (
             ["--to", "csv", "--granularity", "record", "--seed", "1"],
-            "--granularity record: only with --to npy and --to parquet",
+            "--granularity record: only with --to csv, jsonl, npy and parquet",
         ),
         (
             [
