@@ -22,6 +22,14 @@ const MOST_BACK: u32 = 48;
 
 type Corners = [[f32; 3]; 2];
 
+impl Hierarchy {
+    /// Size of the encoded nodes and triangles together. Encodes them, so that the time can be measured.
+    #[must_use]
+    pub fn encoded_bytes(&self, bvh: &BvhSummary) -> usize {
+        encode_nodes(bvh, self).len() + encode_triangles(&self.triangles).len()
+    }
+}
+
 /// Writes the inner nodes.
 pub(super) fn encode_nodes(bvh: &BvhSummary, hierarchy: &Hierarchy) -> Vec<u8> {
     let width = bvh.traversal.width();

@@ -74,7 +74,7 @@ fn brute_force_over_the_stored_triangles_finds_every_stored_hit() {
     let (mut hits, mut misses, mut at_edges) = (0u32, 0u32, 0u32);
     for Stored {
         record, geometry, ..
-    } in rays.iter().step_by(3)
+    } in &rays
     {
         let limit = geometry.hit.map_or(geometry.t_max, |hit| hit.t);
         let mut found = None;
@@ -106,7 +106,10 @@ fn brute_force_over_the_stored_triangles_finds_every_stored_hit() {
         hits += u32::from(found.is_some());
         misses += u32::from(found.is_none());
     }
-    assert!(hits > 3000 && misses > 2000, "{hits} hits, {misses} misses");
+    assert!(
+        hits > 5000 && misses > 10_000,
+        "{hits} hits, {misses} misses"
+    );
     assert!(at_edges < hits / 100, "{at_edges} at edges");
 }
 
