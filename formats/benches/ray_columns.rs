@@ -2,7 +2,8 @@
 //!
 //! `cargo bench -p formats --bench ray_columns -- TRACE...` takes traces captured with
 //! `tracegen rays --all-columns` and prints, for each, a line per column: trace, column, items, coded bytes,
-//! uncoded bytes, seconds to write, seconds to read. One thread; the best of three rounds.
+//! uncoded bytes, seconds to write, seconds to read. One thread. Each tile is timed in every round, and its least
+//! time counts, so that other programs disturb the sum little.
 
 use formats::container::ChunkTag;
 use formats::raytrace::{
@@ -13,7 +14,7 @@ use formats::view::Eye;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 5;
 /// A ray in memory: kind, outcome, depth, parent, steps, triangle tests and alpha tests.
 const RECORD_BYTES: u64 = 3 + 4 * 4;
 /// Nine coordinates and limits, distance, slot and stack depth of 4 bytes each.
@@ -21,17 +22,23 @@ const GEOMETRY_BYTES: u64 = 11 * 4;
 /// A visit: kind and index.
 const VISIT_BYTES: u64 = 5;
 
-/// Seconds of a round.
-#[derive(Clone, Copy, Debug, Default)]
+/// Seconds of a tile for records, with visits, and with visits and geometry.
+#[derive(Clone, Copy, Debug)]
 struct Times {
     write: [f64; 3],
     read: [f64; 3],
 }
 
-fn timed<T>(sum: &mut f64, work: impl FnOnce() -> T) -> T {
+const UNTIMED: Times = Times {
+    write: [f64::MAX; 3],
+    read: [f64::MAX; 3],
+};
+
+/// Keeps the least time.
+fn timed<T>(least: &mut f64, work: impl FnOnce() -> T) -> T {
     let start = Instant::now();
     let result = work();
-    *sum += start.elapsed().as_secs_f64();
+    *least = least.min(start.elapsed().as_secs_f64());
     result
 }
 
@@ -57,13 +64,12 @@ fn records_alone(trace: &Raytrace) -> Raytrace {
     Raytrace::from_bytes(bytes).expect("opens")
 }
 
-/// Times of records, visits and geometry, one on top of the other.
-fn round(trace: &Raytrace, plain: &Raytrace) -> Times {
-    let mut times = Times::default();
+/// Times every tile once.
+fn round(trace: &Raytrace, plain: &Raytrace, times: &mut [Times]) {
     let tables = trace.tables();
     let mut tile = RayTile::default();
     let size = |tile: EncodedRayTile| assert!(tile.size_bytes() > 0);
-    for (eye, number) in places(tables) {
+    for ((eye, number), times) in places(tables).zip(times) {
         let [records, visits, geometry] = &mut times.read;
         timed(records, || plain.decode_tile(eye, number, &mut tile)).expect("decodes");
         timed(visits, || trace.decode_tile(eye, number, &mut tile)).expect("decodes");
@@ -81,7 +87,6 @@ fn round(trace: &Raytrace, plain: &Raytrace) -> Times {
         tile.visits.clear();
         timed(records, || encode_ray_tile(&tile, false).map(size)).expect("encodes");
     }
-    times
 }
 
 fn chunks(trace: &Raytrace, tags: &[ChunkTag]) -> u64 {
@@ -110,9 +115,12 @@ fn measure(path: &Path) {
         rays += tile.rays.len() as u64;
         visits += tile.visits.len() as u64;
     }
-    let rounds: Vec<Times> = (0..ROUNDS).map(|_| round(&trace, &plain)).collect();
-    let best = |of: &dyn Fn(&Times) -> f64| rounds.iter().map(of).fold(f64::MAX, f64::min);
-    let seconds = |part: usize| [best(&|t| t.write[part]), best(&|t| t.read[part])];
+    let mut times = vec![UNTIMED; places(trace.tables()).count()];
+    for _ in 0..ROUNDS {
+        round(&trace, &plain, &mut times);
+    }
+    let sum = |of: &dyn Fn(&Times) -> f64| times.iter().map(of).sum::<f64>();
+    let seconds = |part: usize| [sum(&|t| t.write[part]), sum(&|t| t.read[part])];
     let [records, with_visits, with_geometry] = [0, 1, 2].map(seconds);
     let more = |a: [f64; 2], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
     let tiles = [RAY_TILES, RAY_INDEX];
@@ -146,13 +154,9 @@ fn measure(path: &Path) {
     let bvh = &trace.tables().bvh;
     let (mut write, mut read) = (f64::MAX, f64::MAX);
     for _ in 0..ROUNDS {
-        let mut time = 0.0;
-        let hierarchy = timed(&mut time, || trace.read_hierarchy());
-        read = read.min(time);
+        let hierarchy = timed(&mut read, || trace.read_hierarchy());
         let (hierarchy, _) = hierarchy.expect("decodes").expect("it was there");
-        time = 0.0;
-        let bytes = timed(&mut time, || hierarchy.encoded_bytes(bvh));
-        write = write.min(time);
+        let bytes = timed(&mut write, || hierarchy.encoded_bytes(bvh));
         assert_eq!(bytes as u64, chunks(&trace, &[NODES, SLOTS]));
     }
     let nodes = [
