@@ -78,7 +78,7 @@ fn hierarchy(tables: &RaytraceTables, seed: u64) -> Hierarchy {
     let vertices: Vec<[f32; 3]> = (0..60).map(|_| corner(&mut random)).collect();
     let triangle = |number: u32| HierarchyTriangle {
         primitive: number * 7919 % 41,
-        masked: number % 5 == 0,
+        masked: number.is_multiple_of(5),
         vertices: [0; 3].map(|_| vertices[random.below(60) as usize]),
     };
     Hierarchy {

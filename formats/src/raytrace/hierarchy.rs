@@ -77,7 +77,7 @@ impl Hierarchy {
         ];
         ensure(
             counts.iter().all(|(found, expected)| found == expected)
-                && self.children.len() % width == 0,
+                && self.children.len().is_multiple_of(width),
             || {
                 let expected = format!("{} nodes and {} triangles", bvh.nodes, bvh.triangles);
                 let [(nodes, _), (triangles, _)] = counts;
