@@ -2,7 +2,7 @@
 //! shows that the text is sufficient to write a reader.
 
 use crate::container::{CHUNK_ALIGNMENT_BYTES, DIRECTORY_ENTRY_BYTES, HEADER_BYTES};
-use crate::raytrace::RAY_INDEX_ENTRY_BYTES;
+use crate::raytrace::{GEOMETRY_INDEX_ENTRY_BYTES, RAY_INDEX_ENTRY_BYTES};
 use crate::textrace::{self, INDEX_ENTRY_BYTES, Textrace, TextraceWriter, geometry, tables};
 use std::collections::HashMap;
 
@@ -59,6 +59,7 @@ fn documented_sizes_equal_those_of_the_code() {
         ("raw record", textrace::RAW_RECORD_BYTES),
         ("padding of bits", textrace::BITS_PADDING_BYTES),
         ("ray tile index entry", RAY_INDEX_ENTRY_BYTES),
+        ("geometry index entry", GEOMETRY_INDEX_ENTRY_BYTES),
         (
             "ray triangle",
             crate::raytrace::tables::TRIANGLE_ENTRY_BYTES,

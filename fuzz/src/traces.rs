@@ -75,13 +75,14 @@ pub fn mutate(bytes: &[u8], most_bytes: usize, seed: u32, change: Change<'_>) ->
         return bytes;
     };
     let room = most_bytes.saturating_sub(bytes.len());
-    let mut tiles = parts.tiles();
+    let family = random.below(parts.family_count());
+    let mut tiles = parts.tiles_of(family);
     let full: Vec<usize> = (0..tiles.len()).filter(|i| !tiles[*i].is_empty()).collect();
     if random.below(2) == 0 && !full.is_empty() {
         let tile = &mut tiles[full[random.below(full.len() as u32) as usize]];
         let most = tile.len() + room;
         change(tile, most);
-        parts.set_tiles(&tiles);
+        parts.set_tiles_of(family, &tiles);
     } else {
         let chunk = random.below(parts.chunks.len() as u32) as usize;
         let chunk = &mut parts.chunks[chunk].1;

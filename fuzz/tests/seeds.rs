@@ -1,7 +1,9 @@
 //! The traces at the start of the corpus: small ones of every encoding with every feature of the format.
 //! `UPDATE_CORPUS=1` rewrites them.
 
+use formats::raytrace::TraversalKind;
 use formats::textrace::Encoding;
+use parallax_tests::columns::{column_tables, column_trace_of};
 use parallax_tests::traces;
 use std::path::Path;
 
@@ -35,6 +37,16 @@ fn seeds() -> Vec<(String, Vec<u8>)> {
         let visits = if has_visits { "-visits" } else { "" };
         let name = format!("raytrace/{samples}-samples{visits}");
         seeds.push((name, traces::ray_trace_of(&tables, 7)));
+    }
+    for traversal in [TraversalKind::Bvh2, TraversalKind::Bvh8] {
+        let mut tables = column_tables(1, traversal);
+        let size_px = [3, 2];
+        tables.meta.trace.hmd.eye_size_px = size_px;
+        for eye in &mut tables.meta.eyes {
+            eye.size_px = size_px;
+        }
+        let name = format!("raytrace/columns-{traversal:?}").to_lowercase();
+        seeds.push((name, column_trace_of(&tables, 7)));
     }
     seeds
 }

@@ -63,32 +63,43 @@ def read_textrace(path: Any) -> pa.Table:
 
 
 def read_raytrace(path: Any, rows: str = "rays") -> pa.Table:
-    """Reads all rays, or all samples, of a ray trace.
+    """Reads all rays, samples or visits of a ray trace, or its hierarchy.
 
-    The columns are those of ``replay dump --parquet``. The table uses the decoder's memory without a copy.
+    The columns are those of ``replay dump --parquet``, and of ``replay convert --to parquet`` for visits. The table uses the decoder's memory without a copy.
 
     Parameters
     ----------
     path : path
         A ``.raytrace`` file.
-    rows : {"rays", "samples"}
-        What a row is: a ray with its cost, or a sample of a pixel with its primary hit and colour. Both begin
-        with ``eye``, ``tile``, ``x``, ``y`` (pixel) and ``sample``.
+    rows : {"rays", "samples", "visits", "nodes", "slots"}
+        What a row is: a ray with its cost; a sample of a pixel with its primary hit and colour; a visit of a
+        node or triangle by a ray (of a trace captured with ``--visits``); a child of an inner node, or the
+        triangle of a slot (``--hierarchy``). Those of rays, samples and visits have ``eye``, ``tile``, ``x``,
+        ``y`` (pixel) and ``sample``.
 
     Returns
     -------
     pyarrow.Table
         In file order. For rays: ``ray`` (number in its sample), ``kind``, ``outcome``, ``depth``, ``parent``
-        (4294967295 for primary rays), ``steps`` (inner nodes visited), ``triangle_tests``, ``alpha_tests``.
+        (4294967295 for primary rays), ``steps`` (inner nodes visited), ``triangle_tests``, ``alpha_tests``. If
+        the trace was captured with ``--geometry``, also ``origin_*`` (metres, relative to the trace's origin),
+        ``direction_*`` (unit length), ``t_min``, ``t_max`` (metres; the largest float without a limit), ``t``
+        (distance of the hit, NaN for a miss), ``slot`` (of the triangle hit, 4294967295 for a miss) and
+        ``stack_depth`` (most entries on the traversal stack).
         For samples: ``hit`` (0 or 1), ``t`` (metres), ``position_*`` (metres, relative to the trace's origin),
         ``geometric_normal_*``, ``shading_normal_*``, ``uv_*``, ``primitive``, ``object``, ``material``,
         ``view_independent_*``, ``view_dependent_*`` (linear RGB), ``rays`` (their number). Without a hit,
         measures of the hit are NaN and its numbers 4294967295.
+        For visits: ``address``, ``bytes``, ``ray``, ``kind`` of the ray, ``entry`` ("node" or "triangle") and
+        ``index`` (of the node, or slot). For nodes: ``node``, ``child`` (its number in the node), ``kind``
+        ("node" or "leaf"), ``index`` (node, or first slot), ``triangles`` of a leaf, and the box ``min_*`` to
+        ``max_*``. For slots: ``slot``, ``primitive``, ``masked`` (1 if rays look up its alpha), and the
+        vertices ``v0_*``, ``v1_*``, ``v2_*``.
 
     Raises
     ------
     ParallaxError
-        The file cannot be read or is damaged, or `rows` is something else.
+        The file cannot be read or is damaged, does not have such rows, or `rows` is something else.
     """
     return _table(_native.raytrace(path_of(path, "path"), rows))
 

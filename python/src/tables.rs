@@ -2,7 +2,10 @@
 
 use crate::{errors::Failure, jobs};
 use formats::Trace;
-use formats::interop::{RayRow, RecordRow, SampleRow, Tabular, Values};
+use formats::interop::{
+    ChildRow, GeometryRow, RayAccess, RayRow, RecordRow, SampleRow, SlotRow, Tabular, Values,
+    child_rows, slot_rows,
+};
 use formats::raytrace::Raytrace;
 use formats::textrace::Textrace;
 use numpy::PyArray1;
@@ -46,15 +49,61 @@ pub fn textrace(py: Python<'_>, path: PathBuf) -> PyResult<Vec<Column<'_>>> {
     Ok(columns::<RecordRow>(py, values))
 }
 
-/// The rays or the samples of a ray trace.
+/// The rows of a ray trace: rays, samples, visits, or the children or triangles of its hierarchy.
 #[pyfunction]
 pub fn raytrace<'py>(py: Python<'py>, path: PathBuf, rows: &str) -> PyResult<Vec<Column<'py>>> {
     let open = move || Raytrace::open(&path);
     match rows {
-        "rays" => Ok(columns::<RayRow>(py, read::<RayRow, _>(py, open)?)),
+        "rays" => {
+            let (geometry, values) = jobs::run(py, move |_| {
+                let trace = open()?;
+                Ok(if trace.has_geometry() {
+                    (true, records::columns::<GeometryRow, _>(&trace)?)
+                } else {
+                    (false, records::columns::<RayRow, _>(&trace)?)
+                })
+            })?;
+            Ok(if geometry {
+                columns::<GeometryRow>(py, values)
+            } else {
+                columns::<RayRow>(py, values)
+            })
+        }
         "samples" => Ok(columns::<SampleRow>(py, read::<SampleRow, _>(py, open)?)),
+        "visits" => {
+            let values = jobs::run(py, move |_| {
+                let trace = open()?;
+                if !trace.tables().meta.has_visits {
+                    let file = trace.container().file();
+                    let text = format!(
+                        "{file}: expected a trace with visits (captured with `tracegen rays --visits`), found none"
+                    );
+                    return Err(Failure::Own(anyhow::anyhow!(text)));
+                }
+                Ok(records::columns::<RayAccess, _>(&trace)?)
+            })?;
+            Ok(columns::<RayAccess>(py, values))
+        }
+        "nodes" => {
+            let values = jobs::run(py, move |_| {
+                let trace = open()?;
+                let hierarchy = records::hierarchy(&trace)?;
+                let rows: Vec<ChildRow> = child_rows(&trace.tables().bvh, &hierarchy).collect();
+                Ok(records::columns_of(&rows))
+            })?;
+            Ok(columns::<ChildRow>(py, values))
+        }
+        "slots" => {
+            let values = jobs::run(py, move |_| {
+                let hierarchy = records::hierarchy(&open()?)?;
+                let rows: Vec<SlotRow> = slot_rows(&hierarchy).collect();
+                Ok(records::columns_of(&rows))
+            })?;
+            Ok(columns::<SlotRow>(py, values))
+        }
         _ => {
-            let text = format!("rows: expected rays or samples, found {rows:?}");
+            let text =
+                format!("rows: expected rays, samples, visits, nodes or slots, found {rows:?}");
             Err(Failure::Own(anyhow::anyhow!(text)).into())
         }
     }

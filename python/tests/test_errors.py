@@ -45,7 +45,7 @@ def test_files_that_are_no_traces(atrium, traces, tmp_path, replay):
     assert refused("textrace", parallax.run, rays) == printed(replay, "run", rays)
     refused("raytrace", parallax.read_raytrace, atrium)
     assert refused("raytrace", parallax.reproject, atrium) == printed(replay, "reproject", atrium)
-    refused("rows: expected rays or samples", parallax.read_raytrace, rays, "pixels")
+    refused("rows: expected rays, samples, visits, nodes or slots", parallax.read_raytrace, rays, "pixels")
     for wrong in [None, 7, b"bytes", [atrium]]:
         refused("path: expected a path, found", parallax.read_textrace, wrong)
     refused("trace: expected a path, found NoneType", parallax.run, [None])

@@ -17,10 +17,10 @@ TEXTRACES = ["atrium", "atrium-shadows", "jungle"]
 RAYTRACES = ["teapot-rays", "chess-rays"]
 
 
-def independent(path):
+def independent(path, *options):
     """The rows of a trace as the reader written from FORMAT.md alone prints them."""
     script = ROOT / "tests/independent" / f"{path.suffix[1:]}.py"
-    command = [sys.executable, "-B", script, path]
+    command = [sys.executable, "-B", script, path, *options]
     output = subprocess.run(command, check=True, capture_output=True).stdout
     return [json.loads(line) for line in output.splitlines()[1:]]
 
@@ -83,6 +83,56 @@ def test_rays_and_samples_are_those_of_the_independent_reader(traces, name):
             values = np.array([s[key][axis] for s in samples], np.float32)
             assert np.array_equal(table[f"{key}_{letter}"].to_numpy(), values), key
     assert table["rays"].to_pylist() == [len(s["rays"]) for s in samples]
+
+
+@pytest.mark.parametrize("tree", ["bvh2", "bvh8"])
+def test_columns_are_those_of_the_independent_reader(tmp_path, tree):
+    path = tmp_path / "columns.raytrace"
+    path.write_bytes((ROOT / f"fuzz/corpus/raytrace/columns-{tree}").read_bytes())
+    rays = [ray for sample in independent(path) for ray in sample["rays"]]
+    table = parallax.read_raytrace(path)
+    assert table.num_rows == len(rays) > 20
+    for key in ["origin", "direction"]:
+        for axis, letter in enumerate("xyz"):
+            values = np.array([ray[key][axis] for ray in rays], np.float32)
+            assert np.array_equal(table[f"{key}_{letter}"].to_numpy(), values), key
+    for key in ["t_min", "t_max", "t"]:
+        values = np.array([np.nan if ray[key] is None else ray[key] for ray in rays], np.float32)
+        assert np.array_equal(table[key].to_numpy(), values, equal_nan=True), key
+    slots = [4294967295 if ray["slot"] is None else ray["slot"] for ray in rays]
+    assert table["slot"].to_pylist() == slots
+    assert table["stack_depth"].to_pylist() == [ray["stack_depth"] for ray in rays]
+
+    visits = parallax.read_raytrace(path, rows="visits")
+    of_rays = [visit for ray in rays for visit in ray["visits"]]
+    assert visits["address"].to_pylist() == [visit["address"] for visit in of_rays]
+
+    nodes = independent(path, "--nodes")
+    children = [
+        (node["node"], number, child.get("node", child.get("slot")), *child["min"], *child["max"])
+        for node in nodes
+        for number, child in enumerate(node["children"])
+        if child
+    ]
+    table = parallax.read_raytrace(path, rows="nodes")
+    names = ["node", "child", "index"]
+    names += [f"{corner}_{letter}" for corner in ["min", "max"] for letter in "xyz"]
+    assert list(zip(*(table[name].to_pylist() for name in names))) == children
+
+    table = parallax.read_raytrace(path, rows="slots")
+    rows = independent(path, "--slots")
+    assert table["primitive"].to_pylist() == [row["primitive"] for row in rows]
+    assert table["masked"].to_pylist() == [int(row["masked"]) for row in rows]
+    for vertex in range(3):
+        for axis, letter in enumerate("xyz"):
+            values = [row["vertices"][vertex][axis] for row in rows]
+            assert table[f"v{vertex}_{letter}"].to_pylist() == values
+
+
+def test_rows_that_a_trace_lacks_are_refused(traces):
+    for rows, text in [("visits", "with visits"), ("nodes", "content of its hierarchy")]:
+        with pytest.raises(parallax.ParallaxError, match=text):
+            parallax.read_raytrace(traces / "teapot-rays.raytrace", rows=rows)
 
 
 @pytest.mark.parametrize(

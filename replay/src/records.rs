@@ -1,9 +1,11 @@
 //! Records, rays and samples of whole traces as columns, decoded in parallel.
 
+use anyhow::{Result, bail};
 use formats::interop::{
-    RayRow, RecordRow, SampleRow, Tabular, Values, ray_rows, ray_samples, record_rows,
+    GeometryRow, RayAccess, RayRow, RaySample, RecordRow, SampleRow, Tabular, Values,
+    geometry_rows, ray_rows, ray_samples, record_rows,
 };
-use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
+use formats::raytrace::{BvhSummary, Hierarchy, RayTile, Raytrace, RaytraceTables};
 use formats::textrace::{Pass, Textrace, Tile};
 use formats::view::Eye;
 use rayon::prelude::*;
@@ -66,18 +68,40 @@ impl Rows<RecordRow> for Textrace {
 
 /// Rows of a ray trace's samples.
 trait OfSample: Sized {
-    fn append(sample: &formats::interop::RaySample<'_>, rows: &mut Vec<Self>);
+    /// Whether the rows need the geometry of the rays.
+    const GEOMETRY: bool = false;
+
+    fn append(sample: &RaySample<'_>, bvh: &BvhSummary, rows: &mut Vec<Self>);
 }
 
 impl OfSample for RayRow {
-    fn append(sample: &formats::interop::RaySample<'_>, rows: &mut Vec<Self>) {
+    fn append(sample: &RaySample<'_>, _: &BvhSummary, rows: &mut Vec<Self>) {
         rows.extend(ray_rows(sample));
     }
 }
 
+impl OfSample for GeometryRow {
+    const GEOMETRY: bool = true;
+
+    fn append(sample: &RaySample<'_>, _: &BvhSummary, rows: &mut Vec<Self>) {
+        rows.extend(geometry_rows(sample));
+    }
+}
+
 impl OfSample for SampleRow {
-    fn append(sample: &formats::interop::RaySample<'_>, rows: &mut Vec<Self>) {
+    fn append(sample: &RaySample<'_>, _: &BvhSummary, rows: &mut Vec<Self>) {
         rows.push(sample.into());
+    }
+}
+
+/// Visits, one row each.
+impl OfSample for RayAccess {
+    fn append(sample: &RaySample<'_>, bvh: &BvhSummary, rows: &mut Vec<Self>) {
+        let pushed = sample.accesses(bvh, |access| {
+            rows.push(*access);
+            Ok(())
+        });
+        debug_assert!(pushed.is_ok(), "pushing does not fail");
     }
 }
 
@@ -95,12 +119,39 @@ impl<R: OfSample> Rows<R> for Raytrace {
         tile: &mut RayTile,
         rows: &mut Vec<R>,
     ) -> formats::Result<()> {
-        self.decode_tile(eye, index, tile)?;
+        if R::GEOMETRY {
+            self.decode_tile_with_geometry(eye, index, tile)?;
+        } else {
+            self.decode_tile(eye, index, tile)?;
+        }
         for sample in ray_samples(self.tables(), eye, index, tile) {
-            R::append(&sample, rows);
+            R::append(&sample, &self.tables().bvh, rows);
         }
         Ok(())
     }
+}
+
+/// The content of a trace's hierarchy.
+///
+/// # Errors
+/// The trace does not have it, or it is damaged.
+pub fn hierarchy(trace: &Raytrace) -> Result<Hierarchy> {
+    match trace.read_hierarchy()? {
+        Some((hierarchy, _)) => Ok(hierarchy),
+        None => bail!(
+            "{}: expected a trace with the content of its hierarchy (captured with `tracegen rays --hierarchy`), found none",
+            trace.container().file()
+        ),
+    }
+}
+
+/// The values of rows, column by column in the order of [`Tabular::FIELDS`].
+#[must_use]
+pub fn columns_of<R: Tabular>(rows: &[R]) -> Vec<Values> {
+    R::FIELDS
+        .iter()
+        .map(|field| field.get.values(rows))
+        .collect()
 }
 
 /// All rows of a trace, column by column in the order of [`Tabular::FIELDS`].
@@ -113,10 +164,7 @@ pub fn columns<R: Tabular, T: Rows<R>>(trace: &T) -> formats::Result<Vec<Values>
         for &at in places {
             trace.append(at, &mut tile, &mut rows)?;
         }
-        Ok(R::FIELDS
-            .iter()
-            .map(|field| field.get.values(&rows))
-            .collect())
+        Ok(columns_of(&rows))
     };
     let parts: Vec<formats::Result<Vec<Values>>> =
         trace.places().par_chunks(CHUNK).map(of_chunk).collect();

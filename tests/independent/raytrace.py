@@ -1,13 +1,15 @@
 """Prints a .raytrace: a line of JSON with the tables, then one for each sample with its rays.
 
-    python3 raytrace.py FILE
+    python3 raytrace.py FILE [--nodes | --slots]
 
-Written from FORMAT.md alone; see container.py.
+With --nodes or --slots the lines are the inner nodes or the triangles of the hierarchy. Written from FORMAT.md alone; see container.py.
 """
 
 import math
 import struct
 import sys
+
+from raycolumns import read_geometry, read_nodes, read_slots
 
 from container import FOV, META, V3, Bytes, check_fov, check_meta, f32, parse_json, print_line
 from container import read, require, shaped, tile_spans, unzigzag
@@ -326,8 +328,30 @@ def read_tile(data, pixels, eye, meta, bvh, triangles):
     return out, len(rays)
 
 
-def main(path):
-    chunks, _minor = read(path, 2)
+def geometry_entries(chunks, version, tiles):
+    """Spans of the tiles' geometry, or None."""
+    tags = {"RGEO", "RGIX"} & set(chunks)
+    if not tags:
+        return None
+    require(len(tags) == 2 and version >= (1, 3), "chunks of geometry")
+    index = Bytes(chunks["RGIX"])
+    entries = [index.fields("QII") for _ in range(tiles)]
+    index.end()
+    tile_spans(entries, chunks["RGEO"])
+    return entries
+
+
+def hierarchy_lines(chunks, version, bvh):
+    """Lines of the inner nodes and of the slots, or None."""
+    tags = {"RNOD", "RSLT"} & set(chunks)
+    if not tags:
+        return None
+    require(len(tags) == 2 and version >= (1, 3), "chunks of the hierarchy")
+    return read_nodes(chunks["RNOD"], bvh), read_slots(chunks["RSLT"], bvh)
+
+
+def main(path, what=None):
+    chunks, version = read(path, 2)
     require(TAGS <= set(chunks), "chunks missing")
     meta = check_ray_meta(shaped(parse_json(chunks["META"]), RAY_META))
     bvh = check_hierarchy(shaped(parse_json(chunks["RBVH"]), HIERARCHY))
@@ -346,6 +370,12 @@ def main(path):
             ],
         }
     )
+    lines = hierarchy_lines(chunks, version, bvh)
+    if what in ("--nodes", "--slots"):
+        require(lines, "no hierarchy")
+        for line in lines[what == "--slots"]:
+            print_line(line)
+        return
     width, height = meta["eyes"][0]["size_px"]
     columns, rows = -(-width // 16), -(-height // 16)
     index = Bytes(chunks["RTIX"])
@@ -353,6 +383,7 @@ def main(path):
     index.end()
     require(not any(entry[4] for entry in entries), "reserved bytes")
     tile_spans([entry[:3] for entry in entries], chunks["RAYS"])
+    geometry = geometry_entries(chunks, version, len(entries))
     for number, (offset, size, _, rays, _) in enumerate(entries):
         eye, tile = divmod(number, columns * rows)
         top, left = (16 * n for n in divmod(tile, columns))
@@ -364,9 +395,16 @@ def main(path):
         data = Bytes(chunks["RAYS"][offset : offset + size])
         samples, found = read_tile(data, pixels, meta["eyes"][eye], meta, bvh, triangles)
         require(found == rays, "rays of a tile")
+        if geometry:
+            offset, size, _ = geometry[number]
+            data = Bytes(chunks["RGEO"][offset : offset + size])
+            for sample in samples:
+                point = [sample["x"], sample["y"], sample["sample"], meta["samples_per_px"]]
+                sample["primary"] = direction_through(meta["eyes"][eye], sample_position(*point))
+            read_geometry(data, samples, meta["eyes"][eye], lights, bvh)
         for sample in samples:
             print_line({"eye": ["left", "right"][eye], "tile": tile, **sample})
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

@@ -5,7 +5,7 @@ use formats::Trace;
 use formats::footprint::SamplingOptions;
 use formats::interop::{Expander, Granularity, Origin, ray_samples};
 use formats::layout::{Layout, LayoutConfig};
-use formats::raytrace::{RayTile, Raytrace};
+use formats::raytrace::{RayTile, Raytrace, check_relations};
 use formats::textrace::{Textrace, Tile, with_operands};
 use formats::view::Eye;
 use replay::config::{FrameConfig, FrameMachine};
@@ -109,8 +109,11 @@ fn reproject(trace: &Raytrace) {
     let tables = trace.tables();
     let mut tile = RayTile::default();
     trace
-        .decode_tile(Eye::Right, 0, &mut tile)
+        .decode_tile_with_geometry(Eye::Right, 0, &mut tile)
         .expect("it was decoded before");
+    let hierarchy = trace.read_hierarchy().expect("it was read before");
+    // Columns of different traces need not belong together, but checking them must not panic.
+    let _result = check_relations(&tile, hierarchy.as_ref());
     for sample in ray_samples(tables, Eye::Right, 0, &tile) {
         sample.to_json(&tables.bvh).expect("JSON");
         sample

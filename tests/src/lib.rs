@@ -1,5 +1,6 @@
 //! Helpers of the end-to-end tests: the built programs, the golden traces, the real scenes.
 
+pub mod columns;
 pub mod exercise;
 pub mod figures;
 pub mod repair;

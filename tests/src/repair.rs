@@ -88,18 +88,38 @@ impl Parts {
         *chunk = text.replacen(from, to, 1).into_bytes();
     }
 
-    /// Tags of the chunk of tiles and of its index, and the size of an index entry.
-    fn tiles_and_index(&self) -> ([u8; 4], [u8; 4], usize) {
+    /// Families of tiles: the records, and the geometry of rays if there is any. Each has the tags of the
+    /// chunk of tiles and of its index, and the size of an index entry.
+    fn families(&self) -> Vec<([u8; 4], [u8; 4], usize)> {
+        let has = |tag: &[u8; 4]| self.chunks.iter().any(|(other, _)| other == tag);
         match self.kind {
-            Kind::Textrace => (*b"TILE", *b"TIDX", 32),
-            Kind::Raytrace => (*b"RAYS", *b"RTIX", 24),
+            Kind::Textrace => vec![(*b"TILE", *b"TIDX", 32)],
+            Kind::Raytrace if has(b"RGEO") && has(b"RGIX") => {
+                vec![(*b"RAYS", *b"RTIX", 24), (*b"RGEO", *b"RGIX", 16)]
+            }
+            Kind::Raytrace => vec![(*b"RAYS", *b"RTIX", 24)],
         }
     }
 
-    /// The bytes of every slot of the index, as far as they exist.
+    /// Number of families of tiles: 2 for a ray trace with geometry, else 1.
+    #[must_use]
+    pub fn family_count(&self) -> usize {
+        self.families().len()
+    }
+
+    /// The bytes of every slot of the index of the records, as far as they exist.
     #[must_use]
     pub fn tiles(&mut self) -> Vec<Vec<u8>> {
-        let (tiles, index, entry_bytes) = self.tiles_and_index();
+        self.tiles_of(0)
+    }
+
+    /// The same of a family of tiles, 0 for the records.
+    ///
+    /// # Panics
+    /// There is no such family.
+    #[must_use]
+    pub fn tiles_of(&mut self, family: usize) -> Vec<Vec<u8>> {
+        let (tiles, index, entry_bytes) = self.families()[family];
         let all = self.chunk(&tiles).clone();
         let entries = self.chunk(&index).chunks_exact(entry_bytes);
         let of = |entry: &[u8]| {
@@ -112,7 +132,15 @@ impl Parts {
 
     /// Replaces the tiles. Offsets, sizes and checksums in the index are updated; its counts are not.
     pub fn set_tiles(&mut self, tiles: &[Vec<u8>]) {
-        let (tag, index, entry_bytes) = self.tiles_and_index();
+        self.set_tiles_of(0, tiles);
+    }
+
+    /// The same for a family of tiles.
+    ///
+    /// # Panics
+    /// There is no such family.
+    pub fn set_tiles_of(&mut self, family: usize, tiles: &[Vec<u8>]) {
+        let (tag, index, entry_bytes) = self.families()[family];
         let mut offset = 0u64;
         let entries = self.chunk(&index).chunks_exact_mut(entry_bytes);
         for (entry, tile) in entries.zip(tiles) {
@@ -128,12 +156,14 @@ impl Parts {
 
     /// Corrects the checksums of the tiles at the positions in the index.
     pub fn repair_tiles(&mut self) {
-        let (_, index, entry_bytes) = self.tiles_and_index();
-        let crc32s: Vec<u32> = self.tiles().iter().map(|tile| crc32(tile)).collect();
-        let entries = self.chunk(&index).chunks_exact_mut(entry_bytes);
-        for (entry, crc32) in entries.zip(crc32s) {
-            if number(entry, 8, 4) > 0 {
-                entry[12..16].copy_from_slice(&crc32.to_le_bytes());
+        for (family, (_, index, entry_bytes)) in self.families().into_iter().enumerate() {
+            let tiles = self.tiles_of(family);
+            let crc32s: Vec<u32> = tiles.iter().map(|tile| crc32(tile)).collect();
+            let entries = self.chunk(&index).chunks_exact_mut(entry_bytes);
+            for (entry, crc32) in entries.zip(crc32s) {
+                if number(entry, 8, 4) > 0 {
+                    entry[12..16].copy_from_slice(&crc32.to_le_bytes());
+                }
             }
         }
         self.repair_lists();
@@ -249,9 +279,10 @@ pub fn validate(trace: &Trace) -> formats::Result<()> {
             let mut tile = RayTile::default();
             for eye in [Eye::Left, Eye::Right] {
                 for index in 0..trace.tables().tile_count() {
-                    trace.decode_tile(eye, index, &mut tile)?;
+                    trace.decode_tile_with_geometry(eye, index, &mut tile)?;
                 }
             }
+            trace.read_hierarchy()?;
         }
     }
     Ok(())

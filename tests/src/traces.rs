@@ -420,7 +420,12 @@ fn ray_material() -> RayMaterial {
     }
 }
 
-fn ray_tile(tables: &RaytraceTables, eye: Eye, number: u32, random: &mut Random) -> RayTile {
+pub(crate) fn ray_tile(
+    tables: &RaytraceTables,
+    eye: Eye,
+    number: u32,
+    random: &mut Random,
+) -> RayTile {
     let mut tile = RayTile::default();
     (tile.origin_px, tile.size_px) = tables.tile_rect(number);
     let camera = tables.camera(eye);
@@ -517,8 +522,8 @@ pub fn ray_trace_of(tables: &RaytraceTables, seed: u64) -> Vec<u8> {
     writer.into_bytes(tables).expect("sound tables")
 }
 
-/// Traces of both kinds, with every encoding, with and without visits, and with one or more samples per
-/// pixel.
+/// Traces of both kinds, with every encoding, with and without visits and optional columns, and with one or
+/// more samples per pixel.
 #[must_use]
 pub fn all() -> Vec<(String, Kind, Vec<u8>)> {
     let textures = Encoding::ALL.map(|encoding| {
@@ -533,5 +538,9 @@ pub fn all() -> Vec<(String, Kind, Vec<u8>)> {
     let program = texture_trace_of(&program_tables(), Encoding::Delta, 5);
     let program = ("program".to_owned(), Kind::Textrace, program);
     let textures = textures.into_iter().chain([geometry, program]);
-    textures.chain(rays).collect()
+    let columns = [TraversalKind::Bvh2, TraversalKind::Bvh8].map(|tree| {
+        let name = format!("columns-{tree:?}").to_lowercase();
+        (name, Kind::Raytrace, crate::columns::column_trace(tree, 7))
+    });
+    textures.chain(rays).chain(columns).collect()
 }

@@ -146,9 +146,13 @@ fn python_reads_generated_traces_as_replay_does() {
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     for (name, kind, bytes) in traces::all() {
-        let path = folder.path().join(name).with_extension(kind.to_string());
+        let path = folder.path().join(&name).with_extension(kind.to_string());
         fs::write(&path, bytes).expect("temporary file");
         assert!(check(&path) > 50, "{}", path.display());
+        if name.starts_with("columns") {
+            assert!(check_with(&path, &["--nodes"]) == 60);
+            assert!(check_with(&path, &["--slots"]) == 200);
+        }
     }
 }
 
@@ -253,6 +257,38 @@ fn python_reads_fresh_rays_with_visits_and_several_samples_as_replay_does() {
                 .arg(&path),
         );
         assert_eq!(check(&path), 2 * 40 * 24 * 3);
+    }
+}
+
+#[test]
+fn python_reads_all_columns_of_fresh_rays_as_replay_does() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for (scene, tree, samples) in [("chess", "bvh2", 1), ("lab", "bvh8", 2)] {
+        let path = folder.path().join(scene).with_extension("raytrace");
+        let spp = samples.to_string();
+        let options = [
+            "--size",
+            "40x24",
+            "--spp",
+            &spp,
+            "--all-columns",
+            "--bvh",
+            tree,
+        ];
+        run_ok(
+            program("tracegen")
+                .args(["rays", scene])
+                .args(options)
+                .arg("-o")
+                .arg(&path),
+        );
+        assert_eq!(check(&path), 2 * 40 * 24 * samples);
+        assert!(check_with(&path, &["--nodes"]) > 1000);
+        assert!(check_with(&path, &["--slots"]) > 10_000);
+        run_ok(program("replay").arg("validate").arg(&path));
     }
 }
 

@@ -222,7 +222,8 @@ fn splice(parts: &mut Parts, other: &mut Parts, random: &mut Random) -> String {
 
 /// Truncates, extends or swaps tiles and updates the index.
 fn edit_tile(parts: &mut Parts, random: &mut Random) -> String {
-    let mut tiles = parts.tiles();
+    let family = random.below(parts.family_count() as u32) as usize;
+    let mut tiles = parts.tiles_of(family);
     let full: Vec<usize> = (0..tiles.len()).filter(|i| !tiles[*i].is_empty()).collect();
     let index = full[random.below(full.len() as u32) as usize];
     let tile = &mut tiles[index];
@@ -253,7 +254,7 @@ fn edit_tile(parts: &mut Parts, random: &mut Random) -> String {
             format!("tiles {index} and {with} swapped")
         }
     };
-    parts.set_tiles(&tiles);
+    parts.set_tiles_of(family, &tiles);
     what
 }
 

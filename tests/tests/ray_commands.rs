@@ -1,10 +1,11 @@
 //! Tests of `info`, `dump`, `diff` and `convert` with ray traces, and of commands reading from pipes.
 
+use formats::raytrace::TraversalKind;
 use parallax_tests::{program, root, run_ok, traces};
 use serde_json::Value;
 use std::fs;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Output, Stdio};
 
 fn write_generated_trace(folder: &tempfile::TempDir, name: &str, seed: u64) -> PathBuf {
@@ -176,4 +177,138 @@ fn traces_are_read_from_pipes() {
     }
     let endless = program("replay").args(["info", "/dev/zero"]).output();
     assert_eq!(endless.expect("replay starts").status.code(), Some(2));
+}
+
+/// Captures a small frame with all optional columns.
+fn capture_columns(path: &Path) {
+    let options = ["rays", "chess", "--size", "40x24", "--all-columns", "-o"];
+    run_ok(program("tracegen").args(options).arg(path));
+}
+
+#[test]
+fn columns_do_not_change_the_records_and_survive_a_new_encoding() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = |name: &str| folder.path().join(name);
+    let (all, plain, again) = (
+        at("all.raytrace"),
+        at("plain.raytrace"),
+        at("again.raytrace"),
+    );
+    capture_columns(&all);
+    let options = ["rays", "chess", "--size", "40x24", "-o"];
+    run_ok(program("tracegen").args(options).arg(&plain));
+    run_ok(
+        program("replay")
+            .args(["convert", "--to", "raytrace", "-o"])
+            .args([&again, &all]),
+    );
+    assert!(fs::read(&again).expect("written") == fs::read(&all).expect("written"));
+    run_ok(program("replay").arg("diff").args([&again, &all]));
+    let dumped = |path: &Path| text(run_ok(program("replay").arg("dump").arg(path)));
+    for (a, b) in dumped(&plain).lines().zip(dumped(&all).lines()) {
+        let [a, mut b] = [a, b].map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+        for ray in b["rays"].as_array_mut().expect("rays") {
+            let ray = ray.as_object_mut().expect("a ray");
+            let columns = "visits origin direction t_min t_max t slot stack_depth";
+            for column in columns.split(' ') {
+                assert!(ray.remove(column).is_some(), "{column}");
+            }
+        }
+        assert_eq!(a, b);
+    }
+}
+
+#[test]
+fn columns_are_written_in_every_form_with_the_same_names() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("all.raytrace");
+    capture_columns(&path);
+    let convert = |to: &str, rows: &str| {
+        let options = ["convert", "--to", to, "--granularity", rows];
+        run_ok(program("replay").args(options).arg(&path)).stdout
+    };
+    for (rows, column) in [
+        ("record", "stack_depth"),
+        ("node", "max_z"),
+        ("slot", "v2_z"),
+    ] {
+        let csv = String::from_utf8(convert("csv", rows)).expect("text");
+        let names: Vec<&str> = csv.lines().next().expect("names").split(',').collect();
+        assert!(names.contains(&column), "{names:?}");
+        let jsonl = String::from_utf8(convert("jsonl", rows)).expect("text");
+        assert_eq!(jsonl.lines().count(), csv.lines().count() - 1);
+        for (json, csv) in jsonl.lines().zip(csv.lines().skip(1)) {
+            let json: Value = serde_json::from_str(json).expect("JSON");
+            for (name, text) in names.iter().zip(csv.split(',')) {
+                let same = match &json[name] {
+                    Value::Null => text == "NaN",
+                    Value::String(code) => code == text,
+                    value => value.as_f64() == text.parse().ok(),
+                };
+                assert!(same, "{name}: {text} and {}", json[name]);
+            }
+        }
+        let npy = convert("npy", rows);
+        let header = String::from_utf8_lossy(&npy[..npy.len().min(4000)]).into_owned();
+        for name in names {
+            assert!(header.contains(&format!("('{name}', ")), "{name}: {header}");
+        }
+    }
+    let dumped = text(run_ok(
+        program("replay").args(["dump", "--slots"]).arg(&path),
+    ));
+    assert_eq!(dumped.lines().count(), 42_468);
+}
+
+#[test]
+fn columns_that_do_not_belong_together_are_found_by_validate() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("made-up.raytrace");
+    // Each column is sound, but the visits are no walk of the tree.
+    fs::write(
+        &path,
+        parallax_tests::columns::column_trace(TraversalKind::Bvh2, 7),
+    )
+    .expect("room");
+    let output = program("replay").arg("validate").arg(&path).output();
+    let output = output.expect("replay starts");
+    assert_eq!(output.status.code(), Some(1));
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        message.contains("left eye tile 0, ray 0 of sample"),
+        "{message}"
+    );
+    assert!(message.contains("of nodes visited before"), "{message}");
+}
+
+#[test]
+fn columns_that_a_trace_lacks_are_refused() {
+    let golden = root().join("traces/teapot-rays.raytrace");
+    let missing = "expected a trace with the content of its hierarchy (captured with `tracegen rays --hierarchy`), found none";
+    let texture = root().join("traces/atrium.textrace");
+    for (options, path, expected) in [
+        (vec!["dump", "--nodes"], &golden, missing),
+        (vec!["dump", "--slots"], &golden, missing),
+        (
+            vec!["convert", "--to", "npy", "--granularity", "node"],
+            &golden,
+            missing,
+        ),
+        (
+            vec!["dump", "--nodes"],
+            &texture,
+            "--nodes: expected a ray trace",
+        ),
+        (
+            vec!["convert", "--to", "csv", "--granularity", "slot"],
+            &texture,
+            "a texture trace has no hierarchy",
+        ),
+    ] {
+        let output = program("replay").args(&options).arg(path).output();
+        let output = output.expect("replay starts");
+        assert_eq!(output.status.code(), Some(2), "{options:?}");
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(message.contains(expected), "{options:?}: {message}");
+    }
 }

@@ -4,7 +4,7 @@
 //! use it. Values are those of the file, so fixed-point numbers stay integers.
 
 use super::{Access, Entry, Origin, RayAccess, RaySample};
-use crate::raytrace::{Hit, Outcome, PixelRecord, RayKind, RayRecord};
+use crate::raytrace::{Hit, Outcome, PixelRecord, RayGeometry, RayKind, RayRecord};
 use crate::textrace::{QuadRecord, Tile};
 use crate::view::Eye;
 
@@ -36,7 +36,7 @@ pub struct Field<R> {
     pub get: Get<R>,
 }
 
-const fn field<R>(name: &'static str, get: Get<R>) -> Field<R> {
+pub(super) const fn field<R>(name: &'static str, get: Get<R>) -> Field<R> {
     Field {
         name,
         codes: &[],
@@ -44,7 +44,7 @@ const fn field<R>(name: &'static str, get: Get<R>) -> Field<R> {
     }
 }
 
-const fn coded<R>(
+pub(super) const fn coded<R>(
     name: &'static str,
     codes: &'static [&'static str],
     get: fn(&R) -> u8,
@@ -247,27 +247,81 @@ pub struct RayRow {
     pub record: RayRecord,
 }
 
+/// The columns of a row with a ray, and more columns.
+macro_rules! ray_fields {
+    ($($more:expr),* $(,)?) => {
+        &[
+            coded("eye", EYES, |r: &Self| eye_code(r.place.eye)),
+            field("tile", Get::U32(|r: &Self| r.place.tile)),
+            field("x", Get::U32(|r: &Self| r.place.pixel[0])),
+            field("y", Get::U32(|r: &Self| r.place.pixel[1])),
+            field("sample", Get::U32(|r: &Self| r.place.sample)),
+            field("ray", Get::U32(|r: &Self| r.ray)),
+            coded("kind", RAY_KINDS, |r: &Self| kind_code(r.record.kind)),
+            coded("outcome", OUTCOMES, |r: &Self| {
+                outcome_code(r.record.outcome)
+            }),
+            field("depth", Get::U8(|r: &Self| r.record.depth)),
+            field("parent", Get::U32(|r: &Self| r.record.parent)),
+            field("steps", Get::U32(|r: &Self| r.record.steps)),
+            field(
+                "triangle_tests",
+                Get::U32(|r: &Self| r.record.triangle_tests),
+            ),
+            field("alpha_tests", Get::U32(|r: &Self| r.record.alpha_tests)),
+            $($more),*
+        ]
+    };
+}
+
 impl Tabular for RayRow {
-    const FIELDS: &'static [Field<Self>] = &[
-        coded("eye", EYES, |r: &Self| eye_code(r.place.eye)),
-        field("tile", Get::U32(|r: &Self| r.place.tile)),
-        field("x", Get::U32(|r: &Self| r.place.pixel[0])),
-        field("y", Get::U32(|r: &Self| r.place.pixel[1])),
-        field("sample", Get::U32(|r: &Self| r.place.sample)),
-        field("ray", Get::U32(|r: &Self| r.ray)),
-        coded("kind", RAY_KINDS, |r: &Self| kind_code(r.record.kind)),
-        coded("outcome", OUTCOMES, |r: &Self| {
-            outcome_code(r.record.outcome)
-        }),
-        field("depth", Get::U8(|r: &Self| r.record.depth)),
-        field("parent", Get::U32(|r: &Self| r.record.parent)),
-        field("steps", Get::U32(|r: &Self| r.record.steps)),
+    const FIELDS: &'static [Field<Self>] = ray_fields![];
+}
+
+/// A ray of a trace with geometry.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GeometryRow {
+    /// Its sample.
+    pub place: SamplePlace,
+    /// Number of the ray within its sample.
+    pub ray: u32,
+    /// The ray.
+    pub record: RayRecord,
+    /// Its geometry.
+    pub geometry: RayGeometry,
+}
+
+impl Tabular for GeometryRow {
+    const FIELDS: &'static [Field<Self>] = ray_fields![
+        field("origin_x", Get::F32(|r: &Self| r.geometry.origin[0])),
+        field("origin_y", Get::F32(|r: &Self| r.geometry.origin[1])),
+        field("origin_z", Get::F32(|r: &Self| r.geometry.origin[2])),
+        field("direction_x", Get::F32(|r: &Self| r.geometry.direction[0])),
+        field("direction_y", Get::F32(|r: &Self| r.geometry.direction[1])),
+        field("direction_z", Get::F32(|r: &Self| r.geometry.direction[2])),
+        field("t_min", Get::F32(|r: &Self| r.geometry.t_min)),
+        field("t_max", Get::F32(|r: &Self| r.geometry.t_max)),
         field(
-            "triangle_tests",
-            Get::U32(|r: &Self| r.record.triangle_tests),
+            "t",
+            Get::F32(|r: &Self| r.geometry.hit.map_or(f32::NAN, |hit| hit.t))
         ),
-        field("alpha_tests", Get::U32(|r: &Self| r.record.alpha_tests)),
+        field(
+            "slot",
+            Get::U32(|r: &Self| r.geometry.hit.map_or(u32::MAX, |hit| hit.slot))
+        ),
+        field("stack_depth", Get::U32(|r: &Self| r.geometry.stack_depth)),
     ];
+}
+
+/// The rays of a sample with their geometry; none if it was not read.
+pub fn geometry_rows(sample: &RaySample<'_>) -> impl Iterator<Item = GeometryRow> {
+    let rays = ray_rows(sample).zip(sample.geometry.unwrap_or_default());
+    rays.map(|(row, &geometry)| GeometryRow {
+        place: row.place,
+        ray: row.ray,
+        record: row.record,
+        geometry,
+    })
 }
 
 /// The rays of a sample.

@@ -6,15 +6,18 @@
 
 pub mod columns;
 mod csv;
+mod hierarchy;
 mod jsonl;
 mod npy;
 pub mod plain;
 mod rays;
 
 pub use columns::{
-    Field, Get, RayRow, RecordRow, SampleRow, Tabular, Values, ray_rows, record_rows,
+    Field, GeometryRow, Get, RayRow, RecordRow, SampleRow, Tabular, Values, geometry_rows,
+    ray_rows, record_rows,
 };
 pub use csv::CsvWriter;
+pub use hierarchy::{ChildRow, SlotRow, child_rows, node_to_json, slot_rows, slot_to_json};
 pub use jsonl::{JsonlWriter, record_to_json};
 pub use npy::NpyWriter;
 pub use rays::{Entry, RayAccess, RaySample, ray_samples};

@@ -1,7 +1,7 @@
 //! The samples of a ray trace as JSON, and their accesses to the hierarchy's memory.
 
 use crate::raytrace::{
-    BvhSummary, PixelRecord, RayKind, RayRecord, RayTile, RaytraceTables, Visit,
+    BvhSummary, PixelRecord, RayGeometry, RayKind, RayRecord, RayTile, RaytraceTables, Visit,
 };
 use crate::view::Eye;
 use serde::Serialize;
@@ -24,6 +24,8 @@ pub struct RaySample<'a> {
     pub rays: &'a [RayRecord],
     /// Visits of all rays, or `None` if the trace has no visits.
     visits: Option<&'a [Visit]>,
+    /// Geometry of its rays, or `None` if the tile has none.
+    pub geometry: Option<&'a [RayGeometry]>,
 }
 
 /// The samples of a decoded tile, in file order.
@@ -53,8 +55,16 @@ pub fn ray_samples<'a>(
             record,
             rays,
             visits: tables.meta.has_visits.then_some(own),
+            geometry: geometry_of(tile, record),
         }
     })
+}
+
+/// Geometry of the rays of a sample.
+fn geometry_of<'a>(tile: &'a RayTile, record: &PixelRecord) -> Option<&'a [RayGeometry]> {
+    let first = record.first_ray as usize;
+    let end = first.saturating_add(record.ray_count as usize);
+    tile.geometry.get(first..end)
 }
 
 /// A sample as `replay dump` prints it.
@@ -75,8 +85,35 @@ struct SampleLine<'a> {
 struct RayLine<'a> {
     #[serde(flatten)]
     ray: &'a RayRecord,
+    #[serde(flatten)]
+    geometry: Option<GeometryLine>,
     #[serde(skip_serializing_if = "Option::is_none")]
     visits: Option<Vec<VisitLine>>,
+}
+
+#[derive(Serialize)]
+struct GeometryLine {
+    origin: [f32; 3],
+    direction: [f32; 3],
+    t_min: f32,
+    t_max: f32,
+    t: Option<f32>,
+    slot: Option<u32>,
+    stack_depth: u32,
+}
+
+impl From<&RayGeometry> for GeometryLine {
+    fn from(geometry: &RayGeometry) -> Self {
+        Self {
+            origin: geometry.origin,
+            direction: geometry.direction,
+            t_min: geometry.t_min,
+            t_max: geometry.t_max,
+            t: geometry.hit.map(|hit| hit.t),
+            slot: geometry.hit.map(|hit| hit.slot),
+            stack_depth: geometry.stack_depth,
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -119,8 +156,10 @@ impl RaySample<'_> {
     /// # Errors
     /// None in practice; the signature is the serialiser's.
     pub fn to_json(&self, bvh: &BvhSummary) -> serde_json::Result<String> {
+        let mut geometry = self.geometry.unwrap_or_default().iter();
         let rays = self.rays_and_visits().map(|(ray, visits)| RayLine {
             ray,
+            geometry: geometry.next().map(GeometryLine::from),
             visits: visits.map(|all| all.iter().map(|v| VisitLine::new(bvh, *v)).collect()),
         });
         serde_json::to_string(&SampleLine {

@@ -1,8 +1,10 @@
-//! Writes and reads a `.raytrace`: tables at once, tiles one by one from any thread.
+//! Reads a `.raytrace`: tables at once, tiles one by one from any thread.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::{RayTile, RaytraceTables, codec, tables};
-use crate::container::{AtomicFile, ChunkTag, Container, ContainerWriter, Kind};
+use super::geometry::RayGeometry;
+use super::hierarchy::{Hierarchy, Parents};
+use super::{RayTile, RaytraceTables, codec, geometry_codec, hierarchy_codec, tables};
+use crate::container::{ChunkTag, Container, Kind};
 use crate::error::{Broken, FormatError, Result, ensure};
 use crate::parse::{Parsed, zero};
 use crate::tiles::{TileChunk, TileSpan};
@@ -11,7 +13,6 @@ use nom::Parser;
 use nom::error::context;
 use nom::multi::count;
 use nom::number::complete::le_u32;
-use std::io::{Cursor, Seek, Write};
 use std::path::Path;
 
 /// Chunk of the encoded tiles, the left eye's first.
@@ -21,134 +22,18 @@ pub const RAY_INDEX: ChunkTag = ChunkTag(*b"RTIX");
 /// Size of an index entry: offset, bytes, CRC-32, rays, zero.
 pub const RAY_INDEX_ENTRY_BYTES: usize = 24;
 
-/// A tile's bytes, ready to be appended.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct EncodedRayTile {
-    bytes: Vec<u8>,
-    crc32: u32,
-    rays: u32,
-}
-
-impl EncodedRayTile {
-    /// Encoded size.
-    #[must_use]
-    pub fn size_bytes(&self) -> usize {
-        self.bytes.len()
-    }
-}
-
-/// Encodes a tile. A pure function, so that tiles can be encoded in parallel.
-///
-/// # Errors
-/// The tile violates an invariant of the format.
-pub fn encode_ray_tile(tile: &RayTile, has_visits: bool) -> Result<EncodedRayTile> {
-    let bytes = codec::encode(tile, has_visits).map_err(|broken| {
-        let what = format!("tile at {:?}, {}", tile.origin_px, broken.what);
-        Broken { what, ..broken }.unwritable()
-    })?;
-    let too_many = |_| FormatError::Unwritable {
-        what: format!("tile at {:?}", tile.origin_px),
-        expected: "less than 2^32 bytes and rays".to_owned(),
-        found: format!("{} rays", tile.rays.len()),
-    };
-    u32::try_from(bytes.len()).map_err(too_many)?;
-    Ok(EncodedRayTile {
-        crc32: crc32fast::hash(&bytes),
-        rays: u32::try_from(tile.rays.len()).map_err(too_many)?,
-        bytes,
-    })
-}
-
-/// Writes a trace tile by tile: the left eye's in order, then the right eye's.
-#[derive(Debug)]
-pub struct RaytraceWriter<W = AtomicFile> {
-    container: ContainerWriter<W>,
-    index: Vec<u8>,
-    offset: u64,
-}
-
-impl RaytraceWriter<AtomicFile> {
-    /// Starts a file that appears under its name when it is finished.
-    ///
-    /// # Errors
-    /// The temporary file in the folder of `path` cannot be written.
-    pub fn create(path: &Path) -> Result<Self> {
-        Self::start(ContainerWriter::create(path, Kind::Raytrace)?)
-    }
-
-    /// Writes index and tables, and renames the file. Returns its size in bytes.
-    ///
-    /// # Errors
-    /// Writing failed, tiles are missing, or a table violates an invariant; no file is left.
-    pub fn finish(self, tables: &RaytraceTables) -> Result<u64> {
-        self.complete(tables)?.finish()
-    }
-}
-
-impl RaytraceWriter<Cursor<Vec<u8>>> {
-    /// Starts a trace in memory.
-    ///
-    /// # Errors
-    /// None in practice; the signature matches that for files.
-    pub fn in_memory() -> Result<Self> {
-        Self::start(ContainerWriter::in_memory(Kind::Raytrace)?)
-    }
-
-    /// Writes index and tables, and returns the bytes.
-    ///
-    /// # Errors
-    /// Tiles are missing, or a table violates an invariant.
-    pub fn into_bytes(self, tables: &RaytraceTables) -> Result<Vec<u8>> {
-        self.complete(tables)?.into_bytes()
-    }
-}
-
-impl<W: Write + Seek> RaytraceWriter<W> {
-    fn start(mut container: ContainerWriter<W>) -> Result<Self> {
-        container.begin_chunk(RAY_TILES)?;
-        Ok(Self {
-            container,
-            index: Vec::new(),
-            offset: 0,
-        })
-    }
-
-    /// Appends the next tile.
-    ///
-    /// # Errors
-    /// Writing failed.
-    pub fn tile(&mut self, tile: &EncodedRayTile) -> Result<()> {
-        self.container.append(&tile.bytes)?;
-        let bytes = u32::try_from(tile.bytes.len()).unwrap_or(u32::MAX);
-        let span = TileSpan {
-            offset: self.offset,
-            bytes,
-            crc32: tile.crc32,
-        };
-        span.write(&mut self.index);
-        for number in [tile.rays, 0] {
-            self.index.extend(number.to_le_bytes());
-        }
-        self.offset += u64::from(bytes);
-        Ok(())
-    }
-
-    fn complete(mut self, tables: &RaytraceTables) -> Result<ContainerWriter<W>> {
-        let tiles = 2 * tables.tile_count() as usize;
-        let written = self.index.len() / RAY_INDEX_ENTRY_BYTES;
-        if written != tiles {
-            return Err(FormatError::Unwritable {
-                what: "tiles".to_owned(),
-                expected: format!("{tiles}, all of both eyes"),
-                found: written.to_string(),
-            });
-        }
-        self.container.end_chunk()?;
-        self.container.chunk(RAY_INDEX, &self.index)?;
-        tables::write(tables, &mut self.container)?;
-        Ok(self.container)
-    }
-}
+/// Chunk of the encoded geometry of the rays, tile by tile as [`RAY_TILES`].
+pub const GEOMETRY_TILES: ChunkTag = ChunkTag(*b"RGEO");
+/// Chunk of the index of [`GEOMETRY_TILES`].
+pub const GEOMETRY_INDEX: ChunkTag = ChunkTag(*b"RGIX");
+/// Size of an entry of that index: offset, bytes, CRC-32.
+pub const GEOMETRY_INDEX_ENTRY_BYTES: usize = 16;
+/// Chunk of the inner nodes.
+pub const NODES: ChunkTag = ChunkTag(*b"RNOD");
+/// Chunk of the triangles by slot.
+pub const SLOTS: ChunkTag = ChunkTag(*b"RSLT");
+/// Minor version of traces with one of these chunks.
+pub const COLUMNS_MINOR: u16 = 3;
 
 /// One entry of the index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -170,6 +55,9 @@ pub struct Raytrace {
     container: Container,
     tables: RaytraceTables,
     index: Vec<IndexEntry>,
+    /// Positions of the tiles' geometry; empty if the trace has none.
+    geometry: Vec<TileSpan>,
+    has_hierarchy: bool,
 }
 
 impl Raytrace {
@@ -211,10 +99,14 @@ impl Raytrace {
                 container.malformed(RAY_INDEX, at, broken.expected, broken.found)
             })?;
         }
+        let geometry = geometry_spans(&container, tiles)?;
+        let has_hierarchy = has_all(&container, [NODES, SLOTS])?;
         Ok(Self {
             container,
             tables,
             index,
+            geometry,
+            has_hierarchy,
         })
     }
 
@@ -259,6 +151,76 @@ impl Raytrace {
         outcome
     }
 
+    /// Whether the trace has the geometry of its rays.
+    #[must_use]
+    pub fn has_geometry(&self) -> bool {
+        !self.geometry.is_empty()
+    }
+
+    /// Whether the trace has the content of its hierarchy.
+    #[must_use]
+    pub fn has_hierarchy(&self) -> bool {
+        self.has_hierarchy
+    }
+
+    /// Decodes a tile with the geometry of its rays, if the trace has it.
+    ///
+    /// # Errors
+    /// See [`Self::decode_tile`].
+    pub fn decode_tile_with_geometry(&self, eye: Eye, tile: u32, out: &mut RayTile) -> Result<()> {
+        self.decode_tile(eye, tile, out)?;
+        let geometry = self.decode_geometry(eye, tile, out);
+        match geometry {
+            Ok(geometry) => {
+                out.geometry = geometry;
+                Ok(())
+            }
+            Err(error) => {
+                out.clear();
+                Err(error)
+            }
+        }
+    }
+
+    fn decode_geometry(&self, eye: Eye, tile: u32, records: &RayTile) -> Result<Vec<RayGeometry>> {
+        if self.geometry.is_empty() {
+            return Ok(Vec::new());
+        }
+        let first = match eye {
+            Eye::Left => 0,
+            Eye::Right => self.tables.tile_count() as usize,
+        };
+        let Some(span) = self.geometry.get(first + tile as usize) else {
+            return Ok(Vec::new());
+        };
+        geometry_chunk(&self.container).parse(span, |input| {
+            geometry_codec::decode(&self.tables, self.tables.camera(eye), input, records)
+        })
+    }
+
+    /// Reads the content of the hierarchy and the parents of its nodes and slots; `None` if the trace does not
+    /// have it. A node takes up to 288 bytes of memory, a triangle 44.
+    ///
+    /// # Errors
+    /// The chunks are malformed; the error names the place.
+    pub fn read_hierarchy(&self) -> Result<Option<(Hierarchy, Parents)>> {
+        if !self.has_hierarchy {
+            return Ok(None);
+        }
+        let (container, bvh) = (&self.container, &self.tables.bvh);
+        let hierarchy = Hierarchy {
+            children: container
+                .parse_chunk(NODES, |input| hierarchy_codec::decode_nodes(bvh, input))?,
+            triangles: container
+                .parse_chunk(SLOTS, |input| hierarchy_codec::decode_triangles(bvh, input))?,
+        };
+        let parents = hierarchy.check(bvh).map_err(|broken| {
+            let expected = format!("{}: {}", broken.what, broken.expected);
+            container.malformed(NODES, 0, expected, broken.found)
+        })?;
+        Ok(Some((hierarchy, parents)))
+    }
+
     fn decode_entry(&self, eye: Eye, entry: &IndexEntry, out: &mut RayTile) -> Result<()> {
         let (tables, camera) = (&self.tables, self.tables.camera(eye));
         tile_chunk(&self.container).parse(&entry.span, |input| {
@@ -299,6 +261,51 @@ fn tile_chunk(container: &Container) -> TileChunk<'_> {
         index: RAY_INDEX,
         entry_bytes: RAY_INDEX_ENTRY_BYTES,
     }
+}
+
+fn geometry_chunk(container: &Container) -> TileChunk<'_> {
+    TileChunk {
+        container,
+        tiles: GEOMETRY_TILES,
+        index: GEOMETRY_INDEX,
+        entry_bytes: GEOMETRY_INDEX_ENTRY_BYTES,
+    }
+}
+
+/// Whether a trace has two chunks that belong together.
+fn has_all(container: &Container, [first, second]: [ChunkTag; 2]) -> Result<bool> {
+    let has = |tag| container.entry(tag).is_ok();
+    if has(first) != has(second) {
+        // The error names the missing chunk.
+        container.entry(first)?;
+        container.entry(second)?;
+    }
+    if !has(first) {
+        return Ok(false);
+    }
+    let (major, minor) = container.version();
+    if minor < COLUMNS_MINOR {
+        let expected = format!("version {major}.{COLUMNS_MINOR} for this chunk");
+        return Err(container.malformed(first, 0, expected, format!("{major}.{minor}")));
+    }
+    Ok(true)
+}
+
+/// Positions of the geometry of `tiles` tiles, if the trace has it.
+fn geometry_spans(container: &Container, tiles: usize) -> Result<Vec<TileSpan>> {
+    if !has_all(container, [GEOMETRY_TILES, GEOMETRY_INDEX])? {
+        return Ok(Vec::new());
+    }
+    let bytes = container.chunk(GEOMETRY_INDEX)?.len();
+    if bytes != tiles * GEOMETRY_INDEX_ENTRY_BYTES {
+        let expected = format!("16 bytes for each of {tiles} tiles");
+        return Err(container.malformed(GEOMETRY_INDEX, 0, expected, format!("{bytes} bytes")));
+    }
+    let spans: Vec<TileSpan> = container.parse_chunk(GEOMETRY_INDEX, |input| {
+        count(TileSpan::parse, tiles).parse(input)
+    })?;
+    geometry_chunk(container).check(spans.iter().copied().map(Some))?;
+    Ok(spans)
 }
 
 /// Tile numbers in the order of the index.

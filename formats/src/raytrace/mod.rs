@@ -8,10 +8,19 @@
 pub mod camera;
 mod codec;
 mod file;
+mod geometry;
+mod geometry_codec;
 pub mod half;
+mod hierarchy;
+mod hierarchy_codec;
 pub mod normal;
+mod predict;
+mod relations;
 pub mod tables;
+mod write;
 
+#[cfg(test)]
+mod column_tests;
 #[cfg(test)]
 mod tests;
 
@@ -19,11 +28,15 @@ use crate::textrace::TraceMeta;
 use crate::view::{Eye, TILE_SIZE_PX};
 pub use camera::EyeCamera;
 pub use file::{
-    EncodedRayTile, RAY_INDEX, RAY_INDEX_ENTRY_BYTES, RAY_TILES, Raytrace, RaytraceWriter,
-    encode_ray_tile,
+    GEOMETRY_INDEX, GEOMETRY_INDEX_ENTRY_BYTES, GEOMETRY_TILES, NODES, RAY_INDEX,
+    RAY_INDEX_ENTRY_BYTES, RAY_TILES, Raytrace, SLOTS,
 };
+pub use geometry::{RayGeometry, SlotHit};
 use glam::Vec3;
+pub use hierarchy::{ChildKind, Hierarchy, HierarchyChild, HierarchyTriangle, Parents};
+pub use relations::check_relations;
 use serde::{Deserialize, Serialize};
+pub use write::{EncodedRayTile, RaytraceWriter, encode_ray_tile, encode_ray_tile_with_geometry};
 
 /// Description of the whole trace.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -348,6 +361,8 @@ pub struct RayTile {
     /// Visits of all rays in ray order, [`RayRecord::visit_count`] each, in execution order; empty if the
     /// trace has none.
     pub visits: Vec<Visit>,
+    /// Geometry of all rays in ray order; empty if the trace has none, or if it was not read.
+    pub geometry: Vec<RayGeometry>,
 }
 
 impl RayTile {
@@ -358,6 +373,7 @@ impl RayTile {
         self.pixels.clear();
         self.rays.clear();
         self.visits.clear();
+        self.geometry.clear();
     }
 
     /// Rays of a pixel, its primary ray first; empty for a pixel of another tile.

@@ -64,7 +64,7 @@ fn meta(has_visits: bool) -> RaytraceMeta {
     }
 }
 
-fn tables(has_visits: bool) -> RaytraceTables {
+pub(super) fn tables(has_visits: bool) -> RaytraceTables {
     let material = |name: &str, mirror| RayMaterial {
         name: name.to_owned(),
         diffuse: true,
@@ -114,7 +114,7 @@ fn tables(has_visits: bool) -> RaytraceTables {
 }
 
 /// A generated tile that obeys the format and depends only on the arguments.
-fn tile(tables: &RaytraceTables, eye: Eye, number: u32, seed: u64) -> RayTile {
+pub(super) fn tile(tables: &RaytraceTables, eye: Eye, number: u32, seed: u64) -> RayTile {
     let mut state = seed | 1;
     let mut next = |below: u32| {
         state = state
@@ -187,7 +187,7 @@ fn tile(tables: &RaytraceTables, eye: Eye, number: u32, seed: u64) -> RayTile {
     tile
 }
 
-fn eyes_and_tiles(tables: &RaytraceTables) -> Vec<(Eye, u32)> {
+pub(super) fn eyes_and_tiles(tables: &RaytraceTables) -> Vec<(Eye, u32)> {
     let tiles = tables.tile_count();
     let both = [Eye::Left, Eye::Right];
     both.into_iter()

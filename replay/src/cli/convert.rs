@@ -10,11 +10,13 @@ use formats::Trace;
 use formats::container::{AtomicFile, is_stdout};
 use formats::interop::plain::{CompressedWriter, Compression, PlainAccess, PlainForm, PlainWriter};
 use formats::interop::{
-    Access, AccessSink, CsvWriter, Expander, Granularity, JsonlWriter, Origin, RayAccess, RayRow,
-    RecordRow, ray_samples,
+    Access, AccessSink, CsvWriter, Expander, Granularity, JsonlWriter, Origin, RayAccess,
+    ray_samples,
 };
 use formats::layout::Layout;
-use formats::raytrace::{RayTile, Raytrace, RaytraceWriter, encode_ray_tile};
+use formats::raytrace::{
+    RayTile, Raytrace, RaytraceWriter, encode_ray_tile, encode_ray_tile_with_geometry,
+};
 use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as, with_operands};
 use shell::Output;
 use std::io::{self, Write};
@@ -84,6 +86,10 @@ impl Target {
     fn is_columns(self) -> bool {
         matches!(self, Self::Npy | Self::Parquet)
     }
+
+    fn has_rows(self) -> bool {
+        self.is_columns() || matches!(self, Self::Csv | Self::Jsonl)
+    }
 }
 
 /// Compressions.
@@ -117,8 +123,25 @@ pub enum GranularityName {
     /// distinct line of a visit
     #[default]
     Line,
-    /// With npy and parquet: no accesses, but every record or ray, with the columns of `replay dump --parquet`
+    /// With csv, jsonl, npy and parquet: no accesses, but every record or ray, with the columns of
+    /// `replay dump --parquet`
     Record,
+    /// Likewise, every child of every inner node of a ray trace's hierarchy
+    Node,
+    /// Likewise, the triangle of every slot of the hierarchy
+    Slot,
+}
+
+impl GranularityName {
+    /// The flag's value if the output holds rows of the trace instead of accesses.
+    fn of_rows(self) -> Option<&'static str> {
+        match self {
+            Self::Texel | Self::Line => None,
+            Self::Record => Some("record"),
+            Self::Node => Some("node"),
+            Self::Slot => Some("slot"),
+        }
+    }
 }
 
 /// Arguments of `replay convert`.
@@ -131,6 +154,7 @@ pub enum GranularityName {
   replay convert c.textrace --to npy --granularity record -o records.npy
   replay convert c.textrace --to textrace --encoding raw -o raw.textrace
   replay convert r.raytrace --to csv | head
+  replay convert r.raytrace --to npy --granularity node -o nodes.npy
 Rays are written tile by tile, left eye first. Their accesses need a trace with visits
 (tracegen rays --visits).")]
 pub struct ConvertArgs {
@@ -195,10 +219,10 @@ impl ConvertArgs {
             self.encoding.is_none() || self.to == Target::Textrace,
             "--encoding: only with --to textrace"
         );
-        if self.granularity == Some(GranularityName::Record) {
+        if let Some(rows) = self.granularity.and_then(GranularityName::of_rows) {
             ensure!(
-                self.to.is_columns(),
-                "--granularity record: only with --to npy and --to parquet"
+                self.to.has_rows(),
+                "--granularity {rows}: only with --to csv, jsonl, npy and parquet"
             );
             if let Some(flag) = self.machine.first_of_traces() {
                 bail!("{flag}: it has no effect on records, only on accesses");
@@ -259,11 +283,8 @@ fn write_accesses(
     args: &ConvertArgs,
     out: &mut (impl Write + Send),
 ) -> Result<()> {
-    if args.granularity() == GranularityName::Record {
-        return match trace {
-            Trace::Texture(trace) => columns::records::<RecordRow, _>(&**trace, args.to, out),
-            Trace::Ray(trace) => columns::records::<RayRow, _>(&**trace, args.to, out),
-        };
+    if args.granularity().of_rows().is_some() {
+        return columns::of_trace(trace, args.granularity(), args.to, out);
     }
     if let Trace::Ray(trace) = trace
         && !trace.tables().meta.has_visits
@@ -331,7 +352,7 @@ fn accesses(
         sampling: config.sampling,
         granularity: match granularity {
             GranularityName::Texel => Granularity::Texel,
-            GranularityName::Line | GranularityName::Record => Granularity::Line,
+            _ => Granularity::Line,
         },
         line_bytes: config.line_bytes,
     };
@@ -415,10 +436,18 @@ fn reencode(trace: &Trace, args: &ConvertArgs) -> Result<()> {
         (Trace::Ray(trace), Target::Raytrace) => {
             let tables = trace.tables();
             let mut writer = RaytraceWriter::create(&args.output)?;
+            if let Some((hierarchy, _)) = trace.read_hierarchy()? {
+                writer = writer.with_hierarchy(hierarchy);
+            }
             let mut tile = RayTile::default();
             for (eye, index) in ray_tiles(tables) {
-                trace.decode_tile(eye, index, &mut tile)?;
-                writer.tile(&encode_ray_tile(&tile, tables.meta.has_visits)?)?;
+                trace.decode_tile_with_geometry(eye, index, &mut tile)?;
+                let encoded = if trace.has_geometry() {
+                    encode_ray_tile_with_geometry(tables, tables.camera(eye), &tile)?
+                } else {
+                    encode_ray_tile(&tile, tables.meta.has_visits)?
+                };
+                writer.tile(&encoded)?;
             }
             writer.finish(tables)?;
         }

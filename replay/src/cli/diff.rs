@@ -5,7 +5,7 @@ use super::dump::record_lines;
 use super::tiles::{ray_tiles, tiles};
 use anyhow::Result;
 use formats::Trace;
-use formats::interop::ray_samples;
+use formats::interop::{node_to_json, ray_samples, slot_rows, slot_to_json};
 use formats::raytrace::{RayTile, Raytrace};
 use formats::textrace::geometry::GeometryView;
 use formats::textrace::{Textrace, Tile};
@@ -134,18 +134,52 @@ fn rays(left: &Raytrace, right: &Raytrace, ignore_meta: bool) -> Result<Vec<Stri
     found.extend(entries("material", &a.materials, &b.materials)?);
     found.extend(entries("light", &a.lights, &b.lights)?);
     found.extend(entries("triangle", &a.triangles, &b.triangles)?);
+    found.extend(hierarchies(left, right)?);
     if ray_tiles(&a).eq(ray_tiles(b)) {
         found.extend(first_sample(left, right)?);
     }
     Ok(found)
 }
 
+/// The first different node or slot of two hierarchies.
+fn hierarchies(left: &Raytrace, right: &Raytrace) -> Result<Option<String>> {
+    let content = |trace: &Raytrace| -> Result<Option<Vec<[String; 2]>>> {
+        let bvh = &trace.tables().bvh;
+        let Some((hierarchy, _)) = trace.read_hierarchy()? else {
+            return Ok(None);
+        };
+        let nodes = (0u32..).zip(hierarchy.children.chunks(bvh.traversal.width()));
+        let nodes = nodes.map(|(node, children)| {
+            let text = node_to_json(bvh, node, children)?;
+            Ok([format!("node {node}"), text])
+        });
+        let slots = slot_rows(&hierarchy)
+            .map(|row| Ok([format!("slot {}", row.slot), slot_to_json(bvh, &row)?]));
+        let lines: serde_json::Result<_> = nodes.chain(slots).collect();
+        Ok(Some(lines?))
+    };
+    let there = |trace: &Raytrace| {
+        if trace.has_hierarchy() {
+            "there"
+        } else {
+            "absent"
+        }
+    };
+    let (Some(a), Some(b)) = (content(left)?, content(right)?) else {
+        let [a, b] = [left, right].map(there);
+        return Ok((a != b).then(|| differ("content of the hierarchy", a, b)));
+    };
+    let first = a.iter().zip(&b).find(|(a, b)| a != b);
+    // Different numbers of nodes are differences of the summary.
+    Ok(first.map(|([place, a], [_, b])| differ(place, a, b)))
+}
+
 /// The first different sample of two traces with the same tiles.
 fn first_sample(left: &Raytrace, right: &Raytrace) -> Result<Option<String>> {
     let (mut a, mut b) = (RayTile::default(), RayTile::default());
     for (eye, index) in ray_tiles(left.tables()) {
-        left.decode_tile(eye, index, &mut a)?;
-        right.decode_tile(eye, index, &mut b)?;
+        left.decode_tile_with_geometry(eye, index, &mut a)?;
+        right.decode_tile_with_geometry(eye, index, &mut b)?;
         if a == b {
             continue;
         }

@@ -2,13 +2,14 @@
 
 use super::tiles::{NumberRange, ray_tiles, tiles};
 use crate::files;
-use crate::records::Rows;
+use crate::records::{self, Rows};
 use crate::report::rows_parquet::RowsWriter;
 use anyhow::{Context, Result, bail, ensure};
 use formats::Trace;
 use formats::container::AtomicFile;
 use formats::interop::{
-    RayRow, RecordRow, SampleRow, Tabular, ray_samples, record_rows, record_to_json,
+    GeometryRow, RayRow, RecordRow, SampleRow, Tabular, child_rows, node_to_json, ray_samples,
+    record_rows, record_to_json, slot_rows, slot_to_json,
 };
 use formats::raytrace::{RayTile, Raytrace};
 use formats::textrace::{Textrace, Tile};
@@ -21,12 +22,13 @@ use std::process::ExitCode;
 #[derive(Clone, Debug, clap::Args)]
 #[command(
     after_help = "A texture trace has one line per record. A ray trace has one line per sample of a pixel,
-with its rays and, if the trace has them, their visits.
+with its rays and, if the trace has them, their geometry and their visits.
 
 Examples:
   replay dump c.textrace --pass 0 --tile 1200
   replay dump c.textrace --tile 40..48 | jq .primitive
   replay dump r.raytrace --pass 1 --tile 7 | jq '.rays[].steps'
+  replay dump r.raytrace --nodes --parquet nodes.parquet
   replay dump c.textrace --parquet records.parquet"
 )]
 pub struct DumpArgs {
@@ -41,6 +43,14 @@ pub struct DumpArgs {
     /// Print primitive lists instead of records: one line per tile of each view captured with --geometry
     #[arg(long, conflicts_with_all = ["pass", "tile"])]
     pub lists: bool,
+    /// Print the hierarchy's inner nodes instead, one line per node; in Parquet, one row per child. Needs a
+    /// trace captured with `tracegen rays --hierarchy`
+    #[arg(long, conflicts_with_all = ["pass", "tile", "lists", "samples"])]
+    pub nodes: bool,
+    /// Print the hierarchy's triangles instead, one line per slot. Needs a trace captured with
+    /// `tracegen rays --hierarchy`
+    #[arg(long, conflicts_with_all = ["pass", "tile", "lists", "samples", "nodes"])]
+    pub slots: bool,
     /// Write a Parquet file instead: one row per record or, for ray traces, one row per ray
     #[arg(long, value_name = "FILE", conflicts_with = "lists")]
     pub parquet: Option<PathBuf>,
@@ -62,6 +72,7 @@ pub fn run(args: &DumpArgs) -> Result<ExitCode> {
     let trace = Trace::open(&args.trace)?;
     let mut out = shell::stdout();
     match (&trace, args.lists) {
+        _ if args.nodes || args.slots => hierarchy(&trace, args, &mut out)?,
         (Trace::Texture(trace), true) => primitive_lists(trace, &mut out)?,
         (Trace::Ray(_), true) => bail!(
             "--lists: expected a texture trace, found {}",
@@ -88,6 +99,9 @@ fn to_parquet(trace: &Trace, args: &DumpArgs, path: &Path) -> Result<()> {
         "--samples: expected a ray trace, found {}",
         args.trace.display()
     );
+    if args.nodes || args.slots {
+        return hierarchy_to_parquet(trace, args, path);
+    }
     let write = |out: &mut (dyn Write + Send)| match trace {
         Trace::Texture(trace) => {
             let chosen = |at: &(usize, usize)| args.has(at.0, at.1);
@@ -97,6 +111,8 @@ fn to_parquet(trace: &Trace, args: &DumpArgs, path: &Path) -> Result<()> {
             let chosen = |at: &(_, u32)| args.has(at.0 as usize, at.1 as usize);
             if args.samples {
                 parquet_of::<SampleRow, _>(&**trace, chosen, out)
+            } else if trace.has_geometry() {
+                parquet_of::<GeometryRow, _>(&**trace, chosen, out)
             } else {
                 parquet_of::<RayRow, _>(&**trace, chosen, out)
             }
@@ -184,6 +200,60 @@ pub(super) fn record_lines(pass: usize, index: usize, tile: &Tile) -> impl Itera
         .map(|row| record_to_json(row.origin, &row.record).to_string())
 }
 
+/// The ray trace whose hierarchy is asked for.
+fn ray_trace<'a>(trace: &'a Trace, args: &DumpArgs) -> Result<&'a Raytrace> {
+    match trace {
+        Trace::Ray(trace) => Ok(trace),
+        Trace::Texture(_) => bail!(
+            "{}: expected a ray trace, found {}",
+            if args.nodes { "--nodes" } else { "--slots" },
+            args.trace.display()
+        ),
+    }
+}
+
+/// Prints the inner nodes or the triangles of the hierarchy.
+fn hierarchy(trace: &Trace, args: &DumpArgs, out: &mut impl Write) -> Result<()> {
+    let trace = ray_trace(trace, args)?;
+    let (bvh, hierarchy) = (&trace.tables().bvh, records::hierarchy(trace)?);
+    if args.nodes {
+        let nodes = hierarchy.children.chunks(bvh.traversal.width());
+        for (node, children) in (0u32..).zip(nodes) {
+            writeln!(out, "{}", node_to_json(bvh, node, children)?)?;
+        }
+    } else {
+        for row in slot_rows(&hierarchy) {
+            writeln!(out, "{}", slot_to_json(bvh, &row)?)?;
+        }
+    }
+    Ok(())
+}
+
+/// Writes the children of all inner nodes or the triangles of the hierarchy as Parquet.
+fn hierarchy_to_parquet(trace: &Trace, args: &DumpArgs, path: &Path) -> Result<()> {
+    let trace = ray_trace(trace, args)?;
+    let hierarchy = records::hierarchy(trace)?;
+    let name = || format!("cannot write {}", path.display());
+    let mut out = AtomicFile::create(path).with_context(name)?;
+    if args.nodes {
+        let rows = child_rows(&trace.tables().bvh, &hierarchy);
+        all_rows(rows, &mut out).with_context(name)?;
+    } else {
+        all_rows(slot_rows(&hierarchy), &mut out).with_context(name)?;
+    }
+    out.persist().with_context(name)
+}
+
+fn all_rows<R: Tabular>(
+    mut rows: impl Iterator<Item = R>,
+    out: &mut (dyn Write + Send),
+) -> Result<()> {
+    let mut writer = RowsWriter::new(out)?;
+    rows.try_for_each(|row| writer.write(row))?;
+    writer.finish()?;
+    Ok(())
+}
+
 /// Prints the primitives of each tile of each view.
 fn primitive_lists(trace: &Textrace, out: &mut impl Write) -> Result<()> {
     let Some(geometry) = trace.geometry() else {
@@ -214,7 +284,7 @@ fn samples(
     let mut any = false;
     for (eye, index) in ray_tiles(tables).filter(|at| chosen(at.0 as usize, at.1 as usize)) {
         any = true;
-        trace.decode_tile(eye, index, &mut tile)?;
+        trace.decode_tile_with_geometry(eye, index, &mut tile)?;
         for sample in ray_samples(tables, eye, index, &tile) {
             writeln!(out, "{}", sample.to_json(&tables.bvh)?)?;
         }
@@ -239,6 +309,8 @@ mod tests {
             pass: Some("1".parse().unwrap()),
             tile: Some("2..5".parse().unwrap()),
             lists: false,
+            nodes: false,
+            slots: false,
             parquet: None,
             samples: false,
         };
@@ -263,6 +335,8 @@ mod tests {
             pass: Some(pass.parse().unwrap()),
             tile: Some("2..5".parse().unwrap()),
             lists: false,
+            nodes: false,
+            slots: false,
             parquet: Some(path.clone()),
             samples,
         };
@@ -290,6 +364,8 @@ mod tests {
             pass: Some("9".parse().unwrap()),
             tile: None,
             lists: false,
+            nodes: false,
+            slots: false,
             parquet: None,
             samples: false,
         };

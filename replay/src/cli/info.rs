@@ -156,6 +156,10 @@ fn texture_table(textures: &[Texture]) -> String {
     Table::new(&columns, &rows).text()
 }
 
+fn listed(there: bool) -> &'static str {
+    if there { "listed" } else { "not listed" }
+}
+
 fn ray_text(trace: &Raytrace) -> Result<String> {
     let RaytraceTables {
         meta,
@@ -167,7 +171,8 @@ fn ray_text(trace: &Raytrace) -> Result<String> {
     let mut text = heading(trace.container(), &meta.trace, trace.content_checksum());
     text += &format!(
         "hierarchy by {}, walked as {}: {} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}, \
-         {} bytes a node, {} a triangle\n{} sample(s) a pixel, reflections {} deep, visits {}\n\n",
+         {} bytes a node, {} a triangle\n{} sample(s) a pixel, reflections {} deep, visits {}, \
+         geometry {}, hierarchy {}\n\n",
         bvh.builder,
         format!("{:?}", bvh.traversal).to_lowercase(),
         bvh.triangles,
@@ -179,11 +184,9 @@ fn ray_text(trace: &Raytrace) -> Result<String> {
         bvh.bytes_per_triangle,
         meta.samples_per_px,
         meta.max_depth,
-        if meta.has_visits {
-            "listed"
-        } else {
-            "not listed"
-        },
+        listed(meta.has_visits),
+        listed(trace.has_geometry()),
+        listed(trace.has_hierarchy()),
     );
     let [left, right] = ray_counts(trace)?;
     type EyeRow = (&'static str, RayCounts);

@@ -4,7 +4,7 @@ use super::tiles::{ray_tiles, tiles};
 use crate::config::RunConfig;
 use crate::stream::Expander;
 use anyhow::Result;
-use formats::raytrace::RayTile;
+use formats::raytrace::{RAY_TILES, RayTile, check_relations};
 use formats::textrace::Tile;
 use formats::textrace::tables::TEXTURES;
 use formats::{FormatError, Trace};
@@ -73,11 +73,17 @@ fn validate(path: &std::path::Path) -> formats::Result<String> {
             (counts, "records")
         }
         Trace::Ray(trace) => {
+            let hierarchy = trace.read_hierarchy()?;
             let tiles: Vec<_> = ray_tiles(trace.tables()).collect();
             let rays = tiles
                 .par_iter()
                 .map_init(RayTile::default, |tile, (eye, index)| {
-                    trace.decode_tile(*eye, *index, tile)?;
+                    trace.decode_tile_with_geometry(*eye, *index, tile)?;
+                    check_relations(tile, hierarchy.as_ref()).map_err(|broken| {
+                        let place = format!("{eye} eye tile {index}, {}", broken.what);
+                        let expected = format!("{place}: {}", broken.expected);
+                        container.malformed(RAY_TILES, 0, expected, broken.found)
+                    })?;
                     Ok(tile.rays.len() as u64)
                 });
             (rays.collect(), "rays")

@@ -5,7 +5,7 @@ use super::tracer::{TraceSettings, Tracer, triangle};
 use formats::Result;
 use formats::raytrace::{
     EncodedRayTile, EyeCamera, RayKind, RayTile, RayTriangle, RaytraceTables, RaytraceWriter,
-    encode_ray_tile,
+    encode_ray_tile, encode_ray_tile_with_geometry,
 };
 use glam::Vec3;
 use rayon::prelude::*;
@@ -179,7 +179,7 @@ fn trace_batch(
             |(tracer, tile), number| {
                 tile.clear();
                 (tile.origin_px, tile.size_px) = tables.tile_rect(number);
-                trace_tile(tracer, settings, eye, tile)
+                trace_tile(tracer, settings, tables, eye, tile)
             },
         )
         .collect()
@@ -188,6 +188,7 @@ fn trace_batch(
 fn trace_tile(
     tracer: &mut Tracer<'_>,
     settings: TraceSettings,
+    tables: &RaytraceTables,
     eye: &EyeCamera,
     tile: &mut RayTile,
 ) -> TileResult {
@@ -211,7 +212,11 @@ fn trace_tile(
         })
         .collect();
     TileResult {
-        encoded: encode_ray_tile(tile, settings.visits),
+        encoded: if settings.geometry {
+            encode_ray_tile_with_geometry(tables, eye, tile)
+        } else {
+            encode_ray_tile(tile, settings.visits)
+        },
         origin_px: tile.origin_px,
         size_px: tile.size_px,
         colors,

@@ -1,6 +1,7 @@
 //! Ray tracing: renders a scene for both eyes and records every ray's work in the hierarchy.
 
 pub mod bvh;
+mod cast;
 pub mod frame;
 mod light;
 mod material;

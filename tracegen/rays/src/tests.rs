@@ -1,5 +1,7 @@
 //! The tracer on a small scene with every kind of material.
 
+mod columns;
+
 use super::frame::{RayFrame, trace_frame};
 use super::material::Materials;
 use super::scene::TraceScene;
@@ -122,6 +124,7 @@ fn settings(traversal: TraversalKind) -> TraceSettings {
         max_depth: 3,
         samples_per_px: 1,
         visits: true,
+        geometry: true,
         traversal,
     }
 }
@@ -174,7 +177,9 @@ fn tables(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> Ray
 
 fn trace(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> (RayFrame, Vec<u8>) {
     let mut tables = tables(scene, settings, size_px);
-    let mut writer = RaytraceWriter::in_memory().expect("in memory");
+    let hierarchy = scene.bvh.contents(settings.traversal);
+    let writer = RaytraceWriter::in_memory().expect("in memory");
+    let mut writer = writer.with_hierarchy(hierarchy);
     let mut frame = trace_frame(scene, settings, &tables, &mut writer, |_| ()).expect("traces");
     tables.triangles = std::mem::take(&mut frame.triangles);
     let bytes = writer.into_bytes(&tables).expect("writes");
@@ -199,7 +204,8 @@ fn a_trace_that_is_read_back_equals_the_traced_frame() {
                 traced.clear();
                 (traced.origin_px, traced.size_px) = file.tables().tile_rect(tile);
                 Tracer::new(&scene, settings).tile(file.tables().camera(eye), &mut traced);
-                file.decode_tile(eye, tile, &mut read).expect("decodes");
+                file.decode_tile_with_geometry(eye, tile, &mut read)
+                    .expect("decodes");
                 assert_eq!(read, traced, "{eye:?} tile {tile}");
             }
         }

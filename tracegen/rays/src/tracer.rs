@@ -1,8 +1,9 @@
 //! Whitted-style tracing of one tile: primary rays, shadows, reflection and refraction. Each ray
 //! and its work are recorded when it is cast.
 
-use super::bvh::count::{Counts, Visits};
+use super::bvh::count::Counts;
 use super::bvh::{RayHit, TraversalStack};
+use super::cast::{Cast, Caster, Query};
 use super::light::{Incident, blinn_phong, dielectric, incident, reflect, refract, schlick};
 use super::material::Surface;
 use super::ray::{Ray, barycentrics, offset, point_at};
@@ -28,6 +29,8 @@ pub struct TraceSettings {
     pub samples_per_px: u32,
     /// Record every visited node and triangle.
     pub visits: bool,
+    /// Record origin, direction, limits, hit and stack depth of every ray.
+    pub geometry: bool,
     /// Tree to traverse.
     pub traversal: TraversalKind,
 }
@@ -62,7 +65,7 @@ struct Path {
 pub struct Tracer<'a> {
     scene: &'a TraceScene,
     settings: TraceSettings,
-    stack: TraversalStack,
+    caster: Caster<'a>,
     /// Width of a pixel at distance 1.
     px_spread: f32,
     /// First ray of the current pixel.
@@ -76,7 +79,13 @@ impl<'a> Tracer<'a> {
         Self {
             scene,
             settings,
-            stack: TraversalStack::default(),
+            caster: Caster {
+                bvh: &scene.bvh,
+                traversal: settings.traversal,
+                visits: settings.visits,
+                geometry: settings.geometry,
+                stack: TraversalStack::default(),
+            },
             px_spread: 0.0,
             first_ray: 0,
         }
@@ -144,20 +153,10 @@ impl<'a> Tracer<'a> {
     /// Casts a closest-hit ray and records it. The number is its index among the pixel's rays.
     fn cast(&mut self, path: &Path, out: &mut RayTile) -> (Option<RayHit>, u32) {
         let number = (out.rays.len() - self.first_ray) as u32;
-        let tree = self.settings.traversal;
-        let (bvh, alpha) = (&self.scene.bvh, self.scene.stopping());
-        let (hit, counts) = if self.settings.visits {
-            let mut visits = Visits {
-                counts: Counts::default(),
-                list: &mut out.visits,
-            };
-            let hit = bvh.closest(tree, &path.ray, &mut self.stack, &mut visits, &alpha);
-            (hit, visits.counts)
-        } else {
-            let mut counts = Counts::default();
-            let hit = bvh.closest(tree, &path.ray, &mut self.stack, &mut counts, &alpha);
-            (hit, counts)
-        };
+        let alpha = self.scene.stopping();
+        let (visits, geometry) = (&mut out.visits, &mut out.geometry);
+        let Cast { hit, counts, .. } =
+            (self.caster).cast(Query::Closest, &path.ray, &alpha, visits, geometry);
         let outcome = if hit.is_some() {
             Outcome::Hit
         } else {
@@ -170,28 +169,18 @@ impl<'a> Tracer<'a> {
 
     /// Casts a shadow ray and records it. Returns true if the light is blocked.
     fn cast_shadow(&mut self, ray: &Ray, depth: u32, parent: u32, out: &mut RayTile) -> bool {
-        let tree = self.settings.traversal;
-        let (bvh, alpha) = (&self.scene.bvh, self.scene.shading());
-        let (blocked, counts) = if self.settings.visits {
-            let mut visits = Visits {
-                counts: Counts::default(),
-                list: &mut out.visits,
-            };
-            let blocked = bvh.occluded(tree, ray, &mut self.stack, &mut visits, &alpha);
-            (blocked, visits.counts)
-        } else {
-            let mut counts = Counts::default();
-            let blocked = bvh.occluded(tree, ray, &mut self.stack, &mut counts, &alpha);
-            (blocked, counts)
-        };
-        let outcome = if blocked {
+        let alpha = self.scene.shading();
+        let (visits, geometry) = (&mut out.visits, &mut out.geometry);
+        let Cast { hit, counts, .. } =
+            (self.caster).cast(Query::Blocker, ray, &alpha, visits, geometry);
+        let outcome = if hit.is_some() {
             Outcome::Occluded
         } else {
             Outcome::Miss
         };
         out.rays
             .push(record(RayKind::Shadow, outcome, depth, parent, counts));
-        blocked
+        hit.is_some()
     }
 
     /// Radiance of a secondary ray.

@@ -52,6 +52,15 @@ pub struct RaysArgs {
     /// Record every node and triangle that each ray visits, for cache models (large).
     #[arg(long)]
     visits: bool,
+    /// Record each ray's origin, direction, limits, hit and stack depth.
+    #[arg(long)]
+    geometry: bool,
+    /// Record the hierarchy: boxes and children of its nodes, and its triangles.
+    #[arg(long)]
+    hierarchy: bool,
+    /// Record all optional columns: --visits, --geometry and --hierarchy.
+    #[arg(long)]
+    all_columns: bool,
     /// Tree that rays traverse; steps of bvh2 are counted as in T&I unit 2.0.
     #[arg(long, value_parser = bvh_parser(), default_value = "bvh2")]
     bvh: TraversalKind,
@@ -75,6 +84,11 @@ fn bvh_parser() -> impl TypedValueParser<Value = TraversalKind> {
 }
 
 impl RaysArgs {
+    /// Whether every visited node and triangle is recorded.
+    fn visits(&self) -> bool {
+        self.visits || self.all_columns
+    }
+
     /// Samples of both eyes, as far as they are known without the scene.
     ///
     /// # Errors
@@ -178,7 +192,7 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
         eyes,
         max_depth: args.depth,
         samples_per_px: args.spp,
-        has_visits: args.visits,
+        has_visits: args.visits(),
         sky: [scene.sky.sky.to_array(), scene.sky.ground.to_array()],
     };
     let tables = RaytraceTables {
@@ -201,10 +215,14 @@ fn trace(
     let settings = TraceSettings {
         max_depth: args.depth,
         samples_per_px: args.spp,
-        visits: args.visits,
+        visits: args.visits(),
+        geometry: args.geometry || args.all_columns,
         traversal: tables.bvh.traversal,
     };
     let mut writer = RaytraceWriter::create(&args.output)?;
+    if args.hierarchy || args.all_columns {
+        writer = writer.with_hierarchy(scene.bvh.contents(tables.bvh.traversal));
+    }
     let mut frame = trace_frame(scene, settings, tables, &mut writer, |done| {
         progress.advance(done);
     })?;

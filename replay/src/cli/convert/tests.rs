@@ -169,8 +169,8 @@ fn records_equal_those_of_dump_and_refuse_flags_for_accesses() {
     assert_eq!(rows.len(), count * 52);
     for (arguments, expected) in [
         (
-            ["--to", "csv", "--granularity", "record", "--seed", "1"],
-            "--granularity record: only with --to npy and --to parquet",
+            ["--to", "din", "--granularity", "record", "--seed", "1"],
+            "--granularity record: only with --to csv, jsonl, npy and parquet",
         ),
         (
             [

@@ -10,6 +10,11 @@ pub trait Counter {
     fn triangles(&mut self, first_slot: u32, count: u32);
     /// A look-up of a triangle's alpha.
     fn alpha(&mut self);
+    /// Entries on the stack after a step.
+    #[inline(always)]
+    fn stacked(&mut self, entries: u32) {
+        let _ = entries;
+    }
 }
 
 /// Counts nothing: the baseline for the cost of counting.
@@ -73,5 +78,33 @@ impl Counter for Visits<'_> {
     }
     fn alpha(&mut self) {
         self.counts.alpha();
+    }
+}
+
+/// Another counter, and the most entries on the stack after any step.
+#[derive(Debug)]
+pub struct StackDepth<C> {
+    /// The other counter.
+    pub counter: C,
+    /// Most entries so far.
+    pub entries: u32,
+}
+
+impl<C: Counter> Counter for StackDepth<C> {
+    #[inline(always)]
+    fn step(&mut self, node: u32) {
+        self.counter.step(node);
+    }
+    #[inline(always)]
+    fn triangles(&mut self, first_slot: u32, count: u32) {
+        self.counter.triangles(first_slot, count);
+    }
+    #[inline(always)]
+    fn alpha(&mut self) {
+        self.counter.alpha();
+    }
+    #[inline(always)]
+    fn stacked(&mut self, entries: u32) {
+        self.entries = self.entries.max(entries);
     }
 }

@@ -15,6 +15,8 @@ pub struct RayHit {
     pub primitive: u32,
     /// The triangle's vertices.
     pub vertices: [[f32; 3]; 3],
+    /// Slot of the triangle, its place in leaf order.
+    pub slot: u32,
 }
 
 /// Decides at a masked triangle whether a ray stops.
@@ -83,6 +85,7 @@ impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for Closest<'_, A> {
                     t,
                     primitive,
                     vertices,
+                    slot: block.first_slot + lane as u32,
                 });
             }
         }
@@ -94,7 +97,7 @@ pub(super) struct AnyHit<'a, A> {
     pub bvh: &'a Bvh,
     pub prepared: &'a PreparedRay,
     pub alpha: &'a A,
-    pub blocked: bool,
+    pub blocker: Option<RayHit>,
 }
 
 impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for AnyHit<'_, A> {
@@ -108,12 +111,12 @@ impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for AnyHit<'_, A> {
                 let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
                 mask &= mask - 1;
                 let vertices = block.triangle(lane);
-                if self.prepared.distance(&vertices).is_none() {
+                let Some(t) = self.prepared.distance(&vertices) else {
                     continue;
-                }
+                };
+                let primitive = block.primitives[lane] & !MASKED;
                 if block.primitives[lane] & MASKED != 0 {
                     counter.alpha();
-                    let primitive = block.primitives[lane] & !MASKED;
                     if !self
                         .alpha
                         .opaque(primitive, barycentrics(&self.prepared.ray, &vertices))
@@ -123,7 +126,12 @@ impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for AnyHit<'_, A> {
                 }
                 let tested = (number * BLOCK + lane + 1) as u32;
                 counter.triangles(blocks[0].first_slot, tested);
-                self.blocked = true;
+                self.blocker = Some(RayHit {
+                    t,
+                    primitive,
+                    vertices,
+                    slot: block.first_slot + lane as u32,
+                });
                 return None;
             }
         }

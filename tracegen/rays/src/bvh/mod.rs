@@ -8,6 +8,7 @@
 mod avx2;
 mod build;
 mod collapse;
+mod contents;
 pub mod count;
 mod kernel;
 mod leaf;
@@ -27,7 +28,7 @@ pub use leaf::{AllOpaque, AlphaTest, RayHit};
 use node::{Block, Child, MASKED, Node2, Node8, TRIANGLE_BYTES};
 use stacks::Stacks;
 pub use traverse::TraversalStack;
-use traverse::{Eight, Two, Width, closest, occluded};
+use traverse::{Eight, Two, Width, blocker, closest};
 
 /// A set of triangles for which no hierarchy can be built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -188,9 +189,21 @@ impl Bvh {
         counter: &mut C,
         alpha: &A,
     ) -> bool {
+        self.blocker(tree, ray, stack, counter, alpha).is_some()
+    }
+
+    /// The first triangle on the ray's segment that the traversal finds, which need not be the nearest.
+    pub fn blocker<C: Counter, A: AlphaTest>(
+        &self,
+        tree: TraversalKind,
+        ray: &Ray,
+        stack: &mut TraversalStack,
+        counter: &mut C,
+        alpha: &A,
+    ) -> Option<RayHit> {
         match tree {
-            TraversalKind::Bvh2 => self.occluded_in::<Two, C, A>(ray, stack, counter, alpha),
-            TraversalKind::Bvh8 => self.occluded_in::<Eight, C, A>(ray, stack, counter, alpha),
+            TraversalKind::Bvh2 => self.blocker_in::<Two, C, A>(ray, stack, counter, alpha),
+            TraversalKind::Bvh8 => self.blocker_in::<Eight, C, A>(ray, stack, counter, alpha),
         }
     }
 
@@ -216,23 +229,23 @@ impl Bvh {
     }
 
     #[inline]
-    fn occluded_in<W: Width, C: Counter, A: AlphaTest>(
+    fn blocker_in<W: Width, C: Counter, A: AlphaTest>(
         &self,
         ray: &Ray,
         stack: &mut TraversalStack,
         counter: &mut C,
         alpha: &A,
-    ) -> bool {
+    ) -> Option<RayHit> {
         if self.nodes2.is_empty() || !ray.is_valid() {
-            return false;
+            return None;
         }
         match self.instructions {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx2 => {
                 // SAFETY: `instructions` is Avx2 only if the processor has it.
-                unsafe { occluded_avx2::<W, C, A>(self, ray, stack, counter, alpha) }
+                unsafe { blocker_avx2::<W, C, A>(self, ray, stack, counter, alpha) }
             }
-            _ => occluded::<Scalar, W, C, A>(self, ray, stack, counter, alpha),
+            _ => blocker::<Scalar, W, C, A>(self, ray, stack, counter, alpha),
         }
     }
 }
@@ -264,12 +277,12 @@ fn closest_avx2<W: Width, C: Counter, A: AlphaTest>(
 /// See [`closest_avx2`].
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn occluded_avx2<W: Width, C: Counter, A: AlphaTest>(
+fn blocker_avx2<W: Width, C: Counter, A: AlphaTest>(
     bvh: &Bvh,
     ray: &Ray,
     stack: &mut TraversalStack,
     counter: &mut C,
     alpha: &A,
-) -> bool {
-    occluded::<avx2::Avx2, W, C, A>(bvh, ray, stack, counter, alpha)
+) -> Option<RayHit> {
+    blocker::<avx2::Avx2, W, C, A>(bvh, ray, stack, counter, alpha)
 }

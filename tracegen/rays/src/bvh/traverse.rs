@@ -200,7 +200,9 @@ fn walk<K: Kernel, W: Width, C: Counter>(
             None
         } else {
             counter.step(at.0);
-            W::visit::<K>(bvh, ray, at.0, t_max, entries, &mut top)
+            let next = W::visit::<K>(bvh, ray, at.0, t_max, entries, &mut top);
+            counter.stacked(top as u32);
+            next
         };
         at = match next {
             Some(child) => child,
@@ -239,23 +241,23 @@ pub(super) fn closest<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
     leaf.best
 }
 
-/// True if anything blocks the ray. Counts the triangles up to the first that does.
+/// The first triangle found that blocks the ray. Counts the triangles up to it.
 #[inline(always)]
-pub(super) fn occluded<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
+pub(super) fn blocker<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
     bvh: &Bvh,
     ray: &Ray,
     stack: &mut TraversalStack,
     counter: &mut C,
     alpha: &A,
-) -> bool {
+) -> Option<RayHit> {
     let prepared = PreparedRay::new(ray, bvh.bounds);
     let loaded = K::load(&prepared);
     let mut leaf = AnyHit {
         bvh,
         prepared: &prepared,
         alpha,
-        blocked: false,
+        blocker: None,
     };
     walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, &mut leaf);
-    leaf.blocked
+    leaf.blocker
 }

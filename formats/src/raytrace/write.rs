@@ -1,0 +1,258 @@
+//! Writes a `.raytrace`: tiles one by one, then the tables.
+#![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
+
+use super::file::{
+    COLUMNS_MINOR, GEOMETRY_INDEX, GEOMETRY_INDEX_ENTRY_BYTES, GEOMETRY_TILES, NODES, RAY_INDEX,
+    RAY_INDEX_ENTRY_BYTES, RAY_TILES, SLOTS,
+};
+use super::hierarchy::Hierarchy;
+use super::{EyeCamera, RayTile, RaytraceTables, codec, geometry_codec, hierarchy_codec, tables};
+use crate::container::{AtomicFile, ContainerWriter, Kind};
+use crate::error::{Broken, FormatError, Result};
+use crate::tiles::TileSpan;
+use std::io::{Cursor, Read, Seek, Write};
+use std::path::Path;
+use tempfile::SpooledTempFile;
+
+/// Geometry of this size is kept in memory until the records are written; more goes to a temporary file.
+const SPOOL_BYTES: usize = 64 << 20;
+
+/// A tile's bytes, ready to be appended.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct EncodedRayTile {
+    bytes: Vec<u8>,
+    crc32: u32,
+    rays: u32,
+    geometry: Option<Vec<u8>>,
+}
+
+impl EncodedRayTile {
+    /// Encoded size.
+    #[must_use]
+    pub fn size_bytes(&self) -> usize {
+        self.bytes.len()
+    }
+}
+
+/// Encodes a tile. A pure function, so that tiles can be encoded in parallel.
+///
+/// # Errors
+/// The tile violates an invariant of the format.
+pub fn encode_ray_tile(tile: &RayTile, has_visits: bool) -> Result<EncodedRayTile> {
+    let bytes = codec::encode(tile, has_visits).map_err(|broken| {
+        let what = format!("tile at {:?}, {}", tile.origin_px, broken.what);
+        Broken { what, ..broken }.unwritable()
+    })?;
+    let too_many = |_| FormatError::Unwritable {
+        what: format!("tile at {:?}", tile.origin_px),
+        expected: "less than 2^32 bytes and rays".to_owned(),
+        found: format!("{} rays", tile.rays.len()),
+    };
+    u32::try_from(bytes.len()).map_err(too_many)?;
+    Ok(EncodedRayTile {
+        crc32: crc32fast::hash(&bytes),
+        rays: u32::try_from(tile.rays.len()).map_err(too_many)?,
+        bytes,
+        geometry: None,
+    })
+}
+
+/// Encodes a tile with its [`RayTile::geometry`]; `eye` is the camera of its eye.
+///
+/// # Errors
+/// The tile violates an invariant of the format.
+pub fn encode_ray_tile_with_geometry(
+    tables: &RaytraceTables,
+    eye: &EyeCamera,
+    tile: &RayTile,
+) -> Result<EncodedRayTile> {
+    let mut encoded = encode_ray_tile(tile, tables.meta.has_visits)?;
+    let bytes = geometry_codec::encode(tables, eye, tile).map_err(|broken| {
+        let what = format!("tile at {:?}, {}", tile.origin_px, broken.what);
+        Broken { what, ..broken }.unwritable()
+    })?;
+    if u32::try_from(bytes.len()).is_err() {
+        return Err(FormatError::Unwritable {
+            what: format!("geometry of the tile at {:?}", tile.origin_px),
+            expected: "less than 2^32 bytes".to_owned(),
+            found: bytes.len().to_string(),
+        });
+    }
+    encoded.geometry = Some(bytes);
+    Ok(encoded)
+}
+
+/// The encoded geometry of the tiles written so far, and its index.
+#[derive(Debug)]
+struct GeometrySpool {
+    bytes: SpooledTempFile,
+    index: Vec<u8>,
+    offset: u64,
+}
+
+/// Writes a trace tile by tile: the left eye's in order, then the right eye's.
+#[derive(Debug)]
+pub struct RaytraceWriter<W = AtomicFile> {
+    container: ContainerWriter<W>,
+    index: Vec<u8>,
+    offset: u64,
+    geometry: GeometrySpool,
+    hierarchy: Option<Hierarchy>,
+}
+
+impl RaytraceWriter<AtomicFile> {
+    /// Starts a file that appears under its name when it is finished.
+    ///
+    /// # Errors
+    /// The temporary file in the folder of `path` cannot be written.
+    pub fn create(path: &Path) -> Result<Self> {
+        // An absolute or bare name has its folder as parent, or the current one.
+        let folder = path
+            .parent()
+            .filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new("."));
+        let spool = tempfile::spooled_tempfile_in(SPOOL_BYTES, folder);
+        Self::start(ContainerWriter::create(path, Kind::Raytrace)?, spool)
+    }
+
+    /// Writes index and tables, and renames the file. Returns its size in bytes.
+    ///
+    /// # Errors
+    /// Writing failed, tiles are missing, or a table violates an invariant; no file is left.
+    pub fn finish(self, tables: &RaytraceTables) -> Result<u64> {
+        self.complete(tables)?.finish()
+    }
+}
+
+impl RaytraceWriter<Cursor<Vec<u8>>> {
+    /// Starts a trace in memory.
+    ///
+    /// # Errors
+    /// None in practice; the signature matches that for files.
+    pub fn in_memory() -> Result<Self> {
+        let spool = tempfile::spooled_tempfile(usize::MAX);
+        Self::start(ContainerWriter::in_memory(Kind::Raytrace)?, spool)
+    }
+
+    /// Writes index and tables, and returns the bytes.
+    ///
+    /// # Errors
+    /// Tiles are missing, or a table violates an invariant.
+    pub fn into_bytes(self, tables: &RaytraceTables) -> Result<Vec<u8>> {
+        self.complete(tables)?.into_bytes()
+    }
+}
+
+impl<W: Write + Seek> RaytraceWriter<W> {
+    fn start(mut container: ContainerWriter<W>, spool: SpooledTempFile) -> Result<Self> {
+        container.begin_chunk(RAY_TILES)?;
+        Ok(Self {
+            container,
+            index: Vec::new(),
+            offset: 0,
+            geometry: GeometrySpool {
+                bytes: spool,
+                index: Vec::new(),
+                offset: 0,
+            },
+            hierarchy: None,
+        })
+    }
+
+    /// Adds the content of the hierarchy.
+    #[must_use]
+    pub fn with_hierarchy(mut self, hierarchy: Hierarchy) -> Self {
+        self.hierarchy = Some(hierarchy);
+        self
+    }
+
+    /// Appends the next tile. Either all tiles have geometry or none.
+    ///
+    /// # Errors
+    /// Writing failed.
+    pub fn tile(&mut self, tile: &EncodedRayTile) -> Result<()> {
+        self.container.append(&tile.bytes)?;
+        let bytes = u32::try_from(tile.bytes.len()).unwrap_or(u32::MAX);
+        let span = TileSpan {
+            offset: self.offset,
+            bytes,
+            crc32: tile.crc32,
+        };
+        span.write(&mut self.index);
+        for number in [tile.rays, 0] {
+            self.index.extend(number.to_le_bytes());
+        }
+        self.offset += u64::from(bytes);
+        if let Some(geometry) = &tile.geometry {
+            self.geometry.append(geometry)?;
+        }
+        Ok(())
+    }
+
+    fn complete(mut self, tables: &RaytraceTables) -> Result<ContainerWriter<W>> {
+        let tiles = 2 * tables.tile_count() as usize;
+        let written = self.index.len() / RAY_INDEX_ENTRY_BYTES;
+        if written != tiles {
+            return Err(FormatError::Unwritable {
+                what: "tiles".to_owned(),
+                expected: format!("{tiles}, all of both eyes"),
+                found: written.to_string(),
+            });
+        }
+        let with_geometry = self.geometry.index.len() / GEOMETRY_INDEX_ENTRY_BYTES;
+        if with_geometry != 0 && with_geometry != tiles {
+            return Err(FormatError::Unwritable {
+                what: "geometry".to_owned(),
+                expected: format!("that of all {tiles} tiles or of none"),
+                found: with_geometry.to_string(),
+            });
+        }
+        self.container.end_chunk()?;
+        self.container.chunk(RAY_INDEX, &self.index)?;
+        if with_geometry > 0 {
+            self.container.require_minor(COLUMNS_MINOR);
+            self.geometry.write(&mut self.container)?;
+        }
+        if let Some(hierarchy) = &self.hierarchy {
+            hierarchy.check(&tables.bvh).map_err(Broken::unwritable)?;
+            self.container.require_minor(COLUMNS_MINOR);
+            let nodes = hierarchy_codec::encode_nodes(&tables.bvh, hierarchy);
+            self.container.chunk(NODES, &nodes)?;
+            let triangles = hierarchy_codec::encode_triangles(&hierarchy.triangles);
+            self.container.chunk(SLOTS, &triangles)?;
+        }
+        tables::write(tables, &mut self.container)?;
+        Ok(self.container)
+    }
+}
+
+impl GeometrySpool {
+    fn append(&mut self, bytes: &[u8]) -> Result<()> {
+        let written = self.bytes.write_all(bytes);
+        written.map_err(|source| FormatError::io("temporary file", "write", source))?;
+        let span = TileSpan {
+            offset: self.offset,
+            bytes: u32::try_from(bytes.len()).unwrap_or(u32::MAX),
+            crc32: crc32fast::hash(bytes),
+        };
+        span.write(&mut self.index);
+        self.offset += bytes.len() as u64;
+        Ok(())
+    }
+
+    fn write<W: Write + Seek>(&mut self, container: &mut ContainerWriter<W>) -> Result<()> {
+        let failed = |source| FormatError::io("temporary file", "read", source);
+        self.bytes.rewind().map_err(failed)?;
+        container.begin_chunk(GEOMETRY_TILES)?;
+        let mut buffer = vec![0; 1 << 16];
+        loop {
+            let count = self.bytes.read(&mut buffer).map_err(failed)?;
+            let Some(read) = buffer.get(..count).filter(|read| !read.is_empty()) else {
+                break;
+            };
+            container.append(read)?;
+        }
+        container.end_chunk()?;
+        container.chunk(GEOMETRY_INDEX, &self.index)
+    }
+}
