@@ -112,8 +112,8 @@ fn the_cycle_level_model_conserves_rays_and_requests_and_is_compared_with_the_cl
 fn the_cycle_level_model_prints_the_same_bytes_over_threads() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = teapot_with_visits(&folder);
-    let [one, two, eight] = ["1", "2", "8"]
-        .map(|n| reproject_json(&path, &["--timing", "cycle", "--threads", n]));
+    let [one, two, eight] =
+        ["1", "2", "8"].map(|n| reproject_json(&path, &["--timing", "cycle", "--threads", n]));
     assert!(one == two && one == eight);
 }
 
@@ -128,7 +128,10 @@ fn the_cycle_level_model_refuses_what_it_does_not_support() {
     };
     refuse(&mut with(&[]), &["teapot-rays.raytrace", "--visits"]);
     refuse(&mut with(&["--curve"]), &["--curve", "closed-form"]);
-    refuse(&mut with(&["--sensitivity"]), &["--sensitivity", "closed-form"]);
+    refuse(
+        &mut with(&["--sensitivity"]),
+        &["--sensitivity", "closed-form"],
+    );
 }
 
 #[test]

@@ -31,7 +31,10 @@ fn the_simulation_traces_exactly_the_rays_of_the_closed_form() {
             (&cycles.reference, &o.reference_work),
         ] {
             assert_eq!(timing.requests, work.steps + work.triangle_tests, "{rule}");
-            assert_eq!((timing.answers, timing.rays_left), (timing.requests, timing.rays_entered));
+            assert_eq!(
+                (timing.answers, timing.rays_left),
+                (timing.requests, timing.rays_entered)
+            );
         }
         // A pixel's re-tests are one ray.
         let entered = cycles.reprojected.rays_entered;
@@ -42,9 +45,18 @@ fn the_simulation_traces_exactly_the_rays_of_the_closed_form() {
         // Images do not depend on time.
         let loaded = LoadedTrace::load(&source).expect("loads");
         let rule = rule.parse().expect("a rule");
-        let closed = loaded.run(&rule, Reuse::Primary, &config).expect("runs").outcome;
-        assert_eq!((o.flip_mean, o.reuse_pct), (closed.flip_mean, closed.reuse_pct));
-        assert_eq!(cycles.closed_form_relative_performance, closed.relative_performance);
+        let closed = loaded
+            .run(&rule, Reuse::Primary, &config)
+            .expect("runs")
+            .outcome;
+        assert_eq!(
+            (o.flip_mean, o.reuse_pct),
+            (closed.flip_mean, closed.reuse_pct)
+        );
+        assert_eq!(
+            cycles.closed_form_relative_performance,
+            closed.relative_performance
+        );
         assert_eq!(cycles.closed_form_relative_energy, closed.relative_energy);
         assert_eq!(cycles.reprojected.closed_form_cycles, closed.tni_cycles);
         assert!(closed.cycles.is_none());
@@ -60,7 +72,11 @@ fn results_do_not_depend_on_the_number_of_threads() {
         pool.install(|| outcome(&source, "none", &SgrtConfig::default()))
     };
     let one = on(1);
-    assert!(one.cycles.as_ref().is_some_and(|cycles| cycles.reference.cycles > 0));
+    assert!(
+        one.cycles
+            .as_ref()
+            .is_some_and(|cycles| cycles.reference.cycles > 0)
+    );
     for threads in [2, 8] {
         assert_eq!(on(threads), one, "{threads} threads");
     }
@@ -71,7 +87,11 @@ fn slower_memory_and_fewer_rays_in_flight_cost_cycles() {
     let source = room().with_visits();
     let cycles = |text: &str| {
         let config = SgrtConfig::from_overrides(text).expect("valid");
-        outcome(&source, "none", &config).cycles.expect("simulated").reference.cycles
+        outcome(&source, "none", &config)
+            .cycles
+            .expect("simulated")
+            .reference
+            .cycles
     };
     let base = cycles("");
     assert!(cycles("[memory]\nlatency_ns = 2000") > base);
@@ -88,7 +108,10 @@ fn a_warp_requests_the_union_of_its_rays_requests() {
     let timing = |warp_rays: u32| {
         let config = SgrtConfig::from_overrides(&format!("[cycles]\nwarp_rays = {warp_rays}"));
         let config = config.expect("valid");
-        outcome(&source, "none", &config).cycles.expect("simulated").reference
+        outcome(&source, "none", &config)
+            .cycles
+            .expect("simulated")
+            .reference
     };
     let (single, warps) = (timing(1), timing(16));
     assert_eq!(single.rays_left, warps.rays_left);
