@@ -12,6 +12,8 @@
 //! | `memory` | L1 caches, L2, and their MSHRs |
 //! | `unit` | ray slots, pipelines, return of rays, stall causes |
 //! | `cores` | tile buffers and the shader cores |
+//! | `event` | events and their order within a cycle |
+//! | `rays` | the way of a ray: requests, waits, pipelines |
 //! | `device` | the event loop |
 //! | `counts` | counters, and the conservation of rays and requests |
 //!
@@ -34,8 +36,10 @@ mod cores;
 mod counts;
 mod device;
 mod dram;
+mod event;
 mod machine;
 mod memory;
+mod rays;
 mod server;
 mod unit;
 mod warp;
