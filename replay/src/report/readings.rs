@@ -232,6 +232,8 @@ impl ReadingsReport {
             Column::real("relative_performance", "performance", "ratio", 4, move |c: &Cell| figures(c).relative_performance),
             Column::real("paper_relative_performance", "paper", "ratio", 2, |c: &Cell| Some(c.scene.paper.as_ref()?.relative_performance)),
             Column::real("relative_energy", "energy", "ratio", 4, move |c: &Cell| figures(c).relative_energy),
+            Column::real("relative_energy_least", "at 14 nm, least", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[0]),
+            Column::real("relative_energy_most", "most", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[1]),
             Column::real("paper_relative_energy", "paper", "ratio", 2, |c: &Cell| Some(c.scene.paper.as_ref()?.relative_energy)),
             Column::real("frames_per_second", "frames per second", "", 2, move |c: &Cell| figures(c).frames_per_second),
             Column::real("paper_frames_per_second", "paper", "", 1, |c: &Cell| Some(c.scene.paper.as_ref()?.frames_per_second)),
