@@ -50,8 +50,8 @@ for scene, report in default.items():
         frames = [cycles[run]["closed_form_error_pct"] for run in ("reference", "reprojected")]
         table.append([scene, rule, *(f"{value:.3f}" for pair in zip(closed, timed) for value in pair), *map(one, frames)])
 write("sgrt-timing-performance", "replay reproject --timing cycle --json",
-      ["scene", "rule", "performance: closed form", "cycle level", "energy: closed form", "cycle level", "closed form off by %: both eyes in full",
-       "with reprojection"], table)
+      ["scene", "rule", "performance: closed form", "performance: cycle level", "energy: closed form", "energy: cycle level", "closed form off by %: both eyes in full",
+       "closed form off by %: with reprojection"], table)
 
 table = []
 for name in ["default", *Path("variants").read_text().splitlines()]:
