@@ -48,7 +48,7 @@ pub enum SessionError {
     },
     /// A frame without draws.
     #[error(
-        "frame {0}: nothing was drawn; a page must start its session itself, because nothing clicks its buttons"
+        "frame {0}: nothing was drawn. A page may still be loading: try a later frame. A page that waits for a click never draws: it must start its session itself"
     )]
     NotDrawn(u32),
     /// Records were lost.
