@@ -127,29 +127,21 @@ fn measure(path: &Path) {
     let of_records = chunks(&plain, &tiles);
     let of_visits = chunks(&trace, &tiles) - of_records;
     let of_geometry = chunks(&trace, &[GEOMETRY_TILES, GEOMETRY_INDEX]);
-    line(
-        path,
-        "records",
-        rays,
-        [of_records, rays * RECORD_BYTES],
-        records,
-    );
-    let extra = more(with_visits, records);
-    line(
-        path,
-        "visits",
-        visits,
-        [of_visits, visits * VISIT_BYTES],
-        extra,
-    );
-    let extra = more(with_geometry, with_visits);
-    line(
-        path,
-        "geometry",
-        rays,
-        [of_geometry, rays * GEOMETRY_BYTES],
-        extra,
-    );
+    let [extra_visits, extra_geometry] =
+        [more(with_visits, records), more(with_geometry, with_visits)];
+    for (column, items, coded, plain_bytes, seconds) in [
+        ("records", rays, of_records, RECORD_BYTES, records),
+        ("visits", visits, of_visits, VISIT_BYTES, extra_visits),
+        (
+            "geometry",
+            rays,
+            of_geometry,
+            GEOMETRY_BYTES,
+            extra_geometry,
+        ),
+    ] {
+        line(path, column, items, [coded, items * plain_bytes], seconds);
+    }
 
     let bvh = &trace.tables().bvh;
     let (mut write, mut read) = (f64::MAX, f64::MAX);

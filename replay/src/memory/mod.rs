@@ -11,6 +11,7 @@
 
 mod access;
 mod build;
+mod busy_days;
 mod cache;
 pub mod dram;
 mod fast;
@@ -23,6 +24,7 @@ mod victim;
 mod watched;
 
 pub use access::{Access, Client};
+pub use busy_days::BusyDays;
 pub use cache::Cache;
 pub use fast::Forest;
 pub use hierarchy::{Answer, Caches, Found, Hierarchy, MissPath, OtherWork, SecondLevel};

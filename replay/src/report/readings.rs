@@ -187,8 +187,8 @@ impl ReadingsReport {
             Column::real("test", "test scenes", "RMS ln", 3, |f: &Fit| f.test),
             Column::real("relative_performance", "performance, mean", "ratio", 3, |f: &Fit| f.relative_performance),
             Column::real("relative_energy", "energy, mean", "ratio", 3, |f: &Fit| f.relative_energy),
-            Column::real("relative_energy_least", "at 14 nm, least", "ratio", 3, |f: &Fit| f.relative_energy_bounds[0]),
-            Column::real("relative_energy_most", "most", "ratio", 3, |f: &Fit| f.relative_energy_bounds[1]),
+            Column::real("relative_energy_least", "14 nm, least", "ratio", 3, |f: &Fit| f.relative_energy_bounds[0]),
+            Column::real("relative_energy_most", "14 nm, most", "ratio", 3, |f: &Fit| f.relative_energy_bounds[1]),
             Column::text("saves", "scenes that save energy", |f: &Fit| f.scenes_that_save_energy as u64),
         ];
         Table::new(&columns, &self.fits)
@@ -232,8 +232,8 @@ impl ReadingsReport {
             Column::real("relative_performance", "performance", "ratio", 4, move |c: &Cell| figures(c).relative_performance),
             Column::real("paper_relative_performance", "paper", "ratio", 2, |c: &Cell| Some(c.scene.paper.as_ref()?.relative_performance)),
             Column::real("relative_energy", "energy", "ratio", 4, move |c: &Cell| figures(c).relative_energy),
-            Column::real("relative_energy_least", "at 14 nm, least", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[0]),
-            Column::real("relative_energy_most", "most", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[1]),
+            Column::real("relative_energy_least", "14 nm, least", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[0]),
+            Column::real("relative_energy_most", "14 nm, most", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[1]),
             Column::real("paper_relative_energy", "paper", "ratio", 2, |c: &Cell| Some(c.scene.paper.as_ref()?.relative_energy)),
             Column::real("frames_per_second", "frames per second", "", 2, move |c: &Cell| figures(c).frames_per_second),
             Column::real("paper_frames_per_second", "paper", "", 1, |c: &Cell| Some(c.scene.paper.as_ref()?.frames_per_second)),
@@ -276,7 +276,7 @@ impl ReadingsReport {
             bounds().filter(|[least, _]| *least >= 1.0).count(),
         );
         text.push(format!(
-            "With energies scaled to 14 nm, it does so within all bounds of the scaling under {always}, and within none under {never}."
+            "If the energies are scaled to 14 nm, it saves energy at every scaling within the bounds under {always}, and at none under {never}."
         ));
         if let Some(fit) = self.chosen.and_then(|index| self.fits.get(index)) {
             let distance = |d: Option<f64>| d.map_or("-".to_owned(), |d| format!("{d:.3}"));

@@ -6,6 +6,7 @@
 //! end wait in a heap; the default latencies never reach it.
 
 use super::Cache;
+use crate::memory::busy_days::BusyDays;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -42,8 +43,8 @@ pub struct InFlight {
     chains: Vec<u32>,
     /// By the low bits of the cycle; the length is a power of two.
     days: Vec<Day>,
-    /// One bit per day with entries.
-    busy: Vec<u64>,
+    /// Days with entries.
+    busy: BusyDays,
     /// The earliest cycle with work to do.
     wake: u64,
     /// Arrivals beyond the calendar, earliest on top. The count keeps equal arrivals in order of request.
@@ -65,7 +66,7 @@ impl InFlight {
             free: NONE,
             chains: vec![NONE; CHAINS],
             days: vec![empty; days],
-            busy: vec![0; days / 64],
+            busy: BusyDays::new(days),
             wake: u64::MAX,
             late: BinaryHeap::new(),
             requests: 0,
@@ -127,7 +128,7 @@ impl InFlight {
         let Day { first, last } = self.days[day];
         match self.entries.get_mut(last as usize) {
             Some(last) => last.later = at,
-            None => self.busy[day / 64] |= 1 << (day % 64),
+            None => self.busy.set(day),
         }
         self.days[day] = Day {
             first: if first == NONE { at } else { first },
@@ -171,7 +172,11 @@ impl InFlight {
         }
         let late = self.late.peek();
         let admission = late.map_or(u64::MAX, |Reverse((cycle, ..))| cycle - days + 1);
-        self.wake = self.next_day(today).min(admission);
+        self.wake = self
+            .busy
+            .first_from(today + 1)
+            .unwrap_or(u64::MAX)
+            .min(admission);
     }
 
     /// Fills all lines that arrive at a cycle, in order of request.
@@ -182,7 +187,7 @@ impl InFlight {
             first: NONE,
             last: NONE,
         };
-        self.busy[day / 64] &= !(1 << (day % 64));
+        self.busy.clear(day);
         while at != NONE {
             let Entry { line, later, .. } = self.entries[at as usize];
             self.forget(at);
@@ -206,27 +211,6 @@ impl InFlight {
         }
         self.entries[at as usize].chained = self.free;
         self.free = at;
-    }
-
-    /// The first cycle after `today` with an arrival.
-    fn next_day(&self, today: u64) -> u64 {
-        let start = today + 1;
-        let first = start as usize & (self.days.len() - 1);
-        let words = self.busy.len();
-        // The first word is visited twice: from the current day on and, after wrapping around, up to it.
-        for step in 0..=words {
-            let index = (first / 64 + step) % words;
-            let mut word = self.busy[index];
-            if step == 0 {
-                word &= u64::MAX << (first % 64);
-            }
-            if word != 0 {
-                let day = index * 64 + word.trailing_zeros() as usize;
-                let ahead = day.wrapping_sub(first) & (self.days.len() - 1);
-                return start + ahead as u64;
-            }
-        }
-        u64::MAX
     }
 }
 

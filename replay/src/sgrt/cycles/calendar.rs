@@ -1,5 +1,6 @@
 //! Events by cycle. Cycles without events cost nothing.
 
+use crate::memory::BusyDays;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -10,8 +11,8 @@ const DAYS: usize = 2048;
 pub struct Calendar {
     /// Keys by the low bits of the cycle.
     days: Vec<Vec<u64>>,
-    /// One bit per day with events.
-    busy: Vec<u64>,
+    /// Days with events.
+    busy: BusyDays,
     now: u64,
     /// Events beyond the lists, earliest on top.
     late: BinaryHeap<Reverse<(u64, u64)>>,
@@ -22,7 +23,7 @@ impl Calendar {
     pub fn new() -> Self {
         Self {
             days: vec![Vec::new(); DAYS],
-            busy: vec![0; DAYS / 64],
+            busy: BusyDays::new(DAYS),
             now: 0,
             late: BinaryHeap::new(),
         }
@@ -34,7 +35,7 @@ impl Calendar {
         if cycle - self.now < DAYS as u64 {
             let day = cycle as usize % DAYS;
             self.days[day].push(key);
-            self.busy[day / 64] |= 1 << (day % 64);
+            self.busy.set(day);
         } else {
             self.late.push(Reverse((cycle, key)));
         }
@@ -44,14 +45,14 @@ impl Calendar {
     pub fn advance(&mut self, keys: &mut Vec<u64>) -> Option<u64> {
         keys.clear();
         let late = self.late.peek().map(|Reverse((cycle, _))| *cycle);
-        let cycle = match (self.next_day(), late) {
+        let cycle = match (self.busy.first_from(self.now + 1), late) {
             (Some(day), Some(late)) => day.min(late),
             (day, late) => day.or(late)?,
         };
         self.now = cycle;
         let day = cycle as usize % DAYS;
         std::mem::swap(keys, &mut self.days[day]);
-        self.busy[day / 64] &= !(1 << (day % 64));
+        self.busy.clear(day);
         while let Some(&Reverse((at, key))) = self.late.peek()
             && at == cycle
         {
@@ -60,25 +61,6 @@ impl Calendar {
         }
         keys.sort_unstable();
         Some(cycle)
-    }
-
-    /// The first cycle after the current one with an event in the lists.
-    fn next_day(&self) -> Option<u64> {
-        let first = (self.now as usize + 1) % DAYS;
-        let words = self.busy.len();
-        // The first word is visited twice: from the first day on and, after wrapping around, up to it.
-        for step in 0..=words {
-            let index = (first / 64 + step) % words;
-            let mut word = self.busy[index];
-            if step == 0 {
-                word &= u64::MAX << (first % 64);
-            }
-            if word != 0 {
-                let day = index * 64 + word.trailing_zeros() as usize;
-                return Some(self.now + 1 + (day.wrapping_sub(first) % DAYS) as u64);
-            }
-        }
-        None
     }
 }
 
