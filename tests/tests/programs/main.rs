@@ -52,10 +52,11 @@ struct Captured {
 
 /// Captures the last frame of the program with its picture. Compares the pictures of the program with and
 /// without the layer.
-fn capture(folder: &Path, stereo: &str, more: &[&str]) -> Captured {
+fn capture(folder: &Path, stereo: &str, more: &[&str], of_program: &[&str]) -> Captured {
     let pictures = [folder.join("plain.raw"), folder.join("captured.raw")];
-    let arguments = ["--stereo", stereo, "--frames", "3", "--picture"];
-    run_ok(vulkan_program().args(arguments).arg(&pictures[0]));
+    let frames: &[&str] = &["--stereo", stereo, "--frames", "3"];
+    let arguments = [of_program, frames, &["--picture"]].concat();
+    run_ok(vulkan_program().args(&arguments).arg(&pictures[0]));
     let trace = folder.join(format!("{stereo}.textrace"));
     let mut command = program("tracegen");
     command
@@ -66,7 +67,7 @@ fn capture(folder: &Path, stereo: &str, more: &[&str]) -> Captured {
     command
         .arg("--")
         .arg(env!("CARGO_BIN_EXE_vulkan_program"))
-        .args(arguments)
+        .args(&arguments)
         .arg(&pictures[1]);
     let output = run_ok(&mut command);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -155,14 +156,18 @@ fn every_pixel_shows_a_texel_of_its_last_record_in_every_stereo_mode() {
     if !has_lavapipe() {
         return;
     }
-    for (stereo, rule) in [
-        ("halves", "viewport halves"),
-        ("targets", "a target per eye"),
-        ("twice", "equal draws twice"),
-        ("multiview", "multiview"),
+    for (stereo, rule, of_program) in [
+        ("halves", "viewport halves", &[] as &[&str]),
+        ("targets", "a target per eye", &[]),
+        ("twice", "equal draws twice", &[]),
+        ("multiview", "multiview", &[]),
+        // Pipelines that are linked from libraries.
+        ("halves", "viewport halves", &["--libraries", "0"]),
+        ("multiview", "multiview", &["--libraries", "1"]),
+        ("targets", "a target per eye", &["--libraries", "2"]),
     ] {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let captured = capture(folder.path(), stereo, &[]);
+        let captured = capture(folder.path(), stereo, &[], of_program);
         assert!(captured.message.contains(rule), "{}", captured.message);
         assert!(
             captured.message.contains("0 different"),
@@ -187,7 +192,7 @@ fn a_captured_program_is_replayed_like_a_scene() {
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let captured = capture(folder.path(), "halves", &["--encoding", "planes"]);
+    let captured = capture(folder.path(), "halves", &["--encoding", "planes"], &[]);
     for command in [
         &["validate"][..],
         &["info"],

@@ -4,12 +4,13 @@
 //! pixel identifies the texel that it shows. The objects differ in how their shaders sample.
 //!
 //!     vulkan_program [--stereo halves|targets|twice|multiview|mono] [--objects NAME,NAME...] [--frames N]
-//!         [--size WIDTHxHEIGHT] [--picture FILE] [--end crash|early|fork|hang]
+//!         [--size WIDTHxHEIGHT] [--picture FILE] [--end crash|early|fork|hang] [--libraries 0|1|2]
 //!     vulkan_program --random SEED [--calls N] [--frames N] [--picture FILE]
 //!
 //! With `--random`, it makes random calls instead: see `random`.
 
 mod gpu;
+mod libraries;
 mod objects;
 mod pipeline;
 mod random;
@@ -45,6 +46,8 @@ pub struct Options {
     size_px: [u32; 2],
     picture: Option<String>,
     end: Option<String>,
+    /// Libraries that pipelines are linked from.
+    libraries: Option<libraries::Split>,
     /// Seed of random calls.
     random: Option<u64>,
     /// Number of random operations.
@@ -59,6 +62,7 @@ fn options() -> Result<Options, String> {
         size_px: [240, 200],
         picture: None,
         end: None,
+        libraries: None,
         random: None,
         calls: 100,
     };
@@ -94,6 +98,10 @@ fn options() -> Result<Options, String> {
             }
             "--picture" => options.picture = Some(value),
             "--end" => options.end = Some(value),
+            "--libraries" => {
+                let split = libraries::SPLITS.get(number(&value)? as usize);
+                options.libraries = Some(*split.ok_or(format!("--libraries: {value}"))?);
+            }
             "--random" => options.random = Some(number(&value)?.into()),
             "--calls" => options.calls = number(&value)?,
             _ => return Err(format!("{name} is no option")),

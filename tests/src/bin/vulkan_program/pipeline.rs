@@ -1,15 +1,17 @@
 //! Pipelines, one per object.
 
 use crate::gpu::{Gpu, Result, checked};
+use crate::libraries::{self, Split};
 use crate::scene::Vertex;
 use ash::vk;
 
-/// A pipeline of a module with entry points `vertex` and `fragment`.
+/// A pipeline of a module with entry points `vertex` and `fragment`, linked from libraries if `split` is given.
 pub fn pipeline(
     gpu: &Gpu,
     pass: vk::RenderPass,
     layout: vk::PipelineLayout,
     words: &[u32],
+    split: Option<Split>,
 ) -> Result<vk::Pipeline> {
     let device = &gpu.device;
     let info = vk::ShaderModuleCreateInfo::default().code(words);
@@ -76,9 +78,8 @@ pub fn pipeline(
             .dynamic_state(&dynamic)
             .layout(layout)
             .render_pass(pass);
-        let made = device.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None);
-        let pipelines = made.map_err(|(_, error)| format!("a pipeline: {error}"))?;
+        let made = libraries::create(device, &info, split);
         device.destroy_shader_module(module, None);
-        Ok(pipelines[0])
+        Ok(made?.pipeline)
     }
 }

@@ -4,7 +4,7 @@ use crate::gpu::{Buffer, Gpu, Result};
 use crate::pipeline::pipeline;
 use crate::sets::Sets;
 use crate::targets::{Target, render_pass, targets};
-use crate::{Options, Stereo, scene, shaders};
+use crate::{Options, Stereo, libraries, scene, shaders};
 use ash::{Device, vk};
 
 /// Pipeline and vertices of an object.
@@ -20,7 +20,15 @@ pub fn run(options: &Options) -> Result<()> {
         // A program that never renders.
         std::thread::sleep(std::time::Duration::from_secs(600));
     }
-    let gpu = Gpu::open()?;
+    let gpu = match options.libraries {
+        Some(_) => {
+            let mut of_libraries = libraries::features();
+            let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut of_libraries);
+            let extensions = &libraries::EXTENSIONS;
+            Gpu::open_with(vk::API_VERSION_1_2, extensions, Some(&mut features))?
+        }
+        None => Gpu::open()?,
+    };
     let [width, height] = options.size_px;
     let pass = render_pass(&gpu, options.stereo)?;
     let targets = targets(&gpu, options, pass)?;
@@ -32,7 +40,7 @@ pub fn run(options: &Options) -> Result<()> {
         let vertices = scene::triangles(position, options.objects.len());
         let usage = vk::BufferUsageFlags::VERTEX_BUFFER;
         draws.push(Draw {
-            pipeline: pipeline(&gpu, pass, sets.layout, &words)?,
+            pipeline: pipeline(&gpu, pass, sets.layout, &words, options.libraries)?,
             count: vertices.len() as u32,
             vertices: gpu.buffer_of(bytemuck::cast_slice(&vertices), usage)?,
         });

@@ -22,9 +22,7 @@ pub(super) struct Instance {
 static INSTANCES: LazyLock<Mutex<HashMap<usize, Arc<Instance>>>> = LazyLock::new(Mutex::default);
 
 /// Extensions with objects that the layer does not track. They are hidden from programs.
-const HIDDEN: [&CStr; 11] = [
-    c"VK_EXT_graphics_pipeline_library",
-    c"VK_KHR_pipeline_library",
+const HIDDEN: [&CStr; 9] = [
     c"VK_EXT_shader_object",
     c"VK_EXT_descriptor_buffer",
     c"VK_EXT_mutable_descriptor_type",

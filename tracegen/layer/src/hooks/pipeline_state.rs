@@ -1,17 +1,22 @@
 //! State in the description of a pipeline, and changed descriptions.
 
 use super::api::slice;
+use super::libraries::{self, Parts};
 use crate::spool::DepthInfo;
 use crate::track::State;
 use ash::vk;
 
-/// The state that a description fixes.
+/// The state that the parts of a description fix.
 ///
 /// # Safety
-/// A valid description.
-pub(super) unsafe fn of(info: &vk::GraphicsPipelineCreateInfo<'_>) -> State {
-    // SAFETY: as the caller promises. Structures that the pipeline does not use may be missing.
+/// A valid description with these own parts.
+pub(super) unsafe fn of(info: &vk::GraphicsPipelineCreateInfo<'_>, own: Parts) -> State {
+    // SAFETY: as the caller promises. Structures that the pipeline does not use may be missing, and pointers of
+    // parts that are not its own may be invalid.
     unsafe {
+        let before = own.contains(Parts::PRE_RASTERIZATION_SHADERS);
+        let shades = own.contains(Parts::FRAGMENT_SHADER);
+        let outputs = own.contains(Parts::FRAGMENT_OUTPUT_INTERFACE);
         let mut state = State {
             samples: 1,
             ..State::default()
@@ -20,7 +25,7 @@ pub(super) unsafe fn of(info: &vk::GraphicsPipelineCreateInfo<'_>) -> State {
             let states = slice(dynamic.p_dynamic_states, dynamic.dynamic_state_count);
             state.dynamic = states.iter().map(|s| s.as_raw()).collect();
         }
-        if let Some(viewports) = info.p_viewport_state.as_ref() {
+        if let Some(viewports) = part(info.p_viewport_state, before) {
             // The arrays of dynamic states are ignored, so their pointers may be invalid.
             let fixed = |a, b| !state.is_dynamic(a) && !state.is_dynamic(b);
             let viewport = fixed(
@@ -40,19 +45,21 @@ pub(super) unsafe fn of(info: &vk::GraphicsPipelineCreateInfo<'_>) -> State {
                 state.scissor = all.first().copied();
             }
         }
-        if let Some(assembly) = info.p_input_assembly_state.as_ref() {
+        let inputs = own.contains(Parts::VERTEX_INPUT_INTERFACE);
+        if let Some(assembly) = part(info.p_input_assembly_state, inputs) {
             state.topology = assembly.topology;
         }
-        if let Some(multisampling) = info.p_multisample_state.as_ref() {
+        if let Some(multisampling) = part(info.p_multisample_state, outputs) {
             state.samples = multisampling.rasterization_samples.as_raw();
             if multisampling.sample_shading_enable != 0 {
                 state.caveats.push("sample shading".to_owned());
             }
+            state.alpha_to_coverage = multisampling.alpha_to_coverage_enable != 0;
+            if state.alpha_to_coverage {
+                state.caveats.push("alpha to coverage".to_owned());
+            }
         }
-        if alpha_to_coverage(info) {
-            state.caveats.push("alpha to coverage".to_owned());
-        }
-        if let Some(depth) = info.p_depth_stencil_state.as_ref() {
+        if let Some(depth) = part(info.p_depth_stencil_state, shades) {
             state.depth = DepthInfo {
                 tests: depth.depth_test_enable != 0,
                 writes: depth.depth_write_enable != 0,
@@ -60,13 +67,16 @@ pub(super) unsafe fn of(info: &vk::GraphicsPipelineCreateInfo<'_>) -> State {
                 stencil: depth.stencil_test_enable != 0,
             };
         }
-        if let Some(blend) = info.p_color_blend_state.as_ref() {
+        if let Some(blend) = part(info.p_color_blend_state, outputs) {
             let attachments = slice(blend.p_attachments, blend.attachment_count);
             let masks = attachments.iter().map(|a| a.color_write_mask.as_raw());
             state.color_masks = masks.collect();
             state.blends = attachments.iter().any(|a| a.blend_enable != 0);
         }
-        let stages = slice(info.p_stages, info.stage_count);
+        let stages = match before {
+            true => slice(info.p_stages, info.stage_count),
+            false => &[],
+        };
         let has = |stage| stages.iter().any(|s| s.stage == stage);
         if has(vk::ShaderStageFlags::GEOMETRY) {
             state
@@ -82,14 +92,16 @@ pub(super) unsafe fn of(info: &vk::GraphicsPipelineCreateInfo<'_>) -> State {
     }
 }
 
-/// Whether alpha-to-coverage removes samples after shading.
+/// A structure of a part; `None` if it is missing or the part is not the description's own.
 ///
 /// # Safety
-/// A valid description.
-pub(super) unsafe fn alpha_to_coverage(info: &vk::GraphicsPipelineCreateInfo<'_>) -> bool {
+/// The pointer is valid or null if the part is the description's own.
+unsafe fn part<'a, T>(structure: *const T, is_own: bool) -> Option<&'a T> {
+    if !is_own {
+        return None;
+    }
     // SAFETY: as the caller promises.
-    let multisampling = unsafe { info.p_multisample_state.as_ref() };
-    multisampling.is_some_and(|state| state.alpha_to_coverage_enable != 0)
+    unsafe { structure.as_ref() }
 }
 
 /// Dynamic states that enable writes of depth, stencil or colours.
@@ -138,6 +150,11 @@ impl<'a> Changed<'a> {
         }
     }
 
+    /// Replaces the chain. It must live as long as this description is used.
+    pub fn replace_chain(&mut self, p_next: *const std::ffi::c_void) {
+        self.info.p_next = p_next;
+    }
+
     /// Disables writes of depth, stencil and colours. Tests are unchanged.
     ///
     /// # Safety
@@ -145,7 +162,9 @@ impl<'a> Changed<'a> {
     pub unsafe fn write_nothing(&mut self) {
         // SAFETY: as the caller promises.
         unsafe {
-            if let Some(depth) = self.info.p_depth_stencil_state.as_ref() {
+            let own = libraries::own_parts(&self.info);
+            let shades = own.contains(Parts::FRAGMENT_SHADER);
+            if let Some(depth) = part(self.info.p_depth_stencil_state, shades) {
                 *self.depth = *depth;
                 self.depth.depth_write_enable = vk::FALSE;
                 for face in [&mut self.depth.front, &mut self.depth.back] {
@@ -156,7 +175,8 @@ impl<'a> Changed<'a> {
                 }
                 self.info.p_depth_stencil_state = &*self.depth;
             }
-            if let Some(blend) = self.info.p_color_blend_state.as_ref() {
+            let outputs = own.contains(Parts::FRAGMENT_OUTPUT_INTERFACE);
+            if let Some(blend) = part(self.info.p_color_blend_state, outputs) {
                 *self.blend = *blend;
                 let count = blend.attachment_count;
                 self.attachments = slice(blend.p_attachments, count).to_vec();

@@ -84,7 +84,8 @@ impl Queries {
         }
     }
 
-    /// Counts of the draws.
+    /// Counts of the draws that were executed once. The query of a repeated draw was not reset between its
+    /// executions, so its result is undefined: lavapipe gives one of several counts.
     ///
     /// # Safety
     /// The draws have been executed.
@@ -95,8 +96,12 @@ impl Queries {
         next: &Next,
     ) -> Vec<(u32, u64)> {
         let of_draws = lock(&self.of_draws);
-        let mut found = Vec::new();
+        let mut executions: HashMap<u32, u32> = HashMap::new();
         for &draw in draws {
+            *executions.entry(draw).or_default() += 1;
+        }
+        let mut found = Vec::new();
+        for &draw in draws.iter().filter(|draw| executions[draw] == 1) {
             let Some(&query) = of_draws.get(&draw) else {
                 continue;
             };

@@ -13,7 +13,7 @@ pub use commands::{Call, CommandState, Commands, Dynamic, Executed, OpenPass};
 pub use descriptors::{Descriptors, Template, TemplateEntry, Written};
 pub use images::Images;
 pub use passes::{Attachment, Passes, RenderPass, Subpass};
-pub use pipelines::{Layout, Pipeline, Pipelines, Recorded, State};
+pub use pipelines::{Layout, Library, Pipeline, Pipelines, Recorded, State};
 
 use crate::spool::{DrawInfo, TextureInfo, ViewInfo};
 use std::collections::HashSet;

@@ -5,6 +5,9 @@ use ash::vk::{self, Handle};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
+/// Parts of a pipeline (`VK_EXT_graphics_pipeline_library`).
+type Parts = vk::GraphicsPipelineLibraryFlagsEXT;
+
 /// A pipeline layout.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Layout {
@@ -44,6 +47,8 @@ pub struct State {
     pub blends: bool,
     /// Samples per pixel.
     pub samples: u32,
+    /// Whether alpha-to-coverage removes samples after shading.
+    pub alpha_to_coverage: bool,
     /// Reasons why records are less exact.
     pub caveats: Vec<String>,
 }
@@ -54,6 +59,52 @@ impl State {
     pub fn is_dynamic(&self, state: vk::DynamicState) -> bool {
         self.dynamic.contains(&state.as_raw())
     }
+
+    /// Adds the state of the parts of a library.
+    pub fn add(&mut self, library: &Self, parts: Parts) {
+        self.dynamic.extend(&library.dynamic);
+        for caveat in &library.caveats {
+            if !self.caveats.contains(caveat) {
+                self.caveats.push(caveat.clone());
+            }
+        }
+        if parts.contains(Parts::VERTEX_INPUT_INTERFACE) {
+            self.topology = library.topology;
+        }
+        if parts.contains(Parts::PRE_RASTERIZATION_SHADERS) {
+            self.viewport = library.viewport;
+            self.scissor = library.scissor;
+        }
+        if parts.contains(Parts::FRAGMENT_SHADER) {
+            self.depth = library.depth;
+        }
+        if parts.contains(Parts::FRAGMENT_OUTPUT_INTERFACE) {
+            self.color_masks.clone_from(&library.color_masks);
+            self.blends = library.blends;
+            self.samples = library.samples;
+            self.alpha_to_coverage = library.alpha_to_coverage;
+        }
+    }
+}
+
+/// A library: parts of a pipeline that are linked later.
+#[derive(Clone, Debug, Default)]
+pub struct Library {
+    /// Its parts, with those of its own libraries.
+    pub parts: Parts,
+    /// State of its parts.
+    pub state: State,
+    /// Its pipeline layout.
+    pub layout: vk::PipelineLayout,
+    /// Recording shader of its fragment shader, or the reason why there is none; `None` without a fragment
+    /// shader.
+    pub shader: Option<Result<Arc<ShaderInfo>, String>>,
+    /// The library with the recording shader.
+    pub recording: Option<vk::Pipeline>,
+    /// The library with the recording shader, if it has a fragment shader, and without writes.
+    pub quiet: Option<vk::Pipeline>,
+    /// Dynamic states of the library that `quiet` fixes.
+    pub fixed: Vec<vk::DynamicState>,
 }
 
 /// A graphics pipeline.
@@ -84,6 +135,7 @@ pub struct Pipelines {
     /// them.
     used: HashSet<u64>,
     pipelines: HashMap<u64, Arc<Pipeline>>,
+    libraries: HashMap<u64, Arc<Library>>,
     created: u32,
     shaders: u32,
 }
@@ -145,10 +197,27 @@ impl Pipelines {
         self.pipelines.insert(handle.as_raw(), Arc::new(pipeline));
     }
 
-    /// Removes a pipeline. Returns the handle of its recording pipeline.
-    pub fn destroy(&mut self, handle: vk::Pipeline) -> Option<vk::Pipeline> {
-        let pipeline = self.pipelines.remove(&handle.as_raw())?;
-        pipeline.recorded.as_ref().map(|recorded| recorded.handle)
+    /// Adds a library.
+    pub fn create_library(&mut self, handle: vk::Pipeline, library: Library) {
+        self.libraries.insert(handle.as_raw(), Arc::new(library));
+    }
+
+    /// The library of a handle.
+    #[must_use]
+    pub fn library(&self, handle: vk::Pipeline) -> Option<Arc<Library>> {
+        self.libraries.get(&handle.as_raw()).cloned()
+    }
+
+    /// Removes a pipeline or library. Returns the handles of its recording pipelines.
+    pub fn destroy(&mut self, handle: vk::Pipeline) -> Vec<vk::Pipeline> {
+        let pipeline = self.pipelines.remove(&handle.as_raw());
+        let library = self.libraries.remove(&handle.as_raw());
+        let recorded = pipeline.and_then(|of| of.recorded.as_ref().map(|r| r.handle));
+        let variants = library.map_or([None; 2], |of| [of.recording, of.quiet]);
+        recorded
+            .into_iter()
+            .chain(variants.into_iter().flatten())
+            .collect()
     }
 
     /// The graphics pipeline of a handle.

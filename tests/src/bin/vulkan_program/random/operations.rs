@@ -5,6 +5,7 @@ use super::record::Recorder;
 use super::shaders::{BODIES, OF_TWO_SETS, OFFSETS};
 use super::world::{Class, Contents, FORMATS, PUSHED, Recorded, SET_KINDS, World, command_pool};
 use crate::gpu::{Result, checked};
+use crate::libraries::SPLITS;
 use ash::vk::{self, Handle};
 
 type Operation = fn(&mut World, &mut Generator) -> Result<()>;
@@ -242,7 +243,11 @@ fn create_pipeline(world: &mut World, random: &mut Generator) -> Result<()> {
         _ => BODIES.len(),
     };
     let (dynamic, body, blends) = (random.once_in(2), random.below(most), random.once_in(4));
-    let pipeline = world.pipeline(class, dynamic, layout, body, blends)?;
+    let split = match random.once_in(2) {
+        true => random.pick(&SPLITS).copied(),
+        false => None,
+    };
+    let pipeline = world.pipeline(class, dynamic, layout, body, blends, split)?;
     world.pipelines.push(pipeline);
     Ok(())
 }

@@ -9,6 +9,7 @@ mod pipelines;
 use super::generator::Generator;
 use super::shaders;
 use crate::gpu::{Buffer, Gpu, Image, ImageKind, Result, all_of, checked};
+use crate::libraries;
 use ash::vk::{self, Handle};
 use descriptors::{set_layouts, template};
 use std::collections::BTreeSet;
@@ -92,6 +93,7 @@ pub struct Layout {
 
 pub struct Pipeline {
     pub handle: vk::Pipeline,
+    linked: libraries::Linked,
     pub layout: usize,
     pub class: Class,
     /// Whether it is for dynamic rendering.
@@ -226,6 +228,7 @@ fn open() -> Result<Gpu> {
         .dynamic_rendering(true)
         .synchronization2(true);
     let mut multi = vk::PhysicalDeviceMultiDrawFeaturesEXT::default().multi_draw(true);
+    let mut of_libraries = libraries::features();
     let features = vk::PhysicalDeviceFeatures::default()
         .multi_draw_indirect(true)
         .draw_indirect_first_instance(true)
@@ -235,8 +238,11 @@ fn open() -> Result<Gpu> {
         .features(features)
         .push_next(&mut of_12)
         .push_next(&mut of_13)
-        .push_next(&mut multi);
-    let extensions = [ash::khr::push_descriptor::NAME, ash::ext::multi_draw::NAME];
+        .push_next(&mut multi)
+        .push_next(&mut of_libraries);
+    let push = ash::khr::push_descriptor::NAME;
+    let [library, graphics_library] = libraries::EXTENSIONS;
+    let extensions = [push, ash::ext::multi_draw::NAME, library, graphics_library];
     Gpu::open_with(vk::API_VERSION_1_3, &extensions, Some(&mut features))
 }
 
@@ -347,7 +353,7 @@ impl World {
         };
         for dynamic in [false, true] {
             self.pipelines
-                .push(self.pipeline(class, dynamic, 0, 0, false)?);
+                .push(self.pipeline(class, dynamic, 0, 0, false, None)?);
         }
         self.create_pool(random)?;
         let set = self.set(&self.pools[0], 0)?;

@@ -1,6 +1,7 @@
 //! Pipeline layouts, pipelines, render passes and targets.
 
 use super::*;
+use crate::libraries::{self, Split};
 
 impl World {
     /// Creates a pipeline layout.
@@ -59,6 +60,7 @@ impl World {
         layout: usize,
         body: usize,
         blends: bool,
+        split: Option<Split>,
     ) -> Result<Pipeline> {
         let device = &self.gpu.device;
         let words = shaders::fragment(body, self.layouts[layout].offset)?;
@@ -133,12 +135,13 @@ impl World {
                 pass = self.render_pass(class, true)?;
                 info = info.render_pass(pass);
             }
-            let made = device.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None);
+            let made = libraries::create(device, &info, split);
             device.destroy_shader_module(module, None);
             device.destroy_render_pass(pass, None);
-            let handle = made.map_err(|(_, error)| format!("a pipeline: {error}"))?[0];
+            let linked = made?;
             Ok(Pipeline {
-                handle,
+                handle: linked.pipeline,
+                linked,
                 layout,
                 class,
                 dynamic,
@@ -150,7 +153,7 @@ impl World {
         let pipeline = self.pipelines.swap_remove(place);
         self.forget(pipeline.handle.as_raw());
         // SAFETY: nothing uses the pipeline any more.
-        unsafe { self.gpu.device.destroy_pipeline(pipeline.handle, None) };
+        unsafe { pipeline.linked.destroy(&self.gpu.device) };
     }
 
     pub(super) fn render_pass(&self, class: Class, clears: bool) -> Result<vk::RenderPass> {
