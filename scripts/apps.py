@@ -49,7 +49,7 @@ KART_SETTINGS = (
 KART_FIRST = 100
 COLUMNS = [
     "program", "eyes by", "pixels per eye", "draws", "draws equal to their query", "draws that differ", "draws not compared",
-    "fragments", "plain ms per frame", "with the layer, not recorded", "recorded", "recorded over plain",
+    "fragments", "plain ms per earlier frame", "with the layer, not recorded", "plain ms per frame", "recorded", "recorded over plain",
     "not recorded over plain", "pictures", "plain peak MB", "recorded peak MB", "texture MB, Morton", "Z2 LRTA saves %",
     "Z2 STA saves %", "left out",
 ]
@@ -83,16 +83,18 @@ def note_times(text):
     return [float(time) for time in found(r"milliseconds per frame: ([\d.]+) before, ([\d.]+) captured", text)]
 
 
-def measure(plain_frame, capture):
-    """Medians over turns: ms of a plain frame, of one with the layer, of a recorded one; peak MB plain and recorded.
+def measure(plain_frames, capture):
+    """Medians over turns: ms of the plain frames before the recorded ones, and of the same frames without records; ms of the
+    recorded frames plain and recorded; peak MB plain and recorded.
 
-    `plain_frame` returns milliseconds and peak memory, `capture` what `run` does.
+    `plain_frames` returns both milliseconds and the peak memory, `capture` what `run` does.
     """
     turns = []
     for _ in range(TURNS):
-        plain, plain_peak = plain_frame()
+        plain_before, plain, plain_peak = plain_frames()
         _, said, peak = capture()
-        turns.append([plain, *note_times(said), plain_peak, peak])
+        before, recorded = note_times(said)
+        turns.append([plain_before, before, plain, recorded, plain_peak, peak])
     return [statistics.median(column) for column in zip(*turns)]
 
 
@@ -105,11 +107,11 @@ def describe_page(name, page, query, more):
     base = [f"{BIN}/tracegen", "page", f"{SITE}/{page}", "--query", query, *more]
     window = ["--frames", f"{FIRST}..{FIRST + COUNT}", "-o", f"{OUT}/timed.textrace"]
 
-    def plain_frame():
+    def plain_frames():
         _, said, peak = run([*base, *window, "--plain"])
-        return note_times(said)[1], peak
+        return *note_times(said), peak
 
-    measured = measure(plain_frame, lambda: run([*base, *window]))
+    measured = measure(plain_frames, lambda: run([*base, *window]))
     plain = []
     for number in range(2):
         picture = f"{OUT}/plain-{number}.png"
@@ -146,12 +148,14 @@ def describe_game():
     replay = ["glretrace", calls]
     base = [*screen, f"{BIN}/tracegen", "app"]
 
-    def plain_frame():
+    def plain_frames():
         profile, _, peak = run([*screen, "glretrace", "--pframe-times", calls], environment=ZINK)
-        return statistics.median(frame_times(profile)[first : first + COUNT]), peak
+        times = frame_times(profile)
+        # tracegen, too, takes the second half of the frames before.
+        return statistics.median(times[first // 2 : first]), statistics.median(times[first : first + COUNT]), peak
 
     window = ["--frames", f"{first}..{first + COUNT}", "-o", f"{OUT}/timed.textrace", "--apitrace", calls]
-    measured = measure(plain_frame, lambda: run([*base, *window]))
+    measured = measure(plain_frames, lambda: run([*base, *window]))
     hashes = ["-b", "-s", "-", "--snapshot-format=MD5"]
     plain, _, _ = run([*screen, "glretrace", *hashes, calls], environment=ZINK)
     every = ["--gl", "--to-end", "--frames", f"{first}..{first + COUNT}", "-o", f"{OUT}/timed.textrace", "--"]
@@ -179,8 +183,10 @@ def describe_kart():
     turns = []
     for _ in range(TURNS):
         _, said, peak = run([*base, "--frames", *window, *program])
-        turns.append([*note_times(said), plain_peak, peak])
-    measured = [None, *(statistics.median(column) for column in zip(*turns))]
+        before, recorded = note_times(said)
+        turns.append([before, recorded, peak])
+    before, recorded, peak = (statistics.median(column) for column in zip(*turns))
+    measured = [None, before, None, recorded, plain_peak, peak]
     trace = trace_of(KART)
     _, said, _ = run([*base, "--check", "--frames", f"{KART_FIRST}..{KART_FIRST + 1}", "-o", trace, *program], allowed=(0, 1))
     shutil.rmtree(home)
@@ -202,11 +208,12 @@ def row(name, trace, said, measured, pictures):
         text, _, _ = run([f"{BIN}/replay", "run", trace, "--order", order, "--json"])
         bytes_of[order] = json.loads(text)["result"]["external_bytes"]
     saved = [100 * (1 - bytes_of[order] / bytes_of["morton"]) for order in ORDERS[1:]]
-    plain, idle, recorded, plain_peak, peak = measured
-    over_plain = [f"{time / plain:.2f}" if plain else "-" for time in (recorded, idle)]
+    plain_before, before, plain, recorded, plain_peak, peak = measured
+    pairs = [(recorded, plain), (before, plain_before)]
+    over_plain = [f"{time / of:.2f}" if of else "-" for time, of in pairs]
     return [
         name, rule, f"{width}x{height}", draws, equal, different, "; ".join(f"{n}: {why}" for why, n in apart) or "0",
-        fragments, f"{plain:.1f}" if plain else "-", f"{idle:.1f}", f"{recorded:.1f}", *over_plain,
+        fragments, *(f"{time:.1f}" if time else "-" for time in (plain_before, before, plain, recorded)), *over_plain,
         pictures, f"{plain_peak:.0f}", f"{peak:.0f}", f"{bytes_of['morton'] / 1e6:.2f}",
         *(f"{value:.1f}" for value in saved), "; ".join(left_out) or "nothing",
     ]
@@ -230,7 +237,7 @@ def main():
         file.write("# command: RESULTS=1 scripts/apps.sh\n")
         file.write(f"# machine: {os.cpu_count()} cores, {platform.machine()}, load average {os.getloadavg()[0]:.1f} at the end\n")
         file.write(f"# programs: {version(['chromium', '--version'])}; versions of the libraries in apps/package-lock.json\n")
-        file.write(f"# times: medians of {TURNS} turns of {COUNT} frames; frame {FIRST} is in the trace\n")
+        file.write(f"# times: medians of {TURNS} turns of {COUNT} frames, and of frames before them; frame {FIRST} is in the trace\n")
         table = csv.writer(file, lineterminator="\n")
         table.writerow(COLUMNS)
         table.writerows(rows)

@@ -32,8 +32,9 @@ pub fn times(results: &Results) -> String {
         results,
         &[
             "program",
-            "plain ms per frame",
+            "plain ms per earlier frame",
             "with the layer, not recorded",
+            "plain ms per frame",
             "recorded",
             "not recorded over plain",
             "recorded over plain",
