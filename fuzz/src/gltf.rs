@@ -83,7 +83,7 @@ fn check(scene: &Scene) {
         assert!(!mesh.name.contains(char::is_control));
     }
     for material in &scene.materials {
-        let mut images = material.textures().into_iter().flatten().map(|t| t.image);
+        let mut images = material.textures.all().map(|t| t.image);
         assert!(images.all(|i| i < scene.images.len()));
         assert!(material.base_color.is_finite() && material.emissive.is_finite());
     }

@@ -6,7 +6,7 @@ use super::frame::Frame;
 pub use super::view::{Fragments, View};
 use formats::view::Lens;
 use record::{Captured, Region, Sink};
-use scene::Scene;
+use scene::{Scene, TextureSlot};
 use std::time::Duration;
 
 /// What is recorded of a region, and the sink of the records.
@@ -163,7 +163,7 @@ pub trait CaptureBackend {
     ) -> Result<Vec<Marks>, RasterError>;
 
     /// Renders a view's opaque and masked draws with the filtered texels of the materials' textures in
-    /// `slot` (0 to 5) in place of colour.
+    /// `slot` in place of colour.
     ///
     /// # Errors
     /// Driver errors, and a backend that has no such pictures.
@@ -171,7 +171,7 @@ pub trait CaptureBackend {
         &mut self,
         _draws: &DrawList,
         _view: &View<'_>,
-        _slot: u32,
+        _slot: TextureSlot,
     ) -> Result<Texels, RasterError> {
         Err(RasterError::Unsupported {
             driver: self.driver().to_owned(),

@@ -9,7 +9,7 @@ use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use glam::{Affine3A, Mat4, Vec3};
 use record::Region;
 use scene::geometry::transformed_box;
-use scene::{AlphaMode, Animation, Instance, Material, Mesh, Scene};
+use scene::{AlphaMode, Animation, Instance, Material, Mesh, Scene, TextureSlot};
 use std::collections::{HashMap, HashSet};
 use textures::TextureSet;
 use visibility::{Hierarchy, frustum};
@@ -35,7 +35,9 @@ impl DrawMode {
         match material.alpha {
             AlphaMode::Opaque => Some(Self::Opaque),
             AlphaMode::Blend => Some(Self::Blended),
-            AlphaMode::Mask(_) if material.base_color_texture.is_some() => Some(Self::Masked),
+            AlphaMode::Mask(_) if material.textures[TextureSlot::BaseColor].is_some() => {
+                Some(Self::Masked)
+            }
             AlphaMode::Mask(cutoff) => (material.base_color.w >= cutoff).then_some(Self::Opaque),
         }
     }
@@ -264,14 +266,14 @@ impl DrawList {
             .iter()
             .zip(&self.groups)
             .map(|(material, groups)| {
-                let slots = material.textures();
+                let of_slots = &material.textures;
                 let mut result: Vec<UvGroup> = groups
                     .groups
                     .iter()
                     .map(|group| {
                         let samples = group
                             .iter()
-                            .filter_map(|&slot| slots[slot])
+                            .filter_map(|&slot| of_slots[slot])
                             .filter_map(|t| {
                                 // Images that only unplaced materials use have no texture.
                                 let texture = (*set.of_image.get(t.image)?)?;
@@ -405,7 +407,7 @@ mod tests {
     fn material(alpha: AlphaMode, textured: bool) -> Material {
         Material {
             alpha,
-            base_color_texture: textured.then(|| TextureRef::new(0)),
+            textures: [(TextureSlot::BaseColor, textured.then(|| TextureRef::new(0)))].into(),
             base_color: Vec4::new(1.0, 1.0, 1.0, 0.4),
             ..Material::default()
         }

@@ -1,26 +1,12 @@
 //! Groups of a material's textures that share texture coordinates.
 
-use scene::{Material, TextureRef};
-
-/// Textures that the shader samples: base colour, normal, metallic-roughness, specular,
-/// occlusion, emissive.
-pub const MATERIAL_TEXTURES: usize = SLOTS.len();
-
-/// The shader's names of the slots of [`Material::textures`].
-pub(crate) const SLOTS: [&str; 6] = [
-    "BASE_COLOR",
-    "NORMAL",
-    "METALLIC_ROUGHNESS",
-    "SPECULAR",
-    "OCCLUSION",
-    "EMISSIVE",
-];
+use scene::{Material, TextureRef, TextureSlot};
 
 /// The material's textures by uv group: same texture coordinate set and same transform.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MaterialGroups {
-    /// Slots (0 to 5) of each group; groups in the order of their first slot.
-    pub groups: Vec<Vec<usize>>,
+    /// Slots of each group; groups in the order of their first slot.
+    pub groups: Vec<Vec<TextureSlot>>,
     /// One bit per slot, set if it has a texture.
     pub present: u32,
     /// One bit per slot, set if it is the first of its group.
@@ -31,22 +17,21 @@ impl MaterialGroups {
     /// Groups the textures of `material`.
     #[must_use]
     pub fn new(material: &Material) -> Self {
-        let textures = material.textures();
+        let textures = &material.textures;
         let mut result = Self {
             groups: Vec::new(),
             present: 0,
             leaders: 0,
         };
-        for (slot, texture) in textures.iter().enumerate() {
-            let Some(texture) = texture else { continue };
-            result.present |= 1 << slot;
-            let same = |group: &&mut Vec<usize>| {
+        for (slot, texture) in textures.iter() {
+            result.present |= 1 << slot as u32;
+            let same = |group: &&mut Vec<TextureSlot>| {
                 textures[group[0]].is_some_and(|leader| share_coordinates(&leader, texture))
             };
             if let Some(group) = result.groups.iter_mut().find(same) {
                 group.push(slot);
             } else {
-                result.leaders |= 1 << slot;
+                result.leaders |= 1 << slot as u32;
                 result.groups.push(vec![slot]);
             }
         }
@@ -61,6 +46,8 @@ fn share_coordinates(a: &TextureRef, b: &TextureRef) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use TextureSlot::{BaseColor, Emissive, Normal, Occlusion, Specular};
+    use scene::Textures;
 
     #[test]
     fn textures_with_the_same_coordinates_form_one_group() {
@@ -68,19 +55,29 @@ mod tests {
             uv_transform: [[4.0, 0.0, 0.0], [0.0, 4.0, 0.0]],
             ..TextureRef::new(2)
         };
+        let other_set = TextureRef {
+            uv_set: 1,
+            ..TextureRef::new(3)
+        };
         let material = Material {
-            base_color_texture: Some(TextureRef::new(0)),
-            normal_texture: Some(scaled),
-            specular_texture: Some(TextureRef::new(1)),
-            occlusion_texture: Some(TextureRef {
-                uv_set: 1,
-                ..TextureRef::new(3)
-            }),
-            emissive_texture: Some(scaled),
+            textures: Textures::from([
+                (BaseColor, Some(TextureRef::new(0))),
+                (Normal, Some(scaled)),
+                (Specular, Some(TextureRef::new(1))),
+                (Occlusion, Some(other_set)),
+                (Emissive, Some(scaled)),
+            ]),
             ..Material::default()
         };
         let groups = MaterialGroups::new(&material);
-        assert_eq!(groups.groups, [vec![0, 3], vec![1, 5], vec![4]]);
+        assert_eq!(
+            groups.groups,
+            [
+                vec![BaseColor, Specular],
+                vec![Normal, Emissive],
+                vec![Occlusion]
+            ]
+        );
         assert_eq!(groups.present, 0b11_1011);
         assert_eq!(groups.leaders, 0b01_0011);
     }

@@ -4,11 +4,10 @@
 use super::capture::CaptureJob;
 use super::draws::{DrawCall, DrawMode, SHADOW_SIZE};
 use super::error::RasterError;
-use super::groups::MATERIAL_TEXTURES;
 use formats::texture::MipFilter;
 use formats::view::FrameViews;
 use glam::Vec2;
-use scene::{Mesh, Scene, TextureRef};
+use scene::{Mesh, Scene, TextureRef, TextureSlot};
 use visibility::magnification::{Pixels, least_derivative_squared};
 use visibility::triangles;
 
@@ -52,7 +51,7 @@ impl CaptureJob<'_> {
         // prepared.
         for &draw in &self.draws.moving {
             let material = &scene.materials[self.draws.calls[draw as usize].material];
-            for texture in material.textures().iter().flatten() {
+            for texture in material.textures.all() {
                 if let Some(level) = finest.get_mut(texture.image) {
                     *level = Some(0);
                 }
@@ -66,7 +65,7 @@ impl CaptureJob<'_> {
                 size_px: view.layer.size_px,
                 least_w: projection[3][2] / projection[2][2],
             };
-            let all = |_| MATERIAL_TEXTURES;
+            let all = |_| TextureSlot::COUNT;
             self.sample(scene, &pixels, view.visible, all, finest);
         }
         for (cascade, casters) in frame.lighting.cascades.iter().zip(&frame.casters) {
@@ -94,8 +93,8 @@ impl CaptureJob<'_> {
         for &index in visible {
             let call = &self.draws.calls[index as usize];
             let mesh = &scene.meshes[call.mesh];
-            let textures = scene.materials[call.material].textures();
-            let sampled = || textures[..slots(call.mode)].iter().flatten();
+            let textures = &scene.materials[call.material].textures;
+            let sampled = || textures.first(slots(call.mode));
             if !sampled().any(|t| is_new(t, finest)) || !self.any_inside(call, mesh, pixels) {
                 continue;
             }

@@ -1,11 +1,11 @@
 //! The shader's source: constants shared with the host, followed by the WGSL files.
 
 use crate::draws::{SHADOW_SIZE, SHADOW_TAPS};
-use crate::groups::{MATERIAL_TEXTURES, SLOTS};
 use crate::lighting::MAX_POINT_LIGHTS;
 use crate::uniforms::MAX_CASCADES;
 use formats::textrace::NO_GROUP;
 use record::RECORD_BYTES;
+use scene::TextureSlot;
 
 /// Bindings of group 0.
 pub(crate) const VIEW_BINDINGS: [&str; 7] = [
@@ -19,12 +19,12 @@ pub(crate) const VIEW_BINDINGS: [&str; 7] = [
 ];
 /// Binding of the material's uniforms in group 1.
 pub(crate) const MATERIAL_BINDING: u32 = 0;
-/// First of the material's [`MATERIAL_TEXTURES`] texture bindings in group 1.
+/// First of the material's texture bindings in group 1, in the order of [`TextureSlot::ALL`].
 pub(crate) const TEXTURES_BINDING: u32 = 1;
 /// First of the sampler bindings in group 1, in the order of the textures.
-pub(crate) const SAMPLERS_BINDING: u32 = TEXTURES_BINDING + MATERIAL_TEXTURES as u32;
+pub(crate) const SAMPLERS_BINDING: u32 = TEXTURES_BINDING + TextureSlot::COUNT as u32;
 /// Binding of the copy that alpha tests sample in group 1, if there are copies.
-pub(crate) const ALPHA_BINDING: u32 = SAMPLERS_BINDING + MATERIAL_TEXTURES as u32;
+pub(crate) const ALPHA_BINDING: u32 = SAMPLERS_BINDING + TextureSlot::COUNT as u32;
 
 /// Source of alpha tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,8 +94,8 @@ pub(crate) fn source(granularity: Granularity, alpha: AlphaSource) -> String {
     let mut constant = |name: &str, value: u64| {
         text += &format!("const {name}: u32 = {value}u;\n");
     };
-    for (value, slot) in (0..).zip(SLOTS) {
-        constant(slot, value);
+    for slot in TextureSlot::ALL {
+        constant(&shader_name(slot).to_uppercase(), slot as u64);
     }
     for (value, binding) in (0..).zip(VIEW_BINDINGS) {
         constant(&format!("{binding}_BINDING"), value);
@@ -104,7 +104,7 @@ pub(crate) fn source(granularity: Granularity, alpha: AlphaSource) -> String {
     constant("TEXTURES_BINDING", TEXTURES_BINDING.into());
     constant("SAMPLERS_BINDING", SAMPLERS_BINDING.into());
     constant("ALPHA_BINDING", ALPHA_BINDING.into());
-    constant("MATERIAL_TEXTURES", MATERIAL_TEXTURES as u64);
+    constant("MATERIAL_TEXTURES", TextureSlot::COUNT as u64);
     constant("MAX_CASCADES", MAX_CASCADES as u64);
     constant("MAX_POINT_LIGHTS", MAX_POINT_LIGHTS as u64);
     constant("NO_GROUP", NO_GROUP.into());
@@ -122,7 +122,79 @@ pub(crate) fn source(granularity: Granularity, alpha: AlphaSource) -> String {
         text.push('\n');
         text += part;
     }
+    text.push('\n');
+    text += &textures();
+    if granularity != Granularity::None {
+        text += &record_groups();
+        text += &texels();
+    }
     text
+}
+
+/// A slot's name in the shader.
+fn shader_name(slot: TextureSlot) -> String {
+    slot.name().replace('-', "_")
+}
+
+/// A sample of a slot's texture.
+fn sample(name: &str, number: &str) -> String {
+    format!("textureSample({name}_texture, {name}_sampler, texture_uv({number}, in.uv))")
+}
+
+/// Declarations of the material's textures, and the light that the textures of layers leave.
+fn textures() -> String {
+    let mut text = String::new();
+    let mut layers = String::new();
+    for slot in TextureSlot::ALL {
+        let name = shader_name(slot);
+        let number = name.to_uppercase();
+        text += &format!(
+            "@group(1) @binding(TEXTURES_BINDING + {number}) var {name}_texture: texture_2d<f32>;\n\
+             @group(1) @binding(SAMPLERS_BINDING + {number}) var {name}_sampler: sampler;\n"
+        );
+        if slot.is_of_layer() {
+            let sample = sample(&name, &number);
+            layers += &format!(
+                "    if (TEXTURES & (1u << {number})) != 0u {{ kept -= LAYER_WEIGHT * {sample}.g; }}\n"
+            );
+        }
+    }
+    text + &format!(
+        "\nfn kept_by_layers(in: Fragment) -> f32 {{\n    var kept = 1.0;\n{layers}    return kept;\n}}\n"
+    )
+}
+
+/// One record per group of texture coordinates; returns the index of the base colour's.
+fn record_groups() -> String {
+    let mut text =
+        "\nfn record_groups(lane: Lane, in: Fragment) -> u32 {\n    var first = NONE;\n".to_owned();
+    for slot in TextureSlot::ALL {
+        let number = shader_name(slot).to_uppercase();
+        let index = match slot {
+            TextureSlot::BaseColor => "first",
+            _ => "_",
+        };
+        text += &format!(
+            "    if (LEADERS & (1u << {number})) != 0u {{ {index} = record_uv(lane, \
+             countOneBits(LEADERS & ((1u << {number}) - 1u)), true, texture_uv({number}, in.uv)); }}\n"
+        );
+    }
+    text + "    return first;\n}\n"
+}
+
+/// The texel of the slot that is checked.
+fn texels() -> String {
+    let mut text =
+        "\nfn texel_of(in: Fragment) -> vec4<f32> {\n    var color = vec4(0.0);\n".to_owned();
+    for slot in TextureSlot::ALL {
+        let name = shader_name(slot);
+        let number = name.to_uppercase();
+        let sample = sample(&name, &number);
+        text += &format!(
+            "    if (TEXTURES & (1u << {number})) != 0u && view.counts.z == {number} {{ color = {sample}; }}\n"
+        );
+    }
+    text + "    return color;\n}\n"
 }
 
 /// The module for pictures of two views. The view is selected by the view index that each entry

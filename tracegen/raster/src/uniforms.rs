@@ -2,10 +2,9 @@
 
 use crate::backend::View;
 use crate::cascades::Cascade;
-use crate::groups::MATERIAL_TEXTURES;
 use crate::lighting::{Lighting, MAX_POINT_LIGHTS};
 use glam::{Mat4, Vec3, Vec4};
-use scene::{AlphaMode, Material};
+use scene::{AlphaMode, Material, TextureSlot};
 
 /// Number of shadow cascades in the shader.
 pub(crate) const MAX_CASCADES: usize = 4;
@@ -48,8 +47,8 @@ impl ViewData {
     }
 
     /// Selects the texture slot of the materials.
-    pub fn with_texture_slot(mut self, slot: u32) -> Self {
-        self.counts[2] = slot;
+    pub fn with_texture_slot(mut self, slot: TextureSlot) -> Self {
+        self.counts[2] = slot as u32;
         self
     }
 
@@ -99,16 +98,15 @@ pub(crate) struct MaterialData {
     emissive: [f32; 4],
     specular: [f32; 4],
     surface: [f32; 4],
-    uv_rows: [[f32; 4]; 2 * MATERIAL_TEXTURES],
+    uv_rows: [[f32; 4]; 2 * TextureSlot::COUNT],
 }
 
 impl MaterialData {
     pub fn new(material: &Material) -> Self {
-        let mut uv_rows = [[0.0; 4]; 2 * MATERIAL_TEXTURES];
-        for (slot, texture) in material.textures().iter().enumerate() {
-            let Some(t) = texture else { continue };
+        let mut uv_rows = [[0.0; 4]; 2 * TextureSlot::COUNT];
+        for (slot, t) in material.textures.iter() {
             for (row, m) in t.uv_transform.iter().enumerate() {
-                uv_rows[2 * slot + row] = [m[0], m[1], m[2], t.uv_set as f32];
+                uv_rows[2 * slot as usize + row] = [m[0], m[1], m[2], t.uv_set as f32];
             }
         }
         let cutoff = match material.alpha {

@@ -15,5 +15,7 @@ pub mod soup;
 mod texture;
 pub mod tracer;
 
+pub use material::SLOTS as TEXTURE_SLOTS;
+
 #[cfg(test)]
 mod tests;

@@ -5,7 +5,7 @@ use super::texture::{Pyramid, fast_log2};
 use formats::raytrace::RayMaterial;
 use glam::{Vec3, Vec4};
 use rayon::prelude::*;
-use scene::{AlphaMode, Material, Scene, SceneError, TextureRef};
+use scene::{AlphaMode, Material, Scene, SceneError, TextureRef, TextureSlot};
 
 /// Dielectrics below this roughness get a highlight.
 const GLOSSY_ROUGHNESS: f32 = 0.7;
@@ -90,11 +90,16 @@ impl Materials {
     pub fn surface(&self, material: usize, at: &Attributes, footprint_m: f32) -> Surface {
         let m = &self.materials[material];
         let sample = |t: &Option<TextureRef>| self.sample(t.as_ref(), at, footprint_m);
-        let base = m.base_color * at.color * sample(&m.base_color_texture).unwrap_or(Vec4::ONE);
-        let rough_metal = sample(&m.metallic_roughness_texture).unwrap_or(Vec4::ONE);
+        let base = m.base_color
+            * at.color
+            * sample(&m.textures[TextureSlot::BaseColor]).unwrap_or(Vec4::ONE);
+        let rough_metal = sample(&m.textures[TextureSlot::MetallicRoughness]).unwrap_or(Vec4::ONE);
         let roughness = (m.roughness * rough_metal.y).clamp(0.0, 1.0);
         let metallic = (m.metallic * rough_metal.z).clamp(0.0, 1.0);
-        let emissive = m.emissive * sample(&m.emissive_texture).unwrap_or(Vec4::ONE).truncate();
+        let emissive = m.emissive
+            * sample(&m.textures[TextureSlot::Emissive])
+                .unwrap_or(Vec4::ONE)
+                .truncate();
         let color = base.truncate();
         let specular = (0.04 * m.specular).lerp(color, metallic);
         let smooth_metal = if roughness < MIRROR_ROUGHNESS {
@@ -125,11 +130,13 @@ impl Materials {
     /// Alpha of a masked or blended material at full resolution.
     fn alpha(&self, material: &Material, scene: &Scene, soup: &Soup, hit: Hit) -> f32 {
         let (primitive, bary) = hit;
-        let texel = material.base_color_texture.as_ref().and_then(|t| {
-            let pyramid = self.pyramids.get(t.image)?.as_ref()?;
-            let uv = soup.uv(scene, primitive, bary, t.uv_set);
-            Some(pyramid.sample(t, uv, 0.0, self.srgb).w)
-        });
+        let texel = material.textures[TextureSlot::BaseColor]
+            .as_ref()
+            .and_then(|t| {
+                let pyramid = self.pyramids.get(t.image)?.as_ref()?;
+                let uv = soup.uv(scene, primitive, bary, t.uv_set);
+                Some(pyramid.sample(t, uv, 0.0, self.srgb).w)
+            });
         // As in the raster capture, a mask without a texture is tested once per draw.
         let constant = texel.is_none() && material.alpha != AlphaMode::Blend;
         let vertex = if constant {
@@ -190,15 +197,16 @@ pub fn needs_alpha_test(m: &Material) -> bool {
     m.alpha != AlphaMode::Opaque || m.transmission > 0.0
 }
 
+/// Textures of the materials that rays sample.
+pub const SLOTS: [TextureSlot; 3] = [
+    TextureSlot::BaseColor,
+    TextureSlot::MetallicRoughness,
+    TextureSlot::Emissive,
+];
+
 /// The textures of a material that rays sample.
 fn ray_textures(m: &Material) -> impl Iterator<Item = TextureRef> {
-    [
-        m.base_color_texture,
-        m.metallic_roughness_texture,
-        m.emissive_texture,
-    ]
-    .into_iter()
-    .flatten()
+    SLOTS.into_iter().filter_map(|slot| m.textures[slot])
 }
 
 /// Blinn-Phong exponent of a roughness (Karis 2013), 0 where there is no visible highlight.
@@ -213,12 +221,15 @@ fn highlight_exponent(roughness: f32) -> u32 {
 fn describe(m: &Material) -> RayMaterial {
     let glass = m.transmission > 0.0 || m.alpha == AlphaMode::Blend;
     // Textures reduce both factors, so any texel may be smoother or less metallic.
-    let may_be_smooth = m.metallic_roughness_texture.is_some() || m.roughness < MIRROR_ROUGHNESS;
+    let may_be_smooth =
+        m.textures[TextureSlot::MetallicRoughness].is_some() || m.roughness < MIRROR_ROUGHNESS;
     let metal = m.metallic > 0.0 && may_be_smooth;
-    let polished = m.metallic_roughness_texture.is_some() || m.roughness < POLISHED_ROUGHNESS;
-    let glossy = m.metallic_roughness_texture.is_some() || m.roughness < GLOSSY_ROUGHNESS;
-    let flawless =
-        m.metallic_roughness_texture.is_none() && m.metallic * (1.0 - m.roughness) >= 1.0;
+    let polished =
+        m.textures[TextureSlot::MetallicRoughness].is_some() || m.roughness < POLISHED_ROUGHNESS;
+    let glossy =
+        m.textures[TextureSlot::MetallicRoughness].is_some() || m.roughness < GLOSSY_ROUGHNESS;
+    let flawless = m.textures[TextureSlot::MetallicRoughness].is_none()
+        && m.metallic * (1.0 - m.roughness) >= 1.0;
     RayMaterial {
         name: m.name.clone(),
         diffuse: m.transmission < 1.0
@@ -231,7 +242,9 @@ fn describe(m: &Material) -> RayMaterial {
         alpha_masked: match m.alpha {
             AlphaMode::Opaque => false,
             AlphaMode::Mask(_) => true,
-            AlphaMode::Blend => m.base_color_texture.is_some() || m.base_color.w < BLEND_STOPS_FROM,
+            AlphaMode::Blend => {
+                m.textures[TextureSlot::BaseColor].is_some() || m.base_color.w < BLEND_STOPS_FROM
+            }
         },
     }
 }
@@ -246,7 +259,7 @@ mod tests {
             let material = Material {
                 alpha,
                 base_color: Vec4::new(1.0, 1.0, 1.0, alpha_factor),
-                base_color_texture: textured.then(|| TextureRef::new(0)),
+                textures: [(TextureSlot::BaseColor, textured.then(|| TextureRef::new(0)))].into(),
                 ..Material::default()
             };
             describe(&material).alpha_masked

@@ -38,6 +38,5 @@ fn largest_step(scene: &Scene, mesh: &Mesh) -> f32 {
         let [across, down] = texture.uv_transform;
         texels(across, size[0]).max(texels(down, size[1])) * f32::EPSILON
     };
-    let textures = material.textures();
-    textures.iter().flatten().map(step).fold(0.0, f32::max)
+    material.textures.all().map(step).fold(0.0, f32::max)
 }

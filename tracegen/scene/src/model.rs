@@ -4,7 +4,7 @@
 //! relative to [`Scene::origin`], in single precision.
 
 use crate::geometry::{bounding_box, transformed_box};
-use crate::{Animation, Image, Motion};
+use crate::{Animation, Image, Motion, TextureSlot, TextureSlots, Textures};
 use formats::texture::Sampler;
 use glam::{Affine3A, DVec3, Mat3, Vec2, Vec3, Vec4};
 
@@ -149,30 +149,20 @@ impl TextureRef {
 pub struct Material {
     /// Name for reports.
     pub name: String,
+    /// Textures.
+    pub textures: Textures,
     /// Linear base colour and alpha.
     pub base_color: Vec4,
-    /// Base colour texture.
-    pub base_color_texture: Option<TextureRef>,
-    /// Tangent-space normal map.
-    pub normal_texture: Option<TextureRef>,
     /// Scale of the normal map's x and y.
     pub normal_scale: f32,
     /// Metalness, 0 to 1.
     pub metallic: f32,
     /// Perceptual roughness, 0 to 1.
     pub roughness: f32,
-    /// Roughness in G, metalness in B.
-    pub metallic_roughness_texture: Option<TextureRef>,
     /// Specular colour (KHR_materials_specular), linear.
     pub specular: Vec3,
-    /// Specular colour texture.
-    pub specular_texture: Option<TextureRef>,
-    /// Ambient occlusion in R.
-    pub occlusion_texture: Option<TextureRef>,
     /// Emitted radiance, linear.
     pub emissive: Vec3,
-    /// Emissive texture.
-    pub emissive_texture: Option<TextureRef>,
     /// Alpha mode.
     pub alpha: AlphaMode,
     /// Both faces are drawn.
@@ -190,52 +180,19 @@ impl Default for Material {
     fn default() -> Self {
         Self {
             name: String::new(),
+            textures: Textures::default(),
             base_color: Vec4::ONE,
-            base_color_texture: None,
-            normal_texture: None,
             normal_scale: 1.0,
             metallic: 0.0,
             roughness: 0.8,
-            metallic_roughness_texture: None,
             specular: Vec3::ONE,
-            specular_texture: None,
-            occlusion_texture: None,
             emissive: Vec3::ZERO,
-            emissive_texture: None,
             alpha: AlphaMode::Opaque,
             double_sided: false,
             transmission: 0.0,
             ior: 1.5,
             mirror: 0.0,
         }
-    }
-}
-
-impl Material {
-    /// The textures that the raster shader samples, in shader order: base colour, normal,
-    /// metallic-roughness, specular, occlusion, emissive.
-    #[must_use]
-    pub fn textures(&self) -> [Option<TextureRef>; 6] {
-        [
-            self.base_color_texture,
-            self.normal_texture,
-            self.metallic_roughness_texture,
-            self.specular_texture,
-            self.occlusion_texture,
-            self.emissive_texture,
-        ]
-    }
-
-    /// Mutable references to the slots of [`Self::textures`].
-    pub(crate) fn textures_mut(&mut self) -> [&mut Option<TextureRef>; 6] {
-        [
-            &mut self.base_color_texture,
-            &mut self.normal_texture,
-            &mut self.metallic_roughness_texture,
-            &mut self.specular_texture,
-            &mut self.occlusion_texture,
-            &mut self.emissive_texture,
-        ]
     }
 }
 
@@ -278,22 +235,20 @@ pub enum Light {
 }
 
 impl Scene {
-    /// Removes the textures of the slots (in the order of [`Material::textures`]) that `keep`
-    /// excludes, and the images that only they sample.
-    pub fn keep_texture_slots(&mut self, keep: [bool; 6]) {
+    /// Removes the textures of other slots, and the images that only they sample.
+    pub fn keep_texture_slots(&mut self, keep: TextureSlots) {
         let mut new_index = vec![None; self.images.len()];
         let mut kept = Vec::new();
         for material in &mut self.materials {
-            for (slot, keep) in material.textures_mut().into_iter().zip(keep) {
-                let Some(texture) = slot.filter(|_| keep) else {
-                    *slot = None;
-                    continue;
-                };
-                let image = *new_index[texture.image].get_or_insert_with(|| {
-                    kept.push(self.images[texture.image].clone());
-                    kept.len() - 1
+            for slot in TextureSlot::ALL {
+                let texture = &mut material.textures[slot];
+                *texture = texture.filter(|_| keep.contains(slot)).map(|texture| {
+                    let image = *new_index[texture.image].get_or_insert_with(|| {
+                        kept.push(self.images[texture.image].clone());
+                        kept.len() - 1
+                    });
+                    TextureRef { image, ..texture }
                 });
-                *slot = Some(TextureRef { image, ..texture });
             }
         }
         self.images = kept;

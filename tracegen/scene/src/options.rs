@@ -1,14 +1,13 @@
 //! Options and results of a loader.
 
-use crate::Scene;
+use crate::{Scene, TextureSlots};
 use std::path::PathBuf;
 
 /// Options of a loader.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadOptions {
-    /// Which of [`super::Material::textures`] to keep, in that order; the others become `None` and
-    /// their images are not read.
-    pub slots: [bool; 6],
+    /// Which textures of the materials to keep. The images of the others are not read.
+    pub slots: TextureSlots,
     /// The material variant to show (KHR_materials_variants), or the file's own materials.
     pub variant: Option<String>,
     /// The animation to play: a name, an index, `all` or `none`. The default is the file's first one.
@@ -20,7 +19,7 @@ pub struct LoadOptions {
 impl LoadOptions {
     /// All textures.
     pub const ALL: Self = Self {
-        slots: [true; 6],
+        slots: TextureSlots::ALL,
         variant: None,
         animation: None,
         time_s: 0.0,

@@ -3,7 +3,9 @@
 use super::mesh_builder::MeshBuilder;
 use super::texture_synth::{Map, Recipe, Rgb, linear};
 use glam::{Affine3A, Vec3};
-use scene::{Camera, Instance, Light, Material, Motion, Movement, Scene, TextureRef};
+use scene::{
+    Camera, Instance, Light, Material, Motion, Movement, Scene, TextureRef, TextureSlot, Textures,
+};
 
 /// A material's index and properties for meshes.
 #[derive(Clone, Copy, Debug)]
@@ -71,13 +73,13 @@ impl SceneBuilder {
                 TextureRef::new(images.len() - 1)
             })
         };
-        let base_color_texture = add(Map::Color);
-        let normal_texture = add(Map::Normal);
-        let metallic_roughness_texture = add(Map::Roughness);
-        let occlusion_texture = add(Map::Occlusion);
+        let base_color = add(Map::Color);
+        let normal = add(Map::Normal);
+        let metallic_roughness = add(Map::Roughness);
+        let occlusion = add(Map::Occlusion);
         // The texture multiplies the factors, as in glTF.
         let factor = |plain| {
-            if metallic_roughness_texture.is_some() {
+            if metallic_roughness.is_some() {
                 1.0
             } else {
                 plain
@@ -85,12 +87,14 @@ impl SceneBuilder {
         };
         let mut material = Material {
             name: name.to_owned(),
-            base_color_texture,
-            normal_texture,
+            textures: Textures::from([
+                (TextureSlot::BaseColor, base_color),
+                (TextureSlot::Normal, normal),
+                (TextureSlot::MetallicRoughness, metallic_roughness),
+                (TextureSlot::Occlusion, occlusion),
+            ]),
             metallic: factor(0.0),
             roughness: factor(0.8),
-            metallic_roughness_texture,
-            occlusion_texture,
             ..Material::default()
         };
         adjust(&mut material);

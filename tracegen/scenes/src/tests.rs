@@ -2,7 +2,7 @@
 
 use super::{BUILTINS, build};
 use glam::Vec3;
-use scene::{LoadOptions, Mesh, Scene, TextureRef};
+use scene::{LoadOptions, Mesh, Scene, TextureRef, TextureSlot, TextureSlots};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::OnceLock;
 
@@ -155,7 +155,7 @@ fn textures_are_powers_of_two_and_referenced_in_range() {
             assert!(w.is_power_of_two() && h.is_power_of_two(), "{}", image.name);
         }
         for material in &scene.materials {
-            for texture in material.textures().into_iter().flatten() {
+            for texture in material.textures.all() {
                 assert!(texture.image < scene.images.len(), "{}", material.name);
             }
         }
@@ -248,8 +248,7 @@ fn moving_parts_of_the_plant_start_in_place_and_stay_inside() {
 
 #[test]
 fn removing_texture_slots_removes_their_images() {
-    let mut slots = [true; 6];
-    slots[1] = false;
+    let slots = TextureSlots::ALL.without(TextureSlot::Normal);
     let whole = crate::load("teapot").unwrap();
     let part = crate::load_with(
         "teapot",
@@ -268,13 +267,13 @@ fn removing_texture_slots_removes_their_images() {
     assert!(colors.len() < whole.images.len());
     assert_eq!(names(&part), colors);
     for (before, after) in whole.materials.iter().zip(&part.materials) {
-        assert_eq!(after.normal_texture, None);
+        assert_eq!(after.textures[TextureSlot::Normal], None);
         let image = |scene: &Scene, texture: Option<TextureRef>| {
             texture.map(|t| scene.images[t.image].name.clone())
         };
         assert_eq!(
-            image(&part, after.base_color_texture),
-            image(&whole, before.base_color_texture)
+            image(&part, after.textures[TextureSlot::BaseColor]),
+            image(&whole, before.textures[TextureSlot::BaseColor])
         );
     }
 }

@@ -15,8 +15,8 @@ use rays::frame::{RayFrame, trace_frame};
 use rays::picture;
 use rays::scene::TraceScene;
 use rays::tracer::TraceSettings;
-use scene::LoadOptions;
 use scene::paths::MAX_FRAMES;
+use scene::{LoadOptions, TextureSlots};
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -111,8 +111,7 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     let start = Instant::now();
     let progress = Progress::new("loading the scene", 0, "");
     let textures = LoadOptions {
-        // Base colour, metallic-roughness and emissive: the textures that rays sample.
-        slots: [true, false, true, false, false, true],
+        slots: TextureSlots::of(&rays::TEXTURE_SLOTS),
         ..LoadOptions::ALL
     };
     let setup = {

@@ -7,7 +7,7 @@ use anyhow::{Context, bail, ensure};
 use clap::{Args, Parser};
 use formats::Trace;
 use formats::container::{AtomicFile, check_regular, read_regular, remove_abandoned};
-use scene::LoadOptions;
+use scene::{LoadOptions, TextureSlots};
 use serde::Serialize;
 use shell::{Output, Piece, Progress, Shard, ShardArgs, SlurmArray, Threads, balanced};
 use std::collections::HashMap;
@@ -154,7 +154,7 @@ impl<'a> SceneSizes<'a> {
             _ => scene,
         };
         let without_images = LoadOptions {
-            slots: [false; 6],
+            slots: TextureSlots::NONE,
             ..LoadOptions::ALL
         };
         let triangles = load_with(spec, &without_images)?.scene.triangle_count();

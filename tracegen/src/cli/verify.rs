@@ -6,7 +6,7 @@ use super::path_args::PathArgs;
 use super::scene_args::{SceneArgs, SceneSetup};
 use crate::study::world::shadow_range_m;
 use crate::verify::frame::{CaptureUnderTest, TileChoice, Verified};
-use crate::verify::report::{Report, SLOTS};
+use crate::verify::report::Report;
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::footprint::LodFormula;
@@ -17,7 +17,7 @@ use raster::capture::CaptureJob;
 use raster::draws::DrawList;
 use raster::lavapipe::Lavapipe;
 use raster::lighting::Lighting;
-use scene::LoadOptions;
+use scene::{LoadOptions, TextureSlot, TextureSlots};
 use shell::{Output, Progress, Threads, note};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -308,14 +308,20 @@ fn texels(
     setup: &SceneSetup,
     subject: &CaptureUnderTest<'_>,
     backend: &mut Lavapipe,
-) -> anyhow::Result<Vec<Vec<Texels>>> {
+) -> anyhow::Result<Vec<Vec<(TextureSlot, Texels)>>> {
+    let textures = setup.scene.materials.iter().flat_map(|m| m.textures.iter());
+    let slots: Vec<TextureSlot> = textures.map(|(slot, _)| slot).collect();
+    let used = TextureSlots::of(&slots);
     let frame = job.frame(&setup.frames[0])?;
     let of_pass = |eye: Eye| {
         let view = (frame.views())
             .find(|view| view.layer.eye == Some(eye))
             .context("a layer an eye")?;
-        (0..SLOTS.len() as u32)
-            .map(|slot| Ok(backend.texels(job.draws, &view, slot)?))
+        let slots = TextureSlot::ALL
+            .into_iter()
+            .filter(|slot| used.contains(*slot));
+        slots
+            .map(|slot| Ok((slot, backend.texels(job.draws, &view, slot)?)))
             .collect::<anyhow::Result<Vec<_>>>()
     };
     (subject.passes().into_iter())

@@ -160,7 +160,7 @@ impl<'a> Probe<'a> {
                     let piece = geometry.piece(fragment.piece);
                     let group = geometry.groups(piece).first();
                     let leader =
-                        group.and_then(|slots| geometry.material(piece).textures()[slots[0]]);
+                        group.and_then(|slots| geometry.material(piece).textures[slots[0]]);
                     let uv = leader.map_or(DVec2::ZERO, |leader| {
                         geometry
                             .coordinates(piece, &leader)

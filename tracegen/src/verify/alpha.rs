@@ -6,7 +6,7 @@ use super::piece::{Piece, center};
 use super::reference::AlphaTest;
 use super::sampler::SoftwareSampler;
 use formats::footprint::LodFormula;
-use scene::AlphaMode;
+use scene::{AlphaMode, TextureSlot};
 
 /// Alpha of base colour, vertex colour and texture against the material's cutoff.
 pub struct SampledAlpha<'a> {
@@ -22,7 +22,7 @@ impl AlphaTest for SampledAlpha<'_> {
         let AlphaMode::Mask(cutoff) = material.alpha else {
             return 1.0;
         };
-        let texel = material.base_color_texture.and_then(|reference| {
+        let texel = material.textures[TextureSlot::BaseColor].and_then(|reference| {
             let texture = self.sampler.texture(reference.image)?;
             let at = geometry
                 .coordinates(piece, &reference)

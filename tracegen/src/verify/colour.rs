@@ -11,7 +11,7 @@ use formats::view::TILE_SIZE_PX;
 use glam::{DVec2, DVec4};
 use raster::backend::Texels;
 use raster::draws::DrawList;
-use scene::{Material, Scene};
+use scene::{Material, Scene, TextureSlot};
 
 /// A step of 8 bits.
 const STEP: f64 = 1.0 / 255.0;
@@ -94,7 +94,7 @@ impl ColourCheck<'_> {
         number: usize,
         tile: &Tile,
         texels: &Texels,
-        slot: usize,
+        slot: TextureSlot,
     ) -> ColourErrors {
         let mut errors = ColourErrors::default();
         let lanes = lanes(tile);
@@ -153,7 +153,7 @@ impl ColourCheck<'_> {
         lanes: &[Lane],
         tile: &Tile,
         (primitive, pixel): (u32, [u32; 2]),
-        slot: usize,
+        slot: TextureSlot,
         moved_texels: DVec2,
     ) -> Option<(DVec4, bool)> {
         let calls = &self.draws.calls;
@@ -163,7 +163,7 @@ impl ColourCheck<'_> {
                 .checked_sub(1)?,
         )?;
         let material: &Material = &self.scene.materials[call.material];
-        let reference = material.textures()[slot]?;
+        let reference = material.textures[slot]?;
         let groups = &self.draws.groups[call.material].groups;
         let group = groups.iter().position(|slots| slots.contains(&slot))?;
         let key = key(primitive, pixel);

@@ -136,7 +136,7 @@ impl Comparison<'_> {
         result: &mut Agreement,
     ) {
         let piece = geometry.piece(fragment.piece);
-        let textures = geometry.material(piece).textures();
+        let textures = &geometry.material(piece).textures;
         let draw = &self.tables.draws[piece.draw as usize];
         self.groups(geometry, fragment, lanes, result);
         for lane in lanes {
@@ -190,7 +190,7 @@ impl Comparison<'_> {
         result: &mut Agreement,
     ) {
         let piece = geometry.piece(fragment.piece);
-        let textures = geometry.material(piece).textures();
+        let textures = &geometry.material(piece).textures;
         let groups = geometry.groups(piece);
         let alone = lanes.iter().filter(|lane| lane.group == NO_GROUP).count();
         if !groups.is_empty() {

@@ -15,7 +15,7 @@ use formats::view::{Eye, FrameViews};
 use raster::backend::{Fragments, Texels};
 use raster::draws::DrawList;
 use rayon::prelude::*;
-use scene::Scene;
+use scene::{Scene, TextureSlot};
 use textures::TextureSet;
 
 /// The capture and its inputs.
@@ -58,7 +58,7 @@ pub struct Verified {
     /// Comparison of the records with the reference.
     pub agreement: Agreement,
     /// Comparison of colours by slot of the materials' textures, if texels are given.
-    pub colours: Vec<ColourErrors>,
+    pub colours: Vec<(TextureSlot, ColourErrors)>,
     /// The reference encoded as the trace's tiles, by pass and tile, if requested.
     pub reference: Vec<Vec<EncodedTile>>,
 }
@@ -147,7 +147,7 @@ impl<'a> CaptureUnderTest<'a> {
         &self,
         choice: TileChoice,
         formula: LodFormula,
-        texels: &[Vec<Texels>],
+        texels: &[Vec<(TextureSlot, Texels)>],
         keep: bool,
     ) -> anyhow::Result<Verified> {
         let tables = self.trace.tables();
@@ -198,8 +198,10 @@ impl<'a> CaptureUnderTest<'a> {
                     let mut captured = Tile::default();
                     self.trace.decode_tile(number, tile, &mut captured)?;
                     let (agreement, fragments) = comparison.tile(&geometry, tile, &captured);
-                    let colours: Vec<ColourErrors> = (texels.iter().enumerate())
-                        .map(|(slot, texels)| colour.tile(&geometry, tile, &captured, texels, slot))
+                    let colours: Vec<ColourErrors> = (texels.iter())
+                        .map(|(slot, texels)| {
+                            colour.tile(&geometry, tile, &captured, texels, *slot)
+                        })
                         .collect();
                     let reference = if keep {
                         let tile = reference_tile(&geometry, tables, &fragments, &captured);
@@ -215,10 +217,11 @@ impl<'a> CaptureUnderTest<'a> {
             // Summed in the order of the tiles, so that sums do not depend on the number of threads.
             for (agreement, colours, tile) in found {
                 result.agreement.merge(&agreement);
-                result
-                    .colours
-                    .resize(colours.len(), ColourErrors::default());
-                for (sum, errors) in result.colours.iter_mut().zip(&colours) {
+                if result.colours.is_empty() {
+                    let slots = texels.iter().map(|(slot, _)| *slot);
+                    result.colours = slots.map(|slot| (slot, ColourErrors::default())).collect();
+                }
+                for ((_, sum), errors) in result.colours.iter_mut().zip(&colours) {
                     sum.merge(errors);
                 }
                 reference.extend(tile);

@@ -6,7 +6,7 @@ use formats::footprint::LodFormula;
 use formats::view::{EyeView, TILE_SIZE_PX};
 use glam::{DMat4, DVec2, DVec3, DVec4, Mat4};
 use raster::draws::{DrawCall, DrawList};
-use scene::{Material, Mesh, Scene, TextureRef};
+use scene::{Material, Mesh, Scene, TextureRef, TextureSlot};
 
 /// Height below which rounding of the vertices decides a triangle's winding.
 pub(super) const SLIVER_PX: f64 = 4.0 / 256.0;
@@ -147,7 +147,7 @@ impl<'a> Geometry<'a> {
 
     /// Slots of the material's uv groups.
     #[must_use]
-    pub fn groups(&self, piece: &Piece) -> &'a [Vec<usize>] {
+    pub fn groups(&self, piece: &Piece) -> &'a [Vec<TextureSlot>] {
         &self.draws.groups[self.call(piece).material].groups
     }
 

@@ -6,6 +6,7 @@ use formats::view::TILE_SIZE_PX;
 use glam::DVec2;
 use raster::backend::Fragments;
 use raster::draws::DrawMode;
+use scene::TextureSlot;
 
 const EDGE: usize = TILE_SIZE_PX as usize;
 
@@ -84,7 +85,7 @@ fn writes(geometry: &Geometry<'_>, piece: &Piece, pixel: [u32; 2], alpha: &dyn A
 // For scenes whose alpha is known without a sampler.
 impl<F: Fn(&raster::draws::DrawCall, DVec2) -> bool + Sync> AlphaTest for F {
     fn margin(&self, geometry: &Geometry<'_>, piece: &Piece, pixel: [u32; 2]) -> f64 {
-        let texture = geometry.material(piece).base_color_texture;
+        let texture = geometry.material(piece).textures[TextureSlot::BaseColor];
         let uv = texture.map_or(DVec2::ZERO, |t| {
             geometry.coordinates(piece, &t).at(center(pixel))
         });

@@ -9,16 +9,6 @@ use super::means::Bias;
 use formats::textrace::Tables;
 use serde::Serialize;
 
-/// Names of the textures of a material, in the order of their slots.
-pub const SLOTS: [&str; 6] = [
-    "base-color",
-    "normal",
-    "metallic-roughness",
-    "specular",
-    "occlusion",
-    "emissive",
-];
-
 /// Schema of the report.
 const SCHEMA: &str = "tracegen.verify/1";
 
@@ -105,7 +95,7 @@ fn failures(verified: &Verified, means: &[Bias]) -> Vec<String> {
     let agreement = &verified.agreement;
     let mut failures = verified.faults.clone();
     let sample_causes = |errors: &SampleErrors| errors.causes[SampleCause::Unexplained as usize];
-    let colours = verified.colours.iter().zip(SLOTS);
+    let colours = (verified.colours.iter()).map(|(slot, errors)| (errors, slot.name()));
     let counts = [
         (
             agreement.of_class(Class::Unexplained),
@@ -277,9 +267,9 @@ impl Report {
             },
             capture_precision: Samples::new(&agreement.capture),
             specification: Samples::new(&agreement.specification),
-            colour: (verified.colours.iter().zip(SLOTS))
-                .filter(|(errors, _)| errors.fragments > 0)
-                .map(|(errors, texture)| Colour::new(texture, errors))
+            colour: (verified.colours.iter())
+                .filter(|(_, errors)| errors.fragments > 0)
+                .map(|(slot, errors)| Colour::new(slot.name(), errors))
                 .collect(),
         }
     }

@@ -7,7 +7,7 @@ use super::faults::Faults;
 use super::views::Views;
 use formats::textrace::{Draw, PassKind, Sample, Surfaces, Tables, UvGroup};
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
-use scene::{AlphaMode, Material, Scene, SceneError, TextureRef};
+use scene::{AlphaMode, Material, Scene, SceneError, TextureRef, TextureSlot};
 use std::collections::BTreeSet;
 
 /// Edge of the blocks that textures are compressed in, texels.
@@ -48,8 +48,7 @@ pub fn faults(scene: &Scene, tables: &Tables) -> Result<Vec<String>, SceneError>
 fn used_images(scene: &Scene) -> Vec<usize> {
     let placed = placed_materials(scene);
     let images: BTreeSet<usize> = (placed.into_iter())
-        .flat_map(|material| scene.materials[material].textures())
-        .flatten()
+        .flat_map(|material| scene.materials[material].textures.all())
         .map(|reference| reference.image)
         .filter(|&image| image < scene.images.len())
         .collect();
@@ -85,8 +84,14 @@ fn texture(scene: &Scene, index: usize) -> Result<Texture, SceneError> {
     }
     let blended = placed_materials(scene).into_iter().any(|material| {
         let material = &scene.materials[material];
-        let base = material.base_color_texture.map(|reference| reference.image);
-        matches!(material.alpha, AlphaMode::Blend) && base == Some(index)
+        let samples = |slot| material.textures[slot].is_some_and(|texture| texture.image == index);
+        let blends = material.alpha == AlphaMode::Blend && samples(TextureSlot::BaseColor);
+        // These textures are read in their alpha channel.
+        let of_layers = [
+            TextureSlot::SheenRoughness,
+            TextureSlot::DiffuseTransmission,
+        ];
+        blends || of_layers.into_iter().any(samples)
     });
     let smooth = blended && {
         let texels = image.source.open()?.texels(&[image.part])?;
@@ -153,8 +158,7 @@ fn hold_samplers(scene: &Scene, cascades: u32, tables: &Tables, faults: &mut Fau
     let materials = scene
         .materials
         .iter()
-        .flat_map(Material::textures)
-        .flatten();
+        .flat_map(|material| material.textures.all());
     let mut known: Vec<Sampler> = materials.map(|reference| reference.sampler).collect();
     known.extend((cascades > 0).then_some(Sampler::SHADOW));
     for (number, sampler) in tables.samplers.iter().enumerate() {
@@ -183,7 +187,7 @@ fn hold_draws(scene: &Scene, used: &[usize], cascades: u32, tables: &Tables, fau
         let primitives = (mesh.indices.len() / 3) as u32;
         opaque.push(match material.alpha {
             AlphaMode::Opaque => true,
-            AlphaMode::Mask(_) => material.base_color_texture.is_none(),
+            AlphaMode::Mask(_) => material.textures[TextureSlot::BaseColor].is_none(),
             AlphaMode::Blend => false,
         });
         if let Some(draw) = tables.draws.get(number) {
@@ -208,7 +212,7 @@ fn hold_draws(scene: &Scene, used: &[usize], cascades: u32, tables: &Tables, fau
 fn is_seen(material: &Material) -> bool {
     match material.alpha {
         AlphaMode::Mask(cutoff) => {
-            material.base_color_texture.is_some() || material.base_color.w >= cutoff
+            material.textures[TextureSlot::BaseColor].is_some() || material.base_color.w >= cutoff
         }
         AlphaMode::Opaque | AlphaMode::Blend => true,
     }
@@ -222,7 +226,7 @@ fn groups(
     cascades: u32,
 ) -> Vec<Vec<(Sample, Sampler)>> {
     let mut groups: Vec<(TextureRef, Vec<(Sample, Sampler)>)> = Vec::new();
-    for reference in material.textures().into_iter().flatten() {
+    for reference in material.textures.all() {
         let texture = used.iter().position(|&image| image == reference.image);
         let sample = texture.map(|texture| {
             let sample = Sample {
@@ -236,10 +240,10 @@ fn groups(
         });
         let coordinates = |r: &TextureRef| (r.uv_set, r.uv_transform);
         let same =
-            |(leader, _): &&mut (TextureRef, _)| coordinates(leader) == coordinates(&reference);
+            |(leader, _): &&mut (TextureRef, _)| coordinates(leader) == coordinates(reference);
         match groups.iter_mut().find(same) {
             Some((_, samples)) => samples.extend(sample),
-            None => groups.push((reference, sample.into_iter().collect())),
+            None => groups.push((*reference, sample.into_iter().collect())),
         }
     }
     let shadow = |layer| {

@@ -58,7 +58,7 @@ pub fn reference_tile(
         };
         let first = tile.records.len();
         let groups = geometry.groups(piece);
-        let textures = geometry.material(piece).textures();
+        let textures = &geometry.material(piece).textures;
         for (number, (slots, group)) in (0_u8..).zip(groups.iter().zip(&draw.groups)) {
             let Some(leader) = slots.first().and_then(|&slot| textures[slot]) else {
                 continue;

@@ -1,6 +1,6 @@
 //! The role of each image, which determines its filtering and compression.
 
-use scene::{AlphaMode, Scene};
+use scene::{AlphaMode, Scene, TextureSlot};
 
 /// Use of a texture's alpha.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,25 +35,27 @@ pub(super) fn of_images(scene: &Scene) -> Vec<Option<Role>> {
     }
     let mut roles = vec![None; scene.images.len()];
     for (material, _) in scene.materials.iter().zip(&used).filter(|(_, u)| **u) {
-        let slots = material.textures();
-        for (slot, texture) in slots.into_iter().enumerate() {
-            let Some(role) = texture.and_then(|t| roles.get_mut(t.image)) else {
+        for (slot, texture) in material.textures.iter() {
+            let Some(role) = roles.get_mut(texture.image) else {
                 continue;
             };
             let alpha = match material.alpha {
-                AlphaMode::Mask(cutoff) if slot == 0 => {
+                AlphaMode::Mask(cutoff) if slot == TextureSlot::BaseColor => {
                     let on_texture = cutoff / material.base_color.w.max(1e-6);
                     // At least 1, because a completely transparent texel never passes in BC1.
                     Alpha::Mask((on_texture * 255.0).ceil().clamp(1.0, 255.0) as u8)
                 }
-                AlphaMode::Blend if slot == 0 => Alpha::Smooth,
+                AlphaMode::Blend if slot == TextureSlot::BaseColor => Alpha::Smooth,
+                // These layers read the alpha channel.
+                _ if slot == TextureSlot::SheenRoughness => Alpha::Smooth,
+                _ if slot == TextureSlot::DiffuseTransmission => Alpha::Smooth,
                 _ => Alpha::Ignored,
             };
             let role = role.get_or_insert(Role {
                 alpha: Alpha::Ignored,
                 normal_map: false,
             });
-            role.normal_map |= slot == 1;
+            role.normal_map |= matches!(slot, TextureSlot::Normal | TextureSlot::ClearcoatNormal);
             role.alpha = match (role.alpha, alpha) {
                 (Alpha::Smooth, _) | (_, Alpha::Smooth) => Alpha::Smooth,
                 (Alpha::Mask(a), Alpha::Mask(b)) => Alpha::Mask(a.min(b)),

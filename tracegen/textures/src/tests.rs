@@ -3,7 +3,7 @@
 use super::*;
 use crate::compress::{ENCODER, compress};
 use glam::Affine3A;
-use scene::{AlphaMode, Instance, Material, Mesh, TextureRef};
+use scene::{AlphaMode, Instance, Material, Mesh, TextureRef, TextureSlot};
 
 /// A scene of one triangle whose material samples `image` as base colour.
 fn scene_of(size: [u32; 2], rgba: Vec<u8>, alpha: AlphaMode) -> Scene {
@@ -14,7 +14,7 @@ fn scene_of(size: [u32; 2], rgba: Vec<u8>, alpha: AlphaMode) -> Scene {
             transform: Affine3A::IDENTITY,
         }],
         materials: vec![Material {
-            base_color_texture: Some(TextureRef::new(0)),
+            textures: [(TextureSlot::BaseColor, Some(TextureRef::new(0)))].into(),
             alpha,
             ..Material::default()
         }],
@@ -262,7 +262,7 @@ fn the_key_depends_on_everything_that_determines_the_blocks() {
     let mut linear = scenes[0].clone();
     linear.images[0].color_space = ColorSpace::Linear;
     let mut normals = linear.clone();
-    normals.materials[0].normal_texture = Some(TextureRef::new(0));
+    normals.materials[0].textures[TextureSlot::Normal] = Some(TextureRef::new(0));
     scenes.extend([linear, normals]);
     for scene in &scenes {
         let set = TextureSet::prepare(scene, |_| Some(0), Some(&cache)).unwrap();
@@ -332,7 +332,7 @@ fn resampled_images_share_one_note() {
         ColorSpace::Linear,
         picture([30, 17]),
     ));
-    scene.materials[0].normal_texture = Some(TextureRef::new(1));
+    scene.materials[0].textures[TextureSlot::Normal] = Some(TextureRef::new(1));
     let set = TextureSet::compress(&scene).unwrap();
     let expected = "2 images resampled to whole blocks of 4x4 texels, the first one 'test' from 30x17 to 32x20";
     assert_eq!(set.notes, [expected]);

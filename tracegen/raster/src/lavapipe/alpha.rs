@@ -12,7 +12,7 @@ use super::whole::Whole;
 use crate::draws::{DrawList, DrawMode};
 use crate::error::RasterError;
 use formats::texture::{ColorSpace, Texture};
-use scene::{Material, Scene};
+use scene::{Material, Scene, TextureSlot};
 use std::collections::{BTreeMap, BTreeSet};
 use textures::TextureSet;
 
@@ -24,7 +24,7 @@ const BUDGET_BYTES: u64 = 256 << 20;
 
 /// The texture that a material's alpha test samples, by its number in `set`.
 pub fn of_material(material: &Material, set: &TextureSet) -> Option<usize> {
-    let texture = material.base_color_texture?;
+    let texture = material.textures[TextureSlot::BaseColor]?;
     (*set.of_image.get(texture.image)?).filter(|&index| {
         (set.textures.get(index)).is_some_and(|texture| !texture.blocks.is_empty())
     })

@@ -33,7 +33,7 @@ use pipelines::Pipelines;
 use readback::Readback;
 use record::{Captured, DEPTH_BYTES, Merged, RECORD_BYTES, RawRecords, Region};
 use records::RecordBuffers;
-use scene::Scene;
+use scene::{Scene, TextureSlot};
 use starts::{Drawn, Starts};
 use std::sync::Arc;
 use std::time::Instant;
@@ -570,7 +570,7 @@ impl CaptureBackend for Lavapipe {
         &mut self,
         draws: &DrawList,
         view: &View<'_>,
-        slot: u32,
+        slot: TextureSlot,
     ) -> Result<Texels, RasterError> {
         self.read_texels(draws, view, slot)
     }

@@ -8,6 +8,7 @@ use crate::draws::DrawList;
 use crate::error::RasterError;
 use crate::roles::Purpose;
 use crate::uniforms::ViewData;
+use scene::TextureSlot;
 
 impl Lavapipe {
     /// See [`crate::backend::CaptureBackend::texels`].
@@ -15,7 +16,7 @@ impl Lavapipe {
         &mut self,
         draws: &DrawList,
         view: &View<'_>,
-        slot: u32,
+        slot: TextureSlot,
     ) -> Result<Texels, RasterError> {
         let plan = self.plan(draws, view.visible, Purpose::Texel)?;
         let gpu = &self.gpu;

@@ -6,12 +6,11 @@ use super::device::Gpu;
 use super::pipelines::Layouts;
 use crate::draws::DrawList;
 use crate::error::RasterError;
-use crate::groups::MATERIAL_TEXTURES;
 use crate::shader::{ALPHA_BINDING, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING};
 use crate::uniforms::MaterialData;
 use crate::vertices::{self, InstanceData, VERTEX_STRIDE};
 use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
-use scene::{Animation, Material, Mesh, Scene, TextureRef};
+use scene::{Animation, Material, Mesh, Scene, TextureRef, TextureSlot};
 use std::collections::{BTreeMap, BTreeSet};
 use textures::{CompressedTexture, TextureSet};
 use wgpu::util::DeviceExt;
@@ -247,7 +246,7 @@ fn upload_texture(
 
 /// Textures and samplers of a material.
 struct MaterialViews<'a> {
-    textures: [&'a wgpu::TextureView; MATERIAL_TEXTURES],
+    textures: [&'a wgpu::TextureView; TextureSlot::COUNT],
     alpha: &'a wgpu::TextureView,
 }
 
@@ -267,7 +266,7 @@ impl<'a> MaterialViews<'a> {
         };
         let copy = alpha::of_material(material, set).and_then(|index| copies.get(&index));
         Self {
-            textures: material.textures().map(of_texture),
+            textures: material.textures.map(of_texture),
             alpha: copy.unwrap_or(absent),
         }
     }
@@ -279,7 +278,7 @@ impl<'a> MaterialViews<'a> {
         material: &Material,
         samplers: &mut Samplers,
     ) -> wgpu::BindGroup {
-        let samplers = (material.textures())
+        let samplers = (material.textures)
             .map(|t| samplers.index(gpu, &t.map_or(Sampler::TRILINEAR_REPEAT, |t| t.sampler)))
             .map(|index| &samplers.made[index].1);
         let data = MaterialData::new(material);

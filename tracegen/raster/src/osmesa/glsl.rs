@@ -1,7 +1,6 @@
 //! The shader in GLSL, entry point by entry point.
 
 use crate::error::RasterError;
-use crate::groups::MATERIAL_TEXTURES;
 use crate::shader::{
     self, AlphaSource, Granularity, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING,
     VIEW_BINDINGS,
@@ -10,6 +9,7 @@ use naga::ShaderStage;
 use naga::back::PipelineConstants;
 use naga::back::glsl::{Options, PipelineOptions, Version, Writer, WriterFlags};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use scene::TextureSlot;
 use std::collections::BTreeMap;
 
 /// Uniform block of the view.
@@ -19,7 +19,7 @@ pub const MATERIAL_BLOCK: u32 = 1;
 /// First of the material's texture units.
 pub const MATERIAL_UNITS: u32 = 0;
 /// Texture unit of the shadow maps.
-pub const SHADOW_UNIT: u32 = MATERIAL_TEXTURES as u32;
+pub const SHADOW_UNIT: u32 = TextureSlot::COUNT as u32;
 
 /// The validated shader.
 pub struct Module {

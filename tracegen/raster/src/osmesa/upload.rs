@@ -4,11 +4,10 @@
 use super::gl::{Attribute, Buffer, Gl, Sampler, Texture, Vertices};
 use crate::draws::DrawList;
 use crate::error::RasterError;
-use crate::groups::MATERIAL_TEXTURES;
 use crate::uniforms::MaterialData;
 use crate::vertices::{self, COLOR_STRIDE, InstanceData, VERTEX_STRIDE, VertexData};
 use formats::texture::{self, ColorSpace, Filter, MipFilter, TexelFormat, Wrap};
-use scene::{Animation, Material, Mesh, Scene};
+use scene::{Animation, Material, Mesh, Scene, TextureSlot};
 use textures::{CompressedTexture, TextureSet};
 
 /// S3TC with sRGB, missing in the bindings.
@@ -22,7 +21,7 @@ pub struct MaterialObjects {
     /// The shader's `Material`.
     pub uniform: Buffer,
     /// Texture of each unit; white if it has none.
-    pub units: [(Texture, Sampler); MATERIAL_TEXTURES],
+    pub units: [(Texture, Sampler); TextureSlot::COUNT],
 }
 
 /// A mesh in the driver's memory.
@@ -248,14 +247,12 @@ fn material(
     samplers: &mut Samplers,
 ) -> Result<MaterialObjects, RasterError> {
     let uniform = gl.buffer(bytemuck::bytes_of(&MaterialData::new(material)))?;
-    let textures = material.textures();
     let none = texture::Sampler::TRILINEAR_REPEAT;
-    let mut units = [(white, sampler(gl, &none, samplers)?); MATERIAL_TEXTURES];
-    for (unit, texture) in units.iter_mut().zip(&textures) {
-        let Some(texture) = texture else { continue };
+    let mut units = [(white, sampler(gl, &none, samplers)?); TextureSlot::COUNT];
+    for (slot, texture) in material.textures.iter() {
         let of_image = set.of_image.get(texture.image).copied().flatten();
         let image = of_image.and_then(|i| uploaded.get(i)).copied();
-        *unit = (
+        units[slot as usize] = (
             image.unwrap_or(white),
             sampler(gl, &texture.sampler, samplers)?,
         );

@@ -4,8 +4,7 @@
 
 // Append a record per covered quad and uv group.
 override CAPTURE: bool = false;
-// Bit per texture of the material: base colour, normal, metallic-roughness, specular, occlusion,
-// emissive.
+// Bit per texture of the material, by slot.
 override TEXTURES: u32 = 0u;
 // Bit per texture that is the first of its uv group.
 override LEADERS: u32 = 0u;
@@ -74,18 +73,6 @@ struct Material {
 @group(0) @binding(DEPTHS_BINDING) var<storage, read_write> depths: array<vec4<f32>>;
 
 @group(1) @binding(MATERIAL_BINDING) var<uniform> material: Material;
-@group(1) @binding(TEXTURES_BINDING + BASE_COLOR) var base_color_texture: texture_2d<f32>;
-@group(1) @binding(TEXTURES_BINDING + NORMAL) var normal_texture: texture_2d<f32>;
-@group(1) @binding(TEXTURES_BINDING + METALLIC_ROUGHNESS) var metallic_roughness_texture: texture_2d<f32>;
-@group(1) @binding(TEXTURES_BINDING + SPECULAR) var specular_texture: texture_2d<f32>;
-@group(1) @binding(TEXTURES_BINDING + OCCLUSION) var occlusion_texture: texture_2d<f32>;
-@group(1) @binding(TEXTURES_BINDING + EMISSIVE) var emissive_texture: texture_2d<f32>;
-@group(1) @binding(SAMPLERS_BINDING + BASE_COLOR) var base_color_sampler: sampler;
-@group(1) @binding(SAMPLERS_BINDING + NORMAL) var normal_sampler: sampler;
-@group(1) @binding(SAMPLERS_BINDING + METALLIC_ROUGHNESS) var metallic_roughness_sampler: sampler;
-@group(1) @binding(SAMPLERS_BINDING + SPECULAR) var specular_sampler: sampler;
-@group(1) @binding(SAMPLERS_BINDING + OCCLUSION) var occlusion_sampler: sampler;
-@group(1) @binding(SAMPLERS_BINDING + EMISSIVE) var emissive_sampler: sampler;
 
 struct Vertex {
     @location(0) position: vec3<f32>,

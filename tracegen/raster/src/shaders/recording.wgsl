@@ -62,20 +62,13 @@ fn record_uv(lane: Lane, group: u32, takes: bool, uv: vec2<f32>) -> u32 {
 
 // One record a uv group of the material; tells the index of group 0's.
 fn record_material(lane: Lane, in: Fragment) -> u32 {
-    var first = NONE;
     if LEADERS == 0u && CASCADES == 0u {
         let mask = quad_mask(lane, true);
         if firstTrailingBit(mask) == lane.index {
             _ = append(lane, mask, NO_GROUP, vec4(0.0), vec4(0.0));
         }
     }
-    if (LEADERS & 1u) != 0u { first = record_uv(lane, 0u, true, texture_uv(0u, in.uv)); }
-    if (LEADERS & 2u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 1u), true, texture_uv(1u, in.uv)); }
-    if (LEADERS & 4u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 3u), true, texture_uv(2u, in.uv)); }
-    if (LEADERS & 8u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 7u), true, texture_uv(3u, in.uv)); }
-    if (LEADERS & 16u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 15u), true, texture_uv(4u, in.uv)); }
-    if (LEADERS & 32u) != 0u { _ = record_uv(lane, countOneBits(LEADERS & 31u), true, texture_uv(5u, in.uv)); }
-    return first;
+    return record_groups(lane, in);
 }
 
 // Depth of the four lanes, for the in-order replay; `index` is that of the quad's record in group 0.

@@ -1,5 +1,9 @@
 // Colour: surface, lights, shadows, sky.
 
+// Light that a texture of an additional layer (clear coat, sheen and so on) takes. It stands for the layer's
+// shading: the texture is sampled as in a renderer, and its effect is small.
+const LAYER_WEIGHT: f32 = 0.04;
+
 fn texture_uv(slot: u32, uv: vec4<f32>) -> vec2<f32> {
     let row0 = material.uv_rows[2u * slot];
     let row1 = material.uv_rows[2u * slot + 1u];
@@ -184,5 +188,6 @@ fn shade(in: Fragment, front: bool, base: vec4<f32>, found: ShadowLookup) -> vec
     let gloss = (1.0 - roughness) * (1.0 - roughness);
     let mirrored = mix(ambient(mirror), background(mirror), gloss);
     light += (s.albedo * ambient(normal) + s.f0 * mirrored) * occlusion;
+    light *= kept_by_layers(in);
     return vec4(tone_map(light), select(1.0, base.a, BLENDED));
 }

@@ -8,20 +8,35 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, HashSet};
 
+/// Extensions with textures of additional layers of a material.
+pub(super) const ANISOTROPY: &str = "KHR_materials_anisotropy";
+pub(super) const CLEARCOAT: &str = "KHR_materials_clearcoat";
+pub(super) const DIFFUSE_TRANSMISSION: &str = "KHR_materials_diffuse_transmission";
+pub(super) const IRIDESCENCE: &str = "KHR_materials_iridescence";
+pub(super) const SHEEN: &str = "KHR_materials_sheen";
+pub(super) const TRANSMISSION: &str = "KHR_materials_transmission";
+pub(super) const VOLUME: &str = "KHR_materials_volume";
+
 /// Supported extensions (docs/use/scene-files.md).
-pub(super) const SUPPORTED: [&str; 17] = [
+pub(super) const SUPPORTED: [&str; 23] = [
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_draco_mesh_compression",
     "KHR_lights_punctual",
+    ANISOTROPY,
+    CLEARCOAT,
+    DIFFUSE_TRANSMISSION,
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    IRIDESCENCE,
     "KHR_materials_pbrSpecularGlossiness",
+    SHEEN,
     "KHR_materials_specular",
-    "KHR_materials_transmission",
+    TRANSMISSION,
     "KHR_materials_unlit",
     "KHR_materials_variants",
+    VOLUME,
     "KHR_mesh_quantization",
     "KHR_meshopt_compression",
     "KHR_texture_basisu",

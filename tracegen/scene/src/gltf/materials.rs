@@ -1,7 +1,7 @@
 //! Materials and the textures that they sample.
 //!
 //! For the ray tracer, which follows mirror reflections and refractions but no glossy ones:
-//! - `transmission` is KHR_materials_transmission's factor. Without it, a blended material without
+//! - `transmission` is KHR_materials_transmission's factor, without its texture. Without it, a blended material without
 //!   a base colour texture counts as glass that transmits `1 - alpha`.
 //! - `mirror` is 0, because glTF has no such factor. The reflectance of a smooth metal follows from
 //!   its metalness and roughness where it is hit.
@@ -11,12 +11,13 @@
 
 use super::accessors::Buffers;
 use super::find_file;
+use super::layers::LAYERS;
 use crate::files::{Origin, shown};
 use crate::image_files::{Embedded, Request, Requests, Source, Usage};
 use crate::lookup::Lookup;
 use crate::uri::{self, Uri};
 use crate::warnings::Warnings;
-use crate::{AlphaMode, LoadOptions, Material, SceneError, TextureRef};
+use crate::{AlphaMode, LoadOptions, Material, SceneError, TextureRef, TextureSlot};
 use formats::texture::{Filter, LodRange, MipFilter, Sampler, Wrap};
 use glam::{Vec3, Vec4};
 use gltf::json::extensions::texture::TextureTransform;
@@ -27,6 +28,10 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 const TRANSFORM: &str = "KHR_texture_transform";
+
+/// Number of different coordinates of a material's textures. A draw of a trace has at most 15 groups of
+/// coordinates, and up to 4 of them are of shadow maps.
+const MAX_COORDINATES: usize = 11;
 
 /// Attributes that a mesh needs for its material.
 #[derive(Clone, Copy, Default)]
@@ -85,17 +90,6 @@ pub(super) struct Table<'a> {
     sets: Vec<u32>,
 }
 
-/// One slot of a material, in the order of [`Material::textures`].
-#[derive(Clone, Copy)]
-enum Slot {
-    BaseColor = 0,
-    Normal,
-    MetallicRoughness,
-    Specular,
-    Occlusion,
-    Emissive,
-}
-
 impl<'a> Table<'a> {
     pub fn new(
         document: &'a gltf::Document,
@@ -136,13 +130,13 @@ impl<'a> Table<'a> {
                 ..Material::default()
             },
         };
-        let textures = || read.textures().into_iter().flatten();
-        self.sets.retain(|set| textures().any(|t| t.uv_set == *set));
+        let sampled = |set: &u32| read.textures.all().any(|t| t.uv_set == *set);
+        self.sets.retain(sampled);
         let mut uses = Uses::new(&self.sets);
-        for texture in read.textures_mut().into_iter().flatten() {
+        for texture in read.textures.all_mut() {
             texture.uv_set = uses.of_mesh(texture.uv_set);
         }
-        uses.normal_map_uv = read.normal_texture.map(|t| t.uv_set);
+        uses.normal_map_uv = read.textures[TextureSlot::Normal].map(|t| t.uv_set);
         let known = (self.materials.len(), uses);
         self.used.insert(material, known);
         self.materials.push(read);
@@ -171,10 +165,13 @@ impl<'a> Table<'a> {
             },
             ..Material::default()
         };
-        material.base_color_texture =
-            self.info(Slot::BaseColor, pbr.base_color_texture(), Usage::Color)?;
-        material.metallic_roughness_texture = self.info(
-            Slot::MetallicRoughness,
+        material.textures[TextureSlot::BaseColor] = self.info(
+            TextureSlot::BaseColor,
+            pbr.base_color_texture(),
+            Usage::Color,
+        )?;
+        material.textures[TextureSlot::MetallicRoughness] = self.info(
+            TextureSlot::MetallicRoughness,
             pbr.metallic_roughness_texture(),
             Usage::Data,
         )?;
@@ -182,24 +179,29 @@ impl<'a> Table<'a> {
             material.normal_scale = normal.scale();
             let transform = self.transform(normal.extension_value(TRANSFORM))?;
             let (texture, set) = (normal.texture(), normal.tex_coord());
-            material.normal_texture =
-                self.texture(Slot::Normal, &texture, set, transform, Usage::Data)?;
+            material.textures[TextureSlot::Normal] =
+                self.texture(TextureSlot::Normal, &texture, set, transform, Usage::Data)?;
         }
         if let Some(occlusion) = json.occlusion_texture() {
             let transform = self.transform(occlusion.extension_value(TRANSFORM))?;
             let (texture, set) = (occlusion.texture(), occlusion.tex_coord());
-            material.occlusion_texture =
-                self.texture(Slot::Occlusion, &texture, set, transform, Usage::Data)?;
+            material.textures[TextureSlot::Occlusion] = self.texture(
+                TextureSlot::Occlusion,
+                &texture,
+                set,
+                transform,
+                Usage::Data,
+            )?;
         }
-        material.emissive_texture =
-            self.info(Slot::Emissive, json.emissive_texture(), Usage::Color)?;
+        material.textures[TextureSlot::Emissive] =
+            self.info(TextureSlot::Emissive, json.emissive_texture(), Usage::Color)?;
         if let Some(specular) = json.specular() {
             material.specular =
                 Vec3::from(specular.specular_color_factor()) * specular.specular_factor();
-            material.specular_texture = match specular.specular_color_texture() {
-                Some(info) => self.info(Slot::Specular, Some(info), Usage::Color)?,
+            material.textures[TextureSlot::Specular] = match specular.specular_color_texture() {
+                Some(info) => self.info(TextureSlot::Specular, Some(info), Usage::Color)?,
                 None => self.info(
-                    Slot::Specular,
+                    TextureSlot::Specular,
                     specular.specular_texture(),
                     Usage::AlphaFactor,
                 )?,
@@ -210,10 +212,10 @@ impl<'a> Table<'a> {
             material.metallic = 0.0;
             material.roughness = 1.0 - old.glossiness_factor();
             material.specular = Vec3::from(old.specular_factor());
-            material.base_color_texture =
-                self.info(Slot::BaseColor, old.diffuse_texture(), Usage::Color)?;
-            material.specular_texture = self.info(
-                Slot::Specular,
+            material.textures[TextureSlot::BaseColor] =
+                self.info(TextureSlot::BaseColor, old.diffuse_texture(), Usage::Color)?;
+            material.textures[TextureSlot::Specular] = self.info(
+                TextureSlot::Specular,
                 old.specular_glossiness_texture(),
                 Usage::Color,
             )?;
@@ -221,15 +223,19 @@ impl<'a> Table<'a> {
         if json.unlit() {
             // The colour is shown unchanged: it is emitted and nothing is reflected.
             material.emissive = material.base_color.truncate();
-            material.emissive_texture = material.base_color_texture;
+            material.textures[TextureSlot::Emissive] = material.textures[TextureSlot::BaseColor];
             material.base_color = Vec3::ZERO.extend(material.base_color.w);
             material.specular = Vec3::ZERO;
             (material.metallic, material.roughness) = (0.0, 1.0);
         }
         self.check_factors(&mut material);
+        self.add_layers(json, &mut material)?;
+        self.limit_coordinates(&mut material);
         material.transmission = match json.transmission() {
             Some(transmission) => transmission.transmission_factor(),
-            None if material.alpha == AlphaMode::Blend && material.base_color_texture.is_none() => {
+            None if material.alpha == AlphaMode::Blend
+                && material.textures[TextureSlot::BaseColor].is_none() =>
+            {
                 1.0 - material.base_color.w
             }
             None => 0.0,
@@ -271,7 +277,7 @@ impl<'a> Table<'a> {
 
     fn info(
         &mut self,
-        slot: Slot,
+        slot: TextureSlot,
         info: Option<Info<'_>>,
         usage: Usage,
     ) -> Result<Option<TextureRef>, SceneError> {
@@ -288,7 +294,65 @@ impl<'a> Table<'a> {
         self.texture(slot, &info.texture(), info.tex_coord(), transform, usage)
     }
 
-    /// KHR_texture_transform of a normal or occlusion texture, which the crate leaves as JSON.
+    /// Adds the textures of the material's additional layers.
+    fn add_layers(
+        &mut self,
+        json: &gltf::Material<'_>,
+        material: &mut Material,
+    ) -> Result<(), SceneError> {
+        let root = self.buffers.root;
+        let of_file = json.index().and_then(|index| root.materials.get(index));
+        // As JSON, because the crate has types for some of these extensions only.
+        let extensions = serde_json::to_value(of_file.map(|material| &material.extensions));
+        let extensions = extensions.unwrap_or_default();
+        for layer in &LAYERS {
+            let place = format!("{}, {}.{}", self.place, layer.extension, layer.property);
+            let found = layer.of(&extensions);
+            let found =
+                found.map_err(|e| self.origin.invalid(&place, "a texture", e.to_string()))?;
+            let Some(found) = found else { continue };
+            let Some(texture) = self.document.textures().nth(found.index) else {
+                let expected = format!("an index below {}", root.textures.len());
+                return Err(self
+                    .origin
+                    .invalid(place, expected, found.index.to_string()));
+            };
+            let transform = self.transform(found.extensions.get(TRANSFORM))?;
+            let (slot, set) = (layer.slot, found.tex_coord);
+            material.textures[slot] =
+                self.texture(slot, &texture, set, transform, layer.usage.clone())?;
+        }
+        Ok(())
+    }
+
+    /// Leaves out textures with more coordinates than a draw of a trace can have.
+    fn limit_coordinates(&mut self, material: &mut Material) {
+        let mut known: Vec<TextureRef> = Vec::new();
+        for slot in TextureSlot::ALL {
+            let Some(texture) = material.textures[slot] else {
+                continue;
+            };
+            let same = |t: &TextureRef| {
+                t.uv_set == texture.uv_set && t.uv_transform == texture.uv_transform
+            };
+            if known.iter().any(same) {
+                continue;
+            }
+            if known.len() == MAX_COORDINATES {
+                material.textures[slot] = None;
+                self.warnings.count("coordinates", || {
+                    format!(
+                        "{} has textures with more than {MAX_COORDINATES} different coordinates; the others are left out",
+                        self.place
+                    )
+                });
+                continue;
+            }
+            known.push(texture);
+        }
+    }
+
+    /// KHR_texture_transform of a texture that the crate leaves as JSON.
     fn transform(
         &self,
         json: Option<&serde_json::Value>,
@@ -304,13 +368,13 @@ impl<'a> Table<'a> {
 
     fn texture(
         &mut self,
-        slot: Slot,
+        slot: TextureSlot,
         texture: &Texture<'_>,
         uv_set: u32,
         transform: Option<TextureTransform>,
         usage: Usage,
     ) -> Result<Option<TextureRef>, SceneError> {
-        if !self.options.slots[slot as usize] {
+        if !self.options.slots.contains(slot) {
             return Ok(None);
         }
         let uv_set = transform

@@ -16,6 +16,7 @@ mod channels;
 mod draco;
 mod features;
 mod instancing;
+mod layers;
 mod materials;
 mod meshes;
 mod meshopt;

@@ -9,7 +9,7 @@ use crate::files::Origin;
 use crate::image_files::{Request, Requests, Source, Usage, is_readable};
 use crate::lookup::{Found, Lookup};
 use crate::warnings::Warnings;
-use crate::{AlphaMode, LoadOptions, Material, TextureRef};
+use crate::{AlphaMode, LoadOptions, Material, TextureRef, TextureSlot};
 use formats::texture::Wrap;
 use glam::Vec3;
 
@@ -69,17 +69,28 @@ impl Maker<'_> {
             result.transmission = 1.0 - dissolve;
         }
         let bump = entry.bump_map.as_ref().or(entry.normal_map.as_ref());
-        result.normal_texture = self.texture(1, entry, bump, Usage::Data);
+        result.textures[TextureSlot::Normal] =
+            self.texture(TextureSlot::Normal, entry, bump, Usage::Data);
         result.normal_scale = bump.map_or(1.0, |map| map.bump_multiplier.clamp(-100.0, 100.0));
-        result.specular_texture = self.texture(3, entry, entry.specular_map.as_ref(), Usage::Color);
-        if result.specular_texture.is_some() && result.specular == Vec3::ZERO {
+        result.textures[TextureSlot::Specular] = self.texture(
+            TextureSlot::Specular,
+            entry,
+            entry.specular_map.as_ref(),
+            Usage::Color,
+        );
+        if result.textures[TextureSlot::Specular].is_some() && result.specular == Vec3::ZERO {
             result.specular = Vec3::ONE;
         }
-        result.emissive_texture = self.texture(5, entry, entry.emissive_map.as_ref(), Usage::Color);
-        if result.emissive_texture.is_some() && result.emissive == Vec3::ZERO {
+        result.textures[TextureSlot::Emissive] = self.texture(
+            TextureSlot::Emissive,
+            entry,
+            entry.emissive_map.as_ref(),
+            Usage::Color,
+        );
+        if result.textures[TextureSlot::Emissive].is_some() && result.emissive == Vec3::ZERO {
             result.emissive = Vec3::ONE;
         }
-        if self.options.slots[0] {
+        if self.options.slots.contains(TextureSlot::BaseColor) {
             self.add_base_color(entry, &mut result);
         }
         result
@@ -115,23 +126,25 @@ impl Maker<'_> {
             None => Usage::Color,
         };
         let color = entry.diffuse_map.as_ref();
-        result.base_color_texture = self.texture(0, entry, color, usage).or_else(|| {
-            // An opacity map without a colour map serves as both. `Kd` still colours it.
-            let both = Request { usage, ..opacity? };
-            let image = self.requests.index(both);
-            Some(reference(image, entry.opacity_map.as_ref()?))
-        });
+        result.textures[TextureSlot::BaseColor] = self
+            .texture(TextureSlot::BaseColor, entry, color, usage)
+            .or_else(|| {
+                // An opacity map without a colour map serves as both. `Kd` still colours it.
+                let both = Request { usage, ..opacity? };
+                let image = self.requests.index(both);
+                Some(reference(image, entry.opacity_map.as_ref()?))
+            });
     }
 
     fn texture(
         &mut self,
-        slot: usize,
+        slot: TextureSlot,
         entry: &Entry,
         map: Option<&Map>,
         usage: Usage,
     ) -> Option<TextureRef> {
         let map = map?;
-        if !self.options.slots[slot] {
+        if !self.options.slots.contains(slot) {
             // The scene still refers to the file, so no output may overwrite it.
             self.find(map);
             return None;

@@ -1,6 +1,8 @@
 //! Small generated files.
 
-use crate::{AlphaMode, LoadOptions, Loaded, SceneError, TextureRef, load_file};
+use crate::{
+    AlphaMode, LoadOptions, Loaded, SceneError, TextureRef, TextureSlot, Textures, load_file,
+};
 use formats::texture::Wrap;
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use std::path::Path;
@@ -73,10 +75,10 @@ fn an_opacity_map_becomes_the_colour_maps_alpha() {
     let scene = load(folder.path(), QUAD, Some(mtl)).unwrap().scene;
     let material = &scene.materials[0];
     assert_eq!(material.alpha, AlphaMode::Mask(0.5));
-    let image = material.base_color_texture.unwrap().image;
+    let image = material.textures[TextureSlot::BaseColor].unwrap().image;
     let texels = crate::image::texels(&scene.images, |i| i == image).unwrap();
     assert_eq!(texels[image].as_ref().unwrap()[..4], [200, 100, 50, 77]);
-    assert!(material.normal_texture.is_some());
+    assert!(material.textures[TextureSlot::Normal].is_some());
 }
 
 #[test]
@@ -398,11 +400,11 @@ fn options_scale_move_and_clamp_a_texture_whose_v_grows_upwards() {
     let mtl = "newmtl brick\nmap_Kd -s 2 3 -o 0.5 0.25 0 -clamp on c.png\nbump -bm 0.5 c.png\n";
     let scene = load(folder.path(), QUAD, Some(mtl)).unwrap().scene;
     let material = &scene.materials[0];
-    let texture = material.base_color_texture.unwrap();
+    let texture = material.textures[TextureSlot::BaseColor].unwrap();
     assert_eq!(texture.uv_transform, [[2.0, 0.0, 0.5], [0.0, 3.0, -2.25]]);
     assert_eq!(texture.sampler.wrap, [Wrap::ClampToEdge; 2]);
     assert_eq!(material.normal_scale, 0.5);
-    let normal = material.normal_texture.unwrap();
+    let normal = material.textures[TextureSlot::Normal].unwrap();
     assert_eq!(normal.uv_transform, TextureRef::IDENTITY);
 }
 
@@ -418,7 +420,7 @@ fn missing_textures_and_unsupported_formats_cause_one_warning_each() {
     );
     warns(&loaded, "t.tga is no PNG, JPEG, WebP, KTX2 or DDS image");
     let material = &loaded.scene.materials[0];
-    assert_eq!(material.textures(), [None; 6]);
+    assert_eq!(material.textures, Textures::default());
     assert_eq!(material.alpha, AlphaMode::Opaque);
 }
 

@@ -7,7 +7,7 @@ use draco_core::{
     PointAttribute,
 };
 use glam::{Vec2, Vec3};
-use scene::{LoadOptions, Loaded};
+use scene::{LoadOptions, Loaded, TextureSlot};
 use serde_json::json;
 
 const TEST: &str = "scene/tests/conformance/geometry.rs";
@@ -99,7 +99,10 @@ pub const ROWS: &[Row] = &[
         |f| coordinates(&[0, 3]).load(f),
         |l, f| {
             let material = &l.scene.materials[0];
-            let sets = [material.base_color_texture, material.normal_texture];
+            let sets = [
+                material.textures[TextureSlot::BaseColor],
+                material.textures[TextureSlot::Normal],
+            ];
             assert_eq!(sets.map(|t| t.unwrap().uv_set), [0, 1], "{f}");
             assert_eq!(l.scene.meshes[0].uv1, [Vec2::splat(3.0); 4], "{f}");
             assert!(l.warnings.is_empty(), "{:?}", l.warnings);
@@ -112,8 +115,8 @@ pub const ROWS: &[Row] = &[
         load: |f| coordinates(&[0, 3, 1]).load(f),
         check: |l, f| {
             let material = &l.scene.materials[0];
-            assert!(material.normal_texture.is_some(), "{f}");
-            assert!(material.occlusion_texture.is_none(), "{f}");
+            assert!(material.textures[TextureSlot::Normal].is_some(), "{f}");
+            assert!(material.textures[TextureSlot::Occlusion].is_none(), "{f}");
             assert!(
                 l.warnings[0].contains("TEXCOORD_0, TEXCOORD_3 and TEXCOORD_1"),
                 "{:?}",

@@ -6,6 +6,7 @@
 mod files;
 mod geometry;
 mod images;
+mod materials;
 mod motion;
 mod rows;
 
@@ -13,7 +14,7 @@ use rows::{Row, Status};
 use std::path::Path;
 
 fn all() -> Vec<Row> {
-    [geometry::ROWS, motion::ROWS, images::ROWS].concat()
+    [geometry::ROWS, motion::ROWS, images::ROWS, materials::ROWS].concat()
 }
 
 #[test]

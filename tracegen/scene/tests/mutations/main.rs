@@ -97,7 +97,7 @@ fn check(scene: &Scene, texels: &Texels, at: &str) {
         assert!(!mesh.name.contains(char::is_control), "{at}");
     }
     for material in &scene.materials {
-        let images = material.textures().into_iter().flatten().map(|t| t.image);
+        let images = material.textures.all().map(|t| t.image);
         assert!(images.into_iter().all(|i| i < scene.images.len()), "{at}");
         assert!(material.base_color.is_finite() && material.emissive.is_finite());
     }

@@ -10,7 +10,9 @@ use raster::frame::Frame;
 use raster::lavapipe::Lavapipe;
 use raster::truth::Judgement;
 use record::Region;
-use scene::{AlphaMode, Camera, Instance, LoadOptions, Scene, cameras, hmd};
+use scene::{
+    AlphaMode, Camera, Instance, LoadOptions, Scene, TextureSlot, TextureSlots, cameras, hmd,
+};
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::PathBuf;
@@ -256,10 +258,10 @@ fn load(spec: &str) -> Option<Scene> {
     let mut scene = scenes::load_with(&path, &LoadOptions::ALL).unwrap().scene;
     for material in &mut scene.materials {
         if !matches!(material.alpha, AlphaMode::Mask(_)) {
-            material.base_color_texture = None;
+            material.textures[TextureSlot::BaseColor] = None;
         }
     }
-    scene.keep_texture_slots([true, false, false, false, false, false]);
+    scene.keep_texture_slots(TextureSlots::of(&[TextureSlot::BaseColor]));
     Some(scene)
 }
 

@@ -2,6 +2,7 @@
 
 use super::*;
 use formats::view::TILE_SIZE_PX;
+use scene::TextureSlot;
 use techniques::distance::DistanceCull;
 use techniques::gaze::Gaze;
 use techniques::hidden_mesh::HiddenMesh;
@@ -43,12 +44,10 @@ fn crowd() -> Scene {
     let meshes = (0..3).map(|m| triangles(120, 91 + m as u32, m)).collect();
     let modes = [AlphaMode::Opaque, AlphaMode::Mask(0.5), AlphaMode::Blend];
     let glowing = |mode| {
-        let material = textured(mode, true);
-        Material {
-            emissive: Vec3::new(0.5, 0.4, 0.3),
-            emissive_texture: material.base_color_texture,
-            ..material
-        }
+        let mut material = textured(mode, true);
+        material.emissive = Vec3::new(0.5, 0.4, 0.3);
+        material.textures[TextureSlot::Emissive] = material.textures[TextureSlot::BaseColor];
+        material
     };
     let materials = modes.map(glowing).into();
     scene(meshes, materials, vec![checker()])

@@ -1,6 +1,7 @@
 //! Parts of the tests' scenes, with known coverage and alpha.
 
 use super::*;
+use scene::TextureSlot;
 
 /// Reproducible numbers from 0 to 1.
 pub(super) fn random(seed: u32) -> impl FnMut() -> f32 {
@@ -80,12 +81,13 @@ pub(super) fn textured(alpha: AlphaMode, double_sided: bool) -> Material {
         mip: MipFilter::None,
         ..Sampler::TRILINEAR_REPEAT
     };
+    let texture = TextureRef {
+        sampler,
+        ..TextureRef::new(0)
+    };
     Material {
         name: format!("{alpha:?}"),
-        base_color_texture: Some(TextureRef {
-            sampler,
-            ..TextureRef::new(0)
-        }),
+        textures: [(TextureSlot::BaseColor, Some(texture))].into(),
         alpha,
         double_sided,
         ..Material::default()

@@ -1,7 +1,7 @@
 //! Skipping invisible work changes no output.
 
 use super::*;
-use scene::Light;
+use scene::{Light, TextureSlot};
 
 /// A floor, a finely textured wall 8 m ahead, and the same behind the viewer.
 fn courtyard() -> Scene {
@@ -34,7 +34,7 @@ fn courtyard() -> Scene {
         [-3.0, -1.5, -0.5],
     ];
     let with_image = |image: usize| Material {
-        base_color_texture: Some(TextureRef::new(image)),
+        textures: [(TextureSlot::BaseColor, Some(TextureRef::new(image)))].into(),
         double_sided: true,
         ..Material::default()
     };

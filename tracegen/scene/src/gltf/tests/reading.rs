@@ -1,6 +1,7 @@
 //! Contents read from valid files.
 
 use super::*;
+use crate::TextureSlot;
 use glam::{DVec3, Vec2};
 
 #[test]
@@ -148,9 +149,9 @@ fn an_image_in_both_colour_spaces_is_listed_twice_and_otherwise_once() {
     let scene = files.load().unwrap().scene;
     assert_eq!(scene.images.len(), 2);
     let material = &scene.materials[0];
-    assert_eq!(material.base_color_texture.unwrap().image, 0);
-    assert_eq!(material.emissive_texture.unwrap().image, 0);
-    assert_eq!(material.occlusion_texture.unwrap().image, 1);
+    assert_eq!(material.textures[TextureSlot::BaseColor].unwrap().image, 0);
+    assert_eq!(material.textures[TextureSlot::Emissive].unwrap().image, 0);
+    assert_eq!(material.textures[TextureSlot::Occlusion].unwrap().image, 1);
     let texels = crate::image::texels(&scene.images, |i| i == 0).unwrap();
     assert_eq!(texels[0].as_ref().unwrap()[..4], [10, 20, 30, 255]);
     assert_eq!(texels[1], None);
@@ -206,8 +207,13 @@ fn a_texture_transform_rotates_as_the_extension_specifies() {
     let files = Files::new(&json);
     files.write("my image.png", &png([2, 2], [0; 4]));
     let material = files.load().unwrap().scene.materials.remove(0);
-    let rows = material.base_color_texture.unwrap().uv_transform;
-    assert_eq!(rows, material.normal_texture.unwrap().uv_transform);
+    let rows = material.textures[TextureSlot::BaseColor]
+        .unwrap()
+        .uv_transform;
+    assert_eq!(
+        rows,
+        material.textures[TextureSlot::Normal].unwrap().uv_transform
+    );
     // (1, 0) scales to (2, 0), rotates to (0, -2), moves to (0.5, -1.75).
     let u = rows[0][0] + rows[0][2];
     let v = rows[1][0] + rows[1][2];
@@ -366,9 +372,9 @@ fn a_material_may_sample_any_two_sets_of_texture_coordinates() {
         assert!(warnings.is_empty(), "{sampled:?}: {warnings:?}");
         let (mesh, material) = (&scene.meshes[0], &scene.materials[0]);
         let textures = [
-            material.base_color_texture,
-            material.normal_texture,
-            material.occlusion_texture,
+            material.textures[TextureSlot::BaseColor],
+            material.textures[TextureSlot::Normal],
+            material.textures[TextureSlot::Occlusion],
         ];
         for (texture, set) in textures.into_iter().zip(sampled) {
             let found = match texture.unwrap().uv_set {
@@ -398,7 +404,10 @@ fn a_texture_that_an_extension_replaces_needs_no_coordinates() {
     json["materials"][0]["extensions"] =
         json!({"KHR_materials_pbrSpecularGlossiness": {"glossinessFactor": 0.5}});
     let loaded = load(&json);
-    assert_eq!(loaded.scene.materials[0].base_color_texture, None);
+    assert_eq!(
+        loaded.scene.materials[0].textures[TextureSlot::BaseColor],
+        None
+    );
     assert!(loaded.warnings.is_empty(), "{:?}", loaded.warnings);
 }
 
@@ -406,8 +415,11 @@ fn a_texture_that_an_extension_replaces_needs_no_coordinates() {
 fn a_third_set_and_a_missing_set_of_texture_coordinates_are_reported() {
     let loaded = sets_of_coordinates(&[0, 1, 4], [4, 0, 1]);
     let material = &loaded.scene.materials[0];
-    assert!(material.base_color_texture.is_some() && material.normal_texture.is_some());
-    assert_eq!(material.occlusion_texture, None);
+    assert!(
+        material.textures[TextureSlot::BaseColor].is_some()
+            && material.textures[TextureSlot::Normal].is_some()
+    );
+    assert_eq!(material.textures[TextureSlot::Occlusion], None);
     assert_eq!(
         loaded.warnings,
         [
