@@ -3,17 +3,21 @@
 set -eu
 cd "$(dirname "$0")/.."
 bin=${CARGO_TARGET_DIR:-target}/release
+# The recipe of `app` names the test program.
+PATH=$(cd "$bin" && pwd):$PATH
 for recipe in traces/*.recipe; do
     name=${recipe%.recipe}
     # Word splitting is wanted: a recipe is a list of arguments.
     # shellcheck disable=SC2046
     set -- $(cat "$recipe")
     case "$1" in
-        raster) out=$name.textrace ;;
+        raster | app) out=$name.textrace ;;
         rays) out=$name.raytrace ;;
-        *) echo "$recipe: expected raster or rays, found $1" >&2; exit 2 ;;
+        *) echo "$recipe: expected raster, app or rays, found $1" >&2; exit 2 ;;
     esac
     echo "$recipe -> $out"
-    "$bin/tracegen" "$@" -o "$out"
+    command=$1
+    shift
+    "$bin/tracegen" "$command" -o "$out" "$@"
 done
 UPDATE_GOLDEN=1 "${CARGO:-cargo}" test --release --workspace --locked --test golden

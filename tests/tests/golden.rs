@@ -233,7 +233,7 @@ fn without_errors(json: &[u8]) -> Vec<u8> {
 #[test]
 fn every_golden_trace_replays_to_its_golden_result() {
     let mut digests = Digests::new(MODEL_VERSION);
-    replay_all("textrace", 3, "run", TEXTRACE_RUNS, &mut digests);
+    replay_all("textrace", 4, "run", TEXTRACE_RUNS, &mut digests);
     replay_all("raytrace", 2, "reproject", RAYTRACE_RUNS, &mut digests);
     let path = root().join("traces/golden.digests");
     if let Ok(text) = fs::read_to_string(&path) {

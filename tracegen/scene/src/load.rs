@@ -95,8 +95,7 @@ fn make_names_printable(scene: &mut Scene) {
         .chain(scene.meshes.iter_mut().map(|mesh| &mut mesh.name))
         .chain((scene.materials.iter_mut()).map(|material| &mut material.name))
         .chain(scene.images.iter_mut().map(|image| &mut image.name))
-        .chain(scene.cameras.iter_mut().map(|camera| &mut camera.name))
-        .chain(&mut scene.orthographic_cameras);
+        .chain(scene.cameras.iter_mut().map(|camera| &mut camera.name));
     for name in names {
         *name = shown(name);
     }

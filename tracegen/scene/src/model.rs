@@ -29,8 +29,6 @@ pub struct Scene {
     pub images: Vec<Image>,
     /// Named cameras; never empty once loaded (`cameras::default_camera` fills it).
     pub cameras: Vec<Camera>,
-    /// Names of the file's orthographic cameras, which are not supported.
-    pub orthographic_cameras: Vec<String>,
     /// Lights.
     pub lights: Vec<Light>,
     /// Background and ambient radiance, linear RGB.

@@ -41,16 +41,6 @@ pub enum CameraError {
         /// A similar name, or empty.
         suggestion: String,
     },
-    /// An orthographic camera.
-    #[error(
-        "camera '{name}': expected a perspective camera ({known}), found an orthographic one, unsupported"
-    )]
-    Orthographic {
-        /// Its name.
-        name: String,
-        /// The scene's other cameras.
-        known: String,
-    },
     /// A pose without a direction, or planes in the wrong order.
     #[error("camera '{camera}': expected {expected}, found {found}")]
     Invalid {
@@ -79,14 +69,6 @@ pub fn find<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a Camera, Came
     found.ok_or_else(|| {
         let names: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
         let known = names.join(", ");
-        let is_wanted =
-            |name: &&String| *name == wanted || name.strip_prefix("cam_") == Some(wanted);
-        if let Some(name) = scene.orthographic_cameras.iter().find(is_wanted) {
-            return CameraError::Orthographic {
-                name: name.clone(),
-                known,
-            };
-        }
         let short = names.iter().filter_map(|name| name.strip_prefix("cam_"));
         let suggestion = did_you_mean(wanted, names.iter().copied().chain(short));
         CameraError::Unknown {

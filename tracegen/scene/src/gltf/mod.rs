@@ -42,7 +42,6 @@ pub(crate) use camera_track::camera_track;
 use gltf::binary::Glb;
 use gltf::json::validation::{Error as Fault, Validate};
 use gltf::json::{Path as JsonPath, Root};
-use nodes::Seen;
 use placing::{PlacedRig, Placing};
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -137,13 +136,9 @@ fn place_views(
     };
     for &(node, transform) in &placed.cameras {
         let place = origin::relative_transform(transform, scene.origin);
-        match nodes::camera(root, node, place, warnings) {
-            Some(Seen::Perspective(camera)) => {
-                scene.cameras.push(camera);
-                of.cameras.push(node);
-            }
-            Some(Seen::Orthographic(name)) => scene.orthographic_cameras.push(name),
-            None => {}
+        if let Some(camera) = nodes::camera(root, node, place, warnings) {
+            scene.cameras.push(camera);
+            of.cameras.push(node);
         }
     }
     for &(node, transform) in &placed.lights {

@@ -148,28 +148,36 @@ pub(super) fn camera_name(node: &Node, camera: &gltf::json::Camera, index: usize
         .unwrap_or_else(|| format!("camera-{index}"))
 }
 
-/// The camera of a node.
-pub(super) enum Seen {
-    Perspective(Camera),
-    /// Not supported; its name.
-    Orthographic(String),
-}
+/// Field of view of an orthographic camera, which has none of its own. Displays choose another one.
+const ORTHOGRAPHIC_VFOV_DEG: f32 = 60.0;
 
 /// A camera node looks along its -z. Returns `None` if the node has no direction.
+///
+/// Eyes see in perspective, so an orthographic camera gives only its place and its planes.
 pub(super) fn camera(
     root: &Root,
     index: usize,
     transform: Affine3A,
     warnings: &mut Warnings,
-) -> Option<Seen> {
+) -> Option<Camera> {
     let node = &root.nodes[index];
     let camera = root.cameras.get(node.camera?.value())?;
     let name = camera_name(node, camera, index);
-    let Some(perspective) = &camera.perspective else {
-        warnings.count("orthographic", || {
-            format!("camera '{name}' is orthographic; skipped")
-        });
-        return Some(Seen::Orthographic(name));
+    let (vfov_deg, mut near, mut far) = match (&camera.perspective, &camera.orthographic) {
+        (Some(of), _) => (
+            of.yfov.to_degrees(),
+            of.znear,
+            of.zfar.unwrap_or(DEFAULT_FAR_M),
+        ),
+        (None, Some(of)) => {
+            warnings.count("orthographic", || {
+                format!(
+                    "camera '{name}' is orthographic; the eyes see in perspective from its place"
+                )
+            });
+            (ORTHOGRAPHIC_VFOV_DEG, of.znear, of.zfar)
+        }
+        (None, None) => return None,
     };
     let Some((eye, target, up)) = look_of_node(&transform) else {
         warnings.count("no direction", || {
@@ -177,7 +185,6 @@ pub(super) fn camera(
         });
         return None;
     };
-    let (mut near, mut far) = (perspective.znear, perspective.zfar.unwrap_or(DEFAULT_FAR_M));
     if !(near > 0.0 && far > near && far.is_finite()) {
         warnings.count("planes", || {
             format!(
@@ -186,15 +193,15 @@ pub(super) fn camera(
         });
         (near, far) = (0.05, DEFAULT_FAR_M);
     }
-    Some(Seen::Perspective(Camera {
+    Some(Camera {
         name,
         eye,
         target,
         up,
-        vfov_deg: perspective.yfov.to_degrees(),
+        vfov_deg,
         near,
         far,
-    }))
+    })
 }
 
 /// Punctual lights with unchanged photometric intensity. A spot light becomes a point light.
