@@ -6,10 +6,16 @@ use formats::footprint::{SamplingOptions, record_footprints};
 use formats::textrace::{Textrace, Tile, with_operands};
 use formats::view::Eye;
 use parallax_tests::{has_lavapipe, program, run_ok};
-use std::collections::HashMap;
+use std::cmp::Reverse;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 const SIZE: &str = "192x160";
+
+/// Scenes with opaque, masked and blended materials.
+const SCENES: [&str; 8] = [
+    "atrium", "teapot", "chess", "car", "lab", "plant", "meadow", "jungle",
+];
 
 /// A texel block that a pixel reads: texture, level, layer, columns and rows.
 type Read = (usize, u32, u16, [u32; 2], [u32; 2]);
@@ -46,9 +52,8 @@ fn plain_passes(list: &str) -> [u32; 2] {
     [a.1.min(b.1), a.1.max(b.1)]
 }
 
-/// The reads of each pixel of an eye. `texture` maps a texture of the trace to its number and to the level that
-/// its level 0 is of that texture.
-fn reads(trace: &Textrace, eye: Eye, texture: impl Fn(usize) -> (usize, u32)) -> Reads {
+/// The texels that each pixel of an eye reads, sorted: textures by their numbers in the trace.
+fn reads(trace: &Textrace, eye: Eye) -> Reads {
     let tables = trace.tables();
     let options = SamplingOptions::default();
     let mut found = Reads::new();
@@ -70,8 +75,8 @@ fn reads(trace: &Textrace, eye: Eye, texture: impl Fn(usize) -> (usize, u32)) ->
                             corner[0] + quad[0] + lane % 2,
                             corner[1] + quad[1] + lane / 2,
                         ];
-                        let (number, finest) = texture(sample.texture as usize);
-                        let read = (number, finest + u32::from(f.level), f.layer, f.i, f.j);
+                        let texture = sample.texture as usize;
+                        let read = (texture, u32::from(f.level), f.layer, f.i, f.j);
                         found.entry(pixel).or_default().push(read);
                     };
                     record_footprints(tables, run.draw, record, before, &options, add);
@@ -85,12 +90,73 @@ fn reads(trace: &Textrace, eye: Eye, texture: impl Fn(usize) -> (usize, u32)) ->
     found
 }
 
+/// The texture of one trace for each texture of another, and the level that its level 0 is: that of the same
+/// format with which it shares most texels, pixel by pixel. Textures that are never read have none.
+fn same_textures(
+    from: (&Textrace, &Reads),
+    to: (&Textrace, &Reads),
+) -> HashMap<usize, (usize, u32)> {
+    let size = |trace: &Textrace, read: &Read| {
+        trace.tables().textures[read.0]
+            .size
+            .map(|edge| (edge >> read.1).max(1))
+    };
+    let mut shared: HashMap<usize, HashMap<usize, u64>> = HashMap::new();
+    for (at, reads) in from.1 {
+        for read in reads {
+            let others = to.1.get(at).into_iter().flatten().filter(|other| {
+                (other.2, other.3, other.4) == (read.2, read.3, read.4)
+                    && size(to.0, other) == size(from.0, read)
+            });
+            for other in others {
+                *shared
+                    .entry(read.0)
+                    .or_default()
+                    .entry(other.0)
+                    .or_default() += 1;
+            }
+        }
+    }
+    // Textures of one material often share all coordinates. They are told apart by their order.
+    let mut pairs: Vec<(Reverse<u64>, usize, usize)> = (shared.iter())
+        .flat_map(|(&texture, of)| {
+            of.iter()
+                .map(move |(&other, &n)| (Reverse(n), texture, other))
+        })
+        .collect();
+    pairs.sort_unstable();
+    let mut found = HashMap::new();
+    let mut taken = HashSet::new();
+    for (_, texture, other) in pairs {
+        let [a, b] = [(from.0, texture), (to.0, other)].map(|(t, n)| &t.tables().textures[n]);
+        let is_same = (a.format, a.color_space) == (b.format, b.color_space);
+        if is_same && !found.contains_key(&texture) && taken.insert(other) {
+            found.insert(texture, (other, (b.size[0] / a.size[0]).ilog2()));
+        }
+    }
+    found
+}
+
+/// Reads of the textures that a map gives.
+fn renamed(reads: Reads, textures: &HashMap<usize, (usize, u32)>) -> Reads {
+    let rename = |read: Read| {
+        let (texture, finest) = textures[&read.0];
+        (texture, finest + read.1, read.2, read.3, read.4)
+    };
+    let of_pixel = |(at, reads): ([u32; 2], Vec<Read>)| {
+        let mut reads: Vec<Read> = reads.into_iter().map(rename).collect();
+        reads.sort_unstable();
+        (at, reads)
+    };
+    reads.into_iter().map(of_pixel).collect()
+}
+
 #[test]
 fn the_layer_and_the_raster_capture_sample_the_same_texels_in_every_pixel() {
     if !has_lavapipe() {
         return;
     }
-    for scene in ["atrium"] {
+    for scene in SCENES {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let [own, app] = ["own.textrace", "app.textrace"].map(|name| folder.path().join(name));
         let list = run_ok(
@@ -112,33 +178,23 @@ fn the_layer_and_the_raster_capture_sample_the_same_texels_in_every_pixel() {
         capture.arg(&rules).arg("-o").arg(&app).arg("--");
         run_ok(capture.args(render(scene, &own)));
         let [own, app] = [own, app].map(|path| Textrace::open(&path).expect("a trace"));
-        let own_textures = &own.tables().textures;
         let mut count = 0;
         for eye in [Eye::Left, Eye::Right] {
-            let expected = reads(&own, eye, |texture| (texture, 0));
-            // The layer numbers images in the order in which `tracegen raster` creates them. The finest levels
-            // that no view samples are not uploaded.
-            let found = reads(&app, eye, |texture| {
-                let of = &app.tables().textures[texture];
-                let number = of.name.strip_prefix("image ").expect("an image's name");
-                let number = number.split(' ').next().expect("a number");
-                let number = number.parse::<usize>().expect("a number") - 1;
-                let finest = (own_textures[number].size[0] / of.size[0]).ilog2();
-                (number, finest)
-            });
+            let expected = reads(&own, eye);
+            let found = reads(&app, eye);
+            // The layer's textures lack the finest levels that no view samples: they are not uploaded.
+            let textures = same_textures((&app, &found), (&own, &expected));
+            let found = renamed(found, &textures);
             assert_eq!(
                 expected.len(),
                 found.len(),
                 "{scene}, {eye}: covered pixels"
             );
             // Coordinates are rounded to 1/2048 texel of the finest level, which is not the same in both traces.
-            // At the edge of a texel, the neighbour may therefore be read.
+            // At the edge of a texel or of a level, the neighbour may therefore be read.
             let mut differing = 0;
             for (at, reads) in &expected {
-                let other = &found[at];
-                differing += usize::from(reads != other);
-                let levels = |of: &[Read]| of.iter().map(|r| (r.0, r.1, r.2)).collect::<Vec<_>>();
-                assert_eq!(levels(reads), levels(other), "{scene}, {eye}, {at:?}");
+                differing += usize::from(*reads != found[at]);
             }
             println!(
                 "{scene}, {eye}: {differing} of {} pixels differ",
@@ -151,6 +207,6 @@ fn the_layer_and_the_raster_capture_sample_the_same_texels_in_every_pixel() {
             count += expected.values().map(Vec::len).sum::<usize>();
         }
         println!("{scene}: {count} footprints");
-        assert!(count > 100_000, "{scene}: {count} footprints");
+        assert!(count > 50_000, "{scene}: {count} footprints");
     }
 }
