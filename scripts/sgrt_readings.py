@@ -1,10 +1,10 @@
-"""Tables of docs/results/sgrt-readings.md from what scripts/sgrt-readings.sh measured: sgrt_readings.py RESULTS RULE..."""
+"""Tables of docs/results/sgrt-readings.md from what scripts/sgrt-readings.sh measured: sgrt_readings.py RESULTS"""
 
 import csv
 import math
 import sys
 
-results, rules = sys.argv[1], sys.argv[2:]
+results = sys.argv[1]
 PAPER_SIZE = "2048x1024"
 DESIGN = ["teapot", "chess", "car", "lab", "music-box", "meadow"]
 
@@ -77,17 +77,3 @@ for size in ("512x512", "1024x1024", PAPER_SIZE):
     table.append([size, best, first["scope"], first["reuse"], first["rule"], *(f"{x:.3f}" for x in fits[best])])
 write("sgrt-sizes", "replay readings at each size per eye", ["size per eye", "closest reading", "measured of", "reused", "rule",
       "from the paper: calibration", "test scenes"], table)
-
-table = []
-cases = [("plain reuse, rows in DRAM", "detection,plain.csv"), ("default of replay reproject", "detection,default.csv")]
-cases += [(f"on chip: `{rule}`", f"detection,on-chip,{rule}.csv") for rule in rules]
-for name, file in cases:
-    chosen = [r for r in rows(file) if r["run"] == "chosen"]
-    for label, of in (("design", [r for r in chosen if r["scene"] in DESIGN]), ("held out", [r for r in chosen if r["scene"] not in DESIGN])):
-        flips = {r["scene"]: float(r["flip_mean"]) for r in of}
-        worst = max(flips, key=flips.get)
-        table.append([name, label, f"{flips[worst]:.4f} ({worst.rsplit('/')[-1]})", sum(f < 0.01 for f in flips.values()), len(flips),
-                      f"{mean([float(r['relative_performance']) for r in of]):.3f}", f"{mean([float(r['relative_energy']) for r in of]):.3f}",
-                      f"{max(float(r['relative_energy']) for r in of):.2f}", at_14_nm(of), f"{float(of[0]['detection_sram_kib']):.0f}"])
-write("sgrt-detection", f"replay reproject, {PAPER_SIZE} per eye", ["detection", "scenes", "worst FLIP", "scenes below 0.01", "of",
-      "performance", "energy", "worst energy", "energy at 14 nm", "row buffers KiB"], table)

@@ -6,6 +6,8 @@ use super::reproject::{Candidate, Reprojection};
 /// Column and row offset of a neighbour.
 pub type Offset = (i32, i32);
 
+/// The next pixel of the row.
+pub(super) const RIGHT: [Offset; 1] = [(1, 0)];
 /// Neighbours that share an edge.
 pub(super) const FOUR: [Offset; 4] = [(0, -1), (-1, 0), (1, 0), (0, 1)];
 /// Neighbours that share an edge or a corner.

@@ -30,8 +30,8 @@ static SGRT_PAPER: Preset = Preset {
 /// Error detection without DRAM traffic. Its records are packed: a depth instead of a position, and an object number of 16 bits.
 static ON_CHIP: Preset = Preset {
     name: "on-chip",
-    title: "detection that pays: the default rule with shadow outcomes reused except at shadow edges, packed records, rows kept on chip",
-    rule: "depth=0.02+row=0.02+object+opaque+triangles+shadow-edge",
+    title: "detection that pays: the default rule and gap, shadow outcomes reused except at shadow edges, packed records, rows kept on chip",
+    rule: "depth=0.02+row=0.02+object+opaque+gap+triangles+shadow-edge",
     reuse: Reuse::Shadow,
     parameters: "[gbuffer]\nobject_bytes = 2\ndetect_position_bytes = 4\nrows = \"chip\"\n",
 };

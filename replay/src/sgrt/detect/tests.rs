@@ -339,3 +339,49 @@ fn reused_shadow_outcomes_are_wrong_only_where_they_differ() {
     let (plain, with_edges) = (wrong("triangles"), wrong("triangles+shadow-edge"));
     assert!(with_edges < plain, "{with_edges} of {plain}");
 }
+
+#[test]
+fn gap_rejects_the_arrivals_before_a_hole_and_no_others() {
+    let frame = frame(&room(), View::default());
+    let arrived = reproject(&frame);
+    let plain = decided(&frame, "none");
+    let width = frame.size_px[0] as usize;
+    let mut rejected = 0;
+    for (index, decision) in decided(&frame, "gap").iter().enumerate() {
+        let has_next = index % width + 1 < width;
+        let before_hole = has_next && arrived.candidates[index + 1].is_missing();
+        let expected = match (arrived.candidates[index].is_missing(), before_hole) {
+            (true, _) => PixelClass::Missing,
+            (false, true) => PixelClass::Bad,
+            (false, false) => plain[index].class,
+        };
+        assert_eq!(decision.class, expected, "pixel {index}");
+        rejected += usize::from(expected == PixelClass::Bad);
+    }
+    assert!(rejected > 10, "{rejected}");
+}
+
+#[test]
+fn no_seen_error_is_left_by_the_oracle_and_nothing_is_charged_for_it() {
+    let frame = frame(&room(), View::default());
+    let rule: Rule = "oracle=0".parse().expect("a rule");
+    assert_eq!(
+        rule.reads(),
+        "none".parse::<Rule>().expect("a rule").reads()
+    );
+    let truth = &frame.right().samples;
+    let mut bad = 0;
+    for (decision, truth) in decided(&frame, "oracle=0").iter().zip(truth) {
+        if decision.class.is_reused() {
+            let left = &frame.left().samples[decision.source as usize];
+            let is_same = left.primitive == truth.primitive;
+            assert!(is_same || left.color() == truth.color());
+        }
+        bad += usize::from(decision.class == PixelClass::Bad);
+    }
+    let rejected_by_default = decided(&frame, DEFAULT);
+    let rejected = rejected_by_default
+        .iter()
+        .filter(|d| d.class == PixelClass::Bad);
+    assert!(bad > 0 && bad < rejected.count());
+}

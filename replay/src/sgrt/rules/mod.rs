@@ -6,8 +6,10 @@
 //! eye. Rules reject suspicious arrivals and can be combined with `+`.
 
 mod depth;
+mod gap;
 mod object;
 mod opaque;
+mod oracle;
 mod row;
 mod shadow_edge;
 mod silhouette;
@@ -23,15 +25,17 @@ use std::fmt;
 use std::str::FromStr;
 
 /// All rules, in the order in which combinations are printed.
-pub static RULES: [&RuleKind; 8] = [
+pub static RULES: [&RuleKind; 10] = [
     &depth::RULE,
     &row::RULE,
     &object::RULE,
     &opaque::RULE,
+    &gap::RULE,
     &silhouette::RULE,
     &triangle::RULE,
     &triangles::RULE,
     &shadow_edge::RULE,
+    &oracle::RULE,
 ];
 
 /// Creates the test of a frame from its arrivals and the rule's share.
@@ -258,7 +262,7 @@ mod tests {
             assert!(
                 error.starts_with("rule: expected none, or depth[=SHARE], row[=SHARE], object")
                     && error.contains(
-                        "silhouette, triangle, triangles, shadow-edge joined by '+'; found"
+                        "gap, silhouette, triangle, triangles, shadow-edge, oracle[=SHARE] joined by '+'; found"
                     ),
                 "{error}"
             );
