@@ -1,0 +1,126 @@
+//! Chooses which nodes of the binary tree become nodes of the eight-wide tree, so that the sum of
+//! their areas is least (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs
+//! Through Compressed Wide BVHs", HPG 2017, section 3.1). The leaves stay as they are.
+
+use super::collapse::parents_first;
+use obvhs::bvh2::Bvh2;
+
+/// Children of a wide node.
+const WIDTH: usize = 8;
+
+/// How many wide children the two children of a binary node become, or zeros if the node itself
+/// becomes one.
+type Shares = [u8; 2];
+
+/// The choice for every node of a binary tree.
+pub(super) struct Widening {
+    /// By node and by the most wide children that its subtree may become, less one. The last is the
+    /// choice for a wide node's own children.
+    shares: Vec<[Shares; WIDTH]>,
+}
+
+impl Widening {
+    /// Finds the cheapest choice, bottom up.
+    pub(super) fn cheapest(tree: &Bvh2) -> Self {
+        let mut shares = vec![[[0; 2]; WIDTH]; tree.nodes.len()];
+        // Least area of all wide nodes of a subtree that becomes at most so many children.
+        let mut costs = vec![[0.0f32; WIDTH]; tree.nodes.len()];
+        for at in parents_first(tree).into_iter().rev() {
+            let node = &tree.nodes[at];
+            if node.is_leaf() {
+                continue;
+            }
+            let first = node.first_index as usize;
+            let (left, right) = (costs[first], costs[first + 1]);
+            let mut cost = [f32::INFINITY; WIDTH];
+            for most in 2..=WIDTH {
+                (cost[most - 1], shares[at][most - 1]) = (cost[most - 2], shares[at][most - 2]);
+                for k in 1..most {
+                    let sum = left[k - 1] + right[most - k - 1];
+                    if sum < cost[most - 1] {
+                        cost[most - 1] = sum;
+                        shares[at][most - 1] = [k as u8, (most - k) as u8];
+                    }
+                }
+            }
+            // As one child, the node is wide and has all its children.
+            let whole = node.aabb().half_area() + cost[WIDTH - 1];
+            for most in 0..WIDTH - 1 {
+                if whole <= cost[most] {
+                    (cost[most], shares[at][most]) = (whole, [0; 2]);
+                }
+            }
+            costs[at] = cost;
+        }
+        Self { shares }
+    }
+
+    /// The nodes that become the children of a wide node, in the order of the binary tree.
+    pub(super) fn children(&self, tree: &Bvh2, node: u32) -> Vec<u32> {
+        let mut children = Vec::with_capacity(WIDTH);
+        let mut open = vec![(node, WIDTH)];
+        while let Some((at, most)) = open.pop() {
+            let [left, right] = self.shares[at as usize][most - 1].map(usize::from);
+            if left == 0 {
+                children.push(at);
+            } else {
+                let first = tree.nodes[at as usize].first_index;
+                open.extend([(first + 1, right), (first, left)]);
+            }
+        }
+        children
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::build::build_binary;
+    use super::*;
+    use crate::reference::TestMesh;
+    use glam::DVec3;
+
+    /// The area of all wide nodes, and the leaves below them in order.
+    fn widened(tree: &Bvh2, children: impl Fn(u32) -> Vec<u32>) -> (f64, Vec<u32>) {
+        let (mut area, mut leaves, mut open) = (0.0, Vec::new(), vec![0]);
+        while let Some(at) = open.pop() {
+            let node = &tree.nodes[at as usize];
+            if node.is_leaf() {
+                leaves.push(at);
+                continue;
+            }
+            area += f64::from(node.aabb().half_area());
+            let children = children(at);
+            assert!((2..=WIDTH).contains(&children.len()));
+            open.extend(children);
+        }
+        leaves.sort_unstable();
+        (area, leaves)
+    }
+
+    /// The widest child is opened until there are eight.
+    fn greedy(tree: &Bvh2, node: u32) -> Vec<u32> {
+        let mut open = vec![node];
+        while open.len() < WIDTH {
+            let area = |at: u32| tree.nodes[at as usize].aabb().half_area();
+            let inner = (0..open.len()).filter(|i| !tree.nodes[open[*i] as usize].is_leaf());
+            let Some(i) = inner.max_by(|a, b| area(open[*a]).total_cmp(&area(open[*b]))) else {
+                break;
+            };
+            let first = tree.nodes[open.swap_remove(i) as usize].first_index;
+            open.extend([first, first + 1]);
+        }
+        open
+    }
+
+    #[test]
+    fn the_area_is_below_that_of_greedy_opening_and_leaves_are_kept() {
+        for mesh in [TestMesh::torus(160, 80), TestMesh::sphere(4)] {
+            let tree = build_binary(&mesh.rounded(DVec3::ZERO));
+            let widening = Widening::cheapest(&tree);
+            let (area, leaves) = widened(&tree, |at| widening.children(&tree, at));
+            let (greedy_area, greedy_leaves) = widened(&tree, |at| greedy(&tree, at));
+            assert_eq!(leaves, greedy_leaves);
+            assert!(area < 0.97 * greedy_area, "{area} of {greedy_area}");
+        }
+    }
+}
