@@ -88,7 +88,7 @@ impl Caster<'_> {
             }
         };
         if self.geometry {
-            geometry.push(cast.geometry(ray));
+            geometry.push(cast.geometry(ray, self.bvh));
         }
         cast
     }
@@ -109,7 +109,7 @@ impl Caster<'_> {
 }
 
 impl Cast {
-    fn geometry(&self, ray: &Ray) -> RayGeometry {
+    fn geometry(&self, ray: &Ray, bvh: &Bvh) -> RayGeometry {
         RayGeometry {
             origin: ray.origin.to_array(),
             direction: ray.direction.to_array(),
@@ -117,7 +117,7 @@ impl Cast {
             t_max: ray.t_max,
             hit: self.hit.map(|hit| SlotHit {
                 t: hit.t,
-                slot: hit.slot,
+                slot: bvh.slot(&hit),
             }),
             stack_depth: self.stack_depth,
         }

@@ -9,6 +9,8 @@ pub mod picture;
 pub mod precision;
 pub mod ray;
 pub mod reference;
+pub mod reference_tree;
+pub mod reference_walk;
 pub mod robustness;
 pub mod scene;
 pub mod soup;

@@ -2,7 +2,7 @@
 //! test and padded slabs (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", JCGT
 //! 2013).
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec3, Vec3A, Vec3Swizzles};
 
 /// A ray segment. `direction` need not have unit length, and `t` is in units of its length.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,9 +56,9 @@ const LEAST_DIRECTION: f32 = 1e-18;
 
 /// A ray prepared for traversal.
 #[derive(Clone, Copy, Debug)]
-pub struct PreparedRay {
+pub struct PreparedRay<'a> {
     /// The ray.
-    pub ray: Ray,
+    pub ray: &'a Ray,
     /// Axes of the sheared space. The direction is longest along the last.
     pub axes: [usize; 3],
     /// Shear constants of the first two axes.
@@ -66,83 +66,78 @@ pub struct PreparedRay {
     /// 1 where the direction is negative along the axis.
     pub negative: [usize; 3],
     /// Reciprocal direction, rounded towards an earlier entry.
-    pub near_reciprocal: [f32; 3],
+    pub near_reciprocal: Vec3A,
     /// Reciprocal direction, rounded towards a later exit.
-    pub far_reciprocal: [f32; 3],
-    /// Origin, shifted so that slabs start earlier, times the near reciprocal. The distance of a
-    /// near plane is `plane * near_reciprocal - near_offset`.
-    pub near_offset: [f32; 3],
-    /// Origin, shifted so that slabs end later, times the far reciprocal.
-    pub far_offset: [f32; 3],
+    pub far_reciprocal: Vec3A,
+    /// Minus the origin, shifted so that slabs start earlier, times the near reciprocal. The
+    /// distance of a near plane is `plane * near_reciprocal + near_shift`.
+    pub near_shift: Vec3A,
+    /// Minus the origin, shifted so that slabs end later, times the far reciprocal.
+    pub far_shift: Vec3A,
 }
 
-impl PreparedRay {
+/// Axes of the sheared space, by the axis along which the direction is longest, and whether it is
+/// negative there.
+const SHEARED_AXES: [[[usize; 3]; 2]; 3] = [
+    [[1, 2, 0], [2, 1, 0]],
+    [[2, 0, 1], [0, 2, 1]],
+    [[0, 1, 2], [1, 0, 2]],
+];
+
+/// The axis along which a direction is longest, by the outcomes of x > y, y > z and x > z (bits 0
+/// to 2).
+const LONGEST_AXIS: [u8; 8] = [2, 2, 1, 2, 2, 0, 1, 0];
+
+impl<'a> PreparedRay<'a> {
     /// Prepares a valid ray for a scene with these bounds.
+    ///
+    /// Vector operations without branches, because a short ray spends much of its time here.
     #[must_use]
     #[inline(always)]
-    pub fn new(ray: &Ray, bounds: (Vec3, Vec3)) -> Self {
-        let d = ray.direction.to_array();
-        let size = ray.direction.abs();
-        let kz = if size.x > size.y {
-            if size.x > size.z { 0 } else { 2 }
-        } else if size.y > size.z {
-            1
-        } else {
-            2
-        };
-        let (mut kx, mut ky) = ((kz + 1) % 3, (kz + 2) % 3);
-        if d[kz] < 0.0 {
-            std::mem::swap(&mut kx, &mut ky);
-        }
-        let reach = (ray.origin - bounds.0)
+    pub fn new(ray: &'a Ray, bounds: (Vec3, Vec3)) -> Self {
+        let (origin, direction) = (Vec3A::from(ray.origin), Vec3A::from(ray.direction));
+        let size = direction.abs();
+        let larger = size.xyx().cmpgt(size.yzz()).bitmask();
+        let longest = usize::from(LONGEST_AXIS[larger as usize & 7]);
+        let negative = direction.is_negative_bitmask() as usize;
+        let axes = SHEARED_AXES[longest][negative >> longest & 1];
+        let d: &[f32; 3] = ray.direction.as_ref();
+        let reach = (origin - Vec3A::from(bounds.0))
             .abs()
-            .max((ray.origin - bounds.1).abs());
-        let reach_z = reach.to_array()[kz];
-        let origin = ray.origin.to_array();
-        let mut prepared = Self {
-            ray: *ray,
-            axes: [kx, ky, kz],
-            shear: [d[kx] / d[kz], d[ky] / d[kz]],
-            negative: [0; 3],
-            near_reciprocal: [0.0; 3],
-            far_reciprocal: [0.0; 3],
-            near_offset: [0.0; 3],
-            far_offset: [0.0; 3],
-        };
-        for axis in 0..3 {
-            // Twice the paper's bound, plus the rounding of the shifted origin and its product.
-            let pad = 2.0 * SLAB_EPSILON * (reach.to_array()[axis] + reach_z)
-                + 2.0 * f32::EPSILON * origin[axis].abs();
-            let direction = if d[axis].abs() < LEAST_DIRECTION {
-                LEAST_DIRECTION.copysign(d[axis])
-            } else {
-                d[axis]
-            };
-            let reciprocal = 1.0 / direction;
-            let toward = pad.copysign(direction);
-            prepared.negative[axis] = usize::from(direction < 0.0);
-            let near = reciprocal * (1.0 - 2.0 * f32::EPSILON);
-            let far = reciprocal * (1.0 + 2.0 * f32::EPSILON);
-            prepared.near_reciprocal[axis] = near;
-            prepared.far_reciprocal[axis] = far;
-            prepared.near_offset[axis] = (origin[axis] + toward) * near;
-            prepared.far_offset[axis] = (origin[axis] - toward) * far;
+            .max((origin - Vec3A::from(bounds.1)).abs());
+        let reach_z = reach.to_array()[longest];
+        // Twice the paper's bound, plus the rounding of the shifted origin and its product.
+        let pad = 2.0 * SLAB_EPSILON * (reach + reach_z) + 2.0 * f32::EPSILON * origin.abs();
+        let least = Vec3A::splat(LEAST_DIRECTION);
+        let direction = Vec3A::select(size.cmplt(least), least.copysign(direction), direction);
+        let reciprocal = 1.0 / direction;
+        let toward = pad.copysign(direction);
+        let near_reciprocal = reciprocal * (1.0 - 2.0 * f32::EPSILON);
+        let far_reciprocal = reciprocal * (1.0 + 2.0 * f32::EPSILON);
+        Self {
+            ray,
+            axes,
+            shear: [d[axes[0]] / d[axes[2]], d[axes[1]] / d[axes[2]]],
+            negative: [negative & 1, negative >> 1 & 1, negative >> 2 & 1],
+            near_reciprocal,
+            far_reciprocal,
+            near_shift: -((origin + toward) * near_reciprocal),
+            far_shift: -((origin - toward) * far_reciprocal),
         }
-        prepared
     }
 
     /// Distance to a box's near plane on this axis, rounded towards an earlier entry.
     #[must_use]
     #[inline(always)]
     pub fn near_distance(&self, axis: usize, plane: f32) -> f32 {
-        plane.mul_add(self.near_reciprocal[axis], -self.near_offset[axis])
+        plane.mul_add(self.near_reciprocal[axis], self.near_shift[axis])
     }
 
     /// Distance to a box's far plane on this axis, rounded towards a later exit.
     #[must_use]
     #[inline(always)]
     pub fn far_distance(&self, axis: usize, plane: f32) -> f32 {
-        plane.mul_add(self.far_reciprocal[axis], -self.far_offset[axis])
+        plane.mul_add(self.far_reciprocal[axis], self.far_shift[axis])
     }
 
     /// Entry and exit of a box along the whole line. Entry is later than exit if the line misses.
@@ -190,29 +185,40 @@ impl PreparedRay {
     }
 
     /// Distance to a triangle whose line test passed, or `None` if it is outside the segment.
-    ///
-    /// The plane equation in `f64` is exact to within rounding, whereas the error of the sheared z
-    /// in the 2013 paper exceeds 1e-4 for some rays. The result is then clamped to the triangle's
-    /// own slabs. No enclosing box can start behind it, so every traversal order and tree finds the
-    /// same nearest triangle, bit for bit.
     #[must_use]
     #[inline(always)]
     pub fn distance(&self, v: &[[f32; 3]; 3]) -> Option<f32> {
+        let (near, far) = self.triangle_slab(v);
+        if near > far {
+            return None;
+        }
+        let t = self.distance_within(v, near, far)?;
+        (t > self.ray.t_min && t <= self.ray.t_max).then_some(t)
+    }
+
+    /// Entry and exit of a triangle's box.
+    #[must_use]
+    #[inline(always)]
+    pub fn triangle_slab(&self, v: &[[f32; 3]; 3]) -> (f32, f32) {
+        let min = |a: usize| v[0][a].min(v[1][a]).min(v[2][a]);
+        let max = |a: usize| v[0][a].max(v[1][a]).max(v[2][a]);
+        self.slab([min(0), min(1), min(2)], [max(0), max(1), max(2)])
+    }
+
+    /// Distance to the plane of a triangle, clamped to its slabs `near` and `far`.
+    ///
+    /// The plane equation in `f64` is exact to within rounding, whereas the error of the sheared z
+    /// in the 2013 paper exceeds 1e-4 for some rays. Because the result is clamped to the
+    /// triangle's own slabs, no enclosing box can start behind it, so every traversal order and
+    /// tree finds the same nearest triangle, bit for bit.
+    #[must_use]
+    #[inline(always)]
+    pub fn distance_within(&self, v: &[[f32; 3]; 3], near: f32, far: f32) -> Option<f32> {
         let [v0, v1, v2] = [to_f64(v[0]), to_f64(v[1]), to_f64(v[2])];
         let normal = (v1 - v0).cross(v2 - v0);
         let slope = normal.dot(self.ray.direction.as_dvec3());
         let t = normal.dot(v0 - self.ray.origin.as_dvec3()) / slope;
-        if !t.is_finite() {
-            return None;
-        }
-        let min = |a: usize| v[0][a].min(v[1][a]).min(v[2][a]);
-        let max = |a: usize| v[0][a].max(v[1][a]).max(v[2][a]);
-        let (near, far) = self.slab([min(0), min(1), min(2)], [max(0), max(1), max(2)]);
-        if near > far {
-            return None;
-        }
-        let t = (t as f32).clamp(near, far);
-        (t > self.ray.t_min && t <= self.ray.t_max).then_some(t)
+        t.is_finite().then(|| (t as f32).clamp(near, far))
     }
 }
 

@@ -2,10 +2,11 @@
 //! kernel.
 
 use super::count::Counter;
-use super::kernel::{Kernel, Lanes8};
+use super::kernel::{Ends, Kernel, Lanes8};
 use super::leaf::LeafTest;
-use super::node::{Block, Child, Node2, Node8};
+use super::node::{BLOCK, Block, Child, Node2, Node8};
 use crate::ray::{PreparedRay, line_hits_sheared_f64};
+use glam::Vec3A;
 use std::arch::x86_64::*;
 
 /// AVX2 and FMA. Requires a processor with both: see `Avx2::available`.
@@ -31,30 +32,35 @@ pub struct Ray {
     /// Permutation that puts near planes before far planes.
     order2: [__m128i; 3],
     t_min: f32,
+    /// By axis, for eight boxes.
     near_reciprocal: [__m256; 3],
-    near_offset: [__m256; 3],
+    near_shift: [__m256; 3],
     far_reciprocal: [__m256; 3],
-    far_offset: [__m256; 3],
-    negative: [usize; 3],
-    axes: [usize; 3],
-    /// Origin in the order of `axes`, for four triangles.
+    far_shift: [__m256; 3],
+    /// By axis, the place of the near planes in a node of eight boxes, in bytes.
+    near_at: [usize; 3],
+    /// Places of a vertex's coordinates in a block, in the order of the sheared axes.
+    sheared_at: [usize; 3],
+    /// Lanes of ones for axes along which the direction is negative.
+    negative4: [__m128; 3],
+    /// Origin in the order of the sheared axes, for four triangles.
     origin4: [__m128; 3],
     shear4: [__m128; 2],
 }
 
 impl Kernel for Avx2 {
-    type Ray = Ray;
+    type Ray<'a> = Ray;
 
     #[inline(always)]
-    fn load(ray: &PreparedRay) -> Ray {
-        let o = ray.ray.origin.to_array();
+    fn load(ray: &PreparedRay<'_>) -> Ray {
+        let o: &[f32; 3] = ray.ray.origin.as_ref();
         let (nr, fr) = (ray.near_reciprocal, ray.far_reciprocal);
-        let (no, fo) = (ray.near_offset, ray.far_offset);
+        let (ns, fs) = (ray.near_shift, ray.far_shift);
         // SAFETY: dispatch ensures AVX2.
         unsafe {
             Ray {
                 scale2: std::array::from_fn(|a| _mm_setr_ps(-nr[a], -nr[a], fr[a], fr[a])),
-                offset2: std::array::from_fn(|a| _mm_setr_ps(no[a], no[a], -fo[a], -fo[a])),
+                offset2: std::array::from_fn(|a| _mm_setr_ps(-ns[a], -ns[a], fs[a], fs[a])),
                 order2: std::array::from_fn(|a| {
                     if ray.negative[a] == 1 {
                         _mm_setr_epi32(2, 3, 0, 1)
@@ -63,12 +69,15 @@ impl Kernel for Avx2 {
                     }
                 }),
                 t_min: ray.ray.t_min,
-                near_reciprocal: std::array::from_fn(|a| _mm256_set1_ps(nr[a])),
-                near_offset: std::array::from_fn(|a| _mm256_set1_ps(no[a])),
-                far_reciprocal: std::array::from_fn(|a| _mm256_set1_ps(fr[a])),
-                far_offset: std::array::from_fn(|a| _mm256_set1_ps(fo[a])),
-                negative: ray.negative,
-                axes: ray.axes,
+                near_reciprocal: eight(nr),
+                near_shift: eight(ns),
+                far_reciprocal: eight(fr),
+                far_shift: eight(fs),
+                near_at: std::array::from_fn(|a| a * 64 + ray.negative[a] * 32),
+                sheared_at: ray.axes.map(|axis| axis * BLOCK),
+                negative4: std::array::from_fn(|a| {
+                    _mm_castsi128_ps(_mm_set1_epi32(-(ray.negative[a] as i32)))
+                }),
                 origin4: std::array::from_fn(|k| _mm_set1_ps(o[ray.axes[k]])),
                 shear4: std::array::from_fn(|k| _mm_set1_ps(ray.shear[k])),
             }
@@ -100,12 +109,14 @@ impl Kernel for Avx2 {
         unsafe {
             let mut enter = _mm256_set1_ps(ray.t_min);
             let mut leave = _mm256_set1_ps(t_max);
+            let planes = node.bounds.as_ptr().cast::<u8>();
             for a in 0..3 {
-                let side = ray.negative[a] & 1;
-                let near_plane = _mm256_load_ps(node.bounds[side][a].as_ptr());
-                let far_plane = _mm256_load_ps(node.bounds[side ^ 1][a].as_ptr());
-                let t0 = _mm256_fmsub_ps(near_plane, ray.near_reciprocal[a], ray.near_offset[a]);
-                let t1 = _mm256_fmsub_ps(far_plane, ray.far_reciprocal[a], ray.far_offset[a]);
+                // The far planes lie beside the near planes.
+                let at = ray.near_at[a];
+                let near_plane = _mm256_load_ps(planes.add(at).cast());
+                let far_plane = _mm256_load_ps(planes.add(at ^ 32).cast());
+                let t0 = _mm256_fmadd_ps(near_plane, ray.near_reciprocal[a], ray.near_shift[a]);
+                let t1 = _mm256_fmadd_ps(far_plane, ray.far_reciprocal[a], ray.far_shift[a]);
                 enter = _mm256_max_ps(enter, t0);
                 leave = _mm256_min_ps(leave, t1);
             }
@@ -115,15 +126,13 @@ impl Kernel for Avx2 {
     }
 
     #[inline(always)]
-    fn lines_hit(ray: &Ray, _: &PreparedRay, block: &Block) -> u32 {
-        let [kx, ky, kz] = ray.axes;
+    fn lines_hit(ray: &Ray, block: &Block) -> u32 {
+        let [kx, ky, kz] = ray.sheared_at;
         // SAFETY: dispatch ensures AVX2. Loads are of whole arrays.
         unsafe {
             let sheared = |vertex: usize| {
-                let v = &block.vertices[vertex];
-                let load = |axis: usize, k: usize| {
-                    _mm_sub_ps(_mm_load_ps(v[axis].as_ptr()), ray.origin4[k])
-                };
+                let v = block.vertices[vertex].as_ptr().cast::<f32>();
+                let load = |at: usize, k: usize| _mm_sub_ps(_mm_load_ps(v.add(at)), ray.origin4[k]);
                 let z = load(kz, 2);
                 (
                     _mm_sub_ps(load(kx, 0), _mm_mul_ps(ray.shear4[0], z)),
@@ -165,6 +174,41 @@ impl Kernel for Avx2 {
     }
 
     #[inline(always)]
+    fn boxes_hit(ray: &Ray, block: &Block, t_max: f32, ends: &mut Ends) -> u32 {
+        // SAFETY: dispatch ensures AVX2. Loads and stores are of whole arrays.
+        unsafe {
+            let mut near = _mm_set1_ps(f32::MIN);
+            let mut far = _mm_set1_ps(f32::MAX);
+            for a in 0..3 {
+                let [p, q, r] = [0, 1, 2].map(|v| _mm_load_ps(block.vertices[v][a].as_ptr()));
+                let min = _mm_min_ps(_mm_min_ps(p, q), r);
+                let max = _mm_max_ps(_mm_max_ps(p, q), r);
+                let four = |x| _mm256_castps256_ps128(x);
+                let entered = _mm_blendv_ps(min, max, ray.negative4[a]);
+                let left = _mm_blendv_ps(max, min, ray.negative4[a]);
+                let (nr, ns) = (four(ray.near_reciprocal[a]), four(ray.near_shift[a]));
+                let (fr, fs) = (four(ray.far_reciprocal[a]), four(ray.far_shift[a]));
+                near = _mm_max_ps(near, _mm_fmadd_ps(entered, nr, ns));
+                far = _mm_min_ps(far, _mm_fmadd_ps(left, fr, fs));
+            }
+            _mm_store_ps(ends.0[0].as_mut_ptr(), near);
+            _mm_store_ps(ends.0[1].as_mut_ptr(), far);
+            let ahead = _mm_cmpgt_ps(far, _mm_set1_ps(ray.t_min));
+            let before = _mm_cmple_ps(near, _mm_min_ps(far, _mm_set1_ps(t_max)));
+            _mm_movemask_ps(_mm_and_ps(ahead, before)) as u32
+        }
+    }
+
+    #[inline(always)]
+    fn load_ahead(at: *const i8) {
+        // SAFETY: dispatch ensures SSE. A prefetch of an invalid address has no effect.
+        unsafe {
+            _mm_prefetch::<_MM_HINT_T0>(at);
+            _mm_prefetch::<_MM_HINT_T0>(at.wrapping_add(128));
+        }
+    }
+
+    #[inline(always)]
     fn leaf_out_of_line<C: Counter, L: LeafTest<Self, C>>(
         test: &mut L,
         ray: &Ray,
@@ -173,6 +217,23 @@ impl Kernel for Avx2 {
     ) -> Option<f32> {
         // SAFETY: dispatch ensures AVX2.
         unsafe { leaf_out_of_line(test, ray, counter, leaf) }
+    }
+}
+
+/// Each element of a vector in eight lanes.
+///
+/// # Safety
+/// The processor has AVX2.
+#[inline(always)]
+unsafe fn eight(v: Vec3A) -> [__m256; 3] {
+    let v = __m128::from(v);
+    // SAFETY: see above.
+    unsafe {
+        [
+            _mm256_broadcastss_ps(v),
+            _mm256_broadcastss_ps(_mm_permute_ps::<1>(v)),
+            _mm256_broadcastss_ps(_mm_permute_ps::<2>(v)),
+        ]
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::collapse::{BLOCK_COST, MAX_TRIANGLES, collapse};
 use super::node::{BLOCK, Block, Child, MASKED, Node2, Node8};
+use super::widen::Widening;
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
@@ -79,6 +80,7 @@ pub(super) struct Layout {
     pub nodes2: Vec<Node2>,
     pub nodes8: Vec<Node8>,
     pub blocks: Vec<Block>,
+    pub first_slots: Vec<u32>,
     pub leaves: u64,
     pub depth2: u32,
     pub depth8: u32,
@@ -126,7 +128,6 @@ fn place_leaves(
             let mut block = Block {
                 vertices: [[[f32::NAN; BLOCK]; 3]; 3],
                 primitives: [u32::MAX; BLOCK],
-                first_slot: slot,
             };
             for (lane, member) in chunk.iter().enumerate() {
                 block.primitives[lane] = numbers[*member as usize];
@@ -136,6 +137,7 @@ fn place_leaves(
                     }
                 }
             }
+            out.first_slots.push(slot);
             slot += chunk.len() as u32;
             out.blocks.push(block);
         }
@@ -210,6 +212,7 @@ fn emit2(tree: &Bvh2, leaves: &[Child], out: &mut Layout) {
 }
 
 fn emit8(tree: &Bvh2, leaves: &[Child], out: &mut Layout) {
+    let widening = Widening::cheapest(tree);
     let mut stack = vec![(0u32, None, 1u32)];
     while let Some((at, parent, depth)) = stack.pop() {
         let here = out.nodes8.len() as u32;
@@ -220,14 +223,14 @@ fn emit8(tree: &Bvh2, leaves: &[Child], out: &mut Layout) {
         }
         out.depth8 = out.depth8.max(depth);
         let mut node = Node8 {
-            bounds: [[[f32::MAX; 8]; 3], [[f32::MIN; 8]; 3]],
+            bounds: [[[f32::MAX; 8], [f32::MIN; 8]]; 3],
             children: [Child::NONE; 8],
         };
-        for (side, member) in open_eight(tree, at).into_iter().enumerate().rev() {
+        for (side, member) in widening.children(tree, at).into_iter().enumerate().rev() {
             let (min, max) = corners(tree, member);
             for axis in 0..3 {
-                node.bounds[0][axis][side] = min[axis];
-                node.bounds[1][axis][side] = max[axis];
+                node.bounds[axis][0][side] = min[axis];
+                node.bounds[axis][1][side] = max[axis];
             }
             if tree.nodes[member as usize].is_leaf() {
                 node.children[side] = leaves[member as usize];
@@ -237,21 +240,4 @@ fn emit8(tree: &Bvh2, leaves: &[Child], out: &mut Layout) {
         }
         out.nodes8.push(node);
     }
-}
-
-/// Up to eight descendants that replace a node: the child with the largest area is opened until
-/// there are eight (Wald et al. 2008).
-fn open_eight(tree: &Bvh2, node: u32) -> Vec<u32> {
-    let mut open = vec![node];
-    while open.len() < 8 {
-        let area = |n: u32| tree.nodes[n as usize].aabb().half_area();
-        let widest = (0..open.len())
-            .filter(|i| !tree.nodes[open[*i] as usize].is_leaf())
-            .max_by(|a, b| area(open[*a]).total_cmp(&area(open[*b])));
-        let Some(widest) = widest else { break };
-        let first = tree.nodes[open[widest] as usize].first_index;
-        open[widest] = first;
-        open.insert(widest + 1, first + 1);
-    }
-    open
 }

@@ -40,7 +40,8 @@ pub(super) fn collapse(tree: &Bvh2) -> Bvh2 {
     out
 }
 
-fn parents_first(tree: &Bvh2) -> Vec<usize> {
+/// All nodes, each before its children.
+pub(super) fn parents_first(tree: &Bvh2) -> Vec<usize> {
     let mut order = Vec::with_capacity(tree.nodes.len());
     let mut stack = vec![0];
     while let Some(at) = stack.pop() {

@@ -20,7 +20,7 @@ impl Bvh {
             TraversalKind::Bvh8 => (self.nodes8.iter())
                 .flat_map(|node| {
                     std::array::from_fn::<_, 8, _>(|side| {
-                        let [min, max] = node.bounds.map(|corner| corner.map(|axis| axis[side]));
+                        let [min, max] = [0, 1].map(|far| node.bounds.map(|axis| axis[far][side]));
                         self.child(node.children[side], min, max)
                     })
                 })
@@ -37,7 +37,7 @@ impl Bvh {
             return None;
         } else if child.is_leaf() {
             let (block, count) = child.leaf_range();
-            ChildKind::Leaf(self.blocks[block as usize].first_slot, count)
+            ChildKind::Leaf(self.first_slots[block as usize], count)
         } else {
             ChildKind::Node(child.0)
         };

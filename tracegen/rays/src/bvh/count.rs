@@ -6,8 +6,8 @@ use formats::raytrace::Visit;
 pub trait Counter {
     /// A step at an inner node.
     fn step(&mut self, node: u32);
-    /// Tests of `count` triangles, starting at a slot.
-    fn triangles(&mut self, first_slot: u32, count: u32);
+    /// Tests of `count` triangles, starting at a slot, which is looked up only if it is used.
+    fn triangles(&mut self, first_slot: impl FnOnce() -> u32, count: u32);
     /// A look-up of a triangle's alpha.
     fn alpha(&mut self);
     /// Entries on the stack after a step.
@@ -25,7 +25,7 @@ impl Counter for NoCounter {
     #[inline(always)]
     fn step(&mut self, _: u32) {}
     #[inline(always)]
-    fn triangles(&mut self, _: u32, _: u32) {}
+    fn triangles(&mut self, _: impl FnOnce() -> u32, _: u32) {}
     #[inline(always)]
     fn alpha(&mut self) {}
 }
@@ -48,7 +48,7 @@ impl Counter for Counts {
         self.steps += 1;
     }
     #[inline(always)]
-    fn triangles(&mut self, _: u32, count: u32) {
+    fn triangles(&mut self, _: impl FnOnce() -> u32, count: u32) {
         self.triangle_tests += count;
     }
     #[inline(always)]
@@ -71,8 +71,9 @@ impl Counter for Visits<'_> {
         self.counts.step(node);
         self.list.push(Visit::Node(node));
     }
-    fn triangles(&mut self, first_slot: u32, count: u32) {
-        self.counts.triangles(first_slot, count);
+    fn triangles(&mut self, first_slot: impl FnOnce() -> u32, count: u32) {
+        let first_slot = first_slot();
+        self.counts.triangles(|| first_slot, count);
         let slots = first_slot..first_slot + count;
         self.list.extend(slots.map(Visit::Triangle));
     }
@@ -96,7 +97,7 @@ impl<C: Counter> Counter for StackDepth<C> {
         self.counter.step(node);
     }
     #[inline(always)]
-    fn triangles(&mut self, first_slot: u32, count: u32) {
+    fn triangles(&mut self, first_slot: impl FnOnce() -> u32, count: u32) {
         self.counter.triangles(first_slot, count);
     }
     #[inline(always)]

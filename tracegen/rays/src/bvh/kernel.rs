@@ -12,21 +12,27 @@ use crate::ray::PreparedRay;
 /// instructions.
 pub trait Kernel: Copy + Sized {
     /// The kernel's data of a ray.
-    type Ray: Copy;
+    type Ray<'a>: Copy;
     /// Prepares a ray for the kernel.
-    fn load(ray: &PreparedRay) -> Self::Ray;
+    fn load<'a>(ray: &PreparedRay<'a>) -> Self::Ray<'a>;
     /// The two-box test: minus the entry distances, and a bit for each child that is hit before
     /// `t_max`. With negated entries, one minimum serves entries and exits.
-    fn step2(ray: &Self::Ray, node: &Node2, t_max: f32) -> ([f32; 2], u32);
+    fn step2(ray: &Self::Ray<'_>, node: &Node2, t_max: f32) -> ([f32; 2], u32);
     /// The eight-box test: entry distances into `near`, and a bit for each child that is hit.
-    fn step8(ray: &Self::Ray, node: &Node8, t_max: f32, near: &mut Lanes8) -> u32;
+    fn step8(ray: &Self::Ray<'_>, node: &Node8, t_max: f32, near: &mut Lanes8) -> u32;
     /// A bit mask of a block's triangles through which the line passes.
-    fn lines_hit(ray: &Self::Ray, prepared: &PreparedRay, block: &Block) -> u32;
+    fn lines_hit(ray: &Self::Ray<'_>, block: &Block) -> u32;
+    /// Entries and exits of the boxes of a block's triangles, and a bit mask of those whose box is
+    /// on the segment up to `t_max`.
+    fn boxes_hit(ray: &Self::Ray<'_>, block: &Block, t_max: f32, ends: &mut Ends) -> u32;
+    /// Starts to load the first and the third cache line from an address, which need not be valid.
+    #[inline(always)]
+    fn load_ahead(_: *const i8) {}
     /// Calls a leaf test as a separate function, so that a small loop around it keeps its
     /// registers.
     fn leaf_out_of_line<C: Counter, L: LeafTest<Self, C>>(
         test: &mut L,
-        ray: &Self::Ray,
+        ray: &Self::Ray<'_>,
         counter: &mut C,
         leaf: Child,
     ) -> Option<f32> {
@@ -39,19 +45,24 @@ pub trait Kernel: Copy + Sized {
 #[repr(align(32))]
 pub struct Lanes8(pub [f32; 8]);
 
+/// Entries, then exits, of four boxes.
+#[derive(Clone, Copy)]
+#[repr(align(16))]
+pub struct Ends(pub [[f32; BLOCK]; 2]);
+
 /// Plain Rust: the reference, and the fallback for processors without AVX2.
 #[derive(Clone, Copy)]
 pub struct Scalar;
 
 impl Kernel for Scalar {
-    type Ray = PreparedRay;
+    type Ray<'a> = PreparedRay<'a>;
 
-    fn load(ray: &PreparedRay) -> PreparedRay {
+    fn load<'a>(ray: &PreparedRay<'a>) -> PreparedRay<'a> {
         *ray
     }
 
     #[inline]
-    fn step2(ray: &PreparedRay, node: &Node2, t_max: f32) -> ([f32; 2], u32) {
+    fn step2(ray: &PreparedRay<'_>, node: &Node2, t_max: f32) -> ([f32; 2], u32) {
         let mut mask = 0;
         let minus_near = std::array::from_fn(|child| {
             let plane = |axis: usize, far: usize| {
@@ -69,12 +80,12 @@ impl Kernel for Scalar {
     }
 
     #[inline]
-    fn step8(ray: &PreparedRay, node: &Node8, t_max: f32, near: &mut Lanes8) -> u32 {
+    fn step8(ray: &PreparedRay<'_>, node: &Node8, t_max: f32, near: &mut Lanes8) -> u32 {
         let mut mask = 0;
         for child in 0..8 {
             let corner = |side: usize| {
-                let b = &node.bounds[side];
-                [b[0][child], b[1][child], b[2][child]]
+                let b = &node.bounds;
+                [b[0][side][child], b[1][side][child], b[2][side][child]]
             };
             let (enter, leave) = ray.slab(corner(0), corner(1));
             near.0[child] = enter.max(ray.ray.t_min);
@@ -84,10 +95,22 @@ impl Kernel for Scalar {
     }
 
     #[inline]
-    fn lines_hit(_: &PreparedRay, prepared: &PreparedRay, block: &Block) -> u32 {
+    fn lines_hit(ray: &PreparedRay<'_>, block: &Block) -> u32 {
         (0..BLOCK)
-            .map(|lane| u32::from(prepared.line_hits(&block.triangle(lane))) << lane)
+            .map(|lane| u32::from(ray.line_hits(&block.triangle(lane))) << lane)
             .sum()
+    }
+
+    #[inline]
+    fn boxes_hit(ray: &PreparedRay<'_>, block: &Block, t_max: f32, ends: &mut Ends) -> u32 {
+        let mut mask = 0;
+        for lane in 0..BLOCK {
+            let (near, far) = ray.triangle_slab(&block.triangle(lane));
+            let hit = near <= far && near <= t_max && far > ray.ray.t_min;
+            mask |= u32::from(hit) << lane;
+            (ends.0[0][lane], ends.0[1][lane]) = (near, far);
+        }
+        mask
     }
 }
 

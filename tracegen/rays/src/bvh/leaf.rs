@@ -2,9 +2,9 @@
 
 use super::Bvh;
 use super::count::Counter;
-use super::kernel::Kernel;
-use super::node::{BLOCK, Child, MASKED};
-use crate::ray::{PreparedRay, barycentrics};
+use super::kernel::{Ends, Kernel};
+use super::node::{BLOCK, Block, Child, MASKED};
+use crate::ray::{PreparedRay, Ray, barycentrics};
 
 /// The hit of a ray on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,8 +15,17 @@ pub struct RayHit {
     pub primitive: u32,
     /// The triangle's vertices.
     pub vertices: [[f32; 3]; 3],
-    /// Slot of the triangle, its place in leaf order.
-    pub slot: u32,
+    /// Place in the blocks: four times the block, plus the lane.
+    place: u32,
+}
+
+impl Bvh {
+    /// Slot of a triangle that was hit, its place in leaf order.
+    #[must_use]
+    pub fn slot(&self, hit: &RayHit) -> u32 {
+        let (block, lane) = (hit.place as usize / BLOCK, hit.place % BLOCK as u32);
+        self.first_slots[block] + lane
+    }
 }
 
 /// Decides at a masked triangle whether a ray stops.
@@ -40,102 +49,157 @@ impl AlphaTest for AllOpaque {
 /// would be compiled without the instructions of its traversal.
 pub trait LeafTest<K: Kernel, C: Counter> {
     /// Tests a leaf and returns the new `t_max`, or `None` to stop.
-    fn test(&mut self, ray: &K::Ray, counter: &mut C, leaf: Child) -> Option<f32>;
+    fn test(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32>;
+}
+
+/// What both leaf tests need.
+pub(super) struct Query<'a, A> {
+    pub bvh: &'a Bvh,
+    pub prepared: &'a PreparedRay<'a>,
+    pub alpha: &'a A,
+}
+
+impl<A: AlphaTest> Query<'_, A> {
+    /// The triangles of a block that the ray may hit up to `t_max`, and the ends of their boxes.
+    #[inline(always)]
+    fn candidates<K: Kernel>(&self, ray: &K::Ray<'_>, block: &Block, t_max: f32) -> (u32, Ends) {
+        let mut ends = Ends([[0.0; BLOCK]; 2]);
+        let mut mask = K::lines_hit(ray, block);
+        if mask != 0 {
+            mask &= K::boxes_hit(ray, block, t_max, &mut ends);
+        }
+        (mask, ends)
+    }
+
+    /// True if a masked triangle stops the ray.
+    fn opaque(&self, counter: &mut impl Counter, primitive: u32, vertices: &[[f32; 3]; 3]) -> bool {
+        counter.alpha();
+        let bary = barycentrics(self.prepared.ray, vertices);
+        self.alpha.opaque(primitive, bary)
+    }
 }
 
 pub(super) struct Closest<'a, A> {
-    pub bvh: &'a Bvh,
-    pub prepared: &'a PreparedRay,
-    pub alpha: &'a A,
-    pub best: Option<RayHit>,
+    query: Query<'a, A>,
+    /// The nearest hit. Before the first, the end of the ray and [`NO_PRIMITIVE`].
+    best: RayHit,
+}
+
+/// Above the numbers of all primitives.
+const NO_PRIMITIVE: u32 = u32::MAX;
+
+impl<'a, A: AlphaTest> Closest<'a, A> {
+    pub fn new(query: Query<'a, A>) -> Self {
+        Self {
+            best: RayHit {
+                t: query.prepared.ray.t_max,
+                primitive: NO_PRIMITIVE,
+                vertices: [[0.0; 3]; 3],
+                place: 0,
+            },
+            query,
+        }
+    }
+
+    pub fn hit(self) -> Option<RayHit> {
+        (self.best.primitive != NO_PRIMITIVE).then_some(self.best)
+    }
 }
 
 impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for Closest<'_, A> {
     #[inline(always)]
-    fn test(&mut self, ray: &K::Ray, counter: &mut C, leaf: Child) -> Option<f32> {
+    fn test(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32> {
+        let query = &self.query;
         let (first, count) = leaf.leaf_range();
-        let blocks = &self.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
-        counter.triangles(blocks[0].first_slot, count);
-        for block in blocks {
-            let mut mask = K::lines_hit(ray, self.prepared, block);
+        let blocks = &query.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
+        counter.triangles(|| query.bvh.first_slots[first as usize], count);
+        for (number, block) in (first..).zip(blocks) {
+            let (mut mask, ends) = query.candidates::<K>(ray, block, self.best.t);
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
                 mask &= mask - 1;
                 let vertices = block.triangle(lane);
-                let Some(t) = self.prepared.distance(&vertices) else {
+                let [near, far] = ends.0.map(|end| end[lane]);
+                let Some(t) = query.prepared.distance_within(&vertices, near, far) else {
                     continue;
                 };
                 let primitive = block.primitives[lane] & !MASKED;
-                if self
-                    .best
-                    .is_some_and(|b| (t, primitive) >= (b.t, b.primitive))
+                if t <= query.prepared.ray.t_min
+                    || (t, primitive) >= (self.best.t, self.best.primitive)
                 {
                     continue;
                 }
-                if block.primitives[lane] & MASKED != 0 {
-                    counter.alpha();
-                    if !self
-                        .alpha
-                        .opaque(primitive, barycentrics(&self.prepared.ray, &vertices))
-                    {
-                        continue;
-                    }
+                let masked = block.primitives[lane] & MASKED != 0;
+                if masked && !query.opaque(counter, primitive, &vertices) {
+                    continue;
                 }
-                self.best = Some(RayHit {
+                self.best = RayHit {
                     t,
                     primitive,
                     vertices,
-                    slot: block.first_slot + lane as u32,
-                });
+                    place: number * BLOCK as u32 + lane as u32,
+                };
             }
         }
-        Some(self.best.map_or(self.prepared.ray.t_max, |b| b.t))
+        Some(self.best.t)
     }
 }
 
 pub(super) struct AnyHit<'a, A> {
-    pub bvh: &'a Bvh,
-    pub prepared: &'a PreparedRay,
-    pub alpha: &'a A,
-    pub blocker: Option<RayHit>,
+    query: Query<'a, A>,
+    blocker: Option<RayHit>,
+}
+
+impl<'a, A: AlphaTest> AnyHit<'a, A> {
+    pub fn new(query: Query<'a, A>) -> Self {
+        Self {
+            query,
+            blocker: None,
+        }
+    }
+
+    pub fn hit(self) -> Option<RayHit> {
+        self.blocker
+    }
 }
 
 impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for AnyHit<'_, A> {
     #[inline(always)]
-    fn test(&mut self, ray: &K::Ray, counter: &mut C, leaf: Child) -> Option<f32> {
+    fn test(&mut self, ray: &K::Ray<'_>, counter: &mut C, leaf: Child) -> Option<f32> {
+        let query = &self.query;
+        let Ray { t_min, t_max, .. } = *query.prepared.ray;
         let (first, count) = leaf.leaf_range();
-        let blocks = &self.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
+        let blocks = &query.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
+        let first_slot = || query.bvh.first_slots[first as usize];
         for (number, block) in blocks.iter().enumerate() {
-            let mut mask = K::lines_hit(ray, self.prepared, block);
+            let (mut mask, ends) = query.candidates::<K>(ray, block, t_max);
             while mask != 0 {
                 let lane = mask.trailing_zeros() as usize & (BLOCK - 1);
                 mask &= mask - 1;
                 let vertices = block.triangle(lane);
-                let Some(t) = self.prepared.distance(&vertices) else {
+                let [near, far] = ends.0.map(|end| end[lane]);
+                let Some(t) = query.prepared.distance_within(&vertices, near, far) else {
                     continue;
                 };
-                let primitive = block.primitives[lane] & !MASKED;
-                if block.primitives[lane] & MASKED != 0 {
-                    counter.alpha();
-                    if !self
-                        .alpha
-                        .opaque(primitive, barycentrics(&self.prepared.ray, &vertices))
-                    {
-                        continue;
-                    }
+                if t <= t_min || t > t_max {
+                    continue;
                 }
-                let tested = (number * BLOCK + lane + 1) as u32;
-                counter.triangles(blocks[0].first_slot, tested);
+                let primitive = block.primitives[lane] & !MASKED;
+                let masked = block.primitives[lane] & MASKED != 0;
+                if masked && !query.opaque(counter, primitive, &vertices) {
+                    continue;
+                }
+                counter.triangles(first_slot, (number * BLOCK + lane + 1) as u32);
                 self.blocker = Some(RayHit {
                     t,
                     primitive,
                     vertices,
-                    slot: block.first_slot + lane as u32,
+                    place: (first + number as u32) * BLOCK as u32 + lane as u32,
                 });
                 return None;
             }
         }
-        counter.triangles(blocks[0].first_slot, count);
-        Some(self.prepared.ray.t_max)
+        counter.triangles(first_slot, count);
+        Some(t_max)
     }
 }

@@ -13,8 +13,10 @@ pub mod count;
 mod kernel;
 mod leaf;
 pub mod node;
+mod pages;
 mod stacks;
 mod traverse;
+mod widen;
 
 #[cfg(test)]
 mod tests;
@@ -26,6 +28,7 @@ use glam::Vec3;
 use kernel::{Kernel, Scalar};
 pub use leaf::{AllOpaque, AlphaTest, RayHit};
 use node::{Block, Child, MASKED, Node2, Node8, TRIANGLE_BYTES};
+use pages::in_large_pages;
 use stacks::Stacks;
 pub use traverse::TraversalStack;
 use traverse::{Eight, Two, Width, blocker, closest};
@@ -69,11 +72,16 @@ pub struct Bvh {
     nodes2: Vec<Node2>,
     nodes8: Vec<Node8>,
     blocks: Vec<Block>,
+    /// By block, the number of its first triangle in leaf order. Apart from the blocks, which are
+    /// read more often.
+    first_slots: Vec<u32>,
     bounds: (Vec3, Vec3),
     triangles: u64,
     leaves: u64,
     depth2: u32,
     depth8: u32,
+    /// Entries that a traversal stack needs.
+    stack_size: usize,
     sah_cost: f64,
     instructions: Instructions,
 }
@@ -117,14 +125,16 @@ impl Bvh {
         stacks.expand(&mut tree, &kept);
         let layout = build::lay_out(&tree, &kept, &numbers);
         Ok(Self {
-            nodes2: layout.nodes2,
-            nodes8: layout.nodes8,
-            blocks: layout.blocks,
+            nodes2: in_large_pages(layout.nodes2),
+            nodes8: in_large_pages(layout.nodes8),
+            blocks: in_large_pages(layout.blocks),
+            first_slots: layout.first_slots,
             bounds,
             triangles: tree.primitive_indices.len() as u64,
             leaves: layout.leaves,
             depth2: layout.depth2,
             depth8: layout.depth8,
+            stack_size: (layout.depth2 as usize).max(layout.depth8 as usize * 7) + 8,
             sah_cost: layout.sah_cost,
             instructions: Instructions::best(),
         })
@@ -158,11 +168,6 @@ impl Bvh {
             bytes_per_node: bytes as u32,
             bytes_per_triangle: TRIANGLE_BYTES,
         }
-    }
-
-    /// Entries that a traversal stack needs.
-    fn stack_size(&self) -> usize {
-        (self.depth2 as usize).max(self.depth8 as usize * 7) + 8
     }
 
     /// The nearest triangle that a ray hits. Of equally near ones, the lowest number.

@@ -60,22 +60,20 @@ pub struct Node2 {
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(32))]
 pub struct Node8 {
-    /// Minimum then maximum, by axis, of each child. A missing child's box is inverted.
-    pub bounds: [[[f32; 8]; 3]; 2],
+    /// By axis: minimum, then maximum, of each child. A missing child's box is inverted.
+    pub bounds: [[[f32; 8]; 2]; 3],
     /// Children, [`Child::NONE`] where missing.
     pub children: [Child; 8],
 }
 
 /// Four triangles of a leaf, in structure-of-arrays layout.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(16))]
+#[repr(C, align(32))]
 pub struct Block {
     /// By vertex and axis, one value per triangle. Unused lanes hold a NaN, which fails every test.
     pub vertices: [[[f32; BLOCK]; 3]; 3],
     /// Primitive number with [`MASKED`] in the top bit.
     pub primitives: [u32; BLOCK],
-    /// Number of the first triangle in leaf order.
-    pub first_slot: u32,
 }
 
 /// Marks a primitive whose material has an alpha mask.

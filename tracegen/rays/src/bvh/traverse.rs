@@ -3,7 +3,7 @@
 use super::Bvh;
 use super::count::Counter;
 use super::kernel::{Kernel, Lanes8};
-use super::leaf::{AlphaTest, AnyHit, Closest, LeafTest, RayHit};
+use super::leaf::{AlphaTest, AnyHit, Closest, LeafTest, Query, RayHit};
 use super::node::Child;
 use crate::ray::{PreparedRay, Ray};
 
@@ -22,6 +22,13 @@ impl TraversalStack {
         Self {
             entries: vec![0; capacity],
         }
+    }
+
+    /// Not inlined, because it happens once a thread.
+    #[cold]
+    #[inline(never)]
+    fn grow(&mut self, capacity: usize) {
+        self.entries.resize(capacity, 0);
     }
 }
 
@@ -45,7 +52,7 @@ pub trait Width {
     /// Visits an inner node: pushes its hit children except for the nearest, which it returns.
     fn visit<K: Kernel>(
         bvh: &Bvh,
-        ray: &K::Ray,
+        ray: &K::Ray<'_>,
         node: u32,
         t_max: f32,
         stack: &mut [u64],
@@ -62,7 +69,7 @@ impl Width for Two {
     #[inline(always)]
     fn visit<K: Kernel>(
         bvh: &Bvh,
-        ray: &K::Ray,
+        ray: &K::Ray<'_>,
         node: u32,
         t_max: f32,
         stack: &mut [u64],
@@ -104,6 +111,25 @@ fn keep_branch() {
     unsafe { std::arch::asm!("", options(nomem, nostack, preserves_flags)) }
 }
 
+/// Starts to load a child of a wide node that is visited later, if at all. Gains 1 to 5 %; loading
+/// all its lines gains less, and so does loading the child that is visited next.
+#[inline(always)]
+fn load_ahead<K: Kernel>(bvh: &Bvh, child: Child) {
+    let at = if child.is_leaf() {
+        let (block, _) = child.leaf_range();
+        bvh.blocks.as_ptr().wrapping_add(block as usize).cast()
+    } else {
+        bvh.nodes8.as_ptr().wrapping_add(child.0 as usize).cast()
+    };
+    K::load_ahead(at);
+}
+
+/// The lesser and the greater entry.
+#[inline(always)]
+fn ordered(a: u64, b: u64) -> (u64, u64) {
+    (a.min(b), a.max(b))
+}
+
 /// The eight-wide tree.
 pub struct Eight;
 
@@ -113,7 +139,7 @@ impl Width for Eight {
     #[inline(always)]
     fn visit<K: Kernel>(
         bvh: &Bvh,
-        ray: &K::Ray,
+        ray: &K::Ray<'_>,
         node: u32,
         t_max: f32,
         stack: &mut [u64],
@@ -140,24 +166,35 @@ impl Width for Eight {
         if mask == 0 {
             *top = base + 1;
             if near <= near1 {
+                load_ahead::<K>(bvh, child1);
                 stack[base] = pack(near1, child1);
                 return Some(child);
             }
             keep_branch();
+            load_ahead::<K>(bvh, child);
             stack[base] = pack(near, child);
             return Some(child1);
         }
+        // Three are sorted in registers.
+        let third = mask.trailing_zeros() as usize & 7;
+        mask &= mask - 1;
+        let (a, b) = ordered(pack(near, child), pack(near1, child1));
+        let (b, c) = ordered(b, pack(lanes.0[third], node.children[third]));
+        let (mut nearest, b) = ordered(a, b);
+        for pushed in [b, c] {
+            load_ahead::<K>(bvh, unpack(pushed).1);
+        }
+        stack[base] = c;
+        stack[base + 1] = b;
+        *top = base + 2;
         // Insertion sort keeps the nearest pushed entries on top.
-        let (e0, e1) = (pack(near, child), pack(near1, child1));
-        let mut nearest = e0.min(e1);
-        stack[base] = e0.max(e1);
-        *top = base + 1;
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize & 7;
             mask &= mask - 1;
             let entry = pack(lanes.0[lane], node.children[lane]);
             let pushed = nearest.max(entry);
             nearest = nearest.min(entry);
+            load_ahead::<K>(bvh, unpack(pushed).1);
             let mut at = *top;
             *top += 1;
             while at > base && stack[at - 1] < pushed {
@@ -174,14 +211,14 @@ impl Width for Eight {
 #[inline(always)]
 fn walk<K: Kernel, W: Width, C: Counter>(
     bvh: &Bvh,
-    ray: &K::Ray,
+    ray: &K::Ray<'_>,
     mut t_max: f32,
     stack: &mut TraversalStack,
     counter: &mut C,
     leaf: &mut impl LeafTest<K, C>,
 ) {
-    if stack.entries.len() < bvh.stack_size() {
-        stack.entries.resize(bvh.stack_size(), 0);
+    if stack.entries.len() < bvh.stack_size {
+        stack.grow(bvh.stack_size);
     }
     let entries = &mut stack.entries[..];
     let mut top = 0;
@@ -231,14 +268,13 @@ pub(super) fn closest<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
 ) -> Option<RayHit> {
     let prepared = PreparedRay::new(ray, bvh.bounds);
     let loaded = K::load(&prepared);
-    let mut leaf = Closest {
+    let mut leaf = Closest::new(Query {
         bvh,
         prepared: &prepared,
         alpha,
-        best: None,
-    };
+    });
     walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, &mut leaf);
-    leaf.best
+    leaf.hit()
 }
 
 /// The first triangle found that blocks the ray. Counts the triangles up to it.
@@ -252,12 +288,11 @@ pub(super) fn blocker<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
 ) -> Option<RayHit> {
     let prepared = PreparedRay::new(ray, bvh.bounds);
     let loaded = K::load(&prepared);
-    let mut leaf = AnyHit {
+    let mut leaf = AnyHit::new(Query {
         bvh,
         prepared: &prepared,
         alpha,
-        blocker: None,
-    };
+    });
     walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, &mut leaf);
-    leaf.blocker
+    leaf.hit()
 }
