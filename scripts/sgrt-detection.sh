@@ -29,4 +29,5 @@ for rule in $rules; do
     "$bin/replay" reproject "$traces"/*.raytrace --preset on-chip --rule "$rule" --csv --quiet >"on-chip,$rule.csv"
 done
 # shellcheck disable=SC2086
-python3 "$root/scripts/sgrt_detection.py" "$results" "$root/docs/images/sgrt-detection.svg" $rules
+python3 "$root/scripts/sgrt_detection.py" "$results" $rules
+python3 "$root/scripts/sgrt_detection_chart.py" "$results" "$root/docs/images/sgrt-detection.svg"
