@@ -1,4 +1,4 @@
-//! Table of docs/use/scene-files.md: the files of published packages.
+//! Table of docs/results/scene-files.md: the files of published packages.
 
 use super::view::{Results, Row, markdown};
 

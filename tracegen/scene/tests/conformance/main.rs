@@ -1,5 +1,5 @@
 //! Supported features of scene files, one by one: each row writes its file, loads it and checks the
-//! scene that renderers get. The table in docs/use/scene-files.md is generated from these rows.
+//! scene that renderers get. The table in docs/results/scene-files.md is generated from these rows.
 //!
 //! `UPDATE_FIGURES=1` rewrites results/scene-features.csv.
 
