@@ -18,7 +18,8 @@ pub fn load_file(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneErro
         .extension()
         .map(|e| e.to_string_lossy().to_ascii_lowercase());
     let mut loaded = match extension.as_deref() {
-        Some("gltf" | "glb") => gltf::load(path, options)?,
+        // VRM, for avatars, is a GLB with extensions that say how one moves.
+        Some("gltf" | "glb" | "vrm") => gltf::load(path, options)?,
         Some("obj") => obj::load(path, options)?,
         _ => {
             // The format follows from the name, which a pipe does not have.

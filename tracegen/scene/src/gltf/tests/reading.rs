@@ -40,10 +40,13 @@ fn the_same_scene_comes_from_gltf_data_uris_and_glb() {
         json: json.to_string().into_bytes().into(),
         bin: Some(bytes.into()),
     };
-    files.write("scene.glb", &glb.to_vec().unwrap());
-    let path = files.path("scene.glb");
-    let scene = load_file(&path, &LoadOptions::ALL).unwrap().scene;
-    assert_eq!(scene.meshes[0].positions, expected);
+    for name in ["scene.glb", "avatar.vrm"] {
+        files.write(name, &glb.to_vec().unwrap());
+        let scene = load_file(&files.path(name), &LoadOptions::ALL)
+            .unwrap()
+            .scene;
+        assert_eq!(scene.meshes[0].positions, expected, "{name}");
+    }
 }
 
 #[test]
