@@ -11,8 +11,32 @@ use std::sync::atomic::{AtomicU32, Ordering};
 pub(super) struct Queries {
     pool: vk::QueryPool,
     next: AtomicU32,
-    /// Index of the query of each draw.
-    of_draws: Mutex<HashMap<u32, u32>>,
+    of_draws: Mutex<OfDraws>,
+}
+
+/// Places of draws with pending results.
+#[derive(Default)]
+struct OfDraws {
+    places: HashMap<u32, u32>,
+    /// The draw at each place.
+    draws: HashMap<u32, u32>,
+}
+
+impl OfDraws {
+    /// Gives a draw a place, which another draw may lose.
+    fn insert(&mut self, draw: u32, place: u32) {
+        if let Some(earlier) = self.draws.insert(place, draw) {
+            self.places.remove(&earlier);
+        }
+        if let Some(earlier) = self.places.insert(draw, place) {
+            self.draws.remove(&earlier);
+        }
+    }
+
+    /// Index of the first query of a draw.
+    fn query(&self, draw: u32) -> Option<u32> {
+        self.places.get(&draw).map(|place| place * PER_DRAW)
+    }
 }
 
 /// Maximum number of draws with pending results.
@@ -53,9 +77,7 @@ impl Queries {
     /// The command buffer is being recorded, inside a render pass.
     pub unsafe fn begin(&self, buffer: vk::CommandBuffer, draw: u32, next: &Next) {
         let place = self.next.fetch_add(1, Ordering::Relaxed) % DRAWS;
-        let mut of_draws = lock(&self.of_draws);
-        of_draws.retain(|_, query| *query != place * PER_DRAW);
-        of_draws.insert(draw, place * PER_DRAW);
+        lock(&self.of_draws).insert(draw, place);
         let flags = vk::QueryControlFlags::PRECISE;
         // SAFETY: as the caller promises; the query was reset.
         unsafe { (next.cmd_begin_query)(buffer, self.pool, place * PER_DRAW, flags) };
@@ -66,7 +88,7 @@ impl Queries {
     /// # Safety
     /// [`Self::begin`] was called for the same draw.
     pub unsafe fn end(&self, buffer: vk::CommandBuffer, draw: u32, next: &Next) {
-        if let Some(query) = lock(&self.of_draws).get(&draw).copied() {
+        if let Some(query) = lock(&self.of_draws).query(draw) {
             // SAFETY: as the caller promises.
             unsafe { (next.cmd_end_query)(buffer, self.pool, query) };
         }
@@ -78,9 +100,9 @@ impl Queries {
     /// None of the draws is being executed.
     pub unsafe fn reset(&self, device: vk::Device, draws: &[u32], next: &Next) {
         let of_draws = lock(&self.of_draws);
-        for query in draws.iter().filter_map(|draw| of_draws.get(draw)) {
+        for query in draws.iter().filter_map(|draw| of_draws.query(*draw)) {
             // SAFETY: as the caller promises.
-            unsafe { (next.reset_query_pool)(device, self.pool, *query, PER_DRAW) };
+            unsafe { (next.reset_query_pool)(device, self.pool, query, PER_DRAW) };
         }
     }
 
@@ -102,7 +124,7 @@ impl Queries {
         }
         let mut found = Vec::new();
         for &draw in draws.iter().filter(|draw| executions[draw] == 1) {
-            let Some(&query) = of_draws.get(&draw) else {
+            let Some(query) = of_draws.query(draw) else {
                 continue;
             };
             let mut count = [0_u64; PER_DRAW as usize];
@@ -137,5 +159,29 @@ impl Queries {
     pub unsafe fn destroy(&self, device: vk::Device, next: &Next) {
         // SAFETY: as the caller promises.
         unsafe { (next.destroy_query_pool)(device, self.pool, std::ptr::null()) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_draw_loses_its_query_to_the_next_draw_at_its_place() {
+        let mut of = OfDraws::default();
+        of.insert(7, 0);
+        of.insert(8, 1);
+        of.insert(9, 0);
+        assert_eq!(
+            [7, 8, 9].map(|draw| of.query(draw)),
+            [None, Some(PER_DRAW), Some(0)]
+        );
+        // A draw that is recorded again moves.
+        of.insert(8, 2);
+        of.insert(10, 1);
+        assert_eq!(
+            [8, 10].map(|draw| of.query(draw)),
+            [Some(2 * PER_DRAW), Some(PER_DRAW)]
+        );
     }
 }

@@ -197,8 +197,11 @@ impl Pipelines {
         self.pipelines.insert(handle.as_raw(), Arc::new(pipeline));
     }
 
-    /// Adds a library.
+    /// Adds a library. A pipeline that is linked from it may have no other layout.
     pub fn create_library(&mut self, handle: vk::Pipeline, library: Library) {
+        if library.recording.is_some() || library.quiet.is_some() {
+            self.used.insert(library.layout.as_raw());
+        }
         self.libraries.insert(handle.as_raw(), Arc::new(library));
     }
 

@@ -308,3 +308,43 @@ fn draws_without_a_depth_test_are_outside_scenes_once_a_scene_was_rendered_elsew
     assert!(begin(&mut tracker, window, Some(depth)));
     assert!(!begin(&mut tracker, scene, None), "a scene's picture");
 }
+
+#[test]
+fn a_library_gives_its_parts_and_keeps_its_layout() {
+    use vk::GraphicsPipelineLibraryFlagsEXT as Parts;
+    let mut tracker = Tracker::default();
+    let (layout, handle) = (vk::PipelineLayout::from_raw(5), vk::Pipeline::from_raw(6));
+    let viewport = vk::Viewport {
+        width: 3.0,
+        ..Default::default()
+    };
+    let library = Library {
+        parts: Parts::FRAGMENT_SHADER,
+        layout,
+        recording: Some(vk::Pipeline::from_raw(7)),
+        quiet: Some(vk::Pipeline::from_raw(8)),
+        state: State {
+            viewport: Some(viewport),
+            depth: crate::spool::DepthInfo {
+                tests: true,
+                ..Default::default()
+            },
+            samples: 4,
+            ..State::default()
+        },
+        ..Library::default()
+    };
+    tracker.pipelines.create_library(handle, library);
+    let found = tracker.pipelines.library(handle).unwrap();
+    let mut linked = State {
+        samples: 1,
+        ..State::default()
+    };
+    linked.add(&found.state, found.parts);
+    // Only the state of its own part counts.
+    assert!(linked.depth.tests && linked.viewport.is_none() && linked.samples == 1);
+    assert!(!tracker.pipelines.destroy_layout(layout));
+    let variants = [7, 8].map(vk::Pipeline::from_raw);
+    assert_eq!(tracker.pipelines.destroy(handle), variants);
+    assert!(tracker.pipelines.library(handle).is_none());
+}

@@ -22,7 +22,7 @@ pub(super) struct Layer {
 
 /// A reference to a texture, as the file has it.
 #[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
+#[serde(rename_all = "camelCase", expecting = "an object with an index")]
 pub(super) struct Reference {
     pub index: usize,
     #[serde(default)]

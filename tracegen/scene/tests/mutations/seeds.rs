@@ -136,7 +136,11 @@ fn gltf(uri: Value) -> Value {
         ],
         "materials": [
             {"name": "paint", "pbrMetallicRoughness": {"baseColorTexture": texture, "metallicFactor": 0.25},
-             "normalTexture": {"index": 1, "scale": 0.5}, "alphaMode": "MASK"},
+             "normalTexture": {"index": 1, "scale": 0.5}, "alphaMode": "MASK",
+             "extensions": {
+                 "KHR_materials_clearcoat": {"clearcoatFactor": 1, "clearcoatTexture": {"index": 1, "texCoord": 0}},
+                 "KHR_materials_sheen": {"sheenColorFactor": [0, 1, 0], "sheenColorTexture": {"index": 0,
+                     "extensions": {"KHR_texture_transform": {"scale": [2, 2]}}}}}},
             {"alphaMode": "BLEND", "emissiveFactor": [0.5, 0, 0]}
         ],
         "textures": [{"source": 0, "sampler": 0}, {"source": 1}],
