@@ -319,8 +319,7 @@ impl<'a> Table<'a> {
             };
             let transform = self.transform(found.extensions.get(TRANSFORM))?;
             let (slot, set) = (layer.slot, found.tex_coord);
-            material.textures[slot] =
-                self.texture(slot, &texture, set, transform, layer.usage.clone())?;
+            material.textures[slot] = self.texture(slot, &texture, set, transform, layer.usage)?;
         }
         Ok(())
     }
