@@ -117,7 +117,7 @@ fn same_textures(
             }
         }
     }
-    // Textures of one material often share all coordinates. They are told apart by their order.
+    // Textures of one material often share all coordinates. Their order then distinguishes them.
     let mut pairs: Vec<(Reverse<u64>, usize, usize)> = (shared.iter())
         .flat_map(|(&texture, of)| {
             of.iter()

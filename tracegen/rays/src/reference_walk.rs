@@ -8,7 +8,7 @@ use glam::Vec3;
 
 /// The constants of a ray on one axis.
 #[derive(Clone, Copy)]
-struct Axis {
+pub(crate) struct Axis {
     near: f32,
     far: f32,
     near_offset: f32,
@@ -40,7 +40,7 @@ impl<'a> ReferenceWalk<'a> {
         }
     }
 
-    fn axes(&self, ray: &Ray) -> [Axis; 3] {
+    pub(crate) fn axes(&self, ray: &Ray) -> [Axis; 3] {
         let (o, d) = (ray.origin, ray.direction);
         let e = 2f32.powi(-23);
         let reach = (o - self.bounds.0).abs().max((o - self.bounds.1).abs());
@@ -116,7 +116,7 @@ impl<'a> ReferenceWalk<'a> {
     }
 
     /// The children of a node that a ray hits, the next first.
-    fn hit_children(
+    pub(crate) fn hit_children(
         &self,
         ray: &Ray,
         axes: &[Axis; 3],

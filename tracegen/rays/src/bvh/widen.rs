@@ -1,7 +1,9 @@
-//! Chooses which nodes of the binary tree become nodes of the eight-wide tree, so that their cost
-//! is least: the sum of their areas and of the areas of the leaves below each (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs
-//! Through Compressed Wide BVHs", HPG 2017, section 3.1, without the second
-//! sum). The leaves stay as they are.
+//! Chooses which nodes of the binary tree become nodes of the eight-wide tree.
+//!
+//! The chosen nodes cost least: the cost is the sum of their areas and of the areas of the leaves
+//! below each (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through
+//! Compressed Wide BVHs", HPG 2017, section 3.1, without its sum over triangles). The leaves stay as
+//! they are.
 
 use super::collapse::parents_first;
 use obvhs::bvh2::Bvh2;
@@ -9,9 +11,8 @@ use obvhs::bvh2::Bvh2;
 /// Children of a wide node.
 const WIDTH: usize = 8;
 
-/// Cost of a leaf's area for every wide node above it. A random line passes through a scene, but a
-/// ray ends in a leaf, in a large one more probably. So large leaves belong close to the root. Saves
-/// 9 % of the steps in Crytek Sponza and 1 to 3 % in chess.
+/// Cost of a leaf's area for every wide node above it. A ray ends in a leaf, and more probably in a
+/// large one, so large leaves belong close to the root.
 const LEAF_DEPTH_COST: f32 = 0.6;
 
 /// How many wide children the two children of a binary node become, or zeros if the node itself

@@ -2,10 +2,12 @@
 //! the stored triangles in `f64`, and a walk of the stored tree by the rules of FORMAT.md.
 
 use super::{SIZE_PX, scene, settings, trace};
+use crate::ray::Ray;
+use crate::reference_walk::ReferenceWalk;
 use crate::scene::TraceScene;
 use formats::raytrace::{
-    ChildKind, Hierarchy, HierarchyChild, HierarchyTriangle, Outcome, RayGeometry, RayKind,
-    RayRecord, RayTile, Raytrace, TraversalKind, Visit,
+    ChildKind, Hierarchy, HierarchyTriangle, Outcome, RayGeometry, RayKind, RayRecord, RayTile,
+    Raytrace, TraversalKind, Visit,
 };
 use formats::view::Eye;
 use glam::{DVec3, Vec3};
@@ -113,60 +115,21 @@ fn brute_force_over_the_stored_triangles_finds_every_stored_hit() {
     assert!(at_edges < hits / 100, "{at_edges} at edges");
 }
 
-/// The constants of a ray on one axis (FORMAT.md, Traversal).
-#[derive(Clone, Copy)]
-struct Axis {
-    near: f32,
-    far: f32,
-    near_offset: f32,
-    far_offset: f32,
-    forward: bool,
-}
-
-fn axes(ray: &RayGeometry, low: Vec3, high: Vec3) -> [Axis; 3] {
-    let (o, d) = (Vec3::from(ray.origin), Vec3::from(ray.direction));
-    let e = 2f32.powi(-23);
-    let reach = (o - low).abs().max((o - high).abs());
-    let longest = d.abs().max_element();
-    let z = (0..3).rev().find(|axis| d[*axis].abs() == longest);
-    let reach_z = reach[z.expect("one is the longest")];
-    [0, 1, 2].map(|axis| {
-        let pad = 2.0 * (5.0 * 2f32.powi(-24)) * (reach[axis] + reach_z) + 2.0 * e * o[axis].abs();
-        let pad = pad.copysign(d[axis]);
-        let d = if d[axis].abs() < 1e-18 {
-            1e-18_f32.copysign(d[axis])
-        } else {
-            d[axis]
-        };
-        let (near, far) = ((1.0 / d) * (1.0 - 2.0 * e), (1.0 / d) * (1.0 + 2.0 * e));
-        Axis {
-            near,
-            far,
-            near_offset: (o[axis] + pad) * near,
-            far_offset: (o[axis] - pad) * far,
-            forward: d >= 0.0,
-        }
-    })
-}
-
-/// Where a box is entered, if it is hit before `limit`.
-fn entry(ray: &RayGeometry, axes: &[Axis; 3], child: &HierarchyChild, limit: f32) -> Option<f32> {
-    let (mut enter, mut leave) = (ray.t_min, limit);
-    for (at, axis) in axes.iter().enumerate() {
-        let (mut near, mut far) = (child.min[at], child.max[at]);
-        if !axis.forward {
-            std::mem::swap(&mut near, &mut far);
-        }
-        enter = enter.max(near.mul_add(axis.near, -axis.near_offset));
-        leave = leave.min(far.mul_add(axis.far, -axis.far_offset));
-    }
-    (enter <= leave).then_some(enter)
-}
-
 /// Walks the stored binary tree. The distance of the hit triangle is the stored one, because FORMAT.md does not
 /// define the rounding of others; `None` if the order depends on another triangle's distance.
-fn walk(ray: &Stored, hierarchy: &Hierarchy, axes: &[Axis; 3]) -> Option<(Vec<Visit>, u32)> {
+fn walk(
+    ray: &Stored,
+    hierarchy: &Hierarchy,
+    boxes: &ReferenceWalk<'_>,
+) -> Option<(Vec<Visit>, u32)> {
     let geometry = &ray.geometry;
+    let line = Ray {
+        origin: geometry.origin.into(),
+        direction: geometry.direction.into(),
+        t_min: geometry.t_min,
+        t_max: geometry.t_max,
+    };
+    let axes = boxes.axes(&line);
     let (mut visits, mut stack) = (Vec::new(), Vec::new());
     let (mut limit, mut deepest, mut next) = (geometry.t_max, 0, Some(ChildKind::Node(0)));
     loop {
@@ -181,14 +144,7 @@ fn walk(ray: &Stored, hierarchy: &Hierarchy, axes: &[Axis; 3]) -> Option<(Vec<Vi
         match kind {
             ChildKind::Node(node) => {
                 visits.push(Visit::Node(node));
-                let children = &hierarchy.children[2 * node as usize..][..2];
-                let mut hit: Vec<(f32, ChildKind)> = children
-                    .iter()
-                    .flatten()
-                    .filter_map(|child| Some((entry(geometry, axes, child, limit)?, child.kind)))
-                    .collect();
-                hit.sort_by(|a, b| a.0.total_cmp(&b.0));
-                let mut hit = hit.into_iter();
+                let mut hit = boxes.hit_children(&line, &axes, node, limit).into_iter();
                 next = hit.next().map(|(_, kind)| kind);
                 stack.extend(hit);
                 deepest = deepest.max(stack.len() as u32);
@@ -218,16 +174,10 @@ fn walk(ray: &Stored, hierarchy: &Hierarchy, axes: &[Axis; 3]) -> Option<(Vec<Vi
 #[test]
 fn a_walk_of_the_stored_binary_tree_makes_the_stored_visits() {
     let (rays, hierarchy) = columns(TraversalKind::Bvh2);
-    let vertices = || {
-        let triangles = hierarchy.triangles.iter();
-        triangles.flat_map(|triangle| triangle.vertices.map(Vec3::from))
-    };
-    let low = vertices().fold(Vec3::MAX, Vec3::min);
-    let high = vertices().fold(Vec3::MIN, Vec3::max);
+    let boxes = ReferenceWalk::new(&hierarchy, 2);
     let mut walked = [0u32; 4];
     for ray in &rays {
-        let axes = axes(&ray.geometry, low, high);
-        let Some((visits, deepest)) = walk(ray, &hierarchy, &axes) else {
+        let Some((visits, deepest)) = walk(ray, &hierarchy, &boxes) else {
             continue;
         };
         assert_eq!(visits, ray.visits, "{:?} {:?}", ray.record, ray.geometry);
