@@ -82,8 +82,13 @@ pub fn run(bytes: &[u8]) {
         .map_while(|_| Some([numbers.vector()?, numbers.vector()?, numbers.vector()?]))
         .collect();
     let masked = |number: u32| way & 4 != 0 && number.is_multiple_of(3);
-    let fast = Bvh::build(&triangles, masked).expect("few triangles");
-    let trees = [TraversalKind::Bvh2, TraversalKind::Bvh8];
+    let third = if way & 8 != 0 {
+        TraversalKind::Bvh4
+    } else {
+        TraversalKind::Cwbvh8
+    };
+    let fast = Bvh::build_for(third, &triangles, masked).expect("few triangles");
+    let trees = [TraversalKind::Bvh2, TraversalKind::Bvh8, third];
     let all = |bvh: &Bvh| -> Vec<[Found; 2]> {
         let each = rays.iter().flat_map(|ray| trees.map(|tree| (ray, tree)));
         each.map(|(ray, tree)| {

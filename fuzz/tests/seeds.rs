@@ -38,7 +38,7 @@ fn seeds() -> Vec<(String, Vec<u8>)> {
         let name = format!("raytrace/{samples}-samples{visits}");
         seeds.push((name, traces::ray_trace_of(&tables, 7)));
     }
-    for traversal in [TraversalKind::Bvh2, TraversalKind::Bvh8] {
+    for traversal in TraversalKind::ALL {
         let mut tables = column_tables(1, traversal);
         let size_px = [3, 2];
         tables.meta.trace.hmd.eye_size_px = size_px;

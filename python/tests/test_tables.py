@@ -85,7 +85,7 @@ def test_rays_and_samples_are_those_of_the_independent_reader(traces, name):
     assert table["rays"].to_pylist() == [len(s["rays"]) for s in samples]
 
 
-@pytest.mark.parametrize("tree", ["bvh2", "bvh8"])
+@pytest.mark.parametrize("tree", ["bvh2", "bvh4", "bvh8", "cwbvh8"])
 def test_columns_are_those_of_the_independent_reader(tmp_path, tree):
     path = tmp_path / "columns.raytrace"
     path.write_bytes((ROOT / f"fuzz/corpus/raytrace/columns-{tree}").read_bytes())

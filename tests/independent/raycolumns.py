@@ -176,7 +176,7 @@ def check_box(low, high):
 
 def read_nodes(chunk, bvh):
     data = Bytes(chunk)
-    width = {"bvh2": 2, "bvh8": 8}[bvh["traversal"]]
+    width = {"bvh2": 2, "bvh4": 4, "bvh8": 8, "cwbvh8": 8}[bvh["traversal"]]
     require(bvh["nodes"] * width <= data.left(), "more nodes than bytes")
     boxes = {0: [0.0] * 6}
     taken, leaves, next_slot = set(), 0, 0

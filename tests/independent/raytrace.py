@@ -82,7 +82,7 @@ def check_ray_meta(meta):
 
 
 def check_hierarchy(bvh):
-    require(bvh["traversal"] in ("bvh2", "bvh8"), "traversal")
+    require(bvh["traversal"] in ("bvh2", "bvh4", "bvh8", "cwbvh8"), "traversal")
     require(all(bvh[key] < 1 << 32 for key in ("triangles", "nodes", "leaves")), "counts")
     require(bvh["sah_cost"] >= 0, "cost")
     sizes = [bvh["bytes_per_node"], bvh["bytes_per_triangle"]]

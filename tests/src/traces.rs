@@ -538,7 +538,7 @@ pub fn all() -> Vec<(String, Kind, Vec<u8>)> {
     let program = texture_trace_of(&program_tables(), Encoding::Delta, 5);
     let program = ("program".to_owned(), Kind::Textrace, program);
     let textures = textures.into_iter().chain([geometry, program]);
-    let columns = [TraversalKind::Bvh2, TraversalKind::Bvh8].map(|tree| {
+    let columns = TraversalKind::ALL.map(|tree| {
         let name = format!("columns-{tree:?}").to_lowercase();
         (name, Kind::Raytrace, crate::columns::column_trace(tree, 7))
     });

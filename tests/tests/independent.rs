@@ -266,7 +266,12 @@ fn python_reads_all_columns_of_fresh_rays_as_replay_does() {
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
-    for (scene, tree, samples) in [("chess", "bvh2", 1), ("lab", "bvh8", 2)] {
+    for (scene, tree, samples) in [
+        ("chess", "bvh2", 1),
+        ("lab", "bvh8", 2),
+        ("chess", "bvh4", 1),
+        ("chess", "cwbvh8", 1),
+    ] {
         let path = folder.path().join(scene).with_extension("raytrace");
         let spp = samples.to_string();
         let options = [

@@ -51,7 +51,8 @@ impl TraversalKind {
     pub const fn width(self) -> usize {
         match self {
             Self::Bvh2 => 2,
-            Self::Bvh8 => 8,
+            Self::Bvh4 => 4,
+            Self::Bvh8 | Self::Cwbvh8 => 8,
         }
     }
 }

@@ -134,8 +134,22 @@ impl RayTriangle {
 pub enum TraversalKind {
     /// Binary tree; a step tests both children's boxes, as in T&I unit 2.0.
     Bvh2,
+    /// Four-wide tree; a step tests all children's boxes.
+    Bvh4,
     /// Eight-wide tree; a step tests all children's boxes.
     Bvh8,
+    /// Eight-wide tree of nodes with quantised boxes.
+    Cwbvh8,
+}
+
+impl TraversalKind {
+    /// Every kind.
+    pub const ALL: [Self; 4] = [Self::Bvh2, Self::Bvh4, Self::Bvh8, Self::Cwbvh8];
+
+    /// Whether files with such a tree need minor version [`tables::TREES_MINOR`].
+    pub(crate) const fn is_of_minor_4(self) -> bool {
+        matches!(self, Self::Bvh4 | Self::Cwbvh8)
+    }
 }
 
 /// The bounding volume hierarchy that the counts refer to.

@@ -27,6 +27,8 @@ pub const TRIANGLES: ChunkTag = ChunkTag(*b"RTRI");
 
 /// Bytes of a triangle: primitive, object, material, nine coordinates.
 pub const TRIANGLE_ENTRY_BYTES: usize = 48;
+/// Minor version of files with four-wide or compressed trees.
+pub const TREES_MINOR: u16 = 4;
 /// Maximum number of samples per pixel.
 pub const MAX_SAMPLES_PER_PX: u32 = 1024;
 /// Maximum depth of reflections.
@@ -79,6 +81,11 @@ pub(super) fn read(container: &Container) -> Result<RaytraceTables> {
         lights: json::read(container, LIGHTS, "a light table")?,
         triangles: container.parse_chunk(TRIANGLES, read_triangles)?,
     };
+    let (major, minor) = container.version();
+    if tables.bvh.traversal.is_of_minor_4() && minor < TREES_MINOR {
+        let expected = format!("version {major}.{TREES_MINOR} for this kind of tree");
+        return Err(container.malformed(BVH, 0, expected, format!("{major}.{minor}")));
+    }
     check(&tables).map_err(|((chunk, offset), broken)| {
         let expected = format!("{}: {}", broken.what, broken.expected);
         container.malformed(chunk, offset, expected, broken.found)

@@ -221,6 +221,9 @@ impl<W: Write + Seek> RaytraceWriter<W> {
             let triangles = hierarchy_codec::encode_triangles(&hierarchy.triangles);
             self.container.chunk(SLOTS, &triangles)?;
         }
+        if tables.bvh.traversal.is_of_minor_4() {
+            self.container.require_minor(tables::TREES_MINOR);
+        }
         tables::write(tables, &mut self.container)?;
         Ok(self.container)
     }

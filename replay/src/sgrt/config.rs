@@ -251,10 +251,13 @@ impl SgrtConfig {
     /// Issue cycles and energy of a traversal step.
     #[must_use]
     pub fn step(&self, traversal: TraversalKind) -> (f64, f64) {
-        match traversal {
-            TraversalKind::Bvh2 => (self.tni.trv_cycles_per_step, self.energy.step_pj),
-            TraversalKind::Bvh8 => (self.tni.trv_cycles_per_wide_step, self.energy.wide_step_pj),
+        if traversal == TraversalKind::Bvh2 {
+            return (self.tni.trv_cycles_per_step, self.energy.step_pj);
         }
+        // The parameters are for eight boxes. Work is proportional to the boxes of a step.
+        let share = traversal.width() as f64 / TraversalKind::Bvh8.width() as f64;
+        let (cycles, pj) = (self.tni.trv_cycles_per_wide_step, self.energy.wide_step_pj);
+        (cycles * share, pj * share)
     }
 
     /// The defaults, overridden by a file's values.

@@ -21,7 +21,6 @@ use std::process::ExitCode;
 type Triangle = [[f32; 3]; 3];
 
 const STREAMS: [&str; 4] = ["primary", "shadow", "mirror", "diffuse"];
-const TREES: [TraversalKind; 2] = [TraversalKind::Bvh2, TraversalKind::Bvh8];
 /// What rounding may displace, relative to the farthest corner seen from the origin: a few
 /// operations of half a unit in the last place each.
 const TOLERANCE: f64 = 8.0 * f32::EPSILON as f64;
@@ -94,10 +93,10 @@ impl Differences {
 #[derive(Clone, Copy, Default)]
 struct Findings {
     hits: u64,
-    /// Rays whose hit is not the same, bit for bit, in both trees and with plain Rust.
+    /// Rays whose hit is not the same, bit for bit, in all trees and with plain Rust.
     trees: u64,
     /// Rays whose steps or tests differ from the walk by FORMAT.md, by tree.
-    work: [u64; 2],
+    work: [u64; 4],
     double: Differences,
     embree: Differences,
 }
@@ -107,19 +106,25 @@ impl Findings {
         Self {
             hits: self.hits + other.hits,
             trees: self.trees + other.trees,
-            work: [0, 1].map(|tree| self.work[tree] + other.work[tree]),
+            work: std::array::from_fn(|tree| self.work[tree] + other.work[tree]),
             double: self.double.plus(other.double),
             embree: self.embree.plus(other.embree),
         }
     }
 }
 
+/// One of our trees: the tracer with the best instructions and in plain Rust, and the walk by
+/// FORMAT.md.
+struct Tree<'a> {
+    kind: TraversalKind,
+    bvhs: [&'a Bvh; 2],
+    walk: ReferenceWalk<'a>,
+}
+
 /// A scene's triangles in all searches.
 struct Searches<'a> {
     triangles: &'a [Triangle],
-    bvh: Bvh,
-    plain: Bvh,
-    walks: [ReferenceWalk<'a>; 2],
+    trees: [Tree<'a>; 4],
     double: ReferenceTree,
 }
 
@@ -158,16 +163,17 @@ impl Searches<'_> {
         let Checked { ray, embree } = checked;
         let mut findings = Findings::default();
         let mut found = Vec::new();
-        for (bvh, trees) in [(&self.bvh, &TREES[..]), (&self.plain, &TREES[..])] {
-            for (number, tree) in trees.iter().enumerate() {
+        for (number, tree) in self.trees.iter().enumerate() {
+            let kind = tree.kind;
+            let (walked, slot) = tree.walk.walk(ray, any_hit);
+            for bvh in tree.bvhs {
                 let mut counts = Counts::default();
                 let hit = if any_hit {
-                    bvh.blocker(*tree, ray, stack, &mut counts, &AllOpaque)
+                    bvh.blocker(kind, ray, stack, &mut counts, &AllOpaque)
                 } else {
-                    bvh.closest(*tree, ray, stack, &mut counts, &AllOpaque)
+                    bvh.closest(kind, ray, stack, &mut counts, &AllOpaque)
                 };
-                let (walked, slot) = self.walks[number].walk(ray, any_hit);
-                let same = walked == counts && slot == hit.map(|hit| bvh.slot(&hit));
+                let same = walked == counts && slot == hit.map(|hit| bvh.slot(kind, &hit));
                 findings.work[number] |= u64::from(!same);
                 found.push(hit.map(|hit| (hit.t.to_bits(), hit.primitive)));
             }
@@ -213,18 +219,27 @@ fn run() -> anyhow::Result<bool> {
         .iter()
         .map(|[a, b, c, d, e, f, g, h, i]| [[*a, *b, *c], [*d, *e, *f], [*g, *h, *i]])
         .collect();
-    let build = || Bvh::build(&triangles, |_| false);
-    let bvh = build()?;
-    let contents: [Hierarchy; 2] = TREES.map(|tree| bvh.contents(tree));
+    let built = |instructions| -> anyhow::Result<Vec<Bvh>> {
+        let build = |kind| -> anyhow::Result<Bvh> {
+            let bvh = Bvh::build_for(kind, &triangles, |_| false)?;
+            Ok(bvh.with_instructions(instructions))
+        };
+        TraversalKind::ALL.into_iter().map(build).collect()
+    };
+    let (fast, plain) = (built(Instructions::best())?, built(Instructions::Scalar)?);
+    let contents: [Hierarchy; 4] =
+        std::array::from_fn(|tree| fast[tree].contents(TraversalKind::ALL[tree]));
     let searches = Searches {
         triangles: &triangles,
-        plain: build()?.with_instructions(Instructions::Scalar),
-        walks: [
-            ReferenceWalk::new(&contents[0], 2),
-            ReferenceWalk::new(&contents[1], 8),
-        ],
+        trees: std::array::from_fn(|tree| {
+            let kind = TraversalKind::ALL[tree];
+            Tree {
+                kind,
+                bvhs: [&fast[tree], &plain[tree]],
+                walk: ReferenceWalk::new(&contents[tree], kind.width()),
+            }
+        }),
         double: ReferenceTree::new(&triangles),
-        bvh,
     };
     let mut clean = true;
     for stream in STREAMS {
@@ -236,15 +251,15 @@ fn run() -> anyhow::Result<bool> {
                 searches.check(ray, any_hit, stack)
             })
             .reduce(Findings::default, Findings::plus);
-        clean &= f.trees + f.work[0] + f.work[1] + f.double.unexplained + f.embree.unexplained == 0;
+        clean &=
+            f.trees + f.work.iter().sum::<u64>() + f.double.unexplained + f.embree.unexplained == 0;
         println!(
-            "{{\"stream\":\"{stream}\",\"triangles\":{},\"rays\":{},\"hits\":{},\"trees\":{},\"work_bvh2\":{},\"work_bvh8\":{},{},{}}}",
+            "{{\"stream\":\"{stream}\",\"triangles\":{},\"rays\":{},\"hits\":{},\"trees\":{},\"work\":{},{},{}}}",
             triangles.len(),
             rays.len(),
             f.hits,
             f.trees,
-            f.work[0],
-            f.work[1],
+            f.work.iter().sum::<u64>(),
             f.double.json("double"),
             f.embree.json("embree")
         );

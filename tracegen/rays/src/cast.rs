@@ -88,7 +88,7 @@ impl Caster<'_> {
             }
         };
         if self.geometry {
-            geometry.push(cast.geometry(ray, self.bvh));
+            geometry.push(cast.geometry(ray, self.bvh, self.traversal));
         }
         cast
     }
@@ -109,7 +109,7 @@ impl Caster<'_> {
 }
 
 impl Cast {
-    fn geometry(&self, ray: &Ray, bvh: &Bvh) -> RayGeometry {
+    fn geometry(&self, ray: &Ray, bvh: &Bvh, tree: TraversalKind) -> RayGeometry {
         RayGeometry {
             origin: ray.origin.to_array(),
             direction: ray.direction.to_array(),
@@ -117,7 +117,7 @@ impl Cast {
             t_max: ray.t_max,
             hit: self.hit.map(|hit| SlotHit {
                 t: hit.t,
-                slot: bvh.slot(&hit),
+                slot: bvh.slot(tree, &hit),
             }),
             stack_depth: self.stack_depth,
         }

@@ -84,7 +84,8 @@ impl MeshUnderTest {
         let rounded = moved.rounded(center);
         let points = || rounded.iter().flatten().map(|p| Vec3::from(*p));
         let bounds = points().fold((Vec3::MAX, Vec3::MIN), |b, p| (b.0.min(p), b.1.max(p)));
-        let bvh = Bvh::build(&rounded, |_| false).expect("a test mesh is small");
+        let bvh = Bvh::build_for(TraversalKind::Cwbvh8, &rounded, |_| false)
+            .expect("a test mesh is small");
         Self {
             convex: mesh.name != "torus",
             mesh: moved.translated(-center),
@@ -145,7 +146,11 @@ impl MeshUnderTest {
         let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
         let verdict = reference.verdict(o, d, TOLERANCE);
         let plain = brute_force_f32(&self.rounded, self.bounds, ray);
-        let trees = [TraversalKind::Bvh2, TraversalKind::Bvh8];
+        let trees = [
+            TraversalKind::Bvh2,
+            TraversalKind::Bvh8,
+            TraversalKind::Cwbvh8,
+        ];
         let closest = trees.map(|t| {
             let hit = self.bvh.closest(t, ray, stack, &mut NoCounter, &AllOpaque);
             hit.map(|h| (h.t, h.primitive))

@@ -3,7 +3,7 @@
 use super::bvh::{AlphaTest, Bvh, BvhError};
 use super::material::Materials;
 use super::soup::Soup;
-use formats::raytrace::RayLight;
+use formats::raytrace::{RayLight, TraversalKind};
 use scene::light::Sky;
 use scene::{Light, Scene, SceneError};
 
@@ -39,7 +39,15 @@ impl TraceScene {
     ///
     /// # Errors
     /// The scene has too many triangles, or images that cannot be read.
-    pub fn new(mut scene: Scene) -> Result<Self, PrepareError> {
+    pub fn new(scene: Scene) -> Result<Self, PrepareError> {
+        Self::with_tree(scene, TraversalKind::Bvh2)
+    }
+
+    /// [`Self::new`], with the tree of a kind besides.
+    ///
+    /// # Errors
+    /// The scene has too many triangles, or images that cannot be read.
+    pub fn with_tree(mut scene: Scene, tree: TraversalKind) -> Result<Self, PrepareError> {
         let soup = Soup::new(&scene);
         let (bvh, materials) = rayon::join(
             || {
@@ -48,7 +56,7 @@ impl TraceScene {
                     .iter()
                     .map(super::material::needs_alpha_test)
                     .collect();
-                Bvh::build(&soup.triangles, |p| {
+                Bvh::build_for(tree, &soup.triangles, |p| {
                     masked
                         .get(soup.material(&scene, p))
                         .copied()

@@ -228,20 +228,31 @@ fn the_bytes_do_not_depend_on_threads_or_run() {
 }
 
 #[test]
-fn both_trees_give_the_same_picture_and_the_same_rays() {
-    let scene = TraceScene::new(scene()).expect("small");
-    let (two, two_bytes) = trace(&scene, settings(TraversalKind::Bvh2), SIZE_PX);
-    let (eight, eight_bytes) = trace(&scene, settings(TraversalKind::Bvh8), SIZE_PX);
-    assert_eq!(two.images[0].pixels, eight.images[0].pixels);
-    assert_eq!(two.images[1].pixels, eight.images[1].pixels);
-    let [two, eight] = [two_bytes, eight_bytes].map(|b| Raytrace::from_bytes(b).expect("opens"));
-    let (mut a, mut b) = (RayTile::default(), RayTile::default());
-    for tile in 0..two.tables().tile_count() {
-        two.decode_tile(Eye::Left, tile, &mut a).expect("decodes");
-        eight.decode_tile(Eye::Left, tile, &mut b).expect("decodes");
-        assert_eq!(a.pixels, b.pixels);
-        for (x, y) in a.rays.iter().zip(&b.rays) {
-            assert_eq!((x.kind, x.outcome, x.parent), (y.kind, y.outcome, y.parent));
+fn all_trees_give_the_same_picture_and_the_same_rays() {
+    let traced = |tree| {
+        let scene = TraceScene::with_tree(scene(), tree).expect("small");
+        let (frame, bytes) = trace(&scene, settings(tree), SIZE_PX);
+        (frame, Raytrace::from_bytes(bytes).expect("opens"))
+    };
+    let (frame, binary) = traced(TraversalKind::Bvh2);
+    for tree in [
+        TraversalKind::Bvh4,
+        TraversalKind::Bvh8,
+        TraversalKind::Cwbvh8,
+    ] {
+        let (other_frame, other) = traced(tree);
+        assert_eq!(frame.images[0].pixels, other_frame.images[0].pixels);
+        assert_eq!(frame.images[1].pixels, other_frame.images[1].pixels);
+        let (mut a, mut b) = (RayTile::default(), RayTile::default());
+        for tile in 0..binary.tables().tile_count() {
+            binary
+                .decode_tile(Eye::Left, tile, &mut a)
+                .expect("decodes");
+            other.decode_tile(Eye::Left, tile, &mut b).expect("decodes");
+            assert_eq!(a.pixels, b.pixels);
+            for (x, y) in a.rays.iter().zip(&b.rays) {
+                assert_eq!((x.kind, x.outcome, x.parent), (y.kind, y.outcome, y.parent));
+            }
         }
     }
 }

@@ -75,10 +75,16 @@ fn bvh_parser() -> impl TypedValueParser<Value = TraversalKind> {
             TraversalKind::Bvh2,
             "Binary: a step tests two boxes",
         ),
+        ("bvh4", TraversalKind::Bvh4, "Four-wide: a step tests four"),
         (
             "bvh8",
             TraversalKind::Bvh8,
             "Eight-wide: a step tests eight",
+        ),
+        (
+            "cwbvh8",
+            TraversalKind::Cwbvh8,
+            "Eight-wide, nodes of 80 bytes with quantised boxes",
         ),
     ])
 }
@@ -160,7 +166,7 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
     scene.animate(time_s)?;
     scene.pose(time_s as f32);
     let (scene_triangles, scene_origin) = (scene.triangle_count(), scene.origin);
-    let scene = TraceScene::new(scene)?;
+    let scene = TraceScene::with_tree(scene, args.bvh)?;
     let traversal = args.bvh;
     let bvh = scene.bvh.summary(traversal);
     let Some(views) = frames.first() else {

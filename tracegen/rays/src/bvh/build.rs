@@ -1,8 +1,8 @@
-//! Builds the binary tree with obvhs and lays both trees out for traversal.
+//! Builds the binary tree with obvhs and lays the trees out for traversal.
 
 use super::collapse::{BLOCK_COST, MAX_TRIANGLES, collapse};
 use super::node::{BLOCK, Block, Child, MASKED, Node2, Node8};
-use super::widen::Widening;
+use super::widen::{MAX_WIDTH, Widening};
 use glam::Vec3A;
 use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
@@ -78,16 +78,16 @@ pub(super) fn build_binary(triangles: &[[[f32; 3]; 3]]) -> Bvh2 {
 #[derive(Default)]
 pub(super) struct Layout {
     pub nodes2: Vec<Node2>,
-    pub nodes8: Vec<Node8>,
     pub blocks: Vec<Block>,
     pub first_slots: Vec<u32>,
+    /// By node of the binary tree, its leaf.
+    pub children: Vec<Child>,
     pub leaves: u64,
     pub depth2: u32,
-    pub depth8: u32,
     pub sah_cost: f64,
 }
 
-/// Lays out the trees depth first, so that related nodes share pages.
+/// Lays out leaves and binary tree depth first, so that related nodes share pages.
 ///
 /// `numbers[i]` is the primitive number (with its mask flag) of triangle `i`.
 pub(super) fn lay_out(tree: &Bvh2, triangles: &[[[f32; 3]; 3]], numbers: &[u32]) -> Layout {
@@ -98,7 +98,7 @@ pub(super) fn lay_out(tree: &Bvh2, triangles: &[[[f32; 3]; 3]], numbers: &[u32])
     let leaves = place_leaves(tree, triangles, numbers, &mut out);
     out.sah_cost = sah_cost(tree);
     emit2(tree, &leaves, &mut out);
-    emit8(tree, &leaves, &mut out);
+    out.children = leaves;
     out
 }
 
@@ -211,20 +211,25 @@ fn emit2(tree: &Bvh2, leaves: &[Child], out: &mut Layout) {
     }
 }
 
-fn emit8(tree: &Bvh2, leaves: &[Child], out: &mut Layout) {
-    let widening = Widening::cheapest(tree);
+/// Nodes of a wide tree, depth first, and its depth.
+pub(super) fn emit_wide(tree: &Bvh2, leaves: &[Child], width: usize) -> (Vec<Node8>, u32) {
+    let (mut nodes, mut deepest): (Vec<Node8>, _) = (Vec::new(), 0);
+    if tree.nodes.is_empty() {
+        return (nodes, deepest);
+    }
+    let widening = Widening::cheapest(tree, width);
     let mut stack = vec![(0u32, None, 1u32)];
     while let Some((at, parent, depth)) = stack.pop() {
-        let here = out.nodes8.len() as u32;
+        let here = nodes.len() as u32;
         if let Some((node, side)) = parent {
-            let node: &mut Node8 = &mut out.nodes8[node as usize];
+            let node: &mut Node8 = &mut nodes[node as usize];
             let side: usize = side;
             node.children[side] = Child(here);
         }
-        out.depth8 = out.depth8.max(depth);
+        deepest = deepest.max(depth);
         let mut node = Node8 {
-            bounds: [[[f32::MAX; 8], [f32::MIN; 8]]; 3],
-            children: [Child::NONE; 8],
+            bounds: [[[f32::MAX; MAX_WIDTH], [f32::MIN; MAX_WIDTH]]; 3],
+            children: [Child::NONE; MAX_WIDTH],
         };
         for (side, member) in widening.children(tree, at).into_iter().enumerate().rev() {
             let (min, max) = corners(tree, member);
@@ -238,6 +243,7 @@ fn emit8(tree: &Bvh2, leaves: &[Child], out: &mut Layout) {
                 stack.push((member, Some((here, side)), depth + 1));
             }
         }
-        out.nodes8.push(node);
+        nodes.push(node);
     }
+    (nodes, deepest)
 }

@@ -1,48 +1,57 @@
 //! The content of a tree, as traces store it.
 
 use super::Bvh;
-use super::node::{Block, Child, MASKED};
+use super::node::{Block, Child, MASKED, Node8};
 use formats::raytrace::{ChildKind, Hierarchy, HierarchyChild, HierarchyTriangle, TraversalKind};
 
 impl Bvh {
-    /// All inner nodes of a tree, with the boxes that its traversal tests, and the triangles of both trees.
+    /// All inner nodes of a tree, with the boxes that its traversal tests, and its triangles by slot.
     #[must_use]
     pub fn contents(&self, traversal: TraversalKind) -> Hierarchy {
+        let slots = self.slots_of(traversal);
+        let wide = |nodes: &[Node8]| wide_children(nodes, traversal.width(), slots);
         let children = match traversal {
             TraversalKind::Bvh2 => (self.nodes2.iter())
                 .flat_map(|node| {
                     [0, 1].map(|side| {
                         let corner = |far: usize| node.bounds.map(|axis| axis[side + 2 * far]);
-                        self.child(node.children[side], corner(0), corner(1))
+                        content(node.children[side], slots, corner(0), corner(1))
                     })
                 })
                 .collect(),
-            TraversalKind::Bvh8 => (self.nodes8.iter())
-                .flat_map(|node| {
-                    std::array::from_fn::<_, 8, _>(|side| {
-                        let [min, max] = [0, 1].map(|far| node.bounds.map(|axis| axis[far][side]));
-                        self.child(node.children[side], min, max)
-                    })
-                })
-                .collect(),
+            TraversalKind::Bvh8 => wide(&self.nodes8),
+            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => wide(&self.other.nodes),
         };
+        let mut blocks: Vec<_> = slots.iter().zip(&self.blocks).collect();
+        blocks.sort_unstable_by_key(|(slot, _)| **slot);
+        let triangles = blocks.into_iter().flat_map(|(_, block)| triangles(block));
         Hierarchy {
             children,
-            triangles: self.blocks.iter().flat_map(triangles).collect(),
+            triangles: triangles.collect(),
         }
     }
+}
 
-    fn child(&self, child: Child, min: [f32; 3], max: [f32; 3]) -> Option<HierarchyChild> {
-        let kind = if child == Child::NONE {
-            return None;
-        } else if child.is_leaf() {
-            let (block, count) = child.leaf_range();
-            ChildKind::Leaf(self.first_slots[block as usize], count)
-        } else {
-            ChildKind::Node(child.0)
-        };
-        Some(HierarchyChild { kind, min, max })
-    }
+fn wide_children(nodes: &[Node8], width: usize, slots: &[u32]) -> Vec<Option<HierarchyChild>> {
+    let children = nodes.iter().flat_map(|node| {
+        (0..width).map(|side| {
+            let [min, max] = [0, 1].map(|far| node.bounds.map(|axis| axis[far][side]));
+            content(node.children[side], slots, min, max)
+        })
+    });
+    children.collect()
+}
+
+fn content(child: Child, slots: &[u32], min: [f32; 3], max: [f32; 3]) -> Option<HierarchyChild> {
+    let kind = if child == Child::NONE {
+        return None;
+    } else if child.is_leaf() {
+        let (block, count) = child.leaf_range();
+        ChildKind::Leaf(slots[block as usize], count)
+    } else {
+        ChildKind::Node(child.0)
+    };
+    Some(HierarchyChild { kind, min, max })
 }
 
 /// The triangles of a block. Its unused lanes come last.

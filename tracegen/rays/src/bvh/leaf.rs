@@ -5,6 +5,7 @@ use super::count::Counter;
 use super::kernel::{Ends, Kernel};
 use super::node::{BLOCK, Block, Child, MASKED};
 use crate::ray::{PreparedRay, Ray, barycentrics};
+use formats::raytrace::TraversalKind;
 
 /// The hit of a ray on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,11 +21,11 @@ pub struct RayHit {
 }
 
 impl Bvh {
-    /// Slot of a triangle that was hit, its place in leaf order.
+    /// Slot of a triangle that was hit, its place in the order of a tree's leaves.
     #[must_use]
-    pub fn slot(&self, hit: &RayHit) -> u32 {
+    pub fn slot(&self, tree: TraversalKind, hit: &RayHit) -> u32 {
         let (block, lane) = (hit.place as usize / BLOCK, hit.place % BLOCK as u32);
-        self.first_slots[block] + lane
+        self.slots_of(tree)[block] + lane
     }
 }
 
@@ -55,6 +56,7 @@ pub trait LeafTest<K: Kernel, C: Counter> {
 /// What both leaf tests need.
 pub(super) struct Query<'a, A> {
     pub bvh: &'a Bvh,
+    pub first_slots: &'a [u32],
     pub prepared: &'a PreparedRay<'a>,
     pub alpha: &'a A,
 }
@@ -112,7 +114,7 @@ impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for Closest<'_, A> {
         let query = &self.query;
         let (first, count) = leaf.leaf_range();
         let blocks = &query.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
-        counter.triangles(|| query.bvh.first_slots[first as usize], count);
+        counter.triangles(|| query.first_slots[first as usize], count);
         for (number, block) in (first..).zip(blocks) {
             let (mut mask, ends) = query.candidates::<K>(ray, block, self.best.t);
             while mask != 0 {
@@ -170,7 +172,7 @@ impl<K: Kernel, C: Counter, A: AlphaTest> LeafTest<K, C> for AnyHit<'_, A> {
         let Ray { t_min, t_max, .. } = *query.prepared.ray;
         let (first, count) = leaf.leaf_range();
         let blocks = &query.bvh.blocks[first as usize..][..(count as usize).div_ceil(BLOCK)];
-        let first_slot = || query.bvh.first_slots[first as usize];
+        let first_slot = || query.first_slots[first as usize];
         for (number, block) in blocks.iter().enumerate() {
             let (mut mask, ends) = query.candidates::<K>(ray, block, t_max);
             while mask != 0 {

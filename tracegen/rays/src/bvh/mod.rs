@@ -2,12 +2,14 @@
 //!
 //! One build gives two trees over the same leaves. A step in the binary tree tests both children's
 //! boxes; this is the unit in which T&I unit 2.0 works and in which traces count. The eight-wide
-//! tree is faster. Both find bit-identical hits.
+//! tree is faster. A third tree, four-wide or of compressed nodes, is built on demand. All find
+//! bit-identical hits.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 mod build;
 mod collapse;
+mod compress;
 mod contents;
 pub mod count;
 mod kernel;
@@ -22,16 +24,18 @@ mod widen;
 mod tests;
 
 use crate::ray::{LARGEST_COORDINATE, Ray};
+use compress::{CompressedNode, compressed};
 use count::Counter;
 use formats::raytrace::{BvhSummary, TraversalKind};
 use glam::Vec3;
 use kernel::{Kernel, Scalar};
 pub use leaf::{AllOpaque, AlphaTest, RayHit};
-use node::{Block, Child, MASKED, Node2, Node8, TRIANGLE_BYTES};
+use node::{Block, Child, MASKED, NODE4_BYTES, Node2, Node8, TRIANGLE_BYTES};
 use pages::in_large_pages;
 use stacks::Stacks;
 pub use traverse::TraversalStack;
-use traverse::{Eight, Two, Width, blocker, closest};
+use traverse::{Eight, Other, Two, Width, blocker, closest};
+use widen::MAX_WIDTH;
 
 /// A set of triangles for which no hierarchy can be built.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -67,7 +71,18 @@ impl Instructions {
     }
 }
 
-/// Both trees over a set of triangles.
+/// The third tree.
+#[derive(Default)]
+struct OtherTree {
+    kind: Option<TraversalKind>,
+    /// Only the first four children are used in a four-wide tree.
+    nodes: Vec<Node8>,
+    /// By block, the slot of its first triangle.
+    first_slots: Vec<u32>,
+    depth: u32,
+}
+
+/// The trees over a set of triangles.
 pub struct Bvh {
     nodes2: Vec<Node2>,
     nodes8: Vec<Node8>,
@@ -80,6 +95,7 @@ pub struct Bvh {
     leaves: u64,
     depth2: u32,
     depth8: u32,
+    other: OtherTree,
     /// Entries that a traversal stack needs.
     stack_size: usize,
     sah_cost: f64,
@@ -87,13 +103,25 @@ pub struct Bvh {
 }
 
 impl Bvh {
-    /// Builds the trees. Triangles with a coordinate that is not finite or exceeds
+    /// Builds the binary and the eight-wide tree. Triangles with a coordinate that is not finite or exceeds
     /// [`LARGEST_COORDINATE`] are left out and can't be hit. `masked` returns whether the material
     /// of a triangle number has an alpha mask.
     ///
     /// # Errors
     /// There are more triangles than node references can number.
     pub fn build(
+        triangles: &[[[f32; 3]; 3]],
+        masked: impl Fn(u32) -> bool,
+    ) -> Result<Self, BvhError> {
+        Self::build_for(TraversalKind::Bvh2, triangles, masked)
+    }
+
+    /// [`Self::build`], with the tree of a kind besides.
+    ///
+    /// # Errors
+    /// There are more triangles than node references can number.
+    pub fn build_for(
+        kind: TraversalKind,
         triangles: &[[[f32; 3]; 3]],
         masked: impl Fn(u32) -> bool,
     ) -> Result<Self, BvhError> {
@@ -124,17 +152,39 @@ impl Bvh {
         let mut tree = build::build_binary(&built);
         stacks.expand(&mut tree, &kept);
         let layout = build::lay_out(&tree, &kept, &numbers);
+        let wide = |kind: TraversalKind| build::emit_wide(&tree, &layout.children, kind.width());
+        let (nodes8, depth8) = wide(TraversalKind::Bvh8);
+        let mut other = OtherTree::default();
+        match kind {
+            TraversalKind::Bvh2 | TraversalKind::Bvh8 => {}
+            TraversalKind::Bvh4 => {
+                (other.nodes, other.depth) = wide(kind);
+                other.first_slots.clone_from(&layout.first_slots);
+                other.kind = Some(kind);
+            }
+            TraversalKind::Cwbvh8 => {
+                (other.nodes, other.first_slots) = compressed(&nodes8, layout.blocks.len());
+                other.depth = depth8;
+                other.kind = Some(kind);
+            }
+        }
+        let most_stacked = [
+            layout.depth2,
+            depth8 * (MAX_WIDTH as u32 - 1),
+            other.depth * (MAX_WIDTH as u32 - 1),
+        ];
         Ok(Self {
             nodes2: in_large_pages(layout.nodes2),
-            nodes8: in_large_pages(layout.nodes8),
+            nodes8: in_large_pages(nodes8),
             blocks: in_large_pages(layout.blocks),
             first_slots: layout.first_slots,
             bounds,
             triangles: tree.primitive_indices.len() as u64,
             leaves: layout.leaves,
             depth2: layout.depth2,
-            depth8: layout.depth8,
-            stack_size: (layout.depth2 as usize).max(layout.depth8 as usize * 7) + 8,
+            depth8,
+            other,
+            stack_size: most_stacked.into_iter().max().unwrap_or(0) as usize + MAX_WIDTH,
             sah_cost: layout.sah_cost,
             instructions: Instructions::best(),
         })
@@ -149,12 +199,35 @@ impl Bvh {
         self
     }
 
+    /// Whether the tree of a kind was built.
+    #[must_use]
+    pub fn has(&self, kind: TraversalKind) -> bool {
+        match kind {
+            TraversalKind::Bvh2 | TraversalKind::Bvh8 => true,
+            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => self.other.kind == Some(kind),
+        }
+    }
+
+    /// By block, the slot of its first triangle in a tree.
+    fn slots_of(&self, tree: TraversalKind) -> &[u32] {
+        debug_assert!(self.has(tree));
+        match tree {
+            TraversalKind::Bvh2 | TraversalKind::Bvh8 => &self.first_slots,
+            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => &self.other.first_slots,
+        }
+    }
+
     /// Summary of the tree for a trace.
     #[must_use]
     pub fn summary(&self, traversal: TraversalKind) -> BvhSummary {
         let (nodes, depth, bytes) = match traversal {
             TraversalKind::Bvh2 => (self.nodes2.len(), self.depth2, size_of::<Node2>()),
             TraversalKind::Bvh8 => (self.nodes8.len(), self.depth8, size_of::<Node8>()),
+            TraversalKind::Bvh4 => (self.other.nodes.len(), self.other.depth, NODE4_BYTES),
+            TraversalKind::Cwbvh8 => {
+                let bytes = size_of::<CompressedNode>();
+                (self.other.nodes.len(), self.other.depth, bytes)
+            }
         };
         BvhSummary {
             builder: "obvhs 0.4 ploc+reinsertion, leaves by blocks".to_owned(),
@@ -171,6 +244,9 @@ impl Bvh {
     }
 
     /// The nearest triangle that a ray hits. Of equally near ones, the lowest number.
+    ///
+    /// # Panics
+    /// The tree was not built.
     pub fn closest<C: Counter, A: AlphaTest>(
         &self,
         tree: TraversalKind,
@@ -182,10 +258,16 @@ impl Bvh {
         match tree {
             TraversalKind::Bvh2 => self.closest_in::<Two, C, A>(ray, stack, counter, alpha),
             TraversalKind::Bvh8 => self.closest_in::<Eight, C, A>(ray, stack, counter, alpha),
+            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => {
+                self.closest_in::<Other, C, A>(ray, stack, counter, alpha)
+            }
         }
     }
 
     /// True if any triangle lies on the ray's segment.
+    ///
+    /// # Panics
+    /// The tree was not built.
     pub fn occluded<C: Counter, A: AlphaTest>(
         &self,
         tree: TraversalKind,
@@ -198,6 +280,9 @@ impl Bvh {
     }
 
     /// The first triangle on the ray's segment that the traversal finds, which need not be the nearest.
+    ///
+    /// # Panics
+    /// The tree was not built.
     pub fn blocker<C: Counter, A: AlphaTest>(
         &self,
         tree: TraversalKind,
@@ -209,6 +294,9 @@ impl Bvh {
         match tree {
             TraversalKind::Bvh2 => self.blocker_in::<Two, C, A>(ray, stack, counter, alpha),
             TraversalKind::Bvh8 => self.blocker_in::<Eight, C, A>(ray, stack, counter, alpha),
+            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => {
+                self.blocker_in::<Other, C, A>(ray, stack, counter, alpha)
+            }
         }
     }
 

@@ -1,4 +1,4 @@
-//! Memory layout of the two trees.
+//! Memory layout of the trees.
 
 /// Triangles in a block.
 pub const BLOCK: usize = 4;
@@ -65,6 +65,10 @@ pub struct Node8 {
     /// Children, [`Child::NONE`] where missing.
     pub children: [Child; 8],
 }
+
+/// Bytes of a four-wide node in a ray-tracing unit's memory: four boxes of 24 bytes and four
+/// references, padded to two cache lines.
+pub const NODE4_BYTES: usize = 128;
 
 /// Four triangles of a leaf, in structure-of-arrays layout.
 #[derive(Clone, Copy, Debug)]

@@ -5,17 +5,22 @@ use formats::random::Random;
 use glam::{DVec3, Vec3};
 
 #[test]
-fn hits_of_both_trees_and_both_kernels_equal_brute_force() {
+fn hits_of_all_trees_and_both_kernels_equal_brute_force() {
+    for third in [TraversalKind::Bvh4, TraversalKind::Cwbvh8] {
+        hits_equal_brute_force(third);
+    }
+}
+
+fn hits_equal_brute_force(third: TraversalKind) {
     for mesh in [
         TestMesh::sphere(2),
         TestMesh::grid_box(6),
         TestMesh::torus(24, 12),
     ] {
         let triangles = mesh.rounded(DVec3::ZERO);
-        let fast = Bvh::build(&triangles, |_| false).expect("builds");
-        let plain = Bvh::build(&triangles, |_| false)
-            .expect("builds")
-            .with_instructions(Instructions::Scalar);
+        let build = || Bvh::build_for(third, &triangles, |_| false).expect("builds");
+        let fast = build();
+        let plain = build().with_instructions(Instructions::Scalar);
         let mut stack = TraversalStack::default();
         let mut random = Random(1);
         let mut hits = 0;
@@ -32,7 +37,7 @@ fn hits_of_both_trees_and_both_kernels_equal_brute_force() {
             let ray = Ray::new(origin, aim - origin);
             let expected = brute_force_f32(&triangles, fast.bounds, &ray);
             hits += u32::from(expected.is_some());
-            for tree in [TraversalKind::Bvh2, TraversalKind::Bvh8] {
+            for tree in [TraversalKind::Bvh2, TraversalKind::Bvh8, third] {
                 let work = [&fast, &plain].map(|bvh| {
                     let mut counts = Counts::default();
                     let hit = bvh.closest(tree, &ray, &mut stack, &mut counts, &AllOpaque);

@@ -1,10 +1,10 @@
-//! Closest-hit and any-hit traversal of both trees, for any kernel and counter.
+//! Closest-hit and any-hit traversal of all trees, for any kernel and counter.
 
 use super::Bvh;
 use super::count::Counter;
 use super::kernel::{Kernel, Lanes8};
 use super::leaf::{AlphaTest, AnyHit, Closest, LeafTest, Query, RayHit};
-use super::node::Child;
+use super::node::{Child, Node8};
 use crate::ray::{PreparedRay, Ray};
 
 /// Nodes to visit. Reused between rays to save the allocation.
@@ -49,6 +49,9 @@ pub trait Width {
     /// to stay in registers. That of the eight-wide tree is not, and the call only costs time.
     const LEAVES_OUT_OF_LINE: bool;
 
+    /// By block, the slot of its first triangle.
+    fn first_slots(bvh: &Bvh) -> &[u32];
+
     /// Visits an inner node: pushes its hit children except for the nearest, which it returns.
     fn visit<K: Kernel>(
         bvh: &Bvh,
@@ -65,6 +68,11 @@ pub struct Two;
 
 impl Width for Two {
     const LEAVES_OUT_OF_LINE: bool = true;
+
+    #[inline(always)]
+    fn first_slots(bvh: &Bvh) -> &[u32] {
+        &bvh.first_slots
+    }
 
     #[inline(always)]
     fn visit<K: Kernel>(
@@ -114,12 +122,12 @@ fn keep_branch() {
 /// Starts to load a child of a wide node that is visited later, if at all. Gains 1 to 5 %; loading
 /// all its lines gains less, and so does loading the child that is visited next.
 #[inline(always)]
-fn load_ahead<K: Kernel>(bvh: &Bvh, child: Child) {
+fn load_ahead<K: Kernel>(bvh: &Bvh, nodes: &[Node8], child: Child) {
     let at = if child.is_leaf() {
         let (block, _) = child.leaf_range();
         bvh.blocks.as_ptr().wrapping_add(block as usize).cast()
     } else {
-        bvh.nodes8.as_ptr().wrapping_add(child.0 as usize).cast()
+        nodes.as_ptr().wrapping_add(child.0 as usize).cast()
     };
     K::load_ahead(at);
 }
@@ -137,6 +145,11 @@ impl Width for Eight {
     const LEAVES_OUT_OF_LINE: bool = false;
 
     #[inline(always)]
+    fn first_slots(bvh: &Bvh) -> &[u32] {
+        &bvh.first_slots
+    }
+
+    #[inline(always)]
     fn visit<K: Kernel>(
         bvh: &Bvh,
         ray: &K::Ray<'_>,
@@ -145,66 +158,104 @@ impl Width for Eight {
         stack: &mut [u64],
         top: &mut usize,
     ) -> Option<Child> {
-        let node = &bvh.nodes8[node as usize];
-        let mut lanes = Lanes8([0.0; 8]);
-        let mut mask = K::step8(ray, node, t_max, &mut lanes);
-        if mask == 0 {
-            return None;
-        }
-        let first = mask.trailing_zeros() as usize & 7;
-        mask &= mask - 1;
-        let child = node.children[first];
-        if mask == 0 {
+        visit_wide::<K>(bvh, &bvh.nodes8, ray, node, t_max, stack, top)
+    }
+}
+
+/// The third tree, with four children or compressed nodes.
+pub struct Other;
+
+impl Width for Other {
+    const LEAVES_OUT_OF_LINE: bool = false;
+
+    #[inline(always)]
+    fn first_slots(bvh: &Bvh) -> &[u32] {
+        &bvh.other.first_slots
+    }
+
+    #[inline(always)]
+    fn visit<K: Kernel>(
+        bvh: &Bvh,
+        ray: &K::Ray<'_>,
+        node: u32,
+        t_max: f32,
+        stack: &mut [u64],
+        top: &mut usize,
+    ) -> Option<Child> {
+        visit_wide::<K>(bvh, &bvh.other.nodes, ray, node, t_max, stack, top)
+    }
+}
+
+/// [`Width::visit`] in a list of wide nodes.
+#[inline(always)]
+fn visit_wide<K: Kernel>(
+    bvh: &Bvh,
+    nodes: &[Node8],
+    ray: &K::Ray<'_>,
+    node: u32,
+    t_max: f32,
+    stack: &mut [u64],
+    top: &mut usize,
+) -> Option<Child> {
+    let node = &nodes[node as usize];
+    let mut lanes = Lanes8([0.0; 8]);
+    let mut mask = K::step8(ray, node, t_max, &mut lanes);
+    if mask == 0 {
+        return None;
+    }
+    let first = mask.trailing_zeros() as usize & 7;
+    mask &= mask - 1;
+    let child = node.children[first];
+    if mask == 0 {
+        return Some(child);
+    }
+    let near = lanes.0[first];
+    let second = mask.trailing_zeros() as usize & 7;
+    mask &= mask - 1;
+    let (near1, child1) = (lanes.0[second], node.children[second]);
+    // One or two hit children, the most frequent cases, need no sorting.
+    let base = *top;
+    if mask == 0 {
+        *top = base + 1;
+        if near <= near1 {
+            load_ahead::<K>(bvh, nodes, child1);
+            stack[base] = pack(near1, child1);
             return Some(child);
         }
-        let near = lanes.0[first];
-        let second = mask.trailing_zeros() as usize & 7;
-        mask &= mask - 1;
-        let (near1, child1) = (lanes.0[second], node.children[second]);
-        // One or two hit children, the most frequent cases, need no sorting.
-        let base = *top;
-        if mask == 0 {
-            *top = base + 1;
-            if near <= near1 {
-                load_ahead::<K>(bvh, child1);
-                stack[base] = pack(near1, child1);
-                return Some(child);
-            }
-            keep_branch();
-            load_ahead::<K>(bvh, child);
-            stack[base] = pack(near, child);
-            return Some(child1);
-        }
-        // Three are sorted in registers.
-        let third = mask.trailing_zeros() as usize & 7;
-        mask &= mask - 1;
-        let (a, b) = ordered(pack(near, child), pack(near1, child1));
-        let (b, c) = ordered(b, pack(lanes.0[third], node.children[third]));
-        let (mut nearest, b) = ordered(a, b);
-        for pushed in [b, c] {
-            load_ahead::<K>(bvh, unpack(pushed).1);
-        }
-        stack[base] = c;
-        stack[base + 1] = b;
-        *top = base + 2;
-        // Insertion sort keeps the nearest pushed entries on top.
-        while mask != 0 {
-            let lane = mask.trailing_zeros() as usize & 7;
-            mask &= mask - 1;
-            let entry = pack(lanes.0[lane], node.children[lane]);
-            let pushed = nearest.max(entry);
-            nearest = nearest.min(entry);
-            load_ahead::<K>(bvh, unpack(pushed).1);
-            let mut at = *top;
-            *top += 1;
-            while at > base && stack[at - 1] < pushed {
-                stack[at] = stack[at - 1];
-                at -= 1;
-            }
-            stack[at] = pushed;
-        }
-        Some(unpack(nearest).1)
+        keep_branch();
+        load_ahead::<K>(bvh, nodes, child);
+        stack[base] = pack(near, child);
+        return Some(child1);
     }
+    // Three are sorted in registers.
+    let third = mask.trailing_zeros() as usize & 7;
+    mask &= mask - 1;
+    let (a, b) = ordered(pack(near, child), pack(near1, child1));
+    let (b, c) = ordered(b, pack(lanes.0[third], node.children[third]));
+    let (mut nearest, b) = ordered(a, b);
+    for pushed in [b, c] {
+        load_ahead::<K>(bvh, nodes, unpack(pushed).1);
+    }
+    stack[base] = c;
+    stack[base + 1] = b;
+    *top = base + 2;
+    // Insertion sort keeps the nearest pushed entries on top.
+    while mask != 0 {
+        let lane = mask.trailing_zeros() as usize & 7;
+        mask &= mask - 1;
+        let entry = pack(lanes.0[lane], node.children[lane]);
+        let pushed = nearest.max(entry);
+        nearest = nearest.min(entry);
+        load_ahead::<K>(bvh, nodes, unpack(pushed).1);
+        let mut at = *top;
+        *top += 1;
+        while at > base && stack[at - 1] < pushed {
+            stack[at] = stack[at - 1];
+            at -= 1;
+        }
+        stack[at] = pushed;
+    }
+    Some(unpack(nearest).1)
 }
 
 /// Traverses a tree from the root.
@@ -270,6 +321,7 @@ pub(super) fn closest<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
     let loaded = K::load(&prepared);
     let mut leaf = Closest::new(Query {
         bvh,
+        first_slots: W::first_slots(bvh),
         prepared: &prepared,
         alpha,
     });
@@ -290,6 +342,7 @@ pub(super) fn blocker<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
     let loaded = K::load(&prepared);
     let mut leaf = AnyHit::new(Query {
         bvh,
+        first_slots: W::first_slots(bvh),
         prepared: &prepared,
         alpha,
     });

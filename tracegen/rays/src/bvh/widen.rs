@@ -1,4 +1,4 @@
-//! Chooses which nodes of the binary tree become nodes of the eight-wide tree.
+//! Chooses which nodes of the binary tree become nodes of the four- or eight-wide tree.
 //!
 //! The chosen nodes cost least: the cost is the sum of their areas and of the areas of the leaves
 //! below each (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through
@@ -8,8 +8,8 @@
 use super::collapse::parents_first;
 use obvhs::bvh2::Bvh2;
 
-/// Children of a wide node.
-const WIDTH: usize = 8;
+/// Most children of a wide node.
+pub(super) const MAX_WIDTH: usize = 8;
 
 /// Cost of a leaf's area for every wide node above it. A ray ends in a leaf, and more probably in a
 /// large one, so large leaves belong close to the root.
@@ -23,15 +23,16 @@ type Shares = [u8; 2];
 pub(super) struct Widening {
     /// By node and by the most wide children that its subtree may become, less one. The last is the
     /// choice for a wide node's own children.
-    shares: Vec<[Shares; WIDTH]>,
+    shares: Vec<[Shares; MAX_WIDTH]>,
+    width: usize,
 }
 
 impl Widening {
-    /// Finds the cheapest choice, bottom up.
-    pub(super) fn cheapest(tree: &Bvh2) -> Self {
-        let mut shares = vec![[[0; 2]; WIDTH]; tree.nodes.len()];
+    /// Finds the cheapest choice for nodes of up to `width` children, bottom up.
+    pub(super) fn cheapest(tree: &Bvh2, width: usize) -> Self {
+        let mut shares = vec![[[0; 2]; MAX_WIDTH]; tree.nodes.len()];
         // Least cost of all wide nodes of a subtree that becomes at most so many children.
-        let mut costs = vec![[0.0f32; WIDTH]; tree.nodes.len()];
+        let mut costs = vec![[0.0f32; MAX_WIDTH]; tree.nodes.len()];
         let mut leaf_areas = vec![0.0f32; tree.nodes.len()];
         for at in parents_first(tree).into_iter().rev() {
             let node = &tree.nodes[at];
@@ -42,8 +43,8 @@ impl Widening {
             let first = node.first_index as usize;
             leaf_areas[at] = leaf_areas[first] + leaf_areas[first + 1];
             let (left, right) = (costs[first], costs[first + 1]);
-            let mut cost = [f32::INFINITY; WIDTH];
-            for most in 2..=WIDTH {
+            let mut cost = [f32::INFINITY; MAX_WIDTH];
+            for most in 2..=width {
                 (cost[most - 1], shares[at][most - 1]) = (cost[most - 2], shares[at][most - 2]);
                 for k in 1..most {
                     let sum = left[k - 1] + right[most - k - 1];
@@ -55,21 +56,21 @@ impl Widening {
             }
             // As one child, the node is wide and has all its children.
             let own = node.aabb().half_area() + LEAF_DEPTH_COST * leaf_areas[at];
-            let whole = own + cost[WIDTH - 1];
-            for most in 0..WIDTH - 1 {
+            let whole = own + cost[width - 1];
+            for most in 0..width - 1 {
                 if whole <= cost[most] {
                     (cost[most], shares[at][most]) = (whole, [0; 2]);
                 }
             }
             costs[at] = cost;
         }
-        Self { shares }
+        Self { shares, width }
     }
 
     /// The nodes that become the children of a wide node, in the order of the binary tree.
     pub(super) fn children(&self, tree: &Bvh2, node: u32) -> Vec<u32> {
-        let mut children = Vec::with_capacity(WIDTH);
-        let mut open = vec![(node, WIDTH)];
+        let mut children = Vec::with_capacity(self.width);
+        let mut open = vec![(node, self.width)];
         while let Some((at, most)) = open.pop() {
             let [left, right] = self.shares[at as usize][most - 1].map(usize::from);
             if left == 0 {
@@ -91,7 +92,7 @@ mod tests {
     use glam::DVec3;
 
     /// The cost of all wide nodes, and the leaves below them in order.
-    fn widened(tree: &Bvh2, children: impl Fn(u32) -> Vec<u32>) -> (f64, Vec<u32>) {
+    fn widened(tree: &Bvh2, width: usize, children: impl Fn(u32) -> Vec<u32>) -> (f64, Vec<u32>) {
         let (mut cost, mut leaves, mut open) = (0.0, Vec::new(), vec![(0, 0.0)]);
         while let Some((at, depth)) = open.pop() {
             let node = &tree.nodes[at as usize];
@@ -103,17 +104,17 @@ mod tests {
             }
             cost += area;
             let children = children(at);
-            assert!((2..=WIDTH).contains(&children.len()));
+            assert!((2..=width).contains(&children.len()));
             open.extend(children.into_iter().map(|child| (child, depth + 1.0)));
         }
         leaves.sort_unstable();
         (cost, leaves)
     }
 
-    /// The widest child is opened until there are eight.
-    fn greedy(tree: &Bvh2, node: u32) -> Vec<u32> {
+    /// The widest child is opened until there are enough.
+    fn greedy(tree: &Bvh2, width: usize, node: u32) -> Vec<u32> {
         let mut open = vec![node];
-        while open.len() < WIDTH {
+        while open.len() < width {
             let area = |at: u32| tree.nodes[at as usize].aabb().half_area();
             let inner = (0..open.len()).filter(|i| !tree.nodes[open[*i] as usize].is_leaf());
             let Some(i) = inner.max_by(|a, b| area(open[*a]).total_cmp(&area(open[*b]))) else {
@@ -129,11 +130,14 @@ mod tests {
     fn the_cost_is_below_that_of_greedy_opening_and_leaves_are_kept() {
         for mesh in [TestMesh::torus(160, 80), TestMesh::sphere(4)] {
             let tree = build_binary(&mesh.rounded(DVec3::ZERO));
-            let widening = Widening::cheapest(&tree);
-            let (cost, leaves) = widened(&tree, |at| widening.children(&tree, at));
-            let (greedy_cost, greedy_leaves) = widened(&tree, |at| greedy(&tree, at));
-            assert_eq!(leaves, greedy_leaves);
-            assert!(cost < 0.97 * greedy_cost, "{cost} of {greedy_cost}");
+            for (width, most) in [(4, 0.99), (8, 0.97)] {
+                let widening = Widening::cheapest(&tree, width);
+                let (cost, leaves) = widened(&tree, width, |at| widening.children(&tree, at));
+                let (greedy_cost, greedy_leaves) =
+                    widened(&tree, width, |at| greedy(&tree, width, at));
+                assert_eq!(leaves, greedy_leaves);
+                assert!(cost < most * greedy_cost, "{cost} of {greedy_cost}");
+            }
         }
     }
 }
