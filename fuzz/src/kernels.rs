@@ -87,7 +87,7 @@ pub fn run(bytes: &[u8]) {
     } else {
         TraversalKind::Cwbvh8
     };
-    let fast = Bvh::build_for(third, &triangles, masked).expect("few triangles");
+    let fast = Bvh::build_for(third.into(), &triangles, masked).expect("few triangles");
     let trees = [TraversalKind::Bvh2, TraversalKind::Bvh8, third];
     let all = |bvh: &Bvh| -> Vec<[Found; 2]> {
         let each = rays.iter().flat_map(|ray| trees.map(|tree| (ray, tree)));

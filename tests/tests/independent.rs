@@ -266,11 +266,11 @@ fn python_reads_all_columns_of_fresh_rays_as_replay_does() {
         return;
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
-    for (scene, tree, samples) in [
-        ("chess", "bvh2", 1),
-        ("lab", "bvh8", 2),
-        ("chess", "bvh4", 1),
-        ("chess", "cwbvh8", 1),
+    for (scene, tree, samples, treelets) in [
+        ("chess", "bvh2", 1, None),
+        ("lab", "bvh8", 2, None),
+        ("chess", "bvh4", 1, Some("4096")),
+        ("chess", "cwbvh8", 1, Some("1024")),
     ] {
         let path = folder.path().join(scene).with_extension("raytrace");
         let spp = samples.to_string();
@@ -287,6 +287,12 @@ fn python_reads_all_columns_of_fresh_rays_as_replay_does() {
             program("tracegen")
                 .args(["rays", scene])
                 .args(options)
+                .args(
+                    treelets
+                        .map(|bytes| ["--treelets", bytes])
+                        .into_iter()
+                        .flatten(),
+                )
                 .arg("-o")
                 .arg(&path),
         );

@@ -220,8 +220,8 @@ fn run() -> anyhow::Result<bool> {
         .map(|[a, b, c, d, e, f, g, h, i]| [[*a, *b, *c], [*d, *e, *f], [*g, *h, *i]])
         .collect();
     let built = |instructions| -> anyhow::Result<Vec<Bvh>> {
-        let build = |kind| -> anyhow::Result<Bvh> {
-            let bvh = Bvh::build_for(kind, &triangles, |_| false)?;
+        let build = |kind: TraversalKind| -> anyhow::Result<Bvh> {
+            let bvh = Bvh::build_for(kind.into(), &triangles, |_| false)?;
             Ok(bvh.with_instructions(instructions))
         };
         TraversalKind::ALL.into_iter().map(build).collect()

@@ -84,7 +84,7 @@ impl MeshUnderTest {
         let rounded = moved.rounded(center);
         let points = || rounded.iter().flatten().map(|p| Vec3::from(*p));
         let bounds = points().fold((Vec3::MAX, Vec3::MIN), |b, p| (b.0.min(p), b.1.max(p)));
-        let bvh = Bvh::build_for(TraversalKind::Cwbvh8, &rounded, |_| false)
+        let bvh = Bvh::build_for(TraversalKind::Cwbvh8.into(), &rounded, |_| false)
             .expect("a test mesh is small");
         Self {
             convex: mesh.name != "torus",

@@ -1,6 +1,6 @@
 //! Scene data for ray tracing, prepared once and shared by all threads.
 
-use super::bvh::{AlphaTest, Bvh, BvhError};
+use super::bvh::{AlphaTest, Bvh, BvhError, TreeOptions};
 use super::material::Materials;
 use super::soup::Soup;
 use formats::raytrace::{RayLight, TraversalKind};
@@ -40,14 +40,14 @@ impl TraceScene {
     /// # Errors
     /// The scene has too many triangles, or images that cannot be read.
     pub fn new(scene: Scene) -> Result<Self, PrepareError> {
-        Self::with_tree(scene, TraversalKind::Bvh2)
+        Self::with_tree(scene, TraversalKind::Bvh2.into())
     }
 
-    /// [`Self::new`], with the tree of a kind besides.
+    /// [`Self::new`], with the tree that the options describe.
     ///
     /// # Errors
     /// The scene has too many triangles, or images that cannot be read.
-    pub fn with_tree(mut scene: Scene, tree: TraversalKind) -> Result<Self, PrepareError> {
+    pub fn with_tree(mut scene: Scene, tree: TreeOptions) -> Result<Self, PrepareError> {
         let soup = Soup::new(&scene);
         let (bvh, materials) = rayon::join(
             || {

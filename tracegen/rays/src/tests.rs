@@ -229,8 +229,8 @@ fn the_bytes_do_not_depend_on_threads_or_run() {
 
 #[test]
 fn all_trees_give_the_same_picture_and_the_same_rays() {
-    let traced = |tree| {
-        let scene = TraceScene::with_tree(scene(), tree).expect("small");
+    let traced = |tree: TraversalKind| {
+        let scene = TraceScene::with_tree(scene(), tree.into()).expect("small");
         let (frame, bytes) = trace(&scene, settings(tree), SIZE_PX);
         (frame, Raytrace::from_bytes(bytes).expect("opens"))
     };

@@ -11,6 +11,7 @@ use formats::raytrace::{
     EyeCamera, RayKind, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
 };
 use formats::textrace::TraceMeta;
+use rays::bvh::TreeOptions;
 use rays::frame::{RayFrame, trace_frame};
 use rays::picture;
 use rays::scene::TraceScene;
@@ -64,6 +65,9 @@ pub struct RaysArgs {
     /// Tree that rays traverse; steps of bvh2 are counted as in T&I unit 2.0.
     #[arg(long, value_parser = bvh_parser(), default_value = "bvh2")]
     bvh: TraversalKind,
+    /// Lay the nodes out in treelets of this size; without it, depth first.
+    #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u32).range(256..=1 << 20))]
+    treelets: Option<u32>,
     #[command(flatten)]
     threads: Threads,
 }
@@ -93,6 +97,13 @@ impl RaysArgs {
     /// Whether every visited node and triangle is recorded.
     fn visits(&self) -> bool {
         self.visits || self.all_columns
+    }
+
+    fn tree(&self) -> TreeOptions {
+        TreeOptions {
+            kind: self.bvh,
+            treelet_bytes: self.treelets,
+        }
     }
 
     /// Samples of both eyes, as far as they are known without the scene.
@@ -166,7 +177,7 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
     scene.animate(time_s)?;
     scene.pose(time_s as f32);
     let (scene_triangles, scene_origin) = (scene.triangle_count(), scene.origin);
-    let scene = TraceScene::with_tree(scene, args.bvh)?;
+    let scene = TraceScene::with_tree(scene, args.tree())?;
     let traversal = args.bvh;
     let bvh = scene.bvh.summary(traversal);
     let Some(views) = frames.first() else {

@@ -100,22 +100,17 @@ fn quantised(origin: f32, exponent: u8, [min, max]: [f32; 2]) -> [u8; 2] {
     codes
 }
 
-/// Compresses all nodes of a tree. The results are the compressed nodes, each with the number of
-/// its node in the tree, and the first slot of every block.
+/// Compresses all nodes of a tree, in which every node is behind its parent. The results are the
+/// compressed nodes, each with the number of its node in the tree, and the first slot of every
+/// block.
 fn compress(nodes: &[Node8], blocks: usize) -> (Vec<(CompressedNode, u32)>, Vec<u32>) {
-    let mut out: Vec<Option<(CompressedNode, u32)>> = vec![None; nodes.len()];
-    let (mut slots, mut slot, mut numbered) = (vec![0; blocks], 0, 1);
-    // Pairs of a node of the tree and its number among the compressed nodes.
-    let mut stack = if nodes.is_empty() {
-        vec![]
-    } else {
-        vec![(0, 0)]
-    };
-    while let Some((from, to)) = stack.pop() {
-        let node = &nodes[from as usize];
+    let (mut slots, mut slot) = (vec![0; blocks], 0);
+    // By node, its number among the compressed nodes.
+    let (mut numbers, mut numbered) = (vec![0; nodes.len()], 1);
+    let mut out = Vec::with_capacity(nodes.len());
+    for (from, node) in (0u32..).zip(nodes) {
         let mut compressed = with_boxes(node);
         (compressed.first_child, compressed.first_slot) = (numbered, slot);
-        let pushed = stack.len();
         for (side, child) in node.children.iter().enumerate() {
             if *child == Child::NONE {
                 continue;
@@ -123,7 +118,7 @@ fn compress(nodes: &[Node8], blocks: usize) -> (Vec<(CompressedNode, u32)>, Vec<
             if !child.is_leaf() {
                 compressed.inner |= 1 << side;
                 compressed.counts[side] = 1;
-                stack.push((child.0, numbered));
+                numbers[child.0 as usize] = numbered;
                 numbered += 1;
                 continue;
             }
@@ -134,11 +129,10 @@ fn compress(nodes: &[Node8], blocks: usize) -> (Vec<(CompressedNode, u32)>, Vec<
             }
             slot += count;
         }
-        // Depth first, so that a subtree is close together in memory.
-        stack[pushed..].reverse();
-        out[to as usize] = Some((compressed, from));
+        out.push((compressed, from));
     }
-    (out.into_iter().flatten().collect(), slots)
+    out.sort_unstable_by_key(|(_, from)| numbers[*from as usize]);
+    (out, slots)
 }
 
 /// A compressed node that has its boxes, but no references yet.

@@ -18,6 +18,7 @@ pub mod node;
 mod pages;
 mod stacks;
 mod traverse;
+mod treelets;
 mod widen;
 
 #[cfg(test)]
@@ -35,6 +36,7 @@ use pages::in_large_pages;
 use stacks::Stacks;
 pub use traverse::TraversalStack;
 use traverse::{Eight, Other, Two, Width, blocker, closest};
+use treelets::in_treelets;
 use widen::MAX_WIDTH;
 
 /// A set of triangles for which no hierarchy can be built.
@@ -82,6 +84,34 @@ struct OtherTree {
     depth: u32,
 }
 
+/// The tree that is traversed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct TreeOptions {
+    /// Its kind.
+    pub kind: TraversalKind,
+    /// Size of its treelets. Without, nodes are depth first.
+    pub treelet_bytes: Option<u32>,
+}
+
+impl From<TraversalKind> for TreeOptions {
+    fn from(kind: TraversalKind) -> Self {
+        Self {
+            kind,
+            treelet_bytes: None,
+        }
+    }
+}
+
+/// Bytes of a node in a ray-tracing unit's memory.
+fn node_bytes(kind: TraversalKind) -> usize {
+    match kind {
+        TraversalKind::Bvh2 => size_of::<Node2>(),
+        TraversalKind::Bvh4 => NODE4_BYTES,
+        TraversalKind::Bvh8 => size_of::<Node8>(),
+        TraversalKind::Cwbvh8 => size_of::<CompressedNode>(),
+    }
+}
+
 /// The trees over a set of triangles.
 pub struct Bvh {
     nodes2: Vec<Node2>,
@@ -96,6 +126,7 @@ pub struct Bvh {
     depth2: u32,
     depth8: u32,
     other: OtherTree,
+    treelet_bytes: Option<u32>,
     /// Entries that a traversal stack needs.
     stack_size: usize,
     sah_cost: f64,
@@ -113,15 +144,15 @@ impl Bvh {
         triangles: &[[[f32; 3]; 3]],
         masked: impl Fn(u32) -> bool,
     ) -> Result<Self, BvhError> {
-        Self::build_for(TraversalKind::Bvh2, triangles, masked)
+        Self::build_for(TraversalKind::Bvh2.into(), triangles, masked)
     }
 
-    /// [`Self::build`], with the tree of a kind besides.
+    /// [`Self::build`], with the tree that the options describe.
     ///
     /// # Errors
     /// There are more triangles than node references can number.
     pub fn build_for(
-        kind: TraversalKind,
+        options: TreeOptions,
         triangles: &[[[f32; 3]; 3]],
         masked: impl Fn(u32) -> bool,
     ) -> Result<Self, BvhError> {
@@ -151,19 +182,33 @@ impl Bvh {
         let built: Vec<_> = stacks.built.iter().map(|at| kept[*at as usize]).collect();
         let mut tree = build::build_binary(&built);
         stacks.expand(&mut tree, &kept);
-        let layout = build::lay_out(&tree, &kept, &numbers);
+        let mut layout = build::lay_out(&tree, &kept, &numbers);
         let wide = |kind: TraversalKind| build::emit_wide(&tree, &layout.children, kind.width());
-        let (nodes8, depth8) = wide(TraversalKind::Bvh8);
+        let (mut nodes8, depth8) = wide(TraversalKind::Bvh8);
         let mut other = OtherTree::default();
+        let kind = options.kind;
+        let treelet_bytes = options.treelet_bytes;
+        let treelet_nodes = treelet_bytes.map(|bytes| bytes as usize / node_bytes(kind));
+        let sorted = |nodes: Vec<Node8>| match treelet_nodes {
+            Some(most) => in_treelets(&nodes, most),
+            None => nodes,
+        };
         match kind {
-            TraversalKind::Bvh2 | TraversalKind::Bvh8 => {}
+            TraversalKind::Bvh2 => {
+                if let Some(most) = treelet_nodes {
+                    layout.nodes2 = in_treelets(&layout.nodes2, most);
+                }
+            }
+            TraversalKind::Bvh8 => nodes8 = sorted(nodes8),
             TraversalKind::Bvh4 => {
-                (other.nodes, other.depth) = wide(kind);
+                let (nodes, depth) = wide(kind);
+                (other.nodes, other.depth) = (sorted(nodes), depth);
                 other.first_slots.clone_from(&layout.first_slots);
                 other.kind = Some(kind);
             }
             TraversalKind::Cwbvh8 => {
-                (other.nodes, other.first_slots) = compressed(&nodes8, layout.blocks.len());
+                let blocks = layout.blocks.len();
+                (other.nodes, other.first_slots) = compressed(&sorted(nodes8.clone()), blocks);
                 other.depth = depth8;
                 other.kind = Some(kind);
             }
@@ -184,6 +229,7 @@ impl Bvh {
             depth2: layout.depth2,
             depth8,
             other,
+            treelet_bytes,
             stack_size: most_stacked.into_iter().max().unwrap_or(0) as usize + MAX_WIDTH,
             sah_cost: layout.sah_cost,
             instructions: Instructions::best(),
@@ -220,25 +266,28 @@ impl Bvh {
     /// Summary of the tree for a trace.
     #[must_use]
     pub fn summary(&self, traversal: TraversalKind) -> BvhSummary {
-        let (nodes, depth, bytes) = match traversal {
-            TraversalKind::Bvh2 => (self.nodes2.len(), self.depth2, size_of::<Node2>()),
-            TraversalKind::Bvh8 => (self.nodes8.len(), self.depth8, size_of::<Node8>()),
-            TraversalKind::Bvh4 => (self.other.nodes.len(), self.other.depth, NODE4_BYTES),
-            TraversalKind::Cwbvh8 => {
-                let bytes = size_of::<CompressedNode>();
-                (self.other.nodes.len(), self.other.depth, bytes)
+        let (nodes, depth) = match traversal {
+            TraversalKind::Bvh2 => (self.nodes2.len(), self.depth2),
+            TraversalKind::Bvh8 => (self.nodes8.len(), self.depth8),
+            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => {
+                (self.other.nodes.len(), self.other.depth)
             }
         };
+        let mut settings = build::settings();
+        let treelets = self
+            .treelet_bytes
+            .map(|bytes| ("treelet_bytes".to_owned(), bytes.to_string()));
+        settings.extend(treelets);
         BvhSummary {
             builder: "obvhs 0.4 ploc+reinsertion, leaves by blocks".to_owned(),
-            settings: build::settings(),
+            settings,
             traversal,
             triangles: self.triangles,
             nodes: nodes as u64,
             leaves: self.leaves,
             depth,
             sah_cost: self.sah_cost,
-            bytes_per_node: bytes as u32,
+            bytes_per_node: node_bytes(traversal) as u32,
             bytes_per_triangle: TRIANGLE_BYTES,
         }
     }

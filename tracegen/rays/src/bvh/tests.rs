@@ -6,19 +6,24 @@ use glam::{DVec3, Vec3};
 
 #[test]
 fn hits_of_all_trees_and_both_kernels_equal_brute_force() {
-    for third in [TraversalKind::Bvh4, TraversalKind::Cwbvh8] {
-        hits_equal_brute_force(third);
+    for kind in TraversalKind::ALL {
+        for treelet_bytes in [None, Some(1024)] {
+            hits_equal_brute_force(TreeOptions {
+                kind,
+                treelet_bytes,
+            });
+        }
     }
 }
 
-fn hits_equal_brute_force(third: TraversalKind) {
+fn hits_equal_brute_force(options: TreeOptions) {
     for mesh in [
         TestMesh::sphere(2),
         TestMesh::grid_box(6),
         TestMesh::torus(24, 12),
     ] {
         let triangles = mesh.rounded(DVec3::ZERO);
-        let build = || Bvh::build_for(third, &triangles, |_| false).expect("builds");
+        let build = || Bvh::build_for(options, &triangles, |_| false).expect("builds");
         let fast = build();
         let plain = build().with_instructions(Instructions::Scalar);
         let mut stack = TraversalStack::default();
@@ -37,7 +42,7 @@ fn hits_equal_brute_force(third: TraversalKind) {
             let ray = Ray::new(origin, aim - origin);
             let expected = brute_force_f32(&triangles, fast.bounds, &ray);
             hits += u32::from(expected.is_some());
-            for tree in [TraversalKind::Bvh2, TraversalKind::Bvh8, third] {
+            for tree in [TraversalKind::Bvh2, options.kind] {
                 let work = [&fast, &plain].map(|bvh| {
                     let mut counts = Counts::default();
                     let hit = bvh.closest(tree, &ray, &mut stack, &mut counts, &AllOpaque);

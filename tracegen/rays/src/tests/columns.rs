@@ -21,7 +21,7 @@ struct Stored {
 
 /// All rays of a trace, and its hierarchy.
 fn columns(traversal: TraversalKind) -> (Vec<Stored>, Hierarchy) {
-    let scene = TraceScene::with_tree(scene(), traversal).expect("small");
+    let scene = TraceScene::with_tree(scene(), traversal.into()).expect("small");
     let (_, bytes) = trace(&scene, settings(traversal), SIZE_PX);
     let trace = Raytrace::from_bytes(bytes).expect("opens");
     let (hierarchy, _) = trace.read_hierarchy().expect("reads").expect("is there");
