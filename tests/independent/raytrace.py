@@ -32,6 +32,15 @@ RAY_META = {
     "has_visits": "bool",
     "sky": [V3, V3],
 }
+LIGHTING = {
+    "light_radius_m": "f32",
+    "sun_radius_deg": "f32",
+    "occlusion_rays": "u32",
+    "occlusion_m": "f32",
+    "bounces": "u32",
+    "coloured_shadows": "bool",
+    "normal_maps": "bool",
+}
 HIERARCHY = {
     "builder": "string",
     "settings": (["string", "string"],),
@@ -56,7 +65,7 @@ LIGHTS = {
     "directional": {"kind": "string", "direction": V3, "color": V3},
     "point": {"kind": "string", "position": V3, "color": V3},
 }
-KINDS = ["primary", "shadow", "reflection", "refraction"]
+KINDS = ["primary", "shadow", "reflection", "refraction", "ambient-occlusion", "diffuse"]
 OUTCOMES = ["miss", "hit", "occluded"]
 FARTHEST = f32(1e18)
 
@@ -77,6 +86,12 @@ def check_ray_meta(meta):
                 length = math.sqrt(product) if i == j else product
                 require(abs(length - (i == j)) <= 0.0011, "axes of an eye")
         require(within(eye["position"]), "position of an eye")
+    if "lighting" in meta:
+        light = meta["lighting"]
+        lengths = [light["light_radius_m"], light["occlusion_m"]]
+        require(all(0 <= length <= FARTHEST for length in lengths), "lengths of lighting")
+        require(0 <= light["sun_radius_deg"] <= 45, "size of the sun")
+        require(light["occlusion_rays"] <= 1024 and light["bounces"] <= 64, "rays of lighting")
     require(meta["max_depth"] <= 64 and 1 <= meta["samples_per_px"] <= 1024, "samples or depth")
     return meta
 
@@ -223,10 +238,11 @@ def colors(data, count):
     return [list(color) for color in zip(*channels)]
 
 
-def read_ray(data, own, earlier):
+def read_ray(data, own, earlier, lighting):
     head = data.take(1)[0]
-    kind, outcome = KINDS[head & 3], head >> 2 & 3
-    require(outcome < 3 and head >> 6 == 0, "a ray's byte")
+    number, outcome = head & 3 | head >> 4 & 4, head >> 2 & 3
+    require(outcome < 3 and head >> 7 == 0 and number < (6 if lighting else 4), "a ray's byte")
+    kind = KINDS[number]
     require((own == 0) == (kind == "primary"), "a primary ray first, then the others")
     parent, depth = None, 0
     if own == 0:
@@ -320,7 +336,7 @@ def read_tile(data, pixels, eye, meta, bvh, triangles):
         )
     for number, each in zip(counts, out):
         for own in range(number):
-            each["rays"].append(read_ray(data, own, each["rays"]))
+            each["rays"].append(read_ray(data, own, each["rays"], "lighting" in meta))
     rays = [ray for each in out for ray in each["rays"]]
     if meta["has_visits"]:
         read_visits(data, rays, bvh)
@@ -353,8 +369,12 @@ def hierarchy_lines(chunks, version, bvh):
 def main(path, what=None):
     chunks, version = read(path, 2)
     require(TAGS <= set(chunks), "chunks missing")
-    meta = check_ray_meta(shaped(parse_json(chunks["META"]), RAY_META))
+    text = parse_json(chunks["META"])
+    shape = RAY_META | ({"lighting": LIGHTING} if "lighting" in text else {})
+    meta = check_ray_meta(shaped(text, shape))
     bvh = check_hierarchy(shaped(parse_json(chunks["RBVH"]), HIERARCHY))
+    if "lighting" in meta or bvh["traversal"] in ("bvh4", "cwbvh8"):
+        require(version[1] >= 4, "a later version")
     materials = shaped(parse_json(chunks["RMAT"]), (MATERIAL,))
     lights = [read_light(light) for light in shaped(parse_json(chunks["RLIT"]), ("any",))]
     triangles = read_triangles(chunks["RTRI"], materials)

@@ -368,6 +368,7 @@ pub fn ray_tables(samples_per_px: u32, has_visits: bool) -> RaytraceTables {
             samples_per_px,
             has_visits,
             sky: [[0.3, 0.4, 0.5], [0.1; 3]],
+            lighting: None,
         },
         bvh: BvhSummary {
             builder: "none".to_owned(),

@@ -304,6 +304,38 @@ fn python_reads_all_columns_of_fresh_rays_as_replay_does() {
 }
 
 #[test]
+fn python_reads_rays_beyond_whitteds_model_as_replay_does() {
+    if !has_python() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("light.raytrace");
+    let options = [
+        ["--ambient-occlusion", "4", "--sun-radius", "2"],
+        ["--bounces", "3", "--light-radius", "0.2"],
+    ];
+    for light in options {
+        run_ok(
+            program("tracegen")
+                .args(["rays", "chess", "--size", "40x24", "--spp", "2"])
+                .args([
+                    "--all-columns",
+                    "--coloured-shadows",
+                    "--normal-maps",
+                    "--seed",
+                    "5",
+                ])
+                .args(light)
+                .arg("-o")
+                .arg(&path),
+        );
+        assert_eq!(check(&path), 2 * 40 * 24 * 2);
+        run_ok(program("replay").arg("validate").arg(&path));
+        run_ok(program("replay").arg("reproject").arg(&path));
+    }
+}
+
+#[test]
 fn python_refuses_damaged_traces() {
     if !has_python() {
         return;

@@ -217,7 +217,14 @@ impl From<&RaySample<'_>> for SamplePlace {
 
 /// Names of the eyes.
 pub const EYES: &[&str] = &["left", "right"];
-const RAY_KINDS: &[&str] = &["primary", "shadow", "reflection", "refraction"];
+const RAY_KINDS: &[&str] = &[
+    "primary",
+    "shadow",
+    "reflection",
+    "refraction",
+    "ambient-occlusion",
+    "diffuse",
+];
 const OUTCOMES: &[&str] = &["miss", "hit", "occluded"];
 const ENTRIES: &[&str] = &["node", "triangle"];
 
@@ -506,12 +513,7 @@ mod tests {
         for eye in [Eye::Left, Eye::Right] {
             assert_eq!(EYES[usize::from(eye_code(eye))], eye.to_string());
         }
-        for kind in [
-            RayKind::Primary,
-            RayKind::Shadow,
-            RayKind::Reflection,
-            RayKind::Refraction,
-        ] {
+        for kind in RayKind::ALL {
             assert_eq!(RAY_KINDS[usize::from(kind_code(kind))], kind.to_string());
         }
         for outcome in [Outcome::Miss, Outcome::Hit, Outcome::Occluded] {

@@ -86,21 +86,27 @@ pub fn sample_position_px(x: u32, y: u32, sample: u32, samples_per_px: u32) -> [
     if samples_per_px <= 1 {
         return [x as f32 + 0.5, y as f32 + 0.5];
     }
+    let [u, v] = r2_point(sample, hash(x.wrapping_mul(0x9E37_79B9) ^ hash(y)));
+    [x as f32 + u, y as f32 + v]
+}
+
+/// A point of Roberts's low-discrepancy sequence R2 in the unit square, shifted by a random number.
+#[must_use]
+pub fn r2_point(number: u32, shift: u32) -> [f32; 2] {
     // Fractions of 2^32. The sequence's generators are 1/g and 1/g^2 with g = 1.3247179572.
-    const R2: [u32; 2] = [3_242_174_889, 2_447_445_414];
-    let shift = hash(x.wrapping_mul(0x9E37_79B9) ^ hash(y));
-    let fraction = |axis: usize, shift: u32| {
-        let bits = R2[axis].wrapping_mul(sample).wrapping_add(shift);
+    let fraction = |generator: u32, shift: u32| {
+        let bits = generator.wrapping_mul(number).wrapping_add(shift);
         (bits >> 8) as f32 / (1u32 << 24) as f32
     };
     [
-        x as f32 + fraction(0, shift),
-        y as f32 + fraction(1, hash(shift)),
+        fraction(3_242_174_889, shift),
+        fraction(2_447_445_414, hash(shift)),
     ]
 }
 
 /// Integer hash with full avalanche (Wellons' lowbias32).
-fn hash(mut v: u32) -> u32 {
+#[must_use]
+pub fn hash(mut v: u32) -> u32 {
     v ^= v >> 16;
     v = v.wrapping_mul(0x7FEB_352D);
     v ^= v >> 15;

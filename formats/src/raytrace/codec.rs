@@ -20,6 +20,8 @@ use nom::number::complete::u8 as byte;
 const HAS_ALPHA_TESTS: u8 = 1 << 4;
 /// Flag: the parent is the pixel's primary ray, and no number follows.
 const PARENT_IS_PRIMARY: u8 = 1 << 5;
+/// Flag in the first byte of a ray of a kind from 4 on.
+const LATER_KIND: u8 = 1 << 6;
 
 /// Bits of a visit: the zigzag of a difference of 32-bit numbers, and the kind.
 const VISIT_BITS: u32 = 34;
@@ -97,7 +99,10 @@ fn put_colors(colors: impl Iterator<Item = [f32; 3]> + Clone, out: &mut Vec<u8>)
 }
 
 fn put_ray(own: u32, ray: &RayRecord, out: &mut Vec<u8>) {
-    let mut head = ray.kind as u8 | (ray.outcome as u8) << 2;
+    let mut head = (ray.kind as u8 & 3) | (ray.outcome as u8) << 2;
+    if ray.kind.is_later() {
+        head |= LATER_KIND;
+    }
     if ray.alpha_tests > 0 {
         head |= HAS_ALPHA_TESTS;
     }
@@ -250,7 +255,7 @@ pub(super) fn decode<'a>(
             .map(|p| &mut p.view_dependent)
             .collect(),
     )?;
-    decode_rays(&mut input, tile)?;
+    decode_rays(&mut input, tile, tables.meta.lighting.is_some())?;
     if tables.meta.has_visits {
         decode_visits(&mut input, tables, tile)?;
     }
@@ -285,7 +290,11 @@ fn decode_colors<'a>(
     Ok(())
 }
 
-fn decode_rays<'a>(input: &mut Cursor<'a>, tile: &mut RayTile) -> Result<(), nom::Err<Fault<'a>>> {
+fn decode_rays<'a>(
+    input: &mut Cursor<'a>,
+    tile: &mut RayTile,
+    later_kinds: bool,
+) -> Result<(), nom::Err<Fault<'a>>> {
     let mut total = 0u32;
     for pixel in &mut tile.pixels {
         let at = *input;
@@ -301,7 +310,8 @@ fn decode_rays<'a>(input: &mut Cursor<'a>, tile: &mut RayTile) -> Result<(), nom
     tile.rays.reserve(total as usize);
     for pixel in &tile.pixels {
         for own in 0..pixel.ray_count {
-            let ray = decode_ray(input, own, tile.rays.get(pixel.first_ray as usize..))?;
+            let earlier = tile.rays.get(pixel.first_ray as usize..);
+            let ray = decode_ray(input, own, earlier, later_kinds)?;
             tile.rays.push(ray);
         }
     }
@@ -312,14 +322,22 @@ fn decode_ray<'a>(
     input: &mut Cursor<'a>,
     own: u32,
     earlier: Option<&[RayRecord]>,
+    later_kinds: bool,
 ) -> Result<RayRecord, nom::Err<Fault<'a>>> {
     let at = *input;
     let head = input.parse(byte)?;
-    let kind = match head & 3 {
-        0 => RayKind::Primary,
-        1 => RayKind::Shadow,
-        2 => RayKind::Reflection,
-        _ => RayKind::Refraction,
+    let later = head & LATER_KIND != 0;
+    let kind = match (head & 3, later) {
+        (0, false) => RayKind::Primary,
+        (1, false) => RayKind::Shadow,
+        (2, false) => RayKind::Reflection,
+        (3, false) => RayKind::Refraction,
+        (0, true) if later_kinds => RayKind::AmbientOcclusion,
+        (1, true) if later_kinds => RayKind::Diffuse,
+        (number, _) => {
+            let found = format_args!("{}", number + 4).to_string();
+            return Err(at.fault("a kind that the trace's lighting has", found));
+        }
     };
     let outcome = match head >> 2 & 3 {
         0 => Outcome::Miss,
@@ -327,7 +345,7 @@ fn decode_ray<'a>(
         2 => Outcome::Occluded,
         _ => return Err(at.fault("an outcome of 0 to 2", 3)),
     };
-    if head >> 6 != 0 || (own == 0 && head & PARENT_IS_PRIMARY != 0) {
+    if head >> 7 != 0 || (own == 0 && head & PARENT_IS_PRIMARY != 0) {
         return Err(at.fault("no other flags", format_args!("{head:#04x}")));
     }
     if (own == 0) != (kind == RayKind::Primary) {

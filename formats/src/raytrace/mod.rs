@@ -57,6 +57,28 @@ pub struct RaytraceMeta {
     /// Radiance of the sky and of the ground below the horizon, linear RGB. Misses see it, and it is the
     /// ambient light.
     pub sky: [[f32; 3]; 2],
+    /// Light beyond Whitted's model, if any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lighting: Option<RayLighting>,
+}
+
+/// Light beyond Whitted's model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RayLighting {
+    /// Radius of point lights in metres; 0 for points.
+    pub light_radius_m: f32,
+    /// Angular radius of parallel lights in degrees; 0 for parallel light.
+    pub sun_radius_deg: f32,
+    /// Ambient-occlusion rays per primary hit.
+    pub occlusion_rays: u32,
+    /// Their largest distance in metres.
+    pub occlusion_m: f32,
+    /// Diffuse rays of a path in a row, at most.
+    pub bounces: u32,
+    /// Whether glass and blended surfaces colour the light of shadow rays.
+    pub coloured_shadows: bool,
+    /// Whether normal maps bend shading normals.
+    pub normal_maps: bool,
 }
 
 /// Effects of a material on a ray.
@@ -143,10 +165,10 @@ pub enum TraversalKind {
 }
 
 impl TraversalKind {
-    /// Every kind.
+    /// Every kind of tree.
     pub const ALL: [Self; 4] = [Self::Bvh2, Self::Bvh4, Self::Bvh8, Self::Cwbvh8];
 
-    /// Whether files with such a tree need minor version [`tables::TREES_MINOR`].
+    /// Whether files with such a tree need minor version [`tables::LATER_MINOR`].
     pub(crate) const fn is_of_minor_4(self) -> bool {
         matches!(self, Self::Bvh4 | Self::Cwbvh8)
     }
@@ -216,6 +238,8 @@ impl std::fmt::Display for RayKind {
             Self::Shadow => "shadow",
             Self::Reflection => "reflection",
             Self::Refraction => "refraction",
+            Self::AmbientOcclusion => "ambient-occlusion",
+            Self::Diffuse => "diffuse",
         })
     }
 }
@@ -234,6 +258,34 @@ pub enum RayKind {
     Reflection = 2,
     /// Through glass or a blended surface; closest hit.
     Refraction = 3,
+    /// Into the hemisphere of a surface, up to a distance; any hit.
+    AmbientOcclusion = 4,
+    /// Scattered by a diffuse surface; closest hit.
+    Diffuse = 5,
+}
+
+impl RayKind {
+    /// Every kind, in the order of their numbers.
+    pub const ALL: [Self; 6] = [
+        Self::Primary,
+        Self::Shadow,
+        Self::Reflection,
+        Self::Refraction,
+        Self::AmbientOcclusion,
+        Self::Diffuse,
+    ];
+
+    /// Whether only traces with lighting have the kind.
+    #[must_use]
+    pub const fn is_later(self) -> bool {
+        matches!(self, Self::AmbientOcclusion | Self::Diffuse)
+    }
+
+    /// Whether the ray ends at any triangle, not only at the nearest.
+    #[must_use]
+    pub const fn ends_at_any_hit(self) -> bool {
+        matches!(self, Self::Shadow | Self::AmbientOcclusion)
+    }
 }
 
 /// Results of rays.
@@ -241,12 +293,12 @@ pub enum RayKind {
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
 pub enum Outcome {
-    /// Left the scene; for a shadow ray: reached the light.
+    /// Left the scene; for a shadow ray: reached the light; for an ambient-occlusion ray: met nothing.
     #[default]
     Miss = 0,
     /// Found its closest hit.
     Hit = 1,
-    /// A shadow ray that is blocked.
+    /// A shadow or ambient-occlusion ray that is blocked.
     Occluded = 2,
 }
 

@@ -75,7 +75,7 @@ pub(super) struct Predictor<'a> {
     samples_per_px: u32,
     origin_px: [u32; 2],
     width_px: u32,
-    kinds: [OfKind; 4],
+    kinds: [OfKind; 6],
     /// Rays of the current sample.
     families: Vec<Family>,
 }
@@ -88,7 +88,7 @@ impl<'a> Predictor<'a> {
             samples_per_px: tables.meta.samples_per_px.max(1),
             origin_px: tile.origin_px,
             width_px: tile.size_px[0].max(1),
-            kinds: [OfKind::default(); 4],
+            kinds: [OfKind::default(); 6],
             families: Vec::new(),
         }
     }
@@ -99,7 +99,7 @@ impl<'a> Predictor<'a> {
     }
 
     /// The last values of a kind.
-    #[allow(clippy::indexing_slicing, reason = "four kinds")]
+    #[allow(clippy::indexing_slicing, reason = "six kinds")]
     pub fn of_kind(&mut self, kind: RayKind) -> &mut OfKind {
         &mut self.kinds[kind as usize]
     }
@@ -188,6 +188,7 @@ impl<'a> Predictor<'a> {
                 _ => (last, None),
             },
             RayKind::Refraction => (self.parent(record).geometry.direction, None),
+            RayKind::AmbientOcclusion | RayKind::Diffuse => (last, None),
         }
     }
 

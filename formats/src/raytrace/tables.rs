@@ -1,7 +1,7 @@
 //! The tables of a ray trace as chunks: META, RBVH, RMAT and RLIT (JSON), RTRI (binary).
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::{BvhSummary, EyeCamera, RayTriangle, RaytraceMeta, RaytraceTables};
+use super::{BvhSummary, EyeCamera, RayLighting, RayTriangle, RaytraceMeta, RaytraceTables};
 use crate::container::{ChunkTag, Container, ContainerWriter};
 use crate::error::{Broken, FormatError, Result, ensure};
 use crate::json;
@@ -27,14 +27,18 @@ pub const TRIANGLES: ChunkTag = ChunkTag(*b"RTRI");
 
 /// Bytes of a triangle: primitive, object, material, nine coordinates.
 pub const TRIANGLE_ENTRY_BYTES: usize = 48;
-/// Minor version of files with four-wide or compressed trees.
-pub const TREES_MINOR: u16 = 4;
+/// Minor version of files with four-wide or compressed trees, or with lighting.
+pub const LATER_MINOR: u16 = 4;
 /// Maximum number of samples per pixel.
 pub const MAX_SAMPLES_PER_PX: u32 = 1024;
 /// Maximum depth of reflections.
 pub const MAX_DEPTH: u32 = 64;
 /// Largest absolute coordinate of a vertex or an eye in metres.
 pub const MAX_COORDINATE_M: f32 = 1e18;
+/// Largest angular radius of a parallel light.
+pub const MAX_SUN_RADIUS_DEG: f32 = 45.0;
+/// Most ambient-occlusion rays of a primary hit.
+pub const MAX_OCCLUSION_RAYS: u32 = 1024;
 /// Largest size of a node or a triangle in memory.
 pub const MAX_ENTRY_BYTES: u32 = 4096;
 
@@ -82,9 +86,15 @@ pub(super) fn read(container: &Container) -> Result<RaytraceTables> {
         triangles: container.parse_chunk(TRIANGLES, read_triangles)?,
     };
     let (major, minor) = container.version();
-    if tables.bvh.traversal.is_of_minor_4() && minor < TREES_MINOR {
-        let expected = format!("version {major}.{TREES_MINOR} for this kind of tree");
-        return Err(container.malformed(BVH, 0, expected, format!("{major}.{minor}")));
+    if minor < LATER_MINOR {
+        let later = [
+            (BVH, "kind of tree", tables.bvh.traversal.is_of_minor_4()),
+            (META, "lighting", tables.meta.lighting.is_some()),
+        ];
+        for (chunk, what, _) in later.into_iter().filter(|(.., has)| *has) {
+            let expected = format!("version {major}.{LATER_MINOR} for this {what}");
+            return Err(container.malformed(chunk, 0, expected, format!("{major}.{minor}")));
+        }
     }
     check(&tables).map_err(|((chunk, offset), broken)| {
         let expected = format!("{}: {}", broken.what, broken.expected);
@@ -145,7 +155,42 @@ fn check_meta(meta: &RaytraceMeta) -> std::result::Result<(), Broken> {
     )?;
     ensure(meta.max_depth <= MAX_DEPTH, || {
         Broken::new("depth", format!("at most {MAX_DEPTH}"), meta.max_depth)
-    })
+    })?;
+    meta.lighting.iter().try_for_each(check_lighting)
+}
+
+fn check_lighting(lighting: &RayLighting) -> std::result::Result<(), Broken> {
+    let RayLighting {
+        light_radius_m,
+        sun_radius_deg,
+        occlusion_rays,
+        occlusion_m,
+        bounces,
+        ..
+    } = *lighting;
+    let lengths = [light_radius_m, occlusion_m];
+    ensure(
+        lengths.iter().all(|m| (0.0..=MAX_COORDINATE_M).contains(m)),
+        || {
+            let expected = format!("lengths of 0 to {MAX_COORDINATE_M:e} m");
+            Broken::new("lighting", expected, format_args!("{lengths:?}"))
+        },
+    )?;
+    ensure((0.0..=MAX_SUN_RADIUS_DEG).contains(&sun_radius_deg), || {
+        let expected = format!("a sun of 0 to {MAX_SUN_RADIUS_DEG} degrees");
+        Broken::new("lighting", expected, sun_radius_deg)
+    })?;
+    ensure(
+        occlusion_rays <= MAX_OCCLUSION_RAYS && bounces <= MAX_DEPTH,
+        || {
+            let expected = format!("at most {MAX_OCCLUSION_RAYS} rays and {MAX_DEPTH} bounces");
+            Broken::new(
+                "lighting",
+                expected,
+                format_args!("{occlusion_rays} and {bounces}"),
+            )
+        },
+    )
 }
 
 fn check_eye(eye: &EyeCamera, size_px: [u32; 2]) -> std::result::Result<(), Broken> {

@@ -61,6 +61,11 @@ fn meta(has_visits: bool) -> RaytraceMeta {
         samples_per_px: 1,
         has_visits,
         sky: [[0.3, 0.4, 0.5], [0.1; 3]],
+        // Kinds of rays beyond Whitted's.
+        lighting: has_visits.then(|| RayLighting {
+            bounces: 2,
+            ..RayLighting::default()
+        }),
     }
 }
 
@@ -156,8 +161,8 @@ pub(super) fn tile(tables: &RaytraceTables, eye: Eye, number: u32, seed: u64) ->
             let ray = RayRecord {
                 kind: match own {
                     0 => RayKind::Primary,
-                    _ => [RayKind::Shadow, RayKind::Reflection, RayKind::Refraction]
-                        [next(3) as usize],
+                    _ if tables.meta.lighting.is_some() => RayKind::ALL[1 + next(5) as usize],
+                    _ => RayKind::ALL[1 + next(3) as usize],
                 },
                 outcome: [Outcome::Miss, Outcome::Hit, Outcome::Occluded][next(3) as usize],
                 depth: if own == 0 {
@@ -279,6 +284,21 @@ fn a_damaged_tile_is_named_by_file_chunk_and_byte() {
     let text = error.to_string();
     let start = "memory: chunk RAYS at byte 48: expected a tile with CRC-32 ";
     assert!(text.starts_with(start), "{text}");
+}
+
+#[test]
+fn kinds_beyond_whitteds_need_lighting() {
+    let mut tables = tables(true);
+    let mut writer = RaytraceWriter::in_memory().expect("in memory");
+    for (eye, number) in eyes_and_tiles(&tables) {
+        let tile = tile(&tables, eye, number, 1);
+        writer
+            .tile(&encode_ray_tile(&tile, true).expect("encodes"))
+            .expect("writes");
+    }
+    tables.meta.lighting = None;
+    let refused = writer.into_bytes(&tables).expect_err("has diffuse rays");
+    assert!(refused.to_string().contains("no lighting"), "{refused}");
 }
 
 #[test]

@@ -24,6 +24,8 @@ pub struct EncodedRayTile {
     crc32: u32,
     rays: u32,
     geometry: Option<Vec<u8>>,
+    /// A ray of a kind that only a trace with lighting has.
+    has_later_kinds: bool,
 }
 
 impl EncodedRayTile {
@@ -54,6 +56,7 @@ pub fn encode_ray_tile(tile: &RayTile, has_visits: bool) -> Result<EncodedRayTil
         rays: u32::try_from(tile.rays.len()).map_err(too_many)?,
         bytes,
         geometry: None,
+        has_later_kinds: tile.rays.iter().any(|ray| ray.kind.is_later()),
     })
 }
 
@@ -98,6 +101,7 @@ pub struct RaytraceWriter<W = AtomicFile> {
     offset: u64,
     geometry: GeometrySpool,
     hierarchy: Option<Hierarchy>,
+    has_later_kinds: bool,
 }
 
 impl RaytraceWriter<AtomicFile> {
@@ -156,6 +160,7 @@ impl<W: Write + Seek> RaytraceWriter<W> {
                 offset: 0,
             },
             hierarchy: None,
+            has_later_kinds: false,
         })
     }
 
@@ -183,6 +188,7 @@ impl<W: Write + Seek> RaytraceWriter<W> {
             self.index.extend(number.to_le_bytes());
         }
         self.offset += u64::from(bytes);
+        self.has_later_kinds |= tile.has_later_kinds;
         if let Some(geometry) = &tile.geometry {
             self.geometry.append(geometry)?;
         }
@@ -197,6 +203,13 @@ impl<W: Write + Seek> RaytraceWriter<W> {
                 what: "tiles".to_owned(),
                 expected: format!("{tiles}, all of both eyes"),
                 found: written.to_string(),
+            });
+        }
+        if self.has_later_kinds && tables.meta.lighting.is_none() {
+            return Err(FormatError::Unwritable {
+                what: "rays".to_owned(),
+                expected: "kinds of Whitted's model, as the trace has no lighting".to_owned(),
+                found: "ambient occlusion or diffuse rays".to_owned(),
             });
         }
         let with_geometry = self.geometry.index.len() / GEOMETRY_INDEX_ENTRY_BYTES;
@@ -221,8 +234,8 @@ impl<W: Write + Seek> RaytraceWriter<W> {
             let triangles = hierarchy_codec::encode_triangles(&hierarchy.triangles);
             self.container.chunk(SLOTS, &triangles)?;
         }
-        if tables.bvh.traversal.is_of_minor_4() {
-            self.container.require_minor(tables::TREES_MINOR);
+        if tables.bvh.traversal.is_of_minor_4() || tables.meta.lighting.is_some() {
+            self.container.require_minor(tables::LATER_MINOR);
         }
         tables::write(tables, &mut self.container)?;
         Ok(self.container)

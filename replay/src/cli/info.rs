@@ -11,10 +11,11 @@ use crate::report::table::Table;
 use anyhow::Result;
 use formats::Trace;
 use formats::container::Container;
+use formats::raytrace::RayKind;
 use formats::raytrace::{Raytrace, RaytraceTables};
 use formats::textrace::{ChosenTechniques, PassKind, Textrace, TraceMeta};
 use formats::texture::Texture;
-use json::{PassJson, RAY_KINDS, RayCounts, Totals, lower, passes, ray_counts, version};
+use json::{PassJson, RayCounts, Totals, lower, passes, ray_counts, version};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -195,11 +196,14 @@ fn ray_text(trace: &Raytrace) -> Result<String> {
         count("samples", |r: &EyeRow| r.1.samples),
         count("hits", |r: &EyeRow| r.1.hits),
     ];
-    for kind in RAY_KINDS {
+    for kind in RayKind::ALL {
         let rays = move |r: &EyeRow| r.1.rays[kind as usize];
+        if kind.is_later() && left.rays[kind as usize] + right.rays[kind as usize] == 0 {
+            continue;
+        }
         columns.push(Column::new(
-            lower(&kind),
-            lower(&kind),
+            kind.to_string(),
+            kind.to_string(),
             "",
             Show::Whole,
             rays,

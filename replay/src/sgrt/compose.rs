@@ -75,7 +75,10 @@ pub fn compose(frame: &Frame, decisions: &[Decision], reuse: Reuse) -> Vec<[f32;
             if reuse == Reuse::Pixel && !truth.is_sky() {
                 return left.color();
             }
-            let outcomes = |eye: usize, at: usize| frame.eyes[eye].work[at].shadow_outcomes();
+            let outcomes = |eye: usize, at: usize| {
+                let work = &frame.eyes[eye].work[at];
+                (work.shadow_outcomes(), work.occlusion_blocked)
+            };
             let true_shadows = reuse == Reuse::Primary
                 || decision.retraces_shadows
                 || (reuse == Reuse::Shadow

@@ -195,6 +195,7 @@ pub fn trace(scene: &[Placed], view: View) -> Synthetic {
             samples_per_px: view.samples_per_px,
             has_visits: false,
             sky: [[0.3, 0.5, 0.9]; 2],
+            lighting: None,
         },
         bvh: BvhSummary {
             traversal: view.tree,

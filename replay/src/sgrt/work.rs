@@ -8,9 +8,9 @@ use formats::raytrace::{NO_PARENT, Outcome, RayKind, RayRecord};
 pub enum RayClass {
     /// From the eye.
     Primary = 0,
-    /// From the primary hit to a light. The result does not depend on the eye.
+    /// From the primary hit to a light, or around it for ambient occlusion. The result does not depend on the eye.
     Shadow = 1,
-    /// Reflection and refraction rays and all their descendants. The results depend on the eye.
+    /// All other rays and their descendants. The results of reflection and refraction depend on the eye.
     Secondary = 2,
 }
 
@@ -23,9 +23,13 @@ impl RayClass {
     pub fn of(ray: &RayRecord) -> Self {
         match ray.kind {
             RayKind::Primary => Self::Primary,
-            RayKind::Shadow if ray.parent == 0 => Self::Shadow,
+            RayKind::Shadow | RayKind::AmbientOcclusion if ray.parent == 0 => Self::Shadow,
             // Without parents in the trace, the depth identifies shadow rays of the first level.
-            RayKind::Shadow if ray.parent == NO_PARENT && ray.depth <= 1 => Self::Shadow,
+            RayKind::Shadow | RayKind::AmbientOcclusion
+                if ray.parent == NO_PARENT && ray.depth <= 1 =>
+            {
+                Self::Shadow
+            }
             _ => Self::Secondary,
         }
     }
@@ -59,11 +63,13 @@ impl RayWork<u64> {
 pub struct PixelWork {
     /// By [`RayClass`].
     pub by_class: [RayWork<u32>; 3],
-    /// Reflection and refraction rays. Each ends in a shading kernel.
+    /// Reflection, refraction and diffuse rays. Each ends in a shading kernel.
     pub secondary_shaded: u32,
     /// Outcomes of the primary hit's shadow rays, one bit per ray in their order: 1 if blocked. Rays beyond the
     /// 64th fold onto the first bits.
     pub shadows_blocked: u64,
+    /// The same of its ambient-occlusion rays.
+    pub occlusion_blocked: u64,
 }
 
 impl PixelWork {
@@ -79,16 +85,20 @@ impl PixelWork {
             w.triangle_tests = w.triangle_tests.saturating_add(ray.triangle_tests);
             w.alpha_tests = w.alpha_tests.saturating_add(ray.alpha_tests);
             if class == RayClass::Shadow && ray.outcome == Outcome::Occluded {
-                work.shadows_blocked ^= 1u64.rotate_left(w.rays - 1);
+                let blocked = match ray.kind {
+                    RayKind::AmbientOcclusion => &mut work.occlusion_blocked,
+                    _ => &mut work.shadows_blocked,
+                };
+                *blocked ^= 1u64.rotate_left(w.rays - 1);
             }
-            if class == RayClass::Secondary && ray.kind != RayKind::Shadow {
+            if class == RayClass::Secondary && !ray.kind.ends_at_any_hit() {
                 work.secondary_shaded = work.secondary_shaded.saturating_add(1);
             }
         }
         work
     }
 
-    /// Outcomes of the primary hit's shadow rays, and their number.
+    /// Outcomes of the primary hit's shadow rays, and the number of rays of their class.
     #[must_use]
     pub(super) fn shadow_outcomes(&self) -> (u64, u32) {
         let rays = self.by_class[RayClass::Shadow as usize].rays;

@@ -28,7 +28,7 @@ pub struct EyeImage {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FrameStats {
     /// Rays by kind, in the order of [`RayKind`].
-    pub rays: [u64; 4],
+    pub rays: [u64; 6],
     /// Steps.
     pub steps: u64,
     /// Triangle tests.

@@ -12,6 +12,7 @@ pub mod reference;
 pub mod reference_tree;
 pub mod reference_walk;
 pub mod robustness;
+mod sampling;
 pub mod scene;
 pub mod soup;
 mod texture;

@@ -1,5 +1,6 @@
 //! Lights and the laws of reflection and refraction.
 
+use super::sampling::{across, disk};
 use formats::raytrace::RayLight;
 use glam::Vec3;
 
@@ -31,6 +32,33 @@ pub fn incident(light: &RayLight, at: Vec3) -> Option<Incident> {
                 distance,
                 irradiance: Vec3::from(color) / (distance * distance).max(0.01),
             })
+        }
+    }
+}
+
+/// The light at a point from a random point of a light that has a size: a sphere of `radius_m`, of
+/// which the disk that faces the point is sampled, or a sun of which `sun_tangent` is the tangent
+/// of the angular radius.
+#[must_use]
+pub(crate) fn incident_of_size(
+    light: &RayLight,
+    at: Vec3,
+    radius_m: f32,
+    sun_tangent: f32,
+    point: [f32; 2],
+) -> Option<Incident> {
+    let centre = incident(light, at)?;
+    let [right, up] = across(centre.direction);
+    let [x, y] = disk(point);
+    let aside = x * right + y * up;
+    match *light {
+        RayLight::Directional { .. } => Some(Incident {
+            direction: (centre.direction + sun_tangent * aside).normalize(),
+            ..centre
+        }),
+        RayLight::Point { position, color } => {
+            let position = (Vec3::from(position) + radius_m * aside).to_array();
+            incident(&RayLight::Point { position, color }, at)
         }
     }
 }

@@ -46,7 +46,7 @@ pub struct Surface {
 }
 
 /// A primitive and the weights of its second and third vertex.
-type Hit = (u32, [f32; 2]);
+pub(crate) type Hit = (u32, [f32; 2]);
 
 /// Materials and their textures.
 pub struct Materials {
@@ -127,6 +127,24 @@ impl Materials {
         }
     }
 
+    /// The interpolated normal, bent by the material's normal map, if it has one. The capture
+    /// shader's is the same.
+    #[must_use]
+    pub(crate) fn bent_normal(&self, material: usize, at: &Attributes, footprint_m: f32) -> Vec3 {
+        let m = &self.materials[material];
+        let (normal, tangent) = (at.shading_normal, at.tangent);
+        let Some(texel) = self.sample(m.textures[TextureSlot::Normal].as_ref(), at, footprint_m)
+        else {
+            return normal;
+        };
+        let [x, y, z] = (texel.truncate() * 2.0 - 1.0).to_array();
+        let along = tangent.truncate();
+        let along = (along - normal * normal.dot(along)).normalize_or_zero();
+        let across = normal.cross(along) * tangent.w;
+        let bent = m.normal_scale * (x * along + y * across) + z.max(0.05) * normal;
+        bent.normalize_or(normal)
+    }
+
     /// Alpha of a masked or blended material at full resolution.
     fn alpha(&self, material: &Material, scene: &Scene, soup: &Soup, hit: Hit) -> f32 {
         let (primitive, bary) = hit;
@@ -172,6 +190,25 @@ impl Materials {
         }
     }
 
+    /// The light of a shadow ray that passes the surface, with the colours of glass (once, on entry)
+    /// and of blended surfaces.
+    #[must_use]
+    pub(crate) fn passes(&self, scene: &Scene, soup: &Soup, hit: Hit, enters: bool) -> Vec3 {
+        let material = &self.materials[soup.material(scene, hit.0)];
+        let alpha = || self.alpha(material, scene, soup, hit);
+        let open = |open: bool| if open { Vec3::ONE } else { Vec3::ZERO };
+        match material.alpha {
+            _ if material.transmission > 0.0 && !enters => Vec3::ONE,
+            _ if material.transmission > 0.0 => {
+                let at = soup.attributes(scene, hit.0, hit.1);
+                self.surface(soup.material(scene, hit.0), &at, 0.0).tint * material.transmission
+            }
+            AlphaMode::Opaque => Vec3::ZERO,
+            AlphaMode::Mask(cutoff) => open(alpha() < cutoff),
+            AlphaMode::Blend => Vec3::splat((1.0 - alpha()).clamp(0.0, 1.0)),
+        }
+    }
+
     fn sample(
         &self,
         texture: Option<&TextureRef>,
@@ -197,7 +234,7 @@ pub fn needs_alpha_test(m: &Material) -> bool {
     m.alpha != AlphaMode::Opaque || m.transmission > 0.0
 }
 
-/// Textures of the materials that rays sample.
+/// Textures of the materials that rays sample. With normal maps, they also sample these.
 pub const SLOTS: [TextureSlot; 3] = [
     TextureSlot::BaseColor,
     TextureSlot::MetallicRoughness,
@@ -206,7 +243,8 @@ pub const SLOTS: [TextureSlot; 3] = [
 
 /// The textures of a material that rays sample.
 fn ray_textures(m: &Material) -> impl Iterator<Item = TextureRef> {
-    SLOTS.into_iter().filter_map(|slot| m.textures[slot])
+    let slots = SLOTS.into_iter().chain([TextureSlot::Normal]);
+    slots.filter_map(|slot| m.textures[slot])
 }
 
 /// Blinn-Phong exponent of a roughness (Karis 2013), 0 where there is no visible highlight.

@@ -4,8 +4,10 @@ use super::bvh::{AlphaTest, Bvh, BvhError, TreeOptions};
 use super::material::Materials;
 use super::soup::Soup;
 use formats::raytrace::{RayLight, TraversalKind};
+use glam::Vec3;
 use scene::light::Sky;
 use scene::{Light, Scene, SceneError};
+use std::cell::RefCell;
 
 /// A scene prepared for tracing.
 pub struct TraceScene {
@@ -72,7 +74,7 @@ impl TraceScene {
             .iter()
             .map(|light| match *light {
                 Light::Directional { direction, color } => RayLight::Directional {
-                    direction: direction.normalize_or(-glam::Vec3::Y).to_array(),
+                    direction: direction.normalize_or(-Vec3::Y).to_array(),
                     color: color.to_array(),
                 },
                 Light::Point { position, color } => RayLight::Point {
@@ -113,6 +115,47 @@ impl AlphaTest for Stopping<'_> {
     fn opaque(&self, primitive: u32, bary: [f32; 2]) -> bool {
         let s = self.0;
         s.materials.stops(&s.scene, &s.soup, primitive, bary)
+    }
+}
+
+/// Alpha test of a shadow ray that collects the colours of glass and blended surfaces.
+pub(crate) struct Colouring<'a> {
+    scene: &'a TraceScene,
+    direction: Vec3,
+    /// What passes each primitive. Trees test them in different orders.
+    passed: RefCell<Vec<(u32, Vec3)>>,
+}
+
+impl<'a> Colouring<'a> {
+    pub fn new(scene: &'a TraceScene, direction: Vec3) -> Self {
+        Self {
+            scene,
+            direction,
+            passed: RefCell::default(),
+        }
+    }
+
+    /// The light that passes all surfaces on the way.
+    pub fn light(self) -> Vec3 {
+        let mut passed = self.passed.into_inner();
+        passed.sort_unstable_by_key(|(primitive, _)| *primitive);
+        passed.into_iter().map(|(_, light)| light).product()
+    }
+}
+
+impl AlphaTest for Colouring<'_> {
+    fn opaque(&self, primitive: u32, bary: [f32; 2]) -> bool {
+        let s = self.scene;
+        let [a, b, c] = s.soup.triangles[primitive as usize].map(Vec3::from);
+        // Light travels against its shadow ray.
+        let enters = (b - a).cross(c - a).dot(self.direction) >= 0.0;
+        let light = s
+            .materials
+            .passes(&s.scene, &s.soup, (primitive, bary), enters);
+        if light != Vec3::ZERO {
+            self.passed.borrow_mut().push((primitive, light));
+        }
+        light == Vec3::ZERO
     }
 }
 

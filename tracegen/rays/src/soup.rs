@@ -27,6 +27,8 @@ pub struct Attributes {
     pub geometric_normal: Vec3,
     /// Unit interpolated normal, or the geometric one if the mesh has no valid normal.
     pub shading_normal: Vec3,
+    /// Interpolated tangent in the world, with the bitangent's sign in w.
+    pub tangent: Vec4,
     /// Texture coordinates of both sets.
     pub uv: [Vec2; 2],
     /// Linear vertex colour with alpha; white where the mesh has none.
@@ -110,6 +112,11 @@ impl Soup {
         } else {
             shading
         };
+        let tangent: Vec4 = (0..3)
+            .map(|i| weights[i] * mesh.tangents.get(corners[i]).copied().unwrap_or_default())
+            .sum();
+        let linear = scene.instances[object].transform.matrix3;
+        let tangent = (linear * tangent.truncate()).extend(tangent.w);
         let area = cross.length() as f32;
         let set = |uvs: &[Vec2]| {
             let [p, q, r] = corners.map(|v| uvs.get(v).copied().unwrap_or_default());
@@ -122,6 +129,7 @@ impl Soup {
         Attributes {
             geometric_normal,
             shading_normal,
+            tangent,
             uv: [uv0, uv1],
             color: color(mesh, corners, weights),
             uv_density: [density0, density1],

@@ -1,6 +1,7 @@
 //! The tracer on a small scene with every kind of material.
 
 mod columns;
+mod lighting;
 
 use super::frame::{RayFrame, trace_frame};
 use super::material::Materials;
@@ -126,6 +127,8 @@ fn settings(traversal: TraversalKind) -> TraceSettings {
         visits: true,
         geometry: true,
         traversal,
+        lighting: None,
+        seed: 0,
     }
 }
 
@@ -167,6 +170,7 @@ fn tables(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> Ray
             samples_per_px: settings.samples_per_px,
             has_visits: settings.visits,
             sky: [scene.sky.sky.to_array(), scene.sky.ground.to_array()],
+            lighting: settings.lighting,
         },
         bvh: scene.bvh.summary(settings.traversal),
         materials: scene.materials.table(),
@@ -263,7 +267,7 @@ fn each_material_spawns_its_kind_of_ray() {
     let (_, bytes) = trace(&scene, settings(TraversalKind::Bvh2), [160, 120]);
     let file = Raytrace::from_bytes(bytes).expect("opens");
     let mut tile = RayTile::default();
-    let mut seen = [[0u32; 4]; 5];
+    let mut seen = [[0u32; 6]; 5];
     for number in 0..file.tables().tile_count() {
         file.decode_tile(Eye::Left, number, &mut tile)
             .expect("decodes");

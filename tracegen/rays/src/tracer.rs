@@ -4,14 +4,17 @@
 use super::bvh::count::Counts;
 use super::bvh::{RayHit, TraversalStack};
 use super::cast::{Cast, Caster, Query};
-use super::light::{Incident, blinn_phong, dielectric, incident, reflect, refract, schlick};
+use super::light::{
+    Incident, blinn_phong, dielectric, incident, incident_of_size, reflect, refract, schlick,
+};
 use super::material::Surface;
 use super::ray::{Ray, barycentrics, offset, point_at};
-use super::scene::TraceScene;
+use super::sampling::{Noise, Purpose, cosine_direction};
+use super::scene::{Colouring, TraceScene};
 use formats::raytrace::camera::sample_position_px;
 use formats::raytrace::{
-    EyeCamera, Hit, NO_PARENT, Outcome, PixelRecord, RayKind, RayRecord, RayTile, RayTriangle,
-    TraversalKind, half, normal,
+    EyeCamera, Hit, NO_PARENT, Outcome, PixelRecord, RayKind, RayLight, RayLighting, RayRecord,
+    RayTile, RayTriangle, TraversalKind, half, normal,
 };
 use glam::Vec3;
 
@@ -21,7 +24,7 @@ const LEAST_WEIGHT: f32 = 0.01;
 const LEAST_RADIANCE: f32 = 1.0 / 1024.0;
 
 /// Settings of tracing and recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TraceSettings {
     /// Levels of reflection and refraction.
     pub max_depth: u32,
@@ -33,6 +36,10 @@ pub struct TraceSettings {
     pub geometry: bool,
     /// Tree to traverse.
     pub traversal: TraversalKind,
+    /// Light beyond Whitted's model.
+    pub lighting: Option<RayLighting>,
+    /// Seed of random numbers, which only lighting uses.
+    pub seed: u64,
 }
 
 /// Radiance, split into parts that depend on the viewpoint and parts that do not.
@@ -54,6 +61,10 @@ struct Path {
     ray: Ray,
     kind: RayKind,
     depth: u32,
+    /// Reflections and refractions so far.
+    levels: u32,
+    /// Diffuse rays so far.
+    bounces: u32,
     parent: u32,
     /// Largest fraction of the ray's radiance that reaches the pixel.
     weight: f32,
@@ -70,6 +81,7 @@ pub struct Tracer<'a> {
     px_spread: f32,
     /// First ray of the current pixel.
     first_ray: usize,
+    noise: Noise,
 }
 
 impl<'a> Tracer<'a> {
@@ -88,6 +100,7 @@ impl<'a> Tracer<'a> {
             },
             px_spread: 0.0,
             first_ray: 0,
+            noise: Noise::default(),
         }
     }
 
@@ -100,6 +113,9 @@ impl<'a> Tracer<'a> {
             for x in x0..x0 + width {
                 for sample in 0..self.settings.samples_per_px {
                     let at = sample_position_px(x, y, sample, self.settings.samples_per_px);
+                    if self.settings.lighting.is_some() {
+                        self.noise = Noise::new(self.settings.seed, eye, [x, y], sample);
+                    }
                     let pixel = self.pixel(eye, at, out);
                     out.pixels.push(pixel);
                 }
@@ -114,6 +130,8 @@ impl<'a> Tracer<'a> {
             ray: Ray::new(eye.position.into(), direction.into()),
             kind: RayKind::Primary,
             depth: 0,
+            levels: 0,
+            bounces: 0,
             parent: NO_PARENT,
             weight: 1.0,
             length: 0.0,
@@ -167,20 +185,34 @@ impl<'a> Tracer<'a> {
         (hit, number)
     }
 
-    /// Casts a shadow ray and records it. Returns true if the light is blocked.
-    fn cast_shadow(&mut self, ray: &Ray, depth: u32, parent: u32, out: &mut RayTile) -> bool {
-        let alpha = self.scene.shading();
+    /// Casts a shadow or ambient-occlusion ray and records it. Returns the light that passes.
+    fn cast_any(
+        &mut self,
+        kind: RayKind,
+        ray: &Ray,
+        depth: u32,
+        parent: u32,
+        out: &mut RayTile,
+    ) -> Vec3 {
         let (visits, geometry) = (&mut out.visits, &mut out.geometry);
-        let Cast { hit, counts, .. } =
-            (self.caster).cast(Query::Blocker, ray, &alpha, visits, geometry);
+        let coloured = kind == RayKind::Shadow
+            && (self.settings.lighting).is_some_and(|lighting| lighting.coloured_shadows);
+        let (Cast { hit, counts, .. }, light) = if coloured {
+            let alpha = Colouring::new(self.scene, ray.direction);
+            let cast = (self.caster).cast(Query::Blocker, ray, &alpha, visits, geometry);
+            (cast, alpha.light())
+        } else {
+            let alpha = self.scene.shading();
+            let cast = (self.caster).cast(Query::Blocker, ray, &alpha, visits, geometry);
+            (cast, Vec3::ONE)
+        };
         let outcome = if hit.is_some() {
             Outcome::Occluded
         } else {
             Outcome::Miss
         };
-        out.rays
-            .push(record(RayKind::Shadow, outcome, depth, parent, counts));
-        hit.is_some()
+        out.rays.push(record(kind, outcome, depth, parent, counts));
+        if hit.is_some() { Vec3::ZERO } else { light }
     }
 
     /// Radiance of a secondary ray.
@@ -204,7 +236,6 @@ impl<'a> Tracer<'a> {
             scene: source,
             soup,
             materials,
-            sky,
             ..
         } = self.scene;
         let bary = barycentrics(&path.ray, &hit.vertices);
@@ -213,13 +244,27 @@ impl<'a> Tracer<'a> {
         let front = at.geometric_normal.dot(direction) <= 0.0;
         let facing = if front { 1.0 } else { -1.0 };
         let geometric = at.geometric_normal * facing;
-        let shading = facing_shading_normal(at.shading_normal, geometric);
+        let mut shading = facing_shading_normal(at.shading_normal, geometric);
         let length = path.length + hit.t;
-        let cosine = (-direction.dot(shading)).clamp(0.0, 1.0);
+        let mut cosine = (-direction.dot(shading)).clamp(0.0, 1.0);
         // The footprint lengthens as the surface turns away. The square root is a mean of its two
         // widths.
         let footprint = length * self.px_spread / cosine.max(0.1).sqrt();
-        let surface = materials.surface(soup.material(source, hit.primitive), &at, footprint);
+        let material = soup.material(source, hit.primitive);
+        let surface = materials.surface(material, &at, footprint);
+        if (self.settings.lighting).is_some_and(|lighting| lighting.normal_maps) {
+            let bent = materials.bent_normal(material, &at, footprint);
+            let bent = if shading == at.shading_normal {
+                bent
+            } else {
+                -bent
+            };
+            // A normal that points into the surface would hide it from every light.
+            if bent.dot(geometric) > 0.0 {
+                shading = bent;
+                cosine = (-direction.dot(shading)).clamp(0.0, 1.0);
+            }
+        }
         let place = ShadedPoint {
             point: point_at(&hit.vertices, bary),
             geometric,
@@ -231,7 +276,7 @@ impl<'a> Tracer<'a> {
         };
 
         let mut radiance = self.direct(path, &surface, &place, out);
-        radiance.view_independent += surface.emissive + surface.albedo * sky.ambient(shading);
+        radiance.view_independent += surface.emissive + self.ambient(path, &surface, &place, out);
         radiance.view_dependent += self.reflection(path, &surface, &place, out);
         if surface.transmission > 0.0 {
             let passed = self.glass(path, &surface, &place, front, out);
@@ -256,12 +301,12 @@ impl<'a> Tracer<'a> {
     ) -> Radiance {
         let mut radiance = Radiance::default();
         let origin = offset(place.point, place.geometric);
-        for light in &self.scene.lights {
+        for (number, light) in (0u32..).zip(&self.scene.lights) {
             let Some(Incident {
                 direction,
                 distance,
                 irradiance,
-            }) = incident(light, place.point)
+            }) = self.incident(number, light, place)
             else {
                 continue;
             };
@@ -283,12 +328,85 @@ impl<'a> Tracer<'a> {
                 t_max: distance,
                 ..Ray::new(origin, direction)
             };
-            if !self.cast_shadow(&ray, path.depth + 1, place.number, out) {
-                radiance.view_independent += diffuse;
-                radiance.view_dependent += highlight;
-            }
+            let (kind, depth) = (RayKind::Shadow, path.depth + 1);
+            let light = self.cast_any(kind, &ray, depth, place.number, out);
+            radiance.view_independent += light * diffuse;
+            radiance.view_dependent += light * highlight;
         }
         radiance
+    }
+
+    /// A light as a point sees it. The noise differs between lights and rays.
+    fn incident(&self, number: u32, light: &RayLight, place: &ShadedPoint) -> Option<Incident> {
+        let size = self.settings.lighting.map(|lighting| {
+            let tangent = f64::from(lighting.sun_radius_deg).to_radians().tan();
+            (lighting.light_radius_m, tangent as f32)
+        });
+        match size.filter(|size| *size != (0.0, 0.0)) {
+            None => incident(light, place.point),
+            Some((radius_m, tangent)) => {
+                let point = self.noise.point(place.number, Purpose::Light(number), 0, 1);
+                incident_of_size(light, place.point, radius_m, tangent, point)
+            }
+        }
+    }
+
+    /// Light from all around that a diffuse surface scatters: by a diffuse ray, by the sky as far as
+    /// ambient-occlusion rays do not meet anything, or by the whole sky.
+    fn ambient(
+        &mut self,
+        path: &Path,
+        surface: &Surface,
+        place: &ShadedPoint,
+        out: &mut RayTile,
+    ) -> Vec3 {
+        let sky = surface.albedo * self.scene.sky.ambient(place.shading);
+        let lighting = self.settings.lighting.unwrap_or_default();
+        let weight = surface.albedo.max_element() * path.weight;
+        if lighting.bounces > 0 {
+            if path.bounces >= lighting.bounces {
+                return Vec3::ZERO;
+            }
+            if weight < LEAST_WEIGHT {
+                return sky;
+            }
+            let point = self.noise.point(place.number, Purpose::Diffuse, 0, 1);
+            let next = Path {
+                ray: self.scattered(place, point),
+                kind: RayKind::Diffuse,
+                depth: path.depth + 1,
+                levels: path.levels,
+                bounces: path.bounces + 1,
+                parent: place.number,
+                weight,
+                length: place.length,
+            };
+            return surface.albedo * self.follow(&next, out);
+        }
+        if lighting.occlusion_rays == 0 || path.depth > 0 || sky.max_element() <= 0.0 {
+            return sky;
+        }
+        let (count, mut open) = (lighting.occlusion_rays, Vec3::ZERO);
+        for index in 0..count {
+            let point = self
+                .noise
+                .point(place.number, Purpose::Occlusion, index, count);
+            let ray = Ray {
+                t_max: lighting.occlusion_m,
+                ..self.scattered(place, point)
+            };
+            open += self.cast_any(RayKind::AmbientOcclusion, &ray, 1, place.number, out);
+        }
+        sky * open / count as f32
+    }
+
+    /// A ray in a random direction of a surface's hemisphere.
+    fn scattered(&self, place: &ShadedPoint, point: [f32; 2]) -> Ray {
+        let direction = cosine_direction(place.shading, point);
+        // Directions below the surface, which shading normals can give, are mirrored at it.
+        let below = direction.dot(place.geometric).min(0.0);
+        let direction = (direction - 2.0 * below * place.geometric).normalize();
+        Ray::new(offset(place.point, place.geometric), direction)
     }
 
     /// Reflection of an opaque surface: a ray if it is polished, or else the mean radiance of the
@@ -322,7 +440,7 @@ impl<'a> Tracer<'a> {
         weight: f32,
         out: &mut RayTile,
     ) -> Vec3 {
-        if path.depth >= self.settings.max_depth || weight < LEAST_WEIGHT {
+        if path.levels >= self.settings.max_depth || weight < LEAST_WEIGHT {
             return self.scene.sky.ambient(mirrored);
         }
         // With a shading normal, the mirrored ray can point into the surface. Then the geometric
@@ -336,6 +454,8 @@ impl<'a> Tracer<'a> {
             ray: Ray::new(offset(place.point, place.geometric), direction),
             kind: RayKind::Reflection,
             depth: path.depth + 1,
+            levels: path.levels + 1,
+            bounces: path.bounces,
             parent: place.number,
             weight,
             length: place.length,
@@ -397,13 +517,15 @@ impl<'a> Tracer<'a> {
         out: &mut RayTile,
     ) -> Vec3 {
         let weight = fraction * path.weight;
-        if path.depth >= self.settings.max_depth || weight < LEAST_WEIGHT {
+        if path.levels >= self.settings.max_depth || weight < LEAST_WEIGHT {
             return self.scene.sky.ambient(direction);
         }
         let next = Path {
             ray: Ray::new(offset(place.point, -place.geometric), direction),
             kind: RayKind::Refraction,
             depth: path.depth + 1,
+            levels: path.levels + 1,
+            bounces: path.bounces,
             parent: place.number,
             weight,
             length: place.length,

@@ -5,6 +5,7 @@ mod cache_args;
 mod capture_steps;
 mod choice;
 pub mod lens_args;
+mod light_args;
 mod objective_args;
 pub mod page;
 mod path_args;

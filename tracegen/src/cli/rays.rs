@@ -1,6 +1,7 @@
 //! `tracegen rays`.
 
 use super::choice::choice;
+use super::light_args::LightArgs;
 use super::path_args::PathArgs;
 use super::scene_args::{SceneArgs, SceneSetup, capture_outputs};
 use anyhow::{Context, bail};
@@ -16,8 +17,8 @@ use rays::frame::{RayFrame, trace_frame};
 use rays::picture;
 use rays::scene::TraceScene;
 use rays::tracer::TraceSettings;
+use scene::LoadOptions;
 use scene::paths::MAX_FRAMES;
-use scene::{LoadOptions, TextureSlots};
 use shell::{Progress, Threads, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
@@ -68,6 +69,8 @@ pub struct RaysArgs {
     /// Lay the nodes out in treelets of this size; without it, depth first.
     #[arg(long, value_name = "BYTES", value_parser = clap::value_parser!(u32).range(256..=1 << 20))]
     treelets: Option<u32>,
+    #[command(flatten)]
+    light: LightArgs,
     #[command(flatten)]
     threads: Threads,
 }
@@ -128,7 +131,7 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     let start = Instant::now();
     let progress = Progress::new("loading the scene", 0, "");
     let textures = LoadOptions {
-        slots: TextureSlots::of(&rays::TEXTURE_SLOTS),
+        slots: args.light.texture_slots(),
         ..LoadOptions::ALL
     };
     let setup = {
@@ -196,7 +199,7 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
             camera: camera.name,
             backend: "rays".to_owned(),
             driver: format!("{:?}", bvh.traversal).to_lowercase(),
-            seed: 0,
+            seed: args.light.seed,
             hmd,
             frames,
             surfaces: None,
@@ -210,6 +213,7 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
         samples_per_px: args.spp,
         has_visits: args.visits(),
         sky: [scene.sky.sky.to_array(), scene.sky.ground.to_array()],
+        lighting: args.light.lighting(),
     };
     let tables = RaytraceTables {
         meta,
@@ -234,6 +238,8 @@ fn trace(
         visits: args.visits(),
         geometry: args.geometry || args.all_columns,
         traversal: tables.bvh.traversal,
+        lighting: args.light.lighting(),
+        seed: args.light.seed,
     };
     let mut writer = RaytraceWriter::create(&args.output)?;
     if args.hierarchy || args.all_columns {
@@ -262,18 +268,20 @@ fn report(tables: &RaytraceTables, frame: &RayFrame, bytes: u64, at: [Duration; 
     let (bvh, stats) = (&tables.bvh, &frame.stats);
     let [loaded, prepared, traced] = at.map(|t| t.as_secs_f64());
     let rays = stats.total_rays();
+    let kinds: Vec<_> = RayKind::ALL
+        .map(|kind| (kind, stats.rays_of(kind)))
+        .into_iter()
+        .filter(|(kind, rays)| *rays > 0 || !kind.is_later())
+        .map(|(kind, rays)| format!("{rays} {kind}"))
+        .collect();
     let per_ray = |n: u64| n as f64 / rays.max(1) as f64;
     note(&format!(
         "hierarchy: {}, {} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}",
         bvh.builder, bvh.triangles, bvh.nodes, bvh.leaves, bvh.depth, bvh.sah_cost
     ));
     note(&format!(
-        "rays: {rays} ({} primary, {} shadow, {} reflection, {} refraction), \
-         {:.1} steps and {:.1} triangle tests a ray",
-        stats.rays_of(RayKind::Primary),
-        stats.rays_of(RayKind::Shadow),
-        stats.rays_of(RayKind::Reflection),
-        stats.rays_of(RayKind::Refraction),
+        "rays: {rays} ({}), {:.1} steps and {:.1} triangle tests a ray",
+        kinds.join(", "),
         per_ray(stats.steps),
         per_ray(stats.triangle_tests),
     ));

@@ -269,7 +269,7 @@ pub(super) struct RayCounts {
     /// By [`RayKind`].
     #[cfg_attr(test, schemars(with = "std::collections::BTreeMap<String, u64>"))]
     #[serde(serialize_with = "by_kind")]
-    pub rays: [u64; 4],
+    pub rays: [u64; 6],
     pub steps: u64,
     pub triangle_tests: u64,
     pub alpha_tests: u64,
@@ -313,15 +313,8 @@ struct EyeTotals {
     right: RayCounts,
 }
 
-pub(super) const RAY_KINDS: [RayKind; 4] = [
-    RayKind::Primary,
-    RayKind::Shadow,
-    RayKind::Reflection,
-    RayKind::Refraction,
-];
-
-fn by_kind<S: Serializer>(rays: &[u64; 4], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_map(RAY_KINDS.map(|kind| (lower(&kind), rays[kind as usize])))
+fn by_kind<S: Serializer>(rays: &[u64; 6], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(RayKind::ALL.map(|kind| (kind.to_string(), rays[kind as usize])))
 }
 
 /// Name of a variant as the tables write it.
