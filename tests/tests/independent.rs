@@ -314,10 +314,11 @@ fn python_reads_rays_beyond_whitteds_model_as_replay_does() {
         ["--ambient-occlusion", "4", "--sun-radius", "2"],
         ["--bounces", "3", "--light-radius", "0.2"],
     ];
-    for light in options {
+    for (light, samples) in options.into_iter().zip([1, 2]) {
         run_ok(
             program("tracegen")
-                .args(["rays", "chess", "--size", "40x24", "--spp", "2"])
+                .args(["rays", "chess", "--size", "40x24"])
+                .args(["--spp", &samples.to_string()])
                 .args([
                     "--all-columns",
                     "--coloured-shadows",
@@ -329,9 +330,11 @@ fn python_reads_rays_beyond_whitteds_model_as_replay_does() {
                 .arg("-o")
                 .arg(&path),
         );
-        assert_eq!(check(&path), 2 * 40 * 24 * 2);
+        assert_eq!(check(&path), 2 * 40 * 24 * samples);
         run_ok(program("replay").arg("validate").arg(&path));
-        run_ok(program("replay").arg("reproject").arg(&path));
+        if samples == 1 {
+            run_ok(program("replay").arg("reproject").arg(&path));
+        }
     }
 }
 

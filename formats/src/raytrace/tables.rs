@@ -91,7 +91,7 @@ pub(super) fn read(container: &Container) -> Result<RaytraceTables> {
             (BVH, "kind of tree", tables.bvh.traversal.is_of_minor_4()),
             (META, "lighting", tables.meta.lighting.is_some()),
         ];
-        for (chunk, what, _) in later.into_iter().filter(|(.., has)| *has) {
+        if let Some((chunk, what, _)) = later.into_iter().find(|(.., has)| *has) {
             let expected = format!("version {major}.{LATER_MINOR} for this {what}");
             return Err(container.malformed(chunk, 0, expected, format!("{major}.{minor}")));
         }

@@ -22,6 +22,7 @@ mod run;
 mod subjects;
 mod sweep;
 mod techniques;
+mod temporal;
 #[cfg(test)]
 pub(crate) mod testing;
 mod tiles;
@@ -102,6 +103,8 @@ enum Command {
     Reproject(Box<reproject::ReprojectArgs>),
     /// Set every reading of the SGRT paper's figure 3 beside the paper.
     Readings(Box<readings::ReadingsArgs>),
+    /// Compare reuse of the previous frame with reuse between the eyes, on ray traces of a sequence.
+    Temporal(Box<temporal::TemporalArgs>),
     #[command(flatten)]
     Documents(Documents),
 }
@@ -137,6 +140,7 @@ pub fn main() -> ExitCode {
             Command::Locality(args) => locality::run(&args),
             Command::Reproject(args) => reproject::run(*args),
             Command::Readings(args) => readings::run(&args),
+            Command::Temporal(args) => temporal::run(&args),
             Command::Documents(documents) => documents.run::<Cli>(),
         },
     )

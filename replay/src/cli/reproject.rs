@@ -82,21 +82,28 @@ pub struct ReprojectArgs {
     threads: shell::Threads,
 }
 
-fn rule_help() -> String {
+pub(super) fn rule_help() -> String {
     format!("{} [default: {DEFAULT_RULE}]", rules::help())
 }
 
 /// The preset of a name.
-fn preset(name: &str) -> Result<&'static Preset, String> {
+pub(super) fn preset(name: &str) -> Result<&'static Preset, String> {
     let names = || presets::PRESETS.map(|preset| preset.name).join(" or ");
     presets::find(name).ok_or_else(|| format!("expected {}", names()))
 }
 
+/// The rule: the user's, else the preset's, else the default.
+pub(super) fn rule_of(
+    rule: Option<&Rule>,
+    preset: Option<&'static Preset>,
+) -> anyhow::Result<Rule> {
+    let named = preset.map_or(DEFAULT_RULE, |preset| preset.rule);
+    rule.cloned().map_or_else(|| Ok(named.parse()?), Ok)
+}
+
 impl ReprojectArgs {
-    /// The rule: the user's, else the preset's, else the default.
     fn rule(&self) -> anyhow::Result<Rule> {
-        let named = self.preset.map_or(DEFAULT_RULE, |preset| preset.rule);
-        self.rule.clone().map_or_else(|| Ok(named.parse()?), Ok)
+        rule_of(self.rule.as_ref(), self.preset)
     }
 
     /// What is reused: the user's, else the preset's, else primary hits.

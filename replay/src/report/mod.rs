@@ -24,6 +24,7 @@ pub mod sweep;
 pub mod sweep_plan;
 pub mod table;
 pub mod techniques;
+pub mod temporal;
 pub mod theme;
 pub mod timeline;
 pub mod z2;

@@ -78,6 +78,7 @@ fn all() -> Vec<Published> {
         report::calibration::schema(),
         report::sgrt::schema(),
         report::readings::schema(),
+        report::temporal::schema(),
     ]
 }
 

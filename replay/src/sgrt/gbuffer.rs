@@ -64,6 +64,16 @@ pub(super) fn left_tile(pixels: u64, keeping: Keeping, reads: Reads, g: &Gbuffer
     }
 }
 
+/// Traffic of a tile of the previous frame: the reproject kernel reads the fields that detection needs from DRAM.
+/// The records were written when the frame was rendered.
+#[must_use]
+pub(super) fn previous_tile(pixels: u64, reads: Reads, g: &Gbuffer) -> Traffic {
+    Traffic {
+        on_chip_bytes: 0,
+        dram_bytes: pixels * reads.pixel_bytes(g),
+    }
+}
+
 /// Traffic of a right tile: rows are fetched and searched by detection, reuse reads left records, and the
 /// tile's own records are written.
 #[must_use]

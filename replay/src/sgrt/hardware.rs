@@ -201,9 +201,66 @@ pub(super) fn check_lines(bvh: &BvhSummary, config: &SgrtConfig) -> Result<(), F
     Ok(())
 }
 
-/// Misses of the addresses in the trace, simulated in the configured caches: tiles in order, left before
-/// right, pixels assigned to the units round robin. The triangle of a re-test counts by hit rate, because
-/// its address is not in the trace.
+/// Whether rays of a class are traced for a sample of an eye.
+pub(super) type Kept<'a> = dyn Fn(Eye, usize, RayClass) -> bool + 'a;
+
+/// Misses of the triangles of re-tests, by hit rate, because their addresses are not in the trace.
+pub(super) fn misses_of_retests(work: &BatchWork, bvh: &BvhSummary, config: &SgrtConfig) -> Misses {
+    let retests = BatchWork {
+        retest_tests: work.retest_tests,
+        ..BatchWork::default()
+    };
+    cache::by_rates(&retests, bvh, config)
+}
+
+/// Misses of the addresses in the trace for each choice of rays, by eye and tile: tiles in order, left before
+/// right, pixels assigned to the units round robin.
+///
+/// # Errors
+/// [`FrameError`] for an unreadable tile.
+pub(super) fn misses_of<const N: usize>(
+    source: &dyn RaySource,
+    frame: &Frame,
+    choices: [&Kept<'_>; N],
+    config: &SgrtConfig,
+) -> Result<[[Vec<Misses>; 2]; N], FrameError> {
+    let bvh = &frame.tables.bvh;
+    check_lines(bvh, config)?;
+    let tiles = frame.tables.tile_count();
+    let mut caches = choices.map(|_| DeviceCaches::new(config));
+    let none = vec![Misses::default(); tiles as usize];
+    let mut out = choices.map(|_| [none.clone(), none.clone()]);
+    let mut tile_data = RayTile::default();
+    for tile in 0..tiles {
+        for eye in [Eye::Left, Eye::Right] {
+            source
+                .tile(eye, tile, &mut tile_data)
+                .map_err(|source| FrameError::Tile { eye, tile, source })?;
+            let mut at = 0usize;
+            let pixels = tile_data.pixels.iter().zip(frame.tile_samples(tile));
+            for (turn, (pixel, i)) in pixels.enumerate() {
+                for ray in tile_data.rays_of(pixel) {
+                    let end = at.saturating_add(ray.visit_count() as usize);
+                    let visits = tile_data.visits.get(at..end).unwrap_or(&[]);
+                    at = end;
+                    let class = RayClass::of(ray);
+                    for ((kept, caches), out) in choices.iter().zip(&mut caches).zip(&mut out) {
+                        if !kept(eye, i, class) {
+                            continue;
+                        }
+                        let misses = &mut out[eye as usize][tile as usize];
+                        for &visit in visits {
+                            caches.visit(turn, visit, bvh, misses);
+                        }
+                    }
+                }
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// Misses of the addresses in the trace, with both eyes completely traced and with reprojection.
 ///
 /// # Errors
 /// [`FrameError`] for an unreadable tile.
@@ -215,45 +272,22 @@ pub(super) fn misses_by_addresses(
     work: &[TileWork],
     config: &SgrtConfig,
 ) -> Result<Vec<TileMisses>, FrameError> {
-    let bvh = &frame.tables.bvh;
-    check_lines(bvh, config)?;
-    let [mut reference, mut reprojected] = [(); 2].map(|()| DeviceCaches::new(config));
-    let mut tile_data = RayTile::default();
-    let mut out = vec![TileMisses::default(); work.len()];
-    for ((tile, misses), work) in (0u32..).zip(&mut out).zip(work) {
-        for eye in [Eye::Left, Eye::Right] {
-            source
-                .tile(eye, tile, &mut tile_data)
-                .map_err(|source| FrameError::Tile { eye, tile, source })?;
-            let (full, reused) = match eye {
-                Eye::Left => (&mut misses.left_full, &mut misses.left),
-                Eye::Right => (&mut misses.right_full, &mut misses.right),
-            };
-            let mut at = 0usize;
-            let pixels = tile_data.pixels.iter().zip(frame.tile_samples(tile));
-            for (turn, (pixel, i)) in pixels.enumerate() {
-                for ray in tile_data.rays_of(pixel) {
-                    let end = at.saturating_add(ray.visit_count() as usize);
-                    let visits = tile_data.visits.get(at..end).unwrap_or(&[]);
-                    at = end;
-                    let kept =
-                        eye == Eye::Left || is_traced(&decisions[i], RayClass::of(ray), reuse);
-                    for &visit in visits {
-                        reference.visit(turn, visit, bvh, full);
-                        if kept {
-                            reprojected.visit(turn, visit, bvh, reused);
-                        }
-                    }
-                }
-            }
+    let all: &Kept<'_> = &|_, _, _| true;
+    let kept: &Kept<'_> =
+        &|eye, sample, class| eye == Eye::Left || is_traced(&decisions[sample], class, reuse);
+    let [reference, reprojected] = misses_of(source, frame, [all, kept], config)?;
+    let tile = |(tile, work): (usize, &TileWork)| {
+        let [left_full, right_full] = [0, 1].map(|eye| reference[eye][tile]);
+        let [left, mut right] = [0, 1].map(|eye| reprojected[eye][tile]);
+        right.add(&misses_of_retests(&work.right, &frame.tables.bvh, config));
+        TileMisses {
+            left_full,
+            right_full,
+            left,
+            right,
         }
-        let retests = BatchWork {
-            retest_tests: work.right.retest_tests,
-            ..BatchWork::default()
-        };
-        misses.right.add(&cache::by_rates(&retests, bvh, config));
-    }
-    Ok(out)
+    };
+    Ok(work.iter().enumerate().map(tile).collect())
 }
 
 #[cfg(test)]

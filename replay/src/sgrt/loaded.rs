@@ -120,7 +120,7 @@ impl<'a> LoadedTrace<'a> {
         TracedTiming::new(self.source, &self.model(Reads::NOTHING, config), &work)
     }
 
-    fn model<'b>(&'b self, reads: Reads, config: &'b SgrtConfig) -> Model<'b> {
+    pub(super) fn model<'b>(&'b self, reads: Reads, config: &'b SgrtConfig) -> Model<'b> {
         Model {
             frame: &self.frame,
             reads,

@@ -10,7 +10,7 @@
 //! ([`tni`], [`srp`]), bytes ([`dram`]) and energy ([`energy`]) by the closed form. With [`timing::Timing::Cycle`],
 //! [`cycles`] simulates the units cycle by cycle instead (`ray_batches`: its input; `timed`: its use). The share of [`gbuffer`] follows from the fields that a rule [`reads`] and from
 //! the [`rows`] that hold them. [`loaded`] runs one rule on a trace, [`variations`] many rules or
-//! parameters, [`readings`] every reading of the paper. [`presets`] name whole settings.
+//! parameters, [`readings`] every reading of the paper, [`temporal`] reuse of the previous frame. [`presets`] name whole settings.
 
 pub mod accuracy;
 pub mod cache;
@@ -37,6 +37,7 @@ pub mod rows;
 pub mod rules;
 pub mod run;
 pub mod srp;
+pub mod temporal;
 pub mod timed;
 pub mod timing;
 pub mod tni;

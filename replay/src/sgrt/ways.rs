@@ -28,10 +28,14 @@ pub(super) enum Way {
     Reprojected,
     /// Reprojection, with the whole screen's G-buffer in DRAM.
     WholeScreen,
+    /// The right eye from a left one that is the previous frame: traced before, its G-buffer in DRAM.
+    Previous,
+    /// The left eye, shaded before, is only projected, tile by tile.
+    Projected,
 }
 
 impl Way {
-    /// All ways, in the order of [`Comparison`]'s fields.
+    /// The ways of a stereo frame, in the order of [`Comparison`]'s fields.
     pub const ALL: [Self; 3] = [Self::Reference, Self::Reprojected, Self::WholeScreen];
 }
 
@@ -82,8 +86,8 @@ impl Model<'_> {
                 };
                 return [left, work.right_full].map(|work| batch(work, Traffic::default()));
             }
-            Way::Reprojected => Keeping::Tile,
-            Way::WholeScreen => Keeping::Screen,
+            Way::Reprojected | Way::Projected => Keeping::Tile,
+            Way::WholeScreen | Way::Previous => Keeping::Screen,
         };
         let (reads, g) = (self.reads, &self.config.gbuffer);
         let [band, band_and_beside] = self.rows.of_tile(self.frame, tile);
@@ -93,9 +97,20 @@ impl Model<'_> {
             fetched_bytes: reads.fetched_bytes(g, band, band_and_beside, u64::from(width)),
             row_read_bytes: row_read_bytes(&work.right, self.config),
         };
-        let left = gbuffer::left_tile(work.left.reprojected, keeping, reads, g);
+        let left = match way {
+            Way::Previous => gbuffer::previous_tile(work.left.reprojected, reads, g),
+            _ => gbuffer::left_tile(work.left.reprojected, keeping, reads, g),
+        };
         let right = gbuffer::right_tile(&right_tile, keeping, reads, g);
-        [batch(work.left, left), batch(work.right, right)]
+        let mut left = batch(work.left, left);
+        if matches!(way, Way::Previous | Way::Projected) {
+            left.pixels = 0;
+            left.work = BatchWork {
+                reprojected: work.left.reprojected,
+                ..BatchWork::default()
+            };
+        }
+        [left, batch(work.right, right)]
     }
 
     /// External memory traffic of a batch.
@@ -165,6 +180,36 @@ impl Model<'_> {
         }
         tni
     }
+}
+
+/// Batches of one eye, rendered in one way.
+pub(super) struct Part<'a> {
+    pub model: Model<'a>,
+    pub way: Way,
+    /// The eye of the pair.
+    pub side: Eye,
+    pub work: &'a [TileWork],
+    /// By tile; empty if no ray is traced.
+    pub misses: &'a [Misses],
+}
+
+/// A frame that consists of parts, by the closed form.
+///
+/// # Panics
+/// There is no part.
+pub(super) fn sum_of_parts(parts: &[Part<'_>]) -> Run {
+    let mut run = Run::default();
+    for tile in 0..parts[0].work.len() {
+        for part in parts {
+            let batches = part.model.batches(part.way, tile as u32, &part.work[tile]);
+            let misses = part.misses.get(tile).copied().unwrap_or_default();
+            let batch = &batches[part.side as usize];
+            part.model.add(&mut run, batch, &misses);
+        }
+    }
+    let model = &parts[0].model;
+    run.energy = energy::energy(&run, &model.frame.tables.bvh, model.config);
+    run
 }
 
 /// Bytes that tests against whole rows read from the row buffers: a warp reads each left pixel once for all its lanes.
