@@ -5,7 +5,7 @@
 # Scenes that are absent are skipped with a line. The figures in results/ stay as they are; new ones are in $OUT/reproduce.
 # Exit code 1 if a figure moved, 3 if none could be measured.
 set -eu
-all="backends dram levels organisations paper policies prefetch sgrt shadow-orders whole-frame"
+all="backends dram levels organisations paper policies prefetch ray-trees sgrt shadow-orders temporal whole-frame"
 [ -d "${1:?the folder with the real scenes}" ] || {
     echo "scripts/reproduce.sh: $1: no such folder; \`make scenes\` makes one" >&2
     exit 2

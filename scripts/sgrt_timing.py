@@ -72,3 +72,15 @@ for line in Path("times").read_text().splitlines():
     table.append([scene, millions(rays), one(requests / rays), f"{seconds:.1f}", f"{rays / seconds / 1e6:.2f}", f"{seconds / rays * 1e6:.2f}"])
 write("sgrt-timing-speed", "replay reproject --timing cycle --threads 1 --json, the whole command",
       ["scene", "rays simulated M", "requests per ray", "processor seconds", "M rays per second", "seconds per million rays"], table)
+
+# Published rates (docs/models/sgrt.md) beside ours: RayCore's 239 Mray/s and 1 W of 6 units at 28 nm (Nah et al. 2014), GR6500's 300 Mray/s and
+# 24 G node tests per second at 600 MHz (Imagination). A step of ours tests two boxes.
+table = [["RayCore, 28 nm", "6", "239", "-", f"{1e9 / 239e6:.2f}"], ["PowerVR GR6500", "-", "300", "80", "-"]]
+for scene, report in default.items():
+    run, model = report["result"], report["config"]["model"]["tni"]
+    rays = run["reference_work"]["rays"]
+    seconds = run["cycles"]["reference"]["cycles"] / (model["clock_mhz"] * 1e6)
+    energy = run["reference_energy"]["tni_pj"] + run["reference_energy"]["caches_pj"]
+    table.append([f"ours, 45 nm: {scene}", model["units"], f"{rays / seconds / 1e6:.0f}", f"{2 * run['reference_work']['steps'] / rays:.0f}", f"{energy / rays / 1e3:.2f}"])
+write("sgrt-published-units", "replay reproject --timing cycle --json",
+      ["unit", "units", "Mray/s", "box tests per ray", "nJ per ray, units and their caches"], table)

@@ -18,8 +18,8 @@ use std::process::ExitCode;
 /// Arguments of `replay temporal`.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = "Examples:
-  tracegen rays chess --path orbit --frame 0 -o f0.raytrace
-  tracegen rays chess --path orbit --frame 1 -o f1.raytrace
+  tracegen rays chess --path head --frame 0 -o f0.raytrace
+  tracegen rays chess --path head --frame 1 -o f1.raytrace
   replay temporal f0.raytrace f1.raytrace")]
 pub(super) struct TemporalArgs {
     /// Ray traces of consecutive frames of a scene at rest, in order.
