@@ -148,3 +148,69 @@ fn crytek_sponza_reprojects_with_little_error() {
     assert!(figure(&report, "flip_mean") < 0.01, "{report}");
     assert!(figure(&report, "reuse_pct") > 50.0, "{report}");
 }
+
+/// Two consecutive frames of a scene along a path.
+fn two_frames(folder: &tempfile::TempDir, scene: &str) -> [std::path::PathBuf; 2] {
+    ["10", "11"].map(|frame| {
+        let path = folder.path().join(format!("{scene}-{frame}.raytrace"));
+        run_ok(
+            program("tracegen")
+                .args(["rays", scene, "--size", "64x48", "--visits"])
+                .args(["--path", "head", "--fps", "90", "--frame", frame])
+                .arg("-o")
+                .arg(&path),
+        );
+        path
+    })
+}
+
+#[test]
+fn reuse_over_time_saves_more_than_reuse_between_the_eyes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let frames = two_frames(&folder, "chess");
+    let json = |threads: &str| {
+        let output = run_ok(program("replay").arg("temporal").args(&frames).args([
+            "--json",
+            "--rule",
+            "none",
+            "--threads",
+            threads,
+        ]));
+        output.stdout
+    };
+    let bytes = json("1");
+    assert_eq!(bytes, json("2"));
+    let report: Value = serde_json::from_slice(&bytes).expect("JSON");
+    let schemes = report["frames"][0]["schemes"].as_array().expect("schemes");
+    let of = |name: &str| {
+        let found = schemes.iter().find(|scheme| scheme["scheme"] == name);
+        let scheme = found.expect("the scheme");
+        let number = |value: &Value| value.as_f64().expect("a number");
+        (
+            number(&scheme["reused_pct"][1]),
+            number(&scheme["relative_performance"]),
+        )
+    };
+    assert_eq!(of("full"), (0.0, 1.0));
+    assert!(of("temporal").0 > of("stereo").0, "{report}");
+    assert!(
+        of("stereo").1 > 1.0 && of("both").1 > of("stereo").1,
+        "{report}"
+    );
+}
+
+#[test]
+fn frames_that_do_not_belong_together_are_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let [chess, _] = two_frames(&folder, "chess");
+    let [teapot, _] = two_frames(&folder, "teapot");
+    for (files, expected) in [
+        (
+            vec![&chess, &teapot],
+            "expected those of the previous frame",
+        ),
+        (vec![&chess], "2 values required"),
+    ] {
+        refuse(program("replay").arg("temporal").args(&files), &[expected]);
+    }
+}

@@ -48,6 +48,8 @@ pub struct Decision {
     pub tests: u8,
     /// True if the shadow rays of a reused pixel are traced again, even if shadow outcomes are reused.
     pub retraces_shadows: bool,
+    /// True if the material of the reused hit looks the same from everywhere.
+    pub looks_alike: bool,
 }
 
 /// Decides on every right sample.
@@ -79,10 +81,18 @@ pub fn decide(frame: &Frame, arrived: &Reprojection, rule: &Rule) -> Vec<Decisio
             if decision.class.is_reused() {
                 let source = decision.source;
                 decision.retraces_shadows = tests.iter().any(|t| t.retraces_shadows(at, source));
+                decision.looks_alike = looks_alike(frame, source);
             }
             decision
         })
         .collect()
+}
+
+/// Whether a left hit looks the same from everywhere.
+fn looks_alike(frame: &Frame, source: u32) -> bool {
+    let left = &frame.left().samples[source as usize];
+    let material = frame.tables.materials.get(left.material as usize);
+    !left.is_sky() && material.is_some_and(|m| !m.view_dependent())
 }
 
 /// The decision if no test rejects the arrival.
@@ -101,6 +111,7 @@ fn candidate(at: RightSample) -> Decision {
         exact: None,
         tests: 0,
         retraces_shadows: false,
+        looks_alike: false,
     }
 }
 

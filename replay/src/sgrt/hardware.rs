@@ -102,12 +102,9 @@ fn add_right(frame: &Frame, decision: &Decision, i: usize, reuse: Reuse, batch: 
             batch.add_class(pixel, class);
         }
     }
-    let left = &frame.left().samples[decision.source as usize];
-    let material = frame.tables.materials.get(left.material as usize);
-    let looks_alike = !left.is_sky() && material.is_some_and(|m| !m.view_dependent());
     let is_shaded = match reuse {
         Reuse::Primary | Reuse::Shadow => true,
-        Reuse::Color => !looks_alike,
+        Reuse::Color => !decision.looks_alike,
         Reuse::Pixel => false,
     };
     if is_shaded {
@@ -121,7 +118,12 @@ pub(super) fn is_traced(decision: &Decision, class: RayClass, reuse: Reuse) -> b
         _ if !decision.class.is_reused() => true,
         RayClass::Primary => false,
         RayClass::Shadow => reuse == Reuse::Primary || decision.retraces_shadows,
-        RayClass::Secondary => reuse != Reuse::Pixel,
+        RayClass::Secondary => match reuse {
+            Reuse::Primary | Reuse::Shadow => true,
+            // Its secondary rays are diffuse ones.
+            Reuse::Color => !decision.looks_alike,
+            Reuse::Pixel => false,
+        },
     }
 }
 

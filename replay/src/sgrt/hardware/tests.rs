@@ -184,3 +184,25 @@ fn eyes_that_need_more_rows_have_more_traffic() {
     };
     assert!(of(10.0) > of(0.0), "{} {}", of(10.0), of(0.0));
 }
+
+#[test]
+fn reuse_of_colours_saves_diffuse_rays_only_where_they_look_the_same() {
+    let decision = |looks_alike| Decision {
+        class: PixelClass::Reused,
+        source: 0,
+        primitive: 0,
+        exact: None,
+        tests: 0,
+        retraces_shadows: false,
+        looks_alike,
+    };
+    for (reuse, alike, other) in [
+        (Reuse::Primary, true, true),
+        (Reuse::Shadow, true, true),
+        (Reuse::Color, false, true),
+        (Reuse::Pixel, false, false),
+    ] {
+        let traced = |looks_alike| is_traced(&decision(looks_alike), RayClass::Secondary, reuse);
+        assert_eq!([traced(true), traced(false)], [alike, other], "{reuse:?}");
+    }
+}
