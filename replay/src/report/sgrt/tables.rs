@@ -24,8 +24,19 @@ pub(super) fn rule_line(entries: &[Entry]) -> String {
             Timing::ClosedForm => "",
             Timing::Cycle => "; units simulated cycle by cycle",
         };
+        let rates = entries.iter().map(|entry| &entry.report);
+        let rates = rates.filter(|report| report.config.cache_misses == "rates");
+        let rates: Vec<String> = rates.map(scene_name).collect();
+        let rates = if rates.is_empty() {
+            String::new()
+        } else {
+            format!(
+                "; cache misses by stated hit rates, as without visits (tracegen rays --visits), on {}",
+                rates.join(", ")
+            )
+        };
         format!(
-            "chosen: rule {}, reuse of {}; plain: rule none, every reprojected hit is reused{timing}",
+            "chosen: rule {}, reuse of {}; plain: rule none, every reprojected hit is reused{timing}{rates}",
             config.rule,
             reuse_name(config.reuse)
         )
