@@ -24,7 +24,7 @@ fn figure(report: &Value, name: &str) -> f64 {
 #[test]
 fn golden_ray_traces_are_reproduced_by_their_recipes_for_any_number_of_threads() {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    for name in ["chess-rays", "teapot-rays"] {
+    for name in ["chess-rays", "teapot-rays", "chess-light"] {
         let golden = root().join("traces").join(name);
         let recipe = fs::read_to_string(golden.with_extension("recipe")).expect("recipe");
         let expected = fs::read(golden.with_extension("raytrace")).expect("golden trace");
