@@ -103,11 +103,11 @@ pub fn run(bytes: &[u8]) {
     let plain = fast.with_instructions(Instructions::Scalar);
     let with_plain = all(&plain);
     assert_eq!(with_best, with_plain, "{rays:?} {triangles:?}");
-    for (ray, found) in rays.iter().zip(with_plain.chunks_exact(2)) {
+    for (ray, found) in rays.iter().zip(with_plain.chunks_exact(trees.len())) {
         let expected = one_by_one(&triangles, ray);
-        let [two, eight] = [&found[0], &found[1]].map(|found| found[0].0);
-        assert_eq!(two, expected, "{ray:?} {triangles:?}");
-        assert_eq!(eight, expected, "{ray:?} {triangles:?}");
+        for (tree, found) in trees.iter().zip(found) {
+            assert_eq!(found[0].0, expected, "{tree:?}: {ray:?} {triangles:?}");
+        }
     }
 }
 
