@@ -15,6 +15,8 @@ pub const HISTORY: &[&str] = &[
     "Ray tracing: with reuse of shadow outcomes, a re-tested pixel is shaded at its exact hit. Functional mode: each core has its own L2 if the L2 is not shared.",
     // 5
     "The same counts under other keys: miss rates name what they divide by.",
+    // 6
+    "Ray tracing: with reuse of colours, no secondary ray is traced where the reused material looks the same from everywhere.",
 ];
 
 /// The version of the models, recorded with every result and part of every point's key.
