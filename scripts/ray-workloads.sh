@@ -20,7 +20,7 @@ for scene in chess music-box "$scenes/crytek-sponza/sponza.gltf" "$scenes/stk-bl
     name=$(basename "${scene%/sponza.gltf}" .gltf)
     while IFS='|' read -r workload options; do
         # shellcheck disable=SC2086
-        "$bin/tracegen" rays "$scene" --size "$size" --visits $options -o trace.raytrace 2>"$name,$workload,log"
+        "$bin/tracegen" rays "$scene" --size "$size" --visits $options --quiet -o trace.raytrace
         "$bin/replay" info trace.raytrace --json >"$name,$workload,info.json"
         for reuse in primary shadow color; do
             "$bin/replay" reproject trace.raytrace --rule none --reuse $reuse --json --quiet >"$name,$workload,$reuse.json"
