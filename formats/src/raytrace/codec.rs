@@ -20,8 +20,8 @@ use nom::number::complete::u8 as byte;
 const HAS_ALPHA_TESTS: u8 = 1 << 4;
 /// Flag: the parent is the pixel's primary ray, and no number follows.
 const PARENT_IS_PRIMARY: u8 = 1 << 5;
-/// Flag in the first byte of a ray of a kind from 4 on.
-const LATER_KIND: u8 = 1 << 6;
+/// Flag in the first byte of a ray of a kind that needs lighting; bits 0 and 1 then count from 4.
+const LIGHTING_KIND: u8 = 1 << 6;
 
 /// Bits of a visit: the zigzag of a difference of 32-bit numbers, and the kind.
 const VISIT_BITS: u32 = 34;
@@ -100,8 +100,8 @@ fn put_colors(colors: impl Iterator<Item = [f32; 3]> + Clone, out: &mut Vec<u8>)
 
 fn put_ray(own: u32, ray: &RayRecord, out: &mut Vec<u8>) {
     let mut head = (ray.kind as u8 & 3) | (ray.outcome as u8) << 2;
-    if ray.kind.is_later() {
-        head |= LATER_KIND;
+    if ray.kind.needs_lighting() {
+        head |= LIGHTING_KIND;
     }
     if ray.alpha_tests > 0 {
         head |= HAS_ALPHA_TESTS;
@@ -293,7 +293,7 @@ fn decode_colors<'a>(
 fn decode_rays<'a>(
     input: &mut Cursor<'a>,
     tile: &mut RayTile,
-    later_kinds: bool,
+    has_lighting: bool,
 ) -> Result<(), nom::Err<Fault<'a>>> {
     let mut total = 0u32;
     for pixel in &mut tile.pixels {
@@ -311,7 +311,7 @@ fn decode_rays<'a>(
     for pixel in &tile.pixels {
         for own in 0..pixel.ray_count {
             let earlier = tile.rays.get(pixel.first_ray as usize..);
-            let ray = decode_ray(input, own, earlier, later_kinds)?;
+            let ray = decode_ray(input, own, earlier, has_lighting)?;
             tile.rays.push(ray);
         }
     }
@@ -322,18 +322,18 @@ fn decode_ray<'a>(
     input: &mut Cursor<'a>,
     own: u32,
     earlier: Option<&[RayRecord]>,
-    later_kinds: bool,
+    has_lighting: bool,
 ) -> Result<RayRecord, nom::Err<Fault<'a>>> {
     let at = *input;
     let head = input.parse(byte)?;
-    let later = head & LATER_KIND != 0;
-    let kind = match (head & 3, later) {
+    let needs_lighting = head & LIGHTING_KIND != 0;
+    let kind = match (head & 3, needs_lighting) {
         (0, false) => RayKind::Primary,
         (1, false) => RayKind::Shadow,
         (2, false) => RayKind::Reflection,
         (3, false) => RayKind::Refraction,
-        (0, true) if later_kinds => RayKind::AmbientOcclusion,
-        (1, true) if later_kinds => RayKind::Diffuse,
+        (0, true) if has_lighting => RayKind::AmbientOcclusion,
+        (1, true) if has_lighting => RayKind::Diffuse,
         (number, _) => {
             let found = format_args!("{}", number + 4).to_string();
             return Err(at.fault("a kind that the trace's lighting has", found));

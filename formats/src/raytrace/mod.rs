@@ -168,8 +168,8 @@ impl TraversalKind {
     /// Every kind of tree.
     pub const ALL: [Self; 4] = [Self::Bvh2, Self::Bvh4, Self::Bvh8, Self::Cwbvh8];
 
-    /// Whether files with such a tree need minor version [`tables::LATER_MINOR`].
-    pub(crate) const fn is_of_minor_4(self) -> bool {
+    /// Whether files with such a tree need minor version [`tables::TREES_AND_LIGHTING_MINOR`].
+    pub(crate) const fn is_new_in_minor_4(self) -> bool {
         matches!(self, Self::Bvh4 | Self::Cwbvh8)
     }
 }
@@ -277,7 +277,7 @@ impl RayKind {
 
     /// Whether only traces with lighting have the kind.
     #[must_use]
-    pub const fn is_later(self) -> bool {
+    pub const fn needs_lighting(self) -> bool {
         matches!(self, Self::AmbientOcclusion | Self::Diffuse)
     }
 

@@ -28,7 +28,7 @@ pub const TRIANGLES: ChunkTag = ChunkTag(*b"RTRI");
 /// Bytes of a triangle: primitive, object, material, nine coordinates.
 pub const TRIANGLE_ENTRY_BYTES: usize = 48;
 /// Minor version of files with four-wide or compressed trees, or with lighting.
-pub const LATER_MINOR: u16 = 4;
+pub const TREES_AND_LIGHTING_MINOR: u16 = 4;
 /// Maximum number of samples per pixel.
 pub const MAX_SAMPLES_PER_PX: u32 = 1024;
 /// Maximum depth of reflections.
@@ -86,13 +86,17 @@ pub(super) fn read(container: &Container) -> Result<RaytraceTables> {
         triangles: container.parse_chunk(TRIANGLES, read_triangles)?,
     };
     let (major, minor) = container.version();
-    if minor < LATER_MINOR {
+    if minor < TREES_AND_LIGHTING_MINOR {
         let later = [
-            (BVH, "kind of tree", tables.bvh.traversal.is_of_minor_4()),
+            (
+                BVH,
+                "kind of tree",
+                tables.bvh.traversal.is_new_in_minor_4(),
+            ),
             (META, "lighting", tables.meta.lighting.is_some()),
         ];
         if let Some((chunk, what, _)) = later.into_iter().find(|(.., has)| *has) {
-            let expected = format!("version {major}.{LATER_MINOR} for this {what}");
+            let expected = format!("version {major}.{TREES_AND_LIGHTING_MINOR} for this {what}");
             return Err(container.malformed(chunk, 0, expected, format!("{major}.{minor}")));
         }
     }

@@ -25,7 +25,7 @@ pub struct EncodedRayTile {
     rays: u32,
     geometry: Option<Vec<u8>>,
     /// A ray of a kind that only a trace with lighting has.
-    has_later_kinds: bool,
+    needs_lighting: bool,
 }
 
 impl EncodedRayTile {
@@ -56,7 +56,7 @@ pub fn encode_ray_tile(tile: &RayTile, has_visits: bool) -> Result<EncodedRayTil
         rays: u32::try_from(tile.rays.len()).map_err(too_many)?,
         bytes,
         geometry: None,
-        has_later_kinds: tile.rays.iter().any(|ray| ray.kind.is_later()),
+        needs_lighting: tile.rays.iter().any(|ray| ray.kind.needs_lighting()),
     })
 }
 
@@ -101,7 +101,7 @@ pub struct RaytraceWriter<W = AtomicFile> {
     offset: u64,
     geometry: GeometrySpool,
     hierarchy: Option<Hierarchy>,
-    has_later_kinds: bool,
+    needs_lighting: bool,
 }
 
 impl RaytraceWriter<AtomicFile> {
@@ -160,7 +160,7 @@ impl<W: Write + Seek> RaytraceWriter<W> {
                 offset: 0,
             },
             hierarchy: None,
-            has_later_kinds: false,
+            needs_lighting: false,
         })
     }
 
@@ -188,7 +188,7 @@ impl<W: Write + Seek> RaytraceWriter<W> {
             self.index.extend(number.to_le_bytes());
         }
         self.offset += u64::from(bytes);
-        self.has_later_kinds |= tile.has_later_kinds;
+        self.needs_lighting |= tile.needs_lighting;
         if let Some(geometry) = &tile.geometry {
             self.geometry.append(geometry)?;
         }
@@ -205,7 +205,7 @@ impl<W: Write + Seek> RaytraceWriter<W> {
                 found: written.to_string(),
             });
         }
-        if self.has_later_kinds && tables.meta.lighting.is_none() {
+        if self.needs_lighting && tables.meta.lighting.is_none() {
             return Err(FormatError::Unwritable {
                 what: "rays".to_owned(),
                 expected: "kinds of Whitted's model, as the trace has no lighting".to_owned(),
@@ -234,8 +234,9 @@ impl<W: Write + Seek> RaytraceWriter<W> {
             let triangles = hierarchy_codec::encode_triangles(&hierarchy.triangles);
             self.container.chunk(SLOTS, &triangles)?;
         }
-        if tables.bvh.traversal.is_of_minor_4() || tables.meta.lighting.is_some() {
-            self.container.require_minor(tables::LATER_MINOR);
+        if tables.bvh.traversal.is_new_in_minor_4() || tables.meta.lighting.is_some() {
+            self.container
+                .require_minor(tables::TREES_AND_LIGHTING_MINOR);
         }
         tables::write(tables, &mut self.container)?;
         Ok(self.container)

@@ -198,7 +198,7 @@ fn ray_text(trace: &Raytrace) -> Result<String> {
     ];
     for kind in RayKind::ALL {
         let rays = move |r: &EyeRow| r.1.rays[kind as usize];
-        if kind.is_later() && left.rays[kind as usize] + right.rays[kind as usize] == 0 {
+        if kind.needs_lighting() && left.rays[kind as usize] + right.rays[kind as usize] == 0 {
             continue;
         }
         columns.push(Column::new(

@@ -18,6 +18,7 @@ mod parquet_arg;
 mod readings;
 mod report;
 pub mod reproject;
+mod reuse_args;
 mod run;
 mod subjects;
 mod sweep;

@@ -1,6 +1,6 @@
 //! `replay readings`: the SGRT paper's figure 3 under every reading of what it measures.
 
-use super::reproject::read_config;
+use super::reuse_args::read_config;
 use crate::files::{self, write_atomically};
 use crate::paper::sgrt as paper;
 use crate::report::readings::{ReadingsReport, SceneReadings};

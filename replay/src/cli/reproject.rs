@@ -2,6 +2,7 @@
 //! the right one.
 
 use super::parquet_arg::ParquetArg;
+use super::reuse_args::ReuseArgs;
 use crate::files::{self, write_atomically};
 use crate::model_version::MODEL_VERSION;
 use crate::paper::sgrt as paper;
@@ -11,12 +12,11 @@ use crate::result::{TOOL, TraceId, scene_name};
 use crate::sgrt::compose::Reuse;
 use crate::sgrt::config::{DEFAULT_TOML, SgrtConfig};
 use crate::sgrt::loaded::{LoadedTrace, RuleRun};
-use crate::sgrt::presets::{self, Preset};
+use crate::sgrt::picture;
 use crate::sgrt::result::{Config, Report, SCHEMA};
-use crate::sgrt::rules::{self, Rule};
+use crate::sgrt::rules::Rule;
 use crate::sgrt::timing::Timing;
 use crate::sgrt::variations::curve_rules;
-use crate::sgrt::{DEFAULT_RULE, picture};
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::raytrace::Raytrace;
@@ -38,19 +38,11 @@ pub struct ReprojectArgs {
     /// Ray traces
     #[arg(value_name = "FILE", required_unless_present = "print_config")]
     files: Vec<PathBuf>,
-    #[arg(long, value_name = "NAME", help = presets::help(), value_parser = preset)]
-    preset: Option<&'static Preset>,
-    #[arg(long, value_name = "RULE", help = rule_help())]
-    rule: Option<Rule>,
-    /// Values that a reprojected pixel reuses [default: primary]
-    #[arg(long, value_enum)]
-    reuse: Option<Reuse>,
+    #[command(flatten)]
+    reused: ReuseArgs,
     /// Model of the units' time
     #[arg(long, value_enum, default_value_t)]
     timing: Timing,
-    /// TOML file with model parameters; others keep their defaults
-    #[arg(long, value_name = "TOML")]
-    config: Option<PathBuf>,
     /// Print the model parameters as TOML (the defaults with comments) and stop
     #[arg(long)]
     print_config: bool,
@@ -82,46 +74,15 @@ pub struct ReprojectArgs {
     threads: shell::Threads,
 }
 
-pub(super) fn rule_help() -> String {
-    format!("{} [default: {DEFAULT_RULE}]", rules::help())
-}
-
-/// The preset of a name.
-pub(super) fn preset(name: &str) -> Result<&'static Preset, String> {
-    let names = || presets::PRESETS.map(|preset| preset.name).join(" or ");
-    presets::find(name).ok_or_else(|| format!("expected {}", names()))
-}
-
-/// The rule: the user's, else the preset's, else the default.
-pub(super) fn rule_of(
-    rule: Option<&Rule>,
-    preset: Option<&'static Preset>,
-) -> anyhow::Result<Rule> {
-    let named = preset.map_or(DEFAULT_RULE, |preset| preset.rule);
-    rule.cloned().map_or_else(|| Ok(named.parse()?), Ok)
-}
-
-impl ReprojectArgs {
-    fn rule(&self) -> anyhow::Result<Rule> {
-        rule_of(self.rule.as_ref(), self.preset)
-    }
-
-    /// What is reused: the user's, else the preset's, else primary hits.
-    fn reuse(&self) -> Reuse {
-        let named = self.preset.map_or(Reuse::Primary, |preset| preset.reuse);
-        self.reuse.unwrap_or(named)
-    }
-}
-
 /// Runs the command.
 ///
 /// # Errors
 /// A file that cannot be read, invalid parameters, or an output that cannot be written.
 pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     args.threads.start()?;
-    let config = read_config(args.preset, args.config.as_deref())?;
+    let config = args.reused.parameters()?;
     if args.print_config {
-        let text = match (args.preset, &args.config) {
+        let text = match (args.reused.preset, &args.reused.config) {
             (None, None) => DEFAULT_TOML.to_owned(),
             _ => toml::to_string(&config)?,
         };
@@ -184,9 +145,9 @@ pub fn rows(arguments: &[String], parameters: Option<&str>) -> anyhow::Result<Ta
         anyhow::anyhow!(text.trim_start_matches("error: ").to_owned())
     })?;
     let config = match parameters {
-        None => read_config(args.preset, args.config.as_deref())?,
+        None => args.reused.parameters()?,
         Some(text) => {
-            let named = args.preset.map_or("", |preset| preset.parameters);
+            let named = args.reused.preset.map_or("", |preset| preset.parameters);
             SgrtConfig::from_layers(&[named, text]).context("config")?
         }
     };
@@ -224,28 +185,18 @@ fn check_outputs(args: &ReprojectArgs) -> anyhow::Result<bool> {
     let outputs: Vec<Output> = outputs.into_iter().flatten().collect();
     files::check_outputs(
         &outputs,
-        args.files.iter().chain(&args.config).map(PathBuf::as_path),
+        args.files
+            .iter()
+            .chain(&args.reused.config)
+            .map(PathBuf::as_path),
     )
-}
-
-/// The parameters: the defaults, the preset's over them, the file's over both.
-pub(super) fn read_config(
-    preset: Option<&'static Preset>,
-    path: Option<&Path>,
-) -> anyhow::Result<SgrtConfig> {
-    let named = preset.map_or("", |preset| preset.parameters);
-    let Some(path) = path else {
-        return Ok(SgrtConfig::from_overrides(named)?);
-    };
-    let text = shell::read_settings(path)?;
-    SgrtConfig::from_layers(&[named, &text]).with_context(|| path.display().to_string())
 }
 
 fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::Result<Entry> {
     let file = Raytrace::open(path)?;
     let in_file = || path.display().to_string();
     let loaded = LoadedTrace::load(&file).with_context(in_file)?;
-    let (rule, reuse) = (args.rule()?, args.reuse());
+    let (rule, reuse) = (args.reused.rule()?, args.reused.reuse());
     let traced = match args.timing {
         Timing::ClosedForm => None,
         Timing::Cycle => Some(loaded.traced_timing(config).with_context(in_file)?),
@@ -357,8 +308,8 @@ mod tests {
         let direct = LoadedTrace::load(&source)
             .expect("loads")
             .run(
-                &args.rule().expect("a rule"),
-                args.reuse(),
+                &args.reused.rule().expect("a rule"),
+                args.reused.reuse(),
                 &SgrtConfig::default(),
             )
             .expect("runs");
@@ -407,7 +358,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("p.toml");
         std::fs::write(&path, "[tni]\nunits = 0\n").expect("written");
-        let error = read_config(None, Some(&path)).unwrap_err();
+        let error = super::super::reuse_args::read_config(None, Some(&path)).unwrap_err();
         let text = format!("{error:#}");
         assert!(
             text.contains("p.toml") && text.contains("tni.units"),

@@ -1,14 +1,11 @@
 //! `replay temporal`: reuse of the previous frame's hits beside reuse between the eyes.
 
-use super::reproject::{preset, read_config, rule_help, rule_of};
+use super::reuse_args::ReuseArgs;
 use crate::files;
 use crate::report::temporal::{FrameSchemes, TemporalReport};
 use crate::result::TraceId;
-use crate::sgrt::compose::Reuse;
-use crate::sgrt::presets::{self, Preset};
-use crate::sgrt::rules::Rule;
-use crate::sgrt::temporal::schemes;
-use anyhow::{Context, Result, ensure};
+use crate::sgrt::temporal::{SequenceFrame, schemes};
+use anyhow::{Context, Result};
 use clap::Args;
 use formats::raytrace::Raytrace;
 use shell::{Output, Progress};
@@ -25,16 +22,8 @@ pub(super) struct TemporalArgs {
     /// Ray traces of consecutive frames of a scene at rest, in order.
     #[arg(value_name = "FILE", num_args = 2.., required = true)]
     files: Vec<PathBuf>,
-    #[arg(long, value_name = "NAME", help = presets::help(), value_parser = preset)]
-    preset: Option<&'static Preset>,
-    #[arg(long, value_name = "RULE", help = rule_help())]
-    rule: Option<Rule>,
-    /// Values that a reprojected pixel reuses [default: primary].
-    #[arg(long, value_enum)]
-    reuse: Option<Reuse>,
-    /// Model parameters (TOML) that differ from the defaults.
-    #[arg(long, value_name = "TOML")]
-    config: Option<PathBuf>,
+    #[command(flatten)]
+    reused: ReuseArgs,
     /// Prints JSON (schema replay.temporal/1).
     #[arg(long, conflicts_with = "csv")]
     json: bool,
@@ -51,41 +40,35 @@ pub(super) struct TemporalArgs {
 /// A file that cannot be read, frames that do not belong together, or parameters that cannot be used.
 pub fn run(args: &TemporalArgs) -> Result<ExitCode> {
     args.threads.start()?;
-    let config = read_config(args.preset, args.config.as_deref())?;
-    let rule = rule_of(args.rule.as_ref(), args.preset)?;
-    let reuse = args.reuse.or(args.preset.map(|preset| preset.reuse));
-    let reuse = reuse.unwrap_or_default();
+    let config = args.reused.parameters()?;
+    let (rule, reuse) = (args.reused.rule()?, args.reused.reuse());
     let outputs = [
         args.json.then(|| Output::result("--json")),
         args.csv.then(|| Output::result("--csv")),
     ];
     let outputs: Vec<Output> = outputs.into_iter().flatten().collect();
-    let inputs = args.files.iter().chain(&args.config);
+    let inputs = args.files.iter().chain(&args.reused.config);
     let prints = files::check_outputs(&outputs, inputs.map(PathBuf::as_path))?;
-    ensure!(
-        args.files.len() > 1,
-        "expected two frames or more, found {}",
-        args.files.len()
-    );
-    let progress = Progress::new("reusing", args.files.len() as u64 - 1, "frames");
+    let files: Vec<Raytrace> = (args.files.iter())
+        .map(|path| Raytrace::open(path))
+        .collect::<Result<_, _>>()?;
+    let progress = Progress::new("reusing", files.len() as u64 - 1, "frames");
     let mut frames = Vec::new();
-    let mut previous: Option<(&PathBuf, Raytrace)> = None;
-    for path in &args.files {
-        let file = Raytrace::open(path)?;
-        if let Some((before, earlier)) = &previous {
-            let found = schemes(earlier, &file, &rule, reuse, &config)
-                .with_context(|| format!("{} after {}", path.display(), before.display()))?;
-            let id = |path: &PathBuf, file: &Raytrace| {
-                TraceId::new(path, &file.tables().meta.trace, file.content_checksum())
-            };
+    let mut previous: Option<(SequenceFrame<'_>, TraceId)> = None;
+    for (path, file) in args.files.iter().zip(&files) {
+        let frame = SequenceFrame::load(file).with_context(|| path.display().to_string())?;
+        let id = TraceId::new(path, &file.tables().meta.trace, file.content_checksum());
+        if let Some((before, before_id)) = previous {
+            let found = schemes(&before, &frame, &rule, reuse, &config)
+                .with_context(|| format!("{} after {}", path.display(), before_id.name))?;
             frames.push(FrameSchemes {
-                previous: id(before, earlier),
-                trace: id(path, &file),
+                previous: before_id,
+                trace: id.clone(),
                 schemes: found,
             });
             progress.advance(1);
         }
-        previous = Some((path, file));
+        previous = Some((frame, id));
     }
     drop(progress);
     let report = TemporalReport::new(frames, rule.to_string(), reuse, config);

@@ -7,6 +7,7 @@ use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
 use formats::view::{Eye, TILE_SIZE_PX};
 use rayon::prelude::*;
 use std::error::Error;
+use std::sync::Arc;
 
 /// Object and primitive number of a sky pixel.
 pub(super) const SKY: u32 = u32::MAX;
@@ -156,7 +157,7 @@ pub struct Frame {
     /// The trace's tables.
     pub tables: RaytraceTables,
     /// Left and right eye.
-    pub eyes: [EyeFrame; 2],
+    pub eyes: [Arc<EyeFrame>; 2],
     /// Width and height of one eye's image in pixels.
     pub size_px: [u32; 2],
 }
@@ -176,7 +177,7 @@ impl Frame {
         if found > 1 {
             return Err(FrameError::Samples { found });
         }
-        let load = |eye| load_eye(source, eye, left);
+        let load = |eye| load_eye(source, eye, left).map(Arc::new);
         let eyes = [load(Eye::Left)?, load(Eye::Right)?];
         Ok(Self {
             tables,

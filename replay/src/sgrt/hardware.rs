@@ -120,7 +120,7 @@ pub(super) fn is_traced(decision: &Decision, class: RayClass, reuse: Reuse) -> b
         RayClass::Shadow => reuse == Reuse::Primary || decision.retraces_shadows,
         RayClass::Secondary => match reuse {
             Reuse::Primary | Reuse::Shadow => true,
-            // Its secondary rays are diffuse ones.
+            // A material that looks the same from everywhere has no secondary rays but diffuse ones.
             Reuse::Color => !decision.looks_alike,
             Reuse::Pixel => false,
         },

@@ -51,14 +51,19 @@ impl<'a> LoadedTrace<'a> {
     /// # Errors
     /// [`FrameError`] for an unreadable tile.
     pub fn load(source: &'a dyn RaySource) -> Result<Self, FrameError> {
-        let frame = Frame::load(source)?;
+        Ok(Self::of(source, Frame::load(source)?))
+    }
+
+    /// Reprojects a frame that was loaded from a source.
+    #[must_use]
+    pub(super) fn of(source: &'a dyn RaySource, frame: Frame) -> Self {
         let arrived = reproject(&frame);
         let rows = RowNeeds::new(&frame, &arrived);
         let camera = frame.tables.camera(Eye::Right);
         let ppd = pixels_per_degree(camera.size_px[0], &camera.fov);
         let truth = traced(&frame, Eye::Right);
         let truth_prepared = Prepared::new(&truth, ppd);
-        Ok(Self {
+        Self {
             source,
             frame,
             arrived,
@@ -66,7 +71,7 @@ impl<'a> LoadedTrace<'a> {
             truth,
             truth_prepared,
             ppd,
-        })
+        }
     }
 
     /// The loaded frame.

@@ -11,7 +11,7 @@
 use super::compose::Reuse;
 use super::config::SgrtConfig;
 use super::detect::{Decision, decide};
-use super::frame::{FrameError, RaySource};
+use super::frame::{Frame, FrameError, RaySource};
 use super::hardware::{Kept, TileWork, is_traced, misses_of, misses_of_retests, tile_work};
 use super::loaded::LoadedTrace;
 use super::reads::Reads;
@@ -20,11 +20,10 @@ use super::run::Run;
 use super::ways::{Part, Way, sum_of_parts};
 use super::work::BatchWork;
 use super::{cache, energy_bounds};
-use formats::raytrace::{RayTile, RayTriangle, RaytraceTables};
+use formats::raytrace::{RayTriangle, RaytraceTables};
 use formats::view::Eye;
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::error::Error;
 
 /// Reasons why two traces are not frames of one sequence.
 #[derive(Debug, thiserror::Error)]
@@ -120,40 +119,34 @@ pub struct SchemeFigures {
     pub flip_mean: [f64; 2],
 }
 
+/// A frame of a sequence. Its eyes are decoded once for all pairs.
+pub struct SequenceFrame<'a> {
+    source: &'a dyn RaySource,
+    frame: Frame,
+}
+
+impl<'a> SequenceFrame<'a> {
+    /// Decodes a frame.
+    ///
+    /// # Errors
+    /// [`FrameError`] for an unreadable tile or unsupported eyes.
+    pub fn load(source: &'a dyn RaySource) -> Result<Self, FrameError> {
+        let frame = Frame::load(source)?;
+        Ok(Self { source, frame })
+    }
+}
+
 /// The same eye in two frames, as a stereo pair.
-struct OverTime<'a> {
-    frames: [&'a dyn RaySource; 2],
-    eye: Eye,
-    tables: RaytraceTables,
-}
-
-impl<'a> OverTime<'a> {
-    fn new(frames: [&'a dyn RaySource; 2], eye: Eye) -> Result<Self, TemporalError> {
-        let [previous, current] = frames.map(RaySource::tables);
-        let mut tables = current.clone();
-        tables.triangles = merged(previous, current)?;
-        tables.meta.eyes = [previous, current].map(|tables| *tables.camera(eye));
-        Ok(Self {
-            frames,
-            eye,
-            tables,
-        })
-    }
-}
-
-impl RaySource for OverTime<'_> {
-    fn tables(&self) -> &RaytraceTables {
-        &self.tables
-    }
-
-    fn tile(
-        &self,
-        eye: Eye,
-        index: u32,
-        tile: &mut RayTile,
-    ) -> Result<(), Box<dyn Error + Send + Sync>> {
-        self.frames[eye as usize].tile(self.eye, index, tile)
-    }
+fn over_time(previous: &Frame, current: &Frame, eye: Eye) -> Result<Frame, TemporalError> {
+    let mut tables = current.tables.clone();
+    tables.triangles = merged(&previous.tables, &current.tables)?;
+    let frames = [previous, current];
+    tables.meta.eyes = frames.map(|frame| *frame.tables.camera(eye));
+    Ok(Frame {
+        tables,
+        eyes: frames.map(|frame| frame.eyes[eye as usize].clone()),
+        size_px: current.size_px,
+    })
 }
 
 /// The triangles that either frame saw, by primitive.
@@ -207,18 +200,18 @@ struct Pair<'a> {
 }
 
 impl<'a> Pair<'a> {
-    fn new(source: &'a dyn RaySource, rule: &Rule, reuse: Reuse) -> Result<Self, FrameError> {
-        let loaded = LoadedTrace::load(source)?;
+    fn new(source: &'a dyn RaySource, frame: Frame, rule: &Rule, reuse: Reuse) -> Self {
+        let loaded = LoadedTrace::of(source, frame);
         let decisions = decide(&loaded.frame, &loaded.arrived, rule);
         let work = tile_work(&loaded.frame, &decisions, reuse);
         let picture = loaded.picture(&decisions, reuse);
         let flip_mean = loaded.flip(&picture).mean();
-        Ok(Self {
+        Self {
             loaded,
             decisions,
             work,
             flip_mean,
-        })
+        }
     }
 
     fn reused_pct(&self) -> f64 {
@@ -232,25 +225,20 @@ impl<'a> Pair<'a> {
 /// # Errors
 /// [`TemporalError`] for unreadable tiles and for traces that are not frames of one sequence.
 pub fn schemes(
-    previous: &dyn RaySource,
-    current: &dyn RaySource,
+    previous: &SequenceFrame<'_>,
+    current: &SequenceFrame<'_>,
     rule: &Rule,
     reuse: Reuse,
     config: &SgrtConfig,
 ) -> Result<Vec<SchemeFigures>, TemporalError> {
-    check(previous.tables(), current.tables())?;
-    let frames = [previous, current];
-    let over_time = [
-        OverTime::new(frames, Eye::Left)?,
-        OverTime::new(frames, Eye::Right)?,
-    ];
-    let stereo = Pair::new(current, rule, reuse)?;
-    let temporal = [
-        Pair::new(&over_time[0], rule, reuse)?,
-        Pair::new(&over_time[1], rule, reuse)?,
-    ];
+    check(&previous.frame.tables, &current.frame.tables)?;
+    let source = current.source;
+    let over_time = |eye| over_time(&previous.frame, &current.frame, eye);
+    let pair = |frame| Pair::new(source, frame, rule, reuse);
+    let stereo = pair(current.frame.clone());
+    let temporal = [pair(over_time(Eye::Left)?), pair(over_time(Eye::Right)?)];
     let sequence = Sequence {
-        current,
+        current: source,
         stereo,
         temporal,
         reads: rule.reads(),

@@ -4,24 +4,20 @@
 use super::bvh::count::Counts;
 use super::bvh::{RayHit, TraversalStack};
 use super::cast::{Cast, Caster, Query};
-use super::light::{
-    Incident, blinn_phong, dielectric, incident, incident_of_size, reflect, refract, schlick,
-};
+use super::light::{dielectric, reflect, refract, schlick};
 use super::material::Surface;
 use super::ray::{Ray, barycentrics, offset, point_at};
-use super::sampling::{Noise, Purpose, cosine_direction};
+use super::sampling::Noise;
 use super::scene::{Colouring, TraceScene};
 use formats::raytrace::camera::sample_position_px;
 use formats::raytrace::{
-    EyeCamera, Hit, NO_PARENT, Outcome, PixelRecord, RayKind, RayLight, RayLighting, RayRecord,
-    RayTile, RayTriangle, TraversalKind, half, normal,
+    EyeCamera, Hit, NO_PARENT, Outcome, PixelRecord, RayKind, RayLighting, RayRecord, RayTile,
+    RayTriangle, TraversalKind, half, normal,
 };
 use glam::Vec3;
 
 /// Rays that contribute less than this fraction of a pixel are not cast.
 const LEAST_WEIGHT: f32 = 0.01;
-/// Shadow rays for less than this radiance are not cast.
-const LEAST_RADIANCE: f32 = 1.0 / 1024.0;
 
 /// Settings of tracing and recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,6 +37,8 @@ pub struct TraceSettings {
     /// Seed of random numbers, which only lighting uses.
     pub seed: u64,
 }
+
+mod gather;
 
 /// Radiance, split into parts that depend on the viewpoint and parts that do not.
 #[derive(Clone, Copy, Debug, Default)]
@@ -72,6 +70,23 @@ struct Path {
     length: f32,
 }
 
+impl Path {
+    /// A ray from a point that this one hit.
+    fn child(&self, place: &ShadedPoint, kind: RayKind, ray: Ray, weight: f32) -> Self {
+        let is_diffuse = kind == RayKind::Diffuse;
+        Self {
+            ray,
+            kind,
+            depth: self.depth + 1,
+            levels: self.levels + u32::from(!is_diffuse),
+            bounces: self.bounces + u32::from(is_diffuse),
+            parent: place.number,
+            weight,
+            length: place.length,
+        }
+    }
+}
+
 /// Traces tiles; one per thread.
 pub struct Tracer<'a> {
     scene: &'a TraceScene,
@@ -82,6 +97,9 @@ pub struct Tracer<'a> {
     /// First ray of the current pixel.
     first_ray: usize,
     noise: Noise,
+    /// Radius of point lights in metres and tangent of the angular radius of parallel ones, if any has
+    /// a size.
+    light_size: Option<[f32; 2]>,
 }
 
 impl<'a> Tracer<'a> {
@@ -101,6 +119,7 @@ impl<'a> Tracer<'a> {
             px_spread: 0.0,
             first_ray: 0,
             noise: Noise::default(),
+            light_size: settings.lighting.and_then(gather::light_size),
         }
     }
 
@@ -291,124 +310,6 @@ impl<'a> Tracer<'a> {
         (radiance, shading, at.uv[0].to_array())
     }
 
-    /// Light directly from the light sources, each tested with a shadow ray.
-    fn direct(
-        &mut self,
-        path: &Path,
-        surface: &Surface,
-        place: &ShadedPoint,
-        out: &mut RayTile,
-    ) -> Radiance {
-        let mut radiance = Radiance::default();
-        let origin = offset(place.point, place.geometric);
-        for (number, light) in (0u32..).zip(&self.scene.lights) {
-            let Some(Incident {
-                direction,
-                distance,
-                irradiance,
-            }) = self.incident(number, light, place)
-            else {
-                continue;
-            };
-            let cosine = place.shading.dot(direction);
-            if cosine <= 0.0 || place.geometric.dot(direction) <= 0.0 {
-                continue;
-            }
-            let diffuse = surface.albedo * std::f32::consts::FRAC_1_PI * irradiance * cosine;
-            let highlight = if surface.exponent > 0 {
-                let lobe = blinn_phong(place.shading, direction, place.to_eye, surface.exponent);
-                irradiance * schlick(surface.specular, place.cosine) * lobe
-            } else {
-                Vec3::ZERO
-            };
-            if (diffuse + highlight).max_element() * path.weight < LEAST_RADIANCE {
-                continue;
-            }
-            let ray = Ray {
-                t_max: distance,
-                ..Ray::new(origin, direction)
-            };
-            let (kind, depth) = (RayKind::Shadow, path.depth + 1);
-            let light = self.cast_any(kind, &ray, depth, place.number, out);
-            radiance.view_independent += light * diffuse;
-            radiance.view_dependent += light * highlight;
-        }
-        radiance
-    }
-
-    /// A light as a point sees it. The noise differs between lights and rays.
-    fn incident(&self, number: u32, light: &RayLight, place: &ShadedPoint) -> Option<Incident> {
-        let size = self.settings.lighting.map(|lighting| {
-            let tangent = f64::from(lighting.sun_radius_deg).to_radians().tan();
-            (lighting.light_radius_m, tangent as f32)
-        });
-        match size.filter(|size| *size != (0.0, 0.0)) {
-            None => incident(light, place.point),
-            Some((radius_m, tangent)) => {
-                let point = self.noise.point(place.number, Purpose::Light(number), 0, 1);
-                incident_of_size(light, place.point, radius_m, tangent, point)
-            }
-        }
-    }
-
-    /// Light from all around that a diffuse surface scatters: by a diffuse ray, by the sky as far as
-    /// ambient-occlusion rays do not meet anything, or by the whole sky.
-    fn ambient(
-        &mut self,
-        path: &Path,
-        surface: &Surface,
-        place: &ShadedPoint,
-        out: &mut RayTile,
-    ) -> Vec3 {
-        let sky = surface.albedo * self.scene.sky.ambient(place.shading);
-        let lighting = self.settings.lighting.unwrap_or_default();
-        let weight = surface.albedo.max_element() * path.weight;
-        if lighting.bounces > 0 {
-            if path.bounces >= lighting.bounces {
-                return Vec3::ZERO;
-            }
-            if weight < LEAST_WEIGHT {
-                return sky;
-            }
-            let point = self.noise.point(place.number, Purpose::Diffuse, 0, 1);
-            let next = Path {
-                ray: self.scattered(place, point),
-                kind: RayKind::Diffuse,
-                depth: path.depth + 1,
-                levels: path.levels,
-                bounces: path.bounces + 1,
-                parent: place.number,
-                weight,
-                length: place.length,
-            };
-            return surface.albedo * self.follow(&next, out);
-        }
-        if lighting.occlusion_rays == 0 || path.depth > 0 || sky.max_element() <= 0.0 {
-            return sky;
-        }
-        let (count, mut open) = (lighting.occlusion_rays, Vec3::ZERO);
-        for index in 0..count {
-            let point = self
-                .noise
-                .point(place.number, Purpose::Occlusion, index, count);
-            let ray = Ray {
-                t_max: lighting.occlusion_m,
-                ..self.scattered(place, point)
-            };
-            open += self.cast_any(RayKind::AmbientOcclusion, &ray, 1, place.number, out);
-        }
-        sky * open / count as f32
-    }
-
-    /// A ray in a random direction of a surface's hemisphere.
-    fn scattered(&self, place: &ShadedPoint, point: [f32; 2]) -> Ray {
-        let direction = cosine_direction(place.shading, point);
-        // Directions below the surface, which shading normals can give, are mirrored at it.
-        let below = direction.dot(place.geometric).min(0.0);
-        let direction = (direction - 2.0 * below * place.geometric).normalize();
-        Ray::new(offset(place.point, place.geometric), direction)
-    }
-
     /// Reflection of an opaque surface: a ray if it is polished, or else the mean radiance of the
     /// sky.
     fn reflection(
@@ -450,16 +351,8 @@ impl<'a> Tracer<'a> {
         } else {
             reflect(-place.to_eye, place.geometric)
         };
-        let next = Path {
-            ray: Ray::new(offset(place.point, place.geometric), direction),
-            kind: RayKind::Reflection,
-            depth: path.depth + 1,
-            levels: path.levels + 1,
-            bounces: path.bounces,
-            parent: place.number,
-            weight,
-            length: place.length,
-        };
+        let ray = Ray::new(offset(place.point, place.geometric), direction);
+        let next = path.child(place, RayKind::Reflection, ray, weight);
         self.follow(&next, out)
     }
 
@@ -520,16 +413,8 @@ impl<'a> Tracer<'a> {
         if path.levels >= self.settings.max_depth || weight < LEAST_WEIGHT {
             return self.scene.sky.ambient(direction);
         }
-        let next = Path {
-            ray: Ray::new(offset(place.point, -place.geometric), direction),
-            kind: RayKind::Refraction,
-            depth: path.depth + 1,
-            levels: path.levels + 1,
-            bounces: path.bounces,
-            parent: place.number,
-            weight,
-            length: place.length,
-        };
+        let ray = Ray::new(offset(place.point, -place.geometric), direction);
+        let next = path.child(place, RayKind::Refraction, ray, weight);
         self.follow(&next, out)
     }
 }

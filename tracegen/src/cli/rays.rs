@@ -271,7 +271,7 @@ fn report(tables: &RaytraceTables, frame: &RayFrame, bytes: u64, at: [Duration; 
     let kinds: Vec<_> = RayKind::ALL
         .map(|kind| (kind, stats.rays_of(kind)))
         .into_iter()
-        .filter(|(kind, rays)| *rays > 0 || !kind.is_later())
+        .filter(|(kind, rays)| *rays > 0 || !kind.needs_lighting())
         .map(|(kind, rays)| format!("{rays} {kind}"))
         .collect();
     let per_ray = |n: u64| n as f64 / rays.max(1) as f64;

@@ -275,7 +275,7 @@ fn tests_against_whole_rows_find_all_candidates_of_parallel_eyes() {
 /// The room with a shadow over everything right of the middle.
 fn half_in_shadow() -> Frame {
     let mut frame = frame(&room(), View::default());
-    for eye in &mut frame.eyes {
+    for eye in frame.eyes.iter_mut().map(std::sync::Arc::make_mut) {
         for (sample, work) in eye.samples.iter().zip(&mut eye.work) {
             let in_shadow = !sample.is_sky() && sample.position[0] > 0.05;
             work.shadows_blocked = u64::from(in_shadow);

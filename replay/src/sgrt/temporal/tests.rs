@@ -19,7 +19,8 @@ fn frame(right_m: f64) -> Synthetic {
 fn figures(previous: &Synthetic, current: &Synthetic, rule: &str) -> Vec<SchemeFigures> {
     let rule = rule.parse().expect("a rule");
     let config = SgrtConfig::default();
-    schemes(previous, current, &rule, Reuse::Primary, &config).expect("runs")
+    let [previous, current] = [previous, current].map(|f| SequenceFrame::load(f).expect("loads"));
+    schemes(&previous, &current, &rule, Reuse::Primary, &config).expect("runs")
 }
 
 #[test]
@@ -70,8 +71,9 @@ fn a_small_step_of_the_head_reuses_more_than_the_distance_of_the_eyes() {
 fn arrivals_from_the_previous_frame_are_those_of_a_search_over_all_pixels() {
     let (previous, current) = (frame(0.0), frame(0.02));
     for eye in [Eye::Left, Eye::Right] {
-        let over_time = OverTime::new([&previous, &current], eye).expect("one scene");
-        let loaded = LoadedTrace::load(&over_time).expect("loads");
+        let frames = [&previous, &current].map(|f| Frame::load(f).expect("loads"));
+        let frame = over_time(&frames[0], &frames[1], eye).expect("one scene");
+        let loaded = LoadedTrace::of(&current, frame);
         let [from, to] = &loaded.frame.eyes;
         let camera = current.tables().camera(eye);
         let [width, height] = loaded.frame.size_px;
@@ -98,7 +100,8 @@ fn frames_of_other_scenes_are_refused() {
     let (still, rule) = (frame(0.0), Rule::default());
     let refused = |other: &Synthetic| {
         let config = SgrtConfig::default();
-        let found = schemes(&still, other, &rule, Reuse::Primary, &config);
+        let [still, other] = [&still, other].map(|f| SequenceFrame::load(f).expect("loads"));
+        let found = schemes(&still, &other, &rule, Reuse::Primary, &config);
         found.map(drop).unwrap_err().to_string()
     };
     let mut moved = room();

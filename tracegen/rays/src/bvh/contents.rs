@@ -20,7 +20,7 @@ impl Bvh {
                 })
                 .collect(),
             TraversalKind::Bvh8 => wide(&self.nodes8),
-            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => wide(&self.other.nodes),
+            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => wide(&self.third.nodes),
         };
         let mut blocks: Vec<_> = slots.iter().zip(&self.blocks).collect();
         blocks.sort_unstable_by_key(|(slot, _)| **slot);

@@ -17,6 +17,7 @@ mod leaf;
 pub mod node;
 mod pages;
 mod stacks;
+mod third;
 mod traverse;
 mod treelets;
 mod widen;
@@ -25,17 +26,18 @@ mod widen;
 mod tests;
 
 use crate::ray::{LARGEST_COORDINATE, Ray};
-use compress::{CompressedNode, compressed};
 use count::Counter;
 use formats::raytrace::{BvhSummary, TraversalKind};
 use glam::Vec3;
 use kernel::{Kernel, Scalar};
 pub use leaf::{AllOpaque, AlphaTest, RayHit};
-use node::{Block, Child, MASKED, NODE4_BYTES, Node2, Node8, TRIANGLE_BYTES};
+use node::{Block, Child, MASKED, Node2, Node8, TRIANGLE_BYTES};
 use pages::in_large_pages;
 use stacks::Stacks;
+pub use third::TreeOptions;
+use third::{ThirdTree, node_bytes};
 pub use traverse::TraversalStack;
-use traverse::{Eight, Other, Two, Width, blocker, closest};
+use traverse::{Two, Wide, Width, blocker, closest};
 use treelets::in_treelets;
 use widen::MAX_WIDTH;
 
@@ -73,45 +75,6 @@ impl Instructions {
     }
 }
 
-/// The third tree.
-#[derive(Default)]
-struct OtherTree {
-    kind: Option<TraversalKind>,
-    /// Only the first four children are used in a four-wide tree.
-    nodes: Vec<Node8>,
-    /// By block, the slot of its first triangle.
-    first_slots: Vec<u32>,
-    depth: u32,
-}
-
-/// The tree that is traversed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TreeOptions {
-    /// Its kind.
-    pub kind: TraversalKind,
-    /// Size of its treelets. Without, nodes are depth first.
-    pub treelet_bytes: Option<u32>,
-}
-
-impl From<TraversalKind> for TreeOptions {
-    fn from(kind: TraversalKind) -> Self {
-        Self {
-            kind,
-            treelet_bytes: None,
-        }
-    }
-}
-
-/// Bytes of a node in a ray-tracing unit's memory.
-fn node_bytes(kind: TraversalKind) -> usize {
-    match kind {
-        TraversalKind::Bvh2 => size_of::<Node2>(),
-        TraversalKind::Bvh4 => NODE4_BYTES,
-        TraversalKind::Bvh8 => size_of::<Node8>(),
-        TraversalKind::Cwbvh8 => size_of::<CompressedNode>(),
-    }
-}
-
 /// The trees over a set of triangles.
 pub struct Bvh {
     nodes2: Vec<Node2>,
@@ -125,7 +88,7 @@ pub struct Bvh {
     leaves: u64,
     depth2: u32,
     depth8: u32,
-    other: OtherTree,
+    third: ThirdTree,
     treelet_bytes: Option<u32>,
     /// Entries that a traversal stack needs.
     stack_size: usize,
@@ -183,40 +146,19 @@ impl Bvh {
         let mut tree = build::build_binary(&built);
         stacks.expand(&mut tree, &kept);
         let mut layout = build::lay_out(&tree, &kept, &numbers);
-        let wide = |kind: TraversalKind| build::emit_wide(&tree, &layout.children, kind.width());
-        let (mut nodes8, depth8) = wide(TraversalKind::Bvh8);
-        let mut other = OtherTree::default();
-        let kind = options.kind;
-        let treelet_bytes = options.treelet_bytes;
-        let treelet_nodes = treelet_bytes.map(|bytes| bytes as usize / node_bytes(kind));
-        let sorted = |nodes: Vec<Node8>| match treelet_nodes {
-            Some(most) => in_treelets(&nodes, most),
-            None => nodes,
-        };
-        match kind {
-            TraversalKind::Bvh2 => {
-                if let Some(most) = treelet_nodes {
-                    layout.nodes2 = in_treelets(&layout.nodes2, most);
-                }
-            }
-            TraversalKind::Bvh8 => nodes8 = sorted(nodes8),
-            TraversalKind::Bvh4 => {
-                let (nodes, depth) = wide(kind);
-                (other.nodes, other.depth) = (sorted(nodes), depth);
-                other.first_slots.clone_from(&layout.first_slots);
-                other.kind = Some(kind);
-            }
-            TraversalKind::Cwbvh8 => {
-                let blocks = layout.blocks.len();
-                (other.nodes, other.first_slots) = compressed(&sorted(nodes8.clone()), blocks);
-                other.depth = depth8;
-                other.kind = Some(kind);
+        let (mut nodes8, depth8) = build::emit_wide(&tree, &layout.children, MAX_WIDTH);
+        let third = ThirdTree::new(options, &tree, &layout, (&nodes8, depth8));
+        if let Some(most) = options.treelet_nodes() {
+            match options.kind {
+                TraversalKind::Bvh2 => layout.nodes2 = in_treelets(&layout.nodes2, most),
+                TraversalKind::Bvh8 => nodes8 = in_treelets(&nodes8, most),
+                TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => {}
             }
         }
         let most_stacked = [
             layout.depth2,
             depth8 * (MAX_WIDTH as u32 - 1),
-            other.depth * (MAX_WIDTH as u32 - 1),
+            third.depth * (MAX_WIDTH as u32 - 1),
         ];
         Ok(Self {
             nodes2: in_large_pages(layout.nodes2),
@@ -228,8 +170,8 @@ impl Bvh {
             leaves: layout.leaves,
             depth2: layout.depth2,
             depth8,
-            other,
-            treelet_bytes,
+            third,
+            treelet_bytes: options.treelet_bytes,
             stack_size: most_stacked.into_iter().max().unwrap_or(0) as usize + MAX_WIDTH,
             sah_cost: layout.sah_cost,
             instructions: Instructions::best(),
@@ -250,7 +192,7 @@ impl Bvh {
     pub fn has(&self, kind: TraversalKind) -> bool {
         match kind {
             TraversalKind::Bvh2 | TraversalKind::Bvh8 => true,
-            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => self.other.kind == Some(kind),
+            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => self.third.kind == Some(kind),
         }
     }
 
@@ -259,7 +201,7 @@ impl Bvh {
         debug_assert!(self.has(tree));
         match tree {
             TraversalKind::Bvh2 | TraversalKind::Bvh8 => &self.first_slots,
-            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => &self.other.first_slots,
+            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => &self.third.first_slots,
         }
     }
 
@@ -270,7 +212,7 @@ impl Bvh {
             TraversalKind::Bvh2 => (self.nodes2.len(), self.depth2),
             TraversalKind::Bvh8 => (self.nodes8.len(), self.depth8),
             TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => {
-                (self.other.nodes.len(), self.other.depth)
+                (self.third.nodes.len(), self.third.depth)
             }
         };
         let mut settings = build::settings();
@@ -306,9 +248,9 @@ impl Bvh {
     ) -> Option<RayHit> {
         match tree {
             TraversalKind::Bvh2 => self.closest_in::<Two, C, A>(ray, stack, counter, alpha),
-            TraversalKind::Bvh8 => self.closest_in::<Eight, C, A>(ray, stack, counter, alpha),
+            TraversalKind::Bvh8 => self.closest_in::<Wide<false>, C, A>(ray, stack, counter, alpha),
             TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => {
-                self.closest_in::<Other, C, A>(ray, stack, counter, alpha)
+                self.closest_in::<Wide<true>, C, A>(ray, stack, counter, alpha)
             }
         }
     }
@@ -342,9 +284,9 @@ impl Bvh {
     ) -> Option<RayHit> {
         match tree {
             TraversalKind::Bvh2 => self.blocker_in::<Two, C, A>(ray, stack, counter, alpha),
-            TraversalKind::Bvh8 => self.blocker_in::<Eight, C, A>(ray, stack, counter, alpha),
+            TraversalKind::Bvh8 => self.blocker_in::<Wide<false>, C, A>(ray, stack, counter, alpha),
             TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => {
-                self.blocker_in::<Other, C, A>(ray, stack, counter, alpha)
+                self.blocker_in::<Wide<true>, C, A>(ray, stack, counter, alpha)
             }
         }
     }

@@ -138,15 +138,19 @@ fn ordered(a: u64, b: u64) -> (u64, u64) {
     (a.min(b), a.max(b))
 }
 
-/// The eight-wide tree.
-pub struct Eight;
+/// A wide tree: the eight-wide one, or the third one, with four children or compressed nodes.
+pub struct Wide<const IS_THIRD: bool>;
 
-impl Width for Eight {
+impl<const IS_THIRD: bool> Width for Wide<IS_THIRD> {
     const LEAVES_OUT_OF_LINE: bool = false;
 
     #[inline(always)]
     fn first_slots(bvh: &Bvh) -> &[u32] {
-        &bvh.first_slots
+        if IS_THIRD {
+            &bvh.third.first_slots
+        } else {
+            &bvh.first_slots
+        }
     }
 
     #[inline(always)]
@@ -158,104 +162,71 @@ impl Width for Eight {
         stack: &mut [u64],
         top: &mut usize,
     ) -> Option<Child> {
-        visit_wide::<K>(bvh, &bvh.nodes8, ray, node, t_max, stack, top)
-    }
-}
-
-/// The third tree, with four children or compressed nodes.
-pub struct Other;
-
-impl Width for Other {
-    const LEAVES_OUT_OF_LINE: bool = false;
-
-    #[inline(always)]
-    fn first_slots(bvh: &Bvh) -> &[u32] {
-        &bvh.other.first_slots
-    }
-
-    #[inline(always)]
-    fn visit<K: Kernel>(
-        bvh: &Bvh,
-        ray: &K::Ray<'_>,
-        node: u32,
-        t_max: f32,
-        stack: &mut [u64],
-        top: &mut usize,
-    ) -> Option<Child> {
-        visit_wide::<K>(bvh, &bvh.other.nodes, ray, node, t_max, stack, top)
-    }
-}
-
-/// [`Width::visit`] in a list of wide nodes.
-#[inline(always)]
-fn visit_wide<K: Kernel>(
-    bvh: &Bvh,
-    nodes: &[Node8],
-    ray: &K::Ray<'_>,
-    node: u32,
-    t_max: f32,
-    stack: &mut [u64],
-    top: &mut usize,
-) -> Option<Child> {
-    let node = &nodes[node as usize];
-    let mut lanes = Lanes8([0.0; 8]);
-    let mut mask = K::step8(ray, node, t_max, &mut lanes);
-    if mask == 0 {
-        return None;
-    }
-    let first = mask.trailing_zeros() as usize & 7;
-    mask &= mask - 1;
-    let child = node.children[first];
-    if mask == 0 {
-        return Some(child);
-    }
-    let near = lanes.0[first];
-    let second = mask.trailing_zeros() as usize & 7;
-    mask &= mask - 1;
-    let (near1, child1) = (lanes.0[second], node.children[second]);
-    // One or two hit children, the most frequent cases, need no sorting.
-    let base = *top;
-    if mask == 0 {
-        *top = base + 1;
-        if near <= near1 {
-            load_ahead::<K>(bvh, nodes, child1);
-            stack[base] = pack(near1, child1);
+        let nodes = if IS_THIRD {
+            &bvh.third.nodes
+        } else {
+            &bvh.nodes8
+        };
+        let node = &nodes[node as usize];
+        let mut lanes = Lanes8([0.0; 8]);
+        let mut mask = K::step8(ray, node, t_max, &mut lanes);
+        if mask == 0 {
+            return None;
+        }
+        let first = mask.trailing_zeros() as usize & 7;
+        mask &= mask - 1;
+        let child = node.children[first];
+        if mask == 0 {
             return Some(child);
         }
-        keep_branch();
-        load_ahead::<K>(bvh, nodes, child);
-        stack[base] = pack(near, child);
-        return Some(child1);
-    }
-    // Three are sorted in registers.
-    let third = mask.trailing_zeros() as usize & 7;
-    mask &= mask - 1;
-    let (a, b) = ordered(pack(near, child), pack(near1, child1));
-    let (b, c) = ordered(b, pack(lanes.0[third], node.children[third]));
-    let (mut nearest, b) = ordered(a, b);
-    for pushed in [b, c] {
-        load_ahead::<K>(bvh, nodes, unpack(pushed).1);
-    }
-    stack[base] = c;
-    stack[base + 1] = b;
-    *top = base + 2;
-    // Insertion sort keeps the nearest pushed entries on top.
-    while mask != 0 {
-        let lane = mask.trailing_zeros() as usize & 7;
+        let near = lanes.0[first];
+        let second = mask.trailing_zeros() as usize & 7;
         mask &= mask - 1;
-        let entry = pack(lanes.0[lane], node.children[lane]);
-        let pushed = nearest.max(entry);
-        nearest = nearest.min(entry);
-        load_ahead::<K>(bvh, nodes, unpack(pushed).1);
-        let mut at = *top;
-        *top += 1;
-        while at > base && stack[at - 1] < pushed {
-            stack[at] = stack[at - 1];
-            at -= 1;
+        let (near1, child1) = (lanes.0[second], node.children[second]);
+        // One or two hit children, the most frequent cases, need no sorting.
+        let base = *top;
+        if mask == 0 {
+            *top = base + 1;
+            if near <= near1 {
+                load_ahead::<K>(bvh, nodes, child1);
+                stack[base] = pack(near1, child1);
+                return Some(child);
+            }
+            keep_branch();
+            load_ahead::<K>(bvh, nodes, child);
+            stack[base] = pack(near, child);
+            return Some(child1);
         }
-        stack[at] = pushed;
+        // Three are sorted in registers.
+        let third = mask.trailing_zeros() as usize & 7;
+        mask &= mask - 1;
+        let (a, b) = ordered(pack(near, child), pack(near1, child1));
+        let (b, c) = ordered(b, pack(lanes.0[third], node.children[third]));
+        let (mut nearest, b) = ordered(a, b);
+        for pushed in [b, c] {
+            load_ahead::<K>(bvh, nodes, unpack(pushed).1);
+        }
+        stack[base] = c;
+        stack[base + 1] = b;
+        *top = base + 2;
+        // Insertion sort keeps the nearest pushed entries on top.
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize & 7;
+            mask &= mask - 1;
+            let entry = pack(lanes.0[lane], node.children[lane]);
+            let pushed = nearest.max(entry);
+            nearest = nearest.min(entry);
+            load_ahead::<K>(bvh, nodes, unpack(pushed).1);
+            let mut at = *top;
+            *top += 1;
+            while at > base && stack[at - 1] < pushed {
+                stack[at] = stack[at - 1];
+                at -= 1;
+            }
+            stack[at] = pushed;
+        }
+        Some(unpack(nearest).1)
     }
-    Some(unpack(nearest).1)
 }
 
 /// Traverses a tree from the root.
