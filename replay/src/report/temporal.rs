@@ -81,9 +81,14 @@ impl TemporalReport {
     /// The table for a terminal.
     #[must_use]
     pub fn text(&self) -> String {
-        let pixels = "full: both eyes traced; stereo: the right eye from the left one; temporal: each eye from its \
-                      previous frame; both: the left eye from its previous frame, the right one from the left one";
-        format!("rule {}, {pixels}\n\n{}", self.rule, self.rows().text())
+        let schemes = "\
+full: both eyes are traced
+stereo: the right eye from the left one
+temporal: each eye from its previous frame
+both: the left eye from its previous frame, the right eye from the left one";
+        let reuse = super::sgrt::reuse_name(self.reuse);
+        let (rule, rows) = (&self.rule, self.rows().text());
+        format!("rule {rule}, reuse of {reuse}\n{schemes}\n\n{rows}")
     }
 
     /// One JSON object.

@@ -31,7 +31,7 @@ pub(super) fn rule_line(entries: &[Entry]) -> String {
             String::new()
         } else {
             format!(
-                "; cache misses by stated hit rates, as without visits (tracegen rays --visits), on {}",
+                "; cache misses by stated hit rates, as these traces have no visits (tracegen rays --visits): {}",
                 rates.join(", ")
             )
         };
