@@ -103,7 +103,8 @@ def order_items(
     order : str, callable or sequence
         As in :func:`run`.
     config : dict or path, optional
-        As in :func:`run`. The order depends on ``seed``, ``cores``, ``tile_px`` and the size of the L2.
+        As in :func:`run`. The order depends on ``seed``, ``cores``, ``tile_px`` and the size of the L2;
+        an order that uses counters of the frame before also depends on sampling, layout and line size.
 
     Returns
     -------
@@ -114,8 +115,8 @@ def order_items(
     Raises
     ------
     ParallaxError
-        The trace cannot be read, the order is unknown, or it is no list of tiles (it depends on counters of the
-        frame before, or renders halves of tiles).
+        The trace cannot be read, the order is unknown, or it is no list of tiles because it renders halves of
+        tiles.
     """
     from ._settings import path_of, settings_of
 

@@ -9,8 +9,8 @@ use pyo3::prelude::*;
 use replay::config::{Order, RunConfig};
 use replay::order::curve::Curve;
 use replay::order::parts::Parts;
-use replay::order::{self, Interleave, Listed, PlanInputs, TileRef, View, Views, WorkItem, views};
-use replay::stream::rendered;
+use replay::order::{Interleave, Listed, Phase, TileRef, View, Views, WorkItem, frames, views};
+use replay::stream::{TileSource as _, plan, rendered};
 use std::path::{Path, PathBuf};
 
 /// Eye (0 left, 1 right), column and row.
@@ -24,9 +24,9 @@ type Pair = (u32, u32, u32, u32, u32);
 
 /// The pairs of views of a trace with tiles of this size.
 fn pairs_of(passes: &[Pass]) -> Vec<[View; 2]> {
-    let mut frames: Vec<u32> = passes.iter().map(|pass| pass.frame).collect();
-    frames.dedup();
-    let phases = frames.into_iter().flat_map(|frame| views(passes, frame));
+    let phases = frames(passes)
+        .into_iter()
+        .flat_map(|frame| views(passes, frame));
     phases
         .filter_map(|phase| match phase {
             Views::Pair(left, right) => Some([left, right]),
@@ -126,24 +126,16 @@ pub fn order_items(py: Python<'_>, path: PathBuf, settings: Settings) -> PyResul
         let subject = &traces.subjects()[0];
         check_orders([&config], subject)?;
         let rendered = rendered(subject.source, &config)?;
-        let tables = replay::stream::TileSource::tables(&rendered);
-        if config.order.parts().needs_counters() {
-            let name = config.order.name();
-            return Err(
-                anyhow!("order: {name} depends on counters, so it is no list of tiles").into(),
-            );
-        }
-        listed(&config, &tables.passes, &tables.meta)
+        let phases = plan(&rendered, &config).map_err(anyhow::Error::from)?;
+        listed(&config, &phases, &rendered.tables().passes)
     })
 }
 
 fn listed(
     config: &RunConfig,
+    phases: &[Phase],
     passes: &[Pass],
-    meta: &formats::textrace::TraceMeta,
 ) -> Result<Vec<Vec<Item>>, Failure> {
-    let inputs = PlanInputs::new(config, meta);
-    let phases = order::plan(config.order, &inputs, passes);
     let mut lists = Vec::new();
     for [left, right] in pairs_of(passes) {
         let place = |at: TileRef| {

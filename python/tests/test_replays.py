@@ -100,7 +100,10 @@ def test_reproject_has_the_rows_of_the_program(traces, replay):
     assert not slow.equals(parallax.reproject(path))
 
 
-@pytest.mark.parametrize("order", ["morton", "hilbert", "z2-lrta", "z2-sta", "z2-sta-merge"])
+@pytest.mark.parametrize(
+    "order",
+    ["morton", "hilbert", "z2-lrta", "z2-sta", "z2-sta-merge", "adaptive+sta+offset", "zig-zag+merge+row-primitives"],
+)
 def test_a_list_counts_what_the_order_that_it_lists_counts(atrium, order):
     named = parallax.run(atrium, SMALL, order=order)
     listed = parallax.run(atrium, SMALL, order=parallax.order_items(atrium, order))

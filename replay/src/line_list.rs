@@ -4,10 +4,10 @@
 //! look-ups per core in the same order, but other interleavings of the cores.
 
 use crate::config::{CountBy, RunConfig};
-use crate::order::{self, PlanInputs, TileRef};
+use crate::order::TileRef;
 use crate::stream::{
     Bins, Consumer, Cores, Expander, LineMemory, QuadLines, StreamError, TileSource, TraceCounts,
-    interleave, rendered,
+    Walk, interleave, rendered,
 };
 use formats::textrace::Tables;
 use formats::view::Eye;
@@ -48,29 +48,14 @@ pub fn line_list(source: &dyn TileSource, config: &RunConfig) -> Result<LineList
     let tables = rendered.tables();
     let expander = Expander::new(&rendered, config)?;
     let memory = LineMemory::new(LineMemory::USUAL_BYTES);
-    let mut counts = TraceCounts::new(expander.bins());
+    let mut walk = Walk::new(&expander, &memory, config, [config.order]);
     let mut collector = Collector::new(tables, expander.bins(), config.line_bytes);
-    let mut frames: Vec<u32> = tables.passes.iter().map(|pass| pass.frame).collect();
-    frames.sort_unstable();
-    frames.dedup();
-    let mut counters = None;
-    for number in frames {
-        let frame = expander.frame(number, &memory, &mut counts)?;
-        collector.reserve(&counts);
-        let inputs = PlanInputs::new(config, &tables.meta);
-        let counted = match config.order.parts().needs_counters() {
-            true => Some(frame.counters(&tables.passes, number, &inputs)?),
-            false => None,
-        };
-        let last = counters.take().or_else(|| counted.clone());
-        let inputs = PlanInputs {
-            last: last.as_ref(),
-            ..inputs
-        };
-        let phases = order::plan_frame(config.order, &inputs, &tables.passes, number);
+    for number in walk.frames() {
+        let frame = walk.expand(number)?;
+        collector.reserve(walk.counts());
+        let phases = walk.plan(&frame)?.phases(config);
         let mut cores = Cores::new(&frame, config.cores as usize);
         interleave(&mut cores, &phases, config.dispatch(), &mut collector)?;
-        counters = counted;
     }
     Ok(collector.list)
 }

@@ -63,6 +63,10 @@ fn bytes_equal_those_of_plain_caches_with_din_input() {
         "band2+merge+infinity",
         "strip8+lrta",
         "scanline+right-reversed",
+        "adaptive+sta+offset",
+        "zig-zag+merge+row-primitives",
+        "zig-zag+lrta+row-lines",
+        "zig-zag+sta+offset+runs",
     ];
     let all = names.join(",");
     let json = orders(&["--orders", &all, "--cores", "1", "--caches", "4/16"]);
@@ -192,11 +196,84 @@ fn searched_orders_from_files_replay_to_the_same_bytes() {
         &text.replacen(line, "0:0", 1),
         &["greedy.32k.order", "expected "],
     );
+    refused(
+        &text.replacen("name anneal", "name z2-sta", 1),
+        &[
+            "greedy.32k.order",
+            "line 3: expected a name of no other order or bound, found `z2-sta`",
+        ],
+    );
     let checksum = text.lines().nth(1).expect("the trace");
     refused(
         &text.replacen(checksum, "trace 00000000", 1),
         &["expected an order of one of the traces", "00000000"],
     );
+}
+
+#[test]
+fn an_order_file_for_another_l2_is_named_and_not_replayed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().to_str().expect("a name");
+    let usual = ["--orders", "z2-sta", "--caches"];
+    let search = ["8/32", "--search", "greedy", "--save-orders", path];
+    orders(&[&usual[..], &search].concat());
+    let file = folder.path().join("atrium.greedy.32k.order");
+    let mut command = program("replay");
+    command
+        .arg("orders")
+        .arg(trace())
+        .args(usual)
+        .arg("8/64,8/128");
+    let output = run_ok(command.arg("--json").arg("--order-file").arg(&file));
+    let message = String::from_utf8(output.stderr).expect("text");
+    let expected = "atrium.greedy.32k.order: not replayed: expected l2_bytes of one of the L2 caches of --caches \
+         (64 KiB, 128 KiB), found 32768 (32 KiB)";
+    assert!(message.contains(expected), "{message}");
+    let json: Value = serde_json::from_slice(&output.stdout).expect("one JSON object");
+    let rows = json["rows"].as_array().expect("rows");
+    assert!(rows.iter().all(|row| row["order"] == "z2-sta") && rows.len() == 2);
+}
+
+/// With an L2 that holds everything, orders are equal, and the result says so.
+#[test]
+fn equal_orders_have_results_and_a_warning() {
+    let mut command = program("replay");
+    command.arg("orders").arg(trace());
+    let output = run_ok(command.args(["--orders", "z2-sta,morton", "--caches", "16/16384"]));
+    let (table, message) = (output.stdout, output.stderr);
+    let table = String::from_utf8(table).expect("text");
+    assert!(
+        table.contains("against Z2 STA") && table.contains("0.00"),
+        "{table}"
+    );
+    let message = String::from_utf8(message).expect("text");
+    assert!(
+        message.contains("atrium: the caches fetch each distinct line once"),
+        "{message}"
+    );
+    let small = run_ok(program("replay").arg("orders").arg(trace()).args([
+        "--orders",
+        "z2-sta,morton",
+        "--caches",
+        "4/16",
+    ]));
+    let message = String::from_utf8(small.stderr).expect("text");
+    assert!(!message.contains("distinct line once"), "{message}");
+}
+
+#[test]
+fn all_orders_are_those_that_are_compared_by_default() {
+    let names = |arguments: &[&str]| -> Vec<String> {
+        let json = orders(&[&["--caches", "4/16"][..], arguments].concat());
+        let rows = json["rows"].as_array().expect("rows");
+        let names = rows
+            .iter()
+            .map(|row| row["order"].as_str().expect("a name").to_owned());
+        names.collect()
+    };
+    let all = names(&["--orders", "all"]);
+    assert!(all.len() > 40);
+    assert_eq!(all, names(&[]));
 }
 
 /// Replays two frames with caches kept or emptied between them, and with the learner.

@@ -5,9 +5,9 @@
 use crate::config::{ConfigError, Order, RunConfig};
 use crate::engine::ReplayError;
 use crate::memory::{Cache, Found, Hierarchy};
-use crate::order::{self, Phase, PlanInputs};
+use crate::order::{self, Phase};
 use crate::stream::{
-    Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, TraceCounts, interleave, rendered,
+    Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, Walk, interleave, rendered,
 };
 
 /// The part to replay.
@@ -82,7 +82,6 @@ pub fn counts(
     config.validate()?;
     let rendered = rendered(trace, config)?;
     let expander = Expander::new(&rendered, config)?;
-    let mut accesses = TraceCounts::new(expander.bins());
     let clusters = cluster_count(config)?;
     let mut counting = Counting {
         caches: Hierarchy::build(config)?,
@@ -94,15 +93,15 @@ pub fn counts(
             by_frame: Vec::new(),
         },
     };
-    let passes = &rendered.tables().passes;
-    let inputs = PlanInputs::new(config, &rendered.tables().meta);
+    let config = &RunConfig { order, ..*config };
+    let memory = LineMemory::new(LineMemory::USUAL_BYTES);
+    let mut walk = Walk::new(&expander, &memory, config, [order]);
     let mut index = 0;
     for &number in part.frames {
-        let memory = LineMemory::new(LineMemory::USUAL_BYTES);
         if config.between_frames.empties()? {
             counting.caches.clear();
         }
-        let frame = expander.frame(number, &memory, &mut accesses)?;
+        let frame = walk.expand(number)?;
         let mut keep = |phase: Phase| -> Phase {
             let kept = phase.into_iter().filter(|_| {
                 index += 1;
@@ -110,16 +109,11 @@ pub fn counts(
             });
             kept.collect()
         };
-        let plan = order::plan_frame(order, &inputs, passes, number);
+        let plan = walk.plan(&frame)?.phases(config);
         let phases: Vec<Phase> = plan.into_iter().map(&mut keep).collect();
         let before: u64 = counting.counts.by_cluster.iter().sum();
         let mut cores = Cores::new(&frame, config.cores as usize);
-        interleave(
-            &mut cores,
-            &phases,
-            order.dispatch(config.assign),
-            &mut counting,
-        )?;
+        interleave(&mut cores, &phases, config.dispatch(), &mut counting)?;
         let after: u64 = counting.counts.by_cluster.iter().sum();
         counting.counts.by_frame.push(after - before);
     }
@@ -135,10 +129,7 @@ pub(super) fn cluster_count(config: &RunConfig) -> Result<u32, ConfigError> {
 
 /// The frames of a trace by number, ascending.
 pub fn frames(trace: &dyn TileSource) -> Vec<u32> {
-    let mut frames: Vec<u32> = trace.tables().passes.iter().map(|p| p.frame).collect();
-    frames.sort_unstable();
-    frames.dedup();
-    frames
+    order::frames(&trace.tables().passes)
 }
 
 #[cfg(test)]

@@ -3,8 +3,7 @@
 use super::ConfigArgs;
 use super::tiles::{ray_tiles, tiles};
 use crate::config::RunConfig;
-use crate::order::{self, PlanInputs};
-use crate::stream::{for_quads, rendered};
+use crate::stream::{TileSource, for_quads, plan, rendered};
 use anyhow::{Context, Result, bail, ensure};
 use formats::Trace;
 use formats::container::{AtomicFile, is_stdout};
@@ -175,7 +174,8 @@ pub struct ConvertArgs {
     /// Tile encoding of --to textrace [default: delta]
     #[arg(long)]
     pub encoding: Option<EncodingName>,
-    /// Order, sampling and layout; cache settings have no effect here
+    /// Order, sampling and layout for a texture trace, --line for both kinds. Of the caches only the line size
+    /// counts, and the size of the L2 where the order depends on it
     #[command(flatten)]
     pub machine: ConfigArgs,
 }
@@ -196,6 +196,9 @@ pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
     let inputs = [Some(args.trace.as_path()), args.machine.file()];
     shell::check_outputs(&[output], inputs.into_iter().flatten())?;
     let trace = Trace::open(&args.trace)?;
+    if matches!(trace, Trace::Ray(_)) {
+        args.check_for_rays(&config)?;
+    }
     if args.to.is_trace() {
         reencode(&trace, args)?;
     } else if is_stdout(&args.output) {
@@ -236,6 +239,25 @@ impl ConvertArgs {
             if let Some(flag) = self.machine.first_of_traces() {
                 bail!("{flag}: it has no effect on a trace, only on accesses");
             }
+        }
+        Ok(())
+    }
+
+    /// Fails if the order, or another setting of tiles and textures, is given for rays.
+    fn check_for_rays(&self, config: &RunConfig) -> Result<()> {
+        let rays = "rays are written tile by tile, left eye first";
+        if let Some(flag) = self.machine.first_of_traces() {
+            bail!("{flag}: it has no effect on a ray trace; {rays}");
+        }
+        if let (Some(file), true) = (
+            self.machine.file(),
+            config.order != RunConfig::default().order,
+        ) {
+            bail!(
+                "{}: order {} has no effect on a ray trace; {rays}",
+                file.display(),
+                config.order.name()
+            );
         }
         Ok(())
     }
@@ -337,14 +359,19 @@ fn write_accesses(
     }
 }
 
-/// Writes the accesses of one core that renders the whole order.
+/// Writes the accesses of one core that renders the whole order, as `replay run --cores 1` replays them.
 fn accesses(
     trace: &Textrace,
     config: &RunConfig,
     granularity: GranularityName,
     sink: &mut impl AccessSink,
 ) -> Result<()> {
-    let tables = trace.tables();
+    let config = &RunConfig {
+        cores: 1,
+        ..*config
+    };
+    let source = rendered(trace, config)?;
+    let tables = source.tables();
     let layout = Layout::new(&tables.textures, &config.layout)?;
     let expander = Expander {
         tables,
@@ -356,12 +383,7 @@ fn accesses(
         },
         line_bytes: config.line_bytes,
     };
-    let source = rendered(trace, config)?;
-    let inputs = PlanInputs::new(config, &tables.meta);
-    for item in order::plan(config.order, &inputs, &tables.passes)
-        .iter()
-        .flatten()
-    {
+    for item in plan(&source, config)?.iter().flatten() {
         for_quads(&source, item, |quad| -> Result<()> {
             let origin = Origin {
                 pass: quad.at.pass,

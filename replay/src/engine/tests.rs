@@ -19,13 +19,13 @@ use crate::config::{
     RunConfig, TmuModel,
 };
 use crate::memory::Hierarchy;
-use crate::order::{self, Phase, PlanInputs, WorkItem};
+use crate::order::{Phase, WorkItem};
 use crate::result::{LevelCounters, RunResult};
 use crate::stream::synthetic::Synthetic;
 use crate::stream::testing::repeated;
 use crate::stream::{
     Bins, Consumer, Cores, Expander, LineMemory, LineSet, MemoryTrace, QuadLines, StreamError,
-    TraceCounts, interleave, testing,
+    TraceCounts, interleave, plan, testing,
 };
 use formats::footprint::record_footprints;
 use formats::layout::Layout;
@@ -194,8 +194,7 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     let memory = LineMemory::new(1 << 30);
     let mut counts = TraceCounts::new(expander.bins());
     let frame = expander.frame(0, &memory, &mut counts).unwrap();
-    let inputs = PlanInputs::new(config, &trace.tables.meta);
-    let phases = order::plan(config.order, &inputs, &trace.tables.passes);
+    let phases = plan(trace, config).unwrap();
     let mut cores = Cores::new(&frame, config.cores as usize);
     machine
         .run(&mut cores, &phases, config.dispatch(), None)
@@ -268,8 +267,7 @@ fn sent(trace: &MemoryTrace, config: &RunConfig) -> Vec<Sent> {
     );
     let mut counts = TraceCounts::new(expander.bins());
     let frame = expander.frame(0, &memory, &mut counts).unwrap();
-    let inputs = PlanInputs::new(config, &trace.tables.meta);
-    let phases = order::plan(config.order, &inputs, &trace.tables.passes);
+    let phases = plan(trace, config).unwrap();
     let mut recorder = Recorder::default();
     let mut cores = Cores::new(&frame, config.cores as usize);
     interleave(&mut cores, &phases, config.dispatch(), &mut recorder).unwrap();

@@ -8,10 +8,11 @@ use super::summary::summary;
 use crate::config::{BetweenFrames, Order, RunConfig, TmuModel};
 use crate::memory::OtherWork;
 use crate::order::parts::Eyes;
-use crate::order::{self, Counters, Interleave, Phase, PlanInputs};
+use crate::order::{Interleave, Phase};
 use crate::result::RunResult;
-use crate::stream::{Cores, Expander, Frame, LineMemory, TileSource, TraceCounts, rendered};
-use formats::textrace::TraceMeta;
+use crate::stream::{
+    Cores, Expander, Frame, FramePlan, LineMemory, TileSource, TraceCounts, Walk, rendered,
+};
 use rayon::prelude::*;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -39,36 +40,27 @@ impl<'a> Wave<'a> {
     /// Runs at least one group. While a frame is replayed, the next one is expanded if there is memory for it.
     pub(super) fn run(&self, mut groups: Vec<Group<'a>>) -> Result<(), ReplayError> {
         let rendered = rendered(self.job.trace, groups[0].config())?;
-        let trace_passes = &rendered.tables().passes;
         let expander = expander_for(Expander::new(&rendered, groups[0].config())?, &groups);
         let lost = |group: &Group<'_>| group.config().between_frames.lost_percent();
         if groups.iter().filter_map(lost).next().is_some() {
             check_other_work(expander.lines())?;
         }
-        let mut counts = TraceCounts::new(expander.bins());
-        let mut frames: Vec<u32> = trace_passes.iter().map(|pass| pass.frame).collect();
-        frames.sort_unstable();
-        frames.dedup();
         let orders = Orders::of(&groups);
-        let meta = &rendered.tables().meta;
-        let mut counters = None;
+        let mut walk = Walk::new(
+            &expander,
+            self.memory,
+            groups[0].config(),
+            orders.0.iter().map(|config| config.order),
+        );
+        let frames = walk.frames();
         let mut ahead = None;
         for (index, &number) in frames.iter().enumerate() {
             let frame = match ahead.take() {
                 Some(frame) => frame,
-                None => expander.frame(number, self.memory, &mut counts)?,
+                None => walk.expand(number)?,
             };
             (self.report_stage)(Stage::Loaded);
-            let counted = match orders.need_counters() {
-                true => {
-                    let inputs = PlanInputs::new(groups[0].config(), meta);
-                    Some(frame.counters(trace_passes, number, &inputs)?)
-                }
-                false => None,
-            };
-            let last = counters.take().or_else(|| counted.clone());
-            let plans = orders.plans(trace_passes, number, meta, last.as_ref());
-            counters = counted;
+            let plans = orders.plans(&walk.plan(&frame)?);
             let waiting = AtomicUsize::new(groups.len());
             let is_last = index + 1 == frames.len();
             let replay = |group: &mut Group<'a>, frame: &Frame<'_>| {
@@ -106,7 +98,7 @@ impl<'a> Wave<'a> {
                 return all.try_for_each(|(group, frame)| {
                     let machine = replay(group, &frame)?;
                     drop(frame);
-                    self.finish(group, &*machine, &rendered, &expander, &counts)
+                    self.finish(group, &*machine, &rendered, &expander, walk.counts())
                 });
             };
             let keep = || {
@@ -117,7 +109,7 @@ impl<'a> Wave<'a> {
             };
             let expand = || {
                 let room = self.memory.half_is_left();
-                room.then(|| expander.frame(next, self.memory, &mut counts))
+                room.then(|| walk.expand(next))
             };
             let (kept, expanded) = rayon::join(keep, expand);
             kept?;
@@ -130,7 +122,7 @@ impl<'a> Wave<'a> {
                 &*group.build(&expander)?,
                 &rendered,
                 &expander,
-                &counts,
+                walk.counts(),
             )?;
         }
         Ok(())
@@ -230,27 +222,10 @@ impl Orders {
         Self(orders)
     }
 
-    fn need_counters(&self) -> bool {
-        let mut orders = self.0.iter();
-        orders.any(|config| config.order.parts().needs_counters())
-    }
-
     /// The plan of each order for a frame.
-    fn plans(
-        &self,
-        trace_passes: &[formats::textrace::Pass],
-        frame: u32,
-        meta: &TraceMeta,
-        last: Option<&Counters>,
-    ) -> Vec<Vec<Phase>> {
-        let plan = |config: &RunConfig| {
-            let inputs = PlanInputs {
-                last,
-                ..PlanInputs::new(config, meta)
-            };
-            order::plan_frame(config.order, &inputs, trace_passes, frame)
-        };
-        self.0.par_iter().map(plan).collect()
+    fn plans(&self, plan: &FramePlan<'_>) -> Vec<Vec<Phase>> {
+        let phases = |config: &RunConfig| plan.phases(config);
+        self.0.par_iter().map(phases).collect()
     }
 
     fn plan<'p>(&self, plans: &'p [Vec<Phase>], config: &RunConfig) -> &'p [Phase] {

@@ -5,10 +5,10 @@ use super::place::Place;
 use super::profile::{Profile, StreamCache, check_size};
 use crate::config::{ConfigError, LevelConfig, Order, RunConfig};
 use crate::engine::ReplayError;
-use crate::order::{self, Counters, Phase, PlanInputs};
+use crate::order::{Phase, frames};
 use crate::stream::{
-    Consumer, Cores, Expander, LineMemory, QuadLines, StreamError, TileSource, TraceCounts,
-    interleave, rendered,
+    Consumer, Cores, Expander, LineMemory, QuadLines, StreamError, TileSource, Walk, interleave,
+    rendered,
 };
 use formats::textrace::Pass;
 use formats::view::Eye;
@@ -108,10 +108,7 @@ pub fn analyse(
 ) -> Result<Vec<OrderFigures>, ReplayError> {
     config.validate()?;
     check_size(config, config.cores + u32::from(merged))?;
-    let passes = &trace.tables().passes;
-    let mut frames: Vec<u32> = passes.iter().map(|pass| pass.frame).collect();
-    frames.sort_unstable();
-    frames.dedup();
+    let frames = frames(&trace.tables().passes);
     // State is kept from frame to frame, so with several frames only orders that run concurrently share an expansion.
     let together = match frames.len() {
         0 | 1 => orders.len(),
@@ -125,7 +122,7 @@ pub fn analyse(
     for orders in orders.chunks(together.max(1)) {
         let expander = Expander::new(&rendered, config)?;
         check_tiles(expander.bins().tiles())?;
-        let mut counts = TraceCounts::new(expander.bins());
+        let mut walk = Walk::new(&expander, &memory, config, orders.iter().copied());
         let analyses: Result<Vec<Option<Analysis>>, ConfigError> = orders
             .iter()
             .map(|_| {
@@ -136,28 +133,15 @@ pub fn analyse(
             .collect();
         let mut analyses = analyses?;
         let mut finished: Vec<Option<OrderFigures>> = orders.iter().map(|_| None).collect();
-        let need_counters = orders.iter().any(|order| order.parts().needs_counters());
-        let mut last_counters: Option<Counters> = None;
         for &number in &frames {
-            let frame = expander.frame(number, &memory, &mut counts)?;
+            let frame = walk.expand(number)?;
+            let plan = walk.plan(&frame)?;
             let last = frames.last() == Some(&number);
-            let counted = match need_counters {
-                true => {
-                    let inputs = PlanInputs::new(config, &trace.tables().meta);
-                    Some(frame.counters(passes, number, &inputs)?)
-                }
-                false => None,
-            };
-            let counters = last_counters.take().or_else(|| counted.clone());
             let run = |((&order, kept), finished): (
                 (&Order, &mut Option<Analysis>),
                 &mut Option<OrderFigures>,
             )| {
-                let inputs = PlanInputs {
-                    last: counters.as_ref(),
-                    ..PlanInputs::new(config, &trace.tables().meta)
-                };
-                let phases = order::plan_frame(order, &inputs, passes, number);
+                let phases = plan.phases(&RunConfig { order, ..*config });
                 let mut analysis = match kept.take() {
                     Some(analysis) => analysis,
                     None => Analysis::new(config, merged)?,
@@ -184,7 +168,6 @@ pub fn analyse(
             };
             let orders = orders.par_iter().zip(&mut analyses).zip(&mut finished);
             orders.with_max_len(1).try_for_each(run)?;
-            last_counters = counted;
         }
         let empty = orders.iter().zip(analyses);
         for ((order, analysis), finished) in empty.zip(finished) {

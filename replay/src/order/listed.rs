@@ -3,7 +3,7 @@
 
 use super::cost::{Cost, Information};
 use super::parts::Parts;
-use super::{Order, OrderRow, View, Views, WorkItem, views};
+use super::{Order, OrderRow, View, Views, WorkItem, frames, views};
 use crate::palette::GREY;
 use formats::textrace::Pass;
 use std::sync::{Mutex, PoisonError};
@@ -123,9 +123,10 @@ impl Order {
         if self.row().listed.is_none() {
             return Ok(());
         }
-        let mut frames: Vec<u32> = passes.iter().map(|pass| pass.frame).collect();
-        frames.dedup();
-        for phase in frames.into_iter().flat_map(|frame| views(passes, frame)) {
+        for phase in frames(passes)
+            .into_iter()
+            .flat_map(|frame| views(passes, frame))
+        {
             if let Views::Pair(left, right) = phase {
                 let items = self.listed_items(left).unwrap_or_default();
                 check_items(items, [left, right]).map_err(|fault| (left.pass, fault))?;

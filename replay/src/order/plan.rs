@@ -1,4 +1,4 @@
-//! All work of a trace in phases: a frame's shadow maps and pictures for both eyes come first, each alone in
+//! The work of a frame in phases: a frame's shadow maps and pictures for both eyes come first, each alone in
 //! the order's single-view curve; then what one eye sees, and layers, in the order of the passes: a left
 //! and a right pass that show the same as the order combines them, each other one alone. Every order
 //! visits every tile of every pass exactly once.
@@ -12,18 +12,16 @@ use formats::view::Eye;
 /// map, a frame the one before).
 pub type Phase = Vec<WorkItem>;
 
-/// All work of a trace: frame after frame, monoscopic passes before the stereo pair. All frames use the
-/// counters in `inputs`.
+/// The numbers of all frames, ascending.
 #[must_use]
-pub fn plan(order: Order, inputs: &PlanInputs<'_>, passes: &[Pass]) -> Vec<Phase> {
-    let mut frames: Vec<u32> = passes.iter().map(|p| p.frame).collect();
+pub fn frames(passes: &[Pass]) -> Vec<u32> {
+    let mut frames: Vec<u32> = passes.iter().map(|pass| pass.frame).collect();
     frames.sort_unstable();
     frames.dedup();
-    let plan = |frame| plan_frame(order, inputs, passes, frame);
-    frames.into_iter().flat_map(plan).collect()
+    frames
 }
 
-/// The work of one frame.
+/// The work of one frame, monoscopic passes before the stereo pair. `stream::Walk` plans a whole trace.
 #[must_use]
 pub fn plan_frame(
     order: Order,

@@ -15,8 +15,7 @@ use super::stream::l2_stream;
 use crate::config::{Order, RunConfig};
 use crate::engine::ReplayError;
 use crate::locality::{OptMisses, opt_misses};
-use crate::order::{self, PlanInputs};
-use crate::stream::{Expander, LineMemory, TileSource, TraceCounts, rendered};
+use crate::stream::{Expander, LineMemory, TileSource, Walk, rendered};
 
 /// The minimum number of lines that any order of the items fetches into a cache of this many lines, by windows.
 #[must_use]
@@ -46,11 +45,10 @@ pub fn opt(
     };
     let rendered = rendered(trace, first)?;
     let expander = Expander::new(&rendered, first)?;
-    let mut counts = TraceCounts::new(expander.bins());
     let memory = LineMemory::new(LineMemory::USUAL_BYTES);
-    let expanded = expander.frame(frame, &memory, &mut counts)?;
-    let tables = trace.tables();
-    let passes = &crate::stream::TileSource::tables(&rendered).passes;
+    let mut walk = Walk::new(&expander, &memory, first, [order]);
+    let expanded = walk.expand(frame)?;
+    let plan = walk.plan(&expanded)?;
     // L2 caches below equal L1 caches receive the same requests, if the order is the same.
     let mut streams: Vec<(u64, Order, Vec<u32>)> = Vec::new();
     let mut misses = Vec::with_capacity(configs.len());
@@ -60,10 +58,9 @@ pub fn opt(
         let known =
             |(bytes, of, _): &&(u64, Order, Vec<u32>)| (*bytes, *of) == (l1_bytes, resolved);
         if streams.iter().find(known).is_none() {
-            let phases =
-                order::plan_frame(order, &PlanInputs::new(config, &tables.meta), passes, frame);
             let config = RunConfig { order, ..*config };
-            streams.push((l1_bytes, resolved, l2_stream(&expanded, &phases, &config)?));
+            let stream = l2_stream(&expanded, &plan.phases(&config), &config)?;
+            streams.push((l1_bytes, resolved, stream));
         }
         let stream = streams
             .iter()

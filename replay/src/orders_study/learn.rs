@@ -7,9 +7,8 @@
 use super::stream::Counting;
 use crate::config::{Order, RunConfig};
 use crate::engine::{ReplayError, check_other_work};
-use crate::order::{self, Counters, PlanInputs};
 use crate::stream::{
-    Cores, Expander, Frame, LineMemory, TileSource, TraceCounts, interleave, rendered,
+    Cores, Expander, Frame, FramePlan, LineMemory, TileSource, Walk, interleave, rendered,
 };
 use rayon::prelude::*;
 
@@ -157,7 +156,6 @@ pub fn learn(
 ) -> Result<Option<Learned>, ReplayError> {
     config.validate()?;
     let rendered = rendered(trace, config)?;
-    let tables = TileSource::tables(&rendered);
     let expander = Expander::new(&rendered, config)?;
     if config.between_frames.lost_percent().is_some() {
         check_other_work(expander.lines())?;
@@ -178,35 +176,18 @@ pub fn learn(
             chosen: Vec::new(),
         });
     }
-    let mut frames: Vec<u32> = tables.passes.iter().map(|pass| pass.frame).collect();
-    frames.sort_unstable();
-    frames.dedup();
     let memory = LineMemory::new(LineMemory::USUAL_BYTES);
-    let mut counts = TraceCounts::new(expander.bins());
-    let mut last: Option<Counters> = None;
-    let need_counters = orders.iter().any(|order| order.parts().needs_counters());
-    for &number in &frames {
-        let frame = expander.frame(number, &memory, &mut counts)?;
-        let counted = match need_counters {
-            true => {
-                let inputs = PlanInputs::new(config, &tables.meta);
-                Some(frame.counters(&tables.passes, number, &inputs)?)
-            }
-            false => None,
-        };
-        let of_last = last.take().or_else(|| counted.clone());
-        let inputs = PlanInputs {
-            last: of_last.as_ref(),
-            ..PlanInputs::new(config, &tables.meta)
-        };
+    let mut walk = Walk::new(&expander, &memory, config, orders.iter().copied());
+    for number in walk.frames() {
+        let frame = walk.expand(number)?;
+        let plan = walk.plan(&frame)?;
         let render = |run: &mut Run| {
             if !run.fetched.is_empty() {
                 run.caches.between(config, run.fetched.len());
             }
-            run.frame(&frame, orders, &inputs, &tables.passes, number, config)
+            run.frame(&frame, orders, &plan, config)
         };
         runs.par_iter_mut().try_for_each(render)?;
-        last = counted;
         done(1);
     }
     let learner = runs.pop();
@@ -226,14 +207,12 @@ impl Run {
         &mut self,
         frame: &Frame<'_>,
         orders: &[Order],
-        inputs: &PlanInputs<'_>,
-        passes: &[formats::textrace::Pass],
-        number: u32,
+        plan: &FramePlan<'_>,
         config: &RunConfig,
     ) -> Result<(), ReplayError> {
         let chosen = self.learner.as_mut().map_or(self.order, Learner::choose);
         let order = orders[chosen];
-        let phases = order::plan_frame(order, inputs, passes, number);
+        let phases = plan.phases(&RunConfig { order, ..*config });
         let before = self.caches.fetched;
         let mut cores = Cores::new(frame, config.cores as usize);
         interleave(

@@ -7,8 +7,8 @@ use super::stream::lines_of_items;
 use super::{Items, OrderFile};
 use crate::config::{Order, RunConfig};
 use crate::engine::ReplayError;
-use crate::order::{self, Phase, PlanInputs, Views, WorkItem, views};
-use crate::stream::{Expander, LineMemory, TileSource, TraceCounts, rendered};
+use crate::order::{Phase, Views, WorkItem, views};
+use crate::stream::{Expander, LineMemory, TileSource, Walk, rendered};
 use std::collections::HashMap;
 
 pub use super::anneal::Schedule;
@@ -83,12 +83,15 @@ impl Ground {
         else {
             return Ok(None);
         };
-        let inputs = PlanInputs::new(config, &trace.tables().meta);
-        let items: Phase = order::plan_frame(start, &inputs, passes, frame).swap_remove(pair);
         let expander = Expander::new(&rendered, config)?;
-        let mut counts = TraceCounts::new(expander.bins());
         let memory = LineMemory::new(LineMemory::USUAL_BYTES);
-        let expanded = expander.frame(frame, &memory, &mut counts)?;
+        let mut walk = Walk::new(&expander, &memory, config, [start]);
+        let expanded = walk.expand(frame)?;
+        let order = RunConfig {
+            order: start,
+            ..*config
+        };
+        let items: Phase = walk.plan(&expanded)?.phases(&order).swap_remove(pair);
         let lines = Items::new(&lines_of_items(&expanded, &items, config)?);
         let place = |item: &WorkItem| {
             let at = item.tiles().next()?;

@@ -3,7 +3,6 @@
 use super::expand::Work;
 use super::{Frame, StreamError, TileLines};
 use crate::order::{Counters, PlanInputs, TileRef, View, ViewCounters, Views, views};
-use formats::textrace::Pass;
 
 /// Maximum distance in columns between a row's best shift and the shift of infinity.
 const SHIFTS: i32 = 8;
@@ -63,19 +62,15 @@ fn nothing(view: View) -> ViewCounters {
 }
 
 impl Frame<'_> {
-    /// Counts the views of a frame.
+    /// Counts the views of the frame.
     ///
     /// # Errors
     /// An unreadable tile.
-    pub fn counters(
-        &self,
-        passes: &[Pass],
-        number: u32,
-        inputs: &PlanInputs<'_>,
-    ) -> Result<Counters, StreamError> {
+    pub fn counters(&self, inputs: &PlanInputs<'_>) -> Result<Counters, StreamError> {
+        let passes = &self.expander().source().tables().passes;
         let mut work = self.expander().work();
         let mut counted = Vec::new();
-        for phase in views(passes, number) {
+        for phase in views(passes, self.number()) {
             counted.push(match phase {
                 Views::One(view) => self.count_view(view, inputs, &mut work)?,
                 Views::Pair(left, right) => self.count_pair([left, right], inputs, &mut work)?,

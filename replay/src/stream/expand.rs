@@ -143,6 +143,12 @@ impl<'a> Expander<'a> {
         Self { halves, ..self }
     }
 
+    /// The trace as rendered.
+    #[must_use]
+    pub fn source(&self) -> &'a dyn TileSource {
+        self.source
+    }
+
     /// The bins for counts.
     #[must_use]
     pub fn bins(&self) -> &Bins {
@@ -202,6 +208,7 @@ impl<'a> Expander<'a> {
             first?.into_par_iter().zip(chunks).map(later).collect();
         let mut frame = Frame {
             expander: self,
+            number,
             memory,
             kept: passes.iter().map(|_| Vec::new()).collect(),
         };
@@ -412,6 +419,7 @@ fn access_hash(line: u32) -> u64 {
 /// The tiles of a frame.
 pub struct Frame<'e> {
     expander: &'e Expander<'e>,
+    number: u32,
     memory: &'e LineMemory,
     /// By pass and tile. Empty for passes of other frames and for tiles that memory has no room for yet.
     kept: Vec<Vec<OnceLock<TileLines>>>,
@@ -420,6 +428,12 @@ pub struct Frame<'e> {
 impl<'e> Frame<'e> {
     pub(super) fn expander(&self) -> &'e Expander<'e> {
         self.expander
+    }
+
+    /// The number of the frame.
+    #[must_use]
+    pub fn number(&self) -> u32 {
+        self.number
     }
 
     pub(super) fn kept(&self, at: TileRef) -> Option<&TileLines> {

@@ -24,6 +24,7 @@ pub mod synthetic;
 mod tag;
 #[cfg(test)]
 pub mod testing;
+mod walk;
 
 pub use cores::Cores;
 pub use counts::{Bins, Cell, CellAccesses, TileAccesses, TraceCounts};
@@ -37,3 +38,4 @@ pub use lines::{Footprint, ListEntry, Listed, QuadLines, TileLines, interleaved}
 pub use regroup::{Rendered, rendered};
 pub use source::{MemoryTrace, TileSource};
 pub use tag::{Tag, Use};
+pub use walk::{FramePlan, Walk, plan};

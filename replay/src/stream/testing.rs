@@ -3,6 +3,7 @@
 use super::MemoryTrace;
 use super::counts::TileBins;
 use super::lines::{QuadEnd, TileLines};
+use super::synthetic::Synthetic;
 use super::tag::Tag;
 use formats::textrace::{
     Draw, Pass, PassKind, PrimitiveRun, QuadRecord, SUBTEXELS, Sample, Tables, Tile, TraceMeta,
@@ -147,4 +148,30 @@ pub fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {
         long.tables.passes.extend(passes);
     }
     long
+}
+
+/// A trace of three frames with different pictures, so that their counters differ.
+pub fn different_frames() -> MemoryTrace {
+    let of_seed = |seed| {
+        let synthetic = Synthetic {
+            size_px: [128, 64],
+            patch_px: 17,
+            layers: 2,
+            textures: 3,
+            seed,
+            ..Synthetic::default()
+        };
+        synthetic.generate()
+    };
+    let mut trace = of_seed(1);
+    for frame in 1..3 {
+        let other = of_seed(u64::from(frame) + 1);
+        let passes = other.tables.passes.iter();
+        trace
+            .tables
+            .passes
+            .extend(passes.map(|pass| Pass { frame, ..*pass }));
+        trace.tiles.extend(other.tiles);
+    }
+    trace
 }

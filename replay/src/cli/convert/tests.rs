@@ -1,9 +1,16 @@
 use super::*;
 use crate::cli::testing::{file_of, lines};
-use crate::config::{Mode, Order};
+use crate::config::{LevelConfig, Levels, Mode, Order};
 use crate::engine::replay;
+use crate::line_list::line_list;
+use crate::locality::analyse;
+use crate::memory::AnyCache;
+use crate::order::pairing::Pairing;
+use crate::order::parts::Eyes;
+use crate::orders_study::default_orders;
 use crate::stream::MemoryTrace;
 use crate::stream::synthetic::Synthetic;
+use crate::stream::testing::different_frames;
 use clap::Parser;
 use formats::FormatError;
 use formats::interop::plain::{AddressFile, AddressForm, Block};
@@ -103,6 +110,105 @@ fn every_order_writes_the_same_accesses() {
     for order in Order::all() {
         assert!(sorted(order) == reference, "{}", order.name());
     }
+}
+
+/// Every order of the study, and every combination of the parts that need counters.
+fn all_orders() -> Vec<Order> {
+    let mut orders = default_orders();
+    for eyes in Eyes::ALL {
+        for pairing in Pairing::all() {
+            let names = ["adaptive", "zig-zag"].map(|curve| {
+                let (eyes, pairing) = (eyes.name(), pairing.name());
+                format!("{curve}+{eyes}+{pairing}+boustro")
+            });
+            orders.extend(names.iter().filter_map(|name| Order::by_name(name).ok()));
+        }
+    }
+    orders
+}
+
+/// Frames with different pictures, and tiles of two sizes.
+#[test]
+fn every_order_is_the_same_for_convert_run_locality_and_the_line_list() {
+    let file = file_of(&different_frames());
+    let trace = Trace::open(file.path()).unwrap();
+    let source = textures(&trace);
+    let mut sequences = HashSet::new();
+    for (order, tile_px) in all_orders().into_iter().zip([16, 8].into_iter().cycle()) {
+        let name = order.name();
+        let config = RunConfig {
+            mode: Mode::Functional,
+            order,
+            tile_px,
+            cores: 1,
+            level: Levels::two(LevelConfig::lru(1 << 10), LevelConfig::lru(4 << 10)),
+            ..RunConfig::default()
+        };
+        // Two cores have no effect on what is written.
+        let addresses = din(&trace, &RunConfig { cores: 2, ..config }, "line");
+        assert!(
+            addresses == line_list(source, &config).unwrap().address,
+            "{name}"
+        );
+        let mut caches =
+            [1_u32 << 10, 4 << 10].map(|bytes| AnyCache::lru(bytes / 64, 4).into_box());
+        let mut misses = [0; 2];
+        for address in &addresses {
+            for (cache, misses) in caches.iter_mut().zip(&mut misses) {
+                if cache.access((address / 16) as u32) {
+                    break;
+                }
+                *misses += 1;
+            }
+        }
+        let result = replay(source, &config).unwrap();
+        let counted = [&result.l1, &result.l2].map(|level| level.counters.line_misses);
+        assert_eq!(counted, misses, "{name}");
+        let figures = analyse(source, &config, &[order], false, &|_| ()).unwrap();
+        let streams = figures[0].streams.iter();
+        let counted: Vec<u64> = streams.map(|(_, figures)| figures.split.misses()).collect();
+        assert_eq!(counted, misses, "{name}");
+        sequences.insert(addresses);
+    }
+    assert!(sequences.len() > 40, "{} sequences", sequences.len());
+}
+
+#[test]
+fn every_form_has_the_same_addresses_in_an_order_that_needs_counters() {
+    let file = file_of(&different_frames());
+    let trace = Trace::open(file.path()).unwrap();
+    let config = RunConfig {
+        order: Order::by_name("adaptive+sta+row-lines").unwrap(),
+        ..RunConfig::default()
+    };
+    let addresses = din(&trace, &config, "line");
+    let write = |to: &str| {
+        let mut bytes = Vec::new();
+        write_accesses(&trace, &config, &parse(&["--to", to]), &mut bytes).unwrap();
+        bytes
+    };
+    let number = |text: &str| u64::from_str_radix(text.trim_start_matches("0x"), 16).unwrap();
+    let u32s = write("u32");
+    let u32s = u32s
+        .chunks(4)
+        .map(|word| u32::from_le_bytes(word.try_into().unwrap()));
+    assert!(u32s.map(u64::from).eq(addresses.iter().copied()));
+    let u64s = write("u64");
+    let u64s = u64s
+        .chunks(8)
+        .map(|word| u64::from_le_bytes(word.try_into().unwrap()));
+    assert!(u64s.eq(addresses.iter().copied()));
+    let csv = lines(&write("csv"));
+    let csv = csv
+        .iter()
+        .skip(1)
+        .map(|line| number(line.split(',').next().unwrap()));
+    assert!(csv.eq(addresses.iter().copied()));
+    let text = lines(&write("ramulator"));
+    let text = text
+        .iter()
+        .map(|line| number(line.trim_start_matches("LD ")));
+    assert!(text.eq(addresses.iter().copied()));
 }
 
 #[test]

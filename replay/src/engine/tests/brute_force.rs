@@ -32,8 +32,7 @@ fn twin(trace: &MemoryTrace, config: &RunConfig) -> (LevelCounters, LevelCounter
     );
     let mut seen = HashSet::new();
     let layout = Layout::new(&trace.tables.textures, &config.layout).unwrap();
-    let inputs = PlanInputs::new(config, &trace.tables.meta);
-    let phases = order::plan(config.order, &inputs, &trace.tables.passes);
+    let phases = plan(trace, config).unwrap();
     for item in phases.iter().flatten() {
         let WorkItem::Tile(at) = item else {
             panic!("single-view orders only")

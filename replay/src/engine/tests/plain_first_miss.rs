@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::config::{Allocation, Assign, TmuConfig};
-use crate::order::{Phase, PlanInputs};
+use crate::order::Phase;
 use crate::result::{FirstLookups, TmuResult};
 use crate::stream::for_quads;
 use std::collections::VecDeque;
@@ -177,8 +177,7 @@ impl<'a> PlainFirstMiss<'a> {
     }
 
     fn run(mut self) -> PlainCounts {
-        let inputs = PlanInputs::new(&self.config, &self.trace.tables.meta);
-        for phase in order::plan(self.config.order, &inputs, &self.trace.tables.passes) {
+        for phase in plan(self.trace, &self.config).unwrap() {
             self.phase(&phase);
         }
         let first = self.counts.first.over(self.useful);

@@ -32,6 +32,12 @@ const INPUTS: PlanInputs<'_> = PlanInputs {
     last: None,
 };
 
+/// All work of a trace, with the same counters for all frames.
+fn plan(order: Order, inputs: &PlanInputs<'_>, passes: &[Pass]) -> Vec<Phase> {
+    let plan = |frame| plan_frame(order, inputs, passes, frame);
+    frames(passes).into_iter().flat_map(plan).collect()
+}
+
 fn visited(order: Order, passes: &[Pass]) -> Vec<TileRef> {
     plan(order, &INPUTS, passes)
         .iter()
