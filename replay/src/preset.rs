@@ -2,6 +2,8 @@
 
 use crate::config::{BlockOrder, Mode, RunConfig, TmuModel};
 use crate::registry::{Named, registry};
+use serde_json::Value as Json;
+use std::collections::BTreeSet;
 
 registry! { PresetRow:
     Z2_PAPER = row("z2-paper", "Threads stop at their first miss, and rates count first look-ups, as the Z2 paper's table suggests", z2_paper);
@@ -32,6 +34,32 @@ impl Preset {
     pub fn over(self, config: RunConfig) -> RunConfig {
         (self.row().over)(config)
     }
+
+    /// The keys that the preset sets and that have another value in `config`.
+    #[must_use]
+    pub fn changed_in(self, config: &RunConfig) -> Vec<String> {
+        let values = [*config, self.over(*config)].map(|config| serde_json::json!(config));
+        let mut keys = Vec::new();
+        differing("", &values[0], &values[1], &mut keys);
+        keys
+    }
+}
+
+/// The keys with different values, tables as in `tmu.threads`.
+fn differing(table: &str, a: &Json, b: &Json, keys: &mut Vec<String>) {
+    let (Json::Object(a), Json::Object(b)) = (a, b) else {
+        return;
+    };
+    let of_both: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+    for key in of_both {
+        match (a.get(key), b.get(key)) {
+            (Some(a @ Json::Object(_)), Some(b @ Json::Object(_))) => {
+                differing(&format!("{table}{key}."), a, b, keys);
+            }
+            (a, b) if a != b => keys.push(format!("{table}{key}")),
+            _ => {}
+        }
+    }
 }
 
 /// The model that comes closest to the paper's table. `loop_cycles` is its one free parameter;
@@ -59,5 +87,16 @@ mod tests {
             config.validate().unwrap();
             assert_ne!(config, RunConfig::default(), "{}", preset.name());
         }
+    }
+
+    #[test]
+    fn the_changes_to_a_preset_are_named_by_key() {
+        let mut config = Preset::Z2_PAPER.over(RunConfig::default());
+        assert!(Preset::Z2_PAPER.changed_in(&config).is_empty());
+        config.tmu.loop_cycles = 20;
+        config.layout.base_align_bytes = 4096;
+        config.cores = 4;
+        let changed = Preset::Z2_PAPER.changed_in(&config);
+        assert_eq!(changed, ["layout.base_align_bytes", "tmu.loop_cycles"]);
     }
 }

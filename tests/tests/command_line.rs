@@ -297,3 +297,54 @@ fn a_path_that_is_not_utf8_causes_no_panic() {
     );
     run_ok(program("replay").arg("validate").arg(&path));
 }
+
+#[test]
+fn the_table_of_a_run_has_the_textures_and_the_tiles_that_were_asked_for() {
+    let trace = root().join("traces/atrium.textrace");
+    let shown = |arguments: &[&str]| {
+        let mut command = program("replay");
+        let output = run_ok(command.arg("run").arg(&trace).args(arguments));
+        String::from_utf8(output.stdout).expect("text")
+    };
+    let json: serde_json::Value =
+        serde_json::from_str(&shown(&["--json", "--tiles"])).expect("JSON");
+    let plain = shown(&[]);
+    let textures = shown(&["--count-by", "texture"]);
+    let parts = json["result"]["by_texture"].as_array().expect("textures");
+    let misses = |part: &&serde_json::Value| part["l2"]["line_misses"].as_u64();
+    let busiest = parts.iter().max_by_key(misses).expect("a texture");
+    let busiest = busiest["name"].as_str().expect("a name");
+    assert!(
+        textures.contains(busiest) && !plain.contains(busiest),
+        "{textures}"
+    );
+    let tiles = shown(&["--tiles"]);
+    let map = &json["result"]["tile_maps"][1];
+    assert!(tiles.contains("lines from memory") && !plain.contains("lines from memory"));
+    let last = tiles
+        .lines()
+        .filter(|line| line.trim_start().starts_with("1 "))
+        .last();
+    let last: Vec<&str> = last.expect("a tile").split_whitespace().collect();
+    let of_map = |key: &str| map[key].as_array().and_then(|of| of.last()?.as_u64());
+    let (columns, rows) = (&map["tiles"][0], &map["tiles"][1]);
+    let place = [columns, rows].map(|size| (size.as_u64().expect("a size") - 1).to_string());
+    assert_eq!(last[1..3], place);
+    let found = [4, 5, 6].map(|column| last[column].parse::<u64>().ok());
+    assert_eq!(found, ["footprints", "l1_misses", "l2_misses"].map(of_map));
+}
+
+#[test]
+fn the_warning_of_the_first_miss_model_names_what_differs_from_the_preset() {
+    let trace = root().join("traces/atrium.textrace");
+    let warned = |arguments: &[&str]| {
+        let mut command = program("replay");
+        let output = run_ok(command.arg("run").arg(&trace).args(arguments));
+        String::from_utf8(output.stderr).expect("text")
+    };
+    let preset = ["--preset", "z2-paper"];
+    assert!(!warned(&preset).contains("first-miss"));
+    let changed = warned(&[&preset[..], &["--loop-cycles", "20"]].concat());
+    let expected = "not the machine of --preset z2-paper (tmu.loop_cycles differs)";
+    assert!(changed.contains(expected), "{changed}");
+}

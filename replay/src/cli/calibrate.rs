@@ -110,6 +110,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let done = |done| progress.advance(done);
     let outcome = experiment::run(&plan, &subjects, store.as_ref(), &done)?;
     drop(progress);
+    super::warnings::of_outcome(&outcome);
     let trials = trials(&plan, &outcome, &scenes, args.objective);
     let report = CalibrationReport::new(base, args.objective, trials);
     super::print(&if args.json {

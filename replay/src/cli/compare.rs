@@ -66,7 +66,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let progress = Progress::new("replaying", 2 * orders.len() as u64, "replays");
     let outcome = experiment::run(&plan, &subjects, None, &|done| progress.advance(done))?;
     drop(progress);
-    super::warn_of_first_miss_bytes(&plan);
+    super::warnings::of_outcome(&outcome);
     let rows = outcome.rows();
     let (of_a, of_b) = rows.split_at(orders.len());
     let replayed = of_a.iter().zip(of_b).map(|(a, b)| Replayed {

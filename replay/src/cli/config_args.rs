@@ -81,7 +81,7 @@ pub struct ConfigArgs {
     #[arg(long, value_name = "N", hide_short_help = true)]
     seed: Option<u64>,
 
-    /// Breakdown of the misses in --json; with `draw`, tables also list the draws with most misses
+    /// Breakdown of the misses in --json; the table of `replay run` lists the parts with most misses
     #[arg(long, value_name = "PARTS", hide_short_help = true)]
     count_by: Option<CountBy>,
     /// Width and height of a tile in pixels: 8, 16 (as recorded), 32 or 64
@@ -312,6 +312,12 @@ impl ConfigArgs {
             .into_iter()
             .find(|(_, given)| *given)
             .map(|(flag, _)| flag)
+    }
+
+    /// The parts of `--count-by`, if given.
+    #[must_use]
+    pub(super) fn counts_by(&self) -> Option<CountBy> {
+        self.count_by
     }
 
     /// The file of `--config`.

@@ -99,7 +99,7 @@ impl ExperimentArgs {
         let progress = Progress::new("replaying", replays as u64, "replays");
         let outcome = experiment::run(&plan, &subjects, None, &|done| progress.advance(done))?;
         drop(progress);
-        super::warn_of_first_miss_bytes(&plan);
+        super::warnings::of_outcome(&outcome);
         shell::note(&outcome.shared());
         let report = PaperReport::new(&outcome);
         print(&report, &pictures)?;

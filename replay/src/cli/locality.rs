@@ -8,7 +8,7 @@ use super::subjects::Traces;
 use crate::config::{Order, RunConfig};
 use crate::experiment::frame_count;
 use crate::files::{self, write_atomically};
-use crate::locality::{analyse, analyse_addresses};
+use crate::locality::{OrderFigures, Stream, analyse, analyse_addresses};
 use crate::report::locality::{LocalityReport, TraceFigures};
 use crate::stream::TileSource;
 use anyhow::{Context, Result, ensure};
@@ -108,6 +108,7 @@ fn of_traces(args: &Args, config: &RunConfig, orders: &[Order]) -> Result<Vec<Tr
         let done = |steps| progress.advance(steps);
         let orders = analyse(subject.source, config, orders, args.merged, &done)
             .with_context(|| subject.label.clone())?;
+        warn_of_bound(&subject.label, &orders);
         figures.push(TraceFigures {
             label: subject.label.clone(),
             id: Some(subject.id.clone()),
@@ -116,6 +117,17 @@ fn of_traces(args: &Args, config: &RunConfig, orders: &[Order]) -> Result<Vec<Tr
         });
     }
     Ok(figures)
+}
+
+/// Warns if the L2 misses each line once in every order.
+fn warn_of_bound(label: &str, orders: &[OrderFigures]) {
+    let is_bound = |of: &OrderFigures| {
+        let l2 = of.streams.iter().find(|(stream, _)| *stream == Stream::L2);
+        l2.is_some_and(|(_, l2)| l2.unique_lines > 0 && l2.split.misses() == l2.split.compulsory)
+    };
+    if orders.iter().all(is_bound) {
+        super::warnings::of_bound(&[label]);
+    }
 }
 
 /// Analyses plain addresses.

@@ -28,12 +28,10 @@ mod temporal;
 pub(crate) mod testing;
 mod tiles;
 pub mod validate;
+mod warnings;
 
 pub use config_args::ConfigArgs;
 
-use crate::config::{RunConfig, TmuModel};
-use crate::experiment::Plan;
-use crate::preset::Preset;
 use crate::result::TraceId;
 use anyhow::Result;
 use clap::{Arg, Parser, Subcommand};
@@ -155,20 +153,6 @@ pub fn open_textrace(path: &Path) -> Result<(Textrace, TraceId)> {
     let trace = Textrace::open(path)?;
     let id = TraceId::new(path, &trace.tables().meta, trace.content_checksum());
     Ok((trace, id))
-}
-
-/// Warns before printing memory traffic of the first-miss model on a machine other than the Z2 paper's.
-fn warn_of_first_miss_bytes(plan: &Plan) {
-    let bare = |config: &RunConfig| {
-        config.tmu_model() == Some(TmuModel::FirstMiss) && Preset::Z2_PAPER.over(*config) != *config
-    };
-    if plan.points.iter().any(|point| bare(&point.config)) {
-        shell::warn(
-            "--tmu first-miss without --preset z2-paper: external bytes count every fetch from memory, also of lines that \
-             were replaced before the waiting thread used them. They can be several times the memory traffic of \
-             --tmu looping; use --tmu looping for memory traffic",
-        );
-    }
 }
 
 #[cfg(test)]

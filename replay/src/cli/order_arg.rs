@@ -59,6 +59,11 @@ pub(super) fn parse_orders(text: &str) -> Result<Vec<Order>> {
         let others = Order::all().filter(|o| !z2::ORDERS.contains(o));
         return Ok(z2::ORDERS.into_iter().chain(others).collect());
     }
+    parse_named(text)
+}
+
+/// Parses comma-separated orders without `all`.
+pub(super) fn parse_named(text: &str) -> Result<Vec<Order>> {
     let mut orders = Vec::new();
     for name in text.split(',').map(str::trim) {
         let order = match Order::by_name(name) {

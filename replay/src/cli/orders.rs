@@ -2,7 +2,7 @@
 
 use super::ConfigArgs;
 use super::experiment_args::{page_outputs, parse_caches, write_page};
-use super::order_arg::parse_orders;
+use super::order_arg::parse_named;
 use super::subjects::Traces;
 use crate::config::{BetweenFrames, Mode, Order, RunConfig};
 use crate::experiment::frame_count;
@@ -11,10 +11,15 @@ use crate::orders_study::learn::learn;
 use crate::orders_study::search::{Method, Schedule};
 use crate::orders_study::{BASELINE, OrderFile, Searched, Study, Subjects, default_orders};
 use crate::report::orders::{LearnedTrace, OrdersReport};
+use crate::size::format_bytes;
 use anyhow::{Context, Result, bail, ensure};
 use shell::{Output, Progress, is_stdout};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+
+/// Stands for the orders that the study knows: every curve and every part.
+const ALL: &str = "all";
 
 /// The default orders of the learner.
 const LEARNER: &str = "adaptive+sta+offset+boustro,zig-zag+sta+offset+boustro,band4+sta+offset+boustro,band8+sta+offset+boustro";
@@ -36,8 +41,8 @@ pub struct Args {
     traces: Vec<PathBuf>,
     #[command(flatten)]
     machine: ConfigArgs,
-    /// Orders to compare, comma-separated: names, parts as in strip8+sta+offset, or `all`. z2-sta is always
-    /// included [default: every curve and part]
+    /// Orders to compare, comma-separated: names, or parts as in strip8+sta+offset. z2-sta is always included
+    /// [default: all, which has every named order, every curve and every part]
     #[arg(long, value_name = "ORDERS")]
     orders: Option<String>,
     /// L1/L2 sizes in KiB, comma-separated
@@ -108,6 +113,12 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let progress = Progress::new("replaying", replays as u64, "replays");
     let (rows, searched, work) = study.run(&subjects, &|done| progress.advance(done))?;
     drop(progress);
+    warn_of_unused(&subjects.files, &study.caches_bytes);
+    let replays = rows.iter().filter_map(|row| {
+        let result = row.result.as_ref()?;
+        Some((row.subject, &row.config, result))
+    });
+    super::warnings::of_replays(subjects.traces, &replays.collect::<Vec<_>>());
     shell::note(&work.summary(rows.iter().filter(|row| row.result.is_some()).count()));
     if let Some(folder) = &args.save_orders {
         for Searched { source, file } in searched.iter().skip(subjects.files.len()) {
@@ -160,8 +171,7 @@ fn study(args: &Args) -> Result<Study> {
         base.between_frames == usual.between_frames,
         "--between-frames is varied here; use --between"
     );
-    let named = args.orders.as_deref().map(parse_orders).transpose()?;
-    let mut orders = named.unwrap_or_else(default_orders);
+    let mut orders = parse_orders(args.orders.as_deref().unwrap_or(ALL))?;
     if !orders.contains(&BASELINE) {
         orders.insert(0, BASELINE);
     }
@@ -192,6 +202,14 @@ fn study(args: &Args) -> Result<Study> {
         }
     }
     Ok(study)
+}
+
+/// Parses comma-separated orders. Here `all` also has every curve and part, not only the orders with a name.
+fn parse_orders(text: &str) -> Result<Vec<Order>> {
+    match text {
+        ALL => Ok(default_orders()),
+        names => parse_named(names),
+    }
 }
 
 fn parse_between(text: &str) -> Result<Vec<BetweenFrames>> {
@@ -226,6 +244,22 @@ fn order_files(paths: &[PathBuf], checksums: &[&str]) -> Result<Vec<Searched>> {
     paths.iter().map(read).collect()
 }
 
+/// Warns of order files for an L2 that no machine has, because they are not replayed.
+fn warn_of_unused(files: &[Searched], caches_bytes: &[(u64, u64)]) {
+    let sizes: BTreeSet<u64> = caches_bytes.iter().map(|(_, l2)| *l2).collect();
+    for Searched { source, file } in files {
+        if !sizes.contains(&file.l2_bytes) {
+            let replayed: Vec<String> = sizes.iter().map(|size| format_bytes(*size)).collect();
+            shell::warn(&format!(
+                "{source}: not replayed: expected l2_bytes of one of the L2 caches of --caches ({}), found {} ({})",
+                replayed.join(", "),
+                file.l2_bytes,
+                format_bytes(file.l2_bytes)
+            ));
+        }
+    }
+}
+
 /// Runs the learner, if requested.
 fn learned<'a>(
     args: &Args,
@@ -235,7 +269,7 @@ fn learned<'a>(
     let Some(names) = &args.learn else {
         return Ok(Vec::new());
     };
-    let orders: Vec<Order> = parse_orders(names)?;
+    let orders = parse_orders(names)?;
     let mut learned = Vec::new();
     for subject in subjects.traces {
         let frames = u64::from(frame_count(subject.source.tables()));

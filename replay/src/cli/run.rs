@@ -31,13 +31,8 @@ pub struct Args {
     /// Print one JSON object (schema replay.run/2, or replay.addresses/2)
     #[arg(long)]
     json: bool,
-    /// Also count by tile (in the JSON)
-    #[arg(
-        long,
-        requires = "json",
-        conflicts_with = "addresses",
-        hide_short_help = true
-    )]
+    /// Also count by tile
+    #[arg(long, conflicts_with = "addresses", hide_short_help = true)]
     tiles: bool,
     /// Also write which tiles each core renders over time, for ui.perfetto.dev (timed mode)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["addresses", "compare_modes", "print_config"])]
@@ -90,6 +85,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         !config.timeline || config.is_looping(),
         "--timeline: expected --mode timed --tmu looping, the only model that records when work items run"
     );
+    ensure!(
+        args.json || !(args.tiles && args.compare_modes),
+        "--tiles: expected --json with it, because the table of --compare-modes has no tiles"
+    );
     if let Some(picture) = &args.picture {
         let Some(frame) = &mut config.frame else {
             bail!("--picture: only with --frame");
@@ -119,9 +118,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let subjects = traces.subjects();
 
     let start = Instant::now();
-    super::warn_of_first_miss_bytes(&plan);
     let outcome = experiment::run(&plan, &subjects, None, &|_| ())?;
     let seconds = start.elapsed().as_secs_f64();
+    super::warnings::of_outcome(&outcome);
     let rows = outcome.rows();
     // On stderr, because results must not depend on the host machine.
     let footprints: u64 = rows.iter().map(|row| row.result.footprints).sum();
@@ -143,7 +142,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         ([timed, functional], true) => report::modes_json(timed, functional)?,
         ([timed, functional], false) => report::modes_text(timed, functional),
         ([row, ..], true) => report::json(row)?,
-        ([row, ..], false) => report::text(row),
+        ([row, ..], false) => report::text(row, args.machine.counts_by().is_some()),
         ([], _) => String::new(),
     })?;
     Ok(ExitCode::SUCCESS)

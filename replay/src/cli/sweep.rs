@@ -117,7 +117,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             let done = |done| progress.advance(done);
             experiment::run(&sweep.plan, &subjects, Some(&sweep.store), &done)?
         };
-        super::warn_of_first_miss_bytes(&sweep.plan);
+        super::warnings::of_outcome(&outcome);
         shell::note(&outcome.shared());
         sweep.write(&outcome)?;
     }

@@ -240,8 +240,8 @@ impl FolderTraces {
         let subjects = self.traces.subjects();
         let replays = (subjects.len() * (plan.points.len() + 1)) as u64;
         let progress = Progress::new("replaying", replays, "replays");
-        super::warn_of_first_miss_bytes(&plan);
         let outcome = experiment::run(&plan, &subjects, None, &|done| progress.advance(done))?;
+        super::warnings::of_outcome(&outcome);
         let shared = subjects
             .par_iter()
             .map(|subject| {

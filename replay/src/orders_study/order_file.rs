@@ -10,10 +10,11 @@
 //! 0:18
 //! ```
 //!
-//! An item is a tile, or two tiles whose triangles are rendered in turn. A tile is the index of its pass and
+//! The name is not that of another order. An item is a tile, or two tiles whose triangles are rendered in turn. A tile is the index of its pass and
 //! its number. The items visit all tiles of both passes once.
 
-use crate::order::{Interleave, TileRef, Views, WorkItem, check_items, views};
+use super::Bound;
+use crate::order::{Interleave, Order, TileRef, Views, WorkItem, check_items, views};
 use formats::textrace::Tables;
 use std::fmt::Write as _;
 use thiserror::Error;
@@ -97,6 +98,9 @@ impl OrderFile {
         next("", "`parallax order 1`")?;
         let trace = next("trace", "`trace CHECKSUM`")?;
         let name = next("name", "`name NAME`")?;
+        if Order::by_name(&name).is_ok() || name.starts_with(Bound::PREFIX) {
+            return error(3, "a name of no other order or bound", &name);
+        }
         let l2_bytes = next("l2_bytes", "`l2_bytes BYTES`")?;
         let count = next("items", "`items COUNT`")?;
         let Ok(l2_bytes) = l2_bytes.parse() else {
@@ -223,6 +227,21 @@ mod tests {
                 "trace 0badcafe",
                 "trace ",
                 "line 2: expected `trace CHECKSUM`, found `trace `",
+            ),
+            (
+                "name greedy",
+                "name z2-sta",
+                "line 3: expected a name of no other order or bound, found `z2-sta`",
+            ),
+            (
+                "name greedy",
+                "name strip4+sta",
+                "line 3: expected a name of no other order or bound, found `strip4+sta`",
+            ),
+            (
+                "name greedy",
+                "name bound: windows",
+                "line 3: expected a name of no other order or bound, found `bound: windows`",
             ),
             (
                 "131072",

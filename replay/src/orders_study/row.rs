@@ -23,14 +23,17 @@ pub enum Bound {
 }
 
 impl Bound {
+    /// Begins the name of every bound.
+    pub(super) const PREFIX: &str = "bound: ";
+
     /// Name in the column of orders.
     #[must_use]
     pub fn name(self) -> String {
         match self {
-            Self::Infinite => "bound: infinite cache".to_owned(),
-            Self::Windows => "bound: windows".to_owned(),
-            Self::Opt(order) => format!("bound: OPT of {}", order.name()),
-            Self::OptWays(order) => format!("bound: OPT by ways of {}", order.name()),
+            Self::Infinite => format!("{}infinite cache", Self::PREFIX),
+            Self::Windows => format!("{}windows", Self::PREFIX),
+            Self::Opt(order) => format!("{}OPT of {}", Self::PREFIX, order.name()),
+            Self::OptWays(order) => format!("{}OPT by ways of {}", Self::PREFIX, order.name()),
         }
     }
 }
@@ -100,10 +103,14 @@ impl Row<'_> {
         frame_count(self.subject.source.tables())
     }
 
-    /// Bytes relative to the baseline; none if the baseline fetches nothing.
+    /// Bytes relative to the baseline; none if only the baseline fetches nothing.
     #[must_use]
     pub fn ratio(&self) -> Option<f64> {
-        (self.baseline_bytes > 0).then(|| self.external_bytes as f64 / self.baseline_bytes as f64)
+        match (self.external_bytes, self.baseline_bytes) {
+            (0, 0) => Some(1.0),
+            (_, 0) => None,
+            (own, base) => Some(own as f64 / base as f64),
+        }
     }
 
     /// False if the baseline fetches each line once, so that no order can fetch less.

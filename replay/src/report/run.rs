@@ -8,12 +8,12 @@ use crate::config::RunConfig;
 use crate::experiment::ResultRow;
 use crate::model_version::MODEL_VERSION;
 use crate::result::ClientTraffic;
-use crate::result::{LevelResult, Part, RUN_SCHEMA, RunResult, TOOL, TraceId};
+use crate::result::{LevelResult, Part, RUN_SCHEMA, RunResult, TOOL, TileMap, TraceId};
 use crate::size::format_bytes;
 use serde::Serialize;
 
 /// Schema of the object that `--compare-modes --json` prints.
-const COMPARE_SCHEMA: &str = "replay.compare-modes/2";
+const MODES_SCHEMA: &str = "replay.compare-modes/2";
 
 /// The JSON object of `replay run --json`.
 #[derive(Debug, Serialize)]
@@ -62,9 +62,10 @@ pub fn json(row: &ResultRow) -> serde_json::Result<String> {
     serde_json::to_string_pretty(&RunJson::new(row))
 }
 
-/// One result as tables: levels, views, and the figures of the whole replay.
+/// One result as tables: levels, views, the figures of the whole replay, the draws or (if `by_texture`) the
+/// textures with most misses, and tiles if they were counted.
 #[must_use]
-pub fn text(row: &ResultRow) -> String {
+pub fn text(row: &ResultRow, by_texture: bool) -> String {
     let ResultRow { result, point, .. } = row;
     let config = &point.config;
     let level: Vec<Column<(&str, &LevelResult)>> = vec![
@@ -107,8 +108,12 @@ pub fn text(row: &ResultRow) -> String {
         "quads {}, covered pixels {}, access hash {}\n",
         result.quads, result.lanes, result.access_hash,
     );
-    if !result.by_draw.is_empty() {
-        text += &busiest_draws(&result.by_draw);
+    if by_texture || !result.by_draw.is_empty() {
+        let (kind, parts) = result.parts();
+        text += &busiest(kind, parts);
+    }
+    if !result.tile_maps.is_empty() {
+        text += &tiles(&result.tile_maps);
     }
     text += &result.memory.to_string();
     if !result.clients.is_empty() {
@@ -236,7 +241,7 @@ pub fn modes_json(timed: &ResultRow, functional: &ResultRow) -> serde_json::Resu
         ((*key).to_owned(), difference.into())
     });
     serde_json::to_string_pretty(&ModesJson {
-        schema: COMPARE_SCHEMA,
+        schema: MODES_SCHEMA,
         timed: RunJson::new(timed),
         functional: RunJson::new(functional),
         timed_over_functional_less_one: differences.collect(),
@@ -264,20 +269,54 @@ pub fn modes_text(timed: &ResultRow, functional: &ResultRow) -> String {
     Table::new(&columns, &MEASURES).text()
 }
 
-/// Number of draws in the table of draws with most misses.
-const BUSIEST_DRAWS: usize = 10;
+/// Number of parts in the table of parts with most misses.
+const BUSIEST_PARTS: usize = 10;
 
-/// The draws with the most line misses of the L2.
-fn busiest_draws(draws: &[Part]) -> String {
-    let mut busiest: Vec<&Part> = draws.iter().collect();
-    busiest.sort_by_key(|draw| std::cmp::Reverse((draw.l2.line_misses, draw.l1.footprints)));
-    busiest.truncate(BUSIEST_DRAWS);
+/// The draws or textures with the most line misses of the L2.
+fn busiest(kind: &str, parts: &[Part]) -> String {
+    let mut busiest: Vec<&Part> = parts.iter().collect();
+    busiest.sort_by_key(|part| std::cmp::Reverse((part.l2.line_misses, part.l1.footprints)));
+    busiest.truncate(BUSIEST_PARTS);
     let rows: Vec<Part> = busiest.into_iter().cloned().collect();
-    let more = match draws.len() - rows.len() {
+    let more = match parts.len() - rows.len() {
         0 => String::new(),
-        more => format!("and {more} more draws (--json lists all)\n"),
+        more => format!("and {more} more {kind}s (--json lists all)\n"),
     };
     format!("\n{}{more}", Table::new(&Part::columns(), &rows).text())
+}
+
+/// The counts of every tile, pass by pass and row by row.
+fn tiles(maps: &[TileMap]) -> String {
+    type Tile<'a> = (&'a TileMap, usize);
+    let tiles: Vec<Tile> = maps
+        .iter()
+        .flat_map(|map| (0..map.footprints.len()).map(move |tile| (map, tile)))
+        .collect();
+    let whole = |key: &'static str, name, value: fn(&Tile) -> u64| {
+        Column::new(key, name, "", Show::Whole, value)
+    };
+    let columns = [
+        whole("pass", "pass", |(map, _)| map.pass.into()),
+        whole("column", "column", |(map, tile)| {
+            *tile as u64 % u64::from(map.tiles[0].max(1))
+        }),
+        whole("row", "row", |(map, tile)| {
+            *tile as u64 / u64::from(map.tiles[0].max(1))
+        }),
+        Column::real("overdraw", "overdraw", "", 2, |(map, tile): &Tile| {
+            f64::from(map.overdraw[*tile])
+        }),
+        whole("footprints", "footprints", |(map, tile)| {
+            map.footprints[*tile].into()
+        }),
+        whole("l1_misses", "L1 misses", |(map, tile)| {
+            map.l1_misses[*tile].into()
+        }),
+        whole("l2_misses", "lines from memory", |(map, tile)| {
+            map.l2_misses[*tile].into()
+        }),
+    ];
+    format!("\n{}", Table::new(&columns, &tiles).text())
 }
 
 /// The schema of the JSON object.
@@ -289,5 +328,5 @@ pub(crate) fn schema() -> crate::schemas::Published {
 /// The schema of the JSON object of both modes.
 #[cfg(test)]
 pub(crate) fn modes_schema() -> crate::schemas::Published {
-    crate::schemas::Published::of::<ModesJson<'_>>(COMPARE_SCHEMA)
+    crate::schemas::Published::of::<ModesJson<'_>>(MODES_SCHEMA)
 }

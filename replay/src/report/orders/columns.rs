@@ -121,7 +121,7 @@ pub fn means<'a>() -> Vec<Column<'a, Mean<'a>>> {
         C::text("order", "order", |m| m.name()),
         C::text("buildable", "buildable", |m| m.cost().is_some_and(|cost| cost.is_buildable())),
         C::text("information", "information", information),
-        whole("rows", "rows", "", |m| Some(m.count())).about("traces times caches, without traces in which the baseline fetches each line once"),
+        whole("rows", "rows", "", |m| Some(m.count())).about("traces times caches, without those in which the baseline fetches each line once; means are over these rows, or over all if there are none"),
         real("change_pct", "against Z2 STA", "%", 2, Mean::change_pct).about("geometric mean of bytes over those of z2-sta"),
         C::text("worst_trace", "worst trace", |m| m.worst_trace().map(|(label, _)| label.to_owned())).about("by the geometric mean over its caches"),
         real("worst_trace_change_pct", "there", "%", 2, |m| m.worst_trace().map(|(_, change)| change)),

@@ -46,15 +46,20 @@ impl<'a> Mean<'a> {
         self.rows.first().map(|row| row.name()).unwrap_or_default()
     }
 
-    /// Number of rows in which an order can change the bytes.
+    /// The rows in which an order can change the bytes; all rows if there are none.
     fn open(&self) -> impl Iterator<Item = &'a Row<'a>> + '_ {
-        self.rows.iter().copied().filter(|row| row.can_change())
+        let all = self.count() == 0;
+        self.rows
+            .iter()
+            .copied()
+            .filter(move |row| all || row.can_change())
     }
 
-    /// The rows in which an order can change the bytes.
+    /// Number of rows in which an order can change the bytes.
     #[must_use]
     pub fn count(&self) -> u64 {
-        self.open().count() as u64
+        let open = self.rows.iter().filter(|row| row.can_change());
+        open.count() as u64
     }
 
     /// Change of the bytes relative to the baseline, percent.
