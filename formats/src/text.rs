@@ -18,6 +18,17 @@ pub fn printable_lines(message: &str) -> Cow<'_, str> {
     escaped(message, |c| steers(c) && c != '\n' && c != '\t')
 }
 
+/// Text for a cell of a CSV file. A spreadsheet would run a name that begins with `=`, `+`, `-` or `@` as a
+/// formula, so it gets an apostrophe in front. Numbers stay as they are.
+#[must_use]
+pub fn csv_cell(text: &str) -> Cow<'_, str> {
+    let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.len() > 1;
+    match is_formula && text.parse::<f64>().is_err() {
+        true => Cow::Owned(format!("'{text}")),
+        false => Cow::Borrowed(text),
+    }
+}
+
 fn escaped(text: &str, is_bad: impl Fn(char) -> bool) -> Cow<'_, str> {
     if !text.contains(&is_bad) {
         return Cow::Borrowed(text);
@@ -42,6 +53,22 @@ fn steers(c: char) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_are_no_formulas_in_csv_and_numbers_are_unchanged() {
+        for name in ["=1+1", "+A1", "-A1", "@SUM(A1)", "-1-1", "=", "\t=1"] {
+            let expected = match name.len() {
+                1 => name.to_owned(),
+                _ => format!("'{name}"),
+            };
+            assert_eq!(csv_cell(name), expected);
+        }
+        for plain in [
+            "-1", "-0.25", "+3", "-1e-9", "-inf", "", "-", "z2-sta", "a=b", "'=1",
+        ] {
+            assert_eq!(csv_cell(plain), plain);
+        }
+    }
 
     #[test]
     fn control_characters_are_escaped_and_the_rest_is_unchanged() {

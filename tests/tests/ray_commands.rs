@@ -179,6 +179,117 @@ fn traces_are_read_from_pipes() {
     assert_eq!(endless.expect("replay starts").status.code(), Some(2));
 }
 
+/// `-` is standard input for every command that reads a trace.
+#[test]
+fn a_dash_is_standard_input_for_every_command() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let page = folder.path().join("page.html");
+    let page = page.to_str().expect("a name");
+    let path = |name: &str| root().join("traces").join(name);
+    let (textures, rays) = (path("atrium.textrace"), path("teapot-rays.raytrace"));
+    let [of_textures, of_rays] = [&textures, &rays].map(|path| path.to_str().expect("a name"));
+    let small = ["--caches", "4/16"];
+    let cases: [(&Path, Vec<&str>); 17] = [
+        (&textures, vec!["info", "-"]),
+        (&textures, vec!["validate", "-"]),
+        (&textures, vec!["dump", "-"]),
+        (&textures, vec!["run", "-"]),
+        (&textures, vec!["convert", "-", "--to", "din"]),
+        (&textures, vec!["diff", "-", of_textures]),
+        (
+            &textures,
+            vec!["compare", of_textures, "-", "--orders", "morton"],
+        ),
+        (&textures, vec!["locality", "-", "--orders", "morton"]),
+        (
+            &textures,
+            [&["orders", "-", "--orders", "morton"][..], &small].concat(),
+        ),
+        (
+            &textures,
+            [&["paper", "-", "--orders", "morton"][..], &small].concat(),
+        ),
+        (
+            &textures,
+            [
+                &["report", "-", "--orders", "morton", "-o", page][..],
+                &small,
+            ]
+            .concat(),
+        ),
+        (&rays, vec!["info", "-"]),
+        (&rays, vec!["validate", "-"]),
+        (&rays, vec!["dump", "-"]),
+        (&rays, vec!["convert", "-", "--to", "raytrace", "-o", page]),
+        (&rays, vec!["diff", of_rays, "-"]),
+        (&rays, vec!["reproject", "-"]),
+    ];
+    for (path, arguments) in cases {
+        let bytes = fs::read(path).expect("golden trace");
+        let output = piped(&arguments, &bytes);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}: {message}");
+    }
+    // A redirected file is mapped, and a damaged one is named.
+    let file = fs::File::open(&textures).expect("golden trace");
+    run_ok(program("replay").args(["info", "-"]).stdin(file));
+    let output = piped(&["info", "-"], b"PNG");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(message.contains("standard input: header"), "{message}");
+    let twice = piped(
+        &["diff", "-", "-"],
+        &fs::read(&textures).expect("golden trace"),
+    );
+    let message = String::from_utf8_lossy(&twice.stderr);
+    assert_eq!(twice.status.code(), Some(2));
+    assert!(
+        message.contains("standard input was read already"),
+        "{message}"
+    );
+}
+
+#[test]
+fn an_order_for_rays_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let rays = write_generated_trace(&folder, "r.raytrace", 3);
+    let config = folder.path().join("machine.toml");
+    fs::write(&config, "order = \"hilbert\"\n").expect("a file");
+    let config = config.to_str().expect("a name");
+    for (setting, expected) in [
+        (
+            ["--order", "morton"],
+            "--order: it has no effect on a ray trace",
+        ),
+        (
+            ["--tile-px", "8"],
+            "--tile-px: it has no effect on a ray trace",
+        ),
+        (
+            ["--config", config],
+            "machine.toml: order hilbert has no effect on a ray trace",
+        ),
+    ] {
+        for form in ["din", "csv", "npy"] {
+            let output = folder.path().join("accesses");
+            let mut command = program("replay");
+            command
+                .arg("convert")
+                .arg(&rays)
+                .args(["--to", form])
+                .args(setting);
+            parallax_tests::refuse(command.arg("-o").arg(&output), &[expected]);
+            assert!(!output.exists());
+        }
+    }
+    run_ok(
+        program("replay")
+            .arg("convert")
+            .arg(&rays)
+            .args(["--to", "din", "--line", "64"]),
+    );
+}
+
 /// Captures a small frame with all optional columns.
 fn capture_columns(path: &Path) {
     let options = ["rays", "chess", "--size", "40x24", "--all-columns", "-o"];

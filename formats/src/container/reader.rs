@@ -8,8 +8,9 @@ use crate::parse::{Parsed, parse_all};
 use memmap2::Mmap;
 use serde_json::Value;
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, IsTerminal, Read};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A file's bytes, mapped or owned.
 #[derive(Debug)]
@@ -52,6 +53,29 @@ fn read_stream(name: &str, mut stream: impl Read) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// Standard input, once.
+fn standard_input() -> io::Result<File> {
+    static TAKEN: AtomicBool = AtomicBool::new(false);
+    let stdin = io::stdin();
+    if stdin.is_terminal() {
+        return Err(io::Error::other(
+            "expected a file or a pipe, found a terminal",
+        ));
+    }
+    if TAKEN.swap(true, Ordering::Relaxed) {
+        return Err(io::Error::other("standard input was read already"));
+    }
+    #[cfg(unix)]
+    let file = std::os::fd::AsFd::as_fd(&stdin)
+        .try_clone_to_owned()?
+        .into();
+    #[cfg(windows)]
+    let file = std::os::windows::io::AsHandle::as_handle(&stdin)
+        .try_clone_to_owned()?
+        .into();
+    Ok(file)
+}
+
 /// An open trace file with checked header, directory and padding.
 ///
 /// A chunk's checksum is computed when the file is opened and compared when the chunk is requested.
@@ -66,17 +90,26 @@ pub struct Container {
 }
 
 impl Container {
-    /// Maps a file, or reads a pipe into memory, and checks header, directory and padding.
+    /// Maps a file, or reads a pipe into memory, and checks header, directory and padding. `-` is standard
+    /// input, which may be a pipe or a file.
     ///
     /// # Errors
     /// The file cannot be read or is not a valid container.
     pub fn open(path: &Path) -> Result<Self> {
-        let name = path.display().to_string();
+        let is_stdin = path == Path::new("-");
+        let name = match is_stdin {
+            true => "standard input".to_owned(),
+            false => path.display().to_string(),
+        };
         let io = |action| {
             let name = name.clone();
             move |source| FormatError::io(&name, action, source)
         };
-        let file = File::open(path).map_err(io("open"))?;
+        let file = match is_stdin {
+            true => standard_input(),
+            false => File::open(path),
+        };
+        let file = file.map_err(io("open"))?;
         let metadata = file.metadata().map_err(io("read the size of"))?;
         if metadata.is_dir() {
             return Err(io("read")(std::io::ErrorKind::IsADirectory.into()));

@@ -1,7 +1,7 @@
 //! A table: as text for a terminal, as HTML, and as CSV.
 
 use super::columns::{Column, Heading, Show, Value};
-use formats::text::printable;
+use formats::text::{csv_cell, printable};
 use maud::{Markup, html};
 
 /// Longer texts are wrapped on pages.
@@ -220,12 +220,13 @@ impl Table {
         }
     }
 
-    /// As CSV (RFC 4180) in full precision, with the columns' keys as headings.
+    /// As CSV (RFC 4180) in full precision, with the columns' keys as headings. Names are no formulas.
     #[must_use]
     pub fn csv(&self) -> String {
         let mut csv = csv::Writer::from_writer(Vec::new());
         let keys = self.headings.iter().map(Heading::flat_key);
-        let rows = self.rows.iter().map(|row| row.iter().map(Value::exact));
+        let cell = |value: &Value| csv_cell(&value.exact()).into_owned();
+        let rows = self.rows.iter().map(|row| row.iter().map(cell));
         // Writing to memory cannot fail, and every row has one cell per heading.
         let _ = csv.write_record(keys);
         for row in rows {
@@ -284,6 +285,14 @@ mod tests {
         assert_eq!(
             table(&[("a, \"b\"", 9.814, None)]).csv(),
             "order,l1_footprint_miss_pct,paper_l1_footprint_miss_pct\n\"a, \"\"b\"\"\",9.814,\n"
+        );
+    }
+
+    #[test]
+    fn names_in_csv_are_no_formulas_and_negative_numbers_stay_numbers() {
+        assert_eq!(
+            table(&[("=HYPERLINK(\"x\")", -9.5, None), ("-1+1", 0.0, Some(-1.0))]).csv(),
+            "order,l1_footprint_miss_pct,paper_l1_footprint_miss_pct\n\"'=HYPERLINK(\"\"x\"\")\",-9.5,\n'-1+1,0,-1\n"
         );
     }
 
