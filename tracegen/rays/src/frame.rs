@@ -121,10 +121,9 @@ pub fn trace_frame<W: Write + Seek + Send>(
     let mut traced: (usize, Vec<TileResult>) = (0, Vec::new());
     for (eye, batch) in batches {
         let count = batch.len() as u64;
-        let camera = &tables.meta.eyes[eye];
         let (taken, next) = rayon::join(
             || frame.take(traced, writer, &mut hit),
-            || trace_batch(scene, settings, tables, camera, batch),
+            || trace_batch(scene, settings, tables, eye, batch),
         );
         taken?;
         traced = (eye, next);
@@ -169,13 +168,17 @@ fn trace_batch(
     scene: &TraceScene,
     settings: TraceSettings,
     tables: &RaytraceTables,
-    eye: &EyeCamera,
+    eye: usize,
     batch: Range<u32>,
 ) -> Vec<TileResult> {
+    let (earlier, eye) = (&tables.meta.eyes[..eye], &tables.meta.eyes[eye]);
     batch
         .into_par_iter()
         .map_init(
-            || (Tracer::new(scene, settings), RayTile::default()),
+            || {
+                let tracer = Tracer::new(scene, settings).after(earlier, eye);
+                (tracer, RayTile::default())
+            },
             |(tracer, tile), number| {
                 tile.clear();
                 (tile.origin_px, tile.size_px) = tables.tile_rect(number);

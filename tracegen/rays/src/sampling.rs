@@ -40,8 +40,9 @@ impl Purpose {
 
 impl Noise {
     /// Random numbers of a pixel. Both eyes have their own, because shared noise would look like a
-    /// pane in front of the scene.
-    pub fn new(seed: u64, eye: &EyeCamera, [x, y]: [u32; 2], sample: u32) -> Self {
+    /// pane in front of the scene. Eyes differ by their position; `twin` is the number of earlier eyes at the
+    /// same position.
+    pub fn new(seed: u64, eye: &EyeCamera, twin: u32, [x, y]: [u32; 2], sample: u32) -> Self {
         let place = eye.position.map(f32::to_bits);
         let words = [
             seed as u32,
@@ -55,6 +56,7 @@ impl Noise {
         Self {
             pixel: words
                 .into_iter()
+                .chain(Some(twin).filter(|twin| *twin > 0))
                 .fold(0, |sum, word| hash(sum ^ word).wrapping_add(word)),
             sample,
         }
@@ -137,7 +139,7 @@ mod tests {
             size_px: [1, 1],
         };
         let count = 4096;
-        let noise = Noise::new(7, &eye, [3, 4], 0);
+        let noise = Noise::new(7, &eye, 0, [3, 4], 0);
         let (mut mean, mut squares) = (0.0, 0.0);
         for index in 0..count {
             let point = noise.point(0, Purpose::Diffuse, index, count);

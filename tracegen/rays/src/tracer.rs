@@ -97,6 +97,8 @@ pub struct Tracer<'a> {
     /// First ray of the current pixel.
     first_ray: usize,
     noise: Noise,
+    /// Earlier eyes at the same position.
+    twin: u32,
     /// Radius of point lights in metres and tangent of the angular radius of parallel ones, if any has
     /// a size.
     light_size: Option<[f32; 2]>,
@@ -119,7 +121,19 @@ impl<'a> Tracer<'a> {
             px_spread: 0.0,
             first_ray: 0,
             noise: Noise::default(),
+            twin: 0,
             light_size: settings.lighting.and_then(gather::light_size),
+        }
+    }
+
+    /// The tracer of an eye: of `earlier` ones, those at the same position have their own noise.
+    #[must_use]
+    pub fn after(self, earlier: &[EyeCamera], eye: &EyeCamera) -> Self {
+        let place = |eye: &EyeCamera| eye.position.map(f32::to_bits);
+        let twins = earlier.iter().filter(|other| place(other) == place(eye));
+        Self {
+            twin: twins.count() as u32,
+            ..self
         }
     }
 
@@ -133,7 +147,7 @@ impl<'a> Tracer<'a> {
                 for sample in 0..self.settings.samples_per_px {
                     let at = sample_position_px(x, y, sample, self.settings.samples_per_px);
                     if self.settings.lighting.is_some() {
-                        self.noise = Noise::new(self.settings.seed, eye, [x, y], sample);
+                        self.noise = Noise::new(self.settings.seed, eye, self.twin, [x, y], sample);
                     }
                     let pixel = self.pixel(eye, at, out);
                     out.pixels.push(pixel);

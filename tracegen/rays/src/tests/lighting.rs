@@ -4,7 +4,8 @@ use super::{SIZE_PX, floor, material, scene, settings, sphere, trace};
 use crate::bvh::TreeOptions;
 use crate::scene::TraceScene;
 use formats::raytrace::{
-    Outcome, PixelRecord, RayKind, RayLighting, RayRecord, RayTile, Raytrace, TraversalKind,
+    Outcome, PixelRecord, RayKind, RayLighting, RayRecord, RayTile, Raytrace, RaytraceWriter,
+    TraversalKind,
 };
 use formats::texture::ColorSpace;
 use formats::view::Eye;
@@ -246,6 +247,37 @@ fn a_normal_map_bends_the_shading_normal_and_not_the_surface() {
     }
 }
 
+/// With an eye distance of zero, both pictures differ by their noise only.
+#[test]
+fn eyes_at_one_position_have_their_own_noise() {
+    let scene = TraceScene::new(scene()).expect("small");
+    let traced = |lighting| {
+        let settings = super::TraceSettings {
+            lighting,
+            ..settings(TraversalKind::Bvh2)
+        };
+        let mut tables = super::tables(&scene, settings, SIZE_PX);
+        let [left, right] = &mut tables.meta.eyes;
+        right.clone_from(left);
+        let mut writer = RaytraceWriter::in_memory().expect("in memory");
+        let frame = super::trace_frame(&scene, settings, &tables, &mut writer, |_| ());
+        frame.expect("traces").images
+    };
+    let [left, right] = traced(None);
+    assert_eq!(left.pixels, right.pixels);
+    let [left, right] = traced(Some(RayLighting {
+        light_radius_m: 0.5,
+        bounces: 1,
+        ..RayLighting::default()
+    }));
+    let same = left
+        .pixels
+        .iter()
+        .zip(&right.pixels)
+        .filter(|(a, b)| a == b);
+    assert!(same.count() < left.pixels.len() / 2);
+}
+
 #[test]
 fn lighting_depends_on_the_seed_and_not_on_the_tree_or_the_threads() {
     let traced = |kind: TraversalKind, seed, threads| {
@@ -275,7 +307,7 @@ fn lighting_depends_on_the_seed_and_not_on_the_tree_or_the_threads() {
     }
     let (other, _) = traced(TraversalKind::Bvh2, 2, 2);
     assert_ne!(frame.images[0].pixels, other.images[0].pixels);
-    // Both eyes have their own noise, and both have rays of all kinds but ambient occlusion.
+    // Both eyes have rays of all kinds but ambient occlusion.
     for (kind, least) in [(RayKind::Diffuse, 1000), (RayKind::Shadow, 1000)] {
         assert!(frame.stats.rays_of(kind) > least, "{kind}");
     }
