@@ -332,7 +332,7 @@ mod tests {
         };
         assert_eq!(
             config.validate().unwrap_err().to_string(),
-            "L1 cache of 6 KiB, 4 ways, 16-byte lines: expected a power-of-two number of sets up to 16777216, found 96"
+            "L1 cache of 6 KiB, 4 ways, 16-byte lines: expected a power-of-two number of sets up to 16777216, found 96; possible: 4 KiB or 8 KiB with 4 ways, or 6 KiB with 3 ways"
         );
         let refused = |size_bytes, ways| {
             let cache = LevelConfig {

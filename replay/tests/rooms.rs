@@ -1,5 +1,5 @@
-//! Checks that the modules of `replay` depend on each other in one direction: cli, report, experiment,
-//! engine, cache.
+//! Checks that the modules of `replay` depend on each other in one direction, and that the saved cases of
+//! property tests belong to a module.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -127,4 +127,27 @@ fn a_use_of_a_higher_layer_is_found() {
     assert!(fault("report", "nowhere").is_some());
     assert_eq!(fault("report", "experiment"), None);
     assert_eq!(fault("memory", "config"), None);
+}
+
+/// Property tests read `proptest-regressions/ROOM/FILE.txt` for `src/ROOM/FILE.rs`.
+#[test]
+fn every_saved_case_belongs_to_a_source_file() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let saved = root.join("proptest-regressions");
+    let mut folders = vec![saved.clone()];
+    let mut checked = 0;
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let of = path.strip_prefix(&saved).unwrap().with_extension("rs");
+            let source = root.join("src").join(&of);
+            assert!(source.exists(), "{}: no such test", source.display());
+            checked += 1;
+        }
+    }
+    assert!(checked > 0);
 }

@@ -11,7 +11,7 @@ use thiserror::Error;
 pub enum ConfigError {
     /// The number of sets is not a power of two.
     #[error(
-        "{level} cache of {size}, {ways} ways, {line_bytes}-byte lines: expected a power-of-two number of sets up to {MOST_SETS}, found {found}"
+        "{level} cache of {size}, {ways} ways, {line_bytes}-byte lines: expected a power-of-two number of sets up to {MOST_SETS}, found {found}; possible: {possible}"
     )]
     Sets {
         /// `L1`, `L2`, ...
@@ -24,6 +24,8 @@ pub enum ConfigError {
         line_bytes: u32,
         /// The number of sets found.
         found: String,
+        /// The nearest possible sizes, and the ways that make this size possible.
+        possible: String,
     },
     /// More lines than the limit.
     #[error(

@@ -5,6 +5,9 @@ use crate::memory::Replacement;
 use crate::size::format_bytes;
 use serde::Serialize;
 
+/// Ways up to this number are proposed where a size is not possible.
+const MOST_NAMED_WAYS: u32 = 64;
+
 /// A cache level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
@@ -101,10 +104,39 @@ impl LevelConfig {
                 } else {
                     (self.size_bytes as f64 / bytes_per_set as f64).to_string()
                 },
+                possible: self.possible(bytes_per_set),
             });
         }
         self.check_lines(level, line_bytes, 1)?;
         Ok(sets as u32)
+    }
+
+    /// The nearest sizes with a possible number of sets, and the ways with which this size has one.
+    fn possible(&self, bytes_per_set: u64) -> String {
+        let sets = self.size_bytes / bytes_per_set;
+        let below = if sets == 0 { 1 } else { 1 << sets.ilog2() };
+        let mut near = vec![u64::min(below, MOST_SETS)];
+        let above = (self.size_bytes.div_ceil(bytes_per_set)).checked_next_power_of_two();
+        near.extend(above.filter(|above| *above <= MOST_SETS));
+        near.dedup();
+        let sizes: Vec<String> = near
+            .iter()
+            .map(|sets| format_bytes(sets * bytes_per_set))
+            .collect();
+        let mut possible = format!("{} with {} ways", sizes.join(" or "), self.ways);
+        let (_, accepts) = self.replacement.ways_rule();
+        let bytes_per_way = bytes_per_set / u64::from(self.ways);
+        let suits = |ways: &u32| {
+            let per_set = bytes_per_way * u64::from(*ways);
+            let sets = self.size_bytes / per_set;
+            let is_whole = self.size_bytes.is_multiple_of(per_set);
+            accepts(*ways) && is_whole && sets.is_power_of_two() && sets <= MOST_SETS
+        };
+        let ways = (1..=MOST_NAMED_WAYS).filter(suits);
+        if let Some(ways) = ways.min_by_key(|ways| ways.abs_diff(self.ways)) {
+            possible += &format!(", or {} with {ways} ways", format_bytes(self.size_bytes));
+        }
+        possible
     }
 
     /// Checks that the tags of `caches` such caches fit into this machine's memory.

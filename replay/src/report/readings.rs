@@ -223,7 +223,7 @@ impl ReadingsReport {
             Column::text("height_px", "height", |c: &Cell| u64::from(c.scene.eye_size_px[1])),
             Column::text("set", "set", |c: &Cell| if c.scene.calibrates { "calibration" } else { "test" }),
             Column::text("reading", "reading", |c: &Cell| c.fit.index as u64 + 1),
-            Column::text("chosen", "closest", |c: &Cell| c.chosen.to_string()),
+            Column::text("chosen", "closest", |c: &Cell| c.chosen),
             Column::text("scope", "measured of", |c: &Cell| scope_name(c.fit.reading.scope)),
             Column::text("reuse", "reused", |c: &Cell| super::sgrt::reuse_name(c.fit.reading.reuse)),
             Column::text("rule", "rule", |c: &Cell| rule_name(&c.fit.reading)),

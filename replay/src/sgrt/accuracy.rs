@@ -15,7 +15,8 @@ pub struct ClassCounts {
     pub pixels: u64,
     /// The reused hit is on another object than the true one. The sky counts as an object.
     pub wrong_object: u64,
-    /// Right object, another triangle, and a position error above the first of [`POSITION_LIMITS_PX`].
+    /// Right object, another triangle, and a position error above the first of [`POSITION_LIMITS_PX`]: the part
+    /// of `position_over_1px` that is on another triangle. Another triangle within the limit is no error.
     pub wrong_primitive: u64,
     /// Right object, and a position error above the first of [`POSITION_LIMITS_PX`].
     pub position_over_1px: u64,

@@ -76,7 +76,7 @@ pub struct Outcome {
     pub reuse_pct: f64,
     /// Share of right pixels reused with a hit on another object than the true one.
     pub wrong_object_pct: f64,
-    /// Right object, another triangle, and more than one pixel off.
+    /// Right object, another triangle, and more than one pixel off: part of `position_over_1px_pct`.
     pub wrong_primitive_pct: f64,
     /// Right object, more than one pixel off.
     pub position_over_1px_pct: f64,

@@ -140,6 +140,12 @@ impl Dram {
     pub fn result(&self) -> DramResult {
         let mut channels = self.channels.clone();
         channels.iter_mut().for_each(Channel::drain);
-        DramResult::of(&self.config, &self.device, &channels, self.requests)
+        DramResult::of(
+            &self.config,
+            &self.device,
+            &channels,
+            self.requests,
+            self.line_bytes,
+        )
     }
 }

@@ -12,9 +12,15 @@ use std::fmt;
 pub struct DramResult {
     /// Device.
     pub device: String,
-    /// Lines requested.
+    /// Requests in lines, reads and writes together. The other counts are in bursts.
     pub requests: u64,
-    /// Bursts read. A line smaller than a burst reads a whole burst.
+    /// Bytes of a line; zero in results without the key.
+    #[serde(default)]
+    pub line_bytes: u32,
+    /// Bytes of a burst; zero in results without the key.
+    #[serde(default)]
+    pub burst_bytes: u32,
+    /// Bursts read. A line smaller than a burst reads a whole burst; a longer one reads several.
     pub reads: u64,
     /// Bytes transferred to the chip.
     pub read_bytes: u64,
@@ -24,14 +30,14 @@ pub struct DramResult {
     /// Bytes transferred from the chip.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub write_bytes: u64,
-    /// Writes whose row was open.
+    /// Bursts written whose row was open.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub write_row_hits: u64,
-    /// Reads whose row was open.
+    /// Bursts read whose row was open.
     pub row_hits: u64,
-    /// Reads that opened a row in a bank without an open row.
+    /// Bursts read that opened a row in a bank without an open row.
     pub row_empty: u64,
-    /// Reads that first had to close another row.
+    /// Bursts read that first had to close another row.
     pub row_conflicts: u64,
     /// `row_hits` over `reads`.
     pub row_hit_rate: f64,
@@ -45,7 +51,7 @@ pub struct DramResult {
     pub bandwidth_gb_per_s: f64,
     /// Peak bandwidth of the data buses.
     pub peak_gb_per_s: f64,
-    /// Mean latency from arrival to last data. Requests without a time arrive when they enter the queue.
+    /// Mean latency of a read burst from arrival to last data. Requests without a time arrive when they enter the queue.
     pub latency_mean_ns: f64,
     /// Median latency.
     pub latency_p50_ns: f64,
@@ -66,6 +72,7 @@ impl DramResult {
         device: &Device,
         channels: &[Channel],
         requests: u64,
+        line_bytes: u32,
     ) -> Self {
         let sum = |of: fn(&Channel) -> u64| channels.iter().map(of).sum::<u64>();
         let reads = sum(|c| c.counts.reads);
@@ -110,6 +117,8 @@ impl DramResult {
         Self {
             device: device.name.to_owned(),
             requests,
+            line_bytes,
+            burst_bytes: device.burst_bytes,
             reads,
             read_bytes,
             writes,
@@ -140,9 +149,12 @@ impl fmt::Display for DramResult {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{}: {} reads, {:.2} MB; row hits {:.2} %, {} rows opened, {} closed for another",
+            "{}: {} lines of {} B requested; {} bursts of {} B read, {:.2} MB; row hits {:.2} %, {} rows opened, {} closed for another",
             self.device,
+            self.requests,
+            self.line_bytes,
             self.reads,
+            self.burst_bytes,
             self.read_bytes as f64 * 1e-6,
             100.0 * self.row_hit_rate,
             self.activates,
@@ -151,7 +163,7 @@ impl fmt::Display for DramResult {
         if self.writes > 0 {
             writeln!(
                 f,
-                "{} writes, {:.2} MB; row hits {:.2} %",
+                "{} bursts written, {:.2} MB; row hits {:.2} %",
                 self.writes,
                 self.write_bytes as f64 * 1e-6,
                 100.0 * self.write_row_hits as f64 / self.writes as f64

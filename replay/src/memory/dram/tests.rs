@@ -354,3 +354,26 @@ fn every_request_of_a_random_mixture_is_answered_once() {
         }
     }
 }
+
+/// Lines of twice the size of a burst, and of half its size.
+#[test]
+fn requests_are_lines_and_reads_and_writes_are_bursts() {
+    for preset in ALL {
+        let burst = preset.device().burst_bytes;
+        for (line_bytes, bursts) in [(2 * burst, 2), (burst / 2, 1)] {
+            let mut dram = Dram::new(&config(preset), line_bytes);
+            (0..3).for_each(|line| dram.read(8 * line, None));
+            dram.request(1 << 20, line_bytes.into(), true, None);
+            let result = dram.result();
+            assert_eq!((result.line_bytes, result.burst_bytes), (line_bytes, burst));
+            assert_eq!(result.requests, 4);
+            assert_eq!((result.reads, result.writes), (3 * bursts, bursts));
+            let shown = result.to_string();
+            let lines = format!(
+                "4 lines of {line_bytes} B requested; {} bursts of {burst} B read",
+                3 * bursts
+            );
+            assert!(shown.contains(&lines), "{shown}");
+        }
+    }
+}

@@ -199,7 +199,7 @@ fn hits<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
     vec![
         pct("reuse_pct", "reuse", 2, |o| o.reuse_pct),
         pct("wrong_object_pct", "wrong object", 3, |o| o.wrong_object_pct),
-        pct("wrong_primitive_pct", "wrong triangle", 3, |o| o.wrong_primitive_pct),
+        pct("wrong_primitive_pct", "other triangle, off > 1 px", 3, |o| o.wrong_primitive_pct).about("right object, another triangle than the traced one, and off by more than 1 px; part of the pixels that are off by more than 1 px"),
         pct("position_over_1px_pct", "off > 1 px", 3, |o| o.position_over_1px_pct),
         pct("position_over_2px_pct", "off > 2 px", 3, |o| o.position_over_2px_pct),
     ]
@@ -290,8 +290,8 @@ fn bytes<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
         ratio("whole_screen_relative_energy", "energy", |o| {
             o.whole_screen.relative_energy
         }),
-        text("row_test_applies", "row test applies", |r| {
-            r.report.rows.row_test_applies.to_string()
+        Column::text("row_test_applies", "row test applies", |r: &RuleRow| {
+            r.report.rows.row_test_applies
         }),
     ]
 }
@@ -426,7 +426,9 @@ pub fn classes(entries: &[Entry]) -> Table {
             r.accuracy().pct(r.counts.pixels)
         }),
         pixels("wrong_object", "wrong object", |c| c.wrong_object),
-        pixels("wrong_primitive", "wrong triangle", |c| c.wrong_primitive),
+        pixels("wrong_primitive", "other triangle, off > 1 px", |c| {
+            c.wrong_primitive
+        }),
         pixels("over_1px", "off > 1 px", |c| c.position_over_1px),
         pixels("over_2px", "off > 2 px", |c| c.position_over_2px),
     ];

@@ -17,16 +17,30 @@ use maud::html;
 const RATES_HZ: [u32; 3] = [72, 90, 120];
 
 /// Parts of a bar, from bottom to top; the theme has eight colours.
-const PARTS: [(&str, &[Client]); 8] = [
-    ("textures", &[Client::Texture]),
-    ("indices and vertices", &[Client::Index, Client::Vertex]),
-    ("shaded vertices", &[Client::ShadedVertex]),
-    ("primitive lists", &[Client::PrimitiveList]),
-    ("colour", &[Client::Colour]),
-    ("depth", &[Client::Depth]),
-    ("G-buffer", &[Client::GBuffer]),
-    ("composition and warp", &[Client::Composition]),
+const PARTS: [&str; 8] = [
+    "textures",
+    "indices and vertices",
+    "shaded vertices",
+    "primitive lists",
+    "colour",
+    "depth",
+    "G-buffer",
+    "composition and warp",
 ];
+
+/// The part of a bar, by its number in [`PARTS`], that shows a client.
+const fn part_of(client: Client) -> usize {
+    match client {
+        Client::Texture => 0,
+        Client::Index | Client::Vertex => 1,
+        Client::ShadedVertex => 2,
+        Client::PrimitiveList => 3,
+        Client::Colour => 4,
+        Client::Depth => 5,
+        Client::GBuffer => 6,
+        Client::Composition => 7,
+    }
+}
 
 /// The section of a page; `None` if whole frames were not counted.
 ///
@@ -56,21 +70,18 @@ pub(super) fn section(report: &PaperReport) -> Result<Option<Section>, PlotError
 }
 
 fn chart(scene: &str, rows: &[&ResultRow]) -> StackedChart {
-    let bytes = |row: &ResultRow, clients: &[Client]| -> u64 {
-        let of = row
-            .result
-            .clients
-            .iter()
-            .filter(|c| clients.contains(&c.client));
+    let bytes = |row: &ResultRow, part: usize| -> u64 {
+        let clients = row.result.clients.iter();
+        let of = clients.filter(|c| part_of(c.client) == part);
         of.map(ClientTraffic::bytes).sum()
     };
-    let used: Vec<(usize, (&str, &[Client]))> = (PARTS.into_iter().enumerate())
-        .filter(|(_, (_, clients))| rows.iter().any(|row| bytes(row, clients) > 0))
+    let used: Vec<(usize, &str)> = (PARTS.into_iter().enumerate())
+        .filter(|(part, _)| rows.iter().any(|row| bytes(row, *part) > 0))
         .collect();
     let bar = |row: &&ResultRow| {
         let parts = used
             .iter()
-            .map(|(_, (_, clients))| row.mb_per_frame(bytes(row, clients)));
+            .map(|(part, _)| row.mb_per_frame(bytes(row, *part)));
         (row.point.config.order.title().to_owned(), parts.collect())
     };
     StackedChart {
@@ -78,7 +89,7 @@ fn chart(scene: &str, rows: &[&ResultRow]) -> StackedChart {
         value_label: "MB per frame".to_owned(),
         series: used
             .iter()
-            .map(|(number, (name, _))| SeriesStyle::nth(*name, *number))
+            .map(|(number, name)| SeriesStyle::nth(*name, *number))
             .collect(),
         bars: rows.iter().map(bar).collect(),
         bar_px: 72.0,
