@@ -109,3 +109,25 @@ fn chunks_come_in_the_documented_order() {
         .map(|row| row[0].to_owned());
     assert_eq!(tags.collect::<Vec<_>>(), documented.collect::<Vec<_>>());
 }
+
+#[test]
+fn numbers_are_spelled_as_documented() {
+    let numbers = [
+        0.0,
+        -0.0,
+        1.0,
+        0.064,
+        1e-5,
+        1e-6,
+        12.5e-8,
+        1e15,
+        1e16,
+        123_456_789_012_345_678e3,
+    ];
+    let rows = table("## Content checksum");
+    assert_eq!(rows.len(), numbers.len());
+    for (row, number) in rows.iter().zip(numbers) {
+        let spelled = serde_json::to_string(&number).expect("a finite number");
+        assert_eq!(row[1], format!("`{spelled}`"), "{}", row[0]);
+    }
+}

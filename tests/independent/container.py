@@ -106,6 +106,62 @@ def read(path, kind):
     return {tag.decode("ascii"): chunk for tag, chunk in chunks.items()}, (major, minor)
 
 
+ANNOTATIONS = {"tool", "command_line", "scene", "backend", "driver", "techniques"}
+ESCAPES = {'"': '\\"', "\\": "\\\\", "\b": "\\b", "\f": "\\f", "\n": "\\n", "\r": "\\r", "\t": "\\t"}
+
+
+def spelled_number(number):
+    if isinstance(number, int):
+        return str(number)
+    # `repr` has the shortest digits, the nearest ones of several.
+    mantissa, _, power = f"{number!r}".partition("e")
+    whole, _, fraction = mantissa.lstrip("-").partition(".")
+    digits = (whole + fraction).lstrip("0") or "0"
+    leading = len(whole + fraction) - len((whole + fraction).lstrip("0"))
+    first = len(whole) - 1 - leading + int(power or 0) if number else 0
+    digits = digits.rstrip("0") or "0"
+    sign = "-" if math.copysign(1, number) < 0 else ""
+    if not -5 <= first <= 15:
+        point = "." if len(digits) > 1 else ""
+        return f"{sign}{digits[0]}{point}{digits[1:]}e{first:+d}"
+    if first < 0:
+        return f"{sign}0.{'0' * (-1 - first)}{digits}"
+    digits = digits.ljust(first + 1, "0")
+    return f"{sign}{digits[: first + 1]}.{digits[first + 1 :] or '0'}"
+
+
+def spelled(value):
+    """The spelling of JSON that the content checksum covers."""
+    if isinstance(value, dict):
+        items = sorted((key.encode("utf-8"), key, item) for key, item in value.items())
+        return "{" + ",".join(f"{spelled(key)}:{spelled(item)}" for _, key, item in items) + "}"
+    if isinstance(value, list):
+        return "[" + ",".join(map(spelled, value)) + "]"
+    if isinstance(value, str):
+        escaped = (ESCAPES.get(c) or (f"\\u{ord(c):04x}" if c < " " else c) for c in value)
+        return '"' + "".join(escaped) + '"'
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    return spelled_number(value)
+
+
+def content_checksum(chunks):
+    """As eight hexadecimal digits."""
+
+    def content(value):
+        return {key: item for key, item in value.items() if key not in ANNOTATIONS}
+
+    crc = 0
+    for tag, chunk in chunks.items():
+        if tag != "META":
+            entry = struct.pack("<4sQI", tag.encode("ascii"), len(chunk), zlib.crc32(chunk))
+            crc = zlib.crc32(entry, crc)
+    meta = content(parse_json(chunks["META"]))
+    if isinstance(meta.get("trace"), dict):
+        meta["trace"] = content(meta["trace"])
+    return f"{zlib.crc32(spelled(meta).encode('utf-8'), crc):08x}"
+
+
 def tile_spans(index, tiles):
     """Checks (offset, size, CRC-32) of the tiles that have bytes; they must fill their chunk."""
     end = 0

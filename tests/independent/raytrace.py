@@ -11,7 +11,8 @@ import sys
 
 from raycolumns import read_geometry, read_nodes, read_slots
 
-from container import FOV, META, V3, Bytes, check_fov, check_meta, f32, parse_json, print_line
+from container import FOV, META, V3, Bytes, check_fov, check_meta, content_checksum, f32
+from container import parse_json, print_line
 from container import read, require, shaped, tile_spans, unzigzag
 
 TAGS = {"META", "RBVH", "RMAT", "RLIT", "RTRI", "RAYS", "RTIX"}
@@ -380,6 +381,7 @@ def main(path, what=None):
     triangles = read_triangles(chunks["RTRI"], materials)
     print_line(
         {
+            "checksum": content_checksum(chunks),
             "meta": meta,
             "hierarchy": bvh,
             "materials": materials,

@@ -8,7 +8,8 @@ Written from FORMAT.md alone; see container.py.
 
 import sys
 
-from container import META, Bytes, check_meta, parse_json, print_line, read, require
+from container import META, Bytes, check_meta, content_checksum, parse_json, print_line, read
+from container import require
 from container import shaped, tile_spans, unzigzag
 from planes import decode_planes, read_codes
 
@@ -397,6 +398,7 @@ def main(path, *options):
     check_layers([each for each in passes if each["kind"] == "layer"], version)
     print_line(
         {
+            "checksum": content_checksum(chunks),
             "meta": meta,
             "textures": textures,
             "samplers": samplers,
