@@ -77,8 +77,8 @@ pub struct ViewCounters {
     /// The view; the left one of a stereo pair.
     pub view: View,
     /// Bytes of the distinct lines of each tile, or of each pair of tiles that show the same point at infinity,
-    /// summed over tiles or pairs. A GPU can estimate it by the misses of the L1 caches, which are slightly
-    /// more.
+    /// summed over tiles or pairs. The misses of the L1 caches are no substitute, because they can be far
+    /// fewer.
     pub bytes: u64,
     /// Columns by which the right eye's tiles lie further left than the left eye's tiles with the same
     /// primitives.

@@ -1,6 +1,7 @@
 //! The sentences at the top of pages, computed from the figures.
 
 use super::html::{change, count, list};
+use crate::techniques::{LEAST_SAMPLES, Spread};
 
 /// Least and largest of named values; `None` if there are none.
 fn ends<T>(rows: &[T], value: impl Fn(&T) -> f64) -> Option<(&T, &T)> {
@@ -235,10 +236,19 @@ pub fn reprojected(scenes: &[Reprojected]) -> Vec<String> {
         _ => format!("the mean of {}", count(scenes.len(), "scene")),
     };
     let (speed, energy) = (mean(&|s| s.performance), mean(&|s| s.energy));
+    let range = match ends(scenes, |s| s.energy) {
+        Some((least, most)) if scenes.len() > 1 => {
+            format!(
+                " ({:.2} to {:.2} times, by scene)",
+                least.energy, most.energy
+            )
+        }
+        _ => String::new(),
+    };
     let energy = 100.0 * (energy - 1.0);
     let mut out = vec![
         format!(
-            "In {of}, reprojection reuses {:.1} % of the right pixels, renders {speed:.2} times the frames per second of tracing both eyes, and takes {} energy{}.",
+            "In {of}, reprojection reuses {:.1} % of the right pixels, renders {speed:.2} times the frames per second of tracing both eyes, and takes {} energy{}{range}.",
             plain(&|s| s.reuse_pct),
             change(energy, "less", "more", "the same"),
             if format!("{:.1}", energy.abs()) == "0.0" {
@@ -273,48 +283,79 @@ pub fn reprojected(scenes: &[Reprojected]) -> Vec<String> {
 pub struct Timed {
     /// Name.
     pub name: String,
-    /// Median frame time over that of the baseline.
-    pub time: f64,
+    /// Frame time over that of the baseline.
+    pub time: Spread,
     /// Mean FLIP.
     pub flip: f64,
+}
+
+impl Timed {
+    /// Whether the measurements tell the technique from the baseline: enough of them, and both quartiles on one
+    /// side of 1.
+    fn is_told_apart(&self) -> bool {
+        self.time.samples >= LEAST_SAMPLES && (self.time.q3 < 1.0 || self.time.q1 > 1.0)
+    }
+
+    /// Its frame time against the baseline, with quartiles.
+    fn takes(&self) -> String {
+        let Spread {
+            q1,
+            median,
+            q3,
+            samples,
+            ..
+        } = self.time;
+        let spread = format!(
+            "quartiles {q1:.2} to {q3:.2} times, {}",
+            count(samples, "measurement")
+        );
+        match change(100.0 * (median - 1.0), "less", "more", "").as_str() {
+            "" => format!("as much frame time as the baseline ({spread})"),
+            words => format!("{words} frame time than the baseline ({spread})"),
+        }
+    }
 }
 
 /// Techniques of one scene, without the baseline.
 #[must_use]
 pub fn timed(scene: &str, techniques: &[Timed]) -> Vec<String> {
-    let fastest = |techniques: &mut dyn Iterator<Item = &Timed>| -> Option<(String, f64, f64)> {
-        let best = techniques.min_by(|a, b| a.time.total_cmp(&b.time))?;
-        Some((best.name.clone(), best.time, best.flip))
-    };
-    let takes = |time: f64| {
-        let pct = 100.0 * (time - 1.0);
-        match change(pct, "less", "more", "").as_str() {
-            "" => "as much frame time as the baseline".to_owned(),
-            words => format!("{words} frame time than the baseline"),
-        }
+    let fastest = |without_error: bool| {
+        let of = techniques
+            .iter()
+            .filter(|of| !without_error || of.flip == 0.0);
+        of.min_by(|a, b| a.time.median.total_cmp(&b.time.median))
     };
     let error = |flip: f64| match flip {
         0.0 => "without any image error".to_owned(),
         flip => format!("with a mean FLIP of {flip:.4}"),
     };
-    let Some((name, time, flip)) = fastest(&mut techniques.iter()) else {
+    let Some(best) = fastest(false) else {
         return vec![format!("Only the baseline was measured on {scene}.")];
     };
     let of = match techniques.len() {
-        1 => format!("On {scene}, {name}"),
-        many => format!("Of {many} techniques on {scene}, {name} is the fastest: it"),
+        1 => format!("On {scene}, {}", best.name),
+        many => format!(
+            "Of {many} techniques on {scene}, {} is the fastest: it",
+            best.name
+        ),
     };
-    let mut out = vec![format!("{of} takes {} {}.", takes(time), error(flip))];
-    if flip > 0.0 {
-        match fastest(&mut techniques.iter().filter(|t| t.flip == 0.0)) {
-            Some((name, time, _)) => out.push(format!(
-                "{name} is the fastest without any image error: it takes {}.",
-                takes(time)
+    let mut out = vec![format!("{of} takes {} {}.", best.takes(), error(best.flip))];
+    if !best.is_told_apart() {
+        out.push(format!(
+            "These measurements do not tell it from the baseline: expected {LEAST_SAMPLES} or more with both quartiles on one side of 1."
+        ));
+    }
+    if best.flip > 0.0 {
+        match fastest(true) {
+            Some(of) => out.push(format!(
+                "{} is the fastest without any image error: it takes {}.",
+                of.name,
+                of.takes()
             )),
             None => out.push("Each of them changes the image.".to_owned()),
         }
     }
-    if techniques.len() == 1 && out.len() == 2 && out[1].starts_with("Each") {
+    if techniques.len() == 1 && out.last().is_some_and(|last| last.starts_with("Each")) {
         out.pop();
     }
     out
@@ -496,7 +537,8 @@ mod tests {
         assert!(!one.contains("paper"), "{one}");
         let two = reprojected(&[scene(1.0, Some([2.0, 0.5])), scene(1.0, None)]).join(" ");
         assert!(
-            two.contains("the mean of 2 scenes") && two.contains("takes the same energy."),
+            two.contains("the mean of 2 scenes")
+                && two.contains("takes the same energy (1.00 to 1.00 times, by scene)."),
             "{two}"
         );
         assert!(
@@ -509,7 +551,14 @@ mod tests {
     fn the_answer_covers_slower_single_and_lossless_techniques() {
         let technique = |name: &str, time, flip| Timed {
             name: name.to_owned(),
-            time,
+            time: Spread {
+                p1: time - 0.2,
+                q1: time - 0.05,
+                median: time,
+                q3: time + 0.05,
+                p99: time + 0.2,
+                samples: LEAST_SAMPLES,
+            },
             flip,
         };
         assert_eq!(
@@ -519,7 +568,7 @@ mod tests {
         assert_eq!(
             timed("plant", &[technique("a", 1.1, 0.02)]),
             [
-                "On plant, a takes 10.0 % more frame time than the baseline with a mean FLIP of 0.0200."
+                "On plant, a takes 10.0 % more frame time than the baseline (quartiles 1.05 to 1.15 times, 8 measurements) with a mean FLIP of 0.0200."
             ]
         );
         let text = timed(
@@ -540,11 +589,16 @@ mod tests {
             &[technique("a", 1.0, 0.0), technique("b", 1.2, 0.0)],
         );
         assert_eq!(
-            text,
-            [
-                "Of 2 techniques on plant, a is the fastest: it takes as much frame time as the baseline without any image error."
-            ]
+            text[0],
+            "Of 2 techniques on plant, a is the fastest: it takes as much frame time as the baseline (quartiles 0.95 to 1.05 times, 8 measurements) without any image error."
         );
+        assert!(
+            text[1].contains("do not tell it from the baseline"),
+            "{text:?}"
+        );
+        let mut few = technique("a", 0.5, 0.0);
+        few.time.samples = LEAST_SAMPLES - 1;
+        assert!(timed("plant", &[few])[1].contains("do not tell"));
     }
 
     #[test]

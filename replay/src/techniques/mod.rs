@@ -22,7 +22,7 @@ mod tests;
 pub use folder::{Folder, FolderError};
 pub use measured::{CacheFigures, Count, Gain, Measured, Measures, OrderGain};
 pub use pacing::{Pacing, RATES_HZ};
-pub use pareto::{dominated, dominated_in_time};
+pub use pareto::{LEAST_SAMPLES, dominated, dominated_in_time};
 pub use pictures::{PictureFigures, picture_figures};
 pub use sharing::{Sharing, sharing};
 pub use skipped::{Difference, DifferenceError, differences};

@@ -14,7 +14,7 @@ pub fn dominated(points: &[(f64, f64)]) -> Vec<bool> {
 
 /// Minimum number of measurements of both times. For equal times, the interquartile ranges are disjoint in
 /// 29 of 100 pairs of two measurements each, and in 3 of 100 pairs of eight.
-const LEAST_SAMPLES: usize = 8;
+pub const LEAST_SAMPLES: usize = 8;
 
 /// For each point of a time and an error, whether another one has at most the same error and takes
 /// significantly less time: the interquartile ranges are disjoint, with [`LEAST_SAMPLES`] measurements of

@@ -177,7 +177,7 @@ impl TechniquesReport<'_> {
             let others = measures.rows.iter().filter(|m| !m.is_baseline());
             let timed = others.map(|m| answers::Timed {
                 name: m.row.technique.clone(),
-                time: m.timing.ratio.median,
+                time: m.timing.ratio,
                 flip: m.pictures.flip_mean,
             });
             answers::timed(measures.scene, &timed.collect::<Vec<_>>())
