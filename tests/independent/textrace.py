@@ -342,7 +342,7 @@ def read_mesh(data):
 
 
 def read_geometry(chunks, version, draws, passes, frames):
-    """Yields (view, tile, primitives) for each tile of each view."""
+    """Yields (view, its pass or None, tile, primitives) for each tile of each view."""
     tags = [tag for tag in chunks if tag in GEOMETRY_TAGS]
     if not tags:
         return
@@ -360,6 +360,9 @@ def read_geometry(chunks, version, draws, passes, frames):
     entries = [index.fields("IIIIIQII") for _ in range(index.left() // 36)]
     index.end()
     tile_spans([entry[5:] for entry in entries], chunks["PLST"])
+    places = [(frame, 1 - kind, number) for frame, kind, number, *_ in entries]
+    require(places == sorted(set(places)), "order of the views")
+    require(sum(kind for _, kind, _ in places) == len(passes), "a view of each pass")
     for view, (frame, kind, number, width, height, offset, size, _) in enumerate(entries):
         require(frame in frames and 1 <= width <= 16384 and 1 <= height <= 16384, "a view")
         if kind == 0:
@@ -378,7 +381,7 @@ def read_geometry(chunks, version, draws, passes, frames):
         for tile in range(-(-width // 16) * -(-height // 16)):
             primitives = ascending(lists)
             require(allowed.issuperset(primitives), "a primitive of another draw")
-            yield view, tile, primitives
+            yield view, number if kind == 0 else None, tile, primitives
         lists.end()
 
 
@@ -407,7 +410,10 @@ def main(path, *options):
         }
     )
     frames = {views["frame"] for views in meta["frames"]}
-    for view, tile, primitives in read_geometry(chunks, version, draws, passes, frames):
+    listed = {}
+    for view, of_pass, tile, primitives in read_geometry(chunks, version, draws, passes, frames):
+        if of_pass is not None:
+            listed[of_pass, tile] = set(primitives)
         if "--lists" in options:
             print_line({"view": view, "tile": tile, "primitives": primitives})
     if "--lists" in options:
@@ -435,6 +441,8 @@ def main(path, *options):
         decode = {0: decode_raw, 1: decode_delta, 3: planes}[encoding]
         heads, rows = decode(Bytes(chunks["TILE"][offset : offset + size]), runs, records)
         check_tile(heads, rows, draws)
+        if listed:
+            require(listed[number, tile].issuperset(head[0] for head in heads), "a recorded primitive's list")
         rows = iter(rows)
         for primitive, draw, count in heads:
             for _ in range(count):

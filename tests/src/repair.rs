@@ -264,10 +264,14 @@ pub fn repair_header(bytes: &mut [u8]) {
 pub fn validate(trace: &Trace) -> formats::Result<()> {
     match trace {
         Trace::Texture(trace) => {
+            let lists = trace.pass_lists()?;
             let mut tile = Tile::default();
             for (pass, info) in trace.tables().passes.iter().enumerate() {
                 for index in 0..info.tile_count() as usize {
                     trace.decode_tile(pass, index, &mut tile)?;
+                    if let Some(lists) = &lists {
+                        trace.check_listed(pass, index, &tile, &lists[pass])?;
+                    }
                 }
             }
             let views = trace.geometry().map_or(0, |geometry| geometry.views.len());

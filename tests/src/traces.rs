@@ -274,7 +274,7 @@ pub fn texture_trace(encoding: Encoding, seed: u64) -> Vec<u8> {
 #[must_use]
 pub fn texture_trace_of(tables: &Tables, encoding: Encoding, seed: u64) -> Vec<u8> {
     let writer = TextraceWriter::in_memory(tables).expect("sound tables");
-    with_tiles(writer, tables, encoding, seed)
+    with_tiles(writer, tables, encoding, &random_tiles(tables, seed))
 }
 
 /// A texture trace with the geometry of its draws, its passes and a shadow map.
@@ -296,47 +296,65 @@ pub fn geometry_trace(seed: u64) -> Vec<u8> {
     }
     let writer = TextraceWriter::in_memory(tables).expect("sound tables");
     let mut writer = writer.with_geometry(geometry).expect("sound geometry");
+    let tiles = random_tiles(tables, seed);
+    let mut append = |view: GeometryView, tiles: Option<&[Tile]>| {
+        let mut lists = TileLists {
+            draws: vec![0, 1, 2],
+            starts: vec![0],
+            primitives: Vec::new(),
+        };
+        for tile in 0..view.tile_count() {
+            let runs = tiles.map_or(&[][..], |tiles| &tiles[tile].runs);
+            let mut recorded = runs.iter().map(|run| run.primitive).peekable();
+            let of_tile = (0..3000_u32).filter(|primitive| {
+                let has_records = recorded.next_if_eq(primitive).is_some();
+                random.below(40) == 0 || has_records
+            });
+            lists.primitives.extend(of_tile);
+            lists.starts.push(lists.primitives.len() as u32);
+        }
+        writer.append_view(view, &lists).expect("sound lists");
+    };
     let shadow_map = GeometryView {
         frame: 0,
         target: ViewTarget::ShadowMap(3),
         size_px: [33, 40],
     };
-    let of_pass = |(number, pass): (u32, &Pass)| GeometryView {
-        frame: pass.frame,
-        target: ViewTarget::Pass(number),
-        size_px: pass.size_px,
-    };
-    let views = (0..).zip(&tables.passes).map(of_pass);
-    for view in std::iter::once(shadow_map).chain(views) {
-        let mut lists = TileLists {
-            draws: vec![0, 2],
-            starts: vec![0],
-            primitives: Vec::new(),
+    append(shadow_map, None);
+    for (pass, (number, tiles)) in tables.passes.iter().zip((0..).zip(&tiles)) {
+        let view = GeometryView {
+            frame: pass.frame,
+            target: ViewTarget::Pass(number),
+            size_px: pass.size_px,
         };
-        for _ in 0..view.tile_count() {
-            let of_tile = (0..3000_u32).filter(|p| p / 1000 != 1 && random.below(40) == 0);
-            lists.primitives.extend(of_tile);
-            lists.starts.push(lists.primitives.len() as u32);
-        }
-        writer.append_view(view, &lists).expect("sound lists");
+        append(view, Some(tiles));
     }
-    with_tiles(writer, tables, Encoding::Delta, seed)
+    with_tiles(writer, tables, Encoding::Delta, &tiles)
+}
+
+/// Tiles of each pass; about one in three is untouched.
+fn random_tiles(tables: &Tables, seed: u64) -> Vec<Vec<Tile>> {
+    let mut random = Random(seed);
+    let mut tile = |_| match random.below(3) {
+        0 => Tile::default(),
+        _ => texture_tile(tables, &mut random),
+    };
+    let passes = tables.passes.iter();
+    passes
+        .map(|pass| (0..pass.tile_count()).map(&mut tile).collect())
+        .collect()
 }
 
 fn with_tiles(
     mut writer: TextraceWriter<std::io::Cursor<Vec<u8>>>,
     tables: &Tables,
     encoding: Encoding,
-    seed: u64,
+    tiles: &[Vec<Tile>],
 ) -> Vec<u8> {
-    let mut random = Random(seed);
-    for (pass, info) in tables.passes.iter().enumerate() {
-        for index in 0..info.tile_count() as usize {
-            if random.below(3) > 0 {
-                let tile = texture_tile(tables, &mut random);
-                let encoded = encode_tile_as(encoding, tables, &tile).expect("a sound tile");
-                writer.append(pass, index, encoded).expect("in order");
-            }
+    for (pass, tiles) in tiles.iter().enumerate() {
+        for (index, tile) in tiles.iter().enumerate() {
+            let encoded = encode_tile_as(encoding, tables, tile).expect("a sound tile");
+            writer.append(pass, index, encoded).expect("in order");
         }
     }
     writer.into_bytes().expect("in memory")

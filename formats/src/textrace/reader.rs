@@ -124,6 +124,39 @@ impl Textrace {
         geometry::lists_of(&self.container, &self.tables, view, span)
     }
 
+    /// The primitive lists of each pass, by pass; `None` without geometry.
+    ///
+    /// # Errors
+    /// Damaged lists.
+    pub fn pass_lists(&self) -> Result<Option<Vec<TileLists>>> {
+        let Some(geometry) = &self.geometry else {
+            return Ok(None);
+        };
+        let views = (0..self.tables.passes.len()).filter_map(|pass| geometry.view_of_pass(pass));
+        views
+            .map(|view| self.tile_lists(view))
+            .collect::<Result<_>>()
+            .map(Some)
+    }
+
+    /// Checks that the lists of a pass hold every primitive that has records in a decoded tile of it.
+    ///
+    /// # Errors
+    /// The first primitive that the tile's list lacks.
+    pub fn check_listed(
+        &self,
+        pass: usize,
+        tile: usize,
+        records: &Tile,
+        lists: &TileLists,
+    ) -> Result<()> {
+        lists.check_records(tile, records).map_err(|broken| {
+            let expected = format!("pass {pass}, {}: {}", broken.what, broken.expected);
+            let tag = geometry::PRIMITIVE_LISTS;
+            self.container.malformed(tag, 0, expected, broken.found)
+        })
+    }
+
     /// The tables.
     #[must_use]
     pub fn tables(&self) -> &Tables {

@@ -347,7 +347,7 @@ impl<W: Write + Seek> TextraceWriter<W> {
             tables::write(self.version, &self.tables, &mut self.container)?;
         }
         if let Some(spool) = self.geometry {
-            spool.write(&mut self.container)?;
+            spool.write(&self.tables, &mut self.container)?;
         }
         Ok(self.container)
     }

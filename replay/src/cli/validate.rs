@@ -6,6 +6,7 @@ use crate::stream::Expander;
 use anyhow::Result;
 use formats::raytrace::{RAY_TILES, RayTile, check_relations};
 use formats::textrace::Tile;
+use formats::textrace::geometry::ViewTarget;
 use formats::textrace::tables::TEXTURES;
 use formats::{FormatError, Trace};
 use rayon::prelude::*;
@@ -58,17 +59,23 @@ fn validate(path: &std::path::Path) -> formats::Result<String> {
                 let expected = "tables that can be replayed";
                 return Err(container.malformed(TEXTURES, 0, expected, error));
             }
+            let lists = trace.pass_lists()?;
             let tiles: Vec<_> = tiles(&trace.tables().passes).collect();
             let records = tiles
                 .par_iter()
                 .map_init(Tile::default, |tile, (pass, index)| {
                     trace.decode_tile(*pass, *index, tile)?;
+                    if let Some(lists) = &lists {
+                        trace.check_listed(*pass, *index, tile, &lists[*pass])?;
+                    }
                     Ok(tile.records.len() as u64)
                 });
             let counts = records.collect();
-            let views = trace.geometry().map_or(0, |geometry| geometry.views.len());
-            for view in 0..views {
-                trace.tile_lists(view)?;
+            let views = trace.geometry().map_or(&[][..], |geometry| &geometry.views);
+            for (number, view) in views.iter().enumerate() {
+                if matches!(view.target, ViewTarget::ShadowMap(_)) {
+                    trace.tile_lists(number)?;
+                }
             }
             (counts, "records")
         }

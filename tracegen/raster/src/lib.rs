@@ -11,7 +11,7 @@
 pub mod backend;
 mod batches;
 pub mod capture;
-mod cascades;
+pub mod cascades;
 mod distant;
 pub mod draws;
 pub mod drivers;

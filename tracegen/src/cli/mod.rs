@@ -26,7 +26,8 @@ pub mod sweep;
 mod technique_args;
 pub mod techniques;
 mod values;
-pub mod verify;
+pub mod verified_trace;
+mod verify;
 
 use clap::{Parser, Subcommand};
 use shell::{Common, Documents};

@@ -4,13 +4,14 @@ use super::cache_args::CacheArgs;
 use super::capture_steps::{cascades, prepare_environment, tables};
 use super::path_args::PathArgs;
 use super::scene_args::{SceneArgs, SceneSetup};
+use super::verified_trace::{look_as, refuse_partial, trace_cascades};
 use crate::study::world::shadow_range_m;
-use crate::verify::frame::{CaptureUnderTest, TileChoice, Verified};
+use crate::verify::frame::{CaptureUnderTest, FrameUnderTest, TileChoice, Verified};
 use crate::verify::report::Report;
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::footprint::LodFormula;
-use formats::textrace::{Textrace, TextraceWriter};
+use formats::textrace::{Pass, Textrace, TextraceWriter};
 use formats::view::{Eye, Lens};
 use raster::backend::{CaptureBackend, Fragments, Texels};
 use raster::capture::CaptureJob;
@@ -36,8 +37,8 @@ const MOST_FAILURES: usize = 20;
 pub struct VerifyArgs {
     #[command(flatten)]
     scene: SceneArgs,
-    /// Verify the first frame of this capture of the scene instead of a new one; camera and display are taken
-    /// from the trace.
+    /// Verify this capture of the scene instead of a new one: its first frame, or every frame if nothing of the
+    /// scene moves. Camera and display are taken from the trace.
     #[arg(long, value_name = "FILE.textrace",
           conflicts_with_all = ["camera", "eye", "vfov", "hmd", "size", "hfov", "fov_tangents", "ipd", "cant", "shadows"])]
     trace: Option<PathBuf>,
@@ -112,10 +113,11 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     let mut setup = (args.scene).setup(None, &PathArgs::still(), 0..1, &LoadOptions::ALL)?;
     setup.check_outputs(&outputs)?;
     let mut shadow_cascades = cascades(&setup.scene, args.shadows);
+    let mut shadows_are_known = true;
     if let (Some(trace), Some(file)) = (&existing, &args.trace) {
-        look_as(trace, file, &mut setup)?;
-        // The groups of the trace's draws determine the number of cascades; none of these is verified.
-        shadow_cascades = 0;
+        refuse_partial(trace)?;
+        shadows_are_known = look_as(trace, file, &mut setup)?;
+        shadow_cascades = trace_cascades(trace);
     }
     let mut draws = DrawList::new(&setup.scene, shadow_cascades)?;
     draws.pose(&setup.scene, setup.moments.scene_time_s(0) as f32);
@@ -151,11 +153,24 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         (Some(trace), _) => trace,
         (None, None) => unreachable!("a driver is opened where there is no trace"),
     };
+    let frames = (setup.frames.iter())
+        .map(|views| {
+            let cascades = match shadows_are_known {
+                true => Some(job.frame(views)?.lighting.cascades),
+                false => None,
+            };
+            Ok(FrameUnderTest {
+                views: views.clone(),
+                cascades,
+            })
+        })
+        .collect::<anyhow::Result<Vec<_>>>()?;
     let subject = CaptureUnderTest {
         trace: &trace,
         scene: &setup.scene,
         draws: &draws,
         textures: &textures,
+        frames: &frames,
     };
     subject.check()?;
     let texels = match (&mut backend, args.colour) {
@@ -260,24 +275,6 @@ fn formula_of(driver: &str) -> LodFormula {
     }
 }
 
-/// Takes display and views from a trace.
-fn look_as(trace: &Textrace, file: &Path, setup: &mut SceneSetup) -> anyhow::Result<()> {
-    let meta = &trace.tables().meta;
-    let first = meta
-        .frames
-        .first()
-        .with_context(|| format!("{}: the trace has no frames", file.display()))?;
-    ensure!(
-        !setup.scene.moves() || first.frame == 0,
-        "{}: expected frame 0 of a scene that moves, found frame {}",
-        file.display(),
-        first.frame
-    );
-    setup.hmd = meta.hmd.clone();
-    setup.frames = vec![first.clone()];
-    Ok(())
-}
-
 fn capture(
     job: &CaptureJob<'_>,
     setup: &SceneSetup,
@@ -324,10 +321,9 @@ fn texels(
             .map(|slot| Ok((slot, backend.texels(job.draws, &view, slot)?)))
             .collect::<anyhow::Result<Vec<_>>>()
     };
-    (subject.passes().into_iter())
-        .map(|(_, _, eye)| eye)
-        .map(of_pass)
-        .collect()
+    let of_first = |(_, _, eye, frame): (usize, &Pass, Eye, usize)| (frame == 0).then_some(eye);
+    let eyes = subject.passes().into_iter().map_while(of_first);
+    eyes.map(of_pass).collect()
 }
 
 fn write_reference(
@@ -336,10 +332,9 @@ fn write_reference(
     verified: &Verified,
 ) -> anyhow::Result<()> {
     let mut tables = subject.trace.tables().clone();
-    let passes = subject.passes();
-    let frame = passes.first().map_or(0, |(_, pass, _)| pass.frame);
-    tables.passes.retain(|pass| pass.frame == frame);
-    tables.meta.frames.retain(|views| views.frame == frame);
+    let is_verified = |frame: u32| subject.frames.iter().any(|f| f.views.frame == frame);
+    tables.passes.retain(|pass| is_verified(pass.frame));
+    tables.meta.frames.retain(|views| is_verified(views.frame));
     tables.meta.tool = super::tool();
     tables.meta.backend = "reference".into();
     tables.meta.driver = "double precision".into();

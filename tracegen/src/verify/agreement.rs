@@ -2,6 +2,7 @@
 
 use super::causes::{SampleCause, UvCause};
 use super::classes::Class;
+use super::lookups::LookupAgreement;
 use super::means::Means;
 
 /// The side that has a fragment which the other does not have.
@@ -131,8 +132,10 @@ pub struct Agreement {
     pub groups_unexpected: u64,
     /// Common fragments with coordinates that are not finite on either side.
     pub not_finite: u64,
-    /// Shadow-map look-ups of common fragments, which are not compared.
+    /// Shadow-map look-ups of common fragments that are not compared, because the shadow maps are not known.
     pub shadow_lookups: u64,
+    /// Shadow-map look-ups of common fragments.
+    pub lookups: LookupAgreement,
     /// Compared with the same formula of the level of detail, so that only the capture's precision remains.
     pub capture: SampleErrors,
     /// Compared with the specification: the exact logarithm of each fragment's own derivatives.
@@ -188,6 +191,7 @@ impl Agreement {
         self.groups_unexpected += other.groups_unexpected;
         self.not_finite += other.not_finite;
         self.shadow_lookups += other.shadow_lookups;
+        self.lookups.merge(&other.lookups);
         self.capture.merge(&other.capture);
         self.specification.merge(&other.specification);
     }

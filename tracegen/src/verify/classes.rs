@@ -1,7 +1,7 @@
 //! Causes of a fragment that only the capture or only the reference has.
 
 use super::geometry::{Geometry, SLIVER_PX};
-use super::piece::{Piece, center};
+use super::piece::{Piece, Side, center};
 use super::reference::AlphaTest;
 use raster::backend::Fragments;
 use raster::draws::DrawMode;
@@ -25,7 +25,7 @@ pub enum Class {
     Sliver,
     /// The near or far plane cuts the primitive, and its cut edges are within 1/16 pixel.
     Clipped,
-    /// Another fragment has the same depth within single precision.
+    /// Another fragment or the far plane has the same depth within single precision.
     DepthTie,
     /// It overlaps an alpha-masked fragment whose alpha is within 1/16 of the cutoff.
     AlphaBorder,
@@ -54,12 +54,17 @@ impl Class {
             Self::Edge => "edges within 1/128 px: vertices rounded to 1/256 px",
             Self::Sliver => "slivers: rounding turns or empties the primitive",
             Self::Clipped => "cut by the near or far plane",
-            Self::DepthTie => "as deep as another fragment in single precision",
+            Self::DepthTie => "as deep as another fragment or the far plane in single precision",
             Self::AlphaBorder => "alpha within 1/16 of the cutoff",
             Self::Hidden => "behind a fragment that differs",
             Self::Unexplained => "unexplained",
         }
     }
+}
+
+fn side(piece: &Piece, pixel: [u32; 2]) -> Side {
+    let margin = if piece.clipped { CLIPPED_PX } else { EDGE_PX };
+    piece.side(pixel, margin)
 }
 
 /// The class of a fragment of a primitive at a pixel of a tile, which only one side has.
@@ -81,27 +86,31 @@ pub fn classify(
     let nearest = of_primitive()
         .map(|(index, piece)| (piece.distance_px(pixel), index, piece))
         .max_by(|a, b| a.0.total_cmp(&b.0));
-    let Some((distance, index, piece)) = nearest else {
+    let Some((_, index, piece)) = nearest else {
         return Class::Unexplained;
     };
-    if distance.abs() <= EDGE_PX {
+    if piece.side(pixel, EDGE_PX) == Side::Border {
         return Class::Edge;
     }
-    if piece.clipped && distance.abs() <= CLIPPED_PX {
-        return Class::Clipped;
-    }
-    if distance < 0.0 || recorded == Fragments::All {
-        return Class::Unexplained;
+    match side(piece, pixel) {
+        Side::Border => return Class::Clipped,
+        Side::Outside => return Class::Unexplained,
+        Side::Inside => {}
     }
     let (depth, error) = (piece.depth(at), piece.depth_error(at));
+    if (f64::from(geometry.order.farthest()) - depth).abs() <= error {
+        return Class::DepthTie;
+    }
+    if recorded == Fragments::All {
+        return Class::Unexplained;
+    }
     // The effect of an earlier fragment at the pixel, if it exists: it hides this one or not.
     let mut class = Class::Unexplained;
     for (_, earlier) in geometry.of_tile(tile).filter(|(other, _)| *other < index) {
-        let distance = earlier.distance_px(pixel);
-        let borderline = distance.abs() <= if earlier.clipped { CLIPPED_PX } else { EDGE_PX }
-            || earlier.dropped
-            || earlier.height_px() <= SLIVER_PX;
-        if own(earlier) || (distance < 0.0 && !borderline) {
+        let side = side(earlier, pixel);
+        let borderline =
+            side == Side::Border || earlier.dropped || earlier.height_px() <= SLIVER_PX;
+        if own(earlier) || (side == Side::Outside && !borderline) {
             continue;
         }
         let mode = geometry.call(earlier).mode;

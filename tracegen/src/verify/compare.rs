@@ -8,6 +8,7 @@ use super::lod::{clamped, level_of_detail, taps};
 use super::piece::{center, quad_center};
 use super::precision::rounding_texels;
 use super::reference::{AlphaTest, Fragment, origin, render_tile};
+use super::shadows::Shadows;
 use formats::footprint::{LodFormula, SamplingOptions, footprints, quad_lod};
 use formats::textrace::{NO_GROUP, QuadRecord, SUBTEXELS, Tables, Tile, UvGroup};
 use formats::view::TILE_SIZE_PX;
@@ -24,6 +25,8 @@ pub struct Comparison<'a> {
     pub recorded: Fragments,
     /// The driver's formula of the level of detail; replays of the trace use the same.
     pub formula: LodFormula,
+    /// The frame's shadow maps, if they are known.
+    pub shadows: Option<&'a Shadows>,
 }
 
 /// A captured lane in one group: primitive and pixel of the tile, group and record.
@@ -139,11 +142,10 @@ impl Comparison<'_> {
         let textures = &geometry.material(piece).textures;
         let draw = &self.tables.draws[piece.draw as usize];
         self.groups(geometry, fragment, lanes, result);
+        self.lookups(geometry, fragment, lanes, tile, result);
         for lane in lanes {
             let number = usize::from(lane.group);
-            // Look-ups of shadow maps have their own groups after the material's.
             let Some(slots) = geometry.groups(piece).get(number) else {
-                result.shadow_lookups += u64::from(number < draw.groups.len());
                 continue;
             };
             let (Some(leader), Some(group)) = (

@@ -6,13 +6,15 @@ use super::colour::{ColourCheck, ColourErrors};
 use super::compare::Comparison;
 use super::geometry::Geometry;
 use super::sampler::SoftwareSampler;
+use super::shadows::Shadows;
 use super::write::reference_tile;
-use anyhow::{Context, ensure};
+use anyhow::ensure;
 use formats::footprint::LodFormula;
 use formats::random::Random;
 use formats::textrace::{Draw, EncodedTile, Pass, PassKind, Surfaces, Textrace, Tile, encode_tile};
 use formats::view::{Eye, FrameViews};
 use raster::backend::{Fragments, Texels};
+use raster::cascades::Cascade;
 use raster::draws::DrawList;
 use rayon::prelude::*;
 use scene::{Scene, TextureSlot};
@@ -28,6 +30,17 @@ pub struct CaptureUnderTest<'a> {
     pub draws: &'a DrawList,
     /// The textures that were sampled.
     pub textures: &'a TextureSet,
+    /// The frames to verify, in the trace's order.
+    pub frames: &'a [FrameUnderTest],
+}
+
+/// A frame to verify.
+#[derive(Clone, Debug)]
+pub struct FrameUnderTest {
+    /// Its eyes.
+    pub views: FrameViews,
+    /// Its shadow cascades; `None` if they are not known.
+    pub cascades: Option<Vec<Cascade>>,
 }
 
 /// Which tiles are verified.
@@ -115,30 +128,20 @@ impl<'a> CaptureUnderTest<'a> {
         Ok(())
     }
 
-    /// Passes of the trace's first frame.
+    /// Passes of the frames, each with the position of its frame.
     #[must_use]
-    pub fn passes(&self) -> Vec<(usize, &'a Pass, Eye)> {
-        let tables = self.trace.tables();
-        let first = tables.passes.first().map(|pass| pass.frame);
-        (tables.passes.iter().enumerate())
-            .filter(|(_, pass)| Some(pass.frame) == first)
-            .filter_map(|(number, pass)| Some((number, pass, pass.eye?)))
+    pub fn passes(&self) -> Vec<(usize, &'a Pass, Eye, usize)> {
+        let passes = self.trace.tables().passes.iter().enumerate();
+        passes
+            .filter_map(|(number, pass)| {
+                let is_of = |frame: &FrameUnderTest| frame.views.frame == pass.frame;
+                let frame = self.frames.iter().position(is_of)?;
+                Some((number, pass, pass.eye?, frame))
+            })
             .collect()
     }
 
-    /// The eyes' matrices of the trace's first frame.
-    ///
-    /// # Errors
-    /// Tables without views.
-    pub fn views(&self) -> anyhow::Result<&'a FrameViews> {
-        let frame = self.passes().first().map(|(_, pass, _)| pass.frame);
-        let mut views = self.trace.tables().meta.frames.iter();
-        views
-            .find(|views| Some(views.frame) == frame)
-            .context("the trace has no frame with its eyes' matrices")
-    }
-
-    /// Compares the chosen tiles of the first frame; `texels` are the driver's by pass and slot, or empty.
+    /// Compares the chosen tiles; `texels` are the driver's of the first passes, by pass and slot.
     /// `keep` requests the reference's encoded tiles.
     ///
     /// # Errors
@@ -156,12 +159,6 @@ impl<'a> CaptureUnderTest<'a> {
             sampler: &sampler,
             formula,
         };
-        let comparison = Comparison {
-            tables,
-            alpha: &alpha,
-            recorded: recorded(tables.meta.surfaces.as_ref()),
-            formula,
-        };
         let colour = ColourCheck {
             scene: self.scene,
             draws: self.draws,
@@ -169,11 +166,10 @@ impl<'a> CaptureUnderTest<'a> {
             sampler: &sampler,
             formula,
         };
-        let views = self.views()?;
         let passes = self.passes();
         let counts: Vec<usize> = passes
             .iter()
-            .map(|(_, pass, _)| pass.tile_count() as usize)
+            .map(|(_, pass, ..)| pass.tile_count() as usize)
             .collect();
         let wanted = choose(choice, &counts);
         let mut result = Verified {
@@ -182,12 +178,21 @@ impl<'a> CaptureUnderTest<'a> {
             faults: super::tables::faults(self.scene, tables)?,
             ..Verified::default()
         };
-        for (position, (number, pass, eye)) in passes.into_iter().enumerate() {
+        for (position, (number, pass, eye, frame)) in passes.into_iter().enumerate() {
             let wanted = &wanted[position];
+            let frame = &self.frames[frame];
+            let shadows = frame.cascades.as_deref().map(Shadows::new);
+            let comparison = Comparison {
+                tables,
+                alpha: &alpha,
+                recorded: recorded(tables.meta.surfaces.as_ref()),
+                formula,
+                shadows: shadows.as_ref(),
+            };
             let geometry = Geometry::new(
                 self.scene,
                 self.draws,
-                &views.eyes[eye as usize],
+                &frame.views.eyes[eye as usize],
                 pass.size_px,
                 |tile| wanted[tile],
             );
@@ -228,6 +233,9 @@ impl<'a> CaptureUnderTest<'a> {
             }
             result.reference.push(reference);
         }
+        let lookups = (choice == TileChoice::All).then_some(result.agreement.lookups.by_cascade);
+        let geometry = self.geometry_faults(lookups)?;
+        result.faults.extend(geometry);
         Ok(result)
     }
 }

@@ -1,10 +1,10 @@
 //! The triangles of a view, sorted into its tiles.
 
-use super::piece::{Piece, center, pieces, quad_center};
+use super::piece::{DepthOrder, Piece, center, pieces, quad_center};
 use super::vertex_error::VertexError;
 use formats::footprint::LodFormula;
 use formats::view::{EyeView, TILE_SIZE_PX};
-use glam::{DMat4, DVec2, DVec3, DVec4, Mat4};
+use glam::{DMat4, DVec2, DVec3, DVec4, Mat4, Vec3};
 use raster::draws::{DrawCall, DrawList};
 use scene::{Material, Mesh, Scene, TextureRef, TextureSlot};
 
@@ -22,6 +22,7 @@ pub struct Geometry<'a> {
     pub size_px: [u32; 2],
     /// Tile columns and rows.
     pub tiles: [u32; 2],
+    pub(super) order: DepthOrder,
     pieces: Vec<Piece>,
     /// Pieces that may touch each tile, ascending; empty for tiles that are not verified.
     bins: Vec<Vec<u32>>,
@@ -43,6 +44,7 @@ impl<'a> Geometry<'a> {
             draws,
             size_px,
             tiles,
+            order: DepthOrder::of(&view.eye_to_clip),
             pieces: Vec::new(),
             bins: vec![Vec::new(); tiles[0] as usize * tiles[1] as usize],
         };
@@ -88,7 +90,14 @@ impl<'a> Geometry<'a> {
                 let position = mesh.positions[triangle[i] as usize];
                 VertexError::new(matrices, position.as_dvec3())
             });
-            for piece in pieces(vertices, errors, self.size_px, draw, number, shows) {
+            for piece in pieces(
+                vertices,
+                errors,
+                (self.size_px, self.order),
+                draw,
+                number,
+                shows,
+            ) {
                 // Undrawn pieces are kept only if different rounding might draw them.
                 if !piece.dropped || piece.height_px() <= SLIVER_PX {
                     self.add(piece, wanted);
@@ -183,6 +192,27 @@ impl<'a> Geometry<'a> {
             set,
             rows,
         }
+    }
+
+    /// Values of a piece's vertices over the piece.
+    pub(super) fn values(&self, piece: &'a Piece, set: [DVec2; 3]) -> Coordinates<'a> {
+        Coordinates {
+            piece,
+            uv: set,
+            set,
+            rows: [DVec3::X, DVec3::Y],
+        }
+    }
+
+    /// Positions and normals of a piece's vertices.
+    pub(super) fn vertices(&self, piece: &Piece) -> [[DVec3; 3]; 2] {
+        let mesh = &self.scene.meshes[self.call(piece).mesh];
+        let corners = [0, 1, 2].map(|vertex| corner(mesh, piece, vertex));
+        let normal = |vertex: usize| mesh.normals.get(vertex).copied().unwrap_or(Vec3::Y);
+        [
+            corners.map(|vertex| mesh.positions[vertex].as_dvec3()),
+            corners.map(|vertex| normal(vertex).as_dvec3()),
+        ]
     }
 
     /// Alpha of the vertex colours at a point; 1 without colours.

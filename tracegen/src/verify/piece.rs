@@ -24,11 +24,25 @@ pub(super) struct Corner {
     pub moves_px: DVec2,
     /// 1/256 pixels.
     snapped: [i64; 2],
+    /// Ascending with the distance.
     depth: f64,
+    /// Error of the depth in single precision.
+    depth_error: f64,
     pub inverse_w: f64,
     /// Relative error of `inverse_w`.
     pub inverse_w_error: f64,
     pub weights: DVec3,
+}
+
+/// Where a point lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Side {
+    /// Inside of all edges.
+    Inside,
+    /// So near an edge that rounding decides.
+    Border,
+    /// Outside of an edge.
+    Outside,
 }
 
 /// A primitive, or a part of it after clipping, as a triangle that winds clockwise on the screen.
@@ -41,15 +55,54 @@ pub struct Piece {
     pub number: u32,
     /// It crosses the near or the far plane.
     pub clipped: bool,
+    /// Its primitive winds counter-clockwise on the screen, with y up.
+    pub counter_clockwise: bool,
     /// Its primitive faces away and is not drawn, or has no area after rounding.
     pub dropped: bool,
+}
+
+/// How depth grows in a view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum DepthOrder {
+    /// From 0 at the near plane to 1 at the far plane.
+    Ascending,
+    /// From 1 at the near plane to 0 at the far plane.
+    Reversed,
+}
+
+impl DepthOrder {
+    /// The order of a projection, column by column, that looks along -z.
+    pub fn of(eye_to_clip: &[[f32; 4]; 4]) -> Self {
+        // At distance d the depth is the last column's number over d, plus a constant.
+        if eye_to_clip[3][2] > 0.0 {
+            Self::Reversed
+        } else {
+            Self::Ascending
+        }
+    }
+
+    /// A depth, changed such that it ascends with the distance; exact in any precision.
+    fn ascending(self, depth: f64) -> f64 {
+        match self {
+            Self::Ascending => depth,
+            Self::Reversed => -depth,
+        }
+    }
+
+    /// What the depth buffer holds at first, in ascending order: the depth of the far plane.
+    pub fn farthest(self) -> f32 {
+        match self {
+            Self::Ascending => 1.0,
+            Self::Reversed => 0.0,
+        }
+    }
 }
 
 /// The pieces of a primitive: up to three triangles if planes cut corners off.
 pub(super) fn pieces(
     vertices: [DVec4; 3],
     errors: [VertexError; 3],
-    size_px: [u32; 2],
+    (size_px, order): ([u32; 2], DepthOrder),
     draw: u32,
     number: u32,
     shows: impl Fn(bool) -> bool,
@@ -62,7 +115,7 @@ pub(super) fn pieces(
     };
     let corners = clip_to_depth_range(&[vertex(0), vertex(1), vertex(2)]);
     let clipped = corners.len() != 3 || (0..3).any(|i| corners[i].clip != vertices[i]);
-    let projected: Vec<Corner> = corners.iter().map(|v| project(v, size_px)).collect();
+    let projected: Vec<Corner> = (corners.iter().map(|v| project(v, size_px, order))).collect();
     let triangle = |fan: usize| {
         let mut corners = [projected[0], projected[fan - 1], projected[fan]];
         let area = area(&corners);
@@ -76,6 +129,7 @@ pub(super) fn pieces(
             draw,
             number,
             clipped,
+            counter_clockwise: area < 0,
             dropped,
         }
     };
@@ -149,6 +203,7 @@ impl Corner {
             moves_px: moves(self).max(moves(other)),
             snapped: at.to_array().map(|v| (v * SNAP).round_ties_even() as i64),
             depth: self.depth + share * (other.depth - self.depth),
+            depth_error: self.depth_error.max(other.depth_error),
             inverse_w,
             inverse_w_error: self.inverse_w_error.max(other.inverse_w_error)
                 * (inverse_w / self.inverse_w.min(other.inverse_w)),
@@ -157,7 +212,7 @@ impl Corner {
     }
 }
 
-fn project(vertex: &ClipVertex, size_px: [u32; 2]) -> Corner {
+fn project(vertex: &ClipVertex, size_px: [u32; 2], order: DepthOrder) -> Corner {
     let inverse_w = 1.0 / vertex.clip.w;
     let ndc = vertex.clip * inverse_w;
     let at = DVec2::new(
@@ -167,7 +222,8 @@ fn project(vertex: &ClipVertex, size_px: [u32; 2]) -> Corner {
     Corner {
         at,
         snapped: at.to_array().map(|v| (v * SNAP).round_ties_even() as i64),
-        depth: ndc.z,
+        depth: order.ascending(ndc.z),
+        depth_error: vertex.error.depth(vertex.clip),
         moves_px: vertex.error.moves_px(vertex.clip, size_px, at),
         inverse_w,
         inverse_w_error: vertex.error.inverse_w(vertex.clip),
@@ -249,6 +305,33 @@ impl Piece {
             .fold(f64::INFINITY, f64::min)
     }
 
+    /// The side of a pixel's centre, where edges within `margin_px` and the errors of their ends do not
+    /// decide.
+    pub(super) fn side(&self, pixel: [u32; 2], margin_px: f64) -> Side {
+        let at = center(pixel);
+        let mut side = Side::Inside;
+        for (i, (value, [x, y])) in self.edges(pixel).into_iter().enumerate() {
+            let (a, b) = (&self.corners[i], &self.corners[(i + 1) % 3]);
+            let length = (x as f64).hypot(y as f64).max(1.0);
+            let distance = value as f64 / length / SNAP;
+            let along = (at - a.at).dot(b.at - a.at) / (b.at - a.at).length_squared();
+            let along = if along.is_finite() {
+                along.clamp(0.0, 1.0)
+            } else {
+                0.5
+            };
+            let moves = a.moves_px.lerp(b.moves_px, along).max_element();
+            let tolerance = margin_px + moves;
+            if distance < -tolerance {
+                return Side::Outside;
+            }
+            if distance <= tolerance {
+                side = Side::Border;
+            }
+        }
+        side
+    }
+
     /// Shortest height in pixels; below 1/256, rounding of the vertices decides what is drawn.
     #[must_use]
     pub fn height_px(&self) -> f64 {
@@ -320,14 +403,21 @@ impl Piece {
     }
 
     /// Error in single precision of the depth at a point: a few units in the last place of the largest term
-    /// of the plane's equation.
+    /// of the plane's equation, and the errors of the vertices' depths and places.
     #[must_use]
     pub fn depth_error(&self, p: DVec2) -> f64 {
         let here = self.depth(p);
-        let slope = |step: DVec2| (self.depth(p + step) - here).abs();
-        let across = slope(DVec2::X) * self.farthest_px(p, 0);
-        let down = slope(DVec2::Y) * self.farthest_px(p, 1);
-        16.0 * f64::from(f32::EPSILON) * (here.abs() + across + down)
+        let slope = DVec2::new(
+            self.depth(p + DVec2::X) - here,
+            self.depth(p + DVec2::Y) - here,
+        );
+        let slope = slope.abs();
+        let terms =
+            here.abs() + slope.dot(DVec2::new(self.farthest_px(p, 0), self.farthest_px(p, 1)));
+        let weights = self.screen_weights(p).map(f64::abs);
+        let of_vertices = weights.iter().zip(&self.corners);
+        let of_vertices = of_vertices.map(|(w, c)| w * (c.depth_error + slope.dot(c.moves_px)));
+        16.0 * f64::from(f32::EPSILON) * terms + of_vertices.sum::<f64>()
     }
 
     /// Distance to the corner that is farthest from a point along an axis.
@@ -361,7 +451,7 @@ mod tests {
         let found = pieces(
             [vertex(0), vertex(1), vertex(2)],
             Default::default(),
-            [size; 2],
+            ([size; 2], DepthOrder::Ascending),
             0,
             0,
             |_| true,
@@ -424,7 +514,7 @@ mod tests {
         let found = pieces(
             vertices.map(DVec4::from),
             Default::default(),
-            [64; 2],
+            ([64; 2], DepthOrder::Ascending),
             0,
             0,
             |_| true,

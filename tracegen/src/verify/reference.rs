@@ -34,7 +34,7 @@ pub fn render_tile(
     recorded: Fragments,
 ) -> Vec<Fragment> {
     let mut fragments = Vec::new();
-    let mut nearest = [1.0_f32; EDGE * EDGE];
+    let mut nearest = [geometry.order.farthest(); EDGE * EDGE];
     let origin = origin(geometry, tile);
     for (index, piece) in geometry.of_tile(tile).filter(|(_, piece)| !piece.dropped) {
         let Some(spans) = piece.span_px(geometry.size_px) else {

@@ -5,6 +5,7 @@ use super::causes::{SampleCause, UvCause};
 use super::classes::Class;
 use super::colour::ColourErrors;
 use super::frame::Verified;
+use super::lookups::LookupAgreement;
 use super::means::Bias;
 use formats::textrace::Tables;
 use serde::Serialize;
@@ -31,6 +32,8 @@ pub struct Report {
     capture_precision: Samples,
     /// Compared with the exact logarithm of each fragment's own derivatives.
     specification: Samples,
+    /// Look-ups of shadow maps.
+    shadow_lookups: Lookups,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     colour: Vec<Colour>,
 }
@@ -81,6 +84,32 @@ struct UvError {
     largest_means: Vec<Bias>,
 }
 
+#[derive(Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+struct Lookups {
+    compared: u64,
+    mean_error_texels: f64,
+    p99_error_texels: f64,
+    max_error_texels: f64,
+    causes: Vec<Count<UvCause>>,
+    /// Fragments that are looked up in another cascade than expected, in several, or not at all.
+    other_cascades: u64,
+}
+
+impl Lookups {
+    fn new(agreement: &LookupAgreement) -> Self {
+        let [mean, p99, max] = agreement.errors_texels.summary();
+        Self {
+            compared: agreement.errors_texels.0.len() as u64,
+            mean_error_texels: mean,
+            p99_error_texels: p99,
+            max_error_texels: max,
+            causes: counts(&UvCause::ALL, &agreement.causes),
+            other_cascades: agreement.other_cascades,
+        }
+    }
+}
+
 /// Number of reported means.
 const LARGEST_MEANS: usize = 4;
 
@@ -117,6 +146,14 @@ fn failures(verified: &Verified, means: &[Bias]) -> Vec<String> {
         (
             agreement.differences_unexplained,
             "differences of coordinates over a quad",
+        ),
+        (
+            agreement.lookups.other_cascades,
+            "shadow look-ups of fragments in another cascade",
+        ),
+        (
+            agreement.lookups.causes[UvCause::Unexplained as usize],
+            "coordinates of shadow look-ups",
         ),
         (sample_causes(&agreement.capture), "levels or texels"),
         (
@@ -267,6 +304,7 @@ impl Report {
             },
             capture_precision: Samples::new(&agreement.capture),
             specification: Samples::new(&agreement.specification),
+            shadow_lookups: Lookups::new(&agreement.lookups),
             colour: (verified.colours.iter())
                 .filter(|(_, errors)| errors.fragments > 0)
                 .map(|(slot, errors)| Colour::new(slot.name(), errors))
@@ -347,6 +385,23 @@ impl Report {
                     mean.column
                 ),
             );
+        }
+        let lookups = &self.shadow_lookups;
+        if lookups.compared > 0 {
+            line(
+                "error of shadow look-ups, texels: mean, 99 %, max",
+                format!(
+                    "{:.5}, {:.5}, {:.4} of {}",
+                    lookups.mean_error_texels,
+                    lookups.p99_error_texels,
+                    lookups.max_error_texels,
+                    lookups.compared
+                ),
+            );
+        }
+        let left = self.uv_error_texels.shadow_lookups_not_compared;
+        if left > 0 {
+            line("shadow look-ups not compared", left.to_string());
         }
         self.capture_precision.lines("same LOD formula", &mut line);
         self.specification.lines("specification", &mut line);

@@ -26,6 +26,7 @@ use textures::TextureSet;
 
 mod captured;
 mod culling;
+mod depth;
 mod every_fragment;
 mod far_field;
 mod fragments;

@@ -46,6 +46,13 @@ impl VertexError {
         UNIT * (half * (CLIP_ROUNDINGS * terms / clip.w.abs() + 3.0 * ndc) + at.abs())
     }
 
+    /// Error of the depth.
+    pub fn depth(&self, clip: DVec4) -> f64 {
+        let depth = (clip.z / clip.w).abs();
+        let terms = self.terms.z + depth * self.terms.w;
+        UNIT * (CLIP_ROUNDINGS * terms / clip.w.abs() + 3.0 * depth)
+    }
+
     /// Relative error of 1/w.
     pub fn inverse_w(&self, clip: DVec4) -> f64 {
         UNIT * (CLIP_ROUNDINGS * self.terms.w / clip.w.abs() + 2.0)

@@ -25,8 +25,18 @@ impl Views<'_> {
                 let place = format!("frame {} eye {eye}", views.frame);
                 hold_projection(&place, view, fov, faults);
                 hold_position(&place, view, faults);
+                self.hold_planes(&place, view, faults);
             }
             self.hold_eyes(views, faults);
+        }
+    }
+
+    /// All eyes have the planes of the first one.
+    fn hold_planes(&self, place: &str, view: &EyeView, faults: &mut Faults) {
+        let planes = |view: &EyeView| [view.eye_to_clip[2][2], view.eye_to_clip[3][2]];
+        if let Some(first) = self.frames.first() {
+            let place = format!("{place}: eye_to_clip, near and far plane");
+            faults.hold(&place, &planes(&first.eyes[0]), &planes(view));
         }
     }
 
@@ -94,9 +104,12 @@ fn hold_projection(place: &str, view: &EyeView, fov: &FovTangents, faults: &mut 
             }
         }
     }
-    // Both planes are in front of the eye, the far one behind the near one.
+    // At distance d the depth is offset / d - scale. Both planes are ahead of the eye, the far one behind the
+    // near one or infinitely far, where the scale is -1, or 0 if the depth is reversed.
     let [scale, offset] = depth;
-    if !(scale < -1.0 && offset < 0.0) {
+    let ascending = scale <= -1.0 && offset < 0.0;
+    let reversed = scale >= 0.0 && offset > 0.0;
+    if !(ascending || reversed) {
         let expected = "planes of depth 0 and 1 ahead of the eye";
         faults.add(
             &format!("{place}: eye_to_clip"),

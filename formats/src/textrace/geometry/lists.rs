@@ -3,7 +3,7 @@
 
 use crate::error::{Broken, ensure};
 use crate::parse::{Cursor, Parsed};
-use crate::textrace::Draw;
+use crate::textrace::{Draw, PrimitiveRun, Tile};
 use crate::varint::put;
 
 /// The draws of a view, and the primitives in each tile before any depth test.
@@ -26,6 +26,23 @@ impl TileLists {
         range
             .and_then(|(&first, &end)| self.primitives.get(first as usize..end as usize))
             .unwrap_or_default()
+    }
+
+    /// Checks that every primitive with records in a tile is in the tile's list.
+    ///
+    /// # Errors
+    /// The first primitive that is not.
+    pub fn check_records(&self, tile: usize, records: &Tile) -> Result<(), Broken> {
+        let list = self.tile(tile);
+        let missing = |run: &&PrimitiveRun| list.binary_search(&run.primitive).is_err();
+        match records.runs.iter().find(missing) {
+            None => Ok(()),
+            Some(run) => Err(Broken::new(
+                format!("primitive list of tile {tile}"),
+                "every primitive that has records in the tile",
+                format_args!("none of primitive {}", run.primitive),
+            )),
+        }
     }
 
     /// Checks the lists against the draws and the number of tiles.

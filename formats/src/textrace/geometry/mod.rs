@@ -81,6 +81,14 @@ impl GeometryView {
         columns * rows
     }
 
+    /// Its place in the order of rendering.
+    fn place(&self) -> (u32, u32, u32) {
+        match self.target {
+            ViewTarget::ShadowMap(cascade) => (self.frame, 0, cascade),
+            ViewTarget::Pass(pass) => (self.frame, 1, pass),
+        }
+    }
+
     fn check(&self, tables: &Tables) -> Result<(), Broken> {
         let frames = &tables.meta.frames;
         let fits = (self.size_px.iter()).all(|size| (1..=MOST_PIXELS).contains(size))
@@ -119,6 +127,41 @@ pub struct Geometry {
 }
 
 impl Geometry {
+    /// Checks that a view follows the views so far: frames ascend, and so do the shadow maps of a frame and
+    /// then its passes.
+    fn check_order(&self, view: &GeometryView) -> Result<(), Broken> {
+        let follows = (self.views.last()).is_none_or(|last| last.place() < view.place());
+        ensure(follows, || {
+            Broken::new(
+                format!("view {}", self.views.len()),
+                "views by ascending frame, of each frame shadow maps before passes, both ascending, none twice",
+                format_args!("{view:?} after {:?}", self.views.last()),
+            )
+        })
+    }
+
+    /// Checks that every pass has lists; their order has been checked.
+    fn check_passes(&self, tables: &Tables) -> Result<(), Broken> {
+        let is_pass = |view: &&GeometryView| matches!(view.target, ViewTarget::Pass(_));
+        let (found, expected) = (
+            self.views.iter().filter(is_pass).count(),
+            tables.passes.len(),
+        );
+        ensure(found == expected, || {
+            Broken::new("views", format!("one for each of {expected} passes"), found)
+        })
+    }
+
+    /// Number of the view that a pass is.
+    #[must_use]
+    pub fn view_of_pass(&self, pass: usize) -> Option<usize> {
+        let of_pass = |view: &GeometryView| match view.target {
+            ViewTarget::Pass(number) => number as usize == pass,
+            ViewTarget::ShadowMap(_) => false,
+        };
+        self.views.iter().position(of_pass)
+    }
+
     /// Checks meshes and draws against the tables.
     fn check_meshes(&self, tables: &Tables) -> Result<(), Broken> {
         for (number, mesh) in self.meshes.iter().enumerate() {

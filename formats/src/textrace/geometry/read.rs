@@ -46,10 +46,15 @@ pub(in crate::textrace) fn read(
     let entries = container.chunk(LIST_INDEX)?.len() / LIST_INDEX_ENTRY_BYTES;
     let views =
         container.parse_chunk(LIST_INDEX, |input| count(read_view, entries).parse(input))?;
-    (geometry.views, geometry.spans) = views.into_iter().unzip();
-    for view in &geometry.views {
-        view.check(tables).map_err(broken(LIST_INDEX))?;
+    for (view, span) in views {
+        let sound = view
+            .check(tables)
+            .and_then(|()| geometry.check_order(&view));
+        sound.map_err(broken(LIST_INDEX))?;
+        geometry.views.push(view);
+        geometry.spans.push(span);
     }
+    geometry.check_passes(tables).map_err(broken(LIST_INDEX))?;
     list_chunk(container).check(geometry.spans.iter().copied().map(Some))?;
     Ok(Some(geometry))
 }

@@ -4,7 +4,7 @@ use crate::textrace::tests::tables;
 use crate::textrace::{Textrace, TextraceWriter};
 
 /// A mesh of random triangles for each draw of the tables.
-pub(crate) fn geometry(tables: &Tables) -> Geometry {
+fn geometry(tables: &Tables) -> Geometry {
     let mut state = 1_u32;
     let mut random = move |below: u32| {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -31,6 +31,19 @@ fn view() -> GeometryView {
     }
 }
 
+/// The right eye's view, with empty lists.
+fn right() -> (GeometryView, TileLists) {
+    let view = GeometryView {
+        target: ViewTarget::Pass(1),
+        ..view()
+    };
+    let lists = TileLists {
+        starts: vec![0; 7],
+        ..TileLists::default()
+    };
+    (view, lists)
+}
+
 fn lists() -> TileLists {
     TileLists {
         draws: vec![0, 2],
@@ -49,6 +62,11 @@ fn written(views: &[(GeometryView, TileLists)]) -> Vec<u8> {
     writer.into_bytes().unwrap()
 }
 
+/// A trace with lists for each of its passes.
+pub(crate) fn trace() -> Vec<u8> {
+    written(&[(view(), lists()), right()])
+}
+
 #[test]
 fn geometry_is_read_as_written() {
     let shadow_map = GeometryView {
@@ -56,28 +74,34 @@ fn geometry_is_read_as_written() {
         size_px: [16, 1],
         ..view()
     };
+    let (right, nothing) = right();
     let empty = TileLists {
         starts: vec![0, 0],
         ..TileLists::default()
     };
-    let trace =
-        Textrace::from_bytes(written(&[(view(), lists()), (shadow_map, empty.clone())])).unwrap();
+    let views = [
+        (shadow_map, empty.clone()),
+        (view(), lists()),
+        (right, nothing),
+    ];
+    let trace = Textrace::from_bytes(written(&views)).unwrap();
     let found = trace.geometry().unwrap();
     let expected = geometry(&tables());
     assert_eq!(
         (&found.meshes, &found.draw_meshes),
         (&expected.meshes, &expected.draw_meshes)
     );
-    assert_eq!(found.views, [view(), shadow_map]);
-    assert_eq!(trace.tile_lists(0).unwrap(), lists());
-    assert_eq!(trace.tile_lists(1).unwrap(), empty);
+    assert_eq!(found.views, [shadow_map, view(), right]);
+    assert_eq!(trace.tile_lists(0).unwrap(), empty);
+    assert_eq!(trace.tile_lists(1).unwrap(), lists());
+    assert_eq!(found.view_of_pass(1), Some(2));
     assert_eq!(lists().tile(2), [4, 999]);
     assert!(
         trace
-            .tile_lists(2)
+            .tile_lists(3)
             .unwrap_err()
             .to_string()
-            .contains("view 2")
+            .contains("view 3")
     );
     assert_eq!(trace.container().version(), (1, GEOMETRY_MINOR));
 }
@@ -158,7 +182,7 @@ fn lists_that_violate_a_rule_are_not_written() {
 /// a panic.
 #[test]
 fn changed_bytes_with_right_checksums_are_read_or_refused() {
-    let bytes = written(&[(view(), lists())]);
+    let bytes = trace();
     let whole = Textrace::from_bytes(bytes.clone()).unwrap();
     let mut refused = 0;
     for tag in [PRIMITIVE_LISTS, LIST_INDEX, GEOMETRY] {
@@ -184,9 +208,16 @@ fn repaired(mut bytes: Vec<u8>, whole: &Textrace, changed: ChunkTag) -> Vec<u8> 
         let range = entry.offset_bytes as usize..(entry.offset_bytes + entry.length_bytes) as usize;
         let lists = whole.container().entry(PRIMITIVE_LISTS).unwrap();
         if changed == PRIMITIVE_LISTS && entry.tag == LIST_INDEX {
-            let lists = &bytes[lists.offset_bytes as usize..][..lists.length_bytes as usize];
-            let crc = crc32fast::hash(lists).to_le_bytes();
-            bytes[range.start + 32..range.start + 36].copy_from_slice(&crc);
+            for entry in (range.start..range.end).step_by(LIST_INDEX_ENTRY_BYTES) {
+                let number = |at: usize| {
+                    let bytes = bytes[entry + at..][..4].try_into().unwrap();
+                    u32::from_le_bytes(bytes) as usize
+                };
+                let (start, size) = (number(20), number(28));
+                let list = &bytes[lists.offset_bytes as usize + start..][..size];
+                let crc = crc32fast::hash(list).to_le_bytes();
+                bytes[entry + 32..entry + 36].copy_from_slice(&crc);
+            }
         }
         let crc = crc32fast::hash(&bytes[range]).to_le_bytes();
         bytes[directory + 24 * number + 4..][..4].copy_from_slice(&crc);
@@ -196,4 +227,65 @@ fn repaired(mut bytes: Vec<u8>, whole: &Textrace, changed: ChunkTag) -> Vec<u8> 
     let crc = crc32fast::hash(&bytes[..44]).to_le_bytes();
     bytes[44..48].copy_from_slice(&crc);
     bytes
+}
+
+#[test]
+fn views_out_of_order_or_missing_are_neither_written_nor_read() {
+    let shadow_map = |cascade| {
+        let view = GeometryView {
+            target: ViewTarget::ShadowMap(cascade),
+            ..view()
+        };
+        (view, right().1)
+    };
+    let sound = [shadow_map(0), shadow_map(2), (view(), lists()), right()];
+    let bytes = written(&sound);
+    let tables = tables();
+    let write = |views: &[&(GeometryView, TileLists)]| {
+        let writer = TextraceWriter::in_memory(&tables)?;
+        let mut writer = writer.with_geometry(geometry(&tables))?;
+        for (view, lists) in views {
+            writer.append_view(*view, lists)?;
+        }
+        writer.into_bytes()
+    };
+    let [a, b, c, d] = &sound;
+    for broken in [
+        &[b, a, c, d][..],
+        &[a, a, c, d],
+        &[a, c, b, d],
+        &[a, b, d, c],
+    ] {
+        let error = write(broken).unwrap_err().to_string();
+        assert!(error.contains("ascending"), "{error}");
+    }
+    let error = write(&[a, b, c]).unwrap_err().to_string();
+    assert!(error.contains("one for each of 2 passes"), "{error}");
+    // The number of the second shadow map, and of the second pass.
+    let whole = Textrace::from_bytes(bytes.clone()).unwrap();
+    let index = whole.container().entry(LIST_INDEX).unwrap().offset_bytes as usize;
+    for entry in [1, 3] {
+        let mut changed = bytes.clone();
+        changed[index + entry * LIST_INDEX_ENTRY_BYTES + 8] = 0;
+        let error = Textrace::from_bytes(repaired(changed, &whole, LIST_INDEX)).unwrap_err();
+        assert!(error.to_string().contains("ascending"), "{error}");
+    }
+}
+
+#[test]
+fn a_list_without_a_recorded_primitive_is_found() {
+    let run = |primitive| crate::textrace::PrimitiveRun {
+        primitive,
+        draw: 0,
+        first: 0,
+        count: 1,
+    };
+    let tile = |primitives: &[u32]| crate::textrace::Tile {
+        runs: primitives.iter().copied().map(run).collect(),
+        records: Vec::new(),
+    };
+    assert!(lists().check_records(0, &tile(&[0, 2999])).is_ok());
+    assert!(lists().check_records(1, &tile(&[])).is_ok());
+    let broken = lists().check_records(2, &tile(&[4, 5])).unwrap_err();
+    assert!(broken.found.contains("primitive 5"), "{broken:?}");
 }

@@ -44,6 +44,7 @@ impl Spool {
     /// Appends a view.
     pub fn append(&mut self, tables: &Tables, view: GeometryView, lists: &TileLists) -> Result<()> {
         view.check(tables).map_err(Broken::unwritable)?;
+        (self.geometry.check_order(&view)).map_err(Broken::unwritable)?;
         lists
             .check(&tables.draws, view.tile_count())
             .map_err(Broken::unwritable)?;
@@ -66,7 +67,12 @@ impl Spool {
     }
 
     /// Writes the chunks.
-    pub fn write<W: Write + Seek>(mut self, container: &mut ContainerWriter<W>) -> Result<()> {
+    pub fn write<W: Write + Seek>(
+        mut self,
+        tables: &Tables,
+        container: &mut ContainerWriter<W>,
+    ) -> Result<()> {
+        (self.geometry.check_passes(tables)).map_err(Broken::unwritable)?;
         if container.major() == MAJOR_1 {
             container.require_minor(GEOMETRY_MINOR);
         }

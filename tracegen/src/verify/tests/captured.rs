@@ -242,6 +242,7 @@ pub(super) fn agreement(
         alpha,
         recorded,
         formula: LodFormula::Llvmpipe,
+        shadows: None,
     };
     let mut sum = Agreement::default();
     for (number, tile) in captured.tiles[pass].iter().enumerate() {
