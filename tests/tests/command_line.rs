@@ -320,11 +320,10 @@ fn the_table_of_a_run_has_the_textures_and_the_tiles_that_were_asked_for() {
     );
     let tiles = shown(&["--tiles"]);
     let map = &json["result"]["tile_maps"][1];
-    assert!(tiles.contains("lines from memory") && !plain.contains("lines from memory"));
+    assert!(tiles.contains("overdraw") && !plain.contains("overdraw"));
     let last = tiles
         .lines()
-        .filter(|line| line.trim_start().starts_with("1 "))
-        .last();
+        .rfind(|line| line.trim_start().starts_with("1 "));
     let last: Vec<&str> = last.expect("a tile").split_whitespace().collect();
     let of_map = |key: &str| map[key].as_array().and_then(|of| of.last()?.as_u64());
     let (columns, rows) = (&map["tiles"][0], &map["tiles"][1]);

@@ -239,7 +239,7 @@ fn an_order_file_for_another_l2_is_named_and_not_replayed() {
 fn equal_orders_have_results_and_a_warning() {
     let mut command = program("replay");
     command.arg("orders").arg(trace());
-    let output = run_ok(command.args(["--orders", "z2-sta,morton", "--caches", "16/16384"]));
+    let output = run_ok(command.args(["--orders", "z2-sta,morton", "--caches", "16/65536"]));
     let (table, message) = (output.stdout, output.stderr);
     let table = String::from_utf8(table).expect("text");
     assert!(
