@@ -2,7 +2,7 @@
 
 use super::damages::{Damage, damage};
 use super::trace::Trace;
-use formats::textrace::geometry::{TileLists, ViewTarget};
+use formats::textrace::geometry::{GeometryView, TileLists, ViewTarget};
 
 pub fn of_meshes() -> Vec<Damage> {
     let rows = |field: &str, what: &str, change: fn(&mut Trace)| damage(field, what, change);
@@ -160,11 +160,22 @@ pub fn of_lists() -> Vec<Damage> {
         "those of the first two shadow maps exchanged",
         |t| t.lists.swap(0, 1),
     ));
-    all.push(rows("view", "one shadow map less", |t| {
-        let last = view(t, true) - 1;
-        t.geometry.views.remove(last);
-        t.lists.remove(last);
-    }));
+    all.push(rows(
+        "view",
+        "the shadow map less that is looked up most",
+        |t| {
+            let looked_up = t.most_looked_up();
+            let is_it = |view: &GeometryView| view.target == ViewTarget::ShadowMap(looked_up);
+            let view = t
+                .geometry
+                .views
+                .iter()
+                .position(is_it)
+                .expect("a shadow map");
+            t.geometry.views.remove(view);
+            t.lists.remove(view);
+        },
+    ));
     all.push(rows("view: number of a shadow map", "9", |t| {
         let last = view(t, true) - 1;
         t.geometry.views[last].target = ViewTarget::ShadowMap(9);

@@ -256,6 +256,11 @@ pub fn of_description() -> Vec<Damage> {
         rows("META: eye_to_clip", "eyes exchanged", |t| {
             t.meta.frames[0].eyes.swap(0, 1);
         }),
+        rows("META: eye_to_clip, depth", "another near plane", |t| {
+            for eye in &mut t.meta.frames[0].eyes {
+                eye.eye_to_clip[3][2] *= 2.0;
+            }
+        }),
         rows("META: techniques", "one for none", |t| {
             t.meta.techniques = Some(ChosenTechniques {
                 frames: vec!["baseline".into()],

@@ -188,6 +188,24 @@ impl Trace {
         }
     }
 
+    /// The shadow cascade with most look-ups.
+    pub fn most_looked_up(&self) -> u32 {
+        let mut counts = [0; CASCADES];
+        for tile in self.tiles.iter().flatten() {
+            for run in &tile.runs {
+                let first = self.tables.draws[run.draw as usize].groups.len() - CASCADES;
+                for record in &tile.records[run.first as usize..][..run.count as usize] {
+                    let cascade = usize::from(record.group).checked_sub(first);
+                    if let Some(count) = cascade.and_then(|cascade| counts.get_mut(cascade)) {
+                        *count += 1;
+                    }
+                }
+            }
+        }
+        let most = (0..CASCADES).max_by_key(|cascade| counts[*cascade]);
+        most.unwrap_or(0) as u32
+    }
+
     /// The draw of a primitive.
     pub fn draw_of(&self, primitive: u32) -> u32 {
         let draws = &self.tables.draws;

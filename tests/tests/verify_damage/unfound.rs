@@ -50,18 +50,6 @@ pub fn all() -> Vec<(Damage, &'static str)> {
             "readers ignore it",
         ),
         (
-            of_tables(
-                "META: eye_to_clip, near and far plane",
-                "both eyes' depth of the near plane * 0.99",
-                |t| {
-                    for eye in &mut t.meta.frames[0].eyes {
-                        eye.eye_to_clip[3][2] *= 0.99;
-                    }
-                },
-            ),
-            "another near plane that cuts nothing gives the same fragments",
-        ),
-        (
             steps("record: uv, u", Records::Material),
             "within the error of single precision",
         ),

@@ -16,13 +16,11 @@ const SHADOW_MAPS: &str = "shadow cascades";
 const MOST_CASCADES: u32 = 4;
 
 /// Flags of `tracegen raster` that leave out fragments which a plain picture has.
-const LEAVE_OUT: [&str; 6] = [
+const LEAVE_OUT: [&str; 4] = [
     "--hidden-area-mask",
     "--hidden-area-mesh",
     "--cull-distance",
     "--cull-px",
-    "--auto",
-    "--technique",
 ];
 
 /// Takes display and views from a trace. Returns whether the shadow cascades follow from them.
@@ -72,6 +70,8 @@ fn camera_of(views: &FrameViews, scene: &Scene, own: &Camera) -> Camera {
         true => [offset / (1.0 + scale), offset / scale],
         false => [offset / scale, offset / (1.0 + scale)],
     };
+    // Infinity has either sign.
+    let planes = planes.map(f64::abs);
     let same = |known: f32, found: f64| {
         (f64::from(known) / found - 1.0).abs() < 1e-3 || known.is_infinite() && found.is_infinite()
     };
@@ -105,14 +105,18 @@ pub(super) fn trace_cascades(trace: &Textrace) -> u32 {
 
 /// Refuses a capture that leaves out fragments on purpose.
 pub(super) fn refuse_partial(trace: &Textrace) -> anyhow::Result<()> {
-    let arguments = &trace.tables().meta.command_line;
-    let leaves_out = |argument: &&String| {
-        let flag = argument.split('=').next().unwrap_or_default();
-        LEAVE_OUT.contains(&flag)
+    let meta = &trace.tables().meta;
+    let flag = |argument: &String| {
+        let flag = argument.split('=').next()?;
+        LEAVE_OUT.contains(&flag).then(|| flag.to_owned())
     };
-    if let Some(flag) = arguments.iter().find(leaves_out) {
+    let chosen = meta
+        .techniques
+        .as_ref()
+        .map(|chosen| chosen.schedule.clone());
+    if let Some(found) = meta.command_line.iter().find_map(flag).or(chosen) {
         bail!(
-            "expected a capture of whole pictures, found one with {flag}: verify compares the baseline"
+            "expected a capture of whole pictures, found one with {found}: verify compares the baseline"
         );
     }
     Ok(())

@@ -102,7 +102,7 @@ impl ListedView<'_> {
         found
     }
 
-    /// Whether a box in the world reaches into the view volume, or nearly so.
+    /// Whether a box in the world reaches into the view volume, or nearly so, or is not finite.
     pub fn is_near(&self, bounds: [Vec3; 2]) -> bool {
         let clip_from_world = self.matrices[0] * self.matrices[1];
         let corners = (0..8).map(|corner| {
@@ -113,7 +113,7 @@ impl ListedView<'_> {
         (0..6).all(|side| {
             corners
                 .iter()
-                .any(|c| distance(side, *c) >= -NEAR * c.w.abs())
+                .any(|c| distance(side, *c) >= -NEAR * c.w.abs() || !c.is_finite())
         })
     }
 

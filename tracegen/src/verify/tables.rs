@@ -166,6 +166,13 @@ fn hold_samplers(scene: &Scene, cascades: u32, tables: &Tables, faults: &mut Fau
             let found = serde_json::to_string(sampler).unwrap_or_default();
             faults.add(&format!("sampler {number}"), "one of the scene's", &found);
         }
+        if tables.samplers[..number].contains(sampler) {
+            faults.add(
+                &format!("sampler {number}"),
+                "each sampler once",
+                "one again",
+            );
+        }
     }
 }
 
