@@ -121,7 +121,7 @@ impl Traces {
     /// Opens every file.
     pub fn open(paths: &[PathBuf], stop: &Stop) -> anyhow::Result<Self> {
         let open = |path: &PathBuf| {
-            let (trace, id) = replay::cli::open_textrace(path)?;
+            let (trace, id) = replay::notices::open_textrace(path)?;
             let stem = path.file_stem().unwrap_or_default();
             let stop = stop.clone();
             Ok((

@@ -14,6 +14,7 @@ pub mod line_list;
 pub mod locality;
 pub mod memory;
 pub mod model_version;
+pub mod notices;
 pub mod order;
 pub mod orders_study;
 mod palette;

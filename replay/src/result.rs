@@ -447,6 +447,9 @@ pub struct TraceId {
     pub display: String,
     /// Width and height of the picture of one eye in pixels.
     pub eye_size_px: [u32; 2],
+    /// What figures of the trace lack, such as texture reads that were not recorded.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notices: Vec<String>,
 }
 
 impl TraceId {
@@ -461,6 +464,7 @@ impl TraceId {
             camera: meta.camera.clone(),
             display: meta.hmd.name.clone(),
             eye_size_px: meta.hmd.eye_size_px,
+            notices: crate::notices::of(meta),
         }
     }
 }

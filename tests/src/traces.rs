@@ -11,8 +11,8 @@ use formats::raytrace::{
 use formats::textrace::geometry::{Geometry, GeometryView, MeshGeometry, TileLists, ViewTarget};
 use formats::textrace::{
     Draw, Encoding, LeftOut, LodRule, NO_GROUP, Pass, PassKind, PrimitiveRun, ProgramCapture,
-    QuadRecord, Sample, SampleLevel, Tables, TextraceWriter, Tile, TraceMeta, UvGroup,
-    encode_tile_as, quad_morton,
+    QuadRecord, Sample, SampleLevel, Tables, TextraceWriter, Tile, TraceMeta, UnrecordedReads,
+    UvGroup, encode_tile_as, quad_morton,
 };
 use formats::texture::{
     ColorSpace, Filter, LodRange, MipFilter, Sampler, TexelFormat, Texture, Wrap,
@@ -154,6 +154,14 @@ pub fn program_tables() -> Tables {
             what: "texel buffers".to_owned(),
             draws: 1,
             fragments: 7,
+        }],
+        unrecorded_reads: vec![UnrecordedReads {
+            stage: "vertex".to_owned(),
+            what: "two-dimensional textures".to_owned(),
+            commands: 2,
+            indirect: 1,
+            invocations: 6,
+            reads: 12,
         }],
     });
     tables.textures[0].format = TexelFormat::Bc6h;

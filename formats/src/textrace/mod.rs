@@ -11,6 +11,7 @@ pub mod geometry;
 mod index;
 mod invariant;
 mod planes;
+mod program;
 mod raw;
 mod reader;
 pub mod tables;
@@ -19,6 +20,7 @@ mod writer;
 pub use bits::PADDING_BYTES as BITS_PADDING_BYTES;
 pub use index::INDEX_ENTRY_BYTES;
 pub use invariant::{TILE_QUADS, quad_morton};
+pub use program::{LeftOut, ProgramCapture, UnrecordedReads};
 pub use raw::{RECORD_BYTES as RAW_RECORD_BYTES, RUN_BYTES as RAW_RUN_BYTES};
 pub use reader::{Textrace, TileStats};
 pub use writer::{EncodedTile, TextraceWriter, encode_tile, encode_tile_as};
@@ -110,30 +112,6 @@ pub struct TraceMeta {
     /// Set for the capture of a program; absent for that of a scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub program: Option<ProgramCapture>,
-}
-
-/// How the capture of a program was divided into frames and eyes.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct ProgramCapture {
-    /// Whether the eyes' matrices and frusta are the program's. Otherwise they are placeholders.
-    pub cameras_known: bool,
-    /// Rule that separated the frames.
-    pub frames_by: String,
-    /// Rule that separated the eyes.
-    pub views_by: String,
-    /// Texture accesses of recorded fragments that are not in the trace.
-    pub left_out: Vec<LeftOut>,
-}
-
-/// A kind of texture access that is not in the trace.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct LeftOut {
-    /// Description of the access.
-    pub what: String,
-    /// Number of draws with such accesses.
-    pub draws: u64,
-    /// Number of fragments with such accesses.
-    pub fragments: u64,
 }
 
 /// The techniques of the frames of a path, by name.

@@ -3,6 +3,7 @@
 use super::ConfigArgs;
 use super::tiles::{ray_tiles, tiles};
 use crate::config::RunConfig;
+use crate::notices;
 use crate::stream::{TileSource, for_quads, plan, rendered};
 use anyhow::{Context, Result, bail, ensure};
 use formats::Trace;
@@ -195,7 +196,7 @@ pub fn run(args: &ConvertArgs) -> Result<ExitCode> {
     };
     let inputs = [Some(args.trace.as_path()), args.machine.file()];
     shell::check_outputs(&[output], inputs.into_iter().flatten())?;
-    let trace = Trace::open(&args.trace)?;
+    let trace = notices::open(&args.trace)?;
     if matches!(trace, Trace::Ray(_)) {
         args.check_for_rays(&config)?;
     }

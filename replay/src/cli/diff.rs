@@ -3,6 +3,7 @@
 
 use super::dump::record_lines;
 use super::tiles::{ray_tiles, tiles};
+use crate::notices;
 use anyhow::Result;
 use formats::Trace;
 use formats::interop::{node_to_json, ray_samples, slot_rows, slot_to_json};
@@ -35,8 +36,8 @@ pub struct DiffArgs {
 /// # Errors
 /// A trace cannot be read.
 pub fn run(args: &DiffArgs) -> Result<ExitCode> {
-    let left = Trace::open(&args.left)?;
-    let right = Trace::open(&args.right)?;
+    let left = notices::open(&args.left)?;
+    let right = notices::open(&args.right)?;
     let differences = differences(&left, &right, args.ignore_meta)?;
     if differences.is_empty() {
         return Ok(ExitCode::SUCCESS);

@@ -2,6 +2,7 @@
 
 use super::tiles::{NumberRange, ray_tiles, tiles};
 use crate::files;
+use crate::notices;
 use crate::records::{self, Rows};
 use crate::report::rows_parquet::RowsWriter;
 use anyhow::{Context, Result, bail, ensure};
@@ -66,10 +67,10 @@ pub struct DumpArgs {
 pub fn run(args: &DumpArgs) -> Result<ExitCode> {
     if let Some(path) = &args.parquet {
         files::check_outputs(&[Output::binary("--parquet", path)], [args.trace.as_path()])?;
-        to_parquet(&Trace::open(&args.trace)?, args, path)?;
+        to_parquet(&notices::open(&args.trace)?, args, path)?;
         return Ok(ExitCode::SUCCESS);
     }
-    let trace = Trace::open(&args.trace)?;
+    let trace = notices::open(&args.trace)?;
     let mut out = shell::stdout();
     match (&trace, args.lists) {
         _ if args.nodes || args.slots => hierarchy(&trace, args, &mut out)?,

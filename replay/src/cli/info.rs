@@ -6,6 +6,7 @@ mod json;
 pub(crate) use json::schema;
 pub use json::to_json;
 
+use crate::notices;
 use crate::report::columns::{Column, Show};
 use crate::report::table::Table;
 use anyhow::Result;
@@ -37,7 +38,7 @@ pub struct InfoArgs {
 /// # Errors
 /// The trace cannot be read.
 pub fn run(args: &InfoArgs) -> Result<ExitCode> {
-    let trace = Trace::open(&args.trace)?;
+    let trace = notices::open(&args.trace)?;
     super::print(&match &trace {
         _ if args.json => serde_json::to_string_pretty(&to_json(&trace)?)?,
         Trace::Texture(trace) => texture_text(trace)?,
@@ -81,6 +82,9 @@ fn texture_text(trace: &Textrace) -> Result<String> {
     );
     if let Some(techniques) = &trace.tables().meta.techniques {
         text += &techniques_text(techniques);
+    }
+    for notice in notices::of(&trace.tables().meta) {
+        text += &format!("{notice}\n");
     }
     text += &pass_table(trace);
     text += "\n";

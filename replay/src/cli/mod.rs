@@ -32,12 +32,8 @@ mod warnings;
 
 pub use config_args::ConfigArgs;
 
-use crate::result::TraceId;
-use anyhow::Result;
 use clap::{Arg, Parser, Subcommand};
-use formats::textrace::Textrace;
 use shell::{Common, Documents};
-use std::path::Path;
 use std::process::ExitCode;
 
 pub use shell::print;
@@ -143,16 +139,6 @@ pub fn main() -> ExitCode {
             Command::Documents(documents) => documents.run::<Cli>(),
         },
     )
-}
-
-/// Opens a texture trace and returns its identification for results.
-///
-/// # Errors
-/// The file cannot be read or is damaged.
-pub fn open_textrace(path: &Path) -> Result<(Textrace, TraceId)> {
-    let trace = Textrace::open(path)?;
-    let id = TraceId::new(path, &trace.tables().meta, trace.content_checksum());
-    Ok((trace, id))
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ impl Traces {
     /// A file that cannot be read or is damaged.
     pub fn open(paths: &[PathBuf]) -> Result<Self> {
         let open = |path: &PathBuf| {
-            let (trace, id) = super::open_textrace(path)?;
+            let (trace, id) = crate::notices::open_textrace(path)?;
             let stem = path.file_stem().unwrap_or_default();
             Ok((trace, id, stem.to_string_lossy().into_owned()))
         };

@@ -2,6 +2,7 @@
 
 use super::tiles::{ray_tiles, tiles};
 use crate::config::RunConfig;
+use crate::notices;
 use crate::stream::Expander;
 use anyhow::Result;
 use formats::raytrace::{RAY_TILES, RayTile, check_relations};
@@ -49,7 +50,7 @@ pub fn run(args: &ValidateArgs) -> Result<ExitCode> {
 
 /// Checks a trace by opening it and decoding all tiles, as every reader does.
 fn validate(path: &std::path::Path) -> formats::Result<String> {
-    let trace = Trace::open(path)?;
+    let trace = notices::open(path)?;
     let container = trace.container();
     // Tiles are decoded in parallel, but the error names the first bad tile in the file.
     let (counts, what): (Vec<formats::Result<u64>>, _) = match &trace {

@@ -54,8 +54,8 @@ pub struct Drained {
     pub textures: usize,
     /// Counts of the records.
     pub counts: CaptureCounts,
-    /// Texture accesses that are not in the trace.
-    pub left_out: Vec<LeftOut>,
+    /// How the capture was divided, and which texture reads it lacks.
+    pub program: ProgramCapture,
 }
 
 /// Reasons why no trace was made.
@@ -154,16 +154,8 @@ pub fn drain<W: Write + Seek>(
     if drained.counts.quads == 0 {
         return Err(DrainError::Nothing);
     }
-    drained.left_out = builder.left_out();
-    let rule = drained.rule.map_or("", Rule::name);
-    let meta = meta(
-        session,
-        job,
-        &drained,
-        rule,
-        triangles,
-        builder.not_opaque(),
-    );
+    drained.program = program(session, job, drained.rule, builder.left_out());
+    let meta = meta(session, job, &drained, triangles, builder.not_opaque());
     let writer = builder.finish(meta)?;
     drained.draws = writer.tables().draws.len();
     drained.textures = writer.tables().textures.len();
@@ -223,27 +215,41 @@ fn merge(session: &Session, draws: &[Executed], views: &Views) -> Vec<Merged> {
     merged
 }
 
+/// How the capture was divided, and which texture reads it lacks.
+fn program(
+    session: &Session,
+    job: &Job<'_>,
+    rule: Option<Rule>,
+    left_out: Vec<LeftOut>,
+) -> ProgramCapture {
+    let frames_by = match job.frames_by {
+        FramesBy::Auto if session.by_waits => "waits for the device",
+        FramesBy::Auto | FramesBy::Present => "presents",
+        FramesBy::Readback => "readbacks",
+        FramesBy::Launcher => "the launcher",
+    };
+    let mut frames = job.frames.iter();
+    ProgramCapture {
+        cameras_known: frames.all(|frame| job.cameras.contains_key(frame)),
+        frames_by: frames_by.to_owned(),
+        views_by: rule.map_or("", Rule::name).to_owned(),
+        left_out,
+        unrecorded_reads: session.reads.of_frames(job.frames),
+    }
+}
+
 fn meta(
     session: &Session,
     job: &Job<'_>,
     drained: &Drained,
-    rule: &str,
     triangles: u64,
     not_opaque: Vec<[u32; 2]>,
 ) -> TraceMeta {
-    let cameras_known = job
-        .frames
-        .iter()
-        .all(|frame| job.cameras.contains_key(frame));
+    let cameras_known = drained.program.cameras_known;
     let first = job.frames.first().and_then(|frame| job.cameras.get(frame));
     let (fov, ipd_m) = match first.filter(|_| cameras_known) {
         Some(eyes) => (eyes.map(|eye| fov(&eye)), distance_m(eyes)),
         None => ([PLACEHOLDER_FOV; 2], 0.0),
-    };
-    let frames_by = match job.frames_by {
-        FramesBy::Auto | FramesBy::Present => "presents",
-        FramesBy::Readback => "readbacks",
-        FramesBy::Launcher => "the launcher",
     };
     TraceMeta {
         tool: job.tool.clone(),
@@ -274,12 +280,7 @@ fn meta(
         }),
         origin_m: [0.0; 3],
         techniques: None,
-        program: Some(ProgramCapture {
-            cameras_known,
-            frames_by: frames_by.to_owned(),
-            views_by: rule.to_owned(),
-            left_out: drained.left_out.clone(),
-        }),
+        program: Some(drained.program.clone()),
     }
 }
 

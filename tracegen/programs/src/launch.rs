@@ -1,9 +1,9 @@
 //! Sets up the environment in which programs run with the layer.
 
+use crate::loader;
 use formats::container::ScratchFolder;
 use parallax_layer::control::Control;
-use parallax_layer::spool::{FOLDER_VARIABLE, LAYER_NAME, Settings};
-use std::ffi::OsString;
+use parallax_layer::spool::Settings;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -28,13 +28,18 @@ pub enum LaunchError {
         "no Vulkan driver file of lavapipe was found; install mesa-vulkan-drivers, or name one by VK_DRIVER_FILES"
     )]
     NoDriver,
+    /// An environment variable names no driver.
+    #[error("{variable}={value}: expected a Vulkan driver file or a folder with one, found none")]
+    DriverFiles {
+        /// The variable.
+        variable: &'static str,
+        /// Its value.
+        value: String,
+    },
 }
 
 /// File name of the layer's library.
 const LIBRARY: &str = "libparallax_layer.so";
-/// File that registers the layer with the loader.
-const MANIFEST: &str = "parallax_layer.json";
-
 /// Folders in which drivers register with the loader.
 const DRIVER_FOLDERS: [&str; 3] = [
     "/usr/share/vulkan/icd.d",
@@ -59,16 +64,15 @@ impl Launch {
     /// The layer or the driver is missing, or the folder cannot be written.
     pub fn new(parent: &Path, tool: &Path, settings: &Settings) -> Result<Self, LaunchError> {
         let library = library(tool)?;
-        let driver =
-            match std::env::var_os("VK_DRIVER_FILES").or(std::env::var_os("VK_ICD_FILENAMES")) {
-                Some(_) => None,
-                None => Some(lavapipe().ok_or(LaunchError::NoDriver)?),
-            };
+        let driver = match loader::driver_of_user()? {
+            Some(_) => None,
+            None => Some(lavapipe().ok_or(LaunchError::NoDriver)?),
+        };
         let set_up = || {
-            let folder = ScratchFolder::create_in(parent)?;
+            let folder = loader::folder_in(parent)?;
             settings.save(folder.path())?;
             let control = Control::create(folder.path())?;
-            fs::write(folder.path().join(MANIFEST), manifest(&library))?;
+            loader::register(folder.path(), &library)?;
             Ok((folder, control))
         };
         let (folder, control) = set_up().map_err(|source| LaunchError::Folder {
@@ -98,24 +102,13 @@ impl Launch {
     /// Makes a program use lavapipe, without the layer.
     pub fn prepare_driver(&self, command: &mut Command) {
         if let Some(driver) = &self.driver {
-            command
-                .env("VK_DRIVER_FILES", driver)
-                .env("VK_ICD_FILENAMES", driver);
+            loader::choose_driver(command, driver);
         }
     }
 
     /// Makes a program use the layer, and Mesa's zink for OpenGL if requested.
     pub fn prepare(&self, command: &mut Command, opengl: bool) {
-        command
-            .env(FOLDER_VARIABLE, self.folder())
-            .env(
-                "VK_INSTANCE_LAYERS",
-                prepended("VK_INSTANCE_LAYERS", LAYER_NAME.into()),
-            )
-            .env(
-                "VK_LAYER_PATH",
-                prepended("VK_LAYER_PATH", self.folder().into()),
-            );
+        loader::announce(command, self.folder());
         self.prepare_driver(command);
         if opengl {
             command
@@ -125,16 +118,6 @@ impl Launch {
                 .env("LIBGL_ALWAYS_SOFTWARE", "1");
         }
     }
-}
-
-/// Value of a variable with a list, after an entry is prepended.
-fn prepended(variable: &str, entry: OsString) -> OsString {
-    let mut list = entry;
-    if let Some(old) = std::env::var_os(variable).filter(|old| !old.is_empty()) {
-        list.push(":");
-        list.push(old);
-    }
-    list
 }
 
 /// Finds the layer's library next to a program or among Cargo's build outputs, which may be newer.
@@ -165,29 +148,6 @@ fn lavapipe() -> Option<PathBuf> {
         .collect();
     found.sort();
     found.into_iter().next()
-}
-
-fn manifest(library: &Path) -> String {
-    // Escape the path for JSON.
-    let library = library
-        .display()
-        .to_string()
-        .replace('\\', "\\\\")
-        .replace('"', "\\\"");
-    format!(
-        r#"{{
-  "file_format_version": "1.1.2",
-  "layer": {{
-    "name": "{LAYER_NAME}",
-    "type": "GLOBAL",
-    "library_path": "{library}",
-    "api_version": "1.3.0",
-    "implementation_version": "1",
-    "description": "Records the texture samples of a program"
-  }}
-}}
-"#
-    )
 }
 
 #[cfg(test)]

@@ -13,13 +13,17 @@ mod groups;
 mod lanes;
 mod launch;
 pub mod list;
+mod loader;
 mod pairs;
+mod reads;
 mod session;
 mod texture;
 mod views;
+mod watch;
 
 pub use check::{Check, Difference, check};
 pub use drain::{DrainError, Drained, Job, drain};
 pub use launch::{Launch, LaunchError};
 pub use session::{Executed, ProgramFrame, Session, SessionError};
 pub use views::{FileError, Other, Role, Rule, RuleFile, View, Views, ViewsError, Wanted};
+pub use watch::Watch;

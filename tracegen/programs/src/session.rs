@@ -1,8 +1,10 @@
 //! Frames, render passes and draws of a captured program.
 
+use crate::reads::Reads;
 use parallax_layer::inject::{Form, RawSample, Site, What};
 use parallax_layer::spool::{
-    DrawInfo, Event, ImageInfo, PassInfo, Process, ReadError, Reader, ShaderInfo, Span,
+    DispatchInfo, DrawInfo, Event, ImageInfo, PassInfo, Process, ReadError, Reader, ShaderInfo,
+    Span,
 };
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
@@ -15,9 +17,7 @@ pub enum SessionError {
     #[error(transparent)]
     Read(#[from] ReadError),
     /// The program did not load the layer.
-    #[error(
-        "{0} never used Vulkan through the layer: is it a program of Vulkan, or of OpenGL on zink (--gl)?"
-    )]
+    #[error("{0} never used Vulkan through the layer")]
     NoProcess(String),
     /// The program opened no device.
     #[error("{0} opened no Vulkan device")]
@@ -32,7 +32,7 @@ pub enum SessionError {
     },
     /// None of the requested frames was rendered.
     #[error(
-        "{program}: frames {first} to {last} were asked for, and it ended {counted} frames (--frames, --frames-by); {ended}"
+        "{program}: frames {first} to {last} were asked for, and it ended {counted} frames (--frames, --frames-by)"
     )]
     TooFew {
         /// Name of the program.
@@ -43,8 +43,6 @@ pub enum SessionError {
         last: u32,
         /// Number of frames that the program ended.
         counted: u32,
-        /// How the program ended.
-        ended: String,
     },
     /// A frame without draws.
     #[error(
@@ -114,6 +112,12 @@ pub struct Session {
     pub frames: BTreeMap<u32, ProgramFrame>,
     /// Microseconds of each frame that was not recorded.
     pub before_us: Vec<u64>,
+    /// Texture reads that are not recorded.
+    pub reads: Reads,
+    /// Whether the program's waits separate its frames.
+    pub by_waits: bool,
+    /// Number of frames that ended, up to the last requested one.
+    pub ended: u32,
     draws: HashMap<u32, DrawInfo>,
     passes: HashMap<u32, PassInfo>,
     images: HashMap<u32, ImageInfo>,
@@ -137,7 +141,12 @@ impl Session {
             process: Some(process.clone()),
             ..Self::default()
         };
-        for event in process.events()? {
+        let events = process.events()?;
+        let is_frame = |event: &Event| matches!(event, Event::Frame { .. });
+        let is_wait = |event: &Event| matches!(event, Event::Waited { .. });
+        // Presents or readbacks separate the frames of a program that has any.
+        session.by_waits = events.iter().any(is_wait) && !events.iter().any(is_frame);
+        for event in events {
             session.take(event);
         }
         Ok(session)
@@ -192,21 +201,57 @@ impl Session {
             Event::Draw(draw) => drop(self.draws.insert(draw.draw, draw)),
             Event::Submit {
                 frame,
+                frame_by_waits,
                 draws,
                 records,
                 lost_bytes,
                 occlusion,
+                dispatches,
             } => {
+                let Some(frame) = (if self.by_waits {
+                    frame_by_waits
+                } else {
+                    Some(frame)
+                }) else {
+                    return;
+                };
+                self.count_reads(frame, &draws, &dispatches);
+                if draws.is_empty() {
+                    return;
+                }
                 self.submission(frame, &draws, &occlusion.into_iter().collect(), records);
                 self.frames.entry(frame).or_default().lost_bytes += lost_bytes;
             }
-            Event::Frame { frame, took_us } => match self.frames.get_mut(&frame) {
-                Some(of) => (of.ended, of.took_us) = (true, took_us),
-                None => self.before_us.push(took_us),
-            },
+            Event::Frame { frame, took_us } => self.end_frame(frame, took_us),
+            Event::Waited { frame, took_us } => {
+                if self.by_waits {
+                    self.end_frame(frame, took_us);
+                }
+            }
             Event::Picture { pass, size } => drop(self.pictures.insert(pass, size)),
             Event::Trouble { what } => self.troubles.push(what),
             Event::Closed => {}
+        }
+    }
+
+    fn end_frame(&mut self, frame: u32, took_us: u64) {
+        self.ended += 1;
+        match self.frames.get_mut(&frame) {
+            Some(of) => (of.ended, of.took_us) = (true, took_us),
+            None => self.before_us.push(took_us),
+        }
+    }
+
+    /// Counts the texture reads of a submission that are not recorded.
+    fn count_reads(&mut self, frame: u32, draws: &[[u32; 2]], dispatches: &[DispatchInfo]) {
+        for [draw, pass] in draws {
+            let views = self.passes.get(pass).map_or(0, |of| of.view_mask);
+            if let Some(draw) = self.draws.get(draw) {
+                self.reads.draw(frame, draw, views.count_ones().max(1));
+            }
+        }
+        for dispatch in dispatches {
+            self.reads.dispatch(frame, dispatch);
         }
     }
 
@@ -362,6 +407,8 @@ mod tests {
             records: Span::default(),
             lost_bytes: 0,
             occlusion: Vec::new(),
+            frame_by_waits: None,
+            dispatches: Vec::new(),
         });
     }
 

@@ -1,13 +1,14 @@
 //! `tracegen app`.
 
 use super::choice::choice;
+use super::failed_run::{FailedRun, Tail, file_of};
 use super::program_args::{ProgramArgs, note_frame_times};
 use anyhow::{Context, anyhow, bail, ensure};
 use clap::Args;
 use clap::builder::TypedValueParser;
 use parallax_layer::spool::FramesBy;
-use programs::{Launch, Session, SessionError};
-use shell::{Ended, run_child_until, warn};
+use programs::{Launch, Session, SessionError, Watch};
+use shell::{run_child_until, warn};
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
@@ -75,9 +76,9 @@ pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
     let tool = std::env::current_exe().context("cannot find this program's own file")?;
     let launch = Launch::new(&std::env::temp_dir(), &tool, &settings)?;
     let program = args.name()?;
-    let ended = run_program(args, &launch, &program)?;
+    let run = run_program(args, &launch, &program)?;
     let mut session = Session::of_capture(launch.folder(), &program)
-        .map_err(|error| with_replay_error(error, &launch))?;
+        .map_err(|error| with_replay_error(error, &run, &launch))?;
     let milliseconds = |us: u64| us as f64 / 1e3;
     let wanted = args.capture.frames.clone();
     let is_complete = |frame: u32| session.frames.get(&frame).is_some_and(|frame| frame.ended);
@@ -86,15 +87,15 @@ pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
             program,
             first: wanted.start,
             last: wanted.end - 1,
-            counted: launch.control.counted(),
-            ended: how_it_ended(&ended),
+            counted: launch.control.counted().max(session.ended),
         };
-        return Err(with_replay_error(error, &launch));
+        return Err(with_replay_error(error, &run, &launch));
     }
     let before: Vec<f64> = (session.before_us.iter().copied())
         .map(milliseconds)
         .collect();
     let captured: Vec<f64> = (session.frames.values())
+        .filter(|frame| wanted.contains(&frame.frame))
         .map(|frame| milliseconds(frame.took_us))
         .collect();
     note_frame_times(&before, &captured);
@@ -147,18 +148,23 @@ impl AppArgs {
 }
 
 /// Runs the program until it has rendered its frames or ends.
-fn run_program(args: &AppArgs, launch: &Launch, program: &str) -> anyhow::Result<Ended> {
+fn run_program(args: &AppArgs, launch: &Launch, program: &str) -> anyhow::Result<FailedRun> {
     let mut command = args.command();
     launch.prepare(&mut command, args.gl || args.apitrace.is_some());
+    let mut tail = None;
     if args.apitrace.is_some() {
         // A replay that is terminated prints its call stack.
         let log = File::create(launch.folder().join(REPLAY_LOG));
         command.stderr(log.context("cannot write the log of the replay")?);
+    } else {
+        tail = Some(Tail::of(&mut command).context("cannot make a pipe")?);
     }
+    let mut watch = Watch::default();
     let wanted = args.capture.frames.len() as u32;
     let deadline = Instant::now() + Duration::from_secs(args.timeout);
     let mut late = false;
     let ended = run_child_until(&mut command, || {
+        watch.look();
         late = Instant::now() >= deadline;
         late || (!args.to_end && launch.control.ended() >= wanted)
     });
@@ -175,23 +181,24 @@ fn run_program(args: &AppArgs, launch: &Launch, program: &str) -> anyhow::Result
             args.timeout
         ));
     }
-    Ok(ended)
+    let file = file_of(Path::new(command.get_program()));
+    drop(command);
+    Ok(FailedRun {
+        ended,
+        watch,
+        lines: tail.map(|tail| tail.lines()).unwrap_or_default(),
+        file,
+        opengl: args.gl || args.apitrace.is_some(),
+    })
 }
 
-/// Adds the first error of the replay of a file.
-fn with_replay_error(error: SessionError, launch: &Launch) -> anyhow::Error {
+/// Adds what is known about the run, and the first error of the replay of a file.
+fn with_replay_error(error: SessionError, run: &FailedRun, launch: &Launch) -> anyhow::Error {
+    let error = run.explain(&error);
     let log = std::fs::read(launch.folder().join(REPLAY_LOG)).unwrap_or_default();
     let log = String::from_utf8_lossy(&log);
     match log.lines().find(|line| line.contains("error")) {
         Some(line) => anyhow!("{error}; {REPLAYER}: {}", line.trim()),
-        None => error.into(),
-    }
-}
-
-fn how_it_ended(ended: &Ended) -> String {
-    match (ended.stopped, ended.status.code()) {
-        (true, _) => "it was asked to end".to_owned(),
-        (false, Some(code)) => format!("it ended with exit code {code}"),
-        (false, None) => format!("it ended by {}", ended.status),
+        None => error,
     }
 }

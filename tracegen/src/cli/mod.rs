@@ -4,6 +4,7 @@ pub mod app;
 mod cache_args;
 mod capture_steps;
 mod choice;
+mod failed_run;
 pub mod lens_args;
 mod light_args;
 mod objective_args;

@@ -260,15 +260,8 @@ fn report(session: &Session, drained: &Drained, bytes: u64) {
             counts.not_finite
         ));
     }
-    for left_out in &drained.left_out {
-        let fragments = match left_out.fragments {
-            0 => String::new(),
-            some => format!(", {some} fragments"),
-        };
-        note(&format!(
-            "not in the trace, or less exactly: {} ({} draws{fragments})",
-            left_out.what, left_out.draws
-        ));
+    for notice in drained.program.notices() {
+        note(&notice);
     }
     note(&format!("driver: {}", session.driver));
 }

@@ -66,6 +66,7 @@ pub(super) fn slug(title: &str) -> String {
 /// The whole page.
 #[must_use]
 pub fn page(title: &str, answer: &Answer, sections: &[Section]) -> String {
+    let notices = crate::notices::printed();
     html! {
         (DOCTYPE)
         html lang="en" {
@@ -82,6 +83,7 @@ pub fn page(title: &str, answer: &Answer, sections: &[Section]) -> String {
                     @if !answer.sentences.is_empty() { p.answer { (answer.sentences.join(" ")) } }
                     (answer.chart)
                     div.lead { (answer.about) }
+                    @if !notices.is_empty() { ul { @for notice in &notices { li { (notice) } } } }
                 }
                 nav aria-label="Contents" {
                     ol { @for s in sections { li { a href={ "#" (s.id) } { (s.title) } } } }

@@ -57,6 +57,10 @@ pub(super) unsafe extern "system" fn cmd_bind_pipeline(
                 bound = twin.handle;
             }
             state.bind(pipeline, of);
+        } else if point == vk::PipelineBindPoint::COMPUTE {
+            let tracker = &mut *known.tracker();
+            let of = tracker.pipelines.compute(pipeline);
+            tracker.commands.get_mut(buffer.as_raw()).compute = of;
         }
         (known.next.cmd_bind_pipeline)(buffer, point, bound);
     }
@@ -139,9 +143,17 @@ setters! {
     cmd_set_color_write_enable(count: u32, enables: *const vk::Bool32) cmd_set_color_write_enable |state|
         state.dynamic.color_enables = Some(slice(enables, count).to_vec());
     cmd_copy_image_to_buffer(image: vk::Image, layout: vk::ImageLayout, to: vk::Buffer, count: u32, regions: *const vk::BufferImageCopy) cmd_copy_image_to_buffer |state|
-        state.reads_back = true;
+        state.effects.reads_back = true;
     cmd_copy_image_to_buffer2(info: *const vk::CopyImageToBufferInfo2<'_>) cmd_copy_image_to_buffer2 |state|
-        state.reads_back = true;
+        state.effects.reads_back = true;
+    cmd_set_event(event: vk::Event, stages: vk::PipelineStageFlags) cmd_set_event |state|
+        state.effects.set_event(event);
+    cmd_set_event2(event: vk::Event, info: *const vk::DependencyInfo<'_>) cmd_set_event2 |state|
+        state.effects.set_event(event);
+    cmd_wait_events(count: u32, events: *const vk::Event, from: vk::PipelineStageFlags, to: vk::PipelineStageFlags, memory_count: u32, memory: *const vk::MemoryBarrier<'_>, buffer_count: u32, buffers: *const vk::BufferMemoryBarrier<'_>, image_count: u32, images: *const vk::ImageMemoryBarrier<'_>) cmd_wait_events |state|
+        state.effects.await_events(slice(events, count));
+    cmd_wait_events2(count: u32, events: *const vk::Event, infos: *const vk::DependencyInfo<'_>) cmd_wait_events2 |state|
+        state.effects.await_events(slice(events, count));
     cmd_begin_query(pool: vk::QueryPool, query: u32, flags: vk::QueryControlFlags) cmd_begin_query |state|
         state.active_queries += 1;
     cmd_end_query(pool: vk::QueryPool, query: u32) cmd_end_query |state|
@@ -154,4 +166,33 @@ setters! {
         state.active_queries += 1;
     cmd_end_transform_feedback(first: u32, count: u32, buffers: *const vk::Buffer, offsets: *const vk::DeviceSize) cmd_end_transform_feedback |state|
         state.active_queries = state.active_queries.saturating_sub(1);
+}
+
+/// Hooks of commands that write an image: the image and the next function. A write to an image whose texels the
+/// host can read in memory is a readback.
+macro_rules! image_writers {
+    ($($hook:ident ($($argument:ident: $kind:ty),*) $to:expr;)*) => { $(
+        pub(super) unsafe extern "system" fn $hook(buffer: vk::CommandBuffer, $($argument: $kind),*) {
+            // SAFETY: a valid call of the command.
+            unsafe {
+                let known = Device::of(buffer);
+                {
+                    let tracker = &mut *known.tracker();
+                    if tracker.images.is_linear($to) {
+                        tracker.commands.get_mut(buffer.as_raw()).effects.reads_back = true;
+                    }
+                }
+                (known.next.$hook)(buffer, $($argument),*);
+            }
+        }
+    )* };
+}
+
+image_writers! {
+    cmd_copy_image(from: vk::Image, from_layout: vk::ImageLayout, to: vk::Image, to_layout: vk::ImageLayout, count: u32, regions: *const vk::ImageCopy) to;
+    cmd_copy_image2(info: *const vk::CopyImageInfo2<'_>) (*info).dst_image;
+    cmd_blit_image(from: vk::Image, from_layout: vk::ImageLayout, to: vk::Image, to_layout: vk::ImageLayout, count: u32, regions: *const vk::ImageBlit, filter: vk::Filter) to;
+    cmd_blit_image2(info: *const vk::BlitImageInfo2<'_>) (*info).dst_image;
+    cmd_resolve_image(from: vk::Image, from_layout: vk::ImageLayout, to: vk::Image, to_layout: vk::ImageLayout, count: u32, regions: *const vk::ImageResolve) to;
+    cmd_resolve_image2(info: *const vk::ResolveImageInfo2<'_>) (*info).dst_image;
 }

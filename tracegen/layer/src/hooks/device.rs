@@ -4,6 +4,7 @@ use super::api::{DeviceLink, take_link};
 use super::dispatch_key;
 use super::instance::{Instance, draw_number_offset};
 use super::next::Next;
+use super::pending::{Pending, read_ended};
 use super::pictures::Pictures;
 use super::queries::Queries;
 use crate::capture::{Capture, capture, lock};
@@ -16,6 +17,7 @@ use std::collections::HashMap;
 use std::ffi::CStr;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, LazyLock, Mutex, MutexGuard, RwLock};
+use std::time::Duration;
 
 /// Size of the part of the file of records that is allocated in advance for each requested frame.
 const RESERVED_BYTES_PER_FRAME: u64 = 64 << 20;
@@ -33,8 +35,8 @@ pub(super) struct Device {
     pub queries: Option<Queries>,
     pub pictures: Option<Pictures>,
     tracker: Mutex<Tracker>,
-    /// Held while commands of requested frames are executed.
-    pub submitting: Mutex<()>,
+    /// Submissions of requested frames; locked while commands of such frames are submitted.
+    pub pending: Mutex<Pending>,
     /// Creation parameters of the program's swapchains.
     pub swapchains: Mutex<HashMap<u64, vk::SwapchainCreateInfoKHR<'static>>>,
 }
@@ -83,6 +85,9 @@ static DEVICES: LazyLock<RwLock<HashMap<usize, Arc<Device>>>> = LazyLock::new(Rw
 /// Smallest number of lanes in a subgroup at which ballots are reliable. With narrower vectors, ballots of
 /// Mesa 22.3 corrupt memory.
 const SUBGROUP_LANES: u32 = 8;
+
+/// Timeout for pending submissions when a device is destroyed, at which all commands must have ended.
+const DESTROY_TIMEOUT: Duration = Duration::from_secs(1);
 
 impl Device {
     /// The device of a dispatchable handle.
@@ -259,7 +264,7 @@ unsafe fn track(
         queries,
         tracker: Mutex::new(Tracker::of_device(NUMBER.fetch_add(1, Ordering::Relaxed))),
         pictures: (capture.settings.pictures && is_lavapipe).then(Pictures::default),
-        submitting: Mutex::default(),
+        pending: Mutex::default(),
         swapchains: Mutex::default(),
     }
 }
@@ -276,6 +281,13 @@ pub(super) unsafe extern "system" fn destroy_device(
         let key = dispatch_key(device);
         let removed = DEVICES.write().ok().and_then(|mut all| all.remove(&key));
         if let Some(known) = removed {
+            if !read_ended(&known, &mut lock(&known.pending), DESTROY_TIMEOUT) {
+                let what =
+                    "commands of a requested frame had not ended when the device was destroyed";
+                known.capture.event(&Event::Trouble {
+                    what: what.to_owned(),
+                });
+            }
             if let Some(queries) = &known.queries {
                 queries.destroy(device, &known.next);
             }

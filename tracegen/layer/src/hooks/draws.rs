@@ -2,14 +2,14 @@
 
 use super::api::slice;
 use super::device::Device;
-use crate::spool::OUTSIDE_SCENES;
+use crate::spool::{INDIRECT, OUTSIDE_SCENES};
 use crate::track::{Call, CommandState, Dynamic, Pipeline};
 use ash::vk::{self, Handle};
 use std::sync::Arc;
 
 /// Whether draws of a command buffer may belong to a requested frame. A command buffer that may be submitted
 /// several times can be executed in any later frame.
-fn is_wanted(known: &Device, state: &mut CommandState) -> bool {
+pub(super) fn is_wanted(known: &Device, state: &mut CommandState) -> bool {
     let capture = known.capture;
     let one_time = state.one_time();
     *(state.wanted)
@@ -207,8 +207,6 @@ unsafe fn restore(
 
 /// Caveat for a draw with several instances.
 const INSTANCES: &str = "instances share the numbers of primitives";
-/// Caveat for an indirect draw command, whose draws share one number.
-const INDIRECT: &str = "draws that the device chooses share a number";
 
 fn direct(vertices: u32, instances: u32) -> Call {
     let caveat = (instances > 1).then(|| INSTANCES.to_owned());

@@ -140,6 +140,9 @@ pub(super) unsafe extern "system" fn create_instance(
             asked.p_application_info = &application;
         }
         let result = create(&asked, allocator, instance);
+        if let Some(capture) = capture() {
+            capture.note_use();
+        }
         if result == vk::Result::SUCCESS {
             let handle = *instance;
             let named = |name: &CStr| get(handle, name.as_ptr());

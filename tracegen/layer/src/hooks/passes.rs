@@ -185,6 +185,7 @@ fn enter(tracker: &mut crate::track::Tracker, buffer: vk::CommandBuffer, open: O
         open.subpass,
     );
     let state = tracker.commands.get_mut(buffer.as_raw());
+    state.effects.renders = true;
     state.pass = Some(Arc::new(pass));
     state.open = Some(open);
 }
@@ -314,6 +315,7 @@ pub(super) unsafe extern "system" fn cmd_begin_rendering(
             // A suspended render pass continues.
             let resumes = info.flags.contains(vk::RenderingFlags::RESUMING);
             let state = tracker.commands.get_mut(buffer.as_raw());
+            state.effects.renders = true;
             if !resumes || state.pass.is_none() {
                 let (area, views) = (info.render_area, info.view_mask);
                 state.pass = Some(Arc::new(tracker.passes.info(colors, depth, area, views)));

@@ -5,6 +5,7 @@ use super::device::{Device, DeviceRecorder, RecordingShader};
 use super::libraries::{self, Link, Parts};
 use super::pipeline_state::{self, Changed};
 use super::recording_shaders::{recording_shader, without_module};
+use super::stage_reads;
 use crate::inject::{DepthTests, What};
 use crate::spool::ShaderInfo;
 use crate::track::{Library, Pipeline, Recorded, State};
@@ -57,6 +58,7 @@ pub(super) unsafe fn describe(
         let own = libraries::own_parts(info);
         let links = libraries::links(known, info);
         let mut state = pipeline_state::of(info, own);
+        state.reads = stage_reads::before_fragments(known, info, own);
         let mut parts = own;
         let mut layout = info.layout;
         for library in links.iter().filter_map(|(_, library)| library.as_ref()) {

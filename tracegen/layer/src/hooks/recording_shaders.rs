@@ -10,6 +10,29 @@ use std::ffi::CStr;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
+/// Words of a stage's module, and the name of its entry point.
+///
+/// # Safety
+/// A valid stage.
+pub(super) unsafe fn module_of(
+    known: &Device,
+    stage: &vk::PipelineShaderStageCreateInfo<'_>,
+) -> Result<(Arc<[u32]>, String), String> {
+    // SAFETY: as the caller promises.
+    unsafe {
+        let words = match known.tracker().pipelines.module(stage.module) {
+            Some(words) => words,
+            // The stage may contain its module.
+            None => match find::<vk::ShaderModuleCreateInfo<'_>>(stage.p_next) {
+                Some(inline) => slice(inline.p_code, (inline.code_size / 4) as u32).into(),
+                None => return Err("a shader whose module is not known".to_owned()),
+            },
+        };
+        let entry = CStr::from_ptr(stage.p_name);
+        Ok((words, entry.to_string_lossy().into_owned()))
+    }
+}
+
 /// The recording shader of a fragment stage.
 ///
 /// # Safety
@@ -21,18 +44,8 @@ pub(super) unsafe fn recording_shader(
     multiview: bool,
 ) -> Result<RecordingShader, String> {
     // SAFETY: as the caller promises.
-    let (words, entry) = unsafe {
-        let words = match known.tracker().pipelines.module(stage.module) {
-            Some(words) => words,
-            // The stage may contain its module.
-            None => match find::<vk::ShaderModuleCreateInfo<'_>>(stage.p_next) {
-                Some(inline) => slice(inline.p_code, (inline.code_size / 4) as u32).into(),
-                None => return Err("a shader whose module is not known".to_owned()),
-            },
-        };
-        (words, CStr::from_ptr(stage.p_name))
-    };
-    let key = (words, entry.to_string_lossy().into_owned(), multiview);
+    let (words, entry) = unsafe { module_of(known, stage) }?;
+    let key = (words, entry, multiview);
     if let Some(made) = lock(&recorder.shaders).get(&key) {
         return made.clone();
     }

@@ -1,13 +1,49 @@
-//! Hooks of queues. Records are read when the commands that wrote them have ended.
+//! Hooks of queues.
 
-use super::api::slice;
+use super::api::{find, slice};
 use super::device::Device;
 use super::draws::buffers_of;
+use super::pending::{Pending, Submission, fence_after, read_ended, wait_for};
 use crate::capture::lock;
-use crate::spool::{Event, Span};
-use crate::track::Executed;
+use crate::track::{Effects, Executed};
 use ash::vk::{self, Handle};
-use std::collections::HashSet;
+use std::collections::HashMap;
+use std::time::Duration;
+
+/// Command buffers of a call, and the semaphores that something outside the call must signal.
+struct Submitted {
+    buffers: Vec<vk::CommandBuffer>,
+    waits: Vec<(vk::Semaphore, u64)>,
+}
+
+/// Semaphores that a sequence of submissions waits for and does not signal itself, with their values.
+#[derive(Default)]
+struct Waits {
+    signalled: HashMap<vk::Semaphore, u64>,
+    open: Vec<(vk::Semaphore, u64)>,
+}
+
+impl Waits {
+    fn wait(&mut self, semaphore: vk::Semaphore, value: u64) {
+        let signalled = self.signalled.get(&semaphore);
+        if signalled.is_none_or(|signalled| *signalled < value) {
+            self.open.push((semaphore, value));
+        }
+    }
+
+    fn signal(&mut self, semaphore: vk::Semaphore, value: u64) {
+        let signalled = self.signalled.entry(semaphore).or_default();
+        *signalled = value.max(*signalled);
+    }
+}
+
+/// Values of the semaphores of a submission; none for binary semaphores.
+fn pairs<'a>(
+    semaphores: &'a [vk::Semaphore],
+    values: &'a [u64],
+) -> impl Iterator<Item = (vk::Semaphore, u64)> + 'a {
+    semaphores.iter().copied().zip(values.iter().copied())
+}
 
 pub(super) unsafe extern "system" fn queue_submit(
     queue: vk::Queue,
@@ -18,9 +54,30 @@ pub(super) unsafe extern "system" fn queue_submit(
     // SAFETY: a valid call of vkQueueSubmit.
     unsafe {
         let known = Device::of(queue);
-        let buffers = buffers_of(slice(submits, count));
+        let mut waits = Waits::default();
+        for info in slice(submits, count) {
+            let Some(values) = find::<vk::TimelineSemaphoreSubmitInfo<'_>>(info.p_next) else {
+                continue;
+            };
+            let waited = slice(info.p_wait_semaphores, info.wait_semaphore_count);
+            let of = slice(
+                values.p_wait_semaphore_values,
+                values.wait_semaphore_value_count,
+            );
+            pairs(waited, of).for_each(|(semaphore, value)| waits.wait(semaphore, value));
+            let signalled = slice(info.p_signal_semaphores, info.signal_semaphore_count);
+            let of = slice(
+                values.p_signal_semaphore_values,
+                values.signal_semaphore_value_count,
+            );
+            pairs(signalled, of).for_each(|(semaphore, value)| waits.signal(semaphore, value));
+        }
+        let submitted = Submitted {
+            buffers: buffers_of(slice(submits, count)),
+            waits: waits.open,
+        };
         let submit = || (known.next.queue_submit)(queue, count, submits, fence);
-        submit_and_read(&known, queue, &buffers, submit)
+        submit_and_read(&known, queue, &submitted, submit)
     }
 }
 
@@ -33,44 +90,60 @@ pub(super) unsafe extern "system" fn queue_submit2(
     // SAFETY: a valid call of vkQueueSubmit2.
     unsafe {
         let known = Device::of(queue);
-        let infos = slice(submits, count).iter();
-        let buffers = infos
-            .flat_map(|submit| {
-                slice(
-                    submit.p_command_buffer_infos,
-                    submit.command_buffer_info_count,
-                )
-            })
-            .map(|info| info.command_buffer);
-        let buffers: Vec<vk::CommandBuffer> = buffers.collect();
+        let (mut waits, mut buffers) = (Waits::default(), Vec::new());
+        for info in slice(submits, count) {
+            for of in slice(info.p_wait_semaphore_infos, info.wait_semaphore_info_count) {
+                waits.wait(of.semaphore, of.value);
+            }
+            for of in slice(
+                info.p_signal_semaphore_infos,
+                info.signal_semaphore_info_count,
+            ) {
+                waits.signal(of.semaphore, of.value);
+            }
+            let of = slice(info.p_command_buffer_infos, info.command_buffer_info_count);
+            buffers.extend(of.iter().map(|info| info.command_buffer));
+        }
+        let submitted = Submitted {
+            buffers,
+            waits: waits.open,
+        };
         let submit = || (known.next.queue_submit2)(queue, count, submits, fence);
-        submit_and_read(&known, queue, &buffers, submit)
+        submit_and_read(&known, queue, &submitted, submit)
     }
 }
 
-/// Submits commands. In a requested frame, waits for them and reads their records.
+/// Submits commands. In a requested frame, reads their records.
 ///
 /// # Safety
 /// A valid submission.
 unsafe fn submit_and_read(
     known: &Device,
     queue: vk::Queue,
-    buffers: &[vk::CommandBuffer],
+    submitted: &Submitted,
     submit: impl FnOnce() -> vk::Result,
 ) -> vk::Result {
+    let buffers = submitted.buffers.iter().map(|buffer| buffer.as_raw());
+    let effects = known.tracker().commands.effects(buffers);
+    let (renders, reads_back) = (effects.renders, effects.reads_back);
     // SAFETY: as the caller promises.
-    let result = unsafe { submit_frame(known, queue, buffers, submit) };
+    let result = unsafe { submit_frame(known, queue, submitted, effects, submit) };
     if result == vk::Result::SUCCESS {
-        let tracker = known.tracker();
-        let reads = |buffer: &vk::CommandBuffer| tracker.commands.reads_back(buffer.as_raw());
-        let reads_back = buffers.iter().any(reads);
-        drop(tracker);
+        if renders {
+            known.capture.note_rendering();
+        }
         if reads_back {
             known.capture.note_readback();
         }
     }
     result
 }
+
+/// Timeout for the commands of earlier frames when recording starts.
+const SETTLE_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Timeout for the commands of a submission of which the layer does not know that they wait for the host.
+const END_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Submits commands of the current frame.
 ///
@@ -79,168 +152,92 @@ unsafe fn submit_and_read(
 unsafe fn submit_frame(
     known: &Device,
     queue: vk::Queue,
-    buffers: &[vk::CommandBuffer],
+    submitted: &Submitted,
+    effects: Effects,
     submit: impl FnOnce() -> vk::Result,
 ) -> vk::Result {
     let capture = known.capture;
-    capture.note_frames();
-    let frame = capture.frame();
-    if !capture.wants(frame) {
-        // Reusable command buffers must not record outside requested frames.
-        if let Some(recorder) = known.recorder.as_ref().filter(|r| r.buffer.is_open()) {
-            // Another thread may have started a requested frame in the meantime, and its commands may still
-            // be executing.
-            let _alone = lock(&known.submitting);
-            if !capture.wants(capture.frame()) {
-                recorder.buffer.open(false);
-            }
-        }
-        return submit();
-    }
-    let items: Vec<Executed> = {
-        let tracker = known.tracker();
-        let items = buffers
-            .iter()
-            .flat_map(|b| tracker.commands.items(b.as_raw()));
-        items.cloned().collect()
-    };
-    if items.is_empty() {
-        return submit();
-    }
-    let _alone = lock(&known.submitting);
-    let numbers: Vec<u32> = items.iter().map(|item| item.draw.draw).collect();
+    let mut pending = lock(&known.pending);
     // SAFETY: a queue of the device. The draws are not being executed before they are submitted.
     unsafe {
+        read_ended(known, &mut pending, Duration::ZERO);
+        capture.note_frames();
+        let place = capture.place();
+        if !capture.wants(place) {
+            close(known, &pending);
+            drop(pending);
+            return submit();
+        }
+        let draws = draws_of(known, submitted);
+        if draws.is_empty() && effects.dispatches.is_empty() {
+            drop(pending);
+            return submit();
+        }
         if let Some(recorder) = known.recorder.as_ref().filter(|r| !r.buffer.is_open()) {
-            // Commands in flight belong to earlier frames.
-            let _ = (known.next.queue_wait_idle)(queue);
+            // Commands in flight belong to earlier frames. Those of command buffers that are submitted once
+            // do not record.
+            let mut fences: Vec<vk::Fence> = fence_after(known, queue).into_iter().collect();
+            wait_for(known, &mut fences, SETTLE_TIMEOUT);
             recorder.buffer.open(true);
         }
         if let Some(queries) = &known.queries {
+            let numbers: Vec<u32> = draws.iter().map(|item| item.draw.draw).collect();
             queries.reset(known.handle, &numbers, &known.next);
         }
+        let timeout = match pending.is_empty() && !waits_for_host(known, submitted, &effects) {
+            true => END_TIMEOUT,
+            false => Duration::ZERO,
+        };
         let result = submit();
-        if result != vk::Result::SUCCESS {
-            return result;
-        }
-        if wait(known, queue) {
-            write_records(known, frame, &items, &numbers);
-        } else {
-            if let Some(recorder) = &known.recorder {
-                recorder.buffer.open(false);
-            }
-            capture.event(&Event::Trouble {
-                what: format!(
-                    "commands of frame {frame} did not end within {WAIT_TIMEOUT_S} seconds"
-                ),
-            });
+        if result == vk::Result::SUCCESS {
+            let submission = Submission {
+                place,
+                draws,
+                dispatches: effects.dispatches,
+            };
+            pending.add(known, queue, submission);
+            read_ended(known, &mut pending, timeout);
         }
         result
     }
 }
 
-/// Timeout in seconds for the commands of a frame. Some commands wait for others that the program has not
-/// submitted yet.
-const WAIT_TIMEOUT_S: u64 = 60;
+/// Disables recording outside requested frames, because reusable command buffers must not record there. Pending
+/// submissions must still record.
+fn close(known: &Device, pending: &Pending) {
+    let recorder = known.recorder.as_ref().filter(|r| r.buffer.is_open());
+    if let Some(recorder) = recorder.filter(|_| pending.is_empty()) {
+        recorder.buffer.open(false);
+    }
+}
 
-/// Waits until all submitted commands of a queue have ended; returns false after the timeout.
+/// Draws of a submission in order of execution.
+fn draws_of(known: &Device, submitted: &Submitted) -> Vec<Executed> {
+    let tracker = known.tracker();
+    let buffers = submitted.buffers.iter();
+    let draws = buffers.flat_map(|buffer| tracker.commands.items(buffer.as_raw()));
+    draws.cloned().collect()
+}
+
+/// Whether commands cannot end before the host, or a later submission, signals a semaphore or sets an event.
 ///
 /// # Safety
-/// A queue of the device.
-unsafe fn wait(known: &Device, queue: vk::Queue) -> bool {
+/// A valid submission that has not been made. Earlier submissions have ended.
+unsafe fn waits_for_host(known: &Device, submitted: &Submitted, effects: &Effects) -> bool {
     let next = &known.next;
-    let mut fence = vk::Fence::null();
-    // SAFETY: as the caller promises. A fence that may still be signalled is not used again.
-    unsafe {
-        let info = vk::FenceCreateInfo::default();
-        let made = (next.create_fence)(known.handle, &info, std::ptr::null(), &mut fence);
-        if made != vk::Result::SUCCESS {
-            return (next.queue_wait_idle)(queue) == vk::Result::SUCCESS;
-        }
-        let submitted = (next.queue_submit)(queue, 0, std::ptr::null(), fence);
-        let done = submitted == vk::Result::SUCCESS
-            && (next.wait_for_fences)(
-                known.handle,
-                1,
-                &fence,
-                vk::TRUE,
-                WAIT_TIMEOUT_S * 1_000_000_000,
-            ) == vk::Result::SUCCESS;
-        if done {
-            (next.destroy_fence)(known.handle, fence, std::ptr::null());
-        }
-        done
-    }
-}
-
-/// Writes the records of executed draws.
-///
-/// # Safety
-/// The draws have been executed.
-unsafe fn write_records(known: &Device, frame: u32, items: &[Executed], numbers: &[u32]) {
-    let capture = known.capture;
-    describe(known, items);
-    // SAFETY: as the caller promises.
-    let occlusion = known
-        .queries
-        .as_ref()
-        .map_or_else(Vec::new, |queries| unsafe {
-            queries.results(known.handle, numbers, &known.next)
-        });
-    let (records, lost_bytes) = match &known.recorder {
-        Some(recorder) => recorder.buffer.take(|records, lost| {
-            let span = capture.write(|writer| writer.records(records));
-            (span.unwrap_or_default(), lost)
-        }),
-        None => (Span::default(), 0),
+    let is_open = |(semaphore, value): &(vk::Semaphore, u64)| {
+        let mut now = u64::MAX;
+        known.tracker().timelines.contains(semaphore)
+            // SAFETY: a live timeline semaphore.
+            && unsafe { (next.get_semaphore_counter_value)(known.handle, *semaphore, &mut now) }
+                == vk::Result::SUCCESS
+            && now < *value
     };
-    let draw = |item: &Executed| {
-        let pass = item.pass.as_ref().map_or(u32::MAX, |pass| pass.pass);
-        [item.draw.draw, pass]
+    // SAFETY: a live event.
+    let is_reset = |event: &vk::Event| unsafe {
+        (next.get_event_status)(known.handle, *event) == vk::Result::EVENT_RESET
     };
-    if let Some(pictures) = &known.pictures {
-        let passes: HashSet<u32> = items
-            .iter()
-            .filter_map(|i| Some(i.pass.as_ref()?.pass))
-            .collect();
-        // SAFETY: as the caller promises.
-        unsafe { pictures.write(known, &passes) };
-    }
-    capture.event(&Event::Submit {
-        frame,
-        draws: items.iter().map(draw).collect(),
-        records,
-        lost_bytes,
-        occlusion,
-    });
-}
-
-/// Describes draws, their render passes, shaders and images, each once.
-fn describe(known: &Device, items: &[Executed]) {
-    let capture = known.capture;
-    for item in items {
-        let draw = &item.draw;
-        let mut images: Vec<u32> = Vec::new();
-        if let Some(pass) = &item.pass {
-            images.extend(pass.colors.iter().chain(&pass.depth).map(|view| view.image));
-            capture.write(|w| w.describe("pass", pass.pass, || Event::Pass((**pass).clone())));
-        }
-        let views = draw.textures.iter().filter_map(|texture| texture.view);
-        images.extend(views.map(|view| view.image));
-        for image in images {
-            let info = known.tracker().images.numbered(image).cloned();
-            if let Some(info) = info {
-                capture.write(|w| w.describe("image", image, || Event::Image((*info).clone())));
-            }
-        }
-        if let Some(shader) = draw.shader {
-            let info = known.shader(shader);
-            if let Some(info) = info {
-                capture.write(|w| w.describe("shader", shader, || Event::Shader((*info).clone())));
-            }
-        }
-        capture.write(|w| w.describe("draw", draw.draw, || Event::Draw((**draw).clone())));
-    }
+    submitted.waits.iter().any(is_open) || effects.awaited().iter().any(is_reset)
 }
 
 pub(super) unsafe extern "system" fn queue_present(
@@ -253,5 +250,22 @@ pub(super) unsafe extern "system" fn queue_present(
         let result = (known.next.queue_present)(queue, info);
         known.capture.note_present();
         result
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_semaphores_that_the_call_does_not_signal_before_are_open() {
+        let [own, other] = [1, 2].map(vk::Semaphore::from_raw);
+        let mut waits = Waits::default();
+        waits.wait(other, 5);
+        waits.signal(own, 7);
+        waits.signal(own, 3);
+        waits.wait(own, 7);
+        waits.wait(own, 8);
+        assert_eq!(waits.open, [(other, 5), (own, 8)]);
     }
 }

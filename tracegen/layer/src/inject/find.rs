@@ -36,6 +36,9 @@ pub(super) fn find(shader: &Shader, instruction: &Instruction) -> Option<Found> 
         gradients: None,
         element: None,
     };
+    if opcode == Op::ImageTexelPointer {
+        return Some(left_out("atomics on storage images"));
+    }
     let Some(image_type) = image_type(shader, image) else {
         return Some(left_out("images of unknown type"));
     };
@@ -115,6 +118,11 @@ enum Kind {
     Other(&'static str),
 }
 
+/// Whether an instruction reads texels.
+pub(super) fn reads_texels(opcode: Op) -> bool {
+    kind(opcode).is_some()
+}
+
 fn kind(opcode: Op) -> Option<Kind> {
     use Op::{
         ImageDrefGather, ImageFetch, ImageGather, ImageRead, ImageSampleDrefExplicitLod,
@@ -122,7 +130,7 @@ fn kind(opcode: Op) -> Option<Kind> {
         ImageSampleProjDrefExplicitLod, ImageSampleProjDrefImplicitLod, ImageSampleProjExplicitLod,
         ImageSampleProjImplicitLod, ImageSparseDrefGather, ImageSparseFetch, ImageSparseGather,
         ImageSparseRead, ImageSparseSampleDrefExplicitLod, ImageSparseSampleDrefImplicitLod,
-        ImageSparseSampleExplicitLod, ImageSparseSampleImplicitLod,
+        ImageSparseSampleExplicitLod, ImageSparseSampleImplicitLod, ImageTexelPointer,
     };
     match opcode {
         ImageSampleImplicitLod
@@ -135,7 +143,7 @@ fn kind(opcode: Op) -> Option<Kind> {
         | ImageSampleProjDrefExplicitLod => Some(Kind::Known(Access::Sample)),
         ImageGather | ImageDrefGather => Some(Kind::Known(Access::Gather)),
         ImageFetch => Some(Kind::Known(Access::Fetch)),
-        ImageRead => Some(Kind::Other("storage images")),
+        ImageRead | ImageTexelPointer => Some(Kind::Other("storage images")),
         ImageSparseSampleImplicitLod
         | ImageSparseSampleExplicitLod
         | ImageSparseSampleDrefImplicitLod

@@ -11,6 +11,7 @@ mod find;
 mod flow;
 mod functions;
 mod numbers;
+mod reads;
 mod recorder;
 mod rewrite;
 mod shader;
@@ -19,6 +20,7 @@ mod sites;
 mod writer;
 
 pub use buffer::{COUNTER_BYTES, RawFragment, RawQuad, RawSample, UNIT_BYTES, Unit, unpack};
+pub use reads::{texel_reads, workgroup_size};
 pub use site::{Access, Binding, Form, Lod, Shape, Site, TextureSite, What};
 
 use rspirv::spirv::{BuiltIn, ExecutionMode, Op, StorageClass};

@@ -6,7 +6,7 @@ use rspirv::spirv::{BuiltIn, Decoration, ExecutionMode, ExecutionModel, Op, Stor
 use std::cell::Cell;
 use std::collections::{HashMap, HashSet};
 
-/// A fragment shader in its module.
+/// A shader in its module.
 pub(super) struct Shader {
     pub module: Module,
     /// Index of its entry point in the module.
@@ -37,6 +37,15 @@ const MOST_WORDS: usize = 1 << 22;
 impl Shader {
     /// Parses a module and finds its fragment entry point `name`, or its only one.
     pub fn parse(words: &[u32], name: Option<&str>) -> Result<Self, InjectError> {
+        Self::parse_stage(words, name, ExecutionModel::Fragment)
+    }
+
+    /// Parses a module and finds its entry point `name` of a stage, or its only one.
+    pub fn parse_stage(
+        words: &[u32],
+        name: Option<&str>,
+        stage: ExecutionModel,
+    ) -> Result<Self, InjectError> {
         if words.len() > MOST_WORDS {
             return Err(InjectError::TooLarge(words.len()));
         }
@@ -48,7 +57,7 @@ impl Shader {
                 Some(Operand::LiteralString(found)) => name.is_none_or(|name| name == found),
                 _ => false,
             };
-            let model = Some(&Operand::ExecutionModel(ExecutionModel::Fragment));
+            let model = Some(&Operand::ExecutionModel(stage));
             of_name && entry.operands.first() == model
         };
         let entry =

@@ -19,6 +19,8 @@ pub const FOLDER_VARIABLE: &str = "PARALLAX_CAPTURE_FOLDER";
 pub const LAYER_NAME: &str = "VK_LAYER_PARALLAX_capture";
 /// Reason why a draw outside the pictures of scenes was not recorded; see [`Settings::all_draws`].
 pub const OUTSIDE_SCENES: &str = "no depth test, and outside the pictures of scenes (--all-draws)";
+/// Caveat of an indirect draw command, whose draws share one number.
+pub const INDIRECT: &str = "draws that the device chooses share a number";
 /// File of [`Settings`] in the folder.
 const SETTINGS_FILE: &str = "settings.json";
 /// Extensions of a process's files.
@@ -53,7 +55,7 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FramesBy {
-    /// Presents, or readbacks if the program has no swapchain.
+    /// Presents; readbacks if the program has no swapchain; waits for rendering if it does not read back either.
     Auto,
     /// A frame ends when the program presents an image of a swapchain.
     Present,
@@ -125,6 +127,9 @@ pub enum Event {
     Submit {
         /// Frame.
         frame: u32,
+        /// Frame if the program's waits separate frames.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        frame_by_waits: Option<u32>,
         /// Number and render pass of each draw, in order of execution.
         draws: Vec<[u32; 2]>,
         /// The records of these draws in the file of records.
@@ -133,6 +138,9 @@ pub enum Event {
         lost_bytes: u64,
         /// Samples counted by the occlusion query of each draw: number of the draw, and count.
         occlusion: Vec<(u32, u64)>,
+        /// Dispatches whose shaders read textures.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        dispatches: Vec<DispatchInfo>,
     },
     /// The small picture of a render pass. Its texels are in the file `PASS.rgba` next to the records, row by
     /// row.
@@ -144,6 +152,13 @@ pub enum Event {
     },
     /// A frame ended.
     Frame {
+        /// Its number.
+        frame: u32,
+        /// Microseconds since the end of the previous frame.
+        took_us: u64,
+    },
+    /// A frame ended, if the program's waits separate frames.
+    Waited {
         /// Its number.
         frame: u32,
         /// Microseconds since the end of the previous frame.
@@ -261,6 +276,28 @@ pub struct TextureInfo {
     pub sampler: Option<SamplerInfo>,
 }
 
+/// Image instructions of a shader that are not recorded, for one kind of texture.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct StageReads {
+    /// Name of the stage.
+    pub stage: String,
+    /// Kind of texture.
+    pub what: String,
+    /// Number of instructions.
+    pub instructions: u32,
+}
+
+/// A dispatch whose shader reads textures.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DispatchInfo {
+    /// Number of workgroups in each direction; `None` if the device chose it.
+    pub groups: Option<[u32; 3]>,
+    /// Size of a workgroup.
+    pub workgroup: [u32; 3],
+    /// Texture reads of its shader.
+    pub reads: Vec<StageReads>,
+}
+
 /// Depth test of a draw.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct DepthInfo {
@@ -309,6 +346,9 @@ pub struct DrawInfo {
     pub caveats: Vec<String>,
     /// Textures that its shader may read.
     pub textures: Vec<TextureInfo>,
+    /// Texture reads of the shaders before its fragment shader.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reads: Vec<StageReads>,
 }
 
 #[cfg(test)]

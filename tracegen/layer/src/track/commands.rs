@@ -1,10 +1,10 @@
 //! Command buffers: bound objects, and recorded draws.
 
 use super::descriptors::SetState;
-use super::pipelines::Pipeline;
-use crate::spool::{DrawInfo, PassInfo, TextureInfo};
+use super::pipelines::{Compute, Pipeline};
+use crate::spool::{DispatchInfo, DrawInfo, PassInfo, TextureInfo};
 use ash::vk;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// Maximum number of bound descriptor sets.
@@ -63,6 +63,49 @@ pub struct Dynamic {
     pub color_enables: Option<Vec<vk::Bool32>>,
 }
 
+/// What the commands of a command buffer do besides its draws.
+#[derive(Clone, Debug, Default)]
+pub struct Effects {
+    /// Whether it begins a render pass.
+    pub renders: bool,
+    /// Whether it copies an image to memory that the host reads.
+    pub reads_back: bool,
+    /// Dispatches whose shaders read textures.
+    pub dispatches: Vec<DispatchInfo>,
+    /// Events that it waits for and does not set before.
+    awaited: Vec<vk::Event>,
+    /// Events that it sets.
+    set: HashSet<vk::Event>,
+}
+
+impl Effects {
+    /// Notes that the next commands wait for events.
+    pub fn await_events(&mut self, events: &[vk::Event]) {
+        let others = events.iter().filter(|event| !self.set.contains(event));
+        self.awaited.extend(others);
+    }
+
+    /// Notes that a command sets an event.
+    pub fn set_event(&mut self, event: vk::Event) {
+        self.set.insert(event);
+    }
+
+    /// Events that something else must set before all commands can end.
+    #[must_use]
+    pub fn awaited(&self) -> &[vk::Event] {
+        &self.awaited
+    }
+
+    /// Appends the effects of commands that are executed later.
+    pub fn append(&mut self, later: &Self) {
+        self.renders |= later.renders;
+        self.reads_back |= later.reads_back;
+        self.dispatches.extend_from_slice(&later.dispatches);
+        self.await_events(&later.awaited);
+        self.set.extend(&later.set);
+    }
+}
+
 /// State of a command buffer under recording.
 #[derive(Debug)]
 pub struct CommandState {
@@ -80,11 +123,13 @@ pub struct CommandState {
     pub open: Option<OpenPass>,
     /// Number of active queries and transform feedbacks of the program.
     pub active_queries: u32,
-    /// Whether it copies an image to a buffer.
-    pub reads_back: bool,
+    /// What its commands do besides draws.
+    pub effects: Effects,
     /// Whether its draws may belong to a requested frame; decided once, at its first pipeline or draw. The
     /// frame may change while it is recorded.
     pub wanted: Option<bool>,
+    /// The bound compute pipeline, if its shader reads textures.
+    pub compute: Option<Arc<Compute>>,
     items: Vec<Executed>,
 }
 
@@ -115,8 +160,9 @@ impl CommandState {
             pass: None,
             open: None,
             active_queries: 0,
-            reads_back: false,
+            effects: Effects::default(),
             wanted: None,
+            compute: None,
             items: Vec::new(),
         }
     }
@@ -175,9 +221,9 @@ impl CommandState {
         self.pushed.entry(number).or_insert_with(empty)
     }
 
-    /// Appends the draws of a secondary command buffer, and whether it copies an image to a buffer.
-    fn execute(&mut self, items: &[Executed], reads_back: bool) {
-        self.reads_back |= reads_back;
+    /// Appends the draws and effects of a secondary command buffer.
+    fn execute(&mut self, items: &[Executed], effects: &Effects) {
+        self.effects.append(effects);
         for item in items {
             self.items.push(Executed {
                 draw: Arc::clone(&item.draw),
@@ -282,6 +328,7 @@ impl CommandState {
             samples: state.samples,
             caveats: [&state.caveats[..], &call.caveats].concat(),
             textures,
+            reads: state.reads.clone(),
         })
     }
 }
@@ -350,19 +397,21 @@ impl Commands {
 
     /// Executes a secondary command buffer.
     pub fn execute(&mut self, buffer: u64, secondary: u64) {
-        let (items, reads_back) = match self.buffers.get(&secondary) {
-            Some(of) => (of.items.clone(), of.reads_back),
+        let (items, effects) = match self.buffers.get(&secondary) {
+            Some(of) => (of.items.clone(), of.effects.clone()),
             None => return,
         };
-        self.get_mut(buffer).execute(&items, reads_back);
+        self.get_mut(buffer).execute(&items, &effects);
     }
 
-    /// Whether a command buffer copies an image to a buffer.
+    /// What command buffers do besides draws, executed one after the other.
     #[must_use]
-    pub fn reads_back(&self, buffer: u64) -> bool {
-        self.buffers
-            .get(&buffer)
-            .is_some_and(|state| state.reads_back)
+    pub fn effects(&self, buffers: impl IntoIterator<Item = u64>) -> Effects {
+        let mut all = Effects::default();
+        for state in buffers.into_iter().filter_map(|b| self.buffers.get(&b)) {
+            all.append(&state.effects);
+        }
+        all
     }
 
     /// Draws of a command buffer, in order of execution.

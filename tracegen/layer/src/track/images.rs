@@ -2,7 +2,7 @@
 
 use crate::spool::{ImageInfo, SamplerInfo, ViewInfo};
 use ash::vk::{self, Handle};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// Images, views and samplers by handle. Handles are reused, so images also have unique numbers.
@@ -11,6 +11,8 @@ pub struct Images {
     /// Number of the first image.
     first: u32,
     images: HashMap<u64, Arc<ImageInfo>>,
+    /// Images whose texels the host can read in memory.
+    linear: HashSet<u64>,
     /// By number. Destroyed images stay, because a draw may be described later.
     numbered: Vec<Arc<ImageInfo>>,
     views: HashMap<u64, ViewInfo>,
@@ -28,6 +30,9 @@ impl Images {
     /// Adds an image.
     pub fn create(&mut self, image: vk::Image, info: &vk::ImageCreateInfo<'_>) {
         let size = [info.extent.width, info.extent.height, info.extent.depth];
+        if info.tiling == vk::ImageTiling::LINEAR {
+            self.linear.insert(image.as_raw());
+        }
         self.add(image, |number| ImageInfo {
             image: number,
             format: info.format.as_raw(),
@@ -69,6 +74,13 @@ impl Images {
     /// Removes the handle of a destroyed image.
     pub fn destroy(&mut self, image: vk::Image) {
         self.images.remove(&image.as_raw());
+        self.linear.remove(&image.as_raw());
+    }
+
+    /// Whether the host can read an image's texels in memory.
+    #[must_use]
+    pub fn is_linear(&self, image: vk::Image) -> bool {
+        self.linear.contains(&image.as_raw())
     }
 
     /// The image with a number.

@@ -9,13 +9,14 @@ mod images;
 mod passes;
 mod pipelines;
 
-pub use commands::{Call, CommandState, Commands, Dynamic, Executed, OpenPass};
+pub use commands::{Call, CommandState, Commands, Dynamic, Effects, Executed, OpenPass};
 pub use descriptors::{Descriptors, Template, TemplateEntry, Written};
 pub use images::Images;
 pub use passes::{Attachment, Passes, RenderPass, Subpass};
-pub use pipelines::{Layout, Library, Pipeline, Pipelines, Recorded, State};
+pub use pipelines::{Compute, Layout, Library, Pipeline, Pipelines, Recorded, State};
 
 use crate::spool::{DrawInfo, TextureInfo, ViewInfo};
+use ash::vk;
 use std::collections::HashSet;
 
 /// All tracked objects of a device.
@@ -31,6 +32,8 @@ pub struct Tracker {
     pub passes: Passes,
     /// Command buffers.
     pub commands: Commands,
+    /// Timeline semaphores.
+    pub timelines: HashSet<vk::Semaphore>,
     /// Images into which draws that test depth have rendered colours.
     scene_images: HashSet<u32>,
 }

@@ -1,6 +1,6 @@
 //! Shader modules, pipeline layouts, and graphics pipelines.
 
-use crate::spool::{DepthInfo, ShaderInfo};
+use crate::spool::{DepthInfo, ShaderInfo, StageReads};
 use ash::vk::{self, Handle};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
@@ -51,6 +51,8 @@ pub struct State {
     pub alpha_to_coverage: bool,
     /// Reasons why records are less exact.
     pub caveats: Vec<String>,
+    /// Texture reads of the shaders before the fragment shader.
+    pub reads: Vec<StageReads>,
 }
 
 impl State {
@@ -74,6 +76,7 @@ impl State {
         if parts.contains(Parts::PRE_RASTERIZATION_SHADERS) {
             self.viewport = library.viewport;
             self.scissor = library.scissor;
+            self.reads.extend_from_slice(&library.reads);
         }
         if parts.contains(Parts::FRAGMENT_SHADER) {
             self.depth = library.depth;
@@ -126,6 +129,15 @@ pub struct Pipeline {
     pub state: State,
 }
 
+/// A compute pipeline whose shader reads textures.
+#[derive(Clone, Debug, Default)]
+pub struct Compute {
+    /// Size of a workgroup.
+    pub workgroup: [u32; 3],
+    /// Texture reads of its shader.
+    pub reads: Vec<StageReads>,
+}
+
 /// Modules, layouts and pipelines by handle.
 #[derive(Debug, Default)]
 pub struct Pipelines {
@@ -136,6 +148,7 @@ pub struct Pipelines {
     used: HashSet<u64>,
     pipelines: HashMap<u64, Arc<Pipeline>>,
     libraries: HashMap<u64, Arc<Library>>,
+    computes: HashMap<u64, Arc<Compute>>,
     created: u32,
     shaders: u32,
 }
@@ -205,6 +218,17 @@ impl Pipelines {
         self.libraries.insert(handle.as_raw(), Arc::new(library));
     }
 
+    /// Adds a compute pipeline whose shader reads textures.
+    pub fn create_compute(&mut self, handle: vk::Pipeline, compute: Compute) {
+        self.computes.insert(handle.as_raw(), Arc::new(compute));
+    }
+
+    /// The compute pipeline of a handle, if its shader reads textures.
+    #[must_use]
+    pub fn compute(&self, handle: vk::Pipeline) -> Option<Arc<Compute>> {
+        self.computes.get(&handle.as_raw()).cloned()
+    }
+
     /// The library of a handle.
     #[must_use]
     pub fn library(&self, handle: vk::Pipeline) -> Option<Arc<Library>> {
@@ -215,6 +239,7 @@ impl Pipelines {
     pub fn destroy(&mut self, handle: vk::Pipeline) -> Vec<vk::Pipeline> {
         let pipeline = self.pipelines.remove(&handle.as_raw());
         let library = self.libraries.remove(&handle.as_raw());
+        self.computes.remove(&handle.as_raw());
         let recorded = pipeline.and_then(|of| of.recorded.as_ref().map(|r| r.handle));
         let variants = library.map_or([None; 2], |of| [of.recording, of.quiet]);
         recorded

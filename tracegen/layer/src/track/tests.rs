@@ -267,10 +267,10 @@ fn draws_of_a_secondary_command_buffer_belong_to_the_executing_pass() {
     assert_eq!(found, [(0, Some(0)), (0, Some(0))]);
     assert!(tracker.commands.items(1)[0].pass.is_none());
     // A copy to a buffer in a secondary command buffer ends a frame, too.
-    assert!(!tracker.commands.reads_back(2));
-    tracker.commands.get_mut(1).reads_back = true;
+    assert!(!tracker.commands.effects([2]).reads_back);
+    tracker.commands.get_mut(1).effects.reads_back = true;
     tracker.commands.execute(2, 1);
-    assert!(tracker.commands.reads_back(2));
+    assert!(tracker.commands.effects([2]).reads_back);
 }
 
 #[test]

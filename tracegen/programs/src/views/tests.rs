@@ -86,6 +86,8 @@ impl Build {
             records: Span::default(),
             lost_bytes: 0,
             occlusion: Vec::new(),
+            frame_by_waits: None,
+            dispatches: Vec::new(),
         });
         let frame = self.session.frames[&0].clone();
         find(&self.session, &frame, &self.weights, wanted)

@@ -1,0 +1,225 @@
+//! Submissions of requested frames whose records are not read yet.
+//!
+//! Records are read as soon as the commands have ended: usually in the hook of the submission, which waits. A
+//! submission that waits for the host ends later, so its hook must not wait. Its records are read in a later call.
+
+use super::device::Device;
+use crate::capture::Place;
+use crate::spool::{DispatchInfo, Event, Span};
+use crate::track::Executed;
+use ash::vk;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::time::Duration;
+
+/// The submissions of a device.
+#[derive(Default)]
+pub(super) struct Pending {
+    submissions: Vec<Submission>,
+    /// Fences that are signalled when they have ended.
+    fences: Vec<vk::Fence>,
+}
+
+/// A submission of a requested frame.
+pub(super) struct Submission {
+    pub place: Place,
+    pub draws: Vec<Executed>,
+    pub dispatches: Vec<DispatchInfo>,
+}
+
+impl Pending {
+    /// Whether no submission is pending.
+    pub fn is_empty(&self) -> bool {
+        self.submissions.is_empty()
+    }
+
+    /// Adds a submission that was just made.
+    ///
+    /// # Safety
+    /// A queue of the device, which the program is not using in another thread.
+    pub unsafe fn add(&mut self, known: &Device, queue: vk::Queue, submission: Submission) {
+        // SAFETY: as the caller promises.
+        match unsafe { fence_after(known, queue) } {
+            Some(fence) => self.fences.push(fence),
+            // SAFETY: as above.
+            None => drop(unsafe { (known.next.queue_wait_idle)(queue) }),
+        }
+        self.submissions.push(submission);
+        known.capture.note_submission();
+    }
+}
+
+/// A fence that is signalled when all submitted commands of a queue have ended; `None` if the driver refuses.
+///
+/// # Safety
+/// A queue of the device, which the program is not using in another thread.
+pub(super) unsafe fn fence_after(known: &Device, queue: vk::Queue) -> Option<vk::Fence> {
+    let (next, success) = (&known.next, vk::Result::SUCCESS);
+    let mut fence = vk::Fence::null();
+    // SAFETY: as the caller promises.
+    unsafe {
+        let info = vk::FenceCreateInfo::default();
+        if (next.create_fence)(known.handle, &info, std::ptr::null(), &mut fence) != success {
+            return None;
+        }
+        if (next.queue_submit)(queue, 0, std::ptr::null(), fence) != success {
+            (next.destroy_fence)(known.handle, fence, std::ptr::null());
+            return None;
+        }
+    }
+    Some(fence)
+}
+
+/// Waits for fences of the layer and destroys them; returns false after the timeout.
+///
+/// # Safety
+/// Fences of the device.
+pub(super) unsafe fn wait_for(
+    known: &Device,
+    fences: &mut Vec<vk::Fence>,
+    timeout: Duration,
+) -> bool {
+    let (next, device) = (&known.next, known.handle);
+    let timeout_ns = u64::try_from(timeout.as_nanos()).unwrap_or(u64::MAX);
+    // SAFETY: as the caller promises. Signalled fences are not in use.
+    unsafe {
+        let (count, first) = (fences.len() as u32, fences.as_ptr());
+        let ended = fences.is_empty()
+            || (next.wait_for_fences)(device, count, first, vk::TRUE, timeout_ns)
+                == vk::Result::SUCCESS;
+        if ended {
+            for fence in fences.drain(..) {
+                (next.destroy_fence)(device, fence, std::ptr::null());
+            }
+        }
+        ended
+    }
+}
+
+/// Waits for the pending submissions and writes their records; returns false after the timeout.
+///
+/// # Safety
+/// A live device.
+pub(super) unsafe fn read_ended(known: &Device, pending: &mut Pending, timeout: Duration) -> bool {
+    if pending.is_empty() {
+        return true;
+    }
+    // SAFETY: as the caller promises; the submissions have ended when their records are read.
+    unsafe {
+        if !wait_for(known, &mut pending.fences, timeout) {
+            return false;
+        }
+        let submissions = std::mem::take(&mut pending.submissions);
+        let count = submissions.len() as u32;
+        write_records(known, submissions);
+        known.capture.note_read(count);
+    }
+    true
+}
+
+/// Writes the records of submissions. Those of a frame are written as one submission, because their records are
+/// in one buffer.
+///
+/// # Safety
+/// The submissions have ended.
+unsafe fn write_records(known: &Device, submissions: Vec<Submission>) {
+    let capture = known.capture;
+    let mut frames: BTreeMap<Place, (Vec<Executed>, Vec<DispatchInfo>)> = BTreeMap::new();
+    for submission in submissions {
+        let (draws, dispatches) = frames.entry(submission.place).or_default();
+        draws.extend(submission.draws);
+        dispatches.extend(submission.dispatches);
+    }
+    for (draws, _) in frames.values() {
+        describe(known, draws);
+    }
+    note_mixed(known, &frames);
+    let all = frames.values().flat_map(|(draws, _)| draws);
+    let numbers: Vec<u32> = all.clone().map(|item| item.draw.draw).collect();
+    // SAFETY: as the caller promises.
+    let occlusion: HashMap<u32, u64> = known
+        .queries
+        .as_ref()
+        .map_or_else(Vec::new, |queries| unsafe {
+            queries.results(known.handle, &numbers, &known.next)
+        })
+        .into_iter()
+        .collect();
+    let (records, lost_bytes) = match &known.recorder {
+        Some(recorder) => recorder.buffer.take(|records, lost| {
+            let span = capture.write(|writer| writer.records(records));
+            (span.unwrap_or_default(), lost)
+        }),
+        None => (Span::default(), 0),
+    };
+    if let Some(pictures) = &known.pictures {
+        let passes: HashSet<u32> = all.filter_map(|i| Some(i.pass.as_ref()?.pass)).collect();
+        // SAFETY: as the caller promises.
+        unsafe { pictures.write(known, &passes) };
+    }
+    for (place, (draws, dispatches)) in frames {
+        let numbers = draws.iter().map(|item| item.draw.draw);
+        capture.event(&Event::Submit {
+            frame: place.frame,
+            frame_by_waits: place.by_waits,
+            records,
+            lost_bytes,
+            occlusion: numbers
+                .filter_map(|draw| Some((draw, *occlusion.get(&draw)?)))
+                .collect(),
+            draws: draws.iter().map(number_and_pass).collect(),
+            dispatches,
+        });
+    }
+}
+
+fn number_and_pass(item: &Executed) -> [u32; 2] {
+    let pass = item.pass.as_ref().map_or(u32::MAX, |pass| pass.pass);
+    [item.draw.draw, pass]
+}
+
+/// Reports draws of several frames whose records cannot be told apart, because the frames ended together.
+fn note_mixed(known: &Device, frames: &BTreeMap<Place, (Vec<Executed>, Vec<DispatchInfo>)>) {
+    let mut seen: HashMap<u32, Place> = HashMap::new();
+    let mut mixed = 0_u64;
+    for (place, (draws, _)) in frames {
+        for item in draws {
+            let first = *seen.entry(item.draw.draw).or_insert(*place);
+            mixed += u64::from(first != *place);
+        }
+    }
+    if mixed > 0 {
+        known.capture.event(&Event::Trouble {
+            what: format!(
+                "{mixed} draws were under way in two frames at once: both frames have the records of both executions"
+            ),
+        });
+    }
+}
+
+/// Describes draws, their render passes, shaders and images, each once.
+fn describe(known: &Device, items: &[Executed]) {
+    let capture = known.capture;
+    for item in items {
+        let draw = &item.draw;
+        let mut images: Vec<u32> = Vec::new();
+        if let Some(pass) = &item.pass {
+            images.extend(pass.colors.iter().chain(&pass.depth).map(|view| view.image));
+            capture.write(|w| w.describe("pass", pass.pass, || Event::Pass((**pass).clone())));
+        }
+        let views = draw.textures.iter().filter_map(|texture| texture.view);
+        images.extend(views.map(|view| view.image));
+        for image in images {
+            let info = known.tracker().images.numbered(image).cloned();
+            if let Some(info) = info {
+                capture.write(|w| w.describe("image", image, || Event::Image((*info).clone())));
+            }
+        }
+        if let Some(shader) = draw.shader {
+            let info = known.shader(shader);
+            if let Some(info) = info {
+                capture.write(|w| w.describe("shader", shader, || Event::Shader((*info).clone())));
+            }
+        }
+        capture.write(|w| w.describe("draw", draw.draw, || Event::Draw((**draw).clone())));
+    }
+}

@@ -1,0 +1,190 @@
+//! Texture reads of shaders that are not recorded: those before the fragment shader, and compute shaders.
+
+use super::api::slice;
+use super::device::Device;
+use super::draws::is_wanted;
+use super::libraries::Parts;
+use super::recording_shaders::module_of;
+use crate::inject::{InjectError, texel_reads, workgroup_size};
+use crate::spool::{DispatchInfo, StageReads};
+use crate::track::Compute;
+use ash::vk::{self, Handle};
+use rspirv::spirv::ExecutionModel;
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+type Allocator = *const vk::AllocationCallbacks<'static>;
+
+/// Stages whose reads are counted, with their names.
+const STAGES: [(vk::ShaderStageFlags, ExecutionModel, &str); 5] = [
+    (
+        vk::ShaderStageFlags::VERTEX,
+        ExecutionModel::Vertex,
+        "vertex",
+    ),
+    (
+        vk::ShaderStageFlags::TESSELLATION_CONTROL,
+        ExecutionModel::TessellationControl,
+        "tessellation control",
+    ),
+    (
+        vk::ShaderStageFlags::TESSELLATION_EVALUATION,
+        ExecutionModel::TessellationEvaluation,
+        "tessellation evaluation",
+    ),
+    (
+        vk::ShaderStageFlags::GEOMETRY,
+        ExecutionModel::Geometry,
+        "geometry",
+    ),
+    (
+        vk::ShaderStageFlags::COMPUTE,
+        ExecutionModel::GLCompute,
+        "compute",
+    ),
+];
+
+/// Result for a module that cannot be analysed. It must not end the program.
+fn without_panic<T>(analyse: impl FnOnce() -> Result<T, InjectError>) -> Result<T, InjectError> {
+    catch_unwind(AssertUnwindSafe(analyse)).unwrap_or(Err(InjectError::Malformed("a panic")))
+}
+
+/// Texture reads of a stage.
+///
+/// # Safety
+/// A valid stage.
+unsafe fn of_stage(
+    known: &Device,
+    stage: &vk::PipelineShaderStageCreateInfo<'_>,
+) -> Vec<StageReads> {
+    let Some((_, model, name)) = STAGES.iter().find(|(flag, ..)| *flag == stage.stage) else {
+        return Vec::new();
+    };
+    // SAFETY: as the caller promises.
+    let module = unsafe { module_of(known, stage) };
+    let counts = module.ok().and_then(|(words, entry)| {
+        without_panic(|| texel_reads(&words, Some(&entry), *model)).ok()
+    });
+    let unknown = || BTreeMap::from([("shaders that cannot be analysed".to_owned(), 0)]);
+    let counts = counts.unwrap_or_else(unknown).into_iter();
+    counts
+        .map(|(what, instructions)| StageReads {
+            stage: (*name).to_owned(),
+            what,
+            instructions,
+        })
+        .collect()
+}
+
+/// Texture reads of the own stages of a graphics pipeline before its fragment shader.
+///
+/// # Safety
+/// A valid description with these own parts.
+pub(super) unsafe fn before_fragments(
+    known: &Device,
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+    own: Parts,
+) -> Vec<StageReads> {
+    if !own.contains(Parts::PRE_RASTERIZATION_SHADERS) {
+        return Vec::new();
+    }
+    // SAFETY: as the caller promises.
+    unsafe {
+        let stages = slice(info.p_stages, info.stage_count).iter();
+        stages.flat_map(|stage| of_stage(known, stage)).collect()
+    }
+}
+
+/// Value of a specialisation constant.
+///
+/// # Safety
+/// A valid description or null.
+unsafe fn specialized(info: *const vk::SpecializationInfo<'_>, constant: u32) -> Option<u32> {
+    // SAFETY: as the caller promises; the data have the offsets of the entries.
+    unsafe {
+        let info = info.as_ref()?;
+        let entries = slice(info.p_map_entries, info.map_entry_count);
+        let entry = entries.iter().find(|entry| entry.constant_id == constant)?;
+        let at = info.p_data.cast::<u8>().add(entry.offset as usize);
+        match entry.size {
+            1 => Some(at.read().into()),
+            2 => Some(at.cast::<u16>().read_unaligned().into()),
+            4 => Some(at.cast::<u32>().read_unaligned()),
+            _ => None,
+        }
+    }
+}
+
+pub(super) unsafe extern "system" fn create_compute_pipelines(
+    device: vk::Device,
+    cache: vk::PipelineCache,
+    count: u32,
+    infos: *const vk::ComputePipelineCreateInfo<'_>,
+    allocator: Allocator,
+    pipelines: *mut vk::Pipeline,
+) -> vk::Result {
+    // SAFETY: a valid call of vkCreateComputePipelines.
+    unsafe {
+        let known = Device::of(device);
+        let create = known.next.create_compute_pipelines;
+        let result = create(device, cache, count, infos, allocator, pipelines);
+        for (info, handle) in slice(infos, count).iter().zip(slice(pipelines, count)) {
+            let reads = of_stage(&known, &info.stage);
+            if *handle == vk::Pipeline::null() || reads.is_empty() {
+                continue;
+            }
+            let workgroup = module_of(&known, &info.stage)
+                .ok()
+                .and_then(|(words, entry)| {
+                    let constant = |number| specialized(info.stage.p_specialization_info, number);
+                    without_panic(|| workgroup_size(&words, Some(&entry), constant)).ok()
+                });
+            let compute = Compute {
+                workgroup: workgroup.unwrap_or_default(),
+                reads,
+            };
+            known.tracker().pipelines.create_compute(*handle, compute);
+        }
+        result
+    }
+}
+
+/// Tracks a dispatch whose shader reads textures.
+///
+/// # Safety
+/// The command buffer is being recorded.
+unsafe fn track(known: &Device, buffer: vk::CommandBuffer, groups: Option<[u32; 3]>) {
+    let mut tracker = known.tracker();
+    let state = tracker.commands.get_mut(buffer.as_raw());
+    let Some(compute) = state.compute.clone() else {
+        return;
+    };
+    if known.capture.is_over() || !is_wanted(known, state) {
+        return;
+    }
+    state.effects.dispatches.push(DispatchInfo {
+        groups,
+        workgroup: compute.workgroup,
+        reads: compute.reads.clone(),
+    });
+}
+
+/// Hooks of dispatch commands.
+macro_rules! dispatches {
+    ($($hook:ident ($($argument:ident: $kind:ty),*) $groups:expr;)*) => { $(
+        pub(super) unsafe extern "system" fn $hook(buffer: vk::CommandBuffer, $($argument: $kind),*) {
+            // SAFETY: a valid call of the dispatch command.
+            unsafe {
+                let known = Device::of(buffer);
+                track(&known, buffer, $groups);
+                (known.next.$hook)(buffer, $($argument),*);
+            }
+        }
+    )* };
+}
+
+dispatches! {
+    cmd_dispatch(x: u32, y: u32, z: u32) Some([x, y, z]);
+    cmd_dispatch_base(first_x: u32, first_y: u32, first_z: u32, x: u32, y: u32, z: u32) Some([x, y, z]);
+    cmd_dispatch_indirect(from: vk::Buffer, at: vk::DeviceSize) None;
+}

@@ -1,0 +1,139 @@
+//! Watches the processes of a program for reasons why they do not load the layer.
+
+use parallax_layer::spool::FOLDER_VARIABLE;
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+/// First and longest interval between two looks. A program may end soon.
+const INTERVALS: [Duration; 2] = [Duration::from_millis(10), Duration::from_secs(1)];
+
+/// What was seen of the processes that this one started, and of their descendants.
+#[derive(Debug)]
+pub struct Watch {
+    next: Instant,
+    interval: Duration,
+    /// A process without the environment variables of the capture.
+    pub cleared: Option<String>,
+    /// Whether a process loaded the Vulkan loader.
+    pub vulkan: bool,
+    /// Whether a process loaded an OpenGL library.
+    pub opengl: bool,
+}
+
+impl Default for Watch {
+    fn default() -> Self {
+        Self {
+            next: Instant::now(),
+            interval: INTERVALS[0],
+            cleared: None,
+            vulkan: false,
+            opengl: false,
+        }
+    }
+}
+
+impl Watch {
+    /// Looks at the processes, unless the last look was a moment ago.
+    pub fn look(&mut self) {
+        let now = Instant::now();
+        if now < self.next {
+            return;
+        }
+        self.next = now + self.interval;
+        self.interval = (2 * self.interval).min(INTERVALS[1]);
+        let own = fs::read_link("/proc/self/exe").ok();
+        for process in descendants("self") {
+            let folder = Path::new("/proc").join(&process);
+            // Before it executes its program, a new process is a copy of this one.
+            if fs::read_link(folder.join("exe")).ok() == own {
+                continue;
+            }
+            self.look_at(&folder);
+        }
+    }
+
+    fn look_at(&mut self, folder: &Path) {
+        let maps = fs::read_to_string(folder.join("maps")).unwrap_or_default();
+        // A process that has ended has neither maps nor an environment.
+        if maps.is_empty() {
+            return;
+        }
+        self.vulkan |= maps.contains("/libvulkan.so");
+        let libraries = ["/libGL.so", "/libGLX.so", "/libEGL.so", "/libOpenGL.so"];
+        self.opengl |= libraries.iter().any(|library| maps.contains(library));
+        let environment = fs::read(folder.join("environ"));
+        let name = fs::read_to_string(folder.join("comm"));
+        if let (Ok(environment), Ok(name)) = (environment, name)
+            && !has_variable(&environment)
+            && fs::read(folder.join("maps")).is_ok_and(|maps| !maps.is_empty())
+        {
+            self.cleared.get_or_insert_with(|| name.trim().to_owned());
+        }
+    }
+}
+
+/// Whether the environment of a process has the variables of a capture.
+fn has_variable(environment: &[u8]) -> bool {
+    let mut variables = environment.split(|byte| *byte == 0);
+    let name = FOLDER_VARIABLE.as_bytes();
+    variables.any(|variable| {
+        variable
+            .strip_prefix(name)
+            .is_some_and(|rest| rest.first() == Some(&b'='))
+    })
+}
+
+/// The processes that a process and its descendants started.
+fn descendants(process: &str) -> Vec<String> {
+    let threads = fs::read_dir(format!("/proc/{process}/task"));
+    let threads = threads.into_iter().flatten().flatten();
+    let lists = threads.filter_map(|of| fs::read_to_string(of.path().join("children")).ok());
+    let mut found = Vec::new();
+    for list in lists {
+        for child in list.split_whitespace() {
+            found.push(child.to_owned());
+            found.extend(descendants(child));
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::process::{Child, Command};
+
+    fn sees(command: &mut Command, what: impl Fn(&Watch) -> bool) -> bool {
+        let mut child: Child = command.spawn().unwrap();
+        let mut watch = Watch::default();
+        let end = Instant::now() + Duration::from_secs(3);
+        while Instant::now() < end && !what(&watch) {
+            watch.look();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        what(&watch)
+    }
+
+    #[test]
+    fn a_process_with_a_cleared_environment_is_seen() {
+        let mut kept = Command::new("sleep");
+        kept.arg("1").env(FOLDER_VARIABLE, "/folder");
+        // Other tests of this process may have children, too.
+        let by = |name: &'static str| move |watch: &Watch| watch.cleared.as_deref() == Some(name);
+        assert!(!sees(&mut kept, by("sleep")));
+        let mut cleared = Command::new("tail");
+        cleared.args(["-f", "/dev/null"]).env_clear();
+        assert!(sees(&mut cleared, by("tail")));
+    }
+
+    #[test]
+    fn the_variable_is_found_by_its_whole_name() {
+        let variable = |text: String| has_variable(text.as_bytes());
+        assert!(variable(format!("A=1\0{FOLDER_VARIABLE}=/x\0")));
+        assert!(!variable(format!("A=1\0{FOLDER_VARIABLE}_2=/x\0")));
+        assert!(!variable(String::new()));
+    }
+}
