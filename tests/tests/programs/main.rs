@@ -3,6 +3,7 @@
 //! its last record reads. The picture is the same without the layer.
 
 mod opengl;
+mod other_stages;
 mod pixels;
 mod random;
 

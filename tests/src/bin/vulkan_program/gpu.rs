@@ -222,6 +222,25 @@ impl Gpu {
     /// Records commands, executes them and waits.
     pub fn execute(&self, record: impl FnOnce(&Device, vk::CommandBuffer)) -> Result<()> {
         let device = &self.device;
+        self.execute_by(record, |buffer| {
+            let buffers = [buffer];
+            let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
+            // SAFETY: the commands are complete.
+            unsafe {
+                let submitted = device.queue_submit(self.queue, &submit, vk::Fence::null());
+                checked("a submission", submitted)?;
+                checked("the queue", device.queue_wait_idle(self.queue))
+            }
+        })
+    }
+
+    /// Records commands and executes them by `submit`, which waits for them.
+    pub fn execute_by(
+        &self,
+        record: impl FnOnce(&Device, vk::CommandBuffer),
+        submit: impl FnOnce(vk::CommandBuffer) -> Result<()>,
+    ) -> Result<()> {
+        let device = &self.device;
         // SAFETY: the pool and its buffer are used here alone, and nothing is destroyed before it is done.
         unsafe {
             let info = vk::CommandPoolCreateInfo::default();
@@ -235,10 +254,7 @@ impl Gpu {
             checked("commands", device.begin_command_buffer(buffers[0], &begin))?;
             record(device, buffers[0]);
             checked("commands", device.end_command_buffer(buffers[0]))?;
-            let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
-            let submitted = device.queue_submit(self.queue, &submit, vk::Fence::null());
-            checked("a submission", submitted)?;
-            checked("the queue", device.queue_wait_idle(self.queue))?;
+            submit(buffers[0])?;
             device.destroy_command_pool(pool, None);
         }
         Ok(())

@@ -4,11 +4,13 @@
 //! pixel identifies the texel that it shows. The objects differ in how their shaders sample.
 //!
 //!     vulkan_program [--stereo halves|targets|twice|multiview|mono] [--objects NAME,NAME...] [--frames N]
-//!         [--size WIDTHxHEIGHT] [--picture FILE] [--end crash|early|fork|hang] [--libraries 0|1|2]
+//!         [--size WIDTHxHEIGHT] [--picture FILE] [--end crash|early|fork|hang|before] [--libraries 0|1|2]
+//!         [--also vertex,compute,late,event,unread]
 //!     vulkan_program --random SEED [--calls N] [--frames N] [--picture FILE]
 //!
 //! With `--random`, it makes random calls instead: see `random`.
 
+mod also;
 mod gpu;
 mod libraries;
 mod objects;
@@ -46,6 +48,7 @@ pub struct Options {
     size_px: [u32; 2],
     picture: Option<String>,
     end: Option<String>,
+    also: also::Also,
     /// Libraries that pipelines are linked from.
     libraries: Option<libraries::Split>,
     /// Seed of random calls.
@@ -62,6 +65,7 @@ fn options() -> Result<Options, String> {
         size_px: [240, 200],
         picture: None,
         end: None,
+        also: also::Also::default(),
         libraries: None,
         random: None,
         calls: 100,
@@ -98,6 +102,7 @@ fn options() -> Result<Options, String> {
             }
             "--picture" => options.picture = Some(value),
             "--end" => options.end = Some(value),
+            "--also" => options.also = also::Also::parse(&value)?,
             "--libraries" => {
                 let split = libraries::SPLITS.get(number(&value)? as usize);
                 options.libraries = Some(*split.ok_or(format!("--libraries: {value}"))?);

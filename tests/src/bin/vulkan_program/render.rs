@@ -1,5 +1,6 @@
 //! Renders the frames.
 
+use crate::also::Extras;
 use crate::gpu::{Buffer, Gpu, Result};
 use crate::pipeline::pipeline;
 use crate::sets::Sets;
@@ -20,6 +21,10 @@ pub fn run(options: &Options) -> Result<()> {
         // A program that never renders.
         std::thread::sleep(std::time::Duration::from_secs(600));
     }
+    if options.end.as_deref() == Some("before") {
+        eprintln!("vulkan_program: no display");
+        std::process::abort();
+    }
     let gpu = match options.libraries {
         Some(_) => {
             let mut of_libraries = libraries::features();
@@ -34,9 +39,10 @@ pub fn run(options: &Options) -> Result<()> {
     let targets = targets(&gpu, options, pass)?;
     let eyes = gpu.buffer(128, vk::BufferUsageFlags::UNIFORM_BUFFER)?;
     let sets = Sets::new(&gpu, &eyes)?;
+    let extras = Extras::new(&gpu, options.also, sets.layout)?;
     let mut draws = Vec::new();
     for (position, object) in options.objects.iter().enumerate() {
-        let words = shaders::words(object, options.stereo)?;
+        let words = shaders::words(object, options.stereo, options.also.vertex)?;
         let vertices = scene::triangles(position, options.objects.len());
         let usage = vk::BufferUsageFlags::VERTEX_BUFFER;
         draws.push(Draw {
@@ -50,12 +56,16 @@ pub fn run(options: &Options) -> Result<()> {
     for frame in 0..options.frames {
         let aspect = width as f32 / height as f32;
         gpu.write(&eyes, bytemuck::cast_slice(&scene::eyes(frame, aspect)))?;
-        gpu.execute(|device, buffer| {
+        let record = |device: &Device, buffer| {
+            extras.record(device, buffer, &sets);
             for (number, target) in targets.iter().enumerate() {
                 draw_target(device, options, pass, target, &draws, &sets, buffer);
-                copy(device, options, target, number, &readback, buffer);
+                if !options.also.unread {
+                    copy(device, options, target, number, &readback, buffer);
+                }
             }
-        })?;
+        };
+        gpu.execute_by(record, |buffer| extras.submit(&gpu, buffer, frame))?;
         if let Some(end) = options.end.as_deref().filter(|_| frame == 1) {
             end_abnormally(end);
         }

@@ -71,10 +71,10 @@ fn set_layouts(gpu: &Gpu) -> Result<[vk::DescriptorSetLayout; 2]> {
             .stage_flags(stage)
     };
     let uniform = vec![binding(0, UNIFORM, vk::ShaderStageFlags::VERTEX)];
-    let fragment = vk::ShaderStageFlags::FRAGMENT;
+    let all = vk::ShaderStageFlags::ALL;
     let textures: Vec<_> = (0..)
         .zip(TEXTURES)
-        .map(|(b, kind)| binding(b, kind, fragment))
+        .map(|(b, kind)| binding(b, kind, all))
         .collect();
     let make = |bindings: &[vk::DescriptorSetLayoutBinding<'_>]| {
         let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(bindings);

@@ -24,7 +24,13 @@ struct Fragment {
 ";
 
 /// SPIR-V of an object's vertex and fragment shader, with entry points `vertex` and `fragment`.
-pub fn words(object: &Object, stereo: Stereo) -> Result<Vec<u32>, String> {
+///
+/// With `reads`, the vertex shader also reads a texel, which changes no vertex.
+pub fn words(object: &Object, stereo: Stereo, reads: bool) -> Result<Vec<u32>, String> {
+    let read = match reads {
+        true => "out.uv += min(textureLoad(flat, vec2<i32>(0, 0), 0).x, 0.0);",
+        false => "",
+    };
     let eye = match stereo {
         Stereo::Multiview => "@builtin(view_index) eye: i32",
         _ => "@builtin(instance_index) unused: u32",
@@ -42,6 +48,7 @@ pub fn words(object: &Object, stereo: Stereo) -> Result<Vec<u32>, String> {
             out.position = eyes.clip_from_world[{index}] * vec4(place * constants.scale, 1.0);
             out.uv = uv;
             out.direction = direction;
+            {read}
             return out;
         }}
         @fragment fn fragment(in: Fragment) -> @location(0) vec4<f32> {{ {} }}",
@@ -53,6 +60,18 @@ pub fn words(object: &Object, stereo: Stereo) -> Result<Vec<u32>, String> {
         text
     };
     compile(&text)
+}
+
+/// SPIR-V of a compute shader that reads a texel, with entry point `compute`.
+pub fn compute() -> Result<Vec<u32>, String> {
+    compile(&format!(
+        "{HEAD}
+        var<workgroup> unused: vec4<f32>;
+        @compute @workgroup_size(8, 4, 1) fn compute(@builtin(global_invocation_id) id: vec3<u32>) {{
+            let texel = textureLoad(flat, id.xy % 4, 0);
+            if texel.x > 2.0 {{ unused = texel; }}
+        }}"
+    ))
 }
 
 /// Compiles WGSL to SPIR-V.

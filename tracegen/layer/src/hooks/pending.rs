@@ -17,6 +17,8 @@ pub(super) struct Pending {
     submissions: Vec<Submission>,
     /// Fences that are signalled when they have ended.
     fences: Vec<vk::Fence>,
+    /// Fences after submissions of other frames that wait for the host.
+    blocked: Vec<vk::Fence>,
 }
 
 /// A submission of a requested frame.
@@ -30,6 +32,24 @@ impl Pending {
     /// Whether no submission is pending.
     pub fn is_empty(&self) -> bool {
         self.submissions.is_empty()
+    }
+
+    /// Whether an earlier submission still waits for the host, and with it all later ones.
+    ///
+    /// # Safety
+    /// A live device.
+    pub unsafe fn is_blocked(&mut self, known: &Device) -> bool {
+        // SAFETY: as the caller promises.
+        !self.is_empty() || unsafe { !wait_for(known, &mut self.blocked, Duration::ZERO) }
+    }
+
+    /// Notes that a submission of another frame was just made, which waits for the host.
+    ///
+    /// # Safety
+    /// A queue of the device, which the program is not using in another thread.
+    pub unsafe fn block(&mut self, known: &Device, queue: vk::Queue) {
+        // SAFETY: as the caller promises.
+        self.blocked.extend(unsafe { fence_after(known, queue) });
     }
 
     /// Adds a submission that was just made.

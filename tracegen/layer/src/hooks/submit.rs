@@ -165,9 +165,16 @@ unsafe fn submit_frame(
         let place = capture.place();
         if !capture.wants(place) {
             close(known, &pending);
-            drop(pending);
-            return submit();
+            let waits = !capture.is_over() && waits_for_host(known, submitted, &effects);
+            let result = submit();
+            if waits && result == vk::Result::SUCCESS {
+                // Fences of earlier submissions that have ended are not needed.
+                pending.is_blocked(known);
+                pending.block(known, queue);
+            }
+            return result;
         }
+        let blocked = pending.is_blocked(known);
         let draws = draws_of(known, submitted);
         if draws.is_empty() && effects.dispatches.is_empty() {
             drop(pending);
@@ -176,17 +183,19 @@ unsafe fn submit_frame(
         if let Some(recorder) = known.recorder.as_ref().filter(|r| !r.buffer.is_open()) {
             // Commands in flight belong to earlier frames. Those of command buffers that are submitted once
             // do not record.
-            let mut fences: Vec<vk::Fence> = fence_after(known, queue).into_iter().collect();
-            wait_for(known, &mut fences, SETTLE_TIMEOUT);
+            if !blocked {
+                let mut fences: Vec<vk::Fence> = fence_after(known, queue).into_iter().collect();
+                wait_for(known, &mut fences, SETTLE_TIMEOUT);
+            }
             recorder.buffer.open(true);
         }
         if let Some(queries) = &known.queries {
             let numbers: Vec<u32> = draws.iter().map(|item| item.draw.draw).collect();
             queries.reset(known.handle, &numbers, &known.next);
         }
-        let timeout = match pending.is_empty() && !waits_for_host(known, submitted, &effects) {
-            true => END_TIMEOUT,
-            false => Duration::ZERO,
+        let timeout = match blocked || waits_for_host(known, submitted, &effects) {
+            true => Duration::ZERO,
+            false => END_TIMEOUT,
         };
         let result = submit();
         if result == vk::Result::SUCCESS {
@@ -222,7 +231,7 @@ fn draws_of(known: &Device, submitted: &Submitted) -> Vec<Executed> {
 /// Whether commands cannot end before the host, or a later submission, signals a semaphore or sets an event.
 ///
 /// # Safety
-/// A valid submission that has not been made. Earlier submissions have ended.
+/// A valid submission that has not been made.
 unsafe fn waits_for_host(known: &Device, submitted: &Submitted, effects: &Effects) -> bool {
     let next = &known.next;
     let is_open = |(semaphore, value): &(vk::Semaphore, u64)| {

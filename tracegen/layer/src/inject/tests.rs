@@ -425,3 +425,110 @@ proptest! {
         let _ = instrument(&words, None, &TARGET);
     }
 }
+
+#[test]
+fn image_instructions_of_other_stages_are_counted_by_kind_of_texture() {
+    use rspirv::spirv::ExecutionModel::{Fragment, GLCompute, Vertex};
+    let words = module(&format!(
+        "{HEAD}
+        @group(2) @binding(0) var target_: texture_storage_2d<rgba8unorm, write>;
+        fn helper(uv: vec2<f32>) -> f32 {{ return textureSampleLevel(color, linear, uv, 0.0).x; }}
+        @vertex fn skinned(@builtin(vertex_index) n: u32) -> @builtin(position) vec4<f32> {{
+            let a = textureLoad(normals, vec2<u32>(n, 0u), 0);
+            let b = textureLoad(layers, vec2<u32>(n, 0u), 0, 0);
+            return a + b + textureLoad(volume, vec3<u32>(n), 0) + helper(a.xy);
+        }}
+        @vertex fn plain(@builtin(vertex_index) n: u32) -> @builtin(position) vec4<f32> {{
+            return vec4<f32>(f32(n));
+        }}
+        @compute @workgroup_size(8, 4, 2) fn compute(@builtin(global_invocation_id) id: vec3<u32>) {{
+            textureStore(target_, id.xy, textureLoad(color, id.xy, 0));
+        }}
+        @fragment fn main(in: In) -> @location(0) vec4<f32> {{ return vec4<f32>(0.0); }}"
+    ));
+    let reads = |entry, stage| -> Vec<(String, u32)> {
+        let found = texel_reads(&words, Some(entry), stage).expect("reads");
+        found.into_iter().collect()
+    };
+    let kind = |what: &str, count| (what.to_owned(), count);
+    let flat = "two-dimensional textures";
+    assert_eq!(
+        reads("skinned", Vertex),
+        [
+            kind("texture arrays", 1),
+            kind("three-dimensional textures", 1),
+            kind(flat, 2)
+        ]
+    );
+    assert_eq!(reads("plain", Vertex), []);
+    assert_eq!(reads("main", Fragment), []);
+    assert_eq!(reads("compute", GLCompute), [kind(flat, 1)]);
+    assert!(texel_reads(&words, Some("compute"), Vertex).is_err());
+    let size = workgroup_size(&words, Some("compute"), |_| None);
+    assert_eq!(size, Ok([8, 4, 2]));
+}
+
+#[test]
+fn atomics_on_storage_images_are_left_out_by_name() {
+    let recording = instrumented(&module(
+        "@group(0) @binding(0) var counts: texture_storage_2d<r32uint, atomic>;
+        @fragment fn main() -> @location(0) vec4<f32> {
+            textureAtomicAdd(counts, vec2<u32>(0u), 1u);
+            return vec4<f32>(1.0);
+        }",
+    ));
+    let left_out = What::LeftOut("atomics on storage images".to_owned());
+    assert!(
+        recording.sites.iter().any(|site| site.what == left_out),
+        "{:?}",
+        recording.sites
+    );
+}
+
+/// Assembly of a compute shader whose workgroup has specialisation constants.
+fn specialized_workgroup(by_builtin: bool) -> Vec<u32> {
+    use rspirv::binary::Assemble;
+    use rspirv::dr::{Builder, Operand};
+    use rspirv::spirv::{AddressingModel, Capability, Decoration, ExecutionModel, MemoryModel};
+    let mut b = Builder::new();
+    b.set_version(1, 5);
+    b.capability(Capability::Shader);
+    b.memory_model(AddressingModel::Logical, MemoryModel::GLSL450);
+    let (void, uint) = (b.type_void(), b.type_int(32, 0));
+    let sizes = [16, 2].map(|size| b.spec_constant_bit32(uint, size));
+    let one = b.constant_bit32(uint, 1);
+    for (number, id) in (5..).zip(sizes) {
+        b.decorate(id, Decoration::SpecId, [Operand::LiteralBit32(number)]);
+    }
+    if by_builtin {
+        let vector = b.type_vector(uint, 3);
+        let all = b.spec_constant_composite(vector, [sizes[0], sizes[1], one]);
+        let builtin = Operand::BuiltIn(BuiltIn::WorkgroupSize);
+        b.decorate(all, Decoration::BuiltIn, [builtin]);
+    }
+    let kind = b.type_function(void, []);
+    let none = rspirv::spirv::FunctionControl::NONE;
+    let main = b
+        .begin_function(void, None, none, kind)
+        .expect("a function");
+    b.begin_block(None).expect("a block");
+    b.ret().expect("a return");
+    b.end_function().expect("the end");
+    b.entry_point(ExecutionModel::GLCompute, main, "main", []);
+    match by_builtin {
+        true => b.execution_mode(main, ExecutionMode::LocalSize, [1, 1, 1]),
+        false => b.execution_mode_id(main, ExecutionMode::LocalSizeId, [sizes[0], sizes[1], one]),
+    }
+    b.module().assemble()
+}
+
+#[test]
+fn the_size_of_a_workgroup_may_be_specialised() {
+    for by_builtin in [false, true] {
+        let words = specialized_workgroup(by_builtin);
+        let default = workgroup_size(&words, Some("main"), |_| None);
+        assert_eq!(default, Ok([16, 2, 1]), "{by_builtin}");
+        let given = workgroup_size(&words, Some("main"), |number| (number == 6).then_some(7));
+        assert_eq!(given, Ok([16, 7, 1]), "{by_builtin}");
+    }
+}

@@ -348,3 +348,64 @@ fn a_library_gives_its_parts_and_keeps_its_layout() {
     assert_eq!(tracker.pipelines.destroy(handle), variants);
     assert!(tracker.pipelines.library(handle).is_none());
 }
+
+#[test]
+fn effects_of_secondary_command_buffers_are_executed_in_order() {
+    let [set_before, never_set, set_after] = [1, 2, 3].map(vk::Event::from_raw);
+    let mut commands = Commands::default();
+    commands.begin(1, true);
+    commands.begin(2, true);
+    let secondary = &mut commands.get_mut(2).effects;
+    secondary.await_events(&[set_before, never_set]);
+    secondary.dispatches.push(crate::spool::DispatchInfo {
+        groups: Some([1, 2, 3]),
+        workgroup: [4, 5, 6],
+        reads: Vec::new(),
+    });
+    commands.get_mut(1).effects.set_event(set_before);
+    commands.execute(1, 2);
+    commands.get_mut(1).effects.await_events(&[set_after]);
+    commands.get_mut(1).effects.set_event(set_after);
+    let effects = commands.effects([1]);
+    assert_eq!(effects.awaited(), [never_set, set_after]);
+    assert_eq!(effects.dispatches.len(), 1);
+    assert!(!effects.renders);
+    // A submission of both: the secondary's commands are not executed by themselves.
+    assert_eq!(commands.effects([1, 2]).dispatches.len(), 2);
+}
+
+#[test]
+fn only_linear_images_are_read_by_the_host() {
+    let mut images = Images::default();
+    let [linear, optimal] = [1, 2].map(vk::Image::from_raw);
+    for (image, tiling) in [
+        (linear, vk::ImageTiling::LINEAR),
+        (optimal, vk::ImageTiling::OPTIMAL),
+    ] {
+        images.create(image, &vk::ImageCreateInfo::default().tiling(tiling));
+    }
+    assert!(images.is_linear(linear) && !images.is_linear(optimal));
+    // Handles are reused.
+    images.destroy(linear);
+    images.create(linear, &vk::ImageCreateInfo::default());
+    assert!(!images.is_linear(linear));
+}
+
+#[test]
+fn draws_have_the_reads_of_the_shaders_before_the_fragment_shader() {
+    let reads = vec![crate::spool::StageReads {
+        stage: "vertex".to_owned(),
+        what: "cube maps".to_owned(),
+        instructions: 3,
+    }];
+    let library = |reads: &Vec<_>| State {
+        reads: reads.clone(),
+        ..State::default()
+    };
+    let mut linked = State::default();
+    type Parts = vk::GraphicsPipelineLibraryFlagsEXT;
+    linked.add(&library(&reads), Parts::FRAGMENT_SHADER);
+    assert!(linked.reads.is_empty());
+    linked.add(&library(&reads), Parts::PRE_RASTERIZATION_SHADERS);
+    assert_eq!(linked.reads, reads);
+}
