@@ -347,3 +347,52 @@ fn the_warning_of_the_first_miss_model_names_what_differs_from_the_preset() {
     let expected = "not the machine of --preset z2-paper (tmu.loop_cycles differs)";
     assert!(changed.contains(expected), "{changed}");
 }
+
+#[test]
+fn every_command_prints_what_its_trace_lacks() {
+    use formats::textrace::Encoding;
+    use parallax_tests::traces::{program_tables, texture_trace_of};
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let trace = folder.path().join("p.textrace");
+    let bytes = texture_trace_of(&program_tables(), Encoding::Delta, 5);
+    std::fs::write(&trace, bytes).expect("a trace");
+    let experiment = folder.path().join("e.toml");
+    std::fs::write(&experiment, "[axes]\norder = [\"morton\"]\n").expect("a file");
+    let text = |path: &std::path::Path| path.to_str().expect("a path").to_owned();
+    let (trace, experiment) = (&*text(&trace), &*text(&experiment));
+    // These read no texture trace, or only a folder with some.
+    let others = [
+        "completions",
+        "man",
+        "readings",
+        "reproject",
+        "techniques",
+        "temporal",
+    ];
+    for command in subcommands("replay") {
+        let output = text(&folder.path().join(&command));
+        let output = output.as_str();
+        let arguments: Vec<&str> = match command.as_str() {
+            other if others.contains(&other) => continue,
+            "accuracy" => vec!["-o", output, trace],
+            "calibrate" => vec!["--try", "cores=1,2", trace, trace],
+            "compare" | "diff" => vec![trace, trace],
+            "convert" => vec!["--to", "din", "-o", output, trace],
+            "report" => vec!["-o", output, trace],
+            "sweep" => vec!["-o", output, experiment, trace],
+            _ => vec![trace],
+        };
+        let mut run = program("replay");
+        run.arg(&command).args(&arguments);
+        let run = run.output().expect("the program starts");
+        let message = String::from_utf8_lossy(&run.stderr).into_owned();
+        for notice in [
+            "note: ",
+            "p.textrace: not in the trace: reads by vertex shaders of two-dimensional textures (2 draws, 6 vertices, \
+             12 reads without loops; 1 indirect draws of unknown size)\n",
+            "p.textrace: not in the trace, or less exactly: texel buffers (1 draws, 7 fragments)\n",
+        ] {
+            assert!(message.contains(notice), "{command}: {message}");
+        }
+    }
+}
