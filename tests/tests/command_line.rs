@@ -359,7 +359,8 @@ fn every_command_prints_what_its_trace_lacks() {
     let experiment = folder.path().join("e.toml");
     std::fs::write(&experiment, "[axes]\norder = [\"morton\"]\n").expect("a file");
     let text = |path: &std::path::Path| path.to_str().expect("a path").to_owned();
-    let (trace, experiment) = (&*text(&trace), &*text(&experiment));
+    let (trace, experiment) = (text(&trace), text(&experiment));
+    let (trace, experiment) = (trace.as_str(), experiment.as_str());
     // These read no texture trace, or only a folder with some.
     let others = [
         "completions",

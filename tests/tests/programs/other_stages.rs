@@ -22,11 +22,11 @@ fn reads_of_vertex_and_compute_shaders_are_counted_and_named_by_every_command() 
     let folder = tempfile::tempdir().expect("a temporary folder");
     let objects = ["--objects", "plain,pair", "--also", "vertex,compute"];
     for (name, stereo, draws, libraries) in [
-        ("halves", "halves", 4, &[][..]),
+        ("halves", "halves", 4, &[] as &[&str]),
         ("multiview", "multiview", 2, &[]),
         ("libraries", "halves", 4, &["--libraries", "1"]),
     ] {
-        let arguments = [&objects, &["--stereo", stereo][..], libraries].concat();
+        let arguments = [&objects[..], &["--stereo", stereo], libraries].concat();
         let trace = capture_program(folder.path(), name, &["--frames", "1..3"], &arguments);
         let found = reads(&trace);
         let expected = |stage: &str, commands, invocations| UnrecordedReads {

@@ -102,31 +102,41 @@ fn descendants(process: &str) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::process::{Child, Command};
+    use std::process::Command;
 
-    fn sees(command: &mut Command, what: impl Fn(&Watch) -> bool) -> bool {
-        let mut child: Child = command.spawn().unwrap();
-        let mut watch = Watch::default();
-        let end = Instant::now() + Duration::from_secs(3);
-        while Instant::now() < end && !what(&watch) {
-            watch.look();
+    /// The process without the variables that a look at a program's process finds.
+    fn cleared(command: &mut Command, program: &str) -> Option<String> {
+        let mut child = command.spawn().unwrap();
+        let folder = Path::new("/proc").join(child.id().to_string());
+        let is_started = || {
+            let name = fs::read_to_string(folder.join("comm"));
+            name.is_ok_and(|name| name.trim() == program)
+        };
+        while !is_started() {
             std::thread::sleep(Duration::from_millis(5));
         }
+        let mut watch = Watch::default();
+        watch.look_at(&folder);
         child.kill().unwrap();
         child.wait().unwrap();
-        what(&watch)
+        watch.cleared
     }
 
     #[test]
     fn a_process_with_a_cleared_environment_is_seen() {
-        let mut kept = Command::new("sleep");
-        kept.arg("1").env(FOLDER_VARIABLE, "/folder");
-        // Other tests of this process may have children, too.
-        let by = |name: &'static str| move |watch: &Watch| watch.cleared.as_deref() == Some(name);
-        assert!(!sees(&mut kept, by("sleep")));
-        let mut cleared = Command::new("tail");
-        cleared.args(["-f", "/dev/null"]).env_clear();
-        assert!(sees(&mut cleared, by("tail")));
+        let mut command = Command::new("sleep");
+        command.arg("100").env(FOLDER_VARIABLE, "/folder");
+        assert_eq!(cleared(&mut command, "sleep"), None);
+        command.env_clear();
+        assert_eq!(cleared(&mut command, "sleep").as_deref(), Some("sleep"));
+    }
+
+    #[test]
+    fn processes_that_this_one_started_are_found() {
+        let mut child = Command::new("sleep").arg("100").spawn().unwrap();
+        assert!(descendants("self").contains(&child.id().to_string()));
+        child.kill().unwrap();
+        child.wait().unwrap();
     }
 
     #[test]

@@ -28,7 +28,7 @@ struct Fragment {
 /// With `reads`, the vertex shader also reads a texel, which changes no vertex.
 pub fn words(object: &Object, stereo: Stereo, reads: bool) -> Result<Vec<u32>, String> {
     let read = match reads {
-        true => "out.uv += min(textureLoad(flat, vec2<i32>(0, 0), 0).x, 0.0);",
+        true => "out.uv = out.uv + vec2<f32>(min(textureLoad(flat, vec2<i32>(0, 0), 0).x, 0.0));",
         false => "",
     };
     let eye = match stereo {
@@ -68,7 +68,7 @@ pub fn compute() -> Result<Vec<u32>, String> {
         "{HEAD}
         var<workgroup> unused: vec4<f32>;
         @compute @workgroup_size(8, 4, 1) fn compute(@builtin(global_invocation_id) id: vec3<u32>) {{
-            let texel = textureLoad(flat, id.xy % 4, 0);
+            let texel = textureLoad(flat, id.xy % vec2<u32>(4u, 4u), 0);
             if texel.x > 2.0 {{ unused = texel; }}
         }}"
     ))
