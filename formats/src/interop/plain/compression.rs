@@ -1,7 +1,7 @@
 //! gzip and Zstandard, detected by the first bytes when reading and by the file name when writing.
 
 use flate2::GzBuilder;
-use flate2::read::MultiGzDecoder;
+use flate2::bufread::GzDecoder;
 use flate2::write::GzEncoder;
 use ruzstd::decoding::BlockDecodingStrategy;
 use ruzstd::decoding::FrameDecoder;
@@ -60,13 +60,65 @@ impl Compression {
     /// The decompressed content of `input`, with all its members or frames concatenated.
     pub(super) fn reader<'a>(self, input: impl BufRead + 'a) -> Box<dyn Read + 'a> {
         match self {
-            Self::Gzip => Box::new(MultiGzDecoder::new(input)),
+            Self::Gzip => Box::new(GzipReader {
+                member: Some(GzDecoder::new(input)),
+            }),
             Self::Zstd => Box::new(ZstdReader {
                 input,
                 frame: FrameDecoder::new(),
                 in_frame: false,
             }),
         }
+    }
+}
+
+/// Name and unpacking command of a compression or an archive that is not read, by a file's first bytes.
+pub(super) fn foreign(head: &[u8]) -> Option<(&'static str, &'static str)> {
+    match head {
+        [0xfd, b'7', b'z', b'X', b'Z', 0, ..] => Some(("xz", "xz -dc")),
+        [b'B', b'Z', b'h', b'1'..=b'9', b'1', b'A', b'Y', ..] => Some(("bzip2", "bzip2 -dc")),
+        [0x04, 0x22, 0x4d, 0x18, ..] => Some(("LZ4", "lz4 -dc")),
+        [b'P', b'K', 3, 4, ..] => Some(("ZIP", "unzip -p")),
+        [b'7', b'z', 0xbc, 0xaf, 0x27, 0x1c, ..] => Some(("7z", "7z x -so")),
+        [0x1f, 0x9d, ..] => Some(("compress", "uncompress -c")),
+        _ => None,
+    }
+}
+
+/// Decompresses consecutive members. Zeros after the last one are padding, as tapes and some programs write.
+struct GzipReader<R> {
+    member: Option<GzDecoder<R>>,
+}
+
+impl<R: BufRead> Read for GzipReader<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        while let Some(member) = &mut self.member {
+            let read = member.read(out)?;
+            if read > 0 || out.is_empty() {
+                return Ok(read);
+            }
+            let Some(mut input) = self.member.take().map(GzDecoder::into_inner) else {
+                break;
+            };
+            let mut is_padded = false;
+            loop {
+                let next = input.fill_buf()?;
+                if next.is_empty() {
+                    return Ok(0);
+                }
+                let zeros = next.iter().take_while(|&&byte| byte == 0).count();
+                if zeros == 0 {
+                    break;
+                }
+                is_padded = true;
+                input.consume(zeros);
+            }
+            if is_padded {
+                return Err(invalid("bytes other than zero follow the padding"));
+            }
+            self.member = Some(GzDecoder::new(input));
+        }
+        Ok(0)
     }
 }
 

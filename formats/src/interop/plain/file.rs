@@ -1,5 +1,6 @@
 //! Reads plain accesses from a file, a pipe or standard input.
 
+use super::compression::foreign;
 use super::{AddressForm, Compression, Decoder, MOST_RECORD_BYTES, PlainAccess, din, gem5};
 use crate::error::{FormatError, Place};
 use memmap2::Mmap;
@@ -268,8 +269,23 @@ fn detect_form(
 ) -> Result<AddressForm, FormatError> {
     let compression = Compression::of_name(name);
     let plain = compression.and_then(|c| name.strip_suffix(c.extension()));
-    given
-        .or_else(|| AddressForm::of_name(plain.unwrap_or(name)))
+    let named = given.or_else(|| AddressForm::of_name(plain.unwrap_or(name)));
+    // Words may begin with any bytes.
+    let words = matches!(named, Some(AddressForm::U32 | AddressForm::U64));
+    if let (false, Some((kind, unpack))) = (words, foreign(head)) {
+        let expected = format!(
+            "addresses without compression, or with gzip or Zstandard (unpack with `{unpack}` and pipe \
+             the result into `--addresses -`)"
+        );
+        return Err(malformed(
+            name,
+            Place::Contents,
+            0,
+            &expected,
+            kind.to_owned(),
+        ));
+    }
+    named
         .or_else(|| AddressForm::of_content(head, whole))
         .ok_or_else(|| {
             let found = match head {

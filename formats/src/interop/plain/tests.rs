@@ -184,7 +184,6 @@ fn extended_din_has_sizes_and_comments_are_ignored() {
 #[test]
 fn wrong_din_lines_are_named() {
     for line in [
-        "",
         "0",
         "0 xyz",
         "3 10",
@@ -206,6 +205,61 @@ fn wrong_din_lines_are_named() {
     let endless = [b"0 1\n".as_slice(), &vec![b' '; 3 << 20]].concat();
     let error = refused(&endless, Some(AddressForm::Din));
     assert!(error.contains("line 2") && error.len() < 300, "{error}");
+}
+
+#[test]
+fn din_is_read_with_any_line_ends_blank_lines_and_a_byte_order_mark() {
+    let plain = "0 1000\n1 1040\nr 10 4 x\n0 1000\n";
+    let expected = read(plain.as_bytes(), None).unwrap();
+    assert_eq!(expected.0.len(), 4);
+    for text in [
+        plain.replace('\n', "\r\n"),
+        plain.replace('\n', "\r"),
+        plain.replace('\n', "\n\r"),
+        plain.replace('\n', "\n \t\n\n"),
+        format!("\r\n\n{plain}\n \n"),
+        format!("\u{feff}{plain}"),
+        format!("\u{feff}\n{}", plain.trim_end()),
+    ] {
+        for form in [None, Some(AddressForm::Din)] {
+            assert_eq!(read(text.as_bytes(), form).unwrap(), expected, "{text:?}");
+        }
+    }
+    let error = refused(b"0 1\r\n\r\n\n0 x\r\n", Some(AddressForm::Din));
+    assert!(error.starts_with("x: line 4 at byte 8: "), "{error}");
+    let error = refused(b"0 1\r\r0 x\r", Some(AddressForm::Din));
+    assert!(error.starts_with("x: line 3 at byte 5: "), "{error}");
+    let error = refused(b"\n \r\n", Some(AddressForm::Din));
+    assert!(error.contains("at least one access"), "{error}");
+}
+
+#[test]
+fn gzip_may_be_padded_with_zeros_and_other_compressions_are_named() {
+    let text = b"0 1000\n1 1040\n";
+    let expected = read(text, None).unwrap();
+    let packed = compressed(Compression::Gzip, text);
+    for padding in [1, 7, 512, 70_000] {
+        let padded = [packed.as_slice(), &vec![0; padding]].concat();
+        assert_eq!(read(&padded, None).unwrap(), expected, "{padding}");
+        let followed = [padded.as_slice(), &packed].concat();
+        let error = refused(&followed, None);
+        assert!(error.contains("other than zero"), "{error}");
+    }
+    for (head, name) in [
+        (&b"\xfd7zXZ\0\0\x04"[..], "xz"),
+        (b"BZh91AY&SY", "bzip2"),
+        (b"\x04\x22\x4d\x18\x64", "LZ4"),
+        (b"PK\x03\x04\x14", "ZIP"),
+    ] {
+        let error = refused(head, None);
+        let unpacking = error.contains("unpack with `") && error.contains("gzip or Zstandard");
+        assert!(
+            unpacking && error.ends_with(&format!("found {name}")),
+            "{error}"
+        );
+        let words = [head, &[0; 16]].concat();
+        assert!(read(&words[..8], Some(AddressForm::U64)).is_ok(), "{name}");
+    }
 }
 
 #[test]
