@@ -13,6 +13,7 @@ mod kernels;
 mod captures;
 mod configurations;
 mod gltf;
+mod images;
 mod obj;
 mod paths;
 mod traces;
@@ -53,6 +54,11 @@ impl Target {
             name: "gltf",
             run: gltf::run,
             mutate: gltf::mutate,
+        },
+        Self {
+            name: "images",
+            run: images::run,
+            mutate: plain,
         },
         Self {
             name: "obj",

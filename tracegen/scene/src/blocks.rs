@@ -1,5 +1,6 @@
-//! Texels that a file already holds compressed, and their decoding.
+//! Texels that a file already holds as a texture unit reads them, and their decoding.
 
+use crate::channels::View;
 use crate::srgb;
 use formats::texture::{ColorSpace, TexelFormat};
 
@@ -12,22 +13,47 @@ pub enum ImageData {
     Blocks(Blocks),
 }
 
-/// Compressed levels of an image.
+/// Levels of an image as its file has them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Blocks {
-    /// Format of the blocks.
+    /// Format of the texture.
     pub format: TexelFormat,
-    /// Bytes of each level, largest level first; each holds its blocks row by row from the top.
+    /// Format of `levels`: that of the texture, or RGBA8 where the file's own texels were decoded.
+    pub held: TexelFormat,
+    /// Bytes of each level in the file, largest level first; each holds its blocks row by row from the
+    /// top.
     pub levels: Vec<Vec<u8>>,
+    /// How the texture shows them.
+    pub view: View,
 }
 
-/// Format and number of levels of an image's stored blocks, known without reading the blocks.
+impl Blocks {
+    /// Whether the levels are the texture's own bytes.
+    #[must_use]
+    pub fn is_plain(&self) -> bool {
+        self.held == self.format && self.view == View::default()
+    }
+
+    /// The RGBA8 texels of a level of an image whose level 0 has this size; `None` for a level that is
+    /// missing or cannot be decoded.
+    #[must_use]
+    pub fn texels(&self, level: u32, size: [u32; 2], color_space: ColorSpace) -> Option<Vec<u8>> {
+        let bytes = self.levels.get(level as usize)?;
+        let size = level_size(size, level);
+        let texels = decode(self.held, size, color_space, bytes)?;
+        Some(self.view.shown(texels, size))
+    }
+}
+
+/// Format and number of levels of an image's texture, known without reading the blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StoredBlocks {
     /// Format of the blocks.
     pub format: TexelFormat,
-    /// Levels, at least one and at most a whole chain.
+    /// Levels of the texture, at least one and at most a whole chain.
     pub levels: u32,
+    /// Levels in the file, at least one. The others are made from level 0.
+    pub held: u32,
 }
 
 /// Size of a level in texels.

@@ -5,7 +5,7 @@ use crate::blocks::{self, ImageData, StoredBlocks};
 use crate::containers::{self, Kind};
 use crate::files::{Origin, read_file, read_start};
 use crate::image::{Image, ImageSource, OpenSource};
-use formats::texture::ColorSpace;
+use formats::texture::{ColorSpace, TexelFormat};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 use std::collections::HashMap;
@@ -252,15 +252,15 @@ impl Encoded {
             size: image.size,
             texel_bytes: rgba_bytes(image.size) + rgba_bytes(mask.size),
             encoded_bytes: (bytes, mask_bytes),
-            stored: image.stored.filter(|stored| self.keeps(image.size, stored)),
+            stored: (image.stored).filter(|stored| self.keeps(image.size, stored.format)),
         })
     }
 
     /// Whether the image's blocks are kept: its channels must be used as stored, and level 0 must
     /// consist of whole blocks, as drivers require.
-    fn keeps(&self, size: [u32; 2], stored: &StoredBlocks) -> bool {
+    fn keeps(&self, size: [u32; 2], format: TexelFormat) -> bool {
         matches!(self.request.usage, Usage::Color | Usage::Data)
-            && blocks::is_whole_blocks(stored.format, size)
+            && blocks::is_whole_blocks(format, size)
     }
 
     /// Reads the header of an image in any format.
@@ -325,10 +325,8 @@ impl Encoded {
                 Usage::Color | Usage::Masked(_) => ColorSpace::Srgb,
                 Usage::Data | Usage::AlphaFactor => ColorSpace::Linear,
             };
-            let level = stored.levels.first().map_or(&[][..], Vec::as_slice);
-            let texels = blocks::decode(stored.format, size, color_space, level);
-            let texels = texels.ok_or_else(|| {
-                let expected = format!("blocks of {:?}", stored.format);
+            let texels = stored.texels(0, size, color_space).ok_or_else(|| {
+                let expected = format!("blocks of {:?}", stored.held);
                 self.fault(request, kind, (expected, "others".into()))
             })?;
             return Ok((size, texels));
@@ -349,8 +347,6 @@ impl Encoded {
             .with_guessed_format()
             .map_err(|e| self.corrupt(request, &e))?;
         let mut limits = Limits::no_limits();
-        limits.max_image_width = Some(MAX_SIZE);
-        limits.max_image_height = Some(MAX_SIZE);
         // Eight bytes per texel of the largest image: 16-bit RGBA before it is converted to RGBA8.
         limits.max_alloc = Some(u64::from(MAX_SIZE) * u64::from(MAX_SIZE) * 8);
         reader.limits(limits);
@@ -434,11 +430,7 @@ impl OpenSource for Read<'_> {
     fn data(&self, parts: &[usize]) -> Result<Vec<ImageData>, SceneError> {
         if let Some(kind) = containers::of(&self.image) {
             let (size, blocks) = self.of.stored(&self.of.request, &self.image, kind)?;
-            let stored = StoredBlocks {
-                format: blocks.format,
-                levels: blocks.levels.len() as u32,
-            };
-            if self.of.keeps(size, &stored) {
+            if self.of.keeps(size, blocks.format) {
                 return Ok(vec![ImageData::Blocks(blocks); parts.len()]);
             }
         }

@@ -4,6 +4,7 @@
 mod animation;
 pub mod blocks;
 pub mod cameras;
+pub mod channels;
 mod coarse;
 mod containers;
 mod error;

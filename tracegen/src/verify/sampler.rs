@@ -92,7 +92,7 @@ fn texel(of: &CompressedTexture, level: u32, at: [u32; 2], decoder: Decoder) -> 
 
 /// A texel of a level as its block encodes it; `None` if there are no such blocks.
 fn decoded(of: &CompressedTexture, level: u32, at: [u32; 2], decoder: Decoder) -> Option<DVec4> {
-    let block_bytes = match of.texture.format {
+    let block_bytes = match of.held {
         TexelFormat::Bc1 => 8,
         TexelFormat::Bc3 => 16,
         _ => return stored(of, level, at),
@@ -123,7 +123,7 @@ fn decoded(of: &CompressedTexture, level: u32, at: [u32; 2], decoder: Decoder) -
 /// A texel of a format that is never made and only kept, by the decoder that the driver's copy was made
 /// with.
 fn stored(of: &CompressedTexture, level: u32, at: [u32; 2]) -> Option<DVec4> {
-    let format = of.texture.format;
+    let format = of.held;
     let block = format.block();
     let before: usize = (of.first_level..level)
         .map(|l| level_bytes(format, of.texture.level_size(l)))
@@ -260,6 +260,7 @@ mod tests {
                 texture,
                 first_level: 0,
                 blocks: [0xf800, 0x001f, 0x0400].map(block).concat(),
+                held: TexelFormat::Bc1,
             }],
             of_image: vec![Some(0)],
             ..TextureSet::default()

@@ -115,6 +115,31 @@ pub fn compress(
     (texel_format, blocks)
 }
 
+/// RGBA8 texels of level 1 and all coarser levels of an image that keeps its alpha.
+pub fn chain(
+    base: &[u8],
+    size: [u32; 2],
+    color_space: ColorSpace,
+    normal_map: bool,
+) -> Vec<Vec<u8>> {
+    let kind = mipmap::Kind {
+        srgb: color_space == ColorSpace::Srgb,
+        normal_map,
+    };
+    let is_translucent = base.chunks_exact(4).any(|texel| texel[3] != 255);
+    let mut levels = Vec::new();
+    let mut last: Option<Level> = None;
+    for _ in 1..level_count(size) {
+        let next = match &last {
+            None => Level::half_of(base, size, kind, is_translucent),
+            Some(level) => level.half(kind),
+        };
+        levels.push(next.encode(kind));
+        last = Some(next);
+    }
+    levels
+}
+
 fn append_blocks(
     blocks: &mut Vec<u8>,
     rgba: &[u8],

@@ -41,6 +41,9 @@ pub struct CompressedTexture {
     /// Blocks of the levels from `first_level` on, in order, each level row by row from the top. Empty for a
     /// texture that is not visible in any view.
     pub blocks: Vec<u8>,
+    /// Format of `blocks`: that of the texture, or RGBA8 for levels that were made from those of a file whose
+    /// format has no encoder here.
+    pub held: TexelFormat,
 }
 
 impl CompressedTexture {
@@ -49,30 +52,36 @@ impl CompressedTexture {
     #[must_use]
     pub fn for_driver(&self) -> Cow<'_, Self> {
         let own = &self.texture;
-        if matches!(
-            own.format,
-            TexelFormat::Bc1 | TexelFormat::Bc3 | TexelFormat::Rgba8
-        ) {
-            return Cow::Borrowed(self);
+        match self.held {
+            TexelFormat::Bc1 | TexelFormat::Bc3 => return Cow::Borrowed(self),
+            TexelFormat::Rgba8 if own.format == TexelFormat::Rgba8 => return Cow::Borrowed(self),
+            TexelFormat::Rgba8 => return Cow::Owned(self.as_rgba8(self.blocks.clone())),
+            _ => {}
         }
         let mut rest = self.blocks.as_slice();
         let mut texels = Vec::new();
         for level in self.first_level..own.levels {
             let size = own.level_size(level);
-            let bytes = blocks::level_bytes(own.format, size).min(rest.len());
+            let bytes = blocks::level_bytes(self.held, size).min(rest.len());
             let (stored, others) = rest.split_at(bytes);
-            let decoded = blocks::decode(own.format, size, own.color_space, stored);
+            let decoded = blocks::decode(self.held, size, own.color_space, stored);
             texels.extend(decoded.unwrap_or_default());
             rest = others;
         }
-        Cow::Owned(Self {
+        Cow::Owned(self.as_rgba8(texels))
+    }
+
+    /// The same texture with these texels of RGBA8.
+    fn as_rgba8(&self, blocks: Vec<u8>) -> Self {
+        Self {
             texture: Texture {
                 format: TexelFormat::Rgba8,
-                ..own.clone()
+                ..self.texture.clone()
             },
             first_level: self.first_level,
-            blocks: texels,
-        })
+            blocks,
+            held: TexelFormat::Rgba8,
+        }
     }
 }
 
@@ -175,7 +184,13 @@ impl TextureSet {
     pub fn skipped_bytes(&self) -> usize {
         self.textures
             .iter()
-            .map(|t| compress::chain_bytes(&t.texture, 0) - t.blocks.len())
+            .map(|t| {
+                let held = Texture {
+                    format: t.held,
+                    ..t.texture.clone()
+                };
+                compress::chain_bytes(&held, 0).saturating_sub(t.blocks.len())
+            })
             .sum()
     }
 
@@ -241,6 +256,7 @@ impl Member<'_> {
                 texture,
                 first_level: self.first_level(),
                 blocks,
+                held: format,
             },
             cached,
         }
@@ -279,15 +295,36 @@ impl Member<'_> {
         ))
     }
 
-    /// The texture for the compressed blocks of the image's file.
-    fn with_stored_blocks(&self, held: blocks::Blocks) -> Result<Made, TextureError> {
+    /// The texture for the blocks of the image's file. Levels that the file leaves to be made are averages of
+    /// level 0.
+    fn with_stored_blocks(&self, held: &blocks::Blocks) -> Result<Made, TextureError> {
         let expected = self.image.stored;
         let found = (held.format, held.levels.len() as u32);
-        if expected.map(|stored| (stored.format, stored.levels)) == Some(found) {
+        let Some(stored) = expected.filter(|stored| (stored.format, stored.held) == found) else {
+            // The file was changed after its header was read.
+            return Err(self.error(format!("{expected:?}"), format!("{found:?}")));
+        };
+        if held.is_plain() && stored.levels == stored.held {
             return Ok(self.made(held.format, held.levels.concat(), false));
         }
-        // The file was changed after its header was read.
-        Err(self.error(format!("{expected:?}"), format!("{found:?}")))
+        let Image {
+            size, color_space, ..
+        } = *self.image;
+        let mut levels: Vec<Vec<u8>> = (0..stored.held)
+            .map(|level| held.texels(level, size, color_space))
+            .collect::<Option<_>>()
+            .ok_or_else(|| self.error("levels of texels".to_owned(), format!("{found:?}")))?;
+        if let Some(base) = levels.first() {
+            let made = compress::chain(base, size, color_space, self.role.normal_map);
+            // A file without levels asks for all of them, one with levels for none.
+            levels.extend(
+                made.into_iter()
+                    .take((stored.levels - stored.held) as usize),
+            );
+        }
+        let mut made = self.made(stored.format, levels.concat(), false);
+        made.texture.held = TexelFormat::Rgba8;
+        Ok(made)
     }
 
     fn check_texels(&self, rgba: &[u8]) -> Result<(), TextureError> {
@@ -384,7 +421,7 @@ fn prepare_source(
         let rgba = match data {
             ImageData::Rgba8(rgba) => rgba,
             ImageData::Blocks(held) => {
-                made.push(member.with_stored_blocks(held)?);
+                made.push(member.with_stored_blocks(&held)?);
                 continue;
             }
         };

@@ -184,6 +184,7 @@ fn white() -> CompressedTexture {
         },
         first_level: 0,
         blocks: vec![255; 4],
+        held: TexelFormat::Rgba8,
     }
 }
 

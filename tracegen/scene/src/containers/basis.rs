@@ -3,8 +3,7 @@
 //! UASTC becomes BC7. ETC1S becomes BC1, or BC3 if it has alpha, because its quality is no better
 //! and desktop drivers choose the same. No texel is decoded and compressed again.
 
-use super::{Fault, Header, level};
-use crate::blocks::Blocks;
+use super::{Fault, Header, Texels, level, needed_bytes};
 use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
 use formats::texture::TexelFormat;
 
@@ -31,16 +30,16 @@ pub(super) fn format(bytes: &[u8]) -> Result<TexelFormat, Fault> {
     open(bytes).map(|(_, format, _)| format)
 }
 
-/// Transcodes all levels.
-pub(super) fn blocks(bytes: &[u8], header: &Header) -> Result<Blocks, Fault> {
-    let (transcoder, format, target) = open(bytes)?;
-    let levels = (0..header.stored.levels)
+/// Transcodes all levels of the file.
+pub(super) fn levels(bytes: &[u8], header: &Header) -> Result<Vec<Vec<u8>>, Fault> {
+    let (transcoder, _, target) = open(bytes)?;
+    (0..header.stored.held)
         .map(|number| {
             let transcoded = transcoder
                 .transcode(number, target, DecodeFlags::NONE)
                 .map_err(|e| fault(format!("{e:?} in level {number}")))?;
-            level(header, number, &transcoded)
+            let needed = needed_bytes(header, number, Texels::Own);
+            level(header, number, needed, &transcoded)
         })
-        .collect::<Result<_, _>>()?;
-    Ok(Blocks { format, levels })
+        .collect()
 }
