@@ -3,9 +3,12 @@
 use crate::error::SceneError;
 use formats::container::{kind_of, open_regular};
 use formats::text::printable;
+use memmap2::Mmap;
 use std::fs::Metadata;
 use std::io::Read;
+use std::ops::{Deref, Range};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Names the file in every error of one loader.
 #[derive(Clone, Debug)]
@@ -75,15 +78,83 @@ pub(crate) fn read_file(file: &Path, place: &str, max_bytes: u64) -> Result<Vec<
     read(file, place, length)
 }
 
-/// Reads the first `wanted` bytes of a regular file, or all of a shorter one. Also returns its
-/// length.
+/// The first `wanted` bytes of a regular file, or all of a shorter one. Also returns its length.
 pub(crate) fn read_start(
     file: &Path,
     place: &str,
     wanted: u64,
-) -> Result<(Vec<u8>, u64), SceneError> {
+) -> Result<(Bytes, u64), SceneError> {
     let length = check_regular(file, place)?.len();
-    Ok((read(file, place, length.min(wanted))?, length))
+    let bytes = length.min(wanted);
+    if bytes < MAPPED_FROM_BYTES {
+        return Ok((Bytes::Held(read(file, place, bytes)?), length));
+    }
+    let failed = |e| cannot_read(file, place, e);
+    let opened = open_regular(file).map_err(failed)?;
+    // SAFETY: the map is only read. A program that shortens the file meanwhile would end this one with
+    // a bus error; exporters write a scene before it is captured.
+    let map = unsafe { Mmap::map(&opened) }.map_err(failed)?;
+    let range = 0..map.len().min(usize::try_from(bytes).unwrap_or(usize::MAX));
+    let map = Arc::new(map);
+    Ok((Bytes::Mapped { map, range }, length))
+}
+
+/// Files from this size on are mapped, so that only what a scene uses of them is read.
+const MAPPED_FROM_BYTES: u64 = 1 << 24;
+
+/// Bytes of a file or of a part of it.
+#[derive(Debug)]
+pub(crate) enum Bytes {
+    /// In memory.
+    Held(Vec<u8>),
+    /// In a mapped file.
+    Mapped {
+        /// The file.
+        map: Arc<Mmap>,
+        /// The part.
+        range: Range<usize>,
+    },
+}
+
+impl Bytes {
+    /// These bytes of the part, which a slice of it may outlive.
+    pub fn part(&self, range: Range<usize>) -> Self {
+        match self {
+            Self::Held(bytes) => Self::Held(bytes.get(range).unwrap_or_default().to_vec()),
+            Self::Mapped { map, range: own } => {
+                let [start, end] = [range.start, range.end].map(|at| own.end.min(own.start + at));
+                Self::Mapped {
+                    map: Arc::clone(map),
+                    range: start..end.max(start),
+                }
+            }
+        }
+    }
+
+    /// Shortens the part to this many bytes.
+    pub fn truncate(&mut self, bytes: usize) {
+        match self {
+            Self::Held(held) => held.truncate(bytes),
+            Self::Mapped { range, .. } => range.end = range.end.min(range.start + bytes),
+        }
+    }
+}
+
+impl Default for Bytes {
+    fn default() -> Self {
+        Self::Held(Vec::new())
+    }
+}
+
+impl Deref for Bytes {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        match self {
+            Self::Held(bytes) => bytes,
+            Self::Mapped { map, range } => map.get(range.clone()).unwrap_or_default(),
+        }
+    }
 }
 
 /// The file's metadata, read before the file is opened: opening a FIFO would wait for a writer.

@@ -78,7 +78,10 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
         warn_of_multiview_defect(backend)?;
     }
     let ready = started.elapsed();
-    let scene = format!("{}, camera {}", args.scene.scene, session.setup.camera.name);
+    let scene = format!(
+        "{}, camera {}",
+        &*args.scene.scene, session.setup.camera.name
+    );
     note_ready(&scene, counts, [loaded, textured, ready]);
     let frames = session.setup.frames.clone();
     progress.stage("capturing", frames.len() as u64, "frames");

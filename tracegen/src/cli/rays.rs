@@ -194,7 +194,7 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
         trace: TraceMeta {
             tool: super::tool(),
             command_line: lasting_arguments(std::env::args_os().skip(1)),
-            scene: args.scene.scene.clone(),
+            scene: args.scene.scene.to_string(),
             scene_triangles,
             camera: camera.name,
             backend: "rays".to_owned(),

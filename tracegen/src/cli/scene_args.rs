@@ -3,13 +3,14 @@
 use super::path_args::PathArgs;
 use super::pose_args::PoseArgs;
 use clap::Args;
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use formats::view::{FovTangents, FrameViews, Hmd};
 use glam::{DVec3, Vec3};
 use scene::paths::Moments;
 use scene::{Camera, LoadOptions, Loaded, Scene, cameras, hmd, units};
 use scenes::load_with;
 use shell::Output;
-use std::ops::Range;
+use std::ops::{Deref, Range};
 use std::path::{Path, PathBuf};
 
 /// Scene, camera and display of a capture.
@@ -19,8 +20,8 @@ pub struct SceneArgs {
     ///
     /// The images of a file may decode to at most 512 MiB of RGBA8 texels, or to 128 bytes per byte of their
     /// files if that is more.
-    #[arg(value_name = "SCENE")]
-    pub scene: String,
+    #[arg(value_name = "SCENE", value_parser = SceneSpec::parser())]
+    pub scene: SceneSpec,
     /// Material variant of a glTF file to show (KHR_materials_variants).
     #[arg(long, value_name = "NAME")]
     pub variant: Option<String>,
@@ -68,7 +69,7 @@ impl SceneArgs {
     /// An output that cannot be written, or that would replace the scene, the path or another output.
     pub fn check_outputs(&self, path: &PathArgs, outputs: &[Output]) -> anyhow::Result<()> {
         // Names of built-in scenes have no extension and are not files.
-        let scene = Path::new(&self.scene);
+        let scene = self.scene.path();
         let path = path.file();
         let inputs = scene.extension().map(|_| scene).into_iter();
         shell::check_outputs(outputs, inputs.chain(path.as_deref()))?;
@@ -116,7 +117,7 @@ impl SceneArgs {
         if self.hmd.ipd.is_none()
             && let Some(warning) = units::warning(&scene, &camera, hmd.ipd_m)
         {
-            shell::warn(&format!("{}: {warning}", self.scene));
+            shell::warn(&format!("{}: {warning}", &*self.scene));
         }
         let heads = path.poses(&camera, &moments)?;
         let camera = path.start(&camera)?;
@@ -163,12 +164,47 @@ fn warn_of_coarse_places(camera: &Camera, frames: &[FrameViews], origin: DVec3) 
 ///
 /// # Errors
 /// An unreadable scene.
-pub fn load_scene(spec: &str, options: &LoadOptions) -> anyhow::Result<Loaded> {
-    let loaded = load_with(spec, options)?;
+pub fn load_scene(spec: &SceneSpec, options: &LoadOptions) -> anyhow::Result<Loaded> {
+    let loaded = match spec.path().to_str() {
+        Some(text) => load_with(text, options)?,
+        None => scene::load_file(spec.path(), options)?,
+    };
     for warning in &loaded.warnings {
-        shell::warn(&format!("{spec}: {warning}"));
+        shell::warn(&format!("{}: {warning}", &**spec));
     }
     Ok(loaded)
+}
+
+/// The name of a built-in scene or of a file, which need not be UTF-8.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SceneSpec {
+    path: PathBuf,
+    /// The same for people and for traces.
+    text: String,
+}
+
+impl SceneSpec {
+    /// Parser of an argument.
+    pub fn parser() -> impl TypedValueParser<Value = Self> {
+        OsStringValueParser::new().map(|spec| Self {
+            text: spec.to_string_lossy().into_owned(),
+            path: spec.into(),
+        })
+    }
+
+    /// The file, if it is one.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Deref for SceneSpec {
+    type Target = str;
+
+    fn deref(&self) -> &str {
+        &self.text
+    }
 }
 
 /// Warns that no part of the scene is in the picture; coordinates are relative to `origin`.

@@ -2,7 +2,7 @@
 
 use super::cache_args::CacheArgs;
 use super::pose_args::PoseArgs;
-use super::scene_args::load_scene;
+use super::scene_args::{SceneSpec, load_scene};
 #[cfg(test)]
 use crate::schemas::Published;
 use ::scenes::BUILTINS;
@@ -17,8 +17,8 @@ use textures::{Cache, TextureSet};
 #[derive(Args, Debug)]
 pub struct ScenesArgs {
     /// Scene file or built-in scene to describe; without it the built-in scenes are listed.
-    #[arg(value_name = "SCENE")]
-    scene: Option<String>,
+    #[arg(value_name = "SCENE", value_parser = SceneSpec::parser())]
+    scene: Option<SceneSpec>,
     /// Also read and compress the images as a capture does, and print their size.
     #[arg(long, requires = "scene")]
     textures: bool,
@@ -123,7 +123,7 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
 
 /// Loads and compresses everything, and prints the time on stderr.
 fn read_textures(
-    spec: &str,
+    spec: &SceneSpec,
     options: &LoadOptions,
     cache: Option<&Cache>,
 ) -> anyhow::Result<Description> {

@@ -193,9 +193,13 @@ fn plan(capture: Capture, folder: &Path, scenes: &mut SceneSizes) -> anyhow::Res
         anyhow::anyhow!("{}", first.trim_start_matches("error: "))
     });
     let (scene, pixels, per_triangle) = match parsed.with_context(place)?.command {
-        Command::Raster(args) => (args.scene.scene.clone(), args.pixels(), PIXELS_PER_TRIANGLE),
+        Command::Raster(args) => (
+            args.scene.scene.to_string(),
+            args.pixels(),
+            PIXELS_PER_TRIANGLE,
+        ),
         Command::Rays(args) => (
-            args.scene.scene.clone(),
+            args.scene.scene.to_string(),
             args.samples(),
             SAMPLES_PER_TRIANGLE,
         ),

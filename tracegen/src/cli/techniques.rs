@@ -23,7 +23,7 @@ use image_error::PIXELS_PER_DEGREE;
 use scene::LoadOptions;
 use shell::{Progress, Threads, note};
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use xxhash_rust::xxh3::xxh3_64;
 
 /// Default eye size, without `--size` and `--hmd`: half the default display's.
@@ -275,7 +275,7 @@ impl TechniquesArgs {
         };
         Ok(StudySetup {
             tool: super::tool(),
-            scene: self.scene.scene.clone(),
+            scene: self.scene.scene.to_string(),
             scene_triangles: setup.scene.triangle_count(),
             instances: setup.scene.instances.len() as u64,
             camera: setup.camera.name.clone(),
@@ -317,7 +317,7 @@ impl TechniquesArgs {
 
     /// Files that the study reads.
     fn inputs(&self) -> Vec<PathBuf> {
-        let scene = Path::new(&self.scene.scene);
+        let scene = self.scene.scene.path();
         // Names of built-in scenes have no extension and are not files.
         let scene = scene.extension().map(|_| scene.to_owned());
         scene.into_iter().chain(self.path.file()).collect()

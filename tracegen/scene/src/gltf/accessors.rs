@@ -2,7 +2,7 @@
 
 use super::meshopt;
 use crate::SceneError;
-use crate::files::Origin;
+use crate::files::{Bytes, Origin};
 use gltf::json::accessor::{Accessor, ComponentType, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
@@ -20,7 +20,7 @@ const SMALL_FILE_MADE: u64 = 1 << 26;
 pub(super) struct Buffers<'a> {
     pub root: &'a Root,
     pub origin: &'a Origin,
-    bytes: Vec<Vec<u8>>,
+    bytes: Vec<Bytes>,
     /// Decompressed views, by number, filled on first use.
     decompressed: Vec<OnceCell<Vec<u8>>>,
     /// The file uses KHR_mesh_quantization.
@@ -37,8 +37,8 @@ struct Elements<'a> {
 
 impl<'a> Buffers<'a> {
     /// `json_bytes` is the size of the JSON, or of the GLB.
-    pub fn new(root: &'a Root, bytes: Vec<Vec<u8>>, origin: &'a Origin, json_bytes: usize) -> Self {
-        let file_bytes = json_bytes + bytes.iter().map(Vec::len).sum::<usize>();
+    pub fn new(root: &'a Root, bytes: Vec<Bytes>, origin: &'a Origin, json_bytes: usize) -> Self {
+        let file_bytes = json_bytes + bytes.iter().map(|buffer| buffer.len()).sum::<usize>();
         let budget = (file_bytes as u64) * MADE_PER_BYTE + SMALL_FILE_MADE;
         Self {
             root,
@@ -103,7 +103,7 @@ impl<'a> Buffers<'a> {
         start: u64,
         length: u64,
     ) -> Result<&[u8], SceneError> {
-        let bytes = self.bytes.get(buffer).map_or(&[][..], Vec::as_slice);
+        let bytes = self.bytes.get(buffer).map_or(&[][..], |buffer| buffer);
         slice(bytes, start, length).ok_or_else(|| {
             self.origin.invalid(
                 place,
@@ -287,7 +287,8 @@ impl<'a> Buffers<'a> {
     ) -> Result<Elements<'_>, SceneError> {
         let bytes = self.view(view)?;
         let stride = self.root.buffer_views[view].byte_stride;
-        let stride = stride.map_or(size, |s| s.0);
+        // glTF 1 wrote 0 for elements without a gap, and exporters still do.
+        let stride = stride.map(|s| s.0).filter(|&s| s > 0).unwrap_or(size);
         if stride < size {
             return Err(self.origin.invalid(
                 format!("bufferViews[{view}].byteStride"),

@@ -8,7 +8,7 @@ use super::channels::{self, Moved};
 use super::{Parsed, nodes, parse, read_buffers, rig, tree};
 use crate::SceneError;
 use crate::animation::{Channel, Curve};
-use crate::files::{Origin, read_file, shown};
+use crate::files::{Origin, read_start, shown};
 use crate::lookup::Lookup;
 use crate::paths::CameraTrack;
 use crate::warnings::Warnings;
@@ -27,7 +27,7 @@ pub(crate) fn camera_track(
     camera: Option<&str>,
 ) -> Result<(CameraTrack, Vec<String>), SceneError> {
     let origin = Origin::new(path);
-    let bytes = read_file(path, "path", u64::MAX)?;
+    let (bytes, _) = read_start(path, "path", u64::MAX)?;
     let mut warnings = Warnings::default();
     // The scene loader's warnings do not concern the path.
     let Parsed {

@@ -31,7 +31,7 @@ mod transforms;
 mod tree;
 mod variants;
 
-use super::files::{Origin, read_file, read_start, shown};
+use super::files::{Bytes, Origin, read_start, shown};
 use super::lookup::Lookup;
 use super::origin;
 use super::uri::{self, Uri};
@@ -54,7 +54,7 @@ use transforms::Local;
 /// See [`SceneError`].
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     let origin = Origin::new(path);
-    let bytes = read_file(path, "scene", u64::MAX)?;
+    let (bytes, _) = read_start(path, "scene", u64::MAX)?;
     let mut warnings = Warnings::default();
     let Parsed {
         document,
@@ -153,10 +153,10 @@ fn place_views(
 
 /// The file that a URI names: as written, or else as another system or tool would write it.
 fn named_file(origin: &Origin, uri: &str, path: String, lookup: &mut Lookup) -> PathBuf {
-    let names = [path, uri.to_owned()];
+    let names = uri::names(uri, &path);
     match lookup.find(origin.folder(), &names) {
         Some(found) => found.path,
-        None => origin.sibling(Path::new(&names[0])),
+        None => origin.sibling(Path::new(&path)),
     }
 }
 
@@ -203,11 +203,11 @@ struct Parsed {
     /// The image of each texture.
     texture_images: Vec<Option<usize>>,
     /// The GLB's BIN chunk.
-    blob: Option<Vec<u8>>,
+    blob: Option<Bytes>,
 }
 
 /// Parses the container and the JSON and checks every index.
-fn parse(origin: &Origin, bytes: &[u8], warnings: &mut Warnings) -> Result<Parsed, SceneError> {
+fn parse(origin: &Origin, bytes: &Bytes, warnings: &mut Warnings) -> Result<Parsed, SceneError> {
     let (json, blob) = if bytes.starts_with(b"glTF") {
         let whole = binary::check(bytes, origin)?;
         if whole.len() < bytes.len() {
@@ -218,9 +218,13 @@ fn parse(origin: &Origin, bytes: &[u8], warnings: &mut Warnings) -> Result<Parse
         }
         let glb = Glb::from_slice(whole)
             .map_err(|e| origin.invalid("GLB", "a glTF 2.0 asset", e.to_string()))?;
-        (glb.json, glb.bin)
+        let bin = glb.bin.map(|bin| {
+            let start = bin.as_ptr().addr() - bytes.as_ptr().addr();
+            bytes.part(start..start + bin.len())
+        });
+        (glb.json, bin)
     } else {
-        (bytes.into(), None)
+        (Cow::Borrowed(&**bytes), None)
     };
     let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&json);
     let texture_images = features::check(json, origin, warnings)?;
@@ -230,7 +234,7 @@ fn parse(origin: &Origin, bytes: &[u8], warnings: &mut Warnings) -> Result<Parse
         transforms: transforms::read(json, origin)?,
         texture_images,
         document: gltf::Document::from_json_without_validation(root),
-        blob: blob.map(Cow::into_owned),
+        blob,
     })
 }
 
@@ -267,7 +271,7 @@ fn validate(origin: &Origin, root: &Root) -> Result<(), SceneError> {
             && [".min", ".max", ".bufferView"]
                 .iter()
                 .any(|end| path.ends_with(end));
-        if !unneeded {
+        if !(unneeded || is_zero_stride(root, &path)) {
             first = Some((path, fault));
         }
     });
@@ -284,19 +288,29 @@ fn validate(origin: &Origin, root: &Root) -> Result<(), SceneError> {
     Err(origin.invalid(place, expected, found))
 }
 
+/// Whether this is the place of a stride of 0, which stands for none.
+fn is_zero_stride(root: &Root, path: &str) -> bool {
+    let view = path
+        .strip_prefix("bufferViews[")
+        .and_then(|rest| rest.strip_suffix("].byteStride"))
+        .and_then(|number| root.buffer_views.get(number.parse::<usize>().ok()?));
+    view.and_then(|view| view.byte_stride)
+        .is_some_and(|stride| stride.0 == 0)
+}
+
 /// Reads from every buffer as many bytes as the file states. Fewer bytes are an error.
 fn read_buffers(
     origin: &Origin,
     root: &Root,
-    mut blob: Option<Vec<u8>>,
+    mut blob: Option<Bytes>,
     lookup: &mut Lookup,
     warnings: &mut Warnings,
-) -> Result<Vec<Vec<u8>>, SceneError> {
+) -> Result<Vec<Bytes>, SceneError> {
     let mut buffers = Vec::with_capacity(root.buffers.len());
     for (index, buffer) in root.buffers.iter().enumerate() {
         let place = format!("buffers[{index}]");
         let wanted = buffer.byte_length.0;
-        let whole = |bytes: Vec<u8>| {
+        let whole = |bytes: Bytes| {
             let length = bytes.len() as u64;
             (bytes, length)
         };
@@ -307,14 +321,14 @@ fn read_buffers(
             ),
             // Only compressed views refer to it.
             None if meshopt::is_fallback(buffer) => {
-                buffers.push(Vec::new());
+                buffers.push(Bytes::default());
                 continue;
             }
             None => {
                 return Err(origin.invalid(place, "a uri or the GLB's BIN chunk", "neither"));
             }
             Some(uri) => match uri::parse(uri) {
-                Ok(Uri::Data(bytes)) => (whole(bytes), "the data URI".to_owned()),
+                Ok(Uri::Data(bytes)) => (whole(Bytes::Held(bytes)), "the data URI".to_owned()),
                 Ok(Uri::Path(path)) => {
                     let file = find_file(origin, uri, path, &place, lookup, warnings);
                     let read = read_start(&file, &place, wanted)?;
