@@ -3,6 +3,7 @@
 
 mod captures;
 pub mod cli;
+mod cut_triangles;
 mod hidden_mesh;
 mod picture;
 #[cfg(test)]

@@ -17,7 +17,7 @@ const GRID_PX: f64 = 1.0 / 256.0;
 /// rounds.
 const DEPTH_STEPS: f64 = 4.0;
 
-/// The step of 32-bit depths just below 1.
+/// The step of 32-bit depths relative to a depth, at most.
 const DEPTH_STEP: f64 = 1.0 / (1 << 24) as f64;
 
 /// Share of fragments that may be wrong without a warning. Captures have errors of this size at edges.
@@ -230,7 +230,9 @@ impl Placed {
             return Against::Same;
         }
         debug_assert!(wound_alike || (self.double_sided && other.double_sided));
-        let near = |(a, b): (&DVec3, &DVec3)| (a.z - b.z).abs() <= DEPTH_STEPS * DEPTH_STEP;
+        let near = |(a, b): (&DVec3, &DVec3)| {
+            (a.z - b.z).abs() <= DEPTH_STEPS * DEPTH_STEP * a.z.abs().max(b.z.abs())
+        };
         match self.corners.iter().zip(&other.corners).all(near) {
             true => Against::Upon,
             false => Against::Apart,
@@ -283,7 +285,7 @@ mod tests {
         assert_eq!(placed([B, C, A]).against(&one), Against::Same);
         let other_way = placed([A, C, B]);
         assert_eq!(other_way.against(&one), Against::Upon);
-        assert_eq!(lifted(3.0 * DEPTH_STEP).against(&one), Against::Upon);
+        assert_eq!(lifted(DEPTH_STEP).against(&one), Against::Upon);
         assert_eq!(lifted(100.0 * DEPTH_STEP).against(&one), Against::Apart);
         let aside = placed([A, B, C].map(|[x, y, z]| [x + 0.2, y, z]));
         assert_ne!(aside.place(), one.place());

@@ -86,7 +86,7 @@ impl CaptureJob<'_> {
         let replay = |call: &DrawCall| {
             let is_tested = self.fragments == Fragments::DepthTested;
             if is_tested && call.mode == DrawMode::Masked {
-                DepthReplay::Less
+                DepthReplay::Greater
             } else {
                 DepthReplay::None
             }

@@ -63,7 +63,7 @@ impl CaptureJob<'_> {
             let pixels = Pixels {
                 clip_from_world: view.clip_from_world(),
                 size_px: view.layer.size_px,
-                least_w: projection[3][2] / projection[2][2],
+                least_w: projection[3][2] / (1.0 + projection[2][2]),
             };
             let all = |_| TextureSlot::COUNT;
             self.sample(scene, &pixels, view.visible, all, finest);

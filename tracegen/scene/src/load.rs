@@ -116,7 +116,7 @@ mod tests {
             load_file(&file, &LoadOptions::ALL)
         };
         let camera = load("9e11").unwrap().scene.cameras[0].clone();
-        assert!(camera.eye.is_finite() && camera.far.is_finite());
+        assert!(camera.eye.is_finite() && camera.near.is_finite());
         for extent in ["1.1e12", "1e30", "3e38"] {
             let error = load(extent).unwrap_err().to_string();
             let parts = ["far.obj: positions", "at most 1e12 m", "found"];

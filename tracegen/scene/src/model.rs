@@ -17,6 +17,8 @@ pub struct Scene {
     pub origin: DVec3,
     /// Triangle meshes, each with one material.
     pub meshes: Vec<Mesh>,
+    /// Whether a unit is a metre, as in glTF; other files do not say.
+    pub in_metres: bool,
     /// Meshes placed in the world, in submission order.
     pub instances: Vec<Instance>,
     /// Which instances of a built-in scene move, and how.

@@ -12,7 +12,7 @@ pub fn warning(scene: &Scene, camera: &Camera, ipd_m: f32) -> Option<String> {
     let (low, high) = scene.bounds()?;
     let size = (high - low).max_element();
     // Someone who placed a camera knows the unit.
-    if PLAUSIBLE_M.contains(&size) || *camera != cameras::default_camera(scene) {
+    if PLAUSIBLE_M.contains(&size) || camera.name != cameras::DEFAULT_NAME {
         return None;
     }
     let ipd_mm = f64::from(ipd_m) * 1000.0;
@@ -98,7 +98,7 @@ mod tests {
         let scene = of_size(500.0);
         let mut camera = cameras::default_camera(&scene);
         assert!(warning(&scene, &camera, 0.064).is_some());
-        camera.eye += Vec3::X;
+        camera.name = "custom".to_owned();
         assert_eq!(warning(&scene, &camera, 0.064), None);
     }
 }

@@ -23,7 +23,7 @@ const CASCADES: u32 = 4;
 pub fn load(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<SceneSetup> {
     let setup = args
         .scene
-        .setup(None, &args.path, 0..args.frames, &LoadOptions::ALL)?;
+        .setup(None, &args.path, 0..args.frames(), &LoadOptions::ALL)?;
     setup.check_outputs(outputs)?;
     Ok(setup)
 }

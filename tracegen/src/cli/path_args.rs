@@ -7,6 +7,9 @@ use scene::paths::{DEFAULT_FPS, HeadPath, MAX_FRAMES, Moments, PathOrigin, PathS
 use std::ops::Range;
 use std::path::PathBuf;
 
+/// Most views of `--cameras`.
+const MAX_AROUND: u32 = 360;
+
 /// The head's path.
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Camera")]
@@ -19,6 +22,10 @@ pub struct PathArgs {
         default_value = "walk"
     )]
     pub path: PathSpec,
+    /// Views from all sides instead of a path: frame 0 to N - 1 look at the scene from N directions.
+    #[arg(long, value_name = "auto:N", value_parser = parse_around,
+          conflicts_with_all = ["path", "path_origin", "camera", "eye"])]
+    pub cameras: Option<u32>,
     /// Coordinate system of a file's poses [default: camera for CSV, world for glTF].
     #[arg(long, value_parser = origin_parser(), value_name = "ORIGIN")]
     pub path_origin: Option<PathOrigin>,
@@ -48,6 +55,7 @@ impl PathArgs {
     pub fn still() -> Self {
         Self {
             path: PathSpec::Walk,
+            cameras: None,
             path_origin: None,
             fps: DEFAULT_FPS,
         }
@@ -67,7 +75,17 @@ impl PathArgs {
     /// # Errors
     /// An unreadable file, or one that ends before the last frame.
     pub fn open(&self, frames: Range<u32>) -> anyhow::Result<(HeadPath, Moments)> {
-        let (path, warnings) = HeadPath::open(&self.path, self.path_origin)?;
+        let (path, warnings) = match self.cameras {
+            Some(count) => {
+                anyhow::ensure!(
+                    frames.end <= count,
+                    "--cameras auto:{count}: expected frames below {count}, found {}",
+                    frames.end - 1
+                );
+                (HeadPath::around(count), Vec::new())
+            }
+            None => HeadPath::open(&self.path, self.path_origin)?,
+        };
         for warning in warnings {
             shell::warn(&format!("{}: {warning}", self.path));
         }
@@ -84,6 +102,15 @@ impl PathArgs {
 /// Parser for a number of frames.
 pub fn frame_count() -> clap::builder::RangedI64ValueParser<u32> {
     clap::value_parser!(u32).range(1..=i64::from(MAX_FRAMES))
+}
+
+fn parse_around(text: &str) -> Result<u32, String> {
+    let count = text
+        .strip_prefix("auto:")
+        .and_then(|count| count.parse().ok());
+    count
+        .filter(|count| (1..=MAX_AROUND).contains(count))
+        .ok_or_else(|| format!("expected auto:N with N from 1 to {MAX_AROUND}, found '{text}'"))
 }
 
 fn parse_fps(text: &str) -> Result<f32, String> {

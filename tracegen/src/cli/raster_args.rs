@@ -32,10 +32,9 @@ pub struct RasterArgs {
     pub(super) image: Option<PathBuf>,
     #[command(flatten)]
     pub(super) path: PathArgs,
-    /// Frames along the path.
-    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Camera",
-          value_parser = frame_count())]
-    pub(super) frames: u32,
+    /// Frames along the path [default: 1, or all views of `--cameras`].
+    #[arg(long, value_name = "N", help_heading = "Camera", value_parser = frame_count())]
+    frames: Option<u32>,
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
     pub(super) shadows: bool,
@@ -94,6 +93,11 @@ pub struct RasterArgs {
 }
 
 impl RasterArgs {
+    /// Number of frames.
+    pub(super) fn frames(&self) -> u32 {
+        self.frames.or(self.path.cameras).unwrap_or(1)
+    }
+
     /// Pixels of all frames, as far as they are known without the scene.
     ///
     /// # Errors
@@ -106,7 +110,7 @@ impl RasterArgs {
             .eye_size_px
             .map(u64::from);
         let views = self.views.len() as u64;
-        Ok(width * height * views * u64::from(self.frames))
+        Ok(width * height * views * u64::from(self.frames()))
     }
 }
 

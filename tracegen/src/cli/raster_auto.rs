@@ -5,6 +5,7 @@ use super::capture_steps::{TraceOutput, load, warn_of_multiview_defect};
 use super::prepared::{Preparation, Prepared, prepare};
 use super::raster_args::RasterArgs;
 use super::scene_args::warn_of_nothing_seen;
+use crate::cut_triangles::CutTriangles;
 use crate::study::auto::{Budget, Known, Objective, Schedule, choose, search_frames};
 use crate::study::world::World;
 use crate::unstable_triangles::UnstableTriangles;
@@ -54,7 +55,7 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
         Techniques::Named(schedule) => ((**schedule).clone(), None),
         Techniques::Chosen(budget, objective) => {
             let (schedule, choice) = search(
-                args.frames,
+                args.frames(),
                 (*budget, *objective),
                 &mut world,
                 &mut backend,
@@ -63,11 +64,11 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
             (schedule, Some(choice))
         }
     };
-    let planners = Planners::new(&world, &schedule, args.frames)?;
+    let planners = Planners::new(&world, &schedule, args.frames())?;
     if planners.use_multiview() {
         warn_of_multiview_defect(&mut backend)?;
     }
-    let frames: Vec<u32> = (0..args.frames).collect();
+    let frames: Vec<u32> = (0..args.frames()).collect();
     let mut tables = world.trace_tables(|frame| planners.of_frame(frame), &frames)?;
     let name = |frame: &u32| schedule.row(*frame).name.clone();
     tables.meta.techniques = Some(ChosenTechniques {
@@ -80,6 +81,7 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
     let mut memory = Occlusion::default();
     let mut counts = CaptureCounts::default();
     let (mut first, mut unstable) = (None, UnstableTriangles::default());
+    let mut cut = CutTriangles::default();
     for &frame in &frames {
         let planner = planners.of_frame(frame);
         let shot = world.shoot(&mut backend, planner, frame, &mut memory)?;
@@ -87,6 +89,7 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
             first = Some(world.pictures(&mut backend, &shot)?);
             for eye in &world.views[frame as usize].eyes {
                 unstable.look(&world.scene, &world.draws, eye, world.hmd.eye_size_px);
+                cut.look(&world.scene, &world.draws, eye, world.hmd.eye_size_px);
             }
         }
         let job = world.job(planner);
@@ -101,8 +104,9 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
     if counts.fragments == 0 {
         warn_of_nothing_seen(&camera, world.bounds, world.scene.origin);
     }
-    for warning in unstable.warnings(&world.scene, counts.fragments / u64::from(args.frames)) {
-        shell::warn(&warning);
+    let unstable = unstable.warnings(&world.scene, counts.fragments / u64::from(args.frames()));
+    for warning in cut.warnings(&world.scene).iter().chain(&unstable) {
+        shell::warn(warning);
     }
     note(&format!(
         "{} frame(s): {} quads, {} fragments; file {file_bytes} bytes",

@@ -102,6 +102,10 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
     if summary.counts.fragments == 0 {
         super::scene_args::warn_of_nothing_seen(&setup.camera, session.bounds, setup.scene.origin);
     }
+    warn_of_few_pixels(summary.covered, &setup.camera.name);
+    for warning in summary.cut.warnings(&setup.scene) {
+        shell::warn(&warning);
+    }
     let per_frame = summary.counts.fragments / frames.len().max(1) as u64;
     let unstable = summary.unstable.unwrap_or_default();
     for warning in unstable.warnings(&setup.scene, per_frame) {
@@ -228,13 +232,11 @@ impl<'a> Session<'a> {
         backend.pose(&self.setup.scene, &self.draws);
         if summary.unstable.is_none() {
             let unstable = summary.unstable.insert(UnstableTriangles::default());
+            let (scene, size_px) = (&self.setup.scene, self.setup.hmd.eye_size_px);
             for eye in self.args.views {
-                unstable.look(
-                    &self.setup.scene,
-                    &self.draws,
-                    &views.eyes[*eye as usize],
-                    self.setup.hmd.eye_size_px,
-                );
+                let view = &views.eyes[*eye as usize];
+                unstable.look(scene, &self.draws, view, size_px);
+                summary.cut.look(scene, &self.draws, view, size_px);
             }
         }
         let job = self.job();
@@ -251,6 +253,11 @@ impl<'a> Session<'a> {
             false => Some(render_plain(&job, backend, &frame, summary)?),
         };
         let captured = capture(&job, backend, &frame, output, summary)?;
+        let has_depth =
+            job.fragments == Fragments::DepthTested && !job.planner.settings().multiview;
+        if summary.covered.is_none() && has_depth {
+            summary.covered = Some(covered(&frame, &job.depths(backend, &frame)?));
+        }
         let Some(plain) = plain else {
             return Ok(captured.pictures);
         };
@@ -269,6 +276,32 @@ impl<'a> Session<'a> {
         }
         Ok(Some(plain.pictures))
     }
+}
+
+/// Share of the pictures' pixels that something covers, from the depths of a frame's layers.
+fn covered(frame: &Frame, depths: &[Vec<f32>]) -> f64 {
+    let pictures = (depths.iter().enumerate()).filter(|(layer, _)| frame.plan.is_picture(*layer));
+    let (mut drawn, mut all) = (0, 0);
+    for (_, depth) in pictures {
+        drawn += depth.iter().filter(|depth| **depth > 0.0).count();
+        all += depth.len();
+    }
+    drawn as f64 / all.max(1) as f64
+}
+
+/// Share of the pixels below which a view shows little of a scene.
+const FEW: f64 = 0.25;
+
+/// Warns of a first frame that is mostly background; its caches see little.
+fn warn_of_few_pixels(covered: Option<f64>, camera: &str) {
+    let Some(share) = covered.filter(|share| *share > 0.0 && *share < FEW) else {
+        return;
+    };
+    shell::warn(&format!(
+        "the scene covers {:.1} % of the pixels of the first frame (camera {camera}), so that few texels are read \
+         more than once: choose a nearer --camera or --eye and --target, or views around by --cameras auto:8",
+        100.0 * share
+    ));
 }
 
 fn render_plain(

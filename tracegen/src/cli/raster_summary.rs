@@ -1,5 +1,6 @@
 //! Summary of `tracegen raster`: what was drawn, recorded and skipped, and the times.
 
+use crate::cut_triangles::CutTriangles;
 use crate::study::{memory, processor};
 use crate::unstable_triangles::UnstableTriangles;
 use formats::view::FrameViews;
@@ -55,6 +56,10 @@ pub struct Summary {
     pub predicted: Vec<Predicted>,
     /// Unstable triangles of the first frame.
     pub unstable: Option<UnstableTriangles>,
+    /// What the planes of the first frame cut away.
+    pub cut: CutTriangles,
+    /// Share of the first frame's pixels that something covers.
+    pub covered: Option<f64>,
     /// What was found identical with and without capture.
     pub compared: Option<&'static str>,
     pub looking: Duration,

@@ -6,7 +6,7 @@ use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use formats::view::{FovTangents, FrameViews, Hmd};
 use glam::{DVec3, Vec3};
-use scene::paths::Moments;
+use scene::paths::{HeadPath, Moments};
 use scene::{Camera, LoadOptions, Loaded, Scene, cameras, hmd, units};
 use scenes::load_with;
 use shell::Output;
@@ -106,8 +106,16 @@ impl SceneArgs {
             ..
         } = load_scene(&self.scene, &options)?;
         inputs.extend(path_file);
-        let path = path.relative_to(scene.origin);
-        let camera = self.camera.resolve(&scene)?;
+        let path = path.in_scene(&scene);
+        let mut camera = self.camera.resolve(&scene)?;
+        if let HeadPath::Around(views) = &path
+            && let Some(first) = views.first()
+        {
+            camera = Camera {
+                near: self.camera.near.unwrap_or(first.near),
+                ..first.clone()
+            };
+        }
         let vfov_deg = match self.camera.vfov {
             Some(VerticalFov::File) => Some(camera.vfov_deg),
             Some(VerticalFov::Degrees(degrees)) => Some(degrees),
@@ -237,6 +245,10 @@ pub struct CameraArgs {
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vec3, allow_hyphen_values = true,
           default_value = "0,1,0", requires = "eye")]
     pub up: Vec3,
+    /// Distance of the near plane in metres [default: the camera's; without one, 0.05 for glTF and 1 % of
+    /// the scene's radius for others].
+    #[arg(long, value_name = "M", value_parser = parse_near, allow_negative_numbers = true)]
+    pub near: Option<f32>,
     /// Vertical field of view instead of the display's: degrees, or `file` for the camera's own.
     #[arg(long, value_name = "DEG|file", value_parser = parse_vfov,
           conflicts_with_all = ["hfov", "fov_tangents"])]
@@ -264,6 +276,10 @@ impl CameraArgs {
                 cameras::posed(eye, target, self.up, scene.origin, from_scene)?
             }
             _ => from_scene.clone(),
+        };
+        let camera = Camera {
+            near: self.near.unwrap_or(camera.near),
+            ..camera
         };
         cameras::validate(&camera)?;
         Ok(camera)
@@ -404,6 +420,13 @@ fn parse_point(text: &str) -> Result<DVec3, String> {
     parse_doubles::<3>(text).map(DVec3::from)
 }
 
+fn parse_near(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(near_m) if near_m >= f32::MIN_POSITIVE && near_m.is_finite() => Ok(near_m),
+        _ => Err(format!("expected a distance above 0 m, found '{text}'")),
+    }
+}
+
 fn parse_vfov(text: &str) -> Result<VerticalFov, String> {
     if text == "file" {
         return Ok(VerticalFov::File);
@@ -518,6 +541,14 @@ mod tests {
             ),
             ("--fov-tangents 1,2,3", "4 numbers"),
             ("--vfov 60 --hfov 90", "cannot be used with"),
+            ("--near 0", "a distance above 0 m"),
+            ("--near -1", "a distance above 0 m"),
+            ("--near nan", "a distance above 0 m"),
+            ("--near inf", "a distance above 0 m"),
+            ("--cameras 8", "auto:N"),
+            ("--cameras auto:0", "auto:N"),
+            ("--cameras auto:8 --path head", "cannot be used with"),
+            ("--cameras auto:8 --camera a", "cannot be used with"),
             (
                 "--path run",
                 "walk, head, FILE.csv or FILE.gltf[#CAMERA], found 'run'",

@@ -92,7 +92,8 @@ struct CameraEntry {
     up: [f32; 3],
     vfov_deg: f32,
     near_m: f32,
-    far_m: f32,
+    /// `None` at infinity.
+    far_m: Option<f32>,
 }
 
 /// Runs `tracegen scenes`.
@@ -216,7 +217,7 @@ fn describe(loaded: &Loaded) -> Description {
                 up: c.up.to_array(),
                 vfov_deg: c.vfov_deg,
                 near_m: c.near,
-                far_m: c.far,
+                far_m: c.far.is_finite().then_some(c.far),
             })
             .collect(),
         animations: loaded.animations.clone(),
@@ -277,7 +278,7 @@ fn table(d: &Description) -> String {
             point(c.target),
             c.vfov_deg,
             c.near_m,
-            c.far_m,
+            c.far_m.map_or("infinite".to_owned(), |far| far.to_string()),
         );
     }
     if !d.animations.is_empty() {

@@ -134,7 +134,7 @@ mod tests {
     fn views(yaw: f32) -> FrameViews {
         let eye = EyeView {
             world_to_eye: Mat4::from_rotation_y(yaw).inverse().to_cols_array_2d(),
-            eye_to_clip: perspective(1.0, 1.5, 0.1, 100.0).to_cols_array_2d(),
+            eye_to_clip: perspective(1.0, 1.5, 100.0, 0.1).to_cols_array_2d(),
             ..EyeView::default()
         };
         FrameViews {

@@ -1,7 +1,7 @@
 //! An independent reference that captures are compared with.
 //!
 //! A rasteriser and a texture unit in double precision that share only documented rules with the drivers:
-//! vertices snapped to 1/256 pixel, the top-left rule, a depth test with `Less` in submission order,
+//! vertices snapped to 1/256 pixel, the top-left rule, a depth test with `Greater` in submission order,
 //! perspective-correct interpolation, levels of detail and filtering according to the specification. They
 //! share the scene, the eyes' matrices, the list of draws and the compressed textures with the capture, and
 //! the meaning of records with the trace's readers.

@@ -58,7 +58,10 @@ struct Eye {
     clip_from_eye: DMat4,
     world_from_eye: DMat4,
     near_m: f64,
+    /// The far plane, or a distance from which the eyes' pictures hardly differ.
     far_m: f64,
+    /// Whether the far plane is at infinity.
+    endless: bool,
 }
 
 impl Eye {
@@ -69,14 +72,13 @@ impl Eye {
         Self {
             clip_from_eye,
             world_from_eye: matrix(&view.world_to_eye).inverse(),
-            near_m: offset / scale,
-            // A far plane at infinity has a scale of -1.
-            far_m: if scale < -1.0 - 1e-9 {
-                offset / (scale + 1.0)
+            near_m: offset / (1.0 + scale),
+            far_m: if scale > 0.0 {
+                offset / scale
             } else {
-                // Distance beyond which depths in single precision are equal.
-                1e7 * offset / scale
+                1e7 * offset
             },
+            endless: scale <= 0.0,
         }
     }
 
@@ -268,7 +270,7 @@ impl Stereo {
         let [left, top] = [edge.x + origin.x / scale.x, edge.y - origin.y / scale.y];
         let [right, bottom] = [left + size.x / scale.x, top - size.y / scale.y];
         let planes = |tangent: f64| tangent * near;
-        let clip_from_camera = frustum(
+        let mut clip_from_camera = frustum(
             planes(left),
             planes(right),
             planes(bottom),
@@ -276,6 +278,11 @@ impl Stereo {
             near,
             far,
         );
+        // Depth 1 at the near plane to 0 at the far plane.
+        let endless = self.eyes.iter().any(|eye| eye.endless);
+        let scale_of_depth = if endless { 0.0 } else { near / (far - near) };
+        clip_from_camera.z_axis.z = scale_of_depth;
+        clip_from_camera.w_axis.z = near * (1.0 + scale_of_depth);
         let camera_from_world = self.world_from_camera.inverse();
         let far_px_from_direction = DMat3::from_cols(
             DVec3::new(scale.x, 0.0, 0.0),

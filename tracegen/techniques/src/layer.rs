@@ -59,8 +59,14 @@ impl Layer {
     pub fn drawn_from_world(&self) -> Mat4 {
         match self.start {
             Start::Nearer { end } => {
-                let nearer = Vec4::new(1.0, 1.0, 1.0 / end.max(1e-6), 1.0);
-                Mat4::from_diagonal(nearer) * self.clip_from_world()
+                let beyond = 1.0 / (1.0 - end.min(1.0 - 1e-6));
+                let nearer = Mat4::from_cols(
+                    Vec4::X,
+                    Vec4::Y,
+                    Vec4::Z * beyond,
+                    Vec4::new(0.0, 0.0, -end * beyond, 1.0),
+                );
+                nearer * self.clip_from_world()
             }
             _ => self.clip_from_world(),
         }
@@ -73,7 +79,7 @@ impl Layer {
         let clip_from_world = self.clip_from_world();
         // Half of the near plane's distance, at most a millimetre.
         let [_, _, depth, shift] = self.view.eye_to_clip.map(|column| column[2]);
-        let least_w = (0.5 * shift / depth).clamp(0.0, 1e-3);
+        let least_w = (0.5 * shift / (1.0 + depth)).clamp(0.0, 1e-3);
         let (mut first, mut last) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
         for corner in 0..8 {
             let pick = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
@@ -144,7 +150,7 @@ mod tests {
     /// A view along -z in which only the leftmost tiles may be drawn.
     fn layer() -> Layer {
         let view = EyeView {
-            eye_to_clip: perspective(1.0, 1.0, 0.1, 100.0).to_cols_array_2d(),
+            eye_to_clip: perspective(1.0, 1.0, 100.0, 0.1).to_cols_array_2d(),
             ..EyeView::default()
         };
         Layer {

@@ -32,7 +32,7 @@ pub struct ByDepth<'a> {
     turned: DMat3,
     /// Map from the earlier clip space to the current one.
     now_from_before: DMat4,
-    /// Row by row; 1 in pixels without a draw.
+    /// Row by row; 0 in pixels without a draw.
     depth: &'a [f32],
     size_px: [u32; 2],
 }
@@ -80,7 +80,7 @@ impl<'a> ByDepth<'a> {
         let depth = *self.depth.get(row * self.size_px[0] as usize + column)?;
         let ndc = [2.0 * x / width - 1.0, 1.0 - 2.0 * y / height];
         let clip = self.now_from_before * DVec4::new(ndc[0], ndc[1], depth.into(), 1.0);
-        (depth < 1.0 && clip.w > 0.0).then(|| {
+        (depth > 0.0 && clip.w > 0.0).then(|| {
             [
                 (clip.x / clip.w + 1.0) / 2.0 * width,
                 (1.0 - clip.y / clip.w) / 2.0 * height,
@@ -106,7 +106,7 @@ mod tests {
         let view = Mat4::from_rotation_translation(turn, position).inverse();
         EyeView {
             world_to_eye: view.to_cols_array_2d(),
-            eye_to_clip: perspective(1.1, 1.6, 0.1, 1000.0).to_cols_array_2d(),
+            eye_to_clip: perspective(1.1, 1.6, 1000.0, 0.1).to_cols_array_2d(),
             position: position.to_array(),
         }
     }
@@ -160,7 +160,7 @@ mod tests {
         let clip =
             Mat4::from_cols_array_2d(&before.eye_to_clip) * Vec3::new(0.0, 0.0, -2.0).extend(1.0);
         let depth: Vec<f32> = (0..320 * 200)
-            .map(|i| if i % 320 < 160 { clip.z / clip.w } else { 1.0 })
+            .map(|i| if i % 320 < 160 { clip.z / clip.w } else { 0.0 })
             .collect();
         let by_depth = ByDepth::new(&before, &now, &depth, SIZE_PX);
         let turned = before_from_now_px(&before, &now, SIZE_PX);

@@ -84,11 +84,13 @@ impl Clipped {
         }
         for (index, &corner) in triangle.iter().enumerate() {
             let next = triangle[(index + 1) % 3];
-            if corner.z >= 0.0 {
+            // Depth is 1 at the near plane.
+            let [before, after] = [corner, next].map(|c| c.w - c.z);
+            if before >= 0.0 {
                 clipped.push(corner);
             }
-            if (corner.z >= 0.0) != (next.z >= 0.0) {
-                clipped.push(corner + (next - corner) * (corner.z / (corner.z - next.z)));
+            if (before >= 0.0) != (after >= 0.0) {
+                clipped.push(corner + (next - corner) * (before / (before - after)));
             }
         }
         clipped

@@ -2,7 +2,7 @@
 //! uses neither ballots nor atomics nor post-processing.
 
 use super::Lavapipe;
-use super::pipelines::DEPTH_FORMAT;
+use super::pipelines::{DEPTH_FORMAT, FARTHEST};
 use super::targets::attachment;
 use crate::backend::View;
 use crate::draws::{DrawList, DrawMode};
@@ -53,7 +53,7 @@ impl Lavapipe {
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                 view: &depth_view,
                 depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(1.0),
+                    load: wgpu::LoadOp::Clear(FARTHEST),
                     store: wgpu::StoreOp::Store,
                 }),
                 stencil_ops: None,

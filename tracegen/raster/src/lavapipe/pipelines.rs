@@ -17,6 +17,9 @@ pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrg
 /// Format of depth and shadow maps.
 pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
+/// Depth of an eye's view without a draw.
+pub const FARTHEST: f32 = 0.0;
+
 /// Format of sampled texels.
 pub const TEXEL_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 /// Format of the primitive numbers that accompany texels.
@@ -190,10 +193,11 @@ impl Pipelines {
                 depth_stencil: Some(wgpu::DepthStencilState {
                     format: DEPTH_FORMAT,
                     depth_write_enabled: Some(!key.role.keeps_depth()),
-                    depth_compare: Some(if key.role.marks() {
-                        wgpu::CompareFunction::LessEqual
-                    } else {
-                        wgpu::CompareFunction::Less
+                    depth_compare: Some(match key.role {
+                        // Depth of a cascade runs from 0 to 1.
+                        role if role.casts() => wgpu::CompareFunction::Less,
+                        role if role.marks() => wgpu::CompareFunction::GreaterEqual,
+                        _ => wgpu::CompareFunction::Greater,
                     }),
                     stencil: wgpu::StencilState::default(),
                     bias: if shadow {

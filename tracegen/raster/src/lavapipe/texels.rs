@@ -1,7 +1,7 @@
 //! Samples of visible fragments, filtered by the driver's texture unit, for verifying the records.
 
 use super::Lavapipe;
-use super::pipelines::{DEPTH_FORMAT, PRIMITIVE_FORMAT, TEXEL_FORMAT};
+use super::pipelines::{DEPTH_FORMAT, FARTHEST, PRIMITIVE_FORMAT, TEXEL_FORMAT};
 use super::targets::attachment;
 use crate::backend::{Texels, View};
 use crate::draws::DrawList;
@@ -56,7 +56,7 @@ impl Lavapipe {
                 depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
                     view: depth_view,
                     depth_ops: Some(wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(1.0),
+                        load: wgpu::LoadOp::Clear(FARTHEST),
                         store: wgpu::StoreOp::Store,
                     }),
                     stencil_ops: None,

@@ -1,6 +1,6 @@
 //! Depth for occlusion culling, and the visibility of all draws, found by drawing everything.
 
-use super::pipelines::DEPTH_FORMAT;
+use super::pipelines::{DEPTH_FORMAT, FARTHEST};
 use super::targets::attachment;
 use super::{Lavapipe, bind_view};
 use crate::backend::{Marks, View};
@@ -87,7 +87,7 @@ impl Lavapipe {
         let plan = self.plan(draws, list, purpose)?;
         let load = match marking {
             Some(_) => wgpu::LoadOp::Load,
-            None => wgpu::LoadOp::Clear(1.0),
+            None => wgpu::LoadOp::Clear(FARTHEST),
         };
         self.gpu.checked("rendering depth alone", || {
             let mut encoder = self.gpu.device.create_command_encoder(&Default::default());

@@ -94,10 +94,10 @@ impl Programs {
 fn state(key: &PipelineKey) -> State {
     let role = key.role;
     State {
-        depth: if role.marks() {
-            glow::LEQUAL
-        } else {
-            glow::LESS
+        depth: match role {
+            role if role.casts() => glow::LESS,
+            role if role.marks() => glow::GEQUAL,
+            _ => glow::GREATER,
         },
         writes_depth: !role.keeps_depth(),
         writes_color: !(key.colorless || role.keeps_color()),

@@ -20,10 +20,11 @@ struct Background {
 @vertex
 fn vertex_background(@builtin(vertex_index) index: u32) -> Background {
     let ndc = vec2(f32((index << 1u) & 2u), f32(index & 2u)) * 2.0 - 1.0;
-    let far = view.world_from_clip * vec4(ndc, 1.0, 1.0);
+    // Of a far plane at infinity, only the direction is known: its w is 0.
+    let far = view.world_from_clip * vec4(ndc, 0.0, 1.0);
     var out: Background;
-    out.position = placed(vec4(ndc, 1.0, 1.0));
-    out.direction = far.xyz / far.w - view.eye.xyz;
+    out.position = placed(vec4(ndc, 0.0, 1.0));
+    out.direction = far.xyz - view.eye.xyz * far.w;
     return out;
 }
 

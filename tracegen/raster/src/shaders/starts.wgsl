@@ -48,9 +48,9 @@ fn is_open(eye: u32, position: vec4<f32>) -> bool {
     for (var y = first.y; y <= last.y; y++) {
         for (var x = first.x; x <= last.x; x++) {
             if eye == 0u {
-                if textureLoad(nearer_depth, vec2(x, y), 0) >= start.ends.x { return true; }
+                if textureLoad(nearer_depth, vec2(x, y), 0) <= start.ends.x { return true; }
             } else {
-                if textureLoad(other_depth, vec2(x, y), 0) >= start.ends.y { return true; }
+                if textureLoad(other_depth, vec2(x, y), 0) <= start.ends.y { return true; }
             }
         }
     }
@@ -61,7 +61,7 @@ fn is_open(eye: u32, position: vec4<f32>) -> bool {
 @fragment
 fn fragment_behind(@builtin(position) position: vec4<f32>) -> Pixel {
     if is_open(0u, position) || is_open(1u, position) { discard; }
-    return Pixel(vec4(0.0, 0.0, 0.0, 1.0), 0.0);
+    return Pixel(vec4(0.0, 0.0, 0.0, 1.0), 1.0);
 }
 
 // The nearer layer, and the farther one behind it: linear between the four nearest pixels, in linear light.
@@ -69,7 +69,7 @@ fn fragment_behind(@builtin(position) position: vec4<f32>) -> Pixel {
 fn fragment_composed(@builtin(position) position: vec4<f32>) -> Pixel {
     let pixel = vec2<i32>(position.xy);
     let depth = textureLoad(nearer_depth, pixel, 0);
-    if depth < start.ends.x {
+    if depth > start.ends.x {
         return Pixel(textureLoad(nearer, pixel, 0), depth);
     }
     let place = start.maps[0] * vec4(position.xy, 1.0, 0.0);
@@ -90,5 +90,5 @@ fn fragment_composed(@builtin(position) position: vec4<f32>) -> Pixel {
     let behind = textureLoad(farther_depth, nearest, 0);
     let uv = (vec2<f32>(nearest) + 0.5) / vec2<f32>(size);
     let clip = start.from_farther_clip * vec4(uv * vec2(2.0, -2.0) + vec2(-1.0, 1.0), behind, 1.0);
-    return Pixel(color, clamp(clip.z / clip.w, start.ends.x, 1.0));
+    return Pixel(color, clamp(clip.z / clip.w, 0.0, start.ends.x));
 }

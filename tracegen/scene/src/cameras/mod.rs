@@ -1,32 +1,20 @@
 //! Head poses: a scene's cameras, the pose given by flags, and the matrices of both eyes.
 //!
 //! Conventions: right-handed, y up, each eye looks down its own -z; clip space has y up and depth
-//! 0 at the near plane to 1 at the far plane (not reversed: compare with `Less`).
+//! 1 at the near plane to 0 at the far plane, which may be infinitely far away. Floating-point numbers are
+//! densest at 0, so that depth in single precision has the same relative steps at every distance. Tests
+//! compare with `Greater`.
+
+mod default;
+mod probe;
+
+pub use default::{DEFAULT_NAME, around, default_camera};
 
 use super::{Camera, Scene};
 use crate::origin::relative;
 use crate::suggest::did_you_mean;
 use formats::view::{EyeView, FovTangents, FrameViews, Hmd};
 use glam::{Affine3A, DVec3, Mat3, Mat4, Vec3, Vec4};
-
-/// A view of the whole scene from outside, for files without a camera.
-#[must_use]
-pub fn default_camera(scene: &Scene) -> Camera {
-    let (low, high) = scene.bounds().unwrap_or((-Vec3::ONE, Vec3::ONE));
-    let target = (low + high) / 2.0;
-    let half = (high - low).length() / 2.0;
-    // All points may coincide.
-    let radius = if half > 0.0 { half } else { 1e-3 };
-    Camera {
-        name: "default".into(),
-        eye: target + Vec3::new(0.55, 0.4, 1.0).normalize() * radius * 1.9,
-        target,
-        up: Vec3::Y,
-        vfov_deg: 60.0,
-        near: radius * 0.01,
-        far: radius * 10.0,
-    }
-}
 
 /// A camera that cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -96,7 +84,7 @@ pub fn validate(camera: &Camera) -> Result<(), CameraError> {
     check_direction(eye.as_dvec3(), target.as_dvec3(), up, steps)
         .map_err(|(expected, found)| invalid(expected, found))?;
     let (near, far) = (camera.near, camera.far);
-    if !(near.is_finite() && far.is_finite() && near > 0.0 && far > near) {
+    if !(near.is_finite() && near > 0.0 && far > near) {
         return Err(invalid("0 < near < far", format!("near {near}, far {far}")));
     }
     Ok(())
@@ -191,21 +179,25 @@ pub fn head_pose(camera: &Camera) -> Affine3A {
     Affine3A::from_mat3_translation(Mat3::from_cols(right, up, back), camera.eye)
 }
 
-/// Off-axis perspective from tangents, depth 0 (near) to 1 (far).
+/// Off-axis perspective from tangents, depth 1 (near) to 0 (far, which may be infinite).
 #[must_use]
 pub fn projection(fov: &FovTangents, near: f32, far: f32) -> Mat4 {
     let (width, height) = (fov.left + fov.right, fov.up + fov.down);
-    let depth = far / (near - far);
+    let [scale, shift] = if far.is_finite() {
+        [near / (far - near), near * far / (far - near)]
+    } else {
+        [0.0, near]
+    };
     Mat4::from_cols(
         Vec4::new(2.0 / width, 0.0, 0.0, 0.0),
         Vec4::new(0.0, 2.0 / height, 0.0, 0.0),
         Vec4::new(
             (fov.right - fov.left) / width,
             (fov.up - fov.down) / height,
-            depth,
+            scale,
             -1.0,
         ),
-        Vec4::new(0.0, 0.0, near * depth, 0.0),
+        Vec4::new(0.0, 0.0, shift, 0.0),
     )
 }
 

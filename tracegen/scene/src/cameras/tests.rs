@@ -65,18 +65,32 @@ fn the_projection_matches_a_hand_computation() {
     };
     let m = projection(&fov, 1.0, 3.0);
     let ndc = |p: Vec3| m.project_point3(p);
-    // The corners of the near and far planes, and depth at 2: f (z - n) / (z (f - n)) = 0.75.
+    // The corners of the near and far planes, and depth at 2: n (f - z) / (z (f - n)) = 0.25.
     for (point, expected) in [
-        (Vec3::new(-1.0, 2.0, -1.0), Vec3::new(-1.0, 1.0, 0.0)),
-        (Vec3::new(0.5, -1.0, -1.0), Vec3::new(1.0, -1.0, 0.0)),
-        (Vec3::new(1.5, 6.0, -3.0), Vec3::new(1.0, 1.0, 1.0)),
-        (Vec3::new(-0.5, 1.0, -2.0), Vec3::new(0.0, 0.0, 0.75)),
+        (Vec3::new(-1.0, 2.0, -1.0), Vec3::new(-1.0, 1.0, 1.0)),
+        (Vec3::new(0.5, -1.0, -1.0), Vec3::new(1.0, -1.0, 1.0)),
+        (Vec3::new(1.5, 6.0, -3.0), Vec3::new(1.0, 1.0, 0.0)),
+        (Vec3::new(-0.5, 1.0, -2.0), Vec3::new(0.0, 0.0, 0.25)),
     ] {
         assert!(
             (ndc(point) - expected).length() < 1e-5,
             "{} {expected}",
             ndc(point)
         );
+    }
+}
+
+#[test]
+fn a_far_plane_at_infinity_keeps_relative_steps_of_depth_at_every_distance() {
+    let fov = hmd::preset("symmetric-100").unwrap().fov[0];
+    let [endless, far_away] = [f32::INFINITY, 1e30].map(|far| projection(&fov, 0.05, far));
+    assert_eq!(endless, far_away);
+    let depth = |z: f32| endless.project_point3(Vec3::new(0.3, -0.2, -z)).z;
+    assert_eq!(depth(0.05), 1.0);
+    assert_eq!(depth(1e12), 5e-14);
+    // A millionth of the distance apart, whatever the distance.
+    for z in [0.06, 1.0, 50.0, 3e3, 1e6, 1e9] {
+        assert!(depth(z) > depth(z * 1.000_001), "{z}");
     }
 }
 

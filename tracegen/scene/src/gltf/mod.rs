@@ -105,6 +105,7 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     }
     let (mut scene, rig) = placing.finish()?;
     let moved = place_views(root, &placed, &mut scene, &mut warnings);
+    scene.in_metres = true;
     scene.animation = rig.and_then(|placed| placed.into_animation(moved));
     warnings.append(materials.warnings);
     scene.images = materials.requests.images(&origin)?;

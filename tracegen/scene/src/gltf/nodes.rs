@@ -13,8 +13,8 @@ use gltf::json::extensions::scene::khr_lights_punctual::{Light as JsonLight, Typ
 use gltf::json::scene::Node;
 use gltf::json::validation::Checked;
 
-/// Far plane of a camera whose projection is infinite, metres.
-const DEFAULT_FAR_M: f32 = 1000.0;
+/// Near plane of a camera that gives none that can be used, metres.
+const DEFAULT_NEAR_M: f32 = 0.05;
 
 /// The placed nodes in depth-first order, with transforms to the world.
 #[derive(Default)]
@@ -167,7 +167,7 @@ pub(super) fn camera(
         (Some(of), _) => (
             of.yfov.to_degrees(),
             of.znear,
-            of.zfar.unwrap_or(DEFAULT_FAR_M),
+            of.zfar.unwrap_or(f32::INFINITY),
         ),
         (None, Some(of)) => {
             warnings.count("orthographic", || {
@@ -185,13 +185,13 @@ pub(super) fn camera(
         });
         return None;
     };
-    if !(near > 0.0 && far > near && far.is_finite()) {
+    if !(near > 0.0 && near.is_finite() && far > near) {
         warnings.count("planes", || {
             format!(
-                "camera '{name}' has planes {near} and {far}; 0.05 and {DEFAULT_FAR_M} are used"
+                "camera '{name}' has planes {near} and {far}; {DEFAULT_NEAR_M} m and infinity are used"
             )
         });
-        (near, far) = (0.05, DEFAULT_FAR_M);
+        (near, far) = (DEFAULT_NEAR_M, f32::INFINITY);
     }
     Some(Camera {
         name,

@@ -19,9 +19,9 @@ pub use gltf::CameraTrack;
 pub(crate) use keys::bracket;
 pub use poses::PoseTrack;
 
-use crate::cameras::head_pose;
+use crate::cameras::{self, head_pose};
 use crate::files::Origin;
-use crate::{Camera, SceneError};
+use crate::{Camera, Scene, SceneError};
 use glam::{Affine3A, DAffine3, DMat3, DVec3};
 use std::fmt;
 use std::ops::Range;
@@ -106,6 +106,8 @@ pub enum HeadPath {
     Poses(PoseTrack, PathOrigin),
     /// An animated camera.
     Gltf(CameraTrack, PathOrigin),
+    /// One view after the other; placeholders until [`HeadPath::in_scene`].
+    Around(Vec<Camera>),
 }
 
 /// The frames to evaluate, and their rate.
@@ -169,11 +171,26 @@ impl HeadPath {
         }
     }
 
+    /// This many views of a scene from all sides, one in each frame.
+    #[must_use]
+    pub fn around(count: u32) -> Self {
+        Self::Around(cameras::around(&Scene::default(), count))
+    }
+
+    /// The same path in a scene.
+    #[must_use]
+    pub fn in_scene(self, scene: &Scene) -> Self {
+        match self {
+            Self::Around(views) => Self::Around(cameras::around(scene, views.len() as u32)),
+            path => path.relative_to(scene.origin),
+        }
+    }
+
     /// The same path for a scene whose coordinates are relative to `origin`.
     #[must_use]
     pub fn relative_to(mut self, origin: DVec3) -> Self {
         match &mut self {
-            Self::Walk | Self::Head => {}
+            Self::Walk | Self::Head | Self::Around(_) => {}
             Self::Poses(track, _) => {
                 for (position, _) in &mut track.poses {
                     *position -= origin;
@@ -195,6 +212,9 @@ impl HeadPath {
         match self {
             Self::Walk => Ok(frames
                 .map(|frame| head_pose(&walk::camera_at(camera, moments.time_s(frame))))
+                .collect()),
+            Self::Around(views) => Ok((frames.filter_map(|frame| views.get(frame as usize)))
+                .map(head_pose)
                 .collect()),
             Self::Head => Ok(frames
                 .map(|frame| head::pose_at(camera, moments.time_s(frame)))
@@ -245,7 +265,8 @@ impl HeadPath {
     /// The path is too short.
     pub fn check(&self, moments: &Moments) -> Result<(), SceneError> {
         let (file, duration_s) = match self {
-            Self::Walk | Self::Head => return Ok(()),
+            Self::Walk | Self::Head | Self::Around(_) => return Ok(()),
+
             Self::Poses(track, _) => (track.file(), track.duration_s()),
             Self::Gltf(track, _) => (track.file(), track.duration_s()),
         };

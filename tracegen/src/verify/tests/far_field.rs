@@ -168,10 +168,10 @@ fn a_corridor_has_no_hole_at_the_split_and_is_exact_before_it() {
                 for (pixel, depth) in frame.depths[3 + eye].iter().enumerate() {
                     // The corridor is closed, so the sky is only visible through holes.
                     assert!(
-                        *depth < 1.0,
+                        *depth > 0.0,
                         "{variant_name}: a hole in pixel {pixel} of eye {eye}"
                     );
-                    let is_near = frame.depths[eye][pixel] < end;
+                    let is_near = frame.depths[eye][pixel] > end;
                     near += u32::from(is_near);
                     beyond += u32::from(!is_near);
                     // A blended draw may cover either.
@@ -267,7 +267,7 @@ fn shifts(frame: &RenderedFrame, views: &FrameViews, size_px: [u32; 2]) -> Vec<f
         let composition = composition(frame, eye);
         let eye_from_world = clip(&views.eyes[eye]);
         for (pixel, depth) in (0..).zip(&frame.depths[eye]) {
-            if *depth < composition.end {
+            if *depth > composition.end {
                 continue;
             }
             let px = DVec2::new((pixel % size_px[0]).into(), (pixel / size_px[0]).into()) + 0.5;
@@ -275,7 +275,7 @@ fn shifts(frame: &RenderedFrame, views: &FrameViews, size_px: [u32; 2]) -> Vec<f
             let place = place.truncate() / place.z;
             let [x, y] = [place.x as usize, place.y as usize];
             let depth = frame.depths[2][y * width as usize + x];
-            if depth >= 1.0 {
+            if depth <= 0.0 {
                 continue;
             }
             let ndc = place / far_size * DVec2::new(2.0, -2.0) + DVec2::new(-1.0, 1.0);

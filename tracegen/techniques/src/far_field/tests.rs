@@ -26,7 +26,7 @@ fn eyes(fov: FovTangents, ipd_m: f64, cant_deg: f64, far_m: f64) -> [EyeView; 2]
         };
         let near = 0.1;
         let plane = |tangent: f32| f64::from(tangent) * near;
-        let projection = frustum(
+        let mut projection = frustum(
             -plane(left),
             plane(right),
             -plane(fov.down),
@@ -34,6 +34,8 @@ fn eyes(fov: FovTangents, ipd_m: f64, cant_deg: f64, far_m: f64) -> [EyeView; 2]
             near,
             far_m,
         );
+        projection.z_axis.z = near / (far_m - near);
+        projection.w_axis.z = near * far_m / (far_m - near);
         EyeView {
             world_to_eye: pose.inverse().as_mat4().to_cols_array_2d(),
             eye_to_clip: projection.as_mat4().to_cols_array_2d(),

@@ -173,7 +173,7 @@ fn each_visible_pixel_has_one_part_and_reads_only_drawn_pixels() {
 #[test]
 fn pixels_of_a_layer_have_the_directions_of_the_pictures_pixels() {
     let hmd = hmd([131, 97]);
-    let eye_to_clip = glam::camera::rh::proj::directx::perspective(1.4, 1.2, 0.1, 90.0);
+    let eye_to_clip = glam::camera::rh::proj::directx::perspective(1.4, 1.2, 90.0, 0.1);
     let view = EyeView {
         eye_to_clip: eye_to_clip.to_cols_array_2d(),
         ..EyeView::default()
@@ -324,7 +324,7 @@ fn eyes_without_a_possible_far_field_are_an_error_of_the_plan() {
     let planner = Planner::new(&settings, &hmd, lenses, BOTH, 72.0).unwrap();
     let view = |turn_deg: f32| EyeView {
         world_to_eye: glam::Mat4::from_rotation_y(turn_deg.to_radians()).to_cols_array_2d(),
-        eye_to_clip: glam::camera::rh::proj::directx::perspective(1.5, 1.0, 0.1, 100.0)
+        eye_to_clip: glam::camera::rh::proj::directx::perspective(1.5, 1.0, 100.0, 0.1)
             .to_cols_array_2d(),
         ..EyeView::default()
     };

@@ -103,7 +103,7 @@ fn back_faces_are_dropped_unless_the_draw_is_double_sided() {
 #[test]
 fn every_pixel_of_a_triangle_is_in_its_tiles() {
     let view = BinnedView {
-        clip_from_world: perspective(1.2, 100.0 / 70.0, 0.5, 50.0)
+        clip_from_world: perspective(1.2, 100.0 / 70.0, 50.0, 0.5)
             * look_at_mat4(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, Vec3::Y),
         size_px: SIZE_PX,
     };

@@ -209,8 +209,8 @@ fn the_edges_of_the_visible_space_are_in_the_volumes_of_lossless_techniques() {
             let [right, up, forward] = eye.axes().map(|axis| axis.gradient);
             for step in 0..8_u32 {
                 let corner = |bit: u32| if step & bit == 0 { -1.0 } else { 1.0 };
-                // At depth 0.9, the distance is ten times that of the near plane.
-                let depth = if step & 4 == 0 { 0.0 } else { 0.9 };
+                // At depth 0.1, the distance is ten times that of the near plane.
+                let depth = if step & 4 == 0 { 1.0 } else { 0.1 };
                 let point = from_clip.project_point3(DVec3::new(corner(1), corner(2), depth));
                 assert!(within(Culling::PER_EYE, point), "{number}");
                 assert!(within(Culling::SUPERFRUSTUM, point), "{number}");

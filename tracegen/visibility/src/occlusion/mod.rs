@@ -17,7 +17,8 @@ use glam::{DMat4, DVec4, Mat4, Vec3};
 /// Share of a box's depth range by which a driver's depth may differ. Vertices are rounded to 1/256 pixel,
 /// and depth is extrapolated over that distance.
 const SLACK: f64 = 1.0 / 16.0;
-/// Rounding of a depth from 0 to 1 in the driver.
+/// Relative rounding error of a sum of products in the driver. A depth is the near plane's distance divided
+/// by such a sum.
 const ROUNDING: f64 = 16.0 * (f32::EPSILON as f64) / 2.0;
 
 /// Visible draws of the last frame, by view.
@@ -65,6 +66,7 @@ fn hidden([low, high]: [Vec3; 2], clip_from_world: &DMat4, depth: &Pyramid) -> b
     let [low, high] = [low, high].map(Vec3::as_dvec3);
     let size_px = depth.size_px().map(f64::from);
     let (mut least, mut most) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    let mut rounding = 0.0_f64;
     for corner in 0..8 {
         let along = |axis: usize| {
             if corner >> axis & 1 == 0 {
@@ -73,11 +75,14 @@ fn hidden([low, high]: [Vec3; 2], clip_from_world: &DMat4, depth: &Pyramid) -> b
                 high[axis]
             }
         };
-        let clip = *clip_from_world * DVec4::new(along(0), along(1), along(2), 1.0);
+        let corner = DVec4::new(along(0), along(1), along(2), 1.0);
+        let clip = *clip_from_world * corner;
         // In front of the near plane, or NaN: the condition is false for NaN.
-        if !(clip.z > 0.0 && clip.w > 0.0) {
+        if !(clip.z < clip.w && clip.w > 0.0) {
             return false;
         }
+        let terms = clip_from_world.row(3).abs().dot(corner.abs());
+        rounding = rounding.max(ROUNDING * (1.0 + terms / clip.w));
         let ndc = clip.truncate() / clip.w;
         let place = [
             (ndc.x + 1.0) / 2.0 * size_px[0],
@@ -99,6 +104,6 @@ fn hidden([low, high]: [Vec3; 2], clip_from_world: &DMat4, depth: &Pyramid) -> b
         // Outside the picture. Culling handles this case.
         return false;
     };
-    let nearest = least[2] - SLACK * (most[2] - least[2]) - ROUNDING;
-    nearest > f64::from(depth.farthest(columns, rows))
+    let nearest = most[2] + SLACK * (most[2] - least[2]) + rounding * most[2];
+    nearest < f64::from(depth.farthest(columns, rows))
 }

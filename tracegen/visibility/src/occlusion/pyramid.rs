@@ -15,7 +15,7 @@ struct Level {
 }
 
 impl Pyramid {
-    /// Builds the pyramid from the depth of a picture, row by row from the top; 1 is farthest.
+    /// Builds the pyramid from the depth of a picture, row by row from the top; 0 is farthest.
     ///
     /// # Panics
     /// The length of `depth` differs from the number of pixels, or is zero.
@@ -49,7 +49,7 @@ impl Pyramid {
         let [columns, rows] = [columns, rows].map(|ends| ends.map(|at| (at >> level) as usize));
         (rows[0]..=rows[1])
             .flat_map(|row| &depth[row * size[0] + columns[0]..=row * size[0] + columns[1]])
-            .fold(f32::NEG_INFINITY, |farthest, depth| farthest.max(*depth))
+            .fold(f32::INFINITY, |farthest, depth| farthest.min(*depth))
     }
 }
 
@@ -68,7 +68,7 @@ impl Level {
         for y in 0..size[1] {
             let rows = row(2 * y).chunks(2).zip(row(2 * y + 1).chunks(2));
             depth.extend(rows.map(|(upper, lower)| {
-                (upper.iter().chain(lower)).fold(f32::NEG_INFINITY, |far, d| far.max(*d))
+                (upper.iter().chain(lower)).fold(f32::INFINITY, |far, d| far.min(*d))
             }));
         }
         Some(Self { size, depth })

@@ -21,9 +21,9 @@ fn the_pyramid_is_never_nearer_than_any_pixel_of_the_rectangle() {
         let exact = (rows[0]..=rows[1])
             .flat_map(|y| (columns[0]..=columns[1]).map(move |x| (x, y)))
             .map(|(x, y)| depth[(y * SIZE_PX[0] + x) as usize])
-            .fold(0.0, f32::max);
+            .fold(1.0, f32::min);
         let found = pyramid.farthest(columns, rows);
-        assert!(found >= exact, "{columns:?} {rows:?}");
+        assert!(found <= exact, "{columns:?} {rows:?}");
         // The result is exact for up to four texels per axis.
         if columns[1] - columns[0] < 4 && rows[1] - rows[0] < 4 {
             assert_eq!(found, exact);
@@ -35,13 +35,13 @@ fn the_pyramid_is_never_nearer_than_any_pixel_of_the_rectangle() {
 fn wall(clip: Mat4) -> Pyramid {
     let at = clip.project_point3(Vec3::new(0.0, 0.0, -10.0)).z;
     let [width, height] = SIZE_PX;
-    let row = || (0..width).map(|x| if x < width / 2 { at } else { 1.0 });
+    let row = || (0..width).map(|x| if x < width / 2 { at } else { 0.0 });
     Pyramid::new(SIZE_PX, (0..height).flat_map(|_| row()).collect())
 }
 
 #[test]
 fn only_boxes_behind_the_wall_are_hidden() {
-    let clip = perspective(1.2, 67.0 / 45.0, 0.1, 100.0);
+    let clip = perspective(1.2, 67.0 / 45.0, 100.0, 0.1);
     let wall = wall(clip);
     let hidden = |center: Vec3, half: f32| {
         let bounds = [center - Vec3::splat(half), center + Vec3::splat(half)];
@@ -58,7 +58,7 @@ fn only_boxes_behind_the_wall_are_hidden() {
 
 #[test]
 fn a_box_with_a_point_in_front_of_the_depth_is_never_hidden() {
-    let clip = perspective(1.2, 67.0 / 45.0, 0.1, 100.0);
+    let clip = perspective(1.2, 67.0 / 45.0, 100.0, 0.1);
     let wall = wall(clip);
     let mut random = Random(4);
     let room = [Vec3::new(-20.0, -12.0, -40.0), Vec3::new(20.0, 12.0, 2.0)];
@@ -76,7 +76,7 @@ fn a_box_with_a_point_in_front_of_the_depth_is_never_hidden() {
             let column = ((p.x / p.w + 1.0) / 2.0 * SIZE_PX[0] as f32) as u32;
             let row = ((1.0 - p.y / p.w) / 2.0 * SIZE_PX[1] as f32) as u32;
             let depth = wall.farthest([column; 2], [row; 2]);
-            if p.z / p.w <= depth {
+            if p.z / p.w >= depth {
                 seen += 1;
                 assert!(!hides, "{bounds:?}");
             }
@@ -87,11 +87,11 @@ fn a_box_with_a_point_in_front_of_the_depth_is_never_hidden() {
 
 #[test]
 fn the_first_frame_hides_nothing_and_its_visible_draws_come_first_in_the_second() {
-    let clip = perspective(1.2, 67.0 / 45.0, 0.1, 100.0);
+    let clip = perspective(1.2, 67.0 / 45.0, 100.0, 0.1);
     let behind = [Vec3::new(-9.0, -1.0, -21.0), Vec3::new(-7.0, 1.0, -19.0)];
     let before = behind.map(|corner| corner + Vec3::Z * 12.0);
     let bounds = |draw: u32| if draw == 0 { behind } else { before };
-    let empty = Pyramid::new(SIZE_PX, vec![1.0; (SIZE_PX[0] * SIZE_PX[1]) as usize]);
+    let empty = Pyramid::new(SIZE_PX, vec![0.0; (SIZE_PX[0] * SIZE_PX[1]) as usize]);
     let mut occlusion = Occlusion::default();
     assert!(occlusion.first(0, &[0, 1]).is_empty());
     let mut kept = vec![0, 1];

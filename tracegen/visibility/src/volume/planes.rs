@@ -63,7 +63,7 @@ pub(crate) fn meeting_point(planes: [HalfSpace; 3]) -> DVec3 {
 }
 
 /// Left, right, bottom, top, near and far planes of the space that a driver may draw with a clip matrix
-/// (depth 0 to 1), for geometry whose coordinates are at most `extent` (Gribb and Hartmann 2001).
+/// (depth 1 at the near plane to 0 at the far one), for geometry whose coordinates are at most `extent` (Gribb and Hartmann 2001).
 ///
 /// A driver computes each clip coordinate in single precision and compares two of them. Each plane is moved
 /// outwards by the rounding errors of both. This is relevant for the far plane, whose two coordinates almost
@@ -87,8 +87,8 @@ pub(crate) fn frustum(clip_from_world: Mat4, extent: DVec3) -> [HalfSpace; 6] {
         side(0, -1.0),
         side(1, 1.0),
         side(1, -1.0),
-        side(2, 1.0),
         side(2, -1.0),
+        side(2, 1.0),
     ]
 }
 
