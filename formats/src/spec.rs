@@ -51,6 +51,11 @@ fn documented_sizes_equal_those_of_the_code() {
         ("sample", tables::SAMPLE_BYTES),
         ("sampler of version 2", tables::SAMPLER_BYTES_V2),
         ("sample of version 2", tables::SAMPLE_BYTES_V2),
+        (
+            "texture of version 3 without name",
+            tables::TEXTURE_BYTES_V3,
+        ),
+        ("sampler of version 3", tables::SAMPLER_BYTES_V3),
         ("pass", tables::PASS_BYTES),
         ("tile index entry", INDEX_ENTRY_BYTES),
         ("mesh without indices", geometry::MESH_BYTES),
@@ -81,6 +86,8 @@ fn documented_fields_add_up() {
     assert_eq!(size("### Draw"), tables::DRAW_BYTES);
     assert_eq!(size("### Sampler of version 2"), tables::SAMPLER_BYTES_V2);
     assert_eq!(size("### Sample of version 2"), tables::SAMPLE_BYTES_V2);
+    assert_eq!(size("### Texture of version 3"), tables::TEXTURE_BYTES_V3);
+    assert_eq!(size("### Sampler of version 3"), tables::SAMPLER_BYTES_V3);
     assert_eq!(size("### Pass"), tables::PASS_BYTES);
     assert_eq!(size("### Tile index entry"), INDEX_ENTRY_BYTES);
     assert_eq!(

@@ -177,6 +177,17 @@ pub struct Sampler {
     /// Bias and bounds of the level of detail, applied before levels are chosen.
     #[serde(default, skip_serializing_if = "LodRange::is_whole")]
     pub lod: LodRange,
+    /// Largest anisotropy in 1/256: 256, which filters all pixels alike, to 4096.
+    #[serde(default = "isotropic", skip_serializing_if = "is_isotropic")]
+    pub max_anisotropy_256ths: u16,
+}
+
+fn isotropic() -> u16 {
+    Sampler::ISOTROPIC
+}
+
+fn is_isotropic(max_anisotropy_256ths: &u16) -> bool {
+    *max_anisotropy_256ths == Sampler::ISOTROPIC
 }
 
 /// A sampler's bias and bounds of the level of detail, in 1/256 of a level.
@@ -221,11 +232,34 @@ impl LodRange {
 }
 
 impl Sampler {
+    /// Largest anisotropy of a sampler that filters all pixels alike, in 1/256.
+    pub const ISOTROPIC: u16 = 256;
+    /// Largest anisotropy of all APIs, in 1/256.
+    pub const MOST_ANISOTROPIC: u16 = 4096;
+
     /// Whether version 1 of the trace can represent the sampler.
     #[must_use]
     pub(crate) fn is_in_version_1(&self) -> bool {
         let known = |wrap: &Wrap| (*wrap as u8) <= Wrap::ClampToEdge as u8;
         self.wrap.iter().all(known) && self.lod.is_whole()
+    }
+
+    /// Whether long and narrow pixels are filtered differently from others.
+    #[must_use]
+    pub fn is_anisotropic(&self) -> bool {
+        !is_isotropic(&self.max_anisotropy_256ths)
+    }
+
+    /// Whether the minification filter blends texels of a level that the level of detail chooses.
+    #[must_use]
+    pub fn blends_levels(&self) -> bool {
+        self.min == Filter::Linear && self.mip != MipFilter::None
+    }
+
+    /// Largest ratio of a pixel's axes that the filter follows, at least 1.
+    #[must_use]
+    pub fn max_anisotropy(&self) -> f32 {
+        f32::from(self.max_anisotropy_256ths) / f32::from(Self::ISOTROPIC)
     }
 
     /// Repeat, trilinear: glTF's usual sampler and the default of every model here.
@@ -235,6 +269,7 @@ impl Sampler {
         min: Filter::Linear,
         mip: MipFilter::Linear,
         lod: LodRange::WHOLE,
+        max_anisotropy_256ths: Self::ISOTROPIC,
     };
     /// Clamped, bilinear, without mip levels, for shadow maps.
     pub const SHADOW: Self = Self {
@@ -243,6 +278,7 @@ impl Sampler {
         min: Filter::Linear,
         mip: MipFilter::None,
         lod: LodRange::WHOLE,
+        max_anisotropy_256ths: Self::ISOTROPIC,
     };
 }
 
@@ -272,9 +308,42 @@ pub struct Texture {
     pub format: TexelFormat,
     /// Colour space of the texels.
     pub color_space: ColorSpace,
+    /// The texture whose memory it is a part of: a program can see one image through several views.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part: Option<Part>,
+}
+
+/// Place of a texture in the memory of another one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub struct Part {
+    /// Index of the other texture, which is no part.
+    pub of: u32,
+    /// Its level that is level 0 of the part.
+    pub level: u32,
+    /// Its layer that is layer 0 of the part.
+    pub layer: u32,
 }
 
 impl Texture {
+    /// Whether `whole` has the levels and layers of the part at this place, in blocks of the same size and order.
+    #[must_use]
+    pub fn fits(&self, part: Part, whole: &Self) -> bool {
+        let ends = [(part.level, self.levels), (part.layer, self.layers)]
+            .map(|(first, count)| u64::from(first) + u64::from(count));
+        let kinds = [self.format, whole.format].map(|format| {
+            (
+                format.block(),
+                format.is_depth(),
+                format.is_ordinary_color(),
+            )
+        });
+        whole.part.is_none()
+            && ends[0] <= whole.levels.into()
+            && ends[1] <= whole.layers.into()
+            && self.size == whole.level_size(part.level)
+            && kinds[0] == kinds[1]
+    }
+
     /// Width and height of `level` in texels (halved and rounded down, at least 1).
     #[must_use]
     pub fn level_size(&self, level: u32) -> [u32; 2] {

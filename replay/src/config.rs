@@ -268,7 +268,7 @@ impl RunConfig {
         in_range("sampling.lod_bias", self.sampling.lod_bias, -16.0..=16.0)?;
         in_range(
             "sampling.max_anisotropy",
-            self.sampling.max_anisotropy,
+            self.sampling.max_anisotropy.unwrap_or(1),
             1..=MOST_ANISOTROPY,
         )?;
         let l1_lines = |level: &LevelConfig| level.size_bytes / u64::from(self.line_bytes);

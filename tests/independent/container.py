@@ -82,8 +82,8 @@ def read(path, kind):
     head = Bytes(data)
     magic, major, minor, found_kind, zero16 = head.fields("8sHHHH")
     directory_at, size, entries, directory_crc, zero32, head_crc = head.fields("QQIIII")
-    known = major == 1 or major == 2 and kind == 1
-    require(magic == b"PLXTRACE" and known, "not a trace of version 1 or 2")
+    known = major == 1 or major in (2, 3) and kind == 1
+    require(magic == b"PLXTRACE" and known, "not a trace of version 1, 2 or 3")
     require(zlib.crc32(data[:44]) == head_crc, "damaged header")
     require(found_kind == kind, "a trace of another kind")
     require(zero16 == 0 and zero32 == 0, "reserved bytes")

@@ -18,6 +18,7 @@ TAGS = {
     1: ["META", "TEXS", "SMPS", "DRAW", "PASS", "TILE", "TIDX"],
     2: ["TILE", "TIDX", "META", "TEXS", "SMPS", "DRAW", "PASS"],
 }
+TAGS[3] = TAGS[2]
 GEOMETRY_TAGS = ["GEOM", "PLST", "PLIX"]
 FORMATS = {
     1: "bc1",
@@ -58,6 +59,14 @@ WHOLE_LOD = {"bias_256ths": 0, "min_256ths": -32768, "max_256ths": 32767}
 FILTERS = {0: "nearest", 1: "linear"}
 MIP_FILTERS = {0: "none", 1: "nearest", 2: "linear"}
 NO_GROUP = 15
+NO_PART = 0xFFFFFFFF
+DEPTHS = {"r32f", "d16"}
+WIDE = {"bc6h", "r16", "rg16", "rgba16", "rg32", "rgba32", "packed32", "r32f", "d16"}
+# Texels along a block's edge and bytes of a block; of formats without blocks, bytes of a texel where not 4.
+BLOCKS = {name: (4, 8) for name in ("bc1", "bc4", "etc2", "eac-r11")}
+BLOCKS |= {name: (4, 16) for name in ("bc2", "bc3", "bc5", "bc6h", "bc7", "etc2-rgba", "eac-rg11", "astc-4x4")}
+BLOCKS |= {"astc-5x5": (5, 16), "astc-6x6": (6, 16), "astc-8x8": (8, 16)}
+TEXEL_BYTES = {"r8": 1, "rg8": 2, "r16": 2, "packed16": 2, "d16": 2, "rgba16": 8, "rg32": 8, "rgba32": 16}
 PROGRAM = {
     "cameras_known": "bool",
     "frames_by": "string",
@@ -74,32 +83,64 @@ def named(names, number):
 
 def read_texture(data, major):
     width, height, levels, layers, fmt, space, zero = data.fields("IIIIHBB")
+    whole, level, layer = data.fields("III") if major >= 3 else (NO_PART, 0, 0)
     require(1 <= width <= 65536 and 1 <= height <= 65536, "size of a texture")
     require(1 <= levels <= max(width, height).bit_length(), "mip levels")
     require(1 <= layers <= 65536 and zero == 0, "layers or reserved byte")
-    return {
+    texture = {
         "size": [width, height],
         "levels": levels,
         "layers": layers,
-        "format": named(FORMATS_2 if major == 2 else FORMATS, fmt),
+        "format": named(FORMATS_2 if major >= 2 else FORMATS, fmt),
         "color_space": named({0: "linear", 1: "srgb"}, space),
         "name": data.name(),
     }
+    if whole != NO_PART:
+        texture["part"] = {"of": whole, "level": level, "layer": layer}
+    else:
+        require(level == layer == 0, "a place of what is no part")
+    return texture
+
+
+def block(fmt):
+    return BLOCKS.get(fmt, (1, TEXEL_BYTES.get(fmt, 4)))
+
+
+def check_parts(textures):
+    for texture in textures:
+        if "part" not in texture:
+            continue
+        part = texture["part"]
+        require(part["of"] < len(textures), "a part of nothing")
+        whole = textures[part["of"]]
+        require("part" not in whole, "a part of a part")
+        for of, counts in (("level", "levels"), ("layer", "layers")):
+            require(part[of] + texture[counts] <= whole[counts], f"{counts} that are not there")
+        size = [max(1, side >> part["level"]) for side in whole["size"]]
+        require(texture["size"] == size, "the size of a part")
+        formats = texture["format"], whole["format"]
+        for same in (block, DEPTHS.__contains__, WIDE.__contains__):
+            require(same(formats[0]) == same(formats[1]), "the format of a part")
 
 
 def read_sampler(data, major):
     u, v, mag, small, mip = data.fields("5B")
-    wraps = WRAPS_2 if major == 2 else WRAPS
+    wraps = WRAPS_2 if major >= 2 else WRAPS
     sampler = {
         "wrap": [named(wraps, u), named(wraps, v)],
         "mag": named(FILTERS, mag),
         "min": named(FILTERS, small),
         "mip": named(MIP_FILTERS, mip),
     }
-    if major == 2:
+    if major >= 2:
         lod = dict(zip(WHOLE_LOD, data.fields("3h")))
         if lod != WHOLE_LOD:  # replay leaves out what changes nothing
             sampler["lod"] = lod
+    if major >= 3:
+        most = data.field("H")
+        require(256 <= most <= 4096, "a largest anisotropy")
+        if most != 256:
+            sampler["max_anisotropy_256ths"] = most
     return sampler
 
 
@@ -122,7 +163,7 @@ def read_group(data, textures, samplers, major):
         require(texture < len(textures) and sampler < len(samplers), "a sample of nothing")
         require(layer < textures[texture]["layers"], "a layer that is not there")
         sample = {"texture": texture, "sampler": sampler, "layer": layer, "offset": [x, y]}
-        level = read_level(data) if major == 2 else {"rule": "derivatives", "operands": False}
+        level = read_level(data) if major >= 2 else {"rule": "derivatives", "operands": False}
         if level["rule"] != "derivatives" or level["operands"]:
             sample["level"] = level
         samples.append(sample)
@@ -392,9 +433,10 @@ def main(path, *options):
     require([tag for tag in chunks if tag in tags] == tags, "chunks missing or out of order")
     description = parse_json(chunks["META"])
     meta = check_meta(shaped(description, META))
-    if major == 2 and "program" in description:
+    if major >= 2 and "program" in description:
         meta["program"] = shaped(description["program"], PROGRAM)
     textures = read_table(chunks["TEXS"], 22, lambda data: read_texture(data, major))
+    check_parts(textures)
     samplers = read_table(chunks["SMPS"], 5, lambda data: read_sampler(data, major))
     draws = read_table(chunks["DRAW"], 12, lambda data: read_draw(data, textures, samplers, major))
     passes = read_table(chunks["PASS"], 24, lambda data: read_pass(data, meta))

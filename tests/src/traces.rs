@@ -15,7 +15,7 @@ use formats::textrace::{
     UvGroup, encode_tile_as, quad_morton,
 };
 use formats::texture::{
-    ColorSpace, Filter, LodRange, MipFilter, Sampler, TexelFormat, Texture, Wrap,
+    ColorSpace, Filter, LodRange, MipFilter, Part, Sampler, TexelFormat, Texture, Wrap,
 };
 use formats::view::{Eye, FovTangents, FrameViews, Hmd};
 
@@ -72,6 +72,7 @@ pub fn texture_tables() -> Tables {
         layers: 2,
         format,
         color_space: ColorSpace::Srgb,
+        part: None,
     };
     let sample = |texture, sampler| Sample {
         texture,
@@ -113,7 +114,7 @@ pub fn texture_tables() -> Tables {
                 mag: Filter::Nearest,
                 min: Filter::Linear,
                 mip: MipFilter::Nearest,
-                lod: LodRange::WHOLE,
+                ..Sampler::SHADOW
             },
         ],
         draws: vec![
@@ -196,6 +197,30 @@ pub fn program_tables() -> Tables {
     draws[0].groups.insert(1, operands.clone());
     samples(&mut draws[2], 0, level(LodRule::Explicit, 256, true));
     draws[2].groups.insert(0, operands);
+    tables
+}
+
+/// Tables of a trace of a program with an anisotropic sampler, and with a texture that is a part of another one.
+#[must_use]
+pub fn shared_tables() -> Tables {
+    let mut tables = program_tables();
+    tables.samplers[1].max_anisotropy_256ths = 2560;
+    tables.samplers[2].max_anisotropy_256ths = 300;
+    let (whole, level) = (&tables.textures[0], 2);
+    let part = Texture {
+        name: "a.png from level 2".to_owned(),
+        size: whole.level_size(level),
+        levels: 7,
+        layers: 2,
+        part: Some(Part {
+            of: 0,
+            level,
+            layer: 4,
+        }),
+        ..whole.clone()
+    };
+    tables.textures.push(part);
+    tables.draws[0].groups[2].samples[0].texture = 3;
     tables
 }
 
@@ -564,7 +589,9 @@ pub fn all() -> Vec<(String, Kind, Vec<u8>)> {
     let geometry = ("geometry".to_owned(), Kind::Textrace, geometry_trace(5));
     let program = texture_trace_of(&program_tables(), Encoding::Delta, 5);
     let program = ("program".to_owned(), Kind::Textrace, program);
-    let textures = textures.into_iter().chain([geometry, program]);
+    let shared = texture_trace_of(&shared_tables(), Encoding::Planes, 5);
+    let shared = ("shared".to_owned(), Kind::Textrace, shared);
+    let textures = textures.into_iter().chain([geometry, program, shared]);
     let columns = TraversalKind::ALL.map(|tree| {
         let name = format!("columns-{tree:?}").to_lowercase();
         (name, Kind::Raytrace, crate::columns::column_trace(tree, 7))

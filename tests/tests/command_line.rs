@@ -51,7 +51,7 @@ fn versions_name_the_formats() {
         let text = String::from_utf8(run_ok(program(name).arg("--version")).stdout).expect("UTF-8");
         assert!(text.starts_with(name), "{text}");
         assert!(
-            text.contains(".textrace formats 1.3 and 2.0, .raytrace format 1.3"),
+            text.contains(".textrace formats 1.3, 2.0 and 3.0, .raytrace format 1.3"),
             "{text}"
         );
     }

@@ -10,9 +10,9 @@ use std::sync::LazyLock;
 
 /// Version of the programs, with the version of the trace formats.
 pub static VERSION: LazyLock<String> = LazyLock::new(|| {
-    let [first, second] = VERSIONS.map(|(major, minor)| format!("{major}.{minor}"));
+    let [first, second, third] = VERSIONS.map(|(major, minor)| format!("{major}.{minor}"));
     format!(
-        "{} (.textrace formats {first} and {second}, .raytrace format {first})",
+        "{} (.textrace formats {first}, {second} and {third}, .raytrace format {first})",
         env!("CARGO_PKG_VERSION")
     )
 });

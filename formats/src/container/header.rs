@@ -1,7 +1,7 @@
 //! Byte layout of the header and of the directory.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::{ChunkEntry, ChunkTag, Kind, MAGIC, MAJOR_1, MAJOR_2};
+use super::{ChunkEntry, ChunkTag, Kind, MAGIC, MAJOR_1, MAJOR_3};
 use crate::parse::{Fault, Parsed, ensure, zero};
 use nom::Parser;
 use nom::bytes::complete::take;
@@ -79,8 +79,8 @@ impl Header {
         let (rest, version_major) = context("a major version", le_u16).parse(rest)?;
         ensure(
             at_version,
-            [MAJOR_1, MAJOR_2].contains(&version_major),
-            || format!("major version {MAJOR_1} or {MAJOR_2}"),
+            (MAJOR_1..=MAJOR_3).contains(&version_major),
+            || format!("a major version from {MAJOR_1} to {MAJOR_3}"),
             version_major,
         )?;
         // The checksum is checked before all other fields, so that the error says that the header is

@@ -28,11 +28,13 @@ pub const MAGIC: [u8; 8] = *b"PLXTRACE";
 /// Latest minor version of each major version that readers support. A file declares the earliest version that
 /// has all of its features. Readers accept a later minor version, which may only add features, and refuse
 /// another major version.
-pub const VERSIONS: [(u16, u16); 2] = [(1, 3), (2, 0)];
+pub const VERSIONS: [(u16, u16); 3] = [(1, 3), (2, 0), (3, 0)];
 /// Major version of traces of scenes.
 pub(crate) const MAJOR_1: u16 = 1;
 /// Major version of `.textrace` files whose tables come after the tiles: traces of programs.
 pub(crate) const MAJOR_2: u16 = 2;
+/// Major version of those with anisotropic samplers or textures that share memory.
+pub(crate) const MAJOR_3: u16 = 3;
 /// Chunks start at multiples of this many bytes.
 pub const CHUNK_ALIGNMENT_BYTES: u64 = 8;
 

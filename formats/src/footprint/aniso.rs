@@ -9,7 +9,7 @@
 
 use super::{LodFormula, SamplingOptions, fast_log2};
 use crate::textrace::{QuadRecord, SUBTEXELS};
-use crate::texture::{Filter, MipFilter, Sampler};
+use crate::texture::Sampler;
 use serde::{Deserialize, Serialize};
 
 /// Largest anisotropy, as in every API.
@@ -42,8 +42,7 @@ pub enum Reach {
 impl Reach {
     /// The footprints of a record in a texture with `levels` levels, whose level 0 has `size` texels.
     ///
-    /// Isotropic if anisotropy is off, if the sampler does not blend texels or has no levels, and if the
-    /// pixel is not longer than a texel (nothing is minified).
+    /// Isotropic if anisotropy is off, and if the pixel is not longer than a texel (nothing is minified).
     #[must_use]
     pub fn of(
         record: &QuadRecord,
@@ -53,8 +52,8 @@ impl Reach {
         sampler: &Sampler,
         options: &SamplingOptions,
     ) -> Self {
-        let blends = sampler.min == Filter::Linear && sampler.mip != MipFilter::None;
-        if options.max_anisotropy < 2 || !blends {
+        let most = options.max_anisotropy(sampler).min(MOST_ANISOTROPY as f32);
+        if most <= 1.0 {
             return Self::Isotropic;
         }
         let texels = |derivative: [i32; 2]| {
@@ -71,13 +70,13 @@ impl Reach {
         if !(longer > 1.0 && longer < f32::INFINITY) {
             return Self::Isotropic;
         }
-        let most = options.max_anisotropy.min(MOST_ANISOTROPY);
         match options.anisotropy {
             model @ (AnisotropyModel::Probes | AnisotropyModel::RoundedProbes) => {
                 // The smallest N for which N times the shorter axis is not less than the longer axis.
                 let square = |n: u32| (n * n) as f32;
-                let count = (1..most).find(|&n| square(n) * shorter >= longer);
-                let count = count.unwrap_or(most);
+                let largest = most.ceil() as u32;
+                let count = (1..largest).find(|&n| square(n) * shorter >= longer);
+                let count = count.unwrap_or(largest);
                 if count == 1 {
                     return Self::Isotropic;
                 }
@@ -89,7 +88,7 @@ impl Reach {
                 // The square of the level's argument: a / N, or a / min(a / b, most).
                 let narrowed = match model {
                     AnisotropyModel::RoundedProbes => longer / square(count),
-                    _ => shorter.max(longer / square(most)),
+                    _ => shorter.max(longer / (most * most)),
                 };
                 let lod = match options.lod {
                     LodFormula::Llvmpipe => 0.5 * fast_log2(narrowed),
@@ -105,11 +104,12 @@ impl Reach {
                     axis,
                 })
             }
+            AnisotropyModel::Ellipse if !sampler.blends_levels() => Self::Isotropic,
             AnisotropyModel::Ellipse => {
-                let narrowest = shorter.max(longer / (most * most) as f32);
+                let narrowest = shorter.max(longer / (most * most));
                 let lod = 0.5 * fast_log2(narrowest) + options.lod_bias;
                 // The maximum also limits ellipses that a bias enlarges.
-                let longest = (2 * most) as f32;
+                let longest = 2.0 * most;
                 let shortest_level = (0.5 * (longer / (longest * longest)).log2()).ceil();
                 let level = (lod.max(0.0) as u32).max(shortest_level.max(0.0) as u32);
                 let last = levels.saturating_sub(1);

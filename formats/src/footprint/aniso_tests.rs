@@ -1,7 +1,7 @@
 use super::super::{Footprint, footprints};
 use super::*;
-use crate::textrace::Sample;
-use crate::texture::{ColorSpace, TexelFormat, Texture};
+use crate::textrace::{LodRule, Sample, SampleLevel};
+use crate::texture::{ColorSpace, Filter, MipFilter, TexelFormat, Texture};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 
@@ -12,9 +12,10 @@ fn texture() -> Texture {
         name: String::new(),
         size: [SIZE; 2],
         levels: 11,
-        layers: 1,
+        layers: 4,
         format: TexelFormat::Rgba8,
         color_space: ColorSpace::Linear,
+        part: None,
     }
 }
 
@@ -35,7 +36,7 @@ fn record(at: [f64; 2], dx: [f64; 2], dy: [f64; 2]) -> QuadRecord {
 
 fn options(max_anisotropy: u32, anisotropy: AnisotropyModel) -> SamplingOptions {
     SamplingOptions {
-        max_anisotropy,
+        max_anisotropy: Some(max_anisotropy),
         anisotropy,
         lod: LodFormula::Exact,
         ..SamplingOptions::default()
@@ -43,26 +44,46 @@ fn options(max_anisotropy: u32, anisotropy: AnisotropyModel) -> SamplingOptions 
 }
 
 fn all(record: &QuadRecord, options: &SamplingOptions) -> Vec<Footprint> {
+    read(
+        record,
+        None,
+        SampleLevel::DERIVED,
+        &Sampler::TRILINEAR_REPEAT,
+        options,
+    )
+}
+
+/// Footprints in a texture of four layers.
+fn read(
+    record: &QuadRecord,
+    operands: Option<&QuadRecord>,
+    level: SampleLevel,
+    sampler: &Sampler,
+    options: &SamplingOptions,
+) -> Vec<Footprint> {
     let sample = Sample {
         texture: 0,
         sampler: 0,
         layer: 0,
         offset: [0; 2],
-        level: Default::default(),
+        level,
     };
     let mut found = Vec::new();
-    let sampler = Sampler::TRILINEAR_REPEAT;
+    let extent = [SIZE; 2];
+    let texture = texture();
+    let add = |f| found.push(f);
     footprints(
-        record,
-        None,
-        [SIZE; 2],
-        &sample,
-        &texture(),
-        &sampler,
-        options,
-        |f| found.push(f),
+        record, operands, extent, &sample, &texture, sampler, options, add,
     );
     found
+}
+
+/// A trilinear sampler with this largest anisotropy.
+fn anisotropic(most: f32) -> Sampler {
+    Sampler {
+        max_anisotropy_256ths: (256.0 * most) as u16,
+        ..Sampler::TRILINEAR_REPEAT
+    }
 }
 
 #[test]
@@ -85,6 +106,75 @@ fn the_maximum_bounds_the_probes_and_coarsens_the_level() {
         let found = all(&quad, &options(most, AnisotropyModel::Probes));
         assert_eq!((found.len(), found[0].level), (2 * count, level), "{most}");
     }
+}
+
+#[test]
+fn the_recorded_anisotropy_counts_unless_the_replay_has_its_own() {
+    let quad = record([512.0, 512.0], [0.0, 64.0], [2.0, 0.0]);
+    let recorded = SamplingOptions {
+        max_anisotropy: None,
+        ..options(1, AnisotropyModel::Probes)
+    };
+    let derived = SampleLevel::DERIVED;
+    for most in [1, 2, 5, 16] {
+        let chosen = options(most, AnisotropyModel::Probes);
+        let found = read(&quad, None, derived, &anisotropic(most as f32), &recorded);
+        assert_eq!(found, all(&quad, &chosen), "{most}");
+        let overridden = read(&quad, None, derived, &anisotropic(3.0), &chosen);
+        assert_eq!(overridden, found, "{most}");
+    }
+    // 2.5 of 32: three probes on log2(64 / 2.5) = 4.7.
+    let found = read(&quad, None, derived, &anisotropic(2.5), &recorded);
+    assert_eq!((found.len(), found[0].level), (6, 4));
+}
+
+#[test]
+fn a_recorded_anisotropy_counts_with_any_filter_but_a_replays_only_where_levels_are_blended() {
+    let quad = record([512.0, 512.0], [8.0, 0.0], [0.0, 1.0]);
+    let chosen = options(16, AnisotropyModel::Probes);
+    for (min, mip) in [
+        (Filter::Nearest, MipFilter::Linear),
+        (Filter::Linear, MipFilter::None),
+    ] {
+        let sampler = |most| Sampler {
+            min,
+            mip,
+            ..anisotropic(most)
+        };
+        let count = |sampler, options| {
+            let found = read(&quad, None, SampleLevel::DERIVED, &sampler, options);
+            (found.len(), found[0].level)
+        };
+        assert_eq!(count(sampler(16.0), &SamplingOptions::default()), (8, 0));
+        let plain = count(sampler(1.0), &SamplingOptions::default());
+        assert_eq!(count(sampler(1.0), &chosen), plain);
+        assert!(plain.0 < 8, "{plain:?}");
+    }
+}
+
+#[test]
+fn layers_and_biases_of_lanes_are_filtered_anisotropically_and_explicit_levels_are_not() {
+    let quad = record([512.0, 512.0], [16.0, 0.0], [0.0, 4.0]);
+    // A bias of 1 and layer 3.
+    let operands = QuadRecord {
+        uv: [1.0, 3.0].map(fixed),
+        ..record([1.0, 3.0], [0.0; 2], [0.0; 2])
+    };
+    let by = |rule| {
+        let level = SampleLevel {
+            rule,
+            lod_256ths: 0,
+            operands: true,
+        };
+        let options = SamplingOptions::default();
+        let found = read(&quad, Some(&operands), level, &anisotropic(16.0), &options);
+        assert!(found.iter().all(|f| f.layer == 3), "{found:?}");
+        (found.len(), found[0].level)
+    };
+    // Four probes on level log2(16 / 4) = 2, on which the level of detail is exact.
+    assert_eq!(by(LodRule::Derivatives), (8, 2));
+    assert_eq!(by(LodRule::Bias), (8, 3));
+    assert_eq!(by(LodRule::Explicit), (2, 1));
 }
 
 #[test]

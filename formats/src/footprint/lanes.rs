@@ -1,8 +1,9 @@
-//! Footprints by lane if every lane has its own level of detail
-//! ([`LodFormula::PerLane`](super::LodFormula)).
+//! Footprints by lane if every lane has its own level of detail: with
+//! [`LodFormula::PerLane`](super::LodFormula), or because each has its own bias or level.
 
 use super::{
-    Ellipse, LevelSelection, Probes, Reach, SamplingOptions, lane_lod, lane_record, select_levels,
+    Ellipse, LevelSelection, LodFormula, Probes, Reach, SamplingOptions, lane_record, quad_lod,
+    select_levels,
 };
 use crate::textrace::QuadRecord;
 use crate::texture::{Filter, Sampler};
@@ -17,7 +18,7 @@ pub enum LaneReach {
 }
 
 impl LaneReach {
-    /// The texels of a lane in a texture with `levels` levels, whose level 0 has `size` texels.
+    /// The texels of a lane in a texture with `levels` levels, whose level 0 has `size` texels, by the derivatives.
     #[must_use]
     pub fn of(
         record: &QuadRecord,
@@ -28,11 +29,14 @@ impl LaneReach {
         sampler: &Sampler,
         options: &SamplingOptions,
     ) -> Self {
-        let own = lane_record(record, lane);
+        let own = match options.lod {
+            LodFormula::PerLane => lane_record(record, lane),
+            _ => *record,
+        };
         let selected = |lod| select_levels(lod, sampler, levels);
         match Reach::of(&own, extent, size, levels, sampler, options) {
             Reach::Isotropic => {
-                let lod = lane_lod(record, lane, extent, size) + options.lod_bias;
+                let lod = quad_lod(&own, extent, size, options.lod) + options.lod_bias;
                 Self::Levels(selected(lod), None)
             }
             Reach::Probes(probes) => Self::Levels(selected(probes.lod), Some(probes)),
@@ -56,9 +60,8 @@ impl LaneReach {
         let Self::Levels(levels, probes) = self else {
             return None;
         };
-        let reads = (levels.first..levels.first + levels.count).contains(&level);
         let from_lane = probes.map_or([0; 2], |probes| probes.offset(probe));
-        (reads && probe < self.probe_count()).then_some((from_lane, levels.filter))
+        (levels.contains(level) && probe < self.probe_count()).then_some((from_lane, levels.filter))
     }
 
     /// The ellipse of the lane on a level.

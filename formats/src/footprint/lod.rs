@@ -50,14 +50,3 @@ pub fn lane_record(record: &QuadRecord, lane: u32) -> QuadRecord {
         ..*record
     }
 }
-
-/// Level of detail of one lane with [`LodFormula::PerLane`], without bias.
-#[must_use]
-pub fn lane_lod(record: &QuadRecord, lane: u32, extent: [u32; 2], size: [u32; 2]) -> f32 {
-    quad_lod(
-        &lane_record(record, lane),
-        extent,
-        size,
-        LodFormula::PerLane,
-    )
-}

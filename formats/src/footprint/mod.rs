@@ -15,7 +15,7 @@ mod options;
 
 pub use aniso::{AnisotropyModel, Ellipse, MOST_ANISOTROPY, Probes, Reach};
 pub use lanes::LaneReach;
-pub use lod::{fast_log2, lane_lod, lane_record, quad_lod};
+pub use lod::{fast_log2, lane_record, quad_lod};
 pub use operands::LaneLevel;
 pub use options::{FilterOverride, LodFormula, SamplingOptions};
 
@@ -188,16 +188,19 @@ pub fn footprints(
             });
         }
     };
-    if sample.level.rule == LodRule::Explicit || sample.level.operands {
+    let specified = sample.level.rule == LodRule::Explicit || sample.level.operands;
+    if specified || options.lod == LodFormula::PerLane {
         let operands = operands.filter(|_| sample.level.operands);
-        return visit_specified_levels(&quad, sample, operands, visit_in);
+        let lanes = quad.lanes().map(|lane| {
+            let own = LaneLevel::of(sample, texture, operands, lane);
+            (lane, own.layer, quad.lane_reach(lane, sample, own.lod))
+        });
+        return visit_lanes(&quad, &lanes.collect::<Vec<_>>(), visit_in);
     }
     quad.options.lod_bias += sample.level.lod();
-    let visit = |lane: u32, level: u32, texels| visit_in(lane, level, sample.layer, texels);
-    match options.lod {
-        LodFormula::PerLane => visit_levels_per_lane(&quad, visit),
-        _ => visit_quad_levels(&quad, visit),
-    }
+    visit_quad_levels(&quad, |lane, level, texels| {
+        visit_in(lane, level, sample.layer, texels);
+    });
 }
 
 /// A quad that samples a texture.
@@ -216,87 +219,51 @@ impl Quad<'_> {
         let mask = self.mask;
         (0..4).filter(move |lane| mask >> lane & 1 == 1)
     }
-}
 
-/// Visits the levels that the sample or its operands specify.
-fn visit_specified_levels(
-    quad: &Quad<'_>,
-    sample: &Sample,
-    operands: Option<&QuadRecord>,
-    mut visit_in: impl FnMut(u32, u32, u16, [[i64; 2]; 2]),
-) {
-    let Quad {
-        record,
-        extent,
-        texture,
-        sampler,
-        options,
-        ..
-    } = quad;
-    let extent = *extent;
-    let chosen: Vec<_> = (quad.lanes())
-        .map(|lane| {
-            let derived = || match options.lod {
-                LodFormula::PerLane => lane_lod(record, lane, extent, texture.size),
-                formula => quad_lod(record, extent, texture.size, formula),
-            };
-            let own = LaneLevel::of(sample, texture, operands, lane, || {
-                derived() + options.lod_bias
-            });
-            (lane, own.layer, own.levels(sampler, texture.levels))
-        })
-        .collect();
-    for level in 0..texture.levels {
-        let size = texture.level_size(level);
-        for (lane, layer, levels) in &chosen {
-            if levels.contains(level) {
-                let uv = record.lane_uv(*lane);
-                let axis = |a: usize| fetch(uv[a], size[a], extent[a], levels.filter);
-                visit_in(*lane, level, *layer, [axis(0), axis(1)]);
-            }
+    /// The texels of a lane that specifies a level, or a bias to that of the derivatives.
+    fn lane_reach(&self, lane: u32, sample: &Sample, lod: f32) -> LaneReach {
+        let (size, levels) = (self.texture.size, self.texture.levels);
+        if sample.level.rule == LodRule::Explicit {
+            return LaneReach::Levels(select_levels(lod, &self.sampler, levels), None);
         }
+        let options = SamplingOptions {
+            lod_bias: self.options.lod_bias + lod,
+            ..self.options
+        };
+        let (record, extent) = (self.record, self.extent);
+        LaneReach::of(record, lane, extent, size, levels, &self.sampler, &options)
     }
 }
 
-/// Visits the levels that follow from each lane's derivatives.
-fn visit_levels_per_lane(quad: &Quad<'_>, mut visit: impl FnMut(u32, u32, [[i64; 2]; 2])) {
-    let Quad {
-        record,
-        extent,
-        texture,
-        sampler,
-        options,
-        ..
-    } = quad;
-    let extent = *extent;
-    let (size, levels) = (texture.size, texture.levels);
-    let reach = quad.lanes().map(|lane| {
-        let of = LaneReach::of(record, lane, extent, size, levels, sampler, options);
-        (lane, of)
-    });
-    let reach: Vec<(u32, LaneReach)> = reach.collect();
-    let probes = reach.iter().map(|(_, of)| of.probe_count()).max();
-    for level in 0..levels {
-        let size = texture.level_size(level);
+/// Visits the texels of lanes that have levels of their own: each is a lane, its layer and what it reads.
+fn visit_lanes(
+    quad: &Quad<'_>,
+    lanes: &[(u32, u16, LaneReach)],
+    mut visit: impl FnMut(u32, u32, u16, [[i64; 2]; 2]),
+) {
+    let extent = quad.extent;
+    let probes = lanes.iter().map(|(_, _, of)| of.probe_count()).max();
+    for level in 0..quad.texture.levels {
+        let size = quad.texture.level_size(level);
         for probe in 0..probes.unwrap_or(0) {
-            for (lane, of) in &reach {
+            for (lane, layer, of) in lanes {
                 let Some((from_lane, filter)) = of.probe(level, probe) else {
                     continue;
                 };
-                let uv = record.lane_uv(*lane);
+                let uv = quad.record.lane_uv(*lane);
                 let axis = |a: usize| {
                     let at = uv[a].wrapping_add(from_lane[a]);
                     fetch(at, size[a], extent[a], filter)
                 };
-                visit(*lane, level, [axis(0), axis(1)]);
+                visit(*lane, level, *layer, [axis(0), axis(1)]);
             }
         }
-        for (lane, of) in &reach {
+        for (lane, layer, of) in lanes {
             let blocks = of
                 .ellipse(level)
-                .map(|ellipse| ellipse.blocks(record.lane_uv(*lane), size, extent));
+                .map(|ellipse| ellipse.blocks(quad.record.lane_uv(*lane), size, extent));
             for [x, y] in blocks.into_iter().flatten() {
-                visit(*lane, level, [[x, x + 1], [y, y + 1]]);
+                visit(*lane, level, *layer, [[x, x + 1], [y, y + 1]]);
             }
         }
     }

@@ -20,7 +20,7 @@ pub enum FilterOverride {
 }
 
 impl FilterOverride {
-    /// The sampler after the override; wrap modes and bounds of the level of detail are unchanged.
+    /// The sampler after the override; wrap modes, anisotropy and bounds of the level of detail are unchanged.
     #[must_use]
     pub fn apply(self, sampler: &Sampler) -> Sampler {
         let (filter, mip) = match self {
@@ -65,10 +65,11 @@ pub struct SamplingOptions {
     pub lod: LodFormula,
     /// Helper lanes of partly covered quads read, too.
     pub helper_lanes: bool,
-    /// Footprints of a long and narrow pixel at most, 2 to 16; 1, the default, filters all pixels alike.
-    #[serde(skip_serializing_if = "is_one")]
-    pub max_anisotropy: u32,
-    /// How long and narrow pixels are filtered where `max_anisotropy` is above 1; `"probes"` by default.
+    /// Footprints of a long and narrow pixel at most, 2 to 16, or 1, which filters all pixels alike. Without it,
+    /// as each sample's own sampler; those of scenes have 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_anisotropy: Option<u32>,
+    /// How long and narrow pixels are filtered where the largest anisotropy is above 1; `"probes"` by default.
     #[serde(skip_serializing_if = "is_default")]
     pub anisotropy: AnisotropyModel,
 }
@@ -80,16 +81,32 @@ impl Default for SamplingOptions {
             lod_bias: 0.0,
             lod: LodFormula::default(),
             helper_lanes: false,
-            max_anisotropy: 1,
+            max_anisotropy: None,
             anisotropy: AnisotropyModel::default(),
         }
     }
 }
 
-// Defaults are not written, so results from before anisotropy existed are unchanged.
-fn is_one(value: &u32) -> bool {
-    *value == 1
+impl SamplingOptions {
+    /// Largest anisotropy of a sampler: the recorded one, or the replay's. A replay's does not change samplers that
+    /// were recorded isotropic and do not blend texels or have no levels, such as those of shadow maps.
+    #[must_use]
+    pub fn max_anisotropy(&self, sampler: &Sampler) -> f32 {
+        match self.max_anisotropy {
+            Some(most) if sampler.blends_levels() || sampler.is_anisotropic() => most as f32,
+            Some(_) => 1.0,
+            None => sampler.max_anisotropy(),
+        }
+    }
+
+    /// Whether quads of a sampler may have more than one footprint per lane and level.
+    #[must_use]
+    pub fn is_anisotropic(&self, sampler: &Sampler) -> bool {
+        self.max_anisotropy(sampler) > 1.0
+    }
 }
+
+// Defaults are not written, so results from before anisotropy existed are unchanged.
 
 fn is_default(model: &AnisotropyModel) -> bool {
     *model == AnisotropyModel::default()

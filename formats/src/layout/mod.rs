@@ -2,13 +2,13 @@
 //!
 //! The layers of a texture are consecutive. Each has its levels from fine to coarse, without gaps. A level
 //! is an array of blocks (4x4 texels for BC1, one texel for uncompressed formats) in the configured order.
-//! Shadow maps have their own order.
+//! Shadow maps have their own order. A texture that is a part of another one lies in that one's memory.
 
 mod placement;
 
 pub use placement::BlockPlacement;
 
-use crate::texture::{TexelFormat, Texture};
+use crate::texture::{Part, TexelFormat, Texture};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -84,6 +84,9 @@ pub enum LayoutError {
         /// Name.
         name: String,
     },
+    /// A part of a texture that lacks it.
+    #[error("texture {0} ({1}): expected a part of another texture, found levels that it lacks")]
+    Part(usize, String),
 }
 
 /// A format's unit of storage.
@@ -145,6 +148,8 @@ pub struct TextureLayout {
     pub layers: u32,
     /// Levels from fine to coarse.
     pub levels: Vec<LevelLayout>,
+    /// Whether it lies in the memory of another texture.
+    pub is_part: bool,
 }
 
 impl TextureLayout {
@@ -202,6 +207,7 @@ impl Layout {
             placed.push(place(texture, config).ok_or_else(|| too_large(index, texture))?);
         }
         let mut order: Vec<usize> = (0..textures.len()).collect();
+        order.retain(|&index| textures[index].part.is_none());
         if config.texture_order == TextureOrder::LargestFirst {
             order.sort_by_key(|&index| {
                 std::cmp::Reverse(placed[index].layer_bytes * u64::from(textures[index].layers))
@@ -217,6 +223,12 @@ impl Layout {
                 .zip(after)
                 .filter(|(_, end)| *end < 1 << 63)
                 .ok_or_else(|| too_large(index, texture))?;
+        }
+        for (index, texture) in textures.iter().enumerate() {
+            if let Some(part) = texture.part {
+                placed[index] = within(part, texture, &placed)
+                    .ok_or_else(|| LayoutError::Part(index, texture.name.clone()))?;
+            }
         }
         Ok(Self {
             textures: placed,
@@ -241,7 +253,7 @@ impl Layout {
     pub fn block_at(&self, address: u64) -> Option<BlockAt> {
         let holds = |texture: &TextureLayout| {
             let end = texture.base + texture.size_bytes();
-            (texture.base..end).contains(&address)
+            !texture.is_part && (texture.base..end).contains(&address)
         };
         let (number, texture) = (0..).zip(&self.textures).find(|(_, t)| holds(t))?;
         let within = address - texture.base;
@@ -319,6 +331,23 @@ fn place(texture: &Texture, config: &LayoutConfig) -> Option<TextureLayout> {
         layer_bytes: offset_bytes,
         layers: texture.layers,
         levels,
+        is_part: false,
+    })
+}
+
+/// The placement of a part of a texture; `None` if that texture does not have its levels.
+fn within(part: Part, texture: &Texture, placed: &[TextureLayout]) -> Option<TextureLayout> {
+    let whole = placed
+        .get(part.of as usize)
+        .filter(|whole| !whole.is_part)?;
+    let (first, layer) = (part.level as usize, u64::from(part.layer));
+    let levels = whole.levels.get(first..first + texture.levels as usize)?;
+    Some(TextureLayout {
+        base: whole.base + layer * whole.layer_bytes,
+        layers: texture.layers,
+        levels: levels.to_vec(),
+        is_part: true,
+        ..*whole
     })
 }
 

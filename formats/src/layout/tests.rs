@@ -11,6 +11,7 @@ fn texture(size: [u32; 2], levels: u32, layers: u32, format: TexelFormat) -> Tex
         layers,
         format,
         color_space: ColorSpace::Srgb,
+        part: None,
     }
 }
 
@@ -130,6 +131,44 @@ fn a_format_override_leaves_shadow_maps_alone() {
     let formats: Vec<_> = layout.textures().iter().map(|t| t.format).collect();
     assert_eq!(formats, [TexelFormat::Astc8x8, TexelFormat::R32f]);
     assert_eq!(layout.end(), 64 + 4 * 256);
+}
+
+#[test]
+fn a_part_lies_in_the_memory_of_its_texture() {
+    let whole = texture([64, 32], 7, 4, TexelFormat::Rgba8);
+    let part = Texture {
+        size: [32, 16],
+        levels: 3,
+        layers: 2,
+        part: Some(Part {
+            of: 1,
+            level: 1,
+            layer: 2,
+        }),
+        ..whole.clone()
+    };
+    let other = texture([8, 8], 1, 1, TexelFormat::Rgba8);
+    let textures = [part.clone(), whole, other];
+    for order in [TextureOrder::Table, TextureOrder::LargestFirst] {
+        let config = LayoutConfig {
+            texture_order: order,
+            ..LayoutConfig::default()
+        };
+        let layout = Layout::new(&textures, &config).unwrap();
+        for (layer, level, at) in [(0, 0, [31, 15]), (1, 2, [3, 1])] {
+            let address = layout.address(0, layer, level, at);
+            assert!(address.is_some());
+            assert_eq!(address, layout.address(1, layer + 2, level + 1, at));
+            let found = layout.block_at(address.unwrap()).map(|found| found.texture);
+            assert_eq!(found, Some(1));
+        }
+        assert_eq!(
+            layout.end(),
+            Layout::new(&textures[1..], &config).unwrap().end()
+        );
+    }
+    let alone = Layout::new(&[part], &LayoutConfig::default());
+    assert!(matches!(alone, Err(LayoutError::Part(0, _))), "{alone:?}");
 }
 
 #[test]

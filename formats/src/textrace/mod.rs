@@ -473,10 +473,18 @@ pub struct Tables {
 }
 
 impl Tables {
+    /// Whether the tables have features that version 2 lacks.
+    #[must_use]
+    pub fn need_version_3(&self) -> bool {
+        self.samplers.iter().any(Sampler::is_anisotropic)
+            || self.textures.iter().any(|t| t.part.is_some())
+    }
+
     /// Whether the tables have features that version 1 lacks.
     #[must_use]
     pub fn need_version_2(&self) -> bool {
         self.meta.program.is_some()
+            || self.need_version_3()
             || self.textures.iter().any(|t| !t.format.is_in_version_1())
             || self.samplers.iter().any(|s| !s.is_in_version_1())
             || (self.draws.iter().flat_map(|draw| &draw.groups))

@@ -1,16 +1,16 @@
-//! The tables of a trace as chunks: META (JSON), TEXS, SMPS, DRAW, PASS (binary), in both versions.
+//! The tables of a trace as chunks: META (JSON), TEXS, SMPS, DRAW, PASS (binary), in every version.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::{
     Draw, LodRule, Pass, PassKind, Sample, SampleLevel, TILE_INDEX, TILES, Tables, TraceMeta,
     UvGroup,
 };
-use crate::container::{ChunkTag, Container, ContainerWriter, MAJOR_1, MAJOR_2};
+use crate::container::{ChunkTag, Container, ContainerWriter, MAJOR_1, MAJOR_2, MAJOR_3};
 use crate::error::{Broken, FormatError, Result, ensure};
 use crate::json;
 use crate::parse::{self, Fault, Parsed, zero};
 use crate::texture::{
-    ColorSpace, Filter, LodRange, MipFilter, Sampler, TexelFormat, Texture, Wrap,
+    ColorSpace, Filter, LodRange, MipFilter, Part, Sampler, TexelFormat, Texture, Wrap,
 };
 use crate::view::{Eye, TILE_SIZE_PX};
 use nom::Parser;
@@ -46,6 +46,10 @@ pub const SAMPLE_BYTES: usize = 10;
 pub const SAMPLER_BYTES_V2: usize = 11;
 /// Bytes of a sample in version 2.
 pub const SAMPLE_BYTES_V2: usize = 14;
+/// Bytes of a texture in version 3 without its name.
+pub const TEXTURE_BYTES_V3: usize = 34;
+/// Bytes of a sampler in version 3.
+pub const SAMPLER_BYTES_V3: usize = 13;
 /// Bytes of a pass.
 pub const PASS_BYTES: usize = 24;
 
@@ -59,20 +63,26 @@ pub const MAX_LAYERS: u32 = 1 << 16;
 const LAYERS_MINOR: u16 = 1;
 /// Number for "both eyes" in a pass.
 const NO_EYE: u8 = 255;
+/// Index for "no texture" in a texture that is no part.
+const NO_PART: u32 = u32::MAX;
 
 /// Version of the tables' layout.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Version {
     /// Tables before the tiles.
     One,
     /// Tables after the tiles, with the levels of detail, formats and wrap modes of programs.
     Two,
+    /// Also the anisotropy of samplers, and textures that share memory.
+    Three,
 }
 
 impl Version {
     /// The version that complete tables need.
     pub(super) fn of(tables: &Tables) -> Self {
-        if tables.need_version_2() {
+        if tables.need_version_3() {
+            Self::Three
+        } else if tables.need_version_2() {
             Self::Two
         } else {
             Self::One
@@ -83,6 +93,7 @@ impl Version {
         match self {
             Self::One => MAJOR_1,
             Self::Two => MAJOR_2,
+            Self::Three => MAJOR_3,
         }
     }
 }
@@ -99,7 +110,8 @@ pub(super) fn write<W: Write + Seek>(
         container.require_minor(LAYERS_MINOR);
     }
     container.chunk(META, &json::write("trace description", &tables.meta)?)?;
-    container.chunk(TEXTURES, &table(&tables.textures, write_texture)?)?;
+    let texture = |t: &Texture, bytes: &mut Vec<u8>| write_texture(version, t, bytes);
+    container.chunk(TEXTURES, &table(&tables.textures, texture)?)?;
     let sampler = |s: &Sampler, bytes: &mut Vec<u8>| write_sampler(version, s, bytes);
     container.chunk(SAMPLERS, &table(&tables.samplers, sampler)?)?;
     let draw = |d: &Draw, bytes: &mut Vec<u8>| write_draw(version, d, bytes);
@@ -114,26 +126,25 @@ pub(super) fn check_writable(tables: &Tables) -> Result<()> {
 
 /// Reads and checks the table chunks.
 pub(super) fn read(container: &Container) -> Result<Tables> {
-    let (version, order) = match container.version().0 {
-        MAJOR_2 => (
-            Version::Two,
-            [TILES, TILE_INDEX, META, TEXTURES, SAMPLERS, DRAWS, PASSES],
-        ),
-        _ => (
-            Version::One,
-            [META, TEXTURES, SAMPLERS, DRAWS, PASSES, TILES, TILE_INDEX],
-        ),
+    let version = match container.version().0 {
+        MAJOR_3 => Version::Three,
+        MAJOR_2 => Version::Two,
+        _ => Version::One,
     };
-    container.expect_order(&order)?;
-    let sampler_bytes = match version {
-        Version::One => SAMPLER_BYTES,
-        Version::Two => SAMPLER_BYTES_V2,
+    container.expect_order(&match version {
+        Version::One => [META, TEXTURES, SAMPLERS, DRAWS, PASSES, TILES, TILE_INDEX],
+        _ => [TILES, TILE_INDEX, META, TEXTURES, SAMPLERS, DRAWS, PASSES],
+    })?;
+    let (texture_bytes, sampler_bytes) = match version {
+        Version::One => (TEXTURE_BYTES, SAMPLER_BYTES),
+        Version::Two => (TEXTURE_BYTES, SAMPLER_BYTES_V2),
+        Version::Three => (TEXTURE_BYTES_V3, SAMPLER_BYTES_V3),
     };
     let tables = Tables {
         meta: json::read(container, META, "a trace's description")?,
         textures: container.parse_chunk(TEXTURES, |input| {
             let texture = |input| read_texture(version, input);
-            read_table("texture count", TEXTURE_BYTES, texture, input)
+            read_table("texture count", texture_bytes, texture, input)
         })?,
         samplers: container.parse_chunk(SAMPLERS, |input| {
             let sampler = |input| read_sampler(version, input);
@@ -172,6 +183,10 @@ fn check(tables: &Tables) -> std::result::Result<(), (ChunkTag, Broken)> {
     }
     for (index, texture) in tables.textures.iter().enumerate() {
         check_texture(index, texture).map_err(located(TEXTURES))?;
+        check_part(tables, index, texture).map_err(located(TEXTURES))?;
+    }
+    for (index, sampler) in tables.samplers.iter().enumerate() {
+        check_sampler(index, sampler).map_err(located(SAMPLERS))?;
     }
     for (index, draw) in tables.draws.iter().enumerate() {
         check_draw(tables, index, draw).map_err(located(DRAWS))?;
@@ -215,6 +230,36 @@ fn check_texture(index: usize, texture: &Texture) -> std::result::Result<(), Bro
     })?;
     ensure((1..=MAX_LAYERS).contains(&texture.layers), || {
         Broken::new(what(), format!("1 to {MAX_LAYERS} layers"), texture.layers)
+    })
+}
+
+fn check_part(tables: &Tables, index: usize, texture: &Texture) -> std::result::Result<(), Broken> {
+    let Some(part) = texture.part else {
+        return Ok(());
+    };
+    let whole = usize::try_from(part.of)
+        .ok()
+        .and_then(|of| tables.textures.get(of));
+    ensure(whole.is_some_and(|whole| texture.fits(part, whole)), || {
+        Broken::new(
+            format!("texture {index} ({})", texture.name),
+            "a texture that is no part, with the part's levels and layers in blocks of the same kind",
+            format_args!(
+                "level {}, layer {} of texture {}",
+                part.level, part.layer, part.of
+            ),
+        )
+    })
+}
+
+fn check_sampler(index: usize, sampler: &Sampler) -> std::result::Result<(), Broken> {
+    let range = Sampler::ISOTROPIC..=Sampler::MOST_ANISOTROPIC;
+    ensure(range.contains(&sampler.max_anisotropy_256ths), || {
+        Broken::new(
+            format!("sampler {index}"),
+            "a maximum anisotropy of 256 to 4096 (1/256)",
+            sampler.max_anisotropy_256ths,
+        )
     })
 }
 
@@ -430,7 +475,7 @@ const EYES: &[(u16, Option<Eye>)] = &[
     (NO_EYE as u16, None),
 ];
 
-fn write_texture(texture: &Texture, bytes: &mut Vec<u8>) -> Result<()> {
+fn write_texture(version: Version, texture: &Texture, bytes: &mut Vec<u8>) -> Result<()> {
     for number in [
         texture.size[0],
         texture.size[1],
@@ -441,22 +486,32 @@ fn write_texture(texture: &Texture, bytes: &mut Vec<u8>) -> Result<()> {
     }
     bytes.extend((texture.format as u16).to_le_bytes());
     bytes.extend([texture.color_space as u8, 0]);
+    if version >= Version::Three {
+        let none = Part {
+            of: NO_PART,
+            level: 0,
+            layer: 0,
+        };
+        let Part { of, level, layer } = texture.part.unwrap_or(none);
+        bytes.extend([of, level, layer].iter().flat_map(|n| n.to_le_bytes()));
+    }
     write_name(&texture.name, bytes)
 }
 
 fn read_texture(version: Version, input: &[u8]) -> Parsed<'_, Texture> {
     let formats = match version {
         Version::One => FORMATS,
-        Version::Two => FORMATS_V2,
+        _ => FORMATS_V2,
     };
-    let (rest, (width, height, levels, layers)) = context(
-        "a texture of 22 bytes and a name",
-        (le_u32, le_u32, le_u32, le_u32),
-    )
-    .parse(input)?;
+    let (rest, (width, height, levels, layers)) =
+        context("a texture with a name", (le_u32, le_u32, le_u32, le_u32)).parse(input)?;
     let (rest, format) = id("a texel format", le_u16, formats)(rest)?;
     let (rest, color_space) = id("a colour space", u8, COLOR_SPACES)(rest)?;
     let (rest, ()) = zero(rest, 1)?;
+    let (rest, part) = match version {
+        Version::Three => read_part(rest)?,
+        _ => (rest, None),
+    };
     let (rest, name) = read_name(rest)?;
     let texture = Texture {
         name,
@@ -465,14 +520,31 @@ fn read_texture(version: Version, input: &[u8]) -> Parsed<'_, Texture> {
         layers,
         format,
         color_space,
+        part,
     };
     Ok((rest, texture))
+}
+
+fn read_part(input: &[u8]) -> Parsed<'_, Option<Part>> {
+    let place = (le_u32, le_u32, le_u32);
+    let (rest, (of, level, layer)) = context("a part of 12 bytes", place).parse(input)?;
+    if of != NO_PART {
+        return Ok((rest, Some(Part { of, level, layer })));
+    }
+    match level | layer {
+        0 => Ok((rest, None)),
+        found => Err(nom::Err::Failure(Fault::new(
+            input,
+            "zeros in a texture that is no part",
+            found,
+        ))),
+    }
 }
 
 fn write_sampler(version: Version, sampler: &Sampler, bytes: &mut Vec<u8>) -> Result<()> {
     bytes.extend(sampler.wrap.map(|wrap| wrap as u8));
     bytes.extend([sampler.mag as u8, sampler.min as u8, sampler.mip as u8]);
-    if version == Version::Two {
+    if version >= Version::Two {
         let LodRange {
             bias_256ths,
             min_256ths,
@@ -482,13 +554,16 @@ fn write_sampler(version: Version, sampler: &Sampler, bytes: &mut Vec<u8>) -> Re
             bytes.extend(number.to_le_bytes());
         }
     }
+    if version >= Version::Three {
+        bytes.extend(sampler.max_anisotropy_256ths.to_le_bytes());
+    }
     Ok(())
 }
 
 fn read_sampler(version: Version, input: &[u8]) -> Parsed<'_, Sampler> {
     let wraps = match version {
         Version::One => WRAPS,
-        Version::Two => WRAPS_V2,
+        _ => WRAPS_V2,
     };
     let (rest, wrap_u) = id("a wrap mode", u8, wraps)(input)?;
     let (rest, wrap_v) = id("a wrap mode", u8, wraps)(rest)?;
@@ -497,7 +572,7 @@ fn read_sampler(version: Version, input: &[u8]) -> Parsed<'_, Sampler> {
     let (rest, mip) = id("a mip filter", u8, MIP_FILTERS)(rest)?;
     let (rest, lod) = match version {
         Version::One => (rest, LodRange::WHOLE),
-        Version::Two => {
+        _ => {
             let (rest, (bias_256ths, min_256ths, max_256ths)) = context(
                 "bias and bounds of a level of detail",
                 (le_i16, le_i16, le_i16),
@@ -511,12 +586,17 @@ fn read_sampler(version: Version, input: &[u8]) -> Parsed<'_, Sampler> {
             (rest, lod)
         }
     };
+    let (rest, max_anisotropy_256ths) = match version {
+        Version::Three => context("a maximum anisotropy", le_u16).parse(rest)?,
+        _ => (rest, Sampler::ISOTROPIC),
+    };
     let sampler = Sampler {
         wrap: [wrap_u, wrap_v],
         mag,
         min,
         mip,
         lod,
+        max_anisotropy_256ths,
     };
     Ok((rest, sampler))
 }
@@ -534,7 +614,7 @@ fn write_draw(version: Version, draw: &Draw, bytes: &mut Vec<u8>) -> Result<()> 
             bytes.extend(sample.sampler.to_le_bytes());
             bytes.extend(sample.layer.to_le_bytes());
             bytes.extend(sample.offset.iter().flat_map(|offset| offset.to_le_bytes()));
-            if version == Version::Two {
+            if version >= Version::Two {
                 let SampleLevel {
                     rule,
                     lod_256ths,
@@ -583,7 +663,7 @@ fn read_sample(version: Version, input: &[u8]) -> Parsed<'_, Sample> {
         context("a sample of 10 bytes", (le_u32, le_u16, le_u16, i8, i8)).parse(input)?;
     let (rest, level) = match version {
         Version::One => (rest, SampleLevel::default()),
-        Version::Two => read_level(rest)?,
+        _ => read_level(rest)?,
     };
     let sample = Sample {
         texture,

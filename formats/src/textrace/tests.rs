@@ -1,5 +1,5 @@
 use super::*;
-use crate::texture::{ColorSpace, TexelFormat};
+use crate::texture::{ColorSpace, Part, TexelFormat};
 use crate::view::{EyeView, FovTangents};
 use proptest::prelude::*;
 
@@ -23,6 +23,7 @@ pub(crate) fn tables() -> Tables {
         layers: 2,
         format: TexelFormat::Bc1,
         color_space: ColorSpace::Srgb,
+        part: None,
     };
     let sample = |texture| Sample {
         texture,
@@ -287,6 +288,92 @@ fn growing_tables_give_the_same_trace_as_complete_tables() {
     let mut tile = Tile::default();
     trace.decode_tile(1, 4, &mut tile).unwrap();
     assert_eq!(tile, program_tile());
+}
+
+/// The tables of a program with an anisotropic sampler, and with a texture that is a part of the first one.
+fn tables_of_version_3() -> Tables {
+    let mut tables = program_tables();
+    tables.samplers[0].max_anisotropy_256ths = 2560;
+    let whole = tables.textures[0].clone();
+    tables.textures.push(Texture {
+        size: whole.level_size(1),
+        levels: 1,
+        layers: 1,
+        part: Some(Part {
+            of: 0,
+            level: 1,
+            layer: 0,
+        }),
+        ..whole
+    });
+    tables
+}
+
+#[test]
+fn anisotropy_and_parts_of_textures_are_version_3() {
+    let tables = tables_of_version_3();
+    let bytes = TextraceWriter::in_memory(&tables)
+        .unwrap()
+        .into_bytes()
+        .unwrap();
+    let trace = Textrace::from_bytes(bytes).unwrap();
+    assert_eq!(trace.container().version(), (3, 0));
+    assert_eq!(trace.tables(), &tables);
+    // A growing trace names the earliest version that has all of its tables.
+    for (set, major) in [(false, 2), (true, 3)] {
+        let mut writer = TextraceWriter::growing_in_memory().unwrap();
+        let textures = &tables.textures;
+        for texture in textures {
+            writer
+                .add_texture(Texture {
+                    part: None,
+                    ..texture.clone()
+                })
+                .unwrap();
+        }
+        if set {
+            let last = textures.len() as u32 - 1;
+            writer.set_part(last, textures[last as usize].part).unwrap();
+            assert!(writer.set_part(last + 1, None).is_err());
+        }
+        writer.set_meta(tables.meta.clone()).unwrap();
+        let trace = Textrace::from_bytes(writer.into_bytes().unwrap()).unwrap();
+        assert_eq!(trace.container().version(), (major, 0));
+    }
+}
+
+#[test]
+fn parts_and_anisotropies_that_cannot_be_are_refused() {
+    type Change = fn(&mut Tables);
+    let changes: [(Change, &str); 7] = [
+        (|t| t.samplers[1].max_anisotropy_256ths = 255, "found 255"),
+        (|t| t.samplers[1].max_anisotropy_256ths = 4097, "found 4097"),
+        (|t| last_part(t).of = 99, "of texture 99"),
+        (
+            |t| {
+                let own = t.textures.len() as u32 - 1;
+                last_part(t).of = own;
+            },
+            "level 1, layer 0 of texture",
+        ),
+        (|t| last_part(t).level = 2, "level 2"),
+        (|t| last_part(t).layer = 9, "layer 9"),
+        (
+            |t| t.textures.last_mut().unwrap().format = TexelFormat::Rgba8,
+            "level 1, layer 0",
+        ),
+    ];
+    for (change, found) in changes {
+        let mut tables = tables_of_version_3();
+        change(&mut tables);
+        let error = TextraceWriter::in_memory(&tables).unwrap_err().to_string();
+        assert!(error.contains(found), "{error}");
+    }
+}
+
+fn last_part(tables: &mut Tables) -> &mut Part {
+    let texture = tables.textures.last_mut().unwrap();
+    texture.part.as_mut().unwrap()
 }
 
 #[test]

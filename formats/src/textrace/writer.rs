@@ -6,7 +6,7 @@ use super::tables::{self, Version};
 use super::{Draw, Encoding, Pass, Tables, Tile, TraceMeta, delta, invariant, planes, raw};
 use crate::container::{AtomicFile, ContainerWriter, Kind};
 use crate::error::{Broken, FormatError, Result};
-use crate::texture::{Sampler, Texture};
+use crate::texture::{Part, Sampler, Texture};
 use crate::tiles::TileSpan;
 use std::io::{Cursor, Seek, Write};
 use std::path::Path;
@@ -79,7 +79,8 @@ pub fn encode_tile_as(encoding: Encoding, tables: &Tables, tile: &Tile) -> Resul
 #[derive(Debug)]
 pub struct TextraceWriter<W = AtomicFile> {
     container: ContainerWriter<W>,
-    version: Version,
+    /// Whether the tables come after the tiles.
+    tables_last: bool,
     tables: Tables,
     index: Vec<IndexEntry>,
     /// First index slot that the next tile may have.
@@ -105,7 +106,7 @@ impl TextraceWriter<AtomicFile> {
     /// The file cannot be written.
     pub fn create_growing(path: &Path) -> Result<Self> {
         let container = ContainerWriter::create(path, Kind::Textrace)?;
-        Self::start_version(Version::Two, container, &Tables::default())
+        Self::start_with(true, container, &Tables::default())
     }
 
     /// Completes the file. Returns its size in bytes.
@@ -132,7 +133,7 @@ impl TextraceWriter<Cursor<Vec<u8>>> {
     /// None in practice; the signature matches that for files.
     pub fn growing_in_memory() -> Result<Self> {
         let container = ContainerWriter::in_memory(Kind::Textrace)?;
-        Self::start_version(Version::Two, container, &Tables::default())
+        Self::start_with(true, container, &Tables::default())
     }
 
     /// Completes the trace.
@@ -146,26 +147,26 @@ impl TextraceWriter<Cursor<Vec<u8>>> {
 
 impl<W: Write + Seek> TextraceWriter<W> {
     fn start(container: ContainerWriter<W>, tables: &Tables) -> Result<Self> {
-        Self::start_version(Version::of(tables), container, tables)
+        Self::start_with(Version::of(tables) > Version::One, container, tables)
     }
 
-    fn start_version(
-        version: Version,
+    fn start_with(
+        tables_last: bool,
         mut container: ContainerWriter<W>,
         tables: &Tables,
     ) -> Result<Self> {
-        match version {
-            Version::One => tables::write(version, tables, &mut container)?,
+        if !tables_last {
+            tables::write(Version::One, tables, &mut container)?;
+        } else if *tables != Tables::default() {
             // Report errors of the tables before the work. A growing trace has no tables yet.
-            Version::Two if *tables != Tables::default() => tables::check_writable(tables)?,
-            Version::Two => {}
+            tables::check_writable(tables)?;
         }
         container.begin_chunk(super::TILES)?;
         let slots: u64 = tables.passes.iter().map(Pass::tile_count_u64).sum();
         let tiles = usize::try_from(slots).map_err(|_| too_many_tiles(slots))?;
         Ok(Self {
             container,
-            version,
+            tables_last,
             tables: tables.clone(),
             index: vec![IndexEntry::default(); tiles],
             next_slot: 0,
@@ -187,9 +188,9 @@ impl<W: Write + Seek> TextraceWriter<W> {
     /// # Errors
     /// The tables have been written.
     fn growing(&mut self, what: &str) -> Result<&mut Tables> {
-        match self.version {
-            Version::Two => Ok(&mut self.tables),
-            Version::One => Err(FormatError::Unwritable {
+        match self.tables_last {
+            true => Ok(&mut self.tables),
+            false => Err(FormatError::Unwritable {
                 what: what.to_owned(),
                 expected: "a trace whose tables come last".to_owned(),
                 found: "tables that have been written".to_owned(),
@@ -214,6 +215,22 @@ impl<W: Write + Seek> TextraceWriter<W> {
         let textures = &mut self.growing("a texture")?.textures;
         textures.push(texture);
         index_of_last("texture", textures.len())
+    }
+
+    /// Makes a texture a part of another one, or a texture of its own.
+    ///
+    /// # Errors
+    /// The tables have been written, or there is no such texture.
+    pub fn set_part(&mut self, texture: u32, part: Option<Part>) -> Result<()> {
+        let textures = &mut self.growing("a part of a texture")?.textures;
+        let found = textures.get_mut(texture as usize);
+        found
+            .map(|found| found.part = part)
+            .ok_or_else(|| FormatError::Unwritable {
+                what: "a part of a texture".to_owned(),
+                expected: "a texture of the trace".to_owned(),
+                found: texture.to_string(),
+            })
     }
 
     /// Adds a sampler and returns its index.
@@ -343,8 +360,9 @@ impl<W: Write + Seek> TextraceWriter<W> {
             entry.write(&mut bytes);
         }
         self.container.chunk(super::TILE_INDEX, &bytes)?;
-        if self.version == Version::Two {
-            tables::write(self.version, &self.tables, &mut self.container)?;
+        if self.tables_last {
+            let version = Version::of(&self.tables).max(Version::Two);
+            tables::write(version, &self.tables, &mut self.container)?;
         }
         if let Some(spool) = self.geometry {
             spool.write(&self.tables, &mut self.container)?;

@@ -121,7 +121,7 @@ pub struct ConfigArgs {
         hide_short_help = true
     )]
     lod_bias: Option<f32>,
-    /// Largest number of footprints per anisotropic pixel, 1 to 16
+    /// Largest number of footprints per anisotropic pixel, 1 to 16, instead of each sampler's recorded one
     #[arg(
         long,
         value_name = "N",
@@ -364,7 +364,10 @@ impl ConfigArgs {
         set(&mut config.sampling.filter, self.filter);
         set(&mut config.sampling.lod, self.lod);
         set(&mut config.sampling.lod_bias, self.lod_bias);
-        set(&mut config.sampling.max_anisotropy, self.max_anisotropy);
+        set(
+            &mut config.sampling.max_anisotropy,
+            self.max_anisotropy.map(Some),
+        );
         set(&mut config.sampling.anisotropy, self.anisotropy);
         config.sampling.helper_lanes |= self.helper_lanes;
         set(&mut config.layout.texel_format, self.texel_format.map(Some));

@@ -15,7 +15,7 @@ use formats::container::Container;
 use formats::raytrace::RayKind;
 use formats::raytrace::{Raytrace, RaytraceTables};
 use formats::textrace::{ChosenTechniques, PassKind, Textrace, TraceMeta};
-use formats::texture::Texture;
+use formats::texture::{Sampler, Texture};
 use json::{PassJson, RayCounts, Totals, lower, passes, ray_counts, version};
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -90,14 +90,24 @@ fn texture_text(trace: &Textrace) -> Result<String> {
     text += "\n";
     text += &texture_table(&trace.tables().textures);
     text += &format!(
-        "\n{} draws, {} samplers; {} records in {} tile bytes, {:.2} bytes per record\n",
+        "\n{} draws, {} samplers{}; {} records in {} tile bytes, {:.2} bytes per record\n",
         trace.tables().draws.len(),
         trace.tables().samplers.len(),
+        anisotropy_text(&trace.tables().samplers),
         totals.records,
         totals.tile_bytes,
         totals.bytes_per_record,
     );
     Ok(text)
+}
+
+/// How many of the samplers are anisotropic, and the largest anisotropy; empty if none is.
+fn anisotropy_text(samplers: &[Sampler]) -> String {
+    let found = samplers.iter().filter(|sampler| sampler.is_anisotropic());
+    let most = found.clone().map(Sampler::max_anisotropy).reduce(f32::max);
+    most.map_or_else(String::new, |most| {
+        format!(", {} of them anisotropic up to {most}", found.count())
+    })
 }
 
 /// The techniques that the frames were rendered with, and why they were chosen.
@@ -148,7 +158,10 @@ fn texture_table(textures: &[Texture]) -> String {
     type TextureRow<'a> = (usize, &'a Texture);
     let columns = [
         count("texture", |r: &TextureRow| r.0 as u64),
-        Column::text("name", "name", |r: &TextureRow| r.1.name.clone()),
+        Column::text("name", "name", |r: &TextureRow| match r.1.part {
+            Some(part) => format!("{} (part of {})", r.1.name, part.of),
+            None => r.1.name.clone(),
+        }),
         Column::text("size", "size", |r: &TextureRow| {
             format!("{}x{}", r.1.size[0], r.1.size[1])
         }),

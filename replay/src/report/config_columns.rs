@@ -5,6 +5,7 @@ use super::columns::{Figure, Value};
 use crate::config::{LevelConfig, RunConfig};
 use crate::experiment::{ResultRow, plain, scene_label};
 use crate::model_version::MODEL_VERSION;
+use formats::texture::Sampler;
 use serde::Serialize;
 
 /// The name of an enum's value in configuration files.
@@ -36,6 +37,14 @@ pub fn trace<'a>() -> Vec<Figure<'a>> {
         Figure::text("model_version", "model", |_| u64::from(MODEL_VERSION))
             .about("version of the models; counts of different versions cannot be compared"),
     ]
+}
+
+/// Largest anisotropy of all samples of a row; none if the recorded samplers decide and differ from 1.
+fn max_anisotropy(row: &ResultRow) -> Option<u64> {
+    let chosen = row.point.config.sampling.max_anisotropy;
+    let recorded = &row.subject.source.tables().samplers;
+    let isotropic = !recorded.iter().any(Sampler::is_anisotropic);
+    chosen.or(isotropic.then_some(1)).map(u64::from)
 }
 
 /// Every configuration key, as listed in docs/use/configuration.md.
@@ -81,7 +90,7 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         key("sampling.lod_bias", |c| f64::from(c.sampling.lod_bias)),
         key("sampling.lod", |c| name(&c.sampling.lod)),
         key("sampling.helper_lanes", |c| c.sampling.helper_lanes),
-        key("sampling.max_anisotropy", |c| u64::from(c.sampling.max_anisotropy)),
+        Figure::text("sampling.max_anisotropy", "sampling.max_anisotropy", max_anisotropy),
         key("sampling.anisotropy", |c| name(&c.sampling.anisotropy)),
         key("layout.texel_format", |c| c.layout.texel_format.as_ref().map(name)),
         key("layout.block_order", |c| name(&c.layout.block_order)),

@@ -151,6 +151,7 @@ impl Synthetic {
                         layers: 1,
                         format: TexelFormat::Bc1,
                         color_space: ColorSpace::Linear,
+                        part: None,
                     }
                 })
                 .collect(),

@@ -63,6 +63,7 @@ pub fn tables(sizes: &[[u32; 2]]) -> Tables {
                 layers: 1,
                 format: TexelFormat::Bc1,
                 color_space: ColorSpace::Srgb,
+                part: None,
             })
             .collect(),
         samplers: vec![Sampler::TRILINEAR_REPEAT],

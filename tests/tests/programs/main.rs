@@ -2,6 +2,7 @@
 //! draw, the number of recorded fragments equals that of an occlusion query. Each pixel shows a texel that
 //! its last record reads. The picture is the same without the layer.
 
+mod fields;
 mod opengl;
 mod other_stages;
 mod pixels;

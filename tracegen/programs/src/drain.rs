@@ -1,6 +1,7 @@
 //! Converts frames of a session to a trace.
 
 mod build;
+mod images;
 mod places;
 
 use crate::pairs::pair;

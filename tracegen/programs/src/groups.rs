@@ -1,6 +1,6 @@
 //! The uv groups of a draw: the sites that share records, and their samples.
 
-use crate::lanes::{LaneSample, lod, on_cube};
+use crate::lanes::{Joins, LaneSample, lod, on_cube};
 use formats::textrace::{LodRule, Sample, SampleLevel, UvGroup};
 use parallax_layer::inject::{Access, Form, Lod, RawFragment, RawQuad, Shape, TextureSite, What};
 use parallax_layer::spool::ShaderInfo;
@@ -16,6 +16,8 @@ pub struct Bound {
     pub size: [u32; 2],
     /// Whether coordinates are in texels.
     pub unnormalized: bool,
+    /// Whether the sampler is anisotropic.
+    pub anisotropic: bool,
 }
 
 /// A uv group of a draw.
@@ -31,6 +33,9 @@ pub struct Group {
     /// Size of the first texture, which converts coordinates to texels.
     size: [u32; 2],
     unnormalized: bool,
+    /// Whether replay derives the levels of detail of a cube map or of explicit gradients from the changes of the
+    /// coordinates. A level alone does not say how long and narrow a pixel is.
+    anisotropic: bool,
 }
 
 /// Reason why a site has no group.
@@ -72,6 +77,7 @@ impl Group {
                 kind: texture.clone(),
                 size: bound.size,
                 unnormalized: bound.unnormalized,
+                anisotropic: bound.anisotropic,
             });
             extent = [0, 1].map(|axis| extent[axis].max(bound.size[axis]));
             samples.push(Sample {
@@ -79,7 +85,7 @@ impl Group {
                 sampler: bound.sampler,
                 layer: 0,
                 offset: texture.offset,
-                level: level(texture, of_group.operands),
+                level: level(texture, of_group.operands, of_group.anisotropic),
             });
         }
         let group = group.ok_or(reason)?;
@@ -118,6 +124,14 @@ impl Group {
         };
         if self.kind.shape == Shape::Cube {
             let (face, uv, slopes) = on_cube(raw);
+            if self.anisotropic {
+                return LaneSample {
+                    uv,
+                    lod: own_lod,
+                    layer: face as f32,
+                    slope: slopes,
+                };
+            }
             let derived = || lod(slopes, self.size);
             let lod = match self.kind.lod {
                 Lod::Derivatives | Lod::Gradients => derived(),
@@ -138,14 +152,15 @@ impl Group {
         };
         let (mut uv, mut slope) = (pair(raw.at), [pair(raw.dx), pair(raw.dy)]);
         let gradient = match self.kind.lod {
-            Lod::Gradients => lod(slope, self.size),
+            Lod::Gradients if !self.anisotropic => lod(slope, self.size),
             _ => own_lod,
         };
         if let Some((size, shift)) = self.texels(level) {
             let scaled = |v: [f32; 2]| [0, 1].map(|axis| v[axis] / size[axis] as f32);
             (uv, slope) = (scaled(uv.map(|v| v + shift)), slope.map(scaled));
         }
-        if !matches!(self.kind.lod, Lod::Derivatives | Lod::Bias(_)) {
+        if !matches!(self.kind.lod, Lod::Derivatives | Lod::Bias(_)) && self.joins() != Joins::None
+        {
             // Explicit gradients are not differences to neighbouring lanes.
             slope = [[0.0; 2]; 2];
         }
@@ -161,11 +176,15 @@ impl Group {
         }
     }
 
-    /// Whether lanes with different layers need separate records. On cube maps, their coordinates are on
-    /// different faces.
+    /// Which lanes share a record. On cube maps, the coordinates of lanes with different layers are on different
+    /// faces. The gradients of a lane are the changes of its coordinates in a record of its own.
     #[must_use]
-    pub fn by_layer(&self) -> bool {
-        self.kind.shape == Shape::Cube
+    pub fn joins(&self) -> Joins {
+        match (self.kind.lod, self.kind.shape) {
+            (Lod::Gradients, _) if self.anisotropic => Joins::None,
+            (_, Shape::Cube) => Joins::Layer,
+            _ => Joins::All,
+        }
     }
 
     fn constant_level(&self) -> f32 {
@@ -195,12 +214,13 @@ fn needs_operands(texture: &TextureSite, form: Form) -> bool {
     form == Form::Fragment && (own_level || texture.shape != Shape::Flat)
 }
 
-fn level(texture: &TextureSite, operands: bool) -> SampleLevel {
+fn level(texture: &TextureSite, operands: bool, anisotropic: bool) -> SampleLevel {
     let fixed = |lod: f32| (256.0 * lod).round().clamp(-32768.0, 32767.0) as i16;
     let (rule, lod_256ths) = match (texture.shape, texture.lod) {
         // Derivatives are wrong where a quad crosses faces, so the level is an operand.
+        (_, Lod::Gradients) if anisotropic => (LodRule::Derivatives, 0),
         (Shape::Cube, Lod::Explicit(Some(level))) => (LodRule::Explicit, fixed(level)),
-        (Shape::Cube, _) => (LodRule::Explicit, 0),
+        (Shape::Cube, _) if !anisotropic => (LodRule::Explicit, 0),
         (_, Lod::Derivatives) => (LodRule::Derivatives, 0),
         (_, Lod::Bias(bias)) => (LodRule::Bias, fixed(bias.unwrap_or(0.0))),
         (_, Lod::Explicit(level)) => (LodRule::Explicit, fixed(level.unwrap_or(0.0))),
@@ -240,6 +260,10 @@ mod tests {
     }
 
     fn made(sites: Vec<Site>) -> (Group, Vec<UvGroup>) {
+        made_with(sites, false)
+    }
+
+    fn made_with(sites: Vec<Site>, anisotropic: bool) -> (Group, Vec<UvGroup>) {
         let shader = ShaderInfo {
             shader: 0,
             tests: DepthTests::Either,
@@ -253,6 +277,7 @@ mod tests {
                 sampler: 1,
                 size,
                 unnormalized: false,
+                anisotropic,
             })
         };
         let made = Group::new(&shader, 0, None, 3, bound).unwrap();
@@ -352,5 +377,94 @@ mod tests {
         assert_eq!(sky(Lod::Bias(Some(1.0))).fragment(&raw).lod, 4.0);
         assert_eq!(sky(Lod::Explicit(None)).fragment(&raw).lod, 7.0);
         assert_eq!(sky(Lod::Derivatives).fragment(&raw).layer, 4.0);
+    }
+
+    #[test]
+    fn with_anisotropy_records_keep_the_shape_of_the_pixel_instead_of_a_level() {
+        let of = |shape, lod| {
+            made_with(
+                vec![site(Form::Fragment, 0, shape, Access::Sample, lod)],
+                true,
+            )
+        };
+        let raw = RawFragment {
+            at: [0.0, 0.0, 1.0],
+            dx: [0.25, 0.0, 0.0],
+            dy: [0.0, 0.5, 0.0],
+            lod: 7.0,
+            ..RawFragment::default()
+        };
+        for (shape, lod, rule, own, slope, joins) in [
+            (
+                Shape::Cube,
+                Lod::Derivatives,
+                LodRule::Derivatives,
+                0.0,
+                0.125,
+                Joins::Layer,
+            ),
+            (
+                Shape::Cube,
+                Lod::Bias(None),
+                LodRule::Bias,
+                7.0,
+                0.125,
+                Joins::Layer,
+            ),
+            (
+                Shape::Cube,
+                Lod::Explicit(None),
+                LodRule::Explicit,
+                7.0,
+                0.125,
+                Joins::Layer,
+            ),
+            (
+                Shape::Cube,
+                Lod::Gradients,
+                LodRule::Derivatives,
+                0.0,
+                0.125,
+                Joins::None,
+            ),
+            (
+                Shape::Flat,
+                Lod::Gradients,
+                LodRule::Derivatives,
+                0.0,
+                0.25,
+                Joins::None,
+            ),
+            (
+                Shape::Array,
+                Lod::Gradients,
+                LodRule::Derivatives,
+                0.0,
+                0.25,
+                Joins::None,
+            ),
+            (
+                Shape::Array,
+                Lod::Derivatives,
+                LodRule::Derivatives,
+                0.0,
+                0.25,
+                Joins::All,
+            ),
+        ] {
+            let (group, groups) = of(shape, lod);
+            let sample = groups.last().unwrap().samples[0];
+            let lane = group.fragment(&raw);
+            assert_eq!(
+                (sample.level.rule, group.joins()),
+                (rule, joins),
+                "{shape:?} {lod:?}"
+            );
+            assert_eq!(
+                (lane.lod, lane.slope[0]),
+                (own, [slope, 0.0]),
+                "{shape:?} {lod:?}"
+            );
+        }
     }
 }

@@ -28,27 +28,41 @@ pub struct Visit {
     pub operands: RawQuad,
 }
 
-/// Groups the fragments of a quad, in recording order, into visits. Within a visit the lanes ascend, and,
-/// with `by_layer`, all lanes have the same layer.
+/// Which lanes of a quad may be in one visit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Joins {
+    /// All.
+    All,
+    /// Those with the same layer.
+    Layer,
+    /// None: each lane has changes of its own.
+    None,
+}
+
+/// Groups the fragments of a quad, in recording order, into visits. Within a visit the lanes ascend.
 #[must_use]
-pub fn visits(lanes: &[(u8, LaneSample)], by_layer: bool) -> Vec<Visit> {
+pub fn visits(lanes: &[(u8, LaneSample)], joins: Joins) -> Vec<Visit> {
     let mut open: Vec<(u8, LaneSample)> = Vec::with_capacity(4);
     let mut found = Vec::new();
     for &(lane, sample) in lanes {
         if open.last().is_some_and(|(last, _)| lane <= *last) {
-            close(&mut open, by_layer, &mut found);
+            close(&mut open, joins, &mut found);
         }
         open.push((lane, sample));
     }
-    close(&mut open, by_layer, &mut found);
+    close(&mut open, joins, &mut found);
     found
 }
 
-fn close(open: &mut Vec<(u8, LaneSample)>, by_layer: bool, found: &mut Vec<Visit>) {
-    while let Some((_, first)) = open.first().copied() {
-        let same = |sample: &LaneSample| !by_layer || sample.layer == first.layer;
-        found.push(visit(open.iter().filter(|(_, sample)| same(sample))));
-        open.retain(|(_, sample)| !same(sample));
+fn close(open: &mut Vec<(u8, LaneSample)>, joins: Joins, found: &mut Vec<Visit>) {
+    while let Some((lane, first)) = open.first().copied() {
+        let same = |(other, sample): &&(u8, LaneSample)| match joins {
+            Joins::All => true,
+            Joins::Layer => sample.layer == first.layer,
+            Joins::None => *other == lane,
+        };
+        found.push(visit(open.iter().filter(same)));
+        open.retain(|of| !same(&of));
     }
 }
 
@@ -156,7 +170,7 @@ mod tests {
             (2, sample(-1.0, 2.0)),
             (3, sample(7.0, 3.0)),
         ];
-        let [visit] = &visits(&lanes, false)[..] else {
+        let [visit] = &visits(&lanes, Joins::All)[..] else {
             panic!("one visit");
         };
         assert_eq!((visit.mask, us(&visit.uv)), (15, [0.0, 3.0, -1.0, 7.0]));
@@ -165,7 +179,7 @@ mod tests {
 
     #[test]
     fn missing_lanes_are_extrapolated_from_the_first_lane() {
-        let [visit] = &visits(&[(3, sample(1.0, 2.0))], false)[..] else {
+        let [visit] = &visits(&[(3, sample(1.0, 2.0))], Joins::All)[..] else {
             panic!("one visit");
         };
         assert_eq!((visit.mask, us(&visit.uv)), (8, [0.25, 0.5, 0.75, 1.0]));
@@ -175,19 +189,20 @@ mod tests {
     #[test]
     fn a_repeated_lane_and_another_face_start_another_visit() {
         let lanes = [0, 2, 1, 3, 3].map(|lane| (lane, sample(0.0, 0.0)));
-        let masks = |lanes: &[(u8, LaneSample)], by_layer| -> Vec<u8> {
-            visits(lanes, by_layer)
+        let masks = |lanes: &[(u8, LaneSample)], joins| -> Vec<u8> {
+            visits(lanes, joins)
                 .iter()
                 .map(|visit| visit.mask)
                 .collect()
         };
-        assert_eq!(masks(&lanes, false), [0b0101, 0b1010, 0b1000]);
+        assert_eq!(masks(&lanes, Joins::All), [0b0101, 0b1010, 0b1000]);
         let faces = [
             (0, sample(0.0, 1.0)),
             (1, sample(0.0, 4.0)),
             (2, sample(0.0, 1.0)),
         ];
-        assert_eq!(masks(&faces, true), [0b0101, 0b0010]);
+        assert_eq!(masks(&faces, Joins::Layer), [0b0101, 0b0010]);
+        assert_eq!(masks(&faces, Joins::None), [0b0001, 0b0010, 0b0100]);
     }
 
     #[test]

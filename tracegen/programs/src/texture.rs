@@ -106,12 +106,13 @@ pub fn texture(view: &ViewInfo, image: &ImageInfo) -> Option<Texture> {
         layers: layers.max(1),
         format,
         color_space,
+        part: None,
     })
 }
 
-/// Converts a sampler.
+/// Converts the sampler of a view.
 #[must_use]
-pub fn sampler(info: &SamplerInfo) -> Sampler {
+pub fn sampler(info: &SamplerInfo, view: &ViewInfo) -> Sampler {
     let filter = |raw: i32| match vk::Filter::from_raw(raw) {
         vk::Filter::NEAREST => Filter::Nearest,
         _ => Filter::Linear,
@@ -125,9 +126,14 @@ pub fn sampler(info: &SamplerInfo) -> Sampler {
     };
     let [bias, min, max] = info.lod;
     let fixed = |lod: f32| (256.0 * lod).round().clamp(-32768.0, 32767.0) as i16;
-    // Filters of OpenGL without mip levels are expressed by a maximum that allows only the first level.
-    let is_flat = max <= 0.25;
-    let mip = match vk::SamplerMipmapMode::from_raw(info.mip) {
+    // The view's least level applies after the sampler's bounds.
+    let of_view = view.min_lod_256ths as f32 / 256.0 - view.levels[0] as f32;
+    let (min, max) = (min.max(of_view), max.max(of_view));
+    let between = vk::SamplerMipmapMode::from_raw(info.mip);
+    // Filters of OpenGL without mip levels are expressed by a maximum that allows only the first level. With a
+    // maximum of 0, everything is magnified.
+    let is_flat = max <= 0.25 && (between == vk::SamplerMipmapMode::NEAREST || max <= 0.0);
+    let mip = match between {
         _ if is_flat => MipFilter::None,
         vk::SamplerMipmapMode::NEAREST => MipFilter::Nearest,
         _ => MipFilter::Linear,
@@ -136,16 +142,31 @@ pub fn sampler(info: &SamplerInfo) -> Sampler {
     let max_256ths = if max >= 127.0 { i16::MAX } else { fixed(max) };
     let min_256ths = if min <= 0.0 { i16::MIN } else { fixed(min) };
     Sampler {
-        wrap: info.wrap.map(wrap),
+        // Across an edge of a face lie the texels of another face: as many as at this one's edge.
+        wrap: match is_cube(view) && !info.non_seamless {
+            true => [Wrap::ClampToEdge; 2],
+            false => info.wrap.map(wrap),
+        },
         mag: filter(info.filters[0]),
         min: filter(info.filters[1]),
         mip,
         lod: LodRange {
             bias_256ths: fixed(bias),
             min_256ths,
-            max_256ths: if is_flat { i16::MAX } else { max_256ths },
+            max_256ths: if is_flat && max > 0.0 {
+                i16::MAX
+            } else {
+                max_256ths
+            },
         },
+        max_anisotropy_256ths: (256.0 * info.anisotropy.clamp(1.0, 16.0)).round() as u16,
     }
+}
+
+/// Whether a view is of a cube map, or of several.
+fn is_cube(view: &ViewInfo) -> bool {
+    [vk::ImageViewType::CUBE, vk::ImageViewType::CUBE_ARRAY]
+        .contains(&vk::ImageViewType::from_raw(view.kind))
 }
 
 /// The sampler of a fetch at integer coordinates.
@@ -155,6 +176,7 @@ pub const FETCH: Sampler = Sampler {
     min: Filter::Nearest,
     mip: MipFilter::Nearest,
     lod: LodRange::WHOLE,
+    max_anisotropy_256ths: Sampler::ISOTROPIC,
 };
 
 /// The sampler of a gather, which reads the four texels of a bilinear footprint independently of the filter.
@@ -164,6 +186,7 @@ pub fn gathering(sampler: Sampler) -> Sampler {
         mag: Filter::Linear,
         min: Filter::Linear,
         mip: MipFilter::None,
+        max_anisotropy_256ths: Sampler::ISOTROPIC,
         ..sampler
     }
 }
@@ -179,11 +202,21 @@ mod tests {
         lod: [-0.5, 0.0, 1000.0],
         anisotropy: 16.0,
         unnormalized: false,
+        non_seamless: false,
+    };
+
+    const VIEW: ViewInfo = ViewInfo {
+        image: 3,
+        format: 37,
+        kind: 1,
+        levels: [0, 8],
+        layers: [0, 1],
+        min_lod_256ths: 0,
     };
 
     #[test]
     fn samplers_are_converted_to_those_of_a_trace() {
-        let found = sampler(&INFO);
+        let found = sampler(&INFO, &VIEW);
         assert_eq!(found.wrap, [Wrap::Repeat, Wrap::ClampToBorder]);
         assert_eq!((found.min, found.mip), (Filter::Linear, MipFilter::Linear));
         let bias = LodRange {
@@ -191,17 +224,77 @@ mod tests {
             ..LodRange::WHOLE
         };
         assert_eq!(found.lod, bias);
+        for (most, stored) in [(1.0, 256), (2.5, 640), (16.0, 4096), (64.0, 4096)] {
+            let info = SamplerInfo {
+                anisotropy: most,
+                ..INFO
+            };
+            let found = sampler(&info, &VIEW);
+            assert_eq!(found.max_anisotropy_256ths, stored, "{most}");
+            assert_eq!(gathering(found).max_anisotropy_256ths, 256);
+        }
     }
 
     #[test]
     fn opengl_filters_without_levels_are_recognised_by_the_maximum_level() {
-        let flat = SamplerInfo {
-            mip: 0,
-            lod: [0.0, 0.0, 0.25],
-            ..INFO
+        let with = |mip, max| {
+            let info = SamplerInfo {
+                mip,
+                lod: [0.0, 0.0, max],
+                ..INFO
+            };
+            let found = sampler(&info, &VIEW);
+            (found.mip, found.lod.max_256ths)
         };
-        let found = sampler(&flat);
-        assert_eq!((found.mip, found.lod), (MipFilter::None, LodRange::WHOLE));
+        assert_eq!(with(0, 0.25), (MipFilter::None, i16::MAX));
+        // A maximum of 0 magnifies, and between levels a quarter of the next one is read.
+        assert_eq!(with(0, 0.0), (MipFilter::None, 0));
+        assert_eq!(with(1, 0.0), (MipFilter::None, 0));
+        assert_eq!(with(1, 0.25), (MipFilter::Linear, 64));
+        assert_eq!(with(0, 0.5), (MipFilter::Nearest, 128));
+    }
+
+    #[test]
+    fn the_faces_of_cube_maps_are_clamped_unless_they_have_seams() {
+        for (kind, non_seamless, wrap) in [
+            (3, false, [Wrap::ClampToEdge; 2]),
+            (6, false, [Wrap::ClampToEdge; 2]),
+            (3, true, [Wrap::Repeat, Wrap::ClampToBorder]),
+            (5, false, [Wrap::Repeat, Wrap::ClampToBorder]),
+        ] {
+            let info = SamplerInfo {
+                non_seamless,
+                ..INFO
+            };
+            let view = ViewInfo { kind, ..VIEW };
+            assert_eq!(sampler(&info, &view).wrap, wrap, "{kind} {non_seamless}");
+        }
+    }
+
+    #[test]
+    fn the_least_level_of_a_view_counts_from_the_first_level_of_the_view() {
+        let with = |first, max| {
+            let info = SamplerInfo {
+                lod: [0.0, 0.5, max],
+                ..INFO
+            };
+            let view = ViewInfo {
+                levels: [first, 5],
+                min_lod_256ths: 896,
+                ..VIEW
+            };
+            let LodRange {
+                min_256ths,
+                max_256ths,
+                ..
+            } = sampler(&info, &view).lod;
+            (min_256ths, max_256ths)
+        };
+        assert_eq!(with(0, 1000.0), (896, i16::MAX));
+        assert_eq!(with(1, 1000.0), (640, i16::MAX));
+        assert_eq!(with(3, 2.0), (128, 512));
+        assert_eq!(with(0, 2.0), (896, 896));
+        assert_eq!(with(4, 2.0), (128, 512));
     }
 
     #[test]
@@ -221,6 +314,7 @@ mod tests {
             kind: 1,
             levels: [2, 3],
             layers: [0, 6],
+            min_lod_256ths: 0,
         };
         let part = texture(&view, &image).unwrap();
         assert_eq!((part.size, part.levels, part.layers), ([75, 25], 3, 6));

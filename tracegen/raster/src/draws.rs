@@ -246,6 +246,7 @@ impl DrawList {
                 layers: self.cascades,
                 format: TexelFormat::R32f,
                 color_space: ColorSpace::Linear,
+                part: None,
             });
         }
         textures

@@ -7,7 +7,7 @@ use crate::regions::TileRect;
 use crate::tiles::TileRules;
 use crate::{RawDepth, RawRecord, RawRecords, RecordError};
 use formats::textrace::{Draw, Pass, TextraceWriter, TraceMeta};
-use formats::texture::{Sampler, Texture};
+use formats::texture::{Part, Sampler, Texture};
 use std::collections::HashMap;
 use std::io::{Seek, Write};
 
@@ -49,6 +49,14 @@ impl<W: Write + Seek> Recording<W> {
     /// The table is full.
     pub fn texture(&mut self, texture: Texture) -> Result<u32, RecordError> {
         Ok(self.writer.add_texture(texture)?)
+    }
+
+    /// Makes a texture a part of another one.
+    ///
+    /// # Errors
+    /// There is no such texture.
+    pub fn part(&mut self, texture: u32, part: Part) -> Result<(), RecordError> {
+        Ok(self.writer.set_part(texture, Some(part))?)
     }
 
     /// Adds a sampler, unless the trace already has it, and returns its index.

@@ -89,6 +89,7 @@ fn tables() -> Tables {
             layers: 1,
             format: TexelFormat::Rgba8,
             color_space: ColorSpace::Linear,
+            part: None,
         }],
         samplers: vec![Sampler::TRILINEAR_REPEAT],
         draws: vec![draw(0, 1), draw(1, 2)],

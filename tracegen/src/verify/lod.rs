@@ -144,6 +144,7 @@ mod tests {
             layers: 1,
             format: TexelFormat::Bc1,
             color_space: ColorSpace::Linear,
+            part: None,
         }
     }
 

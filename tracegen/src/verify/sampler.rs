@@ -254,6 +254,7 @@ mod tests {
             layers: 1,
             format: TexelFormat::Bc1,
             color_space,
+            part: None,
         };
         TextureSet {
             textures: vec![CompressedTexture {

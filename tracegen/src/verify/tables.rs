@@ -75,6 +75,7 @@ fn texture(scene: &Scene, index: usize) -> Result<Texture, SceneError> {
             layers: 1,
             format: stored.format,
             color_space: image.color_space,
+            part: None,
         });
     }
     let size = image.size.map(|edge| edge.div_ceil(BLOCK) * BLOCK);
@@ -109,6 +110,7 @@ fn texture(scene: &Scene, index: usize) -> Result<Texture, SceneError> {
             TexelFormat::Bc1
         },
         color_space: image.color_space,
+        part: None,
     })
 }
 
@@ -133,6 +135,7 @@ fn hold_textures(mut expected: Vec<Texture>, cascades: u32, tables: &Tables, fau
             layers: cascades,
             format: TexelFormat::R32f,
             color_space: ColorSpace::Linear,
+            part: None,
         });
     }
     faults.hold(

@@ -249,6 +249,7 @@ impl Member<'_> {
             layers: 1,
             format,
             color_space: self.image.color_space,
+            part: None,
         };
         Made {
             index: self.index,

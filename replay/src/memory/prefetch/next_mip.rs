@@ -59,6 +59,7 @@ mod tests {
             layers: 1,
             format: TexelFormat::Bc1,
             color_space: ColorSpace::Srgb,
+            part: None,
         };
         let layout = Layout::new(&[texture], &LayoutConfig::default()).unwrap();
         let line = |level, texel| (layout.address(0, 0, level, texel).unwrap() / 16) as u32;

@@ -5,6 +5,7 @@ use super::general::General;
 use super::{Footprints, Group, Kind, Level, SampleRef};
 use crate::config::RunConfig;
 use crate::stream::StreamError;
+use formats::footprint::LodFormula;
 use formats::layout::{Layout, LevelLayout};
 use formats::textrace::{SUBTEXELS, Sample, SampleLevel, Tables, UvGroup};
 use formats::texture::{Sampler, TexelFormat};
@@ -72,9 +73,12 @@ impl<'a> Builder<'a> {
             .iter()
             .map(|draw| draw.groups.iter().map(|group| self.group(group)).collect())
             .collect::<Result<_, _>>()?;
-        let kinds = |groups: &Vec<Group>| groups.iter().any(Group::is_general);
+        let sampling = &self.config.sampling;
+        let long = |groups: &Vec<Group>| {
+            sampling.lod == LodFormula::PerLane || groups.iter().any(|g| g.is_long(sampling))
+        };
         Ok(Footprints {
-            general: draws.iter().map(kinds).collect(),
+            long: draws.iter().map(long).collect(),
             draws,
             line_shift: self.config.line_bytes.trailing_zeros(),
             helper_lanes: self.config.sampling.helper_lanes,

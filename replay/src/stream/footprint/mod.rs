@@ -46,8 +46,8 @@ pub struct Scratch {
 #[derive(Debug)]
 pub struct Footprints {
     draws: Vec<Vec<Group>>,
-    /// By draw: some of its samples are general.
-    general: Vec<bool>,
+    /// By draw: a level may have several bundles in some of its samples.
+    long: Vec<bool>,
     line_shift: u32,
     helper_lanes: bool,
     sampling: SamplingConfig,
@@ -62,8 +62,10 @@ struct Group {
 }
 
 impl Group {
-    fn is_general(&self) -> bool {
-        self.kinds.iter().any(|kind| kind.general.is_some())
+    /// Whether a level may have several bundles.
+    fn is_long(&self, sampling: &SamplingConfig) -> bool {
+        let anisotropic = |kind: &Kind| sampling.is_anisotropic(&kind.sampler);
+        (self.kinds.iter()).any(|kind| kind.general.is_some() || anisotropic(kind))
     }
 }
 
@@ -143,8 +145,7 @@ impl Footprints {
         mut emit: impl FnMut(SampleRef, &Bundle),
     ) {
         let groups = &self.draws[draw as usize];
-        let by_lane = self.sampling.max_anisotropy > 1 || self.sampling.lod == LodFormula::PerLane;
-        if by_lane || self.general[draw as usize] {
+        if self.long[draw as usize] {
             self.for_long_quad(groups, records, scratch, &mut emit);
             return;
         }

@@ -117,14 +117,18 @@ fn sampler() -> impl Strategy<Value = Sampler> {
         filter(),
         prop::sample::select(mips),
         lod_range(),
+        prop::sample::select(vec![256_u16, 256, 512, 700, 4096]),
     )
-        .prop_map(|(u, v, mag, min, mip, lod)| Sampler {
-            wrap: [u, v],
-            mag,
-            min,
-            mip,
-            lod,
-        })
+        .prop_map(
+            |(u, v, mag, min, mip, lod, max_anisotropy_256ths)| Sampler {
+                wrap: [u, v],
+                mag,
+                min,
+                mip,
+                lod,
+                max_anisotropy_256ths,
+            },
+        )
 }
 
 fn config() -> impl Strategy<Value = RunConfig> {
@@ -170,7 +174,7 @@ fn config() -> impl Strategy<Value = RunConfig> {
             LodFormula::PerLane,
         ]),
         any::<bool>(),
-        prop::sample::select(vec![1, 1, 2, 5, 16]),
+        prop::sample::select(vec![None, None, Some(1), Some(2), Some(5), Some(16)]),
         prop::sample::select(vec![
             AnisotropyModel::Probes,
             AnisotropyModel::RoundedProbes,
@@ -234,7 +238,7 @@ fn scene() -> impl Strategy<Value = Tables> {
     let offset = prop::array::uniform2(-3_i8..4);
     (
         [size(), size(), size()],
-        prop::collection::vec((0_u32..3, 0_u16..2, offset, level()), 1..6),
+        prop::collection::vec((0_u32..3, 0_u16..2, 0_u16..2, offset, level()), 1..6),
         sampler(),
     )
         .prop_map(|(sizes, samples, sampler)| {
@@ -242,13 +246,20 @@ fn scene() -> impl Strategy<Value = Tables> {
             tables.textures.iter_mut().for_each(|t| t.layers = 2);
             tables.textures[2].format = TexelFormat::R32f;
             tables.textures[2].levels = 1;
-            tables.samplers = vec![sampler];
+            // The same filter for square pixels, so that samples differ by their samplers alone.
+            tables.samplers = vec![
+                sampler,
+                Sampler {
+                    max_anisotropy_256ths: 1024,
+                    ..sampler
+                },
+            ];
             let extent = [0, 1].map(|a| sizes.iter().map(|s| s[a]).max().unwrap());
             let samples = samples
                 .into_iter()
-                .map(|(texture, layer, offset, level)| Sample {
+                .map(|(texture, sampler, layer, offset, level)| Sample {
                     texture,
-                    sampler: 0,
+                    sampler,
                     layer,
                     offset,
                     level,

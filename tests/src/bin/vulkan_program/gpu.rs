@@ -182,7 +182,9 @@ impl Gpu {
         let cube = kind.view == vk::ImageViewType::CUBE;
         let info = vk::ImageCreateInfo::default()
             .flags(match cube {
-                true => vk::ImageCreateFlags::CUBE_COMPATIBLE,
+                true => {
+                    vk::ImageCreateFlags::CUBE_COMPATIBLE | vk::ImageCreateFlags::MUTABLE_FORMAT
+                }
                 false => vk::ImageCreateFlags::empty(),
             })
             .image_type(match kind.view {

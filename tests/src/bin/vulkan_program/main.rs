@@ -7,10 +7,13 @@
 //!         [--size WIDTHxHEIGHT] [--picture FILE] [--end crash|early|fork|hang|before] [--libraries 0|1|2]
 //!         [--also vertex,compute,late,event,unread]
 //!     vulkan_program --random SEED [--calls N] [--frames N] [--picture FILE]
+//!     vulkan_program --fields NAME,NAME...
 //!
-//! With `--random`, it makes random calls instead: see `random`.
+//! With `--random`, it makes random calls instead: see `random`. With `--fields`, it renders a full-screen draw per
+//! frame: see `fields`.
 
 mod also;
+mod fields;
 mod gpu;
 mod libraries;
 mod objects;
@@ -51,6 +54,8 @@ pub struct Options {
     also: also::Also,
     /// Libraries that pipelines are linked from.
     libraries: Option<libraries::Split>,
+    /// Full-screen draws, one per frame.
+    fields: Vec<&'static fields::Field>,
     /// Seed of random calls.
     random: Option<u64>,
     /// Number of random operations.
@@ -67,6 +72,7 @@ fn options() -> Result<Options, String> {
         end: None,
         also: also::Also::default(),
         libraries: None,
+        fields: Vec::new(),
         random: None,
         calls: 100,
     };
@@ -107,6 +113,15 @@ fn options() -> Result<Options, String> {
                 let split = libraries::SPLITS.get(number(&value)? as usize);
                 options.libraries = Some(*split.ok_or(format!("--libraries: {value}"))?);
             }
+            "--fields" => {
+                let find = |name: &str| {
+                    let mut all = fields::FIELDS.iter();
+                    all.find(|field| field.name == name)
+                        .ok_or(format!("--fields: {name}"))
+                };
+                options.fields = value.split(',').map(find).collect::<Result<_, _>>()?;
+                (options.stereo, options.size_px) = (Stereo::Mono, [textures::EDGE; 2]);
+            }
             "--random" => options.random = Some(number(&value)?.into()),
             "--calls" => options.calls = number(&value)?,
             _ => return Err(format!("{name} is no option")),
@@ -121,6 +136,7 @@ fn main() -> ExitCode {
             let (calls, frames) = (options.calls, options.frames);
             random::run(seed, calls, frames, options.picture.as_deref())
         }
+        None if !options.fields.is_empty() => fields::run(&options),
         None => render::run(&options),
     });
     match outcome {

@@ -173,7 +173,7 @@ fn draw_target(
 }
 
 /// Copies a target into the buffer of pictures, row by row, with the left picture first.
-fn copy(
+pub fn copy(
     device: &Device,
     options: &Options,
     target: &Target,

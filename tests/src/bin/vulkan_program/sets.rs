@@ -149,7 +149,8 @@ fn images(gpu: &Gpu) -> Result<[Image; 5]> {
     made.try_into().map_err(|_| "five images".to_owned())
 }
 
-fn upload(gpu: &Gpu, kind: &ImageKind) -> Result<Image> {
+/// Creates a texture with texels that hold their own coordinates.
+pub fn upload(gpu: &Gpu, kind: &ImageKind) -> Result<Image> {
     let image = gpu.image(kind)?;
     let mut bytes = Vec::new();
     let mut regions = Vec::new();

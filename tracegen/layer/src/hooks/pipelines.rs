@@ -4,7 +4,7 @@ use super::api::slice;
 use super::device::Device;
 use super::recording_pipelines::{Described, describe};
 use crate::track::Layout;
-use ash::vk;
+use ash::vk::{self, Handle};
 
 type Allocator = *const vk::AllocationCallbacks<'static>;
 
@@ -56,13 +56,19 @@ pub(super) unsafe extern "system" fn create_pipeline_layout(
             .recorder
             .as_ref()
             .and_then(|r| extended_ranges(ranges, r.push_constant_bytes));
+        let create = |stages| {
+            let tracker = &mut *known.tracker();
+            let sets = slice((*info).p_set_layouts, (*info).set_layout_count).iter();
+            let sets = sets.map(|set| tracker.descriptors.empty_set(set.as_raw()));
+            let sets = sets.collect();
+            tracker
+                .pipelines
+                .create_layout(*layout, Layout { stages, sets });
+        };
         let Some((ranges, stages)) = room else {
             let result = (known.next.create_pipeline_layout)(device, info, allocator, layout);
             if result == vk::Result::SUCCESS {
-                known
-                    .tracker()
-                    .pipelines
-                    .create_layout(*layout, Layout::default());
+                create(vk::ShaderStageFlags::empty());
             }
             return result;
         };
@@ -73,10 +79,7 @@ pub(super) unsafe extern "system" fn create_pipeline_layout(
         };
         let result = (known.next.create_pipeline_layout)(device, &wider, allocator, layout);
         if result == vk::Result::SUCCESS {
-            known
-                .tracker()
-                .pipelines
-                .create_layout(*layout, Layout { stages });
+            create(stages);
         }
         result
     }

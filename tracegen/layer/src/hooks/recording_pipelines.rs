@@ -98,8 +98,9 @@ pub(super) unsafe fn describe(
 
 /// Stages of a layout that see the draw's number.
 fn number_stages(known: &Device, layout: vk::PipelineLayout) -> vk::ShaderStageFlags {
-    let layout = known.tracker().pipelines.layout(layout);
-    layout.unwrap_or_default().stages
+    let tracker = known.tracker();
+    let layout = tracker.pipelines.layout(layout);
+    layout.map(|layout| layout.stages).unwrap_or_default()
 }
 
 /// The fragment shader of a description.

@@ -1,6 +1,6 @@
 //! Hooks of images, views, samplers and swapchains.
 
-use super::api::slice;
+use super::api::{find, slice};
 use super::device::Device;
 use crate::capture::lock;
 use ash::vk::{self, Handle};
@@ -48,7 +48,9 @@ pub(super) unsafe extern "system" fn create_image_view(
         let known = Device::of(device);
         let result = (known.next.create_image_view)(device, info, allocator, view);
         if result == vk::Result::SUCCESS {
-            known.tracker().images.create_view(*view, &*info);
+            let least = find::<vk::ImageViewMinLodCreateInfoEXT<'_>>((*info).p_next);
+            let min_lod = least.map_or(0.0, |least| least.min_lod);
+            known.tracker().images.create_view(*view, &*info, min_lod);
         }
         result
     }

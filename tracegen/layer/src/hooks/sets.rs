@@ -305,10 +305,18 @@ pub(super) unsafe extern "system" fn cmd_bind_sets(
 }
 
 /// Tracks descriptors that are pushed to a set.
-fn push(known: &Device, buffer: vk::CommandBuffer, set: u32, writes: &[Written]) {
+fn push(
+    known: &Device,
+    buffer: vk::CommandBuffer,
+    layout: vk::PipelineLayout,
+    set: u32,
+    writes: &[Written],
+) {
     let tracker = &mut *known.tracker();
     let state = tracker.commands.get_mut(buffer.as_raw());
-    let pushed = state.push(set, Default::default);
+    let of_layout = tracker.pipelines.layout(layout);
+    let empty = of_layout.and_then(|layout| layout.sets.get(set as usize));
+    let pushed = state.push(set, || empty.cloned().unwrap_or_default());
     for write in writes {
         pushed.write(write, &tracker.images);
     }
@@ -327,7 +335,7 @@ pub(super) unsafe extern "system" fn cmd_push_set(
         let known = Device::of(buffer);
         if point == vk::PipelineBindPoint::GRAPHICS {
             let of: Vec<Written> = slice(writes, count).iter().map(|w| written(w)).collect();
-            push(&known, buffer, set, &of);
+            push(&known, buffer, layout, set, &of);
         }
         (known.next.cmd_push_set)(buffer, point, layout, set, count, writes);
     }
@@ -345,7 +353,7 @@ pub(super) unsafe extern "system" fn cmd_push_set_with_template(
         let known = Device::of(buffer);
         let of = known.tracker().descriptors.template(template).cloned();
         if let Some(of) = of.filter(|of| of.graphics) {
-            push(&known, buffer, set, &from_template(&of, data));
+            push(&known, buffer, layout, set, &from_template(&of, data));
         }
         (known.next.cmd_push_set_with_template)(buffer, template, layout, set, data);
     }

@@ -225,6 +225,9 @@ pub struct ViewInfo {
     pub levels: [u32; 2],
     /// First layer and number of layers.
     pub layers: [u32; 2],
+    /// Least level of the image that samples read, in 1/256 (`VK_EXT_image_view_min_lod`).
+    #[serde(default)]
+    pub min_lod_256ths: u32,
 }
 
 /// The part of a sampler's state that determines which texels are read.
@@ -242,6 +245,9 @@ pub struct SamplerInfo {
     pub anisotropy: f32,
     /// Whether coordinates are in texels.
     pub unnormalized: bool,
+    /// Whether the wrap modes also apply to the faces of cube maps (`VK_EXT_non_seamless_cube_map`).
+    #[serde(default)]
+    pub non_seamless: bool,
 }
 
 /// Targets of a render pass.

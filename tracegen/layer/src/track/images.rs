@@ -98,8 +98,13 @@ impl Images {
         found.map(|(handle, _)| vk::Image::from_raw(*handle))
     }
 
-    /// Adds an image view.
-    pub fn create_view(&mut self, view: vk::ImageView, info: &vk::ImageViewCreateInfo<'_>) {
+    /// Adds an image view, with the least level that it lets samples read.
+    pub fn create_view(
+        &mut self,
+        view: vk::ImageView,
+        info: &vk::ImageViewCreateInfo<'_>,
+        min_lod: f32,
+    ) {
         let Some(image) = self.images.get(&info.image.as_raw()) else {
             return;
         };
@@ -131,6 +136,7 @@ impl Images {
                 image.layers,
                 vk::REMAINING_ARRAY_LAYERS,
             ),
+            min_lod_256ths: (256.0 * min_lod).round() as u32,
         };
         self.views.insert(view.as_raw(), of);
     }
@@ -160,6 +166,7 @@ impl Images {
                 _ => finite(info.max_anisotropy),
             },
             unnormalized: info.unnormalized_coordinates != 0,
+            non_seamless: (info.flags).contains(vk::SamplerCreateFlags::NON_SEAMLESS_CUBE_MAP_EXT),
         };
         self.samplers.insert(sampler.as_raw(), of);
     }

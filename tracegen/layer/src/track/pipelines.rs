@@ -1,5 +1,6 @@
 //! Shader modules, pipeline layouts, and graphics pipelines.
 
+use super::descriptors::SetState;
 use crate::spool::{DepthInfo, ShaderInfo, StageReads};
 use ash::vk::{self, Handle};
 use std::collections::{HashMap, HashSet};
@@ -9,10 +10,13 @@ use std::sync::Arc;
 type Parts = vk::GraphicsPipelineLibraryFlagsEXT;
 
 /// A pipeline layout.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default)]
 pub struct Layout {
     /// Stages of the ranges with the draw's number; empty if there is no room for it.
     pub stages: vk::ShaderStageFlags,
+    /// Its sets before any descriptor is written: those that are pushed start from them. Their layouts may be
+    /// destroyed before.
+    pub sets: Vec<SetState>,
 }
 
 /// The recording pipeline of a program's pipeline.
@@ -185,8 +189,8 @@ impl Pipelines {
 
     /// The pipeline layout of a handle.
     #[must_use]
-    pub fn layout(&self, layout: vk::PipelineLayout) -> Option<Layout> {
-        self.layouts.get(&layout.as_raw()).copied()
+    pub fn layout(&self, layout: vk::PipelineLayout) -> Option<&Layout> {
+        self.layouts.get(&layout.as_raw())
     }
 
     /// Handles the destruction of a layout by the program. Returns true if no pipeline uses the layout.

@@ -29,7 +29,7 @@ fn image_view(images: &mut Images, number: u64, size: u32) -> vk::ImageView {
     let info = vk::ImageViewCreateInfo::default()
         .image(image)
         .subresource_range(range);
-    images.create_view(view, &info);
+    images.create_view(view, &info, 0.0);
     view
 }
 

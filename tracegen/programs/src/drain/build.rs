@@ -1,19 +1,20 @@
 //! Builds the draws of a frame, their groups, and the records of each eye.
 
 use super::DrainError;
+use super::images::ImageTextures;
 use super::pass;
 use super::places::Placement;
 use crate::groups::{Bound, Group};
 use crate::lanes::visits;
 use crate::session::{Executed, Session, coverage_group, survival_group};
-use crate::texture::{FETCH, gathering, sampler, texture};
+use crate::texture::{FETCH, gathering, sampler};
 use crate::views::{Role, Views, viewport};
 use ash::vk;
 use formats::textrace::{Draw, LeftOut, NO_GROUP, PassKind, Surfaces, TraceMeta, UvGroup};
 use formats::textrace::{TextraceWriter, tables::MAX_GROUPS};
 use formats::view::Eye;
 use parallax_layer::inject::{Access, Form, RawQuad, RawSample, Site, TextureSite, What};
-use parallax_layer::spool::{DrawInfo, OUTSIDE_SCENES, ShaderInfo, ViewInfo};
+use parallax_layer::spool::{DrawInfo, OUTSIDE_SCENES, ShaderInfo};
 use rayon::prelude::*;
 use record::{CaptureCounts, DepthReplay, RawDepth, RawRecord, RawRecords, Recording};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -75,7 +76,7 @@ struct Records {
 pub struct Builder<W: Write + Seek> {
     recording: Recording<W>,
     pub counts: CaptureCounts,
-    textures: HashMap<ViewInfo, Option<u32>>,
+    textures: ImageTextures,
     next_primitive: u32,
     /// Whether all fragments of each draw hide those behind them.
     opaque: Vec<bool>,
@@ -88,7 +89,7 @@ impl<W: Write + Seek> Builder<W> {
         Self {
             recording,
             counts: CaptureCounts::default(),
-            textures: HashMap::new(),
+            textures: ImageTextures::default(),
             next_primitive: 0,
             opaque: Vec::new(),
             left_out: BTreeMap::new(),
@@ -111,7 +112,8 @@ impl<W: Write + Seek> Builder<W> {
     }
 
     /// Completes the trace with its description.
-    pub fn finish(self, meta: TraceMeta) -> Result<TextraceWriter<W>, DrainError> {
+    pub fn finish(mut self, meta: TraceMeta) -> Result<TextraceWriter<W>, DrainError> {
+        self.textures.join(&mut self.recording)?;
         Ok(self.recording.finish(meta)?)
     }
 
@@ -393,30 +395,14 @@ impl<W: Write + Seek> Builder<W> {
             .image(view.image)
             .ok_or("textures whose image is not known")?;
         let format = || format!("textures of format {:?}", vk::Format::from_raw(view.format));
-        let of_trace = texture(&view, image);
-        let size = of_trace
-            .as_ref()
-            .map(|texture| texture.size)
-            .ok_or_else(format)?;
-        let known = self.textures.get(&view).copied().flatten();
-        let index = match (known, of_trace) {
-            (Some(index), _) => index,
-            (None, Some(of_trace)) => {
-                let index = self
-                    .recording
-                    .texture(of_trace)
-                    .map_err(|e| e.to_string())?;
-                self.textures.insert(view, Some(index));
-                index
-            }
-            (None, None) => return Err(format()),
-        };
+        let found = self.textures.get(&mut self.recording, &view, image);
+        let (index, size) = found.map_err(|e| e.to_string())?.ok_or_else(format)?;
         let state = site.sampler.as_ref().and_then(|s| find(s)?.sampler);
         let unnormalized = state.is_some_and(|state| state.unnormalized);
         let state = match (site.access, state) {
             (Access::Fetch, _) => FETCH,
-            (Access::Gather, Some(state)) => gathering(sampler(&state)),
-            (_, Some(state)) => sampler(&state),
+            (Access::Gather, Some(state)) => gathering(sampler(&state, &view)),
+            (_, Some(state)) => sampler(&state, &view),
             (_, None) => return Err("textures whose sampler is not known".to_owned()),
         };
         Ok(Bound {
@@ -424,6 +410,7 @@ impl<W: Write + Seek> Builder<W> {
             sampler: self.recording.sampler(state).map_err(|e| e.to_string())?,
             size,
             unnormalized,
+            anisotropic: state.is_anisotropic(),
         })
     }
 
@@ -547,7 +534,7 @@ fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
             .map(|(lane, sample)| (*lane, group.fragment(&sample.as_fragment())))
             .collect();
         let to = declared.draws[*draw];
-        for visit in visits(&lanes, group.by_layer()) {
+        for visit in visits(&lanes, group.joins()) {
             if group.operands {
                 let before = group.number - 1;
                 let mut operands = record(to, primitive, visit.mask, before, &visit.operands);

@@ -10,6 +10,7 @@ fn target(image: u32) -> ViewInfo {
         kind: 1,
         levels: [0, 1],
         layers: [0, 1],
+        min_lod_256ths: 0,
     }
 }
 

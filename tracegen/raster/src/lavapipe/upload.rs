@@ -181,6 +181,7 @@ fn white() -> CompressedTexture {
             layers: 1,
             format: TexelFormat::Rgba8,
             color_space: ColorSpace::Linear,
+            part: None,
         },
         first_level: 0,
         blocks: vec![255; 4],

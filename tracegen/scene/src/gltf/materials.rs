@@ -509,6 +509,6 @@ fn sampler(json: &gltf::texture::Sampler<'_>) -> Sampler {
         },
         min,
         mip,
-        lod: LodRange::WHOLE,
+        ..Sampler::TRILINEAR_REPEAT
     }
 }
