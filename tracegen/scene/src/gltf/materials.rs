@@ -18,7 +18,7 @@ use crate::lookup::Lookup;
 use crate::uri::{self, Uri};
 use crate::warnings::Warnings;
 use crate::{AlphaMode, LoadOptions, Material, SceneError, TextureRef, TextureSlot};
-use formats::texture::{Filter, LodRange, MipFilter, Sampler, Wrap};
+use formats::texture::{Filter, MipFilter, Sampler, Wrap};
 use glam::{Vec3, Vec4};
 use gltf::json::extensions::texture::TextureTransform;
 use gltf::material::AlphaMode as JsonAlphaMode;
