@@ -95,7 +95,7 @@ fn options() -> Result<Options, String> {
             }
             "--objects" => {
                 let find = |name: &str| {
-                    let mut all = objects::OBJECTS.iter();
+                    let mut all = objects::OBJECTS.iter().chain(objects::NAMED);
                     all.find(|object| object.name == name)
                         .ok_or(format!("--objects: {name}"))
                 };

@@ -12,7 +12,27 @@ const fn object(name: &'static str, body: &'static str) -> Object {
     Object { name, body }
 }
 
-/// Every object.
+/// The body of a shader that reads a texture in one of several branches, as shaders of sprites do.
+macro_rules! chain {
+    ($($number:literal)*) => {
+        concat!(
+            "let chosen = u32(24.0 * fract(in.uv.x)); var color = vec4(0.0);",
+            $(
+                "if chosen == ", $number, "u { color = textureSampleLevel(flat, nearest, in.uv + ",
+                $number, ".0 * 0.03125, 0.0); } else "
+            ),*,
+            "{ color = vec4(1.0); } return color;"
+        )
+    };
+}
+
+/// Objects that are rendered only if they are named.
+pub const NAMED: &[Object] = &[object(
+    "chain",
+    chain!(0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18 19 20 21 22 23),
+)];
+
+/// Every object that is rendered by default.
 pub const OBJECTS: &[Object] = &[
     object("plain", "return textureSample(flat, nearest, in.uv);"),
     object(

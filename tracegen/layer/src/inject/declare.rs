@@ -22,6 +22,7 @@ pub(super) struct Types {
     pub u32: Word,
     pub f32: Word,
     pub bool: Word,
+    pub uvec2: Word,
     pub uvec4: Word,
     pub vec2: Word,
     pub vec3: Word,
@@ -37,6 +38,7 @@ impl Types {
             u32,
             f32,
             bool: builder.type_bool(),
+            uvec2: builder.type_vector(u32, 2),
             uvec4: builder.type_vector(u32, 4),
             vec2: builder.type_vector(f32, 2),
             vec3: builder.type_vector(f32, 3),
@@ -61,6 +63,18 @@ pub(super) struct Inputs {
     pub invocation: Option<Input>,
     /// The block of push constants, and the index of the member with the draw's number.
     pub draw: (Word, u32),
+    pub known: Known,
+}
+
+/// Variables with what all records of a fragment have in common.
+#[derive(Clone, Copy)]
+pub(super) struct Known {
+    /// Lane of the quad.
+    pub lane: Word,
+    /// Place of the quad.
+    pub packed: Word,
+    /// Capacity of the record buffer.
+    pub capacity: Word,
 }
 
 impl Inputs {
@@ -90,6 +104,19 @@ impl Inputs {
         let invocation = (target.ballots)
             .then(|| input(builder, BuiltIn::SubgroupLocalInvocationId, types.u32, true));
         let draw = draw_number(builder, shader, target, types.u32, &mut interface)?;
+        let private = builder.type_pointer(None, StorageClass::Private, types.u32);
+        let mut known = || {
+            let variable = builder.variable(private, None, StorageClass::Private, None);
+            if lists_all_variables(shader) {
+                interface.push(variable);
+            }
+            variable
+        };
+        let known = Known {
+            lane: known(),
+            packed: known(),
+            capacity: known(),
+        };
         let entry = builder.module_mut().entry_points.first_mut();
         let entry = entry.ok_or(InjectError::NoFragmentEntry)?;
         entry.operands.extend(interface.into_iter().map(id));
@@ -99,6 +126,7 @@ impl Inputs {
             view,
             invocation,
             draw,
+            known,
         })
     }
 }
@@ -226,13 +254,7 @@ fn draw_number(
         builder.member_decorate(block, 0, Decoration::Offset, [offset]);
         let pointer = builder.type_pointer(None, StorageClass::PushConstant, block);
         let variable = builder.variable(pointer, None, StorageClass::PushConstant, None);
-        // From version 1.4 on, an entry point lists all its variables.
-        if shader
-            .module
-            .header
-            .as_ref()
-            .is_some_and(|h| h.version() >= (1, 4))
-        {
+        if lists_all_variables(shader) {
             interface.push(variable);
         }
         return Ok((variable, 0));
@@ -264,6 +286,12 @@ fn draw_number(
     definition.operands.push(id(u32_type));
     builder.member_decorate(block, member, Decoration::Offset, [offset]);
     Ok((variable, member))
+}
+
+/// Whether entry points list all their variables, instead of only inputs and outputs.
+fn lists_all_variables(shader: &Shader) -> bool {
+    let header = shader.module.header.as_ref();
+    header.is_some_and(|h| h.version() >= (1, 4))
 }
 
 /// Whether the functions of the entry point use a variable.

@@ -5,11 +5,13 @@
 //! groups. The buffer's address is a constant in the shader, so descriptor sets and their layouts do not
 //! change. The number of the draw is a push constant.
 
+mod append;
 mod buffer;
 mod declare;
 mod find;
 mod flow;
 mod functions;
+mod lanes;
 mod numbers;
 mod reads;
 mod recorder;

@@ -47,6 +47,13 @@ impl Recorder {
         self.builder.module()
     }
 
+    /// Computes what all records of a fragment have in common.
+    pub fn begin(&mut self, out: &mut Vec<Instruction>) -> Result<(), InjectError> {
+        let function = self.functions.begin(&mut self.builder)?;
+        self.call(vec![function], out);
+        Ok(())
+    }
+
     /// Records the active lanes of a quad and their coordinates.
     pub fn record_quads(
         &mut self,

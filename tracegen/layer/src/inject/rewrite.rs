@@ -34,12 +34,14 @@ pub(super) fn rewrite(
             let body = &mut recorder.builder.module_mut().functions[function].blocks[block];
             let old = std::mem::take(&mut body.instructions);
             let mut new = Vec::with_capacity(2 * old.len());
-            let mut entry = sites.entry.filter(|_| is_main && block == 0);
+            let mut starts = is_main && block == 0;
             for (place, instruction) in old.into_iter().enumerate() {
-                if !stays_first(&instruction)
-                    && let Some(group) = entry.take()
-                {
-                    recorder.record_depth(group, &mut new)?;
+                if starts && !stays_first(&instruction) {
+                    starts = false;
+                    recorder.begin(&mut new)?;
+                    if let Some(group) = sites.entry {
+                        recorder.record_depth(group, &mut new)?;
+                    }
                 }
                 if let Some(batch) = sites.batches.remove(&(function, block, place)) {
                     record(&mut recorder, &shader, &batch, &mut new)?;

@@ -1,51 +1,11 @@
 //! Builds the instructions of a function, at the end of its last block.
 
+use super::InjectError;
 use super::declare::{Input, Types, id, literal};
-use super::{COUNTER_BYTES, InjectError};
 use rspirv::dr::{Builder, InsertPoint, Instruction, Operand};
-use rspirv::spirv::{
-    Decoration, FunctionControl, LoopControl, MemoryAccess, Op, Scope, SelectionControl,
-    StorageClass, Word,
-};
+use rspirv::spirv::{FunctionControl, MemoryAccess, Op, Scope, SelectionControl, Word};
 
 pub(super) type Result<T = Word> = std::result::Result<T, InjectError>;
-
-/// Pointer types for the record buffer.
-#[derive(Clone, Copy)]
-pub(super) struct BufferTypes {
-    /// Pointer to the buffer.
-    pub buffer: Word,
-    /// Pointer to a word of the buffer.
-    pub word: Word,
-}
-
-impl BufferTypes {
-    /// `struct Buffer { uint count; uint capacity; uint words[]; }`
-    pub fn new(builder: &mut Builder, types: Types) -> Self {
-        // New types instead of existing equal ones, because the decorations must not apply to types of the
-        // shader.
-        let mut declare = |opcode: Op, operands: &[Word]| {
-            let result = builder.id();
-            let operands = operands.iter().copied().map(id).collect();
-            let globals = &mut builder.module_mut().types_global_values;
-            globals.push(Instruction::new(opcode, None, Some(result), operands));
-            result
-        };
-        let words = declare(Op::TypeRuntimeArray, &[types.u32]);
-        let buffer = declare(Op::TypeStruct, &[types.u32, types.u32, words]);
-        builder.decorate(words, Decoration::ArrayStride, [literal(4)]);
-        builder.decorate(buffer, Decoration::Block, []);
-        for (member, offset) in [0, 4, COUNTER_BYTES as u32].into_iter().enumerate() {
-            let offset = [literal(offset)];
-            builder.member_decorate(buffer, member as u32, Decoration::Offset, offset);
-        }
-        let class = StorageClass::PhysicalStorageBuffer;
-        Self {
-            buffer: builder.type_pointer(None, class, buffer),
-            word: builder.type_pointer(None, class, types.u32),
-        }
-    }
-}
 
 /// A function under construction.
 pub(super) struct Writer<'a> {
@@ -58,13 +18,6 @@ pub(super) struct Writer<'a> {
 /// A conditional branch: its header and its merge block.
 pub(super) struct Guard {
     header: Word,
-    end: Word,
-}
-
-/// A loop: its header, continue target and merge block.
-pub(super) struct Loop {
-    header: Word,
-    next: Word,
     end: Word,
 }
 
@@ -129,38 +82,6 @@ impl<'a> Writer<'a> {
         Ok(self.pure(Op::Phi, self.types.u32, &pairs))
     }
 
-    /// Starts a loop that is executed at least once. Each pair in `values` has the value for the first
-    /// iteration, and the id of the value for the next iteration, which is defined later.
-    pub fn turn(&mut self, values: &[(Word, Word)]) -> Result<(Loop, Vec<Word>)> {
-        let [header, body, next, end] = [0; 4].map(|_| self.builder.id());
-        let before = self.block;
-        self.builder.branch(header).map_err(builder_error)?;
-        self.start(header)?;
-        let of_turn = values
-            .iter()
-            .map(|(first, later)| {
-                self.pure(Op::Phi, self.types.u32, &[*first, before, *later, next])
-            })
-            .collect();
-        let none = LoopControl::NONE;
-        (self.builder.loop_merge(end, next, none, [])).map_err(builder_error)?;
-        self.builder.branch(body).map_err(builder_error)?;
-        self.start(body)?;
-        Ok((Loop { header, next, end }, of_turn))
-    }
-
-    /// Repeats a loop if a condition holds.
-    pub fn again(&mut self, turn: &Loop, condition: Word) -> Result<()> {
-        self.builder.branch(turn.next).map_err(builder_error)?;
-        self.start(turn.next)?;
-        let ways = (turn.header, turn.end);
-        (self
-            .builder
-            .branch_conditional(condition, ways.0, ways.1, []))
-        .map_err(builder_error)?;
-        self.start(turn.end)
-    }
-
     /// Loads an input as an unsigned number.
     pub fn loaded(&mut self, input: Input) -> Word {
         let value = self.pure(Op::Load, input.of, &[input.variable]);
@@ -177,11 +98,21 @@ impl<'a> Writer<'a> {
         loaded.map_err(builder_error)
     }
 
-    /// Stores a word to the record buffer.
-    pub fn store_word(&mut self, pointer: Word, value: Word) -> Result<()> {
+    /// Stores a value to the record buffer.
+    pub fn store_aligned(&mut self, pointer: Word, value: Word, bytes: u32) -> Result<()> {
         let aligned = Some(MemoryAccess::ALIGNED);
-        let stored = self.builder.store(pointer, value, aligned, [literal(4)]);
+        let stored = (self.builder).store(pointer, value, aligned, [literal(bytes)]);
         stored.map_err(builder_error)
+    }
+
+    /// Loads an unsigned variable.
+    pub fn variable(&mut self, variable: Word) -> Word {
+        self.unsigned(Op::Load, &[variable])
+    }
+
+    /// Stores to a variable.
+    pub fn store_variable(&mut self, variable: Word, value: Word) -> Result<()> {
+        (self.builder.store(variable, value, None, [])).map_err(builder_error)
     }
 
     /// Extracts a component.
@@ -196,6 +127,16 @@ impl<'a> Writer<'a> {
     /// An unsigned constant.
     pub fn constant(&mut self, value: u32) -> Word {
         self.builder.constant_bit32(self.types.u32, value)
+    }
+
+    /// A constant.
+    pub fn float(&mut self, value: f32) -> Word {
+        self.builder.constant_bit32(self.types.f32, value.to_bits())
+    }
+
+    /// Whether both conditions hold.
+    pub fn both(&mut self, a: Word, b: Word) -> Word {
+        self.pure(Op::LogicalAnd, self.types.bool, &[a, b])
     }
 
     /// Adds an operation on unsigned numbers.
@@ -223,15 +164,10 @@ impl<'a> Writer<'a> {
     /// Adds an operation.
     pub fn add(&mut self, opcode: Op, of: Word, operands: Vec<Operand>) -> Word {
         let result = self.builder.id();
-        self.add_named(result, opcode, of, operands);
-        result
-    }
-
-    /// Adds an operation whose result id is already in use.
-    pub fn add_named(&mut self, result: Word, opcode: Op, of: Word, operands: Vec<Operand>) {
         let instruction = Instruction::new(opcode, Some(of), Some(result), operands);
         // Every caller has an open block.
         let _ = (self.builder).insert_into_block(InsertPoint::End, instruction);
+        result
     }
 }
 

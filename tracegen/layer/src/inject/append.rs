@@ -1,0 +1,170 @@
+//! Reserves space in the record buffer and stores records.
+
+use super::declare::{Inputs, Known, Types, id, literal};
+use super::lanes::Lanes;
+use super::writer::{Result, Writer};
+use super::{COUNTER_BYTES, Target, buffer};
+use rspirv::dr::{Builder, Instruction};
+use rspirv::spirv::{Decoration, Op, Scope, StorageClass, Word};
+
+/// The record buffer: its address and types.
+pub(super) struct Append {
+    address: Word,
+    scope: Scope,
+    u64: Word,
+    /// Pointers to the buffer, to one of its first words, and to a pair of words of the records.
+    buffer: Word,
+    word: Word,
+    pair: Word,
+}
+
+/// What a record occupies space for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Each {
+    Quad,
+    Lane,
+}
+
+impl Append {
+    /// Declares `struct Buffer { uint count; uint capacity; uint64_t pairs[]; }`.
+    pub fn new(builder: &mut Builder, types: Types, target: &Target, vulkan_memory: bool) -> Self {
+        let u64 = builder.type_int(64, 0);
+        // New types instead of existing equal ones, because the decorations must not apply to types of the
+        // shader.
+        let mut declare = |opcode: Op, operands: &[Word]| {
+            let result = builder.id();
+            let operands = operands.iter().copied().map(id).collect();
+            let globals = &mut builder.module_mut().types_global_values;
+            globals.push(Instruction::new(opcode, None, Some(result), operands));
+            result
+        };
+        let pairs = declare(Op::TypeRuntimeArray, &[u64]);
+        let block = declare(Op::TypeStruct, &[types.u32, types.u32, pairs]);
+        builder.decorate(pairs, Decoration::ArrayStride, [literal(8)]);
+        builder.decorate(block, Decoration::Block, []);
+        for (member, offset) in [0, 4, COUNTER_BYTES as u32].into_iter().enumerate() {
+            let offset = [literal(offset)];
+            builder.member_decorate(block, member as u32, Decoration::Offset, offset);
+        }
+        let mut pointer = |of| builder.type_pointer(None, StorageClass::PhysicalStorageBuffer, of);
+        Self {
+            buffer: pointer(block),
+            word: pointer(types.u32),
+            pair: pointer(u64),
+            address: builder.constant_bit64(u64, target.address),
+            u64,
+            scope: if vulkan_memory {
+                Scope::QueueFamily
+            } else {
+                Scope::Device
+            },
+        }
+    }
+
+    /// Loads the capacity of the buffer, which is 0 while recording is off.
+    pub fn capacity(&self, w: &mut Writer<'_>) -> Result {
+        let capacity = self.first_word(w, 1);
+        w.load_word(capacity)
+    }
+
+    /// Reserves space for records of `units` units. Returns the index of the first pair of words, and whether
+    /// there was space.
+    pub fn reserve(
+        &self,
+        w: &mut Writer<'_>,
+        lanes: &Lanes,
+        known: Known,
+        units: u32,
+        each: Each,
+    ) -> Result<(Word, Word)> {
+        let Types { u32, bool, .. } = w.types;
+        let units = w.constant(units);
+        let [zero, one] = [0, 1].map(|v| w.constant(v));
+        let capacity = w.variable(known.capacity);
+        let is_open = w.pure(Op::INotEqual, bool, &[capacity, zero]);
+        let (takes, all, before) = match &lanes.subgroup {
+            None => (is_open, units, zero),
+            Some(subgroup) => {
+                let (occupied, below) = match each {
+                    Each::Quad => (subgroup.quads(w), subgroup.below_quad),
+                    Each::Lane => (subgroup.votes, subgroup.below_lane),
+                };
+                let before = w.unsigned(Op::BitwiseAnd, &[occupied, below]);
+                let [all, before] = [occupied, before].map(|of| {
+                    let count = w.unsigned(Op::BitCount, &[of]);
+                    w.unsigned(Op::IMul, &[count, units])
+                });
+                let is_first = subgroup.is_first(w);
+                (w.both(is_first, is_open), all, before)
+            }
+        };
+        // One lane reserves the space for all.
+        let counter = self.first_word(w, 0);
+        let scope = w.constant(self.scope as u32);
+        let guard = w.guard(takes)?;
+        let taken = w.unsigned(Op::AtomicIAdd, &[counter, scope, zero, all]);
+        let taken = w.merge_value(&guard, taken, zero)?;
+        let base = match lanes.subgroup {
+            Some(_) => w.of_subgroup(Op::GroupNonUniformBroadcastFirst, u32, &[taken]),
+            None => taken,
+        };
+        let first = w.unsigned(Op::IAdd, &[base, before]);
+        let end = w.unsigned(Op::IAdd, &[base, all]);
+        let fits = w.pure(Op::ULessThanEqual, bool, &[end, capacity]);
+        Ok((w.unsigned(Op::ShiftLeftLogical, &[first, one]), fits))
+    }
+
+    /// Stores the first unit of a record.
+    pub fn header(
+        &self,
+        w: &mut Writer<'_>,
+        inputs: &Inputs,
+        first: Word,
+        [header, packed]: [Word; 2],
+    ) -> Result<()> {
+        let draw = draw(w, inputs);
+        let primitive = w.loaded(inputs.primitive);
+        self.pair(w, first, 0, [header, draw])?;
+        self.pair(w, first, 1, [packed, primitive])
+    }
+
+    /// Stores two words of a record; `offset` counts pairs.
+    pub fn pair(
+        &self,
+        w: &mut Writer<'_>,
+        first: Word,
+        offset: u32,
+        words: [Word; 2],
+    ) -> Result<()> {
+        let (two, offset) = (w.constant(2), w.constant(offset));
+        let place = w.unsigned(Op::IAdd, &[first, offset]);
+        let buffer = w.pure(Op::ConvertUToPtr, self.buffer, &[self.address]);
+        let to = w.pure(Op::AccessChain, self.pair, &[buffer, two, place]);
+        let both = w.pure(Op::CompositeConstruct, w.types.uvec2, &words);
+        let both = w.pure(Op::Bitcast, self.u64, &[both]);
+        w.store_aligned(to, both, 8)
+    }
+
+    fn first_word(&self, w: &mut Writer<'_>, member: u32) -> Word {
+        let member = w.constant(member);
+        let buffer = w.pure(Op::ConvertUToPtr, self.buffer, &[self.address]);
+        w.pure(Op::AccessChain, self.word, &[buffer, member])
+    }
+}
+
+/// Loads the number of the draw.
+fn draw(w: &mut Writer<'_>, inputs: &Inputs) -> Word {
+    let (block, member) = inputs.draw;
+    let pointer = (w.builder).type_pointer(None, StorageClass::PushConstant, w.types.u32);
+    let member = w.constant(member);
+    let draw = w.pure(Op::AccessChain, pointer, &[block, member]);
+    w.unsigned(Op::Load, &[draw])
+}
+
+/// First word of a record: group, lanes and kind.
+pub(super) fn header(w: &mut Writer<'_>, group: Word, lanes: Word, kind: u32) -> Word {
+    let [shift, kind] = [buffer::LANES_SHIFT, kind].map(|v| w.constant(v));
+    let lanes = w.unsigned(Op::ShiftLeftLogical, &[lanes, shift]);
+    let header = w.unsigned(Op::BitwiseOr, &[group, lanes]);
+    w.unsigned(Op::BitwiseOr, &[header, kind])
+}

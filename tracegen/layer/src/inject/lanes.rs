@@ -1,0 +1,191 @@
+//! Lanes of a quad: where a fragment is, which lanes are active, and coordinates of other lanes.
+
+use super::declare::{Input, Inputs, Types};
+use super::writer::Writer;
+use rspirv::spirv::{Op, Word};
+
+/// Position of a fragment.
+pub(super) struct Place {
+    /// Lane of the quad.
+    pub lane: Word,
+    /// Column and row of the quad, and the view, packed into a word.
+    pub packed: Word,
+}
+
+/// Computes the position of the fragment.
+pub(super) fn place(w: &mut Writer<'_>, inputs: &Inputs) -> Place {
+    let Types { f32, vec4, .. } = w.types;
+    let Input { variable, .. } = inputs.frag_coord;
+    let at = w.pure(Op::Load, vec4, &[variable]);
+    let [one, thirteen, view_shift] = [1, 13, 26].map(|v| w.constant(v));
+    let pixel = [0, 1].map(|axis| {
+        let part = w.extracted(at, axis, f32);
+        w.unsigned(Op::ConvertFToU, &[part])
+    });
+    let odd = pixel.map(|p| w.unsigned(Op::BitwiseAnd, &[p, one]));
+    let quad = pixel.map(|p| w.unsigned(Op::ShiftRightLogical, &[p, one]));
+    let below = w.unsigned(Op::ShiftLeftLogical, &[odd[1], one]);
+    let lane = w.unsigned(Op::BitwiseOr, &[odd[0], below]);
+    let row = w.unsigned(Op::ShiftLeftLogical, &[quad[1], thirteen]);
+    let mut packed = w.unsigned(Op::BitwiseOr, &[quad[0], row]);
+    if let Some(view) = inputs.view {
+        let view = w.loaded(view);
+        let view = w.unsigned(Op::ShiftLeftLogical, &[view, view_shift]);
+        packed = w.unsigned(Op::BitwiseOr, &[packed, view]);
+    }
+    Place { lane, packed }
+}
+
+/// The active lanes at a site, and the lane of this fragment.
+pub(super) struct Lanes {
+    /// Lane of the quad.
+    pub lane: Word,
+    /// Mask with only the bit of this lane.
+    pub own: Word,
+    /// Active lanes of the quad.
+    pub quad: Word,
+    /// Active lanes of the subgroup, if ballots are used.
+    pub subgroup: Option<Subgroup>,
+}
+
+pub(super) struct Subgroup {
+    pub votes: Word,
+    /// Mask with the bit of this invocation.
+    pub own: Word,
+    pub below_quad: Word,
+    pub below_lane: Word,
+}
+
+impl Lanes {
+    /// The active lanes. Without ballots, only the lane itself.
+    pub fn new(w: &mut Writer<'_>, inputs: &Inputs) -> Self {
+        let Types {
+            uvec4, bool, u32, ..
+        } = w.types;
+        let lane = w.variable(inputs.known.lane);
+        let one = w.constant(1);
+        let own = w.unsigned(Op::ShiftLeftLogical, &[one, lane]);
+        let Some(invocation) = inputs.invocation else {
+            return Self {
+                lane,
+                own,
+                quad: own,
+                subgroup: None,
+            };
+        };
+        let invocation = w.loaded(invocation);
+        // Helper lanes do not take part in ballots.
+        let present = w.builder.constant_true(bool);
+        let votes = w.of_subgroup(Op::GroupNonUniformBallot, uvec4, &[present]);
+        let votes = w.extracted(votes, 0, u32);
+        let [of_quad, all] = [28, 15].map(|v| w.constant(v));
+        let first = w.unsigned(Op::BitwiseAnd, &[invocation, of_quad]);
+        let quad = w.unsigned(Op::ShiftRightLogical, &[votes, first]);
+        let quad = w.unsigned(Op::BitwiseAnd, &[quad, all]);
+        let [quad_bit, lane_bit] =
+            [first, invocation].map(|lane| w.unsigned(Op::ShiftLeftLogical, &[one, lane]));
+        let [below_quad, below_lane] =
+            [quad_bit, lane_bit].map(|bit| w.unsigned(Op::ISub, &[bit, one]));
+        Self {
+            lane,
+            own,
+            quad,
+            subgroup: Some(Subgroup {
+                votes,
+                own: lane_bit,
+                below_quad,
+                below_lane,
+            }),
+        }
+    }
+
+    /// The lane `lane ^ step`.
+    pub fn other(&self, w: &mut Writer<'_>, step: u32) -> Word {
+        let step = w.constant(step);
+        w.unsigned(Op::BitwiseXor, &[self.lane, step])
+    }
+
+    /// Whether this is the first active lane of its quad.
+    pub fn is_first(&self, w: &mut Writer<'_>) -> Word {
+        is_lowest(w, self.quad, self.own)
+    }
+
+    /// Whether a lane is not active.
+    pub fn is_absent(&self, w: &mut Writer<'_>, lane: Word) -> Word {
+        let [zero, one] = [0, 1].map(|v| w.constant(v));
+        let active = w.unsigned(Op::ShiftRightLogical, &[self.quad, lane]);
+        let active = w.unsigned(Op::BitwiseAnd, &[active, one]);
+        w.pure(Op::IEqual, w.types.bool, &[active, zero])
+    }
+}
+
+impl Subgroup {
+    /// Whether this is the first active lane of the subgroup.
+    pub fn is_first(&self, w: &mut Writer<'_>) -> Word {
+        is_lowest(w, self.votes, self.own)
+    }
+
+    /// Mask with the first bit of each quad that has active lanes.
+    pub fn quads(&self, w: &mut Writer<'_>) -> Word {
+        let mut any = self.votes;
+        for by in [1, 2] {
+            let by = w.constant(by);
+            let shifted = w.unsigned(Op::ShiftRightLogical, &[any, by]);
+            any = w.unsigned(Op::BitwiseOr, &[any, shifted]);
+        }
+        let firsts = w.constant(0x1111_1111);
+        w.unsigned(Op::BitwiseAnd, &[any, firsts])
+    }
+}
+
+/// Whether a bit is the lowest one in a mask.
+fn is_lowest(w: &mut Writer<'_>, mask: Word, bit: Word) -> Word {
+    let zero = w.constant(0);
+    let negative = w.unsigned(Op::ISub, &[zero, mask]);
+    let lowest = w.unsigned(Op::BitwiseAnd, &[mask, negative]);
+    w.pure(Op::IEqual, w.types.bool, &[lowest, bit])
+}
+
+/// Coordinates, and their change to the right, downwards, and of the first along the second.
+pub(super) struct Slopes {
+    at: Word,
+    by: [Word; 3],
+}
+
+impl Slopes {
+    /// Derivatives of coordinates. All lanes of the quad have to execute this.
+    pub fn new(w: &mut Writer<'_>, at: Word) -> Self {
+        let vec2 = w.types.vec2;
+        let [right, down] = [Op::DPdxFine, Op::DPdyFine].map(|opcode| w.pure(opcode, vec2, &[at]));
+        let both = w.pure(Op::DPdxFine, vec2, &[down]);
+        let by = [right, down, both];
+        Self { at, by }
+    }
+
+    /// Coordinates of the lane `lane ^ step`; `lane` is this fragment's.
+    pub fn coordinates(&self, w: &mut Writer<'_>, lane: Word, step: u32) -> Word {
+        let Types { f32, vec2, .. } = w.types;
+        let one = w.constant(1);
+        // 1 if the other lane is to the right or below, or -1.
+        let [right, down] = [0, 1].map(|axis| {
+            let axis = w.constant(axis);
+            let bit = w.unsigned(Op::ShiftRightLogical, &[lane, axis]);
+            let bit = w.unsigned(Op::BitwiseAnd, &[bit, one]);
+            let bit = w.pure(Op::ConvertUToF, f32, &[bit]);
+            let [one, two] = [1.0_f32, 2.0].map(|v| w.float(v));
+            let twice = w.pure(Op::FMul, f32, &[bit, two]);
+            w.pure(Op::FSub, f32, &[one, twice])
+        });
+        let both = w.pure(Op::FMul, f32, &[right, down]);
+        let used = match step {
+            1 => &[0][..],
+            2 => &[1],
+            _ => &[0, 1, 2],
+        };
+        let signs = [right, down, both];
+        used.iter().fold(self.at, |found, &part| {
+            let change = w.pure(Op::VectorTimesScalar, vec2, &[self.by[part], signs[part]]);
+            w.pure(Op::FAdd, vec2, &[found, change])
+        })
+    }
+}
