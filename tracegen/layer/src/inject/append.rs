@@ -3,18 +3,20 @@
 use super::declare::{Inputs, Known, Types, id, literal};
 use super::lanes::Lanes;
 use super::writer::{Result, Writer};
-use super::{COUNTER_BYTES, Target, buffer};
+use super::{COUNTER_BYTES, Target, UNIT_BYTES, buffer};
 use rspirv::dr::{Builder, Instruction};
 use rspirv::spirv::{Decoration, Op, Scope, StorageClass, Word};
 
 /// The record buffer: its address and types.
 pub(super) struct Append {
-    address: Word,
+    address: u64,
     scope: Scope,
     u64: Word,
-    /// Pointers to the buffer, to one of its first words, and to a pair of words of the records.
+    /// Pointers to the buffer, and to one of its first words.
     buffer: Word,
     word: Word,
+    /// Pointers to a part of a record, and to a pair of words in it.
+    part: Word,
     pair: Word,
 }
 
@@ -26,7 +28,7 @@ pub(super) enum Each {
 }
 
 impl Append {
-    /// Declares `struct Buffer { uint count; uint capacity; uint64_t pairs[]; }`.
+    /// Declares `struct Buffer { uint count; uint capacity; }` and `struct Part { uint64_t pairs[]; }`.
     pub fn new(builder: &mut Builder, types: Types, target: &Target, vulkan_memory: bool) -> Self {
         let u64 = builder.type_int(64, 0);
         // New types instead of existing equal ones, because the decorations must not apply to types of the
@@ -38,20 +40,23 @@ impl Append {
             globals.push(Instruction::new(opcode, None, Some(result), operands));
             result
         };
+        let buffer = declare(Op::TypeStruct, &[types.u32, types.u32]);
         let pairs = declare(Op::TypeRuntimeArray, &[u64]);
-        let block = declare(Op::TypeStruct, &[types.u32, types.u32, pairs]);
+        let part = declare(Op::TypeStruct, &[pairs]);
         builder.decorate(pairs, Decoration::ArrayStride, [literal(8)]);
-        builder.decorate(block, Decoration::Block, []);
-        for (member, offset) in [0, 4, COUNTER_BYTES as u32].into_iter().enumerate() {
-            let offset = [literal(offset)];
-            builder.member_decorate(block, member as u32, Decoration::Offset, offset);
+        for (block, members) in [(buffer, 2), (part, 1)] {
+            builder.decorate(block, Decoration::Block, []);
+            for member in 0..members {
+                builder.member_decorate(block, member, Decoration::Offset, [literal(4 * member)]);
+            }
         }
         let mut pointer = |of| builder.type_pointer(None, StorageClass::PhysicalStorageBuffer, of);
         Self {
-            buffer: pointer(block),
+            buffer: pointer(buffer),
             word: pointer(types.u32),
+            part: pointer(part),
             pair: pointer(u64),
-            address: builder.constant_bit64(u64, target.address),
+            address: target.address,
             u64,
             scope: if vulkan_memory {
                 Scope::QueueFamily
@@ -67,8 +72,8 @@ impl Append {
         w.load_word(capacity)
     }
 
-    /// Reserves space for records of `units` units. Returns the index of the first pair of words, and whether
-    /// there was space.
+    /// Reserves space for records of `units` units. Returns the address of the record, and whether there was
+    /// space.
     pub fn reserve(
         &self,
         w: &mut Writer<'_>,
@@ -79,7 +84,7 @@ impl Append {
     ) -> Result<(Word, Word)> {
         let Types { u32, bool, .. } = w.types;
         let units = w.constant(units);
-        let [zero, one] = [0, 1].map(|v| w.constant(v));
+        let zero = w.constant(0);
         let capacity = w.variable(known.capacity);
         let is_open = w.pure(Op::INotEqual, bool, &[capacity, zero]);
         let (takes, all, before) = match &lanes.subgroup {
@@ -111,35 +116,39 @@ impl Append {
         let first = w.unsigned(Op::IAdd, &[base, before]);
         let end = w.unsigned(Op::IAdd, &[base, all]);
         let fits = w.pure(Op::ULessThanEqual, bool, &[end, capacity]);
-        Ok((w.unsigned(Op::ShiftLeftLogical, &[first, one]), fits))
+        let records = self.number(w, self.address + COUNTER_BYTES);
+        let record = self.after(w, records, first, UNIT_BYTES);
+        Ok((record, fits))
     }
 
-    /// Stores the first unit of a record.
-    pub fn header(
-        &self,
-        w: &mut Writer<'_>,
-        inputs: &Inputs,
-        first: Word,
-        [header, packed]: [Word; 2],
-    ) -> Result<()> {
-        let draw = draw(w, inputs);
-        let primitive = w.loaded(inputs.primitive);
-        self.pair(w, first, 0, [header, draw])?;
-        self.pair(w, first, 1, [packed, primitive])
+    fn number(&self, w: &mut Writer<'_>, value: u64) -> Word {
+        w.builder.constant_bit64(self.u64, value)
     }
 
-    /// Stores two words of a record; `offset` counts pairs.
+    /// The address after `count` parts of `bytes` bytes.
+    fn after(&self, w: &mut Writer<'_>, address: Word, count: Word, bytes: u64) -> Word {
+        let count = w.pure(Op::UConvert, self.u64, &[count]);
+        let bytes = self.number(w, bytes);
+        let offset = w.pure(Op::IMul, self.u64, &[count, bytes]);
+        w.pure(Op::IAdd, self.u64, &[address, offset])
+    }
+
+    /// The address after `count` pairs of words.
+    pub fn after_pairs(&self, w: &mut Writer<'_>, address: Word, count: Word) -> Word {
+        self.after(w, address, count, 8)
+    }
+
+    /// Stores two words after an address; `offset` counts pairs.
     pub fn pair(
         &self,
         w: &mut Writer<'_>,
-        first: Word,
+        address: Word,
         offset: u32,
         words: [Word; 2],
     ) -> Result<()> {
-        let (two, offset) = (w.constant(2), w.constant(offset));
-        let place = w.unsigned(Op::IAdd, &[first, offset]);
-        let buffer = w.pure(Op::ConvertUToPtr, self.buffer, &[self.address]);
-        let to = w.pure(Op::AccessChain, self.pair, &[buffer, two, place]);
+        let (zero, offset) = (w.constant(0), w.constant(offset));
+        let part = w.pure(Op::ConvertUToPtr, self.part, &[address]);
+        let to = w.pure(Op::AccessChain, self.pair, &[part, zero, offset]);
         let both = w.pure(Op::CompositeConstruct, w.types.uvec2, &words);
         let both = w.pure(Op::Bitcast, self.u64, &[both]);
         w.store_aligned(to, both, 8)
@@ -147,9 +156,28 @@ impl Append {
 
     fn first_word(&self, w: &mut Writer<'_>, member: u32) -> Word {
         let member = w.constant(member);
-        let buffer = w.pure(Op::ConvertUToPtr, self.buffer, &[self.address]);
+        let address = self.number(w, self.address);
+        let buffer = w.pure(Op::ConvertUToPtr, self.buffer, &[address]);
         w.pure(Op::AccessChain, self.word, &[buffer, member])
     }
+}
+
+/// The first unit of a record.
+pub(super) fn header(
+    w: &mut Writer<'_>,
+    inputs: &Inputs,
+    group: Word,
+    lanes: Word,
+    kind: u32,
+) -> [Word; 4] {
+    let [shift, kind] = [buffer::LANES_SHIFT, kind].map(|v| w.constant(v));
+    let lanes = w.unsigned(Op::ShiftLeftLogical, &[lanes, shift]);
+    let header = w.unsigned(Op::BitwiseOr, &[group, lanes]);
+    let header = w.unsigned(Op::BitwiseOr, &[header, kind]);
+    let draw = draw(w, inputs);
+    let packed = w.variable(inputs.known.packed);
+    let primitive = w.loaded(inputs.primitive);
+    [header, draw, packed, primitive]
 }
 
 /// Loads the number of the draw.
@@ -159,12 +187,4 @@ fn draw(w: &mut Writer<'_>, inputs: &Inputs) -> Word {
     let member = w.constant(member);
     let draw = w.pure(Op::AccessChain, pointer, &[block, member]);
     w.unsigned(Op::Load, &[draw])
-}
-
-/// First word of a record: group, lanes and kind.
-pub(super) fn header(w: &mut Writer<'_>, group: Word, lanes: Word, kind: u32) -> Word {
-    let [shift, kind] = [buffer::LANES_SHIFT, kind].map(|v| w.constant(v));
-    let lanes = w.unsigned(Op::ShiftLeftLogical, &[lanes, shift]);
-    let header = w.unsigned(Op::BitwiseOr, &[group, lanes]);
-    w.unsigned(Op::BitwiseOr, &[header, kind])
 }

@@ -2,7 +2,8 @@
 //!
 //! The first unit of a record has its header, the number of the draw, the place of the quad and the number of
 //! the primitive. In the record of a quad, two units follow for each coordinate group: u and v of the four
-//! lanes. In the record of a fragment, three units follow: see [`RawFragment`].
+//! lanes. In the record of a fragment, three units follow: see [`RawFragment`]. In a record of depths, each of
+//! these four words is followed by the depth of a lane.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -26,6 +27,10 @@ pub(super) const MOST_GROUPS: usize = 8;
 pub(super) const FRAGMENT: u32 = 1 << 24;
 /// Number of units of a record of a fragment.
 pub(super) const FRAGMENT_UNITS: u32 = 4;
+/// Header bit of a record of depths.
+pub(super) const DEPTH: u32 = 1 << 25;
+/// Number of units of a record of depths.
+pub(super) const DEPTH_UNITS: u32 = 2;
 
 /// The part of a record for one coordinate group.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
@@ -134,14 +139,26 @@ pub struct RawFragment {
 /// Splits records into coordinate groups. Returns false if the last record is incomplete.
 #[must_use]
 pub fn unpack(mut units: &[Unit], mut each: impl FnMut(RawSample)) -> bool {
-    while let Some((&[header, draw, place, primitive], rest)) = units.split_first() {
+    while let Some((&first, rest)) = units.split_first() {
+        let header = first[0];
         let groups = (header >> GROUPS_SHIFT & 15) as usize;
         let is_fragment = header & FRAGMENT != 0;
-        let length = if is_fragment { 3 } else { 2 * groups };
+        let is_depth = header & DEPTH != 0;
+        let length = match (is_depth, is_fragment) {
+            (true, _) => 1,
+            (_, true) => 3,
+            _ => 2 * groups,
+        };
         let Some((of, next)) = rest.split_at_checked(length) else {
             return false;
         };
         units = next;
+        let words = of.as_flattened();
+        let [_, draw, place, primitive] = match words {
+            // Every second word of the record is a depth.
+            [second, _, third, _] if is_depth => [header, first[2], *second, *third],
+            _ => first,
+        };
         let mut sample = RawSample {
             header: header & 0x000f_ffff,
             draw,
@@ -149,7 +166,14 @@ pub fn unpack(mut units: &[Unit], mut each: impl FnMut(RawSample)) -> bool {
             primitive,
             ..RawSample::default()
         };
-        let words = of.as_flattened();
+        if is_depth {
+            let depths = [first[1], first[3], words[1], words[3]];
+            for (lane, depth) in depths.into_iter().enumerate() {
+                sample.values[2 * lane] = f32::from_bits(depth);
+            }
+            each(sample);
+            continue;
+        }
         if is_fragment {
             let (element, values) = words.split_at(1);
             sample.element = element[0];
@@ -199,6 +223,13 @@ mod tests {
             [3, 1.0_f32.to_bits(), 2.0_f32.to_bits(), 3.0_f32.to_bits()],
             floats([4.0, 5.0, 6.0, 7.0]),
             floats([8.0, 9.0, 10.0, 0.0]),
+            [
+                header(7, 5, 0) | DEPTH,
+                0.25_f32.to_bits(),
+                9,
+                0.5_f32.to_bits(),
+            ],
+            [3 | 4 << 13, 0.75_f32.to_bits(), 11, 1.0_f32.to_bits()],
         ];
         let (found, whole) = all(&units);
         assert!(whole);
@@ -206,7 +237,10 @@ mod tests {
             .iter()
             .map(|s| (s.group(), s.draw, s.lanes()))
             .collect();
-        assert_eq!(groups, [(5, 7, 11), (6, 7, 11), (2, 8, 1), (6, 8, 4)]);
+        assert_eq!(
+            groups,
+            [(5, 7, 11), (6, 7, 11), (2, 8, 1), (6, 8, 4), (7, 9, 5)]
+        );
         assert_eq!((found[0].quad(), found[0].view()), ([3, 4], 1));
         let quad = RawQuad {
             uv: [1.0, 2.0],
@@ -222,7 +256,13 @@ mod tests {
             lod: 10.0,
         };
         assert_eq!((found[3].element, found[3].as_fragment()), (3, fragment));
-        assert!(!all(&units[..4]).1 && !all(&units[..8]).1);
+        let depths = found[4].as_quad();
+        assert_eq!((found[4].quad(), found[4].primitive), ([3, 4], 11));
+        assert_eq!(
+            [depths.uv, depths.dx, depths.dy].map(|v| v[0]),
+            [0.25, 0.25, 0.5]
+        );
+        assert!(!all(&units[..4]).1 && !all(&units[..8]).1 && !all(&units[..11]).1);
     }
 
     proptest! {

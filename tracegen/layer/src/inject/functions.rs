@@ -8,10 +8,11 @@
 //! each further loop doubles the time in which LLVM analyses that variable.
 
 use super::append::{Append, Each, header};
+use super::buffer::{self, GROUPS_SHIFT};
 use super::declare::{Inputs, Types};
 use super::lanes::{self, Lanes, Slopes};
 use super::writer::{Result, Writer};
-use super::{InjectError, Target, buffer};
+use super::{InjectError, Target};
 use rspirv::dr::Builder;
 use rspirv::spirv::Word;
 
@@ -53,53 +54,98 @@ impl Functions {
 
     /// `void quads(uint group, vec2 at[count])`: records a quad with this number of coordinates.
     pub fn quads(&self, builder: &mut Builder, count: u32) -> Result {
-        let Types { u32, vec2, .. } = self.types;
+        let Types { u32, f32, vec2, .. } = self.types;
         let mut parameters = vec![u32];
         parameters.extend((0..count).map(|_| vec2));
         let (mut w, function, parameters) = Writer::begin(builder, self.types, &parameters)?;
         let w = &mut w;
         let (&group, at) = parameters.split_first().ok_or(NO_PARAMETERS)?;
         // Derivatives need all lanes of the quad, so they come first.
-        let slopes: Vec<Slopes> = at.iter().map(|at| Slopes::new(w, *at)).collect();
+        let slopes: Vec<Slopes> = at.iter().map(|at| Slopes::new(w, *at, vec2)).collect();
         let lanes = Lanes::new(w, &self.inputs);
-        let packed = w.variable(self.inputs.known.packed);
-        let header = header(w, group, lanes.quad, count << buffer::GROUPS_SHIFT);
-        let known = self.inputs.known;
-        let (first, fits) = (self.append).reserve(w, &lanes, known, 1 + 2 * count, Each::Quad)?;
+        let header = header(w, &self.inputs, group, lanes.quad, count << GROUPS_SHIFT);
+        let (record, fits) = self.reserve(w, &lanes, 1 + 2 * count, Each::Quad)?;
         let is_first = lanes.is_first(w);
         let fits = w.guard(fits)?;
-        let of_quad = w.guard(is_first)?;
-        (self.append).header(w, &self.inputs, first, [header, packed])?;
-        w.merge(&of_quad)?;
-        self.lane(w, first, lanes.lane, at)?;
-        // The first lane of the quad also stores the coordinates of inactive lanes.
-        for step in 1..4 {
-            let other = lanes.other(w, step);
-            let absent = lanes.is_absent(w, other);
-            let stores = w.both(absent, is_first);
-            let stores = w.guard(stores)?;
-            let there: Vec<Word> = (slopes.iter())
-                .map(|slopes| slopes.coordinates(w, lanes.lane, step))
-                .collect();
-            self.lane(w, first, other, &there)?;
-            w.merge(&stores)?;
-        }
+        let stores = w.guard(is_first)?;
+        self.append.pair(w, record, 0, [header[0], header[1]])?;
+        self.append.pair(w, record, 1, [header[2], header[3]])?;
+        w.merge(&stores)?;
+        self.each_lane(w, &lanes, is_first, record, |w, to, step| {
+            for (number, slopes) in (0..).zip(&slopes) {
+                let at = slopes.coordinates(w, lanes.lane, step);
+                let words = [0, 1].map(|axis| {
+                    let part = w.extracted(at, axis, f32);
+                    w.bits(part)
+                });
+                self.append.pair(w, to, 2 + 4 * number, words)?;
+            }
+            Ok(())
+        })?;
         w.merge(&fits)?;
         w.end()?;
         Ok(function)
     }
 
-    /// Stores the coordinates of a lane of the quad.
-    fn lane(&self, w: &mut Writer<'_>, first: Word, lane: Word, at: &[Word]) -> Result<()> {
-        let first = w.unsigned(rspirv::spirv::Op::IAdd, &[first, lane]);
-        for (number, at) in (0..).zip(at) {
-            let words = [0, 1].map(|axis| {
-                let part = w.extracted(*at, axis, self.types.f32);
-                w.bits(part)
-            });
-            self.append.pair(w, first, 2 + 4 * number, words)?;
+    /// `void depth(uint group, float depth)`: records a quad with its depth.
+    pub fn depth(&self, builder: &mut Builder) -> Result {
+        let Types { u32, f32, .. } = self.types;
+        let (mut w, function, parameters) = Writer::begin(builder, self.types, &[u32, f32])?;
+        let w = &mut w;
+        let [group, depth] = parameters[..] else {
+            return Err(NO_PARAMETERS);
+        };
+        let slopes = Slopes::new(w, depth, f32);
+        let lanes = Lanes::new(w, &self.inputs);
+        let header = header(w, &self.inputs, group, lanes.quad, buffer::DEPTH);
+        let (record, fits) = self.reserve(w, &lanes, buffer::DEPTH_UNITS, Each::Quad)?;
+        let is_first = lanes.is_first(w);
+        let fits = w.guard(fits)?;
+        self.each_lane(w, &lanes, is_first, record, |w, to, step| {
+            let lane = lanes.other(w, step);
+            let word = w.select_word(lane, header);
+            let depth = slopes.coordinates(w, lanes.lane, step);
+            let depth = w.bits(depth);
+            self.append.pair(w, to, 0, [word, depth])
+        })?;
+        w.merge(&fits)?;
+        w.end()?;
+        Ok(function)
+    }
+
+    /// Lets each active lane store its part of a record, which is a pair of words behind that of the lane before.
+    /// The first active lane also stores the parts of the inactive ones. `store` gets the address, and the step
+    /// from the own lane to the lane whose part it is.
+    fn each_lane(
+        &self,
+        w: &mut Writer<'_>,
+        lanes: &Lanes,
+        is_first: Word,
+        record: Word,
+        mut store: impl FnMut(&mut Writer<'_>, Word, u32) -> Result<()>,
+    ) -> Result<()> {
+        let own = self.append.after_pairs(w, record, lanes.lane);
+        store(w, own, 0)?;
+        for step in 1..4 {
+            let other = lanes.other(w, step);
+            let absent = lanes.is_absent(w, other);
+            let stores = w.both(absent, is_first);
+            let stores = w.guard(stores)?;
+            let to = self.append.after_pairs(w, record, other);
+            store(w, to, step)?;
+            w.merge(&stores)?;
         }
         Ok(())
+    }
+
+    fn reserve(
+        &self,
+        w: &mut Writer<'_>,
+        lanes: &Lanes,
+        units: u32,
+        each: Each,
+    ) -> Result<(Word, Word)> {
+        (self.append).reserve(w, lanes, self.inputs.known, units, each)
     }
 
     /// `void fragment(uint group, uint element, vec3 at, float lod, vec3 dx, vec3 dy)`
@@ -112,23 +158,19 @@ impl Functions {
             return Err(NO_PARAMETERS);
         };
         let lanes = Lanes::new(w, &self.inputs);
-        let packed = w.variable(self.inputs.known.packed);
-        let header = header(w, group, lanes.own, buffer::FRAGMENT);
-        let (known, units) = (self.inputs.known, buffer::FRAGMENT_UNITS);
-        let (first, fits) = (self.append).reserve(w, &lanes, known, units, Each::Lane)?;
+        let mut words = header(w, &self.inputs, group, lanes.own, buffer::FRAGMENT).to_vec();
+        let (record, fits) = self.reserve(w, &lanes, buffer::FRAGMENT_UNITS, Each::Lane)?;
         let fits = w.guard(fits)?;
-        (self.append).header(w, &self.inputs, first, [header, packed])?;
-        let mut words = vec![element];
+        words.push(element);
         for vector in [at, dx, dy] {
             for axis in 0..3 {
                 let part = w.extracted(vector, axis, f32);
                 words.push(w.bits(part));
             }
         }
-        words.push(w.bits(lod));
-        words.push(w.constant(0));
-        for (offset, words) in (2..).zip(words.chunks_exact(2)) {
-            (self.append).pair(w, first, offset, [words[0], words[1]])?;
+        words.extend([w.bits(lod), w.constant(0)]);
+        for (offset, words) in (0..).zip(words.chunks_exact(2)) {
+            (self.append).pair(w, record, offset, [words[0], words[1]])?;
         }
         w.merge(&fits)?;
         w.end()?;

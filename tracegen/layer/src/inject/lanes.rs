@@ -146,25 +146,25 @@ fn is_lowest(w: &mut Writer<'_>, mask: Word, bit: Word) -> Word {
     w.pure(Op::IEqual, w.types.bool, &[lowest, bit])
 }
 
-/// Coordinates, and their change to the right, downwards, and of the first along the second.
+/// A float or vector, and its change to the right, downwards, and of the first along the second.
 pub(super) struct Slopes {
+    of: Word,
     at: Word,
     by: [Word; 3],
 }
 
 impl Slopes {
-    /// Derivatives of coordinates. All lanes of the quad have to execute this.
-    pub fn new(w: &mut Writer<'_>, at: Word) -> Self {
-        let vec2 = w.types.vec2;
-        let [right, down] = [Op::DPdxFine, Op::DPdyFine].map(|opcode| w.pure(opcode, vec2, &[at]));
-        let both = w.pure(Op::DPdxFine, vec2, &[down]);
+    /// Derivatives of a value of a type. All lanes of the quad have to execute this.
+    pub fn new(w: &mut Writer<'_>, at: Word, of: Word) -> Self {
+        let [right, down] = [Op::DPdxFine, Op::DPdyFine].map(|opcode| w.pure(opcode, of, &[at]));
+        let both = w.pure(Op::DPdxFine, of, &[down]);
         let by = [right, down, both];
-        Self { at, by }
+        Self { of, at, by }
     }
 
-    /// Coordinates of the lane `lane ^ step`; `lane` is this fragment's.
+    /// The value in the lane `lane ^ step`; `lane` is this fragment's.
     pub fn coordinates(&self, w: &mut Writer<'_>, lane: Word, step: u32) -> Word {
-        let Types { f32, vec2, .. } = w.types;
+        let Types { f32, .. } = w.types;
         let one = w.constant(1);
         // 1 if the other lane is to the right or below, or -1.
         let [right, down] = [0, 1].map(|axis| {
@@ -178,14 +178,20 @@ impl Slopes {
         });
         let both = w.pure(Op::FMul, f32, &[right, down]);
         let used = match step {
-            1 => &[0][..],
+            0 => &[][..],
+            1 => &[0],
             2 => &[1],
             _ => &[0, 1, 2],
         };
         let signs = [right, down, both];
+        let times = if self.of == f32 {
+            Op::FMul
+        } else {
+            Op::VectorTimesScalar
+        };
         used.iter().fold(self.at, |found, &part| {
-            let change = w.pure(Op::VectorTimesScalar, vec2, &[self.by[part], signs[part]]);
-            w.pure(Op::FAdd, vec2, &[found, change])
+            let change = w.pure(times, self.of, &[self.by[part], signs[part]]);
+            w.pure(Op::FAdd, self.of, &[found, change])
         })
     }
 }

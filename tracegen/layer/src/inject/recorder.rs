@@ -19,6 +19,8 @@ pub(super) struct Recorder {
     functions: Functions,
     /// `void quads(uint group, vec2 at[n])`, by n.
     quads: HashMap<usize, Word>,
+    /// `void depth(uint group, float depth)`
+    depth: Option<Word>,
     /// `void fragment(uint group, uint element, vec3 at, float lod, vec3 dx, vec3 dy)`
     fragment: Option<Word>,
 }
@@ -37,6 +39,7 @@ impl Recorder {
             uzero: builder.constant_bit32(types.u32, 0),
             functions: Functions::new(&mut builder, types, inputs, target, vulkan_memory),
             quads: HashMap::new(),
+            depth: None,
             fragment: None,
             builder,
         })
@@ -87,7 +90,13 @@ impl Recorder {
         let Input { variable, of } = self.frag_coord;
         let place = self.put(out, Op::Load, of, vec![id(variable)]);
         let depth = self.extracted(place, 2, out);
-        self.record_quads(group, &[vec![depth]], out)
+        let function = match self.depth {
+            Some(function) => function,
+            None => *(self.depth).insert(self.functions.depth(&mut self.builder)?),
+        };
+        let arguments = vec![function, self.group(group), depth];
+        self.call(arguments, out);
+        Ok(())
     }
 
     /// Records the active lanes without coordinates.

@@ -50,7 +50,7 @@ pub(super) fn rewrite(
                     && is_main
                     && let Some(group) = sites.end
                 {
-                    recorder.record_depth(group, &mut new)?;
+                    recorder.record_presence(group, &mut new)?;
                 }
                 new.push(instruction);
             }

@@ -134,6 +134,16 @@ impl<'a> Writer<'a> {
         self.builder.constant_bit32(self.types.f32, value.to_bits())
     }
 
+    /// Selects one of four words.
+    pub fn select_word(&mut self, place: Word, words: [Word; 4]) -> Word {
+        let [first, rest @ ..] = words;
+        (1..).zip(rest).fold(first, |chosen, (number, word)| {
+            let number = self.constant(number);
+            let is_it = self.pure(Op::IEqual, self.types.bool, &[place, number]);
+            self.unsigned(Op::Select, &[is_it, word, chosen])
+        })
+    }
+
     /// Whether both conditions hold.
     pub fn both(&mut self, a: Word, b: Word) -> Word {
         self.pure(Op::LogicalAnd, self.types.bool, &[a, b])
