@@ -9,7 +9,7 @@ scripts/install-deps.sh apps
 out=${OUT:-out}/apps
 bin=$(cd "${CARGO_TARGET_DIR:-target}/release" && pwd)
 mkdir -p "$out/site"
-cp apps/pages/* apps/package.json apps/package-lock.json "$out/site/"
+cp -r apps/pages/* apps/package.json apps/package-lock.json "$out/site/"
 if ! cmp -s apps/package-lock.json "$out/site/node_modules/.installed"; then
     (cd "$out/site" && npm ci --no-audit --no-fund --ignore-scripts --loglevel error)
     cp apps/package-lock.json "$out/site/node_modules/.installed"

@@ -27,6 +27,7 @@ const VIEWS: &[(&str, &str, View)] = &[
         applications::records,
     ),
     ("applications-times", "applications", applications::times),
+    ("compile-times", "compile-times", applications::compiling),
     (
         "calibration-ipd-bias",
         "calibration-ipd-bias",
