@@ -28,7 +28,7 @@ pub fn of_container() -> Vec<Damage> {
             field,
             "+ 1, with a correct checksum",
             move |bytes| {
-                bytes[at] += 1;
+                bytes[at] = bytes[at].wrapping_add(1);
                 repair_header(bytes);
             },
         ));
@@ -53,11 +53,8 @@ pub fn of_container() -> Vec<Damage> {
         let field = format!("chunk {}", String::from_utf8_lossy(tag));
         all.push(of_file(&field, "a bit, without a checksum", move |bytes| {
             let directory = u64::from_le_bytes(bytes[16..24].try_into().expect("eight bytes"));
-            let entries = bytes[directory as usize..].chunks_exact(24);
-            let entry = entries
-                .into_iter()
-                .find(|entry| entry[..4] == *tag)
-                .expect("a chunk");
+            let mut entries = bytes[directory as usize..].chunks_exact(24);
+            let entry = entries.find(|entry| entry[..4] == *tag).expect("a chunk");
             let number =
                 |at: usize| u64::from_le_bytes(entry[at..at + 8].try_into().expect("eight bytes"));
             let middle = (number(8) + number(16) / 2) as usize;
@@ -94,7 +91,8 @@ pub fn of_indices() -> Vec<Damage> {
             &format!("tile index: {field}"),
             "+ 1",
             move |parts| {
-                put_u32(parts, b"TIDX", touched(parts) + at, |value| value + 1);
+                let entry = touched(parts);
+                put_u32(parts, b"TIDX", entry + at, |value| value.wrapping_add(1));
             },
         ));
     }
@@ -122,7 +120,7 @@ pub fn of_indices() -> Vec<Damage> {
             "+ 1",
             move |parts| {
                 let last = parts.chunk(b"PLIX").len() - ENTRY_BYTES[1];
-                put_u32(parts, b"PLIX", last + at, |value| value + 1);
+                put_u32(parts, b"PLIX", last + at, |value| value.wrapping_add(1));
             },
         ));
     }

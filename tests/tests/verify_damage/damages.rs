@@ -11,7 +11,7 @@ pub struct Sound {
 }
 
 /// Makes the damaged file.
-pub type Change = Box<dyn Fn(&Sound) -> Vec<u8>>;
+pub type Change = Box<dyn Fn(&Sound) -> Vec<u8> + Send + Sync>;
 
 /// A field and its damage: one change, or the same change in ascending sizes.
 pub struct Damage {
@@ -20,15 +20,19 @@ pub struct Damage {
 }
 
 /// Changes a part of the trace, which is written anew.
-pub fn damage(field: &str, what: &str, change: impl Fn(&mut Trace) + 'static) -> Damage {
+pub fn damage(
+    field: &str,
+    what: &str,
+    change: impl Fn(&mut Trace) + Send + Sync + 'static,
+) -> Damage {
     Damage {
         field: field.into(),
         sizes: vec![(what.into(), changed(change))],
     }
 }
 
-fn changed(change: impl Fn(&mut Trace) + 'static) -> Change {
-    Box::new(move |sound| {
+fn changed(change: impl Fn(&mut Trace) + Send + Sync + 'static) -> Change {
+    Box::new(move |sound: &Sound| {
         let mut trace = sound.trace.clone();
         change(&mut trace);
         trace.bytes()
@@ -36,7 +40,11 @@ fn changed(change: impl Fn(&mut Trace) + 'static) -> Change {
 }
 
 /// Changes bytes of chunks; the checksums of chunks and tiles are correct afterwards.
-pub fn of_bytes(field: &str, what: &str, change: impl Fn(&mut Parts) + 'static) -> Damage {
+pub fn of_bytes(
+    field: &str,
+    what: &str,
+    change: impl Fn(&mut Parts) + Send + Sync + 'static,
+) -> Damage {
     let apply = move |sound: &Sound| {
         let mut parts = Parts::of(&sound.bytes);
         change(&mut parts);
@@ -49,7 +57,11 @@ pub fn of_bytes(field: &str, what: &str, change: impl Fn(&mut Parts) + 'static) 
 }
 
 /// Changes bytes of the file, without new checksums.
-pub fn of_file(field: &str, what: &str, change: impl Fn(&mut Vec<u8>) + 'static) -> Damage {
+pub fn of_file(
+    field: &str,
+    what: &str,
+    change: impl Fn(&mut Vec<u8>) + Send + Sync + 'static,
+) -> Damage {
     let apply = move |sound: &Sound| {
         let mut bytes = sound.bytes.clone();
         change(&mut bytes);
@@ -61,7 +73,11 @@ pub fn of_file(field: &str, what: &str, change: impl Fn(&mut Vec<u8>) + 'static)
     }
 }
 
-pub fn of_tables(field: &str, what: &str, change: impl Fn(&mut Tables) + 'static) -> Damage {
+pub fn of_tables(
+    field: &str,
+    what: &str,
+    change: impl Fn(&mut Tables) + Send + Sync + 'static,
+) -> Damage {
     damage(field, what, move |trace| change(&mut trace.tables))
 }
 
@@ -69,7 +85,7 @@ pub fn of_tables(field: &str, what: &str, change: impl Fn(&mut Tables) + 'static
 pub fn by_texels(
     field: &str,
     whose: &str,
-    change: impl Fn(&mut Trace, i32) + Clone + 'static,
+    change: impl Fn(&mut Trace, i32) + Clone + Send + Sync + 'static,
 ) -> Damage {
     let sizes = (0..=10).map(|power| {
         let (steps, change) = (1 << power, change.clone());
@@ -86,7 +102,7 @@ pub fn by_texels(
 pub fn by_tenths(
     field: &str,
     unit: &str,
-    change: impl Fn(&mut Tables, f32) + Clone + 'static,
+    change: impl Fn(&mut Tables, f32) + Clone + Send + Sync + 'static,
 ) -> Damage {
     let sizes = (-8..=0).map(|power| {
         let change = change.clone();

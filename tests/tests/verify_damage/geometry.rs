@@ -92,13 +92,13 @@ fn is_recorded(trace: &Trace, tile: usize, primitive: u32) -> bool {
 fn remove(trace: &mut Trace, recorded: bool) {
     let number = view(trace, true);
     let lists = &trace.lists[number];
-    let tiles = (lists.starts.len() - 1) / 3..lists.starts.len() - 1;
+    let mut tiles = (lists.starts.len() - 1) / 3..lists.starts.len() - 1;
     let of_tile = |tile: usize| {
         let mut list = lists.tile(tile).iter().rev();
         let found = list.find(|primitive| is_recorded(trace, tile, **primitive) == recorded);
         Some((tile, *found?))
     };
-    let (tile, primitive) = tiles.into_iter().find_map(of_tile).expect("a primitive");
+    let (tile, primitive) = tiles.find_map(of_tile).expect("a primitive");
     let mut list = lists.tile(tile).to_vec();
     list.retain(|other| *other != primitive);
     trace.replace(number, tile, &list);
@@ -115,7 +115,7 @@ pub fn of_lists() -> Vec<Damage> {
         }),
     ];
     for (is_pass, field) in [(true, "list of a picture"), (false, "list of a shadow map")] {
-        let edit = |what: &str, change: fn(&mut Vec<u32>)| {
+        let edit = move |what: &str, change: fn(&mut Vec<u32>)| {
             damage(field, what, move |t: &mut Trace| {
                 let number = view(t, is_pass);
                 let tile = full_tile(&t.lists[number]);

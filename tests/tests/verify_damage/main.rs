@@ -104,7 +104,7 @@ impl Bench<'_> {
 
     fn row(&self, worker: usize, Damage { field, sizes }: &Damage) -> Row {
         let known = |what: &str| {
-            let row = [field, what].map(quoted).join(",") + ",";
+            let row = [field.as_str(), what].map(quoted).join(",") + ",";
             self.before.lines().any(|line| line.starts_with(&row))
         };
         let at = sizes.iter().position(|(what, _)| known(what));
@@ -127,8 +127,8 @@ impl Bench<'_> {
         }
         let reported = first_error(&outcome.errors);
         let code = outcome.code.to_string();
-        let row = [field, what.as_str(), outcome.found_by, &code, &reported];
-        Ok(row.map(quoted).join(","))
+        let row = [field.as_str(), what, outcome.found_by, &code, &reported].map(quoted);
+        Ok(row.join(","))
     }
 }
 
@@ -206,7 +206,8 @@ fn each_damage_is_reported() {
                 damage.field, outcome.errors
             ));
         }
-        let row = [&damage.field, what, "-", "0", &format!("not found: {why}")].map(quoted);
+        let reported = format!("not found: {why}");
+        let row = [damage.field.as_str(), what, "-", "0", &reported].map(quoted);
         writeln!(csv, "{}", row.join(",")).expect("a string");
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

@@ -101,7 +101,8 @@ pub fn of_tiles() -> Vec<Damage> {
         }),
         rows("tile", "the last record less", |t| {
             let tile = t.tile();
-            Trace::remove_record(tile, tile.records.len() - 1);
+            let last = tile.records.len() - 1;
+            Trace::remove_record(tile, last);
         }),
         rows("tile", "the first record twice", |t| {
             let tile = t.tile();
@@ -119,7 +120,8 @@ pub fn of_tiles() -> Vec<Damage> {
             let tile = t.tile();
             let count = tile.runs.last().expect("a run").count;
             for _ in 0..count {
-                Trace::remove_record(tile, tile.records.len() - 1);
+                let last = tile.records.len() - 1;
+                Trace::remove_record(tile, last);
             }
         }),
         rows("tile", "nothing in it", |t| *t.tile() = Tile::default()),

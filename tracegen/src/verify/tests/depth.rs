@@ -49,7 +49,7 @@ fn captures_agree_whatever_the_ratio_of_far_to_near() {
                 0,
                 "{planes:?}: {agreement:?}"
             );
-            assert!(agreement.both > 20_000, "{planes:?}: {agreement:?}");
+            assert!(agreement.both > 5_000, "{planes:?}: {agreement:?}");
             // Depths that single precision tells apart decide as in the reference.
             let ties = agreement.of_class(Class::DepthTie);
             assert!(
