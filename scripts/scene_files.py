@@ -91,7 +91,7 @@ def draw(tracegen, file, trace):
     said = done.stderr.splitlines()
     warnings = " | ".join(sorted(set(kinds([line[9:] for line in said if line.startswith("warning: ")], file))))
     if done.returncode == 0:
-        quads, fragments, records = re.search(r": (\d+) quads, (\d+) fragments .*, (\d+) records", done.stderr).groups()
+        quads, fragments, records = re.search(r": (\d+) quads, (\d+) fragments .*, (\d+) records", done.stdout).groups()
         listed = subprocess.run([tracegen, "scenes", str(file)], capture_output=True, text=True, check=True).stdout
         triangles = re.search(r"^triangles +(\d+)", listed, re.M)[1]
         return ["drawn", "", triangles, quads, fragments, records, warnings]

@@ -75,6 +75,13 @@ pub fn refuse(command: &mut Command, expected: &[&str]) -> Output {
     output
 }
 
+/// Everything that a command printed: standard output, then standard error.
+#[must_use]
+pub fn said(output: &Output) -> String {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    text(&output.stdout) + &text(&output.stderr)
+}
+
 /// Names of the encodings in a texture trace.
 ///
 /// # Panics
@@ -118,6 +125,17 @@ pub fn has_lavapipe() -> bool {
         skipped!("lavapipe is absent");
     }
     found
+}
+
+/// Whether Chromium and lavapipe are installed; prints a line on stderr if not.
+#[must_use]
+pub fn has_chromium() -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let found = std::env::split_paths(&path).any(|folder| folder.join("chromium").is_file());
+    if !found {
+        skipped!("Chromium is absent");
+    }
+    found && has_lavapipe()
 }
 
 /// Folder of the real test scenes (`PARALLAX_SCENES`, or `../shared/scenes` beside the checkout). Prints a

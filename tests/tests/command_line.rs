@@ -46,6 +46,39 @@ fn the_page_of_commands_lists_exactly_the_subcommands_of_both_programs() {
 }
 
 #[test]
+fn a_misspelt_subcommand_is_suggested() {
+    for name in PROGRAMS {
+        for subcommand in subcommands(name) {
+            let mut misspelt = subcommand.clone();
+            misspelt.remove(subcommand.len() / 2);
+            let suggested = format!("'{subcommand}'");
+            refuse(program(name).arg(&misspelt), &["similar subcommand", &suggested]);
+        }
+    }
+}
+
+#[test]
+fn the_counts_of_a_capture_are_its_result() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let rays = |output: &str| {
+        let mut command = program("tracegen");
+        command.args(["-q", "rays", "teapot", "--size", "32x32", "-o", output]);
+        run_ok(command.current_dir(folder.path()))
+    };
+    let to_file = rays("a.raytrace");
+    let text = String::from_utf8(to_file.stdout).expect("UTF-8");
+    assert!(text.contains("rays: ") && to_file.stderr.is_empty(), "{text}");
+    assert!(rays("-").stdout.starts_with(b"PLXTRACE"));
+    if parallax_tests::has_lavapipe() {
+        let mut raster = program("tracegen");
+        raster.args(["-q", "raster", "atrium", "--size", "32x32", "-o", "a.textrace"]);
+        let output = run_ok(raster.current_dir(folder.path()));
+        let text = String::from_utf8(output.stdout).expect("UTF-8");
+        assert!(text.contains(" quads, ") && output.stderr.is_empty(), "{text}");
+    }
+}
+
+#[test]
 fn versions_name_the_formats() {
     for name in PROGRAMS {
         let text = String::from_utf8(run_ok(program(name).arg("--version")).stdout).expect("UTF-8");

@@ -3,7 +3,7 @@
 
 use formats::view::{FovTangents, Lens};
 use image_error::{Mask, Picture, PictureError, Reference, pixels_per_degree};
-use parallax_tests::{program, real_scene, run_ok};
+use parallax_tests::{program, real_scene, run_ok, said};
 use std::path::Path;
 
 const SIZE_PX: [u32; 2] = [480, 540];
@@ -46,7 +46,7 @@ fn shoot(folder: &Path, scene: &str, options: &[&str]) -> Shot {
         .arg("--image")
         .arg(&png);
     let output = run_ok(command.args(options));
-    let summary = String::from_utf8_lossy(&output.stderr).into_owned();
+    let summary = said(&output);
     let image = image::open(&png).expect("a picture").to_rgb8();
     assert_eq!([image.width(), image.height()], SIZE_PX);
     let number =

@@ -191,6 +191,79 @@ fn no_output_replaces_an_input_or_another_output() {
     );
 }
 
+/// Command lines whose last word is an output over the input `x` of the same command.
+const OVER_INPUTS: &[(&str, &str)] = &[
+    ("tracegen", "page x.html -o OUT"),
+    ("tracegen", "page x.html -o o --image OUT"),
+    ("tracegen", "page x.html --list --list-page OUT"),
+    ("tracegen", "page x.html --query ?a --rules x.html -o OUT"),
+    ("tracegen", "page https://a.test/ --rules x.html -o OUT"),
+    ("tracegen", "page https://a.test/ --iwer x.html -o OUT"),
+    (
+        "tracegen",
+        "page https://a.test/ --chromium ./x.html -o OUT",
+    ),
+    ("tracegen", "app --apitrace x.html -o OUT"),
+    ("tracegen", "app -o OUT -- ./x.html"),
+    ("tracegen", "app -o OUT -- sh x.html"),
+    ("tracegen", "app -o OUT -- sh --file=x.html"),
+    ("tracegen", "app --rules x.html -o OUT -- sh"),
+    ("tracegen", "raster atrium --path x.html -o OUT"),
+    ("tracegen", "raster x.html -o OUT"),
+    ("tracegen", "rays x.html -o o --image OUT"),
+    ("tracegen", "verify atrium --trace x.html --write-reference OUT"),
+    ("replay", "orders x.html --csv OUT"),
+    ("replay", "orders a.textrace --order-file x.html --html OUT"),
+    (
+        "replay",
+        "orders a.textrace --order-file so/X --search anneal --save-orders so",
+    ),
+    (
+        "replay",
+        "orders a.textrace --order-file so/X --search anneal --save-orders ./so/../so",
+    ),
+    ("replay", "convert x.html --to din -o OUT"),
+    ("replay", "run a.textrace --config x.html --timeline OUT"),
+    ("replay", "run --addresses x.html --parquet OUT"),
+    ("replay", "report a.textrace --image atrium=x.html -o OUT"),
+    ("replay", "dump x.html --parquet OUT"),
+    ("replay", "readings a.textrace --config x.html --html OUT"),
+];
+
+#[test]
+fn inputs_of_every_kind_are_kept_under_all_of_their_names() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = |name: &str| folder.path().join(name);
+    fs::create_dir_all(at("so")).expect("a folder");
+    fs::create_dir_all(at("sub")).expect("a folder");
+    fs::copy(golden("atrium.textrace"), at("a.textrace")).expect("a copy");
+    fs::write(at("x.html"), "kept").expect("a file");
+    fs::write(at("so/X"), "kept").expect("a file");
+    fs::set_permissions(at("x.html"), fs::Permissions::from_mode(0o755)).expect("permissions");
+    fs::hard_link(at("x.html"), at("hard")).expect("a hard link");
+    let absolute = at("x.html");
+    let absolute = absolute.to_str().expect("text");
+    for (name, line) in OVER_INPUTS {
+        for output in ["x.html", "./x.html", "sub/../x.html", "hard", absolute] {
+            let words = line.split(' ').map(|word| word.replace("OUT", output));
+            let mut command = program(name);
+            command.args(words).current_dir(folder.path());
+            let expected = match line.contains("so/X") {
+                true => "a folder without inputs",
+                false => "would replace the input",
+            };
+            refuse(&mut command, &[expected]);
+        }
+    }
+    // A relative input from another folder.
+    let mut command = program("tracegen");
+    command.args(["app", "-o", "../x.html", "--", "../x.html"]);
+    refuse(command.current_dir(at("sub")), &["would replace the input"]);
+    for name in ["x.html", "hard", "so/X"] {
+        assert_eq!(fs::read(at(name)).expect("readable"), b"kept", "{name}");
+    }
+}
+
 #[test]
 fn a_replaced_file_keeps_its_permissions_and_a_new_one_follows_the_umask() {
     let folder = tempfile::tempdir().expect("a temporary folder");

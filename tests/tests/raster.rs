@@ -1,7 +1,7 @@
 //! Tests of `tracegen raster`: counts in its summary, passes of moving scenes, skipped geometry, and
 //! refusals.
 
-use parallax_tests::{program, run_ok};
+use parallax_tests::{program, run_ok, said};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -12,11 +12,11 @@ fn raster(options: &[&str], trace: &Path) -> Command {
     command
 }
 
-/// The command's text on stderr.
+/// Everything that the command says.
 fn summary(options: &[&str]) -> String {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let output = run_ok(&mut raster(options, &folder.path().join("a.textrace")));
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    said(&output)
 }
 
 /// The number before ` draws` in the line that starts with a stage's name.

@@ -464,3 +464,68 @@ fn settings_from_an_endless_device_are_refused() {
     sweep.args(["sweep", endless, "-o"]).arg(folder.path());
     refuse(&mut sweep, &expected);
 }
+
+#[test]
+fn numbers_and_files_of_a_page_are_checked_before_the_browser_starts() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let at = |name: &str| folder.path().join(name);
+    for (name, text) in [
+        ("a.html", "<p>"),
+        ("i.js", "1"),
+        ("empty.js", ""),
+        ("r.toml", "[[rule]]\nshows = 1\n"),
+    ] {
+        fs::write(at(name), text).expect("writable");
+    }
+    for (options, expected) in [
+        ("--iwer i.js --ipd nan", "0 to 1000 mm"),
+        ("--iwer i.js --ipd inf", "0 to 1000 mm"),
+        ("--iwer i.js --ipd -5", "0 to 1000 mm"),
+        ("--iwer i.js --ipd 1e9", "0 to 1000 mm"),
+        ("--iwer i.js --fov nan", "1 to 179 degrees"),
+        ("--iwer i.js --fov 0", "1 to 179 degrees"),
+        ("--iwer i.js --fov 180", "1 to 179 degrees"),
+        ("--iwer i.js --fov -90", "1 to 179 degrees"),
+        ("--iwer i.js --head nan,0,0", "found 'nan'"),
+        ("--iwer i.js --head 0,inf,0", "found 'inf'"),
+        ("--iwer i.js --head 0,0", "expected X,Y,Z"),
+        ("--iwer none.js", "none.js"),
+        ("--iwer empty.js", "expected a script"),
+        ("--iwer .", "expected a regular file"),
+        ("--rules none.toml", "none.toml"),
+        ("--rules r.toml", "r.toml"),
+        ("--rate nan", "0.001 to 1000 Hz"),
+        ("--rate 0", "0.001 to 1000 Hz"),
+        ("--settle nan", "0 to 60 s"),
+        ("--timeout 0", "expected seconds"),
+        ("--timeout 18446744073709551615", "expected seconds"),
+        ("--size 0x64", "each from 1"),
+        ("--chromium ./none", "expected a program"),
+    ] {
+        let mut command = program("tracegen");
+        command
+            .args(["page", "a.html", "-o", "o.textrace"])
+            .args(options.split(' '));
+        let output = refuse(command.current_dir(folder.path()), &[expected]);
+        let text = String::from_utf8_lossy(&output.stderr);
+        assert!(!text.contains("starting"), "{options}: {text}");
+    }
+    for camera in [
+        "--ipd nan",
+        "--ipd inf",
+        "--ipd -1",
+        "--hfov nan",
+        "--hfov 180",
+        "--vfov 0",
+        "--size 0x1",
+        "--cant inf",
+    ] {
+        for name in ["raster", "rays"] {
+            let mut command = program("tracegen");
+            command
+                .args([name, "teapot", "-o", "o"])
+                .args(camera.split(' '));
+            refuse(command.current_dir(folder.path()), &[]);
+        }
+    }
+}

@@ -58,7 +58,8 @@ fn write_pages(command: &Command, folder: &Path) -> std::io::Result<()> {
     let mut roff = Vec::new();
     page.render(&mut roff)?;
     formats::container::AtomicFile::write_whole(&folder.join(page.get_filename()), &roff)?;
-    for subcommand in command.get_subcommands().filter(|s| s.get_name() != "help") {
+    let shown = |s: &&Command| s.get_name() != "help" && !s.is_hide_set();
+    for subcommand in command.get_subcommands().filter(shown) {
         write_pages(subcommand, folder)?;
     }
     Ok(())

@@ -1,5 +1,7 @@
 //! Terminal output: results on stdout, everything else on stderr, with control characters replaced.
 
+use super::outputs::Output;
+use formats::container::is_stdout;
 use formats::text::printable_lines;
 use std::io::{self, BufWriter, IsTerminal, Stdout, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -31,6 +33,19 @@ pub fn print(text: &str) -> anyhow::Result<()> {
         writeln!(out, "{text}")?;
     }
     Ok(out.flush()?)
+}
+
+/// Prints a result beside output files: on stdout, or on stderr as a figure about the run if an output takes
+/// stdout.
+///
+/// # Errors
+/// Errors of writing.
+pub fn print_beside(outputs: &[Output], text: &str) -> anyhow::Result<()> {
+    if outputs.iter().any(|output| is_stdout(output.path())) {
+        note(text);
+        return Ok(());
+    }
+    print(text)
 }
 
 /// Buffered standard output with errors that name it. The caller flushes it.

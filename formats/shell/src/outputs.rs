@@ -1,7 +1,7 @@
 //! Checks a command's outputs before its work, which may take minutes.
 
 use anyhow::{Context, bail, ensure};
-use formats::container::{check_target, is_stdout, kind_of};
+use formats::container::{check_target, declare_input, is_same_file, is_stdout, kind_of};
 use std::fs;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -60,8 +60,8 @@ impl Output {
     }
 }
 
-/// Checks that every output can be written and that none replaces an input or another output. Returns
-/// whether stdout is free for the command's own result.
+/// Declares inputs of the command, and checks that every output can be written and that none replaces an
+/// input or another output. Returns whether stdout is free for the command's own result.
 ///
 /// # Errors
 /// The first output that fails a check.
@@ -69,7 +69,9 @@ pub fn check_outputs<'a>(
     outputs: &[Output],
     inputs: impl IntoIterator<Item = &'a Path>,
 ) -> anyhow::Result<bool> {
-    let inputs: Vec<&Path> = inputs.into_iter().collect();
+    for input in inputs {
+        declare_input(input);
+    }
     for (number, output) in outputs.iter().enumerate() {
         if is_stdout(&output.path) {
             let on_terminal = output.kind == Kind::Binary && io::stdout().is_terminal();
@@ -83,20 +85,11 @@ pub fn check_outputs<'a>(
                 .with_context(|| format!("cannot write {}", output.path.display()))?;
         }
         let earlier = &outputs[..number];
-        if let Some(other) = earlier.iter().find(|o| is_same(&o.path, &output.path)) {
+        if let Some(other) = earlier.iter().find(|o| is_same_file(&o.path, &output.path)) {
             bail!(
                 "{} and {}: the same output twice",
                 other.named(),
                 output.named()
-            );
-        }
-        // Inputs that are not files, such as names of built-in scenes, cannot be overwritten.
-        let mut files = inputs.iter().filter(|input| input.exists());
-        if let Some(input) = files.find(|input| is_same(input, &output.path)) {
-            bail!(
-                "{}: would replace the input {}",
-                output.named(),
-                input.display()
             );
         }
     }
@@ -122,45 +115,6 @@ pub fn check_folder(flag: &str, path: &Path) -> anyhow::Result<()> {
         );
     }
     Ok(())
-}
-
-/// Whether two paths name the same file: by spelling, through links of either kind, or as names that do not
-/// exist yet.
-fn is_same(a: &Path, b: &Path) -> bool {
-    match (is_stdout(a), is_stdout(b)) {
-        (true, true) => true,
-        (false, false) => {
-            let (ids, paths) = ([a, b].map(file_id), [a, b].map(full_path));
-            (ids[0].is_some() && ids[0] == ids[1]) || (paths[0].is_some() && paths[0] == paths[1])
-        }
-        _ => false,
-    }
-}
-
-/// Device and inode.
-fn file_id(path: &Path) -> Option<(u64, u64)> {
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::MetadataExt;
-        let found = fs::metadata(path).ok()?;
-        Some((found.dev(), found.ino()))
-    }
-    #[cfg(not(unix))]
-    {
-        let _ = path;
-        None
-    }
-}
-
-fn full_path(path: &Path) -> Option<PathBuf> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    let name = path.file_name()?;
-    fs::canonicalize(path)
-        .ok()
-        .or_else(|| Some(fs::canonicalize(folder).ok()?.join(name)))
 }
 
 #[cfg(test)]

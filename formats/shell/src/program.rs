@@ -1,7 +1,8 @@
 //! Runs a program from its arguments to its exit code.
 
+use super::files::{FileUses, check};
 use super::{memory, message, signals};
-use clap::{CommandFactory, Parser};
+use clap::{ArgMatches, CommandFactory, Parser};
 use formats::container::VERSIONS;
 use formats::text::printable_lines;
 use std::io::{self, Write};
@@ -33,16 +34,18 @@ pub struct Common {
     quiet: bool,
 }
 
-/// Parses the command line, runs the command and returns its exit code. Errors go to stderr. A closed
-/// output pipe (`... | head`) is not an error.
+/// Parses the command line, checks the files that it names, runs the command and returns its exit code. Errors
+/// go to stderr. A closed output pipe (`... | head`) is not an error.
 pub fn run<C: Parser>(
+    files: &FileUses,
     common: impl FnOnce(&C) -> Common,
     command: impl FnOnce(C) -> anyhow::Result<ExitCode>,
 ) -> ExitCode {
-    let cli = parse::<C>();
+    let (cli, matches) = parse::<C>();
     message::set_quiet(common(&cli).quiet);
     let outcome = memory::explain_aborts()
         .and_then(|()| signals::discard_unfinished_on_exit())
+        .and_then(|()| check(files, &matches))
         .and_then(|()| command(cli));
     match outcome {
         Ok(code) => code,
@@ -92,10 +95,10 @@ fn shortened(text: &str) -> String {
     lines.join("\n")
 }
 
-fn parse<C: Parser>() -> C {
+fn parse<C: Parser>() -> (C, ArgMatches) {
     let parsed = command::<C>()
         .try_get_matches()
-        .and_then(|matches| C::from_arg_matches(&matches));
+        .and_then(|matches| Ok((C::from_arg_matches(&matches)?, matches)));
     parsed.unwrap_or_else(|error| {
         let arguments: Vec<String> = (std::env::args_os())
             .map(|a| a.to_string_lossy().into_owned())

@@ -1,11 +1,22 @@
 //! Removes unfinished files and ends children when a signal ends the program.
 
 use anyhow::Context;
-use signal_hook::consts::{SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGXFSZ};
+use signal_hook::consts::{
+    SIGALRM, SIGHUP, SIGINT, SIGIO, SIGPROF, SIGQUIT, SIGSYS, SIGTERM, SIGTRAP, SIGUSR1, SIGUSR2,
+    SIGVTALRM, SIGXCPU, SIGXFSZ,
+};
 use signal_hook::iterator::Signals;
-use signal_hook::low_level::emulate_default_handler;
+use signal_hook::low_level::{emulate_default_handler, exit};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
+
+/// Signals that end a process which does not handle them, without those of faults in its own code.
+const ENDING: [i32; 13] = [
+    SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU,
+    SIGIO, SIGSYS, SIGTRAP,
+];
+/// SIGSTKFLT, SIGPWR and the signals of real time, which end a process on Linux as well.
+const ENDING_ON_LINUX: [std::ops::RangeInclusive<i32>; 3] = [16..=16, 30..=30, 34..=64];
 
 /// Starts a thread that removes unfinished outputs when a signal asks the process to end. It then ends the
 /// process as the signal would have: shells report 130 (SIGINT), 131 (SIGQUIT), 143 (SIGTERM) or 129
@@ -19,19 +30,21 @@ pub(crate) fn discard_unfinished_on_exit() -> anyhow::Result<()> {
     // With any handler installed, a write that is too large fails with EFBIG.
     signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false)))
         .context("cannot handle signals")?;
-    let wanted = [SIGINT, SIGQUIT, SIGTERM, SIGHUP];
-    let wanted = wanted
-        .iter()
-        .filter(|signal| ignored >> (*signal - 1) & 1 == 0);
+    let on_linux = ENDING_ON_LINUX.into_iter().flatten();
+    let more = on_linux.filter(|_| cfg!(target_os = "linux"));
+    let wanted = ENDING.into_iter().chain(more);
+    let wanted = wanted.filter(|signal| ignored >> (*signal - 1) & 1 == 0);
     let mut signals = Signals::new(wanted).context("cannot handle signals")?;
     std::thread::Builder::new()
         .name("signals".to_owned())
         .spawn(move || {
             for signal in signals.forever() {
                 super::children::end_with(signal);
+                super::supervise::end_descendants();
                 formats::container::discard_unfinished();
-                // Does not return for these four signals.
-                let _impossible = emulate_default_handler(signal);
+                // Does not return, except for signals that it does not know.
+                let _unknown = emulate_default_handler(signal);
+                exit(128 + signal);
             }
         })
         .context("cannot handle signals")?;

@@ -1,5 +1,6 @@
 //! Output files that appear under their name completely or not at all.
 
+use super::inputs::replaced_input;
 use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata};
 use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
@@ -127,8 +128,8 @@ impl Seek for AtomicFile {
 /// Checks whether an [`AtomicFile`] could be written to `target`, without leaving anything there.
 ///
 /// # Errors
-/// `target` is not a regular file (a folder, a device, a pipe, a symbolic link, ...), is not writable, or
-/// is in a folder that does not exist or is not writable.
+/// `target` is not a regular file (a folder, a device, a pipe, a symbolic link, ...), is not writable, is a
+/// declared input, or is in a folder that does not exist or is not writable.
 pub fn check_target(target: &Path) -> io::Result<()> {
     if !is_stdout(target) {
         check_name(target)?;
@@ -167,6 +168,10 @@ fn check_name(target: &Path) -> io::Result<Option<Metadata>> {
     }
     if found.permissions().readonly() {
         return refuse("a file that may be written", "a read-only one".to_owned());
+    }
+    if let Some(input) = replaced_input(target) {
+        let message = format!("it would replace the input {}", input.display());
+        return Err(io::Error::new(ErrorKind::InvalidInput, message));
     }
     // Replacing a file needs write access only to its folder, but a read-only file should stay.
     fs::OpenOptions::new().write(true).open(target)?;

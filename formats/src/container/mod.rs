@@ -6,6 +6,7 @@
 
 mod atomic;
 mod header;
+mod inputs;
 mod reader;
 mod regular;
 mod scratch;
@@ -16,6 +17,7 @@ pub use atomic::{
     AtomicFile, check_target, discard_unfinished, is_stdout, kind_of, remove_abandoned,
 };
 pub use header::{DIRECTORY_ENTRY_BYTES, HEADER_BYTES};
+pub use inputs::{declare_input, input_in, is_same_file, replaced_input};
 pub use reader::Container;
 pub use regular::{check_regular, checksum, open_regular, read_regular};
 pub use scratch::ScratchFolder;

@@ -9,6 +9,7 @@ pub mod convert;
 pub mod diff;
 pub mod dump;
 mod experiment_args;
+mod file_uses;
 pub mod info;
 mod locality;
 mod order_arg;
@@ -116,6 +117,7 @@ fn without(refused: &'static [&'static str]) -> impl Fn(Arg) -> Arg {
 #[must_use]
 pub fn main() -> ExitCode {
     shell::run(
+        file_uses::FILES,
         |cli: &Cli| cli.common,
         |cli| match cli.command {
             Command::Run(args) => run::run(&args),
@@ -149,5 +151,11 @@ mod tests {
     #[test]
     fn the_command_line_is_well_formed() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn no_output_of_a_command_replaces_an_input_of_it() {
+        let pairs = shell::check_file_table(&Cli::command(), file_uses::FILES).unwrap();
+        assert!(pairs > 20, "{pairs} pairs of an input and an output");
     }
 }

@@ -4,7 +4,7 @@ use crate::loader;
 use formats::container::ScratchFolder;
 use parallax_layer::control::Control;
 use parallax_layer::spool::Settings;
-use std::fs;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use thiserror::Error;
@@ -40,6 +40,9 @@ pub enum LaunchError {
 
 /// File name of the layer's library.
 const LIBRARY: &str = "libparallax_layer.so";
+/// File that is locked while a capture runs.
+const LOCK: &str = "lock";
+
 /// Folders in which drivers register with the loader.
 const DRIVER_FOLDERS: [&str; 3] = [
     "/usr/share/vulkan/icd.d",
@@ -55,10 +58,13 @@ pub struct Launch {
     pub control: Control,
     library: PathBuf,
     driver: Option<PathBuf>,
+    /// Locked while this process runs; see [`remove_abandoned`].
+    _locked: File,
 }
 
 impl Launch {
-    /// Prepares a capture inside `parent` for programs on lavapipe. `tool` is the path of this program.
+    /// Prepares a capture inside `parent` for programs on lavapipe. `tool` is the path of this program. Removes
+    /// the folders of killed captures.
     ///
     /// # Errors
     /// The layer or the driver is missing, or the folder cannot be written.
@@ -68,14 +74,16 @@ impl Launch {
             Some(_) => None,
             None => Some(lavapipe().ok_or(LaunchError::NoDriver)?),
         };
+        remove_abandoned(parent);
         let set_up = || {
             let folder = loader::folder_in(parent)?;
             settings.save(folder.path())?;
             let control = Control::create(folder.path())?;
+            let locked = lock(folder.path())?;
             loader::register(folder.path(), &library)?;
-            Ok((folder, control))
+            Ok((folder, control, locked))
         };
-        let (folder, control) = set_up().map_err(|source| LaunchError::Folder {
+        let (folder, control, locked) = set_up().map_err(|source| LaunchError::Folder {
             folder: parent.display().to_string(),
             source,
         })?;
@@ -84,6 +92,7 @@ impl Launch {
             control,
             library,
             driver,
+            _locked: locked,
         })
     }
 
@@ -116,6 +125,28 @@ impl Launch {
                 .env("MESA_LOADER_DRIVER_OVERRIDE", "zink")
                 // Otherwise zink finds no device.
                 .env("LIBGL_ALWAYS_SOFTWARE", "1");
+        }
+    }
+}
+
+/// Locks the folder of a capture. Only a running process holds the lock.
+fn lock(folder: &Path) -> std::io::Result<File> {
+    let file = File::create(folder.join(LOCK))?;
+    file.try_lock()?;
+    Ok(file)
+}
+
+/// Removes the folders of captures that were killed together with their supervisor.
+fn remove_abandoned(parent: &Path) {
+    for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
+        let folder = entry.path();
+        // The manifest is written under the lock, so a folder that has one and no lock is abandoned.
+        if ScratchFolder::has_name_of(&folder)
+            && folder.join(loader::MANIFEST).is_file()
+            && lock(&folder).is_ok()
+        {
+            // A folder that cannot be removed does not disturb this capture.
+            let _left = fs::remove_dir_all(folder);
         }
     }
 }
@@ -153,6 +184,20 @@ fn lavapipe() -> Option<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_of_a_killed_capture_is_removed_and_one_of_a_running_capture_stays() {
+        let parent = tempfile::tempdir().unwrap();
+        let [killed, running, other] =
+            [".scratch-a", ".scratch-b", "other"].map(|name| parent.path().join(name));
+        for folder in [&killed, &running, &other] {
+            fs::create_dir(folder).unwrap();
+            fs::write(folder.join(MANIFEST), b"").unwrap();
+        }
+        let _locked = lock(&running).unwrap();
+        remove_abandoned(parent.path());
+        assert!(!killed.exists() && running.exists() && other.exists());
+    }
 
     #[test]
     fn the_library_is_found_next_to_the_tool_or_in_deps() {

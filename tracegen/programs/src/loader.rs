@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// File that registers the layer with the loader.
-const MANIFEST: &str = "parallax_layer.json";
+pub(super) const MANIFEST: &str = "parallax_layer.json";
 /// Link to the layer's library beside the manifest, whose name every manifest can contain.
 const LINK: &str = "libparallax_layer.so";
 /// Character that separates the entries of the loader's lists of paths.

@@ -1,14 +1,15 @@
 //! `tracegen app`.
 
 use super::choice::choice;
-use super::failed_run::{FailedRun, Tail, file_of};
+use super::failed_run::{Ended, FailedRun, Tail};
 use super::program_args::{ProgramArgs, note_frame_times};
+use super::values::parse_timeout;
 use anyhow::{Context, anyhow, bail, ensure};
 use clap::Args;
 use clap::builder::TypedValueParser;
 use parallax_layer::spool::FramesBy;
 use programs::{Launch, Session, SessionError, Watch};
-use shell::{run_child_until, warn};
+use shell::{Program, find_program, warn};
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
 use std::fs::File;
@@ -35,8 +36,8 @@ pub struct AppArgs {
     #[arg(long)]
     to_end: bool,
     /// Timeout in seconds; a program that has not rendered the frames by then is terminated.
-    #[arg(long, value_name = "SECONDS", default_value_t = 600)]
-    timeout: u64,
+    #[arg(long, value_name = "SECONDS", default_value = "600", value_parser = parse_timeout)]
+    timeout: Duration,
     /// The program and its arguments.
     #[arg(
         last = true,
@@ -71,12 +72,14 @@ fn frames_by_parser() -> impl TypedValueParser<Value = FramesBy> {
 /// # Errors
 /// Wrong use, a program that cannot be captured, and outputs that cannot be written.
 pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
-    args.capture.check_outputs(None)?;
+    let eyes = args.capture.check(None)?;
+    args.check_program()?;
     let settings = args.capture.settings(args.frames_by)?;
     let tool = std::env::current_exe().context("cannot find this program's own file")?;
     let launch = Launch::new(&std::env::temp_dir(), &tool, &settings)?;
     let program = args.name()?;
-    let run = run_program(args, &launch, &program)?;
+    // The supervisor watches over the capture's folder until the end.
+    let (_program, run) = run_program(args, &launch, &program)?;
     let mut session = Session::of_capture(launch.folder(), &program)
         .map_err(|error| with_replay_error(error, &run, &launch))?;
     let milliseconds = |us: u64| us as f64 / 1e3;
@@ -100,7 +103,7 @@ pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
         .collect();
     note_frame_times(&before, &captured);
     args.capture
-        .finish(&mut session, program, &settings, BTreeMap::new())
+        .finish(&mut session, program, &settings, &eyes, BTreeMap::new())
 }
 
 /// Program of apitrace that replays files.
@@ -133,63 +136,86 @@ impl AppArgs {
         Ok(name.to_string_lossy().into_owned())
     }
 
-    /// The command that renders the frames.
-    fn command(&self) -> Command {
-        if let Some(file) = &self.apitrace {
-            let mut command = Command::new(REPLAYER);
-            command.arg(file).stdout(Stdio::null());
-            return command;
+    /// The program that renders the frames, and its arguments.
+    fn command(&self) -> (&OsStr, Vec<&OsStr>) {
+        match &self.apitrace {
+            Some(file) => (OsStr::new(REPLAYER), vec![file.as_os_str()]),
+            None => {
+                let (first, rest) = self.program.split_first().unzip();
+                let rest = rest.unwrap_or_default().iter();
+                let first = first.map_or(OsStr::new(""), OsString::as_os_str);
+                (first, rest.map(OsString::as_os_str).collect())
+            }
         }
-        let (first, rest) = self.program.split_first().unzip();
-        let mut command = Command::new(first.map_or(OsStr::new(""), OsString::as_os_str));
-        command.args(rest.unwrap_or_default());
-        command
+    }
+
+    /// Refuses a program that does not exist.
+    fn check_program(&self) -> anyhow::Result<()> {
+        let (name, _) = self.command();
+        ensure!(
+            find_program(name).is_some(),
+            "cannot run {}{}: expected a program, found no such file",
+            name.display(),
+            match self.apitrace {
+                Some(_) => ", which the package apitrace has",
+                None => "",
+            }
+        );
+        Ok(())
     }
 }
 
+/// Interval between two looks at the program's frames.
+const FRAME_INTERVAL: Duration = Duration::from_millis(20);
+
 /// Runs the program until it has rendered its frames or ends.
-fn run_program(args: &AppArgs, launch: &Launch, program: &str) -> anyhow::Result<FailedRun> {
-    let mut command = args.command();
-    launch.prepare(&mut command, args.gl || args.apitrace.is_some());
+fn run_program(args: &AppArgs, launch: &Launch, name: &str) -> anyhow::Result<(Program, FailedRun)> {
+    let opengl = args.gl || args.apitrace.is_some();
+    // A replay that is terminated prints its call stack.
+    let log = args
+        .apitrace
+        .as_ref()
+        .map(|_| File::create(launch.folder().join(REPLAY_LOG)));
+    let log = log
+        .transpose()
+        .context("cannot write the log of the replay")?;
     let mut tail = None;
-    if args.apitrace.is_some() {
-        // A replay that is terminated prints its call stack.
-        let log = File::create(launch.folder().join(REPLAY_LOG));
-        command.stderr(log.context("cannot write the log of the replay")?);
-    } else {
-        tail = Some(Tail::of(&mut command).context("cannot make a pipe")?);
-    }
+    let (program, arguments) = args.command();
+    let started = Program::start(launch.folder(), program, |command: &mut Command| {
+        command.args(arguments);
+        launch.prepare(command, opengl);
+        match log {
+            Some(log) => drop(command.stdout(Stdio::null()).stderr(log)),
+            None => tail = Some(Tail::of(command)),
+        }
+    });
+    let mut running = started.with_context(|| format!("cannot run {}", program.display()))?;
+    let tail = tail.transpose().context("cannot make a pipe")?;
     let mut watch = Watch::default();
     let wanted = args.capture.frames.len() as u32;
-    let deadline = Instant::now() + Duration::from_secs(args.timeout);
-    let mut late = false;
-    let ended = run_child_until(&mut command, || {
+    let start = Instant::now();
+    let (status, stopped) = loop {
         watch.look();
-        late = Instant::now() >= deadline;
-        late || (!args.to_end && launch.control.ended() >= wanted)
-    });
-    let ended = ended.with_context(|| {
-        let name = command.get_program().to_string_lossy().into_owned();
-        match args.apitrace {
-            Some(_) => format!("cannot run {name}, which the package apitrace has"),
-            None => format!("cannot run {name}"),
+        if let Some(status) = running.wait(FRAME_INTERVAL)? {
+            break (status, false);
         }
-    })?;
-    if late {
-        warn(&format!(
-            "{program} was ended after {} seconds",
-            args.timeout
-        ));
-    }
-    let file = file_of(Path::new(command.get_program()));
-    drop(command);
-    Ok(FailedRun {
-        ended,
+        let late = start.elapsed() >= args.timeout;
+        if late || (!args.to_end && launch.control.ended() >= wanted) {
+            if late {
+                let seconds = args.timeout.as_secs_f64();
+                warn(&format!("{name} was ended after {seconds} seconds"));
+            }
+            break (running.end()?, true);
+        }
+    };
+    let run = FailedRun {
+        ended: Ended { status, stopped },
         watch,
         lines: tail.map(|tail| tail.lines()).unwrap_or_default(),
-        file,
-        opengl: args.gl || args.apitrace.is_some(),
-    })
+        file: find_program(program).unwrap_or_default(),
+        opengl,
+    };
+    Ok((running, run))
 }
 
 /// Adds what is known about the run, and the first error of the replay of a file.

@@ -2,13 +2,12 @@
 
 use anyhow::anyhow;
 use programs::{SessionError, Watch};
-use shell::Ended;
 use std::fmt::Write as _;
 use std::io::{self, Read, Write as _};
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, ExitStatus};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -72,6 +71,14 @@ fn last_lines(text: &[u8]) -> Vec<String> {
         .collect();
     lines.reverse();
     lines
+}
+
+/// How a program ended.
+pub struct Ended {
+    /// Exit code or signal.
+    pub status: ExitStatus,
+    /// Whether it was asked to.
+    pub stopped: bool,
 }
 
 /// The run of a program.
@@ -159,18 +166,6 @@ fn refuses_layers(file: &Path) -> Option<&'static str> {
     let mut open = std::fs::File::open(file).ok()?;
     open.read_exact(&mut head).ok()?;
     (head == HEAD).then_some("a program of 32 bits cannot load the layer, which has 64")
-}
-
-/// The file of a command, found like the system finds it.
-pub fn file_of(program: &Path) -> PathBuf {
-    if program.components().count() > 1 {
-        return program.to_owned();
-    }
-    let path = std::env::var_os("PATH").unwrap_or_default();
-    let mut places = std::env::split_paths(&path).map(|folder| folder.join(program));
-    places
-        .find(|place| place.is_file())
-        .unwrap_or(program.to_owned())
 }
 
 fn how_it_ended(ended: &Ended) -> String {

@@ -5,6 +5,7 @@ mod cache_args;
 mod capture_steps;
 mod choice;
 mod failed_run;
+mod file_uses;
 pub mod lens_args;
 mod light_args;
 mod objective_args;
@@ -31,7 +32,7 @@ pub mod verified_trace;
 mod verify;
 
 use clap::{Parser, Subcommand};
-use shell::{Common, Documents};
+use shell::{Common, Documents, SuperviseArgs};
 use std::process::ExitCode;
 
 const EXAMPLES: &str = "\
@@ -65,6 +66,7 @@ enum Command {
     /// Capture the texture samples of an unmodified Vulkan or OpenGL program into a .textrace file.
     App(Box<app::AppArgs>),
     /// Capture the texture samples of a page of WebGL or WebXR in Chromium into a .textrace file.
+    #[command(mut_arg("output", page::without_a_trace))]
     Page(Box<page::PageArgs>),
     /// Measure stereo rendering techniques along a path: times, pictures and traces into a folder.
     Techniques(Box<techniques::TechniquesArgs>),
@@ -80,6 +82,9 @@ enum Command {
     /// Measure the cost and the errors of rays in single and in double precision, near the origin and far
     /// from it.
     Precision(precision::PrecisionArgs),
+    /// Run a program for `app` or `page`.
+    #[command(hide = true)]
+    Supervise(SuperviseArgs),
     #[command(flatten)]
     Documents(Documents),
 }
@@ -88,6 +93,7 @@ enum Command {
 #[must_use]
 pub fn main() -> ExitCode {
     shell::run(
+        file_uses::FILES,
         |cli: &Cli| cli.common,
         |cli| {
             match cli.command {
@@ -101,6 +107,7 @@ pub fn main() -> ExitCode {
                 Command::Rays(args) => rays::run(&args)?,
                 Command::Stress(args) => return stress::run(&args),
                 Command::Precision(args) => precision::run(&args)?,
+                Command::Supervise(args) => return args.run(),
                 Command::Documents(documents) => return documents.run::<Cli>(),
             }
             Ok(ExitCode::SUCCESS)
@@ -121,5 +128,11 @@ mod tests {
     #[test]
     fn the_command_line_is_well_formed() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn no_output_of_a_command_replaces_an_input_of_it() {
+        let pairs = shell::check_file_table(&Cli::command(), file_uses::FILES).unwrap();
+        assert!(pairs > 20, "{pairs} pairs of an input and an output");
     }
 }

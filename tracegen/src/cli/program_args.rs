@@ -15,7 +15,7 @@ use shell::{Output, check_outputs, lasting_arguments, note, warn};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Options of a program's capture.
@@ -123,15 +123,26 @@ fn median(times_ms: &[f64]) -> String {
 }
 
 impl ProgramArgs {
-    /// Refuses outputs that cannot be written.
+    /// Refuses outputs that cannot be written, and reads the rules of the eyes.
     ///
     /// # Errors
-    /// An output that cannot be written.
-    pub fn check_outputs(&self, more: Option<Output>) -> anyhow::Result<()> {
+    /// An output that cannot be written, or rules that cannot be read.
+    pub fn check(&self, more: Option<Output>) -> anyhow::Result<Wanted> {
         let trace = (self.output.as_deref()).map(|path| Output::binary("-o", path));
         let list = (self.list_page.as_deref()).map(|path| Output::text("--list-page", path));
         let outputs: Vec<Output> = trace.into_iter().chain(list).chain(more).collect();
-        check_outputs(&outputs, []).map(drop)
+        check_outputs(&outputs, [])?;
+        Ok(match (&self.rules, self.eyes) {
+            (Some(path), _) => Wanted::File(RuleFile::load(path)?),
+            (None, Some(eyes)) => Wanted::Rule(eyes),
+            (None, None) => Wanted::First,
+        })
+    }
+
+    /// The trace to write, if one is.
+    #[must_use]
+    pub fn output(&self) -> Option<&Path> {
+        self.output.as_deref()
     }
 
     /// Settings of the layer.
@@ -165,20 +176,20 @@ impl ProgramArgs {
         session: &mut Session,
         program: String,
         settings: &Settings,
+        eyes: &Wanted,
         cameras: BTreeMap<u32, [EyeView; 2]>,
     ) -> anyhow::Result<ExitCode> {
         for trouble in &session.troubles {
             warn(trouble);
         }
         let frames: Vec<u32> = self.frames.clone().collect();
-        let eyes = self.wanted()?;
         let Some(output) = &self.output else {
-            self.write_list(session, &program, &eyes)?;
+            self.write_list(session, &program, eyes)?;
             return Ok(ExitCode::SUCCESS);
         };
         let job = Job {
             frames: &frames,
-            eyes: &eyes,
+            eyes,
             frames_by: settings.frames_by,
             cameras,
             program,
@@ -200,15 +211,6 @@ impl ProgramArgs {
 }
 
 impl ProgramArgs {
-    /// How the eyes are identified.
-    fn wanted(&self) -> anyhow::Result<Wanted> {
-        Ok(match (&self.rules, self.eyes) {
-            (Some(path), _) => Wanted::File(RuleFile::load(path)?),
-            (None, Some(eyes)) => Wanted::Rule(eyes),
-            (None, None) => Wanted::First,
-        })
-    }
-
     /// Prints the frames' passes and writes their page.
     fn write_list(
         &self,

@@ -113,7 +113,9 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
     }
     note(&texels);
     let views = [frames.len(), args.views.len()];
-    summary.print(views, size_px, file_bytes, &backend.work());
+    let result = summary.result(views, size_px, file_bytes);
+    shell::print_beside(outputs, &result)?;
+    summary.print(frames.len(), &backend.work());
     Ok(())
 }
 

@@ -106,14 +106,8 @@ impl Summary {
         Ok(frame)
     }
 
-    pub fn print(
-        &self,
-        [frames, views]: [usize; 2],
-        size_px: [u32; 2],
-        file_bytes: u64,
-        work: &Work,
-    ) {
-        self.print_counts([frames, views], size_px, file_bytes);
+    /// Prints figures about the run.
+    pub fn print(&self, frames: usize, work: &Work) {
         self.print_work(frames, work);
         self.print_times();
         if let Some(bytes) = memory::peak_bytes() {
@@ -125,7 +119,12 @@ impl Summary {
     }
 
     /// What was recorded, and the size of the trace.
-    fn print_counts(&self, [frames, views]: [usize; 2], size_px: [u32; 2], file_bytes: u64) {
+    pub fn result(
+        &self,
+        [frames, views]: [usize; 2],
+        size_px: [u32; 2],
+        file_bytes: u64,
+    ) -> String {
         let CaptureCounts {
             quads,
             fragments,
@@ -137,25 +136,25 @@ impl Summary {
         } = self.counts;
         let per = |bytes: u64, n: u64| bytes as f64 / n.max(1) as f64;
         let pixels = (views * frames) as f64 * f64::from(size_px[0]) * f64::from(size_px[1]);
-        note(&format!(
+        let mut lines = vec![format!(
             "{frames} frame(s), {views} x {}x{}: {quads} quads, {fragments} fragments ({:.2} a pixel), {records} records",
             size_px[0],
             size_px[1],
             fragments as f64 / pixels
-        ));
+        )];
         let mean = |share: fn(&Predicted) -> Option<f32>| {
             let shares: Option<Vec<f32>> = self.predicted.iter().map(share).collect();
             shares.map(|shares| shares.iter().sum::<f32>() / shares.len().max(1) as f32)
         };
         if let (Some(rate), Some(shaded)) = (mean(|p| p.rate_share), mean(|p| p.shaded_share)) {
-            note(&format!(
+            lines.push(format!(
                 "{:.2} % of the pixels are open to be shaded: {:.2} % by their rates, the rest for reconstruction",
                 shaded * 100.0,
                 rate * 100.0
             ));
         }
         if masked_lanes_killed > 0 {
-            note(&format!(
+            lines.push(format!(
                 "{masked_lanes_killed} fragments of alpha-masked draws lie behind earlier ones of their draw"
             ));
         }
@@ -164,12 +163,13 @@ impl Summary {
                 "{not_finite} records with texture coordinates that are not finite were left out"
             ));
         }
-        note(&format!(
+        lines.push(format!(
             "file {file_bytes} bytes; tiles {:.2} bytes a quad, {:.2} a record ({} raw)",
             per(tile_bytes, quads),
             per(tile_bytes, records),
             record::RECORD_BYTES
         ));
+        lines.join("\n")
     }
 
     /// What was drawn and skipped.

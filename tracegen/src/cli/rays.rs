@@ -162,7 +162,8 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     if frame.stats.hits == 0 {
         super::scene_args::warn_of_nothing_seen(&camera, bounds, world);
     }
-    report(&tables, &frame, file_bytes, [loaded, prepared, traced]);
+    shell::print_beside(&outputs, &result(&tables, &frame))?;
+    note_times(&frame, file_bytes, [loaded, prepared, traced]);
     Ok(())
 }
 
@@ -263,10 +264,9 @@ fn image_file(frame: &RayFrame, path: &Path) -> anyhow::Result<AtomicFile> {
     Ok(file)
 }
 
-/// Prints figures that vary from run to run on stderr.
-fn report(tables: &RaytraceTables, frame: &RayFrame, bytes: u64, at: [Duration; 3]) {
+/// The hierarchy and the numbers of rays, steps and tests.
+fn result(tables: &RaytraceTables, frame: &RayFrame) -> String {
     let (bvh, stats) = (&tables.bvh, &frame.stats);
-    let [loaded, prepared, traced] = at.map(|t| t.as_secs_f64());
     let rays = stats.total_rays();
     let kinds: Vec<_> = RayKind::ALL
         .map(|kind| (kind, stats.rays_of(kind)))
@@ -275,22 +275,30 @@ fn report(tables: &RaytraceTables, frame: &RayFrame, bytes: u64, at: [Duration; 
         .map(|(kind, rays)| format!("{rays} {kind}"))
         .collect();
     let per_ray = |n: u64| n as f64 / rays.max(1) as f64;
-    note(&format!(
-        "hierarchy: {}, {} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}",
-        bvh.builder, bvh.triangles, bvh.nodes, bvh.leaves, bvh.depth, bvh.sah_cost
-    ));
-    note(&format!(
-        "rays: {rays} ({}), {:.1} steps and {:.1} triangle tests a ray",
+    format!(
+        "hierarchy: {}, {} triangles, {} nodes, {} leaves, depth {}, SAH cost {:.2}\n\
+         rays: {rays} ({}), {:.1} steps and {:.1} triangle tests a ray",
+        bvh.builder,
+        bvh.triangles,
+        bvh.nodes,
+        bvh.leaves,
+        bvh.depth,
+        bvh.sah_cost,
         kinds.join(", "),
         per_ray(stats.steps),
         per_ray(stats.triangle_tests),
-    ));
+    )
+}
+
+/// Prints figures that vary from run to run.
+fn note_times(frame: &RayFrame, bytes: u64, at: [Duration; 3]) {
+    let [loaded, prepared, traced] = at.map(|t| t.as_secs_f64());
     let tracing = traced - prepared;
     note(&format!(
         "time: load {loaded:.2} s, build {:.2} s, trace and write {tracing:.2} s \
          ({:.2} Mray/s); {:.1} MB",
         prepared - loaded,
-        rays as f64 / tracing.max(1e-9) / 1e6,
+        frame.stats.total_rays() as f64 / tracing.max(1e-9) / 1e6,
         bytes as f64 / 1e6,
     ));
 }

@@ -274,6 +274,8 @@ fn capture_all(args: &SweepArgs, planned: &[Planned]) -> anyhow::Result<()> {
             process.args(["--threads", &threads.to_string()]);
         }
         process.current_dir(folder).stdin(Stdio::null());
+        // The result of each capture is in its trace.
+        process.stdout(Stdio::null());
         let status = shell::run_child(&mut process);
         if status.context("the program itself")?.success() {
             let text = p.capture.recipe_text(content_checksum(&p.trace)?);

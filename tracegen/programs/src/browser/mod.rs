@@ -1,19 +1,25 @@
 //! Opens a web page in Chromium and draws it frame by frame through ANGLE on Vulkan.
 
+mod loading;
 mod protocol;
 mod serve;
+mod watch;
 
 pub use protocol::BrowserError;
 
 use formats::view::EyeView;
-use protocol::{Browser, Event};
+use loading::{Loading, State};
+use protocol::Browser;
 use serde::Deserialize;
 use serde_json::{Value, json};
-use std::collections::HashSet;
+use shell::Program;
+use std::collections::BTreeMap;
 use std::ffi::OsString;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
+use watch::Watch;
 
 /// A page and its settings.
 #[derive(Clone, Debug)]
@@ -30,8 +36,10 @@ pub struct Page {
     pub seed: u32,
     /// Milliseconds from frame to frame.
     pub frame_ms: f64,
-    /// Seconds without a request after which a page counts as loaded.
-    pub settle_s: f64,
+    /// Time without a request after which a page counts as loaded.
+    pub settle: Duration,
+    /// Time for loading and drawing all frames.
+    pub timeout: Duration,
     /// Emulated WebXR headset, if any.
     pub headset: Option<Headset>,
 }
@@ -39,8 +47,8 @@ pub struct Page {
 /// An emulated WebXR headset.
 #[derive(Clone, Debug)]
 pub struct Headset {
-    /// Script of the emulator.
-    pub emulator: PathBuf,
+    /// Text of the emulator's script.
+    pub emulator: String,
     /// Distance between the eyes in metres.
     pub ipd_m: f64,
     /// Vertical field of view in radians.
@@ -58,6 +66,8 @@ pub struct Stepped {
     pub took_ms: f64,
     /// Errors of the page's scripts.
     pub errors: Vec<String>,
+    /// Number of contexts of WebGL that the browser took from the page.
+    pub lost: u32,
     /// Eyes that a WebXR session drew.
     pub views: Vec<StepView>,
     /// The canvas as a PNG, if requested.
@@ -128,49 +138,110 @@ const ARGUMENTS: [&str; 15] = [
 /// An open page.
 pub struct Tab {
     browser: Browser,
-    root: Option<PathBuf>,
+    watch: Watch,
     frame_ms: f64,
-    /// Failed requests of the page.
-    pub missing: Vec<String>,
 }
 
+/// The contexts that a page made.
+#[derive(Clone, Debug, Default, Deserialize)]
+pub struct Contexts {
+    /// Names of the renderers of the contexts of WebGL.
+    pub renderers: Vec<String>,
+    /// Calls for a context of WebGL that were refused.
+    pub refused: u32,
+    /// Canvases that were handed to workers.
+    pub handed_over: u32,
+    /// Workers that were started.
+    pub workers: u32,
+    /// Contexts of WebGPU.
+    pub webgpu: u32,
+}
+
+impl Contexts {
+    /// Why a page has no context of WebGL, if it has none.
+    #[must_use]
+    pub fn why_none(&self) -> Option<String> {
+        let Self {
+            refused,
+            handed_over,
+            workers,
+            webgpu,
+            ..
+        } = self;
+        if !self.renderers.is_empty() {
+            return None;
+        }
+        let none = "the page has no context of WebGL";
+        Some(if *handed_over > 0 {
+            format!(
+                "{none} of its own: {handed_over} canvases are drawn by workers, whose frames are not controlled"
+            )
+        } else if *webgpu > 0 {
+            format!("{none}: it uses WebGPU, which is not captured")
+        } else if *refused > 0 {
+            format!("{none}: the browser refused it {refused} times")
+        } else if *workers > 0 {
+            format!(
+                "{none} of its own; it started {workers} workers, whose frames are not controlled"
+            )
+        } else {
+            none.to_owned()
+        })
+    }
+}
+
+/// Files that a browser would write into the user's home, and temporary files.
+const HOMES: [&str; 5] = [
+    "HOME",
+    "XDG_CONFIG_HOME",
+    "XDG_CACHE_HOME",
+    "XDG_DATA_HOME",
+    "TMPDIR",
+];
+
 impl Tab {
-    /// Starts a browser, opens a page and waits until it has loaded.
+    /// Starts a browser and opens an empty page for `page`. The browser's files are in `folder`, the folder of
+    /// the capture.
     ///
     /// # Errors
-    /// The browser cannot be started, or the page cannot be loaded.
+    /// The browser cannot be started.
     pub fn open(
         program: &Path,
-        profile: &Path,
+        folder: &Path,
         page: &Page,
         prepare: impl FnOnce(&mut Command),
     ) -> Result<Self, BrowserError> {
         let [width, height] = page.size_px;
         let mut arguments: Vec<OsString> = ARGUMENTS.iter().map(OsString::from).collect();
         arguments.push(format!("--window-size={width},{height}").into());
-        let mut folder = OsString::from("--user-data-dir=");
-        folder.push(profile);
-        arguments.push(folder);
+        let mut profile = OsString::from("--user-data-dir=");
+        profile.push(folder.join("profile"));
+        arguments.push(profile);
         let mut tab = Self {
-            browser: Browser::start(program, &arguments, prepare)?,
-            root: page.root.clone(),
+            browser: Browser::start(program, folder, &arguments, page.timeout, |command| {
+                command.envs(HOMES.map(|home| (home, folder)));
+                prepare(command);
+            })?,
+            watch: Watch {
+                root: page.root.clone(),
+                ..Watch::default()
+            },
             frame_ms: page.frame_ms,
-            missing: Vec::new(),
         };
         tab.attach(page)?;
-        tab.load(page)?;
         Ok(tab)
     }
 
     fn call(&mut self, method: &'static str, params: Value) -> Result<Value, BrowserError> {
-        let Self { browser, root, .. } = self;
-        browser.call(method, params, &mut |browser, event| match root {
-            Some(root) => serve::serve(browser, root, event),
-            None => Ok(false),
+        let Self { browser, watch, .. } = self;
+        browser.call(method, params, &mut |browser, event| {
+            watch.handle(browser, event)
         })
     }
 
     fn attach(&mut self, page: &Page) -> Result<(), BrowserError> {
+        let deny = json!({ "behavior": "deny", "eventsEnabled": true });
+        self.call("Browser.setDownloadBehavior", deny)?;
         let target = self.call("Target.createTarget", json!({ "url": "about:blank" }))?;
         let attach = json!({ "targetId": target["targetId"], "flatten": true });
         let session = self.call("Target.attachToTarget", attach)?;
@@ -193,14 +264,12 @@ impl Tab {
             include_str!("page.js").replacen("/* SETTINGS */ null", &settings.to_string(), 1);
         self.add_script(&script)?;
         if let Some(headset) = &page.headset {
-            let emulator = std::fs::read_to_string(&headset.emulator)
-                .map_err(|e| BrowserError::Page(format!("{}: {e}", headset.emulator.display())))?;
             let settings = json!({
                 "ipd_m": headset.ipd_m, "fovy": headset.fovy, "position": headset.position,
             });
             let script = include_str!("headset.js");
             let script = script.replacen("/* SETTINGS */ null", &settings.to_string(), 1);
-            self.add_script(&format!("{emulator}\n{script}"))?;
+            self.add_script(&format!("{}\n{script}", headset.emulator))?;
         }
         Ok(())
     }
@@ -211,70 +280,59 @@ impl Tab {
             .map(drop)
     }
 
-    /// Opens the page and waits until it makes no more requests.
-    fn load(&mut self, page: &Page) -> Result<(), BrowserError> {
+    /// Opens the page and waits until it has loaded: until it makes no more requests. Returns the requests that
+    /// were not waited for.
+    ///
+    /// # Errors
+    /// The page cannot be loaded.
+    pub fn load(&mut self, page: &Page) -> Result<String, BrowserError> {
+        self.browser.stage = "loading the page".to_owned();
         let address = match page.root {
             Some(_) => serve::address(&page.address),
             None => page.address.clone(),
         };
         let url = format!("{address}{}", page.query);
+        let mut loading = Loading::new(Instant::now());
         let opened = self.call("Page.navigate", json!({ "url": url }))?;
         if let Some(reason) = opened["errorText"].as_str() {
             return Err(BrowserError::Page(format!("{}: {reason}", page.address)));
         }
-        let settle = Duration::from_secs_f64(page.settle_s);
-        let (mut loaded, mut open) = (false, HashSet::new());
-        let mut last = Instant::now();
-        while !loaded || !open.is_empty() || last.elapsed() < settle {
-            let Some(event) = self.browser.event(Duration::from_millis(50))? else {
-                if last.elapsed() > LOADING_TIMEOUT {
-                    return Err(BrowserError::Silent {
-                        doing: "loading the page",
-                        seconds: LOADING_TIMEOUT.as_secs(),
-                    });
+        loop {
+            match loading.state(Instant::now(), page.settle) {
+                State::No => {}
+                State::Yes => return Ok(String::new()),
+                State::Busy(requests) => return Ok(requests),
+                State::Reloads(times) => {
+                    let text = format!("it loads documents without end: {times} so far");
+                    return Err(BrowserError::Page(text));
                 }
-                continue;
-            };
-            match event.method.as_str() {
-                "Page.loadEventFired" => loaded = true,
-                "Network.requestWillBeSent" => {
-                    let url = event.params["request"]["url"].as_str().unwrap_or("");
-                    // Data URLs are not requested from a server.
-                    if !url.starts_with("data:") && !url.starts_with("blob:") {
-                        open.insert(event.params["requestId"].to_string());
-                    }
+                State::Silent(seconds) => {
+                    let detail = loading.detail();
+                    return Err(BrowserError::Silent { seconds, detail });
                 }
-                "Network.loadingFinished" | "Network.loadingFailed" => {
-                    open.remove(&event.params["requestId"].to_string());
-                }
-                "Fetch.requestPaused" => {}
-                _ => continue,
             }
-            last = Instant::now();
-            self.note(&event);
-            if let Some(root) = self.root.clone() {
-                serve::serve(&mut self.browser, &root, &event)?;
+            let event = self.browser.event(Duration::from_millis(50));
+            let event = event.map_err(|error| with_detail(error, loading.detail()))?;
+            if let Some(event) = event {
+                loading.take(&event, Instant::now());
+                self.watch.handle(&mut self.browser, &event)?;
             }
-        }
-        Ok(())
-    }
-
-    fn note(&mut self, event: &Event) {
-        let response = &event.params;
-        if event.method == "Network.loadingFailed"
-            && let Some(reason) = response["errorText"].as_str()
-        {
-            self.missing.push(reason.to_owned());
         }
     }
 
-    /// Names of the renderers of the page's WebGL contexts.
+    /// The page's contexts.
     ///
     /// # Errors
     /// The browser ended.
-    pub fn renderers(&mut self) -> Result<Vec<String>, BrowserError> {
-        let found = self.evaluate("parallax.renderers()")?;
+    pub fn contexts(&mut self) -> Result<Contexts, BrowserError> {
+        let found = self.evaluate("parallax.contexts()")?;
         Ok(serde_json::from_value(found).unwrap_or_default())
+    }
+
+    /// What the page did on its own, with the number of times.
+    #[must_use]
+    pub fn remarks(&self) -> &BTreeMap<String, u32> {
+        &self.watch.remarks
     }
 
     /// Draws a frame.
@@ -282,9 +340,15 @@ impl Tab {
     /// # Errors
     /// The browser ended, or the page has an error.
     pub fn step(&mut self, frame: u32, picture: bool) -> Result<Stepped, BrowserError> {
+        self.watch.draws = true;
+        self.browser.stage = format!("drawing frame {frame}");
         let time_ms = self.frame_ms * (f64::from(frame) + 1.0);
-        let value = self.evaluate(&format!("parallax.step({time_ms}, {picture})"))?;
-        serde_json::from_value(value).map_err(|e| BrowserError::Page(e.to_string()))
+        let value = self.evaluate(&format!("parallax.step({time_ms}, {picture})"));
+        if let Some(url) = &self.watch.left_for {
+            let text = format!("it left for {url} while frame {frame} was drawn");
+            return Err(BrowserError::Page(text));
+        }
+        serde_json::from_value(value?).map_err(|e| BrowserError::Page(e.to_string()))
     }
 
     fn evaluate(&mut self, expression: &str) -> Result<Value, BrowserError> {
@@ -298,17 +362,23 @@ impl Tab {
         Ok(result["result"]["value"].clone())
     }
 
-    /// Process ID of the browser.
-    #[must_use]
-    pub fn pid(&self) -> u32 {
-        self.browser.pid()
-    }
-
-    /// Ends the browser.
-    pub fn close(self) {
-        self.browser.close();
+    /// Ends the browser. Its supervisor watches over the capture's folder until the result is dropped.
+    ///
+    /// # Errors
+    /// The browser cannot be ended.
+    pub fn close(self) -> io::Result<Program> {
+        self.browser.close()
     }
 }
 
-/// A page that has not loaded is given up after this time without a request.
-const LOADING_TIMEOUT: Duration = Duration::from_secs(120);
+/// Adds what is known about the delay to an exceeded time limit.
+fn with_detail(error: BrowserError, known: String) -> BrowserError {
+    match error {
+        BrowserError::Late { seconds, stage, .. } => BrowserError::Late {
+            seconds,
+            stage,
+            detail: known,
+        },
+        other => other,
+    }
+}

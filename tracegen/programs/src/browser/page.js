@@ -4,6 +4,7 @@
   const settings = /* SETTINGS */ null;
   const real = performance.now.bind(performance);
   const state = { now: 0, callbacks: new Map(), next: 1, contexts: [], errors: [], views: [] };
+  const counts = { refused: 0, handed_over: 0, workers: 0, webgpu: 0 };
 
   // mulberry32
   let seed = settings.seed >>> 0;
@@ -40,8 +41,26 @@
     const original = canvas.prototype.getContext;
     canvas.prototype.getContext = function (kind, ...rest) {
       const context = original.call(this, kind, ...rest);
-      if (context && /webgl/.test(kind) && !state.contexts.includes(context)) state.contexts.push(context);
+      const webgl = /webgl/.test(kind);
+      if (context && webgl && !state.contexts.includes(context)) state.contexts.push(context);
+      if (!context && webgl) counts.refused++;
+      if (context && kind === "webgpu") counts.webgpu++;
       return context;
+    };
+  }
+  const handOver = HTMLCanvasElement.prototype.transferControlToOffscreen;
+  if (handOver) {
+    HTMLCanvasElement.prototype.transferControlToOffscreen = function () {
+      counts.handed_over++;
+      return handOver.call(this);
+    };
+  }
+  if (globalThis.Worker) {
+    globalThis.Worker = class extends Worker {
+      constructor(...of) {
+        super(...of);
+        counts.workers++;
+      }
     };
   }
 
@@ -103,14 +122,16 @@
       for (const gl of state.contexts) finish(gl);
       const took_ms = real() - start;
       const errors = state.errors.splice(0);
-      return { callbacks: due.length, took_ms, errors, views: state.views, picture: shown };
+      const lost = state.contexts.filter((gl) => gl.isContextLost()).length;
+      return { callbacks: due.length, took_ms, errors, lost, views: state.views, picture: shown };
     },
-    // What the page's pictures are drawn with.
-    renderers() {
-      return state.contexts.map((gl) => {
+    // The page's contexts, and what its pictures are drawn with.
+    contexts() {
+      const renderers = state.contexts.map((gl) => {
         const more = gl.getExtension("WEBGL_debug_renderer_info");
-        return String(gl.getParameter(more ? more.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+        return String(gl.getParameter(more ? more.UNMASKED_RENDERER_WEBGL : gl.RENDERER) ?? "a lost context");
       });
+      return { renderers, ...counts };
     },
   };
 })();

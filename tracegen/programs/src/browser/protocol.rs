@@ -1,12 +1,13 @@
 //! Speaks Chromium's DevTools protocol over a pair of pipes.
 
 use serde_json::{Value, json};
+use shell::Program;
 use std::collections::VecDeque;
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::Path;
-use std::process::{Child, ChildStdin, Command, Stdio};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::process::{Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::time::{Duration, Instant};
 use thiserror::Error;
 
@@ -23,14 +24,26 @@ pub enum BrowserError {
     },
     /// The browser ended.
     #[error("the browser ended while {0}")]
-    Ended(&'static str),
-    /// The browser does not answer.
-    #[error("the browser did not answer within {seconds} seconds while {doing}")]
-    Silent {
-        /// The method that was called.
-        doing: &'static str,
+    Ended(String),
+    /// The time limit is over.
+    #[error(
+        "the page was given up after {seconds} seconds while {stage}{detail} (--timeout sets the seconds)"
+    )]
+    Late {
         /// The time limit.
+        seconds: f64,
+        /// What was done.
+        stage: String,
+        /// What is known about the delay.
+        detail: String,
+    },
+    /// The page does not load.
+    #[error("the page did not load: nothing new for {seconds} seconds{detail}")]
+    Silent {
+        /// Time without an event.
         seconds: u64,
+        /// Requests that are not answered.
+        detail: String,
     },
     /// The browser rejected a command.
     #[error("the browser refuses {method}: {reason}")]
@@ -56,77 +69,94 @@ pub struct Event {
 
 /// A running browser.
 pub struct Browser {
-    child: Child,
-    to: Option<ChildStdin>,
+    program: Program,
+    to: Sender<Vec<u8>>,
     from: Receiver<Value>,
     next: u64,
     /// Session of the page; `None` before the page is attached.
     pub session: Option<String>,
+    /// What is being done, for messages: `loading the page`.
+    pub stage: String,
+    started: Instant,
+    most: Duration,
     events: VecDeque<Event>,
 }
 
-/// Time limit for the answer to a command.
-const ANSWER_TIMEOUT: Duration = Duration::from_secs(300);
+/// Time for the browser's own end.
+const CLOSING: Duration = Duration::from_secs(5);
+
+/// Interval between two looks whether the browser is running.
+const LOOK_INTERVAL: Duration = Duration::from_millis(200);
 
 impl Browser {
-    /// Starts a browser with arguments; `prepare` adds environment variables.
+    /// Starts a browser with arguments for at most a time. `folder` is the folder of this capture; `prepare`
+    /// adds environment variables.
     ///
     /// # Errors
     /// The browser cannot be started.
     pub fn start(
         program: &Path,
+        folder: &Path,
         arguments: &[OsString],
+        most: Duration,
         prepare: impl FnOnce(&mut Command),
     ) -> Result<Self, BrowserError> {
-        let failed = |source| BrowserError::Start {
+        // The protocol's pipes are file descriptors 3 and 4.
+        let script = r#"exec "$0" "$@" 3<&0 4>&1 </dev/null >/dev/null 2>&1"#;
+        let started = Program::start(folder, OsStr::new("/bin/sh"), |command| {
+            command
+                .args(["-c", script])
+                .arg(program)
+                .args(arguments)
+                .arg("--remote-debugging-pipe")
+                .stdin(Stdio::piped())
+                .stdout(Stdio::piped());
+            prepare(command);
+        });
+        let mut started = started.map_err(|source| BrowserError::Start {
             program: program.display().to_string(),
             source,
-        };
-        // The protocol's pipes are file descriptors 3 and 4.
-        let mut command = Command::new("/bin/sh");
-        command
-            .args([
-                "-c",
-                r#"exec "$0" "$@" 3<&0 4>&1 </dev/null >/dev/null 2>&1"#,
-            ])
-            .arg(program)
-            .args(arguments)
-            .arg("--remote-debugging-pipe")
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped());
-        prepare(&mut command);
-        let mut child = command.spawn().map_err(failed)?;
-        let to = child.stdin.take();
+        })?;
+        let (input, output) = started.take_pipes();
+        let (to, outgoing) = channel::<Vec<u8>>();
         let (send, from) = channel();
-        if let Some(out) = child.stdout.take() {
-            std::thread::spawn(move || {
-                let mut out = BufReader::new(out);
-                let mut message = Vec::new();
-                // Messages end with a zero byte.
-                while out.read_until(0, &mut message).is_ok_and(|read| read > 0) {
-                    message.pop();
-                    let parsed = serde_json::from_slice(&message);
-                    if parsed.is_ok_and(|value| send.send(value).is_err()) {
-                        return;
-                    }
-                    message.clear();
+        // A browser that does not read blocks only this thread.
+        std::thread::spawn(move || {
+            let Some(mut input) = input else { return };
+            for message in outgoing {
+                if input.write_all(&message).is_err() {
+                    return;
                 }
-            });
-        }
+            }
+        });
+        std::thread::spawn(move || {
+            let Some(output) = output else { return };
+            let mut output = BufReader::new(output);
+            let mut message = Vec::new();
+            // Messages end with a zero byte.
+            while output
+                .read_until(0, &mut message)
+                .is_ok_and(|read| read > 0)
+            {
+                message.pop();
+                let parsed = serde_json::from_slice(&message);
+                if parsed.is_ok_and(|value| send.send(value).is_err()) {
+                    return;
+                }
+                message.clear();
+            }
+        });
         Ok(Self {
-            child,
+            program: started,
             to,
             from,
             next: 1,
             session: None,
+            stage: "starting the browser".to_owned(),
+            started: Instant::now(),
+            most,
             events: VecDeque::new(),
         })
-    }
-
-    /// Process ID of the browser.
-    #[must_use]
-    pub fn pid(&self) -> u32 {
-        self.child.id()
     }
 
     fn send(&mut self, method: &'static str, params: Value) -> Result<u64, BrowserError> {
@@ -138,9 +168,7 @@ impl Browser {
         }
         let mut bytes = message.to_string().into_bytes();
         bytes.push(0);
-        let to = self.to.as_mut().ok_or(BrowserError::Ended(method))?;
-        to.write_all(&bytes)
-            .map_err(|_| BrowserError::Ended(method))?;
+        self.to.send(bytes).map_err(|_| self.ended())?;
         Ok(id)
     }
 
@@ -152,26 +180,21 @@ impl Browser {
         self.send(method, params).map(drop)
     }
 
-    /// Sends a command and waits for its result. `serve` handles events that arrive before it; events that it
-    /// does not handle are kept.
+    /// Sends a command and waits for its result. `handle` gets the events that arrive before it; events that it
+    /// returns false for are kept.
     ///
     /// # Errors
-    /// The browser ended, does not answer, or rejects the command.
+    /// The browser ended, the time limit is over, or the browser rejects the command.
     pub fn call(
         &mut self,
         method: &'static str,
         params: Value,
-        serve: &mut dyn FnMut(&mut Self, &Event) -> Result<bool, BrowserError>,
+        handle: &mut dyn FnMut(&mut Self, &Event) -> Result<bool, BrowserError>,
     ) -> Result<Value, BrowserError> {
         let id = self.send(method, params)?;
-        let deadline = Instant::now() + ANSWER_TIMEOUT;
         loop {
-            let rest = deadline.saturating_duration_since(Instant::now());
-            let Some(message) = self.receive(rest, method)? else {
-                return Err(BrowserError::Silent {
-                    doing: method,
-                    seconds: ANSWER_TIMEOUT.as_secs(),
-                });
+            let Some(message) = self.receive(self.most)? else {
+                continue;
             };
             if message["id"].as_u64() == Some(id) {
                 if let Some(reason) = message["error"]["message"].as_str() {
@@ -183,7 +206,7 @@ impl Browser {
                 return Ok(message["result"].clone());
             }
             if let Some(event) = event(message)
-                && !serve(self, &event)?
+                && !handle(self, &event)?
             {
                 self.events.push_back(event);
             }
@@ -193,15 +216,14 @@ impl Browser {
     /// The next event, if one arrives within a time.
     ///
     /// # Errors
-    /// The browser ended.
+    /// The browser ended, or the time limit is over.
     pub fn event(&mut self, within: Duration) -> Result<Option<Event>, BrowserError> {
         if let Some(event) = self.events.pop_front() {
             return Ok(Some(event));
         }
-        let deadline = Instant::now() + within;
+        let start = Instant::now();
         loop {
-            let rest = deadline.saturating_duration_since(Instant::now());
-            match self.receive(rest, "waiting for the page")? {
+            match self.receive(within.saturating_sub(start.elapsed()))? {
                 None => return Ok(None),
                 Some(message) => {
                     if let Some(event) = event(message) {
@@ -212,38 +234,48 @@ impl Browser {
         }
     }
 
-    fn receive(
-        &mut self,
-        within: Duration,
-        doing: &'static str,
-    ) -> Result<Option<Value>, BrowserError> {
-        match self.from.recv_timeout(within) {
-            Ok(message) => Ok(Some(message)),
-            Err(RecvTimeoutError::Timeout) => Ok(None),
-            Err(RecvTimeoutError::Disconnected) => Err(BrowserError::Ended(doing)),
+    /// The next message, if one arrives within a time.
+    fn receive(&mut self, within: Duration) -> Result<Option<Value>, BrowserError> {
+        let start = Instant::now();
+        loop {
+            if self.started.elapsed() >= self.most {
+                return Err(BrowserError::Late {
+                    seconds: self.most.as_secs_f64(),
+                    stage: self.stage.clone(),
+                    detail: String::new(),
+                });
+            }
+            let rest = within.saturating_sub(start.elapsed());
+            match self.from.recv_timeout(rest.min(LOOK_INTERVAL)) {
+                Ok(message) => return Ok(Some(message)),
+                Err(RecvTimeoutError::Disconnected) => return Err(self.ended()),
+                Err(RecvTimeoutError::Timeout) => {
+                    if self.program.ended().map_or(true, |ended| ended.is_some()) {
+                        return Err(self.ended());
+                    }
+                    if start.elapsed() >= within {
+                        return Ok(None);
+                    }
+                }
+            }
         }
     }
 
-    /// Ends the browser.
-    pub fn close(mut self) {
+    fn ended(&self) -> BrowserError {
+        BrowserError::Ended(self.stage.clone())
+    }
+
+    /// Ends the browser. Its supervisor watches over the capture's folder until the result is dropped.
+    ///
+    /// # Errors
+    /// The browser cannot be ended.
+    pub fn close(mut self) -> io::Result<Program> {
         self.session = None;
         let _gone = self.send("Browser.close", json!({}));
-        self.to = None;
-        let deadline = Instant::now() + Duration::from_secs(10);
-        while Instant::now() < deadline {
-            if self.child.try_wait().is_ok_and(|status| status.is_some()) {
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(20));
+        if self.program.wait(CLOSING)?.is_none() {
+            self.program.end()?;
         }
-    }
-}
-
-impl Drop for Browser {
-    fn drop(&mut self) {
-        // The browser may have ended already.
-        let _gone = self.child.kill();
-        let _status = self.child.wait();
+        Ok(self.program)
     }
 }
 

@@ -1,36 +1,79 @@
 //! Serves the files of a local page to the browser, in place of a web server.
 
-use super::protocol::{Browser, BrowserError, Event};
+use super::protocol::{Browser, BrowserError};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use formats::container::{declare_input, kind_of, open_regular};
 use serde_json::{Value, json};
+use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 /// Origin of local pages. It is secure, so that all web features are available.
 pub const ORIGIN: &str = "https://page.parallax.test";
 
-/// Answers a request that the browser has paused; returns false for other events.
+/// Longest file that is served. The protocol sends files as text in one message.
+const LONGEST_BYTES: u64 = 256 << 20;
+
+/// Answers a request that the browser has paused. Returns the reason if a file that exists is not served.
 ///
 /// # Errors
 /// The browser ended.
-pub fn serve(browser: &mut Browser, root: &Path, event: &Event) -> Result<bool, BrowserError> {
-    if event.method != "Fetch.requestPaused" {
-        return Ok(false);
-    }
-    let id = &event.params["requestId"];
-    let url = event.params["request"]["url"].as_str().unwrap_or("");
-    let content = path_of(root, url).and_then(|path| Some((std::fs::read(&path).ok()?, path)));
-    let answer = match content {
-        Some((bytes, path)) => json!({
-            "requestId": id,
-            "responseCode": 200,
-            "responseHeaders": headers(&path),
-            "body": STANDARD.encode(bytes),
-        }),
-        None => json!({ "requestId": id, "responseCode": 404, "responsePhrase": "Not Found" }),
+pub fn serve(
+    browser: &mut Browser,
+    root: &Path,
+    request: &Value,
+) -> Result<Option<String>, BrowserError> {
+    let id = &request["requestId"];
+    let url = request["request"]["url"].as_str().unwrap_or("");
+    let path = path_of(root, url);
+    let content = path.as_ref().map(|path| content(root, path));
+    let (answer, refused) = match (path, content) {
+        (Some(path), Some(Ok(bytes))) => {
+            declare_input(&path);
+            let answer = json!({
+                "requestId": id,
+                "responseCode": 200,
+                "responseHeaders": headers(&path),
+                "body": STANDARD.encode(bytes),
+            });
+            (answer, None)
+        }
+        (_, content) => {
+            let answer =
+                json!({ "requestId": id, "responseCode": 404, "responsePhrase": "Not Found" });
+            let refused = content.and_then(Result::err).flatten();
+            (answer, refused.map(|why| format!("{url}: {why}")))
+        }
     };
     browser.notify("Fetch.fulfillRequest", answer)?;
-    Ok(true)
+    Ok(refused)
+}
+
+/// Content of a regular file whose real path is below the root. The error is the reason why a file that exists
+/// is not served.
+fn content(root: &Path, path: &Path) -> Result<Vec<u8>, Option<String>> {
+    let real = path.canonicalize().map_err(|_| None)?;
+    if !real.starts_with(root) {
+        return Err(Some(
+            "a link to a file outside the page's folder".to_owned(),
+        ));
+    }
+    let found = real.metadata().map_err(|error| Some(error.to_string()))?;
+    if !found.is_file() {
+        return Err(Some(format!("expected a file, found {}", kind_of(&found))));
+    }
+    if found.len() > LONGEST_BYTES {
+        let mib = LONGEST_BYTES >> 20;
+        return Err(Some(format!(
+            "expected at most {mib} MiB, found {} bytes",
+            found.len()
+        )));
+    }
+    let mut bytes = Vec::new();
+    let read =
+        open_regular(&real).and_then(|file| file.take(LONGEST_BYTES).read_to_end(&mut bytes));
+    read.map_err(|error| Some(error.to_string()))?;
+    Ok(bytes)
 }
 
 /// The file below `root` at an address.
@@ -118,6 +161,42 @@ fn headers(path: &Path) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn only_regular_files_below_the_root_are_served() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path().canonicalize().unwrap().join("root");
+        let at = |name: &str| root.join(name);
+        std::fs::create_dir_all(at("sub")).unwrap();
+        std::fs::write(at("file"), "page").unwrap();
+        std::fs::write(folder.path().join("secret"), "secret").unwrap();
+        symlink("../secret", at("link")).unwrap();
+        symlink("..", at("folder")).unwrap();
+        symlink("../file", at("sub/inner")).unwrap();
+        symlink("/dev/zero", at("device")).unwrap();
+        let _socket = std::os::unix::net::UnixListener::bind(at("socket")).unwrap();
+        let made = std::process::Command::new("mkfifo")
+            .arg(at("pipe"))
+            .status();
+        assert!(made.unwrap().success());
+        for name in ["file", "sub/inner"] {
+            assert_eq!(content(&root, &at(name)), Ok(b"page".to_vec()), "{name}");
+        }
+        for (name, expected) in [
+            ("link", "outside"),
+            ("folder/secret", "outside"),
+            ("device", "outside"),
+            ("socket", "a socket"),
+            ("pipe", "a pipe"),
+            ("sub", "a folder"),
+        ] {
+            let why = content(&root, &at(name)).unwrap_err().unwrap();
+            assert!(why.contains(expected), "{name}: {why}");
+        }
+        assert_eq!(content(&root, &at("none")), Err(None));
+    }
 
     #[test]
     fn addresses_name_files_below_the_root_and_no_others() {

@@ -1,0 +1,59 @@
+//! Files that the commands read and write.
+
+use shell::{FileUse, FileUses};
+
+/// Uses of the arguments of `replay`; a test compares the table with the command line.
+pub const FILES: &FileUses = &[
+    (&["report", "paper"], &["images"], FileUse::Input),
+    (&["techniques"], &["folders"], FileUse::InputFolder),
+    (&["accuracy"], &["techniques"], FileUse::InputFolder),
+    (&["locality"], &["csv"], FileUse::Folder),
+    (&["accuracy"], &["output"], FileUse::Folder),
+    (&["man"], &["folder"], FileUse::Folder),
+    (&[], &["out"], FileUse::Folder),
+    (&[], &["save_orders"], FileUse::FolderOfNewNames),
+    (
+        &[],
+        &[
+            "trace",
+            "traces",
+            "truth",
+            "capture",
+            "rays",
+            "seconds",
+            "traversal",
+            "a",
+            "b",
+            "left",
+            "right",
+            "files",
+            "config",
+            "experiment",
+            "addresses",
+            "order_files",
+        ],
+        FileUse::Input,
+    ),
+    (
+        &[],
+        &[
+            "output", "csv", "html", "image", "parquet", "timeline", "picture",
+        ],
+        FileUse::Output,
+    ),
+    (
+        &[],
+        &[
+            "orders",
+            "caches",
+            "between",
+            "search",
+            "learn",
+            "tries",
+            "held_out",
+            "stand_ins",
+            "paper_scenes",
+        ],
+        FileUse::NoFile,
+    ),
+];
