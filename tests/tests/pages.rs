@@ -96,7 +96,7 @@ fn a_page_that_polls_is_captured_and_one_that_never_loads_is_named() {
         (
             "let n = 0; (function f() { fetch('x' + n++).finally(f) })()",
             "4",
-            "requests that go on",
+            "given up after 4 seconds while loading",
         ),
     ] {
         fs::write(folder.path().join("page.html"), page(script)).expect("writable");
