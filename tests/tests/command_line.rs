@@ -52,7 +52,10 @@ fn a_misspelt_subcommand_is_suggested() {
             let mut misspelt = subcommand.clone();
             misspelt.remove(subcommand.len() / 2);
             let suggested = format!("'{subcommand}'");
-            refuse(program(name).arg(&misspelt), &["similar subcommand", &suggested]);
+            refuse(
+                program(name).arg(&misspelt),
+                &["similar subcommand", &suggested],
+            );
         }
     }
 }
@@ -67,14 +70,28 @@ fn the_counts_of_a_capture_are_its_result() {
     };
     let to_file = rays("a.raytrace");
     let text = String::from_utf8(to_file.stdout).expect("UTF-8");
-    assert!(text.contains("rays: ") && to_file.stderr.is_empty(), "{text}");
+    assert!(
+        text.contains("rays: ") && to_file.stderr.is_empty(),
+        "{text}"
+    );
     assert!(rays("-").stdout.starts_with(b"PLXTRACE"));
     if parallax_tests::has_lavapipe() {
         let mut raster = program("tracegen");
-        raster.args(["-q", "raster", "atrium", "--size", "32x32", "-o", "a.textrace"]);
+        raster.args([
+            "-q",
+            "raster",
+            "atrium",
+            "--size",
+            "32x32",
+            "-o",
+            "a.textrace",
+        ]);
         let output = run_ok(raster.current_dir(folder.path()));
         let text = String::from_utf8(output.stdout).expect("UTF-8");
-        assert!(text.contains(" quads, ") && output.stderr.is_empty(), "{text}");
+        assert!(
+            text.contains(" quads, ") && output.stderr.is_empty(),
+            "{text}"
+        );
     }
 }
 

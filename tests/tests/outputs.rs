@@ -211,7 +211,10 @@ const OVER_INPUTS: &[(&str, &str)] = &[
     ("tracegen", "raster atrium --path x.html -o OUT"),
     ("tracegen", "raster x.html -o OUT"),
     ("tracegen", "rays x.html -o o --image OUT"),
-    ("tracegen", "verify atrium --trace x.html --write-reference OUT"),
+    (
+        "tracegen",
+        "verify atrium --trace x.html --write-reference OUT",
+    ),
     ("replay", "orders x.html --csv OUT"),
     ("replay", "orders a.textrace --order-file x.html --html OUT"),
     (
