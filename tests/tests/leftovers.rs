@@ -122,7 +122,12 @@ fn send_signals(kind: &str, longest: Duration, seed: u64, prepare: impl Fn(&mut 
         let (processes, files) = place.left_after(patience);
         let what = format!("{kind}: SIG{signal} after {moment:?}");
         assert!(processes.is_empty(), "{what}: {processes:#?} are running");
-        assert!(files.is_empty(), "{what}: {files:?} are left");
+        // Nobody removes the small folder of a capture that is killed before its supervisor runs.
+        let is_bare = |path: &PathBuf| {
+            !path.join("supervisor-ended").exists() && !path.join("profile").exists()
+        };
+        let excused = signal == "KILL" && files.iter().all(is_bare);
+        assert!(files.is_empty() || excused, "{what}: {files:?} are left");
         sent += 1;
     }
     println!(

@@ -208,7 +208,6 @@ const OVER_INPUTS: &[(&str, &str)] = &[
     ("tracegen", "app -o OUT -- sh x.html"),
     ("tracegen", "app -o OUT -- sh --file=x.html"),
     ("tracegen", "app --rules x.html -o OUT -- sh"),
-    ("tracegen", "raster atrium --path x.html -o OUT"),
     ("tracegen", "raster x.html -o OUT"),
     ("tracegen", "rays x.html -o o --image OUT"),
     (
@@ -227,7 +226,7 @@ const OVER_INPUTS: &[(&str, &str)] = &[
     ),
     ("replay", "convert x.html --to din -o OUT"),
     ("replay", "run a.textrace --config x.html --timeline OUT"),
-    ("replay", "run --addresses x.html --parquet OUT"),
+    ("replay", "locality --addresses x.html --html OUT"),
     ("replay", "report a.textrace --image atrium=x.html -o OUT"),
     ("replay", "dump x.html --parquet OUT"),
     ("replay", "readings a.textrace --config x.html --html OUT"),

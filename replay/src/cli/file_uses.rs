@@ -51,6 +51,7 @@ pub const FILES: &FileUses = &[
             "learn",
             "tries",
             "held_out",
+            "calibrate",
             "stand_ins",
             "paper_scenes",
         ],
