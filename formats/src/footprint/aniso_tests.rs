@@ -141,7 +141,7 @@ fn a_recorded_anisotropy_counts_with_any_filter_but_a_replays_only_where_levels_
             mip,
             ..anisotropic(most)
         };
-        let count = |sampler, options| {
+        let count = |sampler: Sampler, options: &SamplingOptions| {
             let found = read(&quad, None, SampleLevel::DERIVED, &sampler, options);
             (found.len(), found[0].level)
         };

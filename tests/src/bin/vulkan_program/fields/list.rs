@@ -371,7 +371,7 @@ pub const FIELDS: &[Field] = &[
         ..layered(
             "views-of-layers",
             ARRAY,
-            "textureSample(a, s, uv, 2) + textureSample(b, s, uv)",
+            "textureSample(a, s, uv, 2i) + textureSample(b, s, uv)",
             |s| s,
         )
     },
