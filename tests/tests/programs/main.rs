@@ -350,6 +350,22 @@ fn assert_same(a: &Path, b: &Path) {
 }
 
 #[test]
+fn a_check_changes_no_figure() {
+    if !has_lavapipe() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for stereo in ["halves", "targets", "multiview"] {
+        let of_program = ["--stereo", stereo];
+        let frames = ["--frames", "2"];
+        let plain = capture_program(folder.path(), "plain", &frames, &of_program);
+        let checked = ["--frames", "2", "--check"];
+        let checked = capture_program(folder.path(), "checked", &checked, &of_program);
+        assert_same(&plain, &checked);
+    }
+}
+
+#[test]
 fn programs_that_fork_or_are_started_by_scripts_give_the_same_trace() {
     if !has_lavapipe() {
         return;

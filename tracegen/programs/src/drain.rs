@@ -109,8 +109,7 @@ pub fn drain<W: Write + Seek>(
     let mut drained = Drained::default();
     let mut triangles = 0;
     for &number in job.frames {
-        let frame = session.frames.get(&number).cloned();
-        let frame = frame.ok_or(SessionError::NotDrawn(number))?;
+        let frame = session.drawn(number)?;
         if frame.lost_bytes > 0 {
             return Err(DrainError::Session(SessionError::Lost {
                 frame: number,
@@ -163,7 +162,7 @@ pub fn drain<W: Write + Seek>(
     Ok((writer, drained))
 }
 
-/// Number of fragments of an executed draw.
+/// Number of recorded fragments of an executed draw. Counts of queries would make the eyes depend on `--check`.
 pub(crate) fn weight(
     session: &Session,
     executed: &Executed,
@@ -178,7 +177,7 @@ pub(crate) fn weight(
             of.map(|record| u64::from(record.lanes().count_ones()))
                 .sum()
         }
-        _ => executed.occlusion.unwrap_or(0),
+        _ => 0,
     }
 }
 
@@ -192,7 +191,7 @@ fn key(session: &Session, draw: u32) -> Option<(DrawKey, String)> {
 fn merge(session: &Session, draws: &[Executed], views: &Views) -> Vec<Merged> {
     let with = |wanted: Role| -> Vec<Executed> {
         let both = draws.iter().zip(&views.roles);
-        both.filter(|(_, role)| **role == wanted)
+        both.filter(|(draw, role)| **role == wanted && session.is_shaded(draw))
             .map(|(draw, _)| *draw)
             .collect()
     };

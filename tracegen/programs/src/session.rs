@@ -1,7 +1,7 @@
 //! Frames, render passes and draws of a captured program.
 
 use crate::reads::Reads;
-use parallax_layer::inject::{Form, RawSample, Site, What};
+use parallax_layer::inject::{DepthTests, Form, RawSample, Site, What};
 use parallax_layer::spool::{
     DispatchInfo, DrawInfo, Event, ImageInfo, PassInfo, Process, ReadError, Reader, ShaderInfo,
     Span,
@@ -87,6 +87,10 @@ pub struct ProgramFrame {
     spans: Vec<(Span, HashMap<u32, u32>)>,
     /// Numbers of its draws.
     numbers: HashSet<u32>,
+    /// Source and destination of each copy between images.
+    pub copies: Vec<[u32; 2]>,
+    /// Images that were copied to a buffer.
+    pub read_back: Vec<u32>,
     /// Number of bytes of records that did not fit the buffer.
     pub lost_bytes: u64,
     /// Whether the program ended the frame.
@@ -106,6 +110,9 @@ pub struct Session {
     pub driver: String,
     /// Reason why recording is not possible on the device, if any.
     pub refused: Option<String>,
+    /// Whether the process is a browser with a page. The page's script reads back each of its canvases in each
+    /// frame.
+    pub is_page: bool,
     /// Problems that make the capture incomplete.
     pub troubles: Vec<String>,
     /// Frames by number.
@@ -173,7 +180,7 @@ impl Session {
             return Err(SessionError::NoDevice(program.to_owned()));
         }
         match &session.refused {
-            Some(why) if session.frames.is_empty() => Err(SessionError::Refused {
+            Some(why) if work(&session).0 == 0 => Err(SessionError::Refused {
                 program: program.to_owned(),
                 why: why.clone(),
             }),
@@ -221,6 +228,16 @@ impl Session {
                 }
                 self.submission(frame, &draws, &occlusion.into_iter().collect(), records);
                 self.frames.entry(frame).or_default().lost_bytes += lost_bytes;
+            }
+            Event::Copies {
+                frame,
+                pairs,
+                read_back,
+            } => {
+                let of = self.frames.entry(frame).or_default();
+                of.frame = frame;
+                of.copies.extend(pairs);
+                of.read_back.extend(read_back);
             }
             Event::Frame { frame, took_us } => self.end_frame(frame, took_us),
             Event::Waited { frame, took_us } => {
@@ -350,6 +367,31 @@ impl Session {
         self.shader(draw.shader?)
     }
 
+    /// A frame with at least one draw.
+    ///
+    /// # Errors
+    /// Nothing was drawn in the frame.
+    pub fn drawn(&self, number: u32) -> Result<ProgramFrame, SessionError> {
+        let frame = self.frames.get(&number).cloned();
+        frame
+            .filter(|frame| !frame.draws.is_empty())
+            .ok_or(SessionError::NotDrawn(number))
+    }
+
+    /// Whether the fragment shader of a draw affects anything: colours, or the fragments that pass. Graphics
+    /// hardware does not run other fragment shaders.
+    #[must_use]
+    pub fn is_shaded(&self, executed: &Executed) -> bool {
+        let Some(draw) = self.draw(executed.draw) else {
+            return false;
+        };
+        let colors = self.pass(executed.pass).map_or(0, |pass| pass.colors.len());
+        let shader = self.shader_of(draw);
+        (0..colors).any(|place| writes_color(draw, place))
+            || draw.twice
+            || shader.is_some_and(|shader| shader.tests != DepthTests::Either)
+    }
+
     /// Records of a frame by draw, in recording order.
     ///
     /// # Errors
@@ -371,6 +413,12 @@ impl Session {
         }
         Ok(by_draw)
     }
+}
+
+/// Whether a draw writes a colour attachment.
+#[must_use]
+pub fn writes_color(draw: &DrawInfo, place: usize) -> bool {
+    draw.color_masks.get(place).is_none_or(|mask| *mask != 0)
 }
 
 /// Reason why the records of a draw are less exact, or missing if its passes differ.
@@ -452,5 +500,53 @@ mod tests {
         numbers.sort_unstable();
         numbers.dedup();
         assert_eq!(numbers.len(), 5);
+    }
+
+    #[test]
+    fn a_shader_that_neither_writes_colours_nor_discards_has_no_effect() {
+        let mut session = Session::default();
+        let view = parallax_layer::spool::ViewInfo {
+            image: 1,
+            format: 37,
+            kind: 1,
+            levels: [0, 1],
+            layers: [0, 1],
+        };
+        session.take(Event::Pass(PassInfo {
+            colors: vec![view; 2],
+            ..PassInfo::default()
+        }));
+        for tests in [DepthTests::Either, DepthTests::Late] {
+            session.take(Event::Shader(ShaderInfo {
+                shader: tests as u32,
+                tests,
+                sites: Vec::new(),
+            }));
+        }
+        let cases = [
+            ([0, 0], false, DepthTests::Either, false),
+            ([0, 15], false, DepthTests::Either, true),
+            ([0, 0], true, DepthTests::Either, true),
+            ([0, 0], false, DepthTests::Late, true),
+        ];
+        for (masks, twice, tests, expected) in cases {
+            session.take(Event::Draw(DrawInfo {
+                color_masks: masks.to_vec(),
+                twice,
+                shader: Some(tests as u32),
+                ..DrawInfo::default()
+            }));
+            let executed = Executed {
+                draw: 0,
+                pass: 0,
+                occlusion: None,
+                repeated: false,
+            };
+            assert_eq!(
+                session.is_shaded(&executed),
+                expected,
+                "{masks:?} {tests:?}"
+            );
+        }
     }
 }

@@ -146,6 +146,7 @@ fn write(
     } else {
         note("reading the records");
         let mut session = Session::of_capture(launch.folder(), "the page")?;
+        session.is_page = true;
         let name = format!("{}{}", page_name(&args.page), args.query);
         let cameras = drawn.cameras.clone();
         (args.capture).finish(&mut session, name, settings, eyes, cameras)?

@@ -48,11 +48,9 @@ pub struct ProgramArgs {
     /// differ.
     #[arg(long)]
     check: bool,
-    /// Also record draws without a depth test into images without scenes, such as the draws by which a browser
-    /// composes its window. By default they are skipped if the program renders scenes into other images.
-    /// `--check`, `--list` and `--rules` record all draws.
-    #[arg(long)]
-    all_draws: bool,
+    /// Has no effect: all draws are recorded.
+    #[arg(long = "all-draws", hide = true)]
+    _all_draws: bool,
     /// Size limit of the records of one submission. Unused memory is not allocated.
     #[arg(long, value_name = "SIZE", default_value = "768MiB", value_parser = parse_bytes)]
     records: u64,
@@ -160,7 +158,6 @@ impl ProgramArgs {
             frames: [self.frames.start, self.frames.end],
             frames_by,
             occlusion: self.check || self.list,
-            all_draws: self.all_draws || self.check || self.list || self.rules.is_some(),
             record_bytes: self.records,
             pictures: self.list_page.is_some(),
             modules: self.modules.as_ref().map(absolute).transpose()?,

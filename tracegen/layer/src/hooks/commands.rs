@@ -142,10 +142,6 @@ setters! {
         state.dynamic.color_masks = Some((first, slice(masks, count).to_vec()));
     cmd_set_color_write_enable(count: u32, enables: *const vk::Bool32) cmd_set_color_write_enable |state|
         state.dynamic.color_enables = Some(slice(enables, count).to_vec());
-    cmd_copy_image_to_buffer(image: vk::Image, layout: vk::ImageLayout, to: vk::Buffer, count: u32, regions: *const vk::BufferImageCopy) cmd_copy_image_to_buffer |state|
-        state.effects.reads_back = true;
-    cmd_copy_image_to_buffer2(info: *const vk::CopyImageToBufferInfo2<'_>) cmd_copy_image_to_buffer2 |state|
-        state.effects.reads_back = true;
     cmd_set_event(event: vk::Event, stages: vk::PipelineStageFlags) cmd_set_event |state|
         state.effects.set_event(event);
     cmd_set_event2(event: vk::Event, info: *const vk::DependencyInfo<'_>) cmd_set_event2 |state|
@@ -168,31 +164,31 @@ setters! {
         state.active_queries = state.active_queries.saturating_sub(1);
 }
 
-/// Hooks of commands that write an image: the image and the next function. A write to an image whose texels the
-/// host can read in memory is a readback.
-macro_rules! image_writers {
-    ($($hook:ident ($($argument:ident: $kind:ty),*) $to:expr;)*) => { $(
+/// Hooks of commands that copy images: what is noted, and the next function.
+macro_rules! copies {
+    ($($hook:ident ($($argument:ident: $kind:ty),*) $note:ident ($($image:expr),*);)*) => { $(
         pub(super) unsafe extern "system" fn $hook(buffer: vk::CommandBuffer, $($argument: $kind),*) {
             // SAFETY: a valid call of the command.
             unsafe {
                 let known = Device::of(buffer);
-                {
-                    let tracker = &mut *known.tracker();
-                    if tracker.images.is_linear($to) {
-                        tracker.commands.get_mut(buffer.as_raw()).effects.reads_back = true;
-                    }
-                }
+                known.tracker().$note(buffer, $($image),*);
                 (known.next.$hook)(buffer, $($argument),*);
             }
         }
     )* };
 }
 
-image_writers! {
-    cmd_copy_image(from: vk::Image, from_layout: vk::ImageLayout, to: vk::Image, to_layout: vk::ImageLayout, count: u32, regions: *const vk::ImageCopy) to;
-    cmd_copy_image2(info: *const vk::CopyImageInfo2<'_>) (*info).dst_image;
-    cmd_blit_image(from: vk::Image, from_layout: vk::ImageLayout, to: vk::Image, to_layout: vk::ImageLayout, count: u32, regions: *const vk::ImageBlit, filter: vk::Filter) to;
-    cmd_blit_image2(info: *const vk::BlitImageInfo2<'_>) (*info).dst_image;
-    cmd_resolve_image(from: vk::Image, from_layout: vk::ImageLayout, to: vk::Image, to_layout: vk::ImageLayout, count: u32, regions: *const vk::ImageResolve) to;
-    cmd_resolve_image2(info: *const vk::ResolveImageInfo2<'_>) (*info).dst_image;
+copies! {
+    cmd_copy_image(from: vk::Image, from_layout: vk::ImageLayout, to: vk::Image, to_layout: vk::ImageLayout, count: u32, regions: *const vk::ImageCopy)
+        note_copy(from, to);
+    cmd_copy_image2(info: *const vk::CopyImageInfo2<'_>) note_copy((*info).src_image, (*info).dst_image);
+    cmd_blit_image(from: vk::Image, from_layout: vk::ImageLayout, to: vk::Image, to_layout: vk::ImageLayout, count: u32, regions: *const vk::ImageBlit, filter: vk::Filter)
+        note_copy(from, to);
+    cmd_blit_image2(info: *const vk::BlitImageInfo2<'_>) note_copy((*info).src_image, (*info).dst_image);
+    cmd_resolve_image(from: vk::Image, from_layout: vk::ImageLayout, to: vk::Image, to_layout: vk::ImageLayout, count: u32, regions: *const vk::ImageResolve)
+        note_copy(from, to);
+    cmd_resolve_image2(info: *const vk::ResolveImageInfo2<'_>) note_copy((*info).src_image, (*info).dst_image);
+    cmd_copy_image_to_buffer(image: vk::Image, layout: vk::ImageLayout, to: vk::Buffer, count: u32, regions: *const vk::BufferImageCopy)
+        note_read_back(image);
+    cmd_copy_image_to_buffer2(info: *const vk::CopyImageToBufferInfo2<'_>) note_read_back((*info).src_image);
 }

@@ -2,7 +2,7 @@
 
 use super::api::slice;
 use super::device::Device;
-use crate::spool::{INDIRECT, OUTSIDE_SCENES};
+use crate::spool::INDIRECT;
 use crate::track::{Call, CommandState, Dynamic, Pipeline};
 use ash::vk::{self, Handle};
 use std::sync::Arc;
@@ -32,8 +32,6 @@ struct Plan {
     twice: bool,
     /// Whether the program's own draw records it.
     once: bool,
-    /// Whether the bound recording pipeline must be replaced by the program's.
-    skipped: bool,
     /// Whether a query counts its samples.
     counted: bool,
 }
@@ -44,8 +42,6 @@ fn plan(known: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> 
         return None;
     }
     let tracker = &mut *known.tracker();
-    let outside = !known.capture.settings.all_draws && tracker.is_outside_scenes(buffer.as_raw());
-    tracker.note_scene(buffer.as_raw());
     let state = tracker.commands.get_mut(buffer.as_raw());
     if !is_wanted(known, state) {
         return None;
@@ -63,19 +59,12 @@ fn plan(known: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> 
         info.twice = false;
         info.unrecorded = Some("a query of the program counts the draw".to_owned());
     }
-    let outside = outside && twin.is_some();
-    if outside {
-        info.shader = None;
-        info.twice = false;
-        info.unrecorded = Some(OUTSIDE_SCENES.to_owned());
-    }
     let plan = Plan {
         number: info.draw,
         handle,
         dynamic,
-        twice: twice && !counts_itself && !outside,
-        once: twin.is_some() && !twice && !outside,
-        skipped: outside && !twice,
+        twice: twice && !counts_itself,
+        once: twin.is_some() && !twice,
         counted: known.queries.is_some() && !counts_itself,
         pipeline,
     };
@@ -114,12 +103,7 @@ unsafe fn submit_draw(buffer: vk::CommandBuffer, call: &Call, draw: impl Fn(&Dev
             push_number(known, buffer, &plan);
         }
         let twin = plan.pipeline.recorded.as_ref();
-        if let (true, Some(twin)) = (plan.skipped, twin) {
-            // Both pipelines have the same dynamic states.
-            (next.cmd_bind_pipeline)(buffer, graphics, plan.handle);
-            draw(known);
-            (next.cmd_bind_pipeline)(buffer, graphics, twin.handle);
-        } else if let (true, Some(twin)) = (plan.twice, twin) {
+        if let (true, Some(twin)) = (plan.twice, twin) {
             (next.cmd_bind_pipeline)(buffer, graphics, twin.handle);
             begin();
             draw(known);

@@ -15,6 +15,39 @@ fn used(attachment: u32) -> Option<u32> {
     (attachment != vk::ATTACHMENT_UNUSED).then_some(attachment)
 }
 
+/// Pairs of attachments of a subpass: those that are resolved, and their destinations.
+fn resolved(from: impl Iterator<Item = u32>, to: impl Iterator<Item = u32>) -> Vec<[u32; 2]> {
+    from.zip(to)
+        .filter_map(|(from, to)| Some([used(from)?, used(to)?]))
+        .collect()
+}
+
+/// The resolved attachments of a subpass.
+///
+/// # Safety
+/// A valid description.
+unsafe fn resolves2(subpass: &vk::SubpassDescription2<'_>) -> Vec<[u32; 2]> {
+    // SAFETY: as the caller promises.
+    let (colors, to, depth_to) = unsafe {
+        let count = subpass.color_attachment_count;
+        (
+            slice(subpass.p_color_attachments, count),
+            slice(subpass.p_resolve_attachments, count),
+            find::<vk::SubpassDescriptionDepthStencilResolve<'_>>(subpass.p_next)
+                .and_then(|of| of.p_depth_stencil_resolve_attachment.as_ref()),
+        )
+    };
+    // SAFETY: as the caller promises.
+    let depth = unsafe { subpass.p_depth_stencil_attachment.as_ref() };
+    let place = |of: &vk::AttachmentReference2<'_>| of.attachment;
+    let mut pairs = resolved(colors.iter().map(place), to.iter().map(place));
+    pairs.extend(resolved(
+        depth.into_iter().map(place),
+        depth_to.into_iter().map(place),
+    ));
+    pairs
+}
+
 pub(super) unsafe extern "system" fn create_render_pass(
     device: vk::Device,
     info: *const vk::RenderPassCreateInfo<'_>,
@@ -47,6 +80,17 @@ pub(super) unsafe extern "system" fn create_render_pass(
                         .collect(),
                         depth: (subpass.p_depth_stencil_attachment.as_ref())
                             .and_then(|depth| used(depth.attachment)),
+                        resolves: resolved(
+                            slice(subpass.p_color_attachments, subpass.color_attachment_count)
+                                .iter()
+                                .map(|of| of.attachment),
+                            slice(
+                                subpass.p_resolve_attachments,
+                                subpass.color_attachment_count,
+                            )
+                            .iter()
+                            .map(|of| of.attachment),
+                        ),
                         view_mask: masks.get(number).copied().unwrap_or(0),
                     })
                     .collect(),
@@ -84,6 +128,7 @@ pub(super) unsafe extern "system" fn create_render_pass2(
                         .collect(),
                         depth: (subpass.p_depth_stencil_attachment.as_ref())
                             .and_then(|depth| used(depth.attachment)),
+                        resolves: resolves2(subpass),
                         view_mask: subpass.view_mask,
                     })
                     .collect(),
@@ -184,8 +229,12 @@ fn enter(tracker: &mut crate::track::Tracker, buffer: vk::CommandBuffer, open: O
         open.area,
         open.subpass,
     );
+    let resolves = tracker.passes.resolves(&open);
     let state = tracker.commands.get_mut(buffer.as_raw());
     state.effects.renders = true;
+    for [from, to] in resolves {
+        state.effects.copies.add(from, to);
+    }
     state.pass = Some(Arc::new(pass));
     state.open = Some(open);
 }
@@ -309,13 +358,25 @@ pub(super) unsafe extern "system" fn cmd_begin_rendering(
                 let clears = of.load_op == CLEAR;
                 Some(Attachment { view, clears })
             };
-            let colors = slice(info.p_color_attachments, info.color_attachment_count).iter();
-            let colors = colors.filter_map(attachment).collect();
-            let depth = info.p_depth_attachment.as_ref().and_then(attachment);
+            let all_colors = slice(info.p_color_attachments, info.color_attachment_count);
+            let depth = info.p_depth_attachment.as_ref();
+            let resolves: Vec<[u32; 2]> = (all_colors.iter().chain(depth))
+                .filter(|of| of.resolve_mode != vk::ResolveModeFlags::NONE)
+                .filter_map(|of| {
+                    let [from, to] = [of.image_view, of.resolve_image_view]
+                        .map(|view| tracker.images.view(view));
+                    Some([from?.image, to?.image])
+                })
+                .collect();
+            let colors = all_colors.iter().filter_map(attachment).collect();
+            let depth = depth.and_then(attachment);
             // A suspended render pass continues.
             let resumes = info.flags.contains(vk::RenderingFlags::RESUMING);
             let state = tracker.commands.get_mut(buffer.as_raw());
             state.effects.renders = true;
+            for [from, to] in resolves {
+                state.effects.copies.add(from, to);
+            }
             if !resumes || state.pass.is_none() {
                 let (area, views) = (info.render_area, info.view_mask);
                 state.pass = Some(Arc::new(tracker.passes.info(colors, depth, area, views)));

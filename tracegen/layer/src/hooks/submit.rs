@@ -5,7 +5,8 @@ use super::device::Device;
 use super::draws::buffers_of;
 use super::pending::{Pending, Submission, fence_after, read_ended, wait_for};
 use crate::capture::lock;
-use crate::track::{Effects, Executed};
+use crate::spool::Event;
+use crate::track::{Copies, Effects, Executed};
 use ash::vk::{self, Handle};
 use std::collections::HashMap;
 use std::time::Duration;
@@ -173,6 +174,13 @@ unsafe fn submit_frame(
                 pending.block(known, queue);
             }
             return result;
+        }
+        if effects.copies != Copies::default() {
+            capture.event(&Event::Copies {
+                frame: place.frame,
+                pairs: effects.copies.pairs.clone(),
+                read_back: effects.copies.read_back.clone(),
+            });
         }
         let blocked = pending.is_blocked(known);
         let draws = draws_of(known, submitted);

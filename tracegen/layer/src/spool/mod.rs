@@ -17,8 +17,6 @@ use std::path::{Path, PathBuf};
 pub const FOLDER_VARIABLE: &str = "PARALLAX_CAPTURE_FOLDER";
 /// Name of the layer for the loader.
 pub const LAYER_NAME: &str = "VK_LAYER_PARALLAX_capture";
-/// Reason why a draw outside the pictures of scenes was not recorded; see [`Settings::all_draws`].
-pub const OUTSIDE_SCENES: &str = "no depth test, and outside the pictures of scenes (--all-draws)";
 /// Caveat of an indirect draw command, whose draws share one number.
 pub const INDIRECT: &str = "draws that the device chooses share a number";
 /// File of [`Settings`] in the folder.
@@ -38,9 +36,6 @@ pub struct Settings {
     pub frames_by: FramesBy,
     /// Whether an occlusion query counts the samples of each draw.
     pub occlusion: bool,
-    /// Whether draws without a depth test are recorded even if the program renders scenes into other images.
-    #[serde(default)]
-    pub all_draws: bool,
     /// Size of the record buffer in bytes. It holds the records of one submission.
     pub record_bytes: u64,
     /// Whether small pictures of render passes are written.
@@ -141,6 +136,15 @@ pub enum Event {
         /// Dispatches whose shaders read textures.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         dispatches: Vec<DispatchInfo>,
+    },
+    /// Command buffers copied images.
+    Copies {
+        /// Frame.
+        frame: u32,
+        /// Numbers of the source and the destination of each copy, blit and resolve between images.
+        pairs: Vec<[u32; 2]>,
+        /// Numbers of the images that were copied to a buffer.
+        read_back: Vec<u32>,
     },
     /// The small picture of a render pass. Its texels are in the file `PASS.rgba` next to the records, row by
     /// row.

@@ -96,7 +96,6 @@ fn settings_are_read_as_written() {
         frames: [10, 13],
         frames_by: FramesBy::Present,
         occlusion: true,
-        all_draws: false,
         record_bytes: 1 << 20,
         pictures: false,
         modules: None,

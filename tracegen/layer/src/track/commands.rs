@@ -63,6 +63,32 @@ pub struct Dynamic {
     pub color_enables: Option<Vec<vk::Bool32>>,
 }
 
+/// Copies of images in a command buffer, by the numbers of the images.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Copies {
+    /// Source and destination of copies, blits and resolves between images.
+    pub pairs: Vec<[u32; 2]>,
+    /// Images that are copied to a buffer.
+    pub read_back: Vec<u32>,
+}
+
+impl Copies {
+    /// Adds a copy between images, once.
+    pub fn add(&mut self, from: u32, to: u32) {
+        if from != to && !self.pairs.contains(&[from, to]) {
+            self.pairs.push([from, to]);
+        }
+    }
+
+    /// Adds the copies of other commands.
+    pub fn append(&mut self, other: &Self) {
+        for &[from, to] in &other.pairs {
+            self.add(from, to);
+        }
+        self.read_back.extend(&other.read_back);
+    }
+}
+
 /// What the commands of a command buffer do besides its draws.
 #[derive(Clone, Debug, Default)]
 pub struct Effects {
@@ -70,6 +96,8 @@ pub struct Effects {
     pub renders: bool,
     /// Whether it copies an image to memory that the host reads.
     pub reads_back: bool,
+    /// Images that it copies.
+    pub copies: Copies,
     /// Dispatches whose shaders read textures.
     pub dispatches: Vec<DispatchInfo>,
     /// Events that it waits for and does not set before.
@@ -100,6 +128,7 @@ impl Effects {
     pub fn append(&mut self, later: &Self) {
         self.renders |= later.renders;
         self.reads_back |= later.reads_back;
+        self.copies.append(&later.copies);
         self.dispatches.extend_from_slice(&later.dispatches);
         self.await_events(&later.awaited);
         self.set.extend(&later.set);
@@ -232,18 +261,6 @@ impl CommandState {
         }
     }
 
-    /// Whether the bound pipeline tests depth.
-    pub(super) fn tests_depth(&self) -> bool {
-        let Some(pipeline) = &self.pipeline else {
-            return false;
-        };
-        let dynamic = pipeline
-            .state
-            .is_dynamic(vk::DynamicState::DEPTH_TEST_ENABLE);
-        let set = self.dynamic.depth_test.filter(|_| dynamic);
-        set.unwrap_or(pipeline.state.depth.tests)
-    }
-
     fn info(&self, draw: u32, call: &Call, textures: Vec<TextureInfo>) -> Option<DrawInfo> {
         let pipeline = self.pipeline.as_ref()?;
         let (state, set) = (&pipeline.state, &self.dynamic);
@@ -259,8 +276,12 @@ impl CommandState {
             false => state.scissor,
         };
         let mut depth = state.depth;
-        depth.tests = self.tests_depth();
         let flags = [
+            (
+                vk::DynamicState::DEPTH_TEST_ENABLE,
+                set.depth_test,
+                &mut depth.tests,
+            ),
             (
                 vk::DynamicState::DEPTH_WRITE_ENABLE,
                 set.depth_write,

@@ -83,6 +83,12 @@ impl Images {
         self.linear.contains(&image.as_raw())
     }
 
+    /// The image of a handle.
+    #[must_use]
+    pub fn get(&self, image: vk::Image) -> Option<&Arc<ImageInfo>> {
+        self.images.get(&image.as_raw())
+    }
+
     /// The image with a number.
     #[must_use]
     pub fn numbered(&self, number: u32) -> Option<&Arc<ImageInfo>> {

@@ -9,14 +9,14 @@ mod images;
 mod passes;
 mod pipelines;
 
-pub use commands::{Call, CommandState, Commands, Dynamic, Effects, Executed, OpenPass};
+pub use commands::{Call, CommandState, Commands, Copies, Dynamic, Effects, Executed, OpenPass};
 pub use descriptors::{Descriptors, Template, TemplateEntry, Written};
 pub use images::Images;
 pub use passes::{Attachment, Passes, RenderPass, Subpass};
 pub use pipelines::{Compute, Layout, Library, Pipeline, Pipelines, Recorded, State};
 
-use crate::spool::{DrawInfo, TextureInfo, ViewInfo};
-use ash::vk;
+use crate::spool::{DrawInfo, TextureInfo};
+use ash::vk::{self, Handle};
 use std::collections::HashSet;
 
 /// All tracked objects of a device.
@@ -34,8 +34,6 @@ pub struct Tracker {
     pub commands: Commands,
     /// Timeline semaphores.
     pub timelines: HashSet<vk::Semaphore>,
-    /// Images into which draws that test depth have rendered colours.
-    scene_images: HashSet<u32>,
 }
 
 impl Tracker {
@@ -53,34 +51,25 @@ impl Tracker {
         }
     }
 
-    /// Notes the targets of a draw that tests depth. Such a draw is part of a 3D scene.
-    pub fn note_scene(&mut self, command_buffer: u64) {
-        let Some(state) = self.commands.get(command_buffer) else {
-            return;
-        };
-        if let Some(pass) = state.pass.as_ref().filter(|pass| pass.depth.is_some())
-            && state.tests_depth()
-        {
-            self.scene_images
-                .extend(pass.colors.iter().map(|view| view.image));
+    /// Notes that a command buffer copies an image to another one.
+    pub fn note_copy(&mut self, buffer: vk::CommandBuffer, from: vk::Image, to: vk::Image) {
+        let number = |image| Some(self.images.get(image)?.image);
+        if let (Some(from), Some(to)) = (number(from), number(to)) {
+            let effects = &mut self.commands.get_mut(buffer.as_raw()).effects;
+            effects.copies.add(from, to);
+        }
+        // The host can read the texels of a linear image in memory.
+        if self.images.is_linear(to) {
+            self.commands.get_mut(buffer.as_raw()).effects.reads_back = true;
         }
     }
 
-    /// Whether a draw tests no depth and its targets are no pictures of a scene, while the program has rendered
-    /// scenes into other images. Browsers and desktops compose their windows by such draws.
-    #[must_use]
-    pub fn is_outside_scenes(&self, command_buffer: u64) -> bool {
-        let state = self.commands.get(command_buffer);
-        let Some((state, pass)) = state.and_then(|state| Some((state, state.pass.as_ref()?)))
-        else {
-            return false;
-        };
-        if self.scene_images.is_empty() || pass.colors.is_empty() {
-            return false;
-        }
-        let tests_depth = pass.depth.is_some() && state.tests_depth();
-        let is_scene = |view: &ViewInfo| self.scene_images.contains(&view.image);
-        !tests_depth && !pass.colors.iter().any(is_scene)
+    /// Notes that a command buffer copies an image to a buffer.
+    pub fn note_read_back(&mut self, buffer: vk::CommandBuffer, image: vk::Image) {
+        let number = self.images.get(image).map(|image| image.image);
+        let effects = &mut self.commands.get_mut(buffer.as_raw()).effects;
+        effects.reads_back = true;
+        effects.copies.read_back.extend(number);
     }
 
     /// Description of a draw in a command buffer, with the next number; `None` if no graphics pipeline is

@@ -21,6 +21,8 @@ pub struct Subpass {
     pub colors: Vec<Option<u32>>,
     /// Depth attachment.
     pub depth: Option<u32>,
+    /// Attachments that are resolved, and those that they are resolved to.
+    pub resolves: Vec<[u32; 2]>,
     /// View mask.
     pub view_mask: u32,
 }
@@ -119,6 +121,20 @@ impl Passes {
             .collect();
         let depth = of.depth.and_then(attachment);
         self.info(colors, depth, area, of.view_mask)
+    }
+
+    /// Numbers of the images that a subpass resolves, and of those that they are resolved to.
+    #[must_use]
+    pub fn resolves(&self, open: &super::OpenPass) -> Vec<[u32; 2]> {
+        let pass = self.passes.get(&open.pass.as_raw());
+        let subpass = pass.and_then(|pass| pass.subpasses.get(open.subpass as usize));
+        let known = self.framebuffers.get(&open.framebuffer.as_raw());
+        let views = open.views.as_ref().or(known);
+        let image = |place: u32| Some(views?.get(place as usize)?.as_ref()?.image);
+        let pairs = subpass.into_iter().flat_map(|subpass| &subpass.resolves);
+        pairs
+            .filter_map(|[from, to]| Some([image(*from)?, image(*to)?]))
+            .collect()
     }
 
     /// Describes the targets of a render pass, with the next number.

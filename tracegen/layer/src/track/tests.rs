@@ -222,6 +222,7 @@ fn subpasses_have_their_own_attachments_and_only_the_first_one_clears() {
     let subpass = |color| Subpass {
         colors: vec![Some(color), None],
         depth: None,
+        resolves: Vec::new(),
         view_mask: 3,
     };
     let pass = RenderPass {
@@ -274,39 +275,52 @@ fn draws_of_a_secondary_command_buffer_belong_to_the_executing_pass() {
 }
 
 #[test]
-fn draws_without_a_depth_test_are_outside_scenes_once_a_scene_was_rendered_elsewhere() {
-    let mut tracker = tracker(&[vk::DynamicState::DEPTH_TEST_ENABLE]);
-    let targets = [1, 2, 3].map(|n| {
-        let view = image_view(&mut tracker.images, n, 8);
-        let view = tracker.images.view(view).unwrap();
-        Attachment {
-            view,
-            clears: false,
-        }
-    });
-    let [scene, window, depth] = targets;
-    let begin = |tracker: &mut Tracker, color, depth| {
-        let area = vk::Rect2D::default();
-        let pass = tracker.passes.info(vec![color], depth, area, 0);
-        tracker.commands.get_mut(1).pass = Some(Arc::new(pass));
-        tracker.is_outside_scenes(1)
+fn copies_are_noted_once_by_the_numbers_of_their_images_also_in_secondary_command_buffers() {
+    let mut tracker = Tracker::default();
+    for number in [7, 8, 9] {
+        image_view(&mut tracker.images, number, 64);
+    }
+    let image = vk::Image::from_raw;
+    let buffer = vk::CommandBuffer::from_raw;
+    for (from, to) in [(7, 8), (7, 8), (9, 9), (7, 99)] {
+        tracker.note_copy(buffer(2), image(from), image(to));
+    }
+    tracker.note_read_back(buffer(2), image(9));
+    tracker.commands.execute(1, 2);
+    let copies = &tracker.commands.get(1).unwrap().copies;
+    assert_eq!(
+        (&copies.pairs[..], &copies.read_back[..]),
+        (&[[0, 1]][..], &[2][..])
+    );
+    assert!(tracker.commands.reads_back(1));
+}
+
+#[test]
+fn a_subpass_resolves_attachments_by_the_images_of_its_framebuffer() {
+    let mut tracker = Tracker::default();
+    let views = [7, 8].map(|number| image_view(&mut tracker.images, number, 64));
+    let [pass, framebuffer] = [3, 4];
+    let open = OpenPass {
+        pass: vk::RenderPass::from_raw(pass),
+        framebuffer: vk::Framebuffer::from_raw(framebuffer),
+        views: None,
+        area: vk::Rect2D::default(),
+        subpass: 0,
     };
-    assert!(!begin(&mut tracker, window, None), "no scene yet");
-    // Without the depth test, a draw is not part of a scene.
-    assert!(!begin(&mut tracker, scene, Some(depth)));
-    tracker.note_scene(1);
-    assert!(!begin(&mut tracker, window, None));
-    let test_depth = |tracker: &mut Tracker, test| {
-        tracker.commands.get_mut(1).dynamic.depth_test = Some(test);
+    let subpass = Subpass {
+        colors: vec![Some(0)],
+        resolves: vec![[0, 1]],
+        ..Subpass::default()
     };
-    begin(&mut tracker, scene, Some(depth));
-    test_depth(&mut tracker, true);
-    tracker.note_scene(1);
-    assert!(begin(&mut tracker, window, None), "there is no depth");
-    assert!(!begin(&mut tracker, window, Some(depth)), "it tests depth");
-    test_depth(&mut tracker, false);
-    assert!(begin(&mut tracker, window, Some(depth)));
-    assert!(!begin(&mut tracker, scene, None), "a scene's picture");
+    let of = RenderPass {
+        clears: vec![false; 2],
+        subpasses: vec![subpass],
+    };
+    tracker.passes.create(open.pass, of);
+    tracker
+        .passes
+        .create_framebuffer(open.framebuffer, &views, &tracker.images);
+    assert_eq!(tracker.passes.resolves(&open), [[0, 1]]);
 }
 
 #[test]

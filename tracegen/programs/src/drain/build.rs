@@ -8,13 +8,13 @@ use crate::groups::{Bound, Group};
 use crate::lanes::visits;
 use crate::session::{Executed, Session, coverage_group, survival_group};
 use crate::texture::{FETCH, gathering, sampler};
-use crate::views::{Role, Views, viewport};
+use crate::views::{Other, Role, Views, viewport};
 use ash::vk;
 use formats::textrace::{Draw, LeftOut, NO_GROUP, PassKind, Surfaces, TraceMeta, UvGroup};
 use formats::textrace::{TextraceWriter, tables::MAX_GROUPS};
 use formats::view::Eye;
 use parallax_layer::inject::{Access, Form, RawQuad, RawSample, Site, TextureSite, What};
-use parallax_layer::spool::{DrawInfo, OUTSIDE_SCENES, ShaderInfo};
+use parallax_layer::spool::{DrawInfo, ShaderInfo};
 use rayon::prelude::*;
 use record::{CaptureCounts, DepthReplay, RawDepth, RawRecord, RawRecords, Recording};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -72,6 +72,10 @@ struct Records {
     depths: Vec<RawDepth>,
 }
 
+/// Draws of the eyes and of shadow maps that have no records in the trace; see [`Session::is_shaded`].
+const UNSHADED: &str =
+    "draws that write no colour and discard nothing, so their fragment shader has no effect";
+
 /// Builds a trace frame by frame.
 pub struct Builder<W: Write + Seek> {
     recording: Recording<W>,
@@ -127,14 +131,16 @@ impl<W: Write + Seek> Builder<W> {
     ) {
         for ((executed, role), weight) in draws.iter().zip(&views.roles).zip(weights) {
             let info = session.draw(executed.draw);
-            let skipped =
-                info.is_some_and(|info| info.unrecorded.as_deref() == Some(OUTSIDE_SCENES));
-            if let (Role::Other(other), true) = (role, skipped) {
-                self.leave_out(&format!("{}, not recorded", other.name()), 1, 0);
-            } else if let Role::Other(other) = role {
+            if *role == Role::Other(Other::Browser) {
+                // A browser draws its window at any time, so the numbers vary between runs.
+                continue;
+            }
+            if let Role::Other(other) = role {
                 self.leave_out(other.name(), 1, *weight);
             } else if let Some(why) = info.and_then(|info| info.unrecorded.as_ref()) {
                 self.leave_out(why, 1, *weight);
+            } else if !session.is_shaded(executed) {
+                self.leave_out(UNSHADED, 1, *weight);
             } else if let Some(info) = info {
                 for caveat in &info.caveats {
                     self.leave_out(caveat, 1, *weight);

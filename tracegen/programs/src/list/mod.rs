@@ -68,8 +68,7 @@ pub struct List {
 /// # Errors
 /// The frame has no draws, or the records cannot be read.
 pub fn list(session: &mut Session, number: u32, wanted: &Wanted) -> Result<List, SessionError> {
-    let frame = session.frames.get(&number).cloned();
-    let frame = frame.ok_or(SessionError::NotDrawn(number))?;
+    let frame = session.drawn(number)?;
     let records = session.records(number)?;
     let weight = |draw| weight(session, draw, &records);
     let weights: Vec<u64> = frame.draws.iter().map(weight).collect();
@@ -100,7 +99,11 @@ fn rows(
         }
         let row = &mut rows[number];
         row.draws += 1;
-        row.fragments += weights[place];
+        // Draws that are not recorded have only the count of their query.
+        row.fragments += match session.draw(executed.draw).and_then(|draw| draw.shader) {
+            Some(_) => weights[place],
+            None => executed.occlusion.unwrap_or(0),
+        };
         if let Some(views) = views {
             add_once(&mut row.shows, views.roles[place]);
         }

@@ -62,7 +62,7 @@ struct FileRule {
     viewport: Option<[i64; 4]>,
     /// `VkFormat` of the target.
     format: Option<i32>,
-    /// Whether the draw writes only depth.
+    /// Whether the draw writes depth and no colour.
     depth_only: Option<bool>,
     /// Colour channels that the draw writes: `"r"`, `"gb"`.
     channels: Option<Channels>,

@@ -2,14 +2,16 @@
 //! rules for other programs.
 
 mod file;
+mod images;
 mod others;
 mod rules;
 
 pub use file::{FileError, RuleFile};
 pub use others::Other;
 
-use crate::session::{ProgramFrame, Session};
+use crate::session::{Executed, ProgramFrame, Session, writes_color};
 use formats::view::Eye;
+use images::Images;
 use parallax_layer::spool::{DrawInfo, PassInfo, ViewInfo};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -141,6 +143,12 @@ pub enum ViewsError {
     /// The frame has no draws.
     #[error("frame {0}: nothing was drawn into a colour target")]
     Empty(u32),
+    /// A page has drawn nothing into its canvases.
+    #[error(
+        "frame {0}: the page drew nothing into a canvas of WebGL. It may still be loading: try a later frame. A page that waits for a click \
+         never draws: it must start its session itself. A page whose context was lost draws nothing more"
+    )]
+    EmptyPage(u32),
     /// The eyes of a file's rules have different sizes.
     #[error("frame {frame}: expected eyes of one size, found {left:?} and {right:?} pixels")]
     Sizes {
@@ -158,6 +166,8 @@ struct Drawn<'a> {
     place: usize,
     info: &'a DrawInfo,
     pass: Option<&'a PassInfo>,
+    /// Whether its fragment shader has an effect.
+    shaded: bool,
     /// Number of its render pass in the frame.
     pass_number: usize,
     /// Number of fragments, used to find the main target of a frame.
@@ -190,15 +200,20 @@ impl DrawKey {
 impl Drawn<'_> {
     /// First colour attachment that the draw writes.
     fn target(&self) -> Option<ViewInfo> {
-        let pass = self.pass?;
-        let written = |(place, _): &(usize, &ViewInfo)| {
-            self.info
-                .color_masks
-                .get(*place)
-                .is_none_or(|mask| *mask != 0)
-        };
-        let mut colors = pass.colors.iter().enumerate();
-        colors.find(written).map(|(_, view)| *view)
+        self.colors().next()
+    }
+
+    /// Colour attachments that the draw writes.
+    fn colors(&self) -> impl Iterator<Item = ViewInfo> {
+        let colors = self.pass.map_or(&[][..], |pass| &pass.colors);
+        let written =
+            |(place, view): (usize, &ViewInfo)| writes_color(self.info, place).then_some(*view);
+        colors.iter().enumerate().filter_map(written)
+    }
+
+    /// Depth attachment that the draw writes. A stencil test is no depth.
+    fn written_depth(&self) -> Option<ViewInfo> {
+        self.depth().filter(|_| self.info.depth.writes)
     }
 
     fn depth(&self) -> Option<ViewInfo> {
@@ -206,7 +221,7 @@ impl Drawn<'_> {
     }
 
     fn is_depth_alone(&self) -> bool {
-        self.depth().is_some() && self.target().is_none()
+        self.written_depth().is_some() && self.target().is_none()
     }
 
     /// Whether the draw is part of a 3D scene. Such draws test depth.
@@ -247,6 +262,22 @@ pub fn pass_numbers(frame: &ProgramFrame) -> Vec<usize> {
     frame.draws.iter().map(number).collect()
 }
 
+/// The draws of a frame with their numbers of fragments, 0 where these are missing.
+fn drawn<'a>(session: &'a Session, frame: &ProgramFrame, weights: &[u64]) -> Vec<Drawn<'a>> {
+    let numbers = pass_numbers(frame);
+    let of = |(place, executed): (usize, &Executed)| {
+        Some(Drawn {
+            place,
+            info: session.draw(executed.draw)?,
+            pass: session.pass(executed.pass),
+            shaded: session.is_shaded(executed),
+            pass_number: numbers[place],
+            weight: weights.get(place).copied().unwrap_or(0),
+        })
+    };
+    frame.draws.iter().enumerate().filter_map(of).collect()
+}
+
 /// Identifies the eyes of a frame. `weights` are the numbers of fragments of the executed draws.
 ///
 /// # Errors
@@ -257,17 +288,24 @@ pub fn find(
     weights: &[u64],
     wanted: &Wanted,
 ) -> Result<Views, ViewsError> {
-    let numbers = pass_numbers(frame);
-    let mut draws: Vec<Drawn<'_>> = (frame.draws.iter().zip(weights).enumerate())
-        .filter_map(|(place, (executed, weight))| {
-            Some(Drawn {
-                place,
-                info: session.draw(executed.draw)?,
-                pass: session.pass(executed.pass),
-                pass_number: numbers[place],
-                weight: *weight,
-            })
-        })
+    let all = drawn(session, frame, weights);
+    let next = session.frames.get(&(frame.frame + 1));
+    let later = next.map_or_else(Vec::new, |next| drawn(session, next, &[]));
+    let mut copies = frame.copies.clone();
+    copies.extend(next.iter().flat_map(|next| &next.copies));
+    let graph = Images::new(all.iter().chain(&later), copies);
+    let mut roles = vec![Role::Other(Other::Elsewhere); frame.draws.len()];
+    let of_page = match session.is_page {
+        true => graph.of_page(&frame.read_back),
+        false => None,
+    };
+    let is_browser = |draw: &Drawn<'_>| of_page.as_ref().is_some_and(|page| !page.has(draw));
+    for draw in all.iter().filter(|draw| is_browser(draw)) {
+        roles[draw.place] = Role::Other(Other::Browser);
+    }
+    let by_file = matches!(wanted, Wanted::File(_));
+    let mut draws: Vec<Drawn<'_>> = (all.into_iter())
+        .filter(|draw| by_file || !is_browser(draw))
         .collect();
     let of_scene = |draw: &Drawn<'_>| draw.is_of_scene() && draw.weight > 0;
     if draws.iter().any(of_scene) {
@@ -279,7 +317,10 @@ pub fn find(
     let colored = draws.iter().filter(|draw| draw.target().is_some());
     let colored: u64 = colored.map(|draw| draw.weight).sum();
     if colored == 0 {
-        return Err(ViewsError::Empty(frame.frame));
+        return Err(match session.is_page {
+            true => ViewsError::EmptyPage(frame.frame),
+            false => ViewsError::Empty(frame.frame),
+        });
     }
     let (rule, found) = match wanted {
         Wanted::File(file) => (Rule::File, file.find(frame.frame, &draws)?),
@@ -294,16 +335,15 @@ pub fn find(
             let all = Rule::ALL.into_iter();
             let mut fitting = all
                 .filter_map(|rule| Some((rule, rules::find(rule, &draws)?)))
-                .filter(|(_, found)| found.weight * 2 >= colored);
+                .filter(|(_, found)| found.weight * 2 >= graph.beside(&draws, found));
             fitting.next().ok_or(ViewsError::NoStereo(frame.frame))?
         }
     };
-    let mut roles = vec![Role::Other(Other::Elsewhere); frame.draws.len()];
     for (place, role) in &found.roles {
         roles[*place] = *role;
     }
     if rule != Rule::File {
-        others::classify(&draws, &mut roles);
+        others::classify(&draws, &later, &graph, &mut roles);
     }
     Ok(Views {
         rule,

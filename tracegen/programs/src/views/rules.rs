@@ -18,7 +18,7 @@ pub(super) fn find(rule: Rule, draws: &[Drawn<'_>]) -> Option<Found> {
     }
 }
 
-/// Sums the fragments of draws by a key; the sums_by_key sum comes first.
+/// Sums the fragments of draws by a key; the largest sum comes first.
 fn sums_by_key<K: Copy + Eq + std::hash::Hash>(
     draws: &[&Drawn<'_>],
     key: impl Fn(&Drawn<'_>) -> Option<K>,

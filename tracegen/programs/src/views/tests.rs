@@ -56,7 +56,7 @@ impl Build {
         weight: u64,
         change: impl FnOnce(&mut DrawInfo),
     ) {
-        let draw = self.draws.len() as u32;
+        let draw = self.weights.len() as u32;
         let tests = self
             .session
             .pass(pass)
@@ -68,6 +68,7 @@ impl Build {
             color_masks: vec![15],
             depth: DepthInfo {
                 tests,
+                writes: tests,
                 ..DepthInfo::default()
             },
             vertices: 3,
@@ -80,9 +81,10 @@ impl Build {
         self.weights.push(weight);
     }
 
-    fn find(&mut self, wanted: &Wanted) -> Result<Views, ViewsError> {
+    /// Submits the draws so far as a frame.
+    fn submit(&mut self, frame: u32) {
         self.session.take(Event::Submit {
-            frame: 0,
+            frame,
             draws: std::mem::take(&mut self.draws),
             records: Span::default(),
             lost_bytes: 0,
@@ -90,8 +92,27 @@ impl Build {
             frame_by_waits: None,
             dispatches: Vec::new(),
         });
+    }
+
+    fn copy(&mut self, pairs: &[[u32; 2]], read_back: &[u32]) {
+        self.session.take(Event::Copies {
+            frame: 0,
+            pairs: pairs.to_vec(),
+            read_back: read_back.to_vec(),
+        });
+    }
+
+    /// Identifies the eyes of frame 0.
+    fn find(&mut self, wanted: &Wanted) -> Result<Views, ViewsError> {
+        if !self.draws.is_empty() || self.session.frames.is_empty() {
+            self.submit(0);
+        }
         let frame = self.session.frames[&0].clone();
         find(&self.session, &frame, &self.weights, wanted)
+    }
+
+    fn roles(&mut self) -> Vec<Role> {
+        self.find(&Wanted::First).unwrap().roles
     }
 }
 
@@ -196,7 +217,7 @@ fn draws_outside_the_eyes_are_classified_by_their_readers() {
     let shadow = build.pass(None, Some(10));
     build.draw(shadow, 8, [0, 64], 700);
     let mirror = build.pass(Some(11), Some(12));
-    build.draw(mirror, 7, [0, 16], 50);
+    build.draw_with(mirror, 7, [0, 16], 50, reads(10));
     let prepass = build.pass(None, Some(2));
     build.draw(prepass, 6, [32, 32], 90);
     let eyes = build.pass(Some(1), Some(2));
@@ -205,10 +226,9 @@ fn draws_outside_the_eyes_are_classified_by_their_readers() {
     }
     let bloom = build.pass(Some(13), None);
     build.draw_with(bloom, 5, [0, 64], 4000, reads(1));
-    let roles = build.find(&Wanted::First).unwrap().roles;
     let other = |of| Role::Other(of);
     assert_eq!(
-        roles,
+        build.roles(),
         [
             Role::Shadow,
             other(Other::Reflection),
@@ -218,6 +238,229 @@ fn draws_outside_the_eyes_are_classified_by_their_readers() {
             other(Other::PostProcessing),
         ]
     );
+}
+
+/// A mask: a draw that writes only stencil.
+fn stencil(draw: &mut DrawInfo) {
+    draw.color_masks = vec![0];
+    draw.depth = DepthInfo {
+        stencil: true,
+        ..DepthInfo::default()
+    };
+}
+
+/// The proxy of an occlusion query: a draw that tests depth and writes nothing.
+fn proxy(draw: &mut DrawInfo) {
+    draw.color_masks = vec![0];
+    draw.depth.writes = false;
+}
+
+/// Eyes in the halves of image 1 with depth 2.
+fn eyes(build: &mut Build, change: impl Fn(&mut DrawInfo)) {
+    let pass = build.pass(Some(1), Some(2));
+    for left in [0, 32] {
+        build.draw_with(pass, 1, [left, 32], 300, &change);
+    }
+}
+
+#[test]
+fn masks_and_occlusion_proxies_are_no_shadow_maps() {
+    let mask = Role::Other(Other::Mask);
+    for change in [stencil, proxy] {
+        let mut build = Build::default();
+        // Into a target that nobody reads, and into one whose colours the eyes read.
+        for color in [20, 22] {
+            let target = build.pass(Some(color), Some(21));
+            build.draw_with(target, 9, [0, 64], 700, change);
+        }
+        // Over both eyes at once, and for each eye.
+        let pass = build.pass(Some(1), Some(2));
+        for columns in [[0, 64], [0, 32], [32, 32]] {
+            build.draw_with(pass, 9, columns, 700, change);
+        }
+        eyes(&mut build, |draw| reads(22)(draw));
+        let expected = [mask, mask, mask, mask, mask, LEFT, RIGHT];
+        assert_eq!(build.roles(), expected);
+    }
+    // A mask that discards samples textures for the eye in whose viewport it is.
+    let mut build = Build::default();
+    let pass = build.pass(Some(1), Some(2));
+    for columns in [[0, 64], [32, 32]] {
+        build.draw_with(pass, 9, columns, 700, |draw| {
+            stencil(draw);
+            draw.twice = true;
+        });
+    }
+    eyes(&mut build, |_| ());
+    assert_eq!(build.roles(), [mask, RIGHT, LEFT, RIGHT]);
+}
+
+#[test]
+fn a_portal_draws_the_world_behind_its_mask_into_the_eyes() {
+    let mut build = Build::default();
+    let pass = build.pass(Some(1), Some(2));
+    for left in [0, 32] {
+        build.draw(pass, 1, [left, 32], 300);
+        build.draw_with(pass, 2, [left, 32], 100, stencil);
+        build.draw_with(pass, 3, [left, 32], 90, |draw| draw.depth.stencil = true);
+    }
+    let mask = Role::Other(Other::Mask);
+    assert_eq!(build.roles(), [LEFT, mask, LEFT, RIGHT, mask, RIGHT]);
+}
+
+#[test]
+fn depth_is_a_shadow_map_only_if_it_is_read_for_an_eye() {
+    let mut build = Build::default();
+    // Depth that no draw reads, and depth that only processes the finished eyes.
+    for depth in [30, 31] {
+        let pass = build.pass(None, Some(depth));
+        build.draw(pass, 8, [0, 64], 700);
+    }
+    // A shadow map beside a colour target that is not read, and a mirror whose depth is read as well.
+    let beside = build.pass(Some(32), Some(33));
+    build.draw(beside, 8, [0, 16], 7);
+    let mirror = build.pass(Some(34), Some(35));
+    build.draw(mirror, 8, [0, 16], 7);
+    // A shadow map that is read through a copy.
+    let copied = build.pass(None, Some(36));
+    build.draw(copied, 8, [0, 16], 7);
+    build.copy(&[[36, 37]], &[]);
+    eyes(&mut build, |draw| {
+        for image in [33, 34, 35, 37] {
+            reads(image)(draw);
+        }
+    });
+    // A shadow map that the eyes of the next frame read is in the same image.
+    let after = build.pass(None, Some(37));
+    build.draw(after, 8, [0, 16], 7);
+    let bloom = build.pass(Some(13), None);
+    build.draw_with(bloom, 5, [0, 64], 40, |draw| {
+        reads(1)(draw);
+        reads(31)(draw);
+    });
+    let unread = Role::Other(Other::Depth);
+    assert_eq!(
+        build.roles(),
+        [
+            unread,
+            unread,
+            Role::Shadow,
+            Role::Other(Other::Reflection),
+            Role::Shadow,
+            LEFT,
+            RIGHT,
+            Role::Shadow,
+            Role::Other(Other::PostProcessing),
+        ]
+    );
+}
+
+#[test]
+fn a_shadow_map_may_be_read_in_the_next_frame() {
+    let mut build = Build::default();
+    for (frame, [drawn, read]) in [[40, 41], [41, 40]].into_iter().enumerate() {
+        eyes(&mut build, |draw| reads(read)(draw));
+        let shadow = build.pass(None, Some(drawn));
+        build.draw(shadow, 8, [0, 64], 700);
+        build.submit(frame as u32);
+    }
+    assert_eq!(build.roles(), [LEFT, RIGHT, Role::Shadow]);
+}
+
+#[test]
+fn a_depth_pre_pass_belongs_to_the_eye_that_follows() {
+    let mut build = Build::default();
+    for _ in 0..2 {
+        let prepass = build.pass(None, Some(2));
+        build.draw(prepass, 6, [0, 64], 90);
+        let pass = build.pass(Some(1), Some(2));
+        for pipeline in 0..3 {
+            build.draw(pass, pipeline, [0, 64], 500);
+        }
+    }
+    let views = build.find(&Wanted::First).unwrap();
+    assert_eq!(views.rule, Rule::Twice);
+    let eye = |eye| [eye; 4];
+    assert_eq!(views.roles, [eye(LEFT), eye(RIGHT)].concat());
+}
+
+/// A browser with a page that draws its eyes without depth into canvas 1 of 64 pixels.
+fn page() -> Build {
+    let mut build = Build::default();
+    build.session.is_page = true;
+    // Chromium draws two tiles of its window, with stencil.
+    for tile in [50, 51] {
+        let pass = build.pass(Some(tile), Some(52));
+        build.draw_with(pass, 20, [0, 64], 600, stencil);
+        build.draw_with(pass, 21, [0, 64], 5000, |draw| draw.depth.tests = false);
+    }
+    build
+}
+
+#[test]
+fn the_browsers_draws_are_identified_by_images_and_affect_no_eye() {
+    let mut build = page();
+    let canvas = build.pass(Some(1), None);
+    for left in [0, 32] {
+        build.draw(canvas, 1, [left, 32], 300);
+    }
+    // The window shows the canvas and the tiles.
+    let window = build.pass(Some(60), None);
+    for image in [1, 50, 51] {
+        build.draw_with(window, 22, [0, 64], 9000, reads(image));
+    }
+    build.copy(&[], &[1]);
+    let views = build.find(&Wanted::First).unwrap();
+    assert_eq!(views.rule, Rule::Halves);
+    let browser = [Role::Other(Other::Browser); 4];
+    let expected = [&browser[..], &[LEFT, RIGHT], &browser[..3]].concat();
+    assert_eq!(views.roles, expected);
+}
+
+#[test]
+fn eyes_of_a_page_may_be_in_an_image_that_its_canvas_shows() {
+    let mut build = page();
+    // With several samples per pixel, and with a pass that processes the picture.
+    let scene = build.pass(Some(2), Some(3));
+    for left in [0, 32] {
+        build.draw(scene, 1, [left, 32], 300);
+    }
+    let canvas = build.pass(Some(5), None);
+    build.draw_with(canvas, 2, [0, 64], 900, reads(4));
+    let window = build.pass(Some(60), None);
+    build.draw_with(window, 22, [0, 64], 9000, reads(1));
+    build.copy(&[[2, 4], [5, 1]], &[1]);
+    let browser = Role::Other(Other::Browser);
+    let post = Role::Other(Other::PostProcessing);
+    let expected = [&[browser; 4][..], &[LEFT, RIGHT, post, browser]].concat();
+    assert_eq!(build.roles().len(), expected.len());
+    assert_eq!(build.roles()[..6], expected[..6]);
+    assert_eq!(build.roles()[7], browser);
+}
+
+#[test]
+fn a_page_without_draws_into_its_canvas_has_drawn_nothing() {
+    let mut build = page();
+    build.copy(&[], &[1]);
+    let error = build.find(&Wanted::First).unwrap_err();
+    assert_eq!(error, ViewsError::EmptyPage(0));
+}
+
+#[test]
+fn a_pass_that_combines_two_targets_is_no_reason_against_them() {
+    let mut build = Build::default();
+    for color in [1, 2] {
+        let pass = build.pass(Some(color), Some(3));
+        build.draw(pass, 1, [0, 64], 100);
+    }
+    let combined = build.pass(Some(4), Some(5));
+    build.draw_with(combined, 2, [0, 64], 4000, |draw| {
+        reads(1)(draw);
+        reads(2)(draw);
+    });
+    let views = build.find(&Wanted::First).unwrap();
+    assert_eq!(views.rule, Rule::Targets);
+    assert_eq!(views.roles[..2], [LEFT, RIGHT]);
 }
 
 #[test]
