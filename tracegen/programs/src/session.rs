@@ -89,8 +89,8 @@ pub struct ProgramFrame {
     numbers: HashSet<u32>,
     /// Source and destination of each copy between images.
     pub copies: Vec<[u32; 2]>,
-    /// Images that were copied to a buffer.
-    pub read_back: Vec<u32>,
+    /// Images of which one texel alone was copied to a buffer.
+    pub probed: Vec<u32>,
     /// Number of bytes of records that did not fit the buffer.
     pub lost_bytes: u64,
     /// Whether the program ended the frame.
@@ -110,8 +110,8 @@ pub struct Session {
     pub driver: String,
     /// Reason why recording is not possible on the device, if any.
     pub refused: Option<String>,
-    /// Whether the process is a browser with a page. The page's script reads back each of its canvases in each
-    /// frame.
+    /// Whether the process is a browser with a page. The script in the page reads one pixel of each
+    /// canvas after each frame. The browser reads its whole window.
     pub is_page: bool,
     /// Problems that make the capture incomplete.
     pub troubles: Vec<String>,
@@ -232,12 +232,12 @@ impl Session {
             Event::Copies {
                 frame,
                 pairs,
-                read_back,
+                probed,
             } => {
                 let of = self.frames.entry(frame).or_default();
                 of.frame = frame;
                 of.copies.extend(pairs);
-                of.read_back.extend(read_back);
+                of.probed.extend(probed);
             }
             Event::Frame { frame, took_us } => self.end_frame(frame, took_us),
             Event::Waited { frame, took_us } => {

@@ -189,6 +189,9 @@ copies! {
         note_copy(from, to);
     cmd_resolve_image2(info: *const vk::ResolveImageInfo2<'_>) note_copy((*info).src_image, (*info).dst_image);
     cmd_copy_image_to_buffer(image: vk::Image, layout: vk::ImageLayout, to: vk::Buffer, count: u32, regions: *const vk::BufferImageCopy)
-        note_read_back(image);
-    cmd_copy_image_to_buffer2(info: *const vk::CopyImageToBufferInfo2<'_>) note_read_back((*info).src_image);
+        note_read_back(image, slice(regions, count).iter().map(|region| region.image_extent));
+    cmd_copy_image_to_buffer2(info: *const vk::CopyImageToBufferInfo2<'_>) note_read_back(
+        (*info).src_image,
+        slice((*info).p_regions, (*info).region_count).iter().map(|region| region.image_extent)
+    );
 }

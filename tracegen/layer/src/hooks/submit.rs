@@ -179,7 +179,7 @@ unsafe fn submit_frame(
             capture.event(&Event::Copies {
                 frame: place.frame,
                 pairs: effects.copies.pairs.clone(),
-                read_back: effects.copies.read_back.clone(),
+                probed: effects.copies.probed.clone(),
             });
         }
         let blocked = pending.is_blocked(known);

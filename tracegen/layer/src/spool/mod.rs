@@ -143,8 +143,8 @@ pub enum Event {
         frame: u32,
         /// Numbers of the source and the destination of each copy, blit and resolve between images.
         pairs: Vec<[u32; 2]>,
-        /// Numbers of the images that were copied to a buffer.
-        read_back: Vec<u32>,
+        /// Numbers of the images of which one texel alone was copied to a buffer.
+        probed: Vec<u32>,
     },
     /// The small picture of a render pass. Its texels are in the file `PASS.rgba` next to the records, row by
     /// row.

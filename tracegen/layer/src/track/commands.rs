@@ -68,8 +68,8 @@ pub struct Dynamic {
 pub struct Copies {
     /// Source and destination of copies, blits and resolves between images.
     pub pairs: Vec<[u32; 2]>,
-    /// Images that are copied to a buffer.
-    pub read_back: Vec<u32>,
+    /// Images of which one texel alone is copied to a buffer.
+    pub probed: Vec<u32>,
 }
 
 impl Copies {
@@ -85,7 +85,7 @@ impl Copies {
         for &[from, to] in &other.pairs {
             self.add(from, to);
         }
-        self.read_back.extend(&other.read_back);
+        self.probed.extend(&other.probed);
     }
 }
 

@@ -64,12 +64,19 @@ impl Tracker {
         }
     }
 
-    /// Notes that a command buffer copies an image to a buffer.
-    pub fn note_read_back(&mut self, buffer: vk::CommandBuffer, image: vk::Image) {
+    /// Notes that a command buffer copies regions of an image to a buffer.
+    pub fn note_read_back(
+        &mut self,
+        buffer: vk::CommandBuffer,
+        image: vk::Image,
+        regions: impl IntoIterator<Item = vk::Extent3D>,
+    ) {
+        let is_texel = |size: vk::Extent3D| [size.width, size.height, size.depth] == [1; 3];
+        let is_probe = regions.into_iter().any(is_texel);
         let number = self.images.get(image).map(|image| image.image);
         let effects = &mut self.commands.get_mut(buffer.as_raw()).effects;
         effects.reads_back = true;
-        effects.copies.read_back.extend(number);
+        effects.copies.probed.extend(number.filter(|_| is_probe));
     }
 
     /// Description of a draw in a command buffer, with the next number; `None` if no graphics pipeline is

@@ -285,11 +285,18 @@ fn copies_are_noted_once_by_the_numbers_of_their_images_also_in_secondary_comman
     for (from, to) in [(7, 8), (7, 8), (9, 9), (7, 99)] {
         tracker.note_copy(buffer(2), image(from), image(to));
     }
-    tracker.note_read_back(buffer(2), image(9));
+    for (number, width) in [(8, 64), (9, 1)] {
+        let size = vk::Extent3D {
+            width,
+            height: 1,
+            depth: 1,
+        };
+        tracker.note_read_back(buffer(2), image(number), [size]);
+    }
     tracker.commands.execute(1, 2);
     let copies = &tracker.commands.get(1).unwrap().copies;
     assert_eq!(
-        (&copies.pairs[..], &copies.read_back[..]),
+        (&copies.pairs[..], &copies.probed[..]),
         (&[[0, 1]][..], &[2][..])
     );
     assert!(tracker.commands.reads_back(1));

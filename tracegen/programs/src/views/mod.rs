@@ -296,7 +296,7 @@ pub fn find(
     let graph = Images::new(all.iter().chain(&later), copies);
     let mut roles = vec![Role::Other(Other::Elsewhere); frame.draws.len()];
     let of_page = match session.is_page {
-        true => graph.of_page(&frame.read_back),
+        true => graph.of_page(&frame.probed),
         false => None,
     };
     let is_browser = |draw: &Drawn<'_>| of_page.as_ref().is_some_and(|page| !page.has(draw));

@@ -94,11 +94,11 @@ impl Build {
         });
     }
 
-    fn copy(&mut self, pairs: &[[u32; 2]], read_back: &[u32]) {
+    fn copy(&mut self, pairs: &[[u32; 2]], probed: &[u32]) {
         self.session.take(Event::Copies {
             frame: 0,
             pairs: pairs.to_vec(),
-            read_back: read_back.to_vec(),
+            probed: probed.to_vec(),
         });
     }
 
