@@ -62,7 +62,7 @@ impl Images {
     }
 
     /// The images, and all images that are made from them.
-    fn results(&self, images: impl IntoIterator<Item = u32>) -> HashSet<u32> {
+    pub(super) fn results(&self, images: impl IntoIterator<Item = u32>) -> HashSet<u32> {
         closure(images, &self.steps, |step| (&step.reads, &step.writes))
     }
 

@@ -9,7 +9,8 @@ use std::collections::HashSet;
 pub enum Other {
     /// Renders a picture that the eyes' draws read as a texture: a reflection, a probe, a screen.
     Reflection,
-    /// Processes earlier pictures: tests no depth and reads a picture of the frame.
+    /// Processes earlier pictures: reads the picture of an eye, or tests no depth and reads another picture of the
+    /// frame.
     PostProcessing,
     /// Writes neither colour nor depth: a stencil mask, or the proxy of an occlusion query.
     Mask,
@@ -69,6 +70,13 @@ pub(super) fn classify(
     let rendered: HashSet<u32> = (draws.iter())
         .filter_map(|draw| Some(draw.target()?.image))
         .collect();
+    let results = graph.results(
+        eyes.iter()
+            .flat_map(|eye| eye.colors().map(|view| view.image)),
+    );
+    let processed = |draw: &Drawn<'_>, image: u32| {
+        results.contains(&image) || (!draw.is_of_scene() && rendered.contains(&image))
+    };
     let eye_roles: Vec<Role> = eyes.iter().map(|eye| roles[eye.place]).collect();
     for draw in draws
         .iter()
@@ -95,7 +103,7 @@ pub(super) fn classify(
             (None, _) if draw.is_depth_alone() => Role::Other(Other::Depth),
             (None, _) => Role::Other(Other::Mask),
             _ if draw.is_of_scene() && color_is_read => Role::Other(Other::Reflection),
-            _ if !draw.is_of_scene() && draw.reads().any(|image| rendered.contains(&image)) => {
+            _ if draw.reads().any(|image| processed(draw, image)) => {
                 Role::Other(Other::PostProcessing)
             }
             _ => open,
