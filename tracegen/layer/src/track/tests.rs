@@ -294,12 +294,12 @@ fn copies_are_noted_once_by_the_numbers_of_their_images_also_in_secondary_comman
         tracker.note_read_back(buffer(2), image(number), [size]);
     }
     tracker.commands.execute(1, 2);
-    let copies = &tracker.commands.get(1).unwrap().copies;
+    let copies = &tracker.commands.get(1).unwrap().effects.copies;
     assert_eq!(
         (&copies.pairs[..], &copies.probed[..]),
         (&[[0, 1]][..], &[2][..])
     );
-    assert!(tracker.commands.reads_back(1));
+    assert!(tracker.commands.effects([1]).reads_back);
 }
 
 #[test]
