@@ -14,7 +14,7 @@ pub enum Other {
     PostProcessing,
     /// Writes neither colour nor depth: a stencil mask, or the proxy of an occlusion query.
     Mask,
-    /// Writes depth alone, which is not read for an eye.
+    /// Writes depth alone, for no single eye, and no eye samples it.
     Depth,
     /// Renders into another target for an unknown purpose.
     Elsewhere,
@@ -32,7 +32,7 @@ impl Other {
             Self::Reflection => "reflections and other pictures of scenes that the eyes read",
             Self::PostProcessing => "post-processing",
             Self::Mask => "masks and occlusion queries",
-            Self::Depth => "depth that no eye reads",
+            Self::Depth => "depth of no single eye, which no eye samples",
             Self::Browser => "the browser's own drawing",
             Self::Elsewhere => "draws into other targets",
             Self::Ignored => "passes that the file of rules ignores",
