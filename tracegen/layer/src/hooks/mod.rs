@@ -182,15 +182,6 @@ hooks! { device_hook:
     b"vkCmdCopyImageToBuffer" => commands::cmd_copy_image_to_buffer;
     b"vkCmdCopyImageToBuffer2" => commands::cmd_copy_image_to_buffer2;
     b"vkCmdCopyImageToBuffer2KHR" => commands::cmd_copy_image_to_buffer2;
-    b"vkCmdCopyImage" => commands::cmd_copy_image;
-    b"vkCmdCopyImage2" => commands::cmd_copy_image2;
-    b"vkCmdCopyImage2KHR" => commands::cmd_copy_image2;
-    b"vkCmdBlitImage" => commands::cmd_blit_image;
-    b"vkCmdBlitImage2" => commands::cmd_blit_image2;
-    b"vkCmdBlitImage2KHR" => commands::cmd_blit_image2;
-    b"vkCmdResolveImage" => commands::cmd_resolve_image;
-    b"vkCmdResolveImage2" => commands::cmd_resolve_image2;
-    b"vkCmdResolveImage2KHR" => commands::cmd_resolve_image2;
     b"vkCmdSetEvent" => commands::cmd_set_event;
     b"vkCmdSetEvent2" => commands::cmd_set_event2;
     b"vkCmdSetEvent2KHR" => commands::cmd_set_event2;

@@ -125,9 +125,6 @@ next_functions! {
     cmd_wait_events: PFN_vkCmdWaitEvents [c"vkCmdWaitEvents"];
     cmd_wait_events2: PFN_vkCmdWaitEvents2 [c"vkCmdWaitEvents2", c"vkCmdWaitEvents2KHR"];
     cmd_blit_image: PFN_vkCmdBlitImage [c"vkCmdBlitImage"];
-    cmd_blit_image2: PFN_vkCmdBlitImage2 [c"vkCmdBlitImage2", c"vkCmdBlitImage2KHR"];
-    cmd_resolve_image: PFN_vkCmdResolveImage [c"vkCmdResolveImage"];
-    cmd_resolve_image2: PFN_vkCmdResolveImage2 [c"vkCmdResolveImage2", c"vkCmdResolveImage2KHR"];
     cmd_pipeline_barrier: PFN_vkCmdPipelineBarrier [c"vkCmdPipelineBarrier"];
     create_buffer: PFN_vkCreateBuffer [c"vkCreateBuffer"];
     destroy_buffer: PFN_vkDestroyBuffer [c"vkDestroyBuffer"];
