@@ -169,7 +169,11 @@ impl AppArgs {
 const FRAME_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Runs the program until it has rendered its frames or ends.
-fn run_program(args: &AppArgs, launch: &Launch, name: &str) -> anyhow::Result<(Program, FailedRun)> {
+fn run_program(
+    args: &AppArgs,
+    launch: &Launch,
+    name: &str,
+) -> anyhow::Result<(Program, FailedRun)> {
     let opengl = args.gl || args.apitrace.is_some();
     // A replay that is terminated prints its call stack.
     let log = args
