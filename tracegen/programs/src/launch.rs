@@ -192,7 +192,7 @@ mod tests {
             [".scratch-a", ".scratch-b", "other"].map(|name| parent.path().join(name));
         for folder in [&killed, &running, &other] {
             fs::create_dir(folder).unwrap();
-            fs::write(folder.join(MANIFEST), b"").unwrap();
+            fs::write(folder.join(loader::MANIFEST), b"").unwrap();
         }
         let _locked = lock(&running).unwrap();
         remove_abandoned(parent.path());

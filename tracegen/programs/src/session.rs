@@ -511,6 +511,7 @@ mod tests {
             kind: 1,
             levels: [0, 1],
             layers: [0, 1],
+            min_lod_256ths: 0,
         };
         session.take(Event::Pass(PassInfo {
             colors: vec![view; 2],
