@@ -180,7 +180,7 @@ mod tests {
                 [0, 2, 3, 1],
                 [4, 5, 7, 6],
             ] {
-                mesh.indices.extend([a, b, c, a, c, d].map(|i| first + i));
+                mesh.indices.extend([a, c, b, a, d, c].map(|i| first + i));
             }
         }
         let material = Material {
