@@ -37,7 +37,7 @@ pub const FILES: &FileUses = &[
     (
         &[],
         &[
-            "output", "csv", "html", "image", "parquet", "timeline", "picture",
+            "output", "csv", "html", "image", "parquet", "path", "timeline", "picture",
         ],
         FileUse::Output,
     ),

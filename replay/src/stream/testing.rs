@@ -173,6 +173,11 @@ pub fn different_frames() -> MemoryTrace {
             .passes
             .extend(passes.map(|pass| Pass { frame, ..*pass }));
         trace.tiles.extend(other.tiles);
+        let views = formats::view::FrameViews {
+            frame,
+            ..Default::default()
+        };
+        trace.tables.meta.frames.push(views);
     }
     trace
 }

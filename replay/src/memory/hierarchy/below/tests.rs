@@ -160,7 +160,7 @@ fn values_out_of_range_are_refused_with_the_name_of_the_level() {
     );
     assert_eq!(
         fault(&[level(3, 16, 64, 60)]),
-        "L3 cache of 3 KiB, 16 ways, 64-byte lines: expected a power-of-two number of sets up to 16777216, found 3"
+        "L3 cache of 3 KiB, 16 ways, 64-byte lines: expected a power-of-two number of sets up to 16777216, found 3; possible: 2 KiB or 4 KiB with 16 ways, or 3 KiB with 12 ways"
     );
     assert!(Levels::default().over(&[good; 5]).is_none());
 }
