@@ -63,7 +63,7 @@ fn bytes_equal_those_of_plain_caches_with_din_input() {
         "band2+merge+infinity",
         "strip8+lrta",
         "scanline+right-reversed",
-        "adaptive+sta+offset",
+        "adaptive16+sta+offset",
         "zig-zag+merge+row-primitives",
         "zig-zag+lrta+row-lines",
         "zig-zag+sta+offset+runs",
