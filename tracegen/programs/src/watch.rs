@@ -8,6 +8,9 @@ use std::time::{Duration, Instant};
 /// First and longest interval between two looks. A program may end soon.
 const INTERVALS: [Duration; 2] = [Duration::from_millis(10), Duration::from_secs(1)];
 
+/// Time after which a process that executes a program has its environment.
+const EXECUTION: Duration = Duration::from_millis(20);
+
 /// What was seen of the processes that this one started, and of their descendants.
 #[derive(Debug)]
 pub struct Watch {
@@ -62,10 +65,18 @@ impl Watch {
         self.vulkan |= maps.contains("/libvulkan.so");
         let libraries = ["/libGL.so", "/libGLX.so", "/libEGL.so", "/libOpenGL.so"];
         self.opengl |= libraries.iter().any(|library| maps.contains(library));
-        let environment = fs::read(folder.join("environ"));
+        let is_cleared = || {
+            let environment = fs::read(folder.join("environ"));
+            environment.is_ok_and(|environment| !has_variable(&environment))
+        };
         let name = fs::read_to_string(folder.join("comm"));
-        if let (Ok(environment), Ok(name)) = (environment, name)
-            && !has_variable(&environment)
+        // A process that is just executing its program has no environment yet.
+        if let Ok(name) = name
+            && is_cleared()
+            && {
+                std::thread::sleep(EXECUTION);
+                is_cleared()
+            }
             && fs::read(folder.join("maps")).is_ok_and(|maps| !maps.is_empty())
         {
             self.cleared.get_or_insert_with(|| name.trim().to_owned());

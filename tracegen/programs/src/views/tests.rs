@@ -107,7 +107,7 @@ impl Build {
         if !self.draws.is_empty() || self.session.frames.is_empty() {
             self.submit(0);
         }
-        let frame = self.session.frames[&0].clone();
+        let frame = self.session.frames.get(&0).cloned().unwrap_or_default();
         find(&self.session, &frame, &self.weights, wanted)
     }
 
