@@ -38,7 +38,8 @@ pub(crate) fn discard_unfinished_on_exit() -> anyhow::Result<()> {
     std::thread::Builder::new()
         .name("signals".to_owned())
         .spawn(move || {
-            for signal in signals.forever() {
+            // The first signal ends the program.
+            if let Some(signal) = signals.forever().next() {
                 super::children::end_with(signal);
                 super::supervise::end_descendants();
                 formats::container::discard_unfinished();
