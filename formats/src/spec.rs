@@ -122,7 +122,7 @@ fn numbers_are_spelled_as_documented() {
         12.5e-8,
         1e15,
         1e16,
-        123_456_789_012_345_678e3,
+        1.234_567_890_123_456_8e20,
     ];
     let rows = table("## Content checksum");
     assert_eq!(rows.len(), numbers.len());

@@ -45,7 +45,10 @@ fn image(folder: &Path, bytes: &[u8]) -> Result<Image, String> {
 }
 
 /// Format, levels and levels in the file of an image, and its texels.
-fn read(bytes: &[u8]) -> Result<(Option<(TexelFormat, u32, u32)>, Vec<u8>), String> {
+/// Format with levels and levels that the file holds, if blocks are kept, and the bytes.
+type Found = (Option<(TexelFormat, u32, u32)>, Vec<u8>);
+
+fn read(bytes: &[u8]) -> Result<Found, String> {
     let folder = tempfile::tempdir().unwrap();
     let image = image(folder.path(), bytes)?;
     let stored = image.stored.map(|s| (s.format, s.levels, s.held));
