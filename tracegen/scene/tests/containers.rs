@@ -44,7 +44,6 @@ fn image(folder: &Path, bytes: &[u8]) -> Result<Image, String> {
         .map_err(|e| e.to_string())
 }
 
-/// Format, levels and levels in the file of an image, and its texels.
 /// Format with levels and levels that the file holds, if blocks are kept, and the bytes.
 type Found = (Option<(TexelFormat, u32, u32)>, Vec<u8>);
 
