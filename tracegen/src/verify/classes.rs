@@ -128,7 +128,7 @@ pub fn classify(
         if (there - depth).abs() <= tolerance {
             return Class::DepthTie;
         }
-        if there < depth {
+        if there > depth {
             continue;
         }
         if margin.abs() <= ALPHA {

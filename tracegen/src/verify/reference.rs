@@ -52,7 +52,7 @@ pub fn render_tile(
                 }
                 let slot = (y - origin[1]) as usize * EDGE + (x - origin[0]) as usize;
                 let depth = piece.depth(center(pixel)) as f32;
-                if depth <= nearest[slot] {
+                if depth >= nearest[slot] {
                     continue;
                 }
                 if recorded == Fragments::DepthTested && writes(geometry, piece, pixel, alpha) {
