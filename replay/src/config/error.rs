@@ -17,15 +17,15 @@ pub enum ConfigError {
         /// `L1`, `L2`, ...
         level: &'static str,
         /// Size, formatted.
-        size: String,
+        size: Box<str>,
         /// Ways.
         ways: u32,
         /// Line size in bytes.
         line_bytes: u32,
         /// The number of sets found.
-        found: String,
+        found: Box<str>,
         /// The nearest possible sizes, and the ways that make this size possible.
-        possible: String,
+        possible: Box<str>,
     },
     /// More lines than the limit.
     #[error(

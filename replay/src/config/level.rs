@@ -96,15 +96,16 @@ impl LevelConfig {
         if !is_whole || !sets.is_power_of_two() || sets > MOST_SETS {
             return Err(ConfigError::Sets {
                 level,
-                size: format_bytes(self.size_bytes),
+                size: format_bytes(self.size_bytes).into(),
                 ways: self.ways,
                 line_bytes,
                 found: if is_whole {
                     sets.to_string()
                 } else {
                     (self.size_bytes as f64 / bytes_per_set as f64).to_string()
-                },
-                possible: self.possible(bytes_per_set),
+                }
+                .into(),
+                possible: self.possible(bytes_per_set).into(),
             });
         }
         self.check_lines(level, line_bytes, 1)?;
