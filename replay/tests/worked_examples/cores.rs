@@ -46,7 +46,6 @@ fn trace(items: &[Vec<u32>]) -> MemoryTrace {
                 count: quads.len() as u32,
             }],
             records: records.collect(),
-            ..Tile::default()
         }
     };
     trace.tiles = vec![items.iter().map(tile).collect()];

@@ -18,19 +18,17 @@ pub fn output(settings: &Settings) -> Vec<String> {
     let row_bytes = u64::from(device.row_bytes) * u64::from(device.banks());
     let burst_bytes = u64::from(device.burst_bytes);
     let mut dram = Dram::new(&config, device.burst_bytes);
-    let mut columns = 0;
-    for read in settings.list("read") {
+    for (column, read) in settings.list("read").into_iter().enumerate() {
         let (row, cycle) = read
             .split_once('@')
             .unwrap_or_else(|| panic!("{read}: expected ROW@CYCLE"));
         let (row, cycle): (u64, u64) = (row.parse().unwrap(), cycle.parse().unwrap());
         dram.request(
-            row * row_bytes + burst_bytes * columns,
+            row * row_bytes + burst_bytes * column as u64,
             burst_bytes,
             false,
             Some(cycle),
         );
-        columns += 1;
     }
     let result = dram.result();
     vec![

@@ -42,7 +42,6 @@ pub fn output(settings: &Settings) -> Vec<String> {
     trace.tiles = vec![vec![Tile {
         runs,
         records: vec![record],
-        ..Tile::default()
     }]];
     let text = format!(
         "cores = 1\n[[level]]\nsize_bytes = 16\nways = 1\n[[level]]\nsize_bytes = 1024\n[tmu]\nmodel = \"{}\"\nloop_cycles = {}\n",

@@ -86,7 +86,6 @@ pub fn output(settings: &Settings) -> Vec<String> {
         Tile {
             runs: runs.collect(),
             records: records.collect(),
-            ..Tile::default()
         }
     };
     memory.tiles = vec![drawn.iter().map(tile).collect()];

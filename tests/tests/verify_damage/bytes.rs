@@ -201,7 +201,8 @@ pub fn of_table_bytes() -> Vec<Damage> {
             parts.repair_tiles();
         },
     ));
-    let meta: [(&str, &str, fn(&mut serde_json::Value)); 4] = [
+    type Change = fn(&mut serde_json::Value);
+    let meta: [(&str, &str, Change); 4] = [
         ("META: hmd.eye_size_px", "+ 16", |meta| {
             meta["hmd"]["eye_size_px"][0] = 112.into()
         }),

@@ -391,7 +391,6 @@ mod tests {
             at: [0.0, 0.0, 1.0],
             dx: [0.25, 0.0, 0.0],
             dy: [0.0, 0.5, 0.0],
-            lod: 7.0,
             ..RawFragment::default()
         };
         for (shape, lod, rule, own, slope, joins) in [

@@ -300,7 +300,7 @@ fn distance(side: usize, clip: DVec4) -> f64 {
     let value = clip[side / 2];
     match side {
         4 => value,
-        _ if side % 2 == 0 => clip.w + value,
+        _ if side.is_multiple_of(2) => clip.w + value,
         _ => clip.w - value,
     }
 }

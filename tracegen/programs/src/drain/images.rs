@@ -138,9 +138,11 @@ mod tests {
     use super::*;
     use formats::textrace::TextraceWriter;
 
+    type Place = (u32, u32, u32);
+
     /// Textures of views of an image of 64x64 texels, 7 levels and 6 layers, each by format, levels and layers:
     /// the place of each, and the number of textures.
-    fn joined(views: &[(i32, [u32; 2], [u32; 2])]) -> (Vec<Option<(u32, u32, u32)>>, usize) {
+    fn joined(views: &[(i32, [u32; 2], [u32; 2])]) -> (Vec<Option<Place>>, usize) {
         let image = ImageInfo {
             image: 3,
             format: 37,
