@@ -2,6 +2,7 @@
 //! scenes with a known depth complexity.
 
 use formats::textrace::{PassKind, Textrace, Tile};
+use parallax_tests::repair::Parts;
 use parallax_tests::{program, real_scene, refuse, root, run_ok};
 use serde_json::Value;
 use std::collections::HashSet;
@@ -103,15 +104,23 @@ fn deferred_shading_of_a_real_scene_shades_only_visible_fragments() {
 #[test]
 fn removals_that_need_data_missing_in_the_trace_are_refused() {
     let golden = root().join("traces/atrium.textrace");
-    let run = |hsr: &str, expected: &str| {
+    let folder = tempfile::tempdir().expect("a folder");
+    let old = folder.path().join("old.textrace");
+    let mut parts = Parts::of(&fs::read(&golden).expect("a trace"));
+    parts.edit(b"META", |meta| {
+        let surfaces = meta.as_object_mut().expect("an object").remove("surfaces");
+        assert!(surfaces.is_some());
+    });
+    fs::write(&old, parts.sealed()).expect("a trace");
+    let run = |trace: &Path, hsr: &str, expected: &str| {
         let mut command = program("replay");
         refuse(
-            command.arg("run").arg(&golden).args(["--hsr", hsr]),
+            command.arg("run").arg(trace).args(["--hsr", hsr]),
             &[expected],
         );
     };
-    run("deferred", "does not record which draws are opaque");
-    run("none", "capture with --hsr none");
+    run(&old, "deferred", "does not record which draws are opaque");
+    run(&golden, "none", "capture with --hsr none");
 }
 
 /// Walls across the whole view at some distances, in drawing order.

@@ -160,9 +160,6 @@ pub(super) struct AddressArgs {
         hide_short_help = true
     )]
     caches: Option<String>,
-    /// Print CSV, one row per configuration
-    #[arg(long, conflicts_with = "json", hide_short_help = true)]
-    csv: bool,
 }
 
 impl AddressArgs {
@@ -173,7 +170,7 @@ impl AddressArgs {
     pub fn path(&self, machine: &ConfigArgs) -> Result<Option<&Path>> {
         let path = self.input.path(machine)?;
         if path.is_none() {
-            only_with_addresses(&[("--caches", self.caches.is_some()), ("--csv", self.csv)])?;
+            only_with_addresses(&[("--caches", self.caches.is_some())])?;
         }
         Ok(path)
     }
@@ -182,7 +179,7 @@ impl AddressArgs {
     ///
     /// # Errors
     /// Wrong cache sizes, unreadable input.
-    pub fn run(&self, path: &Path, config: &RunConfig, json: bool) -> Result<ExitCode> {
+    pub fn run(&self, path: &Path, config: &RunConfig, [json, csv]: [bool; 2]) -> Result<ExitCode> {
         let configs = self.configs(config)?;
         let kinds = self.input.kinds();
         let start = Instant::now();
@@ -199,7 +196,7 @@ impl AddressArgs {
             accesses as f64 / seconds / 1e6,
         ));
         let name = name_of(path);
-        super::print(&match (json, self.csv) {
+        super::print(&match (json, csv) {
             (true, _) => report::json(&name, &outcome)?,
             (_, true) => report::csv(&outcome),
             _ => report::text(&name, &outcome),

@@ -31,6 +31,9 @@ pub struct Args {
     /// Print one JSON object (schema replay.run/2, or replay.addresses/2)
     #[arg(long)]
     json: bool,
+    /// Print CSV, one row per configuration; the columns are those of `replay sweep --csv`
+    #[arg(long, conflicts_with_all = ["json", "tiles"], hide_short_help = true)]
+    csv: bool,
     /// Also count by tile
     #[arg(long, conflicts_with = "addresses", hide_short_help = true)]
     tiles: bool,
@@ -49,7 +52,7 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["mode", "preset", "addresses"], hide_short_help = true)]
     compare_modes: bool,
     /// Print the whole configuration as TOML and stop
-    #[arg(long, conflicts_with_all = ["json", "compare_modes", "addresses"])]
+    #[arg(long, conflicts_with_all = ["json", "csv", "compare_modes", "addresses"])]
     print_config: bool,
     #[command(flatten)]
     threads: shell::Threads,
@@ -66,6 +69,7 @@ fn outputs(args: &Args) -> Vec<Output> {
         .map(|path| Output::text("--timeline", path))
         .collect();
     outputs.extend(args.json.then(|| Output::result("--json")));
+    outputs.extend(args.csv.then(|| Output::result("--csv")));
     outputs
 }
 
@@ -77,7 +81,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut config = args.machine.resolve()?;
     if let Some(path) = args.addresses.path(&args.machine)? {
         args.threads.start()?;
-        return args.addresses.run(path, &config, args.json);
+        return args.addresses.run(path, &config, [args.json, args.csv]);
     }
     config.tile_maps |= args.tiles;
     config.timeline = args.timeline.is_some();
@@ -139,6 +143,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     super::print(&match (rows.as_slice(), args.json) {
+        (rows, _) if args.csv => report::csv(rows),
         ([timed, functional], true) => report::modes_json(timed, functional)?,
         ([timed, functional], false) => report::modes_text(timed, functional),
         ([row, ..], true) => report::json(row)?,

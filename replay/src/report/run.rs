@@ -62,6 +62,15 @@ pub fn json(row: &ResultRow) -> serde_json::Result<String> {
     serde_json::to_string_pretty(&RunJson::new(row))
 }
 
+/// Results as CSV, one row each.
+#[must_use]
+pub fn csv(rows: &[ResultRow]) -> String {
+    let mut columns = super::config_columns::trace();
+    columns.extend(super::config_columns::config());
+    columns.extend(figures());
+    Table::new(&columns, rows).csv()
+}
+
 /// One result as tables: levels, views, the figures of the whole replay, the draws or (if `by_texture`) the
 /// textures with most misses, and tiles if they were counted.
 #[must_use]

@@ -3,6 +3,7 @@
 mod build;
 mod images;
 mod places;
+mod portions;
 
 use crate::pairs::pair;
 use crate::session::{Executed, Session, SessionError, coverage_group};

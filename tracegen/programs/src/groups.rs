@@ -50,7 +50,6 @@ impl Group {
         shader: &ShaderInfo,
         coordinates: u16,
         element: Option<u32>,
-        first_number: u8,
         bound: impl Fn(&TextureSite) -> Result<Bound, LeftOut>,
     ) -> Result<(Self, Vec<UvGroup>), LeftOut> {
         let members = (shader.sites.iter()).filter(|site| site.group == coordinates);
@@ -72,7 +71,7 @@ impl Group {
             let operands = needs_operands(texture, of.form);
             let of_group = group.get_or_insert(Self {
                 element,
-                number: first_number + u8::from(operands),
+                number: u8::from(operands),
                 operands,
                 kind: texture.clone(),
                 size: bound.size,
@@ -280,7 +279,7 @@ mod tests {
                 anisotropic,
             })
         };
-        let made = Group::new(&shader, 0, None, 3, bound).unwrap();
+        let made = Group::new(&shader, 0, None, bound).unwrap();
         sizes.get_mut().for_each(drop);
         made
     }
@@ -297,7 +296,7 @@ mod tests {
             )
         };
         let (group, groups) = made(vec![flat(0), flat(0), flat(1)]);
-        assert_eq!((group.number, group.operands), (3, false));
+        assert_eq!((group.number, group.operands), (0, false));
         let [of] = &groups[..] else {
             panic!("{groups:?}");
         };
@@ -319,7 +318,7 @@ mod tests {
             Lod::Bias(None),
         );
         let (group, groups) = made(vec![array]);
-        assert_eq!((group.number, group.operands, groups.len()), (4, true, 2));
+        assert_eq!((group.number, group.operands, groups.len()), (1, true, 2));
         assert!(groups[1].has_operands() && groups[0].samples.is_empty());
         let raw = RawFragment {
             at: [0.5, 0.25, 2.5],

@@ -85,16 +85,16 @@ pub fn texel_format(format: i32) -> Option<(TexelFormat, ColorSpace)> {
 }
 
 /// Converts the part of an image in a view to a texture of a trace; `None` if a trace does not have the
-/// format.
+/// format. `number` names the image: the numbers of the program differ from run to run.
 #[must_use]
-pub fn texture(view: &ViewInfo, image: &ImageInfo) -> Option<Texture> {
+pub fn texture(view: &ViewInfo, image: &ImageInfo, number: u32) -> Option<Texture> {
     let (format, color_space) = texel_format(view.format)?;
     let [first_level, levels] = view.levels;
     let [first_layer, layers] = view.layers;
     let size = [0, 1].map(|axis| (image.size[axis] >> first_level).max(1));
     let whole = [first_level, first_layer] == [0, 0] && layers == image.layers;
     let [width, height, _] = image.size;
-    let mut name = format!("image {} ({width}x{height})", image.image);
+    let mut name = format!("image {number} ({width}x{height})");
     if !whole {
         name += &format!(" from level {first_level}, layer {first_layer}");
     }
@@ -316,7 +316,7 @@ mod tests {
             layers: [0, 6],
             min_lod_256ths: 0,
         };
-        let part = texture(&view, &image).unwrap();
+        let part = texture(&view, &image, 3).unwrap();
         assert_eq!((part.size, part.levels, part.layers), ([75, 25], 3, 6));
         assert_eq!(
             (part.format, part.color_space),
@@ -324,7 +324,7 @@ mod tests {
         );
         assert_eq!(part.name, "image 3 (300x100) from level 2, layer 0");
         view.format = F::G8B8G8R8_422_UNORM.as_raw();
-        assert_eq!(texture(&view, &image), None);
+        assert_eq!(texture(&view, &image, 3), None);
     }
 
     #[test]

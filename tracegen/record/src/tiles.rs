@@ -133,6 +133,7 @@ impl TileRules {
             }
         }
         let mut lanes = 0;
+        let first_of_quad = scratch.tile.records.len();
         // Operands are kept until the record to which they belong.
         let mut operands: Option<Option<QuadRecord>> = None;
         for record in quad.iter().map(of) {
@@ -148,6 +149,7 @@ impl TileRules {
                 ..QuadRecord::default()
             };
             self.open_run(record, scratch);
+            let mut has_operands = false;
             if record.group() != NO_GROUP {
                 let rule = self.rule(record)?;
                 let quantiser = &mut scratch.quantisers[usize::from(record.group())];
@@ -168,11 +170,16 @@ impl TileRules {
                     continue;
                 }
                 if let Some(before) = before.flatten() {
+                    has_operands = true;
                     push(&mut scratch.tile, before);
                 }
             }
             lanes |= mask;
-            push(&mut scratch.tile, result);
+            let mut earlier = scratch.tile.records[first_of_quad..].iter_mut();
+            match earlier.find(|of| !has_operands && joins(of, &result)) {
+                Some(of) => of.mask |= mask,
+                None => push(&mut scratch.tile, result),
+            }
         }
         counts.quads += u64::from(lanes != 0);
         counts.fragments += u64::from(lanes.count_ones());
@@ -221,6 +228,13 @@ impl TileRules {
 fn scales(draw: &Draw, samplers: &[Sampler]) -> Vec<GroupScale> {
     let scale = |group| GroupScale::new(group, samplers);
     draw.groups.iter().map(scale).collect()
+}
+
+/// Whether two records of a quad differ in their lanes alone, as those of the parts of a clipped primitive may.
+/// A driver that records fragments one by one does not tell such parts apart.
+fn joins(a: &QuadRecord, b: &QuadRecord) -> bool {
+    let with_b_lanes = QuadRecord { mask: b.mask, ..*a };
+    a.mask & b.mask == 0 && with_b_lanes == *b
 }
 
 fn push(tile: &mut Tile, record: QuadRecord) {

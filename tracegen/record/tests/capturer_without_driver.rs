@@ -124,6 +124,8 @@ struct Analytic {
     capacity: u64,
     /// Whether the last quad is passed on first.
     backwards: bool,
+    /// Whether each lane has a record of its own.
+    lane_by_lane: bool,
     /// Primitive whose coordinates are NaN.
     not_finite: Option<u32>,
     asked: Vec<Region>,
@@ -136,6 +138,7 @@ impl Analytic {
         Self {
             capacity,
             backwards,
+            lane_by_lane: false,
             not_finite: None,
             asked: Vec::new(),
             empty: 0,
@@ -181,7 +184,15 @@ impl Capturer for Analytic {
                     cross: [0.0; 2],
                 };
                 let depth = [depth; 4];
-                records.push((record, RawDepth { depth }));
+                let lanes = (0..4).map(|lane| 1 << lane).filter(|lane| mask & lane != 0);
+                let masks: Vec<u8> = match self.lane_by_lane {
+                    true => lanes.collect(),
+                    false => vec![mask],
+                };
+                records.extend(masks.into_iter().map(|mask| {
+                    let header = RawRecord::pack(x, y, mask, 0);
+                    (RawRecord { header, ..record }, RawDepth { depth })
+                }));
             }
         }
         let needed = records.len() as u64;
@@ -288,6 +299,16 @@ fn the_trace_does_not_depend_on_the_order_of_records_or_the_size_of_the_buffer()
             "capacity {capacity}"
         );
     }
+}
+
+#[test]
+fn parts_of_a_primitive_with_the_same_coordinates_are_one_record_of_a_quad() {
+    let whole = trace(&mut Analytic::new(100_000, false)).unwrap();
+    let mut capturer = Analytic {
+        lane_by_lane: true,
+        ..Analytic::new(100_000, false)
+    };
+    assert!(trace(&mut capturer).unwrap() == whole);
 }
 
 #[test]

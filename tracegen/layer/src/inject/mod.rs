@@ -13,6 +13,7 @@ mod flow;
 mod functions;
 mod lanes;
 mod numbers;
+mod parse;
 mod reads;
 mod recorder;
 mod rewrite;

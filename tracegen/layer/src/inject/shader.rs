@@ -50,8 +50,7 @@ impl Shader {
             return Err(InjectError::TooLarge(words.len()));
         }
         check_lengths(words)?;
-        let module =
-            rspirv::dr::load_words(words).map_err(|e| InjectError::Parse(e.to_string()))?;
+        let module = super::parse::module(words)?;
         let is_wanted = |entry: &Instruction| {
             let of_name = match entry.operands.get(2) {
                 Some(Operand::LiteralString(found)) => name.is_none_or(|name| name == found),

@@ -4,6 +4,7 @@ use super::DrainError;
 use super::images::ImageTextures;
 use super::pass;
 use super::places::Placement;
+use super::portions::{GroupKey, Groups, OfPrimitives, portions, size};
 use crate::groups::{Bound, Group};
 use crate::lanes::visits;
 use crate::session::{Executed, Session, coverage_group, survival_group};
@@ -76,12 +77,19 @@ struct Records {
 const UNSHADED: &str =
     "draws that write no colour and discard nothing, so their fragment shader has no effect";
 
+/// Fragments of quads that sample at more coordinates than a draw of the trace has groups.
+const DIVIDED: &str =
+    "fragments that sample at more than 15 coordinates, which count once for each 15 of them";
+
 /// Builds a trace frame by frame.
 pub struct Builder<W: Write + Seek> {
     recording: Recording<W>,
     pub counts: CaptureCounts,
     textures: ImageTextures,
     next_primitive: u32,
+    /// Numbers of the program's pipelines, from 1 in the order in which the trace uses them. The program's own
+    /// numbers differ from run to run.
+    pipelines: HashMap<u32, u32>,
     /// Whether all fragments of each draw hide those behind them.
     opaque: Vec<bool>,
     left_out: BTreeMap<String, [u64; 2]>,
@@ -95,6 +103,7 @@ impl<W: Write + Seek> Builder<W> {
             counts: CaptureCounts::default(),
             textures: ImageTextures::default(),
             next_primitive: 0,
+            pipelines: HashMap::new(),
             opaque: Vec::new(),
             left_out: BTreeMap::new(),
         }
@@ -241,21 +250,19 @@ impl<W: Write + Seek> Builder<W> {
         let of_part = |executed: &Executed| -> &[RawSample] {
             records.get(&executed.draw).map_or(&[], Vec::as_slice)
         };
-        let mut used: BTreeSet<GroupKey> = BTreeSet::new();
+        let parts_records: Vec<&[RawSample]> = parts
+            .iter()
+            .map(|(executed, _)| of_part(executed))
+            .collect();
+        let mut used = Groups::new();
         let mut most = 0;
-        for record in parts.iter().flat_map(|(executed, _)| of_part(executed)) {
-            if let Some((_, texture)) = texture_of(shader, record.group()) {
-                let own = texture.image.element.is_none();
-                used.insert((record.group(), own.then_some(record.element)));
-            }
+        for record in parts_records.iter().copied().flatten() {
+            used.extend(key(shader, record));
             most = most.max(record.primitive.saturating_add(1));
         }
-        self.count_left_out(
-            shader,
-            parts.iter().flat_map(|(executed, _)| of_part(executed)),
-        );
+        self.count_left_out(shader, parts_records.iter().copied().flatten());
         let triangles = most.max(primitives(info));
-        let draws = self.declare(session, info, shader, &used, triangles)?;
+        let draws = self.declare(session, info, shader, &used, &parts_records, triangles)?;
         let replay = draws.replay;
         for (executed, part) in &parts {
             let quads = self.quads(shader, &draws, of_part(executed));
@@ -305,56 +312,102 @@ impl<W: Write + Seek> Builder<W> {
         session: &Session,
         info: &DrawInfo,
         shader: &ShaderInfo,
-        used: &BTreeSet<GroupKey>,
+        used: &Groups,
+        records: &[&[RawSample]],
         primitives: u32,
     ) -> Result<Declared, DrainError> {
+        let mut made: BTreeMap<GroupKey, (Group, Vec<UvGroup>)> = BTreeMap::new();
+        for &key in used {
+            match self.group(session, info, shader, key) {
+                Ok(group) => {
+                    made.insert(key, group);
+                }
+                Err(why) => self.leave_out(&why, 1, 0),
+            }
+        }
+        let sizes: BTreeMap<GroupKey, usize> = (made.iter())
+            .map(|(key, (_, groups))| (*key, groups.len()))
+            .collect();
+        let quads = if size(used, &sizes) <= MAX_GROUPS {
+            OfPrimitives::from([(0, BTreeSet::from([used.clone()]))])
+        } else {
+            self.groups_of_quads(shader, records, &sizes)
+        };
         let mut declared = Declared {
-            draws: Vec::new(),
-            groups: HashMap::new(),
+            portions: Vec::new(),
             replay: replay(info),
         };
-        let mut of_draws: Vec<Vec<UvGroup>> = vec![Vec::new()];
-        for &(coordinates, element) in used {
-            let last = of_draws.len() - 1;
-            let first = of_draws[last].len();
-            let made = self.group(session, info, shader, (coordinates, element), first as u8);
-            let (mut group, groups) = match made {
-                Ok(made) => made,
-                Err(why) => {
-                    self.leave_out(&why, 1, 0);
-                    continue;
+        let next = self.pipelines.len() as u32 + 1;
+        let pipeline = *self.pipelines.entry(info.pipeline).or_insert(next);
+        for portion in portions(&quads, &sizes, primitives) {
+            let mut draws = Vec::new();
+            for keys in portion.draws {
+                let is_first = declared.portions.is_empty() && draws.is_empty();
+                let rest = if is_first { "" } else { ", more coordinates" };
+                let mut groups = HashMap::new();
+                let mut uv_groups: Vec<UvGroup> = Vec::new();
+                for key in keys {
+                    let Some((group, of)) = made.get(&key) else {
+                        continue;
+                    };
+                    let mut group = group.clone();
+                    group.number += uv_groups.len() as u8;
+                    uv_groups.extend(of.iter().cloned());
+                    groups.insert(key, group);
                 }
-            };
-            if first + groups.len() > MAX_GROUPS {
-                group.number = groups.len() as u8 - 1;
-                of_draws.push(groups);
-            } else {
-                of_draws[last].extend(groups);
+                let first = self.next_primitive;
+                let primitives = portion.primitives.len() as u32;
+                self.next_primitive = first.saturating_add(primitives);
+                let draw = Draw {
+                    material: format!("pipeline {pipeline}{rest}"),
+                    first_primitive: first,
+                    primitives,
+                    groups: uv_groups,
+                };
+                let index = self.recording.draw(draw, declared.replay)?;
+                self.opaque.push(!info.twice && !info.blends);
+                draws.push(DeclaredDraw {
+                    index,
+                    first,
+                    groups,
+                });
             }
-            let draw = of_draws.len() - 1;
-            declared
-                .groups
-                .insert((coordinates, element), (draw, group));
-        }
-        for (number, groups) in of_draws.into_iter().enumerate() {
-            let rest = if number == 0 {
-                ""
-            } else {
-                ", more coordinates"
-            };
-            let draw = Draw {
-                material: format!("pipeline {}{rest}", info.pipeline),
-                first_primitive: self.next_primitive,
-                primitives,
-                groups,
-            };
-            let first = self.next_primitive;
-            self.next_primitive = first.saturating_add(primitives);
-            let index = self.recording.draw(draw, declared.replay)?;
-            self.opaque.push(!info.twice && !info.blends);
-            declared.draws.push((index, first));
+            declared.portions.push(DeclaredPortion {
+                start: portion.primitives.start,
+                draws,
+            });
         }
         Ok(declared)
+    }
+
+    /// The groups of the quads of each primitive. Names the fragments of quads with too many for one draw.
+    fn groups_of_quads(
+        &mut self,
+        shader: &ShaderInfo,
+        records: &[&[RawSample]],
+        sizes: &BTreeMap<GroupKey, usize>,
+    ) -> OfPrimitives {
+        let mut of_primitives = OfPrimitives::new();
+        let mut divided = 0;
+        for records in records {
+            let mut keys: Vec<_> = (records.iter())
+                .filter_map(|record| Some((place(record), key(shader, record)?, record.lanes())))
+                .collect();
+            keys.sort_unstable();
+            for quad in keys.chunk_by(|a, b| a.0 == b.0) {
+                let groups: Groups = quad.iter().map(|(_, key, _)| *key).collect();
+                if size(&groups, sizes) > MAX_GROUPS {
+                    let lanes = quad.iter().fold(0, |lanes, (_, _, of)| lanes | of);
+                    divided += u64::from(lanes.count_ones());
+                }
+                let primitive = (quad[0].0 >> 32) as u32;
+                of_primitives.entry(primitive).or_default().insert(groups);
+            }
+        }
+        if divided > 0 {
+            self.leave_out(DIVIDED, 1, divided);
+        }
+        of_primitives
     }
 
     fn group(
@@ -363,7 +416,6 @@ impl<W: Write + Seek> Builder<W> {
         info: &DrawInfo,
         shader: &ShaderInfo,
         (coordinates, element): GroupKey,
-        first: u8,
     ) -> Result<(Group, Vec<UvGroup>), String> {
         let mut bound: HashMap<String, Result<Bound, String>> = HashMap::new();
         let members = shader.sites.iter();
@@ -377,7 +429,7 @@ impl<W: Write + Seek> Builder<W> {
             let found = bound.get(&format!("{texture:?}")).cloned();
             found.unwrap_or_else(|| Err("a texture that is not known".to_owned()))
         };
-        Group::new(shader, coordinates, element, first, of)
+        Group::new(shader, coordinates, element, of)
     }
 
     /// The texture and sampler that a site reads.
@@ -456,8 +508,12 @@ fn place(record: &RawSample) -> u64 {
     u64::from(record.primitive) << 32 | u64::from(record.place)
 }
 
-/// A coordinate group, and the element of its binding's array if it varies between fragments.
-type GroupKey = (u16, Option<u32>);
+/// The coordinate group of a record of a texture, and its element.
+fn key(shader: &ShaderInfo, record: &RawSample) -> Option<GroupKey> {
+    let (_, texture) = texture_of(shader, record.group())?;
+    let own = texture.image.element.is_none();
+    Some((record.group(), own.then_some(record.element)))
+}
 
 /// The first site of a coordinate group that reads a texture.
 fn texture_of(shader: &ShaderInfo, group: u16) -> Option<(&Site, &TextureSite)> {
@@ -470,11 +526,54 @@ fn texture_of(shader: &ShaderInfo, group: u16) -> Option<(&Site, &TextureSite)> 
 
 /// Draws of the trace for a draw of the program.
 struct Declared {
-    /// Index and first primitive of each draw.
-    draws: Vec<(u32, u32)>,
-    /// Position in `draws`, and the group.
-    groups: HashMap<GroupKey, (usize, Group)>,
+    /// By their first primitives, which ascend from 0.
+    portions: Vec<DeclaredPortion>,
     replay: DepthReplay,
+}
+
+/// Draws of a range of primitives.
+struct DeclaredPortion {
+    /// Its first primitive in the program's draw.
+    start: u32,
+    draws: Vec<DeclaredDraw>,
+}
+
+/// A draw of the trace.
+struct DeclaredDraw {
+    index: u32,
+    /// Number in the trace of the portion's first primitive.
+    first: u32,
+    groups: HashMap<GroupKey, Group>,
+}
+
+impl Declared {
+    fn portion(&self, primitive: u32) -> &DeclaredPortion {
+        let after = self.portions.partition_point(|of| of.start <= primitive);
+        &self.portions[after - 1]
+    }
+}
+
+impl DeclaredPortion {
+    /// The draw of a quad with records of these groups: the one that has them all, or the first one.
+    fn home(&self, keys: impl Iterator<Item = GroupKey> + Clone) -> &DeclaredDraw {
+        let known = |key: &GroupKey| self.draws.iter().any(|draw| draw.groups.contains_key(key));
+        let has_all = |draw: &&DeclaredDraw| {
+            keys.clone()
+                .filter(known)
+                .all(|key| draw.groups.contains_key(&key))
+        };
+        self.draws.iter().find(has_all).unwrap_or(&self.draws[0])
+    }
+
+    /// The draw for the records of a group in a quad, and the group. `None` for a group that is left out.
+    fn draw<'a>(
+        &'a self,
+        home: &'a DeclaredDraw,
+        key: &GroupKey,
+    ) -> Option<(&'a DeclaredDraw, &'a Group)> {
+        let mut draws = [home].into_iter().chain(&self.draws);
+        draws.find_map(|draw| Some((draw, draw.groups.get(key)?)))
+    }
 }
 
 struct Sites<'a> {
@@ -490,11 +589,12 @@ struct Quad {
     depth: RawDepth,
 }
 
-fn record(draw: (u32, u32), primitive: u32, mask: u8, group: u8, at: &RawQuad) -> RawRecord {
+/// A record of a quad of the portion's primitive `primitive`.
+fn record(draw: &DeclaredDraw, primitive: u32, mask: u8, group: u8, at: &RawQuad) -> RawRecord {
     RawRecord {
         header: RawRecord::pack(0, 0, mask, group),
-        primitive: draw.1.saturating_add(primitive),
-        draw: draw.0,
+        primitive: draw.first.saturating_add(primitive),
+        draw: draw.index,
         passing: 0,
         uv: at.uv,
         dx: at.dx,
@@ -505,23 +605,25 @@ fn record(draw: (u32, u32), primitive: u32, mask: u8, group: u8, at: &RawQuad) -
 
 /// Combines the records of a quad of a primitive.
 fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
-    let primitive = of[0].primitive;
+    let portion = declared.portion(of[0].primitive);
+    let primitive = of[0].primitive - portion.start;
+    let home = portion.home(of.iter().filter_map(|sample| key(sites.shader, sample)));
     let lanes_of = |group: Option<u16>| {
         let of = of.iter().filter(|record| Some(record.group()) == group);
         of.fold(0, |mask, record| mask | record.lanes())
     };
     let covered = lanes_of(sites.coverage);
     let mut records = Vec::new();
-    // Lanes that sample a texture in the first draw, which must have records of all covered lanes.
+    // Lanes that sample a texture in the quad's draw, which must have records of all covered lanes.
     let mut sampled = 0;
     let mut fragments: BTreeMap<GroupKey, Vec<(u8, &RawSample)>> = BTreeMap::new();
     for sample in of {
-        let Some((site, texture)) = texture_of(sites.shader, sample.group()) else {
+        let Some((site, _)) = texture_of(sites.shader, sample.group()) else {
             continue;
         };
-        let element = texture.image.element.is_none().then_some(sample.element);
-        let key = (sample.group(), element);
-        let Some((draw, group)) = declared.groups.get(&key) else {
+        let of_draw =
+            key(sites.shader, sample).and_then(|key| Some((key, portion.draw(home, &key)?)));
+        let Some((key, (draw, group))) = of_draw else {
             continue;
         };
         if site.form == Form::Fragment {
@@ -530,34 +632,41 @@ fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
             continue;
         }
         let at = group.quad(sample.as_quad());
-        let to = declared.draws[*draw];
-        records.push(record(to, primitive, sample.lanes(), group.number, &at));
-        sampled |= if *draw == 0 { sample.lanes() } else { 0 };
+        records.push(record(draw, primitive, sample.lanes(), group.number, &at));
+        sampled |= if draw.index == home.index {
+            sample.lanes()
+        } else {
+            0
+        };
     }
     for (key, of) in fragments {
-        let (draw, group) = &declared.groups[&key];
+        let Some((draw, group)) = portion.draw(home, &key) else {
+            continue;
+        };
         let lanes: Vec<_> = (of.iter())
             .map(|(lane, sample)| (*lane, group.fragment(&sample.as_fragment())))
             .collect();
-        let to = declared.draws[*draw];
         for visit in visits(&lanes, group.joins()) {
             if group.operands {
                 let before = group.number - 1;
-                let mut operands = record(to, primitive, visit.mask, before, &visit.operands);
+                let mut operands = record(draw, primitive, visit.mask, before, &visit.operands);
                 operands.passing = RawRecord::OPERANDS;
                 records.push(operands);
             }
-            records.push(record(to, primitive, visit.mask, group.number, &visit.uv));
-            sampled |= if *draw == 0 { visit.mask } else { 0 };
+            records.push(record(draw, primitive, visit.mask, group.number, &visit.uv));
+            sampled |= if draw.index == home.index {
+                visit.mask
+            } else {
+                0
+            };
         }
     }
-    let first = declared.draws[0];
     let alone = covered & !sampled;
     let none = RawQuad::default();
     let mut depth = RawDepth::default();
     if declared.replay == DepthReplay::None {
         if alone != 0 {
-            records.push(record(first, primitive, alone, NO_GROUP, &none));
+            records.push(record(home, primitive, alone, NO_GROUP, &none));
         }
         return Quad {
             at: of[0].quad(),
@@ -575,13 +684,13 @@ fn quad(sites: &Sites<'_>, declared: &Declared, of: &[&RawSample]) -> Quad {
         depth.depth = [z, z + dx, z + dy, z + dx + dy + cross];
     }
     let flags = RawRecord::HAS_DEPTH | u32::from(survived);
-    let whole = records
-        .iter_mut()
-        .find(|record| record.draw == first.0 && record.mask() == covered && !record.is_operands());
+    let whole = records.iter_mut().find(|record| {
+        record.draw == home.index && record.mask() == covered && !record.is_operands()
+    });
     match whole {
         Some(record) => record.passing |= flags,
         None => {
-            let mut coverage = record(first, primitive, covered, NO_GROUP, &none);
+            let mut coverage = record(home, primitive, covered, NO_GROUP, &none);
             coverage.passing = flags;
             records.push(coverage);
         }

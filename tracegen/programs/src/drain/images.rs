@@ -11,12 +11,15 @@ use std::io::{Seek, Write};
 #[derive(Default)]
 pub struct ImageTextures {
     indices: HashMap<ViewInfo, u32>,
-    by_image: BTreeMap<u32, OfImage>,
+    /// Numbers of the program's images, from 1 in the order in which the trace uses them.
+    numbers: HashMap<u32, u32>,
+    by_number: BTreeMap<u32, OfImage>,
 }
 
 /// The views of an image, in the order of their textures.
 struct OfImage {
     image: ImageInfo,
+    number: u32,
     views: Vec<(ViewInfo, Texture, u32)>,
 }
 
@@ -37,9 +40,12 @@ impl ImageTextures {
         view: &ViewInfo,
         image: &ImageInfo,
     ) -> Result<Option<(u32, [u32; 2])>, RecordError> {
-        let Some(of_trace) = texture(view, image) else {
+        let next = self.numbers.len() as u32 + 1;
+        let number = *self.numbers.get(&view.image).unwrap_or(&next);
+        let Some(of_trace) = texture(view, image, number) else {
             return Ok(None);
         };
+        self.numbers.insert(view.image, number);
         let size = of_trace.size;
         // Views that differ in these alone are of the same memory.
         let view = ViewInfo {
@@ -52,8 +58,9 @@ impl ImageTextures {
         }
         let index = recording.texture(of_trace.clone())?;
         self.indices.insert(view, index);
-        let of_image = self.by_image.entry(view.image).or_insert_with(|| OfImage {
+        let of_image = self.by_number.entry(number).or_insert_with(|| OfImage {
             image: image.clone(),
+            number,
             views: Vec::new(),
         });
         of_image.views.push((view, of_trace, index));
@@ -65,7 +72,7 @@ impl ImageTextures {
     /// # Errors
     /// The table is full.
     pub fn join<W: Write + Seek>(&self, recording: &mut Recording<W>) -> Result<(), RecordError> {
-        for of in self.by_image.values() {
+        for of in self.by_number.values() {
             of.join(recording)?;
         }
         Ok(())
@@ -100,7 +107,7 @@ impl OfImage {
                     layers: [0, self.image.layers],
                     ..self.views[0].0
                 };
-                let Some(of_trace) = texture(&view, &self.image) else {
+                let Some(of_trace) = texture(&view, &self.image, self.number) else {
                     return Ok(());
                 };
                 let index = recording.texture(of_trace.clone())?;

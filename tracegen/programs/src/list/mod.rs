@@ -122,7 +122,7 @@ fn rows(
     for (row, textures) in rows.iter_mut().zip(textures) {
         row.textures = textures.len();
         let bytes = textures.iter().filter_map(|view| {
-            let texture = texture(view, session.image(view.image)?)?;
+            let texture = texture(view, session.image(view.image)?, view.image)?;
             let block = texture.format.block();
             let level = |level| {
                 let size = texture.level_size(level);
