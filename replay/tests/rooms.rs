@@ -14,7 +14,7 @@ const FLOORS: [&[&str]; 12] = [
         "registry",
         "size",
     ],
-    &["config", "memory", "order", "result"],
+    &["config", "memory", "notices", "order", "result"],
     &["paper", "preset", "tmu"],
     &["stream"],
     &["access"],

@@ -5,7 +5,8 @@
 //! counts of an unchanged trace change, the model version must change, too: otherwise `UPDATE_GOLDEN` does
 //! not rewrite the digest.
 
-use parallax_tests::{program, root, run_ok};
+use formats::container::{ChunkTag, Container};
+use parallax_tests::{has_lavapipe, program, root, run_ok};
 use replay::model_version::MODEL_VERSION;
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -311,5 +312,49 @@ fn every_golden_trace_is_valid_and_has_its_recipe() {
         run_ok(program("replay").arg("validate").arg(&trace));
         let recipe = trace.with_extension("recipe");
         assert!(recipe.exists(), "{} is missing", recipe.display());
+    }
+}
+
+/// The driver that captured a trace; none for rays, which no driver traces.
+fn driver(bytes: &[u8]) -> Value {
+    let container = Container::from_bytes(bytes.to_vec()).expect("a trace");
+    let meta = container.chunk(ChunkTag(*b"META")).expect("a description");
+    let mut meta: Value = serde_json::from_slice(meta).expect("JSON");
+    meta["driver"].take()
+}
+
+#[test]
+fn golden_traces_are_made_again_to_the_byte_where_the_driver_is_the_same() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for extension in ["textrace", "raytrace"] {
+        if extension == "textrace" && !has_lavapipe() {
+            continue;
+        }
+        for golden in golden_traces(extension) {
+            let recipe = fs::read_to_string(golden.with_extension("recipe")).expect("a recipe");
+            let made = folder.path().join(golden.file_name().expect("a name"));
+            let mut words = recipe.split_whitespace();
+            let mut command = program("tracegen");
+            command.args(words.next()).arg("-o").arg(&made).args(words);
+            // The program of a recipe lies beside tracegen.
+            let own = PathBuf::from(command.get_program());
+            let mut paths = vec![own.parent().expect("a folder").to_owned()];
+            paths.extend(std::env::split_paths(
+                &std::env::var_os("PATH").expect("PATH"),
+            ));
+            command.env("PATH", std::env::join_paths(paths).expect("a list"));
+            run_ok(&mut command);
+            let [expected, found] = [&golden, &made].map(|path| fs::read(path).expect("a trace"));
+            let drivers = [driver(&expected), driver(&found)];
+            if drivers[0] == drivers[1] {
+                assert!(
+                    expected == found,
+                    "{} differs from what its recipe makes; scripts/golden.sh makes it again",
+                    golden.display()
+                );
+            } else {
+                println!("SKIPPED: golden traces were captured by {}", drivers[0]);
+            }
+        }
     }
 }

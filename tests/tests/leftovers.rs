@@ -10,10 +10,33 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// Signals that end a process.
-const SIGNALS: [&str; 12] = [
-    "KILL", "HUP", "INT", "QUIT", "TERM", "USR1", "USR2", "ALRM", "VTALRM", "PROF", "XCPU", "IO",
+/// Signals that end a process, and their numbers.
+const SIGNALS: [(&str, u32); 12] = [
+    ("KILL", 9),
+    ("HUP", 1),
+    ("INT", 2),
+    ("QUIT", 3),
+    ("TERM", 15),
+    ("USR1", 10),
+    ("USR2", 12),
+    ("ALRM", 14),
+    ("VTALRM", 26),
+    ("PROF", 27),
+    ("XCPU", 24),
+    ("IO", 29),
 ];
+
+/// The signals that this process does not ignore. Programs that `nohup` or a shell starts in the background ignore
+/// some, and so do the programs that they start.
+fn signals() -> Vec<&'static str> {
+    let status = fs::read_to_string("/proc/self/status").expect("/proc");
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = u64::from_str_radix(ignored.expect("a mask").trim(), 16).expect("a number");
+    let taken = SIGNALS
+        .iter()
+        .filter(|(_, number)| ignored >> (number - 1) & 1 == 0);
+    taken.map(|(name, _)| *name).collect()
+}
 
 /// Variable by which all processes of a capture are found.
 const MARK: &str = "PARALLAX_TEST_CAPTURE";
@@ -95,11 +118,12 @@ impl Place {
 
 /// Sends signals at moments up to `longest`. Captures end by the signal, and nothing is left.
 fn send_signals(kind: &str, longest: Duration, seed: u64, prepare: impl Fn(&mut Command)) {
-    let wanted = std::env::var("KILLS").map_or(SIGNALS.len(), |n| n.parse().expect("a number"));
+    let signals = signals();
+    let wanted = std::env::var("KILLS").map_or(signals.len(), |n| n.parse().expect("a number"));
     let mut random = Random(seed);
     let (mut sent, mut late, mut slow) = (0, 0, Duration::ZERO);
     while sent < wanted && late < 20 + sent {
-        let signal = SIGNALS[(sent + late) % SIGNALS.len()];
+        let signal = signals[(sent + late) % signals.len()];
         let moment = longest.mul_f64(f64::from(random.below(1000)) / 1000.0);
         let place = Place::new();
         fs::write(place.folder.path().join("page.html"), PAGE).expect("writable");

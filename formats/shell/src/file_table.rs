@@ -60,7 +60,8 @@ fn check_pairs(command: &Command, of: &Command, uses: &FileUses) -> anyhow::Resu
     for input in &inputs {
         for (output, used) in &outputs {
             let folder = ScratchFolder::create_in(&std::env::temp_dir())?;
-            let file = folder.path().join("file.x");
+            // Some arguments take files of certain kinds only, all of them this one.
+            let file = folder.path().join("file.csv");
             fs::write(&file, "kept")?;
             let target = match used {
                 FileUse::Output => file.as_path(),

@@ -2,8 +2,8 @@
 //!
 //! A program is started by a supervisor: this program again, as the hidden subcommand `supervise`. Descendants
 //! that lose their parent become children of the supervisor, so it finds those in other sessions as well. It
-//! ends all of them when it is told to or when this program ends, and in the second case removes the program's
-//! folder. SIGKILL of this program is such an end.
+//! ends all of them on request or when this program ends, and in the second case removes the program's folder.
+//! SIGKILL of this program is such an end.
 
 use super::children::{
     OnSignal, POLL_INTERVAL, TERMINATE, TERMINATION_TIMEOUT, forget, send, start, wait_if_ending,

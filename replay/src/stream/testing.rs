@@ -173,6 +173,9 @@ pub fn different_frames() -> MemoryTrace {
             .passes
             .extend(passes.map(|pass| Pass { frame, ..*pass }));
         trace.tiles.extend(other.tiles);
+        for (draw, of) in trace.tables.draws.iter_mut().zip(&other.tables.draws) {
+            draw.primitives = draw.primitives.max(of.primitives);
+        }
         let views = formats::view::FrameViews {
             frame,
             ..Default::default()

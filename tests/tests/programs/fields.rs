@@ -55,8 +55,9 @@ const FIELDS: &[(&str, u64, u64)] = &[
     ("aniso-level", 4096, 16384),
     ("aniso-gradients", 8 * 4096, 16384),
     ("aniso-gather", 4096, 16384),
-    // 33 rows of each of two layers.
-    ("aniso-array", 8 * 4096, 2 * 33 * 16 * 16),
+    // 33 rows of each of two layers, of which one is the first or the last. A layer has 21844 bytes, so layer 1
+    // starts in the middle of a line, and each of its two runs of rows has a line more.
+    ("aniso-array", 8 * 4096, 2 * 33 * 16 * 16 + 2 * 16),
     ("aniso-cube", 8 * 4096, 16384),
     ("aniso-mixed", 8 * 4096 + 2 * 4096, 16384 + 256 + 64),
     ("unnormalized", 4096, 8 * 32 * 16),
@@ -65,13 +66,13 @@ const FIELDS: &[(&str, u64, u64)] = &[
     ("cube-seams", 4096, 10 * 34 * 16),
     ("view-level", 4096, 1024),
     ("view-levels", 4096, 1024),
-    ("view-layer", 4096, 16384),
+    ("view-layer", 4096, 16384 + 16),
     ("view-swizzle", 2 * 4096, 16384),
     // The same texels through two views, then others.
     ("views-of-levels", 2 * 4096, 4096),
     ("views-of-formats", 2 * 4096, 16384),
-    ("views-of-layers", 2 * 4096, 16384),
-    ("views-apart", 2 * 4096, 2 * 16384),
+    ("views-of-layers", 2 * 4096, 16384 + 16),
+    ("views-apart", 2 * 4096, 2 * 16384 + 16),
     ("immutable", 8 * 4096, 16384),
     ("pushed", 8 * 4096, 16384),
     ("pushed-immutable", 8 * 4096, 16384),

@@ -91,10 +91,13 @@ fn capture(folder: &Path, stereo: &str, more: &[&str], of_program: &[&str]) -> C
 
 fn object(tables: &Tables, draw: u32) -> &'static str {
     let material = &tables.draws[draw as usize].material;
-    let number = material
-        .strip_prefix("pipeline ")
-        .expect("a pipeline's number");
-    OBJECTS[number.parse::<usize>().expect("a pipeline's number")]
+    let number = material.strip_prefix("pipeline ").and_then(|rest| {
+        // A draw with many coordinates is divided.
+        let number = rest.split(',').next()?;
+        number.parse::<usize>().ok()
+    });
+    // The program draws its objects in order, each with a pipeline of its own.
+    OBJECTS[number.expect("a pipeline's number") - 1]
 }
 
 /// Checks every pixel against its records. Returns the number of explained pixels of each object.

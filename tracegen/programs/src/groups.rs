@@ -390,7 +390,7 @@ mod tests {
             at: [0.0, 0.0, 1.0],
             dx: [0.25, 0.0, 0.0],
             dy: [0.0, 0.5, 0.0],
-            ..RawFragment::default()
+            lod: 7.0,
         };
         for (shape, lod, rule, own, slope, joins) in [
             (

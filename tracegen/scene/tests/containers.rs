@@ -127,6 +127,25 @@ fn dds(code: &[u8; 4], pixels: [u32; 6], extended: &[u32], mips: u32, data: &[u8
     bytes
 }
 
+/// A file of Basis Universal as an encoder writes it with a level count of 0: with level 0 alone.
+fn without_levels(file: &[u8]) -> Vec<u8> {
+    let mut file = file.to_vec();
+    let number = |file: &[u8], at: usize| u64::from_le_bytes(file[at..at + 8].try_into().unwrap());
+    let levels = u32::from_le_bytes(file[40..44].try_into().unwrap());
+    file[40..44].fill(0);
+    let (global, global_bytes) = (number(&file, 64), number(&file, 72));
+    if global_bytes > 0 {
+        // The global data of ETC1S begin with 20 bytes, and with as many for each level.
+        let gone = 20 * (u64::from(levels) - 1);
+        let rest = (global + 20 + 20) as usize;
+        file.drain(rest..rest + gone as usize);
+        file[72..80].copy_from_slice(&(global_bytes - gone).to_le_bytes());
+        let first_level = number(&file, 80) - gone;
+        file[80..88].copy_from_slice(&first_level.to_le_bytes());
+    }
+    file
+}
+
 #[test]
 fn a_file_without_levels_asks_for_all_of_them() {
     for (vk_format, format, bytes) in [
@@ -147,9 +166,7 @@ fn a_file_without_levels_asks_for_all_of_them() {
         (include_bytes!("images/etc1s-alpha.ktx2"), TexelFormat::Bc3),
     ] {
         let (whole, texels) = read(file).unwrap();
-        let mut none = file.to_vec();
-        none[40..44].fill(0);
-        let made = read(&none).unwrap();
+        let made = read(&without_levels(file)).unwrap();
         assert_eq!(made, (Some((format, 5, 1)), texels));
         assert_eq!(whole, Some((format, 5, 5)));
     }

@@ -6,12 +6,26 @@
 use super::{Fault, Header, Texels, level, needed_bytes};
 use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
 use formats::texture::TexelFormat;
+use std::borrow::Cow;
 
 fn fault(found: impl Into<String>) -> Fault {
     (
         "a readable Basis Universal image (ETC1S or UASTC)".to_owned(),
         found.into(),
     )
+}
+
+/// Place of the number of levels in the header of KTX2.
+const LEVEL_COUNT: std::ops::Range<usize> = 40..44;
+
+/// The bytes for the transcoder, which refuses a file without levels: such a file holds one.
+fn held(bytes: &[u8]) -> Cow<'_, [u8]> {
+    if bytes.get(LEVEL_COUNT) != Some(&[0; 4]) {
+        return Cow::Borrowed(bytes);
+    }
+    let mut held = bytes.to_vec();
+    held[LEVEL_COUNT].copy_from_slice(&1_u32.to_le_bytes());
+    Cow::Owned(held)
 }
 
 fn open(bytes: &[u8]) -> Result<(Transcoder<'_>, TexelFormat, TargetFormat), Fault> {
@@ -27,12 +41,13 @@ fn open(bytes: &[u8]) -> Result<(Transcoder<'_>, TexelFormat, TargetFormat), Fau
 
 /// The block format into which a file is transcoded.
 pub(super) fn format(bytes: &[u8]) -> Result<TexelFormat, Fault> {
-    open(bytes).map(|(_, format, _)| format)
+    open(&held(bytes)).map(|(_, format, _)| format)
 }
 
 /// Transcodes all levels of the file.
 pub(super) fn levels(bytes: &[u8], header: &Header) -> Result<Vec<Vec<u8>>, Fault> {
-    let (transcoder, _, target) = open(bytes)?;
+    let bytes = held(bytes);
+    let (transcoder, _, target) = open(&bytes)?;
     (0..header.stored.held)
         .map(|number| {
             let transcoded = transcoder
