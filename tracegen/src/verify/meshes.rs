@@ -25,9 +25,20 @@ pub(super) fn hold(
 ) {
     // Each mesh is stored once.
     let mut stored: HashMap<usize, u32> = HashMap::new();
+    let mut owners: HashMap<u32, usize> = HashMap::new();
     for (draw, (mesh, &number)) in drawn.iter().zip(&found.draw_meshes).enumerate() {
         let expected = *stored.entry(*mesh).or_insert(number);
         faults.hold(&format!("draw {draw}: mesh"), &expected, &number);
+        // Meshes with the same triangles are stored apart, as the scene has them.
+        let owner = *owners.entry(number).or_insert(*mesh);
+        if owner != *mesh {
+            let expected = format!("another one than that of {}", scene.meshes[owner].name);
+            faults.add(
+                &format!("draw {draw}: mesh"),
+                &expected,
+                &number.to_string(),
+            );
+        }
     }
     faults.hold("number of meshes", &stored.len(), &found.meshes.len());
     let mut stored: Vec<(usize, u32)> = stored.into_iter().collect();
