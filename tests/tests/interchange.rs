@@ -530,8 +530,7 @@ fn options_of_traces_are_refused_with_addresses() {
 
 #[test]
 fn options_of_addresses_are_refused_with_traces() {
-    let of_addresses: [&[&str]; 4] = [
-        &["--csv"],
+    let of_addresses: [&[&str]; 3] = [
         &["--kinds", "read"],
         &["--address-form", "u32"],
         &["--caches", "8/128"],

@@ -191,7 +191,13 @@ fn traces_of_isotropic_samplers_are_version_2_and_the_fast_replay_counts_the_sam
         let trace = Textrace::open(&path).expect("a trace");
         assert_eq!(trace.container().version(), (version, 0), "{name}");
         let all = FIELDS.iter().find(|(other, _, _)| *other == name);
-        let (_, footprints, bytes) = all.expect("a field");
-        assert_eq!(replayed(&path, &[]), (*footprints, *bytes), "{name}");
+        let &(_, footprints, bytes) = all.expect("a field");
+        // Without other views of the image, each layer is a texture of its own, which starts at a line's start.
+        let bytes = if name == "views-apart" {
+            bytes - LINE_BYTES
+        } else {
+            bytes
+        };
+        assert_eq!(replayed(&path, &[]), (footprints, bytes), "{name}");
     }
 }

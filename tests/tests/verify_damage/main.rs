@@ -105,7 +105,10 @@ impl Bench<'_> {
     fn row(&self, worker: usize, Damage { field, sizes }: &Damage) -> Row {
         let known = |what: &str| {
             let row = [field.as_str(), what].map(quoted).join(",") + ",";
-            self.before.lines().any(|line| line.starts_with(&row))
+            // Rows of damages that neither program finds have no program.
+            let unfound = format!("{row}-,");
+            let mut lines = self.before.lines();
+            lines.any(|line| line.starts_with(&row) && !line.starts_with(&unfound))
         };
         let at = sizes.iter().position(|(what, _)| known(what));
         let first = if self.searches { 0 } else { at.unwrap_or(0) };
