@@ -4,7 +4,7 @@
 use formats::textrace::Encoding;
 use parallax_tests::{program, refuse, root, run_ok, traces};
 use serde_json::Value;
-use std::collections::{HashSet, VecDeque};
+use std::collections::{HashMap, HashSet, VecDeque};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -526,6 +526,29 @@ fn options_of_traces_are_refused_with_addresses() {
             .args(options);
         refuse(&mut command, &["cannot be used with"]);
     }
+}
+
+#[test]
+fn a_row_of_csv_has_the_figures_of_json() {
+    let run = |form: &str| {
+        let mut command = program("replay");
+        run_ok(command.arg("run").arg(golden("atrium")).arg(form)).stdout
+    };
+    let json: Value = serde_json::from_slice(&run("--json")).expect("JSON");
+    let csv = run("--csv");
+    let mut reader = csv::Reader::from_reader(csv.as_slice());
+    let rows: Vec<HashMap<String, String>> = reader
+        .deserialize()
+        .map(|row| row.expect("a row"))
+        .collect();
+    let [row] = &rows[..] else {
+        panic!("{} rows", rows.len());
+    };
+    assert_eq!(json["trace"]["checksum"], row["checksum"].as_str());
+    for key in ["external_bytes", "cycles"] {
+        assert_eq!(row[key], json["result"][key].to_string(), "{key}");
+    }
+    assert_eq!(row["l2_size_bytes"], "131072");
 }
 
 #[test]

@@ -31,7 +31,7 @@ pub struct Args {
     /// Print one JSON object (schema replay.run/2, or replay.addresses/2)
     #[arg(long)]
     json: bool,
-    /// Print CSV, one row per configuration; the columns are those of `replay sweep --csv`
+    /// Print CSV, one row per configuration
     #[arg(long, conflicts_with_all = ["json", "tiles"], hide_short_help = true)]
     csv: bool,
     /// Also count by tile

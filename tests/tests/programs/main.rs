@@ -207,6 +207,17 @@ fn a_chain_of_branches_with_a_texture_each_is_recorded_in_time() {
     // With one object, its pipeline has the number of `plain`, whose texels are compared the same way.
     let explained = check_pixels(&captured);
     assert!(explained["plain"] > 10_000, "{explained:?}");
+    // The object does not overlap itself, and it has more uv groups than a draw of a trace.
+    let trace = Textrace::open(&captured.trace).expect("a trace");
+    assert!(trace.tables().draws.len() > 1);
+    let output = run_ok(
+        program("replay")
+            .arg("run")
+            .arg(&captured.trace)
+            .arg("--json"),
+    );
+    let result: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!(result["result"]["lanes"], explained["plain"]);
 }
 
 #[test]

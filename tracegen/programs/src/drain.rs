@@ -4,6 +4,7 @@ mod build;
 mod images;
 mod places;
 mod portions;
+mod quads;
 
 use crate::pairs::pair;
 use crate::session::{Executed, Session, SessionError, coverage_group};

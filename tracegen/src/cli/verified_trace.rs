@@ -57,8 +57,8 @@ pub(super) fn look_as(
     Ok(first.frame == 0)
 }
 
-/// The camera between the eyes of a trace. The scene's numbers are taken where they are the same but for
-/// rounding, because the shadow cascades follow from their last bits.
+/// The camera between the eyes of a trace. Numbers that equal the scene's within rounding are
+/// replaced by the scene's, because the shadow cascades depend on the last bits.
 fn camera_of(views: &FrameViews, scene: &Scene, own: &Camera) -> Camera {
     let [left, right] = views
         .eyes

@@ -6,7 +6,7 @@ use super::super::{Bounds, Points, Sweep};
 
 pub(super) const SWEEP: Sweep = Sweep {
     name: "triangles",
-    about: "Degenerate and huge triangles, exact duplicates (the first one wins), one plane close before another, NaN and infinity, against the reference. Planes less than a few steps of 32-bit depth apart (z^2 / near / 2^24, here 10^-5 m), and duplicates that are wound the other way, are told apart by no renderer.",
+    about: "Degenerate and huge triangles, exact duplicates (the first one wins), one plane close before another, NaN and infinity, against the reference. No renderer distinguishes planes that are less than a few steps of 32-bit depth apart (z^2 / near / 2^24, here 10^-5 m), or duplicates with reversed winding.",
     bounds: Bounds {
         fragments_pct: 0.2,
         uv_texels: 0.05,
