@@ -22,6 +22,9 @@ const MOST_TIME: Duration = Duration::from_secs(10);
 const MOST_BYTES: usize = 16 << 20;
 const FRAMES: [u32; 2] = [1, 2];
 
+/// Bytes of room that stay after the last record.
+const ROOM: usize = 4096;
+
 /// Values in place of numbers of the events.
 const NUMBERS: [&str; 12] = [
     "0",
@@ -64,7 +67,14 @@ fn captured() -> Files {
         .map(|entry| {
             let path = entry.expect("an entry").path();
             let name = path.file_name().expect("a name").into();
-            (name, fs::read(&path).expect("a file"))
+            let mut bytes = fs::read(&path).expect("a file");
+            // Room for later records follows the last one.
+            let used = bytes
+                .iter()
+                .rposition(|byte| *byte != 0)
+                .map_or(0, |last| last + 1);
+            bytes.truncate(used.next_multiple_of(ROOM));
+            (name, bytes)
         })
         .collect();
     files.sort();
