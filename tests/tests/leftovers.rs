@@ -272,7 +272,7 @@ fn processes_of_a_capture_are_found() {
     let place = Place::new();
     let mut shell = Command::new("sh");
     let mut child = shell
-        .args(["-c", "sleep 5; :"])
+        .args(["-c", "exec sleep 5"])
         .env(MARK, place.folder.path())
         .spawn()
         .expect("starts");
