@@ -8,9 +8,9 @@ OUT   ?= out
 # Folder of the real scenes (docs/use/real-scenes.md).
 SCENES ?= $(OUT)/scenes
 
-.PHONY: demo apps techniques accuracy stress notebooks test fuzz faults bench lint build deps golden figures reproduce clean screenshots scenes scene-files
+.PHONY: demo apps techniques accuracy stress notebooks test fuzz faults bench lint programs build deps golden figures reproduce clean screenshots scenes scene-files
 
-demo: deps build
+demo: deps programs
 	@OUT="$(OUT)" scripts/demo.sh
 
 # Unmodified programs: two web pages in headless Chromium, captured and replayed (docs/use/applications.md).
@@ -53,6 +53,10 @@ bench:
 lint:
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --release --workspace --all-targets --locked -- -D warnings
+
+# Both programs, without the layer that captures other programs.
+programs:
+	$(CARGO) build --release --locked -p tracegen -p replay
 
 build:
 	$(CARGO) build --release --locked -p tracegen -p replay -p layer

@@ -14,6 +14,8 @@ pub mod layout;
 mod parse;
 pub mod random;
 pub mod raytrace;
+#[cfg(feature = "testing")]
+pub mod schemas;
 pub mod text;
 pub mod textrace;
 pub mod texture;

@@ -179,7 +179,7 @@ pub fn columns<R: Tabular, T: Rows<R>>(trace: &T) -> formats::Result<Vec<Values>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stream::synthetic::Synthetic;
+    use sim::stream::synthetic::Synthetic;
 
     #[test]
     fn a_trace_without_records_has_empty_columns_of_the_right_types() {

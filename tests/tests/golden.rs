@@ -182,7 +182,7 @@ impl Digests {
     /// The file's text.
     fn text(&self) -> String {
         let mut text = format!(
-            "# Model version (replay/src/model_version.rs), then for each golden result: name, trace, counts.\n{}\n",
+            "# Model version (replay/sim/src/model_version.rs), then for each golden result: name, trace, counts.\n{}\n",
             self.model_version
         );
         for (name, Digest { trace, counts }) in &self.results {
@@ -249,7 +249,7 @@ fn every_golden_trace_replays_to_its_golden_result() {
         assert!(
             changed.is_empty(),
             "counts changed under model version {MODEL_VERSION}: {}; add a line to HISTORY in \
-             replay/src/model_version.rs, then UPDATE_GOLDEN=1",
+             replay/sim/src/model_version.rs, then UPDATE_GOLDEN=1",
             changed.join(", ")
         );
     }

@@ -41,6 +41,31 @@ fn replay_depends_neither_on_tracegen_nor_on_a_gpu() {
 }
 
 #[test]
+fn models_depend_neither_on_studies_nor_on_reports() {
+    assert_free_of(
+        "sim",
+        &["shell", "image-error", "sgrt", "studies", "report"],
+    );
+    assert_free_of("sim", &["plotters", "parquet", "maud", "toml", "anyhow"]);
+    assert_free_of(
+        "sgrt",
+        &["shell", "studies", "report", "plotters", "parquet"],
+    );
+    assert_free_of(
+        "studies",
+        &["report", "replay", "plotters", "parquet", "maud"],
+    );
+}
+
+#[test]
+fn tracegen_reads_what_the_layer_writes_without_the_layer() {
+    for package in ["spool", "programs", "tracegen"] {
+        assert_free_of(package, &["layer", "rspirv"]);
+    }
+    assert!(tree("layer").iter().any(|n| n == "spool"));
+}
+
+#[test]
 fn record_depends_only_on_formats() {
     let names = tree("record");
     assert!(names.iter().any(|n| n == "formats"));

@@ -6,10 +6,10 @@
 #![cfg(target_os = "linux")]
 
 use formats::textrace::{Textrace, TextraceWriter, Tile};
-use parallax_layer::spool::FramesBy;
 use parallax_tests::traces::Random;
 use parallax_tests::{has_lavapipe, program, run_ok};
 use programs::{Job, Session, Wanted, check, drain};
+use spool::FramesBy;
 use std::collections::BTreeMap;
 use std::fs;
 use std::panic::catch_unwind;

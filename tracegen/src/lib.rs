@@ -8,7 +8,5 @@ mod hidden_mesh;
 mod picture;
 #[cfg(test)]
 mod schemas;
-mod stress;
 mod study;
 mod unstable_triangles;
-mod verify;

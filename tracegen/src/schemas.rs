@@ -1,12 +1,9 @@
 //! The JSON Schemas of `tracegen` in `schemas/`, derived from the types that the commands print.
 //! `UPDATE_SCHEMAS=1 cargo test -p tracegen schemas` rewrites the files.
 
-#[path = "../../replay/src/schemas/published.rs"]
-mod published;
-
-pub(crate) use published::Published;
-
-use crate::{cli, stress, study, verify};
+use crate::{cli, study};
+use lab::{stress, verify};
+use std::path::Path;
 
 #[test]
 fn published_schemas_equal_those_of_the_types() {
@@ -18,5 +15,6 @@ fn published_schemas_equal_those_of_the_types() {
         verify::report::schema(),
     ];
     all.extend(cli::scenes::schemas());
-    published::assert_published("tracegen", &all);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../schemas");
+    formats::schemas::assert_published("tracegen", &folder, &all);
 }

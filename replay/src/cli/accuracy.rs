@@ -3,19 +3,19 @@
 use super::ConfigArgs;
 use super::addresses::two_levels_only;
 use super::subjects::Traces;
-use crate::accuracy::{Inputs, Rays, Replays, STUDIES, TraversalRow};
-use crate::config::RunConfig;
 use crate::files::{check_outputs, write_atomically};
-use crate::report::accuracy::{AccuracyReport, Measured};
-use crate::result::scene_name;
-use crate::sgrt::frame::RaySource;
-use crate::techniques::Folder;
 use anyhow::{Context, Result, anyhow, ensure};
 use formats::raytrace::Raytrace;
+use report::accuracy::{AccuracyReport, Measured};
 use serde::Deserialize;
+use sgrt::frame::RaySource;
 use shell::{Output, Progress};
+use sim::config::RunConfig;
+use sim::result::scene_name;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use studies::accuracy::{Inputs, Rays, Replays, STUDIES, TraversalRow};
+use studies::techniques::Folder;
 
 /// Names of the files in the output folder.
 const FILES: [&str; 5] = [
@@ -222,8 +222,8 @@ fn write(report: &AccuracyReport, size: &dyn Fn(&str) -> String, folder: &Path) 
 mod tests {
     use super::*;
     use crate::cli::testing::file_of;
-    use crate::stream::synthetic::Synthetic;
     use clap::Parser;
+    use sim::stream::synthetic::Synthetic;
 
     #[derive(Parser)]
     struct Line {
@@ -257,7 +257,7 @@ mod tests {
             |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
         let [page, json, choices, errors, times] = FILES.map(read);
         assert!(page.contains("Precision of the ray traversal"), "{page}");
-        assert!(json.contains(crate::report::accuracy::ACCURACY_SCHEMA));
+        assert!(json.contains(report::accuracy::ACCURACY_SCHEMA));
         assert!(choices.contains("a sphere at 1e5 m"), "{choices}");
         assert!(errors.contains("a 48x48"), "{errors}");
         assert!(times.contains("single precision"), "{times}");

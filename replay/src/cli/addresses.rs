@@ -2,11 +2,11 @@
 
 use super::ConfigArgs;
 use super::experiment_args::parse_caches;
-use crate::addresses::{self, KindSet};
-use crate::config::RunConfig;
-use crate::report::addresses as report;
 use anyhow::{Result, bail, ensure};
 use formats::interop::plain::{AccessKind, AddressFile, AddressForm};
+use report::addresses as report;
+use sim::addresses::{self, KindSet};
+use sim::config::RunConfig;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;

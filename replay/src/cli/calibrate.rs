@@ -2,15 +2,15 @@
 
 use super::ConfigArgs;
 use super::subjects::Traces;
-use crate::config::Mode;
-use crate::experiment::{self, Axis, Objective, Plan, SceneCaptures, Store, trials};
-use crate::paper::z2;
-use crate::preset::Preset;
-use crate::report::calibration::CalibrationReport;
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use report::calibration::CalibrationReport;
 use shell::Progress;
+use sim::config::Mode;
+use sim::paper::z2;
+use sim::preset::Preset;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use studies::experiment::{self, Axis, Objective, Plan, SceneCaptures, Store, trials};
 use toml::Value;
 
 /// Arguments of `replay calibrate`.
@@ -59,7 +59,7 @@ pub struct Args {
 /// Wrong arguments, an invalid configuration, or an unreadable trace.
 pub fn run(args: &Args) -> Result<ExitCode> {
     let preset = args.machine.preset().unwrap_or(Preset::Z2_PAPER);
-    let usual = crate::config::RunConfig::default();
+    let usual = sim::config::RunConfig::default();
     let base = args.machine.resolve_over(preset.over(usual))?;
     ensure!(
         base.mode != Mode::Functional || args.objective != Objective::Surface,
@@ -77,7 +77,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let bytes = |kib: u32| Value::Integer(i64::from(kib) << 10);
         sizes.into_iter().map(bytes).collect()
     };
-    let name = |order: &crate::config::Order| Value::String(order.name().to_owned());
+    let name = |order: &sim::config::Order| Value::String(order.name().to_owned());
     let table = [
         ("l1.size_bytes", sizes(|c| c.0)),
         ("l2.size_bytes", sizes(|c| c.1)),

@@ -3,14 +3,14 @@
 use super::ConfigArgs;
 use super::order_arg::parse_orders;
 use super::subjects::Traces;
-use crate::compare::compare;
-use crate::config::Order;
-use crate::experiment::{self, Axis, Plan};
-use crate::report::compare::{CompareReport, Replayed, Side};
 use anyhow::{Context, Result, ensure};
+use report::compare::{CompareReport, Replayed, Side};
 use shell::Progress;
+use sim::config::Order;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use studies::compare::compare;
+use studies::experiment::{self, Axis, Plan};
 use toml::Value;
 
 /// Arguments of `replay compare`.

@@ -1,22 +1,22 @@
 //! Flags that set the machine. Flags override `--config`, which overrides the defaults.
 
 use super::order_arg::OrderParser;
-use crate::config::FrameMachine;
-use crate::config::{
-    Allocation, AnisotropyModel, Assign, BetweenFrames, BlockOrder, CountBy, FilterOverride, Hsr,
-    LodFormula, Mode, Order, Prefetching, Replacement, RunConfig, TextureOrder, TmuModel,
-};
-use crate::experiment::parse_config;
-use crate::memory::dram::DramPreset;
-use crate::preset::Preset;
-use crate::registry::most_similar;
-use crate::size::{format_bytes, parse_bytes};
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use formats::texture::TexelFormat;
 use serde::de::value::Error as ValueError;
 use serde::de::{DeserializeOwned, IntoDeserializer};
+use sim::config::FrameMachine;
+use sim::config::{
+    Allocation, AnisotropyModel, Assign, BetweenFrames, BlockOrder, CountBy, FilterOverride, Hsr,
+    LodFormula, Mode, Order, Prefetching, Replacement, RunConfig, TextureOrder, TmuModel,
+};
+use sim::memory::dram::DramPreset;
+use sim::preset::Preset;
+use sim::registry::most_similar;
+use sim::size::{format_bytes, parse_bytes};
 use std::path::{Path, PathBuf};
+use studies::experiment::parse_config;
 
 /// Parses an enum of the formats crate by its serialised name.
 fn named<T: DeserializeOwned>(text: &str) -> Result<T, String> {

@@ -2,9 +2,6 @@
 
 use super::ConfigArgs;
 use super::tiles::{ray_tiles, tiles};
-use crate::config::RunConfig;
-use crate::notices;
-use crate::stream::{TileSource, for_quads, plan, rendered};
 use anyhow::{Context, Result, bail, ensure};
 use formats::Trace;
 use formats::container::{AtomicFile, is_stdout};
@@ -18,7 +15,10 @@ use formats::raytrace::{
     RayTile, Raytrace, RaytraceWriter, encode_ray_tile, encode_ray_tile_with_geometry,
 };
 use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as, with_operands};
+use report::notices;
 use shell::Output;
+use sim::config::RunConfig;
+use sim::stream::{TileSource, for_quads, plan, rendered};
 use std::io::{self, Write};
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -3,13 +3,13 @@
 
 use super::dump::record_lines;
 use super::tiles::{ray_tiles, tiles};
-use crate::notices;
 use anyhow::Result;
 use formats::Trace;
 use formats::interop::{node_to_json, ray_samples, slot_rows, slot_to_json};
 use formats::raytrace::{RayTile, Raytrace};
 use formats::textrace::geometry::GeometryView;
 use formats::textrace::{Textrace, Tile};
+use report::notices;
 use serde_json::Value;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -262,9 +262,9 @@ fn lines(place: &str, left: Vec<String>, right: Vec<String>) -> Option<String> {
 mod tests {
     use super::*;
     use crate::cli::testing::file_of;
-    use crate::stream::synthetic::Synthetic;
+    use sim::stream::synthetic::Synthetic;
 
-    fn compare(change: impl FnOnce(&mut crate::stream::MemoryTrace)) -> Vec<String> {
+    fn compare(change: impl FnOnce(&mut sim::stream::MemoryTrace)) -> Vec<String> {
         let mut memory = Synthetic::default().generate();
         let left = file_of(&memory);
         change(&mut memory);

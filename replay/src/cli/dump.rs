@@ -2,9 +2,7 @@
 
 use super::tiles::{NumberRange, ray_tiles, tiles};
 use crate::files;
-use crate::notices;
 use crate::records::{self, Rows};
-use crate::report::rows_parquet::RowsWriter;
 use anyhow::{Context, Result, bail, ensure};
 use formats::Trace;
 use formats::container::AtomicFile;
@@ -14,6 +12,8 @@ use formats::interop::{
 };
 use formats::raytrace::{RayTile, Raytrace};
 use formats::textrace::{Textrace, Tile};
+use report::notices;
+use report::rows_parquet::RowsWriter;
 use shell::Output;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -297,8 +297,8 @@ fn samples(
 mod tests {
     use super::*;
     use crate::cli::testing::{file_of, lines};
-    use crate::stream::synthetic::Synthetic;
     use parquet::file::reader::{FileReader, SerializedFileReader};
+    use sim::stream::synthetic::Synthetic;
 
     #[test]
     fn a_dump_holds_every_record_of_the_chosen_tiles() {

@@ -3,19 +3,19 @@
 use super::ConfigArgs;
 use super::order_arg::parse_orders;
 use super::subjects::Traces;
-use crate::config::RunConfig;
-use crate::experiment::{self, Plan, Subject};
 use crate::files::{self, write_atomically};
-use crate::paper::{self, z2};
-use crate::report::picture::EmbeddedPicture;
-use crate::report::z2::model::PaperReport;
-use crate::report::z2::page;
-use crate::size::parse_bytes;
 use anyhow::{Context, Result, bail, ensure};
 use rayon::prelude::*;
+use report::picture::EmbeddedPicture;
+use report::z2::model::PaperReport;
+use report::z2::page;
 use shell::{Output, Progress, is_stdout};
+use sim::config::RunConfig;
+use sim::paper::{self, z2};
+use sim::size::parse_bytes;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use studies::experiment::{self, Plan, Subject};
 
 /// Arguments of the Z2 paper's experiment.
 #[derive(Debug, clap::Args)]

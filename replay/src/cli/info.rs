@@ -6,9 +6,6 @@ mod json;
 pub(crate) use json::schema;
 pub use json::to_json;
 
-use crate::notices;
-use crate::report::columns::{Column, Show};
-use crate::report::table::Table;
 use anyhow::Result;
 use formats::Trace;
 use formats::container::Container;
@@ -17,6 +14,9 @@ use formats::raytrace::{Raytrace, RaytraceTables};
 use formats::textrace::{ChosenTechniques, PassKind, Textrace, TraceMeta};
 use formats::texture::{Sampler, Texture};
 use json::{PassJson, RayCounts, Totals, lower, passes, ray_counts, version};
+use report::columns::{Column, Show};
+use report::notices;
+use report::table::Table;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -83,7 +83,7 @@ fn texture_text(trace: &Textrace) -> Result<String> {
     if let Some(techniques) = &trace.tables().meta.techniques {
         text += &techniques_text(techniques);
     }
-    for notice in notices::of(&trace.tables().meta) {
+    for notice in sim::result::notices_of(&trace.tables().meta) {
         text += &format!("{notice}\n");
     }
     text += &pass_table(trace);
@@ -248,7 +248,7 @@ fn ray_text(trace: &Raytrace) -> Result<String> {
 mod tests {
     use super::*;
     use crate::cli::testing::file_of;
-    use crate::stream::synthetic::Synthetic;
+    use sim::stream::synthetic::Synthetic;
 
     #[test]
     fn totals_are_the_sums_over_the_trace() {

@@ -5,16 +5,16 @@ use super::addresses::{AddressInput, name_of, two_levels_only};
 use super::experiment_args::{page_outputs, write_page};
 use super::order_arg::parse_orders;
 use super::subjects::Traces;
-use crate::config::{Order, RunConfig};
-use crate::experiment::frame_count;
 use crate::files::{self, write_atomically};
-use crate::locality::{OrderFigures, Stream, analyse, analyse_addresses};
-use crate::report::locality::{LocalityReport, TraceFigures};
-use crate::stream::TileSource;
 use anyhow::{Context, Result, ensure};
+use report::locality::{LocalityReport, TraceFigures};
 use shell::{Output, Progress, is_stdout};
+use sim::config::{Order, RunConfig};
+use sim::stream::TileSource;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use studies::experiment::frame_count;
+use studies::locality::{OrderFigures, Stream, analyse, analyse_addresses};
 
 /// Default of `--orders`.
 const USUAL_ORDERS: &str = "morton,z2-lrta,z2-sta,z2-sta-merge";

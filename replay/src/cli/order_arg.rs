@@ -1,11 +1,11 @@
 //! Tile orders as arguments: names or lists of parts, one order or several.
 
-use crate::config::Order;
-use crate::paper::z2;
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, TypedValueParser};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, Command, Error, ValueEnum};
+use sim::config::Order;
+use sim::paper::z2;
 use std::ffi::OsStr;
 
 /// Parses an order. Help and completions show the table.

@@ -4,19 +4,19 @@ use super::ConfigArgs;
 use super::experiment_args::{page_outputs, parse_caches, write_page};
 use super::order_arg::parse_named;
 use super::subjects::Traces;
-use crate::config::{BetweenFrames, Mode, Order, RunConfig};
-use crate::experiment::frame_count;
 use crate::files::{self, write_atomically};
-use crate::orders_study::learn::learn;
-use crate::orders_study::search::{Method, Schedule};
-use crate::orders_study::{BASELINE, OrderFile, Searched, Study, Subjects, default_orders};
-use crate::report::orders::{LearnedTrace, OrdersReport};
-use crate::size::format_bytes;
 use anyhow::{Context, Result, bail, ensure};
+use report::orders::{LearnedTrace, OrdersReport};
 use shell::{Output, Progress, is_stdout};
+use sim::config::{BetweenFrames, Mode, Order, RunConfig};
+use sim::size::format_bytes;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use studies::experiment::frame_count;
+use studies::orders_study::learn::learn;
+use studies::orders_study::search::{Method, Schedule};
+use studies::orders_study::{BASELINE, OrderFile, Searched, Study, Subjects, default_orders};
 
 /// Stands for the orders that the study knows: every curve and every part.
 const ALL: &str = "all";

@@ -3,10 +3,10 @@
 use super::experiment_args::{ExperimentArgs, page_outputs, write_report};
 use super::parquet_arg::ParquetArg;
 use crate::files::write_atomically;
-use crate::report::errors::{self, Of};
-use crate::report::z2::model::PaperReport;
-use crate::report::z2::tables;
 use anyhow::{Result, ensure};
+use report::errors::{self, Of};
+use report::z2::model::PaperReport;
+use report::z2::tables;
 use shell::{Output, is_stdout};
 use std::fmt::Write as _;
 use std::path::PathBuf;

@@ -1,9 +1,9 @@
 //! The flag `--parquet` of every command that writes its rows as CSV.
 
 use crate::files::write_atomically;
-use crate::report::parquet;
-use crate::report::table::Table;
 use anyhow::{Context, Result};
+use report::parquet;
+use report::table::Table;
 use shell::{Output, is_stdout};
 use std::path::PathBuf;
 

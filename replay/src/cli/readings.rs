@@ -2,14 +2,14 @@
 
 use super::reuse_args::read_config;
 use crate::files::{self, write_atomically};
-use crate::paper::sgrt as paper;
-use crate::report::readings::{ReadingsReport, SceneReadings};
-use crate::result::{TraceId, scene_name};
-use crate::sgrt::loaded::LoadedTrace;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use formats::raytrace::Raytrace;
+use report::readings::{ReadingsReport, SceneReadings};
+use sgrt::loaded::LoadedTrace;
 use shell::{Output, Progress};
+use sim::paper::sgrt as paper;
+use sim::result::{TraceId, scene_name};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -138,8 +138,8 @@ fn mark_calibration(scenes: &mut [SceneReadings], labels: Option<&[String]>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sgrt::synthetic::{View, globe, trace, wall};
     use clap::Parser;
+    use sgrt::synthetic::{View, globe, trace, wall};
     use std::path::Path;
 
     #[derive(Parser)]

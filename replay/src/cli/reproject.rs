@@ -4,24 +4,24 @@
 use super::parquet_arg::ParquetArg;
 use super::reuse_args::ReuseArgs;
 use crate::files::{self, write_atomically};
-use crate::model_version::MODEL_VERSION;
-use crate::paper::sgrt as paper;
-use crate::report::sgrt::{self as report, Entry, Thumbnails};
-use crate::report::table::Table;
-use crate::result::{TOOL, TraceId, scene_name};
-use crate::sgrt::compose::Reuse;
-use crate::sgrt::config::{DEFAULT_TOML, SgrtConfig};
-use crate::sgrt::loaded::{LoadedTrace, RuleRun};
-use crate::sgrt::picture;
-use crate::sgrt::result::{Config, Report, SCHEMA};
-use crate::sgrt::rules::Rule;
-use crate::sgrt::timing::Timing;
-use crate::sgrt::variations::curve_rules;
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::raytrace::Raytrace;
 use image_error::{Picture, png};
+use report::sgrt::{self as document, Entry, Thumbnails};
+use report::table::Table;
+use sgrt::compose::Reuse;
+use sgrt::config::{DEFAULT_TOML, SgrtConfig};
+use sgrt::loaded::{LoadedTrace, RuleRun};
+use sgrt::picture;
+use sgrt::result::{Config, Report, SCHEMA};
+use sgrt::rules::Rule;
+use sgrt::timing::Timing;
+use sgrt::variations::curve_rules;
 use shell::{Output, Progress};
+use sim::model_version::MODEL_VERSION;
+use sim::paper::sgrt as paper;
+use sim::result::{TOOL, TraceId, scene_name};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -106,18 +106,18 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     }
     drop(progress);
     if let Some(path) = &args.html {
-        write_atomically(path, report::page(&entries)?.as_bytes())?;
+        write_atomically(path, document::page(&entries)?.as_bytes())?;
     }
-    args.parquet.write(|| report::rows(&entries))?;
+    args.parquet.write(|| document::rows(&entries))?;
     let reports = entries.iter().map(|e| &e.report);
     let text = if args.json {
         let pretty = entries.len() == 1;
-        let lines: Result<Vec<String>, _> = reports.map(|r| report::json(r, pretty)).collect();
+        let lines: Result<Vec<String>, _> = reports.map(|r| document::json(r, pretty)).collect();
         lines?.join("\n") + "\n"
     } else if args.csv {
-        report::csv(&entries)
+        document::csv(&entries)
     } else {
-        report::text(&entries)
+        document::text(&entries)
     };
     if prints {
         super::print(&text)?;
@@ -158,7 +158,7 @@ pub fn rows(arguments: &[String], parameters: Option<&str>) -> anyhow::Result<Ta
         .iter()
         .map(|path| report_on(path, &args, &config));
     let entries: Vec<Entry> = entries.collect::<anyhow::Result<_>>()?;
-    Ok(report::rows(&entries))
+    Ok(document::rows(&entries))
 }
 
 /// Refuses options that only the closed form supports.
@@ -259,7 +259,7 @@ fn triptych(ours: &RuleRun) -> Picture {
 }
 
 fn thumbnails(loaded: &LoadedTrace, ours: &RuleRun, plain: &RuleRun) -> anyhow::Result<Thumbnails> {
-    let small = |p: &Picture| png::encode(&p.shrunk_to(report::THUMBNAIL_PX));
+    let small = |p: &Picture| png::encode(&p.shrunk_to(document::THUMBNAIL_PX));
     Ok(Thumbnails {
         left: small(&loaded.left())?,
         bad: small(&picture::bad_pixels(&ours.decisions, &ours.picture))?,
@@ -272,8 +272,8 @@ fn thumbnails(loaded: &LoadedTrace, ours: &RuleRun, plain: &RuleRun) -> anyhow::
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sgrt::synthetic::{View, globe, trace, wall};
     use clap::Parser;
+    use sgrt::synthetic::{View, globe, trace, wall};
 
     #[derive(Parser)]
     struct Cli {

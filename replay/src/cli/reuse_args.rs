@@ -1,12 +1,12 @@
 //! Options of the commands that reuse hits: rule, level of reuse and model parameters.
 
-use crate::sgrt::DEFAULT_RULE;
-use crate::sgrt::compose::Reuse;
-use crate::sgrt::config::SgrtConfig;
-use crate::sgrt::presets::{self, Preset};
-use crate::sgrt::rules::{self, Rule};
 use anyhow::Context;
 use clap::Args;
+use sgrt::DEFAULT_RULE;
+use sgrt::compose::Reuse;
+use sgrt::config::SgrtConfig;
+use sgrt::presets::{self, Preset};
+use sgrt::rules::{self, Rule};
 use std::path::{Path, PathBuf};
 
 /// What is reused, and the machine.

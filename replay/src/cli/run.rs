@@ -3,15 +3,15 @@
 use super::ConfigArgs;
 use super::addresses::AddressArgs;
 use super::subjects::Traces;
-use crate::config::{Mode, TmuModel};
-use crate::experiment::{self, Plan};
 use crate::files;
-use crate::report::run as report;
 use anyhow::{Result, bail, ensure};
+use report::run as document;
 use shell::Output;
+use sim::config::{Mode, TmuModel};
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
+use studies::experiment::{self, Plan};
 
 /// Arguments of `replay run`.
 #[derive(Debug, clap::Args)]
@@ -97,8 +97,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let Some(frame) = &mut config.frame else {
             bail!("--picture: only with --frame");
         };
-        let rgb = crate::report::picture::read(picture)?;
-        frame.color_compressed_permille = crate::access::compressed_permille(
+        let rgb = report::picture::read(picture)?;
+        frame.color_compressed_permille = sim::access::compressed_permille(
             rgb.as_raw(),
             rgb.width() as usize,
             config.tile_px,
@@ -136,18 +136,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         && let Some(timeline) = &row.result.timeline
     {
         let tables = row.subject.source.tables();
-        let text = crate::report::timeline::json(timeline, tables, config.line_bytes)?;
+        let text = report::timeline::json(timeline, tables, config.line_bytes)?;
         files::write_atomically(file, text.as_bytes())?;
     }
     if !prints {
         return Ok(ExitCode::SUCCESS);
     }
     super::print(&match (rows.as_slice(), args.json) {
-        (rows, _) if args.csv => report::csv(rows),
-        ([timed, functional], true) => report::modes_json(timed, functional)?,
-        ([timed, functional], false) => report::modes_text(timed, functional),
-        ([row, ..], true) => report::json(row)?,
-        ([row, ..], false) => report::text(row, args.machine.counts_by().is_some()),
+        (rows, _) if args.csv => document::csv(rows),
+        ([timed, functional], true) => document::modes_json(timed, functional)?,
+        ([timed, functional], false) => document::modes_text(timed, functional),
+        ([row, ..], true) => document::json(row)?,
+        ([row, ..], false) => document::text(row, args.machine.counts_by().is_some()),
         ([], _) => String::new(),
     })?;
     Ok(ExitCode::SUCCESS)

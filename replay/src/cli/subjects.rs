@@ -1,11 +1,11 @@
 //! Opens and names the texture traces of an experiment.
 
-use crate::experiment::{Subject, labels};
-use crate::result::TraceId;
-use crate::stream::TileSource;
 use anyhow::Result;
 use formats::textrace::Textrace;
+use sim::result::TraceId;
+use sim::stream::TileSource;
 use std::path::PathBuf;
+use studies::experiment::{Subject, labels};
 
 /// Opened traces.
 pub struct Traces(Vec<(Textrace, TraceId, String)>);
@@ -17,7 +17,7 @@ impl Traces {
     /// A file that cannot be read or is damaged.
     pub fn open(paths: &[PathBuf]) -> Result<Self> {
         let open = |path: &PathBuf| {
-            let (trace, id) = crate::notices::open_textrace(path)?;
+            let (trace, id) = report::notices::open_textrace(path)?;
             let stem = path.file_stem().unwrap_or_default();
             Ok((trace, id, stem.to_string_lossy().into_owned()))
         };

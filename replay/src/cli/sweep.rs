@@ -2,14 +2,14 @@
 
 use super::parquet_arg::ParquetArg;
 use super::subjects::Traces;
-use crate::experiment::{self, ExperimentFile, Outcome, Plan, Point, Split, Store, Subject};
 use crate::files::{self, write_atomically};
-use crate::report::sweep::SweepReport;
-use crate::report::sweep_plan;
 use anyhow::{Context, Result, ensure};
+use report::sweep::SweepReport;
+use report::sweep_plan;
 use shell::{Needs, Output, Progress, Shard, ShardArgs, SlurmArray};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use studies::experiment::{self, ExperimentFile, Outcome, Plan, Point, Split, Store, Subject};
 
 /// Arguments of `replay sweep`.
 #[derive(Debug, clap::Args)]

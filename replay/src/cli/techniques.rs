@@ -5,22 +5,22 @@ use super::experiment_args::{page_outputs, write_page};
 use super::order_arg::parse_orders;
 use super::parquet_arg::ParquetArg;
 use super::subjects::Traces;
-use crate::config::{Mode, Order, RunConfig};
-use crate::experiment::{self, Plan, ResultRow, frame_count};
 use crate::files::{self, write_atomically};
-use crate::report::picture::EmbeddedPicture;
-use crate::report::techniques::{Scene, TechniquesReport};
-use crate::result::scene_name;
-use crate::stream::TileSource;
-use crate::techniques::{
+use anyhow::{Context, Result, bail};
+use rayon::prelude::*;
+use report::picture::EmbeddedPicture;
+use report::techniques::{Scene, TechniquesReport};
+use shell::{Output, Progress, is_stdout};
+use sim::config::{Mode, Order, RunConfig};
+use sim::result::scene_name;
+use sim::stream::TileSource;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use studies::experiment::{self, Plan, ResultRow, frame_count};
+use studies::techniques::{
     CacheFigures, Difference, Folder, Measured, Measures, PictureFigures, Sharing, Timing,
     differences, picture_figures, sharing,
 };
-use anyhow::{Context, Result, bail};
-use rayon::prelude::*;
-use shell::{Output, Progress, is_stdout};
-use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 /// Arguments of `replay techniques`.
 #[derive(Debug, clap::Args)]
@@ -328,11 +328,11 @@ fn embedded(folder: &Folder, differences: Vec<Difference>) -> Result<Scene> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::techniques::testing;
     use clap::Parser;
     use serde_json::Value;
     use std::fs;
     use std::path::Path;
+    use studies::techniques::testing;
 
     #[derive(Parser)]
     struct Line {

@@ -2,13 +2,13 @@
 
 use super::reuse_args::ReuseArgs;
 use crate::files;
-use crate::report::temporal::{FrameSchemes, TemporalReport};
-use crate::result::TraceId;
-use crate::sgrt::temporal::{SequenceFrame, schemes};
 use anyhow::{Context, Result};
 use clap::Args;
 use formats::raytrace::Raytrace;
+use report::temporal::{FrameSchemes, TemporalReport};
+use sgrt::temporal::{SequenceFrame, schemes};
 use shell::{Output, Progress};
+use sim::result::TraceId;
 use std::path::PathBuf;
 use std::process::ExitCode;
 

@@ -1,9 +1,6 @@
 //! `replay validate`: checks every checksum and invariant of a trace.
 
 use super::tiles::{ray_tiles, tiles};
-use crate::config::RunConfig;
-use crate::notices;
-use crate::stream::Expander;
 use anyhow::Result;
 use formats::raytrace::{RAY_TILES, RayTile, check_relations};
 use formats::textrace::Tile;
@@ -11,6 +8,9 @@ use formats::textrace::geometry::ViewTarget;
 use formats::textrace::tables::TEXTURES;
 use formats::{FormatError, Trace};
 use rayon::prelude::*;
+use report::notices;
+use sim::config::RunConfig;
+use sim::stream::Expander;
 use std::path::PathBuf;
 use std::process::ExitCode;
 

@@ -1,10 +1,10 @@
 //! Warnings about results that are right but say little. They go to standard error.
 
-use crate::config::{RunConfig, TmuModel};
-use crate::experiment::{Outcome, Plan, Subject};
-use crate::preset::Preset;
-use crate::result::RunResult;
-use crate::stream::TileSource;
+use sim::config::{RunConfig, TmuModel};
+use sim::preset::Preset;
+use sim::result::RunResult;
+use sim::stream::TileSource;
+use studies::experiment::{Outcome, Plan, Subject};
 
 /// Pictures of which less than this share is covered are warned of, percent.
 const LEAST_COVERED_PCT: f64 = 20.0;
@@ -104,9 +104,9 @@ fn of_first_miss_bytes(plan: &Plan) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::{LevelConfig, Levels, Mode, Order};
-    use crate::engine::replay;
-    use crate::stream::synthetic::Synthetic;
+    use sim::config::{LevelConfig, Levels, Mode, Order};
+    use sim::engine::replay;
+    use sim::stream::synthetic::Synthetic;
 
     #[test]
     fn a_cache_that_holds_everything_is_at_the_bound_and_a_small_one_is_not() {

@@ -1,7 +1,7 @@
 //! The capture that this process belongs to.
 
-use crate::control::Control;
-use crate::spool::{Event, FOLDER_VARIABLE, FramesBy, Settings, Writer};
+use spool::control::Control;
+use spool::{Event, FOLDER_VARIABLE, FramesBy, Settings, Writer};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};

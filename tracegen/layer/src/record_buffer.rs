@@ -3,8 +3,9 @@
 //! It is host memory, because a device address of lavapipe is an address in the process. Untouched pages take
 //! no memory.
 
-use crate::inject::{COUNTER_BYTES, UNIT_BYTES, Unit};
 use memmap2::{MmapMut, MmapOptions};
+use spool::buffer::COUNTER_BYTES;
+use spool::{UNIT_BYTES, Unit};
 use std::io;
 use std::sync::atomic::{AtomicU32, Ordering};
 

@@ -1,8 +1,8 @@
 //! Compares the records of draws with occlusion queries of the driver.
 
 use crate::session::{REPEATED, Session, coverage_group, survival_group};
-use parallax_layer::inject::{DepthTests, RawSample};
-use parallax_layer::spool::ReadError;
+use spool::ReadError;
+use spool::{DepthTests, RawSample};
 use std::collections::{BTreeMap, HashMap};
 
 /// Result of the comparison of recorded fragments with the driver's counts.

@@ -14,10 +14,10 @@ use formats::textrace::{
     LeftOut, Pass, PassKind, ProgramCapture, Surfaces, TextraceWriter, TraceMeta,
 };
 use formats::view::{Eye, EyeView, FovTangents, FrameViews, Hmd, TILE_SIZE_PX};
-use parallax_layer::inject::RawSample;
-use parallax_layer::spool::FramesBy;
 use places::Placement;
 use record::{CaptureCounts, RecordError, Recording};
+use spool::FramesBy;
+use spool::RawSample;
 use std::collections::{BTreeMap, HashMap};
 use std::io::{Seek, Write};
 use thiserror::Error;
@@ -92,8 +92,8 @@ pub enum DrainError {
     Record(#[from] RecordError),
 }
 
-impl From<parallax_layer::spool::ReadError> for DrainError {
-    fn from(error: parallax_layer::spool::ReadError) -> Self {
+impl From<spool::ReadError> for DrainError {
+    fn from(error: spool::ReadError) -> Self {
         Self::Session(error.into())
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::lanes::{Joins, LaneSample, lod, on_cube};
 use formats::textrace::{LodRule, Sample, SampleLevel, UvGroup};
-use parallax_layer::inject::{Access, Form, Lod, RawFragment, RawQuad, Shape, TextureSite, What};
-use parallax_layer::spool::ShaderInfo;
+use spool::ShaderInfo;
+use spool::{Access, Form, Lod, RawFragment, RawQuad, Shape, TextureSite, What};
 
 /// A texture and a sampler of the trace that a site uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -235,7 +235,7 @@ fn level(texture: &TextureSite, operands: bool, anisotropic: bool) -> SampleLeve
 #[cfg(test)]
 mod tests {
     use super::*;
-    use parallax_layer::inject::{Binding, DepthTests, Site};
+    use spool::{Binding, DepthTests, Site};
 
     fn site(form: Form, group: u16, shape: Shape, access: Access, lod: Lod) -> Site {
         let binding = Binding {

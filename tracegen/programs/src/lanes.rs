@@ -1,7 +1,7 @@
 //! Combines records of single fragments into records of quads.
 
 use formats::footprint::fast_log2;
-use parallax_layer::inject::{RawFragment, RawQuad};
+use spool::{RawFragment, RawQuad};
 
 /// Coordinates and operands of one lane.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -2,8 +2,8 @@
 
 use crate::loader;
 use formats::container::ScratchFolder;
-use parallax_layer::control::Control;
-use parallax_layer::spool::Settings;
+use spool::Settings;
+use spool::control::Control;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -13,7 +13,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum LaunchError {
     /// The layer's library is missing.
-    #[error("{0} is missing: it is built with tracegen and belongs beside it")]
+    #[error("{0} is missing: `make build` builds it beside tracegen")]
     NoLayer(String),
     /// The capture's folder cannot be written.
     #[error("cannot set up the capture in {folder}: {source}")]

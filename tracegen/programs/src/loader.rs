@@ -3,7 +3,7 @@
 
 use super::launch::LaunchError;
 use formats::container::ScratchFolder;
-use parallax_layer::spool::{FOLDER_VARIABLE, LAYER_NAME};
+use spool::{FOLDER_VARIABLE, LAYER_NAME};
 use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::os::unix::ffi::OsStrExt;

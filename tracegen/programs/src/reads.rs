@@ -1,7 +1,7 @@
 //! Counts texture reads by shaders of stages that are not recorded.
 
 use formats::textrace::UnrecordedReads;
-use parallax_layer::spool::{DispatchInfo, DrawInfo, INDIRECT, StageReads};
+use spool::{DispatchInfo, DrawInfo, INDIRECT, StageReads};
 use std::collections::BTreeMap;
 
 /// Counts of a frame by stage and kind of texture.

@@ -1,8 +1,8 @@
 //! Frames, render passes and draws of a captured program.
 
 use crate::reads::Reads;
-use parallax_layer::inject::{DepthTests, Form, RawSample, Site, What};
-use parallax_layer::spool::{
+use spool::{DepthTests, Form, RawSample, Site, What};
+use spool::{
     DispatchInfo, DrawInfo, Event, ImageInfo, PassInfo, Process, ReadError, Reader, ShaderInfo,
     Span,
 };
@@ -505,7 +505,7 @@ mod tests {
     #[test]
     fn a_shader_that_neither_writes_colours_nor_discards_has_no_effect() {
         let mut session = Session::default();
-        let view = parallax_layer::spool::ViewInfo {
+        let view = spool::ViewInfo {
             image: 1,
             format: 37,
             kind: 1,

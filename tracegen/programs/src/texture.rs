@@ -4,7 +4,7 @@ use ash::vk::{self, Format as F};
 use formats::texture::{
     ColorSpace, Filter, LodRange, MipFilter, Sampler, TexelFormat, Texture, Wrap,
 };
-use parallax_layer::spool::{ImageInfo, SamplerInfo, ViewInfo};
+use spool::{ImageInfo, SamplerInfo, ViewInfo};
 
 /// Format and colour space in a trace; `None` for formats that textures cannot have.
 #[must_use]

@@ -1,6 +1,6 @@
 //! Watches the processes of a program for reasons why they do not load the layer.
 
-use parallax_layer::spool::FOLDER_VARIABLE;
+use spool::FOLDER_VARIABLE;
 use std::fs;
 use std::path::Path;
 use std::time::{Duration, Instant};

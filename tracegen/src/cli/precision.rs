@@ -70,8 +70,8 @@ impl From<Precision> for PrecisionRow {
 
 /// The schema of the JSON object.
 #[cfg(test)]
-pub(crate) fn schema() -> crate::schemas::Published {
-    crate::schemas::Published::of::<PrecisionDocument>(SCHEMA)
+pub(crate) fn schema() -> formats::schemas::Published {
+    formats::schemas::Published::of::<PrecisionDocument>(SCHEMA)
 }
 
 /// Runs `tracegen precision`.

@@ -3,10 +3,10 @@
 use super::cache_args::CacheArgs;
 use super::pose_args::PoseArgs;
 use super::scene_args::{SceneSpec, load_scene};
-#[cfg(test)]
-use crate::schemas::Published;
 use ::scenes::BUILTINS;
 use clap::Args;
+#[cfg(test)]
+use formats::schemas::Published;
 use glam::Vec3;
 use scene::{LoadOptions, Loaded, Scene};
 use serde::Serialize;

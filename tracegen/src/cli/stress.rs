@@ -1,9 +1,9 @@
 //! `tracegen stress`.
 
-use crate::stress::{self, SWEEPS};
 use anyhow::Context;
 use clap::Args;
 use formats::container::{AtomicFile, ScratchFolder};
+use lab::stress::{self, SWEEPS};
 use shell::{Output, Progress};
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -82,8 +82,8 @@ struct PlannedCapture<'a> {
 
 /// The schema of the JSON object.
 #[cfg(test)]
-pub(crate) fn schema() -> crate::schemas::Published {
-    crate::schemas::Published::of::<PlanDocument<'_>>(PLAN_SCHEMA)
+pub(crate) fn schema() -> formats::schemas::Published {
+    formats::schemas::Published::of::<PlanDocument<'_>>(PLAN_SCHEMA)
 }
 
 /// Runs `tracegen sweep`.

@@ -200,8 +200,8 @@ struct Manifest<'a> {
 
 /// The schema of the JSON object.
 #[cfg(test)]
-pub(crate) fn schema() -> crate::schemas::Published {
-    crate::schemas::Published::of::<Manifest<'_>>(SCHEMA)
+pub(crate) fn schema() -> formats::schemas::Published {
+    formats::schemas::Published::of::<Manifest<'_>>(SCHEMA)
 }
 
 /// A finished row with the key of its study.

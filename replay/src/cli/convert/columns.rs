@@ -2,13 +2,13 @@
 
 use super::{GranularityName, Target};
 use crate::records::{self, Rows};
-use crate::report::rows_parquet::RowsWriter;
 use anyhow::{Result, bail};
 use formats::Trace;
 use formats::interop::{
     Access, AccessSink, Field, GeometryRow, Get, NpyWriter, RayRow, RecordRow, Tabular, child_rows,
     slot_rows,
 };
+use report::rows_parquet::RowsWriter;
 use std::io::{self, Write};
 
 /// A receiver of rows.

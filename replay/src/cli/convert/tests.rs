@@ -1,21 +1,21 @@
 use super::*;
 use crate::cli::testing::{file_of, lines};
-use crate::config::{LevelConfig, Levels, Mode, Order};
-use crate::engine::replay;
-use crate::line_list::line_list;
-use crate::locality::analyse;
-use crate::memory::AnyCache;
-use crate::order::parts::Eyes;
-use crate::orders_study::default_orders;
-use crate::stream::MemoryTrace;
-use crate::stream::synthetic::Synthetic;
-use crate::stream::testing::different_frames;
 use clap::Parser;
 use formats::FormatError;
 use formats::interop::plain::{AddressFile, AddressForm, Block};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::RowAccessor;
+use sim::config::{LevelConfig, Levels, Mode, Order};
+use sim::engine::replay;
+use sim::line_list::line_list;
+use sim::memory::AnyCache;
+use sim::order::parts::Eyes;
+use sim::stream::MemoryTrace;
+use sim::stream::synthetic::Synthetic;
+use sim::stream::testing::different_frames;
 use std::collections::HashSet;
+use studies::locality::analyse;
+use studies::orders_study::default_orders;
 
 #[derive(Parser)]
 struct Line {

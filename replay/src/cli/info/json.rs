@@ -59,7 +59,7 @@ struct ChunkJson {
 struct TextureJson<'a> {
     #[serde(flatten)]
     file: FileJson,
-    #[cfg_attr(test, schemars(with = "crate::schemas::Meta"))]
+    #[cfg_attr(test, schemars(with = "sim::schemas::Meta"))]
     meta: &'a TraceMeta,
     totals: Totals,
     passes: Vec<PassJson<'a>>,
@@ -80,7 +80,7 @@ struct TextureJson<'a> {
 struct RayJson<'a> {
     #[serde(flatten)]
     file: FileJson,
-    #[cfg_attr(test, schemars(with = "crate::schemas::Meta"))]
+    #[cfg_attr(test, schemars(with = "sim::schemas::Meta"))]
     meta: &'a RaytraceMeta,
     totals: EyeTotals,
     /// The trace's chunk RBVH (FORMAT.md), with the settings as an object.
@@ -134,8 +134,8 @@ pub fn to_json(trace: &Trace) -> Result<Value> {
 
 /// The schema of the JSON object.
 #[cfg(test)]
-pub(crate) fn schema() -> crate::schemas::Published {
-    crate::schemas::Published::of::<InfoJson<'_>>(SCHEMA)
+pub(crate) fn schema() -> formats::schemas::Published {
+    formats::schemas::Published::of::<InfoJson<'_>>(SCHEMA)
 }
 
 /// Major and minor version of a trace's format.

@@ -5,7 +5,7 @@
 //! reads, or mean latencies by more than 3 %.
 
 #[allow(dead_code)]
-#[path = "../../../../replay/src/memory/dram/mod.rs"]
+#[path = "../../../../replay/sim/src/memory/dram/mod.rs"]
 mod dram;
 
 use dram::{Dram, DramConfig, DramPreset};

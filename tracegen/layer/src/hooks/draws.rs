@@ -2,9 +2,9 @@
 
 use super::api::slice;
 use super::device::Device;
-use crate::spool::INDIRECT;
 use crate::track::{Call, CommandState, Dynamic, Pipeline};
 use ash::vk::{self, Handle};
+use spool::INDIRECT;
 use std::sync::Arc;
 
 /// Whether draws of a command buffer may belong to a requested frame. A command buffer that may be submitted

@@ -2,9 +2,9 @@
 
 use super::api::{find, slice};
 use super::device::Device;
-use crate::spool::{PassInfo, ViewInfo};
 use crate::track::{Attachment, OpenPass, RenderPass, Subpass};
 use ash::vk::{self, Handle};
+use spool::{PassInfo, ViewInfo};
 use std::sync::Arc;
 
 type Allocator = *const vk::AllocationCallbacks<'static>;

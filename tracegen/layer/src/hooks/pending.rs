@@ -5,9 +5,9 @@
 
 use super::device::Device;
 use crate::capture::Place;
-use crate::spool::{DispatchInfo, Event, Span};
 use crate::track::Executed;
 use ash::vk;
+use spool::{DispatchInfo, Event, Span};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::time::Duration;
 

@@ -5,8 +5,8 @@
 use super::device::Device;
 use super::next::Next;
 use crate::capture::lock;
-use crate::spool::{PassInfo, ViewInfo};
 use ash::vk;
+use spool::{PassInfo, ViewInfo};
 use std::collections::HashSet;
 use std::sync::Mutex;
 

@@ -2,9 +2,9 @@
 
 use super::api::slice;
 use super::libraries::{self, Parts};
-use crate::spool::DepthInfo;
 use crate::track::State;
 use ash::vk;
+use spool::DepthInfo;
 
 /// The state that the parts of a description fix.
 ///

@@ -6,10 +6,10 @@ use super::libraries::{self, Link, Parts};
 use super::pipeline_state::{self, Changed};
 use super::recording_shaders::{recording_shader, without_module};
 use super::stage_reads;
-use crate::inject::{DepthTests, What};
-use crate::spool::ShaderInfo;
 use crate::track::{Library, Pipeline, Recorded, State};
 use ash::vk;
+use spool::ShaderInfo;
+use spool::{DepthTests, What};
 use std::sync::Arc;
 
 /// What the tracker keeps of a description.

@@ -6,10 +6,10 @@ use super::draws::is_wanted;
 use super::libraries::Parts;
 use super::recording_shaders::module_of;
 use crate::inject::{InjectError, texel_reads, workgroup_size};
-use crate::spool::{DispatchInfo, StageReads};
 use crate::track::Compute;
 use ash::vk::{self, Handle};
 use rspirv::spirv::ExecutionModel;
+use spool::{DispatchInfo, StageReads};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 

@@ -5,9 +5,9 @@ use super::device::Device;
 use super::draws::buffers_of;
 use super::pending::{Pending, Submission, fence_after, read_ended, wait_for};
 use crate::capture::lock;
-use crate::spool::Event;
 use crate::track::{Copies, Effects, Executed};
 use ash::vk::{self, Handle};
+use spool::Event;
 use std::collections::HashMap;
 use std::time::Duration;
 

@@ -1,11 +1,13 @@
 //! Reserves space in the record buffer and stores records.
 
+use super::Target;
 use super::declare::{Inputs, Known, Types, id, literal};
 use super::lanes::Lanes;
 use super::writer::{Result, Writer};
-use super::{COUNTER_BYTES, Target, UNIT_BYTES, buffer};
 use rspirv::dr::{Builder, Instruction};
 use rspirv::spirv::{Decoration, Op, Scope, StorageClass, Word};
+use spool::UNIT_BYTES;
+use spool::buffer::{self, COUNTER_BYTES};
 
 /// The record buffer: its address and types.
 pub(super) struct Append {

@@ -1,9 +1,9 @@
 //! Finds image instructions that read texels, and the operands that are recorded.
 
 use super::shader::{Shader, ids};
-use super::site::{Access, Binding, Form, Lod, Shape, TextureSite, What};
 use rspirv::dr::{Instruction, Operand};
 use rspirv::spirv::{Dim, ImageOperands, Op, Word};
+use spool::{Access, Binding, Form, Lod, Shape, TextureSite, What};
 
 /// An image instruction that reads texels, and its recorded operands.
 pub(super) struct Found {

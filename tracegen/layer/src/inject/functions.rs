@@ -8,13 +8,13 @@
 //! each further loop doubles the time in which LLVM analyses that variable.
 
 use super::append::{Append, Each, header};
-use super::buffer::{self, GROUPS_SHIFT};
 use super::declare::{Inputs, Types};
 use super::lanes::{self, Lanes, Slopes};
 use super::writer::{Result, Writer};
 use super::{InjectError, Target};
 use rspirv::dr::Builder;
 use rspirv::spirv::Word;
+use spool::buffer::{self, GROUPS_SHIFT};
 
 /// Declares the functions of a module.
 pub(super) struct Functions {

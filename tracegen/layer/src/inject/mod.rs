@@ -6,7 +6,6 @@
 //! change. The number of the draw is a push constant.
 
 mod append;
-mod buffer;
 mod declare;
 mod find;
 mod flow;
@@ -18,16 +17,14 @@ mod reads;
 mod recorder;
 mod rewrite;
 mod shader;
-mod site;
 mod sites;
 mod writer;
 
-pub use buffer::{COUNTER_BYTES, RawFragment, RawQuad, RawSample, UNIT_BYTES, Unit, unpack};
 pub use reads::{texel_reads, workgroup_size};
-pub use site::{Access, Binding, Form, Lod, Shape, Site, TextureSite, What};
 
 use rspirv::spirv::{BuiltIn, ExecutionMode, Op, StorageClass};
 use shader::Shader;
+use spool::{DepthTests, Site};
 use thiserror::Error;
 
 /// Properties of the device and the pipeline that a recording shader depends on.
@@ -64,21 +61,6 @@ pub enum InjectError {
     /// Push constants of the program at the place of the draw's number.
     #[error("push constants at byte {0} and above")]
     PushConstants(u32),
-}
-
-/// Order of depth test and shading, as far as the shader determines it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DepthTests {
-    /// The order has no effect: the shader neither discards nor writes anything except colours.
-    #[default]
-    Either,
-    /// The test comes first, because the shader declares it.
-    Early,
-    /// The test comes first, but the depth is written after shading, because the shader discards.
-    EarlyLateWrite,
-    /// The test comes last, because the shader writes depth, sample mask or memory.
-    Late,
 }
 
 /// A recording fragment shader.

@@ -3,9 +3,9 @@
 use super::InjectError;
 use super::find::{find, reads_texels};
 use super::shader::{Shader, ids};
-use super::site::{Shape, What};
 use rspirv::dr::Operand;
 use rspirv::spirv::{BuiltIn, Decoration, ExecutionMode, ExecutionModel, Op, Word};
+use spool::{Shape, What};
 use std::collections::BTreeMap;
 
 /// Words before the first instruction of a module.

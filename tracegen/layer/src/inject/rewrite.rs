@@ -3,12 +3,13 @@
 use super::find::Found;
 use super::recorder::Recorder;
 use super::shader::Shader;
-use super::site::{Form, Lod, Site, What};
 use super::sites::{Batch, Sites, stays_first};
-use super::{DepthTests, InjectError, Target};
+use super::{InjectError, Target};
 use rspirv::binary::Assemble;
 use rspirv::dr::{Instruction, Operand};
 use rspirv::spirv::{ExecutionMode, Op, Word};
+use spool::DepthTests;
+use spool::{Form, Lod, Site, What};
 
 /// Rewrites a module. Returns its words and its sites.
 pub(super) fn rewrite(

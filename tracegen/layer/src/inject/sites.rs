@@ -1,14 +1,15 @@
 //! Finds the sites of a shader, their coordinate groups, and the places where groups are recorded together.
 
-use super::buffer::MOST_GROUPS;
+use super::InjectError;
 use super::find::{Found, find};
 use super::flow::unconditional;
 use super::numbers::{Number, Numbers};
 use super::shader::Shader;
-use super::site::{Form, Site, What};
-use super::{DepthTests, InjectError};
 use rspirv::dr::{Function, Instruction};
 use rspirv::spirv::Op;
+use spool::DepthTests;
+use spool::buffer::MOST_GROUPS;
+use spool::{Form, Site, What};
 use std::collections::{HashMap, HashSet};
 
 /// Indices of function, block and instruction.

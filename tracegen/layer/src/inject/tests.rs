@@ -2,6 +2,7 @@ mod growth;
 
 use super::*;
 use proptest::prelude::*;
+use spool::{Access, Binding, Form, Lod, Shape, TextureSite, What};
 use std::io::Write;
 use std::process::{Command, Stdio};
 

@@ -2,8 +2,8 @@
 
 use super::descriptors::SetState;
 use super::pipelines::{Compute, Pipeline};
-use crate::spool::{DispatchInfo, DrawInfo, PassInfo, TextureInfo};
 use ash::vk;
+use spool::{DispatchInfo, DrawInfo, PassInfo, TextureInfo};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
@@ -170,7 +170,7 @@ pub struct OpenPass {
     /// Its framebuffer.
     pub framebuffer: vk::Framebuffer,
     /// Views of an imageless framebuffer.
-    pub views: Option<Vec<Option<crate::spool::ViewInfo>>>,
+    pub views: Option<Vec<Option<spool::ViewInfo>>>,
     /// Rendered area.
     pub area: vk::Rect2D,
     /// Number of the subpass.

@@ -1,8 +1,8 @@
 //! Descriptor sets: the image and sampler of each descriptor.
 
 use super::Images;
-use crate::spool::{SamplerInfo, ViewInfo};
 use ash::vk::{self, Handle};
+use spool::{SamplerInfo, ViewInfo};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// Content of a texture descriptor.

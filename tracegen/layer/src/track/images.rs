@@ -1,7 +1,7 @@
 //! Images, image views and samplers.
 
-use crate::spool::{ImageInfo, SamplerInfo, ViewInfo};
 use ash::vk::{self, Handle};
+use spool::{ImageInfo, SamplerInfo, ViewInfo};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 

@@ -15,8 +15,8 @@ pub use images::Images;
 pub use passes::{Attachment, Passes, RenderPass, Subpass};
 pub use pipelines::{Compute, Layout, Library, Pipeline, Pipelines, Recorded, State};
 
-use crate::spool::{DrawInfo, TextureInfo};
 use ash::vk::{self, Handle};
+use spool::{DrawInfo, TextureInfo};
 use std::collections::HashSet;
 
 /// All tracked objects of a device.

@@ -1,8 +1,8 @@
 //! Render passes, framebuffers and render targets.
 
 use super::Images;
-use crate::spool::{PassInfo, ViewInfo};
 use ash::vk::{self, Handle};
+use spool::{PassInfo, ViewInfo};
 use std::collections::HashMap;
 
 /// An attachment that a subpass writes.

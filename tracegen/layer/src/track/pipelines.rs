@@ -1,8 +1,8 @@
 //! Shader modules, pipeline layouts, and graphics pipelines.
 
 use super::descriptors::SetState;
-use crate::spool::{DepthInfo, ShaderInfo, StageReads};
 use ash::vk::{self, Handle};
+use spool::{DepthInfo, ShaderInfo, StageReads};
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 

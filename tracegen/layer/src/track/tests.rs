@@ -1,7 +1,7 @@
 use super::descriptors::Slot;
 use super::*;
-use crate::spool::ViewInfo;
 use ash::vk::{self, Handle};
+use spool::ViewInfo;
 use std::sync::Arc;
 
 fn image_view(images: &mut Images, number: u64, size: u32) -> vk::ImageView {
@@ -346,7 +346,7 @@ fn a_library_gives_its_parts_and_keeps_its_layout() {
         quiet: Some(vk::Pipeline::from_raw(8)),
         state: State {
             viewport: Some(viewport),
-            depth: crate::spool::DepthInfo {
+            depth: spool::DepthInfo {
                 tests: true,
                 ..Default::default()
             },
@@ -378,7 +378,7 @@ fn effects_of_secondary_command_buffers_are_executed_in_order() {
     commands.begin(2, true);
     let secondary = &mut commands.get_mut(2).effects;
     secondary.await_events(&[set_before, never_set]);
-    secondary.dispatches.push(crate::spool::DispatchInfo {
+    secondary.dispatches.push(spool::DispatchInfo {
         groups: Some([1, 2, 3]),
         workgroup: [4, 5, 6],
         reads: Vec::new(),
@@ -414,7 +414,7 @@ fn only_linear_images_are_read_by_the_host() {
 
 #[test]
 fn draws_have_the_reads_of_the_shaders_before_the_fragment_shader() {
-    let reads = vec![crate::spool::StageReads {
+    let reads = vec![spool::StageReads {
         stage: "vertex".to_owned(),
         what: "cube maps".to_owned(),
         instructions: 3,

@@ -14,9 +14,9 @@ use ash::vk;
 use formats::textrace::{Draw, LeftOut, PassKind, Surfaces, TraceMeta, UvGroup};
 use formats::textrace::{TextraceWriter, tables::MAX_GROUPS};
 use formats::view::Eye;
-use parallax_layer::inject::{Access, RawSample, TextureSite, What};
-use parallax_layer::spool::{DrawInfo, ShaderInfo};
 use record::{CaptureCounts, DepthReplay, RawRecords, Recording};
+use spool::{Access, RawSample, TextureSite, What};
+use spool::{DrawInfo, ShaderInfo};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::{Seek, Write};
 
@@ -431,7 +431,7 @@ impl<W: Write + Seek> Builder<W> {
         site: &TextureSite,
         element: Option<u32>,
     ) -> Result<Bound, String> {
-        let find = |binding: &parallax_layer::inject::Binding| {
+        let find = |binding: &spool::Binding| {
             let wanted = binding.element.or(element).unwrap_or(0);
             info.textures.iter().find(|texture| {
                 (texture.set, texture.binding, texture.element)

@@ -2,8 +2,8 @@
 
 use crate::texture::texture;
 use formats::texture::{Part, Texture};
-use parallax_layer::spool::{ImageInfo, ViewInfo};
 use record::{RecordError, Recording};
+use spool::{ImageInfo, ViewInfo};
 use std::collections::{BTreeMap, HashMap};
 use std::io::{Seek, Write};
 

@@ -6,10 +6,10 @@ use crate::groups::Group;
 use crate::lanes::visits;
 use crate::session::{coverage_group, survival_group};
 use formats::textrace::NO_GROUP;
-use parallax_layer::inject::{Form, RawQuad, RawSample, Site, TextureSite, What};
-use parallax_layer::spool::ShaderInfo;
 use rayon::prelude::*;
 use record::{DepthReplay, RawDepth, RawRecord};
+use spool::ShaderInfo;
+use spool::{Form, RawQuad, RawSample, Site, TextureSite, What};
 use std::collections::{BTreeMap, HashMap};
 
 /// Records of one render pass.

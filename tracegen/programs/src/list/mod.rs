@@ -9,8 +9,8 @@ use crate::session::{ProgramFrame, Session, SessionError};
 use crate::texture::texture;
 use crate::views::{self, Role, View, Views, ViewsError, Wanted, viewport};
 use ash::vk;
-use parallax_layer::inject::{RawSample, What};
-use parallax_layer::spool::{ShaderInfo, ViewInfo};
+use spool::{RawSample, What};
+use spool::{ShaderInfo, ViewInfo};
 use std::collections::{HashMap, HashSet};
 use std::fmt::Write as _;
 

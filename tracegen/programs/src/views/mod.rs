@@ -12,8 +12,8 @@ pub use others::Other;
 use crate::session::{Executed, ProgramFrame, Session, writes_color};
 use formats::view::Eye;
 use images::Images;
-use parallax_layer::spool::{DrawInfo, PassInfo, ViewInfo};
 use serde::{Deserialize, Serialize};
+use spool::{DrawInfo, PassInfo, ViewInfo};
 use thiserror::Error;
 
 /// How a program renders for two eyes.

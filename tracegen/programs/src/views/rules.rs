@@ -2,7 +2,7 @@
 
 use super::{DrawKey, Drawn, Found, LEFT, RIGHT, Role, Rule, View, viewport};
 use crate::pairs::matched_share;
-use parallax_layer::spool::ViewInfo;
+use spool::ViewInfo;
 use std::collections::HashMap;
 
 /// Applies a rule. `None` if it does not fit.

@@ -1,5 +1,5 @@
 use super::*;
-use parallax_layer::spool::{DepthInfo, Event, Span, TextureInfo};
+use spool::{DepthInfo, Event, Span, TextureInfo};
 
 const SIZE: u32 = 64;
 

@@ -1,0 +1,620 @@
+//! The sentences at the top of pages, computed from the figures.
+
+use super::html::{change, count, list};
+use studies::techniques::{LEAST_SAMPLES, Spread};
+
+/// Least and largest of named values; `None` if there are none.
+fn ends<T>(rows: &[T], value: impl Fn(&T) -> f64) -> Option<(&T, &T)> {
+    let least = rows.iter().min_by(|a, b| value(a).total_cmp(&value(b)))?;
+    let most = rows.iter().max_by(|a, b| value(a).total_cmp(&value(b)))?;
+    Some((least, most))
+}
+
+fn traffic(pct: f64) -> String {
+    change(pct, "less", "more", "as much")
+}
+
+/// Orders against a baseline: names, and the percentage of the baseline's traffic that each saves. `over`
+/// says what the means are taken over.
+#[must_use]
+pub(super) fn tile_orders(baseline: &str, over: &str, orders: &[(String, f64)]) -> Vec<String> {
+    let Some((worst, best)) = ends(orders, |o| o.1) else {
+        return vec![format!(
+            "Only {baseline} was replayed, so no order is compared with another."
+        )];
+    };
+    let than = |pct: f64| match traffic(-pct).as_str() {
+        "as much" => format!("as much as {baseline}"),
+        words => format!("{words} than {baseline}"),
+    };
+    let saves = format!("{:.1}", best.1).parse().unwrap_or(0.0) > 0.0;
+    let mut out = vec![match (orders.len(), saves) {
+        (1, _) => match traffic(-best.1).as_str() {
+            "as much" => format!(
+                "{} fetches as much texture data from memory as {baseline} ({over}).",
+                best.0
+            ),
+            words => format!(
+                "{} fetches {words} texture data from memory than {baseline} ({over}).",
+                best.0
+            ),
+        },
+        (others, true) => format!(
+            "Of {}, {} fetches the least texture data from memory: {} ({over}).",
+            count(others + 1, "tile order"),
+            best.0,
+            than(best.1)
+        ),
+        (others, false) => format!(
+            "None of the {others} other orders fetches less texture data from memory than {baseline}; {} comes closest with {} ({over}).",
+            best.0,
+            traffic(-best.1)
+        ),
+    }];
+    // Where every order saves, the baseline itself fetches the most.
+    let costs = format!("{:.1}", worst.1).parse().unwrap_or(0.0) < 0.0;
+    if orders.len() > 1 && costs {
+        out.push(format!("{} fetches the most: {}.", worst.0, than(worst.1)));
+    }
+    out
+}
+
+/// An axis of a sweep: its key, and the mean traffic at each of its values.
+pub type Effect = (String, Vec<(String, f64)>);
+
+/// The points of a sweep with their traffic in MB per frame, and the axes.
+#[must_use]
+pub fn sweep(points: &[(String, f64)], effects: &[Effect]) -> Vec<String> {
+    let Some((least, most)) = ends(points, |p| p.1) else {
+        return vec!["No point was replayed.".to_owned()];
+    };
+    let mb = |value: f64| format!("{value:.2} MB per frame");
+    if points.len() == 1 {
+        return vec![format!(
+            "One point was replayed: it fetches {} from memory.",
+            mb(least.1)
+        )];
+    }
+    if mb(least.1) == mb(most.1) {
+        return vec![format!(
+            "All {} points fetch {} from memory: none of the settings changes it.",
+            points.len(),
+            mb(least.1)
+        )];
+    }
+    let mut out = vec![format!(
+        "Over {} points, external texture traffic ranges from {} ({}) to {} ({}).",
+        points.len(),
+        mb(least.1),
+        least.0,
+        mb(most.1),
+        most.0
+    )];
+    let spread = |effect: &Effect| {
+        ends(&effect.1, |v| v.1).map_or(0.0, |(low, high)| high.1 / low.1.max(f64::MIN_POSITIVE))
+    };
+    let largest = effects.iter().filter(|e| e.1.len() > 1);
+    let largest = largest.max_by(|a, b| spread(a).total_cmp(&spread(b)));
+    if let Some((key, values)) = largest
+        && let Some((low, high)) = ends(values, |v| v.1)
+        && mb(low.1) != mb(high.1)
+    {
+        let which = match effects.iter().filter(|e| e.1.len() > 1).count() {
+            1 => format!("{key} changes the mean"),
+            axes => format!("Of {axes} axes, {key} changes the mean most:"),
+        };
+        out.push(format!(
+            "{which} from {} at {} to {} at {}.",
+            mb(low.1),
+            low.0,
+            mb(high.1),
+            high.0
+        ));
+    }
+    out
+}
+
+/// Misses of the configured cache under one order, percent of line accesses: LRU as configured, and OPT of
+/// the same size.
+pub struct Misses {
+    /// Name of the order.
+    pub order: String,
+    /// As configured.
+    pub miss_pct: f64,
+    /// Under OPT, fully associative.
+    pub opt_pct: f64,
+}
+
+/// The misses of one stream.
+#[must_use]
+pub fn misses(cache: &str, rows: &[Misses]) -> Option<String> {
+    let (least, most) = ends(rows, |r| r.miss_pct)?;
+    let bound = format!("{:.2} % under optimal replacement", least.opt_pct);
+    let pct = |row: &Misses| format!("{:.2} %", row.miss_pct);
+    Some(match rows {
+        [_] => format!(
+            "{cache}: {} of line accesses miss; it would be {bound}.",
+            pct(least)
+        ),
+        _ if pct(least) == pct(most) => format!(
+            "{cache}: {} of line accesses miss in each of the {} orders; it would be {bound}.",
+            pct(least),
+            rows.len()
+        ),
+        _ => format!(
+            "{cache}: {} has the fewest misses of {} orders, {} of line accesses ({bound}), and {} the most, {}.",
+            least.order,
+            rows.len(),
+            pct(least),
+            most.order,
+            pct(most)
+        ),
+    })
+}
+
+/// An order of a study.
+pub(super) struct Studied {
+    /// Name.
+    pub name: String,
+    /// Change of the bytes against the baseline, percent.
+    pub change_pct: f64,
+    /// Whether hardware can have it.
+    pub is_buildable: bool,
+}
+
+/// A study of orders and bounds against a baseline, over `rows` pairs of trace and caches.
+#[must_use]
+pub(super) fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<String> {
+    let compare = |order: &Studied| match traffic(order.change_pct).as_str() {
+        "as much" => format!("{} reads as much from memory as {baseline}", order.name),
+        words => format!("{} reads {words} from memory than {baseline}", order.name),
+    };
+    let over = format!(
+        "geometric mean over {} of trace and caches",
+        count(rows, "pair")
+    );
+    let of = |buildable: bool| {
+        let orders = orders
+            .iter()
+            .filter(move |o| o.is_buildable == buildable && o.name != baseline);
+        orders.min_by(|a, b| a.change_pct.total_cmp(&b.change_pct))
+    };
+    let mut out = Vec::new();
+    match of(true) {
+        Some(best) => {
+            let fewer = format!("{:.1}", best.change_pct).parse().unwrap_or(0.0) < 0.0;
+            let verdict = if fewer {
+                "Best of the orders that hardware can follow"
+            } else {
+                "No other order that hardware can follow reads less than the baseline. The closest"
+            };
+            out.push(format!("{verdict}: {} ({over}).", compare(best)));
+        }
+        None => out.push(format!(
+            "Only {baseline} is an order that hardware can follow ({over})."
+        )),
+    }
+    if let Some(best) = of(false) {
+        out.push(format!(
+            "With knowledge of the frame's accesses, which no hardware has, {}.",
+            compare(best)
+        ));
+    }
+    out
+}
+
+/// Stereo reprojection of one scene.
+pub struct Reprojected {
+    /// Name of the scene.
+    pub scene: String,
+    /// Frames per second over those of tracing both eyes.
+    pub performance: f64,
+    /// Energy over that of tracing both eyes.
+    pub energy: f64,
+    /// Right pixels that are reused, percent.
+    pub reuse_pct: f64,
+    /// Mean FLIP of the right image.
+    pub flip: f64,
+    /// The paper's performance and energy.
+    pub paper: Option<[f64; 2]>,
+}
+
+/// Performance, energy and error of reprojection.
+#[must_use]
+pub fn reprojected(scenes: &[Reprojected]) -> Vec<String> {
+    if scenes.is_empty() {
+        return Vec::new();
+    }
+    let mean = |of: &dyn Fn(&Reprojected) -> f64| {
+        let logs = scenes.iter().map(|s| of(s).max(f64::MIN_POSITIVE).ln());
+        (logs.sum::<f64>() / scenes.len() as f64).exp()
+    };
+    let plain =
+        |of: &dyn Fn(&Reprojected) -> f64| scenes.iter().map(of).sum::<f64>() / scenes.len() as f64;
+    let of = match scenes {
+        [one] => one.scene.clone(),
+        _ => format!("the mean of {}", count(scenes.len(), "scene")),
+    };
+    let (speed, energy) = (mean(&|s| s.performance), mean(&|s| s.energy));
+    let range = match ends(scenes, |s| s.energy) {
+        Some((least, most)) if scenes.len() > 1 => {
+            format!(
+                " ({:.2} to {:.2} times, by scene)",
+                least.energy, most.energy
+            )
+        }
+        _ => String::new(),
+    };
+    let energy = 100.0 * (energy - 1.0);
+    let mut out = vec![
+        format!(
+            "In {of}, reprojection reuses {:.1} % of the right pixels, renders {speed:.2} times the frames per second of tracing both eyes, and takes {} energy{}{range}.",
+            plain(&|s| s.reuse_pct),
+            change(energy, "less", "more", "the same"),
+            if format!("{:.1}", energy.abs()) == "0.0" {
+                ""
+            } else {
+                " than that"
+            }
+        ),
+        format!(
+            "The right image differs from the traced one by a mean FLIP of {:.4}.",
+            plain(&|s| s.flip)
+        ),
+    ];
+    let known: Vec<[f64; 2]> = scenes.iter().filter_map(|s| s.paper).collect();
+    if !known.is_empty() {
+        let mean =
+            |i: usize| (known.iter().map(|p| p[i].ln()).sum::<f64>() / known.len() as f64).exp();
+        let of = match known.len() {
+            1 => "the scene that stands for one of its own".to_owned(),
+            scenes => format!("the {scenes} scenes that stand for its own"),
+        };
+        out.push(format!(
+            "The paper has {:.2} times the frames per second and {:.2} times the energy for {of}.",
+            mean(0),
+            mean(1)
+        ));
+    }
+    out
+}
+
+/// A technique against the baseline.
+pub struct Timed {
+    /// Name.
+    pub name: String,
+    /// Frame time over that of the baseline.
+    pub time: Spread,
+    /// Mean FLIP.
+    pub flip: f64,
+}
+
+impl Timed {
+    /// Whether the measurements tell the technique from the baseline: enough of them, and both quartiles on one
+    /// side of 1.
+    fn is_told_apart(&self) -> bool {
+        self.time.samples >= LEAST_SAMPLES && (self.time.q3 < 1.0 || self.time.q1 > 1.0)
+    }
+
+    /// Its frame time against the baseline, with quartiles.
+    fn takes(&self) -> String {
+        let Spread {
+            q1,
+            median,
+            q3,
+            samples,
+            ..
+        } = self.time;
+        let spread = format!(
+            "quartiles {q1:.2} to {q3:.2} times, {}",
+            count(samples, "measurement")
+        );
+        match change(100.0 * (median - 1.0), "less", "more", "").as_str() {
+            "" => format!("as much frame time as the baseline ({spread})"),
+            words => format!("{words} frame time than the baseline ({spread})"),
+        }
+    }
+}
+
+/// Techniques of one scene, without the baseline.
+#[must_use]
+pub fn timed(scene: &str, techniques: &[Timed]) -> Vec<String> {
+    let fastest = |without_error: bool| {
+        let of = techniques
+            .iter()
+            .filter(|of| !without_error || of.flip == 0.0);
+        of.min_by(|a, b| a.time.median.total_cmp(&b.time.median))
+    };
+    let error = |flip: f64| match flip {
+        0.0 => "without any image error".to_owned(),
+        flip => format!("with a mean FLIP of {flip:.4}"),
+    };
+    let Some(best) = fastest(false) else {
+        return vec![format!("Only the baseline was measured on {scene}.")];
+    };
+    let of = match techniques.len() {
+        1 => format!("On {scene}, {}", best.name),
+        many => format!(
+            "Of {many} techniques on {scene}, {} is the fastest: it",
+            best.name
+        ),
+    };
+    let mut out = vec![format!("{of} takes {} {}.", best.takes(), error(best.flip))];
+    if !best.is_told_apart() {
+        out.push(format!(
+            "These measurements do not tell it from the baseline: expected {LEAST_SAMPLES} or more with both quartiles on one side of 1."
+        ));
+    }
+    if best.flip > 0.0 {
+        match fastest(true) {
+            Some(of) => out.push(format!(
+                "{} is the fastest without any image error: it takes {}.",
+                of.name,
+                of.takes()
+            )),
+            None => out.push("Each of them changes the image.".to_owned()),
+        }
+    }
+    if techniques.len() == 1 && out.last().is_some_and(|last| last.starts_with("Each")) {
+        out.pop();
+    }
+    out
+}
+
+/// Recommended choices: study, time over the reference's, mean error with its unit. A choice that is the
+/// reference itself has no error.
+#[must_use]
+pub fn recommended(studies: &[(String, Option<f64>, bool)]) -> Vec<String> {
+    if studies.is_empty() {
+        return vec!["No study had its inputs.".to_owned()];
+    }
+    let references: Vec<&str> = (studies.iter().filter(|s| s.2).map(|s| s.0.as_str())).collect();
+    let mut out = vec![match (studies.len(), references.len()) {
+        (1, 0) => {
+            "The recommended choice of the study is a faster or simpler method than its reference."
+                .to_owned()
+        }
+        (1, _) => "The recommended choice of the study is its reference.".to_owned(),
+        (all, 0) => format!(
+            "In all {all} studies, the recommended choice is another method than the reference."
+        ),
+        (all, some) if all == some => {
+            format!("In all {all} studies, the reference is the recommended choice.")
+        }
+        (all, some) => format!(
+            "In {} of {all} studies, the recommended choice is another method than the reference; the reference stays in {}.",
+            all - some,
+            list(&references, 3)
+        ),
+    }];
+    let timed: Vec<(&str, f64)> = (studies.iter().filter(|s| !s.2))
+        .filter_map(|s| Some((s.0.as_str(), s.1?)))
+        .filter(|s| s.1 > 0.0)
+        .collect();
+    if let Some((fastest, _)) = ends(&timed, |t| t.1) {
+        out.push(match fastest.1 < 0.995 {
+            true => format!(
+                "The largest saving of time is in \u{201c}{}\u{201d}: {:.2} times the time of the reference.",
+                fastest.0, fastest.1
+            ),
+            false => "None of them saves time on this machine.".to_owned(),
+        });
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn orders(saved: &[f64]) -> Vec<(String, f64)> {
+        let names = ["Z2 LRTA", "Z2 STA", "Hilbert"];
+        names
+            .into_iter()
+            .map(str::to_owned)
+            .zip(saved.iter().copied())
+            .collect()
+    }
+
+    #[test]
+    fn the_answer_covers_orders_that_save_or_cost_and_a_single_order() {
+        let text =
+            |saved: &[f64]| tile_orders("Morton", "mean of atrium", &orders(saved)).join(" ");
+        assert_eq!(
+            text(&[]),
+            "Only Morton was replayed, so no order is compared with another."
+        );
+        assert_eq!(
+            text(&[12.0]),
+            "Z2 LRTA fetches 12.0 % less texture data from memory than Morton (mean of atrium)."
+        );
+        assert_eq!(
+            text(&[0.01]),
+            "Z2 LRTA fetches as much texture data from memory as Morton (mean of atrium)."
+        );
+        assert_eq!(
+            text(&[5.0, 12.0, -3.0]),
+            "Of 4 tile orders, Z2 STA fetches the least texture data from memory: 12.0 % less than Morton (mean of atrium). \
+             Hilbert fetches the most: 3.0 % more than Morton."
+        );
+        assert!(!text(&[5.0, 12.0]).contains("the most"));
+        assert_eq!(
+            text(&[-5.0, -0.01]),
+            "None of the 2 other orders fetches less texture data from memory than Morton; Z2 STA comes closest with as much (mean of atrium). \
+             Z2 LRTA fetches the most: 5.0 % more than Morton."
+        );
+    }
+
+    #[test]
+    fn the_answer_covers_sweeps_of_zero_one_equal_and_several_points() {
+        let point = |name: &str, mb| (name.to_owned(), mb);
+        assert_eq!(sweep(&[], &[]), ["No point was replayed."]);
+        assert_eq!(
+            sweep(&[point("base", 2.0)], &[]),
+            ["One point was replayed: it fetches 2.00 MB per frame from memory."]
+        );
+        assert_eq!(
+            sweep(&[point("a", 2.0), point("b", 2.001)], &[]),
+            ["All 2 points fetch 2.00 MB per frame from memory: none of the settings changes it."]
+        );
+        let axis = |key: &str, low, high| (key.to_owned(), vec![point("1", low), point("2", high)]);
+        let text = sweep(
+            &[point("a", 0.0), point("b", 4.0)],
+            &[axis("l1", 1.9, 2.0), axis("l2", 1.0, 3.0)],
+        );
+        assert_eq!(
+            text.join(" "),
+            "Over 2 points, external texture traffic ranges from 0.00 MB per frame (a) to 4.00 MB per frame (b). \
+             Of 2 axes, l2 changes the mean most: from 1.00 MB per frame at 1 to 3.00 MB per frame at 2."
+        );
+    }
+
+    #[test]
+    fn the_answer_covers_misses_of_one_order_equal_orders_and_different_orders() {
+        let row = |order: &str, miss_pct| Misses {
+            order: order.to_owned(),
+            miss_pct,
+            opt_pct: 1.0,
+        };
+        assert_eq!(misses("L1", &[]), None);
+        assert_eq!(
+            misses("L1", &[row("Morton", 3.0)]).unwrap(),
+            "L1: 3.00 % of line accesses miss; it would be 1.00 % under optimal replacement."
+        );
+        let same = misses("L1", &[row("Morton", 3.0), row("Z2 STA", 3.001)]).unwrap();
+        assert!(same.contains("in each of the 2 orders"), "{same}");
+        let text = misses("L1", &[row("Morton", 3.0), row("Z2 STA", 2.0)]).unwrap();
+        assert!(
+            text.contains("Z2 STA has the fewest misses of 2 orders, 2.00 %"),
+            "{text}"
+        );
+        assert!(text.ends_with("and Morton the most, 3.00 %."), "{text}");
+    }
+
+    #[test]
+    fn the_answer_covers_studies_without_buildable_orders_or_savings() {
+        let order = |name: &str, change_pct, is_buildable| Studied {
+            name: name.to_owned(),
+            change_pct,
+            is_buildable,
+        };
+        let alone = studied("z2-sta", &[order("z2-sta", 0.0, true)], 1);
+        assert_eq!(
+            alone,
+            [
+                "Only z2-sta is an order that hardware can follow (geometric mean over 1 pair of trace and caches)."
+            ]
+        );
+        let worse = studied(
+            "z2-sta",
+            &[order("zig", 2.0, true), order("bound", -9.0, false)],
+            4,
+        );
+        assert!(worse[0].starts_with("No other order"), "{worse:?}");
+        assert!(worse[0].contains("zig reads 2.0 % more"), "{worse:?}");
+        assert!(
+            worse[1].contains("bound reads 9.0 % less from memory than z2-sta"),
+            "{worse:?}"
+        );
+    }
+
+    #[test]
+    fn the_answer_reports_reprojection_that_saves_no_energy() {
+        let scene = |energy, paper| Reprojected {
+            scene: "chess".to_owned(),
+            performance: 1.5,
+            energy,
+            reuse_pct: 90.0,
+            flip: 0.01,
+            paper,
+        };
+        assert!(reprojected(&[]).is_empty());
+        let one = reprojected(&[scene(1.25, None)]).join(" ");
+        assert!(
+            one.starts_with("In chess, ") && one.contains("takes 25.0 % more energy than that."),
+            "{one}"
+        );
+        assert!(!one.contains("paper"), "{one}");
+        let two = reprojected(&[scene(1.0, Some([2.0, 0.5])), scene(1.0, None)]).join(" ");
+        assert!(
+            two.contains("the mean of 2 scenes")
+                && two.contains("takes the same energy (1.00 to 1.00 times, by scene)."),
+            "{two}"
+        );
+        assert!(
+            two.contains("the scene that stands for one of its own"),
+            "{two}"
+        );
+    }
+
+    #[test]
+    fn the_answer_covers_slower_single_and_lossless_techniques() {
+        let technique = |name: &str, time, flip| Timed {
+            name: name.to_owned(),
+            time: Spread {
+                p1: time - 0.2,
+                q1: time - 0.05,
+                median: time,
+                q3: time + 0.05,
+                p99: time + 0.2,
+                samples: LEAST_SAMPLES,
+            },
+            flip,
+        };
+        assert_eq!(
+            timed("plant", &[]),
+            ["Only the baseline was measured on plant."]
+        );
+        assert_eq!(
+            timed("plant", &[technique("a", 1.1, 0.02)]),
+            [
+                "On plant, a takes 10.0 % more frame time than the baseline (quartiles 1.05 to 1.15 times, 8 measurements) with a mean FLIP of 0.0200."
+            ]
+        );
+        let text = timed(
+            "plant",
+            &[technique("a", 0.5, 0.02), technique("b", 0.8, 0.0)],
+        )
+        .join(" ");
+        assert!(
+            text.contains("a is the fastest: it takes 50.0 % less"),
+            "{text}"
+        );
+        assert!(
+            text.contains("b is the fastest without any image error"),
+            "{text}"
+        );
+        let text = timed(
+            "plant",
+            &[technique("a", 1.0, 0.0), technique("b", 1.2, 0.0)],
+        );
+        assert_eq!(
+            text[0],
+            "Of 2 techniques on plant, a is the fastest: it takes as much frame time as the baseline (quartiles 0.95 to 1.05 times, 8 measurements) without any image error."
+        );
+        assert!(
+            text[1].contains("do not tell it from the baseline"),
+            "{text:?}"
+        );
+        let mut few = technique("a", 0.5, 0.0);
+        few.time.samples = LEAST_SAMPLES - 1;
+        assert!(timed("plant", &[few])[1].contains("do not tell"));
+    }
+
+    #[test]
+    fn recommendations_count_the_references() {
+        let study = |name: &str, time, reference| (name.to_owned(), time, reference);
+        assert_eq!(recommended(&[]), ["No study had its inputs."]);
+        let one = recommended(&[study("mode", Some(0.5), false)]);
+        assert!(
+            one[1].contains("mode") && one[1].contains("0.50 times"),
+            "{one:?}"
+        );
+        let two = recommended(&[study("a", Some(1.2), false), study("b", None, true)]);
+        assert!(
+            two[0].contains("In 1 of 2 studies") && two[0].ends_with("stays in b."),
+            "{two:?}"
+        );
+        assert_eq!(two[1], "None of them saves time on this machine.");
+    }
+}

@@ -1,0 +1,157 @@
+//! Results of a calibration (`replay.calibration/2`): the error of each setting on the scenes it was chosen
+//! on and on the others.
+
+use super::columns::{Column, Row};
+use super::table::Table;
+use serde::Serialize;
+use sim::config::RunConfig;
+use sim::model_version::MODEL_VERSION;
+use sim::result::TOOL;
+use studies::experiment::{Objective, SceneFit, Setting, Trial, plain};
+
+/// Schema of the object that `replay calibrate --json` prints.
+const CALIBRATION_SCHEMA: &str = "replay.calibration/2";
+
+/// A calibration: every trial, and the index of the chosen one.
+#[derive(Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+pub struct CalibrationReport {
+    schema: &'static str,
+    tool: &'static str,
+    model_version: u32,
+    base: RunConfig,
+    objective: Objective,
+    /// Index of the best trial on the scenes used for choosing.
+    chosen: Option<usize>,
+    trials: Vec<Trial>,
+}
+
+fn title(settings: &[Setting]) -> String {
+    let parts = settings
+        .iter()
+        .map(|(key, value)| format!("{key}={}", plain(value)));
+    parts.collect::<Vec<_>>().join(" ")
+}
+
+impl Row for Trial {
+    #[rustfmt::skip]
+    fn columns() -> Vec<Column<'static, Self>> {
+        vec![
+            Column::text("settings", "settings", |t: &Self| title(&t.settings)),
+            Column::real("chosen_by", "scenes that choose", "RMS", 3, |t: &Self| t.chosen_by),
+            Column::real("held_out", "held out", "RMS", 3, |t: &Self| t.held_out),
+        ]
+    }
+}
+
+impl Row for SceneFit {
+    #[rustfmt::skip]
+    fn columns() -> Vec<Column<'static, Self>> {
+        vec![
+            Column::text("scene", "scene", |f: &Self| f.scene.clone()),
+            Column::text("held_out", "", |f: &Self| if f.held_out { "held out" } else { "chooses" }),
+            Column::real("surface", "surface", "points", 2, |f: &Self| f.surface_points),
+            Column::real("l1", "L1", "points", 2, |f: &Self| Some(f.table?.l1_points)),
+            Column::real("l2", "L2", "points", 2, |f: &Self| Some(f.table?.l2_points)),
+            Column::real("tmu", "TMU", "points", 2, |f: &Self| f.table?.tmu_points),
+            Column::real("saved", "saved", "points", 2, |f: &Self| Some(f.table?.saved_points)),
+            Column::real("slope", "slope", "", 3, |f: &Self| Some(f.table?.slope)),
+            Column::real("total", "all parts", "of the table's spread", 3, |f: &Self| Some(f.table?.total)),
+        ]
+    }
+}
+
+impl CalibrationReport {
+    /// Chooses the best trial.
+    #[must_use]
+    pub fn new(base: RunConfig, objective: Objective, trials: Vec<Trial>) -> Self {
+        let known = (trials.iter().enumerate()).filter_map(|(i, t)| Some((i, t.chosen_by?)));
+        let chosen = known
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+            .map(|(index, _)| index);
+        Self {
+            schema: CALIBRATION_SCHEMA,
+            tool: TOOL,
+            model_version: MODEL_VERSION,
+            base,
+            objective,
+            chosen,
+            trials,
+        }
+    }
+
+    /// As one JSON object.
+    ///
+    /// # Errors
+    /// A figure that is not finite.
+    pub fn json(&self) -> serde_json::Result<String> {
+        serde_json::to_string_pretty(self)
+    }
+
+    /// The trials, best first, and the figures of the chosen one by scene.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut trials: Vec<&Trial> = self.trials.iter().collect();
+        let rank = |trial: &Trial| trial.chosen_by.unwrap_or(f64::MAX);
+        trials.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
+        let mut text = Table::new(&Trial::columns(), trials).text();
+        if let Some(chosen) = self.chosen.and_then(|index| self.trials.get(index)) {
+            let scenes = Table::new(&SceneFit::columns(), &chosen.scenes);
+            text += &format!(
+                "\n{}: found by search among {}\n{}",
+                title(&chosen.settings),
+                self.trials.len(),
+                scenes.without_empty_columns().text()
+            );
+        }
+        let best = |of: fn(&Trial) -> Option<f64>| {
+            let values = self.trials.iter().filter_map(of);
+            values.min_by(f64::total_cmp)
+        };
+        let chosen = self.chosen.and_then(|index| self.trials[index].held_out);
+        if let (Some(chosen), Some(best)) = (chosen, best(|trial| trial.held_out)) {
+            text += &format!(
+                "\non the held-out scenes: {chosen:.3} with these settings, {best:.3} with the best settings for those scenes\n"
+            );
+        }
+        text
+    }
+}
+
+/// The schema of the JSON object.
+#[cfg(feature = "testing")]
+#[must_use]
+pub fn schema() -> formats::schemas::Published {
+    formats::schemas::Published::of::<CalibrationReport>(CALIBRATION_SCHEMA)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trial(value: i64, chosen_by: f64, held_out: f64) -> Trial {
+        Trial {
+            settings: vec![("tmu.loop_cycles".to_owned(), toml::Value::Integer(value))],
+            scenes: Vec::new(),
+            chosen_by: Some(chosen_by),
+            held_out: Some(held_out),
+        }
+    }
+
+    #[test]
+    fn the_best_trial_on_the_calibration_scenes_is_chosen_and_the_best_on_the_held_out_scenes_is_printed()
+     {
+        let trials = vec![trial(20, 2.0, 1.0), trial(24, 1.5, 3.0)];
+        let report = CalibrationReport::new(RunConfig::default(), Objective::Surface, trials);
+        assert_eq!(report.chosen, Some(1));
+        let text = report.text();
+        assert!(
+            text.contains("tmu.loop_cycles=24: found by search among 2"),
+            "{text}"
+        );
+        assert!(
+            text.contains("3.000 with these settings, 1.000 with the best"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,448 @@
+//! Columns: the names, the number format and the values of a row's figures.
+//!
+//! A row type lists its columns once ([`Row`]); the terminal table, the page's table and CSV
+//! ([`Table`](super::table::Table)) and the JSON object ([`Record`]) walk that list.
+
+use serde::ser::{Serialize, SerializeMap, Serializer};
+use std::borrow::Cow;
+use studies::experiment::ResultRow;
+
+/// A cell.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Value {
+    /// Nothing: an empty cell, `null` in JSON.
+    #[default]
+    None,
+    /// Text.
+    Text(String),
+    /// A name, and its form in tables.
+    Named(&'static str, &'static str),
+    /// Yes or no.
+    Flag(bool),
+    /// A count.
+    Whole(u64),
+    /// A measure.
+    Real(f64),
+}
+
+/// The type of a column's values.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Text.
+    Text,
+    /// Yes or no.
+    Flag,
+    /// Counts.
+    Whole,
+    /// Measures.
+    Real,
+}
+
+/// A type that a column's function can return; it determines the column's kind.
+pub trait Cell: Into<Value> {
+    /// The column's kind.
+    const KIND: Kind;
+}
+
+/// Implements [`Cell`] for a type.
+macro_rules! cell {
+    ($type:ty, $kind:ident, $value:expr) => {
+        impl From<$type> for Value {
+            fn from(value: $type) -> Self {
+                $value(value)
+            }
+        }
+
+        impl Cell for $type {
+            const KIND: Kind = Kind::$kind;
+        }
+    };
+}
+
+cell!(String, Text, Value::Text);
+cell!(&str, Text, |text: &str| Value::Text(text.to_owned()));
+cell!(bool, Flag, Value::Flag);
+cell!(u64, Whole, Value::Whole);
+cell!(f64, Real, Value::Real);
+
+/// A name and its title.
+impl Cell for Value {
+    const KIND: Kind = Kind::Text;
+}
+
+impl<T: Cell> Cell for Option<T> {
+    const KIND: Kind = T::KIND;
+}
+
+impl<T: Into<Self>> From<Option<T>> for Value {
+    fn from(value: Option<T>) -> Self {
+        value.map_or(Self::None, Into::into)
+    }
+}
+
+impl Value {
+    /// The number, if it is one.
+    #[must_use]
+    pub fn number(&self) -> Option<f64> {
+        match self {
+            Self::Whole(n) => Some(*n as f64),
+            Self::Real(x) => Some(*x),
+            Self::None | Self::Text(_) | Self::Named(..) | Self::Flag(_) => None,
+        }
+    }
+
+    /// In full precision, for CSV.
+    #[must_use]
+    pub fn exact(&self) -> String {
+        match self {
+            Self::None => String::new(),
+            Self::Text(text) => text.clone(),
+            Self::Named(name, _) => (*name).to_owned(),
+            Self::Flag(flag) => flag.to_string(),
+            Self::Whole(n) => n.to_string(),
+            Self::Real(x) => x.to_string(),
+        }
+    }
+}
+
+impl Serialize for Value {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::None => serializer.serialize_none(),
+            Self::Text(text) => serializer.serialize_str(text),
+            Self::Named(name, _) => serializer.serialize_str(name),
+            Self::Flag(flag) => serializer.serialize_bool(*flag),
+            Self::Whole(n) => serializer.serialize_u64(*n),
+            Self::Real(x) => serializer.serialize_f64(*x),
+        }
+    }
+}
+
+/// Number format of a column in tables. CSV and JSON have full precision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Show {
+    /// Left-aligned text.
+    Text,
+    /// A count with groups of three digits.
+    Whole,
+    /// With this many decimals.
+    Decimals(usize),
+    /// In millions, with this many decimals.
+    Millions(usize),
+}
+
+impl Show {
+    /// The cell of a table.
+    #[must_use]
+    pub fn write(self, value: &Value) -> String {
+        let fixed = |x: f64, decimals: usize| {
+            // Values that round to negative zero print without a sign.
+            let text = format!("{x:.decimals$}");
+            match text.strip_prefix('-') {
+                Some(rest) if rest.bytes().all(|b| matches!(b, b'0' | b'.')) => rest.to_owned(),
+                _ => text,
+            }
+        };
+        match (self, value.number()) {
+            (Self::Whole, Some(_)) => super::theme::group_thousands(&value.exact()),
+            (Self::Decimals(decimals), Some(x)) => fixed(x, decimals),
+            (Self::Millions(decimals), Some(x)) => fixed(x * 1e-6, decimals),
+            _ => match value {
+                Value::Named(_, title) => (*title).to_owned(),
+                Value::Flag(flag) => if *flag { "yes" } else { "" }.to_owned(),
+                _ => value.exact(),
+            },
+        }
+    }
+}
+
+/// A column without its values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Heading {
+    /// Name in CSV and JSON. In JSON, a dot makes a nested object (`paper.l1_footprint_miss_pct`); in CSV it becomes
+    /// `_`.
+    pub key: Cow<'static, str>,
+    /// Heading of a table.
+    pub name: Cow<'static, str>,
+    /// Unit, or empty.
+    pub unit: &'static str,
+    /// Type of the values.
+    pub kind: Kind,
+    /// Number format in tables.
+    pub show: Show,
+    /// Definition of the figure, for charts and for the page's notes; may be empty.
+    pub about: &'static str,
+    /// Group of columns in tables of a page; may be empty.
+    pub group: Cow<'static, str>,
+    /// Whether it holds published figures, which tables print in a lighter ink.
+    pub published: bool,
+}
+
+impl Heading {
+    /// Name of the group of columns in tables of a page: the part of the key before the dot, unless one is
+    /// set.
+    #[must_use]
+    pub(super) fn group_name(&self) -> String {
+        match (self.group.is_empty(), self.key.split_once('.')) {
+            (false, _) => self.group.to_string(),
+            (true, Some((first, _))) => first.replace('_', " "),
+            (true, None) => String::new(),
+        }
+    }
+
+    /// Name in CSV and Parquet files.
+    #[must_use]
+    pub(super) fn flat_key(&self) -> String {
+        self.key.replace('.', "_")
+    }
+
+    /// Definition and unit, for the axis of a chart.
+    #[must_use]
+    pub(super) fn axis_label(&self) -> String {
+        format!("{}, {}", self.about, self.unit)
+    }
+}
+
+/// A column of rows of type `R`.
+pub struct Column<'a, R: ?Sized> {
+    /// Name and format.
+    pub heading: Heading,
+    value: Box<dyn Fn(&R) -> Value + 'a>,
+}
+
+impl<'a, R: ?Sized> Column<'a, R> {
+    /// A column with this number format and unit.
+    pub fn new<V: Cell>(
+        key: impl Into<Cow<'static, str>>,
+        name: impl Into<Cow<'static, str>>,
+        unit: &'static str,
+        show: Show,
+        value: impl Fn(&R) -> V + 'a,
+    ) -> Self {
+        Self {
+            heading: Heading {
+                key: key.into(),
+                name: name.into(),
+                unit,
+                kind: V::KIND,
+                show,
+                about: "",
+                group: Cow::Borrowed(""),
+                published: false,
+            },
+            value: Box::new(move |row| value(row).into()),
+        }
+    }
+
+    /// A column of text.
+    pub fn text<V: Cell>(
+        key: impl Into<Cow<'static, str>>,
+        name: impl Into<Cow<'static, str>>,
+        value: impl Fn(&R) -> V + 'a,
+    ) -> Self {
+        Self::new(key, name, "", Show::Text, value)
+    }
+
+    /// A column of measures with this many decimals.
+    pub fn real<V: Cell>(
+        key: impl Into<Cow<'static, str>>,
+        name: impl Into<Cow<'static, str>>,
+        unit: &'static str,
+        decimals: usize,
+        value: impl Fn(&R) -> V + 'a,
+    ) -> Self {
+        Self::new(key, name, unit, Show::Decimals(decimals), value)
+    }
+
+    /// The same column for rows that contain such a row.
+    pub fn on<S>(self, of: impl Fn(&S) -> &R + 'a) -> Column<'a, S>
+    where
+        R: 'a,
+    {
+        Column {
+            heading: self.heading,
+            value: Box::new(move |row| (self.value)(of(row))),
+        }
+    }
+
+    /// Sets the definition of the figure.
+    #[must_use]
+    pub fn about(mut self, about: &'static str) -> Self {
+        self.heading.about = about;
+        self
+    }
+
+    /// Sets the group of columns in tables of a page.
+    #[must_use]
+    pub fn group(mut self, group: impl Into<Cow<'static, str>>) -> Self {
+        self.heading.group = group.into();
+        self
+    }
+
+    /// Sets the type of the values where the function's return type does not determine it.
+    #[must_use]
+    pub fn kind(mut self, kind: Kind) -> Self {
+        self.heading.kind = kind;
+        self
+    }
+
+    /// Marks published figures.
+    #[must_use]
+    pub fn published(mut self) -> Self {
+        self.heading.published = true;
+        self
+    }
+
+    /// The cell of a row.
+    pub fn value(&self, row: &R) -> Value {
+        (self.value)(row)
+    }
+}
+
+/// A row type. It lists its columns once, in the order of CSV and JSON.
+pub trait Row {
+    /// Every column.
+    fn columns() -> Vec<Column<'static, Self>>;
+}
+
+/// The columns with these keys, in the order of `keys`. Skips a key that no column has; debug builds panic.
+#[must_use]
+pub fn pick<R: Row>(keys: &[&str]) -> Vec<Column<'static, R>> {
+    let mut all: Vec<Option<Column<R>>> = R::columns().into_iter().map(Some).collect();
+    let mut take = |key: &&str| {
+        let found = all
+            .iter_mut()
+            .find(|c| c.as_ref().is_some_and(|c| c.heading.key == *key));
+        debug_assert!(found.is_some(), "no column `{key}`");
+        found.and_then(Option::take)
+    };
+    keys.iter().filter_map(&mut take).collect()
+}
+
+/// A row as a JSON object of the given columns.
+pub struct Record<'a, 'c, R: ?Sized> {
+    /// Columns; those with the same prefix are adjacent.
+    pub columns: &'a [Column<'c, R>],
+    /// The row.
+    pub row: &'a R,
+}
+
+impl<R: ?Sized> Serialize for Record<'_, '_, R> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let cells: Vec<(&str, Value)> = self
+            .columns
+            .iter()
+            .map(|c| (c.heading.key.as_ref(), c.value(self.row)))
+            .collect();
+        let prefix = |key: &str| key.split_once('.').map(|(first, _)| first.to_owned());
+        let mut map = serializer.serialize_map(None)?;
+        for group in cells.chunk_by(|a, b| prefix(a.0).is_some() && prefix(a.0) == prefix(b.0)) {
+            match prefix(group[0].0) {
+                None => map.serialize_entry(group[0].0, &group[0].1)?,
+                Some(name) if group.iter().all(|(_, v)| *v == Value::None) => {
+                    map.serialize_entry(&name, &())?;
+                }
+                Some(name) => {
+                    let inner: serde_json::Map<String, serde_json::Value> = group
+                        .iter()
+                        .map(|(key, value)| {
+                            (key[name.len() + 1..].to_owned(), serde_json::json!(value))
+                        })
+                        .collect();
+                    map.serialize_entry(&name, &inner)?;
+                }
+            }
+        }
+        map.end()
+    }
+}
+
+/// Rows as a JSON array of such objects.
+pub struct Records<'a, 'c, R> {
+    /// Columns; those with the same prefix are adjacent.
+    pub columns: &'a [Column<'c, R>],
+    /// The rows.
+    pub rows: &'a [R],
+}
+
+impl<R> Serialize for Records<'_, '_, R> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let columns = self.columns;
+        serializer.collect_seq(self.rows.iter().map(|row| Record { columns, row }))
+    }
+}
+
+/// The columns without their values.
+#[cfg(feature = "testing")]
+pub(crate) fn headings<R>(columns: &[Column<'_, R>]) -> Vec<Heading> {
+    columns
+        .iter()
+        .map(|column| column.heading.clone())
+        .collect()
+}
+
+/// A column of point results.
+pub type Figure<'a> = Column<'static, ResultRow<'a>>;
+
+/// `part / whole`, or `None` if the whole is zero.
+pub(super) fn over(part: u64, whole: u64) -> Option<f64> {
+    (whole > 0).then(|| part as f64 / whole as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Point {
+        misses: u64,
+        paper: Option<f64>,
+    }
+
+    impl Row for Point {
+        fn columns() -> Vec<Column<'static, Self>> {
+            vec![
+                Column::new("misses", "misses", "M", Show::Millions(1), |p: &Self| {
+                    p.misses
+                }),
+                Column::real("paper.rate", "paper", "%", 2, |p: &Self| p.paper).published(),
+                Column::real("paper.half", "half", "%", 2, |p: &Self| {
+                    p.paper.map(|x| x / 2.0)
+                }),
+            ]
+        }
+    }
+
+    fn json(point: &Point) -> String {
+        let record = Record {
+            columns: &Point::columns(),
+            row: point,
+        };
+        serde_json::to_string(&record).unwrap()
+    }
+
+    #[test]
+    fn keys_with_dots_nest_in_json_and_an_empty_group_is_null() {
+        let (with, without) = (Some(3.0), None);
+        let point = |paper| Point { misses: 7, paper };
+        assert_eq!(
+            json(&point(with)),
+            r#"{"misses":7,"paper":{"rate":3.0,"half":1.5}}"#
+        );
+        assert_eq!(json(&point(without)), r#"{"misses":7,"paper":null}"#);
+    }
+
+    #[test]
+    fn columns_are_selected_in_the_requested_order() {
+        let picked = pick::<Point>(&["paper.half", "misses"]);
+        let names: Vec<_> = picked.iter().map(|c| c.heading.name.as_ref()).collect();
+        assert_eq!(names, ["half", "misses"]);
+    }
+
+    #[test]
+    fn a_table_rounds_values_and_prints_zero_without_a_sign() {
+        assert_eq!(Show::Decimals(1).write(&Value::Real(-0.04)), "0.0");
+        assert_eq!(Show::Decimals(1).write(&Value::Real(-0.06)), "-0.1");
+        assert_eq!(Show::Millions(2).write(&Value::Whole(1_234_567)), "1.23");
+        assert_eq!(Show::Decimals(1).write(&Value::None), "");
+    }
+}

@@ -1,0 +1,202 @@
+//! Results of comparing two captures (`replay.compare/2`).
+
+use super::columns::{Column, Records, Row, Show, Value};
+use super::table::Table;
+use formats::textrace::TraceMeta;
+use serde::Serialize;
+use sim::config::{Order, RunConfig};
+use sim::model_version::MODEL_VERSION;
+use sim::result::{RunResult, TOOL, TraceId};
+use studies::compare::{Class, Comparison, Tally};
+
+/// Schema of the object that `replay compare --json` prints.
+pub(super) const COMPARE_SCHEMA: &str = "replay.compare/2";
+
+/// Materials that the terminal's table shows.
+const MATERIALS: usize = 12;
+
+/// A capture.
+#[derive(Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+pub struct Side<'a> {
+    /// Scene and checksum.
+    pub trace: &'a TraceId,
+    /// Description.
+    #[cfg_attr(feature = "testing", schemars(with = "sim::schemas::Meta"))]
+    pub meta: &'a TraceMeta,
+}
+
+/// The results of both captures in one order.
+pub struct Replayed<'a> {
+    /// The order.
+    pub order: Order,
+    /// Results of the first and the second capture.
+    pub results: [&'a RunResult; 2],
+    /// The same in Morton order, if it was replayed.
+    pub morton: Option<[&'a RunResult; 2]>,
+}
+
+/// A comparison of two captures.
+pub struct CompareReport<'a> {
+    /// The captures.
+    pub sides: [Side<'a>; 2],
+    /// The machine; each row has its own order.
+    pub config: RunConfig,
+    /// Differences between the captures.
+    pub comparison: &'a Comparison,
+    /// Cache results by order.
+    pub replayed: Vec<Replayed<'a>>,
+}
+
+/// External traffic saved against Morton order, percent, by capture.
+fn saved_pct(row: &Replayed, side: usize) -> Option<f64> {
+    let morton = row.morton?[side].external_bytes;
+    let rest = row.results[side].external_bytes as f64 / morton as f64;
+    (morton > 0 && row.order != Order::MORTON).then_some(100.0 * (1.0 - rest))
+}
+
+/// Relative difference of the second value to the first, percent.
+fn over_pct(values: [f64; 2]) -> Option<f64> {
+    (values[0] > 0.0).then(|| 100.0 * (values[1] / values[0] - 1.0))
+}
+
+impl Row for Replayed<'_> {
+    #[rustfmt::skip]
+    fn columns() -> Vec<Column<'static, Self>> {
+        let bytes = |r: &Self, side: usize| r.results[side].external_bytes;
+        vec![
+            Column::text("order", "order", |r: &Self| Value::Named(r.order.name(), r.order.title())),
+            Column::real("a.l1_footprint_miss_pct", "A: L1", "% of footprints", 3, |r: &Self| 100.0 * r.results[0].l1.footprint_miss_rate),
+            Column::real("a.l2_line_miss_pct", "A: L2", "% of lines", 3, |r: &Self| 100.0 * r.results[0].l2.line_miss_rate),
+            Column::new("a.external_bytes", "A: external", "bytes", Show::Whole, move |r: &Self| bytes(r, 0)),
+            Column::real("a.reduction_pct", "A: saved", "% of Morton", 2, |r: &Self| saved_pct(r, 0)),
+            Column::real("b.l1_footprint_miss_pct", "B: L1", "% of footprints", 3, |r: &Self| 100.0 * r.results[1].l1.footprint_miss_rate),
+            Column::real("b.l2_line_miss_pct", "B: L2", "% of lines", 3, |r: &Self| 100.0 * r.results[1].l2.line_miss_rate),
+            Column::new("b.external_bytes", "B: external", "bytes", Show::Whole, move |r: &Self| bytes(r, 1)),
+            Column::real("b.reduction_pct", "B: saved", "% of Morton", 2, |r: &Self| saved_pct(r, 1)),
+            Column::real("l1_miss_over_pct", "L1 miss", "B/A \u{2212} 1, %", 3, |r: &Self| over_pct(r.results.map(|x| x.l1.footprint_miss_rate))),
+            Column::real("l2_miss_over_pct", "L2 miss", "B/A \u{2212} 1, %", 3, |r: &Self| over_pct(r.results.map(|x| x.l2.line_miss_rate))),
+            Column::real("external_over_pct", "external", "B/A \u{2212} 1, %", 3, |r: &Self| over_pct(r.results.map(|x| x.external_bytes as f64))),
+        ]
+    }
+}
+
+impl Row for Class {
+    #[rustfmt::skip]
+    fn columns() -> Vec<Column<'static, Self>> {
+        vec![
+            Column::text("name", "fragments", |c: &Self| c.name.clone()),
+            Column::new("fragments_in_both", "in both", "", Show::Whole, |c: &Self| c.tally.fragments_in_both),
+            Column::new("fragments_only_in_a", "only A", "", Show::Whole, |c: &Self| c.tally.fragments_only_in_a),
+            Column::new("fragments_only_in_b", "only B", "", Show::Whole, |c: &Self| c.tally.fragments_only_in_b),
+            Column::real("iou_pct", "both / either", "%", 4, |c: &Self| c.tally.intersection_over_union_pct()),
+            Column::real("uv_mean", "uv mean", "texels", 5, |c: &Self| c.tally.uv_texels.mean()),
+            Column::real("uv_99", "uv 99 %", "texels", 4, |c: &Self| c.tally.uv_texels.percentile(99.0)),
+            Column::real("uv_largest", "uv largest", "texels", 3, |c: &Self| c.tally.uv_texels.largest()),
+            Column::real("lod_mean", "LOD mean", "levels", 5, |c: &Self| c.tally.lod_levels.mean()),
+            Column::real("lod_largest", "LOD largest", "levels", 3, |c: &Self| c.tally.lod_levels.largest()),
+            Column::real("footprints_pct", "footprints", "% differ", 3, |c: &Self| c.tally.footprints_that_differ_pct()),
+            Column::new("sampled_differently", "other sample", "lanes", Show::Whole, |c: &Self| c.tally.lanes_sampled_differently),
+        ]
+    }
+}
+
+/// The JSON object.
+#[derive(Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+struct CompareJson<'a, 'r> {
+    schema: &'a str,
+    tool: &'a str,
+    model_version: u32,
+    a: &'a Side<'r>,
+    b: &'a Side<'r>,
+    config: &'a RunConfig,
+    intersection_over_union_pct: f64,
+    #[serde(flatten)]
+    comparison: &'a Comparison,
+    replayed: Records<'a, 'static, Replayed<'r>>,
+}
+
+impl CompareReport<'_> {
+    /// As one JSON object.
+    ///
+    /// # Errors
+    /// A figure that is not finite.
+    pub fn json(&self) -> serde_json::Result<String> {
+        let [a, b] = &self.sides;
+        serde_json::to_string_pretty(&CompareJson {
+            schema: COMPARE_SCHEMA,
+            tool: TOOL,
+            model_version: MODEL_VERSION,
+            a,
+            b,
+            config: &self.config,
+            intersection_over_union_pct: self.comparison.all.intersection_over_union_pct(),
+            comparison: self.comparison,
+            replayed: Records {
+                columns: &Replayed::columns(),
+                rows: &self.replayed,
+            },
+        })
+    }
+
+    /// As tables for a terminal.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        for (name, side) in ["A", "B"].iter().zip(&self.sides) {
+            let Side { trace, meta } = side;
+            text += &format!(
+                "{name}: {} ({}), {}, {}, {}\n",
+                trace.scene, trace.checksum, meta.tool, meta.backend, meta.driver
+            );
+        }
+        let of = self.comparison;
+        text += &format!(
+            "{} of {} tiles differ\n\n{}\n",
+            of.tiles_that_differ,
+            of.tiles,
+            self.classes().text()
+        );
+        let materials = self.materials();
+        if !materials.rows.is_empty() {
+            text += &format!("Materials that differ most\n{}\n", materials.text());
+        }
+        text + &Table::new(&Replayed::columns(), &self.replayed)
+            .without_empty_columns()
+            .text()
+    }
+
+    /// All fragments, and opaque fragments separately from the others.
+    fn classes(&self) -> Table {
+        let all = Class {
+            name: "all".to_owned(),
+            tally: self.comparison.all.clone(),
+        };
+        let classes = std::iter::once(&all).chain(&self.comparison.by_opacity);
+        Table::new(&Class::columns(), classes)
+    }
+
+    /// The materials with the most different footprints and fragments.
+    fn materials(&self) -> Table {
+        let differing = |tally: &Tally| {
+            let apart = tally.fragments_only_in_a + tally.fragments_only_in_b;
+            apart + tally.footprints_that_differ + tally.lanes_sampled_differently
+        };
+        let mut classes: Vec<&Class> = (self.comparison.by_material.iter())
+            .filter(|class| differing(&class.tally) > 0)
+            .collect();
+        classes.sort_by_key(|class| std::cmp::Reverse(differing(&class.tally)));
+        classes.truncate(MATERIALS);
+        Table::new(&Class::columns(), classes)
+    }
+}
+
+/// The schema of the JSON object.
+#[cfg(feature = "testing")]
+#[must_use]
+pub fn schema() -> formats::schemas::Published {
+    use crate::schemas::WithRows;
+    formats::schemas::Published::of::<CompareJson<'_, '_>>(COMPARE_SCHEMA)
+        .rows("replayed", &crate::columns::headings(&Replayed::columns()))
+}

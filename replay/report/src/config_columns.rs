@@ -1,0 +1,186 @@
+//! Columns that identify a row in any file: trace, image size, and every configuration key. Rows of several
+//! files can be joined by them.
+
+use super::columns::{Figure, Value};
+use formats::texture::Sampler;
+use serde::Serialize;
+use sim::config::{LevelConfig, RunConfig};
+use sim::model_version::MODEL_VERSION;
+use studies::experiment::{ResultRow, plain, scene_label};
+
+/// The name of an enum's value in configuration files.
+fn name(value: &impl Serialize) -> String {
+    let value = serde_json::to_value(value).unwrap_or_default();
+    value.as_str().unwrap_or_default().to_owned()
+}
+
+/// The trace.
+pub fn trace<'a>() -> Vec<Figure<'a>> {
+    vec![
+        Figure::text("label", "scene", |r| r.subject.label.clone())
+            .about("short name in this file; it depends on the other traces in the file"),
+        Figure::text("trace", "trace", |r| r.subject.id.name.clone())
+            .about("name of the trace's file without folder and extension"),
+        Figure::text("checksum", "checksum", |r| r.subject.id.checksum.clone())
+            .about("checksum of the trace's content"),
+        Figure::text("scene", "scene", |r| scene_label(r.subject.source.tables())),
+        Figure::text("camera", "camera", |r| r.subject.id.camera.clone()),
+        Figure::text("display", "display", |r| r.subject.id.display.clone()),
+        Figure::text("width_px", "width", |r| {
+            u64::from(r.subject.id.eye_size_px[0])
+        })
+        .about("image width per eye in pixels"),
+        Figure::text("height_px", "height", |r| {
+            u64::from(r.subject.id.eye_size_px[1])
+        })
+        .about("image height per eye in pixels"),
+        Figure::text("model_version", "model", |_| u64::from(MODEL_VERSION))
+            .about("version of the models; counts of different versions cannot be compared"),
+    ]
+}
+
+/// Largest anisotropy of all samples of a row; none if the recorded samplers decide and differ from 1.
+fn max_anisotropy(row: &ResultRow) -> Option<u64> {
+    let chosen = row.point.config.sampling.max_anisotropy;
+    let recorded = &row.subject.source.tables().samplers;
+    let isotropic = !recorded.iter().any(Sampler::is_anisotropic);
+    chosen.or(isotropic.then_some(1)).map(u64::from)
+}
+
+/// Every configuration key, as listed in docs/use/configuration.md.
+#[rustfmt::skip]
+pub fn config<'a>() -> Vec<Figure<'a>> {
+    fn key<'a, V: super::columns::Cell + 'static>(
+        key: &'static str,
+        value: fn(&RunConfig) -> V,
+    ) -> Figure<'a> {
+        Figure::text(key, key, move |r: &ResultRow| value(&r.point.config))
+    }
+    fn cache<'a>(keys: [&'static str; 5], level: fn(&RunConfig) -> &LevelConfig) -> [Figure<'a>; 5] {
+        let [size_bytes, ways, replacement, sectors, victim_lines] = keys;
+        let of = move |r: &ResultRow| *level(&r.point.config);
+        [
+            Figure::text(size_bytes, size_bytes, move |r: &ResultRow| of(r).size_bytes),
+            Figure::text(ways, ways, move |r: &ResultRow| u64::from(of(r).ways)),
+            Figure::text(replacement, replacement, move |r: &ResultRow| of(r).replacement.name()),
+            Figure::text(sectors, sectors, move |r: &ResultRow| u64::from(of(r).sectors)),
+            Figure::text(victim_lines, victim_lines, move |r: &ResultRow| u64::from(of(r).victim_lines)),
+        ]
+    }
+    let mut columns = vec![
+        key("mode", |c| name(&c.mode)),
+        Figure::text("order", "order", |r| {
+            let order = r.point.config.order;
+            Value::Named(order.name(), order.title())
+        }),
+        key("seed", |c| c.seed),
+        key("cores", |c| u64::from(c.cores)),
+        key("assign", |c| name(&c.assign)),
+        key("line_bytes", |c| u64::from(c.line_bytes)),
+    ];
+    columns.extend(cache(["l1.size_bytes", "l1.ways", "l1.replacement", "l1.sectors", "l1.victim_lines"], |c| &c.level.l1));
+    columns.extend(cache(["l2.size_bytes", "l2.ways", "l2.replacement", "l2.sectors", "l2.victim_lines"], |c| &c.level.l2));
+    columns.extend([
+        key("l2.inclusion", |c| name(&c.level.l2.inclusion)),
+        key("l2.shared", |c| c.level.l2.shared),
+        key("l2.hit_cycles", |c| u64::from(c.level.l2.hit_cycles)),
+        key("level", |c| c.level.lower_text(c.line_bytes)),
+        key("memory_cycles", |c| u64::from(c.memory_cycles)),
+        key("sampling.filter", |c| name(&c.sampling.filter)),
+        key("sampling.lod_bias", |c| f64::from(c.sampling.lod_bias)),
+        key("sampling.lod", |c| name(&c.sampling.lod)),
+        key("sampling.helper_lanes", |c| c.sampling.helper_lanes),
+        Figure::text("sampling.max_anisotropy", "sampling.max_anisotropy", max_anisotropy),
+        key("sampling.anisotropy", |c| name(&c.sampling.anisotropy)),
+        key("layout.texel_format", |c| c.layout.texel_format.as_ref().map(name)),
+        key("layout.block_order", |c| name(&c.layout.block_order)),
+        key("layout.shadow_map_order", |c| name(&c.layout.shadow_map_order)),
+        key("layout.base_align_bytes", |c| c.layout.base_align_bytes),
+        key("layout.texture_order", |c| name(&c.layout.texture_order)),
+        key("tmu.model", |c| name(&c.tmu.model)),
+        key("tmu.loop_cycles", |c| u64::from(c.tmu.loop_cycles)),
+        key("tmu.threads", |c| u64::from(c.tmu.threads)),
+        key("tmu.retry_footprints", |c| u64::from(c.tmu.retry_footprints)),
+        key("tmu.fetches_per_trip", |c| u64::from(c.tmu.fetches_per_trip)),
+        key("tmu.allocation", |c| name(&c.tmu.allocation)),
+        key("tmu.l2_mshrs", |c| u64::from(c.tmu.l2_mshrs)),
+        key("tmu.fifo_footprints", |c| u64::from(c.tmu.fifo_footprints)),
+        key("tile_px", |c| u64::from(c.tile_px)),
+        key("tile_maps", |c| c.tile_maps),
+        key("count_by", |c| name(&c.count_by)),
+        key("hsr", |c| name(&c.hsr)),
+        key("between_frames", |c| name(&c.between_frames)),
+        key("prefetch.prefetcher", |c| c.prefetch.map(|p| p.prefetcher.name())),
+        key("prefetch.lines", |c| c.prefetch.map(|p| u64::from(p.lines()))),
+        key("dram.preset", |c| c.dram.map(|dram| name(&dram.preset))),
+        key("dram.channels", |c| c.dram.map(|dram| u64::from(dram.channels))),
+        key("dram.mapping", |c| c.dram.map(|dram| name(&dram.mapping))),
+        key("dram.page_policy", |c| c.dram.map(|dram| name(&dram.page_policy))),
+        key("dram.queue", |c| c.dram.map(|dram| u64::from(dram.queue))),
+        key("dram.core_mhz", |c| c.dram.map(|dram| u64::from(dram.core_mhz))),
+        key("frame.machine", |c| c.frame.map(|frame| name(&frame.machine))),
+        key("frame.multiview", |c| c.frame.map(|frame| frame.multiview)),
+        key("frame.composition", |c| c.frame.map(|frame| frame.composition)),
+        key("frame.color_bytes", |c| c.frame.map(|frame| u64::from(frame.color_bytes))),
+        key("frame.color_compressed_permille", |c| c.frame.map(|frame| u64::from(frame.color_compressed_permille))),
+        key("frame.depth_bytes", |c| c.frame.map(|frame| u64::from(frame.depth_bytes))),
+        key("frame.g_buffer_bytes", |c| c.frame.map(|frame| u64::from(frame.g_buffer_bytes))),
+        key("frame.samples", |c| c.frame.map(|frame| u64::from(frame.samples))),
+        key("frame.store_depth", |c| c.frame.map(|frame| frame.store_depth)),
+        key("frame.line_bytes", |c| c.frame.map(|frame| u64::from(frame.line_bytes))),
+        key("frame.post_transform_entries", |c| c.frame.map(|frame| u64::from(frame.post_transform_entries))),
+        key("frame.vertex_cache_bytes", |c| c.frame.map(|frame| frame.vertex_cache_bytes)),
+        key("frame.varying_bytes", |c| c.frame.map(|frame| u64::from(frame.varying_bytes))),
+        key("frame.shaded_vertex_cache_bytes", |c| c.frame.map(|frame| frame.shaded_vertex_cache_bytes)),
+        key("frame.list_entry_bytes", |c| c.frame.map(|frame| u64::from(frame.list_entry_bytes))),
+        key("frame.pixel_cache_bytes", |c| c.frame.map(|frame| frame.pixel_cache_bytes)),
+    ]);
+    columns
+}
+
+/// The key that this row changes, if any.
+pub fn change<'a>() -> Vec<Figure<'a>> {
+    vec![
+        Figure::text("change.key", "change", |r| {
+            let (key, _) = r.point.change.as_ref()?;
+            Some(key.clone())
+        })
+        .about("configuration key that only this row changes"),
+        Figure::text("change.value", "to", |r| {
+            let (_, value) = r.point.change.as_ref()?;
+            Some(plain(value))
+        })
+        .about("value of the changed key"),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_of_the_configuration_is_a_column() {
+        let page = include_str!("../../../docs/use/configuration.md");
+        let documented = page.lines().filter_map(|line| {
+            let key = line.strip_prefix("| `")?;
+            Some(key.split_once('`')?.0)
+        });
+        // All levels' keys are columns of the L1 and the L2; one more column describes the levels below.
+        let column = |key: &'static str| {
+            if key.starts_with("level.") {
+                "level"
+            } else {
+                key
+            }
+        };
+        let mut documented: Vec<&str> = documented.map(column).collect();
+        documented.dedup();
+        let columns = config();
+        let keys = columns.iter().map(|c| c.heading.key.as_ref());
+        let keys: Vec<&str> = keys
+            .filter(|key| !key.starts_with("l1.") && !key.starts_with("l2."))
+            .collect();
+        assert!(keys.len() > 30);
+        assert_eq!(keys, documented);
+    }
+}

@@ -1,0 +1,33 @@
+//! Prints results as tables, plots, JSON, CSV and pages. Other modules compute them.
+
+pub mod accuracy;
+pub mod addresses;
+pub mod answers;
+pub mod calibration;
+pub mod columns;
+pub mod compare;
+mod config_columns;
+pub mod errors;
+pub mod figures;
+pub mod html;
+pub mod locality;
+mod memory_columns;
+pub mod notices;
+pub mod orders;
+pub mod parquet;
+pub mod picture;
+pub mod plots;
+pub mod readings;
+pub mod rows_parquet;
+pub mod run;
+#[cfg(feature = "testing")]
+pub mod schemas;
+pub mod sgrt;
+pub mod sweep;
+pub mod sweep_plan;
+pub mod table;
+pub mod techniques;
+pub mod temporal;
+pub mod theme;
+pub mod timeline;
+pub mod z2;

@@ -1,0 +1,274 @@
+//! Results of locality analyses, by trace and order: table, JSON, CSV and page.
+
+mod columns;
+mod page;
+mod plots;
+
+use super::columns::Records;
+use super::table::Table;
+use columns::{CurvePoint, Reuses, Subject, Summary, Window};
+use serde::Serialize;
+use sim::config::{LevelConfig, RunConfig};
+use sim::model_version::MODEL_VERSION;
+use sim::result::{TOOL, TraceId};
+use studies::locality::{Figures, OrderFigures, Stream};
+
+/// Schema of the JSON object.
+pub const SCHEMA: &str = "replay.locality/2";
+
+/// A trace's figures.
+pub struct TraceFigures {
+    /// Short name, unique in the report.
+    pub label: String,
+    /// Scene and checksum; `None` for plain addresses.
+    pub id: Option<TraceId>,
+    /// Number of frames.
+    pub frames: u32,
+    /// By order.
+    pub orders: Vec<OrderFigures>,
+}
+
+impl TraceFigures {
+    /// Whether the accesses come from a rendered trace, not from plain addresses.
+    fn is_rendered(&self) -> bool {
+        self.id.is_some()
+    }
+}
+
+/// Locality figures of some traces.
+pub struct LocalityReport {
+    /// The traces.
+    pub traces: Vec<TraceFigures>,
+    /// Caches, sampling and layout.
+    pub config: RunConfig,
+}
+
+/// The JSON object.
+#[derive(Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+struct LocalityJson<'r, 'a> {
+    schema: &'a str,
+    tool: &'a str,
+    model_version: u32,
+    config: RunConfig,
+    traces: Vec<TraceFacts<'a>>,
+    rows: Records<'r, 'a, Summary<'a>>,
+    curves: Records<'r, 'a, CurvePoint<'a>>,
+    distances: Records<'r, 'a, Reuses<'a>>,
+    working_sets: Records<'r, 'a, Window<'a>>,
+}
+
+#[derive(Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+struct TraceFacts<'a> {
+    label: &'a str,
+    #[serde(flatten)]
+    id: Option<&'a TraceId>,
+    frames: u32,
+}
+
+impl<'a> TraceFacts<'a> {
+    fn of(trace: &'a TraceFigures) -> Self {
+        Self {
+            label: &trace.label,
+            id: trace.id.as_ref(),
+            frames: trace.frames,
+        }
+    }
+}
+
+/// Sizes of a curve of fully associative caches: four per doubling, up to the size where misses stop
+/// falling.
+fn curve_sizes(figures: &Figures) -> Vec<u64> {
+    let enough = figures.distances.enough_lines().max(1);
+    let size = |step: i32| (f64::from(step) / 4.0).exp2().round() as u64;
+    let mut sizes: Vec<u64> = (0..).map(size).take_while(|&size| size < enough).collect();
+    sizes.push(enough);
+    sizes.extend(figures.opt.iter().map(|point| point.lines));
+    sizes.sort_unstable();
+    sizes.dedup();
+    sizes
+}
+
+impl LocalityReport {
+    /// Files of [`Self::csv_files`].
+    pub const CSV_FILES: [&'static str; 4] = [
+        "summary.csv",
+        "curves.csv",
+        "distances.csv",
+        "working-sets.csv",
+    ];
+
+    fn cache(&self, stream: Stream) -> &LevelConfig {
+        match stream {
+            Stream::L1 | Stream::Merged => &self.config.level.l1,
+            Stream::L2 => &self.config.level.l2,
+        }
+    }
+
+    /// A row a trace, stream and order.
+    fn summaries(&self) -> Vec<Summary<'_>> {
+        let mut rows = Vec::new();
+        for trace in &self.traces {
+            let streams = trace.orders.first().map_or(0, |order| order.streams.len());
+            for stream in 0..streams {
+                for order in &trace.orders {
+                    let (stream, figures) = &order.streams[stream];
+                    rows.push(Summary {
+                        of: Subject {
+                            trace: &trace.label,
+                            order: order.order,
+                            stream: *stream,
+                            line_bytes: self.config.line_bytes,
+                        },
+                        cache: self.cache(*stream),
+                        figures,
+                    });
+                }
+            }
+        }
+        rows
+    }
+
+    /// The curves of a stream: fully associative LRU, LRU by associativity, OPT.
+    fn curve<'a>(summary: &Summary<'a>) -> Vec<CurvePoint<'a>> {
+        let figures = summary.figures;
+        let full = figures.distances.curve(&curve_sizes(figures));
+        let lru = full.iter().chain(&figures.lru).map(|cache| ("lru", *cache));
+        let opt = figures.opt.iter().map(|cache| ("opt", *cache));
+        let point = |(policy, cache)| CurvePoint {
+            of: summary.of,
+            policy,
+            cache,
+            accesses: figures.accesses,
+        };
+        lru.chain(opt).map(point).collect()
+    }
+
+    /// Reuses by distance; each bin is twice as wide as the one before.
+    fn distances<'a>(summary: &Summary<'a>) -> Vec<Reuses<'a>> {
+        let bins = summary.figures.distances.bins().into_iter();
+        bins.map(|bin| Reuses {
+            of: summary.of,
+            distances: (bin.from, bin.to),
+            reuses: bin.reuses,
+        })
+        .collect()
+    }
+
+    /// Reuses at every distance that occurs.
+    fn exact_distances<'a>(summary: &Summary<'a>) -> Vec<Reuses<'a>> {
+        let all = summary.figures.distances.iter();
+        all.map(|(distance, &reuses)| Reuses {
+            of: summary.of,
+            distances: (distance, distance),
+            reuses,
+        })
+        .collect()
+    }
+
+    fn working_sets<'a>(summary: &Summary<'a>) -> Vec<Window<'a>> {
+        let sets = summary.figures.working_sets.iter();
+        sets.map(|&set| Window {
+            of: summary.of,
+            set,
+        })
+        .collect()
+    }
+
+    /// Every figure of every stream.
+    #[must_use]
+    pub fn table(&self) -> Table {
+        Table::new(&columns::summary(), &self.summaries()).grouped_by(1)
+    }
+
+    /// The figures for a terminal.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let one = self.traces.len() == 1;
+        let keys = columns::SHORT.into_iter();
+        let keys = keys.filter(|key| !(one && *key == "trace"));
+        self.table().picked(keys).text()
+    }
+
+    /// Every figure in full precision.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        self.table().csv()
+    }
+
+    /// The tables of [`Self::CSV_FILES`].
+    #[must_use]
+    pub fn csv_files(&self) -> Vec<(&'static str, String)> {
+        let rows = self.summaries();
+        let curves: Vec<_> = rows.iter().flat_map(Self::curve).collect();
+        let sets: Vec<_> = rows.iter().flat_map(Self::working_sets).collect();
+        // One stream after another, because there are many distances.
+        let mut distances = String::new();
+        for row in &rows {
+            let text = Table::new(&columns::distances(), &Self::exact_distances(row)).csv();
+            let heading = text.find('\n').map_or(0, |end| end + 1);
+            let skip = if distances.is_empty() { 0 } else { heading };
+            distances += &text[skip..];
+        }
+        let tables = [
+            self.csv(),
+            Table::new(&columns::curves(), &curves).csv(),
+            distances,
+            Table::new(&columns::working_sets(), &sets).csv(),
+        ];
+        Self::CSV_FILES.into_iter().zip(tables).collect()
+    }
+
+    /// As one JSON object.
+    ///
+    /// # Errors
+    /// A figure that is not finite.
+    pub fn json(&self) -> serde_json::Result<String> {
+        let rows = self.summaries();
+        let curves: Vec<_> = rows.iter().flat_map(Self::curve).collect();
+        let distances: Vec<_> = rows.iter().flat_map(Self::distances).collect();
+        let sets: Vec<_> = rows.iter().flat_map(Self::working_sets).collect();
+        serde_json::to_string_pretty(&LocalityJson {
+            schema: SCHEMA,
+            tool: TOOL,
+            model_version: MODEL_VERSION,
+            config: self.config,
+            traces: self.traces.iter().map(TraceFacts::of).collect(),
+            rows: Records {
+                columns: &columns::summary(),
+                rows: &rows,
+            },
+            curves: Records {
+                columns: &columns::curves(),
+                rows: &curves,
+            },
+            distances: Records {
+                columns: &columns::distances(),
+                rows: &distances,
+            },
+            working_sets: Records {
+                columns: &columns::working_sets(),
+                rows: &sets,
+            },
+        })
+    }
+}
+
+/// The schema of the JSON object.
+#[cfg(feature = "testing")]
+#[must_use]
+pub fn schema() -> formats::schemas::Published {
+    use crate::schemas::WithRows;
+    formats::schemas::Published::of::<LocalityJson<'_, '_>>(SCHEMA)
+        .rows("rows", &crate::columns::headings(&columns::summary()))
+        .rows("curves", &crate::columns::headings(&columns::curves()))
+        .rows(
+            "distances",
+            &crate::columns::headings(&columns::distances()),
+        )
+        .rows(
+            "working_sets",
+            &crate::columns::headings(&columns::working_sets()),
+        )
+}

@@ -1,0 +1,318 @@
+//! The plots of a stream, with all orders in each plot.
+
+use super::LocalityReport;
+use super::columns::{CurvePoint, Reuses, Summary};
+use crate::plots::SeriesStyle;
+use crate::plots::bars::{BarChart, BarGroup};
+use crate::plots::lines::{Axis, Doublings, LineChart, LineSeries, Mark};
+use crate::plots::stacked::StackedChart;
+use crate::theme;
+use studies::locality::{CacheHits, Origin, Sequence};
+
+fn style(summary: &Summary) -> SeriesStyle {
+    SeriesStyle {
+        name: summary.of.order.title().to_owned(),
+        color: match summary.of.order {
+            Sequence::Order(order) => theme::color(order.color()),
+            Sequence::AsGiven => theme::INK,
+        },
+    }
+}
+
+fn sizes() -> Axis {
+    Axis::doublings("cache size", Doublings::Bytes)
+}
+
+/// A chart over cache sizes with one line per order. On an axis of doublings, values of zero or less are
+/// left out.
+fn over_sizes<'a>(
+    rows: &[Summary<'a>],
+    title: String,
+    y: Axis,
+    points: impl Fn(&Summary<'a>) -> Vec<(f64, f64)>,
+) -> LineChart {
+    let series = |row: &Summary<'a>| LineSeries {
+        style: style(row),
+        points: points(row),
+        mark: Mark::Line,
+    };
+    LineChart {
+        title,
+        x: sizes(),
+        y,
+        series: rows.iter().map(series).collect(),
+    }
+}
+
+/// Smallest fully associative LRU cache in the charts; smaller ones miss nearly always.
+const SMALLEST_BYTES: u64 = 256;
+
+fn full_lru<'a>(row: &Summary<'a>) -> impl Iterator<Item = CurvePoint<'a>> {
+    let points = LocalityReport::curve(row).into_iter();
+    points
+        .filter(|p| p.policy == "lru" && p.cache.ways.is_none() && p.size_bytes() >= SMALLEST_BYTES)
+}
+
+/// Misses of fully associative LRU caches of every size.
+#[must_use]
+pub(super) fn miss_ratio(rows: &[Summary]) -> LineChart {
+    let y = Axis::doublings("misses, % of line accesses", Doublings::Numbers);
+    over_sizes(
+        rows,
+        "Miss ratio by size, fully associative LRU".into(),
+        y,
+        |row| {
+            let points =
+                full_lru(row).filter_map(|p| Some((p.size_bytes() as f64, p.line_miss_pct()?)));
+            points.filter(|p| p.1 > 0.0).collect()
+        },
+    )
+}
+
+/// Hits whose previous use was by the other eye.
+#[must_use]
+pub fn other_eye(rows: &[Summary]) -> LineChart {
+    let y = Axis::linear("hits whose previous use was by the other eye, % of line accesses");
+    over_sizes(
+        rows,
+        "Hits on the other eye's lines, by size".into(),
+        y,
+        |row| {
+            let points =
+                full_lru(row).filter_map(|p| Some((p.size_bytes() as f64, p.other_eye_pct()?)));
+            points.collect()
+        },
+    )
+}
+
+/// LRU misses over OPT misses.
+#[must_use]
+pub(super) fn above_opt(rows: &[Summary]) -> LineChart {
+    let y = Axis::linear("LRU misses over OPT misses");
+    over_sizes(
+        rows,
+        "LRU misses over OPT misses by size, both fully associative".into(),
+        y,
+        |row| {
+            let figures = row.figures;
+            let ratio = |opt: &CacheHits| {
+                let lru = figures.misses(&figures.distances.hits(opt.lines));
+                let size = opt.lines * u64::from(row.of.line_bytes);
+                let misses = figures.misses(&opt.hits).max(1);
+                (size as f64, lru as f64 / misses as f64)
+            };
+            figures.opt.iter().map(ratio).collect()
+        },
+    )
+}
+
+/// Miss ratio by size, a line for each associativity.
+#[must_use]
+pub(super) fn associativity(row: &Summary) -> LineChart {
+    let curve = LocalityReport::curve(row);
+    let lru = || curve.iter().filter(|p| p.policy == "lru");
+    let mut ways: Vec<u32> = lru().filter_map(|p| p.cache.ways).collect();
+    ways.sort_unstable();
+    ways.dedup();
+    let smallest = lru()
+        .filter(|p| p.cache.ways.is_some())
+        .map(CurvePoint::size_bytes);
+    let (smallest, largest) = (smallest.clone().min(), smallest.max());
+    let in_range = |p: &&CurvePoint| {
+        smallest.is_some_and(|s| p.size_bytes() >= s)
+            && largest.is_some_and(|l| p.size_bytes() <= l)
+    };
+    let line = |ways: Option<u32>| {
+        let points = lru().filter(|p| p.cache.ways == ways).filter(in_range);
+        let at = |p: &CurvePoint| Some((p.size_bytes() as f64, p.line_miss_pct()?));
+        points.filter_map(at).filter(|p| p.1 > 0.0).collect()
+    };
+    let of_ways = ways.iter().enumerate().map(|(index, &ways)| LineSeries {
+        style: SeriesStyle::nth(format!("{ways}-way"), index),
+        points: line(Some(ways)),
+        mark: Mark::Line,
+    });
+    let full = LineSeries {
+        style: SeriesStyle::nth("full", 7),
+        points: line(None),
+        mark: Mark::Line,
+    };
+    LineChart {
+        title: format!("{}: miss ratio by size and ways, LRU", row.of.order.title()),
+        x: sizes(),
+        y: Axis::doublings("misses, % of line accesses", Doublings::Numbers),
+        series: of_ways.chain([full]).collect(),
+    }
+}
+
+/// Names and colours of the origins of the previous use.
+fn origins() -> Vec<SeriesStyle> {
+    let name = |(index, origin): (usize, Origin)| {
+        let colors = [7, 1, 4, 3];
+        SeriesStyle::nth(origin.key().replace('_', " "), colors[index])
+    };
+    Origin::ALL.into_iter().enumerate().map(name).collect()
+}
+
+/// Bins of distances of at least `from`.
+fn bins_from<'a>(row: &Summary<'a>, from: u64) -> impl Iterator<Item = Reuses<'a>> {
+    let bins = LocalityReport::distances(row).into_iter();
+    bins.filter(move |bin| bin.distances.0 >= from)
+}
+
+/// Reuses at distances of at least `from`, by the origin of the previous use, one chart per order.
+#[must_use]
+pub fn distances(rows: &[Summary], from: u64) -> Vec<StackedChart> {
+    let share =
+        |row: &Summary, count: u64| 100.0 * count as f64 / row.figures.accesses.max(1) as f64;
+    let highest = rows
+        .iter()
+        .flat_map(|row| bins_from(row, from).map(move |bin| share(row, bin.reuses.iter().sum())));
+    let highest = highest.fold(0.0, f64::max);
+    let most = rows
+        .iter()
+        .map(|row| bins_from(row, from).count())
+        .max()
+        .unwrap_or(0);
+    let chart = |row: &Summary| {
+        let mut bars: Vec<(String, Vec<f64>)> = bins_from(row, from)
+            .map(|bin| {
+                let parts = bin.reuses.iter().map(|&count| share(row, count));
+                (short(bin.distances.0), parts.collect())
+            })
+            .collect();
+        bars.resize(most, (String::new(), vec![0.0; Origin::ALL.len()]));
+        // There is room for every second label.
+        for (name, _) in bars.iter_mut().skip(1).step_by(2) {
+            name.clear();
+        }
+        StackedChart {
+            title: row.of.order.title().to_owned(),
+            value_label: "reuses, % of line accesses".into(),
+            bar_label: "distance, distinct lines from".into(),
+            series: origins(),
+            bars,
+            bar_px: 26.0,
+            highest: (highest > 0.0).then_some(1.05 * highest),
+            decimals: None,
+        }
+    };
+    rows.iter().map(chart).collect()
+}
+
+/// A power of two with a binary unit.
+fn short(number: u64) -> String {
+    match number {
+        n if n >= 1 << 20 => format!("{}M", n >> 20),
+        n if n >= 1 << 10 => format!("{}K", n >> 10),
+        n => n.to_string(),
+    }
+}
+
+/// Reuses at smaller distances, percent of the line accesses. `from` is 1 or the start of a bin.
+#[must_use]
+pub(super) fn nearer_pct(row: &Summary, from: u64) -> Option<f64> {
+    row.share_pct(row.figures.distances.hits(from).iter().sum())
+}
+
+/// Mean working set by length of the stretch.
+#[must_use]
+pub fn working_sets(rows: &[Summary]) -> LineChart {
+    let series = |row: &Summary| {
+        let points = LocalityReport::working_sets(row).into_iter().map(|window| {
+            let bytes = window.mean(window.set.lines) * f64::from(row.of.line_bytes);
+            (window.set.tiles as f64, bytes)
+        });
+        LineSeries {
+            style: style(row),
+            points: points.filter(|p| p.1 > 0.0).collect(),
+            mark: Mark::Line,
+        }
+    };
+    LineChart {
+        title: "Working set by stretch of tiles".into(),
+        x: Axis::doublings("tiles", Doublings::Numbers),
+        y: Axis::doublings(
+            "mean distinct lines of a stretch, in bytes",
+            Doublings::Bytes,
+        ),
+        series: rows.iter().map(series).collect(),
+    }
+}
+
+/// Share of a working set that both eyes use.
+#[must_use]
+pub(super) fn shared_working_sets(rows: &[Summary]) -> LineChart {
+    let series = |row: &Summary| {
+        let points = LocalityReport::working_sets(row).into_iter().map(|window| {
+            let shared = window.set.lines_of_both() as f64 / window.set.lines.max(1) as f64;
+            (window.set.tiles as f64, 100.0 * shared)
+        });
+        LineSeries {
+            style: style(row),
+            points: points.collect(),
+            mark: Mark::Line,
+        }
+    };
+    LineChart {
+        title: "Lines shared by both eyes, by stretch of tiles".into(),
+        x: Axis::doublings("tiles", Doublings::Numbers),
+        y: Axis::linear("lines that both eyes use, % of the stretch's"),
+        series: rows.iter().map(series).collect(),
+    }
+}
+
+/// The configured cache's misses by cause.
+#[must_use]
+pub fn causes(rows: &[Summary]) -> StackedChart {
+    let names = ["compulsory", "capacity", "conflict"]
+        .into_iter()
+        .zip([7, 1, 4]);
+    let bar = |row: &Summary| {
+        let split = &row.figures.split;
+        let sum = |counts: &[u64]| counts.iter().sum();
+        let parts = [split.compulsory, sum(&split.capacity), sum(&split.conflict)];
+        let parts = parts.map(|part| row.share_pct(part).unwrap_or(0.0));
+        (row.of.order.title().to_owned(), parts.to_vec())
+    };
+    StackedChart {
+        title: "Misses by cause".into(),
+        value_label: "misses, % of line accesses".into(),
+        series: names
+            .map(|(name, index)| SeriesStyle::nth(name, index))
+            .collect(),
+        bars: rows.iter().map(bar).collect(),
+        bar_px: 64.0,
+        decimals: Some(2),
+        ..StackedChart::default()
+    }
+}
+
+/// Misses of the configured cache and of a fully associative one, with LRU and with OPT.
+#[must_use]
+pub fn bounds(rows: &[Summary]) -> BarChart {
+    let names = ["as configured", "full LRU", "OPT, ways", "full OPT"];
+    let group = |row: &Summary| BarGroup {
+        label: row.of.order.title().to_owned(),
+        values: [
+            row.figures.split.misses(),
+            row.figures.split.fully_associative_misses(),
+            row.opt_ways_misses(),
+            row.opt_misses(),
+        ]
+        .map(|misses| row.share_pct(misses))
+        .to_vec(),
+        marks: Vec::new(),
+    };
+    let series = names.into_iter().zip([7, 1, 3, 2]);
+    BarChart {
+        title: "LRU and OPT at the configured size".into(),
+        value_label: "misses, % of line accesses".into(),
+        series: series
+            .map(|(name, index)| SeriesStyle::nth(name, index))
+            .collect(),
+        groups: rows.iter().map(group).collect(),
+        decimals: Some(2),
+        ..BarChart::default()
+    }
+}

@@ -1,0 +1,162 @@
+//! Means of an order over traces and caches.
+
+use sim::config::BetweenFrames;
+use sim::order::cost::Cost;
+use studies::orders_study::Row;
+
+/// An order over all traces and caches.
+#[derive(Clone)]
+pub struct Mean<'a> {
+    /// What happens to caches between frames.
+    pub between: BetweenFrames,
+    /// All rows of the order.
+    pub rows: Vec<&'a Row<'a>>,
+}
+
+/// Geometric mean; none without values, or if a value is not positive.
+fn geometric(ratios: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0);
+    for ratio in ratios {
+        if ratio <= 0.0 {
+            return None;
+        }
+        sum += ratio.ln();
+        count += 1;
+    }
+    (count > 0).then(|| (sum / f64::from(count)).exp())
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (mut sum, mut count) = (0.0, 0);
+    for value in values {
+        sum += value;
+        count += 1;
+    }
+    (count > 0).then(|| sum / f64::from(count))
+}
+
+fn change_pct(ratio: f64) -> f64 {
+    100.0 * (ratio - 1.0)
+}
+
+impl<'a> Mean<'a> {
+    /// The order's or bound's name.
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.rows.first().map(|row| row.name()).unwrap_or_default()
+    }
+
+    /// The rows in which an order can change the bytes; all rows if there are none.
+    fn open(&self) -> impl Iterator<Item = &'a Row<'a>> + '_ {
+        let all = self.count() == 0;
+        self.rows
+            .iter()
+            .copied()
+            .filter(move |row| all || row.can_change())
+    }
+
+    /// Number of rows in which an order can change the bytes.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        let open = self.rows.iter().filter(|row| row.can_change());
+        open.count() as u64
+    }
+
+    /// Change of the bytes relative to the baseline, percent.
+    #[must_use]
+    pub fn change_pct(&self) -> Option<f64> {
+        geometric(self.open().filter_map(Row::ratio)).map(change_pct)
+    }
+
+    /// Change of the cycles relative to the baseline, percent.
+    #[must_use]
+    pub fn cycles_change_pct(&self) -> Option<f64> {
+        let ratio = |row: &Row<'_>| {
+            let own = row.result.as_ref()?.cycles?;
+            let base = row.baseline_cycles.filter(|cycles| *cycles > 0)?;
+            Some(own as f64 / base as f64)
+        };
+        geometric(self.open().filter_map(ratio)).map(change_pct)
+    }
+
+    /// The trace with the worst mean over caches, and its change.
+    #[must_use]
+    pub fn worst_trace(&self) -> Option<(&'a str, f64)> {
+        let mut traces: Vec<(&str, Vec<f64>)> = Vec::new();
+        for row in self.open() {
+            let Some(ratio) = row.ratio() else { continue };
+            match traces
+                .last_mut()
+                .filter(|(label, _)| *label == row.subject.label)
+            {
+                Some((_, ratios)) => ratios.push(ratio),
+                None => traces.push((&row.subject.label, vec![ratio])),
+            }
+        }
+        let changes = traces.into_iter().filter_map(|(label, ratios)| {
+            Some((label, change_pct(geometric(ratios.into_iter())?)))
+        });
+        changes.max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+
+    /// The worst change of any trace with any pair of caches.
+    #[must_use]
+    pub fn worst_pct(&self) -> Option<f64> {
+        let changes = self.open().filter_map(Row::ratio).map(change_pct);
+        changes.max_by(f64::total_cmp)
+    }
+
+    /// The part of the distance to the greedy order that the order closes, by geometric means.
+    #[must_use]
+    pub fn closed_pct(&self) -> Option<f64> {
+        let known = || self.open().filter(|row| row.greedy_bytes.is_some());
+        let own = geometric(known().filter_map(Row::ratio))?;
+        let greedy = |row: &Row<'_>| Some(row.greedy_bytes? as f64 / row.baseline_bytes as f64);
+        let greedy = geometric(known().filter_map(greedy))?;
+        (greedy < 1.0).then(|| 100.0 * own.ln() / greedy.ln())
+    }
+
+    /// Mean of a rate over the replays, percent.
+    #[must_use]
+    pub fn rate_pct(&self, rate: fn(&Row<'_>) -> Option<f64>) -> Option<f64> {
+        mean(self.open().filter_map(rate)).map(|rate| 100.0 * rate)
+    }
+
+    /// The largest hardware cost of any row; none for bounds.
+    #[must_use]
+    pub fn cost(&self) -> Option<Cost> {
+        let costs = self.rows.iter().filter_map(|row| row.cost);
+        costs.max_by_key(|cost| (cost.information, cost.state_bytes, cost.table_bytes))
+    }
+}
+
+/// The means by order and by what happens between frames, fewest bytes first.
+pub fn means<'a>(rows: &'a [Row<'a>]) -> Vec<Mean<'a>> {
+    let mut means: Vec<Mean<'a>> = Vec::new();
+    let mut betweens: Vec<BetweenFrames> = Vec::new();
+    for row in rows {
+        let between = row.config.between_frames;
+        if !betweens.contains(&between) {
+            betweens.push(between);
+        }
+        let name = row.name();
+        let known = means
+            .iter_mut()
+            .find(|of| of.between == between && of.name() == name);
+        match known {
+            Some(mean) => mean.rows.push(row),
+            None => means.push(Mean {
+                between,
+                rows: vec![row],
+            }),
+        }
+    }
+    let place = |of: &Mean<'_>| betweens.iter().position(|between| *between == of.between);
+    means.sort_by(|a, b| {
+        let change = |of: &Mean<'_>| of.change_pct().unwrap_or(0.0);
+        place(a)
+            .cmp(&place(b))
+            .then(change(a).total_cmp(&change(b)))
+    });
+    means
+}

@@ -1,0 +1,235 @@
+//! The HTML page: means and bounds by display, hardware costs, and a picture of each order's path.
+
+use super::{Mean, OrdersReport, columns, means};
+use crate::answers;
+use crate::html::{self, Answer, Section, figures};
+use crate::plots::PlotError;
+use crate::plots::SeriesStyle;
+use crate::plots::hbars::HBarChart;
+use crate::plots::paths::{PathPlot, Stop};
+use crate::table::Table;
+use maud::{Markup, html};
+use sim::order::{PlanInputs, View, WorkItem};
+use studies::orders_study::{BASELINE, Of, Row};
+
+/// Keys of the tables of means.
+const SHOWN: [&str; 15] = [
+    "order",
+    "buildable",
+    "information",
+    "change_pct",
+    "worst_trace",
+    "worst_trace_change_pct",
+    "closed_pct",
+    "l1_footprint_miss_pct",
+    "utilization_pct",
+    "cycles_change_pct",
+    "dram_row_hit_pct",
+    "state_bytes",
+    "table_bytes",
+    "tile_buffers",
+    "decision_cycles",
+];
+
+/// Size of the pictures of paths in tiles.
+const PATH_TILES: [u32; 2] = [12, 8];
+
+/// The L2 size for those pictures, which gives strips of four columns.
+const PATH_L2_BYTES: u64 = 4 * 1536;
+
+impl OrdersReport<'_> {
+    /// The page.
+    ///
+    /// # Errors
+    /// A plot that could not be drawn.
+    pub fn page(&self) -> Result<String, PlotError> {
+        let mut sections = Vec::new();
+        let mut displays: Vec<(&str, i32)> = Vec::new();
+        for row in &self.rows {
+            let display = (row.subject.id.display.as_str(), row.offset_tiles);
+            if !displays.contains(&display) {
+                displays.push(display);
+            }
+        }
+        displays.sort_by_key(|(_, offset)| offset.abs());
+        for (display, offset) in displays {
+            let rows: Vec<Row<'_>> = (self.rows.iter())
+                .filter(|row| {
+                    (row.subject.id.display.as_str(), row.offset_tiles) == (display, offset)
+                })
+                .cloned()
+                .collect();
+            let title = format!("Display {display}: infinity {offset} tiles apart");
+            sections.push(Section::new(title, of_display(&means::means(&rows))));
+        }
+        if !self.learned.is_empty() {
+            let table = Table::new(&columns::learned(), &self.learned_rows());
+            sections.push(Section::new(
+                "Learning from the last frames",
+                table.markup(),
+            ));
+        }
+        sections.push(Section::new("Paths", self.paths()?));
+        sections.push(Section::new(
+            "Machine",
+            html::folded(
+                "configuration (TOML)",
+                &toml::to_string(&self.config).unwrap_or_default(),
+            ),
+        ));
+        let about = html! {
+            p {
+                "Bytes between the L2 and memory in each tile order, against those of " code { (BASELINE.name()) }
+                " with the same caches: geometric means over traces and caches. Bounds and searched orders know the frame's accesses in advance; no hardware can have them. "
+                "The JSON file beside this page has every figure, the CSV file every row."
+            }
+        };
+        let means = self.means();
+        let answer = Answer {
+            sentences: sentences(&means),
+            chart: html::figure(&best_and_bounds(&means).svg()?, ""),
+            about,
+        };
+        Ok(html::page("Parallax: tile orders", &answer, &sections))
+    }
+
+    /// The path of each order over a small picture on the display of the first trace.
+    fn paths(&self) -> Result<Markup, PlotError> {
+        let mut pictures = Vec::new();
+        let mut known: Vec<String> = Vec::new();
+        for row in &self.rows {
+            let Of::Order(order) = row.of else { continue };
+            let name = order.name().to_owned();
+            if known.contains(&name) {
+                continue;
+            }
+            let meta = &row.subject.source.tables().meta;
+            let seen = PlanInputs {
+                l2_bytes: PATH_L2_BYTES,
+                tile_px: small_tile_px(row),
+                ..PlanInputs::new(&row.config, meta)
+            };
+            let [left, right] = small_views(row);
+            let items = order.parts().stereo(left, right, &seen);
+            let plot = path(&name, &items);
+            pictures.push((plot.svg()?, String::new()));
+            known.push(name);
+        }
+        Ok(html! {
+            p { "On pictures of " (PATH_TILES[0]) " by " (PATH_TILES[1]) " tiles with an L2 that holds a row of four columns; pairings as on the display of the first trace, at this size." }
+            (figures(&pictures))
+        })
+    }
+}
+
+/// Means over everything, for the first treatment of caches between frames.
+fn first_of<'m, 'a>(means: &'m [Mean<'a>]) -> impl Iterator<Item = &'m Mean<'a>> {
+    let between = means.first().map(|mean| mean.between);
+    means
+        .iter()
+        .filter(move |mean| Some(mean.between) == between)
+}
+
+fn is_buildable(mean: &Mean<'_>) -> bool {
+    mean.rows.first().is_some_and(|row| row.is_buildable())
+}
+
+fn sentences(means: &[Mean<'_>]) -> Vec<String> {
+    let orders = first_of(means).map(|mean| answers::Studied {
+        name: mean.name(),
+        change_pct: mean.change_pct().unwrap_or(0.0),
+        is_buildable: is_buildable(mean),
+    });
+    let rows = first_of(means).map(|mean| mean.rows.len()).max();
+    answers::studied(
+        BASELINE.name(),
+        &orders.collect::<Vec<_>>(),
+        rows.unwrap_or(0),
+    )
+}
+
+/// Bytes of every order and bound relative to the baseline.
+fn best_and_bounds(means: &[Mean<'_>]) -> HBarChart {
+    let row = |mean: &Mean<'_>| {
+        let value = mean.change_pct().map(|change| 100.0 + change);
+        let values = if is_buildable(mean) {
+            vec![value, None]
+        } else {
+            vec![None, value]
+        };
+        (mean.name(), values)
+    };
+    HBarChart {
+        title: "Bytes from memory by order".to_owned(),
+        value_label: format!("% of the bytes of {}", BASELINE.name()),
+        series: vec![
+            SeriesStyle::nth("hardware can follow it", 2),
+            SeriesStyle::nth("needs the future, or a bound", 7),
+        ],
+        rows: first_of(means).map(row).collect(),
+        decimals: Some(1),
+    }
+}
+
+/// The tile size at which a picture has as many columns as the small picture.
+fn small_tile_px(row: &Row<'_>) -> u32 {
+    row.subject.id.eye_size_px[0].div_ceil(PATH_TILES[0])
+}
+
+fn small_views(row: &Row<'_>) -> [View; 2] {
+    let px = small_tile_px(row);
+    [0, 1].map(|pass| View {
+        size_px: PATH_TILES.map(|tiles| tiles * px),
+        ..View::grid(pass, PATH_TILES)
+    })
+}
+
+fn path(name: &str, items: &[WorkItem]) -> PathPlot {
+    let mut stops = Vec::new();
+    for item in items {
+        for (number, at) in item.tiles().enumerate() {
+            stops.push(Stop {
+                eye: at.pass,
+                x: at.tile % PATH_TILES[0],
+                y: at.tile / PATH_TILES[0],
+                paired: number > 0,
+            });
+        }
+    }
+    PathPlot {
+        title: name.to_owned(),
+        note: "steps; the two tiles of a pair share one".to_owned(),
+        tiles: PATH_TILES,
+        stops,
+    }
+}
+
+fn of_display(means: &[Mean<'_>]) -> Markup {
+    let table = Table::new(&columns::means(), means);
+    let mut sections = Vec::new();
+    let mut betweens: Vec<String> = Vec::new();
+    for mean in means {
+        let between = mean.between.to_string();
+        if !betweens.contains(&between) {
+            betweens.push(between);
+        }
+    }
+    for between in betweens {
+        let shown = table.only("between_frames", &between).picked(SHOWN);
+        sections.push((between, shown.without_empty_columns()));
+    }
+    html! {
+        @for (between, table) in &sections {
+            @if sections.len() > 1 { h3 { "Caches between frames: " (between) } }
+            (table.markup())
+        }
+        details {
+            summary { "what the columns are" }
+            dl.note {
+                @for h in table.headings.iter().filter(|h| !h.about.is_empty()) {
+                    dt { (h.name) @if !h.unit.is_empty() { ", " (h.unit) } } dd { (h.about) }
+                }
+            }
+        }
+    }
+}

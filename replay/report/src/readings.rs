@@ -1,0 +1,416 @@
+//! Every reading of the SGRT paper's figure 3, beside the paper's values (`replay.readings/2`).
+
+use super::columns::Column;
+use super::html::{Answer, Section, figure, figures, folded, page};
+use super::plots::lines::{Axis, LineChart, LineSeries, Mark};
+use super::plots::{PlotError, SeriesStyle};
+use super::table::Table;
+use maud::{Markup, html};
+use serde::{Serialize, Serializer};
+use sgrt::config::SgrtConfig;
+use sgrt::readings::{Figures, GbufferPlace, Reading, RowTest, Scope, rms_log};
+use sim::model_version::MODEL_VERSION;
+use sim::paper::sgrt::PaperValues;
+use sim::result::{TOOL, TraceId};
+
+/// Schema of the object that `replay readings --json` prints.
+pub const SCHEMA: &str = "replay.readings/2";
+
+/// The readings of a trace.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+pub struct SceneReadings {
+    /// Name in tables.
+    pub label: String,
+    /// The trace.
+    pub trace: TraceId,
+    /// Width and height of one eye's image.
+    pub eye_size_px: [u32; 2],
+    /// The paper's values, if the trace stands in for one of its scenes.
+    pub paper: Option<PaperValues>,
+    /// True if the closest reading is chosen by this scene.
+    pub calibrates: bool,
+    /// The figures of each reading, the same readings for all scenes.
+    #[serde(serialize_with = "by_reading")]
+    #[cfg_attr(feature = "testing", schemars(with = "Vec<ReadingFigures<'static>>"))]
+    pub readings: Vec<(Reading, Figures)>,
+}
+
+/// A reading and its figures in JSON.
+#[derive(Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+struct ReadingFigures<'a> {
+    /// Index in `fits`, which describes the reading.
+    index: usize,
+    #[serde(flatten)]
+    figures: &'a Figures,
+}
+
+fn by_reading<'a, S: Serializer>(
+    readings: &'a [(Reading, Figures)],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let one = |(index, pair): (usize, &'a (Reading, Figures))| ReadingFigures {
+        index,
+        figures: &pair.1,
+    };
+    serializer.collect_seq(readings.iter().enumerate().map(one))
+}
+
+/// How a reading does over all scenes.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+struct Fit {
+    /// Index of the reading.
+    index: usize,
+    reading: Reading,
+    /// Root mean square of ln(ours / paper) over performance and energy: scenes that calibrate.
+    calibration: Option<f64>,
+    /// The same: the other scenes.
+    test: Option<f64>,
+    /// Geometric means over all scenes.
+    relative_performance: f64,
+    relative_energy: f64,
+    /// The same of the least and most relative energies, if the energies are scaled to 14 nm.
+    relative_energy_bounds: [f64; 2],
+    /// Scenes on which reprojection saves energy.
+    scenes_that_save_energy: usize,
+}
+
+/// All readings of all scenes.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+pub struct ReadingsReport {
+    schema: &'static str,
+    tool: &'static str,
+    model_version: u32,
+    config: SgrtConfig,
+    /// Index of the reading that is closest on the scenes that calibrate.
+    chosen: Option<usize>,
+    fits: Vec<Fit>,
+    scenes: Vec<SceneReadings>,
+}
+
+fn scope_name(scope: Scope) -> &'static str {
+    match scope {
+        Scope::Units => "units",
+        Scope::UnitsAndMemory => "units, hierarchy in DRAM",
+        Scope::Frame => "whole frame",
+    }
+}
+
+fn row_test_name(test: RowTest) -> &'static str {
+    match test {
+        RowTest::Arrivals => "arrivals",
+        RowTest::WholeRow => "whole-row",
+    }
+}
+
+fn gbuffer_name(place: GbufferPlace) -> &'static str {
+    match place {
+        GbufferPlace::Tile => "tile",
+        GbufferPlace::Screen => "screen",
+    }
+}
+
+fn rule_name(reading: &Reading) -> &'static str {
+    match reading.rule.to_string().as_str() {
+        "none" => "none",
+        _ => "default",
+    }
+}
+
+fn geometric_mean(values: impl Iterator<Item = f64>) -> f64 {
+    let logs: Vec<f64> = values.map(f64::ln).collect();
+    (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp()
+}
+
+impl ReadingsReport {
+    /// Compares the readings with the paper's values. The readings of all scenes are the same.
+    #[must_use]
+    pub fn new(scenes: Vec<SceneReadings>, config: SgrtConfig) -> Self {
+        let readings = scenes.first().map_or(&[][..], |scene| &scene.readings);
+        let fit = |(index, (reading, _)): (usize, &(Reading, Figures))| {
+            let distance = |calibrates: bool| {
+                rms_log(scenes.iter().filter_map(|scene| {
+                    let paper = scene.paper.as_ref()?;
+                    let ratios = [paper.relative_performance, paper.relative_energy];
+                    (scene.calibrates == calibrates).then_some((scene.readings[index].1, ratios))
+                }))
+            };
+            let of = |value: fn(&Figures) -> f64| {
+                scenes.iter().map(move |s| value(&s.readings[index].1))
+            };
+            Fit {
+                index,
+                reading: reading.clone(),
+                calibration: distance(true),
+                test: distance(false),
+                relative_performance: geometric_mean(of(|f| f.relative_performance)),
+                relative_energy: geometric_mean(of(|f| f.relative_energy)),
+                relative_energy_bounds: [
+                    geometric_mean(of(|f| f.relative_energy_bounds[0])),
+                    geometric_mean(of(|f| f.relative_energy_bounds[1])),
+                ],
+                scenes_that_save_energy: of(|f| f.relative_energy).filter(|e| *e < 1.0).count(),
+            }
+        };
+        let fits: Vec<Fit> = readings.iter().enumerate().map(fit).collect();
+        let closest = fits
+            .iter()
+            .filter_map(|fit| Some((fit.calibration?, fit.index)));
+        let chosen = closest
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, index)| index);
+        Self {
+            schema: SCHEMA,
+            tool: TOOL,
+            model_version: MODEL_VERSION,
+            config,
+            chosen,
+            fits,
+            scenes,
+        }
+    }
+
+    /// A row per reading.
+    #[rustfmt::skip]
+    fn fits(&self) -> Table {
+        let columns = [
+            Column::text("reading", "reading", |f: &Fit| f.index as u64 + 1),
+            Column::text("scope", "measured of", |f: &Fit| scope_name(f.reading.scope)),
+            Column::text("reuse", "reused", |f: &Fit| super::sgrt::reuse_name(f.reading.reuse)),
+            Column::text("rule", "rule", |f: &Fit| rule_name(&f.reading)),
+            Column::text("row_test", "tested against", |f: &Fit| row_test_name(f.reading.row_test)),
+            Column::text("gbuffer", "G-buffer", |f: &Fit| gbuffer_name(f.reading.gbuffer)),
+            Column::real("calibration", "from the paper, calibration", "RMS ln", 3, |f: &Fit| f.calibration),
+            Column::real("test", "test scenes", "RMS ln", 3, |f: &Fit| f.test),
+            Column::real("relative_performance", "performance, mean", "ratio", 3, |f: &Fit| f.relative_performance),
+            Column::real("relative_energy", "energy, mean", "ratio", 3, |f: &Fit| f.relative_energy),
+            Column::real("relative_energy_least", "14 nm, least", "ratio", 3, |f: &Fit| f.relative_energy_bounds[0]),
+            Column::real("relative_energy_most", "14 nm, most", "ratio", 3, |f: &Fit| f.relative_energy_bounds[1]),
+            Column::text("saves", "scenes that save energy", |f: &Fit| f.scenes_that_save_energy as u64),
+        ];
+        Table::new(&columns, &self.fits)
+    }
+
+    /// The closest reading, scene by scene, beside the paper's values.
+    #[rustfmt::skip]
+    fn closest(&self, index: usize) -> Table {
+        let columns = [
+            Column::text("scene", "scene", |s: &SceneReadings| s.label.clone()),
+            Column::text("set", "set", |s: &SceneReadings| if s.calibrates { "calibration" } else { "test" }),
+            Column::real("relative_performance", "performance", "ratio", 2, move |s: &SceneReadings| s.readings[index].1.relative_performance),
+            Column::real("paper_relative_performance", "paper", "ratio", 2, |s: &SceneReadings| Some(s.paper.as_ref()?.relative_performance)),
+            Column::real("relative_energy", "energy", "ratio", 3, move |s: &SceneReadings| s.readings[index].1.relative_energy),
+            Column::real("paper_relative_energy", "paper", "ratio", 2, |s: &SceneReadings| Some(s.paper.as_ref()?.relative_energy)),
+            Column::real("frames_per_second", "frames per second", "", 1, move |s: &SceneReadings| s.readings[index].1.frames_per_second),
+            Column::real("paper_frames_per_second", "paper", "", 1, |s: &SceneReadings| Some(s.paper.as_ref()?.frames_per_second)),
+        ];
+        Table::new(&columns, &self.scenes)
+    }
+
+    /// A row per reading and scene.
+    #[rustfmt::skip]
+    #[must_use]
+    pub fn rows(&self) -> Table {
+        struct Cell<'a> { fit: &'a Fit, scene: &'a SceneReadings, chosen: bool }
+        let figures = |c: &Cell| c.scene.readings[c.fit.index].1;
+        let columns = [
+            Column::text("scene", "scene", |c: &Cell| c.scene.label.clone()),
+            Column::text("checksum", "checksum", |c: &Cell| c.scene.trace.checksum.clone()),
+            Column::text("width_px", "width", |c: &Cell| u64::from(c.scene.eye_size_px[0])),
+            Column::text("height_px", "height", |c: &Cell| u64::from(c.scene.eye_size_px[1])),
+            Column::text("set", "set", |c: &Cell| if c.scene.calibrates { "calibration" } else { "test" }),
+            Column::text("reading", "reading", |c: &Cell| c.fit.index as u64 + 1),
+            Column::text("chosen", "closest", |c: &Cell| c.chosen),
+            Column::text("scope", "measured of", |c: &Cell| scope_name(c.fit.reading.scope)),
+            Column::text("reuse", "reused", |c: &Cell| super::sgrt::reuse_name(c.fit.reading.reuse)),
+            Column::text("rule", "rule", |c: &Cell| rule_name(&c.fit.reading)),
+            Column::text("row_test", "tested against", |c: &Cell| row_test_name(c.fit.reading.row_test)),
+            Column::text("gbuffer", "G-buffer", |c: &Cell| gbuffer_name(c.fit.reading.gbuffer)),
+            Column::real("relative_performance", "performance", "ratio", 4, move |c: &Cell| figures(c).relative_performance),
+            Column::real("paper_relative_performance", "paper", "ratio", 2, |c: &Cell| Some(c.scene.paper.as_ref()?.relative_performance)),
+            Column::real("relative_energy", "energy", "ratio", 4, move |c: &Cell| figures(c).relative_energy),
+            Column::real("relative_energy_least", "14 nm, least", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[0]),
+            Column::real("relative_energy_most", "14 nm, most", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[1]),
+            Column::real("paper_relative_energy", "paper", "ratio", 2, |c: &Cell| Some(c.scene.paper.as_ref()?.relative_energy)),
+            Column::real("frames_per_second", "frames per second", "", 2, move |c: &Cell| figures(c).frames_per_second),
+            Column::real("paper_frames_per_second", "paper", "", 1, |c: &Cell| Some(c.scene.paper.as_ref()?.frames_per_second)),
+        ];
+        let cells: Vec<Cell> = self.fits.iter().flat_map(|fit| {
+            let chosen = self.chosen == Some(fit.index);
+            self.scenes.iter().map(move |scene| Cell { fit, scene, chosen })
+        }).collect();
+        Table::new(&columns, &cells)
+    }
+
+    /// What was found, in sentences.
+    fn sentences(&self) -> Vec<String> {
+        let (count, scenes) = (self.fits.len(), self.scenes.len());
+        let saving = self.fits.iter().filter(|f| f.relative_energy < 1.0).count();
+        let readings = match count {
+            1 => "the only reading".to_owned(),
+            count => format!("the {count} readings"),
+        };
+        let of = match scenes {
+            1 => "On the only scene".to_owned(),
+            scenes => format!("In the mean over {scenes} scenes"),
+        };
+        let verdict = match saving {
+            0 => format!("none of {readings}")
+                .replace("none of the only reading", "not under the only reading"),
+            saving if saving == count => format!(
+                "under {}",
+                readings.replacen("the ", "all ", usize::from(count > 1))
+            ),
+            saving => format!("under {saving} of {readings}"),
+        };
+        let verdict = verdict.replacen("none of", "under none of", 1);
+        let mut text = vec![format!(
+            "{of}, reprojection saves energy {verdict} of the paper."
+        )];
+        let bounds = || self.fits.iter().map(|f| f.relative_energy_bounds);
+        let (always, never) = (
+            bounds().filter(|[_, most]| *most < 1.0).count(),
+            bounds().filter(|[least, _]| *least >= 1.0).count(),
+        );
+        text.push(format!(
+            "If the energies are scaled to 14 nm, it saves energy at every scaling within the bounds under {always}, and at none under {never}."
+        ));
+        if let Some(fit) = self.chosen.and_then(|index| self.fits.get(index)) {
+            let distance = |d: Option<f64>| d.map_or("-".to_owned(), |d| format!("{d:.3}"));
+            text.push(format!(
+                "Closest to the paper's figure 3 on the scenes that calibrate is reading {}: {}, reuse of {}, rule {}, tested against {}, G-buffer by {} (RMS of ln(ours/paper) {}; on the test scenes {}).",
+                fit.index + 1,
+                scope_name(fit.reading.scope),
+                super::sgrt::reuse_name(fit.reading.reuse),
+                rule_name(&fit.reading),
+                row_test_name(fit.reading.row_test),
+                gbuffer_name(fit.reading.gbuffer),
+                distance(fit.calibration),
+                distance(fit.test),
+            ));
+        }
+        text
+    }
+
+    /// The tables for a terminal.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut out = self.sentences().join(" ") + "\n\nReadings\n" + &self.fits().text();
+        if let Some(index) = self.chosen {
+            out += "\nThe closest reading, scene by scene\n";
+            out += &self.closest(index).text();
+        }
+        out
+    }
+
+    /// One JSON object.
+    ///
+    /// # Errors
+    /// A figure that is not finite.
+    pub fn json(&self) -> serde_json::Result<String> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
+    }
+
+    /// A self-contained page.
+    ///
+    /// # Errors
+    /// A chart that cannot be drawn.
+    pub fn page(&self) -> Result<String, PlotError> {
+        let about = html! {
+            p {
+                "The paper (Lee et al., \u{201c}Fast Stereoscopic Rendering on Mobile Ray Tracing GPU for Virtual Reality "
+                "Applications\u{201d}) leaves open what its figure 3 measures and what a reused pixel takes over. Each reading "
+                "is one choice for each question. Nothing else is fitted: all constants of the hardware are the stated defaults."
+            }
+        };
+        let mut sections = vec![Section::new(
+            "Energy and performance under every reading",
+            self.charts()?,
+        )];
+        if let Some(index) = self.chosen {
+            sections.push(Section::new(
+                "The closest reading, scene by scene",
+                self.closest(index).markup(),
+            ));
+        }
+        sections.push(Section::new("Readings", self.fits().markup()));
+        let config = toml::to_string(&self.config).unwrap_or_default();
+        sections.push(Section::new(
+            "Configuration",
+            folded("All parameters", &config),
+        ));
+        let answer = Answer {
+            sentences: self.sentences(),
+            chart: figure(
+                &self.trade().svg()?,
+                "A symbol for each reading and scene; hover shows its figures.",
+            ),
+            about,
+        };
+        Ok(page("Readings of the SGRT paper", &answer, &sections))
+    }
+
+    /// Energy against performance.
+    fn trade(&self) -> LineChart {
+        let series = |(number, scene): (usize, &SceneReadings)| LineSeries {
+            style: SeriesStyle::nth(&scene.label, number),
+            points: (scene.readings.iter())
+                .map(|(_, f)| (f.relative_performance, f.relative_energy))
+                .collect(),
+            mark: Mark::Dots,
+        };
+        LineChart {
+            title: "Energy against performance under every reading".to_owned(),
+            x: Axis::linear("frames per second over tracing both eyes"),
+            y: Axis::linear("energy over tracing both eyes"),
+            series: self.scenes.iter().enumerate().map(series).collect(),
+        }
+    }
+
+    fn charts(&self) -> Result<Markup, PlotError> {
+        let chart = |title: &str, label: &str, value: fn(&Figures) -> f64| LineChart {
+            title: title.to_owned(),
+            x: Axis::linear("number of the reading in the table"),
+            y: Axis::linear(label),
+            series: (0..)
+                .zip(&self.scenes)
+                .map(|(number, scene)| LineSeries {
+                    style: SeriesStyle::nth(&scene.label, number),
+                    points: (1..)
+                        .zip(&scene.readings)
+                        .map(|(at, (_, figures))| (f64::from(at), value(figures)))
+                        .collect(),
+                    mark: Mark::Dots,
+                })
+                .collect(),
+        };
+        let energy = chart("Relative energy", "energy over tracing both eyes", |f| {
+            f.relative_energy
+        });
+        let performance = chart(
+            "Relative performance",
+            "frames per second over tracing both eyes",
+            |f| f.relative_performance,
+        );
+        Ok(figures(&[
+            (
+                energy.svg()?,
+                "Below 1, reprojection saves energy.".to_owned(),
+            ),
+            (
+                performance.svg()?,
+                "Above 1, reprojection is faster.".to_owned(),
+            ),
+        ]))
+    }
+}
+
+/// The schema of the JSON object.
+#[cfg(feature = "testing")]
+#[must_use]
+pub fn schema() -> formats::schemas::Published {
+    formats::schemas::Published::of::<ReadingsReport>(SCHEMA)
+}

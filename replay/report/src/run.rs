@@ -1,0 +1,343 @@
+//! Results of one replay, and of one point in both modes.
+
+use super::columns::{Column, Row, Show, Value};
+use super::errors::{self, KnownError, Of};
+use super::figures::figures;
+use super::table::Table;
+use serde::Serialize;
+use sim::config::RunConfig;
+use sim::model_version::MODEL_VERSION;
+use sim::result::ClientTraffic;
+use sim::result::{LevelResult, Part, RUN_SCHEMA, RunResult, TOOL, TileMap, TraceId};
+use sim::size::format_bytes;
+use studies::experiment::ResultRow;
+
+/// Schema of the object that `--compare-modes --json` prints.
+const MODES_SCHEMA: &str = "replay.compare-modes/2";
+
+/// The JSON object of `replay run --json`.
+#[derive(Debug, Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+struct RunJson<'a> {
+    schema: &'a str,
+    tool: &'a str,
+    model_version: u32,
+    trace: &'a TraceId,
+    config: &'a RunConfig,
+    result: &'a RunResult,
+    /// Known errors of the figures. Last, because they are not about this trace.
+    errors: Vec<&'static KnownError>,
+}
+
+/// Both modes of a point as JSON.
+#[derive(Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+struct ModesJson<'a> {
+    schema: &'a str,
+    timed: RunJson<'a>,
+    functional: RunJson<'a>,
+    /// Relative difference of each figure.
+    timed_over_functional_less_one: serde_json::Map<String, serde_json::Value>,
+}
+
+impl<'a> RunJson<'a> {
+    fn new(row: &'a ResultRow) -> Self {
+        Self {
+            schema: RUN_SCHEMA,
+            tool: TOOL,
+            model_version: MODEL_VERSION,
+            trace: &row.subject.id,
+            config: &row.point.config,
+            result: row.result,
+            errors: errors::known(Of::Textures),
+        }
+    }
+}
+
+/// One result as JSON.
+///
+/// # Errors
+/// A figure that is not finite.
+pub fn json(row: &ResultRow) -> serde_json::Result<String> {
+    serde_json::to_string_pretty(&RunJson::new(row))
+}
+
+/// Results as CSV, one row each.
+#[must_use]
+pub fn csv(rows: &[ResultRow]) -> String {
+    let mut columns = super::config_columns::trace();
+    columns.extend(super::config_columns::config());
+    columns.extend(figures());
+    Table::new(&columns, rows).csv()
+}
+
+/// One result as tables: levels, views, the figures of the whole replay, the draws or (if `by_texture`) the
+/// textures with most misses, and tiles if they were counted.
+#[must_use]
+pub fn text(row: &ResultRow, by_texture: bool) -> String {
+    let ResultRow { result, point, .. } = row;
+    let config = &point.config;
+    let level: Vec<Column<(&str, &LevelResult)>> = vec![
+        Column::text("level", "", |l: &(&str, _)| l.0),
+        count("footprints", |l| l.1.counters.footprints),
+        count("with a miss", |l| l.1.counters.footprint_misses),
+        count("line look-ups", |l| l.1.counters.line_lookups),
+        count("line misses", |l| l.1.counters.line_misses),
+        count("merged", |l| l.1.counters.secondary_misses),
+        Column::real(
+            "footprint_miss_pct",
+            "miss rate",
+            "% of footprints",
+            2,
+            |l: &(_, &LevelResult)| 100.0 * l.1.footprint_miss_rate,
+        ),
+        Column::real(
+            "line_miss_pct",
+            "miss rate",
+            "% of lines",
+            2,
+            |l: &(_, &LevelResult)| 100.0 * l.1.line_miss_rate,
+        ),
+    ];
+    let levels = Table::new(&level, &[("L1", &result.l1), ("L2", &result.l2)]);
+    let views = Table::new(&Part::columns(), &result.by_view);
+    let mode = config.mode_name();
+    let mut text = format!(
+        "{} ({}), {}, {mode}, L1 {}, L2 {}\n\n{}\n{}\n{}\n",
+        row.subject.id.scene,
+        row.subject.id.checksum,
+        config.order.name(),
+        format_bytes(config.level.l1.size_bytes),
+        format_bytes(config.level.l2.size_bytes),
+        levels.text(),
+        views.text(),
+        whole(row).text().trim_start(),
+    );
+    text += &format!(
+        "quads {}, covered pixels {}, access hash {}\n",
+        result.quads, result.lanes, result.access_hash,
+    );
+    if by_texture || !result.by_draw.is_empty() {
+        let (kind, parts) = result.parts();
+        text += &busiest(kind, parts);
+    }
+    if !result.tile_maps.is_empty() {
+        text += &tiles(&result.tile_maps);
+    }
+    text += &result.memory.to_string();
+    if !result.clients.is_empty() {
+        text += &clients(row).text();
+    }
+    if let Some(counts) = &result.geometry {
+        text += &format!(
+            "{} triangles submitted, {} in the list of at least one tile, {} list entries; {} vertices shaded\n",
+            counts.triangles_submitted,
+            counts.triangles_binned,
+            counts.list_entries,
+            counts.vertices_shaded
+        );
+    }
+    if let Some(tmu) = &result.tmu {
+        text += &format!("{} loops of threads that missed\n", tmu.loops);
+    }
+    text + &errors::text(Of::Textures)
+}
+
+/// Traffic by memory client, and the total.
+fn clients(row: &ResultRow) -> Table {
+    type Line = (&'static str, [u64; 2], f64, f64);
+    let clients = &row.result.clients;
+    let sum: u64 = clients.iter().map(ClientTraffic::bytes).sum();
+    let share = |bytes: u64| 100.0 * bytes as f64 / sum.max(1) as f64;
+    let mut lines: Vec<Line> = (clients.iter())
+        .map(|c| {
+            (
+                c.client.name(),
+                [c.read_bytes, c.write_bytes],
+                share(c.bytes()),
+                c.energy_mj,
+            )
+        })
+        .collect();
+    let all = [0, 1].map(|kind: usize| lines.iter().map(|line| line.1[kind]).sum());
+    let energy_mj = clients.iter().map(|c| c.energy_mj).sum();
+    lines.push(("all", all, share(sum), energy_mj));
+    let frames = |kind: usize| move |l: &Line| row.mb_per_frame(l.1[kind]);
+    let columns = [
+        Column::text("client", "", |l: &Line| l.0),
+        Column::real("read_mb_per_frame", "read", "MB/frame", 3, frames(0)),
+        Column::real("write_mb_per_frame", "written", "MB/frame", 3, frames(1)),
+        Column::real("share_pct", "of all", "%", 1, |l: &Line| l.2),
+        Column::real(
+            "energy_mj_per_frame",
+            "DRAM energy",
+            "mJ/frame",
+            3,
+            |l: &Line| row.per_frame(l.3),
+        ),
+    ];
+    Table::new(&columns, &lines)
+}
+
+type Level<'a> = (&'a str, &'a LevelResult);
+
+fn count<'a>(
+    name: &'static str,
+    value: impl Fn(&Level<'a>) -> u64 + 'static,
+) -> Column<'static, Level<'a>> {
+    Column::new(name, name, "", Show::Decimals(0), value)
+}
+
+/// Every figure of the point that has a value, one per line.
+fn whole(row: &ResultRow) -> Table {
+    type Line = (&'static str, String, &'static str);
+    let mut lines: Vec<Line> = Vec::new();
+    for figure in figures() {
+        let (heading, value) = (&figure.heading, figure.value(row));
+        if value != Value::None {
+            lines.push((heading.about, heading.show.write(&value), heading.unit));
+        }
+    }
+    let columns = [
+        Column::text("about", "", |l: &Line| l.0),
+        Column::real("value", "", "", 0, |l: &Line| l.1.clone()),
+        Column::text("unit", "", |l: &Line| l.2),
+    ];
+    Table::new(&columns, &lines)
+}
+
+/// Timed over functional, minus one; zero if both are zero.
+fn difference(timed: f64, functional: f64) -> f64 {
+    if functional == 0.0 {
+        0.0
+    } else {
+        timed / functional - 1.0
+    }
+}
+
+/// A figure compared between the modes: key in JSON, name, unit, decimals, value.
+type Measure = (
+    &'static str,
+    &'static str,
+    &'static str,
+    usize,
+    fn(&RunResult) -> f64,
+);
+
+const MEASURES: [Measure; 3] = [
+    (
+        "l1_footprint_miss_rate",
+        "L1 miss rate",
+        "% of footprints",
+        2,
+        |r| r.l1.footprint_miss_rate,
+    ),
+    ("l2_line_miss_rate", "L2 miss rate", "% of lines", 2, |r| {
+        r.l2.line_miss_rate
+    }),
+    ("external_bytes", "external", "bytes", 0, |r| {
+        r.external_bytes as f64
+    }),
+];
+
+/// Both modes of a point and their difference as JSON.
+///
+/// # Errors
+/// A figure that is not finite.
+pub fn modes_json(timed: &ResultRow, functional: &ResultRow) -> serde_json::Result<String> {
+    let differences = MEASURES.iter().map(|(key, .., value)| {
+        let difference = difference(value(timed.result), value(functional.result));
+        ((*key).to_owned(), difference.into())
+    });
+    serde_json::to_string_pretty(&ModesJson {
+        schema: MODES_SCHEMA,
+        timed: RunJson::new(timed),
+        functional: RunJson::new(functional),
+        timed_over_functional_less_one: differences.collect(),
+    })
+}
+
+/// Both modes of a point side by side.
+#[must_use]
+pub fn modes_text(timed: &ResultRow, functional: &ResultRow) -> String {
+    let cell = |(.., unit, decimals, value): &Measure, row: &ResultRow| {
+        let scale = if unit.starts_with('%') { 100.0 } else { 1.0 };
+        format!("{:.*} {unit}", decimals, scale * value(row.result))
+    };
+    let columns = [
+        Column::text("measure", "", |m: &Measure| m.1),
+        Column::real("timed", "timed", "", 0, |m: &Measure| cell(m, timed)),
+        Column::real("functional", "functional", "", 0, |m: &Measure| {
+            cell(m, functional)
+        }),
+        Column::real("difference", "difference", "", 0, |m: &Measure| {
+            let [timed, functional] = [timed, functional].map(|row| m.4(row.result));
+            format!("{:+.2} %", 100.0 * difference(timed, functional))
+        }),
+    ];
+    Table::new(&columns, &MEASURES).text()
+}
+
+/// Number of parts in the table of parts with most misses.
+const BUSIEST_PARTS: usize = 10;
+
+/// The draws or textures with the most line misses of the L2.
+fn busiest(kind: &str, parts: &[Part]) -> String {
+    let mut busiest: Vec<&Part> = parts.iter().collect();
+    busiest.sort_by_key(|part| std::cmp::Reverse((part.l2.line_misses, part.l1.footprints)));
+    busiest.truncate(BUSIEST_PARTS);
+    let rows: Vec<Part> = busiest.into_iter().cloned().collect();
+    let more = match parts.len() - rows.len() {
+        0 => String::new(),
+        more => format!("and {more} more {kind}s (--json lists all)\n"),
+    };
+    format!("\n{}{more}", Table::new(&Part::columns(), &rows).text())
+}
+
+/// The counts of every tile, pass by pass and row by row.
+fn tiles(maps: &[TileMap]) -> String {
+    type Tile<'a> = (&'a TileMap, usize);
+    let tiles: Vec<Tile> = maps
+        .iter()
+        .flat_map(|map| (0..map.footprints.len()).map(move |tile| (map, tile)))
+        .collect();
+    let whole = |key: &'static str, name, value: fn(&Tile) -> u64| {
+        Column::new(key, name, "", Show::Whole, value)
+    };
+    let columns = [
+        whole("pass", "pass", |(map, _)| map.pass.into()),
+        whole("column", "column", |(map, tile)| {
+            *tile as u64 % u64::from(map.tiles[0].max(1))
+        }),
+        whole("row", "row", |(map, tile)| {
+            *tile as u64 / u64::from(map.tiles[0].max(1))
+        }),
+        Column::real("overdraw", "overdraw", "", 2, |(map, tile): &Tile| {
+            f64::from(map.overdraw[*tile])
+        }),
+        whole("footprints", "footprints", |(map, tile)| {
+            map.footprints[*tile].into()
+        }),
+        whole("l1_misses", "L1 misses", |(map, tile)| {
+            map.l1_misses[*tile].into()
+        }),
+        whole("l2_misses", "lines from memory", |(map, tile)| {
+            map.l2_misses[*tile].into()
+        }),
+    ];
+    format!("\n{}", Table::new(&columns, &tiles).text())
+}
+
+/// The schema of the JSON object.
+#[cfg(feature = "testing")]
+#[must_use]
+pub fn schema() -> formats::schemas::Published {
+    formats::schemas::Published::of::<RunJson<'_>>(RUN_SCHEMA)
+}
+
+/// The schema of the JSON object of both modes.
+#[cfg(feature = "testing")]
+#[must_use]
+pub fn modes_schema() -> formats::schemas::Published {
+    formats::schemas::Published::of::<ModesJson<'_>>(MODES_SCHEMA)
+}

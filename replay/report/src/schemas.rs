@@ -1,0 +1,78 @@
+//! JSON Schemas of rows, by their columns.
+
+use crate::columns::{Heading, Kind, Records};
+use formats::schemas::Published;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde_json::{Map, Value, json};
+use std::borrow::Cow;
+
+/// Adds the rows of an array to a document's schema.
+pub trait WithRows {
+    /// Describes the rows of an array by their columns.
+    #[must_use]
+    fn rows(self, key: &str, headings: &[Heading]) -> Self;
+}
+
+impl WithRows for Published {
+    fn rows(mut self, key: &str, headings: &[Heading]) -> Self {
+        let properties = self.schema.get_mut("properties").expect("an object");
+        properties[key] = json!({ "type": "array", "items": row(headings) });
+        self
+    }
+}
+
+/// The type of a cell. Every cell can be null.
+fn cell(heading: &Heading) -> Value {
+    let kind = match heading.kind {
+        Kind::Text => "string",
+        Kind::Flag => "boolean",
+        Kind::Whole => "integer",
+        Kind::Real => "number",
+    };
+    let mut text = heading.about.to_owned();
+    if text.is_empty() {
+        text = heading.name.to_string();
+    }
+    if !heading.unit.is_empty() {
+        text = format!("{text} ({})", heading.unit);
+    }
+    json!({ "type": [kind, "null"], "description": text })
+}
+
+/// An object of these columns; keys with a dot are nested objects, which are null if all their cells are.
+fn row(headings: &[Heading]) -> Value {
+    let mut properties = Map::new();
+    for heading in headings {
+        match heading.key.split_once('.') {
+            None => {
+                properties.insert(heading.key.to_string(), cell(heading));
+            }
+            Some((outer, inner)) => {
+                let group = properties.entry(outer).or_insert_with(
+                    || json!({ "type": ["object", "null"], "properties": {}, "required": [] }),
+                );
+                group["properties"][inner] = cell(heading);
+                let required = group["required"].as_array_mut().expect("a list");
+                required.push(inner.into());
+            }
+        }
+    }
+    let required: Vec<&String> = properties.keys().collect();
+    json!({ "type": "object", "required": required, "properties": properties })
+}
+
+/// Rows of columns. [`WithRows::rows`] describes the columns where they are the same in every
+/// run.
+impl<R> JsonSchema for Records<'_, '_, R> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        "Rows".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        json_schema!({ "type": "array", "items": { "type": "object" } })
+    }
+}

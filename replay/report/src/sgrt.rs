@@ -1,0 +1,292 @@
+//! Tables, charts, CSV and page of stereo reprojection on a ray-tracing GPU.
+
+mod charts;
+mod cycle_table;
+mod tables;
+
+use crate::answers;
+use crate::errors::{self, KnownError, Of};
+use crate::html::{Answer, Section, figure as html_figure, folded, page as html_page};
+use crate::plots::{PlotError, data_uri};
+use maud::{Markup, html};
+use serde::Serialize;
+use sgrt::result::Report;
+use sim::paper::sgrt as paper;
+
+pub use tables::{csv, reuse_name, rows};
+
+/// Longest edge of a picture on the page.
+pub const THUMBNAIL_PX: u32 = 560;
+
+/// A trace's results with its pictures.
+#[derive(Clone, Debug)]
+pub struct Entry {
+    /// The figures.
+    pub report: Report,
+    /// Pictures, if a page is written.
+    pub pictures: Option<Thumbnails>,
+}
+
+/// PNG files of one trace.
+#[derive(Clone, Debug)]
+pub struct Thumbnails {
+    /// The left image.
+    pub left: Vec<u8>,
+    /// The right image with its bad pixels in yellow.
+    pub bad: Vec<u8>,
+    /// Its FLIP map.
+    pub flip: Vec<u8>,
+    /// The same under plain reuse.
+    pub plain_bad: Vec<u8>,
+    /// Its FLIP map under plain reuse.
+    pub plain_flip: Vec<u8>,
+}
+
+/// The whole page.
+///
+/// # Errors
+/// A chart that cannot be drawn.
+pub fn page(entries: &[Entry]) -> Result<String, PlotError> {
+    let about = html! {
+        p {
+            "The left image is traced in full. Its hits are reprojected into the right eye and "
+            "reused unless error detection rejects them. Ratios compare with the same hardware "
+            "tracing both eyes in full. Paper: Lee et al., \u{201c}Fast Stereoscopic "
+            "Rendering on Mobile Ray Tracing GPU for Virtual Reality Applications\u{201d}."
+        }
+    };
+    let answer = Answer {
+        sentences: sentences(entries),
+        chart: html_figure(&charts::performance(entries).svg()?, ""),
+        about,
+    };
+    Ok(html_page(
+        "Stereo reprojection on a mobile ray-tracing GPU",
+        &answer,
+        &sections(entries)?,
+    ))
+}
+
+fn sentences(entries: &[Entry]) -> Vec<String> {
+    let scene = |entry: &Entry| {
+        let (report, result) = (&entry.report, &entry.report.result);
+        answers::Reprojected {
+            scene: tables::scene_name(report),
+            performance: result.relative_performance,
+            energy: result.relative_energy,
+            reuse_pct: result.reuse_pct,
+            flip: result.flip_mean,
+            paper: (report.paper.as_ref()).map(|p| [p.relative_performance, p.relative_energy]),
+        }
+    };
+    answers::reprojected(&entries.iter().map(scene).collect::<Vec<_>>())
+}
+
+/// The sections, for a page with other sections.
+///
+/// # Errors
+/// A chart that cannot be drawn.
+pub fn sections(entries: &[Entry]) -> Result<Vec<Section>, PlotError> {
+    let mut out = vec![
+        Section::new("Performance and energy", performance(entries)?),
+        Section::new("Reuse and image error", accuracy(entries)),
+        Section::new("Units, cores and memory", hardware(entries)),
+    ];
+    for entry in entries {
+        let scene = tables::scene_name(&entry.report);
+        if let Some(pictures) = &entry.pictures {
+            out.push(Section::new(
+                format!("Pictures: {scene}"),
+                picture_row(entry, pictures),
+            ));
+        }
+        if !entry.report.curve.is_empty() {
+            out.push(Section::new(
+                format!("Cycles against error: {scene}"),
+                curve(entry)?,
+            ));
+        }
+        if !entry.report.sensitivity.is_empty() {
+            out.push(Section::new(
+                format!("Sensitivity: {scene}"),
+                html! {
+                    p {
+                        "The paper publishes none of these parameters. Each one is halved and doubled "
+                        "on its own (for a hit rate, the miss rate is); rows are sorted by effect."
+                    }
+                    (tables::sensitivity(&entry.report).markup())
+                },
+            ));
+        }
+    }
+    out.extend(errors::section(Of::Rays));
+    if let Some(entry) = entries.first() {
+        let config = toml::to_string(&entry.report.config).unwrap_or_default();
+        out.push(Section::new(
+            "Configuration",
+            folded("All parameters", &config),
+        ));
+    }
+    Ok(out)
+}
+
+/// The JSON object.
+#[derive(Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+struct ReprojectJson<'a> {
+    #[serde(flatten)]
+    report: &'a Report,
+    /// What is known of the figures' errors.
+    errors: Vec<&'static KnownError>,
+}
+
+/// The schema of the JSON object.
+#[cfg(feature = "testing")]
+#[must_use]
+pub fn schema() -> formats::schemas::Published {
+    formats::schemas::Published::of::<ReprojectJson<'_>>(sgrt::result::SCHEMA)
+}
+
+/// A report as JSON; the known errors of the figures come last.
+///
+/// # Errors
+/// A figure that is not finite.
+pub fn json(report: &Report, pretty: bool) -> serde_json::Result<String> {
+    let document = ReprojectJson {
+        report,
+        errors: errors::known(Of::Rays),
+    };
+    match pretty {
+        true => serde_json::to_string_pretty(&document),
+        false => serde_json::to_string(&document),
+    }
+}
+
+/// The tables for a terminal.
+#[must_use]
+pub fn text(entries: &[Entry]) -> String {
+    let mut out = String::new();
+    let mut part = |title: &str, table: String| {
+        out.push_str(title);
+        out.push('\n');
+        out.push_str(table.trim_end_matches('\n'));
+        out.push_str("\n\n");
+    };
+    part("Stereo reprojection", tables::rule_line(entries));
+    part(
+        "Performance and energy",
+        tables::performance(entries).text(),
+    );
+    if let Some(line) = tables::mean_reuse_line(entries) {
+        part("Average reuse", line);
+    }
+    for note in tables::row_notes(entries) {
+        part("Rows", note);
+    }
+    part("Reuse and image error", tables::accuracy(entries).text());
+    part("Right pixels by class", tables::classes(entries).text());
+    part("Bytes moved", tables::traffic(entries).text());
+    if let Some(table) = cycle_table::units(entries) {
+        part(cycle_table::TITLE, table.text());
+    }
+    for entry in entries {
+        let scene = tables::scene_name(&entry.report);
+        if !entry.report.curve.is_empty() {
+            let title = format!("Cycles against error: {scene}");
+            part(&title, tables::curve(&entry.report).text());
+        }
+        if !entry.report.sensitivity.is_empty() {
+            let title = format!("Sensitivity: {scene}");
+            part(&title, tables::sensitivity(&entry.report).text());
+        }
+    }
+    out.truncate(out.trim_end().len());
+    out.push('\n');
+    out + &errors::text(Of::Rays)
+}
+
+fn performance(entries: &[Entry]) -> Result<Markup, PlotError> {
+    Ok(html! {
+        (charts::ratios(entries)?)
+        p { (tables::rule_line(entries)) "." }
+        @if let Some(line) = tables::mean_reuse_line(entries) { p { (line) "." } }
+        @for note in tables::row_notes(entries) { p { strong { (note) "." } } }
+        (tables::performance(entries).markup())
+        p {
+            "The paper's average reuse is " (paper::REUSE_PCT) " %. Its units' work falls by about "
+            (paper::TNI_REDUCTION_PCT) " %, and its cores' work grows by about "
+            (paper::SRP_OVERHEAD_PCT) " %. The paper does not publish unit counts, latencies, cache sizes and "
+            "energies; the model's are parameters, the same for all scenes. "
+            "\u{201c}Units alone\u{201d} is the ratio of unit cycles. \u{201c}14 nm\u{201d} are the bounds of "
+            "the energy ratio if the default energies, which are 45 nm figures, are scaled. Where only primary hits "
+            "are reused, the share of primary rays in all steps limits the saving: scenes with many shadow, "
+            "reflection and refraction rays save little at any rate of reuse."
+        }
+    })
+}
+
+fn accuracy(entries: &[Entry]) -> Markup {
+    html! {
+        p {
+            "FLIP (0 to 1) compares the right image with the fully traced one at the display's "
+            "pixels per degree (ppd). Percentages are of all right pixels. A position error is the "
+            "distance between reused and true hit over the pixel's width at that depth."
+        }
+        (tables::accuracy(entries).markup())
+        (tables::classes(entries).markup())
+    }
+}
+
+fn hardware(entries: &[Entry]) -> Markup {
+    html! {
+        (tables::work(entries).markup())
+        @if let Some(table) = cycle_table::units(entries) { (table.markup()) }
+        (tables::traffic(entries).markup())
+        (tables::energy(entries).markup())
+    }
+}
+
+fn picture_row(entry: &Entry, pictures: &Thumbnails) -> Markup {
+    let report = &entry.report;
+    let figure = |png: &[u8], caption: String| {
+        html! {
+            figure {
+                img src=(data_uri::png(png)) alt=(caption) style="max-width:100%";
+                figcaption { (caption) }
+            }
+        }
+    };
+    let flip = |o: &sgrt::result::Outcome| {
+        format!(
+            "FLIP, mean {:.4} at {:.1} ppd (from black to yellow)",
+            o.flip_mean, o.pixels_per_degree
+        )
+    };
+    let (ours, plain) = (&report.result, &report.plain);
+    html! {
+        div.row {
+            (figure(&pictures.left, "Left image, traced".to_owned()))
+            (figure(&pictures.bad, format!(
+                "Right image, rule {}: {:.2} % reused, yellow is traced",
+                report.config.rule, ours.reuse_pct
+            )))
+            (figure(&pictures.flip, flip(ours)))
+        }
+        div.row {
+            (figure(&pictures.plain_bad, format!(
+                "Right image, plain reuse: {:.2} % reused, yellow is traced", plain.reuse_pct
+            )))
+            (figure(&pictures.plain_flip, flip(plain)))
+        }
+    }
+}
+
+fn curve(entry: &Entry) -> Result<Markup, PlotError> {
+    Ok(html! {
+        (charts::curve(&entry.report)?)
+        (tables::curve(&entry.report).markup())
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,562 @@
+//! Tables of reprojection results.
+
+use super::Entry;
+use crate::columns::{Column, Row, Show, pick};
+use crate::table::Table;
+use sgrt::accuracy::{Accuracy, ClassCounts};
+use sgrt::compose::Reuse;
+use sgrt::result::{CurvePoint, Outcome, Report, Sensitivity};
+use sgrt::run::EnergyPj;
+use sgrt::timing::Timing;
+use sim::paper::sgrt::PaperValues;
+
+/// The name of a trace in tables.
+pub fn scene_name(report: &Report) -> String {
+    sim::result::scene_name(&report.trace.scene).to_owned()
+}
+
+/// Describes the rule and level of reuse of the rows named "chosen".
+#[must_use]
+pub(super) fn rule_line(entries: &[Entry]) -> String {
+    entries.first().map_or_else(String::new, |entry| {
+        let config = &entry.report.config;
+        let timing = match config.timing {
+            Timing::ClosedForm => "",
+            Timing::Cycle => "; units simulated cycle by cycle",
+        };
+        let rates = entries.iter().map(|entry| &entry.report);
+        let rates = rates.filter(|report| report.config.cache_misses == "rates");
+        let rates: Vec<String> = rates.map(scene_name).collect();
+        let rates = if rates.is_empty() {
+            String::new()
+        } else {
+            format!(
+                "; cache misses by stated hit rates, as these traces have no visits (tracegen rays --visits): {}",
+                rates.join(", ")
+            )
+        };
+        format!(
+            "chosen: rule {}, reuse of {}; plain: rule none, every reprojected hit is reused{timing}{rates}",
+            config.rule,
+            reuse_name(config.reuse)
+        )
+    })
+}
+
+/// Mean reuse over the traces that correspond to a scene of the paper, for both rules.
+#[must_use]
+pub(super) fn mean_reuse_line(entries: &[Entry]) -> Option<String> {
+    let of_paper: Vec<&Report> = entries
+        .iter()
+        .map(|e| &e.report)
+        .filter(|r| r.paper.is_some())
+        .collect();
+    let count = of_paper.len();
+    let mean =
+        |pct: fn(&Report) -> f64| of_paper.iter().map(|r| pct(r)).sum::<f64>() / count as f64;
+    (count > 0).then(|| {
+        format!(
+            "right pixels reused, mean of {count} scenes that stand for the paper's: {:.2} % chosen, \
+             {:.2} % plain; paper {:.2} %",
+            mean(|r| r.result.reuse_pct),
+            mean(|r| r.plain.reuse_pct),
+            sim::paper::sgrt::REUSE_PCT
+        )
+    })
+}
+
+/// Notes on traces whose eyes do not meet the conditions of the paper's row test.
+#[must_use]
+pub(super) fn row_notes(entries: &[Entry]) -> Vec<String> {
+    let reports = entries.iter().map(|e| &e.report);
+    reports
+        .filter(|report| !report.rows.row_test_applies)
+        .map(|report| {
+            format!(
+                "{}: the paper's row test does not apply to these eyes: {:.1} % of the left pixels \
+                 arrive in a row of another number, and a right row needs {:.1} left rows; all \
+                 rows that are needed are fetched and charged",
+                scene_name(report),
+                report.rows.other_row_pct,
+                report.rows.left_rows_per_right_row
+            )
+        })
+        .collect()
+}
+
+/// Name of a level of reuse, as on the command line.
+#[must_use]
+pub fn reuse_name(reuse: Reuse) -> &'static str {
+    match reuse {
+        Reuse::Primary => "primary",
+        Reuse::Shadow => "shadow",
+        Reuse::Color => "color",
+        Reuse::Pixel => "pixel",
+    }
+}
+
+/// A trace with one of the two rules that every report has.
+struct RuleRow<'a> {
+    report: &'a Report,
+    /// "chosen" or "plain": tables use these names because rules can be long. [`rule_line`] describes the
+    /// chosen rule.
+    run: &'static str,
+    outcome: &'a Outcome,
+}
+
+fn rule_rows(entries: &[Entry]) -> Vec<RuleRow<'_>> {
+    let both = |entry| {
+        let report: &Report = entry;
+        [("chosen", &report.result), ("plain", &report.plain)].map(|(run, outcome)| RuleRow {
+            report,
+            run,
+            outcome,
+        })
+    };
+    entries.iter().flat_map(|e| both(&e.report)).collect()
+}
+
+fn pct<'a>(
+    key: &'static str,
+    name: &'static str,
+    decimals: usize,
+    value: fn(&Outcome) -> f64,
+) -> Column<'static, RuleRow<'a>> {
+    Column::real(key, name, "%", decimals, move |r: &RuleRow| {
+        value(r.outcome)
+    })
+}
+
+fn ratio<'a>(
+    key: &'static str,
+    name: &'static str,
+    value: fn(&Outcome) -> f64,
+) -> Column<'static, RuleRow<'a>> {
+    Column::real(key, name, "ratio", 3, move |r: &RuleRow| value(r.outcome))
+}
+
+/// The paper's ratio.
+fn paper<'a>(key: &'static str, value: fn(&PaperValues) -> f64) -> Column<'static, RuleRow<'a>> {
+    let of = move |r: &RuleRow| r.report.paper.as_ref().map(value);
+    Column::real(key, "paper", "ratio", 2, of).published()
+}
+
+fn millions<'a>(
+    key: &'static str,
+    name: &'static str,
+    unit: &'static str,
+    value: fn(&Outcome) -> u64,
+) -> Column<'static, RuleRow<'a>> {
+    let show = Show::Millions(2);
+    Column::new(key, name, unit, show, move |r: &RuleRow| value(r.outcome))
+}
+
+fn text<'a>(
+    key: &'static str,
+    name: &'static str,
+    value: fn(&RuleRow) -> String,
+) -> Column<'static, RuleRow<'a>> {
+    Column::text(key, name, move |r: &RuleRow| value(r))
+}
+
+/// What a row is about.
+fn identity<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
+    vec![
+        text("scene", "scene", |r| scene_name(r.report)),
+        text("trace", "trace", |r| r.report.trace.name.clone()),
+        text("checksum", "checksum", |r| r.report.trace.checksum.clone()),
+        text("camera", "camera", |r| r.report.trace.camera.clone()),
+        text("display", "display", |r| r.report.trace.display.clone()),
+        Column::text("width_px", "width", |r: &RuleRow| {
+            u64::from(r.report.eye_size_px[0])
+        }),
+        Column::text("height_px", "height", |r: &RuleRow| {
+            u64::from(r.report.eye_size_px[1])
+        }),
+        Column::text("model_version", "model", |r: &RuleRow| {
+            u64::from(r.report.model_version)
+        }),
+        text("cache_misses", "cache misses from", |r| {
+            r.report.config.cache_misses.clone()
+        }),
+        text("timing", "timing", |r| {
+            r.report.config.timing.name().to_owned()
+        }),
+        text("run", "rule", |r| r.run.to_owned()),
+        text("rule", "rule", |r| match r.run {
+            "chosen" => r.report.config.rule.to_string(),
+            _ => "none".to_owned(),
+        }),
+        text("reuse", "reused", |r| {
+            reuse_name(r.report.config.reuse).to_owned()
+        }),
+    ]
+}
+
+/// Reused hits and their errors.
+#[rustfmt::skip]
+fn hits<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
+    vec![
+        pct("reuse_pct", "reuse", 2, |o| o.reuse_pct),
+        pct("wrong_object_pct", "wrong object", 3, |o| o.wrong_object_pct),
+        pct("wrong_primitive_pct", "other triangle, off > 1 px", 3, |o| o.wrong_primitive_pct).about("right object, another triangle than the traced one, and off by more than 1 px; part of the pixels that are off by more than 1 px"),
+        pct("position_over_1px_pct", "off > 1 px", 3, |o| o.position_over_1px_pct),
+        pct("position_over_2px_pct", "off > 2 px", 3, |o| o.position_over_2px_pct),
+    ]
+}
+
+/// Performance and energy relative to tracing both eyes completely.
+#[rustfmt::skip]
+fn ratios<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
+    vec![
+        ratio("relative_performance", "performance", |o| o.relative_performance),
+        ratio("tni_relative_performance", "units alone", |o| o.tni_relative_performance),
+        paper("paper_relative_performance", |p| p.relative_performance),
+        ratio("relative_energy", "energy", |o| o.relative_energy),
+        ratio("relative_energy_least", "14 nm, least", |o| o.relative_energy_bounds[0]),
+        ratio("relative_energy_most", "14 nm, most", |o| o.relative_energy_bounds[1]),
+        paper("paper_relative_energy", |p| p.relative_energy),
+        pct("primary_steps_pct", "primary steps", 1, |o| o.primary_steps_pct),
+        pct("tni_reduction_pct", "unit cycles saved", 1, |o| o.tni_reduction_pct),
+        pct("right_tni_reduction_pct", "of the right eye's", 1, |o| o.right_tni_reduction_pct),
+        pct("srp_overhead_pct", "core cycles added", 1, |o| o.srp_overhead_pct),
+    ]
+}
+
+/// Cycles, rays and steps.
+#[rustfmt::skip]
+fn cycles<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
+    vec![
+        millions("tni_cycles", "unit cycles", "M", |o| o.tni_cycles),
+        millions("reference_tni_cycles", "both eyes in full", "M", |o| o.reference_tni_cycles),
+        millions("srp_cycles", "core cycles", "M", |o| o.srp_cycles),
+        millions("reference_srp_cycles", "both eyes in full", "M", |o| o.reference_srp_cycles),
+        text("tni_bottleneck", "unit bottleneck", |r| r.outcome.tni_bottleneck.clone()),
+        millions("rays", "rays", "M", |o| o.work.rays),
+        millions("reference_rays", "both eyes in full", "M", |o| o.reference_work.rays),
+        millions("steps", "steps", "M", |o| o.work.steps),
+        millions("reference_steps", "both eyes in full", "M", |o| o.reference_work.steps),
+        millions("retests", "re-tests", "M", |o| o.work.retests),
+    ]
+}
+
+/// Differences between the pictures.
+fn image_error<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
+    vec![
+        Column::real("flip_mean", "FLIP mean", "", 5, |r: &RuleRow| {
+            r.outcome.flip_mean
+        }),
+        Column::real("flip_p99", "FLIP p99", "", 4, |r: &RuleRow| {
+            r.outcome.flip_p99
+        }),
+        Column::real("pixels_per_degree", "ppd", "px/deg", 1, |r: &RuleRow| {
+            r.outcome.pixels_per_degree
+        }),
+        Column::real("psnr_db", "PSNR", "dB", 1, |r: &RuleRow| r.outcome.psnr_db),
+        Column::real("ssim", "SSIM", "", 4, |r: &RuleRow| r.outcome.ssim),
+    ]
+}
+
+/// Reads of the detection, buffers and DRAM traffic.
+fn bytes<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
+    vec![
+        Column::new("detection_bytes", "detection reads", "B/px", Show::Whole, {
+            |r: &RuleRow| {
+                let reads = r.outcome.detection_reads;
+                reads.pixel_bytes(&r.report.config.model.gbuffer)
+            }
+        }),
+        Column::real(
+            "detection_sram_kib",
+            "row buffers",
+            "KiB",
+            0,
+            |r: &RuleRow| r.outcome.detection_sram_bytes as f64 / 1024.0,
+        ),
+        millions("on_chip_bytes", "tile buffers", "MB", |o| o.on_chip_bytes),
+        millions("gbuffer_dram_bytes", "G-buffer in DRAM", "MB", |o| {
+            o.dram.gbuffer_bytes
+        }),
+        millions("dram_bytes", "all DRAM", "MB", |o| o.dram.total()),
+        millions("reference_dram_bytes", "both eyes in full", "MB", |o| {
+            o.reference_dram.total()
+        }),
+        millions("whole_screen_dram_bytes", "whole screen: DRAM", "MB", |o| {
+            o.whole_screen.dram.total()
+        }),
+        ratio("whole_screen_relative_performance", "performance", |o| {
+            o.whole_screen.relative_performance
+        }),
+        ratio("whole_screen_relative_energy", "energy", |o| {
+            o.whole_screen.relative_energy
+        }),
+        Column::text("row_test_applies", "row test applies", |r: &RuleRow| {
+            r.report.rows.row_test_applies
+        }),
+    ]
+}
+
+impl Row for RuleRow<'_> {
+    fn columns() -> Vec<Column<'static, Self>> {
+        let groups = [
+            identity(),
+            hits(),
+            ratios(),
+            cycles(),
+            image_error(),
+            bytes(),
+        ];
+        groups.into_iter().flatten().collect()
+    }
+}
+
+fn by_rule(entries: &[Entry], keys: &[&str]) -> Table {
+    let columns = pick::<RuleRow>(&[&["scene", "run"], keys].concat());
+    Table::new(&columns, &rule_rows(entries)).grouped_by(1)
+}
+
+/// The ratios, and the paper's.
+pub fn performance(entries: &[Entry]) -> Table {
+    let keys = [
+        "reuse_pct",
+        "relative_performance",
+        "tni_relative_performance",
+        "paper_relative_performance",
+        "relative_energy",
+        "relative_energy_least",
+        "relative_energy_most",
+        "paper_relative_energy",
+        "primary_steps_pct",
+        "tni_reduction_pct",
+        "right_tni_reduction_pct",
+        "srp_overhead_pct",
+    ];
+    by_rule(entries, &keys).without_empty_columns()
+}
+
+/// Reuse and its error.
+pub fn accuracy(entries: &[Entry]) -> Table {
+    let keys = [
+        "reuse_pct",
+        "wrong_object_pct",
+        "wrong_primitive_pct",
+        "position_over_1px_pct",
+        "position_over_2px_pct",
+        "flip_mean",
+        "flip_p99",
+        "pixels_per_degree",
+        "psnr_db",
+        "ssim",
+    ];
+    by_rule(entries, &keys)
+}
+
+/// Cycles and work.
+pub fn work(entries: &[Entry]) -> Table {
+    let keys = [
+        "tni_cycles",
+        "reference_tni_cycles",
+        "srp_cycles",
+        "reference_srp_cycles",
+        "tni_bottleneck",
+        "rays",
+        "reference_rays",
+        "steps",
+        "reference_steps",
+        "retests",
+    ];
+    by_rule(entries, &keys)
+}
+
+/// Bytes moved, with a tiled G-buffer and without.
+pub fn traffic(entries: &[Entry]) -> Table {
+    let keys = [
+        "detection_bytes",
+        "detection_sram_kib",
+        "on_chip_bytes",
+        "gbuffer_dram_bytes",
+        "dram_bytes",
+        "reference_dram_bytes",
+        "whole_screen_dram_bytes",
+        "whole_screen_relative_performance",
+        "whole_screen_relative_energy",
+    ];
+    by_rule(entries, &keys)
+}
+
+/// Per trace, one row for the rule and one for plain reuse.
+#[must_use]
+pub fn rows(entries: &[Entry]) -> Table {
+    Table::new(&RuleRow::columns(), &rule_rows(entries))
+}
+
+/// [`rows`] as CSV.
+#[must_use]
+pub fn csv(entries: &[Entry]) -> String {
+    rows(entries).csv()
+}
+
+/// Pixels of a class.
+struct ClassRow<'a> {
+    run: &'a RuleRow<'a>,
+    class: &'static str,
+    counts: &'a ClassCounts,
+}
+
+impl ClassRow<'_> {
+    fn accuracy(&self) -> &Accuracy {
+        &self.run.outcome.classes
+    }
+}
+
+/// Pixels by class, and the errors of the reused ones.
+pub fn classes(entries: &[Entry]) -> Table {
+    let runs = rule_rows(entries);
+    let pixels = |key, name, value: fn(&ClassCounts) -> u64| {
+        Column::new(key, name, "px", Show::Whole, move |r: &ClassRow| {
+            value(r.counts)
+        })
+    };
+    let columns = [
+        Column::text("scene", "scene", |r: &ClassRow| scene_name(r.run.report)),
+        Column::text("run", "rule", |r: &ClassRow| r.run.run),
+        Column::text("class", "class", |r: &ClassRow| r.class),
+        pixels("pixels", "pixels", |c| c.pixels),
+        Column::real("share_pct", "share", "%", 2, |r: &ClassRow| {
+            r.accuracy().pct(r.counts.pixels)
+        }),
+        pixels("wrong_object", "wrong object", |c| c.wrong_object),
+        pixels("wrong_primitive", "other triangle, off > 1 px", |c| {
+            c.wrong_primitive
+        }),
+        pixels("over_1px", "off > 1 px", |c| c.position_over_1px),
+        pixels("over_2px", "off > 2 px", |c| c.position_over_2px),
+    ];
+    let rows: Vec<ClassRow> = runs
+        .iter()
+        .flat_map(|run| {
+            let c = &run.outcome.classes;
+            [
+                ("reused", &c.reused),
+                ("overlapped, nearest reused", &c.overlapped),
+                ("missing, traced", &c.missing),
+                ("bad, traced", &c.bad),
+            ]
+            .map(|(class, counts)| ClassRow { run, class, counts })
+        })
+        .collect();
+    Table::new(&columns, &rows).grouped_by(2)
+}
+
+/// Energy of a rendering method.
+struct EnergyRow<'a> {
+    scene: String,
+    run: &'static str,
+    energy: &'a EnergyPj,
+    whole_pj: f64,
+}
+
+/// Energy by component, relative to the reference's total.
+pub fn energy(entries: &[Entry]) -> Table {
+    let part = |key, name, value: fn(&EnergyPj) -> f64| {
+        Column::real(key, name, "%", 1, move |r: &EnergyRow| {
+            100.0 * value(r.energy) / r.whole_pj
+        })
+    };
+    let columns = [
+        Column::text("scene", "scene", |r: &EnergyRow| r.scene.clone()),
+        Column::text("run", "run", |r: &EnergyRow| r.run),
+        part("tni_pct", "units", |e| e.tni_pj),
+        part("srp_pct", "cores", |e| e.srp_pj),
+        part("caches_pct", "caches", |e| e.caches_pj),
+        part("sram_pct", "tile buffers", |e| e.sram_pj),
+        part("dram_pct", "DRAM", |e| e.dram_pj),
+        part("static_pct", "static", |e| e.static_pj),
+        part("sum_pct", "sum", EnergyPj::total),
+    ];
+    let both = |report| {
+        let report: &Report = report;
+        let o = &report.result;
+        let runs = [
+            ("both eyes in full", &o.reference_energy),
+            ("chosen", &o.energy),
+        ];
+        runs.map(|(run, energy)| EnergyRow {
+            scene: scene_name(report),
+            run,
+            energy,
+            whole_pj: o.reference_energy.total(),
+        })
+    };
+    let rows: Vec<EnergyRow> = entries.iter().flat_map(|e| both(&e.report)).collect();
+    let mut table = Table::new(&columns, &rows).grouped_by(1);
+    table.caption = "Energy by component, % of tracing both eyes in full";
+    table
+}
+
+/// The points of the curve.
+pub fn curve(report: &Report) -> Table {
+    let columns = [
+        Column::text("rule", "rule", |p: &CurvePoint| p.rule.to_string()),
+        Column::text("reuse", "reused", |p: &CurvePoint| reuse_name(p.reuse)),
+        Column::real("reuse_pct", "reuse", "%", 2, |p: &CurvePoint| p.reuse_pct),
+        Column::real(
+            "wrong_object_pct",
+            "wrong object",
+            "%",
+            3,
+            |p: &CurvePoint| p.wrong_object_pct,
+        ),
+        Column::real(
+            "tni_reduction_pct",
+            "unit cycles saved",
+            "%",
+            1,
+            |p: &CurvePoint| p.tni_reduction_pct,
+        ),
+        Column::real(
+            "relative_performance",
+            "performance",
+            "ratio",
+            3,
+            |p: &CurvePoint| p.relative_performance,
+        ),
+        Column::real("relative_energy", "energy", "ratio", 3, |p: &CurvePoint| {
+            p.relative_energy
+        }),
+        Column::real("flip_mean", "FLIP mean", "", 5, |p: &CurvePoint| {
+            p.flip_mean
+        }),
+        Column::real("flip_p99", "FLIP p99", "", 4, |p: &CurvePoint| p.flip_p99),
+    ];
+    Table::new(&columns, &report.curve).grouped_by(1)
+}
+
+/// Parameters, sorted by their effect on the ratios.
+pub fn sensitivity(report: &Report) -> Table {
+    let ratio = |key, name, value: fn(&Sensitivity) -> f64| {
+        Column::real(key, name, "ratio", 3, move |s: &Sensitivity| value(s))
+    };
+    let columns = [
+        Column::text("parameter", "parameter", |s: &Sensitivity| {
+            s.parameter.clone()
+        }),
+        Column::new("value", "value", "", Show::Text, |s: &Sensitivity| s.value),
+        ratio("performance_half", "performance, half", |s| {
+            s.relative_performance[0]
+        }),
+        ratio("performance_twice", "twice", |s| s.relative_performance[1]),
+        ratio("energy_half", "energy, half", |s| s.relative_energy[0]),
+        ratio("energy_twice", "twice", |s| s.relative_energy[1]),
+    ];
+    let o = &report.result;
+    let effect = |s: &Sensitivity| {
+        let off = |pair: [f64; 2], base: f64| pair.map(|v| (v - base).abs()).into_iter().sum();
+        let performance: f64 = off(s.relative_performance, o.relative_performance);
+        let energy: f64 = off(s.relative_energy, o.relative_energy);
+        performance + energy
+    };
+    let mut rows: Vec<&Sensitivity> = report.sensitivity.iter().collect();
+    rows.sort_by(|a, b| effect(b).total_cmp(&effect(a)));
+    Table::new(&columns, rows)
+}

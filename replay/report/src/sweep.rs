@@ -1,0 +1,430 @@
+//! A sweep's results: rows, table, CSV and page.
+
+use super::answers;
+use super::columns::{Column, Figure, Records};
+use super::config_columns;
+use super::figures::{figure, figures, number};
+use super::html::{self, Answer, Section, folded};
+use super::plots::bars::{BarChart, BarGroup};
+use super::plots::hbars::HBarChart;
+use super::plots::lines::{self, Doublings, LineChart, LineSeries, Mark};
+use super::plots::{PlotError, SeriesStyle};
+use super::table::Table;
+use super::theme;
+use maud::html;
+use serde::Serialize;
+use sim::config::{Order, RunConfig};
+use sim::model_version::MODEL_VERSION;
+use sim::palette;
+use sim::result::{TOOL, TraceId};
+use studies::experiment::{
+    Axis, ExperimentFile, Outcome, ResultRow, Setting, Subject, plain, point_key,
+};
+use toml::Value;
+
+/// Schema of a sweep's JSON.
+const SWEEP_SCHEMA: &str = "replay.sweep/3";
+
+const ORDER: &str = "order";
+const TRAFFIC: &str = "external_mb_per_frame";
+
+/// The results of a sweep, sorted by trace, change and axis values.
+pub struct SweepReport<'a> {
+    file: &'a ExperimentFile,
+    outcome: &'a Outcome<'a>,
+    rows: Vec<ResultRow<'a>>,
+}
+
+/// A trace and its label in the rows.
+#[derive(Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+pub(super) struct LabelledTrace<'a> {
+    label: &'a str,
+    trace: &'a TraceId,
+}
+
+impl<'a> LabelledTrace<'a> {
+    pub(super) fn of(subject: &'a Subject<'_>) -> Self {
+        Self {
+            label: &subject.label,
+            trace: &subject.id,
+        }
+    }
+}
+
+/// The JSON object.
+#[derive(Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+struct SweepJson<'a, 'r> {
+    schema: &'a str,
+    tool: &'a str,
+    model_version: u32,
+    traces: Vec<LabelledTrace<'a>>,
+    base: RunConfig,
+    axes: &'a [Axis],
+    one_at_a_time: &'a [Axis],
+    rows: Records<'a, 'static, ResultRow<'r>>,
+}
+
+fn change_title(change: Option<&Setting>) -> String {
+    change.map_or_else(
+        || "base".to_owned(),
+        |(key, value)| format!("{key} = {}", plain(value)),
+    )
+}
+
+impl<'a> SweepReport<'a> {
+    /// The outcome of a file's plan.
+    #[must_use]
+    pub fn new(file: &'a ExperimentFile, outcome: &'a Outcome<'a>) -> Self {
+        Self {
+            file,
+            outcome,
+            rows: outcome.rows(),
+        }
+    }
+
+    /// As one JSON object.
+    ///
+    /// # Errors
+    /// A figure that is not finite.
+    pub fn json(&self) -> serde_json::Result<String> {
+        let columns = Self::columns();
+        let subjects = self.outcome.subjects.iter();
+        serde_json::to_string(&SweepJson {
+            schema: SWEEP_SCHEMA,
+            tool: TOOL,
+            model_version: MODEL_VERSION,
+            traces: subjects.map(LabelledTrace::of).collect(),
+            base: self.file.base,
+            axes: &self.file.axes,
+            one_at_a_time: &self.file.one_at_a_time,
+            rows: Records {
+                columns: &columns,
+                rows: &self.rows,
+            },
+        })
+    }
+
+    /// The columns of every file: those that identify a row, then its figures.
+    fn columns() -> Vec<Figure<'a>> {
+        let mut columns = config_columns::trace();
+        columns.extend(config_columns::config());
+        columns.extend(config_columns::change());
+        columns.push(
+            Figure::text("point", "point", |r| {
+                point_key(&r.subject.id, &r.point.config)
+            })
+            .about("key of the point's row in points/"),
+        );
+        columns.extend(figures());
+        columns
+    }
+
+    /// Values of an axis as written in the experiment file.
+    fn written(i: usize, axis: &Axis) -> Figure<'a> {
+        Column::text(axis.key.clone(), axis.key.clone(), move |r: &ResultRow| {
+            r.point.settings.get(i).map(|(_, value)| plain(value))
+        })
+    }
+
+    /// The rows in full precision.
+    #[must_use]
+    pub fn rows(&self) -> Table {
+        Table::new(&Self::columns(), &self.rows)
+    }
+
+    /// The rows as CSV.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        self.rows().csv()
+    }
+
+    /// The rows as a table, grouped by trace and change.
+    #[must_use]
+    pub fn table(&self) -> Table {
+        let mut columns = vec![Figure::text("label", "scene", |r| r.subject.label.clone())];
+        if !self.file.one_at_a_time.is_empty() {
+            columns.push(Figure::text("change", "change", |r| {
+                change_title(r.point.change.as_ref())
+            }));
+        }
+        let axes = self.file.axes.iter().enumerate();
+        columns.extend(axes.map(|(i, axis)| Self::written(i, axis)));
+        let groups = 1 + usize::from(!self.file.one_at_a_time.is_empty());
+        let shown = [
+            "l1_footprint_miss_pct",
+            "l2_line_miss_pct",
+            "tmu_util_pct",
+            TRAFFIC,
+            "bound_mb_per_frame",
+            "reduction_pct",
+            "over_base",
+        ];
+        columns.extend(super::columns::pick(&shown));
+        let table = Table::new(&columns, &self.rows).grouped_by(groups);
+        table.without_empty_columns()
+    }
+
+    /// The sweep as a page.
+    ///
+    /// # Errors
+    /// A plot that cannot be drawn.
+    pub fn page(&self, title: &str) -> Result<String, PlotError> {
+        let subjects = self.outcome.subjects;
+        let mut pictures = Vec::new();
+        for subject in subjects {
+            let charts = Charts::new(self, &subject.label);
+            pictures.extend(charts.axes()?);
+            if !self.file.one_at_a_time.is_empty() {
+                pictures.push((charts.changes().svg()?, charts.fixed(None)));
+            }
+        }
+        let base = toml::to_string(&self.file.base).unwrap_or_default();
+        let about = html! {
+            p {
+                (self.rows.len()) " points over " (subjects.len()) @if subjects.len() == 1 { " trace. " } @else { " traces. " }
+                "The same numbers are in the JSON and CSV files next to this page. The folder points/ has the configuration and result of each point."
+            }
+        };
+        let traces = html! {
+            ul { @for s in subjects { li { (s.label) ": " (s.id.scene) ", checksum " (s.id.checksum) } } }
+        };
+        let sections = [
+            Section::new("Charts", html::figures(&pictures)),
+            Section::new("Results", self.table().markup()),
+            Section::new("Traces", traces),
+            Section::new("Base configuration", folded("TOML", &base)),
+        ];
+        let chart = match pictures.first() {
+            Some((svg, caption)) => html::figure(svg, caption),
+            None => html! {},
+        };
+        let answer = Answer {
+            sentences: self.sentences(),
+            chart,
+            about,
+        };
+        Ok(html::page(title, &answer, &sections))
+    }
+}
+
+impl SweepReport<'_> {
+    fn sentences(&self) -> Vec<String> {
+        let several = self.outcome.subjects.len() > 1;
+        let point = |row: &ResultRow| {
+            let place = if several {
+                format!("{}: ", row.subject.label)
+            } else {
+                String::new()
+            };
+            Some((
+                format!("{place}{}", row.point.title()),
+                number(row, TRAFFIC)?,
+            ))
+        };
+        let points: Vec<(String, f64)> = self.rows.iter().filter_map(point).collect();
+        let effect = |(index, axis): (usize, &Axis)| {
+            let mean = |value: &Value| {
+                let own = self.rows.iter().filter(|row| {
+                    let own = row.point.settings.get(index).map(|(_, own)| own);
+                    row.point.change.is_none() && own == Some(value)
+                });
+                let all: Vec<f64> = own.filter_map(|row| number(row, TRAFFIC)).collect();
+                let mean = all.iter().sum::<f64>() / all.len() as f64;
+                (!all.is_empty()).then(|| (plain(value), mean))
+            };
+            (
+                axis.key.clone(),
+                axis.values.iter().filter_map(mean).collect(),
+            )
+        };
+        let effects: Vec<_> = self.file.axes.iter().enumerate().map(effect).collect();
+        answers::sweep(&points, &effects)
+    }
+}
+
+/// The number that an axis's value stands for, and whether it has a unit of bytes.
+fn numeric(value: &Value) -> Option<(f64, bool)> {
+    match value {
+        Value::Integer(number) => Some((*number as f64, false)),
+        Value::Float(number) => Some((*number, false)),
+        Value::String(text) => {
+            let bytes = sim::size::parse_bytes(text).ok()?;
+            Some((bytes as f64, true))
+        }
+        _ => None,
+    }
+}
+
+fn value_label() -> String {
+    figure(TRAFFIC).map_or_else(String::new, |f| f.heading.axis_label())
+}
+
+/// The charts of one trace: external traffic in MB per frame.
+struct Charts<'a> {
+    report: &'a SweepReport<'a>,
+    scene: &'a str,
+    rows: Vec<&'a ResultRow<'a>>,
+    /// Values of the order axis; empty if there is none.
+    orders: &'a [Value],
+}
+
+impl<'a> Charts<'a> {
+    fn new(report: &'a SweepReport<'a>, scene: &'a str) -> Self {
+        let orders = report.file.axes.iter().find(|a| a.key == ORDER);
+        let rows = report.rows.iter();
+        Self {
+            report,
+            scene,
+            rows: rows.filter(|r| r.subject.label == scene).collect(),
+            orders: orders.map_or(&[], |a| &a.values),
+        }
+    }
+
+    /// One series per order, or a single one.
+    fn series(&self) -> Vec<SeriesStyle> {
+        if self.orders.is_empty() {
+            return vec![SeriesStyle::nth("external traffic", 2)];
+        }
+        let style = |o: &Value| SeriesStyle {
+            name: plain(o),
+            color: theme::color(Order::find(&plain(o)).map_or(palette::GREY, Order::color)),
+        };
+        self.orders.iter().map(style).collect()
+    }
+
+    /// One value per series. Other axes are at their first value.
+    fn values(&self, axis: Option<(&str, &Value)>, change: Option<&Setting>) -> Vec<Option<f64>> {
+        let with = |order: Option<&Value>| {
+            let named = |key: &str| {
+                let order = order.filter(|_| key == ORDER);
+                order.or(axis.filter(|(k, _)| *k == key).map(|(_, value)| value))
+            };
+            let axes = &self.report.file.axes;
+            let matches = |row: &&&ResultRow| {
+                let mut settings = row.point.settings.iter().zip(axes);
+                row.point.change.as_ref() == change
+                    && settings.all(|((key, value), axis)| {
+                        named(key).or(axis.values.first()) == Some(value)
+                    })
+            };
+            number(self.rows.iter().find(matches)?, TRAFFIC)
+        };
+        if self.orders.is_empty() {
+            return vec![with(None)];
+        }
+        self.orders.iter().map(|o| with(Some(o))).collect()
+    }
+
+    /// A chart with one row for the base and one for each single change.
+    fn changes(&self) -> HBarChart {
+        let axes = self.report.file.one_at_a_time.iter();
+        let changes: Vec<Setting> = axes
+            .flat_map(|axis| axis.values.iter().map(|v| (axis.key.clone(), v.clone())))
+            .collect();
+        let row = |change| (change_title(change), self.values(None, change));
+        HBarChart {
+            title: format!("{}: one change at a time", self.scene),
+            value_label: value_label(),
+            series: self.series(),
+            rows: std::iter::once(None)
+                .chain(changes.iter().map(Some))
+                .map(row)
+                .collect(),
+            decimals: Some(2),
+        }
+    }
+
+    /// The settings that a chart of this axis holds fixed.
+    fn fixed(&self, axis: Option<&str>) -> String {
+        let varies = |key: &str| Some(key) == axis || (key == ORDER && !self.orders.is_empty());
+        let axes = self.report.file.axes.iter();
+        let fixed: Vec<String> = axes
+            .filter(|a| !varies(&a.key))
+            .filter_map(|a| Some(format!("{} = {}", a.key, plain(a.values.first()?))))
+            .collect();
+        match fixed.is_empty() {
+            true => "Held fixed: the base configuration.".to_owned(),
+            false => format!(
+                "Held fixed: {}; all else as in the base configuration.",
+                fixed.join(", ")
+            ),
+        }
+    }
+
+    /// A chart for each axis except the order, with the other axes at their first value: lines over
+    /// numbers, bars over names.
+    fn axes(&self) -> Result<Vec<(String, String)>, PlotError> {
+        let axes = self.report.file.axes.iter();
+        axes.filter(|a| a.key != ORDER && a.values.len() > 1)
+            .map(|axis| {
+                let numbers: Option<Vec<_>> = axis.values.iter().map(numeric).collect();
+                let svg = match numbers {
+                    Some(numbers) => self.lines(axis, &numbers).svg()?,
+                    None => self.bars(axis).svg()?,
+                };
+                Ok((svg, self.fixed(Some(&axis.key))))
+            })
+            .collect()
+    }
+
+    fn lines(&self, axis: &Axis, numbers: &[(f64, bool)]) -> LineChart {
+        let values: Vec<Vec<Option<f64>>> = (axis.values.iter())
+            .map(|v| self.values(Some((&axis.key, v)), None))
+            .collect();
+        let series = |(index, style): (usize, SeriesStyle)| {
+            let points = numbers.iter().zip(&values);
+            let mut points: Vec<(f64, f64)> = points
+                .filter_map(|((at, _), values)| Some((*at, values[index]?)))
+                .collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            LineSeries {
+                style,
+                points,
+                mark: Mark::Line,
+            }
+        };
+        let ends = |of: fn(f64, f64) -> f64| numbers.iter().map(|n| n.0).reduce(of).unwrap_or(0.0);
+        let (low, high) = (ends(f64::min), ends(f64::max));
+        let is_bytes = numbers.iter().all(|n| n.1) || axis.key.ends_with("_bytes");
+        let x = match (low > 0.0 && high >= 4.0 * low, is_bytes) {
+            (true, true) => lines::Axis::doublings(axis.key.clone(), Doublings::Bytes),
+            (true, false) => lines::Axis::doublings(axis.key.clone(), Doublings::Numbers),
+            (false, _) => lines::Axis::linear(axis.key.clone()),
+        };
+        LineChart {
+            title: format!("{}: {}", self.scene, axis.key),
+            x,
+            y: lines::Axis::linear(value_label()),
+            series: self.series().into_iter().enumerate().map(series).collect(),
+        }
+    }
+
+    fn bars(&self, axis: &Axis) -> BarChart {
+        BarChart {
+            title: format!("{}: {}", self.scene, axis.key),
+            value_label: value_label(),
+            group_label: axis.key.clone(),
+            series: self.series(),
+            groups: (axis.values.iter())
+                .map(|v| BarGroup {
+                    label: plain(v),
+                    values: self.values(Some((&axis.key, v)), None),
+                    marks: Vec::new(),
+                })
+                .collect(),
+            decimals: Some(2),
+            ..BarChart::default()
+        }
+    }
+}
+
+/// The schema of the JSON object.
+#[cfg(feature = "testing")]
+#[must_use]
+pub fn schema() -> formats::schemas::Published {
+    use crate::schemas::WithRows;
+    formats::schemas::Published::of::<SweepJson<'_, '_>>(SWEEP_SCHEMA)
+        .rows("rows", &crate::columns::headings(&SweepReport::columns()))
+}

@@ -1,0 +1,232 @@
+//! Results of stereo rendering techniques: table, JSON, CSV and page.
+
+mod columns;
+mod frusta;
+mod page;
+mod plots;
+mod published;
+
+pub use page::Scene;
+
+use super::columns::Records;
+use super::table::Table;
+use columns::{columns, order_columns};
+use formats::view::Lens;
+use published::{ClaimRow, claim_columns, claims};
+use serde::Serialize;
+use sim::config::{Order, RunConfig};
+use sim::model_version::MODEL_VERSION;
+use sim::result::TOOL;
+use studies::techniques::manifest::{Auto, Manifest};
+use studies::techniques::{Measured, Measures, OrderGain};
+
+/// Schema of the JSON object.
+pub const SCHEMA: &str = "replay.techniques/2";
+
+/// Measurements of the techniques on some scenes.
+pub struct TechniquesReport<'a> {
+    /// The scenes.
+    pub scenes: &'a [Measures<'a>],
+    /// Their manifests.
+    pub manifests: Vec<&'a Manifest>,
+    /// Caches, sampling and layout; its order is the order of the table.
+    pub config: RunConfig,
+    /// Orders of the replays.
+    pub orders: Vec<Order>,
+}
+
+/// The JSON object.
+#[derive(Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+struct TechniquesJson<'r, 'a> {
+    schema: &'a str,
+    tool: &'a str,
+    model_version: u32,
+    config: RunConfig,
+    scenes: Vec<SceneFacts<'a>>,
+    rows: Records<'r, 'a, &'a Measured<'a>>,
+    orders: Records<'r, 'a, OrderGain<'a>>,
+    published: Records<'r, 'static, ClaimRow<'a>>,
+}
+
+/// Facts about a scene, for the JSON.
+#[derive(Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+struct SceneFacts<'a> {
+    scene: &'a str,
+    path: Option<&'a str>,
+    frames: &'a [u32],
+    scene_triangles: u64,
+    instances: u64,
+    size_px: [u32; 2],
+    hmd: &'a str,
+    #[cfg_attr(feature = "testing", schemars(with = "[serde_json::Value; 2]"))]
+    lens: [Lens; 2],
+    pixels_per_degree: f32,
+    adapter: &'a str,
+    driver: &'a str,
+    software_driver: bool,
+    measured_by: &'a str,
+    baseline: &'a str,
+    auto: Option<&'a Auto>,
+}
+
+impl<'a> TechniquesReport<'a> {
+    /// The order whose saving is shown, and the order that it is compared with.
+    #[must_use]
+    fn gain_orders(&self) -> (Order, Order) {
+        let own = self.config.order;
+        let other = if own == Order::MORTON {
+            Order::Z2_STA
+        } else {
+            own
+        };
+        (other, Order::MORTON)
+    }
+
+    fn rows(&self) -> Vec<&'a Measured<'a>> {
+        self.scenes.iter().flat_map(|scene| &scene.rows).collect()
+    }
+
+    fn gains(&self) -> Vec<OrderGain<'a>> {
+        let (order, against) = self.gain_orders();
+        let scenes = self.scenes.iter();
+        scenes.flat_map(|s| s.order_gains(order, against)).collect()
+    }
+
+    /// Every figure of every technique.
+    #[must_use]
+    pub fn table(&self) -> Table {
+        let rows = self.rows();
+        let columns = columns(&rows, self.config.order);
+        Table::new(&columns, &rows).grouped_by(1)
+    }
+
+    /// The figures for a terminal.
+    #[must_use]
+    fn short_table(&self) -> Table {
+        let one = self.scenes.len() == 1;
+        let columns = columns::SHORT
+            .into_iter()
+            .filter(|key| !(one && *key == "scene"));
+        let table = self.table().picked(columns);
+        table.grouped_by(usize::from(!one))
+    }
+
+    /// Late frames at the refresh rates of displays.
+    #[must_use]
+    fn pacing_table(&self) -> Table {
+        let one = self.scenes.len() == 1;
+        let keys = columns::pacing_keys();
+        let keys = keys.iter().map(String::as_str);
+        let table = self
+            .table()
+            .picked(keys.filter(|key| !(one && *key == "scene")));
+        table.grouped_by(usize::from(!one))
+    }
+
+    /// Saving of an order with and without each technique.
+    #[must_use]
+    fn order_table(&self) -> Table {
+        let (order, against) = self.gain_orders();
+        let columns = order_columns(&self.orders, order, against);
+        Table::new(&columns, &self.gains()).grouped_by(1)
+    }
+
+    /// Published savings and the measured ones.
+    #[must_use]
+    fn claim_table(&self) -> Table {
+        Table::new(&claim_columns(), &claims(self.scenes)).without_empty_columns()
+    }
+
+    /// The tables for a terminal.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = self.short_table().text();
+        text += "\n";
+        text += &self.pacing_table().text();
+        let orders = self.order_table();
+        if !orders.rows.is_empty() {
+            text += "\n";
+            text += &orders.text();
+        }
+        let software = self.manifests.iter().find(|m| m.software_driver);
+        if let Some(manifest) = software {
+            text += &format!(
+                "\nframe times are a processor's: rendered by {}\n",
+                formats::text::printable(&manifest.adapter)
+            );
+        }
+        for manifest in &self.manifests {
+            if let Some(defect) = &manifest.multiview_defect {
+                text += &format!(
+                    "multiview was timed as separate views and counted as one submission: {}\n",
+                    formats::text::printable(defect)
+                );
+            }
+        }
+        text
+    }
+
+    /// Every figure in full precision.
+    #[must_use]
+    pub fn csv(&self) -> String {
+        self.table().csv()
+    }
+
+    /// As one JSON object.
+    ///
+    /// # Errors
+    /// A figure that is not finite.
+    pub fn json(&self) -> serde_json::Result<String> {
+        let rows = self.rows();
+        let (order, against) = self.gain_orders();
+        let gains = self.gains();
+        let claims = claims(self.scenes);
+        let order_columns = order_columns(&self.orders, order, against);
+        let columns = columns(&rows, self.config.order);
+        let facts = |(scene, m): (&'a Measures<'a>, &&'a Manifest)| SceneFacts {
+            scene: scene.scene,
+            path: m.path.as_deref(),
+            frames: &m.frames,
+            scene_triangles: m.scene_triangles,
+            instances: m.instances,
+            size_px: m.size_px,
+            hmd: &m.hmd.name,
+            lens: m.lens,
+            pixels_per_degree: m.pixels_per_degree,
+            adapter: &m.adapter,
+            driver: &m.driver,
+            software_driver: m.software_driver,
+            measured_by: &m.tool,
+            baseline: &m.baseline,
+            auto: m.auto.as_ref(),
+        };
+        serde_json::to_string_pretty(&TechniquesJson {
+            schema: SCHEMA,
+            tool: TOOL,
+            model_version: MODEL_VERSION,
+            config: self.config,
+            scenes: self.scenes.iter().zip(&self.manifests).map(facts).collect(),
+            rows: Records {
+                columns: &columns,
+                rows: &rows,
+            },
+            orders: Records {
+                columns: &order_columns,
+                rows: &gains,
+            },
+            published: Records {
+                columns: &claim_columns(),
+                rows: &claims,
+            },
+        })
+    }
+}
+
+/// The schema of the JSON object.
+#[cfg(feature = "testing")]
+#[must_use]
+pub fn schema() -> formats::schemas::Published {
+    formats::schemas::Published::of::<TechniquesJson<'_, '_>>(SCHEMA)
+}

@@ -1,0 +1,108 @@
+//! Reuse between the eyes and over time, frame by frame (`replay.temporal/1`).
+
+use super::columns::Column;
+use super::table::Table;
+use serde::Serialize;
+use sgrt::compose::Reuse;
+use sgrt::config::SgrtConfig;
+use sgrt::temporal::SchemeFigures;
+use sim::model_version::MODEL_VERSION;
+use sim::result::{TOOL, TraceId};
+
+/// Schema of the object that `replay temporal --json` prints.
+pub const SCHEMA: &str = "replay.temporal/1";
+
+/// The schemes on a frame.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+pub struct FrameSchemes {
+    /// The frame before it.
+    pub previous: TraceId,
+    /// The frame.
+    pub trace: TraceId,
+    /// What each scheme gives.
+    pub schemes: Vec<SchemeFigures>,
+}
+
+/// The schemes on all frames of a sequence but the first.
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+pub struct TemporalReport {
+    schema: &'static str,
+    tool: &'static str,
+    model_version: u32,
+    rule: String,
+    reuse: Reuse,
+    config: SgrtConfig,
+    frames: Vec<FrameSchemes>,
+}
+
+impl TemporalReport {
+    /// A report on frames that were run with these settings.
+    #[must_use]
+    pub fn new(frames: Vec<FrameSchemes>, rule: String, reuse: Reuse, config: SgrtConfig) -> Self {
+        Self {
+            schema: SCHEMA,
+            tool: TOOL,
+            model_version: MODEL_VERSION,
+            rule,
+            reuse,
+            config,
+            frames,
+        }
+    }
+
+    /// A row per frame and scheme.
+    #[rustfmt::skip]
+    #[must_use]
+    pub fn rows(&self) -> Table {
+        type Line<'a> = (&'a FrameSchemes, &'a SchemeFigures);
+        let columns = [
+            Column::text("frame", "frame", |l: &Line<'_>| l.0.trace.name.clone()),
+            Column::text("scheme", "scheme", |l: &Line<'_>| l.1.scheme.name()),
+            Column::real("left_reused_pct", "left reused", "%", 1, |l: &Line<'_>| l.1.reused_pct[0]),
+            Column::real("right_reused_pct", "right reused", "%", 1, |l: &Line<'_>| l.1.reused_pct[1]),
+            Column::text("rays", "rays", |l: &Line<'_>| l.1.rays),
+            Column::real("relative_performance", "performance", "ratio", 3, |l: &Line<'_>| l.1.relative_performance),
+            Column::real("relative_energy", "energy", "ratio", 3, |l: &Line<'_>| l.1.relative_energy),
+            Column::real("relative_energy_least", "14 nm, least", "ratio", 3, |l: &Line<'_>| l.1.relative_energy_bounds[0]),
+            Column::real("relative_energy_most", "14 nm, most", "ratio", 3, |l: &Line<'_>| l.1.relative_energy_bounds[1]),
+            Column::real("dram_mb", "DRAM", "MB", 2, |l: &Line<'_>| l.1.dram_bytes as f64 / 1e6),
+            Column::real("gbuffer_dram_mb", "of G-buffers", "MB", 2, |l: &Line<'_>| l.1.gbuffer_dram_bytes as f64 / 1e6),
+            Column::real("left_flip_mean", "left FLIP", "", 4, |l: &Line<'_>| l.1.flip_mean[0]),
+            Column::real("right_flip_mean", "right FLIP", "", 4, |l: &Line<'_>| l.1.flip_mean[1]),
+        ];
+        let lines: Vec<Line<'_>> = (self.frames.iter())
+            .flat_map(|frame| frame.schemes.iter().map(move |scheme| (frame, scheme)))
+            .collect();
+        Table::new(&columns, &lines)
+    }
+
+    /// The table for a terminal.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let schemes = "\
+full: both eyes are traced
+stereo: the right eye from the left one
+temporal: each eye from its previous frame
+both: the left eye from its previous frame, the right eye from the left one";
+        let reuse = super::sgrt::reuse_name(self.reuse);
+        let (rule, rows) = (&self.rule, self.rows().text());
+        format!("rule {rule}, reuse of {reuse}\n{schemes}\n\n{rows}")
+    }
+
+    /// One JSON object.
+    ///
+    /// # Errors
+    /// A figure that is not finite.
+    pub fn json(&self) -> serde_json::Result<String> {
+        Ok(serde_json::to_string_pretty(self)? + "\n")
+    }
+}
+
+/// The schema of the JSON.
+#[cfg(feature = "testing")]
+#[must_use]
+pub fn schema() -> formats::schemas::Published {
+    formats::schemas::Published::of::<TemporalReport>(SCHEMA)
+}

@@ -1,0 +1,307 @@
+//! Analyses a stream of lines.
+//!
+//! Every use of a line gets the next time on an axis. The number of lines whose last use is later than this
+//! line's is the number of distinct lines used since: its stack distance (Bennett & Kruskal 1975, Olken
+//! 1981), counted in O(log n). Immediate reuse changes nothing. A full axis is renumbered, so memory
+//! depends only on the number of distinct lines.
+
+use super::axis::{CountedTimes, Renumbering};
+use super::distances::Distances;
+use super::figures::Figures;
+use super::last_use::{LastUses, NEVER, Span};
+use super::opt;
+use super::place::{ByOrigin, Origin, Place, TileOfEye, add};
+use super::set_associative::{CacheHits, SetAssociative};
+use super::split::MissSplit;
+use super::working_set::WorkingSets;
+use sim::config::{ConfigError, LevelConfig, RunConfig, accept};
+use sim::memory::{AnyCache, Cache};
+
+/// The cache that receives a stream.
+#[derive(Clone, Copy, Debug)]
+pub struct StreamCache {
+    /// Size, ways and policy.
+    pub cache: LevelConfig,
+    /// `L1` or `L2`, for errors.
+    pub level: &'static str,
+    /// Bytes per line.
+    pub line_bytes: u32,
+    /// Seed of random replacement.
+    pub seed: u64,
+}
+
+/// Associativities in the curves.
+const WAYS: [u32; 5] = [1, 2, 4, 8, 16];
+
+/// Sizes in the curves: from 1/8 to 16 times the configured size, as powers of two.
+const SIZES: std::ops::RangeInclusive<i32> = -3..=4;
+
+/// Upper limit for the lines of all caches. The caches of the curves, up to sixteen times as large and of
+/// several associativities, then take about 800 MiB.
+const MOST_LINES: u64 = 1 << 21;
+
+/// Checks that memory suffices for the caches of a configuration with `first_levels` L1s.
+///
+/// # Errors
+/// Too many lines.
+pub(super) fn check_size(config: &RunConfig, first_levels: u32) -> Result<(), ConfigError> {
+    let lines = |cache: &LevelConfig| cache.size_bytes / u64::from(config.line_bytes);
+    let of_first = lines(&config.level.l1).saturating_mul(first_levels.into());
+    let found = of_first.saturating_add(lines(&config.level.l2));
+    accept(
+        found <= MOST_LINES,
+        "lines of all L1 and L2 caches",
+        "at most 2097152 for locality, whose curves extend to 16 times the size",
+        found,
+    )
+}
+
+/// Length of the first axis.
+const FIRST_AXIS: u32 = 1 << 16;
+
+/// An analysis in progress. Set the place with [`Self::at`], then add every line looked up there.
+pub struct Profile {
+    of: StreamCache,
+    cache: Box<dyn Cache>,
+    /// Capacity of the cache in lines.
+    lines: u32,
+
+    here: TileOfEye,
+    item: Option<u32>,
+    span: Span,
+    /// Number of tiles so far.
+    tiles: u32,
+
+    uses: LastUses,
+    /// Times of the last uses of all lines.
+    last_times: CountedTimes,
+    now: u32,
+    /// Length of the axis.
+    times: u32,
+    /// Start of the frame, on the axis and on the clock of tiles.
+    frame_start: u32,
+    frame_first: Span,
+
+    distances: Distances,
+    /// Immediate reuses.
+    at_once: ByOrigin,
+    split: MissSplit,
+    lru: SetAssociative,
+    opt: Vec<opt::FullyAssociative>,
+    opt_of_geometry: opt::SetAssociative,
+    working_sets: WorkingSets,
+    frame_lines: u64,
+    frame_lines_of_both_eyes: u64,
+    frame_lines_of_earlier_frames: u64,
+}
+
+impl Profile {
+    /// Largest size in the curves over the configured size rounded up to a power of two.
+    pub(super) const LARGEST_OVER_CONFIGURED: u64 = 1 << *SIZES.end();
+
+    /// An empty analysis.
+    ///
+    /// # Errors
+    /// An impossible cache.
+    pub fn new(of: StreamCache) -> Result<Self, ConfigError> {
+        Self::with_axis(of, FIRST_AXIS)
+    }
+
+    /// An analysis whose first axis has this length, a multiple of 64.
+    pub(super) fn with_axis(of: StreamCache, times: u32) -> Result<Self, ConfigError> {
+        let sets = of.cache.sets(of.level, of.line_bytes)?;
+        let ways = of.cache.ways;
+        let lines = sets * ways;
+        let mut sizes: Vec<u32> = SIZES
+            .filter_map(|power| match power {
+                0.. => lines.next_power_of_two().checked_shl(power as u32),
+                _ => Some(lines.next_power_of_two() >> -power),
+            })
+            .filter(|&size| size > 0)
+            .chain([lines])
+            .collect();
+        sizes.sort_unstable();
+        sizes.dedup();
+        let geometry = |size: u32, ways: u32| {
+            let fits = size.is_multiple_of(ways) && (size / ways).is_power_of_two();
+            fits.then(|| (size / ways, ways))
+        };
+        let of_sizes = sizes.iter().flat_map(|&size| {
+            let all = WAYS.into_iter().chain([ways]);
+            all.filter_map(move |ways| geometry(size, ways))
+        });
+        let opt = sizes.iter();
+        Ok(Self {
+            of,
+            cache: AnyCache::build(&of.cache, of.level, of.line_bytes, of.seed)?.into_box(),
+            lines,
+            here: TileOfEye::NONE,
+            item: None,
+            span: Span::new(1, 1),
+            tiles: 0,
+            uses: LastUses::default(),
+            last_times: CountedTimes::new(times),
+            now: 0,
+            times,
+            frame_start: 0,
+            frame_first: Span::new(1, 1),
+            distances: Distances::default(),
+            at_once: ByOrigin::default(),
+            split: MissSplit::default(),
+            lru: SetAssociative::new(of_sizes.chain([(sets, ways)]).collect()),
+            opt: opt
+                .map(|&size| opt::FullyAssociative::new(size, times))
+                .collect(),
+            opt_of_geometry: opt::SetAssociative::new(sets, ways),
+            working_sets: WorkingSets::default(),
+            frame_lines: 0,
+            frame_lines_of_both_eyes: 0,
+            frame_lines_of_earlier_frames: 0,
+        })
+    }
+
+    /// Empties all caches and returns the figures so far. What follows is analysed as a separate stream.
+    /// The configured cache is reused, because random replacement continues its sequence.
+    ///
+    /// # Errors
+    /// An impossible cache.
+    pub fn flush(&mut self) -> Result<Figures, ConfigError> {
+        let next = Self::with_axis(self.of, self.times)?;
+        let mut last = std::mem::replace(self, next);
+        std::mem::swap(&mut self.cache, &mut last.cache);
+        self.cache.clear();
+        Ok(last.finish())
+    }
+
+    /// Starts a frame. Caches keep their lines.
+    pub(super) fn begin_frame(&mut self) {
+        self.frame_start = self.now;
+        self.frame_first = Span::new(self.tiles + 1, 1);
+        self.item = None;
+    }
+
+    /// Sets the place of the following look-ups.
+    pub fn at(&mut self, place: &Place) {
+        self.here = TileOfEye::of(place);
+        if self.item.is_none_or(|item| place.item > item) {
+            self.item = Some(place.item);
+            self.span = Span::new(self.tiles + 1, place.tiles);
+            self.tiles = (self.tiles + place.tiles.clamp(1, 2)).min(Span::MOST_TILES);
+        }
+    }
+
+    /// Looks up a line in all caches, and fills it on a miss. Returns true for a hit in the configured cache.
+    pub fn access(&mut self, line: u32) -> bool {
+        if self.now == self.times {
+            self.renumber();
+        }
+        let hit = self.cache.access(line);
+        let last = self.uses.of(line);
+        let (before, place_before) = (last.time, last.place);
+        last.place = self.here;
+        if last.span != self.span || place_before != self.here {
+            if last.span < self.frame_first {
+                self.frame_lines += 1;
+                self.frame_lines_of_earlier_frames += u64::from(before != NEVER);
+            }
+            if let Some(eye) = self.here.eye() {
+                let [own, other] = [last.span_of_eye[eye], last.span_of_eye[1 - eye]];
+                let both = own < self.frame_first && other >= self.frame_first;
+                self.frame_lines_of_both_eyes += u64::from(both);
+            }
+            self.working_sets.used(last, self.here, self.span);
+        }
+        let now = self.now;
+        if before == NEVER {
+            last.time = now;
+            self.last_times.insert(now);
+            self.lru.access(line, None);
+            self.opt_of_geometry.access(line, None, now);
+            self.split.compulsory += 1;
+            self.now += 1;
+            return hit;
+        }
+        let in_this_frame = before >= self.frame_start;
+        let origin = Origin::of(place_before, in_this_frame, self.here).index();
+        if before + 1 == now && in_this_frame {
+            self.at_once[origin] += 1;
+            return hit;
+        }
+        last.time = now;
+        let distance = self.last_times.move_to_end(before, now);
+        self.distances.count(distance, origin, 1);
+        self.split.count(origin, hit, distance < self.lines);
+        self.lru.access(line, Some(origin));
+        for opt in &mut self.opt {
+            let kept = before + 1 == now || opt.reuse(before, now);
+            opt.hits[origin] += u64::from(kept);
+        }
+        let kept = self.opt_of_geometry.access(line, Some(before), now);
+        self.opt_of_geometry.hits[origin] += u64::from(kept);
+        self.now += 1;
+        hit
+    }
+
+    /// Removes all times from the axis that are no longer referenced.
+    #[cold]
+    fn renumber(&mut self) {
+        let opt_times = self.opt.iter().map(opt::FullyAssociative::times);
+        let numbers = Renumbering::new(&self.last_times, opt_times);
+        let room = (u64::from(numbers.len()) * 4).next_power_of_two();
+        let times = u32::try_from(room).unwrap_or(NEVER).max(self.times);
+        self.last_times = self.last_times.renumbered(&numbers, times);
+        for opt in &mut self.opt {
+            opt.renumber(&numbers, times);
+        }
+        self.opt_of_geometry.renumber(&numbers);
+        for line in self.uses.used() {
+            line.time = numbers.of(line.time);
+        }
+        self.frame_start = numbers.of(self.frame_start);
+        (self.now, self.times) = (numbers.len(), times);
+    }
+
+    /// The figures of all look-ups.
+    #[must_use]
+    pub fn finish(mut self) -> Figures {
+        for last in self.uses.used() {
+            self.working_sets.ended(last, self.tiles);
+        }
+        let mut distances = self.distances;
+        for (origin, &times) in self.at_once.iter().enumerate() {
+            distances.count(0, origin, times);
+        }
+        let mut split = self.split;
+        add(&mut split.hits_of_both, &self.at_once);
+        let reuses: u64 = distances.total().iter().sum();
+        let with_front = |hits: &ByOrigin| {
+            let mut hits = *hits;
+            add(&mut hits, &self.at_once);
+            hits
+        };
+        let opt = self.opt.iter().map(|opt| CacheHits {
+            lines: opt.lines.into(),
+            ways: None,
+            hits: with_front(&opt.hits),
+        });
+        let lru = self.lru.hits().into_iter().map(|cache| CacheHits {
+            hits: with_front(&cache.hits),
+            ..cache
+        });
+        Figures {
+            accesses: split.compulsory + reuses,
+            unique_lines: split.compulsory,
+            tiles: self.tiles.into(),
+            frame_lines: self.frame_lines,
+            frame_lines_of_both_eyes: self.frame_lines_of_both_eyes,
+            frame_lines_of_earlier_frames: self.frame_lines_of_earlier_frames,
+            split,
+            lru: lru.collect(),
+            opt: opt.collect(),
+            configured_lines: self.lines.into(),
+            opt_of_geometry: with_front(&self.opt_of_geometry.hits),
+            working_sets: self.working_sets.curve(self.tiles),
+            distances,
+        }
+    }
+}

@@ -1,0 +1,373 @@
+//! Replays every order with every pair of caches on every trace, and computes bounds.
+
+use super::row::{BASELINE, Bound, Of, Row, compare, row};
+use super::search::{Ground, Method};
+use super::{OrderFile, OrderFileError, bounds};
+use crate::experiment::{self, Plan, Point, RunError, Subject, frame_count};
+use formats::view::TILE_SIZE_PX;
+use rayon::prelude::*;
+use sim::config::{BetweenFrames, Order, RunConfig};
+use sim::engine::{ReplayError, Work};
+use sim::order::{Listed, PlanInputs, Views, views};
+use thiserror::Error;
+
+/// The subject of a study.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// The machine, except for cache sizes, order, and caches between frames.
+    pub base: RunConfig,
+    /// L1 and L2 sizes in bytes.
+    pub caches_bytes: Vec<(u64, u64)>,
+    /// What happens to caches between frames. Traces of one frame ignore it.
+    pub between: Vec<BetweenFrames>,
+    /// The orders, including the baseline.
+    pub orders: Vec<Order>,
+    /// Search methods for traces of one frame.
+    pub methods: Vec<Method>,
+    /// True if bounds are computed.
+    pub bounds: bool,
+}
+
+/// Reasons why a study fails.
+#[derive(Debug, Error)]
+pub enum StudyError {
+    /// A failed replay.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// A failed search or bound.
+    #[error("{label}: {error}")]
+    Replay {
+        /// The trace.
+        label: String,
+        /// The error.
+        error: ReplayError,
+    },
+    /// An invalid file of a searched order.
+    #[error("{file}: {error}")]
+    File {
+        /// The file.
+        file: String,
+        /// The error.
+        error: OrderFileError,
+    },
+}
+
+/// A searched order and its source.
+#[derive(Clone, Debug)]
+pub struct Searched {
+    /// The name of the file or of the search.
+    pub source: String,
+    /// The order.
+    pub file: OrderFile,
+}
+
+/// Traces, and the searched orders for each.
+pub struct Subjects<'a> {
+    /// The traces.
+    pub traces: &'a [Subject<'a>],
+    /// Orders from files.
+    pub files: Vec<Searched>,
+}
+
+impl Study {
+    /// Replays, searches and computes bounds. Returns the rows trace by trace and the searched orders. Calls
+    /// `done` with the number of replays of each step.
+    ///
+    /// # Errors
+    /// An impossible configuration, an unreadable trace, or a file whose order does not belong to its trace.
+    pub fn run<'a>(
+        &self,
+        subjects: &'a Subjects<'a>,
+        done: &(dyn Fn(u64) + Sync),
+    ) -> Result<(Vec<Row<'a>>, Vec<Searched>, Work), StudyError> {
+        let plan = self.plan(&self.orders);
+        let mut outcome = experiment::run(&plan, subjects.traces, None, done)?;
+        let mut work = std::mem::take(&mut outcome.work);
+        let mut of_traces: Vec<Vec<Row<'a>>> = Vec::new();
+        let all = outcome.rows();
+        let per_trace = plan.points.len().max(1);
+        for (subject, results) in subjects.traces.iter().zip(all.chunks(per_trace)) {
+            let offset_tiles = offset(subject, &self.base);
+            let mut rows = Vec::new();
+            for of_point in results {
+                rows.push(row(
+                    subject,
+                    offset_tiles,
+                    Of::Order(of_point.point.config.order),
+                    of_point.point.config,
+                    of_point.result.clone(),
+                ));
+            }
+            of_traces.push(rows);
+        }
+        let searched = self.searched(subjects)?;
+        let extra = of_traces
+            .par_iter_mut()
+            .zip(subjects.traces)
+            .map(|(rows, subject)| {
+                let works = self.add_searched(subject, &searched, rows, done)?;
+                if self.bounds {
+                    self.add_bounds(subject, rows)?;
+                }
+                compare(rows);
+                self.sort(rows);
+                Ok(works)
+            });
+        let extra: Result<Vec<Work>, StudyError> = extra.collect();
+        extra?.iter().for_each(|of_trace| work.add(of_trace));
+        Ok((of_traces.concat(), searched, work))
+    }
+
+    /// Every order with every pair of caches.
+    fn plan(&self, orders: &[Order]) -> Plan {
+        let mut points = Vec::new();
+        for &between_frames in &self.between {
+            for &(l1_bytes, l2_bytes) in &self.caches_bytes {
+                for &order in orders {
+                    let mut config = RunConfig {
+                        order,
+                        between_frames,
+                        ..self.base
+                    };
+                    config.level.l1.size_bytes = l1_bytes;
+                    config.level.l2.size_bytes = l2_bytes;
+                    points.push(Point {
+                        settings: Vec::new(),
+                        change: None,
+                        config,
+                    });
+                }
+            }
+        }
+        Plan {
+            base: self.base,
+            points,
+        }
+    }
+
+    /// Searches orders for all traces of one frame, and checks the orders from files.
+    fn searched(&self, subjects: &Subjects<'_>) -> Result<Vec<Searched>, StudyError> {
+        for searched in &subjects.files {
+            let of = subjects
+                .traces
+                .iter()
+                .find(|s| s.id.checksum == searched.file.trace);
+            if let Some(subject) = of {
+                let fail = |error| StudyError::File {
+                    file: searched.source.clone(),
+                    error,
+                };
+                searched.file.check(subject.source.tables()).map_err(fail)?;
+            }
+        }
+        let mut sizes: Vec<u64> = self.caches_bytes.iter().map(|(_, l2)| *l2).collect();
+        sizes.sort_unstable();
+        sizes.dedup();
+        let search = |subject: &Subject<'_>| -> Result<Vec<Searched>, StudyError> {
+            let fail = |error| StudyError::Replay {
+                label: subject.label.clone(),
+                error,
+            };
+            let frames = frame_count(subject.source.tables());
+            if self.methods.is_empty() || frames != 1 {
+                return Ok(Vec::new());
+            }
+            let start = self.start();
+            let Some(ground) = Ground::new(subject.source, start, first_frame(subject), &self.base)
+                .map_err(fail)?
+            else {
+                return Ok(Vec::new());
+            };
+            let jobs: Vec<(Method, u64)> = (self.methods.iter())
+                .flat_map(|method| sizes.iter().map(|size| (*method, *size)))
+                .collect();
+            let found = jobs.par_iter().map(|&(method, size)| {
+                let file = ground
+                    .search(method, size, &subject.id.checksum)
+                    .map_err(fail)?;
+                Ok(Searched {
+                    source: format!("{}.{}.{}k.order", subject.label, method.name(), size >> 10),
+                    file,
+                })
+            });
+            found.collect()
+        };
+        let found: Result<Vec<Vec<Searched>>, StudyError> =
+            subjects.traces.par_iter().map(search).collect();
+        let mut all = subjects.files.clone();
+        all.extend(found?.into_iter().flatten());
+        Ok(all)
+    }
+
+    /// The order from which searches start. It pairs tiles as the display needs it.
+    fn start(&self) -> Order {
+        Order::find("zig-zag+sta+offset").unwrap_or(BASELINE)
+    }
+
+    /// Replays the searched orders of a trace with the L2 for which they were searched.
+    fn add_searched<'a>(
+        &self,
+        subject: &'a Subject<'a>,
+        searched: &[Searched],
+        rows: &mut Vec<Row<'a>>,
+        done: &(dyn Fn(u64) + Sync),
+    ) -> Result<Work, StudyError> {
+        let offset_tiles = offset(subject, &self.base);
+        let mut points = Vec::new();
+        let mut names = Vec::new();
+        for Searched { source, file } in searched
+            .iter()
+            .filter(|of| of.file.trace == subject.id.checksum)
+        {
+            let fail = |error| StudyError::File {
+                file: source.clone(),
+                error,
+            };
+            let pass = file.check(subject.source.tables()).map_err(fail)?;
+            let listed = Listed {
+                pairs: vec![(pass, file.items.clone())],
+            };
+            let order = Order::listed(&file.name, self.start().parts(), listed);
+            let plan = self.plan(&[order]);
+            let of_size = plan
+                .points
+                .into_iter()
+                .filter(|point| point.config.level.l2.size_bytes == file.l2_bytes);
+            for point in of_size {
+                names.push(file.name.clone());
+                points.push(point);
+            }
+        }
+        let mut work = Work::default();
+        // Each configuration is run alone, because results are identified by the name of the order, which
+        // several files may share.
+        for (point, name) in points.into_iter().zip(names) {
+            let plan = Plan {
+                base: self.base,
+                points: vec![point],
+            };
+            let outcome = experiment::run(&plan, std::slice::from_ref(subject), None, done)?;
+            work.add(&outcome.work);
+            if let Some(of_point) = outcome.rows().first() {
+                rows.push(row(
+                    subject,
+                    offset_tiles,
+                    Of::Searched(name),
+                    of_point.point.config,
+                    of_point.result.clone(),
+                ));
+            }
+        }
+        Ok(work)
+    }
+
+    /// Adds the bounds for every pair of caches.
+    fn add_bounds<'a>(
+        &self,
+        subject: &'a Subject<'a>,
+        rows: &mut Vec<Row<'a>>,
+    ) -> Result<(), StudyError> {
+        let offset_tiles = offset(subject, &self.base);
+        let distinct_bytes = rows.first().map_or(0, |row| row.distinct_bytes);
+        let fail = |error| StudyError::Replay {
+            label: subject.label.clone(),
+            error,
+        };
+        let bound = |bound, config: RunConfig, bytes| Row {
+            subject,
+            offset_tiles,
+            of: Of::Bound(bound),
+            config,
+            cost: None,
+            external_bytes: bytes,
+            result: None,
+            baseline_bytes: 0,
+            baseline_cycles: None,
+            greedy_bytes: None,
+            distinct_bytes,
+        };
+        let of_baseline = rows.iter().filter(|row| row.is_baseline());
+        let configs: Vec<RunConfig> = of_baseline.map(|row| row.config).collect();
+        for &config in &configs {
+            rows.push(bound(Bound::Infinite, config, distinct_bytes));
+        }
+        if frame_count(subject.source.tables()) != 1 {
+            return Ok(());
+        }
+        let frame = first_frame(subject);
+        for order in [BASELINE, self.start()] {
+            let misses = bounds::opt(subject.source, order, frame, &configs).map_err(fail)?;
+            for (config, of_config) in configs.iter().zip(misses) {
+                let bytes = u64::from(config.line_bytes);
+                rows.push(bound(
+                    Bound::Opt(order),
+                    *config,
+                    of_config.fully_associative * bytes,
+                ));
+                rows.push(bound(
+                    Bound::OptWays(order),
+                    *config,
+                    of_config.set_associative * bytes,
+                ));
+            }
+        }
+        if let Some(ground) =
+            Ground::new(subject.source, self.start(), frame, &self.base).map_err(fail)?
+        {
+            for config in &configs {
+                let lines = config.level.l2.size_bytes / u64::from(config.line_bytes);
+                let lines = bounds::windows(ground.lines(), lines);
+                rows.push(bound(
+                    Bound::Windows,
+                    *config,
+                    lines * u64::from(config.line_bytes),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Sorts by caches, then orders as listed in the study, then searched orders, then bounds.
+    fn sort(&self, rows: &mut [Row<'_>]) {
+        let caches = |row: &Row<'_>| {
+            let between = self
+                .between
+                .iter()
+                .position(|of| *of == row.config.between_frames);
+            let sizes = (
+                row.config.level.l1.size_bytes,
+                row.config.level.l2.size_bytes,
+            );
+            (
+                between,
+                self.caches_bytes.iter().position(|of| *of == sizes),
+            )
+        };
+        let kind = |row: &Row<'_>| match &row.of {
+            Of::Order(order) => (0, self.orders.iter().position(|of| of == order)),
+            Of::Searched(_) => (1, None),
+            Of::Bound(_) => (2, None),
+        };
+        rows.sort_by_key(|row| (caches(row), kind(row)));
+    }
+}
+
+fn first_frame(subject: &Subject<'_>) -> u32 {
+    let passes = &subject.source.tables().passes;
+    passes.iter().map(|pass| pass.frame).min().unwrap_or(0)
+}
+
+/// Columns by which points at infinity are shifted between the eyes of the first frame.
+fn offset(subject: &Subject<'_>, config: &RunConfig) -> i32 {
+    let tables = subject.source.tables();
+    let inputs = PlanInputs {
+        tile_px: TILE_SIZE_PX,
+        ..PlanInputs::new(config, &tables.meta)
+    };
+    let pairs = views(&tables.passes, first_frame(subject)).into_iter();
+    let pair = pairs.into_iter().find_map(|phase| match phase {
+        Views::Pair(left, right) => Some([left, right]),
+        Views::One(_) => None,
+    });
+    pair.map_or(0, |eyes| inputs.offset(eyes)[0])
+}
