@@ -146,7 +146,6 @@ pub fn hierarchy(trace: &Raytrace) -> Result<Hierarchy> {
 }
 
 /// The values of rows, column by column in the order of [`Tabular::FIELDS`].
-#[must_use]
 pub fn columns_of<R: Tabular>(rows: &[R]) -> Vec<Values> {
     R::FIELDS
         .iter()

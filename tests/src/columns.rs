@@ -13,7 +13,6 @@ const NODES: u32 = 60;
 const TRIANGLES: u32 = 200;
 
 /// Tables of a trace with a small tree.
-#[must_use]
 pub fn column_tables(samples_per_px: u32, traversal: TraversalKind) -> RaytraceTables {
     let mut tables = ray_tables(samples_per_px, true);
     tables.bvh.traversal = traversal;
@@ -114,7 +113,6 @@ fn add_geometry(tile: &mut RayTile, random: &mut Random) {
 
 /// A ray trace with visits, geometry and the content of its hierarchy. Its columns are valid each by itself; they
 /// do not belong to one scene.
-#[must_use]
 pub fn column_trace(traversal: TraversalKind, seed: u64) -> Vec<u8> {
     column_trace_of(&column_tables(1, traversal), seed)
 }
@@ -123,7 +121,6 @@ pub fn column_trace(traversal: TraversalKind, seed: u64) -> Vec<u8> {
 ///
 /// # Panics
 /// The tables have another tree.
-#[must_use]
 pub fn column_trace_of(tables: &RaytraceTables, seed: u64) -> Vec<u8> {
     let mut random = Random(seed);
     let writer = RaytraceWriter::in_memory().expect("in memory");

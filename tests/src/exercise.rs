@@ -19,7 +19,6 @@ use replay::sgrt::loaded::LoadedTrace;
 ///
 /// # Panics
 /// A valid trace does not behave as one.
-#[must_use]
 pub fn exercise(bytes: Vec<u8>) -> bool {
     let Ok(trace) = Trace::from_bytes(bytes) else {
         return false;

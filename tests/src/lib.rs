@@ -11,7 +11,6 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// The workspace root.
-#[must_use]
 pub fn root() -> PathBuf {
     let manifest = Path::new(env!("CARGO_MANIFEST_DIR"));
     manifest.parent().expect("tests/ has a parent").to_owned()
@@ -21,7 +20,6 @@ pub fn root() -> PathBuf {
 ///
 /// # Panics
 /// The program is not built: `cargo test --workspace` builds it, `-p parallax-tests` does not.
-#[must_use]
 pub fn program(name: &str) -> Command {
     let test = std::env::current_exe().expect("a running test has a path");
     let profile = test
@@ -76,7 +74,6 @@ pub fn refuse(command: &mut Command, expected: &[&str]) -> Output {
 }
 
 /// Everything that a command printed: standard output, then standard error.
-#[must_use]
 pub fn said(output: &Output) -> String {
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     text(&output.stdout) + &text(&output.stderr)
@@ -86,7 +83,6 @@ pub fn said(output: &Output) -> String {
 ///
 /// # Panics
 /// `replay info` fails.
-#[must_use]
 pub fn encodings(trace: &Path) -> Vec<String> {
     let info = run_ok(program("replay").args(["info", "--json"]).arg(trace)).stdout;
     let info: serde_json::Value = serde_json::from_slice(&info).expect("JSON");
@@ -111,7 +107,6 @@ macro_rules! skipped {
 }
 
 /// Whether lavapipe is installed; prints a line on stderr if not.
-#[must_use]
 pub fn has_lavapipe() -> bool {
     let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
     let mut files = folders
@@ -128,7 +123,6 @@ pub fn has_lavapipe() -> bool {
 }
 
 /// Whether Chromium and lavapipe are installed; prints a line on stderr if not.
-#[must_use]
 pub fn has_chromium() -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
     let found = std::env::split_paths(&path).any(|folder| folder.join("chromium").is_file());
@@ -140,7 +134,6 @@ pub fn has_chromium() -> bool {
 
 /// Folder of the real test scenes (`PARALLAX_SCENES`, or `../shared/scenes` beside the checkout). Prints a
 /// line on stderr and returns `None` if the scene is absent.
-#[must_use]
 pub fn real_scene(relative: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("PARALLAX_SCENES")
         .map_or_else(|| root().join("../shared/scenes"), PathBuf::from);

@@ -25,7 +25,6 @@ impl Parts {
     ///
     /// # Panics
     /// The bytes are not a container.
-    #[must_use]
     pub fn of(bytes: &[u8]) -> Self {
         Self::read(bytes).expect("a sound container")
     }
@@ -102,13 +101,11 @@ impl Parts {
     }
 
     /// Number of families of tiles: 2 for a ray trace with geometry, else 1.
-    #[must_use]
     pub fn family_count(&self) -> usize {
         self.families().len()
     }
 
     /// The bytes of every slot of the index of the records, as far as they exist.
-    #[must_use]
     pub fn tiles(&mut self) -> Vec<Vec<u8>> {
         self.tiles_of(0)
     }
@@ -117,7 +114,6 @@ impl Parts {
     ///
     /// # Panics
     /// There is no such family.
-    #[must_use]
     pub fn tiles_of(&mut self, family: usize) -> Vec<Vec<u8>> {
         let (tiles, index, entry_bytes) = self.families()[family];
         let all = self.chunk(&tiles).clone();
@@ -195,7 +191,6 @@ impl Parts {
 
     /// The file with new checksums of chunks, directory and header. Chunks with a duplicate tag are left
     /// out, because no container can have them.
-    #[must_use]
     pub fn sealed(&self) -> Vec<u8> {
         let mut writer = ContainerWriter::in_memory(self.kind).expect("in memory");
         for (tag, bytes) in &self.chunks {
@@ -218,7 +213,6 @@ fn number(bytes: &[u8], at: usize, size: usize) -> usize {
 }
 
 /// CRC-32 as in zlib and PNG, computed byte by byte, independent of the library used by the traces.
-#[must_use]
 pub fn crc32(bytes: &[u8]) -> u32 {
     const TABLE: [u32; 256] = crc32_table();
     let step = |crc: u32, byte: &u8| crc >> 8 ^ TABLE[usize::from(crc as u8 ^ byte)];

@@ -63,7 +63,6 @@ fn meta(frames: u32) -> TraceMeta {
 }
 
 /// Tables of a texture trace: several groups, an untextured draw, two frames and a shadow map.
-#[must_use]
 pub fn texture_tables() -> Tables {
     let texture = |name: &str, size, levels, format| Texture {
         name: name.to_owned(),
@@ -144,7 +143,6 @@ pub fn texture_tables() -> Tables {
 }
 
 /// Tables of a trace of a program: the same, with features that scenes do not have.
-#[must_use]
 pub fn program_tables() -> Tables {
     let mut tables = texture_tables();
     tables.meta.program = Some(ProgramCapture {
@@ -201,7 +199,6 @@ pub fn program_tables() -> Tables {
 }
 
 /// Tables of a trace of a program with an anisotropic sampler, and with a texture that is a part of another one.
-#[must_use]
 pub fn shared_tables() -> Tables {
     let mut tables = program_tables();
     tables.samplers[1].max_anisotropy_256ths = 2560;
@@ -298,20 +295,17 @@ fn paired(draw: &Draw, records: &[QuadRecord]) -> Vec<QuadRecord> {
 }
 
 /// A texture trace; about a tile in three is untouched.
-#[must_use]
 pub fn texture_trace(encoding: Encoding, seed: u64) -> Vec<u8> {
     texture_trace_of(&texture_tables(), encoding, seed)
 }
 
 /// A texture trace with these tables.
-#[must_use]
 pub fn texture_trace_of(tables: &Tables, encoding: Encoding, seed: u64) -> Vec<u8> {
     let writer = TextraceWriter::in_memory(tables).expect("sound tables");
     with_tiles(writer, tables, encoding, &random_tiles(tables, seed))
 }
 
 /// A texture trace with the geometry of its draws, its passes and a shadow map.
-#[must_use]
 pub fn geometry_trace(seed: u64) -> Vec<u8> {
     let tables = &texture_tables();
     let mut random = Random(seed);
@@ -394,7 +388,6 @@ fn with_tiles(
 }
 
 /// Tables of a ray trace with triangles, materials and lights of every kind.
-#[must_use]
 pub fn ray_tables(samples_per_px: u32, has_visits: bool) -> RaytraceTables {
     let eye = |x: f32| EyeCamera {
         position: [x, 0.1, 0.0],
@@ -554,13 +547,11 @@ fn push_rays(tile: &mut RayTile, random: &mut Random) {
 }
 
 /// A ray trace.
-#[must_use]
 pub fn ray_trace(samples_per_px: u32, has_visits: bool, seed: u64) -> Vec<u8> {
     ray_trace_of(&ray_tables(samples_per_px, has_visits), seed)
 }
 
 /// A ray trace with these tables.
-#[must_use]
 pub fn ray_trace_of(tables: &RaytraceTables, seed: u64) -> Vec<u8> {
     let mut random = Random(seed);
     let mut writer = RaytraceWriter::in_memory().expect("in memory");
@@ -576,7 +567,6 @@ pub fn ray_trace_of(tables: &RaytraceTables, seed: u64) -> Vec<u8> {
 
 /// Traces of both kinds, with every encoding, with and without visits and optional columns, and with one or
 /// more samples per pixel.
-#[must_use]
 pub fn all() -> Vec<(String, Kind, Vec<u8>)> {
     let textures = Encoding::ALL.map(|encoding| {
         let name = format!("{encoding:?}").to_lowercase();

@@ -152,7 +152,6 @@ fn replay(subcommand: &str, trace: &str) -> Command {
 }
 
 /// `replay sweep` of [`write_inputs`]' experiment.
-#[must_use]
 pub fn sweep(inputs: &Path, folder: &Path) -> Command {
     let mut command = program("replay");
     command.arg("sweep").arg("--quiet");
@@ -201,7 +200,6 @@ impl Files {
     ///
     /// # Panics
     /// The folder is unreadable.
-    #[must_use]
     pub fn below(folder: &Path) -> Self {
         let mut files = Self::default();
         let mut open = vec![folder.to_owned()];

@@ -34,7 +34,6 @@ pub struct Capture {
 
 impl Capture {
     /// The arguments in one line, as in the recipes of golden traces.
-    #[must_use]
     pub fn recipe(&self) -> String {
         let words: Vec<_> = self.arguments.iter().map(|a| shell::quoted(a)).collect();
         words.join(" ")
@@ -42,13 +41,11 @@ impl Capture {
 
     /// Name of the recipe's file: the trace's name with `.recipe` appended, so that a texture trace and a ray
     /// trace with the same name have separate recipes.
-    #[must_use]
     pub fn recipe_file(&self) -> String {
         format!("{}.recipe", self.file)
     }
 
     /// Text of the recipe's file: the arguments and the checksum of the trace.
-    #[must_use]
     pub fn recipe_text(&self, checksum: u32) -> String {
         format!("{}\n# content checksum {checksum:08x}\n", self.recipe())
     }

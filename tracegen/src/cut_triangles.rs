@@ -56,7 +56,6 @@ impl CutTriangles {
     }
 
     /// A warning for each plane that cuts away at least a pixel.
-    #[must_use]
     pub fn warnings(&self, scene: &Scene) -> Vec<String> {
         let of = |plane: &Plane, which: &str, advice: &str| {
             let mesh = plane.mesh.filter(|_| plane.area_px >= 1.0)?;

@@ -98,7 +98,6 @@ impl UnstableTriangles {
     }
 
     /// Warnings, if unstable triangles may affect more than a share of the `fragments`.
-    #[must_use]
     pub fn warnings(&self, scene: &Scene, fragments: u64) -> Vec<String> {
         let mut warnings = Vec::new();
         let name = |kind: &Kind| {

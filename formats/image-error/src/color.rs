@@ -4,7 +4,6 @@
 const INVERSE_WHITE: [f32; 3] = [1.052_156_9, 1.0, 0.918_357_7];
 
 /// Linear value of an sRGB-encoded value, both 0 to 1.
-#[must_use]
 pub fn linear_from_srgb(value: f32) -> f32 {
     if value > 0.04045 {
         ((value + 0.055) / 1.055).powf(2.4)
@@ -14,7 +13,6 @@ pub fn linear_from_srgb(value: f32) -> f32 {
 }
 
 /// sRGB encoding of a linear value, clamped to 0..1; NaN becomes 0.
-#[must_use]
 pub fn srgb_from_linear(value: f32) -> f32 {
     let value = if value.is_nan() {
         0.0
@@ -29,13 +27,11 @@ pub fn srgb_from_linear(value: f32) -> f32 {
 }
 
 /// 8-bit sRGB code of a linear value.
-#[must_use]
 pub fn srgb8_from_linear(value: f32) -> u8 {
     (srgb_from_linear(value) * 255.0 + 0.5) as u8
 }
 
 /// CIE XYZ of linear RGB with sRGB primaries.
-#[must_use]
 pub fn xyz_from_linear([r, g, b]: [f32; 3]) -> [f32; 3] {
     [
         0.412_386_56 * r + 0.357_591_49 * g + 0.180_450_49 * b,
@@ -45,7 +41,6 @@ pub fn xyz_from_linear([r, g, b]: [f32; 3]) -> [f32; 3] {
 }
 
 /// Linear RGB of CIE XYZ.
-#[must_use]
 pub fn linear_from_xyz([x, y, z]: [f32; 3]) -> [f32; 3] {
     [
         3.241_003_3 * x - 1.537_398_9 * y - 0.498_615_86 * z,
@@ -55,14 +50,12 @@ pub fn linear_from_xyz([x, y, z]: [f32; 3]) -> [f32; 3] {
 }
 
 /// Opponent space of FLIP's contrast sensitivity filters (achromatic, red-green, blue-yellow).
-#[must_use]
 pub fn ycxcz_from_xyz(xyz: [f32; 3]) -> [f32; 3] {
     let [x, y, z] = relative_to_white(xyz);
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }
 
 /// Inverse of [`ycxcz_from_xyz`].
-#[must_use]
 pub fn xyz_from_ycxcz([yy, cx, cz]: [f32; 3]) -> [f32; 3] {
     let y = (yy + 16.0) / 116.0;
     let x = y + cx / 500.0;
@@ -75,7 +68,6 @@ pub fn xyz_from_ycxcz([yy, cx, cz]: [f32; 3]) -> [f32; 3] {
 }
 
 /// CIELAB of CIE XYZ.
-#[must_use]
 pub fn lab_from_xyz(xyz: [f32; 3]) -> [f32; 3] {
     const DELTA: f32 = 6.0 / 29.0;
     let f = |t: f32| {

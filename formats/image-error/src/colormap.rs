@@ -23,7 +23,6 @@ const MAGMA: [[u8; 3]; 17] = [
 ];
 
 /// Magma colour of a value, clamped to 0..1: black for no error, pale yellow for 1.
-#[must_use]
 pub fn magma(value: f32) -> [u8; 3] {
     let last = MAGMA.len() - 1;
     let value = if value.is_nan() {

@@ -16,7 +16,6 @@ pub const TILE_PX: usize = 32;
 ///
 /// `frames` are two consecutive frames, each with the reference and the test, all of the mask's size.
 /// `motion` is that of the references.
-#[must_use]
 pub fn flicker(frames: [[&Picture; 2]; 2], motion: &Motion, mask: &Mask) -> f64 {
     let [[before_reference, before], [after_reference, after]] = frames;
     let (width, height) = (before.width(), before.height());

@@ -37,19 +37,16 @@ pub struct FlipMap {
 
 impl FlipMap {
     /// Mean error.
-    #[must_use]
     pub fn mean(&self) -> f64 {
         crate::mean(&self.errors)
     }
 
     /// 99th percentile of the error.
-    #[must_use]
     pub fn p99(&self) -> f64 {
         f64::from(crate::quantile(&self.errors, 0.99))
     }
 
     /// The map in FLIP's usual colours.
-    #[must_use]
     pub fn picture(&self) -> Picture {
         Picture {
             size_px: self.size_px,
@@ -75,7 +72,6 @@ pub struct Prepared {
 
 impl Prepared {
     /// Filters a picture for viewing at a number of pixels per degree.
-    #[must_use]
     pub fn new(picture: &Picture, pixels_per_degree: f32) -> Self {
         let size = [picture.width(), picture.height()];
         let linear: [f32; 256] =
@@ -97,13 +93,11 @@ impl Prepared {
     }
 
     /// Pixels per degree used for the filters.
-    #[must_use]
     pub fn pixels_per_degree(&self) -> f32 {
         self.pixels_per_degree
     }
 
     /// Error map of a test picture against this reference, for pixels inside both pictures.
-    #[must_use]
     pub fn compare(&self, test: &Self) -> FlipMap {
         let largest = largest_color_distance();
         let errors = self
@@ -129,7 +123,6 @@ impl Prepared {
 }
 
 /// FLIP of a test picture against a reference.
-#[must_use]
 pub fn flip(reference: &Picture, test: &Picture, pixels_per_degree: f32) -> FlipMap {
     Prepared::new(reference, pixels_per_degree).compare(&Prepared::new(test, pixels_per_degree))
 }

@@ -29,7 +29,6 @@ pub struct Picture {
 
 impl Picture {
     /// A picture of one colour.
-    #[must_use]
     pub fn filled(size_px: [u32; 2], color: [u8; 3]) -> Self {
         let count = size_px[0] as usize * size_px[1] as usize;
         Self {
@@ -40,7 +39,6 @@ impl Picture {
 
     /// Encodes linear radiance: clamped to 0..1, sRGB transfer curve, rounded to 8 bits. Missing pixels are
     /// black.
-    #[must_use]
     pub fn from_linear(size_px: [u32; 2], linear: &[[f32; 3]]) -> Self {
         let mut picture = Self::filled(size_px, [0; 3]);
         picture
@@ -52,19 +50,16 @@ impl Picture {
     }
 
     /// Width in pixels.
-    #[must_use]
     pub fn width(&self) -> usize {
         self.size_px[0] as usize
     }
 
     /// Height in pixels.
-    #[must_use]
     pub fn height(&self) -> usize {
         self.size_px[1] as usize
     }
 
     /// Pictures side by side with gaps of `gap_px` black pixels; shorter ones are padded to the tallest.
-    #[must_use]
     pub fn side_by_side(pictures: &[&Self], gap_px: u32) -> Self {
         let height = pictures.iter().map(|p| p.size_px[1]).max().unwrap_or(0);
         let gaps = gap_px * (pictures.len().saturating_sub(1)) as u32;
@@ -84,7 +79,6 @@ impl Picture {
 
     /// The picture reduced by an integer factor until neither edge is longer than `longest_px`. Each pixel
     /// is the mean of the pixels it covers.
-    #[must_use]
     pub fn shrunk_to(&self, longest_px: u32) -> Self {
         let longest = self.size_px[0].max(self.size_px[1]);
         let factor = longest.div_ceil(longest_px.max(1)).max(1);
@@ -116,13 +110,11 @@ pub const PIXELS_PER_DEGREE: std::ops::RangeInclusive<f32> = 0.1..=1000.0;
 
 /// Pixels per degree at the centre of an eye's image: `(W/2) / tan(h/2) * pi/180`, with the mean of the
 /// horizontal half-angle tangents for off-axis frusta.
-#[must_use]
 pub fn pixels_per_degree(width_px: u32, fov: &FovTangents) -> f32 {
     width_px as f32 / (fov.left + fov.right) * std::f32::consts::PI / 180.0
 }
 
 /// The value that a share `q` (0 to 1) of the values does not exceed (nearest rank).
-#[must_use]
 pub fn quantile(values: &[f32], q: f64) -> f32 {
     if values.is_empty() {
         return 0.0;
@@ -133,7 +125,6 @@ pub fn quantile(values: &[f32], q: f64) -> f32 {
 }
 
 /// Mean of the values, summed in order in double precision, so that it does not depend on threads.
-#[must_use]
 pub fn mean(values: &[f32]) -> f64 {
     if values.is_empty() {
         return 0.0;

@@ -77,7 +77,6 @@ pub struct Motion {
 
 impl Motion {
     /// Finds the motion between two pictures of the same size.
-    #[must_use]
     pub fn between(before: &Picture, now: &Picture) -> Self {
         let mut levels = vec![[Level::of(before), Level::of(now)]];
         while let Some([a, b]) = levels.last()
@@ -109,7 +108,6 @@ impl Motion {
     }
 
     /// Vector from a pixel to the previous position of its content.
-    #[must_use]
     pub fn vector(&self, [x, y]: [usize; 2]) -> [f32; 2] {
         let block = y / BLOCK_PX * self.columns + x / BLOCK_PX;
         self.vectors.get(block).copied().unwrap_or_default()

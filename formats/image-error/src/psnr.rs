@@ -6,7 +6,6 @@ use crate::Picture;
 pub const IDENTICAL_DB: f64 = 100.0;
 
 /// `10 log10(255^2 / MSE)` over all pixels and channels, at most [`IDENTICAL_DB`].
-#[must_use]
 pub fn psnr_db(reference: &Picture, test: &Picture) -> f64 {
     let channels = |p: &Picture| 3 * p.pixels.len();
     let count = channels(reference).min(channels(test));
@@ -22,7 +21,6 @@ pub fn psnr_db(reference: &Picture, test: &Picture) -> f64 {
 
 /// Ratio over several pictures of the same size, from their ratios: the decibels of the mean squared error.
 /// A mean of decibels would hide a bad picture among identical ones.
-#[must_use]
 pub fn pooled_db(of_pictures: impl IntoIterator<Item = f64>) -> f64 {
     let (mut sum, mut pictures) = (0.0, 0_u32);
     for db in of_pictures {

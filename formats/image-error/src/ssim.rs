@@ -10,7 +10,6 @@ const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
 
 /// Mean SSIM over all pixels of the Rec. 709 luma (on sRGB codes), with the original's 11x11 Gaussian
 /// window of deviation 1.5. Windows are cut and renormalised at the edges.
-#[must_use]
 pub fn ssim(reference: &Picture, test: &Picture) -> f64 {
     if reference.pixels.is_empty() || reference.size_px != test.size_px {
         return if reference == test { 1.0 } else { 0.0 };

@@ -17,13 +17,11 @@ pub struct Mask {
 
 impl Mask {
     /// A mask in which all pixels count.
-    #[must_use]
     pub fn everything(size_px: [u32; 2]) -> Self {
         Self::of(size_px, |_| true)
     }
 
     /// The pixels of an eye's picture whose centres the lens shows.
-    #[must_use]
     pub fn of_lens(size_px: [u32; 2], fov: &FovTangents, lens: &Lens) -> Self {
         Self::of(size_px, |pixel| lens.pixel_visible(fov, size_px, pixel))
     }
@@ -100,13 +98,11 @@ impl Reference {
     }
 
     /// The picture.
-    #[must_use]
     pub fn picture(&self) -> &Picture {
         &self.picture
     }
 
     /// The pixels that count.
-    #[must_use]
     pub fn mask(&self) -> &Mask {
         &self.mask
     }

@@ -106,7 +106,6 @@ fn declare_named(value: &OsStr) {
 }
 
 /// The file of a program: a path, or a name that is looked for in the folders of `PATH`.
-#[must_use]
 pub fn find_program(name: &OsStr) -> Option<PathBuf> {
     let is_path = name.as_encoded_bytes().contains(&b'/');
     let folders = match std::env::var_os("PATH").filter(|_| !is_path) {

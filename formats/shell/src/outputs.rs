@@ -24,19 +24,16 @@ enum Kind {
 
 impl Output {
     /// Text output, named by a flag.
-    #[must_use]
     pub fn text(flag: &'static str, path: &Path) -> Self {
         Self::new(flag, path, Kind::Text)
     }
 
     /// A trace or picture, named by a flag.
-    #[must_use]
     pub fn binary(flag: &'static str, path: &Path) -> Self {
         Self::new(flag, path, Kind::Binary)
     }
 
     /// The command's result in another form, selected by a flag such as `--json`.
-    #[must_use]
     pub fn result(flag: &'static str) -> Self {
         Self::new(flag, Path::new("-"), Kind::Result)
     }
@@ -47,7 +44,6 @@ impl Output {
     }
 
     /// Path of the output.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }

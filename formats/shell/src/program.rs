@@ -113,7 +113,6 @@ fn parse<C: Parser>() -> (C, ArgMatches) {
 }
 
 /// An error and its causes in one line. Causes that the error's own text repeats are skipped.
-#[must_use]
 pub fn described(error: &anyhow::Error) -> String {
     error.chain().fold(String::new(), |text, cause| {
         let cause = cause.to_string();

@@ -36,7 +36,6 @@ struct Stage {
 
 impl Progress {
     /// Starts a stage of `total` units; 0 if their number is unknown.
-    #[must_use]
     pub fn new(name: &str, total: u64, unit: &'static str) -> Self {
         let is_terminal = io::stderr().is_terminal();
         let interval = if is_terminal {

@@ -117,7 +117,6 @@ pub struct Piece {
 /// a set's preparation once. Returns the pieces of each shard.
 ///
 /// `preparation[set]` is the cost of a set for each shard with pieces of it.
-#[must_use]
 pub fn balanced(pieces: &[Piece], preparation: &[u64], count: u32) -> Vec<Range<usize>> {
     let line = Line::new(pieces, preparation);
     let end = pieces.len();

@@ -56,7 +56,6 @@ const SUBMIT_AFTER: &str = r#"    after=$(sbatch --parsable "$@" --array=0 --dep
 
 impl SlurmArray<'_> {
     /// The script. `sh FILE` submits it, as arrays and as a last job, which is task 0.
-    #[must_use]
     pub fn script(&self) -> String {
         let name: String = self
             .name
@@ -129,7 +128,6 @@ pub fn absolute(path: &Path) -> anyhow::Result<String> {
 }
 
 /// Quotes a word for a shell.
-#[must_use]
 pub fn quoted(word: &str) -> Cow<'_, str> {
     let plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,+@".contains(c);
     if !word.is_empty() && word.chars().all(plain) {

@@ -27,7 +27,6 @@ struct SweepRow {
 /// The schema of the JSON object.
 /// The schema of the JSON.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<Report>(SCHEMA)
 }
@@ -52,14 +51,12 @@ impl Report {
     }
 
     /// Points beyond their bounds without the expected warning.
-    #[must_use]
     pub fn broken(&self) -> usize {
         let points = self.sweeps.iter().flat_map(|row| &row.points);
         points.filter(|p| p.outcome == Outcome::Broken).count()
     }
 
     /// One line per sweep, then a table of points per sweep.
-    #[must_use]
     pub fn markdown(&self) -> String {
         let mut text = String::from(
             "# Numerical stress\n\nCaptures against a reference (see each sweep). Within: the error keeps the bound. Warned: it does not, \

@@ -78,7 +78,6 @@ pub struct Distances(pub Vec<f32>);
 
 impl Distances {
     /// Mean, 99th percentile and maximum; zeros if there are none.
-    #[must_use]
     pub fn summary(&self) -> [f64; 3] {
         let mut values = self.0.clone();
         let count = values.len();
@@ -148,19 +147,16 @@ impl Agreement {
     }
 
     /// Fragments that only one side has.
-    #[must_use]
     pub fn only(&self, side: Side) -> u64 {
         self.only[side as usize].iter().sum()
     }
 
     /// Differences of a class.
-    #[must_use]
     pub fn of_class(&self, class: Class) -> u64 {
         self.only.iter().map(|side| side[class as usize]).sum()
     }
 
     /// Common fragments over all fragments.
-    #[must_use]
     pub fn coverage_iou(&self) -> f64 {
         let all = self.both + self.only(Side::Reference) + self.only(Side::Capture);
         if all == 0 {

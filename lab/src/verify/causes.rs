@@ -66,7 +66,6 @@ impl UvCause {
     ];
 
     /// Description for reports.
-    #[must_use]
     pub fn text(self) -> &'static str {
         match self {
             Self::Small => "within 1/64 texel",
@@ -90,7 +89,6 @@ impl SampleCause {
     ];
 
     /// Description for reports.
-    #[must_use]
     pub fn text(self) -> &'static str {
         match self {
             Self::Formula => "the LOD formula",
@@ -120,7 +118,6 @@ pub struct FragmentCoordinates<'a> {
 impl FragmentCoordinates<'_> {
     /// The cause of a difference between the coordinates of a record and the true ones; `error` is captured
     /// minus true, in repeats.
-    #[must_use]
     pub fn of_uv(&self, record: &QuadRecord, error: DVec2) -> UvCause {
         let texels = |uv: DVec2| (uv * self.extent).length();
         if texels(error) <= SMALL {
@@ -160,7 +157,6 @@ impl FragmentCoordinates<'_> {
     /// The cause of different levels or texels than expected. `reads` returns whether given coordinates and a
     /// level of detail would read what was captured; `lods` are the captured and the expected level. In
     /// comparisons with the specification, the driver's formula and derivatives are causes.
-    #[must_use]
     pub fn of_sample(
         &self,
         texture: &Texture,

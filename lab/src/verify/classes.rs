@@ -48,7 +48,6 @@ impl Class {
     ];
 
     /// Its cause, for reports.
-    #[must_use]
     pub fn cause(self) -> &'static str {
         match self {
             Self::Edge => "edges within 1/128 px: vertices rounded to 1/256 px",
@@ -68,7 +67,6 @@ fn side(piece: &Piece, pixel: [u32; 2]) -> Side {
 }
 
 /// The class of a fragment of a primitive at a pixel of a tile, which only one side has.
-#[must_use]
 pub fn classify(
     geometry: &Geometry<'_>,
     tile: usize,

@@ -87,7 +87,6 @@ pub struct ColourCheck<'a> {
 
 impl ColourCheck<'_> {
     /// Compares the visible pixels of a tile; `texels` holds the driver's texels of the textures in `slot`.
-    #[must_use]
     pub fn tile(
         &self,
         geometry: &Geometry<'_>,

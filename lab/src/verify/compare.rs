@@ -77,7 +77,6 @@ pub(super) fn lanes(tile: &Tile) -> Vec<Lane> {
 
 impl Comparison<'_> {
     /// Compares one tile with the reference's fragments, which are returned as well.
-    #[must_use]
     pub fn tile(
         &self,
         geometry: &Geometry<'_>,

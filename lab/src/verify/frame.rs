@@ -129,7 +129,6 @@ impl<'a> CaptureUnderTest<'a> {
     }
 
     /// Passes of the frames, each with the position of its frame.
-    #[must_use]
     pub fn passes(&self) -> Vec<(usize, &'a Pass, Eye, usize)> {
         let passes = self.trace.tables().passes.iter().enumerate();
         passes

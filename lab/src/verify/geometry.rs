@@ -30,7 +30,6 @@ pub struct Geometry<'a> {
 
 impl<'a> Geometry<'a> {
     /// Projects the draws; tiles for which `wanted` is false stay empty.
-    #[must_use]
     pub fn new(
         scene: &'a Scene,
         draws: &'a DrawList,
@@ -137,37 +136,31 @@ impl<'a> Geometry<'a> {
     }
 
     /// A piece by its index.
-    #[must_use]
     pub fn piece(&self, index: u32) -> &Piece {
         &self.pieces[index as usize]
     }
 
     /// The draw of a piece.
-    #[must_use]
     pub fn call(&self, piece: &Piece) -> &'a DrawCall {
         &self.draws.calls[piece.draw as usize]
     }
 
     /// The material of a piece.
-    #[must_use]
     pub fn material(&self, piece: &Piece) -> &'a Material {
         &self.scene.materials[self.call(piece).material]
     }
 
     /// Slots of the material's uv groups.
-    #[must_use]
     pub fn groups(&self, piece: &Piece) -> &'a [Vec<TextureSlot>] {
         &self.draws.groups[self.call(piece).material].groups
     }
 
     /// Number of the piece's primitive in the trace.
-    #[must_use]
     pub fn primitive(&self, piece: &Piece) -> u32 {
         self.call(piece).first_primitive + piece.number
     }
 
     /// The texture coordinates of a piece for sampling `texture`.
-    #[must_use]
     pub fn coordinates(&self, piece: &'a Piece, texture: &TextureRef) -> Coordinates<'a> {
         let mesh = &self.scene.meshes[self.call(piece).mesh];
         let set = if texture.uv_set == 1 {
@@ -216,7 +209,6 @@ impl<'a> Geometry<'a> {
     }
 
     /// Alpha of the vertex colours at a point; 1 without colours.
-    #[must_use]
     pub fn vertex_alpha(&self, piece: &Piece, p: DVec2) -> f64 {
         let mesh = &self.scene.meshes[self.call(piece).mesh];
         if mesh.colors.is_empty() {
@@ -268,14 +260,12 @@ impl Coordinates<'_> {
     }
 
     /// Coordinates at a point of the screen.
-    #[must_use]
     pub fn at(&self, p: DVec2) -> DVec2 {
         let (uv, one) = self.fraction(p);
         uv / one
     }
 
     /// Coordinates with their exact derivatives at a point.
-    #[must_use]
     pub fn exact(&self, p: DVec2) -> Sampled {
         let (above, below) = self.fraction(p);
         let uv = above / below;
@@ -292,7 +282,6 @@ impl Coordinates<'_> {
 
     /// Coordinates at a pixel, with the differences in its quad that drivers use as derivatives: of the left
     /// column and the top row (the bottom row in softpipe), or a lane's own.
-    #[must_use]
     pub fn in_quad(&self, pixel: [u32; 2], formula: LodFormula) -> Sampled {
         let quad = quad_center(pixel);
         let lane = center(pixel) - quad;
@@ -310,7 +299,6 @@ impl Coordinates<'_> {
 
     /// Coordinates of a pixel according to its quad's record, if the driver uses the same differences for the
     /// whole quad like softpipe: extrapolated from the `first` covered lane.
-    #[must_use]
     pub fn without_cross(&self, pixel: [u32; 2], first: u32) -> DVec2 {
         let quad = self.in_quad(pixel, LodFormula::Softpipe);
         let start = quad_center(pixel) + DVec2::new((first & 1).into(), (first >> 1).into());
@@ -320,7 +308,6 @@ impl Coordinates<'_> {
 
     /// Error in single precision at a point: a few units in the last place of the largest terms of the plane
     /// equations of numerator and denominator.
-    #[must_use]
     pub fn interpolation_error(&self, p: DVec2) -> DVec2 {
         let (above, below) = self.fraction(p);
         let (mut terms, mut term) = (above.abs(), below.abs());
@@ -334,13 +321,11 @@ impl Coordinates<'_> {
     }
 
     /// The denominator.
-    #[must_use]
     pub fn piece(&self) -> &Piece {
         self.piece
     }
 
     /// The same coordinates over another piece of the primitive.
-    #[must_use]
     pub fn on<'p>(&self, piece: &'p Piece) -> Coordinates<'p> {
         Coordinates {
             piece,

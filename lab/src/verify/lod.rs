@@ -12,7 +12,6 @@ fn size(texture: &Texture) -> DVec2 {
 
 /// Level of detail before clamping, from derivatives in units of the texture: `log2(rho)`, where rho is the
 /// longer derivative in texels, or a driver's approximation.
-#[must_use]
 pub fn level_of_detail(at: &Sampled, texture: &Texture, formula: LodFormula) -> f64 {
     let (dx, dy) = (at.dx * size(texture), at.dy * size(texture));
     let longest = dx.length_squared().max(dy.length_squared());
@@ -31,7 +30,6 @@ pub fn level_of_detail(at: &Sampled, texture: &Texture, formula: LodFormula) -> 
 }
 
 /// A level of detail clamped to the texture's levels.
-#[must_use]
 pub fn clamped(lod: f64, texture: &Texture) -> f64 {
     // Not a number if the derivatives are not.
     lod.max(0.0)

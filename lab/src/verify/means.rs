@@ -90,13 +90,11 @@ impl Bias {
     }
 
     /// Mean divided by its bound.
-    #[must_use]
     pub fn share(&self) -> f64 {
         self.mean_texels.abs() / self.bound_texels
     }
 
     /// Whether the mean exceeds its bound.
-    #[must_use]
     pub fn is_systematic(&self) -> bool {
         self.share() > 1.0
     }
@@ -118,7 +116,6 @@ impl Means {
     }
 
     /// Every mean by draw and group, then by texture.
-    #[must_use]
     pub fn biases(&self, tables: &Tables) -> Vec<Bias> {
         let mut found = Vec::new();
         let mut of_texture = BTreeMap::<u32, [Mean; COLUMNS.len()]>::new();

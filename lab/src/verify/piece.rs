@@ -242,13 +242,11 @@ fn edge(a: [i64; 2], b: [i64; 2], p: [i64; 2]) -> i128 {
 }
 
 /// The centre of a pixel.
-#[must_use]
 pub fn center(pixel: [u32; 2]) -> DVec2 {
     DVec2::new(f64::from(pixel[0]), f64::from(pixel[1])) + 0.5
 }
 
 /// The centre of the top left pixel of a pixel's quad.
-#[must_use]
 pub fn quad_center(pixel: [u32; 2]) -> DVec2 {
     center(pixel.map(|v| v & !1))
 }
@@ -284,7 +282,6 @@ impl Piece {
     }
 
     /// Whether a pixel's centre is covered, by the top-left rule.
-    #[must_use]
     pub fn covers(&self, pixel: [u32; 2]) -> bool {
         self.edges(pixel).into_iter().all(|(value, [x, y])| {
             let (top, left) = (y == 0 && x > 0, y < 0);
@@ -293,7 +290,6 @@ impl Piece {
     }
 
     /// Distance in pixels of a pixel's centre to the nearest edge's line, negative outside.
-    #[must_use]
     pub fn distance_px(&self, pixel: [u32; 2]) -> f64 {
         let distance = |(value, [x, y]): (i128, [i64; 2])| {
             let length = (x as f64).hypot(y as f64).max(1.0);
@@ -333,7 +329,6 @@ impl Piece {
     }
 
     /// Shortest height in pixels; below 1/256, rounding of the vertices decides what is drawn.
-    #[must_use]
     pub fn height_px(&self) -> f64 {
         let [a, b, c] = self.corners.map(|c| c.at);
         let longest = (b - a).length().max((c - b).length()).max((a - c).length());
@@ -341,14 +336,12 @@ impl Piece {
     }
 
     /// Largest distance of its corners from the screen's upper left corner along an axis.
-    #[must_use]
     pub fn largest_px(&self) -> f64 {
         let largest = self.corners.map(|c| c.at.abs().max_element());
         largest.into_iter().fold(0.0, f64::max)
     }
 
     /// The piece with one corner moved, as if the vertex were rounded differently.
-    #[must_use]
     pub fn moved(&self, corner: usize, by_px: DVec2) -> Self {
         let mut moved = *self;
         moved.corners[corner].at += by_px;
@@ -366,7 +359,6 @@ impl Piece {
     /// The triangles that a driver may draw instead of it at the screen's border: drivers clip there, and
     /// each triangulates the rest in its own order. Only triangles that may contain a point, within 1/128
     /// pixel.
-    #[must_use]
     pub fn cut_at_border(&self, size_px: [u32; 2], p: DVec2) -> Vec<Self> {
         let polygon = clip_to_screen(&self.corners, size_px);
         let mut found = Vec::new();
@@ -392,7 +384,6 @@ impl Piece {
     }
 
     /// Depth at a point of the screen, 0 to 1.
-    #[must_use]
     pub fn depth(&self, p: DVec2) -> f64 {
         let weights = self.screen_weights(p);
         weights
@@ -404,7 +395,6 @@ impl Piece {
 
     /// Error in single precision of the depth at a point: a few units in the last place of the largest term
     /// of the plane's equation, and the errors of the vertices' depths and places.
-    #[must_use]
     pub fn depth_error(&self, p: DVec2) -> f64 {
         let here = self.depth(p);
         let slope = DVec2::new(
@@ -421,7 +411,6 @@ impl Piece {
     }
 
     /// Distance to the corner that is farthest from a point along an axis.
-    #[must_use]
     pub fn farthest_px(&self, p: DVec2, axis: usize) -> f64 {
         let away = self.corners.map(|c| (c.at[axis] - p[axis]).abs());
         away.into_iter().fold(0.0, f64::max)
@@ -429,7 +418,6 @@ impl Piece {
 
     /// Weights of the primitive's vertices over w at a point of the screen: linear in the point, and
     /// perspective-correct weights when divided by their sum.
-    #[must_use]
     pub fn weights_over_w(&self, p: DVec2) -> DVec3 {
         let weights = self.screen_weights(p);
         (weights.iter().zip(&self.corners))

@@ -61,7 +61,6 @@ impl Plane {
 impl Coordinates<'_> {
     /// The largest bound of [`Self::single_precision`] at points around a fragment, over the triangles that
     /// clipping at the screen's border may have created: the planes of thin ones lose digits.
-    #[must_use]
     pub fn single_precision_cut<const N: usize>(
         &self,
         fragment: DVec2,
@@ -80,7 +79,6 @@ impl Coordinates<'_> {
 
     /// Error of coordinates at a point of the screen in single precision, in repeats: moved vertices,
     /// interpolation, the texture's transform, and the record's sums. Infinite if there is no bound.
-    #[must_use]
     pub fn single_precision(&self, p: DVec2) -> DVec2 {
         let corners = self.piece().corners();
         let set = self.set();

@@ -26,7 +26,6 @@ pub struct Fragment {
 }
 
 /// Renders a tile; fragments come in submission order.
-#[must_use]
 pub fn render_tile(
     geometry: &Geometry<'_>,
     tile: usize,

@@ -236,7 +236,6 @@ struct Colour {
 /// The schema of the JSON object.
 /// The schema of the JSON.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<Report>(SCHEMA)
 }
@@ -251,7 +250,6 @@ fn share(part: u64, whole: u64) -> f64 {
 
 impl Report {
     /// The report of a verified frame of a scene; `seed` is that of a sample of tiles.
-    #[must_use]
     pub fn new(scene: &str, tables: &Tables, verified: &Verified, seed: Option<u64>) -> Self {
         let Agreement {
             both,
@@ -315,13 +313,11 @@ impl Report {
     }
 
     /// All differences that a correct capture does not have.
-    #[must_use]
     pub fn failures(&self) -> &[String] {
         &self.failures
     }
 
     /// Lines for a terminal.
-    #[must_use]
     pub fn table(&self) -> String {
         let Coverage {
             both,

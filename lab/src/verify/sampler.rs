@@ -29,7 +29,6 @@ pub enum Decoder {
 
 impl<'a> SoftwareSampler<'a> {
     /// A sampler of `set`.
-    #[must_use]
     pub fn new(set: &'a TextureSet) -> Self {
         Self {
             set,
@@ -44,7 +43,6 @@ impl<'a> SoftwareSampler<'a> {
     }
 
     /// The texture of an image, if it has blocks.
-    #[must_use]
     pub fn texture(&self, image: usize) -> Option<&'a CompressedTexture> {
         let index = (*self.set.of_image.get(image)?)?;
         self.set
@@ -54,7 +52,6 @@ impl<'a> SoftwareSampler<'a> {
     }
 
     /// A filtered colour: linear red, green, blue, and alpha.
-    #[must_use]
     pub fn sample(
         &self,
         texture: &CompressedTexture,
@@ -227,7 +224,6 @@ fn polynomial_of_srgb(v: f64) -> f64 {
 }
 
 /// The inverse of [`linear_of_srgb`].
-#[must_use]
 pub fn srgb_of_linear(v: f64) -> f64 {
     if v <= 0.003_130_8 {
         v * 12.92

@@ -34,7 +34,6 @@ enum Place {
 
 impl Shadows {
     /// Of a frame's cascades.
-    #[must_use]
     pub fn new(cascades: &[Cascade]) -> Self {
         let half = DVec3::new(SIZE / 2.0, -SIZE / 2.0, 1.0);
         let start = DVec3::new(SIZE / 2.0, SIZE / 2.0, 0.0);
@@ -51,7 +50,6 @@ impl Shadows {
     }
 
     /// Number of cascades.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.cascades.len()
     }

@@ -24,7 +24,6 @@ struct Quad {
 
 /// The tile that a capture without rounding would have written. Look-ups of shadow maps, which the reference
 /// does not make, are copied from the captured tile where both cover them.
-#[must_use]
 pub fn reference_tile(
     geometry: &Geometry<'_>,
     tables: &Tables,

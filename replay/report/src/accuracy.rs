@@ -75,7 +75,6 @@ impl Measured {
     }
 
     /// One row per choice and scene, with times.
-    #[must_use]
     pub fn table(&self) -> Table {
         Table::new(&self.columns(true), &self.choices)
             .grouped_by(1)
@@ -105,7 +104,6 @@ impl Measured {
     }
 
     /// Chart of time against error; `None` if no choice has both.
-    #[must_use]
     pub fn chart(&self) -> Option<ScatterChart> {
         let names = self.names();
         let mut named: Vec<(&str, (f64, f64))> = Vec::new();
@@ -181,7 +179,6 @@ struct StudyJson<'a> {
 
 impl AccuracyReport {
     /// The recommended choice of each study and its error, optionally with its time.
-    #[must_use]
     pub fn advice(&self, times: bool) -> Table {
         let advice: Vec<Advice<'_>> = (self.studies.iter())
             .map(|measured| {
@@ -227,7 +224,6 @@ impl AccuracyReport {
     }
 
     /// Every value of every choice, one per line.
-    #[must_use]
     pub fn choices_csv(&self) -> String {
         type Line<'a> = (&'a Study, &'a Choice, usize);
         let lines: Vec<Line<'_>> = (self.studies.iter())
@@ -249,7 +245,6 @@ impl AccuracyReport {
     }
 
     /// Times over the reference's time, as CSV. They differ from run to run.
-    #[must_use]
     pub fn times_csv(&self) -> String {
         type Line<'a> = (&'a Study, &'a Choice);
         let lines: Vec<Line<'_>> = (self.studies.iter())
@@ -304,7 +299,6 @@ impl AccuracyReport {
 
     /// The rows of the table of errors on reports: mean and maximum of each contribution, and the scenes on
     /// which they were measured. `size` adds the image size to a scene's name.
-    #[must_use]
     pub fn errors(&self, command: &str, size: &dyn Fn(&str) -> String) -> Vec<KnownError> {
         let mut errors = Vec::new();
         for figure in headline_figures() {
@@ -409,7 +403,6 @@ fn section(measured: &Measured) -> Result<Markup, PlotError> {
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<AccuracyJson<'_>>(ACCURACY_SCHEMA)
 }

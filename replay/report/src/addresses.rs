@@ -191,14 +191,12 @@ pub fn json(input: &str, outcome: &Outcome) -> serde_json::Result<String> {
 }
 
 /// An outcome as CSV, one row per configuration.
-#[must_use]
 pub fn csv(outcome: &Outcome) -> String {
     Table::new(&columns(), &rows(outcome)).csv()
 }
 
 /// An outcome as text: the counts of accesses, then the levels of a single configuration or one row for
 /// each of several.
-#[must_use]
 pub fn text(input: &str, outcome: &Outcome) -> String {
     let of = Accesses::new(&outcome.totals, outcome.unique_lines);
     let mut text = format!(
@@ -254,7 +252,6 @@ const SEVERAL: [&str; 8] = [
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     use crate::schemas::WithRows;
     formats::schemas::Published::of::<AddressesJson<'_, Vec<serde_json::Value>>>(SCHEMA)

@@ -16,7 +16,6 @@ fn traffic(pct: f64) -> String {
 
 /// Orders against a baseline: names, and the percentage of the baseline's traffic that each saves. `over`
 /// says what the means are taken over.
-#[must_use]
 pub(super) fn tile_orders(baseline: &str, over: &str, orders: &[(String, f64)]) -> Vec<String> {
     let Some((worst, best)) = ends(orders, |o| o.1) else {
         return vec![format!(
@@ -63,7 +62,6 @@ pub(super) fn tile_orders(baseline: &str, over: &str, orders: &[(String, f64)]) 
 pub type Effect = (String, Vec<(String, f64)>);
 
 /// The points of a sweep with their traffic in MB per frame, and the axes.
-#[must_use]
 pub fn sweep(points: &[(String, f64)], effects: &[Effect]) -> Vec<String> {
     let Some((least, most)) = ends(points, |p| p.1) else {
         return vec!["No point was replayed.".to_owned()];
@@ -126,7 +124,6 @@ pub struct Misses {
 }
 
 /// The misses of one stream.
-#[must_use]
 pub fn misses(cache: &str, rows: &[Misses]) -> Option<String> {
     let (least, most) = ends(rows, |r| r.miss_pct)?;
     let bound = format!("{:.2} % under optimal replacement", least.opt_pct);
@@ -163,7 +160,6 @@ pub(super) struct Studied {
 }
 
 /// A study of orders and bounds against a baseline, over `rows` pairs of trace and caches.
-#[must_use]
 pub(super) fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<String> {
     let compare = |order: &Studied| match traffic(order.change_pct).as_str() {
         "as much" => format!("{} reads as much from memory as {baseline}", order.name),
@@ -220,7 +216,6 @@ pub struct Reprojected {
 }
 
 /// Performance, energy and error of reprojection.
-#[must_use]
 pub fn reprojected(scenes: &[Reprojected]) -> Vec<String> {
     if scenes.is_empty() {
         return Vec::new();
@@ -317,7 +312,6 @@ impl Timed {
 }
 
 /// Techniques of one scene, without the baseline.
-#[must_use]
 pub fn timed(scene: &str, techniques: &[Timed]) -> Vec<String> {
     let fastest = |without_error: bool| {
         let of = techniques
@@ -363,7 +357,6 @@ pub fn timed(scene: &str, techniques: &[Timed]) -> Vec<String> {
 
 /// Recommended choices: study, time over the reference's, mean error with its unit. A choice that is the
 /// reference itself has no error.
-#[must_use]
 pub fn recommended(studies: &[(String, Option<f64>, bool)]) -> Vec<String> {
     if studies.is_empty() {
         return vec!["No study had its inputs.".to_owned()];

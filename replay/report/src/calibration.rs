@@ -63,7 +63,6 @@ impl Row for SceneFit {
 
 impl CalibrationReport {
     /// Chooses the best trial.
-    #[must_use]
     pub fn new(base: RunConfig, objective: Objective, trials: Vec<Trial>) -> Self {
         let known = (trials.iter().enumerate()).filter_map(|(i, t)| Some((i, t.chosen_by?)));
         let chosen = known
@@ -89,7 +88,6 @@ impl CalibrationReport {
     }
 
     /// The trials, best first, and the figures of the chosen one by scene.
-    #[must_use]
     pub fn text(&self) -> String {
         let mut trials: Vec<&Trial> = self.trials.iter().collect();
         let rank = |trial: &Trial| trial.chosen_by.unwrap_or(f64::MAX);
@@ -120,7 +118,6 @@ impl CalibrationReport {
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<CalibrationReport>(CALIBRATION_SCHEMA)
 }

@@ -82,7 +82,6 @@ impl<T: Into<Self>> From<Option<T>> for Value {
 
 impl Value {
     /// The number, if it is one.
-    #[must_use]
     pub fn number(&self) -> Option<f64> {
         match self {
             Self::Whole(n) => Some(*n as f64),
@@ -92,7 +91,6 @@ impl Value {
     }
 
     /// In full precision, for CSV.
-    #[must_use]
     pub fn exact(&self) -> String {
         match self {
             Self::None => String::new(),
@@ -133,7 +131,6 @@ pub enum Show {
 
 impl Show {
     /// The cell of a table.
-    #[must_use]
     pub fn write(self, value: &Value) -> String {
         let fixed = |x: f64, decimals: usize| {
             // Values that round to negative zero print without a sign.
@@ -181,7 +178,6 @@ pub struct Heading {
 impl Heading {
     /// Name of the group of columns in tables of a page: the part of the key before the dot, unless one is
     /// set.
-    #[must_use]
     pub(super) fn group_name(&self) -> String {
         match (self.group.is_empty(), self.key.split_once('.')) {
             (false, _) => self.group.to_string(),
@@ -191,13 +187,11 @@ impl Heading {
     }
 
     /// Name in CSV and Parquet files.
-    #[must_use]
     pub(super) fn flat_key(&self) -> String {
         self.key.replace('.', "_")
     }
 
     /// Definition and unit, for the axis of a chart.
-    #[must_use]
     pub(super) fn axis_label(&self) -> String {
         format!("{}, {}", self.about, self.unit)
     }
@@ -219,18 +213,31 @@ impl<'a, R: ?Sized> Column<'a, R> {
         show: Show,
         value: impl Fn(&R) -> V + 'a,
     ) -> Self {
+        let value = Box::new(move |row: &R| value(row).into());
+        Self::of_kind(key.into(), name.into(), unit, V::KIND, show, value)
+    }
+
+    /// The part of `new` that is compiled once, not for every closure.
+    fn of_kind(
+        key: Cow<'static, str>,
+        name: Cow<'static, str>,
+        unit: &'static str,
+        kind: Kind,
+        show: Show,
+        value: Box<dyn Fn(&R) -> Value + 'a>,
+    ) -> Self {
         Self {
             heading: Heading {
-                key: key.into(),
-                name: name.into(),
+                key,
+                name,
                 unit,
-                kind: V::KIND,
+                kind,
                 show,
                 about: "",
                 group: Cow::Borrowed(""),
                 published: false,
             },
-            value: Box::new(move |row| value(row).into()),
+            value,
         }
     }
 
@@ -266,28 +273,24 @@ impl<'a, R: ?Sized> Column<'a, R> {
     }
 
     /// Sets the definition of the figure.
-    #[must_use]
     pub fn about(mut self, about: &'static str) -> Self {
         self.heading.about = about;
         self
     }
 
     /// Sets the group of columns in tables of a page.
-    #[must_use]
     pub fn group(mut self, group: impl Into<Cow<'static, str>>) -> Self {
         self.heading.group = group.into();
         self
     }
 
     /// Sets the type of the values where the function's return type does not determine it.
-    #[must_use]
     pub fn kind(mut self, kind: Kind) -> Self {
         self.heading.kind = kind;
         self
     }
 
     /// Marks published figures.
-    #[must_use]
     pub fn published(mut self) -> Self {
         self.heading.published = true;
         self
@@ -306,7 +309,6 @@ pub trait Row {
 }
 
 /// The columns with these keys, in the order of `keys`. Skips a key that no column has; debug builds panic.
-#[must_use]
 pub fn pick<R: Row>(keys: &[&str]) -> Vec<Column<'static, R>> {
     let mut all: Vec<Option<Column<R>>> = R::columns().into_iter().map(Some).collect();
     let mut take = |key: &&str| {

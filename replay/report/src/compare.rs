@@ -141,7 +141,6 @@ impl CompareReport<'_> {
     }
 
     /// As tables for a terminal.
-    #[must_use]
     pub fn text(&self) -> String {
         let mut text = String::new();
         for (name, side) in ["A", "B"].iter().zip(&self.sides) {
@@ -194,7 +193,6 @@ impl CompareReport<'_> {
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     use crate::schemas::WithRows;
     formats::schemas::Published::of::<CompareJson<'_, '_>>(COMPARE_SCHEMA)

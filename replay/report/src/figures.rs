@@ -178,13 +178,11 @@ impl Row for ResultRow<'_> {
 }
 
 /// The figure with this key.
-#[must_use]
 pub fn figure<'a>(key: &str) -> Option<Figure<'a>> {
     pick(&[key]).pop()
 }
 
 /// A row's figure with this key, if it is a number.
-#[must_use]
 pub fn number(row: &ResultRow, key: &str) -> Option<f64> {
     figure(key)?.value(row).number()
 }

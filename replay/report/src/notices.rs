@@ -24,7 +24,6 @@ pub fn print(file: &Path, notices: &[String]) {
 }
 
 /// Sentences of the notices that were printed, sorted.
-#[must_use]
 pub fn printed() -> Vec<String> {
     let printed = PRINTED.lock().unwrap_or_else(PoisonError::into_inner);
     let sentences = printed.iter();

@@ -81,7 +81,6 @@ impl EmbeddedPicture {
     }
 
     /// The picture as a `data:` address.
-    #[must_use]
     pub(super) fn data_uri(&self) -> String {
         data_uri::jpeg(&self.jpeg)
     }

@@ -127,7 +127,6 @@ fn geometric_mean(values: impl Iterator<Item = f64>) -> f64 {
 
 impl ReadingsReport {
     /// Compares the readings with the paper's values. The readings of all scenes are the same.
-    #[must_use]
     pub fn new(scenes: Vec<SceneReadings>, config: SgrtConfig) -> Self {
         let readings = scenes.first().map_or(&[][..], |scene| &scene.readings);
         let fit = |(index, (reading, _)): (usize, &(Reading, Figures))| {
@@ -212,7 +211,6 @@ impl ReadingsReport {
 
     /// A row per reading and scene.
     #[rustfmt::skip]
-    #[must_use]
     pub fn rows(&self) -> Table {
         struct Cell<'a> { fit: &'a Fit, scene: &'a SceneReadings, chosen: bool }
         let figures = |c: &Cell| c.scene.readings[c.fit.index].1;
@@ -296,7 +294,6 @@ impl ReadingsReport {
     }
 
     /// The tables for a terminal.
-    #[must_use]
     pub fn text(&self) -> String {
         let mut out = self.sentences().join(" ") + "\n\nReadings\n" + &self.fits().text();
         if let Some(index) = self.chosen {
@@ -410,7 +407,6 @@ impl ReadingsReport {
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<ReadingsReport>(SCHEMA)
 }

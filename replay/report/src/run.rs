@@ -63,7 +63,6 @@ pub fn json(row: &ResultRow) -> serde_json::Result<String> {
 }
 
 /// Results as CSV, one row each.
-#[must_use]
 pub fn csv(rows: &[ResultRow]) -> String {
     let mut columns = super::config_columns::trace();
     columns.extend(super::config_columns::config());
@@ -73,7 +72,6 @@ pub fn csv(rows: &[ResultRow]) -> String {
 
 /// One result as tables: levels, views, the figures of the whole replay, the draws or (if `by_texture`) the
 /// textures with most misses, and tiles if they were counted.
-#[must_use]
 pub fn text(row: &ResultRow, by_texture: bool) -> String {
     let ResultRow { result, point, .. } = row;
     let config = &point.config;
@@ -258,7 +256,6 @@ pub fn modes_json(timed: &ResultRow, functional: &ResultRow) -> serde_json::Resu
 }
 
 /// Both modes of a point side by side.
-#[must_use]
 pub fn modes_text(timed: &ResultRow, functional: &ResultRow) -> String {
     let cell = |(.., unit, decimals, value): &Measure, row: &ResultRow| {
         let scale = if unit.starts_with('%') { 100.0 } else { 1.0 };
@@ -330,14 +327,12 @@ fn tiles(maps: &[TileMap]) -> String {
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<RunJson<'_>>(RUN_SCHEMA)
 }
 
 /// The schema of the JSON object of both modes.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn modes_schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<ModesJson<'_>>(MODES_SCHEMA)
 }

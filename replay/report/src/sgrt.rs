@@ -142,7 +142,6 @@ struct ReprojectJson<'a> {
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<ReprojectJson<'_>>(sgrt::result::SCHEMA)
 }
@@ -163,7 +162,6 @@ pub fn json(report: &Report, pretty: bool) -> serde_json::Result<String> {
 }
 
 /// The tables for a terminal.
-#[must_use]
 pub fn text(entries: &[Entry]) -> String {
     let mut out = String::new();
     let mut part = |title: &str, table: String| {

@@ -75,7 +75,6 @@ fn change_title(change: Option<&Setting>) -> String {
 
 impl<'a> SweepReport<'a> {
     /// The outcome of a file's plan.
-    #[must_use]
     pub fn new(file: &'a ExperimentFile, outcome: &'a Outcome<'a>) -> Self {
         Self {
             file,
@@ -129,19 +128,16 @@ impl<'a> SweepReport<'a> {
     }
 
     /// The rows in full precision.
-    #[must_use]
     pub fn rows(&self) -> Table {
         Table::new(&Self::columns(), &self.rows)
     }
 
     /// The rows as CSV.
-    #[must_use]
     pub fn csv(&self) -> String {
         self.rows().csv()
     }
 
     /// The rows as a table, grouped by trace and change.
-    #[must_use]
     pub fn table(&self) -> Table {
         let mut columns = vec![Figure::text("label", "scene", |r| r.subject.label.clone())];
         if !self.file.one_at_a_time.is_empty() {
@@ -422,7 +418,6 @@ impl<'a> Charts<'a> {
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     use crate::schemas::WithRows;
     formats::schemas::Published::of::<SweepJson<'_, '_>>(SWEEP_SCHEMA)

@@ -68,7 +68,6 @@ pub fn json(
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<PlanJson<'_>>(PLAN_SCHEMA)
 }

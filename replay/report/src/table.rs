@@ -44,7 +44,6 @@ impl Table {
     }
 
     /// The columns with these keys, in the order of `keys`. Skips unknown keys.
-    #[must_use]
     pub(super) fn picked<'k>(&self, keys: impl IntoIterator<Item = &'k str>) -> Self {
         let at = |key: &str| self.headings.iter().position(|h| h.key == key);
         let columns: Vec<usize> = keys.into_iter().filter_map(at).collect();
@@ -58,7 +57,6 @@ impl Table {
     }
 
     /// The rows with this text in the cell under `key`.
-    #[must_use]
     pub fn only(&self, key: &str, text: &str) -> Self {
         let column = self.headings.iter().position(|h| h.key == key);
         let same = |row: &&Vec<Value>| column.is_some_and(|c| row[c].exact() == text);
@@ -84,7 +82,6 @@ impl Table {
     }
 
     /// The cells as text.
-    #[must_use]
     pub fn cells(&self) -> Vec<Vec<String>> {
         let cell = |(value, heading): (&Value, &Heading)| {
             printable(&heading.show.write(value)).into_owned()
@@ -100,7 +97,6 @@ impl Table {
     }
 
     /// As text for a terminal. Lines are not wrapped, so the output can be piped and compared.
-    #[must_use]
     pub fn text(&self) -> String {
         let names = self
             .headings
@@ -152,9 +148,19 @@ impl Table {
         self.headings.chunk_by(same).map(group).collect()
     }
 
+    /// The columns with their units and meanings, as a list.
+    pub fn meanings(&self) -> Markup {
+        html! {
+            dl.note {
+                @for h in self.headings.iter().filter(|h| !h.about.is_empty()) {
+                    dt { (h.name) @if !h.unit.is_empty() { ", " (h.unit) } } dd { (h.about) }
+                }
+            }
+        }
+    }
+
     /// As HTML in a scrolling box with fixed headings and a fixed first column. The page's script adds
     /// sorting, filtering and a choice of columns.
-    #[must_use]
     pub(super) fn markup(&self) -> Markup {
         let class = |heading: &Heading| match (heading.show == Show::Text, heading.published) {
             (false, true) => "num paper",
@@ -221,7 +227,6 @@ impl Table {
     }
 
     /// As CSV (RFC 4180) in full precision, with the columns' keys as headings. Names are no formulas.
-    #[must_use]
     pub fn csv(&self) -> String {
         let mut csv = csv::Writer::from_writer(Vec::new());
         let keys = self.headings.iter().map(Heading::flat_key);

@@ -39,7 +39,6 @@ pub struct TemporalReport {
 
 impl TemporalReport {
     /// A report on frames that were run with these settings.
-    #[must_use]
     pub fn new(frames: Vec<FrameSchemes>, rule: String, reuse: Reuse, config: SgrtConfig) -> Self {
         Self {
             schema: SCHEMA,
@@ -54,7 +53,6 @@ impl TemporalReport {
 
     /// A row per frame and scheme.
     #[rustfmt::skip]
-    #[must_use]
     pub fn rows(&self) -> Table {
         type Line<'a> = (&'a FrameSchemes, &'a SchemeFigures);
         let columns = [
@@ -79,7 +77,6 @@ impl TemporalReport {
     }
 
     /// The table for a terminal.
-    #[must_use]
     pub fn text(&self) -> String {
         let schemes = "\
 full: both eyes are traced
@@ -102,7 +99,6 @@ both: the left eye from its previous frame, the right eye from the left one";
 
 /// The schema of the JSON.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<TemporalReport>(SCHEMA)
 }

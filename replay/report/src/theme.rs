@@ -19,7 +19,6 @@ pub(super) const SERIES: [RGBColor; 8] = [
 ];
 
 /// The plotting library's form of a colour.
-#[must_use]
 pub const fn color([red, green, blue]: Rgb) -> RGBColor {
     RGBColor(red, green, blue)
 }
@@ -49,7 +48,6 @@ pub(super) const LINE_PX: u32 = 2;
 /// Upper estimate of the width of `text` at `size_px`, in pixels.
 ///
 /// The viewer's font is unknown; these advance widths bound those of common system fonts.
-#[must_use]
 pub(super) fn text_width_px(text: &str, size_px: u32) -> f64 {
     let em: f64 = text
         .chars()
@@ -66,7 +64,6 @@ pub(super) fn text_width_px(text: &str, size_px: u32) -> f64 {
 
 /// Names of at most `most` characters that all differ. The middle of a long name is left out, and names
 /// that would read the same get a number.
-#[must_use]
 pub fn distinct<S: AsRef<str>>(names: &[S], most: usize) -> Vec<String> {
     let mut out: Vec<String> = Vec::with_capacity(names.len());
     // The part that differs should stay, so as much of the end is kept as of the start, then less and less.
@@ -107,7 +104,6 @@ pub fn distinct<S: AsRef<str>>(names: &[S], most: usize) -> Vec<String> {
 /// `low..=high`. The result is in the order of `wishes`.
 ///
 /// Labels that do not all fit keep the gap and exceed `high`.
-#[must_use]
 pub fn spread(wishes: &[f64], gap: f64, low: f64, high: f64) -> Vec<f64> {
     let mut by_position: Vec<usize> = (0..wishes.len()).collect();
     by_position.sort_by(|&a, &b| wishes[a].total_cmp(&wishes[b]).then(a.cmp(&b)));
@@ -143,7 +139,6 @@ pub fn spread(wishes: &[f64], gap: f64, low: f64, high: f64) -> Vec<f64> {
 }
 
 /// Puts a thin space between groups of three digits before the point.
-#[must_use]
 pub(super) fn group_thousands(number: &str) -> String {
     let (sign, rest) = match number.strip_prefix('-') {
         Some(rest) => ("-", rest),

@@ -79,7 +79,6 @@ impl AddressInput {
     }
 
     /// The file of `--addresses`; `None` for standard input.
-    #[must_use]
     pub fn file(&self) -> Option<&Path> {
         self.addresses
             .as_deref()
@@ -101,7 +100,6 @@ impl AddressInput {
     }
 
     /// The kinds of accesses to process.
-    #[must_use]
     pub fn kinds(&self) -> KindSet {
         let kind = |name: &KindName| match name {
             KindName::Read => AccessKind::Read,
@@ -140,7 +138,6 @@ pub(super) fn two_levels_only(config: &RunConfig, place: &str) -> Result<()> {
 }
 
 /// Display name of an address file.
-#[must_use]
 pub fn name_of(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
     name.to_string_lossy().into_owned()

@@ -249,7 +249,6 @@ impl ConfigArgs {
     }
 
     /// The machine of `--preset`.
-    #[must_use]
     pub fn preset(&self) -> Option<Preset> {
         self.preset
     }
@@ -275,7 +274,6 @@ impl ConfigArgs {
 
     /// The first flag given that applies only to tiles, textures or the texture unit, and so not to plain
     /// addresses.
-    #[must_use]
     pub(super) fn first_of_traces(&self) -> Option<&'static str> {
         let flags = [
             ("--preset", self.preset.is_some()),
@@ -315,13 +313,11 @@ impl ConfigArgs {
     }
 
     /// The parts of `--count-by`, if given.
-    #[must_use]
     pub(super) fn counts_by(&self) -> Option<CountBy> {
         self.count_by
     }
 
     /// The file of `--config`.
-    #[must_use]
     pub fn file(&self) -> Option<&Path> {
         self.config.as_deref()
     }

@@ -131,7 +131,6 @@ impl ExperimentArgs {
     }
 
     /// True if the page shows pictures.
-    #[must_use]
     pub(super) fn has_pictures(&self) -> bool {
         !self.images.is_empty()
     }
@@ -181,7 +180,6 @@ pub(super) fn write_report(
 }
 
 /// The page at `path`, and JSON and CSV files with the same numbers; for standard output, only the page.
-#[must_use]
 pub(super) fn page_outputs(flag: &'static str, path: &Path) -> Vec<Output> {
     let mut outputs = vec![Output::text(flag, path)];
     if !is_stdout(path) {

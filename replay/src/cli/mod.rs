@@ -114,7 +114,6 @@ fn without(refused: &'static [&'static str]) -> impl Fn(Arg) -> Arg {
 }
 
 /// Parses the arguments, runs the subcommand and turns its outcome into an exit code.
-#[must_use]
 pub fn main() -> ExitCode {
     shell::run(
         file_uses::FILES,

@@ -81,7 +81,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 /// The tables as text for a terminal.
-#[must_use]
 pub fn text(report: &PaperReport) -> String {
     let mut text = tables::table_2(report).text();
     let _ = write!(text, "\n{}", tables::averages(&report.averages).text());

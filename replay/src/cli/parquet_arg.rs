@@ -17,14 +17,12 @@ pub(super) struct ParquetArg {
 
 impl ParquetArg {
     /// The output file, if given.
-    #[must_use]
     pub fn output(&self) -> Option<Output> {
         let path = self.path.as_deref()?;
         Some(Output::binary("--parquet", path))
     }
 
     /// Whether it writes to standard output instead of the command's result.
-    #[must_use]
     pub(super) fn takes_stdout(&self) -> bool {
         self.path.as_deref().is_some_and(is_stdout)
     }

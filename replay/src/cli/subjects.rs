@@ -35,13 +35,11 @@ impl Traces {
     }
 
     /// Number of quad records of each trace.
-    #[must_use]
     pub fn records(&self) -> Vec<u64> {
         self.0.iter().map(|(trace, ..)| trace.records()).collect()
     }
 
     /// Size of all files.
-    #[must_use]
     pub(super) fn file_bytes(&self) -> u64 {
         let files = self.0.iter();
         files
@@ -50,7 +48,6 @@ impl Traces {
     }
 
     /// The traces, labelled with their file names.
-    #[must_use]
     pub(super) fn subjects_by_file(&self) -> Vec<Subject<'_>> {
         let opened = self.0.iter();
         opened
@@ -59,7 +56,6 @@ impl Traces {
     }
 
     /// The traces, labelled with their scene names if these are unique.
-    #[must_use]
     pub fn subjects(&self) -> Vec<Subject<'_>> {
         let named: Vec<_> = self
             .0

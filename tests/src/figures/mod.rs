@@ -80,7 +80,6 @@ pub fn with_tables(document: &str, folder: &Path) -> Result<(String, Vec<String>
 ///
 /// # Panics
 /// A folder is unreadable.
-#[must_use]
 pub fn documents() -> Vec<PathBuf> {
     let root = crate::root();
     let mut files = ["README.md", "ARCHITECTURE.md", "traces/README.md"]
@@ -108,7 +107,6 @@ const TYPED: [(&str, &str); 1] = [
 ];
 
 /// Headings of tables outside marks with more than 12 numeric cells.
-#[must_use]
 pub fn typed_tables(name: &str, document: &str) -> Vec<String> {
     let (mut found, mut marked) = (Vec::new(), false);
     let mut lines = document.lines().peekable();

@@ -57,7 +57,6 @@ impl Results {
     }
 
     /// Every column and row.
-    #[must_use]
     pub fn full_table(&self) -> String {
         let cells = |row: &Row| self.columns.iter().map(|c| row[c].clone()).collect();
         let headings: Vec<&str> = self.columns.iter().map(String::as_str).collect();
@@ -68,7 +67,6 @@ impl Results {
     ///
     /// # Panics
     /// There is no such row or number.
-    #[must_use]
     pub fn number(&self, keys: &[(&str, &str)], column: &str, decimals: usize) -> String {
         let is = |row: &&Row| keys.iter().all(|(key, value)| row[*key] == *value);
         let row = self.rows.iter().find(is);
@@ -77,7 +75,6 @@ impl Results {
     }
 
     /// The distinct values of a column, in order.
-    #[must_use]
     pub fn values(&self, column: &str) -> Vec<String> {
         let mut values: Vec<String> = Vec::new();
         for row in &self.rows {
@@ -93,7 +90,6 @@ impl Results {
 ///
 /// # Panics
 /// The text is not a number.
-#[must_use]
 pub fn rounded(text: &str, decimals: usize) -> String {
     let number: f64 = text
         .parse()
@@ -102,7 +98,6 @@ pub fn rounded(text: &str, decimals: usize) -> String {
 }
 
 /// A table with these headings and rows.
-#[must_use]
 pub fn markdown(headings: &[&str], rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
     let headings: Vec<String> = headings.iter().map(|&h| h.to_owned()).collect();

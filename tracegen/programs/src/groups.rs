@@ -100,7 +100,6 @@ impl Group {
     }
 
     /// Converts the coordinates of a quad to those of a trace.
-    #[must_use]
     pub fn quad(&self, raw: RawQuad) -> RawQuad {
         let Some((size, shift)) = self.texels(self.constant_level()) else {
             return raw;
@@ -115,7 +114,6 @@ impl Group {
     }
 
     /// Converts a record of a fragment to a lane's sample.
-    #[must_use]
     pub fn fragment(&self, raw: &RawFragment) -> LaneSample {
         let own_lod = match self.kind.lod {
             Lod::Bias(None) | Lod::Explicit(None) => raw.lod,
@@ -177,7 +175,6 @@ impl Group {
 
     /// Which lanes share a record. On cube maps, the coordinates of lanes with different layers are on different
     /// faces. The gradients of a lane are the changes of its coordinates in a record of its own.
-    #[must_use]
     pub fn joins(&self) -> Joins {
         match (self.kind.lod, self.kind.shape) {
             (Lod::Gradients, _) if self.anisotropic => Joins::None,

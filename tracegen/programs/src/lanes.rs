@@ -40,7 +40,6 @@ pub enum Joins {
 }
 
 /// Groups the fragments of a quad, in recording order, into visits. Within a visit the lanes ascend.
-#[must_use]
 pub fn visits(lanes: &[(u8, LaneSample)], joins: Joins) -> Vec<Visit> {
     let mut open: Vec<(u8, LaneSample)> = Vec::with_capacity(4);
     let mut found = Vec::new();
@@ -99,7 +98,6 @@ fn visit<'a>(lanes: impl Iterator<Item = &'a (u8, LaneSample)>) -> Visit {
 }
 
 /// Face of a cube map, the coordinates on it, and their changes.
-#[must_use]
 pub fn on_cube(fragment: &RawFragment) -> (u32, [f32; 2], [[f32; 2]; 2]) {
     let [x, y, z] = fragment.at;
     let [ax, ay, az] = fragment.at.map(f32::abs);
@@ -135,7 +133,6 @@ pub fn on_cube(fragment: &RawFragment) -> (u32, [f32; 2], [[f32; 2]; 2]) {
 }
 
 /// Level of detail for a texture of this size, computed from the changes of the coordinates as lavapipe does.
-#[must_use]
 pub fn lod(slopes: [[f32; 2]; 2], size: [u32; 2]) -> f32 {
     let squared = |d: [f32; 2]| {
         let [u, v] = [0, 1].map(|axis| d[axis] * size[axis] as f32);

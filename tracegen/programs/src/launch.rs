@@ -97,13 +97,11 @@ impl Launch {
     }
 
     /// Folder of the programs' files.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
 
     /// Path of the layer's library.
-    #[must_use]
     pub fn library(&self) -> &Path {
         &self.library
     }

@@ -7,7 +7,6 @@ pub type Pair = (Option<usize>, Option<usize>);
 
 /// Merges two sequences and keeps the order of both. Where the sequences differ, both skip entries until the
 /// nearest pair of equal entries. Skipped entries remain without a partner.
-#[must_use]
 pub fn pair<K: Eq + Hash>(left: &[K], right: &[K]) -> Vec<Pair> {
     let mut pairs = Vec::with_capacity(left.len().max(right.len()));
     let (mut l, mut r) = (0, 0);
@@ -36,7 +35,6 @@ pub fn pair<K: Eq + Hash>(left: &[K], right: &[K]) -> Vec<Pair> {
 }
 
 /// Share of the entries that have a partner, 0 to 1.
-#[must_use]
 pub fn matched_share<K: Eq + Hash>(left: &[K], right: &[K]) -> f64 {
     let longer = left.len().max(right.len());
     if longer == 0 {

@@ -52,7 +52,6 @@ impl Reads {
     }
 
     /// Sums over frames, sorted by stage and kind of texture.
-    #[must_use]
     pub fn of_frames(&self, frames: &[u32]) -> Vec<UnrecordedReads> {
         let mut sums = OfFrame::new();
         for of in frames.iter().filter_map(|frame| self.0.get(frame)) {

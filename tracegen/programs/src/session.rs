@@ -331,38 +331,32 @@ impl Session {
     }
 
     /// The draw with a number.
-    #[must_use]
     pub fn draw(&self, number: u32) -> Option<&DrawInfo> {
         self.draws.get(&number)
     }
 
     /// The render pass with a number.
-    #[must_use]
     pub fn pass(&self, number: u32) -> Option<&PassInfo> {
         self.passes.get(&number)
     }
 
     /// Size and RGBA texels of the picture of a render pass.
-    #[must_use]
     pub fn picture(&self, pass: u32) -> Option<([u32; 2], Vec<u8>)> {
         let size = *self.pictures.get(&pass)?;
         Some((size, self.process.as_ref()?.picture(pass).ok()?))
     }
 
     /// The image with a number.
-    #[must_use]
     pub fn image(&self, number: u32) -> Option<&ImageInfo> {
         self.images.get(&number)
     }
 
     /// The recording shader with a number.
-    #[must_use]
     pub fn shader(&self, number: u32) -> Option<&ShaderInfo> {
         self.shaders.get(&number)
     }
 
     /// Recording shader of a draw.
-    #[must_use]
     pub fn shader_of(&self, draw: &DrawInfo) -> Option<&ShaderInfo> {
         self.shader(draw.shader?)
     }
@@ -380,7 +374,6 @@ impl Session {
 
     /// Whether the fragment shader of a draw affects anything: colours, or the fragments that pass. Graphics
     /// hardware does not run other fragment shaders.
-    #[must_use]
     pub fn is_shaded(&self, executed: &Executed) -> bool {
         let Some(draw) = self.draw(executed.draw) else {
             return false;
@@ -416,7 +409,6 @@ impl Session {
 }
 
 /// Whether a draw writes a colour attachment.
-#[must_use]
 pub fn writes_color(draw: &DrawInfo, place: usize) -> bool {
     draw.color_masks.get(place).is_none_or(|mask| *mask != 0)
 }
@@ -425,7 +417,6 @@ pub fn writes_color(draw: &DrawInfo, place: usize) -> bool {
 pub const REPEATED: &str = "a submission executed the draw several times";
 
 /// Coordinate group whose records contain every started fragment of a shader.
-#[must_use]
 pub fn coverage_group(shader: &ShaderInfo) -> Option<u16> {
     let covers = |site: &&Site| site.unconditional && site.form == Form::Quad;
     let sites = &shader.sites;
@@ -437,7 +428,6 @@ pub fn coverage_group(shader: &ShaderInfo) -> Option<u16> {
 
 /// Coordinate group whose records contain every fragment that was not discarded, if fragments may be
 /// discarded.
-#[must_use]
 pub fn survival_group(shader: &ShaderInfo) -> Option<u16> {
     let mut sites = shader.sites.iter();
     let found = sites.find(|site| site.what == What::Survival);

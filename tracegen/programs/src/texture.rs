@@ -7,7 +7,6 @@ use formats::texture::{
 use spool::{ImageInfo, SamplerInfo, ViewInfo};
 
 /// Format and colour space in a trace; `None` for formats that textures cannot have.
-#[must_use]
 pub fn texel_format(format: i32) -> Option<(TexelFormat, ColorSpace)> {
     use ColorSpace::{Linear, Srgb};
     use TexelFormat as T;
@@ -86,7 +85,6 @@ pub fn texel_format(format: i32) -> Option<(TexelFormat, ColorSpace)> {
 
 /// Converts the part of an image in a view to a texture of a trace; `None` if a trace does not have the
 /// format. `number` names the image: the numbers of the program differ from run to run.
-#[must_use]
 pub fn texture(view: &ViewInfo, image: &ImageInfo, number: u32) -> Option<Texture> {
     let (format, color_space) = texel_format(view.format)?;
     let [first_level, levels] = view.levels;
@@ -111,7 +109,6 @@ pub fn texture(view: &ViewInfo, image: &ImageInfo, number: u32) -> Option<Textur
 }
 
 /// Converts the sampler of a view.
-#[must_use]
 pub fn sampler(info: &SamplerInfo, view: &ViewInfo) -> Sampler {
     let filter = |raw: i32| match vk::Filter::from_raw(raw) {
         vk::Filter::NEAREST => Filter::Nearest,
@@ -180,7 +177,6 @@ pub const FETCH: Sampler = Sampler {
 };
 
 /// The sampler of a gather, which reads the four texels of a bilinear footprint independently of the filter.
-#[must_use]
 pub fn gathering(sampler: Sampler) -> Sampler {
     Sampler {
         mag: Filter::Linear,

@@ -81,7 +81,6 @@ impl CaptureJob<'_> {
     }
 
     /// The recorder of this job's render passes. `tables` are the trace's.
-    #[must_use]
     pub fn recorder<'t>(&self, tables: &'t Tables) -> Recorder<'t> {
         let replay = |call: &DrawCall| {
             let is_tested = self.fragments == Fragments::DepthTested;
@@ -126,7 +125,6 @@ impl CaptureJob<'_> {
     }
 
     /// The eyes of a frame.
-    #[must_use]
     pub fn rig(&self, views: &FrameViews) -> Rig {
         let eye = |eye: &Eye| visibility::Eye {
             view: views.eyes[*eye as usize],
@@ -214,7 +212,6 @@ impl CaptureJob<'_> {
 
     /// True if one draw call renders both eyes' pictures: with multiview, if these are plain
     /// layers.
-    #[must_use]
     pub fn draws_both_at_once(&self, frame: &Frame) -> bool {
         let layers = &frame.plan.layers;
         self.planner.settings().multiview

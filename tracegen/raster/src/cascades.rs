@@ -31,7 +31,6 @@ pub struct Cascade {
 
 /// Fits `count` cascades along `to_sun` to the frusta of `eyes` between `near_m` and `far_m` from
 /// the head. `bounds` are the scene's, so that every caster lies within the depth range.
-#[must_use]
 pub fn fit(
     eyes: &[EyeView],
     count: u32,

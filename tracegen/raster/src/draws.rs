@@ -121,7 +121,6 @@ pub struct DrawList {
 
 impl DrawList {
     /// The trace's record of which draws hide what is behind them, for these fragments.
-    #[must_use]
     pub fn surfaces(&self, fragments: Fragments) -> Surfaces {
         Surfaces {
             depth_tested: fragments == Fragments::DepthTested,
@@ -208,13 +207,11 @@ impl DrawList {
     }
 
     /// Indices of the draws that may be visible in a view or shadow cascade, ascending.
-    #[must_use]
     pub fn visible(&self, clip_from_world: Mat4) -> Vec<u32> {
         self.hierarchy.entering(clip_from_world)
     }
 
     /// The draws of `list` that may be visible in a view.
-    #[must_use]
     pub(crate) fn visible_of(&self, list: &[u32], clip_from_world: Mat4) -> Vec<u32> {
         let bounds = list.iter().map(|&draw| self.calls[draw as usize].bounds);
         (frustum::visible(bounds, clip_from_world).into_iter())
@@ -223,7 +220,6 @@ impl DrawList {
     }
 
     /// The draws of a layer that may touch a region of it, ascending.
-    #[must_use]
     pub(crate) fn touching(&self, view: &View<'_>, region: Region) -> Vec<u32> {
         let size_px = view.layer.size_px;
         if region.size_px == size_px {
@@ -235,7 +231,6 @@ impl DrawList {
     }
 
     /// Texture table of the trace: the scene's textures in their order, then the shadow maps.
-    #[must_use]
     pub fn textures(&self, set: &TextureSet) -> Vec<Texture> {
         let mut textures: Vec<Texture> = set.textures.iter().map(|t| t.texture.clone()).collect();
         if self.cascades > 0 {
@@ -254,7 +249,6 @@ impl DrawList {
 
     /// Sampler and draw tables of the trace. `textures` is the result of [`DrawList::textures`] for
     /// the same `set`.
-    #[must_use]
     pub fn tables(
         &self,
         scene: &Scene,

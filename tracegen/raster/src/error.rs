@@ -6,7 +6,6 @@ use visibility::TooWide;
 
 impl RasterError {
     /// Whether another backend might support what this one does not.
-    #[must_use]
     pub fn is_of_the_driver(&self) -> bool {
         matches!(
             self,

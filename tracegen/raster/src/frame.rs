@@ -97,7 +97,6 @@ impl Frame {
     }
 
     /// A layer with its draws.
-    #[must_use]
     pub fn view(&self, number: usize) -> View<'_> {
         View {
             target: number,

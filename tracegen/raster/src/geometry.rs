@@ -14,7 +14,6 @@ use visibility::binning::{BinnedDraw, BinnedView, bin};
 const INDEX_BYTES: u16 = 4;
 
 /// The meshes of a scene's draws as the drivers store them.
-#[must_use]
 pub fn geometry(scene: &Scene, draws: &DrawList) -> Geometry {
     let mut geometry = Geometry::default();
     let mut known: HashMap<usize, u32> = HashMap::new();

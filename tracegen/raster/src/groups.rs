@@ -15,7 +15,6 @@ pub struct MaterialGroups {
 
 impl MaterialGroups {
     /// Groups the textures of `material`.
-    #[must_use]
     pub fn new(material: &Material) -> Self {
         let textures = &material.textures;
         let mut result = Self {

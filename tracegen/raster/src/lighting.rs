@@ -25,7 +25,6 @@ pub struct Lighting {
 
 impl Lighting {
     /// The scene's brightest sun and point lights, and its sky.
-    #[must_use]
     pub fn new(scene: &Scene) -> Self {
         let (direction, sun) = scene.sun().unwrap_or((Vec3::NEG_Y, Vec3::ZERO));
         let mut points: Vec<(Vec3, Vec3)> = scene

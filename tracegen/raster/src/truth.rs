@@ -36,7 +36,6 @@ pub struct Judgement {
 
 impl Judgement {
     /// Compares a list of draws (ascending) with the visibility of every draw.
-    #[must_use]
     pub fn new(listed: &[u32], visible: &[Marks]) -> Self {
         let mut found = Self::default();
         for (draw, marks) in (0..).zip(visible) {
@@ -92,7 +91,6 @@ impl CaptureJob<'_> {
     }
 
     /// Like [`Self::judge`], with the results of [`Self::truth`] for the frame's eyes.
-    #[must_use]
     pub fn judge_against(&self, frame: &Frame, truth: &[Vec<Marks>]) -> Vec<Judgement> {
         let judge = |(eye, visible): (_, &Vec<Marks>)| {
             let of_eye = |layer: &Layer| layer.eye.is_none() || layer.eye == Some(eye);

@@ -19,7 +19,6 @@ pub struct View<'a> {
 
 impl View<'_> {
     /// World to clip space.
-    #[must_use]
     pub fn clip_from_world(&self) -> Mat4 {
         self.layer.clip_from_world()
     }

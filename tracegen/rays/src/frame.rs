@@ -57,13 +57,11 @@ impl FrameStats {
     }
 
     /// Rays of all kinds.
-    #[must_use]
     pub fn total_rays(&self) -> u64 {
         self.rays.iter().sum()
     }
 
     /// Rays of one kind.
-    #[must_use]
     pub fn rays_of(&self, kind: RayKind) -> u64 {
         self.rays[kind as usize]
     }

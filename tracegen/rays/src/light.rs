@@ -16,7 +16,6 @@ pub struct Incident {
 }
 
 /// The light at a point, or `None` if the point coincides with the light.
-#[must_use]
 pub fn incident(light: &RayLight, at: Vec3) -> Option<Incident> {
     match *light {
         RayLight::Directional { direction, color } => Some(Incident {
@@ -39,7 +38,6 @@ pub fn incident(light: &RayLight, at: Vec3) -> Option<Incident> {
 /// The light at a point from a random point of a light that has a size: a sphere of `radius_m`, of
 /// which the disk that faces the point is sampled, or a sun of which `sun_tangent` is the tangent
 /// of the angular radius.
-#[must_use]
 pub(crate) fn incident_of_size(
     light: &RayLight,
     at: Vec3,
@@ -64,7 +62,6 @@ pub(crate) fn incident_of_size(
 }
 
 /// Schlick's approximation of Fresnel reflectance.
-#[must_use]
 pub fn schlick(normal_incidence: Vec3, cosine: f32) -> Vec3 {
     let f = (1.0 - cosine).clamp(0.0, 1.0);
     let f5 = f * f * f * f * f;
@@ -73,7 +70,6 @@ pub fn schlick(normal_incidence: Vec3, cosine: f32) -> Vec3 {
 
 /// Reflectance of a dielectric boundary for unpolarised light (Fresnel's equations). `eta` is the
 /// ratio of the refractive indices, incident over transmitted.
-#[must_use]
 pub fn dielectric(cosine: f32, eta: f32) -> f32 {
     let sine2 = eta * eta * (1.0 - cosine * cosine);
     if sine2 >= 1.0 {
@@ -87,7 +83,6 @@ pub fn dielectric(cosine: f32, eta: f32) -> f32 {
 
 /// Direction of the refracted ray (Snell's law); `None` at total internal reflection. The normal
 /// faces the incident side.
-#[must_use]
 pub fn refract(direction: Vec3, normal: Vec3, eta: f32) -> Option<Vec3> {
     let cosine = -direction.dot(normal);
     let k = 1.0 - eta * eta * (1.0 - cosine * cosine);
@@ -95,14 +90,12 @@ pub fn refract(direction: Vec3, normal: Vec3, eta: f32) -> Option<Vec3> {
 }
 
 /// Direction of the mirrored ray.
-#[must_use]
 pub fn reflect(direction: Vec3, normal: Vec3) -> Vec3 {
     (direction - 2.0 * direction.dot(normal) * normal).normalize()
 }
 
 /// Blinn-Phong lobe times the cosine, normalised to reflect all light at normal incidence
 /// (Giesen 2009).
-#[must_use]
 pub fn blinn_phong(normal: Vec3, to_light: Vec3, to_eye: Vec3, exponent: u32) -> f32 {
     let n_l = normal.dot(to_light);
     let half = (to_light + to_eye).normalize_or_zero();

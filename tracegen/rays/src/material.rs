@@ -80,13 +80,11 @@ impl Materials {
     }
 
     /// The material table of a trace.
-    #[must_use]
     pub fn table(&self) -> Vec<RayMaterial> {
         self.materials.iter().map(describe).collect()
     }
 
     /// Properties at a hit. `footprint_m` is the ray's width there.
-    #[must_use]
     pub fn surface(&self, material: usize, at: &Attributes, footprint_m: f32) -> Surface {
         let m = &self.materials[material];
         let sample = |t: &Option<TextureRef>| self.sample(t.as_ref(), at, footprint_m);
@@ -129,7 +127,6 @@ impl Materials {
 
     /// The interpolated normal, bent by the material's normal map, if it has one. The capture
     /// shader's is the same.
-    #[must_use]
     pub(crate) fn bent_normal(&self, material: usize, at: &Attributes, footprint_m: f32) -> Vec3 {
         let m = &self.materials[material];
         let (normal, tangent) = (at.shading_normal, at.tangent);
@@ -166,7 +163,6 @@ impl Materials {
     }
 
     /// True if the surface stops a closest-hit ray.
-    #[must_use]
     pub fn stops(&self, scene: &Scene, soup: &Soup, primitive: u32, bary: [f32; 2]) -> bool {
         let material = &self.materials[soup.material(scene, primitive)];
         let alpha = || self.alpha(material, scene, soup, (primitive, bary));
@@ -178,7 +174,6 @@ impl Materials {
     }
 
     /// True if the surface casts a shadow. Glass and nearly transparent surfaces do not.
-    #[must_use]
     pub fn shades(&self, scene: &Scene, soup: &Soup, primitive: u32, bary: [f32; 2]) -> bool {
         let material = &self.materials[soup.material(scene, primitive)];
         let alpha = || self.alpha(material, scene, soup, (primitive, bary));
@@ -192,7 +187,6 @@ impl Materials {
 
     /// The light of a shadow ray that passes the surface, with the colours of glass (once, on entry)
     /// and of blended surfaces.
-    #[must_use]
     pub(crate) fn passes(&self, scene: &Scene, soup: &Soup, hit: Hit, enters: bool) -> Vec3 {
         let material = &self.materials[soup.material(scene, hit.0)];
         let alpha = || self.alpha(material, scene, soup, hit);
@@ -229,7 +223,6 @@ impl Materials {
 }
 
 /// True if rays must test alpha or may pass through the material.
-#[must_use]
 pub fn needs_alpha_test(m: &Material) -> bool {
     m.alpha != AlphaMode::Opaque || m.transmission > 0.0
 }

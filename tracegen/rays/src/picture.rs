@@ -23,7 +23,6 @@ pub fn write_png(images: &[EyeImage; 2], to: impl Write) -> image::ImageResult<(
 }
 
 /// Radiance as sRGB bytes, with the same ACES filmic curve (Narkowicz 2015) as in the raster path.
-#[must_use]
 pub fn displayed(radiance: Vec3) -> [u8; 3] {
     let c = radiance.max(Vec3::ZERO);
     let mapped = (c * (2.51 * c + 0.03)) / (c * (2.43 * c + 0.59) + 0.14);

@@ -247,7 +247,6 @@ pub const ARITHMETICS: [&str; 4] = [
 ///
 /// # Panics
 /// If the mesh has too many triangles for a hierarchy.
-#[must_use]
 pub fn measure(mesh: &TestMesh, at_m: f64, count: usize) -> [Precision; 4] {
     /// Displacement that rounding to single precision may cause, as in [`super::robustness`].
     const TOLERANCE: f64 = 1e-5;

@@ -19,7 +19,6 @@ pub struct Ray {
 
 impl Ray {
     /// A ray of unlimited length.
-    #[must_use]
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         Self {
             origin,
@@ -31,7 +30,6 @@ impl Ray {
 
     /// False if a coordinate is not finite, the direction is zero, or the origin lies beyond
     /// [`LARGEST_COORDINATE`]. Such a ray hits nothing.
-    #[must_use]
     pub fn is_valid(&self) -> bool {
         // Not by the largest element, because that ignores NaN.
         self.origin
@@ -92,7 +90,6 @@ impl<'a> PreparedRay<'a> {
     /// Prepares a valid ray for a scene with these bounds.
     ///
     /// Vector operations without branches, because a short ray spends much of its time here.
-    #[must_use]
     #[inline(always)]
     pub fn new(ray: &'a Ray, bounds: (Vec3, Vec3)) -> Self {
         let (origin, direction) = (Vec3A::from(ray.origin), Vec3A::from(ray.direction));
@@ -127,14 +124,12 @@ impl<'a> PreparedRay<'a> {
     }
 
     /// Distance to a box's near plane on this axis, rounded towards an earlier entry.
-    #[must_use]
     #[inline(always)]
     pub fn near_distance(&self, axis: usize, plane: f32) -> f32 {
         plane.mul_add(self.near_reciprocal[axis], self.near_shift[axis])
     }
 
     /// Distance to a box's far plane on this axis, rounded towards a later exit.
-    #[must_use]
     #[inline(always)]
     pub fn far_distance(&self, axis: usize, plane: f32) -> f32 {
         plane.mul_add(self.far_reciprocal[axis], self.far_shift[axis])
@@ -144,7 +139,6 @@ impl<'a> PreparedRay<'a> {
     ///
     /// Every operation is monotonic, so a box inside another never has an earlier entry or a later
     /// exit.
-    #[must_use]
     #[inline(always)]
     pub fn slab(&self, min: [f32; 3], max: [f32; 3]) -> (f32, f32) {
         let mut near = f32::MIN;
@@ -165,7 +159,6 @@ impl<'a> PreparedRay<'a> {
     ///
     /// Neighbours evaluate a shared edge with the same vertices and get the same sign, so no ray
     /// passes between them.
-    #[must_use]
     #[inline]
     pub fn line_hits(&self, v: &[[f32; 3]; 3]) -> bool {
         let [kx, ky, kz] = self.axes;
@@ -185,7 +178,6 @@ impl<'a> PreparedRay<'a> {
     }
 
     /// Distance to a triangle whose line test passed, or `None` if it is outside the segment.
-    #[must_use]
     #[inline(always)]
     pub fn distance(&self, v: &[[f32; 3]; 3]) -> Option<f32> {
         let (near, far) = self.triangle_slab(v);
@@ -197,7 +189,6 @@ impl<'a> PreparedRay<'a> {
     }
 
     /// Entry and exit of a triangle's box.
-    #[must_use]
     #[inline(always)]
     pub fn triangle_slab(&self, v: &[[f32; 3]; 3]) -> (f32, f32) {
         let min = |a: usize| v[0][a].min(v[1][a]).min(v[2][a]);
@@ -211,7 +202,6 @@ impl<'a> PreparedRay<'a> {
     /// in the 2013 paper exceeds 1e-4 for some rays. Because the result is clamped to the
     /// triangle's own slabs, no enclosing box can start behind it, so every traversal order and
     /// tree finds the same nearest triangle, bit for bit.
-    #[must_use]
     #[inline(always)]
     pub fn distance_within(&self, v: &[[f32; 3]; 3], near: f32, far: f32) -> Option<f32> {
         let [v0, v1, v2] = [to_f64(v[0]), to_f64(v[1]), to_f64(v[2])];
@@ -228,7 +218,6 @@ fn to_f64(p: [f32; 3]) -> DVec3 {
 
 /// The edge test if an edge function is zero in `f32`. Products of two `f32` are exact in `f64`, so
 /// each sign is that of the exact difference.
-#[must_use]
 #[cold]
 pub fn line_hits_sheared_f64(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> bool {
     let edge = |p: [f32; 2], q: [f32; 2]| {
@@ -240,7 +229,6 @@ pub fn line_hits_sheared_f64(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> bool {
 }
 
 /// Weights of the second and third vertex at the point where a line meets a triangle, within 0..1.
-#[must_use]
 pub fn barycentrics(ray: &Ray, v: &[[f32; 3]; 3]) -> [f32; 2] {
     let o = ray.origin.as_dvec3();
     let d = ray.direction.as_dvec3();
@@ -257,7 +245,6 @@ pub fn barycentrics(ray: &Ray, v: &[[f32; 3]; 3]) -> [f32; 2] {
 }
 
 /// A point on a triangle, given by weights, accurate to the rounding of the vertices.
-#[must_use]
 pub fn point_at(v: &[[f32; 3]; 3], bary: [f32; 2]) -> Vec3 {
     let [v0, v1, v2] = [to_f64(v[0]), to_f64(v[1]), to_f64(v[2])];
     let (b, c) = (f64::from(bary[0]), f64::from(bary[1]));
@@ -267,7 +254,6 @@ pub fn point_at(v: &[[f32; 3]; 3], bary: [f32; 2]) -> Vec3 {
 /// Offsets a point from its surface along the normal by a few units in the last place (Waechter and
 /// Binder, "A Fast and Robust Method for Avoiding Self-Intersection", Ray Tracing Gems 2019). The
 /// offset just exceeds the rounding error of the point at any distance from the origin.
-#[must_use]
 pub fn offset(point: Vec3, normal: Vec3) -> Vec3 {
     const NEAR_ORIGIN: f32 = 1.0 / 32.0;
     const FLOAT_SCALE: f32 = 1.0 / 65536.0;

@@ -20,7 +20,6 @@ pub struct TestMesh {
 
 impl TestMesh {
     /// An icosahedron split `levels` times, radius 10.
-    #[must_use]
     pub fn sphere(levels: u32) -> Self {
         let g = (1.0 + 5f64.sqrt()) / 2.0;
         let mut vertices: Vec<DVec3> = [
@@ -86,7 +85,6 @@ impl TestMesh {
     }
 
     /// A box whose faces are grids of axis-aligned triangles: flat slabs and long shared edges.
-    #[must_use]
     pub fn grid_box(cells: u32) -> Self {
         let mut vertices = Vec::new();
         let mut triangles = Vec::new();
@@ -127,7 +125,6 @@ impl TestMesh {
     }
 
     /// A torus of long thin triangles: saddle curvature and self-occlusion.
-    #[must_use]
     pub fn torus(around: u32, across: u32) -> Self {
         let turn = std::f64::consts::TAU;
         let vertices = (0..around * across)
@@ -155,7 +152,6 @@ impl TestMesh {
     }
 
     /// The mesh, translated.
-    #[must_use]
     pub fn translated(&self, by: DVec3) -> Self {
         Self {
             name: self.name,
@@ -165,13 +161,11 @@ impl TestMesh {
     }
 
     /// Corners of a triangle.
-    #[must_use]
     pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
         self.triangles[triangle].map(|v| self.vertices[v as usize])
     }
 
     /// Midpoint of the bounds, about which the mesh is recentred.
-    #[must_use]
     pub fn center(&self) -> DVec3 {
         let lo = self.vertices.iter().copied().reduce(DVec3::min);
         let hi = self.vertices.iter().copied().reduce(DVec3::max);
@@ -179,7 +173,6 @@ impl TestMesh {
     }
 
     /// The mesh in the traversal's input format: relative to `origin` and rounded.
-    #[must_use]
     pub fn rounded(&self, origin: DVec3) -> Vec<[[f32; 3]; 3]> {
         (0..self.triangles.len())
             .map(|t| self.corners(t).map(|v| (v - origin).as_vec3().to_array()))
@@ -207,7 +200,6 @@ pub struct Reference<'a> {
 
 impl<'a> Reference<'a> {
     /// Prepares a mesh.
-    #[must_use]
     pub fn new(mesh: &'a TestMesh) -> Self {
         let spheres = (0..mesh.triangles.len())
             .map(|t| {
@@ -223,7 +215,6 @@ impl<'a> Reference<'a> {
     /// The answer for a ray of unlimited length.
     ///
     /// `tolerance` is the displacement, in the mesh's units, that rounding may cause.
-    #[must_use]
     pub fn verdict(&self, origin: DVec3, direction: DVec3, tolerance: f64) -> Verdict {
         let near = self.near(origin, direction.normalize(), tolerance);
         let nearest = near.hits().min_by(f64::total_cmp);
@@ -397,7 +388,6 @@ impl Near {
 }
 
 /// The traversal's answer without a tree: every triangle is tested with the traversal's own tests.
-#[must_use]
 pub fn brute_force_f32(
     triangles: &[[[f32; 3]; 3]],
     bounds: (Vec3, Vec3),

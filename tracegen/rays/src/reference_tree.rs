@@ -40,7 +40,6 @@ pub struct ReferenceTree {
 
 impl ReferenceTree {
     /// Builds a tree over triangles, which are numbered in their order.
-    #[must_use]
     pub fn new(triangles: &[[[f32; 3]; 3]]) -> Self {
         let exact = triangles.iter().map(exact);
         let mut tree = Self {
@@ -86,7 +85,6 @@ impl ReferenceTree {
     }
 
     /// The nearest triangle beyond the origin that a ray hits.
-    #[must_use]
     pub fn closest(&self, origin: DVec3, direction: DVec3) -> Option<Crossing> {
         let mut nearest: Option<Crossing> = None;
         let mut open = vec![0];
@@ -119,7 +117,6 @@ impl ReferenceTree {
 }
 
 /// The corners of a triangle in `f64`.
-#[must_use]
 pub fn exact(triangle: &[[f32; 3]; 3]) -> Triangle {
     triangle.map(|corner| DVec3::from(corner.map(f64::from)))
 }
@@ -172,7 +169,6 @@ pub enum Cause {
 
 /// The cause of a difference at `triangle`, which only one search found. `other` is what the other
 /// one found, if anything. `tolerance` is a length: what rounding may displace.
-#[must_use]
 pub fn cause(
     triangle: &Triangle,
     other: Option<&Triangle>,

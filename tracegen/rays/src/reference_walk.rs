@@ -26,7 +26,6 @@ pub struct ReferenceWalk<'a> {
 
 impl<'a> ReferenceWalk<'a> {
     /// A walk of a hierarchy whose nodes have `width` children.
-    #[must_use]
     pub fn new(hierarchy: &'a Hierarchy, width: usize) -> Self {
         let triangles = hierarchy.triangles.iter();
         let points = triangles.flat_map(|triangle| triangle.vertices.map(Vec3::from));
@@ -69,7 +68,6 @@ impl<'a> ReferenceWalk<'a> {
 
     /// The work of a ray, and the slot of the triangle at which it ends. Distances to triangles are
     /// those of the tracer.
-    #[must_use]
     pub fn walk(&self, ray: &Ray, any_hit: bool) -> (Counts, Option<u32>) {
         let (axes, prepared) = (self.axes(ray), PreparedRay::new(ray, self.bounds));
         let mut counts = Counts::default();

@@ -35,7 +35,6 @@ pub struct Findings {
 
 impl Findings {
     /// True if no check failed.
-    #[must_use]
     pub fn clean(&self) -> bool {
         self.disagreements == 0
             && self.not_brute_force == 0
@@ -45,7 +44,6 @@ impl Findings {
     }
 
     /// The sum of both.
-    #[must_use]
     pub fn plus(&self, other: &Self) -> Self {
         Self {
             rays: self.rays + other.rays,
@@ -77,7 +75,6 @@ impl MeshUnderTest {
     ///
     /// # Panics
     /// If the mesh has too many triangles.
-    #[must_use]
     pub fn new(mesh: &TestMesh, translation: DVec3) -> Self {
         let moved = mesh.translated(translation);
         let center = moved.center();
@@ -97,7 +94,6 @@ impl MeshUnderTest {
 
     /// Checks `count` rays from outside and inside, aimed at random points, at vertices and at
     /// edges.
-    #[must_use]
     pub fn check(&self, count: u64, seed: u64) -> Findings {
         let mut random = Random(seed.wrapping_mul(2_862_933_555_777_941_757) | 1);
         let mut findings = Findings::default();
@@ -241,7 +237,6 @@ impl Random {
 }
 
 /// The meshes for checking the traversal.
-#[must_use]
 pub fn meshes() -> [TestMesh; 3] {
     [
         TestMesh::sphere(3),

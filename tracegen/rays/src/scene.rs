@@ -95,13 +95,11 @@ impl TraceScene {
     }
 
     /// The alpha test of closest-hit rays.
-    #[must_use]
     pub fn stopping(&self) -> Stopping<'_> {
         Stopping(self)
     }
 
     /// The alpha test of shadow rays.
-    #[must_use]
     pub fn shading(&self) -> Shading<'_> {
         Shading(self)
     }

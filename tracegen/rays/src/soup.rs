@@ -39,7 +39,6 @@ pub struct Attributes {
 
 impl Soup {
     /// Flattens a scene. Positions are transformed and recentred in `f64`.
-    #[must_use]
     pub fn new(scene: &Scene) -> Self {
         let transforms: Vec<DAffine3> = scene
             .instances
@@ -92,7 +91,6 @@ impl Soup {
     }
 
     /// Attributes of a primitive at the weights of its second and third vertex.
-    #[must_use]
     pub fn attributes(&self, scene: &Scene, primitive: u32, bary: [f32; 2]) -> Attributes {
         let object = self.objects[primitive as usize] as usize;
         let mesh = &scene.meshes[scene.instances[object].mesh];
@@ -137,7 +135,6 @@ impl Soup {
     }
 
     /// Only the texture coordinates, for an alpha test.
-    #[must_use]
     pub fn uv(&self, scene: &Scene, primitive: u32, bary: [f32; 2], set: u32) -> Vec2 {
         let object = self.objects[primitive as usize] as usize;
         let mesh = &scene.meshes[scene.instances[object].mesh];
@@ -149,7 +146,6 @@ impl Soup {
     }
 
     /// Alpha of the vertex colour; 1 where the mesh has none.
-    #[must_use]
     pub fn vertex_alpha(&self, scene: &Scene, primitive: u32, bary: [f32; 2]) -> f32 {
         let object = self.objects[primitive as usize] as usize;
         let mesh = &scene.meshes[scene.instances[object].mesh];
@@ -162,7 +158,6 @@ impl Soup {
     }
 
     /// Material of a primitive.
-    #[must_use]
     pub fn material(&self, scene: &Scene, primitive: u32) -> usize {
         let object = self.objects[primitive as usize] as usize;
         scene.meshes[scene.instances[object].mesh].material

@@ -17,7 +17,6 @@ struct Level {
 
 impl Pyramid {
     /// The pyramid of an image, or `None` if there are too few texels.
-    #[must_use]
     pub fn new(image: &Image, rgba: Vec<u8>) -> Option<Self> {
         let [width, height] = image.size;
         let bytes = width as usize * height as usize * 4;
@@ -39,13 +38,11 @@ impl Pyramid {
     }
 
     /// Width and height of level 0.
-    #[must_use]
     pub fn size(&self) -> [u32; 2] {
         self.levels[0].size
     }
 
     /// The value at texture coordinates for a footprint of `2^lod` texels, linear.
-    #[must_use]
     pub fn sample(&self, texture: &TextureRef, uv: Vec2, lod: f32, srgb: &[f32; 256]) -> Vec4 {
         let [[a, b, c], [d, e, f]] = texture.uv_transform;
         let uv = Vec2::new(a * uv.x + b * uv.y + c, d * uv.x + e * uv.y + f);
@@ -152,7 +149,6 @@ fn wrapped(x: f32, size: u32, wrap: Wrap) -> u32 {
 }
 
 /// Base-2 logarithm from exponent and mantissa, exact at powers of two and equal on all platforms.
-#[must_use]
 pub fn fast_log2(x: f32) -> f32 {
     if x <= 0.0 {
         return -126.0;

@@ -106,7 +106,6 @@ pub struct Tracer<'a> {
 
 impl<'a> Tracer<'a> {
     /// A tracer for one thread.
-    #[must_use]
     pub fn new(scene: &'a TraceScene, settings: TraceSettings) -> Self {
         Self {
             scene,
@@ -196,7 +195,6 @@ impl<'a> Tracer<'a> {
     }
 
     /// The table entry of a primitive.
-    #[must_use]
     pub fn triangle(&self, primitive: u32) -> RayTriangle {
         triangle(self.scene, primitive)
     }
@@ -458,7 +456,6 @@ fn facing_shading_normal(shading: Vec3, geometric: Vec3) -> Vec3 {
 }
 
 /// The table entry of a primitive.
-#[must_use]
 pub fn triangle(scene: &TraceScene, primitive: u32) -> RayTriangle {
     RayTriangle {
         primitive,

@@ -24,7 +24,6 @@ impl Merged {
     ///
     /// # Panics
     /// Depths are present, but fewer than records.
-    #[must_use]
     pub fn new(fragments: RawRecords<'_>) -> Self {
         let mut order: Vec<(u64, u32)> = (fragments.quads.par_iter().enumerate())
             .map(|(index, fragment)| (key(fragment), index as u32))
@@ -38,7 +37,6 @@ impl Merged {
     }
 
     /// The merged quads, in no particular order.
-    #[must_use]
     pub fn records(&self) -> RawRecords<'_> {
         RawRecords {
             quads: &self.quads,

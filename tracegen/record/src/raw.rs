@@ -39,37 +39,31 @@ impl RawRecord {
     pub const OPERANDS: u32 = 1 << 30;
 
     /// Whether the coordinates are operands of the next record.
-    #[must_use]
     pub fn is_operands(&self) -> bool {
         self.passing & Self::OPERANDS != 0
     }
 
     /// Quad column in the view.
-    #[must_use]
     pub fn qx(&self) -> u32 {
         self.header & 0xfff
     }
 
     /// Quad row in the view.
-    #[must_use]
     pub fn qy(&self) -> u32 {
         self.header >> 12 & 0xfff
     }
 
     /// Covered lanes: bit 0 top left, 1 top right, 2 bottom left, 3 bottom right.
-    #[must_use]
     pub fn mask(&self) -> u8 {
         (self.header >> 24 & 15) as u8
     }
 
     /// Uv group or `NO_GROUP`.
-    #[must_use]
     pub fn group(&self) -> u8 {
         (self.header >> 28) as u8
     }
 
     /// Packs position, mask and group.
-    #[must_use]
     pub fn pack(qx: u32, qy: u32, mask: u8, group: u8) -> u32 {
         qx & 0xfff | (qy & 0xfff) << 12 | u32::from(mask & 15) << 24 | u32::from(group) << 28
     }

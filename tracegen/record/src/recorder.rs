@@ -19,14 +19,12 @@ pub struct Recorder<'a> {
 
 impl<'a> Recorder<'a> {
     /// Tables of the trace.
-    #[must_use]
     pub const fn tables(&self) -> &'a Tables {
         self.tables
     }
 
     /// A recorder for a trace with these tables. `replays` has the depth test between the primitives of each
     /// draw. For draws with such a test, the capturer must provide depths.
-    #[must_use]
     pub fn new(tables: &'a Tables, replays: Vec<DepthReplay>) -> Self {
         Self {
             tables,

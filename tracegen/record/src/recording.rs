@@ -32,7 +32,6 @@ struct OpenPass {
 
 impl<W: Write + Seek> Recording<W> {
     /// Starts a trace; the writer's tables grow (see [`TextraceWriter::create_growing`]).
-    #[must_use]
     pub fn new(writer: TextraceWriter<W>) -> Self {
         let rules = TileRules::new(writer.tables(), Vec::new());
         Self {

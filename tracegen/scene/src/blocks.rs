@@ -29,14 +29,12 @@ pub struct Blocks {
 
 impl Blocks {
     /// Whether the levels are the texture's own bytes.
-    #[must_use]
     pub fn is_plain(&self) -> bool {
         self.held == self.format && self.view == View::default()
     }
 
     /// The RGBA8 texels of a level of an image whose level 0 has this size; `None` for a level that is
     /// missing or cannot be decoded.
-    #[must_use]
     pub fn texels(&self, level: u32, size: [u32; 2], color_space: ColorSpace) -> Option<Vec<u8>> {
         let bytes = self.levels.get(level as usize)?;
         let size = level_size(size, level);
@@ -57,19 +55,16 @@ pub struct StoredBlocks {
 }
 
 /// Size of a level in texels.
-#[must_use]
 pub fn level_size(size: [u32; 2], level: u32) -> [u32; 2] {
     size.map(|extent| extent.checked_shr(level).unwrap_or(0).max(1))
 }
 
 /// Levels of a whole mip chain.
-#[must_use]
 pub fn whole_chain(size: [u32; 2]) -> u32 {
     size[0].max(size[1]).max(1).ilog2() + 1
 }
 
 /// Bytes of a level of that size.
-#[must_use]
 pub fn level_bytes(format: TexelFormat, size: [u32; 2]) -> usize {
     let block = format.block();
     let across = |axis: usize| size[axis].div_ceil(block.texels[axis]) as usize;
@@ -77,7 +72,6 @@ pub fn level_bytes(format: TexelFormat, size: [u32; 2]) -> usize {
 }
 
 /// True where level 0 consists of whole blocks, as drivers require of compressed textures.
-#[must_use]
 pub fn is_whole_blocks(format: TexelFormat, size: [u32; 2]) -> bool {
     let block = format.block().texels;
     size[0].is_multiple_of(block[0]) && size[1].is_multiple_of(block[1])
@@ -88,7 +82,6 @@ pub fn is_whole_blocks(format: TexelFormat, size: [u32; 2]) -> bool {
 /// A missing channel is 0 and a missing alpha 255, as texture units read them. The third channel of
 /// a two-channel format (BC5, EAC RG11) completes a unit normal. Half-float texels (BC6H) are
 /// clamped to 0..1.
-#[must_use]
 pub fn decode(
     format: TexelFormat,
     size: [u32; 2],

@@ -31,7 +31,6 @@ impl Default for View {
 
 impl View {
     /// RGBA8 texels of this size as they are shown.
-    #[must_use]
     pub fn shown(&self, mut rgba: Vec<u8>, size: [u32; 2]) -> Vec<u8> {
         if self.swizzle != Self::default().swizzle {
             for texel in rgba.chunks_exact_mut(4) {

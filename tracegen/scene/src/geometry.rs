@@ -7,7 +7,6 @@ use glam::{Affine3A, Vec2, Vec3, Vec4};
 /// Area-weighted vertex normals.
 ///
 /// A vertex that no triangle of non-zero area uses gets +y.
-#[must_use]
 pub fn vertex_normals(positions: &[Vec3], indices: &[u32]) -> Vec<Vec3> {
     let mut normals = vec![Vec3::ZERO; positions.len()];
     for t in indices.chunks_exact(3) {
@@ -61,7 +60,6 @@ fn is_direction(v: Vec3) -> bool {
 }
 
 /// Lowest and highest coordinates. Without points, the box is inverted and infinite.
-#[must_use]
 pub fn bounding_box(points: impl IntoIterator<Item = Vec3>) -> [Vec3; 2] {
     let empty = [Vec3::splat(f32::INFINITY), Vec3::splat(f32::NEG_INFINITY)];
     points
@@ -74,7 +72,6 @@ pub fn bounding_box(points: impl IntoIterator<Item = Vec3>) -> [Vec3; 2] {
 /// If the transform maps axes to axes, only the box's corners are transformed. The result is the
 /// same to the last bit, because adding zeros changes no rounding, and scaling and adding keep the
 /// order of numbers.
-#[must_use]
 pub fn transformed_box(points: &[Vec3], object_box: [Vec3; 2], transform: &Affine3A) -> [Vec3; 2] {
     let m = &transform.matrix3;
     let one_axis = |v: glam::Vec3A| v.cmpeq(glam::Vec3A::ZERO).bitmask().count_ones() >= 2;
@@ -86,7 +83,6 @@ pub fn transformed_box(points: &[Vec3], object_box: [Vec3; 2], transform: &Affin
 }
 
 /// The direction of `v`, even if its squared length overflows `f32`; `fallback` if it has none.
-#[must_use]
 pub fn unit_or(v: Vec3, fallback: Vec3) -> Vec3 {
     if v.length_squared().is_normal() {
         return v.normalize_or(fallback);
@@ -102,7 +98,6 @@ pub fn unit_or(v: Vec3, fallback: Vec3) -> Vec3 {
 ///
 /// Where the texture coordinates define no direction, the tangent is an arbitrary perpendicular of
 /// the normal.
-#[must_use]
 pub fn vertex_tangents(
     positions: &[Vec3],
     normals: &[Vec3],
@@ -145,7 +140,6 @@ pub fn vertex_tangents(
 }
 
 /// Three indices per triangle of a strip. Every other triangle is reversed to keep the winding.
-#[must_use]
 pub fn triangulate_strip(strip: &[u32]) -> Vec<u32> {
     strip
         .windows(3)
@@ -158,7 +152,6 @@ pub fn triangulate_strip(strip: &[u32]) -> Vec<u32> {
 }
 
 /// Three indices per triangle of a fan.
-#[must_use]
 pub fn triangulate_fan(fan: &[u32]) -> Vec<u32> {
     let Some((&centre, rim)) = fan.split_first() else {
         return Vec::new();

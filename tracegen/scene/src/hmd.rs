@@ -81,7 +81,6 @@ pub fn preset(name: &str) -> Result<Hmd, HmdError> {
 }
 
 /// The other eye's frustum of a mirror-symmetric display.
-#[must_use]
 pub fn mirrored(fov: &FovTangents) -> FovTangents {
     FovTangents {
         left: fov.right,
@@ -91,7 +90,6 @@ pub fn mirrored(fov: &FovTangents) -> FovTangents {
 }
 
 /// An on-axis frustum with square pixels: the vertical tangents follow from the aspect.
-#[must_use]
 pub fn symmetric(hfov_deg: f32, size_px: [u32; 2]) -> FovTangents {
     // In f64 so that the tangents do not depend on the order of roundings.
     let horizontal = (f64::from(hfov_deg) / 2.0).to_radians().tan();
@@ -165,7 +163,6 @@ pub fn validate(hmd: &Hmd) -> Result<(), HmdError> {
 
 /// Pixels between the images of a point straight ahead at depth `z_m` in parallel on-axis eyes:
 /// `W / (2 tan(h/2)) * IPD / z`.
-#[must_use]
 pub fn disparity_px(hmd: &Hmd, z_m: f32) -> f32 {
     let fov = &hmd.fov[0];
     hmd.eye_size_px[0] as f32 / (fov.left + fov.right) * hmd.ipd_m / z_m

@@ -91,7 +91,6 @@ impl OpenSource for &Texels {
 
 impl Image {
     /// An image from texels in memory (RGBA8, row by row from the top).
-    #[must_use]
     pub fn from_texels(
         name: &str,
         size: [u32; 2],
@@ -110,7 +109,6 @@ impl Image {
 }
 
 /// The indices of the `wanted` images, grouped by source.
-#[must_use]
 pub fn by_source(images: &[Image], wanted: impl Fn(usize) -> bool) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     let mut group_of: HashMap<*const (), usize> = HashMap::new();

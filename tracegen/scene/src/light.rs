@@ -30,7 +30,6 @@ impl Scene {
     }
 
     /// The brightest parallel light: its direction of travel and its irradiance.
-    #[must_use]
     pub fn sun(&self) -> Option<(Vec3, Vec3)> {
         let suns = self.lights.iter().filter_map(|light| match *light {
             Light::Directional { direction, color } => Some((direction, color)),
@@ -51,7 +50,6 @@ pub struct Sky {
 
 impl Sky {
     /// The sky of a scene, and its ground under the brightest sun.
-    #[must_use]
     pub fn new(scene: &Scene) -> Self {
         let (_, sun) = scene.sun().unwrap_or_default();
         Self {
@@ -61,7 +59,6 @@ impl Sky {
     }
 
     /// Radiance along a ray that leaves the scene. The capture shader's `background` is the same.
-    #[must_use]
     pub fn background(&self, direction: Vec3) -> Vec3 {
         let zenith = self.sky * Vec3::new(0.75, 0.85, 1.0);
         let sky = self.sky.lerp(zenith, direction.y.clamp(0.0, 1.0));
@@ -70,7 +67,6 @@ impl Sky {
 
     /// Ambient radiance that reaches a surface of this normal, averaged over its hemisphere. The
     /// capture shader's `ambient` is the same.
-    #[must_use]
     pub fn ambient(&self, normal: Vec3) -> Vec3 {
         self.ground.lerp(self.sky, 0.5 + 0.5 * normal.y)
     }

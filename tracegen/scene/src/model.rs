@@ -66,13 +66,11 @@ pub struct Mesh {
 
 impl Mesh {
     /// Number of triangles.
-    #[must_use]
     pub fn triangles(&self) -> usize {
         self.indices.len() / 3
     }
 
     /// Object-space bounds. Inverted and infinite for a mesh without vertices.
-    #[must_use]
     pub fn bounds(&self) -> [Vec3; 2] {
         bounding_box(self.positions.iter().copied())
     }
@@ -89,13 +87,11 @@ pub struct Instance {
 
 impl Instance {
     /// True where the transform mirrors, which reverses the winding.
-    #[must_use]
     pub fn mirrored(&self) -> bool {
         self.transform.matrix3.determinant() < 0.0
     }
 
     /// Inverse transpose for normals. An instance with a scale of zero uses its own matrix.
-    #[must_use]
     pub fn normal_matrix(&self) -> Mat3 {
         let matrix = Mat3::from(self.transform.matrix3);
         let inverse = matrix.inverse().transpose();
@@ -133,7 +129,6 @@ impl TextureRef {
     pub const IDENTITY: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
     /// Set 0, repeat, trilinear.
-    #[must_use]
     pub fn new(image: usize) -> Self {
         Self {
             image,
@@ -255,7 +250,6 @@ impl Scene {
     }
 
     /// Number of triangles over all instances.
-    #[must_use]
     pub fn triangle_count(&self) -> u64 {
         self.instances
             .iter()
@@ -264,7 +258,6 @@ impl Scene {
     }
 
     /// World-space bounds at time 0, `None` for an empty scene.
-    #[must_use]
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         let boxes: Vec<[Vec3; 2]> = self.meshes.iter().map(Mesh::bounds).collect();
         let placed = self.instances.iter().filter_map(|i| {

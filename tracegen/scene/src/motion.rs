@@ -38,7 +38,6 @@ pub enum Movement {
 
 impl Movement {
     /// Displacement relative to time 0.
-    #[must_use]
     pub fn transform(&self, time_s: f32) -> Affine3A {
         match *self {
             Self::Shuttle {
@@ -63,7 +62,6 @@ impl Movement {
 
 impl Motion {
     /// Displacement of its instances relative to time 0, world space.
-    #[must_use]
     pub fn transform(&self, time_s: f32) -> Affine3A {
         let product = |outer, movement: &Movement| outer * movement.transform(time_s);
         self.movements.iter().fold(Affine3A::IDENTITY, product)
@@ -72,7 +70,6 @@ impl Motion {
 
 impl Scene {
     /// Whether any part of the scene moves.
-    #[must_use]
     pub fn moves(&self) -> bool {
         !self.motions.is_empty() || self.animation.is_some()
     }

@@ -28,7 +28,6 @@ impl LoadOptions {
 
 impl LoadOptions {
     /// The animation chosen by name or index. A scene without animations has none.
-    #[must_use]
     pub fn named_animation(&self) -> Option<&str> {
         let named = self.animation.as_deref();
         named.filter(|name| !["all", "none"].contains(name))

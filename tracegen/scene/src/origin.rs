@@ -35,13 +35,11 @@ fn power_of_two_above(value: f64) -> f64 {
 }
 
 /// A point relative to the origin, rounded only at the end.
-#[must_use]
 pub(crate) fn relative(point: DVec3, origin: DVec3) -> Vec3 {
     (point - origin).as_vec3()
 }
 
 /// A transform to the world, made relative to the origin and rounded only at the end.
-#[must_use]
 pub(crate) fn relative_transform(mut transform: DAffine3, origin: DVec3) -> Affine3A {
     transform.translation -= origin;
     transform.as_affine3a()

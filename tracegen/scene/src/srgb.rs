@@ -7,7 +7,6 @@ pub static LINEAR: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|byte| decode(byte as f64 / 255.0) as f32));
 
 /// Linear value of an encoded value, both 0 to 1.
-#[must_use]
 pub fn decode(encoded: f64) -> f64 {
     if encoded <= 0.04045 {
         encoded / 12.92
@@ -18,7 +17,6 @@ pub fn decode(encoded: f64) -> f64 {
 
 /// [`decode`] in single precision throughout. Its last bit differs for some values; golden ray
 /// traces depend on material factors decoded this way.
-#[must_use]
 pub fn decode_f32(encoded: f32) -> f32 {
     if encoded <= 0.04045 {
         encoded / 12.92
@@ -28,7 +26,6 @@ pub fn decode_f32(encoded: f32) -> f32 {
 }
 
 /// Encoded value of a linear value, both 0 to 1.
-#[must_use]
 pub fn encode(linear: f64) -> f64 {
     if linear <= 0.003_130_8 {
         linear * 12.92
@@ -48,7 +45,6 @@ static FROM_LINEAR: LazyLock<Vec<u8>> = LazyLock::new(|| {
 });
 
 /// Encoded byte of a linear value from 0 to 1.
-#[must_use]
 pub fn encode_byte(linear: f32) -> u8 {
     FROM_LINEAR[(linear.clamp(0.0, 1.0) * FROM_LINEAR_STEPS as f32 + 0.5) as usize]
 }

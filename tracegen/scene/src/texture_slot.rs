@@ -72,7 +72,6 @@ impl TextureSlot {
     pub const COUNT: usize = Self::ALL.len();
 
     /// Name in reports.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::BaseColor => "base-color",
@@ -98,7 +97,6 @@ impl TextureSlot {
 
     /// Whether it is of an additional layer of the material (clear coat, sheen and so on). Such textures are
     /// sampled, and their effect on colours is approximated.
-    #[must_use]
     pub fn is_of_layer(self) -> bool {
         self > Self::Emissive
     }
@@ -173,7 +171,6 @@ impl TextureSlots {
     pub const NONE: Self = Self(0);
 
     /// A set of some slots.
-    #[must_use]
     pub fn of(slots: &[TextureSlot]) -> Self {
         Self(slots.iter().fold(0, |bits, slot| bits | 1 << *slot as u32))
     }
@@ -185,7 +182,6 @@ impl TextureSlots {
     }
 
     /// Whether a slot is in the set.
-    #[must_use]
     pub fn contains(self, slot: TextureSlot) -> bool {
         self.0 >> slot as u32 & 1 == 1
     }

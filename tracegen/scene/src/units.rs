@@ -7,7 +7,6 @@ const PLAUSIBLE_M: std::ops::RangeInclusive<f32> = 0.02..=100.0;
 
 /// A warning for a scene that `camera` shows as a whole, if its size suggests another unit than the metre.
 /// `ipd_m` is the distance between the eyes.
-#[must_use]
 pub fn warning(scene: &Scene, camera: &Camera, ipd_m: f32) -> Option<String> {
     let (low, high) = scene.bounds()?;
     let size = (high - low).max_element();

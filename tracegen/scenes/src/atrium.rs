@@ -100,7 +100,6 @@ const PLAIN: Detail = Detail {
 };
 
 /// Stand-in for Crytek Sponza: many textures per material.
-#[must_use]
 pub fn rich() -> Scene {
     let mut scene = SceneBuilder::new("atrium");
     let palette = materials::rich(&mut scene);
@@ -109,13 +108,11 @@ pub fn rich() -> Scene {
 }
 
 /// Stand-in for the L-Bench Sponza: few simple textures.
-#[must_use]
 pub fn plain() -> Scene {
     simple("atrium-plain", 0)
 }
 
 /// [`plain`] with cascaded shadow maps.
-#[must_use]
 pub fn shadows() -> Scene {
     simple("atrium-shadows", 4)
 }

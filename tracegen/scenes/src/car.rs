@@ -97,7 +97,6 @@ fn kit(scene: &mut SceneBuilder) -> CarMaterials {
 }
 
 /// The scene.
-#[must_use]
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("car");
     let kit = kit(&mut scene);

@@ -364,7 +364,6 @@ fn kit(scene: &mut SceneBuilder) -> ChessMaterials {
 }
 
 /// The scene.
-#[must_use]
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("chess");
     let kit = kit(&mut scene);

@@ -105,7 +105,6 @@ fn cone(m: &mut MeshBuilder, at: Vec3, direction: Vec3, radius: f32, length: f32
 }
 
 /// The animal, 3.6 m tall at the head and 8 m long, standing at the origin, facing +x.
-#[must_use]
 pub fn tyrannosaur() -> Creature {
     let mut animal = Creature::default();
     animal.torso();

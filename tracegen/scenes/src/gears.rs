@@ -24,14 +24,12 @@ pub struct Gear {
 
 impl Gear {
     /// Radius of the pitch circle, on which gears roll on one another.
-    #[must_use]
     pub fn pitch_radius(&self) -> f32 {
         0.5 * self.module * self.teeth as f32
     }
 
     /// The rotation with which this gear meshes with a driver rotated by `driver_turn`, if it is at
     /// `direction` (an angle) from the driver: its gap meets the driver's tooth.
-    #[must_use]
     pub fn mesh_turn(&self, driver: &Self, driver_turn: f32, direction: f32) -> f32 {
         let phase = (direction - driver_turn) * driver.teeth as f32 / TAU;
         direction + PI - (0.5 - phase) * TAU / self.teeth as f32
@@ -69,7 +67,6 @@ impl Gear {
     }
 
     /// The gear, centred on the origin.
-    #[must_use]
     pub fn build(&self) -> MeshBuilder {
         let mut m = MeshBuilder::new();
         let outline = self.outline();
@@ -183,7 +180,6 @@ fn ring_wall(m: &mut MeshBuilder, radius: f32, half: f32, segments: usize, outwa
 }
 
 /// A screw with a slotted head, standing on y = 0.
-#[must_use]
 pub fn screw(radius: f32) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     let h = 0.55 * radius;
@@ -235,7 +231,6 @@ pub fn screw(radius: f32) -> MeshBuilder {
 }
 
 /// A worm about the z axis: a thread of `turns` around a shaft.
-#[must_use]
 pub fn worm(radius: f32, length: f32, turns: f32, steps_per_turn: usize) -> MeshBuilder {
     let steps = (turns * steps_per_turn as f32) as usize;
     let mut m = MeshBuilder::new();
@@ -255,7 +250,6 @@ pub fn worm(radius: f32, length: f32, turns: f32, steps_per_turn: usize) -> Mesh
 }
 
 /// A gear placed at `center` in the plane whose normal is the rotated z axis.
-#[must_use]
 pub fn placed(center: Vec3, facing: Quat, turn: f32) -> Affine3A {
     Affine3A::from_rotation_translation(facing * Quat::from_rotation_z(turn), center)
 }

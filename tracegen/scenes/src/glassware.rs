@@ -6,7 +6,6 @@ use std::f32::consts::TAU;
 
 /// The profile of a vessel: `outer` from the axis at the bottom to the rim, then back down inside
 /// at a distance of `wall` metres.
-#[must_use]
 pub fn shell(outer: &[Knot], wall: f32) -> Vec<Knot> {
     let mut knots = outer.to_vec();
     let normal = |i: usize| {
@@ -38,7 +37,6 @@ pub fn shell(outer: &[Knot], wall: f32) -> Vec<Knot> {
 
 /// The contents of a vessel up to `level`: its inner skin reduced by `gap`, so that glass and
 /// liquid do not share a surface, closed on top with a meniscus.
-#[must_use]
 pub fn filling(outer: &[Knot], wall: f32, gap: f32, level: f32) -> Vec<Knot> {
     let full = shell(outer, wall + gap);
     let mut inside: Vec<Knot> = full[outer.len()..].iter().rev().copied().collect();
@@ -67,7 +65,6 @@ pub fn filling(outer: &[Knot], wall: f32, gap: f32, level: f32) -> Vec<Knot> {
 }
 
 /// A conical flask of height `h`.
-#[must_use]
 pub fn erlenmeyer(h: f32, steps: usize) -> Vec<Knot> {
     curve(
         &[
@@ -87,7 +84,6 @@ pub fn erlenmeyer(h: f32, steps: usize) -> Vec<Knot> {
 }
 
 /// A round-bottomed flask: sphere and neck.
-#[must_use]
 pub fn round_flask(radius: f32, neck: f32, steps: usize) -> Vec<Knot> {
     let mut knots = Vec::new();
     for i in 0..=10 {
@@ -106,7 +102,6 @@ pub fn round_flask(radius: f32, neck: f32, steps: usize) -> Vec<Knot> {
 }
 
 /// A beaker.
-#[must_use]
 pub fn beaker(radius: f32, height: f32, steps: usize) -> Vec<Knot> {
     curve(
         &[
@@ -123,7 +118,6 @@ pub fn beaker(radius: f32, height: f32, steps: usize) -> Vec<Knot> {
 }
 
 /// A test tube.
-#[must_use]
 pub fn test_tube(radius: f32, height: f32, steps: usize) -> Vec<Knot> {
     curve(
         &[
@@ -140,7 +134,6 @@ pub fn test_tube(radius: f32, height: f32, steps: usize) -> Vec<Knot> {
 }
 
 /// A reagent bottle with a shoulder.
-#[must_use]
 pub fn bottle(radius: f32, height: f32, steps: usize) -> Vec<Knot> {
     curve(
         &[
@@ -160,7 +153,6 @@ pub fn bottle(radius: f32, height: f32, steps: usize) -> Vec<Knot> {
 }
 
 /// A ground-glass stopper that sits on y = 0.
-#[must_use]
 pub fn stopper(radius: f32) -> Vec<Knot> {
     curve(
         &[
@@ -177,7 +169,6 @@ pub fn stopper(radius: f32) -> Vec<Knot> {
 }
 
 /// A glass tube along a path: outer and inner skin, rings at both ends.
-#[must_use]
 pub fn glass_tube(points: &[(Vec3, f32)], bore: f32, sides: usize) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     m.tube(points, sides);
@@ -207,7 +198,6 @@ pub fn glass_tube(points: &[(Vec3, f32)], bore: f32, sides: usize) -> MeshBuilde
 }
 
 /// A helix about the y axis from y = 0 upwards.
-#[must_use]
 pub fn helix(
     radius: f32,
     pitch: f32,

@@ -235,7 +235,6 @@ fn materials(scene: &mut SceneBuilder) -> (Leaves, Solids) {
 }
 
 /// The scene.
-#[must_use]
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("jungle");
     let (leaves, solids) = materials(&mut scene);

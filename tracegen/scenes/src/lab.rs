@@ -173,7 +173,6 @@ pub(super) fn vessel(
 }
 
 /// The scene.
-#[must_use]
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("lab");
     let kit = kit(&mut scene);

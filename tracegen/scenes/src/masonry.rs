@@ -13,7 +13,6 @@ pub struct Cell {
 }
 
 /// Rectangular blocks in courses, each course shifted by `shift` of a block.
-#[must_use]
 pub fn courses(u: f32, v: f32, columns: i32, rows: i32, shift: f32) -> Cell {
     let y = v * rows as f32;
     let row = y.floor();
@@ -27,7 +26,6 @@ pub fn courses(u: f32, v: f32, columns: i32, rows: i32, shift: f32) -> Cell {
 }
 
 /// Ashlar: courses of blocks with uneven lengths.
-#[must_use]
 pub fn ashlar(u: f32, v: f32, columns: i32, rows: i32) -> Cell {
     let y = v * rows as f32;
     let row = y.floor() as i32;
@@ -48,7 +46,6 @@ pub fn ashlar(u: f32, v: f32, columns: i32, rows: i32) -> Cell {
 }
 
 /// Square tiles set diagonally with small insets at the corners (id's lowest bit is set there).
-#[must_use]
 pub fn inset_tiles(u: f32, v: f32, count: i32, inset: f32) -> Cell {
     let (x, y) = (u * count as f32, v * count as f32);
     let (cx, cy) = (x.floor(), y.floor());
@@ -91,7 +88,6 @@ pub struct Masonry {
 
 impl Masonry {
     /// The texel at (`u`, `v`) inside `cell`.
-    #[must_use]
     pub fn texel(&self, u: f32, v: f32, cell: Cell) -> Texel {
         let noise = bank();
         let offset = (cell.id & 1023) as f32 / 1024.0;
@@ -120,7 +116,6 @@ impl Masonry {
 }
 
 /// Weathered running-bond brick, 8 bricks by 16 courses.
-#[must_use]
 pub fn brick(stones: [Rgb; 2]) -> Surface {
     let look = Masonry {
         stones,
@@ -138,7 +133,6 @@ pub fn brick(stones: [Rgb; 2]) -> Surface {
 }
 
 /// Dressed stone blocks of uneven length.
-#[must_use]
 pub fn dressed_stone(stones: [Rgb; 2], columns: i32, rows: i32, weather: f32) -> Surface {
     let look = Masonry {
         stones,
@@ -153,7 +147,6 @@ pub fn dressed_stone(stones: [Rgb; 2], columns: i32, rows: i32, weather: f32) ->
 }
 
 /// Large floor slabs, worn and half polished.
-#[must_use]
 pub fn slabs(stones: [Rgb; 2], columns: i32, rows: i32, rough: f32) -> Surface {
     let look = Masonry {
         stones,
@@ -168,7 +161,6 @@ pub fn slabs(stones: [Rgb; 2], columns: i32, rows: i32, rough: f32) -> Surface {
 }
 
 /// Octagonal tiles with dark insets.
-#[must_use]
 pub fn octagon_tiles(stones: [Rgb; 2], inset: Rgb, count: i32) -> Surface {
     let look = Masonry {
         stones,
@@ -194,7 +186,6 @@ pub fn octagon_tiles(stones: [Rgb; 2], inset: Rgb, count: i32) -> Surface {
 }
 
 /// Unjointed stone: columns, capitals, mouldings.
-#[must_use]
 pub fn carved_stone(stones: [Rgb; 2], veins: f32, pitting: f32, rough: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -226,7 +217,6 @@ pub fn carved_stone(stones: [Rgb; 2], veins: f32, pitting: f32, rough: f32) -> S
 }
 
 /// Painted or bare plaster with trowel marks, stains and peeled patches.
-#[must_use]
 pub fn plaster(paint: Rgb, under: Rgb, peeling: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -256,7 +246,6 @@ pub fn plaster(paint: Rgb, under: Rgb, peeling: f32) -> Surface {
 }
 
 /// A carved band: egg-and-dart between fillets, repeating along u.
-#[must_use]
 pub fn carved_band(stones: [Rgb; 2]) -> Surface {
     let stone = carved_stone(stones, 0.0, 0.6, 0.8);
     Box::new(move |u, v| {
@@ -275,7 +264,6 @@ pub fn carved_band(stones: [Rgb; 2]) -> Surface {
 }
 
 /// Half-round clay roof tiles in overlapping rows.
-#[must_use]
 pub fn roof_tiles(stones: [Rgb; 2]) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -305,7 +293,6 @@ pub fn roof_tiles(stones: [Rgb; 2]) -> Surface {
 }
 
 /// Polished tiles in two alternating stones, `count` (even) per side.
-#[must_use]
 pub fn checker(stones: [Rgb; 2], count: i32) -> Surface {
     let surfaces = stones.map(|s| carved_stone([s, mix(s, rgb(0x8f8a84), 0.35)], 0.5, 0.0, 0.2));
     Box::new(move |u, v| {

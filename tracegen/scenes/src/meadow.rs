@@ -147,7 +147,6 @@ fn upright_at(x: f32, z: f32, turn: f32, scale: f32) -> Affine3A {
 }
 
 /// The scene.
-#[must_use]
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("meadow");
     let kit = kit(&mut scene);

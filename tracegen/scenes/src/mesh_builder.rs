@@ -31,7 +31,6 @@ pub struct Knot {
 }
 
 /// A smooth knot.
-#[must_use]
 pub fn smooth(x: f32, y: f32) -> Knot {
     Knot {
         at: vec2(x, y),
@@ -40,7 +39,6 @@ pub fn smooth(x: f32, y: f32) -> Knot {
 }
 
 /// A knot with a sharp edge.
-#[must_use]
 pub fn sharp(x: f32, y: f32) -> Knot {
     Knot {
         at: vec2(x, y),
@@ -49,7 +47,6 @@ pub fn sharp(x: f32, y: f32) -> Knot {
 }
 
 /// A solid of revolution; see [`MeshBuilder::lathe`].
-#[must_use]
 pub fn lathed(profile: &[Knot], segments: usize) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     m.lathe(profile, segments);
@@ -57,7 +54,6 @@ pub fn lathed(profile: &[Knot], segments: usize) -> MeshBuilder {
 }
 
 /// Rounds a profile: `steps` points of a Catmull-Rom curve between each pair of smooth knots.
-#[must_use]
 pub fn curve(knots: &[Knot], steps: usize) -> Vec<Knot> {
     let mut out = Vec::with_capacity(knots.len() * steps);
     for i in 0..knots.len().saturating_sub(1) {
@@ -120,7 +116,6 @@ fn smooth_runs(profile: &[Knot]) -> Vec<Vec<(Vec2, Vec2)>> {
 
 impl MeshBuilder {
     /// An empty mesh.
-    #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
@@ -435,7 +430,6 @@ impl MeshBuilder {
     }
 
     /// The finished mesh: degenerate triangles dropped, tangents computed, uv divided by `tile_m`.
-    #[must_use]
     pub fn finish(mut self, name: &str, material: usize, tile_m: f32) -> Mesh {
         for uv in &mut self.uvs {
             *uv /= tile_m;
@@ -484,7 +478,6 @@ pub struct SweepFrame {
 
 impl SweepFrame {
     /// Frames along a polyline with minimal twist.
-    #[must_use]
     pub fn along(points: &[(Vec3, f32)]) -> Vec<Self> {
         let direction = |i: usize| {
             let (a, b) = (i.saturating_sub(1), (i + 1).min(points.len() - 1));

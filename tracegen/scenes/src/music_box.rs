@@ -89,7 +89,6 @@ fn kit(scene: &mut SceneBuilder) -> MusicBoxMaterials {
 }
 
 /// The scene.
-#[must_use]
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("music-box");
     let kit = kit(&mut scene);

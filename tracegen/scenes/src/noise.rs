@@ -18,7 +18,6 @@ pub struct Rng(Random);
 
 impl Rng {
     /// A generator whose sequence depends only on `seed`.
-    #[must_use]
     pub fn new(seed: u64) -> Self {
         Self(Random(seed ^ 0x5851_f42d_4c95_7f2d))
     }
@@ -50,7 +49,6 @@ impl Rng {
 }
 
 /// A well mixed hash of two integers and a seed.
-#[must_use]
 pub fn hash(x: i32, y: i32, seed: u32) -> u32 {
     let mut h = (x as u32).wrapping_mul(0x8da6_b343)
         ^ (y as u32).wrapping_mul(0xd816_3841)
@@ -63,20 +61,17 @@ pub fn hash(x: i32, y: i32, seed: u32) -> u32 {
 }
 
 /// [`hash`] as a number in 0..1.
-#[must_use]
 pub fn hash_unit(x: i32, y: i32, seed: u32) -> f32 {
     (hash(x, y, seed) >> 8) as f32 * (1.0 / 16_777_216.0)
 }
 
 /// Cubic step from 0 at `low` to 1 at `high`.
-#[must_use]
 pub fn smoothstep(low: f32, high: f32, x: f32) -> f32 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
 /// Linear interpolation.
-#[must_use]
 pub fn lerp(a: f32, b: f32, t: f32) -> f32 {
     a + (b - a) * t
 }
@@ -153,7 +148,6 @@ impl Field {
     }
 
     /// Nearest sample at (`u`, `v`), periodic.
-    #[must_use]
     pub fn at(&self, u: f32, v: f32) -> f32 {
         let x = (u * FIELD_SIZE as f32) as i32 as usize & (FIELD_SIZE - 1);
         let y = (v * FIELD_SIZE as f32) as i32 as usize & (FIELD_SIZE - 1);
@@ -161,7 +155,6 @@ impl Field {
     }
 
     /// Bilinear sample at (`u`, `v`), periodic.
-    #[must_use]
     pub fn smooth(&self, u: f32, v: f32) -> f32 {
         let (x, y) = (u * FIELD_SIZE as f32, v * FIELD_SIZE as f32);
         let (fx, fy) = (x.floor(), y.floor());
@@ -192,7 +185,6 @@ pub struct NoiseBank {
 }
 
 /// The shared fields, computed at first use.
-#[must_use]
 pub fn bank() -> &'static NoiseBank {
     static BANK: OnceLock<NoiseBank> = OnceLock::new();
     BANK.get_or_init(|| {

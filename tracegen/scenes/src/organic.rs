@@ -5,7 +5,6 @@ use super::texture_synth::{Rgb, Surface, Texel, mix, rgb, shade};
 use std::f32::consts::{PI, TAU};
 
 /// Planks with the grain along u.
-#[must_use]
 pub fn planks(woods: [Rgb; 2], rows: i32, rough: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -37,13 +36,11 @@ pub fn planks(woods: [Rgb; 2], rows: i32, rough: f32) -> Surface {
 }
 
 /// A surface with the grain along v instead of u.
-#[must_use]
 pub fn upright(surface: Surface) -> Surface {
     Box::new(move |u, v| surface(v, u))
 }
 
 /// One piece of polished wood with straight grain along u.
-#[must_use]
 pub fn polished_wood(woods: [Rgb; 2], rough: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -61,7 +58,6 @@ pub fn polished_wood(woods: [Rgb; 2], rough: f32) -> Surface {
 }
 
 /// Fissured bark with ridges along v.
-#[must_use]
 pub fn bark(colors: [Rgb; 2], moss: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -112,7 +108,6 @@ pub enum LeafShape {
 }
 
 /// A leaf with its coverage in alpha.
-#[must_use]
 pub fn leaf(shape: LeafShape, colors: [Rgb; 2]) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -251,7 +246,6 @@ fn grass(x: f32, y: f32) -> (f32, f32) {
 }
 
 /// Soil with pebbles and twigs, or a forest floor under leaf litter.
-#[must_use]
 pub fn soil(colors: [Rgb; 2], litter: Option<Rgb>, stones: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -288,7 +282,6 @@ pub fn soil(colors: [Rgb; 2], litter: Option<Rgb>, stones: f32) -> Surface {
 }
 
 /// Rock with cracks, strata, and moss on parts that face up in the texture.
-#[must_use]
 pub fn rock(colors: [Rgb; 2], moss: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -329,7 +322,6 @@ pub fn rock(colors: [Rgb; 2], moss: f32) -> Surface {
 }
 
 /// Woven cloth with a damask pattern that repeats `pattern` times per texture.
-#[must_use]
 pub fn damask(ground: Rgb, figure: Rgb, pattern: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -365,7 +357,6 @@ pub fn damask(ground: Rgb, figure: Rgb, pattern: f32) -> Surface {
 }
 
 /// Metal with scratches and, where `patina` is above zero, oxide in the hollows.
-#[must_use]
 pub fn metal(color: Rgb, oxide: Rgb, patina: f32, rough: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -389,7 +380,6 @@ pub fn metal(color: Rgb, oxide: Rgb, patina: f32, rough: f32) -> Surface {
 }
 
 /// Grass seen from above.
-#[must_use]
 pub fn turf(colors: [Rgb; 2], earth: Rgb) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -409,7 +399,6 @@ pub fn turf(colors: [Rgb; 2], earth: Rgb) -> Surface {
 }
 
 /// Scaly hide, darker along the folds.
-#[must_use]
 pub fn skin(colors: [Rgb; 2]) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
@@ -436,7 +425,6 @@ pub fn skin(colors: [Rgb; 2]) -> Surface {
 }
 
 /// A bottle's paper label with a border and lines of writing.
-#[must_use]
 pub fn paper_label(paper: Rgb, ink: Rgb) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();

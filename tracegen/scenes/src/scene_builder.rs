@@ -22,7 +22,6 @@ pub struct SceneBuilder {
 
 impl SceneBuilder {
     /// An empty scene.
-    #[must_use]
     pub fn new(name: &str) -> Self {
         Self {
             scene: Scene {
@@ -155,7 +154,6 @@ impl SceneBuilder {
     }
 
     /// The finished scene under a sky of the given radiance.
-    #[must_use]
     pub fn finish(mut self, sky: Vec3, shadow_cascades: u32) -> Scene {
         self.scene.sky = sky;
         self.scene.shadow_cascades = shadow_cascades;
@@ -163,7 +161,6 @@ impl SceneBuilder {
     }
 
     /// Triangles placed so far.
-    #[must_use]
     pub fn triangles(&self) -> u64 {
         self.scene.triangle_count()
     }

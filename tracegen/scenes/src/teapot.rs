@@ -32,7 +32,6 @@ fn bezier(patch: &[[f32; 3]; 16], u: f32, v: f32) -> Vec3 {
 }
 
 /// The tessellated teapot, foot at y = 0, spout along +x.
-#[must_use]
 pub fn teapot() -> MeshBuilder {
     let mut m = MeshBuilder::new();
     for patch in &PATCHES {
@@ -42,7 +41,6 @@ pub fn teapot() -> MeshBuilder {
 }
 
 /// The scene.
-#[must_use]
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("teapot");
     let recipe = |name, tile_m, surface| Recipe::new(name, 512, Maps::ColorNormal, tile_m, surface);

@@ -11,25 +11,21 @@ use std::sync::Arc;
 pub type Rgb = [f32; 3];
 
 /// The colour with the code 0xRRGGBB.
-#[must_use]
 pub fn rgb(hex: u32) -> Rgb {
     [hex >> 16, hex >> 8, hex].map(|c| (c & 255) as f32 / 255.0)
 }
 
 /// Linear mix of two colours.
-#[must_use]
 pub fn mix(a: Rgb, b: Rgb, t: f32) -> Rgb {
     std::array::from_fn(|i| lerp(a[i], b[i], t))
 }
 
 /// A colour times a factor.
-#[must_use]
 pub fn shade(a: Rgb, factor: f32) -> Rgb {
     a.map(|c| c * factor)
 }
 
 /// The linear-light value of an sRGB colour, for material factors.
-#[must_use]
 pub fn linear(color: Rgb) -> glam::Vec3 {
     glam::Vec3::from(color.map(srgb::decode_f32))
 }
@@ -53,7 +49,6 @@ pub struct Texel {
 
 impl Texel {
     /// An opaque, fully open dielectric.
-    #[must_use]
     pub fn new(color: Rgb, height: f32, rough: f32) -> Self {
         Self {
             color,
@@ -111,7 +106,6 @@ pub enum Map {
 
 impl Map {
     /// The image of this map of a recipe.
-    #[must_use]
     pub fn image(self, source: &Arc<RecipeSource>) -> Image {
         let (suffix, color_space) = match self {
             Self::Color => ("color", ColorSpace::Srgb),
@@ -133,7 +127,6 @@ impl Map {
 
 impl Maps {
     /// True where the material gets this image.
-    #[must_use]
     pub fn contains(self, map: Map) -> bool {
         match map {
             Map::Color => true,
@@ -156,7 +149,6 @@ pub struct RecipeSource {
 
 impl Recipe {
     /// A recipe; see the fields.
-    #[must_use]
     pub fn new(name: &'static str, size: u32, maps: Maps, tile_m: f32, surface: Surface) -> Self {
         Self {
             name,
@@ -168,7 +160,6 @@ impl Recipe {
     }
 
     /// The source of the recipe's images in a scene.
-    #[must_use]
     pub fn into_source(self, scene: &str) -> Arc<RecipeSource> {
         Arc::new(RecipeSource {
             recipe: self,

@@ -53,38 +53,32 @@ pub struct RawSample {
 
 impl RawSample {
     /// Number of the coordinate group in its shader.
-    #[must_use]
     pub fn group(&self) -> u16 {
         self.header as u16
     }
 
     /// Lanes of the quad, one bit each.
-    #[must_use]
     pub fn lanes(&self) -> u8 {
         (self.header >> LANES_SHIFT & 15) as u8
     }
 
     /// Column and row of the quad.
-    #[must_use]
     pub fn quad(&self) -> [u32; 2] {
         [self.place & 0x1fff, self.place >> 13 & 0x1fff]
     }
 
     /// View in a multiview pass.
-    #[must_use]
     pub fn view(&self) -> u32 {
         self.place >> 26
     }
 
     /// Interprets the data as those of a quad.
-    #[must_use]
     pub fn as_quad(&self) -> RawQuad {
         let lane = |number: usize| [self.values[2 * number], self.values[2 * number + 1]];
         RawQuad::of([0, 1, 2, 3].map(lane))
     }
 
     /// Interprets the data as those of a fragment.
-    #[must_use]
     pub fn as_fragment(&self) -> RawFragment {
         let v = &self.values;
         RawFragment {
@@ -111,7 +105,6 @@ pub struct RawQuad {
 
 impl RawQuad {
     /// Computes the differences from the coordinates of four lanes.
-    #[must_use]
     pub fn of([a, b, c, d]: [[f32; 2]; 4]) -> Self {
         let pair = |of: &dyn Fn(usize) -> f32| [of(0), of(1)];
         Self {
@@ -137,7 +130,6 @@ pub struct RawFragment {
 }
 
 /// Splits records into coordinate groups. Returns false if the last record is incomplete.
-#[must_use]
 pub fn unpack(mut units: &[Unit], mut each: impl FnMut(RawSample)) -> bool {
     while let Some((&first, rest)) = units.split_first() {
         let header = first[0];

@@ -55,7 +55,6 @@ impl Control {
     }
 
     /// Number of the frame that the launcher set.
-    #[must_use]
     pub fn frame(&self) -> u32 {
         self.word(Word::Frame).load(Ordering::SeqCst)
     }
@@ -66,7 +65,6 @@ impl Control {
     }
 
     /// Number of frames that the programs of all processes ended.
-    #[must_use]
     pub fn counted(&self) -> u32 {
         self.word(Word::Counted).load(Ordering::SeqCst)
     }
@@ -77,7 +75,6 @@ impl Control {
     }
 
     /// Number of requested frames that have ended, of all processes.
-    #[must_use]
     pub fn ended(&self) -> u32 {
         self.word(Word::Ended).load(Ordering::SeqCst)
     }

@@ -90,7 +90,6 @@ enum Command {
 }
 
 /// Parses the arguments, runs the subcommand and returns its exit code.
-#[must_use]
 pub fn main() -> ExitCode {
     shell::run(
         file_uses::FILES,

@@ -51,7 +51,6 @@ fn origin_parser() -> impl TypedValueParser<Value = PathOrigin> {
 
 impl PathArgs {
     /// The path of a single frame, at the start of every path.
-    #[must_use]
     pub fn still() -> Self {
         Self {
             path: PathSpec::Walk,
@@ -62,7 +61,6 @@ impl PathArgs {
     }
 
     /// The file that the path is read from.
-    #[must_use]
     pub fn file(&self) -> Option<PathBuf> {
         match &self.path {
             PathSpec::Walk | PathSpec::Head => None,

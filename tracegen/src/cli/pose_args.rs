@@ -23,7 +23,6 @@ pub struct PoseArgs {
 
 impl PoseArgs {
     /// The same options for a scene in this pose.
-    #[must_use]
     pub fn applied_to(&self, options: &LoadOptions) -> LoadOptions {
         LoadOptions {
             animation: self.animation.clone(),

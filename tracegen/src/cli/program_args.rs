@@ -138,7 +138,6 @@ impl ProgramArgs {
     }
 
     /// The trace to write, if one is.
-    #[must_use]
     pub fn output(&self) -> Option<&Path> {
         self.output.as_deref()
     }

@@ -37,7 +37,6 @@ pub struct SceneArgs {
 }
 
 /// A capture's outputs: the trace and optionally a picture.
-#[must_use]
 pub fn capture_outputs(trace: &Path, image: Option<&Path>) -> Vec<Output> {
     let mut outputs = vec![Output::binary("--output", trace)];
     outputs.extend(image.map(|image| Output::binary("--image", image)));
@@ -201,7 +200,6 @@ impl SceneSpec {
     }
 
     /// The file, if it is one.
-    #[must_use]
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -47,7 +47,6 @@ pub struct Counted {
 
 impl Counted {
     /// Counts of a frame of `fragments` that sample `texture_bytes`, from its plan and the backend's work.
-    #[must_use]
     pub fn of(plan: &FramePlan, occludes: bool, work: &Work, fragments: u64) -> Self {
         Self {
             fragments,
@@ -60,13 +59,11 @@ impl Counted {
     }
 
     /// All memory traffic.
-    #[must_use]
     pub fn bytes(&self) -> u64 {
         self.texture_bytes + self.vertex_bytes + self.picture_bytes + self.uploaded_bytes
     }
 
     /// Energy of the traffic and of shading, millijoules: for comparisons, with constants of a 45 nm process.
-    #[must_use]
     pub fn energy_mj(&self) -> f64 {
         let shading = MULTIPLY_ADD_PJ
             * (FRAGMENT_MULTIPLY_ADDS * self.fragments as f64

@@ -303,7 +303,6 @@ impl Folder {
     }
 
     /// The trace of a row: its path in the folder, and the file.
-    #[must_use]
     pub fn trace(&self, row: &str) -> (String, PathBuf) {
         let name = format!("traces/{row}.textrace");
         let path = self.root.join(&name);
@@ -337,14 +336,12 @@ impl Folder {
     }
 
     /// A finished row of this study, if it and all its files exist unchanged.
-    #[must_use]
     pub fn finished(&self, name: &str, settings: &Settings) -> Option<RowRecord> {
         let row: RowRecord = self.kept(name, settings)?;
         self.is_whole(&row).then_some(row)
     }
 
     /// Whether the row's pictures and its trace have the checksums in the row.
-    #[must_use]
     pub fn is_whole(&self, row: &RowRecord) -> bool {
         let picture = |(file, sum): (&String, &String)| {
             read_regular(&self.root.join(file)).is_ok_and(|bytes| checksum(&bytes) == *sum)
@@ -366,7 +363,6 @@ impl Folder {
     }
 
     /// The result that an earlier run of this study stored for a question under a name.
-    #[must_use]
     pub fn kept<T: for<'de> Deserialize<'de>>(
         &self,
         name: &str,

@@ -6,7 +6,6 @@ pub const RUN: u32 = 2;
 
 /// Runs of [`RUN`] frames, spread evenly over a path of `path_frames` from its first frame to its last:
 /// `frames` in all, at most the whole path. The last run is shorter if they do not divide evenly.
-#[must_use]
 pub fn runs(frames: u32, path_frames: u32) -> Vec<Vec<u32>> {
     let frames = frames.min(path_frames);
     let count = frames.div_ceil(RUN);

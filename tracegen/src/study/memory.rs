@@ -3,7 +3,6 @@
 use std::fs;
 
 /// Largest resident set since the start, or since [`forget_peak`].
-#[must_use]
 pub fn peak_bytes() -> Option<u64> {
     let status = fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;

@@ -4,7 +4,6 @@ use std::fs;
 use std::time::Duration;
 
 /// Sum over all threads, if the system reports it (Linux).
-#[must_use]
 pub fn time() -> Option<Duration> {
     let mut nanoseconds = 0_u64;
     for thread in fs::read_dir("/proc/self/task").ok()? {

@@ -57,7 +57,6 @@ impl PartialEq for Part {
 
 impl Part {
     /// Every technique, the baseline first.
-    #[must_use]
     pub fn all() -> Vec<Self> {
         let baseline = Culling::default();
         let others = Culling::all().filter(|culling| *culling != baseline);
@@ -68,7 +67,6 @@ impl Part {
     }
 
     /// Every technique with the settings that a search tries on a display.
-    #[must_use]
     pub fn options(hmd: &Hmd) -> Vec<Self> {
         let mut parts = Self::all();
         // A search renders single frames, and every other frame at half rate has no picture of its own.
@@ -116,13 +114,11 @@ impl Part {
     }
 
     /// Whether its error is a shift in pixels that is bounded for every frame.
-    #[must_use]
     pub fn is_shift(&self) -> bool {
         self.setting() == Setting::FarField
     }
 
     /// The setting that it changes.
-    #[must_use]
     pub fn setting(&self) -> Setting {
         match self.change {
             Change::Culling(_) => Setting::Culling,
@@ -364,7 +360,6 @@ impl Row {
     ///
     /// # Panics
     /// Never, because the baseline is a technique.
-    #[must_use]
     pub fn baseline() -> Self {
         Self::parse(Culling::default().name()).expect("the baseline is a technique")
     }
@@ -373,7 +368,6 @@ impl Row {
     ///
     /// # Panics
     /// Never, because the tests parse every row.
-    #[must_use]
     pub fn all() -> Vec<Self> {
         let alone = Part::all().into_iter();
         let alone = alone.map(|part| Self::parse(&part.name).expect("a technique is a row"));
@@ -384,7 +378,6 @@ impl Row {
     ///
     /// # Panics
     /// Never, because the tests parse every row.
-    #[must_use]
     pub fn combinations() -> Vec<Self> {
         let parse = |name: &str| Self::parse(name).expect("rows of the table are techniques");
         COMBINATIONS.iter().map(|(_, name)| parse(name)).collect()

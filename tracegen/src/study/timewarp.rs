@@ -40,7 +40,6 @@ const PIXEL_BYTES: usize = 4;
 
 /// Reprojects both eyes' pictures of a frame shown `before` to the head's pose `now`: rotated, and translated
 /// if their depth is known.
-#[must_use]
 pub fn reproject(
     shown: &Shown,
     before: &FrameViews,

@@ -21,13 +21,11 @@ pub struct Extent {
 
 impl Extent {
     /// The measured frames, ascending.
-    #[must_use]
     pub fn frames(&self) -> Vec<u32> {
         self.runs.concat()
     }
 
     /// Steps of progress of one row.
-    #[must_use]
     pub fn steps(&self) -> u64 {
         self.frames().len() as u64 * (1 + u64::from(self.repeats))
     }

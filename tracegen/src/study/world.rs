@@ -76,7 +76,6 @@ pub struct Shot {
 
 impl Shot {
     /// Its counts, without textures, which require a capture.
-    #[must_use]
     pub fn counted(&self, fragments: u64) -> Counted {
         if let Some(reprojection) = &self.reprojection {
             return Counted {
@@ -106,7 +105,6 @@ impl World {
     }
 
     /// The job that captures the plans of `planner`.
-    #[must_use]
     pub fn job<'a>(&'a self, planner: &'a Planner) -> CaptureJob<'a> {
         CaptureJob {
             scene: &self.scene,
@@ -286,7 +284,6 @@ impl World {
 }
 
 /// Near and far end of the cascades: from the near plane to where the scene ends.
-#[must_use]
 pub fn shadow_range_m(camera: &Camera, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f32; 2] {
     let farthest = (camera.eye - lo)
         .abs()
@@ -309,7 +306,6 @@ pub struct Tracer<'a, W: Write + Seek> {
 
 impl<'a, W: Write + Seek> Tracer<'a, W> {
     /// A trace with these tables.
-    #[must_use]
     pub fn new(tables: &'a Tables, writer: TextraceWriter<W>) -> Self {
         Self {
             tables,
@@ -336,7 +332,6 @@ impl<'a, W: Write + Seek> Tracer<'a, W> {
     }
 
     /// The writer, to finish the trace.
-    #[must_use]
     pub fn into_writer(self) -> TextraceWriter<W> {
         self.writer
     }

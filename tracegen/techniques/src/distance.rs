@@ -27,7 +27,6 @@ pub struct Head {
 
 impl Head {
     /// The head of a frame on a display.
-    #[must_use]
     pub fn new(views: &FrameViews, hmd: &Hmd) -> Self {
         let [left, right] = views.eyes.map(|eye| Vec3::from_array(eye.position));
         let [width, height] = hmd.eye_size_px.map(|size| size as f32);
@@ -42,7 +41,6 @@ impl Head {
 
 impl DistanceCull {
     /// Whether a draw with these world-space bounds is drawn.
-    #[must_use]
     pub fn keeps(&self, head: &Head, [low, high]: [Vec3; 2]) -> bool {
         // Draws without finite bounds are drawn.
         match *self {

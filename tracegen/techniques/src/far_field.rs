@@ -173,7 +173,6 @@ impl FarField {
 
 impl Stereo {
     /// The far field's camera for two eyes with pictures of `size_px` in a frame.
-    #[must_use]
     pub fn new(eyes: &[EyeView; 2], size_px: [u32; 2], variant: Variant, frame: u32) -> Self {
         let eyes = [Eye::new(&eyes[0]), Eye::new(&eyes[1])];
         let world_from_camera = match variant {
@@ -189,7 +188,6 @@ impl Stereo {
     }
 
     /// Largest shift in pixels of a point beyond a split at `split_m`.
-    #[must_use]
     pub fn worst_shift_px(&self, split_m: f32) -> f32 {
         let shift = |eye: &Eye| {
             let room = self.plane_m(f64::from(split_m)) - self.camera_in(eye).z;
@@ -203,7 +201,6 @@ impl Stereo {
     }
 
     /// Nearest split for which no point beyond it is shifted by more than `shift_px`.
-    #[must_use]
     pub fn split_m(&self, shift_px: f32) -> f32 {
         let plane = |eye: &Eye| self.camera_in(eye).z + self.shift_px_m(eye) / f64::from(shift_px);
         let exact = plane(&self.eyes[0]).max(plane(&self.eyes[1])) / self.plane_m(1.0);
@@ -218,7 +215,6 @@ impl Stereo {
     }
 
     /// Nearest and farthest visible distance.
-    #[must_use]
     pub fn range_m(&self) -> [f32; 2] {
         let [a, b] = &self.eyes;
         [a.near_m.min(b.near_m) as f32, a.far_m.max(b.far_m) as f32]

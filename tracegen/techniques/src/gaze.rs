@@ -31,7 +31,6 @@ impl Default for Gaze {
 
 impl Gaze {
     /// Degrees to the right and up of straight ahead at a time.
-    #[must_use]
     pub fn at(&self, time_s: f32) -> [f32; 2] {
         let samples = match self {
             Self::Fixed(deg) => return *deg,

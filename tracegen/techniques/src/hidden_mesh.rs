@@ -26,14 +26,12 @@ pub struct HiddenMesh {
 
 impl HiddenMesh {
     /// Triangles of eye 0 (left) or 1 (right).
-    #[must_use]
     pub fn eye(&self, eye: usize) -> &[Triangle] {
         [&self.left, &self.right][eye]
     }
 
     /// Visible pixels of an eye's picture. A pixel is hidden if its centre is inside a triangle or on its
     /// edge, as on a GPU that draws the mesh before the scene.
-    #[must_use]
     pub fn shown(&self, eye: usize, size_px: [u32; 2]) -> Mask {
         let [width, height] = size_px.map(|size| size as usize);
         let mut shown = vec![true; width * height];

@@ -28,7 +28,6 @@ pub struct Layer {
 
 impl Layer {
     /// The whole picture of an eye at its full size.
-    #[must_use]
     pub fn whole(eye: Eye, view: EyeView, size_px: [u32; 2]) -> Self {
         Self {
             eye: Some(eye),
@@ -42,20 +41,17 @@ impl Layer {
     }
 
     /// Whether it has all draws, the sky and no mask.
-    #[must_use]
     pub fn is_plain(&self) -> bool {
         self.mask.is_none() && self.start == Start::Sky && self.draws == Stage::All
     }
 
     /// World to clip space.
-    #[must_use]
     pub fn clip_from_world(&self) -> Mat4 {
         Mat4::from_cols_array_2d(&self.view.eye_to_clip)
             * Mat4::from_cols_array_2d(&self.view.world_to_eye)
     }
 
     /// World to a clip space whose far end is the end of the drawn geometry.
-    #[must_use]
     pub fn drawn_from_world(&self) -> Mat4 {
         match self.start {
             Start::Nearer { end } => {
@@ -73,7 +69,6 @@ impl Layer {
     }
 
     /// Whether a draw with these world-space bounds may touch a pixel that may be drawn. True in doubt.
-    #[must_use]
     pub fn may_draw(&self, [low, high]: [Vec3; 2]) -> bool {
         let Some(mask) = &self.mask else { return true };
         let clip_from_world = self.clip_from_world();
@@ -105,7 +100,6 @@ impl Layer {
     }
 
     /// Number of pixels that may be drawn.
-    #[must_use]
     pub fn drawn_px(&self) -> u64 {
         let all = u64::from(self.size_px[0]) * u64::from(self.size_px[1]);
         self.mask.as_ref().map_or(all, |mask| mask.count())

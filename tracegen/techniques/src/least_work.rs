@@ -27,7 +27,6 @@ pub struct Object {
 impl Object {
     /// A draw with these world-space bounds, seen by two eyes with pictures of `size_px`; `None` if neither
     /// eye sees it.
-    #[must_use]
     pub fn of_bounds(
         [low, high]: [Vec3; 2],
         triangles: u32,
@@ -109,7 +108,6 @@ pub struct Pixels {
 
 /// The split, at least `nearest_m`, with the least cost for a frame of `objects`; `None` if a frame without a
 /// far field costs least.
-#[must_use]
 pub fn least_work(
     objects: &[Object],
     pixels: Pixels,

@@ -15,7 +15,6 @@ pub struct Mask {
 
 impl Mask {
     /// The pixels of a layer of `size_px` for which `drawn(x, y)` holds.
-    #[must_use]
     pub fn new(size_px: [u32; 2], drawn: impl Fn(u32, u32) -> bool) -> Self {
         let rows = (0..size_px[1]).flat_map(|y| (0..size_px[0]).map(move |x| (x, y)));
         Self::of(size_px, rows.map(|(x, y)| drawn(x, y)).collect())
@@ -47,7 +46,6 @@ impl Mask {
     }
 
     /// The mask extended by all pixels at a distance of at most `by` columns and rows.
-    #[must_use]
     pub fn grown(&self, by: [u32; 2]) -> Self {
         let [width, height] = self.size_px;
         let near = |at: u32, by: u32, size: u32| at.saturating_sub(by)..(at + by + 1).min(size);
@@ -60,13 +58,11 @@ impl Mask {
     }
 
     /// Width and height of the layer.
-    #[must_use]
     pub fn size_px(&self) -> [u32; 2] {
         self.size_px
     }
 
     /// Whether a pixel may be drawn; false outside the layer.
-    #[must_use]
     pub fn get(&self, x: u32, y: u32) -> bool {
         x < self.size_px[0]
             && y < self.size_px[1]
@@ -74,33 +70,28 @@ impl Mask {
     }
 
     /// One flag per pixel, row by row.
-    #[must_use]
     pub fn flags(&self) -> &[bool] {
         &self.drawn
     }
 
     /// The first pixel that may be drawn, row by row.
-    #[must_use]
     pub fn first(&self) -> Option<[u32; 2]> {
         let at = self.drawn.iter().position(|drawn| *drawn)? as u32;
         Some([at % self.size_px[0], at / self.size_px[0]])
     }
 
     /// Number of pixels that may be drawn.
-    #[must_use]
     pub fn count(&self) -> u64 {
         self.drawn.iter().filter(|drawn| **drawn).count() as u64
     }
 
     /// Whether a tile (16x16 pixels) that touches a rectangle has a pixel that may be drawn; the end of the
     /// rectangle is exclusive.
-    #[must_use]
     pub fn any_in(&self, [left, top]: [u32; 2], [right, bottom]: [u32; 2]) -> bool {
         self.tiles_in([left, top], [right, bottom]) > 0
     }
 
     /// Number of tiles with a pixel that may be drawn.
-    #[must_use]
     pub fn tile_count(&self) -> u32 {
         self.tiles_in([0, 0], self.size_px)
     }
@@ -118,7 +109,6 @@ impl Mask {
 
     /// Origin and size of the smallest rectangle of whole tiles, clipped at the edge, that contains all
     /// pixels that may be drawn; `None` if there are none.
-    #[must_use]
     pub fn bounds_px(&self) -> Option<[[u32; 2]; 2]> {
         if self.tile_count() == 0 {
             return None;

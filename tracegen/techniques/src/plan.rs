@@ -80,7 +80,6 @@ const PIXEL_BYTES: u64 = 4;
 impl FramePlan {
     /// Size of the targets. Consecutive passes share a depth buffer of the largest size, except layers whose
     /// depth a later layer reads. Views that are drawn `at_once` have one depth buffer each.
-    #[must_use]
     pub fn target_bytes(&self, at_once: bool) -> TargetBytes {
         let bytes = |[width, height]: [u32; 2]| PIXEL_BYTES * u64::from(width) * u64::from(height);
         let is_read_later = |number: usize| {
@@ -109,7 +108,6 @@ impl FramePlan {
     }
 
     /// Whether a layer is the unmodified picture of an eye.
-    #[must_use]
     pub fn is_picture(&self, layer: usize) -> bool {
         self.pictures.contains(&PictureSource::Layer(layer))
     }

@@ -73,25 +73,21 @@ impl Planner {
     }
 
     /// The eyes of the frames.
-    #[must_use]
     pub fn eyes(&self) -> &[Eye] {
         &self.eyes
     }
 
     /// The settings.
-    #[must_use]
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
     /// The display.
-    #[must_use]
     pub fn hmd(&self) -> &Hmd {
         &self.hmd
     }
 
     /// Visible parts of the left and right eye's picture.
-    #[must_use]
     pub fn lenses(&self) -> &[Lens; 2] {
         &self.lenses
     }

@@ -130,13 +130,11 @@ impl Default for Rates {
 
 impl Settings {
     /// Whether invisible pixels are masked, by the lens's circle or by a mesh.
-    #[must_use]
     pub fn masks_hidden_area(&self) -> bool {
         self.hidden_area_mask || self.hidden_area_mesh.is_some()
     }
 
     /// Whether a frame is reprojected from the previous one instead of rendered.
-    #[must_use]
     pub fn reprojects(&self, frame: u32) -> bool {
         self.half_rate.is_some() && frame % 2 == 1
     }

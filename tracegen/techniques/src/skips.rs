@@ -46,7 +46,6 @@ impl Skips {
     };
 
     /// All skips except the named ones.
-    #[must_use]
     pub fn without(kept: &[Skip]) -> Self {
         let mut skips = Self::default();
         for Skip(number) in kept {

@@ -8,7 +8,6 @@ use glam::{DMat3, DMat4, DVec3, DVec4};
 
 /// Homogeneous map from pixels of an eye's current picture to pixels of its picture `before`. If the third
 /// coordinate is 0 or less, the direction was behind the eye.
-#[must_use]
 pub fn before_from_now_px(before: &EyeView, now: &EyeView, size_px: [u32; 2]) -> DMat3 {
     let [width, height] = size_px.map(f64::from);
     // Homogeneous clip space (x, y, w) to pixels; rows are numbered downwards.
@@ -42,7 +41,6 @@ const STEPS: u32 = 6;
 
 impl<'a> ByDepth<'a> {
     /// Maps between two poses of an eye; `depth` is that of the earlier picture.
-    #[must_use]
     pub fn new(before: &EyeView, now: &EyeView, depth: &'a [f32], size_px: [u32; 2]) -> Self {
         let clip = |eye: &EyeView| wide(&eye.eye_to_clip) * wide(&eye.world_to_eye);
         Self {
@@ -57,7 +55,6 @@ impl<'a> ByDepth<'a> {
     /// iteration starts at the position for infinite distance. Each step projects the surface found there
     /// into the current picture and corrects the position by the difference. If there is no surface, the
     /// result is the start position.
-    #[must_use]
     pub fn before_px(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let turned = self.turned * DVec3::new(x, y, 1.0);
         let turned = [turned.x / turned.z, turned.y / turned.z];

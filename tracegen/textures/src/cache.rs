@@ -64,7 +64,6 @@ pub struct Cache {
 
 impl Cache {
     /// A cache of at most `limit_bytes` bytes in `folder`, which is created with the first file.
-    #[must_use]
     pub fn new(folder: PathBuf, limit_bytes: u64) -> Self {
         Self {
             folder,

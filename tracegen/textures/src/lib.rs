@@ -49,7 +49,6 @@ pub struct CompressedTexture {
 impl CompressedTexture {
     /// The texture in a format that every driver supports: BC1, BC3 and RGBA8 unchanged, other blocks decoded
     /// to RGBA8. Texture coordinates do not depend on the format.
-    #[must_use]
     pub fn for_driver(&self) -> Cow<'_, Self> {
         let own = &self.texture;
         match self.held {
@@ -174,13 +173,11 @@ impl TextureSet {
     }
 
     /// Size of all blocks in bytes.
-    #[must_use]
     pub fn bytes(&self) -> usize {
         self.textures.iter().map(|t| t.blocks.len()).sum()
     }
 
     /// Size of the levels that are never sampled, including those of invisible textures, in bytes.
-    #[must_use]
     pub fn skipped_bytes(&self) -> usize {
         self.textures
             .iter()
@@ -195,14 +192,12 @@ impl TextureSet {
     }
 
     /// Number of textures without their finest levels, which are never sampled.
-    #[must_use]
     pub fn shortened(&self) -> usize {
         let shortened = |t: &&CompressedTexture| t.first_level > 0 && !t.blocks.is_empty();
         self.textures.iter().filter(shortened).count()
     }
 
     /// Number of textures that are not visible in any view.
-    #[must_use]
     pub fn unseen(&self) -> usize {
         self.textures.iter().filter(|t| t.blocks.is_empty()).count()
     }

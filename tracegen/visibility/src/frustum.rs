@@ -5,7 +5,6 @@ use glam::{Mat4, Vec3, Vec4};
 /// Indices of the world-space bounds that are not completely outside one plane of the frustum.
 ///
 /// The test is conservative: invisible bounds may be included, as are bounds with NaN.
-#[must_use]
 pub fn visible(bounds: impl IntoIterator<Item = [Vec3; 2]>, clip_from_world: Mat4) -> Vec<u32> {
     let planes = frustum_planes(clip_from_world);
     (0_u32..)
@@ -17,7 +16,6 @@ pub fn visible(bounds: impl IntoIterator<Item = [Vec3; 2]>, clip_from_world: Mat
 
 /// Restricts clip space to a region of a view of `size_px`. `crop(..) * clip_from_world` is the clip matrix
 /// of the region enlarged by one pixel, because vertices are rounded to the rasteriser's grid.
-#[must_use]
 pub fn crop(origin_px: [u32; 2], region_px: [u32; 2], size_px: [u32; 2]) -> Mat4 {
     let axis = |axis: usize| {
         let ndc = |px: f32| 2.0 * px / size_px[axis] as f32 - 1.0;

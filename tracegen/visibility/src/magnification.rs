@@ -32,7 +32,6 @@ pub struct Pixels {
 /// A lower bound of the squared length of the longer derivative, in units of `uv` per pixel, over all pixels
 /// in which the view may sample the mesh. Infinity if there are none; 0 if no bound is known. Multiply it by
 /// the number of texels of a texture (width times height) to get the bound in texels.
-#[must_use]
 pub fn least_derivative_squared(
     positions: &[Vec3],
     indices: &[u32],

@@ -45,7 +45,6 @@ impl Receivers {
     ///
     /// # Panics
     /// More than 8 volumes.
-    #[must_use]
     pub fn new(volumes: &[Volume]) -> Self {
         assert!(
             volumes.len() <= MAX_VOLUMES,
@@ -77,13 +76,11 @@ impl Receivers {
     }
 
     /// Whether every volume has been found.
-    #[must_use]
     pub fn all(&self) -> bool {
         self.found.iter().all(|found| *found)
     }
 
     /// Whether each volume has been found so far.
-    #[must_use]
     pub fn found(&self) -> &[bool] {
         &self.found
     }

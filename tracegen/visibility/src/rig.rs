@@ -40,14 +40,12 @@ pub const MAX_COMBINED_DEG: f64 = 179.0;
 impl Rig {
     /// # Panics
     /// There are no eyes.
-    #[must_use]
     pub fn new(eyes: Vec<Eye>) -> Self {
         assert!(!eyes.is_empty(), "somebody has to look");
         Self { eyes }
     }
 
     /// The eyes, left before right.
-    #[must_use]
     pub fn eyes(&self) -> &[Eye] {
         &self.eyes
     }

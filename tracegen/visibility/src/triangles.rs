@@ -5,7 +5,6 @@ use glam::{Affine3A, Mat4, Vec3, Vec4};
 
 /// False only if each triangle is completely outside one plane of the frustum. This is more exact than
 /// testing the box around a mesh that spans the scene. True in doubt, as for coordinates with NaN.
-#[must_use]
 pub fn any_inside(
     positions: &[Vec3],
     indices: &[u32],

@@ -49,7 +49,6 @@ pub enum Of {
 }
 
 /// The measured errors of these figures.
-#[must_use]
 pub fn known(of: Of) -> Vec<&'static KnownError> {
     let rays = |error: &&KnownError| error.figure == REUSE.key;
     let wanted = ERRORS
@@ -86,7 +85,6 @@ fn by_figure(of: Of) -> Vec<Figure> {
 }
 
 /// The table: one row per figure, with the maximum error of each source.
-#[must_use]
 pub fn table(of: Of) -> Table {
     let mut columns = vec![
         Column::text("name", "largest error of", |f: &Figure| {
@@ -103,7 +101,6 @@ pub fn table(of: Of) -> Table {
 }
 
 /// The table with its heading, for a terminal; empty if nothing was measured.
-#[must_use]
 pub fn text(of: Of) -> String {
     source(of).map_or_else(String::new, |source| {
         format!("\nError of the figures ({source})\n{}", table(of).text())
@@ -111,7 +108,6 @@ pub fn text(of: Of) -> String {
 }
 
 /// The table as a section of a page; `None` if nothing was measured.
-#[must_use]
 pub fn section(of: Of) -> Option<Section> {
     let source = source(of)?;
     Some(Section::new(

@@ -50,7 +50,6 @@ impl Section {
 }
 
 /// Lower-case letters and digits of a title, joined by hyphens.
-#[must_use]
 pub(super) fn slug(title: &str) -> String {
     let mut out = String::new();
     for c in title.chars() {
@@ -64,7 +63,6 @@ pub(super) fn slug(title: &str) -> String {
 }
 
 /// The whole page.
-#[must_use]
 pub fn page(title: &str, answer: &Answer, sections: &[Section]) -> String {
     let notices = crate::notices::printed();
     html! {
@@ -101,7 +99,6 @@ pub fn page(title: &str, answer: &Answer, sections: &[Section]) -> String {
 }
 
 /// A picture with a caption; wide pictures scroll in their own box.
-#[must_use]
 pub fn figure(svg: &str, caption: &str) -> Markup {
     html! {
         figure {
@@ -112,7 +109,6 @@ pub fn figure(svg: &str, caption: &str) -> Markup {
 }
 
 /// Pictures in rows that wrap to the window's width.
-#[must_use]
 pub fn figures(pictures: &[(String, String)]) -> Markup {
     html! {
         div.row { @for (svg, caption) in pictures { (figure(svg, caption)) } }
@@ -120,7 +116,6 @@ pub fn figures(pictures: &[(String, String)]) -> Markup {
 }
 
 /// Preformatted text (configuration, command lines) in a collapsible element.
-#[must_use]
 pub fn folded(summary: &str, text: &str) -> Markup {
     html! { details { summary { (summary) } pre { (text) } } }
 }

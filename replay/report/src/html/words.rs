@@ -1,7 +1,6 @@
 //! Words for computed sentences.
 
 /// A number with its noun: `1 frame`, `2 frames`.
-#[must_use]
 pub fn count(number: usize, noun: &str) -> String {
     let number = crate::theme::group_thousands(&number.to_string());
     let plural = match number.as_str() {
@@ -12,7 +11,6 @@ pub fn count(number: usize, noun: &str) -> String {
 }
 
 /// Names as a list: `a`, `a and b`, `a, b and c`; at most `most` of them, then how many more.
-#[must_use]
 pub fn list<S: AsRef<str>>(names: &[S], most: usize) -> String {
     let names: Vec<&str> = names.iter().map(AsRef::as_ref).collect();
     if names.len() > most.max(1) {
@@ -28,7 +26,6 @@ pub fn list<S: AsRef<str>>(names: &[S], most: usize) -> String {
 
 /// A change in percent as words: `12.3 % less`, `0.4 % more`, `as much`. Changes that round to zero are
 /// none.
-#[must_use]
 pub fn change(pct: f64, less: &str, more: &str, same: &str) -> String {
     let size = format!("{:.1}", pct.abs());
     if size == "0.0" {

@@ -78,19 +78,16 @@ impl Summary<'_> {
     }
 
     /// A count as a percentage of the line accesses.
-    #[must_use]
     pub fn share_pct(&self, count: u64) -> Option<f64> {
         pct(count, self.figures.accesses)
     }
 
     /// Misses of a fully associative cache of this size under OPT.
-    #[must_use]
     pub fn opt_misses(&self) -> u64 {
         self.figures.misses(&self.figures.opt_of_size())
     }
 
     /// Misses of the configured geometry under OPT.
-    #[must_use]
     pub fn opt_ways_misses(&self) -> u64 {
         self.figures.misses(&self.figures.opt_of_geometry)
     }
@@ -139,7 +136,6 @@ pub const SHORT: [&str; 15] = [
 ];
 
 /// Columns of the summary.
-#[must_use]
 #[rustfmt::skip]
 pub fn summary<'a>() -> Vec<Column<'a, Summary<'a>>> {
     type C<'a> = Column<'a, Summary<'a>>;
@@ -214,7 +210,6 @@ pub fn summary<'a>() -> Vec<Column<'a, Summary<'a>>> {
 }
 
 /// Columns of the curves.
-#[must_use]
 #[rustfmt::skip]
 pub fn curves<'a>() -> Vec<Column<'a, CurvePoint<'a>>> {
     type C<'a> = Column<'a, CurvePoint<'a>>;
@@ -238,27 +233,23 @@ pub fn curves<'a>() -> Vec<Column<'a, CurvePoint<'a>>> {
 
 impl CurvePoint<'_> {
     /// Size of the cache.
-    #[must_use]
     pub fn size_bytes(&self) -> u64 {
         self.cache.lines * u64::from(self.of.line_bytes)
     }
 
     /// Misses in percent of the line accesses.
-    #[must_use]
     pub fn line_miss_pct(&self) -> Option<f64> {
         let hits: u64 = self.cache.hits.iter().sum();
         pct(self.accesses - hits, self.accesses)
     }
 
     /// Hits whose previous use was in a tile of the other eye, percent of the line accesses.
-    #[must_use]
     pub fn other_eye_pct(&self) -> Option<f64> {
         pct(self.cache.hits[Origin::OtherEye.index()], self.accesses)
     }
 }
 
 /// Columns of reuses by distance.
-#[must_use]
 pub fn distances<'a>() -> Vec<Column<'a, Reuses<'a>>> {
     let mut columns = subject_columns(|r: &Reuses| &r.of);
     columns.extend([
@@ -273,7 +264,6 @@ pub fn distances<'a>() -> Vec<Column<'a, Reuses<'a>>> {
 }
 
 /// Columns of working sets.
-#[must_use]
 #[rustfmt::skip]
 pub fn working_sets<'a>() -> Vec<Column<'a, Window<'a>>> {
     type C<'a> = Column<'a, Window<'a>>;
@@ -295,7 +285,6 @@ pub fn working_sets<'a>() -> Vec<Column<'a, Window<'a>>> {
 
 impl Window<'_> {
     /// Mean over the stretches.
-    #[must_use]
     pub fn mean(&self, sum: u64) -> f64 {
         sum as f64 / self.set.stretches as f64
     }

@@ -177,13 +177,11 @@ impl LocalityReport {
     }
 
     /// Every figure of every stream.
-    #[must_use]
     pub fn table(&self) -> Table {
         Table::new(&columns::summary(), &self.summaries()).grouped_by(1)
     }
 
     /// The figures for a terminal.
-    #[must_use]
     pub fn text(&self) -> String {
         let one = self.traces.len() == 1;
         let keys = columns::SHORT.into_iter();
@@ -192,13 +190,11 @@ impl LocalityReport {
     }
 
     /// Every figure in full precision.
-    #[must_use]
     pub fn csv(&self) -> String {
         self.table().csv()
     }
 
     /// The tables of [`Self::CSV_FILES`].
-    #[must_use]
     pub fn csv_files(&self) -> Vec<(&'static str, String)> {
         let rows = self.summaries();
         let curves: Vec<_> = rows.iter().flat_map(Self::curve).collect();
@@ -257,7 +253,6 @@ impl LocalityReport {
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     use crate::schemas::WithRows;
     formats::schemas::Published::of::<LocalityJson<'_, '_>>(SCHEMA)

@@ -226,11 +226,7 @@ fn meanings(table: &Table) -> Markup {
     html! {
         details {
             summary { "definitions of the columns" }
-            dl.note {
-                @for h in table.headings.iter().filter(|h| !h.about.is_empty()) {
-                    dt { (h.name) @if !h.unit.is_empty() { ", " (h.unit) } } dd { (h.about) }
-                }
-            }
+            (table.meanings())
         }
     }
 }

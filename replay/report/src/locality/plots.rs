@@ -54,7 +54,6 @@ fn full_lru<'a>(row: &Summary<'a>) -> impl Iterator<Item = CurvePoint<'a>> {
 }
 
 /// Misses of fully associative LRU caches of every size.
-#[must_use]
 pub(super) fn miss_ratio(rows: &[Summary]) -> LineChart {
     let y = Axis::doublings("misses, % of line accesses", Doublings::Numbers);
     over_sizes(
@@ -70,7 +69,6 @@ pub(super) fn miss_ratio(rows: &[Summary]) -> LineChart {
 }
 
 /// Hits whose previous use was by the other eye.
-#[must_use]
 pub fn other_eye(rows: &[Summary]) -> LineChart {
     let y = Axis::linear("hits whose previous use was by the other eye, % of line accesses");
     over_sizes(
@@ -86,7 +84,6 @@ pub fn other_eye(rows: &[Summary]) -> LineChart {
 }
 
 /// LRU misses over OPT misses.
-#[must_use]
 pub(super) fn above_opt(rows: &[Summary]) -> LineChart {
     let y = Axis::linear("LRU misses over OPT misses");
     over_sizes(
@@ -107,7 +104,6 @@ pub(super) fn above_opt(rows: &[Summary]) -> LineChart {
 }
 
 /// Miss ratio by size, a line for each associativity.
-#[must_use]
 pub(super) fn associativity(row: &Summary) -> LineChart {
     let curve = LocalityReport::curve(row);
     let lru = || curve.iter().filter(|p| p.policy == "lru");
@@ -161,7 +157,6 @@ fn bins_from<'a>(row: &Summary<'a>, from: u64) -> impl Iterator<Item = Reuses<'a
 }
 
 /// Reuses at distances of at least `from`, by the origin of the previous use, one chart per order.
-#[must_use]
 pub fn distances(rows: &[Summary], from: u64) -> Vec<StackedChart> {
     let share =
         |row: &Summary, count: u64| 100.0 * count as f64 / row.figures.accesses.max(1) as f64;
@@ -210,13 +205,11 @@ fn short(number: u64) -> String {
 }
 
 /// Reuses at smaller distances, percent of the line accesses. `from` is 1 or the start of a bin.
-#[must_use]
 pub(super) fn nearer_pct(row: &Summary, from: u64) -> Option<f64> {
     row.share_pct(row.figures.distances.hits(from).iter().sum())
 }
 
 /// Mean working set by length of the stretch.
-#[must_use]
 pub fn working_sets(rows: &[Summary]) -> LineChart {
     let series = |row: &Summary| {
         let points = LocalityReport::working_sets(row).into_iter().map(|window| {
@@ -241,7 +234,6 @@ pub fn working_sets(rows: &[Summary]) -> LineChart {
 }
 
 /// Share of a working set that both eyes use.
-#[must_use]
 pub(super) fn shared_working_sets(rows: &[Summary]) -> LineChart {
     let series = |row: &Summary| {
         let points = LocalityReport::working_sets(row).into_iter().map(|window| {
@@ -263,7 +255,6 @@ pub(super) fn shared_working_sets(rows: &[Summary]) -> LineChart {
 }
 
 /// The configured cache's misses by cause.
-#[must_use]
 pub fn causes(rows: &[Summary]) -> StackedChart {
     let names = ["compulsory", "capacity", "conflict"]
         .into_iter()
@@ -289,7 +280,6 @@ pub fn causes(rows: &[Summary]) -> StackedChart {
 }
 
 /// Misses of the configured cache and of a fully associative one, with LRU and with OPT.
-#[must_use]
 pub fn bounds(rows: &[Summary]) -> BarChart {
     let names = ["as configured", "full LRU", "OPT, ways", "full OPT"];
     let group = |row: &Summary| BarGroup {

@@ -36,7 +36,6 @@ fn part(row: &Row<'_>, of: fn(Order) -> String) -> Option<String> {
 }
 
 /// Columns of the rows.
-#[must_use]
 #[rustfmt::skip]
 pub fn rows<'a>() -> Vec<Column<'a, Row<'a>>> {
     type C<'a> = Column<'a, Row<'a>>;
@@ -109,7 +108,6 @@ fn row_hit_rate(row: &Row<'_>) -> Option<f64> {
 }
 
 /// Columns of the means.
-#[must_use]
 #[rustfmt::skip]
 pub fn means<'a>() -> Vec<Column<'a, Mean<'a>>> {
     type C<'a> = Column<'a, Mean<'a>>;
@@ -177,7 +175,6 @@ impl LearnedRow<'_> {
 }
 
 /// Columns of the learner's results.
-#[must_use]
 #[rustfmt::skip]
 pub fn learned<'a>() -> Vec<Column<'a, LearnedRow<'a>>> {
     type C<'a> = Column<'a, LearnedRow<'a>>;

@@ -41,7 +41,6 @@ fn change_pct(ratio: f64) -> f64 {
 
 impl<'a> Mean<'a> {
     /// The order's or bound's name.
-    #[must_use]
     pub fn name(&self) -> String {
         self.rows.first().map(|row| row.name()).unwrap_or_default()
     }
@@ -56,20 +55,17 @@ impl<'a> Mean<'a> {
     }
 
     /// Number of rows in which an order can change the bytes.
-    #[must_use]
     pub fn count(&self) -> u64 {
         let open = self.rows.iter().filter(|row| row.can_change());
         open.count() as u64
     }
 
     /// Change of the bytes relative to the baseline, percent.
-    #[must_use]
     pub fn change_pct(&self) -> Option<f64> {
         geometric(self.open().filter_map(Row::ratio)).map(change_pct)
     }
 
     /// Change of the cycles relative to the baseline, percent.
-    #[must_use]
     pub fn cycles_change_pct(&self) -> Option<f64> {
         let ratio = |row: &Row<'_>| {
             let own = row.result.as_ref()?.cycles?;
@@ -80,7 +76,6 @@ impl<'a> Mean<'a> {
     }
 
     /// The trace with the worst mean over caches, and its change.
-    #[must_use]
     pub fn worst_trace(&self) -> Option<(&'a str, f64)> {
         let mut traces: Vec<(&str, Vec<f64>)> = Vec::new();
         for row in self.open() {
@@ -100,14 +95,12 @@ impl<'a> Mean<'a> {
     }
 
     /// The worst change of any trace with any pair of caches.
-    #[must_use]
     pub fn worst_pct(&self) -> Option<f64> {
         let changes = self.open().filter_map(Row::ratio).map(change_pct);
         changes.max_by(f64::total_cmp)
     }
 
     /// The part of the distance to the greedy order that the order closes, by geometric means.
-    #[must_use]
     pub fn closed_pct(&self) -> Option<f64> {
         let known = || self.open().filter(|row| row.greedy_bytes.is_some());
         let own = geometric(known().filter_map(Row::ratio))?;
@@ -117,13 +110,11 @@ impl<'a> Mean<'a> {
     }
 
     /// Mean of a rate over the replays, percent.
-    #[must_use]
     pub fn rate_pct(&self, rate: fn(&Row<'_>) -> Option<f64>) -> Option<f64> {
         mean(self.open().filter_map(rate)).map(|rate| 100.0 * rate)
     }
 
     /// The largest hardware cost of any row; none for bounds.
-    #[must_use]
     pub fn cost(&self) -> Option<Cost> {
         let costs = self.rows.iter().filter_map(|row| row.cost);
         costs.max_by_key(|cost| (cost.information, cost.state_bytes, cost.table_bytes))

@@ -53,7 +53,6 @@ struct TraceFacts<'a> {
 
 impl<'a> OrdersReport<'a> {
     /// Means over traces and caches, fewest bytes first.
-    #[must_use]
     pub fn means(&self) -> Vec<Mean<'_>> {
         means::means(&self.rows)
     }
@@ -63,7 +62,6 @@ impl<'a> OrdersReport<'a> {
     }
 
     /// The means; for a single trace, its rows.
-    #[must_use]
     pub fn text(&self) -> String {
         let means = self.means();
         let keys = columns::SHORT_MEANS.into_iter();
@@ -79,13 +77,11 @@ impl<'a> OrdersReport<'a> {
     }
 
     /// Every row.
-    #[must_use]
     pub fn table(&self) -> Table {
         Table::new(&columns::rows(), &self.rows).grouped_by(1)
     }
 
     /// Every row in full precision.
-    #[must_use]
     pub fn csv(&self) -> String {
         self.table().csv()
     }
@@ -133,7 +129,6 @@ impl<'a> OrdersReport<'a> {
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     use crate::schemas::WithRows;
     formats::schemas::Published::of::<Document<'_, '_>>(SCHEMA)

@@ -225,11 +225,7 @@ fn of_display(means: &[Mean<'_>]) -> Markup {
         }
         details {
             summary { "what the columns are" }
-            dl.note {
-                @for h in table.headings.iter().filter(|h| !h.about.is_empty()) {
-                    dt { (h.name) @if !h.unit.is_empty() { ", " (h.unit) } } dd { (h.about) }
-                }
-            }
+            (table.meanings())
         }
     }
 }

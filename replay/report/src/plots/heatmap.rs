@@ -44,7 +44,6 @@ const TICKS_PX: f64 = 58.0;
 
 impl HeatMap {
     /// The largest value of all panels.
-    #[must_use]
     pub fn largest(&self) -> f64 {
         self.panels
             .iter()
@@ -187,7 +186,6 @@ const VIRIDIS: [[u8; 3]; 9] = [
 ];
 
 /// The colour of a value from 0 to 1.
-#[must_use]
 pub fn color(t: f64) -> RGBColor {
     let t = t.clamp(0.0, 1.0);
     let at = t * (VIRIDIS.len() - 1) as f64;

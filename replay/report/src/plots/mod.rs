@@ -50,7 +50,6 @@ impl SeriesStyle {
 }
 
 /// Escapes text for an XML attribute or body.
-#[must_use]
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")

@@ -79,7 +79,6 @@ impl PathPlot {
     }
 
     /// Each tile's step as a heat map, for grids of any size.
-    #[must_use]
     pub fn steps(&self) -> HeatMap {
         let [columns, rows] = self.tiles;
         let mut panels = ["left eye", "right eye"].map(|name| Panel {

@@ -17,7 +17,6 @@ struct UnitsRow<'a> {
 }
 
 /// One row per simulation; `None` if the closed form was used.
-#[must_use]
 #[rustfmt::skip]
 pub fn units(entries: &[Entry]) -> Option<Table> {
     let pct = |key, name, value: fn(&FrameTiming) -> f64| {

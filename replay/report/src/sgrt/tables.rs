@@ -16,7 +16,6 @@ pub fn scene_name(report: &Report) -> String {
 }
 
 /// Describes the rule and level of reuse of the rows named "chosen".
-#[must_use]
 pub(super) fn rule_line(entries: &[Entry]) -> String {
     entries.first().map_or_else(String::new, |entry| {
         let config = &entry.report.config;
@@ -44,7 +43,6 @@ pub(super) fn rule_line(entries: &[Entry]) -> String {
 }
 
 /// Mean reuse over the traces that correspond to a scene of the paper, for both rules.
-#[must_use]
 pub(super) fn mean_reuse_line(entries: &[Entry]) -> Option<String> {
     let of_paper: Vec<&Report> = entries
         .iter()
@@ -66,7 +64,6 @@ pub(super) fn mean_reuse_line(entries: &[Entry]) -> Option<String> {
 }
 
 /// Notes on traces whose eyes do not meet the conditions of the paper's row test.
-#[must_use]
 pub(super) fn row_notes(entries: &[Entry]) -> Vec<String> {
     let reports = entries.iter().map(|e| &e.report);
     reports
@@ -85,7 +82,6 @@ pub(super) fn row_notes(entries: &[Entry]) -> Vec<String> {
 }
 
 /// Name of a level of reuse, as on the command line.
-#[must_use]
 pub fn reuse_name(reuse: Reuse) -> &'static str {
     match reuse {
         Reuse::Primary => "primary",
@@ -385,13 +381,11 @@ pub fn traffic(entries: &[Entry]) -> Table {
 }
 
 /// Per trace, one row for the rule and one for plain reuse.
-#[must_use]
 pub fn rows(entries: &[Entry]) -> Table {
     Table::new(&RuleRow::columns(), &rule_rows(entries))
 }
 
 /// [`rows`] as CSV.
-#[must_use]
 pub fn csv(entries: &[Entry]) -> String {
     rows(entries).csv()
 }

@@ -33,7 +33,6 @@ pub const SHORT: [&str; 20] = [
 ];
 
 /// Keys of the table of pacing.
-#[must_use]
 pub(super) fn pacing_keys() -> Vec<String> {
     let rates = |name: &'static str| RATES_HZ.map(|hz| format!("{name}_{hz}hz"));
     let start = ["scene", "technique", "frame_ms"].map(str::to_owned);
@@ -250,7 +249,6 @@ fn caches<'a>(order: Order) -> Vec<Figure<'a>> {
 
 /// Every figure of these techniques. Stages and predictions have the names that the captures give them.
 /// `order` is the order of the cache figures.
-#[must_use]
 pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
     let groups = [
         identity(),
@@ -269,7 +267,6 @@ pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
 pub(super) type GainFigure<'a> = Column<'a, OrderGain<'a>>;
 
 /// The table of orders with and without each technique. It shows the saving of `gain` over `against`.
-#[must_use]
 #[rustfmt::skip]
 pub(super) fn order_columns<'a>(orders: &[Order], gain: Order, against: Order) -> Vec<GainFigure<'a>> {
     let mut columns = vec![

@@ -81,7 +81,6 @@ impl Frusta<'_> {
     }
 
     /// The drawing as SVG: one panel near the eyes in millimetres, one up to the splits in metres.
-    #[must_use]
     pub fn svg(&self) -> String {
         let width = 2.0 * PANEL_PX + 3.0 * GAP_PX;
         let height = TOP_PX + PANEL_PX + BOTTOM_PX;

@@ -73,7 +73,6 @@ struct SceneFacts<'a> {
 
 impl<'a> TechniquesReport<'a> {
     /// The order whose saving is shown, and the order that it is compared with.
-    #[must_use]
     fn gain_orders(&self) -> (Order, Order) {
         let own = self.config.order;
         let other = if own == Order::MORTON {
@@ -95,7 +94,6 @@ impl<'a> TechniquesReport<'a> {
     }
 
     /// Every figure of every technique.
-    #[must_use]
     pub fn table(&self) -> Table {
         let rows = self.rows();
         let columns = columns(&rows, self.config.order);
@@ -103,7 +101,6 @@ impl<'a> TechniquesReport<'a> {
     }
 
     /// The figures for a terminal.
-    #[must_use]
     fn short_table(&self) -> Table {
         let one = self.scenes.len() == 1;
         let columns = columns::SHORT
@@ -114,7 +111,6 @@ impl<'a> TechniquesReport<'a> {
     }
 
     /// Late frames at the refresh rates of displays.
-    #[must_use]
     fn pacing_table(&self) -> Table {
         let one = self.scenes.len() == 1;
         let keys = columns::pacing_keys();
@@ -126,7 +122,6 @@ impl<'a> TechniquesReport<'a> {
     }
 
     /// Saving of an order with and without each technique.
-    #[must_use]
     fn order_table(&self) -> Table {
         let (order, against) = self.gain_orders();
         let columns = order_columns(&self.orders, order, against);
@@ -134,13 +129,11 @@ impl<'a> TechniquesReport<'a> {
     }
 
     /// Published savings and the measured ones.
-    #[must_use]
     fn claim_table(&self) -> Table {
         Table::new(&claim_columns(), &claims(self.scenes)).without_empty_columns()
     }
 
     /// The tables for a terminal.
-    #[must_use]
     pub fn text(&self) -> String {
         let mut text = self.short_table().text();
         text += "\n";
@@ -169,7 +162,6 @@ impl<'a> TechniquesReport<'a> {
     }
 
     /// Every figure in full precision.
-    #[must_use]
     pub fn csv(&self) -> String {
         self.table().csv()
     }
@@ -226,7 +218,6 @@ impl<'a> TechniquesReport<'a> {
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<TechniquesJson<'_, '_>>(SCHEMA)
 }

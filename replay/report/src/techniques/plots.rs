@@ -20,7 +20,6 @@ fn style(measured: &Measured) -> SeriesStyle {
 }
 
 /// Run time against error.
-#[must_use]
 pub fn pareto(measures: &Measures) -> ScatterChart {
     let label = "median frame time, \u{d7} the baseline's";
     let times = |of: fn(f64, f64) -> f64| {
@@ -51,7 +50,6 @@ pub fn pareto(measures: &Measures) -> ScatterChart {
 }
 
 /// Distribution of frame times over the baseline's.
-#[must_use]
 pub fn ratios(measures: &Measures) -> BoxChart {
     let values = |s: &Spread| [s.p1, s.q1, s.median, s.q3, s.p99];
     BoxChart {
@@ -107,7 +105,6 @@ fn over_frames(
 }
 
 /// Frame times along the path.
-#[must_use]
 pub(super) fn frame_times(measures: &Measures) -> LineChart {
     over_frames(
         measures,
@@ -118,7 +115,6 @@ pub(super) fn frame_times(measures: &Measures) -> LineChart {
 }
 
 /// Errors along the path; `None` without errors.
-#[must_use]
 pub fn errors(measures: &Measures) -> Option<LineChart> {
     let chart = over_frames(
         measures,

@@ -121,7 +121,6 @@ pub struct PaperReport<'a> {
 
 impl<'a> PaperReport<'a> {
     /// Builds the rows from an outcome of [`Plan::paper`](studies::experiment::Plan::paper).
-    #[must_use]
     pub fn new(outcome: &'a Outcome<'a>) -> Self {
         let mut rows = outcome.rows();
         rows.retain(|row| row.point.change.is_none());
@@ -152,7 +151,6 @@ impl<'a> PaperReport<'a> {
     }
 
     /// Names the traces whose orders replayed different accesses; `None` when there are none.
-    #[must_use]
     pub fn not_conserved(&self) -> Option<String> {
         let wrong = self.conservation.iter().filter(|c| !c.differing.is_empty());
         let wrong: Vec<String> = wrong
@@ -163,19 +161,16 @@ impl<'a> PaperReport<'a> {
     }
 
     /// The orders of the experiment in order of appearance.
-    #[must_use]
     pub fn orders(&self) -> Vec<Order> {
         unique(self.rows.iter().map(|r| r.point.config.order))
     }
 
     /// The cache configurations, as `8/128`, in order of appearance.
-    #[must_use]
     pub fn caches(&self) -> Vec<String> {
         unique(self.rows.iter().map(ResultRow::caches_title))
     }
 
     /// The row of a scene, a cache configuration and an order.
-    #[must_use]
     pub fn row(&self, scene: &str, caches: &str, order: Order) -> Option<&ResultRow<'a>> {
         self.rows.iter().find(|r| {
             r.subject.label == scene && r.caches_title() == caches && r.point.config.order == order
@@ -183,7 +178,6 @@ impl<'a> PaperReport<'a> {
     }
 
     /// A trace's rows with the first cache configuration, one per order; the page shows their details.
-    #[must_use]
     pub fn details(&self, scene: &str) -> Vec<&ResultRow<'a>> {
         let mut of_scene = self.rows.iter().filter(|r| r.subject.label == scene);
         let first = of_scene.clone().next().map(ResultRow::caches_kib);
@@ -239,13 +233,11 @@ impl<'a> PaperReport<'a> {
     }
 
     /// Every row in full precision.
-    #[must_use]
     pub fn table(&self) -> Table {
         Table::new(&Self::figures(), &self.rows)
     }
 
     /// Every row as CSV.
-    #[must_use]
     pub fn csv(&self) -> String {
         self.table().csv()
     }
@@ -401,7 +393,6 @@ fn unique<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn schema() -> formats::schemas::Published {
     use crate::schemas::WithRows;
     formats::schemas::Published::of::<PaperJson<'_, '_>>(PAPER_SCHEMA)

@@ -215,11 +215,7 @@ fn table_2(report: &PaperReport) -> Markup {
     html! {
         (table.markup())
         p.note { "A footprint is one bilinear fetch of one lane; MB are 10\u{2076} bytes. The paper's saving is computed from its two miss rates." }
-        dl.note {
-            @for h in table.headings.iter().filter(|h| !h.about.is_empty()) {
-                dt { (h.name) ", " (h.unit) } dd { (h.about) }
-            }
-        }
+        (table.meanings())
     }
 }
 
@@ -231,11 +227,7 @@ fn as_the_paper_counts(table: &Table) -> Markup {
             "not a traffic figure; the traffic is in the columns on the right. The settings were found by search."
         }
         (table.markup())
-        dl.note {
-            @for h in table.headings.iter().filter(|h| !h.about.is_empty()) {
-                dt { (h.name) ", " (h.unit) } dd { (h.about) }
-            }
-        }
+        (table.meanings())
     }
 }
 

@@ -68,7 +68,6 @@ fn by_caches(
 
 /// Fig. 5: external traffic. The paper's text gives no absolute numbers, so its marks are its ratios to
 /// Morton times the measured Morton traffic.
-#[must_use]
 pub fn bandwidth(report: &PaperReport, scene: &str) -> BarChart {
     let key = "external_mb_per_frame";
     let mark = |row: &ResultRow| {
@@ -88,7 +87,6 @@ pub fn bandwidth(report: &PaperReport, scene: &str) -> BarChart {
 }
 
 /// L1 and L2 miss rates and TMU utilisation with the paper's values as marks.
-#[must_use]
 pub fn rates(report: &PaperReport, scene: &str) -> Vec<BarChart> {
     [
         ("L1 miss rate", "l1_footprint_miss_pct"),
@@ -156,7 +154,6 @@ pub fn surface(report: &PaperReport) -> Result<String, PlotError> {
 }
 
 /// Simulated utilisation against the closed form; `None` without rows of the preset's machine.
-#[must_use]
 pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
     let mut series: Vec<LineSeries> = report
         .orders()
@@ -212,7 +209,6 @@ pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
 }
 
 /// Miss rates and traffic by mip level, one series per order.
-#[must_use]
 pub fn by_level(details: &[&ResultRow]) -> Vec<BarChart> {
     let Some(first) = details.first() else {
         return Vec::new();
@@ -243,7 +239,6 @@ pub fn by_level(details: &[&ResultRow]) -> Vec<BarChart> {
 }
 
 /// The textures or draws with the most external traffic.
-#[must_use]
 pub(super) fn by_part(details: &[&ResultRow], most: usize) -> Vec<HBarChart> {
     let Some(first) = details.first() else {
         return Vec::new();
@@ -317,7 +312,6 @@ impl TileMeasure {
 }
 
 /// Both eyes' tiles of one run; `None` if the run has no maps of both eyes.
-#[must_use]
 pub(super) fn heat_map(
     info: &TraceInfo,
     detail: &ResultRow,
@@ -354,7 +348,6 @@ pub(super) fn heat_map(
 }
 
 /// An order's path over both eyes' grids of `tiles`.
-#[must_use]
 pub fn path(order: Order, seed: u64, tiles: [u32; 2]) -> PathPlot {
     let inputs = PlanInputs {
         seed,

@@ -8,7 +8,6 @@ use studies::experiment::ResultRow;
 
 /// Table 2 of the paper with measured figures, and the paper's figures on the right for scenes that stand
 /// for one of its own.
-#[must_use]
 pub fn table_2(report: &PaperReport) -> Table {
     let columns = pick::<ResultRow>(&[
         "label",
@@ -32,7 +31,6 @@ pub fn table_2(report: &PaperReport) -> Table {
 }
 
 /// Results of the `--preset z2-paper` machine next to those of Table 2; `None` if it was not replayed.
-#[must_use]
 pub fn as_the_paper_counts(report: &PaperReport) -> Option<Table> {
     let columns = pick::<ResultRow>(&[
         "label",
@@ -58,14 +56,12 @@ pub fn as_the_paper_counts(report: &PaperReport) -> Option<Table> {
 }
 
 /// Means by scene and over all scenes.
-#[must_use]
 pub fn averages(averages: &[Average]) -> Table {
     let table = Table::new(&Average::columns(), averages).grouped_by(1);
     table.without_empty_columns()
 }
 
 /// Functional mode against timed mode; `None` if functional mode was not replayed.
-#[must_use]
 pub fn modes(report: &PaperReport) -> Option<Table> {
     let columns = pick::<ResultRow>(&[
         "label",
@@ -85,7 +81,6 @@ pub fn modes(report: &PaperReport) -> Option<Table> {
 }
 
 /// External traffic and that of an infinite cache.
-#[must_use]
 pub fn bounds(report: &PaperReport) -> Table {
     let columns = pick::<ResultRow>(&[
         "label",
@@ -99,7 +94,6 @@ pub fn bounds(report: &PaperReport) -> Table {
 }
 
 /// The parts of a scene with the most external traffic. Each part has one column per order of `details`.
-#[must_use]
 pub fn parts<'a>(
     details: &'a [&ResultRow],
     what: &'static str,
@@ -136,7 +130,6 @@ pub fn parts<'a>(
 
 /// Indices of the `most` parts with the most external traffic, or all parts in their own order if there are
 /// no more.
-#[must_use]
 pub(crate) fn busiest(parts: &[Part], most: usize) -> Vec<usize> {
     let mut index: Vec<usize> = (0..parts.len()).collect();
     if parts.len() > most {

@@ -97,7 +97,6 @@ impl Replayed {
     }
 
     /// Errors against another replay, in the order of [`TEXTURE_FIGURES`]; the larger of both orders.
-    #[must_use]
     pub fn errors(&self, reference: &Self) -> Vec<Option<f64>> {
         let (ours, theirs) = (self.figures(), reference.figures());
         let pairs = ours.iter().zip(&theirs).zip(TEXTURE_FIGURES);

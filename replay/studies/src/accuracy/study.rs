@@ -33,7 +33,6 @@ impl Contribution {
     ];
 
     /// Heading in the table of errors.
-    #[must_use]
     pub fn title(self) -> &'static str {
         match self {
             Self::Capture => "capture precision",
@@ -45,7 +44,6 @@ impl Contribution {
     }
 
     /// Name in the CSV file.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Capture => "capture",

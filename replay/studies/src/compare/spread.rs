@@ -32,7 +32,6 @@ fn bin(steps: u64) -> u64 {
 
 impl Spread {
     /// An empty distribution with this many steps per unit.
-    #[must_use]
     pub fn new(steps_per_unit: u32) -> Self {
         Self {
             steps_per_unit,
@@ -65,25 +64,21 @@ impl Spread {
     }
 
     /// Number of differences.
-    #[must_use]
     pub fn count(&self) -> u64 {
         self.count
     }
 
     /// Mean, in units.
-    #[must_use]
     pub fn mean(&self) -> f64 {
         self.units(self.sum as f64 / self.count.max(1) as f64)
     }
 
     /// Maximum, in units.
-    #[must_use]
     pub fn largest(&self) -> f64 {
         self.units(self.largest as f64)
     }
 
     /// The smallest value that this percentage of differences does not exceed, in units.
-    #[must_use]
     pub fn percentile(&self, percent: f64) -> f64 {
         let wanted = (self.count as f64 * percent / 100.0).ceil() as u64;
         let not_zero: u64 = self.bins.values().sum();

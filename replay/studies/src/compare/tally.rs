@@ -66,19 +66,16 @@ impl Tally {
     }
 
     /// Fragments in at least one capture.
-    #[must_use]
     fn fragments_in_either(&self) -> u64 {
         self.fragments_in_both + self.fragments_only_in_a + self.fragments_only_in_b
     }
 
     /// True without fragments.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.fragments_in_either() == 0
     }
 
     /// Common fragments over fragments in at least one capture, percent.
-    #[must_use]
     pub fn intersection_over_union_pct(&self) -> f64 {
         match self.fragments_in_either() {
             0 => 100.0,
@@ -87,7 +84,6 @@ impl Tally {
     }
 
     /// Different footprints over footprints, percent.
-    #[must_use]
     pub fn footprints_that_differ_pct(&self) -> f64 {
         100.0 * self.footprints_that_differ as f64 / self.footprints.max(1) as f64
     }

@@ -77,7 +77,6 @@ pub struct SceneCaptures {
 
 impl SceneCaptures {
     /// Each trace as a separate scene.
-    #[must_use]
     pub fn one_each(subjects: &[Subject<'_>]) -> Vec<Self> {
         let scene = |(index, subject): (usize, &Subject<'_>)| Self {
             label: subject.label.clone(),
@@ -157,7 +156,6 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// The trials of a plan whose last axes are the paper's caches and orders, by IPD and then in the plan's order.
-#[must_use]
 pub fn trials(
     plan: &Plan,
     outcome: &Outcome,
@@ -220,7 +218,6 @@ fn fit(scene: &SceneCaptures, rows: &[ResultRow]) -> SceneFit {
 }
 
 /// True for the settings that vary within the paper's table.
-#[must_use]
 pub fn is_of_the_table(key: &str) -> bool {
     ["l1.size_bytes", "l2.size_bytes", "order"].contains(&key)
 }

@@ -57,7 +57,6 @@ fn name(settings: &[Setting], change: Option<&Setting>, order: Option<&str>) -> 
 
 impl<'a> Outcome<'a> {
     /// The results of every point on every trace, `results[subject * points + point]`.
-    #[must_use]
     pub fn new(
         plan: &'a Plan,
         subjects: &'a [Subject<'a>],
@@ -73,13 +72,11 @@ impl<'a> Outcome<'a> {
     }
 
     /// Describes for the user how much work was shared.
-    #[must_use]
     pub fn shared(&self) -> String {
         self.work.summary(self.results.len())
     }
 
     /// One row per trace and point, in that order.
-    #[must_use]
     pub fn rows(&self) -> Vec<ResultRow<'_>> {
         let points = &self.plan.points;
         let index: HashMap<PointName, usize> = points
@@ -140,7 +137,6 @@ fn published(subject: &Subject, point: &Point, order: Order) -> Option<&'static 
 
 impl ResultRow<'_> {
     /// L1 and L2 size in KiB.
-    #[must_use]
     pub fn caches_kib(&self) -> (f64, f64) {
         let config = &self.point.config;
         let kib = |bytes: u64| bytes as f64 / 1024.0;
@@ -151,33 +147,28 @@ impl ResultRow<'_> {
     }
 
     /// Both sizes in KiB, as `8/128`.
-    #[must_use]
     pub fn caches_title(&self) -> String {
         let (l1, l2) = self.caches_kib();
         format!("{l1}/{l2}")
     }
 
     /// Converts bytes of all frames to MB (10^6 bytes) per frame.
-    #[must_use]
     pub fn mb_per_frame(&self, bytes: u64) -> f64 {
         self.per_frame(bytes as f64 / 1e6)
     }
 
     /// Converts a sum over all frames to a mean per frame.
-    #[must_use]
     pub fn per_frame(&self, sum: f64) -> f64 {
         let frames = frame_count(self.subject.source.tables()).max(1);
         sum / f64::from(frames)
     }
 
     /// DRAM traffic of an infinite cache in bytes.
-    #[must_use]
     pub fn bound_bytes(&self) -> u64 {
         self.result.unique_lines * u64::from(self.point.config.line_bytes)
     }
 
     /// DRAM traffic saved relative to another result, percent; none if that has no traffic.
-    #[must_use]
     pub fn saved_pct(&self, against: Option<&RunResult>) -> Option<f64> {
         let whole = against?.external_bytes as f64;
         (whole > 0.0).then(|| 100.0 * (1.0 - self.result.external_bytes as f64 / whole))

@@ -44,13 +44,11 @@ pub struct Point {
 
 impl Point {
     /// Whether the point changes no setting of the base configuration.
-    #[must_use]
     pub(super) fn is_base(&self) -> bool {
         self.settings.is_empty() && self.change.is_none()
     }
 
     /// `order=z2-sta l1.size_bytes=8KiB`, followed by the change.
-    #[must_use]
     pub fn title(&self) -> String {
         let parts: Vec<String> = self
             .settings
@@ -67,7 +65,6 @@ impl Point {
 }
 
 /// A value without quotes.
-#[must_use]
 pub fn plain(value: &Value) -> String {
     value
         .as_str()

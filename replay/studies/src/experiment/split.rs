@@ -55,7 +55,6 @@ pub struct Task {
 
 impl Split {
     /// Splits the points of a plan; `records[subject]` is the number of quad records of each trace.
-    #[must_use]
     pub fn new(plan: &Plan, records: &[u64]) -> Self {
         let distinct = groups(&plan.points);
         let configs: Vec<RunConfig> = distinct
@@ -92,7 +91,6 @@ impl Split {
     }
 
     /// Indexes of the distinct configurations that a shard replays, by trace.
-    #[must_use]
     pub fn shard(&self, shard: Shard) -> Vec<Vec<usize>> {
         let mut wanted = vec![Vec::new(); self.subjects];
         for pass in &self.passes[self.passes_of(shard)] {
@@ -102,7 +100,6 @@ impl Split {
     }
 
     /// Estimated minutes of the slowest of `count` shards, with a margin, and at least ten.
-    #[must_use]
     pub fn minutes(&self, count: u32) -> u64 {
         let cost = |passes: std::ops::Range<usize>| -> u64 {
             let of_set = |passes: &[Pass]| {
@@ -127,7 +124,6 @@ impl Split {
     }
 
     /// Every distinct point on every trace, grouped by pass; with `shard`, only its points.
-    #[must_use]
     pub fn tasks(&self, plan: &Plan, shard: Option<Shard>) -> Vec<Task> {
         let distinct = groups(&plan.points);
         let range = shard.map_or(0..self.passes.len(), |shard| self.passes_of(shard));

@@ -94,7 +94,6 @@ enum Added {
 /// Key of a point: a 128-bit FNV-1a hash of the model version, the trace's checksum and the complete configuration.
 ///
 /// The row repeats these, so a collision costs a replay but never gives a wrong result.
-#[must_use]
 pub fn point_key(trace: &TraceId, config: &RunConfig) -> String {
     const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013B;
     const BASIS: u128 = 0x6C62_272E_07BB_0142_62B8_2175_6295_C58D;
@@ -154,19 +153,16 @@ impl Store {
     }
 
     /// The folder of the points files.
-    #[must_use]
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
     /// Skipped rows and files: file, row, expected and found.
-    #[must_use]
     pub fn damages(&self) -> &[String] {
         &self.damages
     }
 
     /// Number of rows of each other model version.
-    #[must_use]
     pub fn foreign(&self) -> &BTreeMap<u32, usize> {
         &self.foreign
     }
@@ -325,7 +321,6 @@ impl Store {
 
 /// The schema of the JSON object.
 #[cfg(feature = "testing")]
-#[must_use]
 pub fn point_schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<StoredPoint>(POINT_SCHEMA)
 }

@@ -32,7 +32,6 @@ impl<'a> Subject<'a> {
 }
 
 /// Number of frames of a trace.
-#[must_use]
 pub fn frame_count(tables: &Tables) -> u32 {
     let seen = tables.passes.iter().filter(|p| p.is_seen());
     let mut frames: Vec<u32> = seen.map(|p| p.frame).collect();
@@ -42,7 +41,6 @@ pub fn frame_count(tables: &Tables) -> u32 {
 }
 
 /// Whether a trace samples a shadow map.
-#[must_use]
 pub fn has_shadow_maps(tables: &Tables) -> bool {
     let mut textures = tables.textures.iter();
     textures.any(|t| t.format == TexelFormat::R32f)
@@ -53,7 +51,6 @@ pub fn has_shadow_maps(tables: &Tables) -> bool {
 /// The label is the scene's short name, with `+shadows` if the trace has shadow maps and the scene usually
 /// has none. Traces that would share a label are labelled by file stem, and by checksum as well if stems
 /// are equal.
-#[must_use]
 pub fn labels(traces: &[(&Tables, &TraceId, String)]) -> Vec<String> {
     let scenes: Vec<String> = traces
         .iter()
@@ -79,7 +76,6 @@ pub fn labels(traces: &[(&Tables, &TraceId, String)]) -> Vec<String> {
 }
 
 /// The scene's short name, with `+shadows` if the trace has shadow maps and the scene usually has none.
-#[must_use]
 pub fn scene_label(tables: &Tables) -> String {
     let name = scene_name(&tables.meta.scene);
     let usual = name.contains("shadow") || name.contains("jungle");

@@ -40,7 +40,6 @@ impl Distances {
     }
 
     /// All reuses.
-    #[must_use]
     pub(super) fn total(&self) -> ByOrigin {
         self.below(self.0.len())
     }
@@ -54,7 +53,6 @@ impl Distances {
     }
 
     /// Hits of a fully associative LRU cache.
-    #[must_use]
     pub fn hits(&self, lines: u64) -> ByOrigin {
         self.below(usize::try_from(lines).unwrap_or(usize::MAX))
     }
@@ -66,7 +64,6 @@ impl Distances {
     }
 
     /// Distance 0, then 1, 2 to 3, 4 to 7 and so on, up to the largest.
-    #[must_use]
     pub fn bins(&self) -> Vec<DistanceBin> {
         let mut bins = Vec::new();
         let mut from = 0;
@@ -87,7 +84,6 @@ impl Distances {
     }
 
     /// Hits of fully associative LRU caches of these sizes in lines, ascending.
-    #[must_use]
     pub fn curve(&self, sizes: &[u64]) -> Vec<CacheHits> {
         let (mut at, mut hits) = (0, ByOrigin::default());
         let point = |&lines: &u64| {
@@ -106,7 +102,6 @@ impl Distances {
     }
 
     /// The smallest size in lines with the maximum number of hits.
-    #[must_use]
     pub fn enough_lines(&self) -> u64 {
         self.0.len() as u64
     }

@@ -66,19 +66,16 @@ impl Figures {
     }
 
     /// Reuses by location of the previous use: the hits of an infinite cache.
-    #[must_use]
     pub fn reuses(&self) -> ByOrigin {
         self.distances.total()
     }
 
     /// Misses of a cache with these hits.
-    #[must_use]
     pub fn misses(&self, hits: &ByOrigin) -> u64 {
         self.accesses - hits.iter().sum::<u64>()
     }
 
     /// Hits under OPT of a fully associative cache of the configured size.
-    #[must_use]
     pub fn opt_of_size(&self) -> ByOrigin {
         let own = self.opt.iter().find(|p| p.lines == self.configured_lines);
         own.map_or(ByOrigin::default(), |point| point.hits)

@@ -27,7 +27,6 @@ pub enum Stream {
 
 impl Stream {
     /// Name in columns.
-    #[must_use]
     pub fn key(self) -> &'static str {
         match self {
             Self::L1 => "l1",
@@ -37,7 +36,6 @@ impl Stream {
     }
 
     /// Name in headings.
-    #[must_use]
     pub fn title(self) -> &'static str {
         match self {
             Self::L1 => "L1",
@@ -58,7 +56,6 @@ pub enum Sequence {
 
 impl Sequence {
     /// Name in columns.
-    #[must_use]
     pub fn key(self) -> &'static str {
         match self {
             Self::Order(order) => order.name(),
@@ -67,7 +64,6 @@ impl Sequence {
     }
 
     /// Name in headings.
-    #[must_use]
     pub fn title(self) -> &'static str {
         match self {
             Self::Order(order) => order.title(),

@@ -66,7 +66,6 @@ impl Origin {
     ];
 
     /// Name in columns.
-    #[must_use]
     pub fn key(self) -> &'static str {
         match self {
             Self::SameTile => "same_tile",
@@ -78,7 +77,6 @@ impl Origin {
 
     /// Index into [`ByOrigin`].
     #[inline(always)]
-    #[must_use]
     pub fn index(self) -> usize {
         match self {
             Self::SameTile => 0,

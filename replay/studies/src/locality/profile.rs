@@ -262,7 +262,6 @@ impl Profile {
     }
 
     /// The figures of all look-ups.
-    #[must_use]
     pub fn finish(mut self) -> Figures {
         for last in self.uses.used() {
             self.working_sets.ended(last, self.tiles);

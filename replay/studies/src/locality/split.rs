@@ -31,7 +31,6 @@ impl MissSplit {
     }
 
     /// Hits of the cache.
-    #[must_use]
     pub fn hits(&self) -> ByOrigin {
         let mut hits = self.hits_of_both;
         add(&mut hits, &self.avoided);
@@ -39,13 +38,11 @@ impl MissSplit {
     }
 
     /// Misses of the cache.
-    #[must_use]
     pub fn misses(&self) -> u64 {
         self.compulsory + sum(&self.capacity) + sum(&self.conflict)
     }
 
     /// Misses of the fully associative cache.
-    #[must_use]
     pub fn fully_associative_misses(&self) -> u64 {
         self.compulsory + sum(&self.capacity) + sum(&self.avoided)
     }

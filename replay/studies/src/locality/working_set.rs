@@ -108,7 +108,6 @@ pub struct WorkingSet {
 
 impl WorkingSet {
     /// Lines that tiles of both eyes use.
-    #[must_use]
     pub fn lines_of_both(&self) -> u64 {
         self.lines_of_eye[0] + self.lines_of_eye[1] - self.lines_of_either
     }

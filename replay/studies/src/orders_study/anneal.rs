@@ -28,7 +28,6 @@ pub struct Schedule {
 
 impl Schedule {
     /// Temperatures chosen on the design cameras of docs/results/orders.md.
-    #[must_use]
     pub fn new(moves: u64, seed: u64) -> Self {
         Self {
             moves,
@@ -225,7 +224,6 @@ impl<'a> Walk<'a> {
 }
 
 /// Returns the best order found. `beside` returns the neighbour of an item on a side, if there is one.
-#[must_use]
 pub fn anneal(
     items: &Items,
     cache: &Lru,

@@ -18,7 +18,6 @@ use sim::engine::ReplayError;
 use sim::stream::{Expander, LineMemory, TileSource, Walk, rendered};
 
 /// The minimum number of lines that any order of the items fetches into a cache of this many lines, by windows.
-#[must_use]
 pub fn windows(items: &Items, cache_lines: u64) -> u64 {
     let mut uses: Vec<u64> = items.users.iter().map(|users| users.len() as u64).collect();
     uses.sort_unstable_by_key(|&uses| std::cmp::Reverse(uses));

@@ -41,7 +41,6 @@ const FURTHER: [&str; 29] = [
 
 /// The baseline, the other orders of the table, every curve with both tiles of a cell on one core, and the
 /// other parts.
-#[must_use]
 pub fn default_orders() -> Vec<Order> {
     let together = Eyes::OneCore(Interleave::Alternate);
     let curves = Curve::all().map(|curve| Order::of(Parts::of(curve).with(together)));

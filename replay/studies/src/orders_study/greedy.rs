@@ -8,7 +8,6 @@ const LINES_MORE: u64 = 8;
 
 /// Always takes the item with the largest share of its lines in the cache. If shares are equal, the first item
 /// in `start` wins, so the order begins there. Considers only the first `ahead` remaining items.
-#[must_use]
 pub fn greedy(items: &Items, cache: &Lru, start: &[u32], ahead: usize) -> Vec<u32> {
     let mut state = cache.empty();
     // Number of lines of each item in the cache.

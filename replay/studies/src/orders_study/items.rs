@@ -16,7 +16,6 @@ pub struct Items {
 
 impl Items {
     /// Builds items from the lines that each uses, which may repeat.
-    #[must_use]
     pub fn new(accesses: &[Vec<u32>]) -> Self {
         let mut items = Self::default();
         let mut numbers: HashMap<u32, u32> = HashMap::new();
@@ -40,13 +39,11 @@ impl Items {
     }
 
     /// Number of items.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.lines.len()
     }
 
     /// True if there are no items.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.lines.is_empty()
     }
@@ -58,7 +55,6 @@ impl Items {
     }
 
     /// Misses of an LRU cache if the items run in this order.
-    #[must_use]
     pub fn misses(&self, order: &[u32], cache: &Lru) -> u64 {
         let mut state = cache.empty();
         let run = |&item: &u32| u64::from(cache.run(self, item, &mut state));
@@ -80,7 +76,6 @@ pub(super) const NONE: u32 = u32::MAX;
 
 impl Lru {
     /// A cache for the lines of items; `sets` is a power of two.
-    #[must_use]
     pub fn new(items: &Items, sets: u32, ways: u32) -> Self {
         let first = |address: &u32| (address & (sets - 1)) * ways;
         Self {

@@ -31,13 +31,11 @@ pub struct Learner {
 impl Learner {
     /// Bytes of registers for this number of orders: a counter per order, the current and the next order, and a
     /// frame counter.
-    #[must_use]
     pub const fn state_bytes(orders: u32) -> u32 {
         4 * orders + 3
     }
 
     /// A learner for one or more orders, without observations.
-    #[must_use]
     pub fn new(orders: usize) -> Self {
         Self {
             fetched: vec![None; orders],
@@ -101,7 +99,6 @@ impl Learned {
     }
 
     /// The best fixed order and its bytes over all frames.
-    #[must_use]
     pub fn best_fixed(&self) -> Option<(Order, u64)> {
         let totals = self.fixed.iter().map(|frames| Self::total(frames));
         self.orders
@@ -112,14 +109,12 @@ impl Learned {
     }
 
     /// Additional bytes of the learner over the best fixed order, percent.
-    #[must_use]
     pub fn regret_pct(&self) -> Option<f64> {
         let (_, best) = self.best_fixed().filter(|(_, best)| *best > 0)?;
         Some(100.0 * (Self::total(&self.learned) as f64 / best as f64 - 1.0))
     }
 
     /// Bytes saved by the best order of each frame over the best fixed order, percent.
-    #[must_use]
     pub fn frame_best_pct(&self) -> Option<f64> {
         let (_, best) = self.best_fixed().filter(|(_, best)| *best > 0)?;
         let least = |frame: usize| {

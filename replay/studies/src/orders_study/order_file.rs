@@ -59,7 +59,6 @@ fn error<T>(line: usize, expected: impl Into<String>, found: &str) -> Result<T, 
 
 impl OrderFile {
     /// The file's text.
-    #[must_use]
     pub fn text(&self) -> String {
         let mut text = format!(
             "{MAGIC}\ntrace {}\nname {}\nl2_bytes {}\nitems {}\n",

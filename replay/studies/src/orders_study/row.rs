@@ -27,7 +27,6 @@ impl Bound {
     pub(super) const PREFIX: &str = "bound: ";
 
     /// Name in the column of orders.
-    #[must_use]
     pub fn name(self) -> String {
         match self {
             Self::Infinite => format!("{}infinite cache", Self::PREFIX),
@@ -78,7 +77,6 @@ pub struct Row<'a> {
 
 impl Row<'_> {
     /// Name in tables.
-    #[must_use]
     pub fn name(&self) -> String {
         match &self.of {
             Of::Order(order) => order.name().to_owned(),
@@ -92,19 +90,16 @@ impl Row<'_> {
     }
 
     /// True if hardware can implement it.
-    #[must_use]
     pub fn is_buildable(&self) -> bool {
         self.cost.is_some_and(|cost| cost.is_buildable())
     }
 
     /// Frames of the trace.
-    #[must_use]
     pub fn frames(&self) -> u32 {
         frame_count(self.subject.source.tables())
     }
 
     /// Bytes relative to the baseline; none if only the baseline fetches nothing.
-    #[must_use]
     pub fn ratio(&self) -> Option<f64> {
         match (self.external_bytes, self.baseline_bytes) {
             (0, 0) => Some(1.0),
@@ -114,25 +109,21 @@ impl Row<'_> {
     }
 
     /// False if the baseline fetches each line once, so that no order can fetch less.
-    #[must_use]
     pub fn can_change(&self) -> bool {
         self.baseline_bytes > self.distinct_bytes
     }
 
     /// Bytes per frame in MB.
-    #[must_use]
     pub fn mb_per_frame(&self) -> f64 {
         self.external_bytes as f64 / f64::from(self.frames().max(1)) / 1e6
     }
 
     /// Name of the information that the order uses; `bound` for bounds.
-    #[must_use]
     pub fn information(&self) -> &'static str {
         self.cost.map_or("bound", |cost| cost.information.name())
     }
 
     /// The part of the distance from the baseline to the greedy order that the order closes, percent.
-    #[must_use]
     pub fn closed_pct(&self) -> Option<f64> {
         let greedy = self.greedy_bytes? as f64;
         let (own, base) = (self.external_bytes as f64, self.baseline_bytes as f64);

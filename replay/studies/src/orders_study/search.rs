@@ -28,7 +28,6 @@ pub enum Method {
 
 impl Method {
     /// Name of the orders that it finds.
-    #[must_use]
     pub fn name(self) -> String {
         match self {
             Self::Greedy { ahead: None } => "greedy".to_owned(),
@@ -38,7 +37,6 @@ impl Method {
     }
 
     /// The method of that name.
-    #[must_use]
     pub fn find(name: &str, schedule: &Schedule) -> Option<Self> {
         match name {
             "greedy" => Some(Self::Greedy { ahead: None }),
@@ -118,7 +116,6 @@ impl Ground {
     }
 
     /// The lines of the items.
-    #[must_use]
     pub fn lines(&self) -> &Items {
         &self.lines
     }

@@ -75,7 +75,6 @@ impl Folder {
     }
 
     /// Name of the folder itself.
-    #[must_use]
     pub fn name(&self) -> String {
         let whole = self.path.canonicalize();
         let path = whole.as_deref().unwrap_or(&self.path);

@@ -183,7 +183,6 @@ pub struct Auto {
 
 impl Manifest {
     /// The row of the baseline.
-    #[must_use]
     pub fn baseline_row(&self) -> Option<&ManifestRow> {
         self.rows.iter().find(|row| row.technique == self.baseline)
     }

@@ -25,7 +25,6 @@ pub struct CacheFigures {
 
 impl CacheFigures {
     /// External traffic in MB (10^6 bytes) per frame.
-    #[must_use]
     pub fn external_mb_per_frame(&self) -> f64 {
         self.external_bytes as f64 / 1e6 / f64::from(self.frames.max(1))
     }
@@ -74,33 +73,28 @@ const OBJECTIVES: [(&str, Cost); 3] = [
 
 impl Measured<'_> {
     /// Whether it is the baseline.
-    #[must_use]
     pub fn is_baseline(&self) -> bool {
         self.row.technique == self.baseline.technique
     }
 
     /// Sum of a count over the frames; `None` if a frame has none.
-    #[must_use]
     pub fn total(&self, of: Count) -> Option<u64> {
         self.row.frames.iter().map(of).sum()
     }
 
     /// Maximum of a count over the frames; `None` if a frame has none.
-    #[must_use]
     pub fn most(&self, of: Count) -> Option<u64> {
         let counts: Option<Vec<u64>> = self.row.frames.iter().map(of).collect();
         counts?.into_iter().max()
     }
 
     /// A count over the baseline's; `None` if the baseline has none.
-    #[must_use]
     pub fn over_baseline(&self, of: Count) -> Option<f64> {
         let whole: u64 = self.baseline.frames.iter().map(of).sum::<Option<u64>>()?;
         (whole > 0).then_some(self.total(of)? as f64 / whole as f64)
     }
 
     /// Energy of the counted work over the baseline's; `None` if the baseline has none.
-    #[must_use]
     pub fn energy_ratio(&self) -> Option<f64> {
         let whole = |row: &ManifestRow| row.frames.iter().map(|f| f.energy_mj).sum::<Option<f64>>();
         let baseline = whole(self.baseline)?;
@@ -108,7 +102,6 @@ impl Measured<'_> {
     }
 
     /// Mean of a figure that the technique predicts.
-    #[must_use]
     pub fn predicted(&self, key: &str) -> Option<f64> {
         let frames = self.row.frames.iter();
         let values: Vec<f64> = frames
@@ -118,7 +111,6 @@ impl Measured<'_> {
     }
 
     /// The cache figures in an order.
-    #[must_use]
     pub fn caches_in(&self, order: Order) -> Option<&CacheFigures> {
         self.caches.iter().find(|c| c.order == order)
     }
@@ -155,7 +147,6 @@ impl Measures<'_> {
     }
 
     /// The saving of an order over another one, with each technique and without.
-    #[must_use]
     pub fn order_gains(&self, order: Order, against: Order) -> Vec<OrderGain<'_>> {
         let gain = |m| Gain::of(m, order, against);
         let baseline = self.rows.iter().find(|m| m.is_baseline()).and_then(gain);
@@ -211,7 +202,6 @@ impl OrderGain<'_> {
 
     /// Explains the change of the saving by the change of its two bounds: the other order's traffic above
     /// that of an infinite cache, and the lines that the eyes share.
-    #[must_use]
     pub fn reason(&self) -> String {
         let Self { own, baseline, .. } = self;
         let gain = own.saved_pct - baseline.saved_pct;

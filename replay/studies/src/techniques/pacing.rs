@@ -17,7 +17,6 @@ pub struct Pacing {
 
 impl Pacing {
     /// From frame times in milliseconds; `None` if there are none.
-    #[must_use]
     pub fn of(rate_hz: u32, times_ms: &[f64]) -> Option<Self> {
         let count = times_ms.len() as f64;
         if times_ms.is_empty() {

@@ -3,7 +3,6 @@
 use super::Spread;
 
 /// For each point of two costs, whether it is dominated.
-#[must_use]
 pub fn dominated(points: &[(f64, f64)]) -> Vec<bool> {
     let beats = |a: &(f64, f64), b: &(f64, f64)| a.0 <= b.0 && a.1 <= b.1 && a != b;
     points
@@ -19,7 +18,6 @@ pub const LEAST_SAMPLES: usize = 8;
 /// For each point of a time and an error, whether another one has at most the same error and takes
 /// significantly less time: the interquartile ranges are disjoint, with [`LEAST_SAMPLES`] measurements of
 /// each.
-#[must_use]
 pub fn dominated_in_time(points: &[(Spread, f64)]) -> Vec<bool> {
     let claims = |a: &Spread, b: &Spread| a.samples.min(b.samples) >= LEAST_SAMPLES && a.q3 < b.q1;
     let beats = |a: &(Spread, f64), b: &(Spread, f64)| a.1 <= b.1 && claims(&a.0, &b.0);

@@ -18,7 +18,6 @@ pub struct Sharing {
 
 impl Sharing {
     /// Lines that both eyes touch, percent of those that at least one touches; `None` if there are none.
-    #[must_use]
     pub(super) fn shared_pct(&self) -> Option<f64> {
         let both = (self.eyes[0] + self.eyes[1]).checked_sub(self.either)?;
         (self.either > 0).then(|| 100.0 * both as f64 / self.either as f64)

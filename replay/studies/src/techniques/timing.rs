@@ -72,7 +72,6 @@ pub struct Timing {
 
 impl Timing {
     /// The times of a row. Every frame needs a time; baseline times must be as many or none.
-    #[must_use]
     pub fn of(row: &ManifestRow) -> Option<Self> {
         let times = || row.frames.iter().flat_map(|f| f.frame_s.iter().copied());
         let beside = || {

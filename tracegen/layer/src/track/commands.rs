@@ -119,7 +119,6 @@ impl Effects {
     }
 
     /// Events that something else must set before all commands can end.
-    #[must_use]
     pub fn awaited(&self) -> &[vk::Event] {
         &self.awaited
     }
@@ -197,19 +196,16 @@ impl CommandState {
     }
 
     /// Whether it is submitted only once.
-    #[must_use]
     pub fn one_time(&self) -> bool {
         self.one_time
     }
 
     /// The bound graphics pipeline.
-    #[must_use]
     pub fn pipeline(&self) -> Option<&Arc<Pipeline>> {
         self.pipeline.as_ref()
     }
 
     /// Handle of the bound graphics pipeline.
-    #[must_use]
     pub fn pipeline_handle(&self) -> vk::Pipeline {
         self.handle
     }
@@ -231,7 +227,6 @@ impl CommandState {
     }
 
     /// Handle of the descriptor set with this number.
-    #[must_use]
     pub fn set(&self, number: u32) -> Option<u64> {
         self.sets
             .get(number as usize)
@@ -240,7 +235,6 @@ impl CommandState {
     }
 
     /// Pushed descriptors of a set.
-    #[must_use]
     pub fn pushed(&self, number: u32) -> Option<&SetState> {
         self.pushed.get(&number)
     }
@@ -380,7 +374,6 @@ impl Commands {
     }
 
     /// State of a command buffer.
-    #[must_use]
     pub fn get(&self, buffer: u64) -> Option<&CommandState> {
         self.buffers.get(&buffer)
     }
@@ -426,7 +419,6 @@ impl Commands {
     }
 
     /// What command buffers do besides draws, executed one after the other.
-    #[must_use]
     pub fn effects(&self, buffers: impl IntoIterator<Item = u64>) -> Effects {
         let mut all = Effects::default();
         for state in buffers.into_iter().filter_map(|b| self.buffers.get(&b)) {
@@ -436,7 +428,6 @@ impl Commands {
     }
 
     /// Draws of a command buffer, in order of execution.
-    #[must_use]
     pub fn items(&self, buffer: u64) -> &[Executed] {
         self.buffers.get(&buffer).map_or(&[], |state| &state.items)
     }

@@ -91,7 +91,6 @@ impl SetState {
     }
 
     /// The written elements of a binding.
-    #[must_use]
     pub fn binding(&self, binding: u32) -> Vec<(u32, Slot)> {
         let all = self.slots.range((binding, 0)..=(binding, u32::MAX));
         all.map(|((_, element), slot)| (*element, *slot)).collect()
@@ -189,7 +188,6 @@ impl Descriptors {
     }
 
     /// An unwritten set of a layout.
-    #[must_use]
     pub fn empty_set(&self, layout: u64) -> SetState {
         self.layouts
             .get(&layout)
@@ -214,7 +212,6 @@ impl Descriptors {
     }
 
     /// The texture descriptors of a set.
-    #[must_use]
     pub fn set(&self, set: u64) -> Option<&SetState> {
         self.sets.get(&set)
     }
@@ -259,7 +256,6 @@ impl Descriptors {
     }
 
     /// The update template of a handle.
-    #[must_use]
     pub fn template(&self, template: vk::DescriptorUpdateTemplate) -> Option<&Template> {
         self.templates.get(&template.as_raw())
     }

@@ -78,26 +78,22 @@ impl Images {
     }
 
     /// Whether the host can read an image's texels in memory.
-    #[must_use]
     pub fn is_linear(&self, image: vk::Image) -> bool {
         self.linear.contains(&image.as_raw())
     }
 
     /// The image of a handle.
-    #[must_use]
     pub fn get(&self, image: vk::Image) -> Option<&Arc<ImageInfo>> {
         self.images.get(&image.as_raw())
     }
 
     /// The image with a number.
-    #[must_use]
     pub fn numbered(&self, number: u32) -> Option<&Arc<ImageInfo>> {
         let place = number.checked_sub(self.first)?;
         self.numbered.get(place as usize)
     }
 
     /// Handle of an image, unless it was destroyed.
-    #[must_use]
     pub fn handle(&self, number: u32) -> Option<vk::Image> {
         let mut all = self.images.iter();
         let found = all.find(|(_, image)| image.image == number);
@@ -153,7 +149,6 @@ impl Images {
     }
 
     /// The image view of a handle.
-    #[must_use]
     pub fn view(&self, view: vk::ImageView) -> Option<ViewInfo> {
         self.views.get(&view.as_raw()).copied()
     }
@@ -183,7 +178,6 @@ impl Images {
     }
 
     /// The sampler of a handle.
-    #[must_use]
     pub fn sampler(&self, sampler: vk::Sampler) -> Option<SamplerInfo> {
         self.samplers.get(&sampler.as_raw()).copied()
     }

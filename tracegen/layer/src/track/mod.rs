@@ -38,7 +38,6 @@ pub struct Tracker {
 
 impl Tracker {
     /// Tracker of a device. The number of the device is part of the numbers of its objects.
-    #[must_use]
     pub fn of_device(device: u32) -> Self {
         // No program creates more objects of one kind.
         let first = device << 26;

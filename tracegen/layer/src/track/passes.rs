@@ -63,7 +63,6 @@ impl Passes {
     }
 
     /// View mask of a subpass.
-    #[must_use]
     pub fn view_mask(&self, handle: vk::RenderPass, subpass: u32) -> u32 {
         let pass = self.passes.get(&handle.as_raw());
         let subpass = pass.and_then(|pass| pass.subpasses.get(subpass as usize));
@@ -124,7 +123,6 @@ impl Passes {
     }
 
     /// Numbers of the images that a subpass resolves, and of those that they are resolved to.
-    #[must_use]
     pub fn resolves(&self, open: &super::OpenPass) -> Vec<[u32; 2]> {
         let pass = self.passes.get(&open.pass.as_raw());
         let subpass = pass.and_then(|pass| pass.subpasses.get(open.subpass as usize));

@@ -61,7 +61,6 @@ pub struct State {
 
 impl State {
     /// Whether a state is dynamic.
-    #[must_use]
     pub fn is_dynamic(&self, state: vk::DynamicState) -> bool {
         self.dynamic.contains(&state.as_raw())
     }
@@ -177,7 +176,6 @@ impl Pipelines {
     }
 
     /// Words of a shader module.
-    #[must_use]
     pub fn module(&self, module: vk::ShaderModule) -> Option<Arc<[u32]>> {
         self.modules.get(&module.as_raw()).cloned()
     }
@@ -188,7 +186,6 @@ impl Pipelines {
     }
 
     /// The pipeline layout of a handle.
-    #[must_use]
     pub fn layout(&self, layout: vk::PipelineLayout) -> Option<&Layout> {
         self.layouts.get(&layout.as_raw())
     }
@@ -228,13 +225,11 @@ impl Pipelines {
     }
 
     /// The compute pipeline of a handle, if its shader reads textures.
-    #[must_use]
     pub fn compute(&self, handle: vk::Pipeline) -> Option<Arc<Compute>> {
         self.computes.get(&handle.as_raw()).cloned()
     }
 
     /// The library of a handle.
-    #[must_use]
     pub fn library(&self, handle: vk::Pipeline) -> Option<Arc<Library>> {
         self.libraries.get(&handle.as_raw()).cloned()
     }
@@ -253,7 +248,6 @@ impl Pipelines {
     }
 
     /// The graphics pipeline of a handle.
-    #[must_use]
     pub fn get(&self, handle: vk::Pipeline) -> Option<&Arc<Pipeline>> {
         self.pipelines.get(&handle.as_raw())
     }

@@ -89,7 +89,6 @@ pub struct StepView {
 
 impl StepView {
     /// The eye in the form of a trace, with depth 0 to 1.
-    #[must_use]
     pub fn eye_view(&self) -> EyeView {
         let column = |of: &[f32; 16], c: usize| [0, 1, 2, 3].map(|row| of[4 * c + row]);
         let mut eye_to_clip = [0, 1, 2, 3].map(|c| column(&self.projection, c));
@@ -106,7 +105,6 @@ impl StepView {
 
 impl Stepped {
     /// Left and right eye of a WebXR session.
-    #[must_use]
     pub fn eyes(&self) -> Option<[EyeView; 2]> {
         let eye = |name: &str| self.views.iter().find(|view| view.eye == name);
         Some([eye("left")?.eye_view(), eye("right")?.eye_view()])
@@ -159,7 +157,6 @@ pub struct Contexts {
 
 impl Contexts {
     /// Why a page has no context of WebGL, if it has none.
-    #[must_use]
     pub fn why_none(&self) -> Option<String> {
         let Self {
             refused,
@@ -330,7 +327,6 @@ impl Tab {
     }
 
     /// What the page did on its own, with the number of times.
-    #[must_use]
     pub fn remarks(&self) -> &BTreeMap<String, u32> {
         &self.watch.remarks
     }

@@ -114,7 +114,6 @@ fn decoded(text: &str) -> Option<String> {
 }
 
 /// Address of a file below the root.
-#[must_use]
 pub fn address(file: &str) -> String {
     let plain = |b: u8| b.is_ascii_alphanumeric() || b"/-_.~".contains(&b);
     let mut url = format!("{ORIGIN}/");

@@ -16,7 +16,6 @@ pub struct Placement {
 
 impl Placement {
     /// The placement of a view.
-    #[must_use]
     pub fn new(view: View) -> Self {
         let first = view.origin.map(|at| at.div_euclid(2));
         let odd = view.origin.map(|at| at.rem_euclid(2) as u32);
@@ -28,7 +27,6 @@ impl Placement {
     }
 
     /// Column and row of a quad in the picture, and the lanes that are inside.
-    #[must_use]
     pub fn quad(&self, quad: [u32; 2], lanes: u8) -> Option<([u32; 2], u8)> {
         let at = [0, 1].map(|axis| i64::from(quad[axis]) - i64::from(self.first[axis]));
         let is_seen = |lane: u8| {
@@ -47,7 +45,6 @@ impl Placement {
 }
 
 /// Size of a picture that can hold either eye.
-#[must_use]
 pub fn both(placements: [Placement; 2]) -> [u32; 2] {
     let [a, b] = placements.map(|placement| placement.size);
     [0, 1].map(|axis: usize| a[axis].max(b[axis]))

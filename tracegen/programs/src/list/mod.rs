@@ -237,7 +237,6 @@ fn cells(row: &PassRow) -> [String; 8] {
 
 impl List {
     /// Text about how the eyes were identified.
-    #[must_use]
     pub fn eyes_text(&self) -> String {
         match &self.eyes {
             Ok(rule) => format!("frame {}: both eyes by {}", self.frame, rule.name()),
@@ -246,7 +245,6 @@ impl List {
     }
 
     /// The list as text.
-    #[must_use]
     pub fn table(&self) -> String {
         let mut lines = vec![COLUMNS.map(str::to_owned)];
         lines.extend(self.rows.iter().map(cells));

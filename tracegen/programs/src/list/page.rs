@@ -13,7 +13,6 @@ th, td { border: 1px solid #ccc; padding: 4px 8px; text-align: left; vertical-al
 img { max-width: 256px; max-height: 256px; background: #888; } .why { color: #a30; }";
 
 /// The page with lists of frames of a program.
-#[must_use]
 pub fn page(program: &str, lists: &[List]) -> String {
     let title = escaped(program);
     let mut text = format!(

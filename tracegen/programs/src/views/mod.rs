@@ -47,7 +47,6 @@ impl Rule {
     ];
 
     /// Name in messages.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Multiview => "multiview",
@@ -97,7 +96,6 @@ pub enum Role {
 
 impl Role {
     /// Name in messages.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Seen(Some(Eye::Left)) => "left eye",
@@ -187,7 +185,6 @@ pub struct DrawKey {
 
 impl DrawKey {
     /// The key of a draw.
-    #[must_use]
     pub fn of(draw: &DrawInfo) -> Self {
         Self {
             pipeline: draw.pipeline,
@@ -235,7 +232,6 @@ impl Drawn<'_> {
 }
 
 /// The rectangle of a draw's viewport.
-#[must_use]
 pub fn viewport(draw: &DrawInfo) -> View {
     let [x, y, width, height] = draw.viewport;
     // With a negative height, the origin is the lower left corner.
@@ -249,7 +245,6 @@ pub fn viewport(draw: &DrawInfo) -> View {
 }
 
 /// Number of each draw's render pass in the frame.
-#[must_use]
 pub fn pass_numbers(frame: &ProgramFrame) -> Vec<usize> {
     let mut seen: Vec<u32> = Vec::new();
     let number = |draw: &crate::session::Executed| {

@@ -26,7 +26,6 @@ pub enum Other {
 
 impl Other {
     /// Name in messages.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Reflection => "reflections and other pictures of scenes that the eyes read",

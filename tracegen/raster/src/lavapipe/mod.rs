@@ -73,7 +73,6 @@ pub struct Lavapipe {
 
 impl Lavapipe {
     /// The device is the processor.
-    #[must_use]
     pub fn is_software(&self) -> bool {
         self.gpu.is_software
     }

@@ -62,7 +62,6 @@ impl LayerTarget {
     }
 
     /// The part of a region that may have pixels to draw.
-    #[must_use]
     pub fn open_part(&self, region: Region) -> Option<Region> {
         let Some(mask) = &self.mask else {
             return Some(region);
@@ -183,7 +182,6 @@ pub struct ShadowMaps {
 
 impl ShadowMaps {
     /// An array of `cascades` layers; without any, a single texel that no pipeline samples.
-    #[must_use]
     pub fn new(gpu: &Gpu, cascades: u32) -> Self {
         let size = if cascades == 0 { 1 } else { SHADOW_SIZE };
         let texture = attachment(

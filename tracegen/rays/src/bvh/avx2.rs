@@ -15,7 +15,6 @@ pub struct Avx2;
 
 impl Avx2 {
     /// True if this processor can run the kernel.
-    #[must_use]
     pub fn available() -> bool {
         is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
     }

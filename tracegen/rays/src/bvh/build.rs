@@ -31,7 +31,6 @@ const SETTINGS: BvhBuildParams = BvhBuildParams {
 const REINSERTIONS_AFTER_COLLAPSE: u32 = 2;
 
 /// The settings by name, for the trace.
-#[must_use]
 pub fn settings() -> Vec<(String, String)> {
     let s = SETTINGS;
     [

@@ -6,7 +6,6 @@ use formats::raytrace::{ChildKind, Hierarchy, HierarchyChild, HierarchyTriangle,
 
 impl Bvh {
     /// All inner nodes of a tree, with the boxes that its traversal tests, and its triangles by slot.
-    #[must_use]
     pub fn contents(&self, traversal: TraversalKind) -> Hierarchy {
         let slots = self.slots_of(traversal);
         let wide = |nodes: &[Node8]| wide_children(nodes, traversal.width(), slots);

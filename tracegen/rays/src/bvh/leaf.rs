@@ -22,7 +22,6 @@ pub struct RayHit {
 
 impl Bvh {
     /// Slot of a triangle that was hit, its place in the order of a tree's leaves.
-    #[must_use]
     pub fn slot(&self, tree: TraversalKind, hit: &RayHit) -> u32 {
         let (block, lane) = (hit.place as usize / BLOCK, hit.place % BLOCK as u32);
         self.slots_of(tree)[block] + lane

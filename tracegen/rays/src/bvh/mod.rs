@@ -65,7 +65,6 @@ pub enum Instructions {
 
 impl Instructions {
     /// The fastest that this processor supports.
-    #[must_use]
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
         if avx2::Avx2::available() {
@@ -188,7 +187,6 @@ impl Bvh {
     }
 
     /// Whether the tree of a kind was built.
-    #[must_use]
     pub fn has(&self, kind: TraversalKind) -> bool {
         match kind {
             TraversalKind::Bvh2 | TraversalKind::Bvh8 => true,
@@ -206,7 +204,6 @@ impl Bvh {
     }
 
     /// Summary of the tree for a trace.
-    #[must_use]
     pub fn summary(&self, traversal: TraversalKind) -> BvhSummary {
         let (nodes, depth) = match traversal {
             TraversalKind::Bvh2 => (self.nodes2.len(), self.depth2),

@@ -21,21 +21,18 @@ impl Child {
     pub const NONE: Self = Self(u32::MAX);
 
     /// A leaf of `count` triangles, starting at `block`.
-    #[must_use]
     pub fn leaf(block: u32, count: u32) -> Self {
         debug_assert!(block < Self::MAX_BLOCKS && (1..=Self::MAX_LEAF).contains(&count));
         Self(Self::LEAF | (count - 1) << Self::COUNT_SHIFT | block)
     }
 
     /// True for a leaf.
-    #[must_use]
     #[inline]
     pub fn is_leaf(self) -> bool {
         self.0 & Self::LEAF != 0
     }
 
     /// First block and number of triangles of a leaf.
-    #[must_use]
     #[inline]
     pub fn leaf_range(self) -> (u32, u32) {
         (
@@ -85,7 +82,6 @@ pub const MASKED: u32 = 1 << 31;
 
 impl Block {
     /// The vertices of a triangle.
-    #[must_use]
     #[inline]
     pub fn triangle(&self, lane: usize) -> [[f32; 3]; 3] {
         std::array::from_fn(|v| std::array::from_fn(|a| self.vertices[v][a][lane]))

@@ -17,7 +17,6 @@ pub struct TraversalStack {
 
 impl TraversalStack {
     /// A stack for trees that need up to `capacity` entries.
-    #[must_use]
     pub fn new(capacity: usize) -> Self {
         Self {
             entries: vec![0; capacity],

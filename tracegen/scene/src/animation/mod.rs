@@ -106,13 +106,11 @@ impl Scene {
 
 impl Animation {
     /// Display name of the animation that plays.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// Time of the last key.
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }

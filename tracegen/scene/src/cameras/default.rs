@@ -28,13 +28,11 @@ const HEADINGS: usize = 16;
 const MAX_FLOORS: usize = 8;
 
 /// The view of a file without a camera.
-#[must_use]
 pub fn default_camera(scene: &Scene) -> Camera {
     inside(scene).unwrap_or_else(|| around(scene, 1).swap_remove(0))
 }
 
 /// This many views from all sides, slightly from above. The bounds of the scene decide the distance.
-#[must_use]
 pub fn around(scene: &Scene, count: u32) -> Vec<Camera> {
     let (low, high) = scene.bounds().unwrap_or((-Vec3::ONE, Vec3::ONE));
     let target = (low + high) / 2.0;

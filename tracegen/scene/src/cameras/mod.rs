@@ -171,7 +171,6 @@ pub fn posed(
 }
 
 /// The head's frame: columns right, up, backwards, and the point between the eyes.
-#[must_use]
 pub fn head_pose(camera: &Camera) -> Affine3A {
     let back = (camera.eye - camera.target).normalize();
     let right = camera.up.cross(back).normalize();
@@ -180,7 +179,6 @@ pub fn head_pose(camera: &Camera) -> Affine3A {
 }
 
 /// Off-axis perspective from tangents, depth 1 (near) to 0 (far, which may be infinite).
-#[must_use]
 pub fn projection(fov: &FovTangents, near: f32, far: f32) -> Mat4 {
     let (width, height) = (fov.left + fov.right, fov.up + fov.down);
     let [scale, shift] = if far.is_finite() {
@@ -202,7 +200,6 @@ pub fn projection(fov: &FovTangents, near: f32, far: f32) -> Mat4 {
 }
 
 /// Both eyes' matrices for the head at a camera.
-#[must_use]
 pub fn eye_views(camera: &Camera, hmd: &Hmd) -> [EyeView; 2] {
     views_of_head(head_pose(camera), camera, hmd)
 }
@@ -226,7 +223,6 @@ fn views_of_head(head: Affine3A, camera: &Camera, hmd: &Hmd) -> [EyeView; 2] {
 
 /// The views of frames with these head poses, numbered from `first_frame`; near and far planes
 /// are the camera's.
-#[must_use]
 pub fn frame_views(
     camera: &Camera,
     hmd: &Hmd,

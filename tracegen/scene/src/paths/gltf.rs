@@ -21,13 +21,11 @@ pub struct CameraTrack {
 
 impl CameraTrack {
     /// The file of the track.
-    #[must_use]
     pub fn file(&self) -> &Path {
         &self.file
     }
 
     /// Seconds from the first key to the last.
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.span_s[1] - self.span_s[0]
     }

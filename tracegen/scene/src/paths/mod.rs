@@ -123,7 +123,6 @@ pub struct Moments {
 
 impl Moments {
     /// The first `frames` frames at the default rate.
-    #[must_use]
     pub fn first(frames: u32) -> Self {
         Self {
             frames: 0..frames,
@@ -133,13 +132,11 @@ impl Moments {
     }
 
     /// Time of a frame, seconds from the start of the path.
-    #[must_use]
     pub fn time_s(&self, frame: u32) -> f32 {
         frame as f32 / self.fps
     }
 
     /// Scene time of a frame, seconds.
-    #[must_use]
     pub fn scene_time_s(&self, frame: u32) -> f64 {
         self.scene_start_s + seconds(self, frame)
     }
@@ -172,7 +169,6 @@ impl HeadPath {
     }
 
     /// This many views of a scene from all sides, one in each frame.
-    #[must_use]
     pub fn around(count: u32) -> Self {
         Self::Around(cameras::around(&Scene::default(), count))
     }

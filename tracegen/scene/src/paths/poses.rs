@@ -65,20 +65,17 @@ impl PoseTrack {
     }
 
     /// The file of the track.
-    #[must_use]
     pub fn file(&self) -> &Path {
         &self.file
     }
 
     /// Seconds from the first pose to the last.
-    #[must_use]
     pub fn duration_s(&self) -> f64 {
         self.times_s.last().copied().unwrap_or_default()
     }
 
     /// The pose `time_s` after the first one: positions are interpolated linearly, rotations along
     /// the shorter arc.
-    #[must_use]
     pub fn pose(&self, time_s: f64) -> DAffine3 {
         let (key, t) = bracket(&self.times_s, time_s);
         let (position, rotation) = self.poses[key];

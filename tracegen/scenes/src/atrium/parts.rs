@@ -24,7 +24,6 @@ pub struct Column {
 
 impl Column {
     /// Mesh of the base and the shaft.
-    #[must_use]
     pub fn shaft(&self) -> MeshBuilder {
         let (r, top) = (self.radius, self.height - 2.0 * self.radius);
         let mut m = MeshBuilder::new();
@@ -57,7 +56,6 @@ impl Column {
     }
 
     /// Mesh of the neck ring, the fluted bell with leaves curling outwards, and the abacus.
-    #[must_use]
     pub fn capital(&self) -> MeshBuilder {
         let (r, top) = (self.radius * 0.87, self.height - 2.0 * self.radius);
         let mut m = MeshBuilder::new();
@@ -134,7 +132,6 @@ impl Bay {
     }
 
     /// Both faces of the wall above the arch.
-    #[must_use]
     pub fn spandrel(&self) -> MeshBuilder {
         let mut m = MeshBuilder::new();
         let half = self.pitch * 0.5;
@@ -160,7 +157,6 @@ impl Bay {
     }
 
     /// The arch's underside, and the moulded voussoirs on both faces.
-    #[must_use]
     pub fn archivolt(&self, moulding_steps: usize) -> MeshBuilder {
         let mut m = MeshBuilder::new();
         let half = self.thickness * 0.5;
@@ -211,7 +207,6 @@ fn towards_opening(p: Vec3, spring: f32, half_thickness: f32) -> Vec3 {
 }
 
 /// A groin vault seen from below over a bay of `half.x` by `half.y` (half extents), rising `rise`.
-#[must_use]
 pub fn groin_vault(half: Vec2, spring: f32, rise: f32, cells: usize) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     for web in 0..4 {
@@ -236,7 +231,6 @@ pub fn groin_vault(half: Vec2, spring: f32, rise: f32, cells: usize) -> MeshBuil
 }
 
 /// A rib under a vault: a square-edged band along a half circle of `radius` about z.
-#[must_use]
 pub fn rib(radius: f32, spring: f32, width: f32, depth: f32, segments: usize) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     let w = width * 0.5;
@@ -267,7 +261,6 @@ pub fn rib(radius: f32, spring: f32, width: f32, depth: f32, segments: usize) ->
 
 /// A straight moulding of `length` metres along +x at height `y`; the wall is at z = 0 and the
 /// profile (out, up) projects towards +z.
-#[must_use]
 pub fn moulding(profile: &[Knot], length: f32, y: f32) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     // right x up = z x y = -x, so the sweep runs backwards.
@@ -282,7 +275,6 @@ pub fn moulding(profile: &[Knot], length: f32, y: f32) -> MeshBuilder {
 }
 
 /// A cornice's profile of the given size.
-#[must_use]
 pub fn cornice(out: f32, height: f32, steps: usize) -> Vec<Knot> {
     curve(
         &[
@@ -303,7 +295,6 @@ pub fn cornice(out: f32, height: f32, steps: usize) -> Vec<Knot> {
 }
 
 /// A baluster 0.7 m high.
-#[must_use]
 pub fn baluster(segments: usize, steps: usize) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     let knots = [
@@ -324,7 +315,6 @@ pub fn baluster(segments: usize, steps: usize) -> MeshBuilder {
 }
 
 /// A hanging cloth `width` x `drop` metres whose top is at the origin, gathered into folds.
-#[must_use]
 pub fn drape(width: f32, drop: f32, folds: f32, cells: [usize; 2], seed: u64) -> MeshBuilder {
     let mut rng = Rng::new(seed);
     let (phase, wander) = (rng.range(0.0, TAU), rng.range(0.6, 1.2));
@@ -350,7 +340,6 @@ pub fn drape(width: f32, drop: f32, folds: f32, cells: [usize; 2], seed: u64) ->
 }
 
 /// A round medallion with a lion's head in relief, facing +z, of radius 1.
-#[must_use]
 pub fn lion_medallion(cells: usize, relief: f32) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     let blob = |x: f32, y: f32, cx: f32, cy: f32, rx: f32, ry: f32| {
@@ -396,7 +385,6 @@ pub fn lion_medallion(cells: usize, relief: f32) -> MeshBuilder {
 }
 
 /// A flower pot of radius and height 1, open at the top, closed at the earth's level.
-#[must_use]
 pub fn pot(segments: usize, steps: usize) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     let knots = [
@@ -418,7 +406,6 @@ pub fn pot(segments: usize, steps: usize) -> MeshBuilder {
 }
 
 /// One arching leaf from the origin along +x, rising: `length` x `width`, covered by the texture once.
-#[must_use]
 pub fn arching_leaf(
     length: f32,
     width: f32,
@@ -440,7 +427,6 @@ pub fn arching_leaf(
 }
 
 /// Leaves around the y axis: `count` of them in whorls, from low and wide to high and steep.
-#[must_use]
 pub fn rosette(
     count: usize,
     length: f32,

@@ -117,7 +117,6 @@ fn lower_edge(x: f32) -> f32 {
 }
 
 /// A point of the body: `x` along, `t` from -1 (left lower edge) over 0 (centre line) to 1.
-#[must_use]
 pub fn body(x: f32, t: f32) -> Vec3 {
     let (w, low, belt, top) = (half_width(x), lower_edge(x), shoulder(x), crown(x));
     let tuck = 0.06 * smoothstep(0.55, 0.19, low);
@@ -175,7 +174,6 @@ fn roof(x: f32) -> f32 {
 }
 
 /// A point of the cabin: `s` from the cowl (0) to the deck (1), `t` from -1 to 1 across.
-#[must_use]
 pub fn cabin(s: f32, t: f32) -> Vec3 {
     let x = COWL + (DECK - COWL) * s;
     let top = roof(x);
@@ -230,7 +228,6 @@ fn panel(s: f32, t: f32) -> Panel {
 }
 
 /// The body's panels as a mesh of `nx` x `nt` cells.
-#[must_use]
 pub fn body_mesh(nx: usize, nt: usize) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     m.surface(nt, nx, |a, b| {
@@ -243,7 +240,6 @@ pub fn body_mesh(nx: usize, nt: usize) -> MeshBuilder {
 }
 
 /// The cabin cut into its panels: paint, glass, trim.
-#[must_use]
 pub fn cabin_meshes(ns: usize, nt: usize) -> [MeshBuilder; 3] {
     let mut whole = MeshBuilder::new();
     whole.surface(ns, nt, |s, t| {
@@ -272,7 +268,6 @@ pub fn cabin_meshes(ns: usize, nt: usize) -> [MeshBuilder; 3] {
 }
 
 /// The nose's intake (`front`) or the tail's panel, a shallow dish inside the body's outline.
-#[must_use]
 pub fn end_cap(nt: usize, front: bool) -> MeshBuilder {
     let (x, out) = if front { (NOSE, 1.0f32) } else { (TAIL, -1.0) };
     let middle = 0.5 * (lower_edge(x) + crown(x));

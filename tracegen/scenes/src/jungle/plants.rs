@@ -14,7 +14,6 @@ fn attach(m: &mut MeshBuilder, leaf: &MeshBuilder, root: Vec3, turn: f32, pitch:
 }
 
 /// A fern: fronds around a crown, arching over.
-#[must_use]
 pub fn fern(fronds: usize, length: f32, rng: &mut Rng) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     for i in 0..fronds {
@@ -35,7 +34,6 @@ pub fn fern(fronds: usize, length: f32, rng: &mut Rng) -> MeshBuilder {
 }
 
 /// A banana-like plant: broad blades on short stalks.
-#[must_use]
 pub fn broadleaf(blades: usize, length: f32, rng: &mut Rng) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     for i in 0..blades {
@@ -56,7 +54,6 @@ pub fn broadleaf(blades: usize, length: f32, rng: &mut Rng) -> MeshBuilder {
 }
 
 /// A bush: cards with sprays of small leaves around a dome.
-#[must_use]
 pub fn bush(cards: usize, radius: f32, rng: &mut Rng) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     for i in 0..cards {
@@ -86,7 +83,6 @@ pub fn bush(cards: usize, radius: f32, rng: &mut Rng) -> MeshBuilder {
 }
 
 /// Tufts of grass: crossed cards.
-#[must_use]
 pub fn grass(tufts: usize, spread: f32, height: f32, rng: &mut Rng) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     for _ in 0..tufts {
@@ -109,7 +105,6 @@ pub fn grass(tufts: usize, spread: f32, height: f32, rng: &mut Rng) -> MeshBuild
 }
 
 /// A trunk with buttress roots from below the ground to `height`.
-#[must_use]
 pub fn buttressed_trunk(
     radius: f32,
     height: f32,
@@ -145,7 +140,6 @@ pub fn buttressed_trunk(
 }
 
 /// Boughs with leaf cards at the top of a trunk `height` metres high.
-#[must_use]
 pub fn canopy(height: f32, radius: f32, cards: usize, rng: &mut Rng) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     for i in 0..cards {
@@ -173,7 +167,6 @@ pub fn canopy(height: f32, radius: f32, cards: usize, rng: &mut Rng) -> MeshBuil
 }
 
 /// The boughs that carry a canopy.
-#[must_use]
 pub fn boughs(height: f32, radius: f32, count: usize, thick: f32, rng: &mut Rng) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     for i in 0..count {
@@ -197,7 +190,6 @@ pub fn boughs(height: f32, radius: f32, count: usize, thick: f32, rng: &mut Rng)
 }
 
 /// A palm's ringed, curved trunk, and the point at its end for the crown.
-#[must_use]
 pub fn palm_trunk(height: f32, bend: f32) -> (MeshBuilder, Vec3) {
     let center = |t: f32| vec3(bend * t * t, height * t - 0.2 * (1.0 - t), 0.0);
     let points: Vec<(Vec3, f32)> = (0..=26)
@@ -216,7 +208,6 @@ pub fn palm_trunk(height: f32, bend: f32) -> (MeshBuilder, Vec3) {
 }
 
 /// A palm's crown of feathered fronds around the origin.
-#[must_use]
 pub fn palm_crown(fronds: usize, length: f32, rng: &mut Rng) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     for i in 0..fronds {
@@ -243,7 +234,6 @@ pub fn palm_crown(fronds: usize, length: f32, rng: &mut Rng) -> MeshBuilder {
 }
 
 /// A liana from `a` to `b` that sags by `sag` metres.
-#[must_use]
 pub fn liana(a: Vec3, b: Vec3, sag: f32, radius: f32) -> MeshBuilder {
     let side = (b - a).cross(Vec3::Y).normalize_or(Vec3::X);
     let points: Vec<(Vec3, f32)> = (0..=18)
@@ -262,7 +252,6 @@ pub fn liana(a: Vec3, b: Vec3, sag: f32, radius: f32) -> MeshBuilder {
 }
 
 /// Leaves along the same liana.
-#[must_use]
 pub fn liana_leaves(a: Vec3, b: Vec3, sag: f32, count: usize, rng: &mut Rng) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     for i in 0..count {
@@ -283,7 +272,6 @@ pub fn liana_leaves(a: Vec3, b: Vec3, sag: f32, count: usize, rng: &mut Rng) -> 
 }
 
 /// A boulder of radius 1, flat at the bottom.
-#[must_use]
 pub fn boulder(cells: [usize; 2], seed: u64) -> MeshBuilder {
     let mut rng = Rng::new(seed);
     let planes: Vec<(Vec3, f32)> = (0..9)

@@ -53,7 +53,6 @@ fn spindle(m: &mut MeshBuilder, base: Vec3, top: Vec3, radius: f32, turn: f32) {
 
 /// A lavender bush: stems and leaves, and the flower spikes with a radius of `spike` metres. 5 + 6
 /// triangles per stalk.
-#[must_use]
 pub fn lavender(stalks: usize, radius: f32, spike: f32, rng: &mut Rng) -> [MeshBuilder; 2] {
     let (mut green, mut purple) = (MeshBuilder::new(), MeshBuilder::new());
     for i in 0..stalks {
@@ -93,7 +92,6 @@ pub fn lavender(stalks: usize, radius: f32, spike: f32, rng: &mut Rng) -> [MeshB
 }
 
 /// A tuft of grass.
-#[must_use]
 pub fn tuft(blades: usize, height: f32, rng: &mut Rng) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     for i in 0..blades {
@@ -113,7 +111,6 @@ pub fn tuft(blades: usize, height: f32, rng: &mut Rng) -> MeshBuilder {
 }
 
 /// A poppy: stem and leaves, and four cupped petals.
-#[must_use]
 pub fn poppy(height: f32, rng: &mut Rng) -> [MeshBuilder; 2] {
     let (mut green, mut red) = (MeshBuilder::new(), MeshBuilder::new());
     let lean = compass(rng.range(0.0, TAU)) * 0.12;
@@ -167,7 +164,6 @@ fn leaf(m: &mut MeshBuilder, center: Vec3, along: Vec3, across: Vec3) {
 }
 
 /// Leaves of a round crown: clusters on the shells of several balls.
-#[must_use]
 pub fn crown(leaves: usize, height: f32, radius: f32, rng: &mut Rng) -> MeshBuilder {
     let balls: Vec<(Vec3, f32)> = (0..11)
         .map(|i| {
@@ -194,7 +190,6 @@ pub fn crown(leaves: usize, height: f32, radius: f32, rng: &mut Rng) -> MeshBuil
 }
 
 /// Foliage of a cypress: a flame of upright sprays.
-#[must_use]
 pub fn cypress(leaves: usize, height: f32, radius: f32, rng: &mut Rng) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     for i in 0..leaves {
@@ -217,7 +212,6 @@ pub fn cypress(leaves: usize, height: f32, radius: f32, rng: &mut Rng) -> MeshBu
 }
 
 /// A surface of half-round tiles, `size` metres: across (x) and up the slope (y), on the x-y plane.
-#[must_use]
 pub fn tiled_slope(size: Vec2, columns: usize, rows: usize) -> MeshBuilder {
     let mut m = MeshBuilder::new();
     let course = size.y / rows as f32;

@@ -57,7 +57,6 @@ struct Layout {
 }
 
 /// The scene with exactly this number of instances, within [`INSTANCES`].
-#[must_use]
 pub fn with_instances(instances: u32) -> Scene {
     let instances = instances as usize;
     let mut scene = SceneBuilder::new("plant");

@@ -20,7 +20,6 @@ pub enum Budget {
 
 impl Budget {
     /// The largest error of a frame, if the budget limits errors.
-    #[must_use]
     pub fn error_limit(self) -> Option<f64> {
         match self {
             Self::Flip(limit) | Self::Pixels(limit) => Some(limit),

@@ -149,7 +149,6 @@ fn check_median(budget: Budget, chosen: &Row, median_s: f64) -> anyhow::Result<(
 
 /// Frames in the middle of equal parts of the path, alternately even and odd, because some techniques treat
 /// even and odd frames differently.
-#[must_use]
 pub fn search_frames(path_frames: u32) -> Vec<u32> {
     let count = SEARCH_FRAMES.min(path_frames);
     let middle = |part: u32| {

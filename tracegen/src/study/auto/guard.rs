@@ -16,7 +16,6 @@ pub struct Held {
 
 impl Held {
     /// Every frame with `row`, unchecked, for budgets without an error limit.
-    #[must_use]
     pub fn everywhere(row: Row, frames: usize) -> Self {
         Self {
             chain: vec![row],
@@ -26,13 +25,11 @@ impl Held {
     }
 
     /// The combination of a frame.
-    #[must_use]
     pub fn row(&self, frame: u32) -> &Row {
         &self.chain[self.of_frame[frame as usize]]
     }
 
     /// Frames in which the chosen combination exceeded the budget.
-    #[must_use]
     pub fn fallen_back(&self) -> Vec<u32> {
         let frames = (0_u32..).zip(&self.of_frame);
         frames

@@ -22,7 +22,6 @@ pub enum Objective {
 
 impl Objective {
     /// Name as on the command line.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Time => "time",
@@ -33,7 +32,6 @@ impl Objective {
     }
 
     /// Unit of its cost.
-    #[must_use]
     pub fn unit(self) -> &'static str {
         match self {
             Self::Time => "s",
@@ -44,7 +42,6 @@ impl Objective {
     }
 
     /// Cost from counts; none for time.
-    #[must_use]
     pub fn counted(self, counts: &Counted) -> Option<f64> {
         match self {
             Self::Time => None,

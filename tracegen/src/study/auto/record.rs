@@ -74,7 +74,6 @@ impl From<&Tried> for Chosen {
 
 impl AutoRecord {
     /// The record of a search over `search_frames`; `held` is its checked result.
-    #[must_use]
     pub fn new(
         budget: Budget,
         objective: Objective,

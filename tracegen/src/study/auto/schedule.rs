@@ -16,7 +16,6 @@ pub struct Schedule {
 
 impl Schedule {
     /// The schedule of a checked search.
-    #[must_use]
     pub fn of(held: &Held) -> Self {
         let mut exceptions: Vec<(RangeInclusive<u32>, usize)> = Vec::new();
         for (frame, &position) in (0..).zip(&held.of_frame) {
@@ -36,14 +35,12 @@ impl Schedule {
     }
 
     /// The combination of a frame.
-    #[must_use]
     pub fn row(&self, frame: u32) -> &Row {
         let of = |(frames, _): &&(RangeInclusive<u32>, Row)| frames.contains(&frame);
         (self.exceptions.iter().find(of)).map_or(&self.row, |(_, row)| row)
     }
 
     /// The last frame with an exception.
-    #[must_use]
     pub fn last_frame(&self) -> Option<u32> {
         let ends = self.exceptions.iter().map(|(frames, _)| *frames.end());
         ends.max()

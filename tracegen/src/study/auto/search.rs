@@ -81,7 +81,6 @@ impl Spread {
     ///
     /// # Panics
     /// Without values.
-    #[must_use]
     pub fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         let last = values.len() - 1;
@@ -98,7 +97,6 @@ impl Spread {
     }
 
     /// Whether it is less beyond noise: the quartiles do not overlap.
-    #[must_use]
     pub fn is_less(&self, other: &Self) -> bool {
         self.q3 < other.q1
     }
@@ -115,13 +113,11 @@ pub struct Tried {
 
 impl Tried {
     /// Its cost relative to the baseline's; infinite if it was not counted.
-    #[must_use]
     pub fn ratio(&self) -> f64 {
         self.verdict.cost.map_or(f64::INFINITY, |cost| cost.ratio)
     }
 
     /// Its cost per frame; infinite if it was not counted.
-    #[must_use]
     pub fn per_frame(&self) -> f64 {
         (self.verdict.cost).map_or(f64::INFINITY, |cost| cost.per_frame)
     }

@@ -17,7 +17,6 @@ const SMALLEST_CYCLE_DEG: f64 = 1.0 / 48.0;
 impl Rates {
     /// The angles from which each rate has no visible loss. They are computed for the display's pixels
     /// straight ahead, which span the largest angle.
-    #[must_use]
     pub fn of_acuity(hmd: &Hmd) -> Self {
         let pixel_deg = |axis: usize| {
             let spans = hmd.fov.map(|fov| match axis {

@@ -86,7 +86,6 @@ impl Hierarchy {
 
     /// The draws that may be in the frustum of a clip matrix (depth 0 to 1), ascending. Used for single views
     /// and shadow cascades.
-    #[must_use]
     pub fn entering(&self, clip_from_world: Mat4) -> Vec<u32> {
         let extent = self.extent();
         let volume = Volume::new(frustum(clip_from_world, extent), None);

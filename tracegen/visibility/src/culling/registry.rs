@@ -71,25 +71,21 @@ impl Culling {
     }
 
     /// Every name, in the order of the table.
-    #[must_use]
     pub fn names() -> &'static [&'static str] {
         NAMES
     }
 
     /// Name in flags, settings and results.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.0.name
     }
 
     /// Name in tables and plots.
-    #[must_use]
     pub fn title(self) -> &'static str {
         self.0.title
     }
 
     /// One line of help.
-    #[must_use]
     pub fn help(self) -> &'static str {
         self.0.help
     }
@@ -100,7 +96,6 @@ impl Culling {
     }
 
     /// Whether all draws visible inside the lens are kept.
-    #[must_use]
     pub fn is_lossless(self) -> bool {
         self.0.lossless
     }

@@ -12,7 +12,6 @@ impl Hierarchy {
     ///
     /// # Panics
     /// More than 2^30 draws.
-    #[must_use]
     pub fn new(bounds: &[[Vec3; 2]]) -> Self {
         assert!(
             bounds.len() < 1 << 30,

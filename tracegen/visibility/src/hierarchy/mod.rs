@@ -82,19 +82,16 @@ fn is_finite([low, high]: [Vec3; 2]) -> bool {
 
 impl Hierarchy {
     /// Number of draws, including those without finite bounds.
-    #[must_use]
     pub fn len(&self) -> usize {
         self.place.len()
     }
 
     /// Whether there are no draws.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.place.is_empty()
     }
 
     /// Largest absolute coordinate of all finite bounds, by axis. Rounding errors are proportional to it.
-    #[must_use]
     pub fn extent(&self) -> DVec3 {
         let Some(root) = self.nodes.first() else {
             return DVec3::ZERO;

@@ -29,7 +29,6 @@ pub struct Occlusion {
 
 impl Occlusion {
     /// Draws of `kept` (ascending) that were visible in a view in the last frame. They must be drawn first.
-    #[must_use]
     pub fn first(&self, view: usize, kept: &[u32]) -> Vec<u32> {
         let Some(visible) = self.visible.get(view) else {
             return Vec::new();

@@ -19,7 +19,6 @@ impl Pyramid {
     ///
     /// # Panics
     /// The length of `depth` differs from the number of pixels, or is zero.
-    #[must_use]
     pub fn new(size_px: [u32; 2], depth: Vec<f32>) -> Self {
         let size = size_px.map(|extent| extent as usize);
         assert!(!depth.is_empty() && depth.len() == size[0] * size[1]);
@@ -31,14 +30,12 @@ impl Pyramid {
     }
 
     /// Width and height of the picture.
-    #[must_use]
     pub fn size_px(&self) -> [u32; 2] {
         self.levels[0].size.map(|extent| extent as u32)
     }
 
     /// Farthest depth of a rectangle of pixels within the picture, given by its first and last column and
     /// row. May include a few pixels around the rectangle.
-    #[must_use]
     pub fn farthest(&self, columns: [u32; 2], rows: [u32; 2]) -> f32 {
         // The finest level in which the rectangle covers at most 4x4 texels.
         let few = |[first, last]: [u32; 2], level: usize| (last >> level) - (first >> level) < 4;

@@ -39,7 +39,6 @@ impl Volume {
     }
 
     /// Whether a point in world space is inside.
-    #[must_use]
     pub fn contains(&self, point: DVec3) -> bool {
         self.planes.iter().all(|plane| plane.height(point) >= 0.0)
             && self.cone.as_ref().is_none_or(|cone| cone.contains(point))
