@@ -1,4 +1,4 @@
-//! Digests of what every command of `replay` prints and writes on the golden traces, and of the help of both programs:
+//! Digests of what the commands of `replay` print and write on the golden traces, and of the help of both programs:
 //! `commands.digests` lists commands, and below each one its outputs. A change of the code that should change no output
 //! changes no digest.
 //!
