@@ -231,8 +231,6 @@ impl SuperviseArgs {
 
 /// Signal that a program cannot handle.
 const KILL: i32 = signal_hook::consts::SIGKILL;
-/// No signal.
-const NONE: i32 = 0;
 
 /// Whether this process is a supervisor.
 static SUPERVISES: AtomicBool = AtomicBool::new(false);
@@ -244,18 +242,31 @@ pub(crate) fn end_descendants() {
     }
     let start = Instant::now();
     signal_descendants(TERMINATE);
-    while start.elapsed() < TERMINATION_TIMEOUT {
+    while start.elapsed() < TERMINATION_TIMEOUT && has_children() {
         // The parent waits for this process for the same time.
-        let is_late = start.elapsed() > TERMINATION_TIMEOUT / 2;
-        if !signal_descendants(if is_late { KILL } else { NONE }) {
-            return;
+        if start.elapsed() > TERMINATION_TIMEOUT / 2 {
+            signal_descendants(KILL);
         }
         std::thread::sleep(POLL_INTERVAL);
     }
 }
 
-/// Sends a signal to all descendants of this process; returns whether there are any. Zombies do not count.
-fn signal_descendants(signal: i32) -> bool {
+/// Whether this process has children, after those that have ended were removed. Descendants of a supervisor
+/// have become its children before their parent can be removed, so without a child it has no descendant. A
+/// search of `/proc` alone can miss one, because processes start and end meanwhile.
+fn has_children() -> bool {
+    use rustix::process::{WaitOptions, wait};
+    loop {
+        match wait(WaitOptions::NOHANG) {
+            Ok(Some(_)) => {}
+            Ok(None) => return true,
+            Err(_) => return false,
+        }
+    }
+}
+
+/// Sends a signal to all descendants of this process that a search finds.
+fn signal_descendants(signal: i32) {
     let mut parents = Vec::new();
     for process in fs::read_dir("/proc").into_iter().flatten().flatten() {
         let pid = process
@@ -277,17 +288,16 @@ fn signal_descendants(signal: i32) -> bool {
     for process in &family[1..] {
         send(*process, signal);
     }
-    family.len() > 1
 }
 
-/// The parent of a process that is not a zombie, from its `/proc/PID/stat`.
+/// The parent of a process, from its `/proc/PID/stat`. A zombie counts: while its other threads end, it still
+/// has children.
 fn parent_of(stat: &str) -> Option<u32> {
     // State and parent follow the name, which is in parentheses and may itself contain spaces and parentheses.
     let (_, fields) = stat.rsplit_once(')')?;
     let mut fields = fields.split_whitespace();
-    let state = fields.next()?;
-    let parent = fields.next()?.parse().ok()?;
-    (!matches!(state, "Z" | "X")).then_some(parent)
+    let _state = fields.next()?;
+    fields.next()?.parse().ok()
 }
 
 /// Removes a folder; processes that are just ending may still write into it.
@@ -308,7 +318,7 @@ mod tests {
     fn the_parent_is_read_behind_any_name() {
         assert_eq!(parent_of("12 (sh) S 3 12 12 0"), Some(3));
         assert_eq!(parent_of("12 (a) Z 9 (b c) R 7 1"), Some(7));
-        assert_eq!(parent_of("12 (sh) Z 3 12 12 0"), None);
+        assert_eq!(parent_of("12 (sh) Z 3 12 12 0"), Some(3));
         assert_eq!(parent_of(""), None);
     }
 }
