@@ -20,4 +20,4 @@ for recipe in traces/*.recipe; do
     shift
     "$bin/tracegen" "$command" -o "$out" "$@"
 done
-UPDATE_GOLDEN=1 "${CARGO:-cargo}" test --release --workspace --locked --test golden
+UPDATE_GOLDEN=1 "${CARGO:-cargo}" test --release --workspace --locked --test e2e golden::

@@ -1,7 +1,7 @@
 //! What a captured program leaves for its trace, with changed bytes: it becomes a valid trace, or the reason why not is
 //! an error. Nothing may panic, take ten seconds or make a trace of more than a few megabytes.
 //!
-//! `MUTATIONS=100000 MUTATIONS_FROM=5000 cargo test --release --workspace --test mutated_captures` tries more and
+//! `MUTATIONS=100000 MUTATIONS_FROM=5000 cargo test --release --workspace --test e2e mutated_captures` tries more and
 //! different ones.
 #![cfg(target_os = "linux")]
 

@@ -1,7 +1,7 @@
 //! Thousands of changed traces with correct checksums. Each is refused or read, and every valid one can be
 //! replayed. None may panic, take ten seconds or use a gigabyte.
 //!
-//! `MUTATIONS=100000 MUTATIONS_FROM=5000 cargo test --release -p parallax-tests --test mutations` tries
+//! `MUTATIONS=100000 MUTATIONS_FROM=5000 cargo test --release --workspace --test e2e mutations::` tries
 //! more and different ones.
 
 use parallax_tests::exercise::exercise;

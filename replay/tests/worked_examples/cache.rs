@@ -1,6 +1,6 @@
 //! `cache POLICY sets=N ways=N access=...`: look-ups of lines in one cache, each missing line filled at once.
 
-use crate::Settings;
+use super::Settings;
 use replay::config::LevelConfig;
 use replay::memory::{AnyCache, Replacement};
 

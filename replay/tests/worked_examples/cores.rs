@@ -1,7 +1,7 @@
 //! `cores ORDER cores=N items=...`: which core runs which quad when, in functional mode. An item is the
 //! footprints of its quads, as `4.1.2`.
 
-use crate::Settings;
+use super::Settings;
 use formats::textrace::{PrimitiveRun, QuadRecord, Tile};
 use formats::texture::{MipFilter, Sampler};
 use replay::config::{Mode, RunConfig};

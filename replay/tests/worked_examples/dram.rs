@@ -1,6 +1,6 @@
 //! `dram open|closed read=R@C,...`: reads of bursts of one bank, each of row R at cycle C.
 
-use crate::Settings;
+use super::Settings;
 use replay::memory::dram::{Dram, DramConfig, Mapping, PagePolicy};
 
 pub fn output(settings: &Settings) -> Vec<String> {

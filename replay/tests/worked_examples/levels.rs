@@ -1,7 +1,7 @@
 //! `levels inclusive|exclusive l1=N l2=N l3=N access=...`: look-ups of lines in three fully associative LRU
 //! levels of so many lines, in functional mode. The word is the inclusion of the L3.
 
-use crate::Settings;
+use super::Settings;
 use replay::config::RunConfig;
 use replay::memory::{Found, Hierarchy};
 

@@ -1,6 +1,6 @@
 //! `look-ups first-miss loop_cycles=N`: one footprint of two lines that share the only way of an L1.
 
-use crate::Settings;
+use super::Settings;
 use formats::textrace::{PrimitiveRun, QuadRecord, SUBTEXELS, Tile};
 use formats::texture::{MipFilter, Sampler, TexelFormat};
 use replay::config::RunConfig;

@@ -1,6 +1,6 @@
 //! `order NAME tiles=CxR`: the work items of a frame.
 
-use crate::Settings;
+use super::Settings;
 use formats::textrace::{Pass, PassKind};
 use formats::view::{Eye, EyeView, FrameViews};
 use replay::order::{

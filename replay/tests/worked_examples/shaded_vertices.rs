@@ -2,7 +2,7 @@
 //! the mesh has the vertices 3i to 3i + 2. `lists` has the triangles of each tile as `0.1`, `drawn` those with
 //! fragments.
 
-use crate::Settings;
+use super::Settings;
 use formats::textrace::geometry::{Geometry, GeometryView, MeshGeometry, TileLists, ViewTarget};
 use formats::textrace::{Draw, PrimitiveRun, QuadRecord, Tables, Tile};
 use replay::config::RunConfig;

@@ -1,6 +1,6 @@
 //! Texture reads of stages that are not recorded, and programs that end their frames in other ways.
 
-use crate::{capture_program, refused};
+use super::{capture_program, refused};
 use formats::textrace::{Textrace, UnrecordedReads};
 use parallax_tests::{has_lavapipe, program, run_ok};
 use std::path::Path;

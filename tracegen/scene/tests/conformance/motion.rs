@@ -9,7 +9,7 @@ use std::f32::consts::FRAC_PI_2;
 use std::path::Path;
 
 const TEST: &str = "scene/tests/conformance/motion.rs";
-const VALUES: &str = "scene/tests/poses/main.rs";
+const VALUES: &str = "scene/tests/poses/mod.rs";
 
 const fn drawn(
     feature: &'static str,

@@ -2,7 +2,7 @@
 //! the found one.
 
 use super::figure::Figure;
-use super::files::File;
+use crate::conformance::files::File;
 use scene::{LoadOptions, cameras};
 use serde_json::json;
 

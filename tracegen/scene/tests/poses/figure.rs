@@ -1,10 +1,10 @@
 //! The figure of the tests: a skinned and morphed leg, a morphed face on a moving node, and a rigid
 //! hat.
 
-use super::files::File;
 use super::naive::{
     Between, Keys, Matrix, Node, Vector, blend, matrix, normal, point, product, unit, world,
 };
+use crate::conformance::files::File;
 use serde_json::{Value, json};
 
 pub const VERTICES: usize = 6;

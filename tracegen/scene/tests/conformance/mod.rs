@@ -3,7 +3,7 @@
 //!
 //! `UPDATE_FIGURES=1` rewrites results/scene-features.csv.
 
-mod files;
+pub(crate) mod files;
 mod geometry;
 mod images;
 mod materials;
@@ -40,7 +40,7 @@ fn every_feature_is_read_as_its_row_says() {
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../results/scene-features.csv");
     if std::env::var_os("UPDATE_FIGURES").is_some() {
-        let command = "UPDATE_FIGURES=1 cargo test --release -p scene --test conformance";
+        let command = "UPDATE_FIGURES=1 cargo test --release -p scene --test files";
         std::fs::write(&path, format!("# command: {command}\n{csv}")).unwrap();
     }
     let stored = std::fs::read_to_string(&path).unwrap_or_default();

@@ -3,10 +3,6 @@
 
 mod damaged;
 mod figure;
-// The table of features builds files with images as well.
-#[allow(dead_code)]
-#[path = "../conformance/files.rs"]
-mod files;
 mod naive;
 
 use figure::{FACE, Figure, HAT, KNEE, LEG, ROOT, VERTICES};

@@ -187,7 +187,7 @@ fn each_damage_is_reported() {
         bench.row(worker, &damages[number])
     });
     let mut csv = String::from(
-        "# command: UPDATE_GOLDEN=1 cargo test --release --workspace --test verify_damage\nfield,damage,found by,exit code,reported as\n",
+        "# command: UPDATE_GOLDEN=1 cargo test --release --workspace --test e2e verify_damage\nfield,damage,found by,exit code,reported as\n",
     );
     let mut wrong = Vec::new();
     for row in rows {

@@ -1,0 +1,5 @@
+//! Tests of the loaders on whole files, in one program.
+
+mod conformance;
+mod containers;
+mod poses;
