@@ -44,7 +44,7 @@ fuzz:
 
 # Programs killed at 200 random moments, and disks that are full at many sizes.
 faults:
-	KILLS=200 STEPS=20 $(CARGO) test --release --workspace --locked --test kills --test full_disk -- --nocapture
+	KILLS=200 STEPS=20 $(CARGO) test --release --workspace --locked --test e2e -- kills:: full_disk:: --nocapture
 
 # What each stage of a replay costs, beside this machine's bandwidth (TEXTRACE=file for another trace).
 bench:
@@ -54,9 +54,9 @@ lint:
 	$(CARGO) fmt --all --check
 	$(CARGO) clippy --release --workspace --all-targets --locked -- -D warnings
 
-# Both programs, without the layer that captures other programs.
+# Both programs as the demo needs them: without the commands that capture programs, without checks of captures, and without decoders of files.
 programs:
-	$(CARGO) build --release --locked -p tracegen -p replay
+	$(CARGO) build --release --locked --no-default-features -p tracegen -p replay
 
 build:
 	$(CARGO) build --release --locked -p tracegen -p replay -p layer
@@ -71,7 +71,7 @@ golden: deps build
 
 # Rewrites the tables of the documents from results/, and the outputs of the tutorial; review the diff.
 figures: build
-	UPDATE_FIGURES=1 $(CARGO) test --release --locked -p parallax-tests --test figures --test tutorial
+	UPDATE_FIGURES=1 $(CARGO) test --release --locked --workspace --test e2e -- figures:: tutorial::
 
 # Every page from small inputs, with screenshots and a check of their layout: out/screenshots.
 screenshots: deps build

@@ -4,7 +4,6 @@ use crate::backend::CaptureBackend;
 use crate::draws::DrawList;
 use crate::error::RasterError;
 use crate::lavapipe::{Lavapipe, device};
-use crate::osmesa::Osmesa;
 use scene::Scene;
 use textures::TextureSet;
 
@@ -36,7 +35,12 @@ impl Driver {
     ) -> Result<Opened, RasterError> {
         let budget = record_budget_bytes;
         let osmesa = || -> Result<Box<dyn CaptureBackend>, RasterError> {
-            Ok(Box::new(Osmesa::new(scene, draws, textures, budget)?))
+            #[cfg(feature = "osmesa")]
+            return Ok(Box::new(crate::osmesa::Osmesa::new(
+                scene, draws, textures, budget,
+            )?));
+            #[cfg(not(feature = "osmesa"))]
+            Err(RasterError::NotBuilt("osmesa"))
         };
         let lavapipe = || -> Result<Box<dyn CaptureBackend>, RasterError> {
             let gpu = device::open(None)?;

@@ -30,6 +30,12 @@ pub enum RasterError {
         "{0} (OSMesa, Mesa without a window) cannot be loaded: {1}; install it with: apt-get install libosmesa6 (Mesa 25.1 and later have none)"
     )]
     NoLibrary(&'static str, String),
+    /// A driver that the program is built without.
+    #[cfg(not(feature = "osmesa"))]
+    #[error(
+        "this program is built without the driver {0}; `make build` builds it with all drivers"
+    )]
+    NotBuilt(&'static str),
     /// Neither of the drivers that can capture is available.
     #[error("{0}; nor OSMesa: {1}")]
     NoBackend(Box<RasterError>, Box<RasterError>),

@@ -22,6 +22,7 @@ mod groups;
 pub mod lavapipe;
 pub mod lighting;
 mod occlude;
+#[cfg(feature = "osmesa")]
 mod osmesa;
 mod roles;
 mod seen;

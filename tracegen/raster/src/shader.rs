@@ -54,6 +54,7 @@ pub(crate) enum Granularity {
     /// One by one, for merging into quads: see [`record::Merged`].
     Fragments,
     /// One by one, with primitives numbered by unshared vertices.
+    #[cfg_attr(not(feature = "osmesa"), expect(dead_code))]
     NumberedFragments,
 }
 

@@ -46,6 +46,13 @@ pub enum SceneError {
     },
 }
 
+/// What is expected and found where a file needs a decoder that this program is built without.
+#[cfg(not(all(feature = "basis", feature = "draco", feature = "meshopt")))]
+pub(crate) fn without_feature(feature: &str) -> (String, String) {
+    let expected = format!("a program with the feature `{feature}` (`make build`)");
+    (expected, "one without it".to_owned())
+}
+
 /// A path as shown in a message. A scene file may name paths with any characters in them.
 fn path(file: &Path) -> String {
     printable(&file.to_string_lossy()).into_owned()

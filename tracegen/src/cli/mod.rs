@@ -1,19 +1,25 @@
 //! The command line, one file per subcommand.
 
+#[cfg(feature = "programs")]
 pub mod app;
 mod cache_args;
 mod capture_steps;
 mod choice;
+#[cfg(feature = "programs")]
 mod failed_run;
 mod file_uses;
 pub mod lens_args;
 mod light_args;
+#[cfg(not(all(feature = "lab", feature = "programs")))]
+mod not_built;
 mod objective_args;
+#[cfg(feature = "programs")]
 pub mod page;
 mod path_args;
 mod pose_args;
 pub mod precision;
 mod prepared;
+#[cfg(feature = "programs")]
 mod program_args;
 pub mod raster;
 mod raster_args;
@@ -23,15 +29,22 @@ mod raster_summary;
 pub mod rays;
 pub mod scene_args;
 pub mod scenes;
+#[cfg(feature = "lab")]
 pub mod stress;
 pub mod sweep;
 mod technique_args;
 pub mod techniques;
 mod values;
+#[cfg(feature = "lab")]
 pub mod verified_trace;
+#[cfg(feature = "lab")]
 mod verify;
 
 use clap::{Parser, Subcommand};
+#[cfg(not(feature = "programs"))]
+use not_built::{app, page};
+#[cfg(not(feature = "lab"))]
+use not_built::{stress, verify};
 use shell::{Common, Documents, SuperviseArgs};
 use std::process::ExitCode;
 
@@ -66,7 +79,6 @@ enum Command {
     /// Capture the texture samples of an unmodified Vulkan or OpenGL program into a .textrace file.
     App(Box<app::AppArgs>),
     /// Capture the texture samples of a page of WebGL or WebXR in Chromium into a .textrace file.
-    #[command(mut_arg("output", page::without_a_trace))]
     Page(Box<page::PageArgs>),
     /// Measure stereo rendering techniques along a path: times, pictures and traces into a folder.
     Techniques(Box<techniques::TechniquesArgs>),

@@ -21,6 +21,7 @@ use std::time::Duration;
 
 /// Arguments of `tracegen page`.
 #[derive(Args, Debug)]
+#[command(mut_arg("output", without_a_trace))]
 pub struct PageArgs {
     #[command(flatten)]
     capture: ProgramArgs,

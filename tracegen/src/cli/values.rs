@@ -37,6 +37,7 @@ pub(super) fn parse_bytes(text: &str) -> Result<u64, String> {
 }
 
 /// Parser of a number within a range, which has a unit. What is not a number is outside every range.
+#[cfg_attr(not(feature = "programs"), allow(dead_code))]
 pub(super) fn number_in(
     range: RangeInclusive<f64>,
     unit: &'static str,
@@ -52,6 +53,7 @@ pub(super) fn number_in(
 }
 
 /// A time limit in seconds.
+#[cfg_attr(not(feature = "programs"), allow(dead_code))]
 pub(super) fn parse_timeout(text: &str) -> Result<Duration, String> {
     let seconds = text.trim().parse().ok();
     let time = seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());

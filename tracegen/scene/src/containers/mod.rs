@@ -1,5 +1,9 @@
 //! Image files that hold texels as texture units read them: one module and one row per format.
 
+#[cfg(feature = "basis")]
+mod basis;
+#[cfg(not(feature = "basis"))]
+#[path = "no_basis.rs"]
 mod basis;
 mod dds;
 mod ktx2;

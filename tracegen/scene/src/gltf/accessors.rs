@@ -200,6 +200,7 @@ impl<'a> Buffers<'a> {
     }
 
     /// Whether an accessor's integers represent numbers from 0 or -1 to 1.
+    #[cfg(feature = "draco")]
     pub fn is_normalized(&self, index: Option<usize>) -> bool {
         let accessor = index.and_then(|index| self.root.accessors.get(index));
         accessor.is_some_and(|accessor| accessor.normalized)

@@ -124,6 +124,26 @@ impl Compressed {
         let (count, stride) = (self.count as usize, self.byte_stride);
         // 64-bit words satisfy every filter's alignment.
         let mut words = vec![0_u64; (bytes as usize).div_ceil(8)];
+        if let Err((expected, found)) = self.decode_into(&mut words, stored) {
+            return invalid(expected, found);
+        }
+        let bytes = words.iter().flat_map(|word| word.to_ne_bytes());
+        Ok(bytes.take(count * stride).collect())
+    }
+
+    #[cfg(not(feature = "meshopt"))]
+    fn decode_into(&self, _to: &mut [u64], _stored: &[u8]) -> Result<(), (String, String)> {
+        Err(crate::error::without_feature("meshopt"))
+    }
+
+    /// Decodes into words that hold all elements.
+    #[cfg(feature = "meshopt")]
+    fn decode_into(&self, words: &mut [u64], stored: &[u8]) -> Result<(), (String, String)> {
+        let (count, stride) = (self.count as usize, self.byte_stride);
+        assert!(
+            size_of_val(words) >= count * stride,
+            "room for all elements"
+        );
         let to = words.as_mut_ptr().cast();
         let (from, length) = (stored.as_ptr(), stored.len());
         // SAFETY: `to` holds `count * stride` bytes. `of_view` has checked the strides and counts
@@ -144,7 +164,7 @@ impl Compressed {
         };
         if code != 0 {
             let expected = format!("{count} elements of {stride} bytes");
-            return invalid(expected, format!("damaged data (code {code})"));
+            return Err((expected, format!("damaged data (code {code})")));
         }
         // SAFETY: as above; filters work in place on the same elements.
         unsafe {
@@ -156,7 +176,6 @@ impl Compressed {
                 Filter::Color => meshopt::ffi::meshopt_decodeFilterColor(to, count, stride),
             }
         }
-        let bytes = words.iter().flat_map(|word| word.to_ne_bytes());
-        Ok(bytes.take(count * stride).collect())
+        Ok(())
     }
 }

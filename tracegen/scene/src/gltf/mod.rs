@@ -13,6 +13,10 @@ mod camera_track;
 #[cfg(test)]
 mod camera_track_tests;
 mod channels;
+#[cfg(feature = "draco")]
+mod draco;
+#[cfg(not(feature = "draco"))]
+#[path = "no_draco.rs"]
 mod draco;
 mod features;
 mod instancing;
