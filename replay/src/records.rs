@@ -178,7 +178,7 @@ pub fn columns<R: Tabular, T: Rows<R>>(trace: &T) -> formats::Result<Vec<Values>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sim::stream::synthetic::Synthetic;
+    use sim::stream::testing::Synthetic;
 
     #[test]
     fn a_trace_without_records_has_empty_columns_of_the_right_types() {

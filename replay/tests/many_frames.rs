@@ -6,7 +6,7 @@ use formats::textrace::{Pass, Tables, Textrace, TextraceWriter, Tile};
 use formats::view::FrameViews;
 use replay::config::{LevelConfig, Levels, Mode, Order, RunConfig, TmuModel};
 use replay::engine::replay_all;
-use replay::stream::synthetic::Synthetic;
+use replay::stream::testing::Synthetic;
 use replay::stream::{LineMemory, TileSource};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -43,15 +43,7 @@ fn source_files(folder: &Path, out: &mut Vec<PathBuf>) {
 fn is_for_tests(path: &Path) -> bool {
     let name = |part: &std::ffi::OsStr| {
         let part = part.to_string_lossy();
-        [
-            "schemas.rs",
-            "tests",
-            "tests.rs",
-            "testing.rs",
-            "synthetic.rs",
-            "mutations.rs",
-        ]
-        .contains(&part.as_ref())
+        ["schemas.rs", "tests", "tests.rs", "testing.rs"].contains(&part.as_ref())
     };
     path.iter().any(name)
 }

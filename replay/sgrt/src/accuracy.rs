@@ -47,26 +47,26 @@ pub struct Accuracy {
 
 impl Accuracy {
     /// Number of right samples.
-    #[must_use]
     pub(super) fn total(&self) -> u64 {
         self.reused.pixels + self.overlapped.pixels + self.missing.pixels + self.bad.pixels
     }
 
     /// Counts of all reused samples, overlapped ones included.
-    #[must_use]
     pub(super) fn all_reused(&self) -> ClassCounts {
-        let (a, b) = (&self.reused, &self.overlapped);
-        ClassCounts {
-            pixels: a.pixels + b.pixels,
-            wrong_object: a.wrong_object + b.wrong_object,
-            wrong_primitive: a.wrong_primitive + b.wrong_primitive,
-            position_over_1px: a.position_over_1px + b.position_over_1px,
-            position_over_2px: a.position_over_2px + b.position_over_2px,
-        }
+        let (mut sum, other) = (self.reused, &self.overlapped);
+        sim::add_fields!(
+            sum,
+            other,
+            pixels,
+            wrong_object,
+            wrong_primitive,
+            position_over_1px,
+            position_over_2px
+        );
+        sum
     }
 
     /// A count as a percentage of all right samples.
-    #[must_use]
     pub fn pct(&self, count: u64) -> f64 {
         if self.total() == 0 {
             return 0.0;
@@ -77,7 +77,6 @@ impl Accuracy {
 
 /// Distance between the reused and the true hit, over the pixel's width at the true hit's depth, in pixels.
 /// Grazing surfaces increase it. It is zero between sky and sky, and infinite between sky and surface.
-#[must_use]
 pub(super) fn position_error_px(
     eye: &EyeCamera,
     decision: &Decision,
@@ -97,7 +96,6 @@ pub(super) fn position_error_px(
 }
 
 /// Counts decisions by class, and compares reused hits with traced ones.
-#[must_use]
 pub(super) fn count_errors(frame: &Frame, decisions: &[Decision]) -> Accuracy {
     let eye = frame.tables.camera(Eye::Right);
     let mut accuracy = Accuracy::default();

@@ -25,14 +25,10 @@ pub struct Misses {
 impl Misses {
     /// Adds another batch's misses.
     pub fn add(&mut self, other: &Self) {
-        self.l1_lines += other.l1_lines;
-        self.l2_lines += other.l2_lines;
-        self.l1_visits += other.l1_visits;
-        self.l2_visits += other.l2_visits;
+        sim::add_fields!(self, other, l1_lines, l2_lines, l1_visits, l2_visits);
     }
 
     /// Bytes fetched by the L2.
-    #[must_use]
     pub(super) fn dram_bytes(&self, line_bytes: u64) -> f64 {
         self.l2_lines * line_bytes as f64
     }
@@ -41,7 +37,6 @@ impl Misses {
 /// Mean number of lines that a record touches, for records stored consecutively. A record of `b` bytes
 /// starts at a multiple of `g = gcd(b, line)`, all multiples equally often, and touches `1 + (b - g) /
 /// line` lines on average.
-#[must_use]
 fn lines_per_record(record_bytes: u32, line_bytes: u64) -> f64 {
     let bytes = u64::from(record_bytes).max(1);
     let (mut divisor, mut rest) = (bytes, line_bytes);
@@ -53,7 +48,6 @@ fn lines_per_record(record_bytes: u32, line_bytes: u64) -> f64 {
 
 /// Misses of a batch by the configured hit rates, which apply per visit: all lines of a visit hit, or all
 /// miss. Re-tests count as primary accesses.
-#[must_use]
 pub(super) fn by_rates(work: &BatchWork, bvh: &BvhSummary, config: &SgrtConfig) -> Misses {
     let cache = &config.cache;
     let rate = |rates: &HitRates, class: RayClass| match class {
@@ -104,7 +98,6 @@ impl DeviceCaches {
     pub const MOST_LINES: u64 = u32::MAX as u64;
 
     /// Empty caches.
-    #[must_use]
     pub fn new(config: &SgrtConfig) -> Self {
         let c = &config.cache;
         let units = config.tni.units as usize;
@@ -147,7 +140,7 @@ impl DeviceCaches {
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::bvh;
+    use super::super::testing::bvh;
     use super::*;
 
     #[test]

@@ -58,7 +58,6 @@ impl Reuse {
 const SAME_SPOT_PX: f32 = 1.0;
 
 /// Colours of the right samples, linear RGB.
-#[must_use]
 pub fn compose(frame: &Frame, decisions: &[Decision], reuse: Reuse) -> Vec<[f32; 3]> {
     let eye = frame.tables.camera(Eye::Right);
     decisions

@@ -249,7 +249,6 @@ impl Default for SgrtConfig {
 
 impl SgrtConfig {
     /// Issue cycles and energy of a traversal step.
-    #[must_use]
     pub fn step(&self, traversal: TraversalKind) -> (f64, f64) {
         if traversal == TraversalKind::Bvh2 {
             return (self.tni.trv_cycles_per_step, self.energy.step_pj);
@@ -331,7 +330,6 @@ impl SgrtConfig {
     }
 
     /// Every parameter by its dotted key, in file order.
-    #[must_use]
     pub fn numbers(&self) -> Vec<(String, f64)> {
         let mut out = Vec::new();
         if let Ok(table) = toml::Table::try_from(self) {
@@ -342,7 +340,6 @@ impl SgrtConfig {
 
     /// A copy with one parameter scaled. Integers are rounded and stay at least 1; for rates, the miss rate
     /// is scaled. `None` for an unknown key.
-    #[must_use]
     pub fn scaled(&self, key: &str, factor: f64) -> Option<Self> {
         let mut table = toml::Table::try_from(self).ok()?;
         let mut parts = key.split('.').peekable();

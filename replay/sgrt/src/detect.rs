@@ -27,7 +27,6 @@ pub enum PixelClass {
 
 impl PixelClass {
     /// True for the reused classes.
-    #[must_use]
     pub(super) fn is_reused(self) -> bool {
         matches!(self, Self::Reused | Self::Overlapped)
     }
@@ -53,7 +52,6 @@ pub struct Decision {
 }
 
 /// Decides on every right sample.
-#[must_use]
 pub fn decide(frame: &Frame, arrived: &Reprojection, rule: &Rule) -> Vec<Decision> {
     let tests = rule.tests(frame, arrived);
     let retests = rule.retests();

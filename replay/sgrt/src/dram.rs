@@ -19,21 +19,23 @@ pub struct DramBytes {
 
 impl DramBytes {
     /// Total bytes.
-    #[must_use]
     pub fn total(&self) -> u64 {
         self.hierarchy_bytes + self.gbuffer_bytes + self.shading_bytes + self.frame_buffer_bytes
     }
 
     /// Adds another batch's bytes.
     pub fn add(&mut self, other: &Self) {
-        self.hierarchy_bytes += other.hierarchy_bytes;
-        self.gbuffer_bytes += other.gbuffer_bytes;
-        self.shading_bytes += other.shading_bytes;
-        self.frame_buffer_bytes += other.frame_buffer_bytes;
+        sim::add_fields!(
+            self,
+            other,
+            hierarchy_bytes,
+            gbuffer_bytes,
+            shading_bytes,
+            frame_buffer_bytes
+        );
     }
 
     /// Transfer time at full bandwidth (1 GB/s is 1 byte/ns).
-    #[must_use]
     pub(super) fn time_ns(&self, config: &SgrtConfig) -> f64 {
         self.total() as f64 / config.memory.bandwidth_gb_s
     }

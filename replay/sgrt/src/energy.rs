@@ -5,7 +5,6 @@ use super::run::{EnergyPj, Run};
 use formats::raytrace::BvhSummary;
 
 /// Energy of a run.
-#[must_use]
 pub fn energy(run: &Run, bvh: &BvhSummary, config: &SgrtConfig) -> EnergyPj {
     let e = &config.energy;
     let work = &run.work;
@@ -29,7 +28,7 @@ pub fn energy(run: &Run, bvh: &BvhSummary, config: &SgrtConfig) -> EnergyPj {
 #[cfg(test)]
 mod tests {
     use super::super::dram::DramBytes;
-    use super::super::synthetic::bvh;
+    use super::super::testing::bvh;
     use super::*;
     use formats::raytrace::TraversalKind;
 

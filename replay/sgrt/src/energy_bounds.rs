@@ -26,7 +26,6 @@ const LOGIC: [f64; 2] = [0.35, 1.0];
 const SRAM: [f64; 2] = [0.75, 1.0];
 
 /// Least and most energy of a run relative to a reference, over all factors within their ranges.
-#[must_use]
 pub(super) fn relative_bounds(run: &EnergyPj, reference: &EnergyPj) -> [f64; 2] {
     let ratios = (0..1_u32 << COMPONENTS.len()).map(|corner| {
         let factor = |number: usize, range: [f64; 2]| range[(corner >> number & 1) as usize];

@@ -124,20 +124,17 @@ pub struct Sample {
 
 impl Sample {
     /// True if nothing was hit.
-    #[must_use]
     pub(super) fn is_sky(&self) -> bool {
         self.primitive == SKY
     }
 
     /// Traced colour, linear RGB.
-    #[must_use]
     pub fn color(&self) -> [f32; 3] {
         add(self.view_independent, self.view_dependent)
     }
 }
 
 /// Sum of two colours.
-#[must_use]
 pub fn add(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
     std::array::from_fn(|c| a[c] + b[c])
 }
@@ -187,19 +184,16 @@ impl Frame {
     }
 
     /// The left eye.
-    #[must_use]
     pub fn left(&self) -> &EyeFrame {
         &self.eyes[0]
     }
 
     /// The right eye.
-    #[must_use]
     pub fn right(&self) -> &EyeFrame {
         &self.eyes[1]
     }
 
     /// Samples per eye, one per pixel.
-    #[must_use]
     pub(super) fn sample_count(&self) -> usize {
         self.size_px[0] as usize * self.size_px[1] as usize
     }
@@ -215,7 +209,6 @@ impl Frame {
     }
 
     /// Image position of a sample of either eye, in pixels from the top left.
-    #[must_use]
     pub(super) fn position_px(&self, sample: usize) -> [f32; 2] {
         let (x, y) = (
             sample as u32 % self.size_px[0],

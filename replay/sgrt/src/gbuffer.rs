@@ -44,7 +44,6 @@ pub(super) struct RightTile {
 
 /// Traffic of a left tile: shading writes its records, the reproject kernel reads the fields that detection
 /// needs, and these are written to DRAM.
-#[must_use]
 pub(super) fn left_tile(pixels: u64, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Traffic {
     let record = pixels * reads.record_bytes(g);
     let row = pixels * reads.pixel_bytes(g);
@@ -66,7 +65,6 @@ pub(super) fn left_tile(pixels: u64, keeping: Keeping, reads: Reads, g: &Gbuffer
 
 /// Traffic of a tile of the previous frame: the reproject kernel reads the fields that detection needs from DRAM.
 /// The records were written when the frame was rendered.
-#[must_use]
 pub(super) fn previous_tile(pixels: u64, reads: Reads, g: &Gbuffer) -> Traffic {
     Traffic {
         on_chip_bytes: 0,
@@ -76,7 +74,6 @@ pub(super) fn previous_tile(pixels: u64, reads: Reads, g: &Gbuffer) -> Traffic {
 
 /// Traffic of a right tile: rows are fetched and searched by detection, reuse reads left records, and the
 /// tile's own records are written.
-#[must_use]
 pub(super) fn right_tile(tile: &RightTile, keeping: Keeping, reads: Reads, g: &Gbuffer) -> Traffic {
     let records = (tile.reused + tile.tested) * reads.record_bytes(g);
     let searched = tile.row_read_bytes + tile.tested * reads.looked_up_bytes(g);

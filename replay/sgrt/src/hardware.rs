@@ -29,19 +29,16 @@ pub struct Comparison {
 
 impl Comparison {
     /// Frames per second of reprojection relative to the reference.
-    #[must_use]
     pub fn relative_performance(&self) -> f64 {
         self.reprojected.performance_over(&self.reference)
     }
 
     /// Energy of reprojection relative to the reference.
-    #[must_use]
     pub fn relative_energy(&self) -> f64 {
         self.reprojected.energy_over(&self.reference)
     }
 
     /// Least and most relative energy, if the energies are scaled to 14 nm.
-    #[must_use]
     pub(super) fn relative_energy_bounds(&self) -> [f64; 2] {
         relative_bounds(&self.reprojected.energy, &self.reference.energy)
     }
@@ -62,7 +59,6 @@ pub struct TileWork {
 }
 
 /// The work of each tile, for given decisions and reuse, by tile number.
-#[must_use]
 pub(super) fn tile_work(frame: &Frame, decisions: &[Decision], reuse: Reuse) -> Vec<TileWork> {
     (0..frame.tables.tile_count())
         .into_par_iter()
@@ -142,7 +138,6 @@ pub struct TileMisses {
 }
 
 /// Misses by the configured hit rates, by tile number.
-#[must_use]
 pub(super) fn misses_by_rates(
     work: &[TileWork],
     frame: &Frame,

@@ -46,7 +46,7 @@ mod ways;
 pub mod work;
 
 #[cfg(any(test, feature = "testing"))]
-pub mod synthetic;
+pub mod testing;
 
 /// The default rule of `replay reproject`: the cheapest measured one with a right image well below a FLIP
 /// of 0.01 on every scene. Foliage needs `opaque`, because the trace does not record whether a re-tested

@@ -55,7 +55,6 @@ impl<'a> LoadedTrace<'a> {
     }
 
     /// Reprojects a frame that was loaded from a source.
-    #[must_use]
     pub(super) fn of(source: &'a dyn RaySource, frame: Frame) -> Self {
         let arrived = reproject(&frame);
         let rows = RowNeeds::new(&frame, &arrived);
@@ -75,25 +74,21 @@ impl<'a> LoadedTrace<'a> {
     }
 
     /// The loaded frame.
-    #[must_use]
     pub fn frame(&self) -> &Frame {
         &self.frame
     }
 
     /// The left rows needed for the right image.
-    #[must_use]
     pub fn rows(&self) -> &RowNeeds {
         &self.rows
     }
 
     /// The left image.
-    #[must_use]
     pub fn left(&self) -> Picture {
         traced(&self.frame, Eye::Left)
     }
 
     /// The source of cache misses.
-    #[must_use]
     pub fn cache_misses(&self) -> &'static str {
         if self.frame.tables.meta.has_visits {
             "addresses"
@@ -242,7 +237,7 @@ fn traced(frame: &Frame, eye: Eye) -> Picture {
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{
+    use super::super::testing::{
         DIFFUSE, LEAF, MIRROR, Placed, Synthetic, View, globe, trace, wall,
     };
     use super::*;

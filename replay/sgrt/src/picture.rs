@@ -7,7 +7,6 @@ use image_error::Picture;
 const BAD_PIXEL: [u8; 3] = [255, 230, 0];
 
 /// The picture with every traced pixel yellow.
-#[must_use]
 pub fn bad_pixels(decisions: &[Decision], picture: &Picture) -> Picture {
     let mut out = picture.clone();
     for (pixel, decision) in out.pixels.iter_mut().zip(decisions) {

@@ -35,13 +35,11 @@ pub struct RightSample<'a> {
 
 impl<'a> RightSample<'a> {
     /// The arrival here.
-    #[must_use]
     pub(super) fn candidate(&self) -> &'a Candidate {
         &self.arrived.candidates[self.index]
     }
 
     /// The left sample that arrived here. Panics if there is none.
-    #[must_use]
     pub fn source(&self) -> &'a Sample {
         &self.frame.left().samples[self.candidate().source as usize]
     }

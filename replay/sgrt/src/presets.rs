@@ -40,13 +40,11 @@ static ON_CHIP: Preset = Preset {
 pub static PRESETS: [&Preset; 2] = [&SGRT_PAPER, &ON_CHIP];
 
 /// The preset of a name.
-#[must_use]
 pub fn find(name: &str) -> Option<&'static Preset> {
     PRESETS.into_iter().find(|preset| preset.name == name)
 }
 
 /// Describes the choices of `--preset`.
-#[must_use]
 pub fn help() -> String {
     let mut text = "Named settings; --rule, --reuse and --config replace parts of them:".to_owned();
     for preset in PRESETS {

@@ -83,7 +83,6 @@ pub struct Figures {
 const ROW_TEST_CYCLES: f64 = 4.0;
 
 /// All readings, in a fixed order: 2 rules x 4 levels of reuse x 6 scopes, row tests and places of the G-buffer.
-#[must_use]
 pub fn all() -> Vec<Reading> {
     let mut out = Vec::new();
     for (scope, row_test, gbuffer) in SCOPES {
@@ -206,7 +205,6 @@ fn energy_of(run: &Run, scope: Scope, config: &SgrtConfig) -> EnergyPj {
 
 /// Distance of a reading from published ratios: the root mean square of ln(ours / published) over performance and
 /// energy. 0.1 is about 10 %. `None` without pairs.
-#[must_use]
 pub fn rms_log(pairs: impl IntoIterator<Item = (Figures, [f64; 2])>) -> Option<f64> {
     let squares: Vec<f64> = pairs
         .into_iter()
@@ -224,7 +222,7 @@ pub fn rms_log(pairs: impl IntoIterator<Item = (Figures, [f64; 2])>) -> Option<f
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{View, globe, trace, wall};
+    use super::super::testing::{View, globe, trace, wall};
     use super::*;
 
     fn loaded(check: impl Fn(&LoadedTrace, &SgrtConfig)) {

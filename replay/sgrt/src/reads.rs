@@ -22,7 +22,6 @@ pub enum Around {
 
 impl Around {
     /// Pixels read per right pixel.
-    #[must_use]
     pub fn pixels(self) -> u64 {
         match self {
             Self::Own => 1,
@@ -33,7 +32,6 @@ impl Around {
     }
 
     /// True if the rows above and below are read as well.
-    #[must_use]
     fn has_neighbour_rows(self) -> bool {
         self >= Self::Cross
     }
@@ -93,13 +91,11 @@ impl Reads {
     }
 
     /// Bytes per left pixel that detection reads: through DRAM, or kept on chip.
-    #[must_use]
     pub fn pixel_bytes(self, g: &Gbuffer) -> u64 {
         self.fields(g).map(|(bytes, _)| bytes).sum()
     }
 
     /// True if detection reads rows above and below a pixel's.
-    #[must_use]
     pub(super) fn has_neighbour_rows(self) -> bool {
         let all = [self.position, self.object, self.triangle, self.shadow];
         all.into_iter().flatten().any(Around::has_neighbour_rows)
@@ -107,7 +103,6 @@ impl Reads {
 
     /// Bytes that DMA fetches for a band of rows. The band's arrivals come from `rows` left rows, and those
     /// of the band and its adjacent rows from `with_neighbours`, of `row_px` pixels each.
-    #[must_use]
     pub(super) fn fetched_bytes(
         self,
         g: &Gbuffer,
@@ -128,7 +123,6 @@ impl Reads {
     }
 
     /// Bytes read from the row buffers per tested right pixel.
-    #[must_use]
     pub(super) fn looked_up_bytes(self, g: &Gbuffer) -> u64 {
         self.fields(g)
             .map(|(bytes, around)| bytes * around.pixels())
@@ -136,7 +130,6 @@ impl Reads {
     }
 
     /// Bytes per G-buffer record: the paper's fields, and the numbers that detection reads.
-    #[must_use]
     pub(super) fn record_bytes(self, g: &Gbuffer) -> u64 {
         let numbers = [
             (g.object_bytes, self.object),

@@ -29,7 +29,6 @@ impl Candidate {
     };
 
     /// True without arrivals.
-    #[must_use]
     pub(super) fn is_missing(&self) -> bool {
         self.source == NONE
     }
@@ -51,7 +50,6 @@ impl Projected {
     };
 
     /// Row and column of the pixel, if inside the image.
-    #[must_use]
     pub fn pixel(&self, [width, height]: [u32; 2]) -> Option<[u32; 2]> {
         let [x, y] = self.at_px;
         let inside = x >= 0.0 && y >= 0.0 && x < width as f32 && y < height as f32;
@@ -69,7 +67,6 @@ pub struct Reprojection {
 }
 
 /// Reprojects the left eye into the right one.
-#[must_use]
 pub fn reproject(frame: &Frame) -> Reprojection {
     let eye = frame.tables.camera(Eye::Right);
     let projected: Vec<Projected> = frame

@@ -257,7 +257,6 @@ pub struct ImageError {
 
 impl Outcome {
     /// Combines the figures.
-    #[must_use]
     pub fn new(
         accuracy: &Accuracy,
         comparison: &Comparison,

@@ -47,7 +47,6 @@ pub struct RowSummary {
 
 impl RowNeeds {
     /// Analyses where left samples arrive.
-    #[must_use]
     pub fn new(frame: &Frame, arrived: &Reprojection) -> Self {
         let [width, height] = frame.size_px.map(|s| s as usize);
         let words = height.div_ceil(64);
@@ -105,14 +104,12 @@ impl RowNeeds {
     }
 
     /// Left rows that a tile's band needs, without and with its adjacent rows.
-    #[must_use]
     pub fn of_tile(&self, frame: &Frame, tile: u32) -> [u64; 2] {
         let band = (tile / frame.tables.tiles()[0]) as usize;
         [self.band[band], self.band_and_beside[band]]
     }
 
     /// Bytes of the largest band of rows that detection fetches, of `row_px` pixels each.
-    #[must_use]
     pub(super) fn largest_band(&self, reads: Reads, g: &Gbuffer, row_px: u64) -> u64 {
         let bands = self.band.iter().zip(&self.band_and_beside);
         let bytes = bands.map(|(&band, &beside)| reads.fetched_bytes(g, band, beside, row_px));
@@ -121,7 +118,6 @@ impl RowNeeds {
 
     /// Left rows alive at most if they stay on chip and bands of left and right tiles alternate: a band of right tiles
     /// follows the last band of left tiles that it needs, and keeps every row that it or a later band needs.
-    #[must_use]
     pub(super) fn rows_on_chip(&self, with_adjacent_rows: bool) -> u64 {
         let tile = u64::from(TILE_SIZE_PX);
         let mut most = 0;
@@ -155,7 +151,7 @@ fn needs_row(sources: &[u64], words: usize, first: usize, end: usize, left: usiz
 mod tests {
     use super::*;
     use crate::reproject::reproject;
-    use crate::synthetic::{View, frame, wall};
+    use crate::testing::{View, frame, wall};
 
     fn needs(view: View) -> (Frame, RowNeeds) {
         let frame = frame(&wall(3.0, [50.0, 50.0], 0.0, 1), view);

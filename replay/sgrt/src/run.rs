@@ -34,13 +34,11 @@ pub struct Run {
 
 impl Run {
     /// Frames per second relative to another run.
-    #[must_use]
     pub(super) fn performance_over(&self, reference: &Self) -> f64 {
         reference.time_ns / self.time_ns
     }
 
     /// Energy relative to another run.
-    #[must_use]
     pub(super) fn energy_over(&self, reference: &Self) -> f64 {
         self.energy.total() / reference.energy.total()
     }
@@ -66,7 +64,6 @@ pub struct EnergyPj {
 
 impl EnergyPj {
     /// Sum of all components.
-    #[must_use]
     pub fn total(&self) -> f64 {
         self.tni_pj + self.srp_pj + self.caches_pj + self.sram_pj + self.dram_pj + self.static_pj
     }

@@ -22,19 +22,16 @@ pub struct SrpCycles {
 
 impl SrpCycles {
     /// Lane cycles of all kernels.
-    #[must_use]
     pub(super) fn lane_cycles(&self) -> f64 {
         self.generation + self.shading + self.added_lane_cycles()
     }
 
     /// Lane cycles of the three kernels that reprojection adds.
-    #[must_use]
     pub(super) fn added_lane_cycles(&self) -> f64 {
         self.reproject + self.detect + self.reuse
     }
 
     /// Cycles of the cores with all lanes busy.
-    #[must_use]
     pub(super) fn total(&self) -> f64 {
         if self.lanes > 0.0 {
             self.lane_cycles() / self.lanes
@@ -45,17 +42,12 @@ impl SrpCycles {
 
     /// Adds another batch's cycles.
     pub fn add(&mut self, other: &Self) {
-        self.generation += other.generation;
-        self.shading += other.shading;
-        self.reproject += other.reproject;
-        self.detect += other.detect;
-        self.reuse += other.reuse;
+        sim::add_fields!(self, other, generation, shading, reproject, detect, reuse);
         self.lanes = other.lanes;
     }
 }
 
 /// Kernel cycles of a batch.
-#[must_use]
 pub fn cycles(work: &BatchWork, config: &SgrtConfig) -> SrpCycles {
     let srp = &config.srp;
     let idle = |lanes: u64| if srp.compaction { 0 } else { lanes };

@@ -67,7 +67,6 @@ impl Scheme {
     pub const ALL: [Self; 4] = [Self::Full, Self::Stereo, Self::Temporal, Self::Both];
 
     /// Name in tables.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Full => "full",

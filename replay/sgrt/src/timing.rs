@@ -16,7 +16,6 @@ pub enum Timing {
 
 impl Timing {
     /// Name on the command line and in files.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::ClosedForm => "closed-form",

@@ -31,7 +31,6 @@ pub struct TniCycles {
 
 impl TniCycles {
     /// Cycles of the batch, which the scarcest resource determines.
-    #[must_use]
     pub(super) fn total(&self) -> f64 {
         [
             self.traversal,
@@ -44,7 +43,6 @@ impl TniCycles {
     }
 
     /// Name of the scarcest resource.
-    #[must_use]
     pub(super) fn bottleneck(&self) -> &'static str {
         let all = [
             ("traversal", self.traversal),
@@ -60,16 +58,12 @@ impl TniCycles {
 
     /// Adds another batch's cycles, resource by resource.
     pub fn add(&mut self, other: &Self) {
-        self.traversal += other.traversal;
-        self.intersection += other.intersection;
-        self.handover += other.handover;
-        self.latency += other.latency;
+        sim::add_fields!(self, other, traversal, intersection, handover, latency);
     }
 }
 
 /// Cycles of a batch with these misses, in a tree of this kind. A step that occupies its pipeline for
 /// several cycles also leaves it that much later.
-#[must_use]
 pub fn cycles(
     work: &BatchWork,
     misses: &Misses,

@@ -99,7 +99,6 @@ impl LoadedTrace<'_> {
 }
 
 /// The rules of the curve: the paper's plain reuse, thresholds, single tests, and combinations.
-#[must_use]
 pub fn curve_rules() -> Vec<Rule> {
     [
         "none",
@@ -126,10 +125,10 @@ pub fn curve_rules() -> Vec<Rule> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::{View, globe, trace, wall};
+    use super::super::testing::{View, globe, trace, wall};
     use super::*;
 
-    fn scene() -> super::super::synthetic::Synthetic {
+    fn scene() -> super::super::testing::Synthetic {
         let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
         scene.extend(globe([0.1, 0.0, -1.5], 0.5, 2));
         trace(&scene, View::default())
@@ -142,7 +141,7 @@ mod tests {
         }
     }
 
-    fn agrees(source: &super::super::synthetic::Synthetic) {
+    fn agrees(source: &super::super::testing::Synthetic) {
         let loaded = LoadedTrace::load(source).expect("loads");
         let config = SgrtConfig::default();
         let rules: Vec<Rule> = vec!["depth=0.02".parse().expect("a rule")];

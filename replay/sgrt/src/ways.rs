@@ -223,7 +223,6 @@ fn row_read_bytes(work: &BatchWork, config: &SgrtConfig) -> u64 {
 }
 
 /// Runs the three ways through the closed form.
-#[must_use]
 pub fn compare(
     frame: &Frame,
     work: &[TileWork],

@@ -19,7 +19,6 @@ impl RayClass {
     pub const ALL: [Self; 3] = [Self::Primary, Self::Shadow, Self::Secondary];
 
     /// Class of a ray.
-    #[must_use]
     pub fn of(ray: &RayRecord) -> Self {
         match ray.kind {
             RayKind::Primary => Self::Primary,
@@ -74,7 +73,6 @@ pub struct PixelWork {
 
 impl PixelWork {
     /// Sums over a pixel's rays; sums saturate.
-    #[must_use]
     pub fn of(rays: &[RayRecord]) -> Self {
         let mut work = Self::default();
         for ray in rays {
@@ -99,7 +97,6 @@ impl PixelWork {
     }
 
     /// Outcomes of the primary hit's shadow rays, and the number of rays of their class.
-    #[must_use]
     pub(super) fn shadow_outcomes(&self) -> (u64, u32) {
         let rays = self.by_class[RayClass::Shadow as usize].rays;
         (self.shadows_blocked, rays)
@@ -148,20 +145,21 @@ impl BatchWork {
     /// Adds another batch.
     pub fn add(&mut self, other: &Self) {
         for (sum, part) in self.by_class.iter_mut().zip(&other.by_class) {
-            sum.rays += part.rays;
-            sum.steps += part.steps;
-            sum.triangle_tests += part.triangle_tests;
-            sum.alpha_tests += part.alpha_tests;
+            sim::add_fields!(sum, part, rays, steps, triangle_tests, alpha_tests);
         }
-        self.retest_rays += other.retest_rays;
-        self.retest_tests += other.retest_tests;
-        self.shaded += other.shaded;
-        self.reprojected += other.reprojected;
-        self.detected += other.detected;
-        self.reused += other.reused;
-        self.row_tests += other.row_tests;
-        self.idle_traced_lanes += other.idle_traced_lanes;
-        self.idle_reused_lanes += other.idle_reused_lanes;
+        sim::add_fields!(
+            self,
+            other,
+            retest_rays,
+            retest_tests,
+            shaded,
+            reprojected,
+            detected,
+            reused,
+            row_tests,
+            idle_traced_lanes,
+            idle_reused_lanes
+        );
     }
 
     /// Adds the idle lanes of a warp with these numbers of traced and reused pixels.
@@ -173,25 +171,21 @@ impl BatchWork {
     }
 
     /// Rays traced.
-    #[must_use]
     pub fn rays(&self) -> u64 {
         self.by_class.iter().map(|w| w.rays).sum()
     }
 
     /// Traversal steps.
-    #[must_use]
     pub fn steps(&self) -> u64 {
         self.by_class.iter().map(|w| w.steps).sum()
     }
 
     /// Triangle tests, including re-tests.
-    #[must_use]
     pub fn triangle_tests(&self) -> u64 {
         self.retest_tests + self.by_class.iter().map(|w| w.triangle_tests).sum::<u64>()
     }
 
     /// Alpha look-ups.
-    #[must_use]
     pub fn alpha_tests(&self) -> u64 {
         self.by_class.iter().map(|w| w.alpha_tests).sum()
     }

@@ -46,7 +46,6 @@ pub enum Mode {
 
 impl Mode {
     /// Name in configuration files.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Timed => "timed",
@@ -213,19 +212,16 @@ const MOST_LINES: u64 = 1 << 24;
 
 impl RunConfig {
     /// The model of the texture units, or none in functional mode.
-    #[must_use]
     pub fn tmu_model(&self) -> Option<TmuModel> {
         (self.mode == Mode::Timed).then_some(self.tmu.model)
     }
 
     /// True for the headline model, in which threads loop until their lines are filled.
-    #[must_use]
     pub fn is_looping(&self) -> bool {
         self.tmu_model() == Some(TmuModel::Looping)
     }
 
     /// The mode or, if it is not the default, the model of the texture unit.
-    #[must_use]
     pub fn mode_name(&self) -> &'static str {
         match self.tmu_model() {
             None => "functional",
@@ -289,25 +285,21 @@ impl RunConfig {
     }
 
     /// True if a miss fills the cache immediately, so that later look-ups of the same thread hit.
-    #[must_use]
     pub fn misses_change_caches_at_once(&self) -> bool {
         self.level.l2.hit_cycles == 0 || self.tmu.allocation == Allocation::OnMiss
     }
 
     /// True if the order of the L2's misses matters, because further levels, DRAM or a prefetcher see them.
-    #[must_use]
     pub fn follows_l2_misses(&self) -> bool {
         self.simulates_below_l2() || self.prefetch.is_some() || self.level.depend_on_evictions()
     }
 
     /// How work items are given to cores: as the order says, else as the configuration does.
-    #[must_use]
     pub fn dispatch(&self) -> Assign {
         self.order.dispatch(self.assign)
     }
 
     /// True if L2 misses go to further levels or to DRAM.
-    #[must_use]
     pub const fn simulates_below_l2(&self) -> bool {
         self.dram.is_some() || self.level.has_lower()
     }

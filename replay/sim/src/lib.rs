@@ -17,4 +17,5 @@ pub mod result;
 pub mod schemas;
 pub mod size;
 pub mod stream;
+mod sums;
 pub mod tmu;

@@ -135,7 +135,7 @@ mod tests {
     use crate::config::{Mode, Order};
     use crate::engine::replay;
     use crate::memory::AnyCache;
-    use crate::stream::synthetic::Synthetic;
+    use crate::stream::testing::Synthetic;
 
     /// Counts the misses of the list in LRU caches, one per core.
     fn misses(list: &LineList, config: &RunConfig) -> u64 {

@@ -30,13 +30,11 @@ const fn row(
 
 impl Preset {
     /// Returns `config` with the preset's values.
-    #[must_use]
     pub fn over(self, config: RunConfig) -> RunConfig {
         (self.row().over)(config)
     }
 
     /// The keys that the preset sets and that have another value in `config`.
-    #[must_use]
     pub fn changed_in(self, config: &RunConfig) -> Vec<String> {
         let values = [*config, self.over(*config)].map(|config| serde_json::json!(config));
         let mut keys = Vec::new();

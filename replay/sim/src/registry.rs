@@ -27,7 +27,6 @@ pub trait Row: fmt::Debug + Sized + 'static {
 }
 
 /// The name most similar to a mistyped one, if any is similar.
-#[must_use]
 pub fn most_similar<'n>(typed: &str, names: impl Iterator<Item = &'n str>) -> Option<&'n str> {
     /// Jaro-Winkler similarity of a suggestion.
     const LEAST_SIMILARITY: f64 = 0.8;
@@ -55,7 +54,6 @@ impl<R: Row> Named<R> {
     }
 
     /// The row with this name.
-    #[must_use]
     pub fn find(name: &str) -> Option<Self> {
         Self::by_name(name).ok()
     }
@@ -70,13 +68,11 @@ impl<R: Row> Named<R> {
     }
 
     /// The row whose name is most similar to a mistyped one, if any is similar.
-    #[must_use]
     pub fn similar(name: &str) -> Option<Self> {
         most_similar(name, R::names().iter().copied()).and_then(Self::find)
     }
 
     /// Name in configurations, results and flags.
-    #[must_use]
     pub fn name(self) -> &'static str {
         self.0.name()
     }

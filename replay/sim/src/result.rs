@@ -32,11 +32,15 @@ pub struct LevelCounters {
 impl LevelCounters {
     /// Adds another part's counters.
     pub fn add(&mut self, other: &Self) {
-        self.footprints += other.footprints;
-        self.footprint_misses += other.footprint_misses;
-        self.line_lookups += other.line_lookups;
-        self.line_misses += other.line_misses;
-        self.secondary_misses += other.secondary_misses;
+        crate::add_fields!(
+            self,
+            other,
+            footprints,
+            footprint_misses,
+            line_lookups,
+            line_misses,
+            secondary_misses
+        );
     }
 }
 
@@ -55,7 +59,6 @@ pub struct LevelResult {
 
 impl LevelResult {
     /// Counters with their rates, which are 0 without look-ups.
-    #[must_use]
     pub fn new(counters: LevelCounters) -> Self {
         let rate = |part: u64, whole: u64| part as f64 / whole.max(1) as f64;
         Self {
@@ -114,14 +117,17 @@ pub struct PrefetchResult {
 impl PrefetchResult {
     /// The sums of two prefetchers' counts.
     #[must_use]
-    pub fn plus(self, other: Self) -> Self {
-        Self {
-            lines: self.lines + other.lines,
-            useful_lines: self.useful_lines + other.useful_lines,
-            dropped_lines: self.dropped_lines + other.dropped_lines,
-            late_lines: self.late_lines + other.late_lines,
-            evicted_lines: self.evicted_lines + other.evicted_lines,
-        }
+    pub fn plus(mut self, other: Self) -> Self {
+        crate::add_fields!(
+            self,
+            other,
+            lines,
+            useful_lines,
+            dropped_lines,
+            late_lines,
+            evicted_lines
+        );
+        self
     }
 }
 
@@ -161,7 +167,6 @@ pub struct ClientTraffic {
 
 impl ClientTraffic {
     /// Bytes read and written.
-    #[must_use]
     pub const fn bytes(&self) -> u64 {
         self.read_bytes + self.write_bytes
     }
@@ -204,7 +209,6 @@ pub struct MemoryResult {
 
 impl MemoryResult {
     /// DRAM traffic in bytes, given the line misses and the line size of the L2.
-    #[must_use]
     pub fn external_bytes(&self, l2_line_misses: u64, l2_line_bytes: u32) -> u64 {
         if let Some(last) = self.lower_levels.last() {
             return last.line_misses * u64::from(last.line_bytes);
@@ -421,7 +425,6 @@ pub struct RunResult {
 
 impl RunResult {
     /// The kind of the parts that counts are broken down by (texture or draw), and the parts.
-    #[must_use]
     pub fn parts(&self) -> (&'static str, &[Part]) {
         match self.by_draw.is_empty() {
             true => ("texture", &self.by_texture),
@@ -454,7 +457,6 @@ pub struct TraceId {
 
 impl TraceId {
     /// Identifies the trace in `file`.
-    #[must_use]
     pub fn new(file: &Path, meta: &TraceMeta, content_checksum: u32) -> Self {
         let name = file.file_stem().unwrap_or_default();
         Self {
@@ -473,7 +475,6 @@ impl TraceId {
 ///
 /// A file is named by its stem, or by its folder if that is more specific: `crytek-sponza` for
 /// `scenes/crytek-sponza/sponza.gltf`.
-#[must_use]
 pub fn scene_name(scene: &str) -> &str {
     let mut parts = scene.trim_end_matches(['/', '\\']).rsplit(['/', '\\']);
     let file = parts.next().unwrap_or(scene);
@@ -484,7 +485,6 @@ pub fn scene_name(scene: &str) -> &str {
 }
 
 /// The notices of a trace: texture reads that it lacks.
-#[must_use]
 pub fn notices_of(meta: &TraceMeta) -> Vec<String> {
     let program = meta.program.as_ref();
     program.map_or_else(Vec::new, |program| program.notices())

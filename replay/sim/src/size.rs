@@ -29,7 +29,6 @@ pub fn parse_bytes(text: &str) -> Result<u64, String> {
 }
 
 /// Formats a byte count with the largest binary unit that divides it.
-#[must_use]
 pub fn format_bytes(bytes: u64) -> String {
     match bytes {
         b if b >= 1 << 20 && b % (1 << 20) == 0 => format!("{} MiB", b >> 20),

@@ -223,7 +223,7 @@ mod tests {
     use super::*;
     use crate::cli::testing::file_of;
     use clap::Parser;
-    use sim::stream::synthetic::Synthetic;
+    use sim::stream::testing::Synthetic;
 
     #[derive(Parser)]
     struct Line {

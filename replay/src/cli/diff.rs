@@ -262,7 +262,7 @@ fn lines(place: &str, left: Vec<String>, right: Vec<String>) -> Option<String> {
 mod tests {
     use super::*;
     use crate::cli::testing::file_of;
-    use sim::stream::synthetic::Synthetic;
+    use sim::stream::testing::Synthetic;
 
     fn compare(change: impl FnOnce(&mut sim::stream::MemoryTrace)) -> Vec<String> {
         let mut memory = Synthetic::default().generate();

@@ -298,7 +298,7 @@ mod tests {
     use super::*;
     use crate::cli::testing::{file_of, lines};
     use parquet::file::reader::{FileReader, SerializedFileReader};
-    use sim::stream::synthetic::Synthetic;
+    use sim::stream::testing::Synthetic;
 
     #[test]
     fn a_dump_holds_every_record_of_the_chosen_tiles() {

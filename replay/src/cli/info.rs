@@ -248,7 +248,7 @@ fn ray_text(trace: &Raytrace) -> Result<String> {
 mod tests {
     use super::*;
     use crate::cli::testing::file_of;
-    use sim::stream::synthetic::Synthetic;
+    use sim::stream::testing::Synthetic;
 
     #[test]
     fn totals_are_the_sums_over_the_trace() {

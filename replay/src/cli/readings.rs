@@ -139,7 +139,7 @@ fn mark_calibration(scenes: &mut [SceneReadings], labels: Option<&[String]>) -> 
 mod tests {
     use super::*;
     use clap::Parser;
-    use sgrt::synthetic::{View, globe, trace, wall};
+    use sgrt::testing::{View, globe, trace, wall};
     use std::path::Path;
 
     #[derive(Parser)]

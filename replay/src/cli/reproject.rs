@@ -273,7 +273,7 @@ fn thumbnails(loaded: &LoadedTrace, ours: &RuleRun, plain: &RuleRun) -> anyhow::
 mod tests {
     use super::*;
     use clap::Parser;
-    use sgrt::synthetic::{View, globe, trace, wall};
+    use sgrt::testing::{View, globe, trace, wall};
 
     #[derive(Parser)]
     struct Cli {

@@ -106,7 +106,7 @@ mod tests {
     use super::*;
     use sim::config::{LevelConfig, Levels, Mode, Order};
     use sim::engine::replay;
-    use sim::stream::synthetic::Synthetic;
+    use sim::stream::testing::Synthetic;
 
     #[test]
     fn a_cache_that_holds_everything_is_at_the_bound_and_a_small_one_is_not() {

@@ -6,7 +6,7 @@ use formats::textrace::{PrimitiveRun, QuadRecord, Tile};
 use formats::texture::{MipFilter, Sampler};
 use replay::config::{Mode, RunConfig};
 use replay::order::{Order, PlanInputs, plan_frame};
-use replay::stream::synthetic::Synthetic;
+use replay::stream::testing::Synthetic;
 use replay::stream::{
     Consumer, Cores, Expander, LineMemory, MemoryTrace, QuadLines, TraceCounts, interleave,
 };

@@ -5,7 +5,7 @@ use formats::textrace::{PrimitiveRun, QuadRecord, SUBTEXELS, Tile};
 use formats::texture::{MipFilter, Sampler, TexelFormat};
 use replay::config::RunConfig;
 use replay::engine::replay;
-use replay::stream::synthetic::Synthetic;
+use replay::stream::testing::Synthetic;
 
 pub fn output(settings: &Settings) -> Vec<String> {
     let mut trace = Synthetic {

@@ -6,7 +6,7 @@ use formats::view::{Eye, EyeView, FrameViews};
 use replay::order::{
     Counters, Order, PlanInputs, TileRef, View, ViewCounters, WorkItem, plan_frame,
 };
-use replay::stream::synthetic::Synthetic;
+use replay::stream::testing::Synthetic;
 
 pub fn output(settings: &Settings) -> Vec<String> {
     let order = Order::by_name(&settings.subject).unwrap_or_else(|why| panic!("{why:?}"));

@@ -8,7 +8,7 @@ use formats::textrace::{Draw, PrimitiveRun, QuadRecord, Tables, Tile};
 use replay::config::RunConfig;
 use replay::engine::replay;
 use replay::memory::Client;
-use replay::stream::synthetic::Synthetic;
+use replay::stream::testing::Synthetic;
 use replay::stream::{MemoryTrace, StreamError, TileSource};
 
 struct Trace {

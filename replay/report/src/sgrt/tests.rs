@@ -4,7 +4,7 @@ use sgrt::config::SgrtConfig;
 use sgrt::loaded::LoadedTrace;
 use sgrt::result::{Config, SCHEMA};
 use sgrt::rules::Rule;
-use sgrt::synthetic::{View, globe, trace, wall};
+use sgrt::testing::{View, globe, trace, wall};
 use sgrt::variations::curve_rules;
 use sim::model_version::MODEL_VERSION;
 use sim::paper::sgrt::PaperValues;

@@ -54,7 +54,6 @@ impl Batch {
     }
 
     /// Rays of all items.
-    #[must_use]
     pub fn rays(&self) -> u64 {
         let items = self.items.iter().flatten();
         items.map(|item| u64::from(item.rays)).sum()

@@ -13,15 +13,12 @@ pub struct LineCounts {
 
 impl LineCounts {
     /// All look-ups.
-    #[must_use]
     pub fn all(&self) -> u64 {
         self.hits + self.merged + self.misses
     }
 
-    fn combine(&mut self, other: &Self, with: impl Fn(u64, u64) -> u64) {
-        self.hits = with(self.hits, other.hits);
-        self.merged = with(self.merged, other.merged);
-        self.misses = with(self.misses, other.misses);
+    fn add(&mut self, other: &Self) {
+        sim::add_fields!(self, other, hits, merged, misses);
     }
 }
 
@@ -45,18 +42,12 @@ pub struct UnitCycles {
 
 impl UnitCycles {
     /// All cycles.
-    #[must_use]
     pub fn all(&self) -> u64 {
         self.busy + self.no_ray + self.mshr + self.dram + self.l2 + self.latency
     }
 
-    fn combine(&mut self, other: &Self, with: impl Fn(u64, u64) -> u64) {
-        self.busy = with(self.busy, other.busy);
-        self.no_ray = with(self.no_ray, other.no_ray);
-        self.mshr = with(self.mshr, other.mshr);
-        self.dram = with(self.dram, other.dram);
-        self.l2 = with(self.l2, other.l2);
-        self.latency = with(self.latency, other.latency);
+    fn add(&mut self, other: &Self) {
+        sim::add_fields!(self, other, busy, no_ray, mshr, dram, l2, latency);
     }
 }
 
@@ -98,36 +89,28 @@ pub struct Counts {
 }
 
 impl Counts {
-    fn combine(&mut self, other: &Self, with: impl Fn(u64, u64) -> u64 + Copy) {
-        self.rays_entered = with(self.rays_entered, other.rays_entered);
-        self.rays_left = with(self.rays_left, other.rays_left);
-        self.ray_cycles = with(self.ray_cycles, other.ray_cycles);
-        self.requests = with(self.requests, other.requests);
-        self.answers = with(self.answers, other.answers);
-        self.steps = with(self.steps, other.steps);
-        self.tests = with(self.tests, other.tests);
-        self.l1_fetching_requests = with(self.l1_fetching_requests, other.l1_fetching_requests);
-        self.l2_fetching_requests = with(self.l2_fetching_requests, other.l2_fetching_requests);
-        self.dram_lines = with(self.dram_lines, other.dram_lines);
-        self.l1_mshr_waits = with(self.l1_mshr_waits, other.l1_mshr_waits);
-        self.l2_mshr_waits = with(self.l2_mshr_waits, other.l2_mshr_waits);
-        self.node_l1.combine(&other.node_l1, with);
-        self.triangle_l1.combine(&other.triangle_l1, with);
-        self.l2.combine(&other.l2, with);
-        self.cycles.combine(&other.cycles, with);
-    }
-
     /// Adds other counters.
     pub fn add(&mut self, other: &Self) {
-        self.combine(other, |a, b| a + b);
-    }
-
-    /// The counters since an earlier state.
-    #[must_use]
-    pub fn since(&self, earlier: &Self) -> Self {
-        let mut out = *self;
-        out.combine(earlier, |a, b| a - b);
-        out
+        sim::add_fields!(
+            self,
+            other,
+            rays_entered,
+            rays_left,
+            ray_cycles,
+            requests,
+            answers,
+            steps,
+            tests,
+            l1_fetching_requests,
+            l2_fetching_requests,
+            dram_lines,
+            l1_mshr_waits,
+            l2_mshr_waits
+        );
+        self.node_l1.add(&other.node_l1);
+        self.triangle_l1.add(&other.triangle_l1);
+        self.l2.add(&other.l2);
+        self.cycles.add(&other.cycles);
     }
 
     /// Checks the counters at the end of a simulation of `rays` rays with `requests` requests.

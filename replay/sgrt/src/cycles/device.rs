@@ -57,6 +57,7 @@ pub fn simulate<S: BatchSource>(
     let mut device = Device::new(machine);
     device.run(source).map_err(SimulationError::Source)?;
     let (rays, requests) = device.expected;
+    device.out.counts.add(&device.counts);
     let counts = &device.out.counts;
     counts
         .check(rays, requests)
@@ -92,8 +93,8 @@ pub(super) struct Device<'m> {
     expected: (u64, u64),
     /// Items that return in this cycle.
     pub returns: Vec<(usize, usize)>,
-    /// Counters at the end of the last batch.
-    at_last_end: Counts,
+    /// Counters since the end of the last batch.
+    pub counts: Counts,
     pub out: Simulated,
 }
 
@@ -111,7 +112,7 @@ impl<'m> Device<'m> {
             is_source_empty: false,
             expected: (0, 0),
             returns: Vec::new(),
-            at_last_end: Counts::default(),
+            counts: Counts::default(),
             out: Simulated::default(),
         }
     }
@@ -204,10 +205,10 @@ impl<'m> Device<'m> {
         {
             let start = batch.opened.max(self.out.unit_cycles);
             for unit in &mut self.units {
-                unit.count_until(now, &mut self.out.counts.cycles);
+                unit.count_until(now, &mut self.counts.cycles);
             }
-            let counts = self.out.counts.since(&self.at_last_end);
-            self.at_last_end = self.out.counts;
+            let counts = std::mem::take(&mut self.counts);
+            self.out.counts.add(&counts);
             self.out.batches.push(BatchTiming {
                 cycles: end.saturating_sub(start),
                 counts,
@@ -224,12 +225,12 @@ impl<'m> Device<'m> {
         let mut ends = false;
         for (unit, slot) in std::mem::take(&mut self.returns) {
             let u = &mut self.units[unit];
-            u.count_until(now, &mut self.out.counts.cycles);
+            u.count_until(now, &mut self.counts.cycles);
             let s = u.slots[slot];
             let rays = u64::from(s.rays);
             u.release(slot);
-            self.out.counts.rays_left += rays;
-            self.out.counts.ray_cycles += rays * (now + 1 - s.accepted);
+            self.counts.rays_left += rays;
+            self.counts.ray_cycles += rays * (now + 1 - s.accepted);
             let batch = &mut self.loaded[(s.batch - self.first) as usize];
             batch.remaining -= rays;
             ends |= batch.remaining == 0;
@@ -257,11 +258,11 @@ impl<'m> Device<'m> {
             self.calendar.push(ready, key(phase::ACCEPT, unit, 0, 0));
             return false;
         }
-        u.count_until(now, &mut self.out.counts.cycles);
+        u.count_until(now, &mut self.counts.cycles);
         u.cursor.1 += 1;
         let last = (0..item.rays).fold(now, |_, _| u.input.take(now).start);
         let slot = u.place(&item, batch, now);
-        self.out.counts.rays_entered += u64::from(item.rays);
+        self.counts.rays_entered += u64::from(item.rays);
         let key = key(phase::UNIT, unit, SLOT, slot);
         self.calendar.push(last + 1, key);
         true

@@ -17,7 +17,6 @@ pub struct Pipelines {
 
 impl Pipelines {
     /// Cycles between two items of one pipeline.
-    #[must_use]
     pub fn interval_cycles(&self) -> f64 {
         self.interval as f64 / TICKS as f64
     }
@@ -65,7 +64,6 @@ pub struct Machine {
 
 impl Machine {
     /// The machine of a configuration, for traces of a tree of this kind.
-    #[must_use]
     pub fn new(config: &SgrtConfig, tree: TraversalKind) -> Self {
         let (tni, cache, cycles) = (&config.tni, &config.cache, &config.cycles);
         let (step_cycles, _) = config.step(tree);

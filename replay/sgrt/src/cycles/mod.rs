@@ -52,5 +52,3 @@ pub(super) use warp::merge;
 
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod twin;

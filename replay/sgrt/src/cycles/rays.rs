@@ -9,7 +9,7 @@ impl Device<'_> {
     /// Continues the item of a slot: it was accepted, left a pipeline, or has its lines.
     pub(super) fn proceed(&mut self, unit: usize, slot: usize, now: u64) {
         let u = &mut self.units[unit];
-        u.count_until(now, &mut self.out.counts.cycles);
+        u.count_until(now, &mut self.counts.cycles);
         match u.slots[slot].state {
             State::ForLines(_) => {
                 u.set(slot, State::Moving);
@@ -28,7 +28,7 @@ impl Device<'_> {
             s.arrival = 0;
             s.from_dram = false;
             s.fetched = [false; 2];
-            self.out.counts.requests += 1;
+            self.counts.requests += 1;
             self.look_up(unit, slot, now);
             return;
         }
@@ -44,7 +44,7 @@ impl Device<'_> {
 
     /// Looks up the remaining lines of a slot's request.
     fn look_up(&mut self, unit: usize, slot: usize, now: u64) {
-        let (u, counts) = (&mut self.units[unit], &mut self.out.counts);
+        let (u, counts) = (&mut self.units[unit], &mut self.counts);
         let s = &mut u.slots[slot];
         let batch = &self.loaded[(s.batch - self.first) as usize].batch;
         let request = batch.requests[s.request as usize];
@@ -126,7 +126,7 @@ impl Device<'_> {
                 break;
             };
             let u = &mut self.units[unit];
-            u.count_until(now, &mut self.out.counts.cycles);
+            u.count_until(now, &mut self.counts.cycles);
             u.set(slot, State::Moving);
             self.look_up(unit, slot, now);
         }
@@ -135,7 +135,7 @@ impl Device<'_> {
 
     /// Queues a slot's request for its pipeline; its data is complete.
     fn issue(&mut self, unit: usize, slot: usize, now: u64) {
-        let (u, counts) = (&mut self.units[unit], &mut self.out.counts);
+        let (u, counts) = (&mut self.units[unit], &mut self.counts);
         let s = &mut u.slots[slot];
         let batch = &self.loaded[(s.batch - self.first) as usize].batch;
         let pipeline = batch.requests[s.request as usize].pipeline;

@@ -1,11 +1,13 @@
+mod twin;
+
 use super::machine::{CacheSize, Pipelines};
 use super::server::TICKS;
-use super::twin::twin;
 use super::*;
 use crate::config::SgrtConfig;
 use formats::raytrace::TraversalKind;
 use proptest::prelude::*;
 use std::convert::Infallible;
+use twin::twin;
 
 /// Batches in memory.
 struct List<'a>(std::slice::Iter<'a, Batch>);

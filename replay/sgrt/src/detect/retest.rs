@@ -47,7 +47,6 @@ pub fn retest(at: RightSample, offsets: &'static [Offset], decision: &mut Decisi
 /// Distance at which a ray from `origin` along `direction` hits a triangle, from either side.
 ///
 /// Double precision gives the exact answer except for rays within about 1e-12 of an edge.
-#[must_use]
 pub fn intersect(origin: [f32; 3], direction: [f32; 3], vertices: &[[f32; 3]; 3]) -> Option<f32> {
     let o = origin.map(f64::from);
     let d = direction.map(f64::from);

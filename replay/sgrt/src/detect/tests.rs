@@ -2,7 +2,7 @@ use super::*;
 use crate::accuracy::count_errors;
 use crate::compose::{Reuse, compose};
 use crate::reproject::reproject;
-use crate::synthetic::{DIFFUSE, LEAF, MIRROR, Placed, Shape, View, frame, globe, wall};
+use crate::testing::{DIFFUSE, LEAF, MIRROR, Placed, Shape, View, frame, globe, wall};
 
 /// The default rule of `replay reproject`.
 const DEFAULT: &str = crate::DEFAULT_RULE;

@@ -3,7 +3,7 @@ use crate::detect::{PixelClass, decide};
 use crate::reproject::reproject;
 use crate::rows::RowNeeds;
 use crate::rules::Rule;
-use crate::synthetic::{Placed, View, frame, wall};
+use crate::testing::{Placed, View, frame, wall};
 use crate::ways::compare;
 use formats::raytrace::TraversalKind;
 

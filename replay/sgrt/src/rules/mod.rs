@@ -97,14 +97,12 @@ impl Part {
 
 impl Rule {
     /// The fields that the rule reads.
-    #[must_use]
     pub fn reads(&self) -> Reads {
         let parts = self.0.iter().map(|part| part.kind().reads);
         parts.fold(Reads::ARRIVALS, Reads::and)
     }
 
     /// The tests of a frame.
-    #[must_use]
     pub fn tests<'a>(
         &self,
         frame: &'a Frame,
@@ -115,7 +113,6 @@ impl Rule {
     }
 
     /// The rule with every share multiplied by a factor.
-    #[must_use]
     pub fn scaled(&self, factor: f32) -> Self {
         let scaled = |part: &Part| Part {
             share: part.share * factor,
@@ -125,7 +122,6 @@ impl Rule {
     }
 
     /// Neighbours whose triangles are intersected in addition to the candidate's; `None` without re-tests.
-    #[must_use]
     pub fn retests(&self) -> Option<&'static [Offset]> {
         let retests = self.0.iter().filter_map(|part| part.kind().retests);
         retests.max_by_key(|offsets| offsets.len())
@@ -152,7 +148,6 @@ fn synopsis() -> String {
 }
 
 /// Describes the choices of `--rule`.
-#[must_use]
 pub fn help() -> String {
     let mut text = "Which reprojected pixels are rejected and traced: `none` (every \
                     arrival is reused), or some of these joined by `+`:"

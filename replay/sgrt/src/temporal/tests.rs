@@ -1,4 +1,4 @@
-use super::super::synthetic::{Placed, Synthetic, View, globe, trace, wall};
+use super::super::testing::{Placed, Synthetic, View, globe, trace, wall};
 use super::*;
 
 fn room() -> Vec<Placed> {

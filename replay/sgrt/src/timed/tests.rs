@@ -2,7 +2,7 @@ use super::*;
 use crate::config::SgrtConfig;
 use crate::loaded::LoadedTrace;
 use crate::result::Outcome;
-use crate::synthetic::{MIRROR, Synthetic, View, globe, trace, wall};
+use crate::testing::{MIRROR, Synthetic, View, globe, trace, wall};
 
 fn room() -> Synthetic {
     let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);

@@ -169,7 +169,7 @@ fn a_visit_waits_once_for_all_its_lines_and_energy_pays_for_each() {
             misses,
             ..Default::default()
         };
-        crate::energy::energy(&run, &crate::synthetic::bvh(), &config).caches_pj
+        crate::energy::energy(&run, &crate::testing::bvh(), &config).caches_pj
     };
     let line_pj = config.cache.line_bytes as f64 * config.energy.l2_pj_per_byte;
     assert!((energy(wide) - energy(narrow) - 30.0 * line_pj).abs() < 1e-6);

@@ -231,7 +231,6 @@ impl<'a> FrameClients<'a> {
     }
 
     /// Traffic of each active client, given the texture units' bytes, and the counts of vertex processing.
-    #[must_use]
     pub fn result(&self, texture_bytes: u64) -> (Vec<ClientTraffic>, GeometryCounts) {
         let dram = self.config.dram.unwrap_or_default();
         let pj_per_byte = dram.preset.device().pj_per_byte();
@@ -252,7 +251,6 @@ impl<'a> FrameClients<'a> {
 }
 
 /// The error for a trace without the requested geometry.
-#[must_use]
 pub fn missing() -> StreamError {
     StreamError::Tables(
         "expected geometry for the traffic of a whole frame (`tracegen raster --geometry`), found none".to_owned(),

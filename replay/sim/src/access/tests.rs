@@ -4,7 +4,7 @@ use super::*;
 use crate::config::Order;
 use crate::order::PlanInputs;
 use crate::stream::MemoryTrace;
-use crate::stream::synthetic::Synthetic;
+use crate::stream::testing::Synthetic;
 use formats::textrace::geometry::{GeometryView, MeshGeometry, TileLists};
 use formats::textrace::{Draw, PrimitiveRun, QuadRecord, Surfaces, Tile};
 

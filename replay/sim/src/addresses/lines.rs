@@ -16,7 +16,6 @@ impl KindSet {
     pub const ALL: Self = Self([true; 3]);
 
     /// These kinds.
-    #[must_use]
     pub fn of(kinds: &[AccessKind]) -> Self {
         let has = |kind| kinds.contains(&kind);
         Self([AccessKind::Read, AccessKind::Write, AccessKind::Fetch].map(has))

@@ -16,19 +16,16 @@ pub struct LevelCounts {
 
 impl LevelCounts {
     /// Line look-ups of all kinds.
-    #[must_use]
     pub fn line_lookups(&self) -> u64 {
         self.lookups.iter().sum()
     }
 
     /// Line misses of all kinds.
-    #[must_use]
     pub fn line_misses(&self) -> u64 {
         self.misses.iter().sum()
     }
 
     /// Line misses over line look-ups; 0 without look-ups.
-    #[must_use]
     pub fn line_miss_rate(&self) -> f64 {
         match self.line_lookups() {
             0 => 0.0,
@@ -75,7 +72,6 @@ impl Point {
     }
 
     /// Bytes fetched from memory.
-    #[must_use]
     pub fn external_bytes(&self) -> u64 {
         let l2_misses = self.l2.line_misses();
         self.memory

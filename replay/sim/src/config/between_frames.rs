@@ -41,7 +41,6 @@ impl BetweenFrames {
     }
 
     /// The percentage of each cache that other work fills, if it fills a part.
-    #[must_use]
     pub const fn lost_percent(self) -> Option<u8> {
         match self {
             Self::Lose(percent) => Some(percent),

@@ -45,7 +45,6 @@ pub(super) fn is_one(value: &u32) -> bool {
 
 impl LevelConfig {
     /// A shared four-way LRU level of this size with a latency of zero.
-    #[must_use]
     pub const fn lru(size_bytes: u64) -> Self {
         Self {
             size_bytes,
@@ -62,7 +61,6 @@ impl LevelConfig {
     }
 
     /// True for plain LRU with one line per tag, the only cache that stack distances describe.
-    #[must_use]
     pub fn is_plain_lru(&self) -> bool {
         self.replacement == Replacement::LRU
             && (self.sectors, self.victim_lines) == (1, 0)
@@ -70,7 +68,6 @@ impl LevelConfig {
     }
 
     /// Caches of this level in a machine with `cores` cores.
-    #[must_use]
     pub const fn caches(&self, cores: u32) -> u32 {
         if self.shared { 1 } else { cores }
     }
@@ -203,7 +200,6 @@ pub enum LevelClients {
 
 impl LevelClients {
     /// True if only texture units use the level.
-    #[must_use]
     pub fn is_textures(&self) -> bool {
         *self == Self::Textures
     }
@@ -227,7 +223,6 @@ pub enum Inclusion {
 
 impl Inclusion {
     /// True if levels evict independently.
-    #[must_use]
     pub fn is_none(&self) -> bool {
         *self == Self::None
     }

@@ -65,7 +65,6 @@ impl Levels {
 
     /// The default level of this size: the Z2 paper's L1 and L2 (section 4.1), and 16 ways and 60
     /// cycles below them.
-    #[must_use]
     pub const fn usual(index: usize, size_bytes: u64) -> LevelConfig {
         let lru = LevelConfig::lru(size_bytes);
         match index {
@@ -86,7 +85,6 @@ impl Levels {
     }
 
     /// An L1 and an L2 with default latencies and sharing.
-    #[must_use]
     pub const fn two(l1: LevelConfig, l2: LevelConfig) -> Self {
         Self {
             l1: LevelConfig {
@@ -103,7 +101,6 @@ impl Levels {
     }
 
     /// Returns these levels with `lower` below the L2, or none if there are too many.
-    #[must_use]
     pub fn over(mut self, lower: &[LevelConfig]) -> Option<Self> {
         self.lower = [None; Self::MOST - 2];
         for (index, level) in lower.iter().enumerate() {
@@ -118,7 +115,6 @@ impl Levels {
     }
 
     /// True with levels below the L2.
-    #[must_use]
     pub(super) const fn has_lower(&self) -> bool {
         self.lower[0].is_some()
     }
@@ -149,7 +145,6 @@ impl Levels {
     }
 
     /// True if the content of a level depends on what other levels evict.
-    #[must_use]
     pub fn depend_on_evictions(&self) -> bool {
         self.iter().any(|level| !level.inclusion.is_none())
     }
@@ -233,7 +228,6 @@ impl Levels {
 
     /// Describes the levels below the L2 for a column: `4 MiB, 16 ways, lru, 64-byte lines, 60
     /// cycles; ...`. None without such levels.
-    #[must_use]
     pub fn lower_text(&self, l1_line_bytes: u32) -> Option<String> {
         let level = |(_, level, line_bytes): (_, &LevelConfig, u32)| {
             let mut text = format!(

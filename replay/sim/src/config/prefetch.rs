@@ -29,13 +29,11 @@ impl Default for PrefetchConfig {
 
 impl PrefetchConfig {
     /// Maximum number of lines that one request can prefetch.
-    #[must_use]
     pub fn lines(&self) -> u32 {
         self.lines.unwrap_or_else(|| self.prefetcher.usual_lines())
     }
 
     /// True if the prefetcher only works for textures.
-    #[must_use]
     pub fn needs_textures(&self) -> bool {
         self.build(16, None).needs_layout()
     }

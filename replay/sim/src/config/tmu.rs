@@ -37,7 +37,6 @@ pub enum TmuModel {
 
 impl TmuModel {
     /// Name in configuration files.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Looping => "looping",

@@ -33,13 +33,10 @@ pub struct Work {
 impl Work {
     /// Adds the counts of another batch.
     pub fn add(&mut self, other: &Self) {
-        self.replays += other.replays;
-        self.passes += other.passes;
-        self.expansions += other.expansions;
+        crate::add_fields!(self, other, replays, passes, expansions);
     }
 
     /// Describes for the user what was shared and skipped among `points` points.
-    #[must_use]
     pub fn summary(&self, points: usize) -> String {
         let Self {
             replays,

@@ -74,7 +74,6 @@ pub(super) struct CacheCounts {
 
 impl CacheCounts {
     /// All zero.
-    #[must_use]
     pub fn new(bins: &Bins, tile_maps: bool) -> Self {
         let tiles = if tile_maps { bins.tiles() } else { 0 };
         Self {

@@ -19,7 +19,6 @@ use std::sync::Arc;
 const MOST_TOGETHER: usize = 256;
 
 /// The groups, by stream. A group lists indices of configurations.
-#[must_use]
 pub fn sharing(configs: &[RunConfig]) -> Vec<Vec<Vec<usize>>> {
     let streams = grouped(0..configs.len(), |&index| stream_key(&configs[index]));
     let points = |stream| {

@@ -71,7 +71,6 @@ impl LineReplay {
     }
 
     /// True if a repeated access to a line hits in every L1 and changes nothing.
-    #[must_use]
     pub fn skips_repeats(&self) -> bool {
         self.skips_repeats
     }

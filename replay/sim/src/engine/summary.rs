@@ -143,7 +143,7 @@ mod tests {
     use super::super::counts::FootprintMisses;
     use super::*;
     use crate::stream::Expander;
-    use crate::stream::synthetic::Synthetic;
+    use crate::stream::testing::Synthetic;
 
     /// Uses counts as large as those of a trace of many hours.
     #[test]

@@ -21,7 +21,7 @@ use crate::config::{
 use crate::memory::Hierarchy;
 use crate::order::{Phase, WorkItem};
 use crate::result::{LevelCounters, RunResult};
-use crate::stream::synthetic::Synthetic;
+use crate::stream::testing::Synthetic;
 use crate::stream::testing::repeated;
 use crate::stream::{
     Bins, Consumer, Cores, Expander, LineMemory, LineSet, MemoryTrace, QuadLines, StreamError,

@@ -42,7 +42,6 @@ impl Client {
     ];
 
     /// Name in tables and files.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Texture => "texture",

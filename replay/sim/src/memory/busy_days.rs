@@ -8,7 +8,6 @@ pub struct BusyDays {
 
 impl BusyDays {
     /// No busy days. `days` is a power of two, at least 64.
-    #[must_use]
     pub fn new(days: usize) -> Self {
         debug_assert!(days.is_power_of_two() && days >= 64);
         Self {
@@ -27,7 +26,6 @@ impl BusyDays {
     }
 
     /// The first cycle from `start` on whose day is busy; all busy days belong to cycles from `start` on.
-    #[must_use]
     pub fn first_from(&self, start: u64) -> Option<u64> {
         let words = self.words.len();
         let last_day = 64 * words - 1;

@@ -37,7 +37,6 @@ impl Assignment {
     ];
 
     /// Name in an order's name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::FirstIdle => "first-idle",
@@ -49,7 +48,6 @@ impl Assignment {
     }
 
     /// The rule of the configuration that distributes the permuted items.
-    #[must_use]
     pub(super) const fn dispatch(self) -> Assign {
         match self {
             Self::FirstIdle => Assign::FirstIdle,

@@ -24,7 +24,6 @@ pub enum Information {
 
 impl Information {
     /// Name in tables.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Grid => "grid",
@@ -54,7 +53,6 @@ pub struct Cost {
 
 impl Cost {
     /// Registers of this size and one tile buffer.
-    #[must_use]
     pub fn state(state_bytes: u32) -> Self {
         Self {
             state_bytes,
@@ -112,7 +110,6 @@ impl Cost {
     }
 
     /// True if hardware can implement the order, because it does not use accesses of the current frame.
-    #[must_use]
     pub fn is_buildable(&self) -> bool {
         self.information < Information::Future
     }

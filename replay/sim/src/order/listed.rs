@@ -86,7 +86,6 @@ impl Listed {
 impl Order {
     /// An order for one trace: pairs of views as listed, other views by these parts. It is kept until the
     /// program ends.
-    #[must_use]
     pub fn listed(name: &str, parts: Parts, listed: Listed) -> Self {
         let name: &'static str = name.to_owned().leak();
         Self::new(Box::leak(Box::new(OrderRow {
@@ -101,7 +100,6 @@ impl Order {
 
     /// A listed order that configurations accept by its name. An order with the same name and items is reused;
     /// with other items, it is replaced. A name with `@` never equals the name of another kind of order.
-    #[must_use]
     pub fn own(name: &str, parts: Parts, listed: Listed) -> Self {
         let mut named = NAMED.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(at) = named.iter().position(|order| order.name() == name) {

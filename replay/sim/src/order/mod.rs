@@ -90,25 +90,21 @@ fn composed_by_name(name: &str) -> Result<Order, Option<String>> {
 
 impl Order {
     /// Name in tables and plots.
-    #[must_use]
     pub fn title(self) -> &'static str {
         self.row().title
     }
 
     /// Colour, the same in every plot.
-    #[must_use]
     pub fn color(self) -> Rgb {
         self.row().color
     }
 
     /// The parts of the order.
-    #[must_use]
     pub fn parts(self) -> Parts {
         self.row().parts
     }
 
     /// The order with these parts.
-    #[must_use]
     pub fn of(parts: Parts) -> Self {
         composed::order(parts)
     }
@@ -123,14 +119,12 @@ impl Order {
     }
 
     /// How items are assigned to cores: by the order if it contains an assignment, otherwise as configured.
-    #[must_use]
     pub fn dispatch(self, configured: Assign) -> Assign {
         let own = self.parts().assignment;
         own.map_or(configured, assignment::Assignment::dispatch)
     }
 
     /// The work for the pictures of two eyes, passes 0 and 1, which consist of whole tiles.
-    #[must_use]
     pub fn stereo(self, tiles: [u32; 2], inputs: &PlanInputs<'_>) -> Vec<WorkItem> {
         let [left, right] = [0, 1].map(|pass| View::grid(pass, tiles));
         self.parts().stereo(left, right, inputs)

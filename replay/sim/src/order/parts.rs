@@ -29,7 +29,6 @@ impl Eyes {
     ];
 
     /// Name in an order's name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::ViewByView => "sv",
@@ -68,7 +67,6 @@ impl Direction {
     pub const ALL: [Self; 3] = [Self::Same, Self::Boustro, Self::RightReversed];
 
     /// Name in an order's name.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Same => "same",
@@ -105,7 +103,6 @@ const MOST_SIZE: u32 = 1 << 20;
 
 impl Parts {
     /// A curve that traverses one view after the other.
-    #[must_use]
     pub const fn of(curve: Curve) -> Self {
         Self {
             curve,
@@ -146,7 +143,6 @@ impl Parts {
     }
 
     /// True for a name with several parts, and for a curve with or without a number.
-    #[must_use]
     pub(super) fn is_composed(name: &str) -> bool {
         let curve = name.trim_end_matches(|c: char| c.is_ascii_digit());
         name.contains('+') || Curve::find(curve).is_some()
@@ -201,14 +197,12 @@ impl Parts {
     }
 
     /// True if the order needs counters of the last frame.
-    #[must_use]
     pub fn needs_counters(&self) -> bool {
         let pairing = self.pairing == Pairing::ROW_PRIMITIVES || self.pairing == Pairing::ROW_LINES;
         pairing || self.curve == Curve::ADAPTIVE
     }
 
     /// The hardware cost for views of `tiles`.
-    #[must_use]
     pub fn cost(&self, tiles: [u32; 2], cores: u32) -> Cost {
         let assignment = self.assignment.unwrap_or(Assignment::FirstIdle);
         let parts = [
@@ -244,7 +238,6 @@ impl Parts {
     }
 
     /// The work of a stereo pair. A tile without a partner is an item of its own.
-    #[must_use]
     pub fn stereo(&self, left: View, right: View, inputs: &PlanInputs<'_>) -> Vec<WorkItem> {
         if self.eyes == Eyes::ViewByView {
             return self.view_by_view(left, right, inputs);

@@ -13,7 +13,6 @@ use formats::view::Eye;
 pub type Phase = Vec<WorkItem>;
 
 /// The numbers of all frames, ascending.
-#[must_use]
 pub fn frames(passes: &[Pass]) -> Vec<u32> {
     let mut frames: Vec<u32> = passes.iter().map(|pass| pass.frame).collect();
     frames.sort_unstable();
@@ -22,7 +21,6 @@ pub fn frames(passes: &[Pass]) -> Vec<u32> {
 }
 
 /// The work of one frame, monoscopic passes before the stereo pair. `stream::Walk` plans a whole trace.
-#[must_use]
 pub fn plan_frame(
     order: Order,
     inputs: &PlanInputs<'_>,
@@ -60,7 +58,6 @@ pub enum Views {
 }
 
 /// The views of a frame, phase by phase.
-#[must_use]
 pub fn views(passes: &[Pass], frame: u32) -> Vec<Views> {
     let of_frame = passes.iter().enumerate().filter(|(_, p)| p.frame == frame);
     let first = of_frame.clone().next().map_or(0, |(index, _)| index);

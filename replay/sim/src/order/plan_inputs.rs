@@ -27,7 +27,6 @@ pub struct PlanInputs<'a> {
 
 impl<'a> PlanInputs<'a> {
     /// The information available before the first frame of a trace.
-    #[must_use]
     pub fn new(config: &RunConfig, meta: &'a TraceMeta) -> Self {
         Self {
             seed: config.seed,
@@ -50,7 +49,6 @@ impl<'a> PlanInputs<'a> {
 
     /// Columns and rows by which a point at infinity lies further left and further up in the right eye's
     /// picture than in the left eye's.
-    #[must_use]
     pub fn offset(&self, eyes: [View; 2]) -> [i32; 2] {
         let directions = self.directions(eyes);
         directions.map_or([0, 0], |directions| directions.offset())

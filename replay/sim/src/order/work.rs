@@ -61,7 +61,6 @@ pub struct View {
 
 impl View {
     /// The view of a pass, given its index in its frame.
-    #[must_use]
     pub const fn of(index: u32, number: u32, pass: &Pass) -> Self {
         Self {
             pass: index,
@@ -73,7 +72,6 @@ impl View {
     }
 
     /// An eye's picture that consists of whole tiles.
-    #[must_use]
     pub const fn grid(pass: u32, tiles: [u32; 2]) -> Self {
         Self {
             pass,
@@ -85,7 +83,6 @@ impl View {
     }
 
     /// The tile at a column and row, if the grid has it.
-    #[must_use]
     pub fn tile(&self, [x, y]: [u32; 2]) -> Option<TileRef> {
         (x < self.tiles[0] && y < self.tiles[1]).then(|| TileRef {
             pass: self.pass,

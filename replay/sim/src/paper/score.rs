@@ -138,7 +138,6 @@ static SPREADS: LazyLock<[f64; 5]> = LazyLock::new(|| {
 
 /// Compares a machine's rows of a scene with the paper's. None unless the rows have all of the paper's
 /// caches and orders, each once.
-#[must_use]
 pub fn score(scene: &str, rows: &[Measured]) -> Option<Score> {
     let expected = scene_rows(scene);
     let ours: Option<Vec<Measured>> = expected

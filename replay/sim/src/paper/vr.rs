@@ -16,7 +16,6 @@ pub enum Quantity {
 
 impl Quantity {
     /// Name in tables.
-    #[must_use]
     pub fn title(self) -> &'static str {
         match self {
             Self::CullTests => "frustum tests",
@@ -42,7 +41,6 @@ pub struct Claim {
 
 impl Claim {
     /// True if these settings match the technique.
-    #[must_use]
     pub fn is_about(&self, settings: &serde_json::Value) -> bool {
         let (pointer, expected) = self.setting;
         let found = settings.pointer(pointer);
@@ -54,7 +52,6 @@ impl Claim {
     }
 
     /// The saving as text.
-    #[must_use]
     pub fn text(&self) -> String {
         let [low, high] = self.saved_pct;
         if low == high {

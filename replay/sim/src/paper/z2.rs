@@ -28,26 +28,22 @@ pub struct PublishedRow {
 impl PublishedRow {
     /// DRAM traffic in lines per footprint (L1 times L2 miss rate). This is Fig. 5 except for its scale,
     /// which the paper does not give in numbers.
-    #[must_use]
     fn external_lines_per_footprint(&self) -> f64 {
         self.l1_footprint_miss_pct * self.l2_line_miss_pct / 1e4
     }
 
     /// The same scene and caches in Morton order.
-    #[must_use]
     pub fn morton(&self) -> Option<&'static Self> {
         row(&self.scene, self.l1_kib, self.l2_kib, Order::MORTON)
     }
 
     /// DRAM traffic saved relative to Morton order, percent.
-    #[must_use]
     pub fn reduction_pct(&self) -> Option<f64> {
         let morton = self.morton()?.external_lines_per_footprint();
         Some(100.0 * (1.0 - self.external_lines_per_footprint() / morton))
     }
 
     /// TMU utilisation relative to Morton order.
-    #[must_use]
     pub fn tmu_ratio(&self) -> Option<f64> {
         Some(self.tmu_util_pct / self.morton()?.tmu_util_pct)
     }
@@ -71,13 +67,11 @@ static TABLE: LazyLock<Vec<PublishedRow>> =
     LazyLock::new(|| parse_table(include_str!("../../data/z2-table2.csv")));
 
 /// The paper's Table 2.
-#[must_use]
 pub fn table() -> &'static [PublishedRow] {
     &TABLE
 }
 
 /// The row of Table 2 for a scene, a cache configuration and an order, if it has one.
-#[must_use]
 pub fn row(scene: &str, l1_kib: u32, l2_kib: u32, order: Order) -> Option<&'static PublishedRow> {
     table()
         .iter()
@@ -106,7 +100,6 @@ const STAND_INS: [(&str, [Option<&str>; 2]); 7] = {
 };
 
 /// The paper's scene that a scene stands in for, by its exact short name and by whether it samples shadow maps.
-#[must_use]
 pub fn stand_in(scene: &str, shadow_maps: bool) -> Option<&'static str> {
     super::stand_in(scene, &STAND_INS)?[usize::from(shadow_maps)]
 }

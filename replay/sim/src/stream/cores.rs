@@ -50,7 +50,6 @@ impl Slot<'_> {
 
 impl<'f> Cores<'f> {
     /// Idle cores.
-    #[must_use]
     pub fn new(frame: &'f Frame<'f>, cores: usize) -> Self {
         Self {
             frame,
@@ -60,7 +59,6 @@ impl<'f> Cores<'f> {
     }
 
     /// Number of cores.
-    #[must_use]
     pub fn count(&self) -> usize {
         self.cores.len()
     }
@@ -113,7 +111,6 @@ impl<'f> Cores<'f> {
 
     /// The quad last returned by [`Self::next_quad`]; none after [`Self::load`].
     #[inline]
-    #[must_use]
     pub fn quad(&self, core: usize) -> Option<QuadLines<'_>> {
         let core = &self.cores[core];
         let quad = core.quads.start.checked_sub(1)?;

@@ -94,7 +94,6 @@ impl Bins {
     }
 
     /// One cell per kind of access, for lines without tiles.
-    #[must_use]
     pub fn of_kinds() -> Self {
         Self {
             by: CountBy::Texture,
@@ -111,37 +110,31 @@ impl Bins {
     }
 
     /// Number of cells.
-    #[must_use]
     pub fn cells(&self) -> usize {
         VIEWS.len() * self.view_cells()
     }
 
     /// Number of tiles.
-    #[must_use]
     pub fn tiles(&self) -> usize {
         self.tiles
     }
 
     /// First tile of each pass.
-    #[must_use]
     pub fn first_tiles(&self) -> &[usize] {
         &self.first_tiles
     }
 
     /// Names of the views.
-    #[must_use]
     pub fn view_names(&self) -> [&'static str; 3] {
         VIEWS
     }
 
     /// True if a pass of the trace belongs to this view.
-    #[must_use]
     pub fn has_view(&self, view: usize) -> bool {
         self.views.contains(&view)
     }
 
     /// The meaning of a cell.
-    #[must_use]
     pub fn meaning(&self, cell: usize) -> Cell {
         let (view, within) = (cell / self.view_cells(), cell % self.view_cells());
         // Textures without levels share their first cell with the next texture that has levels.
@@ -217,7 +210,6 @@ pub struct TraceCounts {
 
 impl TraceCounts {
     /// All zero.
-    #[must_use]
     pub fn new(bins: &Bins) -> Self {
         Self {
             tiles: vec![TileAccesses::default(); bins.tiles()],
@@ -239,12 +231,10 @@ impl TraceCounts {
 
     /// Adds the counts of a worker thread.
     pub(super) fn add(&mut self, other: &Self) {
-        self.quads += other.quads;
-        self.lanes += other.lanes;
+        crate::add_fields!(self, other, quads, lanes);
         self.hash = self.hash.wrapping_add(other.hash);
         for (cell, other) in self.cells.iter_mut().zip(&other.cells) {
-            cell.footprints += other.footprints;
-            cell.line_lookups += other.line_lookups;
+            crate::add_fields!(cell, other, footprints, line_lookups);
         }
     }
 }

@@ -32,7 +32,6 @@ impl LineMemory {
     pub const USUAL_BYTES: u64 = 384 << 20;
 
     /// A limit of this many bytes.
-    #[must_use]
     pub fn new(bytes: u64) -> Self {
         Self {
             bytes,
@@ -41,7 +40,6 @@ impl LineMemory {
     }
 
     /// True if half of the memory is free, which leaves room for more frames.
-    #[must_use]
     pub fn half_is_left(&self) -> bool {
         self.left() >= self.bytes / 2
     }
@@ -144,26 +142,22 @@ impl<'a> Expander<'a> {
     }
 
     /// The trace as rendered.
-    #[must_use]
     pub fn source(&self) -> &'a dyn TileSource {
         self.source
     }
 
     /// The bins for counts.
-    #[must_use]
     pub fn bins(&self) -> &Bins {
         &self.bins
     }
 
     /// Location of the textures under a configuration.
-    #[must_use]
     pub fn layout(&self, config: &RunConfig) -> Option<Arc<Layout>> {
         let layout = Layout::new(&self.source.tables().textures, &config.layout);
         layout.ok().map(Arc::new)
     }
 
     /// Lines of the whole address space.
-    #[must_use]
     pub fn lines(&self) -> u64 {
         self.footprints.lines()
     }
@@ -431,7 +425,6 @@ impl<'e> Frame<'e> {
     }
 
     /// The number of the frame.
-    #[must_use]
     pub fn number(&self) -> u32 {
         self.number
     }

@@ -18,7 +18,6 @@ pub struct LineSet {
 
 impl LineSet {
     /// An empty set for lines below `lines`.
-    #[must_use]
     pub fn new(lines: u64) -> Self {
         let blocks = lines.div_ceil(1 << BLOCK_BITS);
         Self {
@@ -40,7 +39,6 @@ impl LineSet {
     }
 
     /// Number of lines.
-    #[must_use]
     pub fn count(&self) -> u64 {
         let ones = |word: &AtomicU64| u64::from(word.load(Ordering::Relaxed).count_ones());
         let blocks = self.blocks.iter().filter_map(OnceLock::get);

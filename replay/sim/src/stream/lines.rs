@@ -51,7 +51,6 @@ impl TileLines {
     }
 
     /// Size of the lists in bytes.
-    #[must_use]
     pub fn bytes(&self) -> u64 {
         let quads = size_of_val(&*self.runs) + size_of_val(&*self.quads);
         let lines = size_of_val(&*self.lines) + size_of_val(&*self.tags);
@@ -88,7 +87,6 @@ impl TileLines {
     }
 
     /// Number of quads.
-    #[must_use]
     pub(super) fn quad_count(&self) -> usize {
         self.quads.len()
     }
@@ -109,7 +107,6 @@ impl TileLines {
 
     /// A quad.
     #[inline(always)]
-    #[must_use]
     pub fn quad(&self, index: usize) -> QuadLines<'_> {
         let (start, distinct_start) = match index.checked_sub(1) {
             None => (0, 0),
@@ -242,7 +239,6 @@ pub struct QuadLines<'a> {
 
 impl<'a> QuadLines<'a> {
     /// Lines without a tile, each with its tag.
-    #[must_use]
     pub fn of_lines(lines: &'a [u32], tags: &'a [Tag]) -> Self {
         Self {
             place: TileBins::default(),
@@ -256,28 +252,24 @@ impl<'a> QuadLines<'a> {
 
     /// Number of its tile (see [`super::Bins`]).
     #[inline(always)]
-    #[must_use]
     pub fn tile(&self) -> usize {
         self.place.tile as usize
     }
 
     /// The cell of the footprint that contains line `index` (see [`super::Bins`]).
     #[inline(always)]
-    #[must_use]
     pub fn cell(&self, index: usize) -> usize {
         self.place.first_cell as usize + self.tags[index].cell() as usize
     }
 
     /// The cell of the footprints that use a distinct line.
     #[inline(always)]
-    #[must_use]
     pub fn cell_of(&self, of: Use) -> usize {
         self.place.first_cell as usize + of.cell() as usize
     }
 
     /// End of the footprint that contains line `index`.
     #[inline(always)]
-    #[must_use]
     pub fn end_of_footprint(&self, index: usize) -> usize {
         let mut end = index + 1;
         while end < self.tags.len() && !self.tags[end].is_first() {
@@ -288,7 +280,6 @@ impl<'a> QuadLines<'a> {
 
     /// True if all footprints fit into one segment.
     #[inline(always)]
-    #[must_use]
     pub fn is_one_segment(&self) -> bool {
         self.footprints <= FOOTPRINTS
     }

@@ -20,7 +20,6 @@ mod line_set;
 mod lines;
 mod regroup;
 mod source;
-pub mod synthetic;
 mod tag;
 #[cfg(any(test, feature = "testing"))]
 pub mod testing;

@@ -204,7 +204,7 @@ mod tests {
     use super::*;
     use crate::engine::replay;
     use crate::stream::MemoryTrace;
-    use crate::stream::synthetic::Synthetic;
+    use crate::stream::testing::Synthetic;
 
     fn trace() -> MemoryTrace {
         Synthetic {

@@ -24,7 +24,6 @@ impl Tag {
     }
 
     /// The tag of a footprint of one line.
-    #[must_use]
     pub fn of_line(cell: u32) -> Self {
         let [first, _] = Self::of_footprint(cell, 0);
         first
@@ -32,21 +31,18 @@ impl Tag {
 
     /// True for a footprint's first line.
     #[inline(always)]
-    #[must_use]
     pub fn is_first(self) -> bool {
         self.0 & Self::FIRST != 0
     }
 
     /// On a footprint's first line: how often the same lines are looked up again (0 to 3).
     #[inline(always)]
-    #[must_use]
     pub fn repeats(self) -> u32 {
         (self.0 & !Self::FIRST) >> Self::REPEATS_SHIFT
     }
 
     /// Cell within the view.
     #[inline(always)]
-    #[must_use]
     pub fn cell(self) -> u32 {
         self.0 & (Self::CELLS as u32 - 1)
     }
@@ -87,21 +83,18 @@ impl Use {
 
     /// True if the quad may already have listed the line, for another cell or in another segment.
     #[inline(always)]
-    #[must_use]
     pub fn may_be_listed(self) -> bool {
         self.cell & Self::LISTED != 0
     }
 
     /// One bit per footprint of the segment, repeats included.
     #[inline(always)]
-    #[must_use]
     pub fn footprints(self) -> u32 {
         self.bits & ((1 << FOOTPRINTS) - 1)
     }
 
     /// Index of its first occurrence among the segment's lines.
     #[inline(always)]
-    #[must_use]
     pub fn first_line(self) -> usize {
         ((self.bits & !Self::LAST) >> FOOTPRINTS) as usize
     }

@@ -39,19 +39,16 @@ impl<'e> Walk<'e> {
     }
 
     /// The numbers of all frames, ascending.
-    #[must_use]
     pub fn frames(&self) -> Vec<u32> {
         frames(&self.tables().passes)
     }
 
     /// The tables of the trace as rendered.
-    #[must_use]
     pub fn tables(&self) -> &'e Tables {
         self.expander.source().tables()
     }
 
     /// The accesses of all frames expanded so far.
-    #[must_use]
     pub fn counts(&self) -> &TraceCounts {
         &self.counts
     }
@@ -108,7 +105,6 @@ pub struct FramePlan<'e> {
 
 impl FramePlan<'_> {
     /// The work of the frame in the order of `config`.
-    #[must_use]
     pub fn phases(&self, config: &RunConfig) -> Vec<Phase> {
         let inputs = PlanInputs {
             last: self.last.as_deref(),

@@ -5,7 +5,6 @@
 ///
 /// `l1_miss` is footprint misses over footprints, `l2_miss` line misses over line look-ups, both 0 to 1.
 /// For comparison only: the cycle model does not use it.
-#[must_use]
 pub fn closed_form(l1_miss: f64, l2_miss: f64) -> f64 {
     let any_l1_miss = 1.0 - (1.0 - l1_miss).powf(17.12);
     let any_l2_miss = 1.0 - (1.0 - l1_miss * l2_miss).powf(9.64);

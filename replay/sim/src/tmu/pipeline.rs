@@ -33,15 +33,10 @@ pub struct PipelineStats {
 impl PipelineStats {
     /// Adds another core's counters.
     pub fn add(&mut self, other: &Self) {
-        self.useful += other.useful;
-        self.wasted += other.wasted;
-        self.idle += other.idle;
-        self.threads += other.threads;
-        self.loops += other.loops;
+        crate::add_fields!(self, other, useful, wasted, idle, threads, loops);
     }
 
     /// Useful cycles over all cycles, 0 to 1.
-    #[must_use]
     pub fn utilization(&self) -> f64 {
         let cycles = self.useful + self.wasted + self.idle;
         if cycles == 0 {
@@ -90,7 +85,6 @@ pub struct Pipeline {
 
 impl Pipeline {
     /// An empty pipeline at cycle 0.
-    #[must_use]
     pub fn new(config: TmuConfig) -> Self {
         Self {
             config,
@@ -106,13 +100,11 @@ impl Pipeline {
 
     /// The current cycle.
     #[inline]
-    #[must_use]
     pub fn clock(&self) -> u64 {
         self.clock
     }
 
     /// The counters.
-    #[must_use]
     pub fn stats(&self) -> PipelineStats {
         self.stats
     }

@@ -20,7 +20,6 @@ impl Pending {
 
     /// `footprints` has one bit per footprint of the segment that waits until the cycle `ready`.
     #[inline(always)]
-    #[must_use]
     pub fn new(ready: u64, footprints: u32, segment: u32) -> Self {
         let group = u64::from(segment / 2) << Self::GROUP;
         Self {
@@ -75,7 +74,6 @@ impl Waiting {
 
     /// True if the thread waits for nothing.
     #[inline(always)]
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }

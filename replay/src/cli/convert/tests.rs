@@ -11,7 +11,7 @@ use sim::line_list::line_list;
 use sim::memory::AnyCache;
 use sim::order::parts::Eyes;
 use sim::stream::MemoryTrace;
-use sim::stream::synthetic::Synthetic;
+use sim::stream::testing::Synthetic;
 use sim::stream::testing::different_frames;
 use std::collections::HashSet;
 use studies::locality::analyse;

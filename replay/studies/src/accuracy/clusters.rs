@@ -138,7 +138,7 @@ mod tests {
     use formats::textrace::{Pass, Surfaces};
     use sim::config::{Assign, BetweenFrames, Hsr, LevelConfig, Levels, Mode};
     use sim::engine::replay;
-    use sim::stream::synthetic::Synthetic;
+    use sim::stream::testing::Synthetic;
 
     /// Every option that changes the misses of a functional replay changes the sample as well.
     #[test]

@@ -153,7 +153,7 @@ impl RaySource for Moved<'_> {
 mod tests {
     use super::super::testing::{inputs, small_trace};
     use super::*;
-    use sgrt::synthetic::{View, globe, trace, wall};
+    use sgrt::testing::{View, globe, trace, wall};
 
     #[test]
     fn every_rule_is_a_choice_and_thresholds_change_the_reused_share() {

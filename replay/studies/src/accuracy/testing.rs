@@ -5,7 +5,7 @@ use super::inputs::Inputs;
 use crate::experiment::Subject;
 use sim::config::{LevelConfig, Levels, RunConfig};
 use sim::result::TraceId;
-use sim::stream::synthetic::Synthetic;
+use sim::stream::testing::Synthetic;
 use sim::stream::{MemoryTrace, TileSource};
 
 /// A trace that fits in no cache of [`inputs`].

@@ -55,8 +55,7 @@ impl Spread {
 
     /// Adds another distribution.
     pub fn add(&mut self, other: &Self) {
-        self.count += other.count;
-        self.sum += other.sum;
+        sim::add_fields!(self, other, count, sum);
         self.largest = self.largest.max(other.largest);
         for (bin, count) in &other.bins {
             *self.bins.entry(*bin).or_insert(0) += count;

@@ -55,14 +55,17 @@ impl Default for Tally {
 impl Tally {
     /// Adds another class.
     pub fn add(&mut self, other: &Self) {
-        self.fragments_in_both += other.fragments_in_both;
-        self.fragments_only_in_a += other.fragments_only_in_a;
-        self.fragments_only_in_b += other.fragments_only_in_b;
-        self.lanes_sampled_differently += other.lanes_sampled_differently;
+        sim::add_fields!(
+            self,
+            other,
+            fragments_in_both,
+            fragments_only_in_a,
+            fragments_only_in_b,
+            lanes_sampled_differently
+        );
         self.uv_texels.add(&other.uv_texels);
         self.lod_levels.add(&other.lod_levels);
-        self.footprints += other.footprints;
-        self.footprints_that_differ += other.footprints_that_differ;
+        sim::add_fields!(self, other, footprints, footprints_that_differ);
     }
 
     /// Fragments in at least one capture.

@@ -5,7 +5,7 @@ use formats::textrace::{SUBTEXELS, Surfaces};
 use sim::config::{Hsr, Mode};
 use sim::engine::replay;
 use sim::stream::MemoryTrace;
-use sim::stream::synthetic::Synthetic;
+use sim::stream::testing::Synthetic;
 
 fn small() -> MemoryTrace {
     Synthetic {

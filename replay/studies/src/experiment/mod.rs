@@ -28,6 +28,4 @@ pub use store::{Absent, POINT_SCHEMA, Store, StoredPoint, point_key};
 pub use subject::{Subject, frame_count, has_shadow_maps, labels, scene_label};
 
 #[cfg(test)]
-mod mutations;
-#[cfg(test)]
 mod tests;

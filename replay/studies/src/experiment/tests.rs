@@ -1,3 +1,5 @@
+mod mutations;
+
 use super::*;
 use sim::config::{Mode, Order, RunConfig};
 use sim::engine::Work;

@@ -40,12 +40,16 @@ pub struct Figures {
 impl Figures {
     /// Adds the figures of another cache of the level.
     pub fn add(&mut self, other: &Self) {
-        self.accesses += other.accesses;
-        self.unique_lines += other.unique_lines;
-        self.tiles += other.tiles;
-        self.frame_lines += other.frame_lines;
-        self.frame_lines_of_both_eyes += other.frame_lines_of_both_eyes;
-        self.frame_lines_of_earlier_frames += other.frame_lines_of_earlier_frames;
+        sim::add_fields!(
+            self,
+            other,
+            accesses,
+            unique_lines,
+            tiles,
+            frame_lines,
+            frame_lines_of_both_eyes,
+            frame_lines_of_earlier_frames
+        );
         self.distances.add(&other.distances);
         self.split.add(&other.split);
         let lists = [(&mut self.lru, &other.lru), (&mut self.opt, &other.opt)];

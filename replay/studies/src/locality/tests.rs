@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use sim::config::{BetweenFrames, LevelConfig, Levels, Mode, Order, Replacement, RunConfig};
 use sim::engine::replay;
 use sim::stream::MemoryTrace;
-use sim::stream::synthetic::Synthetic;
+use sim::stream::testing::Synthetic;
 
 /// A look-up, with everything known about it.
 #[derive(Clone, Copy, Debug)]

@@ -114,9 +114,7 @@ impl WorkingSet {
 
     /// Adds the windows of another core.
     pub(super) fn add(&mut self, other: &Self) {
-        self.stretches += other.stretches;
-        self.lines += other.lines;
-        self.lines_of_either += other.lines_of_either;
+        sim::add_fields!(self, other, stretches, lines, lines_of_either);
         for (lines, other) in self.lines_of_eye.iter_mut().zip(other.lines_of_eye) {
             *lines += other;
         }

@@ -180,7 +180,7 @@ fn tile(text: &str) -> Option<TileRef> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sim::stream::synthetic::Synthetic;
+    use sim::stream::testing::Synthetic;
 
     fn file() -> OrderFile {
         let tile = |pass, tile| TileRef { pass, tile };

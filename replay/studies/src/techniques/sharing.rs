@@ -80,7 +80,7 @@ mod tests {
     use super::*;
     use formats::textrace::PrimitiveRun;
     use sim::stream::MemoryTrace;
-    use sim::stream::synthetic::Synthetic;
+    use sim::stream::testing::Synthetic;
     use sim::stream::testing::{record, tables};
 
     /// A quad of each eye, at these texels of an uncompressed texture's first row.

@@ -3,7 +3,7 @@
 use super::manifest::{Frame, ManifestRow};
 use image_error::{Picture, png};
 use serde_json::{Value, json};
-use sim::stream::synthetic::Synthetic;
+use sim::stream::testing::Synthetic;
 use sim::stream::testing::file_of;
 use std::fs;
 use std::path::Path;

@@ -88,7 +88,6 @@ pub struct Dram {
 
 impl Dram {
     /// A memory with all rows closed, accessed in lines of `line_bytes`.
-    #[must_use]
     pub fn new(config: &DramConfig, line_bytes: u32) -> Self {
         let device = config.preset.device();
         let channel = || Channel::new(device, config.queue as usize, config.page_policy);
@@ -136,7 +135,6 @@ impl Dram {
     }
 
     /// Serves all requests and returns the counts.
-    #[must_use]
     pub fn result(&self) -> DramResult {
         let mut channels = self.channels.clone();
         channels.iter_mut().for_each(Channel::drain);

@@ -86,7 +86,6 @@ pub struct Device {
 
 impl Device {
     /// Energy per byte read or written if every second burst opens a row. Excludes standby and refresh.
-    #[must_use]
     pub fn pj_per_byte(&self) -> f64 {
         1000.0 * (self.read_nj + 0.5 * self.activate_nj) / f64::from(self.burst_bytes)
     }
@@ -218,7 +217,6 @@ const GDDR6: Device = Device {
 
 impl DramPreset {
     /// The device.
-    #[must_use]
     pub const fn device(self) -> Device {
         match self {
             Self::Lpddr4 => LPDDR4,
@@ -231,13 +229,11 @@ impl DramPreset {
 
 impl Device {
     /// Banks per channel.
-    #[must_use]
     pub const fn banks(&self) -> u32 {
         self.groups * self.banks_of_group
     }
 
     /// Peak bandwidth of a channel's data bus in bytes per second.
-    #[must_use]
     pub fn peak_bytes_per_s(&self) -> f64 {
         f64::from(self.burst_bytes) / (f64::from(self.burst) * f64::from(self.clock_ps) * 1e-12)
     }

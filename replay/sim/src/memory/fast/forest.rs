@@ -64,7 +64,6 @@ pub struct Forest {
 impl Forest {
     /// Empty caches. `trees` lists at least one number of sets (powers of two, ascending), each
     /// with its largest associativity (at most 255).
-    #[must_use]
     pub fn new(trees: &[(u32, u32)]) -> Self {
         debug_assert!(!trees.is_empty() && trees.is_sorted_by(|a, b| a.0 < b.0));
         let stacks = |&(sets, ways): &(u32, u32)| Stacks {

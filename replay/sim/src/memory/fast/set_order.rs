@@ -109,7 +109,6 @@ impl Delay for FourWayLru {
 
 impl SetOrder {
     /// An empty cache; `sets` is a power of two.
-    #[must_use]
     pub fn new(sets: u32) -> Self {
         debug_assert!(sets.is_power_of_two());
         Self {

@@ -41,7 +41,6 @@ impl Hierarchy<Box<dyn Cache>> {
 
 impl<C: Cache> Hierarchy<C> {
     /// Empty caches.
-    #[must_use]
     pub fn new(caches: Caches<C>, path: MissPath) -> Self {
         Self {
             l1: caches.l1,
@@ -51,7 +50,6 @@ impl<C: Cache> Hierarchy<C> {
     }
 
     /// Up to this many distinct lines accessed in sequence are all in the L1 afterwards.
-    #[must_use]
     pub fn repeat_safe_lines(&self) -> u32 {
         match self.invalidates {
             true => 1,
@@ -60,7 +58,6 @@ impl<C: Cache> Hierarchy<C> {
     }
 
     /// True if evictions of other levels invalidate L1 lines.
-    #[must_use]
     pub fn invalidates(&self) -> bool {
         self.invalidates
     }
@@ -114,7 +111,6 @@ impl<C: Cache> Hierarchy<C> {
     }
 
     /// Counts beside and below the L2.
-    #[must_use]
     pub fn result(&self) -> MemoryResult {
         self.l2.result()
     }

@@ -261,7 +261,6 @@ impl Below {
     }
 
     /// Serves all requests and returns the counts of the levels (L3 first) and of the DRAM.
-    #[must_use]
     pub fn result(&self) -> (Vec<LowerLevelResult>, Option<DramResult>) {
         let level = |level: &Level| LowerLevelResult {
             name: level.name.to_owned(),

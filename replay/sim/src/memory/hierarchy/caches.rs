@@ -20,7 +20,6 @@ pub(super) fn of_core<C>(caches: &mut [C], core: usize) -> &mut C {
 
 impl<C: Delay> Caches<C> {
     /// Turns the caches into caches with delayed fills; most lines arrive within these latencies.
-    #[must_use]
     pub fn delayed(self, l1_cycles: u64, l2_cycles: u64) -> Caches<C::Delayed> {
         let delayed = |caches: Vec<C>, cycles| {
             let all = caches.into_iter().map(|cache| cache.delayed(cycles));
@@ -60,7 +59,6 @@ impl Caches<AnyCache> {
     }
 
     /// Turns the caches into caches that allocate on a miss.
-    #[must_use]
     pub fn allocate_on_miss(self) -> Caches<AllocateOnMiss> {
         let allocate = |caches: Vec<AnyCache>| {
             let all = caches.into_iter().map(AnyCache::into_box);
@@ -73,7 +71,6 @@ impl Caches<AnyCache> {
     }
 
     /// Boxes the caches.
-    #[must_use]
     pub fn boxed(self) -> Caches<Box<dyn Cache>> {
         let boxed = |caches: Vec<AnyCache>| caches.into_iter().map(AnyCache::into_box).collect();
         Caches {

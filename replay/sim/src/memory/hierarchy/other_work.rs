@@ -34,7 +34,6 @@ impl OtherWork {
     }
 
     /// The work after the frame with this index. Its lines differ from those after the 15 frames before.
-    #[must_use]
     pub fn after(frame: usize, percent: u8, config: &RunConfig) -> Self {
         Self {
             percent,
@@ -44,13 +43,11 @@ impl OtherWork {
     }
 
     /// Its lines in an L2 of the configuration.
-    #[must_use]
     pub fn l2_lines(self) -> Range<u32> {
         self.lines(self.l2_lines, 0)
     }
 
     /// Its lines in a cache with `all` lines, each of which contains 2^`shift` lines of the L2.
-    #[must_use]
     pub fn lines(self, all: u64, shift: u32) -> Range<u32> {
         let first = self.first >> shift;
         let count = all * u64::from(self.percent) / 100;

@@ -35,7 +35,6 @@ pub struct MissPath {
 
 impl MissPath {
     /// Memory directly below the L2, which is only counted.
-    #[must_use]
     pub fn memory_alone() -> Self {
         Self {
             below: None,
@@ -75,7 +74,6 @@ impl MissPath {
     }
 
     /// True if evictions of other levels invalidate L1 lines.
-    #[must_use]
     pub fn invalidates(&self) -> bool {
         self.evictions.is_some()
     }
@@ -216,7 +214,6 @@ impl<C> SecondLevel<C> {
     }
 
     /// Serves all requests and returns the counts beside and below the L2.
-    #[must_use]
     pub fn result(&self) -> MemoryResult {
         let path = &self.path;
         let (lower_levels, dram) =
@@ -234,13 +231,11 @@ impl<C> SecondLevel<C> {
     }
 
     /// Fetches per interval of time; empty if not recorded.
-    #[must_use]
     pub fn fetched_lines(&self) -> &[u32] {
         self.path.fetched_lines.as_deref().unwrap_or_default()
     }
 
     /// Maximum number of lines of the next work item to prefetch when an item starts.
-    #[must_use]
     pub fn lines_of_next_item(&self) -> usize {
         let prefetch = self.path.prefetch.first();
         prefetch.map_or(0, |prefetch| prefetch.prefetcher.lines_of_next_item())

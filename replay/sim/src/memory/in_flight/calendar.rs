@@ -54,7 +54,6 @@ pub struct InFlight {
 
 impl InFlight {
     /// An empty calendar; most lines should arrive within `usual_cycles`.
-    #[must_use]
     pub fn new(usual_cycles: u64) -> Self {
         let days = (usual_cycles + 1).next_power_of_two().clamp(64, 4096) as usize;
         let empty = Day {
@@ -80,7 +79,6 @@ impl InFlight {
 
     /// Arrival of the line, if it is in flight.
     #[inline(always)]
-    #[must_use]
     pub fn arrival(&self, line: u32) -> Option<u64> {
         let mut at = self.chains[line as usize % CHAINS];
         while at != NONE {

@@ -17,7 +17,6 @@ pub(in crate::memory) fn boxed(cache: impl Cache + 'static) -> AnyCache {
 
 impl AnyCache {
     /// An empty LRU cache; `sets` is a power of two.
-    #[must_use]
     pub fn lru(sets: u32, ways: u32) -> Self {
         match ways {
             1 => boxed(Lru::new(sets, WaysOf::<1>)),
@@ -29,7 +28,6 @@ impl AnyCache {
     }
 
     /// Boxes the cache, whatever its kind.
-    #[must_use]
     pub fn into_box(self) -> Box<dyn Cache> {
         match self {
             Self::FourWayLru(cache) => Box::new(cache),

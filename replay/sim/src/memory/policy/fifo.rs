@@ -13,7 +13,6 @@ pub(super) struct Fifo {
 
 impl Fifo {
     /// An empty cache; `sets` is a power of two, `ways` at most 255.
-    #[must_use]
     pub fn new(sets: u32, ways: u32) -> Self {
         Self {
             tags: vec![EMPTY; sets as usize * ways as usize],

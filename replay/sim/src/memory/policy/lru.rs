@@ -74,7 +74,6 @@ pub type FourWayLru = Lru<WaysOf<4>>;
 
 impl<W: Ways, L: Line> Lru<W, L> {
     /// An empty cache; `sets` is a power of two.
-    #[must_use]
     pub fn new(sets: u32, ways: W) -> Self {
         debug_assert!(sets.is_power_of_two());
         Self {

@@ -34,7 +34,6 @@ pub(super) fn by_name(name: &str) -> Result<Replacement, Option<String>> {
 impl Replacement {
     /// A policy under a name of its own, which configurations then accept. It replaces an earlier one of the
     /// same name. A name with `@` never equals a name of the table.
-    #[must_use]
     pub fn own(name: &str, make: MakePolicy) -> Self {
         let row: &'static PolicyRow = Box::leak(Box::new(PolicyRow {
             name: name.to_owned().leak(),
@@ -125,7 +124,7 @@ mod tests {
     use super::*;
     use crate::config::{Mode, Order, RunConfig};
     use crate::engine::replay;
-    use crate::stream::synthetic::Synthetic;
+    use crate::stream::testing::Synthetic;
 
     /// LRU by time stamps.
     struct Stamps {

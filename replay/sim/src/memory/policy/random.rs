@@ -12,7 +12,6 @@ pub(super) struct RandomReplacement {
 
 impl RandomReplacement {
     /// An empty cache; `sets` is a power of two.
-    #[must_use]
     pub fn new(sets: u32, ways: u32, seed: u64) -> Self {
         Self {
             tags: vec![EMPTY; sets as usize * ways as usize],

@@ -142,7 +142,6 @@ pub(super) struct Rrip {
 
 impl Rrip {
     /// An empty cache; `sets` is a power of two, `ways` at most 255.
-    #[must_use]
     pub fn new(sets: u32, ways: u32, insertion: Insertion) -> Self {
         Self {
             sets: Sets::new(sets, ways),

@@ -30,7 +30,6 @@ const fn signature(line: u32) -> usize {
 
 impl Ship {
     /// An empty cache; `sets` is a power of two, `ways` at most 255.
-    #[must_use]
     pub fn new(sets: u32, ways: u32) -> Self {
         Self {
             sets: Sets::new(sets, ways),

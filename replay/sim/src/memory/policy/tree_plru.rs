@@ -18,7 +18,6 @@ pub(super) fn accepts_ways(ways: u32) -> bool {
 
 impl TreePlru {
     /// An empty cache; `sets` and `ways` are powers of two, `ways` at most 64.
-    #[must_use]
     pub fn new(sets: u32, ways: u32) -> Self {
         Self {
             tags: vec![EMPTY; sets as usize * ways as usize],

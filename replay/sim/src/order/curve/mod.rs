@@ -90,25 +90,21 @@ const fn row(
 
 impl Curve {
     /// Colour, the same in every plot.
-    #[must_use]
     pub fn color(self) -> Rgb {
         self.row().color
     }
 
     /// The unit of the number after the name; none for a curve without a number.
-    #[must_use]
     pub fn size_unit(self) -> Option<&'static str> {
         Some(self.row().size.unit).filter(|unit| !unit.is_empty())
     }
 
     /// The default of the number after the name.
-    #[must_use]
     pub fn usual_size(self, l2_bytes: u64) -> u32 {
         (self.row().size.usual)(l2_bytes)
     }
 
     /// The path.
-    #[must_use]
     pub fn path(self) -> &'static dyn Path {
         self.row().path
     }

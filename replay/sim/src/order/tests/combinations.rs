@@ -8,7 +8,7 @@ use super::*;
 use crate::config::BetweenFrames;
 use crate::engine::replay_all;
 use crate::stream::LineMemory;
-use crate::stream::synthetic::Synthetic;
+use crate::stream::testing::Synthetic;
 use crate::stream::testing::repeated;
 use proptest::prelude::*;
 use std::collections::HashSet;

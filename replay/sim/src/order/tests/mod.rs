@@ -5,7 +5,7 @@ use super::curve::Ground;
 use super::*;
 use crate::config::{Mode, RunConfig};
 use crate::engine::replay;
-use crate::stream::synthetic::Synthetic;
+use crate::stream::testing::Synthetic;
 use clap::ValueEnum;
 use formats::textrace::{Pass, PassKind, TraceMeta};
 use formats::view::{Eye, FrameViews};

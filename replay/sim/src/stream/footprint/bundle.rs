@@ -31,7 +31,6 @@ impl Bundle {
 
     /// Distinct lines of a footprint, in texel order.
     #[inline(always)]
-    #[must_use]
     pub fn lines_of(&self, index: usize) -> &[u32] {
         let len = usize::from(self.lens[index & 3]).min(4);
         &self.lines[index & 3][..len]
@@ -70,7 +69,6 @@ impl Bundle {
 
     /// The distinct lines, if they were requested from [`Footprints::scratch`](super::Footprints::scratch).
     #[inline(always)]
-    #[must_use]
     pub fn distinct(&self) -> &DistinctLines {
         &self.distinct
     }
@@ -152,21 +150,18 @@ pub struct DistinctLine(u64);
 impl DistinctLine {
     /// Line relative to the texture.
     #[inline(always)]
-    #[must_use]
     pub fn line(self) -> u32 {
         self.0 as u32
     }
 
     /// Footprints of the bundle that use it, one bit each.
     #[inline(always)]
-    #[must_use]
     pub fn users(self) -> u32 {
         (self.0 >> 32) as u32 & 0xffff
     }
 
     /// Index of its first occurrence among the lines of footprints that do not repeat the footprint before.
     #[inline(always)]
-    #[must_use]
     pub fn first(self) -> u32 {
         (self.0 >> 48) as u32
     }
@@ -231,21 +226,18 @@ impl DistinctLines {
 
     /// Line look-ups of all footprints.
     #[inline(always)]
-    #[must_use]
     pub fn lookups(&self) -> u32 {
         self.lookups
     }
 
     /// The lowest and the highest line.
     #[inline(always)]
-    #[must_use]
     pub fn span(&self) -> [u32; 2] {
         self.span
     }
 
     /// Total lines of footprints that do not repeat the footprint before.
     #[inline(always)]
-    #[must_use]
     pub fn listed(&self) -> u32 {
         self.listed
     }

@@ -111,7 +111,6 @@ impl Footprints {
     }
 
     /// Buffers for [`Self::for_quad`]. `distinct`: bundles list their distinct lines.
-    #[must_use]
     pub fn scratch(&self, distinct: bool) -> Scratch {
         let kinds = self
             .draws
@@ -129,7 +128,6 @@ impl Footprints {
     }
 
     /// Lines of the whole address space.
-    #[must_use]
     pub fn lines(&self) -> u64 {
         self.lines
     }

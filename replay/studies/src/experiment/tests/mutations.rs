@@ -1,14 +1,14 @@
 //! Damaged experiment files and configurations must be read or refused, quickly.
 
-use super::*;
+use super::super::*;
 use formats::random::Random;
 use sim::config::RunConfig;
 use std::time::{Duration, Instant};
 
 const SEEDS: [&str; 4] = [
-    include_str!("../../../experiments/caches.toml"),
-    include_str!("../../../experiments/open-choices.toml"),
-    include_str!("../../../experiments/texel-density.toml"),
+    include_str!("../../../../experiments/caches.toml"),
+    include_str!("../../../../experiments/open-choices.toml"),
+    include_str!("../../../../experiments/texel-density.toml"),
     "traces = [\"a.textrace\", \"b.textrace\"]\n[base]\nmode = \"functional\"\ncores = 4\n[base.l1]\nsize_bytes = \"8KiB\"\nways = 4\nreplacement = \"fifo\"\n[base.tmu]\nthreads = 64\n[axes]\norder = [\"morton\"]\nseed = [1, 2]\n",
 ];
 

@@ -10,8 +10,9 @@ use formats::raytrace::{
     encode_ray_tile,
 };
 use formats::textrace::TraceMeta;
-use formats::view::{Eye, FovTangents, FrameViews, Hmd};
+use formats::view::{Eye, FovTangents, Hmd};
 use glam::Vec3;
+use sim::stream::testing::meta;
 use std::error::Error;
 
 /// Index of the diffuse material.
@@ -175,30 +176,18 @@ pub fn trace(scene: &[Placed], view: View) -> Synthetic {
         glossy: false,
         alpha_masked: false,
     };
+    let meta = meta(view.size_px, fov);
     let tables = RaytraceTables {
         meta: RaytraceMeta {
             trace: TraceMeta {
-                tool: "test".into(),
-                command_line: Vec::new(),
                 scene: "synthetic".into(),
                 scene_triangles: scene.len() as u64,
-                camera: "default".into(),
                 backend: "rays".into(),
-                driver: "test".into(),
-                seed: 0,
                 hmd: Hmd {
-                    name: "custom".into(),
-                    source: "test".into(),
-                    eye_size_px: view.size_px,
-                    fov: [fov; 2],
                     ipd_m: view.ipd_m,
-                    cant_deg: 0.0,
+                    ..meta.hmd.clone()
                 },
-                frames: vec![FrameViews::default()],
-                surfaces: None,
-                origin_m: [0.0; 3],
-                techniques: None,
-                program: None,
+                ..meta
             },
             origin: [0.0; 3],
             eyes,

@@ -1,11 +1,11 @@
 //! A second implementation of the simulation, for tests: a plain loop over all cycles that looks at every slot in each
 //! of them. It shares only the types of input and output, the meaning of a tick, and the phases of a cycle.
 
-use super::batch::{Batch, Item, Pipeline, Request};
-use super::counts::{Counts, LineCounts};
-use super::device::{BatchTiming, Simulated};
-use super::machine::{CacheSize, Machine};
-use super::server::TICKS;
+use super::super::batch::{Batch, Item, Pipeline, Request};
+use super::super::counts::{Counts, LineCounts};
+use super::super::device::{BatchTiming, Simulated};
+use super::super::machine::{CacheSize, Machine};
+use super::super::server::TICKS;
 use std::collections::VecDeque;
 
 /// A cache: per set the resident lines, most recently used first, and the lines in flight in order of request.
@@ -257,11 +257,12 @@ impl Twin<'_> {
             && self.remaining[self.out.batches.len()] == 0
         {
             let start = self.opened[self.out.batches.len()].max(self.out.unit_cycles);
+            let counts = std::mem::take(&mut self.counts);
             self.out.batches.push(BatchTiming {
                 cycles: end.saturating_sub(start),
-                counts: self.counts.since(&self.last),
+                counts,
             });
-            self.last = self.counts;
+            self.last.add(&counts);
             self.out.unit_cycles = self.out.unit_cycles.max(end);
         }
         self.out.batches.len() > before
