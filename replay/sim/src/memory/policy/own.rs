@@ -1,22 +1,7 @@
-//! Replacement policies that the caller of this library implements. The cache keeps the tags, the policy
-//! only chooses ways.
+//! Replacement policies that the caller of this library implements.
 
-use super::any_cache::{AnyCache, boxed};
-use super::{ANY_WAYS, Build, Geometry, PolicyRow, Replacement};
-use crate::memory::cache::{Cache, EMPTY, empty_way};
+use super::{ANY_WAYS, Build, Policy, PolicyRow, Replacement};
 use std::sync::{Mutex, PoisonError};
-
-/// A policy for all sets of a cache.
-pub trait Policy: Send {
-    /// A look-up of `line` found it in this way.
-    fn hit(&mut self, set: u32, way: u32, line: u32);
-
-    /// `line` was filled into this way.
-    fn fill(&mut self, set: u32, way: u32, line: u32);
-
-    /// The way to evict from a full set; less than the number of ways.
-    fn victim(&mut self, set: u32) -> u32;
-}
 
 /// Makes the policy of a cache from its number of sets and ways.
 pub type MakePolicy = Box<dyn Fn(u32, u32) -> Box<dyn Policy> + Send + Sync>;
@@ -46,76 +31,6 @@ impl Replacement {
         named.retain(|other| *other != policy);
         named.push(policy);
         policy
-    }
-}
-
-/// A cache with such a policy.
-struct Own {
-    tags: Vec<u32>,
-    set_mask: u32,
-    ways: usize,
-    policy: Box<dyn Policy>,
-}
-
-pub(super) fn build(make: &MakePolicy, geometry: Geometry) -> AnyCache {
-    let Geometry { sets, ways, .. } = geometry;
-    boxed(Own {
-        tags: vec![EMPTY; sets as usize * ways as usize],
-        set_mask: sets - 1,
-        ways: ways as usize,
-        policy: make(sets, ways),
-    })
-}
-
-impl Own {
-    fn set_of(&self, line: u32) -> (u32, usize) {
-        let set = line & self.set_mask;
-        (set, set as usize * self.ways)
-    }
-
-    fn way_of(&self, line: u32) -> Option<usize> {
-        let (_, first) = self.set_of(line);
-        let mut tags = self.tags[first..first + self.ways].iter();
-        tags.position(|&tag| tag == line)
-    }
-}
-
-impl Cache for Own {
-    fn lookup(&mut self, line: u32) -> bool {
-        let Some(way) = self.way_of(line) else {
-            return false;
-        };
-        let (set, _) = self.set_of(line);
-        self.policy.hit(set, way as u32, line);
-        true
-    }
-
-    fn contains(&self, line: u32) -> bool {
-        self.way_of(line).is_some()
-    }
-
-    fn fill(&mut self, line: u32) -> u32 {
-        let (set, first) = self.set_of(line);
-        let tags = &mut self.tags[first..first + self.ways];
-        let empty = tags.iter().position(|&tag| tag == EMPTY);
-        let way = empty.unwrap_or_else(|| self.policy.victim(set) as usize % self.ways);
-        let evicted = std::mem::replace(&mut tags[way], line);
-        self.policy.fill(set, way as u32, line);
-        evicted
-    }
-
-    fn remove(&mut self, line: u32) -> bool {
-        let (_, first) = self.set_of(line);
-        empty_way(&mut self.tags[first..first + self.ways], line).is_some()
-    }
-
-    fn clear(&mut self) {
-        self.tags.fill(EMPTY);
-    }
-
-    /// A policy may count hits, so every repeat is simulated.
-    fn repeat_safe_lines(&self) -> u32 {
-        0
     }
 }
 

@@ -3,8 +3,8 @@
 //! A table of counters records per region whether lines are used again after their fill. Lines of
 //! regions without reuse are inserted as the next victims.
 
-use super::rrip::{DISTANT, LONG, Sets};
-use crate::memory::cache::{Cache, EMPTY};
+use super::rrip::{DISTANT, LONG, Predictions};
+use super::{Geometry, Policy};
 
 /// Lines of a region: 4 KiB at 16 bytes per line, 16 KiB at 64.
 const REGION_LINES: u32 = 256;
@@ -14,12 +14,13 @@ const MOST_COUNTED: u8 = 7;
 /// Initial counter of a region.
 const UNTRAINED: u8 = 1;
 
-/// A cache with hit prediction per region.
+/// Hit prediction per region.
 pub(super) struct Ship {
-    sets: Sets,
-    /// Whether the line at each place was used again.
-    is_reused: Vec<bool>,
+    predictions: Predictions,
+    /// The counter of each line's region, and whether the line was used again.
+    lines: Vec<(u16, bool)>,
     counters: Vec<u8>,
+    ways: u32,
 }
 
 /// The counter of a line's region.
@@ -29,56 +30,46 @@ const fn signature(line: u32) -> usize {
 }
 
 impl Ship {
-    /// An empty cache; `sets` is a power of two, `ways` at most 255.
-    pub fn new(sets: u32, ways: u32) -> Self {
+    pub(super) fn new(geometry: Geometry) -> Self {
         Self {
-            sets: Sets::new(sets, ways),
-            is_reused: vec![false; sets as usize * ways as usize],
+            predictions: Predictions::new(geometry),
+            lines: vec![(0, false); geometry.lines()],
             counters: vec![UNTRAINED; SIGNATURES],
+            ways: geometry.ways,
         }
     }
 }
 
-impl Cache for Ship {
-    fn lookup(&mut self, line: u32) -> bool {
-        let found = self.sets.lookup(line);
-        if let Some((place, true)) = found
-            && !self.is_reused[place]
-        {
-            self.is_reused[place] = true;
-            let counter = &mut self.counters[signature(line)];
+impl Policy for Ship {
+    fn hit(&mut self, set: u32, way: u32, _line: u32) {
+        let (signature, is_reused) = &mut self.lines[(set * self.ways + way) as usize];
+        if self.predictions.hit(set, way) && !std::mem::replace(is_reused, true) {
+            let counter = &mut self.counters[usize::from(*signature)];
             *counter = (*counter + 1).min(MOST_COUNTED);
         }
-        found.is_some()
     }
 
-    fn contains(&self, line: u32) -> bool {
-        self.sets.contains(line)
-    }
-
-    fn fill(&mut self, line: u32) -> u32 {
-        let place = self.sets.victim(self.sets.set(line));
-        let victim = self.sets.line(place);
-        if victim != EMPTY && !self.is_reused[place] {
-            let counter = &mut self.counters[signature(victim)];
-            *counter = counter.saturating_sub(1);
-        }
-        self.is_reused[place] = false;
-        let prediction = match self.counters[signature(line)] {
+    fn fill(&mut self, set: u32, way: u32, line: u32) {
+        let signature = signature(line);
+        self.lines[(set * self.ways + way) as usize] = (signature as u16, false);
+        let prediction = match self.counters[signature] {
             0 => DISTANT,
             _ => LONG,
         };
-        self.sets.insert(place, line, prediction);
-        victim
+        self.predictions.fill(set, way, prediction);
     }
 
-    fn remove(&mut self, line: u32) -> bool {
-        self.sets.remove(line)
+    fn victim(&mut self, set: u32) -> u32 {
+        let way = self.predictions.victim(set);
+        let (signature, is_reused) = self.lines[(set * self.ways + way) as usize];
+        if !is_reused {
+            let counter = &mut self.counters[usize::from(signature)];
+            *counter = counter.saturating_sub(1);
+        }
+        way
     }
 
     fn clear(&mut self) {
-        self.sets.clear();
-        self.is_reused.fill(false);
         self.counters.fill(UNTRAINED);
     }
 }
