@@ -1,4 +1,5 @@
 use super::cache::EMPTY;
+use super::in_flight::Immediate;
 use super::*;
 use crate::config::{Inclusion, LevelConfig, Levels, RunConfig};
 use proptest::prelude::*;
@@ -265,7 +266,8 @@ proptest! {
             };
             config.validate().unwrap();
             let mut caches = Caches::build(&config).unwrap().boxed();
-            let mut l2 = SecondLevel::new(caches.l2, MissPath::build(&config, None).unwrap());
+            let l2 = caches.l2.into_iter().map(Immediate).collect();
+            let mut l2 = SecondLevel::new(l2, MissPath::build(&config, None).unwrap());
             let mut missed = Vec::new();
             for (step, &line) in trace.iter().enumerate() {
                 if caches.l1[step % 2].access(line) {
@@ -279,7 +281,7 @@ proptest! {
                 }
                 for line in 0..400 {
                     let in_l1 = caches.l1.iter().any(|l1| l1.contains(line));
-                    prop_assert!(!in_l1 || !l2_inclusive || l2.cache(0).contains(line));
+                    prop_assert!(!in_l1 || !l2_inclusive || l2.cache(0).0.contains(line));
                 }
             }
             let result = l2.result();
@@ -289,9 +291,9 @@ proptest! {
             } else {
                 // The L3 holds all lines of the L2, so it cannot miss.
                 let below = l3.line_misses;
-                let held: Vec<u32> = (0..400).filter(|&line| l2.cache(0).contains(line)).collect();
+                let held: Vec<u32> = (0..400).filter(|&line| l2.cache(0).0.contains(line)).collect();
                 for line in held {
-                    l2.cache(0).remove(line);
+                    l2.cache(0).remove(line, 0);
                     l2.access(0, line);
                 }
                 prop_assert_eq!(l2.result().lower_levels[0].line_misses, below);

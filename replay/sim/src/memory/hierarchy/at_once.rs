@@ -4,6 +4,7 @@ use super::caches::Caches;
 use super::other_work::OtherWork;
 use super::second_level::{MissPath, SecondLevel};
 use crate::config::{ConfigError, RunConfig};
+use crate::memory::in_flight::Immediate;
 use crate::memory::{Access, Cache};
 use crate::result::MemoryResult;
 
@@ -21,7 +22,7 @@ pub enum Found {
 /// The caches of a machine with any number of levels.
 pub struct Hierarchy<C> {
     l1: Vec<C>,
-    l2: SecondLevel<C>,
+    l2: SecondLevel<Immediate<C>>,
     /// True if evictions of other levels invalidate L1 lines.
     invalidates: bool,
 }
@@ -45,7 +46,7 @@ impl<C: Cache> Hierarchy<C> {
         Self {
             l1: caches.l1,
             invalidates: path.invalidates(),
-            l2: SecondLevel::new(caches.l2, path),
+            l2: SecondLevel::new(caches.l2.into_iter().map(Immediate).collect(), path),
         }
     }
 
@@ -87,7 +88,7 @@ impl<C: Cache> Hierarchy<C> {
 
     /// Accesses memory for a client other than the texture units. Returns the bytes that caches serve.
     pub fn client_access(&mut self, core: usize, access: &Access) -> u64 {
-        self.l2.client_access_at_once(core, access)
+        self.l2.client_access(core, access, 0)
     }
 
     /// Invalidates L1 lines that lower levels have evicted.
@@ -100,13 +101,13 @@ impl<C: Cache> Hierarchy<C> {
     /// Empties all caches.
     pub fn clear(&mut self) {
         self.l1.iter_mut().for_each(C::clear);
-        self.l2.empty();
+        self.l2.clear();
     }
 
     /// Empties the L1 caches, and other work fills part of each other cache.
     pub fn lose(&mut self, other: OtherWork) {
         self.l1.iter_mut().for_each(C::clear);
-        self.l2.lose_at_once(other);
+        self.l2.lose(other, 0);
         self.follow_evictions();
     }
 

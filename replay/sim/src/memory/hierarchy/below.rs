@@ -88,35 +88,28 @@ impl Below {
         }))
     }
 
-    /// Reads a line for a core's L2, without time.
-    pub fn read(&mut self, core: usize, line: u32) {
-        let missed = self.look_up(core, line);
-        if missed == self.levels.len() {
-            let line = self.line_of_memory(line);
-            if let Some(dram) = &mut self.dram {
-                dram.read(line, None);
-            }
-        }
-        self.fill(core, missed, line);
-    }
-
-    /// Reads a line for a core's L2 and returns its arrival cycle. `now` never decreases.
+    /// Reads a line for a core's L2 and returns its arrival cycle; without time it arrives at once. `now` never
+    /// decreases.
     ///
     /// A level that holds the line sends it after `hit_cycles`, or when the line arrives there, whichever is later.
-    pub fn read_at(&mut self, core: usize, line: u32, now: u64) -> u64 {
+    pub fn read(&mut self, core: usize, line: u32, now: Option<u64>) -> u64 {
         let missed = self.look_up(core, line);
-        let arrival = if let Some(level) = self.levels.get_mut(missed) {
-            level.arrival(core, line, now)
-        } else {
-            let line = self.line_of_memory(line);
-            if let Some(dram) = &mut self.dram {
-                dram.read(line, Some(now));
+        let arrival = match (self.levels.get_mut(missed), now) {
+            (Some(level), Some(now)) => level.arrival(core, line, now),
+            (Some(_), None) => 0,
+            (None, _) => {
+                let line = self.line_of_memory(line);
+                if let Some(dram) = &mut self.dram {
+                    dram.read(line, now);
+                }
+                now.map_or(0, |now| now + self.memory_cycles)
             }
-            now + self.memory_cycles
         };
         self.fill(core, missed, line);
-        for level in &mut self.levels[..missed] {
-            level.enter(core, line, now, arrival);
+        if let Some(now) = now {
+            for level in &mut self.levels[..missed] {
+                level.enter(core, line, now, arrival);
+            }
         }
         arrival
     }

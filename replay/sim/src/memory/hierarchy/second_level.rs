@@ -6,7 +6,7 @@ use super::inclusion::Evictions;
 use super::other_work::OtherWork;
 use crate::config::{ConfigError, PrefetchConfig, RunConfig};
 use crate::memory::cache::EMPTY;
-use crate::memory::in_flight::{DelayedFill, LimitedMshrs, NOT_IN_FLIGHT};
+use crate::memory::in_flight::{DelayedFill, Immediate, LimitedMshrs, NOT_IN_FLIGHT};
 use crate::memory::prefetch::{Demand, Prefetcher};
 use crate::memory::{Access, Cache};
 use crate::result::{MemoryResult, MshrResult, PrefetchResult, Timeline};
@@ -86,11 +86,23 @@ impl MissPath {
 
     /// Arrival of a line that the L2 requests at `now`.
     #[inline(always)]
-    fn fetch(&mut self, core: usize, line: u32, now: u64) -> u64 {
+    fn fetch<D: DelayedFill>(&mut self, core: usize, line: u32, now: u64) -> u64 {
+        if !D::HAS_LATENCIES {
+            self.read_at_once(core, line);
+            return now;
+        }
         if !self.mshrs.is_empty() {
             return self.fetch_by_mshr(core, line, now);
         }
         self.read(core, line, now)
+    }
+
+    /// Reads a line from below without time.
+    #[inline(always)]
+    fn read_at_once(&mut self, core: usize, line: u32) {
+        if let Some(below) = &mut self.below {
+            below.read(core, line, None);
+        }
     }
 
     #[inline(never)]
@@ -99,11 +111,6 @@ impl MissPath {
         let arrival = self.read(core, line, start);
         of_core(&mut self.mshrs, core).enter(arrival);
         arrival
-    }
-
-    /// Other work fills part of each cache below the L2.
-    fn lose_below(&mut self, other: OtherWork) {
-        self.below.iter_mut().for_each(|below| below.lose(other));
     }
 
     /// True if a fetch would wait for an MSHR.
@@ -123,7 +130,7 @@ impl MissPath {
         }
         match &mut self.below {
             None => now + self.memory_cycles,
-            Some(below) => below.read_at(core, line, now),
+            Some(below) => below.read(core, line, Some(now)),
         }
     }
 }
@@ -251,17 +258,25 @@ impl<C> SecondLevel<C> {
             evictions.invalidate_l1(remove);
         }
     }
+}
 
-    fn clear_path(&mut self) {
-        self.path.below.iter_mut().for_each(Below::clear);
-        self.path.mshrs.iter_mut().for_each(LimitedMshrs::clear);
-        for prefetch in &mut self.path.prefetch {
-            prefetch.unused.clear();
+impl<C: Cache> SecondLevel<Immediate<C>> {
+    /// Looks up a line for a core and fills it on a miss. Returns true for a hit.
+    #[inline(always)]
+    pub fn access(&mut self, core: usize, line: u32) -> bool {
+        let hit = of_core(&mut self.caches, core).0.access(line);
+        if !hit {
+            self.path.read_at_once(core, line);
         }
+        if self.path.has_consequences {
+            let answer = if hit { Answer::Hit } else { Answer::Miss(0) };
+            self.prefetch(core, line, 0, answer);
+            self.follow_evictions(0);
+        }
+        hit
     }
 }
 
-/// Timed operation.
 impl<D: DelayedFill> SecondLevel<D> {
     /// Answers a core's request and fetches a missing line.
     #[inline(always)]
@@ -270,7 +285,7 @@ impl<D: DelayedFill> SecondLevel<D> {
         let answer = match cache.look_up(line, now) {
             0 => Answer::Hit,
             NOT_IN_FLIGHT => {
-                let arrival = self.path.fetch(core, line, now);
+                let arrival = self.path.fetch::<D>(core, line, now);
                 cache.enter(line, now, arrival);
                 Answer::Miss(arrival)
             }
@@ -307,7 +322,8 @@ impl<D: DelayedFill> SecondLevel<D> {
     /// Accesses memory for a client other than the texture units. Returns the bytes that caches serve.
     pub fn client_access(&mut self, core: usize, access: &Access, now: u64) -> u64 {
         if access.write || !self.path.is_for_all_clients {
-            return self.path.client_access(core, access, Some(now));
+            let now = D::HAS_LATENCIES.then_some(now);
+            return self.path.client_access(core, access, now);
         }
         let line_bytes = self.path.line_bytes;
         let last = access.address + access.bytes - 1;
@@ -332,11 +348,11 @@ impl<D: DelayedFill> SecondLevel<D> {
         for &line in &wanted {
             let cache = of_core(&mut self.caches, core);
             if line != EMPTY && !cache.holds(line, now) {
-                if self.path.is_busy(core, now) {
+                if D::HAS_LATENCIES && self.path.is_busy(core, now) {
                     of_core(&mut self.path.prefetch, core).counts.dropped_lines += 1;
                     continue;
                 }
-                cache.enter(line, now, self.path.fetch(core, line, now));
+                cache.enter(line, now, self.path.fetch::<D>(core, line, now));
                 of_core(&mut self.path.prefetch, core).fetched(line);
             }
         }
@@ -346,103 +362,33 @@ impl<D: DelayedFill> SecondLevel<D> {
     /// Empties the levels and drops the lines in flight.
     pub fn clear(&mut self) {
         self.caches.iter_mut().for_each(D::clear);
-        self.clear_path();
+        self.path.below.iter_mut().for_each(Below::clear);
+        self.path.mshrs.iter_mut().for_each(LimitedMshrs::clear);
+        for prefetch in &mut self.path.prefetch {
+            prefetch.unused.clear();
+        }
     }
 
     /// Other work fills part of each cache. Its lines arrive at `now`.
     pub fn lose(&mut self, other: OtherWork, now: u64) {
         for cache in &mut self.caches {
             for line in other.l2_lines() {
-                if !cache.holds(line, now) {
+                let is_there = match D::HAS_LATENCIES {
+                    true => cache.holds(line, now),
+                    false => cache.look_up(line, now) == 0,
+                };
+                if !is_there {
                     cache.enter(line, now, now);
                 }
             }
         }
         // Evictions of the L2 enter an exclusive level before other work fills that level.
         self.follow_evictions(now);
-        self.path.lose_below(other);
+        self.path
+            .below
+            .iter_mut()
+            .for_each(|below| below.lose(other));
         self.follow_evictions(now);
-    }
-}
-
-/// Operation without time: fetches complete immediately.
-impl<C: Cache> SecondLevel<C> {
-    /// Looks up a line for a core and fills it on a miss. Returns true for a hit.
-    #[inline(always)]
-    pub fn access(&mut self, core: usize, line: u32) -> bool {
-        let hit = of_core(&mut self.caches, core).access(line);
-        if !hit && let Some(below) = &mut self.path.below {
-            below.read(core, line);
-        }
-        if self.path.has_consequences {
-            self.prefetch_at_once(core, line, hit);
-            self.follow_evictions_at_once();
-        }
-        hit
-    }
-
-    /// Accesses memory for a client other than the texture units. Returns the bytes that caches serve.
-    pub fn client_access_at_once(&mut self, core: usize, access: &Access) -> u64 {
-        if access.write || !self.path.is_for_all_clients {
-            return self.path.client_access(core, access, None);
-        }
-        let line_bytes = self.path.line_bytes;
-        let last = access.address + access.bytes - 1;
-        let lines = access.address / line_bytes..=last / line_bytes;
-        let hits = lines.filter(|&line| self.access(core, line as u32));
-        (hits.count() as u64 * line_bytes).min(access.bytes)
-    }
-
-    #[inline(never)]
-    fn follow_evictions_at_once(&mut self) {
-        if let Some(evictions) = &mut self.path.evictions {
-            for cache in &mut self.caches {
-                cache.take_evicted(&mut evictions.evicted);
-            }
-            evictions.follow(self.path.below.as_mut(), |line| {
-                let removed = self.caches.iter_mut().map(|cache| cache.remove(line));
-                removed.map(u64::from).sum()
-            });
-        }
-    }
-
-    #[inline(never)]
-    fn prefetch_at_once(&mut self, core: usize, line: u32, hit: bool) {
-        if self.path.prefetch.is_empty() {
-            return;
-        }
-        let prefetch = of_core(&mut self.path.prefetch, core);
-        prefetch.observe(line, if hit { Answer::Hit } else { Answer::Miss(0) });
-        for index in 0..prefetch.wanted.len() {
-            let line = prefetch.wanted[index];
-            let cache = of_core(&mut self.caches, core);
-            if line != EMPTY && !cache.contains(line) {
-                if let Some(below) = &mut self.path.below {
-                    below.read(core, line);
-                }
-                cache.fill(line);
-                prefetch.fetched(line);
-            }
-        }
-    }
-
-    /// Empties the levels.
-    pub fn empty(&mut self) {
-        self.caches.iter_mut().for_each(C::clear);
-        self.clear_path();
-    }
-
-    /// Other work fills part of each cache.
-    pub fn lose_at_once(&mut self, other: OtherWork) {
-        for cache in &mut self.caches {
-            for line in other.l2_lines() {
-                cache.access(line);
-            }
-        }
-        // Evictions of the L2 enter an exclusive level before other work fills that level.
-        self.follow_evictions_at_once();
-        self.path.lose_below(other);
-        self.follow_evictions_at_once();
     }
 }
 

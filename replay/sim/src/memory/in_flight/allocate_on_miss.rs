@@ -27,15 +27,6 @@ pub struct Reserved {
 }
 
 impl DelayedFill for Reserved {
-    fn look_up_all(&mut self, lines: &[u32], now: u64, mut missing: impl FnMut(usize, u32, u64)) {
-        for (index, &line) in lines.iter().enumerate() {
-            match self.look_up(line, now) {
-                0 => {}
-                arrival => missing(index, line, arrival),
-            }
-        }
-    }
-
     fn look_up(&mut self, line: u32, now: u64) -> u64 {
         let allocated = self.cache.lookup(line);
         match self.in_flight.arrival(line, now) {

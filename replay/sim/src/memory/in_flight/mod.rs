@@ -6,10 +6,12 @@
 
 mod allocate_on_miss;
 mod calendar;
+mod immediate;
 mod limited_mshrs;
 mod table;
 
 pub use allocate_on_miss::AllocateOnMiss;
+pub use immediate::Immediate;
 pub use limited_mshrs::LimitedMshrs;
 pub use table::Mshrs;
 
@@ -21,9 +23,19 @@ pub const NOT_IN_FLIGHT: u64 = u64::MAX;
 
 /// A cache and its lines in flight.
 pub trait DelayedFill: Send {
+    /// False if a requested line arrives at once, and cycles mean nothing.
+    const HAS_LATENCIES: bool = true;
+
     /// Looks up lines and marks resident ones as used. Calls `missing` for each other line, in
     /// order, with its index, number and arrival ([`NOT_IN_FLIGHT`] if it was not requested).
-    fn look_up_all(&mut self, lines: &[u32], now: u64, missing: impl FnMut(usize, u32, u64));
+    fn look_up_all(&mut self, lines: &[u32], now: u64, mut missing: impl FnMut(usize, u32, u64)) {
+        for (index, &line) in lines.iter().enumerate() {
+            match self.look_up(line, now) {
+                0 => {}
+                arrival => missing(index, line, arrival),
+            }
+        }
+    }
 
     /// Looks up a line and marks it as used. Returns its arrival: 0 if it is resident,
     /// [`NOT_IN_FLIGHT`] if it was not requested.

@@ -101,9 +101,9 @@ proptest! {
         let mut now = 0;
         for (pause, line) in steps {
             now += pause;
-            let found = timed.read_at(0, line, now);
+            let found = timed.read(0, line, Some(now));
             prop_assert_eq!(found, twin_read(&mut timed_twins, line, now, 200));
-            functional.read(0, line);
+            functional.read(0, line, None);
             // Cycles this far apart leave nothing in flight.
             twin_read(&mut functional_twins, line, now * 1000, 0);
         }
@@ -129,14 +129,14 @@ fn a_stream_misses_once_for_each_longer_line() {
     for line in 0..400_u32 {
         let start = u64::from(line / 4 * 1000);
         let now = start + u64::from(line % 4);
-        assert_eq!(below.read_at(0, line, now), start + 200, "line {line}");
+        assert_eq!(below.read(0, line, Some(now)), start + 200, "line {line}");
     }
     assert_eq!(counts(&below), [[400, 100, 300]]);
     assert_eq!(below.result().1.unwrap().requests, 100);
     // All lines have arrived.
-    assert_eq!(below.read_at(0, 3, 1_000_000), 1_000_060);
+    assert_eq!(below.read(0, 3, Some(1_000_000)), 1_000_060);
     below.clear();
-    assert_eq!(below.read_at(0, 3, 1_000_100), 1_000_300);
+    assert_eq!(below.read(0, 3, Some(1_000_100)), 1_000_300);
 }
 
 #[test]

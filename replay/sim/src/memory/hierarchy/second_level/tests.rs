@@ -20,9 +20,9 @@ fn cache(config: &RunConfig) -> AnyCache {
     AnyCache::build(&config.level.l2, "L2", 16, 1).unwrap()
 }
 
-fn functional(config: &RunConfig) -> SecondLevel<Box<dyn Cache>> {
+fn functional(config: &RunConfig) -> SecondLevel<Immediate<Box<dyn Cache>>> {
     SecondLevel::new(
-        vec![cache(config).into_box()],
+        vec![Immediate(cache(config).into_box())],
         MissPath::build(config, None).unwrap(),
     )
 }
