@@ -17,6 +17,7 @@ use crate::config::{Allocation, Assign, ConfigError, RunConfig, TmuModel};
 use crate::memory::{Caches, Delay, DelayedFill, MissPath, OtherWork, SecondLevel};
 use crate::order::Phase;
 use crate::stream::{Cores, StreamError, furthest_behind};
+use crate::tmu::PipelineStats;
 use first_miss::FirstMiss;
 use formats::layout::Layout;
 use items::{Items, start_item};
@@ -24,14 +25,8 @@ use looping::Looping;
 use prefetch_fifo::PrefetchFifo;
 use std::sync::Arc;
 
-/// The texture units of all cores and their shared caches.
+/// The texture units of all cores.
 trait ThreadModel: Send {
-    /// The L1 caches, with their bookkeeping of lines in flight.
-    type L1: DelayedFill;
-
-    /// The caches.
-    fn shared(&mut self) -> &mut Shared<Self::L1>;
-
     /// Starts a phase at a cycle.
     fn start_phase(&mut self, cycle: u64);
 
@@ -40,8 +35,9 @@ trait ThreadModel: Send {
 
     /// Runs a core until it needs a shared resource later than `until`. Returns its cycle, or the maximum
     /// if it is done.
-    fn run_core(
+    fn run_core<D: DelayedFill>(
         &mut self,
+        shared: &mut Shared<D>,
         core: usize,
         until: u64,
         work: &mut Cores<'_>,
@@ -51,34 +47,22 @@ trait ThreadModel: Send {
     /// Ends the phase and returns the cycle in which the last core finished.
     fn end_phase(&mut self) -> u64;
 
-    /// Performs the accesses of other clients while no core works, at the maximum rate of memory. The cores
-    /// continue at `cycle`.
-    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64) {
-        self.shared().client_accesses(clients, cycle);
-    }
+    /// The counters of each core.
+    fn stats(&self) -> Vec<PipelineStats>;
 
-    /// Empties all caches and drops the lines in flight.
-    fn flush(&mut self) {
-        self.shared().flush();
-    }
-
-    /// Empties the L1 caches, and other work fills part of each other cache.
-    fn lose(&mut self, other: OtherWork, cycle: u64) {
-        self.shared().lose(other, cycle);
-    }
-
-    /// The counts until a cycle.
-    fn outcome(&self, cycles: u64) -> Outcome;
+    /// Adds the counts that only this model has.
+    fn complete<D: DelayedFill>(&self, _shared: &Shared<D>, _outcome: &mut Outcome) {}
 }
 
 /// A machine of clocked texture units.
-struct Clocked<M> {
+struct Clocked<M, D> {
     model: M,
+    shared: Shared<D>,
     /// Cycles until the last core finished.
     cycles: u64,
 }
 
-impl<M: ThreadModel> Machine for Clocked<M> {
+impl<M: ThreadModel, D: DelayedFill> Machine for Clocked<M, D> {
     /// A phase starts when the last core has finished the previous one.
     fn run(
         &mut self,
@@ -87,33 +71,47 @@ impl<M: ThreadModel> Machine for Clocked<M> {
         assign: Assign,
         mut clients: Option<&mut FrameClients<'_>>,
     ) -> Result<(), StreamError> {
+        let Self { model, shared, .. } = self;
         for phase in phases {
-            self.model.start_phase(self.cycles);
+            model.start_phase(self.cycles);
             // A finished core has the maximum as its clock.
-            let mut clocks = self.model.clocks();
+            let mut clocks = model.clocks();
             let mut items = Items::new(phase, assign, clocks.len(), clients.as_deref_mut());
             while let Some((core, until)) = furthest_behind(&clocks) {
-                clocks[core] = self.model.run_core(core, until, work, &mut items)?;
+                clocks[core] = model.run_core(shared, core, until, work, &mut items)?;
             }
-            self.cycles = self.model.end_phase();
+            self.cycles = model.end_phase();
         }
         Ok(())
     }
 
+    /// Performs the accesses of other clients while no core works, at the maximum rate of memory.
     fn client_accesses(&mut self, clients: &mut FrameClients<'_>) {
-        self.model.client_accesses(clients, self.cycles);
+        let l2 = &mut self.shared.l2;
+        clients.send(|access| l2.idle_client_access(access));
+        l2.catch_up(self.cycles);
     }
 
+    /// Empties all caches and drops the lines in flight.
     fn flush(&mut self) {
-        self.model.flush();
+        self.shared.l1.iter_mut().for_each(D::clear);
+        self.shared.l2.clear();
     }
 
     fn lose(&mut self, other: OtherWork) {
-        self.model.lose(other, self.cycles);
+        self.shared.l1.iter_mut().for_each(D::clear);
+        self.shared.l2.lose(other, self.cycles);
+        self.shared.follow_evictions(self.cycles);
     }
 
     fn outcome(&self, _config: &RunConfig) -> Outcome {
-        self.model.outcome(self.cycles)
+        let counts = self.shared.counts.clone();
+        let mut outcome = Outcome {
+            memory: self.shared.l2.result(),
+            ..Outcome::timed(counts, self.model.stats().into_iter(), self.cycles)
+        };
+        self.model.complete(&self.shared, &mut outcome);
+        outcome
     }
 }
 
@@ -156,22 +154,6 @@ impl<D: DelayedFill> Shared<D> {
             removed.map(u64::from).sum()
         });
     }
-
-    fn client_accesses(&mut self, clients: &mut FrameClients<'_>, cycle: u64) {
-        clients.send(|access| self.l2.idle_client_access(access));
-        self.l2.catch_up(cycle);
-    }
-
-    fn flush(&mut self) {
-        self.l1.iter_mut().for_each(D::clear);
-        self.l2.clear();
-    }
-
-    fn lose(&mut self, other: OtherWork, cycle: u64) {
-        self.l1.iter_mut().for_each(D::clear);
-        self.l2.lose(other, cycle);
-        self.follow_evictions(cycle);
-    }
 }
 
 /// The clocked machine of a configuration.
@@ -207,13 +189,28 @@ pub(super) fn machine_of<C: Delay>(
 where
     C::Delayed: 'static,
 {
-    fn clocked(model: impl ThreadModel + 'static) -> Box<dyn Machine> {
-        Box::new(Clocked { model, cycles: 0 })
-    }
+    let cores = caches.l1.len();
     let path = MissPath::build(config, layout)?;
+    // Looping threads with many missing lines request the last ones on later trips.
+    let later_trips_cycles = match config.tmu.model {
+        TmuModel::Looping => 8 * u64::from(config.tmu.loop_cycles),
+        TmuModel::FirstMiss | TmuModel::PrefetchFifo => 0,
+    };
+    let shared = Shared::new(caches, config, counts, path, later_trips_cycles);
+    fn clocked<D: DelayedFill + 'static>(
+        model: impl ThreadModel + 'static,
+        shared: Shared<D>,
+    ) -> Box<dyn Machine> {
+        let cycles = 0;
+        Box::new(Clocked {
+            model,
+            shared,
+            cycles,
+        })
+    }
     Ok(match config.tmu.model {
-        TmuModel::Looping => clocked(Looping::new(caches, config, counts, path)),
-        TmuModel::FirstMiss => clocked(FirstMiss::new(caches, config, counts, path)),
-        TmuModel::PrefetchFifo => clocked(PrefetchFifo::new(caches, config, counts, path)),
+        TmuModel::Looping => clocked(Looping::new(config, cores), shared),
+        TmuModel::FirstMiss => clocked(FirstMiss::new(config, cores), shared),
+        TmuModel::PrefetchFifo => clocked(PrefetchFifo::new(config, cores), shared),
     })
 }

@@ -7,16 +7,14 @@
 use super::first_miss::Thread;
 use super::{Items, Shared, ThreadModel, start_item};
 use crate::config::{RunConfig, TmuConfig};
-use crate::engine::counts::{CacheCounts, FootprintMisses};
-use crate::engine::outcome::Outcome;
-use crate::memory::{Caches, Delay, DelayedFill, MissPath, NOT_IN_FLIGHT};
+use crate::engine::counts::FootprintMisses;
+use crate::memory::{DelayedFill, NOT_IN_FLIGHT};
 use crate::stream::{Cores, StreamError};
 use crate::tmu::PipelineStats;
 use std::collections::VecDeque;
 
-/// Texture units and their shared caches.
-pub struct PrefetchFifo<D> {
-    shared: Shared<D>,
+/// The texture units of all cores.
+pub struct PrefetchFifo {
     units: Vec<Unit>,
     tmu: TmuConfig,
     /// Start of the phase, and footprints that had left each FIFO before it.
@@ -37,24 +35,18 @@ struct Unit {
     stats: PipelineStats,
 }
 
-impl<D: DelayedFill> PrefetchFifo<D> {
-    /// Empty caches, and one texture unit per L1.
-    pub fn new<C: Delay<Delayed = D>>(
-        caches: Caches<C>,
-        config: &RunConfig,
-        counts: CacheCounts,
-        path: MissPath,
-    ) -> Self {
+impl PrefetchFifo {
+    /// One texture unit per core.
+    pub fn new(config: &RunConfig, cores: usize) -> Self {
         Self {
-            units: caches.l1.iter().map(|_| Unit::default()).collect(),
-            shared: Shared::new(caches, config, counts, path, 0),
+            units: (0..cores).map(|_| Unit::default()).collect(),
             tmu: config.tmu,
             phase: (0, Vec::new()),
         }
     }
 
     /// Puts the core's next footprint into the FIFO, or advances time until there is room.
-    fn check_tags(&mut self, core: usize) {
+    fn check_tags<D: DelayedFill>(&mut self, shared: &mut Shared<D>, core: usize) {
         let unit = &mut self.units[core];
         let now = unit.clock;
         while unit.exits.front().is_some_and(|&exit| exit <= now) {
@@ -72,7 +64,7 @@ impl<D: DelayedFill> PrefetchFifo<D> {
             l2,
             l2_cycles,
             counts,
-        } = &mut self.shared;
+        } = &mut *shared;
         let l1 = &mut l1[core];
         let mut misses = FootprintMisses::default();
         let mut ready = now;
@@ -98,17 +90,11 @@ impl<D: DelayedFill> PrefetchFifo<D> {
         unit.exits.push_back(unit.last_exit);
         unit.stats.useful += 1;
         unit.clock += 1;
-        self.shared.follow_evictions(now);
+        shared.follow_evictions(now);
     }
 }
 
-impl<D: DelayedFill> ThreadModel for PrefetchFifo<D> {
-    type L1 = D;
-
-    fn shared(&mut self) -> &mut Shared<D> {
-        &mut self.shared
-    }
-
+impl ThreadModel for PrefetchFifo {
     fn start_phase(&mut self, cycle: u64) {
         self.phase = (
             cycle,
@@ -124,8 +110,9 @@ impl<D: DelayedFill> ThreadModel for PrefetchFifo<D> {
         self.units.iter().map(|unit| unit.clock).collect()
     }
 
-    fn run_core(
+    fn run_core<D: DelayedFill>(
         &mut self,
+        shared: &mut Shared<D>,
         core: usize,
         until: u64,
         work: &mut Cores<'_>,
@@ -138,12 +125,12 @@ impl<D: DelayedFill> ThreadModel for PrefetchFifo<D> {
                 return Ok(now);
             }
             if unit.quad.footprint().is_some() {
-                self.check_tags(core);
+                self.check_tags(shared, core);
             } else if let Some(quad) = work.next_quad(core) {
                 unit.stats.threads += u64::from(quad.footprints > 0);
                 unit.quad.begin(quad);
             } else if let Some(item) = items.next(core) {
-                start_item(&mut self.shared.l2, work, items, core, item, now)?;
+                start_item(&mut shared.l2, work, items, core, item, now)?;
             } else {
                 return Ok(u64::MAX);
             }
@@ -159,11 +146,7 @@ impl<D: DelayedFill> ThreadModel for PrefetchFifo<D> {
         exits.max().unwrap_or(*start)
     }
 
-    fn outcome(&self, cycles: u64) -> Outcome {
-        let stats = self.units.iter().map(|unit| unit.stats);
-        Outcome {
-            memory: self.shared.l2.result(),
-            ..Outcome::timed(self.shared.counts.clone(), stats, cycles)
-        }
+    fn stats(&self) -> Vec<PipelineStats> {
+        self.units.iter().map(|unit| unit.stats).collect()
     }
 }

@@ -3,81 +3,47 @@
 
 use super::super::Shared;
 use super::thread::{FETCHES_UNTIL_KEPT, Thread};
-use crate::config::RunConfig;
-use crate::engine::counts::{CacheCounts, CellMisses};
-use crate::memory::{Answer, Caches, Delay, DelayedFill, MissPath, NOT_IN_FLIGHT, SecondLevel};
-use crate::result::{FirstLookups, MemoryResult};
+use crate::engine::counts::CellMisses;
+use crate::memory::{Answer, DelayedFill, NOT_IN_FLIGHT};
+use crate::result::FirstLookups;
 
 /// Outcome of a footprint's look-up in the core's L1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
     /// All lines are resident.
     All,
-    /// Some lines are missing; [`Memory::request`] requests them.
+    /// Some lines are missing; [`FirstMissMemory::request`] requests them.
     NotAll,
 }
 
-/// L1 caches above a shared L2.
-pub struct Memory<D> {
-    shared: Shared<D>,
+/// What a look-up found, and both ways of counting.
+pub struct FirstMissMemory {
     /// Per core, the missing lines of the last footprint looked up: index and arrival.
     missing: Vec<Vec<(usize, u64)>>,
-    first: FirstLookups,
-    /// Look-ups served by data that the thread kept, not by the cache.
-    pub forwarded: u64,
+    /// First look-ups, and look-ups served by data that the thread kept, not by the cache.
+    pub first: FirstLookups,
 }
 
-impl<D: DelayedFill> Memory<D> {
-    /// Empty caches.
-    pub fn new<C: Delay<Delayed = D>>(
-        caches: Caches<C>,
-        config: &RunConfig,
-        counts: CacheCounts,
-        path: MissPath,
-    ) -> Self {
+impl FirstMissMemory {
+    pub fn new(cores: usize) -> Self {
         Self {
-            missing: vec![Vec::with_capacity(4); caches.l1.len()],
-            shared: Shared::new(caches, config, counts, path, 0),
+            missing: vec![Vec::with_capacity(4); cores],
             first: FirstLookups::default(),
-            forwarded: 0,
         }
-    }
-
-    /// Counts beside and below the L2.
-    pub fn result(&self) -> MemoryResult {
-        self.shared.l2.result()
-    }
-
-    /// Primary misses.
-    pub fn counts(&self) -> &CacheCounts {
-        &self.shared.counts
-    }
-
-    /// First look-ups, with rates of this number of footprints.
-    pub fn first_lookups(&self, footprints: u64) -> FirstLookups {
-        FirstLookups {
-            forwarded: self.forwarded,
-            ..self.first
-        }
-        .over(footprints)
-    }
-
-    /// The caches.
-    pub fn shared(&mut self) -> &mut Shared<D> {
-        &mut self.shared
-    }
-
-    /// The L2 and everything beside and below it.
-    pub fn l2(&mut self) -> &mut SecondLevel<D> {
-        &mut self.shared.l2
     }
 
     /// Looks up all lines of a footprint in the core's L1. A second look-up in the same cycle changes nothing.
     #[inline(always)]
-    pub fn look_up(&mut self, core: usize, now: u64, lines: &[u32]) -> Seen {
+    pub fn look_up<D: DelayedFill>(
+        &mut self,
+        shared: &mut Shared<D>,
+        core: usize,
+        now: u64,
+        lines: &[u32],
+    ) -> Seen {
         let missing = &mut self.missing[core];
         missing.clear();
-        self.shared.l1[core].look_up_all(lines, now, |index, _, arrival| {
+        shared.l1[core].look_up_all(lines, now, |index, _, arrival| {
             missing.push((index, arrival))
         });
         if missing.is_empty() {
@@ -88,7 +54,13 @@ impl<D: DelayedFill> Memory<D> {
     }
 
     /// Requests the missing lines of the last footprint looked up, except those in flight.
-    pub fn request(&mut self, core: usize, now: u64, thread: &mut Thread) {
+    pub fn request<D: DelayedFill>(
+        &mut self,
+        shared: &mut Shared<D>,
+        core: usize,
+        now: u64,
+        thread: &mut Thread,
+    ) {
         let Some(footprint) = thread.footprint() else {
             return;
         };
@@ -105,7 +77,7 @@ impl<D: DelayedFill> Memory<D> {
             l2: second,
             l2_cycles,
             counts,
-        } = &mut self.shared;
+        } = &mut *shared;
         let CellMisses { l1, l2 } = &mut counts.cells[cell];
         let (mut fetched, mut from_memory, mut latest) = (0_u32, 0_u32, now);
         for &(index, arrival) in &self.missing[core] {
@@ -160,6 +132,6 @@ impl<D: DelayedFill> Memory<D> {
             }
         }
         thread.state = state;
-        self.shared.follow_evictions(now);
+        shared.follow_evictions(now);
     }
 }

@@ -9,18 +9,17 @@ mod thread;
 
 use super::{Items, Shared, ThreadModel, start_item};
 use crate::config::{RunConfig, TmuConfig};
-use crate::engine::counts::CacheCounts;
 use crate::engine::outcome::Outcome;
-use crate::memory::{Caches, Delay, DelayedFill, MissPath};
+use crate::memory::DelayedFill;
 use crate::stream::{Cores, StreamError};
 use crate::tmu::PipelineStats;
-use memory::{Memory, Seen};
+use memory::{FirstMissMemory, Seen};
 use std::collections::VecDeque;
 pub(super) use thread::Thread;
 
-/// Cores whose threads stop at their first miss, over caches with delayed fill.
-pub struct FirstMiss<D> {
-    memory: Memory<D>,
+/// Cores whose threads stop at their first miss.
+pub struct FirstMiss {
+    memory: FirstMissMemory,
     units: Vec<Unit>,
     tmu: TmuConfig,
 }
@@ -71,32 +70,27 @@ impl Unit {
     }
 }
 
-impl<D: DelayedFill> FirstMiss<D> {
-    /// Empty caches, and one texture unit per L1.
-    pub fn new<C: Delay<Delayed = D>>(
-        caches: Caches<C>,
-        config: &RunConfig,
-        counts: CacheCounts,
-        path: MissPath,
-    ) -> Self {
+impl FirstMiss {
+    /// One texture unit per core.
+    pub fn new(config: &RunConfig, cores: usize) -> Self {
         Self {
-            units: caches.l1.iter().map(|_| Unit::default()).collect(),
-            memory: Memory::new(caches, config, counts, path),
+            units: (0..cores).map(|_| Unit::default()).collect(),
+            memory: FirstMissMemory::new(cores),
             tmu: config.tmu,
         }
     }
 
     /// Runs the current thread until it misses or finishes. Returns false if it must access the L2 later than `until`.
-    fn pass(&mut self, core: usize, until: u64) -> bool {
+    fn pass<D: DelayedFill>(&mut self, shared: &mut Shared<D>, core: usize, until: u64) -> bool {
         let unit = &mut self.units[core];
         let Some((began, mut thread)) = unit.running.take() else {
             return true;
         };
         while let Some(footprint) = thread.footprint() {
             let now = unit.clock;
-            let seen = self.memory.look_up(core, now, footprint.lines);
+            let seen = self.memory.look_up(shared, core, now, footprint.lines);
             if seen == Seen::All || thread.has_kept(now) {
-                self.memory.forwarded += u64::from(seen != Seen::All);
+                self.memory.first.forwarded += u64::from(seen != Seen::All);
                 unit.stats.useful += 1;
                 unit.clock += 1;
                 thread.advance();
@@ -104,7 +98,7 @@ impl<D: DelayedFill> FirstMiss<D> {
                 unit.running = Some((began, thread));
                 return false;
             } else {
-                self.memory.request(core, now, &mut thread);
+                self.memory.request(shared, core, now, &mut thread);
                 unit.stats.wasted += 1;
                 unit.clock += 1;
                 let back = began + u64::from(self.tmu.loop_cycles);
@@ -117,13 +111,7 @@ impl<D: DelayedFill> FirstMiss<D> {
     }
 }
 
-impl<D: DelayedFill> ThreadModel for FirstMiss<D> {
-    type L1 = D;
-
-    fn shared(&mut self) -> &mut Shared<D> {
-        self.memory.shared()
-    }
-
+impl ThreadModel for FirstMiss {
     fn start_phase(&mut self, cycle: u64) {
         for unit in &mut self.units {
             (unit.drained, unit.clock) = (false, cycle);
@@ -134,8 +122,9 @@ impl<D: DelayedFill> ThreadModel for FirstMiss<D> {
         self.units.iter().map(|unit| unit.clock).collect()
     }
 
-    fn run_core(
+    fn run_core<D: DelayedFill>(
         &mut self,
+        shared: &mut Shared<D>,
         core: usize,
         until: u64,
         work: &mut Cores<'_>,
@@ -146,7 +135,7 @@ impl<D: DelayedFill> ThreadModel for FirstMiss<D> {
             match unit.next(self.tmu.threads) {
                 Next::Done => return Ok(u64::MAX),
                 Next::Run => {
-                    if !self.pass(core, until) {
+                    if !self.pass(shared, core, until) {
                         return Ok(self.units[core].clock);
                     }
                 }
@@ -162,7 +151,7 @@ impl<D: DelayedFill> ThreadModel for FirstMiss<D> {
                         return Ok(unit.clock);
                     } else if let Some(item) = items.next(core) {
                         let now = unit.clock;
-                        start_item(self.memory.l2(), work, items, core, item, now)?;
+                        start_item(&mut shared.l2, work, items, core, item, now)?;
                     } else {
                         unit.drained = true;
                     }
@@ -175,13 +164,12 @@ impl<D: DelayedFill> ThreadModel for FirstMiss<D> {
         self.units.iter().map(|unit| unit.clock).max().unwrap_or(0)
     }
 
-    fn outcome(&self, cycles: u64) -> Outcome {
-        let stats = self.units.iter().map(|unit| unit.stats);
+    fn stats(&self) -> Vec<PipelineStats> {
+        self.units.iter().map(|unit| unit.stats).collect()
+    }
+
+    fn complete<D: DelayedFill>(&self, _shared: &Shared<D>, outcome: &mut Outcome) {
         let useful = self.units.iter().map(|unit| unit.stats.useful).sum();
-        Outcome {
-            memory: self.memory.result(),
-            first_lookups: Some(self.memory.first_lookups(useful)),
-            ..Outcome::timed(self.memory.counts().clone(), stats, cycles)
-        }
+        outcome.first_lookups = Some(self.memory.first.over(useful));
     }
 }

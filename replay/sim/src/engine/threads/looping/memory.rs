@@ -9,9 +9,7 @@
 use super::super::Shared;
 use super::requests::{Absent, Requests, Trips};
 use crate::config::{RunConfig, TmuConfig};
-use crate::engine::counts::CacheCounts;
-use crate::memory::{Caches, Delay, DelayedFill, MissPath, NOT_IN_FLIGHT, SecondLevel};
-use crate::result::MemoryResult;
+use crate::memory::{DelayedFill, NOT_IN_FLIGHT};
 use crate::stream::{QuadLines, Use};
 use crate::tmu::{Pending, Waiting};
 use std::ops::Range;
@@ -38,9 +36,8 @@ pub enum Found {
     NotAll,
 }
 
-/// L1 caches above a shared L2.
-pub struct Memory<D> {
-    shared: Shared<D>,
+/// The threads' look-ups and requests.
+pub struct LoopingMemory {
     /// One per core.
     threads: Vec<LookedUp>,
     tmu: TmuConfig,
@@ -51,20 +48,10 @@ pub struct Memory<D> {
     by_first_use: [Absent; Use::FIRST_LINES],
 }
 
-impl<D: DelayedFill> Memory<D> {
-    /// Empty caches.
-    pub fn new<C: Delay<Delayed = D>>(
-        caches: Caches<C>,
-        config: &RunConfig,
-        counts: CacheCounts,
-        path: MissPath,
-    ) -> Self {
-        // Threads with many missing lines request the last ones on later trips.
-        let later_trips_cycles = 8 * u64::from(config.tmu.loop_cycles);
-        let threads = caches.l1.iter().map(|_| LookedUp::default());
+impl LoopingMemory {
+    pub fn new(config: &RunConfig, cores: usize) -> Self {
         Self {
-            threads: threads.collect(),
-            shared: Shared::new(caches, config, counts, path, later_trips_cycles),
+            threads: (0..cores).map(|_| LookedUp::default()).collect(),
             tmu: config.tmu,
             memory_cycles: config.memory_cycles.into(),
             misses_change_caches_at_once: config.misses_change_caches_at_once(),
@@ -72,35 +59,16 @@ impl<D: DelayedFill> Memory<D> {
         }
     }
 
-    /// Misses so far.
-    pub fn counts(&self) -> &CacheCounts {
-        &self.shared.counts
-    }
-
-    /// Counts beside and below the L2.
-    pub fn result(&self) -> MemoryResult {
-        self.shared.l2.result()
-    }
-
-    /// Fetches of the L2 per interval of time, if recorded.
-    pub fn fetched_lines(&self) -> &[u32] {
-        self.shared.l2.fetched_lines()
-    }
-
-    /// The caches.
-    pub fn shared(&mut self) -> &mut Shared<D> {
-        &mut self.shared
-    }
-
-    /// The L2 and everything beside and below it.
-    pub fn l2(&mut self) -> &mut SecondLevel<D> {
-        &mut self.shared.l2
-    }
-
     /// Looks up all lines of a thread that enters at `now` in the core's L1. If lines are neither resident
     /// nor in flight, the caller must call [`Self::request`].
     #[inline(always)]
-    pub fn look_up(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> Found {
+    pub fn look_up<D: DelayedFill>(
+        &mut self,
+        shared: &mut Shared<D>,
+        core: usize,
+        now: u64,
+        quad: &QuadLines<'_>,
+    ) -> Found {
         let LookedUp {
             waiting,
             absent,
@@ -112,7 +80,7 @@ impl<D: DelayedFill> Memory<D> {
             // Distinct lines are not listed; `request` looks footprints up one by one.
             return Found::NotAll;
         }
-        let (cache, counts) = (&mut self.shared.l1[core], &mut self.shared.counts);
+        let (cache, counts) = (&mut shared.l1[core], &mut shared.counts);
         let mut look_up = |lines: Range<usize>, segment: u32| {
             let uses = &quad.uses[lines.clone()];
             cache.look_up_all(&quad.distinct[lines], now, |index, line, arrival| {
@@ -152,14 +120,20 @@ impl<D: DelayedFill> Memory<D> {
 
     /// Requests the absent lines when the core has access to the L2. Returns the arrivals that the footprints wait for.
     #[inline(never)]
-    pub fn request(&mut self, core: usize, now: u64, quad: &QuadLines<'_>) -> &mut Waiting {
+    pub fn request<D: DelayedFill>(
+        &mut self,
+        shared: &mut Shared<D>,
+        core: usize,
+        now: u64,
+        quad: &QuadLines<'_>,
+    ) -> &mut Waiting {
         let first = &mut self.threads[core];
         let Shared {
             l1,
             l2,
             l2_cycles,
             counts,
-        } = &mut self.shared;
+        } = &mut *shared;
         let mut requests = Requests {
             core,
             l1: &mut l1[core],
@@ -190,7 +164,7 @@ impl<D: DelayedFill> Memory<D> {
             }
             first.waiting.sort_by_segment();
         }
-        self.shared.follow_evictions(now);
+        shared.follow_evictions(now);
         &mut self.threads[core].waiting
     }
 }

@@ -7,17 +7,16 @@ mod timeline;
 
 use super::{Items, Shared, ThreadModel, start_item};
 use crate::config::RunConfig;
-use crate::engine::counts::CacheCounts;
 use crate::engine::outcome::Outcome;
-use crate::memory::{Caches, Delay, DelayedFill, MissPath};
+use crate::memory::DelayedFill;
 use crate::stream::{Cores, StreamError};
-use crate::tmu::{Pipeline, Turn};
-use memory::{Found, Memory};
+use crate::tmu::{Pipeline, PipelineStats, Turn};
+use memory::{Found, LoopingMemory};
 use timeline::Recorder;
 
-/// Texture units and their shared caches.
-pub struct Looping<D> {
-    memory: Memory<D>,
+/// The texture units of all cores.
+pub struct Looping {
+    memory: LoopingMemory,
     units: Vec<Pipeline>,
     /// Per core, whether its thread has been looked up and has requests for the L2.
     is_requesting: Vec<bool>,
@@ -25,17 +24,11 @@ pub struct Looping<D> {
     recorder: Option<Recorder>,
 }
 
-impl<D: DelayedFill> Looping<D> {
-    /// Empty caches, and one texture unit per L1.
-    pub fn new<C: Delay<Delayed = D>>(
-        caches: Caches<C>,
-        config: &RunConfig,
-        counts: CacheCounts,
-        path: MissPath,
-    ) -> Self {
-        let cores = caches.l1.len();
+impl Looping {
+    /// One texture unit per core.
+    pub fn new(config: &RunConfig, cores: usize) -> Self {
         Self {
-            memory: Memory::new(caches, config, counts, path),
+            memory: LoopingMemory::new(config, cores),
             units: vec![Pipeline::new(config.tmu); cores],
             is_requesting: vec![false; cores],
             recorder: config.timeline.then(|| Recorder::new(cores)),
@@ -43,13 +36,7 @@ impl<D: DelayedFill> Looping<D> {
     }
 }
 
-impl<D: DelayedFill> ThreadModel for Looping<D> {
-    type L1 = D;
-
-    fn shared(&mut self) -> &mut Shared<D> {
-        self.memory.shared()
-    }
-
+impl ThreadModel for Looping {
     fn start_phase(&mut self, cycle: u64) {
         self.units.iter_mut().for_each(|unit| unit.resume(cycle));
     }
@@ -58,8 +45,9 @@ impl<D: DelayedFill> ThreadModel for Looping<D> {
         self.units.iter().map(Pipeline::clock).collect()
     }
 
-    fn run_core(
+    fn run_core<D: DelayedFill>(
         &mut self,
+        shared: &mut Shared<D>,
         core: usize,
         until: u64,
         work: &mut Cores<'_>,
@@ -69,7 +57,7 @@ impl<D: DelayedFill> ThreadModel for Looping<D> {
         if std::mem::take(&mut self.is_requesting[core])
             && let Some(quad) = work.quad(core)
         {
-            let waiting = self.memory.request(core, unit.clock(), &quad);
+            let waiting = self.memory.request(shared, core, unit.clock(), &quad);
             unit.start(quad.footprints, waiting);
         }
         loop {
@@ -82,7 +70,7 @@ impl<D: DelayedFill> ThreadModel for Looping<D> {
                         if quad.footprints == 0 {
                             continue;
                         }
-                        match self.memory.look_up(core, now, &quad) {
+                        match self.memory.look_up(shared, core, now, &quad) {
                             Found::All | Found::InFlight => {
                                 unit.start(quad.footprints, self.memory.waiting(core));
                             }
@@ -91,7 +79,7 @@ impl<D: DelayedFill> ThreadModel for Looping<D> {
                                 return Ok(now);
                             }
                             Found::NotAll => {
-                                let waiting = self.memory.request(core, now, &quad);
+                                let waiting = self.memory.request(shared, core, now, &quad);
                                 unit.start(quad.footprints, waiting);
                             }
                         }
@@ -101,7 +89,7 @@ impl<D: DelayedFill> ThreadModel for Looping<D> {
                         if let Some(recorder) = &mut self.recorder {
                             recorder.start(core, now, unit.stats(), item);
                         }
-                        start_item(self.memory.l2(), work, items, core, item, now)?;
+                        start_item(&mut shared.l2, work, items, core, item, now)?;
                     } else {
                         unit.drain();
                     }
@@ -119,13 +107,12 @@ impl<D: DelayedFill> ThreadModel for Looping<D> {
         self.units.iter().map(Pipeline::clock).max().unwrap_or(0)
     }
 
-    fn outcome(&self, cycles: u64) -> Outcome {
-        let stats = self.units.iter().map(Pipeline::stats);
-        Outcome {
-            memory: self.memory.result(),
-            timeline: (self.recorder.as_ref())
-                .map(|recorder| recorder.timeline(self.memory.fetched_lines())),
-            ..Outcome::timed(self.memory.counts().clone(), stats, cycles)
-        }
+    fn stats(&self) -> Vec<PipelineStats> {
+        self.units.iter().map(Pipeline::stats).collect()
+    }
+
+    fn complete<D: DelayedFill>(&self, shared: &Shared<D>, outcome: &mut Outcome) {
+        let recorder = self.recorder.as_ref();
+        outcome.timeline = recorder.map(|of| of.timeline(shared.l2.fetched_lines()));
     }
 }
