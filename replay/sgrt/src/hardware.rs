@@ -8,7 +8,7 @@ use super::energy_bounds::relative_bounds;
 use super::frame::{Frame, FrameError, RaySource};
 use super::run::Run;
 use super::work::{BatchWork, RayClass};
-use formats::raytrace::{BvhSummary, RayRecord, RayTile, Visit};
+use formats::raytrace::{BvhSummary, RayTile, Visit};
 use formats::view::Eye;
 use rayon::prelude::*;
 
@@ -56,6 +56,29 @@ pub struct TileWork {
     pub right_full: BatchWork,
     /// Right eye with reprojection.
     pub right: BatchWork,
+}
+
+/// What remains to be done with reuse: the work of each tile, and the rays that are traced.
+pub(super) struct RemainingWork {
+    /// By tile.
+    pub(super) tiles: Vec<TileWork>,
+    /// By right sample and [`RayClass`].
+    traced: Vec<[bool; 3]>,
+}
+
+impl RemainingWork {
+    pub(super) fn new(frame: &Frame, decisions: &[Decision], reuse: Reuse) -> Self {
+        let traced = |decision: &Decision| RayClass::ALL.map(|of| is_traced(decision, of, reuse));
+        Self {
+            tiles: tile_work(frame, decisions, reuse),
+            traced: decisions.par_iter().map(traced).collect(),
+        }
+    }
+
+    /// True if rays of a class are traced for a right sample.
+    pub(super) fn traces(&self, sample: usize, class: RayClass) -> bool {
+        self.traced[sample][class as usize]
+    }
 }
 
 /// The work of each tile, for given decisions and reuse, by tile number.
@@ -156,37 +179,6 @@ pub(super) fn misses_by_rates(
     work.par_iter().map(tile).collect()
 }
 
-/// Misses of one eye, completely traced on its own, by tile number.
-///
-/// # Errors
-/// [`FrameError`] for an unreadable tile.
-pub(super) fn misses_of_eye(
-    source: &dyn RaySource,
-    frame: &Frame,
-    eye: Eye,
-    config: &SgrtConfig,
-) -> Result<Vec<Misses>, FrameError> {
-    let bvh = &frame.tables.bvh;
-    check_lines(bvh, config)?;
-    let mut caches = DeviceCaches::new(config);
-    let mut data = RayTile::default();
-    let mut out = vec![Misses::default(); frame.tables.tile_count() as usize];
-    for (tile, misses) in (0u32..).zip(&mut out) {
-        source
-            .tile(eye, tile, &mut data)
-            .map_err(|source| FrameError::Tile { eye, tile, source })?;
-        let mut visits = data.visits.iter();
-        for (turn, pixel) in data.pixels.iter().enumerate() {
-            let rays = data.rays_of(pixel).iter();
-            let count: u64 = rays.map(RayRecord::visit_count).sum();
-            for &visit in visits.by_ref().take(count as usize) {
-                caches.visit(turn, visit, bvh, misses);
-            }
-        }
-    }
-    Ok(out)
-}
-
 /// Checks that the lines of a hierarchy can be numbered.
 pub(super) fn check_lines(bvh: &BvhSummary, config: &SgrtConfig) -> Result<(), FrameError> {
     let last = bvh.triangles.checked_sub(1);
@@ -199,7 +191,7 @@ pub(super) fn check_lines(bvh: &BvhSummary, config: &SgrtConfig) -> Result<(), F
 }
 
 /// Whether rays of a class are traced for a sample of an eye.
-pub(super) type Kept<'a> = dyn Fn(Eye, usize, RayClass) -> bool + 'a;
+pub(super) type Kept<'a> = dyn Fn(Eye, usize, RayClass) -> bool + Sync + 'a;
 
 /// Misses of the triangles of re-tests, by hit rate, because their addresses are not in the trace.
 pub(super) fn misses_of_retests(work: &BatchWork, bvh: &BvhSummary, config: &SgrtConfig) -> Misses {
@@ -210,81 +202,116 @@ pub(super) fn misses_of_retests(work: &BatchWork, bvh: &BvhSummary, config: &Sgr
     cache::by_rates(&retests, bvh, config)
 }
 
-/// Misses of the addresses in the trace for each choice of rays, by eye and tile: tiles in order, left before
-/// right, pixels assigned to the units round robin.
+/// Tiles that are decoded at a time.
+const DECODED_TILES: usize = 32;
+
+/// Misses of the addresses in the trace, by eye and tile, for each choice of rays and the caches that they visit. The
+/// trace is read once: tiles in order, left before right, pixels assigned to the units round robin.
 ///
 /// # Errors
 /// [`FrameError`] for an unreadable tile.
-pub(super) fn misses_of<const N: usize>(
+pub(super) fn misses_of(
     source: &dyn RaySource,
     frame: &Frame,
-    choices: [&Kept<'_>; N],
-    config: &SgrtConfig,
-) -> Result<[[Vec<Misses>; 2]; N], FrameError> {
+    choices: &[(&Kept<'_>, &SgrtConfig)],
+) -> Result<Vec<[Vec<Misses>; 2]>, FrameError> {
     let bvh = &frame.tables.bvh;
-    check_lines(bvh, config)?;
-    let tiles = frame.tables.tile_count();
-    let mut caches = choices.map(|_| DeviceCaches::new(config));
-    let none = vec![Misses::default(); tiles as usize];
-    let mut out = choices.map(|_| [none.clone(), none.clone()]);
-    let mut tile_data = RayTile::default();
-    for tile in 0..tiles {
-        for eye in [Eye::Left, Eye::Right] {
-            source
-                .tile(eye, tile, &mut tile_data)
-                .map_err(|source| FrameError::Tile { eye, tile, source })?;
-            let mut at = 0usize;
-            let pixels = tile_data.pixels.iter().zip(frame.tile_samples(tile));
-            for (turn, (pixel, i)) in pixels.enumerate() {
-                for ray in tile_data.rays_of(pixel) {
-                    let end = at.saturating_add(ray.visit_count() as usize);
-                    let visits = tile_data.visits.get(at..end).unwrap_or(&[]);
-                    at = end;
-                    let class = RayClass::of(ray);
-                    for ((kept, caches), out) in choices.iter().zip(&mut caches).zip(&mut out) {
-                        if !kept(eye, i, class) {
-                            continue;
-                        }
-                        let misses = &mut out[eye as usize][tile as usize];
-                        for &visit in visits {
-                            caches.visit(turn, visit, bvh, misses);
-                        }
-                    }
+    let decode = |&(tile, eye): &(u32, Eye)| {
+        let mut data = RayTile::default();
+        let decoded = source.tile(eye, tile, &mut data);
+        decoded.map_err(|source| FrameError::Tile { eye, tile, source })?;
+        Ok(data)
+    };
+    let mut runs = Vec::new();
+    for (kept, config) in choices {
+        check_lines(bvh, config)?;
+        runs.push((kept, DeviceCaches::new(config), [Vec::new(), Vec::new()]));
+    }
+    let tiles =
+        (0..frame.tables.tile_count()).flat_map(|tile| [(tile, Eye::Left), (tile, Eye::Right)]);
+    for places in tiles.collect::<Vec<_>>().chunks(DECODED_TILES) {
+        let decoded: Vec<Result<RayTile, FrameError>> = places.par_iter().map(decode).collect();
+        let decoded = decoded.into_iter().collect::<Result<Vec<_>, _>>()?;
+        runs.par_iter_mut().for_each(|(kept, caches, misses)| {
+            for (&(tile, eye), data) in places.iter().zip(&decoded) {
+                let is_kept = |sample, class| kept(eye, sample, class);
+                let of_tile = misses_of_tile(frame, tile, data, is_kept, caches);
+                misses[eye as usize].push(of_tile);
+            }
+        });
+    }
+    Ok(runs.into_iter().map(|(.., misses)| misses).collect())
+}
+
+fn misses_of_tile(
+    frame: &Frame,
+    tile: u32,
+    data: &RayTile,
+    is_kept: impl Fn(usize, RayClass) -> bool,
+    caches: &mut DeviceCaches,
+) -> Misses {
+    let mut misses = Misses::default();
+    let mut at = 0usize;
+    let pixels = data.pixels.iter().zip(frame.tile_samples(tile));
+    for (turn, (pixel, sample)) in pixels.enumerate() {
+        for ray in data.rays_of(pixel) {
+            let end = at.saturating_add(ray.visit_count() as usize);
+            let visits = data.visits.get(at..end).unwrap_or(&[]);
+            at = end;
+            if is_kept(sample, RayClass::of(ray)) {
+                for &visit in visits {
+                    caches.visit(turn, visit, &frame.tables.bvh, &mut misses);
                 }
             }
         }
     }
-    Ok(out)
+    misses
 }
 
-/// Misses of the addresses in the trace, with both eyes completely traced and with reprojection.
+/// Misses of the addresses in the trace, with both eyes completely traced and with reprojection, by run and tile.
 ///
 /// # Errors
 /// [`FrameError`] for an unreadable tile.
 pub(super) fn misses_by_addresses(
     source: &dyn RaySource,
     frame: &Frame,
-    decisions: &[Decision],
-    reuse: Reuse,
-    work: &[TileWork],
-    config: &SgrtConfig,
-) -> Result<Vec<TileMisses>, FrameError> {
+    runs: &[(&RemainingWork, &SgrtConfig)],
+) -> Result<Vec<Vec<TileMisses>>, FrameError> {
     let all: &Kept<'_> = &|_, _, _| true;
-    let kept: &Kept<'_> =
-        &|eye, sample, class| eye == Eye::Left || is_traced(&decisions[sample], class, reuse);
-    let [reference, reprojected] = misses_of(source, frame, [all, kept], config)?;
-    let tile = |(tile, work): (usize, &TileWork)| {
-        let [left_full, right_full] = [0, 1].map(|eye| reference[eye][tile]);
-        let [left, mut right] = [0, 1].map(|eye| reprojected[eye][tile]);
-        right.add(&misses_of_retests(&work.right, &frame.tables.bvh, config));
-        TileMisses {
-            left_full,
-            right_full,
-            left,
-            right,
-        }
-    };
-    Ok(work.iter().enumerate().map(tile).collect())
+    let mut references: Vec<&SgrtConfig> = runs.iter().map(|(_, config)| *config).collect();
+    references.dedup_by(|a, b| std::ptr::eq(*a, *b));
+    let kept = runs
+        .iter()
+        .map(|(work, _)| |eye, sample, class| eye == Eye::Left || work.traces(sample, class));
+    let kept: Vec<_> = kept.collect();
+    let reprojected = kept
+        .iter()
+        .zip(runs)
+        .map(|(kept, (_, config))| (kept as &Kept<'_>, *config));
+    let choices = references.iter().map(|config| (all, *config));
+    let misses = misses_of(
+        source,
+        frame,
+        &choices.chain(reprojected).collect::<Vec<_>>(),
+    )?;
+    let (of_references, of_runs) = misses.split_at(references.len());
+    let run =
+        |((work, config), [left, right]): (&(&RemainingWork, &SgrtConfig), &[Vec<Misses>; 2])| {
+            let reference = references.iter().position(|of| std::ptr::eq(*of, *config));
+            let [left_full, right_full] = &of_references[reference.unwrap_or(0)];
+            let tile = |(tile, work): (usize, &TileWork)| {
+                let mut right = right[tile];
+                right.add(&misses_of_retests(&work.right, &frame.tables.bvh, config));
+                TileMisses {
+                    left_full: left_full[tile],
+                    right_full: right_full[tile],
+                    left: left[tile],
+                    right,
+                }
+            };
+            work.tiles.iter().enumerate().map(tile).collect()
+        };
+    Ok(runs.iter().zip(of_runs).map(run).collect())
 }
 
 #[cfg(test)]

@@ -6,7 +6,8 @@ use super::config::{RowStorage, SgrtConfig};
 use super::detect::{Decision, decide};
 use super::frame::{Frame, FrameError, RaySource};
 use super::hardware::{
-    Comparison, TileMisses, TileWork, misses_by_addresses, misses_by_rates, tile_work,
+    Comparison, RemainingWork, TileMisses, TileWork, misses_by_addresses, misses_by_rates,
+    tile_work,
 };
 use super::reads::Reads;
 use super::reproject::{Reprojection, reproject};
@@ -41,8 +42,16 @@ pub struct RuleRun {
     /// Its error map.
     pub flip: FlipMap,
     pub(super) reads: Reads,
-    pub(super) work: Vec<TileWork>,
+    pub(super) work: RemainingWork,
     pub(super) misses: Vec<TileMisses>,
+}
+
+/// The decisions of a rule, and what remains to be done.
+struct Decided {
+    decisions: Vec<Decision>,
+    work: RemainingWork,
+    reads: Reads,
+    reuse: Reuse,
 }
 
 impl<'a> LoadedTrace<'a> {
@@ -107,10 +116,13 @@ impl<'a> LoadedTrace<'a> {
         reuse: Reuse,
         config: &SgrtConfig,
     ) -> Result<RuleRun, FrameError> {
-        self.run_timed(rule, reuse, config, None)
+        let decided = self.decided(rule, reuse);
+        let misses = self.misses(&[(&decided.work, config)])?;
+        let misses = misses.into_iter().next().unwrap_or_default();
+        self.finish(decided, misses, config, None)
     }
 
-    /// Simulates the units cycle by cycle without reprojection, for [`Self::run_timed`] with the same `config`.
+    /// Simulates the units cycle by cycle without reprojection, for [`Self::run_with_plain`] with the same `config`.
     ///
     /// # Errors
     /// [`FrameError`] for a trace without visits or for a tile whose addresses cannot be read.
@@ -129,29 +141,59 @@ impl<'a> LoadedTrace<'a> {
         }
     }
 
-    /// Runs a rule and a level of reuse: with `traced` by the cycle-level model, without by the closed form.
+    /// Runs a rule, and the paper's plain reuse of every arrival: with `traced` by the cycle-level model, without by
+    /// the closed form.
     ///
     /// # Errors
     /// [`FrameError`] for a tile whose addresses cannot be read.
-    pub fn run_timed(
+    pub fn run_with_plain(
         &self,
         rule: &Rule,
         reuse: Reuse,
         config: &SgrtConfig,
         traced: Option<&TracedTiming>,
-    ) -> Result<RuleRun, FrameError> {
+    ) -> Result<[RuleRun; 2], FrameError> {
+        let [ours, plain] = [rule, &Rule::default()].map(|rule| self.decided(rule, reuse));
+        let misses = self.misses(&[(&ours.work, config), (&plain.work, config)])?;
+        let mut misses = misses.into_iter();
+        let mut finish = |decided| {
+            let misses = misses.next().unwrap_or_default();
+            self.finish(decided, misses, config, traced)
+        };
+        Ok([finish(ours)?, finish(plain)?])
+    }
+
+    fn decided(&self, rule: &Rule, reuse: Reuse) -> Decided {
         let decisions = decide(&self.frame, &self.arrived, rule);
+        Decided {
+            work: RemainingWork::new(&self.frame, &decisions, reuse),
+            decisions,
+            reads: rule.reads(),
+            reuse,
+        }
+    }
+
+    fn finish(
+        &self,
+        decided: Decided,
+        misses: Vec<TileMisses>,
+        config: &SgrtConfig,
+        traced: Option<&TracedTiming>,
+    ) -> Result<RuleRun, FrameError> {
+        let Decided {
+            decisions,
+            work,
+            reads,
+            reuse,
+        } = decided;
         let accuracy = count_errors(&self.frame, &decisions);
-        let work = tile_work(&self.frame, &decisions, reuse);
-        let misses = self.misses(&work, &decisions, reuse, config)?;
-        let reads = rule.reads();
         let (comparison, cycles) = match traced {
-            None => (self.compare(&work, &misses, reads, config), None),
+            None => (self.compare(&work.tiles, &misses, reads, config), None),
             Some(traced) => {
                 let model = self.model(reads, config);
                 let decided = (decisions.as_slice(), reuse);
                 let (comparison, cycles) =
-                    timed::compare(self.source, &model, decided, &work, &misses, traced)?;
+                    timed::compare(self.source, &model, decided, &work.tiles, &misses, traced)?;
                 (comparison, Some(cycles))
             }
         };
@@ -204,18 +246,18 @@ impl<'a> LoadedTrace<'a> {
         compare(&self.frame, work, misses, reads, &self.rows, config)
     }
 
+    /// The misses of each run by tile. Addresses are read once for all of them.
     pub(super) fn misses(
         &self,
-        work: &[TileWork],
-        decisions: &[Decision],
-        reuse: Reuse,
-        config: &SgrtConfig,
-    ) -> Result<Vec<TileMisses>, FrameError> {
+        runs: &[(&RemainingWork, &SgrtConfig)],
+    ) -> Result<Vec<Vec<TileMisses>>, FrameError> {
         if self.frame.tables.meta.has_visits {
-            misses_by_addresses(self.source, &self.frame, decisions, reuse, work, config)
-        } else {
-            Ok(misses_by_rates(work, &self.frame, config))
+            return misses_by_addresses(self.source, &self.frame, runs);
         }
+        let of_run = |(work, config): &(&RemainingWork, &_)| {
+            misses_by_rates(&work.tiles, &self.frame, config)
+        };
+        Ok(runs.iter().map(of_run).collect())
     }
 
     pub(super) fn picture(&self, decisions: &[Decision], reuse: Reuse) -> Picture {

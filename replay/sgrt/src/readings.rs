@@ -7,7 +7,7 @@ use super::config::SgrtConfig;
 use super::detect::decide;
 use super::energy_bounds::relative_bounds;
 use super::frame::FrameError;
-use super::hardware::{Comparison, tile_work};
+use super::hardware::{Comparison, RemainingWork};
 use super::loaded::LoadedTrace;
 use super::rules::Rule;
 use super::run::{EnergyPj, Run};
@@ -122,24 +122,29 @@ impl LoadedTrace<'_> {
     /// # Errors
     /// [`FrameError`] for a tile whose addresses cannot be read.
     pub fn readings(&self, config: &SgrtConfig) -> Result<Vec<(Reading, Figures)>, FrameError> {
-        let mut runs: Vec<(Rule, Reuse, RowTest, Comparison)> = Vec::new();
+        let mut decided: Vec<(Rule, Reuse, RemainingWork)> = Vec::new();
         for rule in rules() {
             let decisions = decide(&self.frame, &self.arrived, &rule);
             for reuse in Reuse::ALL {
-                let work = tile_work(&self.frame, &decisions, reuse);
-                let misses = self.misses(&work, &decisions, reuse, config)?;
-                for row_test in [RowTest::Arrivals, RowTest::WholeRow] {
-                    let config = with_row_test(config, row_test);
-                    let compared = self.compare(&work, &misses, rule.reads(), &config);
-                    runs.push((rule.clone(), reuse, row_test, compared));
-                }
+                let work = RemainingWork::new(&self.frame, &decisions, reuse);
+                decided.push((rule.clone(), reuse, work));
+            }
+        }
+        let works: Vec<_> = decided.iter().map(|(.., work)| (work, config)).collect();
+        let misses = self.misses(&works)?;
+        let mut runs: Vec<(&Rule, Reuse, RowTest, Comparison)> = Vec::new();
+        for ((rule, reuse, work), misses) in decided.iter().zip(&misses) {
+            for row_test in [RowTest::Arrivals, RowTest::WholeRow] {
+                let config = with_row_test(config, row_test);
+                let compared = self.compare(&work.tiles, misses, rule.reads(), &config);
+                runs.push((rule, *reuse, row_test, compared));
             }
         }
         let figures = |reading: Reading| {
             let of = (&reading.rule, reading.reuse, reading.row_test);
             let run = runs
                 .iter()
-                .find(|(rule, reuse, test, _)| (rule, *reuse, *test) == of);
+                .find(|(rule, reuse, test, _)| (*rule, *reuse, *test) == of);
             run.map(|(.., compared)| {
                 let figures = measure(compared, reading.scope, reading.gbuffer, config);
                 (reading, figures)

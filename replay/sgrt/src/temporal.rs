@@ -8,11 +8,12 @@
 //!
 //! The previous frame is taken as completely traced, so errors do not add up over a sequence.
 
+use super::cache::Misses;
 use super::compose::Reuse;
 use super::config::SgrtConfig;
 use super::detect::{Decision, decide};
 use super::frame::{Frame, FrameError, RaySource};
-use super::hardware::{Kept, TileWork, is_traced, misses_of, misses_of_retests, tile_work};
+use super::hardware::{Kept, RemainingWork, misses_of, misses_of_retests};
 use super::loaded::LoadedTrace;
 use super::reads::Reads;
 use super::rules::Rule;
@@ -194,7 +195,7 @@ fn check(previous: &RaytraceTables, current: &RaytraceTables) -> Result<(), Temp
 struct Pair<'a> {
     loaded: LoadedTrace<'a>,
     decisions: Vec<Decision>,
-    work: Vec<TileWork>,
+    work: RemainingWork,
     flip_mean: f64,
 }
 
@@ -202,7 +203,7 @@ impl<'a> Pair<'a> {
     fn new(source: &'a dyn RaySource, frame: Frame, rule: &Rule, reuse: Reuse) -> Self {
         let loaded = LoadedTrace::of(source, frame);
         let decisions = decide(&loaded.frame, &loaded.arrived, rule);
-        let work = tile_work(&loaded.frame, &decisions, reuse);
+        let work = RemainingWork::new(&loaded.frame, &decisions, reuse);
         let picture = loaded.picture(&decisions, reuse);
         let flip_mean = loaded.flip(&picture).mean();
         Self {
@@ -241,12 +242,16 @@ pub fn schemes(
         stereo,
         temporal,
         reads: rule.reads(),
-        reuse,
         config,
     };
-    let full = sequence.run(Scheme::Full)?;
-    let figures = |scheme| Ok(sequence.figures(scheme, &sequence.run(scheme)?, &full));
-    Scheme::ALL.into_iter().map(figures).collect()
+    let misses = sequence.misses()?;
+    let runs: Vec<Run> = Scheme::ALL
+        .into_iter()
+        .zip(&misses)
+        .map(|(scheme, misses)| sequence.run(scheme, misses))
+        .collect();
+    let figures = |(scheme, run): (Scheme, &Run)| sequence.figures(scheme, run, &runs[0]);
+    Ok(Scheme::ALL.into_iter().zip(&runs).map(figures).collect())
 }
 
 struct Sequence<'a> {
@@ -254,7 +259,6 @@ struct Sequence<'a> {
     stereo: Pair<'a>,
     temporal: [Pair<'a>; 2],
     reads: Reads,
-    reuse: Reuse,
     config: &'a SgrtConfig,
 }
 
@@ -290,24 +294,19 @@ impl Sequence<'_> {
         pair: &'s Pair<'_>,
         way: Way,
         side: Eye,
-        misses: &'s [cache::Misses],
+        misses: &'s [Misses],
     ) -> Part<'s> {
         Part {
             model: pair.loaded.model(self.reads, self.config),
             way,
             side,
-            work: &pair.work,
+            work: &pair.work.tiles,
             misses,
         }
     }
 
-    /// The cost of the current frame.
-    fn run(&self, scheme: Scheme) -> Result<Run, FrameError> {
-        let kept: &Kept<'_> = &|eye, sample, class| {
-            self.pair(scheme, eye)
-                .is_none_or(|pair| is_traced(&pair.decisions[sample], class, self.reuse))
-        };
-        let misses = self.misses(scheme, kept)?;
+    /// The cost of the current frame, from the misses of each eye's batches.
+    fn run(&self, scheme: Scheme, misses: &[Vec<Misses>; 2]) -> Run {
         let mut parts = Vec::new();
         for eye in [Eye::Left, Eye::Right] {
             let misses = &misses[eye as usize];
@@ -333,38 +332,47 @@ impl Sequence<'_> {
                 }
             }
         }
-        Ok(sum_of_parts(&parts))
+        sum_of_parts(&parts)
     }
 
-    /// Misses of each eye's batches by tile.
-    fn misses(
-        &self,
-        scheme: Scheme,
-        kept: &Kept<'_>,
-    ) -> Result<[Vec<cache::Misses>; 2], FrameError> {
+    /// Misses of each eye's batches by tile, for each scheme.
+    fn misses(&self) -> Result<Vec<[Vec<Misses>; 2]>, FrameError> {
         let frame = self.stereo.loaded.frame();
         let bvh = &frame.tables.bvh;
-        let works = [Eye::Left, Eye::Right].map(|eye| match self.pair(scheme, eye) {
-            Some(pair) => pair.work.iter().map(|work| work.right).collect(),
-            None => {
-                let full = self.stereo.work.iter().map(|work| match eye {
-                    Eye::Left => work.left,
-                    Eye::Right => work.right_full,
-                });
-                full.collect::<Vec<_>>()
-            }
-        });
+        let works =
+            Scheme::ALL.map(|scheme| [Eye::Left, Eye::Right].map(|eye| self.works(scheme, eye)));
         if !frame.tables.meta.has_visits {
             let by_rates = |work: &BatchWork| cache::by_rates(work, bvh, self.config);
-            return Ok(works.map(|works| works.iter().map(by_rates).collect()));
+            let of_eye = |works: Vec<BatchWork>| works.iter().map(by_rates).collect();
+            return Ok(works.map(|of_scheme| of_scheme.map(of_eye)).into());
         }
-        let [mut misses] = misses_of(self.current, frame, [kept], self.config)?;
-        for (misses, works) in misses.iter_mut().zip(&works) {
+        let kept = Scheme::ALL.map(|scheme| {
+            move |eye, sample, class| {
+                let pair = self.pair(scheme, eye);
+                pair.is_none_or(|pair| pair.work.traces(sample, class))
+            }
+        });
+        let choices = kept.each_ref().map(|kept| (kept as &Kept<'_>, self.config));
+        let mut misses = misses_of(self.current, frame, &choices)?;
+        let of_eyes = misses.iter_mut().flatten().zip(works.iter().flatten());
+        for (misses, works) in of_eyes {
             for (misses, work) in misses.iter_mut().zip(works) {
                 misses.add(&misses_of_retests(work, bvh, self.config));
             }
         }
         Ok(misses)
+    }
+
+    /// The work of an eye's batches.
+    fn works(&self, scheme: Scheme, eye: Eye) -> Vec<BatchWork> {
+        let Some(pair) = self.pair(scheme, eye) else {
+            let full = self.stereo.work.tiles.iter().map(|work| match eye {
+                Eye::Left => work.left,
+                Eye::Right => work.right_full,
+            });
+            return full.collect();
+        };
+        pair.work.tiles.iter().map(|work| work.right).collect()
     }
 }
 

@@ -8,7 +8,7 @@ use super::cycles::{Counts, LineCounts, Machine, Simulated, SimulationError, sim
 use super::detect::Decision;
 use super::energy;
 use super::frame::{FrameError, RaySource};
-use super::hardware::{Comparison, TileMisses, TileWork, check_lines, misses_of_eye};
+use super::hardware::{Comparison, Kept, TileMisses, TileWork, check_lines, misses_of};
 use super::ray_batches::RayBatches;
 use super::timing::{CycleTiming, FrameTiming, IdlePct};
 use super::tni::TniCycles;
@@ -50,16 +50,20 @@ impl TracedTiming {
                 run(&machine, rays)
             })
             .collect::<Result<_, _>>()?;
-        let alone = |eye: Eye, simulated: &Simulated| -> Result<FrameTiming, FrameError> {
+        let each_alone: [&Kept<'_>; 2] = [&|eye, _, _| eye == Eye::Left, &|eye, _, _| {
+            eye == Eye::Right
+        }];
+        let choices = each_alone.map(|kept| (kept, model.config));
+        let own_misses = misses_of(source, model.frame, &choices)?;
+        let alone = |eye: Eye, simulated: &Simulated| {
             let of_batches = simulated.batches.iter().map(|batch| misses(&batch.counts));
             let simulated_misses: Vec<Misses> = of_batches.collect();
-            let own_misses = misses_of_eye(source, model.frame, eye, model.config)?;
-            let (resources, own) = model.eye(eye, work, &own_misses);
+            let (resources, own) = model.eye(eye, work, &own_misses[eye as usize][eye as usize]);
             let (_, same) = model.eye(eye, work, &simulated_misses);
-            Ok(timing(&machine, simulated, &resources, [own, same]))
+            timing(&machine, simulated, &resources, [own, same])
         };
-        let left = alone(Eye::Left, &runs[1])?;
-        let right = alone(Eye::Right, &runs[2])?;
+        let left = alone(Eye::Left, &runs[1]);
+        let right = alone(Eye::Right, &runs[2]);
         Ok(Self {
             frame: runs.swap_remove(0),
             left,

@@ -5,7 +5,7 @@ use super::compose::Reuse;
 use super::config::SgrtConfig;
 use super::detect::decide;
 use super::frame::FrameError;
-use super::hardware::{Comparison, tile_work};
+use super::hardware::RemainingWork;
 use super::loaded::{LoadedTrace, RuleRun};
 use super::result::{CurvePoint, Sensitivity};
 use super::rules::Rule;
@@ -25,14 +25,13 @@ impl LoadedTrace<'_> {
         config: &SgrtConfig,
     ) -> Result<Vec<CurvePoint>, FrameError> {
         let mut points = Vec::new();
+        let mut works = Vec::new();
         for rule in rules {
             let decisions = decide(&self.frame, &self.arrived, rule);
             let accuracy = count_errors(&self.frame, &decisions);
             let mut last: Option<(Picture, FlipMap)> = None;
             for &reuse in levels {
-                let work = tile_work(&self.frame, &decisions, reuse);
-                let misses = self.misses(&work, &decisions, reuse, config)?;
-                let comparison = self.compare(&work, &misses, rule.reads(), config);
+                works.push(RemainingWork::new(&self.frame, &decisions, reuse));
                 let picture = self.picture(&decisions, reuse);
                 let (_, flip) = match last.take() {
                     Some((same, flip)) if same == picture => last.insert((same, flip)),
@@ -46,15 +45,21 @@ impl LoadedTrace<'_> {
                     reuse,
                     reuse_pct: accuracy.pct(accuracy.all_reused().pixels),
                     wrong_object_pct: accuracy.pct(accuracy.all_reused().wrong_object),
-                    tni_reduction_pct: 100.0
-                        * (1.0
-                            - comparison.reprojected.tni_cycles / comparison.reference.tni_cycles),
-                    relative_performance: comparison.relative_performance(),
-                    relative_energy: comparison.relative_energy(),
+                    tni_reduction_pct: 0.0,
+                    relative_performance: 0.0,
+                    relative_energy: 0.0,
                     flip_mean: flip.mean(),
                     flip_p99: flip.p99(),
                 });
             }
+        }
+        let misses = self.misses(&works.iter().map(|work| (work, config)).collect::<Vec<_>>())?;
+        for ((point, work), misses) in points.iter_mut().zip(&works).zip(&misses) {
+            let compared = self.compare(&work.tiles, misses, point.rule.reads(), config);
+            let left = compared.reprojected.tni_cycles / compared.reference.tni_cycles;
+            point.tni_reduction_pct = 100.0 * (1.0 - left);
+            point.relative_performance = compared.relative_performance();
+            point.relative_energy = compared.relative_energy();
         }
         Ok(points)
     }
@@ -66,35 +71,41 @@ impl LoadedTrace<'_> {
     pub fn sensitivity(
         &self,
         run: &RuleRun,
-        reuse: Reuse,
         config: &SgrtConfig,
     ) -> Result<Vec<Sensitivity>, FrameError> {
-        let mut out = Vec::new();
-        for (parameter, value) in config.numbers() {
-            // The closed form does not read these.
-            if parameter.starts_with("cycles.") {
-                continue;
-            }
-            let mut ratios = [Comparison::default(); 2];
-            for (ratio, factor) in ratios.iter_mut().zip([0.5, 2.0]) {
-                let Some(scaled) = config.scaled(&parameter, factor) else {
-                    continue;
-                };
-                let changes_misses = parameter.starts_with("cache.") || parameter == "tni.units";
-                let again = changes_misses
-                    .then(|| self.misses(&run.work, &run.decisions, reuse, &scaled))
-                    .transpose()?;
+        let mut parameters = config.numbers();
+        // The closed form does not read these.
+        parameters.retain(|(name, _)| !name.starts_with("cycles."));
+        let changes_misses = |name: &str| name.starts_with("cache.") || name == "tni.units";
+        let scaled = |(name, value): (String, f64)| {
+            let of = |factor| {
+                config
+                    .scaled(&name, factor)
+                    .unwrap_or_else(|| config.clone())
+            };
+            ([of(0.5), of(2.0)], name, value)
+        };
+        let scaled: Vec<([SgrtConfig; 2], String, f64)> =
+            parameters.into_iter().map(scaled).collect();
+        let changed = scaled.iter().filter(|(_, name, _)| changes_misses(name));
+        let changed = changed.flat_map(|(configs, ..)| configs);
+        let runs: Vec<_> = changed.map(|config| (&run.work, config)).collect();
+        let mut again = self.misses(&runs)?.into_iter();
+        let of_parameter = |(configs, parameter, value): ([SgrtConfig; 2], String, f64)| {
+            let changes = changes_misses(&parameter);
+            let ratios = configs.map(|config| {
+                let again = changes.then(|| again.next()).flatten();
                 let misses = again.as_ref().unwrap_or(&run.misses);
-                *ratio = self.compare(&run.work, misses, run.reads, &scaled);
-            }
-            out.push(Sensitivity {
+                self.compare(&run.work.tiles, misses, run.reads, &config)
+            });
+            Sensitivity {
                 parameter,
                 value,
                 relative_performance: ratios.map(|c| c.relative_performance()),
                 relative_energy: ratios.map(|c| c.relative_energy()),
-            });
-        }
-        Ok(out)
+            }
+        };
+        Ok(scaled.iter().cloned().map(of_parameter).collect())
     }
 }
 
@@ -162,9 +173,7 @@ mod tests {
         let run = loaded
             .run(&Rule::default(), Reuse::Primary, &config)
             .expect("runs");
-        let all = loaded
-            .sensitivity(&run, Reuse::Primary, &config)
-            .expect("runs");
+        let all = loaded.sensitivity(&run, &config).expect("runs");
         let numbers = config.numbers();
         let read = numbers
             .iter()

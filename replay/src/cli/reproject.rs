@@ -15,7 +15,6 @@ use sgrt::config::{DEFAULT_TOML, SgrtConfig};
 use sgrt::loaded::{LoadedTrace, RuleRun};
 use sgrt::picture;
 use sgrt::result::{Config, Report, SCHEMA};
-use sgrt::rules::Rule;
 use sgrt::timing::Timing;
 use sgrt::variations::curve_rules;
 use shell::{Output, Progress};
@@ -201,11 +200,8 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
         Timing::ClosedForm => None,
         Timing::Cycle => Some(loaded.traced_timing(config).with_context(in_file)?),
     };
-    let run = |rule: &Rule| {
-        let run = loaded.run_timed(rule, reuse, config, traced.as_ref());
-        run.with_context(in_file)
-    };
-    let (ours, plain) = (run(&rule)?, run(&Rule::default())?);
+    let runs = loaded.run_with_plain(&rule, reuse, config, traced.as_ref());
+    let [ours, plain] = runs.with_context(in_file)?;
     if let Some(image) = &args.image {
         write_atomically(image, &png::encode(&triptych(&ours))?)?;
     }
@@ -235,9 +231,7 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
             Vec::new()
         },
         sensitivity: if args.sensitivity {
-            loaded
-                .sensitivity(&ours, reuse, config)
-                .with_context(in_file)?
+            loaded.sensitivity(&ours, config).with_context(in_file)?
         } else {
             Vec::new()
         },

@@ -46,9 +46,7 @@ fn entry_of(view: View) -> Entry {
             curve: loaded
                 .curve(&curve_rules()[..3], &Reuse::ALL, &model)
                 .expect("runs"),
-            sensitivity: loaded
-                .sensitivity(&ours, Reuse::Primary, &model)
-                .expect("runs"),
+            sensitivity: loaded.sensitivity(&ours, &model).expect("runs"),
             config: Config {
                 rule,
                 reuse: Reuse::Primary,
