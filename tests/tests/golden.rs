@@ -1,13 +1,13 @@
 //! Golden traces: compares the output of `replay` for each of them with the committed JSON, byte for byte.
 //! `UPDATE_GOLDEN=1` rewrites the JSON; review the diff.
 //!
-//! `traces/golden.digests` has the model version and a digest of the counts of every golden result. If
+//! `traces/golden.digests` and `traces/golden-rays.digests` have the model version and a digest of the counts of every golden result. If
 //! counts of an unchanged trace change, the model version must change, too: otherwise `UPDATE_GOLDEN` does
 //! not rewrite the digest.
 
 use formats::container::{ChunkTag, Container};
 use parallax_tests::{has_lavapipe, program, root, run_ok};
-use replay::model_version::MODEL_VERSION;
+use replay::model_version::{MODEL_VERSION, RAY_MODEL_VERSION};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -231,29 +231,41 @@ fn without_errors(json: &[u8]) -> Vec<u8> {
     }
 }
 
-#[test]
-fn every_golden_trace_replays_to_its_golden_result() {
-    let mut digests = Digests::new(MODEL_VERSION);
-    replay_all("textrace", 4, "run", TEXTRACE_RUNS, &mut digests);
-    replay_all("raytrace", 2, "reproject", RAYTRACE_RUNS, &mut digests);
-    let path = root().join("traces/golden.digests");
+/// Compares digests with those of a file, which may change only with the model version.
+fn check_digests(digests: &Digests, file: &str, history: &str) {
+    let path = root().join("traces").join(file);
+    let version = digests.model_version;
     if let Ok(text) = fs::read_to_string(&path) {
         let before = Digests::parse(&text);
         assert!(
-            before.model_version <= MODEL_VERSION,
-            "{}: expected a model version up to {MODEL_VERSION}, found {}",
+            before.model_version <= version,
+            "{}: expected a model version up to {version}, found {}",
             path.display(),
             before.model_version
         );
         let changed = digests.changed_since(&before);
         assert!(
             changed.is_empty(),
-            "counts changed under model version {MODEL_VERSION}: {}; add a line to HISTORY in \
+            "counts changed under model version {version}: {}; add a line to {history} in \
              replay/sim/src/model_version.rs, then UPDATE_GOLDEN=1",
             changed.join(", ")
         );
     }
     compare(&path, digests.text().as_bytes());
+}
+
+#[test]
+fn every_golden_trace_replays_to_its_golden_result() {
+    let mut digests = Digests::new(MODEL_VERSION);
+    replay_all("textrace", 4, "run", TEXTRACE_RUNS, &mut digests);
+    check_digests(&digests, "golden.digests", "TEXTURE_HISTORY");
+}
+
+#[test]
+fn every_golden_ray_trace_replays_to_its_golden_result() {
+    let mut digests = Digests::new(RAY_MODEL_VERSION);
+    replay_all("raytrace", 2, "reproject", RAYTRACE_RUNS, &mut digests);
+    check_digests(&digests, "golden-rays.digests", "RAY_HISTORY");
 }
 
 /// All orders of `replay orders`, functional and, without what is slow, timed.

@@ -9,7 +9,7 @@ use maud::{Markup, html};
 use serde::{Serialize, Serializer};
 use sgrt::config::SgrtConfig;
 use sgrt::readings::{Figures, GbufferPlace, Reading, RowTest, Scope, rms_log};
-use sim::model_version::MODEL_VERSION;
+use sim::model_version::RAY_MODEL_VERSION;
 use sim::paper::sgrt::PaperValues;
 use sim::result::{TOOL, TraceId};
 
@@ -164,7 +164,7 @@ impl ReadingsReport {
         Self {
             schema: SCHEMA,
             tool: TOOL,
-            model_version: MODEL_VERSION,
+            model_version: RAY_MODEL_VERSION,
             config,
             chosen,
             fits,

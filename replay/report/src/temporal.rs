@@ -6,7 +6,7 @@ use serde::Serialize;
 use sgrt::compose::Reuse;
 use sgrt::config::SgrtConfig;
 use sgrt::temporal::SchemeFigures;
-use sim::model_version::MODEL_VERSION;
+use sim::model_version::RAY_MODEL_VERSION;
 use sim::result::{TOOL, TraceId};
 
 /// Schema of the object that `replay temporal --json` prints.
@@ -43,7 +43,7 @@ impl TemporalReport {
         Self {
             schema: SCHEMA,
             tool: TOOL,
-            model_version: MODEL_VERSION,
+            model_version: RAY_MODEL_VERSION,
             rule,
             reuse,
             config,

@@ -1,10 +1,7 @@
-//! The version of the models: which counts a replay of a given trace and configuration yields.
+//! The versions of the models: which counts a replay of a given trace and configuration yields.
 
-/// What changed with each version, version 1 first. A change that alters any count adds a line.
-///
-/// Results of different model versions cannot be compared, so a sweep never takes a stored point of
-/// another version. `tests/tests/golden.rs` refuses changed golden counts under an unchanged version.
-pub const HISTORY: &[&str] = &[
+/// What changed with each version that both models share, version 1 first.
+const HISTORY: &[&str] = &[
     // 1
     "The first numbered version.",
     // 2
@@ -19,5 +16,17 @@ pub const HISTORY: &[&str] = &[
     "Ray tracing: with reuse of colours, no secondary ray is traced where the reused material looks the same from everywhere.",
 ];
 
-/// The version of the models, recorded with every result and part of every point's key.
-pub const MODEL_VERSION: u32 = HISTORY.len() as u32;
+/// What changed since then in replays of texture traces. A change that alters any count adds a line.
+///
+/// Results of different model versions cannot be compared, so a sweep never takes a stored point of
+/// another version. `tests/tests/golden.rs` refuses changed golden counts under an unchanged version.
+const TEXTURE_HISTORY: &[&str] = &[];
+
+/// The same of ray traces.
+const RAY_HISTORY: &[&str] = &[];
+
+/// The version of the texture models, recorded with every result and part of every point's key.
+pub const MODEL_VERSION: u32 = (HISTORY.len() + TEXTURE_HISTORY.len()) as u32;
+
+/// The version of the ray-tracing models, recorded with every result.
+pub const RAY_MODEL_VERSION: u32 = (HISTORY.len() + RAY_HISTORY.len()) as u32;

@@ -18,7 +18,7 @@ use sgrt::result::{Config, Report, SCHEMA};
 use sgrt::timing::Timing;
 use sgrt::variations::curve_rules;
 use shell::{Output, Progress};
-use sim::model_version::MODEL_VERSION;
+use sim::model_version::RAY_MODEL_VERSION;
 use sim::paper::sgrt as paper;
 use sim::result::{TOOL, TraceId, scene_name};
 use std::path::{Path, PathBuf};
@@ -210,7 +210,7 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
     let report = Report {
         schema: SCHEMA.to_owned(),
         tool: TOOL.to_owned(),
-        model_version: MODEL_VERSION,
+        model_version: RAY_MODEL_VERSION,
         trace: TraceId::new(path, &meta.trace, file.content_checksum()),
         scene_triangles: meta.trace.scene_triangles,
         eye_size_px: loaded.frame().size_px,

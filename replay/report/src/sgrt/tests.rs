@@ -6,7 +6,7 @@ use sgrt::result::{Config, SCHEMA};
 use sgrt::rules::Rule;
 use sgrt::testing::{View, globe, trace, wall};
 use sgrt::variations::curve_rules;
-use sim::model_version::MODEL_VERSION;
+use sim::model_version::RAY_MODEL_VERSION;
 use sim::paper::sgrt::PaperValues;
 use sim::result::TraceId;
 
@@ -28,7 +28,7 @@ fn entry_of(view: View) -> Entry {
         report: Report {
             schema: SCHEMA.to_owned(),
             tool: "replay test".to_owned(),
-            model_version: MODEL_VERSION,
+            model_version: RAY_MODEL_VERSION,
             trace: TraceId {
                 scene: "scenes/teapot.obj".to_owned(),
                 checksum: "0badcafe".to_owned(),
