@@ -12,6 +12,9 @@ use std::sync::Arc;
 /// Object and primitive number of a sky pixel.
 pub(super) const SKY: u32 = u32::MAX;
 
+/// An invalid tile, with its location.
+pub type TileError = Box<dyn Error + Send + Sync>;
+
 /// A source of ray trace tiles.
 pub trait RaySource: Sync {
     /// All tables.
@@ -21,12 +24,7 @@ pub trait RaySource: Sync {
     ///
     /// # Errors
     /// An invalid tile, with its location.
-    fn tile(
-        &self,
-        eye: Eye,
-        index: u32,
-        tile: &mut RayTile,
-    ) -> Result<(), Box<dyn Error + Send + Sync>>;
+    fn tile(&self, eye: Eye, index: u32, tile: &mut RayTile) -> Result<(), TileError>;
 }
 
 impl RaySource for Raytrace {
@@ -34,12 +32,7 @@ impl RaySource for Raytrace {
         Self::tables(self)
     }
 
-    fn tile(
-        &self,
-        eye: Eye,
-        index: u32,
-        tile: &mut RayTile,
-    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+    fn tile(&self, eye: Eye, index: u32, tile: &mut RayTile) -> Result<(), TileError> {
         Ok(self.decode_tile(eye, index, tile)?)
     }
 }
@@ -55,7 +48,7 @@ pub enum FrameError {
         /// Tile number.
         tile: u32,
         /// The error.
-        source: Box<dyn Error + Send + Sync>,
+        source: TileError,
     },
     /// Nodes and triangles occupy more lines than cache line numbers allow.
     #[error(

@@ -1,7 +1,7 @@
 //! Ray traces of scenes with known results, for tests.
 
 use super::detect::intersect;
-use super::frame::{Frame, RaySource};
+use super::frame::{Frame, RaySource, TileError};
 use formats::raytrace::camera::sample_position_px;
 use formats::raytrace::half::round3;
 use formats::raytrace::{
@@ -13,7 +13,6 @@ use formats::textrace::TraceMeta;
 use formats::view::{Eye, FovTangents, Hmd};
 use glam::Vec3;
 use sim::stream::testing::meta;
-use std::error::Error;
 
 /// Index of the diffuse material.
 pub const DIFFUSE: u32 = 0;
@@ -74,12 +73,7 @@ impl RaySource for Synthetic {
         &self.tables
     }
 
-    fn tile(
-        &self,
-        eye: Eye,
-        index: u32,
-        tile: &mut RayTile,
-    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+    fn tile(&self, eye: Eye, index: u32, tile: &mut RayTile) -> Result<(), TileError> {
         *tile = self.tiles[eye as usize][index as usize].clone();
         Ok(())
     }

@@ -8,14 +8,21 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::{Value, json};
 use std::borrow::Cow;
 
-impl<R: Row> JsonSchema for Named<R> {
-    fn inline_schema() -> bool {
-        true
-    }
+/// The members of a schema that is written where it is used.
+macro_rules! inline {
+    ($name:literal) => {
+        fn inline_schema() -> bool {
+            true
+        }
 
-    fn schema_name() -> Cow<'static, str> {
-        "Name".into()
-    }
+        fn schema_name() -> Cow<'static, str> {
+            $name.into()
+        }
+    };
+}
+
+impl<R: Row> JsonSchema for Named<R> {
+    inline!("Name");
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         json_schema!({ "type": "string", "examples": R::names() })
@@ -23,13 +30,7 @@ impl<R: Row> JsonSchema for Named<R> {
 }
 
 impl JsonSchema for Levels {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Levels".into()
-    }
+    inline!("Levels");
 
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let level = generator.subschema_for::<LevelConfig>();
@@ -38,13 +39,7 @@ impl JsonSchema for Levels {
 }
 
 impl JsonSchema for BetweenFrames {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "BetweenFrames".into()
-    }
+    inline!("BetweenFrames");
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         json_schema!({ "type": "string", "pattern": "^(keep|flush|lose-(100|[1-9][0-9]?))$" })
@@ -55,13 +50,7 @@ impl JsonSchema for BetweenFrames {
 pub struct Meta;
 
 impl JsonSchema for Meta {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Meta".into()
-    }
+    inline!("Meta");
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         json_schema!({ "type": "object", "description": "The trace's chunk META (FORMAT.md)." })
@@ -90,13 +79,7 @@ fn like(example: &Value, description: &str) -> Schema {
 pub struct Sampling;
 
 impl JsonSchema for Sampling {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Sampling".into()
-    }
+    inline!("Sampling");
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         let example = json!(SamplingOptions::default());
@@ -111,13 +94,7 @@ impl JsonSchema for Sampling {
 pub struct Layout;
 
 impl JsonSchema for Layout {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        "Layout".into()
-    }
+    inline!("Layout");
 
     fn json_schema(_: &mut SchemaGenerator) -> Schema {
         let example = json!(LayoutConfig::default());

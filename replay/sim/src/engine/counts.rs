@@ -64,7 +64,7 @@ impl FootprintMisses {
 }
 
 /// All misses of a replay.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct CacheCounts {
     /// By cell (see [`Bins`]).
     pub cells: Vec<CellMisses>,

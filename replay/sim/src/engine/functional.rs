@@ -1,13 +1,13 @@
 //! Caches of any policy without latencies: a miss fills immediately.
 
 use super::counts::{CacheCounts, FootprintMisses};
-use super::machine::{AtOnce, Machine};
+use super::machine::{AtOnce, FrameWork, Machine};
 use super::outcome::Outcome;
 use crate::access::FrameClients;
-use crate::config::{Assign, RunConfig};
+use crate::config::RunConfig;
 use crate::memory::{Cache, Hierarchy, OtherWork};
-use crate::order::{Phase, WorkItem};
-use crate::stream::{Consumer, Cores, QuadLines, StreamError, Tag, interleave};
+use crate::order::WorkItem;
+use crate::stream::{Consumer, QuadLines, StreamError, Tag, interleave};
 
 /// L1 caches over a shared L2.
 pub struct Functional<C> {
@@ -90,13 +90,13 @@ impl<C: Cache> Consumer for WithClients<'_, '_, C> {
 }
 
 impl<C: Cache> Machine for Functional<C> {
-    fn run(
-        &mut self,
-        cores: &mut Cores<'_>,
-        phases: &[Phase],
-        assign: Assign,
-        clients: Option<&mut FrameClients<'_>>,
-    ) -> Result<(), StreamError> {
+    fn run(&mut self, frame: FrameWork) -> Result<(), StreamError> {
+        let FrameWork {
+            cores,
+            phases,
+            assign,
+            clients,
+        } = frame;
         match clients {
             None => interleave(cores, phases, assign, self),
             Some(clients) => {

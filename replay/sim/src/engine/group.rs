@@ -33,7 +33,7 @@ pub fn sharing(configs: &[RunConfig]) -> Vec<Vec<Vec<usize>>> {
 }
 
 /// Groups the indices by equal keys, in order of first member.
-pub(super) fn grouped(
+pub fn grouped(
     indexes: impl IntoIterator<Item = usize>,
     key: impl Fn(&usize) -> RunConfig,
 ) -> Vec<Vec<usize>> {

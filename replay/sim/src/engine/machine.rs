@@ -7,16 +7,19 @@ use crate::memory::OtherWork;
 use crate::order::Phase;
 use crate::stream::{Cores, StreamError, Tag};
 
+/// The work of a frame.
+pub(super) struct FrameWork<'w, 'c, 'f> {
+    pub(super) cores: &'w mut Cores<'c>,
+    pub(super) phases: &'w [Phase],
+    pub(super) assign: Assign,
+    /// The other clients of memory, if simulated.
+    pub(super) clients: Option<&'w mut FrameClients<'f>>,
+}
+
 /// A machine that processes the cores' work: caches, with or without clocks, for one or more configurations.
 pub(super) trait Machine: Send {
     /// Runs the phases of a frame. Other clients of memory, if simulated, follow the cores' items.
-    fn run(
-        &mut self,
-        cores: &mut Cores<'_>,
-        phases: &[Phase],
-        assign: Assign,
-        clients: Option<&mut FrameClients<'_>>,
-    ) -> Result<(), StreamError>;
+    fn run(&mut self, frame: FrameWork) -> Result<(), StreamError>;
 
     /// Performs the accesses of other clients before the first item of a frame or after the last one.
     fn client_accesses(&mut self, _clients: &mut FrameClients<'_>) {}

@@ -20,6 +20,6 @@ pub use batch::{Work, replay, replay_all, replay_jobs};
 pub use counts::Misses;
 pub use error::ReplayError;
 pub use error::check_other_work;
-pub use group::sharing;
+pub use group::{grouped, sharing};
 pub use lines::{LineOutcome, LineReplay};
 pub use wave::Job;

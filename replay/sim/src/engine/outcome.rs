@@ -5,6 +5,7 @@ use crate::result::{FirstLookups, MemoryResult, Timeline, TmuResult};
 use crate::tmu::PipelineStats;
 
 /// The counts of a machine for one configuration.
+#[derive(Default)]
 pub struct Outcome {
     /// Cache misses.
     pub counts: CacheCounts,
@@ -30,7 +31,6 @@ impl Outcome {
         let mut sum = PipelineStats::default();
         units.for_each(|unit| sum.add(&unit));
         Self {
-            first_lookups: None,
             counts,
             tmu: Some(TmuResult {
                 utilization: sum.utilization(),
@@ -39,8 +39,7 @@ impl Outcome {
                 loops: sum.loops,
             }),
             cycles: Some(cycles),
-            memory: MemoryResult::default(),
-            timeline: None,
+            ..Self::default()
         }
     }
 }
@@ -48,12 +47,8 @@ impl Outcome {
 impl From<CacheCounts> for Outcome {
     fn from(counts: CacheCounts) -> Self {
         Self {
-            first_lookups: None,
             counts,
-            tmu: None,
-            cycles: None,
-            memory: MemoryResult::default(),
-            timeline: None,
+            ..Self::default()
         }
     }
 }

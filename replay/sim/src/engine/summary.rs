@@ -2,7 +2,7 @@
 
 use super::counts::{CacheCounts, CellMisses, Misses};
 use crate::config::{CountBy, RunConfig};
-use crate::result::{LevelCounters, LevelResult, MemoryResult, Part, RunResult, TileMap};
+use crate::result::{LevelCounters, LevelResult, Part, RunResult, TileMap};
 use crate::stream::{Bins, Cell, CellAccesses, TraceCounts};
 use formats::textrace::{Pass, Tables};
 
@@ -36,6 +36,17 @@ pub fn summary(
     let mut by_view = sums(bins.view_names().map(str::to_owned).to_vec(), |c| c.view);
     let mut shown = (0..).map(|view| bins.has_view(view));
     by_view.retain(|_| shown.next() == Some(true));
+    let (by_texture, by_level, by_draw) = match config.count_by {
+        CountBy::Texture => {
+            let names = tables.textures.iter().map(|t| t.name.clone()).collect();
+            let levels = sums(level_names.collect(), |c| c.level);
+            (sums(names, |c| c.part), levels, Vec::new())
+        }
+        CountBy::Draw => {
+            let draws = sums(draw_names(tables), |c| c.part);
+            (Vec::new(), Vec::new(), draws)
+        }
+    };
     RunResult {
         quads: trace.quads,
         lanes: trace.lanes,
@@ -45,34 +56,16 @@ pub fn summary(
         external_bytes: all.l2.line_misses * u64::from(config.line_bytes),
         unique_lines: trace.unique_lines,
         access_hash: format!("{:016x}", trace.hash),
-        tmu: None,
-        cycles: None,
-        first_lookups: None,
-        memory: MemoryResult::default(),
-        timeline: None,
-        clients: Vec::new(),
-        geometry: None,
         by_view,
-        by_texture: match config.count_by {
-            CountBy::Texture => sums(
-                tables.textures.iter().map(|t| t.name.clone()).collect(),
-                |c| c.part,
-            ),
-            CountBy::Draw => Vec::new(),
-        },
-        by_level: match config.count_by {
-            CountBy::Texture => sums(level_names.collect(), |c| c.level),
-            CountBy::Draw => Vec::new(),
-        },
-        by_draw: match config.count_by {
-            CountBy::Texture => Vec::new(),
-            CountBy::Draw => sums(draw_names(tables), |c| c.part),
-        },
+        by_texture,
+        by_level,
+        by_draw,
         tile_maps: if config.tile_maps {
             tile_maps(tables, bins, trace, caches, config.tile_px)
         } else {
             Vec::new()
         },
+        ..RunResult::default()
     }
 }
 

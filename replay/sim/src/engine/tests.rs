@@ -10,7 +10,7 @@ mod timeline;
 
 use super::counts::CacheCounts;
 use super::functional::Functional;
-use super::machine::Machine;
+use super::machine::{FrameWork, Machine};
 use super::outcome::Outcome;
 use super::summary::summary;
 use super::*;
@@ -19,7 +19,7 @@ use crate::config::{
     RunConfig, TmuModel,
 };
 use crate::memory::Hierarchy;
-use crate::order::{Phase, WorkItem};
+use crate::order::WorkItem;
 use crate::result::{LevelCounters, RunResult};
 use crate::stream::testing::Synthetic;
 use crate::stream::testing::repeated;
@@ -36,11 +36,8 @@ use std::sync::Mutex;
 
 fn small() -> MemoryTrace {
     Synthetic {
-        size_px: [72, 56],
-        patch_px: 24,
-        layers: 2,
         materials: 3,
-        ..Synthetic::default()
+        ..Synthetic::new([72, 56], 24)
     }
     .generate()
 }
@@ -197,7 +194,12 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     let phases = plan(trace, config).unwrap();
     let mut cores = Cores::new(&frame, config.cores as usize);
     machine
-        .run(&mut cores, &phases, config.dispatch(), None)
+        .run(FrameWork {
+            cores: &mut cores,
+            phases: &phases,
+            assign: config.dispatch(),
+            clients: None,
+        })
         .unwrap();
     let outcome = machine.outcome(config);
     let (tmu, cycles) = (outcome.tmu, outcome.cycles);

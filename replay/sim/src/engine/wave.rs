@@ -2,7 +2,7 @@
 
 use super::error::{ReplayError, check_other_work};
 use super::group::Group;
-use super::machine::Machine;
+use super::machine::{FrameWork, Machine};
 use super::scheduler::Stage;
 use super::summary::summary;
 use crate::config::{BetweenFrames, Order, RunConfig, TmuModel};
@@ -75,12 +75,12 @@ impl<'a> Wave<'a> {
                     machine.client_accesses(clients);
                 }
                 let phases = orders.plan(&plans, &config);
-                machine.run(
-                    &mut cores,
+                machine.run(FrameWork {
+                    cores: &mut cores,
                     phases,
-                    config.dispatch(),
-                    group.clients.as_mut(),
-                )?;
+                    assign: config.dispatch(),
+                    clients: group.clients.as_mut(),
+                })?;
                 if let Some(clients) = &mut group.clients {
                     clients.end_frame();
                     machine.client_accesses(clients);
@@ -162,14 +162,10 @@ impl<'a> Wave<'a> {
         for &index in &group.points {
             let config = &self.job.configs[index];
             let outcome = machine.outcome(config);
-            let (tmu, cycles) = (outcome.tmu, outcome.cycles);
-            let mut result = RunResult {
-                tmu,
-                cycles,
-                timeline: outcome.timeline,
-                first_lookups: outcome.first_lookups,
-                ..summary(tables, expander.bins(), counts, &outcome.counts, config)
-            };
+            let mut result = summary(tables, expander.bins(), counts, &outcome.counts, config);
+            (result.tmu, result.cycles) = (outcome.tmu, outcome.cycles);
+            result.timeline = outcome.timeline;
+            result.first_lookups = outcome.first_lookups;
             let l2_misses = result.l2.counters.line_misses;
             result.external_bytes = outcome.memory.external_bytes(l2_misses, config.line_bytes);
             result.memory = outcome.memory;

@@ -208,12 +208,9 @@ mod tests {
 
     fn trace() -> MemoryTrace {
         Synthetic {
-            size_px: [160, 80],
-            patch_px: 17,
-            layers: 2,
-            textures: 3,
             materials: 2,
             seed: 4,
+            ..Synthetic::new([160, 80], 17)
         }
         .generate()
     }

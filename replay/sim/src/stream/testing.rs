@@ -168,12 +168,8 @@ pub fn repeated(trace: &MemoryTrace, frames: u32) -> MemoryTrace {
 pub fn different_frames() -> MemoryTrace {
     let of_seed = |seed| {
         let synthetic = Synthetic {
-            size_px: [128, 64],
-            patch_px: 17,
-            layers: 2,
-            textures: 3,
             seed,
-            ..Synthetic::default()
+            ..Synthetic::new([128, 64], 17)
         };
         synthetic.generate()
     };
@@ -254,6 +250,16 @@ struct Patch {
 }
 
 impl Synthetic {
+    /// Two layers of rectangles.
+    pub fn new(size_px: [u32; 2], patch_px: u32) -> Self {
+        Self {
+            size_px,
+            patch_px,
+            layers: 2,
+            ..Self::default()
+        }
+    }
+
     /// Generates the trace.
     pub fn generate(&self) -> MemoryTrace {
         let patches = self.patches();

@@ -1,12 +1,12 @@
 //! Error from the limited precision of captures: compares each capture with the reference of
 //! `tracegen verify --write-reference`.
 
+use super::configurations::functional;
 use super::headline::TEXTURE_FIGURES;
 use super::inputs::Inputs;
 use super::study::{Choice, Contribution, Study, StudyError};
 use crate::compare::comparable;
 use crate::experiment::Subject;
-use sim::config::{Mode, RunConfig};
 
 pub const CAPTURE: Study = Study {
     key: "capture",
@@ -21,10 +21,7 @@ pub const CAPTURE: Study = Study {
 };
 
 fn captures(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
-    let config = RunConfig {
-        mode: Mode::Functional,
-        ..inputs.config
-    };
+    let config = functional(inputs.config);
     let mut choices = Vec::new();
     for truth in &inputs.truths {
         let of_views = |s: &&Subject<'_>| {

@@ -5,7 +5,7 @@
 use sim::config::{ConfigError, Order, RunConfig};
 use sim::engine::ReplayError;
 use sim::memory::{Cache, Found, Hierarchy};
-use sim::order::{self, Phase};
+use sim::order::Phase;
 use sim::stream::{
     Consumer, Cores, Expander, LineMemory, QuadLines, TileSource, Walk, interleave, rendered,
 };
@@ -127,17 +127,13 @@ pub(super) fn cluster_count(config: &RunConfig) -> Result<u32, ConfigError> {
     Ok(l1.min(l2))
 }
 
-/// The frames of a trace by number, ascending.
-pub fn frames(trace: &dyn TileSource) -> Vec<u32> {
-    order::frames(&trace.tables().passes)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use formats::textrace::{Pass, Surfaces};
     use sim::config::{Assign, BetweenFrames, Hsr, LevelConfig, Levels, Mode};
     use sim::engine::replay;
+    use sim::order;
     use sim::stream::testing::Synthetic;
 
     /// Every option that changes the misses of a functional replay changes the sample as well.
@@ -185,7 +181,7 @@ mod tests {
                 &trace,
                 config,
                 Order::MORTON,
-                &Part::frames(&frames(&trace)),
+                &Part::frames(&order::frames(&trace.tables.passes)),
             );
             let found = found.unwrap();
             let footprints = found.by_tile.iter().map(|tile| tile.1).sum::<u64>();
@@ -224,7 +220,7 @@ mod tests {
             ..RunConfig::default()
         };
         for order in [Order::MORTON, Order::Z2_STA] {
-            let frames = frames(&trace);
+            let frames = order::frames(&trace.tables.passes);
             let found = counts(&trace, &config, order, &Part::frames(&frames)).unwrap();
             let expected = replay(&trace, &RunConfig { order, ..config }).unwrap();
             assert_eq!(

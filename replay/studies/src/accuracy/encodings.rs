@@ -1,11 +1,11 @@
 //! Size and time of the tile encodings; they have no effect on accuracy.
 
+use super::configurations::functional;
 use super::figure::{Figure, figure};
 use super::headline::Replayed;
 use super::inputs::{Inputs, time_ratio};
 use super::study::{Choice, Study, StudyError};
 use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as};
-use sim::config::{Mode, RunConfig};
 use sim::stream::TileSource;
 
 const FIGURES: [Figure; 2] = [
@@ -26,10 +26,7 @@ pub(super) const ENCODING: Study = Study {
 };
 
 fn encodings(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
-    let config = RunConfig {
-        mode: Mode::Functional,
-        ..inputs.config
-    };
+    let config = functional(inputs.config);
     let mut choices = Vec::new();
     for subject in inputs.stills() {
         let raw = written(subject.source, Encoding::Raw)?;

@@ -9,11 +9,10 @@ use formats::view::Eye;
 use sgrt::DEFAULT_RULE;
 use sgrt::compose::Reuse;
 use sgrt::config::SgrtConfig;
-use sgrt::frame::RaySource;
+use sgrt::frame::{RaySource, TileError};
 use sgrt::loaded::LoadedTrace;
 use sgrt::rules::Rule;
 use sgrt::variations::curve_rules;
-use std::error::Error;
 
 const RULE_FIGURES: [Figure; 4] = [
     figure("flip_mean", "mean FLIP of the right image", ""),
@@ -124,12 +123,7 @@ impl RaySource for Moved<'_> {
         self.0.tables()
     }
 
-    fn tile(
-        &self,
-        eye: Eye,
-        index: u32,
-        tile: &mut RayTile,
-    ) -> Result<(), Box<dyn Error + Send + Sync>> {
+    fn tile(&self, eye: Eye, index: u32, tile: &mut RayTile) -> Result<(), TileError> {
         self.0.tile(eye, index, tile)?;
         let from = self.tables().camera(eye).position;
         for hit in tile

@@ -1,6 +1,7 @@
 //! Studies of estimating external traffic from some sets, tiles or frames, and of the confidence intervals.
 
-use super::clusters::{Counts, Part, cluster_count, counts, frames};
+use super::clusters::{Counts, Part, cluster_count, counts};
+use super::configurations::functional;
 use super::figure::{Figure, figure};
 use super::inputs::{Inputs, time_ratio};
 use super::interval::{Judged, drawn, interval, judged, some};
@@ -8,7 +9,8 @@ use super::stopwatch::Stopwatch;
 use super::study::{Choice, Study, StudyError};
 use crate::experiment::Subject;
 use formats::random::Random;
-use sim::config::{Mode, Order, RunConfig};
+use sim::config::{Order, RunConfig};
+use sim::order::frames;
 use std::time::Duration;
 
 const FIGURES: [Figure; 4] = [
@@ -64,10 +66,7 @@ fn each<'a, 's: 'a>(
     inputs: &Inputs<'_>,
     sampler: Sampler,
 ) -> Result<Vec<Choice>, StudyError> {
-    let config = RunConfig {
-        mode: Mode::Functional,
-        ..inputs.config
-    };
+    let config = functional(inputs.config);
     let mut choices = Vec::new();
     for subject in subjects {
         choices.extend(sampler(subject, &config)?);
@@ -107,7 +106,7 @@ fn replayed(
 /// Draws use one replay with counts by set, because replaying only these sets has the same counts. One draw
 /// is replayed alone to measure its time.
 fn sets(subject: &Subject<'_>, config: &RunConfig) -> Result<Vec<Choice>, StudyError> {
-    let frames = frames(subject.source);
+    let frames = frames(&subject.source.tables().passes);
     let (whole, whole_time) = replayed(subject, config, &Part::frames(&frames))?;
     let values: Vec<f64> = whole
         .by_cluster
@@ -145,7 +144,7 @@ fn sets(subject: &Subject<'_>, config: &RunConfig) -> Result<Vec<Choice>, StudyE
 fn tiles(subject: &Subject<'_>, config: &RunConfig) -> Result<Vec<Choice>, StudyError> {
     /// Largest number of first tiles; each is a replay.
     const STARTS: u64 = 8;
-    let frames = frames(subject.source);
+    let frames = frames(&subject.source.tables().passes);
     let (whole, whole_time) = replayed(subject, config, &Part::frames(&frames))?;
     let sums = |tiles: &[(u64, u64)]| tiles.iter().fold((0, 0), |(m, f), t| (m + t.0, f + t.1));
     let (truth, footprints) = sums(&whole.by_tile);
@@ -190,7 +189,7 @@ fn tiles(subject: &Subject<'_>, config: &RunConfig) -> Result<Vec<Choice>, Study
 
 /// Replays every frame from empty caches and after the frame before it; draws choose among these results.
 fn sampled_frames(subject: &Subject<'_>, config: &RunConfig) -> Result<Vec<Choice>, StudyError> {
-    let all = frames(subject.source);
+    let all = frames(&subject.source.tables().passes);
     let (whole, whole_time) = replayed(subject, config, &Part::frames(&all))?;
     let truth = whole.by_frame.iter().sum::<u64>() as f64;
     let mut choices = Vec::new();

@@ -9,12 +9,9 @@ use sim::stream::testing::Synthetic;
 
 fn small() -> MemoryTrace {
     Synthetic {
-        size_px: [64, 48],
-        patch_px: 20,
-        layers: 2,
         materials: 3,
         textures: 2,
-        ..Synthetic::default()
+        ..Synthetic::new([64, 48], 20)
     }
     .generate()
 }

@@ -4,11 +4,11 @@ use super::store::Absent;
 use super::{Outcome, Plan, Point, Store, Subject};
 use rayon::prelude::*;
 use sim::config::RunConfig;
-use sim::engine::{Job, ReplayError, Work, replay_jobs};
+use sim::engine::{Job, ReplayError, Work, grouped, replay_jobs};
 use sim::model_version::MODEL_VERSION;
 use sim::result::RunResult;
 use sim::stream::LineMemory;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -187,17 +187,7 @@ impl fmt::Display for Incomplete {
 /// Groups points, by index, with the same configuration, which need one replay per trace. (A change may try
 /// the base's value.)
 pub(super) fn groups(points: &[Point]) -> Vec<Vec<usize>> {
-    let mut groups: Vec<Vec<usize>> = Vec::new();
-    let mut known: HashMap<String, usize> = HashMap::new();
-    for (index, point) in points.iter().enumerate() {
-        let config = serde_json::to_string(&point.config).unwrap_or_default();
-        let group = *known.entry(config).or_insert(groups.len());
-        if group == groups.len() {
-            groups.push(Vec::new());
-        }
-        groups[group].push(index);
-    }
-    groups
+    grouped(0..points.len(), |&index| points[index].config)
 }
 
 /// The wanted groups of a trace: stored results, and results of the engine.

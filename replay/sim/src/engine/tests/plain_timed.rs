@@ -2,7 +2,6 @@
 //! per thread, and one look-up per footprint. The fast machine must agree cycle by cycle.
 
 use super::*;
-use crate::access::FrameClients;
 use crate::config::{Allocation, Replacement, TmuConfig};
 use crate::engine::counts::FootprintMisses;
 use crate::memory::{AnyCache, Cache, Caches, OtherWork};
@@ -254,13 +253,13 @@ impl PlainTimed {
 }
 
 impl Machine for PlainTimed {
-    fn run(
-        &mut self,
-        work: &mut Cores<'_>,
-        phases: &[Phase],
-        assign: Assign,
-        _clients: Option<&mut FrameClients<'_>>,
-    ) -> Result<(), StreamError> {
+    fn run(&mut self, frame: FrameWork) -> Result<(), StreamError> {
+        let FrameWork {
+            cores: work,
+            phases,
+            assign,
+            ..
+        } = frame;
         let cores = self.units.len();
         for phase in phases {
             for unit in &mut self.units {

@@ -10,12 +10,11 @@ mod looping;
 mod prefetch_fifo;
 
 use super::counts::CacheCounts;
-use super::machine::Machine;
+use super::machine::{FrameWork, Machine};
 use super::outcome::Outcome;
 use crate::access::FrameClients;
-use crate::config::{Allocation, Assign, ConfigError, RunConfig, TmuModel};
+use crate::config::{Allocation, ConfigError, RunConfig, TmuModel};
 use crate::memory::{Caches, Delay, DelayedFill, MissPath, OtherWork, SecondLevel};
-use crate::order::Phase;
 use crate::stream::{Cores, StreamError, furthest_behind};
 use crate::tmu::PipelineStats;
 use first_miss::FirstMiss;
@@ -25,6 +24,15 @@ use looping::Looping;
 use prefetch_fifo::PrefetchFifo;
 use std::sync::Arc;
 
+/// A core's turn to run, until the cycle `until`.
+struct CoreRun<'r, 'c, 'i, 'f, D> {
+    shared: &'r mut Shared<D>,
+    core: usize,
+    until: u64,
+    work: &'r mut Cores<'c>,
+    items: &'r mut Items<'i, 'f>,
+}
+
 /// The texture units of all cores.
 trait ThreadModel: Send {
     /// Starts a phase at a cycle.
@@ -33,16 +41,9 @@ trait ThreadModel: Send {
     /// The clock of each core.
     fn clocks(&self) -> Vec<u64>;
 
-    /// Runs a core until it needs a shared resource later than `until`. Returns its cycle, or the maximum
+    /// Runs a core until it needs a shared resource later than its turn lasts. Returns its cycle, or the maximum
     /// if it is done.
-    fn run_core<D: DelayedFill>(
-        &mut self,
-        shared: &mut Shared<D>,
-        core: usize,
-        until: u64,
-        work: &mut Cores<'_>,
-        items: &mut Items<'_, '_>,
-    ) -> Result<u64, StreamError>;
+    fn run_core<D: DelayedFill>(&mut self, run: CoreRun<D>) -> Result<u64, StreamError>;
 
     /// Ends the phase and returns the cycle in which the last core finished.
     fn end_phase(&mut self) -> u64;
@@ -64,23 +65,28 @@ struct Clocked<M, D> {
 
 impl<M: ThreadModel, D: DelayedFill> Machine for Clocked<M, D> {
     /// A phase starts when the last core has finished the previous one.
-    fn run(
-        &mut self,
-        work: &mut Cores<'_>,
-        phases: &[Phase],
-        assign: Assign,
-        mut clients: Option<&mut FrameClients<'_>>,
-    ) -> Result<(), StreamError> {
-        let Self { model, shared, .. } = self;
+    fn run(&mut self, frame: FrameWork) -> Result<(), StreamError> {
+        let FrameWork {
+            cores,
+            phases,
+            assign,
+            mut clients,
+        } = frame;
         for phase in phases {
-            model.start_phase(self.cycles);
+            self.model.start_phase(self.cycles);
             // A finished core has the maximum as its clock.
-            let mut clocks = model.clocks();
+            let mut clocks = self.model.clocks();
             let mut items = Items::new(phase, assign, clocks.len(), clients.as_deref_mut());
             while let Some((core, until)) = furthest_behind(&clocks) {
-                clocks[core] = model.run_core(shared, core, until, work, &mut items)?;
+                clocks[core] = self.model.run_core(CoreRun {
+                    shared: &mut self.shared,
+                    core,
+                    until,
+                    work: &mut *cores,
+                    items: &mut items,
+                })?;
             }
-            self.cycles = model.end_phase();
+            self.cycles = self.model.end_phase();
         }
         Ok(())
     }

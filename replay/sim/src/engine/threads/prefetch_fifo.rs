@@ -5,11 +5,11 @@
 //! merge with its fetch.
 
 use super::first_miss::Thread;
-use super::{Items, Shared, ThreadModel, start_item};
+use super::{CoreRun, Shared, ThreadModel, start_item};
 use crate::config::{RunConfig, TmuConfig};
 use crate::engine::counts::FootprintMisses;
 use crate::memory::{DelayedFill, NOT_IN_FLIGHT};
-use crate::stream::{Cores, StreamError};
+use crate::stream::StreamError;
 use crate::tmu::PipelineStats;
 use std::collections::VecDeque;
 
@@ -110,14 +110,14 @@ impl ThreadModel for PrefetchFifo {
         self.units.iter().map(|unit| unit.clock).collect()
     }
 
-    fn run_core<D: DelayedFill>(
-        &mut self,
-        shared: &mut Shared<D>,
-        core: usize,
-        until: u64,
-        work: &mut Cores<'_>,
-        items: &mut Items<'_, '_>,
-    ) -> Result<u64, StreamError> {
+    fn run_core<D: DelayedFill>(&mut self, run: CoreRun<D>) -> Result<u64, StreamError> {
+        let CoreRun {
+            shared,
+            core,
+            until,
+            work,
+            items,
+        } = run;
         loop {
             let unit = &mut self.units[core];
             let now = unit.clock;

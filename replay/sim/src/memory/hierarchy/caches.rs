@@ -18,6 +18,15 @@ pub(super) fn of_core<C>(caches: &mut [C], core: usize) -> &mut C {
     &mut caches[core.min(last)]
 }
 
+impl<C> Caches<C> {
+    fn map<D>(self, turn: impl Fn(C) -> D) -> Caches<D> {
+        Caches {
+            l1: self.l1.into_iter().map(&turn).collect(),
+            l2: self.l2.into_iter().map(&turn).collect(),
+        }
+    }
+}
+
 impl<C: Delay> Caches<C> {
     /// Turns the caches into caches with delayed fills; most lines arrive within these latencies.
     pub fn delayed(self, l1_cycles: u64, l2_cycles: u64) -> Caches<C::Delayed> {
@@ -60,23 +69,12 @@ impl Caches<AnyCache> {
 
     /// Turns the caches into caches that allocate on a miss.
     pub fn allocate_on_miss(self) -> Caches<AllocateOnMiss> {
-        let allocate = |caches: Vec<AnyCache>| {
-            let all = caches.into_iter().map(AnyCache::into_box);
-            all.map(AllocateOnMiss).collect()
-        };
-        Caches {
-            l1: allocate(self.l1),
-            l2: allocate(self.l2),
-        }
+        self.map(|cache| AllocateOnMiss(cache.into_box()))
     }
 
     /// Boxes the caches.
     pub fn boxed(self) -> Caches<Box<dyn Cache>> {
-        let boxed = |caches: Vec<AnyCache>| caches.into_iter().map(AnyCache::into_box).collect();
-        Caches {
-            l1: boxed(self.l1),
-            l2: boxed(self.l2),
-        }
+        self.map(AnyCache::into_box)
     }
 
     /// Returns the caches with their concrete type if all are [`FourWayLru`].
@@ -88,16 +86,9 @@ impl Caches<AnyCache> {
         if !self.l1.iter().chain(&self.l2).all(is_four_way) {
             return Err(self.boxed());
         }
-        let four_way = |caches: Vec<AnyCache>| {
-            let all = caches.into_iter().filter_map(|cache| match cache {
-                AnyCache::FourWayLru(cache) => Some(cache),
-                AnyCache::Other(_) => None,
-            });
-            all.collect()
-        };
-        Ok(Caches {
-            l1: four_way(self.l1),
-            l2: four_way(self.l2),
-        })
+        Ok(self.map(|cache| match cache {
+            AnyCache::FourWayLru(cache) => cache,
+            AnyCache::Other(_) => unreachable!("all caches are four-way LRU"),
+        }))
     }
 }

@@ -12,14 +12,12 @@ mod tally;
 
 use self::pending::{Pending, Under};
 use self::tally::{Access, ByTile, Level};
-use crate::access::FrameClients;
-use crate::config::{Assign, LevelConfig, RunConfig};
+use crate::config::{LevelConfig, RunConfig};
 use crate::engine::counts::{CacheCounts, CellMisses, TileMisses};
-use crate::engine::machine::{AtOnce, Machine};
+use crate::engine::machine::{AtOnce, FrameWork, Machine};
 use crate::engine::outcome::Outcome;
 use crate::memory::{Forest, OtherWork};
-use crate::order::Phase;
-use crate::stream::{Bins, Consumer, Cores, QuadLines, StreamError, Tag, interleave};
+use crate::stream::{Bins, Consumer, QuadLines, StreamError, Tag, interleave};
 
 /// Sets and ways of a cache.
 pub type Geometry = (u32, u32);
@@ -171,14 +169,8 @@ impl Consumer for OnePass {
 }
 
 impl Machine for OnePass {
-    fn run(
-        &mut self,
-        cores: &mut Cores<'_>,
-        phases: &[Phase],
-        assign: Assign,
-        _clients: Option<&mut FrameClients<'_>>,
-    ) -> Result<(), StreamError> {
-        let answer = interleave(cores, phases, assign, self);
+    fn run(&mut self, frame: FrameWork) -> Result<(), StreamError> {
+        let answer = interleave(frame.cores, frame.phases, frame.assign, self);
         self.drain();
         answer
     }
@@ -201,10 +193,7 @@ impl Machine for OnePass {
     fn outcome(&self, config: &RunConfig) -> Outcome {
         // Only configurations with a geometry are in a group of several.
         let counts = geometry(config).map(|geometry| self.counts(geometry));
-        let mut counts = counts.unwrap_or_else(|| CacheCounts {
-            cells: Vec::new(),
-            tiles: Vec::new(),
-        });
+        let mut counts = counts.unwrap_or_default();
         if !config.tile_maps {
             counts.tiles.clear();
         }

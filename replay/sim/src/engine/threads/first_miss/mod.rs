@@ -7,11 +7,11 @@
 mod memory;
 mod thread;
 
-use super::{Items, Shared, ThreadModel, start_item};
+use super::{CoreRun, Shared, ThreadModel, start_item};
 use crate::config::{RunConfig, TmuConfig};
 use crate::engine::outcome::Outcome;
 use crate::memory::DelayedFill;
-use crate::stream::{Cores, StreamError};
+use crate::stream::StreamError;
 use crate::tmu::PipelineStats;
 use memory::{FirstMissMemory, Seen};
 use std::collections::VecDeque;
@@ -122,14 +122,14 @@ impl ThreadModel for FirstMiss {
         self.units.iter().map(|unit| unit.clock).collect()
     }
 
-    fn run_core<D: DelayedFill>(
-        &mut self,
-        shared: &mut Shared<D>,
-        core: usize,
-        until: u64,
-        work: &mut Cores<'_>,
-        items: &mut Items<'_, '_>,
-    ) -> Result<u64, StreamError> {
+    fn run_core<D: DelayedFill>(&mut self, run: CoreRun<D>) -> Result<u64, StreamError> {
+        let CoreRun {
+            shared,
+            core,
+            until,
+            work,
+            items,
+        } = run;
         loop {
             let unit = &mut self.units[core];
             match unit.next(self.tmu.threads) {

@@ -5,11 +5,11 @@ mod memory;
 mod requests;
 mod timeline;
 
-use super::{Items, Shared, ThreadModel, start_item};
+use super::{CoreRun, Shared, ThreadModel, start_item};
 use crate::config::RunConfig;
 use crate::engine::outcome::Outcome;
 use crate::memory::DelayedFill;
-use crate::stream::{Cores, StreamError};
+use crate::stream::StreamError;
 use crate::tmu::{Pipeline, PipelineStats, Turn};
 use memory::{Found, LoopingMemory};
 use timeline::Recorder;
@@ -45,14 +45,14 @@ impl ThreadModel for Looping {
         self.units.iter().map(Pipeline::clock).collect()
     }
 
-    fn run_core<D: DelayedFill>(
-        &mut self,
-        shared: &mut Shared<D>,
-        core: usize,
-        until: u64,
-        work: &mut Cores<'_>,
-        items: &mut Items<'_, '_>,
-    ) -> Result<u64, StreamError> {
+    fn run_core<D: DelayedFill>(&mut self, run: CoreRun<D>) -> Result<u64, StreamError> {
+        let CoreRun {
+            shared,
+            core,
+            until,
+            work,
+            items,
+        } = run;
         let unit = &mut self.units[core];
         if std::mem::take(&mut self.is_requesting[core])
             && let Some(quad) = work.quad(core)
