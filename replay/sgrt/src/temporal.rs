@@ -18,7 +18,7 @@ use super::loaded::LoadedTrace;
 use super::reads::Reads;
 use super::rules::Rule;
 use super::run::Run;
-use super::ways::{Part, Way, sum_of_parts};
+use super::ways::{FramePart, Way, sum_of_parts};
 use super::work::BatchWork;
 use super::{cache, energy_bounds};
 use formats::raytrace::{RayTriangle, RaytraceTables};
@@ -295,8 +295,8 @@ impl Sequence<'_> {
         way: Way,
         side: Eye,
         misses: &'s [Misses],
-    ) -> Part<'s> {
-        Part {
+    ) -> FramePart<'s> {
+        FramePart {
             model: pair.loaded.model(self.reads, self.config),
             way,
             side,

@@ -41,7 +41,7 @@ impl Way {
 
 /// A tile of one eye, rendered in one way.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Batch {
+pub(super) struct TileBatch {
     /// Its work.
     pub work: BatchWork,
     /// G-buffer bytes.
@@ -70,10 +70,10 @@ pub(super) struct Model<'a> {
 
 impl Model<'_> {
     /// The left and the right batch of a tile.
-    pub(super) fn batches(&self, way: Way, tile: u32, work: &TileWork) -> [Batch; 2] {
+    pub(super) fn batches(&self, way: Way, tile: u32, work: &TileWork) -> [TileBatch; 2] {
         let (_, [width, height]) = self.frame.tables.tile_rect(tile);
         let pixels = u64::from(width) * u64::from(height);
-        let batch = |work, traffic| Batch {
+        let batch = |work, traffic| TileBatch {
             work,
             traffic,
             pixels,
@@ -114,7 +114,7 @@ impl Model<'_> {
     }
 
     /// External memory traffic of a batch.
-    pub(super) fn dram_bytes(&self, batch: &Batch, misses: &Misses) -> DramBytes {
+    pub(super) fn dram_bytes(&self, batch: &TileBatch, misses: &Misses) -> DramBytes {
         let memory = &self.config.memory;
         DramBytes {
             hierarchy_bytes: misses.dram_bytes(self.config.cache.line_bytes).round() as u64,
@@ -159,7 +159,7 @@ impl Model<'_> {
     }
 
     /// Adds a batch to a run, and returns its unit cycles.
-    fn add(&self, run: &mut Run, batch: &Batch, misses: &Misses) -> TniCycles {
+    fn add(&self, run: &mut Run, batch: &TileBatch, misses: &Misses) -> TniCycles {
         let (config, work) = (self.config, &batch.work);
         let tni = tni::cycles(work, misses, self.frame.tables.bvh.traversal, config);
         let srp = srp::cycles(work, config);
@@ -183,7 +183,7 @@ impl Model<'_> {
 }
 
 /// Batches of one eye, rendered in one way.
-pub(super) struct Part<'a> {
+pub(super) struct FramePart<'a> {
     pub model: Model<'a>,
     pub way: Way,
     /// The eye of the pair.
@@ -197,7 +197,7 @@ pub(super) struct Part<'a> {
 ///
 /// # Panics
 /// There is no part.
-pub(super) fn sum_of_parts(parts: &[Part<'_>]) -> Run {
+pub(super) fn sum_of_parts(parts: &[FramePart<'_>]) -> Run {
     let mut run = Run::default();
     for tile in 0..parts[0].work.len() {
         for part in parts {

@@ -6,7 +6,7 @@ use super::cores::Cores;
 use super::counts::{Counts, Unbalanced};
 use super::event::{SLOT, key, phase};
 use super::machine::Machine;
-use super::memory::Memory;
+use super::memory::CacheMemory;
 use super::unit::Unit;
 use std::collections::VecDeque;
 
@@ -79,7 +79,7 @@ pub(super) struct Loaded {
 pub(super) struct Device<'m> {
     pub machine: &'m Machine,
     pub units: Vec<Unit>,
-    pub memory: Memory,
+    pub memory: CacheMemory,
     cores: Cores,
     pub calendar: Calendar,
     /// Batches in tile buffers, in order.
@@ -103,7 +103,7 @@ impl<'m> Device<'m> {
         Self {
             machine,
             units: (0..machine.units).map(|_| Unit::new(machine)).collect(),
-            memory: Memory::new(machine),
+            memory: CacheMemory::new(machine),
             cores: Cores::new(),
             calendar: Calendar::new(),
             loaded: VecDeque::new(),

@@ -87,7 +87,7 @@ pub enum Found {
 }
 
 /// All caches.
-pub struct Memory {
+pub struct CacheMemory {
     /// Per unit, the node cache and then the triangle cache.
     pub l1: Vec<Level>,
     /// The shared cache.
@@ -97,7 +97,7 @@ pub struct Memory {
     l2_latency: u64,
 }
 
-impl Memory {
+impl CacheMemory {
     /// Empty caches and an idle channel.
     pub fn new(machine: &Machine) -> Self {
         let usual = machine.dram_latency + machine.l2_latency;

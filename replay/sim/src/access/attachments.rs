@@ -14,13 +14,13 @@ use formats::textrace::{Pass, PassKind};
 pub(super) struct Attachments {
     machine: FrameConfig,
     tile_px: u32,
-    views: Vec<View>,
+    views: Vec<AttachmentView>,
     /// The display's pictures, per composed view.
     displays: Vec<u64>,
 }
 
 /// A view's buffers.
-struct View {
+struct AttachmentView {
     /// None for a shadow map.
     pass: Option<u32>,
     size_px: [u32; 2],
@@ -44,7 +44,7 @@ impl Attachments {
             let count = u64::from(tiles[0]) * u64::from(tiles[1]);
             let tile_bytes = |pixel: u32| u64::from(config.tile_px).pow(2) * u64::from(pixel);
             let mut place = |pixel: u32| buffers.place(count * tile_bytes(pixel));
-            View {
+            AttachmentView {
                 pass: match of.view.target {
                     ViewTarget::Pass(pass) => Some(pass),
                     ViewTarget::ShadowMap(_) => None,
@@ -57,7 +57,7 @@ impl Attachments {
                 is_resolved: vec![false; count as usize],
             }
         };
-        let views: Vec<View> = views.iter().map(&mut view).collect();
+        let views: Vec<AttachmentView> = views.iter().map(&mut view).collect();
         let displays = views.iter().map(|view| {
             let pixels = view.size_px.map(u64::from);
             buffers.place(pixels[0] * pixels[1] * u64::from(machine.color_bytes))
@@ -72,7 +72,7 @@ impl Attachments {
 
     /// First byte and number of bytes inside the picture of a tile of an attachment. The tiles of an
     /// attachment are stored consecutively.
-    fn tile(&self, view: &View, base: u64, pixel_bytes: u32, tile: u32) -> [u64; 2] {
+    fn tile(&self, view: &AttachmentView, base: u64, pixel_bytes: u32, tile: u32) -> [u64; 2] {
         let at = [tile % view.columns, tile / view.columns];
         let side = |axis: usize| (view.size_px[axis] - at[axis] * self.tile_px).min(self.tile_px);
         let whole = u64::from(self.tile_px).pow(2) * u64::from(pixel_bytes);
@@ -81,7 +81,7 @@ impl Attachments {
     }
 
     /// A tile of a picture in memory.
-    fn picture_tile(&self, view: &View, tile: u32) -> [u64; 2] {
+    fn picture_tile(&self, view: &AttachmentView, tile: u32) -> [u64; 2] {
         let [first, bytes] = self.tile(view, view.colour, self.machine.color_bytes, tile);
         let permille = u64::from(self.machine.color_compressed_permille);
         [first, (bytes * permille).div_ceil(1000)]
@@ -156,7 +156,7 @@ impl Attachments {
 
     /// Composition reads layers and writes pictures; the warp then reads pictures and writes the display's.
     fn compose(&self, passes: &[Pass], traffic: &mut Traffic) {
-        let is_layer = |view: &View| {
+        let is_layer = |view: &AttachmentView| {
             let pass = view.pass.and_then(|pass| passes.get(pass as usize));
             pass.is_some_and(|pass| pass.kind == PassKind::Layer)
         };

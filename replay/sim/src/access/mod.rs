@@ -153,7 +153,7 @@ impl<'a> FrameClients<'a> {
                 Some(partner) => Reuse::Of(&self.views[partner], partner),
                 None => Reuse::None,
             };
-            let mut vertices = vertices::Stage {
+            let mut vertices = vertices::VertexStage {
                 geometry: self.geometry,
                 tables,
                 machine: &self.machine,

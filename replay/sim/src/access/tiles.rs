@@ -6,7 +6,7 @@ use super::vertices::{POSITION_BYTES, ShadedView};
 use crate::config::{FrameConfig, RunConfig};
 use crate::memory::{Client, Lru, WaysOf};
 use crate::order::{Interleave, TileRef, WorkItem};
-use crate::stream::{ListEntry, Listed, StreamError, TileSource, interleaved};
+use crate::stream::{ListEntry, ListedRun, StreamError, TileSource, interleaved};
 use formats::textrace::Tile;
 use formats::textrace::geometry::ViewTarget;
 
@@ -97,7 +97,7 @@ impl Tiles {
             })
         });
         interleaved(interleave, [&mut left, &mut right], &mut order);
-        for Listed { tile, run, .. } in order {
+        for ListedRun { tile, run, .. } in order {
             let list = lists[usize::from(tile)];
             let entry = list.primitives[run as usize];
             self.primitive(core, list.view, entry, views, traffic);

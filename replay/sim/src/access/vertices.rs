@@ -38,7 +38,7 @@ pub(super) enum Reuse<'a> {
 }
 
 /// Vertex processing, and the sums it updates.
-pub(super) struct Stage<'a> {
+pub(super) struct VertexStage<'a> {
     pub geometry: &'a Geometry,
     pub tables: &'a Tables,
     pub machine: &'a FrameConfig,
@@ -47,7 +47,7 @@ pub(super) struct Stage<'a> {
     pub counts: &'a mut GeometryCounts,
 }
 
-impl Stage<'_> {
+impl VertexStage<'_> {
     /// Shades the draws of a view, in order.
     pub(super) fn shade(
         &mut self,

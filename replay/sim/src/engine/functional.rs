@@ -2,7 +2,7 @@
 
 use super::counts::{CacheCounts, FootprintMisses};
 use super::machine::{AtOnce, FrameWork, Machine};
-use super::outcome::Outcome;
+use super::outcome::MachineOutcome;
 use crate::access::FrameClients;
 use crate::config::RunConfig;
 use crate::memory::{Cache, Hierarchy, OtherWork};
@@ -122,8 +122,8 @@ impl<C: Cache> Machine for Functional<C> {
         self.caches.lose(other);
     }
 
-    fn outcome(&self, _config: &RunConfig) -> Outcome {
-        Outcome {
+    fn outcome(&self, _config: &RunConfig) -> MachineOutcome {
+        MachineOutcome {
             memory: self.caches.result(),
             ..self.counts.clone().into()
         }

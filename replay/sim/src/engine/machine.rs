@@ -1,6 +1,6 @@
 //! The interface of machines.
 
-use super::outcome::Outcome;
+use super::outcome::MachineOutcome;
 use crate::access::FrameClients;
 use crate::config::{Assign, RunConfig};
 use crate::memory::OtherWork;
@@ -31,7 +31,7 @@ pub(super) trait Machine: Send {
     fn lose(&mut self, other: OtherWork);
 
     /// The counts for one of its configurations.
-    fn outcome(&self, config: &RunConfig) -> Outcome;
+    fn outcome(&self, config: &RunConfig) -> MachineOutcome;
 }
 
 /// A machine without clocks, which accepts lines from any source.

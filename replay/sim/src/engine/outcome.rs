@@ -6,7 +6,7 @@ use crate::tmu::PipelineStats;
 
 /// The counts of a machine for one configuration.
 #[derive(Default)]
-pub struct Outcome {
+pub struct MachineOutcome {
     /// Cache misses.
     pub counts: CacheCounts,
     /// Sum over texture units; none in functional mode.
@@ -21,7 +21,7 @@ pub struct Outcome {
     pub timeline: Option<Timeline>,
 }
 
-impl Outcome {
+impl MachineOutcome {
     /// Combines the counts of texture units and caches.
     pub(super) fn timed(
         counts: CacheCounts,
@@ -44,7 +44,7 @@ impl Outcome {
     }
 }
 
-impl From<CacheCounts> for Outcome {
+impl From<CacheCounts> for MachineOutcome {
     fn from(counts: CacheCounts) -> Self {
         Self {
             counts,

@@ -11,7 +11,7 @@ mod timeline;
 use super::counts::CacheCounts;
 use super::functional::Functional;
 use super::machine::{FrameWork, Machine};
-use super::outcome::Outcome;
+use super::outcome::MachineOutcome;
 use super::summary::summary;
 use super::*;
 use crate::config::{

@@ -40,13 +40,13 @@ pub struct Score {
 }
 
 /// The compared quantities, by row and by L1 size.
-struct Parts {
+struct ScoreParts {
     /// L1, L2 and TMU of each row, and its saving relative to Morton order, which has none itself.
     rows: Vec<[Option<f64>; 4]>,
     slopes: Vec<f64>,
 }
 
-impl Parts {
+impl ScoreParts {
     fn of(rows: &[Measured]) -> Self {
         let product = |row: &Measured| row.l1_footprint_miss_pct * row.l2_line_miss_pct;
         let saved = |row: &Measured| {
@@ -125,7 +125,7 @@ fn root_mean_square(values: impl Iterator<Item = f64>) -> f64 {
 static SPREADS: LazyLock<[f64; 5]> = LazyLock::new(|| {
     let mut all: [Vec<f64>; 5] = Default::default();
     for scene in z2::SCENES {
-        let lists = Parts::of(&scene_rows(scene)).lists();
+        let lists = ScoreParts::of(&scene_rows(scene)).lists();
         for (all, mut list) in all.iter_mut().zip(lists) {
             all.append(&mut list);
         }
@@ -148,7 +148,10 @@ pub fn score(scene: &str, rows: &[Measured]) -> Option<Score> {
         })
         .collect();
     let ours = ours.filter(|ours| !ours.is_empty())?;
-    let (ours, theirs) = (Parts::of(&ours).lists(), Parts::of(&expected).lists());
+    let (ours, theirs) = (
+        ScoreParts::of(&ours).lists(),
+        ScoreParts::of(&expected).lists(),
+    );
     // Parts that the rows lack are left out.
     let distance = |part: usize| {
         let (ours, theirs) = (&ours[part], &theirs[part]);
@@ -214,7 +217,7 @@ mod tests {
     /// The table's slopes: T-Rex .58 to .63, Crytek 16 KB .62 to .70 and 8 KB .10 to .13.
     #[test]
     fn slopes_equal_those_of_the_table() {
-        let slopes = |scene| Parts::of(&scene_rows(scene)).slopes;
+        let slopes = |scene| ScoreParts::of(&scene_rows(scene)).slopes;
         let [small, large] = slopes("crytek-sponza")[..] else {
             panic!("two sizes")
         };

@@ -1,7 +1,7 @@
 //! The work of each core: the quads of its work item, in order.
 
-use super::expand::Work;
-use super::lines::{Listed, interleaved};
+use super::expand::TileBuffers;
+use super::lines::{ListedRun, interleaved};
 use super::{Frame, QuadLines, StreamError, TileLines};
 use crate::order::{TileRef, WorkItem};
 use std::collections::HashSet;
@@ -19,7 +19,7 @@ pub struct Cores<'f> {
 #[derive(Debug, Default)]
 struct Core<'f> {
     tiles: [Slot<'f>; 2],
-    runs: Vec<Listed>,
+    runs: Vec<ListedRun>,
     next_run: usize,
     /// Remaining quads of the current run, and the slot of their tile.
     slot: usize,
@@ -34,7 +34,7 @@ enum Slot<'f> {
     /// Lines kept in the frame.
     Kept(&'f TileLines),
     /// Lines expanded for this core.
-    Own(Box<Work>),
+    Own(Box<TileBuffers>),
 }
 
 impl Slot<'_> {
@@ -125,7 +125,7 @@ impl<'f> Cores<'f> {
             if let Some(quad) = core.quads.next() {
                 return core.tiles[core.slot].lines().map(|tile| tile.quad(quad));
             }
-            let &Listed { tile, run, part } = core.runs.get(core.next_run)?;
+            let &ListedRun { tile, run, part } = core.runs.get(core.next_run)?;
             core.next_run += 1;
             core.slot = usize::from(tile);
             core.quads = core.tiles[core.slot].lines()?.run(run as usize, part);

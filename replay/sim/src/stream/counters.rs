@@ -1,6 +1,6 @@
 //! Counters of a frame that a GPU can maintain, for the orders of the next frame.
 
-use super::expand::Work;
+use super::expand::TileBuffers;
 use super::{Frame, StreamError, TileLines};
 use crate::order::{Counters, PlanInputs, TileRef, View, ViewCounters, Views, views};
 
@@ -83,7 +83,7 @@ impl Frame<'_> {
         &self,
         view: View,
         inputs: &PlanInputs<'_>,
-        work: &mut Work,
+        work: &mut TileBuffers,
     ) -> Result<ViewCounters, StreamError> {
         let mut counted = nothing(view);
         for y in 0..view.tiles[1] {
@@ -97,7 +97,7 @@ impl Frame<'_> {
         &self,
         eyes: [View; 2],
         inputs: &PlanInputs<'_>,
-        work: &mut Work,
+        work: &mut TileBuffers,
     ) -> Result<ViewCounters, StreamError> {
         let offset = inputs.offset(eyes);
         let rows = eyes[0].tiles[1];
@@ -133,7 +133,12 @@ impl Frame<'_> {
     }
 
     /// The tiles of a row; none outside of the grid.
-    fn row(&self, view: View, y: Option<u32>, work: &mut Work) -> Result<Vec<Own>, StreamError> {
+    fn row(
+        &self,
+        view: View,
+        y: Option<u32>,
+        work: &mut TileBuffers,
+    ) -> Result<Vec<Own>, StreamError> {
         let Some(y) = y.filter(|&y| y < view.tiles[1]) else {
             return Ok(Vec::new());
         };

@@ -77,7 +77,7 @@ pub struct Expander<'a> {
 
 /// Buffers for expanding a tile, reused from tile to tile, and the counts.
 #[derive(Debug)]
-pub(super) struct Work {
+pub(super) struct TileBuffers {
     tile: Tile,
     scratch: Scratch,
     counts: TraceCounts,
@@ -218,8 +218,8 @@ impl<'a> Expander<'a> {
         Ok(frame)
     }
 
-    pub(super) fn work(&self) -> Work {
-        Work {
+    pub(super) fn work(&self) -> TileBuffers {
+        TileBuffers {
             tile: Tile::default(),
             scratch: self.footprints.scratch(self.distinct),
             counts: TraceCounts::without_tiles(&self.bins),
@@ -230,9 +230,13 @@ impl<'a> Expander<'a> {
     }
 
     /// Expands a tile into `work.lines`.
-    pub(super) fn expand(&self, at: TileRef, work: &mut Work) -> Result<TileAccesses, StreamError> {
+    pub(super) fn expand(
+        &self,
+        at: TileRef,
+        work: &mut TileBuffers,
+    ) -> Result<TileAccesses, StreamError> {
         feed::read(self.source, at, &mut work.tile)?;
-        let Work {
+        let TileBuffers {
             tile,
             scratch,
             counts,

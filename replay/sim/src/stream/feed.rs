@@ -1,6 +1,6 @@
 //! Iterates over the quads of work items with their records.
 
-use super::lines::{ListEntry, Listed, Part, interleaved};
+use super::lines::{ListEntry, ListedRun, TilePart, interleaved};
 use super::{StreamError, TileSource};
 use crate::order::{TileRef, WorkItem};
 use formats::textrace::{PrimitiveRun, QuadRecord, Tile};
@@ -52,22 +52,22 @@ pub fn for_quads<E: From<StreamError>>(
         _ => runs.extend(
             (0..)
                 .zip(tiles.iter().flat_map(|(_, tile)| &tile.runs))
-                .map(|(run, _)| Listed {
+                .map(|(run, _)| ListedRun {
                     tile: 0,
                     run,
-                    part: Part::Whole,
+                    part: TilePart::Whole,
                 }),
         ),
     }
-    for Listed { tile, run, part } in runs {
+    for ListedRun { tile, run, part } in runs {
         let (at, tile) = &tiles[usize::from(tile)];
         let run = &tile.runs[run as usize];
         let is_in_part = |records: &&[QuadRecord]| {
             let lower = records.first().is_some_and(|of| is_lower(of, half));
             match part {
-                Part::Whole => true,
-                Part::Upper => !lower,
-                Part::Lower => lower,
+                TilePart::Whole => true,
+                TilePart::Upper => !lower,
+                TilePart::Lower => lower,
             }
         };
         for records in quads(tile, run).filter(is_in_part) {

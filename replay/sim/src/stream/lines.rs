@@ -92,16 +92,16 @@ impl TileLines {
     }
 
     /// The quads of a run, or those in the tile's upper or lower half.
-    pub(super) fn run(&self, run: usize, part: Part) -> std::ops::Range<usize> {
+    pub(super) fn run(&self, run: usize, part: TilePart) -> std::ops::Range<usize> {
         let before = run.checked_sub(1).and_then(|before| self.runs.get(before));
         let first = before.map_or(0, |run| run.end as usize);
         let Some(&QuadRun { middle, end, .. }) = self.runs.get(run) else {
             return first..first;
         };
         match part {
-            Part::Whole => first..end as usize,
-            Part::Upper => first..middle as usize,
-            Part::Lower => middle as usize..end as usize,
+            TilePart::Whole => first..end as usize,
+            TilePart::Upper => first..middle as usize,
+            TilePart::Lower => middle as usize..end as usize,
         }
     }
 
@@ -130,7 +130,7 @@ impl TileLines {
 
 /// The part of a run that is rendered: all quads, or those in a half of the tile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Part {
+pub enum TilePart {
     /// All quads.
     #[default]
     Whole,
@@ -142,13 +142,13 @@ pub enum Part {
 
 /// Quads of one primitive in one of two tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Listed {
+pub struct ListedRun {
     /// 0 or 1.
     pub tile: u8,
     /// Number of the run in its tile.
     pub run: u32,
     /// Which of its quads.
-    pub part: Part,
+    pub part: TilePart,
 }
 
 /// A run of a tile's primitive list.
@@ -164,10 +164,10 @@ pub struct ListEntry {
 pub fn interleaved(
     interleave: Interleave,
     lists: [&mut dyn Iterator<Item = ListEntry>; 2],
-    out: &mut Vec<Listed>,
+    out: &mut Vec<ListedRun>,
 ) {
     out.clear();
-    let part = Part::Whole;
+    let part = TilePart::Whole;
     match interleave {
         Interleave::Alternate => {
             let [left, right] = lists.map(|list| (0..).zip(list));
@@ -188,12 +188,12 @@ pub fn interleaved(
             out.extend(
                 primitives
                     .iter()
-                    .map(|&(_, tile, run)| Listed { tile, run, part }),
+                    .map(|&(_, tile, run)| ListedRun { tile, run, part }),
             );
         }
         Interleave::Halves => {
             let lists = lists.map(|list| -> Vec<(u32, ListEntry)> { (0..).zip(list).collect() });
-            for (half, part) in [Part::Upper, Part::Lower].into_iter().enumerate() {
+            for (half, part) in [TilePart::Upper, TilePart::Lower].into_iter().enumerate() {
                 let [left, right] = lists.each_ref().map(|list| {
                     let inside = list.iter().filter(move |(_, of)| of.in_half[half]);
                     inside.map(|(run, _)| *run)
@@ -208,13 +208,13 @@ pub fn interleaved(
 fn alternate(
     mut left: impl Iterator<Item = u32>,
     mut right: impl Iterator<Item = u32>,
-    part: Part,
-    out: &mut Vec<Listed>,
+    part: TilePart,
+    out: &mut Vec<ListedRun>,
 ) {
     loop {
         let (l, r) = (left.next(), right.next());
-        out.extend(l.map(|run| Listed { tile: 0, run, part }));
-        out.extend(r.map(|run| Listed { tile: 1, run, part }));
+        out.extend(l.map(|run| ListedRun { tile: 0, run, part }));
+        out.extend(r.map(|run| ListedRun { tile: 1, run, part }));
         if l.or(r).is_none() {
             break;
         }

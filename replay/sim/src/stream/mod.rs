@@ -33,7 +33,7 @@ pub use feed::{Quad, for_quads};
 pub use hsr::{Shaded, shaded};
 pub use interleave::{Consumer, furthest_behind, interleave};
 pub use line_set::LineSet;
-pub use lines::{Footprint, ListEntry, Listed, QuadLines, TileLines, interleaved};
+pub use lines::{Footprint, ListEntry, ListedRun, QuadLines, TileLines, interleaved};
 pub use regroup::{Rendered, rendered};
 pub use source::{MemoryTrace, TileSource};
 pub use tag::{Tag, Use};

@@ -49,7 +49,7 @@ impl PipelineStats {
 
 /// A thread that returns to the first stage.
 #[derive(Clone, Copy, Debug)]
-struct Looping {
+struct LoopingThread {
     /// Cycle of its return.
     back: u64,
     /// Earliest arrival that it waits for.
@@ -72,7 +72,7 @@ pub struct Pipeline {
     /// The current cycle.
     clock: u64,
     /// In order of return, because all loops have the same length.
-    looping: VecDeque<Looping>,
+    looping: VecDeque<LoopingThread>,
     /// Lists of pending footprints.
     pending: Vec<Vec<Pending>>,
     /// Unused lists.
@@ -177,7 +177,7 @@ impl Pipeline {
             self.pending.push(Vec::new());
             self.pending.len() as u32 - 1
         });
-        let thread = Looping {
+        let thread = LoopingThread {
             back: 0,
             earliest: waiting.earliest,
             waiting: waiting.count(),
@@ -189,7 +189,7 @@ impl Pipeline {
 
     /// One trip: `hits` footprints are filtered, the waiting ones are not.
     #[inline(always)]
-    fn trip(&mut self, hits: u64, thread: Looping) {
+    fn trip(&mut self, hits: u64, thread: LoopingThread) {
         let entered = self.clock;
         self.stats.useful += hits;
         self.clock += hits;
@@ -201,7 +201,7 @@ impl Pipeline {
         self.open_slot %= self.config.retry_footprints;
         self.stats.wasted += slots;
         self.clock += slots;
-        self.looping.push_back(Looping {
+        self.looping.push_back(LoopingThread {
             back: entered + u64::from(self.config.loop_cycles),
             ..thread
         });

@@ -41,14 +41,14 @@ pub struct Counts {
     pub by_frame: Vec<u64>,
 }
 
-struct Counting<'a> {
+struct ClusterCounting<'a> {
     caches: Hierarchy<Box<dyn Cache>>,
     mask: u32,
     chosen: Option<&'a [bool]>,
     counts: Counts,
 }
 
-impl Consumer for Counting<'_> {
+impl Consumer for ClusterCounting<'_> {
     fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
         let tile = quad.tile();
         for footprint in quad.footprints() {
@@ -83,7 +83,7 @@ pub fn counts(
     let rendered = rendered(trace, config)?;
     let expander = Expander::new(&rendered, config)?;
     let clusters = cluster_count(config)?;
-    let mut counting = Counting {
+    let mut counting = ClusterCounting {
         caches: Hierarchy::build(config)?,
         mask: clusters - 1,
         chosen: part.clusters,

@@ -35,7 +35,7 @@ pub struct ExperimentFile {
 type Leaf<'a, 'i> = (String, usize, &'a DeValue<'i>);
 
 /// An error at a key, and the key's position in the text.
-struct Fault {
+struct KeyError {
     offset: usize,
     key: String,
     message: String,
@@ -50,7 +50,7 @@ impl ExperimentFile {
         read(text, Self::read)
     }
 
-    fn read(document: &DeTable) -> Result<Self, Fault> {
+    fn read(document: &DeTable) -> Result<Self, KeyError> {
         let mut file = Self {
             traces: Vec::new(),
             base: RunConfig::default(),
@@ -62,7 +62,7 @@ impl ExperimentFile {
         let mut sections: Vec<_> = document.iter().collect();
         sections.sort_by_key(|(key, _)| (key.get_ref() != "base", key.span().start));
         for (key, value) in sections {
-            let fault = |message: String| Fault {
+            let fault = |message: String| KeyError {
                 offset: key.span().start,
                 key: key.get_ref().to_string(),
                 message,
@@ -119,7 +119,7 @@ pub fn parse_config(text: &str) -> Result<RunConfig, PlanError> {
 }
 
 /// Reads a document, adding lines to errors.
-fn read<T>(text: &str, content: impl Fn(&DeTable) -> Result<T, Fault>) -> Result<T, PlanError> {
+fn read<T>(text: &str, content: impl Fn(&DeTable) -> Result<T, KeyError>) -> Result<T, PlanError> {
     let line_at = |offset: usize| 1 + text.bytes().take(offset).filter(|b| *b == b'\n').count();
     let document = DeTable::parse(text).map_err(|e| PlanError::Syntax {
         line: line_at(e.span().map_or(0, |s| s.start)),
@@ -133,14 +133,14 @@ fn read<T>(text: &str, content: impl Fn(&DeTable) -> Result<T, Fault>) -> Result
 }
 
 /// Sets the keys of a table in a configuration.
-fn with_keys(config: &mut Table, table: &DeTable) -> Result<RunConfig, Fault> {
+fn with_keys(config: &mut Table, table: &DeTable) -> Result<RunConfig, KeyError> {
     let mut last = parsed(config).unwrap_or_default();
     for (key, offset, value) in leaves(table)? {
         let found = to_value(value).and_then(|value| {
             set(config, &key, value);
             parsed(config)
         });
-        last = found.map_err(|message| Fault {
+        last = found.map_err(|message| KeyError {
             offset,
             key,
             message,
@@ -159,7 +159,7 @@ fn brief(text: &str) -> String {
 }
 
 /// The axes of a section, in file order, with every value checked against the base.
-fn axes(table: &DeTable, base: &Table) -> Result<Vec<Axis>, Fault> {
+fn axes(table: &DeTable, base: &Table) -> Result<Vec<Axis>, KeyError> {
     let axis = |key: &str, value: &DeValue| {
         let values = match to_value(value)? {
             Value::Array(values) if values.len() > MOST_POINTS => {
@@ -184,7 +184,7 @@ fn axes(table: &DeTable, base: &Table) -> Result<Vec<Axis>, Fault> {
     leaves(table)?
         .into_iter()
         .map(|(key, offset, value)| {
-            axis(&key, value).map_err(|message| Fault {
+            axis(&key, value).map_err(|message| KeyError {
                 offset,
                 key,
                 message,
@@ -195,7 +195,7 @@ fn axes(table: &DeTable, base: &Table) -> Result<Vec<Axis>, Fault> {
 
 /// The leaves of nested tables with dotted keys, in file order. A key can be written in several ways
 /// (`"l1.ways"`, `l1.ways`), but only once.
-fn leaves<'a, 'i>(table: &'a DeTable<'i>) -> Result<Vec<Leaf<'a, 'i>>, Fault> {
+fn leaves<'a, 'i>(table: &'a DeTable<'i>) -> Result<Vec<Leaf<'a, 'i>>, KeyError> {
     fn walk<'a, 'i>(table: &'a DeTable<'i>, prefix: &str, out: &mut Vec<Leaf<'a, 'i>>) {
         for (key, value) in table.iter() {
             let path = format!("{prefix}{}", key.get_ref());
@@ -213,7 +213,7 @@ fn leaves<'a, 'i>(table: &'a DeTable<'i>) -> Result<Vec<Leaf<'a, 'i>>, Fault> {
     let mut known = HashSet::new();
     match out.iter().find(|(key, ..)| !known.insert(key.as_str())) {
         None => Ok(out),
-        Some((key, offset, _)) => Err(Fault {
+        Some((key, offset, _)) => Err(KeyError {
             offset: *offset,
             key: key.clone(),
             message: "duplicate key".to_owned(),

@@ -40,7 +40,7 @@ pub fn run<'a>(
     done: &(dyn Fn(u64) + Sync),
 ) -> Result<Outcome<'a>, RunError> {
     let groups = groups(&plan.points);
-    let part = |subject| Part::new(plan, subject, groups.clone(), store, done);
+    let part = |subject| SubjectRun::new(plan, subject, groups.clone(), store, done);
     let answers = replayed(subjects.iter().map(part).collect());
     let mut results = Vec::with_capacity(subjects.len());
     let mut work = Work::default();
@@ -67,7 +67,7 @@ pub fn run_part(
     let all = groups(&plan.points);
     let part = |(subject, wanted): (_, &Vec<usize>)| {
         let groups = wanted.iter().map(|&group| all[group].clone()).collect();
-        Part::new(plan, subject, groups, Some(store), done)
+        SubjectRun::new(plan, subject, groups, Some(store), done)
     };
     let answers = replayed(subjects.iter().zip(wanted).map(part).collect());
     let mut work = Work::default();
@@ -191,7 +191,7 @@ pub(super) fn groups(points: &[Point]) -> Vec<Vec<usize>> {
 }
 
 /// The wanted groups of a trace: stored results, and results of the engine.
-struct Part<'p> {
+struct SubjectRun<'p> {
     plan: &'p Plan,
     subject: &'p Subject<'p>,
     groups: Vec<Vec<usize>>,
@@ -205,7 +205,7 @@ struct Part<'p> {
     unkept: Mutex<Option<anyhow::Error>>,
 }
 
-impl<'p> Part<'p> {
+impl<'p> SubjectRun<'p> {
     /// Reads the stored results.
     fn new(
         plan: &'p Plan,
@@ -271,9 +271,9 @@ impl<'p> Part<'p> {
 }
 
 /// Replays the missing groups of each part.
-fn replayed(parts: Vec<Part<'_>>) -> Vec<Result<(Vec<RunResult>, Work), RunError>> {
+fn replayed(parts: Vec<SubjectRun<'_>>) -> Vec<Result<(Vec<RunResult>, Work), RunError>> {
     let memory = LineMemory::new(LineMemory::USUAL_BYTES);
-    let tell = |part| move |index, result| Part::finished(part, index, result);
+    let tell = |part| move |index, result| SubjectRun::finished(part, index, result);
     let finished: Vec<_> = parts.iter().map(tell).collect();
     let mut jobs: Vec<Job<'_>> = Vec::with_capacity(parts.len());
     for (part, finished) in parts.iter().zip(&finished) {

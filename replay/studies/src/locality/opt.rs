@@ -61,7 +61,7 @@ impl FullyAssociative {
 
 /// A set-associative cache under OPT, with independent sets.
 #[derive(Clone, Debug)]
-pub(super) struct SetAssociative {
+pub(super) struct OptSets {
     /// By set: the time of its last use, then the times since which its other places are free. Times count
     /// from 1; zero is before all.
     sets: Vec<u32>,
@@ -71,7 +71,7 @@ pub(super) struct SetAssociative {
     pub(super) hits: ByOrigin,
 }
 
-impl SetAssociative {
+impl OptSets {
     /// An empty cache; `sets` is a power of two.
     pub(super) fn new(sets: u32, ways: u32) -> Self {
         Self {

@@ -1,6 +1,6 @@
 //! Belady's OPT for one cache over a recorded stream.
 
-use super::opt::{FullyAssociative, SetAssociative};
+use super::opt::{FullyAssociative, OptSets};
 use sim::config::{ConfigError, LevelConfig};
 use std::collections::HashMap;
 
@@ -26,7 +26,7 @@ pub fn opt_misses(
     let sets = cache.sets("L2", line_bytes)?;
     let times = u32::try_from(stream.len()).unwrap_or(u32::MAX);
     let mut full = FullyAssociative::new(sets * cache.ways, times.saturating_add(1));
-    let mut sets = SetAssociative::new(sets, cache.ways);
+    let mut sets = OptSets::new(sets, cache.ways);
     let mut last: HashMap<u32, u32> = HashMap::new();
     let mut misses = OptMisses {
         fully_associative: 0,

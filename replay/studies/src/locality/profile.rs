@@ -88,7 +88,7 @@ pub struct Profile {
     split: MissSplit,
     lru: SetAssociative,
     opt: Vec<opt::FullyAssociative>,
-    opt_of_geometry: opt::SetAssociative,
+    opt_of_geometry: opt::OptSets,
     working_sets: WorkingSets,
     frame_lines: u64,
     frame_lines_of_both_eyes: u64,
@@ -152,7 +152,7 @@ impl Profile {
             opt: opt
                 .map(|&size| opt::FullyAssociative::new(size, times))
                 .collect(),
-            opt_of_geometry: opt::SetAssociative::new(sets, ways),
+            opt_of_geometry: opt::OptSets::new(sets, ways),
             working_sets: WorkingSets::default(),
             frame_lines: 0,
             frame_lines_of_both_eyes: 0,

@@ -35,7 +35,7 @@ pub fn sharing(source: &dyn TileSource, config: &RunConfig) -> Result<Sharing, R
         ..*config
     };
     let lines = |keep: fn(&Pass) -> bool| {
-        let part = Part { source, keep };
+        let part = SomePasses { source, keep };
         replay(&part, &config).map(|result| result.unique_lines)
     };
     Ok(Sharing {
@@ -48,12 +48,12 @@ pub fn sharing(source: &dyn TileSource, config: &RunConfig) -> Result<Sharing, R
 }
 
 /// A trace with only some of its passes.
-struct Part<'a> {
+struct SomePasses<'a> {
     source: &'a dyn TileSource,
     keep: fn(&Pass) -> bool,
 }
 
-impl TileSource for Part<'_> {
+impl TileSource for SomePasses<'_> {
     fn tables(&self) -> &Tables {
         self.source.tables()
     }

@@ -302,7 +302,7 @@ impl Machine for PlainTimed {
         }
     }
 
-    fn outcome(&self, _config: &RunConfig) -> Outcome {
+    fn outcome(&self, _config: &RunConfig) -> MachineOutcome {
         let sum = |of: fn(&PlainUnit) -> u64| self.units.iter().map(of).sum::<u64>();
         let (useful, wasted) = (sum(|unit| unit.useful), sum(|unit| unit.wasted));
         let cycles = useful + wasted + sum(|unit| unit.idle);
@@ -310,7 +310,7 @@ impl Machine for PlainTimed {
             0 => 0.0,
             _ => useful as f64 / cycles as f64,
         };
-        Outcome {
+        MachineOutcome {
             counts: self.counts.clone(),
             tmu: Some(TmuResult {
                 utilization,

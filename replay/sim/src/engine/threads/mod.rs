@@ -11,7 +11,7 @@ mod prefetch_fifo;
 
 use super::counts::CacheCounts;
 use super::machine::{FrameWork, Machine};
-use super::outcome::Outcome;
+use super::outcome::MachineOutcome;
 use crate::access::FrameClients;
 use crate::config::{Allocation, ConfigError, RunConfig, TmuModel};
 use crate::memory::{Caches, Delay, DelayedFill, MissPath, OtherWork, SecondLevel};
@@ -52,7 +52,7 @@ trait ThreadModel: Send {
     fn stats(&self) -> Vec<PipelineStats>;
 
     /// Adds the counts that only this model has.
-    fn complete<D: DelayedFill>(&self, _shared: &Shared<D>, _outcome: &mut Outcome) {}
+    fn complete<D: DelayedFill>(&self, _shared: &Shared<D>, _outcome: &mut MachineOutcome) {}
 }
 
 /// A machine of clocked texture units.
@@ -110,11 +110,11 @@ impl<M: ThreadModel, D: DelayedFill> Machine for Clocked<M, D> {
         self.shared.follow_evictions(self.cycles);
     }
 
-    fn outcome(&self, _config: &RunConfig) -> Outcome {
+    fn outcome(&self, _config: &RunConfig) -> MachineOutcome {
         let counts = self.shared.counts.clone();
-        let mut outcome = Outcome {
+        let mut outcome = MachineOutcome {
             memory: self.shared.l2.result(),
-            ..Outcome::timed(counts, self.model.stats().into_iter(), self.cycles)
+            ..MachineOutcome::timed(counts, self.model.stats().into_iter(), self.cycles)
         };
         self.model.complete(&self.shared, &mut outcome);
         outcome

@@ -15,7 +15,7 @@ use std::collections::VecDeque;
 
 /// The texture units of all cores.
 pub struct PrefetchFifo {
-    units: Vec<Unit>,
+    units: Vec<FifoUnit>,
     tmu: TmuConfig,
     /// Start of the phase, and footprints that had left each FIFO before it.
     phase: (u64, Vec<u64>),
@@ -23,7 +23,7 @@ pub struct PrefetchFifo {
 
 /// A core's texture unit.
 #[derive(Default)]
-struct Unit {
+struct FifoUnit {
     /// Cycle of the next footprint's tag check.
     clock: u64,
     /// The quad whose footprints come next.
@@ -39,7 +39,7 @@ impl PrefetchFifo {
     /// One texture unit per core.
     pub fn new(config: &RunConfig, cores: usize) -> Self {
         Self {
-            units: (0..cores).map(|_| Unit::default()).collect(),
+            units: (0..cores).map(|_| FifoUnit::default()).collect(),
             tmu: config.tmu,
             phase: (0, Vec::new()),
         }

@@ -12,7 +12,7 @@ use std::ops::RangeInclusive;
 
 /// The levels below the L2, and memory.
 pub struct Below {
-    levels: Vec<Level>,
+    levels: Vec<LowerLevel>,
     dram: Option<Dram>,
     memory_cycles: u64,
     /// L2 lines that inclusive levels have evicted.
@@ -20,7 +20,7 @@ pub struct Below {
 }
 
 /// A level. A missing line is allocated immediately (allocation on miss).
-struct Level {
+struct LowerLevel {
     name: &'static str,
     /// One cache, or one per core.
     caches: Vec<Filling>,
@@ -65,7 +65,7 @@ impl Below {
                 })
             };
             let caches = (0..level.caches(config.cores)).map(&mut filling);
-            levels.push(Level {
+            levels.push(LowerLevel {
                 name,
                 caches: caches.collect::<Result<_, ConfigError>>()?,
                 lines: level.size_bytes / u64::from(line_bytes),
@@ -255,7 +255,7 @@ impl Below {
 
     /// Serves all requests and returns the counts of the levels (L3 first) and of the DRAM.
     pub fn result(&self) -> (Vec<LowerLevelResult>, Option<DramResult>) {
-        let level = |level: &Level| LowerLevelResult {
+        let level = |level: &LowerLevel| LowerLevelResult {
             name: level.name.to_owned(),
             line_bytes: level.line_bytes,
             line_miss_rate: level.misses as f64 / level.look_ups.max(1) as f64,
@@ -268,7 +268,7 @@ impl Below {
     }
 }
 
-impl Level {
+impl LowerLevel {
     /// The cache that a core uses.
     fn cache(&mut self, core: usize) -> &mut Box<dyn Cache> {
         &mut of_core(&mut self.caches, core).cache

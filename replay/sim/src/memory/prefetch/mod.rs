@@ -17,7 +17,7 @@ use tile_ahead::TileAhead;
 
 registry! { PrefetchRow:
     // constant        name             help
-    // lines; default lines   built from [`Parts`]
+    // lines; default lines   built from [`PrefetchParameters`]
     NEXT_LINE =     row("next-line",     "The next lines after each miss and each first use of a prefetched line",         ANY_LINES, 4,          |of| Box::new(NextLine { lines: of.lines }));
     ALIGNED_BLOCK = row("aligned-block", "The other lines of the aligned block of each line that misses",                  POWERS_OF_TWO, 4,      |of| Box::new(AlignedBlock { lines: of.lines }));
     NEXT_MIP =      row("next-mip",      "The same place of the coarser mip levels of each line that misses; textures only",    ANY_LINES, 1,          |of| Box::new(NextMip { levels: of.lines, layout: of.layout, line_bytes: of.line_bytes }));
@@ -34,11 +34,11 @@ pub struct PrefetchRow {
     help: &'static str,
     lines: LinesRule,
     usual_lines: u32,
-    build: fn(Parts) -> Box<dyn Prefetcher>,
+    build: fn(PrefetchParameters) -> Box<dyn Prefetcher>,
 }
 
 /// Parameters of a prefetcher.
-pub struct Parts {
+pub struct PrefetchParameters {
     /// The key `lines`.
     lines: u32,
     /// Line size of the L2 in bytes.
@@ -62,7 +62,7 @@ const fn row(
     help: &'static str,
     lines: LinesRule,
     usual_lines: u32,
-    build: fn(Parts) -> Box<dyn Prefetcher>,
+    build: fn(PrefetchParameters) -> Box<dyn Prefetcher>,
 ) -> PrefetchRow {
     PrefetchRow {
         name,
@@ -120,7 +120,7 @@ impl PrefetchConfig {
         line_bytes: u32,
         layout: Option<Arc<Layout>>,
     ) -> Box<dyn Prefetcher> {
-        (self.prefetcher.row().build)(Parts {
+        (self.prefetcher.row().build)(PrefetchParameters {
             lines: self.lines(),
             line_bytes: line_bytes.into(),
             layout,

@@ -29,17 +29,17 @@ use zig_zag::ZigZag;
 
 registry! { CurveRow:
     // constant            name         colour     number that may follow the name           help                                                                     the path
-    SCANLINE =   row("scanline",  VERMILION, Size::NONE,                                 "Rows from left to right",                                               &Scanline);
-    ZIG_ZAG =    row("zig-zag",   PURPLE,    Size::NONE,                                 "Rows, every other one from right to left",                              &ZigZag);
-    MORTON =     row("morton",    ORANGE,    Size::NONE,                                 "Z-order curve of the next power of two",                                &Morton);
-    HILBERT =    row("hilbert",   YELLOW,    Size::NONE,                                 "Hilbert curve of the next power of two",                                &Hilbert);
-    GILBERT =    row("gilbert",   GREEN,     Size::NONE,                                 "Hilbert curve generalised to any grid",                                 &GeneralisedHilbert);
-    STRIP =      row("strip",     BLUE,      Size::new("columns", strip::columns),       "Vertical strips of N columns, rows in alternating direction; without N as wide as the L2 allows", &Strip);
-    BAND =       row("band",      SKY_BLUE,  Size::new("rows", |_| band::USUAL_ROWS),    "Horizontal bands of N rows, columns in alternating direction; without N 4 rows", &Band);
-    ADAPTIVE =   row("adaptive",  GREEN,     Size::new("KiB of L2", adaptive::l2_kib),   "Rows if the L2 holds a row, otherwise bands, by the lines of the last frame", &Adaptive);
-    RANDOM =     row("random",    GREY,      Size::NONE,                                 "Shuffled cells: a control",                                           &Random);
+    SCANLINE =   row("scanline",  VERMILION, CurveSize::NONE,                                 "Rows from left to right",                                               &Scanline);
+    ZIG_ZAG =    row("zig-zag",   PURPLE,    CurveSize::NONE,                                 "Rows, every other one from right to left",                              &ZigZag);
+    MORTON =     row("morton",    ORANGE,    CurveSize::NONE,                                 "Z-order curve of the next power of two",                                &Morton);
+    HILBERT =    row("hilbert",   YELLOW,    CurveSize::NONE,                                 "Hilbert curve of the next power of two",                                &Hilbert);
+    GILBERT =    row("gilbert",   GREEN,     CurveSize::NONE,                                 "Hilbert curve generalised to any grid",                                 &GeneralisedHilbert);
+    STRIP =      row("strip",     BLUE,      CurveSize::new("columns", strip::columns),       "Vertical strips of N columns, rows in alternating direction; without N as wide as the L2 allows", &Strip);
+    BAND =       row("band",      SKY_BLUE,  CurveSize::new("rows", |_| band::USUAL_ROWS),    "Horizontal bands of N rows, columns in alternating direction; without N 4 rows", &Band);
+    ADAPTIVE =   row("adaptive",  GREEN,     CurveSize::new("KiB of L2", adaptive::l2_kib),   "Rows if the L2 holds a row, otherwise bands, by the lines of the last frame", &Adaptive);
+    RANDOM =     row("random",    GREY,      CurveSize::NONE,                                 "Shuffled cells: a control",                                           &Random);
     #[cfg(test)]
-    COLUMNS =    row("test-columns", GREY,   Size::NONE,                                 "Columns from the top",                                                  &super::tests::columns::Columns);
+    COLUMNS =    row("test-columns", GREY,   CurveSize::NONE,                                 "Columns from the top",                                                  &super::tests::columns::Columns);
 }
 
 /// A curve by name.
@@ -50,21 +50,21 @@ pub type Curve = Named<CurveRow>;
 pub struct CurveRow {
     name: &'static str,
     color: Rgb,
-    size: Size,
+    size: CurveSize,
     help: &'static str,
     path: &'static (dyn Path + Sync),
 }
 
 /// The number that may follow a curve's name.
 #[derive(Debug)]
-pub struct Size {
+pub struct CurveSize {
     /// Its unit; empty if the curve has no number.
     unit: &'static str,
     /// The default, given the size of the L2 in bytes.
     usual: fn(u64) -> u32,
 }
 
-impl Size {
+impl CurveSize {
     const NONE: Self = Self::new("", |_| 0);
 
     const fn new(unit: &'static str, usual: fn(u64) -> u32) -> Self {
@@ -75,7 +75,7 @@ impl Size {
 const fn row(
     name: &'static str,
     color: Rgb,
-    size: Size,
+    size: CurveSize,
     help: &'static str,
     path: &'static (dyn Path + Sync),
 ) -> CurveRow {

@@ -9,21 +9,21 @@ use crate::order::{PlanInputs, View};
 
 /// Pairs with one shift per row.
 #[derive(Debug)]
-pub struct Row {
+pub struct RowPairing {
     shifts: fn(&ViewCounters) -> &[i32],
 }
 
 /// Compares primitives.
-pub(super) const PRIMITIVES: Row = Row {
+pub(super) const PRIMITIVES: RowPairing = RowPairing {
     shifts: |of| &of.primitive_shift,
 };
 
 /// Compares lines.
-pub const LINES: Row = Row {
+pub const LINES: RowPairing = RowPairing {
     shifts: |of| &of.line_shift,
 };
 
-impl Rule for Row {
+impl Rule for RowPairing {
     fn place(&self, eyes: [View; 2], inputs: &PlanInputs<'_>) -> Placement {
         let Some(counted) = inputs.counted(eyes[0]) else {
             return Offset.place(eyes, inputs);

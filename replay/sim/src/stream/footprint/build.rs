@@ -2,7 +2,7 @@
 
 use super::axis::Axis;
 use super::general::General;
-use super::{Footprints, Group, Kind, Level, SampleRef};
+use super::{Footprints, Kind, MipLevel, SampleGroup, SampleRef};
 use crate::config::RunConfig;
 use crate::stream::StreamError;
 use formats::footprint::LodFormula;
@@ -22,7 +22,7 @@ struct KindKey {
     offset: [i8; 2],
     extent: [u32; 2],
     skew_bytes: u32,
-    /// Level and layer of a general sample, and the texture's layers.
+    /// MipLevel and layer of a general sample, and the texture's layers.
     general: Option<(SampleLevel, u16, u32)>,
 }
 
@@ -68,13 +68,13 @@ impl<'a> Builder<'a> {
             )));
         }
         let tables = self.tables;
-        let draws: Vec<Vec<Group>> = tables
+        let draws: Vec<Vec<SampleGroup>> = tables
             .draws
             .iter()
             .map(|draw| draw.groups.iter().map(|group| self.group(group)).collect())
             .collect::<Result<_, _>>()?;
         let sampling = &self.config.sampling;
-        let long = |groups: &Vec<Group>| {
+        let long = |groups: &Vec<SampleGroup>| {
             sampling.lod == LodFormula::PerLane || groups.iter().any(|g| g.is_long(sampling))
         };
         Ok(Footprints {
@@ -87,8 +87,8 @@ impl<'a> Builder<'a> {
         })
     }
 
-    fn group(&mut self, group: &UvGroup) -> Result<Group, StreamError> {
-        let mut out = Group::default();
+    fn group(&mut self, group: &UvGroup) -> Result<SampleGroup, StreamError> {
+        let mut out = SampleGroup::default();
         for sample in &group.samples {
             let kind = self.kind(sample, group.extent)?;
             let slot = out
@@ -174,7 +174,7 @@ impl<'a> Builder<'a> {
                     bytes.collect(),
                 )
             };
-            Level {
+            MipLevel {
                 base_bytes: layout.offset_bytes as u32,
                 u: axis(0),
                 v: axis(1),

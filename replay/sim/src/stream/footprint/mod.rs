@@ -45,7 +45,7 @@ pub struct Scratch {
 /// The footprint generator of a trace with one sampling and layout.
 #[derive(Debug)]
 pub struct Footprints {
-    draws: Vec<Vec<Group>>,
+    draws: Vec<Vec<SampleGroup>>,
     /// By draw: a level may have several bundles in some of its samples.
     long: Vec<bool>,
     line_shift: u32,
@@ -56,12 +56,12 @@ pub struct Footprints {
 
 /// A uv group: its kinds of textures, and its samples in shader order.
 #[derive(Debug, Default)]
-struct Group {
+struct SampleGroup {
     kinds: Vec<Arc<Kind>>,
     samples: Vec<(usize, SampleRef)>,
 }
 
-impl Group {
+impl SampleGroup {
     /// Whether a level may have several bundles.
     fn is_long(&self, sampling: &SamplingConfig) -> bool {
         let anisotropic = |kind: &Kind| sampling.is_anisotropic(&kind.sampler);
@@ -81,20 +81,20 @@ struct Kind {
     sampler: Sampler,
     /// Offset in bytes from the start of a line to the start of the texture.
     skew_bytes: u32,
-    levels: Vec<Level>,
+    levels: Vec<MipLevel>,
     general: Option<General>,
 }
 
 impl Kind {
     /// Size of a level in texels.
     fn level_size(&self, level: u32) -> [u32; 2] {
-        let Level { u, v, .. } = &self.levels[level as usize];
+        let MipLevel { u, v, .. } = &self.levels[level as usize];
         [u.texels(), v.texels()]
     }
 }
 
 #[derive(Debug)]
-struct Level {
+struct MipLevel {
     /// First byte within the layer.
     base_bytes: u32,
     u: Axis,
@@ -174,7 +174,7 @@ impl Footprints {
     #[inline(never)]
     fn for_long_quad(
         &self,
-        groups: &[Group],
+        groups: &[SampleGroup],
         records: &[QuadRecord],
         scratch: &mut Scratch,
         emit: &mut dyn FnMut(SampleRef, &Bundle),
@@ -256,7 +256,7 @@ impl Footprints {
         blocks: impl Iterator<Item = [i64; 2]>,
         out: &mut Vec<Bundle>,
     ) {
-        let Level { base_bytes, u, v } = &kind.levels[level as usize];
+        let MipLevel { base_bytes, u, v } = &kind.levels[level as usize];
         let base = base_bytes + kind.skew_bytes;
         let line = |offset: u32| (base + offset) >> self.line_shift;
         let mut last = [0; 4];
@@ -395,7 +395,7 @@ impl Footprints {
         out: &mut Bundle,
     ) {
         out.begin(level as u8);
-        let Level { base_bytes, u, v } = &kind.levels[level as usize];
+        let MipLevel { base_bytes, u, v } = &kind.levels[level as usize];
         let base = base_bytes + kind.skew_bytes;
         let line = |offset: u32| (base + offset) >> self.line_shift;
         // An array of closures over `axis` is not always inlined.

@@ -10,20 +10,20 @@
 mod pending;
 mod tally;
 
-use self::pending::{Pending, Under};
-use self::tally::{Access, ByTile, Level};
+use self::pending::{PendingLines, Under};
+use self::tally::{ByTile, FootprintLine, LevelTallies};
 use crate::config::{LevelConfig, RunConfig};
 use crate::engine::counts::{CacheCounts, CellMisses, TileMisses};
 use crate::engine::machine::{AtOnce, FrameWork, Machine};
-use crate::engine::outcome::Outcome;
+use crate::engine::outcome::MachineOutcome;
 use crate::memory::{Forest, OtherWork};
 use crate::stream::{Bins, Consumer, QuadLines, StreamError, Tag, interleave};
 
 /// Sets and ways of a cache.
-pub type Geometry = (u32, u32);
+pub type SetsAndWays = (u32, u32);
 
-/// Geometry of both levels.
-pub(crate) type LevelGeometry = (Geometry, Geometry);
+/// Sets and ways of both levels.
+pub(crate) type LevelGeometry = (SetsAndWays, SetsAndWays);
 
 /// The geometry of a configuration with a shared L2 whose caches are all plain LRU.
 pub fn geometry(config: &RunConfig) -> Option<LevelGeometry> {
@@ -40,13 +40,13 @@ pub fn geometry(config: &RunConfig) -> Option<LevelGeometry> {
 
 /// A set of LRU hierarchies.
 pub(crate) struct OnePass {
-    l1: Level,
+    l1: LevelTallies,
     /// One per core.
     forests: Vec<Forest>,
     under: Vec<Under>,
     /// The smallest associativity of the L1 caches.
     least_ways: u32,
-    pending: Pending,
+    pending: PendingLines,
 }
 
 impl OnePass {
@@ -54,13 +54,13 @@ impl OnePass {
     pub fn new(bins: &Bins, cores: u32, tile_maps: bool, geometries: &[LevelGeometry]) -> Self {
         let by_tile = |what| tile_maps.then_some(what);
         let l1 = geometries.iter().map(|g| g.0);
-        let l1 = Level::new(bins, by_tile(ByTile::Footprints), l1);
-        let mut distinct: Vec<Geometry> = geometries.iter().map(|g| g.0).collect();
+        let l1 = LevelTallies::new(bins, by_tile(ByTile::Footprints), l1);
+        let mut distinct: Vec<SetsAndWays> = geometries.iter().map(|g| g.0).collect();
         distinct.sort_unstable();
         distinct.dedup();
         let under = distinct.iter().map(|&of| {
             let below = geometries.iter().filter(|g| g.0 == of).map(|g| g.1);
-            let level = Level::new(bins, by_tile(ByTile::Lines), below);
+            let level = LevelTallies::new(bins, by_tile(ByTile::Lines), below);
             let (tree, rank) = l1.find(of);
             Under {
                 tree,
@@ -73,7 +73,7 @@ impl OnePass {
         Self {
             forests: (0..cores).map(|_| l1.forest()).collect(),
             least_ways: distinct.iter().map(|g| g.1).min().unwrap_or(0),
-            pending: Pending::new(l1.tallies.len()),
+            pending: PendingLines::new(l1.tallies.len()),
             under: under.collect(),
             l1,
         }
@@ -122,7 +122,7 @@ impl OnePass {
         let (cell, tile) = (quad.cell(index) as u32, quad.tile() as u32);
         let footprint = self.pending.footprint();
         loop {
-            self.pending.push(Access {
+            self.pending.push(FootprintLine {
                 line: quad.lines[index],
                 cell,
                 tile,
@@ -190,7 +190,7 @@ impl Machine for OnePass {
         }
     }
 
-    fn outcome(&self, config: &RunConfig) -> Outcome {
+    fn outcome(&self, config: &RunConfig) -> MachineOutcome {
         // Only configurations with a geometry are in a group of several.
         let counts = geometry(config).map(|geometry| self.counts(geometry));
         let mut counts = counts.unwrap_or_default();

@@ -4,7 +4,7 @@
 //! Processing a batch for one number of sets at a time keeps the loops short and free of unpredictable
 //! branches.
 
-use super::tally::{Access, Level};
+use super::tally::{FootprintLine, LevelTallies};
 use crate::memory::Forest;
 
 /// Accesses per batch: few enough for the processor's L1 cache, and very few in tests, which replay little.
@@ -19,23 +19,23 @@ pub(super) struct Under {
     pub(super) tree: usize,
     pub(super) ways: u8,
     pub(super) rank: usize,
-    pub(super) level: Level,
+    pub(super) level: LevelTallies,
     pub(super) forest: Forest,
 }
 
 /// Accesses to the L1 caches of all cores, in order.
-pub(super) struct Pending {
-    accesses: Vec<Access>,
+pub(super) struct PendingLines {
+    accesses: Vec<FootprintLine>,
     /// Depth of each line, by number of sets, with room for one more footprint.
     depths: Vec<u8>,
     /// Number of L1 set counts.
     trees: usize,
     /// Misses of one L1, with their depths for one number of L2 sets.
-    missed: Vec<Access>,
+    missed: Vec<FootprintLine>,
     l2_depths: Vec<u8>,
 }
 
-impl Pending {
+impl PendingLines {
     pub(super) fn new(trees: usize) -> Self {
         Self {
             accesses: Vec::with_capacity(MOST + LINES),
@@ -61,7 +61,7 @@ impl Pending {
 
     /// Adds an access whose depths have been written.
     #[inline(always)]
-    pub(super) fn push(&mut self, access: Access) {
+    pub(super) fn push(&mut self, access: FootprintLine) {
         self.accesses.push(access);
     }
 
@@ -72,7 +72,7 @@ impl Pending {
     }
 
     /// Counts all accesses and simulates the L2 caches.
-    pub(super) fn drain(&mut self, l1: &mut Level, under: &mut [Under]) {
+    pub(super) fn drain(&mut self, l1: &mut LevelTallies, under: &mut [Under]) {
         for (tree, tally) in l1.tallies.iter_mut().enumerate() {
             let depths = of_tree(&self.depths, self.trees, tree);
             tally.count(&self.accesses, depths);
@@ -105,7 +105,7 @@ fn of_tree(depths: &[u8], trees: usize, tree: usize) -> impl Iterator<Item = u8>
 
 /// Branch-free: keeps the accesses with a depth of at least `least`.
 #[inline(always)]
-fn retain(accesses: &mut Vec<Access>, depths: impl Iterator<Item = u8>, least: u8) {
+fn retain(accesses: &mut Vec<FootprintLine>, depths: impl Iterator<Item = u8>, least: u8) {
     let mut kept = 0;
     for (index, depth) in (0..accesses.len()).zip(depths) {
         // A dropped access is overwritten by the next one.

@@ -2,7 +2,7 @@
 //!
 //! Accesses are counted in batches and without branches, because whether a line misses is unpredictable.
 
-use super::Geometry;
+use super::SetsAndWays;
 use crate::engine::counts::Misses;
 use crate::memory::Forest;
 use crate::stream::Bins;
@@ -10,7 +10,7 @@ use std::hint::select_unpredictable;
 
 /// A line of a footprint that misses in some cache.
 #[derive(Clone, Copy)]
-pub(super) struct Access {
+pub(super) struct FootprintLine {
     pub(super) line: u32,
     pub(super) cell: u32,
     pub(super) tile: u32,
@@ -18,7 +18,7 @@ pub(super) struct Access {
     pub(super) footprint: u32,
 }
 
-impl Access {
+impl FootprintLine {
     /// Placeholder before the first access.
     const NONE: Self = Self {
         line: 0,
@@ -78,7 +78,7 @@ impl Tally {
     }
 
     /// Counts accesses, footprint by footprint. `depths` has each line's depth in its stack.
-    pub(super) fn count(&mut self, accesses: &[Access], depths: impl Iterator<Item = u8>) {
+    pub(super) fn count(&mut self, accesses: &[FootprintLine], depths: impl Iterator<Item = u8>) {
         match *self.ways {
             [ways] => self.count_one(ways as u8, accesses, depths),
             _ => self.count_several(accesses, depths),
@@ -86,7 +86,12 @@ impl Tally {
     }
 
     /// For one associativity: a footprint counts at its first miss.
-    fn count_one(&mut self, ways: u8, accesses: &[Access], depths: impl Iterator<Item = u8>) {
+    fn count_one(
+        &mut self,
+        ways: u8,
+        accesses: &[FootprintLine],
+        depths: impl Iterator<Item = u8>,
+    ) {
         // Separate borrows, so that they stay in registers.
         let (lines, footprints) = (
             &mut self.lines.counts[1..],
@@ -115,7 +120,7 @@ impl Tally {
 
     /// For several associativities: a footprint counts at its end, by the most associativities that miss
     /// any of its lines.
-    fn count_several(&mut self, accesses: &[Access], depths: impl Iterator<Item = u8>) {
+    fn count_several(&mut self, accesses: &[FootprintLine], depths: impl Iterator<Item = u8>) {
         let classes = self.ways.len();
         let place = |bin: u32, missing: u8| bin as usize * classes + usize::from(missing);
         let (lines, footprints) = (&mut *self.lines.counts, &mut *self.footprints.counts);
@@ -126,7 +131,7 @@ impl Tally {
                 *total = total.wrapping_add(u32::from(count));
             }
         };
-        let mut last = Access::NONE;
+        let mut last = FootprintLine::NONE;
         // The most associativities that miss a line of the current footprint.
         let mut most = 0;
         for (access, depth) in accesses.iter().zip(depths) {
@@ -169,21 +174,21 @@ impl Tally {
 }
 
 /// All caches of a level that receive the same lines.
-pub(super) struct Level {
+pub(super) struct LevelTallies {
     /// By number of sets, ascending.
     pub(super) tallies: Vec<Tally>,
 }
 
-impl Level {
+impl LevelTallies {
     pub(super) fn new(
         bins: &Bins,
         by_tile: Option<ByTile>,
-        geometries: impl Iterator<Item = Geometry>,
+        geometries: impl Iterator<Item = SetsAndWays>,
     ) -> Self {
-        let mut sorted: Vec<Geometry> = geometries.collect();
+        let mut sorted: Vec<SetsAndWays> = geometries.collect();
         sorted.sort_unstable();
         sorted.dedup();
-        let tally = |same_sets: &[Geometry]| {
+        let tally = |same_sets: &[SetsAndWays]| {
             let ways: Vec<u32> = same_sets.iter().map(|&(_, ways)| ways).collect();
             let depth = ways.last().copied().unwrap_or(0);
             let missing = |depth| ways.iter().filter(|&&w| w <= depth).count() as u8;
@@ -209,7 +214,7 @@ impl Level {
     }
 
     /// Index of the number of sets, and rank of the associativity.
-    pub(super) fn find(&self, (sets, ways): Geometry) -> (usize, usize) {
+    pub(super) fn find(&self, (sets, ways): SetsAndWays) -> (usize, usize) {
         let tree = self.tallies.partition_point(|tally| tally.sets < sets);
         (tree, self.tallies[tree].rank(ways))
     }

@@ -9,7 +9,7 @@ mod thread;
 
 use super::{CoreRun, Shared, ThreadModel, start_item};
 use crate::config::{RunConfig, TmuConfig};
-use crate::engine::outcome::Outcome;
+use crate::engine::outcome::MachineOutcome;
 use crate::memory::DelayedFill;
 use crate::stream::StreamError;
 use crate::tmu::PipelineStats;
@@ -20,13 +20,13 @@ pub(super) use thread::Thread;
 /// Cores whose threads stop at their first miss.
 pub struct FirstMiss {
     memory: FirstMissMemory,
-    units: Vec<Unit>,
+    units: Vec<FirstMissUnit>,
     tmu: TmuConfig,
 }
 
 /// A core's texture unit.
 #[derive(Default)]
-struct Unit {
+struct FirstMissUnit {
     clock: u64,
     /// The running thread, and the cycle at which its current trip began.
     running: Option<(u64, Thread)>,
@@ -48,7 +48,7 @@ enum Next {
     Done,
 }
 
-impl Unit {
+impl FirstMissUnit {
     /// Advances time until a thread occupies the slot or a new one can.
     fn next(&mut self, threads: u32) -> Next {
         if self.running.is_some() {
@@ -74,7 +74,7 @@ impl FirstMiss {
     /// One texture unit per core.
     pub fn new(config: &RunConfig, cores: usize) -> Self {
         Self {
-            units: (0..cores).map(|_| Unit::default()).collect(),
+            units: (0..cores).map(|_| FirstMissUnit::default()).collect(),
             memory: FirstMissMemory::new(cores),
             tmu: config.tmu,
         }
@@ -168,7 +168,7 @@ impl ThreadModel for FirstMiss {
         self.units.iter().map(|unit| unit.stats).collect()
     }
 
-    fn complete<D: DelayedFill>(&self, _shared: &Shared<D>, outcome: &mut Outcome) {
+    fn complete<D: DelayedFill>(&self, _shared: &Shared<D>, outcome: &mut MachineOutcome) {
         let useful = self.units.iter().map(|unit| unit.stats.useful).sum();
         outcome.first_lookups = Some(self.memory.first.over(useful));
     }

@@ -12,7 +12,7 @@ pub(super) const FETCHES_UNTIL_KEPT: u32 = 8;
 #[derive(Debug, Default)]
 pub(crate) struct Thread {
     lines: Vec<u32>,
-    footprints: Vec<Listed>,
+    footprints: Vec<ThreadFootprint>,
     tile: usize,
     /// Index of the next footprint, index of its first line, and number of its repeats already filtered.
     at: usize,
@@ -24,7 +24,7 @@ pub(crate) struct Thread {
 
 /// A footprint and its number of repeats.
 #[derive(Debug)]
-struct Listed {
+struct ThreadFootprint {
     end: usize,
     repeats: u32,
     cell: usize,
@@ -65,7 +65,7 @@ impl Thread {
         let mut end = 0;
         self.footprints.extend(quad.footprints().map(|footprint| {
             end += footprint.lines.len();
-            Listed {
+            ThreadFootprint {
                 end,
                 repeats: footprint.repeats,
                 cell: footprint.cell,

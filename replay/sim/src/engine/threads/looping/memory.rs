@@ -27,7 +27,7 @@ struct LookedUp {
 
 /// Outcome of a thread's look-up in the core's L1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Found {
+pub enum QuadLookup {
     /// All lines are resident.
     All,
     /// The missing lines are all in flight.
@@ -68,7 +68,7 @@ impl LoopingMemory {
         core: usize,
         now: u64,
         quad: &QuadLines<'_>,
-    ) -> Found {
+    ) -> QuadLookup {
         let LookedUp {
             waiting,
             absent,
@@ -78,7 +78,7 @@ impl LoopingMemory {
         absent.clear();
         if self.misses_change_caches_at_once || quad.distinct.is_empty() {
             // Distinct lines are not listed; `request` looks footprints up one by one.
-            return Found::NotAll;
+            return QuadLookup::NotAll;
         }
         let (cache, counts) = (&mut shared.l1[core], &mut shared.counts);
         let mut look_up = |lines: Range<usize>, segment: u32| {
@@ -106,9 +106,9 @@ impl LoopingMemory {
             }
         }
         match (absent.is_empty(), waiting.is_empty()) {
-            (false, _) => Found::NotAll,
-            (true, false) => Found::InFlight,
-            (true, true) => Found::All,
+            (false, _) => QuadLookup::NotAll,
+            (true, false) => QuadLookup::InFlight,
+            (true, true) => QuadLookup::All,
         }
     }
 

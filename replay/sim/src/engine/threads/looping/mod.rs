@@ -7,11 +7,11 @@ mod timeline;
 
 use super::{CoreRun, Shared, ThreadModel, start_item};
 use crate::config::RunConfig;
-use crate::engine::outcome::Outcome;
+use crate::engine::outcome::MachineOutcome;
 use crate::memory::DelayedFill;
 use crate::stream::StreamError;
 use crate::tmu::{Pipeline, PipelineStats, Turn};
-use memory::{Found, LoopingMemory};
+use memory::{LoopingMemory, QuadLookup};
 use timeline::Recorder;
 
 /// The texture units of all cores.
@@ -71,14 +71,14 @@ impl ThreadModel for Looping {
                             continue;
                         }
                         match self.memory.look_up(shared, core, now, &quad) {
-                            Found::All | Found::InFlight => {
+                            QuadLookup::All | QuadLookup::InFlight => {
                                 unit.start(quad.footprints, self.memory.waiting(core));
                             }
-                            Found::NotAll if now > until => {
+                            QuadLookup::NotAll if now > until => {
                                 self.is_requesting[core] = true;
                                 return Ok(now);
                             }
-                            Found::NotAll => {
+                            QuadLookup::NotAll => {
                                 let waiting = self.memory.request(shared, core, now, &quad);
                                 unit.start(quad.footprints, waiting);
                             }
@@ -111,7 +111,7 @@ impl ThreadModel for Looping {
         self.units.iter().map(Pipeline::stats).collect()
     }
 
-    fn complete<D: DelayedFill>(&self, shared: &Shared<D>, outcome: &mut Outcome) {
+    fn complete<D: DelayedFill>(&self, shared: &Shared<D>, outcome: &mut MachineOutcome) {
         let recorder = self.recorder.as_ref();
         outcome.timeline = recorder.map(|of| of.timeline(shared.l2.fetched_lines()));
     }
