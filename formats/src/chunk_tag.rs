@@ -3,7 +3,7 @@
 use std::fmt;
 
 /// Four printable ASCII characters that name a chunk.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Clone, Copy, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ChunkTag(pub [u8; 4]);
 
 impl fmt::Display for ChunkTag {

@@ -6,7 +6,7 @@ use std::io;
 use thiserror::Error;
 
 /// Result of the functions that read or write traces.
-pub type Result<T> = std::result::Result<T, FormatError>;
+pub type Result<T, E = FormatError> = std::result::Result<T, E>;
 
 /// Part of a file that an error refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +102,22 @@ impl FormatError {
         }
     }
 
+    pub(crate) fn malformed(
+        file: &str,
+        place: Place,
+        offset: u64,
+        expected: impl fmt::Display,
+        found: impl fmt::Display,
+    ) -> Self {
+        Self::Malformed {
+            file: file.to_owned(),
+            place,
+            offset,
+            expected: expected.to_string(),
+            found: found.to_string(),
+        }
+    }
+
     /// Offset of the first bad byte, if the error has one.
     #[must_use]
     pub fn offset(&self) -> Option<u64> {
@@ -144,10 +160,15 @@ impl Broken {
     }
 }
 
-/// Fails unless `holds`.
+/// Fails unless `holds`. The texts are only formatted for a failure.
 pub(crate) fn ensure(
     holds: bool,
-    broken: impl FnOnce() -> Broken,
-) -> std::result::Result<(), Broken> {
-    if holds { Ok(()) } else { Err(broken()) }
+    what: impl fmt::Display,
+    expected: impl fmt::Display,
+    found: impl fmt::Display,
+) -> Result<(), Broken> {
+    match holds {
+        true => Ok(()),
+        false => Err(Broken::new(what.to_string(), expected.to_string(), found)),
+    }
 }

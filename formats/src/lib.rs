@@ -14,6 +14,7 @@ pub mod layout;
 mod parse;
 pub mod random;
 pub mod raytrace;
+mod records;
 #[cfg(feature = "testing")]
 pub mod schemas;
 pub mod text;
@@ -25,7 +26,7 @@ mod varint;
 pub mod view;
 
 #[cfg(test)]
-mod spec;
+mod tests;
 
 pub use error::{Broken, FormatError, Result};
 pub use trace::Trace;

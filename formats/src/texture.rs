@@ -6,11 +6,12 @@ use serde::{Deserialize, Serialize};
 ///
 /// A trace names the format used at capture; replay may choose another, since records hold
 /// texture coordinates and not addresses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u16)]
 pub enum TexelFormat {
     /// 4x4 texels in 8 bytes (DXT1).
+    #[default]
     Bc1 = 1,
     /// 4x4 texels in 16 bytes (DXT3).
     Bc2 = 2,
@@ -93,33 +94,15 @@ impl TexelFormat {
                 | Self::Packed32
         )
     }
-
-    /// Whether version 1 of the trace has the format.
-    #[must_use]
-    pub(crate) const fn is_in_version_1(self) -> bool {
-        matches!(
-            self,
-            Self::Bc1
-                | Self::Bc3
-                | Self::Bc7
-                | Self::Etc2
-                | Self::Etc2Rgba
-                | Self::Astc4x4
-                | Self::Astc5x5
-                | Self::Astc6x6
-                | Self::Astc8x8
-                | Self::Rgba8
-                | Self::R32f
-        )
-    }
 }
 
 /// Handling of coordinates outside 0..1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
 pub enum Wrap {
     /// Repeat.
+    #[default]
     Repeat = 0,
     /// Repeat, mirrored every other time.
     MirroredRepeat = 1,
@@ -140,22 +123,24 @@ impl Wrap {
 }
 
 /// Minification and magnification filter within a level.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
 pub enum Filter {
     /// One texel.
+    #[default]
     Nearest = 0,
     /// 2x2 texels.
     Linear = 1,
 }
 
 /// Filter between mip levels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
 pub enum MipFilter {
     /// Level 0 only.
+    #[default]
     None = 0,
     /// The nearer level.
     Nearest = 1,
@@ -237,13 +222,6 @@ impl Sampler {
     /// Largest anisotropy of all APIs, in 1/256.
     pub const MOST_ANISOTROPIC: u16 = 4096;
 
-    /// Whether version 1 of the trace can represent the sampler.
-    #[must_use]
-    pub(crate) fn is_in_version_1(&self) -> bool {
-        let known = |wrap: &Wrap| (*wrap as u8) <= Wrap::ClampToEdge as u8;
-        self.wrap.iter().all(known) && self.lod.is_whole()
-    }
-
     /// Whether long and narrow pixels are filtered differently from others.
     #[must_use]
     pub fn is_anisotropic(&self) -> bool {
@@ -282,19 +260,26 @@ impl Sampler {
     };
 }
 
+impl Default for Sampler {
+    fn default() -> Self {
+        Self::TRILINEAR_REPEAT
+    }
+}
+
 /// Colour space of the stored texels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
 pub enum ColorSpace {
     /// Linear data (normal maps, roughness, depth).
+    #[default]
     Linear = 0,
     /// sRGB-encoded colour.
     Srgb = 1,
 }
 
 /// One texture (an image in memory) of a trace.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Texture {
     /// Name for reports: the image's file name, or the procedural texture's.
     pub name: String,

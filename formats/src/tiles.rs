@@ -2,11 +2,12 @@
 //! checksum, so that it can be read alone.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use crate::container::{ChunkTag, Container};
-use crate::error::{Place, Result};
-use crate::parse::{Parsed, parse_all};
-use nom::Parser;
-use nom::number::complete::{le_u32, le_u64};
+use crate::container::{ChunkTag, Container, ContainerWriter};
+use crate::error::{Broken, FormatError, Place, Result};
+use crate::parse::{Parsed, Taken, parse_all};
+use crate::records::{Codec, Record, parse_records};
+use std::io::{Read, Seek, Write};
+use tempfile::SpooledTempFile;
 
 /// Position of a tile: the first 16 bytes of every index entry.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,33 +20,17 @@ pub struct TileSpan {
     pub crc32: u32,
 }
 
-impl TileSpan {
-    /// Appends the span.
-    pub fn write(&self, out: &mut Vec<u8>) {
-        out.extend(self.offset.to_le_bytes());
-        out.extend(self.bytes.to_le_bytes());
-        out.extend(self.crc32.to_le_bytes());
-    }
-
-    /// Reads a span.
-    pub fn parse(input: &[u8]) -> Parsed<'_, Self> {
-        let (rest, (offset, bytes, crc32)) = (le_u64, le_u32, le_u32).parse(input)?;
-        Ok((
-            rest,
-            Self {
-                offset,
-                bytes,
-                crc32,
-            },
-        ))
+impl Record for TileSpan {
+    fn fields<'a>(&mut self, codec: &mut Codec<'a>) -> Taken<'a> {
+        codec.number(&mut self.offset)?;
+        codec.number(&mut self.bytes)?;
+        codec.number(&mut self.crc32)
     }
 }
 
-/// The chunk of tiles of an open trace and its index.
+/// The chunk of tiles of a trace and its index.
 #[derive(Clone, Copy, Debug)]
-pub struct TileChunk<'a> {
-    /// The file.
-    pub container: &'a Container,
+pub struct TileChunk {
     /// Chunk of the tiles.
     pub tiles: ChunkTag,
     /// Chunk of the index.
@@ -54,16 +39,32 @@ pub struct TileChunk<'a> {
     pub entry_bytes: usize,
 }
 
-impl TileChunk<'_> {
+impl TileChunk {
+    /// Reads an index that has an entry for each of `slots` tiles.
+    ///
+    /// # Errors
+    /// The chunk is missing, damaged or of another size, or an entry is malformed.
+    pub fn read_index<T: Record>(&self, container: &Container, slots: u64) -> Result<Vec<T>> {
+        let bytes = container.chunk(self.index)?.len() as u64;
+        if slots.checked_mul(self.entry_bytes as u64) != Some(bytes) {
+            let expected = format!("{} bytes for each of {slots} tiles", self.entry_bytes);
+            return Err(container.malformed(self.index, 0, expected, format!("{bytes} bytes")));
+        }
+        let (major, _) = container.version();
+        container.parse_chunk(self.index, |input| parse_records(major, input))
+    }
+
     /// Checks that the tiles fill their chunk in index order without overlap or gap, and the checksums of
     /// all chunks. `spans` has every slot of the index, `None` for slots without tile.
     ///
     /// # Errors
     /// The first entry that is out of place; the first damaged tile, or else the damaged chunk.
-    pub fn check(&self, spans: impl Iterator<Item = Option<TileSpan>> + Clone) -> Result<()> {
-        let Self {
-            container, index, ..
-        } = *self;
+    pub fn check(
+        &self,
+        container: &Container,
+        spans: impl Iterator<Item = Option<TileSpan>> + Clone,
+    ) -> Result<()> {
+        let index = self.index;
         let chunk_bytes = container.entry(self.tiles)?.length_bytes;
         let mut end = 0u64;
         for (slot, span) in spans.clone().enumerate() {
@@ -87,7 +88,7 @@ impl TileChunk<'_> {
         if container.chunk(self.tiles).is_err() {
             // The tiles' checksums are checked first, because they locate damage more precisely.
             for span in spans.flatten() {
-                self.bytes(&span)?;
+                self.bytes(container, &span)?;
             }
         }
         container.check_chunks()
@@ -97,8 +98,8 @@ impl TileChunk<'_> {
     ///
     /// # Errors
     /// The bytes are damaged.
-    fn bytes(&self, span: &TileSpan) -> Result<&[u8]> {
-        let chunk = self.container.chunk_unchecked(self.tiles)?;
+    fn bytes<'a>(&self, container: &'a Container, span: &TileSpan) -> Result<&'a [u8]> {
+        let chunk = container.chunk_unchecked(self.tiles)?;
         // The index was checked against the chunk when the file was opened.
         let bytes = usize::try_from(span.offset)
             .ok()
@@ -110,9 +111,7 @@ impl TileChunk<'_> {
         }
         let expected = format!("a tile with CRC-32 {:08x}", span.crc32);
         let found = format!("{crc32:08x}");
-        Err(self
-            .container
-            .malformed(self.tiles, span.offset, expected, found))
+        Err(container.malformed(self.tiles, span.offset, expected, found))
     }
 
     /// Runs a parser over a complete tile.
@@ -121,13 +120,78 @@ impl TileChunk<'_> {
     /// The tile is damaged, or rejected by the parser; the error names the byte.
     pub fn parse<T>(
         &self,
+        container: &Container,
         span: &TileSpan,
         parser: impl for<'b> FnOnce(&'b [u8]) -> Parsed<'b, T>,
     ) -> Result<T> {
-        let bytes = self.bytes(span)?;
-        let start = self.container.entry(self.tiles)?.offset_bytes;
+        let bytes = self.bytes(container, span)?;
+        let start = container.entry(self.tiles)?.offset_bytes;
         let at = start.saturating_add(span.offset);
         let place = Place::Chunk(self.tiles);
-        parse_all(self.container.file(), place, at, bytes, parser)
+        parse_all(container.file(), place, at, bytes, parser)
     }
+}
+
+/// Tiles in a temporary file, because only one chunk can be written at a time.
+#[derive(Debug)]
+pub struct TileSpool {
+    file: SpooledTempFile,
+    end: u64,
+}
+
+impl TileSpool {
+    /// Size of the tiles in memory before they are moved to the file.
+    pub const IN_MEMORY_BYTES: usize = 64 << 20;
+
+    /// Starts with an empty file.
+    pub fn new(file: SpooledTempFile) -> Self {
+        Self { file, end: 0 }
+    }
+
+    /// Appends a tile; `what` names it in errors.
+    ///
+    /// # Errors
+    /// The tile is too large, or the file cannot be written.
+    pub fn append(&mut self, what: &str, tile: &[u8]) -> Result<TileSpan> {
+        let span = TileSpan {
+            offset: self.end,
+            bytes: size_u32(what, tile.len())?,
+            crc32: crc32fast::hash(tile),
+        };
+        let written = self.file.write_all(tile);
+        written.map_err(|source| FormatError::io("temporary file", "write", source))?;
+        self.end += u64::from(span.bytes);
+        Ok(span)
+    }
+
+    /// Writes the tiles as a chunk.
+    ///
+    /// # Errors
+    /// The file cannot be read, or the chunk cannot be written.
+    pub fn write<W: Write + Seek>(
+        &mut self,
+        tag: ChunkTag,
+        container: &mut ContainerWriter<W>,
+    ) -> Result<()> {
+        let failed = |source| FormatError::io("temporary file", "read", source);
+        self.file.rewind().map_err(failed)?;
+        container.begin_chunk(tag)?;
+        let mut buffer = vec![0; 1 << 16];
+        loop {
+            let count = self.file.read(&mut buffer).map_err(failed)?;
+            match buffer.get(..count) {
+                Some(read) if count > 0 => container.append(read)?,
+                _ => return container.end_chunk(),
+            }
+        }
+    }
+}
+
+/// A size in the four bytes of an index entry.
+///
+/// # Errors
+/// It does not fit.
+pub fn size_u32(what: &str, bytes: usize) -> Result<u32> {
+    let too_large = |_| Broken::new(what, "less than 2^32 bytes", bytes).unwritable();
+    u32::try_from(bytes).map_err(too_large)
 }

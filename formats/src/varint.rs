@@ -1,7 +1,7 @@
 //! Variable-length numbers (LEB128) and signed differences (zigzag).
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use crate::parse::{Cursor, Fault, Parsed};
+use crate::parse::{Cursor, Fault, Parsed, Taken};
 
 /// Appends a number: seven bits per byte, the lowest first. The top bit marks that more bytes follow.
 pub fn put(mut value: u64, bytes: &mut Vec<u8>) {
@@ -27,11 +27,9 @@ pub fn take<'a>(what: &'static str, bits: u32, input: &'a [u8]) -> Parsed<'a, u6
             return Ok((input.get(index + 1..).unwrap_or_default(), value));
         }
     }
-    Err(nom::Err::Failure(Fault::new(
-        input,
-        format!("{what}, below 2^{bits} and in as few bytes as it needs"),
-        format_args!("{:02x?}", input.get(..most).unwrap_or(input)),
-    )))
+    let expected = format_args!("{what}, below 2^{bits} and in as few bytes as it needs");
+    let found = input.get(..most).unwrap_or(input);
+    Err(Fault::new(input, expected, format_args!("{found:02x?}")))
 }
 
 /// Maps small numbers of either sign to small numbers: 0, -1, 1, -2, ...
@@ -70,7 +68,7 @@ impl<'a> Cursor<'a> {
     /// # Errors
     /// The bytes end, or the number is too large or its encoding too long.
     #[inline]
-    pub fn number(&mut self, what: &'static str, bits: u32) -> Result<u64, nom::Err<Fault<'a>>> {
+    pub fn number(&mut self, what: &'static str, bits: u32) -> Taken<'a, u64> {
         self.parse(|input| take(what, bits, input))
     }
 
@@ -79,7 +77,7 @@ impl<'a> Cursor<'a> {
     /// # Errors
     /// See [`Self::number`].
     #[inline]
-    pub fn number_u32(&mut self, what: &'static str) -> Result<u32, nom::Err<Fault<'a>>> {
+    pub fn number_u32(&mut self, what: &'static str) -> Taken<'a, u32> {
         self.number(what, 32).map(low_u32)
     }
 
@@ -88,11 +86,7 @@ impl<'a> Cursor<'a> {
     /// # Errors
     /// See [`Self::number`].
     #[inline]
-    pub fn difference(
-        &mut self,
-        previous: &mut u32,
-        what: &'static str,
-    ) -> Result<u32, nom::Err<Fault<'a>>> {
+    pub fn difference(&mut self, previous: &mut u32, what: &'static str) -> Taken<'a, u32> {
         let code = self.number(what, 32)?;
         *previous = previous.wrapping_add(low_u32(unzigzag(code).cast_unsigned()));
         Ok(*previous)

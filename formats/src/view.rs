@@ -56,25 +56,18 @@ impl FovTangents {
     /// The tangent or sum that is out of range.
     pub fn check(&self) -> Result<(), Broken> {
         let all = [self.left, self.right, self.up, self.down];
+        let (what, found) = ("field-of-view tangents", format_args!("{all:?}"));
         ensure(
             all.iter().all(|tangent| tangent.abs() <= MAX_TANGENT),
-            || {
-                Broken::new(
-                    "field-of-view tangents",
-                    format!("left, right, up and down each from -{MAX_TANGENT} to {MAX_TANGENT}"),
-                    format_args!("{all:?}"),
-                )
-            },
+            what,
+            format_args!("left, right, up and down each from -{MAX_TANGENT} to {MAX_TANGENT}"),
+            found,
         )?;
         ensure(
             self.left + self.right > MIN_TANGENT_SUM && self.up + self.down > MIN_TANGENT_SUM,
-            || {
-                Broken::new(
-                    "field-of-view tangents",
-                    format!("left + right and up + down above {MIN_TANGENT_SUM}"),
-                    format_args!("{all:?}"),
-                )
-            },
+            what,
+            format_args!("left + right and up + down above {MIN_TANGENT_SUM}"),
+            found,
         )
     }
 }
@@ -126,31 +119,24 @@ impl Lens {
     pub fn check(&self) -> Result<(), Broken> {
         let figures = [self.center[0], self.center[1], self.radius];
         let fits = figures.iter().all(|t| t.abs() <= MAX_TANGENT) && self.radius > 0.0;
-        ensure(fits, || {
-            Broken::new(
-                "lens",
-                format!(
-                    "centre x and y from -{MAX_TANGENT} to {MAX_TANGENT}, radius above 0 to {MAX_TANGENT}"
-                ),
-                format_args!("{figures:?}"),
-            )
-        })
+        ensure(
+            fits,
+            "lens",
+            format_args!(
+                "centre x and y from -{MAX_TANGENT} to {MAX_TANGENT}, radius above 0 to {MAX_TANGENT}"
+            ),
+            format_args!("{figures:?}"),
+        )
     }
 }
 
 /// Checks the size of an eye's image.
 pub(crate) fn check_eye_size(size_px: [u32; 2]) -> Result<(), Broken> {
     ensure(
-        size_px
-            .iter()
-            .all(|size| (1..=MAX_EYE_SIZE_PX).contains(size)),
-        || {
-            Broken::new(
-                "size of an eye's image",
-                format!("1 to {MAX_EYE_SIZE_PX} pixels each way"),
-                format_args!("{size_px:?}"),
-            )
-        },
+        (size_px.iter()).all(|size| (1..=MAX_EYE_SIZE_PX).contains(size)),
+        "size of an eye's image",
+        format_args!("1 to {MAX_EYE_SIZE_PX} pixels each way"),
+        format_args!("{size_px:?}"),
     )
 }
 
@@ -181,20 +167,18 @@ impl Hmd {
         for fov in &self.fov {
             fov.check()?;
         }
-        ensure((0.0..=MAX_IPD_M).contains(&self.ipd_m), || {
-            Broken::new(
-                "distance between the eyes",
-                format!("0 to {MAX_IPD_M} m"),
-                format_args!("{} m", self.ipd_m),
-            )
-        })?;
-        ensure(self.cant_deg.abs() <= MAX_CANT_DEG, || {
-            Broken::new(
-                "cant",
-                format!("-{MAX_CANT_DEG} to {MAX_CANT_DEG} degrees"),
-                format_args!("{} degrees", self.cant_deg),
-            )
-        })
+        ensure(
+            (0.0..=MAX_IPD_M).contains(&self.ipd_m),
+            "distance between the eyes",
+            format_args!("0 to {MAX_IPD_M} m"),
+            format_args!("{} m", self.ipd_m),
+        )?;
+        ensure(
+            self.cant_deg.abs() <= MAX_CANT_DEG,
+            "cant",
+            format_args!("-{MAX_CANT_DEG} to {MAX_CANT_DEG} degrees"),
+            format_args!("{} degrees", self.cant_deg),
+        )
     }
 }
 

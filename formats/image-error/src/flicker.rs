@@ -93,7 +93,7 @@ impl Source {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_pictures::{noise, panned, scene_like, shifted};
+    use crate::testing::{noise, panned, scene_like, shifted};
 
     fn of(frames: [[&Picture; 2]; 2]) -> f64 {
         let motion = Motion::between(frames[0][0], frames[1][0]);

@@ -321,7 +321,7 @@ fn color_error(distance: f32, largest: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_pictures::{noise, scene_like, shifted};
+    use crate::testing::{noise, scene_like, shifted};
 
     /// The authors' C++ implementation.
     fn reference_flip(a: &Picture, b: &Picture, ppd: f32) -> Vec<f32> {

@@ -133,7 +133,7 @@ pub fn mean(values: &[f32]) -> f64 {
 }
 
 #[cfg(test)]
-pub(crate) mod test_pictures;
+pub(crate) mod testing;
 
 #[cfg(test)]
 mod tests {

@@ -206,7 +206,7 @@ fn between_pixels(before: &Level, now: &Level, block: [usize; 2], vector: [isize
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_pictures::panned;
+    use crate::testing::panned;
 
     #[test]
     fn a_panned_picture_moves_by_the_pan_to_half_a_pixel() {

@@ -37,7 +37,7 @@ pub fn encode(picture: &Picture) -> Result<Vec<u8>, PngError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_pictures::noise;
+    use crate::testing::noise;
 
     #[test]
     fn an_encoded_picture_decodes_to_the_same_pixels() {

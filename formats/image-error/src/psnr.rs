@@ -47,7 +47,7 @@ pub(crate) fn psnr_of_squares(squares: u64, count: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_pictures::noise;
+    use crate::testing::noise;
 
     #[test]
     fn one_code_of_difference_everywhere_is_48_db() {

@@ -82,7 +82,7 @@ fn blur(source: &[[f64; 5]], [width, height]: [usize; 2], vertical: bool) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::test_pictures::{noise, scene_like, shifted};
+    use crate::testing::{noise, scene_like, shifted};
 
     /// The definition, with every window summed in two dimensions.
     fn brute_force(a: &Picture, b: &Picture) -> f64 {

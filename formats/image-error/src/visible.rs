@@ -182,7 +182,7 @@ mod tests {
     use super::*;
     use crate::flip::flip;
     use crate::psnr::psnr_db;
-    use crate::test_pictures::{noise, scene_like, shifted};
+    use crate::testing::{noise, scene_like, shifted};
 
     const FOV: FovTangents = FovTangents {
         left: 1.0,

@@ -41,21 +41,13 @@ pub(crate) const MAJOR_3: u16 = 3;
 pub const CHUNK_ALIGNMENT_BYTES: u64 = 8;
 
 /// Kinds of trace files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u16)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Kind {
     /// Texture addresses (`.textrace`).
-    Textrace = 1,
+    #[default]
+    Textrace,
     /// Rays (`.raytrace`).
-    Raytrace = 2,
-}
-
-impl Kind {
-    fn from_id(id: u16) -> Option<Self> {
-        [Self::Textrace, Self::Raytrace]
-            .into_iter()
-            .find(|kind| *kind as u16 == id)
-    }
+    Raytrace,
 }
 
 impl fmt::Display for Kind {
@@ -68,7 +60,7 @@ impl fmt::Display for Kind {
 }
 
 /// One entry of the chunk directory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ChunkEntry {
     /// Name, unique in the file.
     pub tag: ChunkTag,

@@ -3,10 +3,12 @@
 
 use super::header::{DIRECTORY_ENTRY_BYTES, HEADER_BYTES, Header};
 use super::{CHUNK_ALIGNMENT_BYTES, ChunkEntry, ChunkTag, Kind};
-use crate::error::{FormatError, Place, Result};
+use crate::error::{Broken, FormatError, Place, Result};
 use crate::parse::{Parsed, parse_all};
+use crate::records::parse_records;
 use memmap2::Mmap;
 use serde_json::Value;
+use std::fmt::{Arguments, Display};
 use std::fs::File;
 use std::io::{self, IsTerminal, Read};
 use std::path::Path;
@@ -39,13 +41,15 @@ fn read_stream(name: &str, mut stream: impl Read) -> Result<Vec<u8>> {
     header.read_to_end(&mut bytes).map_err(io)?;
     let header = parse_all(name, Place::Header, 0, &bytes, Header::parse)?;
     if header.file_bytes > MAX_STREAM_BYTES {
-        return Err(FormatError::Malformed {
-            file: name.to_owned(),
-            place: Place::Header,
-            offset: 24,
-            expected: format!("at most {MAX_STREAM_BYTES} bytes from a pipe: save it as a file"),
-            found: header.file_bytes.to_string(),
-        });
+        let expected = format!("at most {MAX_STREAM_BYTES} bytes from a pipe: save it as a file");
+        let found = header.file_bytes;
+        return Err(FormatError::malformed(
+            name,
+            Place::Header,
+            24,
+            expected,
+            found,
+        ));
     }
     // Read one extra byte to detect a longer stream.
     let rest = header.file_bytes.saturating_sub(HEADER_BYTES as u64) + 1;
@@ -138,12 +142,8 @@ impl Container {
 
     fn from_named_bytes(file: String, bytes: Bytes) -> Result<Self> {
         let all = bytes.as_slice();
-        let malformed = |place, offset, expected: String, found: String| FormatError::Malformed {
-            file: file.clone(),
-            place,
-            offset,
-            expected,
-            found,
+        let malformed = |place, offset, expected: String, found: String| {
+            FormatError::malformed(&file, place, offset, expected, found)
         };
         let header_bytes = all.get(..HEADER_BYTES).unwrap_or(all);
         let header = parse_all(&file, Place::Header, 0, header_bytes, Header::parse)?;
@@ -185,12 +185,11 @@ impl Container {
                 format!("{crc32:08x}"),
             ));
         }
-        let entries = directory_bytes.len() / DIRECTORY_ENTRY_BYTES;
-        let directory = parse_all(&file, Place::Directory, at, directory_bytes, |input| {
-            ChunkEntry::parse_directory(entries, input)
-        })?;
-        check_placement(all, at, &directory)
-            .map_err(|(offset, fault)| malformed(Place::Directory, offset, fault.0, fault.1))?;
+        let directory: Vec<ChunkEntry> =
+            parse_all(&file, Place::Directory, at, directory_bytes, |input| {
+                parse_records(header.version_major, input)
+            })?;
+        check_placement(&file, all, at, &directory)?;
         let crc32_of = |entry| crc32fast::hash(slice(all, entry).unwrap_or_default());
         let crc32s = directory.iter().map(crc32_of).collect();
         Ok(Self {
@@ -240,13 +239,14 @@ impl Container {
         if self.kind() == kind {
             return Ok(());
         }
-        Err(FormatError::Malformed {
-            file: self.file.clone(),
-            place: Place::Header,
-            offset: 12,
-            expected: format!("a {kind}"),
-            found: format!("a {}", self.kind()),
-        })
+        let (expected, found) = (format_args!("a {kind}"), format_args!("a {}", self.kind()));
+        Err(FormatError::malformed(
+            &self.file,
+            Place::Header,
+            12,
+            expected,
+            found,
+        ))
     }
 
     /// The directory entry of a required chunk.
@@ -257,12 +257,10 @@ impl Container {
         self.directory
             .iter()
             .find(|entry| entry.tag == tag)
-            .ok_or_else(|| FormatError::Malformed {
-                file: self.file.clone(),
-                place: Place::Directory,
-                offset: self.header.directory_offset,
-                expected: format!("an entry for chunk {tag}"),
-                found: "none".to_owned(),
+            .ok_or_else(|| {
+                let at = self.header.directory_offset;
+                let expected = format_args!("an entry for chunk {tag}");
+                FormatError::malformed(&self.file, Place::Directory, at, expected, "none")
             })
     }
 
@@ -325,20 +323,46 @@ impl Container {
         &self,
         tag: ChunkTag,
         offset_in_chunk: u64,
-        expected: impl Into<String>,
-        found: impl ToString,
+        expected: impl Display,
+        found: impl Display,
     ) -> FormatError {
         let start = self.entry(tag).map_or(0, |entry| entry.offset_bytes);
-        FormatError::Malformed {
+        let offset = start.saturating_add(offset_in_chunk);
+        FormatError::malformed(&self.file, Place::Chunk(tag), offset, expected, found)
+    }
+
+    /// An error for the request of something that the trace does not have.
+    pub(crate) fn out_of_range(&self, what: &'static str, index: u64, count: u64) -> FormatError {
+        FormatError::OutOfRange {
             file: self.file.clone(),
-            place: Place::Chunk(tag),
-            offset: start.saturating_add(offset_in_chunk),
-            expected: expected.into(),
-            found: found.to_string(),
+            what,
+            index,
+            count,
         }
     }
 
-    /// Runs a nom parser over a complete checked chunk.
+    /// A violated rule at byte `offset_in_chunk` of a chunk.
+    pub(crate) fn broken(
+        &self,
+        tag: ChunkTag,
+        offset_in_chunk: u64,
+        broken: Broken,
+    ) -> FormatError {
+        let expected = format!("{}: {}", broken.what, broken.expected);
+        self.malformed(tag, offset_in_chunk, expected, broken.found)
+    }
+
+    /// Checks that a file with `what`, which is in a chunk, has the minor version that introduced it.
+    pub(crate) fn expect_minor(&self, least: u16, tag: ChunkTag, what: &str) -> Result<()> {
+        let (major, minor) = self.version();
+        if minor >= least {
+            return Ok(());
+        }
+        let expected = format!("version {major}.{least} for {what}");
+        Err(self.malformed(tag, 0, expected, format_args!("{major}.{minor}")))
+    }
+
+    /// Runs a parser over a complete checked chunk.
     ///
     /// # Errors
     /// The chunk is missing, damaged, or rejected by the parser.
@@ -423,64 +447,81 @@ fn slice<'a>(all: &'a [u8], entry: &ChunkEntry) -> Option<&'a [u8]> {
 /// Checks that the chunks are consecutive and aligned, with only zero padding between them: no overlap, no
 /// hidden bytes, no chunk past the end, no duplicate tag.
 fn check_placement(
+    file: &str,
     all: &[u8],
     directory_offset: u64,
     directory: &[ChunkEntry],
-) -> std::result::Result<(), (u64, (String, String))> {
+) -> Result<()> {
+    let check = |holds: bool, at: u64, expected: Arguments<'_>, found: Arguments<'_>| match holds {
+        true => Ok(()),
+        false => Err(FormatError::malformed(
+            file,
+            Place::Directory,
+            at,
+            expected,
+            found,
+        )),
+    };
+    let check_padding = |end: u64, start: u64| {
+        let range = usize::try_from(end).ok().zip(usize::try_from(start).ok());
+        let padding = range.and_then(|(end, start)| all.get(end..start));
+        let is_zero = padding.is_some_and(|bytes| bytes.iter().all(|byte| *byte == 0));
+        check(
+            is_zero,
+            end,
+            format_args!("zero padding"),
+            format_args!("{padding:02x?}"),
+        )
+    };
     let mut end = HEADER_BYTES as u64;
     for (index, entry) in directory.iter().enumerate() {
         let at = directory_offset + (index * DIRECTORY_ENTRY_BYTES) as u64;
-        let tag = entry.tag;
-        if !tag.0.iter().all(u8::is_ascii_graphic) {
-            let found = tag.to_string();
-            return Err((at, ("a tag of printable ASCII".to_owned(), found)));
-        }
-        if directory
+        let ChunkEntry {
+            tag,
+            offset_bytes,
+            length_bytes,
+            ..
+        } = *entry;
+        let is_ascii = tag.0.iter().all(u8::is_ascii_graphic);
+        check(
+            is_ascii,
+            at,
+            format_args!("a tag of printable ASCII"),
+            format_args!("{tag}"),
+        )?;
+        let is_new = directory
             .iter()
             .take(index)
-            .any(|earlier| earlier.tag == tag)
-        {
-            return Err((at, ("each tag once".to_owned(), format!("{tag} twice"))));
-        }
+            .all(|earlier| earlier.tag != tag);
+        check(
+            is_new,
+            at,
+            format_args!("each tag once"),
+            format_args!("{tag} twice"),
+        )?;
         let start = end.next_multiple_of(CHUNK_ALIGNMENT_BYTES);
-        if entry.offset_bytes != start {
-            let expected = format!("chunk {tag} at byte {start}");
-            return Err((at + 8, (expected, format!("offset {}", entry.offset_bytes))));
-        }
-        check_padding(all, end, start)?;
-        end = start
-            .checked_add(entry.length_bytes)
-            .filter(|end| *end <= directory_offset)
-            .ok_or_else(|| {
-                let room = directory_offset.saturating_sub(start);
-                let expected = format!("chunk {tag} of at most {room} bytes");
-                (at + 16, (expected, format!("{} bytes", entry.length_bytes)))
-            })?;
+        check(
+            offset_bytes == start,
+            at + 8,
+            format_args!("chunk {tag} at byte {start}"),
+            format_args!("offset {offset_bytes}"),
+        )?;
+        check_padding(end, start)?;
+        let room = directory_offset.saturating_sub(start);
+        check(
+            length_bytes <= room,
+            at + 16,
+            format_args!("chunk {tag} of at most {room} bytes"),
+            format_args!("{length_bytes} bytes"),
+        )?;
+        end = start.saturating_add(length_bytes);
     }
     let start = end.next_multiple_of(CHUNK_ALIGNMENT_BYTES);
-    if start != directory_offset {
-        let expected = format!("the directory at byte {start}, after the last chunk");
-        return Err((
-            directory_offset,
-            (expected, format!("it at {directory_offset}")),
-        ));
-    }
-    check_padding(all, end, start)
-}
-
-fn check_padding(
-    all: &[u8],
-    end: u64,
-    start: u64,
-) -> std::result::Result<(), (u64, (String, String))> {
-    let range = usize::try_from(end).ok().zip(usize::try_from(start).ok());
-    let padding = range.and_then(|(end, start)| all.get(end..start));
-    match padding {
-        Some(bytes) if bytes.iter().all(|byte| *byte == 0) => Ok(()),
-        Some(bytes) => Err((end, ("zero padding".to_owned(), format!("{bytes:02x?}")))),
-        None => Err((
-            end,
-            ("padding".to_owned(), "the end of the file".to_owned()),
-        )),
-    }
+    check(
+        start == directory_offset,
+        directory_offset,
+        format_args!("the directory at byte {start}, after the last chunk"),
+        format_args!("it at {directory_offset}"),
+    )?;
+    check_padding(end, start)
 }

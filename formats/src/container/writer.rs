@@ -2,8 +2,9 @@
 
 use super::atomic::AtomicFile;
 use super::header::{HEADER_BYTES, Header};
-use super::{CHUNK_ALIGNMENT_BYTES, ChunkEntry, ChunkTag, Kind};
-use crate::error::{FormatError, Result};
+use super::{CHUNK_ALIGNMENT_BYTES, ChunkEntry, ChunkTag, Kind, MAJOR_1};
+use crate::error::{Broken, FormatError, Result};
+use crate::records;
 use std::io::{Cursor, Seek, SeekFrom, Write};
 use std::path::Path;
 
@@ -68,7 +69,11 @@ impl<W: Write + Seek> ContainerWriter<W> {
             file,
             sink,
             position: 0,
-            header: Header::new(kind),
+            header: Header {
+                version_major: MAJOR_1,
+                kind,
+                ..Header::default()
+            },
             directory: Vec::new(),
             open: None,
         };
@@ -109,11 +114,8 @@ impl<W: Write + Seek> ContainerWriter<W> {
     pub fn begin_chunk(&mut self, tag: ChunkTag) -> Result<()> {
         self.end_chunk()?;
         if self.directory.iter().any(|entry| entry.tag == tag) {
-            return Err(FormatError::Unwritable {
-                what: format!("chunk {tag}"),
-                expected: "each tag once".to_owned(),
-                found: "the same tag again".to_owned(),
-            });
+            let what = format!("chunk {tag}");
+            return Err(Broken::new(what, "each tag once", "the same tag again").unwritable());
         }
         self.pad()?;
         self.open = Some((tag, self.position, crc32fast::Hasher::new()));
@@ -126,11 +128,8 @@ impl<W: Write + Seek> ContainerWriter<W> {
     /// Writing failed, or no chunk is open.
     pub fn append(&mut self, bytes: &[u8]) -> Result<()> {
         let Some((_, _, crc32)) = &mut self.open else {
-            return Err(FormatError::Unwritable {
-                what: format!("{} bytes", bytes.len()),
-                expected: "an open chunk".to_owned(),
-                found: "none".to_owned(),
-            });
+            let what = format!("{} bytes", bytes.len());
+            return Err(Broken::new(what, "an open chunk", "none").unwritable());
         };
         crc32.update(bytes);
         self.raw(bytes)
@@ -163,14 +162,14 @@ impl<W: Write + Seek> ContainerWriter<W> {
         self.pad()?;
         let mut directory = Vec::new();
         for entry in &self.directory {
-            entry.write(&mut directory);
+            records::write(MAJOR_1, entry, &mut directory)?;
         }
         self.header.directory_offset = self.position;
         self.header.directory_count = u32::try_from(self.directory.len()).unwrap_or(u32::MAX);
         self.header.directory_crc32 = crc32fast::hash(&directory);
         self.raw(&directory)?;
         self.header.file_bytes = self.position;
-        let header = self.header.to_bytes();
+        let header = self.header.to_bytes()?;
         self.sink
             .seek(SeekFrom::Start(0))
             .and_then(|_| self.sink.write_all(&header))

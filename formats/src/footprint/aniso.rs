@@ -207,5 +207,4 @@ impl Ellipse {
 }
 
 #[cfg(test)]
-#[path = "aniso_tests.rs"]
 mod tests;

@@ -10,11 +10,8 @@ use super::{
     Visit, half, normal,
 };
 use crate::error::Broken;
-use crate::parse::{Cursor, Fault, Parsed};
+use crate::parse::{Cursor, Parsed, Taken};
 use crate::varint::{low_u32, put, put_difference, unzigzag, zigzag};
-use nom::bytes::complete::take;
-use nom::error::context;
-use nom::number::complete::u8 as byte;
 
 /// Ray byte: bits 0-1 kind, 2-3 outcome, then flags.
 const HAS_ALPHA_TESTS: u8 = 1 << 4;
@@ -182,10 +179,7 @@ pub(super) fn decode<'a>(
     let [width, height] = tile.size_px;
     let count = width as usize * height as usize * samples as usize;
     let at_bits = input;
-    let bits = input.parse(context(
-        "a hit bit for each sample",
-        take(count.div_ceil(8)),
-    ))?;
+    let bits = input.bytes("a hit bit for each sample", count.div_ceil(8))?;
     let is_hit = |i: usize| bits.get(i / 8).is_some_and(|b| b >> (i % 8) & 1 == 1);
     if (count..bits.len() * 8).any(is_hit) {
         return Err(at_bits.fault("zero bits behind the last sample's", "a one"));
@@ -267,16 +261,13 @@ fn decode_short<'a>(
     input: &mut Cursor<'a>,
     previous: &mut u32,
     what: &'static str,
-) -> Result<u16, nom::Err<Fault<'a>>> {
+) -> Taken<'a, u16> {
     let at = *input;
     let value = input.difference(previous, what)?;
     u16::try_from(value).map_err(|_| at.fault(format!("{what}, below 2^16"), value))
 }
 
-fn decode_colors<'a>(
-    input: &mut Cursor<'a>,
-    mut colors: Vec<&mut [f32; 3]>,
-) -> Result<(), nom::Err<Fault<'a>>> {
+fn decode_colors<'a>(input: &mut Cursor<'a>, mut colors: Vec<&mut [f32; 3]>) -> Taken<'a> {
     for channel in 0..3 {
         let mut previous = 0;
         for value in colors.iter_mut().filter_map(|c| c.get_mut(channel)) {
@@ -290,11 +281,7 @@ fn decode_colors<'a>(
     Ok(())
 }
 
-fn decode_rays<'a>(
-    input: &mut Cursor<'a>,
-    tile: &mut RayTile,
-    has_lighting: bool,
-) -> Result<(), nom::Err<Fault<'a>>> {
+fn decode_rays<'a>(input: &mut Cursor<'a>, tile: &mut RayTile, has_lighting: bool) -> Taken<'a> {
     let mut total = 0u32;
     for pixel in &mut tile.pixels {
         let at = *input;
@@ -323,9 +310,9 @@ fn decode_ray<'a>(
     own: u32,
     earlier: Option<&[RayRecord]>,
     has_lighting: bool,
-) -> Result<RayRecord, nom::Err<Fault<'a>>> {
+) -> Taken<'a, RayRecord> {
     let at = *input;
-    let head = input.parse(byte)?;
+    let head: u8 = input.fixed("a ray")?;
     let needs_lighting = head & LIGHTING_KIND != 0;
     let kind = match (head & 3, needs_lighting) {
         (0, false) => RayKind::Primary,
@@ -398,7 +385,7 @@ fn decode_visits<'a>(
     input: &mut Cursor<'a>,
     tables: &RaytraceTables,
     tile: &mut RayTile,
-) -> Result<(), nom::Err<Fault<'a>>> {
+) -> Taken<'a> {
     let visits: u64 = tile.rays.iter().map(RayRecord::visit_count).sum();
     if visits > input.rest().len() as u64 {
         return Err(input.fault("a byte or more for each visit", visits));

@@ -5,14 +5,11 @@ use super::geometry::RayGeometry;
 use super::hierarchy::{Hierarchy, Parents};
 use super::{RayTile, RaytraceTables, codec, geometry_codec, hierarchy_codec, tables};
 use crate::container::{ChunkTag, Container, Kind};
-use crate::error::{Broken, FormatError, Result, ensure};
-use crate::parse::{Parsed, zero};
+use crate::error::Result;
+use crate::parse::Taken;
+use crate::records::{Codec, Record};
 use crate::tiles::{TileChunk, TileSpan};
 use crate::view::Eye;
-use nom::Parser;
-use nom::error::context;
-use nom::multi::count;
-use nom::number::complete::le_u32;
 use std::path::Path;
 
 /// Chunk of the encoded tiles, the left eye's first.
@@ -35,18 +32,33 @@ pub const SLOTS: ChunkTag = ChunkTag(*b"RSLT");
 /// Minor version of traces with one of these chunks.
 pub const COLUMNS_MINOR: u16 = 3;
 
+/// The tiles and their index.
+const TILE_CHUNK: TileChunk = TileChunk {
+    tiles: RAY_TILES,
+    index: RAY_INDEX,
+    entry_bytes: RAY_INDEX_ENTRY_BYTES,
+};
+/// The geometry of the tiles and its index.
+const GEOMETRY_CHUNK: TileChunk = TileChunk {
+    tiles: GEOMETRY_TILES,
+    index: GEOMETRY_INDEX,
+    entry_bytes: GEOMETRY_INDEX_ENTRY_BYTES,
+};
+
 /// One entry of the index.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct IndexEntry {
-    span: TileSpan,
-    rays: u32,
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct IndexEntry {
+    pub span: TileSpan,
+    pub rays: u32,
 }
 
-fn index_entry(input: &[u8]) -> Parsed<'_, IndexEntry> {
-    let (rest, (span, rays)) =
-        context("an index entry of 24 bytes", (TileSpan::parse, le_u32)).parse(input)?;
-    let (rest, ()) = zero(rest, 4)?;
-    Ok((rest, IndexEntry { span, rays }))
+impl Record for IndexEntry {
+    fn fields<'a>(&mut self, codec: &mut Codec<'a>) -> Taken<'a> {
+        codec.record = "an index entry of 24 bytes";
+        self.span.fields(codec)?;
+        codec.number(&mut self.rays)?;
+        codec.reserved::<4>()
+    }
 }
 
 /// An open ray trace.
@@ -84,20 +96,23 @@ impl Raytrace {
     pub fn from_container(container: Container) -> Result<Self> {
         container.expect_kind(Kind::Raytrace)?;
         let tables = tables::read(&container)?;
-        let tiles = 2 * tables.tile_count() as usize;
-        let bytes = container.chunk(RAY_INDEX)?.len();
-        if bytes != tiles * RAY_INDEX_ENTRY_BYTES {
-            let expected = format!("24 bytes for each of {tiles} tiles");
-            return Err(container.malformed(RAY_INDEX, 0, expected, format!("{bytes} bytes")));
-        }
-        let index: Vec<IndexEntry> =
-            container.parse_chunk(RAY_INDEX, |input| count(index_entry, tiles).parse(input))?;
-        tile_chunk(&container).check(index.iter().map(|entry| Some(entry.span)))?;
-        for (slot, (entry, tile)) in index.iter().zip(tile_numbers(&tables)).enumerate() {
-            check_entry(&tables, entry, tile).map_err(|broken| {
+        let tiles = 2 * u64::from(tables.tile_count());
+        let index: Vec<IndexEntry> = TILE_CHUNK.read_index(&container, tiles)?;
+        TILE_CHUNK.check(&container, index.iter().map(|entry| Some(entry.span)))?;
+        let numbers = (0..tables.tile_count()).chain(0..tables.tile_count());
+        for (slot, (entry, tile)) in index.iter().zip(numbers).enumerate() {
+            let (_, [width, height]) = tables.tile_rect(tile);
+            let samples = u64::from(width * height) * u64::from(tables.meta.samples_per_px);
+            let least = codec::least_bytes(samples);
+            // Bytes and rays must be enough for the samples, before any allocation.
+            let IndexEntry { span, rays } = entry;
+            if u64::from(*rays) < samples || u64::from(span.bytes) < least {
                 let at = (slot * RAY_INDEX_ENTRY_BYTES) as u64;
-                container.malformed(RAY_INDEX, at, broken.expected, broken.found)
-            })?;
+                let expected =
+                    format_args!("{samples} samples: as many rays, in {least} bytes or more");
+                let found = format_args!("{rays} rays in {} bytes", span.bytes);
+                return Err(container.malformed(RAY_INDEX, at, expected, found));
+            }
         }
         let geometry = geometry_spans(&container, tiles)?;
         let has_hierarchy = has_all(&container, [NODES, SLOTS])?;
@@ -169,31 +184,17 @@ impl Raytrace {
     /// See [`Self::decode_tile`].
     pub fn decode_tile_with_geometry(&self, eye: Eye, tile: u32, out: &mut RayTile) -> Result<()> {
         self.decode_tile(eye, tile, out)?;
-        let geometry = self.decode_geometry(eye, tile, out);
-        match geometry {
-            Ok(geometry) => {
-                out.geometry = geometry;
-                Ok(())
-            }
-            Err(error) => {
-                out.clear();
-                Err(error)
-            }
-        }
+        out.geometry = self
+            .decode_geometry(eye, tile, out)
+            .inspect_err(|_| out.clear())?;
+        Ok(())
     }
 
     fn decode_geometry(&self, eye: Eye, tile: u32, records: &RayTile) -> Result<Vec<RayGeometry>> {
-        if self.geometry.is_empty() {
-            return Ok(Vec::new());
-        }
-        let first = match eye {
-            Eye::Left => 0,
-            Eye::Right => self.tables.tile_count() as usize,
-        };
-        let Some(span) = self.geometry.get(first + tile as usize) else {
+        let Some(span) = self.geometry.get(self.slot(eye, tile)) else {
             return Ok(Vec::new());
         };
-        geometry_chunk(&self.container).parse(span, |input| {
+        GEOMETRY_CHUNK.parse(&self.container, span, |input| {
             geometry_codec::decode(&self.tables, self.tables.camera(eye), input, records)
         })
     }
@@ -214,61 +215,41 @@ impl Raytrace {
             triangles: container
                 .parse_chunk(SLOTS, |input| hierarchy_codec::decode_triangles(bvh, input))?,
         };
-        let parents = hierarchy.check(bvh).map_err(|broken| {
-            let expected = format!("{}: {}", broken.what, broken.expected);
-            container.malformed(NODES, 0, expected, broken.found)
-        })?;
+        let parents =
+            (hierarchy.check(bvh)).map_err(|broken| container.broken(NODES, 0, broken))?;
         Ok(Some((hierarchy, parents)))
     }
 
     fn decode_entry(&self, eye: Eye, entry: &IndexEntry, out: &mut RayTile) -> Result<()> {
         let (tables, camera) = (&self.tables, self.tables.camera(eye));
-        tile_chunk(&self.container).parse(&entry.span, |input| {
+        TILE_CHUNK.parse(&self.container, &entry.span, |input| {
             codec::decode(tables, camera, input, out)
         })?;
-        if out.rays.len() as u64 == u64::from(entry.rays) {
+        let found = out.rays.len();
+        if found as u64 == u64::from(entry.rays) {
             return Ok(());
         }
-        let expected = format!("{} rays, as the index says", entry.rays);
-        let found = out.rays.len();
+        let expected = format_args!("{} rays, as the index says", entry.rays);
         Err(self
             .container
             .malformed(RAY_TILES, entry.span.offset, expected, found))
     }
 
-    fn entry(&self, eye: Eye, tile: u32) -> Result<&IndexEntry> {
-        let tiles = self.tables.tile_count();
+    /// Place of a tile in the index.
+    fn slot(&self, eye: Eye, tile: u32) -> usize {
         let first = match eye {
             Eye::Left => 0,
-            Eye::Right => tiles as usize,
+            Eye::Right => self.tables.tile_count() as usize,
         };
+        first + tile as usize
+    }
+
+    fn entry(&self, eye: Eye, tile: u32) -> Result<&IndexEntry> {
+        let tiles = self.tables.tile_count();
         Some(tile)
             .filter(|tile| *tile < tiles)
-            .and_then(|tile| self.index.get(first + tile as usize))
-            .ok_or_else(|| FormatError::OutOfRange {
-                file: self.container.file().to_owned(),
-                what: "tile",
-                index: u64::from(tile),
-                count: u64::from(tiles),
-            })
-    }
-}
-
-fn tile_chunk(container: &Container) -> TileChunk<'_> {
-    TileChunk {
-        container,
-        tiles: RAY_TILES,
-        index: RAY_INDEX,
-        entry_bytes: RAY_INDEX_ENTRY_BYTES,
-    }
-}
-
-fn geometry_chunk(container: &Container) -> TileChunk<'_> {
-    TileChunk {
-        container,
-        tiles: GEOMETRY_TILES,
-        index: GEOMETRY_INDEX,
-        entry_bytes: GEOMETRY_INDEX_ENTRY_BYTES,
+            .and_then(|tile| self.index.get(self.slot(eye, tile)))
+            .ok_or_else(|| (self.container).out_of_range("tile", tile.into(), tiles.into()))
     }
 }
 
@@ -280,56 +261,18 @@ fn has_all(container: &Container, [first, second]: [ChunkTag; 2]) -> Result<bool
         container.entry(first)?;
         container.entry(second)?;
     }
-    if !has(first) {
-        return Ok(false);
+    if has(first) {
+        container.expect_minor(COLUMNS_MINOR, first, "this chunk")?;
     }
-    let (major, minor) = container.version();
-    if minor < COLUMNS_MINOR {
-        let expected = format!("version {major}.{COLUMNS_MINOR} for this chunk");
-        return Err(container.malformed(first, 0, expected, format!("{major}.{minor}")));
-    }
-    Ok(true)
+    Ok(has(first))
 }
 
 /// Positions of the geometry of `tiles` tiles, if the trace has it.
-fn geometry_spans(container: &Container, tiles: usize) -> Result<Vec<TileSpan>> {
+fn geometry_spans(container: &Container, tiles: u64) -> Result<Vec<TileSpan>> {
     if !has_all(container, [GEOMETRY_TILES, GEOMETRY_INDEX])? {
         return Ok(Vec::new());
     }
-    let bytes = container.chunk(GEOMETRY_INDEX)?.len();
-    if bytes != tiles * GEOMETRY_INDEX_ENTRY_BYTES {
-        let expected = format!("16 bytes for each of {tiles} tiles");
-        return Err(container.malformed(GEOMETRY_INDEX, 0, expected, format!("{bytes} bytes")));
-    }
-    let spans: Vec<TileSpan> = container.parse_chunk(GEOMETRY_INDEX, |input| {
-        count(TileSpan::parse, tiles).parse(input)
-    })?;
-    geometry_chunk(container).check(spans.iter().copied().map(Some))?;
+    let spans: Vec<TileSpan> = GEOMETRY_CHUNK.read_index(container, tiles)?;
+    GEOMETRY_CHUNK.check(container, spans.iter().copied().map(Some))?;
     Ok(spans)
-}
-
-/// Tile numbers in the order of the index.
-fn tile_numbers(tables: &RaytraceTables) -> impl Iterator<Item = u32> + use<> {
-    let tiles = tables.tile_count();
-    (0..tiles).chain(0..tiles)
-}
-
-/// Checks that a tile's bytes and rays are enough for its samples, before any allocation.
-fn check_entry(
-    tables: &RaytraceTables,
-    entry: &IndexEntry,
-    tile: u32,
-) -> std::result::Result<(), Broken> {
-    let (_, [width, height]) = tables.tile_rect(tile);
-    let samples = u64::from(width * height) * u64::from(tables.meta.samples_per_px);
-    let least = codec::least_bytes(samples);
-    let IndexEntry { span, rays } = entry;
-    ensure(
-        u64::from(*rays) >= samples && u64::from(span.bytes) >= least,
-        || {
-            let expected = format!("{samples} samples: as many rays, in {least} bytes or more");
-            let found = format!("{rays} rays in {} bytes", span.bytes);
-            Broken::new(format!("tile {tile}"), expected, found)
-        },
-    )
 }

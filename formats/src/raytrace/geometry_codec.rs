@@ -3,12 +3,12 @@
 
 use super::geometry::{RayGeometry, SlotHit, UNIT_TOLERANCE};
 use super::predict::{Predictor, Subject};
-use super::tables::MAX_COORDINATE_M;
+use super::tables::in_range;
 use super::{EyeCamera, Outcome, RayTile, RaytraceTables};
-use crate::error::Broken;
-use crate::parse::{Cursor, Fault, Parsed};
+use crate::error::{Broken, ensure};
+use crate::parse::{Cursor, Parsed, Taken};
 use crate::varint::{put, zigzag};
-use nom::number::complete::u8 as byte;
+use std::fmt::Debug;
 
 /// Flags of a ray: what is not as predicted, and therefore follows.
 const ORIGIN: u8 = 1 << 0;
@@ -65,8 +65,9 @@ pub(super) fn encode(
                 sample,
             };
             let hits = record.outcome != Outcome::Miss;
-            check(ray, hits, tables.bvh.triangles).map_err(|(expected, found)| {
-                Broken::new(format!("a ray of sample {sample}"), expected, found)
+            check(ray, hits, tables.bvh.triangles).map_err(|broken| Broken {
+                what: format!("a ray of sample {sample}"),
+                ..broken
             })?;
             put_ray(&mut predictor, &subject, ray, &mut out);
         }
@@ -187,48 +188,43 @@ fn best_light(
     best.1
 }
 
-/// Checks a ray; the error is what was expected and found.
-fn check(ray: &RayGeometry, hits: bool, triangles: u64) -> Result<(), (String, String)> {
-    let holds = |holds: bool, expected: &str, found: &dyn std::fmt::Debug| {
-        if holds {
-            Ok(())
-        } else {
-            Err((expected.to_owned(), format!("{found:?}")))
-        }
+/// Checks a ray; the error does not name it.
+fn check(ray: &RayGeometry, hits: bool, triangles: u64) -> Result<(), Broken> {
+    let holds = |holds: bool, expected: &str, found: &dyn Debug| {
+        ensure(holds, "", expected, format_args!("{found:?}"))
     };
-    let inside = |x: &f32| x.abs() <= MAX_COORDINATE_M;
+    let RayGeometry {
+        origin,
+        direction,
+        t_min,
+        t_max,
+        hit,
+        ..
+    } = *ray;
+    holds(in_range(&origin), "an origin within 1e18 m", &origin)?;
+    let [x, y, z] = direction;
+    let off = (x * x + y * y + z * z - 1.0).abs();
     holds(
-        ray.origin.iter().all(inside),
-        "an origin within 1e18 m",
-        &ray.origin,
-    )?;
-    let [x, y, z] = ray.direction;
-    let squared = x * x + y * y + z * z;
-    holds(
-        (squared - 1.0).abs() <= UNIT_TOLERANCE,
+        off <= UNIT_TOLERANCE,
         "a direction of unit length",
-        &ray.direction,
+        &direction,
     )?;
     holds(
-        ray.t_min >= 0.0 && ray.t_min <= ray.t_max && ray.t_max <= f32::MAX,
+        t_min >= 0.0 && t_min <= t_max && t_max <= f32::MAX,
         "finite limits, the first at least 0 and at most the second",
-        &(ray.t_min, ray.t_max),
+        &(t_min, t_max),
     )?;
+    holds(hits == hit.is_some(), "a hit unless the ray missed", &hit)?;
+    let Some(SlotHit { t, slot }) = hit else {
+        return Ok(());
+    };
     holds(
-        hits == ray.hit.is_some(),
-        "a hit unless the ray missed",
-        &ray.hit,
-    )?;
-    let Some(hit) = ray.hit else { return Ok(()) };
-    holds(
-        (ray.t_min..=ray.t_max).contains(&hit.t),
+        (t_min..=t_max).contains(&t),
         "a distance within the ray's limits",
-        &hit.t,
+        &t,
     )?;
-    if u64::from(hit.slot) >= triangles {
-        return Err((format!("a slot below {triangles}"), hit.slot.to_string()));
-    }
-    Ok(())
+    let expected = format_args!("a slot below {triangles}");
+    ensure(u64::from(slot) < triangles, "", expected, slot)
 }
 
 /// Reads the geometry of a tile whose records are decoded.
@@ -260,7 +256,7 @@ pub(super) fn decode<'a>(
             let ray = take_ray(&mut predictor, &subject, &mut input)?;
             let hits = record.outcome != Outcome::Miss;
             check(&ray, hits, tables.bvh.triangles)
-                .map_err(|(expected, found)| at.fault(expected, found))?;
+                .map_err(|broken| at.fault(broken.expected, broken.found))?;
             out.push(ray);
         }
     }
@@ -271,10 +267,10 @@ fn take_ray<'a>(
     predictor: &mut Predictor<'_>,
     subject: &Subject<'_>,
     input: &mut Cursor<'a>,
-) -> Result<RayGeometry, nom::Err<Fault<'a>>> {
+) -> Taken<'a, RayGeometry> {
     let at = *input;
     let kind = subject.record.kind;
-    let flags = input.parse(byte)?;
+    let flags: u8 = input.fixed("a ray")?;
     let lights = if kind == super::RayKind::Shadow {
         predictor.lights()
     } else {
@@ -347,7 +343,7 @@ fn one<'a>(
     differs: bool,
     prediction: f32,
     what: &'static str,
-) -> Result<f32, nom::Err<Fault<'a>>> {
+) -> Taken<'a, f32> {
     let mut bits = prediction.to_bits();
     if differs {
         input.difference(&mut bits, what)?;
@@ -361,7 +357,7 @@ fn three<'a>(
     predictions: [f32; 3],
     offset: [u32; 3],
     what: &'static str,
-) -> Result<[f32; 3], nom::Err<Fault<'a>>> {
+) -> Taken<'a, [f32; 3]> {
     let mut out = predictions;
     for (value, offset) in out.iter_mut().zip(offset) {
         let mut bits = value.to_bits().wrapping_add(offset);

@@ -1,6 +1,6 @@
 //! The content of the hierarchy: boxes and children of the inner nodes, and the triangle of each slot.
 
-use super::tables::MAX_COORDINATE_M;
+use super::tables::in_range;
 use super::{BvhSummary, TraversalKind};
 use crate::error::{Broken, ensure};
 use serde::Serialize;
@@ -76,14 +76,13 @@ impl Hierarchy {
             (nodes as u64, bvh.nodes),
             (self.triangles.len() as u64, bvh.triangles),
         ];
+        let [(found_nodes, _), (found_triangles, _)] = counts;
         ensure(
             counts.iter().all(|(found, expected)| found == expected)
                 && self.children.len().is_multiple_of(width),
-            || {
-                let expected = format!("{} nodes and {} triangles", bvh.nodes, bvh.triangles);
-                let [(nodes, _), (triangles, _)] = counts;
-                Broken::new("hierarchy", expected, format!("{nodes} and {triangles}"))
-            },
+            "hierarchy",
+            format_args!("{} nodes and {} triangles", bvh.nodes, bvh.triangles),
+            format_args!("{found_nodes} and {found_triangles}"),
         )?;
         let mut parents = Parents {
             of_nodes: vec![u32::MAX; nodes],
@@ -91,77 +90,59 @@ impl Hierarchy {
         };
         let mut leaves = 0;
         for (number, children) in (0u32..).zip(self.children.chunks_exact(width)) {
-            let what = || format!("node {number}");
-            ensure(
-                number == 0 || parents.of_nodes.get(number as usize) != Some(&u32::MAX),
-                || Broken::new(what(), "a child of a node before it", "of none"),
-            )?;
+            let what = format_args!("node {number}");
+            let is_child = number == 0 || parents.of_nodes.get(number as usize) != Some(&u32::MAX);
+            ensure(is_child, what, "a child of a node before it", "of none")?;
             for child in children.iter().flatten() {
-                child.check_box().map_err(|found| {
-                    Broken::new(what(), "boxes within 1e18 m, minimum first", found)
-                })?;
-                parents.adopt(number, child.kind).map_err(|expected| {
-                    Broken::new(what(), expected, format_args!("{:?}", child.kind))
-                })?;
+                let HierarchyChild { kind, min, max } = child;
+                let corners = min.iter().zip(max);
+                ensure(
+                    { corners }.all(|(min, max)| min <= max && in_range(&[*min, *max])),
+                    what,
+                    "boxes within 1e18 m, minimum first",
+                    format_args!("{min:?} to {max:?}"),
+                )?;
+                let (adopted, expected) = parents.adopt(number, *kind);
+                ensure(adopted, what, expected, format_args!("{kind:?}"))?;
                 leaves += u64::from(matches!(child.kind, ChildKind::Leaf(..)));
             }
         }
+        let is_whole = parents.of_slots.iter().all(|parent| *parent != u32::MAX);
         ensure(
-            parents.of_slots.iter().all(|parent| *parent != u32::MAX),
-            || Broken::new("hierarchy", "every slot in a leaf", "a slot in none"),
+            is_whole,
+            "hierarchy",
+            "every slot in a leaf",
+            "a slot in none",
         )?;
-        ensure(leaves == bvh.leaves, || {
-            Broken::new("hierarchy", format!("{} leaves", bvh.leaves), leaves)
-        })?;
+        let expected = format_args!("{} leaves", bvh.leaves);
+        ensure(leaves == bvh.leaves, "hierarchy", expected, leaves)?;
         for (slot, triangle) in self.triangles.iter().enumerate() {
-            let mut coordinates = triangle.vertices.as_flattened().iter();
-            ensure(coordinates.all(|x| x.abs() <= MAX_COORDINATE_M), || {
-                let found = format!("{:?}", triangle.vertices);
-                Broken::new(format!("slot {slot}"), "vertices within 1e18 m", found)
-            })?;
+            ensure(
+                in_range(triangle.vertices.as_flattened()),
+                format_args!("slot {slot}"),
+                "vertices within 1e18 m",
+                format_args!("{:?}", triangle.vertices),
+            )?;
         }
         Ok(parents)
     }
 }
 
-impl HierarchyChild {
-    fn check_box(&self) -> Result<(), String> {
-        let axes = self.min.iter().zip(&self.max);
-        let mut fits = axes.map(|(min, max)| {
-            min <= max && min.abs() <= MAX_COORDINATE_M && max.abs() <= MAX_COORDINATE_M
-        });
-        if fits.all(|fits| fits) {
-            return Ok(());
-        }
-        Err(format!("{:?} to {:?}", self.min, self.max))
-    }
-}
-
 impl Parents {
-    /// Enters a child of a node; the error is what was expected.
-    fn adopt(&mut self, node: u32, kind: ChildKind) -> Result<(), &'static str> {
-        let free = |entry: &mut u32| {
-            let free = *entry == u32::MAX;
-            *entry = node;
-            free
-        };
+    /// Enters a child of a node: whether it fits, and what was expected.
+    fn adopt(&mut self, node: u32, kind: ChildKind) -> (bool, &'static str) {
+        let free = |entry: &mut u32| std::mem::replace(entry, node) == u32::MAX;
         match kind {
             ChildKind::Node(child) => {
                 let entry = self.of_nodes.get_mut(child as usize);
-                entry
-                    .filter(|_| child > node)
-                    .is_some_and(free)
-                    .then_some(())
-                    .ok_or("a node behind its parent and of no other")
+                let fits = entry.filter(|_| child > node).is_some_and(free);
+                (fits, "a node behind its parent and of no other")
             }
             ChildKind::Leaf(first, count) => {
                 let range = first as usize..(first as usize).saturating_add(count as usize);
-                self.of_slots
-                    .get_mut(range)
-                    .filter(|_| count > 0)
-                    .is_some_and(|slots| slots.iter_mut().all(free))
-                    .then_some(())
-                    .ok_or("a leaf of slots of no other leaf")
+                let slots = self.of_slots.get_mut(range).filter(|_| count > 0);
+                let fits = slots.is_some_and(|slots| slots.iter_mut().all(free));
+                (fits, "a leaf of slots of no other leaf")
             }
         }
     }

@@ -3,9 +3,8 @@
 
 use super::BvhSummary;
 use super::hierarchy::{ChildKind, Hierarchy, HierarchyChild, HierarchyTriangle};
-use crate::parse::{Cursor, Fault, Parsed};
+use crate::parse::{Cursor, Parsed, Taken};
 use crate::varint::{low_u32, put, put_difference, unzigzag, zigzag};
-use nom::number::complete::u8 as byte;
 
 /// Kinds of a child, in the lowest bits of its first number.
 const NONE: u64 = 0;
@@ -118,7 +117,7 @@ fn take_child<'a>(
     input: &mut Cursor<'a>,
     number: usize,
     next_slot: &mut i64,
-) -> Result<Option<ChildKind>, nom::Err<Fault<'a>>> {
+) -> Taken<'a, Option<ChildKind>> {
     let at = *input;
     let code = input.number("a child", CHILD_BITS)?;
     let difference = unzigzag(code >> 2);
@@ -143,9 +142,9 @@ fn take_child<'a>(
     })
 }
 
-fn take_box<'a>(own: Corners, input: &mut Cursor<'a>) -> Result<Corners, nom::Err<Fault<'a>>> {
+fn take_box<'a>(own: Corners, input: &mut Cursor<'a>) -> Taken<'a, Corners> {
     let at = *input;
-    let bits = input.parse(byte)?;
+    let bits: u8 = input.fixed("a box")?;
     if bits >> 6 != 0 {
         return Err(at.fault("bits of six planes", format_args!("{bits:#04x}")));
     }
@@ -237,7 +236,7 @@ impl Recent {
         found.copied().unwrap_or_default()
     }
 
-    fn take<'a>(&mut self, input: &mut Cursor<'a>) -> Result<[u32; 3], nom::Err<Fault<'a>>> {
+    fn take<'a>(&mut self, input: &mut Cursor<'a>) -> Taken<'a, [u32; 3]> {
         let at = *input;
         let back = input.number_u32("a vertex")?;
         if back > MOST_BACK || u64::from(back) > self.count {

@@ -20,8 +20,6 @@ pub mod tables;
 mod write;
 
 #[cfg(test)]
-mod column_tests;
-#[cfg(test)]
 mod tests;
 
 use crate::textrace::TraceMeta;

@@ -34,14 +34,10 @@ pub fn check_relations(
             if let Some(hit) = segment.and_then(|segment| segment.hit)
                 && !tile.visits.is_empty()
             {
-                ensure(own.contains(&Visit::Triangle(hit.slot)), || {
-                    let expected = "a triangle that the ray visits";
-                    named(Broken::new(
-                        "hit",
-                        expected,
-                        format_args!("slot {}", hit.slot),
-                    ))
-                })?;
+                let found = format_args!("slot {}", hit.slot);
+                let is_visited = own.contains(&Visit::Triangle(hit.slot));
+                ensure(is_visited, "hit", "a triangle that the ray visits", found)
+                    .map_err(named)?;
             }
             if let (0, Some(segment), Some((hierarchy, _))) = (index, segment, hierarchy) {
                 check_primary(pixel.hit.as_ref(), segment, hierarchy).map_err(named)?;
@@ -62,14 +58,8 @@ fn check_visits(visits: &[Visit], parents: &Parents) -> Result<(), Broken> {
         let parent = match *visit {
             Visit::Node(node) => {
                 let parent = parents.of_nodes.get(node as usize).copied();
-                let fresh = seen.insert(node);
-                ensure(fresh, || {
-                    Broken::new(
-                        "visits",
-                        "each node at most once",
-                        format!("{visit:?} again"),
-                    )
-                })?;
+                let found = format_args!("{visit:?} again");
+                ensure(seen.insert(node), "visits", "each node at most once", found)?;
                 if number == 0 && node == 0 {
                     continue;
                 }
@@ -77,10 +67,12 @@ fn check_visits(visits: &[Visit], parents: &Parents) -> Result<(), Broken> {
             }
             Visit::Triangle(slot) => parents.of_slots.get(slot as usize).copied(),
         };
-        ensure(parent.is_some_and(|parent| seen.contains(&parent)), || {
-            let expected = "the root, then children of nodes visited before";
-            Broken::new("visits", expected, format!("{visit:?} as number {number}"))
-        })?;
+        ensure(
+            parent.is_some_and(|parent| seen.contains(&parent)),
+            "visits",
+            "the root, then children of nodes visited before",
+            format_args!("{visit:?} as number {number}"),
+        )?;
     }
     Ok(())
 }
@@ -95,11 +87,12 @@ fn check_primary(
         Some((triangle.primitive, hit.t.to_bits()))
     });
     let expected = hit.map(|hit| (hit.primitive, hit.t.to_bits()));
-    ensure(found == expected, || {
-        let text = |hit: Option<(u32, u32)>| match hit {
-            Some((primitive, t)) => format!("primitive {primitive} at {} m", f32::from_bits(t)),
-            None => "a miss".to_owned(),
-        };
-        Broken::new("hit", text(expected), text(found))
-    })
+    if found == expected {
+        return Ok(());
+    }
+    let text = |hit: Option<(u32, u32)>| match hit {
+        Some((primitive, t)) => format!("primitive {primitive} at {} m", f32::from_bits(t)),
+        None => "a miss".to_owned(),
+    };
+    Err(Broken::new("hit", text(expected), text(found)))
 }

@@ -1,5 +1,7 @@
 //! Tests of the file: round trip, damage, and data that must not be written.
 
+mod columns;
+
 use super::*;
 use crate::error::FormatError;
 use crate::textrace::TraceMeta;

@@ -2,20 +2,19 @@
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::file::{
-    COLUMNS_MINOR, GEOMETRY_INDEX, GEOMETRY_INDEX_ENTRY_BYTES, GEOMETRY_TILES, NODES, RAY_INDEX,
-    RAY_INDEX_ENTRY_BYTES, RAY_TILES, SLOTS,
+    COLUMNS_MINOR, GEOMETRY_INDEX, GEOMETRY_INDEX_ENTRY_BYTES, GEOMETRY_TILES, IndexEntry, NODES,
+    RAY_INDEX, RAY_INDEX_ENTRY_BYTES, RAY_TILES, SLOTS,
 };
 use super::hierarchy::Hierarchy;
 use super::{EyeCamera, RayTile, RaytraceTables, codec, geometry_codec, hierarchy_codec, tables};
-use crate::container::{AtomicFile, ContainerWriter, Kind};
-use crate::error::{Broken, FormatError, Result};
-use crate::tiles::TileSpan;
-use std::io::{Cursor, Read, Seek, Write};
+use crate::container::{AtomicFile, ContainerWriter, Kind, MAJOR_1};
+use crate::error::{Broken, FormatError, Result, ensure};
+use crate::records;
+use crate::tiles::{TileSpan, TileSpool, size_u32};
+use std::fmt::Display;
+use std::io::{Cursor, Seek, Write};
 use std::path::Path;
 use tempfile::SpooledTempFile;
-
-/// Geometry of this size is kept in memory until the records are written; more goes to a temporary file.
-const SPOOL_BYTES: usize = 64 << 20;
 
 /// A tile's bytes, ready to be appended.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -41,23 +40,21 @@ impl EncodedRayTile {
 /// # Errors
 /// The tile violates an invariant of the format.
 pub fn encode_ray_tile(tile: &RayTile, has_visits: bool) -> Result<EncodedRayTile> {
-    let bytes = codec::encode(tile, has_visits).map_err(|broken| {
-        let what = format!("tile at {:?}, {}", tile.origin_px, broken.what);
-        Broken { what, ..broken }.unwritable()
-    })?;
-    let too_many = |_| FormatError::Unwritable {
-        what: format!("tile at {:?}", tile.origin_px),
-        expected: "less than 2^32 bytes and rays".to_owned(),
-        found: format!("{} rays", tile.rays.len()),
-    };
-    u32::try_from(bytes.len()).map_err(too_many)?;
+    let bytes = codec::encode(tile, has_visits).map_err(|broken| of_tile(tile, broken))?;
+    let what = format!("tile at {:?}", tile.origin_px);
+    size_u32(&what, bytes.len())?;
     Ok(EncodedRayTile {
         crc32: crc32fast::hash(&bytes),
-        rays: u32::try_from(tile.rays.len()).map_err(too_many)?,
+        rays: size_u32(&what, tile.rays.len())?,
         bytes,
         geometry: None,
         needs_lighting: tile.rays.iter().any(|ray| ray.kind.needs_lighting()),
     })
+}
+
+fn of_tile(tile: &RayTile, broken: Broken) -> FormatError {
+    let what = format!("tile at {:?}, {}", tile.origin_px, broken.what);
+    Broken { what, ..broken }.unwritable()
 }
 
 /// Encodes a tile with its [`RayTile::geometry`]; `eye` is the camera of its eye.
@@ -70,27 +67,14 @@ pub fn encode_ray_tile_with_geometry(
     tile: &RayTile,
 ) -> Result<EncodedRayTile> {
     let mut encoded = encode_ray_tile(tile, tables.meta.has_visits)?;
-    let bytes = geometry_codec::encode(tables, eye, tile).map_err(|broken| {
-        let what = format!("tile at {:?}, {}", tile.origin_px, broken.what);
-        Broken { what, ..broken }.unwritable()
-    })?;
-    if u32::try_from(bytes.len()).is_err() {
-        return Err(FormatError::Unwritable {
-            what: format!("geometry of the tile at {:?}", tile.origin_px),
-            expected: "less than 2^32 bytes".to_owned(),
-            found: bytes.len().to_string(),
-        });
-    }
+    let bytes =
+        geometry_codec::encode(tables, eye, tile).map_err(|broken| of_tile(tile, broken))?;
+    size_u32(
+        &format!("geometry of the tile at {:?}", tile.origin_px),
+        bytes.len(),
+    )?;
     encoded.geometry = Some(bytes);
     Ok(encoded)
-}
-
-/// The encoded geometry of the tiles written so far, and its index.
-#[derive(Debug)]
-struct GeometrySpool {
-    bytes: SpooledTempFile,
-    index: Vec<u8>,
-    offset: u64,
 }
 
 /// Writes a trace tile by tile: the left eye's in order, then the right eye's.
@@ -99,7 +83,8 @@ pub struct RaytraceWriter<W = AtomicFile> {
     container: ContainerWriter<W>,
     index: Vec<u8>,
     offset: u64,
-    geometry: GeometrySpool,
+    geometry: TileSpool,
+    geometry_index: Vec<u8>,
     hierarchy: Option<Hierarchy>,
     needs_lighting: bool,
 }
@@ -115,7 +100,7 @@ impl RaytraceWriter<AtomicFile> {
             .parent()
             .filter(|folder| !folder.as_os_str().is_empty());
         let folder = folder.unwrap_or(Path::new("."));
-        let spool = tempfile::spooled_tempfile_in(SPOOL_BYTES, folder);
+        let spool = tempfile::spooled_tempfile_in(TileSpool::IN_MEMORY_BYTES, folder);
         Self::start(ContainerWriter::create(path, Kind::Raytrace)?, spool)
     }
 
@@ -154,11 +139,8 @@ impl<W: Write + Seek> RaytraceWriter<W> {
             container,
             index: Vec::new(),
             offset: 0,
-            geometry: GeometrySpool {
-                bytes: spool,
-                index: Vec::new(),
-                offset: 0,
-            },
+            geometry: TileSpool::new(spool),
+            geometry_index: Vec::new(),
             hierarchy: None,
             needs_lighting: false,
         })
@@ -177,20 +159,21 @@ impl<W: Write + Seek> RaytraceWriter<W> {
     /// Writing failed.
     pub fn tile(&mut self, tile: &EncodedRayTile) -> Result<()> {
         self.container.append(&tile.bytes)?;
-        let bytes = u32::try_from(tile.bytes.len()).unwrap_or(u32::MAX);
         let span = TileSpan {
             offset: self.offset,
-            bytes,
+            bytes: size_u32("tile", tile.bytes.len())?,
             crc32: tile.crc32,
         };
-        span.write(&mut self.index);
-        for number in [tile.rays, 0] {
-            self.index.extend(number.to_le_bytes());
-        }
-        self.offset += u64::from(bytes);
+        let entry = IndexEntry {
+            span,
+            rays: tile.rays,
+        };
+        records::write(MAJOR_1, &entry, &mut self.index)?;
+        self.offset += tile.bytes.len() as u64;
         self.needs_lighting |= tile.needs_lighting;
         if let Some(geometry) = &tile.geometry {
-            self.geometry.append(geometry)?;
+            let span = self.geometry.append("geometry of a tile", geometry)?;
+            records::write(MAJOR_1, &span, &mut self.geometry_index)?;
         }
         Ok(())
     }
@@ -198,33 +181,27 @@ impl<W: Write + Seek> RaytraceWriter<W> {
     fn complete(mut self, tables: &RaytraceTables) -> Result<ContainerWriter<W>> {
         let tiles = 2 * tables.tile_count() as usize;
         let written = self.index.len() / RAY_INDEX_ENTRY_BYTES;
-        if written != tiles {
-            return Err(FormatError::Unwritable {
-                what: "tiles".to_owned(),
-                expected: format!("{tiles}, all of both eyes"),
-                found: written.to_string(),
-            });
-        }
-        if self.needs_lighting && tables.meta.lighting.is_none() {
-            return Err(FormatError::Unwritable {
-                what: "rays".to_owned(),
-                expected: "kinds of Whitted's model, as the trace has no lighting".to_owned(),
-                found: "ambient occlusion or diffuse rays".to_owned(),
-            });
-        }
-        let with_geometry = self.geometry.index.len() / GEOMETRY_INDEX_ENTRY_BYTES;
-        if with_geometry != 0 && with_geometry != tiles {
-            return Err(FormatError::Unwritable {
-                what: "geometry".to_owned(),
-                expected: format!("that of all {tiles} tiles or of none"),
-                found: with_geometry.to_string(),
-            });
-        }
+        let require = |holds, what, expected: &str, found: &dyn Display| {
+            ensure(holds, what, expected, found).map_err(Broken::unwritable)
+        };
+        let expected = format!("{tiles}, all of both eyes");
+        require(written == tiles, "tiles", &expected, &written)?;
+        require(
+            !self.needs_lighting || tables.meta.lighting.is_some(),
+            "rays",
+            "kinds of Whitted's model, as the trace has no lighting",
+            &"ambient occlusion or diffuse rays",
+        )?;
+        let with_geometry = self.geometry_index.len() / GEOMETRY_INDEX_ENTRY_BYTES;
+        let expected = format!("that of all {tiles} tiles or of none");
+        let is_whole = with_geometry == 0 || with_geometry == tiles;
+        require(is_whole, "geometry", &expected, &with_geometry)?;
         self.container.end_chunk()?;
         self.container.chunk(RAY_INDEX, &self.index)?;
         if with_geometry > 0 {
             self.container.require_minor(COLUMNS_MINOR);
-            self.geometry.write(&mut self.container)?;
+            self.geometry.write(GEOMETRY_TILES, &mut self.container)?;
+            self.container.chunk(GEOMETRY_INDEX, &self.geometry_index)?;
         }
         if let Some(hierarchy) = &self.hierarchy {
             hierarchy.check(&tables.bvh).map_err(Broken::unwritable)?;
@@ -240,36 +217,5 @@ impl<W: Write + Seek> RaytraceWriter<W> {
         }
         tables::write(tables, &mut self.container)?;
         Ok(self.container)
-    }
-}
-
-impl GeometrySpool {
-    fn append(&mut self, bytes: &[u8]) -> Result<()> {
-        let written = self.bytes.write_all(bytes);
-        written.map_err(|source| FormatError::io("temporary file", "write", source))?;
-        let span = TileSpan {
-            offset: self.offset,
-            bytes: u32::try_from(bytes.len()).unwrap_or(u32::MAX),
-            crc32: crc32fast::hash(bytes),
-        };
-        span.write(&mut self.index);
-        self.offset += bytes.len() as u64;
-        Ok(())
-    }
-
-    fn write<W: Write + Seek>(&mut self, container: &mut ContainerWriter<W>) -> Result<()> {
-        let failed = |source| FormatError::io("temporary file", "read", source);
-        self.bytes.rewind().map_err(failed)?;
-        container.begin_chunk(GEOMETRY_TILES)?;
-        let mut buffer = vec![0; 1 << 16];
-        loop {
-            let count = self.bytes.read(&mut buffer).map_err(failed)?;
-            let Some(read) = buffer.get(..count).filter(|read| !read.is_empty()) else {
-                break;
-            };
-            container.append(read)?;
-        }
-        container.end_chunk()?;
-        container.chunk(GEOMETRY_INDEX, &self.index)
     }
 }

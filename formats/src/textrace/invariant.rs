@@ -121,9 +121,10 @@ fn check_operands(draw: &Draw, first: u32, records: &[QuadRecord]) -> Result<(),
         let place = |r: &QuadRecord| (r.x, r.y, r.mask);
         place(operands) == place(record) && operands.group.checked_add(1) == Some(record.group)
     };
-    let broken = |index: usize| {
-        Broken::new(
-            format!("record {}", u64::from(first) + index as u64),
+    let require = |holds: bool, index: usize| {
+        ensure(
+            holds,
+            format_args!("record {}", u64::from(first) + index as u64),
             "operands right before the record of the next group in the same lanes",
             "one without the other",
         )
@@ -137,10 +138,10 @@ fn check_operands(draw: &Draw, first: u32, records: &[QuadRecord]) -> Result<(),
             Some(operands) => paired(operands, record),
             None => !asks,
         };
-        ensure(holds, || broken(index))?;
+        require(holds, index)?;
         operands = draw.is_operands(record.group).then_some(record);
     }
-    ensure(operands.is_none(), || broken(records.len()))
+    require(operands.is_none(), records.len())
 }
 
 #[cold]

@@ -60,11 +60,8 @@ impl Encoding {
     /// Every encoding, by number.
     pub const ALL: [Self; 3] = [Self::Raw, Self::Delta, Self::Planes];
 
-    fn from_id(id: u64) -> Option<Self> {
-        Self::ALL
-            .into_iter()
-            .find(|encoding| *encoding as u64 == id)
-    }
+    /// Every encoding with its number.
+    const IDS: [(u64, Self); 3] = [(0, Self::Raw), (1, Self::Delta), (3, Self::Planes)];
 
     /// Maximum number of records in `bytes` bytes, at the best compression.
     fn most_records(self, bytes: u32) -> u64 {
@@ -171,13 +168,12 @@ impl Surfaces {
         for [first, count] in &self.not_opaque {
             let end = u64::from(*first) + u64::from(*count);
             let fits = u64::from(*first) >= next && *count > 0 && end <= draws as u64;
-            ensure(fits, || {
-                Broken::new(
-                    "surfaces.not_opaque",
-                    format!("ranges of draws below {draws}, ascending and apart"),
-                    format_args!("{:?}", self.not_opaque),
-                )
-            })?;
+            ensure(
+                fits,
+                "surfaces.not_opaque",
+                format_args!("ranges of draws below {draws}, ascending and apart"),
+                format_args!("{:?}", self.not_opaque),
+            )?;
             next = end;
         }
         Ok(())
@@ -191,30 +187,26 @@ impl TraceMeta {
         let numbers: Vec<u32> = self.frames.iter().map(|views| views.frame).collect();
         ensure(
             !numbers.is_empty() && numbers.is_sorted_by(|a, b| a < b),
-            || {
-                Broken::new(
-                    "frames",
-                    "at least one, numbers ascending",
-                    format_args!("{numbers:?}"),
-                )
-            },
+            "frames",
+            "at least one, numbers ascending",
+            format_args!("{numbers:?}"),
         )?;
-        ensure(self.origin_m.iter().all(|at| at.is_finite()), || {
-            Broken::new(
-                "origin",
-                "finite numbers",
-                format_args!("{:?}", self.origin_m),
-            )
-        })
+        ensure(
+            self.origin_m.iter().all(|at| at.is_finite()),
+            "origin",
+            "finite numbers",
+            format_args!("{:?}", self.origin_m),
+        )
     }
 }
 
 /// Kinds of passes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
 pub enum PassKind {
     /// The picture of one eye.
+    #[default]
     Main = 0,
     /// A layer of a shadow map (texture accesses of alpha-masked casters).
     Shadow = 1,
@@ -223,7 +215,7 @@ pub enum PassKind {
 }
 
 /// One pass: one view of one frame. Its tiles are numbered row by row from the top left.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Pass {
     /// Frame number.
     pub frame: u32,
@@ -302,7 +294,7 @@ impl SampleLevel {
 }
 
 /// One texture read that a draw makes per fragment.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub struct Sample {
     /// Index into the texture table.
     pub texture: u32,
@@ -318,7 +310,7 @@ pub struct Sample {
 }
 
 /// Textures that one draw samples at the same texture coordinates; one quad record serves all.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct UvGroup {
     /// Texels per unit of u and v that define the fixed-point step `1 / (SUBTEXELS * extent)`: by axis, the
     /// largest level-0 size among the group's textures.
@@ -345,7 +337,7 @@ impl Draw {
 }
 
 /// One draw call. The same draw has the same index in every pass.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Draw {
     /// Material name for reports.
     pub material: String,
@@ -426,7 +418,7 @@ pub fn with_operands(
 }
 
 /// A run of records that belong to one primitive in one tile.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PrimitiveRun {
     /// Global primitive number (see `Draw::first_primitive`), ascending within a tile.
     pub primitive: u32,
@@ -470,27 +462,6 @@ pub struct Tables {
     pub draws: Vec<Draw>,
     /// Passes in submission order; a stereo frame is left eye then right eye.
     pub passes: Vec<Pass>,
-}
-
-impl Tables {
-    /// Whether the tables have features that version 2 lacks.
-    #[must_use]
-    pub fn need_version_3(&self) -> bool {
-        self.samplers.iter().any(Sampler::is_anisotropic)
-            || self.textures.iter().any(|t| t.part.is_some())
-    }
-
-    /// Whether the tables have features that version 1 lacks.
-    #[must_use]
-    pub fn need_version_2(&self) -> bool {
-        self.meta.program.is_some()
-            || self.need_version_3()
-            || self.textures.iter().any(|t| !t.format.is_in_version_1())
-            || self.samplers.iter().any(|s| !s.is_in_version_1())
-            || (self.draws.iter().flat_map(|draw| &draw.groups))
-                .flat_map(|group| &group.samples)
-                .any(|sample| !sample.level.is_default())
-    }
 }
 
 #[cfg(test)]

@@ -3,10 +3,7 @@
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::{PrimitiveRun, QuadRecord, Tile};
-use crate::parse::Parsed;
-use nom::Parser;
-use nom::error::context;
-use nom::number::complete::{le_i32, le_u32, u8};
+use crate::parse::{Cursor, Number, Parsed};
 
 /// Bytes of a run: primitive, draw, records.
 pub const RUN_BYTES: usize = 12;
@@ -17,15 +14,11 @@ pub(super) fn encode(tile: &Tile) -> Vec<u8> {
     let size = tile.runs.len() * RUN_BYTES + tile.records.len() * RECORD_BYTES;
     let mut bytes = Vec::with_capacity(size);
     for run in &tile.runs {
-        for number in [run.primitive, run.draw, run.count] {
-            bytes.extend(number.to_le_bytes());
-        }
+        [run.primitive, run.draw, run.count].put(&mut bytes);
     }
     for record in &tile.records {
         bytes.extend([record.x, record.y, record.mask, record.group]);
-        for number in [record.uv, record.dx, record.dy, record.cross].as_flattened() {
-            bytes.extend(number.to_le_bytes());
-        }
+        [record.uv, record.dx, record.dy, record.cross].put(&mut bytes);
     }
     bytes
 }
@@ -36,11 +29,10 @@ pub(super) fn decode<'a>(
     input: &'a [u8],
     tile: &mut Tile,
 ) -> Parsed<'a, ()> {
-    let mut rest = input;
+    let mut input = Cursor::new(input);
     let mut first = 0u32;
     for _ in 0..runs {
-        let (after, (primitive, draw, count)) =
-            context("a run of 12 bytes", (le_u32, le_u32, le_u32)).parse(rest)?;
+        let [primitive, draw, count] = input.fixed("a run of 12 bytes")?;
         tile.runs.push(PrimitiveRun {
             primitive,
             draw,
@@ -48,14 +40,10 @@ pub(super) fn decode<'a>(
             count,
         });
         first = first.saturating_add(count);
-        rest = after;
     }
     for _ in 0..records {
-        let (after, ((x, y, mask, group), uv, dx, dy, cross)) = context(
-            "a record of 36 bytes",
-            ((u8, u8, u8, u8), pair, pair, pair, pair),
-        )
-        .parse(rest)?;
+        let [x, y, mask, group] = input.fixed("a record of 36 bytes")?;
+        let [uv, dx, dy, cross] = input.fixed("a record of 36 bytes")?;
         tile.records.push(QuadRecord {
             x,
             y,
@@ -66,11 +54,6 @@ pub(super) fn decode<'a>(
             dy,
             cross,
         });
-        rest = after;
     }
-    Ok((rest, ()))
-}
-
-fn pair(input: &[u8]) -> Parsed<'_, [i32; 2]> {
-    (le_i32, le_i32).map(|(u, v)| [u, v]).parse(input)
+    Ok((input.rest(), ()))
 }

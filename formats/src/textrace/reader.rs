@@ -2,16 +2,10 @@
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::geometry::{self, Geometry, TileLists};
-use super::index::IndexEntry;
-use super::{
-    Encoding, INDEX_ENTRY_BYTES, Pass, TILE_INDEX, TILES, Tables, Tile, delta, invariant, planes,
-    raw, tables,
-};
+use super::index::{IndexEntry, TILE_CHUNK};
+use super::{Encoding, Pass, TILES, Tables, Tile, delta, invariant, planes, raw, tables};
 use crate::container::{Container, Kind};
-use crate::error::{FormatError, Result};
-use crate::tiles::TileChunk;
-use nom::Parser;
-use nom::multi::count;
+use crate::error::{Broken, Result};
 use std::path::Path;
 
 /// Maximum number of records for which memory is reserved before decoding.
@@ -68,16 +62,8 @@ impl Textrace {
             .iter()
             .map(Pass::tile_count_u64)
             .fold(0, u64::saturating_add);
-        let bytes = container.chunk(TILE_INDEX)?.len();
-        let entries = bytes / INDEX_ENTRY_BYTES;
-        if slots.checked_mul(INDEX_ENTRY_BYTES as u64) != Some(bytes as u64) {
-            let expected = format!("32 bytes for each of {slots} tiles");
-            return Err(container.malformed(TILE_INDEX, 0, expected, format!("{bytes} bytes")));
-        }
-        let index: Vec<IndexEntry> = container.parse_chunk(TILE_INDEX, |input| {
-            count(IndexEntry::parse, entries).parse(input)
-        })?;
-        tile_chunk(&container).check(index.iter().map(IndexEntry::touched))?;
+        let index: Vec<IndexEntry> = TILE_CHUNK.read_index(&container, slots)?;
+        TILE_CHUNK.check(&container, index.iter().map(IndexEntry::touched))?;
         let mut next = 0usize;
         let pass_slots = tables
             .passes
@@ -114,12 +100,8 @@ impl Textrace {
         let found =
             views.and_then(|geometry| geometry.views.get(view).zip(geometry.spans.get(view)));
         let Some((view, span)) = found else {
-            return Err(FormatError::OutOfRange {
-                file: self.container.file().to_owned(),
-                what: "view",
-                index: view as u64,
-                count: views.map_or(0, |geometry| geometry.views.len() as u64),
-            });
+            let count = views.map_or(0, |geometry| geometry.views.len() as u64);
+            return Err(self.container.out_of_range("view", view as u64, count));
         };
         geometry::lists_of(&self.container, &self.tables, view, span)
     }
@@ -151,9 +133,9 @@ impl Textrace {
         lists: &TileLists,
     ) -> Result<()> {
         lists.check_records(tile, records).map_err(|broken| {
-            let expected = format!("pass {pass}, {}: {}", broken.what, broken.expected);
+            let what = format!("pass {pass}, {}", broken.what);
             let tag = geometry::PRIMITIVE_LISTS;
-            self.container.malformed(tag, 0, expected, broken.found)
+            self.container.broken(tag, 0, Broken { what, ..broken })
         })
     }
 
@@ -230,44 +212,28 @@ impl Textrace {
         // Small records can be numerous. Beyond the size of a usual tile, memory grows while decoding.
         out.runs.reserve(runs.min(MOST_RESERVED) as usize);
         out.records.reserve(records.min(MOST_RESERVED) as usize);
-        tile_chunk(&self.container).parse(&entry.span, |input| match entry.encoding {
+        TILE_CHUNK.parse(&self.container, &entry.span, |input| match entry.encoding {
             Encoding::Raw => raw::decode(runs, records, input, out),
             Encoding::Delta => delta::decode(runs, records, input, out),
             Encoding::Planes => planes::decode(runs, records, input, out),
         })?;
         invariant::check(&self.tables.draws, out).map_err(|broken| {
-            let expected = format!("{} of the tile: {}", broken.what, broken.expected);
+            let what = format!("{} of the tile", broken.what);
+            let offset = entry.span.offset;
             self.container
-                .malformed(TILES, entry.span.offset, expected, broken.found)
+                .broken(TILES, offset, Broken { what, ..broken })
         })
     }
 
     fn entry(&self, pass: usize, tile: usize) -> Result<&IndexEntry> {
-        let out_of_range = |what, index: usize, count: u64| FormatError::OutOfRange {
-            file: self.container.file().to_owned(),
-            what,
-            index: index as u64,
-            count,
-        };
-        let (info, first) = self
-            .tables
-            .passes
-            .get(pass)
-            .zip(self.pass_slots.get(pass))
-            .ok_or_else(|| out_of_range("pass", pass, self.tables.passes.len() as u64))?;
+        let (container, passes) = (&self.container, &self.tables.passes);
+        let found = passes.get(pass).zip(self.pass_slots.get(pass));
+        let (info, first) = found
+            .ok_or_else(|| container.out_of_range("pass", pass as u64, passes.len() as u64))?;
         let tiles = info.tile_count_u64();
         Some(tile)
             .filter(|tile| (*tile as u64) < tiles)
             .and_then(|tile| self.index.get(first + tile))
-            .ok_or_else(|| out_of_range("tile", tile, tiles))
-    }
-}
-
-fn tile_chunk(container: &Container) -> TileChunk<'_> {
-    TileChunk {
-        container,
-        tiles: TILES,
-        index: TILE_INDEX,
-        entry_bytes: INDEX_ENTRY_BYTES,
+            .ok_or_else(|| container.out_of_range("tile", tile as u64, tiles))
     }
 }

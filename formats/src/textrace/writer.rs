@@ -2,10 +2,10 @@
 
 use super::geometry::{Geometry, GeometryView, Spool, TileLists};
 use super::index::IndexEntry;
-use super::tables::{self, Version};
-use super::{Draw, Encoding, Pass, Tables, Tile, TraceMeta, delta, invariant, planes, raw};
-use crate::container::{AtomicFile, ContainerWriter, Kind};
+use super::{Draw, Encoding, Pass, Tables, Tile, TraceMeta, delta, invariant, planes, raw, tables};
+use crate::container::{AtomicFile, ContainerWriter, Kind, MAJOR_1, MAJOR_2};
 use crate::error::{Broken, FormatError, Result};
+use crate::records;
 use crate::texture::{Part, Sampler, Texture};
 use crate::tiles::TileSpan;
 use std::io::{Cursor, Seek, Write};
@@ -57,10 +57,9 @@ pub fn encode_tile_as(encoding: Encoding, tables: &Tables, tile: &Tile) -> Resul
         Encoding::Delta => delta::encode(tile),
         Encoding::Planes => planes::encode(tile),
     };
-    let too_many = |_| FormatError::Unwritable {
-        what: "tile".to_owned(),
-        expected: "less than 2^32 bytes".to_owned(),
-        found: format!("{} records in {} bytes", tile.records.len(), bytes.len()),
+    let too_many = |_| {
+        let found = format!("{} records in {} bytes", tile.records.len(), bytes.len());
+        Broken::new("tile", "less than 2^32 bytes", found).unwritable()
     };
     u32::try_from(bytes.len()).map_err(too_many)?;
     Ok(EncodedTile {
@@ -147,7 +146,7 @@ impl TextraceWriter<Cursor<Vec<u8>>> {
 
 impl<W: Write + Seek> TextraceWriter<W> {
     fn start(container: ContainerWriter<W>, tables: &Tables) -> Result<Self> {
-        Self::start_with(Version::of(tables) > Version::One, container, tables)
+        Self::start_with(tables::major_of(tables) > MAJOR_1, container, tables)
     }
 
     fn start_with(
@@ -156,7 +155,7 @@ impl<W: Write + Seek> TextraceWriter<W> {
         tables: &Tables,
     ) -> Result<Self> {
         if !tables_last {
-            tables::write(Version::One, tables, &mut container)?;
+            tables::write(MAJOR_1, tables, &mut container)?;
         } else if *tables != Tables::default() {
             // Report errors of the tables before the work. A growing trace has no tables yet.
             tables::check_writable(tables)?;
@@ -190,11 +189,10 @@ impl<W: Write + Seek> TextraceWriter<W> {
     fn growing(&mut self, what: &str) -> Result<&mut Tables> {
         match self.tables_last {
             true => Ok(&mut self.tables),
-            false => Err(FormatError::Unwritable {
-                what: what.to_owned(),
-                expected: "a trace whose tables come last".to_owned(),
-                found: "tables that have been written".to_owned(),
-            }),
+            false => {
+                let expected = "a trace whose tables come last";
+                Err(Broken::new(what, expected, "tables that have been written").unwritable())
+            }
         }
     }
 
@@ -222,15 +220,12 @@ impl<W: Write + Seek> TextraceWriter<W> {
     /// # Errors
     /// The tables have been written, or there is no such texture.
     pub fn set_part(&mut self, texture: u32, part: Option<Part>) -> Result<()> {
-        let textures = &mut self.growing("a part of a texture")?.textures;
+        let what = "a part of a texture";
+        let textures = &mut self.growing(what)?.textures;
         let found = textures.get_mut(texture as usize);
         found
             .map(|found| found.part = part)
-            .ok_or_else(|| FormatError::Unwritable {
-                what: "a part of a texture".to_owned(),
-                expected: "a texture of the trace".to_owned(),
-                found: texture.to_string(),
-            })
+            .ok_or_else(|| Broken::new(what, "a texture of the trace", texture).unwritable())
     }
 
     /// Adds a sampler and returns its index.
@@ -321,10 +316,8 @@ impl<W: Write + Seek> TextraceWriter<W> {
     /// # Errors
     /// The tile does not exist, is out of order, or cannot be written.
     pub fn append(&mut self, pass: usize, tile_index: usize, tile: EncodedTile) -> Result<()> {
-        let unwritable = |expected: String| FormatError::Unwritable {
-            what: format!("tile {tile_index} of pass {pass}"),
-            expected,
-            found: "it".to_owned(),
+        let unwritable = |expected: String| {
+            Broken::new(format!("tile {tile_index} of pass {pass}"), expected, "it").unwritable()
         };
         let passes = &self.tables.passes;
         let tiles = passes.get(pass).map_or(0, Pass::tile_count_u64);
@@ -357,12 +350,12 @@ impl<W: Write + Seek> TextraceWriter<W> {
     fn seal(mut self) -> Result<ContainerWriter<W>> {
         let mut bytes = Vec::with_capacity(self.index.len() * super::INDEX_ENTRY_BYTES);
         for entry in &self.index {
-            entry.write(&mut bytes);
+            records::write(MAJOR_2, entry, &mut bytes)?;
         }
         self.container.chunk(super::TILE_INDEX, &bytes)?;
         if self.tables_last {
-            let version = Version::of(&self.tables).max(Version::Two);
-            tables::write(version, &self.tables, &mut self.container)?;
+            let major = tables::major_of(&self.tables).max(MAJOR_2);
+            tables::write(major, &self.tables, &mut self.container)?;
         }
         if let Some(spool) = self.geometry {
             spool.write(&self.tables, &mut self.container)?;
@@ -372,17 +365,13 @@ impl<W: Write + Seek> TextraceWriter<W> {
 }
 
 fn too_many_tiles(tiles: u64) -> FormatError {
-    FormatError::Unwritable {
-        what: "tile index".to_owned(),
-        expected: "a number of tiles that fits in memory".to_owned(),
-        found: tiles.to_string(),
-    }
+    let expected = "a number of tiles that fits in memory";
+    Broken::new("tile index", expected, tiles).unwritable()
 }
 
 fn index_of_last<T: TryFrom<usize>>(what: &str, entries: usize) -> Result<T> {
-    T::try_from(entries - 1).map_err(|_| FormatError::Unwritable {
-        what: format!("{what} table"),
-        expected: "entries that their indices can name".to_owned(),
-        found: entries.to_string(),
+    T::try_from(entries - 1).map_err(|_| {
+        let expected = "entries that their indices can name";
+        Broken::new(format!("{what} table"), expected, entries).unwritable()
     })
 }

@@ -14,7 +14,7 @@ mod runs;
 
 use super::Tile;
 use super::bits::{BitReader, BitWriter, PADDING_BYTES};
-use crate::parse::{Fault, Parsed, ensure};
+use crate::parse::{Cursor, Fault, Parsed};
 
 /// Minimum bits per record, which bounds the number of records in a tile's bytes.
 pub const MIN_RECORD_BITS: u32 = records::CONTROL_BITS;
@@ -35,31 +35,20 @@ pub(super) fn decode<'a>(
 ) -> Parsed<'a, ()> {
     let (packed, ()) = runs::decode(run_count, record_count, input, &mut tile.runs)?;
     let mut bits = BitReader::new(packed);
-    let short = |bits: &BitReader<'a>| {
-        let rest = bits.rest();
-        nom::Err::Failure(Fault::new(
-            rest,
-            "a record",
-            format_args!("{} bytes left", rest.len()),
-        ))
-    };
     let mut state = records::State::new();
     for run in &tile.runs {
         records::decode_run(run, &mut state, &mut bits, &mut tile.records)
-            .ok_or_else(|| short(&bits))?;
+            .ok_or_else(|| Fault::short(bits.rest(), "a record"))?;
     }
-    let rest = bits.rest();
-    ensure(
-        rest,
-        bits.left_in_byte() == 0,
-        || "zero bits after the last record".to_owned(),
-        format_args!("{:#b}", bits.left_in_byte()),
-    )?;
-    ensure(
-        rest,
-        rest.len() == PADDING_BYTES && rest.iter().all(|byte| *byte == 0),
-        || format!("{PADDING_BYTES} zero bytes after the last record"),
-        format_args!("{} bytes", rest.len()),
+    let (end, left) = (Cursor::new(bits.rest()), bits.left_in_byte());
+    let expected = "zero bits after the last record";
+    end.check(left == 0, expected, format_args!("{left:#b}"))?;
+    let is_padding = end.rest() == [0; PADDING_BYTES];
+    let expected = format_args!("{PADDING_BYTES} zero bytes after the last record");
+    end.check(
+        is_padding,
+        expected,
+        format_args!("{} bytes", end.rest().len()),
     )?;
     Ok((&[], ()))
 }

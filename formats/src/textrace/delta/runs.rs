@@ -1,6 +1,6 @@
 //! Encodes the runs of a tile as variable-length numbers.
 
-use crate::parse::{Cursor, Parsed, ensure};
+use crate::parse::{Cursor, Parsed};
 use crate::textrace::PrimitiveRun;
 use crate::varint::put;
 
@@ -48,12 +48,8 @@ pub(super) fn decode<'a>(
             .checked_add(1)
             .ok_or_else(|| at.fault("a record count below 2^32", count))?;
         let left = record_count - first;
-        ensure(
-            at.rest(),
-            count <= left,
-            || format!("a run of at most {left} records"),
-            count,
-        )?;
+        let expected = format_args!("a run of at most {left} records");
+        at.check(count <= left, expected, count)?;
         runs.push(PrimitiveRun {
             primitive,
             draw,
@@ -63,11 +59,7 @@ pub(super) fn decode<'a>(
         first += count;
         next_primitive = u64::from(primitive) + 1;
     }
-    ensure(
-        input.rest(),
-        first == record_count,
-        || format!("runs of {record_count} records in all"),
-        first,
-    )?;
+    let expected = format_args!("runs of {record_count} records in all");
+    input.check(first == record_count, expected, first)?;
     Ok((input.rest(), ()))
 }

@@ -2,7 +2,7 @@
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use crate::error::{Broken, ensure};
-use crate::parse::{Cursor, Parsed};
+use crate::parse::{Cursor, Parsed, Taken};
 use crate::textrace::{Draw, PrimitiveRun, Tile};
 use crate::varint::put;
 
@@ -52,24 +52,14 @@ impl TileLists {
                 .draws
                 .last()
                 .is_none_or(|draw| (*draw as usize) < draws.len());
-        ensure(known, || {
-            Broken::new(
-                "draws of a view",
-                format!("ascending numbers below {}", draws.len()),
-                "others",
-            )
-        })?;
+        let expected = format_args!("ascending numbers below {}", draws.len());
+        ensure(known, "draws of a view", expected, "others")?;
         let whole = self.starts.len() == tiles + 1
             && self.starts.first() == Some(&0)
             && self.starts.is_sorted()
             && self.starts.last().map(|end| *end as usize) == Some(self.primitives.len());
-        ensure(whole, || {
-            Broken::new(
-                "primitive lists",
-                format!("one for each of {tiles} tiles"),
-                self.starts.len(),
-            )
-        })?;
+        let expected = format_args!("one for each of {tiles} tiles");
+        ensure(whole, "primitive lists", expected, self.starts.len())?;
         let ranges: Vec<std::ops::Range<u32>> = (self.draws.iter())
             .filter_map(|draw| draws.get(*draw as usize))
             .map(|draw| draw.first_primitive..draw.first_primitive.saturating_add(draw.primitives))
@@ -85,13 +75,12 @@ impl TileLists {
                 }
                 draw.contains(primitive)
             });
-            ensure(ascending && drawn, || {
-                Broken::new(
-                    format!("primitive list of tile {tile}"),
-                    "ascending primitives of the view's draws",
-                    format_args!("{:?}", list.get(..8).unwrap_or(list)),
-                )
-            })?;
+            ensure(
+                ascending && drawn,
+                format_args!("primitive list of tile {tile}"),
+                "ascending primitives of the view's draws",
+                format_args!("{:?}", list.get(..8).unwrap_or(list)),
+            )?;
         }
         Ok(())
     }
@@ -114,10 +103,7 @@ impl TileLists {
 
     /// Reads the lists of `tiles` tiles.
     pub(super) fn decode(tiles: usize, input: &[u8]) -> Parsed<'_, Self> {
-        fn ascending<'a>(
-            input: &mut Cursor<'a>,
-            out: &mut Vec<u32>,
-        ) -> Result<(), nom::Err<crate::parse::Fault<'a>>> {
+        fn ascending<'a>(input: &mut Cursor<'a>, out: &mut Vec<u32>) -> Taken<'a> {
             let count = input.number_u32("a number of entries")?;
             let mut next = 0_u64;
             for _ in 0..count {
@@ -130,12 +116,9 @@ impl TileLists {
             Ok(())
         }
         let mut input = Cursor::new(input);
-        if tiles > input.rest().len() {
-            return Err(input.fault(
-                format!("at least a byte for each of {tiles} tiles"),
-                format_args!("{} bytes", input.rest().len()),
-            ));
-        }
+        let bytes = input.rest().len();
+        let expected = format_args!("at least a byte for each of {tiles} tiles");
+        input.check(tiles <= bytes, expected, format_args!("{bytes} bytes"))?;
         let mut lists = Self::default();
         ascending(&mut input, &mut lists.draws)?;
         lists.starts.reserve(tiles + 1);

@@ -16,7 +16,7 @@ pub(super) use write::Spool;
 use super::{Pass, Tables};
 use crate::container::ChunkTag;
 use crate::error::{Broken, ensure};
-use crate::tiles::TileSpan;
+use crate::tiles::{TileChunk, TileSpan};
 use crate::view::TILE_SIZE_PX;
 
 /// Meshes, and the mesh of each draw.
@@ -31,6 +31,12 @@ pub const GEOMETRY_MINOR: u16 = 2;
 pub const MESH_BYTES: usize = 12;
 /// Bytes of an entry of the list index.
 pub const LIST_INDEX_ENTRY_BYTES: usize = 36;
+/// The lists and their index.
+const LIST_CHUNK: TileChunk = TileChunk {
+    tiles: PRIMITIVE_LISTS,
+    index: LIST_INDEX,
+    entry_bytes: LIST_INDEX_ENTRY_BYTES,
+};
 /// Largest width and height of a view in pixels.
 const MOST_PIXELS: u32 = 16384;
 
@@ -101,15 +107,14 @@ impl GeometryView {
                     })
                 }
             };
-        ensure(fits, || {
-            Broken::new(
-                "view",
-                format!(
-                    "a pass of the trace with its frame and size, or a shadow map of 1 to {MOST_PIXELS} pixels of one of its frames"
-                ),
-                format_args!("{self:?}"),
-            )
-        })
+        ensure(
+            fits,
+            "view",
+            format_args!(
+                "a pass of the trace with its frame and size, or a shadow map of 1 to {MOST_PIXELS} pixels of one of its frames"
+            ),
+            format_args!("{self:?}"),
+        )
     }
 }
 
@@ -131,25 +136,21 @@ impl Geometry {
     /// then its passes.
     fn check_order(&self, view: &GeometryView) -> Result<(), Broken> {
         let follows = (self.views.last()).is_none_or(|last| last.place() < view.place());
-        ensure(follows, || {
-            Broken::new(
-                format!("view {}", self.views.len()),
-                "views by ascending frame, of each frame shadow maps before passes, both ascending, none twice",
-                format_args!("{view:?} after {:?}", self.views.last()),
-            )
-        })
+        ensure(
+            follows,
+            format_args!("view {}", self.views.len()),
+            "views by ascending frame, of each frame shadow maps before passes, both ascending, none twice",
+            format_args!("{view:?} after {:?}", self.views.last()),
+        )
     }
 
     /// Checks that every pass has lists; their order has been checked.
     fn check_passes(&self, tables: &Tables) -> Result<(), Broken> {
         let is_pass = |view: &&GeometryView| matches!(view.target, ViewTarget::Pass(_));
-        let (found, expected) = (
-            self.views.iter().filter(is_pass).count(),
-            tables.passes.len(),
-        );
-        ensure(found == expected, || {
-            Broken::new("views", format!("one for each of {expected} passes"), found)
-        })
+        let found = self.views.iter().filter(is_pass).count();
+        let passes = tables.passes.len();
+        let expected = format_args!("one for each of {passes} passes");
+        ensure(found == passes, "views", expected, found)
     }
 
     /// Number of the view that a pass is.
@@ -169,43 +170,31 @@ impl Geometry {
                 && mesh.vertex_bytes > 0
                 && mesh.indices.len().is_multiple_of(3)
                 && mesh.indices.iter().all(|index| *index < mesh.vertices);
-            ensure(fits, || {
-                Broken::new(
-                    format!("mesh {number}"),
-                    "indices of 2 or 4 bytes, three for each triangle, below the number of vertices; vertices of at least 1 byte",
-                    format_args!(
-                        "{} indices of {} bytes, {} vertices of {} bytes",
-                        mesh.indices.len(),
-                        mesh.index_bytes,
-                        mesh.vertices,
-                        mesh.vertex_bytes
-                    ),
-                )
-            })?;
+            ensure(
+                fits,
+                format_args!("mesh {number}"),
+                "indices of 2 or 4 bytes, three for each triangle, below the number of vertices; vertices of at least 1 byte",
+                format_args!(
+                    "{} indices of {} bytes, {} vertices of {} bytes",
+                    mesh.indices.len(),
+                    mesh.index_bytes,
+                    mesh.vertices,
+                    mesh.vertex_bytes
+                ),
+            )?;
         }
-        ensure(self.draw_meshes.len() == tables.draws.len(), || {
-            Broken::new(
-                "meshes of draws",
-                format!("{}", tables.draws.len()),
-                self.draw_meshes.len(),
-            )
-        })?;
+        let (found, draws) = (self.draw_meshes.len(), tables.draws.len());
+        ensure(found == draws, "meshes of draws", draws, found)?;
         for (number, (mesh, draw)) in self.draw_meshes.iter().zip(&tables.draws).enumerate() {
-            let triangles = self
-                .meshes
-                .get(*mesh as usize)
-                .map(|mesh| mesh.indices.len() / 3);
-            ensure(triangles == Some(draw.primitives as usize), || {
-                Broken::new(
-                    format!("mesh of draw {number}"),
-                    format!(
-                        "one of {} meshes, of {} triangles",
-                        self.meshes.len(),
-                        draw.primitives
-                    ),
-                    format_args!("mesh {mesh} of {triangles:?}"),
-                )
-            })?;
+            let found = self.meshes.get(*mesh as usize);
+            let triangles = found.map(|mesh| mesh.indices.len() / 3);
+            let meshes = self.meshes.len();
+            ensure(
+                triangles == Some(draw.primitives as usize),
+                format_args!("mesh of draw {number}"),
+                format_args!("one of {meshes} meshes, of {} triangles", draw.primitives),
+                format_args!("mesh {mesh} of {triangles:?}"),
+            )?;
         }
         Ok(())
     }

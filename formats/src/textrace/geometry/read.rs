@@ -2,19 +2,16 @@
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
 use super::{
-    GEOMETRY, GEOMETRY_MINOR, Geometry, GeometryView, LIST_INDEX, LIST_INDEX_ENTRY_BYTES,
-    MESH_BYTES, MeshGeometry, PRIMITIVE_LISTS, TileLists, ViewTarget,
+    GEOMETRY, GEOMETRY_MINOR, Geometry, GeometryView, LIST_CHUNK, LIST_INDEX, MESH_BYTES,
+    MeshGeometry, PRIMITIVE_LISTS, TileLists, ViewTarget,
 };
 use crate::container::{Container, MAJOR_1};
-use crate::error::Result;
-use crate::parse::{self, Cursor, Fault, Parsed};
+use crate::error::{Broken, Result};
+use crate::parse::{Cursor, Parsed};
+use crate::records;
 use crate::textrace::{TILE_INDEX, Tables};
-use crate::tiles::{TileChunk, TileSpan};
+use crate::tiles::TileSpan;
 use crate::varint::unzigzag;
-use nom::Parser;
-use nom::error::context;
-use nom::multi::count;
-use nom::number::complete::{le_u16, le_u32};
 
 /// The geometry of a trace, if it has any.
 pub(in crate::textrace) fn read(
@@ -26,26 +23,13 @@ pub(in crate::textrace) fn read(
         return Ok(None);
     }
     container.expect_order(&[TILE_INDEX, GEOMETRY, PRIMITIVE_LISTS, LIST_INDEX])?;
-    let (major, minor) = container.version();
-    if major == MAJOR_1 && minor < GEOMETRY_MINOR {
-        let expected = format!("version {major}.{GEOMETRY_MINOR} for a trace with geometry");
-        return Err(container.malformed(GEOMETRY, 0, expected, format!("{major}.{minor}")));
+    if container.version().0 == MAJOR_1 {
+        container.expect_minor(GEOMETRY_MINOR, GEOMETRY, "a trace with geometry")?;
     }
-    let broken = |tag| {
-        move |broken: crate::error::Broken| {
-            container.malformed(
-                tag,
-                0,
-                format!("{}: {}", broken.what, broken.expected),
-                broken.found,
-            )
-        }
-    };
+    let broken = |tag| move |broken: Broken| container.broken(tag, 0, broken);
     let mut geometry = container.parse_chunk(GEOMETRY, read_meshes)?;
     geometry.check_meshes(tables).map_err(broken(GEOMETRY))?;
-    let entries = container.chunk(LIST_INDEX)?.len() / LIST_INDEX_ENTRY_BYTES;
-    let views =
-        container.parse_chunk(LIST_INDEX, |input| count(read_view, entries).parse(input))?;
+    let views = container.parse_chunk(LIST_INDEX, read_views)?;
     for (view, span) in views {
         let sound = view
             .check(tables)
@@ -55,7 +39,7 @@ pub(in crate::textrace) fn read(
         geometry.spans.push(span);
     }
     geometry.check_passes(tables).map_err(broken(LIST_INDEX))?;
-    list_chunk(container).check(geometry.spans.iter().copied().map(Some))?;
+    LIST_CHUNK.check(container, geometry.spans.iter().copied().map(Some))?;
     Ok(Some(geometry))
 }
 
@@ -67,31 +51,20 @@ pub(in crate::textrace) fn lists_of(
     span: &TileSpan,
 ) -> Result<TileLists> {
     let tiles = view.tile_count();
-    let lists = list_chunk(container).parse(span, |input| TileLists::decode(tiles, input))?;
-    lists.check(&tables.draws, tiles).map_err(|broken| {
-        let expected = format!("{}: {}", broken.what, broken.expected);
-        container.malformed(PRIMITIVE_LISTS, span.offset, expected, broken.found)
-    })?;
+    let lists = LIST_CHUNK.parse(container, span, |input| TileLists::decode(tiles, input))?;
+    (lists.check(&tables.draws, tiles))
+        .map_err(|broken| container.broken(PRIMITIVE_LISTS, span.offset, broken))?;
     Ok(lists)
-}
-
-fn list_chunk(container: &Container) -> TileChunk<'_> {
-    TileChunk {
-        container,
-        tiles: PRIMITIVE_LISTS,
-        index: LIST_INDEX,
-        entry_bytes: LIST_INDEX_ENTRY_BYTES,
-    }
 }
 
 fn read_meshes(input: &[u8]) -> Parsed<'_, Geometry> {
     let mut input = Cursor::new(input);
-    let meshes = input.parse(parse::count("mesh count", MESH_BYTES))?;
+    let meshes = input.count("mesh count", MESH_BYTES)?;
     let mut geometry = Geometry::default();
     for _ in 0..meshes {
-        let (vertices, vertex_bytes, index_bytes) =
-            input.parse(context("a mesh", (le_u32, le_u16, le_u16)))?;
-        let indices = input.parse(parse::count("index count", 1))?;
+        let vertices = input.fixed("a mesh")?;
+        let [vertex_bytes, index_bytes] = input.fixed("a mesh")?;
+        let indices = input.count("index count", 1)?;
         let mut mesh = MeshGeometry {
             vertices,
             vertex_bytes,
@@ -107,32 +80,31 @@ fn read_meshes(input: &[u8]) -> Parsed<'_, Geometry> {
         }
         geometry.meshes.push(mesh);
     }
-    let draws = input.parse(parse::count("draw count", 4))?;
-    geometry.draw_meshes = input.parse(count(le_u32, draws))?;
+    for _ in 0..input.count("draw count", 4)? {
+        geometry.draw_meshes.push(input.fixed("a mesh of a draw")?);
+    }
     Ok((input.rest(), geometry))
 }
 
-fn read_view(at: &[u8]) -> Parsed<'_, (GeometryView, TileSpan)> {
-    let (rest, (frame, kind, number, width, height, span)) = context(
-        "an entry of 36 bytes of the list index",
-        (le_u32, le_u32, le_u32, le_u32, le_u32, TileSpan::parse),
-    )
-    .parse(at)?;
-    let target = match kind {
-        0 => ViewTarget::Pass(number),
-        1 => ViewTarget::ShadowMap(number),
-        _ => {
-            return Err(nom::Err::Failure(Fault::new(
-                at,
-                "a view of kind 0 or 1",
-                kind,
-            )));
-        }
-    };
-    let view = GeometryView {
-        frame,
-        target,
-        size_px: [width, height],
-    };
-    Ok((rest, (view, span)))
+fn read_views(input: &[u8]) -> Parsed<'_, Vec<(GeometryView, TileSpan)>> {
+    let mut input = Cursor::new(input);
+    let mut views = Vec::new();
+    while !input.rest().is_empty() {
+        let at = input;
+        let what = "an entry of 36 bytes of the list index";
+        let [frame, kind, number, width, height] = input.fixed(what)?;
+        let target = match kind {
+            0 => ViewTarget::Pass(number),
+            1 => ViewTarget::ShadowMap(number),
+            _ => return Err(at.fault("a view of kind 0 or 1", kind)),
+        };
+        let size_px = [width, height];
+        let view = GeometryView {
+            frame,
+            target,
+            size_px,
+        };
+        views.push((view, input.parse(|input| records::parse(MAJOR_1, input))?));
+    }
+    Ok((input.rest(), views))
 }

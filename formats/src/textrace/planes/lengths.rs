@@ -2,7 +2,7 @@
 //!
 //! They are part of the format; FORMAT.md has the same lines. They are optimal for the symbols of four
 //! traces with equal weight (crytek-sponza, atrium with shadows, jungle, black-forest), counted by
-//! [`super::train`].
+//! `tests/train.rs`.
 
 use super::codes::CODES;
 

@@ -25,7 +25,7 @@ mod widths;
 
 use super::Tile;
 use super::bits::{BitWriter, PADDING_BYTES};
-use crate::parse::{Fault, Parsed, ensure};
+use crate::parse::{Cursor, Fault, Parsed};
 use codes::Codes;
 use decode::Decoder;
 
@@ -64,29 +64,17 @@ pub(super) fn decode<'a>(
     let outcome = decoder.tile(runs, records, tile);
     let (front, back) = (decoder.front, decoder.back);
     let rest = input.get(front.bytes_read()..).unwrap_or_default();
-    outcome.map_err(|expected| {
-        let found = format_args!("{} bytes left", rest.len());
-        nom::Err::Failure(Fault::new(rest, expected, found))
-    })?;
+    outcome.map_err(|expected| Fault::short(rest, expected))?;
+    let end = Cursor::new(rest);
     let read = front.bytes_read() + back.bytes_read();
-    ensure(
-        rest,
-        read == input.len(),
-        || format!("{read} bytes, from the front and from the back"),
-        format_args!("{}", input.len()),
-    )?;
+    let expected = format_args!("{read} bytes, from the front and from the back");
+    end.check(read == input.len(), expected, input.len())?;
     for left in [front.left_in_byte(), back.left_in_byte()] {
-        ensure(
-            rest,
-            left == 0,
-            || "zero bits after the last record".to_owned(),
-            format_args!("{left:#b}"),
-        )?;
+        let expected = "zero bits after the last record";
+        end.check(left == 0, expected, format_args!("{left:#b}"))?;
     }
     Ok((&[], ()))
 }
 
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod train;

@@ -4,6 +4,8 @@
     reason = "a test may panic"
 )]
 
+mod train;
+
 use super::codes::{Code, Codes, MOST_BITS};
 use super::lengths::LENGTHS;
 use super::mode::{Deviation, Mode};

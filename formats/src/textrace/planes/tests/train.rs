@@ -1,5 +1,5 @@
 //! Computes the code lengths.
-//! `TEXTRACES=a.textrace:b.textrace cargo test --release -p formats --lib planes::train -- --ignored --nocapture`
+//! `TEXTRACES=a.textrace:b.textrace cargo test --release -p formats --lib planes::tests::train -- --ignored --nocapture`
 //! counts symbols in traces and prints `lengths.rs` for them, and the bits of a record by purpose. It
 //! repeats this `ROUNDS` times and uses every `EVERY`th tile.
 #![allow(
@@ -8,12 +8,12 @@
     reason = "a test may panic"
 )]
 
-use super::codes::{CODES, Code, Codes, MOST_BITS};
-use super::encode::{self, Sink};
-use super::lengths::LENGTHS;
-use super::places::ESCAPE_PLACE;
-use super::residual::ESCAPE_SIZES;
-use super::widths::{CORRECTION, DX_AND_UV, DY_AND_CROSS};
+use super::super::codes::{CODES, Code, Codes, MOST_BITS};
+use super::super::encode::{self, Sink};
+use super::super::lengths::LENGTHS;
+use super::super::places::ESCAPE_PLACE;
+use super::super::residual::ESCAPE_SIZES;
+use super::super::widths::{CORRECTION, DX_AND_UV, DY_AND_CROSS};
 use crate::textrace::{Textrace, Tile};
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! Tests of the optional columns: round trip, damage, and data that must not be written.
 
-use super::tests::{eyes_and_tiles, tables, tile};
-use super::*;
+use super::super::*;
+use super::{eyes_and_tiles, tables, tile};
 use crate::error::FormatError;
 use crate::random::Random;
 use proptest::prelude::*;
