@@ -119,7 +119,6 @@ impl FormatError {
     }
 
     /// Offset of the first bad byte, if the error has one.
-    #[must_use]
     pub fn offset(&self) -> Option<u64> {
         match self {
             Self::Malformed { offset, .. } => Some(*offset),
@@ -150,7 +149,6 @@ impl Broken {
     }
 
     /// The corresponding error for data to be written.
-    #[must_use]
     pub fn unwritable(self) -> FormatError {
         FormatError::Unwritable {
             what: self.what,

@@ -56,7 +56,7 @@ fn parse<T: DeserializeOwned>(json: &[u8]) -> serde_json::Result<T> {
 struct Sound;
 
 impl<'de> Deserialize<'de> for Sound {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(Self)
     }
 }
@@ -68,7 +68,7 @@ impl<'de> Visitor<'de> for Sound {
         f.write_str("JSON")
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> std::result::Result<Self, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self, A::Error> {
         let mut keys = HashSet::new();
         while let Some(key) = map.next_key::<String>()? {
             map.next_value::<Self>()?;
@@ -79,12 +79,12 @@ impl<'de> Visitor<'de> for Sound {
         Ok(self)
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> std::result::Result<Self, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut seq: A) -> Result<Self, A::Error> {
         while seq.next_element::<Self>()?.is_some() {}
         Ok(self)
     }
 
-    fn visit_f64<E: Error>(self, number: f64) -> std::result::Result<Self, E> {
+    fn visit_f64<E: Error>(self, number: f64) -> Result<Self, E> {
         if number.abs() <= f32::MAX.into() {
             return Ok(self);
         }
@@ -93,23 +93,23 @@ impl<'de> Visitor<'de> for Sound {
         )))
     }
 
-    fn visit_bool<E>(self, _: bool) -> std::result::Result<Self, E> {
+    fn visit_bool<E>(self, _: bool) -> Result<Self, E> {
         Ok(self)
     }
 
-    fn visit_u64<E>(self, _: u64) -> std::result::Result<Self, E> {
+    fn visit_u64<E>(self, _: u64) -> Result<Self, E> {
         Ok(self)
     }
 
-    fn visit_i64<E>(self, _: i64) -> std::result::Result<Self, E> {
+    fn visit_i64<E>(self, _: i64) -> Result<Self, E> {
         Ok(self)
     }
 
-    fn visit_str<E>(self, _: &str) -> std::result::Result<Self, E> {
+    fn visit_str<E>(self, _: &str) -> Result<Self, E> {
         Ok(self)
     }
 
-    fn visit_unit<E>(self) -> std::result::Result<Self, E> {
+    fn visit_unit<E>(self) -> Result<Self, E> {
         Ok(self)
     }
 }

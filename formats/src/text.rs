@@ -7,20 +7,17 @@ use std::borrow::Cow;
 ///
 /// Names of materials, cameras, files and passes are escaped before they are stored in a scene or shown in
 /// a message.
-#[must_use]
 pub fn printable(text: &str) -> Cow<'_, str> {
     escaped(text, steers)
 }
 
 /// [`printable`] for whole messages, which may have line breaks and tabs.
-#[must_use]
 pub fn printable_lines(message: &str) -> Cow<'_, str> {
     escaped(message, |c| steers(c) && c != '\n' && c != '\t')
 }
 
 /// Text for a cell of a CSV file. A spreadsheet would run a name that begins with `=`, `+`, `-` or `@` as a
 /// formula, so it gets an apostrophe in front. Numbers stay as they are.
-#[must_use]
 pub fn csv_cell(text: &str) -> Cow<'_, str> {
     let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.len() > 1;
     match is_formula && text.parse::<f64>().is_err() {

@@ -73,13 +73,11 @@ pub enum TexelFormat {
 
 impl TexelFormat {
     /// Whether the format holds depth: a shadow map.
-    #[must_use]
     pub const fn is_depth(self) -> bool {
         matches!(self, Self::R32f | Self::D16)
     }
 
     /// Whether texels can be stored in another colour format: neither depth nor more than 8 bits per channel.
-    #[must_use]
     pub const fn is_ordinary_color(self) -> bool {
         !matches!(
             self,
@@ -116,7 +114,6 @@ pub enum Wrap {
 
 impl Wrap {
     /// Whether coordinates that differ by two whole units select the same texel.
-    #[must_use]
     pub const fn is_periodic(self) -> bool {
         matches!(self, Self::Repeat | Self::MirroredRepeat)
     }
@@ -201,13 +198,11 @@ impl LodRange {
     };
 
     /// Whether there is no bias, and no bound other than the texture's levels.
-    #[must_use]
     pub fn is_whole(&self) -> bool {
         *self == Self::WHOLE
     }
 
     /// The level of detail after bias and bounds.
-    #[must_use]
     #[inline]
     pub fn apply(&self, lod: f32) -> f32 {
         let [bias, min, max] =
@@ -223,19 +218,16 @@ impl Sampler {
     pub const MOST_ANISOTROPIC: u16 = 4096;
 
     /// Whether long and narrow pixels are filtered differently from others.
-    #[must_use]
     pub fn is_anisotropic(&self) -> bool {
         !is_isotropic(&self.max_anisotropy_256ths)
     }
 
     /// Whether the minification filter blends texels of a level that the level of detail chooses.
-    #[must_use]
     pub fn blends_levels(&self) -> bool {
         self.min == Filter::Linear && self.mip != MipFilter::None
     }
 
     /// Largest ratio of a pixel's axes that the filter follows, at least 1.
-    #[must_use]
     pub fn max_anisotropy(&self) -> f32 {
         f32::from(self.max_anisotropy_256ths) / f32::from(Self::ISOTROPIC)
     }
@@ -311,7 +303,6 @@ pub struct Part {
 
 impl Texture {
     /// Whether `whole` has the levels and layers of the part at this place, in blocks of the same size and order.
-    #[must_use]
     pub fn fits(&self, part: Part, whole: &Self) -> bool {
         let ends = [(part.level, self.levels), (part.layer, self.layers)]
             .map(|(first, count)| u64::from(first) + u64::from(count));
@@ -330,7 +321,6 @@ impl Texture {
     }
 
     /// Width and height of `level` in texels (halved and rounded down, at least 1).
-    #[must_use]
     pub fn level_size(&self, level: u32) -> [u32; 2] {
         self.size
             .map(|extent| extent.checked_shr(level).unwrap_or(0).max(1))

@@ -40,7 +40,6 @@ impl Trace {
     }
 
     /// CRC-32 of the content, which identifies the trace in results.
-    #[must_use]
     pub fn content_checksum(&self) -> u32 {
         match self {
             Self::Texture(trace) => trace.content_checksum(),
@@ -49,7 +48,6 @@ impl Trace {
     }
 
     /// The container of either kind.
-    #[must_use]
     pub fn container(&self) -> &Container {
         match self {
             Self::Texture(trace) => trace.container(),

@@ -86,7 +86,6 @@ impl Lens {
     /// The default for an unknown lens: a circle around the viewing direction that touches the edges of the
     /// picture's longer axis (their mean if the two differ). It hides the corners of any picture; for a
     /// square and symmetric one, 1 - pi/4 of all pixels.
-    #[must_use]
     pub fn of(fov: &FovTangents) -> Self {
         let longer = (fov.left + fov.right).max(fov.up + fov.down);
         Self {
@@ -96,14 +95,12 @@ impl Lens {
     }
 
     /// Whether the direction with these tangents (right, up) is visible; the circle itself is.
-    #[must_use]
     pub fn contains(&self, [x, y]: [f32; 2]) -> bool {
         let [dx, dy] = [x - self.center[0], y - self.center[1]].map(f64::from);
         dx * dx + dy * dy <= f64::from(self.radius) * f64::from(self.radius)
     }
 
     /// Whether a pixel's centre is visible; columns count from the left, rows from the top.
-    #[must_use]
     pub fn pixel_visible(&self, fov: &FovTangents, size_px: [u32; 2], pixel: [u32; 2]) -> bool {
         let along = |axis: usize, from: f32, to: f32| {
             let part = (pixel[axis] as f32 + 0.5) / size_px[axis] as f32;

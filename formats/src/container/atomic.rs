@@ -29,7 +29,6 @@ pub fn discard_unfinished() {
 }
 
 /// Whether an output is standard output, which `-` names; a file with that name is `./-`.
-#[must_use]
 pub fn is_stdout(path: &Path) -> bool {
     path.as_os_str() == "-"
 }
@@ -179,7 +178,6 @@ fn check_name(target: &Path) -> io::Result<Option<Metadata>> {
 }
 
 /// The kind of a file system entry, as text.
-#[must_use]
 pub fn kind_of(found: &Metadata) -> &'static str {
     if found.is_file() {
         return "a file";
@@ -205,7 +203,8 @@ pub fn kind_of(found: &Metadata) -> &'static str {
     }
 }
 
-fn folder_of(target: &Path) -> &Path {
+/// The folder of a file; an absolute or bare name has one, too.
+pub(crate) fn folder_of(target: &Path) -> &Path {
     match target.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

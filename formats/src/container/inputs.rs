@@ -1,6 +1,6 @@
 //! Files that the running command reads, which no output replaces.
 
-use super::atomic::is_stdout;
+use super::atomic::{folder_of, is_stdout};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -26,7 +26,6 @@ pub fn declare_input(path: &Path) {
 }
 
 /// The declared input that an output would replace.
-#[must_use]
 pub fn replaced_input(output: &Path) -> Option<PathBuf> {
     let inputs = inputs();
     let mut named = inputs.iter();
@@ -34,7 +33,6 @@ pub fn replaced_input(output: &Path) -> Option<PathBuf> {
 }
 
 /// A declared input that lies in a folder.
-#[must_use]
 pub fn input_in(folder: &Path) -> Option<PathBuf> {
     let folder = fs::canonicalize(folder).ok()?;
     let is_in = |path: &Path| path.parent() == Some(folder.as_path());
@@ -52,7 +50,6 @@ pub fn input_in(folder: &Path) -> Option<PathBuf> {
 
 /// Whether two paths name the same file: by spelling, through links of either kind, or as names that do not
 /// exist yet. Standard output is the same only as itself.
-#[must_use]
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     match (is_stdout(a), is_stdout(b)) {
         (true, true) => true,
@@ -80,14 +77,10 @@ fn file_id(path: &Path) -> Option<(u64, u64)> {
 }
 
 fn full_path(path: &Path) -> Option<PathBuf> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
     let name = path.file_name()?;
     fs::canonicalize(path)
         .ok()
-        .or_else(|| Some(fs::canonicalize(folder).ok()?.join(name)))
+        .or_else(|| Some(fs::canonicalize(folder_of(path)).ok()?.join(name)))
 }
 
 #[cfg(all(test, unix))]

@@ -13,6 +13,7 @@ mod scratch;
 mod writer;
 
 pub use crate::chunk_tag::ChunkTag;
+pub(crate) use atomic::folder_of;
 pub use atomic::{
     AtomicFile, check_target, discard_unfinished, is_stdout, kind_of, remove_abandoned,
 };

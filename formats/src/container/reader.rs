@@ -202,31 +202,26 @@ impl Container {
     }
 
     /// Name for error messages.
-    #[must_use]
     pub fn file(&self) -> &str {
         &self.file
     }
 
     /// The kind of trace.
-    #[must_use]
     pub fn kind(&self) -> Kind {
         self.header.kind
     }
 
     /// Major and minor version.
-    #[must_use]
     pub fn version(&self) -> (u16, u16) {
         (self.header.version_major, self.header.version_minor)
     }
 
     /// Size of the file.
-    #[must_use]
     pub fn file_bytes(&self) -> u64 {
         self.header.file_bytes
     }
 
     /// The chunks in file order.
-    #[must_use]
     pub fn directory(&self) -> &[ChunkEntry] {
         &self.directory
     }
@@ -318,7 +313,6 @@ impl Container {
     }
 
     /// An error located at byte `offset_in_chunk` of a chunk.
-    #[must_use]
     pub fn malformed(
         &self,
         tag: ChunkTag,
@@ -414,7 +408,6 @@ impl Container {
     /// CRC-32 of the whole file.
     ///
     /// Combines the chunks' checksums with those of the few bytes around them.
-    #[must_use]
     pub fn file_checksum(&self) -> u32 {
         let all = self.bytes.as_slice();
         let mut crc32 = crc32fast::Hasher::new();

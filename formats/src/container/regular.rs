@@ -41,7 +41,6 @@ pub fn read_regular(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 /// CRC-32 of a file's bytes as 8 hexadecimal digits, the form used in manifests.
-#[must_use]
 pub fn checksum(bytes: &[u8]) -> String {
     format!("{:08x}", crc32fast::hash(bytes))
 }

@@ -40,14 +40,12 @@ impl ScratchFolder {
     }
 
     /// Whether a path has the name of such a folder.
-    #[must_use]
     pub fn has_name_of(path: &Path) -> bool {
         let name = path.file_name().unwrap_or_default();
         name.as_encoded_bytes().starts_with(PREFIX.as_bytes())
     }
 
     /// Path of the folder.
-    #[must_use]
     pub fn path(&self) -> &Path {
         self.folder.path()
     }

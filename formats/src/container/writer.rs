@@ -152,7 +152,6 @@ impl<W: Write + Seek> ContainerWriter<W> {
     }
 
     /// Number of bytes written so far, including the header.
-    #[must_use]
     pub fn position_bytes(&self) -> u64 {
         self.position
     }

@@ -43,7 +43,6 @@ impl Reach {
     /// The footprints of a record in a texture with `levels` levels, whose level 0 has `size` texels.
     ///
     /// Isotropic if anisotropy is off, and if the pixel is not longer than a texel (nothing is minified).
-    #[must_use]
     pub fn of(
         record: &QuadRecord,
         extent: [u32; 2],
@@ -136,7 +135,6 @@ pub struct Probes {
 impl Probes {
     /// Offset of a probe from the lane's coordinates, in fixed point rounded to nearest:
     /// `i / (N + 1) - 1/2` of the axis, with i from 1 to N.
-    #[must_use]
     pub fn offset(&self, probe: u32) -> [i32; 2] {
         let parts = i64::from(self.count) + 1;
         let from_middle = 2 * (i64::from(probe) + 1) - parts;
@@ -171,7 +169,6 @@ impl Ellipse {
     }
 
     /// Whether a texel at this distance from the centre is inside.
-    #[must_use]
     fn contains(&self, u: f64, v: f64) -> bool {
         self.a * u * u + self.b * u * v + self.c * v * v < self.f
     }

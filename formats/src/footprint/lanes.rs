@@ -19,7 +19,6 @@ pub enum LaneReach {
 
 impl LaneReach {
     /// The texels of a lane in a texture with `levels` levels, whose level 0 has `size` texels, by the derivatives.
-    #[must_use]
     pub fn of(
         record: &QuadRecord,
         lane: u32,
@@ -45,7 +44,6 @@ impl LaneReach {
     }
 
     /// Number of filter applications per level.
-    #[must_use]
     pub fn probe_count(&self) -> u32 {
         match self {
             Self::Levels(_, probes) => probes.map_or(1, |probes| probes.count),
@@ -55,7 +53,6 @@ impl LaneReach {
 
     /// Offset of a probe from the lane's coordinates on a level, and its filter; `None` if the lane has no
     /// such probe.
-    #[must_use]
     pub fn probe(&self, level: u32, probe: u32) -> Option<([i32; 2], Filter)> {
         let Self::Levels(levels, probes) = self else {
             return None;
@@ -65,7 +62,6 @@ impl LaneReach {
     }
 
     /// The ellipse of the lane on a level.
-    #[must_use]
     pub fn ellipse(&self, level: u32) -> Option<&Ellipse> {
         match self {
             Self::Ellipse(ellipse) if ellipse.level == level => Some(ellipse),

@@ -5,7 +5,6 @@ use crate::textrace::{QuadRecord, SUBTEXELS};
 
 /// llvmpipe's base-2 logarithm: the exponent plus the mantissa minus one. It is exact at powers of two and
 /// at most 0.086 too low in between.
-#[must_use]
 #[inline]
 pub fn fast_log2(x: f32) -> f32 {
     let bits = x.to_bits();
@@ -16,7 +15,6 @@ pub fn fast_log2(x: f32) -> f32 {
 
 /// Level of detail of a quad in a texture whose level 0 has `size` texels, without bias. Computed from the
 /// derivatives of the top-left lane, in f32 with one rounding per operation.
-#[must_use]
 pub fn quad_lod(record: &QuadRecord, extent: [u32; 2], size: [u32; 2], formula: LodFormula) -> f32 {
     let texels = |derivative: [i32; 2]| {
         [0, 1].map(|a| {
@@ -39,7 +37,6 @@ pub fn quad_lod(record: &QuadRecord, extent: [u32; 2], size: [u32; 2], formula: 
 
 /// The record with one lane's own derivatives, for [`LodFormula::PerLane`]: the differences along its row
 /// and column of the quad. Coordinates must still be taken from the original record.
-#[must_use]
 pub fn lane_record(record: &QuadRecord, lane: u32) -> QuadRecord {
     let own = |derivative: [i32; 2], other: bool| {
         [0, 1].map(|a| derivative[a].wrapping_add(if other { record.cross[a] } else { 0 }))

@@ -63,7 +63,6 @@ pub struct LevelSelection {
 
 impl LevelSelection {
     /// Whether a level is one of the selected levels.
-    #[must_use]
     pub fn contains(&self, level: u32) -> bool {
         (self.first..self.first + self.count).contains(&level)
     }
@@ -73,7 +72,6 @@ impl LevelSelection {
 ///
 /// `lod <= 0` magnifies: level 0 with the `mag` filter. Linear mip filtering reads `floor(lod)` and the
 /// next level; from the last level on, only the last.
-#[must_use]
 #[inline]
 pub fn select_levels(lod: f32, sampler: &Sampler, levels: u32) -> LevelSelection {
     let last = levels.saturating_sub(1);
@@ -100,7 +98,6 @@ pub fn select_levels(lod: f32, sampler: &Sampler, levels: u32) -> LevelSelection
 /// Left (or upper) texel of a fetch along one axis, before wrapping:
 /// `floor(coordinate * size / (SUBTEXELS * extent) - 0.5)` for a linear filter, without the half texel for
 /// a nearest one. The result is exact.
-#[must_use]
 pub fn texel_before_wrap(coordinate: i32, size: u32, extent: u32, filter: Filter) -> i64 {
     let unit = i64::from(SUBTEXELS) * i64::from(extent);
     let position = i64::from(coordinate) * i64::from(size);
@@ -120,7 +117,6 @@ fn fetch(coordinate: i32, size: u32, extent: u32, filter: Filter) -> [i64; 2] {
 }
 
 /// Maps a texel coordinate into `0..size`; `None` if the border is read.
-#[must_use]
 pub fn wrap_texel(texel: i64, size: u32, wrap: Wrap) -> Option<u32> {
     let size = i64::from(size);
     let wrapped = match wrap {

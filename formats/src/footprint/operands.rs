@@ -14,7 +14,6 @@ pub struct LaneLevel {
 
 impl SampleLevel {
     /// The bias or level that applies to every fragment.
-    #[must_use]
     pub fn lod(&self) -> f32 {
         f32::from(self.lod_256ths) / 256.0
     }
@@ -22,7 +21,6 @@ impl SampleLevel {
 
 impl LaneLevel {
     /// Level or bias, and layer, from a lane's operands, if it has any.
-    #[must_use]
     pub fn of(
         sample: &Sample,
         texture: &Texture,

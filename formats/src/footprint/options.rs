@@ -21,7 +21,6 @@ pub enum FilterOverride {
 
 impl FilterOverride {
     /// The sampler after the override; wrap modes, anisotropy and bounds of the level of detail are unchanged.
-    #[must_use]
     pub fn apply(self, sampler: &Sampler) -> Sampler {
         let (filter, mip) = match self {
             Self::AsRecorded => return *sampler,
@@ -90,7 +89,6 @@ impl Default for SamplingOptions {
 impl SamplingOptions {
     /// Largest anisotropy of a sampler: the recorded one, or the replay's. A replay's does not change samplers that
     /// were recorded isotropic and do not blend texels or have no levels, such as those of shadow maps.
-    #[must_use]
     pub fn max_anisotropy(&self, sampler: &Sampler) -> f32 {
         match self.max_anisotropy {
             Some(most) if sampler.blends_levels() || sampler.is_anisotropic() => most as f32,
@@ -100,7 +98,6 @@ impl SamplingOptions {
     }
 
     /// Whether quads of a sampler may have more than one footprint per lane and level.
-    #[must_use]
     pub fn is_anisotropic(&self, sampler: &Sampler) -> bool {
         self.max_anisotropy(sampler) > 1.0
     }

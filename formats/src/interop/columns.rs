@@ -3,26 +3,69 @@
 //! [`Tabular::FIELDS`] is the only list of the columns of a row type. Parquet, NPY and the Python package
 //! use it. Values are those of the file, so fixed-point numbers stay integers.
 
-use super::{Access, Entry, Origin, RayAccess, RaySample};
-use crate::raytrace::{Hit, Outcome, PixelRecord, RayGeometry, RayKind, RayRecord};
+use super::{Access, Origin, RayAccess, RaySample};
+use crate::raytrace::{Hit, PixelRecord, RayGeometry, RayRecord};
 use crate::textrace::{QuadRecord, Tile};
 use crate::view::Eye;
+use std::io::{self, Write};
 
-/// Reads a value of a row. The variant is the column's type.
-#[derive(Debug)]
-pub enum Get<R> {
-    /// Unsigned, 8 bits.
-    U8(fn(&R) -> u8),
-    /// Unsigned, 16 bits.
-    U16(fn(&R) -> u16),
-    /// Unsigned, 32 bits.
-    U32(fn(&R) -> u32),
-    /// Unsigned, 64 bits.
-    U64(fn(&R) -> u64),
-    /// Signed, 32 bits.
-    I32(fn(&R) -> i32),
-    /// Floating point, 32 bits.
-    F32(fn(&R) -> f32),
+macro_rules! column_types {
+    ($($variant:ident $type:ident $numpy:literal $doc:literal)*) => {
+        /// Reads a value of a row. The variant is the column's type.
+        #[derive(Debug)]
+        pub enum Get<R> {
+            $(#[doc = $doc] $variant(fn(&R) -> $type),)*
+        }
+
+        /// The values of a column.
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum Values {
+            $(#[doc = $doc] $variant(Vec<$type>),)*
+        }
+
+        impl Values {
+            /// The values of several parts of a column, one after the other. All parts have the same type.
+            pub fn joined(parts: &[&Self]) -> Option<Self> {
+                Some(match parts.first()? {
+                    $(Self::$variant(_) => Self::$variant(parts.iter().flat_map(|part| match part {
+                        Self::$variant(values) => values.as_slice(),
+                        _ => &[],
+                    }).copied().collect()),)*
+                })
+            }
+        }
+
+        impl<R> Get<R> {
+            /// The values of `rows`.
+            pub fn values(&self, rows: &[R]) -> Values {
+                match self {
+                    $(Self::$variant(get) => Values::$variant(rows.iter().map(get).collect()),)*
+                }
+            }
+
+            /// Appends the little-endian bytes of a row's value.
+            pub fn append_bytes(&self, row: &R, bytes: &mut Vec<u8>) {
+                match self {
+                    $(Self::$variant(get) => bytes.extend(get(row).to_le_bytes()),)*
+                }
+            }
+
+            /// The type as NumPy writes it.
+            pub const fn numpy_type(&self) -> &'static str {
+                match self {
+                    $(Self::$variant(_) => $numpy,)*
+                }
+            }
+        }
+    };
+}
+column_types! {
+    U8 u8 "|u1" "Unsigned, 8 bits."
+    U16 u16 "<u2" "Unsigned, 16 bits."
+    U32 u32 "<u4" "Unsigned, 32 bits."
+    U64 u64 "<u8" "Unsigned, 64 bits."
+    I32 i32 "<i4" "Signed, 32 bits."
+    F32 f32 "<f4" "Floating point, 32 bits."
 }
 
 /// A column.
@@ -36,23 +79,24 @@ pub struct Field<R> {
     pub get: Get<R>,
 }
 
-pub(super) const fn field<R>(name: &'static str, get: Get<R>) -> Field<R> {
-    Field {
-        name,
-        codes: &[],
-        get,
-    }
-}
-
-pub(super) const fn coded<R>(
-    name: &'static str,
-    codes: &'static [&'static str],
-    get: fn(&R) -> u8,
-) -> Field<R> {
-    Field {
-        name,
-        codes,
-        get: Get::U8(get),
+impl<R> Field<R> {
+    /// Writes a row's value as text in its shortest form: codes as names, numbers that are not finite as `NaN`.
+    ///
+    /// # Errors
+    /// Errors of the underlying writer.
+    pub fn write_text(&self, row: &R, out: &mut impl Write) -> io::Result<()> {
+        match &self.get {
+            Get::U8(get) => match self.codes.get(usize::from(get(row))) {
+                Some(name) => out.write_all(name.as_bytes()),
+                None => write!(out, "{}", get(row)),
+            },
+            Get::U16(get) => write!(out, "{}", get(row)),
+            Get::U32(get) => write!(out, "{}", get(row)),
+            Get::U64(get) => write!(out, "{}", get(row)),
+            Get::I32(get) => write!(out, "{}", get(row)),
+            Get::F32(get) if !get(row).is_finite() => out.write_all(b"NaN"),
+            Get::F32(get) => Ok(serde_json::to_writer(out, &get(row))?),
+        }
     }
 }
 
@@ -62,89 +106,29 @@ pub trait Tabular: Sized + Send + Sync + 'static {
     const FIELDS: &'static [Field<Self>];
 }
 
-/// The values of a column.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Values {
-    /// Unsigned, 8 bits.
-    U8(Vec<u8>),
-    /// Unsigned, 16 bits.
-    U16(Vec<u16>),
-    /// Unsigned, 32 bits.
-    U32(Vec<u32>),
-    /// Unsigned, 64 bits.
-    U64(Vec<u64>),
-    /// Signed, 32 bits.
-    I32(Vec<i32>),
-    /// Floating point, 32 bits.
-    F32(Vec<f32>),
+/// The columns of a row type: name, type or `[names of codes]`, and value of a row.
+macro_rules! columns {
+    ($row:ident: $($name:literal $type:tt $value:expr),* $(,)?) => {
+        &[$($crate::interop::columns::column!($name, $type, |$row: &Self| $value)),*]
+    };
 }
-
-/// Joins the vectors of the first part's variant.
-macro_rules! joined {
-    ($parts:expr, $first:expr, $($variant:ident)*) => {
-        match $first {
-            $(Values::$variant(_) => {
-                let parts: Vec<&[_]> = $parts
-                    .iter()
-                    .filter_map(|part| match part {
-                        Values::$variant(values) => Some(values.as_slice()),
-                        _ => None,
-                    })
-                    .collect();
-                Values::$variant(parts.concat())
-            })*
+macro_rules! column {
+    ($name:literal, [$codes:expr], $get:expr) => {
+        $crate::interop::columns::Field {
+            name: $name,
+            codes: $codes,
+            get: $crate::interop::columns::Get::U8($get),
+        }
+    };
+    ($name:literal, $type:ident, $get:expr) => {
+        $crate::interop::columns::Field {
+            name: $name,
+            codes: &[],
+            get: $crate::interop::columns::Get::$type($get),
         }
     };
 }
-
-impl Values {
-    /// The values of several parts of a column, one after the other. All parts have the same type.
-    #[must_use]
-    pub fn joined(parts: &[&Self]) -> Option<Self> {
-        let first = parts.first()?;
-        Some(joined!(parts, first, U8 U16 U32 U64 I32 F32))
-    }
-}
-
-impl<R> Get<R> {
-    /// The values of `rows`.
-    #[must_use]
-    pub fn values(&self, rows: &[R]) -> Values {
-        match self {
-            Self::U8(get) => Values::U8(rows.iter().map(get).collect()),
-            Self::U16(get) => Values::U16(rows.iter().map(get).collect()),
-            Self::U32(get) => Values::U32(rows.iter().map(get).collect()),
-            Self::U64(get) => Values::U64(rows.iter().map(get).collect()),
-            Self::I32(get) => Values::I32(rows.iter().map(get).collect()),
-            Self::F32(get) => Values::F32(rows.iter().map(get).collect()),
-        }
-    }
-
-    /// Appends the little-endian bytes of a row's value.
-    pub fn append_bytes(&self, row: &R, bytes: &mut Vec<u8>) {
-        match self {
-            Self::U8(get) => bytes.push(get(row)),
-            Self::U16(get) => bytes.extend(get(row).to_le_bytes()),
-            Self::U32(get) => bytes.extend(get(row).to_le_bytes()),
-            Self::U64(get) => bytes.extend(get(row).to_le_bytes()),
-            Self::I32(get) => bytes.extend(get(row).to_le_bytes()),
-            Self::F32(get) => bytes.extend(get(row).to_le_bytes()),
-        }
-    }
-
-    /// The type as NumPy writes it.
-    #[must_use]
-    pub const fn numpy_type(&self) -> &'static str {
-        match self {
-            Self::U8(_) => "|u1",
-            Self::U16(_) => "<u2",
-            Self::U32(_) => "<u4",
-            Self::U64(_) => "<u8",
-            Self::I32(_) => "<i4",
-            Self::F32(_) => "<f4",
-        }
-    }
-}
+pub(super) use {column, columns};
 
 /// A quad record and its place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -156,23 +140,23 @@ pub struct RecordRow {
 }
 
 impl Tabular for RecordRow {
-    const FIELDS: &'static [Field<Self>] = &[
-        field("pass", Get::U32(|r: &Self| r.origin.pass)),
-        field("tile", Get::U32(|r: &Self| r.origin.tile)),
-        field("draw", Get::U32(|r: &Self| r.origin.draw)),
-        field("primitive", Get::U32(|r: &Self| r.origin.primitive)),
-        field("x", Get::U8(|r: &Self| r.record.x)),
-        field("y", Get::U8(|r: &Self| r.record.y)),
-        field("mask", Get::U8(|r: &Self| r.record.mask)),
-        field("group", Get::U8(|r: &Self| r.record.group)),
-        field("uv_u", Get::I32(|r: &Self| r.record.uv[0])),
-        field("uv_v", Get::I32(|r: &Self| r.record.uv[1])),
-        field("dx_u", Get::I32(|r: &Self| r.record.dx[0])),
-        field("dx_v", Get::I32(|r: &Self| r.record.dx[1])),
-        field("dy_u", Get::I32(|r: &Self| r.record.dy[0])),
-        field("dy_v", Get::I32(|r: &Self| r.record.dy[1])),
-        field("cross_u", Get::I32(|r: &Self| r.record.cross[0])),
-        field("cross_v", Get::I32(|r: &Self| r.record.cross[1])),
+    const FIELDS: &'static [Field<Self>] = columns![r:
+        "pass" U32 r.origin.pass,
+        "tile" U32 r.origin.tile,
+        "draw" U32 r.origin.draw,
+        "primitive" U32 r.origin.primitive,
+        "x" U8 r.record.x,
+        "y" U8 r.record.y,
+        "mask" U8 r.record.mask,
+        "group" U8 r.record.group,
+        "uv_u" I32 r.record.uv[0],
+        "uv_v" I32 r.record.uv[1],
+        "dx_u" I32 r.record.dx[0],
+        "dx_v" I32 r.record.dx[1],
+        "dy_u" I32 r.record.dy[0],
+        "dy_v" I32 r.record.dy[1],
+        "cross_u" I32 r.record.cross[0],
+        "cross_v" I32 r.record.cross[1],
     ];
 }
 
@@ -228,21 +212,6 @@ const RAY_KINDS: &[&str] = &[
 const OUTCOMES: &[&str] = &["miss", "hit", "occluded"];
 const ENTRIES: &[&str] = &["node", "triangle"];
 
-const fn eye_code(eye: Eye) -> u8 {
-    match eye {
-        Eye::Left => 0,
-        Eye::Right => 1,
-    }
-}
-
-const fn kind_code(kind: RayKind) -> u8 {
-    kind as u8
-}
-
-const fn outcome_code(outcome: Outcome) -> u8 {
-    outcome as u8
-}
-
 /// A ray and its sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RayRow {
@@ -254,35 +223,39 @@ pub struct RayRow {
     pub record: RayRecord,
 }
 
+/// The columns of a row with a sample's place, and more columns.
+macro_rules! place_columns {
+    ($r:ident: $($more:tt)*) => {
+        columns![$r:
+            "eye" [EYES] $r.place.eye as u8,
+            "tile" U32 $r.place.tile,
+            "x" U32 $r.place.pixel[0],
+            "y" U32 $r.place.pixel[1],
+            "sample" U32 $r.place.sample,
+            $($more)*
+        ]
+    };
+}
+
 /// The columns of a row with a ray, and more columns.
-macro_rules! ray_fields {
-    ($($more:expr),* $(,)?) => {
-        &[
-            coded("eye", EYES, |r: &Self| eye_code(r.place.eye)),
-            field("tile", Get::U32(|r: &Self| r.place.tile)),
-            field("x", Get::U32(|r: &Self| r.place.pixel[0])),
-            field("y", Get::U32(|r: &Self| r.place.pixel[1])),
-            field("sample", Get::U32(|r: &Self| r.place.sample)),
-            field("ray", Get::U32(|r: &Self| r.ray)),
-            coded("kind", RAY_KINDS, |r: &Self| kind_code(r.record.kind)),
-            coded("outcome", OUTCOMES, |r: &Self| {
-                outcome_code(r.record.outcome)
-            }),
-            field("depth", Get::U8(|r: &Self| r.record.depth)),
-            field("parent", Get::U32(|r: &Self| r.record.parent)),
-            field("steps", Get::U32(|r: &Self| r.record.steps)),
-            field(
-                "triangle_tests",
-                Get::U32(|r: &Self| r.record.triangle_tests),
-            ),
-            field("alpha_tests", Get::U32(|r: &Self| r.record.alpha_tests)),
-            $($more),*
+macro_rules! ray_columns {
+    ($r:ident: $($more:tt)*) => {
+        place_columns![$r:
+            "ray" U32 $r.ray,
+            "kind" [RAY_KINDS] $r.record.kind as u8,
+            "outcome" [OUTCOMES] $r.record.outcome as u8,
+            "depth" U8 $r.record.depth,
+            "parent" U32 $r.record.parent,
+            "steps" U32 $r.record.steps,
+            "triangle_tests" U32 $r.record.triangle_tests,
+            "alpha_tests" U32 $r.record.alpha_tests,
+            $($more)*
         ]
     };
 }
 
 impl Tabular for RayRow {
-    const FIELDS: &'static [Field<Self>] = ray_fields![];
+    const FIELDS: &'static [Field<Self>] = ray_columns![r:];
 }
 
 /// A ray of a trace with geometry.
@@ -299,24 +272,18 @@ pub struct GeometryRow {
 }
 
 impl Tabular for GeometryRow {
-    const FIELDS: &'static [Field<Self>] = ray_fields![
-        field("origin_x", Get::F32(|r: &Self| r.geometry.origin[0])),
-        field("origin_y", Get::F32(|r: &Self| r.geometry.origin[1])),
-        field("origin_z", Get::F32(|r: &Self| r.geometry.origin[2])),
-        field("direction_x", Get::F32(|r: &Self| r.geometry.direction[0])),
-        field("direction_y", Get::F32(|r: &Self| r.geometry.direction[1])),
-        field("direction_z", Get::F32(|r: &Self| r.geometry.direction[2])),
-        field("t_min", Get::F32(|r: &Self| r.geometry.t_min)),
-        field("t_max", Get::F32(|r: &Self| r.geometry.t_max)),
-        field(
-            "t",
-            Get::F32(|r: &Self| r.geometry.hit.map_or(f32::NAN, |hit| hit.t))
-        ),
-        field(
-            "slot",
-            Get::U32(|r: &Self| r.geometry.hit.map_or(u32::MAX, |hit| hit.slot))
-        ),
-        field("stack_depth", Get::U32(|r: &Self| r.geometry.stack_depth)),
+    const FIELDS: &'static [Field<Self>] = ray_columns![r:
+        "origin_x" F32 r.geometry.origin[0],
+        "origin_y" F32 r.geometry.origin[1],
+        "origin_z" F32 r.geometry.origin[2],
+        "direction_x" F32 r.geometry.direction[0],
+        "direction_y" F32 r.geometry.direction[1],
+        "direction_z" F32 r.geometry.direction[2],
+        "t_min" F32 r.geometry.t_min,
+        "t_max" F32 r.geometry.t_max,
+        "t" F32 r.geometry.hit.map_or(f32::NAN, |hit| hit.t),
+        "slot" U32 r.geometry.hit.map_or(u32::MAX, |hit| hit.slot),
+        "stack_depth" U32 r.geometry.stack_depth,
     ];
 }
 
@@ -368,121 +335,64 @@ impl From<&RaySample<'_>> for SampleRow {
     }
 }
 
-/// Columns with one floating-point value of the hit each.
-macro_rules! hit_fields {
-    ($($name:literal: $hit:ident => $value:expr;)*) => {
-        [$(field($name, Get::F32(|r: &SampleRow| r.measure(|$hit| $value)))),*]
-    };
-}
-
-const HIT_MEASURES: [Field<SampleRow>; 12] = hit_fields! {
-    "t": hit => hit.t;
-    "position_x": hit => hit.position[0];
-    "position_y": hit => hit.position[1];
-    "position_z": hit => hit.position[2];
-    "geometric_normal_x": hit => hit.geometric_normal[0];
-    "geometric_normal_y": hit => hit.geometric_normal[1];
-    "geometric_normal_z": hit => hit.geometric_normal[2];
-    "shading_normal_x": hit => hit.shading_normal[0];
-    "shading_normal_y": hit => hit.shading_normal[1];
-    "shading_normal_z": hit => hit.shading_normal[2];
-    "uv_u": hit => hit.uv[0];
-    "uv_v": hit => hit.uv[1];
-};
-
 impl Tabular for SampleRow {
-    const FIELDS: &'static [Field<Self>] = {
-        let [t, px, py, pz, gx, gy, gz, sx, sy, sz, u, v] = HIT_MEASURES;
-        &[
-            coded("eye", EYES, |r: &Self| eye_code(r.place.eye)),
-            field("tile", Get::U32(|r: &Self| r.place.tile)),
-            field("x", Get::U32(|r: &Self| r.place.pixel[0])),
-            field("y", Get::U32(|r: &Self| r.place.pixel[1])),
-            field("sample", Get::U32(|r: &Self| r.place.sample)),
-            field("hit", Get::U8(|r: &Self| u8::from(r.record.hit.is_some()))),
-            t,
-            px,
-            py,
-            pz,
-            gx,
-            gy,
-            gz,
-            sx,
-            sy,
-            sz,
-            u,
-            v,
-            field(
-                "primitive",
-                Get::U32(|r: &Self| r.number(|hit| hit.primitive)),
-            ),
-            field("object", Get::U32(|r: &Self| r.number(|hit| hit.object))),
-            field(
-                "material",
-                Get::U32(|r: &Self| r.number(|hit| hit.material)),
-            ),
-            field(
-                "view_independent_r",
-                Get::F32(|r: &Self| r.record.view_independent[0]),
-            ),
-            field(
-                "view_independent_g",
-                Get::F32(|r: &Self| r.record.view_independent[1]),
-            ),
-            field(
-                "view_independent_b",
-                Get::F32(|r: &Self| r.record.view_independent[2]),
-            ),
-            field(
-                "view_dependent_r",
-                Get::F32(|r: &Self| r.record.view_dependent[0]),
-            ),
-            field(
-                "view_dependent_g",
-                Get::F32(|r: &Self| r.record.view_dependent[1]),
-            ),
-            field(
-                "view_dependent_b",
-                Get::F32(|r: &Self| r.record.view_dependent[2]),
-            ),
-            field("rays", Get::U32(|r: &Self| r.record.ray_count)),
-        ]
-    };
+    const FIELDS: &'static [Field<Self>] = place_columns![r:
+        "hit" U8 u8::from(r.record.hit.is_some()),
+        "t" F32 r.measure(|hit| hit.t),
+        "position_x" F32 r.measure(|hit| hit.position[0]),
+        "position_y" F32 r.measure(|hit| hit.position[1]),
+        "position_z" F32 r.measure(|hit| hit.position[2]),
+        "geometric_normal_x" F32 r.measure(|hit| hit.geometric_normal[0]),
+        "geometric_normal_y" F32 r.measure(|hit| hit.geometric_normal[1]),
+        "geometric_normal_z" F32 r.measure(|hit| hit.geometric_normal[2]),
+        "shading_normal_x" F32 r.measure(|hit| hit.shading_normal[0]),
+        "shading_normal_y" F32 r.measure(|hit| hit.shading_normal[1]),
+        "shading_normal_z" F32 r.measure(|hit| hit.shading_normal[2]),
+        "uv_u" F32 r.measure(|hit| hit.uv[0]),
+        "uv_v" F32 r.measure(|hit| hit.uv[1]),
+        "primitive" U32 r.number(|hit| hit.primitive),
+        "object" U32 r.number(|hit| hit.object),
+        "material" U32 r.number(|hit| hit.material),
+        "view_independent_r" F32 r.record.view_independent[0],
+        "view_independent_g" F32 r.record.view_independent[1],
+        "view_independent_b" F32 r.record.view_independent[2],
+        "view_dependent_r" F32 r.record.view_dependent[0],
+        "view_dependent_g" F32 r.record.view_dependent[1],
+        "view_dependent_b" F32 r.record.view_dependent[2],
+        "rays" U32 r.record.ray_count,
+    ];
 }
 
 impl Tabular for Access {
-    const FIELDS: &'static [Field<Self>] = &[
-        field("address", Get::U64(|a: &Self| a.address)),
-        field("pass", Get::U32(|a: &Self| a.pass)),
-        field("tile", Get::U32(|a: &Self| a.tile)),
-        field("draw", Get::U32(|a: &Self| a.draw)),
-        field("primitive", Get::U32(|a: &Self| a.primitive)),
-        field("pixel_x", Get::U8(|a: &Self| a.pixel_x)),
-        field("pixel_y", Get::U8(|a: &Self| a.pixel_y)),
-        field("texture", Get::U32(|a: &Self| a.texture)),
-        field("layer", Get::U16(|a: &Self| a.layer)),
-        field("level", Get::U8(|a: &Self| a.level)),
-        field("x", Get::U32(|a: &Self| a.x)),
-        field("y", Get::U32(|a: &Self| a.y)),
+    const FIELDS: &'static [Field<Self>] = columns![a:
+        "address" U64 a.address,
+        "pass" U32 a.pass,
+        "tile" U32 a.tile,
+        "draw" U32 a.draw,
+        "primitive" U32 a.primitive,
+        "pixel_x" U8 a.pixel_x,
+        "pixel_y" U8 a.pixel_y,
+        "texture" U32 a.texture,
+        "layer" U16 a.layer,
+        "level" U8 a.level,
+        "x" U32 a.x,
+        "y" U32 a.y,
     ];
 }
 
 impl Tabular for RayAccess {
-    const FIELDS: &'static [Field<Self>] = &[
-        field("address", Get::U64(|a: &Self| a.address)),
-        field("bytes", Get::U32(|a: &Self| a.bytes)),
-        coded("eye", EYES, |a: &Self| eye_code(a.eye)),
-        field("tile", Get::U32(|a: &Self| a.tile)),
-        field("x", Get::U32(|a: &Self| a.x)),
-        field("y", Get::U32(|a: &Self| a.y)),
-        field("sample", Get::U32(|a: &Self| a.sample)),
-        field("ray", Get::U32(|a: &Self| a.ray)),
-        coded("kind", RAY_KINDS, |a: &Self| kind_code(a.kind)),
-        coded("entry", ENTRIES, |a: &Self| match a.entry {
-            Entry::Node => 0,
-            Entry::Triangle => 1,
-        }),
-        field("index", Get::U32(|a: &Self| a.index)),
+    const FIELDS: &'static [Field<Self>] = columns![a:
+        "address" U64 a.address,
+        "bytes" U32 a.bytes,
+        "eye" [EYES] a.eye as u8,
+        "tile" U32 a.tile,
+        "x" U32 a.x,
+        "y" U32 a.y,
+        "sample" U32 a.sample,
+        "ray" U32 a.ray,
+        "kind" [RAY_KINDS] a.kind as u8,
+        "entry" [ENTRIES] a.entry as u8,
+        "index" U32 a.index,
     ];
 }
 
@@ -490,6 +400,7 @@ impl Tabular for RayAccess {
 mod tests {
     use super::super::CsvWriter;
     use super::*;
+    use crate::raytrace::{Outcome, RayKind};
     use crate::textrace::NO_GROUP;
 
     fn names<R: Tabular>() -> Vec<&'static str> {
@@ -498,26 +409,25 @@ mod tests {
 
     #[test]
     fn accesses_have_the_columns_of_csv() {
-        let mut header = Vec::new();
-        CsvWriter::new(&mut header).unwrap();
-        assert_eq!(
-            String::from_utf8(header).unwrap().trim(),
-            names::<Access>().join(",")
-        );
-        assert_eq!(RayAccess::CSV_HEADER, names::<RayAccess>().join(","));
+        let (mut texture, mut ray) = (Vec::new(), Vec::new());
+        CsvWriter::<_, Access>::new(&mut texture).unwrap();
+        CsvWriter::<_, RayAccess>::new(&mut ray).unwrap();
+        let text = |header| String::from_utf8(header).unwrap().trim().to_owned();
+        assert_eq!(text(texture), names::<Access>().join(","));
+        assert_eq!(text(ray), names::<RayAccess>().join(","));
     }
 
     #[test]
     fn codes_have_the_names_used_in_json() {
         let text = |value: serde_json::Value| value.as_str().unwrap().to_owned();
         for eye in [Eye::Left, Eye::Right] {
-            assert_eq!(EYES[usize::from(eye_code(eye))], eye.to_string());
+            assert_eq!(EYES[eye as usize], eye.to_string());
         }
         for kind in RayKind::ALL {
-            assert_eq!(RAY_KINDS[usize::from(kind_code(kind))], kind.to_string());
+            assert_eq!(RAY_KINDS[kind as usize], kind.to_string());
         }
         for outcome in [Outcome::Miss, Outcome::Hit, Outcome::Occluded] {
-            let name = OUTCOMES[usize::from(outcome_code(outcome))];
+            let name = OUTCOMES[outcome as usize];
             assert_eq!(name, text(serde_json::to_value(outcome).unwrap()));
         }
     }

@@ -1,46 +1,55 @@
-//! Accesses as CSV with a header line.
+//! Rows as CSV with a header line.
 
+use super::columns::{Get, Tabular};
 use super::{Access, AccessSink};
 use std::io::{self, Write};
+use std::marker::PhantomData;
 
-/// Column names, in order.
-const HEADER: &str = "address,pass,tile,draw,primitive,pixel_x,pixel_y,texture,layer,level,x,y";
-
-/// Writes CSV; the address is hexadecimal with `0x`.
+/// Writes CSV. Addresses are hexadecimal with `0x`.
 #[derive(Debug)]
-pub struct CsvWriter<W>(W);
+pub struct CsvWriter<W, R> {
+    out: W,
+    line: Vec<u8>,
+    rows: PhantomData<fn(&R)>,
+}
 
-impl<W: Write> CsvWriter<W> {
+impl<W: Write, R: Tabular> CsvWriter<W, R> {
     /// Writes the header line.
     ///
     /// # Errors
     /// Errors of the underlying writer.
     pub fn new(mut out: W) -> io::Result<Self> {
-        writeln!(out, "{HEADER}")?;
-        Ok(Self(out))
+        let names: Vec<&str> = R::FIELDS.iter().map(|field| field.name).collect();
+        writeln!(out, "{}", names.join(","))?;
+        Ok(Self {
+            out,
+            line: Vec::new(),
+            rows: PhantomData,
+        })
+    }
+
+    /// Writes a row.
+    ///
+    /// # Errors
+    /// Errors of the underlying writer.
+    pub fn row(&mut self, row: &R) -> io::Result<()> {
+        self.line.clear();
+        for field in R::FIELDS {
+            if !self.line.is_empty() {
+                self.line.push(b',');
+            }
+            match &field.get {
+                Get::U64(get) => write!(self.line, "{:#x}", get(row))?,
+                _ => field.write_text(row, &mut self.line)?,
+            }
+        }
+        self.line.push(b'\n');
+        self.out.write_all(&self.line)
     }
 }
 
-impl<W: Write> AccessSink for CsvWriter<W> {
+impl<W: Write> AccessSink for CsvWriter<W, Access> {
     fn write(&mut self, access: &Access) -> io::Result<()> {
-        let Access {
-            address,
-            bytes: _,
-            pass,
-            tile,
-            draw,
-            primitive,
-            pixel_x,
-            pixel_y,
-            texture,
-            layer,
-            level,
-            x,
-            y,
-        } = access;
-        writeln!(
-            self.0,
-            "{address:#x},{pass},{tile},{draw},{primitive},{pixel_x},{pixel_y},{texture},{layer},{level},{x},{y}"
-        )
+        self.row(access)
     }
 }

@@ -1,6 +1,6 @@
 //! The content of a hierarchy as rows and as JSON.
 
-use super::columns::{Field, Get, Tabular, coded, field};
+use super::columns::{Field, Tabular, columns};
 use crate::raytrace::{BvhSummary, ChildKind, Hierarchy, HierarchyChild, HierarchyTriangle, Visit};
 use serde::Serialize;
 
@@ -28,21 +28,18 @@ impl ChildRow {
 }
 
 impl Tabular for ChildRow {
-    const FIELDS: &'static [Field<Self>] = &[
-        field("node", Get::U32(|r: &Self| r.node)),
-        field("child", Get::U8(|r: &Self| r.number)),
-        coded("kind", CHILD_KINDS, |r: &Self| match r.child.kind {
-            ChildKind::Node(_) => 0,
-            ChildKind::Leaf(..) => 1,
-        }),
-        field("index", Get::U32(|r: &Self| r.index().0)),
-        field("triangles", Get::U32(|r: &Self| r.index().1)),
-        field("min_x", Get::F32(|r: &Self| r.child.min[0])),
-        field("min_y", Get::F32(|r: &Self| r.child.min[1])),
-        field("min_z", Get::F32(|r: &Self| r.child.min[2])),
-        field("max_x", Get::F32(|r: &Self| r.child.max[0])),
-        field("max_y", Get::F32(|r: &Self| r.child.max[1])),
-        field("max_z", Get::F32(|r: &Self| r.child.max[2])),
+    const FIELDS: &'static [Field<Self>] = columns![r:
+        "node" U32 r.node,
+        "child" U8 r.number,
+        "kind" [CHILD_KINDS] u8::from(matches!(r.child.kind, ChildKind::Leaf(..))),
+        "index" U32 r.index().0,
+        "triangles" U32 r.index().1,
+        "min_x" F32 r.child.min[0],
+        "min_y" F32 r.child.min[1],
+        "min_z" F32 r.child.min[2],
+        "max_x" F32 r.child.max[0],
+        "max_y" F32 r.child.max[1],
+        "max_z" F32 r.child.max[2],
     ];
 }
 
@@ -56,19 +53,19 @@ pub struct SlotRow {
 }
 
 impl Tabular for SlotRow {
-    const FIELDS: &'static [Field<Self>] = &[
-        field("slot", Get::U32(|r: &Self| r.slot)),
-        field("primitive", Get::U32(|r: &Self| r.triangle.primitive)),
-        field("masked", Get::U8(|r: &Self| u8::from(r.triangle.masked))),
-        field("v0_x", Get::F32(|r: &Self| r.triangle.vertices[0][0])),
-        field("v0_y", Get::F32(|r: &Self| r.triangle.vertices[0][1])),
-        field("v0_z", Get::F32(|r: &Self| r.triangle.vertices[0][2])),
-        field("v1_x", Get::F32(|r: &Self| r.triangle.vertices[1][0])),
-        field("v1_y", Get::F32(|r: &Self| r.triangle.vertices[1][1])),
-        field("v1_z", Get::F32(|r: &Self| r.triangle.vertices[1][2])),
-        field("v2_x", Get::F32(|r: &Self| r.triangle.vertices[2][0])),
-        field("v2_y", Get::F32(|r: &Self| r.triangle.vertices[2][1])),
-        field("v2_z", Get::F32(|r: &Self| r.triangle.vertices[2][2])),
+    const FIELDS: &'static [Field<Self>] = columns![r:
+        "slot" U32 r.slot,
+        "primitive" U32 r.triangle.primitive,
+        "masked" U8 u8::from(r.triangle.masked),
+        "v0_x" F32 r.triangle.vertices[0][0],
+        "v0_y" F32 r.triangle.vertices[0][1],
+        "v0_z" F32 r.triangle.vertices[0][2],
+        "v1_x" F32 r.triangle.vertices[1][0],
+        "v1_y" F32 r.triangle.vertices[1][1],
+        "v1_z" F32 r.triangle.vertices[1][2],
+        "v2_x" F32 r.triangle.vertices[2][0],
+        "v2_y" F32 r.triangle.vertices[2][1],
+        "v2_z" F32 r.triangle.vertices[2][2],
     ];
 }
 

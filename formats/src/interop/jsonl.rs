@@ -17,7 +17,6 @@ impl<W: Write> AccessSink for JsonlWriter<W> {
 }
 
 /// A quad record as `replay dump` prints it, with the stored fixed-point numbers.
-#[must_use]
 pub fn record_to_json(origin: Origin, record: &QuadRecord) -> Value {
     let group = Some(record.group).filter(|group| *group != NO_GROUP);
     json!({

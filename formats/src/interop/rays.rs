@@ -5,7 +5,7 @@ use crate::raytrace::{
 };
 use crate::view::Eye;
 use serde::Serialize;
-use std::io::{self, Write};
+use std::io;
 
 /// One sample of a pixel with its rays and their visits.
 #[derive(Clone, Copy, Debug)]
@@ -252,23 +252,5 @@ impl RayAccess {
         let line_bytes = u64::from(line_bytes.max(1));
         let last = self.address + u64::from(self.bytes.max(1)) - 1;
         (self.address / line_bytes..=last / line_bytes).map(move |line| line * line_bytes)
-    }
-
-    /// Header of the columns that [`Self::write_csv`] writes.
-    pub const CSV_HEADER: &str = "address,bytes,eye,tile,x,y,sample,ray,kind,entry,index";
-
-    /// Writes a CSV line; the address is hexadecimal with `0x`.
-    ///
-    /// # Errors
-    /// Errors of the underlying writer.
-    pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
-        let eye = self.eye.to_string();
-        let kind = self.kind.to_string();
-        let entry = format!("{:?}", self.entry).to_lowercase();
-        writeln!(
-            out,
-            "{:#x},{},{eye},{},{},{},{},{},{kind},{entry},{}",
-            self.address, self.bytes, self.tile, self.x, self.y, self.sample, self.ray, self.index
-        )
     }
 }

@@ -100,7 +100,6 @@ pub struct BlockInfo {
 
 impl TexelFormat {
     /// The format's block.
-    #[must_use]
     pub const fn block(self) -> BlockInfo {
         let (edge, bytes) = match self {
             Self::Bc1 | Self::Bc4 | Self::Etc2 | Self::EacR11 => (4, 8),
@@ -154,13 +153,11 @@ pub struct TextureLayout {
 
 impl TextureLayout {
     /// Size of all layers.
-    #[must_use]
     pub fn size_bytes(&self) -> u64 {
         self.layer_bytes * u64::from(self.layers)
     }
 
     /// Address of the block that contains a texel; `None` if the level does not exist.
-    #[must_use]
     pub fn address(&self, layer: u32, level: u32, texel: [u32; 2]) -> Option<u64> {
         let level = self.levels.get(level as usize)?;
         let block = [
@@ -237,19 +234,16 @@ impl Layout {
     }
 
     /// Placement of each texture, in table order.
-    #[must_use]
     pub fn textures(&self) -> &[TextureLayout] {
         &self.textures
     }
 
     /// First address after the last texture.
-    #[must_use]
     pub fn end(&self) -> u64 {
         self.end
     }
 
     /// The block at an address; `None` between textures and after the last one.
-    #[must_use]
     pub fn block_at(&self, address: u64) -> Option<BlockAt> {
         let holds = |texture: &TextureLayout| {
             let end = texture.base + texture.size_bytes();
@@ -272,7 +266,6 @@ impl Layout {
     }
 
     /// Address of the block that contains a texel; `None` if the texture or level does not exist.
-    #[must_use]
     pub fn address(&self, texture: u32, layer: u32, level: u32, texel: [u32; 2]) -> Option<u64> {
         let texture = self.textures.get(texture as usize)?;
         texture.address(layer, level, texel)

@@ -55,7 +55,6 @@ impl BlockPlacement {
     }
 
     /// Number of a block in memory order.
-    #[must_use]
     pub fn index(&self, [x, y]: [u32; 2]) -> u64 {
         match *self {
             Self::Linear { pitch } => u64::from(y) * u64::from(pitch) + u64::from(x),
@@ -76,7 +75,6 @@ impl BlockPlacement {
 
 impl BlockPlacement {
     /// The block with a number in memory order, including padding.
-    #[must_use]
     pub fn block(&self, index: u64) -> [u32; 2] {
         match *self {
             Self::Linear { pitch } => {

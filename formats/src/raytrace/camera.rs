@@ -26,7 +26,6 @@ pub struct EyeCamera {
 
 impl EyeCamera {
     /// The camera of an eye's view, relative to `origin`.
-    #[must_use]
     pub fn new(view: &EyeView, fov: FovTangents, size_px: [u32; 2], origin: [f64; 3]) -> Self {
         let [x, y, z, _] = view.world_to_eye;
         // A rotation's inverse is its transpose, so the rows of world-to-eye are the eye's axes.
@@ -44,7 +43,6 @@ impl EyeCamera {
 
     /// Unit direction of the ray through a point of the image, in pixels from the top left
     /// (the centre of the first pixel is 0.5, 0.5).
-    #[must_use]
     pub fn direction(&self, point_px: [f32; 2]) -> [f32; 3] {
         let f = &self.fov;
         let u = point_px[0] / self.size_px[0] as f32;
@@ -57,7 +55,6 @@ impl EyeCamera {
 
     /// Image position of a point in pixels from the top left, and its depth along the view direction in
     /// metres. `None` for points behind the eye.
-    #[must_use]
     pub fn project(&self, position: [f32; 3]) -> Option<([f32; 2], f32)> {
         let d = Vec3::from(position) - Vec3::from(self.position);
         let depth = d.dot(Vec3::from(self.forward));
@@ -73,7 +70,6 @@ impl EyeCamera {
     }
 
     /// The point at distance `t` metres from the eye along a direction.
-    #[must_use]
     pub fn at(&self, direction: [f32; 3], t: f32) -> [f32; 3] {
         std::array::from_fn(|a| self.position[a] + t * direction[a])
     }
@@ -81,7 +77,6 @@ impl EyeCamera {
 
 /// Image position of a sample of a pixel: the centre for a single sample, else points of the R2 sequence
 /// shifted by a hash of the pixel (the same for both eyes).
-#[must_use]
 pub fn sample_position_px(x: u32, y: u32, sample: u32, samples_per_px: u32) -> [f32; 2] {
     if samples_per_px <= 1 {
         return [x as f32 + 0.5, y as f32 + 0.5];
@@ -91,7 +86,6 @@ pub fn sample_position_px(x: u32, y: u32, sample: u32, samples_per_px: u32) -> [
 }
 
 /// A point of Roberts's low-discrepancy sequence R2 in the unit square, shifted by a random number.
-#[must_use]
 pub fn r2_point(number: u32, shift: u32) -> [f32; 2] {
     // Fractions of 2^32. The sequence's generators are 1/g and 1/g^2 with g = 1.3247179572.
     let fraction = |generator: u32, shift: u32| {
@@ -105,7 +99,6 @@ pub fn r2_point(number: u32, shift: u32) -> [f32; 2] {
 }
 
 /// Integer hash with full avalanche (Wellons' lowbias32).
-#[must_use]
 pub fn hash(mut v: u32) -> u32 {
     v ^= v >> 16;
     v = v.wrapping_mul(0x7FEB_352D);

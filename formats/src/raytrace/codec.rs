@@ -38,27 +38,14 @@ pub(super) fn encode(tile: &RayTile, has_visits: bool) -> Result<Vec<u8>, Broken
         let bits = (0u8..).zip(eight);
         bits.fold(0, |bits, (i, p)| bits | u8::from(p.hit.is_some()) << i)
     }));
-    let mut previous = 0;
-    for hit in hits() {
-        put_difference(&mut previous, hit.primitive, &mut out);
-    }
-    let mut previous = 0;
-    for hit in hits() {
-        put_difference(&mut previous, hit.t.to_bits(), &mut out);
-    }
-    let mut previous = [0; 2];
-    for hit in hits() {
-        let code = normal::encode(hit.shading_normal);
-        for (previous, value) in previous.iter_mut().zip(code) {
-            put_difference(previous, value.cast_unsigned().into(), &mut out);
-        }
-    }
-    let mut previous = [0; 2];
-    for hit in hits() {
-        for (previous, value) in previous.iter_mut().zip(hit.uv) {
-            put_difference(previous, value.to_bits(), &mut out);
-        }
-    }
+    put_columns(hits().map(|hit| [hit.primitive]), &mut out);
+    put_columns(hits().map(|hit| [hit.t.to_bits()]), &mut out);
+    let normals = hits().map(|hit| normal::encode(hit.shading_normal));
+    put_columns(
+        normals.map(|code| code.map(|value| value.cast_unsigned().into())),
+        &mut out,
+    );
+    put_columns(hits().map(|hit| hit.uv.map(f32::to_bits)), &mut out);
     let hit_pixels = tile.pixels.iter().filter(|p| p.hit.is_some());
     put_colors(hit_pixels.map(|p| p.view_independent), &mut out);
     put_colors(tile.pixels.iter().map(|p| p.view_dependent), &mut out);
@@ -85,13 +72,42 @@ pub(super) fn encode(tile: &RayTile, has_visits: bool) -> Result<Vec<u8>, Broken
     Ok(out)
 }
 
+/// Writes columns of differences, row by row.
+fn put_columns<const N: usize>(rows: impl Iterator<Item = [u32; N]>, out: &mut Vec<u8>) {
+    let mut previous = [0; N];
+    for row in rows {
+        for (previous, value) in previous.iter_mut().zip(row) {
+            put_difference(previous, value, out);
+        }
+    }
+}
+
+/// Reads columns of differences, row by row.
+fn take_columns<'a, const N: usize, T>(
+    input: &mut Cursor<'a>,
+    rows: usize,
+    what: &'static str,
+    value: impl Fn(Cursor<'a>, [u32; N]) -> Taken<'a, T>,
+) -> Taken<'a, Vec<T>> {
+    let mut row = [0; N];
+    let mut values = Vec::with_capacity(rows);
+    for _ in 0..rows {
+        let at = *input;
+        for column in &mut row {
+            input.difference(column, what)?;
+        }
+        values.push(value(at, row)?);
+    }
+    Ok(values)
+}
+
 /// Writes red of all pixels, then green, then blue.
 fn put_colors(colors: impl Iterator<Item = [f32; 3]> + Clone, out: &mut Vec<u8>) {
     for channel in 0..3 {
-        let mut previous = 0;
-        for value in colors.clone().filter_map(|c| c.get(channel).copied()) {
-            put_difference(&mut previous, half::encode(value).into(), out);
-        }
+        let values = colors
+            .clone()
+            .filter_map(|color| color.get(channel).copied());
+        put_columns(values.map(|value| [half::encode(value).into()]), out);
     }
 }
 
@@ -186,43 +202,26 @@ pub(super) fn decode<'a>(
     }
     let hits = (0..count).filter(|i| is_hit(*i)).count();
 
-    let mut primitives = Vec::with_capacity(hits);
-    let mut previous = 0;
-    for _ in 0..hits {
-        let at = input;
-        let primitive = input.difference(&mut previous, "a primitive number")?;
+    let primitives = take_columns(&mut input, hits, "a primitive number", |at, [primitive]| {
         let known = tables.triangle(primitive);
-        primitives
-            .push(known.ok_or_else(|| at.fault("a primitive of the triangle table", primitive))?);
-    }
-    let mut distances = Vec::with_capacity(hits);
-    let mut previous = 0;
-    for _ in 0..hits {
-        let at = input;
-        let distance = f32::from_bits(input.difference(&mut previous, "a distance")?);
-        if !(0.0..=f32::MAX).contains(&distance) {
-            return Err(at.fault("a distance of 0 or more", distance));
-        }
-        distances.push(distance);
-    }
-    let mut normals = Vec::with_capacity(hits);
-    let mut previous = [0; 2];
-    for _ in 0..hits {
-        let mut code = [0; 2];
-        for (previous, code) in previous.iter_mut().zip(&mut code) {
-            *code = decode_short(&mut input, previous, "a normal")?.cast_signed();
-        }
-        normals.push(code);
-    }
-    let mut coordinates = Vec::with_capacity(hits);
-    let mut previous = [0; 2];
-    for _ in 0..hits {
-        let mut uv = [0.0; 2];
-        for (previous, value) in previous.iter_mut().zip(&mut uv) {
-            *value = f32::from_bits(input.difference(previous, "a texture coordinate")?);
-        }
-        coordinates.push(uv);
-    }
+        known.ok_or_else(|| at.fault("a primitive of the triangle table", primitive))
+    })?;
+    let distances = take_columns(&mut input, hits, "a distance", |at, [bits]| {
+        let distance = f32::from_bits(bits);
+        let is_distance = (0.0..=f32::MAX).contains(&distance);
+        at.check(is_distance, "a distance of 0 or more", distance)?;
+        Ok(distance)
+    })?;
+    let normals = take_columns(&mut input, hits, "a normal", |at, [u, v]| {
+        let short = |value| short(at, "a normal", value).map(u16::cast_signed);
+        Ok([short(u)?, short(v)?])
+    })?;
+    let coordinates = take_columns(
+        &mut input,
+        hits,
+        "a texture coordinate",
+        |_, uv: [u32; 2]| Ok(uv.map(f32::from_bits)),
+    )?;
 
     let found = primitives.into_iter().zip(distances);
     let mut found = found.zip(normals.into_iter().zip(coordinates));
@@ -256,27 +255,20 @@ pub(super) fn decode<'a>(
     Ok((input.rest(), ()))
 }
 
-/// Reads a 16-bit value by its difference.
-fn decode_short<'a>(
-    input: &mut Cursor<'a>,
-    previous: &mut u32,
-    what: &'static str,
-) -> Taken<'a, u16> {
-    let at = *input;
-    let value = input.difference(previous, what)?;
-    u16::try_from(value).map_err(|_| at.fault(format!("{what}, below 2^16"), value))
+/// A value of 16 bits.
+fn short<'a>(at: Cursor<'a>, what: &str, value: u32) -> Taken<'a, u16> {
+    u16::try_from(value).map_err(|_| at.fault(format_args!("{what}, below 2^16"), value))
 }
 
 fn decode_colors<'a>(input: &mut Cursor<'a>, mut colors: Vec<&mut [f32; 3]>) -> Taken<'a> {
     for channel in 0..3 {
-        let mut previous = 0;
-        for value in colors.iter_mut().filter_map(|c| c.get_mut(channel)) {
-            let at = *input;
-            *value = half::decode(decode_short(input, &mut previous, "a colour")?);
-            if !value.is_finite() {
-                return Err(at.fault("a finite colour", *value));
-            }
-        }
+        let values = take_columns(input, colors.len(), "a colour", |at, [code]| {
+            let value = half::decode(short(at, "a colour", code)?);
+            at.check(value.is_finite(), "a finite colour", value)?;
+            Ok(value)
+        })?;
+        let channel = colors.iter_mut().filter_map(|color| color.get_mut(channel));
+        channel.zip(values).for_each(|(to, value)| *to = value);
     }
     Ok(())
 }
@@ -322,8 +314,7 @@ fn decode_ray<'a>(
         (0, true) if has_lighting => RayKind::AmbientOcclusion,
         (1, true) if has_lighting => RayKind::Diffuse,
         (number, _) => {
-            let found = format_args!("{}", number + 4).to_string();
-            return Err(at.fault("a kind that the trace's lighting has", found));
+            return Err(at.fault("a kind that the trace's lighting has", number + 4));
         }
     };
     let outcome = match head >> 2 & 3 {
@@ -335,10 +326,9 @@ fn decode_ray<'a>(
     if head >> 7 != 0 || (own == 0 && head & PARENT_IS_PRIMARY != 0) {
         return Err(at.fault("no other flags", format_args!("{head:#04x}")));
     }
-    if (own == 0) != (kind == RayKind::Primary) {
-        let found = format_args!("kind {kind} as ray {own}").to_string();
-        return Err(at.fault("a primary ray first, then the others", found));
-    }
+    let is_first = (own == 0) == (kind == RayKind::Primary);
+    let found = format_args!("kind {kind} as ray {own}");
+    at.check(is_first, "a primary ray first, then the others", found)?;
     let (parent, depth) = if own == 0 {
         (NO_PARENT, 0)
     } else {

@@ -126,26 +126,22 @@ impl Raytrace {
     }
 
     /// The tables.
-    #[must_use]
     pub fn tables(&self) -> &RaytraceTables {
         &self.tables
     }
 
     /// The container, for its directory and sizes.
-    #[must_use]
     pub fn container(&self) -> &Container {
         &self.container
     }
 
     /// CRC-32 of the content, which identifies the trace in results. It does not depend on the program,
     /// driver and path of the capture (FORMAT.md).
-    #[must_use]
     pub fn content_checksum(&self) -> u32 {
         self.container.content_checksum(tables::META)
     }
 
     /// Number of rays of a tile from the index; 0 for a missing tile.
-    #[must_use]
     pub fn tile_rays(&self, eye: Eye, tile: u32) -> u32 {
         self.entry(eye, tile).map_or(0, |entry| entry.rays)
     }
@@ -167,13 +163,11 @@ impl Raytrace {
     }
 
     /// Whether the trace has the geometry of its rays.
-    #[must_use]
     pub fn has_geometry(&self) -> bool {
         !self.geometry.is_empty()
     }
 
     /// Whether the trace has the content of its hierarchy.
-    #[must_use]
     pub fn has_hierarchy(&self) -> bool {
         self.has_hierarchy
     }

@@ -3,19 +3,16 @@
 use half::f16;
 
 /// The half float nearest to a value, ties to even; values out of range are clamped to the largest.
-#[must_use]
 pub fn encode(value: f32) -> u16 {
     f16::from_f32(value.clamp(f16::MIN.into(), f16::MAX.into())).to_bits()
 }
 
 /// The value of a half float.
-#[must_use]
 pub fn decode(half: u16) -> f32 {
     f16::from_bits(half).into()
 }
 
 /// A colour rounded as it will be read.
-#[must_use]
 pub fn round3(color: [f32; 3]) -> [f32; 3] {
     color.map(|c| decode(encode(if c.is_nan() { 0.0 } else { c })))
 }

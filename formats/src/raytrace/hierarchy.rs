@@ -47,7 +47,6 @@ pub struct Hierarchy {
 
 impl TraversalKind {
     /// Largest number of children of an inner node.
-    #[must_use]
     pub const fn width(self) -> usize {
         match self {
             Self::Bvh2 => 2,

@@ -23,7 +23,6 @@ type Corners = [[f32; 3]; 2];
 
 impl Hierarchy {
     /// Size of the encoded nodes and triangles together. Encodes them, so that the time can be measured.
-    #[must_use]
     pub fn encoded_bytes(&self, bvh: &BvhSummary) -> usize {
         encode_nodes(bvh, self).len() + encode_triangles(&self.triangles).len()
     }

@@ -99,7 +99,6 @@ pub struct RayMaterial {
 
 impl RayMaterial {
     /// Whether the colour depends on the viewpoint.
-    #[must_use]
     pub fn view_dependent(&self) -> bool {
         self.mirror || self.glass || self.glossy
     }
@@ -140,7 +139,6 @@ pub struct RayTriangle {
 
 impl RayTriangle {
     /// Unit normal on the front side; zero for a degenerate triangle.
-    #[must_use]
     pub fn normal(&self) -> [f32; 3] {
         let [a, b, c] = self.vertices.map(Vec3::from);
         let cross = (b - a).as_dvec3().cross((c - a).as_dvec3());
@@ -199,7 +197,6 @@ pub struct BvhSummary {
 
 impl BvhSummary {
     /// Byte address of a visit; nodes start at 0, and triangles follow them in leaf order.
-    #[must_use]
     pub fn address(&self, visit: Visit) -> u64 {
         match visit {
             Visit::Node(index) => u64::from(index) * u64::from(self.bytes_per_node),
@@ -211,7 +208,6 @@ impl BvhSummary {
     }
 
     /// Number of bytes that a visit reads.
-    #[must_use]
     pub fn visit_bytes(&self, visit: Visit) -> u32 {
         match visit {
             Visit::Node(_) => self.bytes_per_node,
@@ -274,13 +270,11 @@ impl RayKind {
     ];
 
     /// Whether only traces with lighting have the kind.
-    #[must_use]
     pub const fn needs_lighting(self) -> bool {
         matches!(self, Self::AmbientOcclusion | Self::Diffuse)
     }
 
     /// Whether the ray ends at any triangle, not only at the nearest.
-    #[must_use]
     pub const fn ends_at_any_hit(self) -> bool {
         matches!(self, Self::Shadow | Self::AmbientOcclusion)
     }
@@ -332,7 +326,6 @@ fn parent_or_null<S: serde::Serializer>(parent: &u32, out: S) -> Result<S::Ok, S
 
 impl RayRecord {
     /// Number of entries of the ray in [`RayTile::visits`], if the trace has visits.
-    #[must_use]
     pub fn visit_count(&self) -> u64 {
         u64::from(self.steps) + u64::from(self.triangle_tests)
     }
@@ -362,7 +355,6 @@ pub struct Hit {
 impl Hit {
     /// The hit of a primary ray at `t` metres along a unit direction from an eye. Values that the trace
     /// does not store are computed from the triangle.
-    #[must_use]
     pub fn new(
         eye: &EyeCamera,
         direction: [f32; 3],
@@ -405,7 +397,6 @@ pub struct PixelRecord {
 
 impl PixelRecord {
     /// Final colour: the sum of both parts, linear RGB.
-    #[must_use]
     pub fn color(&self) -> [f32; 3] {
         std::array::from_fn(|c| self.view_independent[c] + self.view_dependent[c])
     }
@@ -441,7 +432,6 @@ impl RayTile {
     }
 
     /// Rays of a pixel, its primary ray first; empty for a pixel of another tile.
-    #[must_use]
     pub fn rays_of(&self, pixel: &PixelRecord) -> &[RayRecord] {
         let first = pixel.first_ray as usize;
         self.rays
@@ -467,7 +457,6 @@ pub struct RaytraceTables {
 
 impl RaytraceTables {
     /// The triangle of a primitive, if a primary ray hit it.
-    #[must_use]
     pub fn triangle(&self, primitive: u32) -> Option<&RayTriangle> {
         let at = self
             .triangles
@@ -477,7 +466,6 @@ impl RaytraceTables {
     }
 
     /// Camera of an eye.
-    #[must_use]
     pub fn camera(&self, eye: Eye) -> &EyeCamera {
         let [left, right] = &self.meta.eyes;
         match eye {
@@ -487,20 +475,17 @@ impl RaytraceTables {
     }
 
     /// Tile columns and rows of an eye's image; tiles are numbered row by row from the top left.
-    #[must_use]
     pub fn tiles(&self) -> [u32; 2] {
         self.meta.eyes[0].size_px.map(|s| s.div_ceil(TILE_SIZE_PX))
     }
 
     /// Number of tiles of an eye's image.
-    #[must_use]
     pub fn tile_count(&self) -> u32 {
         let [columns, rows] = self.tiles();
         columns * rows
     }
 
     /// Left and top pixel, width and height of a tile.
-    #[must_use]
     pub fn tile_rect(&self, tile: u32) -> ([u32; 2], [u32; 2]) {
         let [columns, _] = self.tiles();
         let [width, height] = self.meta.eyes[0].size_px;

@@ -1,7 +1,6 @@
 //! Unit vectors in 2 x 16 bits, encoded by the octahedral map (Cigolle et al., JCGT 2014).
 
 /// The code of a unit vector.
-#[must_use]
 pub fn encode(n: [f32; 3]) -> [i16; 2] {
     let sum = n[0].abs() + n[1].abs() + n[2].abs();
     if sum.is_nan() || sum <= 0.0 {
@@ -15,7 +14,6 @@ pub fn encode(n: [f32; 3]) -> [i16; 2] {
 }
 
 /// The unit vector of a code.
-#[must_use]
 pub fn decode(code: [i16; 2]) -> [f32; 3] {
     let [mut x, mut y] = code.map(|v| f32::from(v.max(-32767)) / 32767.0);
     let z = 1.0 - x.abs() - y.abs();

@@ -7,7 +7,7 @@ use super::file::{
 };
 use super::hierarchy::Hierarchy;
 use super::{EyeCamera, RayTile, RaytraceTables, codec, geometry_codec, hierarchy_codec, tables};
-use crate::container::{AtomicFile, ContainerWriter, Kind, MAJOR_1};
+use crate::container::{AtomicFile, ContainerWriter, Kind, MAJOR_1, folder_of};
 use crate::error::{Broken, FormatError, Result, ensure};
 use crate::records;
 use crate::tiles::{TileSpan, TileSpool, size_u32};
@@ -29,7 +29,6 @@ pub struct EncodedRayTile {
 
 impl EncodedRayTile {
     /// Encoded size.
-    #[must_use]
     pub fn size_bytes(&self) -> usize {
         self.bytes.len()
     }
@@ -95,12 +94,7 @@ impl RaytraceWriter<AtomicFile> {
     /// # Errors
     /// The temporary file in the folder of `path` cannot be written.
     pub fn create(path: &Path) -> Result<Self> {
-        // An absolute or bare name has its folder as parent, or the current one.
-        let folder = path
-            .parent()
-            .filter(|folder| !folder.as_os_str().is_empty());
-        let folder = folder.unwrap_or(Path::new("."));
-        let spool = tempfile::spooled_tempfile_in(TileSpool::IN_MEMORY_BYTES, folder);
+        let spool = tempfile::spooled_tempfile_in(TileSpool::IN_MEMORY_BYTES, folder_of(path));
         Self::start(ContainerWriter::create(path, Kind::Raytrace)?, spool)
     }
 

@@ -8,7 +8,6 @@ use crate::error::{Broken, ensure};
 pub const TILE_QUADS: u8 = 8;
 
 /// Position of a quad on the Morton curve of its tile, 0 to 63 (x in the even bits).
-#[must_use]
 pub const fn quad_morton(x: u8, y: u8) -> u8 {
     const fn spread(v: u8) -> u8 {
         (v & 1) | (v & 2) << 1 | (v & 4) << 2

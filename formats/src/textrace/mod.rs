@@ -234,13 +234,11 @@ pub struct Pass {
 
 impl Pass {
     /// Whether the pass is visible to an eye, that is, not a shadow map.
-    #[must_use]
     pub fn is_seen(&self) -> bool {
         self.kind != PassKind::Shadow
     }
 
     /// Number of tiles.
-    #[must_use]
     pub fn tile_count(&self) -> u32 {
         self.tiles[0] * self.tiles[1]
     }
@@ -287,7 +285,6 @@ impl SampleLevel {
     };
 
     /// Whether only the derivatives determine the level, and the layer is the sample's.
-    #[must_use]
     pub fn is_default(&self) -> bool {
         *self == Self::default()
     }
@@ -321,7 +318,6 @@ pub struct UvGroup {
 
 impl UvGroup {
     /// Whether each record of the group follows a record of operands, which belongs to the group before it.
-    #[must_use]
     pub fn has_operands(&self) -> bool {
         self.samples.iter().any(|sample| sample.level.operands)
     }
@@ -329,7 +325,6 @@ impl UvGroup {
 
 impl Draw {
     /// Whether records of a group are operands of the group after it.
-    #[must_use]
     pub fn is_operands(&self, group: u8) -> bool {
         let next = self.groups.get(usize::from(group) + 1);
         next.is_some_and(UvGroup::has_operands)
@@ -382,7 +377,6 @@ pub struct QuadRecord {
 
 impl QuadRecord {
     /// Fixed-point coordinates of a lane (0 to 3): `uv + i*dx + j*dy + i*j*cross`.
-    #[must_use]
     #[inline]
     pub fn lane_uv(&self, lane: u32) -> [i32; 2] {
         let i = (lane & 1) as i32;
@@ -398,7 +392,6 @@ impl QuadRecord {
 
     /// A lane's values in a record of operands: its level of detail, and its layer rounded to the nearest
     /// integer.
-    #[must_use]
     pub fn lane_operands(&self, lane: u32) -> (f32, i32) {
         let [lod, layer] = self.lane_uv(lane);
         let half = SUBTEXELS / 2;

@@ -21,7 +21,6 @@ pub struct ProgramCapture {
 
 impl ProgramCapture {
     /// A sentence for each kind of texture access that the trace lacks or holds less exactly.
-    #[must_use]
     pub fn notices(&self) -> Vec<String> {
         let reads = self.unrecorded_reads.iter();
         let reads = reads.map(|reads| format!("not in the trace: {reads}"));

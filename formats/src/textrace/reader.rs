@@ -86,7 +86,6 @@ impl Textrace {
     }
 
     /// Meshes and views, if the trace was captured with geometry.
-    #[must_use]
     pub fn geometry(&self) -> Option<&Geometry> {
         self.geometry.as_ref()
     }
@@ -140,26 +139,22 @@ impl Textrace {
     }
 
     /// The tables.
-    #[must_use]
     pub fn tables(&self) -> &Tables {
         &self.tables
     }
 
     /// The container, for its directory and sizes.
-    #[must_use]
     pub fn container(&self) -> &Container {
         &self.container
     }
 
     /// CRC-32 of the content, which identifies the trace in results. It does not depend on the program,
     /// driver and path of the capture (FORMAT.md).
-    #[must_use]
     pub fn content_checksum(&self) -> u32 {
         self.container.content_checksum(tables::META)
     }
 
     /// Figures of a tile from the index; zero for an untouched or missing tile.
-    #[must_use]
     pub fn tile_stats(&self, pass: usize, tile: usize) -> TileStats {
         self.entry(pass, tile).map_or_else(
             |_| TileStats::default(),
@@ -172,7 +167,6 @@ impl Textrace {
     }
 
     /// Number of quad records of all tiles.
-    #[must_use]
     pub fn records(&self) -> u64 {
         let passes = (0..).zip(&self.tables().passes);
         let tiles = passes.flat_map(|(pass, info)| {

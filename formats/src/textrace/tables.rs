@@ -304,14 +304,12 @@ const EYES: &[(u8, Option<Eye>)] = &[(0, Some(Eye::Left)), (1, Some(Eye::Right))
 
 impl Tables {
     /// Whether the tables have features that version 2 lacks.
-    #[must_use]
     pub fn need_version_3(&self) -> bool {
         self.samplers.iter().any(Sampler::is_anisotropic)
             || self.textures.iter().any(|t| t.part.is_some())
     }
 
     /// Whether the tables have features that version 1 lacks.
-    #[must_use]
     pub fn need_version_2(&self) -> bool {
         let has_format = |t: &Texture| FORMATS.iter().any(|(_, format)| *format == t.format);
         let has_wrap = |wrap: &Wrap| WRAPS.iter().any(|(_, known)| known == wrap);

@@ -23,13 +23,11 @@ pub struct EncodedTile {
 
 impl EncodedTile {
     /// Encoded size.
-    #[must_use]
     pub fn size_bytes(&self) -> usize {
         self.bytes.len()
     }
 
     /// The encoded bytes.
-    #[must_use]
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
@@ -176,7 +174,6 @@ impl<W: Write + Seek> TextraceWriter<W> {
     }
 
     /// The current tables.
-    #[must_use]
     pub fn tables(&self) -> &Tables {
         &self.tables
     }
@@ -273,7 +270,6 @@ impl<W: Write + Seek> TextraceWriter<W> {
     }
 
     /// Whether the trace has geometry.
-    #[must_use]
     pub fn has_geometry(&self) -> bool {
         self.geometry.is_some()
     }
@@ -296,7 +292,6 @@ impl<W: Write + Seek> TextraceWriter<W> {
     }
 
     /// The encoding to use for tiles passed to [`Self::append`].
-    #[must_use]
     pub fn encoding(&self) -> Encoding {
         self.encoding
     }

@@ -342,8 +342,8 @@ fn write_accesses(
             })
         }
         (Trace::Ray(trace), None) if args.to == Target::Csv => {
-            writeln!(out, "{}", RayAccess::CSV_HEADER)?;
-            ray_accesses(trace, config, args, |access| access.write_csv(out))
+            let mut csv = CsvWriter::new(out)?;
+            ray_accesses(trace, config, args, |access| csv.row(access))
         }
         (Trace::Ray(trace), None) if args.to.is_columns() => columns::rows(
             args.to,

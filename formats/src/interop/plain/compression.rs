@@ -23,7 +23,6 @@ impl Compression {
     pub const ALL: [Self; 2] = [Self::Gzip, Self::Zstd];
 
     /// Name in flags and messages.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Gzip => "gzip",
@@ -32,7 +31,6 @@ impl Compression {
     }
 
     /// File name extension.
-    #[must_use]
     pub const fn extension(self) -> &'static str {
         match self {
             Self::Gzip => ".gz",
@@ -41,7 +39,6 @@ impl Compression {
     }
 
     /// The compression of a file name's extension, if any.
-    #[must_use]
     pub fn of_name(name: &str) -> Option<Self> {
         let ends = |compression: &Self| name.ends_with(compression.extension());
         Self::ALL.into_iter().find(ends)

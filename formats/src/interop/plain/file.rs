@@ -2,6 +2,7 @@
 
 use super::compression::foreign;
 use super::{AddressForm, Compression, Decoder, MOST_RECORD_BYTES, PlainAccess, din, gem5};
+use crate::container::kind_of;
 use crate::error::{FormatError, Place};
 use memmap2::Mmap;
 use std::fs::File;
@@ -69,14 +70,10 @@ impl AddressFile<'static> {
         }
         let mut file = File::open(path).map_err(io("open"))?;
         let metadata = file.metadata().map_err(io("read the size of"))?;
-        let kind = metadata.file_type();
-        if kind.is_dir() {
-            return Err(wanted(&name, "a file or a pipe", "a folder"));
+        if let kind @ ("a folder" | "a device") = kind_of(&metadata) {
+            return Err(wanted(&name, "a file or a pipe", kind));
         }
-        if is_device(kind) {
-            return Err(wanted(&name, "a file or a pipe", "a device"));
-        }
-        if !kind.is_file() || metadata.len() == 0 {
+        if !metadata.is_file() || metadata.len() == 0 {
             return Self::of_stream(name, form, file);
         }
         let mut magic = Vec::new();
@@ -129,19 +126,16 @@ impl<'a> AddressFile<'a> {
     }
 
     /// Name in errors.
-    #[must_use]
     pub fn name(&self) -> &str {
         &self.name
     }
 
     /// Form of the accesses.
-    #[must_use]
     pub fn form(&self) -> AddressForm {
         self.form
     }
 
     /// Compression of the file.
-    #[must_use]
     pub fn compression(&self) -> Option<Compression> {
         self.compression
     }
@@ -166,7 +160,8 @@ impl<'a> AddressFile<'a> {
                 0 => "none".to_owned(),
                 others => format!("none among {others} packets"),
             };
-            return Err(malformed(&name, Place::Contents, 0, "at least one access", found).into());
+            let expected = "at least one access";
+            return Err(FormatError::malformed(&name, Place::Contents, 0, expected, found).into());
         }
         Ok(found)
     }
@@ -183,8 +178,8 @@ impl<'a> AddressFile<'a> {
             found.accesses += words.len() as u64;
             if ended && !rest.is_empty() {
                 let place = Place::Access(found.accesses + 1);
-                let (expected, rest) = (format!("{N} bytes"), rest.len().to_string());
-                return Err(malformed(&name, place, at + taken as u64, &expected, rest).into());
+                let (at, expected) = (at + taken as u64, format_args!("{N} bytes"));
+                return Err(FormatError::malformed(&name, place, at, expected, rest.len()).into());
             }
             visit(words)?;
             Ok(taken)
@@ -208,7 +203,7 @@ impl<'a> AddressFile<'a> {
                 let decoded = decoder.decode(rest, ended, &mut accesses);
                 taken += decoded.map_err(|fault| {
                     let at = at + (taken + fault.at) as u64;
-                    malformed(&name, fault.place, at, &fault.expected, fault.found)
+                    FormatError::malformed(&name, fault.place, at, fault.expected, fault.found)
                 })?;
                 if accesses.is_empty() {
                     return Ok(taken);
@@ -273,16 +268,16 @@ fn detect_form(
     // Words may begin with any bytes.
     let words = matches!(named, Some(AddressForm::U32 | AddressForm::U64));
     if let (false, Some((kind, unpack))) = (words, foreign(head)) {
-        let expected = format!(
+        let expected = format_args!(
             "addresses without compression, or with gzip or Zstandard (unpack with `{unpack}` and pipe \
              the result into `--addresses -`)"
         );
-        return Err(malformed(
+        return Err(FormatError::malformed(
             name,
             Place::Contents,
             0,
-            &expected,
-            kind.to_owned(),
+            expected,
+            kind,
         ));
     }
     named
@@ -294,18 +289,8 @@ fn detect_form(
             };
             let expected = "din text, a gem5 trace, or a name that ends in .u32, .u64, .din or .gem5 \
                             (--address-form tells)";
-            malformed(name, Place::Contents, 0, expected, found)
+            FormatError::malformed(name, Place::Contents, 0, expected, found)
         })
-}
-
-fn malformed(file: &str, place: Place, offset: u64, expected: &str, found: String) -> FormatError {
-    FormatError::Malformed {
-        file: file.to_owned(),
-        place,
-        offset,
-        expected: expected.to_owned(),
-        found,
-    }
 }
 
 fn wanted(name: &str, expected: &str, found: &str) -> FormatError {
@@ -331,15 +316,4 @@ fn unreadable(
     };
     let why = format!("after {at} bytes of content: {why}");
     FormatError::io(name, action, io::Error::new(source.kind(), why))
-}
-
-#[cfg(unix)]
-fn is_device(kind: std::fs::FileType) -> bool {
-    use std::os::unix::fs::FileTypeExt;
-    kind.is_char_device() || kind.is_block_device()
-}
-
-#[cfg(not(unix))]
-fn is_device(_: std::fs::FileType) -> bool {
-    false
 }

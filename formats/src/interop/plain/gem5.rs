@@ -8,6 +8,7 @@
 
 use super::{AccessKind, BLOCK, Decoder, Fault, MOST_RECORD_BYTES, PlainAccess};
 use crate::error::Place;
+use crate::varint::put;
 use std::io::{self, Write};
 
 /// First bytes of every trace.
@@ -43,10 +44,10 @@ pub(super) fn write_header(out: &mut impl Write) -> io::Result<()> {
     // The tick is the number of the access, with the usual 10^12 ticks per second.
     let mut header = Vec::new();
     put_field(&mut header, 1, 2);
-    put_varint(&mut header, 8);
+    put(8, &mut header);
     header.extend_from_slice(b"parallax");
     put_field(&mut header, 3, 0);
-    put_varint(&mut header, 1_000_000_000_000);
+    put(1_000_000_000_000, &mut header);
     out.write_all(MAGIC)?;
     put_message(out, &header)
 }
@@ -67,28 +68,20 @@ pub(super) fn write(out: &mut impl Write, access: &PlainAccess, tick: u64) -> io
     let mut packet = Vec::with_capacity(40);
     for (number, value) in fields.into_iter().chain(flags) {
         put_field(&mut packet, number, 0);
-        put_varint(&mut packet, value);
+        put(value, &mut packet);
     }
     put_message(out, &packet)
 }
 
 fn put_message(out: &mut impl Write, message: &[u8]) -> io::Result<()> {
     let mut length = Vec::with_capacity(2);
-    put_varint(&mut length, message.len() as u64);
+    put(message.len() as u64, &mut length);
     out.write_all(&length)?;
     out.write_all(message)
 }
 
 fn put_field(out: &mut Vec<u8>, number: u8, wire_type: u8) {
     out.push(number << 3 | wire_type);
-}
-
-fn put_varint(out: &mut Vec<u8>, mut value: u64) {
-    while value >= 0x80 {
-        out.push((value & 0x7f) as u8 | 0x80);
-        value >>= 7;
-    }
-    out.push((value & 0x7f) as u8);
 }
 
 /// Reads packets.

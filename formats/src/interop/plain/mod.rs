@@ -49,7 +49,6 @@ impl PlainAccess {
     pub const MOST_BYTES: u32 = 1 << 20;
 
     /// A read.
-    #[must_use]
     pub fn read(address: u64, bytes: u32) -> Self {
         Self {
             address,
@@ -88,7 +87,6 @@ impl AddressForm {
     pub const ALL: [Self; 4] = [Self::U32, Self::U64, Self::Din, Self::Gem5];
 
     /// Name in flags, and file name extension.
-    #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::U32 => "u32",

@@ -25,7 +25,6 @@ pub enum PlainForm {
 
 impl PlainForm {
     /// Whether it is text, which may be printed on a terminal.
-    #[must_use]
     pub const fn is_text(self) -> bool {
         matches!(self, Self::Din | Self::Ramulator | Self::RamulatorO3)
     }

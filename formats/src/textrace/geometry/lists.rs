@@ -20,7 +20,6 @@ pub struct TileLists {
 
 impl TileLists {
     /// The primitives of a tile; empty if there is no such tile.
-    #[must_use]
     pub fn tile(&self, tile: usize) -> &[u32] {
         let range = self.starts.get(tile).zip(self.starts.get(tile + 1));
         range

@@ -75,13 +75,11 @@ pub struct GeometryView {
 
 impl GeometryView {
     /// Tile columns and rows.
-    #[must_use]
     pub fn tiles(&self) -> [u32; 2] {
         self.size_px.map(|size| size.div_ceil(TILE_SIZE_PX))
     }
 
     /// Number of tiles.
-    #[must_use]
     pub fn tile_count(&self) -> usize {
         let [columns, rows] = self.tiles().map(|tiles| tiles as usize);
         columns * rows
@@ -154,7 +152,6 @@ impl Geometry {
     }
 
     /// Number of the view that a pass is.
-    #[must_use]
     pub fn view_of_pass(&self, pass: usize) -> Option<usize> {
         let of_pass = |view: &GeometryView| match view.target {
             ViewTarget::Pass(number) => number as usize == pass,

@@ -5,7 +5,7 @@ use crate::records::{self, Rows};
 use anyhow::{Result, bail};
 use formats::Trace;
 use formats::interop::{
-    Access, AccessSink, Field, GeometryRow, Get, NpyWriter, RayRow, RecordRow, Tabular, child_rows,
+    Access, AccessSink, CsvWriter, GeometryRow, NpyWriter, RayRow, RecordRow, Tabular, child_rows,
     slot_rows,
 };
 use report::rows_parquet::RowsWriter;
@@ -36,11 +36,11 @@ pub(super) fn rows<R: Tabular>(
         return Ok(());
     }
     if to == Target::Csv {
-        let names: Vec<&str> = R::FIELDS.iter().map(|field| field.name).collect();
-        writeln!(out, "{}", names.join(","))?;
+        let mut csv = CsvWriter::new(out)?;
+        return send(&mut |row| Ok(csv.row(&row)?));
     }
     if !to.is_columns() {
-        return send(&mut |row| Ok(text_row(to, &row, out)?));
+        return send(&mut |row| Ok(json_row(&row, out)?));
     }
     let mut count = 0;
     send(&mut |_| {
@@ -68,41 +68,25 @@ pub(super) fn records<R: Tabular, T: Rows<R>>(
     })
 }
 
-/// Writes a row as a line of CSV or JSON. Codes are written as names.
-fn text_row<R: Tabular>(to: Target, row: &R, out: &mut impl Write) -> io::Result<()> {
-    let values = R::FIELDS.iter().map(|field| (field, text(field, row)));
-    if to == Target::Csv {
-        let texts: Vec<String> = values
-            .map(|(_, text)| text.unwrap_or_else(|| "NaN".to_owned()))
-            .collect();
-        return writeln!(out, "{}", texts.join(","));
-    }
-    let pairs: Vec<String> = values
-        .map(|(field, text)| {
+/// Writes a row as a line of JSON. Codes are written as names.
+fn json_row<R: Tabular>(row: &R, out: &mut impl Write) -> io::Result<()> {
+    let mut line = b"{".to_vec();
+    for field in R::FIELDS {
+        let separator = if line.len() > 1 { "," } else { "" };
+        write!(line, "{separator}\"{}\":", field.name)?;
+        let begin = line.len();
+        field.write_text(row, &mut line)?;
+        if line.ends_with(b"NaN") {
             // JSON has no NaN.
-            let text = text.unwrap_or_else(|| "null".to_owned());
-            let quote = if field.codes.is_empty() { "" } else { "\"" };
-            format!("\"{}\":{quote}{text}{quote}", field.name)
-        })
-        .collect();
-    writeln!(out, "{{{}}}", pairs.join(","))
-}
-
-/// A value as text in its shortest form; `None` for a number that is not finite.
-fn text<R: Tabular>(field: &Field<R>, row: &R) -> Option<String> {
-    let number = match &field.get {
-        Get::U8(get) => match field.codes.get(usize::from(get(row))) {
-            Some(name) => (*name).to_owned(),
-            None => get(row).to_string(),
-        },
-        Get::U16(get) => get(row).to_string(),
-        Get::U32(get) => get(row).to_string(),
-        Get::U64(get) => get(row).to_string(),
-        Get::I32(get) => get(row).to_string(),
-        Get::F32(get) if !get(row).is_finite() => return None,
-        Get::F32(get) => serde_json::to_string(&get(row)).ok()?,
-    };
-    Some(number)
+            line.truncate(begin);
+            line.extend(b"null");
+        } else if !field.codes.is_empty() {
+            line.insert(begin, b'"');
+            line.push(b'"');
+        }
+    }
+    line.extend(b"}\n");
+    out.write_all(&line)
 }
 
 /// Writes the rows of a trace: its records or rays, or the nodes or slots of its hierarchy.
