@@ -1,8 +1,24 @@
-//! The Parallax trace files.
+//! The Parallax trace files: what `tracegen` (scene or program to trace) writes and `replay` (trace to results)
+//! reads. FORMAT.md in the repository root is the byte-level specification.
 //!
-//! This crate contains the code that `tracegen` (scene to trace) and `replay` (trace to results) share. The
-//! two programs communicate only through the files it describes. FORMAT.md in the repository root is the
-//! byte-level specification.
+//! | to | use |
+//! | --- | --- |
+//! | read a file of either kind | [`Trace::open`] |
+//! | read texture coordinates of quads (`.textrace`) | [`Textrace`], tile by tile from any thread |
+//! | write them | [`TextraceWriter`] |
+//! | read rays (`.raytrace`) | [`Raytrace`] |
+//! | write them | [`RaytraceWriter`] |
+//! | compute which texels a quad reads, and at which addresses | [`footprint`], [`layout`] |
+//! | pass accesses to other tools, or read theirs | [`interop`] |
+//!
+//! Every error names the file, the place, what was expected and what was found ([`FormatError`]).
+//!
+//! # Example
+//!
+//! A reader of its own (`examples/read_trace.rs`):
+//! ```no_run
+#![doc = include_str!("../examples/read_trace.rs")]
+//! ```
 
 mod chunk_tag;
 pub mod container;
@@ -29,4 +45,6 @@ pub mod view;
 mod tests;
 
 pub use error::{Broken, FormatError, Result};
+pub use raytrace::{Raytrace, RaytraceWriter};
+pub use textrace::{Textrace, TextraceWriter};
 pub use trace::Trace;

@@ -1,4 +1,19 @@
 //! Replays texture traces through caches, DRAM and a texture unit, in any tile order.
+//!
+//! | to | use |
+//! | --- | --- |
+//! | replay a trace with a configuration | [`replay`]; [`engine::replay_all`] shares work between many |
+//! | describe a machine | [`RunConfig`]: caches, mode, order, layout, sampling |
+//! | read what a replay counted | [`result::RunResult`] |
+//! | write a replacement policy | [`memory::Policy`] and [`memory::Replacement::own`]: `examples/own_policy.rs` |
+//! | write a tile order | [`order::Listed`] and [`order::Order::own`]: `examples/own_order.rs` |
+//! | replay addresses of other tools | [`addresses`] |
+//!
+//! # Example
+//!
+//! ```no_run
+#![doc = include_str!("../examples/own_policy.rs")]
+//! ```
 
 pub mod access;
 pub mod addresses;
@@ -19,3 +34,7 @@ pub mod size;
 pub mod stream;
 mod sums;
 pub mod tmu;
+
+pub use config::RunConfig;
+pub use engine::{ReplayError, replay};
+pub use result::RunResult;
