@@ -18,120 +18,98 @@ pub struct Writer {
     pub draws: bool,
 }
 
+impl Writer {
+    /// One that measures no times and needs no driver.
+    const fn new(name: &'static str, command: fn(&Path, &Path) -> Command) -> Self {
+        Self {
+            name,
+            command,
+            measures: false,
+            draws: false,
+        }
+    }
+
+    /// One that measures times.
+    const fn measuring(self) -> Self {
+        Self {
+            measures: true,
+            ..self
+        }
+    }
+
+    /// One that needs the driver.
+    const fn drawing(self) -> Self {
+        Self {
+            draws: true,
+            ..self
+        }
+    }
+}
+
 /// All writers; the first [`QUICK`] take a fraction of a second and need no driver.
 pub const ALL: &[Writer] = &[
-    Writer {
-        name: "tracegen rays",
-        command: |_, folder| {
-            let mut command = tracegen(&["rays", "teapot", "--size", "96x96", "-o"]);
-            command.arg(folder.join("a.raytrace"));
-            command.arg("--image").arg(folder.join("a.png"));
-            command
-        },
-        measures: false,
-        draws: false,
-    },
-    Writer {
-        name: "replay convert --to textrace",
-        command: |_, folder| {
-            let mut command = replay("convert", "atrium-shadows.textrace");
-            command.args(["--to", "textrace", "--encoding", "planes", "-o"]);
-            command.arg(folder.join("a.textrace"));
-            command
-        },
-        measures: false,
-        draws: false,
-    },
-    Writer {
-        name: "tracegen sweep",
-        command: |inputs, folder| {
-            let mut command = tracegen(&["sweep"]);
-            command.arg(inputs.join("captures.toml"));
-            command.arg("-o").arg(folder);
-            command
-        },
-        measures: false,
-        draws: false,
-    },
-    Writer {
-        name: "replay sweep",
-        command: |inputs, folder| sweep(inputs, folder),
-        measures: false,
-        draws: false,
-    },
-    Writer {
-        name: "replay paper",
-        command: |_, folder| {
-            let mut command = replay("paper", "atrium-shadows.textrace");
-            command.arg("--csv").arg(folder.join("table.csv"));
-            command.arg("--parquet").arg(folder.join("table.parquet"));
-            command.arg("--html").arg(folder.join("page.html"));
-            command
-        },
-        measures: false,
-        draws: false,
-    },
-    Writer {
-        name: "replay convert --to din",
-        command: |_, folder| {
-            let mut command = replay("convert", "atrium-shadows.textrace");
-            command.args(["--to", "din", "-o"]);
-            command.arg(folder.join("a.din.gz"));
-            command
-        },
-        measures: false,
-        draws: false,
-    },
-    Writer {
-        name: "replay run",
-        command: |_, _| replay("run", "atrium-shadows.textrace"),
-        measures: false,
-        draws: false,
-    },
-    Writer {
-        name: "replay report",
-        command: |_, folder| {
-            let mut command = replay("report", "atrium-shadows.textrace");
-            command.arg("-o").arg(folder.join("report.html"));
-            command
-        },
-        measures: false,
-        draws: false,
-    },
-    Writer {
-        name: "replay reproject",
-        command: |_, folder| {
-            let mut command = replay("reproject", "teapot-rays.raytrace");
-            command.arg("--html").arg(folder.join("page.html"));
-            command.arg("--image").arg(folder.join("a.png"));
-            command
-        },
-        measures: false,
-        draws: false,
-    },
-    Writer {
-        name: "tracegen raster",
-        command: |_, folder| {
-            let mut command = tracegen(&["raster", "teapot", "--size", "64x72", "-o"]);
-            command.arg(folder.join("a.textrace"));
-            command.arg("--image").arg(folder.join("a.png"));
-            command
-        },
-        measures: false,
-        draws: true,
-    },
-    Writer {
-        name: "tracegen techniques",
-        command: |_, folder| {
-            let mut command = tracegen(&["techniques", "atrium-plain", "--path", "head"]);
-            command.args(["--size", "64x72", "--path-frames", "4", "--frames", "2"]);
-            command.args(["--repeats", "1", "--only", "superfrustum,conical", "-o"]);
-            command.arg(folder);
-            command
-        },
-        measures: true,
-        draws: true,
-    },
+    Writer::new("tracegen rays", |_, folder| {
+        let mut command = tracegen(&["rays", "teapot", "--size", "96x96", "-o"]);
+        command.arg(folder.join("a.raytrace"));
+        command.arg("--image").arg(folder.join("a.png"));
+        command
+    }),
+    Writer::new("replay convert --to textrace", |_, folder| {
+        let mut command = replay("convert", "atrium-shadows.textrace");
+        command.args(["--to", "textrace", "--encoding", "planes", "-o"]);
+        command.arg(folder.join("a.textrace"));
+        command
+    }),
+    Writer::new("tracegen sweep", |inputs, folder| {
+        let mut command = tracegen(&["sweep"]);
+        command.arg(inputs.join("captures.toml"));
+        command.arg("-o").arg(folder);
+        command
+    }),
+    Writer::new("replay sweep", |inputs, folder| sweep(inputs, folder)),
+    Writer::new("replay paper", |_, folder| {
+        let mut command = replay("paper", "atrium-shadows.textrace");
+        command.arg("--csv").arg(folder.join("table.csv"));
+        command.arg("--parquet").arg(folder.join("table.parquet"));
+        command.arg("--html").arg(folder.join("page.html"));
+        command
+    }),
+    Writer::new("replay convert --to din", |_, folder| {
+        let mut command = replay("convert", "atrium-shadows.textrace");
+        command.args(["--to", "din", "-o"]);
+        command.arg(folder.join("a.din.gz"));
+        command
+    }),
+    Writer::new("replay run", |_, _| {
+        replay("run", "atrium-shadows.textrace")
+    }),
+    Writer::new("replay report", |_, folder| {
+        let mut command = replay("report", "atrium-shadows.textrace");
+        command.arg("-o").arg(folder.join("report.html"));
+        command
+    }),
+    Writer::new("replay reproject", |_, folder| {
+        let mut command = replay("reproject", "teapot-rays.raytrace");
+        command.arg("--html").arg(folder.join("page.html"));
+        command.arg("--image").arg(folder.join("a.png"));
+        command
+    }),
+    Writer::new("tracegen raster", |_, folder| {
+        let mut command = tracegen(&["raster", "teapot", "--size", "64x72", "-o"]);
+        command.arg(folder.join("a.textrace"));
+        command.arg("--image").arg(folder.join("a.png"));
+        command
+    })
+    .drawing(),
+    Writer::new("tracegen techniques", |_, folder| {
+        let mut command = tracegen(&["techniques", "atrium-plain", "--path", "head"]);
+        command.args(["--size", "64x72", "--path-frames", "4", "--frames", "2"]);
+        command.args(["--repeats", "1", "--only", "superfrustum,conical", "-o"]);
+        command.arg(folder);
+        command
+    })
+    .measuring()
+    .drawing(),
 ];
 
 /// Number of entries of [`ALL`] that every test run uses.

@@ -224,6 +224,11 @@ fn a_pose_has_the_trace_of_a_static_file_in_that_pose() {
     }
 }
 
+/// Flags with the scene's time.
+fn at_time<'a>(flags: &[&'a str], seconds: &'a str) -> Vec<&'a str> {
+    [flags, &["--time", seconds]].concat()
+}
+
 #[test]
 fn scene_time_advances_per_frame() {
     if !has_lavapipe() {
@@ -233,12 +238,7 @@ fn scene_time_advances_per_frame() {
     let folder = folder.path();
     let (scene, there) = (animated(folder), baked(folder, 0.5));
     let flags = ["--fps", "4", "--frames", "2"];
-    let moving = capture(
-        folder,
-        "raster",
-        &scene,
-        &[&flags[..], &["--time", "0.25"]].concat(),
-    );
+    let moving = capture(folder, "raster", &scene, &at_time(&flags, "0.25"));
     let still = capture(folder, "raster", &there, &flags);
     let (Trace::Texture(moving), Trace::Texture(still)) = (moving, still) else {
         panic!("texture traces");
@@ -272,12 +272,7 @@ fn scene_time_advances_per_frame() {
         );
     }
     let flags = ["--fps", "4", "--frame", "1"];
-    let moving = content(
-        folder,
-        "rays",
-        &scene,
-        &[&flags[..], &["--time", "0.25"]].concat(),
-    );
+    let moving = content(folder, "rays", &scene, &at_time(&flags, "0.25"));
     assert_eq!(moving, content(folder, "rays", &there, &flags));
 }
 
@@ -290,12 +285,7 @@ fn shadows_and_named_techniques_follow_the_animation() {
     let folder = folder.path();
     let (scene, there) = (animated(folder), baked(folder, 0.5));
     for flags in [&["--shadows", "--occlusion"], &["--technique", "per-eye"]] {
-        let moving = content(
-            folder,
-            "raster",
-            &scene,
-            &[&flags[..], &["--time", "0.5"]].concat(),
-        );
+        let moving = content(folder, "raster", &scene, &at_time(flags, "0.5"));
         assert_eq!(
             moving,
             content(folder, "raster", &there, flags),

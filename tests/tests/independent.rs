@@ -240,6 +240,18 @@ fn python_reads_the_primitive_lists_of_a_fresh_capture_as_replay_does() {
     assert_eq!(check_with(&encoded, &["--lists"]), 2 * 12 + 4 * 128 * 128);
 }
 
+/// Captures rays of a scene.
+fn rays(scene: &str, options: &[&str], path: &Path) {
+    let mut command = program("tracegen");
+    run_ok(
+        command
+            .args(["rays", scene])
+            .args(options)
+            .arg("-o")
+            .arg(path),
+    );
+}
+
 #[test]
 fn python_reads_fresh_rays_with_visits_and_several_samples_as_replay_does() {
     if !has_python() {
@@ -249,13 +261,7 @@ fn python_reads_fresh_rays_with_visits_and_several_samples_as_replay_does() {
     for (scene, tree) in [("teapot", "bvh2"), ("chess", "bvh8")] {
         let path = folder.path().join(scene).with_extension("raytrace");
         let options = ["--size", "40x24", "--spp", "3", "--visits", "--bvh", tree];
-        run_ok(
-            program("tracegen")
-                .args(["rays", scene])
-                .args(options)
-                .arg("-o")
-                .arg(&path),
-        );
+        rays(scene, &options, &path);
         assert_eq!(check(&path), 2 * 40 * 24 * 3);
     }
 }
@@ -274,7 +280,7 @@ fn python_reads_all_columns_of_fresh_rays_as_replay_does() {
     ] {
         let path = folder.path().join(scene).with_extension("raytrace");
         let spp = samples.to_string();
-        let options = [
+        let mut options = vec![
             "--size",
             "40x24",
             "--spp",
@@ -283,19 +289,8 @@ fn python_reads_all_columns_of_fresh_rays_as_replay_does() {
             "--bvh",
             tree,
         ];
-        run_ok(
-            program("tracegen")
-                .args(["rays", scene])
-                .args(options)
-                .args(
-                    treelets
-                        .map(|bytes| ["--treelets", bytes])
-                        .into_iter()
-                        .flatten(),
-                )
-                .arg("-o")
-                .arg(&path),
-        );
+        options.extend(treelets.iter().flat_map(|bytes| ["--treelets", bytes]));
+        rays(scene, &options, &path);
         assert_eq!(check(&path), 2 * 40 * 24 * samples);
         assert!(check_with(&path, &["--nodes"]) > 1000);
         assert!(check_with(&path, &["--slots"]) > 10_000);
@@ -315,21 +310,11 @@ fn python_reads_rays_beyond_whitteds_model_as_replay_does() {
         ["--bounces", "3", "--light-radius", "0.2"],
     ];
     for (light, samples) in options.into_iter().zip([1, 2]) {
-        run_ok(
-            program("tracegen")
-                .args(["rays", "chess", "--size", "40x24"])
-                .args(["--spp", &samples.to_string()])
-                .args([
-                    "--all-columns",
-                    "--coloured-shadows",
-                    "--normal-maps",
-                    "--seed",
-                    "5",
-                ])
-                .args(light)
-                .arg("-o")
-                .arg(&path),
-        );
+        let spp = samples.to_string();
+        let mut options = vec!["--size", "40x24", "--spp", &spp, "--all-columns"];
+        options.extend(["--coloured-shadows", "--normal-maps", "--seed", "5"]);
+        options.extend(light);
+        rays("chess", &options, &path);
         assert_eq!(check(&path), 2 * 40 * 24 * samples);
         run_ok(program("replay").arg("validate").arg(&path));
         if samples == 1 {

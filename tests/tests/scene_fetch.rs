@@ -56,6 +56,14 @@ fn an_unreachable_source_is_a_line_and_no_failure() {
     assert!(!folder.path().join("utah-teapot").exists());
 }
 
+fn assert_refused(output: &Output, parts: [&str; 2]) {
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{errors}");
+    for part in parts {
+        assert!(errors.contains(part), "{errors}");
+    }
+}
+
 #[test]
 fn a_wrong_file_is_named_with_both_checksums() {
     let folder = tempfile::tempdir().expect("a temporary folder");
@@ -65,14 +73,13 @@ fn a_wrong_file_is_named_with_both_checksums() {
     let Some(output) = make(folder.path(), "utah-teapot") else {
         return;
     };
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{errors}");
-    for part in [
-        "teapot.bpt: expected 7568 bytes, SHA-256 264d37f8",
-        "found 2 bytes, e29c9c18",
-    ] {
-        assert!(errors.contains(part), "{errors}");
-    }
+    assert_refused(
+        &output,
+        [
+            "teapot.bpt: expected 7568 bytes, SHA-256 264d37f8",
+            "found 2 bytes, e29c9c18",
+        ],
+    );
     let left = fs::read_dir(folder.path()).expect("a folder").count();
     assert_eq!(left, 1, "only the downloads are left");
 }
@@ -83,10 +90,5 @@ fn a_scene_that_is_not_in_the_table_is_refused() {
     let Some(output) = make(folder.path(), "teapot") else {
         return;
     };
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{errors}");
-    assert!(
-        errors.contains("utah-teapot") && errors.contains("found 'teapot'"),
-        "{errors}"
-    );
+    assert_refused(&output, ["utah-teapot", "found 'teapot'"]);
 }
