@@ -13,11 +13,11 @@ mod sweeps;
 pub use report::Report;
 pub use sweeps::SWEEPS;
 
-use probe::{Capture, Probe, Ran};
+use probe::{Capture, Probe, Ran, Views};
 use serde::Serialize;
 use std::path::Path;
 
-/// A sweep: a file in [`sweeps`] and a row of [`SWEEPS`].
+/// A sweep: a row of [`SWEEPS`].
 pub struct Sweep {
     /// Name on the command line and in the table.
     pub name: &'static str,
@@ -27,7 +27,49 @@ pub struct Sweep {
     bounds: Bounds,
     /// Part of the warning that points beyond the bounds must print; none if no point may exceed them.
     warning: Option<&'static str>,
-    run: fn(&mut Points<'_>) -> anyhow::Result<()>,
+    /// Its cases; those that take minutes only if the argument is true.
+    cases: fn(bool) -> sweeps::Cases,
+}
+
+/// A point before it runs: a scene, how it is captured, and what the capture is compared with.
+struct Case {
+    /// Value of the parameter.
+    at: String,
+    /// Name of the scene's file.
+    file: &'static str,
+    /// Its content.
+    scene: String,
+    /// Flags after `tracegen raster SCENE`, separated by spaces.
+    flags: String,
+    /// Size of the texture `stress.png`.
+    texture_px: [u32; 2],
+    against: Against,
+}
+
+impl Case {
+    /// An OBJ scene, compared with the reference.
+    fn new(at: impl Into<String>, scene: String, flags: impl Into<String>) -> Self {
+        Self {
+            at: at.into(),
+            file: "a.obj",
+            scene,
+            flags: flags.into(),
+            texture_px: [64, 64],
+            against: Against::Reference,
+        }
+    }
+}
+
+/// What a capture is compared with.
+enum Against {
+    /// The reference in double precision.
+    Reference,
+    /// The reference in double precision; later points are compared with this capture.
+    ReferenceAsFirst,
+    /// The last capture of [`Self::ReferenceAsFirst`].
+    First,
+    /// The mirror image of a capture of this OBJ scene with the same flags, and the width of its pictures.
+    MirrorImageOf(String, u32),
 }
 
 /// Largest errors that a sweep's points may have without a warning.
@@ -101,46 +143,51 @@ pub struct Point {
     pub said: Option<String>,
 }
 
-/// The points of a sweep, in the order of their runs.
-pub struct Points<'a> {
-    probe: &'a Probe<'a>,
-    /// Whether points that take minutes are included.
-    full: bool,
-    bounds: Bounds,
-    warning: Option<&'static str>,
-    points: Vec<Point>,
+/// Eyes exchanged and columns mirrored, in pictures of a width.
+fn mirrored([left, right]: Views, width_px: u32) -> Views {
+    [right, left].map(|view| {
+        let fragments = view.into_iter();
+        let mirrored = fragments.map(|(([x, y], primitive), lane)| {
+            let pixel = [width_px - 1 - x, y];
+            ((pixel, primitive), lane)
+        });
+        mirrored.collect()
+    })
 }
 
-impl Points<'_> {
-    /// Captures a scene of the sweep's folder and adds the point.
-    fn add(
-        &mut self,
-        at: impl Into<String>,
-        capture: &Capture,
-        measure: impl FnOnce(&Probe<'_>) -> anyhow::Result<Error>,
-    ) -> anyhow::Result<()> {
-        let ran = self.probe.capture(capture)?;
-        let captured = ran.exit_code == Some(0);
-        let error = captured.then(|| measure(self.probe)).transpose()?;
+impl Sweep {
+    /// Runs a case; `first` keeps the capture that later cases are compared with.
+    fn run(&self, case: Case, probe: &Probe<'_>, first: &mut Views) -> anyhow::Result<Point> {
+        probe.write("stress.png", shapes::checker(case.texture_px)?)?;
+        let mut mirror_image = Views::default();
+        if let Against::MirrorImageOf(scene, width_px) = &case.against {
+            let scene = probe.write("a.obj", scene)?;
+            probe.capture(&Capture::new(scene, &case.flags))?;
+            mirror_image = mirrored(probe.views()?, *width_px);
+        }
+        let scene = probe.write(case.file, case.scene)?;
+        let capture = Capture::new(scene, &case.flags);
+        let ran = probe.capture(&capture)?;
+        let error = match (&case.against, ran.exit_code) {
+            (Against::Reference | Against::ReferenceAsFirst, Some(0)) => {
+                Some(probe.against_reference(&capture)?)
+            }
+            (Against::First, Some(0)) => Some(probe.against(first)?),
+            (Against::MirrorImageOf(..), Some(0)) => Some(probe.against(&mirror_image)?),
+            _ => None,
+        };
+        if matches!(case.against, Against::ReferenceAsFirst) {
+            *first = probe.views()?;
+        }
         let outcome = Outcome::of(&ran, error.as_ref(), &self.bounds, self.warning);
         let belongs = self.warning.and_then(|part| ran.said(part));
         let said = ran.said("error:").or(belongs).or(ran.said(""));
-        self.points.push(Point {
-            at: at.into(),
+        Ok(Point {
+            at: case.at,
             outcome,
             error,
             said: said.map(str::to_owned),
-        });
-        Ok(())
-    }
-
-    /// Like [`Self::add`], compared with the reference in double precision.
-    fn add_against_reference(
-        &mut self,
-        at: impl Into<String>,
-        capture: &Capture,
-    ) -> anyhow::Result<()> {
-        self.add(at, capture, |probe| probe.against_reference(capture))
+        })
     }
 }
 
@@ -160,19 +207,12 @@ pub fn run(
     let chosen = |sweep: &&Sweep| names.is_empty() || names.iter().any(|name| name == sweep.name);
     for sweep in SWEEPS.iter().filter(chosen) {
         progress(sweep);
-        // Files that a sweep may replace.
-        probe.write("stress.png", shapes::checker([64, 64])?)?;
         probe.write("holes.png", shapes::holes([64, 64])?)?;
         probe.write("stress.mtl", shapes::MATERIALS)?;
-        let mut points = Points {
-            probe: &probe,
-            full,
-            bounds: sweep.bounds,
-            warning: sweep.warning,
-            points: Vec::new(),
-        };
-        (sweep.run)(&mut points)?;
-        report.add(sweep, points.points);
+        let mut first = Views::default();
+        let cases = (sweep.cases)(full);
+        let points = cases.map(|case| sweep.run(case, &probe, &mut first));
+        report.add(sweep, points.collect::<anyhow::Result<_>>()?);
     }
     Ok(report)
 }
