@@ -8,7 +8,7 @@ mod materials;
 pub(crate) mod parts;
 
 use super::mesh_builder::MeshBuilder;
-use super::scene_builder::{MaterialId, SceneBuilder};
+use super::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use materials::Palette;
 use parts::{Bay, Column, baluster, cornice, groin_vault, moulding, rib};
@@ -102,8 +102,8 @@ const PLAIN: Detail = Detail {
 /// Stand-in for Crytek Sponza: many textures per material.
 pub fn rich() -> Scene {
     let mut scene = SceneBuilder::new("atrium");
-    let palette = materials::rich(&mut scene);
-    build(&mut scene, &palette, &RICH);
+    materials::add_rich(&mut scene);
+    build(&mut scene, &materials::RICH, &RICH);
     scene.finish(vec3(0.62, 0.74, 0.92), 0)
 }
 
@@ -119,8 +119,8 @@ pub fn shadows() -> Scene {
 
 fn simple(name: &str, cascades: u32) -> Scene {
     let mut scene = SceneBuilder::new(name);
-    let palette = materials::plain(&mut scene);
-    build(&mut scene, &palette, &PLAIN);
+    materials::add_plain(&mut scene);
+    build(&mut scene, &materials::PLAIN, &PLAIN);
     scene.finish(vec3(0.62, 0.74, 0.92), cascades)
 }
 
@@ -171,7 +171,7 @@ fn place_all(
     scene: &mut SceneBuilder,
     name: &str,
     mesh: MeshBuilder,
-    material: MaterialId,
+    material: &str,
     places: &[Affine3A],
 ) {
     let mesh = scene.mesh(name, mesh, material);

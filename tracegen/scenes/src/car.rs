@@ -4,107 +4,57 @@ mod body;
 mod details;
 
 use super::masonry::carved_stone;
-use super::mesh_builder::{MeshBuilder, curve, sharp, smooth};
+use super::mesh_builder::{MeshBuilder, curve, profile};
 use super::organic::damask;
-use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, rgb};
+use super::scene_builder::SceneBuilder;
+use super::texture_synth::{Maps, Recipe, rgb, tones};
 use body::{AXLES, TYRE};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-pub(super) struct CarMaterials {
-    pub(super) paint: MaterialId,
-    pub(super) glass: MaterialId,
-    pub(super) trim: MaterialId,
-    pub(super) chrome: MaterialId,
-    pub(super) alloy: MaterialId,
-    pub(super) tyre: MaterialId,
-    pub(super) leather: MaterialId,
-    pub(super) lamp: MaterialId,
-    pub(super) tail_lamp: MaterialId,
-    pub(super) brake: MaterialId,
-    pub(super) floor: MaterialId,
-}
-
-fn kit(scene: &mut SceneBuilder) -> CarMaterials {
-    let recipe = Recipe::new;
-    let mut sets = [
-        recipe(
-            "studio-floor",
-            1024,
-            Maps::ColorNormal,
-            4.0,
-            carved_stone([rgb(0x75787d), rgb(0x6c6f74)], 0.0, 0.0, 0.2),
-        ),
-        recipe(
-            "leather",
-            512,
-            Maps::Color,
-            0.4,
-            damask(rgb(0x7a4a2c), rgb(0x6a3f25), 8.0),
-        ),
-    ]
-    .into_iter();
-    let floor = match sets.next() {
-        Some(set) => scene.textured(set, |m| {
-            m.roughness = 0.2;
-            m.mirror = 0.10;
-        }),
-        None => scene.plain("missing", rgb(0xff_00ff), 0.5, |_| {}),
-    };
-    let leather = match sets.next() {
-        Some(set) => scene.textured(set, |m| m.roughness = 0.6),
-        None => floor,
-    };
-    CarMaterials {
-        paint: scene.plain("paint", rgb(0xb3141c), 0.08, |m| {
-            m.mirror = 0.12;
-            m.double_sided = true;
-        }),
-        glass: scene.plain("glass", rgb(0xdce8e4), 0.0, |m| {
-            m.transmission = 0.88;
-            m.ior = 1.05;
-            m.mirror = 0.06;
-            m.double_sided = true;
-        }),
-        trim: scene.plain("trim", rgb(0x16171a), 0.4, |m| m.double_sided = true),
-        chrome: scene.plain("chrome", rgb(0xd8dce0), 0.03, |m| {
-            m.metallic = 1.0;
-            m.mirror = 0.8;
-        }),
-        alloy: scene.plain("alloy", rgb(0xb8bcc2), 0.2, |m| {
-            m.metallic = 1.0;
-            m.mirror = 0.4;
-        }),
-        tyre: scene.plain("tyre", rgb(0x1d1d1f), 0.85, |_| {}),
-        leather,
-        lamp: scene.plain("headlamp", rgb(0xf0f4f8), 0.0, |m| {
-            m.transmission = 0.8;
-            m.ior = 1.3;
-            m.mirror = 0.1;
-        }),
-        tail_lamp: scene.plain("tail-lamp", rgb(0xc01018), 0.1, |m| {
-            m.emissive = vec3(0.5, 0.02, 0.02);
-            m.mirror = 0.1;
-        }),
-        brake: scene.plain("brake", rgb(0x90949a), 0.3, |m| {
-            m.metallic = 1.0;
-            m.mirror = 0.2;
-        }),
-        floor,
-    }
+fn materials(scene: &mut SceneBuilder) {
+    let floor = carved_stone(tones(0x75787d, 0x6c6f74), 0.0, 0.0, 0.2);
+    let floor = Recipe::new("studio-floor", 1024, Maps::ColorNormal, 4.0, floor);
+    scene.polished(floor, 0.2, 0.10);
+    let leather = damask(rgb(0x7a4a2c), rgb(0x6a3f25), 8.0);
+    let leather = Recipe::new("leather", 512, Maps::Color, 0.4, leather);
+    scene.polished(leather, 0.6, 0.0);
+    scene.plain("paint", rgb(0xb3141c), 0.08, |m| {
+        m.mirror = 0.12;
+        m.double_sided = true;
+    });
+    scene.plain("glass", rgb(0xdce8e4), 0.0, |m| {
+        m.transmission = 0.88;
+        m.ior = 1.05;
+        m.mirror = 0.06;
+        m.double_sided = true;
+    });
+    scene.plain("trim", rgb(0x16171a), 0.4, |m| m.double_sided = true);
+    scene.metal("chrome", 0xd8dce0, 0.03, 0.8);
+    scene.metal("alloy", 0xb8bcc2, 0.2, 0.4);
+    scene.plain("tyre", rgb(0x1d1d1f), 0.85, |_| {});
+    scene.plain("headlamp", rgb(0xf0f4f8), 0.0, |m| {
+        m.transmission = 0.8;
+        m.ior = 1.3;
+        m.mirror = 0.1;
+    });
+    scene.plain("tail-lamp", rgb(0xc01018), 0.1, |m| {
+        m.emissive = vec3(0.5, 0.02, 0.02);
+        m.mirror = 0.1;
+    });
+    scene.metal("brake", 0x90949a, 0.3, 0.2);
 }
 
 /// The scene.
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("car");
-    let kit = kit(&mut scene);
-    skin(&mut scene, &kit);
-    details::wheels(&mut scene, &kit);
-    details::details(&mut scene, &kit);
-    interior(&mut scene, &kit);
-    studio(&mut scene, &kit);
+    materials(&mut scene);
+    skin(&mut scene);
+    details::wheels(&mut scene);
+    details::details(&mut scene);
+    interior(&mut scene);
+    studio(&mut scene);
     scene.camera(
         "default",
         vec3(2.2, 1.02, 1.5),
@@ -131,14 +81,14 @@ pub fn scene() -> Scene {
     scene.finish(vec3(0.30, 0.34, 0.40), 0)
 }
 
-fn skin(scene: &mut SceneBuilder, kit: &CarMaterials) {
-    scene.add("body", body::body_mesh(92, 40), kit.paint);
-    scene.add("intake", body::end_cap(32, true), kit.trim);
-    scene.add("rear-panel", body::end_cap(32, false), kit.paint);
+fn skin(scene: &mut SceneBuilder) {
+    scene.add("body", body::body_mesh(92, 40), "paint");
+    scene.add("intake", body::end_cap(32, true), "trim");
+    scene.add("rear-panel", body::end_cap(32, false), "paint");
     let [paint, glass, trim] = body::cabin_meshes(60, 52);
-    scene.add("roof", paint, kit.paint);
-    scene.add("windows", glass, kit.glass);
-    scene.add("window-trim", trim, kit.trim);
+    scene.add("roof", paint, "paint");
+    scene.add("windows", glass, "glass");
+    scene.add("window-trim", trim, "trim");
     // Floor pan and wheel houses.
     let mut pan = MeshBuilder::new();
     pan.block(vec3(-1.9, 0.19, -0.55), vec3(1.75, 0.25, 0.55), 0.01);
@@ -172,10 +122,10 @@ fn skin(scene: &mut SceneBuilder, kit: &CarMaterials) {
             );
         }
     }
-    scene.add("floor-pan", pan, kit.trim);
+    scene.add("floor-pan", pan, "trim");
 }
 
-fn interior(scene: &mut SceneBuilder, kit: &CarMaterials) {
+fn interior(scene: &mut SceneBuilder) {
     let mut seats = MeshBuilder::new();
     for side in [-1.0f32, 1.0] {
         let at = vec3(-0.38, 0.34, side * 0.34);
@@ -218,19 +168,15 @@ fn interior(scene: &mut SceneBuilder, kit: &CarMaterials) {
             );
         }
     }
-    scene.add("seats", seats, kit.leather);
+    scene.add("seats", seats, "leather");
     let mut dash = MeshBuilder::new();
     dash.block(vec3(0.36, 0.52, -0.66), vec3(0.80, 0.80, 0.66), 0.06);
     dash.block(vec3(-0.5, 0.24, -0.10), vec3(0.45, 0.50, 0.10), 0.03);
     let hub = vec3(0.20, 0.72, -0.34);
     let lean = Quat::from_rotation_z(0.4);
-    let wheel: Vec<(Vec3, f32)> = (0..=36)
-        .map(|i| {
-            let (sin, cos) = (TAU * (i % 36) as f32 / 36.0).sin_cos();
-            (hub + lean * vec3(0.0, 0.175 * sin, 0.175 * cos), 0.014)
-        })
-        .collect();
-    dash.tube(&wheel, 10);
+    dash.ring([36, 10], 0.014, |sin, cos| {
+        hub + lean * vec3(0.0, 0.175 * sin, 0.175 * cos)
+    });
     for a in [0.1f32, PI - 0.1, -FRAC_PI_2] {
         let (sin, cos) = a.sin_cos();
         dash.tube(
@@ -241,25 +187,17 @@ fn interior(scene: &mut SceneBuilder, kit: &CarMaterials) {
             8,
         );
     }
-    scene.add("dashboard", dash, kit.trim);
+    scene.add("dashboard", dash, "trim");
 }
 
-fn studio(scene: &mut SceneBuilder, kit: &CarMaterials) {
+fn studio(scene: &mut SceneBuilder) {
     // A round floor that runs up into the backdrop in one curve; uv unrolls from the middle.
     let mut floor = MeshBuilder::new();
-    let profile = [
-        sharp(9.0, 4.2),
-        smooth(9.0, 2.6),
-        smooth(8.4, 0.9),
-        smooth(7.4, 0.15),
-        smooth(6.4, 0.0),
-        smooth(3.2, 0.0),
-        smooth(0.0, 0.0),
-    ];
+    let profile = profile("9,4.2! 9,2.6 8.4,0.9 7.4,0.15 6.4,0 3.2,0 0,0");
     floor.lathe(&curve(&profile, 2), 40);
     for (p, uv) in floor.positions.iter().zip(&mut floor.uvs) {
         let out = vec2(p.x, p.z);
         *uv = out + out.normalize_or_zero() * p.y;
     }
-    scene.add("studio", floor, kit.floor);
+    scene.add("studio", floor, "studio-floor");
 }

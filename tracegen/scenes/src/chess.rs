@@ -1,11 +1,11 @@
 //! A full chess set on a reflective board, a few moves into the Italian game: 42 K triangles.
 
 use super::masonry::carved_stone;
-use super::mesh_builder::{Knot, MeshBuilder, curve, lathed, sharp, smooth};
+use super::mesh_builder::{Knot, MeshBuilder, curve, lathed, profile, sharp, smooth};
 use super::noise::smoothstep;
 use super::organic::polished_wood;
-use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, rgb};
+use super::scene_builder::SceneBuilder;
+use super::texture_synth::{Maps, Recipe, rgb, tones};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -44,27 +44,19 @@ fn turned(radius: f32, upper: &[Knot]) -> MeshBuilder {
 }
 
 fn pawn() -> MeshBuilder {
-    let mut upper = vec![smooth(0.0085, 0.026), smooth(0.0062, 0.036)];
+    let mut upper = profile("0.0085,0.026 0.0062,0.036");
     upper.extend(collar(0.0105, 0.0395));
-    upper.extend([
-        smooth(0.0088, 0.0462),
-        smooth(0.0108, 0.0515),
-        smooth(0.0088, 0.0575),
-        smooth(0.0, 0.0622),
-    ]);
+    upper.extend(profile(
+        "0.0088,0.0462 0.0108,0.0515 0.0088,0.0575 0,0.0622",
+    ));
     turned(0.0165, &upper)
 }
 
 fn rook() -> MeshBuilder {
-    let upper = [
-        smooth(0.0118, 0.027),
-        smooth(0.0102, 0.042),
-        sharp(0.0104, 0.046),
-        smooth(0.0145, 0.0485),
-        sharp(0.0148, 0.052),
-        sharp(0.0148, 0.0535),
-        sharp(0.0, 0.0535),
-    ];
+    let upper = profile(
+        "0.0118,0.027 0.0102,0.042 0.0104,0.046! 0.0145,0.0485 0.0148,0.052! 0.0148,0.0535! \
+        0,0.0535!",
+    );
     let mut m = turned(0.0195, &upper);
     // Six merlons: arcs of a ring.
     for i in 0..6 {
@@ -98,17 +90,12 @@ fn rook() -> MeshBuilder {
 
 fn bishop() -> MeshBuilder {
     let mut knots = foot(0.0185);
-    knots.extend([smooth(0.0095, 0.028), smooth(0.0066, 0.044)]);
+    knots.extend(profile("0.0095,0.028 0.0066,0.044"));
     knots.extend(collar(0.0125, 0.0495));
-    knots.extend([
-        smooth(0.0085, 0.0575),
-        smooth(0.0118, 0.0645),
-        smooth(0.0088, 0.0735),
-        smooth(0.0032, 0.0800),
-        sharp(0.0018, 0.0818),
-        smooth(0.0034, 0.0842),
-        smooth(0.0, 0.0872),
-    ]);
+    knots.extend(profile(
+        "0.0085,0.0575 0.0118,0.0645 0.0088,0.0735 0.0032,0.08 0.0018,0.0818! 0.0034,0.0842 \
+        0,0.0872",
+    ));
     let mut m = MeshBuilder::new();
     // The mitre's cut: a notch that rises along one side.
     m.lathe_shaped(&curve(&knots, 2), SEGMENTS + 5, |angle, y| {
@@ -121,18 +108,12 @@ fn bishop() -> MeshBuilder {
 
 fn queen() -> MeshBuilder {
     let mut knots = foot(0.0212);
-    knots.extend([smooth(0.0108, 0.032), smooth(0.0074, 0.056)]);
+    knots.extend(profile("0.0108,0.032 0.0074,0.056"));
     knots.extend(collar(0.0142, 0.0615));
-    knots.extend([
-        smooth(0.0085, 0.0695),
-        smooth(0.0112, 0.0775),
-        sharp(0.0148, 0.0835),
-        sharp(0.0118, 0.0832),
-        smooth(0.0072, 0.0852),
-        sharp(0.0030, 0.0870),
-        smooth(0.0042, 0.0892),
-        smooth(0.0, 0.0925),
-    ]);
+    knots.extend(profile(
+        "0.0085,0.0695 0.0112,0.0775 0.0148,0.0835! 0.0118,0.0832! 0.0072,0.0852 0.003,0.087! \
+        0.0042,0.0892 0,0.0925",
+    ));
     let mut m = MeshBuilder::new();
     m.lathe_shaped(&curve(&knots, 2), 27, |angle, y| {
         let crown = smoothstep(0.0785, 0.0825, y) * smoothstep(0.0845, 0.0838, y);
@@ -142,16 +123,11 @@ fn queen() -> MeshBuilder {
 }
 
 fn king() -> MeshBuilder {
-    let mut upper = vec![smooth(0.0112, 0.033), smooth(0.0078, 0.060)];
+    let mut upper = profile("0.0112,0.033 0.0078,0.06");
     upper.extend(collar(0.0148, 0.0655));
-    upper.extend([
-        smooth(0.0088, 0.0735),
-        smooth(0.0112, 0.0820),
-        sharp(0.0142, 0.0885),
-        smooth(0.0105, 0.0905),
-        sharp(0.0034, 0.0928),
-        sharp(0.0, 0.0930),
-    ]);
+    upper.extend(profile(
+        "0.0088,0.0735 0.0112,0.082 0.0142,0.0885! 0.0105,0.0905 0.0034,0.0928! 0,0.093!",
+    ));
     let mut m = turned(0.0218, &upper);
     // A cross whose arms widen outwards.
     m.block(
@@ -189,11 +165,7 @@ fn spline<const N: usize>(values: &[[f32; 4]; N], t: f32) -> [f32; 4] {
 
 /// The knight: an oval swept from the chest over the poll down to the muzzle.
 fn knight() -> MeshBuilder {
-    let upper = [
-        smooth(0.0145, 0.0195),
-        sharp(0.0150, 0.0215),
-        sharp(0.0, 0.0225),
-    ];
+    let upper = profile("0.0145,0.0195 0.015,0.0215! 0,0.0225!");
     let mut m = turned(0.0195, &upper);
     // Forward, height, half depth in the plane, half width, all in millimetres.
     let spine: [[f32; 4]; 10] = [
@@ -236,33 +208,13 @@ fn knight() -> MeshBuilder {
     head.orient(|p| vec3(0.0, 0.0, p.z.signum()));
     m.merge(&head, Affine3A::IDENTITY);
     for side in [-1.0f32, 1.0] {
-        let ear = lathed(
-            &curve(
-                &[
-                    sharp(0.0026, 0.0),
-                    smooth(0.0022, 0.003),
-                    smooth(0.0, 0.0078),
-                ],
-                2,
-            ),
-            8,
-        );
+        let ear = lathed(&curve(&profile("0.0026,0! 0.0022,0.003 0,0.0078"), 2), 8);
         let tilt = Quat::from_rotation_z(0.25) * Quat::from_rotation_x(side * 0.3);
         m.merge(
             &ear,
             Affine3A::from_rotation_translation(tilt, vec3(0.0005, 0.0655, side * 0.0035)),
         );
-        let eye = lathed(
-            &curve(
-                &[
-                    smooth(0.0, -0.0016),
-                    smooth(0.0016, 0.0),
-                    smooth(0.0, 0.0016),
-                ],
-                3,
-            ),
-            8,
-        );
+        let eye = lathed(&curve(&profile("0,-0.0016 0.0016,0 0,0.0016"), 3), 8);
         m.merge(
             &eye,
             Affine3A::from_translation(vec3(0.0078, 0.0578, side * 0.0050)),
@@ -272,7 +224,7 @@ fn knight() -> MeshBuilder {
 }
 
 /// Squares, their frame and the table below.
-fn board(scene: &mut SceneBuilder, kit: &ChessMaterials) {
+fn board(scene: &mut SceneBuilder) {
     let mut fields = [MeshBuilder::new(), MeshBuilder::new()];
     for rank in 0..8 {
         for file in 0..8 {
@@ -286,8 +238,8 @@ fn board(scene: &mut SceneBuilder, kit: &ChessMaterials) {
         }
     }
     let [a, b] = fields;
-    scene.add("light-squares", a, kit.light);
-    scene.add("dark-squares", b, kit.dark);
+    scene.add("light-squares", a, "light-marble");
+    scene.add("dark-squares", b, "dark-marble");
     let mut frame = MeshBuilder::new();
     let (inner, outer) = (4.0 * SQUARE, 4.0 * SQUARE + 0.042);
     for turn in 0..4 {
@@ -300,7 +252,7 @@ fn board(scene: &mut SceneBuilder, kit: &ChessMaterials) {
         let rotation = Quat::from_rotation_y(turn as f32 * FRAC_PI_2);
         frame.merge(&side, Affine3A::from_quat(rotation));
     }
-    scene.add("board-frame", frame, kit.walnut);
+    scene.add("board-frame", frame, "walnut");
     let mut table = MeshBuilder::new();
     table.panel(
         vec3(-1.2, -0.022, 1.2),
@@ -309,66 +261,29 @@ fn board(scene: &mut SceneBuilder, kit: &ChessMaterials) {
         8,
         8,
     );
-    scene.add("table", table, kit.oak);
+    scene.add("table", table, "table-oak");
 }
 
-struct ChessMaterials {
-    light: MaterialId,
-    dark: MaterialId,
-    walnut: MaterialId,
-    oak: MaterialId,
-    ivory: MaterialId,
-    ebony: MaterialId,
-}
-
-fn kit(scene: &mut SceneBuilder) -> ChessMaterials {
+fn materials(scene: &mut SceneBuilder) {
     let recipe = |name, tile_m, surface| Recipe::new(name, 512, Maps::Color, tile_m, surface);
-    let mut sets = [
-        recipe(
-            "light-marble",
-            0.25,
-            carved_stone([rgb(0xe6dfd0), rgb(0xcfc2ac)], 0.5, 0.0, 0.2),
-        ),
-        recipe(
-            "dark-marble",
-            0.25,
-            carved_stone([rgb(0x2c3a34), rgb(0x16211d)], 0.0, 0.0, 0.2),
-        ),
-        recipe(
-            "walnut",
-            0.4,
-            polished_wood([rgb(0x6a4026), rgb(0x3c2212)], 0.3),
-        ),
-        recipe(
-            "table-oak",
-            0.8,
-            polished_wood([rgb(0xa9794a), rgb(0x7d5430)], 0.45),
-        ),
-    ]
-    .into_iter();
-    let mut textured = |scene: &mut SceneBuilder, mirror: f32, roughness: f32| match sets.next() {
-        Some(set) => scene.textured(set, |m| {
-            m.mirror = mirror;
-            m.roughness = roughness;
-        }),
-        None => scene.plain("missing", rgb(0xff_00ff), roughness, |_| {}),
-    };
-    ChessMaterials {
-        light: textured(scene, 0.22, 0.1),
-        dark: textured(scene, 0.22, 0.1),
-        walnut: textured(scene, 0.06, 0.3),
-        oak: textured(scene, 0.02, 0.45),
-        ivory: scene.plain("ivory", rgb(0xe2d0a8), 0.18, |m| m.mirror = 0.04),
-        ebony: scene.plain("ebony", rgb(0x241a16), 0.12, |m| m.mirror = 0.14),
-    }
+    let light = carved_stone(tones(0xe6dfd0, 0xcfc2ac), 0.5, 0.0, 0.2);
+    scene.polished(recipe("light-marble", 0.25, light), 0.1, 0.22);
+    let dark = carved_stone(tones(0x2c3a34, 0x16211d), 0.0, 0.0, 0.2);
+    scene.polished(recipe("dark-marble", 0.25, dark), 0.1, 0.22);
+    let walnut = polished_wood(tones(0x6a4026, 0x3c2212), 0.3);
+    scene.polished(recipe("walnut", 0.4, walnut), 0.3, 0.06);
+    let oak = polished_wood(tones(0xa9794a, 0x7d5430), 0.45);
+    scene.polished(recipe("table-oak", 0.8, oak), 0.45, 0.02);
+    scene.plain("ivory", rgb(0xe2d0a8), 0.18, |m| m.mirror = 0.04);
+    scene.plain("ebony", rgb(0x241a16), 0.12, |m| m.mirror = 0.14);
 }
 
 /// The scene.
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("chess");
-    let kit = kit(&mut scene);
-    board(&mut scene, &kit);
-    pieces(&mut scene, &kit);
+    materials(&mut scene);
+    board(&mut scene);
+    pieces(&mut scene);
     scene.camera(
         "default",
         vec3(0.05, 0.20, 0.30),
@@ -389,7 +304,7 @@ pub fn scene() -> Scene {
 }
 
 /// The position after 1. e4 e5 2. Nf3 Nc6 3. Bc4 Bc5 4. c3 Nf6 5. d3 d6.
-fn pieces(scene: &mut SceneBuilder, kit: &ChessMaterials) {
+fn pieces(scene: &mut SceneBuilder) {
     let back = [
         "rook", "knight", "bishop", "queen", "king", "bishop", "knight", "rook",
     ];
@@ -400,7 +315,7 @@ fn pieces(scene: &mut SceneBuilder, kit: &ChessMaterials) {
             (3.5 - rank as f32) * SQUARE,
         )
     };
-    for (color, material) in [kit.ivory, kit.ebony].into_iter().enumerate() {
+    for (color, material) in ["ivory", "ebony"].into_iter().enumerate() {
         let (home, forward) = if color == 0 {
             (0, FRAC_PI_2)
         } else {

@@ -1,6 +1,6 @@
 //! Laboratory glass, each piece a closed shell: outer skin, rim, inner skin.
 
-use super::mesh_builder::{Knot, MeshBuilder, SweepFrame, curve, sharp, smooth};
+use super::mesh_builder::{Knot, MeshBuilder, SweepFrame, curve, scaled_profile, sharp, smooth};
 use glam::{Vec2, Vec3, vec2, vec3};
 use std::f32::consts::TAU;
 
@@ -67,18 +67,11 @@ pub fn filling(outer: &[Knot], wall: f32, gap: f32, level: f32) -> Vec<Knot> {
 /// A conical flask of height `h`.
 pub fn erlenmeyer(h: f32, steps: usize) -> Vec<Knot> {
     curve(
-        &[
-            sharp(0.0, 0.0),
-            smooth(0.26 * h, 0.002 * h),
-            smooth(0.345 * h, 0.03 * h),
-            smooth(0.355 * h, 0.09 * h),
-            smooth(0.25 * h, 0.42 * h),
-            smooth(0.135 * h, 0.70 * h),
-            smooth(0.115 * h, 0.80 * h),
-            smooth(0.115 * h, 0.94 * h),
-            smooth(0.125 * h, 0.97 * h),
-            sharp(0.145 * h, 1.0 * h),
-        ],
+        &scaled_profile(
+            "0,0! 0.26,0.002 0.345,0.03 0.355,0.09 0.25,0.42 \
+             0.135,0.7 0.115,0.8 0.115,0.94 0.125,0.97 0.145,1!",
+            Vec2::splat(h),
+        ),
         steps,
     )
 }
@@ -104,15 +97,11 @@ pub fn round_flask(radius: f32, neck: f32, steps: usize) -> Vec<Knot> {
 /// A beaker.
 pub fn beaker(radius: f32, height: f32, steps: usize) -> Vec<Knot> {
     curve(
-        &[
-            sharp(0.0, 0.0),
-            smooth(0.82 * radius, 0.0),
-            smooth(0.97 * radius, 0.03 * height),
-            smooth(radius, 0.1 * height),
-            smooth(radius, 0.5 * height),
-            smooth(radius, 0.93 * height),
-            sharp(1.08 * radius, height),
-        ],
+        &scaled_profile(
+            "0,0! 0.82,0 0.97,0.03 1,0.1 \
+             1,0.5 1,0.93 1.08,1!",
+            vec2(radius, height),
+        ),
         steps,
     )
 }
@@ -136,18 +125,11 @@ pub fn test_tube(radius: f32, height: f32, steps: usize) -> Vec<Knot> {
 /// A reagent bottle with a shoulder.
 pub fn bottle(radius: f32, height: f32, steps: usize) -> Vec<Knot> {
     curve(
-        &[
-            sharp(0.0, 0.0),
-            smooth(0.9 * radius, 0.0),
-            smooth(radius, 0.04 * height),
-            smooth(radius, 0.3 * height),
-            smooth(radius, 0.58 * height),
-            smooth(0.88 * radius, 0.69 * height),
-            smooth(0.42 * radius, 0.80 * height),
-            smooth(0.38 * radius, 0.92 * height),
-            smooth(0.5 * radius, 0.97 * height),
-            sharp(0.5 * radius, 1.0 * height),
-        ],
+        &scaled_profile(
+            "0,0! 0.9,0 1,0.04 1,0.3 1,0.58 \
+             0.88,0.69 0.42,0.8 0.38,0.92 0.5,0.97 0.5,1!",
+            vec2(radius, height),
+        ),
         steps,
     )
 }
@@ -155,15 +137,11 @@ pub fn bottle(radius: f32, height: f32, steps: usize) -> Vec<Knot> {
 /// A ground-glass stopper that sits on y = 0.
 pub fn stopper(radius: f32) -> Vec<Knot> {
     curve(
-        &[
-            sharp(0.0, -1.1 * radius),
-            sharp(0.72 * radius, -1.1 * radius),
-            sharp(0.8 * radius, 0.0),
-            smooth(1.25 * radius, 0.25 * radius),
-            smooth(1.35 * radius, 0.8 * radius),
-            smooth(0.9 * radius, 1.5 * radius),
-            smooth(0.0, 1.7 * radius),
-        ],
+        &scaled_profile(
+            "0,-1.1! 0.72,-1.1! 0.8,0! 1.25,0.25 \
+             1.35,0.8 0.9,1.5 0,1.7",
+            Vec2::splat(radius),
+        ),
         3,
     )
 }

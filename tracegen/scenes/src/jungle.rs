@@ -10,8 +10,8 @@ use super::masonry::{carved_band, carved_stone, dressed_stone};
 use super::mesh_builder::MeshBuilder;
 use super::noise::{Rng, bank, smoothstep};
 use super::organic::{LeafShape, bark, leaf, rock, skin, soil};
-use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, Surface, rgb};
+use super::scene_builder::SceneBuilder;
+use super::texture_synth::{Maps, Recipe, Surface, rgb, tones};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::{AlphaMode, Scene};
 use std::f32::consts::TAU;
@@ -41,31 +41,14 @@ fn ground(x: f32, z: f32) -> f32 {
     bank_height + rough * (2.2 * hummocks + 0.5 * bumps) + 0.05 * bumps
 }
 
-struct Leaves {
-    ferns: [MaterialId; 2],
-    palms: [MaterialId; 2],
-    broad: [MaterialId; 2],
-    bushes: [MaterialId; 3],
-    grasses: [MaterialId; 2],
-    canopies: [MaterialId; 2],
-    ivy: MaterialId,
-}
-
-struct Solids {
-    litter: MaterialId,
-    path: MaterialId,
-    barks: [MaterialId; 2],
-    palm_bark: MaterialId,
-    liana: MaterialId,
-    rocks: [MaterialId; 2],
-    masonry: MaterialId,
-    carved: MaterialId,
-    steps: MaterialId,
-    idol: MaterialId,
-    hide: MaterialId,
-    teeth: MaterialId,
-    eye: MaterialId,
-}
+/// Materials of plants that have several.
+const FERNS: [&str; 2] = ["fern-bright", "fern-dark"];
+const BROAD: [&str; 2] = ["banana-leaf", "philodendron"];
+const BUSHES: [&str; 3] = ["bush-bright", "bush-dark", "bush-red"];
+const GRASSES: [&str; 2] = ["grass-green", "grass-dry"];
+const CANOPIES: [&str; 2] = ["canopy-near", "canopy-far"];
+const BARKS: [&str; 2] = ["bark-grey", "bark-brown"];
+const ROCKS: [&str; 2] = ["rock-mossy", "rock-bare"];
 
 fn color(name: &'static str, size: u32, surface: Surface) -> Recipe {
     Recipe::new(name, size, Maps::Color, 1.0, surface)
@@ -82,173 +65,84 @@ fn full(name: &'static str, tile_m: f32, surface: Surface) -> Recipe {
     }
 }
 
-/// Texture sets of [`Leaves`], in the order of its fields.
+/// Texture sets of leaves.
 fn leaf_textures() -> Vec<Recipe> {
     use LeafShape::{Blade, Frond, Grass, Ivy, Palm, Spray};
     vec![
-        color(
-            "fern-bright",
-            1024,
-            leaf(Frond, [rgb(0x3c6a1c), rgb(0x86ac3c)]),
-        ),
-        color(
-            "fern-dark",
-            1024,
-            leaf(Frond, [rgb(0x24491a), rgb(0x4f7d30)]),
-        ),
-        color(
-            "palm-feather",
-            1024,
-            leaf(Frond, [rgb(0x35601f), rgb(0x7d9c40)]),
-        ),
-        color("palm-fan", 1024, leaf(Palm, [rgb(0x335c22), rgb(0x6f9440)])),
-        normal(
-            "banana-leaf",
-            1.0,
-            leaf(Blade, [rgb(0x3f7a24), rgb(0x90b848)]),
-        ),
-        normal(
-            "philodendron",
-            1.0,
-            leaf(Blade, [rgb(0x1f4a24), rgb(0x467c3c)]),
-        ),
-        color(
-            "bush-bright",
-            1024,
-            leaf(Spray, [rgb(0x41701f), rgb(0x8aa83a)]),
-        ),
-        color(
-            "bush-dark",
-            1024,
-            leaf(Spray, [rgb(0x21451c), rgb(0x4a7530)]),
-        ),
-        color("bush-red", 512, leaf(Spray, [rgb(0x6d2a2c), rgb(0x9c5a3c)])),
-        color(
-            "grass-green",
-            512,
-            leaf(Grass, [rgb(0x466e22), rgb(0x94ac48)]),
-        ),
-        color(
-            "grass-dry",
-            512,
-            leaf(Grass, [rgb(0x7a6f34), rgb(0xb4a458)]),
-        ),
-        color(
-            "canopy-near",
-            1024,
-            leaf(Spray, [rgb(0x35601d), rgb(0x7ba03a)]),
-        ),
-        color(
-            "canopy-far",
-            1024,
-            leaf(Spray, [rgb(0x2a5220), rgb(0x5c8a36)]),
-        ),
-        color("ivy", 512, leaf(Ivy, [rgb(0x2a5223), rgb(0x5f8f3f)])),
+        color("fern-bright", 1024, leaf(Frond, tones(0x3c6a1c, 0x86ac3c))),
+        color("fern-dark", 1024, leaf(Frond, tones(0x24491a, 0x4f7d30))),
+        color("palm-feather", 1024, leaf(Frond, tones(0x35601f, 0x7d9c40))),
+        color("palm-fan", 1024, leaf(Palm, tones(0x335c22, 0x6f9440))),
+        normal("banana-leaf", 1.0, leaf(Blade, tones(0x3f7a24, 0x90b848))),
+        normal("philodendron", 1.0, leaf(Blade, tones(0x1f4a24, 0x467c3c))),
+        color("bush-bright", 1024, leaf(Spray, tones(0x41701f, 0x8aa83a))),
+        color("bush-dark", 1024, leaf(Spray, tones(0x21451c, 0x4a7530))),
+        color("bush-red", 512, leaf(Spray, tones(0x6d2a2c, 0x9c5a3c))),
+        color("grass-green", 512, leaf(Grass, tones(0x466e22, 0x94ac48))),
+        color("grass-dry", 512, leaf(Grass, tones(0x7a6f34, 0xb4a458))),
+        color("canopy-near", 1024, leaf(Spray, tones(0x35601d, 0x7ba03a))),
+        color("canopy-far", 1024, leaf(Spray, tones(0x2a5220, 0x5c8a36))),
+        color("ivy", 512, leaf(Ivy, tones(0x2a5223, 0x5f8f3f))),
     ]
 }
 
-/// Texture sets of [`Solids`], in the order of its fields.
+/// Texture sets of everything else.
 fn solid_textures() -> Vec<Recipe> {
-    let moss_stone = [rgb(0x8d8a72), rgb(0x6b6d55)];
+    let moss_stone = tones(0x8d8a72, 0x6b6d55);
     vec![
         full(
             "forest-floor",
             3.0,
-            soil([rgb(0x3c2f1e), rgb(0x5d4a2e)], Some(rgb(0x8a6a36)), 0.5),
+            soil(tones(0x3c2f1e, 0x5d4a2e), Some(rgb(0x8a6a36)), 0.5),
         ),
         full(
             "trodden-earth",
             2.5,
-            soil([rgb(0x6e5638), rgb(0x8a7048)], None, 1.0),
+            soil(tones(0x6e5638, 0x8a7048), None, 1.0),
         ),
-        normal("bark-grey", 2.0, bark([rgb(0x3a3026), rgb(0x84745c)], 0.7)),
-        normal("bark-brown", 2.0, bark([rgb(0x3b2818), rgb(0x7c5a3a)], 0.4)),
-        normal("palm-bark", 1.2, bark([rgb(0x4c4030), rgb(0x94826a)], 0.1)),
-        color("liana", 512, bark([rgb(0x3a2e1c), rgb(0x6a5834)], 0.6)),
-        normal("rock-mossy", 2.2, rock([rgb(0x6a665c), rgb(0x8f897c)], 1.0)),
-        normal("rock-bare", 2.2, rock([rgb(0x7a6c5a), rgb(0x9c8f7c)], 0.3)),
+        normal("bark-grey", 2.0, bark(tones(0x3a3026, 0x84745c), 0.7)),
+        normal("bark-brown", 2.0, bark(tones(0x3b2818, 0x7c5a3a), 0.4)),
+        normal("palm-bark", 1.2, bark(tones(0x4c4030, 0x94826a), 0.1)),
+        color("liana", 512, bark(tones(0x3a2e1c, 0x6a5834), 0.6)),
+        normal("rock-mossy", 2.2, rock(tones(0x6a665c, 0x8f897c), 1.0)),
+        normal("rock-bare", 2.2, rock(tones(0x7a6c5a, 0x9c8f7c), 0.3)),
         full("temple-blocks", 2.6, dressed_stone(moss_stone, 3, 6, 1.0)),
-        full(
-            "temple-frieze",
-            1.6,
-            carved_band([rgb(0x948f74), rgb(0x73745a)]),
-        ),
+        full("temple-frieze", 1.6, carved_band(tones(0x948f74, 0x73745a))),
         normal(
             "temple-steps",
             2.0,
-            dressed_stone([rgb(0x98917a), rgb(0x77745e)], 4, 5, 0.9),
+            dressed_stone(tones(0x98917a, 0x77745e), 4, 5, 0.9),
         ),
         normal(
             "idol",
             1.0,
-            carved_stone([rgb(0x7f8468), rgb(0x5b634a)], 0.2, 0.8, 0.7),
+            carved_stone(tones(0x7f8468, 0x5b634a), 0.2, 0.8, 0.7),
         ),
-        full("hide", 1.4, skin([rgb(0x857650), rgb(0x474c36)])),
+        full("hide", 1.4, skin(tones(0x857650, 0x474c36))),
     ]
 }
 
-fn materials(scene: &mut SceneBuilder) -> (Leaves, Solids) {
-    let mut sets = leaf_textures().into_iter().chain(solid_textures());
-    let mut next = |foliage: bool| match sets.next() {
-        Some(set) => scene.textured(set, |m| {
-            if foliage {
-                m.alpha = AlphaMode::Mask(0.5);
-                m.double_sided = true;
-                m.roughness = 0.6;
-            }
-        }),
-        None => scene.plain("missing", rgb(0xff_00ff), 0.8, |_| {}),
-    };
-    let leaves = Leaves {
-        ferns: [next(true), next(true)],
-        palms: [next(true), next(true)],
-        broad: [next(true), next(true)],
-        bushes: [next(true), next(true), next(true)],
-        grasses: [next(true), next(true)],
-        canopies: [next(true), next(true)],
-        ivy: next(true),
-    };
-    let [litter, path] = [next(false), next(false)];
-    let barks = [next(false), next(false)];
-    let [palm_bark, liana] = [next(false), next(false)];
-    let rocks = [next(false), next(false)];
-    let [masonry, carved, steps] = [next(false), next(false), next(false)];
-    let [idol, hide] = [next(false), next(false)];
-    let teeth = scene.plain("teeth", rgb(0xd8ceb0), 0.4, |_| {});
-    let eye = scene.plain("eye", rgb(0xc89a20), 0.1, |_| {});
-    let solids = Solids {
-        litter,
-        path,
-        barks,
-        palm_bark,
-        liana,
-        rocks,
-        masonry,
-        carved,
-        steps,
-        idol,
-        hide,
-        teeth,
-        eye,
-    };
-    (leaves, solids)
+fn materials(scene: &mut SceneBuilder) {
+    for recipe in leaf_textures() {
+        scene.textured(recipe, |m| {
+            m.alpha = AlphaMode::Mask(0.5);
+            m.double_sided = true;
+            m.roughness = 0.6;
+        });
+    }
+    for recipe in solid_textures() {
+        scene.textured(recipe, |_| {});
+    }
+    scene.plain("teeth", rgb(0xd8ceb0), 0.4, |_| {});
+    scene.plain("eye", rgb(0xc89a20), 0.1, |_| {});
 }
 
 /// The scene.
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("jungle");
-    let (leaves, solids) = materials(&mut scene);
-    terrain(&mut scene, &solids);
-    temple::build(
-        &mut scene,
-        TEMPLE,
-        &temple::Stones {
-            blocks: solids.masonry,
-            frieze: solids.carved,
-            steps: solids.steps,
-            idol: solids.idol,
-        },
-    );
+    materials(&mut scene);
+    terrain(&mut scene);
+    temple::build(&mut scene, TEMPLE);
     let Creature { hide, teeth, eyes } = creature::tyrannosaur();
     let stand = Affine3A::from_rotation_translation(
         Quat::from_rotation_y(4.3),
@@ -259,16 +153,15 @@ pub fn scene() -> Scene {
         ),
     );
     for (name, mesh, material) in [
-        ("creature", hide, solids.hide),
-        ("creature-teeth", teeth, solids.teeth),
-        ("creature-eyes", eyes, solids.eye),
+        ("creature", hide, "hide"),
+        ("creature-teeth", teeth, "teeth"),
+        ("creature-eyes", eyes, "eye"),
     ] {
-        let mesh = scene.mesh(name, mesh, material);
-        scene.place(mesh, stand);
+        scene.put(name, mesh, material, stand);
     }
     let mut rng = Rng::new(2014);
-    trees(&mut scene, &leaves, &solids, &mut rng);
-    undergrowth(&mut scene, &leaves, &solids, &mut rng);
+    trees(&mut scene, &mut rng);
+    undergrowth(&mut scene, &mut rng);
 
     let eye = |x: f32, z: f32| vec3(x, ground(x, z) + 1.65, z);
     scene.camera(
@@ -296,13 +189,13 @@ pub fn scene() -> Scene {
     scene.finish(vec3(0.55, 0.66, 0.60), 1)
 }
 
-fn terrain(scene: &mut SceneBuilder, solids: &Solids) {
+fn terrain(scene: &mut SceneBuilder) {
     let mut floor = MeshBuilder::new();
     floor.surface(72, 72, |s, t| {
         let (x, z) = (HALF * (2.0 * s - 1.0), HALF * (1.0 - 2.0 * t));
         (vec3(x, ground(x, z), z), vec2(x, z))
     });
-    scene.add("forest-floor", floor, solids.litter);
+    scene.add("forest-floor", floor, "forest-floor");
     let mut path = MeshBuilder::new();
     path.surface(8, 120, |s, t| {
         let x = -HALF + t * (HALF + 8.5);
@@ -313,7 +206,7 @@ fn terrain(scene: &mut SceneBuilder, solids: &Solids) {
         (vec3(x, ground(x, z) + lift, z), vec2(x, z))
     });
     path.orient(|_| Vec3::Y);
-    scene.add("path", path, solids.path);
+    scene.add("path", path, "trodden-earth");
 }
 
 /// Whether a plant that keeps `clear` metres from the path would be inside or in front of the
@@ -355,12 +248,12 @@ fn upright(position: Vec3, turn: f32, scale: f32) -> Affine3A {
     )
 }
 
-fn trees(scene: &mut SceneBuilder, leaves: &Leaves, solids: &Solids, rng: &mut Rng) {
+fn trees(scene: &mut SceneBuilder, rng: &mut Rng) {
     let kinds: Vec<[usize; 3]> = (0..3)
         .map(|i| {
             let (radius, height) = ([0.42, 0.55, 0.34][i], [9.5, 12.0, 8.0][i]);
             let crown = [4.6, 5.6, 3.8][i];
-            let bark = solids.barks[i % 2];
+            let bark = BARKS[i % 2];
             let trunk =
                 plants::buttressed_trunk(radius, height, [5.0, 6.0, 4.0][i], [30, 18], i as u64);
             [
@@ -373,7 +266,7 @@ fn trees(scene: &mut SceneBuilder, leaves: &Leaves, solids: &Solids, rng: &mut R
                 scene.mesh(
                     "canopy",
                     plants::canopy(height, crown, 140, rng),
-                    leaves.canopies[i % 2],
+                    CANOPIES[i % 2],
                 ),
             ]
         })
@@ -399,8 +292,8 @@ fn trees(scene: &mut SceneBuilder, leaves: &Leaves, solids: &Solids, rng: &mut R
             let (trunk, top) = plants::palm_trunk([4.2, 5.6, 3.1][i], [0.7, -1.2, 0.4][i]);
             let crown = plants::palm_crown(15, [2.3, 2.6, 1.9][i], rng);
             (
-                scene.mesh("palm-trunk", trunk, solids.palm_bark),
-                scene.mesh("palm-crown", crown, leaves.palms[0]),
+                scene.mesh("palm-trunk", trunk, "palm-bark"),
+                scene.mesh("palm-crown", crown, "palm-feather"),
                 top,
             )
         })
@@ -427,16 +320,16 @@ fn trees(scene: &mut SceneBuilder, leaves: &Leaves, solids: &Solids, rng: &mut R
             vec3(x + rng.jitter(2.0), 5.5 + rng.jitter(1.2), b),
         );
         let sag = rng.range(0.8, 2.0);
-        scene.add("liana", plants::liana(a, b, sag, 0.035), solids.liana);
+        scene.add("liana", plants::liana(a, b, sag, 0.035), "liana");
         scene.add(
             "liana-leaves",
             plants::liana_leaves(a, b, sag, 60, rng),
-            leaves.ivy,
+            "ivy",
         );
     }
 }
 
-fn undergrowth(scene: &mut SceneBuilder, leaves: &Leaves, solids: &Solids, rng: &mut Rng) {
+fn undergrowth(scene: &mut SceneBuilder, rng: &mut Rng) {
     let mut scatter = |scene: &mut SceneBuilder,
                        meshes: &[usize],
                        count: usize,
@@ -454,23 +347,11 @@ fn undergrowth(scene: &mut SceneBuilder, leaves: &Leaves, solids: &Solids, rng: 
     };
     let mut seeds = Rng::new(99);
     let ferns: Vec<usize> = (0..4)
-        .map(|i| {
-            scene.mesh(
-                "fern",
-                plants::fern(12, 0.95, &mut seeds),
-                leaves.ferns[i % 2],
-            )
-        })
+        .map(|i| scene.mesh("fern", plants::fern(12, 0.95, &mut seeds), FERNS[i % 2]))
         .collect();
     scatter(scene, &ferns, 250, 1.35, 12.0, 7.2, [0.7, 1.4]);
     let fans: Vec<usize> = (0..2)
-        .map(|_| {
-            scene.mesh(
-                "fan-palm",
-                plants::bush(16, 1.3, &mut seeds),
-                leaves.palms[1],
-            )
-        })
+        .map(|_| scene.mesh("fan-palm", plants::bush(16, 1.3, &mut seeds), "palm-fan"))
         .collect();
     scatter(scene, &fans, 50, 2.2, 14.0, 8.4, [0.8, 1.3]);
     let broad: Vec<usize> = (0..4)
@@ -478,19 +359,13 @@ fn undergrowth(scene: &mut SceneBuilder, leaves: &Leaves, solids: &Solids, rng: 
             scene.mesh(
                 "broadleaf",
                 plants::broadleaf(9, [1.7, 1.0][i % 2], &mut seeds),
-                leaves.broad[i % 2],
+                BROAD[i % 2],
             )
         })
         .collect();
     scatter(scene, &broad, 90, 1.9, 13.0, 8.0, [0.75, 1.3]);
     let bushes: Vec<usize> = (0..6)
-        .map(|i| {
-            scene.mesh(
-                "bush",
-                plants::bush(22, 0.95, &mut seeds),
-                leaves.bushes[i % 3],
-            )
-        })
+        .map(|i| scene.mesh("bush", plants::bush(22, 0.95, &mut seeds), BUSHES[i % 3]))
         .collect();
     scatter(scene, &bushes, 140, 2.0, 16.0, 7.8, [0.7, 1.6]);
     let grasses: Vec<usize> = (0..4)
@@ -498,19 +373,13 @@ fn undergrowth(scene: &mut SceneBuilder, leaves: &Leaves, solids: &Solids, rng: 
             scene.mesh(
                 "grass",
                 plants::grass(9, 0.5, 0.42, &mut seeds),
-                leaves.grasses[i % 2],
+                GRASSES[i % 2],
             )
         })
         .collect();
     scatter(scene, &grasses, 260, 1.0, 9.0, 6.6, [0.7, 1.3]);
     let rocks: Vec<usize> = (0..4)
-        .map(|i| {
-            scene.mesh(
-                "boulder",
-                plants::boulder([22, 14], i as u64),
-                solids.rocks[i % 2],
-            )
-        })
+        .map(|i| scene.mesh("boulder", plants::boulder([22, 14], i as u64), ROCKS[i % 2]))
         .collect();
     scatter(scene, &rocks, 60, 1.5, 13.0, 7.0, [0.18, 0.8]);
 }

@@ -6,109 +6,50 @@ use super::glassware::{
     beaker, bottle, erlenmeyer, filling, glass_tube, shell, stopper, test_tube,
 };
 use super::masonry::octagon_tiles;
-use super::mesh_builder::{Knot, MeshBuilder, curve, lathed, sharp, smooth};
+use super::mesh_builder::{Knot, MeshBuilder, curve, lathed, profile, sharp};
 use super::noise::smoothstep;
 use super::organic::{paper_label, polished_wood};
-use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, rgb};
+use super::scene_builder::SceneBuilder;
+use super::texture_synth::{Maps, Recipe, rgb, tones};
 use glam::{Affine3A, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-pub(super) struct LabMaterials {
-    pub(super) glass: MaterialId,
-    pub(super) amber: MaterialId,
-    pub(super) liquids: [MaterialId; 5],
-    pub(super) steel: MaterialId,
-    pub(super) brass: MaterialId,
-    pub(super) rubber: MaterialId,
-    pub(super) wood: MaterialId,
-    pub(super) bench: MaterialId,
-    pub(super) tiles: MaterialId,
-    pub(super) label: MaterialId,
-    pub(super) flame: MaterialId,
-}
+/// Liquids in the vessels.
+const LIQUIDS: [&str; 5] = [
+    "copper-sulphate",
+    "potassium-chromate",
+    "permanganate",
+    "nickel-chloride",
+    "cobalt-chloride",
+];
 
-fn kit(scene: &mut SceneBuilder) -> LabMaterials {
+fn materials(scene: &mut SceneBuilder) {
     let recipe =
         |name, size, tile_m, surface| Recipe::new(name, size, Maps::Color, tile_m, surface);
-    let mut sets = [
-        recipe(
-            "rack-beech",
-            512,
-            0.3,
-            polished_wood([rgb(0xc89a62), rgb(0x9a6c3c)], 0.45),
-        ),
-        recipe(
-            "bench-top",
-            1024,
-            0.9,
-            polished_wood([rgb(0x7d5030), rgb(0x4f2f1a)], 0.3),
-        ),
-        recipe(
-            "wall-tiles",
-            1024,
-            0.9,
-            octagon_tiles([rgb(0xe9e8e0), rgb(0xdcdcd4)], rgb(0x2f6a72), 8),
-        ),
-        recipe("label", 256, 1.0, paper_label(rgb(0xeee4c8), rgb(0x33291f))),
-    ]
-    .into_iter();
-    let mut textured = |scene: &mut SceneBuilder, roughness: f32, mirror: f32| match sets.next() {
-        Some(set) => scene.textured(set, |m| {
-            m.roughness = roughness;
-            m.mirror = mirror;
-        }),
-        None => scene.plain("missing", rgb(0xff_00ff), roughness, |_| {}),
-    };
-    let wood = textured(scene, 0.45, 0.0);
-    let bench = textured(scene, 0.25, 0.03);
-    let tiles = textured(scene, 0.2, 0.06);
-    let label = textured(scene, 0.9, 0.0);
-    let liquid = |scene: &mut SceneBuilder, name: &str, color: u32| {
-        scene.plain(name, rgb(color), 0.0, |m| {
-            m.transmission = 0.9;
-            m.ior = 1.33;
-            m.double_sided = true;
-        })
-    };
-    let glass = |scene: &mut SceneBuilder, name: &str, color: u32| {
-        scene.plain(name, rgb(color), 0.0, |m| {
-            m.transmission = 0.96;
-            m.ior = 1.47;
-            m.double_sided = true;
-        })
-    };
-    let metal = |scene: &mut SceneBuilder, name: &str, color: u32, rough: f32, mirror: f32| {
-        scene.plain(name, rgb(color), rough, |m| {
-            m.metallic = 1.0;
-            m.mirror = mirror;
-        })
-    };
-    LabMaterials {
-        glass: glass(scene, "borosilicate", 0xf6fbfa),
-        amber: glass(scene, "amber-glass", 0xb5641a),
-        liquids: [
-            liquid(scene, "copper-sulphate", 0x2a86e0),
-            liquid(scene, "potassium-chromate", 0xf0c020),
-            liquid(scene, "permanganate", 0x9a2a9a),
-            liquid(scene, "nickel-chloride", 0x35b060),
-            liquid(scene, "cobalt-chloride", 0xe04a5a),
-        ],
-        steel: metal(scene, "steel", 0xc8ccd0, 0.15, 0.55),
-        brass: metal(scene, "brass", 0xd6a84a, 0.2, 0.4),
-        rubber: scene.plain("rubber", rgb(0x2a2624), 0.85, |_| {}),
-        wood,
-        bench,
-        tiles,
-        label,
-        flame: scene.plain("flame", rgb(0x6090ff), 0.5, |m| {
-            m.emissive = vec3(0.5, 0.9, 2.6);
-            m.transmission = 0.6;
-            m.ior = 1.0;
-            m.double_sided = true;
-        }),
+    let beech = polished_wood(tones(0xc89a62, 0x9a6c3c), 0.45);
+    scene.polished(recipe("rack-beech", 512, 0.3, beech), 0.45, 0.0);
+    let top = polished_wood(tones(0x7d5030, 0x4f2f1a), 0.3);
+    scene.polished(recipe("bench-top", 1024, 0.9, top), 0.25, 0.03);
+    let tiles = octagon_tiles(tones(0xe9e8e0, 0xdcdcd4), rgb(0x2f6a72), 8);
+    scene.polished(recipe("wall-tiles", 1024, 0.9, tiles), 0.2, 0.06);
+    let label = paper_label(rgb(0xeee4c8), rgb(0x33291f));
+    scene.polished(recipe("label", 256, 1.0, label), 0.9, 0.0);
+    scene.clear("borosilicate", 0xf6fbfa, 0.96, 1.47);
+    scene.clear("amber-glass", 0xb5641a, 0.96, 1.47);
+    let colors = [0x2a86e0, 0xf0c020, 0x9a2a9a, 0x35b060, 0xe04a5a];
+    for (name, color) in LIQUIDS.into_iter().zip(colors) {
+        scene.clear(name, color, 0.9, 1.33);
     }
+    scene.metal("steel", 0xc8ccd0, 0.15, 0.55);
+    scene.metal("brass", 0xd6a84a, 0.2, 0.4);
+    scene.plain("rubber", rgb(0x2a2624), 0.85, |_| {});
+    scene.plain("flame", rgb(0x6090ff), 0.5, |m| {
+        m.emissive = vec3(0.5, 0.9, 2.6);
+        m.transmission = 0.6;
+        m.ior = 1.0;
+        m.double_sided = true;
+    });
 }
 
 pub(super) fn at(x: f32, y: f32, z: f32) -> Affine3A {
@@ -141,9 +82,9 @@ impl<'a> Ware<'a> {
 /// A turned vessel and its contents (liquid and its level), placed together.
 pub(super) fn vessel(
     scene: &mut SceneBuilder,
-    glass: MaterialId,
+    glass: &str,
     ware: &Ware<'_>,
-    fill: Option<(MaterialId, f32)>,
+    fill: Option<(&str, f32)>,
     places: &[Affine3A],
 ) {
     let &Ware {
@@ -175,12 +116,12 @@ pub(super) fn vessel(
 /// The scene.
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("lab");
-    let kit = kit(&mut scene);
-    furniture(&mut scene, &kit);
-    flasks(&mut scene, &kit);
-    rack(&mut scene, &kit);
-    still::distillation(&mut scene, &kit);
-    shelf(&mut scene, &kit);
+    materials(&mut scene);
+    furniture(&mut scene);
+    flasks(&mut scene);
+    rack(&mut scene);
+    still::distillation(&mut scene);
+    shelf(&mut scene);
     scene.camera(
         "default",
         vec3(0.02, 0.265, 0.40),
@@ -200,50 +141,50 @@ pub fn scene() -> Scene {
     scene.finish(vec3(0.32, 0.36, 0.40), 0)
 }
 
-fn furniture(scene: &mut SceneBuilder, kit: &LabMaterials) {
+fn furniture(scene: &mut SceneBuilder) {
     let mut bench = MeshBuilder::new();
     bench.block(vec3(-1.1, -0.04, -0.32), vec3(1.1, 0.0, 0.55), 0.006);
-    scene.add("bench", bench, kit.bench);
+    scene.add("bench", bench, "bench-top");
     let mut wall = MeshBuilder::new();
     wall.panel(vec3(-1.4, -0.5, -0.33), Vec3::X * 2.8, Vec3::Y * 1.6, 12, 8);
-    scene.add("wall", wall, kit.tiles);
+    scene.add("wall", wall, "wall-tiles");
 }
 
 /// Conical flasks and beakers with their contents, a rod, a dish and a funnel.
-fn flasks(scene: &mut SceneBuilder, kit: &LabMaterials) {
+fn flasks(scene: &mut SceneBuilder) {
     let flask = erlenmeyer(0.145, 3);
     vessel(
         scene,
-        kit.glass,
+        "borosilicate",
         &Ware::new(&flask, 0.0018, 47, 0.0),
-        Some((kit.liquids[0], 0.055)),
+        Some((LIQUIDS[0], 0.055)),
         &[at(-0.10, 0.0, 0.16)],
     );
     let small = erlenmeyer(0.105, 2);
     vessel(
         scene,
-        kit.glass,
+        "borosilicate",
         &Ware::new(&small, 0.0016, 40, 0.0),
-        Some((kit.liquids[4], 0.036)),
+        Some((LIQUIDS[4], 0.036)),
         &[at(0.20, 0.0, 0.185)],
     );
     let large = beaker(0.043, 0.115, 3);
     vessel(
         scene,
-        kit.glass,
+        "borosilicate",
         &Ware::new(&large, 0.0017, 47, 0.14),
-        Some((kit.liquids[1], 0.062)),
+        Some((LIQUIDS[1], 0.062)),
         &[at(0.075, 0.0, 0.155)],
     );
     let cup = beaker(0.030, 0.075, 3);
     vessel(
         scene,
-        kit.glass,
+        "borosilicate",
         &Ware::new(&cup, 0.0014, 40, 0.14),
-        Some((kit.liquids[2], 0.03)),
+        Some((LIQUIDS[2], 0.03)),
         &[at(-0.24, 0.0, 0.19)],
     );
-    graduated_cylinder(scene, kit);
+    graduated_cylinder(scene);
     // A stirring rod in the beaker and a petri dish in front of it.
     let rod = glass_tube(
         &[
@@ -254,42 +195,40 @@ fn flasks(scene: &mut SceneBuilder, kit: &LabMaterials) {
         0.4,
         16,
     );
-    scene.add("rod", rod, kit.glass);
+    scene.add("rod", rod, "borosilicate");
     let dish = beaker(0.038, 0.012, 3);
     vessel(
         scene,
-        kit.glass,
+        "borosilicate",
         &Ware::new(&dish, 0.0014, 40, 0.0),
-        Some((kit.liquids[3], 0.005)),
+        Some((LIQUIDS[3], 0.005)),
         &[at(0.0, 0.0, 0.245)],
     );
-    funnel(scene, kit);
+    funnel(scene);
 }
 
 /// The cylinder, its foot and its marks.
-fn graduated_cylinder(scene: &mut SceneBuilder, kit: &LabMaterials) {
+fn graduated_cylinder(scene: &mut SceneBuilder) {
     let cylinder = beaker(0.0155, 0.19, 3);
     vessel(
         scene,
-        kit.glass,
+        "borosilicate",
         &Ware::new(&cylinder, 0.0013, 34, 0.18),
-        Some((kit.liquids[3], 0.11)),
+        Some((LIQUIDS[3], 0.11)),
         &[at(-0.185, 0.006, 0.065)],
     );
     let mut foot = MeshBuilder::new();
     foot.lathe_shaped(
-        &[
-            sharp(0.0, 0.0),
-            sharp(0.033, 0.0),
-            sharp(0.033, 0.004),
-            smooth(0.017, 0.0058),
-            smooth(0.0, 0.0058),
-        ],
+        &profile("0,0! 0.033,0! 0.033,0.004! 0.017,0.0058 0,0.0058"),
         36,
         |a, _| 1.0 + 0.05 * (6.0 * a).cos(),
     );
-    let foot = scene.mesh("cylinder-foot", foot, kit.glass);
-    scene.place(foot, at(-0.185, 0.0, 0.065));
+    scene.put(
+        "cylinder-foot",
+        foot,
+        "borosilicate",
+        at(-0.185, 0.0, 0.065),
+    );
     let mut marks = MeshBuilder::new();
     for i in 0..18 {
         let (y, half) = (
@@ -306,20 +245,13 @@ fn graduated_cylinder(scene: &mut SceneBuilder, kit: &LabMaterials) {
         });
     }
     marks.orient(|p| vec3(p.x, 0.0, p.z));
-    let marks = scene.mesh("graduation", marks, kit.rubber);
-    scene.place(marks, at(-0.185, 0.006, 0.065));
+    scene.put("graduation", marks, "rubber", at(-0.185, 0.006, 0.065));
 }
 
-fn funnel(scene: &mut SceneBuilder, kit: &LabMaterials) {
+fn funnel(scene: &mut SceneBuilder) {
     let mut funnel = MeshBuilder::new();
     let cone = curve(
-        &[
-            sharp(0.0026, 0.0),
-            smooth(0.0034, 0.03),
-            smooth(0.005, 0.048),
-            smooth(0.030, 0.082),
-            sharp(0.031, 0.085),
-        ],
+        &profile("0.0026,0! 0.0034,0.03 0.005,0.048 0.03,0.082 0.031,0.085!"),
         4,
     );
     let mut walls = cone.clone();
@@ -329,11 +261,10 @@ fn funnel(scene: &mut SceneBuilder, kit: &LabMaterials) {
     }));
     walls.push(cone[0]);
     funnel.lathe(&walls, 32);
-    let funnel = scene.mesh("funnel", funnel, kit.glass);
-    scene.place(funnel, at(-0.10, 0.105, 0.16));
+    scene.put("funnel", funnel, "borosilicate", at(-0.10, 0.105, 0.16));
 }
 
-fn rack(scene: &mut SceneBuilder, kit: &LabMaterials) {
+fn rack(scene: &mut SceneBuilder) {
     let (x0, z) = (0.235, 0.045);
     let mut rack = MeshBuilder::new();
     rack.block(
@@ -361,16 +292,16 @@ fn rack(scene: &mut SceneBuilder, kit: &LabMaterials) {
             );
         }
     }
-    scene.add("rack", rack, kit.wood);
+    scene.add("rack", rack, "rack-beech");
     let tube = test_tube(0.0085, 0.135, 2);
     for i in 0..6 {
         let place = at(x0 + 0.0165 + 0.0335 * i as f32, 0.0135, z);
         let level = 0.035 + 0.012 * ((i * 5 % 6) as f32);
         vessel(
             scene,
-            kit.glass,
+            "borosilicate",
             &Ware::new(&tube, 0.0010, 17, 0.0),
-            Some((kit.liquids[(i * 2 + 1) % 5], level)),
+            Some((LIQUIDS[(i * 2 + 1) % 5], level)),
             &[place],
         );
     }
@@ -411,7 +342,7 @@ fn plate_with_hole(m: &mut MeshBuilder, center: Vec3, half: glam::Vec2, hole: f3
     }
 }
 
-fn shelf(scene: &mut SceneBuilder, kit: &LabMaterials) {
+fn shelf(scene: &mut SceneBuilder) {
     let mut board = MeshBuilder::new();
     board.block(vec3(-0.62, 0.262, -0.32), vec3(0.62, 0.282, -0.16), 0.003);
     for x in [-0.5, 0.0, 0.5] {
@@ -421,7 +352,7 @@ fn shelf(scene: &mut SceneBuilder, kit: &LabMaterials) {
             0.003,
         );
     }
-    scene.add("shelf", board, kit.wood);
+    scene.add("shelf", board, "rack-beech");
     let outer = bottle(0.036, 0.12, 2);
     let places =
         |xs: &[f32], y: f32, z: f32| -> Vec<Affine3A> { xs.iter().map(|x| at(*x, y, z)).collect() };
@@ -430,27 +361,27 @@ fn shelf(scene: &mut SceneBuilder, kit: &LabMaterials) {
     let low = places(&[-0.40, -0.30, 0.30, 0.42], 0.0, -0.22);
     vessel(
         scene,
-        kit.amber,
+        "amber-glass",
         &Ware::new(&outer, 0.002, 22, 0.0),
-        Some((kit.liquids[1], 0.05)),
+        Some((LIQUIDS[1], 0.05)),
         &amber,
     );
     vessel(
         scene,
-        kit.glass,
+        "borosilicate",
         &Ware::new(&outer, 0.002, 22, 0.0),
-        Some((kit.liquids[0], 0.062)),
+        Some((LIQUIDS[0], 0.062)),
         &clear,
     );
     vessel(
         scene,
-        kit.glass,
+        "borosilicate",
         &Ware::new(&outer, 0.002, 22, 0.0),
-        Some((kit.liquids[4], 0.045)),
+        Some((LIQUIDS[4], 0.045)),
         &low,
     );
     let plug = lathed(&stopper(0.0145), 12);
-    let plug = scene.mesh("glass-stopper", plug, kit.glass);
+    let plug = scene.mesh("glass-stopper", plug, "borosilicate");
     let mut label = MeshBuilder::new();
     label.surface(12, 1, |s, t| {
         let a = -FRAC_PI_2 + 1.3 * (s - 0.5);
@@ -460,7 +391,7 @@ fn shelf(scene: &mut SceneBuilder, kit: &LabMaterials) {
             vec2(s, 1.0 - t),
         )
     });
-    let label = scene.mesh("label", label, kit.label);
+    let label = scene.mesh("label", label, "label");
     for place in amber.iter().chain(&clear).chain(&low) {
         scene.place(plug, *place * at(0.0, 0.121, 0.0));
         scene.place(label, *place);

@@ -189,11 +189,7 @@ pub fn octagon_tiles(stones: [Rgb; 2], inset: Rgb, count: i32) -> Surface {
 pub fn carved_stone(stones: [Rgb; 2], veins: f32, pitting: f32, rough: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
-        let (cloud, mottle, grain) = (
-            noise.cloud.at(u, v),
-            noise.mottle.at(u, v),
-            noise.grain.at(u, v),
-        );
+        let [cloud, mottle, grain] = noise.at(u, v);
         let warp = cloud * 0.35 + mottle * 0.08;
         let ridge = 1.0 - (noise.cloud.at(u * 2.0 + warp, v + warp) - 0.5).abs() * 14.0;
         let vein = veins * smoothstep(0.2, 1.0, ridge);
@@ -220,11 +216,7 @@ pub fn carved_stone(stones: [Rgb; 2], veins: f32, pitting: f32, rough: f32) -> S
 pub fn plaster(paint: Rgb, under: Rgb, peeling: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
-        let (cloud, mottle, grain) = (
-            noise.cloud.at(u, v),
-            noise.mottle.at(u, v),
-            noise.grain.at(u, v),
-        );
+        let [cloud, mottle, grain] = noise.at(u, v);
         // Columns of noise stretched downwards look like rain streaks.
         let streak = noise.mottle.at(u * 2.0, v * 0.0 + 0.3) * noise.cloud.at(u, v * 0.5 + 0.25);
         let off = peeling * smoothstep(0.66, 0.70, cloud + 0.12 * (mottle - 0.5));

@@ -8,8 +8,8 @@ use super::masonry::{dressed_stone, plaster, roof_tiles};
 use super::mesh_builder::MeshBuilder;
 use super::noise::{Rng, bank, smoothstep};
 use super::organic::{bark, planks, rock, soil, turf, upright};
-use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, rgb};
+use super::scene_builder::SceneBuilder;
+use super::texture_synth::{Maps, Recipe, rgb, tones};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::TAU;
@@ -21,6 +21,9 @@ pub(super) const HOUSE: Vec3 = vec3(7.5, 0.0, -27.0);
 /// Distance between rows in metres.
 const ROW: f32 = 1.7;
 
+/// Materials of lavender flowers.
+const LAVENDER: [&str; 2] = ["lavender-flower", "lavender-pale"];
+
 /// Height of the ground in metres.
 pub(super) fn ground(x: f32, z: f32) -> f32 {
     let noise = bank();
@@ -30,112 +33,59 @@ pub(super) fn ground(x: f32, z: f32) -> f32 {
     yard * (1.6 * swell + hills * (0.6 + 1.4 * swell.abs())) + 0.012 * -z.min(0.0) * yard
 }
 
-pub(super) struct MeadowMaterials {
-    pub(super) field: MaterialId,
-    pub(super) grass_ground: MaterialId,
-    pub(super) walls: MaterialId,
-    pub(super) plaster: MaterialId,
-    pub(super) roof: MaterialId,
-    pub(super) wood: MaterialId,
-    pub(super) shutter: MaterialId,
-    pub(super) stone: MaterialId,
-    pub(super) bark: MaterialId,
-    pub(super) stem: MaterialId,
-    pub(super) lavender: [MaterialId; 2],
-    pub(super) grass: MaterialId,
-    pub(super) straw: MaterialId,
-    pub(super) poppy: MaterialId,
-    pub(super) leaf: MaterialId,
-    pub(super) olive: MaterialId,
-    pub(super) cypress: MaterialId,
-    pub(super) pane: MaterialId,
-}
-
-fn kit(scene: &mut SceneBuilder) -> MeadowMaterials {
+fn materials(scene: &mut SceneBuilder) {
     let recipe = |name, tile_m, surface| Recipe::new(name, 1024, Maps::Color, tile_m, surface);
-    let mut sets = [
+    for recipe in [
         recipe(
             "lavender-field",
             3.4,
-            soil([rgb(0x9a6a44), rgb(0xb98a5c)], None, 0.5),
+            soil(tones(0x9a6a44, 0xb98a5c), None, 0.5),
         ),
         recipe(
             "grassland",
             8.0,
-            turf([rgb(0x55662a), rgb(0x84883f)], rgb(0xa98a5c)),
+            turf(tones(0x55662a, 0x84883f), rgb(0xa98a5c)),
         ),
         recipe(
             "farm-stone",
             2.4,
-            dressed_stone([rgb(0xc9b28c), rgb(0xa89068)], 5, 9, 0.7),
+            dressed_stone(tones(0xc9b28c, 0xa89068), 5, 9, 0.7),
         ),
         recipe(
             "ochre-plaster",
             3.0,
             plaster(rgb(0xdcb884), rgb(0xb39a74), 0.6),
         ),
-        recipe(
-            "clay-tiles",
-            1.5,
-            roof_tiles([rgb(0xc07048), rgb(0x9a5236)]),
-        ),
+        recipe("clay-tiles", 1.5, roof_tiles(tones(0xc07048, 0x9a5236))),
         recipe(
             "door-wood",
             1.2,
-            upright(planks([rgb(0x7a5230), rgb(0x523420)], 7, 0.7)),
+            upright(planks(tones(0x7a5230, 0x523420), 7, 0.7)),
         ),
         recipe(
             "blue-shutters",
             0.8,
-            planks([rgb(0x6f92b4), rgb(0x4f7498)], 12, 0.6),
+            planks(tones(0x6f92b4, 0x4f7498), 12, 0.6),
         ),
-        recipe(
-            "field-stone",
-            1.6,
-            rock([rgb(0x9c9484), rgb(0xb8b09c)], 0.25),
-        ),
-        recipe("bark", 1.6, bark([rgb(0x4a3c2e), rgb(0x8c7a62)], 0.2)),
-    ]
-    .into_iter();
-    let mut textured = |scene: &mut SceneBuilder| match sets.next() {
-        Some(set) => scene.textured(set, |m| m.roughness = 0.9),
-        None => scene.plain("missing", rgb(0xff_00ff), 0.8, |_| {}),
-    };
-    let field = textured(scene);
-    let grass_ground = textured(scene);
-    let walls = textured(scene);
-    let plaster = textured(scene);
-    let roof = textured(scene);
-    let wood = textured(scene);
-    let shutter = textured(scene);
-    let stone = textured(scene);
-    let bark = textured(scene);
-    let leafy = |scene: &mut SceneBuilder, name: &str, color: u32| {
-        scene.plain(name, rgb(color), 0.7, |m| m.double_sided = true)
-    };
-    MeadowMaterials {
-        field,
-        grass_ground,
-        walls,
-        plaster,
-        roof,
-        wood,
-        shutter,
-        stone,
-        bark,
-        stem: leafy(scene, "lavender-stem", 0x7d9070),
-        lavender: [
-            leafy(scene, "lavender-flower", 0x7a58b8),
-            leafy(scene, "lavender-pale", 0x9678cc),
-        ],
-        grass: leafy(scene, "grass", 0x7f9a3e),
-        straw: leafy(scene, "straw", 0xc2aa60),
-        poppy: leafy(scene, "poppy", 0xd8301c),
-        leaf: leafy(scene, "oak-leaf", 0x587f30),
-        olive: leafy(scene, "olive-leaf", 0x8a9a70),
-        cypress: leafy(scene, "cypress", 0x365426),
-        pane: scene.plain("window-pane", rgb(0x20282e), 0.05, |m| m.mirror = 0.35),
+        recipe("field-stone", 1.6, rock(tones(0x9c9484, 0xb8b09c), 0.25)),
+        recipe("bark", 1.6, bark(tones(0x4a3c2e, 0x8c7a62), 0.2)),
+    ] {
+        scene.textured(recipe, |m| m.roughness = 0.9);
     }
+    for (name, color) in [
+        ("lavender-stem", 0x7d9070),
+        (LAVENDER[0], 0x7a58b8),
+        (LAVENDER[1], 0x9678cc),
+        ("grass", 0x7f9a3e),
+        ("straw", 0xc2aa60),
+        ("poppy", 0xd8301c),
+        ("oak-leaf", 0x587f30),
+        ("olive-leaf", 0x8a9a70),
+        ("cypress", 0x365426),
+    ] {
+        scene.plain(name, rgb(color), 0.7, |m| m.double_sided = true);
+    }
+    scene.plain("window-pane", rgb(0x20282e), 0.05, |m| m.mirror = 0.35);
 }
 
 fn upright_at(x: f32, z: f32, turn: f32, scale: f32) -> Affine3A {
@@ -149,14 +99,14 @@ fn upright_at(x: f32, z: f32, turn: f32, scale: f32) -> Affine3A {
 /// The scene.
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("meadow");
-    let kit = kit(&mut scene);
+    materials(&mut scene);
     let mut rng = Rng::new(600);
-    land(&mut scene, &kit);
-    house::farm_house(&mut scene, &kit);
-    garden_wall(&mut scene, &kit, &mut rng);
-    trees(&mut scene, &kit, &mut rng);
-    lavender(&mut scene, &kit, &mut rng);
-    grass_and_poppies(&mut scene, &kit, &mut rng);
+    land(&mut scene);
+    house::farm_house(&mut scene);
+    garden_wall(&mut scene, &mut rng);
+    trees(&mut scene, &mut rng);
+    lavender(&mut scene, &mut rng);
+    grass_and_poppies(&mut scene, &mut rng);
     let eye = |x: f32, z: f32| vec3(x, ground(x, z) + 1.55, z);
     scene.camera(
         "default",
@@ -183,7 +133,7 @@ pub fn scene() -> Scene {
     scene.finish(vec3(0.36, 0.52, 0.78), 0)
 }
 
-fn land(scene: &mut SceneBuilder, kit: &MeadowMaterials) {
+fn land(scene: &mut SceneBuilder) {
     let mut far = MeshBuilder::new();
     far.surface(96, 96, |s, t| {
         // Cell size grows with distance.
@@ -191,7 +141,7 @@ fn land(scene: &mut SceneBuilder, kit: &MeadowMaterials) {
         let (x, z) = (125.0 * spread(s), -10.0 - 125.0 * spread(t));
         (vec3(x, ground(x, z) - 0.05, z), vec2(x, z + 10.0))
     });
-    scene.add("grassland", far, kit.grass_ground);
+    scene.add("grassland", far, "grassland");
     let mut field = MeshBuilder::new();
     field.surface(60, 120, |s, t| {
         let (x, z) = (-17.0 + 34.0 * s, 5.2 - 26.0 * t);
@@ -202,11 +152,11 @@ fn land(scene: &mut SceneBuilder, kit: &MeadowMaterials) {
             vec2(x, z + 8.0),
         )
     });
-    scene.add("field", field, kit.field);
+    scene.add("field", field, "lavender-field");
 }
 
 /// A dry-stone wall along the edge of the yard, with a gap for the gate.
-fn garden_wall(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
+fn garden_wall(scene: &mut SceneBuilder, rng: &mut Rng) {
     let mut m = MeshBuilder::new();
     for course in 0..4 {
         let mut x = -9.0;
@@ -231,24 +181,24 @@ fn garden_wall(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
             x += w;
         }
     }
-    scene.add("garden-wall", m, kit.stone);
+    scene.add("garden-wall", m, "field-stone");
 }
 
-fn trees(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
+fn trees(scene: &mut SceneBuilder, rng: &mut Rng) {
     let oaks: Vec<[usize; 3]> = (0..3)
         .map(|i| {
             let (height, radius) = ([5.2, 4.2, 3.4][i], [3.4, 2.7, 2.3][i]);
-            let foliage = if i == 2 { kit.olive } else { kit.leaf };
+            let foliage = if i == 2 { "olive-leaf" } else { "oak-leaf" };
             [
                 scene.mesh(
                     "trunk",
                     buttressed_trunk(0.26, height, 5.0, [18, 10], 40 + i as u64),
-                    kit.bark,
+                    "bark",
                 ),
                 scene.mesh(
                     "boughs",
                     boughs(height * 0.85, radius, 8, 0.10, rng),
-                    kit.bark,
+                    "bark",
                 ),
                 scene.mesh(
                     "crown",
@@ -276,7 +226,7 @@ fn trees(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
             scene.place(mesh, place);
         }
     }
-    let spire = scene.mesh("cypress", parts::cypress(2600, 7.5, 0.85, rng), kit.cypress);
+    let spire = scene.mesh("cypress", parts::cypress(2600, 7.5, 0.85, rng), "cypress");
     for (x, z) in [
         (0.9, -24.6),
         (14.3, -22.2),
@@ -294,15 +244,15 @@ fn trees(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
     }
 }
 
-fn lavender(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
+fn lavender(scene: &mut SceneBuilder, rng: &mut Rng) {
     let bushes =
         |scene: &mut SceneBuilder, stalks: usize, spike: f32, rng: &mut Rng| -> Vec<[usize; 2]> {
             (0..4)
                 .map(|i| {
                     let [green, purple] = parts::lavender(stalks, 0.52, spike, rng);
                     [
-                        scene.mesh("lavender-stems", green, kit.stem),
-                        scene.mesh("lavender-flowers", purple, kit.lavender[i % 2]),
+                        scene.mesh("lavender-stems", green, "lavender-stem"),
+                        scene.mesh("lavender-flowers", purple, LAVENDER[i % 2]),
                     ]
                 })
                 .collect()
@@ -330,13 +280,13 @@ fn lavender(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
     }
 }
 
-fn grass_and_poppies(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut Rng) {
+fn grass_and_poppies(scene: &mut SceneBuilder, rng: &mut Rng) {
     let poppies: Vec<[usize; 2]> = (0..3)
         .map(|_| {
             let [green, red] = parts::poppy(0.42, rng);
             [
-                scene.mesh("poppy-stem", green, kit.grass),
-                scene.mesh("poppy-petals", red, kit.poppy),
+                scene.mesh("poppy-stem", green, "grass"),
+                scene.mesh("poppy-petals", red, "poppy"),
             ]
         })
         .collect();
@@ -353,7 +303,7 @@ fn grass_and_poppies(scene: &mut SceneBuilder, kit: &MeadowMaterials, rng: &mut 
     let blades = 11;
     let tufts: Vec<usize> = (0..6)
         .map(|i| {
-            let material = if i % 3 == 2 { kit.straw } else { kit.grass };
+            let material = if i % 3 == 2 { "straw" } else { "grass" };
             scene.mesh("tuft", parts::tuft(blades, 0.30, rng), material)
         })
         .collect();

@@ -46,6 +46,33 @@ pub fn sharp(x: f32, y: f32) -> Knot {
     }
 }
 
+/// An outline as text: points `x,y` separated by spaces, those with a sharp edge marked by `!`.
+///
+/// # Panics
+/// If a point has another form.
+pub fn profile(points: &str) -> Vec<Knot> {
+    scaled_profile(points, Vec2::ONE)
+}
+
+/// [`profile`] in units of `size`.
+///
+/// # Panics
+/// If a point has another form.
+pub fn scaled_profile(points: &str, size: Vec2) -> Vec<Knot> {
+    let number = |text: &str| text.parse::<f32>().expect("a coordinate is a number");
+    let knot = |point: &str| {
+        let (x, y) = point
+            .trim_end_matches('!')
+            .split_once(',')
+            .expect("a point is x,y");
+        Knot {
+            at: vec2(number(x), number(y)) * size,
+            sharp: point.ends_with('!'),
+        }
+    };
+    points.split_whitespace().map(knot).collect()
+}
+
 /// A solid of revolution; see [`MeshBuilder::lathe`].
 pub fn lathed(profile: &[Knot], segments: usize) -> MeshBuilder {
     let mut m = MeshBuilder::new();
@@ -363,6 +390,27 @@ impl MeshBuilder {
             let (frame, c) = (&frames[i / (sides + 1)], circle[i % (sides + 1)].at);
             *normal = frame.right * c.x + frame.up * c.y;
         }
+    }
+
+    /// A straight tube.
+    pub fn rod(&mut self, from: Vec3, to: Vec3, radius: f32, sides: usize) {
+        self.tube(&[(from, radius), (to, radius)], sides);
+    }
+
+    /// A closed tube through `point(sine, cosine)` of `cells` angles of a circle.
+    pub fn ring(
+        &mut self,
+        [cells, sides]: [usize; 2],
+        radius: f32,
+        point: impl Fn(f32, f32) -> Vec3,
+    ) {
+        let points: Vec<(Vec3, f32)> = (0..=cells)
+            .map(|i| {
+                let (sin, cos) = (TAU * (i % cells) as f32 / cells as f32).sin_cos();
+                (point(sin, cos), radius)
+            })
+            .collect();
+        self.tube(&points, sides);
     }
 
     /// Adds `other`, transformed.

@@ -4,11 +4,11 @@
 mod train;
 
 use super::gears::screw;
-use super::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
+use super::mesh_builder::{MeshBuilder, curve, lathed, profile, sharp};
 use super::noise::{Rng, smoothstep};
 use super::organic::{damask, polished_wood};
-use super::scene_builder::{MaterialId, SceneBuilder};
-use super::texture_synth::{Maps, Recipe, rgb};
+use super::scene_builder::SceneBuilder;
+use super::texture_synth::{Maps, Recipe, rgb, tones};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -22,82 +22,35 @@ const CYLINDER_RADIUS: f32 = 0.0115;
 /// Teeth of the comb.
 const TINES: usize = 64;
 
-pub(super) struct MusicBoxMaterials {
-    pub(super) brass: MaterialId,
-    pub(super) polished: MaterialId,
-    pub(super) steel: MaterialId,
-    pub(super) blued: MaterialId,
-    pub(super) wood: MaterialId,
-    pub(super) felt: MaterialId,
-    pub(super) table: MaterialId,
-    pub(super) ruby: MaterialId,
-}
-
-fn kit(scene: &mut SceneBuilder) -> MusicBoxMaterials {
+fn materials(scene: &mut SceneBuilder) {
     let recipe =
         |name, size, tile_m, surface| Recipe::new(name, size, Maps::Color, tile_m, surface);
-    let mut sets = [
-        recipe(
-            "rosewood",
-            1024,
-            0.25,
-            polished_wood([rgb(0x7a3f26), rgb(0x3a1a10)], 0.25),
-        ),
-        recipe(
-            "velvet",
-            512,
-            0.10,
-            damask(rgb(0x5a1424), rgb(0x74202e), 4.0),
-        ),
-        recipe(
-            "table",
-            1024,
-            0.7,
-            polished_wood([rgb(0xb98a58), rgb(0x8a6038)], 0.4),
-        ),
-    ]
-    .into_iter();
-    let mut textured = |scene: &mut SceneBuilder, roughness: f32, mirror: f32| match sets.next() {
-        Some(set) => scene.textured(set, |m| {
-            m.roughness = roughness;
-            m.mirror = mirror;
-        }),
-        None => scene.plain("missing", rgb(0xff_00ff), roughness, |_| {}),
-    };
-    let wood = textured(scene, 0.2, 0.06);
-    let felt = textured(scene, 0.95, 0.0);
-    let table = textured(scene, 0.4, 0.03);
-    let metal = |scene: &mut SceneBuilder, name: &str, color: u32, rough: f32, mirror: f32| {
-        scene.plain(name, rgb(color), rough, |m| {
-            m.metallic = 1.0;
-            m.mirror = mirror;
-        })
-    };
-    MusicBoxMaterials {
-        brass: metal(scene, "brass", 0xdcb45e, 0.22, 0.25),
-        polished: metal(scene, "polished-brass", 0xe8bf62, 0.08, 0.6),
-        steel: metal(scene, "steel", 0xcfd3d8, 0.1, 0.6),
-        blued: metal(scene, "blued-steel", 0x2f4a86, 0.15, 0.45),
-        wood,
-        felt,
-        table,
-        ruby: scene.plain("ruby", rgb(0xd01840), 0.05, |m| {
-            m.transmission = 0.6;
-            m.ior = 1.76;
-        }),
-    }
+    let rosewood = polished_wood(tones(0x7a3f26, 0x3a1a10), 0.25);
+    scene.polished(recipe("rosewood", 1024, 0.25, rosewood), 0.2, 0.06);
+    let velvet = damask(rgb(0x5a1424), rgb(0x74202e), 4.0);
+    scene.polished(recipe("velvet", 512, 0.10, velvet), 0.95, 0.0);
+    let table = polished_wood(tones(0xb98a58, 0x8a6038), 0.4);
+    scene.polished(recipe("table", 1024, 0.7, table), 0.4, 0.03);
+    scene.metal("brass", 0xdcb45e, 0.22, 0.25);
+    scene.metal("polished-brass", 0xe8bf62, 0.08, 0.6);
+    scene.metal("steel", 0xcfd3d8, 0.1, 0.6);
+    scene.metal("blued-steel", 0x2f4a86, 0.15, 0.45);
+    scene.plain("ruby", rgb(0xd01840), 0.05, |m| {
+        m.transmission = 0.6;
+        m.ior = 1.76;
+    });
 }
 
 /// The scene.
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("music-box");
-    let kit = kit(&mut scene);
-    casket(&mut scene, &kit);
-    cylinder(&mut scene, &kit);
-    comb(&mut scene, &kit);
-    train::train(&mut scene, &kit);
-    train::fittings(&mut scene, &kit);
-    train::bells(&mut scene, &kit);
+    materials(&mut scene);
+    casket(&mut scene);
+    cylinder(&mut scene);
+    comb(&mut scene);
+    train::train(&mut scene);
+    train::fittings(&mut scene);
+    train::bells(&mut scene);
     scene.camera(
         "default",
         vec3(-0.002, 0.096, 0.070),
@@ -118,7 +71,7 @@ pub fn scene() -> Scene {
 }
 
 /// A box with an open, velvet-lined lid, on a table.
-fn casket(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
+fn casket(scene: &mut SceneBuilder) {
     let (w, d, h, t) = (0.092, 0.062, 0.052, 0.007);
     let mut wood = MeshBuilder::new();
     wood.block(vec3(-w, 0.0, -d), vec3(w, 0.006, d), 0.0015);
@@ -133,15 +86,7 @@ fn casket(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         );
         for z in [-d + 0.012, d - 0.012] {
             let foot = lathed(
-                &curve(
-                    &[
-                        sharp(0.0, -0.009),
-                        smooth(0.006, -0.008),
-                        smooth(0.008, -0.004),
-                        sharp(0.006, 0.0),
-                    ],
-                    3,
-                ),
+                &curve(&profile("0,-0.009! 0.006,-0.008 0.008,-0.004 0.006,0!"), 3),
                 24,
             );
             wood.merge(
@@ -150,7 +95,7 @@ fn casket(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
             );
         }
     }
-    scene.add("casket", wood, kit.wood);
+    scene.add("casket", wood, "rosewood");
     // The lid leans back at its hinges.
     let hinge = Affine3A::from_rotation_translation(Quat::from_rotation_x(-1.95), vec3(0.0, h, -d));
     let mut lid = MeshBuilder::new();
@@ -169,8 +114,7 @@ fn casket(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         vec3(w - t, 0.0, 2.0 * d),
         0.0012,
     );
-    let lid = scene.mesh("lid", lid, kit.wood);
-    scene.place(lid, hinge);
+    scene.put("lid", lid, "rosewood", hinge);
     let mut lining = MeshBuilder::new();
     lining.quad(
         vec3(-w + t, -0.0006, t),
@@ -178,8 +122,7 @@ fn casket(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         Vec3::Z * 2.0 * (d - t),
         vec2(0.0, 0.0),
     );
-    let lining = scene.mesh("lining", lining, kit.felt);
-    scene.place(lining, hinge);
+    scene.put("lining", lining, "velvet", hinge);
     let mut bed = MeshBuilder::new();
     bed.panel(
         vec3(-w + t, 0.0066, d - t),
@@ -188,18 +131,17 @@ fn casket(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         8,
         6,
     );
-    scene.add("velvet", bed, kit.felt);
+    scene.add("velvet", bed, "velvet");
     let mut barrel = MeshBuilder::new();
     for x in [-0.06, 0.06] {
-        barrel.tube(
-            &[
-                (vec3(x - 0.01, h, -d - 0.001), 0.002),
-                (vec3(x + 0.01, h, -d - 0.001), 0.002),
-            ],
+        barrel.rod(
+            vec3(x - 0.01, h, -d - 0.001),
+            vec3(x + 0.01, h, -d - 0.001),
+            0.002,
             14,
         );
     }
-    scene.add("hinges", barrel, kit.polished);
+    scene.add("hinges", barrel, "polished-brass");
     let mut table = MeshBuilder::new();
     table.panel(
         vec3(-0.7, -0.009, 0.6),
@@ -208,14 +150,14 @@ fn casket(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         10,
         10,
     );
-    scene.add("table", table, kit.table);
+    scene.add("table", table, "table");
 }
 
-fn cylinder(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
+fn cylinder(scene: &mut SceneBuilder) {
     let along_x = Quat::from_rotation_z(-FRAC_PI_2);
     let mut drum = MeshBuilder::new();
     let (r, half) = (CYLINDER_RADIUS, CYLINDER_HALF);
-    let profile = [
+    let outline = [
         sharp(0.0, -half - 0.004),
         sharp(0.0022, -half - 0.004),
         sharp(0.0022, -half),
@@ -227,17 +169,16 @@ fn cylinder(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         sharp(0.0022, half + 0.004),
         sharp(0.0, half + 0.004),
     ];
-    drum.lathe(&profile, 96);
-    let drum = scene.mesh("cylinder", drum, kit.polished);
-    scene.place(drum, Affine3A::from_rotation_translation(along_x, CYLINDER));
+    drum.lathe(&outline, 96);
+    scene.put(
+        "cylinder",
+        drum,
+        "polished-brass",
+        Affine3A::from_rotation_translation(along_x, CYLINDER),
+    );
     // Pins: a melody of chords and runs on the tracks of the comb's tines.
     let pin = lathed(
-        &[
-            sharp(0.00022, -0.0004),
-            sharp(0.0002, 0.0010),
-            smooth(0.00013, 0.00125),
-            smooth(0.0, 0.00132),
-        ],
+        &profile("0.00022,-0.0004! 0.0002,0.001! 0.00013,0.00125 0,0.00132"),
         6,
     );
     let mut rng = Rng::new(1796);
@@ -260,7 +201,7 @@ fn cylinder(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
             pins.merge(&pin, Affine3A::from_rotation_translation(lean, at));
         }
     }
-    scene.add("pins", pins, kit.steel);
+    scene.add("pins", pins, "steel");
 }
 
 /// Position of a tine (and its track of pins) along x.
@@ -270,7 +211,7 @@ fn tine_x(tine: usize) -> f32 {
 }
 
 /// The comb: tines cut to length, lead weights under the bass, held by a clamp with screws.
-fn comb(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
+fn comb(scene: &mut SceneBuilder) {
     let mut steel = MeshBuilder::new();
     let tip = CYLINDER.z + CYLINDER_RADIUS + 0.0011;
     let root = tip + 0.0235;
@@ -332,7 +273,7 @@ fn comb(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         vec3(x1, y + 0.0011, root + 0.010),
         0.0003,
     );
-    scene.add("comb", steel, kit.steel);
+    scene.add("comb", steel, "steel");
     let mut clamp = MeshBuilder::new();
     clamp.block(
         vec3(x0 - 0.001, y + 0.0011, root + 0.002),
@@ -344,8 +285,8 @@ fn comb(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         vec3(x1 + 0.001, y - 0.0011, root + 0.011),
         0.0008,
     );
-    scene.add("comb-clamp", clamp, kit.brass);
-    let head = scene.mesh("clamp-screw", screw(0.0023), kit.blued);
+    scene.add("comb-clamp", clamp, "brass");
+    let head = scene.mesh("clamp-screw", screw(0.0023), "blued-steel");
     for i in 0..7 {
         let x = x0 + (x1 - x0) * (i as f32 + 0.5) / 7.0;
         let turn = Quat::from_rotation_y(1.3 * i as f32);

@@ -184,6 +184,13 @@ pub struct NoiseBank {
     pub pebble: Field,
 }
 
+impl NoiseBank {
+    /// Clouds, mottling and grain at (`u`, `v`).
+    pub fn at(&self, u: f32, v: f32) -> [f32; 3] {
+        [&self.cloud, &self.mottle, &self.grain].map(|field| field.at(u, v))
+    }
+}
+
 /// The shared fields, computed at first use.
 pub fn bank() -> &'static NoiseBank {
     static BANK: OnceLock<NoiseBank> = OnceLock::new();

@@ -249,11 +249,7 @@ fn grass(x: f32, y: f32) -> (f32, f32) {
 pub fn soil(colors: [Rgb; 2], litter: Option<Rgb>, stones: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
-        let (cloud, mottle, grain) = (
-            noise.cloud.at(u, v),
-            noise.mottle.at(u, v),
-            noise.grain.at(u, v),
-        );
+        let [cloud, mottle, grain] = noise.at(u, v);
         let pebble =
             stones * smoothstep(0.42, 0.2, noise.pebble.at(u, v)) * smoothstep(0.4, 0.6, mottle);
         let mut color = shade(
@@ -285,11 +281,7 @@ pub fn soil(colors: [Rgb; 2], litter: Option<Rgb>, stones: f32) -> Surface {
 pub fn rock(colors: [Rgb; 2], moss: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
-        let (cloud, mottle, grain) = (
-            noise.cloud.at(u, v),
-            noise.mottle.at(u, v),
-            noise.grain.at(u, v),
-        );
+        let [cloud, mottle, grain] = noise.at(u, v);
         let warp = 0.3 * cloud;
         let crack = smoothstep(
             0.06,
@@ -360,11 +352,7 @@ pub fn damask(ground: Rgb, figure: Rgb, pattern: f32) -> Surface {
 pub fn metal(color: Rgb, oxide: Rgb, patina: f32, rough: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
-        let (cloud, mottle, grain) = (
-            noise.cloud.at(u, v),
-            noise.mottle.at(u, v),
-            noise.grain.at(u, v),
-        );
+        let [cloud, mottle, grain] = noise.at(u, v);
         let scratch = noise.grain.at(u * 0.125 + 0.2 * cloud, v * 2.0);
         let rust = patina * smoothstep(0.4, 0.65, 0.6 * cloud + 0.4 * mottle);
         let bare = shade(color, 0.85 + 0.2 * scratch);
@@ -402,11 +390,7 @@ pub fn turf(colors: [Rgb; 2], earth: Rgb) -> Surface {
 pub fn skin(colors: [Rgb; 2]) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
-        let (cloud, mottle, grain) = (
-            noise.cloud.at(u, v),
-            noise.mottle.at(u, v),
-            noise.grain.at(u, v),
-        );
+        let [cloud, mottle, grain] = noise.at(u, v);
         let scale = noise.pebble.at(u * 3.0 + 0.02 * mottle, v * 3.0);
         let fold = noise.pebble.at(u + 0.05 * cloud, v + 0.05 * cloud);
         let bump = 1.0 - scale.min(1.0);

@@ -1,18 +1,12 @@
 //! Assembles materials, meshes, instances, cameras and lights into a scene.
 
 use super::mesh_builder::MeshBuilder;
-use super::texture_synth::{Map, Recipe, Rgb, linear};
+use super::texture_synth::{Map, Recipe, Rgb, linear, rgb};
 use glam::{Affine3A, Vec3};
 use scene::{
     Camera, Instance, Light, Material, Motion, Movement, Scene, TextureRef, TextureSlot, Textures,
 };
-
-/// A material's index and properties for meshes.
-#[derive(Clone, Copy, Debug)]
-pub struct MaterialId {
-    index: usize,
-    tile_m: f32,
-}
+use std::collections::HashMap;
 
 /// A scene under construction.
 pub struct SceneBuilder {
@@ -32,14 +26,10 @@ impl SceneBuilder {
         }
     }
 
-    /// Adds a material.
-    pub fn material(&mut self, material: Material, tile_m: f32) -> MaterialId {
+    /// Adds a material. Meshes refer to it by its name.
+    fn material(&mut self, material: Material, tile_m: f32) {
         self.scene.materials.push(material);
         self.tile_m.push(tile_m);
-        MaterialId {
-            index: self.scene.materials.len() - 1,
-            tile_m,
-        }
     }
 
     /// Adds an untextured material with an sRGB colour and a roughness. `adjust` can change the
@@ -50,7 +40,7 @@ impl SceneBuilder {
         color: Rgb,
         roughness: f32,
         adjust: impl FnOnce(&mut Material),
-    ) -> MaterialId {
+    ) {
         let mut material = Material {
             name: name.to_owned(),
             base_color: linear(color).extend(1.0),
@@ -58,11 +48,36 @@ impl SceneBuilder {
             ..Material::default()
         };
         adjust(&mut material);
-        self.material(material, 1.0)
+        self.material(material, 1.0);
+    }
+
+    /// Adds bare metal that mirrors a fraction of the light.
+    pub fn metal(&mut self, name: &str, color: u32, roughness: f32, mirror: f32) {
+        self.plain(name, rgb(color), roughness, |m| {
+            m.metallic = 1.0;
+            m.mirror = mirror;
+        });
+    }
+
+    /// Adds glass or a liquid, seen from both sides.
+    pub fn clear(&mut self, name: &str, color: u32, transmission: f32, ior: f32) {
+        self.plain(name, rgb(color), 0.0, |m| {
+            m.transmission = transmission;
+            m.ior = ior;
+            m.double_sided = true;
+        });
+    }
+
+    /// Adds a material with its textures, a roughness and a mirrored fraction of the light.
+    pub fn polished(&mut self, recipe: Recipe, roughness: f32, mirror: f32) {
+        self.textured(recipe, |m| {
+            m.roughness = roughness;
+            m.mirror = mirror;
+        });
     }
 
     /// Adds a material with its textures. `adjust` can change the rest.
-    pub fn textured(&mut self, recipe: Recipe, adjust: impl FnOnce(&mut Material)) -> MaterialId {
+    pub fn textured(&mut self, recipe: Recipe, adjust: impl FnOnce(&mut Material)) {
         let (name, tile_m, maps) = (recipe.name, recipe.tile_m, recipe.maps);
         let source = recipe.into_source(&self.scene.name);
         let images = &mut self.scene.images;
@@ -97,14 +112,20 @@ impl SceneBuilder {
             ..Material::default()
         };
         adjust(&mut material);
-        self.material(material, tile_m)
+        self.material(material, tile_m);
     }
 
     /// Adds a mesh that is not placed yet; returns its index.
-    pub fn mesh(&mut self, name: &str, mesh: MeshBuilder, material: MaterialId) -> usize {
-        self.scene
-            .meshes
-            .push(mesh.finish(name, material.index, material.tile_m));
+    ///
+    /// # Panics
+    /// If no material has that name.
+    pub fn mesh(&mut self, name: &str, mesh: MeshBuilder, material: &str) -> usize {
+        let mut materials = self.scene.materials.iter();
+        let Some(material) = materials.position(|known| known.name == material) else {
+            panic!("{}/{name}: no material {material}", self.scene.name);
+        };
+        let mesh = mesh.finish(name, material, self.tile_m[material]);
+        self.scene.meshes.push(mesh);
         self.scene.meshes.len() - 1
     }
 
@@ -121,10 +142,15 @@ impl SceneBuilder {
         });
     }
 
-    /// Adds a mesh and places it without a transform.
-    pub fn add(&mut self, name: &str, mesh: MeshBuilder, material: MaterialId) {
+    /// Adds a mesh and places it once.
+    pub fn put(&mut self, name: &str, mesh: MeshBuilder, material: &str, place: Affine3A) {
         let mesh = self.mesh(name, mesh, material);
-        self.place(mesh, Affine3A::IDENTITY);
+        self.place(mesh, place);
+    }
+
+    /// Adds a mesh and places it without a transform.
+    pub fn add(&mut self, name: &str, mesh: MeshBuilder, material: &str) {
+        self.put(name, mesh, material, Affine3A::IDENTITY);
     }
 
     /// Adds a camera; the first is the default one.
@@ -158,6 +184,14 @@ impl SceneBuilder {
         self.scene.sky = sky;
         self.scene.shadow_cascades = shadow_cascades;
         self.scene
+    }
+
+    /// Mesh numbers by name.
+    pub fn mesh_numbers(&self) -> HashMap<String, usize> {
+        let meshes = self.scene.meshes.iter().zip(0..);
+        meshes
+            .map(|(mesh, number)| (mesh.name.clone(), number))
+            .collect()
     }
 
     /// Triangles placed so far.

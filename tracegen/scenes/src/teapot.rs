@@ -6,8 +6,8 @@ use super::masonry::checker;
 use super::mesh_builder::MeshBuilder;
 use super::organic::polished_wood;
 use super::scene_builder::SceneBuilder;
-use super::texture_synth::{Maps, Recipe, rgb};
-use glam::{Affine3A, Vec3, vec2, vec3};
+use super::texture_synth::{Maps, Recipe, rgb, tones};
+use glam::{Vec3, vec2, vec3};
 use patches::PATCHES;
 use scene::Scene;
 
@@ -34,8 +34,10 @@ fn bezier(patch: &[[f32; 3]; 16], u: f32, v: f32) -> Vec3 {
 /// The tessellated teapot, foot at y = 0, spout along +x.
 pub fn teapot() -> MeshBuilder {
     let mut m = MeshBuilder::new();
-    for patch in &PATCHES {
-        m.surface(CELLS, CELLS, |u, v| (bezier(patch, u, v), vec2(u, v) * 0.2));
+    for patch in PATCHES.iter().flat_map(|(copies, patch)| copies.of(patch)) {
+        m.surface(CELLS, CELLS, |u, v| {
+            (bezier(&patch, u, v), vec2(u, v) * 0.2)
+        });
     }
     m
 }
@@ -44,44 +46,27 @@ pub fn teapot() -> MeshBuilder {
 pub fn scene() -> Scene {
     let mut scene = SceneBuilder::new("teapot");
     let recipe = |name, tile_m, surface| Recipe::new(name, 512, Maps::ColorNormal, tile_m, surface);
-    let mut sets = [
-        recipe(
-            "checker-floor",
-            0.8,
-            checker([rgb(0xe8e2d6), rgb(0x30343c)], 8),
-        ),
-        recipe(
-            "table-edge",
-            0.6,
-            polished_wood([rgb(0x8a5a34), rgb(0x5a3518)], 0.4),
-        ),
-    ]
-    .into_iter();
-    let glaze = scene.plain("glaze", rgb(0xc9482e), 0.12, |m| {
+    scene.plain("glaze", rgb(0xc9482e), 0.12, |m| {
         m.mirror = 0.08;
         m.double_sided = true;
     });
-    scene.add("teapot", teapot(), glaze);
-    if let (Some(tiles), Some(wood)) = (sets.next(), sets.next()) {
-        let floor = scene.textured(tiles, |m| {
-            m.roughness = 0.15;
-            m.mirror = 0.2;
-        });
-        let mut top = MeshBuilder::new();
-        top.panel(
-            vec3(-0.8, 0.0, 0.8),
-            Vec3::X * 1.6,
-            Vec3::NEG_Z * 1.6,
-            18,
-            18,
-        );
-        scene.add("table-top", top, floor);
-        let wood = scene.textured(wood, |m| m.roughness = 0.35);
-        let mut edge = MeshBuilder::new();
-        edge.block(vec3(-0.86, -0.09, -0.86), vec3(0.86, -0.004, 0.86), 0.015);
-        let edge = scene.mesh("table-edge", edge, wood);
-        scene.place(edge, Affine3A::IDENTITY);
-    }
+    scene.add("teapot", teapot(), "glaze");
+    let tiles = checker(tones(0xe8e2d6, 0x30343c), 8);
+    scene.polished(recipe("checker-floor", 0.8, tiles), 0.15, 0.2);
+    let mut top = MeshBuilder::new();
+    top.panel(
+        vec3(-0.8, 0.0, 0.8),
+        Vec3::X * 1.6,
+        Vec3::NEG_Z * 1.6,
+        18,
+        18,
+    );
+    scene.add("table-top", top, "checker-floor");
+    let wood = polished_wood(tones(0x8a5a34, 0x5a3518), 0.4);
+    scene.polished(recipe("table-edge", 0.6, wood), 0.35, 0.0);
+    let mut edge = MeshBuilder::new();
+    edge.block(vec3(-0.86, -0.09, -0.86), vec3(0.86, -0.004, 0.86), 0.015);
+    scene.add("table-edge", edge, "table-edge");
     scene.camera(
         "default",
         vec3(0.10, 0.24, 0.31),

@@ -15,6 +15,11 @@ pub fn rgb(hex: u32) -> Rgb {
     [hex >> 16, hex >> 8, hex].map(|c| (c & 255) as f32 / 255.0)
 }
 
+/// The colours with two codes 0xRRGGBB, between which a surface varies.
+pub fn tones(a: u32, b: u32) -> [Rgb; 2] {
+    [a, b].map(rgb)
+}
+
 /// Linear mix of two colours.
 pub fn mix(a: Rgb, b: Rgb, t: f32) -> Rgb {
     std::array::from_fn(|i| lerp(a[i], b[i], t))

@@ -2,7 +2,7 @@
 
 use super::materials::Palette;
 use super::parts::{arching_leaf, drape, lion_medallion, pot, rosette};
-use crate::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
+use crate::mesh_builder::{MeshBuilder, curve, lathed, profile};
 use crate::noise::Rng;
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec3};
@@ -38,10 +38,7 @@ fn drapes(scene: &mut SceneBuilder, p: &Palette) {
         })
         .collect();
     let mut rod = MeshBuilder::new();
-    rod.tube(
-        &[(vec3(-1.4, 0.02, 0.0), 0.02), (vec3(1.4, 0.02, 0.0), 0.02)],
-        10,
-    );
+    rod.rod(vec3(-1.4, 0.02, 0.0), vec3(1.4, 0.02, 0.0), 0.02, 10);
     let rod = scene.mesh("curtain-rod", rod, p.lamp);
     for (i, bay) in [-3, -1, 0, 2].into_iter().enumerate() {
         for (s, side) in [-1.0f32, 1.0].into_iter().enumerate() {
@@ -103,10 +100,7 @@ fn drapes(scene: &mut SceneBuilder, p: &Palette) {
 fn plants(scene: &mut SceneBuilder, p: &Palette) {
     let mut rng = Rng::new(77);
     let pot_mesh = scene.mesh("pot", pot(20, 1), p.pot);
-    let earth = lathed(
-        &[sharp(0.86, 0.88), smooth(0.4, 0.92), smooth(0.0, 0.93)],
-        20,
-    );
+    let earth = lathed(&profile("0.86,0.88! 0.4,0.92 0,0.93"), 20);
     let earth = scene.mesh("earth", earth, p.earth);
     let bushes: Vec<usize> = (0..3)
         .map(|_| scene.mesh("plant", rosette(26, 0.95, 0.17, [2, 6], &mut rng), p.leaf))
@@ -182,27 +176,14 @@ fn reliefs(scene: &mut SceneBuilder, p: &Palette) {
 
 fn lamps(scene: &mut SceneBuilder, p: &Palette) {
     let mut lamp = MeshBuilder::new();
-    let body = [
-        sharp(0.0, 0.0),
-        smooth(0.05, 0.02),
-        smooth(0.14, 0.10),
-        sharp(0.17, 0.20),
-        smooth(0.15, 0.26),
-        smooth(0.07, 0.36),
-        sharp(0.03, 0.42),
-        sharp(0.0, 0.44),
-    ];
+    let body = profile("0,0! 0.05,0.02 0.14,0.1 0.17,0.2! 0.15,0.26 0.07,0.36 0.03,0.42! 0,0.44!");
     lamp.lathe(&curve(&body, 3), 16);
     for i in 0..12 {
         let y = 0.44 + i as f32 * 0.06;
         let tilt = if i % 2 == 0 { Vec3::X } else { Vec3::Z };
-        let ring: Vec<(Vec3, f32)> = (0..=6)
-            .map(|k| {
-                let (sin, cos) = (TAU * (k % 6) as f32 / 6.0).sin_cos();
-                (Vec3::Y * (y + 0.04 * sin) + tilt * (0.016 * cos), 0.005)
-            })
-            .collect();
-        lamp.tube(&ring, 3);
+        lamp.ring([6, 3], 0.005, |sin, cos| {
+            Vec3::Y * (y + 0.04 * sin) + tilt * (0.016 * cos)
+        });
     }
     let mesh = scene.mesh("lamp", lamp, p.lamp);
     for i in [-4, -2, 0, 2] {
@@ -221,30 +202,11 @@ fn lamps(scene: &mut SceneBuilder, p: &Palette) {
 
 fn fountain(scene: &mut SceneBuilder, p: &Palette) {
     let mut basin = MeshBuilder::new();
-    let outer = [
-        sharp(1.35, 0.0),
-        sharp(1.35, 0.12),
-        smooth(1.18, 0.16),
-        smooth(1.12, 0.34),
-        sharp(1.2, 0.46),
-        smooth(1.26, 0.5),
-        sharp(1.22, 0.55),
-        sharp(1.04, 0.55),
-        smooth(1.0, 0.4),
-        sharp(0.96, 0.22),
-        sharp(0.3, 0.2),
-        smooth(0.2, 0.3),
-        smooth(0.13, 0.6),
-        smooth(0.16, 0.84),
-        smooth(0.36, 0.98),
-        sharp(0.58, 1.08),
-        sharp(0.56, 1.11),
-        smooth(0.3, 1.03),
-        sharp(0.08, 1.0),
-        smooth(0.07, 1.14),
-        smooth(0.1, 1.22),
-        smooth(0.0, 1.32),
-    ];
+    let outer = profile(
+        "1.35,0! 1.35,0.12! 1.18,0.16 1.12,0.34 1.2,0.46! 1.26,0.5 1.22,0.55! 1.04,0.55! 1,0.4 \
+        0.96,0.22! 0.3,0.2! 0.2,0.3 0.13,0.6 0.16,0.84 0.36,0.98 0.58,1.08! 0.56,1.11! 0.3,1.03 \
+        0.08,1! 0.07,1.14 0.1,1.22 0,1.32",
+    );
     basin.lathe_shaped(&curve(&outer, 2), 48, |angle, y| {
         if y > 0.86 {
             1.0 + 0.05 * (12.0 * angle).cos()
@@ -252,6 +214,10 @@ fn fountain(scene: &mut SceneBuilder, p: &Palette) {
             1.0
         }
     });
-    let mesh = scene.mesh("fountain", basin, p.rail);
-    scene.place(mesh, at(vec3(5.25, 0.0, 0.0), 0.0, 1.0));
+    scene.put(
+        "fountain",
+        basin,
+        p.rail,
+        at(vec3(5.25, 0.0, 0.0), 0.0, 1.0),
+    );
 }

@@ -4,91 +4,91 @@ use crate::masonry::{
     brick, carved_band, carved_stone, dressed_stone, octagon_tiles, plaster, roof_tiles, slabs,
 };
 use crate::organic::{LeafShape, damask, leaf, metal, planks, soil, upright};
-use crate::scene_builder::{MaterialId, SceneBuilder};
-use crate::texture_synth::{Maps, Recipe, Surface, rgb};
+use crate::scene_builder::SceneBuilder;
+use crate::texture_synth::{Maps, Recipe, Surface, rgb, tones};
 use scene::AlphaMode;
 
 /// The materials of the architecture.
 #[derive(Clone, Copy, Debug)]
 pub struct Palette {
     /// Slabs of the open court.
-    pub court_floor: MaterialId,
+    pub court_floor: &'static str,
     /// Tiles of the arcades and galleries.
-    pub arcade_floor: MaterialId,
+    pub arcade_floor: &'static str,
     /// Outer wall of the ground floor.
-    pub wall_low: MaterialId,
+    pub wall_low: &'static str,
     /// Stone base of the outer wall.
-    pub dado: MaterialId,
+    pub dado: &'static str,
     /// Outer wall of the upper floor.
-    pub wall_high: MaterialId,
+    pub wall_high: &'static str,
     /// Wall above the arches.
-    pub spandrel: MaterialId,
+    pub spandrel: &'static str,
     /// Lower columns.
-    pub shaft: MaterialId,
+    pub shaft: &'static str,
     /// Upper columns.
-    pub shaft_high: MaterialId,
+    pub shaft_high: &'static str,
     /// Capitals.
-    pub capital: MaterialId,
+    pub capital: &'static str,
     /// Voussoirs.
-    pub arch: MaterialId,
+    pub arch: &'static str,
     /// Vaults.
-    pub vault: MaterialId,
+    pub vault: &'static str,
     /// Ribs and pilasters.
-    pub rib: MaterialId,
+    pub rib: &'static str,
     /// Cornices.
-    pub cornice: MaterialId,
+    pub cornice: &'static str,
     /// Balustrades.
-    pub rail: MaterialId,
+    pub rail: &'static str,
     /// Roof.
-    pub roof: MaterialId,
+    pub roof: &'static str,
     /// Beams and upper ceilings.
-    pub beam: MaterialId,
+    pub beam: &'static str,
     /// Doors and shutters.
-    pub door: MaterialId,
+    pub door: &'static str,
     /// Drapes in three colours.
-    pub drapes: [MaterialId; 3],
+    pub drapes: [&'static str; 3],
     /// Leaves in pots.
-    pub leaf: MaterialId,
+    pub leaf: &'static str,
     /// Trailing ivy.
-    pub ivy: MaterialId,
+    pub ivy: &'static str,
     /// Pots.
-    pub pot: MaterialId,
+    pub pot: &'static str,
     /// Earth in pots.
-    pub earth: MaterialId,
+    pub earth: &'static str,
     /// Reliefs.
-    pub medallion: MaterialId,
+    pub medallion: &'static str,
     /// Lamps.
-    pub lamp: MaterialId,
+    pub lamp: &'static str,
 }
 
 fn recipe(name: &'static str, maps: Maps, tile_m: f32, surface: Surface) -> Recipe {
     Recipe::new(name, 1024, maps, tile_m, surface)
 }
 
-/// Texture sets of floors, walls and roofs, in the order of the [`Palette`].
+/// Texture sets of floors, walls and roofs.
 fn masonry_textures() -> Vec<Recipe> {
     use Maps::{Full, FullOcclusion};
-    let sand = [rgb(0xcdb894), rgb(0xb39b74)];
-    let cream = [rgb(0xd9cbb0), rgb(0xc2ae8c)];
-    let grey = [rgb(0xaaa499), rgb(0x8d867b)];
+    let sand = tones(0xcdb894, 0xb39b74);
+    let cream = tones(0xd9cbb0, 0xc2ae8c);
+    let grey = tones(0xaaa499, 0x8d867b);
     vec![
         recipe(
             "court-slabs",
             FullOcclusion,
             3.0,
-            slabs([rgb(0xb7a88e), rgb(0x94866d)], 4, 6, 0.55),
+            slabs(tones(0xb7a88e, 0x94866d), 4, 6, 0.55),
         ),
         recipe(
             "arcade-tiles",
             Full,
             2.4,
-            octagon_tiles([rgb(0xc4a583), rgb(0xa7795a)], rgb(0x4b3c36), 6),
+            octagon_tiles(tones(0xc4a583, 0xa7795a), rgb(0x4b3c36), 6),
         ),
         recipe(
             "brick",
             FullOcclusion,
             2.4,
-            brick([rgb(0xa8674a), rgb(0x8a4f3a)]),
+            brick(tones(0xa8674a, 0x8a4f3a)),
         ),
         recipe("dado-stone", Full, 2.4, dressed_stone(grey, 3, 4, 0.8)),
         recipe(
@@ -107,13 +107,13 @@ fn masonry_textures() -> Vec<Recipe> {
             "limestone",
             Full,
             2.1,
-            carved_stone([rgb(0xd2c0a0), rgb(0xbda680)], 0.15, 0.8, 0.75),
+            carved_stone(tones(0xd2c0a0, 0xbda680), 0.15, 0.8, 0.75),
         ),
         recipe(
             "veined-marble",
             Full,
             1.6,
-            carved_stone([rgb(0xdcd3c2), rgb(0xc0ab98)], 0.6, 0.15, 0.35),
+            carved_stone(tones(0xdcd3c2, 0xc0ab98), 0.6, 0.15, 0.35),
         ),
         recipe(
             "capital-stone",
@@ -132,7 +132,7 @@ fn masonry_textures() -> Vec<Recipe> {
             "rib-stone",
             Full,
             2.0,
-            dressed_stone([rgb(0xbfae8e), rgb(0xa8946f)], 4, 5, 0.4),
+            dressed_stone(tones(0xbfae8e, 0xa8946f), 4, 5, 0.4),
         ),
         recipe("carved-cornice", FullOcclusion, 1.75, carved_band(cream)),
         recipe("rail-stone", Full, 1.8, carved_stone(grey, 0.1, 1.0, 0.8)),
@@ -140,12 +140,12 @@ fn masonry_textures() -> Vec<Recipe> {
             "roof-tiles",
             Full,
             2.6,
-            roof_tiles([rgb(0xb5643e), rgb(0x8f4a30)]),
+            roof_tiles(tones(0xb5643e, 0x8f4a30)),
         ),
     ]
 }
 
-/// Texture sets of the furnishing, in the order of the [`Palette`].
+/// Texture sets of the furnishing.
 fn furnishing_textures() -> Vec<Recipe> {
     use Maps::Full;
     vec![
@@ -153,13 +153,13 @@ fn furnishing_textures() -> Vec<Recipe> {
             "old-beams",
             Full,
             2.0,
-            planks([rgb(0x6b4a2e), rgb(0x3f2a1a)], 5, 0.75),
+            planks(tones(0x6b4a2e, 0x3f2a1a), 5, 0.75),
         ),
         recipe(
             "door-oak",
             Full,
             1.6,
-            upright(planks([rgb(0x7a4e2a), rgb(0x4b2e18)], 8, 0.6)),
+            upright(planks(tones(0x7a4e2a, 0x4b2e18), 8, 0.6)),
         ),
         recipe(
             "drape-red",
@@ -183,25 +183,25 @@ fn furnishing_textures() -> Vec<Recipe> {
             "palm-leaf",
             Full,
             1.0,
-            leaf(LeafShape::Blade, [rgb(0x2e5a1e), rgb(0x6f9a3a)]),
+            leaf(LeafShape::Blade, tones(0x2e5a1e, 0x6f9a3a)),
         ),
         recipe(
             "ivy-leaf",
             Full,
             1.0,
-            leaf(LeafShape::Ivy, [rgb(0x2a5223), rgb(0x5f8f3f)]),
+            leaf(LeafShape::Ivy, tones(0x2a5223, 0x5f8f3f)),
         ),
         recipe(
             "terracotta",
             Full,
             1.2,
-            carved_stone([rgb(0xb9683f), rgb(0x9c5333)], 0.0, 0.7, 0.8),
+            carved_stone(tones(0xb9683f, 0x9c5333), 0.0, 0.7, 0.8),
         ),
         recipe(
             "potting-earth",
             Full,
             0.8,
-            soil([rgb(0x3b2a1d), rgb(0x57402c)], None, 0.7),
+            soil(tones(0x3b2a1d, 0x57402c), None, 0.7),
         ),
         recipe(
             "bronze",
@@ -219,140 +219,135 @@ fn furnishing_textures() -> Vec<Recipe> {
 }
 
 /// The rich palette: a separate material for every surface.
-pub fn rich(scene: &mut SceneBuilder) -> Palette {
-    let mut sets = masonry_textures().into_iter().chain(furnishing_textures());
-    let mut next = |leafy: bool| {
-        let Some(set) = sets.next() else {
-            return scene.plain("missing", rgb(0xff_00ff), 0.8, |_| {});
-        };
-        scene.textured(set, |m| {
-            if leafy {
+pub const RICH: Palette = Palette {
+    court_floor: "court-slabs",
+    arcade_floor: "arcade-tiles",
+    wall_low: "brick",
+    dado: "dado-stone",
+    wall_high: "ochre-plaster",
+    spandrel: "ashlar",
+    shaft: "limestone",
+    shaft_high: "veined-marble",
+    capital: "capital-stone",
+    arch: "voussoirs",
+    vault: "vault-plaster",
+    rib: "rib-stone",
+    cornice: "carved-cornice",
+    rail: "rail-stone",
+    roof: "roof-tiles",
+    beam: "old-beams",
+    door: "door-oak",
+    drapes: ["drape-red", "drape-green", "drape-blue"],
+    leaf: "palm-leaf",
+    ivy: "ivy-leaf",
+    pot: "terracotta",
+    earth: "potting-earth",
+    medallion: "bronze",
+    lamp: "lamp-brass",
+};
+
+/// Adds the materials of [`RICH`].
+pub fn add_rich(scene: &mut SceneBuilder) {
+    for recipe in masonry_textures().into_iter().chain(furnishing_textures()) {
+        scene.textured(recipe, |m| {
+            if [RICH.leaf, RICH.ivy].contains(&m.name.as_str()) {
                 m.alpha = AlphaMode::Mask(0.5);
                 m.double_sided = true;
             }
             m.double_sided |= m.name.starts_with("drape");
-        })
-    };
-    Palette {
-        court_floor: next(false),
-        arcade_floor: next(false),
-        wall_low: next(false),
-        dado: next(false),
-        wall_high: next(false),
-        spandrel: next(false),
-        shaft: next(false),
-        shaft_high: next(false),
-        capital: next(false),
-        arch: next(false),
-        vault: next(false),
-        rib: next(false),
-        cornice: next(false),
-        rail: next(false),
-        roof: next(false),
-        beam: next(false),
-        door: next(false),
-        drapes: std::array::from_fn(|_| next(false)),
-        leaf: next(true),
-        ivy: next(true),
-        pot: next(false),
-        earth: next(false),
-        medallion: next(false),
-        lamp: next(false),
+        });
     }
 }
 
 /// The plain palette: eight shared base-colour textures. Only the floor has a normal map.
-pub fn plain(scene: &mut SceneBuilder) -> Palette {
-    let simple = Recipe::new;
-    let sand = [rgb(0xcdb894), rgb(0xb39b74)];
-    let mut sets = [
-        simple(
+pub const PLAIN: Palette = Palette {
+    court_floor: "floor",
+    arcade_floor: "floor",
+    wall_low: "brick",
+    dado: "wall",
+    wall_high: "ceiling",
+    spandrel: "wall",
+    shaft: "column",
+    shaft_high: "column",
+    capital: "trim",
+    arch: "trim",
+    vault: "ceiling",
+    rib: "wall",
+    cornice: "trim",
+    rail: "trim",
+    roof: "roof",
+    beam: "wood",
+    door: "wood",
+    drapes: ["ceiling"; 3],
+    leaf: "trim",
+    ivy: "trim",
+    pot: "trim",
+    earth: "trim",
+    medallion: "trim",
+    lamp: "trim",
+};
+
+/// Adds the materials of [`PLAIN`].
+pub fn add_plain(scene: &mut SceneBuilder) {
+    let sand = tones(0xcdb894, 0xb39b74);
+    for recipe in [
+        Recipe::new(
             "floor",
             1024,
             Maps::ColorNormal,
             3.0,
-            slabs([rgb(0xb7a88e), rgb(0x94866d)], 4, 6, 0.55),
+            slabs(tones(0xb7a88e, 0x94866d), 4, 6, 0.55),
         ),
-        simple(
+        Recipe::new(
             "wall",
             1024,
             Maps::Color,
             2.4,
             dressed_stone(sand, 3, 7, 0.5),
         ),
-        simple(
+        Recipe::new(
             "brick",
             512,
             Maps::Color,
             1.6,
-            brick([rgb(0xa8674a), rgb(0x8a4f3a)]),
+            brick(tones(0xa8674a, 0x8a4f3a)),
         ),
-        simple(
+        Recipe::new(
             "column",
             512,
             Maps::Color,
             1.6,
-            carved_stone([rgb(0xd2c0a0), rgb(0xbda680)], 0.15, 0.8, 0.75),
+            carved_stone(tones(0xd2c0a0, 0xbda680), 0.15, 0.8, 0.75),
         ),
-        simple(
+        Recipe::new(
             "trim",
             512,
             Maps::Color,
             1.3,
-            carved_stone([rgb(0xd9cbb0), rgb(0xc2ae8c)], 0.0, 0.4, 0.7),
+            carved_stone(tones(0xd9cbb0, 0xc2ae8c), 0.0, 0.4, 0.7),
         ),
-        simple(
+        Recipe::new(
             "ceiling",
             512,
             Maps::Color,
             2.0,
             plaster(rgb(0xd8cdb8), rgb(0xb9a27c), 0.5),
         ),
-        simple(
+        Recipe::new(
             "roof",
             512,
             Maps::Color,
             2.0,
-            roof_tiles([rgb(0xb5643e), rgb(0x8f4a30)]),
+            roof_tiles(tones(0xb5643e, 0x8f4a30)),
         ),
-        simple(
+        Recipe::new(
             "wood",
             512,
             Maps::Color,
             2.0,
-            planks([rgb(0x6b4a2e), rgb(0x3f2a1a)], 5, 0.75),
+            planks(tones(0x6b4a2e, 0x3f2a1a), 5, 0.75),
         ),
-    ]
-    .into_iter()
-    .map(|set| scene.textured(set, |_| {}))
-    .collect::<Vec<_>>();
-    let mut next = || sets.remove(0);
-    let (floor, wall, brick, column) = (next(), next(), next(), next());
-    let (trim, ceiling, roof, wood) = (next(), next(), next(), next());
-    Palette {
-        court_floor: floor,
-        arcade_floor: floor,
-        wall_low: brick,
-        dado: wall,
-        wall_high: ceiling,
-        spandrel: wall,
-        shaft: column,
-        shaft_high: column,
-        capital: trim,
-        arch: trim,
-        vault: ceiling,
-        rib: wall,
-        cornice: trim,
-        rail: trim,
-        roof,
-        beam: wood,
-        door: wood,
-        drapes: [ceiling; 3],
-        leaf: trim,
-        ivy: trim,
-        pot: trim,
-        earth: trim,
-        medallion: trim,
-        lamp: trim,
+    ] {
+        scene.textured(recipe, |_| {});
     }
 }

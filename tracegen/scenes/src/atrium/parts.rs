@@ -1,6 +1,8 @@
 //! Architectural parts of the atrium: columns, arches, vaults, drapes, reliefs, plants.
 
-use crate::mesh_builder::{Knot, MeshBuilder, SweepFrame, curve, sharp, smooth};
+use crate::mesh_builder::{
+    Knot, MeshBuilder, SweepFrame, curve, profile, scaled_profile, sharp, smooth,
+};
 use crate::noise::{Rng, smoothstep};
 use glam::{Affine3A, Quat, Vec2, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -33,17 +35,11 @@ impl Column {
             vec3(plinth, 0.3 * r, plinth),
             0.02,
         );
-        let base = [
-            sharp(1.38 * r, 0.3 * r),
-            smooth(1.42 * r, 0.42 * r),
-            sharp(1.3 * r, 0.55 * r),
-            smooth(1.16 * r, 0.62 * r),
-            sharp(1.2 * r, 0.72 * r),
-            smooth(1.22 * r, 0.79 * r),
-            sharp(1.1 * r, 0.86 * r),
-            smooth(1.03 * r, 0.9 * r),
-            sharp(r, 1.0 * r),
-        ];
+        let base = scaled_profile(
+            "1.38,0.3! 1.42,0.42 1.3,0.55! 1.16,0.62 1.2,0.72! \
+             1.22,0.79 1.1,0.86! 1.03,0.9 1,1!",
+            Vec2::splat(r),
+        );
         m.lathe(&curve(&base, self.steps), self.segments);
         let entasis: Vec<Knot> = (0..=self.rows)
             .map(|i| {
@@ -277,19 +273,11 @@ pub fn moulding(profile: &[Knot], length: f32, y: f32) -> MeshBuilder {
 /// A cornice's profile of the given size.
 pub fn cornice(out: f32, height: f32, steps: usize) -> Vec<Knot> {
     curve(
-        &[
-            sharp(0.0, 0.0),
-            sharp(0.25 * out, 0.0),
-            sharp(0.25 * out, 0.18 * height),
-            smooth(0.45 * out, 0.28 * height),
-            sharp(0.5 * out, 0.42 * height),
-            sharp(0.85 * out, 0.45 * height),
-            sharp(0.85 * out, 0.68 * height),
-            smooth(0.9 * out, 0.82 * height),
-            sharp(out, 0.9 * height),
-            sharp(out, height),
-            sharp(0.0, height),
-        ],
+        &scaled_profile(
+            "0,0! 0.25,0! 0.25,0.18! 0.45,0.28 0.5,0.42! 0.85,0.45! \
+             0.85,0.68! 0.9,0.82 1,0.9! 1,1! 0,1!",
+            vec2(out, height),
+        ),
         steps,
     )
 }
@@ -297,19 +285,10 @@ pub fn cornice(out: f32, height: f32, steps: usize) -> Vec<Knot> {
 /// A baluster 0.7 m high.
 pub fn baluster(segments: usize, steps: usize) -> MeshBuilder {
     let mut m = MeshBuilder::new();
-    let knots = [
-        sharp(0.075, 0.0),
-        sharp(0.075, 0.06),
-        smooth(0.045, 0.10),
-        smooth(0.088, 0.24),
-        smooth(0.052, 0.42),
-        smooth(0.034, 0.52),
-        sharp(0.05, 0.57),
-        smooth(0.06, 0.60),
-        sharp(0.05, 0.63),
-        sharp(0.072, 0.65),
-        sharp(0.072, 0.70),
-    ];
+    let knots = profile(
+        "0.075,0! 0.075,0.06! 0.045,0.1 0.088,0.24 0.052,0.42 0.034,0.52 0.05,0.57! 0.06,0.6 \
+        0.05,0.63! 0.072,0.65! 0.072,0.7!",
+    );
     m.lathe(&curve(&knots, steps), segments);
     m
 }
@@ -387,20 +366,10 @@ pub fn lion_medallion(cells: usize, relief: f32) -> MeshBuilder {
 /// A flower pot of radius and height 1, open at the top, closed at the earth's level.
 pub fn pot(segments: usize, steps: usize) -> MeshBuilder {
     let mut m = MeshBuilder::new();
-    let knots = [
-        sharp(0.0, 0.0),
-        sharp(0.55, 0.0),
-        sharp(0.6, 0.06),
-        smooth(0.62, 0.12),
-        smooth(0.86, 0.45),
-        smooth(0.9, 0.7),
-        sharp(0.82, 0.82),
-        sharp(0.98, 0.86),
-        smooth(1.02, 0.93),
-        sharp(0.98, 1.0),
-        sharp(0.86, 1.0),
-        sharp(0.84, 0.9),
-    ];
+    let knots = profile(
+        "0,0! 0.55,0! 0.6,0.06! 0.62,0.12 0.86,0.45 0.9,0.7 0.82,0.82! 0.98,0.86! 1.02,0.93 \
+        0.98,1! 0.86,1! 0.84,0.9!",
+    );
     m.lathe(&curve(&knots, steps), segments);
     m
 }

@@ -1,8 +1,7 @@
 //! Wheels, lamps, mirrors, seams and the other small parts of the car.
 
-use super::CarMaterials;
 use super::body::{self, AXLES, TYRE};
-use crate::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
+use crate::mesh_builder::{MeshBuilder, curve, lathed, profile, sharp, smooth};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -10,11 +9,11 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 /// Half the width of a tyre, metres. Wheels rotate about y, and their outside is at +y.
 const HALF_WIDTH: f32 = 0.118;
 
-pub(super) fn wheels(scene: &mut SceneBuilder, kit: &CarMaterials) {
-    let tyre = scene.mesh("tyre", tyre(), kit.tyre);
-    let rim = scene.mesh("rim", rim(), kit.alloy);
-    let disc = scene.mesh("brake-disc", brake_disc(), kit.brake);
-    let caliper = scene.mesh("caliper", caliper(), kit.tail_lamp);
+pub(super) fn wheels(scene: &mut SceneBuilder) {
+    let tyre = scene.mesh("tyre", tyre(), "tyre");
+    let rim = scene.mesh("rim", rim(), "alloy");
+    let disc = scene.mesh("brake-disc", brake_disc(), "brake");
+    let caliper = scene.mesh("caliper", caliper(), "tail-lamp");
     for (i, x) in AXLES.into_iter().enumerate() {
         for side in [-1.0f32, 1.0] {
             let outward = Quat::from_rotation_x(side * FRAC_PI_2);
@@ -87,15 +86,7 @@ fn rim() -> MeshBuilder {
         sharp(0.222, -HALF_WIDTH + 0.01),
     ];
     rim.lathe(&barrel, 40);
-    let hub = [
-        sharp(0.0, 0.03),
-        sharp(0.055, 0.03),
-        smooth(0.062, 0.06),
-        sharp(0.050, 0.076),
-        sharp(0.030, 0.078),
-        smooth(0.026, 0.088),
-        smooth(0.0, 0.092),
-    ];
+    let hub = profile("0,0.03! 0.055,0.03! 0.062,0.06 0.05,0.076! 0.03,0.078! 0.026,0.088 0,0.092");
     rim.lathe(&curve(&hub, 2), 24);
     for i in 0..10 {
         let pair = if i % 2 == 0 { 0.115 } else { -0.115 };
@@ -138,29 +129,14 @@ fn spoke(angle: f32, pair: f32) -> MeshBuilder {
 
 fn wheel_nut() -> MeshBuilder {
     lathed(
-        &curve(
-            &[
-                sharp(0.0085, 0.0),
-                sharp(0.0085, 0.010),
-                smooth(0.006, 0.016),
-                smooth(0.0, 0.018),
-            ],
-            2,
-        ),
+        &curve(&profile("0.0085,0! 0.0085,0.01! 0.006,0.016 0,0.018"), 2),
         8,
     )
 }
 
 fn brake_disc() -> MeshBuilder {
     lathed(
-        &[
-            sharp(0.0, 0.0),
-            sharp(0.165, 0.0),
-            sharp(0.165, 0.02),
-            sharp(0.07, 0.02),
-            sharp(0.065, 0.035),
-            sharp(0.0, 0.035),
-        ],
+        &profile("0,0! 0.165,0! 0.165,0.02! 0.07,0.02! 0.065,0.035! 0,0.035!"),
         40,
     )
 }
@@ -261,8 +237,8 @@ struct Details {
     paint: MeshBuilder,
 }
 
-pub(super) fn details(scene: &mut SceneBuilder, kit: &CarMaterials) {
-    scene.add("panel-gaps", panel_gaps(), kit.trim);
+pub(super) fn details(scene: &mut SceneBuilder) {
+    scene.add("panel-gaps", panel_gaps(), "trim");
     let mut details = Details::default();
     for side in [-1.0f32, 1.0] {
         details.headlamp(side);
@@ -274,11 +250,11 @@ pub(super) fn details(scene: &mut SceneBuilder, kit: &CarMaterials) {
         details.wiper(side);
     }
     details.spoiler_plate_and_badge();
-    scene.add("chrome", details.chrome, kit.chrome);
-    scene.add("headlamps", details.lamps, kit.lamp);
-    scene.add("tail-lamps", details.tails, kit.tail_lamp);
-    scene.add("intakes", details.dark, kit.trim);
-    scene.add("mirrors-and-wing", details.paint, kit.paint);
+    scene.add("chrome", details.chrome, "chrome");
+    scene.add("headlamps", details.lamps, "headlamp");
+    scene.add("tail-lamps", details.tails, "tail-lamp");
+    scene.add("intakes", details.dark, "trim");
+    scene.add("mirrors-and-wing", details.paint, "paint");
 }
 
 impl Details {
@@ -297,15 +273,9 @@ impl Details {
         for k in [-1.0f32, 1.0] {
             let bowl = lathed(
                 &curve(
-                    &[
-                        sharp(0.0, 0.0),
-                        smooth(0.022, 0.006),
-                        smooth(0.036, 0.026),
-                        sharp(0.038, 0.03),
-                        sharp(0.034, 0.028),
-                        smooth(0.02, 0.011),
-                        smooth(0.0, 0.005),
-                    ],
+                    &profile(
+                        "0,0! 0.022,0.006 0.036,0.026 0.038,0.03! 0.034,0.028! 0.02,0.011 0,0.005",
+                    ),
                     2,
                 ),
                 18,
@@ -334,20 +304,13 @@ impl Details {
                     vec3(-2.205 + 0.02 * k as f32, 0.70, z),
                 ),
             );
-            let ring: Vec<(Vec3, f32)> = (0..=32)
-                .map(|i| {
-                    let (sin, cos) = (TAU * (i % 32) as f32 / 32.0).sin_cos();
-                    (
-                        vec3(
-                            -2.208 + 0.02 * k as f32,
-                            0.70 + 0.067 * sin,
-                            z + 0.067 * cos,
-                        ),
-                        0.006,
-                    )
-                })
-                .collect();
-            self.chrome.tube(&ring, 8);
+            self.chrome.ring([32, 8], 0.006, |sin, cos| {
+                vec3(
+                    -2.208 + 0.02 * k as f32,
+                    0.70 + 0.067 * sin,
+                    z + 0.067 * cos,
+                )
+            });
         }
     }
 
@@ -370,7 +333,7 @@ impl Details {
                 head + vec3(0.0, 0.03, side * 0.03),
             ),
         );
-        let mut face = lathed(&[smooth(0.0, 0.0), smooth(1.0, 0.0)], 24);
+        let mut face = lathed(&profile("0,0 1,0"), 24);
         face.orient(|_| Vec3::Y);
         self.chrome.merge(
             &face,
@@ -398,13 +361,7 @@ impl Details {
         for k in 0..2 {
             let z = side * (0.28 + 0.095 * k as f32);
             let pipe = lathed(
-                &[
-                    sharp(0.036, 0.0),
-                    sharp(0.040, 0.01),
-                    sharp(0.040, 0.22),
-                    sharp(0.036, 0.22),
-                    sharp(0.036, 0.0),
-                ],
+                &profile("0.036,0! 0.04,0.01! 0.04,0.22! 0.036,0.22! 0.036,0!"),
                 24,
             );
             self.chrome.merge(

@@ -3,24 +3,12 @@
 use crate::atrium::parts::{Column, cornice, lion_medallion, moulding};
 use crate::mesh_builder::MeshBuilder;
 use crate::noise::Rng;
-use crate::scene_builder::{MaterialId, SceneBuilder};
+use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec3};
 use std::f32::consts::FRAC_PI_2;
 
-/// Materials of the ruin.
-pub struct Stones {
-    /// Walls.
-    pub blocks: MaterialId,
-    /// Carved bands.
-    pub frieze: MaterialId,
-    /// Stairs.
-    pub steps: MaterialId,
-    /// Idols.
-    pub idol: MaterialId,
-}
-
 /// Builds the ruin around `center`; its stair faces -x.
-pub fn build(scene: &mut SceneBuilder, center: Vec3, stones: &Stones) {
+pub fn build(scene: &mut SceneBuilder, center: Vec3) {
     let mut rng = Rng::new(5);
     let mut tiers = MeshBuilder::new();
     let mut bands = MeshBuilder::new();
@@ -63,8 +51,7 @@ pub fn build(scene: &mut SceneBuilder, center: Vec3, stones: &Stones) {
         );
     }
     let place = Affine3A::from_translation(center);
-    let mesh = scene.mesh("temple-tiers", tiers, stones.blocks);
-    scene.place(mesh, place);
+    scene.put("temple-tiers", tiers, "temple-blocks", place);
 
     let mut stairs = MeshBuilder::new();
     for i in 0..18 {
@@ -88,17 +75,15 @@ pub fn build(scene: &mut SceneBuilder, center: Vec3, stones: &Stones) {
             );
         }
     }
-    let mesh = scene.mesh("temple-stairs", stairs, stones.steps);
-    scene.place(mesh, place);
+    scene.put("temple-stairs", stairs, "temple-steps", place);
 
-    shrine(scene, center + Vec3::Y * 3.6, &mut bands, stones);
-    let mesh = scene.mesh("temple-bands", bands, stones.frieze);
-    scene.place(mesh, place);
-    columns(scene, center, stones, &mut rng);
+    shrine(scene, center + Vec3::Y * 3.6, &mut bands);
+    scene.put("temple-bands", bands, "temple-frieze", place);
+    columns(scene, center, &mut rng);
 }
 
 /// The gate house on top, with a face over its door.
-fn shrine(scene: &mut SceneBuilder, base: Vec3, bands: &mut MeshBuilder, stones: &Stones) {
+fn shrine(scene: &mut SceneBuilder, base: Vec3, bands: &mut MeshBuilder) {
     let mut walls = MeshBuilder::new();
     let (half, wall) = (1.9, 0.5);
     for side in [-1.0f32, 1.0] {
@@ -136,7 +121,7 @@ fn shrine(scene: &mut SceneBuilder, base: Vec3, bands: &mut MeshBuilder, stones:
         0.04,
     );
     walls.block(vec3(-0.5, 3.25, -1.5), vec3(-0.1, 4.6, 1.5), 0.05);
-    let mesh = scene.mesh("shrine", walls, stones.blocks);
+    let mesh = scene.mesh("shrine", walls, "temple-blocks");
     scene.place(mesh, Affine3A::from_translation(base));
     for turn in 0..4 {
         let rotation = Affine3A::from_quat(Quat::from_rotation_y(turn as f32 * FRAC_PI_2));
@@ -146,7 +131,7 @@ fn shrine(scene: &mut SceneBuilder, base: Vec3, bands: &mut MeshBuilder, stones:
             rotation * shift,
         );
     }
-    let idol = scene.mesh("idol", lion_medallion(28, 0.6), stones.idol);
+    let idol = scene.mesh("idol", lion_medallion(28, 0.6), "idol");
     let facing = |position: Vec3, scale: f32| {
         Affine3A::from_scale_rotation_translation(
             Vec3::splat(scale),
@@ -162,7 +147,7 @@ fn shrine(scene: &mut SceneBuilder, base: Vec3, bands: &mut MeshBuilder, stones:
     }
 }
 
-fn columns(scene: &mut SceneBuilder, center: Vec3, stones: &Stones, rng: &mut Rng) {
+fn columns(scene: &mut SceneBuilder, center: Vec3, rng: &mut Rng) {
     let whole = Column {
         radius: 0.34,
         height: 3.6,
@@ -171,22 +156,15 @@ fn columns(scene: &mut SceneBuilder, center: Vec3, stones: &Stones, rng: &mut Rn
         flutes: 8,
         steps: 2,
     };
-    let shaft = scene.mesh("ruin-column", whole.shaft(), stones.steps);
-    let capital = scene.mesh("ruin-capital", whole.capital(), stones.idol);
+    let shaft = scene.mesh("ruin-column", whole.shaft(), "temple-steps");
+    let capital = scene.mesh("ruin-capital", whole.capital(), "idol");
     let mut drum = MeshBuilder::new();
-    use crate::mesh_builder::sharp;
+    use crate::mesh_builder::profile;
     drum.lathe(
-        &[
-            sharp(0.0, 0.0),
-            sharp(0.31, 0.0),
-            sharp(0.34, 0.03),
-            sharp(0.34, 0.57),
-            sharp(0.31, 0.6),
-            sharp(0.0, 0.6),
-        ],
+        &profile("0,0! 0.31,0! 0.34,0.03! 0.34,0.57! 0.31,0.6! 0,0.6!"),
         20,
     );
-    let drum = scene.mesh("drum", drum, stones.steps);
+    let drum = scene.mesh("drum", drum, "temple-steps");
     for (i, z) in [-5.2f32, -3.2, 3.2, 5.2].into_iter().enumerate() {
         let foot = center + vec3(-8.6, 0.0, z);
         if i != 1 {

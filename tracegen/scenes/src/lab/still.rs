@@ -1,8 +1,8 @@
 //! The still: burner, retort, condenser, receiver and the stand that holds them.
 
-use super::{LabMaterials, Ware, at, vessel};
+use super::{LIQUIDS, Ware, at, vessel};
 use crate::glassware::{glass_tube, helix, round_flask, stopper};
-use crate::mesh_builder::{Knot, MeshBuilder, curve, lathed, sharp, smooth};
+use crate::mesh_builder::{Knot, MeshBuilder, curve, lathed, profile};
 use crate::noise::smoothstep;
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
@@ -14,58 +14,38 @@ const AXIS_Z: f32 = 0.0;
 /// Height of the retort's bottom, metres.
 const LIFT: f32 = 0.131;
 
-pub(super) fn distillation(scene: &mut SceneBuilder, kit: &LabMaterials) {
-    burner(scene, kit);
-    hose(scene, kit);
-    let neck_end = retort(scene, kit);
-    let outlet = condenser(scene, kit, neck_end);
-    receiver(scene, kit, outlet);
+pub(super) fn distillation(scene: &mut SceneBuilder) {
+    burner(scene);
+    hose(scene);
+    let neck_end = retort(scene);
+    let outlet = condenser(scene, neck_end);
+    receiver(scene, outlet);
     let mut metal = MeshBuilder::new();
     stand(&mut metal);
     tripod(&mut metal);
-    scene.add("stand", metal, kit.steel);
+    scene.add("stand", metal, "steel");
 }
 
-fn burner(scene: &mut SceneBuilder, kit: &LabMaterials) {
+fn burner(scene: &mut SceneBuilder) {
     let mut burner = MeshBuilder::new();
-    let body = [
-        sharp(0.0, 0.0),
-        sharp(0.036, 0.0),
-        smooth(0.036, 0.004),
-        smooth(0.026, 0.009),
-        smooth(0.012, 0.013),
-        sharp(0.0095, 0.02),
-        sharp(0.0115, 0.021),
-        sharp(0.0115, 0.036),
-        sharp(0.0088, 0.037),
-        sharp(0.0088, 0.072),
-        sharp(0.0098, 0.073),
-        sharp(0.0098, 0.079),
-        sharp(0.0072, 0.079),
-        sharp(0.0072, 0.045),
-        sharp(0.0, 0.045),
-    ];
+    let body = profile(
+        "0,0! 0.036,0! 0.036,0.004 0.026,0.009 0.012,0.013 0.0095,0.02! 0.0115,0.021! \
+        0.0115,0.036! 0.0088,0.037! 0.0088,0.072! 0.0098,0.073! 0.0098,0.079! 0.0072,0.079! \
+        0.0072,0.045! 0,0.045!",
+    );
     burner.lathe(&curve(&body, 3), 32);
-    let burner = scene.mesh("burner", burner, kit.brass);
-    scene.place(burner, at(AXIS_X, 0.0, AXIS_Z));
+    scene.put("burner", burner, "brass", at(AXIS_X, 0.0, AXIS_Z));
     let flame = lathed(
         &curve(
-            &[
-                smooth(0.0, 0.08),
-                smooth(0.0065, 0.086),
-                smooth(0.0078, 0.096),
-                smooth(0.0045, 0.112),
-                smooth(0.0, 0.128),
-            ],
+            &profile("0,0.08 0.0065,0.086 0.0078,0.096 0.0045,0.112 0,0.128"),
             4,
         ),
         20,
     );
-    let flame = scene.mesh("flame", flame, kit.flame);
-    scene.place(flame, at(AXIS_X, 0.0, AXIS_Z));
+    scene.put("flame", flame, "flame", at(AXIS_X, 0.0, AXIS_Z));
 }
 
-fn hose(scene: &mut SceneBuilder, kit: &LabMaterials) {
+fn hose(scene: &mut SceneBuilder) {
     let hose: Vec<(Vec3, f32)> = (0..=24)
         .map(|i| {
             let t = i as f32 / 24.0;
@@ -81,22 +61,21 @@ fn hose(scene: &mut SceneBuilder, kit: &LabMaterials) {
         .collect();
     let mut tube = MeshBuilder::new();
     tube.tube(&hose, 12);
-    scene.add("hose", tube, kit.rubber);
+    scene.add("hose", tube, "rubber");
 }
 
 /// A bulb whose neck bends over into the condenser. Returns the neck's end.
-fn retort(scene: &mut SceneBuilder, kit: &LabMaterials) -> Vec3 {
+fn retort(scene: &mut SceneBuilder) -> Vec3 {
     let bulb = round_flask(0.045, 0.012, 1);
     vessel(
         scene,
-        kit.glass,
+        "borosilicate",
         &Ware::new(&bulb, 0.0015, 47, 0.0),
-        Some((kit.liquids[2], 0.034)),
+        Some((LIQUIDS[2], 0.034)),
         &[at(AXIS_X, LIFT, AXIS_Z)],
     );
     let plug = lathed(&stopper(0.0125), 24);
-    let plug = scene.mesh("stopper", plug, kit.rubber);
-    scene.place(plug, at(AXIS_X, LIFT + 0.103, AXIS_Z));
+    scene.put("stopper", plug, "rubber", at(AXIS_X, LIFT + 0.103, AXIS_Z));
     let neck: Vec<(Vec3, f32)> = (0..=40)
         .map(|i| {
             let t = i as f32 / 40.0;
@@ -109,28 +88,21 @@ fn retort(scene: &mut SceneBuilder, kit: &LabMaterials) -> Vec3 {
             )
         })
         .collect();
-    scene.add("retort-neck", glass_tube(&neck, 0.82, 16), kit.glass);
+    scene.add("retort-neck", glass_tube(&neck, 0.82, 16), "borosilicate");
     neck.last().map_or(Vec3::ZERO, |n| n.0)
 }
 
 /// Jacket, coil and nozzles, at a slant below the neck's end. Returns the point below the outlet.
-fn condenser(scene: &mut SceneBuilder, kit: &LabMaterials, neck_end: Vec3) -> Vec3 {
+fn condenser(scene: &mut SceneBuilder, neck_end: Vec3) -> Vec3 {
     let slant = Affine3A::from_rotation_translation(
         Quat::from_rotation_z(0.42),
         neck_end + vec3(0.022, -0.175, 0.0),
     );
     let jacket = curve(
-        &[
-            sharp(0.0062, 0.0),
-            smooth(0.0066, 0.012),
-            smooth(0.021, 0.022),
-            smooth(0.023, 0.032),
-            smooth(0.023, 0.09),
-            smooth(0.023, 0.148),
-            smooth(0.021, 0.158),
-            smooth(0.0085, 0.168),
-            sharp(0.0082, 0.182),
-        ],
+        &profile(
+            "0.0062,0! 0.0066,0.012 0.021,0.022 0.023,0.032 0.023,0.09 0.023,0.148 0.021,0.158 \
+            0.0085,0.168 0.0082,0.182!",
+        ),
         4,
     );
     let mut walls = jacket.clone();
@@ -140,54 +112,52 @@ fn condenser(scene: &mut SceneBuilder, kit: &LabMaterials, neck_end: Vec3) -> Ve
     }));
     walls.push(jacket[0]);
     let m = lathed(&walls, 32);
-    let jacket = scene.mesh("condenser", m, kit.glass);
-    scene.place(jacket, slant);
+    scene.put("condenser", m, "borosilicate", slant);
     let mut coil = helix(0.0125, 0.0125, 9.0, 0.0032, 20);
     for (p, _) in &mut coil {
         p.y += 0.033;
     }
-    let coil = scene.mesh("coil", glass_tube(&coil, 0.65, 8), kit.glass);
-    scene.place(coil, slant);
+    scene.put("coil", glass_tube(&coil, 0.65, 8), "borosilicate", slant);
     for (y, side) in [(0.036, 1.0f32), (0.144, -1.0)] {
         let nozzle = [
             (vec3(side * 0.021, y, 0.0), 0.0045),
             (vec3(side * 0.032, y, 0.0), 0.004),
             (vec3(side * 0.045, y + 0.002, 0.0), 0.0038),
         ];
-        let nozzle = scene.mesh("nozzle", glass_tube(&nozzle, 0.6, 16), kit.glass);
-        scene.place(nozzle, slant);
+        scene.put(
+            "nozzle",
+            glass_tube(&nozzle, 0.6, 16),
+            "borosilicate",
+            slant,
+        );
     }
     slant.transform_point3(vec3(0.0, -0.002, 0.0))
 }
 
 /// The flask below the condenser, on a ring of cork.
-fn receiver(scene: &mut SceneBuilder, kit: &LabMaterials, outlet: Vec3) {
+fn receiver(scene: &mut SceneBuilder, outlet: Vec3) {
     let flask = round_flask(0.031, 0.022, 1);
     let low = (outlet.y - 0.088).max(0.012);
     vessel(
         scene,
-        kit.glass,
+        "borosilicate",
         &Ware::new(&flask, 0.0014, 40, 0.0),
-        Some((kit.liquids[0], 0.018)),
+        Some((LIQUIDS[0], 0.018)),
         &[at(outlet.x, low, outlet.z)],
     );
     let cork = lathed(
         &curve(
-            &[
-                sharp(0.019, 0.0),
-                smooth(0.023, 0.005),
-                smooth(0.021, 0.012),
-                sharp(0.017, 0.014),
-                sharp(0.015, 0.010),
-                sharp(0.015, 0.0),
-                sharp(0.019, 0.0),
-            ],
+            &profile("0.019,0! 0.023,0.005 0.021,0.012 0.017,0.014! 0.015,0.01! 0.015,0! 0.019,0!"),
             3,
         ),
         36,
     );
-    let ring = scene.mesh("cork-ring", cork, kit.wood);
-    scene.place(ring, at(outlet.x, low - 0.012, outlet.z));
+    scene.put(
+        "cork-ring",
+        cork,
+        "rack-beech",
+        at(outlet.x, low - 0.012, outlet.z),
+    );
 }
 
 /// Plate, rod and the clamp around the retort's neck.
@@ -198,11 +168,10 @@ fn stand(stand: &mut MeshBuilder) {
         0.003,
     );
     let rod_x = AXIS_X - 0.075;
-    stand.tube(
-        &[
-            (vec3(rod_x, 0.008, AXIS_Z - 0.075), 0.0048),
-            (vec3(rod_x, 0.36, AXIS_Z - 0.075), 0.0048),
-        ],
+    stand.rod(
+        vec3(rod_x, 0.008, AXIS_Z - 0.075),
+        vec3(rod_x, 0.36, AXIS_Z - 0.075),
+        0.0048,
         20,
     );
     let y = LIFT + 0.094;
@@ -219,44 +188,23 @@ fn stand(stand: &mut MeshBuilder) {
         ],
         14,
     );
-    let ring: Vec<(Vec3, f32)> = (0..=32)
-        .map(|i| {
-            let (sin, cos) = (TAU * (i % 32) as f32 / 32.0).sin_cos();
-            (
-                vec3(AXIS_X + 0.0165 * cos, y, AXIS_Z + 0.0165 * sin),
-                0.0026,
-            )
-        })
-        .collect();
-    stand.tube(&ring, 12);
+    stand.ring([32, 12], 0.0026, |sin, cos| {
+        vec3(AXIS_X + 0.0165 * cos, y, AXIS_Z + 0.0165 * sin)
+    });
 }
 
 /// A tripod with gauze over the flame.
 fn tripod(stand: &mut MeshBuilder) {
     let top = 0.1285;
-    let ring: Vec<(Vec3, f32)> = (0..=40)
-        .map(|i| {
-            let (sin, cos) = (TAU * (i % 40) as f32 / 40.0).sin_cos();
-            (
-                vec3(AXIS_X + 0.047 * cos, top - 0.004, AXIS_Z + 0.047 * sin),
-                0.0028,
-            )
-        })
-        .collect();
-    stand.tube(&ring, 12);
+    stand.ring([40, 12], 0.0028, |sin, cos| {
+        vec3(AXIS_X + 0.047 * cos, top - 0.004, AXIS_Z + 0.047 * sin)
+    });
     for i in 0..3 {
         let (sin, cos) = (0.5 + TAU * i as f32 / 3.0).sin_cos();
-        stand.tube(
-            &[
-                (
-                    vec3(AXIS_X + 0.047 * cos, top - 0.004, AXIS_Z + 0.047 * sin),
-                    0.0028,
-                ),
-                (
-                    vec3(AXIS_X + 0.072 * cos, 0.0, AXIS_Z + 0.072 * sin),
-                    0.0028,
-                ),
-            ],
+        stand.rod(
+            vec3(AXIS_X + 0.047 * cos, top - 0.004, AXIS_Z + 0.047 * sin),
+            vec3(AXIS_X + 0.072 * cos, 0.0, AXIS_Z + 0.072 * sin),
+            0.0028,
             12,
         );
     }
@@ -270,7 +218,7 @@ fn tripod(stand: &mut MeshBuilder) {
                 (vec3(-reach, 0.0007, o), vec3(reach, 0.0007, o))
             };
             let c = vec3(AXIS_X, top, AXIS_Z);
-            stand.tube(&[(c + a, 0.0005), (c + b, 0.0005)], 5);
+            stand.rod(c + a, c + b, 0.0005, 5);
         }
     }
 }

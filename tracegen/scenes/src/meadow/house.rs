@@ -1,7 +1,7 @@
 //! The farm house: walls with recessed openings, shutters, tiled roof, barn.
 
 use super::parts;
-use super::{HOUSE, MeadowMaterials, ground};
+use super::{HOUSE, ground};
 use crate::mesh_builder::MeshBuilder;
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
@@ -64,7 +64,7 @@ const DEPTH: f32 = 6.0;
 const EAVES: f32 = 4.9;
 const RISE: f32 = 1.75;
 
-pub(super) fn farm_house(scene: &mut SceneBuilder, kit: &MeadowMaterials) {
+pub(super) fn farm_house(scene: &mut SceneBuilder) {
     let mut house = House::default();
     house.facades();
     house.gables();
@@ -74,17 +74,16 @@ pub(super) fn farm_house(scene: &mut SceneBuilder, kit: &MeadowMaterials) {
         HOUSE + Vec3::Y * (ground(HOUSE.x, HOUSE.z) + 0.05),
     );
     for (name, mesh, material) in [
-        ("house-walls", house.walls, kit.plaster),
-        ("house-frames", house.frames, kit.stone),
-        ("house-panes", house.panes, kit.pane),
-        ("house-shutters", house.shutters, kit.shutter),
-        ("house-door", house.door, kit.wood),
-        ("house-roof", house.roof, kit.roof),
-        ("house-chimney", chimney(), kit.walls),
-        ("house-barn", barn(), kit.walls),
+        ("house-walls", house.walls, "ochre-plaster"),
+        ("house-frames", house.frames, "field-stone"),
+        ("house-panes", house.panes, "window-pane"),
+        ("house-shutters", house.shutters, "blue-shutters"),
+        ("house-door", house.door, "door-wood"),
+        ("house-roof", house.roof, "clay-tiles"),
+        ("house-chimney", chimney(), "farm-stone"),
+        ("house-barn", barn(), "farm-stone"),
     ] {
-        let mesh = scene.mesh(name, mesh, material);
-        scene.place(mesh, place);
+        scene.put(name, mesh, material, place);
     }
 }
 
@@ -290,11 +289,10 @@ impl House {
             self.roof
                 .merge(&sheet, Affine3A::from_rotation_y(turn) * lay);
         }
-        self.roof.tube(
-            &[
-                (vec3(-WIDTH / 2.0 - 0.35, EAVES + RISE + 0.02, 0.0), 0.13),
-                (vec3(WIDTH / 2.0 + 0.35, EAVES + RISE + 0.02, 0.0), 0.13),
-            ],
+        self.roof.rod(
+            vec3(-WIDTH / 2.0 - 0.35, EAVES + RISE + 0.02, 0.0),
+            vec3(WIDTH / 2.0 + 0.35, EAVES + RISE + 0.02, 0.0),
+            0.13,
             12,
         );
         let barn_roof = parts::tiled_slope(vec2(4.7, 5.3), 20, 12);

@@ -1,14 +1,14 @@
 //! The music box's gear train, governor, bells and fittings.
 
-use super::{CYLINDER, CYLINDER_HALF, MODULE, MusicBoxMaterials};
+use super::{CYLINDER, CYLINDER_HALF, MODULE};
 use crate::gears::{Gear, placed, screw, worm};
-use crate::mesh_builder::{MeshBuilder, curve, lathed, sharp, smooth};
+use crate::mesh_builder::{MeshBuilder, curve, lathed, profile, sharp};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
 /// Spring barrel, great wheel, intermediate wheels and the governor.
-pub(super) fn train(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
+pub(super) fn train(scene: &mut SceneBuilder) {
     // Gears are in planes of constant x: their z axis points to +x.
     let facing = Quat::from_rotation_y(FRAC_PI_2);
     let wheel = |teeth: u32, thickness: f32, spokes: u32| Gear {
@@ -24,7 +24,7 @@ pub(super) fn train(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
     let third = wheel(22, 0.0020, 4);
     let meshes: Vec<usize> = [great, pinion, second, third]
         .iter()
-        .zip([kit.brass, kit.steel, kit.brass, kit.brass])
+        .zip(["brass", "steel", "brass", "brass"])
         .map(|(gear, material)| scene.mesh("gear", gear.build(), material))
         .collect();
     // In the wheel's plane, angles run from -z upwards.
@@ -51,14 +51,9 @@ pub(super) fn train(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         scene.place(meshes[3], placed(c2 + plane2, facing, t2));
         let mut arbors = MeshBuilder::new();
         for c in [center, c1, c2] {
-            let shaft = [
-                sharp(0.0, -0.011),
-                sharp(0.0007, -0.011),
-                sharp(0.0013, -0.009),
-                sharp(0.0013, 0.009),
-                sharp(0.0007, 0.011),
-                sharp(0.0, 0.011),
-            ];
+            let shaft = profile(
+                "0,-0.011! 0.0007,-0.011! 0.0013,-0.009! 0.0013,0.009! 0.0007,0.011! 0,0.011!",
+            );
             let rod = lathed(&shaft, 20);
             arbors.merge(
                 &rod,
@@ -68,7 +63,7 @@ pub(super) fn train(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
                 ),
             );
         }
-        scene.add("arbors", arbors, kit.steel);
+        scene.add("arbors", arbors, "steel");
         // Cock: a plate outside the train, with jewelled holes.
         let mut plate = MeshBuilder::new();
         let x = plane + sign * 0.0135;
@@ -77,38 +72,29 @@ pub(super) fn train(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
             vec3(x + 0.001, 0.048, CYLINDER.z + 0.021),
             0.0004,
         );
-        scene.add("plate", plate, kit.polished);
+        scene.add("plate", plate, "polished-brass");
         let mut jewels = MeshBuilder::new();
         for c in [center, c1, c2] {
-            let jewel = lathed(
-                &curve(
-                    &[
-                        sharp(0.0017, 0.0),
-                        smooth(0.0016, 0.0006),
-                        smooth(0.0, 0.0011),
-                    ],
-                    4,
-                ),
-                24,
-            );
+            let jewel = lathed(&curve(&profile("0.0017,0! 0.0016,0.0006 0,0.0011"), 4), 24);
             let out = Quat::from_rotation_z(-sign * FRAC_PI_2);
             jewels.merge(
                 &jewel,
                 Affine3A::from_rotation_translation(out, vec3(x + sign * 0.001, c.y, c.z)),
             );
         }
-        scene.add("jewels", jewels, kit.ruby);
+        scene.add("jewels", jewels, "ruby");
     }
-    governor(scene, kit);
+    governor(scene);
 }
 
 /// Worm and fan: an upright worm with two vanes.
-fn governor(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
+fn governor(scene: &mut SceneBuilder) {
     let foot = vec3(-0.071, 0.010, 0.022);
     let upright = Quat::from_rotation_x(-FRAC_PI_2);
-    let thread = scene.mesh("worm", worm(0.0016, 0.014, 9.0, 18), kit.steel);
-    scene.place(
-        thread,
+    scene.put(
+        "worm",
+        worm(0.0016, 0.014, 9.0, 18),
+        "steel",
         Affine3A::from_rotation_translation(upright, foot + Vec3::Y * 0.012),
     );
     let mut fan = MeshBuilder::new();
@@ -124,52 +110,34 @@ fn governor(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
             (vec3(x, 0.010 * v, curl), vec2(x, v * 0.01))
         });
     }
-    let fan = scene.mesh("fan", fan, kit.polished);
-    scene.place(
+    scene.put(
+        "fan",
         fan,
+        "polished-brass",
         Affine3A::from_rotation_translation(Quat::from_rotation_y(0.6), foot + Vec3::Y * 0.021),
     );
     let mut cage = MeshBuilder::new();
-    cage.tube(&[(foot, 0.0009), (foot + Vec3::Y * 0.034, 0.0009)], 12);
+    cage.rod(foot, foot + Vec3::Y * 0.034, 0.0009, 12);
     cage.block(
         foot + vec3(-0.004, -0.002, -0.004),
         foot + vec3(0.004, 0.001, 0.004),
         0.0006,
     );
-    scene.add("governor-post", cage, kit.steel);
+    scene.add("governor-post", cage, "steel");
 }
 
 /// Six bells on a rod behind the cylinder, largest on the left, each with its hammer.
-pub(super) fn bells(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
+pub(super) fn bells(scene: &mut SceneBuilder) {
     let mut bell = MeshBuilder::new();
-    let skin = [
-        sharp(0.0, 1.0),
-        smooth(0.28, 0.98),
-        smooth(0.52, 0.84),
-        smooth(0.62, 0.55),
-        smooth(0.74, 0.24),
-        sharp(1.0, 0.0),
-        sharp(0.94, 0.0),
-        smooth(0.68, 0.24),
-        smooth(0.56, 0.55),
-        smooth(0.46, 0.80),
-        smooth(0.0, 0.92),
-    ];
+    let skin = profile(
+        "0,1! 0.28,0.98 0.52,0.84 0.62,0.55 0.74,0.24 1,0! 0.94,0! 0.68,0.24 0.56,0.55 0.46,0.8 \
+        0,0.92",
+    );
     // The outline runs from the crown down and is reversed to face outwards.
     let skin: Vec<_> = skin.into_iter().rev().collect();
     bell.lathe(&curve(&skin, 2), 32);
-    let bell = scene.mesh("bell", bell, kit.polished);
-    let mut hammer = lathed(
-        &curve(
-            &[
-                smooth(0.0, -0.0016),
-                smooth(0.0016, 0.0),
-                smooth(0.0, 0.0016),
-            ],
-            4,
-        ),
-        14,
-    );
+    let bell = scene.mesh("bell", bell, "polished-brass");
+    let mut hammer = lathed(&curve(&profile("0,-0.0016 0.0016,0 0,0.0016"), 4), 14);
     hammer.tube(
         &[
             (vec3(0.0, 0.0, 0.0), 0.0004),
@@ -178,7 +146,7 @@ pub(super) fn bells(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         ],
         8,
     );
-    let hammer = scene.mesh("hammer", hammer, kit.steel);
+    let hammer = scene.mesh("hammer", hammer, "steel");
     let (y, z) = (0.0425, -0.036);
     for i in 0..6 {
         let size = 0.0088 - 0.0007 * i as f32;
@@ -197,11 +165,10 @@ pub(super) fn bells(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         );
     }
     let mut rod = MeshBuilder::new();
-    rod.tube(
-        &[
-            (vec3(-0.048, y + 0.001, z), 0.0011),
-            (vec3(0.055, y + 0.001, z), 0.0011),
-        ],
+    rod.rod(
+        vec3(-0.048, y + 0.001, z),
+        vec3(0.055, y + 0.001, z),
+        0.0011,
         14,
     );
     for x in [-0.046, 0.053] {
@@ -213,25 +180,25 @@ pub(super) fn bells(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
             14,
         );
     }
-    scene.add("bell-rod", rod, kit.brass);
+    scene.add("bell-rod", rod, "brass");
 }
 
 /// Bedplate, spring barrels and the winding key.
-pub(super) fn fittings(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
-    bedplate(scene, kit);
-    spring_barrels(scene, kit);
-    winding_key(scene, kit);
+pub(super) fn fittings(scene: &mut SceneBuilder) {
+    bedplate(scene);
+    spring_barrels(scene);
+    winding_key(scene);
 }
 
-fn bedplate(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
+fn bedplate(scene: &mut SceneBuilder) {
     let mut bed = MeshBuilder::new();
     bed.block(
         vec3(-0.080, 0.0066, -0.042),
         vec3(0.082, 0.0090, 0.047),
         0.0008,
     );
-    scene.add("bedplate", bed, kit.brass);
-    let head = scene.mesh("bed-screw", screw(0.0028), kit.blued);
+    scene.add("bedplate", bed, "brass");
+    let head = scene.mesh("bed-screw", screw(0.0028), "blued-steel");
     for (i, (x, z)) in [
         (-0.074, -0.037),
         (0.076, -0.037),
@@ -250,7 +217,7 @@ fn bedplate(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
 }
 
 /// Barrels behind the cylinder, their mainsprings seen from above.
-fn spring_barrels(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
+fn spring_barrels(scene: &mut SceneBuilder) {
     let mut barrel = MeshBuilder::new();
     let (r, h) = (0.0085, 0.012);
     barrel.lathe(
@@ -267,7 +234,7 @@ fn spring_barrels(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         64,
     );
     let place = Affine3A::from_translation(vec3(0.052, 0.009, -0.025));
-    let barrel_mesh = scene.mesh("barrel", barrel, kit.polished);
+    let barrel_mesh = scene.mesh("barrel", barrel, "polished-brass");
     let mut spring = MeshBuilder::new();
     let coil = |s: f32| {
         let a = 7.0 * TAU * s;
@@ -295,7 +262,7 @@ fn spring_barrels(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
         let q = p + p.normalize_or_zero() * (0.0002 - 0.0004 * t);
         (vec3(q.x, 0.011, q.y), vec2(s * 0.2, t * 0.001))
     });
-    let spring = scene.mesh("mainspring", spring, kit.blued);
+    let spring = scene.mesh("mainspring", spring, "blued-steel");
     for x in [0.0, -0.03] {
         let place = Affine3A::from_translation(Vec3::X * x) * place;
         scene.place(barrel_mesh, place);
@@ -304,41 +271,20 @@ fn spring_barrels(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
 }
 
 /// The key in the front of the box.
-fn winding_key(scene: &mut SceneBuilder, kit: &MusicBoxMaterials) {
+fn winding_key(scene: &mut SceneBuilder) {
     let mut key = lathed(
         &curve(
-            &[
-                sharp(0.0, 0.0),
-                sharp(0.0034, 0.0),
-                smooth(0.0026, 0.004),
-                smooth(0.0022, 0.012),
-                sharp(0.003, 0.018),
-                sharp(0.0, 0.018),
-            ],
+            &profile("0,0! 0.0034,0! 0.0026,0.004 0.0022,0.012 0.003,0.018! 0,0.018!"),
             3,
         ),
         24,
     );
     for side in [-1.0f32, 1.0] {
-        let loop_points: Vec<(Vec3, f32)> = (0..=36)
-            .map(|i| {
-                let a = TAU * (i % 36) as f32 / 36.0;
-                (
-                    vec3(
-                        side * (0.0072 + 0.006 * a.cos()),
-                        0.021 + 0.0075 * a.sin(),
-                        0.0,
-                    ),
-                    0.0015,
-                )
-            })
-            .collect();
-        key.tube(&loop_points, 12);
+        key.ring([36, 12], 0.0015, |sin, cos| {
+            vec3(side * (0.0072 + 0.006 * cos), 0.021 + 0.0075 * sin, 0.0)
+        });
     }
-    let key = scene.mesh("key", key, kit.polished);
     let turned = Quat::from_rotation_z(-FRAC_PI_2) * Quat::from_rotation_y(0.5);
-    scene.place(
-        key,
-        Affine3A::from_rotation_translation(turned, vec3(0.092, 0.028, 0.01)),
-    );
+    let place = Affine3A::from_rotation_translation(turned, vec3(0.092, 0.028, 0.01));
+    scene.put("key", key, "polished-brass", place);
 }

@@ -1,47 +1,12 @@
 //! Objects in the plant: tanks, pumps, machines, conveyors, racks and their loads, and the crane.
 //! Each is modelled about its own origin on the floor.
 
-use super::materials::PlantMaterials;
+use super::materials::{PIPES, SIGNALS};
 use super::parts::{NAVE_M, bar};
-use crate::mesh_builder::{MeshBuilder, lathed, sharp, smooth};
+use crate::mesh_builder::{MeshBuilder, lathed, profile};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
-
-/// Mesh numbers.
-pub(super) struct Machines {
-    pub(super) tank: usize,
-    pub(super) vessel: usize,
-    pub(super) tank_leg: usize,
-    pub(super) saddle: usize,
-    pub(super) ladder: usize,
-    pub(super) pump: usize,
-    pub(super) motor: usize,
-    pub(super) plinth: usize,
-    pub(super) mill: usize,
-    pub(super) mill_guard: usize,
-    pub(super) press: usize,
-    pub(super) cabinet: usize,
-    pub(super) panel: usize,
-    pub(super) signal: [usize; 2],
-    pub(super) conveyor: usize,
-    pub(super) roller: usize,
-    pub(super) upright: usize,
-    pub(super) beam: usize,
-    pub(super) pallet: usize,
-    pub(super) crate_box: usize,
-    pub(super) carton: usize,
-    pub(super) drum: usize,
-    pub(super) bin: usize,
-    pub(super) bench: usize,
-    pub(super) girder: usize,
-    pub(super) end_truck: usize,
-    pub(super) trolley: usize,
-    pub(super) rope: usize,
-    pub(super) hook: usize,
-    pub(super) cart: usize,
-    pub(super) wheel: usize,
-}
 
 fn block(low: [f32; 3], high: [f32; 3], bevel: f32) -> MeshBuilder {
     let mut m = MeshBuilder::new();
@@ -60,22 +25,10 @@ fn boxes(list: &[([f32; 3], [f32; 3])], bevel: f32) -> MeshBuilder {
 /// An upright tank of radius 1.1 m from 0.7 m to 4.4 m above the floor.
 fn tank() -> MeshBuilder {
     lathed(
-        &[
-            smooth(0.0, 0.62),
-            smooth(0.7, 0.7),
-            smooth(1.05, 0.92),
-            sharp(1.1, 1.1),
-            sharp(1.1, 2.2),
-            sharp(1.13, 2.2),
-            sharp(1.13, 2.26),
-            sharp(1.1, 2.26),
-            sharp(1.1, 3.9),
-            smooth(1.02, 4.1),
-            smooth(0.6, 4.3),
-            sharp(0.3, 4.36),
-            sharp(0.3, 4.5),
-            sharp(0.0, 4.5),
-        ],
+        &profile(
+            "0,0.62 0.7,0.7 1.05,0.92 1.1,1.1! 1.1,2.2! 1.13,2.2! 1.13,2.26! 1.1,2.26! 1.1,3.9! \
+            1.02,4.1 0.6,4.3 0.3,4.36! 0.3,4.5! 0,4.5!",
+        ),
         18,
     )
 }
@@ -83,18 +36,9 @@ fn tank() -> MeshBuilder {
 /// A vessel of radius 0.6 m along z from 0 to 4.2 m, its axis at the origin's height.
 fn vessel() -> MeshBuilder {
     let upright = lathed(
-        &[
-            smooth(0.0, 0.0),
-            smooth(0.42, 0.08),
-            sharp(0.6, 0.3),
-            sharp(0.6, 0.9),
-            sharp(0.68, 0.9),
-            sharp(0.68, 1.0),
-            sharp(0.6, 1.0),
-            sharp(0.6, 3.9),
-            smooth(0.42, 4.12),
-            smooth(0.0, 4.2),
-        ],
+        &profile(
+            "0,0 0.42,0.08 0.6,0.3! 0.6,0.9! 0.68,0.9! 0.68,1! 0.6,1! 0.6,3.9! 0.42,4.12 0,4.2",
+        ),
         16,
     );
     let mut m = MeshBuilder::new();
@@ -122,31 +66,16 @@ fn ladder() -> MeshBuilder {
 fn pump() -> MeshBuilder {
     let mut m = MeshBuilder::new();
     let volute = lathed(
-        &[
-            sharp(0.09, -0.42),
-            sharp(0.16, -0.42),
-            sharp(0.16, -0.38),
-            sharp(0.09, -0.38),
-            smooth(0.1, -0.16),
-            smooth(0.24, -0.12),
-            smooth(0.27, 0.0),
-            smooth(0.2, 0.12),
-            smooth(0.1, 0.16),
-            sharp(0.08, 0.34),
-            sharp(0.0, 0.34),
-        ],
+        &profile(
+            "0.09,-0.42! 0.16,-0.42! 0.16,-0.38! 0.09,-0.38! 0.1,-0.16 0.24,-0.12 0.27,0 0.2,0.12 \
+            0.1,0.16 0.08,0.34! 0,0.34!",
+        ),
         14,
     );
     let place = Affine3A::from_translation(Vec3::Y * 0.35) * Affine3A::from_rotation_x(FRAC_PI_2);
     m.merge(&volute, place);
     let neck = lathed(
-        &[
-            sharp(0.09, 0.4),
-            sharp(0.09, 0.9),
-            sharp(0.15, 0.9),
-            sharp(0.15, 0.95),
-            sharp(0.0, 0.95),
-        ],
+        &profile("0.09,0.4! 0.09,0.9! 0.15,0.9! 0.15,0.95! 0,0.95!"),
         10,
     );
     m.merge(&neck, Affine3A::from_translation(Vec3::X * 0.12));
@@ -158,16 +87,8 @@ fn pump() -> MeshBuilder {
 fn motor() -> MeshBuilder {
     let mut m = MeshBuilder::new();
     let mut body = MeshBuilder::new();
-    let outline = [
-        sharp(0.0, -0.02),
-        sharp(0.06, -0.02),
-        sharp(0.06, 0.06),
-        sharp(0.2, 0.08),
-        sharp(0.22, 0.12),
-        sharp(0.22, 0.62),
-        smooth(0.2, 0.68),
-        sharp(0.0, 0.7),
-    ];
+    let outline =
+        profile("0,-0.02! 0.06,-0.02! 0.06,0.06! 0.2,0.08! 0.22,0.12! 0.22,0.62! 0.2,0.68 0,0.7!");
     // Cooling fins.
     body.lathe_shaped(&outline, 32, |angle, y| {
         let finned = f32::from(u8::from((0.12..0.63).contains(&y)));
@@ -197,13 +118,7 @@ fn mill() -> MeshBuilder {
     // Spindle head above a table with a vice.
     m.block(vec3(-0.3, 1.5, 0.0), vec3(0.1, 2.1, 0.45), 0.0);
     let spindle = lathed(
-        &[
-            sharp(0.0, 1.1),
-            sharp(0.03, 1.1),
-            sharp(0.05, 1.3),
-            sharp(0.12, 1.3),
-            sharp(0.12, 1.5),
-        ],
+        &profile("0,1.1! 0.03,1.1! 0.05,1.3! 0.12,1.3! 0.12,1.5!"),
         10,
     );
     m.merge(&spindle, Affine3A::from_translation(vec3(-0.1, 0.0, 0.2)));
@@ -224,7 +139,7 @@ fn press() -> MeshBuilder {
         ],
         0.02,
     );
-    let ram = lathed(&[sharp(0.18, 1.85), sharp(0.18, 2.6)], 12);
+    let ram = lathed(&profile("0.18,1.85! 0.18,2.6!"), 12);
     m.merge(&ram, Affine3A::IDENTITY);
     m
 }
@@ -244,19 +159,10 @@ fn pallet() -> MeshBuilder {
 
 fn drum() -> MeshBuilder {
     lathed(
-        &[
-            sharp(0.29, 0.0),
-            sharp(0.29, 0.28),
-            smooth(0.305, 0.3),
-            sharp(0.29, 0.32),
-            sharp(0.29, 0.58),
-            smooth(0.305, 0.6),
-            sharp(0.29, 0.62),
-            sharp(0.29, 0.88),
-            sharp(0.27, 0.88),
-            sharp(0.27, 0.86),
-            sharp(0.0, 0.86),
-        ],
+        &profile(
+            "0.29,0! 0.29,0.28! 0.305,0.3 0.29,0.32! 0.29,0.58! 0.305,0.6 0.29,0.62! 0.29,0.88! \
+            0.27,0.88! 0.27,0.86! 0,0.86!",
+        ),
         12,
     )
 }
@@ -320,23 +226,12 @@ fn tank_leg() -> MeshBuilder {
 }
 
 fn signal() -> MeshBuilder {
-    lathed(
-        &[sharp(0.05, 0.0), sharp(0.05, 0.14), smooth(0.0, 0.17)],
-        10,
-    )
+    lathed(&profile("0.05,0! 0.05,0.14! 0,0.17"), 10)
 }
 
 fn roller() -> MeshBuilder {
     let mut roller = MeshBuilder::new();
-    let turned = lathed(
-        &[
-            sharp(0.0, 0.0),
-            sharp(0.035, 0.0),
-            sharp(0.035, 0.64),
-            sharp(0.0, 0.64),
-        ],
-        8,
-    );
+    let turned = lathed(&profile("0,0! 0.035,0! 0.035,0.64! 0,0.64!"), 8);
     roller.merge(
         &turned,
         Affine3A::from_translation(Vec3::X * 0.32) * Affine3A::from_rotation_z(FRAC_PI_2),
@@ -359,22 +254,14 @@ fn rope() -> MeshBuilder {
     let mut rope = MeshBuilder::new();
     for (x, z) in [(-0.12, -0.05), (-0.12, 0.05), (0.12, -0.05), (0.12, 0.05)] {
         let at = vec3(x, 0.0, z);
-        rope.tube(&[(at, 0.014), (at + Vec3::Y * 3.5, 0.014)], 5);
+        rope.rod(at, at + Vec3::Y * 3.5, 0.014, 5);
     }
     rope
 }
 
 fn wheel() -> MeshBuilder {
     let mut wheel = MeshBuilder::new();
-    let tyre = lathed(
-        &[
-            sharp(0.0, -0.05),
-            sharp(0.14, -0.05),
-            sharp(0.14, 0.05),
-            sharp(0.0, 0.05),
-        ],
-        12,
-    );
+    let tyre = lathed(&profile("0,-0.05! 0.14,-0.05! 0.14,0.05! 0,0.05!"), 12);
     wheel.merge(&tyre, Affine3A::from_rotation_z(FRAC_PI_2));
     wheel
 }
@@ -418,80 +305,86 @@ fn bench() -> MeshBuilder {
     )
 }
 
-/// Adds the machines.
-pub(super) fn machines(scene: &mut SceneBuilder, kit: &PlantMaterials) -> Machines {
-    let mut add = |name: &str, m: MeshBuilder, material| scene.mesh(name, m, material);
-    Machines {
-        tank: add("tank", tank(), kit.stainless),
-        vessel: add("vessel", vessel(), kit.pipes[4]),
-        tank_leg: add("tank-leg", tank_leg(), kit.frame),
-        saddle: add(
+/// Adds the machines; returns the meshes of the signal lights.
+pub(super) fn machines(scene: &mut SceneBuilder) -> [usize; 2] {
+    for (name, mesh, material) in [
+        ("tank", tank(), "stainless"),
+        ("vessel", vessel(), PIPES[4]),
+        ("tank-leg", tank_leg(), "steel-frame"),
+        (
             "saddle",
             block([-0.55, 0.0, -0.12], [0.55, 0.7, 0.12], 0.0),
-            kit.frame,
+            "steel-frame",
         ),
-        ladder: add("ladder", ladder(), kit.crane),
-        pump: add("pump", pump(), kit.cast_iron),
-        motor: add("motor", motor(), kit.motor),
-        plinth: add(
+        ("ladder", ladder(), "crane-paint"),
+        ("pump", pump(), "cast-iron"),
+        ("motor", motor(), "motor"),
+        (
             "plinth",
             block([-0.4, 0.0, -0.55], [0.4, 0.15, 1.15], 0.02),
-            kit.hazard,
+            "hazard",
         ),
-        mill: add("mill", mill(), kit.machine),
-        mill_guard: add(
+        ("mill", mill(), "machine"),
+        (
             "mill-guard",
             block([-0.94, 0.76, -0.79], [0.74, 2.09, -0.77], 0.0),
-            kit.guard,
+            "acrylic-guard",
         ),
-        press: add("press", press(), kit.press),
-        cabinet: add(
+        ("press", press(), "press"),
+        (
             "cabinet",
             block([-0.5, 0.0, -0.25], [0.5, 2.0, 0.25], 0.02),
-            kit.machine,
+            "machine",
         ),
-        panel: add("panel", panel(), kit.panel),
-        signal: std::array::from_fn(|i| add("signal", signal(), kit.signals[i])),
-        conveyor: add("conveyor", conveyor(), kit.press),
-        roller: add("roller", roller(), kit.zinc),
-        upright: add("rack-upright", upright(), kit.rack),
-        beam: add(
+        ("panel", panel(), "panel"),
+    ] {
+        scene.mesh(name, mesh, material);
+    }
+    let signals = SIGNALS.map(|material| scene.mesh("signal", signal(), material));
+    for (name, mesh, material) in [
+        ("conveyor", conveyor(), "press"),
+        ("roller", roller(), "zinc"),
+        ("rack-upright", upright(), "rack-upright"),
+        (
             "shelf-beam",
             block([-0.03, -0.06, 0.0], [0.03, 0.06, 2.9], 0.0),
-            kit.beam,
+            "rack-beam",
         ),
-        pallet: add("pallet", pallet(), kit.wood),
-        crate_box: add(
+        ("pallet", pallet(), "pallet-wood"),
+        (
             "crate",
             block([-0.5, 0.0, -0.38], [0.5, 0.8, 0.38], 0.015),
-            kit.wood,
+            "pallet-wood",
         ),
-        carton: add(
+        (
             "carton",
             block([-0.28, 0.0, -0.19], [0.28, 0.36, 0.19], 0.0),
-            kit.card,
+            "cardboard",
         ),
-        drum: add("drum", drum(), kit.drum),
-        bin: add(
+        ("drum", drum(), "drum"),
+        (
             "bin",
             block([-0.18, 0.0, -0.2], [0.18, 0.26, 0.2], 0.01),
-            kit.bin,
+            "bin",
         ),
-        bench: add("bench", bench(), kit.wood),
-        girder: add("crane-girder", girder(), kit.crane),
-        end_truck: add(
+        ("bench", bench(), "pallet-wood"),
+        ("crane-girder", girder(), "crane-paint"),
+        (
             "crane-end-truck",
             block([-0.2, -0.1, -1.9], [0.2, 0.35, 1.9], 0.0),
-            kit.crane,
+            "crane-paint",
         ),
-        trolley: add("crane-trolley", trolley(), kit.hazard),
-        rope: add("crane-rope", rope(), kit.rubber),
-        hook: add("crane-hook", hook(), kit.crane),
-        cart: add(
+        ("crane-trolley", trolley(), "hazard"),
+        ("crane-rope", rope(), "rubber"),
+        ("crane-hook", hook(), "crane-paint"),
+        (
             "cart",
             block([-0.45, 0.12, -0.75], [0.45, 0.35, 0.75], 0.03),
-            kit.crane,
+            "crane-paint",
         ),
-        wheel: add("cart-wheel", wheel(), kit.rubber),
+        ("cart-wheel", wheel(), "rubber"),
+    ] {
+        scene.mesh(name, mesh, material);
     }
+    signals
 }

@@ -2,204 +2,107 @@
 
 use crate::noise::{bank, hash_unit, lerp, smoothstep};
 use crate::organic::{metal, planks};
-use crate::scene_builder::{MaterialId, SceneBuilder};
-use crate::texture_synth::{Maps, Recipe, Rgb, Surface, Texel, mix, rgb, shade};
-use glam::{Vec3, vec3};
+use crate::scene_builder::SceneBuilder;
+use crate::texture_synth::{Maps, Recipe, Rgb, Surface, Texel, mix, rgb, shade, tones};
+use glam::vec3;
 use scene::AlphaMode;
 use std::f32::consts::TAU;
 
 /// Number of services that pipes carry. Each has its own colour of paint.
 pub(super) const SERVICES: usize = 6;
 
-pub(super) struct PlantMaterials {
-    pub(super) floor: MaterialId,
-    pub(super) wall: MaterialId,
-    pub(super) roof: MaterialId,
-    pub(super) frame: MaterialId,
-    pub(super) crane: MaterialId,
-    pub(super) zinc: MaterialId,
-    pub(super) stainless: MaterialId,
-    pub(super) cast_iron: MaterialId,
-    pub(super) grating: MaterialId,
-    pub(super) hazard: MaterialId,
-    pub(super) pipes: [MaterialId; SERVICES],
-    pub(super) machine: MaterialId,
-    pub(super) press: MaterialId,
-    pub(super) motor: MaterialId,
-    pub(super) rack: MaterialId,
-    pub(super) beam: MaterialId,
-    pub(super) panel: MaterialId,
-    pub(super) sign: MaterialId,
-    pub(super) wood: MaterialId,
-    pub(super) card: MaterialId,
-    pub(super) drum: MaterialId,
-    pub(super) bin: MaterialId,
-    pub(super) rubber: MaterialId,
-    pub(super) cables: [MaterialId; 3],
-    pub(super) valve: MaterialId,
-    pub(super) dial: MaterialId,
-    pub(super) lamp: MaterialId,
-    pub(super) sky_light: MaterialId,
-    pub(super) signals: [MaterialId; 2],
-    pub(super) guard: MaterialId,
-    pub(super) lane: MaterialId,
-}
+/// Materials of pipes by service.
+pub(super) const PIPES: [&str; SERVICES] = [
+    "pipe-water",
+    "pipe-air",
+    "pipe-gas",
+    "pipe-fire",
+    "pipe-steam",
+    "pipe-acid",
+];
+/// Materials of cables.
+pub(super) const CABLES: [&str; 3] = ["cable-black", "cable-grey", "cable-orange"];
+/// Materials of signal lights.
+pub(super) const SIGNALS: [&str; 2] = ["signal-green", "signal-red"];
 
-/// A textured material; without a roughness map, roughness is 0.55.
-fn textured(
-    scene: &mut SceneBuilder,
-    name: &'static str,
-    size: u32,
-    maps: Maps,
-    tile_m: f32,
-    surface: Surface,
-) -> MaterialId {
-    let recipe = Recipe::new(name, size, maps, tile_m, surface);
-    let full = maps == Maps::Full;
-    scene.textured(recipe, |m| {
-        if !full {
-            m.roughness = 0.55;
-        }
-    })
-}
-
-/// Small parts of painted steel.
-fn small_painted(
-    scene: &mut SceneBuilder,
-    name: &'static str,
-    tile_m: f32,
-    color: u32,
-    wear: f32,
-) -> MaterialId {
-    let surface = painted(rgb(color), wear);
-    textured(scene, name, 256, Maps::ColorNormal, tile_m, surface)
-}
-
-/// Pipes by service.
-fn pipes(scene: &mut SceneBuilder) -> [MaterialId; SERVICES] {
-    [
-        small_painted(scene, "pipe-water", 1.5, 0x3f7a4c, 0.25),
-        small_painted(scene, "pipe-air", 1.5, 0x4d7fa8, 0.25),
-        small_painted(scene, "pipe-gas", 1.5, 0xc9a227, 0.25),
-        small_painted(scene, "pipe-fire", 1.5, 0xa5281f, 0.25),
-        textured(scene, "pipe-steam", 512, Maps::Full, 1.5, lagging()),
-        small_painted(scene, "pipe-acid", 1.5, 0x7d5a86, 0.25),
-    ]
-}
-
-fn grating(scene: &mut SceneBuilder) -> MaterialId {
-    let recipe = Recipe::new("grating", 256, Maps::Color, 1.0, grating_bars());
-    scene.textured(recipe, |m| {
-        m.alpha = AlphaMode::Mask(0.5);
-        m.double_sided = true;
-        m.roughness = 0.6;
-    })
-}
-
-fn guard(scene: &mut SceneBuilder) -> MaterialId {
-    scene.plain("acrylic-guard", rgb(0xb8d8dc), 0.08, |m| {
-        m.base_color.w = 0.28;
-        m.alpha = AlphaMode::Blend;
-        m.double_sided = true;
-    })
-}
-
-fn plain(
-    scene: &mut SceneBuilder,
-    name: &str,
-    color: u32,
-    roughness: f32,
-    emissive: Vec3,
-) -> MaterialId {
-    scene.plain(name, rgb(color), roughness, |m| m.emissive = emissive)
-}
-
-pub(super) fn kit(scene: &mut SceneBuilder) -> PlantMaterials {
+/// Adds the materials.
+pub(super) fn materials(scene: &mut SceneBuilder) {
     use Maps::{Color, ColorNormal, Full};
+    // Small parts of painted steel.
+    let small = |name, tile_m, color, wear| {
+        let surface = painted(rgb(color), wear);
+        (name, 256, ColorNormal, tile_m, surface)
+    };
     let stainless = metal(rgb(0xc6cacc), rgb(0x8a7a66), 0.15, 0.32);
-    let pallet_wood = planks([rgb(0xb98d58), rgb(0x8d6638)], 6, 0.85);
-    let dark = Vec3::ZERO;
-    PlantMaterials {
-        pipes: pipes(scene),
-        floor: textured(scene, "floor", 1024, Full, 6.0, concrete()),
-        wall: textured(
-            scene,
-            "cladding",
-            512,
-            ColorNormal,
-            3.0,
-            cladding(rgb(0xb9c2c6)),
-        ),
-        roof: textured(
-            scene,
-            "roof-deck",
-            256,
-            ColorNormal,
-            3.0,
-            cladding(rgb(0xd8dcdd)),
-        ),
-        frame: textured(
-            scene,
-            "steel-frame",
-            512,
-            Full,
-            2.0,
-            painted(rgb(0x5d7486), 0.35),
-        ),
-        crane: small_painted(scene, "crane-paint", 2.0, 0xe0a81c, 0.3),
-        zinc: textured(scene, "zinc", 256, Full, 1.0, galvanised()),
-        stainless: textured(scene, "stainless", 512, Full, 2.0, stainless),
-        cast_iron: textured(
-            scene,
-            "cast-iron",
-            256,
-            Full,
-            1.0,
-            painted(rgb(0x3f6f86), 0.5),
-        ),
-        hazard: textured(scene, "hazard", 256, ColorNormal, 0.8, hazard_stripes()),
-        machine: textured(
-            scene,
-            "machine",
-            512,
-            Full,
-            2.0,
-            machine_paint(rgb(0xc8ccc4)),
-        ),
-        press: textured(scene, "press", 512, Full, 2.0, machine_paint(rgb(0x4f7d6a))),
-        motor: small_painted(scene, "motor", 1.0, 0x3d5f94, 0.3),
-        rack: textured(
-            scene,
+    let pallet_wood = planks(tones(0xb98d58, 0x8d6638), 6, 0.85);
+    for (name, size, maps, tile_m, surface) in [
+        small(PIPES[0], 1.5, 0x3f7a4c, 0.25),
+        small(PIPES[1], 1.5, 0x4d7fa8, 0.25),
+        small(PIPES[2], 1.5, 0xc9a227, 0.25),
+        small(PIPES[3], 1.5, 0xa5281f, 0.25),
+        (PIPES[4], 512, Full, 1.5, lagging()),
+        small(PIPES[5], 1.5, 0x7d5a86, 0.25),
+        ("floor", 1024, Full, 6.0, concrete()),
+        ("cladding", 512, ColorNormal, 3.0, cladding(rgb(0xb9c2c6))),
+        ("roof-deck", 256, ColorNormal, 3.0, cladding(rgb(0xd8dcdd))),
+        ("steel-frame", 512, Full, 2.0, painted(rgb(0x5d7486), 0.35)),
+        small("crane-paint", 2.0, 0xe0a81c, 0.3),
+        ("zinc", 256, Full, 1.0, galvanised()),
+        ("stainless", 512, Full, 2.0, stainless),
+        ("cast-iron", 256, Full, 1.0, painted(rgb(0x3f6f86), 0.5)),
+        ("hazard", 256, ColorNormal, 0.8, hazard_stripes()),
+        ("machine", 512, Full, 2.0, machine_paint(rgb(0xc8ccc4))),
+        ("press", 512, Full, 2.0, machine_paint(rgb(0x4f7d6a))),
+        small("motor", 1.0, 0x3d5f94, 0.3),
+        (
             "rack-upright",
             256,
             ColorNormal,
             1.0,
             perforated(rgb(0x2f5ea8)),
         ),
-        beam: small_painted(scene, "rack-beam", 1.0, 0xd8701f, 0.25),
-        panel: textured(scene, "panel", 512, Full, 1.0, control_panel()),
-        sign: textured(scene, "sign", 256, Color, 1.0, warning_sign()),
-        wood: textured(scene, "pallet-wood", 256, ColorNormal, 1.2, pallet_wood),
-        card: textured(scene, "cardboard", 256, ColorNormal, 0.8, cardboard()),
-        drum: small_painted(scene, "drum", 1.2, 0x27589a, 0.3),
-        bin: textured(scene, "bin", 256, Color, 0.6, painted(rgb(0xb0352a), 0.05)),
-        grating: grating(scene),
-        guard: guard(scene),
-        rubber: plain(scene, "rubber", 0x1d1d1f, 0.8, dark),
-        cables: [
-            plain(scene, "cable-black", 0x232326, 0.6, dark),
-            plain(scene, "cable-grey", 0x77797c, 0.6, dark),
-            plain(scene, "cable-orange", 0xc8581a, 0.6, dark),
-        ],
-        valve: plain(scene, "handwheel", 0xb02418, 0.4, dark),
-        dial: plain(scene, "dial", 0xe9e9e2, 0.3, dark),
-        lamp: plain(scene, "lamp", 0xfff4e0, 0.5, vec3(5.0, 4.7, 4.2)),
-        sky_light: plain(scene, "sky-light", 0xeaf2f8, 0.5, vec3(1.5, 1.65, 1.8)),
-        signals: [
-            plain(scene, "signal-green", 0x1e9c40, 0.4, vec3(0.05, 1.2, 0.25)),
-            plain(scene, "signal-red", 0xb02018, 0.4, vec3(1.6, 0.1, 0.06)),
-        ],
-        lane: plain(scene, "lane-paint", 0xd9b120, 0.7, dark),
+        small("rack-beam", 1.0, 0xd8701f, 0.25),
+        ("panel", 512, Full, 1.0, control_panel()),
+        ("sign", 256, Color, 1.0, warning_sign()),
+        ("pallet-wood", 256, ColorNormal, 1.2, pallet_wood),
+        ("cardboard", 256, ColorNormal, 0.8, cardboard()),
+        small("drum", 1.2, 0x27589a, 0.3),
+        ("bin", 256, Color, 0.6, painted(rgb(0xb0352a), 0.05)),
+    ] {
+        scene.textured(Recipe::new(name, size, maps, tile_m, surface), |m| {
+            if maps != Full {
+                m.roughness = 0.55;
+            }
+        });
+    }
+    let grating = Recipe::new("grating", 256, Color, 1.0, grating_bars());
+    scene.textured(grating, |m| {
+        m.alpha = AlphaMode::Mask(0.5);
+        m.double_sided = true;
+        m.roughness = 0.6;
+    });
+    scene.plain("acrylic-guard", rgb(0xb8d8dc), 0.08, |m| {
+        m.base_color.w = 0.28;
+        m.alpha = AlphaMode::Blend;
+        m.double_sided = true;
+    });
+    let dark = [0.0; 3];
+    for (name, color, roughness, emissive) in [
+        ("rubber", 0x1d1d1f, 0.8, dark),
+        (CABLES[0], 0x232326, 0.6, dark),
+        (CABLES[1], 0x77797c, 0.6, dark),
+        (CABLES[2], 0xc8581a, 0.6, dark),
+        ("handwheel", 0xb02418, 0.4, dark),
+        ("dial", 0xe9e9e2, 0.3, dark),
+        ("lamp", 0xfff4e0, 0.5, [5.0, 4.7, 4.2]),
+        ("sky-light", 0xeaf2f8, 0.5, [1.5, 1.65, 1.8]),
+        (SIGNALS[0], 0x1e9c40, 0.4, [0.05, 1.2, 0.25]),
+        (SIGNALS[1], 0xb02018, 0.4, [1.6, 0.1, 0.06]),
+        ("lane-paint", 0xd9b120, 0.7, dark),
+    ] {
+        scene.plain(name, rgb(color), roughness, |m| {
+            m.emissive = emissive.into()
+        });
     }
 }
 
@@ -207,11 +110,7 @@ pub(super) fn kit(scene: &mut SceneBuilder) -> PlantMaterials {
 fn painted(color: Rgb, wear: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
-        let (cloud, mottle, grain) = (
-            noise.cloud.at(u, v),
-            noise.mottle.at(u, v),
-            noise.grain.at(u, v),
-        );
+        let [cloud, mottle, grain] = noise.at(u, v);
         let chipped = wear * smoothstep(0.66, 0.74, 0.5 * mottle + 0.3 * cloud + 0.2 * grain);
         let dirt = smoothstep(0.5, 0.95, cloud) * 0.2;
         let paint = shade(color, (0.92 + 0.14 * grain) * (1.0 - dirt));
@@ -231,11 +130,7 @@ fn painted(color: Rgb, wear: f32) -> Surface {
 fn concrete() -> Surface {
     Box::new(|u, v| {
         let noise = bank();
-        let (cloud, mottle, grain) = (
-            noise.cloud.at(u, v),
-            noise.mottle.at(u, v),
-            noise.grain.at(u, v),
-        );
+        let [cloud, mottle, grain] = noise.at(u, v);
         let edge = |x: f32| (x - x.floor()).min(1.0 - (x - x.floor()));
         let cut = smoothstep(0.0016, 0.0008, edge(u * 2.0).min(edge(v * 2.0)) / 2.0);
         let stain = smoothstep(

@@ -16,10 +16,11 @@ mod process;
 
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Mat3, Vec3, vec3};
-use machines::{Machines, machines};
-use materials::kit;
-use parts::{BAY_M, NAVE_M, Parts, parts};
+use machines::machines;
+use materials::materials;
+use parts::{BAY_M, NAVE_M, Pipework, parts};
 use scene::{Movement, Scene};
+use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
 /// Default number of instances.
@@ -52,21 +53,26 @@ const UP_WHEEL_OUT: Mat3 = Mat3::from_cols(Vec3::NEG_X, Vec3::Z, Vec3::Y);
 struct Layout {
     placed: Vec<(usize, Affine3A, Option<usize>)>,
     motions: Vec<Vec<Movement>>,
-    p: Parts,
-    m: Machines,
+    pipework: Pipework,
+    /// Green and red lights.
+    signals: [usize; 2],
+    /// Mesh numbers by name.
+    meshes: HashMap<String, usize>,
 }
 
 /// The scene with exactly this number of instances, within [`INSTANCES`].
 pub fn with_instances(instances: u32) -> Scene {
     let instances = instances as usize;
     let mut scene = SceneBuilder::new("plant");
-    let kit = kit(&mut scene);
-    let (p, m) = (parts(&mut scene, &kit), machines(&mut scene, &kit));
+    materials(&mut scene);
+    let pipework = parts(&mut scene);
+    let signals = machines(&mut scene);
     let mut layout = Layout {
         placed: Vec::with_capacity(instances),
         motions: Vec::new(),
-        p,
-        m,
+        pipework,
+        signals,
+        meshes: scene.mesh_numbers(),
     };
     // The hall is about three times as long as wide. Its last bay holds the stores.
     let cells = instances as f32 / 390.0;
@@ -130,15 +136,19 @@ impl Layout {
         self.motions.clear();
     }
 
-    fn put(&mut self, mesh: usize, turn: Mat3, x: f32, y: f32, z: f32) {
+    fn put(&mut self, name: &str, turn: Mat3, x: f32, y: f32, z: f32) {
+        self.put_mesh(self.meshes[name], turn, x, y, z);
+    }
+
+    fn put_mesh(&mut self, mesh: usize, turn: Mat3, x: f32, y: f32, z: f32) {
         let place = Affine3A::from_mat3_translation(turn, vec3(x, y, z));
         self.placed.push((mesh, place, None));
     }
 
     /// Places a part of a moving group.
-    fn put_moving(&mut self, motion: usize, mesh: usize, turn: Mat3, at: Vec3) {
+    fn put_moving(&mut self, motion: usize, name: &str, turn: Mat3, at: Vec3) {
         let place = Affine3A::from_mat3_translation(turn, at);
-        self.placed.push((mesh, place, Some(motion)));
+        self.placed.push((self.meshes[name], place, Some(motion)));
     }
 
     fn motion(&mut self, movements: Vec<Movement>) -> usize {
@@ -205,18 +215,18 @@ impl Layout {
     /// Four anchor bolts around a base plate.
     fn bolts(&mut self, x: f32, y: f32, z: f32, half_x: f32, half_z: f32) {
         for (sx, sz) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
-            self.put(self.p.bolt, ALONG, x + sx * half_x, y, z + sz * half_z);
+            self.put("bolt", ALONG, x + sx * half_x, y, z + sz * half_z);
         }
     }
 
     fn cabinet(&mut self, x: f32, z: f32, turn: Mat3, panel: bool) {
         // The door is at -z, so it faces against the rotated z axis.
         let turn = turn * AROUND;
-        self.put(self.m.cabinet, turn, x, 0.0, z);
+        self.put("cabinet", turn, x, 0.0, z);
         if panel {
-            self.put(self.m.panel, turn, x, 0.0, z);
-            self.put(
-                self.m.signal[usize::from(z as i32 % 5 == 0)],
+            self.put("panel", turn, x, 0.0, z);
+            self.put_mesh(
+                self.signals[usize::from(z as i32 % 5 == 0)],
                 turn,
                 x,
                 2.0,
@@ -229,17 +239,17 @@ impl Layout {
         // The door faces along the rotated z axis.
         let turn = turn * AROUND;
         let side = |along: f32, out: f32| turn * vec3(along, 0.0, -out);
-        self.put(self.m.mill, turn, x, 0.0, z);
-        self.put(self.m.mill_guard, turn, x, 0.0, z);
+        self.put("mill", turn, x, 0.0, z);
+        self.put("mill-guard", turn, x, 0.0, z);
         let light = side(1.0, 0.4);
-        self.put(
-            self.m.signal[number % 2],
+        self.put_mesh(
+            self.signals[number % 2],
             turn,
             x + light.x,
             2.35,
             z + light.z,
         );
         let bench = side(0.4, 1.4);
-        self.put(self.m.bin, turn, x + bench.x, 0.0, z + bench.z);
+        self.put("bin", turn, x + bench.x, 0.0, z + bench.z);
     }
 }

@@ -32,7 +32,7 @@ impl Layout {
         for dz in [-1.0, 1.0] {
             self.put_moving(
                 bridge,
-                self.m.girder,
+                "crane-girder",
                 ALONG,
                 vec3(middle, rail + 0.1, z + dz),
             );
@@ -40,18 +40,18 @@ impl Layout {
         for side in [0.75, NAVE_M - 0.75] {
             self.put_moving(
                 bridge,
-                self.m.end_truck,
+                "crane-end-truck",
                 ALONG,
                 vec3(x + side, rail + 0.1, z),
             );
         }
         let trolley = self.motion(vec![travel, across]);
         let at = vec3(x + 10.3, rail + 1.06, z);
-        self.put_moving(trolley, self.m.trolley, ALONG, at);
+        self.put_moving(trolley, "crane-trolley", ALONG, at);
         // The ropes' upper ends stay inside the trolley's drum.
         let load = self.motion(vec![travel, across, hoist]);
-        self.put_moving(load, self.m.rope, ALONG, at - Vec3::Y * 2.7);
-        self.put_moving(load, self.m.hook, ALONG, at - Vec3::Y * 3.6);
+        self.put_moving(load, "crane-rope", ALONG, at - Vec3::Y * 2.7);
+        self.put_moving(load, "crane-hook", ALONG, at - Vec3::Y * 3.6);
     }
 
     /// A cart that drives along the aisle with a crate.
@@ -64,24 +64,24 @@ impl Layout {
             phase: 0.08,
         };
         let motion = self.motion(vec![drive]);
-        self.put_moving(motion, self.m.cart, ALONG, vec3(x, 0.0, z));
-        self.put_moving(motion, self.m.pallet, RIGHT, vec3(x, 0.35, z));
-        self.put_moving(motion, self.m.crate_box, RIGHT, vec3(x, 0.494, z));
+        self.put_moving(motion, "cart", ALONG, vec3(x, 0.0, z));
+        self.put_moving(motion, "pallet", RIGHT, vec3(x, 0.35, z));
+        self.put_moving(motion, "crate", RIGHT, vec3(x, 0.494, z));
         for (sx, sz) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
             let at = vec3(x + 0.4 * sx, 0.14, z + 0.5 * sz);
-            self.put_moving(motion, self.m.wheel, ALONG, at);
+            self.put_moving(motion, "cart-wheel", ALONG, at);
         }
     }
 
     /// A fan in the end wall.
     pub(super) fn fan(&mut self, x: f32, z: f32, phase: f32) {
         let at = vec3(x, 9.0, z);
-        self.put(self.p.fan_ring, ALONG, at.x, at.y, at.z);
+        self.put("fan-ring", ALONG, at.x, at.y, at.z);
         let turning = self.motion(vec![Movement::Turn {
             pivot: at,
             axis: Vec3::Z,
             turns_per_s: 1.3 + 0.2 * phase,
         }]);
-        self.put_moving(turning, self.p.fan_blades, ALONG, at);
+        self.put_moving(turning, "fan-blades", ALONG, at);
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! Long parts run along +z from their origin. Parts on the floor have their origin there.
 
-use super::materials::{PlantMaterials, SERVICES};
-use crate::mesh_builder::{Knot, MeshBuilder, SweepFrame, lathed, sharp, smooth};
+use super::materials::{CABLES, PIPES, SERVICES};
+use crate::mesh_builder::{Knot, MeshBuilder, SweepFrame, lathed, profile, sharp, smooth};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -22,48 +22,15 @@ pub(super) const BEND: f32 = 3.0;
 const SIDES: [usize; 3] = [6, 8, 12];
 const SIZES: [&str; 3] = ["s", "m", "l"];
 
-/// Mesh numbers.
-pub(super) struct Parts {
-    pub(super) slab: usize,
-    pub(super) lane: usize,
-    pub(super) wall: usize,
-    pub(super) window: usize,
-    pub(super) deck: usize,
-    pub(super) sky_light: usize,
-    pub(super) column: usize,
-    pub(super) truss: usize,
-    pub(super) purlin: usize,
-    pub(super) runway: usize,
-    pub(super) bracket: usize,
-    pub(super) bolt: usize,
-    pub(super) lamp_shade: usize,
-    pub(super) lamp: usize,
+/// Numbers of the meshes that exist in several sizes and colours.
+pub(super) struct Pipework {
     /// Pipes of bay length, by size and service.
     pub(super) pipe: [[usize; SERVICES]; 3],
     /// Pipes of 2 m length, by size and service.
     pub(super) spool: [[usize; SERVICES]; 3],
     pub(super) elbow: [[usize; SERVICES]; 3],
     pub(super) flange: [usize; 3],
-    pub(super) shoe: usize,
-    pub(super) valve: usize,
-    pub(super) gauge: usize,
-    pub(super) rack_post: usize,
-    pub(super) rack_beam: usize,
-    pub(super) tray: usize,
-    pub(super) stand: usize,
     pub(super) cable: [usize; 3],
-    pub(super) duct: usize,
-    pub(super) diffuser: usize,
-    pub(super) sprinkler: usize,
-    pub(super) grating: usize,
-    pub(super) stringer: usize,
-    pub(super) railing: usize,
-    pub(super) leg: usize,
-    pub(super) stairs: usize,
-    pub(super) bollard: usize,
-    pub(super) sign: usize,
-    pub(super) fan_ring: usize,
-    pub(super) fan_blades: usize,
 }
 
 /// A straight prism of an outline (counter-clockwise, closed by its first point) along +z.
@@ -129,7 +96,7 @@ pub(super) fn bar(m: &mut MeshBuilder, from: Vec3, to: Vec3, width: f32) {
 
 fn straight_pipe(radius: f32, length: f32, sides: usize) -> MeshBuilder {
     let mut m = MeshBuilder::new();
-    m.tube(&[(Vec3::ZERO, radius), (Vec3::Z * length, radius)], sides);
+    m.rod(Vec3::ZERO, Vec3::Z * length, radius, sides);
     m
 }
 
@@ -177,23 +144,13 @@ fn valve() -> MeshBuilder {
     );
     m.merge(&body, Affine3A::from_rotation_x(FRAC_PI_2));
     let bonnet = lathed(
-        &[
-            sharp(0.07, 0.08),
-            sharp(0.06, 0.22),
-            sharp(0.02, 0.24),
-            sharp(0.018, 0.42),
-            sharp(0.0, 0.42),
-        ],
+        &profile("0.07,0.08! 0.06,0.22! 0.02,0.24! 0.018,0.42! 0,0.42!"),
         8,
     );
     m.merge(&bonnet, Affine3A::IDENTITY);
-    let wheel: Vec<(Vec3, f32)> = (0..=10)
-        .map(|i| {
-            let (sin, cos) = (TAU * (i % 10) as f32 / 10.0).sin_cos();
-            (vec3(0.14 * cos, 0.39, 0.14 * sin), 0.014)
-        })
-        .collect();
-    m.tube(&wheel, 4);
+    m.ring([10, 4], 0.014, |sin, cos| {
+        vec3(0.14 * cos, 0.39, 0.14 * sin)
+    });
     bar(&mut m, vec3(-0.14, 0.39, 0.0), vec3(0.14, 0.39, 0.0), 0.016);
     bar(&mut m, vec3(0.0, 0.39, -0.14), vec3(0.0, 0.39, 0.14), 0.016);
     m
@@ -202,17 +159,9 @@ fn valve() -> MeshBuilder {
 /// A pressure gauge on a stem, its face to +z.
 fn gauge() -> MeshBuilder {
     let mut m = MeshBuilder::new();
-    let stem = lathed(&[sharp(0.012, 0.0), sharp(0.012, 0.16)], 6);
+    let stem = lathed(&profile("0.012,0! 0.012,0.16!"), 6);
     m.merge(&stem, Affine3A::IDENTITY);
-    let can = lathed(
-        &[
-            sharp(0.0, -0.02),
-            sharp(0.06, -0.02),
-            sharp(0.06, 0.02),
-            sharp(0.0, 0.02),
-        ],
-        12,
-    );
+    let can = lathed(&profile("0,-0.02! 0.06,-0.02! 0.06,0.02! 0,0.02!"), 12);
     let face = Affine3A::from_translation(Vec3::Y * 0.2) * Affine3A::from_rotation_x(FRAC_PI_2);
     m.merge(&can, face);
     m
@@ -256,7 +205,7 @@ fn railing() -> MeshBuilder {
         m.block(vec3(-0.02, 0.0, z - 0.02), vec3(0.02, 1.1, z + 0.02), 0.0);
     }
     for y in [0.55, 1.1] {
-        m.tube(&[(vec3(0.0, y, 0.0), 0.024), (vec3(0.0, y, 2.0), 0.024)], 6);
+        m.rod(vec3(0.0, y, 0.0), vec3(0.0, y, 2.0), 0.024, 6);
     }
     m.block(vec3(-0.006, 0.02, 0.0), vec3(0.006, 0.14, 2.0), 0.0);
     m
@@ -306,28 +255,14 @@ fn fan_blades() -> MeshBuilder {
         blade.block(vec3(0.08, -0.11, -0.01), vec3(0.68, 0.11, 0.01), 0.0);
         m.merge(&blade, turn * Affine3A::from_rotation_x(0.5));
     }
-    let hub = lathed(
-        &[
-            sharp(0.0, -0.08),
-            sharp(0.11, -0.08),
-            sharp(0.11, 0.06),
-            smooth(0.0, 0.1),
-        ],
-        10,
-    );
+    let hub = lathed(&profile("0,-0.08! 0.11,-0.08! 0.11,0.06! 0,0.1"), 10);
     m.merge(&hub, Affine3A::from_rotation_x(FRAC_PI_2));
     m
 }
 
 fn fan_ring() -> MeshBuilder {
     let ring = lathed(
-        &[
-            sharp(0.74, -0.15),
-            sharp(0.82, -0.15),
-            sharp(0.82, 0.15),
-            sharp(0.74, 0.15),
-            sharp(0.74, -0.15),
-        ],
+        &profile("0.74,-0.15! 0.82,-0.15! 0.82,0.15! 0.74,0.15! 0.74,-0.15!"),
         18,
     );
     let mut m = MeshBuilder::new();
@@ -369,33 +304,20 @@ fn bracket() -> MeshBuilder {
 
 fn bolt() -> MeshBuilder {
     lathed(
-        &[
-            sharp(0.024, 0.0),
-            sharp(0.024, 0.03),
-            sharp(0.012, 0.03),
-            sharp(0.012, 0.07),
-            sharp(0.0, 0.07),
-        ],
+        &profile("0.024,0! 0.024,0.03! 0.012,0.03! 0.012,0.07! 0,0.07!"),
         6,
     )
 }
 
 fn lamp_shade() -> MeshBuilder {
     lathed(
-        &[
-            sharp(0.32, 0.0),
-            smooth(0.3, 0.1),
-            smooth(0.12, 0.26),
-            sharp(0.1, 0.45),
-            sharp(0.012, 0.45),
-            sharp(0.012, 1.1),
-        ],
+        &profile("0.32,0! 0.3,0.1 0.12,0.26 0.1,0.45! 0.012,0.45! 0.012,1.1!"),
         12,
     )
 }
 
 fn lamp() -> MeshBuilder {
-    let mut lamp = lathed(&[sharp(0.0, 0.02), sharp(0.29, 0.06)], 12);
+    let mut lamp = lathed(&profile("0,0.02! 0.29,0.06!"), 12);
     lamp.orient(|_| Vec3::NEG_Y);
     lamp
 }
@@ -448,12 +370,7 @@ fn duct() -> MeshBuilder {
     let mut duct = straight_pipe(0.45, BAY_M, 14);
     for z in [0.02, 2.0, 4.0] {
         let ring = lathed(
-            &[
-                sharp(0.45, -0.03),
-                sharp(0.48, -0.03),
-                sharp(0.48, 0.03),
-                sharp(0.45, 0.03),
-            ],
+            &profile("0.45,-0.03! 0.48,-0.03! 0.48,0.03! 0.45,0.03!"),
             14,
         );
         let place = Affine3A::from_translation(Vec3::Z * z) * Affine3A::from_rotation_x(FRAC_PI_2);
@@ -463,27 +380,11 @@ fn duct() -> MeshBuilder {
 }
 
 fn diffuser() -> MeshBuilder {
-    lathed(
-        &[
-            sharp(0.0, -0.75),
-            sharp(0.35, -0.75),
-            sharp(0.2, -0.6),
-            sharp(0.2, -0.4),
-        ],
-        12,
-    )
+    lathed(&profile("0,-0.75! 0.35,-0.75! 0.2,-0.6! 0.2,-0.4!"), 12)
 }
 
 fn sprinkler() -> MeshBuilder {
-    lathed(
-        &[
-            sharp(0.0, -0.2),
-            sharp(0.035, -0.19),
-            sharp(0.012, -0.17),
-            sharp(0.012, 0.0),
-        ],
-        6,
-    )
+    lathed(&profile("0,-0.2! 0.035,-0.19! 0.012,-0.17! 0.012,0!"), 6)
 }
 
 fn grating() -> MeshBuilder {
@@ -508,15 +409,7 @@ fn leg() -> MeshBuilder {
 }
 
 fn bollard() -> MeshBuilder {
-    lathed(
-        &[
-            sharp(0.1, 0.0),
-            sharp(0.1, 0.9),
-            smooth(0.07, 0.98),
-            smooth(0.0, 1.0),
-        ],
-        10,
-    )
+    lathed(&profile("0.1,0! 0.1,0.9! 0.07,0.98 0,1"), 10)
 }
 
 fn sign() -> MeshBuilder {
@@ -528,63 +421,51 @@ fn sign() -> MeshBuilder {
 }
 
 /// Flat sheets: slab, lane, wall, window, roof deck and sky light.
-fn panels(scene: &mut SceneBuilder, kit: &PlantMaterials) -> [usize; 6] {
-    let mut panel = |name: &str, corner: Vec3, right: Vec3, up: Vec3, material| {
+fn panels(scene: &mut SceneBuilder) {
+    let b = BAY_M;
+    let corner = vec3(0.0, 0.0, b);
+    for (name, corner, right, up, material) in [
+        ("floor-slab", corner, Vec3::X * b, Vec3::Z * -b, "floor"),
+        (
+            "lane",
+            vec3(-0.06, 0.0, b),
+            Vec3::X * 0.12,
+            Vec3::Z * -b,
+            "lane-paint",
+        ),
+        // Walls face +x and are half as high as the hall, with room for bands of windows between them.
+        ("wall", corner, Vec3::Z * -b, Vec3::Y * 5.0, "cladding"),
+        ("window", corner, Vec3::Z * -b, Vec3::Y * 1.5, "sky-light"),
+        // Seen from below.
+        (
+            "roof-deck",
+            Vec3::ZERO,
+            Vec3::X * b,
+            Vec3::Z * b,
+            "roof-deck",
+        ),
+        (
+            "sky-light",
+            vec3(0.3, -0.05, 0.9),
+            Vec3::X * 1.2,
+            Vec3::Z * (b - 1.8),
+            "sky-light",
+        ),
+    ] {
         let mut m = MeshBuilder::new();
         m.panel(corner, right, up, 1, 1);
-        scene.mesh(name, m, material)
-    };
-    let b = BAY_M;
-    let slab = panel(
-        "floor-slab",
-        vec3(0.0, 0.0, b),
-        Vec3::X * b,
-        Vec3::Z * -b,
-        kit.floor,
-    );
-    let lane = panel(
-        "lane",
-        vec3(-0.06, 0.0, b),
-        Vec3::X * 0.12,
-        Vec3::Z * -b,
-        kit.lane,
-    );
-    // Walls face +x and are half as high as the hall, with room for bands of windows between them.
-    let wall = panel(
-        "wall",
-        vec3(0.0, 0.0, b),
-        Vec3::Z * -b,
-        Vec3::Y * 5.0,
-        kit.wall,
-    );
-    let window = panel(
-        "window",
-        vec3(0.0, 0.0, b),
-        Vec3::Z * -b,
-        Vec3::Y * 1.5,
-        kit.sky_light,
-    );
-    // Seen from below.
-    let deck = panel("roof-deck", Vec3::ZERO, Vec3::X * b, Vec3::Z * b, kit.roof);
-    let light = vec3(0.3, -0.05, 0.9);
-    let sky_light = panel(
-        "sky-light",
-        light,
-        Vec3::X * 1.2,
-        Vec3::Z * (b - 1.8),
-        kit.sky_light,
-    );
-    [slab, lane, wall, window, deck, sky_light]
+        scene.mesh(name, m, material);
+    }
 }
 
 /// Pipes, spools and elbows, each by size and service.
-fn pipes(scene: &mut SceneBuilder, kit: &PlantMaterials) -> [[[usize; SERVICES]; 3]; 3] {
-    let services = ["water", "air", "gas", "fire", "steam", "acid"];
+fn pipes(scene: &mut SceneBuilder) -> [[[usize; SERVICES]; 3]; 3] {
     let mut each = |what: &str, mesh: &dyn Fn(usize) -> MeshBuilder| {
         std::array::from_fn(|size| {
             std::array::from_fn(|service| {
-                let name = format!("{what}-{}-{}", SIZES[size], services[service]);
-                scene.mesh(&name, mesh(size), kit.pipes[service])
+                let material = PIPES[service];
+                let name = material.replace("pipe", &format!("{what}-{}", SIZES[size]));
+                scene.mesh(&name, mesh(size), material)
             })
         })
     };
@@ -599,52 +480,54 @@ fn pipes(scene: &mut SceneBuilder, kit: &PlantMaterials) -> [[[usize; SERVICES];
 }
 
 /// Adds the parts.
-pub(super) fn parts(scene: &mut SceneBuilder, kit: &PlantMaterials) -> Parts {
-    let [slab, lane, wall, window, deck, sky_light] = panels(scene, kit);
-    let [pipe, spool, elbow] = pipes(scene, kit);
+pub(super) fn parts(scene: &mut SceneBuilder) -> Pipework {
+    panels(scene);
+    let [pipe, spool, elbow] = pipes(scene);
     let flange = std::array::from_fn(|size| {
         let name = format!("flange-{}", SIZES[size]);
-        scene.mesh(&name, flange(RADII_M[size], SIDES[size] + 2), kit.cast_iron)
+        scene.mesh(&name, flange(RADII_M[size], SIDES[size] + 2), "cast-iron")
     });
-    let mut add = |name: &str, m: MeshBuilder, material| scene.mesh(name, m, material);
-    Parts {
-        slab,
-        lane,
-        wall,
-        window,
-        deck,
-        sky_light,
-        column: add("column", column(), kit.frame),
-        truss: add("truss", truss(), kit.frame),
-        purlin: add("purlin", purlin(), kit.zinc),
-        runway: add("runway", runway(), kit.frame),
-        bracket: add("bracket", bracket(), kit.frame),
-        bolt: add("bolt", bolt(), kit.zinc),
-        lamp_shade: add("lamp-shade", lamp_shade(), kit.zinc),
-        lamp: add("lamp", lamp(), kit.lamp),
+    for (name, mesh, material) in [
+        ("column", column(), "steel-frame"),
+        ("truss", truss(), "steel-frame"),
+        ("purlin", purlin(), "zinc"),
+        ("runway", runway(), "steel-frame"),
+        ("bracket", bracket(), "steel-frame"),
+        ("bolt", bolt(), "zinc"),
+        ("lamp-shade", lamp_shade(), "zinc"),
+        ("lamp", lamp(), "lamp"),
+        ("pipe-shoe", pipe_shoe(), "zinc"),
+        ("valve", valve(), "handwheel"),
+        ("gauge", gauge(), "dial"),
+        ("rack-post", rack_post(), "steel-frame"),
+        ("rack-beam", rack_beam(), "steel-frame"),
+        ("tray", tray(), "zinc"),
+        ("stand", stand(), "zinc"),
+    ] {
+        scene.mesh(name, mesh, material);
+    }
+    let cable = std::array::from_fn(|i| scene.mesh("cable", cable(i), CABLES[i]));
+    for (name, mesh, material) in [
+        ("duct", duct(), "zinc"),
+        ("diffuser", diffuser(), "zinc"),
+        ("sprinkler", sprinkler(), "stainless"),
+        ("grating", grating(), "grating"),
+        ("stringer", stringer(), "steel-frame"),
+        ("railing", railing(), "crane-paint"),
+        ("leg", leg(), "steel-frame"),
+        ("stairs", stairs(), "steel-frame"),
+        ("bollard", bollard(), "hazard"),
+        ("sign", sign(), "sign"),
+        ("fan-ring", fan_ring(), "steel-frame"),
+        ("fan-blades", fan_blades(), "cast-iron"),
+    ] {
+        scene.mesh(name, mesh, material);
+    }
+    Pipework {
         pipe,
         spool,
         elbow,
         flange,
-        shoe: add("pipe-shoe", pipe_shoe(), kit.zinc),
-        valve: add("valve", valve(), kit.valve),
-        gauge: add("gauge", gauge(), kit.dial),
-        rack_post: add("rack-post", rack_post(), kit.frame),
-        rack_beam: add("rack-beam", rack_beam(), kit.frame),
-        tray: add("tray", tray(), kit.zinc),
-        stand: add("stand", stand(), kit.zinc),
-        cable: std::array::from_fn(|i| add("cable", cable(i), kit.cables[i])),
-        duct: add("duct", duct(), kit.zinc),
-        diffuser: add("diffuser", diffuser(), kit.zinc),
-        sprinkler: add("sprinkler", sprinkler(), kit.stainless),
-        grating: add("grating", grating(), kit.grating),
-        stringer: add("stringer", stringer(), kit.frame),
-        railing: add("railing", railing(), kit.crane),
-        leg: add("leg", leg(), kit.frame),
-        stairs: add("stairs", stairs(), kit.frame),
-        bollard: add("bollard", bollard(), kit.hazard),
-        sign: add("sign", sign(), kit.sign),
-        fan_ring: add("fan-ring", fan_ring(), kit.frame),
-        fan_blades: add("fan-blades", fan_blades(), kit.cast_iron),
+        cable,
     }
 }

@@ -9,24 +9,24 @@ impl Layout {
     /// Three levels of pipes along the nave, with supports, joints and branches.
     pub(super) fn pipe_rack(&mut self, x: f32, z: f32, nave: usize, bay: usize) {
         for post in [0.9, 3.3] {
-            self.put(self.p.rack_post, ALONG, x + post, 0.0, z + 1.0);
+            self.put("rack-post", ALONG, x + post, 0.0, z + 1.0);
             self.bolts(x + post, 0.02, z + 1.0, 0.15, 0.15);
         }
         for (level, y) in [4.0, 5.0, 6.0].into_iter().enumerate() {
-            self.put(self.p.rack_beam, ALONG, x + 0.9, y, z + 1.0);
+            self.put("rack-beam", ALONG, x + 0.9, y, z + 1.0);
             let mut at = x + 1.15;
             for slot in 0..7 {
                 let (size, service) = rack_pipe(nave, level, slot);
                 let radius = RADII_M[size];
                 at += radius;
                 let height = y + 0.16 + radius;
-                self.put(self.p.pipe[size][service], ALONG, at, height, z);
-                self.put(self.p.shoe, ALONG, at, y + 0.1, z + 1.0);
+                self.put_mesh(self.pipework.pipe[size][service], ALONG, at, height, z);
+                self.put("pipe-shoe", ALONG, at, y + 0.1, z + 1.0);
                 if (bay + slot).is_multiple_of(2) {
-                    self.put(self.p.flange[size], ALONG, at, height, z);
+                    self.put_mesh(self.pipework.flange[size], ALONG, at, height, z);
                 }
                 if (bay * 7 + slot) % 9 == 4 && size == 1 {
-                    self.put(self.p.valve, ALONG, at, height, z + 4.0);
+                    self.put("valve", ALONG, at, height, z + 4.0);
                 }
                 at += radius + 0.1;
             }
@@ -45,8 +45,8 @@ impl Layout {
                 self.drop_pipe(x, z + 2.95, nave, bay, 4.4);
             }
         }
-        self.put(self.p.bollard, ALONG, x + 9.7, 0.0, z + 1.6);
-        self.put(self.p.bollard, ALONG, x + 9.7, 0.0, z + 4.6);
+        self.put("bollard", ALONG, x + 9.7, 0.0, z + 1.6);
+        self.put("bollard", ALONG, x + 9.7, 0.0, z + 4.6);
         // Switchgear under the rack.
         for k in 0..3 {
             self.cabinet(x + 1.9, z + 1.9 + 1.15 * k as f32, RIGHT, k == 1);
@@ -58,53 +58,71 @@ impl Layout {
         let service = (nave + bay) % SERVICES;
         let bend = BEND * RADII_M[1];
         let (y, end) = (3.6, x + reach);
-        self.put(self.p.spool[1][service], RIGHT, end - bend - 2.0, y, z);
-        self.put(self.p.elbow[1][service], RIGHT_DOWN, end - bend, y, z);
-        self.put(self.p.spool[1][service], UP, end, y - bend - 2.0, z);
-        self.put(self.p.flange[1], UP, end, y - bend, z);
+        self.put_mesh(
+            self.pipework.spool[1][service],
+            RIGHT,
+            end - bend - 2.0,
+            y,
+            z,
+        );
+        self.put_mesh(
+            self.pipework.elbow[1][service],
+            RIGHT_DOWN,
+            end - bend,
+            y,
+            z,
+        );
+        self.put_mesh(self.pipework.spool[1][service], UP, end, y - bend - 2.0, z);
+        self.put_mesh(self.pipework.flange[1], UP, end, y - bend, z);
         let valve = y - bend - 2.0 - 0.2;
-        self.put(self.p.valve, UP, end, valve, z);
-        self.put(self.p.flange[1], UP, end, valve - 0.2, z);
+        self.put("valve", UP, end, valve, z);
+        self.put_mesh(self.pipework.flange[1], UP, end, valve - 0.2, z);
         // Continues into the floor.
-        self.put(self.p.spool[1][service], UP, end, valve - 2.2, z);
+        self.put_mesh(self.pipework.spool[1][service], UP, end, valve - 2.2, z);
     }
 
     /// Two tanks with legs, ladder, pipes and gauges.
     fn tanks(&mut self, x: f32, z: f32, nave: usize, bay: usize) {
         for (k, (dx, dz)) in [(5.6, 1.5), (7.6, 4.4)].into_iter().enumerate() {
             let (tx, tz) = (x + dx, z + dz);
-            self.put(self.m.tank, ALONG, tx, 0.0, tz);
+            self.put("tank", ALONG, tx, 0.0, tz);
             for (sx, sz) in [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)] {
                 let (lx, lz) = (tx + sx * 0.72, tz + sz * 0.72);
-                self.put(self.m.tank_leg, ALONG, lx, 0.0, lz);
+                self.put("tank-leg", ALONG, lx, 0.0, lz);
                 self.bolts(lx, 0.02, lz, 0.1, 0.1);
             }
-            self.put(self.m.ladder, ALONG, tx, 0.0, tz - 1.32);
-            self.put(self.p.gauge, RIGHT, tx + 0.9, 4.1, tz);
-            self.put(self.p.sign, RIGHT, tx + 1.14, 1.5, tz);
+            self.put("ladder", ALONG, tx, 0.0, tz - 1.32);
+            self.put("gauge", RIGHT, tx + 0.9, 4.1, tz);
+            self.put("sign", RIGHT, tx + 1.14, 1.5, tz);
             // From the tank's top back to the rack.
             let service = (nave + bay + k) % SERVICES;
             let bend = BEND * RADII_M[1];
             let top = 4.45 + 0.3;
-            self.put(self.p.flange[1], UP, tx, 4.55, tz);
-            self.put(self.p.elbow[1][service], UP_LEFT, tx, top - 0.28, tz);
+            self.put_mesh(self.pipework.flange[1], UP, tx, 4.55, tz);
+            self.put_mesh(self.pipework.elbow[1][service], UP_LEFT, tx, top - 0.28, tz);
             let turned = tx - bend;
-            self.put(
-                self.p.spool[1][service],
+            self.put_mesh(
+                self.pipework.spool[1][service],
                 LEFT,
                 turned,
                 top - 0.28 + bend,
                 tz,
             );
             if k == 1 {
-                self.put(
-                    self.p.spool[1][service],
+                self.put_mesh(
+                    self.pipework.spool[1][service],
                     LEFT,
                     turned - 2.0,
                     top - 0.28 + bend,
                     tz,
                 );
-                self.put(self.p.flange[1], LEFT, turned - 2.0, top - 0.28 + bend, tz);
+                self.put_mesh(
+                    self.pipework.flange[1],
+                    LEFT,
+                    turned - 2.0,
+                    top - 0.28 + bend,
+                    tz,
+                );
             }
         }
     }
@@ -115,29 +133,35 @@ impl Layout {
         let pz = z + 3.2;
         for k in 0..4 {
             let px = x + 4.9 + 1.25 * k as f32;
-            self.put(self.m.plinth, ALONG, px, 0.0, pz);
+            self.put("plinth", ALONG, px, 0.0, pz);
             self.bolts(px, 0.15, pz + 0.3, 0.32, 0.75);
-            self.put(self.m.pump, ALONG, px, 0.15, pz);
-            self.put(self.m.motor, ALONG, px, 0.15, pz + 0.36);
-            self.put(self.p.gauge, AROUND, px - 0.2, 0.6, pz);
+            self.put("pump", ALONG, px, 0.15, pz);
+            self.put("motor", ALONG, px, 0.15, pz + 0.36);
+            self.put("gauge", AROUND, px - 0.2, 0.6, pz);
             let riser = px + 0.12;
-            self.put(self.p.flange[1], UP, riser, 1.12, pz);
-            self.put(self.p.valve, UP_WHEEL_OUT, riser, 1.34, pz);
-            self.put(self.p.flange[1], UP, riser, 1.56, pz);
-            self.put(self.p.spool[1][service], UP, riser, 1.56, pz);
-            self.put(self.p.flange[1], ALONG, px, 0.5, pz - 0.42);
-            self.put(self.p.valve, ALONG, px, 0.5, pz - 0.64);
-            self.put(self.p.flange[1], ALONG, px, 0.5, pz - 0.86);
-            self.put(self.p.spool[1][service], AROUND, px, 0.5, pz - 0.84);
+            self.put_mesh(self.pipework.flange[1], UP, riser, 1.12, pz);
+            self.put("valve", UP_WHEEL_OUT, riser, 1.34, pz);
+            self.put_mesh(self.pipework.flange[1], UP, riser, 1.56, pz);
+            self.put_mesh(self.pipework.spool[1][service], UP, riser, 1.56, pz);
+            self.put_mesh(self.pipework.flange[1], ALONG, px, 0.5, pz - 0.42);
+            self.put("valve", ALONG, px, 0.5, pz - 0.64);
+            self.put_mesh(self.pipework.flange[1], ALONG, px, 0.5, pz - 0.86);
+            self.put_mesh(self.pipework.spool[1][service], AROUND, px, 0.5, pz - 0.84);
         }
-        self.put(self.p.pipe[2][service], RIGHT, x + 3.3, 3.75, pz);
-        self.put(self.p.flange[2], RIGHT, x + 9.3, 3.75, pz);
-        self.put(self.p.pipe[2][service], RIGHT, x + 3.5, 0.5, z + 0.36);
+        self.put_mesh(self.pipework.pipe[2][service], RIGHT, x + 3.3, 3.75, pz);
+        self.put_mesh(self.pipework.flange[2], RIGHT, x + 9.3, 3.75, pz);
+        self.put_mesh(
+            self.pipework.pipe[2][service],
+            RIGHT,
+            x + 3.5,
+            0.5,
+            z + 0.36,
+        );
         for end in [3.5, 9.5] {
-            self.put(self.p.flange[2], RIGHT, x + end, 0.5, z + 0.36);
+            self.put_mesh(self.pipework.flange[2], RIGHT, x + end, 0.5, z + 0.36);
         }
         for k in 0..3 {
-            self.put(self.m.drum, ALONG, x + 5.2 + 0.75 * k as f32, 0.0, z + 5.3);
+            self.put("drum", ALONG, x + 5.2 + 0.75 * k as f32, 0.0, z + 5.3);
         }
     }
 
@@ -145,19 +169,25 @@ impl Layout {
     fn vessels(&mut self, x: f32, z: f32, bay: usize) {
         for dx in [5.4, 7.6] {
             for dz in [0.9, 3.8] {
-                self.put(self.m.saddle, ALONG, x + dx, 0.0, z + dz + 0.2);
-                self.put(self.m.saddle, ALONG, x + dx, 1.8, z + dz + 0.2);
+                self.put("saddle", ALONG, x + dx, 0.0, z + dz + 0.2);
+                self.put("saddle", ALONG, x + dx, 1.8, z + dz + 0.2);
                 self.bolts(x + dx, 0.0, z + dz + 0.2, 0.62, 0.0);
             }
             for y in [1.2, 3.0] {
-                self.put(self.m.vessel, ALONG, x + dx, y, z + 0.4);
-                self.put(self.p.flange[1], UP, x + dx, y + 0.6, z + 2.0);
-                self.put(self.p.gauge, RIGHT, x + dx + 0.3, y + 0.5, z + 3.2);
+                self.put("vessel", ALONG, x + dx, y, z + 0.4);
+                self.put_mesh(self.pipework.flange[1], UP, x + dx, y + 0.6, z + 2.0);
+                self.put("gauge", RIGHT, x + dx + 0.3, y + 0.5, z + 3.2);
             }
-            self.put(self.p.spool[1][bay % SERVICES], UP, x + dx, 3.6, z + 2.0);
+            self.put_mesh(
+                self.pipework.spool[1][bay % SERVICES],
+                UP,
+                x + dx,
+                3.6,
+                z + 2.0,
+            );
             let bend = BEND * RADII_M[1];
-            self.put(
-                self.p.elbow[1][bay % SERVICES],
+            self.put_mesh(
+                self.pipework.elbow[1][bay % SERVICES],
                 UP_LEFT,
                 x + dx,
                 5.6,
@@ -165,8 +195,8 @@ impl Layout {
             );
             for k in 0..=usize::from(dx > 6.0) {
                 let from = x + dx - bend - 2.0 * k as f32;
-                self.put(
-                    self.p.spool[1][bay % SERVICES],
+                self.put_mesh(
+                    self.pipework.spool[1][bay % SERVICES],
                     LEFT,
                     from,
                     5.6 + bend,
@@ -174,7 +204,7 @@ impl Layout {
                 );
             }
         }
-        self.put(self.p.sign, RIGHT, x + 8.22, 1.0, z + 1.8);
+        self.put("sign", RIGHT, x + 8.22, 1.0, z + 1.8);
     }
 }
 
