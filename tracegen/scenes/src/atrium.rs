@@ -188,26 +188,18 @@ fn build(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
     if d.furnished {
         furnishing::furnish(scene, p);
     }
-    scene.camera(
-        "default",
-        vec3(-11.6, 1.7, -0.4),
-        vec3(11.0, 3.7, 0.1),
+    scene.cameras(
         0.1,
         100.0,
-    );
-    scene.camera(
-        "gallery",
-        vec3(-9.6, FLOOR2 + 1.7, 4.2),
-        vec3(8.0, 5.2, -2.2),
-        0.1,
-        100.0,
-    );
-    scene.camera(
-        "arcade",
-        vec3(12.2, 1.6, -5.3),
-        vec3(-6.0, 2.1, -4.4),
-        0.1,
-        100.0,
+        [
+            ("default", vec3(-11.6, 1.7, -0.4), vec3(11.0, 3.7, 0.1)),
+            (
+                "gallery",
+                vec3(-9.6, FLOOR2 + 1.7, 4.2),
+                vec3(8.0, 5.2, -2.2),
+            ),
+            ("arcade", vec3(12.2, 1.6, -5.3), vec3(-6.0, 2.1, -4.4)),
+        ],
     );
     // Sun along the court, onto its north wall and the floor.
     scene.sun(vec3(0.38, -0.84, -0.39), vec3(3.3, 3.0, 2.55));

@@ -55,26 +55,14 @@ pub fn scene() -> Scene {
     details::details(&mut scene);
     interior(&mut scene);
     studio(&mut scene);
-    scene.camera(
-        "default",
-        vec3(2.2, 1.02, 1.5),
-        vec3(0.35, 0.55, 0.0),
+    scene.cameras(
         0.05,
         60.0,
-    );
-    scene.camera(
-        "rear",
-        vec3(-3.0, 1.25, 1.75),
-        vec3(-0.4, 0.6, 0.0),
-        0.05,
-        60.0,
-    );
-    scene.camera(
-        "side",
-        vec3(0.15, 1.0, 2.6),
-        vec3(0.0, 0.6, 0.0),
-        0.05,
-        60.0,
+        [
+            ("default", vec3(2.2, 1.02, 1.5), vec3(0.35, 0.55, 0.0)),
+            ("rear", vec3(-3.0, 1.25, 1.75), vec3(-0.4, 0.6, 0.0)),
+            ("side", vec3(0.15, 1.0, 2.6), vec3(0.0, 0.6, 0.0)),
+        ],
     );
     scene.sun(vec3(-0.45, -0.80, -0.40), vec3(1.35, 1.3, 1.2));
     scene.lamp(vec3(2.5, 3.2, 2.2), vec3(3.2, 3.3, 3.6));

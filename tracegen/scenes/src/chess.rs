@@ -1,7 +1,7 @@
 //! A full chess set on a reflective board, a few moves into the Italian game: 42 K triangles.
 
 use super::masonry::carved_stone;
-use super::mesh_builder::{Knot, MeshBuilder, curve, lathed, profile, sharp, smooth};
+use super::mesh_builder::{Knot, MeshBuilder, curve, lathed, profile, rounded, sharp, smooth};
 use super::noise::smoothstep;
 use super::organic::polished_wood;
 use super::scene_builder::SceneBuilder;
@@ -37,7 +37,7 @@ fn collar(r: f32, y: f32) -> [Knot; 4] {
     ]
 }
 
-fn turned(radius: f32, upper: &[Knot]) -> MeshBuilder {
+fn piece(radius: f32, upper: &[Knot]) -> MeshBuilder {
     let mut knots = foot(radius);
     knots.extend_from_slice(upper);
     lathed(&curve(&knots, 2), SEGMENTS)
@@ -49,7 +49,7 @@ fn pawn() -> MeshBuilder {
     upper.extend(profile(
         "0.0088,0.0462 0.0108,0.0515 0.0088,0.0575 0,0.0622",
     ));
-    turned(0.0165, &upper)
+    piece(0.0165, &upper)
 }
 
 fn rook() -> MeshBuilder {
@@ -57,7 +57,7 @@ fn rook() -> MeshBuilder {
         "0.0118,0.027 0.0102,0.042 0.0104,0.046! 0.0145,0.0485 0.0148,0.052! 0.0148,0.0535! \
         0,0.0535!",
     );
-    let mut m = turned(0.0195, &upper);
+    let mut m = piece(0.0195, &upper);
     // Six merlons: arcs of a ring.
     for i in 0..6 {
         let (from, span) = (TAU * i as f32 / 6.0, TAU / 6.0 * 0.68);
@@ -128,7 +128,7 @@ fn king() -> MeshBuilder {
     upper.extend(profile(
         "0.0088,0.0735 0.0112,0.082 0.0142,0.0885! 0.0105,0.0905 0.0034,0.0928! 0,0.093!",
     ));
-    let mut m = turned(0.0218, &upper);
+    let mut m = piece(0.0218, &upper);
     // A cross whose arms widen outwards.
     m.block(
         vec3(-0.0014, 0.0925, -0.0014),
@@ -166,7 +166,7 @@ fn spline<const N: usize>(values: &[[f32; 4]; N], t: f32) -> [f32; 4] {
 /// The knight: an oval swept from the chest over the poll down to the muzzle.
 fn knight() -> MeshBuilder {
     let upper = profile("0.0145,0.0195 0.015,0.0215! 0,0.0225!");
-    let mut m = turned(0.0195, &upper);
+    let mut m = piece(0.0195, &upper);
     // Forward, height, half depth in the plane, half width, all in millimetres.
     let spine: [[f32; 4]; 10] = [
         [-0.5, 20.0, 12.8, 11.0],
@@ -208,13 +208,13 @@ fn knight() -> MeshBuilder {
     head.orient(|p| vec3(0.0, 0.0, p.z.signum()));
     m.merge(&head, Affine3A::IDENTITY);
     for side in [-1.0f32, 1.0] {
-        let ear = lathed(&curve(&profile("0.0026,0! 0.0022,0.003 0,0.0078"), 2), 8);
+        let ear = rounded("0.0026,0! 0.0022,0.003 0,0.0078", 2, 8);
         let tilt = Quat::from_rotation_z(0.25) * Quat::from_rotation_x(side * 0.3);
         m.merge(
             &ear,
             Affine3A::from_rotation_translation(tilt, vec3(0.0005, 0.0655, side * 0.0035)),
         );
-        let eye = lathed(&curve(&profile("0,-0.0016 0.0016,0 0,0.0016"), 3), 8);
+        let eye = rounded("0,-0.0016 0.0016,0 0,0.0016", 3, 8);
         m.merge(
             &eye,
             Affine3A::from_translation(vec3(0.0078, 0.0578, side * 0.0050)),
@@ -284,19 +284,13 @@ pub fn scene() -> Scene {
     materials(&mut scene);
     board(&mut scene);
     pieces(&mut scene);
-    scene.camera(
-        "default",
-        vec3(0.05, 0.20, 0.30),
-        vec3(0.0, 0.0, 0.03),
+    scene.cameras(
         0.01,
         20.0,
-    );
-    scene.camera(
-        "low",
-        vec3(0.20, 0.10, 0.26),
-        vec3(-0.05, 0.03, 0.0),
-        0.01,
-        20.0,
+        [
+            ("default", vec3(0.05, 0.20, 0.30), vec3(0.0, 0.0, 0.03)),
+            ("low", vec3(0.20, 0.10, 0.26), vec3(-0.05, 0.03, 0.0)),
+        ],
     );
     scene.sun(vec3(-0.5, -0.8, -0.35), vec3(1.3, 1.2, 1.05));
     scene.lamp(vec3(0.5, 0.7, 0.3), vec3(0.36, 0.32, 0.26));

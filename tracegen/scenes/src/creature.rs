@@ -1,6 +1,6 @@
 //! A tyrannosaur: ovals swept along the centre lines of body, neck, tail, legs and arms.
 
-use super::mesh_builder::{MeshBuilder, curve, lathed, profile, sharp, smooth};
+use super::mesh_builder::{MeshBuilder, curve, lathed, rounded, sharp, smooth};
 use super::noise::{bank, smoothstep};
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::TAU;
@@ -197,7 +197,7 @@ impl Creature {
                 size * 0.75,
             );
         }
-        let ball = lathed(&curve(&profile("0,-0.055 0.055,0 0,0.055"), 4), 12);
+        let ball = rounded("0,-0.055 0.055,0 0,0.055", 4, 12);
         self.eyes.merge(
             &ball,
             Affine3A::from_translation(vec3(2.80, 3.64, 0.105 + side * 0.245)),

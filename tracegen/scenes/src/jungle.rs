@@ -164,26 +164,18 @@ pub fn scene() -> Scene {
     undergrowth(&mut scene, &mut rng);
 
     let eye = |x: f32, z: f32| vec3(x, ground(x, z) + 1.65, z);
-    scene.camera(
-        "default",
-        eye(-8.5, path_z(-8.5)),
-        vec3(6.0, 2.3, -0.9),
+    scene.cameras(
         0.1,
         120.0,
-    );
-    scene.camera(
-        "ruin",
-        eye(3.8, path_z(3.8)),
-        vec3(15.0, 3.4, -0.3),
-        0.1,
-        120.0,
-    );
-    scene.camera(
-        "thicket",
-        eye(-17.0, path_z(-17.0) + 2.4),
-        vec3(-6.0, 1.2, -1.5),
-        0.1,
-        120.0,
+        [
+            ("default", eye(-8.5, path_z(-8.5)), vec3(6.0, 2.3, -0.9)),
+            ("ruin", eye(3.8, path_z(3.8)), vec3(15.0, 3.4, -0.3)),
+            (
+                "thicket",
+                eye(-17.0, path_z(-17.0) + 2.4),
+                vec3(-6.0, 1.2, -1.5),
+            ),
+        ],
     );
     scene.sun(vec3(0.42, -0.80, -0.43), vec3(3.4, 3.1, 2.4));
     scene.finish(vec3(0.55, 0.66, 0.60), 1)

@@ -122,19 +122,13 @@ pub fn scene() -> Scene {
     rack(&mut scene);
     still::distillation(&mut scene);
     shelf(&mut scene);
-    scene.camera(
-        "default",
-        vec3(0.02, 0.265, 0.40),
-        vec3(0.0, 0.125, -0.02),
+    scene.cameras(
         0.02,
         20.0,
-    );
-    scene.camera(
-        "side",
-        vec3(-0.46, 0.22, 0.24),
-        vec3(0.05, 0.13, -0.02),
-        0.02,
-        20.0,
+        [
+            ("default", vec3(0.02, 0.265, 0.40), vec3(0.0, 0.125, -0.02)),
+            ("side", vec3(-0.46, 0.22, 0.24), vec3(0.05, 0.13, -0.02)),
+        ],
     );
     scene.sun(vec3(0.35, -0.75, -0.55), vec3(1.15, 1.15, 1.1));
     scene.lamp(vec3(-0.7, 1.0, 0.7), vec3(0.6, 0.56, 0.5));
@@ -152,38 +146,54 @@ fn furniture(scene: &mut SceneBuilder) {
 
 /// Conical flasks and beakers with their contents, a rod, a dish and a funnel.
 fn flasks(scene: &mut SceneBuilder) {
-    let flask = erlenmeyer(0.145, 3);
-    vessel(
-        scene,
-        "borosilicate",
-        &Ware::new(&flask, 0.0018, 47, 0.0),
-        Some((LIQUIDS[0], 0.055)),
-        &[at(-0.10, 0.0, 0.16)],
-    );
-    let small = erlenmeyer(0.105, 2);
-    vessel(
-        scene,
-        "borosilicate",
-        &Ware::new(&small, 0.0016, 40, 0.0),
-        Some((LIQUIDS[4], 0.036)),
-        &[at(0.20, 0.0, 0.185)],
-    );
-    let large = beaker(0.043, 0.115, 3);
-    vessel(
-        scene,
-        "borosilicate",
-        &Ware::new(&large, 0.0017, 47, 0.14),
-        Some((LIQUIDS[1], 0.062)),
-        &[at(0.075, 0.0, 0.155)],
-    );
-    let cup = beaker(0.030, 0.075, 3);
-    vessel(
-        scene,
-        "borosilicate",
-        &Ware::new(&cup, 0.0014, 40, 0.14),
-        Some((LIQUIDS[2], 0.03)),
-        &[at(-0.24, 0.0, 0.19)],
-    );
+    // Outline, wall, segments and lip; liquid and its level; place.
+    for (outer, wall, segments, lip, liquid, level, place) in [
+        (
+            erlenmeyer(0.145, 3),
+            0.0018,
+            47,
+            0.0,
+            0,
+            0.055,
+            at(-0.10, 0.0, 0.16),
+        ),
+        (
+            erlenmeyer(0.105, 2),
+            0.0016,
+            40,
+            0.0,
+            4,
+            0.036,
+            at(0.20, 0.0, 0.185),
+        ),
+        (
+            beaker(0.043, 0.115, 3),
+            0.0017,
+            47,
+            0.14,
+            1,
+            0.062,
+            at(0.075, 0.0, 0.155),
+        ),
+        (
+            beaker(0.030, 0.075, 3),
+            0.0014,
+            40,
+            0.14,
+            2,
+            0.03,
+            at(-0.24, 0.0, 0.19),
+        ),
+    ] {
+        let ware = Ware::new(&outer, wall, segments, lip);
+        vessel(
+            scene,
+            "borosilicate",
+            &ware,
+            Some((LIQUIDS[liquid], level)),
+            &[place],
+        );
+    }
     graduated_cylinder(scene);
     // A stirring rod in the beaker and a petri dish in front of it.
     let rod = glass_tube(
@@ -359,27 +369,14 @@ fn shelf(scene: &mut SceneBuilder) {
     let amber = places(&[-0.46, -0.27, 0.10, 0.37], 0.282, -0.235);
     let clear = places(&[-0.365, -0.17, 0.01, 0.19, 0.28], 0.282, -0.24);
     let low = places(&[-0.40, -0.30, 0.30, 0.42], 0.0, -0.22);
-    vessel(
-        scene,
-        "amber-glass",
-        &Ware::new(&outer, 0.002, 22, 0.0),
-        Some((LIQUIDS[1], 0.05)),
-        &amber,
-    );
-    vessel(
-        scene,
-        "borosilicate",
-        &Ware::new(&outer, 0.002, 22, 0.0),
-        Some((LIQUIDS[0], 0.062)),
-        &clear,
-    );
-    vessel(
-        scene,
-        "borosilicate",
-        &Ware::new(&outer, 0.002, 22, 0.0),
-        Some((LIQUIDS[4], 0.045)),
-        &low,
-    );
+    for (glass, liquid, level, places) in [
+        ("amber-glass", 1, 0.05, &amber),
+        ("borosilicate", 0, 0.062, &clear),
+        ("borosilicate", 4, 0.045, &low),
+    ] {
+        let ware = Ware::new(&outer, 0.002, 22, 0.0);
+        vessel(scene, glass, &ware, Some((LIQUIDS[liquid], level)), places);
+    }
     let plug = lathed(&stopper(0.0145), 12);
     let plug = scene.mesh("glass-stopper", plug, "borosilicate");
     let mut label = MeshBuilder::new();

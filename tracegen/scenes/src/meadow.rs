@@ -108,26 +108,22 @@ pub fn scene() -> Scene {
     lavender(&mut scene, &mut rng);
     grass_and_poppies(&mut scene, &mut rng);
     let eye = |x: f32, z: f32| vec3(x, ground(x, z) + 1.55, z);
-    scene.camera(
-        "default",
-        eye(0.85, 6.6),
-        vec3(2.6, 0.75, -14.0),
+    scene.cameras(
         0.1,
         400.0,
+        [
+            ("default", eye(0.85, 6.6), vec3(2.6, 0.75, -14.0)),
+            ("yard", eye(1.5, -17.5), HOUSE + vec3(0.5, 2.2, 0.0)),
+        ],
     );
-    scene.camera(
-        "yard",
-        eye(1.5, -17.5),
-        HOUSE + vec3(0.5, 2.2, 0.0),
-        0.1,
-        400.0,
-    );
-    scene.camera(
-        "rows",
-        vec3(-4.2, ground(-4.2, 3.0) + 0.9, 3.0),
-        vec3(-3.0, 0.4, -8.0),
+    scene.cameras(
         0.05,
         400.0,
+        [(
+            "rows",
+            vec3(-4.2, ground(-4.2, 3.0) + 0.9, 3.0),
+            vec3(-3.0, 0.4, -8.0),
+        )],
     );
     scene.sun(vec3(0.55, -0.62, -0.42), vec3(2.3, 2.1, 1.75));
     scene.finish(vec3(0.36, 0.52, 0.78), 0)

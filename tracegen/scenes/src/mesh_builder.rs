@@ -80,6 +80,16 @@ pub fn lathed(profile: &[Knot], segments: usize) -> MeshBuilder {
     m
 }
 
+/// A solid of revolution of a [`profile`].
+pub fn turned(points: &str, segments: usize) -> MeshBuilder {
+    lathed(&profile(points), segments)
+}
+
+/// A solid of revolution of a [`profile`] rounded by [`curve`].
+pub fn rounded(points: &str, steps: usize, segments: usize) -> MeshBuilder {
+    lathed(&curve(&profile(points), steps), segments)
+}
+
 /// Rounds a profile: `steps` points of a Catmull-Rom curve between each pair of smooth knots.
 pub fn curve(knots: &[Knot], steps: usize) -> Vec<Knot> {
     let mut out = Vec::with_capacity(knots.len() * steps);

@@ -4,7 +4,7 @@
 mod train;
 
 use super::gears::screw;
-use super::mesh_builder::{MeshBuilder, curve, lathed, profile, sharp};
+use super::mesh_builder::{MeshBuilder, rounded, sharp, turned};
 use super::noise::{Rng, smoothstep};
 use super::organic::{damask, polished_wood};
 use super::scene_builder::SceneBuilder;
@@ -51,19 +51,21 @@ pub fn scene() -> Scene {
     train::train(&mut scene);
     train::fittings(&mut scene);
     train::bells(&mut scene);
-    scene.camera(
-        "default",
-        vec3(-0.002, 0.096, 0.070),
-        vec3(0.004, 0.020, -0.010),
+    scene.cameras(
         0.01,
         10.0,
-    );
-    scene.camera(
-        "train",
-        vec3(-0.085, 0.075, 0.075),
-        vec3(-0.045, 0.022, -0.004),
-        0.01,
-        10.0,
+        [
+            (
+                "default",
+                vec3(-0.002, 0.096, 0.070),
+                vec3(0.004, 0.020, -0.010),
+            ),
+            (
+                "train",
+                vec3(-0.085, 0.075, 0.075),
+                vec3(-0.045, 0.022, -0.004),
+            ),
+        ],
     );
     scene.sun(vec3(-0.4, -0.8, -0.45), vec3(1.25, 1.2, 1.1));
     scene.lamp(vec3(0.25, 0.35, 0.2), vec3(0.12, 0.11, 0.09));
@@ -85,10 +87,7 @@ fn casket(scene: &mut SceneBuilder) {
             0.0012,
         );
         for z in [-d + 0.012, d - 0.012] {
-            let foot = lathed(
-                &curve(&profile("0,-0.009! 0.006,-0.008 0.008,-0.004 0.006,0!"), 3),
-                24,
-            );
+            let foot = rounded("0,-0.009! 0.006,-0.008 0.008,-0.004 0.006,0!", 3, 24);
             wood.merge(
                 &foot,
                 Affine3A::from_translation(vec3(s * (w - 0.012), 0.0, z)),
@@ -177,8 +176,8 @@ fn cylinder(scene: &mut SceneBuilder) {
         Affine3A::from_rotation_translation(along_x, CYLINDER),
     );
     // Pins: a melody of chords and runs on the tracks of the comb's tines.
-    let pin = lathed(
-        &profile("0.00022,-0.0004! 0.0002,0.001! 0.00013,0.00125 0,0.00132"),
+    let pin = turned(
+        "0.00022,-0.0004! 0.0002,0.001! 0.00013,0.00125 0,0.00132",
         6,
     );
     let mut rng = Rng::new(1796);

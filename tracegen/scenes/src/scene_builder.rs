@@ -153,17 +153,24 @@ impl SceneBuilder {
         self.put(name, mesh, material, Affine3A::IDENTITY);
     }
 
-    /// Adds a camera; the first is the default one.
-    pub fn camera(&mut self, name: &str, eye: Vec3, target: Vec3, near: f32, far: f32) {
-        self.scene.cameras.push(Camera {
-            name: name.to_owned(),
-            eye,
-            target,
-            up: Vec3::Y,
-            vfov_deg: 60.0,
-            near,
-            far,
-        });
+    /// Adds cameras by name, position and target; the first is the default one.
+    pub fn cameras<const N: usize>(
+        &mut self,
+        near: f32,
+        far: f32,
+        cameras: [(&str, Vec3, Vec3); N],
+    ) {
+        for (name, eye, target) in cameras {
+            self.scene.cameras.push(Camera {
+                name: name.to_owned(),
+                eye,
+                target,
+                up: Vec3::Y,
+                vfov_deg: 60.0,
+                near,
+                far,
+            });
+        }
     }
 
     /// Adds parallel light that travels along `direction`.

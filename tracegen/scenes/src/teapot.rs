@@ -67,19 +67,13 @@ pub fn scene() -> Scene {
     let mut edge = MeshBuilder::new();
     edge.block(vec3(-0.86, -0.09, -0.86), vec3(0.86, -0.004, 0.86), 0.015);
     scene.add("table-edge", edge, "table-edge");
-    scene.camera(
-        "default",
-        vec3(0.10, 0.24, 0.31),
-        vec3(0.01, 0.10, 0.0),
+    scene.cameras(
         0.02,
         20.0,
-    );
-    scene.camera(
-        "low",
-        vec3(-0.36, 0.09, 0.30),
-        vec3(0.0, 0.11, 0.0),
-        0.02,
-        20.0,
+        [
+            ("default", vec3(0.10, 0.24, 0.31), vec3(0.01, 0.10, 0.0)),
+            ("low", vec3(-0.36, 0.09, 0.30), vec3(0.0, 0.11, 0.0)),
+        ],
     );
     scene.sun(vec3(-0.45, -0.8, -0.4), vec3(1.6, 1.5, 1.35));
     scene.lamp(vec3(-0.7, 0.9, 0.6), vec3(0.5, 0.53, 0.6));

@@ -2,7 +2,7 @@
 
 use super::materials::Palette;
 use super::parts::{arching_leaf, drape, lion_medallion, pot, rosette};
-use crate::mesh_builder::{MeshBuilder, curve, lathed, profile};
+use crate::mesh_builder::{MeshBuilder, curve, profile, turned};
 use crate::noise::Rng;
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec3};
@@ -100,7 +100,7 @@ fn drapes(scene: &mut SceneBuilder, p: &Palette) {
 fn plants(scene: &mut SceneBuilder, p: &Palette) {
     let mut rng = Rng::new(77);
     let pot_mesh = scene.mesh("pot", pot(20, 1), p.pot);
-    let earth = lathed(&profile("0.86,0.88! 0.4,0.92 0,0.93"), 20);
+    let earth = turned("0.86,0.88! 0.4,0.92 0,0.93", 20);
     let earth = scene.mesh("earth", earth, p.earth);
     let bushes: Vec<usize> = (0..3)
         .map(|_| scene.mesh("plant", rosette(26, 0.95, 0.17, [2, 6], &mut rng), p.leaf))

@@ -1,7 +1,7 @@
 //! Wheels, lamps, mirrors, seams and the other small parts of the car.
 
 use super::body::{self, AXLES, TYRE};
-use crate::mesh_builder::{MeshBuilder, curve, lathed, profile, sharp, smooth};
+use crate::mesh_builder::{MeshBuilder, curve, profile, rounded, sharp, smooth, turned};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
@@ -128,15 +128,12 @@ fn spoke(angle: f32, pair: f32) -> MeshBuilder {
 }
 
 fn wheel_nut() -> MeshBuilder {
-    lathed(
-        &curve(&profile("0.0085,0! 0.0085,0.01! 0.006,0.016 0,0.018"), 2),
-        8,
-    )
+    rounded("0.0085,0! 0.0085,0.01! 0.006,0.016 0,0.018", 2, 8)
 }
 
 fn brake_disc() -> MeshBuilder {
-    lathed(
-        &profile("0,0! 0.165,0! 0.165,0.02! 0.07,0.02! 0.065,0.035! 0,0.035!"),
+    turned(
+        "0,0! 0.165,0! 0.165,0.02! 0.07,0.02! 0.065,0.035! 0,0.035!",
         40,
     )
 }
@@ -271,13 +268,9 @@ impl Details {
             ),
         );
         for k in [-1.0f32, 1.0] {
-            let bowl = lathed(
-                &curve(
-                    &profile(
-                        "0,0! 0.022,0.006 0.036,0.026 0.038,0.03! 0.034,0.028! 0.02,0.011 0,0.005",
-                    ),
-                    2,
-                ),
+            let bowl = rounded(
+                "0,0! 0.022,0.006 0.036,0.026 0.038,0.03! 0.034,0.028! 0.02,0.011 0,0.005",
+                2,
                 18,
             );
             let forward = tilt * Quat::from_rotation_z(-0.9);
@@ -333,7 +326,7 @@ impl Details {
                 head + vec3(0.0, 0.03, side * 0.03),
             ),
         );
-        let mut face = lathed(&profile("0,0 1,0"), 24);
+        let mut face = turned("0,0 1,0", 24);
         face.orient(|_| Vec3::Y);
         self.chrome.merge(
             &face,
@@ -360,10 +353,7 @@ impl Details {
     fn exhausts(&mut self, side: f32) {
         for k in 0..2 {
             let z = side * (0.28 + 0.095 * k as f32);
-            let pipe = lathed(
-                &profile("0.036,0! 0.04,0.01! 0.04,0.22! 0.036,0.22! 0.036,0!"),
-                24,
-            );
+            let pipe = turned("0.036,0! 0.04,0.01! 0.04,0.22! 0.036,0.22! 0.036,0!", 24);
             self.chrome.merge(
                 &pipe,
                 Affine3A::from_rotation_translation(

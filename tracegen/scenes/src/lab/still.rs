@@ -2,7 +2,7 @@
 
 use super::{LIQUIDS, Ware, at, vessel};
 use crate::glassware::{glass_tube, helix, round_flask, stopper};
-use crate::mesh_builder::{Knot, MeshBuilder, curve, lathed, profile};
+use crate::mesh_builder::{Knot, MeshBuilder, curve, lathed, profile, rounded};
 use crate::noise::smoothstep;
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
@@ -35,11 +35,9 @@ fn burner(scene: &mut SceneBuilder) {
     );
     burner.lathe(&curve(&body, 3), 32);
     scene.put("burner", burner, "brass", at(AXIS_X, 0.0, AXIS_Z));
-    let flame = lathed(
-        &curve(
-            &profile("0,0.08 0.0065,0.086 0.0078,0.096 0.0045,0.112 0,0.128"),
-            4,
-        ),
+    let flame = rounded(
+        "0,0.08 0.0065,0.086 0.0078,0.096 0.0045,0.112 0,0.128",
+        4,
         20,
     );
     scene.put("flame", flame, "flame", at(AXIS_X, 0.0, AXIS_Z));
@@ -145,11 +143,9 @@ fn receiver(scene: &mut SceneBuilder, outlet: Vec3) {
         Some((LIQUIDS[0], 0.018)),
         &[at(outlet.x, low, outlet.z)],
     );
-    let cork = lathed(
-        &curve(
-            &profile("0.019,0! 0.023,0.005 0.021,0.012 0.017,0.014! 0.015,0.01! 0.015,0! 0.019,0!"),
-            3,
-        ),
+    let cork = rounded(
+        "0.019,0! 0.023,0.005 0.021,0.012 0.017,0.014! 0.015,0.01! 0.015,0! 0.019,0!",
+        3,
         36,
     );
     scene.put(

@@ -2,7 +2,7 @@
 
 use super::{CYLINDER, CYLINDER_HALF, MODULE};
 use crate::gears::{Gear, placed, screw, worm};
-use crate::mesh_builder::{MeshBuilder, curve, lathed, profile, sharp};
+use crate::mesh_builder::{MeshBuilder, curve, lathed, profile, rounded, sharp};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -75,7 +75,7 @@ pub(super) fn train(scene: &mut SceneBuilder) {
         scene.add("plate", plate, "polished-brass");
         let mut jewels = MeshBuilder::new();
         for c in [center, c1, c2] {
-            let jewel = lathed(&curve(&profile("0.0017,0! 0.0016,0.0006 0,0.0011"), 4), 24);
+            let jewel = rounded("0.0017,0! 0.0016,0.0006 0,0.0011", 4, 24);
             let out = Quat::from_rotation_z(-sign * FRAC_PI_2);
             jewels.merge(
                 &jewel,
@@ -137,7 +137,7 @@ pub(super) fn bells(scene: &mut SceneBuilder) {
     let skin: Vec<_> = skin.into_iter().rev().collect();
     bell.lathe(&curve(&skin, 2), 32);
     let bell = scene.mesh("bell", bell, "polished-brass");
-    let mut hammer = lathed(&curve(&profile("0,-0.0016 0.0016,0 0,0.0016"), 4), 14);
+    let mut hammer = rounded("0,-0.0016 0.0016,0 0,0.0016", 4, 14);
     hammer.tube(
         &[
             (vec3(0.0, 0.0, 0.0), 0.0004),
@@ -272,11 +272,9 @@ fn spring_barrels(scene: &mut SceneBuilder) {
 
 /// The key in the front of the box.
 fn winding_key(scene: &mut SceneBuilder) {
-    let mut key = lathed(
-        &curve(
-            &profile("0,0! 0.0034,0! 0.0026,0.004 0.0022,0.012 0.003,0.018! 0,0.018!"),
-            3,
-        ),
+    let mut key = rounded(
+        "0,0! 0.0034,0! 0.0026,0.004 0.0022,0.012 0.003,0.018! 0,0.018!",
+        3,
         24,
     );
     for side in [-1.0f32, 1.0] {

@@ -3,7 +3,7 @@
 
 use super::materials::{PIPES, SIGNALS};
 use super::parts::{NAVE_M, bar};
-use crate::mesh_builder::{MeshBuilder, lathed, profile};
+use crate::mesh_builder::{MeshBuilder, profile, turned};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -24,21 +24,17 @@ fn boxes(list: &[([f32; 3], [f32; 3])], bevel: f32) -> MeshBuilder {
 
 /// An upright tank of radius 1.1 m from 0.7 m to 4.4 m above the floor.
 fn tank() -> MeshBuilder {
-    lathed(
-        &profile(
-            "0,0.62 0.7,0.7 1.05,0.92 1.1,1.1! 1.1,2.2! 1.13,2.2! 1.13,2.26! 1.1,2.26! 1.1,3.9! \
+    turned(
+        "0,0.62 0.7,0.7 1.05,0.92 1.1,1.1! 1.1,2.2! 1.13,2.2! 1.13,2.26! 1.1,2.26! 1.1,3.9! \
             1.02,4.1 0.6,4.3 0.3,4.36! 0.3,4.5! 0,4.5!",
-        ),
         18,
     )
 }
 
 /// A vessel of radius 0.6 m along z from 0 to 4.2 m, its axis at the origin's height.
 fn vessel() -> MeshBuilder {
-    let upright = lathed(
-        &profile(
-            "0,0 0.42,0.08 0.6,0.3! 0.6,0.9! 0.68,0.9! 0.68,1! 0.6,1! 0.6,3.9! 0.42,4.12 0,4.2",
-        ),
+    let upright = turned(
+        "0,0 0.42,0.08 0.6,0.3! 0.6,0.9! 0.68,0.9! 0.68,1! 0.6,1! 0.6,3.9! 0.42,4.12 0,4.2",
         16,
     );
     let mut m = MeshBuilder::new();
@@ -65,19 +61,14 @@ fn ladder() -> MeshBuilder {
 /// A centrifugal pump: shaft towards +z at 0.35 m, suction along -z, discharge up to 0.95 m.
 fn pump() -> MeshBuilder {
     let mut m = MeshBuilder::new();
-    let volute = lathed(
-        &profile(
-            "0.09,-0.42! 0.16,-0.42! 0.16,-0.38! 0.09,-0.38! 0.1,-0.16 0.24,-0.12 0.27,0 0.2,0.12 \
+    let volute = turned(
+        "0.09,-0.42! 0.16,-0.42! 0.16,-0.38! 0.09,-0.38! 0.1,-0.16 0.24,-0.12 0.27,0 0.2,0.12 \
             0.1,0.16 0.08,0.34! 0,0.34!",
-        ),
         14,
     );
     let place = Affine3A::from_translation(Vec3::Y * 0.35) * Affine3A::from_rotation_x(FRAC_PI_2);
     m.merge(&volute, place);
-    let neck = lathed(
-        &profile("0.09,0.4! 0.09,0.9! 0.15,0.9! 0.15,0.95! 0,0.95!"),
-        10,
-    );
+    let neck = turned("0.09,0.4! 0.09,0.9! 0.15,0.9! 0.15,0.95! 0,0.95!", 10);
     m.merge(&neck, Affine3A::from_translation(Vec3::X * 0.12));
     m.block(vec3(-0.16, 0.0, -0.1), vec3(0.16, 0.14, 0.1), 0.0);
     m
@@ -117,10 +108,7 @@ fn mill() -> MeshBuilder {
     );
     // Spindle head above a table with a vice.
     m.block(vec3(-0.3, 1.5, 0.0), vec3(0.1, 2.1, 0.45), 0.0);
-    let spindle = lathed(
-        &profile("0,1.1! 0.03,1.1! 0.05,1.3! 0.12,1.3! 0.12,1.5!"),
-        10,
-    );
+    let spindle = turned("0,1.1! 0.03,1.1! 0.05,1.3! 0.12,1.3! 0.12,1.5!", 10);
     m.merge(&spindle, Affine3A::from_translation(vec3(-0.1, 0.0, 0.2)));
     m.block(vec3(-0.7, 0.75, -0.4), vec3(0.5, 0.9, 0.3), 0.0);
     m.block(vec3(-0.25, 0.9, -0.15), vec3(0.05, 1.0, 0.1), 0.0);
@@ -139,7 +127,7 @@ fn press() -> MeshBuilder {
         ],
         0.02,
     );
-    let ram = lathed(&profile("0.18,1.85! 0.18,2.6!"), 12);
+    let ram = turned("0.18,1.85! 0.18,2.6!", 12);
     m.merge(&ram, Affine3A::IDENTITY);
     m
 }
@@ -158,11 +146,9 @@ fn pallet() -> MeshBuilder {
 }
 
 fn drum() -> MeshBuilder {
-    lathed(
-        &profile(
-            "0.29,0! 0.29,0.28! 0.305,0.3 0.29,0.32! 0.29,0.58! 0.305,0.6 0.29,0.62! 0.29,0.88! \
+    turned(
+        "0.29,0! 0.29,0.28! 0.305,0.3 0.29,0.32! 0.29,0.58! 0.305,0.6 0.29,0.62! 0.29,0.88! \
             0.27,0.88! 0.27,0.86! 0,0.86!",
-        ),
         12,
     )
 }
@@ -226,12 +212,12 @@ fn tank_leg() -> MeshBuilder {
 }
 
 fn signal() -> MeshBuilder {
-    lathed(&profile("0.05,0! 0.05,0.14! 0,0.17"), 10)
+    turned("0.05,0! 0.05,0.14! 0,0.17", 10)
 }
 
 fn roller() -> MeshBuilder {
     let mut roller = MeshBuilder::new();
-    let turned = lathed(&profile("0,0! 0.035,0! 0.035,0.64! 0,0.64!"), 8);
+    let turned = turned("0,0! 0.035,0! 0.035,0.64! 0,0.64!", 8);
     roller.merge(
         &turned,
         Affine3A::from_translation(Vec3::X * 0.32) * Affine3A::from_rotation_z(FRAC_PI_2),
@@ -261,7 +247,7 @@ fn rope() -> MeshBuilder {
 
 fn wheel() -> MeshBuilder {
     let mut wheel = MeshBuilder::new();
-    let tyre = lathed(&profile("0,-0.05! 0.14,-0.05! 0.14,0.05! 0,0.05!"), 12);
+    let tyre = turned("0,-0.05! 0.14,-0.05! 0.14,0.05! 0,0.05!", 12);
     wheel.merge(&tyre, Affine3A::from_rotation_z(FRAC_PI_2));
     wheel
 }

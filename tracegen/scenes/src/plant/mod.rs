@@ -92,32 +92,36 @@ pub fn with_instances(instances: u32) -> Scene {
     let (width, length) = (naves as f32 * NAVE_M, bays as f32 * BAY_M);
     let nave = |x: f32| x - width / 2.0;
     let end = length / 2.0;
-    let mut camera =
-        |name: &str, eye: Vec3, target: Vec3| scene.camera(name, eye, target, 0.1, 600.0);
-    camera(
-        "default",
-        vec3(nave(11.6), 1.75, end - 31.0),
-        vec3(nave(4.6), 2.6, end - 12.0),
-    );
-    camera(
-        "aisle",
-        vec3(nave(11.5), 1.7, end - 50.0),
-        vec3(nave(11.5), 2.2, end),
-    );
-    camera(
-        "walkway",
-        vec3(nave(20.2), 5.2, end - 40.0),
-        vec3(nave(8.0), 1.5, end - 22.0),
-    );
-    camera(
-        "pumps",
-        vec3(nave(9.4), 1.5, end - 24.0),
-        vec3(nave(2.0), 1.6, end - 17.0),
-    );
-    camera(
-        "overview",
-        vec3(nave(20.5), 9.9, -end + 1.0),
-        vec3(nave(10.0), 3.0, end),
+    scene.cameras(
+        0.1,
+        600.0,
+        [
+            (
+                "default",
+                vec3(nave(11.6), 1.75, end - 31.0),
+                vec3(nave(4.6), 2.6, end - 12.0),
+            ),
+            (
+                "aisle",
+                vec3(nave(11.5), 1.7, end - 50.0),
+                vec3(nave(11.5), 2.2, end),
+            ),
+            (
+                "walkway",
+                vec3(nave(20.2), 5.2, end - 40.0),
+                vec3(nave(8.0), 1.5, end - 22.0),
+            ),
+            (
+                "pumps",
+                vec3(nave(9.4), 1.5, end - 24.0),
+                vec3(nave(2.0), 1.6, end - 17.0),
+            ),
+            (
+                "overview",
+                vec3(nave(20.5), 9.9, -end + 1.0),
+                vec3(nave(10.0), 3.0, end),
+            ),
+        ],
     );
     scene.sun(vec3(-0.42, -1.0, 0.3), vec3(1.2, 1.16, 1.08));
     for k in 0..8 {

@@ -3,7 +3,7 @@
 //! Long parts run along +z from their origin. Parts on the floor have their origin there.
 
 use super::materials::{CABLES, PIPES, SERVICES};
-use crate::mesh_builder::{Knot, MeshBuilder, SweepFrame, lathed, profile, sharp, smooth};
+use crate::mesh_builder::{Knot, MeshBuilder, SweepFrame, lathed, sharp, smooth, turned};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
@@ -143,10 +143,7 @@ fn valve() -> MeshBuilder {
         10,
     );
     m.merge(&body, Affine3A::from_rotation_x(FRAC_PI_2));
-    let bonnet = lathed(
-        &profile("0.07,0.08! 0.06,0.22! 0.02,0.24! 0.018,0.42! 0,0.42!"),
-        8,
-    );
+    let bonnet = turned("0.07,0.08! 0.06,0.22! 0.02,0.24! 0.018,0.42! 0,0.42!", 8);
     m.merge(&bonnet, Affine3A::IDENTITY);
     m.ring([10, 4], 0.014, |sin, cos| {
         vec3(0.14 * cos, 0.39, 0.14 * sin)
@@ -159,9 +156,9 @@ fn valve() -> MeshBuilder {
 /// A pressure gauge on a stem, its face to +z.
 fn gauge() -> MeshBuilder {
     let mut m = MeshBuilder::new();
-    let stem = lathed(&profile("0.012,0! 0.012,0.16!"), 6);
+    let stem = turned("0.012,0! 0.012,0.16!", 6);
     m.merge(&stem, Affine3A::IDENTITY);
-    let can = lathed(&profile("0,-0.02! 0.06,-0.02! 0.06,0.02! 0,0.02!"), 12);
+    let can = turned("0,-0.02! 0.06,-0.02! 0.06,0.02! 0,0.02!", 12);
     let face = Affine3A::from_translation(Vec3::Y * 0.2) * Affine3A::from_rotation_x(FRAC_PI_2);
     m.merge(&can, face);
     m
@@ -255,14 +252,14 @@ fn fan_blades() -> MeshBuilder {
         blade.block(vec3(0.08, -0.11, -0.01), vec3(0.68, 0.11, 0.01), 0.0);
         m.merge(&blade, turn * Affine3A::from_rotation_x(0.5));
     }
-    let hub = lathed(&profile("0,-0.08! 0.11,-0.08! 0.11,0.06! 0,0.1"), 10);
+    let hub = turned("0,-0.08! 0.11,-0.08! 0.11,0.06! 0,0.1", 10);
     m.merge(&hub, Affine3A::from_rotation_x(FRAC_PI_2));
     m
 }
 
 fn fan_ring() -> MeshBuilder {
-    let ring = lathed(
-        &profile("0.74,-0.15! 0.82,-0.15! 0.82,0.15! 0.74,0.15! 0.74,-0.15!"),
+    let ring = turned(
+        "0.74,-0.15! 0.82,-0.15! 0.82,0.15! 0.74,0.15! 0.74,-0.15!",
         18,
     );
     let mut m = MeshBuilder::new();
@@ -303,21 +300,18 @@ fn bracket() -> MeshBuilder {
 }
 
 fn bolt() -> MeshBuilder {
-    lathed(
-        &profile("0.024,0! 0.024,0.03! 0.012,0.03! 0.012,0.07! 0,0.07!"),
-        6,
-    )
+    turned("0.024,0! 0.024,0.03! 0.012,0.03! 0.012,0.07! 0,0.07!", 6)
 }
 
 fn lamp_shade() -> MeshBuilder {
-    lathed(
-        &profile("0.32,0! 0.3,0.1 0.12,0.26 0.1,0.45! 0.012,0.45! 0.012,1.1!"),
+    turned(
+        "0.32,0! 0.3,0.1 0.12,0.26 0.1,0.45! 0.012,0.45! 0.012,1.1!",
         12,
     )
 }
 
 fn lamp() -> MeshBuilder {
-    let mut lamp = lathed(&profile("0,0.02! 0.29,0.06!"), 12);
+    let mut lamp = turned("0,0.02! 0.29,0.06!", 12);
     lamp.orient(|_| Vec3::NEG_Y);
     lamp
 }
@@ -369,10 +363,7 @@ fn stand() -> MeshBuilder {
 fn duct() -> MeshBuilder {
     let mut duct = straight_pipe(0.45, BAY_M, 14);
     for z in [0.02, 2.0, 4.0] {
-        let ring = lathed(
-            &profile("0.45,-0.03! 0.48,-0.03! 0.48,0.03! 0.45,0.03!"),
-            14,
-        );
+        let ring = turned("0.45,-0.03! 0.48,-0.03! 0.48,0.03! 0.45,0.03!", 14);
         let place = Affine3A::from_translation(Vec3::Z * z) * Affine3A::from_rotation_x(FRAC_PI_2);
         duct.merge(&ring, place);
     }
@@ -380,11 +371,11 @@ fn duct() -> MeshBuilder {
 }
 
 fn diffuser() -> MeshBuilder {
-    lathed(&profile("0,-0.75! 0.35,-0.75! 0.2,-0.6! 0.2,-0.4!"), 12)
+    turned("0,-0.75! 0.35,-0.75! 0.2,-0.6! 0.2,-0.4!", 12)
 }
 
 fn sprinkler() -> MeshBuilder {
-    lathed(&profile("0,-0.2! 0.035,-0.19! 0.012,-0.17! 0.012,0!"), 6)
+    turned("0,-0.2! 0.035,-0.19! 0.012,-0.17! 0.012,0!", 6)
 }
 
 fn grating() -> MeshBuilder {
@@ -409,7 +400,7 @@ fn leg() -> MeshBuilder {
 }
 
 fn bollard() -> MeshBuilder {
-    lathed(&profile("0.1,0! 0.1,0.9! 0.07,0.98 0,1"), 10)
+    turned("0.1,0! 0.1,0.9! 0.07,0.98 0,1", 10)
 }
 
 fn sign() -> MeshBuilder {
