@@ -13,10 +13,15 @@ use rayon::prelude::*;
 use rays::bvh::count::Counts;
 use rays::bvh::{AllOpaque, Bvh, Instructions, TraversalStack};
 use rays::ray::Ray;
-use rays::reference_tree::{Cause, ReferenceTree, cause, exact};
-use rays::reference_walk::ReferenceWalk;
+use reference_tree::{Cause, ReferenceTree, cause, exact};
+use reference_walk::ReferenceWalk;
 use std::path::Path;
 use std::process::ExitCode;
+
+#[path = "../src/tests/reference_tree.rs"]
+mod reference_tree;
+#[path = "../src/tests/reference_walk.rs"]
+mod reference_walk;
 
 type Triangle = [[f32; 3]; 3];
 

@@ -6,8 +6,11 @@
 
 use glam::DVec3;
 use rayon::prelude::*;
-use rays::robustness::{Findings, MeshUnderTest, TRANSLATIONS, meshes};
+use robustness::{Findings, MeshUnderTest, TRANSLATIONS, meshes};
 use std::process::ExitCode;
+
+#[path = "../src/tests/robustness.rs"]
+mod robustness;
 
 fn main() -> ExitCode {
     const CHUNK: u64 = 10_000;

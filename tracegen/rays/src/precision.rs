@@ -7,8 +7,7 @@
 use super::bvh::count::NoCounter;
 use super::bvh::{AllOpaque, Bvh, TraversalStack};
 use super::ray::Ray;
-use super::reference::{Reference, TestMesh, Verdict};
-use super::robustness::Random;
+use super::reference::{Random, Reference, TestMesh, Verdict};
 use formats::raytrace::TraversalKind;
 use glam::DVec3;
 use std::ops::{Add, Div, Mul, Sub};

@@ -401,3 +401,33 @@ pub fn brute_force_f32(
         .filter_map(|(v, i)| prepared.distance(v).map(|t| (t, i)))
         .reduce(|a, b| if b < a { b } else { a })
 }
+
+/// A small seeded generator.
+#[derive(Clone, Debug)]
+pub struct Random(pub u64);
+
+impl Random {
+    /// Uniform in 0..1.
+    pub fn unit(&mut self) -> f32 {
+        self.0 = self
+            .0
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 40) as f32 / (1u64 << 24) as f32
+    }
+
+    /// Uniform index below `n`.
+    pub fn below(&mut self, n: usize) -> usize {
+        (f64::from(self.unit()) * n as f64) as usize % n.max(1)
+    }
+
+    /// A point in the unit ball.
+    pub fn in_ball(&mut self) -> Vec3 {
+        loop {
+            let p = Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0;
+            if p.length_squared() <= 1.0 {
+                return p;
+            }
+        }
+    }
+}

@@ -2,6 +2,10 @@
 
 mod columns;
 mod lighting;
+// Also used by the benches, which include these files.
+mod reference_tree;
+mod reference_walk;
+mod robustness;
 
 use super::frame::{RayFrame, trace_frame};
 use super::material::Materials;

@@ -24,6 +24,7 @@ mod options;
 mod origin;
 pub mod paths;
 #[cfg(test)]
+#[path = "tests/real_scenes.rs"]
 mod real_scenes;
 pub mod srgb;
 mod suggest;

@@ -1,9 +1,9 @@
 //! The optional columns of a small scene, checked by code that shares nothing with the tracer: brute force over
 //! the stored triangles in `f64`, and a walk of the stored tree by the rules of FORMAT.md.
 
+use super::reference_walk::ReferenceWalk;
 use super::{SIZE_PX, scene, settings, trace};
 use crate::ray::Ray;
-use crate::reference_walk::ReferenceWalk;
 use crate::scene::TraceScene;
 use formats::raytrace::{
     ChildKind, Hierarchy, HierarchyTriangle, Outcome, RayGeometry, RayKind, RayRecord, RayTile,

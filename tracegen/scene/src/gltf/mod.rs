@@ -10,8 +10,6 @@
 mod accessors;
 mod binary;
 mod camera_track;
-#[cfg(test)]
-mod camera_track_tests;
 mod channels;
 #[cfg(feature = "draco")]
 mod draco;

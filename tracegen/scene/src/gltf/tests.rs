@@ -1,6 +1,7 @@
 //! Small generated files: how they are read, and the errors for broken ones.
 
 mod bad_input;
+mod camera_track;
 mod reading;
 
 use crate::{AlphaMode, Light, LoadOptions, Loaded, SceneError, load_file};

@@ -1,10 +1,10 @@
 //! An independent walk of a hierarchy by the rules of FORMAT.md (Traversal), in plain `f32`, which
 //! counts the work of a ray.
 
-use super::bvh::count::Counts;
-use super::ray::{PreparedRay, Ray};
 use formats::raytrace::{ChildKind, Hierarchy, HierarchyChild};
 use glam::Vec3;
+use rays::bvh::count::Counts;
+use rays::ray::{PreparedRay, Ray};
 
 /// The constants of a ray on one axis.
 #[derive(Clone, Copy)]

@@ -1,6 +1,6 @@
 //! Animated cameras against hand computations, and the errors for damaged ones.
 
-use super::camera_track::camera_track;
+use crate::gltf::camera_track::camera_track;
 use crate::paths::CameraTrack;
 use glam::{Quat, Vec3};
 use serde_json::{Value, json};

@@ -1,11 +1,11 @@
 //! Checks the traversal against brute force: no leak, no false hit, no self-hit.
 
-use super::bvh::count::NoCounter;
-use super::bvh::{AllOpaque, Bvh, TraversalStack};
-use super::ray::{Ray, barycentrics, offset, point_at};
-use super::reference::{Reference, TestMesh, Verdict, brute_force_f32};
 use formats::raytrace::TraversalKind;
 use glam::{DVec3, Vec3};
+use rays::bvh::count::NoCounter;
+use rays::bvh::{AllOpaque, Bvh, TraversalStack};
+use rays::ray::{Ray, barycentrics, offset, point_at};
+use rays::reference::{Random, Reference, TestMesh, Verdict, brute_force_f32};
 
 /// Displacement that rounding to `f32` may cause on a mesh of radius 10 seen from a distance of up
 /// to 40: half a unit in the last place of each coordinate and of the shear, times a small factor.
@@ -206,32 +206,6 @@ impl MeshUnderTest {
         let exits = reference.verdict(within.as_dvec3(), -away.as_dvec3(), TOLERANCE);
         if !hits(within, -away) && matches!(exits, Verdict::Hit(_)) {
             findings.leaks += 1;
-        }
-    }
-}
-
-/// A small seeded generator.
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn unit(&mut self) -> f32 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 40) as f32 / (1u64 << 24) as f32
-    }
-
-    pub(crate) fn below(&mut self, n: usize) -> usize {
-        (f64::from(self.unit()) * n as f64) as usize % n.max(1)
-    }
-
-    pub(crate) fn in_ball(&mut self) -> Vec3 {
-        loop {
-            let p = Vec3::new(self.unit(), self.unit(), self.unit()) * 2.0 - 1.0;
-            if p.length_squared() <= 1.0 {
-                return p;
-            }
         }
     }
 }

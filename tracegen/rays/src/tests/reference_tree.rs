@@ -217,15 +217,14 @@ fn edge_near(triangle: &Triangle, origin: DVec3, direction: DVec3, tolerance: f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::{TestMesh, Verdict};
-    use crate::robustness::Random;
+    use rays::reference::{Random, Reference, TestMesh, Verdict};
 
     #[test]
     fn hits_are_those_of_brute_force() {
         let mesh = TestMesh::torus(48, 20);
         let triangles = mesh.rounded(DVec3::ZERO);
         let tree = ReferenceTree::new(&triangles);
-        let brute = crate::reference::Reference::new(&mesh);
+        let brute = Reference::new(&mesh);
         let mut random = Random(3);
         let mut hits = 0;
         for _ in 0..2000 {
