@@ -162,6 +162,7 @@ pub fn triangulate_fan(fan: &[u32]) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use formats::random::Random;
 
     #[test]
     fn a_larger_triangle_weighs_more_in_a_vertex_normal() {
@@ -211,11 +212,8 @@ mod tests {
 
     #[test]
     fn a_transformed_box_is_the_box_of_the_transformed_points_to_the_last_bit() {
-        let mut state = 3_u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 16_777_216.0 * 40.0 - 20.0
-        };
+        let mut source = Random(3);
+        let mut random = || source.unit_f32() * 40.0 - 20.0;
         let axes = [
             Vec3::X,
             Vec3::NEG_Y,

@@ -139,6 +139,7 @@ pub struct Predicted {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use formats::random::Random;
     use glam::camera::rh::proj::directx::perspective;
 
     /// A view along -z in which only the leftmost tiles may be drawn.
@@ -172,11 +173,8 @@ mod tests {
     fn bounds_with_a_point_in_a_drawn_pixel_are_drawn() {
         let layer = layer();
         let clip = layer.clip_from_world();
-        let mut state = 7_u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 16_777_216.0 * 20.0 - 10.0
-        };
+        let mut source = Random(7);
+        let mut random = || source.unit_f32() * 20.0 - 10.0;
         let mut drawn = 0;
         for _ in 0..5000 {
             let (p, q) = (

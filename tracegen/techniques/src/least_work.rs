@@ -242,6 +242,7 @@ fn areas(object: &Object) -> (f64, [f64; 2]) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use formats::random::Random;
 
     const PIXELS: Pixels = Pixels {
         eye: 10_000.0,
@@ -291,11 +292,8 @@ mod tests {
 
     #[test]
     fn no_allowed_split_on_a_fine_grid_costs_less() {
-        let mut state = 7_u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 16_777_216.0
-        };
+        let mut source = Random(7);
+        let mut random = || source.unit_f32();
         let (mut with, mut without) = (0, 0);
         for _ in 0..300 {
             let count = 1 + (random() * 30.0) as usize;

@@ -58,6 +58,7 @@ fn outside(plane: Vec4, [lo, hi]: [Vec3; 2]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use formats::random::Random;
     #[test]
     fn only_boxes_wholly_outside_a_plane_are_skipped() {
         let clip = glam::camera::rh::proj::directx::perspective(1.0, 1.0, 0.1, 100.0);
@@ -77,11 +78,8 @@ mod tests {
     fn a_point_is_visible_in_its_region_and_not_in_a_distant_one() {
         let clip = glam::camera::rh::proj::directx::perspective(1.2, 1.5, 0.1, 50.0);
         let size_px = [300, 200];
-        let mut state = 5_u32;
-        let mut random = |below: u32| {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) % below
-        };
+        let mut source = Random(5);
+        let mut random = |below: u32| source.below(below);
         for _ in 0..2000 {
             let pixel = [random(300), random(200)];
             let center = [0, 1].map(|axis| (pixel[axis] as f32 + 0.5) / size_px[axis] as f32);
@@ -106,11 +104,8 @@ mod tests {
     fn a_box_with_any_point_inside_is_never_skipped() {
         let clip = glam::camera::rh::proj::directx::perspective(1.2, 0.9, 0.1, 50.0)
             * glam::camera::rh::view::look_at_mat4(Vec3::new(1.0, 2.0, 3.0), Vec3::ZERO, Vec3::Y);
-        let mut state = 1_u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 16_777_216.0 * 40.0 - 20.0
-        };
+        let mut source = Random(1);
+        let mut random = || source.unit_f32() * 40.0 - 20.0;
         let mut inside = 0;
         for _ in 0..2000 {
             let p = Vec3::new(random(), random(), random());

@@ -207,6 +207,7 @@ impl Receivers {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use formats::random::Random;
     use glam::camera::rh::{
         proj::directx::{orthographic, perspective},
         view::look_at_mat4,
@@ -282,11 +283,8 @@ mod tests {
 
     #[test]
     fn every_visible_point_is_looked_up_in_a_found_volume() {
-        let mut state = 3_u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 16_777_216.0
-        };
+        let mut source = Random(3);
+        let mut random = || source.unit_f32();
         let (mut looked_up, mut unused) = (0, 0);
         for _ in 0..3000 {
             let volumes = volumes(&[

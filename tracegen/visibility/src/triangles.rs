@@ -41,6 +41,7 @@ fn planes_outside(planes: &[Vec4; 6], world_from_object: &Affine3A, p: Vec3) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use formats::random::Random;
     use glam::camera::rh::{proj::directx::perspective, view::look_at_mat4};
 
     fn clip() -> Mat4 {
@@ -66,11 +67,8 @@ mod tests {
 
     #[test]
     fn meshes_with_a_point_in_view_or_nan_coordinates_are_visible() {
-        let mut state = 1_u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 16_777_216.0 * 40.0 - 20.0
-        };
+        let mut source = Random(1);
+        let mut random = || source.unit_f32() * 40.0 - 20.0;
         let moved = Affine3A::from_rotation_y(0.7) * Affine3A::from_translation(Vec3::splat(3.0));
         let mut inside = 0;
         for _ in 0..4000 {

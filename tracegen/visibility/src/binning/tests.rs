@@ -1,4 +1,5 @@
 use super::*;
+use formats::random::Random;
 use glam::camera::rh::{proj::directx::perspective, view::look_at_mat4};
 use std::collections::BTreeSet;
 
@@ -109,11 +110,8 @@ fn every_pixel_of_a_triangle_is_in_its_tiles() {
     };
     let inverse =
         DMat4::from_cols_array(&view.clip_from_world.to_cols_array().map(f64::from)).inverse();
-    let mut state = 1_u32;
-    let mut random = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 8) as f32 / 16_777_216.0 * 8.0 - 4.0
-    };
+    let mut source = Random(1);
+    let mut random = || source.unit_f32() * 8.0 - 4.0;
     let (mut crossing, mut listed, mut covered) = (0, 0, 0);
     for _ in 0..400 {
         let triangle = [(); 3].map(|()| Vec3::new(random(), random(), random()));

@@ -147,6 +147,7 @@ impl PreparedCone {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use formats::random::Random;
 
     /// A cone along -z with its apex at the origin.
     fn cone(tangent: f64) -> Cone {
@@ -181,11 +182,8 @@ mod tests {
     /// sphere is, and kept if the largest sphere inside it is.
     #[test]
     fn boxes_are_classified_between_their_outer_and_inner_spheres() {
-        let mut state = 3_u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 16_777_216.0
-        };
+        let mut source = Random(3);
+        let mut random = || source.unit_f32();
         let (mut lost, mut kept) = (0, 0);
         for _ in 0..20_000 {
             let tangent = 0.1 + 2.0 * f64::from(random());
@@ -211,11 +209,8 @@ mod tests {
 
     #[test]
     fn boxes_with_points_inside_and_outside_are_classified_correctly() {
-        let mut state = 9_u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 16_777_216.0
-        };
+        let mut source = Random(9);
+        let mut random = || source.unit_f32();
         let mut seen = [0; 2];
         for _ in 0..20_000 {
             let tangent = 0.05 + 3.0 * f64::from(random());
