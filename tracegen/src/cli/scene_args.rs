@@ -297,8 +297,8 @@ impl CameraArgs {
 #[derive(Args, Clone, Debug)]
 #[command(next_help_heading = "Display")]
 pub struct HmdArgs {
-    /// Preset: symmetric-100, dk2, vive, quest2, rift-cv1, rift-s, index, pimax-5k-plus, pimax-8k or quest3.
-    #[arg(long, value_name = "NAME", default_value = hmd::PRESETS[0])]
+    /// Name of a preset.
+    #[arg(long, value_name = "NAME", default_value = hmd::PRESETS[0], help = preset_help())]
     pub hmd: String,
     /// Pixels per eye [default: the preset's].
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
@@ -317,6 +317,11 @@ pub struct HmdArgs {
     /// Outward turn of each eye in degrees.
     #[arg(long, value_name = "DEG", allow_hyphen_values = true)]
     pub cant: Option<f32>,
+}
+
+fn preset_help() -> String {
+    let [others @ .., last] = &hmd::PRESETS;
+    format!("Preset: {} or {last}", others.join(", "))
 }
 
 impl HmdArgs {

@@ -14,6 +14,7 @@ use std::str::FromStr;
 use techniques::Gaze;
 use techniques::Settings;
 use techniques::distance::DistanceCull;
+use techniques::foveation::MODES;
 use techniques::gaze::GazeSample;
 use techniques::settings::{FarField, Foveation, FoveationKind, Rates, Split, Variant};
 use visibility::Culling;
@@ -124,29 +125,11 @@ fn variant_parser() -> impl TypedValueParser<Value = Variant> {
 }
 
 fn foveate_parser() -> impl TypedValueParser<Value = FoveationKind> {
-    use FoveationKind::{LensMatched, MultiResolution, RadialDensity, Rings};
-    choice([
-        (
-            "rings",
-            Rings,
-            "A rate for each 16x16 tile: 1, 1/2, 1/4, 1/8 or 1/16 of the pixels",
-        ),
-        (
-            "multi-resolution",
-            MultiResolution,
-            "3x3 viewports, the outer ones at half the resolution",
-        ),
-        (
-            "radial-density",
-            RadialDensity,
-            "Every other 2x2 quad of the periphery, filled from its neighbours",
-        ),
-        (
-            "lens-matched",
-            LensMatched,
-            "2x2 viewports, coarser towards the edges by a projective map",
-        ),
-    ])
+    choice(
+        MODES
+            .each_ref()
+            .map(|mode| (mode.name, mode.kind, mode.help)),
+    )
 }
 
 fn culling_parser() -> impl TypedValueParser<Value = Culling> {
@@ -230,14 +213,21 @@ impl TechniqueArgs {
         let Some(kind) = self.foveate else {
             return Ok(None);
         };
-        ensure!(
-            kind != FoveationKind::LensMatched || self.rates.is_none() && self.gaze.is_none(),
-            "--rates, --gaze: expected with another --foveate, found with lens-matched, whose rates are those of its projection around straight ahead"
-        );
-        ensure!(
-            kind != FoveationKind::MultiResolution || self.rates.is_none(),
-            "--rates: expected with --foveate rings or radial-density, found with multi-resolution, whose rates are those of its viewports"
-        );
+        let mode = kind.mode();
+        if let Some(of) = mode.rates_of {
+            let found = format!("found with {}, whose rates are those of {of}", mode.name);
+            ensure!(
+                mode.follows_gaze || self.rates.is_none() && self.gaze.is_none(),
+                "--rates, --gaze: expected with another --foveate, {found}"
+            );
+            let by_angle = MODES.iter().filter(|mode| mode.rates_of.is_none());
+            let names: Vec<&str> = by_angle.map(|mode| mode.name).collect();
+            ensure!(
+                self.rates.is_none(),
+                "--rates: expected with --foveate {}, {found}",
+                names.join(" or ")
+            );
+        }
         Ok(Some(Foveation {
             kind,
             gaze: self

@@ -2,9 +2,8 @@
 
 use formats::view::Hmd;
 use techniques::distance::DistanceCull;
-use techniques::settings::{
-    FarField, Foveation, FoveationKind, Rates, Reprojection, Split, Variant,
-};
+use techniques::foveation::{MODES, Mode};
+use techniques::settings::{FarField, Foveation, Rates, Reprojection, Split, Variant};
 use techniques::{Gaze, Settings};
 use visibility::Culling;
 
@@ -63,6 +62,11 @@ impl Part {
         let mut parts = vec![Self::culling(baseline)];
         parts.extend(others.map(Self::culling));
         parts.extend(TECHNIQUES.iter().map(Self::switch));
+        parts.extend(
+            MODES
+                .iter()
+                .map(|mode| Self::foveation(mode, "", "", Rates::default())),
+        );
         parts
     }
 
@@ -72,26 +76,15 @@ impl Part {
         // A search renders single frames, and every other frame at half rate has no picture of its own.
         parts.retain(|part| part.setting() != Setting::Rate);
         parts.extend(VARIANTS.iter().map(Self::switch));
+        let by_angle = || MODES.iter().filter(|mode| mode.rates_of.is_none());
+        parts.extend(
+            by_angle().map(|mode| Self::foveation(mode, "-wide", ", 1.5 times as wide", wide())),
+        );
         let acuity = Rates::of_acuity(hmd);
-        for (name, title, kind) in [
-            (
-                "foveation-rings-acuity",
-                "Foveation by rings where the eye cannot tell",
-                FoveationKind::Rings,
-            ),
-            (
-                "radial-density-acuity",
-                "Radial density mask where the eye cannot tell",
-                FoveationKind::RadialDensity,
-            ),
-        ] {
-            parts.push(Self {
-                name: name.to_owned(),
-                title: title.to_owned(),
-                lossless: false,
-                change: Change::Foveation(foveation(kind, acuity)),
-            });
-        }
+        parts
+            .extend(by_angle().map(|mode| {
+                Self::foveation(mode, "-acuity", " where the eye cannot tell", acuity)
+            }));
         parts
     }
 
@@ -101,6 +94,20 @@ impl Part {
             title: title.to_owned(),
             lossless,
             change: Change::Switch(setting, change),
+        }
+    }
+
+    /// A foveation mode with some rates and the gaze straight ahead.
+    fn foveation(mode: &Mode, suffix: &str, title: &str, rates: Rates) -> Self {
+        Self {
+            name: format!("{}{suffix}", mode.technique),
+            title: format!("{}{title}", mode.title),
+            lossless: false,
+            change: Change::Foveation(Foveation {
+                kind: mode.kind,
+                gaze: Gaze::default(),
+                rates,
+            }),
         }
     }
 
@@ -139,7 +146,7 @@ impl Part {
 /// Name, title, whether it is lossless, the setting that it changes, and the change.
 struct Switch(&'static str, &'static str, bool, Setting, fn(&mut Settings));
 
-/// The techniques besides culling.
+/// The techniques besides culling and foveation.
 const TECHNIQUES: &[Switch] = &[
     Switch(
         "occlusion",
@@ -207,34 +214,6 @@ const TECHNIQUES: &[Switch] = &[
         Setting::FarField,
         |s| s.far_field = far_field(Split::Pixels(1.0), Variant::AlternateEye),
     ),
-    Switch(
-        "foveation-rings",
-        "Foveation by rings",
-        false,
-        Setting::Foveation,
-        |s| s.foveation = Some(foveation(FoveationKind::Rings, Rates::default())),
-    ),
-    Switch(
-        "multi-resolution",
-        "Multi-resolution",
-        false,
-        Setting::Foveation,
-        |s| s.foveation = Some(foveation(FoveationKind::MultiResolution, Rates::default())),
-    ),
-    Switch(
-        "radial-density",
-        "Radial density mask",
-        false,
-        Setting::Foveation,
-        |s| s.foveation = Some(foveation(FoveationKind::RadialDensity, Rates::default())),
-    ),
-    Switch(
-        "lens-matched",
-        "Lens-matched viewports",
-        false,
-        Setting::Foveation,
-        |s| s.foveation = Some(foveation(FoveationKind::LensMatched, Rates::default())),
-    ),
 ];
 
 /// Other settings of these techniques, for searches.
@@ -260,33 +239,10 @@ const VARIANTS: &[Switch] = &[
         Setting::FarField,
         |s| s.far_field = far_field(Split::Pixels(1.0), Variant::DepthShift),
     ),
-    Switch(
-        "foveation-rings-wide",
-        "Foveation by rings, 1.5 times as wide",
-        false,
-        Setting::Foveation,
-        |s| s.foveation = Some(foveation(FoveationKind::Rings, wide())),
-    ),
-    Switch(
-        "radial-density-wide",
-        "Radial density mask, 1.5 times as wide",
-        false,
-        Setting::Foveation,
-        |s| s.foveation = Some(foveation(FoveationKind::RadialDensity, wide())),
-    ),
 ];
 
 fn far_field(split: Split, variant: Variant) -> Option<FarField> {
     Some(FarField { split, variant })
-}
-
-/// Gaze straight ahead.
-fn foveation(kind: FoveationKind, rates: Rates) -> Foveation {
-    Foveation {
-        kind,
-        gaze: Gaze::default(),
-        rates,
-    }
 }
 
 /// The default rates, each starting 1.5 times as far out.

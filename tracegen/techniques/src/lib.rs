@@ -7,7 +7,7 @@ pub mod distance;
 mod error;
 mod eye;
 pub mod far_field;
-mod foveation;
+pub mod foveation;
 pub mod gaze;
 mod hidden_area;
 pub mod hidden_mesh;

@@ -3,12 +3,10 @@
 use crate::error::SettingsError;
 use crate::eye::EyePicture;
 use crate::far_field::{self, FarFieldError, FarView, Stereo};
-use crate::foveation::{lens_matched, multi_resolution, radial_density, rings};
 use crate::layer::Predicted;
 use crate::least_work::Object;
 use crate::patch::EyePatches;
 use crate::plan::{FramePlan, PictureSource};
-use crate::settings::FoveationKind;
 use crate::{Settings, hidden_area};
 use formats::view::{Eye, FrameViews, Hmd, Lens};
 use std::sync::{Arc, Mutex};
@@ -35,8 +33,8 @@ impl Planner {
     /// Plans frames with the pictures of `eyes`, in this order, with `fps` frames per second. `lenses` are
     /// the visible parts of the pictures.
     ///
+    /// # Errors
     /// See [`Settings::check`].
-    /// [`Settings::check`].
     pub fn new(
         settings: &Settings,
         hmd: &Hmd,
@@ -94,8 +92,8 @@ impl Planner {
 
     /// Checks that the far field, if any, can be drawn for a frame's eyes.
     ///
+    /// # Errors
     /// See [`Stereo::view`].
-    /// As [`Stereo::view`].
     pub fn check_views(&self, views: &FrameViews) -> Result<(), FarFieldError> {
         self.far_view(views, Vec::new).map(|_| ())
     }
@@ -193,14 +191,7 @@ impl Planner {
             }
             let mut made = match &self.settings.foveation {
                 None => hidden_area::patches(&picture),
-                Some(foveation) => match foveation.kind {
-                    FoveationKind::Rings => rings::patches(&picture, &foveation.rates),
-                    FoveationKind::MultiResolution => multi_resolution::patches(&picture),
-                    FoveationKind::LensMatched => lens_matched::patches(&picture),
-                    FoveationKind::RadialDensity => {
-                        radial_density::patches(&picture, &foveation.rates)
-                    }
-                },
+                Some(foveation) => (foveation.kind.mode().patches)(&picture, &foveation.rates),
             };
             // A rate without tiles needs no layer.
             made.patches.retain(|patch| patch.draws_something());
