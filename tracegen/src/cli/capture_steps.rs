@@ -3,13 +3,12 @@
 use super::raster_args::RasterArgs;
 use super::scene_args::SceneSetup;
 use crate::picture;
-use crate::study::world::Tracer;
+use crate::study::world::{Tracer, World};
 use anyhow::Context;
 use formats::container::AtomicFile;
-use formats::textrace::{Pass, Tables, TextraceWriter, TraceMeta};
+use formats::textrace::{Tables, TextraceWriter, TraceMeta};
 use raster::backend::{CaptureBackend, Fragments};
 use raster::capture::Pictures;
-use raster::draws::DrawList;
 use raster::geometry::geometry;
 use scene::{LoadOptions, Scene};
 use shell::{Output, lasting_arguments};
@@ -62,16 +61,11 @@ pub struct TraceOutput<'a> {
 
 impl<'a> TraceOutput<'a> {
     /// Creates the trace beside its final place.
-    pub fn create(
-        args: &'a RasterArgs,
-        tables: &'a Tables,
-        scene: &Scene,
-        draws: &DrawList,
-    ) -> anyhow::Result<Self> {
+    pub fn create(args: &'a RasterArgs, tables: &'a Tables, world: &World) -> anyhow::Result<Self> {
         let writer = TextraceWriter::create(&args.output, tables)?;
         let mut writer = writer.with_encoding(args.encoding);
         if args.geometry {
-            writer = writer.with_geometry(geometry(scene, draws))?;
+            writer = writer.with_geometry(geometry(&world.scene, &world.draws))?;
         }
         Ok(Self {
             tracer: Tracer::new(tables, writer),
@@ -106,39 +100,37 @@ pub(super) fn cascades(scene: &Scene, shadows: bool) -> u32 {
     }
 }
 
-/// The tables of a trace of the scene's frames that records `fragments`.
+/// The tables of a trace of all frames that records `fragments`, without passes.
 pub(super) fn tables(
-    setup: &SceneSetup,
+    world: &World,
     spec: &str,
-    draws: &DrawList,
     uploads: &TextureSet,
     backend: &dyn CaptureBackend,
-    passes: Vec<Pass>,
     fragments: Fragments,
 ) -> Tables {
-    let textures = draws.textures(uploads);
-    let (samplers, draw_table) = draws.tables(&setup.scene, uploads, &textures);
+    let textures = world.draws.textures(uploads);
+    let (samplers, draws) = world.draws.tables(&world.scene, uploads, &textures);
     Tables {
         meta: TraceMeta {
             tool: super::tool(),
             command_line: lasting_arguments(std::env::args_os().skip(1)),
             scene: spec.into(),
-            scene_triangles: setup.scene.triangle_count(),
-            camera: setup.camera.name.clone(),
+            scene_triangles: world.scene.triangle_count(),
+            camera: world.camera.name.clone(),
             backend: backend.name().into(),
             driver: backend.driver().into(),
             seed: 0,
-            hmd: setup.hmd.clone(),
-            frames: setup.frames.clone(),
-            surfaces: Some(draws.surfaces(fragments)),
-            origin_m: setup.scene.origin.to_array(),
+            hmd: world.hmd.clone(),
+            frames: world.views.clone(),
+            surfaces: Some(world.draws.surfaces(fragments)),
+            origin_m: world.scene.origin.to_array(),
             techniques: None,
             program: None,
         },
         textures,
         samplers,
-        draws: draw_table,
-        passes,
+        draws,
+        passes: Vec::new(),
     }
 }
 

@@ -3,11 +3,10 @@
 use super::cache_args::CacheArgs;
 use super::capture_steps::{self, prepare_textures};
 use super::scene_args::SceneSetup;
-use crate::study::world::{World, shadow_range_m};
+use crate::study::world::World;
 use ::raster::backend::Fragments;
-use ::raster::draws::DrawList;
+use ::raster::error::RasterError;
 use ::raster::lavapipe::{Lavapipe, device::Gpu};
-use ::raster::lighting::Lighting;
 use formats::view::Lens;
 
 /// A world and the device that renders it.
@@ -24,8 +23,6 @@ pub struct Preparation<'a> {
     pub scene: &'a str,
     /// Visible parts of the left and right eye's pictures.
     pub lens: [Lens; 2],
-    /// Frames per second along the path.
-    pub fps: f32,
     /// Whether shadow cascades are added.
     pub shadows: bool,
     /// Size limit of raw records in bytes.
@@ -40,36 +37,33 @@ pub struct Preparation<'a> {
 /// # Errors
 /// Unreadable textures, driver errors.
 pub fn prepare(of: Preparation<'_>, setup: SceneSetup, gpu: Gpu) -> anyhow::Result<Prepared> {
-    let scene = &setup.scene;
-    let draws = DrawList::new(scene, capture_steps::cascades(scene, of.shadows))?;
+    let cascades = capture_steps::cascades(&setup.scene, of.shadows);
+    let mut world = world(setup, cascades, of.lens)?;
+    let scene = &world.scene;
     let uploads = prepare_textures(scene, |_| Some(0), of.cache.open()?.as_ref())?;
-    let size_px = setup.hmd.eye_size_px;
-    let backend = Lavapipe::on(gpu, scene, &draws, &uploads, size_px, of.record_budget)?;
-    let tables = capture_steps::tables(
-        &setup,
-        of.scene,
-        &draws,
+    let size_px = world.hmd.eye_size_px;
+    let backend = Lavapipe::on(
+        gpu,
+        scene,
+        &world.draws,
         &uploads,
-        &backend,
-        Vec::new(),
-        Fragments::DepthTested,
-    );
-    let bounds = scene.bounds().unwrap_or_default();
-    let world = World {
-        draws,
-        lighting: Lighting::new(scene),
-        bounds,
-        shadow_range_m: shadow_range_m(&setup.camera, bounds),
-        lens: of.lens,
-        tables,
-        fps: of.fps,
-        start_s: setup.moments.scene_start_s,
-        camera: setup.camera,
-        hmd: setup.hmd,
-        views: setup.frames,
-        scene: setup.scene,
-        texture_bytes: uploads.bytes() as u64,
-        shown: None,
-    };
+        size_px,
+        of.record_budget,
+    )?;
+    world.tables =
+        capture_steps::tables(&world, of.scene, &uploads, &backend, Fragments::DepthTested);
+    world.texture_bytes = uploads.bytes() as u64;
     Ok(Prepared { world, backend })
+}
+
+/// The world of a loaded scene with a number of shadow cascades.
+///
+/// # Errors
+/// A scene that cannot be drawn.
+pub fn world(setup: SceneSetup, cascades: u32, lens: [Lens; 2]) -> Result<World, RasterError> {
+    World::new(
+        (setup.scene, cascades),
+        (setup.camera, setup.frames, setup.moments),
+        (setup.hmd, lens),
+    )
 }

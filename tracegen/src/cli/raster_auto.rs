@@ -4,11 +4,10 @@
 use super::capture_steps::{TraceOutput, load, warn_of_multiview_defect};
 use super::prepared::{Preparation, Prepared, prepare};
 use super::raster_args::RasterArgs;
+use super::raster_summary::DoubtfulTriangles;
 use super::scene_args::warn_of_nothing_seen;
-use crate::cut_triangles::CutTriangles;
 use crate::study::auto::{Budget, Known, Objective, Schedule, choose, search_frames};
 use crate::study::world::World;
-use crate::unstable_triangles::UnstableTriangles;
 use ::raster::lavapipe::{Lavapipe, device};
 use anyhow::ensure;
 use formats::textrace::{Choice, ChosenTechniques};
@@ -42,7 +41,6 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
     } = prepare(
         Preparation {
             lens: args.techniques.lens.lenses(&setup.hmd)?,
-            fps: args.path.fps,
             scene: &args.scene.scene,
             shadows: args.shadows,
             record_budget: args.record_budget,
@@ -76,20 +74,18 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
         schedule: schedule.to_string(),
         choice: choice.clone(),
     });
-    let mut output = TraceOutput::create(args, &tables, &world.scene, &world.draws)?;
+    let mut output = TraceOutput::create(args, &tables, &world)?;
     progress.stage("capturing", frames.len() as u64, "frames");
     let mut memory = Occlusion::default();
     let mut counts = CaptureCounts::default();
-    let (mut first, mut unstable) = (None, UnstableTriangles::default());
-    let mut cut = CutTriangles::default();
+    let (mut first, mut doubtful) = (None, DoubtfulTriangles::default());
     for &frame in &frames {
         let planner = planners.of_frame(frame);
         let shot = world.shoot(&mut backend, planner, frame, &mut memory)?;
         if first.is_none() {
             first = Some(world.pictures(&mut backend, &shot)?);
             for eye in &world.views[frame as usize].eyes {
-                unstable.look(&world.scene, &world.draws, eye, world.hmd.eye_size_px);
-                cut.look(&world.scene, &world.draws, eye, world.hmd.eye_size_px);
+                doubtful.look(&world, eye);
             }
         }
         let job = world.job(planner);
@@ -104,10 +100,7 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
     if counts.fragments == 0 {
         warn_of_nothing_seen(&camera, world.bounds, world.scene.origin);
     }
-    let unstable = unstable.warnings(&world.scene, counts.fragments / u64::from(args.frames()));
-    for warning in cut.warnings(&world.scene).iter().chain(&unstable) {
-        shell::warn(warning);
-    }
+    doubtful.warn(&world.scene, counts.fragments / u64::from(args.frames()));
     note(&format!(
         "{} frame(s): {} quads, {} fragments; file {file_bytes} bytes",
         frames.len(),

@@ -3,22 +3,19 @@
 use super::capture_steps::{
     TraceOutput, cascades, load, prepare_textures, tables, warn_of_multiview_defect,
 };
+use super::prepared::world;
 use super::raster_args::RasterArgs;
-use super::raster_summary::{Summary, worked_since};
+use super::raster_summary::{DoubtfulTriangles, Summary, worked_since};
 use super::scene_args::SceneSetup;
 use crate::study::processor;
-use crate::study::world::shadow_range_m;
-use crate::unstable_triangles::UnstableTriangles;
+use crate::study::world::World;
 use anyhow::ensure;
 use formats::textrace::Pass;
 use formats::view::FrameViews;
-use glam::Vec3;
 use raster::backend::{CaptureBackend, Fragments};
 use raster::capture::{CaptureJob, CapturedFrame, Pictures};
-use raster::draws::DrawList;
 use raster::drivers::Opened;
 use raster::frame::Frame;
-use raster::lighting::Lighting;
 use shell::{Output, Progress, note};
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -28,10 +25,8 @@ use textures::TextureSet;
 /// What is captured of a scene.
 struct Session<'a> {
     args: &'a RasterArgs,
-    setup: SceneSetup,
-    draws: DrawList,
+    world: World,
     planner: Planner,
-    bounds: (Vec3, Vec3),
 }
 
 /// A frame as it is rendered without capture.
@@ -55,20 +50,19 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
     let mut session = Session::new(args, setup)?;
     let (passes, finest) = session.plan()?;
     let searched = started.elapsed();
-    let scene = &session.setup.scene;
+    let scene = &session.world.scene;
     let textures = prepare_textures(scene, |image| finest[image], cache.as_ref())?;
     let textured = started.elapsed();
     let mut opened = session.open_driver(&textures)?;
     let backend = opened.backend.as_mut();
-    let tables = tables(
-        &session.setup,
+    let mut tables = tables(
+        &session.world,
         &args.scene.scene,
-        &session.draws,
         &textures,
         backend,
-        passes,
         args.hsr,
     );
+    tables.passes = passes;
     let texels = texels_note(&textures, searched - loaded);
     let counts = [textures.textures.len(), textures.cached, textures.unseen()];
     drop(textures);
@@ -80,12 +74,12 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
     let ready = started.elapsed();
     let scene = format!(
         "{}, camera {}",
-        &*args.scene.scene, session.setup.camera.name
+        &*args.scene.scene, session.world.camera.name
     );
     note_ready(&scene, counts, [loaded, textured, ready]);
-    let frames = session.setup.frames.clone();
+    let frames = session.world.views.clone();
     progress.stage("capturing", frames.len() as u64, "frames");
-    let mut output = TraceOutput::create(args, &tables, &session.setup.scene, &session.draws)?;
+    let mut output = TraceOutput::create(args, &tables, &session.world)?;
     let mut first_pictures: Option<Pictures> = None;
     let mut first = Some(first);
     for views in &frames {
@@ -94,22 +88,18 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
         progress.advance(1);
     }
     drop(progress);
-    let setup = &session.setup;
-    let size_px = setup.hmd.eye_size_px;
+    let world = &session.world;
+    let size_px = world.hmd.eye_size_px;
     let start = Instant::now();
     let file_bytes = output.finish(first_pictures.as_ref(), size_px)?;
     summary.captured += start.elapsed();
     if summary.counts.fragments == 0 {
-        super::scene_args::warn_of_nothing_seen(&setup.camera, session.bounds, setup.scene.origin);
+        super::scene_args::warn_of_nothing_seen(&world.camera, world.bounds, world.scene.origin);
     }
-    warn_of_few_pixels(summary.covered, &setup.camera.name);
-    for warning in summary.cut.warnings(&setup.scene) {
-        shell::warn(&warning);
-    }
-    let per_frame = summary.counts.fragments / frames.len().max(1) as u64;
-    let unstable = summary.unstable.unwrap_or_default();
-    for warning in unstable.warnings(&setup.scene, per_frame) {
-        shell::warn(&warning);
+    warn_of_few_pixels(summary.covered, &world.camera.name);
+    if let Some(doubtful) = &summary.doubtful {
+        let per_frame = summary.counts.fragments / frames.len().max(1) as u64;
+        doubtful.warn(&world.scene, per_frame);
     }
     note(&texels);
     let views = [frames.len(), args.views.len()];
@@ -121,50 +111,29 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
 
 impl<'a> Session<'a> {
     fn new(args: &'a RasterArgs, setup: SceneSetup) -> anyhow::Result<Self> {
+        let lens = args.techniques.lens.lenses(&setup.hmd)?;
         let cascades = cascades(&setup.scene, args.shadows);
+        let world = world(setup, cascades, lens)?;
+        let settings = args.techniques.settings(&world.hmd)?;
+        let planner = Planner::new(&settings, &world.hmd, world.lens, args.views, args.path.fps)?;
         Ok(Self {
             args,
-            draws: DrawList::new(&setup.scene, cascades)?,
-            planner: Planner::new(
-                &args.techniques.settings(&setup.hmd)?,
-                &setup.hmd,
-                args.techniques.lens.lenses(&setup.hmd)?,
-                args.views,
-                args.path.fps,
-            )?,
-            bounds: setup.scene.bounds().unwrap_or_default(),
-            setup,
+            world,
+            planner,
         })
-    }
-
-    /// Poses the scene and its draws for a frame.
-    fn pose(&mut self, frame: u32) -> anyhow::Result<()> {
-        let time_s = self.setup.moments.scene_time_s(frame);
-        let scene = &mut self.setup.scene;
-        scene.animate(time_s)?;
-        if scene.animation.is_some() {
-            self.bounds = scene.bounds().unwrap_or_default();
-        }
-        self.draws.pose(scene, time_s as f32);
-        Ok(())
     }
 
     /// What to capture of the draws where they are.
     fn job(&self) -> CaptureJob<'_> {
         let args = self.args;
         CaptureJob {
-            scene: &self.setup.scene,
-            draws: &self.draws,
-            lighting: Lighting::new(&self.setup.scene),
-            bounds: self.bounds,
-            shadow_range_m: shadow_range_m(&self.setup.camera, self.bounds),
-            planner: &self.planner,
             skips: Skips::without(&args.no_skip),
             fragments: args.hsr,
             // Both views at once leave no depth to compare.
             shaded: args.shade
                 || self.planner.settings().multiview
                 || args.no_plain && args.image.is_some(),
+            ..self.world.job(&self.planner)
         }
     }
 
@@ -172,23 +141,24 @@ impl<'a> Session<'a> {
     /// they start afterwards.
     fn plan(&mut self) -> anyhow::Result<(Vec<Pass>, Vec<Option<u32>>)> {
         let (mut passes, mut finest) = (Vec::new(), Vec::new());
-        for number in 0..self.setup.frames.len() {
+        for number in 0..self.world.views.len() {
             // The layers of a frame depend on where its draws are.
-            self.pose(self.setup.frames[number].frame)?;
-            let (job, views) = (self.job(), &self.setup.frames[number]);
+            self.world.pose(self.world.views[number].frame)?;
+            let (job, views) = (self.job(), &self.world.views[number]);
             passes.extend(job.passes(views)?);
             job.add_finest_levels(views, &mut finest)?;
         }
-        self.pose(self.setup.moments.frames.start)?;
+        self.world.pose(self.world.moments.frames.start)?;
         Ok((passes, finest))
     }
 
     /// Opens the driver and prints what it replaces or lacks.
     fn open_driver(&self, textures: &TextureSet) -> anyhow::Result<Opened> {
-        let size_px = self.setup.hmd.eye_size_px;
+        let world = &self.world;
+        let size_px = world.hmd.eye_size_px;
         let budget = self.args.record_budget;
         let driver = self.args.backend;
-        let opened = driver.open(&self.setup.scene, &self.draws, textures, size_px, budget)?;
+        let opened = driver.open(&world.scene, &world.draws, textures, size_px, budget)?;
         let backend = &opened.backend;
         if let Some(reason) = &opened.instead_of {
             shell::warn(&format!("{reason}; {} captures instead", backend.name()));
@@ -212,7 +182,7 @@ impl<'a> Session<'a> {
         summary: &mut Summary,
     ) -> anyhow::Result<Frame> {
         let job = self.job();
-        let first = summary.look(&job, backend, &self.setup.frames[0])?;
+        let first = summary.look(&job, backend, &self.world.views[0])?;
         summary.light(&job, backend, &first)?;
         if !self.args.no_plain {
             job.warm_up(backend, &first)?;
@@ -230,15 +200,13 @@ impl<'a> Session<'a> {
         output: &mut TraceOutput<'_>,
         summary: &mut Summary,
     ) -> anyhow::Result<Option<Pictures>> {
-        self.pose(views.frame)?;
-        backend.pose(&self.setup.scene, &self.draws);
-        if summary.unstable.is_none() {
-            let unstable = summary.unstable.insert(UnstableTriangles::default());
-            let (scene, size_px) = (&self.setup.scene, self.setup.hmd.eye_size_px);
+        self.world.pose(views.frame)?;
+        let world = &self.world;
+        backend.pose(&world.scene, &world.draws);
+        if summary.doubtful.is_none() {
+            let doubtful = summary.doubtful.insert(DoubtfulTriangles::default());
             for eye in self.args.views {
-                let view = &views.eyes[*eye as usize];
-                unstable.look(scene, &self.draws, view, size_px);
-                summary.cut.look(scene, &self.draws, view, size_px);
+                doubtful.look(world, &views.eyes[*eye as usize]);
             }
         }
         let job = self.job();

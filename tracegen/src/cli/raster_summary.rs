@@ -1,14 +1,16 @@
 //! Summary of `tracegen raster`: what was drawn, recorded and skipped, and the times.
 
 use crate::cut_triangles::CutTriangles;
+use crate::study::world::World;
 use crate::study::{memory, processor};
 use crate::unstable_triangles::UnstableTriangles;
-use formats::view::FrameViews;
+use formats::view::{EyeView, FrameViews};
 use raster::backend::{CaptureBackend, Work};
 use raster::capture::CaptureJob;
 use raster::error::RasterError;
 use raster::frame::{Frame, Skipped};
 use record::CaptureCounts;
+use scene::Scene;
 use shell::note;
 use std::time::{Duration, Instant};
 use techniques::layer::Predicted;
@@ -54,10 +56,8 @@ pub struct Summary {
     pub sorting: Duration,
     pub counts: CaptureCounts,
     pub predicted: Vec<Predicted>,
-    /// Unstable triangles of the first frame.
-    pub unstable: Option<UnstableTriangles>,
-    /// What the planes of the first frame cut away.
-    pub cut: CutTriangles,
+    /// Triangles of the first frame that may be lost.
+    pub doubtful: Option<DoubtfulTriangles>,
     /// Share of the first frame's pixels that something covers.
     pub covered: Option<f64>,
     /// What was found identical with and without capture.
@@ -69,6 +69,30 @@ pub struct Summary {
     pub occlusion_tests: u64,
     pub occluded: u64,
     pub skipped: Skipped,
+}
+
+/// Triangles of a frame that rounding or a plane may take away.
+#[derive(Default)]
+pub struct DoubtfulTriangles {
+    unstable: UnstableTriangles,
+    cut: CutTriangles,
+}
+
+impl DoubtfulTriangles {
+    /// Adds the triangles of a view.
+    pub fn look(&mut self, world: &World, view: &EyeView) {
+        let (scene, draws, size_px) = (&world.scene, &world.draws, world.hmd.eye_size_px);
+        self.unstable.look(scene, draws, view, size_px);
+        self.cut.look(scene, draws, view, size_px);
+    }
+
+    /// Warns of those that may affect a visible share of a frame's `fragments`.
+    pub fn warn(&self, scene: &Scene, fragments: u64) {
+        let unstable = self.unstable.warnings(scene, fragments);
+        for warning in self.cut.warnings(scene).iter().chain(&unstable) {
+            shell::warn(warning);
+        }
+    }
 }
 
 impl Summary {

@@ -131,7 +131,6 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         Preparation {
             scene: &args.scene.scene,
             lens: subject.lens,
-            fps: args.path.fps,
             shadows: args.shadows,
             record_budget: RECORD_BUDGET,
             cache: args.cache,

@@ -3,9 +3,10 @@
 use super::cache_args::CacheArgs;
 use super::capture_steps::{cascades, prepare_environment, tables};
 use super::path_args::PathArgs;
-use super::scene_args::{SceneArgs, SceneSetup};
+use super::prepared::world;
+use super::scene_args::SceneArgs;
 use super::verified_trace::{look_as, refuse_partial, trace_cascades};
-use crate::study::world::shadow_range_m;
+use crate::study::world::World;
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::footprint::LodFormula;
@@ -13,17 +14,15 @@ use formats::textrace::{Pass, Textrace, TextraceWriter};
 use formats::view::{Eye, Lens};
 use lab::verify::frame::{CaptureUnderTest, FrameUnderTest, TileChoice, Verified};
 use lab::verify::report::Report;
-use raster::backend::{CaptureBackend, Fragments, Texels};
+use raster::backend::{CaptureBackend, Texels};
 use raster::capture::CaptureJob;
-use raster::draws::DrawList;
 use raster::lavapipe::Lavapipe;
-use raster::lighting::Lighting;
 use scene::{LoadOptions, TextureSlot, TextureSlots};
 use shell::{Output, Progress, Threads, note};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
-use techniques::{Planner, Settings, Skips};
+use techniques::{Settings, Skips};
 use textures::TextureSet;
 
 /// Memory for raw records.
@@ -119,41 +118,35 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         shadows_are_known = look_as(trace, file, &mut setup)?;
         shadow_cascades = trace_cascades(trace);
     }
-    let mut draws = DrawList::new(&setup.scene, shadow_cascades)?;
-    draws.pose(&setup.scene, setup.moments.scene_time_s(0) as f32);
-    let planner = plain_planner(&setup)?;
-    let bounds = setup.scene.bounds().unwrap_or_default();
+    let lens = setup.hmd.fov.map(|fov| Lens::of(&fov));
+    let mut world = world(setup, shadow_cascades, lens)?;
+    let time_s = world.moments.scene_time_s(0);
+    world.draws.pose(&world.scene, time_s as f32);
+    let planner = world.planner(&Settings::default())?;
     let job = CaptureJob {
-        scene: &setup.scene,
-        draws: &draws,
-        lighting: Lighting::new(&setup.scene),
-        bounds,
-        shadow_range_m: shadow_range_m(&setup.camera, bounds),
-        planner: &planner,
         skips: Skips::default(),
-        fragments: Fragments::DepthTested,
-        shaded: false,
+        ..world.job(&planner)
     };
     progress.stage("preparing textures", 0, "");
-    let finest = job.finest_levels(&setup.frames)?;
-    let textures = TextureSet::prepare(&setup.scene, |image| finest[image], cache.as_ref())?;
+    let finest = job.finest_levels(&world.views)?;
+    let textures = TextureSet::prepare(&world.scene, |image| finest[image], cache.as_ref())?;
     let mut backend = match existing.is_none() || args.colour {
         true => Some(Lavapipe::new(
-            &setup.scene,
-            &draws,
+            &world.scene,
+            &world.draws,
             &textures,
-            setup.hmd.eye_size_px,
+            world.hmd.eye_size_px,
             RECORD_BUDGET_BYTES,
         )?),
         false => None,
     };
     progress.stage("capturing", 0, "");
     let trace = match (existing, &mut backend) {
-        (None, Some(backend)) => capture(&job, &setup, &args.scene.scene, &textures, backend)?,
+        (None, Some(backend)) => capture(&job, &world, &args.scene.scene, &textures, backend)?,
         (Some(trace), _) => trace,
         (None, None) => unreachable!("a driver is opened where there is no trace"),
     };
-    let frames = (setup.frames.iter())
+    let frames = (world.views.iter())
         .map(|views| {
             let cascades = match shadows_are_known {
                 true => Some(job.frame(views)?.lighting.cascades),
@@ -167,14 +160,14 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         .collect::<anyhow::Result<Vec<_>>>()?;
     let subject = CaptureUnderTest {
         trace: &trace,
-        scene: &setup.scene,
-        draws: &draws,
+        scene: &world.scene,
+        draws: &world.draws,
         textures: &textures,
         frames: &frames,
     };
     subject.check()?;
     let texels = match (&mut backend, args.colour) {
-        (Some(backend), true) => texels(&job, &setup, &subject, backend)?,
+        (Some(backend), true) => texels(&job, &subject, backend)?,
         _ => Vec::new(),
     };
     progress.stage("verifying", 0, "");
@@ -258,14 +251,6 @@ fn filter_in_single_precision() {
     }
 }
 
-/// Plans both eyes without techniques.
-fn plain_planner(setup: &SceneSetup) -> anyhow::Result<Planner> {
-    let lenses = setup.hmd.fov.map(|fov| Lens::of(&fov));
-    let (eyes, fps) = (&[Eye::Left, Eye::Right], scene::paths::DEFAULT_FPS);
-    let settings = Settings::default();
-    Ok(Planner::new(&settings, &setup.hmd, lenses, eyes, fps)?)
-}
-
 /// Formula of the level of detail of a driver.
 fn formula_of(driver: &str) -> LodFormula {
     if driver.contains("softpipe") {
@@ -277,22 +262,14 @@ fn formula_of(driver: &str) -> LodFormula {
 
 fn capture(
     job: &CaptureJob<'_>,
-    setup: &SceneSetup,
+    world: &World,
     scene: &str,
     textures: &TextureSet,
     backend: &mut Lavapipe,
 ) -> anyhow::Result<Textrace> {
-    let passes = job.passes(&setup.frames[0])?;
-    let tables = tables(
-        setup,
-        scene,
-        job.draws,
-        textures,
-        backend,
-        passes,
-        job.fragments,
-    );
-    let frame = job.frame(&setup.frames[0])?;
+    let mut tables = tables(world, scene, textures, backend, job.fragments);
+    tables.passes = job.passes(&world.views[0])?;
+    let frame = job.frame(&world.views[0])?;
     job.light(backend, &frame)?;
     let mut writer = TextraceWriter::in_memory(&tables)?;
     job.capture_frame(backend, &frame, 0, &mut job.recorder(&tables), &mut writer)?;
@@ -302,14 +279,13 @@ fn capture(
 /// The driver's texels, by pass of the trace's first frame and by slot.
 fn texels(
     job: &CaptureJob<'_>,
-    setup: &SceneSetup,
     subject: &CaptureUnderTest<'_>,
     backend: &mut Lavapipe,
 ) -> anyhow::Result<Vec<Vec<(TextureSlot, Texels)>>> {
-    let textures = setup.scene.materials.iter().flat_map(|m| m.textures.iter());
+    let textures = job.scene.materials.iter().flat_map(|m| m.textures.iter());
     let slots: Vec<TextureSlot> = textures.map(|(slot, _)| slot).collect();
     let used = TextureSlots::of(&slots);
-    let frame = job.frame(&setup.frames[0])?;
+    let frame = job.frame(&subject.frames[0].views)?;
     let of_pass = |eye: Eye| {
         let view = (frame.views())
             .find(|view| view.layer.eye == Some(eye))

@@ -11,6 +11,7 @@ use raster::error::RasterError;
 use raster::frame::Frame;
 use raster::lighting::Lighting;
 use record::Recorder;
+use scene::paths::Moments;
 use scene::{Camera, Scene};
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
@@ -37,10 +38,8 @@ pub struct World {
     pub hmd: Hmd,
     /// Visible parts of the left and right eye's pictures.
     pub lens: [Lens; 2],
-    /// Frames per second along the path.
-    pub fps: f32,
-    /// Scene time of frame 0.
-    pub start_s: f64,
+    /// Times of the frames.
+    pub moments: Moments,
     /// The pose at the start of the path.
     pub camera: Camera,
     /// The path, by frame number.
@@ -96,12 +95,39 @@ impl Shot {
 }
 
 impl World {
+    /// A scene with some shadow cascades, seen from a path through lenses. Its tables are empty.
+    ///
+    /// # Errors
+    /// A scene that cannot be drawn.
+    pub fn new(
+        (scene, cascades): (Scene, u32),
+        (camera, views, moments): (Camera, Vec<FrameViews>, Moments),
+        (hmd, lens): (Hmd, [Lens; 2]),
+    ) -> Result<Self, RasterError> {
+        let bounds = scene.bounds().unwrap_or_default();
+        Ok(Self {
+            draws: DrawList::new(&scene, cascades)?,
+            lighting: Lighting::new(&scene),
+            bounds,
+            shadow_range_m: shadow_range_m(&camera, bounds),
+            hmd,
+            lens,
+            moments,
+            camera,
+            views,
+            tables: Tables::default(),
+            texture_bytes: 0,
+            shown: None,
+            scene,
+        })
+    }
+
     /// Plans frames with `settings`.
     ///
     /// # Errors
     /// Settings that contradict each other or do not suit the display.
     pub fn planner(&self, settings: &Settings) -> Result<Planner, SettingsError> {
-        Planner::new(settings, &self.hmd, self.lens, EYES, self.fps)
+        Planner::new(settings, &self.hmd, self.lens, EYES, self.moments.fps)
     }
 
     /// The job that captures the plans of `planner`.
@@ -134,12 +160,12 @@ impl World {
         Ok(())
     }
 
-    /// Poses the scene for a frame.
+    /// Poses the scene and its draws for a frame.
     ///
     /// # Errors
     /// A coordinate exceeds the supported range.
-    fn pose(&mut self, number: u32) -> Result<(), RasterError> {
-        let time_s = self.start_s + f64::from(number) / f64::from(self.fps);
+    pub fn pose(&mut self, number: u32) -> Result<(), RasterError> {
+        let time_s = self.moments.scene_time_s(number);
         let scene = &mut self.scene;
         (scene.animate(time_s)).map_err(|error| RasterError::Scene(error.to_string()))?;
         if scene.animation.is_some() {
@@ -284,7 +310,7 @@ impl World {
 }
 
 /// Near and far end of the cascades: from the near plane to where the scene ends.
-pub fn shadow_range_m(camera: &Camera, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f32; 2] {
+fn shadow_range_m(camera: &Camera, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f32; 2] {
     let farthest = (camera.eye - lo)
         .abs()
         .max((camera.eye - hi).abs())
