@@ -7,7 +7,7 @@
 //! scene = ["atrium", "sponza.gltf"]
 //! hmd = ["vive", "quest2"]
 //! [[captures]]
-//! //! command = "rays"                # default: `raster`
+//! command = "rays"                # default: `raster`
 //! scene = "chess"
 //! ```
 

@@ -25,7 +25,6 @@ struct SweepRow {
 }
 
 /// The schema of the JSON object.
-/// The schema of the JSON.
 #[cfg(feature = "testing")]
 pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<Report>(SCHEMA)

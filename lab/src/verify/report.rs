@@ -234,7 +234,6 @@ struct Colour {
 }
 
 /// The schema of the JSON object.
-/// The schema of the JSON.
 #[cfg(feature = "testing")]
 pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<Report>(SCHEMA)

@@ -195,6 +195,7 @@ pub trait CaptureBackend {
 
     /// Creates the targets of the frame's layers that differ from the last frame's. The same
     /// techniques reuse memory and masks from frame to frame.
+    ///
     /// # Errors
     /// Driver errors.
     fn prepare(&mut self, frame: &Frame) -> Result<(), RasterError>;

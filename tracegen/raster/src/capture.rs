@@ -150,6 +150,7 @@ impl CaptureJob<'_> {
 
     /// Makes the driver compile every shader of the frame's plain and captured pictures by
     /// rendering a tile of each layer. Measured times then exclude compilation.
+    ///
     /// # Errors
     /// Driver errors.
     pub fn warm_up(

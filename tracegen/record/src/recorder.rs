@@ -35,9 +35,9 @@ impl<'a> Recorder<'a> {
 
     /// Captures a view as pass `pass` of the trace, in as many regions as its records need.
     ///
+    /// # Errors
     /// Errors of the capturer, a tile that overflows alone, records that contradict the tables, and errors of
     /// writing.
-    /// and errors of writing.
     pub fn record_pass<C: Capturer, W: Write + Seek>(
         &mut self,
         capturer: &mut C,
