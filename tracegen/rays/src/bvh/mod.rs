@@ -29,7 +29,7 @@ use crate::ray::{LARGEST_COORDINATE, Ray};
 use count::Counter;
 use formats::raytrace::{BvhSummary, TraversalKind};
 use glam::Vec3;
-use kernel::{Kernel, Scalar};
+use kernel::Scalar;
 pub use leaf::{AllOpaque, AlphaTest, RayHit};
 use node::{Block, Child, MASKED, Node2, Node8, TRIANGLE_BYTES};
 use pages::in_large_pages;
@@ -37,7 +37,7 @@ use stacks::Stacks;
 pub use third::TreeOptions;
 use third::{ThirdTree, node_bytes};
 pub use traverse::TraversalStack;
-use traverse::{Two, Wide, Width, blocker, closest};
+use traverse::{Two, Wide, Width, search};
 use treelets::in_treelets;
 use widen::MAX_WIDTH;
 
@@ -243,13 +243,7 @@ impl Bvh {
         counter: &mut C,
         alpha: &A,
     ) -> Option<RayHit> {
-        match tree {
-            TraversalKind::Bvh2 => self.closest_in::<Two, C, A>(ray, stack, counter, alpha),
-            TraversalKind::Bvh8 => self.closest_in::<Wide<false>, C, A>(ray, stack, counter, alpha),
-            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => {
-                self.closest_in::<Wide<true>, C, A>(ray, stack, counter, alpha)
-            }
-        }
+        self.search::<false, C, A>(tree, ray, stack, counter, alpha)
     }
 
     /// True if any triangle lies on the ray's segment.
@@ -279,17 +273,31 @@ impl Bvh {
         counter: &mut C,
         alpha: &A,
     ) -> Option<RayHit> {
+        self.search::<true, C, A>(tree, ray, stack, counter, alpha)
+    }
+
+    #[inline]
+    fn search<const ANY_HIT: bool, C: Counter, A: AlphaTest>(
+        &self,
+        tree: TraversalKind,
+        ray: &Ray,
+        stack: &mut TraversalStack,
+        counter: &mut C,
+        alpha: &A,
+    ) -> Option<RayHit> {
         match tree {
-            TraversalKind::Bvh2 => self.blocker_in::<Two, C, A>(ray, stack, counter, alpha),
-            TraversalKind::Bvh8 => self.blocker_in::<Wide<false>, C, A>(ray, stack, counter, alpha),
+            TraversalKind::Bvh2 => self.search_in::<ANY_HIT, Two, C, A>(ray, stack, counter, alpha),
+            TraversalKind::Bvh8 => {
+                self.search_in::<ANY_HIT, Wide<false>, C, A>(ray, stack, counter, alpha)
+            }
             TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => {
-                self.blocker_in::<Wide<true>, C, A>(ray, stack, counter, alpha)
+                self.search_in::<ANY_HIT, Wide<true>, C, A>(ray, stack, counter, alpha)
             }
         }
     }
 
     #[inline]
-    fn closest_in<W: Width, C: Counter, A: AlphaTest>(
+    fn search_in<const ANY_HIT: bool, W: Width, C: Counter, A: AlphaTest>(
         &self,
         ray: &Ray,
         stack: &mut TraversalStack,
@@ -303,67 +311,23 @@ impl Bvh {
             #[cfg(target_arch = "x86_64")]
             Instructions::Avx2 => {
                 // SAFETY: `instructions` is Avx2 only if the processor has it.
-                unsafe { closest_avx2::<W, C, A>(self, ray, stack, counter, alpha) }
+                unsafe { search_avx2::<ANY_HIT, W, C, A>(self, ray, stack, counter, alpha) }
             }
-            _ => closest_with::<Scalar, W, C, A>(self, ray, stack, counter, alpha),
+            _ => search::<ANY_HIT, Scalar, W, C, A>(self, ray, stack, counter, alpha),
         }
     }
-
-    #[inline]
-    fn blocker_in<W: Width, C: Counter, A: AlphaTest>(
-        &self,
-        ray: &Ray,
-        stack: &mut TraversalStack,
-        counter: &mut C,
-        alpha: &A,
-    ) -> Option<RayHit> {
-        if self.nodes2.is_empty() || !ray.is_valid() {
-            return None;
-        }
-        match self.instructions {
-            #[cfg(target_arch = "x86_64")]
-            Instructions::Avx2 => {
-                // SAFETY: `instructions` is Avx2 only if the processor has it.
-                unsafe { blocker_avx2::<W, C, A>(self, ray, stack, counter, alpha) }
-            }
-            _ => blocker::<Scalar, W, C, A>(self, ray, stack, counter, alpha),
-        }
-    }
-}
-
-fn closest_with<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
-    bvh: &Bvh,
-    ray: &Ray,
-    stack: &mut TraversalStack,
-    counter: &mut C,
-    alpha: &A,
-) -> Option<RayHit> {
-    closest::<K, W, C, A>(bvh, ray, stack, counter, alpha)
 }
 
 /// The traversal compiled for AVX2. Compiled for the baseline instruction set, the kernel runs at
 /// an eighth of the speed.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn closest_avx2<W: Width, C: Counter, A: AlphaTest>(
+fn search_avx2<const ANY_HIT: bool, W: Width, C: Counter, A: AlphaTest>(
     bvh: &Bvh,
     ray: &Ray,
     stack: &mut TraversalStack,
     counter: &mut C,
     alpha: &A,
 ) -> Option<RayHit> {
-    closest::<avx2::Avx2, W, C, A>(bvh, ray, stack, counter, alpha)
-}
-
-/// See [`closest_avx2`].
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,fma")]
-fn blocker_avx2<W: Width, C: Counter, A: AlphaTest>(
-    bvh: &Bvh,
-    ray: &Ray,
-    stack: &mut TraversalStack,
-    counter: &mut C,
-    alpha: &A,
-) -> Option<RayHit> {
-    blocker::<avx2::Avx2, W, C, A>(bvh, ray, stack, counter, alpha)
+    search::<ANY_HIT, avx2::Avx2, W, C, A>(bvh, ray, stack, counter, alpha)
 }

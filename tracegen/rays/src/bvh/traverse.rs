@@ -278,9 +278,10 @@ fn walk<K: Kernel, W: Width, C: Counter>(
     }
 }
 
-/// The nearest triangle. Of equally near ones, the lowest primitive number.
+/// The nearest triangle (of equally near ones, the lowest primitive number), or with `ANY_HIT` the first
+/// triangle found that blocks the ray, which counts the triangles up to it.
 #[inline(always)]
-pub(super) fn closest<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
+pub(super) fn search<const ANY_HIT: bool, K: Kernel, W: Width, C: Counter, A: AlphaTest>(
     bvh: &Bvh,
     ray: &Ray,
     stack: &mut TraversalStack,
@@ -289,33 +290,19 @@ pub(super) fn closest<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
 ) -> Option<RayHit> {
     let prepared = PreparedRay::new(ray, bvh.bounds);
     let loaded = K::load(&prepared);
-    let mut leaf = Closest::new(Query {
+    let query = Query {
         bvh,
         first_slots: W::first_slots(bvh),
         prepared: &prepared,
         alpha,
-    });
-    walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, &mut leaf);
-    leaf.hit()
-}
-
-/// The first triangle found that blocks the ray. Counts the triangles up to it.
-#[inline(always)]
-pub(super) fn blocker<K: Kernel, W: Width, C: Counter, A: AlphaTest>(
-    bvh: &Bvh,
-    ray: &Ray,
-    stack: &mut TraversalStack,
-    counter: &mut C,
-    alpha: &A,
-) -> Option<RayHit> {
-    let prepared = PreparedRay::new(ray, bvh.bounds);
-    let loaded = K::load(&prepared);
-    let mut leaf = AnyHit::new(Query {
-        bvh,
-        first_slots: W::first_slots(bvh),
-        prepared: &prepared,
-        alpha,
-    });
-    walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, &mut leaf);
-    leaf.hit()
+    };
+    if ANY_HIT {
+        let mut leaf = AnyHit::new(query);
+        walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, &mut leaf);
+        leaf.hit()
+    } else {
+        let mut leaf = Closest::new(query);
+        walk::<K, W, C>(bvh, &loaded, ray.t_max, stack, counter, &mut leaf);
+        leaf.hit()
+    }
 }
