@@ -62,6 +62,14 @@ pub(super) fn text_width_px(text: &str, size_px: u32) -> f64 {
     1.07 * em * f64::from(size_px)
 }
 
+/// Width of the widest text, px.
+pub(super) fn widest_px<S: AsRef<str>>(texts: &[S], size_px: u32) -> f64 {
+    let widths = texts
+        .iter()
+        .map(|text| text_width_px(text.as_ref(), size_px));
+    widths.fold(0.0, f64::max)
+}
+
 /// Names of at most `most` characters that all differ. The middle of a long name is left out, and names
 /// that would read the same get a number.
 pub fn distinct<S: AsRef<str>>(names: &[S], most: usize) -> Vec<String> {

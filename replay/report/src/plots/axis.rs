@@ -217,11 +217,8 @@ impl Ticked {
 
     /// Width of the widest text, px.
     pub fn widest_px(&self) -> f64 {
-        let texts = self
-            .ticks
-            .iter()
-            .map(|(_, text)| theme::text_width_px(text, theme::TICK_PX));
-        texts.fold(0.0, f64::max)
+        let texts: Vec<&str> = self.ticks.iter().map(|(_, text)| text.as_str()).collect();
+        theme::widest_px(&texts, theme::TICK_PX)
     }
 
     /// Every n-th tick, so that their texts do not touch on an axis of this width.

@@ -1,6 +1,7 @@
 //! Grouped bars with optional reference marks, such as a paper's values.
 
-use super::frame::{Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+use super::bands::{Columns, boxes, check_bars, end_above};
+use super::frame::{LegendEntry, Symbol, text_style};
 use super::lines::exact;
 use super::{PlotError, SeriesStyle};
 use crate::theme;
@@ -38,12 +39,8 @@ pub struct BarChart {
     pub decimals: Option<usize>,
 }
 
-const LEFT_PX: u32 = 58;
-const TOP_PX: u32 = 66;
-const PLOT_HEIGHT_PX: f64 = 216.0;
 /// Factor on the axis that leaves room for the number over the highest bar.
 const HEADROOM: f64 = 1.08;
-const LINE_HEIGHT_PX: i32 = 15;
 
 impl BarChart {
     /// The chart as SVG.
@@ -51,125 +48,84 @@ impl BarChart {
     /// # Errors
     /// A value that is not finite or negative, or a group whose values do not match the series.
     pub fn svg(&self) -> Result<String, PlotError> {
-        self.check().map_err(|problem| PlotError {
-            title: self.title.clone(),
-            problem,
-        })?;
+        self.check()?;
         let bars = self.series.len().max(1) as f64;
         let groups = self.groups.len().max(1) as f64;
         let bar_px = self.bar_width_px();
         let group_px = (bar_px * bars + (bar_px * 0.8).max(14.0))
             .max(self.widest_word_px() + 10.0)
             .max(320.0 / groups);
-        let names: Vec<Vec<String>> = self
-            .groups
-            .iter()
-            .map(|g| wrap(&g.label, group_px - 6.0, theme::LABEL_PX))
-            .collect();
-        let name_lines = names.iter().map(Vec::len).max().unwrap_or(1) as u32;
-        let axis_title_px = if self.group_label.is_empty() { 0 } else { 18 };
-        let largest = self
-            .groups
-            .iter()
-            .flat_map(|g| g.values.iter().chain(&g.marks).flatten().copied())
-            .chain(self.reference)
-            .fold(0.0, f64::max);
-        let values = 0.0..HEADROOM * if largest > 0.0 { largest } else { 1.0 };
-        let frame = Frame {
+        let names = self.groups.iter();
+        let names = names.map(|g| wrap(&g.label, group_px - 6.0, theme::LABEL_PX));
+        let all = (self.groups.iter()).flat_map(|g| g.values.iter().chain(&g.marks).flatten());
+        // Without a value, the axis still has room for a number.
+        let largest = end_above(all.copied().chain(self.reference), 1.0);
+        let axis = Columns {
             title: &self.title,
             value_label: &self.value_label,
             legend: self.legend(),
-            plot_px: ((group_px * groups).floor(), PLOT_HEIGHT_PX),
-            around_px: [
-                TOP_PX,
-                14,
-                10 + LINE_HEIGHT_PX as u32 * name_lines + axis_title_px,
-                LEFT_PX,
-            ],
+            names: names.collect(),
+            name_px: (theme::LABEL_PX, 14),
+            width_px: (group_px * groups).floor(),
+            x_label: &self.group_label,
+            highest: HEADROOM * largest,
+            reference: self.reference,
         };
-        frame.draw(|root, mut builder, marks| {
-            // Group number `g` spans g to g + 1.
-            let mut chart = builder.build_cartesian_2d(0.0..groups, values.clone())?;
-            let mut mesh = chart.configure_mesh();
-            themed(&mut mesh)
-                .disable_x_mesh()
-                .x_labels(0)
-                .x_desc(&self.group_label)
-                .y_label_formatter(&tick_format(&values))
-                .draw()?;
-            let number = text_style(theme::TICK_PX, theme::INK, HPos::Center);
-            let name = text_style(theme::LABEL_PX, theme::INK, HPos::Center);
-            let bar = bar_px / group_px;
-            for (g, (group, lines)) in self.groups.iter().zip(&names).enumerate() {
-                let middle = g as f64 + 0.5;
-                for (s, (value, style)) in group.values.iter().zip(&self.series).enumerate() {
-                    let Some(value) = *value else { continue };
-                    let left = middle + bar * (s as f64 - bars / 2.0);
-                    let right = left + bar;
-                    let [(x0, y0), (x1, y1)] =
-                        [(left, 0.0), (right, value)].map(|at| chart.backend_coord(&at));
-                    let mark = group.marks.get(s).copied().flatten();
-                    let mut title = format!("{}, {}: {}", group.label, style.name, exact(value));
-                    if let (Some(mark), Some(name)) = (mark, &self.mark_name) {
-                        title += &format!(" ({name}: {})", exact(mark));
-                    }
-                    marks.rect([(x0 + 1, y0), (x1 - 1, y1)], style.color, &title);
-                    if let Some(mark) = mark {
-                        let y = chart.backend_coord(&(left, mark)).1;
-                        let width = f64::from(theme::LINE_PX);
-                        marks.line(&[(x0, y), (x1, y)], theme::INK, (width, ""));
-                    }
-                    if let Some(decimals) = self.decimals {
-                        let (x, top) = chart.backend_coord(&(left + bar / 2.0, value));
-                        let strokes = [self.reference, mark]
-                            .map(|v| v.map(|v| chart.backend_coord(&(left, v)).1));
-                        let at = (x, label_y(top, strokes));
-                        root.draw_text(&format!("{value:.decimals$}"), &number, at)?;
-                    }
+        let number = text_style(theme::TICK_PX, theme::INK, HPos::Center);
+        let bar = bar_px / group_px;
+        axis.draw(|g, root, axes, marks| {
+            let group = &self.groups[g];
+            let middle = g as f64 + 0.5;
+            for (s, (value, style)) in group.values.iter().zip(&self.series).enumerate() {
+                let Some(value) = *value else { continue };
+                let left = middle + bar * (s as f64 - bars / 2.0);
+                let right = left + bar;
+                let [(x0, y0), (x1, y1)] =
+                    [(left, 0.0), (right, value)].map(|at| axes.backend_coord(&at));
+                let mark = group.marks.get(s).copied().flatten();
+                let mut title = format!("{}, {}: {}", group.label, style.name, exact(value));
+                if let (Some(mark), Some(name)) = (mark, &self.mark_name) {
+                    title += &format!(" ({name}: {})", exact(mark));
                 }
-                for (i, line) in (0..).zip(lines) {
-                    let (x, y) = chart.backend_coord(&(middle, 0.0));
-                    root.draw_text(line, &name, (x, y + 14 + LINE_HEIGHT_PX * i))?;
+                marks.rect([(x0 + 1, y0), (x1 - 1, y1)], style.color, &title);
+                if let Some(mark) = mark {
+                    let y = axes.backend_coord(&(left, mark)).1;
+                    let width = f64::from(theme::LINE_PX);
+                    marks.line(&[(x0, y), (x1, y)], theme::INK, (width, ""));
                 }
-            }
-            if let Some(reference) = self.reference {
-                let line =
-                    [(0.0, reference), (groups, reference)].map(|at| chart.backend_coord(&at));
-                marks.line(&line, theme::AXIS, (1.0, "4 2"));
+                if let Some(decimals) = self.decimals {
+                    let (x, top) = axes.backend_coord(&(left + bar / 2.0, value));
+                    let strokes =
+                        [self.reference, mark].map(|v| v.map(|v| axes.backend_coord(&(left, v)).1));
+                    let at = (x, label_y(top, strokes));
+                    root.draw_text(&format!("{value:.decimals$}"), &number, at)?;
+                }
             }
             Ok(())
         })
     }
 
-    fn check(&self) -> Result<(), String> {
-        for BarGroup {
-            label,
-            values,
-            marks,
-        } in &self.groups
-        {
-            if values.len() != self.series.len() {
-                return Err(format!(
-                    "group `{label}` has {} values for {} series",
-                    values.len(),
-                    self.series.len()
-                ));
+    fn check(&self) -> Result<(), PlotError> {
+        for group in &self.groups {
+            let (values, series) = (group.values.len(), self.series.len());
+            if values != series {
+                let label = &group.label;
+                let problem = format!("group `{label}` has {values} values for {series} series");
+                return Err(PlotError::new(&self.title, problem));
             }
-            let mut numbers = values.iter().chain(marks).flatten();
-            if let Some(bad) = numbers.find(|v| !(v.is_finite() && **v >= 0.0)) {
-                return Err(format!("group `{label}` holds {bad}"));
-            }
+            let numbers = group.values.iter().chain(&group.marks).flatten();
+            check_bars(&self.title, ("group", &group.label), numbers)?;
         }
         Ok(())
     }
 
     /// Width of the longest word in the group names, which break at spaces: the minimum width of a group.
     fn widest_word_px(&self) -> f64 {
-        self.groups
-            .iter()
+        let words = self.groups.iter();
+        let words: Vec<String> = words
             .flat_map(|g| wrap(&g.label, 0.0, theme::LABEL_PX))
-            .map(|word| theme::text_width_px(&word, theme::LABEL_PX))
-            .fold(0.0, f64::max)
+            .collect();
+        theme::widest_px(&words, theme::LABEL_PX)
     }
 
     /// Minimum width at which the numbers over neighbouring bars do not touch.
@@ -177,27 +133,20 @@ impl BarChart {
         let Some(decimals) = self.decimals else {
             return 22.0;
         };
-        let widest = self
-            .groups
-            .iter()
-            .flat_map(|g| g.values.iter().flatten())
-            .map(|v| theme::text_width_px(&format!("{v:.decimals$}"), theme::TICK_PX))
-            .fold(0.0, f64::max);
+        let values = self.groups.iter().flat_map(|g| g.values.iter().flatten());
+        let numbers: Vec<String> = values.map(|v| format!("{v:.decimals$}")).collect();
+        let widest = theme::widest_px(&numbers, theme::TICK_PX);
         (widest + 5.0).max(22.0)
     }
 
     fn legend(&self) -> Vec<LegendEntry<'_>> {
-        let series = self.series.iter().map(|s| LegendEntry {
-            name: &s.name,
-            color: s.color,
-            symbol: Symbol::Box,
-        });
-        let mark = self.mark_name.as_deref().map(|name| LegendEntry {
+        let mut legend = boxes(&self.series);
+        legend.extend(self.mark_name.as_deref().map(|name| LegendEntry {
             name,
             color: theme::INK,
             symbol: Symbol::Stroke,
-        });
-        series.chain(mark).collect()
+        }));
+        legend
     }
 }
 

@@ -1,11 +1,12 @@
 //! Distributions as horizontal boxes, one per row: whiskers, quartiles and median.
 
 use super::axis::Axis;
-use super::frame::{AXIS_PX, Frame, text_style, themed, tick_format};
+use super::bands::Rows;
+use super::frame::{AXIS_PX, text_style};
 use super::lines::exact;
 use super::{PlotError, SeriesStyle};
 use crate::theme;
-use plotters::prelude::{BindKeyPoints, Color, PathElement};
+use plotters::prelude::{Color, PathElement};
 use plotters::style::text_anchor::HPos;
 
 /// A chart of boxes.
@@ -48,56 +49,29 @@ impl BoxChart {
     pub fn svg(&self) -> Result<String, PlotError> {
         for row in &self.rows {
             if !row.values.iter().all(|v| v.is_finite()) || !row.values.is_sorted() {
-                return Err(PlotError {
-                    title: self.title.clone(),
-                    problem: format!("row `{}` holds {:?}", row.style.name, row.values),
-                });
+                let problem = format!("row `{}` holds {:?}", row.style.name, row.values);
+                return Err(PlotError::new(&self.title, problem));
             }
         }
         let all = self.rows.iter().flat_map(|row| row.values);
-        let x = self.x.fit(all.chain(self.reference));
-        let names: Vec<&str> = self
-            .rows
-            .iter()
-            .map(|row| row.style.name.as_str())
-            .collect();
-        let names = theme::distinct(&names, LONGEST_NAME_CHARS);
-        let name_px = names
-            .iter()
-            .map(|name| theme::text_width_px(name, theme::TICK_PX));
-        let height_px = ROW_PX * self.rows.len().max(1) as i32;
-        let frame = Frame {
+        let values = self.x.fit(all.chain(self.reference));
+        let end = values.end;
+        let names = self.rows.iter().map(|row| row.style.name.as_str());
+        let names: Vec<&str> = names.collect();
+        let axis = Rows {
             title: &self.title,
             value_label: &self.note,
             legend: Vec::new(),
-            plot_px: (PLOT_WIDTH_PX, f64::from(height_px)),
-            around_px: [
-                TOP_PX,
-                52,
-                AXIS_PX,
-                name_px.fold(40.0, f64::max) as u32 + 16,
-            ],
+            names: theme::distinct(&names, LONGEST_NAME_CHARS),
+            row_px: ROW_PX,
+            width_px: PLOT_WIDTH_PX,
+            around_px: [TOP_PX, 52, AXIS_PX],
+            x_label: &self.x.label,
+            values,
         };
-        frame.draw(|root, mut builder, marks| {
-            let middles: Vec<i32> = (0..self.rows.len() as i32)
-                .map(|row| ROW_PX * row + ROW_PX / 2)
-                .collect();
-            let rows = (height_px..0).with_key_points(middles);
-            let mut chart = builder.build_cartesian_2d(x.clone(), rows)?;
-            let name = |y: &i32| {
-                names
-                    .get((y / ROW_PX) as usize)
-                    .cloned()
-                    .unwrap_or_default()
-            };
-            themed(&mut chart.configure_mesh())
-                .disable_y_mesh()
-                .x_desc(&self.x.label)
-                .y_label_style(text_style(theme::TICK_PX, theme::INK, HPos::Right))
-                .x_label_formatter(&tick_format(&x))
-                .y_label_formatter(&name)
-                .draw()?;
-            let area = chart.plotting_area();
+        let height_px = axis.height_px();
+        axis.draw(|root, axes, marks| {
+            let area = axes.plotting_area();
             if let Some(value) = self.reference {
                 let line = [(value, 0), (value, height_px)];
                 area.draw(&PathElement::new(line, theme::AXIS.stroke_width(1)))?;
@@ -109,14 +83,14 @@ impl BoxChart {
                 let whiskers = [(low, y), (high, y)];
                 area.draw(&PathElement::new(whiskers, style.color.stroke_width(1)))?;
                 let corners = [(q1, y - BOX_PX / 2), (q3, y + BOX_PX / 2)];
-                let corners = corners.map(|at| chart.backend_coord(&at));
+                let corners = corners.map(|at| axes.backend_coord(&at));
                 let [low, q1, middle, q3, high] = values.map(exact);
                 let title = format!("{}: {low}, {q1}, {middle}, {q3}, {high}", style.name);
                 marks.rect(corners, style.color, &title);
                 let mark = [(median, y - BOX_PX / 2 - 2), (median, y + BOX_PX / 2 + 2)];
-                let mark = mark.map(|at| chart.backend_coord(&at));
+                let mark = mark.map(|at| axes.backend_coord(&at));
                 marks.line(&mark, theme::INK, (f64::from(theme::LINE_PX), ""));
-                let (right, y) = chart.backend_coord(&(x.end, y));
+                let (right, y) = axes.backend_coord(&(end, y));
                 let text = format!("{median:.0$}", self.decimals);
                 root.draw_text(&text, &number, (right + 6, y))?;
             }

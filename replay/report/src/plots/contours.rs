@@ -47,10 +47,7 @@ impl ContourChart<'_> {
     /// # Errors
     /// A range that is not above 0, or a point that is not finite.
     pub fn svg(&self) -> Result<String, PlotError> {
-        let fail = |problem: String| PlotError {
-            title: self.title.clone(),
-            problem,
-        };
+        let fail = |problem: String| PlotError::new(&self.title, problem);
         let (low, high) = self.x_range;
         if !(low > 0.0 && high > low) {
             return Err(fail(format!("horizontal range {low} to {high}")));

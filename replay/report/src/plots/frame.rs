@@ -1,7 +1,7 @@
 //! The frame of every chart: heading, legend, axes and grid in the theme's style.
 
 use super::marks::{Marks, Shape};
-use super::{PlotError, escape};
+use super::{PlotError, SeriesStyle, escape};
 use crate::theme;
 use plotters::chart::{ChartBuilder, MeshStyle};
 use plotters::coord::Shift;
@@ -60,7 +60,16 @@ pub(super) enum Symbol {
     Point(Shape, bool),
 }
 
-impl LegendEntry<'_> {
+impl<'a> LegendEntry<'a> {
+    /// A filled box in the colour of a series.
+    pub(super) fn filled(series: &'a SeriesStyle) -> Self {
+        Self {
+            name: &series.name,
+            color: series.color,
+            symbol: Symbol::Box,
+        }
+    }
+
     fn width_px(&self) -> f64 {
         LEGEND_SYMBOL_PX + theme::text_width_px(self.name, theme::LABEL_PX) + LEGEND_GAP_PX
     }
@@ -103,10 +112,7 @@ impl Frame<'_> {
             paint(&root, chart, &mut marks)
                 .and_then(|()| self.heading(&root, &legend, &mut marks))
                 .and_then(|()| root.present())
-                .map_err(|e| PlotError {
-                    title: self.title.to_owned(),
-                    problem: e.to_string(),
-                })?;
+                .map_err(|e| PlotError::new(self.title, e.to_string()))?;
         }
         // The font is the same for all texts, and opacity 1 is the default.
         let family = format!("font-family=\"{}\" ", theme::FONT);

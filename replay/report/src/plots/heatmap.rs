@@ -56,10 +56,7 @@ impl HeatMap {
     /// # Errors
     /// A panel whose cells are not columns times rows, or a value that is not finite.
     pub fn svg(&self) -> Result<String, PlotError> {
-        let fail = |problem: String| PlotError {
-            title: self.title.clone(),
-            problem,
-        };
+        let fail = |problem: String| PlotError::new(&self.title, problem);
         for panel in &self.panels {
             let cells = panel.tiles[0] as usize * panel.tiles[1] as usize;
             if panel.values.len() != cells || cells == 0 {

@@ -62,10 +62,8 @@ impl LineChart {
                 |&(x, y): &(f64, f64)| self.x.place(x).is_finite() && self.y.place(y).is_finite();
             if let Some((x, y)) = series.points.iter().find(|point| !is_finite(point)) {
                 let name = &series.style.name;
-                return Err(PlotError {
-                    title: self.title.clone(),
-                    problem: format!("series `{name}` has a point at ({x}, {y})"),
-                });
+                let problem = format!("series `{name}` has a point at ({x}, {y})");
+                return Err(PlotError::new(&self.title, problem));
             }
         }
         Ok(())

@@ -1,6 +1,7 @@
 //! Charts as SVG text, drawn by plotters. Equal numbers give equal bytes.
 
 pub mod axis;
+mod bands;
 pub mod bars;
 pub mod boxes;
 pub mod contours;
@@ -28,6 +29,15 @@ pub struct PlotError {
     pub title: String,
     /// Message from plotters or from the check of the data.
     pub problem: String,
+}
+
+impl PlotError {
+    fn new(title: &str, problem: impl Into<String>) -> Self {
+        Self {
+            title: title.to_owned(),
+            problem: problem.into(),
+        }
+    }
 }
 
 /// A named, coloured series.

@@ -50,10 +50,8 @@ impl PathPlot {
             .iter()
             .find(|s| s.x >= columns || s.y >= rows || s.eye > 1)
         {
-            return Err(PlotError {
-                title: self.title.clone(),
-                problem: format!("{bad:?} is outside of 2 x {columns}x{rows} tiles"),
-            });
+            let problem = format!("{bad:?} is outside of 2 x {columns}x{rows} tiles");
+            return Err(PlotError::new(&self.title, problem));
         }
         let cell = (240.0 / f64::from(columns.max(rows).max(1)))
             .clamp(8.0, 30.0)

@@ -145,10 +145,10 @@ impl ScatterChart {
     fn check(&self) -> Result<(), PlotError> {
         let is_bad = |p: &&NamedPoint| !(p.at.0.is_finite() && p.at.1.is_finite());
         match self.points.iter().find(is_bad) {
-            Some(bad) => Err(PlotError {
-                title: self.title.clone(),
-                problem: format!("point `{}` at {:?}", bad.style.name, bad.at),
-            }),
+            Some(NamedPoint { style, at, .. }) => {
+                let problem = format!("point `{}` at {at:?}", style.name);
+                Err(PlotError::new(&self.title, problem))
+            }
             None => Ok(()),
         }
     }
@@ -174,9 +174,7 @@ impl ScatterChart {
         let (right, height) = match labels.listed {
             true => {
                 let list_height = LIST_GAP_PX * labels.labels.len() as f64;
-                let list_px = (labels.list_names.iter())
-                    .map(|name| theme::text_width_px(name, theme::TICK_PX))
-                    .fold(0.0, f64::max);
+                let list_px = theme::widest_px(&labels.list_names, theme::TICK_PX);
                 (list_px as u32 + 36, PLOT_PX.1.max(list_height))
             }
             false => (RIGHT_PX, PLOT_PX.1),

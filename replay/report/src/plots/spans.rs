@@ -1,9 +1,10 @@
 //! Spans of time in rows: when each row works, and on what.
 
-use super::frame::{Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+use super::bands::{Rows, boxes};
+use super::frame::text_style;
 use super::{PlotError, SeriesStyle};
 use crate::theme;
-use plotters::prelude::{BindKeyPoints, Color, Rectangle};
+use plotters::prelude::{Color, Rectangle};
 use plotters::style::text_anchor::HPos;
 use std::ops::Range;
 
@@ -46,41 +47,21 @@ impl SpanChart {
     pub fn svg(&self) -> Result<String, PlotError> {
         let Range { start, end } = self.range;
         if !(start.is_finite() && end.is_finite() && start < end) {
-            return Err(PlotError {
-                title: self.title.clone(),
-                problem: format!("from {start} to {end}"),
-            });
+            let problem = format!("from {start} to {end}");
+            return Err(PlotError::new(&self.title, problem));
         }
-        let names = self.rows.iter().map(|(name, _)| name);
-        let name_px = names
-            .map(|name| theme::text_width_px(name, theme::TICK_PX))
-            .fold(40.0, f64::max);
-        let height_px = ROW_PX * self.rows.len().max(1) as i32;
-        let legend = self.kinds.iter().map(|kind| LegendEntry {
-            name: &kind.name,
-            color: kind.color,
-            symbol: Symbol::Box,
-        });
-        let frame = Frame {
+        let axis = Rows {
             title: &self.title,
             value_label: &self.value_label,
-            legend: legend.collect(),
-            plot_px: (PLOT_WIDTH_PX, f64::from(height_px)),
-            around_px: [TOP_PX, 22, 26, name_px as u32 + 16],
+            legend: boxes(&self.kinds),
+            names: self.rows.iter().map(|(name, _)| name.clone()).collect(),
+            row_px: ROW_PX,
+            width_px: PLOT_WIDTH_PX,
+            around_px: [TOP_PX, 22, 26],
+            x_label: "",
+            values: self.range.clone(),
         };
-        frame.draw(|root, mut builder, _| {
-            let middles: Vec<i32> = (0..self.rows.len() as i32)
-                .map(|row| ROW_PX * row + ROW_PX / 2)
-                .collect();
-            let rows = (height_px..0).with_key_points(middles);
-            let mut chart = builder.build_cartesian_2d(start..end, rows)?;
-            let name = |y: &i32| self.rows.get((y / ROW_PX) as usize);
-            themed(&mut chart.configure_mesh())
-                .disable_y_mesh()
-                .y_label_style(text_style(theme::TICK_PX, theme::INK, HPos::Right))
-                .x_label_formatter(&tick_format(&self.range))
-                .y_label_formatter(&|y| name(y).map_or_else(String::new, |(name, _)| name.clone()))
-                .draw()?;
+        axis.draw(|root, axes, _| {
             let label_style = text_style(theme::TICK_PX, theme::PAPER, HPos::Center);
             for (row, (_, spans)) in (0..).zip(&self.rows) {
                 let top = ROW_PX * row + GAP_PX / 2;
@@ -95,12 +76,12 @@ impl SpanChart {
                         let y = top + height * part / parts;
                         let corners = [(left, y), (right, top + height * (part + 1) / parts)];
                         let color = self.kinds[*kind].color;
-                        let area = chart.plotting_area();
+                        let area = axes.plotting_area();
                         area.draw(&Rectangle::new(corners, color.filled()))?;
                         area.draw(&Rectangle::new(corners, theme::PAPER.stroke_width(1)))?;
                     }
                     let [(from, _), (to, y)] =
-                        [left, right].map(|x| chart.backend_coord(&(x, top + height / 2)));
+                        [left, right].map(|x| axes.backend_coord(&(x, top + height / 2)));
                     if f64::from(to - from)
                         > theme::text_width_px(&span.label, theme::TICK_PX) + 4.0
                     {

@@ -1,7 +1,8 @@
 //! Stacked bars: the parts of several totals.
 
+use super::bands::{Columns, boxes, check_bars, end_above};
 use super::bars::wrap;
-use super::frame::{Frame, LegendEntry, Symbol, text_style, themed, tick_format};
+use super::frame::text_style;
 use super::lines::exact;
 use super::{PlotError, SeriesStyle};
 use crate::theme;
@@ -28,10 +29,6 @@ pub(crate) struct StackedChart {
     pub decimals: Option<usize>,
 }
 
-const LEFT_PX: u32 = 58;
-const TOP_PX: u32 = 66;
-const PLOT_HEIGHT_PX: f64 = 216.0;
-const LINE_HEIGHT_PX: i32 = 15;
 /// Free share of the width of each bar's place.
 const GAP: f64 = 0.16;
 
@@ -42,98 +39,49 @@ impl StackedChart {
     /// A part that is not finite or negative, or a bar whose parts do not match the series.
     pub fn svg(&self) -> Result<String, PlotError> {
         for (name, parts) in &self.bars {
-            let bad = parts
-                .iter()
-                .find(|part| !(part.is_finite() && **part >= 0.0));
-            let problem = match bad {
-                Some(bad) => format!("bar `{name}` holds {bad}"),
-                None if parts.len() != self.series.len() => format!(
-                    "bar `{name}` has {} parts for {} series",
-                    parts.len(),
-                    self.series.len()
-                ),
-                None => continue,
-            };
-            return Err(PlotError {
-                title: self.title.clone(),
-                problem,
-            });
+            check_bars(&self.title, ("bar", name), parts.iter())?;
+            let (parts, series) = (parts.len(), self.series.len());
+            if parts != series {
+                let problem = format!("bar `{name}` has {parts} parts for {series} series");
+                return Err(PlotError::new(&self.title, problem));
+            }
         }
-        let sums = self.bars.iter().map(|(_, parts)| parts.iter().sum::<f64>());
-        let largest = sums.clone().fold(0.0, f64::max);
-        let highest = match self.highest {
-            Some(highest) => highest,
-            None if largest > 0.0 => 1.08 * largest,
-            None => 1.0,
-        };
-        let names: Vec<Vec<String>> = self
-            .bars
-            .iter()
-            .map(|(name, _)| wrap(name, self.bar_px * 1.1, theme::TICK_PX))
-            .collect();
-        let name_lines = names.iter().map(Vec::len).max().unwrap_or(1) as u32;
-        let axis_title_px = if self.bar_label.is_empty() { 0 } else { 18 };
-        let count = self.bars.len().max(1) as f64;
-        let values = 0.0..highest;
-        let frame = Frame {
+        let sum = |(_, parts): &(String, Vec<f64>)| parts.iter().sum::<f64>();
+        let names = self.bars.iter();
+        let names = names.map(|(name, _)| wrap(name, self.bar_px * 1.1, theme::TICK_PX));
+        let axis = Columns {
             title: &self.title,
             value_label: &self.value_label,
-            legend: self.legend(),
-            plot_px: ((self.bar_px * count).max(120.0), PLOT_HEIGHT_PX),
-            around_px: [
-                TOP_PX,
-                14,
-                10 + LINE_HEIGHT_PX as u32 * name_lines + axis_title_px,
-                LEFT_PX,
-            ],
+            legend: boxes(&self.series),
+            names: names.collect(),
+            name_px: (theme::TICK_PX, 13),
+            width_px: (self.bar_px * self.bars.len().max(1) as f64).max(120.0),
+            x_label: &self.bar_label,
+            highest: self
+                .highest
+                .unwrap_or_else(|| end_above(self.bars.iter().map(sum), 1.08)),
+            reference: None,
         };
-        frame.draw(|root, mut builder, marks| {
-            let mut chart = builder.build_cartesian_2d(0.0..count, values.clone())?;
-            let mut mesh = chart.configure_mesh();
-            themed(&mut mesh)
-                .disable_x_mesh()
-                .x_labels(0)
-                .x_desc(&self.bar_label)
-                .y_label_formatter(&tick_format(&values))
-                .draw()?;
-            let name_style = text_style(theme::TICK_PX, theme::INK, HPos::Center);
-            for (index, (((name, parts), lines), sum)) in
-                self.bars.iter().zip(&names).zip(sums).enumerate()
-            {
-                let (left, right) = (index as f64 + GAP / 2.0, index as f64 + 1.0 - GAP / 2.0);
-                let mut below = 0.0;
-                for (part, style) in parts.iter().zip(&self.series) {
-                    let corners = [(left, below), (right, below + part)];
-                    let corners = corners.map(|at| chart.backend_coord(&at));
-                    let title = format!("{name}, {}: {}", style.name, exact(*part));
-                    if *part > 0.0 {
-                        marks.rect(corners, style.color, &title);
-                    }
-                    below += part;
+        let number = text_style(theme::TICK_PX, theme::INK, HPos::Center);
+        axis.draw(|index, root, axes, marks| {
+            let bar @ (name, parts) = &self.bars[index];
+            let (left, right) = (index as f64 + GAP / 2.0, index as f64 + 1.0 - GAP / 2.0);
+            let mut below = 0.0;
+            for (part, style) in parts.iter().zip(&self.series) {
+                let corners = [(left, below), (right, below + part)];
+                let corners = corners.map(|at| axes.backend_coord(&at));
+                let title = format!("{name}, {}: {}", style.name, exact(*part));
+                if *part > 0.0 {
+                    marks.rect(corners, style.color, &title);
                 }
-                if let Some(decimals) = self.decimals {
-                    let (x, y) = chart.backend_coord(&((left + right) / 2.0, sum));
-                    root.draw_text(&format!("{sum:.decimals$}"), &name_style, (x, y - 8))?;
-                }
-                for (number, line) in (0..).zip(lines) {
-                    let (x, y) = chart.backend_coord(&((left + right) / 2.0, 0.0));
-                    let at = (x, y + 13 + LINE_HEIGHT_PX * number);
-                    root.draw_text(line, &name_style, at)?;
-                }
+                below += part;
+            }
+            if let Some(decimals) = self.decimals {
+                let (x, y) = axes.backend_coord(&((left + right) / 2.0, sum(bar)));
+                root.draw_text(&format!("{:.decimals$}", sum(bar)), &number, (x, y - 8))?;
             }
             Ok(())
         })
-    }
-
-    fn legend(&self) -> Vec<LegendEntry<'_>> {
-        let series = self.series.iter();
-        series
-            .map(|style| LegendEntry {
-                name: &style.name,
-                color: style.color,
-                symbol: Symbol::Box,
-            })
-            .collect()
     }
 }
 
