@@ -8,8 +8,9 @@ use pyo3::prelude::*;
 use replay::config::{Order, RunConfig};
 use replay::experiment::{self, ExperimentFile, Outcome, Plan, PlanError, Subject, parse_config};
 use replay::memory::Replacement;
+use replay::report::document::Document;
 use replay::report::sweep::SweepReport;
-use replay::report::{parquet, run as report};
+use replay::report::{parquet, run::RunReport};
 use std::path::PathBuf;
 
 /// The text of settings, its source, and the settings that replace some of them.
@@ -179,7 +180,11 @@ pub fn result(py: Python<'_>, path: PathBuf, settings: Settings) -> PyResult<Str
         replayed(&[path], &settings.policies, &plan, &stop, |outcome| {
             let rows = outcome.rows();
             let row = rows.first().context("no result")?;
-            Ok(report::json(row)?)
+            Ok(RunReport {
+                row,
+                by_texture: false,
+            }
+            .json()?)
         })
     })
 }

@@ -3,28 +3,33 @@
 
 use crate::cli;
 use formats::schemas::{Published, assert_published};
+use report::document::published;
+use report::{
+    accuracy, addresses, calibration, compare, locality, orders, readings, run, sgrt, sweep,
+    sweep_plan, techniques, temporal, z2,
+};
 use std::path::Path;
 use studies::experiment;
 
 fn all() -> Vec<Published> {
     vec![
         cli::info::schema(),
-        report::run::schema(),
-        report::run::modes_schema(),
-        report::addresses::schema(),
-        report::sweep::schema(),
-        report::sweep_plan::schema(),
+        published::<run::RunReport<'_>>(),
+        run::modes_schema(),
+        published::<addresses::AddressesReport<'_>>(),
+        published::<sweep::SweepReport<'_>>(),
+        published::<sweep_plan::SweepPlan<'_>>(),
         experiment::point_schema(),
-        report::z2::model::schema(),
-        report::compare::schema(),
-        report::locality::schema(),
-        report::orders::schema(),
-        report::techniques::schema(),
-        report::accuracy::schema(),
-        report::calibration::schema(),
-        report::sgrt::schema(),
-        report::readings::schema(),
-        report::temporal::schema(),
+        published::<z2::model::PaperReport<'_>>(),
+        published::<compare::CompareReport<'_>>(),
+        published::<locality::LocalityReport>(),
+        published::<orders::OrdersReport<'_>>(),
+        published::<techniques::TechniquesReport<'_>>(),
+        published::<accuracy::AccuracyReport>(),
+        published::<calibration::CalibrationReport>(),
+        sgrt::schema(),
+        published::<readings::ReadingsReport>(),
+        published::<temporal::TemporalReport>(),
     ]
 }
 

@@ -2,7 +2,8 @@
 //! and the table of errors on reports.
 
 use super::answers;
-use super::columns::{Column, Record};
+use super::columns::Column;
+use super::document::Document;
 use super::errors::KnownError;
 use super::html::{self, Answer, Section};
 use super::plots::lines::Axis;
@@ -13,13 +14,9 @@ use super::theme;
 use maud::{Markup, html};
 use serde::Serialize;
 use sim::config::RunConfig;
-use sim::model_version::MODEL_VERSION;
 use sim::result::TOOL;
 use studies::accuracy::{Choice, Contribution, Study, headline_figures};
 use studies::techniques::dominated;
-
-/// Schema of `accuracy.json`.
-pub const ACCURACY_SCHEMA: &str = "replay.accuracy/3";
 
 /// A study with its measurements.
 pub struct Measured {
@@ -157,10 +154,7 @@ struct Advice<'a> {
 /// The JSON object. It has no values that depend on the host machine.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-struct AccuracyJson<'a> {
-    schema: &'a str,
-    tool: &'a str,
-    model_version: u32,
+pub struct AccuracyJson<'a> {
     config: &'a RunConfig,
     studies: Vec<StudyJson<'a>>,
 }
@@ -174,7 +168,60 @@ struct StudyJson<'a> {
     reference: &'a str,
     recommended: &'a str,
     reason: &'a str,
-    choices: Vec<serde_json::Value>,
+    #[cfg_attr(feature = "testing", schemars(with = "Vec<serde_json::Value>"))]
+    choices: Table,
+}
+
+impl Document for AccuracyReport {
+    const SCHEMA: &'static str = "replay.accuracy/3";
+    type Json<'a> = AccuracyJson<'a>;
+
+    /// Without times.
+    fn content(&self) -> AccuracyJson<'_> {
+        let study = |measured: &Measured| StudyJson {
+            key: measured.study.key,
+            title: measured.study.title,
+            about: measured.study.about,
+            reference: measured.study.reference,
+            recommended: measured.study.recommended,
+            reason: measured.study.reason,
+            choices: Table::new(&measured.columns(false), &measured.choices),
+        };
+        AccuracyJson {
+            config: &self.config,
+            studies: self.studies.iter().map(study).collect(),
+        }
+    }
+
+    /// Every value of every choice, one per line.
+    fn rows(&self) -> Table {
+        type Line<'a> = (&'a Study, &'a Choice, usize);
+        let lines: Vec<Line<'_>> = (self.studies.iter())
+            .flat_map(|m| m.choices.iter().map(|choice| (m.study, choice)))
+            .flat_map(|(study, choice)| {
+                (0..study.figures.len()).map(move |index| (study, choice, index))
+            })
+            .filter(|(_, choice, index)| choice.values[*index].is_some())
+            .collect();
+        let columns = [
+            Column::text("study", "study", |l: &Line<'_>| l.0.key),
+            Column::text("choice", "choice", |l: &Line<'_>| l.1.name.clone()),
+            Column::text("scene", "scene", |l: &Line<'_>| l.1.scene.clone()),
+            Column::text("figure", "figure", |l: &Line<'_>| l.0.figures[l.2].key),
+            Column::real("value", "value", "", 6, |l: &Line<'_>| l.1.values[l.2]),
+            Column::text("unit", "unit", |l: &Line<'_>| l.0.figures[l.2].unit),
+        ];
+        Table::new(&columns, &lines)
+    }
+
+    fn text(&self) -> String {
+        let mut text = self.advice(true).text();
+        for measured in &self.studies {
+            let Study { title, about, .. } = measured.study;
+            text += &format!("\n{title}: {about}\n{}", measured.table().text());
+        }
+        text
+    }
 }
 
 impl AccuracyReport {
@@ -223,27 +270,6 @@ impl AccuracyReport {
         Table::new(&columns, &advice)
     }
 
-    /// Every value of every choice, one per line.
-    pub fn choices_csv(&self) -> String {
-        type Line<'a> = (&'a Study, &'a Choice, usize);
-        let lines: Vec<Line<'_>> = (self.studies.iter())
-            .flat_map(|m| m.choices.iter().map(|choice| (m.study, choice)))
-            .flat_map(|(study, choice)| {
-                (0..study.figures.len()).map(move |index| (study, choice, index))
-            })
-            .filter(|(_, choice, index)| choice.values[*index].is_some())
-            .collect();
-        let columns = [
-            Column::text("study", "study", |l: &Line<'_>| l.0.key),
-            Column::text("choice", "choice", |l: &Line<'_>| l.1.name.clone()),
-            Column::text("scene", "scene", |l: &Line<'_>| l.1.scene.clone()),
-            Column::text("figure", "figure", |l: &Line<'_>| l.0.figures[l.2].key),
-            Column::real("value", "value", "", 6, |l: &Line<'_>| l.1.values[l.2]),
-            Column::text("unit", "unit", |l: &Line<'_>| l.0.figures[l.2].unit),
-        ];
-        Table::new(&columns, &lines).csv()
-    }
-
     /// Times over the reference's time, as CSV. They differ from run to run.
     pub fn times_csv(&self) -> String {
         type Line<'a> = (&'a Study, &'a Choice);
@@ -260,41 +286,6 @@ impl AccuracyReport {
             }),
         ];
         Table::new(&columns, &lines).csv()
-    }
-
-    /// As one JSON object, without times.
-    ///
-    /// # Errors
-    /// A figure that is not finite.
-    pub fn json(&self) -> serde_json::Result<String> {
-        let study = |measured: &Measured| {
-            let columns = measured.columns(false);
-            let choices = measured.choices.iter();
-            let records = choices.map(|choice| {
-                serde_json::to_value(Record {
-                    columns: &columns,
-                    row: choice,
-                })
-            });
-            Ok(StudyJson {
-                key: measured.study.key,
-                title: measured.study.title,
-                about: measured.study.about,
-                reference: measured.study.reference,
-                recommended: measured.study.recommended,
-                reason: measured.study.reason,
-                choices: records.collect::<serde_json::Result<_>>()?,
-            })
-        };
-        serde_json::to_string_pretty(&AccuracyJson {
-            schema: ACCURACY_SCHEMA,
-            tool: TOOL,
-            model_version: MODEL_VERSION,
-            config: &self.config,
-            studies: (self.studies.iter())
-                .map(study)
-                .collect::<serde_json::Result<_>>()?,
-        })
     }
 
     /// The rows of the table of errors on reports: mean and maximum of each contribution, and the scenes on
@@ -401,12 +392,6 @@ fn section(measured: &Measured) -> Result<Markup, PlotError> {
     })
 }
 
-/// The schema of the JSON object.
-#[cfg(feature = "testing")]
-pub fn schema() -> formats::schemas::Published {
-    formats::schemas::Published::of::<AccuracyJson<'_>>(ACCURACY_SCHEMA)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -451,7 +436,7 @@ mod tests {
         assert_eq!(report.studies[0].table().cells()[0][2], "0.200");
         assert!(report.times_csv().contains("0.2"));
         assert!(!report.json().unwrap().contains("time_ratio"));
-        assert!(!report.choices_csv().contains("time_ratio"));
+        assert!(!report.csv().contains("time_ratio"));
         let page = report.page().unwrap();
         for text in ["Functional or timed", "0.200", "what to choose"] {
             assert!(page.to_lowercase().contains(&text.to_lowercase()), "{text}");

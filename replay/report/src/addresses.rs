@@ -1,15 +1,19 @@
 //! Results for plain addresses: one row per configuration.
 
-use super::columns::{Column, Records, Show};
+use super::columns::{Column, Show};
+use super::document::Document;
 use super::memory_columns;
 use super::table::Table;
 use serde::Serialize;
 use sim::addresses::{LevelCounts, Outcome, Point, Totals};
-use sim::model_version::MODEL_VERSION;
-use sim::result::TOOL;
 
-/// Schema of the object that `replay run --addresses --json` prints.
-const SCHEMA: &str = "replay.addresses/2";
+/// The replays of an address file.
+pub struct AddressesReport<'a> {
+    /// Name of the file.
+    pub input: &'a str,
+    /// What was counted.
+    pub outcome: &'a Outcome,
+}
 
 /// A configuration of an outcome.
 struct PointRow<'a> {
@@ -125,11 +129,6 @@ fn columns<'a, 'r: 'a>() -> Vec<Column<'a, PointRow<'r>>> {
     columns
 }
 
-fn rows(outcome: &Outcome) -> Vec<PointRow<'_>> {
-    let row = |point| PointRow { point, outcome };
-    outcome.points.iter().map(row).collect()
-}
-
 /// Counts of the accesses, as JSON.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
@@ -160,72 +159,77 @@ impl Accesses {
     }
 }
 
+/// The JSON object.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-struct AddressesJson<'a, P> {
-    schema: &'static str,
-    tool: &'static str,
-    model_version: u32,
+pub struct AddressesJson<'a> {
     input: &'a str,
     accesses: Accesses,
-    points: P,
+    points: Table,
 }
 
-/// An outcome as JSON.
-///
-/// # Errors
-/// A figure that is not finite.
-pub fn json(input: &str, outcome: &Outcome) -> serde_json::Result<String> {
-    let (columns, rows) = (columns(), rows(outcome));
-    serde_json::to_string_pretty(&AddressesJson {
-        schema: SCHEMA,
-        tool: TOOL,
-        model_version: MODEL_VERSION,
-        input,
-        accesses: Accesses::new(&outcome.totals, outcome.unique_lines),
-        points: Records {
-            columns: &columns,
-            rows: &rows,
-        },
-    })
-}
+impl Document for AddressesReport<'_> {
+    const SCHEMA: &'static str = "replay.addresses/2";
+    type Json<'a>
+        = AddressesJson<'a>
+    where
+        Self: 'a;
 
-/// An outcome as CSV, one row per configuration.
-pub fn csv(outcome: &Outcome) -> String {
-    Table::new(&columns(), &rows(outcome)).csv()
-}
-
-/// An outcome as text: the counts of accesses, then the levels of a single configuration or one row for
-/// each of several.
-pub fn text(input: &str, outcome: &Outcome) -> String {
-    let of = Accesses::new(&outcome.totals, outcome.unique_lines);
-    let mut text = format!(
-        "{input}: {} accesses ({} reads, {} writes, {} fetches), {} line look-ups, {} distinct lines\n",
-        of.accesses, of.reads, of.writes, of.fetches, of.line_lookups, of.unique_lines
-    );
-    if of.left_out > 0 {
-        text += &format!("{} accesses of other kinds skipped\n", of.left_out);
-    }
-    if of.other_packets > 0 {
-        text += &format!(
-            "{} packets skipped that are not accesses\n",
-            of.other_packets
-        );
-    }
-    let all = Table::new(&columns(), &rows(outcome)).without_empty_columns();
-    let part = |keys: &[&str]| all.picked(keys.iter().copied()).text();
-    if let [point] = outcome.points.as_slice() {
-        for level in ["l1", "l2"] {
-            let keys = LEVEL.map(|key| format!("{level}.{key}"));
-            let kinds = KINDS.map(|kind| format!("{kind}.{level}_line_misses"));
-            let keys = keys.iter().chain(&kinds).map(String::as_str);
-            text += &format!("\n{}", all.picked(keys).text());
+    fn content(&self) -> AddressesJson<'_> {
+        AddressesJson {
+            input: self.input,
+            accesses: Accesses::new(&self.outcome.totals, self.outcome.unique_lines),
+            points: self.rows(),
         }
-        let line_bytes = point.config.line_bytes;
-        text += &format!("\nlines of {line_bytes} bytes\n{}", point.memory);
-        return text + &part(&["external_bytes", "bound_bytes"]);
     }
-    text + "\n" + &part(&SEVERAL)
+
+    /// One row per configuration.
+    fn rows(&self) -> Table {
+        let outcome = self.outcome;
+        let rows: Vec<PointRow> = (outcome.points.iter())
+            .map(|point| PointRow { point, outcome })
+            .collect();
+        Table::new(&columns(), &rows)
+    }
+
+    #[cfg(feature = "testing")]
+    fn tables() -> Vec<(&'static str, Table)> {
+        vec![("points", Table::new(&columns(), &[]))]
+    }
+
+    /// The text: the counts of accesses, then the levels of a single configuration or one row for
+    /// each of several.
+    fn text(&self) -> String {
+        let Self { input, outcome } = self;
+        let of = Accesses::new(&outcome.totals, outcome.unique_lines);
+        let mut text = format!(
+            "{input}: {} accesses ({} reads, {} writes, {} fetches), {} line look-ups, {} distinct lines\n",
+            of.accesses, of.reads, of.writes, of.fetches, of.line_lookups, of.unique_lines
+        );
+        if of.left_out > 0 {
+            text += &format!("{} accesses of other kinds skipped\n", of.left_out);
+        }
+        if of.other_packets > 0 {
+            text += &format!(
+                "{} packets skipped that are not accesses\n",
+                of.other_packets
+            );
+        }
+        let all = self.rows().without_empty_columns();
+        let part = |keys: &[&str]| all.picked(keys.iter().copied()).text();
+        if let [point] = outcome.points.as_slice() {
+            for level in ["l1", "l2"] {
+                let keys = LEVEL.map(|key| format!("{level}.{key}"));
+                let kinds = KINDS.map(|kind| format!("{kind}.{level}_line_misses"));
+                let keys = keys.iter().chain(&kinds).map(String::as_str);
+                text += &format!("\n{}", all.picked(keys).text());
+            }
+            let line_bytes = point.config.line_bytes;
+            text += &format!("\nlines of {line_bytes} bytes\n{}", point.memory);
+            return text + &part(&["external_bytes", "bound_bytes"]);
+        }
+        text + "\n" + &part(&SEVERAL)
+    }
 }
 
 /// Columns of a level: the second half of their keys.
@@ -249,11 +253,3 @@ const SEVERAL: [&str; 8] = [
     "l2.line_miss_pct",
     "external_bytes",
 ];
-
-/// The schema of the JSON object.
-#[cfg(feature = "testing")]
-pub fn schema() -> formats::schemas::Published {
-    use crate::schemas::WithRows;
-    formats::schemas::Published::of::<AddressesJson<'_, Vec<serde_json::Value>>>(SCHEMA)
-        .rows("points", &crate::columns::headings(&columns()))
-}

@@ -2,23 +2,16 @@
 //! on and on the others.
 
 use super::columns::{Column, Row};
+use super::document::Document;
 use super::table::Table;
 use serde::Serialize;
 use sim::config::RunConfig;
-use sim::model_version::MODEL_VERSION;
-use sim::result::TOOL;
 use studies::experiment::{Objective, SceneFit, Setting, Trial, plain};
-
-/// Schema of the object that `replay calibrate --json` prints.
-const CALIBRATION_SCHEMA: &str = "replay.calibration/2";
 
 /// A calibration: every trial, and the index of the chosen one.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
 pub struct CalibrationReport {
-    schema: &'static str,
-    tool: &'static str,
-    model_version: u32,
     base: RunConfig,
     objective: Objective,
     /// Index of the best trial on the scenes used for choosing.
@@ -69,26 +62,28 @@ impl CalibrationReport {
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .map(|(index, _)| index);
         Self {
-            schema: CALIBRATION_SCHEMA,
-            tool: TOOL,
-            model_version: MODEL_VERSION,
             base,
             objective,
             chosen,
             trials,
         }
     }
+}
 
-    /// As one JSON object.
-    ///
-    /// # Errors
-    /// A figure that is not finite.
-    pub fn json(&self) -> serde_json::Result<String> {
-        serde_json::to_string_pretty(self)
+impl Document for CalibrationReport {
+    const SCHEMA: &'static str = "replay.calibration/2";
+    type Json<'a> = &'a Self;
+
+    fn content(&self) -> &Self {
+        self
+    }
+
+    fn rows(&self) -> Table {
+        Table::new(&Trial::columns(), &self.trials)
     }
 
     /// The trials, best first, and the figures of the chosen one by scene.
-    pub fn text(&self) -> String {
+    fn text(&self) -> String {
         let mut trials: Vec<&Trial> = self.trials.iter().collect();
         let rank = |trial: &Trial| trial.chosen_by.unwrap_or(f64::MAX);
         trials.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
@@ -114,12 +109,6 @@ impl CalibrationReport {
         }
         text
     }
-}
-
-/// The schema of the JSON object.
-#[cfg(feature = "testing")]
-pub fn schema() -> formats::schemas::Published {
-    formats::schemas::Published::of::<CalibrationReport>(CALIBRATION_SCHEMA)
 }
 
 #[cfg(test)]

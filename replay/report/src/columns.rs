@@ -1,9 +1,9 @@
 //! Columns: the names, the number format and the values of a row's figures.
 //!
 //! A row type lists its columns once ([`Row`]); the terminal table, the page's table and CSV
-//! ([`Table`](super::table::Table)) and the JSON object ([`Record`]) walk that list.
+//! and the JSON objects ([`Table`](super::table::Table)) walk that list.
 
-use serde::ser::{Serialize, SerializeMap, Serializer};
+use serde::ser::{Serialize, Serializer};
 use std::borrow::Cow;
 use studies::experiment::ResultRow;
 
@@ -321,68 +321,6 @@ pub fn pick<R: Row>(keys: &[&str]) -> Vec<Column<'static, R>> {
     keys.iter().filter_map(&mut take).collect()
 }
 
-/// A row as a JSON object of the given columns.
-pub struct Record<'a, 'c, R: ?Sized> {
-    /// Columns; those with the same prefix are adjacent.
-    pub columns: &'a [Column<'c, R>],
-    /// The row.
-    pub row: &'a R,
-}
-
-impl<R: ?Sized> Serialize for Record<'_, '_, R> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let cells: Vec<(&str, Value)> = self
-            .columns
-            .iter()
-            .map(|c| (c.heading.key.as_ref(), c.value(self.row)))
-            .collect();
-        let prefix = |key: &str| key.split_once('.').map(|(first, _)| first.to_owned());
-        let mut map = serializer.serialize_map(None)?;
-        for group in cells.chunk_by(|a, b| prefix(a.0).is_some() && prefix(a.0) == prefix(b.0)) {
-            match prefix(group[0].0) {
-                None => map.serialize_entry(group[0].0, &group[0].1)?,
-                Some(name) if group.iter().all(|(_, v)| *v == Value::None) => {
-                    map.serialize_entry(&name, &())?;
-                }
-                Some(name) => {
-                    let inner: serde_json::Map<String, serde_json::Value> = group
-                        .iter()
-                        .map(|(key, value)| {
-                            (key[name.len() + 1..].to_owned(), serde_json::json!(value))
-                        })
-                        .collect();
-                    map.serialize_entry(&name, &inner)?;
-                }
-            }
-        }
-        map.end()
-    }
-}
-
-/// Rows as a JSON array of such objects.
-pub struct Records<'a, 'c, R> {
-    /// Columns; those with the same prefix are adjacent.
-    pub columns: &'a [Column<'c, R>],
-    /// The rows.
-    pub rows: &'a [R],
-}
-
-impl<R> Serialize for Records<'_, '_, R> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let columns = self.columns;
-        serializer.collect_seq(self.rows.iter().map(|row| Record { columns, row }))
-    }
-}
-
-/// The columns without their values.
-#[cfg(feature = "testing")]
-pub(crate) fn headings<R>(columns: &[Column<'_, R>]) -> Vec<Heading> {
-    columns
-        .iter()
-        .map(|column| column.heading.clone())
-        .collect()
-}
-
 /// A column of point results.
 pub type Figure<'a> = Column<'static, ResultRow<'a>>;
 
@@ -412,25 +350,6 @@ mod tests {
                 }),
             ]
         }
-    }
-
-    fn json(point: &Point) -> String {
-        let record = Record {
-            columns: &Point::columns(),
-            row: point,
-        };
-        serde_json::to_string(&record).unwrap()
-    }
-
-    #[test]
-    fn keys_with_dots_nest_in_json_and_an_empty_group_is_null() {
-        let (with, without) = (Some(3.0), None);
-        let point = |paper| Point { misses: 7, paper };
-        assert_eq!(
-            json(&point(with)),
-            r#"{"misses":7,"paper":{"rate":3.0,"half":1.5}}"#
-        );
-        assert_eq!(json(&point(without)), r#"{"misses":7,"paper":null}"#);
     }
 
     #[test]

@@ -1,16 +1,13 @@
 //! Results of comparing two captures (`replay.compare/2`).
 
-use super::columns::{Column, Records, Row, Show, Value};
+use super::columns::{Column, Row, Show, Value};
+use super::document::Document;
 use super::table::Table;
 use formats::textrace::TraceMeta;
 use serde::Serialize;
 use sim::config::{Order, RunConfig};
-use sim::model_version::MODEL_VERSION;
-use sim::result::{RunResult, TOOL, TraceId};
+use sim::result::{RunResult, TraceId};
 use studies::compare::{Class, Comparison, Tally};
-
-/// Schema of the object that `replay compare --json` prints.
-pub(super) const COMPARE_SCHEMA: &str = "replay.compare/2";
 
 /// Materials that the terminal's table shows.
 const MATERIALS: usize = 12;
@@ -104,44 +101,45 @@ impl Row for Class {
 /// The JSON object.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-struct CompareJson<'a, 'r> {
-    schema: &'a str,
-    tool: &'a str,
-    model_version: u32,
-    a: &'a Side<'r>,
-    b: &'a Side<'r>,
+pub struct CompareJson<'a> {
+    a: &'a Side<'a>,
+    b: &'a Side<'a>,
     config: &'a RunConfig,
     intersection_over_union_pct: f64,
     #[serde(flatten)]
     comparison: &'a Comparison,
-    replayed: Records<'a, 'static, Replayed<'r>>,
+    replayed: Table,
 }
 
-impl CompareReport<'_> {
-    /// As one JSON object.
-    ///
-    /// # Errors
-    /// A figure that is not finite.
-    pub fn json(&self) -> serde_json::Result<String> {
+impl Document for CompareReport<'_> {
+    const SCHEMA: &'static str = "replay.compare/2";
+    type Json<'a>
+        = CompareJson<'a>
+    where
+        Self: 'a;
+
+    fn content(&self) -> CompareJson<'_> {
         let [a, b] = &self.sides;
-        serde_json::to_string_pretty(&CompareJson {
-            schema: COMPARE_SCHEMA,
-            tool: TOOL,
-            model_version: MODEL_VERSION,
+        CompareJson {
             a,
             b,
             config: &self.config,
             intersection_over_union_pct: self.comparison.all.intersection_over_union_pct(),
             comparison: self.comparison,
-            replayed: Records {
-                columns: &Replayed::columns(),
-                rows: &self.replayed,
-            },
-        })
+            replayed: self.rows(),
+        }
     }
 
-    /// As tables for a terminal.
-    pub fn text(&self) -> String {
+    fn rows(&self) -> Table {
+        Table::new(&Replayed::columns(), &self.replayed)
+    }
+
+    #[cfg(feature = "testing")]
+    fn tables() -> Vec<(&'static str, Table)> {
+        vec![("replayed", Table::new(&Replayed::columns(), &[]))]
+    }
+
+    fn text(&self) -> String {
         let mut text = String::new();
         for (name, side) in ["A", "B"].iter().zip(&self.sides) {
             let Side { trace, meta } = side;
@@ -161,11 +159,11 @@ impl CompareReport<'_> {
         if !materials.rows.is_empty() {
             text += &format!("Materials that differ most\n{}\n", materials.text());
         }
-        text + &Table::new(&Replayed::columns(), &self.replayed)
-            .without_empty_columns()
-            .text()
+        text + &self.rows().without_empty_columns().text()
     }
+}
 
+impl CompareReport<'_> {
     /// All fragments, and opaque fragments separately from the others.
     fn classes(&self) -> Table {
         let all = Class {
@@ -189,12 +187,4 @@ impl CompareReport<'_> {
         classes.truncate(MATERIALS);
         Table::new(&Class::columns(), classes)
     }
-}
-
-/// The schema of the JSON object.
-#[cfg(feature = "testing")]
-pub fn schema() -> formats::schemas::Published {
-    use crate::schemas::WithRows;
-    formats::schemas::Published::of::<CompareJson<'_, '_>>(COMPARE_SCHEMA)
-        .rows("replayed", &crate::columns::headings(&Replayed::columns()))
 }

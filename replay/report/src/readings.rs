@@ -1,6 +1,7 @@
 //! Every reading of the SGRT paper's figure 3, beside the paper's values (`replay.readings/2`).
 
 use super::columns::Column;
+use super::document::Document;
 use super::html::{Answer, Section, figure, figures, folded, page};
 use super::plots::lines::{Axis, LineChart, LineSeries, Mark};
 use super::plots::{PlotError, SeriesStyle};
@@ -9,12 +10,8 @@ use maud::{Markup, html};
 use serde::{Serialize, Serializer};
 use sgrt::config::SgrtConfig;
 use sgrt::readings::{Figures, GbufferPlace, Reading, RowTest, Scope, rms_log};
-use sim::model_version::RAY_MODEL_VERSION;
 use sim::paper::sgrt::PaperValues;
-use sim::result::{TOOL, TraceId};
-
-/// Schema of the object that `replay readings --json` prints.
-pub const SCHEMA: &str = "replay.readings/2";
+use sim::result::TraceId;
 
 /// The readings of a trace.
 #[derive(Clone, Debug, Serialize)]
@@ -81,9 +78,6 @@ struct Fit {
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
 pub struct ReadingsReport {
-    schema: &'static str,
-    tool: &'static str,
-    model_version: u32,
     config: SgrtConfig,
     /// Index of the reading that is closest on the scenes that calibrate.
     chosen: Option<usize>,
@@ -125,6 +119,60 @@ fn geometric_mean(values: impl Iterator<Item = f64>) -> f64 {
     (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp()
 }
 
+impl Document for ReadingsReport {
+    const SCHEMA: &'static str = "replay.readings/2";
+    const FILES_BESIDE_PAGE: bool = false;
+    type Json<'a> = &'a Self;
+
+    fn content(&self) -> &Self {
+        self
+    }
+
+    /// A row per reading and scene.
+    #[rustfmt::skip]
+    fn rows(&self) -> Table {
+        struct Cell<'a> { fit: &'a Fit, scene: &'a SceneReadings, chosen: bool }
+        let figures = |c: &Cell| c.scene.readings[c.fit.index].1;
+        let columns = [
+            Column::text("scene", "scene", |c: &Cell| c.scene.label.clone()),
+            Column::text("checksum", "checksum", |c: &Cell| c.scene.trace.checksum.clone()),
+            Column::text("width_px", "width", |c: &Cell| u64::from(c.scene.eye_size_px[0])),
+            Column::text("height_px", "height", |c: &Cell| u64::from(c.scene.eye_size_px[1])),
+            Column::text("set", "set", |c: &Cell| if c.scene.calibrates { "calibration" } else { "test" }),
+            Column::text("reading", "reading", |c: &Cell| c.fit.index as u64 + 1),
+            Column::text("chosen", "closest", |c: &Cell| c.chosen),
+            Column::text("scope", "measured of", |c: &Cell| scope_name(c.fit.reading.scope)),
+            Column::text("reuse", "reused", |c: &Cell| super::sgrt::reuse_name(c.fit.reading.reuse)),
+            Column::text("rule", "rule", |c: &Cell| rule_name(&c.fit.reading)),
+            Column::text("row_test", "tested against", |c: &Cell| row_test_name(c.fit.reading.row_test)),
+            Column::text("gbuffer", "G-buffer", |c: &Cell| gbuffer_name(c.fit.reading.gbuffer)),
+            Column::real("relative_performance", "performance", "ratio", 4, move |c: &Cell| figures(c).relative_performance),
+            Column::real("paper_relative_performance", "paper", "ratio", 2, |c: &Cell| Some(c.scene.paper.as_ref()?.relative_performance)),
+            Column::real("relative_energy", "energy", "ratio", 4, move |c: &Cell| figures(c).relative_energy),
+            Column::real("relative_energy_least", "14 nm, least", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[0]),
+            Column::real("relative_energy_most", "14 nm, most", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[1]),
+            Column::real("paper_relative_energy", "paper", "ratio", 2, |c: &Cell| Some(c.scene.paper.as_ref()?.relative_energy)),
+            Column::real("frames_per_second", "frames per second", "", 2, move |c: &Cell| figures(c).frames_per_second),
+            Column::real("paper_frames_per_second", "paper", "", 1, |c: &Cell| Some(c.scene.paper.as_ref()?.frames_per_second)),
+        ];
+        let cells: Vec<Cell> = self.fits.iter().flat_map(|fit| {
+            let chosen = self.chosen == Some(fit.index);
+            self.scenes.iter().map(move |scene| Cell { fit, scene, chosen })
+        }).collect();
+        Table::new(&columns, &cells)
+    }
+
+    /// The tables for a terminal.
+    fn text(&self) -> String {
+        let mut out = self.sentences().join(" ") + "\n\nReadings\n" + &self.fits().text();
+        if let Some(index) = self.chosen {
+            out += "\nThe closest reading, scene by scene\n";
+            out += &self.closest(index).text();
+        }
+        out
+    }
+}
+
 impl ReadingsReport {
     /// Compares the readings with the paper's values. The readings of all scenes are the same.
     pub fn new(scenes: Vec<SceneReadings>, config: SgrtConfig) -> Self {
@@ -162,9 +210,6 @@ impl ReadingsReport {
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, index)| index);
         Self {
-            schema: SCHEMA,
-            tool: TOOL,
-            model_version: RAY_MODEL_VERSION,
             config,
             chosen,
             fits,
@@ -207,40 +252,6 @@ impl ReadingsReport {
             Column::real("paper_frames_per_second", "paper", "", 1, |s: &SceneReadings| Some(s.paper.as_ref()?.frames_per_second)),
         ];
         Table::new(&columns, &self.scenes)
-    }
-
-    /// A row per reading and scene.
-    #[rustfmt::skip]
-    pub fn rows(&self) -> Table {
-        struct Cell<'a> { fit: &'a Fit, scene: &'a SceneReadings, chosen: bool }
-        let figures = |c: &Cell| c.scene.readings[c.fit.index].1;
-        let columns = [
-            Column::text("scene", "scene", |c: &Cell| c.scene.label.clone()),
-            Column::text("checksum", "checksum", |c: &Cell| c.scene.trace.checksum.clone()),
-            Column::text("width_px", "width", |c: &Cell| u64::from(c.scene.eye_size_px[0])),
-            Column::text("height_px", "height", |c: &Cell| u64::from(c.scene.eye_size_px[1])),
-            Column::text("set", "set", |c: &Cell| if c.scene.calibrates { "calibration" } else { "test" }),
-            Column::text("reading", "reading", |c: &Cell| c.fit.index as u64 + 1),
-            Column::text("chosen", "closest", |c: &Cell| c.chosen),
-            Column::text("scope", "measured of", |c: &Cell| scope_name(c.fit.reading.scope)),
-            Column::text("reuse", "reused", |c: &Cell| super::sgrt::reuse_name(c.fit.reading.reuse)),
-            Column::text("rule", "rule", |c: &Cell| rule_name(&c.fit.reading)),
-            Column::text("row_test", "tested against", |c: &Cell| row_test_name(c.fit.reading.row_test)),
-            Column::text("gbuffer", "G-buffer", |c: &Cell| gbuffer_name(c.fit.reading.gbuffer)),
-            Column::real("relative_performance", "performance", "ratio", 4, move |c: &Cell| figures(c).relative_performance),
-            Column::real("paper_relative_performance", "paper", "ratio", 2, |c: &Cell| Some(c.scene.paper.as_ref()?.relative_performance)),
-            Column::real("relative_energy", "energy", "ratio", 4, move |c: &Cell| figures(c).relative_energy),
-            Column::real("relative_energy_least", "14 nm, least", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[0]),
-            Column::real("relative_energy_most", "14 nm, most", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[1]),
-            Column::real("paper_relative_energy", "paper", "ratio", 2, |c: &Cell| Some(c.scene.paper.as_ref()?.relative_energy)),
-            Column::real("frames_per_second", "frames per second", "", 2, move |c: &Cell| figures(c).frames_per_second),
-            Column::real("paper_frames_per_second", "paper", "", 1, |c: &Cell| Some(c.scene.paper.as_ref()?.frames_per_second)),
-        ];
-        let cells: Vec<Cell> = self.fits.iter().flat_map(|fit| {
-            let chosen = self.chosen == Some(fit.index);
-            self.scenes.iter().map(move |scene| Cell { fit, scene, chosen })
-        }).collect();
-        Table::new(&columns, &cells)
     }
 
     /// What was found, in sentences.
@@ -291,24 +302,6 @@ impl ReadingsReport {
             ));
         }
         text
-    }
-
-    /// The tables for a terminal.
-    pub fn text(&self) -> String {
-        let mut out = self.sentences().join(" ") + "\n\nReadings\n" + &self.fits().text();
-        if let Some(index) = self.chosen {
-            out += "\nThe closest reading, scene by scene\n";
-            out += &self.closest(index).text();
-        }
-        out
-    }
-
-    /// One JSON object.
-    ///
-    /// # Errors
-    /// A figure that is not finite.
-    pub fn json(&self) -> serde_json::Result<String> {
-        Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 
     /// A self-contained page.
@@ -403,10 +396,4 @@ impl ReadingsReport {
             ),
         ]))
     }
-}
-
-/// The schema of the JSON object.
-#[cfg(feature = "testing")]
-pub fn schema() -> formats::schemas::Published {
-    formats::schemas::Published::of::<ReadingsReport>(SCHEMA)
 }

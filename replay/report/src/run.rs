@@ -1,27 +1,32 @@
 //! Results of one replay, and of one point in both modes.
 
 use super::columns::{Column, Row, Show, Value};
+use super::document::{Document, Envelope};
 use super::errors::{self, KnownError, Of};
 use super::figures::figures;
 use super::table::Table;
 use serde::Serialize;
 use sim::config::RunConfig;
-use sim::model_version::MODEL_VERSION;
 use sim::result::ClientTraffic;
-use sim::result::{LevelResult, Part, RUN_SCHEMA, RunResult, TOOL, TileMap, TraceId};
+use sim::result::{LevelResult, Part, RUN_SCHEMA, RunResult, TileMap, TraceId};
 use sim::size::format_bytes;
 use studies::experiment::ResultRow;
 
-/// Schema of the object that `--compare-modes --json` prints.
-const MODES_SCHEMA: &str = "replay.compare-modes/2";
+/// One replay.
+pub struct RunReport<'a> {
+    /// The result.
+    pub row: &'a ResultRow<'a>,
+    /// Whether the text has the textures with most misses.
+    pub by_texture: bool,
+}
+
+/// One point in timed and in functional mode.
+pub struct ModesReport<'a>(pub [&'a ResultRow<'a>; 2]);
 
 /// The JSON object of `replay run --json`.
 #[derive(Debug, Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-struct RunJson<'a> {
-    schema: &'a str,
-    tool: &'a str,
-    model_version: u32,
+pub struct RunJson<'a> {
     trace: &'a TraceId,
     config: &'a RunConfig,
     result: &'a RunResult,
@@ -32,10 +37,10 @@ struct RunJson<'a> {
 /// Both modes of a point as JSON.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-struct ModesJson<'a> {
-    schema: &'a str,
-    timed: RunJson<'a>,
-    functional: RunJson<'a>,
+pub struct ModesJson<'a> {
+    schema: &'static str,
+    timed: Envelope<RunJson<'a>>,
+    functional: Envelope<RunJson<'a>>,
     /// Relative difference of each figure.
     timed_over_functional_less_one: serde_json::Map<String, serde_json::Value>,
 }
@@ -43,9 +48,6 @@ struct ModesJson<'a> {
 impl<'a> RunJson<'a> {
     fn new(row: &'a ResultRow) -> Self {
         Self {
-            schema: RUN_SCHEMA,
-            tool: TOOL,
-            model_version: MODEL_VERSION,
             trace: &row.subject.id,
             config: &row.point.config,
             result: row.result,
@@ -54,25 +56,75 @@ impl<'a> RunJson<'a> {
     }
 }
 
-/// One result as JSON.
-///
-/// # Errors
-/// A figure that is not finite.
-pub fn json(row: &ResultRow) -> serde_json::Result<String> {
-    serde_json::to_string_pretty(&RunJson::new(row))
-}
-
-/// Results as CSV, one row each.
-pub fn csv(rows: &[ResultRow]) -> String {
+/// Every figure of every result.
+fn rows<'r>(rows: impl IntoIterator<Item = &'r ResultRow<'r>>) -> Table {
     let mut columns = super::config_columns::trace();
     columns.extend(super::config_columns::config());
     columns.extend(figures());
-    Table::new(&columns, rows).csv()
+    Table::new(&columns, rows)
+}
+
+impl Document for RunReport<'_> {
+    const SCHEMA: &'static str = RUN_SCHEMA;
+    type Json<'a>
+        = RunJson<'a>
+    where
+        Self: 'a;
+
+    fn content(&self) -> RunJson<'_> {
+        RunJson::new(self.row)
+    }
+
+    fn rows(&self) -> Table {
+        rows([self.row])
+    }
+
+    fn text(&self) -> String {
+        text(self.row, self.by_texture)
+    }
+}
+
+impl Document for ModesReport<'_> {
+    const SCHEMA: &'static str = "replay.compare-modes/2";
+    type Json<'a>
+        = ModesJson<'a>
+    where
+        Self: 'a;
+
+    fn content(&self) -> ModesJson<'_> {
+        let [timed, functional] = self.0;
+        let differences = MEASURES.iter().map(|(key, .., value)| {
+            let difference = difference(value(timed.result), value(functional.result));
+            ((*key).to_owned(), difference.into())
+        });
+        let [timed, functional] =
+            [timed, functional].map(|row| Envelope::new(RUN_SCHEMA, RunJson::new(row)));
+        ModesJson {
+            schema: Self::SCHEMA,
+            timed,
+            functional,
+            timed_over_functional_less_one: differences.collect(),
+        }
+    }
+
+    fn rows(&self) -> Table {
+        rows(self.0)
+    }
+
+    fn text(&self) -> String {
+        let [timed, functional] = self.0;
+        modes_text(timed, functional)
+    }
+
+    /// Without versions of its own, because both modes have theirs.
+    fn json(&self) -> serde_json::Result<String> {
+        serde_json::to_string_pretty(&self.content())
+    }
 }
 
 /// One result as tables: levels, views, the figures of the whole replay, the draws or (if `by_texture`) the
 /// textures with most misses, and tiles if they were counted.
-pub fn text(row: &ResultRow, by_texture: bool) -> String {
+fn text(row: &ResultRow, by_texture: bool) -> String {
     let ResultRow { result, point, .. } = row;
     let config = &point.config;
     let level: Vec<Column<(&str, &LevelResult)>> = vec![
@@ -238,25 +290,8 @@ const MEASURES: [Measure; 3] = [
     }),
 ];
 
-/// Both modes of a point and their difference as JSON.
-///
-/// # Errors
-/// A figure that is not finite.
-pub fn modes_json(timed: &ResultRow, functional: &ResultRow) -> serde_json::Result<String> {
-    let differences = MEASURES.iter().map(|(key, .., value)| {
-        let difference = difference(value(timed.result), value(functional.result));
-        ((*key).to_owned(), difference.into())
-    });
-    serde_json::to_string_pretty(&ModesJson {
-        schema: MODES_SCHEMA,
-        timed: RunJson::new(timed),
-        functional: RunJson::new(functional),
-        timed_over_functional_less_one: differences.collect(),
-    })
-}
-
 /// Both modes of a point side by side.
-pub fn modes_text(timed: &ResultRow, functional: &ResultRow) -> String {
+fn modes_text(timed: &ResultRow, functional: &ResultRow) -> String {
     let cell = |(.., unit, decimals, value): &Measure, row: &ResultRow| {
         let scale = if unit.starts_with('%') { 100.0 } else { 1.0 };
         format!("{:.*} {unit}", decimals, scale * value(row.result))
@@ -325,14 +360,8 @@ fn tiles(maps: &[TileMap]) -> String {
     format!("\n{}", Table::new(&columns, &tiles).text())
 }
 
-/// The schema of the JSON object.
-#[cfg(feature = "testing")]
-pub fn schema() -> formats::schemas::Published {
-    formats::schemas::Published::of::<RunJson<'_>>(RUN_SCHEMA)
-}
-
 /// The schema of the JSON object of both modes.
 #[cfg(feature = "testing")]
 pub fn modes_schema() -> formats::schemas::Published {
-    formats::schemas::Published::of::<ModesJson<'_>>(MODES_SCHEMA)
+    formats::schemas::Published::of::<ModesJson<'_>>(ModesReport::SCHEMA)
 }

@@ -1,24 +1,19 @@
-//! JSON Schemas of rows, by their columns.
+//! JSON Schemas of tables, by their columns.
 
-use crate::columns::{Heading, Kind, Records};
+use crate::columns::{Heading, Kind};
+use crate::table::Table;
 use formats::schemas::Published;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde_json::{Map, Value, json};
 use std::borrow::Cow;
 
-/// Adds the rows of an array to a document's schema.
-pub trait WithRows {
-    /// Describes the rows of an array by their columns.
-    #[must_use]
-    fn rows(self, key: &str, headings: &[Heading]) -> Self;
-}
-
-impl WithRows for Published {
-    fn rows(mut self, key: &str, headings: &[Heading]) -> Self {
-        let properties = self.schema.get_mut("properties").expect("an object");
-        properties[key] = json!({ "type": "array", "items": row(headings) });
-        self
+/// Describes the rows of a document's tables by their columns.
+pub(crate) fn with_tables(mut published: Published, tables: Vec<(&str, Table)>) -> Published {
+    let properties = published.schema.get_mut("properties").expect("an object");
+    for (key, table) in tables {
+        properties[key] = json!({ "type": "array", "items": row(&table.headings) });
     }
+    published
 }
 
 /// The type of a cell. Every cell can be null.
@@ -61,9 +56,8 @@ fn row(headings: &[Heading]) -> Value {
     json!({ "type": "object", "required": required, "properties": properties })
 }
 
-/// Rows of columns. [`WithRows::rows`] describes the columns where they are the same in every
-/// run.
-impl<R> JsonSchema for Records<'_, '_, R> {
+/// Rows of columns. [`with_tables`] describes the columns where they are the same in every run.
+impl JsonSchema for Table {
     fn inline_schema() -> bool {
         true
     }

@@ -5,15 +5,17 @@ mod cycle_table;
 mod tables;
 
 use crate::answers;
+use crate::document::Document;
 use crate::errors::{self, KnownError, Of};
 use crate::html::{Answer, Section, figure as html_figure, folded, page as html_page};
 use crate::plots::{PlotError, data_uri};
+use crate::table::Table;
 use maud::{Markup, html};
 use serde::Serialize;
 use sgrt::result::Report;
 use sim::paper::sgrt as paper;
 
-pub use tables::{csv, reuse_name, rows};
+pub use tables::reuse_name;
 
 /// Longest edge of a picture on the page.
 pub const THUMBNAIL_PX: u32 = 560;
@@ -25,6 +27,12 @@ pub struct Entry {
     pub report: Report,
     /// Pictures, if a page is written.
     pub pictures: Option<Thumbnails>,
+}
+
+/// Results of several traces.
+pub struct ReprojectReport {
+    /// The traces.
+    pub entries: Vec<Entry>,
 }
 
 /// PNG files of one trace.
@@ -133,7 +141,7 @@ pub fn sections(entries: &[Entry]) -> Result<Vec<Section>, PlotError> {
 /// The JSON object.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-struct ReprojectJson<'a> {
+pub struct ReprojectJson<'a> {
     #[serde(flatten)]
     report: &'a Report,
     /// What is known of the figures' errors.
@@ -146,23 +154,45 @@ pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<ReprojectJson<'_>>(sgrt::result::SCHEMA)
 }
 
-/// A report as JSON; the known errors of the figures come last.
-///
-/// # Errors
-/// A figure that is not finite.
-pub fn json(report: &Report, pretty: bool) -> serde_json::Result<String> {
-    let document = ReprojectJson {
-        report,
-        errors: errors::known(Of::Rays),
-    };
-    match pretty {
-        true => serde_json::to_string_pretty(&document),
-        false => serde_json::to_string(&document),
+impl Document for ReprojectReport {
+    const SCHEMA: &'static str = sgrt::result::SCHEMA;
+    const FILES_BESIDE_PAGE: bool = false;
+    type Json<'a> = Vec<ReprojectJson<'a>>;
+
+    fn content(&self) -> Vec<ReprojectJson<'_>> {
+        let errors = || errors::known(Of::Rays);
+        let reports = self.entries.iter().map(|entry| &entry.report);
+        reports
+            .map(|report| ReprojectJson {
+                report,
+                errors: errors(),
+            })
+            .collect()
+    }
+
+    fn rows(&self) -> Table {
+        tables::rows(&self.entries)
+    }
+
+    fn text(&self) -> String {
+        text(&self.entries)
+    }
+
+    /// One object for each trace; those of several traces have a line each.
+    fn json(&self) -> serde_json::Result<String> {
+        match self.content().as_slice() {
+            [object] => serde_json::to_string_pretty(object),
+            objects => {
+                let lines: serde_json::Result<Vec<_>> =
+                    objects.iter().map(serde_json::to_string).collect();
+                Ok(lines?.join("\n"))
+            }
+        }
     }
 }
 
 /// The tables for a terminal.
-pub fn text(entries: &[Entry]) -> String {
+fn text(entries: &[Entry]) -> String {
     let mut out = String::new();
     let mut part = |title: &str, table: String| {
         out.push_str(title);

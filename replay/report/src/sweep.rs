@@ -1,8 +1,9 @@
 //! A sweep's results: rows, table, CSV and page.
 
 use super::answers;
-use super::columns::{Column, Figure, Records};
+use super::columns::{Column, Figure};
 use super::config_columns;
+use super::document::Document;
 use super::figures::{figure, figures, number};
 use super::html::{self, Answer, Section, folded};
 use super::plots::bars::{BarChart, BarGroup};
@@ -14,16 +15,12 @@ use super::theme;
 use maud::html;
 use serde::Serialize;
 use sim::config::{Order, RunConfig};
-use sim::model_version::MODEL_VERSION;
 use sim::palette;
-use sim::result::{TOOL, TraceId};
+use sim::result::TraceId;
 use studies::experiment::{
     Axis, ExperimentFile, Outcome, ResultRow, Setting, Subject, plain, point_key,
 };
 use toml::Value;
-
-/// Schema of a sweep's JSON.
-const SWEEP_SCHEMA: &str = "replay.sweep/3";
 
 const ORDER: &str = "order";
 const TRAFFIC: &str = "external_mb_per_frame";
@@ -38,7 +35,7 @@ pub struct SweepReport<'a> {
 /// A trace and its label in the rows.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-pub(super) struct LabelledTrace<'a> {
+pub struct LabelledTrace<'a> {
     label: &'a str,
     trace: &'a TraceId,
 }
@@ -55,15 +52,12 @@ impl<'a> LabelledTrace<'a> {
 /// The JSON object.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-struct SweepJson<'a, 'r> {
-    schema: &'a str,
-    tool: &'a str,
-    model_version: u32,
+pub struct SweepJson<'a> {
     traces: Vec<LabelledTrace<'a>>,
     base: RunConfig,
     axes: &'a [Axis],
     one_at_a_time: &'a [Axis],
-    rows: Records<'a, 'static, ResultRow<'r>>,
+    rows: Table,
 }
 
 fn change_title(change: Option<&Setting>) -> String {
@@ -81,28 +75,6 @@ impl<'a> SweepReport<'a> {
             outcome,
             rows: outcome.rows(),
         }
-    }
-
-    /// As one JSON object.
-    ///
-    /// # Errors
-    /// A figure that is not finite.
-    pub fn json(&self) -> serde_json::Result<String> {
-        let columns = Self::columns();
-        let subjects = self.outcome.subjects.iter();
-        serde_json::to_string(&SweepJson {
-            schema: SWEEP_SCHEMA,
-            tool: TOOL,
-            model_version: MODEL_VERSION,
-            traces: subjects.map(LabelledTrace::of).collect(),
-            base: self.file.base,
-            axes: &self.file.axes,
-            one_at_a_time: &self.file.one_at_a_time,
-            rows: Records {
-                columns: &columns,
-                rows: &self.rows,
-            },
-        })
     }
 
     /// The columns of every file: those that identify a row, then its figures.
@@ -127,18 +99,8 @@ impl<'a> SweepReport<'a> {
         })
     }
 
-    /// The rows in full precision.
-    pub fn rows(&self) -> Table {
-        Table::new(&Self::columns(), &self.rows)
-    }
-
-    /// The rows as CSV.
-    pub fn csv(&self) -> String {
-        self.rows().csv()
-    }
-
     /// The rows as a table, grouped by trace and change.
-    pub fn table(&self) -> Table {
+    fn table(&self) -> Table {
         let mut columns = vec![Figure::text("label", "scene", |r| r.subject.label.clone())];
         if !self.file.one_at_a_time.is_empty() {
             columns.push(Figure::text("change", "change", |r| {
@@ -202,6 +164,39 @@ impl<'a> SweepReport<'a> {
             about,
         };
         Ok(html::page(title, &answer, &sections))
+    }
+}
+
+impl Document for SweepReport<'_> {
+    const SCHEMA: &'static str = "replay.sweep/3";
+    const INDENTED: bool = false;
+    type Json<'a>
+        = SweepJson<'a>
+    where
+        Self: 'a;
+
+    fn content(&self) -> SweepJson<'_> {
+        let subjects = self.outcome.subjects.iter();
+        SweepJson {
+            traces: subjects.map(LabelledTrace::of).collect(),
+            base: self.file.base,
+            axes: &self.file.axes,
+            one_at_a_time: &self.file.one_at_a_time,
+            rows: self.rows(),
+        }
+    }
+
+    fn rows(&self) -> Table {
+        Table::new(&Self::columns(), &self.rows)
+    }
+
+    #[cfg(feature = "testing")]
+    fn tables() -> Vec<(&'static str, Table)> {
+        vec![("rows", Table::new(&Self::columns(), []))]
+    }
+
+    fn text(&self) -> String {
+        self.table().text()
     }
 }
 
@@ -414,12 +409,4 @@ impl<'a> Charts<'a> {
             ..BarChart::default()
         }
     }
-}
-
-/// The schema of the JSON object.
-#[cfg(feature = "testing")]
-pub fn schema() -> formats::schemas::Published {
-    use crate::schemas::WithRows;
-    formats::schemas::Published::of::<SweepJson<'_, '_>>(SWEEP_SCHEMA)
-        .rows("rows", &crate::columns::headings(&SweepReport::columns()))
 }

@@ -1,21 +1,29 @@
 //! The plan of a sweep, for schedulers: each point with its key, its estimated cost and whether it is done.
 
+use super::columns::Column;
+use super::document::Document;
 use super::sweep::LabelledTrace;
+use super::table::Table;
 use rayon::prelude::*;
 use serde::Serialize;
-use sim::model_version::MODEL_VERSION;
-use sim::result::TOOL;
-use studies::experiment::{Plan, Store, Subject, Task, point_key};
+use studies::experiment::{Plan, Point, Store, Subject, Task, point_key};
 
-/// Schema of a plan's JSON.
-pub const PLAN_SCHEMA: &str = "replay.plan/2";
+/// A sweep before it runs.
+pub struct SweepPlan<'a> {
+    /// The points of each trace.
+    pub plan: &'a Plan,
+    /// The traces.
+    pub subjects: &'a [Subject<'a>],
+    /// The points to run, by trace.
+    pub tasks: &'a [Task],
+    /// The rows of points that are done.
+    pub store: &'a Store,
+}
 
+/// The JSON object.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-struct PlanJson<'a> {
-    schema: &'a str,
-    tool: &'a str,
-    model_version: u32,
+pub struct PlanJson<'a> {
     traces: Vec<LabelledTrace<'a>>,
     points: Vec<PlannedPoint<'a>>,
 }
@@ -36,38 +44,41 @@ struct PlannedPoint<'a> {
     done: bool,
 }
 
-/// A plan's tasks as one JSON object.
-///
-/// # Errors
-/// None for valid plans.
-pub fn json(
-    plan: &Plan,
-    subjects: &[Subject],
-    tasks: &[Task],
-    store: &Store,
-) -> serde_json::Result<String> {
-    let point = |task: &Task| {
-        let (subject, point) = (&subjects[task.subject], &plan.points[task.point]);
-        PlannedPoint {
-            key: point_key(&subject.id, &point.config),
-            scene: &subject.label,
-            point: point.title(),
-            pass: task.pass,
-            cost: task.cost,
-            done: store.find(&subject.id, &point.config).is_ok(),
-        }
-    };
-    serde_json::to_string(&PlanJson {
-        schema: PLAN_SCHEMA,
-        tool: TOOL,
-        model_version: MODEL_VERSION,
-        traces: subjects.iter().map(LabelledTrace::of).collect(),
-        points: tasks.par_iter().map(point).collect(),
-    })
-}
+impl Document for SweepPlan<'_> {
+    const SCHEMA: &'static str = "replay.plan/2";
+    const INDENTED: bool = false;
+    type Json<'a>
+        = PlanJson<'a>
+    where
+        Self: 'a;
 
-/// The schema of the JSON object.
-#[cfg(feature = "testing")]
-pub fn schema() -> formats::schemas::Published {
-    formats::schemas::Published::of::<PlanJson<'_>>(PLAN_SCHEMA)
+    fn content(&self) -> PlanJson<'_> {
+        let point = |task: &Task| {
+            let (subject, point) = (&self.subjects[task.subject], &self.plan.points[task.point]);
+            PlannedPoint {
+                key: point_key(&subject.id, &point.config),
+                scene: &subject.label,
+                point: point.title(),
+                pass: task.pass,
+                cost: task.cost,
+                done: self.store.find(&subject.id, &point.config).is_ok(),
+            }
+        };
+        PlanJson {
+            traces: self.subjects.iter().map(LabelledTrace::of).collect(),
+            points: self.tasks.par_iter().map(point).collect(),
+        }
+    }
+
+    fn rows(&self) -> Table {
+        let columns = [Column::text("point", "point", |point: &Point| {
+            point.title()
+        })];
+        Table::new(&columns, &self.plan.points)
+    }
+
+    fn text(&self) -> String {
+        let titles: Vec<String> = self.plan.points.iter().map(Point::title).collect();
+        titles.join("\n")
+    }
 }

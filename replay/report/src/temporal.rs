@@ -1,16 +1,13 @@
 //! Reuse between the eyes and over time, frame by frame (`replay.temporal/1`).
 
 use super::columns::Column;
+use super::document::Document;
 use super::table::Table;
 use serde::Serialize;
 use sgrt::compose::Reuse;
 use sgrt::config::SgrtConfig;
 use sgrt::temporal::SchemeFigures;
-use sim::model_version::RAY_MODEL_VERSION;
-use sim::result::{TOOL, TraceId};
-
-/// Schema of the object that `replay temporal --json` prints.
-pub const SCHEMA: &str = "replay.temporal/1";
+use sim::result::TraceId;
 
 /// The schemes on a frame.
 #[derive(Clone, Debug, Serialize)]
@@ -28,32 +25,27 @@ pub struct FrameSchemes {
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
 pub struct TemporalReport {
-    schema: &'static str,
-    tool: &'static str,
-    model_version: u32,
-    rule: String,
-    reuse: Reuse,
-    config: SgrtConfig,
-    frames: Vec<FrameSchemes>,
+    /// The rule that rejects reused hits.
+    pub rule: String,
+    /// What is reused.
+    pub reuse: Reuse,
+    /// The machine.
+    pub config: SgrtConfig,
+    /// The frames.
+    pub frames: Vec<FrameSchemes>,
 }
 
-impl TemporalReport {
-    /// A report on frames that were run with these settings.
-    pub fn new(frames: Vec<FrameSchemes>, rule: String, reuse: Reuse, config: SgrtConfig) -> Self {
-        Self {
-            schema: SCHEMA,
-            tool: TOOL,
-            model_version: RAY_MODEL_VERSION,
-            rule,
-            reuse,
-            config,
-            frames,
-        }
+impl Document for TemporalReport {
+    const SCHEMA: &'static str = "replay.temporal/1";
+    type Json<'a> = &'a Self;
+
+    fn content(&self) -> &Self {
+        self
     }
 
     /// A row per frame and scheme.
     #[rustfmt::skip]
-    pub fn rows(&self) -> Table {
+    fn rows(&self) -> Table {
         type Line<'a> = (&'a FrameSchemes, &'a SchemeFigures);
         let columns = [
             Column::text("frame", "frame", |l: &Line<'_>| l.0.trace.name.clone()),
@@ -77,7 +69,7 @@ impl TemporalReport {
     }
 
     /// The table for a terminal.
-    pub fn text(&self) -> String {
+    fn text(&self) -> String {
         let schemes = "\
 full: both eyes are traced
 stereo: the right eye from the left one
@@ -87,18 +79,4 @@ both: the left eye from its previous frame, the right eye from the left one";
         let (rule, rows) = (&self.rule, self.rows().text());
         format!("rule {rule}, reuse of {reuse}\n{schemes}\n\n{rows}")
     }
-
-    /// One JSON object.
-    ///
-    /// # Errors
-    /// A figure that is not finite.
-    pub fn json(&self) -> serde_json::Result<String> {
-        Ok(serde_json::to_string_pretty(self)? + "\n")
-    }
-}
-
-/// The schema of the JSON.
-#[cfg(feature = "testing")]
-pub fn schema() -> formats::schemas::Published {
-    formats::schemas::Published::of::<TemporalReport>(SCHEMA)
 }

@@ -7,6 +7,7 @@ use crate::files::{check_outputs, write_atomically};
 use anyhow::{Context, Result, anyhow, ensure};
 use formats::raytrace::Raytrace;
 use report::accuracy::{AccuracyReport, Measured};
+use report::document::Document;
 use serde::Deserialize;
 use sgrt::frame::RaySource;
 use shell::{Output, Progress};
@@ -131,16 +132,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         }
     };
     write(&report, &size, &args.output)?;
-    let mut text = report.advice(true).text();
-    for measured in &report.studies {
-        text += &format!(
-            "\n{}: {}\n{}",
-            measured.study.title,
-            measured.study.about,
-            measured.table().text()
-        );
-    }
-    super::print(&text)?;
+    super::print(&report.text())?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -202,7 +194,7 @@ fn write(report: &AccuracyReport, size: &dyn Fn(&str) -> String, folder: &Path) 
     let texts = [
         report.page()?,
         report.json()? + "\n",
-        report.choices_csv(),
+        report.csv(),
         String::from_utf8(errors.into_inner()?)?,
         report.times_csv(),
     ];
@@ -257,7 +249,7 @@ mod tests {
             |name: &str| std::fs::read_to_string(folder.path().join("out").join(name)).unwrap();
         let [page, json, choices, errors, times] = FILES.map(read);
         assert!(page.contains("Precision of the ray traversal"), "{page}");
-        assert!(json.contains(report::accuracy::ACCURACY_SCHEMA));
+        assert!(json.contains(AccuracyReport::SCHEMA));
         assert!(choices.contains("a sphere at 1e5 m"), "{choices}");
         assert!(errors.contains("a 48x48"), "{errors}");
         assert!(times.contains("single precision"), "{times}");

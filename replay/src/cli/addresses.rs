@@ -2,9 +2,11 @@
 
 use super::ConfigArgs;
 use super::experiment_args::parse_caches;
+use super::outputs::Outputs;
+use crate::files::check_outputs;
 use anyhow::{Result, bail, ensure};
 use formats::interop::plain::{AccessKind, AddressFile, AddressForm};
-use report::addresses as report;
+use report::addresses::AddressesReport;
 use sim::addresses::{self, KindSet};
 use sim::config::RunConfig;
 use std::path::{Path, PathBuf};
@@ -176,7 +178,8 @@ impl AddressArgs {
     ///
     /// # Errors
     /// Wrong cache sizes, unreadable input.
-    pub fn run(&self, path: &Path, config: &RunConfig, [json, csv]: [bool; 2]) -> Result<ExitCode> {
+    pub fn run(&self, path: &Path, config: &RunConfig, outputs: &Outputs) -> Result<ExitCode> {
+        let prints = check_outputs(&outputs.list::<AddressesReport>()?, self.input.file())?;
         let configs = self.configs(config)?;
         let kinds = self.input.kinds();
         let start = Instant::now();
@@ -192,12 +195,11 @@ impl AddressArgs {
             "{:.1} M accesses/s ({accesses} accesses in {seconds:.3} s, read as {read_as})",
             accesses as f64 / seconds / 1e6,
         ));
-        let name = name_of(path);
-        super::print(&match (json, csv) {
-            (true, _) => report::json(&name, &outcome)?,
-            (_, true) => report::csv(&outcome),
-            _ => report::text(&name, &outcome),
-        })?;
+        let report = AddressesReport {
+            input: &name_of(path),
+            outcome: &outcome,
+        };
+        outputs.write(&report, prints)?;
         Ok(ExitCode::SUCCESS)
     }
 

@@ -1,7 +1,9 @@
 //! `replay calibrate`: chooses settings on some scenes and evaluates them on others, against the Z2 paper.
 
 use super::ConfigArgs;
+use super::outputs::Outputs;
 use super::subjects::Traces;
+use crate::files::check_outputs;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use report::calibration::CalibrationReport;
 use shell::Progress;
@@ -44,9 +46,8 @@ pub struct Args {
     /// Folder for results; a repeated search reads them and continues
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// Print one JSON object (schema replay.calibration/2)
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    outputs: Outputs,
     #[command(flatten)]
     threads: shell::Threads,
     #[command(flatten)]
@@ -89,6 +90,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     });
     let axes: Vec<Axis> = tries.into_iter().chain(table).collect();
     let plan = Plan::cross(base, &axes, &[])?;
+    let inputs = args.traces.iter().map(PathBuf::as_path);
+    let inputs = inputs.into_iter().chain(args.machine.file());
+    let prints = check_outputs(&args.outputs.list::<CalibrationReport>()?, inputs)?;
     args.threads.start()?;
     let traces = Traces::open(&args.traces)?;
     let subjects = traces.subjects();
@@ -113,11 +117,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     super::warnings::of_outcome(&outcome);
     let trials = trials(&plan, &outcome, &scenes, args.objective);
     let report = CalibrationReport::new(base, args.objective, trials);
-    super::print(&if args.json {
-        report.json()?
-    } else {
-        report.text()
-    })?;
+    args.outputs.write(&report, prints)?;
     Ok(ExitCode::SUCCESS)
 }
 

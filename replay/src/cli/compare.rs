@@ -2,7 +2,9 @@
 
 use super::ConfigArgs;
 use super::order_arg::parse_orders;
+use super::outputs::Outputs;
 use super::subjects::Traces;
+use crate::files::check_outputs;
 use anyhow::{Context, Result, ensure};
 use report::compare::{CompareReport, Replayed, Side};
 use shell::Progress;
@@ -31,9 +33,8 @@ pub struct Args {
     /// Orders for the replays of both, comma-separated, or `all`
     #[arg(long, value_name = "ORDERS", default_value = "morton,z2-lrta,z2-sta")]
     orders: String,
-    /// Print one JSON object (schema replay.compare/2)
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    outputs: Outputs,
     #[command(flatten)]
     threads: shell::Threads,
     #[command(flatten)]
@@ -51,6 +52,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         "--order: this command varies the order; use --orders"
     );
     let orders = parse_orders(&args.orders)?;
+    let inputs = [args.a.as_path(), &args.b];
+    let inputs = inputs.into_iter().chain(args.machine.file());
+    let prints = check_outputs(&args.outputs.list::<CompareReport>()?, inputs)?;
     args.threads.start()?;
     let traces = Traces::open(&[args.a.clone(), args.b.clone()])?;
     let subjects = traces.subjects();
@@ -83,10 +87,6 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         comparison: &comparison,
         replayed: replayed.collect(),
     };
-    super::print(&if args.json {
-        report.json()?
-    } else {
-        report.text()
-    })?;
+    args.outputs.write(&report, prints)?;
     Ok(ExitCode::SUCCESS)
 }

@@ -3,13 +3,12 @@
 use super::ConfigArgs;
 use super::order_arg::parse_orders;
 use super::subjects::Traces;
-use crate::files::{self, write_atomically};
+use crate::files;
 use anyhow::{Context, Result, bail, ensure};
 use rayon::prelude::*;
 use report::picture::EmbeddedPicture;
 use report::z2::model::PaperReport;
-use report::z2::page;
-use shell::{Output, Progress, is_stdout};
+use shell::{Output, Progress};
 use sim::config::RunConfig;
 use sim::paper::{self, z2};
 use sim::size::parse_bytes;
@@ -46,18 +45,18 @@ pub(super) struct ExperimentArgs {
 }
 
 impl ExperimentArgs {
-    /// Replays every point and passes the report and the pictures to `print`. Returns exit code 1 if the
-    /// orders replayed different accesses. Checks `outputs` first.
+    /// Replays every point and passes the report, the pictures, and whether standard output is free to `write`.
+    /// Returns exit code 1 if the orders replayed different accesses. Checks `outputs` first.
     ///
     /// # Errors
     /// Wrong arguments, an unreadable trace or picture, an output that cannot be written, or an error of
-    /// `print`.
+    /// `write`.
     pub fn run(
         &self,
         outputs: &[Output],
         functional: bool,
         tile_maps: bool,
-        print: impl FnOnce(&PaperReport, &[EmbeddedPicture]) -> Result<()>,
+        write: impl FnOnce(&PaperReport, &[EmbeddedPicture], bool) -> Result<()>,
     ) -> Result<ExitCode> {
         self.threads.start()?;
         let base = self.machine.resolve_without_preset()?;
@@ -78,7 +77,8 @@ impl ExperimentArgs {
             Path::new(file)
         });
         let traces = self.traces.iter().map(PathBuf::as_path);
-        files::check_outputs(outputs, traces.chain(images).chain(self.machine.file()))?;
+        let prints =
+            files::check_outputs(outputs, traces.chain(images).chain(self.machine.file()))?;
         let caches = parse_caches(&self.caches)?;
         let mut plan = Plan::paper(base, &caches, &parse_orders(&self.orders)?, functional)?;
         if let Some(preset) = self.machine.preset() {
@@ -102,7 +102,7 @@ impl ExperimentArgs {
         super::warnings::of_outcome(&outcome);
         shell::note(&outcome.shared());
         let report = PaperReport::new(&outcome);
-        print(&report, &pictures)?;
+        write(&report, &pictures, prints)?;
         if let Some(problem) = report.not_conserved() {
             shell::error(&problem);
             return Ok(ExitCode::FAILURE);
@@ -164,40 +164,6 @@ impl ExperimentArgs {
         // Report the first error in the order of the arguments.
         pictures.into_iter().collect()
     }
-}
-
-/// Writes the report's page, and JSON and CSV files with the same numbers.
-///
-/// # Errors
-/// A plot that cannot be drawn, or a file that cannot be written.
-pub(super) fn write_report(
-    report: &PaperReport,
-    pictures: &[EmbeddedPicture],
-    path: &Path,
-) -> Result<()> {
-    let html = page::page(report, pictures)?;
-    write_page(path, &html, &report.json()?, &report.csv())
-}
-
-/// The page at `path`, and JSON and CSV files with the same numbers; for standard output, only the page.
-pub(super) fn page_outputs(flag: &'static str, path: &Path) -> Vec<Output> {
-    let mut outputs = vec![Output::text(flag, path)];
-    if !is_stdout(path) {
-        outputs.extend(["json", "csv"].map(|e| Output::text(flag, &path.with_extension(e))));
-    }
-    outputs
-}
-
-/// Writes a page, and JSON and CSV files with the same numbers.
-///
-/// # Errors
-/// A file that cannot be written.
-pub(super) fn write_page(path: &Path, page: &str, json: &str, csv: &str) -> Result<()> {
-    if !is_stdout(path) {
-        write_atomically(&path.with_extension("json"), format!("{json}\n").as_bytes())?;
-        write_atomically(&path.with_extension("csv"), csv.as_bytes())?;
-    }
-    write_atomically(path, page.as_bytes())
 }
 
 /// Parses L1 and L2 sizes, such as `8/128,16KiB/1MiB`, to bytes. Numbers without a unit are KiB.

@@ -2,13 +2,13 @@
 
 use super::ConfigArgs;
 use super::addresses::{AddressInput, name_of, two_levels_only};
-use super::experiment_args::{page_outputs, write_page};
 use super::order_arg::parse_orders;
+use super::outputs::PageOutputs;
 use super::subjects::Traces;
-use crate::files::{self, write_atomically};
+use crate::files::check_outputs;
 use anyhow::{Context, Result, ensure};
 use report::locality::{LocalityReport, TraceFigures};
-use shell::{Output, Progress, is_stdout};
+use shell::Progress;
 use sim::config::{Order, RunConfig};
 use sim::stream::TileSource;
 use std::path::{Path, PathBuf};
@@ -42,15 +42,8 @@ pub struct Args {
     /// Also analyse the accesses of all cores as one stream
     #[arg(long)]
     merged: bool,
-    /// Print one JSON object (schema replay.locality/2)
-    #[arg(long)]
-    json: bool,
-    /// Also write the tables as CSV files into this folder, with exact counts of every distance
-    #[arg(long, value_name = "DIR")]
-    csv: Option<PathBuf>,
-    /// Also write a page with plots, and JSON and CSV files with the same numbers
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
+    #[command(flatten)]
+    outputs: PageOutputs,
     #[command(flatten)]
     threads: shell::Threads,
     #[command(flatten)]
@@ -72,27 +65,17 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         "--order: this command varies the order; use --orders"
     );
     let orders = parse_orders(args.orders.as_deref().unwrap_or(USUAL_ORDERS))?;
-    let prints = check_outputs(args)?;
+    let inputs = args.traces.iter().map(PathBuf::as_path);
+    let inputs = inputs
+        .chain(args.addresses.file())
+        .chain(args.machine.file());
+    let prints = check_outputs(&args.outputs.list::<LocalityReport>()?, inputs)?;
     let traces = match args.addresses.path(&args.machine)? {
         Some(path) => vec![of_addresses(args, path, &config)?],
         None => of_traces(args, &config, &orders)?,
     };
     let report = LocalityReport { traces, config };
-    if let Some(folder) = &args.csv {
-        for (name, text) in report.csv_files() {
-            write_atomically(&folder.join(name), text.as_bytes())?;
-        }
-    }
-    if let Some(path) = &args.html {
-        write_page(path, &report.page()?, &report.json()?, &report.csv())?;
-    }
-    if prints {
-        super::print(&if args.json {
-            report.json()?
-        } else {
-            report.text()
-        })?;
-    }
+    args.outputs.write(&report, prints, || report.page())?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -143,24 +126,4 @@ fn of_addresses(args: &Args, path: &Path, config: &RunConfig) -> Result<TraceFig
         frames: 1,
         orders: vec![analyse_addresses(file, config, args.addresses.kinds())?],
     })
-}
-
-/// Checks the outputs; returns true if standard output is free for the result.
-fn check_outputs(args: &Args) -> Result<bool> {
-    if let Some(folder) = &args.csv {
-        shell::check_folder("--csv", folder)?;
-    }
-    let csv: Vec<PathBuf> = args
-        .csv
-        .iter()
-        .flat_map(|folder| LocalityReport::CSV_FILES.map(|name| folder.join(name)))
-        .collect();
-    let mut outputs: Vec<Output> = csv.iter().map(|path| Output::text("--csv", path)).collect();
-    let pages = args.html.iter();
-    outputs.extend(pages.flat_map(|path| page_outputs("--html", path)));
-    outputs.extend(args.json.then(|| Output::result("--json")));
-    let inputs = args.traces.iter().map(PathBuf::as_path);
-    let inputs = inputs.chain(args.addresses.file());
-    files::check_outputs(&outputs, inputs.chain(args.machine.file()))?;
-    Ok(!args.html.iter().any(|path| is_stdout(path)))
 }

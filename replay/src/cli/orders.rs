@@ -1,17 +1,18 @@
 //! `replay orders`: compares tile orders with each other and with bounds.
 
 use super::ConfigArgs;
-use super::experiment_args::{page_outputs, parse_caches, write_page};
+use super::experiment_args::parse_caches;
 use super::order_arg::parse_named;
+use super::outputs::PageOutputs;
 use super::subjects::Traces;
 use crate::files::{self, write_atomically};
 use anyhow::{Context, Result, bail, ensure};
 use report::orders::{LearnedTrace, OrdersReport};
-use shell::{Output, Progress, is_stdout};
+use shell::Progress;
 use sim::config::{BetweenFrames, Mode, Order, RunConfig};
 use sim::size::format_bytes;
 use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use studies::experiment::frame_count;
 use studies::orders_study::learn::learn;
@@ -75,15 +76,8 @@ pub struct Args {
     /// curves with sta, offset and boustro]
     #[arg(long, value_name = "ORDERS", num_args = 0..=1, default_missing_value = LEARNER)]
     learn: Option<String>,
-    /// Print one JSON object (schema replay.orders/2)
-    #[arg(long)]
-    json: bool,
-    /// Also write the rows as CSV; - writes them to standard output instead of the table
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
-    /// Also write an HTML page with tables and paths, and JSON and CSV files beside it
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
+    #[command(flatten)]
+    outputs: PageOutputs,
     #[command(flatten)]
     threads: shell::Threads,
 }
@@ -130,25 +124,8 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         learned: learned(args, &study, &subjects)?,
         config: study.base,
     };
-    write(args, &report, prints)?;
+    args.outputs.write(&report, prints, || report.page())?;
     Ok(ExitCode::SUCCESS)
-}
-
-fn write(args: &Args, report: &OrdersReport<'_>, prints: bool) -> Result<()> {
-    if let Some(path) = &args.csv {
-        write_atomically(path, report.csv().as_bytes())?;
-    }
-    if let Some(path) = &args.html {
-        write_page(path, &report.page()?, &report.json()?, &report.csv())?;
-    }
-    if prints {
-        super::print(&if args.json {
-            report.json()?
-        } else {
-            report.text()
-        })?;
-    }
-    Ok(())
 }
 
 /// Builds the study from the arguments.
@@ -304,21 +281,11 @@ fn check_outputs(args: &Args) -> Result<bool> {
     if let Some(folder) = &args.save_orders {
         shell::check_folder("--save-orders", folder)?;
     }
-    let mut outputs: Vec<Output> = Vec::new();
-    outputs.extend(args.csv.iter().map(|path| Output::text("--csv", path)));
-    outputs.extend(
-        args.html
-            .iter()
-            .flat_map(|path| page_outputs("--html", path)),
-    );
-    outputs.extend(args.json.then(|| Output::result("--json")));
     let inputs = args
         .traces
         .iter()
         .chain(&args.order_files)
         .map(PathBuf::as_path);
-    files::check_outputs(&outputs, inputs.chain(args.machine.file()))?;
-    let files = args.csv.iter().chain(&args.html);
-    let taken = |path: &Path| is_stdout(path);
-    Ok(!files.into_iter().any(|path| taken(path)))
+    let outputs = args.outputs.list::<OrdersReport>()?;
+    files::check_outputs(&outputs, inputs.chain(args.machine.file()))
 }

@@ -1,13 +1,14 @@
 //! `replay readings`: the SGRT paper's figure 3 under every reading of what it measures.
 
+use super::outputs::{self, PageOutputs};
 use super::reuse_args::read_config;
-use crate::files::{self, write_atomically};
+use crate::files;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use formats::raytrace::Raytrace;
 use report::readings::{ReadingsReport, SceneReadings};
 use sgrt::loaded::LoadedTrace;
-use shell::{Output, Progress};
+use shell::Progress;
 use sim::paper::sgrt as paper;
 use sim::result::{TraceId, scene_name};
 use std::path::PathBuf;
@@ -15,9 +16,12 @@ use std::process::ExitCode;
 
 /// Arguments of `replay readings`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Examples:
+#[command(
+    mut_arg("csv", outputs::csv_before_traces),
+    after_help = "Examples:
   replay readings teapot.raytrace chess.raytrace car.raytrace
-  replay readings *.raytrace --calibrate teapot,chess,car --html readings.html")]
+  replay readings *.raytrace --calibrate teapot,chess,car --html readings.html"
+)]
 pub(super) struct ReadingsArgs {
     /// Ray traces.
     #[arg(value_name = "FILE", required = true)]
@@ -33,15 +37,8 @@ pub(super) struct ReadingsArgs {
     /// [default: the scene that a built-in one of the paper's stands for].
     #[arg(long = "as", value_name = "SCENE")]
     paper_scenes: Vec<String>,
-    /// Prints JSON (schema replay.readings/2).
-    #[arg(long, conflicts_with = "csv")]
-    json: bool,
-    /// Prints CSV: a row per reading and trace.
-    #[arg(long)]
-    csv: bool,
-    /// Writes a page with charts.
-    #[arg(long, value_name = "HTML")]
-    html: Option<PathBuf>,
+    #[command(flatten)]
+    outputs: PageOutputs,
     #[command(flatten)]
     threads: shell::Threads,
 }
@@ -55,7 +52,9 @@ pub fn run(args: &ReadingsArgs) -> Result<ExitCode> {
     let config = read_config(None, args.config.as_deref())?;
     // A wrong --as is refused before the work.
     paper::values("", "", &args.paper_scenes)?;
-    let prints = check_outputs(args)?;
+    let inputs = args.files.iter().chain(&args.config);
+    let outputs = args.outputs.list::<ReadingsReport>()?;
+    let prints = files::check_outputs(&outputs, inputs.map(PathBuf::as_path))?;
     let progress = Progress::new("reading", args.files.len() as u64, "traces");
     let mut scenes = Vec::new();
     for path in &args.files {
@@ -77,31 +76,8 @@ pub fn run(args: &ReadingsArgs) -> Result<ExitCode> {
     drop(progress);
     mark_calibration(&mut scenes, args.calibrate.as_deref())?;
     let report = ReadingsReport::new(scenes, config);
-    if let Some(path) = &args.html {
-        write_atomically(path, report.page()?.as_bytes())?;
-    }
-    let text = if args.json {
-        report.json()?
-    } else if args.csv {
-        report.rows().csv()
-    } else {
-        report.text()
-    };
-    if prints {
-        super::print(&text)?;
-    }
+    args.outputs.write(&report, prints, || report.page())?;
     Ok(ExitCode::SUCCESS)
-}
-
-fn check_outputs(args: &ReadingsArgs) -> Result<bool> {
-    let outputs = [
-        args.html.as_deref().map(|p| Output::text("--html", p)),
-        args.json.then(|| Output::result("--json")),
-        args.csv.then(|| Output::result("--csv")),
-    ];
-    let outputs: Vec<Output> = outputs.into_iter().flatten().collect();
-    let inputs = args.files.iter().chain(&args.config);
-    files::check_outputs(&outputs, inputs.map(PathBuf::as_path))
 }
 
 /// Marks the scenes that the closest reading is chosen by.

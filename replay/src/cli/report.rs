@@ -1,9 +1,12 @@
 //! `replay report`: writes the Z2 paper's experiment as a page.
 
-use super::experiment_args::{ExperimentArgs, page_outputs, write_report};
-use super::parquet_arg::ParquetArg;
+use super::experiment_args::ExperimentArgs;
+use super::outputs::{ParquetArg, page_outputs, write_page};
 use anyhow::Result;
-use shell::is_stdout;
+use report::document::Document;
+use report::picture::EmbeddedPicture;
+use report::z2::model::PaperReport;
+use report::z2::page;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -28,15 +31,15 @@ pub struct Args {
 /// # Errors
 /// Wrong arguments, an unreadable trace, or an output that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
-    let mut outputs = page_outputs("--output", &args.output);
+    let mut outputs = page_outputs::<PaperReport>("--output", &args.output);
     outputs.extend(args.parquet.output());
-    args.experiment
-        .run(&outputs, true, true, |report, pictures| {
-            write_report(report, pictures, &args.output)?;
-            args.parquet.write(|| report.table())?;
-            if !is_stdout(&args.output) && !args.parquet.takes_stdout() {
-                super::print(&args.output.display().to_string())?;
-            }
-            Ok(())
-        })
+    let write = |report: &PaperReport, pictures: &[EmbeddedPicture], prints| {
+        write_page(&args.output, report, &page::page(report, pictures)?)?;
+        args.parquet.write(|| report.rows())?;
+        match prints {
+            true => super::print(&args.output.display().to_string()),
+            false => Ok(()),
+        }
+    };
+    args.experiment.run(&outputs, true, true, write)
 }

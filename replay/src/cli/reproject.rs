@@ -1,14 +1,15 @@
 //! `replay reproject`: replays ray traces through a ray-tracing GPU model that reuses the left image for
 //! the right one.
 
-use super::parquet_arg::ParquetArg;
+use super::outputs::{self, PageOutputs};
 use super::reuse_args::ReuseArgs;
 use crate::files::{self, write_atomically};
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::raytrace::Raytrace;
 use image_error::{Picture, png};
-use report::sgrt::{self as document, Entry, Thumbnails};
+use report::document::Document;
+use report::sgrt::{self as document, Entry, ReprojectReport, Thumbnails};
 use report::table::Table;
 use sgrt::compose::Reuse;
 use sgrt::config::{DEFAULT_TOML, SgrtConfig};
@@ -26,13 +27,16 @@ use std::process::ExitCode;
 
 /// Arguments of `replay reproject`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Examples:
+#[command(
+    mut_arg("csv", outputs::csv_before_traces),
+    after_help = "Examples:
   replay reproject teapot.raytrace
   replay reproject teapot.raytrace --preset sgrt-paper
   replay reproject teapot.raytrace --rule none --image plain.png --json
   replay reproject teapot.raytrace --timing cycle
   replay reproject *.raytrace --html out/reprojection.html
-  replay reproject chess.raytrace --curve --sensitivity --html chess.html")]
+  replay reproject chess.raytrace --curve --sensitivity --html chess.html"
+)]
 pub struct ReprojectArgs {
     /// Ray traces
     #[arg(value_name = "FILE", required_unless_present = "print_config")]
@@ -51,14 +55,8 @@ pub struct ReprojectArgs {
     /// Add the sensitivity of the ratios to halving and doubling each parameter
     #[arg(long)]
     sensitivity: bool,
-    /// Print one JSON object per file, one per line
-    #[arg(long, conflicts_with = "csv")]
-    json: bool,
-    /// Print CSV: per file, one row for the rule and one for plain reuse
-    #[arg(long)]
-    csv: bool,
     #[command(flatten)]
-    parquet: ParquetArg,
+    outputs: PageOutputs,
     /// Scene of the paper to compare with: SCENE for every trace, or LABEL=SCENE; `none` for no comparison
     /// [default: by the name of the scene]
     #[arg(long = "as", value_name = "SCENE")]
@@ -66,9 +64,6 @@ pub struct ReprojectArgs {
     /// Write the right image, its bad pixels in yellow and its FLIP map side by side (one input file)
     #[arg(long, value_name = "PNG")]
     image: Option<PathBuf>,
-    /// Write a page with charts and pictures
-    #[arg(long, value_name = "HTML")]
-    html: Option<PathBuf>,
     #[command(flatten)]
     threads: shell::Threads,
 }
@@ -96,7 +91,11 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     check_timing(&args)?;
     // Report a wrong --as before the replays.
     paper::values("", "", &args.paper_scenes)?;
-    let prints = check_outputs(&args)?;
+    let mut outputs = args.outputs.list::<ReprojectReport>()?;
+    let image = args.image.iter();
+    outputs.extend(image.map(|path| Output::binary("--image", path)));
+    let inputs = args.files.iter().chain(&args.reused.config);
+    let prints = files::check_outputs(&outputs, inputs.map(PathBuf::as_path))?;
     let mut entries = Vec::new();
     let progress = Progress::new("reprojecting", args.files.len() as u64, "traces");
     for path in &args.files {
@@ -104,23 +103,9 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
         progress.advance(1);
     }
     drop(progress);
-    if let Some(path) = &args.html {
-        write_atomically(path, document::page(&entries)?.as_bytes())?;
-    }
-    args.parquet.write(|| document::rows(&entries))?;
-    let reports = entries.iter().map(|e| &e.report);
-    let text = if args.json {
-        let pretty = entries.len() == 1;
-        let lines: Result<Vec<String>, _> = reports.map(|r| document::json(r, pretty)).collect();
-        lines?.join("\n") + "\n"
-    } else if args.csv {
-        document::csv(&entries)
-    } else {
-        document::text(&entries)
-    };
-    if prints {
-        super::print(&text)?;
-    }
+    let report = ReprojectReport { entries };
+    args.outputs
+        .write(&report, prints, || document::page(&report.entries))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -156,8 +141,8 @@ pub fn rows(arguments: &[String], parameters: Option<&str>) -> anyhow::Result<Ta
         .files
         .iter()
         .map(|path| report_on(path, &args, &config));
-    let entries: Vec<Entry> = entries.collect::<anyhow::Result<_>>()?;
-    Ok(document::rows(&entries))
+    let entries = entries.collect::<anyhow::Result<_>>()?;
+    Ok(ReprojectReport { entries }.rows())
 }
 
 /// Refuses options that only the closed form supports.
@@ -170,25 +155,6 @@ fn check_timing(args: &ReprojectArgs) -> anyhow::Result<()> {
         );
     }
     Ok(())
-}
-
-/// Checks the outputs before the replays; returns true if the result is to be printed.
-fn check_outputs(args: &ReprojectArgs) -> anyhow::Result<bool> {
-    let outputs = [
-        args.image.as_deref().map(|p| Output::binary("--image", p)),
-        args.html.as_deref().map(|p| Output::text("--html", p)),
-        args.parquet.output(),
-        args.json.then(|| Output::result("--json")),
-        args.csv.then(|| Output::result("--csv")),
-    ];
-    let outputs: Vec<Output> = outputs.into_iter().flatten().collect();
-    files::check_outputs(
-        &outputs,
-        args.files
-            .iter()
-            .chain(&args.reused.config)
-            .map(PathBuf::as_path),
-    )
 }
 
 fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::Result<Entry> {
@@ -238,7 +204,7 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
         result: ours.outcome.clone(),
         plain: plain.outcome.clone(),
     };
-    let pictures = if args.html.is_some() {
+    let pictures = if args.outputs.html.is_some() {
         Some(thumbnails(&loaded, &ours, &plain)?)
     } else {
         None

@@ -2,10 +2,11 @@
 
 use super::ConfigArgs;
 use super::addresses::AddressArgs;
+use super::outputs::{self, Outputs};
 use super::subjects::Traces;
 use crate::files;
 use anyhow::{Result, bail, ensure};
-use report::run as document;
+use report::run::{ModesReport, RunReport};
 use shell::Output;
 use sim::config::{Mode, TmuModel};
 use std::path::PathBuf;
@@ -15,7 +16,9 @@ use studies::experiment::{self, Plan};
 
 /// Arguments of `replay run`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:
+#[command(
+    mut_arg("csv", outputs::csv_before_traces),
+    after_help = "Examples:
   replay run c.textrace --order z2-sta
   replay run c.textrace --order z2-lrta --l1 16KiB --l2 256KiB --json
   replay run c.textrace --mode functional --order morton --block-order morton
@@ -23,19 +26,16 @@ use studies::experiment::{self, Plan};
   replay run c.textrace --order z2-sta --timeline c.perfetto.json
   replay run c.textrace --print-config > machine.toml
   replay run --addresses gcc.din.gz --l1 32KiB --l2 256KiB --line 64 --ways 8
-  replay convert c.textrace --to u32 | replay run --addresses - --address-form u32 --caches 8/128,16/256")]
+  replay convert c.textrace --to u32 | replay run --addresses - --address-form u32 --caches 8/128,16/256"
+)]
 pub struct Args {
     /// Texture trace; optional with --addresses and --print-config
     #[arg(required_unless_present_any = ["print_config", "addresses"], conflicts_with = "addresses")]
     trace: Option<PathBuf>,
-    /// Print one JSON object (schema replay.run/2, or replay.addresses/2)
-    #[arg(long)]
-    json: bool,
-    /// Print CSV, one row per configuration
-    #[arg(long, conflicts_with_all = ["json", "tiles"], hide_short_help = true)]
-    csv: bool,
+    #[command(flatten)]
+    outputs: Outputs,
     /// Also count by tile
-    #[arg(long, conflicts_with = "addresses", hide_short_help = true)]
+    #[arg(long, conflicts_with_all = ["addresses", "csv"], hide_short_help = true)]
     tiles: bool,
     /// Also write which tiles each core renders over time, for ui.perfetto.dev (timed mode)
     #[arg(long, value_name = "FILE", conflicts_with_all = ["addresses", "compare_modes", "print_config"])]
@@ -62,17 +62,6 @@ pub struct Args {
     machine: ConfigArgs,
 }
 
-/// All outputs of the command, including standard output.
-fn outputs(args: &Args) -> Vec<Output> {
-    let timeline = args.timeline.iter();
-    let mut outputs: Vec<Output> = timeline
-        .map(|path| Output::text("--timeline", path))
-        .collect();
-    outputs.extend(args.json.then(|| Output::result("--json")));
-    outputs.extend(args.csv.then(|| Output::result("--csv")));
-    outputs
-}
-
 /// Runs the subcommand.
 ///
 /// # Errors
@@ -81,7 +70,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     let mut config = args.machine.resolve()?;
     if let Some(path) = args.addresses.path(&args.machine)? {
         args.threads.start()?;
-        return args.addresses.run(path, &config, [args.json, args.csv]);
+        return args.addresses.run(path, &config, &args.outputs);
     }
     config.tile_maps |= args.tiles;
     config.timeline = args.timeline.is_some();
@@ -90,7 +79,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         "--timeline: expected --mode timed --tmu looping, the only model that records when work items run"
     );
     ensure!(
-        args.json || !(args.tiles && args.compare_modes),
+        args.outputs.json || !(args.tiles && args.compare_modes),
         "--tiles: expected --json with it, because the table of --compare-modes has no tiles"
     );
     if let Some(picture) = &args.picture {
@@ -115,7 +104,10 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let inputs = std::iter::once(path.as_path()).chain(args.machine.file());
     let inputs = inputs.chain(args.picture.as_deref());
-    let prints = files::check_outputs(&outputs(args), inputs)?;
+    let mut outputs = args.outputs.list::<RunReport>()?;
+    let timeline = args.timeline.iter();
+    outputs.extend(timeline.map(|path| Output::text("--timeline", path)));
+    let prints = files::check_outputs(&outputs, inputs)?;
     let plan = Plan::single(config, args.compare_modes)?;
     args.threads.start()?;
     let traces = Traces::open(&[path])?;
@@ -139,16 +131,15 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         let text = report::timeline::json(timeline, tables, config.line_bytes)?;
         files::write_atomically(file, text.as_bytes())?;
     }
-    if !prints {
-        return Ok(ExitCode::SUCCESS);
+    match rows.as_slice() {
+        [] => {}
+        [row] => {
+            let by_texture = args.machine.counts_by().is_some();
+            args.outputs.write(&RunReport { row, by_texture }, prints)?;
+        }
+        [timed, functional, ..] => args
+            .outputs
+            .write(&ModesReport([timed, functional]), prints)?,
     }
-    super::print(&match (rows.as_slice(), args.json) {
-        (rows, _) if args.csv => document::csv(rows),
-        ([timed, functional], true) => document::modes_json(timed, functional)?,
-        ([timed, functional], false) => document::modes_text(timed, functional),
-        ([row, ..], true) => document::json(row)?,
-        ([row, ..], false) => document::text(row, args.machine.counts_by().is_some()),
-        ([], _) => String::new(),
-    })?;
     Ok(ExitCode::SUCCESS)
 }

@@ -1,11 +1,12 @@
 //! `replay sweep`: replays the points of an experiment file on one or many machines.
 
-use super::parquet_arg::ParquetArg;
+use super::outputs::ParquetArg;
 use super::subjects::Traces;
 use crate::files::{self, write_atomically};
 use anyhow::{Context, Result, ensure};
+use report::document::Document;
 use report::sweep::SweepReport;
-use report::sweep_plan;
+use report::sweep_plan::SweepPlan;
 use shell::{Needs, Output, Progress, Shard, ShardArgs, SlurmArray};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -102,12 +103,17 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         super::print(&sweep.slurm_script(shards)?)?;
     } else if args.plan {
         let tasks = sweep.split().tasks(&sweep.plan, args.shards.shard);
-        let text = sweep_plan::json(&sweep.plan, &subjects, &tasks, &sweep.store)?;
-        super::print(&text)?;
+        let plan = SweepPlan {
+            plan: &sweep.plan,
+            subjects: &subjects,
+            tasks: &tasks,
+            store: &sweep.store,
+        };
+        super::print(&plan.json()?)?;
     } else if let Some(shard) = args.shards.shard {
         sweep.run_shard(shard, &subjects)?;
     } else {
-        sweep.check_outputs()?;
+        let prints = sweep.check_outputs()?;
         let outcome = if args.merge_only {
             experiment::merge(&sweep.plan, &subjects, &sweep.store)
                 .with_context(|| sweep.out.display().to_string())?
@@ -119,7 +125,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         };
         super::warnings::of_outcome(&outcome);
         shell::note(&outcome.shared());
-        sweep.write(&outcome)?;
+        sweep.write(&outcome, prints)?;
     }
     Ok(ExitCode::SUCCESS)
 }
@@ -179,7 +185,8 @@ impl<'a> Sweep<'a> {
         ["results.json", "results.csv", "report.html"].map(|name| self.out.join(name))
     }
 
-    fn check_outputs(&self) -> Result<()> {
+    /// Checks the outputs; returns true if standard output is free for the result.
+    fn check_outputs(&self) -> Result<bool> {
         if let Some(path) = &self.args.parquet.path {
             ensure!(
                 path != self.store.folder(),
@@ -192,8 +199,7 @@ impl<'a> Sweep<'a> {
         let mut outputs: Vec<Output> = outputs.chain(self.args.parquet.output()).collect();
         outputs.extend(self.args.json.then(|| Output::result("--json")));
         let inputs = self.paths.iter().chain([&self.args.experiment]);
-        files::check_outputs(&outputs, inputs.map(PathBuf::as_path))?;
-        Ok(())
+        files::check_outputs(&outputs, inputs.map(PathBuf::as_path))
     }
 
     /// Replays the points of a shard and writes only their rows.
@@ -219,7 +225,7 @@ impl<'a> Sweep<'a> {
     }
 
     /// Writes and prints the results.
-    fn write(&self, outcome: &Outcome) -> Result<()> {
+    fn write(&self, outcome: &Outcome, prints: bool) -> Result<()> {
         let report = SweepReport::new(&self.file, outcome);
         let stem = self.args.experiment.file_stem().unwrap_or_default();
         let json = report.json()?;
@@ -229,14 +235,11 @@ impl<'a> Sweep<'a> {
             write_atomically(path, text.as_bytes())?;
         }
         self.args.parquet.write(|| report.rows())?;
-        if self.args.parquet.takes_stdout() {
-            return Ok(());
+        match (prints, self.args.json) {
+            (false, _) => Ok(()),
+            (true, true) => super::print(&json),
+            (true, false) => super::print(&report.text()),
         }
-        super::print(&if self.args.json {
-            json
-        } else {
-            report.table().text()
-        })
     }
 
     /// A script that runs the same sweep as a Slurm job array.

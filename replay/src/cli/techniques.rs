@@ -1,16 +1,15 @@
 //! `replay techniques`: compares rendering techniques from the measurements of `tracegen techniques`.
 
 use super::ConfigArgs;
-use super::experiment_args::{page_outputs, write_page};
 use super::order_arg::parse_orders;
-use super::parquet_arg::ParquetArg;
+use super::outputs::PageOutputs;
 use super::subjects::Traces;
-use crate::files::{self, write_atomically};
+use crate::files;
 use anyhow::{Context, Result, bail};
 use rayon::prelude::*;
 use report::picture::EmbeddedPicture;
 use report::techniques::{Scene, TechniquesReport};
-use shell::{Output, Progress, is_stdout};
+use shell::Progress;
 use sim::config::{Mode, Order, RunConfig};
 use sim::result::scene_name;
 use sim::stream::TileSource;
@@ -40,17 +39,8 @@ pub struct Args {
         default_value = "morton,z2-lrta,z2-sta,z2-sta-merge"
     )]
     orders: String,
-    /// Print one JSON object (schema replay.techniques/2)
-    #[arg(long)]
-    json: bool,
-    /// Also write the rows as CSV; - writes them to standard output instead of the table
-    #[arg(long, value_name = "FILE")]
-    csv: Option<PathBuf>,
     #[command(flatten)]
-    parquet: ParquetArg,
-    /// Also write a page with plots and pictures, and JSON and CSV files with the same numbers
-    #[arg(long, value_name = "FILE")]
-    html: Option<PathBuf>,
+    outputs: PageOutputs,
     #[command(flatten)]
     threads: shell::Threads,
     #[command(flatten)]
@@ -108,27 +98,15 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         config,
         orders,
     };
-    if let Some(path) = &args.csv {
-        write_atomically(path, report.csv().as_bytes())?;
+    let mut embedded_pictures = Vec::new();
+    if args.outputs.html.is_some() {
+        for (index, (folder, figures)) in folders.iter().zip(&pictures).enumerate() {
+            let differences = differences(folder, figures, &traces.of_rows(index, folder))?;
+            embedded_pictures.push(embedded(folder, differences)?);
+        }
     }
-    args.parquet.write(|| report.table())?;
-    if let Some(path) = &args.html {
-        let scenes = folders.iter().zip(&pictures).enumerate();
-        let scenes = scenes
-            .map(|(index, (folder, figures))| {
-                let differences = differences(folder, figures, &traces.of_rows(index, folder))?;
-                embedded(folder, differences)
-            })
-            .collect::<Result<Vec<_>>>()?;
-        write_page(path, &report.page(&scenes)?, &report.json()?, &report.csv())?;
-    }
-    if prints {
-        super::print(&if args.json {
-            report.json()?
-        } else {
-            report.text()
-        })?;
-    }
+    args.outputs
+        .write(&report, prints, || report.page(&embedded_pictures))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -153,26 +131,12 @@ fn check_once(folders: &[PathBuf]) -> Result<()> {
 /// Checks the outputs against all files in the folders; returns true if standard output is free for the
 /// result.
 fn check_outputs(args: &Args, folders: &[Folder]) -> Result<bool> {
-    let mut outputs: Vec<Output> = Vec::new();
-    outputs.extend(args.csv.iter().map(|path| Output::text("--csv", path)));
-    outputs.extend(
-        args.html
-            .iter()
-            .flat_map(|path| page_outputs("--html", path)),
-    );
-    outputs.extend(args.parquet.output());
-    outputs.extend(args.json.then(|| Output::result("--json")));
     let mut inputs: Vec<PathBuf> = args.machine.file().map(PathBuf::from).into_iter().collect();
     for folder in folders {
         inputs.extend(folder.files()?);
     }
-    files::check_outputs(&outputs, inputs.iter().map(PathBuf::as_path))?;
-    let to_stdout = args
-        .csv
-        .iter()
-        .chain(&args.html)
-        .any(|path| is_stdout(path));
-    Ok(!to_stdout && !args.parquet.takes_stdout())
+    let outputs = args.outputs.list::<TechniquesReport>()?;
+    files::check_outputs(&outputs, inputs.iter().map(PathBuf::as_path))
 }
 
 /// Scene names of the folders; folders of the same scene get their own names in addition.

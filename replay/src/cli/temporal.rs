@@ -1,5 +1,6 @@
 //! `replay temporal`: reuse of the previous frame's hits beside reuse between the eyes.
 
+use super::outputs::{self, Outputs};
 use super::reuse_args::ReuseArgs;
 use crate::files;
 use anyhow::{Context, Result};
@@ -7,29 +8,28 @@ use clap::Args;
 use formats::raytrace::Raytrace;
 use report::temporal::{FrameSchemes, TemporalReport};
 use sgrt::temporal::{SequenceFrame, schemes};
-use shell::{Output, Progress};
+use shell::Progress;
 use sim::result::TraceId;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Arguments of `replay temporal`.
 #[derive(Clone, Debug, Args)]
-#[command(after_help = "Examples:
+#[command(
+    mut_arg("csv", outputs::csv_before_traces),
+    after_help = "Examples:
   tracegen rays chess --path head --frame 0 -o f0.raytrace
   tracegen rays chess --path head --frame 1 -o f1.raytrace
-  replay temporal f0.raytrace f1.raytrace")]
+  replay temporal f0.raytrace f1.raytrace"
+)]
 pub(super) struct TemporalArgs {
     /// Ray traces of consecutive frames of a scene at rest, in order.
     #[arg(value_name = "FILE", num_args = 2.., required = true)]
     files: Vec<PathBuf>,
     #[command(flatten)]
     reused: ReuseArgs,
-    /// Prints JSON (schema replay.temporal/1).
-    #[arg(long, conflicts_with = "csv")]
-    json: bool,
-    /// Prints CSV: a row per frame and scheme.
-    #[arg(long)]
-    csv: bool,
+    #[command(flatten)]
+    outputs: Outputs,
     #[command(flatten)]
     threads: shell::Threads,
 }
@@ -42,13 +42,11 @@ pub fn run(args: &TemporalArgs) -> Result<ExitCode> {
     args.threads.start()?;
     let config = args.reused.parameters()?;
     let (rule, reuse) = (args.reused.rule()?, args.reused.reuse());
-    let outputs = [
-        args.json.then(|| Output::result("--json")),
-        args.csv.then(|| Output::result("--csv")),
-    ];
-    let outputs: Vec<Output> = outputs.into_iter().flatten().collect();
     let inputs = args.files.iter().chain(&args.reused.config);
-    let prints = files::check_outputs(&outputs, inputs.map(PathBuf::as_path))?;
+    let prints = files::check_outputs(
+        &args.outputs.list::<TemporalReport>()?,
+        inputs.map(PathBuf::as_path),
+    )?;
     let files: Vec<Raytrace> = (args.files.iter())
         .map(|path| Raytrace::open(path))
         .collect::<Result<_, _>>()?;
@@ -71,16 +69,12 @@ pub fn run(args: &TemporalArgs) -> Result<ExitCode> {
         previous = Some((frame, id));
     }
     drop(progress);
-    let report = TemporalReport::new(frames, rule.to_string(), reuse, config);
-    let text = if args.json {
-        report.json()?
-    } else if args.csv {
-        report.rows().csv()
-    } else {
-        report.text()
+    let report = TemporalReport {
+        rule: rule.to_string(),
+        reuse,
+        config,
+        frames,
     };
-    if prints {
-        super::print(&text)?;
-    }
+    args.outputs.write(&report, prints)?;
     Ok(ExitCode::SUCCESS)
 }

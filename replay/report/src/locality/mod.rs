@@ -4,17 +4,13 @@ mod columns;
 mod page;
 mod plots;
 
-use super::columns::Records;
+use super::document::Document;
 use super::table::Table;
 use columns::{CurvePoint, Reuses, Subject, Summary, Window};
 use serde::Serialize;
 use sim::config::{LevelConfig, RunConfig};
-use sim::model_version::MODEL_VERSION;
-use sim::result::{TOOL, TraceId};
+use sim::result::TraceId;
 use studies::locality::{Figures, OrderFigures, Stream};
-
-/// Schema of the JSON object.
-pub const SCHEMA: &str = "replay.locality/2";
 
 /// A trace's figures.
 pub struct TraceFigures {
@@ -46,16 +42,13 @@ pub struct LocalityReport {
 /// The JSON object.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-struct LocalityJson<'r, 'a> {
-    schema: &'a str,
-    tool: &'a str,
-    model_version: u32,
+pub struct LocalityJson<'a> {
     config: RunConfig,
     traces: Vec<TraceFacts<'a>>,
-    rows: Records<'r, 'a, Summary<'a>>,
-    curves: Records<'r, 'a, CurvePoint<'a>>,
-    distances: Records<'r, 'a, Reuses<'a>>,
-    working_sets: Records<'r, 'a, Window<'a>>,
+    rows: Table,
+    curves: Table,
+    distances: Table,
+    working_sets: Table,
 }
 
 #[derive(Serialize)]
@@ -91,14 +84,6 @@ fn curve_sizes(figures: &Figures) -> Vec<u64> {
 }
 
 impl LocalityReport {
-    /// Files of [`Self::csv_files`].
-    pub const CSV_FILES: [&'static str; 4] = [
-        "summary.csv",
-        "curves.csv",
-        "distances.csv",
-        "working-sets.csv",
-    ];
-
     fn cache(&self, stream: Stream) -> &LevelConfig {
         match stream {
             Stream::L1 | Stream::Merged => &self.config.level.l1,
@@ -175,30 +160,66 @@ impl LocalityReport {
         })
         .collect()
     }
+}
 
-    /// Every figure of every stream.
-    pub fn table(&self) -> Table {
+/// The miss-ratio curves of the streams.
+fn curves(rows: &[Summary]) -> Table {
+    let points: Vec<_> = rows.iter().flat_map(LocalityReport::curve).collect();
+    Table::new(&columns::curves(), &points)
+}
+
+/// The working sets of the streams.
+fn working_sets(rows: &[Summary]) -> Table {
+    let sets: Vec<_> = rows.iter().flat_map(LocalityReport::working_sets).collect();
+    Table::new(&columns::working_sets(), &sets)
+}
+
+impl Document for LocalityReport {
+    const SCHEMA: &'static str = "replay.locality/2";
+    const CSV_FILES: &'static [&'static str] = &[
+        "summary.csv",
+        "curves.csv",
+        "distances.csv",
+        "working-sets.csv",
+    ];
+    type Json<'a> = LocalityJson<'a>;
+
+    fn content(&self) -> LocalityJson<'_> {
+        let rows = self.summaries();
+        let distances: Vec<_> = rows.iter().flat_map(Self::distances).collect();
+        LocalityJson {
+            config: self.config,
+            traces: self.traces.iter().map(TraceFacts::of).collect(),
+            rows: self.rows(),
+            curves: curves(&rows),
+            distances: Table::new(&columns::distances(), &distances),
+            working_sets: working_sets(&rows),
+        }
+    }
+
+    fn rows(&self) -> Table {
         Table::new(&columns::summary(), &self.summaries()).grouped_by(1)
     }
 
-    /// The figures for a terminal.
-    pub fn text(&self) -> String {
+    #[cfg(feature = "testing")]
+    fn tables() -> Vec<(&'static str, Table)> {
+        vec![
+            ("rows", Table::new(&columns::summary(), &[])),
+            ("curves", curves(&[])),
+            ("distances", Table::new(&columns::distances(), &[])),
+            ("working_sets", working_sets(&[])),
+        ]
+    }
+
+    fn text(&self) -> String {
         let one = self.traces.len() == 1;
         let keys = columns::SHORT.into_iter();
         let keys = keys.filter(|key| !(one && *key == "trace"));
-        self.table().picked(keys).text()
+        self.rows().picked(keys).text()
     }
 
-    /// Every figure in full precision.
-    pub fn csv(&self) -> String {
-        self.table().csv()
-    }
-
-    /// The tables of [`Self::CSV_FILES`].
-    pub fn csv_files(&self) -> Vec<(&'static str, String)> {
+    fn csv_files(&self) -> Vec<String> {
         let rows = self.summaries();
-        let curves: Vec<_> = rows.iter().flat_map(Self::curve).collect();
-        let sets: Vec<_> = rows.iter().flat_map(Self::working_sets).collect();
         // One stream after another, because there are many distances.
         let mut distances = String::new();
         for row in &rows {
@@ -207,63 +228,11 @@ impl LocalityReport {
             let skip = if distances.is_empty() { 0 } else { heading };
             distances += &text[skip..];
         }
-        let tables = [
+        vec![
             self.csv(),
-            Table::new(&columns::curves(), &curves).csv(),
+            curves(&rows).csv(),
             distances,
-            Table::new(&columns::working_sets(), &sets).csv(),
-        ];
-        Self::CSV_FILES.into_iter().zip(tables).collect()
+            working_sets(&rows).csv(),
+        ]
     }
-
-    /// As one JSON object.
-    ///
-    /// # Errors
-    /// A figure that is not finite.
-    pub fn json(&self) -> serde_json::Result<String> {
-        let rows = self.summaries();
-        let curves: Vec<_> = rows.iter().flat_map(Self::curve).collect();
-        let distances: Vec<_> = rows.iter().flat_map(Self::distances).collect();
-        let sets: Vec<_> = rows.iter().flat_map(Self::working_sets).collect();
-        serde_json::to_string_pretty(&LocalityJson {
-            schema: SCHEMA,
-            tool: TOOL,
-            model_version: MODEL_VERSION,
-            config: self.config,
-            traces: self.traces.iter().map(TraceFacts::of).collect(),
-            rows: Records {
-                columns: &columns::summary(),
-                rows: &rows,
-            },
-            curves: Records {
-                columns: &columns::curves(),
-                rows: &curves,
-            },
-            distances: Records {
-                columns: &columns::distances(),
-                rows: &distances,
-            },
-            working_sets: Records {
-                columns: &columns::working_sets(),
-                rows: &sets,
-            },
-        })
-    }
-}
-
-/// The schema of the JSON object.
-#[cfg(feature = "testing")]
-pub fn schema() -> formats::schemas::Published {
-    use crate::schemas::WithRows;
-    formats::schemas::Published::of::<LocalityJson<'_, '_>>(SCHEMA)
-        .rows("rows", &crate::columns::headings(&columns::summary()))
-        .rows("curves", &crate::columns::headings(&columns::curves()))
-        .rows(
-            "distances",
-            &crate::columns::headings(&columns::distances()),
-        )
-        .rows(
-            "working_sets",
-            &crate::columns::headings(&columns::working_sets()),
-        )
 }

@@ -3,6 +3,7 @@
 use super::columns::Summary;
 use super::{LocalityReport, TraceFigures, plots};
 use crate::answers;
+use crate::document::Document;
 use crate::html::{self, Answer, Section, figures};
 use crate::plots::PlotError;
 use crate::plots::stacked::StackedChart;
@@ -43,7 +44,7 @@ impl LocalityReport {
     /// # Errors
     /// A plot that cannot be drawn.
     pub fn page(&self) -> Result<String, PlotError> {
-        let (rows, table) = (self.summaries(), self.table());
+        let (rows, table) = (self.summaries(), self.rows());
         let mut sections = Vec::new();
         let same = |a: &Summary, b: &Summary| {
             (a.of.trace, a.of.stream.key()) == (b.of.trace, b.of.stream.key())

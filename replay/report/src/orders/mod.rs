@@ -4,19 +4,15 @@ mod columns;
 mod means;
 mod page;
 
-use super::columns::Records;
+use super::document::Document;
 use super::table::Table;
 use columns::LearnedRow;
 pub use columns::LearnedTrace;
 pub use means::Mean;
 use serde::Serialize;
 use sim::config::RunConfig;
-use sim::model_version::MODEL_VERSION;
-use sim::result::{TOOL, TraceId};
+use sim::result::TraceId;
 use studies::orders_study::Row;
-
-/// Schema of the JSON object.
-pub const SCHEMA: &str = "replay.orders/2";
 
 /// The results of a study.
 pub struct OrdersReport<'a> {
@@ -28,17 +24,15 @@ pub struct OrdersReport<'a> {
     pub config: RunConfig,
 }
 
+/// The JSON object.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-struct Document<'r, 'a> {
-    schema: &'a str,
-    tool: &'a str,
-    model_version: u32,
+pub struct OrdersJson<'a> {
     config: RunConfig,
     traces: Vec<TraceFacts<'a>>,
-    rows: Records<'r, 'a, Row<'a>>,
-    means: Records<'r, 'a, Mean<'a>>,
-    learned: Records<'r, 'a, LearnedRow<'a>>,
+    rows: Table,
+    means: Table,
+    learned: Table,
 }
 
 #[derive(Serialize)]
@@ -57,40 +51,20 @@ impl<'a> OrdersReport<'a> {
         means::means(&self.rows)
     }
 
-    fn learned_rows(&self) -> Vec<LearnedRow<'_>> {
-        self.learned.iter().flat_map(LearnedTrace::rows).collect()
+    fn learned_table(&self) -> Table {
+        let rows: Vec<LearnedRow<'_>> = self.learned.iter().flat_map(LearnedTrace::rows).collect();
+        Table::new(&columns::learned(), &rows)
     }
+}
 
-    /// The means; for a single trace, its rows.
-    pub fn text(&self) -> String {
-        let means = self.means();
-        let keys = columns::SHORT_MEANS.into_iter();
-        let table = Table::new(&columns::means(), &means)
-            .grouped_by(1)
-            .picked(keys);
-        let mut text = table.without_empty_columns().text();
-        if !self.learned.is_empty() {
-            text += "\n";
-            text += &Table::new(&columns::learned(), &self.learned_rows()).text();
-        }
-        text
-    }
+impl Document for OrdersReport<'_> {
+    const SCHEMA: &'static str = "replay.orders/2";
+    type Json<'a>
+        = OrdersJson<'a>
+    where
+        Self: 'a;
 
-    /// Every row.
-    pub fn table(&self) -> Table {
-        Table::new(&columns::rows(), &self.rows).grouped_by(1)
-    }
-
-    /// Every row in full precision.
-    pub fn csv(&self) -> String {
-        self.table().csv()
-    }
-
-    /// As one JSON object.
-    ///
-    /// # Errors
-    /// A value that is not finite.
-    pub fn json(&self) -> serde_json::Result<String> {
+    fn content(&self) -> OrdersJson<'_> {
         let mut traces: Vec<TraceFacts<'_>> = Vec::new();
         for row in &self.rows {
             if traces
@@ -105,34 +79,36 @@ impl<'a> OrdersReport<'a> {
                 });
             }
         }
-        serde_json::to_string_pretty(&Document {
-            schema: SCHEMA,
-            tool: TOOL,
-            model_version: MODEL_VERSION,
+        OrdersJson {
             config: self.config,
             traces,
-            rows: Records {
-                columns: &columns::rows(),
-                rows: &self.rows,
-            },
-            means: Records {
-                columns: &columns::means(),
-                rows: &self.means(),
-            },
-            learned: Records {
-                columns: &columns::learned(),
-                rows: &self.learned_rows(),
-            },
-        })
+            rows: self.rows(),
+            means: Table::new(&columns::means(), &self.means()),
+            learned: self.learned_table(),
+        }
     }
-}
 
-/// The schema of the JSON object.
-#[cfg(feature = "testing")]
-pub fn schema() -> formats::schemas::Published {
-    use crate::schemas::WithRows;
-    formats::schemas::Published::of::<Document<'_, '_>>(SCHEMA)
-        .rows("rows", &crate::columns::headings(&columns::rows()))
-        .rows("means", &crate::columns::headings(&columns::means()))
-        .rows("learned", &crate::columns::headings(&columns::learned()))
+    fn rows(&self) -> Table {
+        Table::new(&columns::rows(), &self.rows).grouped_by(1)
+    }
+
+    #[cfg(feature = "testing")]
+    fn tables() -> Vec<(&'static str, Table)> {
+        vec![
+            ("rows", Table::new(&columns::rows(), &[])),
+            ("means", Table::new(&columns::means(), &[])),
+            ("learned", Table::new(&columns::learned(), &[])),
+        ]
+    }
+
+    /// The means; for a single trace, its rows.
+    fn text(&self) -> String {
+        let means = Table::new(&columns::means(), &self.means()).grouped_by(1);
+        let table = means.picked(columns::SHORT_MEANS);
+        let mut text = table.without_empty_columns().text();
+        if !self.learned.is_empty() {
+            text += &format!("\n{}", self.learned_table().text());
+        }
+        text
+    }
 }

@@ -63,10 +63,9 @@ impl OrdersReport<'_> {
             sections.push(Section::new(title, of_display(&means::means(&rows))));
         }
         if !self.learned.is_empty() {
-            let table = Table::new(&columns::learned(), &self.learned_rows());
             sections.push(Section::new(
                 "Learning from the last frames",
-                table.markup(),
+                self.learned_table().markup(),
             ));
         }
         sections.push(Section::new("Paths", self.paths()?));

@@ -385,11 +385,6 @@ pub fn rows(entries: &[Entry]) -> Table {
     Table::new(&RuleRow::columns(), &rule_rows(entries))
 }
 
-/// [`rows`] as CSV.
-pub fn csv(entries: &[Entry]) -> String {
-    rows(entries).csv()
-}
-
 /// Pixels of a class.
 struct ClassRow<'a> {
     run: &'a RuleRow<'a>,

@@ -86,7 +86,7 @@ fn the_page_shows_both_charts_the_pictures_and_the_papers_values() {
 
 #[test]
 fn csv_has_as_many_cells_in_each_row_as_in_its_heading() {
-    let text = csv(&[entry()]);
+    let text = tables::rows(&[entry()]).csv();
     let widths: Vec<usize> = text.lines().map(|l| l.split(',').count()).collect();
     assert_eq!(widths.len(), 3);
     assert!(widths.iter().all(|w| *w == widths[0]), "{widths:?}");
@@ -124,7 +124,8 @@ fn eyes_unsuitable_for_the_row_test_are_reported_in_every_output() {
     let json = serde_json::to_value(&canted.report).expect("json");
     assert_eq!(json["rows"]["row_test_applies"], false);
     assert!(
-        csv(&[canted])
+        tables::rows(&[canted])
+            .csv()
             .lines()
             .nth(1)
             .expect("a row")

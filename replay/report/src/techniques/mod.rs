@@ -8,20 +8,15 @@ mod published;
 
 pub use page::Scene;
 
-use super::columns::Records;
+use super::document::Document;
 use super::table::Table;
 use columns::{columns, order_columns};
 use formats::view::Lens;
-use published::{ClaimRow, claim_columns, claims};
+use published::{claim_columns, claims};
 use serde::Serialize;
 use sim::config::{Order, RunConfig};
-use sim::model_version::MODEL_VERSION;
-use sim::result::TOOL;
 use studies::techniques::manifest::{Auto, Manifest};
 use studies::techniques::{Measured, Measures, OrderGain};
-
-/// Schema of the JSON object.
-pub const SCHEMA: &str = "replay.techniques/2";
 
 /// Measurements of the techniques on some scenes.
 pub struct TechniquesReport<'a> {
@@ -38,15 +33,12 @@ pub struct TechniquesReport<'a> {
 /// The JSON object.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-struct TechniquesJson<'r, 'a> {
-    schema: &'a str,
-    tool: &'a str,
-    model_version: u32,
+pub struct TechniquesJson<'a> {
     config: RunConfig,
     scenes: Vec<SceneFacts<'a>>,
-    rows: Records<'r, 'a, &'a Measured<'a>>,
-    orders: Records<'r, 'a, OrderGain<'a>>,
-    published: Records<'r, 'static, ClaimRow<'a>>,
+    rows: Table,
+    orders: Table,
+    published: Table,
 }
 
 /// Facts about a scene, for the JSON.
@@ -83,21 +75,8 @@ impl<'a> TechniquesReport<'a> {
         (other, Order::MORTON)
     }
 
-    fn rows(&self) -> Vec<&'a Measured<'a>> {
+    fn measured(&self) -> Vec<&'a Measured<'a>> {
         self.scenes.iter().flat_map(|scene| &scene.rows).collect()
-    }
-
-    fn gains(&self) -> Vec<OrderGain<'a>> {
-        let (order, against) = self.gain_orders();
-        let scenes = self.scenes.iter();
-        scenes.flat_map(|s| s.order_gains(order, against)).collect()
-    }
-
-    /// Every figure of every technique.
-    pub fn table(&self) -> Table {
-        let rows = self.rows();
-        let columns = columns(&rows, self.config.order);
-        Table::new(&columns, &rows).grouped_by(1)
     }
 
     /// The figures for a terminal.
@@ -106,7 +85,7 @@ impl<'a> TechniquesReport<'a> {
         let columns = columns::SHORT
             .into_iter()
             .filter(|key| !(one && *key == "scene"));
-        let table = self.table().picked(columns);
+        let table = self.rows().picked(columns);
         table.grouped_by(usize::from(!one))
     }
 
@@ -116,7 +95,7 @@ impl<'a> TechniquesReport<'a> {
         let keys = columns::pacing_keys();
         let keys = keys.iter().map(String::as_str);
         let table = self
-            .table()
+            .rows()
             .picked(keys.filter(|key| !(one && *key == "scene")));
         table.grouped_by(usize::from(!one))
     }
@@ -125,16 +104,59 @@ impl<'a> TechniquesReport<'a> {
     fn order_table(&self) -> Table {
         let (order, against) = self.gain_orders();
         let columns = order_columns(&self.orders, order, against);
-        Table::new(&columns, &self.gains()).grouped_by(1)
+        let scenes = self.scenes.iter();
+        let gains: Vec<OrderGain> = scenes.flat_map(|s| s.order_gains(order, against)).collect();
+        Table::new(&columns, &gains).grouped_by(1)
     }
 
     /// Published savings and the measured ones.
     fn claim_table(&self) -> Table {
-        Table::new(&claim_columns(), &claims(self.scenes)).without_empty_columns()
+        Table::new(&claim_columns(), &claims(self.scenes))
+    }
+}
+
+impl<'r> Document for TechniquesReport<'r> {
+    const SCHEMA: &'static str = "replay.techniques/2";
+    type Json<'a>
+        = TechniquesJson<'a>
+    where
+        Self: 'a;
+
+    fn content(&self) -> TechniquesJson<'_> {
+        let facts = |(scene, m): (&'r Measures<'r>, &&'r Manifest)| SceneFacts {
+            scene: scene.scene,
+            path: m.path.as_deref(),
+            frames: &m.frames,
+            scene_triangles: m.scene_triangles,
+            instances: m.instances,
+            size_px: m.size_px,
+            hmd: &m.hmd.name,
+            lens: m.lens,
+            pixels_per_degree: m.pixels_per_degree,
+            adapter: &m.adapter,
+            driver: &m.driver,
+            software_driver: m.software_driver,
+            measured_by: &m.tool,
+            baseline: &m.baseline,
+            auto: m.auto.as_ref(),
+        };
+        TechniquesJson {
+            config: self.config,
+            scenes: self.scenes.iter().zip(&self.manifests).map(facts).collect(),
+            rows: self.rows(),
+            orders: self.order_table(),
+            published: self.claim_table(),
+        }
+    }
+
+    fn rows(&self) -> Table {
+        let rows = self.measured();
+        let columns = columns(&rows, self.config.order);
+        Table::new(&columns, &rows).grouped_by(1)
     }
 
     /// The tables for a terminal.
-    pub fn text(&self) -> String {
+    fn text(&self) -> String {
         let mut text = self.short_table().text();
         text += "\n";
         text += &self.pacing_table().text();
@@ -160,64 +182,4 @@ impl<'a> TechniquesReport<'a> {
         }
         text
     }
-
-    /// Every figure in full precision.
-    pub fn csv(&self) -> String {
-        self.table().csv()
-    }
-
-    /// As one JSON object.
-    ///
-    /// # Errors
-    /// A figure that is not finite.
-    pub fn json(&self) -> serde_json::Result<String> {
-        let rows = self.rows();
-        let (order, against) = self.gain_orders();
-        let gains = self.gains();
-        let claims = claims(self.scenes);
-        let order_columns = order_columns(&self.orders, order, against);
-        let columns = columns(&rows, self.config.order);
-        let facts = |(scene, m): (&'a Measures<'a>, &&'a Manifest)| SceneFacts {
-            scene: scene.scene,
-            path: m.path.as_deref(),
-            frames: &m.frames,
-            scene_triangles: m.scene_triangles,
-            instances: m.instances,
-            size_px: m.size_px,
-            hmd: &m.hmd.name,
-            lens: m.lens,
-            pixels_per_degree: m.pixels_per_degree,
-            adapter: &m.adapter,
-            driver: &m.driver,
-            software_driver: m.software_driver,
-            measured_by: &m.tool,
-            baseline: &m.baseline,
-            auto: m.auto.as_ref(),
-        };
-        serde_json::to_string_pretty(&TechniquesJson {
-            schema: SCHEMA,
-            tool: TOOL,
-            model_version: MODEL_VERSION,
-            config: self.config,
-            scenes: self.scenes.iter().zip(&self.manifests).map(facts).collect(),
-            rows: Records {
-                columns: &columns,
-                rows: &rows,
-            },
-            orders: Records {
-                columns: &order_columns,
-                rows: &gains,
-            },
-            published: Records {
-                columns: &claim_columns(),
-                rows: &claims,
-            },
-        })
-    }
-}
-
-/// The schema of the JSON object.
-#[cfg(feature = "testing")]
-pub fn schema() -> formats::schemas::Published {
-    formats::schemas::Published::of::<TechniquesJson<'_, '_>>(SCHEMA)
 }

@@ -3,6 +3,7 @@
 use super::frusta::Frusta;
 use super::{TechniquesReport, plots};
 use crate::answers;
+use crate::document::Document;
 use crate::html::{self, Answer, Section, figures, slug};
 use crate::picture::EmbeddedPicture;
 use crate::plots::PlotError;
@@ -69,7 +70,7 @@ impl TechniquesReport<'_> {
                 self.orders_section(&orders),
             ));
         }
-        let claims = self.claim_table();
+        let claims = self.claim_table().without_empty_columns();
         if !claims.rows.is_empty() {
             sections.push(Section::new(
                 "Published and measured savings",
@@ -96,7 +97,7 @@ impl TechniquesReport<'_> {
     /// The sections of each scene.
     fn scene_sections(&self, pictures: &[Scene]) -> Result<Vec<Section>, PlotError> {
         let mut sections = Vec::new();
-        let table = self.table();
+        let table = self.rows();
         for ((measures, manifest), scene) in self.scenes.iter().zip(&self.manifests).zip(pictures) {
             let name = measures.scene;
             let section = |title: String, body: Markup| Section {

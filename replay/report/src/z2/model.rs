@@ -1,19 +1,17 @@
 //! The Z2 paper's experiment: its rows, their averages and their checks (`replay.paper/3`).
 
-use crate::columns::{Column, Figure, Records, Row, Value};
+use crate::columns::{Column, Figure, Row, Value};
+use crate::document::Document;
 use crate::errors::{self, KnownError, Of};
 use crate::figures::number;
 use crate::table::Table;
+use crate::z2::tables;
 use formats::textrace::TraceMeta;
 use serde::Serialize;
 use sim::config::{Order, RunConfig};
-use sim::model_version::MODEL_VERSION;
 use sim::paper::z2::{self, PublishedRow};
-use sim::result::{Part, TOOL, TileMap, TraceId};
+use sim::result::{Part, TileMap, TraceId};
 use studies::experiment::{Outcome, ResultRow, Subject, frame_count};
-
-/// Schema of the object that `replay paper --json` prints.
-const PAPER_SCHEMA: &str = "replay.paper/3";
 
 /// A trace of the experiment.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -231,62 +229,60 @@ impl<'a> PaperReport<'a> {
         columns.retain(|c| !matches!(c.heading.key.as_ref(), "over_base" | "caches"));
         columns
     }
-
-    /// Every row in full precision.
-    pub fn table(&self) -> Table {
-        Table::new(&Self::figures(), &self.rows)
-    }
-
-    /// Every row as CSV.
-    pub fn csv(&self) -> String {
-        self.table().csv()
-    }
-
-    /// The experiment as one JSON object.
-    ///
-    /// # Errors
-    /// A figure that is not finite.
-    pub fn json(&self) -> serde_json::Result<String> {
-        let columns = Self::figures();
-        let details = self.traces.iter().flat_map(|t| self.details(&t.label));
-        serde_json::to_string(&PaperJson {
-            schema: PAPER_SCHEMA,
-            tool: TOOL,
-            model_version: MODEL_VERSION,
-            config: &self.config,
-            traces: &self.traces,
-            rows: Records {
-                columns: &columns,
-                rows: &self.rows,
-            },
-            averages: Records {
-                columns: &Average::columns(),
-                rows: &self.averages,
-            },
-            closed_form: self.closed_form,
-            conservation: &self.conservation,
-            errors: errors::known(Of::Textures),
-            details: details.map(Detail::new).collect(),
-        })
-    }
 }
 
 /// The JSON object.
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-struct PaperJson<'a, 'r> {
-    schema: &'a str,
-    tool: &'a str,
-    model_version: u32,
+pub struct PaperJson<'a> {
     config: &'a RunConfig,
     traces: &'a [TraceInfo],
-    rows: Records<'a, 'static, ResultRow<'r>>,
-    averages: Records<'a, 'static, Average>,
+    rows: Table,
+    averages: Table,
     closed_form: Deviation,
     conservation: &'a [Conservation],
     /// What is known of the figures' errors.
     errors: Vec<&'static KnownError>,
     details: Vec<Detail<'a>>,
+}
+
+impl Document for PaperReport<'_> {
+    const SCHEMA: &'static str = "replay.paper/3";
+    const INDENTED: bool = false;
+    type Json<'a>
+        = PaperJson<'a>
+    where
+        Self: 'a;
+
+    fn content(&self) -> PaperJson<'_> {
+        let details = self.traces.iter().flat_map(|t| self.details(&t.label));
+        PaperJson {
+            config: &self.config,
+            traces: &self.traces,
+            rows: self.rows(),
+            averages: Table::new(&Average::columns(), &self.averages),
+            closed_form: self.closed_form,
+            conservation: &self.conservation,
+            errors: errors::known(Of::Textures),
+            details: details.map(Detail::new).collect(),
+        }
+    }
+
+    fn rows(&self) -> Table {
+        Table::new(&Self::figures(), &self.rows)
+    }
+
+    #[cfg(feature = "testing")]
+    fn tables() -> Vec<(&'static str, Table)> {
+        vec![
+            ("rows", Table::new(&Self::figures(), [])),
+            ("averages", Table::new(&Average::columns(), [])),
+        ]
+    }
+
+    fn text(&self) -> String {
+        tables::text(self)
+    }
 }
 
 /// Breakdown of a trace's traffic for one configuration and order.
@@ -389,15 +385,6 @@ fn unique<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
         }
     }
     seen
-}
-
-/// The schema of the JSON object.
-#[cfg(feature = "testing")]
-pub fn schema() -> formats::schemas::Published {
-    use crate::schemas::WithRows;
-    formats::schemas::Published::of::<PaperJson<'_, '_>>(PAPER_SCHEMA)
-        .rows("rows", &crate::columns::headings(&PaperReport::figures()))
-        .rows("averages", &crate::columns::headings(&Average::columns()))
 }
 
 #[cfg(test)]

@@ -2,8 +2,10 @@
 
 use super::model::{Average, PaperReport};
 use crate::columns::{Column, Row, pick};
+use crate::errors::{self, Of};
 use crate::table::Table;
 use sim::result::Part;
+use std::fmt::Write as _;
 use studies::experiment::ResultRow;
 
 /// Table 2 of the paper with measured figures, and the paper's figures on the right for scenes that stand
@@ -137,6 +139,43 @@ pub(crate) fn busiest(parts: &[Part], most: usize) -> Vec<usize> {
         index.truncate(most);
     }
     index
+}
+
+/// The tables as text for a terminal.
+pub(super) fn text(report: &PaperReport) -> String {
+    let mut text = table_2(report).text();
+    let _ = write!(text, "\n{}", averages(&report.averages).text());
+    if let Some(table) = as_the_paper_counts(report) {
+        let _ = write!(
+            text,
+            "\nCounted as in the paper (--preset z2-paper): first look-ups, with merged requests; memory traffic is in the columns on the right\n{}",
+            table.text()
+        );
+    }
+    if let Some(table) = modes(report) {
+        let _ = write!(text, "\n{}", table.text());
+    }
+    let fit = &report.closed_form;
+    if fit.rows > 0 {
+        let _ = write!(
+            text,
+            "\nTMU utilisation against the paper's surface, at first look-ups: mean absolute deviation {:.2} points, maximum {:.2}, over {} rows\n",
+            fit.mean_absolute_points, fit.largest_points, fit.rows
+        );
+    }
+    text += &errors::text(Of::Textures);
+    for c in report
+        .conservation
+        .iter()
+        .filter(|c| c.differing.is_empty())
+    {
+        let _ = writeln!(
+            text,
+            "{}: {} runs replayed the same accesses ({})",
+            c.scene, c.runs, c.access_hash
+        );
+    }
+    text
 }
 
 #[cfg(test)]
