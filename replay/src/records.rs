@@ -38,6 +38,9 @@ pub trait Rows<R>: Sync {
     /// All tiles, in file order.
     fn places(&self) -> Vec<Self::At>;
 
+    /// Number of the pass or eye, and of the tile.
+    fn place(at: Self::At) -> (usize, usize);
+
     /// Appends the rows of a tile. `tile` is reused.
     ///
     /// # Errors
@@ -52,6 +55,10 @@ impl Rows<RecordRow> for Textrace {
 
     fn places(&self) -> Vec<Self::At> {
         tiles(&self.tables().passes).collect()
+    }
+
+    fn place(at: Self::At) -> (usize, usize) {
+        at
     }
 
     fn append(
@@ -111,6 +118,10 @@ impl<R: OfSample> Rows<R> for Raytrace {
 
     fn places(&self) -> Vec<Self::At> {
         ray_tiles(self.tables()).collect()
+    }
+
+    fn place((eye, tile): Self::At) -> (usize, usize) {
+        (eye as usize, tile as usize)
     }
 
     fn append(

@@ -2,10 +2,11 @@
 //! and the table of errors on reports.
 
 use super::answers;
-use super::columns::Column;
+use super::columns::{Column, Columns, columns_of};
 use super::document::Document;
 use super::errors::KnownError;
-use super::html::{self, Answer, Section};
+use super::html::{self, Answer, Page};
+use super::lists::unique;
 use super::plots::lines::Axis;
 use super::plots::scatter::{NamedPoint, ScatterChart};
 use super::plots::{PlotError, SeriesStyle};
@@ -44,10 +45,9 @@ fn mean_and_largest(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
 impl Measured {
     /// Columns of its choices. Times are optional because they differ from run to run.
     fn columns(&self, times: bool) -> Vec<Column<'static, Choice>> {
-        let mut columns = vec![
-            Column::text("scene", "on", |c: &Choice| c.scene.clone()),
-            Column::text("choice", "choice", |c: &Choice| c.name.clone()),
-        ];
+        let mut columns = columns_of::<Choice>()
+            .text("scene", "on", |c| c.scene.clone())
+            .text("choice", "choice", |c| c.name.clone());
         if times {
             columns.push(Column::real(
                 "time_ratio",
@@ -80,13 +80,7 @@ impl Measured {
 
     /// Names of its choices, in order of first occurrence.
     fn names(&self) -> Vec<&str> {
-        let mut names: Vec<&str> = Vec::new();
-        for choice in &self.choices {
-            if !names.contains(&choice.name.as_str()) {
-                names.push(&choice.name);
-            }
-        }
-        names
+        unique(self.choices.iter().map(|choice| choice.name.as_str()))
     }
 
     fn of<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Choice> {
@@ -174,10 +168,9 @@ struct StudyJson<'a> {
 
 impl Document for AccuracyReport {
     const SCHEMA: &'static str = "replay.accuracy/3";
-    type Json<'a> = AccuracyJson<'a>;
 
     /// Without times.
-    fn content(&self) -> AccuracyJson<'_> {
+    fn content(&self) -> impl Serialize {
         let study = |measured: &Measured| StudyJson {
             key: measured.study.key,
             title: measured.study.title,
@@ -203,14 +196,13 @@ impl Document for AccuracyReport {
             })
             .filter(|(_, choice, index)| choice.values[*index].is_some())
             .collect();
-        let columns = [
-            Column::text("study", "study", |l: &Line<'_>| l.0.key),
-            Column::text("choice", "choice", |l: &Line<'_>| l.1.name.clone()),
-            Column::text("scene", "scene", |l: &Line<'_>| l.1.scene.clone()),
-            Column::text("figure", "figure", |l: &Line<'_>| l.0.figures[l.2].key),
-            Column::real("value", "value", "", 6, |l: &Line<'_>| l.1.values[l.2]),
-            Column::text("unit", "unit", |l: &Line<'_>| l.0.figures[l.2].unit),
-        ];
+        let columns = columns_of::<Line<'_>>()
+            .text("study", "study", |l| l.0.key)
+            .text("choice", "choice", |l| l.1.name.clone())
+            .text("scene", "scene", |l| l.1.scene.clone())
+            .text("figure", "figure", |l| l.0.figures[l.2].key)
+            .real("value", "value", "", 6, |l| l.1.values[l.2])
+            .text("unit", "unit", |l| l.0.figures[l.2].unit);
         Table::new(&columns, &lines)
     }
 
@@ -241,12 +233,9 @@ impl AccuracyReport {
                 }
             })
             .collect();
-        let mut columns = vec![
-            Column::text("study", "study", |a: &Advice<'_>| a.study.title),
-            Column::text("recommended", "recommended", |a: &Advice<'_>| {
-                a.study.recommended
-            }),
-        ];
+        let mut columns = columns_of::<Advice<'_>>()
+            .text("study", "study", |a| a.study.title)
+            .text("recommended", "recommended", |a| a.study.recommended);
         if times {
             columns.push(Column::real(
                 "time_ratio",
@@ -256,17 +245,12 @@ impl AccuracyReport {
                 |a: &Advice<'_>| a.time,
             ));
         }
-        columns.extend([
-            Column::text("figure", "error of", |a: &Advice<'_>| {
-                a.study.figures[0].name
-            }),
-            Column::real("mean", "mean", "", 3, |a: &Advice<'_>| a.error.map(|e| e.0)),
-            Column::real("largest", "largest", "", 3, |a: &Advice<'_>| {
-                a.error.map(|e| e.1)
-            }),
-            Column::text("unit", "", |a: &Advice<'_>| a.study.figures[0].unit),
-            Column::text("reason", "because", |a: &Advice<'_>| a.study.reason),
-        ]);
+        columns = columns
+            .text("figure", "error of", |a| a.study.figures[0].name)
+            .real("mean", "mean", "", 3, |a| a.error.map(|e| e.0))
+            .real("largest", "largest", "", 3, |a| a.error.map(|e| e.1))
+            .text("unit", "", |a| a.study.figures[0].unit)
+            .text("reason", "because", |a| a.study.reason);
         Table::new(&columns, &advice)
     }
 
@@ -277,14 +261,11 @@ impl AccuracyReport {
             .flat_map(|m| m.choices.iter().map(|choice| (m.study, choice)))
             .filter(|(_, choice)| choice.time_ratio.is_some())
             .collect();
-        let columns = [
-            Column::text("study", "study", |l: &Line<'_>| l.0.key),
-            Column::text("choice", "choice", |l: &Line<'_>| l.1.name.clone()),
-            Column::text("scene", "scene", |l: &Line<'_>| l.1.scene.clone()),
-            Column::real("time_ratio", "time", "\u{d7}", 3, |l: &Line<'_>| {
-                l.1.time_ratio
-            }),
-        ];
+        let columns = columns_of::<Line<'_>>()
+            .text("study", "study", |l| l.0.key)
+            .text("choice", "choice", |l| l.1.name.clone())
+            .text("scene", "scene", |l| l.1.scene.clone())
+            .real("time_ratio", "time", "\u{d7}", 3, |l| l.1.time_ratio);
         Table::new(&columns, &lines).csv()
     }
 
@@ -337,7 +318,8 @@ impl AccuracyReport {
     /// # Errors
     /// A chart that cannot be drawn.
     pub fn page(&self) -> Result<String, PlotError> {
-        let mut sections = vec![Section::new(
+        let mut page = Page::default();
+        page.add(
             "What to choose",
             html! {
                 p { "The recommended choice of each study, its time over the time of the study's reference, and its error: mean and maximum over the scenes. Times differ from run to run." }
@@ -346,15 +328,13 @@ impl AccuracyReport {
                 @let keys = advice.headings.iter().map(|h| h.key.as_ref()).filter(|key| *key != "reason");
                 (advice.picked(keys).markup())
             },
-        )];
+        );
         for measured in &self.studies {
-            sections.push(Section::new(measured.study.title, section(measured)?));
+            page.add(measured.study.title, section(measured)?);
         }
         let about = html! { p { "Run time and error of faster methods (" (TOOL) "), measured one after another on one thread." } };
-        let chart = match self.studies.iter().find_map(Measured::chart) {
-            Some(chart) => html::figure(&chart.svg()?, ""),
-            None => html! {},
-        };
+        let chart = self.studies.iter().find_map(Measured::chart);
+        let chart = html::chart(chart.map(|chart| chart.svg()), "")?;
         let recommended: Vec<_> = (self.studies.iter())
             .map(|measured| {
                 let study = measured.study;
@@ -369,24 +349,17 @@ impl AccuracyReport {
             chart,
             about,
         };
-        Ok(html::page(
-            "Parallax: run time against error",
-            &answer,
-            &sections,
-        ))
+        Ok(page.text("Parallax: run time against error", &answer))
     }
 }
 
 fn section(measured: &Measured) -> Result<Markup, PlotError> {
     let study = measured.study;
-    let mut charts = Vec::new();
-    if let Some(chart) = measured.chart() {
-        charts.push((chart.svg()?, String::new()));
-    }
+    let chart = measured.chart().map(|chart| chart.svg());
     Ok(html! {
         p { (study.about) }
         p { "Recommended: " strong { (study.recommended) } ", " (study.reason) "." }
-        (html::figures(&charts))
+        (html::charts(chart)?)
         (measured.table().markup())
         p.note { "Time: " (study.time) "." }
     })

@@ -1,6 +1,6 @@
 //! Results for plain addresses: one row per configuration.
 
-use super::columns::{Column, Show};
+use super::columns::{Column, Columns, Show, columns_of};
 use super::document::Document;
 use super::memory_columns;
 use super::table::Table;
@@ -71,32 +71,30 @@ fn count<'a, 'r, V: super::columns::Cell>(
 /// Every column. Columns by kind of access are empty if all accesses are reads.
 fn columns<'a, 'r: 'a>() -> Vec<Column<'a, PointRow<'r>>> {
     let kib = |bytes: u64| bytes as f64 / 1024.0;
-    let mut columns = vec![
-        Column::real("line_bytes", "line", "B", 0, |r: &PointRow<'r>| {
+    let mut columns = columns_of::<PointRow<'r>>()
+        .real("line_bytes", "line", "B", 0, |r| {
             u64::from(r.point.config.line_bytes)
-        }),
-        Column::real("l1.kib", "L1", "KiB", 0, move |r: &PointRow<'r>| {
+        })
+        .real("l1.kib", "L1", "KiB", 0, move |r| {
             kib(r.point.config.level.l1.size_bytes)
-        }),
-        Column::real("l1.ways", "ways", "", 0, |r: &PointRow<'r>| {
+        })
+        .real("l1.ways", "ways", "", 0, |r| {
             u64::from(r.point.config.level.l1.ways)
-        }),
-        Column::text("l1.replacement", "policy", |r: &PointRow<'r>| {
+        })
+        .text("l1.replacement", "policy", |r| {
             r.point.config.level.l1.replacement.name()
-        }),
-    ];
+        });
     columns.extend(level("l1", "L1", |point| &point.l1));
-    columns.extend([
-        Column::real("l2.kib", "L2", "KiB", 0, move |r: &PointRow<'r>| {
+    columns = columns
+        .real("l2.kib", "L2", "KiB", 0, move |r| {
             kib(r.point.config.level.l2.size_bytes)
-        }),
-        Column::real("l2.ways", "ways", "", 0, |r: &PointRow<'r>| {
+        })
+        .real("l2.ways", "ways", "", 0, |r| {
             u64::from(r.point.config.level.l2.ways)
-        }),
-        Column::text("l2.replacement", "policy", |r: &PointRow<'r>| {
+        })
+        .text("l2.replacement", "policy", |r| {
             r.point.config.level.l2.replacement.name()
-        }),
-    ]);
+        });
     columns.extend(level("l2", "L2", |point| &point.l2));
     columns.push(
         Column::real(
@@ -170,12 +168,8 @@ pub struct AddressesJson<'a> {
 
 impl Document for AddressesReport<'_> {
     const SCHEMA: &'static str = "replay.addresses/2";
-    type Json<'a>
-        = AddressesJson<'a>
-    where
-        Self: 'a;
 
-    fn content(&self) -> AddressesJson<'_> {
+    fn content(&self) -> impl Serialize {
         AddressesJson {
             input: self.input,
             accesses: Accesses::new(&self.outcome.totals, self.outcome.unique_lines),

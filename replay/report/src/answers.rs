@@ -1,6 +1,7 @@
 //! The sentences at the top of pages, computed from the figures.
 
 use super::html::{change, count, list};
+use super::lists::{geometric_mean, mean};
 use studies::techniques::{LEAST_SAMPLES, Spread};
 
 /// Least and largest of named values; `None` if there are none.
@@ -220,17 +221,16 @@ pub fn reprojected(scenes: &[Reprojected]) -> Vec<String> {
     if scenes.is_empty() {
         return Vec::new();
     }
-    let mean = |of: &dyn Fn(&Reprojected) -> f64| {
-        let logs = scenes.iter().map(|s| of(s).max(f64::MIN_POSITIVE).ln());
-        (logs.sum::<f64>() / scenes.len() as f64).exp()
+    let geometric = |of: fn(&Reprojected) -> f64| {
+        let values = scenes.iter().map(|s| of(s).max(f64::MIN_POSITIVE));
+        geometric_mean(values).unwrap_or(1.0)
     };
-    let plain =
-        |of: &dyn Fn(&Reprojected) -> f64| scenes.iter().map(of).sum::<f64>() / scenes.len() as f64;
+    let plain = |of: fn(&Reprojected) -> f64| mean(scenes.iter().map(of)).unwrap_or(0.0);
     let of = match scenes {
         [one] => one.scene.clone(),
         _ => format!("the mean of {}", count(scenes.len(), "scene")),
     };
-    let (speed, energy) = (mean(&|s| s.performance), mean(&|s| s.energy));
+    let (speed, energy) = (geometric(|s| s.performance), geometric(|s| s.energy));
     let range = match ends(scenes, |s| s.energy) {
         Some((least, most)) if scenes.len() > 1 => {
             format!(
@@ -244,7 +244,7 @@ pub fn reprojected(scenes: &[Reprojected]) -> Vec<String> {
     let mut out = vec![
         format!(
             "In {of}, reprojection reuses {:.1} % of the right pixels, renders {speed:.2} times the frames per second of tracing both eyes, and takes {} energy{}{range}.",
-            plain(&|s| s.reuse_pct),
+            plain(|s| s.reuse_pct),
             change(energy, "less", "more", "the same"),
             if format!("{:.1}", energy.abs()) == "0.0" {
                 ""
@@ -254,13 +254,12 @@ pub fn reprojected(scenes: &[Reprojected]) -> Vec<String> {
         ),
         format!(
             "The right image differs from the traced one by a mean FLIP of {:.4}.",
-            plain(&|s| s.flip)
+            plain(|s| s.flip)
         ),
     ];
     let known: Vec<[f64; 2]> = scenes.iter().filter_map(|s| s.paper).collect();
     if !known.is_empty() {
-        let mean =
-            |i: usize| (known.iter().map(|p| p[i].ln()).sum::<f64>() / known.len() as f64).exp();
+        let mean = |i: usize| geometric_mean(known.iter().map(|p| p[i])).unwrap_or(1.0);
         let of = match known.len() {
             1 => "the scene that stands for one of its own".to_owned(),
             scenes => format!("the {scenes} scenes that stand for its own"),

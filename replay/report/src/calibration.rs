@@ -1,7 +1,7 @@
 //! Results of a calibration (`replay.calibration/2`): the error of each setting on the scenes it was chosen
 //! on and on the others.
 
-use super::columns::{Column, Row};
+use super::columns::{Column, Columns, Row, columns_of};
 use super::document::Document;
 use super::table::Table;
 use serde::Serialize;
@@ -29,28 +29,26 @@ fn title(settings: &[Setting]) -> String {
 impl Row for Trial {
     #[rustfmt::skip]
     fn columns() -> Vec<Column<'static, Self>> {
-        vec![
-            Column::text("settings", "settings", |t: &Self| title(&t.settings)),
-            Column::real("chosen_by", "scenes that choose", "RMS", 3, |t: &Self| t.chosen_by),
-            Column::real("held_out", "held out", "RMS", 3, |t: &Self| t.held_out),
-        ]
+        columns_of::<Self>()
+            .text("settings", "settings", |t| title(&t.settings))
+            .real("chosen_by", "scenes that choose", "RMS", 3, |t| t.chosen_by)
+            .real("held_out", "held out", "RMS", 3, |t| t.held_out)
     }
 }
 
 impl Row for SceneFit {
     #[rustfmt::skip]
     fn columns() -> Vec<Column<'static, Self>> {
-        vec![
-            Column::text("scene", "scene", |f: &Self| f.scene.clone()),
-            Column::text("held_out", "", |f: &Self| if f.held_out { "held out" } else { "chooses" }),
-            Column::real("surface", "surface", "points", 2, |f: &Self| f.surface_points),
-            Column::real("l1", "L1", "points", 2, |f: &Self| Some(f.table?.l1_points)),
-            Column::real("l2", "L2", "points", 2, |f: &Self| Some(f.table?.l2_points)),
-            Column::real("tmu", "TMU", "points", 2, |f: &Self| f.table?.tmu_points),
-            Column::real("saved", "saved", "points", 2, |f: &Self| Some(f.table?.saved_points)),
-            Column::real("slope", "slope", "", 3, |f: &Self| Some(f.table?.slope)),
-            Column::real("total", "all parts", "of the table's spread", 3, |f: &Self| Some(f.table?.total)),
-        ]
+        columns_of::<Self>()
+            .text("scene", "scene", |f| f.scene.clone())
+            .text("held_out", "", |f| if f.held_out { "held out" } else { "chooses" })
+            .real("surface", "surface", "points", 2, |f| f.surface_points)
+            .real("l1", "L1", "points", 2, |f| Some(f.table?.l1_points))
+            .real("l2", "L2", "points", 2, |f| Some(f.table?.l2_points))
+            .real("tmu", "TMU", "points", 2, |f| f.table?.tmu_points)
+            .real("saved", "saved", "points", 2, |f| Some(f.table?.saved_points))
+            .real("slope", "slope", "", 3, |f| Some(f.table?.slope))
+            .real("total", "all parts", "of the table's spread", 3, |f| Some(f.table?.total))
     }
 }
 
@@ -72,9 +70,8 @@ impl CalibrationReport {
 
 impl Document for CalibrationReport {
     const SCHEMA: &'static str = "replay.calibration/2";
-    type Json<'a> = &'a Self;
 
-    fn content(&self) -> &Self {
+    fn content(&self) -> impl Serialize {
         self
     }
 

@@ -62,7 +62,10 @@ macro_rules! cell {
 cell!(String, Text, Value::Text);
 cell!(&str, Text, |text: &str| Value::Text(text.to_owned()));
 cell!(bool, Flag, Value::Flag);
+cell!(u8, Whole, |n: u8| Value::Whole(n.into()));
+cell!(u32, Whole, |n: u32| Value::Whole(n.into()));
 cell!(u64, Whole, Value::Whole);
+cell!(f32, Real, |x: f32| Value::Real(x.into()));
 cell!(f64, Real, Value::Real);
 
 /// A name and its title.
@@ -207,8 +210,8 @@ pub struct Column<'a, R: ?Sized> {
 impl<'a, R: ?Sized> Column<'a, R> {
     /// A column with this number format and unit.
     pub fn new<V: Cell>(
-        key: impl Into<Cow<'static, str>>,
-        name: impl Into<Cow<'static, str>>,
+        key: impl Into<Name>,
+        name: impl Into<Name>,
         unit: &'static str,
         show: Show,
         value: impl Fn(&R) -> V + 'a,
@@ -243,8 +246,8 @@ impl<'a, R: ?Sized> Column<'a, R> {
 
     /// A column of text.
     pub fn text<V: Cell>(
-        key: impl Into<Cow<'static, str>>,
-        name: impl Into<Cow<'static, str>>,
+        key: impl Into<Name>,
+        name: impl Into<Name>,
         value: impl Fn(&R) -> V + 'a,
     ) -> Self {
         Self::new(key, name, "", Show::Text, value)
@@ -252,8 +255,8 @@ impl<'a, R: ?Sized> Column<'a, R> {
 
     /// A column of measures with this many decimals.
     pub fn real<V: Cell>(
-        key: impl Into<Cow<'static, str>>,
-        name: impl Into<Cow<'static, str>>,
+        key: impl Into<Name>,
+        name: impl Into<Name>,
         unit: &'static str,
         decimals: usize,
         value: impl Fn(&R) -> V + 'a,
@@ -279,7 +282,7 @@ impl<'a, R: ?Sized> Column<'a, R> {
     }
 
     /// Sets the group of columns in tables of a page.
-    pub fn group(mut self, group: impl Into<Cow<'static, str>>) -> Self {
+    pub fn group(mut self, group: impl Into<Name>) -> Self {
         self.heading.group = group.into();
         self
     }
@@ -299,6 +302,99 @@ impl<'a, R: ?Sized> Column<'a, R> {
     /// The cell of a row.
     pub fn value(&self, row: &R) -> Value {
         (self.value)(row)
+    }
+}
+
+/// Text that is fixed or computed.
+type Name = Cow<'static, str>;
+
+/// An empty list of columns of rows of type `R`; [`Columns`] adds to it.
+pub fn columns_of<'a, R: ?Sized>() -> Vec<Column<'a, R>> {
+    Vec::new()
+}
+
+/// Adds columns to a list. A definition and a mark belong to the column before them.
+pub trait Columns<'a, R: ?Sized>: Sized {
+    /// Adds a column.
+    #[must_use]
+    fn and(self, column: Column<'a, R>) -> Self;
+
+    /// Changes the last column.
+    #[must_use]
+    fn change_last(self, change: impl FnOnce(Column<'a, R>) -> Column<'a, R>) -> Self;
+
+    /// Adds a column with this number format.
+    #[must_use]
+    fn shown<V: Cell>(
+        self,
+        key: impl Into<Name>,
+        name: impl Into<Name>,
+        unit: &'static str,
+        show: Show,
+        value: impl Fn(&R) -> V + 'a,
+    ) -> Self {
+        self.and(Column::new(key, name, unit, show, value))
+    }
+
+    /// Adds a column of text.
+    #[must_use]
+    fn text<V: Cell>(
+        self,
+        key: impl Into<Name>,
+        name: impl Into<Name>,
+        value: impl Fn(&R) -> V + 'a,
+    ) -> Self {
+        self.shown(key, name, "", Show::Text, value)
+    }
+
+    /// Adds a column of measures with this many decimals.
+    #[must_use]
+    fn real<V: Cell>(
+        self,
+        key: impl Into<Name>,
+        name: impl Into<Name>,
+        unit: &'static str,
+        decimals: usize,
+        value: impl Fn(&R) -> V + 'a,
+    ) -> Self {
+        self.shown(key, name, unit, Show::Decimals(decimals), value)
+    }
+
+    /// Adds a column of counts.
+    #[must_use]
+    fn whole<V: Cell>(
+        self,
+        key: impl Into<Name>,
+        name: impl Into<Name>,
+        unit: &'static str,
+        value: impl Fn(&R) -> V + 'a,
+    ) -> Self {
+        self.shown(key, name, unit, Show::Whole, value)
+    }
+
+    /// Sets the definition of the figure.
+    #[must_use]
+    fn about(self, about: &'static str) -> Self {
+        self.change_last(|column| column.about(about))
+    }
+
+    /// Marks published figures.
+    #[must_use]
+    fn published(self) -> Self {
+        self.change_last(Column::published)
+    }
+}
+
+impl<'a, R: ?Sized> Columns<'a, R> for Vec<Column<'a, R>> {
+    fn and(mut self, column: Column<'a, R>) -> Self {
+        self.push(column);
+        self
+    }
+
+    fn change_last(mut self, change: impl FnOnce(Column<'a, R>) -> Column<'a, R>) -> Self {
+        let last = self.pop().map(change);
+        self.extend(last);
+        self
     }
 }
 
@@ -340,15 +436,9 @@ mod tests {
 
     impl Row for Point {
         fn columns() -> Vec<Column<'static, Self>> {
-            vec![
-                Column::new("misses", "misses", "M", Show::Millions(1), |p: &Self| {
-                    p.misses
-                }),
-                Column::real("paper.rate", "paper", "%", 2, |p: &Self| p.paper).published(),
-                Column::real("paper.half", "half", "%", 2, |p: &Self| {
-                    p.paper.map(|x| x / 2.0)
-                }),
-            ]
+            columns_of::<Self>()
+                .real("misses", "misses", "M", 1, |p| p.misses)
+                .real("paper.half", "half", "%", 2, |p| p.paper.map(|x| x / 2.0))
         }
     }
 

@@ -1,6 +1,6 @@
 //! Results of comparing two captures (`replay.compare/2`).
 
-use super::columns::{Column, Row, Show, Value};
+use super::columns::{Column, Columns, Row, Value, columns_of};
 use super::document::Document;
 use super::table::Table;
 use formats::textrace::TraceMeta;
@@ -61,40 +61,38 @@ impl Row for Replayed<'_> {
     #[rustfmt::skip]
     fn columns() -> Vec<Column<'static, Self>> {
         let bytes = |r: &Self, side: usize| r.results[side].external_bytes;
-        vec![
-            Column::text("order", "order", |r: &Self| Value::Named(r.order.name(), r.order.title())),
-            Column::real("a.l1_footprint_miss_pct", "A: L1", "% of footprints", 3, |r: &Self| 100.0 * r.results[0].l1.footprint_miss_rate),
-            Column::real("a.l2_line_miss_pct", "A: L2", "% of lines", 3, |r: &Self| 100.0 * r.results[0].l2.line_miss_rate),
-            Column::new("a.external_bytes", "A: external", "bytes", Show::Whole, move |r: &Self| bytes(r, 0)),
-            Column::real("a.reduction_pct", "A: saved", "% of Morton", 2, |r: &Self| saved_pct(r, 0)),
-            Column::real("b.l1_footprint_miss_pct", "B: L1", "% of footprints", 3, |r: &Self| 100.0 * r.results[1].l1.footprint_miss_rate),
-            Column::real("b.l2_line_miss_pct", "B: L2", "% of lines", 3, |r: &Self| 100.0 * r.results[1].l2.line_miss_rate),
-            Column::new("b.external_bytes", "B: external", "bytes", Show::Whole, move |r: &Self| bytes(r, 1)),
-            Column::real("b.reduction_pct", "B: saved", "% of Morton", 2, |r: &Self| saved_pct(r, 1)),
-            Column::real("l1_miss_over_pct", "L1 miss", "B/A \u{2212} 1, %", 3, |r: &Self| over_pct(r.results.map(|x| x.l1.footprint_miss_rate))),
-            Column::real("l2_miss_over_pct", "L2 miss", "B/A \u{2212} 1, %", 3, |r: &Self| over_pct(r.results.map(|x| x.l2.line_miss_rate))),
-            Column::real("external_over_pct", "external", "B/A \u{2212} 1, %", 3, |r: &Self| over_pct(r.results.map(|x| x.external_bytes as f64))),
-        ]
+        columns_of::<Self>()
+            .text("order", "order", |r| Value::Named(r.order.name(), r.order.title()))
+            .real("a.l1_footprint_miss_pct", "A: L1", "% of footprints", 3, |r| 100.0 * r.results[0].l1.footprint_miss_rate)
+            .real("a.l2_line_miss_pct", "A: L2", "% of lines", 3, |r| 100.0 * r.results[0].l2.line_miss_rate)
+            .whole("a.external_bytes", "A: external", "bytes", move |r| bytes(r, 0))
+            .real("a.reduction_pct", "A: saved", "% of Morton", 2, |r| saved_pct(r, 0))
+            .real("b.l1_footprint_miss_pct", "B: L1", "% of footprints", 3, |r| 100.0 * r.results[1].l1.footprint_miss_rate)
+            .real("b.l2_line_miss_pct", "B: L2", "% of lines", 3, |r| 100.0 * r.results[1].l2.line_miss_rate)
+            .whole("b.external_bytes", "B: external", "bytes", move |r| bytes(r, 1))
+            .real("b.reduction_pct", "B: saved", "% of Morton", 2, |r| saved_pct(r, 1))
+            .real("l1_miss_over_pct", "L1 miss", "B/A \u{2212} 1, %", 3, |r| over_pct(r.results.map(|x| x.l1.footprint_miss_rate)))
+            .real("l2_miss_over_pct", "L2 miss", "B/A \u{2212} 1, %", 3, |r| over_pct(r.results.map(|x| x.l2.line_miss_rate)))
+            .real("external_over_pct", "external", "B/A \u{2212} 1, %", 3, |r| over_pct(r.results.map(|x| x.external_bytes as f64)))
     }
 }
 
 impl Row for Class {
     #[rustfmt::skip]
     fn columns() -> Vec<Column<'static, Self>> {
-        vec![
-            Column::text("name", "fragments", |c: &Self| c.name.clone()),
-            Column::new("fragments_in_both", "in both", "", Show::Whole, |c: &Self| c.tally.fragments_in_both),
-            Column::new("fragments_only_in_a", "only A", "", Show::Whole, |c: &Self| c.tally.fragments_only_in_a),
-            Column::new("fragments_only_in_b", "only B", "", Show::Whole, |c: &Self| c.tally.fragments_only_in_b),
-            Column::real("iou_pct", "both / either", "%", 4, |c: &Self| c.tally.intersection_over_union_pct()),
-            Column::real("uv_mean", "uv mean", "texels", 5, |c: &Self| c.tally.uv_texels.mean()),
-            Column::real("uv_99", "uv 99 %", "texels", 4, |c: &Self| c.tally.uv_texels.percentile(99.0)),
-            Column::real("uv_largest", "uv largest", "texels", 3, |c: &Self| c.tally.uv_texels.largest()),
-            Column::real("lod_mean", "LOD mean", "levels", 5, |c: &Self| c.tally.lod_levels.mean()),
-            Column::real("lod_largest", "LOD largest", "levels", 3, |c: &Self| c.tally.lod_levels.largest()),
-            Column::real("footprints_pct", "footprints", "% differ", 3, |c: &Self| c.tally.footprints_that_differ_pct()),
-            Column::new("sampled_differently", "other sample", "lanes", Show::Whole, |c: &Self| c.tally.lanes_sampled_differently),
-        ]
+        columns_of::<Self>()
+            .text("name", "fragments", |c| c.name.clone())
+            .whole("fragments_in_both", "in both", "", |c| c.tally.fragments_in_both)
+            .whole("fragments_only_in_a", "only A", "", |c| c.tally.fragments_only_in_a)
+            .whole("fragments_only_in_b", "only B", "", |c| c.tally.fragments_only_in_b)
+            .real("iou_pct", "both / either", "%", 4, |c| c.tally.intersection_over_union_pct())
+            .real("uv_mean", "uv mean", "texels", 5, |c| c.tally.uv_texels.mean())
+            .real("uv_99", "uv 99 %", "texels", 4, |c| c.tally.uv_texels.percentile(99.0))
+            .real("uv_largest", "uv largest", "texels", 3, |c| c.tally.uv_texels.largest())
+            .real("lod_mean", "LOD mean", "levels", 5, |c| c.tally.lod_levels.mean())
+            .real("lod_largest", "LOD largest", "levels", 3, |c| c.tally.lod_levels.largest())
+            .real("footprints_pct", "footprints", "% differ", 3, |c| c.tally.footprints_that_differ_pct())
+            .whole("sampled_differently", "other sample", "lanes", |c| c.tally.lanes_sampled_differently)
     }
 }
 
@@ -113,12 +111,8 @@ pub struct CompareJson<'a> {
 
 impl Document for CompareReport<'_> {
     const SCHEMA: &'static str = "replay.compare/2";
-    type Json<'a>
-        = CompareJson<'a>
-    where
-        Self: 'a;
 
-    fn content(&self) -> CompareJson<'_> {
+    fn content(&self) -> impl Serialize {
         let [a, b] = &self.sides;
         CompareJson {
             a,

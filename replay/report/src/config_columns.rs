@@ -1,7 +1,7 @@
 //! Columns that identify a row in any file: trace, image size, and every configuration key. Rows of several
 //! files can be joined by them.
 
-use super::columns::{Figure, Value};
+use super::columns::{Columns, Figure, Value, columns_of};
 use formats::texture::Sampler;
 use serde::Serialize;
 use sim::config::{LevelConfig, RunConfig};
@@ -16,27 +16,26 @@ fn name(value: &impl Serialize) -> String {
 
 /// The trace.
 pub fn trace<'a>() -> Vec<Figure<'a>> {
-    vec![
-        Figure::text("label", "scene", |r| r.subject.label.clone())
-            .about("short name in this file; it depends on the other traces in the file"),
-        Figure::text("trace", "trace", |r| r.subject.id.name.clone())
-            .about("name of the trace's file without folder and extension"),
-        Figure::text("checksum", "checksum", |r| r.subject.id.checksum.clone())
-            .about("checksum of the trace's content"),
-        Figure::text("scene", "scene", |r| scene_label(r.subject.source.tables())),
-        Figure::text("camera", "camera", |r| r.subject.id.camera.clone()),
-        Figure::text("display", "display", |r| r.subject.id.display.clone()),
-        Figure::text("width_px", "width", |r| {
+    columns_of::<ResultRow>()
+        .text("label", "scene", |r| r.subject.label.clone())
+        .about("short name in this file; it depends on the other traces in the file")
+        .text("trace", "trace", |r| r.subject.id.name.clone())
+        .about("name of the trace's file without folder and extension")
+        .text("checksum", "checksum", |r| r.subject.id.checksum.clone())
+        .about("checksum of the trace's content")
+        .text("scene", "scene", |r| scene_label(r.subject.source.tables()))
+        .text("camera", "camera", |r| r.subject.id.camera.clone())
+        .text("display", "display", |r| r.subject.id.display.clone())
+        .text("width_px", "width", |r| {
             u64::from(r.subject.id.eye_size_px[0])
         })
-        .about("image width per eye in pixels"),
-        Figure::text("height_px", "height", |r| {
+        .about("image width per eye in pixels")
+        .text("height_px", "height", |r| {
             u64::from(r.subject.id.eye_size_px[1])
         })
-        .about("image height per eye in pixels"),
-        Figure::text("model_version", "model", |_| u64::from(MODEL_VERSION))
-            .about("version of the models; counts of different versions cannot be compared"),
-    ]
+        .about("image height per eye in pixels")
+        .text("model_version", "model", |_| MODEL_VERSION)
+        .about("version of the models; counts of different versions cannot be compared")
 }
 
 /// Largest anisotropy of all samples of a row; none if the recorded samplers decide and differ from 1.
@@ -61,10 +60,10 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         let of = move |r: &ResultRow| *level(&r.point.config);
         [
             Figure::text(size_bytes, size_bytes, move |r: &ResultRow| of(r).size_bytes),
-            Figure::text(ways, ways, move |r: &ResultRow| u64::from(of(r).ways)),
+            Figure::text(ways, ways, move |r: &ResultRow| of(r).ways),
             Figure::text(replacement, replacement, move |r: &ResultRow| of(r).replacement.name()),
-            Figure::text(sectors, sectors, move |r: &ResultRow| u64::from(of(r).sectors)),
-            Figure::text(victim_lines, victim_lines, move |r: &ResultRow| u64::from(of(r).victim_lines)),
+            Figure::text(sectors, sectors, move |r: &ResultRow| of(r).sectors),
+            Figure::text(victim_lines, victim_lines, move |r: &ResultRow| of(r).victim_lines),
         ]
     }
     let mut columns = vec![
@@ -74,20 +73,20 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
             Value::Named(order.name(), order.title())
         }),
         key("seed", |c| c.seed),
-        key("cores", |c| u64::from(c.cores)),
+        key("cores", |c| c.cores),
         key("assign", |c| name(&c.assign)),
-        key("line_bytes", |c| u64::from(c.line_bytes)),
+        key("line_bytes", |c| c.line_bytes),
     ];
     columns.extend(cache(["l1.size_bytes", "l1.ways", "l1.replacement", "l1.sectors", "l1.victim_lines"], |c| &c.level.l1));
     columns.extend(cache(["l2.size_bytes", "l2.ways", "l2.replacement", "l2.sectors", "l2.victim_lines"], |c| &c.level.l2));
     columns.extend([
         key("l2.inclusion", |c| name(&c.level.l2.inclusion)),
         key("l2.shared", |c| c.level.l2.shared),
-        key("l2.hit_cycles", |c| u64::from(c.level.l2.hit_cycles)),
+        key("l2.hit_cycles", |c| c.level.l2.hit_cycles),
         key("level", |c| c.level.lower_text(c.line_bytes)),
-        key("memory_cycles", |c| u64::from(c.memory_cycles)),
+        key("memory_cycles", |c| c.memory_cycles),
         key("sampling.filter", |c| name(&c.sampling.filter)),
-        key("sampling.lod_bias", |c| f64::from(c.sampling.lod_bias)),
+        key("sampling.lod_bias", |c| c.sampling.lod_bias),
         key("sampling.lod", |c| name(&c.sampling.lod)),
         key("sampling.helper_lanes", |c| c.sampling.helper_lanes),
         Figure::text("sampling.max_anisotropy", "sampling.max_anisotropy", max_anisotropy),
@@ -98,41 +97,41 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         key("layout.base_align_bytes", |c| c.layout.base_align_bytes),
         key("layout.texture_order", |c| name(&c.layout.texture_order)),
         key("tmu.model", |c| name(&c.tmu.model)),
-        key("tmu.loop_cycles", |c| u64::from(c.tmu.loop_cycles)),
-        key("tmu.threads", |c| u64::from(c.tmu.threads)),
-        key("tmu.retry_footprints", |c| u64::from(c.tmu.retry_footprints)),
-        key("tmu.fetches_per_trip", |c| u64::from(c.tmu.fetches_per_trip)),
+        key("tmu.loop_cycles", |c| c.tmu.loop_cycles),
+        key("tmu.threads", |c| c.tmu.threads),
+        key("tmu.retry_footprints", |c| c.tmu.retry_footprints),
+        key("tmu.fetches_per_trip", |c| c.tmu.fetches_per_trip),
         key("tmu.allocation", |c| name(&c.tmu.allocation)),
-        key("tmu.l2_mshrs", |c| u64::from(c.tmu.l2_mshrs)),
-        key("tmu.fifo_footprints", |c| u64::from(c.tmu.fifo_footprints)),
-        key("tile_px", |c| u64::from(c.tile_px)),
+        key("tmu.l2_mshrs", |c| c.tmu.l2_mshrs),
+        key("tmu.fifo_footprints", |c| c.tmu.fifo_footprints),
+        key("tile_px", |c| c.tile_px),
         key("tile_maps", |c| c.tile_maps),
         key("count_by", |c| name(&c.count_by)),
         key("hsr", |c| name(&c.hsr)),
         key("between_frames", |c| name(&c.between_frames)),
         key("prefetch.prefetcher", |c| c.prefetch.map(|p| p.prefetcher.name())),
-        key("prefetch.lines", |c| c.prefetch.map(|p| u64::from(p.lines()))),
+        key("prefetch.lines", |c| c.prefetch.map(|p| p.lines())),
         key("dram.preset", |c| c.dram.map(|dram| name(&dram.preset))),
-        key("dram.channels", |c| c.dram.map(|dram| u64::from(dram.channels))),
+        key("dram.channels", |c| c.dram.map(|dram| dram.channels)),
         key("dram.mapping", |c| c.dram.map(|dram| name(&dram.mapping))),
         key("dram.page_policy", |c| c.dram.map(|dram| name(&dram.page_policy))),
-        key("dram.queue", |c| c.dram.map(|dram| u64::from(dram.queue))),
-        key("dram.core_mhz", |c| c.dram.map(|dram| u64::from(dram.core_mhz))),
+        key("dram.queue", |c| c.dram.map(|dram| dram.queue)),
+        key("dram.core_mhz", |c| c.dram.map(|dram| dram.core_mhz)),
         key("frame.machine", |c| c.frame.map(|frame| name(&frame.machine))),
         key("frame.multiview", |c| c.frame.map(|frame| frame.multiview)),
         key("frame.composition", |c| c.frame.map(|frame| frame.composition)),
-        key("frame.color_bytes", |c| c.frame.map(|frame| u64::from(frame.color_bytes))),
-        key("frame.color_compressed_permille", |c| c.frame.map(|frame| u64::from(frame.color_compressed_permille))),
-        key("frame.depth_bytes", |c| c.frame.map(|frame| u64::from(frame.depth_bytes))),
-        key("frame.g_buffer_bytes", |c| c.frame.map(|frame| u64::from(frame.g_buffer_bytes))),
-        key("frame.samples", |c| c.frame.map(|frame| u64::from(frame.samples))),
+        key("frame.color_bytes", |c| c.frame.map(|frame| frame.color_bytes)),
+        key("frame.color_compressed_permille", |c| c.frame.map(|frame| frame.color_compressed_permille)),
+        key("frame.depth_bytes", |c| c.frame.map(|frame| frame.depth_bytes)),
+        key("frame.g_buffer_bytes", |c| c.frame.map(|frame| frame.g_buffer_bytes)),
+        key("frame.samples", |c| c.frame.map(|frame| frame.samples)),
         key("frame.store_depth", |c| c.frame.map(|frame| frame.store_depth)),
-        key("frame.line_bytes", |c| c.frame.map(|frame| u64::from(frame.line_bytes))),
-        key("frame.post_transform_entries", |c| c.frame.map(|frame| u64::from(frame.post_transform_entries))),
+        key("frame.line_bytes", |c| c.frame.map(|frame| frame.line_bytes)),
+        key("frame.post_transform_entries", |c| c.frame.map(|frame| frame.post_transform_entries)),
         key("frame.vertex_cache_bytes", |c| c.frame.map(|frame| frame.vertex_cache_bytes)),
-        key("frame.varying_bytes", |c| c.frame.map(|frame| u64::from(frame.varying_bytes))),
+        key("frame.varying_bytes", |c| c.frame.map(|frame| frame.varying_bytes)),
         key("frame.shaded_vertex_cache_bytes", |c| c.frame.map(|frame| frame.shaded_vertex_cache_bytes)),
-        key("frame.list_entry_bytes", |c| c.frame.map(|frame| u64::from(frame.list_entry_bytes))),
+        key("frame.list_entry_bytes", |c| c.frame.map(|frame| frame.list_entry_bytes)),
         key("frame.pixel_cache_bytes", |c| c.frame.map(|frame| frame.pixel_cache_bytes)),
     ]);
     columns
@@ -140,18 +139,17 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
 
 /// The key that this row changes, if any.
 pub fn change<'a>() -> Vec<Figure<'a>> {
-    vec![
-        Figure::text("change.key", "change", |r| {
+    columns_of::<ResultRow>()
+        .text("change.key", "change", |r| {
             let (key, _) = r.point.change.as_ref()?;
             Some(key.clone())
         })
-        .about("configuration key that only this row changes"),
-        Figure::text("change.value", "to", |r| {
+        .about("configuration key that only this row changes")
+        .text("change.value", "to", |r| {
             let (_, value) = r.point.change.as_ref()?;
             Some(plain(value))
         })
-        .about("value of the changed key"),
-    ]
+        .about("value of the changed key")
 }
 
 #[cfg(test)]

@@ -17,12 +17,7 @@ pub trait Document {
     const FILES_BESIDE_PAGE: bool = true;
 
     /// Members of the JSON object after its schema and versions.
-    type Json<'a>: Serialize
-    where
-        Self: 'a;
-
-    /// The members of the JSON object.
-    fn content(&self) -> Self::Json<'_>;
+    fn content(&self) -> impl Serialize;
 
     /// The rows in full precision.
     fn rows(&self) -> Table;
@@ -82,12 +77,9 @@ impl<T> Envelope<T> {
     }
 }
 
-/// The schema of a document's JSON object.
+/// The schema of a document's JSON object, which has these members.
 #[cfg(feature = "testing")]
-pub fn published<D: Document + 'static>() -> formats::schemas::Published
-where
-    D::Json<'static>: schemars::JsonSchema,
-{
-    let published = formats::schemas::Published::of::<Envelope<D::Json<'static>>>(D::SCHEMA);
+pub fn published<D: Document, Members: schemars::JsonSchema>() -> formats::schemas::Published {
+    let published = formats::schemas::Published::of::<Envelope<Members>>(D::SCHEMA);
     crate::schemas::with_tables(published, D::tables())
 }

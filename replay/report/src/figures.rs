@@ -1,6 +1,6 @@
 //! The figures of a replayed point, one per line. Every table, file and chart takes them from here.
 
-use super::columns::{Column, Figure, Row, Show, over, pick};
+use super::columns::{Column, Columns, Figure, Row, Show, columns_of, over, pick};
 use super::{config_columns, memory_columns};
 use formats::texture::TexelFormat;
 use sim::result::ClientTraffic;
@@ -12,12 +12,11 @@ use studies::experiment::ResultRow;
 /// configuration.
 fn identity<'a>() -> Vec<Figure<'a>> {
     let mut columns = config_columns::trace();
-    columns.extend([
-        Figure::text("twin", "stands for", |r| r.subject.stand_in_for),
-        Figure::real("caches", "L1/L2", "KiB", 0, ResultRow::caches_title),
-        Figure::real("l1_kib", "L1", "KiB", 0, |r| r.caches_kib().0),
-        Figure::real("l2_kib", "L2", "KiB", 0, |r| r.caches_kib().1),
-    ]);
+    columns = columns
+        .text("twin", "stands for", |r| r.subject.stand_in_for)
+        .real("caches", "L1/L2", "KiB", 0, ResultRow::caches_title)
+        .real("l1_kib", "L1", "KiB", 0, |r| r.caches_kib().0)
+        .real("l2_kib", "L2", "KiB", 0, |r| r.caches_kib().1);
     columns.extend(config_columns::config());
     columns
 }
@@ -25,62 +24,60 @@ fn identity<'a>() -> Vec<Figure<'a>> {
 /// Counts and derived figures.
 #[rustfmt::skip]
 pub fn figures<'a>() -> Vec<Figure<'a>> {
-    let mut figures = vec![
-        Figure::real("l1_footprint_miss_pct", "L1 miss", "% of footprints", 2, |r| 100.0 * r.result.l1.footprint_miss_rate)
-            .about("footprints with a missing line"),
-        Figure::real("l2_line_miss_pct", "L2 miss", "% of lines", 2, |r| 100.0 * r.result.l2.line_miss_rate)
-            .about("line look-ups of the L2 that miss"),
-        Figure::real("tmu_util_pct", "TMU", "%", 2, |r| tmu_util_pct(r.result))
-            .about("percentage of cycles in which a footprint leaves the texture unit"),
-        Figure::real("tmu_ratio", "TMU", "\u{d7} Morton", 3, |r| Some(utilization(r.result)? / utilization(r.morton?)?))
-            .about("utilisation over the utilisation in Morton order"),
-        Figure::real("reduction_pct", "saved", "% of Morton", 1, |r| r.saved_pct(r.morton))
-            .about("external traffic saved against Morton order with all other settings equal"),
-        Figure::real("external_bytes", "external", "bytes", 0, |r| r.result.external_bytes)
-            .about("lines from memory times the line size of the last level, all frames"),
-        Figure::real("external_mb_per_frame", "external", "MB/frame", 2, |r| r.mb_per_frame(r.result.external_bytes))
-            .about("external texture traffic"),
-        Figure::real("bound_mb_per_frame", "bound", "MB/frame", 2, |r| r.mb_per_frame(r.bound_bytes()))
-            .about("external traffic of an infinite cache"),
-        Figure::real("over_bound", "external", "\u{d7} bound", 2, |r| over(r.result.external_bytes, r.bound_bytes()))
-            .about("external traffic over the bound"),
-        Figure::real("over_base", "external", "\u{d7} base", 3, |r| over(r.result.external_bytes, r.unchanged?.external_bytes))
-            .about("external traffic over that of the settings without the change"),
-        Figure::real("static_footprints_per_pixel", "static", "footprints/pixel", 2, |r| complexity(r, false))
-            .about("footprints of loaded textures per covered pixel: static texture complexity (Z2 paper, table 1)"),
-        Figure::real("dynamic_footprints_per_pixel", "dynamic", "footprints/pixel", 2, |r| complexity(r, true))
-            .about("footprints of shadow maps per covered pixel: dynamic texture complexity (Z2 paper, table 1)"),
-        Figure::real("first_l1_footprint_miss_pct", "first L1", "% of footprints", 2, |r| first_l1_pct(r.result))
-            .about("footprints whose first look-up found a line absent or in flight"),
-        Figure::real("first_l2_line_miss_pct", "first L2", "% of lines", 2, |r| first_l2_pct(r.result))
-            .about("lines of these look-ups that were absent from the L2, merged requests counted"),
-        Figure::real("closed_form_util_pct", "TMU fit", "%", 2, |r| closed_form_pct(r.result))
-            .about("utilisation that the Z2 paper's table implies for the rates of first look-ups"),
-        Figure::real("closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| deviation_points(r.result))
-            .about("simulated utilisation minus the utilisation that the Z2 paper's table implies for the rates of first look-ups"),
-        Figure::real("prefetch_coverage_pct", "covered", "% of L2 misses", 1, |r| { let useful = r.result.memory.prefetch?.useful_lines; Some(100.0 * over(useful, useful + r.result.l2.counters.line_misses)?) })
-            .about("useful prefetches as a share of useful prefetches and L2 line misses"),
-        Figure::real("l2_stalled_misses_pct", "stalled", "% of L2 misses", 2, |r| { let stalled = r.result.memory.l2_mshrs?.stalled_misses; Some(100.0 * over(stalled, r.result.l2.counters.line_misses)?) })
-            .about("L2 misses that were delayed because all MSHRs were in use"),
-    ];
+    let mut figures = columns_of::<ResultRow>()
+        .real("l1_footprint_miss_pct", "L1 miss", "% of footprints", 2, |r| 100.0 * r.result.l1.footprint_miss_rate)
+            .about("footprints with a missing line")
+        .real("l2_line_miss_pct", "L2 miss", "% of lines", 2, |r| 100.0 * r.result.l2.line_miss_rate)
+            .about("line look-ups of the L2 that miss")
+        .real("tmu_util_pct", "TMU", "%", 2, |r| tmu_util_pct(r.result))
+            .about("percentage of cycles in which a footprint leaves the texture unit")
+        .real("tmu_ratio", "TMU", "\u{d7} Morton", 3, |r| Some(utilization(r.result)? / utilization(r.morton?)?))
+            .about("utilisation over the utilisation in Morton order")
+        .real("reduction_pct", "saved", "% of Morton", 1, |r| r.saved_pct(r.morton))
+            .about("external traffic saved against Morton order with all other settings equal")
+        .real("external_bytes", "external", "bytes", 0, |r| r.result.external_bytes)
+            .about("lines from memory times the line size of the last level, all frames")
+        .real("external_mb_per_frame", "external", "MB/frame", 2, |r| r.mb_per_frame(r.result.external_bytes))
+            .about("external texture traffic")
+        .real("bound_mb_per_frame", "bound", "MB/frame", 2, |r| r.mb_per_frame(r.bound_bytes()))
+            .about("external traffic of an infinite cache")
+        .real("over_bound", "external", "\u{d7} bound", 2, |r| over(r.result.external_bytes, r.bound_bytes()))
+            .about("external traffic over the bound")
+        .real("over_base", "external", "\u{d7} base", 3, |r| over(r.result.external_bytes, r.unchanged?.external_bytes))
+            .about("external traffic over that of the settings without the change")
+        .real("static_footprints_per_pixel", "static", "footprints/pixel", 2, |r| complexity(r, false))
+            .about("footprints of loaded textures per covered pixel: static texture complexity (Z2 paper, table 1)")
+        .real("dynamic_footprints_per_pixel", "dynamic", "footprints/pixel", 2, |r| complexity(r, true))
+            .about("footprints of shadow maps per covered pixel: dynamic texture complexity (Z2 paper, table 1)")
+        .real("first_l1_footprint_miss_pct", "first L1", "% of footprints", 2, |r| first_l1_pct(r.result))
+            .about("footprints whose first look-up found a line absent or in flight")
+        .real("first_l2_line_miss_pct", "first L2", "% of lines", 2, |r| first_l2_pct(r.result))
+            .about("lines of these look-ups that were absent from the L2, merged requests counted")
+        .real("closed_form_util_pct", "TMU fit", "%", 2, |r| closed_form_pct(r.result))
+            .about("utilisation that the Z2 paper's table implies for the rates of first look-ups")
+        .real("closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| deviation_points(r.result))
+            .about("simulated utilisation minus the utilisation that the Z2 paper's table implies for the rates of first look-ups")
+        .real("prefetch_coverage_pct", "covered", "% of L2 misses", 1, |r| { let useful = r.result.memory.prefetch?.useful_lines; Some(100.0 * over(useful, useful + r.result.l2.counters.line_misses)?) })
+            .about("useful prefetches as a share of useful prefetches and L2 line misses")
+        .real("l2_stalled_misses_pct", "stalled", "% of L2 misses", 2, |r| { let stalled = r.result.memory.l2_mshrs?.stalled_misses; Some(100.0 * over(stalled, r.result.l2.counters.line_misses)?) })
+            .about("L2 misses that were delayed because all MSHRs were in use");
     let memory = memory_columns::columns().into_iter();
     figures.extend(memory.map(|column| column.on(|r: &ResultRow| &r.result.memory)));
-    figures.extend(vec![
-        Figure::real("frame_read_bytes", "all reads", "bytes", 0, |r| whole(r.result, |c| c.read_bytes))
-            .about("bytes that all memory clients read, all frames"),
-        Figure::real("frame_write_bytes", "all writes", "bytes", 0, |r| whole(r.result, |c| c.write_bytes))
-            .about("bytes that all memory clients write, all frames"),
-        Figure::real("frame_mb_per_frame", "all traffic", "MB/frame", 2, |r| Some(r.mb_per_frame(whole(r.result, ClientTraffic::bytes)?)))
-            .about("traffic of all memory clients"),
-        Figure::real("frame_energy_mj_per_frame", "all traffic", "mJ/frame", 3, |r| Some(r.per_frame(whole_mj(r.result)?)))
-            .about("DRAM energy of the traffic of all clients, at a constant energy per byte"),
-        Figure::real("texture_share_pct", "texture", "% of all", 1, |r| Some(100.0 * r.result.external_bytes as f64 / whole(r.result, ClientTraffic::bytes)? as f64))
-            .about("texture reads as a share of the traffic of all clients"),
-        Figure::real("frame_reduction_pct", "saved of all", "% of Morton", 1, |r| whole_saved_pct(r))
-            .about("traffic of all clients saved against Morton order with all other settings equal"),
-        Figure::real("cycles", "cycles", "", 0, |r| r.result.cycles)
-            .about("cycles until the last core finishes"),
-    ]);
+    figures = figures
+        .real("frame_read_bytes", "all reads", "bytes", 0, |r| whole(r.result, |c| c.read_bytes))
+            .about("bytes that all memory clients read, all frames")
+        .real("frame_write_bytes", "all writes", "bytes", 0, |r| whole(r.result, |c| c.write_bytes))
+            .about("bytes that all memory clients write, all frames")
+        .real("frame_mb_per_frame", "all traffic", "MB/frame", 2, |r| Some(r.mb_per_frame(whole(r.result, ClientTraffic::bytes)?)))
+            .about("traffic of all memory clients")
+        .real("frame_energy_mj_per_frame", "all traffic", "mJ/frame", 3, |r| Some(r.per_frame(whole_mj(r.result)?)))
+            .about("DRAM energy of the traffic of all clients, at a constant energy per byte")
+        .real("texture_share_pct", "texture", "% of all", 1, |r| Some(100.0 * r.result.external_bytes as f64 / whole(r.result, ClientTraffic::bytes)? as f64))
+            .about("texture reads as a share of the traffic of all clients")
+        .real("frame_reduction_pct", "saved of all", "% of Morton", 1, |r| whole_saved_pct(r))
+            .about("traffic of all clients saved against Morton order with all other settings equal")
+        .real("cycles", "cycles", "", 0, |r| r.result.cycles)
+            .about("cycles until the last core finishes");
     figures
 }
 
@@ -116,56 +113,54 @@ fn whole_saved_pct(row: &ResultRow) -> Option<f64> {
 /// The paper's figures for the same point. Its saving is computed from its two miss rates.
 #[rustfmt::skip]
 fn published<'a>() -> Vec<Figure<'a>> {
-    vec![
-        Figure::real("paper.l1_footprint_miss_pct", "paper L1", "%", 2, |r| Some(r.paper?.l1_footprint_miss_pct)),
-        Figure::real("paper.l2_line_miss_pct", "paper L2", "%", 2, |r| Some(r.paper?.l2_line_miss_pct)),
-        Figure::real("paper.tmu_util_pct", "paper TMU", "%", 2, |r| Some(r.paper?.tmu_util_pct)),
-        Figure::real("paper.tmu_ratio", "paper TMU", "\u{d7} Morton", 3, |r| r.paper?.tmu_ratio()),
-        Figure::real("paper.reduction_pct", "paper saved", "% of Morton", 1, |r| r.paper?.reduction_pct()),
-    ].into_iter().map(Column::published).collect()
+    columns_of::<ResultRow>()
+        .real("paper.l1_footprint_miss_pct", "paper L1", "%", 2, |r| Some(r.paper?.l1_footprint_miss_pct))
+        .real("paper.l2_line_miss_pct", "paper L2", "%", 2, |r| Some(r.paper?.l2_line_miss_pct))
+        .real("paper.tmu_util_pct", "paper TMU", "%", 2, |r| Some(r.paper?.tmu_util_pct))
+        .real("paper.tmu_ratio", "paper TMU", "\u{d7} Morton", 3, |r| r.paper?.tmu_ratio())
+        .real("paper.reduction_pct", "paper saved", "% of Morton", 1, |r| r.paper?.reduction_pct())
+        .into_iter().map(Column::published).collect()
 }
 
 /// The same point in functional mode.
 #[rustfmt::skip]
 fn functional<'a>() -> Vec<Figure<'a>> {
-    vec![
-        Figure::real("functional.l1_footprint_miss_pct", "functional L1", "% of footprints", 2, |r| Some(100.0 * r.functional?.l1.footprint_miss_rate)),
-        Figure::real("functional.l2_line_miss_pct", "functional L2", "% of lines", 2, |r| Some(100.0 * r.functional?.l2.line_miss_rate)),
-        Figure::real("functional.external_mb_per_frame", "functional", "MB/frame", 2, |r| Some(r.mb_per_frame(r.functional?.external_bytes))),
-        Figure::real("functional.external_difference_pct", "difference", "%", 2, |r| Some(100.0 * (over(r.functional?.external_bytes, r.result.external_bytes).unwrap_or(1.0) - 1.0))),
-    ]
+    columns_of::<ResultRow>()
+        .real("functional.l1_footprint_miss_pct", "functional L1", "% of footprints", 2, |r| Some(100.0 * r.functional?.l1.footprint_miss_rate))
+        .real("functional.l2_line_miss_pct", "functional L2", "% of lines", 2, |r| Some(100.0 * r.functional?.l2.line_miss_rate))
+        .real("functional.external_mb_per_frame", "functional", "MB/frame", 2, |r| Some(r.mb_per_frame(r.functional?.external_bytes)))
+        .real("functional.external_difference_pct", "difference", "%", 2, |r| Some(100.0 * (over(r.functional?.external_bytes, r.result.external_bytes).unwrap_or(1.0) - 1.0)))
 }
 
 /// The same point on the machine of `--preset z2-paper`: rates of first look-ups, then counts as for other
 /// machines.
 #[rustfmt::skip]
 fn z2_paper<'a>() -> Vec<Figure<'a>> {
-    vec![
-        Figure::real("z2_paper.l1_footprint_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.z2_paper?))
-            .about("footprints whose first look-up found a line absent or in flight"),
-        Figure::real("z2_paper.l2_line_miss_pct", "first L2", "%", 2, |r| first_l2_pct(r.z2_paper?))
-            .about("lines of these look-ups that were absent from the L2, merged requests counted"),
-        Figure::real("z2_paper.tmu_util_pct", "TMU", "%", 2, |r| tmu_util_pct(r.z2_paper?))
-            .about("percentage of cycles in which a footprint leaves the texture unit"),
-        Figure::real("z2_paper.tmu_ratio", "TMU", "\u{d7} Morton", 3, |r| Some(utilization(r.z2_paper?)? / utilization(r.z2_paper_morton?)?))
-            .about("utilisation over the utilisation in Morton order"),
-        Figure::real("z2_paper.closed_form_util_pct", "TMU fit", "%", 2, |r| closed_form_pct(r.z2_paper?))
-            .about("utilisation that the Z2 paper's table implies for the rates of first look-ups"),
-        Figure::real("z2_paper.closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| deviation_points(r.z2_paper?))
-            .about("simulated utilisation minus the utilisation that the Z2 paper's table implies for the rates of first look-ups"),
-        Figure::real("z2_paper.product_reduction_pct", "saved, L1 \u{d7} L2", "% of Morton", 1, |r| product_saved_pct(r))
-            .about("traffic saved according to the product of both rates, as in the paper; merged requests count"),
-        Figure::real("z2_paper.primary_l1_footprint_miss_pct", "primary L1", "% of footprints", 2, |r| Some(100.0 * r.z2_paper?.l1.footprint_miss_rate))
-            .about("footprints that fetched a line"),
-        Figure::real("z2_paper.primary_l2_line_miss_pct", "primary L2", "% of lines", 2, |r| Some(100.0 * r.z2_paper?.l2.line_miss_rate))
-            .about("fetched lines that came from memory"),
-        Figure::real("z2_paper.external_bytes", "external", "bytes", 0, |r| Some(r.z2_paper?.external_bytes))
-            .about("bytes read from memory"),
-        Figure::real("z2_paper.external_mb_per_frame", "external", "MB/frame", 2, |r| Some(r.mb_per_frame(r.z2_paper?.external_bytes)))
-            .about("bytes read from memory"),
-        Figure::real("z2_paper.reduction_pct", "saved", "% of Morton", 1, |r| saved_pct(r.z2_paper?, r.z2_paper_morton?))
-            .about("bytes read from memory saved against Morton order"),
-    ]
+    columns_of::<ResultRow>()
+        .real("z2_paper.l1_footprint_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.z2_paper?))
+            .about("footprints whose first look-up found a line absent or in flight")
+        .real("z2_paper.l2_line_miss_pct", "first L2", "%", 2, |r| first_l2_pct(r.z2_paper?))
+            .about("lines of these look-ups that were absent from the L2, merged requests counted")
+        .real("z2_paper.tmu_util_pct", "TMU", "%", 2, |r| tmu_util_pct(r.z2_paper?))
+            .about("percentage of cycles in which a footprint leaves the texture unit")
+        .real("z2_paper.tmu_ratio", "TMU", "\u{d7} Morton", 3, |r| Some(utilization(r.z2_paper?)? / utilization(r.z2_paper_morton?)?))
+            .about("utilisation over the utilisation in Morton order")
+        .real("z2_paper.closed_form_util_pct", "TMU fit", "%", 2, |r| closed_form_pct(r.z2_paper?))
+            .about("utilisation that the Z2 paper's table implies for the rates of first look-ups")
+        .real("z2_paper.closed_form_deviation_points", "TMU \u{2212} fit", "points", 2, |r| deviation_points(r.z2_paper?))
+            .about("simulated utilisation minus the utilisation that the Z2 paper's table implies for the rates of first look-ups")
+        .real("z2_paper.product_reduction_pct", "saved, L1 \u{d7} L2", "% of Morton", 1, |r| product_saved_pct(r))
+            .about("traffic saved according to the product of both rates, as in the paper; merged requests count")
+        .real("z2_paper.primary_l1_footprint_miss_pct", "primary L1", "% of footprints", 2, |r| Some(100.0 * r.z2_paper?.l1.footprint_miss_rate))
+            .about("footprints that fetched a line")
+        .real("z2_paper.primary_l2_line_miss_pct", "primary L2", "% of lines", 2, |r| Some(100.0 * r.z2_paper?.l2.line_miss_rate))
+            .about("fetched lines that came from memory")
+        .real("z2_paper.external_bytes", "external", "bytes", 0, |r| Some(r.z2_paper?.external_bytes))
+            .about("bytes read from memory")
+        .real("z2_paper.external_mb_per_frame", "external", "MB/frame", 2, |r| Some(r.mb_per_frame(r.z2_paper?.external_bytes)))
+            .about("bytes read from memory")
+        .real("z2_paper.reduction_pct", "saved", "% of Morton", 1, |r| saved_pct(r.z2_paper?, r.z2_paper_morton?))
+            .about("bytes read from memory saved against Morton order")
 }
 
 impl Row for ResultRow<'_> {
@@ -190,16 +185,15 @@ pub fn number(row: &ResultRow, key: &str) -> Option<f64> {
 impl Row for Part {
     #[rustfmt::skip]
     fn columns() -> Vec<Column<'static, Self>> {
-        vec![
-            Column::text("name", "", |p: &Self| p.name.clone()),
-            Column::new("footprints", "footprints", "millions", Show::Millions(3), |p: &Self| p.l1.footprints),
-            Column::real("l1_footprint_miss_pct", "L1 miss", "% of footprints", 2, |p: &Self| Some(100.0 * over(p.l1.footprint_misses, p.l1.footprints)?))
-                .about("footprints with a missing line"),
-            Column::real("l2_line_miss_pct", "L2 miss", "% of lines", 2, |p: &Self| Some(100.0 * over(p.l2.line_misses, p.l2.line_lookups)?))
-                .about("line look-ups of the L2 that miss"),
-            Column::real("external_lines", "external", "1000 lines", 1, |p: &Self| p.l2.line_misses as f64 / 1e3)
-                .about("external traffic"),
-        ]
+        columns_of::<Self>()
+            .text("name", "", |p| p.name.clone())
+            .shown("footprints", "footprints", "millions", Show::Millions(3), |p| p.l1.footprints)
+            .real("l1_footprint_miss_pct", "L1 miss", "% of footprints", 2, |p| Some(100.0 * over(p.l1.footprint_misses, p.l1.footprints)?))
+                .about("footprints with a missing line")
+            .real("l2_line_miss_pct", "L2 miss", "% of lines", 2, |p| Some(100.0 * over(p.l2.line_misses, p.l2.line_lookups)?))
+                .about("line look-ups of the L2 that miss")
+            .real("external_lines", "external", "1000 lines", 1, |p| p.l2.line_misses as f64 / 1e3)
+                .about("external traffic")
     }
 }
 

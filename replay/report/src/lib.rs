@@ -11,6 +11,7 @@ pub mod document;
 pub mod errors;
 pub mod figures;
 pub mod html;
+mod lists;
 pub mod locality;
 mod memory_columns;
 pub mod notices;

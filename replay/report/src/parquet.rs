@@ -9,9 +9,10 @@ use ::parquet::errors::ParquetError;
 use ::parquet::file::metadata::KeyValue;
 use ::parquet::file::properties::WriterProperties;
 use ::parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
-use ::parquet::schema::types::{Type, TypePtr};
+use ::parquet::schema::types::Type;
 use serde_json::{Map, json};
 use sim::result::TOOL;
+use std::io::Write;
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -52,11 +53,17 @@ pub fn bytes(table: &Table) -> Result<Vec<u8>, TableError> {
         .map(|h| (h.flat_key(), json!({ "unit": h.unit, "about": h.about })))
         .collect();
     let facts = serde_json::Value::Object(facts).to_string();
-    let properties = WriterProperties::builder()
-        .set_created_by(TOOL.to_owned())
-        .set_key_value_metadata(Some(vec![KeyValue::new(COLUMNS_KEY.to_owned(), facts)]))
-        .build();
-    let mut writer = SerializedFileWriter::new(Vec::new(), schema(table)?, Arc::new(properties))?;
+    let facts = KeyValue::new(COLUMNS_KEY.to_owned(), facts);
+    let columns = table.headings.iter().map(|heading| {
+        let (physical, logical) = match heading.kind {
+            Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
+            Kind::Flag => (Physical::BOOLEAN, None),
+            Kind::Whole => (Physical::INT64, None),
+            Kind::Real => (Physical::DOUBLE, None),
+        };
+        (heading.flat_key(), physical, logical)
+    });
+    let mut writer = create(Vec::new(), Repetition::OPTIONAL, columns, vec![facts])?;
     let mut rows = writer.next_row_group()?;
     for (index, heading) in table.headings.iter().enumerate() {
         let cells = Cells {
@@ -86,27 +93,39 @@ pub fn bytes(table: &Table) -> Result<Vec<u8>, TableError> {
     Ok(writer.into_inner()?)
 }
 
-fn schema(table: &Table) -> Result<TypePtr, ParquetError> {
-    let column = |heading: &Heading| {
-        let (physical, logical) = match heading.kind {
-            Kind::Text => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
-            Kind::Flag => (Physical::BOOLEAN, None),
-            Kind::Whole => (Physical::INT64, None),
-            Kind::Real => (Physical::DOUBLE, None),
-        };
-        let column = Type::primitive_type_builder(&heading.flat_key(), physical)
-            .with_repetition(Repetition::OPTIONAL)
+/// Begins a file of rows. Equal rows have equal bytes.
+pub(crate) fn create<W: Write + Send, N: AsRef<str>>(
+    out: W,
+    repetition: Repetition,
+    columns: impl Iterator<Item = (N, Physical, Option<LogicalType>)>,
+    facts: Vec<KeyValue>,
+) -> Result<SerializedFileWriter<W>, ParquetError> {
+    let column = |(name, physical, logical): (N, Physical, Option<LogicalType>)| {
+        let column = Type::primitive_type_builder(name.as_ref(), physical)
+            .with_repetition(repetition)
             .with_logical_type(logical)
             .build()?;
         Ok(Arc::new(column))
     };
-    let columns: Vec<TypePtr> = table
-        .headings
-        .iter()
-        .map(column)
-        .collect::<Result<_, ParquetError>>()?;
-    let rows = Type::group_type_builder("rows").with_fields(columns);
-    Ok(Arc::new(rows.build()?))
+    let columns: Result<Vec<_>, ParquetError> = columns.map(column).collect();
+    let rows = Type::group_type_builder("rows").with_fields(columns?);
+    let properties = WriterProperties::builder()
+        .set_created_by(TOOL.to_owned())
+        .set_key_value_metadata((!facts.is_empty()).then_some(facts))
+        .build();
+    SerializedFileWriter::new(out, Arc::new(rows.build()?), Arc::new(properties))
+}
+
+/// Writes the next column of a group. `present` has a number per row of a column that may be empty.
+pub(crate) fn write_column<T: DataType, W: Write + Send>(
+    group: &mut SerializedRowGroupWriter<'_, W>,
+    values: &[T::T],
+    present: Option<&[i16]>,
+) -> Result<(), ParquetError> {
+    let missing = || ParquetError::General("fewer columns than the schema has".to_owned());
+    let mut column = group.next_column()?.ok_or_else(missing)?;
+    column.typed::<T>().write_batch(values, present, None)?;
+    column.close().map(|_| ())
 }
 
 /// The cells of a column.
@@ -141,13 +160,7 @@ impl Cells<'_> {
                 })?);
             }
         }
-        let missing = || ParquetError::General("fewer columns than the schema has".to_owned());
-        let mut column = rows.next_column()?.ok_or_else(missing)?;
-        column
-            .typed::<T>()
-            .write_batch(&values, Some(&present), None)?;
-        column.close()?;
-        Ok(())
+        Ok(write_column::<T, _>(rows, &values, Some(&present))?)
     }
 }
 
@@ -157,7 +170,6 @@ mod tests {
     use crate::columns::Column;
     use ::parquet::file::reader::{FileReader, SerializedFileReader};
     use ::parquet::record::Field;
-    use std::io::Write;
 
     type Cells = (&'static str, Option<f64>, u64, bool);
 

@@ -1,8 +1,9 @@
 //! Every reading of the SGRT paper's figure 3, beside the paper's values (`replay.readings/2`).
 
-use super::columns::Column;
+use super::columns::{Columns, columns_of};
 use super::document::Document;
-use super::html::{Answer, Section, figure, figures, folded, page};
+use super::html::{Answer, Page, figure, figures, settings};
+use super::lists::geometric_mean;
 use super::plots::lines::{Axis, LineChart, LineSeries, Mark};
 use super::plots::{PlotError, SeriesStyle};
 use super::table::Table;
@@ -114,17 +115,11 @@ fn rule_name(reading: &Reading) -> &'static str {
     }
 }
 
-fn geometric_mean(values: impl Iterator<Item = f64>) -> f64 {
-    let logs: Vec<f64> = values.map(f64::ln).collect();
-    (logs.iter().sum::<f64>() / logs.len().max(1) as f64).exp()
-}
-
 impl Document for ReadingsReport {
     const SCHEMA: &'static str = "replay.readings/2";
     const FILES_BESIDE_PAGE: bool = false;
-    type Json<'a> = &'a Self;
 
-    fn content(&self) -> &Self {
+    fn content(&self) -> impl Serialize {
         self
     }
 
@@ -133,28 +128,27 @@ impl Document for ReadingsReport {
     fn rows(&self) -> Table {
         struct Cell<'a> { fit: &'a Fit, scene: &'a SceneReadings, chosen: bool }
         let figures = |c: &Cell| c.scene.readings[c.fit.index].1;
-        let columns = [
-            Column::text("scene", "scene", |c: &Cell| c.scene.label.clone()),
-            Column::text("checksum", "checksum", |c: &Cell| c.scene.trace.checksum.clone()),
-            Column::text("width_px", "width", |c: &Cell| u64::from(c.scene.eye_size_px[0])),
-            Column::text("height_px", "height", |c: &Cell| u64::from(c.scene.eye_size_px[1])),
-            Column::text("set", "set", |c: &Cell| if c.scene.calibrates { "calibration" } else { "test" }),
-            Column::text("reading", "reading", |c: &Cell| c.fit.index as u64 + 1),
-            Column::text("chosen", "closest", |c: &Cell| c.chosen),
-            Column::text("scope", "measured of", |c: &Cell| scope_name(c.fit.reading.scope)),
-            Column::text("reuse", "reused", |c: &Cell| super::sgrt::reuse_name(c.fit.reading.reuse)),
-            Column::text("rule", "rule", |c: &Cell| rule_name(&c.fit.reading)),
-            Column::text("row_test", "tested against", |c: &Cell| row_test_name(c.fit.reading.row_test)),
-            Column::text("gbuffer", "G-buffer", |c: &Cell| gbuffer_name(c.fit.reading.gbuffer)),
-            Column::real("relative_performance", "performance", "ratio", 4, move |c: &Cell| figures(c).relative_performance),
-            Column::real("paper_relative_performance", "paper", "ratio", 2, |c: &Cell| Some(c.scene.paper.as_ref()?.relative_performance)),
-            Column::real("relative_energy", "energy", "ratio", 4, move |c: &Cell| figures(c).relative_energy),
-            Column::real("relative_energy_least", "14 nm, least", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[0]),
-            Column::real("relative_energy_most", "14 nm, most", "ratio", 4, move |c: &Cell| figures(c).relative_energy_bounds[1]),
-            Column::real("paper_relative_energy", "paper", "ratio", 2, |c: &Cell| Some(c.scene.paper.as_ref()?.relative_energy)),
-            Column::real("frames_per_second", "frames per second", "", 2, move |c: &Cell| figures(c).frames_per_second),
-            Column::real("paper_frames_per_second", "paper", "", 1, |c: &Cell| Some(c.scene.paper.as_ref()?.frames_per_second)),
-        ];
+        let columns = columns_of::<Cell>()
+            .text("scene", "scene", |c| c.scene.label.clone())
+            .text("checksum", "checksum", |c| c.scene.trace.checksum.clone())
+            .text("width_px", "width", |c| c.scene.eye_size_px[0])
+            .text("height_px", "height", |c| c.scene.eye_size_px[1])
+            .text("set", "set", |c| if c.scene.calibrates { "calibration" } else { "test" })
+            .text("reading", "reading", |c| c.fit.index as u64 + 1)
+            .text("chosen", "closest", |c| c.chosen)
+            .text("scope", "measured of", |c| scope_name(c.fit.reading.scope))
+            .text("reuse", "reused", |c| super::sgrt::reuse_name(c.fit.reading.reuse))
+            .text("rule", "rule", |c| rule_name(&c.fit.reading))
+            .text("row_test", "tested against", |c| row_test_name(c.fit.reading.row_test))
+            .text("gbuffer", "G-buffer", |c| gbuffer_name(c.fit.reading.gbuffer))
+            .real("relative_performance", "performance", "ratio", 4, move |c| figures(c).relative_performance)
+            .real("paper_relative_performance", "paper", "ratio", 2, |c| Some(c.scene.paper.as_ref()?.relative_performance))
+            .real("relative_energy", "energy", "ratio", 4, move |c| figures(c).relative_energy)
+            .real("relative_energy_least", "14 nm, least", "ratio", 4, move |c| figures(c).relative_energy_bounds[0])
+            .real("relative_energy_most", "14 nm, most", "ratio", 4, move |c| figures(c).relative_energy_bounds[1])
+            .real("paper_relative_energy", "paper", "ratio", 2, |c| Some(c.scene.paper.as_ref()?.relative_energy))
+            .real("frames_per_second", "frames per second", "", 2, move |c| figures(c).frames_per_second)
+            .real("paper_frames_per_second", "paper", "", 1, |c| Some(c.scene.paper.as_ref()?.frames_per_second));
         let cells: Vec<Cell> = self.fits.iter().flat_map(|fit| {
             let chosen = self.chosen == Some(fit.index);
             self.scenes.iter().map(move |scene| Cell { fit, scene, chosen })
@@ -188,16 +182,17 @@ impl ReadingsReport {
             let of = |value: fn(&Figures) -> f64| {
                 scenes.iter().map(move |s| value(&s.readings[index].1))
             };
+            let geometric = |values| geometric_mean(values).unwrap_or(1.0);
             Fit {
                 index,
                 reading: reading.clone(),
                 calibration: distance(true),
                 test: distance(false),
-                relative_performance: geometric_mean(of(|f| f.relative_performance)),
-                relative_energy: geometric_mean(of(|f| f.relative_energy)),
+                relative_performance: geometric(of(|f| f.relative_performance)),
+                relative_energy: geometric(of(|f| f.relative_energy)),
                 relative_energy_bounds: [
-                    geometric_mean(of(|f| f.relative_energy_bounds[0])),
-                    geometric_mean(of(|f| f.relative_energy_bounds[1])),
+                    geometric(of(|f| f.relative_energy_bounds[0])),
+                    geometric(of(|f| f.relative_energy_bounds[1])),
                 ],
                 scenes_that_save_energy: of(|f| f.relative_energy).filter(|e| *e < 1.0).count(),
             }
@@ -220,37 +215,35 @@ impl ReadingsReport {
     /// A row per reading.
     #[rustfmt::skip]
     fn fits(&self) -> Table {
-        let columns = [
-            Column::text("reading", "reading", |f: &Fit| f.index as u64 + 1),
-            Column::text("scope", "measured of", |f: &Fit| scope_name(f.reading.scope)),
-            Column::text("reuse", "reused", |f: &Fit| super::sgrt::reuse_name(f.reading.reuse)),
-            Column::text("rule", "rule", |f: &Fit| rule_name(&f.reading)),
-            Column::text("row_test", "tested against", |f: &Fit| row_test_name(f.reading.row_test)),
-            Column::text("gbuffer", "G-buffer", |f: &Fit| gbuffer_name(f.reading.gbuffer)),
-            Column::real("calibration", "from the paper, calibration", "RMS ln", 3, |f: &Fit| f.calibration),
-            Column::real("test", "test scenes", "RMS ln", 3, |f: &Fit| f.test),
-            Column::real("relative_performance", "performance, mean", "ratio", 3, |f: &Fit| f.relative_performance),
-            Column::real("relative_energy", "energy, mean", "ratio", 3, |f: &Fit| f.relative_energy),
-            Column::real("relative_energy_least", "14 nm, least", "ratio", 3, |f: &Fit| f.relative_energy_bounds[0]),
-            Column::real("relative_energy_most", "14 nm, most", "ratio", 3, |f: &Fit| f.relative_energy_bounds[1]),
-            Column::text("saves", "scenes that save energy", |f: &Fit| f.scenes_that_save_energy as u64),
-        ];
+        let columns = columns_of::<Fit>()
+            .text("reading", "reading", |f| f.index as u64 + 1)
+            .text("scope", "measured of", |f| scope_name(f.reading.scope))
+            .text("reuse", "reused", |f| super::sgrt::reuse_name(f.reading.reuse))
+            .text("rule", "rule", |f| rule_name(&f.reading))
+            .text("row_test", "tested against", |f| row_test_name(f.reading.row_test))
+            .text("gbuffer", "G-buffer", |f| gbuffer_name(f.reading.gbuffer))
+            .real("calibration", "from the paper, calibration", "RMS ln", 3, |f| f.calibration)
+            .real("test", "test scenes", "RMS ln", 3, |f| f.test)
+            .real("relative_performance", "performance, mean", "ratio", 3, |f| f.relative_performance)
+            .real("relative_energy", "energy, mean", "ratio", 3, |f| f.relative_energy)
+            .real("relative_energy_least", "14 nm, least", "ratio", 3, |f| f.relative_energy_bounds[0])
+            .real("relative_energy_most", "14 nm, most", "ratio", 3, |f| f.relative_energy_bounds[1])
+            .text("saves", "scenes that save energy", |f| f.scenes_that_save_energy as u64);
         Table::new(&columns, &self.fits)
     }
 
     /// The closest reading, scene by scene, beside the paper's values.
     #[rustfmt::skip]
     fn closest(&self, index: usize) -> Table {
-        let columns = [
-            Column::text("scene", "scene", |s: &SceneReadings| s.label.clone()),
-            Column::text("set", "set", |s: &SceneReadings| if s.calibrates { "calibration" } else { "test" }),
-            Column::real("relative_performance", "performance", "ratio", 2, move |s: &SceneReadings| s.readings[index].1.relative_performance),
-            Column::real("paper_relative_performance", "paper", "ratio", 2, |s: &SceneReadings| Some(s.paper.as_ref()?.relative_performance)),
-            Column::real("relative_energy", "energy", "ratio", 3, move |s: &SceneReadings| s.readings[index].1.relative_energy),
-            Column::real("paper_relative_energy", "paper", "ratio", 2, |s: &SceneReadings| Some(s.paper.as_ref()?.relative_energy)),
-            Column::real("frames_per_second", "frames per second", "", 1, move |s: &SceneReadings| s.readings[index].1.frames_per_second),
-            Column::real("paper_frames_per_second", "paper", "", 1, |s: &SceneReadings| Some(s.paper.as_ref()?.frames_per_second)),
-        ];
+        let columns = columns_of::<SceneReadings>()
+            .text("scene", "scene", |s| s.label.clone())
+            .text("set", "set", |s| if s.calibrates { "calibration" } else { "test" })
+            .real("relative_performance", "performance", "ratio", 2, move |s| s.readings[index].1.relative_performance)
+            .real("paper_relative_performance", "paper", "ratio", 2, |s| Some(s.paper.as_ref()?.relative_performance))
+            .real("relative_energy", "energy", "ratio", 3, move |s| s.readings[index].1.relative_energy)
+            .real("paper_relative_energy", "paper", "ratio", 2, |s| Some(s.paper.as_ref()?.relative_energy))
+            .real("frames_per_second", "frames per second", "", 1, move |s| s.readings[index].1.frames_per_second)
+            .real("paper_frames_per_second", "paper", "", 1, |s| Some(s.paper.as_ref()?.frames_per_second));
         Table::new(&columns, &self.scenes)
     }
 
@@ -316,22 +309,14 @@ impl ReadingsReport {
                 "is one choice for each question. Nothing else is fitted: all constants of the hardware are the stated defaults."
             }
         };
-        let mut sections = vec![Section::new(
-            "Energy and performance under every reading",
-            self.charts()?,
-        )];
+        let mut page = Page::default();
+        page.add("Energy and performance under every reading", self.charts()?);
         if let Some(index) = self.chosen {
-            sections.push(Section::new(
-                "The closest reading, scene by scene",
-                self.closest(index).markup(),
-            ));
+            let title = "The closest reading, scene by scene";
+            page.add(title, self.closest(index).markup());
         }
-        sections.push(Section::new("Readings", self.fits().markup()));
-        let config = toml::to_string(&self.config).unwrap_or_default();
-        sections.push(Section::new(
-            "Configuration",
-            folded("All parameters", &config),
-        ));
+        page.add("Readings", self.fits().markup());
+        page.add("Configuration", settings("All parameters", &self.config));
         let answer = Answer {
             sentences: self.sentences(),
             chart: figure(
@@ -340,7 +325,7 @@ impl ReadingsReport {
             ),
             about,
         };
-        Ok(page("Readings of the SGRT paper", &answer, &sections))
+        Ok(page.text("Readings of the SGRT paper", &answer))
     }
 
     /// Energy against performance.

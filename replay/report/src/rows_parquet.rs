@@ -1,15 +1,12 @@
 //! Rows of traces as Parquet files, one row group per million rows.
 
+use crate::parquet;
+use ::parquet::basic::{LogicalType, Repetition, Type as Physical};
+use ::parquet::data_type::{ByteArray, ByteArrayType, DataType, FloatType, Int32Type, Int64Type};
+use ::parquet::errors::ParquetError;
+use ::parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use formats::interop::{Field, Get, Tabular};
-use parquet::basic::{LogicalType, Repetition, Type as Physical};
-use parquet::data_type::{ByteArray, ByteArrayType, DataType, FloatType, Int32Type, Int64Type};
-use parquet::errors::ParquetError;
-use parquet::file::properties::WriterProperties;
-use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
-use parquet::schema::types::{Type, TypePtr};
-use sim::result::TOOL;
 use std::io::Write;
-use std::sync::Arc;
 
 /// Rows per group.
 const GROUP_ROWS: usize = 1 << 20;
@@ -26,15 +23,9 @@ impl<W: Write + Send, R: Tabular> RowsWriter<W, R> {
     /// # Errors
     /// Errors of the underlying writer.
     pub fn new(out: W) -> Result<Self, ParquetError> {
-        let properties = WriterProperties::builder()
-            .set_created_by(TOOL.to_owned())
-            .build();
         let columns = R::FIELDS.iter().map(column);
-        let columns: Vec<TypePtr> = columns.collect::<Result<_, ParquetError>>()?;
-        let schema = Type::group_type_builder("rows").with_fields(columns);
-        let schema = Arc::new(schema.build()?);
         Ok(Self {
-            file: SerializedFileWriter::new(out, schema, Arc::new(properties))?,
+            file: parquet::create(out, Repetition::REQUIRED, columns, Vec::new())?,
             rows: Vec::new(),
         })
     }
@@ -73,7 +64,8 @@ impl<W: Write + Send, R: Tabular> RowsWriter<W, R> {
     }
 }
 
-fn column<R>(field: &Field<R>) -> Result<TypePtr, ParquetError> {
+/// Name and types of a field's column.
+fn column<R>(field: &Field<R>) -> (&'static str, Physical, Option<LogicalType>) {
     let unsigned = |bit_width| Some(LogicalType::integer(bit_width, false));
     let (physical, logical) = match field.get {
         _ if !field.codes.is_empty() => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
@@ -84,11 +76,7 @@ fn column<R>(field: &Field<R>) -> Result<TypePtr, ParquetError> {
         Get::I32(_) => (Physical::INT32, None),
         Get::F32(_) => (Physical::FLOAT, None),
     };
-    let column = Type::primitive_type_builder(field.name, physical)
-        .with_repetition(Repetition::REQUIRED)
-        .with_logical_type(logical)
-        .build()?;
-    Ok(Arc::new(column))
+    (field.name, physical, logical)
 }
 
 fn write_column<R, W: Write + Send>(
@@ -120,20 +108,17 @@ fn write<T: DataType, R, W: Write + Send>(
     of: impl Fn(&R) -> T::T,
 ) -> Result<(), ParquetError> {
     let values: Vec<T::T> = rows.iter().map(of).collect();
-    let missing = || ParquetError::General("fewer columns than the schema has".to_owned());
-    let mut column = group.next_column()?.ok_or_else(missing)?;
-    column.typed::<T>().write_batch(&values, None, None)?;
-    column.close().map(|_| ())
+    parquet::write_column::<T, W>(group, &values, None)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ::parquet::file::reader::{FileReader, SerializedFileReader};
     use formats::interop::{Origin, RayRow, RecordRow};
     use formats::raytrace::{RayKind, RayRecord};
     use formats::textrace::QuadRecord;
     use formats::view::Eye;
-    use parquet::file::reader::{FileReader, SerializedFileReader};
 
     fn read(bytes: Vec<u8>) -> Vec<String> {
         let mut file = tempfile::tempfile().unwrap();

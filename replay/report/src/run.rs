@@ -1,6 +1,6 @@
 //! Results of one replay, and of one point in both modes.
 
-use super::columns::{Column, Row, Show, Value};
+use super::columns::{Column, Columns, Row, Show, Value, columns_of};
 use super::document::{Document, Envelope};
 use super::errors::{self, KnownError, Of};
 use super::figures::figures;
@@ -66,12 +66,8 @@ fn rows<'r>(rows: impl IntoIterator<Item = &'r ResultRow<'r>>) -> Table {
 
 impl Document for RunReport<'_> {
     const SCHEMA: &'static str = RUN_SCHEMA;
-    type Json<'a>
-        = RunJson<'a>
-    where
-        Self: 'a;
 
-    fn content(&self) -> RunJson<'_> {
+    fn content(&self) -> impl Serialize {
         RunJson::new(self.row)
     }
 
@@ -86,12 +82,8 @@ impl Document for RunReport<'_> {
 
 impl Document for ModesReport<'_> {
     const SCHEMA: &'static str = "replay.compare-modes/2";
-    type Json<'a>
-        = ModesJson<'a>
-    where
-        Self: 'a;
 
-    fn content(&self) -> ModesJson<'_> {
+    fn content(&self) -> impl Serialize {
         let [timed, functional] = self.0;
         let differences = MEASURES.iter().map(|(key, .., value)| {
             let difference = difference(value(timed.result), value(functional.result));
@@ -213,19 +205,14 @@ fn clients(row: &ResultRow) -> Table {
     let energy_mj = clients.iter().map(|c| c.energy_mj).sum();
     lines.push(("all", all, share(sum), energy_mj));
     let frames = |kind: usize| move |l: &Line| row.mb_per_frame(l.1[kind]);
-    let columns = [
-        Column::text("client", "", |l: &Line| l.0),
-        Column::real("read_mb_per_frame", "read", "MB/frame", 3, frames(0)),
-        Column::real("write_mb_per_frame", "written", "MB/frame", 3, frames(1)),
-        Column::real("share_pct", "of all", "%", 1, |l: &Line| l.2),
-        Column::real(
-            "energy_mj_per_frame",
-            "DRAM energy",
-            "mJ/frame",
-            3,
-            |l: &Line| row.per_frame(l.3),
-        ),
-    ];
+    let columns = columns_of::<Line>()
+        .text("client", "", |l| l.0)
+        .real("read_mb_per_frame", "read", "MB/frame", 3, frames(0))
+        .real("write_mb_per_frame", "written", "MB/frame", 3, frames(1))
+        .real("share_pct", "of all", "%", 1, |l| l.2)
+        .real("energy_mj_per_frame", "DRAM energy", "mJ/frame", 3, |l| {
+            row.per_frame(l.3)
+        });
     Table::new(&columns, &lines)
 }
 
@@ -248,11 +235,10 @@ fn whole(row: &ResultRow) -> Table {
             lines.push((heading.about, heading.show.write(&value), heading.unit));
         }
     }
-    let columns = [
-        Column::text("about", "", |l: &Line| l.0),
-        Column::real("value", "", "", 0, |l: &Line| l.1.clone()),
-        Column::text("unit", "", |l: &Line| l.2),
-    ];
+    let columns = columns_of::<Line>()
+        .text("about", "", |l| l.0)
+        .real("value", "", "", 0, |l| l.1.clone())
+        .text("unit", "", |l| l.2);
     Table::new(&columns, &lines)
 }
 
@@ -296,17 +282,14 @@ fn modes_text(timed: &ResultRow, functional: &ResultRow) -> String {
         let scale = if unit.starts_with('%') { 100.0 } else { 1.0 };
         format!("{:.*} {unit}", decimals, scale * value(row.result))
     };
-    let columns = [
-        Column::text("measure", "", |m: &Measure| m.1),
-        Column::real("timed", "timed", "", 0, |m: &Measure| cell(m, timed)),
-        Column::real("functional", "functional", "", 0, |m: &Measure| {
-            cell(m, functional)
-        }),
-        Column::real("difference", "difference", "", 0, |m: &Measure| {
+    let columns = columns_of::<Measure>()
+        .text("measure", "", |m| m.1)
+        .real("timed", "timed", "", 0, |m| cell(m, timed))
+        .real("functional", "functional", "", 0, |m| cell(m, functional))
+        .real("difference", "difference", "", 0, |m| {
             let [timed, functional] = [timed, functional].map(|row| m.4(row.result));
             format!("{:+.2} %", 100.0 * difference(timed, functional))
-        }),
-    ];
+        });
     Table::new(&columns, &MEASURES).text()
 }
 

@@ -7,7 +7,7 @@ mod tables;
 use crate::answers;
 use crate::document::Document;
 use crate::errors::{self, KnownError, Of};
-use crate::html::{Answer, Section, figure as html_figure, folded, page as html_page};
+use crate::html::{Answer, Page, figure as html_figure, settings};
 use crate::plots::{PlotError, data_uri};
 use crate::table::Table;
 use maud::{Markup, html};
@@ -68,11 +68,8 @@ pub fn page(entries: &[Entry]) -> Result<String, PlotError> {
         chart: html_figure(&charts::performance(entries).svg()?, ""),
         about,
     };
-    Ok(html_page(
-        "Stereo reprojection on a mobile ray-tracing GPU",
-        &answer,
-        &sections(entries)?,
-    ))
+    let title = "Stereo reprojection on a mobile ray-tracing GPU";
+    Ok(sections(entries)?.text(title, &answer))
 }
 
 fn sentences(entries: &[Entry]) -> Vec<String> {
@@ -90,32 +87,25 @@ fn sentences(entries: &[Entry]) -> Vec<String> {
     answers::reprojected(&entries.iter().map(scene).collect::<Vec<_>>())
 }
 
-/// The sections, for a page with other sections.
+/// The sections of the page.
 ///
 /// # Errors
 /// A chart that cannot be drawn.
-pub fn sections(entries: &[Entry]) -> Result<Vec<Section>, PlotError> {
-    let mut out = vec![
-        Section::new("Performance and energy", performance(entries)?),
-        Section::new("Reuse and image error", accuracy(entries)),
-        Section::new("Units, cores and memory", hardware(entries)),
-    ];
+fn sections(entries: &[Entry]) -> Result<Page, PlotError> {
+    let mut page = Page::default();
+    page.add("Performance and energy", performance(entries)?);
+    page.add("Reuse and image error", accuracy(entries));
+    page.add("Units, cores and memory", hardware(entries));
     for entry in entries {
         let scene = tables::scene_name(&entry.report);
         if let Some(pictures) = &entry.pictures {
-            out.push(Section::new(
-                format!("Pictures: {scene}"),
-                picture_row(entry, pictures),
-            ));
+            page.add(format!("Pictures: {scene}"), picture_row(entry, pictures));
         }
         if !entry.report.curve.is_empty() {
-            out.push(Section::new(
-                format!("Cycles against error: {scene}"),
-                curve(entry)?,
-            ));
+            page.add(format!("Cycles against error: {scene}"), curve(entry)?);
         }
         if !entry.report.sensitivity.is_empty() {
-            out.push(Section::new(
+            page.add(
                 format!("Sensitivity: {scene}"),
                 html! {
                     p {
@@ -124,18 +114,15 @@ pub fn sections(entries: &[Entry]) -> Result<Vec<Section>, PlotError> {
                     }
                     (tables::sensitivity(&entry.report).markup())
                 },
-            ));
+            );
         }
     }
-    out.extend(errors::section(Of::Rays));
+    page.sections.extend(errors::section(Of::Rays));
     if let Some(entry) = entries.first() {
-        let config = toml::to_string(&entry.report.config).unwrap_or_default();
-        out.push(Section::new(
-            "Configuration",
-            folded("All parameters", &config),
-        ));
+        let config = &entry.report.config;
+        page.add("Configuration", settings("All parameters", config));
     }
-    Ok(out)
+    Ok(page)
 }
 
 /// The JSON object.
@@ -154,20 +141,24 @@ pub fn schema() -> formats::schemas::Published {
     formats::schemas::Published::of::<ReprojectJson<'_>>(sgrt::result::SCHEMA)
 }
 
+impl ReprojectReport {
+    fn objects(&self) -> Vec<ReprojectJson<'_>> {
+        let errors = || errors::known(Of::Rays);
+        let reports = self.entries.iter().map(|entry| &entry.report);
+        let object = |report| ReprojectJson {
+            report,
+            errors: errors(),
+        };
+        reports.map(object).collect()
+    }
+}
+
 impl Document for ReprojectReport {
     const SCHEMA: &'static str = sgrt::result::SCHEMA;
     const FILES_BESIDE_PAGE: bool = false;
-    type Json<'a> = Vec<ReprojectJson<'a>>;
 
-    fn content(&self) -> Vec<ReprojectJson<'_>> {
-        let errors = || errors::known(Of::Rays);
-        let reports = self.entries.iter().map(|entry| &entry.report);
-        reports
-            .map(|report| ReprojectJson {
-                report,
-                errors: errors(),
-            })
-            .collect()
+    fn content(&self) -> impl Serialize {
+        self.objects()
     }
 
     fn rows(&self) -> Table {
@@ -180,7 +171,7 @@ impl Document for ReprojectReport {
 
     /// One object for each trace; those of several traces have a line each.
     fn json(&self) -> serde_json::Result<String> {
-        match self.content().as_slice() {
+        match self.objects().as_slice() {
             [object] => serde_json::to_string_pretty(object),
             objects => {
                 let lines: serde_json::Result<Vec<_>> =

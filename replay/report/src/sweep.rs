@@ -1,11 +1,11 @@
 //! A sweep's results: rows, table, CSV and page.
 
 use super::answers;
-use super::columns::{Column, Figure};
+use super::columns::{Column, Columns, Figure, columns_of};
 use super::config_columns;
 use super::document::Document;
 use super::figures::{figure, figures, number};
-use super::html::{self, Answer, Section, folded};
+use super::html::{self, Answer, Page, settings};
 use super::plots::bars::{BarChart, BarGroup};
 use super::plots::hbars::HBarChart;
 use super::plots::lines::{self, Doublings, LineChart, LineSeries, Mark};
@@ -101,7 +101,8 @@ impl<'a> SweepReport<'a> {
 
     /// The rows as a table, grouped by trace and change.
     fn table(&self) -> Table {
-        let mut columns = vec![Figure::text("label", "scene", |r| r.subject.label.clone())];
+        let mut columns =
+            columns_of::<ResultRow>().text("label", "scene", |r| r.subject.label.clone());
         if !self.file.one_at_a_time.is_empty() {
             columns.push(Figure::text("change", "change", |r| {
                 change_title(r.point.change.as_ref())
@@ -138,7 +139,6 @@ impl<'a> SweepReport<'a> {
                 pictures.push((charts.changes().svg()?, charts.fixed(None)));
             }
         }
-        let base = toml::to_string(&self.file.base).unwrap_or_default();
         let about = html! {
             p {
                 (self.rows.len()) " points over " (subjects.len()) @if subjects.len() == 1 { " trace. " } @else { " traces. " }
@@ -148,12 +148,11 @@ impl<'a> SweepReport<'a> {
         let traces = html! {
             ul { @for s in subjects { li { (s.label) ": " (s.id.scene) ", checksum " (s.id.checksum) } } }
         };
-        let sections = [
-            Section::new("Charts", html::figures(&pictures)),
-            Section::new("Results", self.table().markup()),
-            Section::new("Traces", traces),
-            Section::new("Base configuration", folded("TOML", &base)),
-        ];
+        let mut page = Page::default();
+        page.add("Charts", html::figures(&pictures));
+        page.add("Results", self.table().markup());
+        page.add("Traces", traces);
+        page.add("Base configuration", settings("TOML", &self.file.base));
         let chart = match pictures.first() {
             Some((svg, caption)) => html::figure(svg, caption),
             None => html! {},
@@ -163,19 +162,15 @@ impl<'a> SweepReport<'a> {
             chart,
             about,
         };
-        Ok(html::page(title, &answer, &sections))
+        Ok(page.text(title, &answer))
     }
 }
 
 impl Document for SweepReport<'_> {
     const SCHEMA: &'static str = "replay.sweep/3";
     const INDENTED: bool = false;
-    type Json<'a>
-        = SweepJson<'a>
-    where
-        Self: 'a;
 
-    fn content(&self) -> SweepJson<'_> {
+    fn content(&self) -> impl Serialize {
         let subjects = self.outcome.subjects.iter();
         SweepJson {
             traces: subjects.map(LabelledTrace::of).collect(),

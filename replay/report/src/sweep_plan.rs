@@ -1,6 +1,6 @@
 //! The plan of a sweep, for schedulers: each point with its key, its estimated cost and whether it is done.
 
-use super::columns::Column;
+use super::columns::{Columns, columns_of};
 use super::document::Document;
 use super::sweep::LabelledTrace;
 use super::table::Table;
@@ -47,12 +47,8 @@ struct PlannedPoint<'a> {
 impl Document for SweepPlan<'_> {
     const SCHEMA: &'static str = "replay.plan/2";
     const INDENTED: bool = false;
-    type Json<'a>
-        = PlanJson<'a>
-    where
-        Self: 'a;
 
-    fn content(&self) -> PlanJson<'_> {
+    fn content(&self) -> impl Serialize {
         let point = |task: &Task| {
             let (subject, point) = (&self.subjects[task.subject], &self.plan.points[task.point]);
             PlannedPoint {
@@ -71,9 +67,7 @@ impl Document for SweepPlan<'_> {
     }
 
     fn rows(&self) -> Table {
-        let columns = [Column::text("point", "point", |point: &Point| {
-            point.title()
-        })];
+        let columns = columns_of::<Point>().text("point", "point", |point| point.title());
         Table::new(&columns, &self.plan.points)
     }
 

@@ -159,6 +159,11 @@ impl Table {
         }
     }
 
+    /// The same in a collapsible element.
+    pub(super) fn folded_meanings(&self) -> Markup {
+        html! { details { summary { "definitions of the columns" } (self.meanings()) } }
+    }
+
     /// As HTML in a scrolling box with fixed headings and a fixed first column. The page's script adds
     /// sorting, filtering and a choice of columns.
     pub(super) fn markup(&self) -> Markup {

@@ -1,6 +1,6 @@
 //! Reuse between the eyes and over time, frame by frame (`replay.temporal/1`).
 
-use super::columns::Column;
+use super::columns::{Columns, columns_of};
 use super::document::Document;
 use super::table::Table;
 use serde::Serialize;
@@ -37,9 +37,8 @@ pub struct TemporalReport {
 
 impl Document for TemporalReport {
     const SCHEMA: &'static str = "replay.temporal/1";
-    type Json<'a> = &'a Self;
 
-    fn content(&self) -> &Self {
+    fn content(&self) -> impl Serialize {
         self
     }
 
@@ -47,21 +46,20 @@ impl Document for TemporalReport {
     #[rustfmt::skip]
     fn rows(&self) -> Table {
         type Line<'a> = (&'a FrameSchemes, &'a SchemeFigures);
-        let columns = [
-            Column::text("frame", "frame", |l: &Line<'_>| l.0.trace.name.clone()),
-            Column::text("scheme", "scheme", |l: &Line<'_>| l.1.scheme.name()),
-            Column::real("left_reused_pct", "left reused", "%", 1, |l: &Line<'_>| l.1.reused_pct[0]),
-            Column::real("right_reused_pct", "right reused", "%", 1, |l: &Line<'_>| l.1.reused_pct[1]),
-            Column::text("rays", "rays", |l: &Line<'_>| l.1.rays),
-            Column::real("relative_performance", "performance", "ratio", 3, |l: &Line<'_>| l.1.relative_performance),
-            Column::real("relative_energy", "energy", "ratio", 3, |l: &Line<'_>| l.1.relative_energy),
-            Column::real("relative_energy_least", "14 nm, least", "ratio", 3, |l: &Line<'_>| l.1.relative_energy_bounds[0]),
-            Column::real("relative_energy_most", "14 nm, most", "ratio", 3, |l: &Line<'_>| l.1.relative_energy_bounds[1]),
-            Column::real("dram_mb", "DRAM", "MB", 2, |l: &Line<'_>| l.1.dram_bytes as f64 / 1e6),
-            Column::real("gbuffer_dram_mb", "of G-buffers", "MB", 2, |l: &Line<'_>| l.1.gbuffer_dram_bytes as f64 / 1e6),
-            Column::real("left_flip_mean", "left FLIP", "", 4, |l: &Line<'_>| l.1.flip_mean[0]),
-            Column::real("right_flip_mean", "right FLIP", "", 4, |l: &Line<'_>| l.1.flip_mean[1]),
-        ];
+        let columns = columns_of::<Line<'_>>()
+            .text("frame", "frame", |l| l.0.trace.name.clone())
+            .text("scheme", "scheme", |l| l.1.scheme.name())
+            .real("left_reused_pct", "left reused", "%", 1, |l| l.1.reused_pct[0])
+            .real("right_reused_pct", "right reused", "%", 1, |l| l.1.reused_pct[1])
+            .text("rays", "rays", |l| l.1.rays)
+            .real("relative_performance", "performance", "ratio", 3, |l| l.1.relative_performance)
+            .real("relative_energy", "energy", "ratio", 3, |l| l.1.relative_energy)
+            .real("relative_energy_least", "14 nm, least", "ratio", 3, |l| l.1.relative_energy_bounds[0])
+            .real("relative_energy_most", "14 nm, most", "ratio", 3, |l| l.1.relative_energy_bounds[1])
+            .real("dram_mb", "DRAM", "MB", 2, |l| l.1.dram_bytes as f64 / 1e6)
+            .real("gbuffer_dram_mb", "of G-buffers", "MB", 2, |l| l.1.gbuffer_dram_bytes as f64 / 1e6)
+            .real("left_flip_mean", "left FLIP", "", 4, |l| l.1.flip_mean[0])
+            .real("right_flip_mean", "right FLIP", "", 4, |l| l.1.flip_mean[1]);
         let lines: Vec<Line<'_>> = (self.frames.iter())
             .flat_map(|frame| frame.schemes.iter().map(move |scheme| (frame, scheme)))
             .collect();

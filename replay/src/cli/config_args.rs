@@ -215,11 +215,13 @@ pub struct ConfigArgs {
     allocation: Option<Allocation>,
 }
 
-/// Overwrites `target` if the flag is given.
-fn set<T>(target: &mut T, flag: Option<T>) {
+/// Overwrites `target` if the flag is given, and returns whether it is.
+fn set<T>(target: &mut T, flag: Option<T>) -> bool {
+    let is_given = flag.is_some();
     if let Some(value) = flag {
         *target = value;
     }
+    is_given
 }
 
 impl ConfigArgs {
@@ -275,41 +277,7 @@ impl ConfigArgs {
     /// The first flag given that applies only to tiles, textures or the texture unit, and so not to plain
     /// addresses.
     pub(super) fn first_of_traces(&self) -> Option<&'static str> {
-        let flags = [
-            ("--preset", self.preset.is_some()),
-            ("--order", self.order.is_some()),
-            ("--mode", self.mode.is_some()),
-            ("--cores", self.cores.is_some()),
-            ("--assign", self.assign.is_some()),
-            ("--between-frames", self.between_frames.is_some()),
-            ("--count-by", self.count_by.is_some()),
-            ("--tile-px", self.tile_px.is_some()),
-            ("--hsr", self.hsr.is_some()),
-            ("--frame", self.frame.is_some()),
-            ("--filter", self.filter.is_some()),
-            ("--lod", self.lod.is_some()),
-            ("--lod-bias", self.lod_bias.is_some()),
-            ("--max-anisotropy", self.max_anisotropy.is_some()),
-            ("--anisotropy", self.anisotropy.is_some()),
-            ("--helper-lanes", self.helper_lanes),
-            ("--texel-format", self.texel_format.is_some()),
-            ("--block-order", self.block_order.is_some()),
-            ("--shadow-map-order", self.shadow_map_order.is_some()),
-            ("--base-align", self.base_align.is_some()),
-            ("--texture-order", self.texture_order.is_some()),
-            ("--tmu", self.tmu.is_some()),
-            ("--l2-cycles", self.l2_cycles.is_some()),
-            ("--memory-cycles", self.memory_cycles.is_some()),
-            ("--loop-cycles", self.loop_cycles.is_some()),
-            ("--tmu-threads", self.tmu_threads.is_some()),
-            ("--retry-footprints", self.retry_footprints.is_some()),
-            ("--fetches-per-trip", self.fetches_per_trip.is_some()),
-            ("--allocation", self.allocation.is_some()),
-        ];
-        flags
-            .into_iter()
-            .find(|(_, given)| *given)
-            .map(|(flag, _)| flag)
+        self.apply_of_traces(&mut RunConfig::default())
     }
 
     /// The parts of `--count-by`, if given.
@@ -327,8 +295,7 @@ impl ConfigArgs {
     /// # Errors
     /// A line size that does not fit its type.
     pub fn apply(&self, config: &mut RunConfig) -> Result<()> {
-        set(&mut config.order, self.order);
-        set(&mut config.mode, self.mode);
+        self.apply_of_traces(config);
         set(&mut config.level.l1.size_bytes, self.l1);
         set(&mut config.level.l2.size_bytes, self.l2);
         set(&mut config.level.l1.ways, self.l1_ways.or(self.ways));
@@ -338,13 +305,7 @@ impl ConfigArgs {
         if let Some(line) = self.line {
             config.line_bytes = u32::try_from(line).context("--line")?;
         }
-        set(&mut config.cores, self.cores);
-        set(&mut config.assign, self.assign);
         set(&mut config.seed, self.seed);
-        set(&mut config.tile_px, self.tile_px);
-        set(&mut config.count_by, self.count_by);
-        set(&mut config.hsr, self.hsr);
-        set(&mut config.between_frames, self.between_frames);
         if let Some(size_bytes) = self.l3 {
             config.level.set_l3(size_bytes);
         }
@@ -357,29 +318,84 @@ impl ConfigArgs {
         if let Some(machine) = self.frame {
             config.frame.get_or_insert_default().machine = machine;
         }
-        set(&mut config.sampling.filter, self.filter);
-        set(&mut config.sampling.lod, self.lod);
-        set(&mut config.sampling.lod_bias, self.lod_bias);
-        set(
-            &mut config.sampling.max_anisotropy,
-            self.max_anisotropy.map(Some),
-        );
-        set(&mut config.sampling.anisotropy, self.anisotropy);
-        config.sampling.helper_lanes |= self.helper_lanes;
-        set(&mut config.layout.texel_format, self.texel_format.map(Some));
-        set(&mut config.layout.block_order, self.block_order);
-        set(&mut config.layout.shadow_map_order, self.shadow_map_order);
-        set(&mut config.layout.base_align_bytes, self.base_align);
-        set(&mut config.layout.texture_order, self.texture_order);
-        set(&mut config.tmu.model, self.tmu);
-        set(&mut config.level.l2.hit_cycles, self.l2_cycles);
-        set(&mut config.memory_cycles, self.memory_cycles);
-        set(&mut config.tmu.loop_cycles, self.loop_cycles);
-        set(&mut config.tmu.threads, self.tmu_threads);
-        set(&mut config.tmu.retry_footprints, self.retry_footprints);
-        set(&mut config.tmu.fetches_per_trip, self.fetches_per_trip);
-        set(&mut config.tmu.allocation, self.allocation);
         Ok(())
+    }
+
+    /// Applies the flags of tiles, textures and the texture unit, and returns the first that is given.
+    fn apply_of_traces(&self, config: &mut RunConfig) -> Option<&'static str> {
+        let (sampling, layout) = (&mut config.sampling, &mut config.layout);
+        let (tmu, texel_format) = (&mut config.tmu, self.texel_format.map(Some));
+        let max_anisotropy = self.max_anisotropy.map(Some);
+        sampling.helper_lanes |= self.helper_lanes;
+        let flags = [
+            ("--preset", self.preset.is_some()),
+            ("--order", set(&mut config.order, self.order)),
+            ("--mode", set(&mut config.mode, self.mode)),
+            ("--cores", set(&mut config.cores, self.cores)),
+            ("--assign", set(&mut config.assign, self.assign)),
+            (
+                "--between-frames",
+                set(&mut config.between_frames, self.between_frames),
+            ),
+            ("--count-by", set(&mut config.count_by, self.count_by)),
+            ("--tile-px", set(&mut config.tile_px, self.tile_px)),
+            ("--hsr", set(&mut config.hsr, self.hsr)),
+            ("--frame", self.frame.is_some()),
+            ("--filter", set(&mut sampling.filter, self.filter)),
+            ("--lod", set(&mut sampling.lod, self.lod)),
+            ("--lod-bias", set(&mut sampling.lod_bias, self.lod_bias)),
+            (
+                "--max-anisotropy",
+                set(&mut sampling.max_anisotropy, max_anisotropy),
+            ),
+            (
+                "--anisotropy",
+                set(&mut sampling.anisotropy, self.anisotropy),
+            ),
+            ("--helper-lanes", self.helper_lanes),
+            (
+                "--texel-format",
+                set(&mut layout.texel_format, texel_format),
+            ),
+            (
+                "--block-order",
+                set(&mut layout.block_order, self.block_order),
+            ),
+            (
+                "--shadow-map-order",
+                set(&mut layout.shadow_map_order, self.shadow_map_order),
+            ),
+            (
+                "--base-align",
+                set(&mut layout.base_align_bytes, self.base_align),
+            ),
+            (
+                "--texture-order",
+                set(&mut layout.texture_order, self.texture_order),
+            ),
+            ("--tmu", set(&mut tmu.model, self.tmu)),
+            (
+                "--l2-cycles",
+                set(&mut config.level.l2.hit_cycles, self.l2_cycles),
+            ),
+            (
+                "--memory-cycles",
+                set(&mut config.memory_cycles, self.memory_cycles),
+            ),
+            ("--loop-cycles", set(&mut tmu.loop_cycles, self.loop_cycles)),
+            ("--tmu-threads", set(&mut tmu.threads, self.tmu_threads)),
+            (
+                "--retry-footprints",
+                set(&mut tmu.retry_footprints, self.retry_footprints),
+            ),
+            (
+                "--fetches-per-trip",
+                set(&mut tmu.fetches_per_trip, self.fetches_per_trip),
+            ),
+            ("--allocation", set(&mut tmu.allocation, self.allocation)),
+        ];
+        let mut given = flags.into_iter().filter(|(_, is_given)| *is_given);
+        given.next().map(|(flag, _)| flag)
     }
 }
 

@@ -1,8 +1,11 @@
 //! `replay convert`: writes a trace in another encoding, or its accesses for other simulators.
 
+pub(super) mod columns;
+
 use super::ConfigArgs;
 use super::tiles::{ray_tiles, tiles};
 use anyhow::{Context, Result, bail, ensure};
+use columns::RowKind;
 use formats::Trace;
 use formats::container::{AtomicFile, is_stdout};
 use formats::interop::plain::{CompressedWriter, Compression, PlainAccess, PlainForm, PlainWriter};
@@ -133,13 +136,13 @@ pub enum GranularityName {
 }
 
 impl GranularityName {
-    /// The flag's value if the output holds rows of the trace instead of accesses.
-    fn of_rows(self) -> Option<&'static str> {
+    /// The flag's value and the rows, if the output holds rows of the trace instead of accesses.
+    fn of_rows(self) -> Option<(&'static str, RowKind)> {
         match self {
             Self::Texel | Self::Line => None,
-            Self::Record => Some("record"),
-            Self::Node => Some("node"),
-            Self::Slot => Some("slot"),
+            Self::Record => Some(("record", RowKind::Record)),
+            Self::Node => Some(("node", RowKind::Node)),
+            Self::Slot => Some(("slot", RowKind::Slot)),
         }
     }
 }
@@ -223,7 +226,7 @@ impl ConvertArgs {
             self.encoding.is_none() || self.to == Target::Textrace,
             "--encoding: only with --to textrace"
         );
-        if let Some(rows) = self.granularity.and_then(GranularityName::of_rows) {
+        if let Some((rows, _)) = self.granularity.and_then(GranularityName::of_rows) {
             ensure!(
                 self.to.has_rows(),
                 "--granularity {rows}: only with --to csv, jsonl, npy and parquet"
@@ -306,8 +309,8 @@ fn write_accesses(
     args: &ConvertArgs,
     out: &mut (impl Write + Send),
 ) -> Result<()> {
-    if args.granularity().of_rows().is_some() {
-        return columns::of_trace(trace, args.granularity(), args.to, out);
+    if let Some((_, kind)) = args.granularity().of_rows() {
+        return columns::of_trace(trace, kind, args.to, out, &|_, _| true);
     }
     if let Trace::Ray(trace) = trace
         && !trace.tables().meta.has_visits
@@ -483,6 +486,5 @@ fn reencode(trace: &Trace, args: &ConvertArgs) -> Result<()> {
     Ok(())
 }
 
-mod columns;
 #[cfg(test)]
 mod tests;

@@ -1,20 +1,21 @@
 //! `replay dump`: prints decoded records as JSON Lines.
 
+use super::convert::Target;
+use super::convert::columns::{self, RowKind};
 use super::tiles::{NumberRange, ray_tiles, tiles};
 use crate::files;
-use crate::records::{self, Rows};
+use crate::records;
 use anyhow::{Context, Result, bail, ensure};
 use formats::Trace;
 use formats::container::AtomicFile;
 use formats::interop::{
-    GeometryRow, RayRow, RecordRow, SampleRow, Tabular, child_rows, node_to_json, ray_samples,
-    record_rows, record_to_json, slot_rows, slot_to_json,
+    node_to_json, ray_samples, record_rows, record_to_json, slot_rows, slot_to_json,
 };
 use formats::raytrace::{RayTile, Raytrace};
 use formats::textrace::{Textrace, Tile};
 use report::notices;
-use report::rows_parquet::RowsWriter;
 use shell::Output;
+use std::cell::Cell;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -100,50 +101,32 @@ fn to_parquet(trace: &Trace, args: &DumpArgs, path: &Path) -> Result<()> {
         "--samples: expected a ray trace, found {}",
         args.trace.display()
     );
-    if args.nodes || args.slots {
-        return hierarchy_to_parquet(trace, args, path);
-    }
-    let write = |out: &mut (dyn Write + Send)| match trace {
-        Trace::Texture(trace) => {
-            let chosen = |at: &(usize, usize)| args.has(at.0, at.1);
-            parquet_of::<RecordRow, _>(&**trace, chosen, out)
-        }
-        Trace::Ray(trace) => {
-            let chosen = |at: &(_, u32)| args.has(at.0 as usize, at.1 as usize);
-            if args.samples {
-                parquet_of::<SampleRow, _>(&**trace, chosen, out)
-            } else if trace.has_geometry() {
-                parquet_of::<GeometryRow, _>(&**trace, chosen, out)
+    let kind = match args {
+        _ if args.nodes || args.slots => {
+            let trace = ray_trace(trace, args)?;
+            if !trace.has_hierarchy() {
+                records::hierarchy(trace)?;
+            }
+            if args.nodes {
+                RowKind::Node
             } else {
-                parquet_of::<RayRow, _>(&**trace, chosen, out)
+                RowKind::Slot
             }
         }
+        _ if args.samples => RowKind::Sample,
+        _ => RowKind::Record,
     };
     let name = || format!("cannot write {}", path.display());
     let mut out = AtomicFile::create(path).with_context(name)?;
-    let any = write(&mut out).with_context(name)?;
-    check_any(any, trace, args)?;
+    let any = Cell::new(args.nodes || args.slots);
+    let chosen = |pass, tile| {
+        let is_chosen = args.has(pass, tile);
+        any.set(any.get() || is_chosen);
+        is_chosen
+    };
+    columns::of_trace(trace, kind, Target::Parquet, &mut out, &chosen).with_context(name)?;
+    check_any(any.get(), trace, args)?;
     out.persist().with_context(name)
-}
-
-/// Writes the rows of the chosen tiles; returns false if no tile matches.
-fn parquet_of<R: Tabular, T: Rows<R>>(
-    trace: &T,
-    chosen: impl Fn(&T::At) -> bool,
-    out: &mut (dyn Write + Send),
-) -> Result<bool> {
-    let mut writer = RowsWriter::new(out)?;
-    let (mut tile, mut rows) = (T::Tile::default(), Vec::new());
-    let mut any = false;
-    for at in trace.places().into_iter().filter(chosen) {
-        any = true;
-        trace.append(at, &mut tile, &mut rows)?;
-        for row in rows.drain(..) {
-            writer.write(row)?;
-        }
-    }
-    writer.finish()?;
-    Ok(any)
 }
 
 fn dump(trace: &Trace, args: &DumpArgs, out: &mut impl Write) -> Result<()> {
@@ -227,31 +210,6 @@ fn hierarchy(trace: &Trace, args: &DumpArgs, out: &mut impl Write) -> Result<()>
             writeln!(out, "{}", slot_to_json(bvh, &row)?)?;
         }
     }
-    Ok(())
-}
-
-/// Writes the children of all inner nodes or the triangles of the hierarchy as Parquet.
-fn hierarchy_to_parquet(trace: &Trace, args: &DumpArgs, path: &Path) -> Result<()> {
-    let trace = ray_trace(trace, args)?;
-    let hierarchy = records::hierarchy(trace)?;
-    let name = || format!("cannot write {}", path.display());
-    let mut out = AtomicFile::create(path).with_context(name)?;
-    if args.nodes {
-        let rows = child_rows(&trace.tables().bvh, &hierarchy);
-        all_rows(rows, &mut out).with_context(name)?;
-    } else {
-        all_rows(slot_rows(&hierarchy), &mut out).with_context(name)?;
-    }
-    out.persist().with_context(name)
-}
-
-fn all_rows<R: Tabular>(
-    mut rows: impl Iterator<Item = R>,
-    out: &mut (dyn Write + Send),
-) -> Result<()> {
-    let mut writer = RowsWriter::new(out)?;
-    rows.try_for_each(|row| writer.write(row))?;
-    writer.finish()?;
     Ok(())
 }
 

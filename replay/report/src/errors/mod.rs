@@ -1,8 +1,9 @@
 //! Known errors of headline figures, measured by `replay accuracy` on the scenes that the table names.
 //! Errors that were not measured are not in the table.
 
-use super::columns::Column;
+use super::columns::{Column, Columns, columns_of};
 use super::html::Section;
+use super::lists::unique;
 use super::table::Table;
 use maud::html;
 use serde::{Deserialize, Serialize};
@@ -86,12 +87,9 @@ fn by_figure(of: Of) -> Vec<Figure> {
 
 /// The table: one row per figure, with the maximum error of each source.
 pub fn table(of: Of) -> Table {
-    let mut columns = vec![
-        Column::text("name", "largest error of", |f: &Figure| {
-            f.first.name.clone()
-        }),
-        Column::text("unit", "", |f: &Figure| f.first.unit.clone()),
-    ];
+    let mut columns = columns_of::<Figure>()
+        .text("name", "largest error of", |f| f.first.name.clone())
+        .text("unit", "", |f| f.first.unit.clone());
     for (index, contribution) in Contribution::ALL.into_iter().enumerate() {
         let (key, name) = (contribution.name(), contribution.title());
         let largest = move |f: &Figure| Some(f.errors[index]?.largest);
@@ -123,12 +121,7 @@ pub fn section(of: Of) -> Option<Section> {
 fn source(of: Of) -> Option<String> {
     let known = known(of);
     let command = &known.first()?.command;
-    let mut scenes: Vec<&str> = Vec::new();
-    for scene in known.iter().flat_map(|e| e.scenes.split(", ")) {
-        if !scenes.contains(&scene) {
-            scenes.push(scene);
-        }
-    }
+    let scenes = unique(known.iter().flat_map(|e| e.scenes.split(", ")));
     Some(format!("{command} on {}", scenes.join(", ")))
 }
 

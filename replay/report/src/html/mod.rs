@@ -1,13 +1,14 @@
 //! The self-contained HTML page: inline styles, script and pictures, no external resources.
 //!
-//! A page is a title, its [`Answer`] and a list of [`Section`]s. Every subcommand that writes a page builds
-//! them and calls [`page`]. The script sorts and filters tables; the page is whole without it.
+//! A [`Page`] is a title, its [`Answer`] and a list of [`Section`]s. The script sorts and filters tables; the page is whole without it.
 
 mod words;
 
 pub use words::{change, count, list};
 
+use crate::plots::PlotError;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use serde::Serialize;
 
 /// Inline style sheet. It recolours the plots' inks by attribute to follow the reader's colour scheme.
 const CSS: &str = include_str!("style.css");
@@ -62,8 +63,27 @@ pub(super) fn slug(title: &str) -> String {
     out.trim_end_matches('-').to_owned()
 }
 
+/// A page before it is written.
+#[derive(Debug, Default)]
+pub struct Page {
+    /// Its parts.
+    pub sections: Vec<Section>,
+}
+
+impl Page {
+    /// Adds a section whose anchor is derived from its title.
+    pub fn add(&mut self, title: impl Into<String>, body: Markup) {
+        self.sections.push(Section::new(title, body));
+    }
+
+    /// The page as text.
+    pub fn text(&self, title: &str, answer: &Answer) -> String {
+        page(title, answer, &self.sections)
+    }
+}
+
 /// The whole page.
-pub fn page(title: &str, answer: &Answer, sections: &[Section]) -> String {
+fn page(title: &str, answer: &Answer, sections: &[Section]) -> String {
     let notices = crate::notices::printed();
     html! {
         (DOCTYPE)
@@ -115,8 +135,35 @@ pub fn figures(pictures: &[(String, String)]) -> Markup {
     }
 }
 
+/// Charts without captions, in rows.
+///
+/// # Errors
+/// The first chart that cannot be drawn.
+pub fn charts(
+    svgs: impl IntoIterator<Item = Result<String, PlotError>>,
+) -> Result<Markup, PlotError> {
+    let pictures = svgs.into_iter().map(|svg| Ok((svg?, String::new())));
+    Ok(figures(&pictures.collect::<Result<Vec<_>, PlotError>>()?))
+}
+
+/// A chart, if there is one.
+///
+/// # Errors
+/// It cannot be drawn.
+pub fn chart(svg: Option<Result<String, PlotError>>, caption: &str) -> Result<Markup, PlotError> {
+    Ok(match svg {
+        Some(svg) => figure(&svg?, caption),
+        None => html! {},
+    })
+}
+
+/// Settings as TOML in a collapsible element.
+pub fn settings(summary: &str, settings: &impl Serialize) -> Markup {
+    folded(summary, &toml::to_string(settings).unwrap_or_default())
+}
+
 /// Preformatted text (configuration, command lines) in a collapsible element.
-pub fn folded(summary: &str, text: &str) -> Markup {
+fn folded(summary: &str, text: &str) -> Markup {
     html! { details { summary { (summary) } pre { (text) } } }
 }
 

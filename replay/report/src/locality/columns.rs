@@ -1,6 +1,6 @@
 //! Row types of the tables, and their columns.
 
-use crate::columns::{Column, Show};
+use crate::columns::{Column, Columns, Show};
 use sim::config::LevelConfig;
 use studies::locality::{
     ByOrigin, CacheHits, Figures, MissSplit, Origin, Sequence, Stream, WorkingSet,
@@ -212,18 +212,16 @@ pub fn summary<'a>() -> Vec<Column<'a, Summary<'a>>> {
 /// Columns of the curves.
 #[rustfmt::skip]
 pub fn curves<'a>() -> Vec<Column<'a, CurvePoint<'a>>> {
-    type C<'a> = Column<'a, CurvePoint<'a>>;
     let mut columns = subject_columns(|r: &CurvePoint| &r.of);
-    columns.extend([
-        C::text("policy", "policy", |r| r.policy),
-        C::new("ways", "ways", "", Show::Whole, |r| r.cache.ways.map(u64::from)).about("empty: fully associative"),
-        C::new("lines", "lines", "", Show::Whole, |r| r.cache.lines),
-        C::new("size_bytes", "size", "bytes", Show::Whole, CurvePoint::size_bytes),
-        C::new("misses", "misses", "", Show::Whole, |r| r.accesses - r.cache.hits.iter().sum::<u64>()),
-        C::real("line_miss_pct", "miss rate", "% of lines", 3, CurvePoint::line_miss_pct),
-        C::real("other_eye_pct", "from the other eye", "% of hits", 2, |r| share(&r.cache.hits, Origin::OtherEye)),
-        C::real("earlier_frame_pct", "from an earlier frame", "% of hits", 2, |r| share(&r.cache.hits, Origin::EarlierFrame)),
-    ]);
+    columns = columns
+        .text("policy", "policy", |r| r.policy)
+        .whole("ways", "ways", "", |r| r.cache.ways.map(u64::from)).about("empty: fully associative")
+        .whole("lines", "lines", "", |r| r.cache.lines)
+        .whole("size_bytes", "size", "bytes", CurvePoint::size_bytes)
+        .whole("misses", "misses", "", |r| r.accesses - r.cache.hits.iter().sum::<u64>())
+        .real("line_miss_pct", "miss rate", "% of lines", 3, CurvePoint::line_miss_pct)
+        .real("other_eye_pct", "from the other eye", "% of hits", 2, |r| share(&r.cache.hits, Origin::OtherEye))
+        .real("earlier_frame_pct", "from an earlier frame", "% of hits", 2, |r| share(&r.cache.hits, Origin::EarlierFrame));
     columns.extend(origin_columns(|r: &CurvePoint| &r.cache.hits).into_iter().map(|mut column| {
         column.heading.key = format!("hits_{}", column.heading.key).into();
         column
@@ -252,13 +250,10 @@ impl CurvePoint<'_> {
 /// Columns of reuses by distance.
 pub fn distances<'a>() -> Vec<Column<'a, Reuses<'a>>> {
     let mut columns = subject_columns(|r: &Reuses| &r.of);
-    columns.extend([
-        Column::new("from", "from", "lines", Show::Whole, |r: &Reuses| {
-            r.distances.0
-        })
-        .about("smallest number of distinct other lines since the previous use"),
-        Column::new("to", "to", "lines", Show::Whole, |r: &Reuses| r.distances.1),
-    ]);
+    columns = columns
+        .whole("from", "from", "lines", |r| r.distances.0)
+        .about("smallest number of distinct other lines since the previous use")
+        .whole("to", "to", "lines", |r| r.distances.1);
     columns.extend(origin_columns(|r: &Reuses| &r.reuses));
     columns
 }

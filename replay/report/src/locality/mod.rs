@@ -182,9 +182,8 @@ impl Document for LocalityReport {
         "distances.csv",
         "working-sets.csv",
     ];
-    type Json<'a> = LocalityJson<'a>;
 
-    fn content(&self) -> LocalityJson<'_> {
+    fn content(&self) -> impl Serialize {
         let rows = self.summaries();
         let distances: Vec<_> = rows.iter().flat_map(Self::distances).collect();
         LocalityJson {

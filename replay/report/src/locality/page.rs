@@ -4,7 +4,7 @@ use super::columns::Summary;
 use super::{LocalityReport, TraceFigures, plots};
 use crate::answers;
 use crate::document::Document;
-use crate::html::{self, Answer, Section, figures};
+use crate::html::{self, Answer, Page, figures};
 use crate::plots::PlotError;
 use crate::plots::stacked::StackedChart;
 use crate::table::Table;
@@ -45,7 +45,7 @@ impl LocalityReport {
     /// A plot that cannot be drawn.
     pub fn page(&self) -> Result<String, PlotError> {
         let (rows, table) = (self.summaries(), self.rows());
-        let mut sections = Vec::new();
+        let mut page = Page::default();
         let same = |a: &Summary, b: &Summary| {
             (a.of.trace, a.of.stream.key()) == (b.of.trace, b.of.stream.key())
         };
@@ -56,19 +56,13 @@ impl LocalityReport {
                 .only("stream", of.stream.key());
             let trace = self.traces.iter().find(|t| t.label == of.trace);
             let Some(trace) = trace else { continue };
-            let body = stream(rows, &table, trace)?;
-            sections.push(Section::new(
-                format!("{}: {}", of.trace, of.stream.title()),
-                body,
-            ));
+            let title = format!("{}: {}", of.trace, of.stream.title());
+            page.add(title, stream(rows, &table, trace)?);
         }
-        sections.push(Section::new(
+        page.add(
             "Machine",
-            html::folded(
-                "configuration (TOML)",
-                &toml::to_string(&self.config).unwrap_or_default(),
-            ),
-        ));
+            html::settings("configuration (TOML)", &self.config),
+        );
         let names: Vec<&str> = self.traces.iter().map(|t| t.label.as_str()).collect();
         let rendered = self.traces.iter().any(TraceFigures::is_rendered);
         let about = html! {
@@ -83,16 +77,13 @@ impl LocalityReport {
                 }
             }
         };
-        let chart = match rows.chunk_by(same).next() {
-            Some(rows) => html::figure(&plots::miss_ratio(rows).svg()?, ""),
-            None => html! {},
-        };
+        let first = rows.chunk_by(same).next();
         let answer = Answer {
             sentences: sentences(&rows),
-            chart,
+            chart: html::chart(first.map(|rows| plots::miss_ratio(rows).svg()), "")?,
             about,
         };
-        Ok(html::page("Parallax: locality", &answer, &sections))
+        Ok(page.text("Parallax: locality", &answer))
     }
 }
 
@@ -129,27 +120,23 @@ fn sentences(rows: &[Summary]) -> Vec<String> {
 /// A stream of a trace: its table and plots.
 fn stream(rows: &[Summary], table: &Table, trace: &TraceFigures) -> Result<Markup, PlotError> {
     let (rendered, one_frame) = (trace.is_rendered(), trace.frames < 2);
-    let plain = |svg: String| (svg, String::new());
     // The start of a bin.
     let far_from = (rows[0].figures.configured_lines / 8)
         .max(1)
         .next_power_of_two();
     let far = distances(rows, far_from)?;
     let all = distances(rows, 1)?;
-    let ways = rows
-        .iter()
-        .map(|row| Ok(plain(plots::associativity(row).svg()?)));
-    let ways = ways.collect::<Result<Vec<_>, PlotError>>()?;
+    let ways = rows.iter().map(|row| plots::associativity(row).svg());
     let keys = SHOWN.into_iter();
     let empty =
         |key: &&str| (one_frame && key.contains("earlier")) || (!rendered && key.contains("eye"));
     let shown = table.picked(keys.filter(|key| !empty(key)));
     let shown = shown.without_empty_columns();
-    let mut by_size = vec![plain(plots::miss_ratio(rows).svg()?)];
+    let mut by_size = vec![plots::miss_ratio(rows).svg()];
     if rendered {
-        by_size.push(plain(plots::other_eye(rows).svg()?));
+        by_size.push(plots::other_eye(rows).svg());
     }
-    by_size.push(plain(plots::above_opt(rows).svg()?));
+    by_size.push(plots::above_opt(rows).svg());
     let together = if rendered {
         "Two tiles rendered together count as two tiles in length, and their lines belong to both."
     } else {
@@ -157,14 +144,14 @@ fn stream(rows: &[Summary], table: &Table, trace: &TraceFigures) -> Result<Marku
     };
     let mut working_sets = vec![(plots::working_sets(rows).svg()?, together.to_owned())];
     if rendered {
-        working_sets.push(plain(plots::shared_working_sets(rows).svg()?));
+        working_sets.push((plots::shared_working_sets(rows).svg()?, String::new()));
     }
     Ok(html! {
         p { (about(rows, rendered)) }
         (shown.markup())
-        (meanings(&shown))
+        (shown.folded_meanings())
         h3 { "Misses by size" }
-        (figures(&by_size))
+        (html::charts(by_size)?)
         h3 { "The configured cache" }
         (figures(&[
             (plots::causes(rows).svg()?, "Compulsory: first uses. Conflict: a fully associative cache of this size hits. Capacity: it also misses.".to_owned()),
@@ -181,7 +168,7 @@ fn stream(rows: &[Summary], table: &Table, trace: &TraceFigures) -> Result<Marku
         (figures(&working_sets))
         details {
             summary { "miss ratio by size and ways, by order" }
-            (figures(&ways))
+            (html::charts(ways)?)
         }
     })
 }
@@ -220,14 +207,4 @@ fn about(rows: &[Summary], rendered: bool) -> String {
     );
     let (ways, policy) = (cache.ways, cache.replacement.name());
     format!("{sees}. The configured cache: {size}, {ways} ways, {policy}, lines of {line}.")
-}
-
-/// Definitions of the columns.
-fn meanings(table: &Table) -> Markup {
-    html! {
-        details {
-            summary { "definitions of the columns" }
-            (table.meanings())
-        }
-    }
 }

@@ -1,5 +1,6 @@
 //! Means of an order over traces and caches.
 
+use crate::lists::{geometric_mean, mean, unique};
 use sim::config::BetweenFrames;
 use sim::order::cost::Cost;
 use studies::orders_study::Row;
@@ -15,24 +16,9 @@ pub struct Mean<'a> {
 
 /// Geometric mean; none without values, or if a value is not positive.
 fn geometric(ratios: impl Iterator<Item = f64>) -> Option<f64> {
-    let (mut sum, mut count) = (0.0, 0);
-    for ratio in ratios {
-        if ratio <= 0.0 {
-            return None;
-        }
-        sum += ratio.ln();
-        count += 1;
-    }
-    (count > 0).then(|| (sum / f64::from(count)).exp())
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (mut sum, mut count) = (0.0, 0);
-    for value in values {
-        sum += value;
-        count += 1;
-    }
-    (count > 0).then(|| sum / f64::from(count))
+    let ratios: Vec<f64> = ratios.collect();
+    let is_positive = ratios.iter().all(|ratio| *ratio > 0.0);
+    geometric_mean(ratios).filter(|_| is_positive)
 }
 
 fn change_pct(ratio: f64) -> f64 {
@@ -124,12 +110,9 @@ impl<'a> Mean<'a> {
 /// The means by order and by what happens between frames, fewest bytes first.
 pub fn means<'a>(rows: &'a [Row<'a>]) -> Vec<Mean<'a>> {
     let mut means: Vec<Mean<'a>> = Vec::new();
-    let mut betweens: Vec<BetweenFrames> = Vec::new();
+    let betweens = unique(rows.iter().map(|row| row.config.between_frames));
     for row in rows {
         let between = row.config.between_frames;
-        if !betweens.contains(&between) {
-            betweens.push(between);
-        }
         let name = row.name();
         let known = means
             .iter_mut()

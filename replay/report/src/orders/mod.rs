@@ -59,12 +59,8 @@ impl<'a> OrdersReport<'a> {
 
 impl Document for OrdersReport<'_> {
     const SCHEMA: &'static str = "replay.orders/2";
-    type Json<'a>
-        = OrdersJson<'a>
-    where
-        Self: 'a;
 
-    fn content(&self) -> OrdersJson<'_> {
+    fn content(&self) -> impl Serialize {
         let mut traces: Vec<TraceFacts<'_>> = Vec::new();
         for row in &self.rows {
             if traces

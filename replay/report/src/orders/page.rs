@@ -2,11 +2,12 @@
 
 use super::{Mean, OrdersReport, columns, means};
 use crate::answers;
-use crate::html::{self, Answer, Section, figures};
+use crate::html::{self, Answer, Page};
+use crate::lists::unique;
 use crate::plots::PlotError;
 use crate::plots::SeriesStyle;
 use crate::plots::hbars::HBarChart;
-use crate::plots::paths::{PathPlot, Stop};
+use crate::plots::paths::{PathPlot, stops};
 use crate::table::Table;
 use maud::{Markup, html};
 use sim::order::{PlanInputs, View, WorkItem};
@@ -43,39 +44,27 @@ impl OrdersReport<'_> {
     /// # Errors
     /// A plot that could not be drawn.
     pub fn page(&self) -> Result<String, PlotError> {
-        let mut sections = Vec::new();
-        let mut displays: Vec<(&str, i32)> = Vec::new();
-        for row in &self.rows {
-            let display = (row.subject.id.display.as_str(), row.offset_tiles);
-            if !displays.contains(&display) {
-                displays.push(display);
-            }
-        }
+        let mut page = Page::default();
+        let display = |row: &Row<'_>| (row.subject.id.display.clone(), row.offset_tiles);
+        let mut displays = unique(self.rows.iter().map(display));
         displays.sort_by_key(|(_, offset)| offset.abs());
-        for (display, offset) in displays {
-            let rows: Vec<Row<'_>> = (self.rows.iter())
-                .filter(|row| {
-                    (row.subject.id.display.as_str(), row.offset_tiles) == (display, offset)
-                })
-                .cloned()
-                .collect();
-            let title = format!("Display {display}: infinity {offset} tiles apart");
-            sections.push(Section::new(title, of_display(&means::means(&rows))));
+        for of in displays {
+            let own = self.rows.iter().filter(|row| display(row) == of);
+            let rows: Vec<Row<'_>> = own.cloned().collect();
+            let title = format!("Display {}: infinity {} tiles apart", of.0, of.1);
+            page.add(title, of_display(&means::means(&rows)));
         }
         if !self.learned.is_empty() {
-            sections.push(Section::new(
+            page.add(
                 "Learning from the last frames",
                 self.learned_table().markup(),
-            ));
+            );
         }
-        sections.push(Section::new("Paths", self.paths()?));
-        sections.push(Section::new(
+        page.add("Paths", self.paths()?);
+        page.add(
             "Machine",
-            html::folded(
-                "configuration (TOML)",
-                &toml::to_string(&self.config).unwrap_or_default(),
-            ),
-        ));
+            html::settings("configuration (TOML)", &self.config),
+        );
         let about = html! {
             p {
                 "Bytes between the L2 and memory in each tile order, against those of " code { (BASELINE.name()) }
@@ -89,7 +78,7 @@ impl OrdersReport<'_> {
             chart: html::figure(&best_and_bounds(&means).svg()?, ""),
             about,
         };
-        Ok(html::page("Parallax: tile orders", &answer, &sections))
+        Ok(page.text("Parallax: tile orders", &answer))
     }
 
     /// The path of each order over a small picture on the display of the first trace.
@@ -111,12 +100,12 @@ impl OrdersReport<'_> {
             let [left, right] = small_views(row);
             let items = order.parts().stereo(left, right, &seen);
             let plot = path(&name, &items);
-            pictures.push((plot.svg()?, String::new()));
+            pictures.push(plot.svg());
             known.push(name);
         }
         Ok(html! {
             p { "On pictures of " (PATH_TILES[0]) " by " (PATH_TILES[1]) " tiles with an L2 that holds a row of four columns; pairings as on the display of the first trace, at this size." }
-            (figures(&pictures))
+            (html::charts(pictures)?)
         })
     }
 }
@@ -184,36 +173,18 @@ fn small_views(row: &Row<'_>) -> [View; 2] {
 }
 
 fn path(name: &str, items: &[WorkItem]) -> PathPlot {
-    let mut stops = Vec::new();
-    for item in items {
-        for (number, at) in item.tiles().enumerate() {
-            stops.push(Stop {
-                eye: at.pass,
-                x: at.tile % PATH_TILES[0],
-                y: at.tile / PATH_TILES[0],
-                paired: number > 0,
-            });
-        }
-    }
     PathPlot {
         title: name.to_owned(),
         note: "steps; the two tiles of a pair share one".to_owned(),
         tiles: PATH_TILES,
-        stops,
+        stops: stops(items, PATH_TILES),
     }
 }
 
 fn of_display(means: &[Mean<'_>]) -> Markup {
     let table = Table::new(&columns::means(), means);
     let mut sections = Vec::new();
-    let mut betweens: Vec<String> = Vec::new();
-    for mean in means {
-        let between = mean.between.to_string();
-        if !betweens.contains(&between) {
-            betweens.push(between);
-        }
-    }
-    for between in betweens {
+    for between in unique(means.iter().map(|mean| mean.between.to_string())) {
         let shown = table.only("between_frames", &between).picked(SHOWN);
         sections.push((between, shown.without_empty_columns()));
     }

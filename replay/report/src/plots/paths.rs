@@ -7,6 +7,7 @@ use crate::theme;
 use plotters::chart::ChartBuilder;
 use plotters::prelude::{Color, PathElement, Rectangle};
 use plotters::style::text_anchor::HPos;
+use sim::order::WorkItem;
 
 /// A stop of the path: the eye (0 left, 1 right), column and row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +20,22 @@ pub struct Stop {
     pub y: u32,
     /// Whether it is rendered together with the stop before it, on the same core.
     pub paired: bool,
+}
+
+/// The stops of an order's items over grids of this many columns and rows; the pass of a tile is its eye.
+pub(crate) fn stops(items: &[WorkItem], [columns, _]: [u32; 2]) -> Vec<Stop> {
+    let mut stops = Vec::new();
+    for item in items {
+        for (number, at) in item.tiles().enumerate() {
+            stops.push(Stop {
+                eye: at.pass,
+                x: at.tile % columns.max(1),
+                y: at.tile / columns.max(1),
+                paired: number > 0,
+            });
+        }
+    }
+    stops
 }
 
 /// An order's path.

@@ -1,7 +1,7 @@
 //! Tables of reprojection results.
 
 use super::Entry;
-use crate::columns::{Column, Row, Show, pick};
+use crate::columns::{Column, Columns, Row, Show, columns_of, pick};
 use crate::table::Table;
 use sgrt::accuracy::{Accuracy, ClassCounts};
 use sgrt::compose::Reuse;
@@ -147,46 +147,27 @@ fn millions<'a>(
     Column::new(key, name, unit, show, move |r: &RuleRow| value(r.outcome))
 }
 
-fn text<'a>(
-    key: &'static str,
-    name: &'static str,
-    value: fn(&RuleRow) -> String,
-) -> Column<'static, RuleRow<'a>> {
-    Column::text(key, name, move |r: &RuleRow| value(r))
-}
-
 /// What a row is about.
 fn identity<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
-    vec![
-        text("scene", "scene", |r| scene_name(r.report)),
-        text("trace", "trace", |r| r.report.trace.name.clone()),
-        text("checksum", "checksum", |r| r.report.trace.checksum.clone()),
-        text("camera", "camera", |r| r.report.trace.camera.clone()),
-        text("display", "display", |r| r.report.trace.display.clone()),
-        Column::text("width_px", "width", |r: &RuleRow| {
-            u64::from(r.report.eye_size_px[0])
-        }),
-        Column::text("height_px", "height", |r: &RuleRow| {
-            u64::from(r.report.eye_size_px[1])
-        }),
-        Column::text("model_version", "model", |r: &RuleRow| {
-            u64::from(r.report.model_version)
-        }),
-        text("cache_misses", "cache misses from", |r| {
-            r.report.config.cache_misses.clone()
-        }),
-        text("timing", "timing", |r| {
-            r.report.config.timing.name().to_owned()
-        }),
-        text("run", "rule", |r| r.run.to_owned()),
-        text("rule", "rule", |r| match r.run {
+    columns_of::<RuleRow>()
+        .text("scene", "scene", |r| scene_name(r.report))
+        .text("trace", "trace", |r| r.report.trace.name.as_str())
+        .text("checksum", "checksum", |r| r.report.trace.checksum.as_str())
+        .text("camera", "camera", |r| r.report.trace.camera.as_str())
+        .text("display", "display", |r| r.report.trace.display.as_str())
+        .text("width_px", "width", |r| r.report.eye_size_px[0])
+        .text("height_px", "height", |r| r.report.eye_size_px[1])
+        .text("model_version", "model", |r| r.report.model_version)
+        .text("cache_misses", "cache misses from", |r| {
+            r.report.config.cache_misses.as_str()
+        })
+        .text("timing", "timing", |r| r.report.config.timing.name())
+        .text("run", "rule", |r| r.run)
+        .text("rule", "rule", |r| match r.run {
             "chosen" => r.report.config.rule.to_string(),
             _ => "none".to_owned(),
-        }),
-        text("reuse", "reused", |r| {
-            reuse_name(r.report.config.reuse).to_owned()
-        }),
-    ]
+        })
+        .text("reuse", "reused", |r| reuse_name(r.report.config.reuse))
 }
 
 /// Reused hits and their errors.
@@ -227,7 +208,7 @@ fn cycles<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
         millions("reference_tni_cycles", "both eyes in full", "M", |o| o.reference_tni_cycles),
         millions("srp_cycles", "core cycles", "M", |o| o.srp_cycles),
         millions("reference_srp_cycles", "both eyes in full", "M", |o| o.reference_srp_cycles),
-        text("tni_bottleneck", "unit bottleneck", |r| r.outcome.tni_bottleneck.clone()),
+        Column::text("tni_bottleneck", "unit bottleneck", |r: &RuleRow| r.outcome.tni_bottleneck.clone()),
         millions("rays", "rays", "M", |o| o.work.rays),
         millions("reference_rays", "both eyes in full", "M", |o| o.reference_work.rays),
         millions("steps", "steps", "M", |o| o.work.steps),
@@ -238,19 +219,14 @@ fn cycles<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
 
 /// Differences between the pictures.
 fn image_error<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
-    vec![
-        Column::real("flip_mean", "FLIP mean", "", 5, |r: &RuleRow| {
-            r.outcome.flip_mean
-        }),
-        Column::real("flip_p99", "FLIP p99", "", 4, |r: &RuleRow| {
-            r.outcome.flip_p99
-        }),
-        Column::real("pixels_per_degree", "ppd", "px/deg", 1, |r: &RuleRow| {
+    columns_of::<RuleRow>()
+        .real("flip_mean", "FLIP mean", "", 5, |r| r.outcome.flip_mean)
+        .real("flip_p99", "FLIP p99", "", 4, |r| r.outcome.flip_p99)
+        .real("pixels_per_degree", "ppd", "px/deg", 1, |r| {
             r.outcome.pixels_per_degree
-        }),
-        Column::real("psnr_db", "PSNR", "dB", 1, |r: &RuleRow| r.outcome.psnr_db),
-        Column::real("ssim", "SSIM", "", 4, |r: &RuleRow| r.outcome.ssim),
-    ]
+        })
+        .real("psnr_db", "PSNR", "dB", 1, |r| r.outcome.psnr_db)
+        .real("ssim", "SSIM", "", 4, |r| r.outcome.ssim)
 }
 
 /// Reads of the detection, buffers and DRAM traffic.
@@ -306,78 +282,36 @@ impl Row for RuleRow<'_> {
     }
 }
 
-fn by_rule(entries: &[Entry], keys: &[&str]) -> Table {
-    let columns = pick::<RuleRow>(&[&["scene", "run"], keys].concat());
+fn by_rule<'a>(entries: &'a [Entry], figures: Vec<Column<'static, RuleRow<'a>>>) -> Table {
+    let mut columns = pick::<RuleRow>(&["scene", "run"]);
+    columns.extend(figures);
     Table::new(&columns, &rule_rows(entries)).grouped_by(1)
 }
 
 /// The ratios, and the paper's.
 pub fn performance(entries: &[Entry]) -> Table {
-    let keys = [
-        "reuse_pct",
-        "relative_performance",
-        "tni_relative_performance",
-        "paper_relative_performance",
-        "relative_energy",
-        "relative_energy_least",
-        "relative_energy_most",
-        "paper_relative_energy",
-        "primary_steps_pct",
-        "tni_reduction_pct",
-        "right_tni_reduction_pct",
-        "srp_overhead_pct",
-    ];
-    by_rule(entries, &keys).without_empty_columns()
+    let mut figures = pick(&["reuse_pct"]);
+    figures.extend(ratios());
+    by_rule(entries, figures).without_empty_columns()
 }
 
 /// Reuse and its error.
 pub fn accuracy(entries: &[Entry]) -> Table {
-    let keys = [
-        "reuse_pct",
-        "wrong_object_pct",
-        "wrong_primitive_pct",
-        "position_over_1px_pct",
-        "position_over_2px_pct",
-        "flip_mean",
-        "flip_p99",
-        "pixels_per_degree",
-        "psnr_db",
-        "ssim",
-    ];
-    by_rule(entries, &keys)
+    let mut figures = hits();
+    figures.extend(image_error());
+    by_rule(entries, figures)
 }
 
 /// Cycles and work.
 pub fn work(entries: &[Entry]) -> Table {
-    let keys = [
-        "tni_cycles",
-        "reference_tni_cycles",
-        "srp_cycles",
-        "reference_srp_cycles",
-        "tni_bottleneck",
-        "rays",
-        "reference_rays",
-        "steps",
-        "reference_steps",
-        "retests",
-    ];
-    by_rule(entries, &keys)
+    by_rule(entries, cycles())
 }
 
 /// Bytes moved, with a tiled G-buffer and without.
 pub fn traffic(entries: &[Entry]) -> Table {
-    let keys = [
-        "detection_bytes",
-        "detection_sram_kib",
-        "on_chip_bytes",
-        "gbuffer_dram_bytes",
-        "dram_bytes",
-        "reference_dram_bytes",
-        "whole_screen_dram_bytes",
-        "whole_screen_relative_performance",
-        "whole_screen_relative_energy",
-    ];
-    by_rule(entries, &keys)
+    let mut figures = bytes();
+    figures.retain(|figure| figure.heading.key != "row_test_applies");
+    by_rule(entries, figures)
 }
 
 /// Per trace, one row for the rule and one for plain reuse.
@@ -485,39 +419,24 @@ pub fn energy(entries: &[Entry]) -> Table {
 
 /// The points of the curve.
 pub fn curve(report: &Report) -> Table {
-    let columns = [
-        Column::text("rule", "rule", |p: &CurvePoint| p.rule.to_string()),
-        Column::text("reuse", "reused", |p: &CurvePoint| reuse_name(p.reuse)),
-        Column::real("reuse_pct", "reuse", "%", 2, |p: &CurvePoint| p.reuse_pct),
-        Column::real(
-            "wrong_object_pct",
-            "wrong object",
-            "%",
-            3,
-            |p: &CurvePoint| p.wrong_object_pct,
-        ),
-        Column::real(
-            "tni_reduction_pct",
-            "unit cycles saved",
-            "%",
-            1,
-            |p: &CurvePoint| p.tni_reduction_pct,
-        ),
-        Column::real(
-            "relative_performance",
-            "performance",
-            "ratio",
-            3,
-            |p: &CurvePoint| p.relative_performance,
-        ),
-        Column::real("relative_energy", "energy", "ratio", 3, |p: &CurvePoint| {
+    let columns = columns_of::<CurvePoint>()
+        .text("rule", "rule", |p| p.rule.to_string())
+        .text("reuse", "reused", |p| reuse_name(p.reuse))
+        .real("reuse_pct", "reuse", "%", 2, |p| p.reuse_pct)
+        .real("wrong_object_pct", "wrong object", "%", 3, |p| {
+            p.wrong_object_pct
+        })
+        .real("tni_reduction_pct", "unit cycles saved", "%", 1, |p| {
+            p.tni_reduction_pct
+        })
+        .real("relative_performance", "performance", "ratio", 3, |p| {
+            p.relative_performance
+        })
+        .real("relative_energy", "energy", "ratio", 3, |p| {
             p.relative_energy
-        }),
-        Column::real("flip_mean", "FLIP mean", "", 5, |p: &CurvePoint| {
-            p.flip_mean
-        }),
-        Column::real("flip_p99", "FLIP p99", "", 4, |p: &CurvePoint| p.flip_p99),
-    ];
+        })
+        .real("flip_mean", "FLIP mean", "", 5, |p| p.flip_mean)
+        .real("flip_p99", "FLIP p99", "", 4, |p| p.flip_p99);
     Table::new(&columns, &report.curve).grouped_by(1)
 }
 

@@ -1,6 +1,7 @@
 //! The figures of a technique, one per line.
 
-use crate::columns::{Column, Show};
+use crate::columns::{Column, Columns, Show, columns_of};
+use crate::lists::unique;
 use sim::config::Order;
 use sim::model_version::MODEL_VERSION;
 use studies::techniques::{CacheFigures, Count, Measured, OrderGain, RATES_HZ};
@@ -58,57 +59,55 @@ fn ratio<'a>(key: &'static str, name: &'static str, of: Count) -> Figure<'a> {
 /// What a row is about.
 #[rustfmt::skip]
 fn identity<'a>() -> Vec<Figure<'a>> {
-    vec![
-        Figure::text("scene", "scene", |m| m.scene),
-        Figure::text("trace", "trace", |m| m.row.trace.as_deref().map(|file| file.trim_end_matches(".textrace")))
-            .about("name of the technique's trace without folder and extension"),
-        Figure::text("checksum", "checksum", |m| m.row.trace_checksum.as_deref())
-            .about("checksum of the trace's content"),
-        Figure::text("camera", "camera", |m| m.manifest.camera.as_str()),
-        Figure::text("display", "display", |m| m.manifest.hmd.name.as_str()),
-        Figure::text("width_px", "width", |m| u64::from(m.manifest.size_px[0]))
-            .about("image width per eye in pixels"),
-        Figure::text("height_px", "height", |m| u64::from(m.manifest.size_px[1]))
-            .about("image height per eye in pixels"),
-        Figure::text("model_version", "model", |_| u64::from(MODEL_VERSION))
-            .about("version of the models; counts of different versions cannot be compared"),
-        Figure::text("technique", "technique", |m| m.row.technique.as_str()),
-        Figure::text("title", "name", |m| m.row.title.as_str()),
-        Figure::text("parts", "combines", |m| m.row.parts.join(" + ")),
-        Figure::text("lossless", "lossless", |m| m.row.lossless)
-            .about("meant to leave every visible pixel unchanged"),
-        Figure::text("dominated", "dominated", |m| m.dominated)
-            .about("another technique has no more error and takes less time (the interquartile ranges do not overlap)"),
-        Figure::text("dominated_in", "dominated in", |m| m.dominated_in.join(" "))
-            .about("counts in which another technique is at least as good, with at most the same error in its worst picture, and better in one of both"),
-    ]
+    columns_of::<&'a Measured<'a>>()
+        .text("scene", "scene", |m| m.scene)
+        .text("trace", "trace", |m| m.row.trace.as_deref().map(|file| file.trim_end_matches(".textrace")))
+            .about("name of the technique's trace without folder and extension")
+        .text("checksum", "checksum", |m| m.row.trace_checksum.as_deref())
+            .about("checksum of the trace's content")
+        .text("camera", "camera", |m| m.manifest.camera.as_str())
+        .text("display", "display", |m| m.manifest.hmd.name.as_str())
+        .text("width_px", "width", |m| m.manifest.size_px[0])
+            .about("image width per eye in pixels")
+        .text("height_px", "height", |m| m.manifest.size_px[1])
+            .about("image height per eye in pixels")
+        .text("model_version", "model", |_| MODEL_VERSION)
+            .about("version of the models; counts of different versions cannot be compared")
+        .text("technique", "technique", |m| m.row.technique.as_str())
+        .text("title", "name", |m| m.row.title.as_str())
+        .text("parts", "combines", |m| m.row.parts.join(" + "))
+        .text("lossless", "lossless", |m| m.row.lossless)
+            .about("meant to leave every visible pixel unchanged")
+        .text("dominated", "dominated", |m| m.dominated)
+            .about("another technique has no more error and takes less time (the interquartile ranges do not overlap)")
+        .text("dominated_in", "dominated in", |m| m.dominated_in.join(" "))
+            .about("counts in which another technique is at least as good, with at most the same error in its worst picture, and better in one of both")
 }
 
 /// Times relative to the baseline, and frame times.
 #[rustfmt::skip]
 fn times<'a>() -> Vec<Figure<'a>> {
-    vec![
-        Figure::real("frame_time_ratio", "time", "\u{d7} baseline", 3, |m| m.timing.ratio.median)
-            .about("frame time over that of the baseline measured next to it: median over all frames and repeats"),
-        Figure::real("frame_time_ratio_q1", "lower quartile", "\u{d7} baseline", 3, |m| m.timing.ratio.q1),
-        Figure::real("frame_time_ratio_q3", "upper quartile", "\u{d7} baseline", 3, |m| m.timing.ratio.q3),
-        Figure::real("frame_time_ratio_p1", "1 %", "\u{d7} baseline", 3, |m| m.timing.ratio.p1),
-        Figure::real("frame_time_ratio_p99", "99 %", "\u{d7} baseline", 3, |m| m.timing.ratio.p99),
-        Figure::real("processor_time_ratio", "processors", "\u{d7} baseline", 3, |m| m.timing.processor_ratio)
-            .about("processor time over the baseline's, all frames; each frame counts with its fastest repeat. Other load on the machine affects it less than the frame time"),
-        Figure::real("processor_time_ratio_q1", "lower quartile", "\u{d7} baseline", 3, |m| m.timing.processor_ratios.map(|r| r.q1)),
-        Figure::real("processor_time_ratio_q3", "upper quartile", "\u{d7} baseline", 3, |m| m.timing.processor_ratios.map(|r| r.q3)),
-        Figure::real("frame_ms", "frame", "ms", 2, |m| m.timing.frame_ms.median)
-            .about("median frame time without capture"),
-        Figure::real("frame_ms_p1", "1 %", "ms", 2, |m| m.timing.frame_ms.p1),
-        Figure::real("frame_ms_p99", "99 %", "ms", 2, |m| m.timing.frame_ms.p99),
-        Figure::real("beyond_90hz_pct", "late at 90 Hz", "%", 1, |m| m.timing.beyond_pct[0])
-            .about("frames longer than 11.1 ms, with times scaled to a median of 11.1 ms for the baseline"),
-        Figure::real("beyond_72hz_pct", "late at 72 Hz", "%", 1, |m| m.timing.beyond_pct[1])
-            .about("frames longer than 13.9 ms, with times scaled to a median of 11.1 ms for the baseline"),
-        Figure::real("cull_ms", "culling", "ms", 3, |m| m.timing.cull_ms)
-            .about("median culling time per frame"),
-    ]
+    columns_of::<&'a Measured<'a>>()
+        .real("frame_time_ratio", "time", "\u{d7} baseline", 3, |m| m.timing.ratio.median)
+            .about("frame time over that of the baseline measured next to it: median over all frames and repeats")
+        .real("frame_time_ratio_q1", "lower quartile", "\u{d7} baseline", 3, |m| m.timing.ratio.q1)
+        .real("frame_time_ratio_q3", "upper quartile", "\u{d7} baseline", 3, |m| m.timing.ratio.q3)
+        .real("frame_time_ratio_p1", "1 %", "\u{d7} baseline", 3, |m| m.timing.ratio.p1)
+        .real("frame_time_ratio_p99", "99 %", "\u{d7} baseline", 3, |m| m.timing.ratio.p99)
+        .real("processor_time_ratio", "processors", "\u{d7} baseline", 3, |m| m.timing.processor_ratio)
+            .about("processor time over the baseline's, all frames; each frame counts with its fastest repeat. Other load on the machine affects it less than the frame time")
+        .real("processor_time_ratio_q1", "lower quartile", "\u{d7} baseline", 3, |m| m.timing.processor_ratios.map(|r| r.q1))
+        .real("processor_time_ratio_q3", "upper quartile", "\u{d7} baseline", 3, |m| m.timing.processor_ratios.map(|r| r.q3))
+        .real("frame_ms", "frame", "ms", 2, |m| m.timing.frame_ms.median)
+            .about("median frame time without capture")
+        .real("frame_ms_p1", "1 %", "ms", 2, |m| m.timing.frame_ms.p1)
+        .real("frame_ms_p99", "99 %", "ms", 2, |m| m.timing.frame_ms.p99)
+        .real("beyond_90hz_pct", "late at 90 Hz", "%", 1, |m| m.timing.beyond_pct[0])
+            .about("frames longer than 11.1 ms, with times scaled to a median of 11.1 ms for the baseline")
+        .real("beyond_72hz_pct", "late at 72 Hz", "%", 1, |m| m.timing.beyond_pct[1])
+            .about("frames longer than 13.9 ms, with times scaled to a median of 11.1 ms for the baseline")
+        .real("cull_ms", "culling", "ms", 3, |m| m.timing.cull_ms)
+            .about("median culling time per frame")
 }
 
 /// Frames that miss a display's refresh, by rate.
@@ -130,12 +129,8 @@ fn pacing<'a>() -> Vec<Figure<'a>> {
 
 /// Times of the stages, under the names that the captures give them.
 fn stages<'a>(rows: &[&'a Measured<'a>]) -> Vec<Figure<'a>> {
-    let mut stages: Vec<&str> = Vec::new();
-    for (stage, _) in rows.iter().flat_map(|m| &m.timing.stages_ms) {
-        if !stages.contains(&stage.as_str()) {
-            stages.push(stage);
-        }
-    }
+    let all = rows.iter().flat_map(|m| &m.timing.stages_ms);
+    let stages = unique(all.map(|(stage, _)| stage.as_str()));
     let figures = stages.into_iter().map(str::to_owned).map(|stage| {
         let heading = (format!("stages_ms.{stage}"), stage.clone());
         Figure::real(heading.0, heading.1, "ms", 3, move |m| {
@@ -188,39 +183,31 @@ fn counts<'a>() -> Vec<Figure<'a>> {
 /// Differences from the baseline's pictures.
 #[rustfmt::skip]
 fn image_error<'a>() -> Vec<Figure<'a>> {
-    vec![
-        Figure::real("flip_mean", "FLIP", "", 5, |m| m.pictures.flip_mean)
-            .about("mean FLIP inside the visible area of the lens"),
-        Figure::real("flip_p99", "FLIP 99 %", "", 5, |m| m.pictures.flip_p99)
-            .about("mean of the pictures' 99th percentiles of FLIP"),
-        Figure::real("flip_worst", "worst", "FLIP", 5, |m| m.pictures.flip_worst)
-            .about("mean FLIP of the worst picture"),
-        Figure::new("worst_frame", "frame", "worst", Show::Whole, |m| u64::from(m.worst_frame)),
-        Figure::real("psnr_db", "PSNR", "dB", 1, |m| m.pictures.psnr_db)
-            .about("mean peak signal-to-noise ratio; 100 means identical"),
-        Figure::real("psnr_worst_db", "worst", "dB", 1, |m| m.pictures.psnr_worst_db),
-        Figure::real("ssim", "SSIM", "", 4, |m| m.pictures.ssim)
-            .about("mean structural similarity"),
-        Figure::real("ssim_worst", "worst", "SSIM", 4, |m| m.pictures.ssim_worst),
-        Figure::real("flicker", "flicker", "", 5, |m| m.pictures.flicker)
-            .about("temporal change of the picture minus that of the baseline, 0 to 1, along the baseline's motion"),
-        Figure::real("identical_pct", "identical", "% of pictures", 1, |m| m.pictures.identical_pct)
-            .about("pictures whose visible pixels equal the baseline's bit for bit"),
-    ]
+    columns_of::<&'a Measured<'a>>()
+        .real("flip_mean", "FLIP", "", 5, |m| m.pictures.flip_mean)
+            .about("mean FLIP inside the visible area of the lens")
+        .real("flip_p99", "FLIP 99 %", "", 5, |m| m.pictures.flip_p99)
+            .about("mean of the pictures' 99th percentiles of FLIP")
+        .real("flip_worst", "worst", "FLIP", 5, |m| m.pictures.flip_worst)
+            .about("mean FLIP of the worst picture")
+        .whole("worst_frame", "frame", "worst", |m| m.worst_frame)
+        .real("psnr_db", "PSNR", "dB", 1, |m| m.pictures.psnr_db)
+            .about("mean peak signal-to-noise ratio; 100 means identical")
+        .real("psnr_worst_db", "worst", "dB", 1, |m| m.pictures.psnr_worst_db)
+        .real("ssim", "SSIM", "", 4, |m| m.pictures.ssim)
+            .about("mean structural similarity")
+        .real("ssim_worst", "worst", "SSIM", 4, |m| m.pictures.ssim_worst)
+        .real("flicker", "flicker", "", 5, |m| m.pictures.flicker)
+            .about("temporal change of the picture minus that of the baseline, 0 to 1, along the baseline's motion")
+        .real("identical_pct", "identical", "% of pictures", 1, |m| m.pictures.identical_pct)
+            .about("pictures whose visible pixels equal the baseline's bit for bit")
 }
 
 /// Means of the techniques' own predictions.
 fn predictions<'a>(rows: &[&'a Measured<'a>]) -> Vec<Figure<'a>> {
-    let mut predictions: Vec<&str> = Vec::new();
-    for (key, _) in rows
-        .iter()
-        .flat_map(|m| &m.row.frames)
-        .flat_map(|f| &f.predicted)
-    {
-        if !predictions.contains(&key.as_str()) {
-            predictions.push(key);
-        }
-    }
+    let frames = rows.iter().flat_map(|m| &m.row.frames);
+    let all = frames.flat_map(|f| &f.predicted);
+    let predictions = unique(all.map(|(key, _)| key.as_str()));
     let figures = predictions.into_iter().map(str::to_owned).map(|key| {
         let heading = (
             format!("predicted.{key}"),
@@ -235,16 +222,15 @@ fn predictions<'a>(rows: &[&'a Measured<'a>]) -> Vec<Figure<'a>> {
 /// Cache figures in an order.
 #[rustfmt::skip]
 fn caches<'a>(order: Order) -> Vec<Figure<'a>> {
-    vec![
-        Figure::new("footprints", "footprints", "", Show::Whole, move |m| Some(m.caches_in(order)?.footprints))
-            .about("bilinear footprints of the trace"),
-        Figure::real("l1_footprint_miss_pct", "L1 miss", "% of footprints", 2, move |m| Some(m.caches_in(order)?.l1_footprint_miss_pct)),
-        Figure::real("l2_line_miss_pct", "L2 miss", "% of lines", 2, move |m| Some(m.caches_in(order)?.l2_line_miss_pct)),
-        Figure::new("external_bytes", "external", "bytes", Show::Whole, move |m| Some(m.caches_in(order)?.external_bytes))
-            .about("line misses of the L2 times the line size, all frames of the trace"),
-        Figure::real("external_mb_per_frame", "external", "MB/frame", 3, move |m| m.caches_in(order).map(CacheFigures::external_mb_per_frame))
-            .about("external texture traffic"),
-    ]
+    columns_of::<&'a Measured<'a>>()
+        .whole("footprints", "footprints", "", move |m| Some(m.caches_in(order)?.footprints))
+            .about("bilinear footprints of the trace")
+        .real("l1_footprint_miss_pct", "L1 miss", "% of footprints", 2, move |m| Some(m.caches_in(order)?.l1_footprint_miss_pct))
+        .real("l2_line_miss_pct", "L2 miss", "% of lines", 2, move |m| Some(m.caches_in(order)?.l2_line_miss_pct))
+        .whole("external_bytes", "external", "bytes", move |m| Some(m.caches_in(order)?.external_bytes))
+            .about("line misses of the L2 times the line size, all frames of the trace")
+        .real("external_mb_per_frame", "external", "MB/frame", 3, move |m| m.caches_in(order).map(CacheFigures::external_mb_per_frame))
+            .about("external texture traffic")
 }
 
 /// Every figure of these techniques. Stages and predictions have the names that the captures give them.
@@ -269,10 +255,9 @@ pub(super) type GainFigure<'a> = Column<'a, OrderGain<'a>>;
 /// The table of orders with and without each technique. It shows the saving of `gain` over `against`.
 #[rustfmt::skip]
 pub(super) fn order_columns<'a>(orders: &[Order], gain: Order, against: Order) -> Vec<GainFigure<'a>> {
-    let mut columns = vec![
-        GainFigure::text("scene", "scene", |g| g.measured.scene),
-        GainFigure::text("technique", "technique", |g| g.measured.row.technique.as_str()),
-    ];
+    let mut columns = columns_of::<OrderGain<'a>>()
+        .text("scene", "scene", |g| g.measured.scene)
+        .text("technique", "technique", |g| g.measured.row.technique.as_str());
     columns.extend(orders.iter().map(|&order| {
         let key = format!("external_mb_per_frame.{}", order.name());
         GainFigure::real(key, order.title(), "MB/frame", 3, move |g| {
@@ -281,16 +266,15 @@ pub(super) fn order_columns<'a>(orders: &[Order], gain: Order, against: Order) -
     }));
     let saved = format!("{} saves", gain.title());
     let of = format!("of {}", against.title());
-    columns.extend([
-        GainFigure::real("saved_pct", saved, "%", 1, |g| g.own.saved_pct),
-        GainFigure::real("saved_without_pct", "without", "%", 1, |g| g.baseline.saved_pct)
-            .about("saving of the order on the baseline's trace"),
-        GainFigure::real("shared_pct", "shared", "% of lines", 1, |g| g.own.shared_pct)
-            .about("percentage of the touched lines that both eyes touch"),
-        GainFigure::real("headroom_pct", "above bound", "%", 1, |g| g.own.headroom_pct)
-            .about("traffic above that of an infinite cache: the largest possible saving of any order"),
-        GainFigure::text("reason", "why", OrderGain::reason),
-    ]);
+    columns = columns
+        .real("saved_pct", saved, "%", 1, |g| g.own.saved_pct)
+        .real("saved_without_pct", "without", "%", 1, |g| g.baseline.saved_pct)
+            .about("saving of the order on the baseline's trace")
+        .real("shared_pct", "shared", "% of lines", 1, |g| g.own.shared_pct)
+            .about("percentage of the touched lines that both eyes touch")
+        .real("headroom_pct", "above bound", "%", 1, |g| g.own.headroom_pct)
+            .about("traffic above that of an infinite cache: the largest possible saving of any order")
+        .text("reason", "why", OrderGain::reason);
     if let Some(column) = columns.iter_mut().find(|c| c.heading.key == "saved_pct") {
         column.heading.about = "external traffic that the order saves";
         column.heading.name = format!("{} {of}", column.heading.name).into();

@@ -117,12 +117,8 @@ impl<'a> TechniquesReport<'a> {
 
 impl<'r> Document for TechniquesReport<'r> {
     const SCHEMA: &'static str = "replay.techniques/2";
-    type Json<'a>
-        = TechniquesJson<'a>
-    where
-        Self: 'a;
 
-    fn content(&self) -> TechniquesJson<'_> {
+    fn content(&self) -> impl Serialize {
         let facts = |(scene, m): (&'r Measures<'r>, &&'r Manifest)| SceneFacts {
             scene: scene.scene,
             path: m.path.as_deref(),

@@ -4,7 +4,7 @@ use super::frusta::Frusta;
 use super::{TechniquesReport, plots};
 use crate::answers;
 use crate::document::Document;
-use crate::html::{self, Answer, Section, figures, slug};
+use crate::html::{self, Answer, Page};
 use crate::picture::EmbeddedPicture;
 use crate::plots::PlotError;
 use crate::table::Table;
@@ -62,98 +62,85 @@ impl TechniquesReport<'_> {
     /// # Errors
     /// A plot that cannot be drawn.
     pub fn page(&self, pictures: &[Scene]) -> Result<String, PlotError> {
-        let mut sections = self.scene_sections(pictures)?;
+        let mut page = Page::default();
+        self.scene_sections(pictures, &mut page)?;
         let orders = self.order_table();
         if !orders.rows.is_empty() {
-            sections.push(Section::new(
-                "Tile orders with and without each technique",
-                self.orders_section(&orders),
-            ));
+            let title = "Tile orders with and without each technique";
+            page.add(title, self.orders_section(&orders));
         }
         let claims = self.claim_table().without_empty_columns();
         if !claims.rows.is_empty() {
-            sections.push(Section::new(
+            page.add(
                 "Published and measured savings",
                 html! {
                     (claims.markup())
                     p.note { "Device and scenes differ from those of the published figure. The image error of the technique is in the same row." }
                 },
-            ));
+            );
         }
-        sections.push(Section::new(
+        page.add(
             "Machine of the caches",
-            html::folded(
-                "configuration (TOML)",
-                &toml::to_string(&self.config).unwrap_or_default(),
-            ),
-        ));
-        Ok(html::page(
-            "Parallax: techniques of stereo rendering",
-            &self.answer()?,
-            &sections,
-        ))
+            html::settings("configuration (TOML)", &self.config),
+        );
+        let title = "Parallax: techniques of stereo rendering";
+        Ok(page.text(title, &self.answer()?))
     }
 
     /// The sections of each scene.
-    fn scene_sections(&self, pictures: &[Scene]) -> Result<Vec<Section>, PlotError> {
-        let mut sections = Vec::new();
+    fn scene_sections(&self, pictures: &[Scene], page: &mut Page) -> Result<(), PlotError> {
         let table = self.rows();
         for ((measures, manifest), scene) in self.scenes.iter().zip(&self.manifests).zip(pictures) {
             let name = measures.scene;
-            let section = |title: String, body: Markup| Section {
-                id: slug(&title),
-                title,
-                body,
-            };
             let own = table.only("scene", name).picked(SHOWN);
-            sections.push(section(
+            page.add(
                 format!("{name}: techniques"),
                 html! {
                     (facts(manifest))
                     (own.markup())
-                    (meanings(&own))
+                    (own.folded_meanings())
                 },
-            ));
-            sections.push(section(
+            );
+            page.add(
                 format!("{name}: time and error"),
                 time_and_error(measures, manifest)?,
-            ));
+            );
             let pacing = self.pacing_table();
             let pacing = if pacing.headings.iter().any(|h| h.key == "scene") {
                 pacing.only("scene", name)
             } else {
                 pacing
             };
-            sections.push(section(
+            page.add(
                 format!("{name}: frames and refreshes"),
                 html! {
                     (pacing.markup())
-                    (meanings(&pacing))
+                    (pacing.folded_meanings())
                     p.note { "Times are as measured on the device above, not scaled to a display's refresh rate." }
                 },
-            ));
-            sections.push(section(
+            );
+            page.add(
                 format!("{name}: frusta and cones"),
                 html::figure(
                     &frusta(measures, manifest).svg(),
                     "Both drawings are to scale. Far fields begin at their split and are rendered by one camera between the eyes.",
                 ),
-            ));
+            );
             let stages = self.stage_table(&table, name);
             if !stages.rows.is_empty() {
-                sections.push(section(format!("{name}: time by stage"), stages.markup()));
+                page.add(format!("{name}: time by stage"), stages.markup());
             }
             if let Some(auto) = &manifest.auto {
-                sections.push(section(format!("{name}: automatic choice"), chosen(auto)));
+                page.add(format!("{name}: automatic choice"), chosen(auto));
             }
             if !scene.differences.is_empty() {
-                sections.push(section(
+                page.add(
                     format!("{name}: skipped work"),
                     differences(measures, &scene.differences),
-                ));
+                );
             }
         }
-        Ok(sections)
+        Ok(())
     }
 
     /// The top of the page: what was found, in sentences and a chart.
@@ -170,10 +157,8 @@ impl TechniquesReport<'_> {
                 p { strong { "Frame times are a processor's" } ": the driver renders in software, so the cost of vertices, fragments and state changes differs from a GPU's. Counts, image errors and cache figures do not depend on that." }
             }
         };
-        let chart = match self.scenes.first() {
-            Some(measures) => html::figure(&plots::pareto(measures).svg()?, PARETO_CAPTION),
-            None => html! {},
-        };
+        let first = self.scenes.first();
+        let chart = html::chart(first.map(|m| plots::pareto(m).svg()), PARETO_CAPTION)?;
         let mut sentences = self.scenes.first().map_or_else(Vec::new, |measures| {
             let others = measures.rows.iter().filter(|m| !m.is_baseline());
             let timed = others.map(|m| answers::Timed {
@@ -214,7 +199,7 @@ impl TechniquesReport<'_> {
         let (order, against) = self.gain_orders();
         html! {
             (orders.markup())
-            (meanings(orders))
+            (orders.folded_meanings())
             p.note {
                 (order.title()) " renders the tiles of both eyes that show the same place together. The second eye then hits the lines that the first eye fetched. "
                 "It can save at most the repeated fetches of " (against.title()) ": the traffic above that of an infinite cache, as far as both eyes touch the lines. "
@@ -250,16 +235,6 @@ fn facts(manifest: &Manifest) -> Markup {
     }
 }
 
-/// Definitions of the columns.
-fn meanings(table: &Table) -> Markup {
-    html! {
-        details {
-            summary { "definitions of the columns" }
-            (table.meanings())
-        }
-    }
-}
-
 /// The display from above, with the mean splits of the scene's techniques.
 fn frusta<'a>(measures: &Measures, manifest: &'a Manifest) -> Frusta<'a> {
     let split = |m: &Measured| Some((m.row.technique.clone(), m.predicted("split_m")?));
@@ -272,16 +247,14 @@ fn frusta<'a>(measures: &Measures, manifest: &'a Manifest) -> Frusta<'a> {
 }
 
 fn time_and_error(measures: &Measures, manifest: &Manifest) -> Result<Markup, PlotError> {
-    let mut rows = vec![(plots::ratios(measures).svg()?, String::new())];
+    let mut rows = vec![plots::ratios(measures).svg()];
     if manifest.frames.len() > 1 {
-        rows.push((plots::frame_times(measures).svg()?, String::new()));
-        if let Some(errors) = plots::errors(measures) {
-            rows.push((errors.svg()?, String::new()));
-        }
+        rows.push(plots::frame_times(measures).svg());
+        rows.extend(plots::errors(measures).map(|errors| errors.svg()));
     }
     Ok(html! {
         (html::figure(&plots::pareto(measures).svg()?, PARETO_CAPTION))
-        (figures(&rows))
+        (html::charts(rows)?)
         @if manifest.frames.len() > 1 { p.note { "Lines along the path: the baseline and the techniques that are not dominated." } }
     })
 }

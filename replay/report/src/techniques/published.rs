@@ -1,6 +1,6 @@
 //! Published savings and the measured ones.
 
-use crate::columns::Column;
+use crate::columns::{Column, Columns, columns_of};
 use sim::paper::vr::{CLAIMS, Claim, Quantity};
 use studies::techniques::{Measured, Measures};
 
@@ -36,15 +36,14 @@ impl ClaimRow<'_> {
 /// The table of published savings.
 #[rustfmt::skip]
 pub(super) fn claim_columns<'a>() -> Vec<Column<'static, ClaimRow<'a>>> {
-    vec![
-        Column::text("technique", "technique", |r: &ClaimRow| {
+    columns_of::<ClaimRow>()
+        .text("technique", "technique", |r| {
             r.measured.row.technique.as_str()
-        }),
-        Column::text("quantity", "saves", |r: &ClaimRow| r.claim.quantity.title()),
-        Column::real("published_pct", "published", "%", 0, |r: &ClaimRow| r.claim.text()).published(),
-        Column::text("scene", "on", |r: &ClaimRow| r.measured.scene),
-        Column::real("ours_pct", "ours", "%", 1, |r: &ClaimRow| r.saved_pct()),
-        Column::real("flip_mean", "FLIP", "", 5, |r: &ClaimRow| r.measured.pictures.flip_mean),
-        Column::text("source", "source", |r: &ClaimRow| r.claim.source).published(),
-    ]
+        })
+        .text("quantity", "saves", |r| r.claim.quantity.title())
+        .real("published_pct", "published", "%", 0, |r| r.claim.text()).published()
+        .text("scene", "on", |r| r.measured.scene)
+        .real("ours_pct", "ours", "%", 1, |r| r.saved_pct())
+        .real("flip_mean", "FLIP", "", 5, |r| r.measured.pictures.flip_mean)
+        .text("source", "source", |r| r.claim.source).published()
 }

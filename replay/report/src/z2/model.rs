@@ -1,9 +1,10 @@
 //! The Z2 paper's experiment: its rows, their averages and their checks (`replay.paper/3`).
 
-use crate::columns::{Column, Figure, Row, Value};
+use crate::columns::{Column, Columns, Figure, Row, Value, columns_of};
 use crate::document::Document;
 use crate::errors::{self, KnownError, Of};
 use crate::figures::number;
+use crate::lists::{mean, unique};
 use crate::table::Table;
 use crate::z2::tables;
 use formats::textrace::TraceMeta;
@@ -63,14 +64,13 @@ pub struct Average {
 impl Row for Average {
     #[rustfmt::skip]
     fn columns() -> Vec<Column<'static, Self>> {
-        vec![
-            Column::text("scene", "mean over cache sizes", |a: &Self| a.scene.clone()),
-            Column::text("order", "order", |a: &Self| Value::Named(a.order.name(), a.order.title())),
-            Column::real("reduction_pct", "saved", "% of Morton", 1, |a: &Self| a.reduction_pct),
-            Column::real("tmu_ratio", "TMU", "\u{d7} Morton", 3, |a: &Self| a.tmu_ratio),
-            Column::real("paper_reduction_pct", "paper saved", "% of Morton", 1, |a: &Self| a.paper_reduction_pct).published(),
-            Column::real("paper_tmu_ratio", "paper TMU", "\u{d7} Morton", 3, |a: &Self| a.paper_tmu_ratio).published(),
-        ]
+        columns_of::<Self>()
+            .text("scene", "mean over cache sizes", |a| a.scene.clone())
+            .text("order", "order", |a| Value::Named(a.order.name(), a.order.title()))
+            .real("reduction_pct", "saved", "% of Morton", 1, |a| a.reduction_pct)
+            .real("tmu_ratio", "TMU", "\u{d7} Morton", 3, |a| a.tmu_ratio)
+            .real("paper_reduction_pct", "paper saved", "% of Morton", 1, |a| a.paper_reduction_pct).published()
+            .real("paper_tmu_ratio", "paper TMU", "\u{d7} Morton", 3, |a| a.paper_tmu_ratio).published()
     }
 }
 
@@ -249,12 +249,8 @@ pub struct PaperJson<'a> {
 impl Document for PaperReport<'_> {
     const SCHEMA: &'static str = "replay.paper/3";
     const INDENTED: bool = false;
-    type Json<'a>
-        = PaperJson<'a>
-    where
-        Self: 'a;
 
-    fn content(&self) -> PaperJson<'_> {
+    fn content(&self) -> impl Serialize {
         let details = self.traces.iter().flat_map(|t| self.details(&t.label));
         PaperJson {
             config: &self.config,
@@ -370,21 +366,6 @@ fn deviation(rows: &[ResultRow]) -> Deviation {
         largest_points: points.iter().copied().fold(0.0, f64::max),
         rows: points.len(),
     }
-}
-
-fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
-    let (sum, count) = values.fold((0.0, 0usize), |(s, n), v| (s + v, n + 1));
-    (count > 0).then(|| sum / count as f64)
-}
-
-fn unique<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
-    let mut seen = Vec::new();
-    for item in items {
-        if !seen.contains(&item) {
-            seen.push(item);
-        }
-    }
-    seen
 }
 
 #[cfg(test)]

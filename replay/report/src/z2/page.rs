@@ -5,9 +5,11 @@ use super::plots::{self, TileMeasure};
 use super::{cores, tables, whole_frame};
 use crate::answers;
 use crate::errors::{self, Of};
-use crate::html::{self, Answer, Section, count, figures, folded};
+use crate::html::{self, Answer, Page, charts, count};
 use crate::picture::EmbeddedPicture;
 use crate::plots::PlotError;
+use crate::plots::bars::BarChart;
+use crate::plots::hbars::HBarChart;
 use crate::table::Table;
 use maud::{Markup, html};
 use sim::config::{CountBy, Order};
@@ -23,55 +25,47 @@ const EXAMPLE_TILES: [u32; 2] = [8, 4];
 /// # Errors
 /// A plot that cannot be drawn (a figure that is not finite).
 pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String, PlotError> {
-    let mut sections = vec![Section::new("What was run", runs(report))];
+    let mut page = Page::default();
+    page.add("What was run", runs(report));
     if !pictures.is_empty() {
-        sections.push(Section::new("Pictures", scenes(pictures)));
+        page.add("Pictures", scenes(pictures));
     }
-    sections.push(Section::new(
+    page.add(
         "Miss rates, utilisation and traffic (Table 2)",
         table_2(report),
-    ));
-    sections.push(Section::new(
-        "Averages",
-        tables::averages(&report.averages).markup(),
-    ));
-    sections.push(Section::new(
-        "External bandwidth (Fig. 5)",
-        bandwidth(report)?,
-    ));
-    sections.extend(whole_frame::section(report)?);
-    sections.push(Section::new("Charts of Table 2", rates(report)?));
+    );
+    page.add("Averages", tables::averages(&report.averages).markup());
+    page.add("External bandwidth (Fig. 5)", bandwidth(report)?);
+    page.sections.extend(whole_frame::section(report)?);
+    page.add("Charts of Table 2", rates(report)?);
     if let Some(table) = tables::as_the_paper_counts(report) {
-        sections.push(Section::new(
-            "As the paper counts",
-            as_the_paper_counts(&table),
-        ));
+        page.add("As the paper counts", as_the_paper_counts(&table));
     }
     if report.closed_form.rows > 0 {
-        sections.push(Section::new(
+        page.add(
             "TMU utilisation and the paper's surface",
             utilisation(report)?,
-        ));
+        );
     }
     if let Some(modes) = tables::modes(report) {
         let note = "Functional mode has no latencies: misses fill at once. The difference shows how timing changes the order in which the cores' accesses reach the L2.";
         let body = html! { p { (note) } (modes.markup()) };
-        sections.push(Section::new("Functional against timed mode", body));
+        page.add("Functional against timed mode", body);
     }
-    sections.push(Section::new("Bounds and checks", bounds(report)));
-    sections.push(Section::new("Tile orders", orders(report)?));
-    sections.extend(cores::section(report)?);
-    sections.push(Section::new("Heat maps by tile", heat_maps(report)?));
+    page.add("Bounds and checks", bounds(report));
+    page.add("Tile orders", orders(report)?);
+    page.sections.extend(cores::section(report)?);
+    page.add("Heat maps by tile", heat_maps(report)?);
     if report.config.count_by == CountBy::Texture {
-        sections.push(Section::new("By mip level", levels(report)?));
+        page.add("By mip level", levels(report)?);
     }
     let by_part = match report.config.count_by {
         CountBy::Texture => "By texture",
         CountBy::Draw => "By draw",
     };
-    sections.push(Section::new(by_part, parts(report)?));
-    sections.extend(errors::section(Of::Textures));
-    sections.push(Section::new("Configuration", configuration(report)));
+    page.add(by_part, parts(report)?);
+    page.sections.extend(errors::section(Of::Textures));
+    page.add("Configuration", configuration(report));
     let about = html! {
         p {
             "Stereo frames replayed through the caches and the texture unit of the Z\u{b2} paper's machine ("
@@ -83,20 +77,14 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
         }
         (in_short(report))
     };
-    let chart = match report.traces.first() {
-        Some(info) => html::figure(&plots::bandwidth(report, &info.label).svg()?, ""),
-        None => html! {},
-    };
+    let first = report.traces.first();
+    let chart = first.map(|info| plots::bandwidth(report, &info.label).svg());
     let answer = Answer {
         sentences: sentences(report),
-        chart,
+        chart: html::chart(chart, "")?,
         about,
     };
-    Ok(html::page(
-        "Parallax: tile orders for stereo rendering",
-        &answer,
-        &sections,
-    ))
+    Ok(page.text("Parallax: tile orders for stereo rendering", &answer))
 }
 
 /// The answer: the best order in the mean over everything, and the paper's figure for it.
@@ -231,42 +219,40 @@ fn as_the_paper_counts(table: &Table) -> Markup {
     }
 }
 
+/// What each trace shows.
+fn by_trace(
+    report: &PaperReport,
+    body: impl Fn(&TraceInfo) -> Result<Markup, PlotError>,
+) -> Result<Markup, PlotError> {
+    let bodies: Vec<Markup> = report.traces.iter().map(body).collect::<Result<_, _>>()?;
+    Ok(html! { @for body in bodies { (body) } })
+}
+
 fn bandwidth(report: &PaperReport) -> Result<Markup, PlotError> {
-    let charts = report
-        .traces
-        .iter()
-        .map(|info| Ok((plots::bandwidth(report, &info.label).svg()?, String::new())))
-        .collect::<Result<Vec<_>, PlotError>>()?;
+    let traces = report.traces.iter();
+    let svgs = traces.map(|info| plots::bandwidth(report, &info.label).svg());
     Ok(html! {
-        (figures(&charts))
+        (charts(svgs)?)
         p.note { "The paper's text gives no absolute traffic. A mark is its ratio to Morton times the measured Morton traffic, for scenes that stand for one of the paper's." }
     })
 }
 
 fn rates(report: &PaperReport) -> Result<Markup, PlotError> {
-    let mut body = Vec::new();
-    for info in &report.traces {
-        let charts = plots::rates(report, &info.label)
-            .iter()
-            .map(|chart| Ok((chart.svg()?, String::new())))
-            .collect::<Result<Vec<_>, PlotError>>()?;
-        body.push(figures(&charts));
-    }
-    Ok(html! { @for row in body { (row) } })
+    by_trace(report, |info| {
+        charts(plots::rates(report, &info.label).iter().map(BarChart::svg))
+    })
 }
 
 fn utilisation(report: &PaperReport) -> Result<Markup, PlotError> {
-    let mut charts = vec![(plots::surface(report)?, String::new())];
-    if let Some(chart) = plots::closed_form(report) {
-        charts.push((chart.svg()?, String::new()));
-    }
+    let closed_form = plots::closed_form(report).map(|chart| chart.svg());
+    let svgs = std::iter::once(plots::surface(report)).chain(closed_form);
     let d = &report.closed_form;
     Ok(html! {
         p {
             "Mean absolute deviation from the closed form " strong { (format!("{:.2}", d.mean_absolute_points)) " points" }
             ", largest " (format!("{:.2}", d.largest_points)) " points, over " (d.rows) " rows."
         }
-        (figures(&charts))
+        (charts(svgs)?)
     })
 }
 
@@ -289,28 +275,24 @@ fn bounds(report: &PaperReport) -> Markup {
 
 fn orders(report: &PaperReport) -> Result<Markup, PlotError> {
     let grid = report.traces.first().map_or(EXAMPLE_TILES, |t| t.tiles);
-    let (mut examples, mut maps) = (Vec::new(), Vec::new());
-    for order in report.orders() {
-        let seed = report.config.seed;
-        examples.push((
-            plots::path(order, seed, EXAMPLE_TILES).svg()?,
-            String::new(),
-        ));
-        maps.push((plots::path(order, seed, grid).steps().svg()?, String::new()));
-    }
+    let paths = |tiles| {
+        let orders = report.orders().into_iter();
+        orders.map(move |order| plots::path(order, report.config.seed, tiles))
+    };
+    let examples = paths(EXAMPLE_TILES).map(|path| path.svg());
+    let maps = paths(grid).map(|path| path.steps().svg());
     Ok(html! {
         p { "On 32 tiles per eye, as in the paper's Fig. 3; the numbers are steps." }
-        (figures(&examples))
+        (charts(examples)?)
         p { "On the grid of the traces, " (grid[0]) "\u{d7}" (grid[1]) " tiles per eye:" }
-        (figures(&maps))
+        (charts(maps)?)
     })
 }
 
 fn heat_maps(report: &PaperReport) -> Result<Markup, PlotError> {
-    let mut body = Vec::new();
-    for info in &report.traces {
+    by_trace(report, |info| {
         let details = report.details(&info.label);
-        let mut charts = Vec::new();
+        let mut svgs = Vec::new();
         for (measure, depends_on_order) in TileMeasure::ALL {
             let mut maps: Vec<_> = details
                 .iter()
@@ -321,55 +303,50 @@ fn heat_maps(report: &PaperReport) -> Result<Markup, PlotError> {
             let high = maps.iter().map(|m| m.largest()).fold(0.0, f64::max);
             for map in &mut maps {
                 map.high = Some(high);
-                charts.push((map.svg()?, String::new()));
+                svgs.push(map.svg());
             }
         }
-        if let (Some(first), false) = (details.first(), charts.is_empty()) {
-            let caches = first.caches_title();
-            body.push(html! { h3 { (info.label) ", L1/L2 " (caches) " KiB" } (figures(&charts)) });
-        }
-    }
-    Ok(html! { @for scene in body { (scene) } })
+        Ok(match details.first() {
+            Some(first) if !svgs.is_empty() => html! {
+                h3 { (info.label) ", L1/L2 " (first.caches_title()) " KiB" } (charts(svgs)?)
+            },
+            _ => html! {},
+        })
+    })
 }
 
 fn levels(report: &PaperReport) -> Result<Markup, PlotError> {
-    let mut body = Vec::new();
-    for info in &report.traces {
+    by_trace(report, |info| {
         let details = report.details(&info.label);
-        let charts = plots::by_level(&details)
-            .iter()
-            .map(|c| Ok((c.svg()?, String::new())))
-            .collect::<Result<Vec<_>, PlotError>>()?;
+        let svgs = plots::by_level(&details);
         let table = tables::parts(&details, "mip level", |d| &d.result.by_level, usize::MAX);
-        body.push(html! { h3 { (info.label) } (figures(&charts)) details { summary { "table" } (table.markup()) } });
-    }
-    Ok(html! { @for scene in body { (scene) } })
+        Ok(html! {
+            h3 { (info.label) }
+            (charts(svgs.iter().map(BarChart::svg))?)
+            details { summary { "table" } (table.markup()) }
+        })
+    })
 }
 
 fn parts(report: &PaperReport) -> Result<Markup, PlotError> {
-    let mut body = Vec::new();
-    for info in &report.traces {
+    by_trace(report, |info| {
         let details = report.details(&info.label);
         let (what, all) = (details.first()).map_or(("texture", 0), |d| {
             let (what, parts) = d.result.parts();
             (what, parts.len())
         });
-        let charts = plots::by_part(&details, BUSIEST_PARTS)
-            .iter()
-            .map(|c| Ok((c.svg()?, String::new())))
-            .collect::<Result<Vec<_>, PlotError>>()?;
+        let svgs = plots::by_part(&details, BUSIEST_PARTS);
         let table = tables::parts(&details, what, |d| d.result.parts().1, BUSIEST_PARTS);
-        body.push(html! {
+        Ok(html! {
             h3 { (info.label) }
             @if all > BUSIEST_PARTS { p.note { "The " (BUSIEST_PARTS) " of " (all) " " (what) "s with the most external traffic; all are in the JSON." } }
-            (figures(&charts)) details { summary { "table" } (table.markup()) }
-        });
-    }
-    Ok(html! { @for scene in body { (scene) } })
+            (charts(svgs.iter().map(HBarChart::svg))?)
+            details { summary { "table" } (table.markup()) }
+        })
+    })
 }
 
 fn configuration(report: &PaperReport) -> Markup {
-    let text = toml::to_string(&report.config).unwrap_or_default();
     let orders: Vec<&str> = report.orders().into_iter().map(Order::title).collect();
     let caches = report.caches();
     let mode = report.config.mode_name();
@@ -378,7 +355,7 @@ fn configuration(report: &PaperReport) -> Markup {
             "Mode " (mode) "; varied: orders " (orders.join(", ")) "; L1/L2 " (caches.join(", ")) " KiB. "
             "All other settings as below. Written by " (TOOL) "."
         }
-        (folded("full configuration (TOML)", &text))
+        (html::settings("full configuration (TOML)", &report.config))
     }
 }
 

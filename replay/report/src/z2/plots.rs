@@ -9,7 +9,7 @@ use crate::plots::contours::{ContourChart, PointSeries};
 use crate::plots::hbars::HBarChart;
 use crate::plots::heatmap::{HeatMap, Panel};
 use crate::plots::lines::{Axis, LineChart, LineSeries, Mark};
-use crate::plots::paths::{PathPlot, Stop};
+use crate::plots::paths::{PathPlot, stops};
 use crate::plots::{PlotError, SeriesStyle};
 use crate::theme;
 use sim::config::Order;
@@ -354,17 +354,7 @@ pub fn path(order: Order, seed: u64, tiles: [u32; 2]) -> PathPlot {
         ..PlanInputs::default()
     };
     let items = order.stereo(tiles, &inputs);
-    let mut stops = Vec::with_capacity(2 * tiles[0] as usize * tiles[1] as usize);
-    for item in &items {
-        for (i, tile) in item.tiles().enumerate() {
-            stops.push(Stop {
-                eye: tile.pass,
-                x: tile.tile % tiles[0].max(1),
-                y: tile.tile / tiles[0].max(1),
-                paired: i > 0,
-            });
-        }
-    }
+    let stops = stops(&items, tiles);
     let pairs = items.iter().any(|i| matches!(i, WorkItem::Pair(..)));
     let alternates = stops.windows(2).take(1).any(|w| w[0].eye != w[1].eye);
     let note = match (pairs, alternates) {

@@ -1,12 +1,12 @@
 //! Rows with typed columns: NPY and Parquet, CSV and JSON Lines.
 
-use super::{GranularityName, Target};
+use super::Target;
 use crate::records::{self, Rows};
 use anyhow::{Result, bail};
 use formats::Trace;
 use formats::interop::{
-    Access, AccessSink, CsvWriter, GeometryRow, NpyWriter, RayRow, RecordRow, Tabular, child_rows,
-    slot_rows,
+    Access, AccessSink, CsvWriter, GeometryRow, NpyWriter, RayRow, RecordRow, SampleRow, Tabular,
+    child_rows, slot_rows,
 };
 use report::rows_parquet::RowsWriter;
 use std::io::{self, Write};
@@ -52,17 +52,24 @@ pub(super) fn rows<R: Tabular>(
     Ok(writer.finish()?)
 }
 
-/// Writes the records, rays or samples of a trace, in file order.
-pub(super) fn records<R: Tabular, T: Rows<R>>(
+/// Whether a tile is written, by its pass or eye and its number.
+pub(in crate::cli) type Chosen<'a> = &'a dyn Fn(usize, usize) -> bool;
+
+/// Writes the rows of the chosen tiles of a trace, in file order.
+fn of_tiles<R: Tabular, T: Rows<R>>(
     trace: &T,
     to: Target,
     out: &mut (impl Write + Send),
+    chosen: Chosen<'_>,
 ) -> Result<()> {
     rows(to, out, |send| {
         let (mut tile, mut found) = (T::Tile::default(), Vec::new());
         for at in trace.places() {
-            trace.append(at, &mut tile, &mut found)?;
-            found.drain(..).try_for_each(&mut *send)?;
+            let (pass, number) = T::place(at);
+            if chosen(pass, number) {
+                trace.append(at, &mut tile, &mut found)?;
+                found.drain(..).try_for_each(&mut *send)?;
+            }
         }
         Ok(())
     })
@@ -89,31 +96,52 @@ fn json_row<R: Tabular>(row: &R, out: &mut impl Write) -> io::Result<()> {
     out.write_all(&line)
 }
 
-/// Writes the rows of a trace: its records or rays, or the nodes or slots of its hierarchy.
-pub(super) fn of_trace(
+/// Rows of a trace.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::cli) enum RowKind {
+    /// Records or rays.
+    Record,
+    /// Samples of pixels of a ray trace.
+    Sample,
+    /// Children of the inner nodes of the hierarchy.
+    Node,
+    /// Slots of the hierarchy.
+    Slot,
+}
+
+/// Writes the rows of a trace: those of the chosen tiles, or all of the hierarchy.
+pub(in crate::cli) fn of_trace(
     trace: &Trace,
-    granularity: GranularityName,
+    kind: RowKind,
     to: Target,
     out: &mut (impl Write + Send),
+    chosen: Chosen<'_>,
 ) -> Result<()> {
-    let is_hierarchy = granularity != GranularityName::Record;
-    match trace {
-        Trace::Texture(trace) if is_hierarchy => bail!(
+    let trace = match (trace, kind) {
+        (Trace::Texture(trace), RowKind::Record) => {
+            return of_tiles::<RecordRow, _>(&**trace, to, out, chosen);
+        }
+        (Trace::Texture(trace), _) => bail!(
             "{}: expected a ray trace, because a texture trace has no hierarchy",
             trace.container().file()
         ),
-        Trace::Texture(trace) => records::<RecordRow, _>(&**trace, to, out),
-        Trace::Ray(trace) if is_hierarchy => {
-            let hierarchy = records::hierarchy(trace)?;
-            if granularity == GranularityName::Slot {
-                return rows(to, out, |send| slot_rows(&hierarchy).try_for_each(send));
-            }
-            let bvh = &trace.tables().bvh;
+        (Trace::Ray(trace), _) => &**trace,
+    };
+    match kind {
+        RowKind::Record if trace.has_geometry() => {
+            of_tiles::<GeometryRow, _>(trace, to, out, chosen)
+        }
+        RowKind::Record => of_tiles::<RayRow, _>(trace, to, out, chosen),
+        RowKind::Sample => of_tiles::<SampleRow, _>(trace, to, out, chosen),
+        RowKind::Node => {
+            let (bvh, hierarchy) = (&trace.tables().bvh, records::hierarchy(trace)?);
             rows(to, out, |send| {
                 child_rows(bvh, &hierarchy).try_for_each(send)
             })
         }
-        Trace::Ray(trace) if trace.has_geometry() => records::<GeometryRow, _>(&**trace, to, out),
-        Trace::Ray(trace) => records::<RayRow, _>(&**trace, to, out),
+        RowKind::Slot => {
+            let hierarchy = records::hierarchy(trace)?;
+            rows(to, out, |send| slot_rows(&hierarchy).try_for_each(send))
+        }
     }
 }
