@@ -1,11 +1,12 @@
 //! Results for plain addresses: one row per configuration.
 
-use super::columns::{Column, Columns, Show, columns_of};
+use super::columns::{Column, Columns, columns_of};
 use super::document::Document;
 use super::memory_columns;
 use super::table::Table;
 use serde::Serialize;
 use sim::addresses::{LevelCounts, Outcome, Point, Totals};
+use sim::config::LevelConfig;
 
 /// The replays of an address file.
 pub struct AddressesReport<'a> {
@@ -33,93 +34,62 @@ type OfLevel = fn(&Point) -> &LevelCounts;
 /// Names of the kinds of access, in the order of the counters.
 const KINDS: [&str; 3] = ["reads", "writes", "fetches"];
 
-/// Columns of a level: look-ups, misses and miss rate.
+/// Columns of a level: the cache, look-ups, misses and miss rate.
 fn level<'a, 'r>(
-    key: &'static str,
     name: &'static str,
+    cache: fn(&Point) -> &LevelConfig,
     of: OfLevel,
-) -> [Column<'a, PointRow<'r>>; 3] {
-    let key = |end: &str| format!("{key}.{end}");
-    let name = |end: &str| format!("{name} {end}");
-    [
-        count(
-            key("line_lookups"),
-            name("look-ups"),
-            move |r: &PointRow<'r>| of(r.point).line_lookups(),
-        ),
-        count(key("line_misses"), name("misses"), move |r| {
+) -> Vec<Column<'a, PointRow<'r>>> {
+    let key = |end: &str| format!("{}.{end}", name.to_lowercase());
+    let named = |end: &str| format!("{name} {end}");
+    columns_of::<PointRow<'r>>()
+        .real(key("kib"), name, "KiB", 0, move |r| {
+            cache(r.point).size_bytes as f64 / 1024.0
+        })
+        .real(key("ways"), "ways", "", 0, move |r| cache(r.point).ways)
+        .text(key("replacement"), "policy", move |r| {
+            cache(r.point).replacement.name()
+        })
+        .real(key("line_lookups"), named("look-ups"), "", 0, move |r| {
+            of(r.point).line_lookups()
+        })
+        .real(key("line_misses"), named("misses"), "", 0, move |r| {
             of(r.point).line_misses()
-        }),
-        Column::real(
-            key("line_miss_pct"),
-            name("miss"),
-            "%",
-            2,
-            move |r: &PointRow<'r>| 100.0 * of(r.point).line_miss_rate(),
-        ),
-    ]
-}
-
-fn count<'a, 'r, V: super::columns::Cell>(
-    key: String,
-    name: String,
-    value: impl Fn(&PointRow<'r>) -> V + 'a,
-) -> Column<'a, PointRow<'r>> {
-    Column::new(key, name, "", Show::Decimals(0), value)
+        })
+        .real(key("line_miss_pct"), named("miss"), "%", 2, move |r| {
+            100.0 * of(r.point).line_miss_rate()
+        })
 }
 
 /// Every column. Columns by kind of access are empty if all accesses are reads.
 fn columns<'a, 'r: 'a>() -> Vec<Column<'a, PointRow<'r>>> {
-    let kib = |bytes: u64| bytes as f64 / 1024.0;
     let mut columns = columns_of::<PointRow<'r>>()
-        .real("line_bytes", "line", "B", 0, |r| {
-            u64::from(r.point.config.line_bytes)
-        })
-        .real("l1.kib", "L1", "KiB", 0, move |r| {
-            kib(r.point.config.level.l1.size_bytes)
-        })
-        .real("l1.ways", "ways", "", 0, |r| {
-            u64::from(r.point.config.level.l1.ways)
-        })
-        .text("l1.replacement", "policy", |r| {
-            r.point.config.level.l1.replacement.name()
-        });
-    columns.extend(level("l1", "L1", |point| &point.l1));
+        .real("line_bytes", "line", "B", 0, |r| r.point.config.line_bytes);
+    columns.extend(level(
+        "L1",
+        |point| &point.config.level.l1,
+        |point| &point.l1,
+    ));
+    columns.extend(level(
+        "L2",
+        |point| &point.config.level.l2,
+        |point| &point.l2,
+    ));
     columns = columns
-        .real("l2.kib", "L2", "KiB", 0, move |r| {
-            kib(r.point.config.level.l2.size_bytes)
+        .real("external_bytes", "external", "bytes", 0, |r| {
+            r.point.external_bytes()
         })
-        .real("l2.ways", "ways", "", 0, |r| {
-            u64::from(r.point.config.level.l2.ways)
-        })
-        .text("l2.replacement", "policy", |r| {
-            r.point.config.level.l2.replacement.name()
-        });
-    columns.extend(level("l2", "L2", |point| &point.l2));
-    columns.push(
-        Column::real(
-            "external_bytes",
-            "external",
-            "bytes",
-            0,
-            |r: &PointRow<'r>| r.point.external_bytes(),
-        )
-        .about("lines from memory times the line size of the last level"),
-    );
-    columns.push(
-        Column::real("bound_bytes", "bound", "bytes", 0, |r: &PointRow<'r>| {
-            r.infinite_bytes()
-        })
-        .about("external traffic of an infinite cache"),
-    );
+        .about("lines from memory times the line size of the last level")
+        .real("bound_bytes", "bound", "bytes", 0, PointRow::infinite_bytes)
+        .about("external traffic of an infinite cache");
     for (kind, name) in KINDS.into_iter().enumerate() {
         let only_reads = |r: &PointRow<'r>| r.outcome.totals.accesses[1..] == [0, 0];
         let levels: [(&str, OfLevel); 2] = [("L1", |point| &point.l1), ("L2", |point| &point.l2)];
         for (level, of) in levels {
             let key = format!("{name}.{}_line_misses", level.to_lowercase());
-            columns.push(count(key, format!("{level} {name}"), move |r| {
+            columns = columns.real(key, format!("{level} {name}"), "", 0, move |r| {
                 (!only_reads(r)).then(|| of(r.point).misses[kind])
-            }));
+            });
         }
     }
     let memory = memory_columns::columns().into_iter();

@@ -3,6 +3,7 @@
 
 use super::columns::{Column, Columns, Row, columns_of};
 use super::document::Document;
+use super::lists::least;
 use super::table::Table;
 use serde::Serialize;
 use sim::config::RunConfig;
@@ -55,10 +56,7 @@ impl Row for SceneFit {
 impl CalibrationReport {
     /// Chooses the best trial.
     pub fn new(base: RunConfig, objective: Objective, trials: Vec<Trial>) -> Self {
-        let known = (trials.iter().enumerate()).filter_map(|(i, t)| Some((i, t.chosen_by?)));
-        let chosen = known
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(index, _)| index);
+        let chosen = least(trials.iter().map(|trial| trial.chosen_by));
         Self {
             base,
             objective,

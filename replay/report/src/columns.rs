@@ -417,6 +417,12 @@ pub fn pick<R: Row>(keys: &[&str]) -> Vec<Column<'static, R>> {
     keys.iter().filter_map(&mut take).collect()
 }
 
+/// The name of an enum's value in files and on the command line.
+pub(super) fn name(value: &impl Serialize) -> String {
+    let value = serde_json::to_value(value).unwrap_or_default();
+    value.as_str().unwrap_or_default().to_owned()
+}
+
 /// A column of point results.
 pub type Figure<'a> = Column<'static, ResultRow<'a>>;
 

@@ -1,18 +1,11 @@
 //! Columns that identify a row in any file: trace, image size, and every configuration key. Rows of several
 //! files can be joined by them.
 
-use super::columns::{Columns, Figure, Value, columns_of};
+use super::columns::{Columns, Figure, Value, columns_of, name};
 use formats::texture::Sampler;
-use serde::Serialize;
 use sim::config::{LevelConfig, RunConfig};
 use sim::model_version::MODEL_VERSION;
 use studies::experiment::{ResultRow, plain, scene_label};
-
-/// The name of an enum's value in configuration files.
-fn name(value: &impl Serialize) -> String {
-    let value = serde_json::to_value(value).unwrap_or_default();
-    value.as_str().unwrap_or_default().to_owned()
-}
 
 /// The trace.
 pub fn trace<'a>() -> Vec<Figure<'a>> {

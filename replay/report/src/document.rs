@@ -9,6 +9,8 @@ use sim::result::TOOL;
 pub trait Document {
     /// Name and version of the JSON object.
     const SCHEMA: &'static str;
+    /// Version of the models behind its figures.
+    const MODEL_VERSION: u32 = MODEL_VERSION;
     /// Whether the JSON object is indented.
     const INDENTED: bool = true;
     /// Files of a folder that `--csv` names; none where it names a file of all rows.
@@ -46,7 +48,7 @@ pub trait Document {
     /// # Errors
     /// A figure that is not finite.
     fn json(&self) -> serde_json::Result<String> {
-        let object = Envelope::new(Self::SCHEMA, self.content());
+        let object = Envelope::new(Self::SCHEMA, Self::MODEL_VERSION, self.content());
         match Self::INDENTED {
             true => serde_json::to_string_pretty(&object),
             false => serde_json::to_string(&object),
@@ -67,11 +69,11 @@ pub(crate) struct Envelope<T> {
 
 impl<T> Envelope<T> {
     /// An object of this schema.
-    pub(crate) fn new(schema: &'static str, content: T) -> Self {
+    pub(crate) fn new(schema: &'static str, model_version: u32, content: T) -> Self {
         Self {
             schema,
             tool: TOOL,
-            model_version: MODEL_VERSION,
+            model_version,
             content,
         }
     }

@@ -22,3 +22,11 @@ pub(crate) fn mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 pub(crate) fn geometric_mean(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     mean(values.into_iter().map(f64::ln)).map(f64::exp)
 }
+
+/// Number of the least value; the first one of equal values.
+pub(crate) fn least(values: impl IntoIterator<Item = Option<f64>>) -> Option<usize> {
+    let known = values.into_iter().enumerate();
+    let known = known.filter_map(|(number, value)| Some((number, value?)));
+    let least = known.min_by(|a, b| a.1.total_cmp(&b.1));
+    least.map(|(number, _)| number)
+}

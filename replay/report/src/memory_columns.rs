@@ -1,7 +1,13 @@
 //! Columns of the prefetcher, the MSHRs, the levels below the L2 and DRAM.
 
 use super::columns::{Column, Columns, columns_of, over};
+use sim::memory::dram::DramResult;
 use sim::result::MemoryResult;
+
+/// A figure of the DRAM, if there is one.
+fn dram<V>(of: fn(&DramResult) -> V) -> impl Fn(&MemoryResult) -> Option<V> {
+    move |result| result.dram.as_ref().map(of)
+}
 
 /// Every figure of the memory system. Figures of parts that a configuration lacks are empty.
 #[rustfmt::skip]
@@ -21,18 +27,18 @@ pub fn columns() -> Vec<Column<'static, MemoryResult>> {
             .about("line look-ups of the last level below the L2 that miss")
         .real("dram_row_hit_pct", "row hits", "%", 2, |r| Some(100.0 * r.dram.as_ref()?.row_hit_rate))
             .about("DRAM reads whose row was open")
-        .real("dram_activates", "activates", "", 0, |r| Some(r.dram.as_ref()?.activates))
+        .real("dram_activates", "activates", "", 0, dram(|d| d.activates))
             .about("DRAM rows opened")
-        .real("dram_read_bytes", "DRAM reads", "bytes", 0, |r| Some(r.dram.as_ref()?.read_bytes))
+        .real("dram_read_bytes", "DRAM reads", "bytes", 0, dram(|d| d.read_bytes))
             .about("bytes of whole bursts; more than the lines if these are smaller than a burst")
-        .real("dram_bandwidth_gb_per_s", "bandwidth", "GB/s", 2, |r| Some(r.dram.as_ref()?.bandwidth_gb_per_s))
+        .real("dram_bandwidth_gb_per_s", "bandwidth", "GB/s", 2, dram(|d| d.bandwidth_gb_per_s))
             .about("bytes read over the time of the replay; in functional mode, at the DRAM's full speed")
-        .real("dram_peak_gb_per_s", "peak", "GB/s", 1, |r| Some(r.dram.as_ref()?.peak_gb_per_s))
+        .real("dram_peak_gb_per_s", "peak", "GB/s", 1, dram(|d| d.peak_gb_per_s))
             .about("peak bandwidth of the data buses")
-        .real("dram_latency_mean_ns", "latency", "ns", 1, |r| Some(r.dram.as_ref()?.latency_mean_ns))
+        .real("dram_latency_mean_ns", "latency", "ns", 1, dram(|d| d.latency_mean_ns))
             .about("time of a DRAM read from its arrival to its last data, mean")
-        .real("dram_latency_p99_ns", "latency, 99 %", "ns", 1, |r| Some(r.dram.as_ref()?.latency_p99_ns))
+        .real("dram_latency_p99_ns", "latency, 99 %", "ns", 1, dram(|d| d.latency_p99_ns))
             .about("99th percentile of the time of a DRAM read")
-        .real("dram_energy_mj", "DRAM energy", "mJ", 4, |r| Some(r.dram.as_ref()?.energy_mj))
+        .real("dram_energy_mj", "DRAM energy", "mJ", 4, dram(|d| d.energy_mj))
             .about("energy of activates, reads, writes, refreshes and standby")
 }

@@ -1,16 +1,16 @@
 //! Every reading of the SGRT paper's figure 3, beside the paper's values (`replay.readings/2`).
 
-use super::columns::{Columns, columns_of};
+use super::columns::{Columns, columns_of, name};
 use super::document::Document;
 use super::html::{Answer, Page, figure, figures, settings};
-use super::lists::geometric_mean;
-use super::plots::lines::{Axis, LineChart, LineSeries, Mark};
+use super::lists::{geometric_mean, least};
+use super::plots::lines::{Axis, LineChart, LineSeries};
 use super::plots::{PlotError, SeriesStyle};
 use super::table::Table;
 use maud::{Markup, html};
 use serde::{Serialize, Serializer};
 use sgrt::config::SgrtConfig;
-use sgrt::readings::{Figures, GbufferPlace, Reading, RowTest, Scope, rms_log};
+use sgrt::readings::{Figures, Reading, Scope, rms_log};
 use sim::paper::sgrt::PaperValues;
 use sim::result::TraceId;
 
@@ -94,20 +94,6 @@ fn scope_name(scope: Scope) -> &'static str {
     }
 }
 
-fn row_test_name(test: RowTest) -> &'static str {
-    match test {
-        RowTest::Arrivals => "arrivals",
-        RowTest::WholeRow => "whole-row",
-    }
-}
-
-fn gbuffer_name(place: GbufferPlace) -> &'static str {
-    match place {
-        GbufferPlace::Tile => "tile",
-        GbufferPlace::Screen => "screen",
-    }
-}
-
 fn rule_name(reading: &Reading) -> &'static str {
     match reading.rule.to_string().as_str() {
         "none" => "none",
@@ -117,6 +103,7 @@ fn rule_name(reading: &Reading) -> &'static str {
 
 impl Document for ReadingsReport {
     const SCHEMA: &'static str = "replay.readings/2";
+    const MODEL_VERSION: u32 = sim::model_version::RAY_MODEL_VERSION;
     const FILES_BESIDE_PAGE: bool = false;
 
     fn content(&self) -> impl Serialize {
@@ -137,10 +124,10 @@ impl Document for ReadingsReport {
             .text("reading", "reading", |c| c.fit.index as u64 + 1)
             .text("chosen", "closest", |c| c.chosen)
             .text("scope", "measured of", |c| scope_name(c.fit.reading.scope))
-            .text("reuse", "reused", |c| super::sgrt::reuse_name(c.fit.reading.reuse))
+            .text("reuse", "reused", |c| name(&c.fit.reading.reuse))
             .text("rule", "rule", |c| rule_name(&c.fit.reading))
-            .text("row_test", "tested against", |c| row_test_name(c.fit.reading.row_test))
-            .text("gbuffer", "G-buffer", |c| gbuffer_name(c.fit.reading.gbuffer))
+            .text("row_test", "tested against", |c| name(&c.fit.reading.row_test))
+            .text("gbuffer", "G-buffer", |c| name(&c.fit.reading.gbuffer))
             .real("relative_performance", "performance", "ratio", 4, move |c| figures(c).relative_performance)
             .real("paper_relative_performance", "paper", "ratio", 2, |c| Some(c.scene.paper.as_ref()?.relative_performance))
             .real("relative_energy", "energy", "ratio", 4, move |c| figures(c).relative_energy)
@@ -198,12 +185,7 @@ impl ReadingsReport {
             }
         };
         let fits: Vec<Fit> = readings.iter().enumerate().map(fit).collect();
-        let closest = fits
-            .iter()
-            .filter_map(|fit| Some((fit.calibration?, fit.index)));
-        let chosen = closest
-            .min_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, index)| index);
+        let chosen = least(fits.iter().map(|fit| fit.calibration));
         Self {
             config,
             chosen,
@@ -218,10 +200,10 @@ impl ReadingsReport {
         let columns = columns_of::<Fit>()
             .text("reading", "reading", |f| f.index as u64 + 1)
             .text("scope", "measured of", |f| scope_name(f.reading.scope))
-            .text("reuse", "reused", |f| super::sgrt::reuse_name(f.reading.reuse))
+            .text("reuse", "reused", |f| name(&f.reading.reuse))
             .text("rule", "rule", |f| rule_name(&f.reading))
-            .text("row_test", "tested against", |f| row_test_name(f.reading.row_test))
-            .text("gbuffer", "G-buffer", |f| gbuffer_name(f.reading.gbuffer))
+            .text("row_test", "tested against", |f| name(&f.reading.row_test))
+            .text("gbuffer", "G-buffer", |f| name(&f.reading.gbuffer))
             .real("calibration", "from the paper, calibration", "RMS ln", 3, |f| f.calibration)
             .real("test", "test scenes", "RMS ln", 3, |f| f.test)
             .real("relative_performance", "performance, mean", "ratio", 3, |f| f.relative_performance)
@@ -286,10 +268,10 @@ impl ReadingsReport {
                 "Closest to the paper's figure 3 on the scenes that calibrate is reading {}: {}, reuse of {}, rule {}, tested against {}, G-buffer by {} (RMS of ln(ours/paper) {}; on the test scenes {}).",
                 fit.index + 1,
                 scope_name(fit.reading.scope),
-                super::sgrt::reuse_name(fit.reading.reuse),
+                name(&fit.reading.reuse),
                 rule_name(&fit.reading),
-                row_test_name(fit.reading.row_test),
-                gbuffer_name(fit.reading.gbuffer),
+                name(&fit.reading.row_test),
+                name(&fit.reading.gbuffer),
                 distance(fit.calibration),
                 distance(fit.test),
             ));
@@ -330,12 +312,11 @@ impl ReadingsReport {
 
     /// Energy against performance.
     fn trade(&self) -> LineChart {
-        let series = |(number, scene): (usize, &SceneReadings)| LineSeries {
-            style: SeriesStyle::nth(&scene.label, number),
-            points: (scene.readings.iter())
-                .map(|(_, f)| (f.relative_performance, f.relative_energy))
-                .collect(),
-            mark: Mark::Dots,
+        let series = |(number, scene): (usize, &SceneReadings)| {
+            LineSeries::dots(
+                SeriesStyle::nth(&scene.label, number),
+                (scene.readings.iter()).map(|(_, f)| (f.relative_performance, f.relative_energy)),
+            )
         };
         LineChart {
             title: "Energy against performance under every reading".to_owned(),
@@ -352,13 +333,13 @@ impl ReadingsReport {
             y: Axis::linear(label),
             series: (0..)
                 .zip(&self.scenes)
-                .map(|(number, scene)| LineSeries {
-                    style: SeriesStyle::nth(&scene.label, number),
-                    points: (1..)
-                        .zip(&scene.readings)
-                        .map(|(at, (_, figures))| (f64::from(at), value(figures)))
-                        .collect(),
-                    mark: Mark::Dots,
+                .map(|(number, scene)| {
+                    LineSeries::dots(
+                        SeriesStyle::nth(&scene.label, number),
+                        (1..)
+                            .zip(&scene.readings)
+                            .map(|(at, (_, figures))| (f64::from(at), value(figures))),
+                    )
                 })
                 .collect(),
         };

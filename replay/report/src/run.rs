@@ -7,6 +7,7 @@ use super::figures::figures;
 use super::table::Table;
 use serde::Serialize;
 use sim::config::RunConfig;
+use sim::model_version::MODEL_VERSION;
 use sim::result::ClientTraffic;
 use sim::result::{LevelResult, Part, RUN_SCHEMA, RunResult, TileMap, TraceId};
 use sim::size::format_bytes;
@@ -90,7 +91,7 @@ impl Document for ModesReport<'_> {
             ((*key).to_owned(), difference.into())
         });
         let [timed, functional] =
-            [timed, functional].map(|row| Envelope::new(RUN_SCHEMA, RunJson::new(row)));
+            [timed, functional].map(|row| Envelope::new(RUN_SCHEMA, MODEL_VERSION, RunJson::new(row)));
         ModesJson {
             schema: Self::SCHEMA,
             timed,

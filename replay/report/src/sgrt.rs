@@ -15,8 +15,6 @@ use serde::Serialize;
 use sgrt::result::Report;
 use sim::paper::sgrt as paper;
 
-pub use tables::reuse_name;
-
 /// Longest edge of a picture on the page.
 pub const THUMBNAIL_PX: u32 = 560;
 

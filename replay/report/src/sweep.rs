@@ -8,7 +8,7 @@ use super::figures::{figure, figures, number};
 use super::html::{self, Answer, Page, settings};
 use super::plots::bars::{BarChart, BarGroup};
 use super::plots::hbars::HBarChart;
-use super::plots::lines::{self, Doublings, LineChart, LineSeries, Mark};
+use super::plots::lines::{self, Doublings, LineChart, LineSeries};
 use super::plots::{PlotError, SeriesStyle};
 use super::table::Table;
 use super::theme;
@@ -365,11 +365,7 @@ impl<'a> Charts<'a> {
                 .filter_map(|((at, _), values)| Some((*at, values[index]?)))
                 .collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            LineSeries {
-                style,
-                points,
-                mark: Mark::Line,
-            }
+            LineSeries::line(style, points)
         };
         let ends = |of: fn(f64, f64) -> f64| numbers.iter().map(|n| n.0).reduce(of).unwrap_or(0.0);
         let (low, high) = (ends(f64::min), ends(f64::max));

@@ -1,6 +1,6 @@
 //! Reuse between the eyes and over time, frame by frame (`replay.temporal/1`).
 
-use super::columns::{Columns, columns_of};
+use super::columns::{Columns, columns_of, name};
 use super::document::Document;
 use super::table::Table;
 use serde::Serialize;
@@ -37,6 +37,7 @@ pub struct TemporalReport {
 
 impl Document for TemporalReport {
     const SCHEMA: &'static str = "replay.temporal/1";
+    const MODEL_VERSION: u32 = sim::model_version::RAY_MODEL_VERSION;
 
     fn content(&self) -> impl Serialize {
         self
@@ -73,7 +74,7 @@ full: both eyes are traced
 stereo: the right eye from the left one
 temporal: each eye from its previous frame
 both: the left eye from its previous frame, the right eye from the left one";
-        let reuse = super::sgrt::reuse_name(self.reuse);
+        let reuse = name(&self.reuse);
         let (rule, rows) = (&self.rule, self.rows().text());
         format!("rule {rule}, reuse of {reuse}\n{schemes}\n\n{rows}")
     }

@@ -213,15 +213,8 @@ fn write(report: &AccuracyReport, size: &dyn Fn(&str) -> String, folder: &Path) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::testing::file_of;
-    use clap::Parser;
+    use crate::cli::testing::{arguments, file_of};
     use sim::stream::testing::Synthetic;
-
-    #[derive(Parser)]
-    struct Line {
-        #[command(flatten)]
-        args: Args,
-    }
 
     fn run_on(folder: &Path, traversal: &str) -> Result<ExitCode> {
         let trace = Synthetic {
@@ -232,10 +225,9 @@ mod tests {
         let at = |name: &str| folder.join(name).display().to_string();
         std::fs::copy(file_of(&trace).path(), at("a.textrace"))?;
         std::fs::write(at("p.json"), traversal)?;
-        let line = ["accuracy", &at("a.textrace"), "--traversal", &at("p.json")];
-        let line = line.into_iter().map(str::to_owned);
-        let line = line.chain(["-o".to_owned(), at("out")]);
-        run(&Line::try_parse_from(line)?.args)
+        let traces = [at("a.textrace"), "--traversal".to_owned(), at("p.json")];
+        let output = ["-o".to_owned(), at("out")];
+        run(&arguments(traces.into_iter().chain(output)))
     }
 
     const ROWS: &str = r#"{"schema": "tracegen.precision/1", "rows": [

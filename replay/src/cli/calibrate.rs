@@ -2,11 +2,10 @@
 
 use super::ConfigArgs;
 use super::outputs::Outputs;
-use super::subjects::Traces;
+use super::subjects::{Traces, replayed};
 use crate::files::check_outputs;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use report::calibration::CalibrationReport;
-use shell::Progress;
 use sim::config::Mode;
 use sim::paper::z2;
 use sim::preset::Preset;
@@ -109,12 +108,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     }
     let store = args.out.as_deref().map(|out| Store::open(out, None));
     let store = store.transpose()?;
-    let replays = (subjects.len() * plan.points.len()) as u64;
-    let progress = Progress::new("replaying", replays, "replays");
-    let done = |done| progress.advance(done);
-    let outcome = experiment::run(&plan, &subjects, store.as_ref(), &done)?;
-    drop(progress);
-    super::warnings::of_outcome(&outcome);
+    let outcome = replayed(&plan, &subjects, store.as_ref())?;
     let trials = trials(&plan, &outcome, &scenes, args.objective);
     let report = CalibrationReport::new(base, args.objective, trials);
     args.outputs.write(&report, prints)?;

@@ -3,16 +3,15 @@
 use super::ConfigArgs;
 use super::order_arg::parse_orders;
 use super::outputs::Outputs;
-use super::subjects::Traces;
+use super::subjects::{Traces, replayed};
 use crate::files::check_outputs;
 use anyhow::{Context, Result, ensure};
 use report::compare::{CompareReport, Replayed, Side};
-use shell::Progress;
 use sim::config::Order;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use studies::compare::compare;
-use studies::experiment::{self, Axis, Plan};
+use studies::experiment::{Axis, Plan};
 use toml::Value;
 
 /// Arguments of `replay compare`.
@@ -67,10 +66,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         values: orders.iter().map(name).collect(),
     };
     let plan = Plan::cross(config, &[axis], &[])?;
-    let progress = Progress::new("replaying", 2 * orders.len() as u64, "replays");
-    let outcome = experiment::run(&plan, &subjects, None, &|done| progress.advance(done))?;
-    drop(progress);
-    super::warnings::of_outcome(&outcome);
+    let outcome = replayed(&plan, &subjects, None)?;
     let rows = outcome.rows();
     let (of_a, of_b) = rows.split_at(orders.len());
     let replayed = of_a.iter().zip(of_b).map(|(a, b)| Replayed {

@@ -2,19 +2,19 @@
 
 use super::ConfigArgs;
 use super::order_arg::parse_orders;
-use super::subjects::Traces;
+use super::subjects::{Traces, replayed};
 use crate::files;
 use anyhow::{Context, Result, bail, ensure};
 use rayon::prelude::*;
 use report::picture::EmbeddedPicture;
 use report::z2::model::PaperReport;
-use shell::{Output, Progress};
+use shell::Output;
 use sim::config::RunConfig;
 use sim::paper::{self, z2};
 use sim::size::parse_bytes;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use studies::experiment::{self, Plan, Subject};
+use studies::experiment::{Plan, Subject};
 
 /// Arguments of the Z2 paper's experiment.
 #[derive(Debug, clap::Args)]
@@ -60,16 +60,7 @@ impl ExperimentArgs {
     ) -> Result<ExitCode> {
         self.threads.start()?;
         let base = self.machine.resolve_without_preset()?;
-        let usual = RunConfig::default();
-        ensure!(
-            base.order == usual.order,
-            "--order: this command varies the order; use --orders"
-        );
-        ensure!(
-            (base.level.l1.size_bytes, base.level.l2.size_bytes)
-                == (usual.level.l1.size_bytes, usual.level.l2.size_bytes),
-            "--l1 and --l2: this command varies the sizes; use --caches"
-        );
+        refuse_varied(&base, &RunConfig::default())?;
         let images = self.images.iter().map(|image| {
             let file = image
                 .split_once('=')
@@ -95,11 +86,7 @@ impl ExperimentArgs {
         let mut subjects = traces.subjects();
         self.choose_stand_ins(&mut subjects)?;
         let pictures = self.pictures(&subjects)?;
-        let replays = subjects.len() * plan.points.len();
-        let progress = Progress::new("replaying", replays as u64, "replays");
-        let outcome = experiment::run(&plan, &subjects, None, &|done| progress.advance(done))?;
-        drop(progress);
-        super::warnings::of_outcome(&outcome);
+        let outcome = replayed(&plan, &subjects, None)?;
         shell::note(&outcome.shared());
         let report = PaperReport::new(&outcome);
         write(&report, &pictures, prints)?;
@@ -164,6 +151,26 @@ impl ExperimentArgs {
         // Report the first error in the order of the arguments.
         pictures.into_iter().collect()
     }
+}
+
+/// Refuses flags of settings that the command varies.
+///
+/// # Errors
+/// A setting that differs from the `usual` one.
+pub(super) fn refuse_varied(base: &RunConfig, usual: &RunConfig) -> Result<()> {
+    let [sizes, usual_sizes] = [base, usual].map(|config| {
+        let level = &config.level;
+        [level.l1.size_bytes, level.l2.size_bytes]
+    });
+    ensure!(
+        base.order == usual.order,
+        "--order is varied here; use --orders"
+    );
+    ensure!(
+        sizes == usual_sizes,
+        "--l1 and --l2 are varied here; use --caches"
+    );
+    Ok(())
 }
 
 /// Parses L1 and L2 sizes, such as `8/128,16KiB/1MiB`, to bytes. Numbers without a unit are KiB.

@@ -7,6 +7,7 @@ use super::outputs::PageOutputs;
 use super::subjects::Traces;
 use crate::files::check_outputs;
 use anyhow::{Context, Result, ensure};
+use clap::Arg;
 use report::locality::{LocalityReport, TraceFigures};
 use shell::Progress;
 use sim::config::{Order, RunConfig};
@@ -21,13 +22,16 @@ const USUAL_ORDERS: &str = "morton,z2-lrta,z2-sta,z2-sta-merge";
 
 /// Arguments of `replay locality`.
 #[derive(Debug, clap::Args)]
-#[command(after_help = "Examples:
+#[command(
+    mut_arg("csv", csv_folder),
+    after_help = "Examples:
   replay locality c.textrace
   replay locality c.textrace --orders all --html locality.html
   replay locality c.textrace --orders morton,z2-sta --l1 16KiB --json
   replay locality c.textrace --csv tables
   replay locality --addresses gcc.din.gz --l1 32KiB --l2 256KiB --line 64
-docs/models/locality.md defines every figure.")]
+docs/models/locality.md defines every figure."
+)]
 pub struct Args {
     /// Texture traces
     #[arg(
@@ -50,6 +54,13 @@ pub struct Args {
     addresses: AddressInput,
     #[command(flatten)]
     machine: ConfigArgs,
+}
+
+fn csv_folder(csv: Arg) -> Arg {
+    csv.value_name("DIR").help(
+        "Also write the tables as CSV files into this folder, with exact counts of every distance; without DIR, print \
+         the summary",
+    )
 }
 
 /// Runs the subcommand.

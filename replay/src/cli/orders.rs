@@ -1,7 +1,7 @@
 //! `replay orders`: compares tile orders with each other and with bounds.
 
 use super::ConfigArgs;
-use super::experiment_args::parse_caches;
+use super::experiment_args::{parse_caches, refuse_varied};
 use super::order_arg::parse_named;
 use super::outputs::PageOutputs;
 use super::subjects::Traces;
@@ -135,15 +135,7 @@ fn study(args: &Args) -> Result<Study> {
         ..RunConfig::default()
     };
     let base = args.machine.resolve_over(usual)?;
-    ensure!(
-        base.order == usual.order,
-        "--order is varied here; use --orders"
-    );
-    ensure!(
-        (base.level.l1.size_bytes, base.level.l2.size_bytes)
-            == (usual.level.l1.size_bytes, usual.level.l2.size_bytes),
-        "--l1 and --l2 are varied here; use --caches"
-    );
+    refuse_varied(&base, &usual)?;
     ensure!(
         base.between_frames == usual.between_frames,
         "--between-frames is varied here; use --between"

@@ -41,7 +41,7 @@ impl ParquetArg {
 /// Forms of a result.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub(super) struct Outputs {
-    /// Print one JSON object
+    /// Print one JSON object (docs/use/analysis.md names its schema)
     #[arg(long)]
     pub json: bool,
     /// Also write the rows as CSV; without FILE or with -, print them instead of the table
@@ -54,6 +54,11 @@ pub(super) struct Outputs {
 /// `--csv` of a command whose traces may follow the flag.
 pub(super) fn csv_before_traces(csv: Arg) -> Arg {
     csv.require_equals(true).conflicts_with("json")
+}
+
+/// `--html` of a command that writes no files beside the page.
+pub(super) fn page_alone(html: Arg) -> Arg {
+    html.help("Also write a page with charts")
 }
 
 impl Outputs {
@@ -108,7 +113,7 @@ impl Outputs {
 pub(super) struct PageOutputs {
     #[command(flatten)]
     pub rows: Outputs,
-    /// Also write a page with charts
+    /// Also write a page with charts, and JSON and CSV files with the same numbers beside it
     #[arg(long, value_name = "FILE")]
     pub html: Option<PathBuf>,
 }
@@ -162,4 +167,78 @@ pub(super) fn write_page<D: Document>(path: &Path, document: &D, page: &str) -> 
         write_atomically(&path.with_extension("csv"), document.csv().as_bytes())?;
     }
     write_atomically(path, page.as_bytes())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+    use studies::experiment::Objective;
+
+    #[derive(Debug, Parser)]
+    struct Line {
+        traces: Vec<PathBuf>,
+        #[command(flatten)]
+        outputs: Outputs,
+    }
+
+    #[derive(Debug, Parser)]
+    #[command(mut_arg("csv", csv_before_traces))]
+    struct TracesLast {
+        traces: Vec<PathBuf>,
+        #[command(flatten)]
+        outputs: Outputs,
+    }
+
+    #[test]
+    fn csv_without_a_file_is_printed() {
+        let csv = |words: &[&str]| Line::try_parse_from(words).unwrap().outputs.csv;
+        let (stdout, file) = (Some(PathBuf::from("-")), Some(PathBuf::from("rows.csv")));
+        assert_eq!(csv(&["x", "a", "--csv"]), stdout);
+        assert_eq!(csv(&["x", "--csv", "--json"]), stdout);
+        assert_eq!(csv(&["x", "a", "--csv", "rows.csv"]), file);
+        assert_eq!(csv(&["x", "--csv=rows.csv", "a"]), file);
+    }
+
+    #[test]
+    fn a_trace_after_the_flag_is_no_file_for_the_rows() {
+        let parse = |words: &[&str]| TracesLast::try_parse_from(words);
+        let line = parse(&["x", "--csv", "a"]).unwrap();
+        assert_eq!(line.outputs.csv, Some(PathBuf::from("-")));
+        assert_eq!(line.traces, [PathBuf::from("a")]);
+        let line = parse(&["x", "--csv=rows.csv", "a"]).unwrap();
+        assert_eq!(line.outputs.csv, Some(PathBuf::from("rows.csv")));
+        let error = parse(&["x", "--csv", "--json", "a"])
+            .unwrap_err()
+            .to_string();
+        assert!(error.contains("cannot be used with"), "{error}");
+    }
+
+    #[test]
+    fn rows_are_written_to_a_file_beside_the_table_and_printed_instead_of_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("rows.csv");
+        let outputs = |csv: &Path| Outputs {
+            csv: Some(csv.to_owned()),
+            ..Outputs::default()
+        };
+        let report = report::calibration::CalibrationReport::new(
+            sim::config::RunConfig::default(),
+            Objective::Surface,
+            Vec::new(),
+        );
+        let of_file = outputs(&file);
+        let list = of_file
+            .list::<report::calibration::CalibrationReport>()
+            .unwrap();
+        assert!(crate::files::check_outputs(&list, []).unwrap());
+        of_file.write(&report, false).unwrap();
+        let text = std::fs::read_to_string(file).unwrap();
+        assert_eq!(text, "settings,chosen_by,held_out\n");
+        let list = outputs(Path::new("-"));
+        let list = list
+            .list::<report::calibration::CalibrationReport>()
+            .unwrap();
+        assert!(!crate::files::check_outputs(&list, []).unwrap());
+    }
 }

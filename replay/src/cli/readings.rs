@@ -18,6 +18,7 @@ use std::process::ExitCode;
 #[derive(Clone, Debug, Args)]
 #[command(
     mut_arg("csv", outputs::csv_before_traces),
+    mut_arg("html", outputs::page_alone),
     after_help = "Examples:
   replay readings teapot.raytrace chess.raytrace car.raytrace
   replay readings *.raytrace --calibrate teapot,chess,car --html readings.html"
@@ -114,19 +115,12 @@ fn mark_calibration(scenes: &mut [SceneReadings], labels: Option<&[String]>) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::Parser;
+    use crate::cli::testing::arguments;
     use sgrt::testing::{View, globe, trace, wall};
     use std::path::Path;
 
-    #[derive(Parser)]
-    struct Cli {
-        #[command(flatten)]
-        args: ReadingsArgs,
-    }
-
     fn run_with(list: &[&str]) -> Result<ExitCode> {
-        let words = std::iter::once("readings").chain(list.iter().copied());
-        run(&Cli::try_parse_from(words).expect("valid arguments").args)
+        run(&arguments(list))
     }
 
     fn trace_file(folder: &Path) -> String {

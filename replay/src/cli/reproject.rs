@@ -29,6 +29,8 @@ use std::process::ExitCode;
 #[derive(Clone, Debug, Args)]
 #[command(
     mut_arg("csv", outputs::csv_before_traces),
+    mut_arg("html", outputs::page_alone),
+    mut_arg("json", |json| json.help("Print one JSON object per file, one per line")),
     after_help = "Examples:
   replay reproject teapot.raytrace
   replay reproject teapot.raytrace --preset sgrt-paper
@@ -232,18 +234,11 @@ fn thumbnails(loaded: &LoadedTrace, ours: &RuleRun, plain: &RuleRun) -> anyhow::
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::Parser;
+    use crate::cli::testing::arguments;
     use sgrt::testing::{View, globe, trace, wall};
 
-    #[derive(Parser)]
-    struct Cli {
-        #[command(flatten)]
-        args: ReprojectArgs,
-    }
-
     fn args(list: &[&str]) -> ReprojectArgs {
-        let words = std::iter::once("reproject").chain(list.iter().copied());
-        Cli::try_parse_from(words).expect("valid arguments").args
+        arguments(list)
     }
 
     /// A small trace in its own folder.

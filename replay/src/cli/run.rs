@@ -52,7 +52,7 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["mode", "preset", "addresses"], hide_short_help = true)]
     compare_modes: bool,
     /// Print the whole configuration as TOML and stop
-    #[arg(long, conflicts_with_all = ["json", "csv", "compare_modes", "addresses"])]
+    #[arg(long, conflicts_with_all = ["json", "csv", "path", "compare_modes", "addresses"])]
     print_config: bool,
     #[command(flatten)]
     threads: shell::Threads,

@@ -2,10 +2,11 @@
 
 use anyhow::Result;
 use formats::textrace::Textrace;
+use shell::Progress;
 use sim::result::TraceId;
 use sim::stream::TileSource;
 use std::path::PathBuf;
-use studies::experiment::{Subject, labels};
+use studies::experiment::{self, Outcome, Plan, Store, Subject, labels};
 
 /// Opened traces.
 pub struct Traces(Vec<(Textrace, TraceId, String)>);
@@ -67,4 +68,21 @@ impl Traces {
             .map(|((trace, id, _), label)| Subject::new(trace, id.clone(), label))
             .collect()
     }
+}
+
+/// Replays every point of a plan on every trace, and warns of results that say little.
+///
+/// # Errors
+/// A trace that cannot be replayed.
+pub(super) fn replayed<'a>(
+    plan: &'a Plan,
+    subjects: &'a [Subject<'a>],
+    store: Option<&Store>,
+) -> Result<Outcome<'a>> {
+    let replays = subjects.len() * plan.points.len();
+    let progress = Progress::new("replaying", replays as u64, "replays");
+    let outcome = experiment::run(plan, subjects, store, &|done| progress.advance(done))?;
+    drop(progress);
+    super::warnings::of_outcome(&outcome);
+    Ok(outcome)
 }

@@ -292,24 +292,18 @@ fn embedded(folder: &Folder, differences: Vec<Difference>) -> Result<Scene> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::Parser;
+    use crate::cli::testing::arguments;
     use serde_json::Value;
     use std::fs;
     use std::path::Path;
     use studies::techniques::testing;
 
-    #[derive(Parser)]
-    struct Line {
-        #[command(flatten)]
-        args: Args,
-    }
-
     fn run_on(folders: &[&Path], page: &Path) -> Result<ExitCode> {
-        let mut line = vec!["techniques".to_owned(), "--csv".to_owned()];
+        let mut line = vec!["--csv".to_owned()];
         line.push(page.with_extension("rows").display().to_string());
         line.extend(["--html".to_owned(), page.display().to_string()]);
         line.extend(folders.iter().map(|f| f.display().to_string()));
-        run(&Line::try_parse_from(line).unwrap().args)
+        run(&arguments(line))
     }
 
     #[test]

@@ -116,13 +116,8 @@ fn origin_columns<'a, R: 'a>(of: fn(&R) -> &ByOrigin) -> Vec<Column<'a, R>> {
     Origin::ALL.into_iter().map(column).collect()
 }
 
-/// Keys of the summary on a terminal.
-pub const SHORT: [&str; 15] = [
-    "trace",
-    "order",
-    "stream",
-    "accesses",
-    "unique_lines",
+/// Keys of the misses of the configured cache and of a fully associative one.
+pub(super) const MISSES: [&str; 7] = [
     "line_miss_pct",
     "compulsory_pct",
     "capacity_pct",
@@ -130,10 +125,14 @@ pub const SHORT: [&str; 15] = [
     "avoided_pct",
     "fully_associative_line_miss_pct",
     "opt_line_miss_pct",
-    "hits_other_eye_pct",
-    "hits_earlier_frame_pct",
-    "tile_lines",
 ];
+
+/// Keys of the summary on a terminal.
+pub(super) fn short() -> Vec<&'static str> {
+    let stream = ["trace", "order", "stream", "accesses", "unique_lines"];
+    let hits = ["hits_other_eye_pct", "hits_earlier_frame_pct", "tile_lines"];
+    [&stream[..], &MISSES, &hits].concat()
+}
 
 /// Columns of the summary.
 #[rustfmt::skip]

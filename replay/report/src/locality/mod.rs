@@ -212,7 +212,7 @@ impl Document for LocalityReport {
 
     fn text(&self) -> String {
         let one = self.traces.len() == 1;
-        let keys = columns::SHORT.into_iter();
+        let keys = columns::short().into_iter();
         let keys = keys.filter(|key| !(one && *key == "trace"));
         self.rows().picked(keys).text()
     }

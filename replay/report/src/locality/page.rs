@@ -1,6 +1,6 @@
 //! The page: plots and tables of every trace and stream.
 
-use super::columns::Summary;
+use super::columns::{MISSES, Summary};
 use super::{LocalityReport, TraceFigures, plots};
 use crate::answers;
 use crate::document::Document;
@@ -14,19 +14,14 @@ use studies::locality::Stream;
 
 /// Keys of the columns in the page's table; CSV and JSON have all columns. Earlier frames are left out for
 /// traces of one frame.
-const SHOWN: [&str; 21] = [
+const BEFORE_MISSES: [&str; 5] = [
     "order",
     "accesses",
     "unique_lines",
     "both_eyes_pct",
     "earlier_frames_pct",
-    "line_miss_pct",
-    "compulsory_pct",
-    "capacity_pct",
-    "conflict_pct",
-    "avoided_pct",
-    "fully_associative_line_miss_pct",
-    "opt_line_miss_pct",
+];
+const AFTER_MISSES: [&str; 9] = [
     "opt_ways_line_miss_pct",
     "hits_same_tile_pct",
     "hits_other_tile_pct",
@@ -127,7 +122,7 @@ fn stream(rows: &[Summary], table: &Table, trace: &TraceFigures) -> Result<Marku
     let far = distances(rows, far_from)?;
     let all = distances(rows, 1)?;
     let ways = rows.iter().map(|row| plots::associativity(row).svg());
-    let keys = SHOWN.into_iter();
+    let keys = BEFORE_MISSES.into_iter().chain(MISSES).chain(AFTER_MISSES);
     let empty =
         |key: &&str| (one_frame && key.contains("earlier")) || (!rendered && key.contains("eye"));
     let shown = table.picked(keys.filter(|key| !empty(key)));

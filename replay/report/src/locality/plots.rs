@@ -1,10 +1,10 @@
 //! The plots of a stream, with all orders in each plot.
 
 use super::LocalityReport;
-use super::columns::{CurvePoint, Reuses, Summary};
+use super::columns::{CurvePoint, Reuses, Summary, Window};
 use crate::plots::SeriesStyle;
 use crate::plots::bars::{BarChart, BarGroup};
-use crate::plots::lines::{Axis, Doublings, LineChart, LineSeries, Mark};
+use crate::plots::lines::{Axis, Doublings, LineChart, LineSeries};
 use crate::plots::stacked::StackedChart;
 use crate::theme;
 use studies::locality::{CacheHits, Origin, Sequence};
@@ -27,17 +27,13 @@ fn sizes() -> Axis {
 /// left out.
 fn over_sizes<'a>(
     rows: &[Summary<'a>],
-    title: String,
+    title: &str,
     y: Axis,
     points: impl Fn(&Summary<'a>) -> Vec<(f64, f64)>,
 ) -> LineChart {
-    let series = |row: &Summary<'a>| LineSeries {
-        style: style(row),
-        points: points(row),
-        mark: Mark::Line,
-    };
+    let series = |row: &Summary<'a>| LineSeries::line(style(row), points(row));
     LineChart {
-        title,
+        title: title.to_owned(),
         x: sizes(),
         y,
         series: rows.iter().map(series).collect(),
@@ -58,7 +54,7 @@ pub(super) fn miss_ratio(rows: &[Summary]) -> LineChart {
     let y = Axis::doublings("misses, % of line accesses", Doublings::Numbers);
     over_sizes(
         rows,
-        "Miss ratio by size, fully associative LRU".into(),
+        "Miss ratio by size, fully associative LRU",
         y,
         |row| {
             let points =
@@ -71,16 +67,11 @@ pub(super) fn miss_ratio(rows: &[Summary]) -> LineChart {
 /// Hits whose previous use was by the other eye.
 pub fn other_eye(rows: &[Summary]) -> LineChart {
     let y = Axis::linear("hits whose previous use was by the other eye, % of line accesses");
-    over_sizes(
-        rows,
-        "Hits on the other eye's lines, by size".into(),
-        y,
-        |row| {
-            let points =
-                full_lru(row).filter_map(|p| Some((p.size_bytes() as f64, p.other_eye_pct()?)));
-            points.collect()
-        },
-    )
+    over_sizes(rows, "Hits on the other eye's lines, by size", y, |row| {
+        let points =
+            full_lru(row).filter_map(|p| Some((p.size_bytes() as f64, p.other_eye_pct()?)));
+        points.collect()
+    })
 }
 
 /// LRU misses over OPT misses.
@@ -88,7 +79,7 @@ pub(super) fn above_opt(rows: &[Summary]) -> LineChart {
     let y = Axis::linear("LRU misses over OPT misses");
     over_sizes(
         rows,
-        "LRU misses over OPT misses by size, both fully associative".into(),
+        "LRU misses over OPT misses by size, both fully associative",
         y,
         |row| {
             let figures = row.figures;
@@ -121,18 +112,18 @@ pub(super) fn associativity(row: &Summary) -> LineChart {
     let line = |ways: Option<u32>| {
         let points = lru().filter(|p| p.cache.ways == ways).filter(in_range);
         let at = |p: &CurvePoint| Some((p.size_bytes() as f64, p.line_miss_pct()?));
-        points.filter_map(at).filter(|p| p.1 > 0.0).collect()
+        points
+            .filter_map(at)
+            .filter(|p| p.1 > 0.0)
+            .collect::<Vec<_>>()
     };
-    let of_ways = ways.iter().enumerate().map(|(index, &ways)| LineSeries {
-        style: SeriesStyle::nth(format!("{ways}-way"), index),
-        points: line(Some(ways)),
-        mark: Mark::Line,
+    let of_ways = ways.iter().enumerate().map(|(index, &ways)| {
+        LineSeries::line(
+            SeriesStyle::nth(format!("{ways}-way"), index),
+            line(Some(ways)),
+        )
     });
-    let full = LineSeries {
-        style: SeriesStyle::nth("full", 7),
-        points: line(None),
-        mark: Mark::Line,
-    };
+    let full = LineSeries::line(SeriesStyle::nth("full", 7), line(None));
     LineChart {
         title: format!("{}: miss ratio by size and ways, LRU", row.of.order.title()),
         x: sizes(),
@@ -209,56 +200,52 @@ pub(super) fn nearer_pct(row: &Summary, from: u64) -> Option<f64> {
     row.share_pct(row.figures.distances.hits(from).iter().sum())
 }
 
-/// Mean working set by length of the stretch.
-pub fn working_sets(rows: &[Summary]) -> LineChart {
+/// A figure of working sets over the length of the stretch.
+fn over_stretches(
+    rows: &[Summary],
+    title: &str,
+    y: Axis,
+    of: impl Fn(&Summary, &Window) -> f64,
+) -> LineChart {
     let series = |row: &Summary| {
-        let points = LocalityReport::working_sets(row).into_iter().map(|window| {
-            let bytes = window.mean(window.set.lines) * f64::from(row.of.line_bytes);
-            (window.set.tiles as f64, bytes)
-        });
-        LineSeries {
-            style: style(row),
-            points: points.filter(|p| p.1 > 0.0).collect(),
-            mark: Mark::Line,
-        }
+        let windows = LocalityReport::working_sets(row).into_iter();
+        LineSeries::line(
+            style(row),
+            windows.map(|window| (window.set.tiles as f64, of(row, &window))),
+        )
     };
     LineChart {
-        title: "Working set by stretch of tiles".into(),
+        title: title.to_owned(),
         x: Axis::doublings("tiles", Doublings::Numbers),
-        y: Axis::doublings(
-            "mean distinct lines of a stretch, in bytes",
-            Doublings::Bytes,
-        ),
+        y,
         series: rows.iter().map(series).collect(),
     }
+}
+
+/// Mean working set by length of the stretch.
+pub fn working_sets(rows: &[Summary]) -> LineChart {
+    let label = "mean distinct lines of a stretch, in bytes";
+    let y = Axis::doublings(label, Doublings::Bytes);
+    let mut chart = over_stretches(rows, "Working set by stretch of tiles", y, |row, window| {
+        window.mean(window.set.lines) * f64::from(row.of.line_bytes)
+    });
+    for series in &mut chart.series {
+        series.points.retain(|point| point.1 > 0.0);
+    }
+    chart
 }
 
 /// Share of a working set that both eyes use.
 pub(super) fn shared_working_sets(rows: &[Summary]) -> LineChart {
-    let series = |row: &Summary| {
-        let points = LocalityReport::working_sets(row).into_iter().map(|window| {
-            let shared = window.set.lines_of_both() as f64 / window.set.lines.max(1) as f64;
-            (window.set.tiles as f64, 100.0 * shared)
-        });
-        LineSeries {
-            style: style(row),
-            points: points.collect(),
-            mark: Mark::Line,
-        }
-    };
-    LineChart {
-        title: "Lines shared by both eyes, by stretch of tiles".into(),
-        x: Axis::doublings("tiles", Doublings::Numbers),
-        y: Axis::linear("lines that both eyes use, % of the stretch's"),
-        series: rows.iter().map(series).collect(),
-    }
+    let y = Axis::linear("lines that both eyes use, % of the stretch's");
+    let title = "Lines shared by both eyes, by stretch of tiles";
+    over_stretches(rows, title, y, |_, window| {
+        100.0 * (window.set.lines_of_both() as f64 / window.set.lines.max(1) as f64)
+    })
 }
 
 /// The configured cache's misses by cause.
 pub fn causes(rows: &[Summary]) -> StackedChart {
-    let names = ["compulsory", "capacity", "conflict"]
-        .into_iter()
-        .zip([7, 1, 4]);
     let bar = |row: &Summary| {
         let split = &row.figures.split;
         let sum = |counts: &[u64]| counts.iter().sum();
@@ -269,9 +256,7 @@ pub fn causes(rows: &[Summary]) -> StackedChart {
     StackedChart {
         title: "Misses by cause".into(),
         value_label: "misses, % of line accesses".into(),
-        series: names
-            .map(|(name, index)| SeriesStyle::nth(name, index))
-            .collect(),
+        series: SeriesStyle::list(&[("compulsory", 7), ("capacity", 1), ("conflict", 4)]),
         bars: rows.iter().map(bar).collect(),
         bar_px: 64.0,
         decimals: Some(2),
@@ -281,7 +266,12 @@ pub fn causes(rows: &[Summary]) -> StackedChart {
 
 /// Misses of the configured cache and of a fully associative one, with LRU and with OPT.
 pub fn bounds(rows: &[Summary]) -> BarChart {
-    let names = ["as configured", "full LRU", "OPT, ways", "full OPT"];
+    let series = [
+        ("as configured", 7),
+        ("full LRU", 1),
+        ("OPT, ways", 3),
+        ("full OPT", 2),
+    ];
     let group = |row: &Summary| BarGroup {
         label: row.of.order.title().to_owned(),
         values: [
@@ -294,13 +284,10 @@ pub fn bounds(rows: &[Summary]) -> BarChart {
         .to_vec(),
         marks: Vec::new(),
     };
-    let series = names.into_iter().zip([7, 1, 3, 2]);
     BarChart {
         title: "LRU and OPT at the configured size".into(),
         value_label: "misses, % of line accesses".into(),
-        series: series
-            .map(|(name, index)| SeriesStyle::nth(name, index))
-            .collect(),
+        series: SeriesStyle::list(&series),
         groups: rows.iter().map(group).collect(),
         decimals: Some(2),
         ..BarChart::default()

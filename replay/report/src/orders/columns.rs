@@ -6,11 +6,8 @@ use sim::config::Order;
 use studies::orders_study::learn::{Learned, Learner};
 use studies::orders_study::{Of, Row};
 
-/// Keys of the means for a terminal.
-pub(super) const SHORT_MEANS: [&str; 13] = [
-    "between_frames",
-    "order",
-    "buildable",
+/// Keys of the means' changes and rates.
+pub(super) const CHANGES: [&str; 7] = [
     "change_pct",
     "worst_trace",
     "worst_trace_change_pct",
@@ -18,10 +15,10 @@ pub(super) const SHORT_MEANS: [&str; 13] = [
     "l1_footprint_miss_pct",
     "utilization_pct",
     "cycles_change_pct",
-    "state_bytes",
-    "table_bytes",
-    "tile_buffers",
 ];
+
+/// Keys of the sizes of an order's tables.
+pub(super) const SIZES: [&str; 3] = ["state_bytes", "table_bytes", "tile_buffers"];
 
 fn kib(bytes: u64) -> f64 {
     bytes as f64 / 1024.0

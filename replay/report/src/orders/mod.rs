@@ -100,7 +100,8 @@ impl Document for OrdersReport<'_> {
     /// The means; for a single trace, its rows.
     fn text(&self) -> String {
         let means = Table::new(&columns::means(), &self.means()).grouped_by(1);
-        let table = means.picked(columns::SHORT_MEANS);
+        let names = ["between_frames", "order", "buildable"].into_iter();
+        let table = means.picked(names.chain(columns::CHANGES).chain(columns::SIZES));
         let mut text = table.without_empty_columns().text();
         if !self.learned.is_empty() {
             text += &format!("\n{}", self.learned_table().text());

@@ -13,25 +13,6 @@ use maud::{Markup, html};
 use sim::order::{PlanInputs, View, WorkItem};
 use studies::orders_study::{BASELINE, Of, Row};
 
-/// Keys of the tables of means.
-const SHOWN: [&str; 15] = [
-    "order",
-    "buildable",
-    "information",
-    "change_pct",
-    "worst_trace",
-    "worst_trace_change_pct",
-    "closed_pct",
-    "l1_footprint_miss_pct",
-    "utilization_pct",
-    "cycles_change_pct",
-    "dram_row_hit_pct",
-    "state_bytes",
-    "table_bytes",
-    "tile_buffers",
-    "decision_cycles",
-];
-
 /// Size of the pictures of paths in tiles.
 const PATH_TILES: [u32; 2] = [12, 8];
 
@@ -150,10 +131,10 @@ fn best_and_bounds(means: &[Mean<'_>]) -> HBarChart {
     HBarChart {
         title: "Bytes from memory by order".to_owned(),
         value_label: format!("% of the bytes of {}", BASELINE.name()),
-        series: vec![
-            SeriesStyle::nth("hardware can follow it", 2),
-            SeriesStyle::nth("needs the future, or a bound", 7),
-        ],
+        series: SeriesStyle::list(&[
+            ("hardware can follow it", 2),
+            ("needs the future, or a bound", 7),
+        ]),
         rows: first_of(means).map(row).collect(),
         decimals: Some(1),
     }
@@ -185,7 +166,10 @@ fn of_display(means: &[Mean<'_>]) -> Markup {
     let table = Table::new(&columns::means(), means);
     let mut sections = Vec::new();
     for between in unique(means.iter().map(|mean| mean.between.to_string())) {
-        let shown = table.only("between_frames", &between).picked(SHOWN);
+        let names = ["order", "buildable", "information"].into_iter();
+        let keys = names.chain(columns::CHANGES).chain(["dram_row_hit_pct"]);
+        let keys = keys.chain(columns::SIZES).chain(["decision_cycles"]);
+        let shown = table.only("between_frames", &between).picked(keys);
         sections.push((between, shown.without_empty_columns()));
     }
     html! {

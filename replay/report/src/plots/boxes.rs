@@ -35,11 +35,8 @@ pub(crate) struct BoxRow {
     pub values: [f64; 5],
 }
 
-const TOP_PX: u32 = 50;
 const ROW_PX: i32 = 20;
 const BOX_PX: i32 = 10;
-const PLOT_WIDTH_PX: f64 = 420.0;
-const LONGEST_NAME_CHARS: usize = 48;
 
 impl BoxChart {
     /// The chart as SVG.
@@ -62,10 +59,10 @@ impl BoxChart {
             title: &self.title,
             value_label: &self.note,
             legend: Vec::new(),
-            names: theme::distinct(&names, LONGEST_NAME_CHARS),
+            names: theme::distinct(&names, 48),
             row_px: ROW_PX,
-            width_px: PLOT_WIDTH_PX,
-            around_px: [TOP_PX, 52, AXIS_PX],
+            width_px: 420.0,
+            around_px: [50, 52, AXIS_PX],
             x_label: &self.x.label,
             values,
         };

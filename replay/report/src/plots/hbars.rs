@@ -22,13 +22,10 @@ pub(crate) struct HBarChart {
     pub decimals: Option<usize>,
 }
 
-const TOP_PX: u32 = 66;
 const BAR_PX: i32 = 6;
 /// Height of a bar with a number: a line of text.
 const NUMBERED_BAR_PX: i32 = 12;
 const ROW_GAP_PX: i32 = 7;
-const PLOT_WIDTH_PX: f64 = 300.0;
-const LONGEST_NAME_CHARS: usize = 34;
 
 impl HBarChart {
     /// The chart as SVG.
@@ -50,10 +47,10 @@ impl HBarChart {
             title: &self.title,
             value_label: &self.value_label,
             legend: boxes(&self.series),
-            names: theme::distinct(&names, LONGEST_NAME_CHARS),
+            names: theme::distinct(&names, 34),
             row_px,
-            width_px: PLOT_WIDTH_PX,
-            around_px: [TOP_PX, right_px, 26],
+            width_px: 300.0,
+            around_px: [66, right_px, 26],
             x_label: "",
             values: 0.0..end_above(all.copied(), 1.02),
         };

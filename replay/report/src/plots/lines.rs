@@ -30,6 +30,25 @@ pub struct LineSeries {
     pub mark: Mark,
 }
 
+impl LineSeries {
+    /// A line through points.
+    pub fn line(style: SeriesStyle, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self {
+            style,
+            points: points.into_iter().collect(),
+            mark: Mark::Line,
+        }
+    }
+
+    /// A cloud of points.
+    pub fn dots(style: SeriesStyle, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self {
+            mark: Mark::Dots,
+            ..Self::line(style, points)
+        }
+    }
+}
+
 /// A line or scatter chart.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LineChart {
@@ -43,14 +62,11 @@ pub struct LineChart {
     pub series: Vec<LineSeries>,
 }
 
-const LEFT_PX: u32 = 58;
-const TOP_PX: u32 = 72;
 const PLOT_PX: (f64, f64) = (430.0, 260.0);
 const LABEL_GAP_PX: f64 = 15.0;
 /// Leader and sample of the line, between the axes and the names.
 const LEADER_PX: i32 = 16;
 const SAMPLE_PX: i32 = 26;
-const LONGEST_NAME_CHARS: usize = 34;
 /// A line with more points than this has symbols at some of them only.
 const MOST_SYMBOLS: usize = 14;
 
@@ -81,7 +97,7 @@ impl LineChart {
         let y = self.y.fit(points().map(|p| p.1));
         let (x, y) = (self.x.ticked(x).thinned(PLOT_PX.0), self.y.ticked(y));
         let names: Vec<&str> = self.series.iter().map(|s| s.style.name.as_str()).collect();
-        let names = theme::distinct(&names, LONGEST_NAME_CHARS);
+        let names = theme::distinct(&names, 34);
         let styled = || self.series.iter().zip(&names).enumerate();
         let is_named = |(_, (s, _)): &(usize, (&LineSeries, &String)), mark| {
             s.mark == mark && !s.style.name.is_empty() && !s.points.is_empty()
@@ -107,10 +123,10 @@ impl LineChart {
             legend: legend.collect(),
             plot_px: (PLOT_PX.0, height),
             around_px: [
-                TOP_PX,
+                72,
                 right as u32 + names_px.ceil() as u32,
                 AXIS_PX,
-                LEFT_PX.max(y.widest_px() as u32 + 16),
+                58.max(y.widest_px() as u32 + 16),
             ],
         };
         frame.draw(|root, mut builder, marks| {

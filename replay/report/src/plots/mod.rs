@@ -50,6 +50,14 @@ pub struct SeriesStyle {
 }
 
 impl SeriesStyle {
+    /// Series with these names and numbers of colours.
+    pub fn list(named: &[(&str, usize)]) -> Vec<Self> {
+        let series = named.iter();
+        series
+            .map(|(name, index)| Self::nth(*name, *index))
+            .collect()
+    }
+
     /// A series with the `index`-th colour of the theme.
     pub fn nth(name: impl Into<String>, index: usize) -> Self {
         Self {

@@ -38,14 +38,11 @@ pub struct NamedPoint {
     pub dominated: bool,
 }
 
-const TOP_PX: u32 = 72;
-const LEFT_PX: u32 = 58;
 const RIGHT_PX: u32 = 120;
 const PLOT_PX: (f64, f64) = (620.0, 380.0);
 /// With more points than this, names stand in a list.
 const MOST_NAMES: usize = 6;
 const LIST_GAP_PX: f64 = 15.0;
-const LONGEST_NAME_CHARS: usize = 40;
 const NAME_HEIGHT_PX: f64 = 14.0;
 /// Labels within this distance from their point need no leader line.
 const NEAR_PX: f64 = 16.0;
@@ -95,7 +92,7 @@ impl ScatterChart {
 
     fn labels(&self) -> Labels {
         let names: Vec<&str> = self.points.iter().map(|p| p.style.name.as_str()).collect();
-        let names = theme::distinct(&names, LONGEST_NAME_CHARS);
+        let names = theme::distinct(&names, 40);
         let listed = names.len() > MOST_NAMES;
         let order = self.numbered();
         let mut number = vec![0; names.len()];
@@ -191,12 +188,7 @@ impl ScatterChart {
                 })
                 .into(),
             plot_px: (PLOT_PX.0, height),
-            around_px: [
-                TOP_PX,
-                right,
-                AXIS_PX,
-                LEFT_PX.max(y.widest_px() as u32 + 16),
-            ],
+            around_px: [72, right, AXIS_PX, 58.max(y.widest_px() as u32 + 16)],
         }
     }
 

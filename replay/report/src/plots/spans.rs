@@ -34,10 +34,8 @@ pub struct Span {
     pub label: String,
 }
 
-const TOP_PX: u32 = 66;
 const ROW_PX: i32 = 26;
 const GAP_PX: i32 = 4;
-const PLOT_WIDTH_PX: f64 = 860.0;
 
 impl SpanChart {
     /// The chart as SVG.
@@ -56,8 +54,8 @@ impl SpanChart {
             legend: boxes(&self.kinds),
             names: self.rows.iter().map(|(name, _)| name.clone()).collect(),
             row_px: ROW_PX,
-            width_px: PLOT_WIDTH_PX,
-            around_px: [TOP_PX, 22, 26],
+            width_px: 860.0,
+            around_px: [66, 22, 26],
             x_label: "",
             values: self.range.clone(),
         };

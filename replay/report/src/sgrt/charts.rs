@@ -3,7 +3,7 @@
 use super::Entry;
 use crate::html::figures;
 use crate::plots::bars::{BarChart, BarGroup};
-use crate::plots::lines::{Axis, LineChart, LineSeries, Mark};
+use crate::plots::lines::{Axis, LineChart, LineSeries};
 use crate::plots::{PlotError, SeriesStyle};
 use maud::Markup;
 use sgrt::compose::Reuse;
@@ -61,10 +61,7 @@ fn chart(
         title: title.to_owned(),
         value_label: value_label.to_owned(),
         group_label: String::new(),
-        series: vec![
-            SeriesStyle::nth("chosen rule", 2),
-            SeriesStyle::nth("plain reuse", 1),
-        ],
+        series: SeriesStyle::list(&[("chosen rule", 2), ("plain reuse", 1)]),
         groups,
         mark_name: any_mark.then(|| "paper".to_owned()),
         reference: Some(1.0),
@@ -88,11 +85,7 @@ pub fn curve(report: &Report) -> Result<Markup, PlotError> {
             .map(|p| (x(p), p.tni_reduction_pct))
             .collect();
         points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        LineSeries {
-            style: SeriesStyle::nth(name(reuse), index),
-            points,
-            mark: Mark::Dots,
-        }
+        LineSeries::dots(SeriesStyle::nth(name(reuse), index), points)
     };
     // Colour reuse saves no more unit cycles than shadow reuse, and looks the same.
     let levels = [(Reuse::Primary, 2), (Reuse::Shadow, 0)];

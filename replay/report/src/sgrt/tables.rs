@@ -1,10 +1,9 @@
 //! Tables of reprojection results.
 
 use super::Entry;
-use crate::columns::{Column, Columns, Row, Show, columns_of, pick};
+use crate::columns::{Column, Columns, Row, Show, columns_of, name, pick};
 use crate::table::Table;
 use sgrt::accuracy::{Accuracy, ClassCounts};
-use sgrt::compose::Reuse;
 use sgrt::result::{CurvePoint, Outcome, Report, Sensitivity};
 use sgrt::run::EnergyPj;
 use sgrt::timing::Timing;
@@ -37,7 +36,7 @@ pub(super) fn rule_line(entries: &[Entry]) -> String {
         format!(
             "chosen: rule {}, reuse of {}; plain: rule none, every reprojected hit is reused{timing}{rates}",
             config.rule,
-            reuse_name(config.reuse)
+            name(&config.reuse)
         )
     })
 }
@@ -79,16 +78,6 @@ pub(super) fn row_notes(entries: &[Entry]) -> Vec<String> {
             )
         })
         .collect()
-}
-
-/// Name of a level of reuse, as on the command line.
-pub fn reuse_name(reuse: Reuse) -> &'static str {
-    match reuse {
-        Reuse::Primary => "primary",
-        Reuse::Shadow => "shadow",
-        Reuse::Color => "color",
-        Reuse::Pixel => "pixel",
-    }
 }
 
 /// A trace with one of the two rules that every report has.
@@ -167,7 +156,7 @@ fn identity<'a>() -> Vec<Column<'static, RuleRow<'a>>> {
             "chosen" => r.report.config.rule.to_string(),
             _ => "none".to_owned(),
         })
-        .text("reuse", "reused", |r| reuse_name(r.report.config.reuse))
+        .text("reuse", "reused", |r| name(&r.report.config.reuse))
 }
 
 /// Reused hits and their errors.
@@ -421,7 +410,7 @@ pub fn energy(entries: &[Entry]) -> Table {
 pub fn curve(report: &Report) -> Table {
     let columns = columns_of::<CurvePoint>()
         .text("rule", "rule", |p| p.rule.to_string())
-        .text("reuse", "reused", |p| reuse_name(p.reuse))
+        .text("reuse", "reused", |p| name(&p.reuse))
         .real("reuse_pct", "reuse", "%", 2, |p| p.reuse_pct)
         .real("wrong_object_pct", "wrong object", "%", 3, |p| {
             p.wrong_object_pct

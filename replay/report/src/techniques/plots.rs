@@ -2,7 +2,7 @@
 
 use crate::plots::SeriesStyle;
 use crate::plots::boxes::{BoxChart, BoxRow};
-use crate::plots::lines::{Axis, Doublings, LineChart, LineSeries, Mark};
+use crate::plots::lines::{Axis, Doublings, LineChart, LineSeries};
 use crate::plots::scatter::{NamedPoint, ScatterChart};
 use studies::techniques::{Measured, Measures, Spread};
 
@@ -90,11 +90,7 @@ fn over_frames(
 ) -> LineChart {
     let series = |(m, style): (&Measured, SeriesStyle)| {
         let numbers = m.row.frames.iter().map(|f| f64::from(f.frame));
-        LineSeries {
-            style,
-            points: numbers.zip(of(m)).collect(),
-            mark: Mark::Line,
-        }
+        LineSeries::line(style, numbers.zip(of(m)))
     };
     LineChart {
         title: format!("{}: {title}", measures.scene),

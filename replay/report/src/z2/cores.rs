@@ -60,11 +60,7 @@ fn chart(row: &ResultRow, timeline: &Timeline) -> SpanChart {
     SpanChart {
         title: row.point.config.order.title().to_owned(),
         value_label: "cycles".to_owned(),
-        kinds: vec![
-            SeriesStyle::nth("left eye", 0),
-            SeriesStyle::nth("right eye", 1),
-            SeriesStyle::nth("both", 2),
-        ],
+        kinds: SeriesStyle::list(&[("left eye", 0), ("right eye", 1), ("both", 2)]),
         rows: (0..cores)
             .map(|core| (format!("core {core}"), of_core(core).map(span).collect()))
             .collect(),

@@ -8,7 +8,7 @@ use crate::plots::bars::{BarChart, BarGroup};
 use crate::plots::contours::{ContourChart, PointSeries};
 use crate::plots::hbars::HBarChart;
 use crate::plots::heatmap::{HeatMap, Panel};
-use crate::plots::lines::{Axis, LineChart, LineSeries, Mark};
+use crate::plots::lines::{Axis, LineChart, LineSeries};
 use crate::plots::paths::{PathPlot, stops};
 use crate::plots::{PlotError, SeriesStyle};
 use crate::theme;
@@ -103,6 +103,20 @@ pub fn rates(report: &PaperReport, scene: &str) -> Vec<BarChart> {
     .collect()
 }
 
+/// Two figures of an order's rows on the machine of `--preset z2-paper`.
+fn points<'r>(
+    report: &'r PaperReport,
+    order: Order,
+    keys: [&'static str; 2],
+) -> impl Iterator<Item = (f64, f64)> + 'r {
+    let keys = keys.map(|key| format!("z2_paper.{key}"));
+    let rows = report
+        .rows
+        .iter()
+        .filter(move |r| r.point.config.order == order);
+    rows.filter_map(move |row| Some((number(row, &keys[0])?, number(row, &keys[1])?)))
+}
+
 /// Every row's rates of first look-ups on the paper's utilisation surface.
 ///
 /// # Errors
@@ -122,17 +136,8 @@ pub fn surface(report: &PaperReport) -> Result<String, PlotError> {
     series.extend(report.orders().into_iter().map(|order| {
         PointSeries {
             style: style(order),
-            points: report
-                .rows
-                .iter()
-                .filter(|r| r.point.config.order == order)
-                .filter_map(|r| {
-                    let l1_footprint_miss_pct = number(r, "z2_paper.l1_footprint_miss_pct")?;
-                    Some((
-                        l1_footprint_miss_pct.max(0.5),
-                        number(r, "z2_paper.l2_line_miss_pct")?,
-                    ))
-                })
+            points: points(report, order, ["l1_footprint_miss_pct", "l2_line_miss_pct"])
+                .map(|(l1, l2)| (l1.max(0.5), l2))
                 .collect(),
             hollow: false,
         }
@@ -158,20 +163,11 @@ pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
     let mut series: Vec<LineSeries> = report
         .orders()
         .into_iter()
-        .map(|order| LineSeries {
-            style: style(order),
-            points: report
-                .rows
-                .iter()
-                .filter(|r| r.point.config.order == order)
-                .filter_map(|r| {
-                    Some((
-                        number(r, "z2_paper.closed_form_util_pct")?,
-                        number(r, "z2_paper.tmu_util_pct")?,
-                    ))
-                })
-                .collect(),
-            mark: Mark::Dots,
+        .map(|order| {
+            LineSeries::dots(
+                style(order),
+                points(report, order, ["closed_form_util_pct", "tmu_util_pct"]),
+            )
         })
         .filter(|s| !s.points.is_empty())
         .collect();
@@ -190,14 +186,13 @@ pub fn closed_form(report: &PaperReport) -> Option<LineChart> {
         (0.0, "equal"),
         (-1.5, "\u{2212}1.5 points"),
     ] {
-        let line = LineSeries {
-            style: SeriesStyle {
+        let line = LineSeries::line(
+            SeriesStyle {
                 name: name.to_owned(),
                 color: theme::AXIS,
             },
-            points: vec![(ends.0, ends.0 + offset), (ends.1, ends.1 + offset)],
-            mark: Mark::Line,
-        };
+            vec![(ends.0, ends.0 + offset), (ends.1, ends.1 + offset)],
+        );
         series.insert(0, line);
     }
     Some(LineChart {

@@ -182,6 +182,7 @@ pub(super) fn text(report: &PaperReport) -> String {
 mod tests {
     use super::super::testing::with_report;
     use super::*;
+    use crate::document::Document;
 
     #[test]
     fn table_2_of_fixed_inputs_matches_the_papers_layout() {

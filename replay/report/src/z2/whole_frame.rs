@@ -75,22 +75,19 @@ fn chart(scene: &str, rows: &[&ResultRow]) -> StackedChart {
         let of = clients.filter(|c| part_of(c.client) == part);
         of.map(ClientTraffic::bytes).sum()
     };
-    let used: Vec<(usize, &str)> = (PARTS.into_iter().enumerate())
-        .filter(|(part, _)| rows.iter().any(|row| bytes(row, *part) > 0))
+    let used: Vec<(&str, usize)> = (PARTS.into_iter().zip(0..))
+        .filter(|(_, part)| rows.iter().any(|row| bytes(row, *part) > 0))
         .collect();
     let bar = |row: &&ResultRow| {
         let parts = used
             .iter()
-            .map(|(part, _)| row.mb_per_frame(bytes(row, *part)));
+            .map(|(_, part)| row.mb_per_frame(bytes(row, *part)));
         (row.point.config.order.title().to_owned(), parts.collect())
     };
     StackedChart {
         title: format!("{scene}: traffic by client"),
         value_label: "MB per frame".to_owned(),
-        series: used
-            .iter()
-            .map(|(number, name)| SeriesStyle::nth(*name, *number))
-            .collect(),
+        series: SeriesStyle::list(&used),
         bars: rows.iter().map(bar).collect(),
         bar_px: 72.0,
         decimals: Some(1),
