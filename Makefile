@@ -15,11 +15,11 @@ demo: deps programs
 
 # Unmodified programs: two web pages in headless Chromium, captured and replayed (docs/use/applications.md).
 apps: deps build
-	@OUT="$(OUT)" scripts/apps.sh
+	@python3 -m studies apps --two-pages --out "$(OUT)"
 
 # Every stereo rendering technique on three scenes, measured against its image error.
 techniques: deps build
-	@OUT="$(OUT)" scripts/techniques.sh
+	@python3 -m studies techniques --out "$(OUT)"
 
 # Numbers that try to break a capture: errors and bounds in $(OUT)/stress/stress.md, about two minutes.
 stress: deps build
@@ -27,7 +27,7 @@ stress: deps build
 
 # Run time against error, from capture precision to techniques: a page in $(OUT)/accuracy.
 accuracy: deps build
-	@OUT="$(OUT)" scripts/accuracy.sh
+	@python3 -m studies accuracy --out "$(OUT)" --results "$(OUT)/accuracy"
 
 # The Python package and its notebooks in a fresh virtual environment, with packages from PyPI (docs/use/python.md).
 notebooks: build
@@ -75,7 +75,7 @@ figures: build
 
 # Every page from small inputs, with screenshots and a check of their layout: out/screenshots.
 screenshots: deps build
-	scripts/screenshots.sh
+	@python3 -m studies screenshots --out "$(OUT)"
 
 # Fetches and converts the real scenes that may be had by address, into $(SCENES).
 scenes:
@@ -83,12 +83,12 @@ scenes:
 
 # Draws the glTF files of published packages and writes results/scene-files.csv, about ten minutes (docs/use/scene-files.md).
 scene-files: deps build
-	@python3 -B scripts/scene_files.py "$${CARGO_TARGET_DIR:-target}/release/tracegen" "$(OUT)/scene-files" results/scene-files.csv
+	@python3 -m studies scene-files --out "$(OUT)"
 
 # Measures the tables of the documents again and prints what moved (docs/use/real-scenes.md):
-#   make reproduce SCENES=folder SCRIPTS="policies levels"
+#   make reproduce SCENES=folder STUDIES="policies levels"
 reproduce: deps build
-	@OUT="$(OUT)" scripts/reproduce.sh "$(SCENES)" $(SCRIPTS)
+	@python3 -m studies reproduce $(STUDIES) --out "$(OUT)" --scenes "$(SCENES)"
 
 clean:
 	$(CARGO) clean

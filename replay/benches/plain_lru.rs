@@ -3,7 +3,7 @@
 //! most recently used first: 8 KiB over 128 KiB, four ways.
 //!
 //! `cargo bench -p replay --bench plain_lru -- FILE [LINE_BYTES]`; without a file it generates a stream.
-//! `scripts/addresses_speed.py` compares whole processes.
+//! `python3 -m studies addresses-speed` compares whole processes.
 
 use memmap2::Mmap;
 use std::fs::File;

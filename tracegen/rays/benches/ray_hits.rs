@@ -2,7 +2,7 @@
 //! `cargo bench -p rays --bench ray_hits -- FOLDER [RAYS]`.
 //!
 //! FOLDER has triangles and streams of rays as written by `rays --dump`, and what Embree found for
-//! them (see scripts/embree_hits.py, which runs this). RAYS of each stream are checked, evenly
+//! them (see `studies/embree.py`, which runs this). RAYS of each stream are checked, evenly
 //! spread, by default 300,000. A line per stream has the counts of rays that differ, as JSON. The
 //! exit code is 1 if a difference has no cause.
 

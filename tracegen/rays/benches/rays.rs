@@ -5,7 +5,7 @@
 //! counting is measured in slices, in which the variants alternate. A rate uses the best round of
 //! every slice, so that a disturbance affects only one slice of one round. The gain of two threads
 //! compares the best rounds of whole streams. `--dump` writes triangles and rays as plain
-//! little-endian floats for scripts/embree_compare.py.
+//! little-endian floats for `studies/embree.py`.
 
 use formats::raytrace::{EyeCamera, TraversalKind};
 use glam::Vec3;
