@@ -87,7 +87,7 @@ def show_worst(rows):
 
 def by_set(rows):
     """The changes on the design cameras and on those held out."""
-    return [one(change(where(rows, set=name))) for name in SETS]
+    return [change(where(rows, set=name)) for name in SETS]
 
 
 def rank_correlation(a, b):
@@ -142,9 +142,9 @@ def displays(study, write):
     table, worsts = [], []
     for order, rows in by(found["symmetric-100"], "order").items():
         of = {name: where(found[name], order=order) for name in found}
-        table.append([order, *(rows[0][key] for key in ("state_bytes", "table_bytes", "tile_buffers")), *(one(change(own)) for own in of.values())])
+        table.append([order, *(rows[0][key] for key in ("state_bytes", "table_bytes", "tile_buffers")), *(change(own) for own in of.values())])
         (most, label), display = max((worst(own), name) for name, own in of.items())
-        worsts.append([order, one(most), label, display, one(max(row["change_pct"] for own in of.values() for row in own if can_change(row)))])
+        worsts.append([order, most, label, display, max(row["change_pct"] for own in of.values() for row in own if can_change(row))])
     splits = [[name, *by_set(where(found[name], order=BEST)), one(correlation_of_sets(found[name]), 3)] for name in DISPLAYS]
     detail = "tracegen raster SCENE --hmd DISPLAY, replay orders TRACES --orders ... --json: rows, change_pct"
     offsets = " | ".join(f"{name}: {abs(int(found[name][0]['offset_tiles']))} tiles" for name in DISPLAYS)
@@ -159,7 +159,7 @@ def all_orders(study, write):
     for order, own in sorted(by(every, "order").items(), key=lambda pair: change(pair[1])):
         misses = mean(row["l1_footprint_miss_pct"] for row in own)
         needs = [own[0][key] for key in ("state_bytes", "table_bytes", "look_ahead_items", "tile_buffers", "decision_cycles", "information")]
-        table.append([order, one(change(own)), *by_set(own), show_worst(own), one(misses, 2), *needs])
+        table.append([order, change(own), *by_set(own), show_worst(own), one(misses, 2), *needs])
     write("orders-all", "replay orders TRACES --json: rows", (
         "order | all cameras, % | design, % | held out, % | worst camera, % | L1 misses, % | state, bytes | tables, bytes | look-ahead, items | "
         "tile buffers | decision, cycles | information"), table)
@@ -182,15 +182,15 @@ def cameras(study, write):
     table = []
     for trace, own in by(rows, "trace").items():
         base = mean(row["external_mb_per_frame"] for row in where(own, order=BASE))
-        table.append([trace.replace(",", ": "), one(base, 3), *(one(change(where(own, order=name))) for name in BY_CAMERA)])
-    table.append(["geometric mean", "", *(one(change(where(rows, order=name))) for name in BY_CAMERA)])
+        table.append([trace.replace(",", ": "), one(base, 3), *(change(where(own, order=name)) for name in BY_CAMERA)])
+    table.append(["geometric mean", "", *(change(where(rows, order=name)) for name in BY_CAMERA)])
     write("orders-cameras", detail, " | ".join(["camera", "z2-sta, MB per frame", *BY_CAMERA]), table)
     of = {name: where(rows, order=name) for name in BOUNDS}
     log = {name: math.log(1 + change(own) / 100) for name, own in of.items()}
     table = []
     for name, own in of.items():
-        by_l2 = [one(change(where(own, l2_kib=l2))) for l2 in (128, 256)]
-        table.append([name, "yes" if own[0]["buildable"] else "", *by_l2, one(change(own)),
+        by_l2 = [change(where(own, l2_kib=l2)) for l2 in (128, 256)]
+        table.append([name, "yes" if own[0]["buildable"] else "", *by_l2, change(own),
                       *(one(100 * log[name] / log[to], 0) for to in ("greedy", "anneal", INFINITE))])
     write("orders-bounds", detail, (
         "order or bound | buildable | 128 KiB L2, % | 256 KiB L2, % | all, % | of the way to greedy, % | to anneal, % | to the infinite cache, %"), table)
@@ -220,15 +220,15 @@ def frames(study, write):
             over.append(percent)
             regrets.append(learner["regret_pct"])
             if l1 == 8:
-                table.append([learner["trace"].replace(",", ": "), f"8/{l2:.0f}", best, one(percent), *(one(learner[key]) for key in ("regret_pct", "frame_best_pct"))])
+                table.append([learner["trace"].replace(",", ": "), f"8/{l2:.0f}", best, percent, learner["regret_pct"], learner["frame_best_pct"]])
         study.drop(*traces)
-    table.append(["mean of all caches", "", "", one(mean_change(over)), one(mean(regrets)), ""])
+    table.append(["mean of all caches", "", "", mean_change(over), mean(regrets), ""])
     write("orders-learned", "replay orders TRACE --learn --json: learned", (
         "camera | caches, KiB | best fixed order | learned, against adaptive+sta+offset+boustro, % | regret, % | best order of each frame saves, %"), table)
     table = []
     for order, own in by(rows, "order").items():
         kept = where(own, between_frames="keep")
-        table.append([order, *(one(change(where(own, between_frames=name))) for name in BETWEEN), *by_set(kept), show_worst(kept)])
+        table.append([order, *(change(where(own, between_frames=name)) for name in BETWEEN), *by_set(kept), show_worst(kept)])
     titles = ", % | ".join(BETWEEN.values())
     write("orders-frames", f"tracegen raster SCENE --path head --frames 120, replay orders TRACE {between} --json: rows, change_pct",
           f"order | {titles}, % | kept: design, % | kept: held out, % | kept: worst camera, %", table)
@@ -251,9 +251,9 @@ def timed(study, write):
         costs = []
         for rows in by_cores.values():
             own = where(rows, order=order)
-            costs += [one(change(own)), one(mean_change(row["cycles_change_pct"] for row in own), 2)]
+            costs += [change(own), one(mean_change(row["cycles_change_pct"] for row in own), 2)]
         figures = [one(mean(row[key] for row in where(two, order=order)), digits) for key, digits in TIMED_FIGURES]
-        table.append([order, *costs[:2], *figures, one(100 * (energy[order] / energy[BASE] - 1)), *costs[2:]])
+        table.append([order, *costs[:2], *figures, 100 * (energy[order] / energy[BASE] - 1), *costs[2:]])
     write("orders-timed", "replay orders TRACES --mode timed --dram lpddr4 --cores N --caches 8/128,16/256 --json: rows; bytes, cycles and energy against z2-sta", (
         "order | bytes, % | cycles, % | utilisation, % | L1 misses, % | DRAM row hits, % | DRAM energy, % | 4 cores: bytes, % | 4 cores: cycles, % | "
         "8 cores: bytes, % | 8 cores: cycles, % | 16 cores: bytes, % | 16 cores: cycles, %"), table)
@@ -292,8 +292,8 @@ def axes(study, write):
         settled = [min(rows, key=lambda row: row["external_bytes"]) for rows in zip(*(of[order] for order in CURVES))]
         whole = [own["whole_frame_bytes"] / base["whole_frame_bytes"] for own, base in zip(of[BEST], of[BASE]) if base["whole_frame_bytes"]]
         table.append([
-            setting, one(mean(row["external_mb_per_frame"] for row in of[BASE]), 3), one(change(of[BEST])), *by_set(of[BEST]), show_worst(of[BEST]),
-            *(one(change(of[order])) for order in shown), one(change(settled)), one(100 * (geometric_mean(whole) - 1)) if whole else ""])
+            setting, one(mean(row["external_mb_per_frame"] for row in of[BASE]), 3), change(of[BEST]), *by_set(of[BEST]), show_worst(of[BEST]),
+            *(change(of[order]) for order in shown), change(settled), 100 * (geometric_mean(whole) - 1) if whole else ""])
     study.drop(*made[1])
     write("orders-axes", "replay orders TRACES with the flag that the row names, --json: rows, change_pct", (
         f"changed setting | z2-sta, MB per frame | {BEST}, % | design, % | held out, % | worst camera, % | {', % | '.join(shown)}, % | "
@@ -308,7 +308,7 @@ def speed(study, write):
     replays = len(json.loads(done.out)["rows"])
     write("orders-speed", "replay orders TRACES --json, timed by the study", (
         "cameras | orders | pairs of caches | replays | processors | wall time, s | user time, s | system time, s"),
-        [[len(traces), len(orders), 4, replays, os.cpu_count(), *map(one, (done.wall_s, done.user_s, done.system_s))]])
+        [[len(traces), len(orders), 4, replays, os.cpu_count(), done.wall_s, done.user_s, done.system_s]])
 
 
 PARTS = {"displays": displays, "all": all_orders, "cameras": cameras, "frames": frames, "timed": timed, "axes": axes, "speed": speed}
@@ -319,4 +319,10 @@ def run(study):
     for part in study.options.parts or PARTS:
         if part not in PARTS:
             raise Failed(f"expected some of: {', '.join(PARTS)}; found '{part}'")
-        PARTS[part](study, lambda *table, part=part: study.write(*table, part=part))
+
+        def write(name, detail, heading, rows):
+            """Writes a table of the part. Figures have a decimal unless they are formatted already."""
+            cells = [[one(cell) if cell is None or isinstance(cell, float) else cell for cell in row] for row in rows]
+            study.write(name, detail, heading, cells, part=part)
+
+        PARTS[part](study, write)

@@ -26,7 +26,7 @@ def run(study):
             for without, result in zip(base, study.pair(trace, *flags(study, prefetcher, lines))):
                 prefetched = result.get("prefetch")
                 useful = f"{100 * prefetched['useful_lines'] / prefetched['lines']:.1f}" if prefetched else "-"
-                row += [megabytes(result), useful, f"{result['l2']['misses']:,}", f"{100 * (result['cycles'] / without['cycles'] - 1):+.1f}"]
+                row += [megabytes(result), useful, f"{result['l2']['line_misses']:,}", f"{100 * (result['cycles'] / without['cycles'] - 1):+.1f}"]
             rows.append(row)
     study.write(
         "prefetch", "tracegen raster SCENE --hmd dk2 --no-plain, replay run TRACE --config FILE with a [prefetch] table",
