@@ -25,7 +25,7 @@ def parse(name, about, module, words):
     parser.add_argument("--results", type=Path, default=ROOT / "results", help="folder of the results files (results)")
     parser.add_argument("--out", type=Path, default=Path(OUT), help=f"folder of all other outputs ({OUT})")
     parser.add_argument("--scenes", type=Path, help="folder of the real scenes (OUT/scenes)")
-    parser.add_argument("--traces", type=Path, help="keep the captures in this folder, and use those that are there again")
+    parser.add_argument("--traces", type=Path, help="keep the captures below this folder, and use them again")
     parser.add_argument("--bin", type=Path, help="folder of tracegen and replay ($CARGO_TARGET_DIR/release)")
     for flag, settings in getattr(module, "OPTIONS", {}).items():
         parser.add_argument(flag, **settings)

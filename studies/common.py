@@ -111,7 +111,7 @@ class Study:
         self.scenes = (options.scenes or options.out / "scenes").resolve()
         self.bin = (options.bin or Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")) / "release").resolve()
         self.work = work
-        self.traces = (options.traces or work / "traces").resolve()
+        self.traces = (options.traces / name if options.traces else work / "traces").resolve()
         self.start = time.monotonic()
         for folder in (self.results, self.traces):
             folder.mkdir(parents=True, exist_ok=True)
