@@ -1,6 +1,6 @@
 //! Converts frames of a session to a trace.
 
-mod build;
+mod frame_builder;
 mod images;
 mod places;
 mod portions;
@@ -9,15 +9,15 @@ mod quads;
 use crate::pairs::pair;
 use crate::session::{Executed, Session, SessionError, coverage_group};
 use crate::views::{self, DrawKey, Role, Rule, Views, ViewsError, Wanted};
-use build::{Builder, Merged};
 use formats::textrace::{
     LeftOut, Pass, PassKind, ProgramCapture, Surfaces, TextraceWriter, TraceMeta,
 };
 use formats::view::{Eye, EyeView, FovTangents, FrameViews, Hmd, TILE_SIZE_PX};
+use frame_builder::{Builder, StereoDraw};
 use places::Placement;
 use record::{CaptureCounts, RecordError, Recording};
 use spool::FramesBy;
-use spool::RawSample;
+use spool::{RawSample, TextureInfo};
 use std::collections::{BTreeMap, HashMap};
 use std::io::{Seek, Write};
 use thiserror::Error;
@@ -184,27 +184,30 @@ pub(crate) fn weight(
 }
 
 /// Key that is equal for draws that are the same draw of the trace, with their textures.
-fn key(session: &Session, draw: u32) -> Option<(DrawKey, String)> {
+fn key(session: &Session, draw: u32) -> Option<(DrawKey, &[TextureInfo])> {
     let info = session.draw(draw)?;
-    Some((DrawKey::of(info), format!("{:?}", info.textures)))
+    Some((DrawKey::of(info), &info.textures))
 }
 
 /// Merges the draws of both eyes in a frame. The result keeps the order of each eye.
-fn merge(session: &Session, draws: &[Executed], views: &Views) -> Vec<Merged> {
+fn merge(session: &Session, draws: &[Executed], views: &Views) -> Vec<StereoDraw> {
     let with = |wanted: Role| -> Vec<Executed> {
         let both = draws.iter().zip(&views.roles);
         both.filter(|(draw, role)| **role == wanted && session.is_shaded(draw))
             .map(|(draw, _)| *draw)
             .collect()
     };
-    let mut merged: Vec<Merged> = with(Role::Shadow).into_iter().map(Merged::Shadow).collect();
+    let mut merged: Vec<StereoDraw> = with(Role::Shadow)
+        .into_iter()
+        .map(StereoDraw::Shadow)
+        .collect();
     let layers = views.layers;
     merged.extend(
         with(Role::Multiview)
             .into_iter()
-            .map(|draw| Merged::Multiview(draw, layers)),
+            .map(|draw| StereoDraw::Multiview(draw, layers)),
     );
-    merged.extend(with(Role::Seen(None)).into_iter().map(Merged::Mono));
+    merged.extend(with(Role::Seen(None)).into_iter().map(StereoDraw::Mono));
     let [left, right] = [Eye::Left, Eye::Right].map(|eye| with(Role::Seen(Some(eye))));
     let keys =
         |of: &[Executed]| -> Vec<_> { of.iter().map(|draw| key(session, draw.draw)).collect() };
@@ -212,7 +215,7 @@ fn merge(session: &Session, draws: &[Executed], views: &Views) -> Vec<Merged> {
     merged.extend(
         pairs
             .into_iter()
-            .map(|(l, r)| Merged::Eyes([l.map(|l| left[l]), r.map(|r| right[r])])),
+            .map(|(l, r)| StereoDraw::Eyes([l.map(|l| left[l]), r.map(|r| right[r])])),
     );
     merged
 }

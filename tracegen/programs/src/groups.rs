@@ -50,7 +50,7 @@ impl Group {
         shader: &ShaderInfo,
         coordinates: u16,
         element: Option<u32>,
-        bound: impl Fn(&TextureSite) -> Result<Bound, LeftOut>,
+        mut bound: impl FnMut(&TextureSite) -> Result<Bound, LeftOut>,
     ) -> Result<(Self, Vec<UvGroup>), LeftOut> {
         let members = (shader.sites.iter()).filter(|site| site.group == coordinates);
         let mut group: Option<Self> = None;
@@ -265,9 +265,9 @@ mod tests {
             tests: DepthTests::Either,
             sites,
         };
-        let mut sizes = std::cell::RefCell::new([[64, 32], [16, 128]].into_iter());
+        let mut sizes = [[64, 32], [16, 128]].into_iter();
         let bound = |_: &TextureSite| {
-            let size = sizes.borrow_mut().next().ok_or("no more".to_owned())?;
+            let size = sizes.next().ok_or("no more".to_owned())?;
             Ok(Bound {
                 texture: 5,
                 sampler: 1,
@@ -276,9 +276,7 @@ mod tests {
                 anisotropic,
             })
         };
-        let made = Group::new(&shader, 0, None, bound).unwrap();
-        sizes.get_mut().for_each(drop);
-        made
+        Group::new(&shader, 0, None, bound).unwrap()
     }
 
     #[test]

@@ -1,13 +1,11 @@
 //! Pairs the draws of the left eye with those of the right eye.
 
-use std::hash::Hash;
-
 /// Indices of a draw in the sequences of the left and the right eye.
 pub type Pair = (Option<usize>, Option<usize>);
 
 /// Merges two sequences and keeps the order of both. Where the sequences differ, both skip entries until the
 /// nearest pair of equal entries. Skipped entries remain without a partner.
-pub fn pair<K: Eq + Hash>(left: &[K], right: &[K]) -> Vec<Pair> {
+pub fn pair<K: PartialEq>(left: &[K], right: &[K]) -> Vec<Pair> {
     let mut pairs = Vec::with_capacity(left.len().max(right.len()));
     let (mut l, mut r) = (0, 0);
     while l < left.len() && r < right.len() {
@@ -35,7 +33,7 @@ pub fn pair<K: Eq + Hash>(left: &[K], right: &[K]) -> Vec<Pair> {
 }
 
 /// Share of the entries that have a partner, 0 to 1.
-pub fn matched_share<K: Eq + Hash>(left: &[K], right: &[K]) -> f64 {
+pub fn matched_share<K: PartialEq>(left: &[K], right: &[K]) -> f64 {
     let longer = left.len().max(right.len());
     if longer == 0 {
         return 0.0;

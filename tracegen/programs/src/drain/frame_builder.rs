@@ -22,7 +22,7 @@ use std::io::{Seek, Write};
 
 /// A draw of the trace and the executed draws that it consists of.
 #[derive(Clone, Copy, Debug)]
-pub enum Merged {
+pub enum StereoDraw {
     /// A draw into a shadow map.
     Shadow(Executed),
     /// A draw into a picture that both eyes use.
@@ -33,7 +33,7 @@ pub enum Merged {
     Eyes([Option<Executed>; 2]),
 }
 
-impl Merged {
+impl StereoDraw {
     /// The executed draws, and the targets of their records.
     fn parts(&self) -> Vec<(Executed, RecordTarget)> {
         match *self {
@@ -160,14 +160,17 @@ impl<W: Write + Seek> Builder<W> {
         &mut self,
         session: &Session,
         number: u32,
-        merged: &[Merged],
+        merged: &[StereoDraw],
         records: &HashMap<u32, Vec<RawSample>>,
         placements: [Placement; 2],
         size_px: [u32; 2],
     ) -> Result<u64, DrainError> {
         let mut passes: BTreeMap<TargetPass, Records> = BTreeMap::new();
         let eyes = match merged {
-            _ if merged.iter().any(|draw| matches!(draw, Merged::Mono(_))) => {
+            _ if merged
+                .iter()
+                .any(|draw| matches!(draw, StereoDraw::Mono(_))) =>
+            {
                 &[TargetPass::Both][..]
             }
             _ => &[TargetPass::Left, TargetPass::Right],
@@ -178,7 +181,7 @@ impl<W: Write + Seek> Builder<W> {
         let mut shadow_sizes: HashMap<u32, (Placement, [u32; 2])> = HashMap::new();
         let mut triangles = 0;
         for draw in merged {
-            if let Merged::Shadow(executed) = draw
+            if let StereoDraw::Shadow(executed) = draw
                 && let Some(info) = session.draw(executed.draw)
             {
                 let view = viewport(info);
@@ -225,7 +228,7 @@ impl<W: Write + Seek> Builder<W> {
     fn draw(
         &mut self,
         session: &Session,
-        merged: &Merged,
+        merged: &StereoDraw,
         records: &HashMap<u32, Vec<RawSample>>,
         placements: [Placement; 2],
         shadows: &HashMap<u32, (Placement, [u32; 2])>,
@@ -408,19 +411,9 @@ impl<W: Write + Seek> Builder<W> {
         shader: &ShaderInfo,
         (coordinates, element): GroupKey,
     ) -> Result<(Group, Vec<UvGroup>), String> {
-        let mut bound: HashMap<String, Result<Bound, String>> = HashMap::new();
-        let members = shader.sites.iter();
-        for of in members.filter(|site| site.group == coordinates) {
-            if let What::Texture(texture) = &of.what {
-                let found = self.bound(session, info, texture, element);
-                bound.insert(format!("{texture:?}"), found);
-            }
-        }
-        let of = |texture: &TextureSite| {
-            let found = bound.get(&format!("{texture:?}")).cloned();
-            found.unwrap_or_else(|| Err("a texture that is not known".to_owned()))
-        };
-        Group::new(shader, coordinates, element, of)
+        Group::new(shader, coordinates, element, |texture| {
+            self.bound(session, info, texture, element)
+        })
     }
 
     /// The texture and sampler that a site reads.
