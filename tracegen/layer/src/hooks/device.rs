@@ -270,33 +270,33 @@ unsafe fn track(
 }
 
 pub(super) unsafe extern "system" fn destroy_device(
-    device: vk::Device,
+    handle: vk::Device,
     allocator: *const vk::AllocationCallbacks<'_>,
 ) {
-    if device == vk::Device::null() {
+    if handle == vk::Device::null() {
         return;
     }
     // SAFETY: a valid call of vkDestroyDevice.
     unsafe {
-        let key = dispatch_key(device);
+        let key = dispatch_key(handle);
         let removed = DEVICES.write().ok().and_then(|mut all| all.remove(&key));
-        if let Some(known) = removed {
-            if !read_ended(&known, &mut lock(&known.pending), DESTROY_TIMEOUT) {
+        if let Some(device) = removed {
+            if !read_ended(&device, &mut lock(&device.pending), DESTROY_TIMEOUT) {
                 let what =
                     "commands of a requested frame had not ended when the device was destroyed";
-                known.capture.event(&Event::Trouble {
+                device.capture.event(&Event::Trouble {
                     what: what.to_owned(),
                 });
             }
-            if let Some(queries) = &known.queries {
-                queries.destroy(device, &known.next);
+            if let Some(queries) = &device.queries {
+                queries.destroy(handle, &device.next);
             }
-            if let Some(pictures) = &known.pictures {
-                pictures.destroy(device, &known.next);
+            if let Some(pictures) = &device.pictures {
+                pictures.destroy(handle, &device.next);
             }
-            known.capture.note_frames();
-            known.capture.event(&Event::Closed);
-            (known.next.destroy_device)(device, allocator);
+            device.capture.note_frames();
+            device.capture.event(&Event::Closed);
+            (device.next.destroy_device)(handle, allocator);
         }
     }
 }

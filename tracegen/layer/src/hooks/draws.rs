@@ -9,16 +9,16 @@ use std::sync::Arc;
 
 /// Whether draws of a command buffer may belong to a requested frame. A command buffer that may be submitted
 /// several times can be executed in any later frame.
-pub(super) fn is_wanted(known: &Device, state: &mut CommandState) -> bool {
-    let capture = known.capture;
+pub(super) fn is_wanted(device: &Device, state: &mut CommandState) -> bool {
+    let capture = device.capture;
     let one_time = state.one_time();
     *(state.wanted)
         .get_or_insert_with(|| !capture.is_over() && (!one_time || capture.may_want_commands()))
 }
 
 /// Whether draws of a command buffer are recorded.
-pub(super) fn records(known: &Device, state: &mut CommandState) -> bool {
-    known.recorder.is_some() && is_wanted(known, state)
+pub(super) fn records(device: &Device, state: &mut CommandState) -> bool {
+    device.recorder.is_some() && is_wanted(device, state)
 }
 
 /// How a draw is recorded and counted.
@@ -37,13 +37,13 @@ struct Plan {
 }
 
 /// Tracks the draw; `None` if it is not recorded or listed.
-fn plan(known: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> {
-    if known.capture.is_over() {
+fn plan(device: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> {
+    if device.capture.is_over() {
         return None;
     }
-    let tracker = &mut *known.tracker();
+    let tracker = &mut *device.tracker();
     let state = tracker.commands.get_mut(buffer.as_raw());
-    if !is_wanted(known, state) {
+    if !is_wanted(device, state) {
         return None;
     }
     let pipeline = Arc::clone(state.pipeline()?);
@@ -65,7 +65,7 @@ fn plan(known: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> 
         dynamic,
         twice: twice && !counts_itself,
         once: twin.is_some() && !twice,
-        counted: known.queries.is_some() && !counts_itself,
+        counted: device.queries.is_some() && !counts_itself,
         pipeline,
     };
     tracker.commands.add(buffer.as_raw(), info);
@@ -78,42 +78,42 @@ fn plan(known: &Device, buffer: vk::CommandBuffer, call: &Call) -> Option<Plan> 
 /// The command buffer is being recorded, and `draw` records the draw into it.
 unsafe fn submit_draw(buffer: vk::CommandBuffer, call: &Call, draw: impl Fn(&Device)) {
     // SAFETY: as the caller promises.
-    let known = &*unsafe { Device::of(buffer) };
-    let Some(plan) = plan(known, buffer, call) else {
-        draw(known);
+    let device = &*unsafe { Device::of(buffer) };
+    let Some(plan) = plan(device, buffer, call) else {
+        draw(device);
         return;
     };
-    let next = &known.next;
+    let next = &device.next;
     // SAFETY: the program's draw is valid at this point. The recording pipeline differs only in its fragment
     // shader and its writes. Afterwards the program's pipeline is bound again, with the dynamic states that
     // the recording pipeline fixed.
     unsafe {
         let begin = || {
-            if let Some(queries) = known.queries.as_ref().filter(|_| plan.counted) {
+            if let Some(queries) = device.queries.as_ref().filter(|_| plan.counted) {
                 queries.begin(buffer, plan.number, next);
             }
         };
         let end = || {
-            if let Some(queries) = known.queries.as_ref().filter(|_| plan.counted) {
+            if let Some(queries) = device.queries.as_ref().filter(|_| plan.counted) {
                 queries.end(buffer, plan.number, next);
             }
         };
         let graphics = vk::PipelineBindPoint::GRAPHICS;
         if plan.once || plan.twice {
-            push_number(known, buffer, &plan);
+            push_number(device, buffer, &plan);
         }
         let twin = plan.pipeline.recorded.as_ref();
         if let (true, Some(twin)) = (plan.twice, twin) {
             (next.cmd_bind_pipeline)(buffer, graphics, twin.handle);
             begin();
-            draw(known);
+            draw(device);
             end();
             (next.cmd_bind_pipeline)(buffer, graphics, plan.handle);
-            restore(known, buffer, &plan.dynamic, &twin.fixed);
-            draw(known);
+            restore(device, buffer, &plan.dynamic, &twin.fixed);
+            draw(device);
         } else {
             begin();
-            draw(known);
+            draw(device);
             end();
         }
     }
@@ -123,13 +123,13 @@ unsafe fn submit_draw(buffer: vk::CommandBuffer, call: &Call, draw: impl Fn(&Dev
 ///
 /// # Safety
 /// The command buffer is being recorded.
-unsafe fn push_number(known: &Device, buffer: vk::CommandBuffer, plan: &Plan) {
-    let Some(recorder) = &known.recorder else {
+unsafe fn push_number(device: &Device, buffer: vk::CommandBuffer, plan: &Plan) {
+    let Some(recorder) = &device.recorder else {
         return;
     };
     // SAFETY: the layout has room for the number at this offset and lives as long as its pipelines.
     unsafe {
-        (known.next.cmd_push_constants)(
+        (device.next.cmd_push_constants)(
             buffer,
             plan.pipeline.layout,
             plan.pipeline.stages,
@@ -145,12 +145,12 @@ unsafe fn push_number(known: &Device, buffer: vk::CommandBuffer, plan: &Plan) {
 /// # Safety
 /// The command buffer is being recorded.
 unsafe fn restore(
-    known: &Device,
+    device: &Device,
     buffer: vk::CommandBuffer,
     dynamic: &Dynamic,
     fixed: &[vk::DynamicState],
 ) {
-    let next = &known.next;
+    let next = &device.next;
     // SAFETY: the program has set these states with the same values.
     unsafe {
         for state in fixed {
@@ -215,7 +215,7 @@ macro_rules! draws {
         pub(super) unsafe extern "system" fn $hook(buffer: vk::CommandBuffer, $($argument: $kind),*) {
             // SAFETY: a valid call of the draw command.
             unsafe {
-                submit_draw(buffer, &$call, |known| (known.next.$hook)(buffer, $($argument),*));
+                submit_draw(buffer, &$call, |device| (device.next.$hook)(buffer, $($argument),*));
             }
         }
     )* };

@@ -53,7 +53,10 @@ pub(super) type Link = (vk::Pipeline, Option<Arc<Library>>);
 ///
 /// # Safety
 /// A valid description.
-pub(super) unsafe fn links(known: &Device, info: &vk::GraphicsPipelineCreateInfo<'_>) -> Vec<Link> {
+pub(super) unsafe fn links(
+    device: &Device,
+    info: &vk::GraphicsPipelineCreateInfo<'_>,
+) -> Vec<Link> {
     // SAFETY: as the caller promises.
     let handles = unsafe {
         find::<vk::PipelineLibraryCreateInfoKHR<'_>>(info.p_next)
@@ -61,7 +64,7 @@ pub(super) unsafe fn links(known: &Device, info: &vk::GraphicsPipelineCreateInfo
                 slice(links.p_libraries, links.library_count)
             })
     };
-    let tracker = known.tracker();
+    let tracker = device.tracker();
     let library = |handle| tracker.pipelines.library(handle);
     handles.iter().map(|h| (*h, library(*h))).collect()
 }

@@ -38,33 +38,33 @@ impl Pending {
     ///
     /// # Safety
     /// A live device.
-    pub unsafe fn is_blocked(&mut self, known: &Device) -> bool {
+    pub unsafe fn is_blocked(&mut self, device: &Device) -> bool {
         // SAFETY: as the caller promises.
-        !self.is_empty() || unsafe { !wait_for(known, &mut self.blocked, Duration::ZERO) }
+        !self.is_empty() || unsafe { !wait_for(device, &mut self.blocked, Duration::ZERO) }
     }
 
     /// Notes that a submission of another frame was just made, which waits for the host.
     ///
     /// # Safety
     /// A queue of the device, which the program is not using in another thread.
-    pub unsafe fn block(&mut self, known: &Device, queue: vk::Queue) {
+    pub unsafe fn block(&mut self, device: &Device, queue: vk::Queue) {
         // SAFETY: as the caller promises.
-        self.blocked.extend(unsafe { fence_after(known, queue) });
+        self.blocked.extend(unsafe { fence_after(device, queue) });
     }
 
     /// Adds a submission that was just made.
     ///
     /// # Safety
     /// A queue of the device, which the program is not using in another thread.
-    pub unsafe fn add(&mut self, known: &Device, queue: vk::Queue, submission: Submission) {
+    pub unsafe fn add(&mut self, device: &Device, queue: vk::Queue, submission: Submission) {
         // SAFETY: as the caller promises.
-        match unsafe { fence_after(known, queue) } {
+        match unsafe { fence_after(device, queue) } {
             Some(fence) => self.fences.push(fence),
             // SAFETY: as above.
-            None => drop(unsafe { (known.next.queue_wait_idle)(queue) }),
+            None => drop(unsafe { (device.next.queue_wait_idle)(queue) }),
         }
         self.submissions.push(submission);
-        known.capture.note_submission();
+        device.capture.note_submission();
     }
 }
 
@@ -72,17 +72,17 @@ impl Pending {
 ///
 /// # Safety
 /// A queue of the device, which the program is not using in another thread.
-pub(super) unsafe fn fence_after(known: &Device, queue: vk::Queue) -> Option<vk::Fence> {
-    let (next, success) = (&known.next, vk::Result::SUCCESS);
+pub(super) unsafe fn fence_after(device: &Device, queue: vk::Queue) -> Option<vk::Fence> {
+    let (next, success) = (&device.next, vk::Result::SUCCESS);
     let mut fence = vk::Fence::null();
     // SAFETY: as the caller promises.
     unsafe {
         let info = vk::FenceCreateInfo::default();
-        if (next.create_fence)(known.handle, &info, std::ptr::null(), &mut fence) != success {
+        if (next.create_fence)(device.handle, &info, std::ptr::null(), &mut fence) != success {
             return None;
         }
         if (next.queue_submit)(queue, 0, std::ptr::null(), fence) != success {
-            (next.destroy_fence)(known.handle, fence, std::ptr::null());
+            (next.destroy_fence)(device.handle, fence, std::ptr::null());
             return None;
         }
     }
@@ -94,21 +94,21 @@ pub(super) unsafe fn fence_after(known: &Device, queue: vk::Queue) -> Option<vk:
 /// # Safety
 /// Fences of the device.
 pub(super) unsafe fn wait_for(
-    known: &Device,
+    device: &Device,
     fences: &mut Vec<vk::Fence>,
     timeout: Duration,
 ) -> bool {
-    let (next, device) = (&known.next, known.handle);
+    let (next, handle) = (&device.next, device.handle);
     let timeout_ns = u64::try_from(timeout.as_nanos()).unwrap_or(u64::MAX);
     // SAFETY: as the caller promises. Signalled fences are not in use.
     unsafe {
         let (count, first) = (fences.len() as u32, fences.as_ptr());
         let ended = fences.is_empty()
-            || (next.wait_for_fences)(device, count, first, vk::TRUE, timeout_ns)
+            || (next.wait_for_fences)(handle, count, first, vk::TRUE, timeout_ns)
                 == vk::Result::SUCCESS;
         if ended {
             for fence in fences.drain(..) {
-                (next.destroy_fence)(device, fence, std::ptr::null());
+                (next.destroy_fence)(handle, fence, std::ptr::null());
             }
         }
         ended
@@ -119,19 +119,19 @@ pub(super) unsafe fn wait_for(
 ///
 /// # Safety
 /// A live device.
-pub(super) unsafe fn read_ended(known: &Device, pending: &mut Pending, timeout: Duration) -> bool {
+pub(super) unsafe fn read_ended(device: &Device, pending: &mut Pending, timeout: Duration) -> bool {
     if pending.is_empty() {
         return true;
     }
     // SAFETY: as the caller promises; the submissions have ended when their records are read.
     unsafe {
-        if !wait_for(known, &mut pending.fences, timeout) {
+        if !wait_for(device, &mut pending.fences, timeout) {
             return false;
         }
         let submissions = std::mem::take(&mut pending.submissions);
         let count = submissions.len() as u32;
-        write_records(known, submissions);
-        known.capture.note_read(count);
+        write_records(device, submissions);
+        device.capture.note_read(count);
     }
     true
 }
@@ -141,8 +141,8 @@ pub(super) unsafe fn read_ended(known: &Device, pending: &mut Pending, timeout: 
 ///
 /// # Safety
 /// The submissions have ended.
-unsafe fn write_records(known: &Device, submissions: Vec<Submission>) {
-    let capture = known.capture;
+unsafe fn write_records(device: &Device, submissions: Vec<Submission>) {
+    let capture = device.capture;
     let mut frames: BTreeMap<Place, (Vec<Executed>, Vec<DispatchInfo>)> = BTreeMap::new();
     for submission in submissions {
         let (draws, dispatches) = frames.entry(submission.place).or_default();
@@ -150,31 +150,31 @@ unsafe fn write_records(known: &Device, submissions: Vec<Submission>) {
         dispatches.extend(submission.dispatches);
     }
     for (draws, _) in frames.values() {
-        describe(known, draws);
+        describe(device, draws);
     }
-    note_mixed(known, &frames);
+    note_mixed(device, &frames);
     let all = frames.values().flat_map(|(draws, _)| draws);
     let numbers: Vec<u32> = all.clone().map(|item| item.draw.draw).collect();
     // SAFETY: as the caller promises.
-    let occlusion: HashMap<u32, u64> = known
+    let occlusion: HashMap<u32, u64> = device
         .queries
         .as_ref()
         .map_or_else(Vec::new, |queries| unsafe {
-            queries.results(known.handle, &numbers, &known.next)
+            queries.results(device.handle, &numbers, &device.next)
         })
         .into_iter()
         .collect();
-    let (records, lost_bytes) = match &known.recorder {
+    let (records, lost_bytes) = match &device.recorder {
         Some(recorder) => recorder.buffer.take(|records, lost| {
             let span = capture.write(|writer| writer.records(records));
             (span.unwrap_or_default(), lost)
         }),
         None => (Span::default(), 0),
     };
-    if let Some(pictures) = &known.pictures {
+    if let Some(pictures) = &device.pictures {
         let passes: HashSet<u32> = all.filter_map(|i| Some(i.pass.as_ref()?.pass)).collect();
         // SAFETY: as the caller promises.
-        unsafe { pictures.write(known, &passes) };
+        unsafe { pictures.write(device, &passes) };
     }
     for (place, (draws, dispatches)) in frames {
         let numbers = draws.iter().map(|item| item.draw.draw);
@@ -198,7 +198,7 @@ fn number_and_pass(item: &Executed) -> [u32; 2] {
 }
 
 /// Reports draws of several frames whose records cannot be told apart, because the frames ended together.
-fn note_mixed(known: &Device, frames: &BTreeMap<Place, (Vec<Executed>, Vec<DispatchInfo>)>) {
+fn note_mixed(device: &Device, frames: &BTreeMap<Place, (Vec<Executed>, Vec<DispatchInfo>)>) {
     let mut seen: HashMap<u32, Place> = HashMap::new();
     let mut mixed = 0_u64;
     for (place, (draws, _)) in frames {
@@ -208,7 +208,7 @@ fn note_mixed(known: &Device, frames: &BTreeMap<Place, (Vec<Executed>, Vec<Dispa
         }
     }
     if mixed > 0 {
-        known.capture.event(&Event::Trouble {
+        device.capture.event(&Event::Trouble {
             what: format!(
                 "{mixed} draws were under way in two frames at once: both frames have the records of both executions"
             ),
@@ -217,8 +217,8 @@ fn note_mixed(known: &Device, frames: &BTreeMap<Place, (Vec<Executed>, Vec<Dispa
 }
 
 /// Describes draws, their render passes, shaders and images, each once.
-fn describe(known: &Device, items: &[Executed]) {
-    let capture = known.capture;
+fn describe(device: &Device, items: &[Executed]) {
+    let capture = device.capture;
     for item in items {
         let draw = &item.draw;
         let mut images: Vec<u32> = Vec::new();
@@ -229,13 +229,13 @@ fn describe(known: &Device, items: &[Executed]) {
         let views = draw.textures.iter().filter_map(|texture| texture.view);
         images.extend(views.map(|view| view.image));
         for image in images {
-            let info = known.tracker().images.numbered(image).cloned();
+            let info = device.tracker().images.numbered(image).cloned();
             if let Some(info) = info {
                 capture.write(|w| w.describe("image", image, || Event::Image((*info).clone())));
             }
         }
         if let Some(shader) = draw.shader {
-            let info = known.shader(shader);
+            let info = device.shader(shader);
             if let Some(info) = info {
                 capture.write(|w| w.describe("shader", shader, || Event::Shader((*info).clone())));
             }

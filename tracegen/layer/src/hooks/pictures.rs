@@ -104,13 +104,13 @@ impl Pictures {
     ///
     /// # Safety
     /// The command buffer is being recorded, outside a render pass.
-    pub unsafe fn take(&self, known: &Device, buffer: vk::CommandBuffer, pass: &PassInfo) {
+    pub unsafe fn take(&self, device: &Device, buffer: vk::CommandBuffer, pass: &PassInfo) {
         let (view, kind) = match (pass.colors.first(), &pass.depth) {
             (Some(color), _) => (color, Kind::color(color)),
             (None, Some(depth)) => (depth, Some(Kind::depth(depth))),
             (None, None) => return,
         };
-        let (Some(kind), tracker) = (kind, known.tracker()) else {
+        let (Some(kind), tracker) = (kind, device.tracker()) else {
             return;
         };
         let image = tracker.images.numbered(view.image).cloned();
@@ -130,10 +130,10 @@ impl Pictures {
         let size = full.map(side);
         // SAFETY: as the caller promises.
         unsafe {
-            let Some(picture) = PassReadback::new(known, pass.pass, size, kind) else {
+            let Some(picture) = PassReadback::new(device, pass.pass, size, kind) else {
                 return;
             };
-            picture.record(known, buffer, from, view, full, kind.aspect);
+            picture.record(device, buffer, from, view, full, kind.aspect);
             lock(&self.made).push(picture);
         }
     }
@@ -142,7 +142,7 @@ impl Pictures {
     ///
     /// # Safety
     /// The passes have been executed.
-    pub unsafe fn write(&self, known: &Device, passes: &HashSet<u32>) {
+    pub unsafe fn write(&self, device: &Device, passes: &HashSet<u32>) {
         let made = lock(&self.made);
         for picture in made.iter().filter(|picture| passes.contains(&picture.pass)) {
             // SAFETY: the buffer is mapped as long as the picture is kept.
@@ -157,7 +157,7 @@ impl Pictures {
             };
             let texels = texels.get(..(4 * picture.size[0] * picture.size[1]) as usize);
             let texels = texels.unwrap_or_default();
-            known
+            device
                 .capture
                 .write(|w| w.picture(picture.pass, picture.size, texels));
         }
@@ -167,10 +167,10 @@ impl Pictures {
     ///
     /// # Safety
     /// No commands are being executed.
-    pub unsafe fn destroy(&self, device: vk::Device, next: &Next) {
+    pub unsafe fn destroy(&self, handle: vk::Device, next: &Next) {
         for picture in lock(&self.made).drain(..) {
             // SAFETY: as the caller promises.
-            unsafe { picture.destroy(device, next) };
+            unsafe { picture.destroy(handle, next) };
         }
     }
 }
@@ -180,8 +180,8 @@ impl PassReadback {
     ///
     /// # Safety
     /// The device is open.
-    unsafe fn new(known: &Device, pass: u32, size: [u32; 2], kind: Kind) -> Option<Self> {
-        let (device, next) = (known.handle, &known.next);
+    unsafe fn new(device: &Device, pass: u32, size: [u32; 2], kind: Kind) -> Option<Self> {
+        let (handle, next) = (device.handle, &device.next);
         let mut picture = Self {
             pass,
             size,
@@ -211,11 +211,11 @@ impl PassReadback {
         unsafe {
             let none = std::ptr::null();
             let success = vk::Result::SUCCESS;
-            let made = (next.create_image)(device, &image, none, &mut picture.image) == success
-                && (next.create_buffer)(device, &buffer, none, &mut picture.buffer) == success
-                && picture.bind(known);
+            let made = (next.create_image)(handle, &image, none, &mut picture.image) == success
+                && (next.create_buffer)(handle, &buffer, none, &mut picture.buffer) == success
+                && picture.bind(device);
             if !made {
-                picture.destroy(device, next);
+                picture.destroy(handle, next);
                 return None;
             }
         }
@@ -226,14 +226,14 @@ impl PassReadback {
     ///
     /// # Safety
     /// Both were just created.
-    unsafe fn bind(&mut self, known: &Device) -> bool {
-        let (device, next) = (known.handle, &known.next);
+    unsafe fn bind(&mut self, device: &Device) -> bool {
+        let (handle, next) = (device.handle, &device.next);
         let success = vk::Result::SUCCESS;
         let mut needs = [vk::MemoryRequirements::default(); 2];
         // SAFETY: as the caller promises.
         unsafe {
-            (next.image_requirements)(device, self.image, &mut needs[0]);
-            (next.buffer_requirements)(device, self.buffer, &mut needs[1]);
+            (next.image_requirements)(handle, self.image, &mut needs[0]);
+            (next.buffer_requirements)(handle, self.buffer, &mut needs[1]);
             for of in needs {
                 // Lavapipe has a single memory type, which is host memory.
                 let info = vk::MemoryAllocateInfo::default()
@@ -241,7 +241,7 @@ impl PassReadback {
                     .memory_type_index(of.memory_type_bits.trailing_zeros());
                 let mut memory = vk::DeviceMemory::null();
                 let none = std::ptr::null();
-                if (next.allocate_memory)(device, &info, none, &mut memory) != success {
+                if (next.allocate_memory)(handle, &info, none, &mut memory) != success {
                     return false;
                 }
                 self.memory.push(memory);
@@ -249,9 +249,9 @@ impl PassReadback {
             let mut address = std::ptr::null_mut();
             let (memory, all) = (self.memory[1], vk::WHOLE_SIZE);
             let flags = vk::MemoryMapFlags::empty();
-            let bound = (next.bind_image_memory)(device, self.image, self.memory[0], 0) == success
-                && (next.bind_buffer_memory)(device, self.buffer, memory, 0) == success
-                && (next.map_memory)(device, memory, 0, all, flags, &mut address) == success;
+            let bound = (next.bind_image_memory)(handle, self.image, self.memory[0], 0) == success
+                && (next.bind_buffer_memory)(handle, self.buffer, memory, 0) == success
+                && (next.map_memory)(handle, memory, 0, all, flags, &mut address) == success;
             self.address = address as usize;
             bound
         }
@@ -268,14 +268,14 @@ impl PassReadback {
     /// The command buffer is being recorded, outside a render pass.
     unsafe fn record(
         &self,
-        known: &Device,
+        device: &Device,
         buffer: vk::CommandBuffer,
         from: vk::Image,
         view: &ViewInfo,
         full: [u32; 2],
         aspect: vk::ImageAspectFlags,
     ) {
-        let next = &known.next;
+        let next = &device.next;
         let corner = |[x, y]: [u32; 2]| vk::Offset3D {
             x: x as i32,
             y: y as i32,
@@ -336,13 +336,13 @@ impl PassReadback {
 
     /// # Safety
     /// No commands that use the picture are being executed.
-    unsafe fn destroy(&self, device: vk::Device, next: &Next) {
+    unsafe fn destroy(&self, handle: vk::Device, next: &Next) {
         // SAFETY: as the caller promises; null handles are ignored.
         unsafe {
-            (next.destroy_image)(device, self.image, std::ptr::null());
-            (next.destroy_buffer)(device, self.buffer, std::ptr::null());
+            (next.destroy_image)(handle, self.image, std::ptr::null());
+            (next.destroy_buffer)(handle, self.buffer, std::ptr::null());
             for memory in &self.memory {
-                (next.free_memory)(device, *memory, std::ptr::null());
+                (next.free_memory)(handle, *memory, std::ptr::null());
             }
         }
     }

@@ -8,56 +8,57 @@ use ash::vk::{self, Handle};
 
 type Allocator = *const vk::AllocationCallbacks<'static>;
 
-pub(super) unsafe extern "system" fn create_shader_module(
-    device: vk::Device,
-    info: *const vk::ShaderModuleCreateInfo<'_>,
-    allocator: Allocator,
-    module: *mut vk::ShaderModule,
-) -> vk::Result {
-    // SAFETY: a valid call of vkCreateShaderModule.
-    unsafe {
-        let known = Device::of(device);
-        let result = (known.next.create_shader_module)(device, info, allocator, module);
-        if result == vk::Result::SUCCESS {
-            let words = slice((*info).p_code, ((*info).code_size / 4) as u32);
-            known.tracker().pipelines.create_module(*module, words);
-        }
-        result
-    }
+creates! {
+    create_shader_module ShaderModuleCreateInfo => ShaderModule |device, info, module| {
+        let words = slice(info.p_code, (info.code_size / 4) as u32);
+        device.tracker().pipelines.create_module(module, words);
+    };
 }
 
-pub(super) unsafe extern "system" fn destroy_shader_module(
-    device: vk::Device,
-    module: vk::ShaderModule,
-    allocator: Allocator,
-) {
-    // SAFETY: a valid call of vkDestroyShaderModule.
-    unsafe {
-        let known = Device::of(device);
-        known.tracker().pipelines.destroy_module(module);
-        (known.next.destroy_shader_module)(device, module, allocator);
-    }
+destroys! {
+    destroy_shader_module ShaderModule |device, module| device.tracker().pipelines.destroy_module(module);
+    // The recording pipelines belong to this layer.
+    destroy_pipeline Pipeline |device, pipeline| {
+        let recording_pipelines = device.tracker().pipelines.destroy(pipeline);
+        for recording_pipeline in recording_pipelines {
+            (device.next.destroy_pipeline)(device.handle, recording_pipeline, std::ptr::null());
+        }
+    };
+}
+
+after! {
+    create_graphics_pipelines(handle: vk::Device, cache: vk::PipelineCache, count: u32, infos: *const vk::GraphicsPipelineCreateInfo<'_>, allocator: Allocator, pipelines: *mut vk::Pipeline) |device, result|
+        for (info, handle) in slice(infos, count).iter().zip(slice(pipelines, count)) {
+            if *handle != vk::Pipeline::null() {
+                let described = describe(&device, info);
+                let pipelines = &mut device.tracker().pipelines;
+                match described {
+                    Described::Pipeline(pipeline) => pipelines.create(*handle, pipeline),
+                    Described::Library(library) => pipelines.create_library(*handle, library),
+                }
+            }
+        };
 }
 
 pub(super) unsafe extern "system" fn create_pipeline_layout(
-    device: vk::Device,
+    handle: vk::Device,
     info: *const vk::PipelineLayoutCreateInfo<'_>,
     allocator: Allocator,
     layout: *mut vk::PipelineLayout,
 ) -> vk::Result {
     // SAFETY: a valid call of vkCreatePipelineLayout.
     unsafe {
-        let known = Device::of(device);
+        let device = Device::of(handle);
         let ranges = slice(
             (*info).p_push_constant_ranges,
             (*info).push_constant_range_count,
         );
-        let room = known
+        let room = device
             .recorder
             .as_ref()
             .and_then(|r| extended_ranges(ranges, r.push_constant_bytes));
         let create = |stages| {
-            let tracker = &mut *known.tracker();
+            let tracker = &mut *device.tracker();
             let sets = slice((*info).p_set_layouts, (*info).set_layout_count).iter();
             let sets = sets.map(|set| tracker.descriptors.empty_set(set.as_raw()));
             let sets = sets.collect();
@@ -66,7 +67,7 @@ pub(super) unsafe extern "system" fn create_pipeline_layout(
                 .create_layout(*layout, Layout { stages, sets });
         };
         let Some((ranges, stages)) = room else {
-            let result = (known.next.create_pipeline_layout)(device, info, allocator, layout);
+            let result = (device.next.create_pipeline_layout)(handle, info, allocator, layout);
             if result == vk::Result::SUCCESS {
                 create(vk::ShaderStageFlags::empty());
             }
@@ -77,7 +78,7 @@ pub(super) unsafe extern "system" fn create_pipeline_layout(
             p_push_constant_ranges: ranges.as_ptr(),
             ..*info
         };
-        let result = (known.next.create_pipeline_layout)(device, &wider, allocator, layout);
+        let result = (device.next.create_pipeline_layout)(handle, &wider, allocator, layout);
         if result == vk::Result::SUCCESS {
             create(stages);
         }
@@ -118,60 +119,17 @@ fn extended_ranges(
 }
 
 pub(super) unsafe extern "system" fn destroy_pipeline_layout(
-    device: vk::Device,
+    handle: vk::Device,
     layout: vk::PipelineLayout,
     allocator: Allocator,
 ) {
     // SAFETY: a valid call of vkDestroyPipelineLayout. A layout that draws still need is not destroyed.
     unsafe {
-        let known = Device::of(device);
-        let unused = known.tracker().pipelines.destroy_layout(layout);
+        let device = Device::of(handle);
+        let unused = device.tracker().pipelines.destroy_layout(layout);
         if unused {
-            (known.next.destroy_pipeline_layout)(device, layout, allocator);
+            (device.next.destroy_pipeline_layout)(handle, layout, allocator);
         }
-    }
-}
-
-pub(super) unsafe extern "system" fn destroy_pipeline(
-    device: vk::Device,
-    pipeline: vk::Pipeline,
-    allocator: Allocator,
-) {
-    // SAFETY: a valid call of vkDestroyPipeline. The recording pipelines belong to this layer.
-    unsafe {
-        let known = Device::of(device);
-        let recording_pipelines = known.tracker().pipelines.destroy(pipeline);
-        for recording_pipeline in recording_pipelines {
-            (known.next.destroy_pipeline)(device, recording_pipeline, std::ptr::null());
-        }
-        (known.next.destroy_pipeline)(device, pipeline, allocator);
-    }
-}
-
-pub(super) unsafe extern "system" fn create_graphics_pipelines(
-    device: vk::Device,
-    cache: vk::PipelineCache,
-    count: u32,
-    infos: *const vk::GraphicsPipelineCreateInfo<'_>,
-    allocator: Allocator,
-    pipelines: *mut vk::Pipeline,
-) -> vk::Result {
-    // SAFETY: a valid call of vkCreateGraphicsPipelines.
-    unsafe {
-        let known = Device::of(device);
-        let create = known.next.create_graphics_pipelines;
-        let result = create(device, cache, count, infos, allocator, pipelines);
-        for (info, handle) in slice(infos, count).iter().zip(slice(pipelines, count)) {
-            if *handle != vk::Pipeline::null() {
-                let described = describe(&known, info);
-                let pipelines = &mut known.tracker().pipelines;
-                match described {
-                    Described::Pipeline(pipeline) => pipelines.create(*handle, pipeline),
-                    Described::Library(library) => pipelines.create_library(*handle, library),
-                }
-            }
-        }
-        result
     }
 }
 

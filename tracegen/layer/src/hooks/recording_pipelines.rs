@@ -50,15 +50,15 @@ impl Fragment<'_> {
 /// # Safety
 /// A valid description.
 pub(super) unsafe fn describe(
-    known: &Device,
+    device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
 ) -> Described {
     // SAFETY: as the caller promises.
     unsafe {
         let own = libraries::own_parts(info);
-        let links = libraries::links(known, info);
+        let links = libraries::links(device, info);
         let mut state = pipeline_state::of(info, own);
-        state.reads = stage_reads::before_fragments(known, info, own);
+        state.reads = stage_reads::before_fragments(device, info, own);
         let mut parts = own;
         let mut layout = info.layout;
         for library in links.iter().filter_map(|(_, library)| library.as_ref()) {
@@ -69,8 +69,8 @@ pub(super) unsafe fn describe(
                 layout = library.layout;
             }
         }
-        let fragment = match &known.recorder {
-            Some(recorder) => fragment(known, recorder, info, own, &links),
+        let fragment = match &device.recorder {
+            Some(recorder) => fragment(device, recorder, info, own, &links),
             None => Fragment::None,
         };
         if libraries::is_library(info) {
@@ -81,24 +81,24 @@ pub(super) unsafe fn describe(
                 shader: fragment.shader(),
                 ..Library::default()
             };
-            return Described::Library(with_variants(known, info, &links, &fragment, library));
+            return Described::Library(with_variants(device, info, &links, &fragment, library));
         }
         let pipeline = Pipeline {
             number: 0,
             layout,
-            stages: number_stages(known, layout),
+            stages: number_stages(device, layout),
             recorded: None,
             unrecorded: None,
             bindings: Vec::new(),
             state,
         };
-        Described::Pipeline(recorded(known, info, &links, &fragment, pipeline))
+        Described::Pipeline(recorded(device, info, &links, &fragment, pipeline))
     }
 }
 
 /// Stages of a layout that see the draw's number.
-fn number_stages(known: &Device, layout: vk::PipelineLayout) -> vk::ShaderStageFlags {
-    let tracker = known.tracker();
+fn number_stages(device: &Device, layout: vk::PipelineLayout) -> vk::ShaderStageFlags {
+    let tracker = device.tracker();
     let layout = tracker.pipelines.layout(layout);
     layout.map(|layout| layout.stages).unwrap_or_default()
 }
@@ -108,7 +108,7 @@ fn number_stages(known: &Device, layout: vk::PipelineLayout) -> vk::ShaderStageF
 /// # Safety
 /// A valid description with these own parts and libraries.
 unsafe fn fragment<'a>(
-    known: &Device,
+    device: &Device,
     recorder: &DeviceRecorder,
     info: &vk::GraphicsPipelineCreateInfo<'a>,
     own: Parts,
@@ -127,11 +127,11 @@ unsafe fn fragment<'a>(
         let Some((place, stage)) = fragment_stage(info, own) else {
             return Fragment::None;
         };
-        if number_stages(known, info.layout).is_empty() {
+        if number_stages(device, info.layout).is_empty() {
             return Fragment::Unrecorded("push constants without room for a number".to_owned());
         }
-        let multiview = view_mask(known, info) != 0;
-        match recording_shader(known, recorder, &stage, multiview) {
+        let multiview = view_mask(device, info) != 0;
+        match recording_shader(device, recorder, &stage, multiview) {
             Ok(shader) => Fragment::Own(Box::new(OwnFragment {
                 place,
                 stage,
@@ -170,9 +170,9 @@ unsafe fn fragment_stage<'a>(
 ///
 /// # Safety
 /// A valid description.
-unsafe fn view_mask(known: &Device, info: &vk::GraphicsPipelineCreateInfo<'_>) -> u32 {
+unsafe fn view_mask(device: &Device, info: &vk::GraphicsPipelineCreateInfo<'_>) -> u32 {
     if info.render_pass != vk::RenderPass::null() {
-        return known
+        return device
             .tracker()
             .passes
             .view_mask(info.render_pass, info.subpass);
@@ -187,7 +187,7 @@ unsafe fn view_mask(known: &Device, info: &vk::GraphicsPipelineCreateInfo<'_>) -
 /// # Safety
 /// A valid description with these libraries and this fragment shader.
 unsafe fn recorded(
-    known: &Device,
+    device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     links: &[Link],
     fragment: &Fragment<'_>,
@@ -203,7 +203,7 @@ unsafe fn recorded(
     };
     let twice = is_drawn_twice(&shader, &pipeline.state);
     // SAFETY: as the caller promises.
-    match unsafe { variant(known, info, links, fragment, twice) } {
+    match unsafe { variant(device, info, links, fragment, twice) } {
         Ok((handle, fixed)) => {
             pipeline.bindings = bindings(&shader);
             pipeline.recorded = Some(Recorded {
@@ -223,7 +223,7 @@ unsafe fn recorded(
 /// # Safety
 /// A valid description of a library with these libraries and this fragment shader.
 unsafe fn with_variants(
-    known: &Device,
+    device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     links: &[Link],
     fragment: &Fragment<'_>,
@@ -240,10 +240,10 @@ unsafe fn with_variants(
         Some(DepthTests::Early | DepthTests::Late) => (true, false),
         Some(DepthTests::EarlyLateWrite) => (false, true),
         Some(DepthTests::Either) => (true, true),
-        None => (false, outputs && known.recorder.is_some()),
+        None => (false, outputs && device.recorder.is_some()),
     };
     // SAFETY: as the caller promises.
-    let make = |quiet| unsafe { variant(known, info, links, fragment, quiet) };
+    let make = |quiet| unsafe { variant(device, info, links, fragment, quiet) };
     if once {
         match make(false) {
             Ok((handle, _)) => library.recording = Some(handle),
@@ -291,7 +291,7 @@ fn bindings(shader: &ShaderInfo) -> Vec<(u32, u32)> {
 /// # Safety
 /// A valid description with these libraries and this fragment shader.
 unsafe fn variant(
-    known: &Device,
+    device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     links: &[Link],
     fragment: &Fragment<'_>,
@@ -302,12 +302,12 @@ unsafe fn variant(
         let mut stages = slice(info.p_stages, info.stage_count).to_vec();
         let mut module = vk::ShaderModule::null();
         if let Fragment::Own(own) = fragment {
-            module = create_module(known, &own.shader)?;
+            module = create_module(device, &own.shader)?;
             stages[own.place].module = module;
             stages[own.place].p_next = without_module(own.stage.p_next);
         }
-        let made = linked(known, info, stages, links, quiet);
-        (known.next.destroy_shader_module)(known.handle, module, std::ptr::null());
+        let made = linked(device, info, stages, links, quiet);
+        (device.next.destroy_shader_module)(device.handle, module, std::ptr::null());
         made
     }
 }
@@ -317,7 +317,7 @@ unsafe fn variant(
 /// # Safety
 /// As for [`variant`].
 unsafe fn linked(
-    known: &Device,
+    device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     stages: Vec<vk::PipelineShaderStageCreateInfo<'_>>,
     links: &[Link],
@@ -347,8 +347,8 @@ unsafe fn linked(
             changed.write_nothing();
         }
         let mut handle = vk::Pipeline::null();
-        let result = (known.next.create_graphics_pipelines)(
-            known.handle,
+        let result = (device.next.create_graphics_pipelines)(
+            device.handle,
             vk::PipelineCache::null(),
             1,
             changed.info(),
@@ -370,7 +370,7 @@ unsafe fn linked(
 /// # Safety
 /// A live device.
 unsafe fn create_module(
-    known: &Device,
+    device: &Device,
     shader: &RecordingShader,
 ) -> Result<vk::ShaderModule, String> {
     let info = vk::ShaderModuleCreateInfo {
@@ -381,7 +381,7 @@ unsafe fn create_module(
     let mut module = vk::ShaderModule::null();
     // SAFETY: the words live until the end of the call.
     let result = unsafe {
-        (known.next.create_shader_module)(known.handle, &info, std::ptr::null(), &mut module)
+        (device.next.create_shader_module)(device.handle, &info, std::ptr::null(), &mut module)
     };
     match result {
         vk::Result::SUCCESS => Ok(module),

@@ -15,17 +15,17 @@ use std::sync::Arc;
 /// # Safety
 /// A valid stage.
 pub(super) unsafe fn module_of(
-    known: &Device,
+    device: &Device,
     stage: &vk::PipelineShaderStageCreateInfo<'_>,
 ) -> Result<(Arc<[u32]>, String), String> {
     // SAFETY: as the caller promises.
     unsafe {
-        let words = match known.tracker().pipelines.module(stage.module) {
+        let words = match device.tracker().pipelines.module(stage.module) {
             Some(words) => words,
             // The stage may contain its module.
             None => match find::<vk::ShaderModuleCreateInfo<'_>>(stage.p_next) {
                 Some(inline) => slice(inline.p_code, (inline.code_size / 4) as u32).into(),
-                None => return Err("a shader whose module is not known".to_owned()),
+                None => return Err("a shader whose module is not device".to_owned()),
             },
         };
         let entry = CStr::from_ptr(stage.p_name);
@@ -38,13 +38,13 @@ pub(super) unsafe fn module_of(
 /// # Safety
 /// A valid stage.
 pub(super) unsafe fn recording_shader(
-    known: &Device,
+    device: &Device,
     recorder: &DeviceRecorder,
     stage: &vk::PipelineShaderStageCreateInfo<'_>,
     multiview: bool,
 ) -> Result<RecordingShader, String> {
     // SAFETY: as the caller promises.
-    let (words, entry) = unsafe { module_of(known, stage) }?;
+    let (words, entry) = unsafe { module_of(device, stage) }?;
     let key = (words, entry, multiview);
     if let Some(made) = lock(&recorder.shaders).get(&key) {
         return made.clone();
@@ -57,7 +57,7 @@ pub(super) unsafe fn recording_shader(
     .unwrap_or(Err(crate::inject::InjectError::Malformed("a panic")))
     .map_err(|error| error.to_string())
     .map(|recording| {
-        let shader = known.tracker().pipelines.next_shader();
+        let shader = device.tracker().pipelines.next_shader();
         keep_module(shader, "program", &key.0);
         keep_module(shader, "recording", &recording.words);
         RecordingShader {

@@ -6,117 +6,122 @@ use crate::track::{Template, TemplateEntry, Written};
 use ash::vk::{self, Handle};
 use std::ffi::c_void;
 
-type Allocator = *const vk::AllocationCallbacks<'static>;
-
-pub(super) unsafe extern "system" fn create_set_layout(
-    device: vk::Device,
-    info: *const vk::DescriptorSetLayoutCreateInfo<'_>,
-    allocator: Allocator,
-    layout: *mut vk::DescriptorSetLayout,
-) -> vk::Result {
-    // SAFETY: a valid call of vkCreateDescriptorSetLayout.
-    unsafe {
-        let known = Device::of(device);
-        let result = (known.next.create_set_layout)(device, info, allocator, layout);
-        if result == vk::Result::SUCCESS {
-            let bindings = slice((*info).p_bindings, (*info).binding_count).iter();
-            let bindings = bindings.map(|binding| {
-                let count = binding.descriptor_count;
-                let has_samplers = [
-                    vk::DescriptorType::SAMPLER,
-                    vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
-                ]
-                .contains(&binding.descriptor_type);
-                // For other kinds of descriptors the pointer is ignored and may be invalid.
-                let samplers = match has_samplers {
-                    true => slice(binding.p_immutable_samplers, count).to_vec(),
-                    false => Vec::new(),
-                };
-                (binding.binding, count, samplers)
-            });
-            let bindings: Vec<_> = bindings.collect();
-            let tracker = &mut *known.tracker();
-            tracker
-                .descriptors
-                .create_layout(*layout, bindings, &tracker.images);
-        }
-        result
-    }
+creates! {
+    create_set_layout DescriptorSetLayoutCreateInfo => DescriptorSetLayout |device, info, layout| {
+        let bindings = slice(info.p_bindings, info.binding_count).iter();
+        let bindings: Vec<_> = bindings.map(|binding| layout_binding(binding)).collect();
+        let tracker = &mut *device.tracker();
+        tracker.descriptors.create_layout(layout, bindings, &tracker.images);
+    };
+    create_template DescriptorUpdateTemplateCreateInfo => DescriptorUpdateTemplate |device, info, template|
+        device.tracker().descriptors.create_template(template, described(info));
 }
 
-pub(super) unsafe extern "system" fn destroy_set_layout(
-    device: vk::Device,
-    layout: vk::DescriptorSetLayout,
-    allocator: Allocator,
-) {
-    // SAFETY: a valid call of vkDestroyDescriptorSetLayout.
-    unsafe {
-        let known = Device::of(device);
-        known.tracker().descriptors.destroy_layout(layout);
-        (known.next.destroy_set_layout)(device, layout, allocator);
-    }
+destroys! {
+    destroy_set_layout DescriptorSetLayout |device, layout| device.tracker().descriptors.destroy_layout(layout);
+    destroy_pool DescriptorPool |device, pool| device.tracker().descriptors.reset_pool(pool);
+    destroy_template DescriptorUpdateTemplate |device, template| device.tracker().descriptors.destroy_template(template);
 }
 
-pub(super) unsafe extern "system" fn allocate_sets(
-    device: vk::Device,
-    info: *const vk::DescriptorSetAllocateInfo<'_>,
-    sets: *mut vk::DescriptorSet,
-) -> vk::Result {
-    // SAFETY: a valid call of vkAllocateDescriptorSets.
-    unsafe {
-        let known = Device::of(device);
-        let result = (known.next.allocate_sets)(device, info, sets);
+after! {
+    allocate_sets(handle: vk::Device, info: *const vk::DescriptorSetAllocateInfo<'_>, sets: *mut vk::DescriptorSet) |device, result|
         if result == vk::Result::SUCCESS {
             let count = (*info).descriptor_set_count;
             let layouts = slice((*info).p_set_layouts, count);
-            let mut tracker = known.tracker();
+            let mut tracker = device.tracker();
             for (set, layout) in slice(sets, count).iter().zip(layouts) {
-                tracker
-                    .descriptors
-                    .allocate((*info).descriptor_pool, *set, *layout);
+                tracker.descriptors.allocate((*info).descriptor_pool, *set, *layout);
+            }
+        };
+}
+
+before! {
+    free_sets(handle: vk::Device, pool: vk::DescriptorPool, count: u32, sets: *const vk::DescriptorSet) -> vk::Result |device|
+        device.tracker().descriptors.free(pool, slice(sets, count));
+    reset_pool(handle: vk::Device, pool: vk::DescriptorPool, flags: vk::DescriptorPoolResetFlags) -> vk::Result |device|
+        device.tracker().descriptors.reset_pool(pool);
+    update_sets(handle: vk::Device, writes: u32, first_write: *const vk::WriteDescriptorSet<'_>, copies: u32, first_copy: *const vk::CopyDescriptorSet<'_>) |device| {
+        let tracker = &mut *device.tracker();
+        for write in slice(first_write, writes) {
+            tracker.descriptors.write(write.dst_set, &written(write), &tracker.images);
+        }
+        for copy in slice(first_copy, copies) {
+            tracker.descriptors.copy(copy);
+        }
+    };
+    update_with_template(handle: vk::Device, set: vk::DescriptorSet, template: vk::DescriptorUpdateTemplate, data: *const c_void) |device| {
+        let tracker = &mut *device.tracker();
+        if let Some(of) = tracker.descriptors.template(template).cloned() {
+            for write in from_template(&of, data) {
+                tracker.descriptors.write(set, &write, &tracker.images);
             }
         }
-        result
-    }
+    };
+    cmd_bind_sets(buffer: vk::CommandBuffer, point: vk::PipelineBindPoint, layout: vk::PipelineLayout, first: u32, count: u32, sets: *const vk::DescriptorSet, offset_count: u32, offsets: *const u32) |device|
+        if point == vk::PipelineBindPoint::GRAPHICS {
+            let handles = slice(sets, count).iter().map(|set| set.as_raw());
+            device.tracker().commands.get_mut(buffer.as_raw()).bind_sets(first, handles);
+        };
+    cmd_push_set(buffer: vk::CommandBuffer, point: vk::PipelineBindPoint, layout: vk::PipelineLayout, set: u32, count: u32, writes: *const vk::WriteDescriptorSet<'_>) |device|
+        if point == vk::PipelineBindPoint::GRAPHICS {
+            let of: Vec<Written> = slice(writes, count).iter().map(|w| written(w)).collect();
+            push(&device, buffer, layout, set, &of);
+        };
+    cmd_push_set_with_template(buffer: vk::CommandBuffer, template: vk::DescriptorUpdateTemplate, layout: vk::PipelineLayout, set: u32, data: *const c_void) |device| {
+        let of = device.tracker().descriptors.template(template).cloned();
+        if let Some(of) = of.filter(|of| of.graphics) {
+            push(&device, buffer, layout, set, &from_template(&of, data));
+        }
+    };
 }
 
-pub(super) unsafe extern "system" fn free_sets(
-    device: vk::Device,
-    pool: vk::DescriptorPool,
-    count: u32,
-    sets: *const vk::DescriptorSet,
-) -> vk::Result {
-    // SAFETY: a valid call of vkFreeDescriptorSets.
-    unsafe {
-        let known = Device::of(device);
-        known.tracker().descriptors.free(pool, slice(sets, count));
-        (known.next.free_sets)(device, pool, count, sets)
-    }
+/// Number, count and immutable samplers of a binding.
+///
+/// # Safety
+/// A valid description.
+unsafe fn layout_binding(
+    binding: &vk::DescriptorSetLayoutBinding<'_>,
+) -> (u32, u32, Vec<vk::Sampler>) {
+    let count = binding.descriptor_count;
+    let has_samplers = [
+        vk::DescriptorType::SAMPLER,
+        vk::DescriptorType::COMBINED_IMAGE_SAMPLER,
+    ]
+    .contains(&binding.descriptor_type);
+    let samplers = match has_samplers {
+        // SAFETY: as the caller promises. For other kinds of descriptors the pointer is ignored and may be invalid.
+        true => unsafe { slice(binding.p_immutable_samplers, count) }.to_vec(),
+        false => Vec::new(),
+    };
+    (binding.binding, count, samplers)
 }
 
-pub(super) unsafe extern "system" fn reset_pool(
-    device: vk::Device,
-    pool: vk::DescriptorPool,
-    flags: vk::DescriptorPoolResetFlags,
-) -> vk::Result {
-    // SAFETY: a valid call of vkResetDescriptorPool.
-    unsafe {
-        let known = Device::of(device);
-        known.tracker().descriptors.reset_pool(pool);
-        (known.next.reset_pool)(device, pool, flags)
-    }
-}
-
-pub(super) unsafe extern "system" fn destroy_pool(
-    device: vk::Device,
-    pool: vk::DescriptorPool,
-    allocator: Allocator,
-) {
-    // SAFETY: a valid call of vkDestroyDescriptorPool.
-    unsafe {
-        let known = Device::of(device);
-        known.tracker().descriptors.reset_pool(pool);
-        (known.next.destroy_pool)(device, pool, allocator);
+/// The textures of a template.
+///
+/// # Safety
+/// A valid description.
+unsafe fn described(info: &vk::DescriptorUpdateTemplateCreateInfo<'_>) -> Template {
+    // SAFETY: as the caller promises.
+    let entries = unsafe {
+        slice(
+            info.p_descriptor_update_entries,
+            info.descriptor_update_entry_count,
+        )
+    };
+    let textures = entries
+        .iter()
+        .filter(|entry| is_texture(entry.descriptor_type));
+    let entries = textures.map(|entry| TemplateEntry {
+        binding: entry.dst_binding,
+        element: entry.dst_array_element,
+        count: entry.descriptor_count,
+        kind: entry.descriptor_type,
+        offset: entry.offset,
+        stride: entry.stride,
+    });
+    Template {
+        entries: entries.collect(),
+        graphics: info.pipeline_bind_point == vk::PipelineBindPoint::GRAPHICS,
     }
 }
 
@@ -150,82 +155,6 @@ fn is_texture(kind: vk::DescriptorType) -> bool {
     )
 }
 
-pub(super) unsafe extern "system" fn update_sets(
-    device: vk::Device,
-    writes: u32,
-    first_write: *const vk::WriteDescriptorSet<'_>,
-    copies: u32,
-    first_copy: *const vk::CopyDescriptorSet<'_>,
-) {
-    // SAFETY: a valid call of vkUpdateDescriptorSets.
-    unsafe {
-        let known = Device::of(device);
-        {
-            let tracker = &mut *known.tracker();
-            for write in slice(first_write, writes) {
-                let of = written(write);
-                tracker
-                    .descriptors
-                    .write(write.dst_set, &of, &tracker.images);
-            }
-            for copy in slice(first_copy, copies) {
-                tracker.descriptors.copy(copy);
-            }
-        }
-        (known.next.update_sets)(device, writes, first_write, copies, first_copy);
-    }
-}
-
-pub(super) unsafe extern "system" fn create_template(
-    device: vk::Device,
-    info: *const vk::DescriptorUpdateTemplateCreateInfo<'_>,
-    allocator: Allocator,
-    template: *mut vk::DescriptorUpdateTemplate,
-) -> vk::Result {
-    // SAFETY: a valid call of vkCreateDescriptorUpdateTemplate.
-    unsafe {
-        let known = Device::of(device);
-        let result = (known.next.create_template)(device, info, allocator, template);
-        if result == vk::Result::SUCCESS {
-            let info = &*info;
-            let entries = slice(
-                info.p_descriptor_update_entries,
-                info.descriptor_update_entry_count,
-            );
-            let textures = entries
-                .iter()
-                .filter(|entry| is_texture(entry.descriptor_type));
-            let entries = textures.map(|entry| TemplateEntry {
-                binding: entry.dst_binding,
-                element: entry.dst_array_element,
-                count: entry.descriptor_count,
-                kind: entry.descriptor_type,
-                offset: entry.offset,
-                stride: entry.stride,
-            });
-            let of = Template {
-                entries: entries.collect(),
-                graphics: info.pipeline_bind_point == vk::PipelineBindPoint::GRAPHICS,
-            };
-            known.tracker().descriptors.create_template(*template, of);
-        }
-        result
-    }
-}
-
-pub(super) unsafe extern "system" fn destroy_template(
-    device: vk::Device,
-    template: vk::DescriptorUpdateTemplate,
-    allocator: Allocator,
-) {
-    // SAFETY: a valid call of vkDestroyDescriptorUpdateTemplate.
-    unsafe {
-        let known = Device::of(device);
-        known.tracker().descriptors.destroy_template(template);
-        (known.next.destroy_template)(device, template, allocator);
-    }
-}
-
 /// The writes that a template describes.
 ///
 /// # Safety
@@ -249,112 +178,20 @@ unsafe fn from_template(template: &Template, data: *const c_void) -> Vec<Written
     template.entries.iter().map(read).collect()
 }
 
-pub(super) unsafe extern "system" fn update_with_template(
-    device: vk::Device,
-    set: vk::DescriptorSet,
-    template: vk::DescriptorUpdateTemplate,
-    data: *const c_void,
-) {
-    // SAFETY: a valid call of vkUpdateDescriptorSetWithTemplate.
-    unsafe {
-        let known = Device::of(device);
-        {
-            let tracker = &mut *known.tracker();
-            if let Some(of) = tracker.descriptors.template(template).cloned() {
-                for write in from_template(&of, data) {
-                    tracker.descriptors.write(set, &write, &tracker.images);
-                }
-            }
-        }
-        (known.next.update_with_template)(device, set, template, data);
-    }
-}
-
-pub(super) unsafe extern "system" fn cmd_bind_sets(
-    buffer: vk::CommandBuffer,
-    point: vk::PipelineBindPoint,
-    layout: vk::PipelineLayout,
-    first: u32,
-    count: u32,
-    sets: *const vk::DescriptorSet,
-    offset_count: u32,
-    offsets: *const u32,
-) {
-    // SAFETY: a valid call of vkCmdBindDescriptorSets.
-    unsafe {
-        let known = Device::of(buffer);
-        if point == vk::PipelineBindPoint::GRAPHICS {
-            let handles = slice(sets, count).iter().map(|set| set.as_raw());
-            let mut tracker = known.tracker();
-            tracker
-                .commands
-                .get_mut(buffer.as_raw())
-                .bind_sets(first, handles);
-        }
-        (known.next.cmd_bind_sets)(
-            buffer,
-            point,
-            layout,
-            first,
-            count,
-            sets,
-            offset_count,
-            offsets,
-        );
-    }
-}
-
 /// Tracks descriptors that are pushed to a set.
 fn push(
-    known: &Device,
+    device: &Device,
     buffer: vk::CommandBuffer,
     layout: vk::PipelineLayout,
     set: u32,
     writes: &[Written],
 ) {
-    let tracker = &mut *known.tracker();
+    let tracker = &mut *device.tracker();
     let state = tracker.commands.get_mut(buffer.as_raw());
     let of_layout = tracker.pipelines.layout(layout);
     let empty = of_layout.and_then(|layout| layout.sets.get(set as usize));
     let pushed = state.push(set, || empty.cloned().unwrap_or_default());
     for write in writes {
         pushed.write(write, &tracker.images);
-    }
-}
-
-pub(super) unsafe extern "system" fn cmd_push_set(
-    buffer: vk::CommandBuffer,
-    point: vk::PipelineBindPoint,
-    layout: vk::PipelineLayout,
-    set: u32,
-    count: u32,
-    writes: *const vk::WriteDescriptorSet<'_>,
-) {
-    // SAFETY: a valid call of vkCmdPushDescriptorSetKHR.
-    unsafe {
-        let known = Device::of(buffer);
-        if point == vk::PipelineBindPoint::GRAPHICS {
-            let of: Vec<Written> = slice(writes, count).iter().map(|w| written(w)).collect();
-            push(&known, buffer, layout, set, &of);
-        }
-        (known.next.cmd_push_set)(buffer, point, layout, set, count, writes);
-    }
-}
-
-pub(super) unsafe extern "system" fn cmd_push_set_with_template(
-    buffer: vk::CommandBuffer,
-    template: vk::DescriptorUpdateTemplate,
-    layout: vk::PipelineLayout,
-    set: u32,
-    data: *const c_void,
-) {
-    // SAFETY: a valid call of vkCmdPushDescriptorSetWithTemplateKHR.
-    unsafe {
-        let known = Device::of(buffer);
-        let of = known.tracker().descriptors.template(template).cloned();
-        if let Some(of) = of.filter(|of| of.graphics) {
-            push(&known, buffer, layout, set, &from_template(&of, data));
-        }
-        (known.next.cmd_push_set_with_template)(buffer, template, layout, set, data);
     }
 }

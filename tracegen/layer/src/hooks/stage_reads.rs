@@ -13,36 +13,22 @@ use spool::{DispatchInfo, StageReads};
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-type Allocator = *const vk::AllocationCallbacks<'static>;
-
 /// Stages whose reads are counted, with their names.
-const STAGES: [(vk::ShaderStageFlags, ExecutionModel, &str); 5] = [
-    (
-        vk::ShaderStageFlags::VERTEX,
-        ExecutionModel::Vertex,
-        "vertex",
-    ),
-    (
-        vk::ShaderStageFlags::TESSELLATION_CONTROL,
-        ExecutionModel::TessellationControl,
-        "tessellation control",
-    ),
-    (
-        vk::ShaderStageFlags::TESSELLATION_EVALUATION,
-        ExecutionModel::TessellationEvaluation,
-        "tessellation evaluation",
-    ),
-    (
-        vk::ShaderStageFlags::GEOMETRY,
-        ExecutionModel::Geometry,
-        "geometry",
-    ),
-    (
-        vk::ShaderStageFlags::COMPUTE,
-        ExecutionModel::GLCompute,
-        "compute",
-    ),
-];
+const STAGES: [(vk::ShaderStageFlags, ExecutionModel, &str); 5] = {
+    use {ExecutionModel as Model, vk::ShaderStageFlags as Stage};
+    let (control, evaluation) = (Model::TessellationControl, Model::TessellationEvaluation);
+    [
+        (Stage::VERTEX, Model::Vertex, "vertex"),
+        (Stage::TESSELLATION_CONTROL, control, "tessellation control"),
+        (
+            Stage::TESSELLATION_EVALUATION,
+            evaluation,
+            "tessellation evaluation",
+        ),
+        (Stage::GEOMETRY, Model::Geometry, "geometry"),
+        (Stage::COMPUTE, Model::GLCompute, "compute"),
+    ]
+};
 
 /// Result for a module that cannot be analysed. It must not end the program.
 fn without_panic<T>(analyse: impl FnOnce() -> Result<T, InjectError>) -> Result<T, InjectError> {
@@ -54,14 +40,14 @@ fn without_panic<T>(analyse: impl FnOnce() -> Result<T, InjectError>) -> Result<
 /// # Safety
 /// A valid stage.
 unsafe fn of_stage(
-    known: &Device,
+    device: &Device,
     stage: &vk::PipelineShaderStageCreateInfo<'_>,
 ) -> Vec<StageReads> {
     let Some((_, model, name)) = STAGES.iter().find(|(flag, ..)| *flag == stage.stage) else {
         return Vec::new();
     };
     // SAFETY: as the caller promises.
-    let module = unsafe { module_of(known, stage) };
+    let module = unsafe { module_of(device, stage) };
     let counts = module.ok().and_then(|(words, entry)| {
         without_panic(|| texel_reads(&words, Some(&entry), *model)).ok()
     });
@@ -81,7 +67,7 @@ unsafe fn of_stage(
 /// # Safety
 /// A valid description with these own parts.
 pub(super) unsafe fn before_fragments(
-    known: &Device,
+    device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     own: Parts,
 ) -> Vec<StageReads> {
@@ -91,7 +77,7 @@ pub(super) unsafe fn before_fragments(
     // SAFETY: as the caller promises.
     unsafe {
         let stages = slice(info.p_stages, info.stage_count).iter();
-        stages.flat_map(|stage| of_stage(known, stage)).collect()
+        stages.flat_map(|stage| of_stage(device, stage)).collect()
     }
 }
 
@@ -115,51 +101,36 @@ unsafe fn specialized(info: *const vk::SpecializationInfo<'_>, constant: u32) ->
     }
 }
 
-pub(super) unsafe extern "system" fn create_compute_pipelines(
-    device: vk::Device,
-    cache: vk::PipelineCache,
-    count: u32,
-    infos: *const vk::ComputePipelineCreateInfo<'_>,
-    allocator: Allocator,
-    pipelines: *mut vk::Pipeline,
-) -> vk::Result {
-    // SAFETY: a valid call of vkCreateComputePipelines.
-    unsafe {
-        let known = Device::of(device);
-        let create = known.next.create_compute_pipelines;
-        let result = create(device, cache, count, infos, allocator, pipelines);
+after! {
+    create_compute_pipelines(handle: vk::Device, cache: vk::PipelineCache, count: u32, infos: *const vk::ComputePipelineCreateInfo<'_>, allocator: *const vk::AllocationCallbacks<'_>, pipelines: *mut vk::Pipeline) |device, result|
         for (info, handle) in slice(infos, count).iter().zip(slice(pipelines, count)) {
-            let reads = of_stage(&known, &info.stage);
+            let reads = of_stage(&device, &info.stage);
             if *handle == vk::Pipeline::null() || reads.is_empty() {
                 continue;
             }
-            let workgroup = module_of(&known, &info.stage)
-                .ok()
-                .and_then(|(words, entry)| {
-                    let constant = |number| specialized(info.stage.p_specialization_info, number);
-                    without_panic(|| workgroup_size(&words, Some(&entry), constant)).ok()
-                });
+            let workgroup = module_of(&device, &info.stage).ok().and_then(|(words, entry)| {
+                let constant = |number| specialized(info.stage.p_specialization_info, number);
+                without_panic(|| workgroup_size(&words, Some(&entry), constant)).ok()
+            });
             let compute = Compute {
                 workgroup: workgroup.unwrap_or_default(),
                 reads,
             };
-            known.tracker().pipelines.create_compute(*handle, compute);
-        }
-        result
-    }
+            device.tracker().pipelines.create_compute(*handle, compute);
+        };
 }
 
 /// Tracks a dispatch whose shader reads textures.
 ///
 /// # Safety
 /// The command buffer is being recorded.
-unsafe fn track(known: &Device, buffer: vk::CommandBuffer, groups: Option<[u32; 3]>) {
-    let mut tracker = known.tracker();
+unsafe fn track(device: &Device, buffer: vk::CommandBuffer, groups: Option<[u32; 3]>) {
+    let mut tracker = device.tracker();
     let state = tracker.commands.get_mut(buffer.as_raw());
     let Some(compute) = state.compute.clone() else {
         return;
     };
-    if known.capture.is_over() || !is_wanted(known, state) {
+    if device.capture.is_over() || !is_wanted(device, state) {
         return;
     }
     state.effects.dispatches.push(DispatchInfo {
@@ -169,22 +140,9 @@ unsafe fn track(known: &Device, buffer: vk::CommandBuffer, groups: Option<[u32; 
     });
 }
 
-/// Hooks of dispatch commands.
-macro_rules! dispatches {
-    ($($hook:ident ($($argument:ident: $kind:ty),*) $groups:expr;)*) => { $(
-        pub(super) unsafe extern "system" fn $hook(buffer: vk::CommandBuffer, $($argument: $kind),*) {
-            // SAFETY: a valid call of the dispatch command.
-            unsafe {
-                let known = Device::of(buffer);
-                track(&known, buffer, $groups);
-                (known.next.$hook)(buffer, $($argument),*);
-            }
-        }
-    )* };
-}
-
-dispatches! {
-    cmd_dispatch(x: u32, y: u32, z: u32) Some([x, y, z]);
-    cmd_dispatch_base(first_x: u32, first_y: u32, first_z: u32, x: u32, y: u32, z: u32) Some([x, y, z]);
-    cmd_dispatch_indirect(from: vk::Buffer, at: vk::DeviceSize) None;
+before! {
+    cmd_dispatch(buffer: vk::CommandBuffer, x: u32, y: u32, z: u32) |device| track(&device, buffer, Some([x, y, z]));
+    cmd_dispatch_base(buffer: vk::CommandBuffer, first_x: u32, first_y: u32, first_z: u32, x: u32, y: u32, z: u32) |device|
+        track(&device, buffer, Some([x, y, z]));
+    cmd_dispatch_indirect(buffer: vk::CommandBuffer, from: vk::Buffer, at: vk::DeviceSize) |device| track(&device, buffer, None);
 }

@@ -54,7 +54,7 @@ pub(super) unsafe extern "system" fn queue_submit(
 ) -> vk::Result {
     // SAFETY: a valid call of vkQueueSubmit.
     unsafe {
-        let known = Device::of(queue);
+        let device = Device::of(queue);
         let mut waits = Waits::default();
         for info in slice(submits, count) {
             let Some(values) = find::<vk::TimelineSemaphoreSubmitInfo<'_>>(info.p_next) else {
@@ -77,8 +77,8 @@ pub(super) unsafe extern "system" fn queue_submit(
             buffers: buffers_of(slice(submits, count)),
             waits: waits.open,
         };
-        let submit = || (known.next.queue_submit)(queue, count, submits, fence);
-        submit_and_read(&known, queue, &submitted, submit)
+        let submit = || (device.next.queue_submit)(queue, count, submits, fence);
+        submit_and_read(&device, queue, &submitted, submit)
     }
 }
 
@@ -90,7 +90,7 @@ pub(super) unsafe extern "system" fn queue_submit2(
 ) -> vk::Result {
     // SAFETY: a valid call of vkQueueSubmit2.
     unsafe {
-        let known = Device::of(queue);
+        let device = Device::of(queue);
         let (mut waits, mut buffers) = (Waits::default(), Vec::new());
         for info in slice(submits, count) {
             for of in slice(info.p_wait_semaphore_infos, info.wait_semaphore_info_count) {
@@ -109,8 +109,8 @@ pub(super) unsafe extern "system" fn queue_submit2(
             buffers,
             waits: waits.open,
         };
-        let submit = || (known.next.queue_submit2)(queue, count, submits, fence);
-        submit_and_read(&known, queue, &submitted, submit)
+        let submit = || (device.next.queue_submit2)(queue, count, submits, fence);
+        submit_and_read(&device, queue, &submitted, submit)
     }
 }
 
@@ -119,22 +119,22 @@ pub(super) unsafe extern "system" fn queue_submit2(
 /// # Safety
 /// A valid submission.
 unsafe fn submit_and_read(
-    known: &Device,
+    device: &Device,
     queue: vk::Queue,
     submitted: &Submitted,
     submit: impl FnOnce() -> vk::Result,
 ) -> vk::Result {
     let buffers = submitted.buffers.iter().map(|buffer| buffer.as_raw());
-    let effects = known.tracker().commands.effects(buffers);
+    let effects = device.tracker().commands.effects(buffers);
     let (renders, reads_back) = (effects.renders, effects.reads_back);
     // SAFETY: as the caller promises.
-    let result = unsafe { submit_frame(known, queue, submitted, effects, submit) };
+    let result = unsafe { submit_frame(device, queue, submitted, effects, submit) };
     if result == vk::Result::SUCCESS {
         if renders {
-            known.capture.note_rendering();
+            device.capture.note_rendering();
         }
         if reads_back {
-            known.capture.note_readback();
+            device.capture.note_readback();
         }
     }
     result
@@ -151,27 +151,27 @@ const END_TIMEOUT: Duration = Duration::from_secs(20);
 /// # Safety
 /// A valid submission.
 unsafe fn submit_frame(
-    known: &Device,
+    device: &Device,
     queue: vk::Queue,
     submitted: &Submitted,
     effects: Effects,
     submit: impl FnOnce() -> vk::Result,
 ) -> vk::Result {
-    let capture = known.capture;
-    let mut pending = lock(&known.pending);
+    let capture = device.capture;
+    let mut pending = lock(&device.pending);
     // SAFETY: a queue of the device. The draws are not being executed before they are submitted.
     unsafe {
-        read_ended(known, &mut pending, Duration::ZERO);
+        read_ended(device, &mut pending, Duration::ZERO);
         capture.note_frames();
         let place = capture.place();
         if !capture.wants(place) {
-            close(known, &pending);
-            let waits = !capture.is_over() && waits_for_host(known, submitted, &effects);
+            close(device, &pending);
+            let waits = !capture.is_over() && waits_for_host(device, submitted, &effects);
             let result = submit();
             if waits && result == vk::Result::SUCCESS {
                 // Fences of earlier submissions that have ended are not needed.
-                pending.is_blocked(known);
-                pending.block(known, queue);
+                pending.is_blocked(device);
+                pending.block(device, queue);
             }
             return result;
         }
@@ -182,26 +182,26 @@ unsafe fn submit_frame(
                 probed: effects.copies.probed.clone(),
             });
         }
-        let blocked = pending.is_blocked(known);
-        let draws = draws_of(known, submitted);
+        let blocked = pending.is_blocked(device);
+        let draws = draws_of(device, submitted);
         if draws.is_empty() && effects.dispatches.is_empty() {
             drop(pending);
             return submit();
         }
-        if let Some(recorder) = known.recorder.as_ref().filter(|r| !r.buffer.is_open()) {
+        if let Some(recorder) = device.recorder.as_ref().filter(|r| !r.buffer.is_open()) {
             // Commands in flight belong to earlier frames. Those of command buffers that are submitted once
             // do not record.
             if !blocked {
-                let mut fences: Vec<vk::Fence> = fence_after(known, queue).into_iter().collect();
-                wait_for(known, &mut fences, SETTLE_TIMEOUT);
+                let mut fences: Vec<vk::Fence> = fence_after(device, queue).into_iter().collect();
+                wait_for(device, &mut fences, SETTLE_TIMEOUT);
             }
             recorder.buffer.open(true);
         }
-        if let Some(queries) = &known.queries {
+        if let Some(queries) = &device.queries {
             let numbers: Vec<u32> = draws.iter().map(|item| item.draw.draw).collect();
-            queries.reset(known.handle, &numbers, &known.next);
+            queries.reset(device.handle, &numbers, &device.next);
         }
-        let timeout = match blocked || waits_for_host(known, submitted, &effects) {
+        let timeout = match blocked || waits_for_host(device, submitted, &effects) {
             true => Duration::ZERO,
             false => END_TIMEOUT,
         };
@@ -212,8 +212,8 @@ unsafe fn submit_frame(
                 draws,
                 dispatches: effects.dispatches,
             };
-            pending.add(known, queue, submission);
-            read_ended(known, &mut pending, timeout);
+            pending.add(device, queue, submission);
+            read_ended(device, &mut pending, timeout);
         }
         result
     }
@@ -221,16 +221,16 @@ unsafe fn submit_frame(
 
 /// Disables recording outside requested frames, because reusable command buffers must not record there. Pending
 /// submissions must still record.
-fn close(known: &Device, pending: &Pending) {
-    let recorder = known.recorder.as_ref().filter(|r| r.buffer.is_open());
+fn close(device: &Device, pending: &Pending) {
+    let recorder = device.recorder.as_ref().filter(|r| r.buffer.is_open());
     if let Some(recorder) = recorder.filter(|_| pending.is_empty()) {
         recorder.buffer.open(false);
     }
 }
 
 /// Draws of a submission in order of execution.
-fn draws_of(known: &Device, submitted: &Submitted) -> Vec<Executed> {
-    let tracker = known.tracker();
+fn draws_of(device: &Device, submitted: &Submitted) -> Vec<Executed> {
+    let tracker = device.tracker();
     let buffers = submitted.buffers.iter();
     let draws = buffers.flat_map(|buffer| tracker.commands.items(buffer.as_raw()));
     draws.cloned().collect()
@@ -240,34 +240,25 @@ fn draws_of(known: &Device, submitted: &Submitted) -> Vec<Executed> {
 ///
 /// # Safety
 /// A valid submission that has not been made.
-unsafe fn waits_for_host(known: &Device, submitted: &Submitted, effects: &Effects) -> bool {
-    let next = &known.next;
+unsafe fn waits_for_host(device: &Device, submitted: &Submitted, effects: &Effects) -> bool {
+    let next = &device.next;
     let is_open = |(semaphore, value): &(vk::Semaphore, u64)| {
         let mut now = u64::MAX;
-        known.tracker().timelines.contains(semaphore)
+        device.tracker().timelines.contains(semaphore)
             // SAFETY: a live timeline semaphore.
-            && unsafe { (next.get_semaphore_counter_value)(known.handle, *semaphore, &mut now) }
+            && unsafe { (next.get_semaphore_counter_value)(device.handle, *semaphore, &mut now) }
                 == vk::Result::SUCCESS
             && now < *value
     };
     // SAFETY: a live event.
     let is_reset = |event: &vk::Event| unsafe {
-        (next.get_event_status)(known.handle, *event) == vk::Result::EVENT_RESET
+        (next.get_event_status)(device.handle, *event) == vk::Result::EVENT_RESET
     };
     submitted.waits.iter().any(is_open) || effects.awaited().iter().any(is_reset)
 }
 
-pub(super) unsafe extern "system" fn queue_present(
-    queue: vk::Queue,
-    info: *const vk::PresentInfoKHR<'_>,
-) -> vk::Result {
-    // SAFETY: a valid call of vkQueuePresentKHR.
-    unsafe {
-        let known = Device::of(queue);
-        let result = (known.next.queue_present)(queue, info);
-        known.capture.note_present();
-        result
-    }
+after! {
+    queue_present(queue: vk::Queue, info: *const vk::PresentInfoKHR<'_>) |device, result| device.capture.note_present();
 }
 
 #[cfg(test)]
