@@ -5,13 +5,23 @@
 
 CARGO ?= cargo
 OUT   ?= out
+# Where `make install` puts bin, lib and share.
+PREFIX ?= $(HOME)/.local
 # Folder of the real scenes (docs/use/real-scenes.md).
 SCENES ?= $(OUT)/scenes
 
-.PHONY: demo apps techniques accuracy stress notebooks test fuzz faults bench lint programs build deps golden figures reproduce clean screenshots scenes scene-files
+.PHONY: demo dist install apps techniques accuracy stress notebooks test fuzz faults bench lint programs build deps golden figures reproduce clean screenshots scenes scene-files
 
 demo: deps programs
 	@OUT="$(OUT)" scripts/demo.sh
+
+# An archive and a Python wheel, which run without Rust, in $(OUT)/dist (docs/use/install.md).
+dist:
+	$(CARGO) build --release --locked -p tracegen -p replay -p layer -p parallax-python
+	@python3 -B scripts/dist.py "$${CARGO_TARGET_DIR:-target}/release" "$(OUT)/dist" archive wheel
+
+install: build
+	@python3 -B scripts/dist.py "$${CARGO_TARGET_DIR:-target}/release" "$(DESTDIR)$(PREFIX)" install
 
 # Unmodified programs: two web pages in headless Chromium, captured and replayed (docs/use/applications.md).
 apps: deps build

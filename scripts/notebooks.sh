@@ -1,7 +1,7 @@
 #!/bin/sh
 # Installs the Python package into a fresh virtual environment, tests it, and executes its notebooks.
 #   OUT=FOLDER            executed notebooks and their figures go to FOLDER/notebooks (default out)
-#   PARALLAX_NATIVE=FILE  the built extension module; without it, pip builds it
+#   PARALLAX_WHEEL=FILE   the wheel (`make dist`); without it, pip builds the extension module
 #   UPDATE_NOTEBOOKS=1    rewrites the notebooks and the figures of docs/use/python.md
 # Exit code 3, with a line `SKIPPED: ...`, where venv or the package index is absent.
 set -eu
@@ -25,16 +25,7 @@ pip() {
 pip download --quiet --no-deps --dest "$out" iniconfig >"$out/pip.log" 2>&1 ||
     absent "the Python package index cannot be reached"
 
-if [ -n "${PARALLAX_NATIVE:-}" ]; then
-    # As an installation has it: the package's modules beside the extension module.
-    site=$("$python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
-    cp -r python/parallax "$site"
-    cp "$PARALLAX_NATIVE" "$site/parallax/_native.abi3.so"
-    "$python" python/needs.py notebooks >"$out/needs.txt"
-    pip install --quiet -r "$out/needs.txt"
-else
-    pip install --quiet "./python[notebooks]"
-fi
+pip install --quiet "${PARALLAX_WHEEL:-./python}[notebooks]"
 # Not from python/, whose folder `parallax` has no extension module.
 "$python" -m pytest -q -p no:cacheprovider python/tests
 if [ "${UPDATE_NOTEBOOKS:-}" = 1 ]; then

@@ -11,6 +11,7 @@ Trace files come from ``tracegen``; every function takes their paths. Replays ar
 
 from ._native import ParallaxError, __version__
 from ._orders import Grid, order_items
+from ._programs import program
 from ._replays import reproject, result, run, sweep
 from ._tables import EYES, info, lines, read_raytrace, read_textrace
 
@@ -22,6 +23,7 @@ __all__ = [
     "info",
     "lines",
     "order_items",
+    "program",
     "read_raytrace",
     "read_textrace",
     "reproject",

@@ -132,6 +132,25 @@ pub fn has_chromium() -> bool {
     found && has_lavapipe()
 }
 
+/// Packs the built programs into a folder as `archive` or `wheel` and returns the file; prints a line on stderr
+/// where Python is absent.
+///
+/// # Panics
+/// The programs cannot be packed.
+pub fn packed(folder: &Path, kind: &str) -> Option<PathBuf> {
+    if Command::new("python3").arg("--version").output().is_err() {
+        skipped!("python3 is absent");
+        return None;
+    }
+    let replay = program("replay");
+    let build = Path::new(replay.get_program()).parent();
+    let mut pack = Command::new("python3");
+    pack.arg("-B").arg(root().join("scripts/dist.py"));
+    run_ok(pack.arg(build.expect("a folder")).arg(folder).arg(kind));
+    let mut files = std::fs::read_dir(folder).expect("the folder");
+    Some(files.next().expect("a file").expect("an entry").path())
+}
+
 /// Folder of the real test scenes (`PARALLAX_SCENES`, or `../shared/scenes` beside the checkout). Prints a
 /// line on stderr and returns `None` if the scene is absent.
 pub fn real_scene(relative: &str) -> Option<PathBuf> {

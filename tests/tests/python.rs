@@ -1,6 +1,6 @@
 //! The Python package: its own tests and its notebooks, in a fresh virtual environment.
 
-use parallax_tests::{program, root};
+use parallax_tests::{packed, program, root};
 use std::path::Path;
 use std::process::Command;
 
@@ -8,12 +8,13 @@ use std::process::Command;
 fn the_package_passes_its_tests_and_the_notebooks_run() {
     let replay = program("replay");
     let replay = Path::new(replay.get_program());
-    let native = replay.with_file_name("deps/lib_native.so");
-    assert!(native.exists(), "{} is not built", native.display());
     let out = tempfile::tempdir().expect("a temporary folder");
+    let Some(wheel) = packed(out.path(), "wheel") else {
+        return;
+    };
     let output = Command::new(root().join("scripts/notebooks.sh"))
         .env("OUT", out.path())
-        .env("PARALLAX_NATIVE", &native)
+        .env("PARALLAX_WHEEL", &wheel)
         .env("PARALLAX_REPLAY", replay)
         .env_remove("PARALLAX_TRACE")
         .env_remove("UPDATE_NOTEBOOKS")

@@ -13,7 +13,9 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum LaunchError {
     /// The layer's library is missing.
-    #[error("{0} is missing: `make build` builds it beside tracegen")]
+    #[error(
+        "{0} is missing: `make install` installs it with the programs, and `make build` builds it beside them; `cargo install` installs no Vulkan layer"
+    )]
     NoLayer(String),
     /// The capture's folder cannot be written.
     #[error("cannot set up the capture in {folder}: {source}")]
@@ -149,15 +151,22 @@ fn remove_abandoned(parent: &Path) {
     }
 }
 
-/// Finds the layer's library next to a program or among Cargo's build outputs, which may be newer.
+/// Finds the layer's library next to a program, among Cargo's build outputs, which may be newer, or where
+/// `scripts/dist.py` puts it.
 fn library(tool: &Path) -> Result<PathBuf, LaunchError> {
     let folder = tool.parent().unwrap_or(Path::new("."));
-    let places = [folder.join("deps").join(LIBRARY), folder.join(LIBRARY)];
-    let files = places.iter().filter(|place| place.is_file());
+    let installed = folder.with_file_name("lib").join("parallax");
+    let beside = folder.join(LIBRARY);
+    let places = [
+        &installed.join(LIBRARY),
+        &folder.join("deps").join(LIBRARY),
+        &beside,
+    ];
+    let files = places.into_iter().filter(|place| place.is_file());
     let found = files.max_by_key(|place| fs::metadata(place).and_then(|of| of.modified()).ok());
     found
         .cloned()
-        .ok_or_else(|| LaunchError::NoLayer(places[1].display().to_string()))
+        .ok_or_else(|| LaunchError::NoLayer(beside.display().to_string()))
 }
 
 fn lavapipe() -> Option<PathBuf> {
@@ -198,14 +207,15 @@ mod tests {
     }
 
     #[test]
-    fn the_library_is_found_next_to_the_tool_or_in_deps() {
+    fn the_library_is_found_next_to_the_tool_in_deps_or_where_it_is_installed() {
         let folder = tempfile::tempdir().unwrap();
-        let tool = folder.path().join("tracegen");
+        let [bin, deps, installed] =
+            ["bin", "bin/deps", "lib/parallax"].map(|place| folder.path().join(place));
+        let tool = bin.join("tracegen");
         let text = library(&tool).unwrap_err().to_string();
         assert!(text.contains("libparallax_layer.so is missing"), "{text}");
-        let deps = folder.path().join("deps");
-        fs::create_dir(&deps).unwrap();
-        for place in [deps, folder.path().to_owned()] {
+        for place in [installed, deps, bin] {
+            fs::create_dir_all(&place).unwrap();
             let file = place.join(LIBRARY);
             fs::write(&file, b"").unwrap();
             assert_eq!(library(&tool).unwrap(), file);

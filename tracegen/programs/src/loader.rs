@@ -12,7 +12,7 @@ use std::process::Command;
 
 /// File that registers the layer with the loader.
 pub(super) const MANIFEST: &str = "parallax_layer.json";
-/// Link to the layer's library beside the manifest, whose name every manifest can contain.
+/// Link to the layer's library beside the manifest, which names it.
 const LINK: &str = "libparallax_layer.so";
 /// Character that separates the entries of the loader's lists of paths.
 const SEPARATOR: u8 = b':';
@@ -51,21 +51,7 @@ pub fn folder_in(parent: &Path) -> std::io::Result<ScratchFolder> {
 /// The folder cannot be written.
 pub fn register(folder: &Path, library: &Path) -> std::io::Result<()> {
     std::os::unix::fs::symlink(library, folder.join(LINK))?;
-    let text = format!(
-        r#"{{
-  "file_format_version": "1.1.2",
-  "layer": {{
-    "name": "{LAYER_NAME}",
-    "type": "GLOBAL",
-    "library_path": "./{LINK}",
-    "api_version": "1.3.0",
-    "implementation_version": "1",
-    "description": "Records the texture samples of a program"
-  }}
-}}
-"#
-    );
-    fs::write(folder.join(MANIFEST), text)
+    fs::write(folder.join(MANIFEST), include_bytes!("parallax_layer.json"))
 }
 
 /// Makes a program load the registered layer.
@@ -211,6 +197,7 @@ mod tests {
         register(folder.path(), &library).unwrap();
         let text = fs::read(folder.path().join(MANIFEST)).unwrap();
         let manifest: serde_json::Value = serde_json::from_slice(&text).unwrap();
+        assert_eq!(manifest["layer"]["name"], LAYER_NAME);
         let named = manifest["layer"]["library_path"].as_str().unwrap();
         assert_eq!(fs::read(folder.path().join(named)).unwrap(), b"library");
     }
