@@ -117,7 +117,7 @@ def tree(build, packages):
 
 
 def mode(path):
-    return 0o755 if Path(path).name in PROGRAMS and "completions" not in path else 0o644
+    return 0o755 if Path(path).parent.name in ("bin", "scripts") else 0o644
 
 
 def archive(name, files):
@@ -176,7 +176,7 @@ def write(path, data):
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_name(f".{path.name}.part")
     part.write_bytes(data)
-    part.chmod(mode(str(path)))
+    part.chmod(mode(path))
     part.replace(path)
 
 
