@@ -146,3 +146,124 @@ fn a_scene_with_a_nan_position_names_the_place() {
         &["scene.gltf", "NaN"],
     );
 }
+
+#[test]
+fn a_path_with_a_nan_pose_is_refused_by_every_command_with_a_path() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("path.csv");
+    let header = "time_s,x_m,y_m,z_m,qx,qy,qz,qw";
+    fs::write(
+        &path,
+        format!("{header}\n0,0,0,0,0,0,0,1\n1,0,NaN,0,0,0,0,1\n"),
+    )
+    .expect("a file");
+    for (subcommand, out) in [("raster", "out.textrace"), ("rays", "out.raytrace")] {
+        refuse(
+            program("tracegen")
+                .args([subcommand, "teapot", "--path"])
+                .arg(&path)
+                .arg("-o")
+                .arg(folder.path().join(out)),
+            &["path.csv: line 3, column y_m: expected a finite number, found 'NaN'"],
+        );
+    }
+    fs::write(
+        &path,
+        format!("{header}\n0,0,0,0,0,0,0,1\n1,0,0,0,0,0,0,1\n"),
+    )
+    .expect("a file");
+    refuse(
+        program("tracegen")
+            .args(["raster", "teapot", "--frames", "100", "-o"])
+            .arg(folder.path().join("out.textrace"))
+            .arg("--path")
+            .arg(&path),
+        &["path.csv", "at most 73 frames", "found 100 frames"],
+    );
+    let left = fs::read_dir(folder.path()).expect("folder").count();
+    assert_eq!(left, 1, "something was left behind");
+}
+
+#[test]
+fn culling_options_that_do_not_fit_the_display_are_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let out = folder.path().join("out.textrace");
+    let wide: &[&str] = &["--hfov", "100", "--cant", "42"];
+    let cases: [(&[&str], &[&str], &[&str]); 6] = [
+        (
+            &["--cull", "superfrustum"],
+            wide,
+            &["below 179 degrees", "184.0 degrees"],
+        ),
+        (
+            &["--cull", "conical-superfrustum"],
+            wide,
+            &["below 179 degrees"],
+        ),
+        (
+            &["--cull", "octree"],
+            &[],
+            &["octree", "per-eye, superfrustum"],
+        ),
+        (
+            &["--lens-radius", "-1"],
+            &[],
+            &["--lens-radius", "radius above 0", "-1"],
+        ),
+        (
+            &["--lens-center", "0.1"],
+            &[],
+            &["--lens-center", "two tangents", "'0.1'"],
+        ),
+        (
+            &["--lens-center", "nan,0"],
+            &[],
+            &["--lens-center", "centre x and y", "NaN"],
+        ),
+    ];
+    for (technique, display, message) in cases {
+        refuse(
+            (program("tracegen").args(["raster", "teapot", "--size", "32x32"]))
+                .args(technique)
+                .args(display)
+                .arg("-o")
+                .arg(&out),
+            message,
+        );
+        assert!(!out.exists(), "{technique:?}");
+    }
+}
+
+#[test]
+fn a_damaged_ray_trace_is_refused() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let bytes = fs::read(root().join("traces/teapot-rays.raytrace")).expect("golden trace");
+    let path = folder.path().join("damaged.raytrace");
+    for keep in [0, 7, 63, 1000, bytes.len() - 1] {
+        fs::write(&path, &bytes[..keep]).expect("temporary file");
+        refuse(
+            program("replay").arg("reproject").arg(&path),
+            &["damaged.raytrace"],
+        );
+    }
+    let mut flipped = bytes.clone();
+    let middle = flipped.len() / 2;
+    flipped[middle] ^= 0x10;
+    fs::write(&path, flipped).expect("temporary file");
+    refuse(
+        program("replay").arg("reproject").arg(&path),
+        &["damaged.raytrace"],
+    );
+    let texture_trace = root().join("traces/atrium.textrace");
+    refuse(
+        program("replay").arg("reproject").arg(texture_trace),
+        &["atrium.textrace"],
+    );
+    refuse(
+        program("replay")
+            .arg("reproject")
+            .arg(root().join("traces/teapot-rays.raytrace"))
+            .args(["--rule", "depht=0.02"]),
+        &["depht"],
+    );
+}
