@@ -17,6 +17,9 @@ pub(crate) struct RecordBuffer {
     capacity: u32,
 }
 
+/// A capacity that no buffer has.
+pub(crate) const NO_CAPACITY: u32 = u32::MAX;
+
 /// Word of the buffer with the number of appended units.
 const COUNT: usize = 0;
 /// Word of the buffer with its capacity, for shaders.
@@ -26,6 +29,7 @@ impl RecordBuffer {
     /// Reserves `bytes` bytes for records.
     pub fn new(bytes: u64) -> io::Result<Self> {
         let capacity = u32::try_from(bytes / UNIT_BYTES).unwrap_or(u32::MAX);
+        let capacity = capacity.min(NO_CAPACITY - 1);
         let bytes = COUNTER_BYTES + u64::from(capacity) * UNIT_BYTES;
         let bytes = usize::try_from(bytes).map_err(|_| io::ErrorKind::OutOfMemory)?;
         let map = MmapOptions::new().len(bytes).no_reserve_swap().map_anon()?;

@@ -12,8 +12,9 @@ use super::declare::{Inputs, Types};
 use super::lanes::{self, Lanes, Slopes};
 use super::writer::{Result, Writer};
 use super::{InjectError, Target};
+use crate::record_buffer::NO_CAPACITY;
 use rspirv::dr::Builder;
-use rspirv::spirv::Word;
+use rspirv::spirv::{Op, Word};
 use spool::buffer::{self, GROUPS_SHIFT};
 
 /// Declares the functions of a module.
@@ -48,8 +49,19 @@ impl Functions {
         w.store_variable(known.lane, place.lane)?;
         w.store_variable(known.packed, place.packed)?;
         w.store_variable(known.capacity, capacity)?;
+        self.never_discard(w, capacity)?;
         w.end()?;
         Ok(function)
+    }
+
+    /// A discard that never happens. Lavapipe compiles a second version of a shader for tiles that an opaque
+    /// triangle covers, unless the shader discards; it then also drops the earlier draws of such tiles, whose records
+    /// would be lost.
+    fn never_discard(&self, w: &mut Writer<'_>, capacity: Word) -> Result<()> {
+        let no_capacity = w.constant(NO_CAPACITY);
+        let never = w.pure(Op::IEqual, w.types.bool, &[capacity, no_capacity]);
+        let guard = w.guard(never)?;
+        w.kill(&guard)
     }
 
     /// `void quads(uint group, vec2 at[count])`: records a quad with this number of coordinates.

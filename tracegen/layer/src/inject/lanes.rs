@@ -62,10 +62,10 @@ impl Lanes {
         let Types {
             uvec4, bool, u32, ..
         } = w.types;
-        let lane = w.variable(inputs.known.lane);
         let one = w.constant(1);
-        let own = w.unsigned(Op::ShiftLeftLogical, &[one, lane]);
         let Some(invocation) = inputs.invocation else {
+            let lane = w.variable(inputs.known.lane);
+            let own = w.unsigned(Op::ShiftLeftLogical, &[one, lane]);
             return Self {
                 lane,
                 own,
@@ -74,6 +74,10 @@ impl Lanes {
             };
         };
         let invocation = w.loaded(invocation);
+        // The driver knows the invocations, so it computes at compile time what follows from the lane alone.
+        let three = w.constant(3);
+        let lane = w.unsigned(Op::BitwiseAnd, &[invocation, three]);
+        let own = w.unsigned(Op::ShiftLeftLogical, &[one, lane]);
         // Helper lanes do not take part in ballots.
         let present = w.builder.constant_true(bool);
         let votes = w.of_subgroup(Op::GroupNonUniformBallot, uvec4, &[present]);

@@ -6,6 +6,7 @@
 //! change. The number of the draw is a push constant.
 
 mod append;
+mod calls;
 mod declare;
 mod find;
 mod flow;
@@ -14,7 +15,6 @@ mod lanes;
 mod numbers;
 mod parse;
 mod reads;
-mod recorder;
 mod rewrite;
 mod shader;
 mod sites;
@@ -65,7 +65,7 @@ pub enum InjectError {
 
 /// A recording fragment shader.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Recording {
+pub struct Rewritten {
     /// The module.
     pub words: Vec<u32>,
     /// The sites where it records.
@@ -90,11 +90,11 @@ pub fn instrument(
     words: &[u32],
     entry: Option<&str>,
     target: &Target,
-) -> Result<Recording, InjectError> {
+) -> Result<Rewritten, InjectError> {
     let shader = Shader::parse(words, entry)?;
     let tests = tests_of(&shader);
     let (words, sites) = rewrite::rewrite(shader, tests, target)?;
-    Ok(Recording {
+    Ok(Rewritten {
         words,
         sites,
         tests,

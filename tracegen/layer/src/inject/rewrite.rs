@@ -1,7 +1,7 @@
 //! Inserts calls of the recording functions and the declarations that they need.
 
+use super::calls::CallEmitter;
 use super::find::Found;
-use super::recorder::Recorder;
 use super::shader::Shader;
 use super::sites::{Batch, Sites, stays_first};
 use super::{InjectError, Target};
@@ -19,108 +19,116 @@ pub(super) fn rewrite(
 ) -> Result<(Vec<u32>, Vec<Site>), InjectError> {
     let mut sites = Sites::new(&shader, tests)?;
     let (functions, main) = (shader.functions.clone(), shader.main);
-    let mut recorder = Recorder::new(&shader, target)?;
+    let mut calls = CallEmitter::new(&shader, target)?;
     if tests == DepthTests::Either || tests == DepthTests::EarlyLateWrite {
         // The rewritten discarding shader is used by an additional draw, which writes nothing.
-        recorder
+        calls
             .builder
             .execution_mode(main, ExecutionMode::EarlyFragmentTests, []);
     }
+    // Depth is compared again only for draws that are recorded by an additional draw: those of shaders that discard,
+    // and those with alpha to coverage, which needs an output.
+    let needs_depth = match tests {
+        DepthTests::EarlyLateWrite => true,
+        DepthTests::Either => shader.has_outputs(),
+        DepthTests::Early | DepthTests::Late => false,
+    };
     for function in functions {
         let is_main = sites.main == function;
-        let blocks = recorder.builder.module_ref().functions[function]
-            .blocks
-            .len();
+        let blocks = calls.builder.module_ref().functions[function].blocks.len();
         for block in 0..blocks {
-            let body = &mut recorder.builder.module_mut().functions[function].blocks[block];
+            let body = &mut calls.builder.module_mut().functions[function].blocks[block];
             let old = std::mem::take(&mut body.instructions);
             let mut new = Vec::with_capacity(2 * old.len());
             let mut starts = is_main && block == 0;
             for (place, instruction) in old.into_iter().enumerate() {
                 if starts && !stays_first(&instruction) {
                     starts = false;
-                    recorder.begin(&mut new)?;
+                    calls.begin(&mut new)?;
                     if let Some(group) = sites.entry {
-                        recorder.record_depth(group, &mut new)?;
+                        match needs_depth {
+                            true => calls.record_depth(group, &mut new)?,
+                            false => calls.record_presence(group, &mut new)?,
+                        }
                     }
                 }
                 if let Some(batch) = sites.batches.remove(&(function, block, place)) {
-                    record(&mut recorder, &shader, &batch, &mut new)?;
+                    record(&mut calls, &shader, &batch, &mut new)?;
                 }
                 if instruction.class.opcode == Op::Return
                     && is_main
                     && let Some(group) = sites.end
                 {
-                    recorder.record_presence(group, &mut new)?;
+                    calls.record_presence(group, &mut new)?;
                 }
                 new.push(instruction);
             }
-            recorder.builder.module_mut().functions[function].blocks[block].instructions = new;
+            calls.builder.module_mut().functions[function].blocks[block].instructions = new;
         }
     }
-    Ok((recorder.finish().assemble(), sites.sites))
+    Ok((calls.finish().assemble(), sites.sites))
 }
 
 /// Inserts the recording of coordinate groups before an instruction.
 fn record(
-    recorder: &mut Recorder,
+    calls: &mut CallEmitter,
     shader: &Shader,
     batch: &Batch,
     out: &mut Vec<Instruction>,
 ) -> Result<(), InjectError> {
     match &batch.of[..] {
         [found] if matches!(found.what, What::LeftOut(_)) => {
-            recorder.record_presence(batch.group, out)
+            calls.record_presence(batch.group, out)
         }
         [found] if found.form == Form::Fragment => {
-            record_fragment(recorder, shader, batch.group, found, out)
+            record_fragment(calls, shader, batch.group, found, out)
         }
         all => {
             let at: Vec<Vec<Word>> = (all.iter())
-                .map(|found| coordinates(recorder, shader, found, out))
+                .map(|found| coordinates(calls, shader, found, out))
                 .collect();
-            recorder.record_quads(batch.group, &at, out)
+            calls.record_quads(batch.group, &at, out)
         }
     }
 }
 
 /// Coordinates as 32-bit floats, divided if the instruction divides them.
 fn coordinates(
-    recorder: &mut Recorder,
+    calls: &mut CallEmitter,
     shader: &Shader,
     found: &Found,
     out: &mut Vec<Instruction>,
 ) -> Vec<Word> {
-    let mut at = recorder.floats(shader, found.coordinate, out);
+    let mut at = calls.floats(shader, found.coordinate, out);
     if let Some(divisor) = found.divisor
         && let Some(&q) = at.get(divisor as usize)
     {
         at.truncate(divisor as usize);
         for part in &mut at {
-            *part = recorder.divided(*part, q, out);
+            *part = calls.divided(*part, q, out);
         }
     }
     at
 }
 
 fn record_fragment(
-    recorder: &mut Recorder,
+    calls: &mut CallEmitter,
     shader: &Shader,
     group: u16,
     found: &Found,
     out: &mut Vec<Instruction>,
 ) -> Result<(), InjectError> {
-    let at = coordinates(recorder, shader, found, out);
-    let lod = found.lod.map(|lod| recorder.float(shader, lod, out));
+    let at = coordinates(calls, shader, found, out);
+    let lod = found.lod.map(|lod| calls.float(shader, lod, out));
     let gradients = match (&found.what, found.gradients) {
-        (_, Some(named)) => Some(named.map(|id| recorder.floats(shader, id, out))),
+        (_, Some(named)) => Some(named.map(|id| calls.floats(shader, id, out))),
         (What::Texture(of), None) if matches!(of.lod, Lod::Derivatives | Lod::Bias(_)) => {
-            Some(recorder.derivatives(&at, out))
+            Some(calls.derivatives(&at, out))
         }
         _ => None,
     };
-    let element = found.element.map(|id| recorder.unsigned(shader, id, out));
-    recorder.record_fragment(group, element, &at, lod, gradients, out)
+    let element = found.element.map(|id| calls.unsigned(shader, id, out));
+    calls.record_fragment(group, element, &at, lod, gradients, out)
 }
 
 /// Appends an instruction with a result, and returns the id of the result.

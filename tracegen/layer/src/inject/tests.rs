@@ -50,7 +50,7 @@ fn module(text: &str) -> Vec<u32> {
 }
 
 /// Rewrites a shader for every target, and validates the results with `spirv-val` if it is installed.
-fn instrumented(words: &[u32]) -> Recording {
+fn instrumented(words: &[u32]) -> Rewritten {
     for (ballots, multiview) in [(false, false), (false, true), (true, true)] {
         let target = Target {
             ballots,
@@ -95,7 +95,7 @@ fn validate(words: &[u32]) {
     );
 }
 
-fn textures(recording: &Recording) -> Vec<&TextureSite> {
+fn textures(recording: &Rewritten) -> Vec<&TextureSite> {
     recording
         .sites
         .iter()
@@ -150,12 +150,12 @@ fn textures_at_the_same_coordinates_share_a_group() {
     assert_eq!(textures(&recording)[3].offset, [1, -2]);
 }
 
-fn groups(recording: &Recording) -> Vec<u16> {
+fn groups(recording: &Rewritten) -> Vec<u16> {
     recording.sites.iter().map(|site| site.group).collect()
 }
 
 /// Number of calls that record, in a module that had no calls before it was rewritten. One more call prepares.
-fn calls(recording: &Recording) -> usize {
+fn calls(recording: &Rewritten) -> usize {
     number_of(&recording.words, Op::FunctionCall) - 1
 }
 

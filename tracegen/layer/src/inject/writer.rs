@@ -74,6 +74,12 @@ impl<'a> Writer<'a> {
         self.start(guard.end)
     }
 
+    /// Ends the fragment in a guard, and starts the guard's merge block.
+    pub fn kill(&mut self, guard: &Guard) -> Result<()> {
+        self.builder.kill().map_err(builder_error)?;
+        self.start(guard.end)
+    }
+
     /// Starts the merge block of a guard. Returns `value` if the condition held, and `other` if not.
     pub fn merge_value(&mut self, guard: &Guard, value: Word, other: Word) -> Result {
         let from = self.block;

@@ -25,6 +25,19 @@ fn recording_adds_no_loops() {
 }
 
 #[test]
+fn recording_shaders_discard_so_that_lavapipe_compiles_them_once() {
+    for words in [
+        chain(1),
+        rich(),
+        shader("return vec4<f32>(in.uv, 0.0, 1.0);"),
+    ] {
+        let discards = number_of(&words, Op::Kill);
+        let recording = instrumented(&words);
+        assert_eq!(number_of(&recording.words, Op::Kill), discards + 1);
+    }
+}
+
+#[test]
 fn recording_code_grows_linearly_with_the_sites() {
     let sizes = [10, 20, 40, 80].map(|count| {
         let words = chain(count);

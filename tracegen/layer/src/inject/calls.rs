@@ -10,7 +10,7 @@ use rspirv::spirv::{Op, Word};
 use std::collections::HashMap;
 
 /// Generates calls in a module.
-pub(super) struct Recorder {
+pub(super) struct CallEmitter {
     pub builder: Builder,
     types: Types,
     frag_coord: Input,
@@ -25,7 +25,7 @@ pub(super) struct Recorder {
     fragment: Option<Word>,
 }
 
-impl Recorder {
+impl CallEmitter {
     /// Declares what the recording functions need.
     pub fn new(shader: &Shader, target: &Target) -> Result<Self, InjectError> {
         let mut builder = declare::builder(shader, target);
