@@ -60,7 +60,7 @@ mod tests {
                 "misses",
                 "M",
                 Show::Millions(1),
-                |_: &Option<f64>| 7,
+                |_: &Option<f64>| 7_u64,
             ),
             Column::real("paper.rate", "paper", "%", 2, |p: &Option<f64>| *p).published(),
             Column::real("paper.half", "half", "%", 2, |p: &Option<f64>| {

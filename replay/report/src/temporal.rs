@@ -25,14 +25,22 @@ pub struct FrameSchemes {
 #[derive(Clone, Debug, Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
 pub struct TemporalReport {
-    /// The rule that rejects reused hits.
-    pub rule: String,
-    /// What is reused.
-    pub reuse: Reuse,
-    /// The machine.
-    pub config: SgrtConfig,
-    /// The frames.
-    pub frames: Vec<FrameSchemes>,
+    rule: String,
+    reuse: Reuse,
+    config: SgrtConfig,
+    frames: Vec<FrameSchemes>,
+}
+
+impl TemporalReport {
+    /// A report on frames that were run with these settings.
+    pub fn new(frames: Vec<FrameSchemes>, rule: String, reuse: Reuse, config: SgrtConfig) -> Self {
+        Self {
+            rule,
+            reuse,
+            config,
+            frames,
+        }
+    }
 }
 
 impl Document for TemporalReport {

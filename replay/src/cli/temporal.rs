@@ -69,12 +69,7 @@ pub fn run(args: &TemporalArgs) -> Result<ExitCode> {
         previous = Some((frame, id));
     }
     drop(progress);
-    let report = TemporalReport {
-        rule: rule.to_string(),
-        reuse,
-        config,
-        frames,
-    };
+    let report = TemporalReport::new(frames, rule.to_string(), reuse, config);
     args.outputs.write(&report, prints)?;
     Ok(ExitCode::SUCCESS)
 }
