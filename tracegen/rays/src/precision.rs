@@ -247,7 +247,7 @@ pub const ARITHMETICS: [&str; 4] = [
 /// # Panics
 /// If the mesh has too many triangles for a hierarchy.
 pub fn measure(mesh: &TestMesh, at_m: f64, count: usize) -> [Precision; 4] {
-    /// Displacement that rounding to single precision may cause, as in [`super::robustness`].
+    /// Displacement that rounding to single precision may cause, as in `tests/robustness.rs`.
     const TOLERANCE: f64 = 1e-5;
     let place = DVec3::new(1.0, 0.7, -0.9) * at_m;
     let mut random = Random(11);

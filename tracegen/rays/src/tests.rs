@@ -2,9 +2,12 @@
 
 mod columns;
 mod lighting;
-// Also used by the benches, which include these files.
+// The benches include these files, and use more of them than the tests do.
+#[allow(dead_code)]
 mod reference_tree;
+#[allow(dead_code)]
 mod reference_walk;
+#[allow(dead_code)]
 mod robustness;
 
 use super::frame::{RayFrame, trace_frame};
