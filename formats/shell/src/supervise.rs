@@ -110,7 +110,7 @@ impl Program {
             return Ok(status);
         }
         fs::write(self.folder.join(END), "")?;
-        match self.wait(2 * TERMINATION_TIMEOUT)? {
+        match self.wait(6 * TERMINATION_TIMEOUT)? {
             Some(status) => Ok(status),
             None => Err(io::Error::other("the program's processes do not end")),
         }

@@ -90,8 +90,8 @@ impl Document for ModesReport<'_> {
             let difference = difference(value(timed.result), value(functional.result));
             ((*key).to_owned(), difference.into())
         });
-        let [timed, functional] =
-            [timed, functional].map(|row| Envelope::new(RUN_SCHEMA, MODEL_VERSION, RunJson::new(row)));
+        let [timed, functional] = [timed, functional]
+            .map(|row| Envelope::new(RUN_SCHEMA, MODEL_VERSION, RunJson::new(row)));
         ModesJson {
             schema: Self::SCHEMA,
             timed,

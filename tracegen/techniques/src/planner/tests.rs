@@ -4,7 +4,7 @@ use crate::gaze::Gaze;
 use crate::hidden_mesh::HiddenMesh;
 use crate::layer::Layer;
 use crate::plan::{Filter, PicturePart};
-use crate::settings::{FarField, Foveation, Rates, Reprojection, Split, Variant};
+use crate::settings::{FarField, Foveation, FoveationKind, Rates, Reprojection, Split, Variant};
 use formats::view::{EyeView, FovTangents};
 
 const BOTH: &[Eye] = &[Eye::Left, Eye::Right];
