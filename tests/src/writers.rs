@@ -66,7 +66,7 @@ pub const ALL: &[Writer] = &[
         command.arg("-o").arg(folder);
         command
     }),
-    Writer::new("replay sweep", |inputs, folder| sweep(inputs, folder)),
+    Writer::new("replay sweep", sweep),
     Writer::new("replay paper", |_, folder| {
         let mut command = replay("paper", "atrium-shadows.textrace");
         command.arg("--csv").arg(folder.join("table.csv"));

@@ -317,7 +317,7 @@ fn a_dash_is_standard_output_for_binary_and_text() {
     same(reproject(), reproject(), "--image");
     refuse(
         reproject().args(["--json", "--html", "-"]),
-        &["--html - and --json: the same output twice"],
+        &["--json and --html -: the same output twice"],
     );
 }
 

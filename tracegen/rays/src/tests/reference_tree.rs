@@ -214,7 +214,9 @@ fn edge_near(triangle: &Triangle, origin: DVec3, direction: DVec3, tolerance: f6
     })
 }
 
+// A bench without a test harness leaves the tests out, not their imports.
 #[cfg(test)]
+#[allow(unused_imports)]
 mod tests {
     use super::*;
     use rays::reference::{Random, Reference, TestMesh, Verdict};

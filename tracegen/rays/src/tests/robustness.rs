@@ -222,7 +222,9 @@ pub fn meshes() -> [TestMesh; 3] {
 /// Distances from the world's origin along a diagonal.
 pub const TRANSLATIONS: [f64; 4] = [0.0, 1e3, 1e5, 1e6];
 
+// A bench without a test harness leaves the tests out, not their imports.
 #[cfg(test)]
+#[allow(unused_imports)]
 mod tests {
     use super::*;
 
