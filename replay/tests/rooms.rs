@@ -9,7 +9,15 @@ const CRATES: [(&str, &[&[&str]]); 2] = [
     (
         "sim",
         &[
-            &["model_version", "palette", "registry", "size"],
+            // `add_fields` is the macro of `sums`.
+            &[
+                "add_fields",
+                "model_version",
+                "palette",
+                "registry",
+                "size",
+                "sums",
+            ],
             &["config", "memory", "order", "result"],
             &["paper", "preset", "tmu"],
             &["stream"],
