@@ -9,6 +9,7 @@ pub mod writers;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::time::UNIX_EPOCH;
 
 /// The workspace root.
 pub fn root() -> PathBuf {
@@ -33,10 +34,30 @@ pub fn program(name: &str) -> Command {
         "{} is not built: run `make test`, or `cargo build --release` first",
         path.display()
     );
-    let mut command = Command::new(path);
-    // Results of a test must not depend on earlier runs.
-    command.env("PARALLAX_CACHE_SIZE", "0");
+    let mut command = Command::new(&path);
+    command.env("PARALLAX_CACHE_DIR", texture_cache(profile));
+    command.env("PARALLAX_CACHE_SIZE", "4GiB");
     command
+}
+
+/// The folder in which all tests of one build keep compressed textures, which take most of the time of a small capture. A new
+/// build has a new folder, so results do not depend on earlier builds.
+fn texture_cache(profile: &Path) -> PathBuf {
+    let file = profile
+        .join("tracegen")
+        .metadata()
+        .expect("tracegen is built");
+    let time = file.modified().expect("a file system with times");
+    let time = time.duration_since(UNIX_EPOCH).expect("a time after 1970");
+    let folders = profile.join("test-textures");
+    let folder = folders.join(format!("{}-{}", file.len(), time.as_nanos()));
+    // Another test may remove the same folder at the same time.
+    for old in folders.read_dir().into_iter().flatten().flatten() {
+        if old.path() != folder {
+            let _ = std::fs::remove_dir_all(old.path());
+        }
+    }
+    folder
 }
 
 /// Runs a command and returns its output.
