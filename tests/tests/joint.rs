@@ -92,4 +92,5 @@ fn only_raster_depends_on_the_driver() {
         assert_free_of(package, &["wgpu", "naga", "raster", "rays"]);
     }
     assert!(tree("raster").iter().any(|n| n == "wgpu"));
+    assert_free_of("raster", &["osmesa", "glow"]);
 }

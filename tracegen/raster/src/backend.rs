@@ -1,16 +1,17 @@
 //! The interface between the capture and the drivers.
 
+use super::batches::Plan;
 use super::draws::DrawList;
 use super::error::RasterError;
 use super::frame::Frame;
+use super::lavapipe::Lavapipe;
 pub use super::view::{Fragments, View};
-use formats::view::Lens;
 use record::{Captured, Region, Sink};
-use scene::{Scene, TextureSlot};
+use scene::Scene;
 use std::time::Duration;
 
 /// What is recorded of a region, and the sink of the records.
-pub struct Recording<'s, 't> {
+pub struct RecordRequest<'s, 't> {
     /// Which fragments are recorded.
     pub fragments: Fragments,
     /// Draws the picture as well. Otherwise the layer's colour is unchanged.
@@ -71,6 +72,25 @@ pub struct Work {
     pub pipelines: u64,
     /// Samplers made.
     pub samplers: u64,
+}
+
+impl Work {
+    /// Adds the draws of a render pass. `mesh_counts` returns a mesh's vertices and triangles.
+    pub fn add_draws(
+        &mut self,
+        draws: &DrawList,
+        plan: &Plan,
+        mesh_counts: impl Fn(usize) -> [u32; 2],
+    ) {
+        for (batch, _) in plan {
+            let instances = batch.range.len() as u64;
+            let [vertices, triangles] = mesh_counts(draws.calls[batch.draw as usize].mesh);
+            self.vertices += instances * u64::from(vertices);
+            self.triangles += instances * u64::from(triangles);
+            self.draws += instances;
+        }
+        self.calls += plan.len() as u64;
+    }
 }
 
 impl std::ops::Sub for Work {
@@ -139,73 +159,17 @@ pub trait CaptureBackend {
         draws: &DrawList,
         view: &View<'_>,
         region: Region,
-        recording: Option<Recording<'_, '_>>,
+        recording: Option<RecordRequest<'_, '_>>,
     ) -> Result<Captured, RasterError>;
-
-    /// Renders only the depth of a view's opaque and masked draws and reads it: row by row, 1 where
-    /// nothing was drawn.
-    ///
-    /// # Errors
-    /// Driver errors.
-    fn depth(&mut self, draws: &DrawList, view: &View<'_>) -> Result<Vec<f32>, RasterError>;
-
-    /// Draws everything, culled or not, and returns for each draw whether it is visible in a view.
-    /// A draw is visible if one of its fragments passes the depth test against the final depth (and
-    /// its alpha test).
-    ///
-    /// # Errors
-    /// Driver errors, and a device that cannot capture.
-    fn marks(
-        &mut self,
-        draws: &DrawList,
-        view: &View<'_>,
-        lens: &Lens,
-    ) -> Result<Vec<Marks>, RasterError>;
-
-    /// Renders a view's opaque and masked draws with the filtered texels of the materials' textures in
-    /// `slot` in place of colour.
-    ///
-    /// # Errors
-    /// Driver errors, and a backend that has no such pictures.
-    fn texels(
-        &mut self,
-        _draws: &DrawList,
-        _view: &View<'_>,
-        _slot: TextureSlot,
-    ) -> Result<Texels, RasterError> {
-        Err(RasterError::Unsupported {
-            driver: self.driver().to_owned(),
-            what: "pictures of texels".into(),
-        })
-    }
-
-    /// Defect of the driver's multiview; `None` if it works.
-    ///
-    /// # Errors
-    /// Driver errors.
-    fn multiview_defect(&mut self) -> Result<Option<String>, RasterError>;
-
-    /// Renders the left and the right layer, whole and of equal size, with one list of draws for
-    /// both: in one submission if the driver's multiview is sound, or else one by one. [`Work`]
-    /// counts one submission either way.
-    ///
-    /// # Errors
-    /// Driver errors.
-    fn render_both(&mut self, draws: &DrawList, views: [&View<'_>; 2]) -> Result<(), RasterError>;
-
-    /// Creates the targets of the frame's layers that differ from the last frame's. The same
-    /// techniques reuse memory and masks from frame to frame.
-    ///
-    /// # Errors
-    /// Driver errors.
-    fn prepare(&mut self, frame: &Frame) -> Result<(), RasterError>;
 
     /// Composes the frame's pictures from its layers, all of whose regions have been rendered.
     /// Pictures that are single layers need no composition.
     ///
     /// # Errors
     /// Driver errors.
-    fn compose(&mut self, frame: &Frame) -> Result<(), RasterError>;
+    fn compose(&mut self, _frame: &Frame) -> Result<(), RasterError> {
+        Ok(())
+    }
 
     /// Reads the depth in a layer's target: row by row, 1 where nothing was drawn.
     ///
@@ -218,4 +182,23 @@ pub trait CaptureBackend {
     /// # Errors
     /// Driver errors.
     fn picture(&mut self, frame: &Frame, number: usize) -> Result<Vec<u8>, RasterError>;
+
+    /// The only backend that draws with techniques; `None` for others.
+    fn lavapipe(&mut self) -> Option<&mut Lavapipe> {
+        None
+    }
+}
+
+impl dyn CaptureBackend + '_ {
+    /// The backend, if it draws with techniques.
+    ///
+    /// # Errors
+    /// A backend that captures only plain frames.
+    pub fn for_technique(&mut self, what: &str) -> Result<&mut Lavapipe, RasterError> {
+        let driver = self.driver().to_owned();
+        self.lavapipe().ok_or_else(|| RasterError::Unsupported {
+            driver,
+            what: what.to_owned(),
+        })
+    }
 }

@@ -1,16 +1,38 @@
 //! Draws that share one instanced draw call.
 
 use crate::draws::DrawList;
-use crate::roles::{Purpose, roles};
+use crate::roles::{MaterialState, PipelineKey, Purpose, roles};
 use std::ops::Range;
 
 /// Consecutive draws of a list with the same mesh, material and roles.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Batch {
+pub struct Batch {
     /// The first draw.
     pub draw: u32,
     /// Positions of the draws in the list.
     pub range: Range<u32>,
+}
+
+/// The draw calls of a render pass in order, each with the key of its pipeline.
+pub type Plan = Vec<(Batch, PipelineKey)>;
+
+/// Plans a render pass over `visible` (indices into the draw list).
+pub fn plan(
+    draws: &DrawList,
+    materials: &[MaterialState],
+    visible: &[u32],
+    purpose: Purpose,
+) -> Plan {
+    let mut plan = Vec::new();
+    for batch in batches(draws, visible, purpose) {
+        let call = &draws.calls[batch.draw as usize];
+        let material = &materials[call.material];
+        for &role in roles(call.mode, purpose) {
+            let key = PipelineKey::new(call, material, role, purpose, draws.cascades);
+            plan.push((batch.clone(), key));
+        }
+    }
+    plan
 }
 
 /// Splits `visible` (indices into the draw list) into batches. Draws without a role are left out.
@@ -18,7 +40,7 @@ pub(crate) struct Batch {
 /// The order is kept and instances are drawn in order, so that depth test and blending have the
 /// same result as draw by draw. A draw with two roles has its own batch, because its second role
 /// writes the depth against which the next draw's first role is tested.
-pub(crate) fn batches(draws: &DrawList, visible: &[u32], purpose: Purpose) -> Vec<Batch> {
+fn batches(draws: &DrawList, visible: &[u32], purpose: Purpose) -> Vec<Batch> {
     let mut found: Vec<Batch> = Vec::new();
     for (position, &draw) in (0..).zip(visible) {
         let call = &draws.calls[draw as usize];

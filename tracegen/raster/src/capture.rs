@@ -1,6 +1,6 @@
 //! Captures the frames of a scene into a trace.
 
-use super::backend::{CaptureBackend, Fragments, Recording, View};
+use super::backend::{CaptureBackend, Fragments, RecordRequest, View};
 use super::cascades;
 use super::draws::{DrawCall, DrawList, DrawMode};
 use super::error::RasterError;
@@ -172,7 +172,7 @@ impl CaptureJob<'_> {
                     .map(|axis: usize| (layer.size_px[axis] - origin_px[axis]).min(TILE_SIZE_PX)),
             };
             backend.render(self.draws, &view, tile, None)?;
-            let recording = Recording {
+            let recording = RecordRequest {
                 fragments: self.fragments,
                 picture: self.shaded,
                 sink: &mut |_| Ok(()),
@@ -199,7 +199,7 @@ impl CaptureJob<'_> {
     ) -> Result<(), RasterError> {
         let views: Vec<View<'_>> = frame.views().collect();
         if let ([left, right], true) = (&views[..], self.draws_both_at_once(frame)) {
-            return backend.render_both(self.draws, [left, right]);
+            return (backend.for_technique("multiview")?).render_both(self.draws, [left, right]);
         }
         for view in &views {
             let whole = Region {
@@ -374,7 +374,7 @@ impl Capturer for ViewCapturer<'_> {
             visible: &touching,
             ..self.view
         };
-        let recording = Recording {
+        let recording = RecordRequest {
             fragments: self.fragments,
             picture: self.picture,
             sink,

@@ -25,20 +25,6 @@ pub enum RasterError {
     /// A driver that is installed but does not start, with the reason.
     #[error("lavapipe (Mesa's CPU Vulkan driver) is installed and does not start: {0}")]
     NotLoaded(String),
-    /// OSMesa is missing: the name of the file, and the loader's message.
-    #[error(
-        "{0} (OSMesa, Mesa without a window) cannot be loaded: {1}; install it with: apt-get install libosmesa6 (Mesa 25.1 and later have none)"
-    )]
-    NoLibrary(&'static str, String),
-    /// A driver that the program is built without.
-    #[cfg(not(feature = "osmesa"))]
-    #[error(
-        "this program is built without the driver {0}; `make build` builds it with all drivers"
-    )]
-    NotBuilt(&'static str),
-    /// Neither of the drivers that can capture is available.
-    #[error("{0}; nor OSMesa: {1}")]
-    NoBackend(Box<RasterError>, Box<RasterError>),
     /// No adapter with that name.
     #[error("no adapter '{wanted}': expected a part of one of these names: {known}")]
     NoAdapter {

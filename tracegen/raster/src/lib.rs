@@ -9,12 +9,12 @@
 //! not depend on a sort by distance, which differs between the eyes.
 
 pub mod backend;
-mod batches;
+pub mod batches;
 pub mod capture;
 pub mod cascades;
+pub mod culling_truth;
 mod distant;
 pub mod draws;
-pub mod drivers;
 pub mod error;
 pub mod frame;
 pub mod geometry;
@@ -22,15 +22,10 @@ mod groups;
 pub mod lavapipe;
 pub mod lighting;
 mod occlude;
-#[cfg(feature = "osmesa")]
-mod osmesa;
-mod roles;
+pub mod roles;
 mod seen;
-mod shader;
+pub mod shader;
 mod skips;
-pub mod truth;
-mod uniforms;
-mod vertices;
+pub mod uniforms;
+pub mod vertices;
 mod view;
-
-pub use vertices::VERTEX_STRIDE;

@@ -22,6 +22,7 @@ impl CaptureJob<'_> {
         occlusion: &mut Occlusion,
     ) -> Result<(), RasterError> {
         let start = Instant::now();
+        let backend = backend.for_technique("depth for occlusion culling")?;
         for number in 0..frame.plan.layers.len() {
             let first = occlusion.first(number, &frame.visible[number]);
             let (depth, clip_from_world) = {

@@ -1,14 +1,14 @@
 //! Roles of a draw in each render pass, and the keys of their pipelines.
 
 use crate::backend::Fragments;
-use crate::backend::Recording;
+use crate::backend::RecordRequest;
 use crate::draws::{DrawCall, DrawMode};
 use crate::groups::MaterialGroups;
 use scene::Material;
 
 /// Role of a draw in a render pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Role {
+pub enum Role {
     /// Colour and depth with forced early depth test.
     Opaque,
     /// Colour blended over earlier draws; depth tested early, not written.
@@ -111,7 +111,7 @@ impl Role {
 
 /// Purpose of a render pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Purpose {
+pub enum Purpose {
     /// Only the picture.
     Plain,
     /// The picture and the records.
@@ -134,7 +134,7 @@ pub(crate) enum Purpose {
 
 impl Purpose {
     /// The render passes over a region, in order.
-    pub fn of(recording: Option<&Recording<'_, '_>>) -> &'static [Self] {
+    pub fn of(recording: Option<&RecordRequest<'_, '_>>) -> &'static [Self] {
         match recording.map(|recording| (recording.fragments, recording.picture)) {
             None => &[Self::Plain],
             Some((Fragments::DepthTested, true)) => &[Self::Capture],
@@ -154,7 +154,7 @@ impl Purpose {
 }
 
 /// Roles of a draw, in order.
-pub(crate) fn roles(mode: DrawMode, purpose: Purpose) -> &'static [Role] {
+pub fn roles(mode: DrawMode, purpose: Purpose) -> &'static [Role] {
     match (mode, purpose) {
         (DrawMode::Opaque, Purpose::Plain | Purpose::Capture) => &[Role::Opaque],
         (DrawMode::Blended, Purpose::Plain | Purpose::Capture) => &[Role::Blended],
@@ -182,13 +182,14 @@ pub(crate) fn roles(mode: DrawMode, purpose: Purpose) -> &'static [Role] {
 
 /// Draw state of a material.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct MaterialState {
+pub struct MaterialState {
     double_sided: bool,
     textures: u32,
     leaders: u32,
 }
 
 impl MaterialState {
+    /// The state of a material with its groups of textures.
     pub fn new(material: &Material, groups: &MaterialGroups) -> Self {
         Self {
             double_sided: material.double_sided,
@@ -200,7 +201,7 @@ impl MaterialState {
 
 /// Key of a pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct PipelineKey {
+pub struct PipelineKey {
     /// Role of the draw.
     pub role: Role,
     /// Records are written.

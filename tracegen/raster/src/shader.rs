@@ -8,7 +8,7 @@ use record::RECORD_BYTES;
 use scene::TextureSlot;
 
 /// Bindings of group 0.
-pub(crate) const VIEW_BINDINGS: [&str; 7] = [
+pub const VIEW_BINDINGS: [&str; 7] = [
     "VIEW",
     "INSTANCES",
     "COUNTER",
@@ -18,17 +18,17 @@ pub(crate) const VIEW_BINDINGS: [&str; 7] = [
     "DEPTHS",
 ];
 /// Binding of the material's uniforms in group 1.
-pub(crate) const MATERIAL_BINDING: u32 = 0;
+pub const MATERIAL_BINDING: u32 = 0;
 /// First of the material's texture bindings in group 1, in the order of [`TextureSlot::ALL`].
-pub(crate) const TEXTURES_BINDING: u32 = 1;
+pub const TEXTURES_BINDING: u32 = 1;
 /// First of the sampler bindings in group 1, in the order of the textures.
-pub(crate) const SAMPLERS_BINDING: u32 = TEXTURES_BINDING + TextureSlot::COUNT as u32;
+pub const SAMPLERS_BINDING: u32 = TEXTURES_BINDING + TextureSlot::COUNT as u32;
 /// Binding of the copy that alpha tests sample in group 1, if there are copies.
-pub(crate) const ALPHA_BINDING: u32 = SAMPLERS_BINDING + TextureSlot::COUNT as u32;
+pub const ALPHA_BINDING: u32 = SAMPLERS_BINDING + TextureSlot::COUNT as u32;
 
 /// Source of alpha tests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum AlphaSource {
+pub enum AlphaSource {
     /// The base colour.
     Color,
     /// A copy of its alpha.
@@ -46,7 +46,7 @@ impl AlphaSource {
 
 /// How fragments are recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Granularity {
+pub enum Granularity {
     /// Not recorded, on devices that cannot capture.
     None,
     /// Quad by quad.
@@ -54,7 +54,6 @@ pub(crate) enum Granularity {
     /// One by one, for merging into quads: see [`record::Merged`].
     Fragments,
     /// One by one, with primitives numbered by unshared vertices.
-    #[cfg_attr(not(feature = "osmesa"), expect(dead_code))]
     NumberedFragments,
 }
 
@@ -87,7 +86,7 @@ impl Granularity {
 }
 
 /// The whole WGSL module, with the recording code.
-pub(crate) fn source(granularity: Granularity, alpha: AlphaSource) -> String {
+pub fn source(granularity: Granularity, alpha: AlphaSource) -> String {
     let mut text = String::new();
     if granularity.by_index() {
         text += "enable primitive_index;\n\n";
@@ -200,7 +199,7 @@ fn texels() -> String {
 
 /// The module for pictures of two views. The view is selected by the view index that each entry
 /// point receives.
-pub(crate) fn of_two_views() -> String {
+pub fn of_two_views() -> String {
     let one = source(Granularity::None, AlphaSource::Color);
     let declaration = "var<uniform> view: View;";
     let two = "var<uniform> views: array<View, 2>;\nvar<private> view_number: u32;";

@@ -7,12 +7,12 @@ use glam::{Mat4, Vec3, Vec4};
 use scene::{AlphaMode, Material, TextureSlot};
 
 /// Number of shadow cascades in the shader.
-pub(crate) const MAX_CASCADES: usize = 4;
+pub const MAX_CASCADES: usize = 4;
 
 /// The shader's `View`.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-pub(crate) struct ViewData {
+pub struct ViewData {
     clip_from_world: [[f32; 4]; 4],
     world_from_clip: [[f32; 4]; 4],
     eye: [f32; 4],
@@ -93,7 +93,7 @@ fn clip_to_uv() -> Mat4 {
 /// The shader's `Material`.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-pub(crate) struct MaterialData {
+pub struct MaterialData {
     base_color: [f32; 4],
     emissive: [f32; 4],
     specular: [f32; 4],
@@ -102,6 +102,7 @@ pub(crate) struct MaterialData {
 }
 
 impl MaterialData {
+    /// The data of a material.
     pub fn new(material: &Material) -> Self {
         let mut uv_rows = [[0.0; 4]; 2 * TextureSlot::COUNT];
         for (slot, t) in material.textures.iter() {

@@ -7,7 +7,7 @@ use scene::Mesh;
 /// Interleaved vertex of the shader's `Vertex`.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-pub(crate) struct VertexData {
+pub struct VertexData {
     position: [f32; 3],
     normal: [f32; 3],
     tangent: [f32; 4],
@@ -20,7 +20,7 @@ pub const VERTEX_STRIDE: u64 = size_of::<VertexData>() as u64;
 /// The shader's `Instance`.
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-pub(crate) struct InstanceData {
+pub struct InstanceData {
     world_from_object: [[f32; 4]; 4],
     normal_from_object: [[f32; 4]; 4],
 }
@@ -47,7 +47,7 @@ impl InstanceData {
 }
 
 /// Interleaves a mesh's vertices. Missing attributes get defaults.
-pub(crate) fn pack(mesh: &Mesh) -> Vec<VertexData> {
+pub fn pack(mesh: &Mesh) -> Vec<VertexData> {
     let at2 = |set: &[glam::Vec2], i: usize| set.get(i).copied().unwrap_or_default();
     mesh.positions
         .iter()
@@ -75,13 +75,13 @@ pub(crate) fn pack(mesh: &Mesh) -> Vec<VertexData> {
 }
 
 /// Colour of a vertex, 16 bits per channel.
-pub(crate) type ColorData = [u16; 4];
+pub type ColorData = [u16; 4];
 
 /// Bytes between two colours.
-pub(crate) const COLOR_STRIDE: u64 = size_of::<ColorData>() as u64;
+pub const COLOR_STRIDE: u64 = size_of::<ColorData>() as u64;
 
 /// The mesh's vertex colours, if it has any.
-pub(crate) fn pack_colors(mesh: &Mesh) -> Vec<ColorData> {
+pub fn pack_colors(mesh: &Mesh) -> Vec<ColorData> {
     if mesh.colors.is_empty() {
         return Vec::new();
     }
@@ -92,7 +92,7 @@ pub(crate) fn pack_colors(mesh: &Mesh) -> Vec<ColorData> {
 }
 
 /// One row per draw, at least one.
-pub(crate) fn instances(draws: &DrawList) -> Vec<InstanceData> {
+pub fn instances(draws: &DrawList) -> Vec<InstanceData> {
     let mut rows: Vec<InstanceData> = (0_u32..)
         .zip(&draws.calls)
         .map(|(draw, call)| InstanceData::new(draw, call))

@@ -44,7 +44,7 @@ pub fn prepare_textures(
 pub fn warn_of_multiview_defect(
     backend: &mut dyn CaptureBackend,
 ) -> anyhow::Result<Option<String>> {
-    let defect = backend.multiview_defect()?;
+    let defect = backend.for_technique("multiview")?.multiview_defect()?;
     if let Some(defect) = &defect {
         shell::warn(&format!(
             "multiview cannot be trusted, so views are drawn one by one: {defect}"

@@ -5,6 +5,7 @@ pub mod app;
 mod cache_args;
 mod capture_steps;
 mod choice;
+mod drivers;
 #[cfg(feature = "programs")]
 mod failed_run;
 mod file_uses;

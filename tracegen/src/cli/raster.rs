@@ -1,12 +1,12 @@
 //! `tracegen raster`.
 
 use super::capture_steps::prepare_environment;
+use super::drivers::Driver;
 use super::raster_args::RasterArgs;
 use super::raster_auto::{self, Techniques};
 use super::raster_frames;
 use super::scene_args::capture_outputs;
 use raster::backend::Fragments;
-use raster::drivers::Driver;
 use std::path::PathBuf;
 
 /// Runs `tracegen raster`.

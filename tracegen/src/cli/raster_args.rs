@@ -2,6 +2,7 @@
 
 use super::cache_args::CacheArgs;
 use super::choice::choice;
+use super::drivers::Driver;
 use super::objective_args::ObjectiveArgs;
 use super::path_args::{PathArgs, frame_count};
 use super::scene_args::SceneArgs;
@@ -14,7 +15,6 @@ use clap::builder::TypedValueParser;
 use formats::textrace::Encoding;
 use formats::view::Eye;
 use raster::backend::Fragments;
-use raster::drivers::Driver;
 use shell::Threads;
 use std::path::PathBuf;
 use techniques::skips::Skip;

@@ -3,6 +3,7 @@
 use super::capture_steps::{
     TraceOutput, cascades, load, prepare_textures, tables, warn_of_multiview_defect,
 };
+use super::drivers::Opened;
 use super::prepared::world;
 use super::raster_args::RasterArgs;
 use super::raster_summary::{DoubtfulTriangles, Summary, worked_since};
@@ -14,7 +15,6 @@ use formats::textrace::Pass;
 use formats::view::FrameViews;
 use raster::backend::{CaptureBackend, Fragments};
 use raster::capture::{CaptureJob, CapturedFrame, Pictures};
-use raster::drivers::Opened;
 use raster::frame::Frame;
 use shell::{Output, Progress, note};
 use std::collections::BTreeSet;

@@ -14,7 +14,7 @@ use formats::textrace::{Pass, Textrace, TextraceWriter};
 use formats::view::{Eye, Lens};
 use lab::verify::frame::{CaptureUnderTest, FrameUnderTest, TileChoice, Verified};
 use lab::verify::report::Report;
-use raster::backend::{CaptureBackend, Texels};
+use raster::backend::Texels;
 use raster::capture::CaptureJob;
 use raster::lavapipe::Lavapipe;
 use scene::{LoadOptions, TextureSlot, TextureSlots};

@@ -4,8 +4,8 @@
 use formats::footprint::{SamplingOptions, record_footprints};
 use formats::layout::{Layout, LayoutConfig};
 use formats::textrace::{Textrace, Tile, with_operands};
-use raster::VERTEX_STRIDE;
 use raster::backend::Work;
+use raster::vertices::VERTEX_STRIDE;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::ops::AddAssign;

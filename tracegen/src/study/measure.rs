@@ -8,8 +8,8 @@ use super::timing::{CULL, Extent, median_s, time};
 use super::world::{Shot, Tracer, World};
 use formats::textrace::{Encoding, Textrace, TextraceWriter};
 use raster::backend::Marks;
+use raster::culling_truth::Wrong;
 use raster::lavapipe::Lavapipe;
-use raster::truth::Wrong;
 use record::CaptureCounts;
 use shell::Progress;
 use std::collections::hash_map::Entry;
@@ -178,7 +178,7 @@ impl Bench<'_> {
         let job = self.world.job(&planner);
         let truth = match self.truth.entry(number) {
             Entry::Occupied(known) => known.into_mut(),
-            Entry::Vacant(open) => open.insert(job.truth(self.backend, &shot.frame)?),
+            Entry::Vacant(open) => open.insert(job.culling_truth(self.backend, &shot.frame)?),
         };
         let mut wrong = Wrong::default();
         for judgement in job.judge_against(&shot.frame, truth) {

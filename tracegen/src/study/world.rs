@@ -9,6 +9,7 @@ use raster::capture::{CaptureJob, CapturedFrame, Pictures};
 use raster::draws::DrawList;
 use raster::error::RasterError;
 use raster::frame::Frame;
+use raster::lavapipe::Lavapipe;
 use raster::lighting::Lighting;
 use record::Recorder;
 use scene::paths::Moments;
@@ -184,7 +185,7 @@ impl World {
     /// Driver errors, or eyes that the culling technique does not support.
     pub fn shoot(
         &mut self,
-        backend: &mut dyn CaptureBackend,
+        backend: &mut Lavapipe,
         planner: &Planner,
         number: u32,
         memory: &mut Occlusion,

@@ -5,10 +5,10 @@ use formats::view::{FrameViews, Hmd, Lens};
 use glam::{Affine3A, Quat, Vec3};
 use raster::backend::{CaptureBackend, Marks};
 use raster::capture::{CaptureJob, Pictures};
+use raster::culling_truth::Judgement;
 use raster::draws::{DrawList, DrawMode};
 use raster::frame::Frame;
 use raster::lavapipe::Lavapipe;
-use raster::truth::Judgement;
 use record::Region;
 use scene::{
     AlphaMode, Camera, Instance, LoadOptions, Scene, TextureSlot, TextureSlots, cameras, hmd,
@@ -132,7 +132,7 @@ fn every_mark_is_seen_in_the_depth_and_unmarked_draws_are_seen_nowhere() {
     let job = job(&scene, &draws, &planner);
     let views = frames(&scene.cameras[0], &hmd, 1).remove(0);
     let frame = job.frame(&views).unwrap();
-    let truth = job.truth(&mut backend, &frame).unwrap();
+    let truth = job.culling_truth(&mut backend, &frame).unwrap();
     let every: Vec<u32> = (0..draws.calls.len() as u32).collect();
     let whole = Region {
         origin_px: [0, 0],
@@ -298,7 +298,7 @@ fn judge_scene(spec: &str, camera: Option<&str>, count: u32) {
         let everything = job(&scene, &draws, &none);
         let truth = {
             let frame = everything.frame(&views).unwrap();
-            everything.truth(&mut backend, &frame).unwrap()
+            everything.culling_truth(&mut backend, &frame).unwrap()
         };
         seen += (truth.iter().flatten())
             .filter(|marks| marks.picture)

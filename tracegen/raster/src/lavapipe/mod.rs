@@ -17,23 +17,22 @@ mod upload;
 mod visible;
 mod whole;
 
-use super::backend::{CaptureBackend, Fragments, Marks, Recording, Texels, View, Work};
-use super::batches::{Batch, batches};
+use super::backend::{CaptureBackend, Fragments, RecordRequest, View, Work};
+use super::batches::{self, Batch, Plan};
 use super::draws::{DrawList, DrawMode};
 use super::error::RasterError;
 use super::frame::Frame;
-use super::roles::{MaterialState, PipelineKey, Purpose, roles};
+use super::roles::{MaterialState, PipelineKey, Purpose};
 use super::shader::{AlphaSource, Granularity, VIEW_BINDINGS};
 use super::uniforms::ViewData;
 use compose::Composer;
 use device::Gpu;
-use formats::view::Lens;
 use multiview::{Multiview, Trust};
 use pipelines::Pipelines;
 use readback::Readback;
 use record::{Captured, DEPTH_BYTES, Merged, RECORD_BYTES, RawRecords, Region};
 use records::RecordBuffers;
-use scene::{Scene, TextureSlot};
+use scene::Scene;
 use starts::{Drawn, Starts};
 use std::sync::Arc;
 use std::time::Instant;
@@ -204,6 +203,18 @@ impl Lavapipe {
         target.clear(gpu)
     }
 
+    /// Creates the targets of the frame's layers that differ from the last frame's. The same
+    /// techniques reuse memory and masks from frame to frame.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn prepare(&mut self, frame: &Frame) -> Result<(), RasterError> {
+        for view in frame.views() {
+            self.prepare_target(&view)?;
+        }
+        self.gpu.wait("preparing the targets")
+    }
+
     /// Batches a list of draws and creates the missing pipelines. The list stays in the instance
     /// buffer until the next plan's submission.
     fn plan(
@@ -211,24 +222,15 @@ impl Lavapipe {
         draws: &DrawList,
         visible: &[u32],
         purpose: Purpose,
-    ) -> Result<Vec<(Batch, PipelineKey)>, RasterError> {
-        let mut plan = Vec::new();
-        for batch in batches(draws, visible, purpose) {
-            let call = &draws.calls[batch.draw as usize];
-            let material = &self.materials[call.material];
-            for &role in roles(call.mode, purpose) {
-                let key = PipelineKey::new(call, material, role, purpose, draws.cascades);
-                self.pipelines.prepare(&self.gpu, key)?;
-                let instances = u64::from(batch.range.end - batch.range.start);
-                if let Some(mesh) = &self.scene.meshes[call.mesh] {
-                    self.work.vertices += instances * u64::from(mesh.vertex_count);
-                    self.work.triangles += instances * u64::from(mesh.index_count / 3);
-                }
-                self.work.draws += instances;
-                self.work.calls += 1;
-                plan.push((batch.clone(), key));
-            }
+    ) -> Result<Plan, RasterError> {
+        let plan = batches::plan(draws, &self.materials, visible, purpose);
+        for (_, key) in &plan {
+            self.pipelines.prepare(&self.gpu, *key)?;
         }
+        let meshes = &self.scene.meshes;
+        self.work.add_draws(draws, &plan, |mesh| {
+            (meshes[mesh].as_ref()).map_or([0; 2], |m| [m.vertex_count, m.index_count / 3])
+        });
         self.gpu
             .queue
             .write_buffer(&self.scene.instance_draws, 0, bytemuck::cast_slice(visible));
@@ -297,12 +299,7 @@ impl Lavapipe {
     }
 
     /// Encodes a plan and sets only the state that changes.
-    fn issue(
-        &self,
-        pass: &mut wgpu::RenderPass<'_>,
-        draws: &DrawList,
-        plan: &[(Batch, PipelineKey)],
-    ) {
+    fn issue(&self, pass: &mut wgpu::RenderPass<'_>, draws: &DrawList, plan: &Plan) {
         let mut last = None;
         pass.set_vertex_buffer(1, self.scene.instance_draws.slice(..));
         for (batch, key) in plan {
@@ -363,7 +360,7 @@ impl State {
 }
 
 /// Number of state changes of a plan.
-fn state_changes(draws: &DrawList, plan: &[(Batch, PipelineKey)]) -> u64 {
+fn state_changes(draws: &DrawList, plan: &Plan) -> u64 {
     let mut last = None;
     let changes = plan.iter().map(|(batch, key)| {
         let state = State::new(draws, batch, *key);
@@ -455,7 +452,7 @@ impl CaptureBackend for Lavapipe {
         draws: &DrawList,
         view: &View<'_>,
         region: Region,
-        recording: Option<Recording<'_, '_>>,
+        recording: Option<RecordRequest<'_, '_>>,
     ) -> Result<Captured, RasterError> {
         if let (Some(_), Some(what)) = (&recording, &self.gpu.no_capture) {
             return Err(RasterError::Unsupported {
@@ -497,7 +494,7 @@ impl CaptureBackend for Lavapipe {
         self.work.state_changes += (plans.iter())
             .map(|(_, plan)| state_changes(draws, plan))
             .sum::<u64>();
-        let Some(Recording {
+        let Some(RecordRequest {
             fragments, sink, ..
         }) = recording
         else {
@@ -542,43 +539,6 @@ impl CaptureBackend for Lavapipe {
 
     fn records_fragments_because(&self) -> Option<&str> {
         self.gpu.by_fragment.as_deref()
-    }
-
-    fn multiview_defect(&mut self) -> Result<Option<String>, RasterError> {
-        self.find_multiview_defect()
-    }
-
-    fn render_both(&mut self, draws: &DrawList, views: [&View<'_>; 2]) -> Result<(), RasterError> {
-        self.draw_both(draws, views)
-    }
-
-    fn depth(&mut self, draws: &DrawList, view: &View<'_>) -> Result<Vec<f32>, RasterError> {
-        self.read_depth(draws, view)
-    }
-
-    fn marks(
-        &mut self,
-        draws: &DrawList,
-        view: &View<'_>,
-        lens: &Lens,
-    ) -> Result<Vec<Marks>, RasterError> {
-        self.read_marks(draws, view, lens)
-    }
-
-    fn texels(
-        &mut self,
-        draws: &DrawList,
-        view: &View<'_>,
-        slot: TextureSlot,
-    ) -> Result<Texels, RasterError> {
-        self.read_texels(draws, view, slot)
-    }
-
-    fn prepare(&mut self, frame: &Frame) -> Result<(), RasterError> {
-        for view in frame.views() {
-            self.prepare_target(&view)?;
-        }
-        self.gpu.wait("preparing the targets")
     }
 
     fn compose(&mut self, frame: &Frame) -> Result<(), RasterError> {
@@ -630,6 +590,10 @@ impl CaptureBackend for Lavapipe {
                 })?,
         };
         self.readback.texels(&self.gpu, picture.view.texture())
+    }
+
+    fn lavapipe(&mut self) -> Option<&mut Lavapipe> {
+        Some(self)
     }
 }
 

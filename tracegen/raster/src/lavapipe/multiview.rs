@@ -46,8 +46,12 @@ pub enum Trust {
 }
 
 impl Lavapipe {
-    /// Draws the test scene with both methods on first use.
-    pub(super) fn find_multiview_defect(&mut self) -> Result<Option<String>, RasterError> {
+    /// Defect of the driver's multiview; `None` if it works. Draws the test scene with both methods
+    /// on first use.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn multiview_defect(&mut self) -> Result<Option<String>, RasterError> {
         if let Trust::Unknown = self.multiview_trust {
             self.multiview_trust = if self.gpu.has_multiview {
                 match differing_px(&self.gpu)? {
@@ -68,8 +72,13 @@ impl Lavapipe {
         })
     }
 
-    /// See [`CaptureBackend::render_both`].
-    pub(super) fn draw_both(
+    /// Renders the left and the right layer, whole and of equal size, with one list of draws for
+    /// both: in one submission if the driver's multiview is sound, or else one by one.
+    /// [`crate::backend::Work`] counts one submission either way.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn render_both(
         &mut self,
         draws: &DrawList,
         views: [&View<'_>; 2],
@@ -80,7 +89,7 @@ impl Lavapipe {
             ..*view
         });
         let mut at_once = None;
-        if self.find_multiview_defect()?.is_none() {
+        if self.multiview_defect()?.is_none() {
             self.draw_at_once(draws, &both)?;
             if let Trust::Sound = self.multiview_trust {
                 return Ok(());

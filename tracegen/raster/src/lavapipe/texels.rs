@@ -11,8 +11,12 @@ use crate::uniforms::ViewData;
 use scene::TextureSlot;
 
 impl Lavapipe {
-    /// See [`crate::backend::CaptureBackend::texels`].
-    pub(super) fn read_texels(
+    /// Renders a view's opaque and masked draws with the filtered texels of the materials' textures in
+    /// `slot` in place of colour.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn texels(
         &mut self,
         draws: &DrawList,
         view: &View<'_>,

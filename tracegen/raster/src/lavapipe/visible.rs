@@ -12,12 +12,12 @@ use formats::view::Lens;
 use glam::Mat4;
 
 impl Lavapipe {
-    /// Depth of the view's opaque and masked draws, row by row.
-    pub(super) fn read_depth(
-        &mut self,
-        draws: &DrawList,
-        view: &View<'_>,
-    ) -> Result<Vec<f32>, RasterError> {
+    /// Renders only the depth of a view's opaque and masked draws and reads it: row by row, 0 where
+    /// nothing was drawn.
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn depth(&mut self, draws: &DrawList, view: &View<'_>) -> Result<Vec<f32>, RasterError> {
         let data = ViewData::of_eye(view, 0);
         (self.gpu.queue).write_buffer(&self.buffers.view_uniform, 0, bytemuck::bytes_of(&data));
         let depth = self.depth_texture(view);
@@ -25,8 +25,13 @@ impl Lavapipe {
         self.readback.texels(&self.gpu, &depth)
     }
 
-    /// Visibility of every draw, including draws that culling removed.
-    pub(super) fn read_marks(
+    /// Draws everything, culled or not, and returns for each draw whether it is visible in a view.
+    /// A draw is visible if one of its fragments passes the depth test against the final depth (and
+    /// its alpha test).
+    ///
+    /// # Errors
+    /// Driver errors, and a device that cannot capture.
+    pub fn marks(
         &mut self,
         draws: &DrawList,
         view: &View<'_>,

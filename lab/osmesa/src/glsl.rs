@@ -1,14 +1,14 @@
 //! The shader in GLSL, entry point by entry point.
 
-use crate::error::RasterError;
-use crate::shader::{
-    self, AlphaSource, Granularity, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING,
-    VIEW_BINDINGS,
-};
 use naga::ShaderStage;
 use naga::back::PipelineConstants;
 use naga::back::glsl::{Options, PipelineOptions, Version, Writer, WriterFlags};
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use raster::error::RasterError;
+use raster::shader::{
+    self, AlphaSource, Granularity, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING,
+    VIEW_BINDINGS,
+};
 use scene::TextureSlot;
 use std::collections::BTreeMap;
 

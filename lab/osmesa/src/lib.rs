@@ -11,17 +11,16 @@ mod programs;
 mod targets;
 mod upload;
 
-use crate::backend::{CaptureBackend, Fragments, Marks, Recording, View, Work};
-use crate::batches::{Batch, batches};
-use crate::draws::{DrawList, DrawMode};
-use crate::error::RasterError;
-use crate::frame::Frame;
-use crate::roles::{MaterialState, PipelineKey, Purpose, roles};
-use crate::shader::VIEW_BINDINGS;
-use crate::uniforms::ViewData;
-use formats::view::Lens;
 use gl::{Buffer, Gl, Vertices};
-use programs::{Pipeline, Programs};
+use programs::Programs;
+use raster::backend::{CaptureBackend, Fragments, RecordRequest, View, Work};
+use raster::batches::{self, Plan};
+use raster::draws::{DrawList, DrawMode};
+use raster::error::RasterError;
+use raster::frame::Frame;
+use raster::roles::{MaterialState, Purpose};
+use raster::shader::VIEW_BINDINGS;
+use raster::uniforms::ViewData;
 use record::{
     Captured, DEPTH_BYTES, Merged, RECORD_BYTES, RawDepth, RawRecord, RawRecords, Region,
 };
@@ -32,6 +31,19 @@ use techniques::Start;
 use techniques::plan::PictureSource;
 use textures::TextureSet;
 use upload::SceneObjects;
+
+/// Why OSMesa does not capture.
+#[derive(Debug, thiserror::Error)]
+pub enum OpenError {
+    /// The library is missing: the name of the file, and the loader's message.
+    #[error(
+        "{0} (OSMesa, Mesa without a window) cannot be loaded: {1}; install it with: apt-get install libosmesa6 (Mesa 25.1 and later have none)"
+    )]
+    NoLibrary(&'static str, String),
+    /// The library lacks a feature, or the driver failed.
+    #[error(transparent)]
+    Driver(#[from] RasterError),
+}
 
 /// The scene uploaded to OSMesa.
 pub struct Osmesa {
@@ -62,9 +74,6 @@ struct RecordBuffers {
     capacity: u32,
 }
 
-/// Draws of a render pass: their pipeline, material and mesh.
-type Plan = Vec<(Batch, Pipeline)>;
-
 impl Osmesa {
     /// Loads the library and uploads the scene. A region is split if its raw records exceed
     /// `record_budget_bytes`, capped by the driver's limit of a storage block.
@@ -76,7 +85,7 @@ impl Osmesa {
         draws: &DrawList,
         textures: &TextureSet,
         record_budget_bytes: u64,
-    ) -> Result<Self, RasterError> {
+    ) -> Result<Self, OpenError> {
         let gl = Gl::open()?;
         let limit = gl.limit(glow::MAX_SHADER_STORAGE_BLOCK_SIZE);
         let capacity = (record_budget_bytes.min(limit) / RECORD_BYTES).max(1);
@@ -138,24 +147,15 @@ impl Osmesa {
         visible: &[u32],
         purpose: Purpose,
     ) -> Result<Plan, RasterError> {
-        let mut plan = Vec::new();
-        for batch in batches(draws, visible, purpose) {
-            let call = &draws.calls[batch.draw as usize];
-            let material = &self.materials[call.material];
-            let instances = u64::from(batch.range.end - batch.range.start);
-            for &role in roles(call.mode, purpose) {
-                let key = PipelineKey::new(call, material, role, purpose, draws.cascades);
-                let pipeline = self.programs.get(&self.gl, &key)?;
-                if let Some(mesh) = &self.scene.meshes[call.mesh] {
-                    let count = mesh.vertices.count;
-                    self.work.vertices += instances * u64::from(count);
-                    self.work.triangles += instances * u64::from(count / 3);
-                }
-                self.work.draws += instances;
-                self.work.calls += 1;
-                plan.push((batch.clone(), pipeline));
-            }
+        let plan = batches::plan(draws, &self.materials, visible, purpose);
+        for (_, key) in &plan {
+            self.programs.prepare(&self.gl, key)?;
         }
+        let meshes = &self.scene.meshes;
+        self.work.add_draws(draws, &plan, |mesh| {
+            let vertices = meshes[mesh].as_ref().map_or(0, |m| m.vertices.count);
+            [vertices, vertices / 3]
+        });
         self.gl
             .write(self.scene.instance_draws, 0, bytemuck::cast_slice(visible));
         self.work.bytes_uploaded += size_of_val(visible) as u64;
@@ -185,10 +185,12 @@ impl Osmesa {
     /// Draws a plan.
     fn issue(&mut self, draws: &DrawList, plan: &Plan) {
         let mut material = None;
-        for (batch, pipeline) in plan {
+        for (batch, key) in plan {
             let call = &draws.calls[batch.draw as usize];
-            let Some(mesh) = &self.scene.meshes[call.mesh] else {
-                // Unreachable: every draw's mesh is uploaded.
+            let (Some(mesh), Some(pipeline)) =
+                (&self.scene.meshes[call.mesh], self.programs.get(key))
+            else {
+                // Unreachable: every draw's mesh is uploaded, and a plan prepares its pipelines.
                 continue;
             };
             pipeline.set(&self.gl);
@@ -212,7 +214,7 @@ impl Osmesa {
     }
 
     /// Passes the records to the sink.
-    fn hand_over(&self, recording: Recording<'_, '_>) -> Result<Captured, RasterError> {
+    fn hand_over(&self, recording: RecordRequest<'_, '_>) -> Result<Captured, RasterError> {
         let mut counted = [0_u32];
         self.gl
             .read(self.buffers.counter, bytemuck::cast_slice_mut(&mut counted));
@@ -276,7 +278,7 @@ impl CaptureBackend for Osmesa {
     }
 
     fn render_shadows(&mut self, draws: &DrawList, frame: &Frame) -> Result<(), RasterError> {
-        use crate::draws::SHADOW_SIZE;
+        use raster::draws::SHADOW_SIZE;
         let lighting = &frame.lighting;
         for (number, cascade) in lighting.cascades.iter().enumerate() {
             if !frame.cascades_seen[number] {
@@ -301,7 +303,7 @@ impl CaptureBackend for Osmesa {
         draws: &DrawList,
         view: &View<'_>,
         region: Region,
-        recording: Option<Recording<'_, '_>>,
+        recording: Option<RecordRequest<'_, '_>>,
     ) -> Result<Captured, RasterError> {
         if view.layer.mask.is_some() || view.layer.start != Start::Sky {
             return self.lacks("layers with masks, or that start with other layers");
@@ -328,44 +330,6 @@ impl CaptureBackend for Osmesa {
         self.work.submitting += submitted - start;
         self.work.waiting += submitted.elapsed();
         Ok(Captured::Complete)
-    }
-
-    fn depth(&mut self, _: &DrawList, _: &View<'_>) -> Result<Vec<f32>, RasterError> {
-        self.lacks("depth for occlusion culling")
-    }
-
-    fn marks(&mut self, _: &DrawList, _: &View<'_>, _: &Lens) -> Result<Vec<Marks>, RasterError> {
-        self.lacks("marks of visible draws")
-    }
-
-    fn multiview_defect(&mut self) -> Result<Option<String>, RasterError> {
-        Ok(Some("OSMesa has no multiview".to_owned()))
-    }
-
-    fn render_both(&mut self, draws: &DrawList, views: [&View<'_>; 2]) -> Result<(), RasterError> {
-        for view in views {
-            let whole = Region {
-                origin_px: [0, 0],
-                size_px: view.layer.size_px,
-            };
-            self.render(draws, view, whole, None)?;
-        }
-        Ok(())
-    }
-
-    fn prepare(&mut self, frame: &Frame) -> Result<(), RasterError> {
-        for view in frame.views() {
-            self.target(view.target, view.layer.size_px)?;
-        }
-        Ok(())
-    }
-
-    fn compose(&mut self, frame: &Frame) -> Result<(), RasterError> {
-        let is_layer = |picture: &PictureSource| matches!(picture, PictureSource::Layer(_));
-        if frame.plan.pictures.iter().all(is_layer) {
-            return Ok(());
-        }
-        self.lacks("pictures that are composed of layers")
     }
 
     fn layer_depth(&mut self, layer: usize) -> Result<Vec<f32>, RasterError> {

@@ -1,9 +1,10 @@
 //! Errors of culling, found by drawing everything.
 
-use super::backend::{CaptureBackend, Marks};
+use super::backend::Marks;
 use super::capture::CaptureJob;
 use super::error::RasterError;
 use super::frame::Frame;
+use super::lavapipe::Lavapipe;
 use std::ops::AddAssign;
 use techniques::Layer;
 
@@ -62,9 +63,9 @@ impl CaptureJob<'_> {
     ///
     /// # Errors
     /// Driver errors, and a device that cannot capture.
-    pub fn truth(
+    pub fn culling_truth(
         &self,
-        backend: &mut dyn CaptureBackend,
+        backend: &mut Lavapipe,
         frame: &Frame,
     ) -> Result<Vec<Vec<Marks>>, RasterError> {
         (self.planner.eyes().iter().zip(frame.rig.eyes()))
@@ -84,13 +85,13 @@ impl CaptureJob<'_> {
     /// Driver errors, and a device that cannot capture.
     pub fn judge(
         &self,
-        backend: &mut dyn CaptureBackend,
+        backend: &mut Lavapipe,
         frame: &Frame,
     ) -> Result<Vec<Judgement>, RasterError> {
-        Ok(self.judge_against(frame, &self.truth(backend, frame)?))
+        Ok(self.judge_against(frame, &self.culling_truth(backend, frame)?))
     }
 
-    /// Like [`Self::judge`], with the results of [`Self::truth`] for the frame's eyes.
+    /// Like [`Self::judge`], with the results of [`Self::culling_truth`] for the frame's eyes.
     pub fn judge_against(&self, frame: &Frame, truth: &[Vec<Marks>]) -> Vec<Judgement> {
         let judge = |(eye, visible): (_, &Vec<Marks>)| {
             let of_eye = |layer: &Layer| layer.eye.is_none() || layer.eye == Some(eye);

@@ -1,9 +1,10 @@
 //! Selection of the driver that captures.
 
-use crate::backend::CaptureBackend;
-use crate::draws::DrawList;
-use crate::error::RasterError;
-use crate::lavapipe::{Lavapipe, device};
+use anyhow::anyhow;
+use raster::backend::CaptureBackend;
+use raster::draws::DrawList;
+use raster::error::RasterError;
+use raster::lavapipe::{Lavapipe, device};
 use scene::Scene;
 use textures::TextureSet;
 
@@ -32,15 +33,17 @@ impl Driver {
         textures: &TextureSet,
         view_size_px: [u32; 2],
         record_budget_bytes: u64,
-    ) -> Result<Opened, RasterError> {
+    ) -> anyhow::Result<Opened> {
         let budget = record_budget_bytes;
-        let osmesa = || -> Result<Box<dyn CaptureBackend>, RasterError> {
+        let osmesa = || -> anyhow::Result<Box<dyn CaptureBackend>> {
             #[cfg(feature = "osmesa")]
-            return Ok(Box::new(crate::osmesa::Osmesa::new(
+            return Ok(Box::new(osmesa::Osmesa::new(
                 scene, draws, textures, budget,
             )?));
             #[cfg(not(feature = "osmesa"))]
-            Err(RasterError::NotBuilt("osmesa"))
+            anyhow::bail!(
+                "this program is built without the driver osmesa; `make build` builds it with all drivers"
+            )
         };
         let lavapipe = || -> Result<Box<dyn CaptureBackend>, RasterError> {
             let gpu = device::open(None)?;
@@ -70,12 +73,12 @@ pub struct Opened {
 /// The first driver or, if it is missing or lacks a feature, the second one with the reason.
 fn either<B>(
     first: Result<B, RasterError>,
-    second: impl FnOnce() -> Result<B, RasterError>,
-) -> Result<(B, Option<RasterError>), RasterError> {
+    second: impl FnOnce() -> anyhow::Result<B>,
+) -> anyhow::Result<(B, Option<RasterError>)> {
     match first {
         Err(error) if error.is_of_the_driver() => match second() {
             Ok(backend) => Ok((backend, Some(error))),
-            Err(other) => Err(RasterError::NoBackend(Box::new(error), Box::new(other))),
+            Err(other) => Err(anyhow!("{error}; nor OSMesa: {other}")),
         },
         first => Ok((first?, None)),
     }
@@ -94,9 +97,8 @@ mod tests {
 
     #[test]
     fn the_second_driver_replaces_one_that_lacks_a_feature_and_both_reasons_are_reported() {
-        let both = either::<()>(Err(lacking()), || {
-            Err(RasterError::NoLibrary("libOSMesa.so.8", "absent".into()))
-        });
+        let absent = || Err(anyhow!("libOSMesa.so.8 is absent"));
+        let both = either::<()>(Err(lacking()), absent);
         let error = both.expect_err("no driver at all").to_string();
         assert!(error.contains("PRIMITIVE_INDEX"), "{error}");
         assert!(error.contains("libOSMesa.so.8"), "{error}");
@@ -104,7 +106,7 @@ mod tests {
         let other = RasterError::Scene("inconsistent".into());
         let error = either::<()>(Err(other), || {
             tried = true;
-            Err(lacking())
+            absent()
         });
         assert!(error.is_err() && !tried, "another driver helps no scene");
         let (backend, instead_of) = either(Err(lacking()), || Ok("osmesa")).unwrap();

@@ -1,12 +1,12 @@
 //! The scene in the driver's memory: vertices that triangles do not share, textures, materials,
 //! instances.
 
-use super::gl::{Attribute, Buffer, Gl, Sampler, Texture, Vertices};
-use crate::draws::DrawList;
-use crate::error::RasterError;
-use crate::uniforms::MaterialData;
-use crate::vertices::{self, COLOR_STRIDE, InstanceData, VERTEX_STRIDE, VertexData};
+use crate::gl::{Attribute, Buffer, Gl, Sampler, Texture, Vertices};
 use formats::texture::{self, ColorSpace, Filter, MipFilter, TexelFormat, Wrap};
+use raster::draws::DrawList;
+use raster::error::RasterError;
+use raster::uniforms::MaterialData;
+use raster::vertices::{self, COLOR_STRIDE, InstanceData, VERTEX_STRIDE, VertexData};
 use scene::{Animation, Material, Mesh, Scene, TextureSlot};
 use textures::{CompressedTexture, TextureSet};
 

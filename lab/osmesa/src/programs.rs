@@ -1,10 +1,10 @@
 //! The programs for a scene's draws, all from one shader source.
 
-use super::gl::{Gl, Program, State};
-use super::glsl::Module;
-use crate::error::RasterError;
-use crate::roles::{PipelineKey, Role};
+use crate::gl::{Gl, Program, State};
+use crate::glsl::Module;
 use naga::ShaderStage::{Fragment, Vertex};
+use raster::error::RasterError;
+use raster::roles::{PipelineKey, Role};
 use std::collections::BTreeMap;
 
 /// A program with its depth test and blending.
@@ -58,13 +58,18 @@ impl Programs {
         })
     }
 
-    /// The pipeline of `key`, created on first use.
+    /// A prepared pipeline.
+    pub fn get(&self, key: &PipelineKey) -> Option<&Pipeline> {
+        self.made.get(key)
+    }
+
+    /// Creates the pipeline for `key` unless it exists.
     ///
     /// # Errors
     /// Driver and validation errors.
-    pub fn get(&mut self, gl: &Gl, key: &PipelineKey) -> Result<Pipeline, RasterError> {
-        if let Some(pipeline) = self.made.get(key) {
-            return Ok(*pipeline);
+    pub fn prepare(&mut self, gl: &Gl, key: &PipelineKey) -> Result<(), RasterError> {
+        if self.made.contains_key(key) {
+            return Ok(());
         }
         let constants = key.constants();
         let vertex = if key.colored {
@@ -81,7 +86,7 @@ impl Programs {
             state: state(key),
         };
         self.made.insert(*key, pipeline);
-        Ok(pipeline)
+        Ok(())
     }
 
     /// Number of programs created.

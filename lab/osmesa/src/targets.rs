@@ -1,8 +1,8 @@
 //! Targets of layers and shadow maps.
 
-use super::gl::{Framebuffer, Gl, Sampler, Texture};
-use crate::draws::SHADOW_SIZE;
-use crate::error::RasterError;
+use crate::gl::{Framebuffer, Gl, Sampler, Texture};
+use raster::draws::SHADOW_SIZE;
+use raster::error::RasterError;
 
 /// Most pixels along a view's edge: records hold 12 bits of quad column and row.
 const MAX_EDGE_PX: u64 = 8192;
