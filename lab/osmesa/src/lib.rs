@@ -22,7 +22,7 @@ use raster::roles::{MaterialState, Purpose};
 use raster::shader::VIEW_BINDINGS;
 use raster::uniforms::ViewData;
 use record::{
-    Captured, DEPTH_BYTES, Merged, RECORD_BYTES, RawDepth, RawRecord, RawRecords, Region,
+    Captured, DEPTH_BYTES, MergedQuads, RECORD_BYTES, RawDepth, RawRecord, RawRecords, Region,
 };
 use scene::Scene;
 use std::time::Instant;
@@ -240,7 +240,7 @@ impl Osmesa {
                 .read(self.buffers.depths, bytemuck::cast_slice_mut(&mut depths));
         }
         self.gl.check("reading the records")?;
-        let merged = Merged::new(RawRecords {
+        let merged = MergedQuads::new(RawRecords {
             quads: &quads,
             depths: &depths,
         });

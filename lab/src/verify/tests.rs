@@ -17,7 +17,7 @@ use raster::error::RasterError;
 use raster::frame::Skipped;
 use raster::lavapipe::{Lavapipe, device};
 use raster::lighting::Lighting;
-use record::CaptureCounts;
+use record::{CaptureCounts, Recorder};
 use scene::{AlphaMode, Camera, Image, Instance, Material, Mesh, Scene, TextureRef, cameras, hmd};
 use std::collections::BTreeSet;
 use techniques::layer::Predicted;

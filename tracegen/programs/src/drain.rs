@@ -15,7 +15,7 @@ use formats::textrace::{
 use formats::view::{Eye, EyeView, FovTangents, FrameViews, Hmd, TILE_SIZE_PX};
 use frame_builder::{Builder, StereoDraw};
 use places::Placement;
-use record::{CaptureCounts, RecordError, Recording};
+use record::{CaptureCounts, RecordError, Recorder};
 use spool::FramesBy;
 use spool::{RawSample, TextureInfo};
 use std::collections::{BTreeMap, HashMap};
@@ -107,7 +107,7 @@ pub fn drain<W: Write + Seek>(
     job: &Job<'_>,
     writer: TextraceWriter<W>,
 ) -> Result<(TextraceWriter<W>, Drained), DrainError> {
-    let mut builder = Builder::new(Recording::new(writer));
+    let mut builder = Builder::new(Recorder::new(writer, Vec::new()));
     let mut drained = Drained::default();
     let mut triangles = 0;
     for &number in job.frames {

@@ -3,7 +3,7 @@
 //! ```text
 //! launch: the program under the layer -> a folder of events and records (layer::spool)
 //!   -> session: frames, passes, draws -> views: which draw shows which eye
-//!   -> drain: records of draws -> quads and their groups -> record::Recording -> .textrace
+//!   -> drain: records of draws -> quads and their groups -> record::Recorder -> .textrace
 //! ```
 
 pub mod browser;

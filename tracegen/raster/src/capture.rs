@@ -2,14 +2,14 @@
 
 use super::backend::{CaptureBackend, Fragments, RecordRequest, View};
 use super::cascades;
-use super::draws::{DrawCall, DrawList, DrawMode};
+use super::draws::{DrawCall, DrawList};
 use super::error::RasterError;
 use super::frame::Frame;
 use super::geometry;
 use super::lighting::Lighting;
-use formats::textrace::{Pass, PassKind, Tables, TextraceWriter};
+use formats::textrace::{Pass, PassKind};
 use formats::view::{Eye, FrameViews, TILE_SIZE_PX};
-use record::{CaptureCounts, Captured, Capturer, DepthReplay, RecordError, Recorder, Region, Sink};
+use record::{CaptureCounts, Captured, Capturer, RecordError, Recorder, Region, Sink};
 use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
@@ -78,19 +78,6 @@ impl CaptureJob<'_> {
         let plan = self.plan(views)?;
         let pass = |number| pass(views.frame, &plan, number);
         Ok((0..plan.layers.len()).map(pass).collect())
-    }
-
-    /// The recorder of this job's render passes. `tables` are the trace's.
-    pub fn recorder<'t>(&self, tables: &'t Tables) -> Recorder<'t> {
-        let replay = |call: &DrawCall| {
-            let is_tested = self.fragments == Fragments::DepthTested;
-            if is_tested && call.mode == DrawMode::Masked {
-                DepthReplay::Greater
-            } else {
-                DepthReplay::None
-            }
-        };
-        Recorder::new(tables, self.draws.calls.iter().map(replay).collect())
     }
 
     /// Fits the frame's shadow cascades to both eyes, whichever are captured, and finds the draws
@@ -236,8 +223,8 @@ impl CaptureJob<'_> {
         Ok((pictures, start.elapsed()))
     }
 
-    /// Renders a frame with capture and appends its tiles to the trace; `first_pass` is the number
-    /// of the first layer's render pass. The frame's shadow maps have been rendered.
+    /// Renders a frame with capture and appends its tiles to the trace. The frame's shadow maps have
+    /// been rendered, and its first layer is the trace's next render pass.
     ///
     /// # Errors
     /// Driver errors, a tile whose records exceed the budget, and errors of writing.
@@ -245,25 +232,23 @@ impl CaptureJob<'_> {
         &self,
         backend: &mut dyn CaptureBackend,
         frame: &Frame,
-        first_pass: usize,
-        recorder: &mut Recorder<'_>,
-        writer: &mut TextraceWriter<W>,
+        recorder: &mut Recorder<W>,
     ) -> Result<CapturedFrame, RasterError> {
         let mut counts = CaptureCounts::default();
         let mut sorting = Duration::ZERO;
+        let first_pass = recorder.next_pass();
         self.check_passes(frame, &recorder.tables().passes, first_pass)?;
-        if writer.has_geometry()
-            && let Some(pass) = recorder.tables().passes.get(first_pass)
+        if recorder.writer().has_geometry()
+            && let Some(&pass) = recorder.tables().passes.get(first_pass)
         {
             for (view, lists) in
                 geometry::views(self.scene, self.draws, frame, pass.frame, first_pass)
             {
-                writer
-                    .append_view(view, &lists)
-                    .map_err(RecordError::from)?;
+                let written = recorder.writer().append_view(view, &lists);
+                written.map_err(RecordError::from)?;
             }
         }
-        for (pass, view) in (first_pass..).zip(frame.views()) {
+        for view in frame.views() {
             let mut capturer = ViewCapturer {
                 backend: &mut *backend,
                 draws: self.draws,
@@ -272,7 +257,7 @@ impl CaptureJob<'_> {
                 fragments: self.fragments,
                 picture: self.shaded,
             };
-            let recorded = recorder.record_pass(&mut capturer, pass, writer)?;
+            let recorded = recorder.capture_pass(&mut capturer)?;
             counts += recorded.counts;
             sorting += recorded.sorting;
         }

@@ -7,7 +7,7 @@ use super::view::{Fragments, View};
 use formats::textrace::{Draw, Sample, Surfaces, UvGroup};
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use glam::{Affine3A, Mat4, Vec3};
-use record::Region;
+use record::{DepthReplay, Region};
 use scene::geometry::transformed_box;
 use scene::{AlphaMode, Animation, Instance, Material, Mesh, Scene, TextureSlot};
 use std::collections::{HashMap, HashSet};
@@ -204,6 +204,15 @@ impl DrawList {
         }
         let bounds = |&draw: &u32| (draw, self.calls[draw as usize].bounds);
         self.hierarchy.refit(self.moving.iter().map(bounds));
+    }
+
+    /// The depth test between the primitives of each draw, which a recorder of `fragments` repeats.
+    pub fn replays(&self, fragments: Fragments) -> Vec<DepthReplay> {
+        let replay = |call: &DrawCall| match (fragments, call.mode) {
+            (Fragments::DepthTested, DrawMode::Masked) => DepthReplay::Greater,
+            _ => DepthReplay::None,
+        };
+        self.calls.iter().map(replay).collect()
     }
 
     /// Indices of the draws that may be visible in a view or shadow cascade, ascending.

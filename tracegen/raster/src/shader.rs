@@ -51,7 +51,7 @@ pub enum Granularity {
     None,
     /// Quad by quad.
     Quads,
-    /// One by one, for merging into quads: see [`record::Merged`].
+    /// One by one, for merging into quads: see [`record::MergedQuads`].
     Fragments,
     /// One by one, with primitives numbered by unshared vertices.
     NumberedFragments,

@@ -14,12 +14,12 @@ const LANES: u32 = 15;
 
 /// Quads merged from fragments.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Merged {
+pub struct MergedQuads {
     quads: Vec<RawRecord>,
     depths: Vec<RawDepth>,
 }
 
-impl Merged {
+impl MergedQuads {
     /// Merges the fragments of a region.
     ///
     /// # Panics
@@ -112,9 +112,9 @@ mod tests {
             .collect()
     }
 
-    fn merged(fragments: &[(RawRecord, RawDepth)]) -> Merged {
+    fn merged(fragments: &[(RawRecord, RawDepth)]) -> MergedQuads {
         let (quads, depths): (Vec<_>, Vec<_>) = fragments.iter().copied().unzip();
-        Merged::new(RawRecords {
+        MergedQuads::new(RawRecords {
             quads: &quads,
             depths: &depths,
         })
@@ -158,7 +158,7 @@ mod tests {
     #[test]
     fn records_without_depths_are_merged_without_depths() {
         let record = quad([0, 0], 0, [1, 0], 0);
-        let merged = Merged::new(RawRecords {
+        let merged = MergedQuads::new(RawRecords {
             quads: &[record],
             depths: &[],
         });

@@ -17,7 +17,7 @@ pub struct RawRecord {
     /// Index into the draw table.
     pub draw: u32,
     /// Covered lanes whose alpha passes the test, in the form of [`Self::mask`]; only used for masked draws.
-    /// The bits above are flags of records for a [`crate::Recording`]: [`Self::HAS_DEPTH`] and
+    /// The bits above are flags of records that are passed to a [`crate::Recorder`]: [`Self::HAS_DEPTH`] and
     /// [`Self::OPERANDS`].
     pub passing: u32,
     /// Coordinates of the top-left lane, covered or not.

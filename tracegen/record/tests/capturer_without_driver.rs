@@ -14,7 +14,7 @@ use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
 use formats::view::{Eye, EyeView, FovTangents, FrameViews, Hmd};
 use record::{
     Captured, Capturer, DepthReplay, RawDepth, RawRecord, RawRecords, RecordError, Recorder,
-    Recording, Region, Sink,
+    Region, Sink,
 };
 use std::collections::BTreeMap;
 
@@ -217,12 +217,18 @@ impl Capturer for Analytic {
 }
 
 fn trace(capturer: &mut Analytic) -> Result<Vec<u8>, RecordError> {
-    let tables = tables();
-    let mut writer = TextraceWriter::in_memory(&tables)?;
-    let mut recorder = Recorder::new(&tables, vec![DepthReplay::None, DepthReplay::Less]);
-    recorder.record_pass(capturer, 0, &mut writer)?;
-    Ok(writer.into_bytes()?)
+    let mut recorder = recorder();
+    recorder.capture_pass(capturer)?;
+    Ok(recorder.into_writer()?.into_bytes()?)
 }
+
+/// A recorder for the tables of the analytic scene.
+fn recorder() -> InMemory {
+    let writer = TextraceWriter::in_memory(&tables()).unwrap();
+    Recorder::new(writer, REPLAYS.to_vec())
+}
+
+type InMemory = Recorder<std::io::Cursor<Vec<u8>>>;
 
 #[test]
 fn a_capturer_without_a_driver_writes_a_trace_with_exactly_its_records() {
@@ -263,16 +269,15 @@ fn a_capturer_without_a_driver_writes_a_trace_with_exactly_its_records() {
 #[test]
 fn fragments_with_nan_coordinates_are_not_counted() {
     let counts = |not_finite: Option<u32>| {
-        let tables = tables();
-        let mut writer = TextraceWriter::in_memory(&tables).unwrap();
-        let mut recorder = Recorder::new(&tables, vec![DepthReplay::None, DepthReplay::Less]);
+        let mut recorder = recorder();
         let mut capturer = Analytic {
             not_finite,
             ..Analytic::new(1 << 20, false)
         };
-        let recorded = recorder.record_pass(&mut capturer, 0, &mut writer);
+        let recorded = recorder.capture_pass(&mut capturer);
         let counts = recorded.unwrap().counts;
-        let trace = Textrace::from_bytes(writer.into_bytes().unwrap()).unwrap();
+        let bytes = recorder.into_writer().unwrap().into_bytes().unwrap();
+        let trace = Textrace::from_bytes(bytes).unwrap();
         (counts, trace.records())
     };
     let (all, _) = counts(None);
@@ -364,21 +369,19 @@ fn records_that_contradict_the_tables_are_refused() {
         (record(0, 7, 0), "primitive"),
     ];
     for (record, expected) in cases {
-        let tables = tables();
-        let mut writer = TextraceWriter::in_memory(&tables).unwrap();
-        let mut recorder = Recorder::new(&tables, vec![DepthReplay::None, DepthReplay::Less]);
-        let refused = recorder.record_pass(&mut Wrong(record), 0, &mut writer);
+        let mut recorder = recorder();
+        let refused = recorder.capture_pass(&mut Wrong(record));
         let message = refused.unwrap_err().to_string();
         assert!(message.contains(expected), "{message}");
     }
 }
 
 /// The texture, sampler and draws of the analytic scene as events, followed by the start of a pass.
-fn begun() -> Recording<std::io::Cursor<Vec<u8>>> {
+fn begun() -> InMemory {
     let tables = tables();
-    let mut recording = Recording::new(TextraceWriter::growing_in_memory().unwrap());
+    let mut recording = Recorder::new(TextraceWriter::growing_in_memory().unwrap(), Vec::new());
     recording.texture(tables.textures[0].clone()).unwrap();
-    let index = |r: &mut Recording<_>| r.sampler(tables.samplers[0]).unwrap();
+    let index = |r: &mut Recorder<_>| r.sampler(tables.samplers[0]).unwrap();
     assert_eq!([0, 0], [index(&mut recording), index(&mut recording)]);
     recording.begin_pass(tables.passes[0]).unwrap();
     for (draw, replay) in tables.draws.iter().zip(REPLAYS) {
@@ -406,6 +409,13 @@ fn all_records() -> (Vec<RawRecord>, Vec<RawDepth>) {
     all
 }
 
+/// The trace of events.
+fn finished(recorder: InMemory) -> Textrace {
+    let mut writer = recorder.into_writer().unwrap();
+    writer.set_meta(tables().meta).unwrap();
+    Textrace::from_bytes(writer.into_bytes().unwrap()).unwrap()
+}
+
 fn tiles(trace: &Textrace) -> Vec<Tile> {
     let decode = |index| {
         let mut tile = Tile::default();
@@ -416,7 +426,7 @@ fn tiles(trace: &Textrace) -> Vec<Tile> {
 }
 
 #[test]
-fn a_recording_gives_the_same_tiles_as_a_recorder() {
+fn events_give_the_same_tiles_as_a_capturer_that_is_asked() {
     let asked = trace(&mut Analytic::new(1 << 20, false)).unwrap();
     let asked = Textrace::from_bytes(asked).unwrap();
     let (quads, depths) = all_records();
@@ -429,12 +439,7 @@ fn a_recording_gives_the_same_tiles_as_a_recorder() {
             recording.records(RawRecords { quads, depths }).unwrap();
         }
         let recorded = recording.end_pass().unwrap();
-        let bytes = recording
-            .finish(tables().meta)
-            .unwrap()
-            .into_bytes()
-            .unwrap();
-        let pushed = Textrace::from_bytes(bytes).unwrap();
+        let pushed = finished(recording);
         assert_eq!(pushed.tables(), asked.tables());
         assert_eq!(tiles(&pushed), tiles(&asked), "{part} at a time");
         assert_eq!(recorded.counts.records, asked.records());
@@ -443,7 +448,7 @@ fn a_recording_gives_the_same_tiles_as_a_recorder() {
 
 #[test]
 fn operands_stay_with_their_record_in_loops_and_with_values_that_are_not_finite() {
-    let mut recording = Recording::new(TextraceWriter::growing_in_memory().unwrap());
+    let mut recording = Recorder::new(TextraceWriter::growing_in_memory().unwrap(), Vec::new());
     let tables = tables();
     recording.texture(tables.textures[0].clone()).unwrap();
     recording.sampler(tables.samplers[0]).unwrap();
@@ -490,8 +495,7 @@ fn operands_stay_with_their_record_in_loops_and_with_values_that_are_not_finite(
         (recorded.counts.records, recorded.counts.not_finite),
         (4, 2)
     );
-    let bytes = recording.finish(tables.meta).unwrap().into_bytes().unwrap();
-    let tile = &tiles(&Textrace::from_bytes(bytes).unwrap())[0];
+    let tile = &tiles(&finished(recording))[0];
     let found: Vec<_> = tile.records.iter().map(|r| (r.group, r.uv[0])).collect();
     let texel = |u: f32| (u * EDGE as f32) as i32 * SUBTEXELS;
     assert_eq!(
@@ -528,7 +532,7 @@ fn calls_at_the_wrong_time_are_refused() {
         let text = error.to_string();
         assert!(text.contains("expected an open pass, found none"), "{text}");
     }
-    let Err(error) = begun().finish(tables().meta) else {
+    let Err(error) = begun().into_writer() else {
         panic!("an open pass was finished");
     };
     assert!(error.to_string().contains("no open pass"), "{error}");

@@ -3,13 +3,14 @@
 use super::raster_args::RasterArgs;
 use super::scene_args::SceneSetup;
 use crate::picture;
-use crate::study::world::{Tracer, World};
+use crate::study::world::World;
 use anyhow::Context;
 use formats::container::AtomicFile;
 use formats::textrace::{Tables, TextraceWriter, TraceMeta};
 use raster::backend::{CaptureBackend, Fragments};
 use raster::capture::Pictures;
 use raster::geometry::geometry;
+use record::Recorder;
 use scene::{LoadOptions, Scene};
 use shell::{Output, lasting_arguments};
 use std::path::Path;
@@ -55,20 +56,20 @@ pub fn warn_of_multiview_defect(
 
 /// The trace of `tracegen raster` and its picture.
 pub struct TraceOutput<'a> {
-    pub tracer: Tracer<'a, AtomicFile>,
+    pub recorder: Recorder<AtomicFile>,
     image: Option<&'a Path>,
 }
 
 impl<'a> TraceOutput<'a> {
     /// Creates the trace beside its final place.
-    pub fn create(args: &'a RasterArgs, tables: &'a Tables, world: &World) -> anyhow::Result<Self> {
+    pub fn create(args: &'a RasterArgs, tables: &Tables, world: &World) -> anyhow::Result<Self> {
         let writer = TextraceWriter::create(&args.output, tables)?;
         let mut writer = writer.with_encoding(args.encoding);
         if args.geometry {
             writer = writer.with_geometry(geometry(&world.scene, &world.draws))?;
         }
         Ok(Self {
-            tracer: Tracer::new(tables, writer),
+            recorder: Recorder::new(writer, world.draws.replays(args.hsr)),
             image: args.image.as_deref(),
         })
     }
@@ -83,7 +84,7 @@ impl<'a> TraceOutput<'a> {
             }
             _ => None,
         };
-        let file_bytes = self.tracer.into_writer().finish()?;
+        let file_bytes = self.recorder.into_writer()?.finish()?;
         if let Some((path, image)) = image {
             image.persist().with_context(|| cannot_write(path))?;
         }

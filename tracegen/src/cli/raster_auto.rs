@@ -89,10 +89,8 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
             }
         }
         let job = world.job(planner);
-        counts += output
-            .tracer
-            .capture(&job, &mut backend, &shot.frame)?
-            .counts;
+        let captured = job.capture_frame(&mut backend, &shot.frame, &mut output.recorder)?;
+        counts += captured.counts;
         progress.advance(1);
     }
     drop(progress);

@@ -302,7 +302,7 @@ fn capture(
     summary: &mut Summary,
 ) -> anyhow::Result<CapturedFrame> {
     let (start, worked, before) = (Instant::now(), processor::time(), backend.work());
-    let captured = output.tracer.capture(job, backend, frame)?;
+    let captured = job.capture_frame(backend, frame, &mut output.recorder)?;
     summary.capture_draws.add(before, backend.work());
     summary.sorting += captured.sorting;
     summary.captured += start.elapsed();

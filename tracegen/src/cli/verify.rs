@@ -17,6 +17,7 @@ use lab::verify::report::Report;
 use raster::backend::Texels;
 use raster::capture::CaptureJob;
 use raster::lavapipe::Lavapipe;
+use record::Recorder;
 use scene::{LoadOptions, TextureSlot, TextureSlots};
 use shell::{Output, Progress, Threads, note};
 use std::path::{Path, PathBuf};
@@ -271,9 +272,10 @@ fn capture(
     tables.passes = job.passes(&world.views[0])?;
     let frame = job.frame(&world.views[0])?;
     job.light(backend, &frame)?;
-    let mut writer = TextraceWriter::in_memory(&tables)?;
-    job.capture_frame(backend, &frame, 0, &mut job.recorder(&tables), &mut writer)?;
-    Ok(Textrace::from_bytes(writer.into_bytes()?)?)
+    let writer = TextraceWriter::in_memory(&tables)?;
+    let mut recorder = Recorder::new(writer, job.draws.replays(job.fragments));
+    job.capture_frame(backend, &frame, &mut recorder)?;
+    Ok(Textrace::from_bytes(recorder.into_writer()?.into_bytes()?)?)
 }
 
 /// The driver's texels, by pass of the trace's first frame and by slot.

@@ -5,12 +5,12 @@ use super::folder::{Folder, FrameRecord, RowRecord, trace_checksum};
 use super::memory;
 use super::rows::Row;
 use super::timing::{CULL, Extent, median_s, time};
-use super::world::{Shot, Tracer, World};
+use super::world::{Shot, World};
 use formats::textrace::{Encoding, Textrace, TextraceWriter};
-use raster::backend::Marks;
+use raster::backend::{Fragments, Marks};
 use raster::culling_truth::Wrong;
 use raster::lavapipe::Lavapipe;
-use record::CaptureCounts;
+use record::{CaptureCounts, Recorder};
 use shell::Progress;
 use std::collections::hash_map::Entry;
 use std::collections::{BTreeMap, HashMap};
@@ -103,17 +103,17 @@ impl Bench<'_> {
         let (trace_name, trace_path) = self.folder.trace(&row.name);
         let mut traced = match kept.is_empty() || !self.captures {
             true => None,
-            false => Some(Tracer::new(
-                &tables[0],
+            false => Some(Recorder::new(
                 TextraceWriter::create(&trace_path, &tables[0])?.with_encoding(self.encoding),
+                self.world.draws.replays(Fragments::DepthTested),
             )),
         };
         // Frames outside the trace are captured as well, to count what they sample.
         let mut counted = match left_out.is_empty() || !self.captures {
             true => None,
-            false => Some(Tracer::new(
-                &tables[1],
+            false => Some(Recorder::new(
                 TextraceWriter::in_memory(&tables[1])?,
+                self.world.draws.replays(Fragments::DepthTested),
             )),
         };
         let mut frames = Vec::new();
@@ -136,10 +136,10 @@ impl Bench<'_> {
             let (backend, frame) = (&mut *self.backend, &shot.frame);
             let captured = match (&mut traced, &mut counted) {
                 _ if shot.reprojection.is_some() => None,
-                (Some(tracer), _) if kept.contains(&number) => {
-                    Some(tracer.capture(&job, backend, frame)?)
+                (Some(recorder), _) if kept.contains(&number) => {
+                    Some(job.capture_frame(backend, frame, recorder)?)
                 }
-                (_, Some(tracer)) => Some(tracer.capture(&job, backend, frame)?),
+                (_, Some(recorder)) => Some(job.capture_frame(backend, frame, recorder)?),
                 _ => None,
             };
             let counts = (self.captures)
@@ -155,14 +155,14 @@ impl Bench<'_> {
         }
         let trace = match traced {
             Some(traced) => {
-                traced.into_writer().finish()?;
+                traced.into_writer()?.finish()?;
                 count_textures(&mut frames, &Textrace::open(&trace_path)?)?;
                 Some(trace_name)
             }
             None => None,
         };
         if let Some(counted) = counted {
-            let trace = Textrace::from_bytes(counted.into_writer().into_bytes()?)?;
+            let trace = Textrace::from_bytes(counted.into_writer()?.into_bytes()?)?;
             count_textures(&mut frames, &trace)?;
         }
         Ok((frames, trace))

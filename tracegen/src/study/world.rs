@@ -2,19 +2,17 @@
 
 use super::counted::Counted;
 use super::timewarp::{self, Reprojected, Shown};
-use formats::textrace::{Tables, TextraceWriter};
+use formats::textrace::Tables;
 use formats::view::{Eye, FrameViews, Hmd, Lens};
 use raster::backend::{CaptureBackend, Fragments, Work};
-use raster::capture::{CaptureJob, CapturedFrame, Pictures};
+use raster::capture::{CaptureJob, Pictures};
 use raster::draws::DrawList;
 use raster::error::RasterError;
 use raster::frame::Frame;
 use raster::lavapipe::Lavapipe;
 use raster::lighting::Lighting;
-use record::Recorder;
 use scene::paths::Moments;
 use scene::{Camera, Scene};
-use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
 use techniques::settings::Reprojection;
 use techniques::{Planner, Settings, SettingsError, Skips};
@@ -320,46 +318,4 @@ fn shadow_range_m(camera: &Camera, (lo, hi): (glam::Vec3, glam::Vec3)) -> [f32; 
     // scene.
     let near = camera.near.max(farthest.min(1.0) * 0.05);
     [near, farthest.min(camera.far).max(2.0 * near)]
-}
-
-/// Appends frames to a trace, one after the other.
-pub struct Tracer<'a, W: Write + Seek> {
-    tables: &'a Tables,
-    writer: TextraceWriter<W>,
-    /// Kept between frames, because it remembers how many regions the records of a view need.
-    recorder: Option<Recorder<'a>>,
-    pass: usize,
-}
-
-impl<'a, W: Write + Seek> Tracer<'a, W> {
-    /// A trace with these tables.
-    pub fn new(tables: &'a Tables, writer: TextraceWriter<W>) -> Self {
-        Self {
-            tables,
-            writer,
-            recorder: None,
-            pass: 0,
-        }
-    }
-
-    /// Captures the next frame; its shadow maps must have been rendered.
-    ///
-    /// # Errors
-    /// Driver errors, and errors of writing.
-    pub fn capture(
-        &mut self,
-        job: &CaptureJob<'_>,
-        backend: &mut dyn CaptureBackend,
-        frame: &Frame,
-    ) -> Result<CapturedFrame, RasterError> {
-        let recorder = (self.recorder).get_or_insert_with(|| job.recorder(self.tables));
-        let captured = job.capture_frame(backend, frame, self.pass, recorder, &mut self.writer)?;
-        self.pass += frame.plan.layers.len();
-        Ok(captured)
-    }
-
-    /// The writer, to finish the trace.
-    pub fn into_writer(self) -> TextraceWriter<W> {
-        self.writer
-    }
 }

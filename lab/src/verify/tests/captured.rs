@@ -169,14 +169,17 @@ pub(super) fn capture_skipping(
     // Multiview leaves no depth per view.
     let compares = matches!(plain, Some(Ok(_))) && !planner.settings().multiview;
     let depths = compares.then(|| job.depths(&mut backend, &frame).unwrap());
-    let mut writer = TextraceWriter::in_memory(&tables).unwrap();
-    let mut recorder = job.recorder(&tables);
+    let recorder = || {
+        let writer = TextraceWriter::in_memory(&tables).unwrap();
+        Recorder::new(writer, draws.replays(fragments))
+    };
+    let mut shaded = recorder();
     let before = backend.work();
     let CapturedFrame {
         pictures, counts, ..
-    } = job.capture_frame(&mut backend, &frame, 0, &mut recorder, &mut writer)?;
+    } = job.capture_frame(&mut backend, &frame, &mut shaded)?;
     let after = backend.work();
-    let trace = writer.into_bytes().unwrap();
+    let trace = shaded.into_writer().unwrap().into_bytes().unwrap();
     if let Some(depths) = &depths {
         assert!(job.depths(&mut backend, &frame)? == *depths, "shaded");
     }
@@ -185,11 +188,10 @@ pub(super) fn capture_skipping(
         shaded: false,
         ..job
     };
-    let mut writer = TextraceWriter::in_memory(&tables).unwrap();
-    let mut recorder = unshaded.recorder(&tables);
-    unshaded.capture_frame(&mut backend, &frame, 0, &mut recorder, &mut writer)?;
+    let mut without = recorder();
+    unshaded.capture_frame(&mut backend, &frame, &mut without)?;
     assert!(
-        writer.into_bytes().unwrap() == trace,
+        without.into_writer().unwrap().into_bytes().unwrap() == trace,
         "a trace without shading"
     );
     if let Some(depths) = &depths

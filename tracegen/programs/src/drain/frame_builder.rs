@@ -14,7 +14,7 @@ use ash::vk;
 use formats::textrace::{Draw, LeftOut, PassKind, Surfaces, TraceMeta, UvGroup};
 use formats::textrace::{TextraceWriter, tables::MAX_GROUPS};
 use formats::view::Eye;
-use record::{CaptureCounts, DepthReplay, RawRecords, Recording};
+use record::{CaptureCounts, DepthReplay, RawRecords, RecordError, Recorder};
 use spool::{Access, RawSample, TextureSite, What};
 use spool::{DrawInfo, ShaderInfo};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
@@ -74,7 +74,7 @@ const DIVIDED: &str = "fragments of quads that sample at more than 15 coordinate
 
 /// Builds a trace frame by frame.
 pub struct Builder<W: Write + Seek> {
-    recording: Recording<W>,
+    recorder: Recorder<W>,
     pub counts: CaptureCounts,
     textures: ImageTextures,
     next_primitive: u32,
@@ -88,9 +88,9 @@ pub struct Builder<W: Write + Seek> {
 
 impl<W: Write + Seek> Builder<W> {
     /// Starts an empty trace.
-    pub fn new(recording: Recording<W>) -> Self {
+    pub fn new(recorder: Recorder<W>) -> Self {
         Self {
-            recording,
+            recorder,
             counts: CaptureCounts::default(),
             textures: ImageTextures::default(),
             next_primitive: 0,
@@ -117,8 +117,10 @@ impl<W: Write + Seek> Builder<W> {
 
     /// Completes the trace with its description.
     pub fn finish(mut self, meta: TraceMeta) -> Result<TextraceWriter<W>, DrainError> {
-        self.textures.join(&mut self.recording)?;
-        Ok(self.recording.finish(meta)?)
+        self.textures.join(&mut self.recorder)?;
+        let mut writer = self.recorder.into_writer()?;
+        writer.set_meta(meta).map_err(RecordError::from)?;
+        Ok(writer)
     }
 
     /// Counts draws that are in no render pass of the trace, and draws with caveats.
@@ -213,13 +215,12 @@ impl<W: Write + Seek> Builder<W> {
             if kind == PassKind::Shadow && of.quads.is_empty() {
                 continue;
             }
-            self.recording
-                .begin_pass(pass(number, kind, eye, size_px))?;
-            self.recording.records(RawRecords {
+            self.recorder.begin_pass(pass(number, kind, eye, size_px))?;
+            self.recorder.records(RawRecords {
                 quads: &of.quads,
                 depths: &of.depths,
             })?;
-            self.counts += self.recording.end_pass()?.counts;
+            self.counts += self.recorder.end_pass()?.counts;
         }
         Ok(triangles)
     }
@@ -358,7 +359,7 @@ impl<W: Write + Seek> Builder<W> {
                     primitives,
                     groups: uv_groups,
                 };
-                let index = self.recording.draw(draw, declared.replay)?;
+                let index = self.recorder.draw(draw, declared.replay)?;
                 self.opaque.push(!info.twice && !info.blends);
                 draws.push(DeclaredDraw {
                     index,
@@ -437,7 +438,7 @@ impl<W: Write + Seek> Builder<W> {
             .image(view.image)
             .ok_or("textures whose image is not known")?;
         let format = || format!("textures of format {:?}", vk::Format::from_raw(view.format));
-        let found = self.textures.get(&mut self.recording, &view, image);
+        let found = self.textures.get(&mut self.recorder, &view, image);
         let (index, size) = found.map_err(|e| e.to_string())?.ok_or_else(format)?;
         let state = site.sampler.as_ref().and_then(|s| find(s)?.sampler);
         let unnormalized = state.is_some_and(|state| state.unnormalized);
@@ -449,7 +450,7 @@ impl<W: Write + Seek> Builder<W> {
         };
         Ok(Bound {
             texture: index,
-            sampler: self.recording.sampler(state).map_err(|e| e.to_string())?,
+            sampler: self.recorder.sampler(state).map_err(|e| e.to_string())?,
             size,
             unnormalized,
             anisotropic: state.is_anisotropic(),

@@ -2,7 +2,7 @@
 
 use crate::texture::texture;
 use formats::texture::{Part, Texture};
-use record::{RecordError, Recording};
+use record::{RecordError, Recorder};
 use spool::{ImageInfo, ViewInfo};
 use std::collections::{BTreeMap, HashMap};
 use std::io::{Seek, Write};
@@ -36,7 +36,7 @@ impl ImageTextures {
     /// The table is full.
     pub fn get<W: Write + Seek>(
         &mut self,
-        recording: &mut Recording<W>,
+        recorder: &mut Recorder<W>,
         view: &ViewInfo,
         image: &ImageInfo,
     ) -> Result<Option<(u32, [u32; 2])>, RecordError> {
@@ -56,7 +56,7 @@ impl ImageTextures {
         if let Some(index) = self.indices.get(&view) {
             return Ok(Some((*index, size)));
         }
-        let index = recording.texture(of_trace.clone())?;
+        let index = recorder.texture(of_trace.clone())?;
         self.indices.insert(view, index);
         let of_image = self.by_number.entry(number).or_insert_with(|| OfImage {
             image: image.clone(),
@@ -71,16 +71,16 @@ impl ImageTextures {
     ///
     /// # Errors
     /// The table is full.
-    pub fn join<W: Write + Seek>(&self, recording: &mut Recording<W>) -> Result<(), RecordError> {
+    pub fn join<W: Write + Seek>(&self, recorder: &mut Recorder<W>) -> Result<(), RecordError> {
         for of in self.by_number.values() {
-            of.join(recording)?;
+            of.join(recorder)?;
         }
         Ok(())
     }
 }
 
 impl OfImage {
-    fn join<W: Write + Seek>(&self, recording: &mut Recording<W>) -> Result<(), RecordError> {
+    fn join<W: Write + Seek>(&self, recorder: &mut Recorder<W>) -> Result<(), RecordError> {
         let pairs = (self.views.iter().enumerate())
             .flat_map(|(number, a)| self.views[..number].iter().map(move |b| (&a.0, &b.0)));
         let shared = |(a, b): (&ViewInfo, &ViewInfo)| {
@@ -110,14 +110,14 @@ impl OfImage {
                 let Some(of_trace) = texture(&view, &self.image, self.number) else {
                     return Ok(());
                 };
-                let index = recording.texture(of_trace.clone())?;
+                let index = recorder.texture(of_trace.clone())?;
                 added = (view, of_trace, index);
                 &added
             }
         };
         for (view, of_trace, index) in self.views.iter().filter(|(_, _, index)| *index != whole.2) {
             if let Some(part) = part(view, of_trace, whole) {
-                recording.part(*index, part)?;
+                recorder.part(*index, part)?;
             }
         }
         Ok(())
@@ -159,7 +159,7 @@ mod tests {
             samples: 1,
             presented: false,
         };
-        let mut recording = Recording::new(TextraceWriter::growing_in_memory().unwrap());
+        let mut recorder = Recorder::new(TextraceWriter::growing_in_memory().unwrap(), Vec::new());
         let mut textures = ImageTextures::default();
         for (number, &(format, levels, layers)) in (0..).zip(views) {
             for kind in [1, 5] {
@@ -171,15 +171,12 @@ mod tests {
                     layers,
                     min_lod_256ths: 0,
                 };
-                let (index, _) = textures
-                    .get(&mut recording, &view, &image)
-                    .unwrap()
-                    .unwrap();
+                let (index, _) = textures.get(&mut recorder, &view, &image).unwrap().unwrap();
                 assert_eq!(index, number);
             }
         }
-        textures.join(&mut recording).unwrap();
-        let writer = recording.finish(Default::default()).unwrap();
+        textures.join(&mut recorder).unwrap();
+        let writer = recorder.into_writer().unwrap();
         let tables = writer.tables();
         let place = |texture: &Texture| texture.part.map(|p| (p.of, p.level, p.layer));
         let places = tables.textures.iter().map(place).collect();

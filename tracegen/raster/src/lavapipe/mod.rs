@@ -30,7 +30,7 @@ use device::Gpu;
 use multiview::{Multiview, Trust};
 use pipelines::Pipelines;
 use readback::Readback;
-use record::{Captured, DEPTH_BYTES, Merged, RECORD_BYTES, RawRecords, Region};
+use record::{Captured, DEPTH_BYTES, MergedQuads, RECORD_BYTES, RawRecords, Region};
 use records::RecordBuffers;
 use scene::Scene;
 use starts::{Drawn, Starts};
@@ -521,7 +521,7 @@ impl CaptureBackend for Lavapipe {
                 if gpu.granularity() == Granularity::Quads {
                     return Ok(sink(records)?);
                 }
-                Ok(sink(Merged::new(records).records())?)
+                Ok(sink(MergedQuads::new(records).records())?)
             };
             gpu.read(&buffers.records, 0..needed * RECORD_BYTES, |quads| {
                 let quads = records_of(quads)?;

@@ -6,11 +6,12 @@ use super::search::{Cost, Judge, Spread, Verdict};
 use crate::study::counted::{Counted, texture_bytes};
 use crate::study::rows::Row;
 use crate::study::timing::{Extent, in_turns, median_s, time, undisturbed_s};
-use crate::study::world::{Shot, Tracer, World};
+use crate::study::world::{Shot, World};
 use anyhow::Context;
 use formats::textrace::{Textrace, TextraceWriter};
 use image_error::{Mask, Picture, Reference};
 use raster::lavapipe::Lavapipe;
+use record::Recorder;
 use serde::{Deserialize, Serialize};
 use shell::Progress;
 use std::collections::{BTreeMap, HashMap};
@@ -104,9 +105,11 @@ impl SearchBench<'_> {
             return Ok(shot.counted(0));
         }
         let tables = self.world.trace_tables(|_| planner, &[frame])?;
-        let mut tracer = Tracer::new(&tables, TextraceWriter::in_memory(&tables)?);
-        let captured = tracer.capture(&self.world.job(planner), self.backend, &shot.frame)?;
-        let trace = Textrace::from_bytes(tracer.into_writer().into_bytes()?)?;
+        let job = self.world.job(planner);
+        let writer = TextraceWriter::in_memory(&tables)?;
+        let mut recorder = Recorder::new(writer, job.draws.replays(job.fragments));
+        let captured = job.capture_frame(self.backend, &shot.frame, &mut recorder)?;
+        let trace = Textrace::from_bytes(recorder.into_writer()?.into_bytes()?)?;
         Ok(Counted {
             texture_bytes: texture_bytes(&trace)?.iter().sum(),
             ..shot.counted(captured.counts.fragments)
