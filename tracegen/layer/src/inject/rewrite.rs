@@ -26,13 +26,8 @@ pub(super) fn rewrite(
             .builder
             .execution_mode(main, ExecutionMode::EarlyFragmentTests, []);
     }
-    // Depth is compared again only for draws that are recorded by an additional draw: those of shaders that discard,
-    // and those with alpha to coverage, which needs an output.
-    let needs_depth = match tests {
-        DepthTests::EarlyLateWrite => true,
-        DepthTests::Either => shader.has_outputs(),
-        DepthTests::Early | DepthTests::Late => false,
-    };
+    // Only the primitives of a draw whose fragments may be discarded are compared again.
+    let needs_depth = tests == DepthTests::EarlyLateWrite;
     for function in functions {
         let is_main = sites.main == function;
         let blocks = calls.builder.module_ref().functions[function].blocks.len();

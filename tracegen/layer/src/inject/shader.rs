@@ -222,13 +222,6 @@ impl Shader {
         })
     }
 
-    /// Whether the module has output variables.
-    pub fn has_outputs(&self) -> bool {
-        let class = Some(&Operand::StorageClass(StorageClass::Output));
-        let mut globals = self.module.types_global_values.iter();
-        globals.any(|of| of.class.opcode == Op::Variable && of.operands.first() == class)
-    }
-
     /// The interface variable of the entry point for a built-in.
     pub fn builtin(&self, wanted: BuiltIn, class: StorageClass) -> Option<Word> {
         let interface = self.module.entry_points[self.entry].operands.get(3..)?;

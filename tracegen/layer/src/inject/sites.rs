@@ -31,7 +31,7 @@ pub(super) struct Sites {
     pub main: usize,
     /// Batches by the instruction that they precede.
     pub batches: HashMap<At, Batch>,
-    /// Group for the start of each fragment, if no other site records it or if depths are needed.
+    /// Group for the start of each fragment, if no other site records it or if fragments may be discarded.
     pub entry: Option<u16>,
     /// Group for the end of each fragment.
     pub end: Option<u16>,

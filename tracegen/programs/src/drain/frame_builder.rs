@@ -15,7 +15,7 @@ use formats::textrace::{Draw, LeftOut, PassKind, Surfaces, TraceMeta, UvGroup};
 use formats::textrace::{TextraceWriter, tables::MAX_GROUPS};
 use formats::view::Eye;
 use record::{CaptureCounts, DepthReplay, RawRecords, RecordError, Recorder};
-use spool::{Access, RawSample, TextureSite, What};
+use spool::{Access, DepthTests, RawSample, TextureSite, What};
 use spool::{DrawInfo, ShaderInfo};
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::{Seek, Write};
@@ -330,7 +330,7 @@ impl<W: Write + Seek> Builder<W> {
         };
         let mut declared = Declared {
             portions: Vec::new(),
-            replay: replay(info),
+            replay: replay(info, shader.tests),
         };
         let next = self.pipelines.len() as u32 + 1;
         let pipeline = *self.pipelines.entry(info.pipeline).or_insert(next);
@@ -473,9 +473,10 @@ fn primitives(info: &DrawInfo) -> u32 {
 }
 
 /// Depth test between the primitives of a draw that must be repeated. If fragments may be discarded, the
-/// recording draw writes no depth, so the driver has not tested its primitives against each other.
-fn replay(info: &DrawInfo) -> DepthReplay {
-    if !info.twice || !info.depth.tests || !info.depth.writes {
+/// recording draw writes no depth, so the driver has not tested its primitives against each other. The same holds
+/// with alpha to coverage, but there no record tells which samples a fragment covers, so it hides none.
+fn replay(info: &DrawInfo, tests: DepthTests) -> DepthReplay {
+    if tests != DepthTests::EarlyLateWrite || !info.depth.tests || !info.depth.writes {
         return DepthReplay::None;
     }
     match vk::CompareOp::from_raw(info.depth.compare) {
@@ -485,5 +486,28 @@ fn replay(info: &DrawInfo) -> DepthReplay {
         vk::CompareOp::GREATER_OR_EQUAL => DepthReplay::GreaterOrEqual,
         // With these comparisons, written depths do not affect the test.
         _ => DepthReplay::None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spool::DepthInfo;
+
+    #[test]
+    fn only_draws_that_may_discard_repeat_the_depth_test() {
+        let info = DrawInfo {
+            twice: true,
+            depth: DepthInfo {
+                tests: true,
+                writes: true,
+                compare: vk::CompareOp::LESS.as_raw(),
+                stencil: false,
+            },
+            ..DrawInfo::default()
+        };
+        assert_eq!(replay(&info, DepthTests::EarlyLateWrite), DepthReplay::Less);
+        // Alpha to coverage: the sites of such a shader need not record depth.
+        assert_eq!(replay(&info, DepthTests::Either), DepthReplay::None);
     }
 }
