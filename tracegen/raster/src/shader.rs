@@ -49,6 +49,8 @@ impl AlphaSource {
 pub enum Granularity {
     /// Not recorded, on devices that cannot capture.
     None,
+    /// Not recorded, in pictures of two views at once.
+    TwoViews,
     /// Quad by quad.
     Quads,
     /// One by one, for merging into quads: see [`record::MergedQuads`].
@@ -69,19 +71,43 @@ impl Granularity {
         const TEXELS: &str = include_str!("shaders/texels.wgsl");
         const VULKAN: &str = include_str!("shaders/conventions_vulkan.wgsl");
         const OPENGL: &str = include_str!("shaders/conventions_opengl.wgsl");
+        const ONE: &str = include_str!("shaders/one_view.wgsl");
+        const ONE_PLAIN: &str = include_str!("shaders/one_view_plain.wgsl");
+        const TWO: &str = include_str!("shaders/two_views.wgsl");
+        const PLAIN: &str = include_str!("shaders/plain.wgsl");
         match self {
-            Self::None => &[VULKAN, include_str!("shaders/plain.wgsl")],
-            Self::Quads => &[VULKAN, BY_BALLOT, RECORDING, CAPTURING, TEXELS],
-            Self::Fragments => &[VULKAN, BY_INDEX, BY_FRAGMENT, RECORDING, CAPTURING, TEXELS],
-            Self::NumberedFragments => {
-                &[OPENGL, BY_VERTEX, BY_FRAGMENT, RECORDING, CAPTURING, TEXELS]
-            }
+            Self::None => &[VULKAN, PLAIN, ONE, ONE_PLAIN],
+            Self::TwoViews => &[VULKAN, PLAIN, TWO],
+            Self::Quads => &[VULKAN, BY_BALLOT, RECORDING, CAPTURING, TEXELS, ONE],
+            Self::Fragments => &[
+                VULKAN,
+                BY_INDEX,
+                BY_FRAGMENT,
+                RECORDING,
+                CAPTURING,
+                TEXELS,
+                ONE,
+            ],
+            Self::NumberedFragments => &[
+                OPENGL,
+                BY_VERTEX,
+                BY_FRAGMENT,
+                RECORDING,
+                CAPTURING,
+                TEXELS,
+                ONE,
+            ],
         }
     }
 
     /// Whether the driver numbers the primitives.
     fn by_index(self) -> bool {
         matches!(self, Self::Quads | Self::Fragments)
+    }
+
+    /// Whether there are entry points that record.
+    fn records(self) -> bool {
+        !matches!(self, Self::None | Self::TwoViews)
     }
 }
 
@@ -100,6 +126,12 @@ pub fn source(granularity: Granularity, alpha: AlphaSource) -> String {
     for (value, binding) in (0..).zip(VIEW_BINDINGS) {
         constant(&format!("{binding}_BINDING"), value);
     }
+    let views = if granularity == Granularity::TwoViews {
+        2
+    } else {
+        1
+    };
+    constant("VIEW_COUNT", views);
     constant("MATERIAL_BINDING", MATERIAL_BINDING.into());
     constant("TEXTURES_BINDING", TEXTURES_BINDING.into());
     constant("SAMPLERS_BINDING", SAMPLERS_BINDING.into());
@@ -124,7 +156,7 @@ pub fn source(granularity: Granularity, alpha: AlphaSource) -> String {
     }
     text.push('\n');
     text += &textures();
-    if granularity != Granularity::None {
+    if granularity.records() {
         text += &record_groups();
         text += &texels();
     }
@@ -191,60 +223,8 @@ fn texels() -> String {
         let number = name.to_uppercase();
         let sample = sample(&name, &number);
         text += &format!(
-            "    if (TEXTURES & (1u << {number})) != 0u && view.counts.z == {number} {{ color = {sample}; }}\n"
+            "    if (TEXTURES & (1u << {number})) != 0u && views[view_number].counts.z == {number} {{ color = {sample}; }}\n"
         );
     }
     text + "    return color;\n}\n"
-}
-
-/// The module for pictures of two views. The view is selected by the view index that each entry
-/// point receives.
-pub fn of_two_views() -> String {
-    let one = source(Granularity::None, AlphaSource::Color);
-    let declaration = "var<uniform> view: View;";
-    let two = "var<uniform> views: array<View, 2>;\nvar<private> view_number: u32;";
-    assert!(one.contains(declaration), "the shader declares its view");
-    let text = one
-        .replace(declaration, two)
-        .replace("view.", "views[view_number].");
-    let mut told = String::with_capacity(text.len());
-    let mut rest = text.as_str();
-    while let Some(stage) = ["@vertex", "@fragment"]
-        .iter()
-        .filter_map(|s| rest.find(s))
-        .min()
-    {
-        // `fn name(parameters) -> result {`, possibly over several lines.
-        let opening = rest[stage..]
-            .find("fn ")
-            .and_then(|f| Some(stage + f + rest[stage + f..].find('(')? + 1));
-        let body = opening.and_then(|o| Some(o + rest[o..].find("{\n")? + 2));
-        let (Some(opening), Some(body)) = (opening, body) else {
-            break;
-        };
-        told += &rest[..opening];
-        told += "@builtin(view_index) view_index: u32, ";
-        told += &rest[opening..body];
-        told += "    view_number = view_index;\n";
-        rest = &rest[body..];
-    }
-    told + rest
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_entry_point_for_two_views_receives_its_view_index() {
-        let (one, two) = (
-            source(Granularity::None, AlphaSource::Color),
-            of_two_views(),
-        );
-        let entries = one.matches("@vertex").count() + one.matches("@fragment").count();
-        assert!(entries >= 6, "{entries}");
-        assert_eq!(two.matches("@builtin(view_index)").count(), entries);
-        assert_eq!(two.matches("view_number = view_index;").count(), entries);
-        assert!(!two.contains(" view."), "every use of the view names which");
-    }
 }

@@ -6,7 +6,8 @@ use super::whole::{OverLayer, Whole};
 use crate::error::RasterError;
 use crate::roles::{PipelineKey, Role};
 use crate::shader::{
-    self, ALPHA_BINDING, AlphaSource, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING,
+    self, ALPHA_BINDING, AlphaSource, Granularity, MATERIAL_BINDING, SAMPLERS_BINDING,
+    TEXTURES_BINDING,
 };
 use crate::vertices::{COLOR_STRIDE, VERTEX_STRIDE};
 use std::collections::BTreeMap;
@@ -68,7 +69,7 @@ impl Pipelines {
     /// # Errors
     /// Driver and validation errors.
     pub fn new(gpu: &Gpu, alpha: AlphaSource) -> Result<Self, RasterError> {
-        Self::compile(gpu, &shader::source(gpu.granularity(), alpha), None)
+        Self::compile(gpu, gpu.granularity(), alpha, None)
     }
 
     /// Compiles the shader for pictures of two views.
@@ -76,12 +77,14 @@ impl Pipelines {
     /// # Errors
     /// Driver and validation errors.
     pub fn for_both_views(gpu: &Gpu) -> Result<Self, RasterError> {
-        Self::compile(gpu, &shader::of_two_views(), Some(VIEWS))
+        let (granularity, alpha) = (Granularity::TwoViews, AlphaSource::Color);
+        Self::compile(gpu, granularity, alpha, Some(VIEWS))
     }
 
     fn compile(
         gpu: &Gpu,
-        source: &str,
+        granularity: Granularity,
+        alpha: AlphaSource,
         multiview_mask: Option<NonZeroU32>,
     ) -> Result<Self, RasterError> {
         gpu.checked("compiling the shader", || {
@@ -89,7 +92,7 @@ impl Pipelines {
                 .device
                 .create_shader_module(wgpu::ShaderModuleDescriptor {
                     label: Some("capture"),
-                    source: wgpu::ShaderSource::Wgsl(source.into()),
+                    source: wgpu::ShaderSource::Wgsl(shader::source(granularity, alpha).into()),
                 });
             let layouts = Layouts {
                 view: bindings::layout(gpu, "view", view_bindings()),

@@ -56,7 +56,7 @@ fn fragment_count() -> @location(0) vec4<f32> {
 // Marks a draw as visible, and as visible through the lens. Whoever writes a word writes the same.
 fn mark(in: Fragment) {
     marks[2u * in.ids.x] = 1u;
-    let from_center = (in.position.xy - view.lens.xy) * view.lens.zw;
+    let from_center = (in.position.xy - views[view_number].lens.xy) * views[view_number].lens.zw;
     if dot(from_center, from_center) <= 1.0 { marks[2u * in.ids.x + 1u] = 1u; }
 }
 

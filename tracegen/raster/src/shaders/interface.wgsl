@@ -62,7 +62,8 @@ struct Material {
     uv_rows: array<vec4<f32>, 2u * MATERIAL_TEXTURES>,
 }
 
-@group(0) @binding(VIEW_BINDING) var<uniform> view: View;
+// The views that are drawn at once; `view_number` is that of the invocation (one_view.wgsl, two_views.wgsl).
+@group(0) @binding(VIEW_BINDING) var<uniform> views: array<View, VIEW_COUNT>;
 @group(0) @binding(INSTANCES_BINDING) var<storage, read> instances: array<Instance>;
 @group(0) @binding(COUNTER_BINDING) var<storage, read_write> counter: atomic<u32>;
 @group(0) @binding(RECORDS_BINDING) var<storage, read_write> records: array<vec4<u32>>;
@@ -101,7 +102,7 @@ fn transform(in: Vertex, color: vec4<f32>) -> Fragment {
     let world = product(instance.world_from_object, vec4(in.position, 1.0));
     let n = instance.normal_from_object;
     var out: Fragment;
-    out.position = placed(product(view.clip_from_world, world));
+    out.position = placed(product(views[view_number].clip_from_world, world));
     out.world = world.xyz;
     out.normal = turned(n, in.normal);
     out.tangent = vec4(turned(instance.world_from_object, in.tangent.xyz), in.tangent.w);
@@ -109,14 +110,4 @@ fn transform(in: Vertex, color: vec4<f32>) -> Fragment {
     out.ids = bitcast<vec2<u32>>(n[3].xy);
     out.color = color;
     return out;
-}
-
-@vertex
-fn vertex_main(in: Vertex) -> Fragment {
-    return transform(in, vec4(1.0));
-}
-
-@vertex
-fn vertex_colored(in: Vertex, @location(5) color: vec4<f32>) -> Fragment {
-    return transform(in, color);
 }

@@ -1,8 +1,7 @@
-// Fragment entry points, the background and shadow maps.
+// Fragments of masked draws, the background and shadow maps.
 
 // Colour of an alpha-masked draw: depth is tested and written after the discard.
-@fragment
-fn fragment_masked(in: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+fn masked(in: Fragment, front: bool) -> vec4<f32> {
     let base = base_color(in);
     let geometric = select(-1.0, 1.0, front) * safe_normalize(in.normal);
     let found = find_cascade(in.world, geometric);
@@ -17,19 +16,17 @@ struct Background {
 }
 
 // One triangle over the view at the far plane; it also clears the region's depth.
-@vertex
-fn vertex_background(@builtin(vertex_index) index: u32) -> Background {
+fn background_corner(index: u32) -> Background {
     let ndc = vec2(f32((index << 1u) & 2u), f32(index & 2u)) * 2.0 - 1.0;
     // Of a far plane at infinity, only the direction is known: its w is 0.
-    let far = view.world_from_clip * vec4(ndc, 0.0, 1.0);
+    let far = views[view_number].world_from_clip * vec4(ndc, 0.0, 1.0);
     var out: Background;
     out.position = placed(vec4(ndc, 0.0, 1.0));
-    out.direction = far.xyz - view.eye.xyz * far.w;
+    out.direction = far.xyz - views[view_number].eye.xyz * far.w;
     return out;
 }
 
-@fragment
-fn fragment_background(in: Background) -> @location(0) vec4<f32> {
+fn background_color(in: Background) -> vec4<f32> {
     let direction = safe_normalize(in.direction);
     return vec4(tone_map(background(direction)), 1.0);
 }

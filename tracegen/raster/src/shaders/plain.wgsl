@@ -1,7 +1,6 @@
-// In place of recording.wgsl and capturing.wgsl on devices that cannot capture.
+// In place of recording.wgsl and capturing.wgsl where nothing is captured.
 
-@fragment
-fn fragment_early(in: Fragment, @builtin(front_facing) front: bool) -> @location(0) vec4<f32> {
+fn shaded(in: Fragment, front: bool) -> vec4<f32> {
     let geometric = select(-1.0, 1.0, front) * safe_normalize(in.normal);
     return shade(in, front, base_color(in), find_cascade(in.world, geometric));
 }

@@ -30,7 +30,7 @@ fn lane_at(in: Fragment, primitive: u32, invocation: u32) -> Lane {
 // cost them little more than one.
 fn append(lane: Lane, mask: u32, group: u32, a: vec4<f32>, b: vec4<f32>) -> u32 {
     let index = atomicAdd(&counter, 1u);
-    if index < view.counts.y {
+    if index < views[view_number].counts.y {
         let first = index * RECORD_VECTORS;
         let header = lane.quad | (mask << 24u) | (group << 28u);
         records[first] = vec4(header, lane.primitive, lane.draw, lane.passing);
@@ -76,7 +76,7 @@ fn record_depth(lane: Lane, index: u32, depth: f32) {
     let dx = dpdx(depth);
     let dy = dpdy(depth);
     let cross = dpdx(dy);
-    if index < view.counts.y {
+    if index < views[view_number].counts.y {
         let right = f32(lane.index & 1u);
         let down = f32(lane.index >> 1u);
         let dx_top = dx - down * cross;

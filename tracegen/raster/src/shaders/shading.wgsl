@@ -56,8 +56,8 @@ fn safe_normalize(v: vec3<f32>) -> vec3<f32> {
 fn shadow_coordinates(cascade: u32, world: vec3<f32>, normal: vec3<f32>) -> vec3<f32> {
     // Pushing the receiver off its surface by a little more than a texel hides the stairs that
     // the map's resolution leaves on slanted surfaces.
-    let offset = normal * (1.6 * view.shadow_texel_m[cascade]);
-    return product(view.cascades[cascade], vec4(world + offset, 1.0)).xyz;
+    let offset = normal * (1.6 * views[view_number].shadow_texel_m[cascade]);
+    return product(views[view_number].cascades[cascade], vec4(world + offset, 1.0)).xyz;
 }
 
 // A margin of two texels keeps every tap inside the map.
@@ -130,14 +130,14 @@ fn reflect_light(s: Surface, to_light: vec3<f32>) -> vec3<f32> {
 
 // Mean radiance over the hemisphere around a direction, as scene::light::Sky has it.
 fn ambient(direction: vec3<f32>) -> vec3<f32> {
-    return mix(view.ground.rgb, view.sky.rgb, 0.5 + 0.5 * direction.y);
+    return mix(views[view_number].ground.rgb, views[view_number].sky.rgb, 0.5 + 0.5 * direction.y);
 }
 
 // Radiance from a direction, as scene::light::Sky has it.
 fn background(direction: vec3<f32>) -> vec3<f32> {
-    let zenith = view.sky.rgb * vec3(0.75, 0.85, 1.0);
-    let sky = mix(view.sky.rgb, zenith, clamp(direction.y, 0.0, 1.0));
-    return mix(view.ground.rgb, sky, smoothstep(-0.1, 0.02, direction.y));
+    let zenith = views[view_number].sky.rgb * vec3(0.75, 0.85, 1.0);
+    let sky = mix(views[view_number].sky.rgb, zenith, clamp(direction.y, 0.0, 1.0));
+    return mix(views[view_number].ground.rgb, sky, smoothstep(-0.1, 0.02, direction.y));
 }
 
 // Narkowicz 2015, a fit of the ACES filmic curve.
@@ -176,13 +176,13 @@ fn shade(in: Fragment, front: bool, base: vec4<f32>, found: ShadowLookup) -> vec
     s.f0 = mix(0.04 * specular, base.rgb, metalness);
     s.alpha = max(roughness * roughness, 0.02);
     s.normal = normal;
-    s.to_eye = safe_normalize(view.eye.xyz - in.world);
+    s.to_eye = safe_normalize(views[view_number].eye.xyz - in.world);
 
-    light += reflect_light(s, view.to_sun.xyz) * view.sun.rgb * sunlit(found);
-    for (var k = 0u; k < view.counts.x; k++) {
-        let to_light = view.points[k].position.xyz - in.world;
+    light += reflect_light(s, views[view_number].to_sun.xyz) * views[view_number].sun.rgb * sunlit(found);
+    for (var k = 0u; k < views[view_number].counts.x; k++) {
+        let to_light = views[view_number].points[k].position.xyz - in.world;
         let falloff = 1.0 / max(dot(to_light, to_light), 0.01);
-        light += reflect_light(s, safe_normalize(to_light)) * view.points[k].intensity.rgb * falloff;
+        light += reflect_light(s, safe_normalize(to_light)) * views[view_number].points[k].intensity.rgb * falloff;
     }
     let mirror = reflect(-s.to_eye, normal);
     let gloss = (1.0 - roughness) * (1.0 - roughness);

@@ -6,11 +6,11 @@ struct Texel {
     @location(1) primitive: u32,
 }
 
-// The texture in slot view.counts.z.
+// The texture in slot views[view_number].counts.z.
 fn texel(in: Fragment, primitive: u32) -> Texel {
     var out: Texel;
     out.primitive = NONE;
-    let slot = view.counts.z;
+    let slot = views[view_number].counts.z;
     out.color = texel_of(in);
     if (TEXTURES & (1u << slot)) != 0u { out.primitive = in.ids.y + primitive; }
     return out;
