@@ -45,13 +45,6 @@ const LIBRARY: &str = "libparallax_layer.so";
 /// File that is locked while a capture runs.
 const LOCK: &str = "lock";
 
-/// Folders in which drivers register with the loader.
-const DRIVER_FOLDERS: [&str; 3] = [
-    "/usr/share/vulkan/icd.d",
-    "/etc/vulkan/icd.d",
-    "/usr/local/share/vulkan/icd.d",
-];
-
 /// A capture: its folder, which is removed at the end, and the page of memory shared with the programs.
 #[derive(Debug)]
 pub struct Launch {
@@ -74,7 +67,10 @@ impl Launch {
         let library = library(tool)?;
         let driver = match loader::driver_of_user()? {
             Some(_) => None,
-            None => Some(lavapipe().ok_or(LaunchError::NoDriver)?),
+            None => {
+                let installed = mesa::driver_files().into_iter().next();
+                Some(installed.ok_or(LaunchError::NoDriver)?)
+            }
         };
         remove_abandoned(parent);
         let set_up = || {
@@ -167,25 +163,6 @@ fn library(tool: &Path) -> Result<PathBuf, LaunchError> {
     found
         .cloned()
         .ok_or_else(|| LaunchError::NoLayer(beside.display().to_string()))
-}
-
-fn lavapipe() -> Option<PathBuf> {
-    let files = DRIVER_FOLDERS
-        .iter()
-        .filter_map(|folder| fs::read_dir(folder).ok())
-        .flatten();
-    let mut found: Vec<PathBuf> = files
-        .filter_map(|file| Some(file.ok()?.path()))
-        .filter(|path| {
-            let name = path
-                .file_name()
-                .and_then(|name| name.to_str())
-                .unwrap_or("");
-            name.starts_with("lvp_icd") && name.ends_with(".json") && !name.contains("i686")
-        })
-        .collect();
-    found.sort();
-    found.into_iter().next()
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use crate::inject::Target;
 use crate::record_buffer::RecordBuffer;
 use crate::track::Tracker;
 use ash::vk;
+use mesa::SUBGROUP_LANES;
 use spool::{Event, ShaderInfo};
 use std::collections::HashMap;
 use std::ffi::CStr;
@@ -81,10 +82,6 @@ unsafe impl Sync for Device {}
 static NUMBER: AtomicU32 = AtomicU32::new(0);
 
 static DEVICES: LazyLock<RwLock<HashMap<usize, Arc<Device>>>> = LazyLock::new(RwLock::default);
-
-/// Smallest number of lanes in a subgroup at which ballots are reliable. With narrower vectors, ballots of
-/// Mesa 22.3 corrupt memory.
-const SUBGROUP_LANES: u32 = 8;
 
 /// Timeout for pending submissions when a device is destroyed, at which all commands must have ended.
 const DESTROY_TIMEOUT: Duration = Duration::from_secs(1);

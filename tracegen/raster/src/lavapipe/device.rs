@@ -2,6 +2,7 @@
 
 use crate::error::RasterError;
 use crate::shader::Granularity;
+use mesa::SUBGROUP_LANES;
 
 /// An opened lavapipe.
 pub struct Gpu {
@@ -22,10 +23,6 @@ pub struct Gpu {
     /// Reason for recording fragments one by one instead of quad by quad, if they are.
     pub by_fragment: Option<String>,
 }
-
-/// Lanes of a subgroup at llvmpipe's native 256-bit vectors: two quads. At 128 bits its ballot
-/// corrupts memory (Mesa 22.3), so with any other size fragments are recorded one by one.
-const SUBGROUP_LANES: u32 = 8;
 
 /// Features and limits that captures require.
 const CAPTURE_FEATURES: wgpu::Features = wgpu::Features::PRIMITIVE_INDEX

@@ -6,13 +6,6 @@ use std::path::{Path, PathBuf};
 /// Library of Vulkan's loader.
 const LOADER: &str = "libvulkan.so.1";
 
-/// Folders of the files in which drivers name their library.
-const FOLDERS: [&str; 3] = [
-    "/usr/local/share/vulkan/icd.d",
-    "/etc/vulkan/icd.d",
-    "/usr/share/vulkan/icd.d",
-];
-
 /// Approximate address space that lavapipe needs in addition to its libraries.
 const NEEDED_BYTES: usize = 512 << 20;
 
@@ -30,20 +23,11 @@ pub(super) fn reason() -> Option<String> {
         .or_else(little_memory)
 }
 
-/// Lavapipe's libraries, read from its description files.
+/// Lavapipe's libraries, read from its driver files.
 fn installed() -> Vec<PathBuf> {
-    let folders = FOLDERS.iter().filter_map(|f| std::fs::read_dir(f).ok());
-    let files = folders.flatten().flatten().map(|entry| entry.path());
-    let named = |path: &PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        name.starts_with("lvp_icd") && name.ends_with(".json")
-    };
-    let text = |path: PathBuf| std::fs::read_to_string(path).ok();
-    files
-        .filter(named)
-        .filter_map(text)
-        .filter_map(|text| library_of(&text))
-        .collect()
+    let text = |path| std::fs::read_to_string(path).ok();
+    let texts = mesa::driver_files().into_iter().filter_map(text);
+    texts.filter_map(|text| library_of(&text)).collect()
 }
 
 /// The value of `library_path`.
