@@ -9,7 +9,7 @@ use std::time::Instant;
 
 /// Number of the current frame, by each way of counting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Place {
+pub(crate) struct FrameNumbers {
     pub frame: u32,
     /// Number if waits separate frames; `None` once something else does.
     pub by_waits: Option<u32>,
@@ -99,8 +99,8 @@ impl Capture {
     }
 
     /// The current frame.
-    pub fn place(&self) -> Place {
-        Place {
+    pub fn place(&self) -> FrameNumbers {
+        FrameNumbers {
             frame: self.frame(),
             by_waits: self.frame_by_waits(),
         }
@@ -124,7 +124,7 @@ impl Capture {
     }
 
     /// Whether the launcher requested a frame.
-    pub fn wants(&self, place: Place) -> bool {
+    pub fn wants(&self, place: FrameNumbers) -> bool {
         self.wants_number(place.frame) || place.by_waits.is_some_and(|f| self.wants_number(f))
     }
 
@@ -137,7 +137,7 @@ impl Capture {
     /// the next frame before they submit those of the current one.
     pub fn may_want_commands(&self) -> bool {
         let now = self.place();
-        let next = Place {
+        let next = FrameNumbers {
             frame: now.frame.saturating_add(1),
             by_waits: now.by_waits.map(|frame| frame.saturating_add(1)),
         };

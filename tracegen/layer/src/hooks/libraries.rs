@@ -8,8 +8,7 @@ use ash::vk::{self, TaggedStructure};
 use std::ffi::c_void;
 use std::sync::Arc;
 
-/// Parts of a pipeline.
-pub(super) type Parts = vk::GraphicsPipelineLibraryFlagsEXT;
+pub(super) use crate::track::Parts;
 
 /// Whether a description is of a library.
 ///
@@ -47,7 +46,7 @@ pub(super) unsafe fn own_parts(info: &vk::GraphicsPipelineCreateInfo<'_>) -> Par
 }
 
 /// A library of a description: its handle and, if it is tracked, its properties.
-pub(super) type Link = (vk::Pipeline, Option<Arc<Library>>);
+pub(super) type LinkedLibrary = (vk::Pipeline, Option<Arc<Library>>);
 
 /// Libraries of a description.
 ///
@@ -56,7 +55,7 @@ pub(super) type Link = (vk::Pipeline, Option<Arc<Library>>);
 pub(super) unsafe fn links(
     device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
-) -> Vec<Link> {
+) -> Vec<LinkedLibrary> {
     // SAFETY: as the caller promises.
     let handles = unsafe {
         find::<vk::PipelineLibraryCreateInfoKHR<'_>>(info.p_next)

@@ -4,7 +4,7 @@
 //! submission that waits for the host ends later, so its hook must not wait. Its records are read in a later call.
 
 use super::device::Device;
-use crate::capture::Place;
+use crate::capture::FrameNumbers;
 use crate::track::Executed;
 use ash::vk;
 use spool::{DispatchInfo, Event, Span};
@@ -23,7 +23,7 @@ pub(super) struct Pending {
 
 /// A submission of a requested frame.
 pub(super) struct Submission {
-    pub place: Place,
+    pub place: FrameNumbers,
     pub draws: Vec<Executed>,
     pub dispatches: Vec<DispatchInfo>,
 }
@@ -143,7 +143,7 @@ pub(super) unsafe fn read_ended(device: &Device, pending: &mut Pending, timeout:
 /// The submissions have ended.
 unsafe fn write_records(device: &Device, submissions: Vec<Submission>) {
     let capture = device.capture;
-    let mut frames: BTreeMap<Place, (Vec<Executed>, Vec<DispatchInfo>)> = BTreeMap::new();
+    let mut frames: BTreeMap<FrameNumbers, (Vec<Executed>, Vec<DispatchInfo>)> = BTreeMap::new();
     for submission in submissions {
         let (draws, dispatches) = frames.entry(submission.place).or_default();
         draws.extend(submission.draws);
@@ -198,8 +198,11 @@ fn number_and_pass(item: &Executed) -> [u32; 2] {
 }
 
 /// Reports draws of several frames whose records cannot be told apart, because the frames ended together.
-fn note_mixed(device: &Device, frames: &BTreeMap<Place, (Vec<Executed>, Vec<DispatchInfo>)>) {
-    let mut seen: HashMap<u32, Place> = HashMap::new();
+fn note_mixed(
+    device: &Device,
+    frames: &BTreeMap<FrameNumbers, (Vec<Executed>, Vec<DispatchInfo>)>,
+) {
+    let mut seen: HashMap<u32, FrameNumbers> = HashMap::new();
     let mut mixed = 0_u64;
     for (place, (draws, _)) in frames {
         for item in draws {

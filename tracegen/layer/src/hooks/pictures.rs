@@ -33,13 +33,13 @@ struct PassReadback {
 
 /// Format and aspect of a picture.
 #[derive(Clone, Copy)]
-struct Kind {
+struct PictureKind {
     format: vk::Format,
     aspect: vk::ImageAspectFlags,
 }
 
-impl Kind {
-    /// Kind of a colour target's picture: sRGB-encoded unless the target already is. `None` for integer
+impl PictureKind {
+    /// PictureKind of a colour target's picture: sRGB-encoded unless the target already is. `None` for integer
     /// formats.
     fn color(view: &ViewInfo) -> Option<Self> {
         let name = format!("{:?}", vk::Format::from_raw(view.format));
@@ -106,8 +106,8 @@ impl Pictures {
     /// The command buffer is being recorded, outside a render pass.
     pub unsafe fn take(&self, device: &Device, buffer: vk::CommandBuffer, pass: &PassInfo) {
         let (view, kind) = match (pass.colors.first(), &pass.depth) {
-            (Some(color), _) => (color, Kind::color(color)),
-            (None, Some(depth)) => (depth, Some(Kind::depth(depth))),
+            (Some(color), _) => (color, PictureKind::color(color)),
+            (None, Some(depth)) => (depth, Some(PictureKind::depth(depth))),
             (None, None) => return,
         };
         let (Some(kind), tracker) = (kind, device.tracker()) else {
@@ -180,7 +180,7 @@ impl PassReadback {
     ///
     /// # Safety
     /// The device is open.
-    unsafe fn new(device: &Device, pass: u32, size: [u32; 2], kind: Kind) -> Option<Self> {
+    unsafe fn new(device: &Device, pass: u32, size: [u32; 2], kind: PictureKind) -> Option<Self> {
         let (handle, next) = (device.handle, &device.next);
         let mut picture = Self {
             pass,

@@ -2,7 +2,7 @@
 
 use super::api::{find, slice};
 use super::device::{Device, DeviceRecorder, RecordingShader};
-use super::libraries::{self, Link, Parts};
+use super::libraries::{self, LinkedLibrary, Parts};
 use super::pipeline_state::{self, Changed};
 use super::recording_shaders::{recording_shader, without_module};
 use super::stage_reads;
@@ -112,7 +112,7 @@ unsafe fn fragment<'a>(
     recorder: &DeviceRecorder,
     info: &vk::GraphicsPipelineCreateInfo<'a>,
     own: Parts,
-    links: &[Link],
+    links: &[LinkedLibrary],
 ) -> Fragment<'a> {
     if !own.contains(Parts::FRAGMENT_SHADER) {
         let mut shaders = links.iter().filter_map(|(_, l)| l.as_ref()?.shader.clone());
@@ -189,7 +189,7 @@ unsafe fn view_mask(device: &Device, info: &vk::GraphicsPipelineCreateInfo<'_>) 
 unsafe fn recorded(
     device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
-    links: &[Link],
+    links: &[LinkedLibrary],
     fragment: &Fragment<'_>,
     mut pipeline: Pipeline,
 ) -> Pipeline {
@@ -225,7 +225,7 @@ unsafe fn recorded(
 unsafe fn with_variants(
     device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
-    links: &[Link],
+    links: &[LinkedLibrary],
     fragment: &Fragment<'_>,
     mut library: Library,
 ) -> Library {
@@ -293,7 +293,7 @@ fn bindings(shader: &ShaderInfo) -> Vec<(u32, u32)> {
 unsafe fn variant(
     device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
-    links: &[Link],
+    links: &[LinkedLibrary],
     fragment: &Fragment<'_>,
     quiet: bool,
 ) -> Result<(vk::Pipeline, Vec<vk::DynamicState>), String> {
@@ -320,7 +320,7 @@ unsafe fn linked(
     device: &Device,
     info: &vk::GraphicsPipelineCreateInfo<'_>,
     stages: Vec<vk::PipelineShaderStageCreateInfo<'_>>,
-    links: &[Link],
+    links: &[LinkedLibrary],
     quiet: bool,
 ) -> Result<(vk::Pipeline, Vec<vk::DynamicState>), String> {
     // SAFETY: as the caller promises. The chain lives until the end of the call.

@@ -25,7 +25,7 @@ pub(super) unsafe fn module_of(
             // The stage may contain its module.
             None => match find::<vk::ShaderModuleCreateInfo<'_>>(stage.p_next) {
                 Some(inline) => slice(inline.p_code, (inline.code_size / 4) as u32).into(),
-                None => return Err("a shader whose module is not device".to_owned()),
+                None => return Err("a shader whose module is not known".to_owned()),
             },
         };
         let entry = CStr::from_ptr(stage.p_name);

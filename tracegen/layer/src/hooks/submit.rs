@@ -19,12 +19,12 @@ struct Submitted {
 
 /// Semaphores that a sequence of submissions waits for and does not signal itself, with their values.
 #[derive(Default)]
-struct Waits {
+struct SemaphoreWaits {
     signalled: HashMap<vk::Semaphore, u64>,
     open: Vec<(vk::Semaphore, u64)>,
 }
 
-impl Waits {
+impl SemaphoreWaits {
     fn wait(&mut self, semaphore: vk::Semaphore, value: u64) {
         let signalled = self.signalled.get(&semaphore);
         if signalled.is_none_or(|signalled| *signalled < value) {
@@ -55,7 +55,7 @@ pub(super) unsafe extern "system" fn queue_submit(
     // SAFETY: a valid call of vkQueueSubmit.
     unsafe {
         let device = Device::of(queue);
-        let mut waits = Waits::default();
+        let mut waits = SemaphoreWaits::default();
         for info in slice(submits, count) {
             let Some(values) = find::<vk::TimelineSemaphoreSubmitInfo<'_>>(info.p_next) else {
                 continue;
@@ -91,7 +91,7 @@ pub(super) unsafe extern "system" fn queue_submit2(
     // SAFETY: a valid call of vkQueueSubmit2.
     unsafe {
         let device = Device::of(queue);
-        let (mut waits, mut buffers) = (Waits::default(), Vec::new());
+        let (mut waits, mut buffers) = (SemaphoreWaits::default(), Vec::new());
         for info in slice(submits, count) {
             for of in slice(info.p_wait_semaphore_infos, info.wait_semaphore_info_count) {
                 waits.wait(of.semaphore, of.value);
@@ -268,7 +268,7 @@ mod tests {
     #[test]
     fn only_semaphores_that_the_call_does_not_signal_before_are_open() {
         let [own, other] = [1, 2].map(vk::Semaphore::from_raw);
-        let mut waits = Waits::default();
+        let mut waits = SemaphoreWaits::default();
         waits.wait(other, 5);
         waits.signal(own, 7);
         waits.signal(own, 3);

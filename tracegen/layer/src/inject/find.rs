@@ -24,7 +24,7 @@ pub(super) struct Found {
 /// The texel read of an instruction; `None` if it reads no texels.
 pub(super) fn find(shader: &Shader, instruction: &Instruction) -> Option<Found> {
     let opcode = instruction.class.opcode;
-    let kind = kind(opcode)?;
+    let operation = operation(opcode)?;
     let ids = ids(instruction);
     let (image, coordinate) = (*ids.first()?, *ids.get(1)?);
     let left_out = |what: &str| Found {
@@ -42,9 +42,9 @@ pub(super) fn find(shader: &Shader, instruction: &Instruction) -> Option<Found> 
     let Some(image_type) = image_type(shader, image) else {
         return Some(left_out("images of unknown type"));
     };
-    let access = match kind {
-        Kind::Known(access) => access,
-        Kind::Other(what) => {
+    let access = match operation {
+        Operation::Known(access) => access,
+        Operation::Other(what) => {
             let is_subpass = image_type.dim == Dim::DimSubpassData;
             return Some(left_out(if is_subpass {
                 "input attachments"
@@ -112,7 +112,7 @@ pub(super) fn find(shader: &Shader, instruction: &Instruction) -> Option<Found> 
 }
 
 /// The operation of an opcode on an image.
-enum Kind {
+enum Operation {
     Known(Access),
     /// Not recorded, with its name for the report.
     Other(&'static str),
@@ -120,10 +120,10 @@ enum Kind {
 
 /// Whether an instruction reads texels.
 pub(super) fn reads_texels(opcode: Op) -> bool {
-    kind(opcode).is_some()
+    operation(opcode).is_some()
 }
 
-fn kind(opcode: Op) -> Option<Kind> {
+fn operation(opcode: Op) -> Option<Operation> {
     use Op::{
         ImageDrefGather, ImageFetch, ImageGather, ImageRead, ImageSampleDrefExplicitLod,
         ImageSampleDrefImplicitLod, ImageSampleExplicitLod, ImageSampleImplicitLod,
@@ -140,10 +140,10 @@ fn kind(opcode: Op) -> Option<Kind> {
         | ImageSampleProjImplicitLod
         | ImageSampleProjExplicitLod
         | ImageSampleProjDrefImplicitLod
-        | ImageSampleProjDrefExplicitLod => Some(Kind::Known(Access::Sample)),
-        ImageGather | ImageDrefGather => Some(Kind::Known(Access::Gather)),
-        ImageFetch => Some(Kind::Known(Access::Fetch)),
-        ImageRead | ImageTexelPointer => Some(Kind::Other("storage images")),
+        | ImageSampleProjDrefExplicitLod => Some(Operation::Known(Access::Sample)),
+        ImageGather | ImageDrefGather => Some(Operation::Known(Access::Gather)),
+        ImageFetch => Some(Operation::Known(Access::Fetch)),
+        ImageRead | ImageTexelPointer => Some(Operation::Other("storage images")),
         ImageSparseSampleImplicitLod
         | ImageSparseSampleExplicitLod
         | ImageSparseSampleDrefImplicitLod
@@ -151,7 +151,7 @@ fn kind(opcode: Op) -> Option<Kind> {
         | ImageSparseFetch
         | ImageSparseGather
         | ImageSparseDrefGather
-        | ImageSparseRead => Some(Kind::Other("sparse images")),
+        | ImageSparseRead => Some(Operation::Other("sparse images")),
         _ => None,
     }
 }

@@ -5,7 +5,7 @@ use super::writer::Writer;
 use rspirv::spirv::{Op, Word};
 
 /// Position of a fragment.
-pub(super) struct Place {
+pub(super) struct FragmentPlace {
     /// Lane of the quad.
     pub lane: Word,
     /// Column and row of the quad, and the view, packed into a word.
@@ -13,7 +13,7 @@ pub(super) struct Place {
 }
 
 /// Computes the position of the fragment.
-pub(super) fn place(w: &mut Writer<'_>, inputs: &Inputs) -> Place {
+pub(super) fn place(w: &mut Writer<'_>, inputs: &Inputs) -> FragmentPlace {
     let Types { f32, vec4, .. } = w.types;
     let Input { variable, .. } = inputs.frag_coord;
     let at = w.pure(Op::Load, vec4, &[variable]);
@@ -33,7 +33,7 @@ pub(super) fn place(w: &mut Writer<'_>, inputs: &Inputs) -> Place {
         let view = w.unsigned(Op::ShiftLeftLogical, &[view, view_shift]);
         packed = w.unsigned(Op::BitwiseOr, &[packed, view]);
     }
-    Place { lane, packed }
+    FragmentPlace { lane, packed }
 }
 
 /// The active lanes at a site, and the lane of this fragment.

@@ -13,7 +13,7 @@ pub use commands::{Call, CommandState, Commands, Copies, Dynamic, Effects, Execu
 pub use descriptors::{Descriptors, Template, TemplateEntry, Written};
 pub use images::Images;
 pub use passes::{Attachment, Passes, RenderPass, Subpass};
-pub use pipelines::{Compute, Layout, Library, Pipeline, Pipelines, Recorded, State};
+pub use pipelines::{Compute, Layout, Library, Parts, Pipeline, Pipelines, Recorded, State};
 
 use ash::vk::{self, Handle};
 use spool::{DrawInfo, TextureInfo};

@@ -7,7 +7,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// Parts of a pipeline (`VK_EXT_graphics_pipeline_library`).
-type Parts = vk::GraphicsPipelineLibraryFlagsEXT;
+pub type Parts = vk::GraphicsPipelineLibraryFlagsEXT;
 
 /// A pipeline layout.
 #[derive(Clone, Debug, Default)]

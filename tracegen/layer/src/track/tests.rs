@@ -332,7 +332,6 @@ fn a_subpass_resolves_attachments_by_the_images_of_its_framebuffer() {
 
 #[test]
 fn a_library_gives_its_parts_and_keeps_its_layout() {
-    use vk::GraphicsPipelineLibraryFlagsEXT as Parts;
     let mut tracker = Tracker::default();
     let (layout, handle) = (vk::PipelineLayout::from_raw(5), vk::Pipeline::from_raw(6));
     let viewport = vk::Viewport {
@@ -424,7 +423,6 @@ fn draws_have_the_reads_of_the_shaders_before_the_fragment_shader() {
         ..State::default()
     };
     let mut linked = State::default();
-    type Parts = vk::GraphicsPipelineLibraryFlagsEXT;
     linked.add(&library(&reads), Parts::FRAGMENT_SHADER);
     assert!(linked.reads.is_empty());
     linked.add(&library(&reads), Parts::PRE_RASTERIZATION_SHADERS);

@@ -19,7 +19,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
-use watch::Watch;
+use watch::PageWatch;
 
 /// A page and its settings.
 #[derive(Clone, Debug)]
@@ -136,7 +136,7 @@ const ARGUMENTS: [&str; 15] = [
 /// An open page.
 pub struct Tab {
     browser: Browser,
-    watch: Watch,
+    watch: PageWatch,
     frame_ms: f64,
 }
 
@@ -219,9 +219,9 @@ impl Tab {
                 command.envs(HOMES.map(|home| (home, folder)));
                 prepare(command);
             })?,
-            watch: Watch {
+            watch: PageWatch {
                 root: page.root.clone(),
-                ..Watch::default()
+                ..PageWatch::default()
             },
             frame_ms: page.frame_ms,
         };

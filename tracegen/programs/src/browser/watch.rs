@@ -8,7 +8,7 @@ use std::path::PathBuf;
 
 /// What a page did on its own.
 #[derive(Debug, Default)]
-pub struct Watch {
+pub struct PageWatch {
     /// Folder with the files of a local page.
     pub root: Option<PathBuf>,
     /// What the user should know, with the number of times.
@@ -19,7 +19,7 @@ pub struct Watch {
     pub left_for: Option<String>,
 }
 
-impl Watch {
+impl PageWatch {
     /// Handles an event; returns false for events that are left to the caller.
     ///
     /// # Errors

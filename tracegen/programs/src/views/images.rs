@@ -18,7 +18,7 @@ pub(super) struct Images {
 }
 
 /// Images of a page: its canvases, and what is read for them.
-pub(super) struct Page {
+pub(super) struct PageImages {
     images: HashSet<u32>,
     canvases: HashSet<u32>,
 }
@@ -79,16 +79,16 @@ impl Images {
     }
 
     /// The images of a page with these canvases; `None` if no canvas is known.
-    pub(super) fn of_page(&self, canvases: &[u32]) -> Option<Page> {
+    pub(super) fn of_page(&self, canvases: &[u32]) -> Option<PageImages> {
         let canvases: HashSet<u32> = canvases.iter().copied().collect();
-        (!canvases.is_empty()).then(|| Page {
+        (!canvases.is_empty()).then(|| PageImages {
             images: self.sources(canvases.iter().copied()),
             canvases,
         })
     }
 }
 
-impl Page {
+impl PageImages {
     /// Whether a draw is the page's: it draws into an image of the page, or reads one that is not a canvas.
     /// The browser reads only canvases.
     pub(super) fn has(&self, draw: &Drawn<'_>) -> bool {
