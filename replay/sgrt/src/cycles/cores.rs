@@ -1,6 +1,6 @@
 //! The shader cores: they work on one tile at a time, in order, after its rays have returned.
 
-use super::dram::Channel;
+use sim::memory::SimpleMemory;
 
 /// What the cores do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ impl Cores {
     }
 
     /// Starts a tile. Returns the cycle of the next event.
-    pub fn start(&mut self, now: u64, cycles: u64, lines: u64, dram: &mut Channel) -> u64 {
+    pub fn start(&mut self, now: u64, cycles: u64, lines: u64, dram: &mut SimpleMemory) -> u64 {
         let cycles = cycles.max(1);
         self.phase = Phase::Computing;
         dram.start_stream(now, cycles, lines);
@@ -41,7 +41,7 @@ impl Cores {
     }
 
     /// Handles the event of cycle `now`. Returns the cycle of the next event, or `None` if the tile is finished.
-    pub fn proceed(&mut self, now: u64, dram: &mut Channel) -> Option<u64> {
+    pub fn proceed(&mut self, now: u64, dram: &mut SimpleMemory) -> Option<u64> {
         if self.phase == Phase::Computing {
             let end = dram.end_stream(now);
             if end > now {

@@ -1,14 +1,17 @@
 //! The event loop of the simulation: units, caches, DRAM and cores.
 
 use super::batch::{Batch, BatchSource, Item};
-use super::calendar::Calendar;
 use super::cores::Cores;
 use super::counts::{Counts, Unbalanced};
 use super::event::{SLOT, key, phase};
 use super::machine::Machine;
 use super::memory::CacheMemory;
 use super::unit::Unit;
+use sim::memory::Calendar;
 use std::collections::VecDeque;
+
+/// Cycles that most events lie ahead at most; a queue for memory is rarely longer.
+const DAYS: u64 = 2047;
 
 /// The simulation of a frame.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -81,7 +84,8 @@ pub(super) struct Device<'m> {
     pub units: Vec<Unit>,
     pub memory: CacheMemory,
     cores: Cores,
-    pub calendar: Calendar,
+    /// Keys of [`super::event`] by cycle.
+    pub calendar: Calendar<u64>,
     /// Batches in tile buffers, in order.
     pub loaded: VecDeque<Loaded>,
     /// Number of the first of these.
@@ -105,7 +109,7 @@ impl<'m> Device<'m> {
             units: (0..machine.units).map(|_| Unit::new(machine)).collect(),
             memory: CacheMemory::new(machine),
             cores: Cores::new(),
-            calendar: Calendar::new(),
+            calendar: Calendar::new(DAYS),
             loaded: VecDeque::new(),
             first: 0,
             spare: Vec::new(),

@@ -1,8 +1,8 @@
 //! The configuration of the simulation in whole cycles of the units' clock.
 
-use super::server::{TICKS, ticks};
 use crate::config::SgrtConfig;
 use formats::raytrace::TraversalKind;
+use sim::memory::{TICKS, ticks};
 
 /// A kind of pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

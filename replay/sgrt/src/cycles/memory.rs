@@ -5,9 +5,8 @@
 //! one, and nothing is fetched.
 
 use super::counts::{Counts, LineCounts};
-use super::dram::Channel;
 use super::machine::{CacheSize, Machine};
-use sim::memory::{AnyCache, Cache, Delay, DelayedFill, LimitedMshrs, NOT_IN_FLIGHT};
+use sim::memory::{AnyCache, Cache, Delay, DelayedFill, LimitedMshrs, NOT_IN_FLIGHT, SimpleMemory};
 use std::collections::VecDeque;
 
 /// A cache with its lines in flight, its MSHRs, and the rays that wait for one.
@@ -93,7 +92,7 @@ pub struct CacheMemory {
     /// The shared cache.
     pub l2: Level,
     /// The DRAM channel.
-    pub dram: Channel,
+    pub dram: SimpleMemory,
     l2_latency: u64,
 }
 
@@ -105,7 +104,7 @@ impl CacheMemory {
         Self {
             l1: (0..machine.units).flat_map(of_unit).collect(),
             l2: Level::new(machine.l2, usual),
-            dram: Channel::new(machine),
+            dram: SimpleMemory::new(machine.dram_latency, machine.dram_ticks_per_line),
             l2_latency: machine.l2_latency,
         }
     }

@@ -6,9 +6,7 @@
 //! | `machine` | the configuration in whole cycles |
 //! | `batch` | the input: rays and their requests, per tile of an eye |
 //! | `warp` | rays in lock step, merged into one sequence of requests |
-//! | `server` | pipelines and ports: first come, first served |
-//! | `calendar` | events by cycle, so that idle cycles cost nothing |
-//! | `dram` | the channel that the L2 and the shader cores share |
+//! | [`sim::memory`] | the calendar of events, pipelines and ports as servers, and the channel that the L2 and the cores share |
 //! | `memory` | L1 caches, L2, and their MSHRs |
 //! | `unit` | ray slots, pipelines, return of rays, stall causes |
 //! | `cores` | tile buffers and the shader cores |
@@ -31,16 +29,13 @@
 //! Engine", SIGGRAPH Asia 2011), and then queues. A ray whose miss finds all MSHRs in use waits for a free one.
 
 mod batch;
-mod calendar;
 mod cores;
 mod counts;
 mod device;
-mod dram;
 mod event;
 mod machine;
 mod memory;
 mod rays;
-mod server;
 mod unit;
 mod warp;
 

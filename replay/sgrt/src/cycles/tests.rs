@@ -1,11 +1,11 @@
 mod twin;
 
 use super::machine::{CacheSize, Pipelines};
-use super::server::TICKS;
 use super::*;
 use crate::config::SgrtConfig;
 use formats::raytrace::TraversalKind;
 use proptest::prelude::*;
+use sim::memory::TICKS;
 use std::convert::Infallible;
 use twin::twin;
 

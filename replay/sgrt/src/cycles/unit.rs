@@ -3,7 +3,7 @@
 use super::batch::{Item, Pipeline};
 use super::counts::UnitCycles;
 use super::machine::Machine;
-use super::server::Servers;
+use sim::memory::Servers;
 use std::collections::VecDeque;
 
 /// What the ray or warp of a slot does.

@@ -5,7 +5,7 @@ use super::super::batch::{Batch, Item, Pipeline, Request};
 use super::super::counts::{Counts, LineCounts};
 use super::super::device::{BatchTiming, Simulated};
 use super::super::machine::{CacheSize, Machine};
-use super::super::server::TICKS;
+use sim::memory::TICKS;
 use std::collections::VecDeque;
 
 /// A cache: per set the resident lines, most recently used first, and the lines in flight in order of request.

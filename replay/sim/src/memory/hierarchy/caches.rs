@@ -11,13 +11,6 @@ pub struct Caches<C> {
     pub l2: Vec<C>,
 }
 
-/// The cache of a level that a core uses.
-#[inline(always)]
-pub(super) fn of_core<C>(caches: &mut [C], core: usize) -> &mut C {
-    let last = caches.len() - 1;
-    &mut caches[core.min(last)]
-}
-
 impl<C> Caches<C> {
     fn map<D>(self, turn: impl Fn(C) -> D) -> Caches<D> {
         Caches {

@@ -28,18 +28,16 @@ impl Evictions {
 
     /// Processes the evictions of the L2 and of lower levels since the last call. `remove` removes
     /// a line from all L2 caches and returns how many held it.
-    pub fn follow(&mut self, below: Option<&mut Below>, mut remove: impl FnMut(u32) -> u64) {
+    pub fn follow(&mut self, below: &mut Below, mut remove: impl FnMut(u32) -> u64) {
         if self.is_l2_inclusive {
             self.invalidated.extend_from_slice(&self.evicted);
         }
-        if let Some(below) = below {
-            for &line in &self.evicted {
-                below.take_evicted_by_l2(line);
-            }
-            for line in below.take_invalidated().into_iter().flatten() {
-                self.invalidated_lines += remove(line);
-                self.invalidated.push(line);
-            }
+        for &line in &self.evicted {
+            below.take_evicted_by_l2(line);
+        }
+        for line in below.take_invalidated().into_iter().flatten() {
+            self.invalidated_lines += remove(line);
+            self.invalidated.push(line);
         }
         self.evicted.clear();
     }

@@ -4,6 +4,7 @@ mod at_once;
 mod below;
 mod caches;
 mod inclusion;
+mod level;
 mod other_work;
 mod second_level;
 

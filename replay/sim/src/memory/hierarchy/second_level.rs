@@ -1,8 +1,8 @@
 //! The L2 as seen by the L1 caches: one cache or one per core, with prefetchers and the path of their misses.
 
 use super::below::Below;
-use super::caches::of_core;
 use super::inclusion::Evictions;
+use super::level::{Level, LevelShape, of_core};
 use super::other_work::OtherWork;
 use crate::config::{ConfigError, PrefetchConfig, RunConfig};
 use crate::memory::cache::EMPTY;
@@ -16,7 +16,8 @@ use std::sync::Arc;
 
 /// The parts of a configuration beside and below the L2.
 pub struct MissPath {
-    below: Option<Below>,
+    l2: LevelShape,
+    below: Below,
     /// One per L2 cache; empty without prefetcher.
     prefetch: Vec<Prefetch>,
     /// One per L2 cache, if the number of MSHRs is limited.
@@ -25,10 +26,6 @@ pub struct MissPath {
     evictions: Option<Evictions>,
     /// True if a request has effects after its answer: prefetches or evictions to process.
     has_consequences: bool,
-    memory_cycles: u64,
-    line_bytes: u64,
-    /// True if the L2 holds lines of all clients.
-    is_for_all_clients: bool,
     /// Fetches per interval of time, if recorded.
     fetched_lines: Option<Vec<u32>>,
 }
@@ -37,14 +34,12 @@ impl MissPath {
     /// Memory directly below the L2, which is only counted.
     pub fn memory_alone() -> Self {
         Self {
-            below: None,
+            l2: LevelShape::alone(),
+            below: Below::memory_alone(0),
             prefetch: Vec::new(),
             mshrs: Vec::new(),
             evictions: None,
             has_consequences: false,
-            memory_cycles: 0,
-            line_bytes: 1,
-            is_for_all_clients: false,
             fetched_lines: None,
         }
     }
@@ -58,7 +53,9 @@ impl MissPath {
         let mshrs = config.tmu.l2_mshrs;
         let limited = caches.clone().filter(|_| mshrs > 0);
         let prefetchers = caches.filter_map(|_| config.prefetch.as_ref());
+        let l2 = LevelShape::all(config).nth(1);
         Ok(Self {
+            l2: l2.unwrap_or(LevelShape::alone()),
             below: Below::build(config)?,
             prefetch: prefetchers
                 .map(|prefetch| Prefetch::new(prefetch, config.line_bytes, layout))
@@ -66,9 +63,6 @@ impl MissPath {
             mshrs: limited.map(|_| LimitedMshrs::new(mshrs)).collect(),
             evictions: Evictions::build(config),
             has_consequences: config.prefetch.is_some() || config.level.depend_on_evictions(),
-            memory_cycles: config.memory_cycles.into(),
-            line_bytes: config.line_bytes.into(),
-            is_for_all_clients: !config.level.l2.clients.is_textures(),
             fetched_lines: config.timeline.then(Vec::new),
         })
     }
@@ -78,31 +72,17 @@ impl MissPath {
         self.evictions.is_some()
     }
 
-    /// Accesses memory for a client below the L2. Returns the bytes that lower levels serve.
-    fn client_access(&mut self, core: usize, access: &Access, now: Option<u64>) -> u64 {
-        let below = self.below.as_mut();
-        below.map_or(0, |below| below.client_access(core, access, now))
-    }
-
     /// Arrival of a line that the L2 requests at `now`.
     #[inline(always)]
     fn fetch<D: DelayedFill>(&mut self, core: usize, line: u32, now: u64) -> u64 {
         if !D::HAS_LATENCIES {
-            self.read_at_once(core, line);
+            self.below.read(core, line, None);
             return now;
         }
         if !self.mshrs.is_empty() {
             return self.fetch_by_mshr(core, line, now);
         }
         self.read(core, line, now)
-    }
-
-    /// Reads a line from below without time.
-    #[inline(always)]
-    fn read_at_once(&mut self, core: usize, line: u32) {
-        if let Some(below) = &mut self.below {
-            below.read(core, line, None);
-        }
     }
 
     #[inline(never)]
@@ -128,10 +108,7 @@ impl MissPath {
             }
             fetched_lines[interval] += 1;
         }
-        match &mut self.below {
-            None => now + self.memory_cycles,
-            Some(below) => below.read(core, line, Some(now)),
-        }
+        self.below.read(core, line, Some(now))
     }
 }
 
@@ -190,41 +167,41 @@ pub enum Answer {
 
 /// The L2 and everything beside and below it.
 pub struct SecondLevel<C> {
-    /// One cache, or one per core.
-    caches: Vec<C>,
+    level: Level<C>,
     path: MissPath,
 }
 
 impl<C> SecondLevel<C> {
     /// Empty caches above the path of their misses.
     pub fn new(caches: Vec<C>, path: MissPath) -> Self {
-        Self { caches, path }
+        let shape = path.l2;
+        Self {
+            level: Level { shape, caches },
+            path,
+        }
     }
 
     /// Delays DRAM requests from `cycle` on by the time that requests without a time have taken.
     pub fn catch_up(&mut self, cycle: u64) {
-        if let Some(below) = &mut self.path.below {
-            below.catch_up(cycle);
-        }
+        self.path.below.catch_up(cycle);
     }
 
     /// Accesses memory below the L2 for a client other than the texture units, while no core works.
     /// Returns the bytes that lower levels serve.
     pub fn idle_client_access(&mut self, access: &Access) -> u64 {
-        self.path.client_access(0, access, None)
+        self.path.below.client_access(0, access, None)
     }
 
     /// The cache that a core uses.
     #[inline(always)]
     pub fn cache(&mut self, core: usize) -> &mut C {
-        of_core(&mut self.caches, core)
+        self.level.cache(core)
     }
 
     /// Serves all requests and returns the counts beside and below the L2.
     pub fn result(&self) -> MemoryResult {
         let path = &self.path;
-        let (lower_levels, dram) =
-            (path.below.as_ref()).map_or_else(Default::default, Below::result);
+        let (lower_levels, dram) = path.below.result();
         let prefetch = path.prefetch.iter().map(|prefetch| prefetch.counts);
         let mshrs = path.mshrs.iter().map(|mshrs| mshrs.counts);
         MemoryResult {
@@ -264,9 +241,9 @@ impl<C: Cache> SecondLevel<Immediate<C>> {
     /// Looks up a line for a core and fills it on a miss. Returns true for a hit.
     #[inline(always)]
     pub fn access(&mut self, core: usize, line: u32) -> bool {
-        let hit = of_core(&mut self.caches, core).0.access(line);
+        let hit = self.level.cache(core).0.access(line);
         if !hit {
-            self.path.read_at_once(core, line);
+            self.path.below.read(core, line, None);
         }
         if self.path.has_consequences {
             let answer = if hit { Answer::Hit } else { Answer::Miss(0) };
@@ -281,7 +258,7 @@ impl<D: DelayedFill> SecondLevel<D> {
     /// Answers a core's request and fetches a missing line.
     #[inline(always)]
     pub fn request(&mut self, core: usize, line: u32, now: u64) -> Answer {
-        let cache = of_core(&mut self.caches, core);
+        let cache = self.level.cache(core);
         let answer = match cache.look_up(line, now) {
             0 => Answer::Hit,
             NOT_IN_FLIGHT => {
@@ -301,11 +278,12 @@ impl<D: DelayedFill> SecondLevel<D> {
     #[inline(never)]
     fn follow_evictions(&mut self, now: u64) {
         if let Some(evictions) = &mut self.path.evictions {
-            for cache in &mut self.caches {
+            let caches = &mut self.level.caches;
+            for cache in caches.iter_mut() {
                 cache.take_evicted(&mut evictions.evicted);
             }
-            evictions.follow(self.path.below.as_mut(), |line| {
-                let removed = self.caches.iter_mut().map(|cache| cache.remove(line, now));
+            evictions.follow(&mut self.path.below, |line| {
+                let removed = caches.iter_mut().map(|cache| cache.remove(line, now));
                 removed.map(u64::from).sum()
             });
         }
@@ -321,11 +299,11 @@ impl<D: DelayedFill> SecondLevel<D> {
 
     /// Accesses memory for a client other than the texture units. Returns the bytes that caches serve.
     pub fn client_access(&mut self, core: usize, access: &Access, now: u64) -> u64 {
-        if access.write || !self.path.is_for_all_clients {
+        if access.write || !self.level.shape.is_for_all_clients {
             let now = D::HAS_LATENCIES.then_some(now);
-            return self.path.client_access(core, access, now);
+            return self.path.below.client_access(core, access, now);
         }
-        let line_bytes = self.path.line_bytes;
+        let line_bytes = u64::from(self.level.shape.line_bytes);
         let last = access.address + access.bytes - 1;
         let lines = access.address / line_bytes..=last / line_bytes;
         let hits = lines.filter(|&line| self.request(core, line as u32, now) == Answer::Hit);
@@ -346,7 +324,7 @@ impl<D: DelayedFill> SecondLevel<D> {
     fn fetch_wanted(&mut self, core: usize, now: u64) {
         let wanted = std::mem::take(&mut of_core(&mut self.path.prefetch, core).wanted);
         for &line in &wanted {
-            let cache = of_core(&mut self.caches, core);
+            let cache = self.level.cache(core);
             if line != EMPTY && !cache.holds(line, now) {
                 if D::HAS_LATENCIES && self.path.is_busy(core, now) {
                     of_core(&mut self.path.prefetch, core).counts.dropped_lines += 1;
@@ -361,8 +339,8 @@ impl<D: DelayedFill> SecondLevel<D> {
 
     /// Empties the levels and drops the lines in flight.
     pub fn clear(&mut self) {
-        self.caches.iter_mut().for_each(D::clear);
-        self.path.below.iter_mut().for_each(Below::clear);
+        self.level.caches.iter_mut().for_each(D::clear);
+        self.path.below.clear();
         self.path.mshrs.iter_mut().for_each(LimitedMshrs::clear);
         for prefetch in &mut self.path.prefetch {
             prefetch.unused.clear();
@@ -371,7 +349,7 @@ impl<D: DelayedFill> SecondLevel<D> {
 
     /// Other work fills part of each cache. Its lines arrive at `now`.
     pub fn lose(&mut self, other: OtherWork, now: u64) {
-        for cache in &mut self.caches {
+        for cache in &mut self.level.caches {
             for line in other.l2_lines() {
                 let is_there = match D::HAS_LATENCIES {
                     true => cache.holds(line, now),
@@ -384,10 +362,7 @@ impl<D: DelayedFill> SecondLevel<D> {
         }
         // Evictions of the L2 enter an exclusive level before other work fills that level.
         self.follow_evictions(now);
-        self.path
-            .below
-            .iter_mut()
-            .for_each(|below| below.lose(other));
+        self.path.below.lose(other);
         self.follow_evictions(now);
     }
 }

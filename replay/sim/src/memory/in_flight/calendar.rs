@@ -1,14 +1,8 @@
 //! Misses in flight (MSHRs without a limit): lines that were requested and have not arrived.
-//! Further requests for such a line merge with its fetch.
-//!
-//! Arrivals are kept in a calendar queue: one list of lines for each of the next cycles and one bit
-//! per non-empty list, so that requests and arrivals need no search. Arrivals beyond the calendar's
-//! end wait in a heap; the default latencies never reach it.
+//! Further requests for such a line merge with its fetch. Arrivals are events of a calendar.
 
 use super::Cache;
-use crate::memory::busy_days::BusyDays;
-use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use crate::memory::calendar::Calendar;
 
 /// No entry.
 const NONE: u32 = u32::MAX;
@@ -22,16 +16,7 @@ struct Entry {
     line: u32,
     /// Next entry of its chain, or next free entry.
     chained: u32,
-    /// Next entry of the same cycle, in order of request.
-    later: u32,
     cycle: u64,
-}
-
-/// First and last entry of a cycle.
-#[derive(Clone, Copy, Debug)]
-struct Day {
-    first: u32,
-    last: u32,
 }
 
 /// Lines in flight into one cache.
@@ -41,40 +26,32 @@ pub struct InFlight {
     free: u32,
     /// First entry of each chain.
     chains: Vec<u32>,
-    /// By the low bits of the cycle; the length is a power of two.
-    days: Vec<Day>,
-    /// Days with entries.
-    busy: BusyDays,
-    /// The earliest cycle with work to do.
-    wake: u64,
-    /// Arrivals beyond the calendar, earliest on top. The count keeps equal arrivals in order of request.
-    late: BinaryHeap<Reverse<(u64, u64, u32)>>,
+    /// Arrivals: the number of the request, which orders equal arrivals, and the entry.
+    arrivals: Calendar<(u64, u32)>,
+    /// Arrivals of the last cycle.
+    arrived: Vec<(u64, u32)>,
     requests: u64,
 }
 
 impl InFlight {
-    /// An empty calendar; most lines should arrive within `usual_cycles`.
+    /// No lines; most should arrive within `usual_cycles`.
     pub fn new(usual_cycles: u64) -> Self {
-        let days = (usual_cycles + 1).next_power_of_two().clamp(64, 4096) as usize;
-        let empty = Day {
-            first: NONE,
-            last: NONE,
-        };
         Self {
             entries: Vec::new(),
             free: NONE,
             chains: vec![NONE; CHAINS],
-            days: vec![empty; days],
-            busy: BusyDays::new(days),
-            wake: u64::MAX,
-            late: BinaryHeap::new(),
+            arrivals: Calendar::new(usual_cycles),
+            arrived: Vec::new(),
             requests: 0,
         }
     }
 
     /// Drops all lines in flight.
     pub fn clear(&mut self) {
-        *self = Self::new(self.days.len() as u64 - 1);
+        self.entries.clear();
+        self.free = NONE;
+        self.chains.fill(NONE);
+        self.arrivals.clear();
     }
 
     /// Arrival of the line, if it is in flight.
@@ -94,104 +71,46 @@ impl InFlight {
     /// Adds a line, not yet in flight, that arrives at `cycle`, after `now`. All arrivals up to
     /// `now` must have been processed by [`Self::arrive`].
     pub fn request(&mut self, line: u32, now: u64, cycle: u64) {
+        let chain = &mut self.chains[line as usize % CHAINS];
         let entry = Entry {
             line,
-            chained: self.chains[line as usize % CHAINS],
-            later: NONE,
+            chained: *chain,
             cycle,
         };
-        let at = match self.entries.get(self.free as usize) {
-            Some(free) => std::mem::replace(&mut self.free, free.chained),
+        let at = match self.entries.get_mut(self.free as usize) {
+            Some(free) => {
+                let next = std::mem::replace(free, entry).chained;
+                std::mem::replace(&mut self.free, next)
+            }
             None => {
                 self.entries.push(entry);
                 self.entries.len() as u32 - 1
             }
         };
-        self.entries[at as usize] = entry;
-        self.chains[line as usize % CHAINS] = at;
-        let days = self.days.len() as u64;
-        if cycle - now < days {
-            self.enter(at);
-        } else {
-            self.late.push(Reverse((cycle, self.requests, at)));
-            self.requests += 1;
-            self.wake = self.wake.min(cycle - days + 1);
-        }
-    }
-
-    /// Adds an entry to the calendar, after those of the same cycle.
-    fn enter(&mut self, at: u32) {
-        let cycle = self.entries[at as usize].cycle;
-        let day = cycle as usize & (self.days.len() - 1);
-        let Day { first, last } = self.days[day];
-        match self.entries.get_mut(last as usize) {
-            Some(last) => last.later = at,
-            None => self.busy.set(day),
-        }
-        self.days[day] = Day {
-            first: if first == NONE { at } else { first },
-            last: at,
-        };
-        self.wake = self.wake.min(cycle);
+        *chain = at;
+        self.arrivals.skip_to(now);
+        self.arrivals.push(cycle, (self.requests, at));
+        self.requests += 1;
     }
 
     /// Fills the lines that have arrived by `now` into the cache.
     #[inline(always)]
     pub fn arrive(&mut self, now: u64, cache: &mut impl Cache) {
-        if self.wake <= now {
-            self.wake_up(now, cache);
+        if self.arrivals.next() <= now {
+            self.fill(now, cache);
         }
     }
 
     #[inline(never)]
-    fn wake_up(&mut self, now: u64, cache: &mut impl Cache) {
-        // In order of time: late arrivals enter the calendar before its next day is processed.
-        while self.wake <= now {
-            let today = self.wake;
-            self.take(today, cache);
-            self.turn_to(today);
-        }
-        if !self.late.is_empty() {
-            // A request at `now` must queue behind earlier ones of the same cycle.
-            self.turn_to(now);
-        }
-    }
-
-    /// Advances the calendar to a day with no work left: moves late arrivals into it and finds the
-    /// next day with work.
-    fn turn_to(&mut self, today: u64) {
-        let days = self.days.len() as u64;
-        while let Some(&Reverse((cycle, _, at))) = self.late.peek() {
-            if cycle - today >= days {
-                break;
+    fn fill(&mut self, now: u64, cache: &mut impl Cache) {
+        let mut arrived = std::mem::take(&mut self.arrived);
+        while self.arrivals.next() <= now && self.arrivals.advance(&mut arrived).is_some() {
+            for &(_, at) in &arrived {
+                cache.fill(self.entries[at as usize].line);
+                self.forget(at);
             }
-            self.late.pop();
-            self.enter(at);
         }
-        let late = self.late.peek();
-        let admission = late.map_or(u64::MAX, |Reverse((cycle, ..))| cycle - days + 1);
-        self.wake = self
-            .busy
-            .first_from(today + 1)
-            .unwrap_or(u64::MAX)
-            .min(admission);
-    }
-
-    /// Fills all lines that arrive at a cycle, in order of request.
-    fn take(&mut self, cycle: u64, cache: &mut impl Cache) {
-        let day = cycle as usize & (self.days.len() - 1);
-        let mut at = self.days[day].first;
-        self.days[day] = Day {
-            first: NONE,
-            last: NONE,
-        };
-        self.busy.clear(day);
-        while at != NONE {
-            let Entry { line, later, .. } = self.entries[at as usize];
-            self.forget(at);
-            cache.fill(line);
-            at = later;
-        }
+        self.arrived = arrived;
     }
 
     /// Unlinks an entry from its chain and frees it.

@@ -96,7 +96,7 @@ proptest! {
         }).collect();
         let config = RunConfig { level: Levels::default().over(&levels).unwrap(), ..RunConfig::default() };
         config.validate().unwrap();
-        let [mut timed, mut functional] = [0, 1].map(|_| Below::build(&config).unwrap().unwrap());
+        let [mut timed, mut functional] = [0, 1].map(|_| Below::build(&config).unwrap());
         let (mut timed_twins, mut functional_twins) = (twins(&config), twins(&config));
         let mut now = 0;
         for (pause, line) in steps {
@@ -125,7 +125,7 @@ fn a_stream_misses_once_for_each_longer_line() {
         dram: Some(DramConfig::default()),
         ..RunConfig::default()
     };
-    let mut below = Below::build(&config).unwrap().unwrap();
+    let mut below = Below::build(&config).unwrap();
     for line in 0..400_u32 {
         let start = u64::from(line / 4 * 1000);
         let now = start + u64::from(line % 4);

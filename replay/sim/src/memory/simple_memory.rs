@@ -1,12 +1,11 @@
-//! The DRAM channel: a fixed latency behind a queue of limited bandwidth. The L2 and the shader cores share it.
+//! Memory of textures and of rays as time sees it: a fixed latency behind a channel of limited or unlimited bandwidth.
 //!
-//! Requests are served in order of time, without rows and banks, as in the closed form. A read that finds the channel
-//! free takes exactly the latency.
+//! Requests are served in order of time, without rows and banks. A read that finds the channel free takes exactly the
+//! latency.
 
-use super::machine::Machine;
 use super::server::TICKS;
 
-/// Lines that the cores transfer while they work on a tile, at equal intervals.
+/// Lines that other work transfers at equal intervals.
 #[derive(Clone, Copy, Debug)]
 struct Stream {
     start: u64,
@@ -15,8 +14,9 @@ struct Stream {
     sent: u64,
 }
 
-/// The channel.
-pub struct Channel {
+/// Memory with a fixed latency.
+#[derive(Clone, Debug)]
+pub struct SimpleMemory {
     latency: u64,
     ticks_per_line: u64,
     /// Tick at which the channel is free.
@@ -26,9 +26,9 @@ pub struct Channel {
     stream_end: u64,
 }
 
-impl Channel {
-    /// An idle channel.
-    pub fn new(machine: &Machine) -> Self {
+impl SimpleMemory {
+    /// Idle memory. A line occupies its channel for `ticks_per_line`; 0: unlimited bandwidth.
+    pub fn new(latency_cycles: u64, ticks_per_line: u64) -> Self {
         let stream = Stream {
             start: 0,
             cycles: 1,
@@ -36,8 +36,8 @@ impl Channel {
             sent: 0,
         };
         Self {
-            latency: machine.dram_latency,
-            ticks_per_line: machine.dram_ticks_per_line,
+            latency: latency_cycles,
+            ticks_per_line,
             free: 0,
             stream,
             stream_end: 0,
@@ -45,13 +45,17 @@ impl Channel {
     }
 
     /// Reads a line in cycle `now`. Returns the cycle in which the data arrives.
+    #[inline(always)]
     pub fn read(&mut self, now: u64) -> u64 {
+        if self.ticks_per_line == 0 {
+            return now + self.latency;
+        }
         self.send_until(now);
         let start = self.transfer(now);
         start.div_ceil(TICKS) + self.latency
     }
 
-    /// Starts the cores' transfers for a tile: `lines` lines over `cycles` cycles. The previous stream has ended.
+    /// Starts the transfers of other work: `lines` lines over `cycles` cycles. The previous stream has ended.
     pub fn start_stream(&mut self, now: u64, cycles: u64, lines: u64) {
         self.stream = Stream {
             start: now,
