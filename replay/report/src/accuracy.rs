@@ -2,11 +2,12 @@
 //! and the table of errors on reports.
 
 use super::answers;
-use super::columns::{Column, Columns, columns_of};
+use super::columns::{Column, Columns, Kind, Value, columns_of};
 use super::document::Document;
 use super::errors::KnownError;
 use super::html::{self, Answer, Page};
 use super::lists::unique;
+use super::plots::bars::{BarChart, BarGroup};
 use super::plots::lines::Axis;
 use super::plots::scatter::{NamedPoint, ScatterChart};
 use super::plots::{PlotError, SeriesStyle};
@@ -16,8 +17,15 @@ use maud::{Markup, html};
 use serde::Serialize;
 use sim::config::RunConfig;
 use sim::result::TOOL;
-use studies::accuracy::{Choice, Contribution, Study, headline_figures};
+use studies::accuracy::{Choice, Contribution, Metric, Study, headline_figures};
 use studies::techniques::dominated;
+
+/// The estimate of one sample, in tables of the studies of samples.
+const ESTIMATE: Metric = Metric {
+    key: "estimate_pct",
+    name: "one estimate",
+    unit: "% of all",
+};
 
 /// A study with its measurements.
 pub struct Measured {
@@ -31,6 +39,8 @@ pub struct Measured {
 pub struct AccuracyReport {
     /// The machine.
     pub config: RunConfig,
+    /// Version of the ray-tracing models, if a study used them.
+    pub ray_model_version: Option<u32>,
     /// Studies that had inputs.
     pub studies: Vec<Measured>,
 }
@@ -68,6 +78,11 @@ impl Measured {
                 value,
             ));
         }
+        if self.choices.iter().any(|c| c.estimate_pct.is_some()) {
+            let Metric { key, name, unit } = ESTIMATE;
+            let value = |c: &Choice| c.estimate_pct.clone();
+            columns.push(Column::real(key, name, unit, 1, value));
+        }
         columns
     }
 
@@ -92,6 +107,44 @@ impl Measured {
         let (time, _) = mean_and_largest(self.of(name).filter_map(|c| c.time_ratio))?;
         let (error, _) = mean_and_largest(self.of(name).filter_map(|c| c.values[0]))?;
         Some((time, error))
+    }
+
+    /// Chart of the estimates, with their intervals or bounds; `None` without estimates.
+    fn estimates(&self) -> Option<BarChart> {
+        let names = self.names();
+        let scenes = unique(self.choices.iter().map(|choice| choice.scene.as_str()));
+        let group = |scene: &&str| {
+            let of = |name: &str| {
+                let mut choices = self.choices.iter();
+                choices.find(|c| c.name == name && c.scene == *scene)
+            };
+            let figures: Vec<_> = (names.iter())
+                .map(|name| of(name).and_then(|c| c.estimate_pct.as_ref()))
+                .collect();
+            BarGroup {
+                label: (*scene).to_owned(),
+                values: figures.iter().map(|f| Some(f.as_ref()?.value)).collect(),
+                ends: figures
+                    .iter()
+                    .map(|f| f.map(|f| [f.low.max(0.0), f.high]))
+                    .collect(),
+                ..BarGroup::default()
+            }
+        };
+        let groups: Vec<BarGroup> = scenes.iter().map(group).collect();
+        let any = groups.iter().any(|group| group.numbers().next().is_some());
+        any.then(|| BarChart {
+            title: format!("{}: one estimate each", self.study.title),
+            value_label: "estimated external bytes, % of those of the whole trace".to_owned(),
+            group_label: "trace".to_owned(),
+            series: (0..)
+                .zip(&names)
+                .map(|(i, name)| SeriesStyle::nth(*name, i))
+                .collect(),
+            groups,
+            reference: Some(100.0),
+            ..BarChart::default()
+        })
     }
 
     /// Chart of time against error; `None` if no choice has both.
@@ -149,6 +202,9 @@ struct Advice<'a> {
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
 pub struct AccuracyJson<'a> {
+    /// Version of the ray-tracing models, if a study used them. `model_version` is that of the texture models.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ray_model_version: Option<u32>,
     config: &'a RunConfig,
     studies: Vec<StudyJson<'a>>,
 }
@@ -181,6 +237,7 @@ impl Document for AccuracyReport {
             choices: Table::new(&measured.columns(false), &measured.choices),
         };
         AccuracyJson {
+            ray_model_version: self.ray_model_version,
             config: &self.config,
             studies: self.studies.iter().map(study).collect(),
         }
@@ -188,21 +245,25 @@ impl Document for AccuracyReport {
 
     /// Every value of every choice, one per line.
     fn rows(&self) -> Table {
-        type Line<'a> = (&'a Study, &'a Choice, usize);
+        type Line<'a> = (&'a Study, &'a Choice, &'a Metric, Value);
         let lines: Vec<Line<'_>> = (self.studies.iter())
             .flat_map(|m| m.choices.iter().map(|choice| (m.study, choice)))
             .flat_map(|(study, choice)| {
-                (0..study.figures.len()).map(move |index| (study, choice, index))
+                let values = choice.values.iter().map(|value| (*value).into());
+                let values = values.chain([choice.estimate_pct.clone().into()]);
+                let metrics = study.figures.iter().chain([&ESTIMATE]).zip(values);
+                metrics.map(move |(metric, value)| (study, choice, metric, value))
             })
-            .filter(|(_, choice, index)| choice.values[*index].is_some())
+            .filter(|line| line.3 != Value::None)
             .collect();
         let columns = columns_of::<Line<'_>>()
             .text("study", "study", |l| l.0.key)
             .text("choice", "choice", |l| l.1.name.clone())
             .text("scene", "scene", |l| l.1.scene.clone())
-            .text("figure", "figure", |l| l.0.figures[l.2].key)
-            .real("value", "value", "", 6, |l| l.1.values[l.2])
-            .text("unit", "unit", |l| l.0.figures[l.2].unit);
+            .text("figure", "figure", |l| l.2.key)
+            .real("value", "value", "", 6, |l| l.3.clone())
+            .change_last(|column| column.kind(Kind::Real))
+            .text("unit", "unit", |l| l.2.unit);
         Table::new(&columns, &lines)
     }
 
@@ -356,6 +417,9 @@ impl AccuracyReport {
 fn section(measured: &Measured) -> Result<Markup, PlotError> {
     let study = measured.study;
     let chart = measured.chart().map(|chart| chart.svg());
+    let chart = chart
+        .into_iter()
+        .chain(measured.estimates().map(|chart| chart.svg()));
     Ok(html! {
         p { (study.about) }
         p { "Recommended: " strong { (study.recommended) } ", " (study.reason) "." }
@@ -368,6 +432,7 @@ fn section(measured: &Measured) -> Result<Markup, PlotError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sim::figure::{Because, Figure};
     use studies::accuracy::STUDIES;
 
     fn report() -> AccuracyReport {
@@ -378,9 +443,11 @@ mod tests {
             contribution: Some(Contribution::Timing),
             time_ratio: Some(time),
             values: vec![Some(bytes), Some(0.1), None, None, None, None],
+            estimate_pct: None,
         };
         AccuracyReport {
             config: RunConfig::default(),
+            ray_model_version: None,
             studies: vec![Measured {
                 study,
                 choices: vec![choice("a", 0.2, -0.5), choice("b", 0.4, 0.1)],
@@ -414,6 +481,39 @@ mod tests {
         for text in ["Functional or timed", "0.200", "what to choose"] {
             assert!(page.to_lowercase().contains(&text.to_lowercase()), "{text}");
         }
+    }
+
+    #[test]
+    fn an_estimate_has_its_ends_in_every_output() {
+        let mut report = report();
+        let because = Because::Sampling {
+            method: "Student's t",
+            n: 4,
+            of: 16,
+            degrees_of_freedom: 3.0,
+        };
+        let estimate = Figure::sampled(101.0, 2.5, 0.95, because);
+        report.studies[0].choices[0].estimate_pct = Some(estimate);
+        let json: serde_json::Value = serde_json::from_str(&report.json().unwrap()).unwrap();
+        let row = &json["studies"][0]["choices"][0];
+        let figure = &row["figures"]["estimate_pct"];
+        assert_eq!(
+            (&row["estimate_pct"], &figure["high"]),
+            (&101.0.into(), &103.5.into())
+        );
+        assert_eq!(
+            (&figure["confidence"], &figure["because"]["n"]),
+            (&0.95.into(), &4.into())
+        );
+        assert!(json["studies"][0]["choices"][1].get("figures").is_none());
+        let csv = report.csv();
+        assert!(csv.starts_with("study,choice,scene,figure,value,value_low,value_high,unit"));
+        assert!(
+            csv.contains("estimate_pct,101,98.5,103.5,% of all"),
+            "{csv}"
+        );
+        assert!(report.text().contains("101.0 (98.5 to 103.5)"));
+        assert!(report.page().unwrap().contains("one estimate each"));
     }
 
     #[test]

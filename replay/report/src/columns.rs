@@ -4,6 +4,7 @@
 //! and the JSON objects ([`Table`](super::table::Table)) walk that list.
 
 use serde::ser::{Serialize, Serializer};
+use sim::figure::{Because, Figure};
 use std::borrow::Cow;
 use studies::experiment::ResultRow;
 
@@ -23,6 +24,8 @@ pub enum Value {
     Whole(u64),
     /// A measure.
     Real(f64),
+    /// A measure with its doubt.
+    Figure(Box<Figure>),
 }
 
 /// The type of a column's values.
@@ -67,6 +70,7 @@ cell!(u32, Whole, |n: u32| Value::Whole(n.into()));
 cell!(u64, Whole, Value::Whole);
 cell!(f32, Real, |x: f32| Value::Real(x.into()));
 cell!(f64, Real, Value::Real);
+cell!(Figure, Real, |figure| Value::Figure(Box::new(figure)));
 
 /// A name and its title.
 impl Cell for Value {
@@ -89,7 +93,16 @@ impl Value {
         match self {
             Self::Whole(n) => Some(*n as f64),
             Self::Real(x) => Some(*x),
+            Self::Figure(figure) => Some(figure.value),
             Self::None | Self::Text(_) | Self::Named(..) | Self::Flag(_) => None,
+        }
+    }
+
+    /// The figure, if it has a doubt.
+    pub fn figure(&self) -> Option<&Figure> {
+        match self {
+            Self::Figure(figure) => Some(figure),
+            _ => None,
         }
     }
 
@@ -102,6 +115,7 @@ impl Value {
             Self::Flag(flag) => flag.to_string(),
             Self::Whole(n) => n.to_string(),
             Self::Real(x) => x.to_string(),
+            Self::Figure(figure) => figure.value.to_string(),
         }
     }
 }
@@ -115,6 +129,7 @@ impl Serialize for Value {
             Self::Flag(flag) => serializer.serialize_bool(*flag),
             Self::Whole(n) => serializer.serialize_u64(*n),
             Self::Real(x) => serializer.serialize_f64(*x),
+            Self::Figure(figure) => serializer.serialize_f64(figure.value),
         }
     }
 }
@@ -133,8 +148,17 @@ pub enum Show {
 }
 
 impl Show {
-    /// The cell of a table.
+    /// The cell of a table. The ends of an interval are in parentheses, those of bounds in brackets.
     pub fn write(self, value: &Value) -> String {
+        if let Value::Figure(figure) = value {
+            let [text, low, high] =
+                [figure.value, figure.low, figure.high].map(|x| self.write(&Value::Real(x)));
+            return match figure.because {
+                Because::Exact => text,
+                Because::Sampling { .. } => format!("{text} ({low} to {high})"),
+                Because::Bounds { .. } => format!("{text} [{low} to {high}]"),
+            };
+        }
         let fixed = |x: f64, decimals: usize| {
             // Values that round to negative zero print without a sign.
             let text = format!("{x:.decimals$}");
@@ -424,7 +448,7 @@ pub(super) fn name(value: &impl Serialize) -> String {
 }
 
 /// A column of point results.
-pub type Figure<'a> = Column<'static, ResultRow<'a>>;
+pub type PointColumn<'a> = Column<'static, ResultRow<'a>>;
 
 /// `part / whole`, or `None` if the whole is zero.
 pub(super) fn over(part: u64, whole: u64) -> Option<f64> {

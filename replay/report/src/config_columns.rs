@@ -1,14 +1,14 @@
 //! Columns that identify a row in any file: trace, image size, and every configuration key. Rows of several
 //! files can be joined by them.
 
-use super::columns::{Columns, Figure, Value, columns_of, name};
+use super::columns::{Columns, PointColumn, Value, columns_of, name};
 use formats::texture::Sampler;
 use sim::config::{LevelConfig, RunConfig};
 use sim::model_version::MODEL_VERSION;
 use studies::experiment::{ResultRow, plain, scene_label};
 
 /// The trace.
-pub fn trace<'a>() -> Vec<Figure<'a>> {
+pub fn trace<'a>() -> Vec<PointColumn<'a>> {
     columns_of::<ResultRow>()
         .text("label", "scene", |r| r.subject.label.clone())
         .about("short name in this file; it depends on the other traces in the file")
@@ -41,27 +41,27 @@ fn max_anisotropy(row: &ResultRow) -> Option<u64> {
 
 /// Every configuration key, as listed in docs/use/configuration.md.
 #[rustfmt::skip]
-pub fn config<'a>() -> Vec<Figure<'a>> {
+pub fn config<'a>() -> Vec<PointColumn<'a>> {
     fn key<'a, V: super::columns::Cell + 'static>(
         key: &'static str,
         value: fn(&RunConfig) -> V,
-    ) -> Figure<'a> {
-        Figure::text(key, key, move |r: &ResultRow| value(&r.point.config))
+    ) -> PointColumn<'a> {
+        PointColumn::text(key, key, move |r: &ResultRow| value(&r.point.config))
     }
-    fn cache<'a>(keys: [&'static str; 5], level: fn(&RunConfig) -> &LevelConfig) -> [Figure<'a>; 5] {
+    fn cache<'a>(keys: [&'static str; 5], level: fn(&RunConfig) -> &LevelConfig) -> [PointColumn<'a>; 5] {
         let [size_bytes, ways, replacement, sectors, victim_lines] = keys;
         let of = move |r: &ResultRow| *level(&r.point.config);
         [
-            Figure::text(size_bytes, size_bytes, move |r: &ResultRow| of(r).size_bytes),
-            Figure::text(ways, ways, move |r: &ResultRow| of(r).ways),
-            Figure::text(replacement, replacement, move |r: &ResultRow| of(r).replacement.name()),
-            Figure::text(sectors, sectors, move |r: &ResultRow| of(r).sectors),
-            Figure::text(victim_lines, victim_lines, move |r: &ResultRow| of(r).victim_lines),
+            PointColumn::text(size_bytes, size_bytes, move |r: &ResultRow| of(r).size_bytes),
+            PointColumn::text(ways, ways, move |r: &ResultRow| of(r).ways),
+            PointColumn::text(replacement, replacement, move |r: &ResultRow| of(r).replacement.name()),
+            PointColumn::text(sectors, sectors, move |r: &ResultRow| of(r).sectors),
+            PointColumn::text(victim_lines, victim_lines, move |r: &ResultRow| of(r).victim_lines),
         ]
     }
     let mut columns = vec![
         key("mode", |c| name(&c.mode)),
-        Figure::text("order", "order", |r| {
+        PointColumn::text("order", "order", |r| {
             let order = r.point.config.order;
             Value::Named(order.name(), order.title())
         }),
@@ -82,7 +82,7 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
         key("sampling.lod_bias", |c| c.sampling.lod_bias),
         key("sampling.lod", |c| name(&c.sampling.lod)),
         key("sampling.helper_lanes", |c| c.sampling.helper_lanes),
-        Figure::text("sampling.max_anisotropy", "sampling.max_anisotropy", max_anisotropy),
+        PointColumn::text("sampling.max_anisotropy", "sampling.max_anisotropy", max_anisotropy),
         key("sampling.anisotropy", |c| name(&c.sampling.anisotropy)),
         key("layout.texel_format", |c| c.layout.texel_format.as_ref().map(name)),
         key("layout.block_order", |c| name(&c.layout.block_order)),
@@ -131,7 +131,7 @@ pub fn config<'a>() -> Vec<Figure<'a>> {
 }
 
 /// The key that this row changes, if any.
-pub fn change<'a>() -> Vec<Figure<'a>> {
+pub fn change<'a>() -> Vec<PointColumn<'a>> {
     columns_of::<ResultRow>()
         .text("change.key", "change", |r| {
             let (key, _) = r.point.change.as_ref()?;

@@ -2,8 +2,10 @@
 
 use crate::table::Table;
 use serde::Serialize;
+use sim::figure::Figure;
 use sim::model_version::MODEL_VERSION;
 use sim::result::TOOL;
+use std::collections::BTreeMap;
 
 /// The result of a command: one JSON object, rows for CSV and Parquet, and text for a terminal.
 pub trait Document {
@@ -23,6 +25,11 @@ pub trait Document {
 
     /// The rows in full precision.
     fn rows(&self) -> Table;
+
+    /// Members of the JSON object that have a doubt, by key. Members of table rows are beside their row.
+    fn figures(&self) -> BTreeMap<String, Figure> {
+        BTreeMap::new()
+    }
 
     /// The tables for a terminal.
     fn text(&self) -> String;
@@ -48,7 +55,8 @@ pub trait Document {
     /// # Errors
     /// A figure that is not finite.
     fn json(&self) -> serde_json::Result<String> {
-        let object = Envelope::new(Self::SCHEMA, Self::MODEL_VERSION, self.content());
+        let mut object = Envelope::new(Self::SCHEMA, Self::MODEL_VERSION, self.content());
+        object.figures = self.figures();
         match Self::INDENTED {
             true => serde_json::to_string_pretty(&object),
             false => serde_json::to_string(&object),
@@ -65,6 +73,13 @@ pub(crate) struct Envelope<T> {
     model_version: u32,
     #[serde(flatten)]
     content: T,
+    /// Members with their lowest and highest value, and the reason of the difference.
+    #[cfg_attr(
+        feature = "testing",
+        schemars(with = "serde_json::Map<String, serde_json::Value>")
+    )]
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    figures: BTreeMap<String, Figure>,
 }
 
 impl<T> Envelope<T> {
@@ -75,6 +90,7 @@ impl<T> Envelope<T> {
             tool: TOOL,
             model_version,
             content,
+            figures: BTreeMap::new(),
         }
     }
 }
@@ -84,4 +100,43 @@ impl<T> Envelope<T> {
 pub fn published<D: Document, Members: schemars::JsonSchema>() -> formats::schemas::Published {
     let published = formats::schemas::Published::of::<Envelope<Members>>(D::SCHEMA);
     crate::schemas::with_tables(published, D::tables())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Doubtful(Option<Figure>);
+
+    impl Document for Doubtful {
+        const SCHEMA: &'static str = "replay.doubtful/1";
+
+        fn content(&self) -> impl Serialize {
+            serde_json::json!({ "saved_pct": 42.0 })
+        }
+
+        fn rows(&self) -> Table {
+            Table::default()
+        }
+
+        fn text(&self) -> String {
+            String::new()
+        }
+
+        fn figures(&self) -> BTreeMap<String, Figure> {
+            let figure = self.0.iter().cloned();
+            figure.map(|f| ("saved_pct".to_owned(), f)).collect()
+        }
+    }
+
+    #[test]
+    fn the_json_object_has_figures_only_where_they_exist() {
+        let json = |of: Doubtful| -> serde_json::Value {
+            serde_json::from_str(&of.json().unwrap()).unwrap()
+        };
+        let with = json(Doubtful(Some(Figure::exact(42.0))));
+        assert_eq!(with["figures"]["saved_pct"]["because"]["doubt"], "exact");
+        assert_eq!(with["saved_pct"], 42.0);
+        assert!(json(Doubtful(None)).get("figures").is_none());
+    }
 }

@@ -1,6 +1,6 @@
 //! The figures of a replayed point, one per line. Every table, file and chart takes them from here.
 
-use super::columns::{Column, Columns, Figure, Row, Show, columns_of, over, pick};
+use super::columns::{Column, Columns, PointColumn, Row, Show, columns_of, over, pick};
 use super::{config_columns, memory_columns};
 use formats::texture::TexelFormat;
 use sim::result::ClientTraffic;
@@ -10,7 +10,7 @@ use studies::experiment::ResultRow;
 
 /// Columns that identify a point: the trace, the axes of the Z2 paper's experiment, and the whole
 /// configuration.
-fn identity<'a>() -> Vec<Figure<'a>> {
+fn identity<'a>() -> Vec<PointColumn<'a>> {
     let mut columns = config_columns::trace();
     columns = columns
         .text("twin", "stands for", |r| r.subject.stand_in_for)
@@ -23,7 +23,7 @@ fn identity<'a>() -> Vec<Figure<'a>> {
 
 /// Counts and derived figures.
 #[rustfmt::skip]
-pub fn figures<'a>() -> Vec<Figure<'a>> {
+pub fn figures<'a>() -> Vec<PointColumn<'a>> {
     let mut figures = columns_of::<ResultRow>()
         .real("l1_footprint_miss_pct", "L1 miss", "% of footprints", 2, |r| 100.0 * r.result.l1.footprint_miss_rate)
             .about("footprints with a missing line")
@@ -112,7 +112,7 @@ fn whole_saved_pct(row: &ResultRow) -> Option<f64> {
 
 /// The paper's figures for the same point. Its saving is computed from its two miss rates.
 #[rustfmt::skip]
-fn published<'a>() -> Vec<Figure<'a>> {
+fn published<'a>() -> Vec<PointColumn<'a>> {
     columns_of::<ResultRow>()
         .real("paper.l1_footprint_miss_pct", "paper L1", "%", 2, |r| Some(r.paper?.l1_footprint_miss_pct))
         .real("paper.l2_line_miss_pct", "paper L2", "%", 2, |r| Some(r.paper?.l2_line_miss_pct))
@@ -124,7 +124,7 @@ fn published<'a>() -> Vec<Figure<'a>> {
 
 /// The same point in functional mode.
 #[rustfmt::skip]
-fn functional<'a>() -> Vec<Figure<'a>> {
+fn functional<'a>() -> Vec<PointColumn<'a>> {
     columns_of::<ResultRow>()
         .real("functional.l1_footprint_miss_pct", "functional L1", "% of footprints", 2, |r| Some(100.0 * r.functional?.l1.footprint_miss_rate))
         .real("functional.l2_line_miss_pct", "functional L2", "% of lines", 2, |r| Some(100.0 * r.functional?.l2.line_miss_rate))
@@ -135,7 +135,7 @@ fn functional<'a>() -> Vec<Figure<'a>> {
 /// The same point on the machine of `--preset z2-paper`: rates of first look-ups, then counts as for other
 /// machines.
 #[rustfmt::skip]
-fn z2_paper<'a>() -> Vec<Figure<'a>> {
+fn z2_paper<'a>() -> Vec<PointColumn<'a>> {
     columns_of::<ResultRow>()
         .real("z2_paper.l1_footprint_miss_pct", "first L1", "%", 2, |r| first_l1_pct(r.z2_paper?))
             .about("footprints whose first look-up found a line absent or in flight")
@@ -173,7 +173,7 @@ impl Row for ResultRow<'_> {
 }
 
 /// The figure with this key.
-pub fn figure<'a>(key: &str) -> Option<Figure<'a>> {
+pub fn figure<'a>(key: &str) -> Option<PointColumn<'a>> {
     pick(&[key]).pop()
 }
 

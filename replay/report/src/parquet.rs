@@ -47,6 +47,7 @@ pub enum TableError {
 /// # Errors
 /// A cell that its column cannot hold.
 pub fn bytes(table: &Table) -> Result<Vec<u8>, TableError> {
+    let table = table.with_ends();
     let facts: Map<String, serde_json::Value> = table
         .headings
         .iter()

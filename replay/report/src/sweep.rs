@@ -1,7 +1,7 @@
 //! A sweep's results: rows, table, CSV and page.
 
 use super::answers;
-use super::columns::{Column, Columns, Figure, columns_of};
+use super::columns::{Column, Columns, PointColumn, columns_of};
 use super::config_columns;
 use super::document::Document;
 use super::figures::{figure, figures, number};
@@ -78,12 +78,12 @@ impl<'a> SweepReport<'a> {
     }
 
     /// The columns of every file: those that identify a row, then its figures.
-    fn columns() -> Vec<Figure<'a>> {
+    fn columns() -> Vec<PointColumn<'a>> {
         let mut columns = config_columns::trace();
         columns.extend(config_columns::config());
         columns.extend(config_columns::change());
         columns.push(
-            Figure::text("point", "point", |r| {
+            PointColumn::text("point", "point", |r| {
                 point_key(&r.subject.id, &r.point.config)
             })
             .about("key of the point's row in points/"),
@@ -93,7 +93,7 @@ impl<'a> SweepReport<'a> {
     }
 
     /// Values of an axis as written in the experiment file.
-    fn written(i: usize, axis: &Axis) -> Figure<'a> {
+    fn written(i: usize, axis: &Axis) -> PointColumn<'a> {
         Column::text(axis.key.clone(), axis.key.clone(), move |r: &ResultRow| {
             r.point.settings.get(i).map(|(_, value)| plain(value))
         })
@@ -104,7 +104,7 @@ impl<'a> SweepReport<'a> {
         let mut columns =
             columns_of::<ResultRow>().text("label", "scene", |r| r.subject.label.clone());
         if !self.file.one_at_a_time.is_empty() {
-            columns.push(Figure::text("change", "change", |r| {
+            columns.push(PointColumn::text("change", "change", |r| {
                 change_title(r.point.change.as_ref())
             }));
         }
@@ -393,7 +393,7 @@ impl<'a> Charts<'a> {
                 .map(|v| BarGroup {
                     label: plain(v),
                     values: self.values(Some((&axis.key, v)), None),
-                    marks: Vec::new(),
+                    ..BarGroup::default()
                 })
                 .collect(),
             decimals: Some(2),

@@ -1,8 +1,10 @@
 //! A table: as text for a terminal, as HTML, and as CSV.
 
-use super::columns::{Column, Heading, Show, Value};
+use super::columns::{Column, Heading, Kind, Show, Value};
 use formats::text::{csv_cell, printable};
 use maud::{Markup, html};
+use sim::figure::Figure;
+use std::borrow::Cow;
 
 /// Longer texts are wrapped on pages.
 const LONGEST_LINE_CHARS: usize = 60;
@@ -79,6 +81,29 @@ impl Table {
             row.retain(|_| *keep.next().unwrap_or(&true));
         }
         self
+    }
+
+    /// The columns of files: one with figures is followed by their ends, under its key with `_low` and `_high`.
+    pub(super) fn with_ends(&self) -> Cow<'_, Self> {
+        let mut table = Cow::Borrowed(self);
+        for column in (0..self.headings.len()).rev() {
+            if !self.rows.iter().any(|row| row[column].figure().is_some()) {
+                continue;
+            }
+            let table = table.to_mut();
+            let ends: [(_, fn(&Figure) -> f64); 2] = [("high", |f| f.high), ("low", |f| f.low)];
+            for (name, end) in ends {
+                let mut heading = self.headings[column].clone();
+                heading.key = format!("{}_{name}", heading.key).into();
+                heading.kind = Kind::Real;
+                table.headings.insert(column + 1, heading);
+                for row in &mut table.rows {
+                    let cell = row[column].figure().map(end);
+                    row.insert(column + 1, cell.into());
+                }
+            }
+        }
+        table
     }
 
     /// The cells as text.
@@ -234,9 +259,10 @@ impl Table {
     /// As CSV (RFC 4180) in full precision, with the columns' keys as headings. Names are no formulas.
     pub fn csv(&self) -> String {
         let mut csv = csv::Writer::from_writer(Vec::new());
-        let keys = self.headings.iter().map(Heading::flat_key);
+        let table = self.with_ends();
+        let keys = table.headings.iter().map(Heading::flat_key);
         let cell = |value: &Value| csv_cell(&value.exact()).into_owned();
-        let rows = self.rows.iter().map(|row| row.iter().map(cell));
+        let rows = table.rows.iter().map(|row| row.iter().map(cell));
         // Writing to memory cannot fail, and every row has one cell per heading.
         let _ = csv.write_record(keys);
         for row in rows {

@@ -19,6 +19,7 @@ pub mod access;
 pub mod addresses;
 pub mod config;
 pub mod engine;
+pub mod figure;
 pub mod line_list;
 pub mod memory;
 pub mod model_version;

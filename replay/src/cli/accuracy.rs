@@ -12,6 +12,7 @@ use serde::Deserialize;
 use sgrt::frame::RaySource;
 use shell::{Output, Progress};
 use sim::config::RunConfig;
+use sim::model_version::RAY_MODEL_VERSION;
 use sim::result::scene_name;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -151,6 +152,7 @@ fn measured(inputs: &Inputs<'_>) -> Result<AccuracyReport> {
     }
     Ok(AccuracyReport {
         config: inputs.config,
+        ray_model_version: (!inputs.rays.is_empty()).then_some(RAY_MODEL_VERSION),
         studies,
     })
 }

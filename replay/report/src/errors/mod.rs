@@ -59,18 +59,18 @@ pub fn known(of: Of) -> Vec<&'static KnownError> {
 }
 
 /// A figure and its measured errors.
-struct Figure {
+struct MeasuredFigure {
     first: &'static KnownError,
     /// By [`Contribution::ALL`].
     errors: [Option<&'static KnownError>; 5],
 }
 
 /// The figures with measured errors, in the table's order.
-fn by_figure(of: Of) -> Vec<Figure> {
-    let mut figures: Vec<Figure> = Vec::new();
+fn by_figure(of: Of) -> Vec<MeasuredFigure> {
+    let mut figures: Vec<MeasuredFigure> = Vec::new();
     for error in known(of) {
         if !figures.iter().any(|f| f.first.figure == error.figure) {
-            figures.push(Figure {
+            figures.push(MeasuredFigure {
                 first: error,
                 errors: [None; 5],
             });
@@ -87,12 +87,12 @@ fn by_figure(of: Of) -> Vec<Figure> {
 
 /// The table: one row per figure, with the maximum error of each source.
 pub fn table(of: Of) -> Table {
-    let mut columns = columns_of::<Figure>()
+    let mut columns = columns_of::<MeasuredFigure>()
         .text("name", "largest error of", |f| f.first.name.clone())
         .text("unit", "", |f| f.first.unit.clone());
     for (index, contribution) in Contribution::ALL.into_iter().enumerate() {
         let (key, name) = (contribution.name(), contribution.title());
-        let largest = move |f: &Figure| Some(f.errors[index]?.largest);
+        let largest = move |f: &MeasuredFigure| Some(f.errors[index]?.largest);
         columns.push(Column::real(key, name, "", 3, largest));
     }
     Table::new(&columns, &by_figure(of)).without_empty_columns()

@@ -282,7 +282,7 @@ pub fn bounds(rows: &[Summary]) -> BarChart {
         ]
         .map(|misses| row.share_pct(misses))
         .to_vec(),
-        marks: Vec::new(),
+        ..BarGroup::default()
     };
     BarChart {
         title: "LRU and OPT at the configured size".into(),

@@ -16,6 +16,16 @@ pub struct BarGroup {
     pub values: Vec<Option<f64>>,
     /// One reference mark per series, in the values' unit.
     pub marks: Vec<Option<f64>>,
+    /// Lowest and highest value per series, drawn as an error bar.
+    pub ends: Vec<Option<[f64; 2]>>,
+}
+
+impl BarGroup {
+    /// Every number that is drawn.
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = &f64> {
+        let ends = self.ends.iter().flatten().flatten();
+        self.values.iter().chain(&self.marks).flatten().chain(ends)
+    }
 }
 
 /// A grouped bar chart. Values start at zero.
@@ -57,7 +67,7 @@ impl BarChart {
             .max(320.0 / groups);
         let names = self.groups.iter();
         let names = names.map(|g| wrap(&g.label, group_px - 6.0, theme::LABEL_PX));
-        let all = (self.groups.iter()).flat_map(|g| g.values.iter().chain(&g.marks).flatten());
+        let all = self.groups.iter().flat_map(BarGroup::numbers);
         // Without a value, the axis still has room for a number.
         let largest = end_above(all.copied().chain(self.reference), 1.0);
         let axis = Columns {
@@ -87,14 +97,31 @@ impl BarChart {
                 if let (Some(mark), Some(name)) = (mark, &self.mark_name) {
                     title += &format!(" ({name}: {})", exact(mark));
                 }
+                let ends = group.ends.get(s).copied().flatten();
+                if let Some([low, high]) = ends {
+                    title += &format!(", {} to {}", exact(low), exact(high));
+                }
                 marks.rect([(x0 + 1, y0), (x1 - 1, y1)], style.color, &title);
+                let mut top = y1;
+                if let Some(ends) = ends {
+                    let x = (x0 + x1) / 2;
+                    let [low, high] = ends.map(|end| axes.backend_coord(&(left, end)).1);
+                    for line in [
+                        [(x, low), (x, high)],
+                        [(x - 3, low), (x + 3, low)],
+                        [(x - 3, high), (x + 3, high)],
+                    ] {
+                        marks.line(&line, theme::INK, (1.0, ""));
+                    }
+                    top = top.min(high);
+                }
                 if let Some(mark) = mark {
                     let y = axes.backend_coord(&(left, mark)).1;
                     let width = f64::from(theme::LINE_PX);
                     marks.line(&[(x0, y), (x1, y)], theme::INK, (width, ""));
                 }
                 if let Some(decimals) = self.decimals {
-                    let (x, top) = axes.backend_coord(&(left + bar / 2.0, value));
+                    let x = axes.backend_coord(&(left + bar / 2.0, value)).0;
                     let strokes =
                         [self.reference, mark].map(|v| v.map(|v| axes.backend_coord(&(left, v)).1));
                     let at = (x, label_y(top, strokes));
@@ -113,8 +140,7 @@ impl BarChart {
                 let problem = format!("group `{label}` has {values} values for {series} series");
                 return Err(PlotError::new(&self.title, problem));
             }
-            let numbers = group.values.iter().chain(&group.marks).flatten();
-            check_bars(&self.title, ("group", &group.label), numbers)?;
+            check_bars(&self.title, ("group", &group.label), group.numbers())?;
         }
         Ok(())
     }
@@ -196,6 +222,7 @@ mod tests {
                 label: "8/128".into(),
                 values: vec![Some(12.5), Some(8.25)],
                 marks: vec![None, Some(9.0)],
+                ..BarGroup::default()
             }],
             mark_name: Some("paper".into()),
             reference: None,
@@ -224,6 +251,16 @@ mod tests {
             bad.svg().unwrap_err().to_string(),
             "plot `Crytek`: group `8/128` holds NaN"
         );
+    }
+
+    #[test]
+    fn an_error_bar_spans_its_ends_and_the_axis_has_room_for_it() {
+        let mut with_ends = chart();
+        with_ends.groups[0].ends = vec![Some([9.0, 31.0]), None];
+        let svg = with_ends.svg().unwrap();
+        assert!(svg.contains("Morton: 12.5, 9 to 31</title>"), "{svg}");
+        assert!(svg.contains("\n30\n"), "a tick above the bars");
+        assert!(text_at(&svg, "12.5").1 < text_at(&svg, "30").1 + 8.0);
     }
 
     #[test]

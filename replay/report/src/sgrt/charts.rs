@@ -53,6 +53,7 @@ fn chart(
                 label: super::tables::scene_name(report),
                 values: vec![Some(ours(&report.result)), Some(ours(&report.plain))],
                 marks: vec![mark, mark],
+                ..BarGroup::default()
             }
         })
         .collect();

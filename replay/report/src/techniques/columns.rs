@@ -7,7 +7,7 @@ use sim::model_version::MODEL_VERSION;
 use studies::techniques::{CacheFigures, Count, Measured, OrderGain, RATES_HZ};
 
 /// A column of techniques.
-pub type Figure<'a> = Column<'a, &'a Measured<'a>>;
+pub type TechniqueColumn<'a> = Column<'a, &'a Measured<'a>>;
 
 /// Keys of the table on a terminal; missing columns are skipped.
 pub const SHORT: [&str; 20] = [
@@ -44,21 +44,21 @@ pub(super) fn pacing_keys() -> Vec<String> {
 }
 
 /// Mean of a count over the frames.
-fn mean<'a>(key: &'static str, name: &'static str, of: Count) -> Figure<'a> {
-    Figure::real(key, name, "a frame", 0, move |m| {
+fn mean<'a>(key: &'static str, name: &'static str, of: Count) -> TechniqueColumn<'a> {
+    TechniqueColumn::real(key, name, "a frame", 0, move |m| {
         Some(m.total(of)? as f64 / m.row.frames.len().max(1) as f64)
     })
 }
 
-fn ratio<'a>(key: &'static str, name: &'static str, of: Count) -> Figure<'a> {
-    Figure::real(key, name, "\u{d7} baseline", 3, move |m| {
+fn ratio<'a>(key: &'static str, name: &'static str, of: Count) -> TechniqueColumn<'a> {
+    TechniqueColumn::real(key, name, "\u{d7} baseline", 3, move |m| {
         m.over_baseline(of)
     })
 }
 
 /// What a row is about.
 #[rustfmt::skip]
-fn identity<'a>() -> Vec<Figure<'a>> {
+fn identity<'a>() -> Vec<TechniqueColumn<'a>> {
     columns_of::<&'a Measured<'a>>()
         .text("scene", "scene", |m| m.scene)
         .text("trace", "trace", |m| m.row.trace.as_deref().map(|file| file.trim_end_matches(".textrace")))
@@ -86,7 +86,7 @@ fn identity<'a>() -> Vec<Figure<'a>> {
 
 /// Times relative to the baseline, and frame times.
 #[rustfmt::skip]
-fn times<'a>() -> Vec<Figure<'a>> {
+fn times<'a>() -> Vec<TechniqueColumn<'a>> {
     columns_of::<&'a Measured<'a>>()
         .real("frame_time_ratio", "time", "\u{d7} baseline", 3, |m| m.timing.ratio.median)
             .about("frame time over that of the baseline measured next to it: median over all frames and repeats")
@@ -112,28 +112,28 @@ fn times<'a>() -> Vec<Figure<'a>> {
 
 /// Frames that miss a display's refresh, by rate.
 #[rustfmt::skip]
-fn pacing<'a>() -> Vec<Figure<'a>> {
-    let mut columns: Vec<Figure<'a>> = Vec::new();
+fn pacing<'a>() -> Vec<TechniqueColumn<'a>> {
+    let mut columns: Vec<TechniqueColumn<'a>> = Vec::new();
     columns.extend((0..RATES_HZ.len()).map(|at| {
         let hz = RATES_HZ[at];
-        Figure::real(format!("missed_pct_{hz}hz"), format!("missed at {hz} Hz"), "%", 1, move |m| Some(m.timing.pacing.get(at)?.missed_pct))
+        TechniqueColumn::real(format!("missed_pct_{hz}hz"), format!("missed at {hz} Hz"), "%", 1, move |m| Some(m.timing.pacing.get(at)?.missed_pct))
             .about("frames that take longer than a refresh interval, by measured times")
     }));
     columns.extend((0..RATES_HZ.len()).map(|at| {
         let hz = RATES_HZ[at];
-        Figure::real(format!("steps_{hz}hz"), format!("steps at {hz} Hz"), "refreshes", 2, move |m| Some(m.timing.pacing.get(at)?.steps))
+        TechniqueColumn::real(format!("steps_{hz}hz"), format!("steps at {hz} Hz"), "refreshes", 2, move |m| Some(m.timing.pacing.get(at)?.steps))
             .about("mean number of refresh intervals per frame, 1 if no frame is late; the display rate divided by it is the frame rate")
     }));
     columns
 }
 
 /// Times of the stages, under the names that the captures give them.
-fn stages<'a>(rows: &[&'a Measured<'a>]) -> Vec<Figure<'a>> {
+fn stages<'a>(rows: &[&'a Measured<'a>]) -> Vec<TechniqueColumn<'a>> {
     let all = rows.iter().flat_map(|m| &m.timing.stages_ms);
     let stages = unique(all.map(|(stage, _)| stage.as_str()));
     let figures = stages.into_iter().map(str::to_owned).map(|stage| {
         let heading = (format!("stages_ms.{stage}"), stage.clone());
-        Figure::real(heading.0, heading.1, "ms", 3, move |m| {
+        TechniqueColumn::real(heading.0, heading.1, "ms", 3, move |m| {
             let found = m.timing.stages_ms.iter().find(|(name, _)| *name == stage);
             found.map(|(_, ms)| *ms)
         })
@@ -144,14 +144,14 @@ fn stages<'a>(rows: &[&'a Measured<'a>]) -> Vec<Figure<'a>> {
 
 /// Counts per frame, and memory.
 #[rustfmt::skip]
-fn counts<'a>() -> Vec<Figure<'a>> {
+fn counts<'a>() -> Vec<TechniqueColumn<'a>> {
     vec![
-        Figure::new("cull_tests", "tests", "all frames", Show::Whole, |m| m.total(|f| Some(f.cull_tests)))
+        TechniqueColumn::new("cull_tests", "tests", "all frames", Show::Whole, |m| m.total(|f| Some(f.cull_tests)))
             .about("bounds tested against a frustum"),
         ratio("cull_tests_ratio", "tests", |f| Some(f.cull_tests)),
-        Figure::new("false_negatives", "missed", "draws", Show::Whole, |m| m.total(|f| f.false_negatives))
+        TechniqueColumn::new("false_negatives", "missed", "draws", Show::Whole, |m| m.total(|f| f.false_negatives))
             .about("draws that were culled although a fragment is visible, all frames"),
-        Figure::new("false_positives", "needless", "draws", Show::Whole, |m| m.total(|f| f.false_positives))
+        TechniqueColumn::new("false_positives", "needless", "draws", Show::Whole, |m| m.total(|f| f.false_positives))
             .about("draws that were rendered although nothing of them is visible, all frames"),
         mean("draws", "draws", |f| Some(f.draws)),
         ratio("draws_ratio", "draws", |f| Some(f.draws)),
@@ -166,23 +166,23 @@ fn counts<'a>() -> Vec<Figure<'a>> {
         mean("memory_bytes", "traffic", |f| f.memory_bytes)
             .about("counted memory traffic: texture lines once per tile, vertices, images, uploads"),
         ratio("memory_bytes_ratio", "traffic", |f| f.memory_bytes),
-        Figure::real("energy_ratio", "energy", "\u{d7} baseline", 3, |m| m.energy_ratio())
+        TechniqueColumn::real("energy_ratio", "energy", "\u{d7} baseline", 3, |m| m.energy_ratio())
             .about("energy of the counted traffic, fragments and vertices, over the baseline's"),
         mean("bytes_reprojected", "reprojected", |f| Some(f.bytes_reprojected)),
-        Figure::new("target_color_bytes", "colour targets", "MB", Show::Millions(2), |m| m.most(|f| f.target_color_bytes))
+        TechniqueColumn::new("target_color_bytes", "colour targets", "MB", Show::Millions(2), |m| m.most(|f| f.target_color_bytes))
             .about("colour targets of all layers and composed images; the frame with the most"),
-        Figure::new("target_depth_bytes", "depth targets", "MB", Show::Millions(2), |m| m.most(|f| f.target_depth_bytes))
+        TechniqueColumn::new("target_depth_bytes", "depth targets", "MB", Show::Millions(2), |m| m.most(|f| f.target_depth_bytes))
             .about("depth buffers in use at the same time: successive render passes share one, views drawn at once do not"),
-        Figure::new("texture_bytes", "textures", "MB", Show::Millions(2), |m| m.row.texture_bytes)
+        TechniqueColumn::new("texture_bytes", "textures", "MB", Show::Millions(2), |m| m.row.texture_bytes)
             .about("texels of the scene, stored once for both eyes"),
-        Figure::new("peak_memory_bytes", "memory", "MB", Show::Millions(0), |m| m.row.peak_memory_bytes)
+        TechniqueColumn::new("peak_memory_bytes", "memory", "MB", Show::Millions(0), |m| m.row.peak_memory_bytes)
             .about("peak memory of the capturing process"),
     ]
 }
 
 /// Differences from the baseline's pictures.
 #[rustfmt::skip]
-fn image_error<'a>() -> Vec<Figure<'a>> {
+fn image_error<'a>() -> Vec<TechniqueColumn<'a>> {
     columns_of::<&'a Measured<'a>>()
         .real("flip_mean", "FLIP", "", 5, |m| m.pictures.flip_mean)
             .about("mean FLIP inside the visible area of the lens")
@@ -204,7 +204,7 @@ fn image_error<'a>() -> Vec<Figure<'a>> {
 }
 
 /// Means of the techniques' own predictions.
-fn predictions<'a>(rows: &[&'a Measured<'a>]) -> Vec<Figure<'a>> {
+fn predictions<'a>(rows: &[&'a Measured<'a>]) -> Vec<TechniqueColumn<'a>> {
     let frames = rows.iter().flat_map(|m| &m.row.frames);
     let all = frames.flat_map(|f| &f.predicted);
     let predictions = unique(all.map(|(key, _)| key.as_str()));
@@ -213,7 +213,7 @@ fn predictions<'a>(rows: &[&'a Measured<'a>]) -> Vec<Figure<'a>> {
             format!("predicted.{key}"),
             format!("predicted {}", key.replace('_', " ")),
         );
-        Figure::real(heading.0, heading.1, "", 3, move |m| m.predicted(&key))
+        TechniqueColumn::real(heading.0, heading.1, "", 3, move |m| m.predicted(&key))
             .about("mean of the technique's own prediction")
     });
     figures.collect()
@@ -221,7 +221,7 @@ fn predictions<'a>(rows: &[&'a Measured<'a>]) -> Vec<Figure<'a>> {
 
 /// Cache figures in an order.
 #[rustfmt::skip]
-fn caches<'a>(order: Order) -> Vec<Figure<'a>> {
+fn caches<'a>(order: Order) -> Vec<TechniqueColumn<'a>> {
     columns_of::<&'a Measured<'a>>()
         .whole("footprints", "footprints", "", move |m| Some(m.caches_in(order)?.footprints))
             .about("bilinear footprints of the trace")
@@ -235,7 +235,7 @@ fn caches<'a>(order: Order) -> Vec<Figure<'a>> {
 
 /// Every figure of these techniques. Stages and predictions have the names that the captures give them.
 /// `order` is the order of the cache figures.
-pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<Figure<'a>> {
+pub fn columns<'a>(rows: &[&'a Measured<'a>], order: Order) -> Vec<TechniqueColumn<'a>> {
     let groups = [
         identity(),
         times(),

@@ -1,6 +1,6 @@
 //! The Z2 paper's experiment: its rows, their averages and their checks (`replay.paper/3`).
 
-use crate::columns::{Column, Columns, Figure, Row, Value, columns_of};
+use crate::columns::{Column, Columns, PointColumn, Row, Value, columns_of};
 use crate::document::Document;
 use crate::errors::{self, KnownError, Of};
 use crate::figures::number;
@@ -224,7 +224,7 @@ impl<'a> PaperReport<'a> {
     }
 
     /// The figures of the experiment, without those of a change against a base.
-    fn figures() -> Vec<Figure<'a>> {
+    fn figures() -> Vec<PointColumn<'a>> {
         let mut columns = ResultRow::columns();
         columns.retain(|c| !matches!(c.heading.key.as_ref(), "over_base" | "caches"));
         columns

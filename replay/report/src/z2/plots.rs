@@ -45,6 +45,7 @@ fn by_caches(
                 values: orders.iter().map(|o| number(row(o)?, key)).collect(),
                 marks: orders.iter().map(|o| mark(row(o)?)).collect(),
                 label: caches,
+                ..BarGroup::default()
             }
         })
         .collect();
@@ -223,7 +224,7 @@ pub fn by_level(details: &[&ResultRow]) -> Vec<BarChart> {
                     .iter()
                     .map(|d| column.value(d.result.by_level.get(level)?).number())
                     .collect(),
-                marks: Vec::new(),
+                ..BarGroup::default()
             })
             .collect(),
         ..BarChart::default()

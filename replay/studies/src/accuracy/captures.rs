@@ -49,6 +49,7 @@ fn captures(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
                 scene: scene(truth),
                 time_ratio: times.map(|(ours, theirs)| ours / theirs.max(1e-9)),
                 values: found.errors(&expected),
+                ..Choice::default()
             });
         }
     }

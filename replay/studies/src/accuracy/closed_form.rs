@@ -1,14 +1,14 @@
 //! Utilisation from a formula instead of a cycle model.
 
 use super::configurations::{functional, looping};
-use super::figure::{Figure, figure};
 use super::inputs::{Inputs, time_ratio};
+use super::metric::{Metric, metric};
 use super::study::{Choice, Study, StudyError};
 use sim::config::TmuModel;
 use sim::result::RunResult;
 use sim::tmu::closed_form;
 
-const FIGURES: [Figure; 1] = [figure("tmu_util_pct", "TMU utilisation", "points")];
+const FIGURES: [Metric; 1] = [metric("tmu_util_pct", "TMU utilisation", "points")];
 
 pub(super) const CLOSED_FORM: Study = Study {
     key: "closed-form",
@@ -45,9 +45,9 @@ fn forms(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
             choices.push(Choice {
                 name: name.to_owned(),
                 scene: subject.label.clone(),
-                contribution: None,
                 time_ratio: Some(time_ratio(from.time, model.time)),
                 values: vec![found.max_by(|a, b| a.abs().total_cmp(&b.abs()))],
+                ..Choice::default()
             });
         }
     }

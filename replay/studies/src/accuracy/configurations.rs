@@ -43,6 +43,7 @@ fn measured(
                 contribution: variant.contribution,
                 time_ratio: Some(time_ratio(found.time, expected.time)),
                 values: found.errors(&expected),
+                ..Choice::default()
             });
         }
     }

@@ -1,16 +1,16 @@
 //! Size and time of the tile encodings; they have no effect on accuracy.
 
 use super::configurations::functional;
-use super::figure::{Figure, figure};
 use super::headline::Replayed;
 use super::inputs::{Inputs, time_ratio};
+use super::metric::{Metric, metric};
 use super::study::{Choice, Study, StudyError};
 use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as};
 use sim::stream::TileSource;
 
-const FIGURES: [Figure; 2] = [
-    figure("external_bytes", "external bytes", "%"),
-    figure("file_pct", "file", "% of raw"),
+const FIGURES: [Metric; 2] = [
+    metric("external_bytes", "external bytes", "%"),
+    metric("file_pct", "file", "% of raw"),
 ];
 
 pub(super) const ENCODING: Study = Study {
@@ -39,9 +39,9 @@ fn encodings(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
             choices.push(Choice {
                 name: format!("{encoding:?}").to_lowercase(),
                 scene: subject.label.clone(),
-                contribution: None,
                 time_ratio: Some(time_ratio(found.time, expected.time)),
                 values: vec![found.errors(&expected)[0], Some(share)],
+                ..Choice::default()
             });
         }
     }

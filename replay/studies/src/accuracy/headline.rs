@@ -1,6 +1,6 @@
 //! The headline figures, and the error of one replay's figures against another's.
 
-use super::figure::{Figure, figure};
+use super::metric::{Metric, metric};
 use super::stopwatch::Stopwatch;
 use crate::experiment::Subject;
 use sim::config::{Order, RunConfig};
@@ -11,20 +11,20 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// Headline figures of texture traces.
-pub(super) const TEXTURE_FIGURES: [Figure; 6] = [
-    figure("external_bytes", "external bytes", "%"),
-    figure("l1_footprint_miss_pct", "L1 miss rate", "points"),
-    figure("l2_line_miss_pct", "L2 miss rate", "points"),
-    figure("reduction_pct", "saved against Morton", "points"),
-    figure("tmu_util_pct", "TMU utilisation", "points"),
-    figure("tmu_ratio", "TMU utilisation over Morton's", "%"),
+pub(super) const TEXTURE_FIGURES: [Metric; 6] = [
+    metric("external_bytes", "external bytes", "%"),
+    metric("l1_footprint_miss_pct", "L1 miss rate", "points"),
+    metric("l2_line_miss_pct", "L2 miss rate", "points"),
+    metric("reduction_pct", "saved against Morton", "points"),
+    metric("tmu_util_pct", "TMU utilisation", "points"),
+    metric("tmu_ratio", "TMU utilisation over Morton's", "%"),
 ];
 
 /// The headline figure of ray traces.
-pub const REUSE: Figure = figure("reuse_pct", "right pixels reused", "points");
+pub const REUSE: Metric = metric("reuse_pct", "right pixels reused", "points");
 
 /// All figures in the table of errors.
-pub fn headline_figures() -> impl Iterator<Item = Figure> {
+pub fn headline_figures() -> impl Iterator<Item = Metric> {
     TEXTURE_FIGURES.into_iter().chain([REUSE])
 }
 

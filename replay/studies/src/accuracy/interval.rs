@@ -1,6 +1,7 @@
 //! Means of samples, their confidence intervals, and how often these contain the true value.
 
 use formats::random::Random;
+use sim::figure::{Because, Figure};
 
 /// `count` of the first `of` numbers, every subset with equal probability.
 pub fn some(random: &mut Random, count: usize, of: usize) -> Vec<usize> {
@@ -28,23 +29,29 @@ fn student(degrees: usize) -> f64 {
     }
 }
 
-/// Mean of a sample and half the width of its 95 % confidence interval, from Student's t with the finite
-/// population correction.
-pub fn interval(sample: &[f64], whole: usize) -> (f64, f64) {
-    let count = sample.len() as f64;
+/// Mean of a sample with its 95 % confidence interval, from Student's t with the finite population correction.
+pub fn mean(sample: &[f64], of: usize) -> Figure {
+    let n = sample.len();
+    let count = n as f64;
     let mean = sample.iter().sum::<f64>() / count;
     let squares = sample.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
-    let left = 1.0 - count / whole as f64;
+    let left = 1.0 - count / of as f64;
     if left <= 0.0 {
-        return (mean, 0.0);
+        return Figure::exact(mean);
     }
     let variance = squares / (count - 1.0).max(1.0);
-    let half = student(sample.len() - 1) * (variance / count * left).sqrt();
-    (mean, half)
+    let half = student(n - 1) * (variance / count * left).sqrt();
+    let because = Because::Sampling {
+        method: "Student's t",
+        n,
+        of,
+        degrees_of_freedom: count - 1.0,
+    };
+    Figure::sampled(mean, half, 0.95, because)
 }
 
 /// Quality of a kind of sample, percent.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Judged {
     /// Root mean square error.
     pub error_pct: f64,
@@ -54,22 +61,24 @@ pub(super) struct Judged {
     pub interval_pct: f64,
     /// Share of intervals that contain the true value; nominally 95.
     pub holds_pct: f64,
+    /// The first draw, percent of the true value.
+    pub estimate_pct: Option<Figure>,
 }
 
-/// Evaluates draws of (estimate, half width) against the true value.
-pub fn judged(truth: f64, draws: &[(f64, f64)]) -> Judged {
+/// Evaluates draws against the true value.
+pub fn judged(truth: f64, draws: &[Figure]) -> Judged {
     let count = draws.len().max(1) as f64;
     let percent = |value: f64| 100.0 * value / truth.max(1.0);
-    let errors = draws.iter().map(|(mean, _)| mean - truth);
+    let errors = draws.iter().map(|draw| draw.value - truth);
     let squares = errors.clone().map(|e| e * e).sum::<f64>();
-    let holds = draws.iter();
     // Allow for rounding, because an estimate from all values equals the true value.
-    let holds = holds.filter(|(mean, half)| (mean - truth).abs() <= half + 1e-9 * truth);
+    let holds = |draw: &&Figure| (draw.value - truth).abs() <= draw.half() + 1e-9 * truth;
     Judged {
         error_pct: percent((squares / count).sqrt()),
         bias_pct: percent(errors.sum::<f64>() / count),
-        interval_pct: percent(draws.iter().map(|(_, half)| half).sum::<f64>() / count),
-        holds_pct: 100.0 * holds.count() as f64 / count,
+        interval_pct: percent(draws.iter().map(Figure::half).sum::<f64>() / count),
+        holds_pct: 100.0 * draws.iter().filter(holds).count() as f64 / count,
+        estimate_pct: draws.first().map(|first| first.clone().times(percent(1.0))),
     }
 }
 
@@ -82,10 +91,9 @@ pub fn drawn(values: &[f64], one_in: u64, truth: f64) -> Judged {
     let draw = |seed: u64| {
         let chosen = some(&mut Random(seed), count, whole);
         let sample: Vec<f64> = chosen.iter().map(|&at| values[at]).collect();
-        let (mean, half) = interval(&sample, whole);
-        (mean * whole as f64, half * whole as f64)
+        mean(&sample, whole).times(whole as f64)
     };
-    let draws: Vec<(f64, f64)> = (0..DRAWS).map(draw).collect();
+    let draws: Vec<Figure> = (0..DRAWS).map(draw).collect();
     judged(truth, &draws)
 }
 
@@ -123,6 +131,7 @@ mod tests {
         let all = of(&[5.0, 9.0, 1.0, 40.0], 1);
         assert_eq!((all.interval_pct, all.holds_pct), (0.0, 100.0));
         assert!(all.error_pct < 1e-9);
+        assert_eq!(all.estimate_pct.unwrap().because, Because::Exact);
     }
 
     #[test]

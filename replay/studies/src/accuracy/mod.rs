@@ -8,10 +8,10 @@ mod closed_form;
 mod clusters;
 mod configurations;
 mod encodings;
-mod figure;
 mod headline;
 mod inputs;
 mod interval;
+mod metric;
 mod reprojection;
 mod samples;
 mod stopwatch;
@@ -21,9 +21,9 @@ mod techniques;
 mod testing;
 mod traversal;
 
-pub use figure::Figure;
 pub use headline::{REUSE, Replays, headline_figures};
 pub use inputs::{Inputs, Rays, TraversalRow};
+pub use metric::Metric;
 pub use study::{Choice, Contribution, Study, StudyError};
 
 /// Every study, in the order of the page.

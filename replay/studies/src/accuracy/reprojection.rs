@@ -1,8 +1,8 @@
 //! Studies of reprojection rules and their thresholds: reuse and image error.
 
-use super::figure::{Figure, figure};
 use super::headline::REUSE;
 use super::inputs::{Inputs, Rays};
+use super::metric::{Metric, metric};
 use super::study::{Choice, Contribution, Study, StudyError};
 use formats::raytrace::{RayTile, RaytraceTables};
 use formats::view::Eye;
@@ -14,11 +14,11 @@ use sgrt::loaded::LoadedTrace;
 use sgrt::rules::Rule;
 use sgrt::variations::curve_rules;
 
-const RULE_FIGURES: [Figure; 4] = [
-    figure("flip_mean", "mean FLIP of the right image", ""),
-    figure("flip_p99", "its 99th percentile", ""),
-    figure("reused_pct", "reused", "% of right pixels"),
-    figure("wrong_object_pct", "of a wrong object", "% of right pixels"),
+const RULE_FIGURES: [Metric; 4] = [
+    metric("flip_mean", "mean FLIP of the right image", ""),
+    metric("flip_p99", "its 99th percentile", ""),
+    metric("reused_pct", "reused", "% of right pixels"),
+    metric("wrong_object_pct", "of a wrong object", "% of right pixels"),
 ];
 
 pub const RULES: Study = Study {
@@ -42,7 +42,6 @@ fn rules(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
             Choice {
                 name: point.rule.to_string(),
                 scene: rays.label.clone(),
-                contribution: None,
                 time_ratio: Some(1.0 / point.relative_performance),
                 values: [
                     point.flip_mean,
@@ -52,6 +51,7 @@ fn rules(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
                 ]
                 .map(Some)
                 .to_vec(),
+                ..Choice::default()
             }
         }));
     }
@@ -109,6 +109,7 @@ fn reuse(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
                 contribution: Some(contribution),
                 time_ratio: Some(performance / found.1),
                 values: vec![Some(found.0 - expected)],
+                ..Choice::default()
             });
         }
     }

@@ -2,22 +2,23 @@
 
 use super::clusters::{Counts, Part, cluster_count, counts};
 use super::configurations::functional;
-use super::figure::{Figure, figure};
 use super::inputs::{Inputs, time_ratio};
-use super::interval::{Judged, drawn, interval, judged, some};
+use super::interval::{Judged, drawn, judged, mean, some};
+use super::metric::{Metric, metric};
 use super::stopwatch::Stopwatch;
 use super::study::{Choice, Study, StudyError};
 use crate::experiment::Subject;
 use formats::random::Random;
 use sim::config::{Order, RunConfig};
+use sim::figure::Figure;
 use sim::order::frames;
 use std::time::Duration;
 
-const FIGURES: [Figure; 4] = [
-    figure("error_pct", "error of external bytes (RMS)", "%"),
-    figure("bias_pct", "bias", "%"),
-    figure("interval_pct", "95 % interval", "\u{b1} %"),
-    figure("holds_pct", "interval holds the truth", "%"),
+const FIGURES: [Metric; 4] = [
+    metric("error_pct", "error of external bytes (RMS)", "%"),
+    metric("bias_pct", "bias", "%"),
+    metric("interval_pct", "95 % interval", "\u{b1} %"),
+    metric("holds_pct", "interval holds the truth", "%"),
 ];
 
 const TIME: &str = "functional replay of the sample, over that of the whole trace";
@@ -80,6 +81,7 @@ fn choice(subject: &Subject<'_>, name: String, time_ratio: f64, judged: Judged) 
         bias_pct,
         interval_pct,
         holds_pct,
+        estimate_pct,
     } = judged;
     Choice {
         name,
@@ -89,6 +91,7 @@ fn choice(subject: &Subject<'_>, name: String, time_ratio: f64, judged: Judged) 
         values: [error_pct, bias_pct, interval_pct, holds_pct]
             .map(Some)
             .to_vec(),
+        estimate_pct,
     }
 }
 
@@ -172,16 +175,23 @@ fn tiles(subject: &Subject<'_>, config: &RunConfig) -> Result<Vec<Choice>, Study
             if residuals.len() < 2 {
                 continue;
             }
-            let (_, half) = interval(&residuals, busy);
+            let residual = mean(&residuals, busy);
             let per_tile = sampled as f64 / tiles.len() as f64;
             let scale = footprints as f64;
-            draws.push((ratio * scale, half / per_tile * scale));
+            draws.push(residual.times(scale / per_tile).around(ratio * scale));
         }
+        let mut judged = judged(truth as f64, &draws);
+        // Every n-th tile is no random sample, and its bias has no probability.
+        judged.estimate_pct = draws.first().map(|first| {
+            let values = draws.iter().map(|draw| draw.value);
+            let over = format!("{} of {one_in} first tiles", draws.len());
+            Figure::bounded(first.value, values, over).times(100.0 / truth.max(1) as f64)
+        });
         choices.push(choice(
             subject,
             format!("1/{one_in} of the tiles"),
             time_ratio(time / starts as u32, whole_time),
-            judged(truth as f64, &draws),
+            judged,
         ));
     }
     Ok(choices)

@@ -1,7 +1,8 @@
 //! Types of a study: choices, each with its time and its error against a reference.
 
-use super::figure::Figure;
 use super::inputs::Inputs;
+use super::metric::Metric;
+use sim::figure::Figure;
 use std::error::Error;
 
 /// Reason why a study failed.
@@ -72,13 +73,13 @@ pub struct Study {
     /// Reason of the recommendation.
     pub reason: &'static str,
     /// Figures of each choice; the first one is the error.
-    pub figures: &'static [Figure],
+    pub figures: &'static [Metric],
     /// Measures every choice; empty if the inputs have nothing for this study.
     pub measure: fn(&Inputs<'_>) -> Result<Vec<Choice>, StudyError>,
 }
 
 /// The measurements of a choice on a scene.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Choice {
     /// Name of the choice.
     pub name: String,
@@ -90,4 +91,6 @@ pub struct Choice {
     pub time_ratio: Option<f64>,
     /// Values in the order of [`Study::figures`].
     pub values: Vec<Option<f64>>,
+    /// External bytes that one sample estimates, percent of those of the whole trace.
+    pub estimate_pct: Option<Figure>,
 }

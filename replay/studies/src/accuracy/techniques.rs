@@ -1,14 +1,14 @@
 //! Study of rendering techniques, from the measurements of `tracegen techniques`.
 
-use super::figure::{Figure, figure};
 use super::inputs::Inputs;
+use super::metric::{Metric, metric};
 use super::study::{Choice, Study, StudyError};
 use crate::techniques::{Timing, picture_figures};
 use sim::result::scene_name;
 
-const FIGURES: [Figure; 2] = [
-    figure("flip_mean", "mean FLIP", ""),
-    figure("flip_p99", "mean of the pictures' 99th percentiles", ""),
+const FIGURES: [Metric; 2] = [
+    metric("flip_mean", "mean FLIP", ""),
+    metric("flip_p99", "mean of the pictures' 99th percentiles", ""),
 ];
 
 pub const TECHNIQUES: Study = Study {
@@ -35,9 +35,9 @@ fn measured(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
             choices.push(Choice {
                 name: row.technique.clone(),
                 scene: scene_name(&manifest.scene).to_owned(),
-                contribution: None,
                 time_ratio: Timing::of(row).map(|timing| timing.ratio.median),
                 values: vec![Some(pictures.flip_mean), Some(pictures.flip_p99)],
+                ..Choice::default()
             });
         }
     }

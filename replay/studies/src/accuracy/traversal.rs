@@ -1,12 +1,12 @@
 //! Study of the precision of the ray traversal, from the measurements of `tracegen precision`.
 
-use super::figure::{Figure, figure};
 use super::inputs::Inputs;
+use super::metric::{Metric, metric};
 use super::study::{Choice, Study, StudyError};
 
-const FIGURES: [Figure; 2] = [
-    figure("wrong_pct", "rays that hit or miss wrongly", "%"),
-    figure(
+const FIGURES: [Metric; 2] = [
+    metric("wrong_pct", "rays that hit or miss wrongly", "%"),
+    metric(
         "distance_ppm",
         "error of the distance (99th percentile)",
         "ppm",
@@ -32,9 +32,9 @@ fn measured(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
             0.0 => "a sphere at the origin".to_owned(),
             far => format!("a sphere at {far:e} m"),
         },
-        contribution: None,
         time_ratio: Some(row.time_ratio),
         values: vec![Some(row.wrong_pct), Some(row.distance_ppm)],
+        ..Choice::default()
     };
     Ok(inputs.traversal.iter().map(choice).collect())
 }
