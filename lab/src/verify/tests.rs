@@ -14,7 +14,7 @@ use raster::backend::{CaptureBackend, Fragments, View, Work};
 use raster::capture::{CaptureJob, CapturedFrame};
 use raster::draws::{DrawCall, DrawList, SHADOW_SIZE};
 use raster::error::RasterError;
-use raster::frame::Skipped;
+use raster::frame::{Frame, Skipped};
 use raster::lavapipe::{Lavapipe, device};
 use raster::lighting::Lighting;
 use record::{CaptureCounts, Recorder};

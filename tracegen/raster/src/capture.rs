@@ -7,14 +7,14 @@ use super::error::RasterError;
 use super::frame::Frame;
 use super::geometry;
 use super::lighting::Lighting;
-use formats::textrace::{Pass, PassKind};
+use formats::textrace::Pass;
 use formats::view::{Eye, FrameViews, TILE_SIZE_PX};
 use record::{CaptureCounts, Captured, Capturer, RecordError, Recorder, Region, Sink};
 use scene::Scene;
 use std::io::{Seek, Write};
 use std::time::{Duration, Instant};
 use techniques::least_work::Object;
-use techniques::{FramePlan, Planner, Skips, Start};
+use techniques::{FramePlan, Planner, Skips};
 use visibility::Rig;
 
 /// Inputs shared by plain rendering and capture.
@@ -69,31 +69,48 @@ impl CaptureJob<'_> {
         Ok(self.planner.plan(views, objects)?)
     }
 
-    /// Render passes of a frame, in the order in which [`Self::capture_frame`] writes them. Moving
-    /// draws must have their positions of that frame.
-    ///
-    /// # Errors
-    /// As [`Self::plan`].
-    pub fn passes(&self, views: &FrameViews) -> Result<Vec<Pass>, RasterError> {
-        let plan = self.plan(views)?;
-        let pass = |number| pass(views.frame, &plan, number);
-        Ok((0..plan.layers.len()).map(pass).collect())
-    }
-
     /// Fits the frame's shadow cascades to both eyes, whichever are captured, and finds the draws
     /// that each layer may see.
     ///
     /// # Errors
     /// Eyes that the culling technique does not support.
     pub fn frame(&self, views: &FrameViews) -> Result<Frame, RasterError> {
+        self.planned(views, |_| {})
+    }
+
+    /// [`Self::frame`], and in `finest` by image of the scene the finest mip level that this frame
+    /// or an earlier one may sample; `None` for an image that they do not sample.
+    ///
+    /// # Errors
+    /// Eyes that the culling technique does not support.
+    pub fn frame_and_levels(
+        &self,
+        views: &FrameViews,
+        finest: &mut Vec<Option<u32>>,
+    ) -> Result<Frame, RasterError> {
+        self.planned(views, |frame| self.add_finest_levels(frame, finest))
+    }
+
+    /// The planned frame. `boxes_seen` receives it before draws are culled by more than their
+    /// bounding boxes.
+    fn planned(
+        &self,
+        views: &FrameViews,
+        boxes_seen: impl FnOnce(&Frame),
+    ) -> Result<Frame, RasterError> {
+        let start = Instant::now();
         let mut frame = self.boxes_seen(views)?;
+        let seen = start.elapsed();
+        boxes_seen(&frame);
+        let start = Instant::now();
         self.cull_distant(&mut frame, views);
         self.skip(&mut frame);
+        frame.plan_time = seen + start.elapsed();
         Ok(frame)
     }
 
     /// The frame according to the bounding boxes of its draws.
-    pub(crate) fn boxes_seen(&self, views: &FrameViews) -> Result<Frame, RasterError> {
+    fn boxes_seen(&self, views: &FrameViews) -> Result<Frame, RasterError> {
         let mut lighting = self.lighting.clone();
         let [near, far] = self.shadow_range_m;
         lighting.cascades = cascades::fit(
@@ -276,15 +293,14 @@ impl CaptureJob<'_> {
         passes: &[Pass],
         first_pass: usize,
     ) -> Result<(), RasterError> {
-        let number = passes.get(first_pass).map_or(0, |pass| pass.frame);
-        let layers = (0..frame.plan.layers.len()).map(|layer| pass(number, &frame.plan, layer));
         let planned = passes.iter().skip(first_pass);
-        let planned = planned.take_while(|pass| pass.frame == number);
-        if layers.eq(planned.cloned()) {
+        let planned = planned.take_while(|pass| pass.frame == frame.number);
+        if frame.plan.passes(frame.number).iter().eq(planned) {
             return Ok(());
         }
         Err(RasterError::Scene(format!(
-            "frame {number}: expected the layers that were planned for it, found {}",
+            "frame {}: expected the layers that were planned for it, found {}",
+            frame.number,
             frame.plan.layers.len()
         )))
     }
@@ -301,25 +317,6 @@ impl CaptureJob<'_> {
         (0..frame.plan.layers.len())
             .map(|layer| backend.layer_depth(layer))
             .collect()
-    }
-}
-
-/// The render pass of a layer of a frame.
-fn pass(frame: u32, plan: &FramePlan, number: usize) -> Pass {
-    let layer = &plan.layers[number];
-    let whole = plan.is_picture(number) && layer.start == Start::Sky;
-    let (kind, number) = if whole {
-        (PassKind::Main, 0)
-    } else {
-        (PassKind::Layer, layer.number)
-    };
-    Pass {
-        frame,
-        kind,
-        eye: layer.eye,
-        layer: number,
-        size_px: layer.size_px,
-        tiles: layer.size_px.map(|s| s.div_ceil(TILE_SIZE_PX)),
     }
 }
 

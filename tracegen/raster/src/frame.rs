@@ -11,6 +11,8 @@ use visibility::{Culling, Rig, Scratch, TooWide};
 /// One frame, ready to be drawn.
 #[derive(Clone, Debug)]
 pub struct Frame {
+    /// Its number.
+    pub number: u32,
     /// Lights, with the shadow cascades fitted to the frame.
     pub lighting: Lighting,
     /// Draws that may be visible in each shadow cascade.
@@ -27,6 +29,8 @@ pub struct Frame {
     pub occluded: u64,
     /// Time for culling.
     pub cull_time: Duration,
+    /// Time for the plan, the lists of draws and what is skipped.
+    pub plan_time: Duration,
     /// The eyes.
     pub rig: Rig,
     /// Draws that may be visible in each layer.
@@ -77,6 +81,7 @@ impl Frame {
             .collect();
         let cascades_seen = vec![true; lighting.cascades.len()];
         Ok(Self {
+            number,
             lighting,
             casters,
             cascades_seen,
@@ -85,6 +90,7 @@ impl Frame {
             occlusion_tests: 0,
             occluded: 0,
             cull_time,
+            plan_time: Duration::ZERO,
             rig,
             visible,
             skipped: Skipped::default(),

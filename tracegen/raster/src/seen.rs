@@ -3,9 +3,8 @@
 
 use super::capture::CaptureJob;
 use super::draws::{DrawCall, DrawMode, SHADOW_SIZE};
-use super::error::RasterError;
+use super::frame::Frame;
 use formats::texture::MipFilter;
-use formats::view::FrameViews;
 use glam::Vec2;
 use scene::{Mesh, Scene, TextureRef, TextureSlot};
 use visibility::magnification::{Pixels, least_derivative_squared};
@@ -18,33 +17,14 @@ const DRIVER_LEVELS: f64 = 0.1;
 const LARGEST_UV: f32 = 256.0;
 
 impl CaptureJob<'_> {
-    /// For each image of the scene, the finest mip level that may be sampled by a draw that may be
-    /// visible in any frame, or by a masked caster that may be visible in a shadow cascade. `None`
-    /// for an image that is never sampled.
-    ///
-    /// # Errors
-    /// Eyes that the culling technique does not support.
-    pub fn finest_levels(&self, frames: &[FrameViews]) -> Result<Vec<Option<u32>>, RasterError> {
-        let mut finest = Vec::new();
-        for views in frames {
-            self.add_finest_levels(views, &mut finest)?;
-        }
-        Ok(finest)
-    }
-
-    /// Adds the result of [`Self::finest_levels`] for one frame to `finest`, which may be empty.
-    ///
-    /// # Errors
-    /// As [`Self::finest_levels`].
-    pub fn add_finest_levels(
-        &self,
-        views: &FrameViews,
-        finest: &mut Vec<Option<u32>>,
-    ) -> Result<(), RasterError> {
+    /// Lowers the levels of `finest`, which may be empty, to the finest mip level of each image
+    /// that may be sampled by a draw that may be visible in the frame, or by a masked caster that
+    /// may be visible in a shadow cascade.
+    pub(crate) fn add_finest_levels(&self, frame: &Frame, finest: &mut Vec<Option<u32>>) {
         let scene = self.scene;
         if !self.skips.images {
             *finest = vec![Some(0); scene.images.len()];
-            return Ok(());
+            return;
         }
         finest.resize(scene.images.len(), None);
         // Moving draws have other positions in every frame and are few, so all their levels are
@@ -57,7 +37,6 @@ impl CaptureJob<'_> {
                 }
             }
         }
-        let frame = self.boxes_seen(views)?;
         for view in frame.views() {
             let projection = view.layer.view.eye_to_clip;
             let pixels = Pixels {
@@ -78,7 +57,6 @@ impl CaptureJob<'_> {
             };
             self.sample(scene, &pixels, casters, slots, finest);
         }
-        Ok(())
     }
 
     /// Adds the samples of a view through the first `slots` of its draws' materials.

@@ -11,8 +11,6 @@ use super::scene_args::SceneSetup;
 use crate::study::processor;
 use crate::study::world::World;
 use anyhow::ensure;
-use formats::textrace::Pass;
-use formats::view::FrameViews;
 use raster::backend::{CaptureBackend, Fragments};
 use raster::capture::{CaptureJob, CapturedFrame, Pictures};
 use raster::frame::Frame;
@@ -48,7 +46,7 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
     let loaded = started.elapsed();
     progress.stage("preparing textures and shaders", 0, "");
     let mut session = Session::new(args, setup)?;
-    let (passes, finest) = session.plan()?;
+    let (mut planned, finest) = session.plan()?;
     let searched = started.elapsed();
     let scene = &session.world.scene;
     let textures = prepare_textures(scene, |image| finest[image], cache.as_ref())?;
@@ -62,12 +60,17 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
         backend,
         args.hsr,
     );
-    tables.passes = passes;
+    tables.passes = (planned.iter())
+        .flat_map(|frame| frame.plan.passes(frame.number))
+        .collect();
     let texels = texels_note(&textures, searched - loaded);
     let counts = [textures.textures.len(), textures.cached, textures.unseen()];
     drop(textures);
     let mut summary = Summary::default();
-    let first = session.first_frame(backend, &mut summary)?;
+    session.prepare(backend, &mut planned[0], &mut summary)?;
+    if !args.no_plain {
+        session.job().warm_up(backend, &planned[0])?;
+    }
     if session.planner.settings().multiview {
         warn_of_multiview_defect(backend)?;
     }
@@ -77,13 +80,16 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
         &*args.scene.scene, session.world.camera.name
     );
     note_ready(&scene, counts, [loaded, textured, ready]);
-    let frames = session.world.views.clone();
-    progress.stage("capturing", frames.len() as u64, "frames");
+    let frames = planned.len();
+    progress.stage("capturing", frames as u64, "frames");
     let mut output = TraceOutput::create(args, &tables, &session.world)?;
     let mut first_pictures: Option<Pictures> = None;
-    let mut first = Some(first);
-    for views in &frames {
-        let pictures = session.frame(backend, views, first.take(), &mut output, &mut summary)?;
+    for (position, mut frame) in planned.into_iter().enumerate() {
+        session.pose(backend, position, &mut summary)?;
+        if position > 0 {
+            session.prepare(backend, &mut frame, &mut summary)?;
+        }
+        let pictures = session.draw(backend, &frame, &mut output, &mut summary)?;
         first_pictures = first_pictures.or(pictures);
         progress.advance(1);
     }
@@ -98,14 +104,14 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
     }
     warn_of_few_pixels(summary.covered, &world.camera.name);
     if let Some(doubtful) = &summary.doubtful {
-        let per_frame = summary.counts.fragments / frames.len().max(1) as u64;
+        let per_frame = summary.counts.fragments / frames as u64;
         doubtful.warn(&world.scene, per_frame);
     }
     note(&texels);
-    let views = [frames.len(), args.views.len()];
+    let views = [frames, args.views.len()];
     let result = summary.result(views, size_px, file_bytes);
     shell::print_beside(outputs, &result)?;
-    summary.print(frames.len(), &backend.work());
+    summary.print(frames, &backend.work());
     Ok(())
 }
 
@@ -137,19 +143,18 @@ impl<'a> Session<'a> {
         }
     }
 
-    /// The passes of all frames, and the finest level of each image that a view samples. Draws are where
-    /// they start afterwards.
-    fn plan(&mut self) -> anyhow::Result<(Vec<Pass>, Vec<Option<u32>>)> {
-        let (mut passes, mut finest) = (Vec::new(), Vec::new());
-        for number in 0..self.world.views.len() {
+    /// Plans all frames: their layers and draws, and the finest level of each image that they sample. Draws
+    /// are where they start afterwards.
+    fn plan(&mut self) -> anyhow::Result<(Vec<Frame>, Vec<Option<u32>>)> {
+        let (mut planned, mut finest) = (Vec::new(), Vec::new());
+        for position in 0..self.world.views.len() {
             // The layers of a frame depend on where its draws are.
-            self.world.pose(self.world.views[number].frame)?;
-            let (job, views) = (self.job(), &self.world.views[number]);
-            passes.extend(job.passes(views)?);
-            job.add_finest_levels(views, &mut finest)?;
+            self.world.pose(self.world.views[position].frame)?;
+            let views = &self.world.views[position];
+            planned.push(self.job().frame_and_levels(views, &mut finest)?);
         }
         self.world.pose(self.world.moments.frames.start)?;
-        Ok((passes, finest))
+        Ok((planned, finest))
     }
 
     /// Opens the driver and prints what it replaces or lacks.
@@ -175,72 +180,69 @@ impl<'a> Session<'a> {
         Ok(opened)
     }
 
-    /// Culls the first frame, renders its shadow maps and warms the driver up.
-    fn first_frame(
+    /// Removes the draws of a frame that others hide and renders its shadow maps.
+    fn prepare(
         &self,
         backend: &mut dyn CaptureBackend,
+        frame: &mut Frame,
         summary: &mut Summary,
-    ) -> anyhow::Result<Frame> {
+    ) -> anyhow::Result<()> {
         let job = self.job();
-        let first = summary.look(&job, backend, &self.world.views[0])?;
-        summary.light(&job, backend, &first)?;
-        if !self.args.no_plain {
-            job.warm_up(backend, &first)?;
-        }
-        Ok(first)
+        summary.occlude(&job, backend, frame)?;
+        Ok(summary.light(&job, backend, frame)?)
     }
 
-    /// Captures a frame, which `first` is if it has been culled before. Returns its pictures if any were
-    /// drawn.
-    fn frame(
+    /// Poses the scene for a frame of the path. Looks for doubtful triangles in the first.
+    fn pose(
         &mut self,
         backend: &mut dyn CaptureBackend,
-        views: &FrameViews,
-        first: Option<Frame>,
-        output: &mut TraceOutput<'_>,
+        position: usize,
         summary: &mut Summary,
-    ) -> anyhow::Result<Option<Pictures>> {
-        self.world.pose(views.frame)?;
+    ) -> anyhow::Result<()> {
+        self.world.pose(self.world.views[position].frame)?;
         let world = &self.world;
         backend.pose(&world.scene, &world.draws);
         if summary.doubtful.is_none() {
             let doubtful = summary.doubtful.insert(DoubtfulTriangles::default());
             for eye in self.args.views {
-                doubtful.look(world, &views.eyes[*eye as usize]);
+                doubtful.look(world, &world.views[position].eyes[*eye as usize]);
             }
         }
+        Ok(())
+    }
+
+    /// Captures a prepared frame. Returns its pictures if any were drawn.
+    fn draw(
+        &self,
+        backend: &mut dyn CaptureBackend,
+        frame: &Frame,
+        output: &mut TraceOutput<'_>,
+        summary: &mut Summary,
+    ) -> anyhow::Result<Option<Pictures>> {
         let job = self.job();
-        let frame = match first {
-            Some(first) => first,
-            None => {
-                let frame = summary.look(&job, backend, views)?;
-                summary.light(&job, backend, &frame)?;
-                frame
-            }
-        };
         let plain = match self.args.no_plain {
             true => None,
-            false => Some(render_plain(&job, backend, &frame, summary)?),
+            false => Some(render_plain(&job, backend, frame, summary)?),
         };
-        let captured = capture(&job, backend, &frame, output, summary)?;
+        let captured = capture(&job, backend, frame, output, summary)?;
         let has_depth =
             job.fragments == Fragments::DepthTested && !job.planner.settings().multiview;
         if summary.covered.is_none() && has_depth {
-            summary.covered = Some(covered(&frame, &job.depths(backend, &frame)?));
+            summary.covered = Some(covered(frame, &job.depths(backend, frame)?));
         }
         let Some(plain) = plain else {
             return Ok(captured.pictures);
         };
         let compared = match (&captured.pictures, &plain.depths) {
             (Some(drawn), _) => Some(("pictures", *drawn == plain.pictures)),
-            (_, Some(depths)) => Some(("depths", job.depths(backend, &frame)? == *depths)),
+            (_, Some(depths)) => Some(("depths", job.depths(backend, frame)? == *depths)),
             _ => None,
         };
         if let Some((what, same)) = compared {
             ensure!(
                 same,
                 "frame {}: {what} with and without capture differ: the capture disturbed the rendering",
-                views.frame
+                frame.number
             );
             summary.compared = Some(what);
         }

@@ -4,7 +4,7 @@ use crate::cut_triangles::CutTriangles;
 use crate::study::world::World;
 use crate::study::{memory, processor};
 use crate::unstable_triangles::UnstableTriangles;
-use formats::view::{EyeView, FrameViews};
+use formats::view::EyeView;
 use raster::backend::{CaptureBackend, Work};
 use raster::capture::CaptureJob;
 use raster::error::RasterError;
@@ -109,25 +109,24 @@ impl Summary {
         Ok(())
     }
 
-    /// Culls the draws of a frame.
-    pub fn look(
+    /// Removes the draws of a planned frame that others hide.
+    pub fn occlude(
         &mut self,
         job: &CaptureJob<'_>,
         backend: &mut dyn CaptureBackend,
-        views: &FrameViews,
-    ) -> Result<Frame, RasterError> {
+        frame: &mut Frame,
+    ) -> Result<(), RasterError> {
         let start = Instant::now();
-        let mut frame = job.frame(views)?;
         if job.planner.settings().occlusion {
-            job.occlude(backend, &mut frame, &mut self.occlusion)?;
+            job.occlude(backend, frame, &mut self.occlusion)?;
         }
-        self.looking += start.elapsed();
+        self.looking += frame.plan_time + start.elapsed();
         self.skipped += frame.skipped;
         self.cull_tests += frame.cull_tests;
         self.occlusion_tests += frame.occlusion_tests;
         self.occluded += frame.occluded;
         self.culling += frame.cull_time;
-        Ok(frame)
+        Ok(())
     }
 
     /// Prints figures about the run.

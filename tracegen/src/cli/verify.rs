@@ -6,16 +6,16 @@ use super::path_args::PathArgs;
 use super::prepared::world;
 use super::scene_args::SceneArgs;
 use super::verified_trace::{look_as, refuse_partial, trace_cascades};
-use crate::study::world::World;
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::footprint::LodFormula;
-use formats::textrace::{Pass, Textrace, TextraceWriter};
+use formats::textrace::{Pass, Tables, Textrace, TextraceWriter};
 use formats::view::{Eye, Lens};
 use lab::verify::frame::{CaptureUnderTest, FrameUnderTest, TileChoice, Verified};
 use lab::verify::report::Report;
 use raster::backend::Texels;
 use raster::capture::CaptureJob;
+use raster::frame::Frame;
 use raster::lavapipe::Lavapipe;
 use record::Recorder;
 use scene::{LoadOptions, TextureSlot, TextureSlots};
@@ -129,7 +129,10 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
         ..world.job(&planner)
     };
     progress.stage("preparing textures", 0, "");
-    let finest = job.finest_levels(&world.views)?;
+    let mut finest = Vec::new();
+    let planned = (world.views.iter())
+        .map(|views| job.frame_and_levels(views, &mut finest))
+        .collect::<Result<Vec<_>, _>>()?;
     let textures = TextureSet::prepare(&world.scene, |image| finest[image], cache.as_ref())?;
     let mut backend = match existing.is_none() || args.colour {
         true => Some(Lavapipe::new(
@@ -143,22 +146,19 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     };
     progress.stage("capturing", 0, "");
     let trace = match (existing, &mut backend) {
-        (None, Some(backend)) => capture(&job, &world, &args.scene.scene, &textures, backend)?,
+        (None, Some(backend)) => {
+            let tables = tables(&world, &args.scene.scene, &textures, backend, job.fragments);
+            capture(&job, &planned[0], tables, backend)?
+        }
         (Some(trace), _) => trace,
         (None, None) => unreachable!("a driver is opened where there is no trace"),
     };
-    let frames = (world.views.iter())
-        .map(|views| {
-            let cascades = match shadows_are_known {
-                true => Some(job.frame(views)?.lighting.cascades),
-                false => None,
-            };
-            Ok(FrameUnderTest {
-                views: views.clone(),
-                cascades,
-            })
+    let frames: Vec<_> = (world.views.iter().zip(&planned))
+        .map(|(views, frame)| FrameUnderTest {
+            views: views.clone(),
+            cascades: shadows_are_known.then(|| frame.lighting.cascades.clone()),
         })
-        .collect::<anyhow::Result<Vec<_>>>()?;
+        .collect();
     let subject = CaptureUnderTest {
         trace: &trace,
         scene: &world.scene,
@@ -168,7 +168,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
     };
     subject.check()?;
     let texels = match (&mut backend, args.colour) {
-        (Some(backend), true) => texels(&job, &subject, backend)?,
+        (Some(backend), true) => texels(&job, &planned[0], &subject, backend)?,
         _ => Vec::new(),
     };
     progress.stage("verifying", 0, "");
@@ -263,31 +263,28 @@ fn formula_of(driver: &str) -> LodFormula {
 
 fn capture(
     job: &CaptureJob<'_>,
-    world: &World,
-    scene: &str,
-    textures: &TextureSet,
+    frame: &Frame,
+    mut tables: Tables,
     backend: &mut Lavapipe,
 ) -> anyhow::Result<Textrace> {
-    let mut tables = tables(world, scene, textures, backend, job.fragments);
-    tables.passes = job.passes(&world.views[0])?;
-    let frame = job.frame(&world.views[0])?;
-    job.light(backend, &frame)?;
+    tables.passes = frame.plan.passes(frame.number);
+    job.light(backend, frame)?;
     let writer = TextraceWriter::in_memory(&tables)?;
     let mut recorder = Recorder::new(writer, job.draws.replays(job.fragments));
-    job.capture_frame(backend, &frame, &mut recorder)?;
+    job.capture_frame(backend, frame, &mut recorder)?;
     Ok(Textrace::from_bytes(recorder.into_writer()?.into_bytes()?)?)
 }
 
 /// The driver's texels, by pass of the trace's first frame and by slot.
 fn texels(
     job: &CaptureJob<'_>,
+    frame: &Frame,
     subject: &CaptureUnderTest<'_>,
     backend: &mut Lavapipe,
 ) -> anyhow::Result<Vec<Vec<(TextureSlot, Texels)>>> {
     let textures = job.scene.materials.iter().flat_map(|m| m.textures.iter());
     let slots: Vec<TextureSlot> = textures.map(|(slot, _)| slot).collect();
     let used = TextureSlots::of(&slots);
-    let frame = job.frame(&subject.frames[0].views)?;
     let of_pass = |eye: Eye| {
         let view = (frame.views())
             .find(|view| view.layer.eye == Some(eye))

@@ -301,8 +301,8 @@ impl World {
         for views in &tables.meta.frames {
             // The layers of a frame depend on where its draws are.
             self.pose(views.frame)?;
-            let passes = self.job(planner(views.frame)).passes(views)?;
-            tables.passes.extend(passes);
+            let plan = self.job(planner(views.frame)).plan(views)?;
+            tables.passes.extend(plan.passes(views.frame));
         }
         Ok(tables)
     }

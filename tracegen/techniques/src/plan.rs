@@ -3,6 +3,8 @@
 use crate::Mask;
 use crate::layer::{Layer, Predicted};
 use crate::start::Start;
+use formats::textrace::{Pass, PassKind};
+use formats::view::TILE_SIZE_PX;
 use glam::DMat3;
 use std::sync::Arc;
 
@@ -105,6 +107,26 @@ impl FramePlan {
                 + composed.sum::<u64>(),
             depth: sum(&kept) + largest.unwrap_or(0),
         }
+    }
+
+    /// Render passes of frame `number`, one per layer.
+    pub fn passes(&self, number: u32) -> Vec<Pass> {
+        let pass = |(index, layer): (usize, &Layer)| {
+            let is_main = self.is_picture(index) && layer.start == Start::Sky;
+            Pass {
+                frame: number,
+                kind: if is_main {
+                    PassKind::Main
+                } else {
+                    PassKind::Layer
+                },
+                eye: layer.eye,
+                layer: if is_main { 0 } else { layer.number },
+                size_px: layer.size_px,
+                tiles: layer.size_px.map(|size| size.div_ceil(TILE_SIZE_PX)),
+            }
+        };
+        self.layers.iter().enumerate().map(pass).collect()
     }
 
     /// Whether a layer is the unmodified picture of an eye.

@@ -95,7 +95,7 @@ pub(super) fn capture_as(
 /// The tables of a trace of one frame.
 fn tables(
     job: &CaptureJob<'_>,
-    views: &FrameViews,
+    (views, frame): (&FrameViews, &Frame),
     set: &TextureSet,
     backend: &Lavapipe,
 ) -> Tables {
@@ -121,7 +121,7 @@ fn tables(
         textures,
         samplers,
         draws: draw_table,
-        passes: job.passes(views).unwrap(),
+        passes: frame.plan.passes(frame.number),
     }
 }
 
@@ -159,11 +159,11 @@ pub(super) fn capture_skipping(
         fragments,
         ..job(scene, &draws, planner)
     };
-    let finest = job.finest_levels(std::slice::from_ref(&views))?;
+    let mut finest = Vec::new();
+    let frame = job.frame_and_levels(&views, &mut finest)?;
     let set = TextureSet::prepare(scene, |image| finest[image], None).unwrap();
     let mut backend = Lavapipe::new(scene, &draws, &set, size_px, budget)?;
-    let tables = tables(&job, &views, &set, &backend);
-    let frame = job.frame(&views)?;
+    let tables = tables(&job, (&views, &frame), &set, &backend);
     job.light(&mut backend, &frame)?;
     let plain = plain.then(|| job.plain_frame(&mut backend, &frame));
     // Multiview leaves no depth per view.
