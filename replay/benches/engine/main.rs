@@ -1,6 +1,6 @@
 //! Measures each stage of a replay on one core, and compares it with the machine's memory bandwidth (the
 //! roofline) and with a plain LRU loop over the same lines in a mapped file (the yardstick).
-//! `docs/results/stages.md` explains the table.
+//! `docs/results/costs.md` explains the table.
 //!
 //! `cargo bench -p replay --bench engine [-- TRACE]`, or `TEXTRACE=file make bench`.
 

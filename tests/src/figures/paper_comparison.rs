@@ -1,4 +1,4 @@
-//! Tables of docs/results/z2-comparison.md, z2-open-choices.md and paper-z2.md.
+//! Tables of docs/results/z2-comparison.md, z2-open-choices.md and papers.md.
 
 use super::view::{Results, markdown};
 use replay::paper::z2;

@@ -45,7 +45,7 @@ impl Counts {
     }
 }
 
-/// Rows of the table in docs/results/encodings.md, and the row of each code.
+/// Rows of the table in docs/results/costs.md, and the row of each code.
 const ROWS: [&str; 6] = [
     "places",
     "first quads",
