@@ -25,7 +25,8 @@ pip() {
 pip download --quiet --no-deps --dest "$out" iniconfig >"$out/pip.log" 2>&1 ||
     absent "the Python package index cannot be reached"
 
-pip install --quiet "${PARALLAX_WHEEL:-./python}[notebooks]"
+# Byte code of packages that run once is not worth its time.
+pip install --quiet --no-compile "${PARALLAX_WHEEL:-./python}[notebooks]"
 # Not from python/, whose folder `parallax` has no extension module.
 "$python" -m pytest -q -p no:cacheprovider python/tests
 if [ "${UPDATE_NOTEBOOKS:-}" = 1 ]; then
