@@ -4,15 +4,13 @@
 //! one bay deep with a gallery on top.
 
 mod furnishing;
-mod materials;
 pub(crate) mod parts;
 
 use super::mesh_builder::MeshBuilder;
 use super::scene_builder::SceneBuilder;
+use super::scene_text::Code;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
-use materials::Palette;
 use parts::{Bay, Column, baluster, cornice, groin_vault, moulding, rib};
-use scene::Scene;
 use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Edge of a bay in metres.
@@ -37,10 +35,9 @@ struct Detail {
     baluster: (usize, usize),
     balusters: usize,
     dentils: bool,
-    /// Chamfer the edges of blocks.
-    chamfer: bool,
+    /// Factor of the chamfers of blocks.
+    bevel: f32,
     floor_cells: usize,
-    furnished: bool,
 }
 
 const RICH: Detail = Detail {
@@ -66,9 +63,8 @@ const RICH: Detail = Detail {
     baluster: (8, 1),
     balusters: 7,
     dentils: true,
-    chamfer: true,
+    bevel: 1.0,
     floor_cells: 4,
-    furnished: true,
 };
 
 const PLAIN: Detail = Detail {
@@ -94,35 +90,21 @@ const PLAIN: Detail = Detail {
     baluster: (5, 1),
     balusters: 5,
     dentils: false,
-    chamfer: false,
+    bevel: 0.0,
     floor_cells: 2,
-    furnished: false,
 };
 
-/// Stand-in for Crytek Sponza: many textures per material.
-pub fn rich() -> Scene {
-    let mut scene = SceneBuilder::new("atrium");
-    materials::add_rich(&mut scene);
-    build(&mut scene, &materials::RICH, &RICH);
-    scene.finish(vec3(0.62, 0.74, 0.92), 0)
-}
-
-/// Stand-in for the L-Bench Sponza: few simple textures.
-pub fn plain() -> Scene {
-    simple("atrium-plain", 0)
-}
-
-/// [`plain`] with cascaded shadow maps.
-pub fn shadows() -> Scene {
-    simple("atrium-shadows", 4)
-}
-
-fn simple(name: &str, cascades: u32) -> Scene {
-    let mut scene = SceneBuilder::new(name);
-    materials::add_plain(&mut scene);
-    build(&mut scene, &materials::PLAIN, &PLAIN);
-    scene.finish(vec3(0.62, 0.74, 0.92), cascades)
-}
+/// What the scenes' texts name.
+pub const CODE: Code = Code {
+    shapes: &[],
+    steps: &[
+        ("architecture", |scene, row| match row.word() {
+            "rich" => build(scene, &RICH),
+            _ => build(scene, &PLAIN),
+        }),
+        ("furnishing", |scene, _| furnishing::furnish(scene)),
+    ],
+};
 
 /// A rotation about the vertical, then a translation.
 fn at(position: Vec3, turn: f32) -> Affine3A {
@@ -180,32 +162,14 @@ fn place_all(
     }
 }
 
-fn build(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
-    floors_and_walls(scene, p, d);
-    colonnades(scene, p, d);
-    arcade_ceilings(scene, p, d);
-    mouldings_and_roof(scene, p, d);
-    if d.furnished {
-        furnishing::furnish(scene, p);
-    }
-    scene.cameras(
-        0.1,
-        100.0,
-        [
-            ("default", vec3(-11.6, 1.7, -0.4), vec3(11.0, 3.7, 0.1)),
-            (
-                "gallery",
-                vec3(-9.6, FLOOR2 + 1.7, 4.2),
-                vec3(8.0, 5.2, -2.2),
-            ),
-            ("arcade", vec3(12.2, 1.6, -5.3), vec3(-6.0, 2.1, -4.4)),
-        ],
-    );
-    // Sun along the court, onto its north wall and the floor.
-    scene.sun(vec3(0.38, -0.84, -0.39), vec3(3.3, 3.0, 2.55));
+fn build(scene: &mut SceneBuilder, d: &Detail) {
+    floors_and_walls(scene, d);
+    colonnades(scene, d);
+    arcade_ceilings(scene, d);
+    mouldings_and_roof(scene, d);
 }
 
-fn floors_and_walls(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
+fn floors_and_walls(scene: &mut SceneBuilder, d: &Detail) {
     let n = d.floor_cells;
     let mut court = MeshBuilder::new();
     let (cx, cz) = COURT;
@@ -216,7 +180,7 @@ fn floors_and_walls(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
         8 * n,
         2 * n,
     );
-    scene.add("court", court, p.court_floor);
+    scene.add("court", court, "court-floor");
 
     let mut tiles = MeshBuilder::new();
     let mut ceiling = MeshBuilder::new();
@@ -242,8 +206,8 @@ fn floors_and_walls(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
         let far = corner + vec3(0.0, EAVES - 0.08, -h);
         ceiling.panel(far, Vec3::X * w, Vec3::Z * h, cells(w), 1);
     }
-    scene.add("arcade-floors", tiles, p.arcade_floor);
-    scene.add("gallery-ceiling", ceiling, p.beam);
+    scene.add("arcade-floors", tiles, "arcade-floor");
+    scene.add("gallery-ceiling", ceiling, "beam");
 
     // Outer walls: corner, direction seen from inside, width.
     let walls = [
@@ -286,32 +250,31 @@ fn floors_and_walls(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
             1,
         );
     }
-    scene.add("wall-low", low, p.wall_low);
-    scene.add("dado", dado, p.dado);
-    scene.add("wall-high", high, p.wall_high);
+    scene.add("wall-low", low, "wall-low");
+    scene.add("dado", dado, "dado");
+    scene.add("wall-high", high, "wall-high");
 }
 
-fn colonnades(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
-    let bevel = f32::from(u8::from(d.chamfer));
+fn colonnades(scene: &mut SceneBuilder, d: &Detail) {
     let axes: Vec<Affine3A> = column_axes().into_iter().map(|c| at(c, 0.0)).collect();
     let raised: Vec<Affine3A> = column_axes()
         .into_iter()
         .map(|c| at(c + Vec3::Y * FLOOR2, 0.0))
         .collect();
-    place_all(scene, "column", d.column.shaft(), p.shaft, &axes);
-    place_all(scene, "capital", d.column.capital(), p.capital, &axes);
+    place_all(scene, "column", d.column.shaft(), "shaft", &axes);
+    place_all(scene, "capital", d.column.capital(), "capital", &axes);
     place_all(
         scene,
         "column-high",
         d.column_high.shaft(),
-        p.shaft_high,
+        "shaft-high",
         &raised,
     );
     place_all(
         scene,
         "capital-high",
         d.column_high.capital(),
-        p.capital,
+        "capital",
         &raised,
     );
 
@@ -334,20 +297,20 @@ fn colonnades(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
         thickness: 0.5,
         ..low
     };
-    place_all(scene, "spandrel", low.spandrel(), p.spandrel, &bays);
+    place_all(scene, "spandrel", low.spandrel(), "spandrel", &bays);
     place_all(
         scene,
         "arch",
         low.archivolt(d.moulding_steps),
-        p.arch,
+        "arch",
         &bays,
     );
-    place_all(scene, "spandrel-high", high.spandrel(), p.spandrel, &bays);
+    place_all(scene, "spandrel-high", high.spandrel(), "spandrel", &bays);
     place_all(
         scene,
         "arch-high",
         high.archivolt(d.moulding_steps),
-        p.arch,
+        "arch",
         &bays,
     );
 
@@ -357,29 +320,29 @@ fn colonnades(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
     rails.block(
         vec3(-half, foot, -0.12),
         vec3(half, foot + 0.12, 0.12),
-        0.015 * bevel,
+        0.015 * d.bevel,
     );
     rails.block(
         vec3(-half, foot + 0.82, -0.13),
         vec3(half, foot + 0.95, 0.13),
-        0.03 * bevel,
+        0.03 * d.bevel,
     );
     let one = baluster(d.baluster.0, d.baluster.1);
     for i in 0..d.balusters {
         let x = ((i as f32 + 0.5) / d.balusters as f32 * 2.0 - 1.0) * half;
         rails.merge(&one, Affine3A::from_translation(vec3(x, foot + 0.12, 0.0)));
     }
-    place_all(scene, "balustrade", rails, p.rail, &bays);
+    place_all(scene, "balustrade", rails, "rail", &bays);
 }
 
-fn arcade_ceilings(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
-    vaults(scene, p, d);
-    ribs_and_pilasters(scene, p, d);
-    joists(scene, p, d);
-    doors(scene, p, d);
+fn arcade_ceilings(scene: &mut SceneBuilder, d: &Detail) {
+    vaults(scene, d);
+    ribs_and_pilasters(scene, d);
+    joists(scene, d);
+    doors(scene, d);
 }
 
-fn vaults(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
+fn vaults(scene: &mut SceneBuilder, d: &Detail) {
     let mut vaults = Vec::new();
     for i in -5..5 {
         for j in -2..2 {
@@ -394,14 +357,13 @@ fn vaults(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
         scene,
         "vault",
         groin_vault(vec2(half, half), SPRING, half, d.vault_cells),
-        p.vault,
+        "vault",
         &vaults,
     );
 }
 
 /// Ribs from each column to the wall, on pilasters.
-fn ribs_and_pilasters(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
-    let bevel = f32::from(u8::from(d.chamfer));
+fn ribs_and_pilasters(scene: &mut SceneBuilder, d: &Detail) {
     let half = 0.5 * BAY;
     let mut ribs = Vec::new();
     let mut pilasters = Vec::new();
@@ -420,38 +382,37 @@ fn ribs_and_pilasters(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
         scene,
         "rib",
         rib(half, SPRING, 0.42, 0.14, d.arch_segments),
-        p.rib,
+        "rib",
         &ribs,
     );
     let mut pilaster = MeshBuilder::new();
-    pilaster.block(vec3(-0.3, 0.0, -0.3), vec3(0.3, 0.35, 0.3), 0.02 * bevel);
+    pilaster.block(vec3(-0.3, 0.0, -0.3), vec3(0.3, 0.35, 0.3), 0.02 * d.bevel);
     pilaster.block(
         vec3(-0.24, 0.35, -0.24),
         vec3(0.24, SPRING - 0.28, 0.24),
-        0.02 * bevel,
+        0.02 * d.bevel,
     );
     pilaster.block(
         vec3(-0.29, SPRING - 0.28, -0.29),
         vec3(0.29, SPRING - 0.2, 0.29),
-        0.015 * bevel,
+        0.015 * d.bevel,
     );
     pilaster.block(
         vec3(-0.34, SPRING - 0.2, -0.34),
         vec3(0.34, SPRING, 0.34),
-        0.03 * bevel,
+        0.03 * d.bevel,
     );
-    place_all(scene, "pilaster", pilaster, p.rib, &pilasters);
+    place_all(scene, "pilaster", pilaster, "rib", &pilasters);
 }
 
 /// Joists under the gallery's ceiling, every 0.7 m along the long sides.
-fn joists(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
-    let bevel = f32::from(u8::from(d.chamfer));
+fn joists(scene: &mut SceneBuilder, d: &Detail) {
     let half = 0.5 * BAY;
     let mut joist = MeshBuilder::new();
     joist.block(
         vec3(-0.09, EAVES - 0.32, -half),
         vec3(0.09, EAVES - 0.08, half),
-        0.012 * bevel,
+        0.012 * d.bevel,
     );
     let joists: Vec<Affine3A> = (-20..=20)
         .flat_map(|i| [-1.0, 1.0].map(|s| at(vec3(i as f32 * 0.7, 0.0, s * (COURT.1 + half)), 0.0)))
@@ -459,37 +420,44 @@ fn joists(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
             [-1.0, 1.0].map(|s| at(vec3(s * (COURT.0 + half), 0.0, i as f32 * 0.7), FRAC_PI_2))
         }))
         .collect();
-    place_all(scene, "joist", joist, p.beam, &joists);
+    place_all(scene, "joist", joist, "beam", &joists);
 }
 
 /// Doors in the outer wall, every other bay.
-fn doors(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
-    let bevel = f32::from(u8::from(d.chamfer));
+fn doors(scene: &mut SceneBuilder, d: &Detail) {
     let mut door = MeshBuilder::new();
     door.block(
         vec3(-0.75, 0.0, -0.05),
         vec3(-0.01, 2.55, 0.1),
-        0.015 * bevel,
+        0.015 * d.bevel,
     );
-    door.block(vec3(0.01, 0.0, -0.05), vec3(0.75, 2.55, 0.1), 0.015 * bevel);
+    door.block(
+        vec3(0.01, 0.0, -0.05),
+        vec3(0.75, 2.55, 0.1),
+        0.015 * d.bevel,
+    );
     for (x, y) in [(-0.64, 0.25), (0.12, 0.25), (-0.64, 1.45), (0.12, 1.45)] {
         door.block(
             vec3(x, y, 0.09),
             vec3(x + 0.52, y + 0.95, 0.13),
-            0.03 * bevel,
+            0.03 * d.bevel,
         );
     }
     let mut frame = MeshBuilder::new();
     frame.block(
         vec3(-1.0, 0.0, -0.05),
         vec3(-0.75, 2.55, 0.18),
-        0.03 * bevel,
+        0.03 * d.bevel,
     );
-    frame.block(vec3(0.75, 0.0, -0.05), vec3(1.0, 2.55, 0.18), 0.03 * bevel);
+    frame.block(
+        vec3(0.75, 0.0, -0.05),
+        vec3(1.0, 2.55, 0.18),
+        0.03 * d.bevel,
+    );
     frame.block(
         vec3(-1.08, 2.55, -0.05),
         vec3(1.08, 2.85, 0.24),
-        0.04 * bevel,
+        0.04 * d.bevel,
     );
     let doors: Vec<Affine3A> = (0..4)
         .flat_map(|i| {
@@ -509,12 +477,11 @@ fn doors(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
         .map(|a| Affine3A::from_translation(Vec3::Y * FLOOR2) * *a)
         .collect();
     let all: Vec<Affine3A> = doors.into_iter().chain(above).collect();
-    place_all(scene, "door", door, p.door, &all);
-    place_all(scene, "door-frame", frame, p.rib, &all);
+    place_all(scene, "door", door, "door", &all);
+    place_all(scene, "door-frame", frame, "rib", &all);
 }
 
-fn mouldings_and_roof(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
-    let bevel = f32::from(u8::from(d.chamfer));
+fn mouldings_and_roof(scene: &mut SceneBuilder, d: &Detail) {
     let steps = d.moulding_steps + 1;
     let (string, top) = (cornice(0.24, 0.32, steps), cornice(0.5, 0.6, steps));
     for side in sides() {
@@ -530,14 +497,14 @@ fn mouldings_and_roof(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
             scene,
             "string-course",
             moulding(&string, BAY, FLOOR2 - 0.32),
-            p.cornice,
+            "cornice",
             &places(0.375),
         );
         place_all(
             scene,
             "cornice",
             moulding(&top, BAY, EAVES),
-            p.cornice,
+            "cornice",
             &places(0.25),
         );
         if d.dentils {
@@ -548,10 +515,10 @@ fn mouldings_and_roof(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
                 row.block(
                     vec3(x - 0.08, EAVES - 0.16, 0.2),
                     vec3(x + 0.08, EAVES + 0.02, 0.40),
-                    0.012 * bevel,
+                    0.012 * d.bevel,
                 );
             }
-            place_all(scene, "dentils", row, p.cornice, &[at(mid, side.turn)]);
+            place_all(scene, "dentils", row, "cornice", &[at(mid, side.turn)]);
         }
         // The roof slopes up from the eaves to the outer wall.
         let mut roof = MeshBuilder::new();
@@ -563,7 +530,7 @@ fn mouldings_and_roof(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
             side.bays.len() * 2,
             4,
         );
-        place_all(scene, "roof", roof, p.roof, &[at(mid, side.turn)]);
+        place_all(scene, "roof", roof, "roof", &[at(mid, side.turn)]);
     }
     // Tie beams and purlins over the open court.
     let mut beams = MeshBuilder::new();
@@ -572,14 +539,14 @@ fn mouldings_and_roof(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
         beams.block(
             vec3(x - 0.11, EAVES + 0.6, -COURT.1 - 0.3),
             vec3(x + 0.11, EAVES + 0.88, COURT.1 + 0.3),
-            0.015 * bevel,
+            0.015 * d.bevel,
         );
         for s in [-1.0f32, 1.0] {
             let (z0, z1) = (s * (COURT.1 - 0.25), s * (COURT.1 - 0.05));
             beams.block(
-                vec3(x - 0.09, EAVES + 0.1, z0.min(z1)),
-                vec3(x + 0.09, EAVES + 0.6, z0.max(z1)),
-                0.01 * bevel,
+                vec3(x - 0.09, EAVES + 0.1, z0),
+                vec3(x + 0.09, EAVES + 0.6, z1),
+                0.01 * d.bevel,
             );
         }
     }
@@ -587,8 +554,8 @@ fn mouldings_and_roof(scene: &mut SceneBuilder, p: &Palette, d: &Detail) {
         beams.block(
             vec3(-COURT.0, EAVES + 0.88, z - 0.08),
             vec3(COURT.0, EAVES + 1.06, z + 0.08),
-            0.01 * bevel,
+            0.01 * d.bevel,
         );
     }
-    scene.add("roof-beams", beams, p.beam);
+    scene.add("roof-beams", beams, "beam");
 }

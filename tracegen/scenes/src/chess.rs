@@ -1,13 +1,11 @@
 //! A full chess set on a reflective board, a few moves into the Italian game: 42 K triangles.
 
-use super::masonry::carved_stone;
 use super::mesh_builder::{Knot, MeshBuilder, curve, lathed, profile, rounded, sharp, smooth};
 use super::noise::smoothstep;
-use super::organic::polished_wood;
+use super::row::Row;
 use super::scene_builder::SceneBuilder;
-use super::texture_synth::{Maps, Recipe, rgb, tones};
-use glam::{Affine3A, Quat, Vec3, vec2, vec3};
-use scene::Scene;
+use super::scene_text::Code;
+use glam::{Affine3A, Quat, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// Edge of a square in metres (tournament size).
@@ -37,27 +35,28 @@ fn collar(r: f32, y: f32) -> [Knot; 4] {
     ]
 }
 
-fn piece(radius: f32, upper: &[Knot]) -> MeshBuilder {
+/// The outline of a piece: foot, stem, collar (if it has one) and head.
+fn outline(radius: f32, stem: &str, ring: Option<[f32; 2]>, head: &str) -> Vec<Knot> {
     let mut knots = foot(radius);
-    knots.extend_from_slice(upper);
-    lathed(&curve(&knots, 2), SEGMENTS)
+    knots.extend(profile(stem));
+    knots.extend(ring.into_iter().flat_map(|[r, y]| collar(r, y)));
+    knots.extend(profile(head));
+    curve(&knots, 2)
 }
 
 fn pawn() -> MeshBuilder {
-    let mut upper = profile("0.0085,0.026 0.0062,0.036");
-    upper.extend(collar(0.0105, 0.0395));
-    upper.extend(profile(
-        "0.0088,0.0462 0.0108,0.0515 0.0088,0.0575 0,0.0622",
-    ));
-    piece(0.0165, &upper)
+    let head = "0.0088,0.0462 0.0108,0.0515 0.0088,0.0575 0,0.0622";
+    let collar = Some([0.0105, 0.0395]);
+    lathed(
+        &outline(0.0165, "0.0085,0.026 0.0062,0.036", collar, head),
+        SEGMENTS,
+    )
 }
 
 fn rook() -> MeshBuilder {
-    let upper = profile(
-        "0.0118,0.027 0.0102,0.042 0.0104,0.046! 0.0145,0.0485 0.0148,0.052! 0.0148,0.0535! \
-        0,0.0535!",
-    );
-    let mut m = piece(0.0195, &upper);
+    let head = "0.0118,0.027 0.0102,0.042 0.0104,0.046! 0.0145,0.0485 0.0148,0.052! \
+        0.0148,0.0535! 0,0.0535!";
+    let mut m = lathed(&outline(0.0195, "", None, head), SEGMENTS);
     // Six merlons: arcs of a ring.
     for i in 0..6 {
         let (from, span) = (TAU * i as f32 / 6.0, TAU / 6.0 * 0.68);
@@ -89,16 +88,13 @@ fn rook() -> MeshBuilder {
 }
 
 fn bishop() -> MeshBuilder {
-    let mut knots = foot(0.0185);
-    knots.extend(profile("0.0095,0.028 0.0066,0.044"));
-    knots.extend(collar(0.0125, 0.0495));
-    knots.extend(profile(
-        "0.0085,0.0575 0.0118,0.0645 0.0088,0.0735 0.0032,0.08 0.0018,0.0818! 0.0034,0.0842 \
-        0,0.0872",
-    ));
+    let head = "0.0085,0.0575 0.0118,0.0645 0.0088,0.0735 0.0032,0.08 0.0018,0.0818! \
+        0.0034,0.0842 0,0.0872";
+    let collar = Some([0.0125, 0.0495]);
+    let knots = outline(0.0185, "0.0095,0.028 0.0066,0.044", collar, head);
     let mut m = MeshBuilder::new();
     // The mitre's cut: a notch that rises along one side.
-    m.lathe_shaped(&curve(&knots, 2), SEGMENTS + 5, |angle, y| {
+    m.lathe_shaped(&knots, SEGMENTS + 5, |angle, y| {
         let turn = (angle + PI).rem_euclid(TAU) - PI;
         let cut = (-((y - 0.0700 - 0.004 * turn) / 0.0016).powi(2)).exp();
         1.0 - 0.34 * cut * smoothstep(1.1, 0.5, turn.abs())
@@ -107,15 +103,12 @@ fn bishop() -> MeshBuilder {
 }
 
 fn queen() -> MeshBuilder {
-    let mut knots = foot(0.0212);
-    knots.extend(profile("0.0108,0.032 0.0074,0.056"));
-    knots.extend(collar(0.0142, 0.0615));
-    knots.extend(profile(
-        "0.0085,0.0695 0.0112,0.0775 0.0148,0.0835! 0.0118,0.0832! 0.0072,0.0852 0.003,0.087! \
-        0.0042,0.0892 0,0.0925",
-    ));
+    let head = "0.0085,0.0695 0.0112,0.0775 0.0148,0.0835! 0.0118,0.0832! 0.0072,0.0852 \
+        0.003,0.087! 0.0042,0.0892 0,0.0925";
+    let collar = Some([0.0142, 0.0615]);
+    let knots = outline(0.0212, "0.0108,0.032 0.0074,0.056", collar, head);
     let mut m = MeshBuilder::new();
-    m.lathe_shaped(&curve(&knots, 2), 27, |angle, y| {
+    m.lathe_shaped(&knots, 27, |angle, y| {
         let crown = smoothstep(0.0785, 0.0825, y) * smoothstep(0.0845, 0.0838, y);
         1.0 + 0.10 * crown * (9.0 * angle).cos()
     });
@@ -123,28 +116,18 @@ fn queen() -> MeshBuilder {
 }
 
 fn king() -> MeshBuilder {
-    let mut upper = profile("0.0112,0.033 0.0078,0.06");
-    upper.extend(collar(0.0148, 0.0655));
-    upper.extend(profile(
-        "0.0088,0.0735 0.0112,0.082 0.0142,0.0885! 0.0105,0.0905 0.0034,0.0928! 0,0.093!",
-    ));
-    let mut m = piece(0.0218, &upper);
-    // A cross whose arms widen outwards.
-    m.block(
-        vec3(-0.0014, 0.0925, -0.0014),
-        vec3(0.0014, 0.1055, 0.0014),
-        0.0005,
-    );
-    m.block(
-        vec3(-0.0046, 0.0975, -0.0013),
-        vec3(0.0046, 0.1005, 0.0013),
-        0.0005,
-    );
-    m.block(
-        vec3(-0.0021, 0.1040, -0.0016),
-        vec3(0.0021, 0.1062, 0.0016),
-        0.0005,
-    );
+    let head = "0.0088,0.0735 0.0112,0.082 0.0142,0.0885! 0.0105,0.0905 0.0034,0.0928! 0,0.093!";
+    let collar = Some([0.0148, 0.0655]);
+    let knots = outline(0.0218, "0.0112,0.033 0.0078,0.06", collar, head);
+    let mut m = lathed(&knots, SEGMENTS);
+    // A cross whose arms widen outwards: half widths, depths and heights.
+    for [x, z, low, high] in [
+        [0.0014, 0.0014, 0.0925, 0.1055],
+        [0.0046, 0.0013, 0.0975, 0.1005],
+        [0.0021, 0.0016, 0.1040, 0.1062],
+    ] {
+        m.block(vec3(-x, low, -z), vec3(x, high, z), 0.0005);
+    }
     m
 }
 
@@ -165,8 +148,8 @@ fn spline<const N: usize>(values: &[[f32; 4]; N], t: f32) -> [f32; 4] {
 
 /// The knight: an oval swept from the chest over the poll down to the muzzle.
 fn knight() -> MeshBuilder {
-    let upper = profile("0.0145,0.0195 0.015,0.0215! 0,0.0225!");
-    let mut m = piece(0.0195, &upper);
+    let head = "0.0145,0.0195 0.015,0.0215! 0,0.0225!";
+    let mut m = lathed(&outline(0.0195, "", None, head), SEGMENTS);
     // Forward, height, half depth in the plane, half width, all in millimetres.
     let spine: [[f32; 4]; 10] = [
         [-0.5, 20.0, 12.8, 11.0],
@@ -223,135 +206,57 @@ fn knight() -> MeshBuilder {
     m
 }
 
-/// Squares, their frame and the table below.
-fn board(scene: &mut SceneBuilder) {
-    let mut fields = [MeshBuilder::new(), MeshBuilder::new()];
+/// The squares of one colour, whose ranks and files add up to an even (0) or odd (1) number.
+fn squares(m: &mut MeshBuilder, color: usize) {
     for rank in 0..8 {
-        for file in 0..8 {
+        for file in (0..8).filter(|file| (rank + file) % 2 == color) {
             let (x, z) = ((file as f32 - 4.0) * SQUARE, (rank as f32 - 4.0) * SQUARE);
             let gap = 0.0003;
-            fields[(rank + file) % 2].block(
+            m.block(
                 vec3(x + gap, -0.006, z + gap),
                 vec3(x + SQUARE - gap, 0.0, z + SQUARE - gap),
                 0.0006,
             );
         }
     }
-    let [a, b] = fields;
-    scene.add("light-squares", a, "light-marble");
-    scene.add("dark-squares", b, "dark-marble");
-    let mut frame = MeshBuilder::new();
-    let (inner, outer) = (4.0 * SQUARE, 4.0 * SQUARE + 0.042);
-    for turn in 0..4 {
-        let mut side = MeshBuilder::new();
-        side.block(
-            vec3(-outer, -0.022, inner),
-            vec3(inner, 0.002, outer),
-            0.004,
-        );
-        let rotation = Quat::from_rotation_y(turn as f32 * FRAC_PI_2);
-        frame.merge(&side, Affine3A::from_quat(rotation));
-    }
-    scene.add("board-frame", frame, "walnut");
-    let mut table = MeshBuilder::new();
-    table.panel(
-        vec3(-1.2, -0.022, 1.2),
-        Vec3::X * 2.4,
-        Vec3::NEG_Z * 2.4,
-        8,
-        8,
-    );
-    scene.add("table", table, "table-oak");
 }
 
-fn materials(scene: &mut SceneBuilder) {
-    let recipe = |name, tile_m, surface| Recipe::new(name, 512, Maps::Color, tile_m, surface);
-    let light = carved_stone(tones(0xe6dfd0, 0xcfc2ac), 0.5, 0.0, 0.2);
-    scene.polished(recipe("light-marble", 0.25, light), 0.1, 0.22);
-    let dark = carved_stone(tones(0x2c3a34, 0x16211d), 0.0, 0.0, 0.2);
-    scene.polished(recipe("dark-marble", 0.25, dark), 0.1, 0.22);
-    let walnut = polished_wood(tones(0x6a4026, 0x3c2212), 0.3);
-    scene.polished(recipe("walnut", 0.4, walnut), 0.3, 0.06);
-    let oak = polished_wood(tones(0xa9794a, 0x7d5430), 0.45);
-    scene.polished(recipe("table-oak", 0.8, oak), 0.45, 0.02);
-    scene.plain("ivory", rgb(0xe2d0a8), 0.18, |m| m.mirror = 0.04);
-    scene.plain("ebony", rgb(0x241a16), 0.12, |m| m.mirror = 0.14);
-}
-
-/// The scene.
-pub fn scene() -> Scene {
-    let mut scene = SceneBuilder::new("chess");
-    materials(&mut scene);
-    board(&mut scene);
-    pieces(&mut scene);
-    scene.cameras(
-        0.01,
-        20.0,
-        [
-            ("default", vec3(0.05, 0.20, 0.30), vec3(0.0, 0.0, 0.03)),
-            ("low", vec3(0.20, 0.10, 0.26), vec3(-0.05, 0.03, 0.0)),
-        ],
-    );
-    scene.sun(vec3(-0.5, -0.8, -0.35), vec3(1.3, 1.2, 1.05));
-    scene.lamp(vec3(0.5, 0.7, 0.3), vec3(0.36, 0.32, 0.26));
-    scene.finish(vec3(0.28, 0.32, 0.38), 0)
-}
-
-/// The position after 1. e4 e5 2. Nf3 Nc6 3. Bc4 Bc5 4. c3 Nf6 5. d3 d6.
-fn pieces(scene: &mut SceneBuilder) {
-    let back = [
-        "rook", "knight", "bishop", "queen", "king", "bishop", "knight", "rook",
-    ];
-    let square = |file: usize, rank: usize| {
-        vec3(
-            (file as f32 - 3.5) * SQUARE,
-            0.0,
-            (3.5 - rank as f32) * SQUARE,
-        )
+/// The pieces of a colour with their squares: those of the first rank, then the pawns.
+fn pieces(scene: &mut SceneBuilder, row: &mut Row) {
+    let material = row.word();
+    let (color, forward) = match material {
+        "ivory" => (0, FRAC_PI_2),
+        _ => (1, -FRAC_PI_2),
     };
-    for (color, material) in ["ivory", "ebony"].into_iter().enumerate() {
-        let (home, forward) = if color == 0 {
-            (0, FRAC_PI_2)
-        } else {
-            (7, -FRAC_PI_2)
+    for (name, piece) in [
+        ("pawn", pawn()),
+        ("rook", rook()),
+        ("knight", knight()),
+        ("bishop", bishop()),
+        ("queen", queen()),
+        ("king", king()),
+    ] {
+        scene.mesh(name, piece, material);
+    }
+    for number in 0..16 {
+        let mesh = scene.numbers(row.word()).get(color).copied();
+        let mesh = mesh.unwrap_or_else(|| row.fail("a piece, ivory first"));
+        let &[file, rank] = row.word().as_bytes() else {
+            row.fail("a square");
         };
-        let pieces: [(&str, MeshBuilder); 6] = [
-            ("pawn", pawn()),
-            ("rook", rook()),
-            ("knight", knight()),
-            ("bishop", bishop()),
-            ("queen", queen()),
-            ("king", king()),
-        ];
-        let kinds: Vec<(&str, usize)> = pieces
-            .into_iter()
-            .map(|(name, m)| (name, scene.mesh(name, m, material)))
-            .collect();
-        let mesh = |name: &str| kinds.iter().find(|(n, _)| *n == name).map_or(0, |k| k.1);
-        for (file, name) in back.into_iter().enumerate() {
-            let (f, r) = match (color, name, file) {
-                (0, "knight", 6) => (5, 2),
-                (1, "knight", 1) => (2, 5),
-                (0, "bishop", 5) => (2, 3),
-                (1, "bishop", 5) => (2, 4),
-                (1, "knight", 6) => (5, 5),
-                _ => (file, home),
-            };
-            let turn = forward + 0.06 * ((file * 7 + color * 3) as f32).sin();
-            let place =
-                Affine3A::from_rotation_translation(Quat::from_rotation_y(turn), square(f, r));
-            scene.place(mesh(name), place);
-        }
-        for file in 0..8 {
-            let rank = match (color, file) {
-                (0, 4) => 3,
-                (0, 2 | 3) => 2,
-                (0, _) => 1,
-                (_, 4) => 4,
-                (_, 3) => 5,
-                _ => 6,
-            };
-            scene.place(mesh("pawn"), Affine3A::from_translation(square(file, rank)));
-        }
+        let (x, z) = (f32::from(file) - 100.5, 52.5 - f32::from(rank));
+        let turn = match number {
+            0..8 => forward + 0.06 * ((number * 7 + color * 3) as f32).sin(),
+            _ => 0.0,
+        };
+        let turn = Quat::from_rotation_y(turn);
+        let at = vec3(x * SQUARE, 0.0, z * SQUARE);
+        scene.place(mesh, Affine3A::from_rotation_translation(turn, at));
     }
 }
+
+/// What the scene's text names.
+pub const CODE: Code = Code {
+    shapes: &[("squares", |m, row| squares(m, row.number()))],
+    steps: &[("pieces", pieces)],
+};

@@ -5,15 +5,12 @@
 pub(crate) mod plants;
 mod temple;
 
-use super::creature::{self, Creature};
-use super::masonry::{carved_band, carved_stone, dressed_stone};
-use super::mesh_builder::MeshBuilder;
+use super::creature;
+use super::mesh_builder::{MeshBuilder, upright};
 use super::noise::{Rng, bank, smoothstep};
-use super::organic::{LeafShape, bark, leaf, rock, skin, soil};
 use super::scene_builder::SceneBuilder;
-use super::texture_synth::{Maps, Recipe, Surface, rgb, tones};
+use super::scene_text::Code;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
-use scene::{AlphaMode, Scene};
 use std::f32::consts::TAU;
 
 /// Half extent of the ground in metres.
@@ -50,135 +47,45 @@ const CANOPIES: [&str; 2] = ["canopy-near", "canopy-far"];
 const BARKS: [&str; 2] = ["bark-grey", "bark-brown"];
 const ROCKS: [&str; 2] = ["rock-mossy", "rock-bare"];
 
-fn color(name: &'static str, size: u32, surface: Surface) -> Recipe {
-    Recipe::new(name, size, Maps::Color, 1.0, surface)
-}
+/// What the scene's text names.
+pub const CODE: Code = Code {
+    shapes: &[
+        ("limb", creature::limb_of),
+        ("teeth", |m, row| creature::teeth(m, row.number())),
+        ("toes", |m, row| creature::toes(m, row.number())),
+    ],
+    steps: &[
+        ("cameras", |scene, _| cameras(scene)),
+        ("place-creature", |scene, _| place_creature(scene)),
+        ("plants", |scene, _| {
+            let mut rng = Rng::new(2014);
+            trees(scene, &mut rng);
+            undergrowth(scene, &mut rng);
+        }),
+        ("temple", |scene, _| temple::build(scene, TEMPLE)),
+        ("terrain", |scene, _| terrain(scene)),
+    ],
+};
 
-fn normal(name: &'static str, tile_m: f32, surface: Surface) -> Recipe {
-    Recipe::new(name, 1024, Maps::ColorNormal, tile_m, surface)
-}
-
-fn full(name: &'static str, tile_m: f32, surface: Surface) -> Recipe {
-    Recipe {
-        maps: Maps::Full,
-        ..normal(name, tile_m, surface)
+/// Stands the creature beside the path.
+fn place_creature(scene: &mut SceneBuilder) {
+    let turn = Quat::from_rotation_y(4.3);
+    let at = CREATURE.with_y(ground(CREATURE.x, CREATURE.z) - 0.03);
+    for name in ["creature", "creature-teeth", "creature-eyes"] {
+        let stand = Affine3A::from_rotation_translation(turn, at);
+        scene.place(scene.numbers(name)[0], stand);
     }
 }
 
-/// Texture sets of leaves.
-fn leaf_textures() -> Vec<Recipe> {
-    use LeafShape::{Blade, Frond, Grass, Ivy, Palm, Spray};
-    vec![
-        color("fern-bright", 1024, leaf(Frond, tones(0x3c6a1c, 0x86ac3c))),
-        color("fern-dark", 1024, leaf(Frond, tones(0x24491a, 0x4f7d30))),
-        color("palm-feather", 1024, leaf(Frond, tones(0x35601f, 0x7d9c40))),
-        color("palm-fan", 1024, leaf(Palm, tones(0x335c22, 0x6f9440))),
-        normal("banana-leaf", 1.0, leaf(Blade, tones(0x3f7a24, 0x90b848))),
-        normal("philodendron", 1.0, leaf(Blade, tones(0x1f4a24, 0x467c3c))),
-        color("bush-bright", 1024, leaf(Spray, tones(0x41701f, 0x8aa83a))),
-        color("bush-dark", 1024, leaf(Spray, tones(0x21451c, 0x4a7530))),
-        color("bush-red", 512, leaf(Spray, tones(0x6d2a2c, 0x9c5a3c))),
-        color("grass-green", 512, leaf(Grass, tones(0x466e22, 0x94ac48))),
-        color("grass-dry", 512, leaf(Grass, tones(0x7a6f34, 0xb4a458))),
-        color("canopy-near", 1024, leaf(Spray, tones(0x35601d, 0x7ba03a))),
-        color("canopy-far", 1024, leaf(Spray, tones(0x2a5220, 0x5c8a36))),
-        color("ivy", 512, leaf(Ivy, tones(0x2a5223, 0x5f8f3f))),
-    ]
-}
-
-/// Texture sets of everything else.
-fn solid_textures() -> Vec<Recipe> {
-    let moss_stone = tones(0x8d8a72, 0x6b6d55);
-    vec![
-        full(
-            "forest-floor",
-            3.0,
-            soil(tones(0x3c2f1e, 0x5d4a2e), Some(rgb(0x8a6a36)), 0.5),
-        ),
-        full(
-            "trodden-earth",
-            2.5,
-            soil(tones(0x6e5638, 0x8a7048), None, 1.0),
-        ),
-        normal("bark-grey", 2.0, bark(tones(0x3a3026, 0x84745c), 0.7)),
-        normal("bark-brown", 2.0, bark(tones(0x3b2818, 0x7c5a3a), 0.4)),
-        normal("palm-bark", 1.2, bark(tones(0x4c4030, 0x94826a), 0.1)),
-        color("liana", 512, bark(tones(0x3a2e1c, 0x6a5834), 0.6)),
-        normal("rock-mossy", 2.2, rock(tones(0x6a665c, 0x8f897c), 1.0)),
-        normal("rock-bare", 2.2, rock(tones(0x7a6c5a, 0x9c8f7c), 0.3)),
-        full("temple-blocks", 2.6, dressed_stone(moss_stone, 3, 6, 1.0)),
-        full("temple-frieze", 1.6, carved_band(tones(0x948f74, 0x73745a))),
-        normal(
-            "temple-steps",
-            2.0,
-            dressed_stone(tones(0x98917a, 0x77745e), 4, 5, 0.9),
-        ),
-        normal(
-            "idol",
-            1.0,
-            carved_stone(tones(0x7f8468, 0x5b634a), 0.2, 0.8, 0.7),
-        ),
-        full("hide", 1.4, skin(tones(0x857650, 0x474c36))),
-    ]
-}
-
-fn materials(scene: &mut SceneBuilder) {
-    for recipe in leaf_textures() {
-        scene.textured(recipe, |m| {
-            m.alpha = AlphaMode::Mask(0.5);
-            m.double_sided = true;
-            m.roughness = 0.6;
-        });
-    }
-    for recipe in solid_textures() {
-        scene.textured(recipe, |_| {});
-    }
-    scene.plain("teeth", rgb(0xd8ceb0), 0.4, |_| {});
-    scene.plain("eye", rgb(0xc89a20), 0.1, |_| {});
-}
-
-/// The scene.
-pub fn scene() -> Scene {
-    let mut scene = SceneBuilder::new("jungle");
-    materials(&mut scene);
-    terrain(&mut scene);
-    temple::build(&mut scene, TEMPLE);
-    let Creature { hide, teeth, eyes } = creature::tyrannosaur();
-    let stand = Affine3A::from_rotation_translation(
-        Quat::from_rotation_y(4.3),
-        vec3(
-            CREATURE.x,
-            ground(CREATURE.x, CREATURE.z) - 0.03,
-            CREATURE.z,
-        ),
-    );
-    for (name, mesh, material) in [
-        ("creature", hide, "hide"),
-        ("creature-teeth", teeth, "teeth"),
-        ("creature-eyes", eyes, "eye"),
+fn cameras(scene: &mut SceneBuilder) {
+    for (name, x, aside, target) in [
+        ("default", -8.5, 0.0, vec3(6.0, 2.3, -0.9)),
+        ("ruin", 3.8, 0.0, vec3(15.0, 3.4, -0.3)),
+        ("thicket", -17.0, 2.4, vec3(-6.0, 1.2, -1.5)),
     ] {
-        scene.put(name, mesh, material, stand);
+        let z = path_z(x) + aside;
+        scene.camera(name, 0.1, 120.0, vec3(x, ground(x, z) + 1.65, z), target);
     }
-    let mut rng = Rng::new(2014);
-    trees(&mut scene, &mut rng);
-    undergrowth(&mut scene, &mut rng);
-
-    let eye = |x: f32, z: f32| vec3(x, ground(x, z) + 1.65, z);
-    scene.cameras(
-        0.1,
-        120.0,
-        [
-            ("default", eye(-8.5, path_z(-8.5)), vec3(6.0, 2.3, -0.9)),
-            ("ruin", eye(3.8, path_z(3.8)), vec3(15.0, 3.4, -0.3)),
-            (
-                "thicket",
-                eye(-17.0, path_z(-17.0) + 2.4),
-                vec3(-6.0, 1.2, -1.5),
-            ),
-        ],
-    );
-    scene.sun(vec3(0.42, -0.80, -0.43), vec3(3.4, 3.1, 2.4));
-    scene.finish(vec3(0.55, 0.66, 0.60), 1)
 }
 
 fn terrain(scene: &mut SceneBuilder) {
@@ -230,14 +137,6 @@ fn spot(rng: &mut Rng, clear: f32, reach: f32, temple: f32) -> Vec3 {
             return vec3(x, ground(x, z), z);
         }
     }
-}
-
-fn upright(position: Vec3, turn: f32, scale: f32) -> Affine3A {
-    Affine3A::from_scale_rotation_translation(
-        Vec3::splat(scale),
-        Quat::from_rotation_y(turn),
-        position,
-    )
 }
 
 fn trees(scene: &mut SceneBuilder, rng: &mut Rng) {
@@ -321,57 +220,74 @@ fn trees(scene: &mut SceneBuilder, rng: &mut Rng) {
     }
 }
 
+/// Plants and rocks in several variants: their mesh, materials and number, the distances that they keep
+/// ([`spot`]) and their smallest and largest size.
 fn undergrowth(scene: &mut SceneBuilder, rng: &mut Rng) {
-    let mut scatter = |scene: &mut SceneBuilder,
-                       meshes: &[usize],
-                       count: usize,
-                       clear: f32,
-                       reach: f32,
-                       temple: f32,
-                       size: [f32; 2]| {
+    use plants::{boulder, broadleaf, bush, fern, grass};
+    type Variant = fn(usize, &mut Rng) -> MeshBuilder;
+    let fans = &["palm-fan"; 2];
+    let kinds: [(&str, usize, Variant, &[&str], usize, [f32; 5]); 6] = [
+        (
+            "fern",
+            4,
+            |_, rng| fern(12, 0.95, rng),
+            &FERNS,
+            250,
+            [1.35, 12.0, 7.2, 0.7, 1.4],
+        ),
+        (
+            "fan-palm",
+            2,
+            |_, rng| bush(16, 1.3, rng),
+            fans,
+            50,
+            [2.2, 14.0, 8.4, 0.8, 1.3],
+        ),
+        (
+            "broadleaf",
+            4,
+            |i, rng| broadleaf(9, [1.7, 1.0][i % 2], rng),
+            &BROAD,
+            90,
+            [1.9, 13.0, 8.0, 0.75, 1.3],
+        ),
+        (
+            "bush",
+            6,
+            |_, rng| bush(22, 0.95, rng),
+            &BUSHES,
+            140,
+            [2.0, 16.0, 7.8, 0.7, 1.6],
+        ),
+        (
+            "grass",
+            4,
+            |_, rng| grass(9, 0.5, 0.42, rng),
+            &GRASSES,
+            260,
+            [1.0, 9.0, 6.6, 0.7, 1.3],
+        ),
+        (
+            "boulder",
+            4,
+            |i, _| boulder([22, 14], i as u64),
+            &ROCKS,
+            60,
+            [1.5, 13.0, 7.0, 0.18, 0.8],
+        ),
+    ];
+    let mut seeds = Rng::new(99);
+    for (name, variants, mesh, materials, count, [clear, reach, temple, small, large]) in kinds {
+        let meshes: Vec<usize> = (0..variants)
+            .map(|i| scene.mesh(name, mesh(i, &mut seeds), materials[i % materials.len()]))
+            .collect();
         for _ in 0..count {
             let place = spot(rng, clear, reach, temple);
+            let mesh = meshes[rng.below(variants)];
             scene.place(
-                meshes[rng.below(meshes.len())],
-                upright(place, rng.range(0.0, TAU), rng.range(size[0], size[1])),
+                mesh,
+                upright(place, rng.range(0.0, TAU), rng.range(small, large)),
             );
         }
-    };
-    let mut seeds = Rng::new(99);
-    let ferns: Vec<usize> = (0..4)
-        .map(|i| scene.mesh("fern", plants::fern(12, 0.95, &mut seeds), FERNS[i % 2]))
-        .collect();
-    scatter(scene, &ferns, 250, 1.35, 12.0, 7.2, [0.7, 1.4]);
-    let fans: Vec<usize> = (0..2)
-        .map(|_| scene.mesh("fan-palm", plants::bush(16, 1.3, &mut seeds), "palm-fan"))
-        .collect();
-    scatter(scene, &fans, 50, 2.2, 14.0, 8.4, [0.8, 1.3]);
-    let broad: Vec<usize> = (0..4)
-        .map(|i| {
-            scene.mesh(
-                "broadleaf",
-                plants::broadleaf(9, [1.7, 1.0][i % 2], &mut seeds),
-                BROAD[i % 2],
-            )
-        })
-        .collect();
-    scatter(scene, &broad, 90, 1.9, 13.0, 8.0, [0.75, 1.3]);
-    let bushes: Vec<usize> = (0..6)
-        .map(|i| scene.mesh("bush", plants::bush(22, 0.95, &mut seeds), BUSHES[i % 3]))
-        .collect();
-    scatter(scene, &bushes, 140, 2.0, 16.0, 7.8, [0.7, 1.6]);
-    let grasses: Vec<usize> = (0..4)
-        .map(|i| {
-            scene.mesh(
-                "grass",
-                plants::grass(9, 0.5, 0.42, &mut seeds),
-                GRASSES[i % 2],
-            )
-        })
-        .collect();
-    scatter(scene, &grasses, 260, 1.0, 9.0, 6.6, [0.7, 1.3]);
-    let rocks: Vec<usize> = (0..4)
-        .map(|i| scene.mesh("boulder", plants::boulder([22, 14], i as u64), ROCKS[i % 2]))
-        .collect();
-    scatter(scene, &rocks, 60, 1.5, 13.0, 7.0, [0.18, 0.8]);
+    }
 }

@@ -15,11 +15,16 @@ mod music_box;
 mod noise;
 mod organic;
 mod plant;
+mod row;
 mod scene_builder;
+mod scene_text;
+mod surfaces;
 mod teapot;
 mod texture_synth;
 
 use scene::{LoadOptions, Loaded, Scene, SceneError};
+use scene_builder::SceneBuilder;
+use scene_text::Code;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
@@ -36,107 +41,123 @@ pub struct Builtin {
     pub cameras: &'static [&'static str],
     /// Allowed numbers of instances in `name:NUMBER`.
     pub instances: Option<RangeInclusive<u32>>,
-    builder: Builder,
+    /// Its rows, and the functions that they name.
+    text: &'static str,
+    code: Code,
 }
 
-/// The function that builds a scene.
-#[derive(Clone, Copy, Debug)]
-enum Builder {
-    /// A scene without parameters.
-    Fixed(fn() -> Scene),
-    /// A scene with a number of instances; the default number comes first.
-    Sized(u32, fn(u32) -> Scene),
+/// An entry of [`BUILTINS`].
+const fn builtin(
+    name: &'static str,
+    triangles: u64,
+    cameras: &'static [&'static str],
+    description: &'static str,
+    text: &'static str,
+    code: Code,
+) -> Builtin {
+    Builtin {
+        name,
+        description,
+        triangles,
+        cameras,
+        instances: None,
+        text,
+        code,
+    }
 }
 
 /// The built-in scenes.
 pub const BUILTINS: &[Builtin] = &[
+    builtin(
+        "atrium",
+        274_152,
+        &["default", "gallery", "arcade"],
+        "two-storey colonnaded courtyard, 26 materials with three to four maps each",
+        include_str!("../data/atrium.scene"),
+        atrium::CODE,
+    ),
+    builtin(
+        "atrium-plain",
+        66_672,
+        &["default", "gallery", "arcade"],
+        "the same architecture with few simple textures",
+        include_str!("../data/atrium-plain.scene"),
+        atrium::CODE,
+    ),
+    builtin(
+        "atrium-shadows",
+        66_672,
+        &["default", "gallery", "arcade"],
+        "atrium-plain with four cascaded shadow maps",
+        include_str!("../data/atrium-plain.scene"),
+        atrium::CODE,
+    ),
+    builtin(
+        "jungle",
+        440_886,
+        &["default", "ruin", "thicket"],
+        "temple ruin among instanced foliage with alpha masks, one shadow map",
+        include_str!("../data/jungle.scene"),
+        jungle::CODE,
+    ),
+    builtin(
+        "teapot",
+        14_972,
+        &["default", "low"],
+        "the Utah teapot on a polished floor",
+        include_str!("../data/teapot.scene"),
+        Code::NONE,
+    ),
+    builtin(
+        "chess",
+        42_468,
+        &["default", "low"],
+        "a chess set on a reflective board",
+        include_str!("../data/chess.scene"),
+        chess::CODE,
+    ),
+    builtin(
+        "car",
+        55_596,
+        &["default", "rear", "side"],
+        "a sports car in a studio, paint, glass and chrome",
+        include_str!("../data/car.scene"),
+        car::CODE,
+    ),
+    builtin(
+        "lab",
+        97_886,
+        &["default", "side"],
+        "glassware on a chemistry bench, refraction",
+        include_str!("../data/lab.scene"),
+        lab::CODE,
+    ),
+    builtin(
+        "music-box",
+        106_752,
+        &["default", "train"],
+        "gears, comb and pinned cylinder in reflective brass and steel",
+        include_str!("../data/music-box.scene"),
+        music_box::CODE,
+    ),
+    builtin(
+        "meadow",
+        599_974,
+        &["default", "yard", "rows"],
+        "lavender rows before a farm house",
+        include_str!("../data/meadow.scene"),
+        meadow::CODE,
+    ),
     Builtin {
-        name: "atrium",
-        description: "two-storey colonnaded courtyard, 26 materials with three to four maps each",
-        triangles: 274_152,
-        cameras: &["default", "gallery", "arcade"],
-        instances: None,
-        builder: Builder::Fixed(atrium::rich),
-    },
-    Builtin {
-        name: "atrium-plain",
-        description: "the same architecture with few simple textures",
-        triangles: 66_672,
-        cameras: &["default", "gallery", "arcade"],
-        instances: None,
-        builder: Builder::Fixed(atrium::plain),
-    },
-    Builtin {
-        name: "atrium-shadows",
-        description: "atrium-plain with four cascaded shadow maps",
-        triangles: 66_672,
-        cameras: &["default", "gallery", "arcade"],
-        instances: None,
-        builder: Builder::Fixed(atrium::shadows),
-    },
-    Builtin {
-        name: "jungle",
-        description: "temple ruin among instanced foliage with alpha masks, one shadow map",
-        triangles: 440_886,
-        cameras: &["default", "ruin", "thicket"],
-        instances: None,
-        builder: Builder::Fixed(jungle::scene),
-    },
-    Builtin {
-        name: "teapot",
-        description: "the Utah teapot on a polished floor",
-        triangles: 14_972,
-        cameras: &["default", "low"],
-        instances: None,
-        builder: Builder::Fixed(teapot::scene),
-    },
-    Builtin {
-        name: "chess",
-        description: "a chess set on a reflective board",
-        triangles: 42_468,
-        cameras: &["default", "low"],
-        instances: None,
-        builder: Builder::Fixed(chess::scene),
-    },
-    Builtin {
-        name: "car",
-        description: "a sports car in a studio, paint, glass and chrome",
-        triangles: 55_596,
-        cameras: &["default", "rear", "side"],
-        instances: None,
-        builder: Builder::Fixed(car::scene),
-    },
-    Builtin {
-        name: "lab",
-        description: "glassware on a chemistry bench, refraction",
-        triangles: 97_886,
-        cameras: &["default", "side"],
-        instances: None,
-        builder: Builder::Fixed(lab::scene),
-    },
-    Builtin {
-        name: "music-box",
-        description: "gears, comb and pinned cylinder in reflective brass and steel",
-        triangles: 106_752,
-        cameras: &["default", "train"],
-        instances: None,
-        builder: Builder::Fixed(music_box::scene),
-    },
-    Builtin {
-        name: "meadow",
-        description: "lavender rows before a farm house",
-        triangles: 599_974,
-        cameras: &["default", "yard", "rows"],
-        instances: None,
-        builder: Builder::Fixed(meadow::scene),
-    },
-    Builtin {
-        name: "plant",
-        description: "industrial hall of 20,000 instances (plant:N has N) under moving cranes",
-        triangles: 1_037_726,
-        cameras: &["default", "aisle", "walkway", "pumps", "overview"],
         instances: Some(plant::INSTANCES),
-        builder: Builder::Sized(plant::DEFAULT_INSTANCES, plant::with_instances),
+        ..builtin(
+            "plant",
+            1_037_726,
+            &["default", "aisle", "walkway", "pumps", "overview"],
+            "industrial hall of 20,000 instances (plant:N has N) under moving cranes",
+            include_str!("../data/plant.scene"),
+            plant::CODE,
+        )
     },
 ];
 
@@ -157,17 +178,24 @@ pub fn build(spec: &str) -> Result<Option<Scene>, SceneError> {
         spec: spec.to_owned(),
         expected,
     };
-    match (found.builder, &found.instances, number) {
-        (Builder::Fixed(build), _, None) => Ok(Some(build())),
-        (Builder::Sized(usual, build), _, None) => Ok(Some(build(usual))),
-        (Builder::Sized(_, build), Some(range), Some(number)) => {
+    let number = match (&found.instances, number) {
+        (Some(range), Some(number)) => {
             let number = number.parse().ok().filter(|number| range.contains(number));
             let (low, high) = (range.start(), range.end());
             let expected = || format!("{name}:N with N instances from {low} to {high}");
-            Ok(Some(build(number.ok_or_else(|| refused(expected()))?)))
+            number.ok_or_else(|| refused(expected()))?
         }
-        (_, _, Some(_)) => Err(refused(format!("{name}, which has no parameter"))),
+        (None, Some(_)) => return Err(refused(format!("{name}, which has no parameter"))),
+        (_, None) => plant::DEFAULT_INSTANCES,
+    };
+    let mut scene = SceneBuilder::new(name);
+    scene_text::read(&mut scene, found.text, found.code);
+    match name {
+        "atrium-shadows" => scene.shadow_cascades(4),
+        "plant" => plant::lay_out(&mut scene, number),
+        _ => {}
     }
+    Ok(Some(scene.finish()))
 }
 
 /// Loads a built-in scene by name, or a glTF or OBJ file by path, with all its images.

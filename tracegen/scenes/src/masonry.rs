@@ -87,6 +87,25 @@ pub struct Masonry {
 }
 
 impl Masonry {
+    /// Blocks of these colours with joints of a width, a bevel and a depth.
+    fn new(
+        stones: [Rgb; 2],
+        mortar: Rgb,
+        [joint, bevel, depth]: [f32; 3],
+        weather: f32,
+        rough: f32,
+    ) -> Self {
+        Self {
+            stones,
+            mortar,
+            joint,
+            bevel,
+            depth,
+            weather,
+            rough,
+        }
+    }
+
     /// The texel at (`u`, `v`) inside `cell`.
     pub fn texel(&self, u: f32, v: f32, cell: Cell) -> Texel {
         let noise = bank();
@@ -117,15 +136,8 @@ impl Masonry {
 
 /// Weathered running-bond brick, 8 bricks by 16 courses.
 pub fn brick(stones: [Rgb; 2]) -> Surface {
-    let look = Masonry {
-        stones,
-        mortar: rgb(0xa89c88),
-        joint: 0.0022,
-        bevel: 0.005,
-        depth: 0.006,
-        weather: 0.6,
-        rough: 0.85,
-    };
+    let mortar = rgb(0xa89c88);
+    let look = Masonry::new(stones, mortar, [0.0022, 0.005, 0.006], 0.6, 0.85);
     Box::new(move |u, v| {
         let wobble = (bank().mottle.at(u, v) - 0.5) * 0.004;
         look.texel(u, v, courses(u + wobble, v + wobble, 10, 30, 0.5))
@@ -134,29 +146,15 @@ pub fn brick(stones: [Rgb; 2]) -> Surface {
 
 /// Dressed stone blocks of uneven length.
 pub fn dressed_stone(stones: [Rgb; 2], columns: i32, rows: i32, weather: f32) -> Surface {
-    let look = Masonry {
-        stones,
-        mortar: shade(stones[0], 0.62),
-        joint: 0.0015,
-        bevel: 0.005,
-        depth: 0.004,
-        weather,
-        rough: 0.8,
-    };
+    let mortar = shade(stones[0], 0.62);
+    let look = Masonry::new(stones, mortar, [0.0015, 0.005, 0.004], weather, 0.8);
     Box::new(move |u, v| look.texel(u, v, ashlar(u, v, columns, rows)))
 }
 
 /// Large floor slabs, worn and half polished.
 pub fn slabs(stones: [Rgb; 2], columns: i32, rows: i32, rough: f32) -> Surface {
-    let look = Masonry {
-        stones,
-        mortar: shade(stones[0], 0.42),
-        joint: 0.0012,
-        bevel: 0.003,
-        depth: 0.0025,
-        weather: 0.25,
-        rough,
-    };
+    let mortar = shade(stones[0], 0.42);
+    let look = Masonry::new(stones, mortar, [0.0012, 0.003, 0.0025], 0.25, rough);
     Box::new(move |u, v| look.texel(u, v, courses(u, v, columns, rows, 0.5)))
 }
 

@@ -4,14 +4,11 @@ mod house;
 mod parts;
 
 use super::jungle::plants::{boughs, buttressed_trunk};
-use super::masonry::{dressed_stone, plaster, roof_tiles};
-use super::mesh_builder::MeshBuilder;
+use super::mesh_builder::{MeshBuilder, upright};
 use super::noise::{Rng, bank, smoothstep};
-use super::organic::{bark, planks, rock, soil, turf, upright};
 use super::scene_builder::SceneBuilder;
-use super::texture_synth::{Maps, Recipe, rgb, tones};
+use super::scene_text::Code;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
-use scene::Scene;
 use std::f32::consts::TAU;
 
 /// Number of triangles up to which grass fills the scene.
@@ -33,100 +30,35 @@ pub(super) fn ground(x: f32, z: f32) -> f32 {
     yard * (1.6 * swell + hills * (0.6 + 1.4 * swell.abs())) + 0.012 * -z.min(0.0) * yard
 }
 
-fn materials(scene: &mut SceneBuilder) {
-    let recipe = |name, tile_m, surface| Recipe::new(name, 1024, Maps::Color, tile_m, surface);
-    for recipe in [
-        recipe(
-            "lavender-field",
-            3.4,
-            soil(tones(0x9a6a44, 0xb98a5c), None, 0.5),
-        ),
-        recipe(
-            "grassland",
-            8.0,
-            turf(tones(0x55662a, 0x84883f), rgb(0xa98a5c)),
-        ),
-        recipe(
-            "farm-stone",
-            2.4,
-            dressed_stone(tones(0xc9b28c, 0xa89068), 5, 9, 0.7),
-        ),
-        recipe(
-            "ochre-plaster",
-            3.0,
-            plaster(rgb(0xdcb884), rgb(0xb39a74), 0.6),
-        ),
-        recipe("clay-tiles", 1.5, roof_tiles(tones(0xc07048, 0x9a5236))),
-        recipe(
-            "door-wood",
-            1.2,
-            upright(planks(tones(0x7a5230, 0x523420), 7, 0.7)),
-        ),
-        recipe(
-            "blue-shutters",
-            0.8,
-            planks(tones(0x6f92b4, 0x4f7498), 12, 0.6),
-        ),
-        recipe("field-stone", 1.6, rock(tones(0x9c9484, 0xb8b09c), 0.25)),
-        recipe("bark", 1.6, bark(tones(0x4a3c2e, 0x8c7a62), 0.2)),
-    ] {
-        scene.textured(recipe, |m| m.roughness = 0.9);
-    }
-    for (name, color) in [
-        ("lavender-stem", 0x7d9070),
-        (LAVENDER[0], 0x7a58b8),
-        (LAVENDER[1], 0x9678cc),
-        ("grass", 0x7f9a3e),
-        ("straw", 0xc2aa60),
-        ("poppy", 0xd8301c),
-        ("oak-leaf", 0x587f30),
-        ("olive-leaf", 0x8a9a70),
-        ("cypress", 0x365426),
-    ] {
-        scene.plain(name, rgb(color), 0.7, |m| m.double_sided = true);
-    }
-    scene.plain("window-pane", rgb(0x20282e), 0.05, |m| m.mirror = 0.35);
-}
+/// What the scene's text names.
+pub const CODE: Code = Code {
+    shapes: &[],
+    steps: &[
+        ("cameras", |scene, _| cameras(scene)),
+        ("farm-house", |scene, _| house::farm_house(scene)),
+        ("garden-and-plants", |scene, _| {
+            let mut rng = Rng::new(600);
+            garden_wall(scene, &mut rng);
+            trees(scene, &mut rng);
+            lavender(scene, &mut rng);
+            grass_and_poppies(scene, &mut rng);
+        }),
+        ("land", |scene, _| land(scene)),
+    ],
+};
 
 fn upright_at(x: f32, z: f32, turn: f32, scale: f32) -> Affine3A {
-    Affine3A::from_scale_rotation_translation(
-        Vec3::splat(scale),
-        Quat::from_rotation_y(turn),
-        vec3(x, ground(x, z), z),
-    )
+    upright(vec3(x, ground(x, z), z), turn, scale)
 }
 
-/// The scene.
-pub fn scene() -> Scene {
-    let mut scene = SceneBuilder::new("meadow");
-    materials(&mut scene);
-    let mut rng = Rng::new(600);
-    land(&mut scene);
-    house::farm_house(&mut scene);
-    garden_wall(&mut scene, &mut rng);
-    trees(&mut scene, &mut rng);
-    lavender(&mut scene, &mut rng);
-    grass_and_poppies(&mut scene, &mut rng);
-    let eye = |x: f32, z: f32| vec3(x, ground(x, z) + 1.55, z);
-    scene.cameras(
-        0.1,
-        400.0,
-        [
-            ("default", eye(0.85, 6.6), vec3(2.6, 0.75, -14.0)),
-            ("yard", eye(1.5, -17.5), HOUSE + vec3(0.5, 2.2, 0.0)),
-        ],
-    );
-    scene.cameras(
-        0.05,
-        400.0,
-        [(
-            "rows",
-            vec3(-4.2, ground(-4.2, 3.0) + 0.9, 3.0),
-            vec3(-3.0, 0.4, -8.0),
-        )],
-    );
-    scene.sun(vec3(0.55, -0.62, -0.42), vec3(2.3, 2.1, 1.75));
-    scene.finish(vec3(0.36, 0.52, 0.78), 0)
+fn cameras(scene: &mut SceneBuilder) {
+    for (name, near, [x, height, z], target) in [
+        ("default", 0.1, [0.85, 1.55, 6.6], vec3(2.6, 0.75, -14.0)),
+        ("yard", 0.1, [1.5, 1.55, -17.5], HOUSE + vec3(0.5, 2.2, 0.0)),
+        ("rows", 0.05, [-4.2, 0.9, 3.0], vec3(-3.0, 0.4, -8.0)),
+    ] {
+        scene.camera(name, near, 400.0, vec3(x, ground(x, z) + height, z), target);
+    }
 }
 
 fn land(scene: &mut SceneBuilder) {
@@ -164,15 +96,12 @@ fn garden_wall(scene: &mut SceneBuilder, rng: &mut Rng) {
                     -20.8 + rng.jitter(0.03),
                     0.21 * course as f32 + ground(middle, -20.8) - 0.08,
                 );
-                let mut stone = MeshBuilder::new();
                 let (half, height) = (0.5 * w - 0.008, 0.2 + rng.jitter(0.012));
-                stone.block(vec3(-half, 0.0, -0.2), vec3(half, height, 0.2), 0.035);
+                let (low, high) = (vec3(-half, 0.0, -0.2), vec3(half, height, 0.2));
                 let turn = Quat::from_rotation_y(rng.jitter(0.06))
                     * Quat::from_rotation_z(rng.jitter(0.03));
-                m.merge(
-                    &stone,
-                    Affine3A::from_rotation_translation(turn, vec3(middle, y, z)),
-                );
+                let place = Affine3A::from_rotation_translation(turn, vec3(middle, y, z));
+                m.merge_block(low, high, 0.035, place);
             }
             x += w;
         }

@@ -3,7 +3,7 @@
 //! Texture coordinates are in metres (u to the right, v downwards as seen from outside).
 //! [`MeshBuilder::finish`] scales them by the material's tile size.
 
-use glam::{Affine3A, Vec2, Vec3, vec2, vec3};
+use glam::{Affine3A, Quat, Vec2, Vec3, vec2, vec3};
 use scene::Mesh;
 use scene::geometry::vertex_tangents;
 use std::f32::consts::TAU;
@@ -59,18 +59,26 @@ pub fn profile(points: &str) -> Vec<Knot> {
 /// # Panics
 /// If a point has another form.
 pub fn scaled_profile(points: &str, size: Vec2) -> Vec<Knot> {
+    points
+        .split_whitespace()
+        .map(|point| knot(point, size))
+        .collect()
+}
+
+/// A point of a [`profile`] in units of `size`.
+///
+/// # Panics
+/// If the point has another form.
+pub fn knot(point: &str, size: Vec2) -> Knot {
     let number = |text: &str| text.parse::<f32>().expect("a coordinate is a number");
-    let knot = |point: &str| {
-        let (x, y) = point
-            .trim_end_matches('!')
-            .split_once(',')
-            .expect("a point is x,y");
-        Knot {
-            at: vec2(number(x), number(y)) * size,
-            sharp: point.ends_with('!'),
-        }
-    };
-    points.split_whitespace().map(knot).collect()
+    let (x, y) = point
+        .trim_end_matches('!')
+        .split_once(',')
+        .expect("a point is x,y");
+    Knot {
+        at: vec2(number(x), number(y)) * size,
+        sharp: point.ends_with('!'),
+    }
 }
 
 /// A solid of revolution; see [`MeshBuilder::lathe`].
@@ -149,6 +157,12 @@ fn smooth_runs(profile: &[Knot]) -> Vec<Vec<(Vec2, Vec2)>> {
         start = end;
     }
     runs
+}
+
+/// A placement rotated about the vertical and scaled.
+pub fn upright(position: Vec3, turn: f32, scale: f32) -> Affine3A {
+    let turn = Quat::from_rotation_y(turn);
+    Affine3A::from_scale_rotation_translation(Vec3::splat(scale), turn, position)
 }
 
 impl MeshBuilder {
@@ -240,8 +254,9 @@ impl MeshBuilder {
         self.stitch(first, nu + 1, nv + 1);
     }
 
-    /// An axis-aligned box with its edges chamfered by `bevel` (0 for sharp edges).
-    pub fn block(&mut self, low: Vec3, high: Vec3, bevel: f32) {
+    /// An axis-aligned box between two corners, its edges chamfered by `bevel` (0 for sharp edges).
+    pub fn block(&mut self, a: Vec3, b: Vec3, bevel: f32) {
+        let (low, high) = (a.min(b), a.max(b));
         let (center, half) = ((low + high) * 0.5, (high - low) * 0.5);
         let bevel = bevel.min(half.min_element() * 0.9);
         let axes = [Vec3::X, Vec3::Y, Vec3::Z];
@@ -307,6 +322,13 @@ impl MeshBuilder {
             });
             self.indices.extend(v);
         }
+    }
+
+    /// [`Self::block`], transformed.
+    pub fn merge_block(&mut self, low: Vec3, high: Vec3, bevel: f32, transform: Affine3A) {
+        let mut block = Self::new();
+        block.block(low, high, bevel);
+        self.merge(&block, transform);
     }
 
     /// Rotates `profile` (radius, height; outside to its right when it goes up) about the y axis.
@@ -421,6 +443,52 @@ impl MeshBuilder {
             })
             .collect();
         self.tube(&points, sides);
+    }
+
+    /// A box between two points, `width` thick in both directions.
+    pub fn bar(&mut self, from: Vec3, to: Vec3, width: f32) {
+        let h = width / 2.0;
+        let rotation = Quat::from_rotation_arc(Vec3::Z, (to - from).normalize_or(Vec3::Z));
+        let place = Affine3A::from_rotation_translation(rotation, from);
+        self.merge_block(vec3(-h, -h, 0.0), vec3(h, h, from.distance(to)), 0.0, place);
+    }
+
+    /// A straight prism of a closed, counter-clockwise outline along +z.
+    pub fn prism(&mut self, outline: &[Knot], length: f32) {
+        let frame = |z: f32| SweepFrame {
+            origin: Vec3::Z * z,
+            right: Vec3::X,
+            up: Vec3::Y,
+            scale: 1.0,
+        };
+        self.sweep(outline, &[frame(0.0), frame(length)]);
+    }
+
+    /// An I-beam of a width, height and thickness along +z.
+    pub fn beam(&mut self, length: f32, [w, h, t]: [f32; 3]) {
+        let (x, y, s) = (w / 2.0, h / 2.0, t / 2.0);
+        // A quarter of the outline; the others are its mirror images.
+        let quarter = [(x, y), (x, y - t), (s, y - t)];
+        let half = (quarter.iter().map(|(x, y)| sharp(*x, -y)))
+            .chain(quarter.iter().rev().map(|(x, y)| sharp(*x, *y)));
+        let right: Vec<Knot> = half.collect();
+        let left = right.iter().rev().map(|k| sharp(-k.at.x, k.at.y));
+        let outline: Vec<Knot> = [sharp(-x, -y)]
+            .into_iter()
+            .chain(right.iter().copied())
+            .chain(left)
+            .collect();
+        self.prism(&outline, length);
+    }
+
+    /// Adds `other`.
+    pub fn append(&mut self, other: Self) {
+        let first = self.positions.len() as u32;
+        self.positions.extend(other.positions);
+        self.normals.extend(other.normals);
+        self.uvs.extend(other.uvs);
+        self.indices
+            .extend(other.indices.into_iter().map(|i| first + i));
     }
 
     /// Adds `other`, transformed.

@@ -1,17 +1,14 @@
-//! A musical movement in an open wooden box: pinned cylinder, comb, spring barrel, gear train and
-//! air governor. 106 K triangles of brass and steel.
+//! Shapes and steps of the music box: what its text cannot say.
 
 mod train;
 
-use super::gears::screw;
-use super::mesh_builder::{MeshBuilder, rounded, sharp, turned};
+use super::gears::{screw, worm};
+use super::mesh_builder::{MeshBuilder, turned};
 use super::noise::{Rng, smoothstep};
-use super::organic::{damask, polished_wood};
 use super::scene_builder::SceneBuilder;
-use super::texture_synth::{Maps, Recipe, rgb, tones};
+use super::scene_text::Code;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
-use scene::Scene;
-use std::f32::consts::{FRAC_PI_2, TAU};
+use std::f32::consts::TAU;
 
 /// Module of the train's gears in metres.
 pub(super) const MODULE: f32 = 0.0009;
@@ -22,166 +19,30 @@ const CYLINDER_RADIUS: f32 = 0.0115;
 /// Teeth of the comb.
 const TINES: usize = 64;
 
-fn materials(scene: &mut SceneBuilder) {
-    let recipe =
-        |name, size, tile_m, surface| Recipe::new(name, size, Maps::Color, tile_m, surface);
-    let rosewood = polished_wood(tones(0x7a3f26, 0x3a1a10), 0.25);
-    scene.polished(recipe("rosewood", 1024, 0.25, rosewood), 0.2, 0.06);
-    let velvet = damask(rgb(0x5a1424), rgb(0x74202e), 4.0);
-    scene.polished(recipe("velvet", 512, 0.10, velvet), 0.95, 0.0);
-    let table = polished_wood(tones(0xb98a58, 0x8a6038), 0.4);
-    scene.polished(recipe("table", 1024, 0.7, table), 0.4, 0.03);
-    scene.metal("brass", 0xdcb45e, 0.22, 0.25);
-    scene.metal("polished-brass", 0xe8bf62, 0.08, 0.6);
-    scene.metal("steel", 0xcfd3d8, 0.1, 0.6);
-    scene.metal("blued-steel", 0x2f4a86, 0.15, 0.45);
-    scene.plain("ruby", rgb(0xd01840), 0.05, |m| {
-        m.transmission = 0.6;
-        m.ior = 1.76;
-    });
-}
+/// What the scene's text names.
+pub const CODE: Code = Code {
+    shapes: &[
+        ("fan", |m, _| train::fan(m)),
+        ("mainspring", |m, _| train::mainspring(m)),
+        ("pins", |m, _| pins(m)),
+        ("screw", |m, row| m.append(screw(row.number()))),
+        ("worm", |m, _| m.append(worm(0.0016, 0.014, 9.0, 18))),
+    ],
+    steps: &[
+        ("bells", |scene, _| train::bells(scene)),
+        ("comb", |scene, _| comb(scene)),
+        ("train", |scene, _| train::train(scene)),
+    ],
+};
 
-/// The scene.
-pub fn scene() -> Scene {
-    let mut scene = SceneBuilder::new("music-box");
-    materials(&mut scene);
-    casket(&mut scene);
-    cylinder(&mut scene);
-    comb(&mut scene);
-    train::train(&mut scene);
-    train::fittings(&mut scene);
-    train::bells(&mut scene);
-    scene.cameras(
-        0.01,
-        10.0,
-        [
-            (
-                "default",
-                vec3(-0.002, 0.096, 0.070),
-                vec3(0.004, 0.020, -0.010),
-            ),
-            (
-                "train",
-                vec3(-0.085, 0.075, 0.075),
-                vec3(-0.045, 0.022, -0.004),
-            ),
-        ],
-    );
-    scene.sun(vec3(-0.4, -0.8, -0.45), vec3(1.25, 1.2, 1.1));
-    scene.lamp(vec3(0.25, 0.35, 0.2), vec3(0.12, 0.11, 0.09));
-    scene.finish(vec3(0.36, 0.39, 0.43), 0)
-}
-
-/// A box with an open, velvet-lined lid, on a table.
-fn casket(scene: &mut SceneBuilder) {
-    let (w, d, h, t) = (0.092, 0.062, 0.052, 0.007);
-    let mut wood = MeshBuilder::new();
-    wood.block(vec3(-w, 0.0, -d), vec3(w, 0.006, d), 0.0015);
-    for s in [-1.0f32, 1.0] {
-        let (z0, z1) = (s * d, s * (d - t));
-        wood.block(vec3(-w, 0.006, z0.min(z1)), vec3(w, h, z0.max(z1)), 0.0015);
-        let (x0, x1) = (s * w, s * (w - t));
-        wood.block(
-            vec3(x0.min(x1), 0.006, -d + t),
-            vec3(x0.max(x1), h, d - t),
-            0.0012,
-        );
-        for z in [-d + 0.012, d - 0.012] {
-            let foot = rounded("0,-0.009! 0.006,-0.008 0.008,-0.004 0.006,0!", 3, 24);
-            wood.merge(
-                &foot,
-                Affine3A::from_translation(vec3(s * (w - 0.012), 0.0, z)),
-            );
-        }
-    }
-    scene.add("casket", wood, "rosewood");
-    // The lid leans back at its hinges.
-    let hinge = Affine3A::from_rotation_translation(Quat::from_rotation_x(-1.95), vec3(0.0, h, -d));
-    let mut lid = MeshBuilder::new();
-    lid.block(vec3(-w, 0.0, 0.0), vec3(w, 0.006, 2.0 * d), 0.002);
-    for s in [-1.0f32, 1.0] {
-        let (x0, x1) = (s * w, s * (w - t));
-        lid.block(
-            vec3(x0.min(x1), -0.014, 0.0),
-            vec3(x0.max(x1), 0.0, 2.0 * d),
-            0.0012,
-        );
-    }
-    lid.block(vec3(-w + t, -0.014, 0.0), vec3(w - t, 0.0, t), 0.0012);
-    lid.block(
-        vec3(-w + t, -0.014, 2.0 * d - t),
-        vec3(w - t, 0.0, 2.0 * d),
-        0.0012,
-    );
-    scene.put("lid", lid, "rosewood", hinge);
-    let mut lining = MeshBuilder::new();
-    lining.quad(
-        vec3(-w + t, -0.0006, t),
-        Vec3::X * 2.0 * (w - t),
-        Vec3::Z * 2.0 * (d - t),
-        vec2(0.0, 0.0),
-    );
-    scene.put("lining", lining, "velvet", hinge);
-    let mut bed = MeshBuilder::new();
-    bed.panel(
-        vec3(-w + t, 0.0066, d - t),
-        Vec3::X * 2.0 * (w - t),
-        Vec3::NEG_Z * 2.0 * (d - t),
-        8,
-        6,
-    );
-    scene.add("velvet", bed, "velvet");
-    let mut barrel = MeshBuilder::new();
-    for x in [-0.06, 0.06] {
-        barrel.rod(
-            vec3(x - 0.01, h, -d - 0.001),
-            vec3(x + 0.01, h, -d - 0.001),
-            0.002,
-            14,
-        );
-    }
-    scene.add("hinges", barrel, "polished-brass");
-    let mut table = MeshBuilder::new();
-    table.panel(
-        vec3(-0.7, -0.009, 0.6),
-        Vec3::X * 1.4,
-        Vec3::NEG_Z * 1.2,
-        10,
-        10,
-    );
-    scene.add("table", table, "table");
-}
-
-fn cylinder(scene: &mut SceneBuilder) {
-    let along_x = Quat::from_rotation_z(-FRAC_PI_2);
-    let mut drum = MeshBuilder::new();
-    let (r, half) = (CYLINDER_RADIUS, CYLINDER_HALF);
-    let outline = [
-        sharp(0.0, -half - 0.004),
-        sharp(0.0022, -half - 0.004),
-        sharp(0.0022, -half),
-        sharp(0.92 * r, -half),
-        sharp(r, -half + 0.0008),
-        sharp(r, half - 0.0008),
-        sharp(0.92 * r, half),
-        sharp(0.0022, half),
-        sharp(0.0022, half + 0.004),
-        sharp(0.0, half + 0.004),
-    ];
-    drum.lathe(&outline, 96);
-    scene.put(
-        "cylinder",
-        drum,
-        "polished-brass",
-        Affine3A::from_rotation_translation(along_x, CYLINDER),
-    );
-    // Pins: a melody of chords and runs on the tracks of the comb's tines.
+/// A melody of chords and runs on the tracks of the comb's tines.
+fn pins(pins: &mut MeshBuilder) {
+    let r = CYLINDER_RADIUS;
     let pin = turned(
         "0.00022,-0.0004! 0.0002,0.001! 0.00013,0.00125 0,0.00132",
         6,
     );
     let mut rng = Rng::new(1796);
-    let mut pins = MeshBuilder::new();
     for beat in 0..96 {
         let chord = if beat % 8 == 0 {
             14
@@ -200,7 +61,6 @@ fn cylinder(scene: &mut SceneBuilder) {
             pins.merge(&pin, Affine3A::from_rotation_translation(lean, at));
         }
     }
-    scene.add("pins", pins, "steel");
 }
 
 /// Position of a tine (and its track of pins) along x.

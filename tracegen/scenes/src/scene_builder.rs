@@ -1,7 +1,7 @@
 //! Assembles materials, meshes, instances, cameras and lights into a scene.
 
 use super::mesh_builder::MeshBuilder;
-use super::texture_synth::{Map, Recipe, Rgb, linear, rgb};
+use super::texture_synth::{Map, Recipe, Rgb, linear};
 use glam::{Affine3A, Vec3};
 use scene::{
     Camera, Instance, Light, Material, Motion, Movement, Scene, TextureRef, TextureSlot, Textures,
@@ -12,6 +12,8 @@ use std::collections::HashMap;
 pub struct SceneBuilder {
     scene: Scene,
     tile_m: Vec<f32>,
+    /// Materials by their other names.
+    roles: HashMap<&'static str, &'static str>,
 }
 
 impl SceneBuilder {
@@ -23,6 +25,7 @@ impl SceneBuilder {
                 ..Scene::default()
             },
             tile_m: Vec::new(),
+            roles: HashMap::new(),
         }
     }
 
@@ -49,31 +52,6 @@ impl SceneBuilder {
         };
         adjust(&mut material);
         self.material(material, 1.0);
-    }
-
-    /// Adds bare metal that mirrors a fraction of the light.
-    pub fn metal(&mut self, name: &str, color: u32, roughness: f32, mirror: f32) {
-        self.plain(name, rgb(color), roughness, |m| {
-            m.metallic = 1.0;
-            m.mirror = mirror;
-        });
-    }
-
-    /// Adds glass or a liquid, seen from both sides.
-    pub fn clear(&mut self, name: &str, color: u32, transmission: f32, ior: f32) {
-        self.plain(name, rgb(color), 0.0, |m| {
-            m.transmission = transmission;
-            m.ior = ior;
-            m.double_sided = true;
-        });
-    }
-
-    /// Adds a material with its textures, a roughness and a mirrored fraction of the light.
-    pub fn polished(&mut self, recipe: Recipe, roughness: f32, mirror: f32) {
-        self.textured(recipe, |m| {
-            m.roughness = roughness;
-            m.mirror = mirror;
-        });
     }
 
     /// Adds a material with its textures. `adjust` can change the rest.
@@ -115,11 +93,22 @@ impl SceneBuilder {
         self.material(material, tile_m);
     }
 
+    /// The scene's name.
+    pub fn name(&self) -> &str {
+        &self.scene.name
+    }
+
+    /// Gives a material another name.
+    pub fn role(&mut self, role: &'static str, material: &'static str) {
+        self.roles.insert(role, material);
+    }
+
     /// Adds a mesh that is not placed yet; returns its index.
     ///
     /// # Panics
     /// If no material has that name.
     pub fn mesh(&mut self, name: &str, mesh: MeshBuilder, material: &str) -> usize {
+        let material = self.roles.get(material).copied().unwrap_or(material);
         let mut materials = self.scene.materials.iter();
         let Some(material) = materials.position(|known| known.name == material) else {
             panic!("{}/{name}: no material {material}", self.scene.name);
@@ -153,24 +142,17 @@ impl SceneBuilder {
         self.put(name, mesh, material, Affine3A::IDENTITY);
     }
 
-    /// Adds cameras by name, position and target; the first is the default one.
-    pub fn cameras<const N: usize>(
-        &mut self,
-        near: f32,
-        far: f32,
-        cameras: [(&str, Vec3, Vec3); N],
-    ) {
-        for (name, eye, target) in cameras {
-            self.scene.cameras.push(Camera {
-                name: name.to_owned(),
-                eye,
-                target,
-                up: Vec3::Y,
-                vfov_deg: 60.0,
-                near,
-                far,
-            });
-        }
+    /// Adds a camera; the first is the default one.
+    pub fn camera(&mut self, name: &str, near: f32, far: f32, eye: Vec3, target: Vec3) {
+        self.scene.cameras.push(Camera {
+            name: name.to_owned(),
+            eye,
+            target,
+            up: Vec3::Y,
+            vfov_deg: 60.0,
+            near,
+            far,
+        });
     }
 
     /// Adds parallel light that travels along `direction`.
@@ -186,11 +168,26 @@ impl SceneBuilder {
         self.scene.lights.push(Light::Point { position, color });
     }
 
-    /// The finished scene under a sky of the given radiance.
-    pub fn finish(mut self, sky: Vec3, shadow_cascades: u32) -> Scene {
+    /// Sets the sky's radiance.
+    pub fn sky(&mut self, sky: Vec3) {
         self.scene.sky = sky;
-        self.scene.shadow_cascades = shadow_cascades;
+    }
+
+    /// Sets the number of shadow maps.
+    pub fn shadow_cascades(&mut self, cascades: u32) {
+        self.scene.shadow_cascades = cascades;
+    }
+
+    /// The finished scene.
+    pub fn finish(self) -> Scene {
         self.scene
+    }
+
+    /// Numbers of the meshes of a name.
+    pub fn numbers(&self, name: &str) -> Vec<usize> {
+        let meshes = self.scene.meshes.iter().enumerate();
+        let named = meshes.filter(|(_, mesh)| mesh.name == name);
+        named.map(|(number, _)| number).collect()
     }
 
     /// Mesh numbers by name.

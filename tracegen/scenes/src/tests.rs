@@ -277,3 +277,10 @@ fn removing_texture_slots_removes_their_images() {
         );
     }
 }
+
+#[test]
+#[should_panic(expected = "test, line 2: expected 3 numbers instead of '0,0'")]
+fn a_row_of_another_form_is_refused_with_its_place() {
+    let mut scene = crate::SceneBuilder::new("test");
+    crate::scene_text::read(&mut scene, "sky 1,1,1\nlamp 0,0 1,1,1\n", crate::Code::NONE);
+}

@@ -15,11 +15,6 @@ pub fn rgb(hex: u32) -> Rgb {
     [hex >> 16, hex >> 8, hex].map(|c| (c & 255) as f32 / 255.0)
 }
 
-/// The colours with two codes 0xRRGGBB, between which a surface varies.
-pub fn tones(a: u32, b: u32) -> [Rgb; 2] {
-    [a, b].map(rgb)
-}
-
 /// Linear mix of two colours.
 pub fn mix(a: Rgb, b: Rgb, t: f32) -> Rgb {
     std::array::from_fn(|i| lerp(a[i], b[i], t))
@@ -267,9 +262,19 @@ fn normal_map(height: &[f32], n: usize) -> Vec<u8> {
 
 /// The source text of every file of this crate that may affect a texture.
 const SOURCE_TEXT: &[&str] = &[
+    include_str!("../data/atrium-plain.scene"),
+    include_str!("../data/atrium.scene"),
+    include_str!("../data/car-lines.txt"),
+    include_str!("../data/car.scene"),
+    include_str!("../data/chess.scene"),
+    include_str!("../data/jungle.scene"),
+    include_str!("../data/lab.scene"),
+    include_str!("../data/meadow.scene"),
+    include_str!("../data/music-box.scene"),
+    include_str!("../data/plant.scene"),
+    include_str!("../data/teapot.scene"),
     include_str!("atrium.rs"),
     include_str!("atrium/furnishing.rs"),
-    include_str!("atrium/materials.rs"),
     include_str!("atrium/parts.rs"),
     include_str!("car.rs"),
     include_str!("car/body.rs"),
@@ -300,9 +305,11 @@ const SOURCE_TEXT: &[&str] = &[
     include_str!("plant/moving.rs"),
     include_str!("plant/parts.rs"),
     include_str!("plant/process.rs"),
+    include_str!("row.rs"),
     include_str!("scene_builder.rs"),
+    include_str!("scene_text.rs"),
+    include_str!("surfaces.rs"),
     include_str!("teapot.rs"),
-    include_str!("teapot/patches.rs"),
     include_str!("texture_synth.rs"),
 ];
 
@@ -313,7 +320,8 @@ mod tests {
 
     #[test]
     fn texture_cache_keys_cover_every_file_of_this_crate() {
-        let mut open = vec![PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("src")];
+        let here = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+        let mut open = vec![here.join("src"), here.join("data")];
         while let Some(path) = open.pop() {
             if path.is_dir() {
                 let entries = std::fs::read_dir(path).unwrap();

@@ -1,45 +1,38 @@
 //! Furnishing of the atrium: drapes, plants, reliefs, lamps, a fountain.
 
-use super::materials::Palette;
 use super::parts::{arching_leaf, drape, lion_medallion, pot, rosette};
-use crate::mesh_builder::{MeshBuilder, curve, profile, turned};
+use crate::mesh_builder::{MeshBuilder, curve, profile, turned, upright as at};
 use crate::noise::Rng;
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 const BAY: f32 = 3.5;
-
-fn at(position: Vec3, turn: f32, scale: f32) -> Affine3A {
-    Affine3A::from_scale_rotation_translation(
-        Vec3::splat(scale),
-        Quat::from_rotation_y(turn),
-        position,
-    )
-}
+/// Materials of the drapes.
+const DRAPES: [&str; 3] = ["drape-red", "drape-green", "drape-blue"];
 
 /// Places all furniture.
-pub fn furnish(scene: &mut SceneBuilder, p: &Palette) {
-    drapes(scene, p);
-    plants(scene, p);
-    reliefs(scene, p);
-    lamps(scene, p);
-    fountain(scene, p);
+pub fn furnish(scene: &mut SceneBuilder) {
+    drapes(scene);
+    plants(scene);
+    reliefs(scene);
+    lamps(scene);
+    fountain(scene);
 }
 
-fn drapes(scene: &mut SceneBuilder, p: &Palette) {
+fn drapes(scene: &mut SceneBuilder) {
     let cloths: Vec<usize> = (0..3)
         .map(|c| {
             scene.mesh(
                 "drape",
                 drape(2.6, 2.45, 8.0, [56, 16], 40 + c as u64),
-                p.drapes[c],
+                DRAPES[c],
             )
         })
         .collect();
     let mut rod = MeshBuilder::new();
     rod.rod(vec3(-1.4, 0.02, 0.0), vec3(1.4, 0.02, 0.0), 0.02, 10);
-    let rod = scene.mesh("curtain-rod", rod, p.lamp);
+    let rod = scene.mesh("curtain-rod", rod, "lamp-brass");
     for (i, bay) in [-3, -1, 0, 2].into_iter().enumerate() {
         for (s, side) in [-1.0f32, 1.0].into_iter().enumerate() {
             let x = (bay as f32 + 0.5 + s as f32) * BAY;
@@ -84,7 +77,7 @@ fn drapes(scene: &mut SceneBuilder, p: &Palette) {
                 Vec3::Y
             }
         });
-        let mesh = scene.mesh("carpet", carpet, p.drapes[(i + 1) % 3]);
+        let mesh = scene.mesh("carpet", carpet, DRAPES[(i + 1) % 3]);
         let x = (bay as f32 + 0.5) * BAY;
         scene.place(
             mesh,
@@ -97,13 +90,19 @@ fn drapes(scene: &mut SceneBuilder, p: &Palette) {
     }
 }
 
-fn plants(scene: &mut SceneBuilder, p: &Palette) {
+fn plants(scene: &mut SceneBuilder) {
     let mut rng = Rng::new(77);
-    let pot_mesh = scene.mesh("pot", pot(20, 1), p.pot);
+    let pot_mesh = scene.mesh("pot", pot(20, 1), "terracotta");
     let earth = turned("0.86,0.88! 0.4,0.92 0,0.93", 20);
-    let earth = scene.mesh("earth", earth, p.earth);
+    let earth = scene.mesh("earth", earth, "potting-earth");
     let bushes: Vec<usize> = (0..3)
-        .map(|_| scene.mesh("plant", rosette(26, 0.95, 0.17, [2, 6], &mut rng), p.leaf))
+        .map(|_| {
+            scene.mesh(
+                "plant",
+                rosette(26, 0.95, 0.17, [2, 6], &mut rng),
+                "palm-leaf",
+            )
+        })
         .collect();
     // A trail of ivy: leaves along a few hanging stems.
     let trails: Vec<usize> = (0..3)
@@ -124,7 +123,7 @@ fn plants(scene: &mut SceneBuilder, p: &Palette) {
                     );
                 }
             }
-            scene.mesh("ivy", trail, p.ivy)
+            scene.mesh("ivy", trail, "ivy-leaf")
         })
         .collect();
     for i in -3i32..=3 {
@@ -159,8 +158,8 @@ fn plants(scene: &mut SceneBuilder, p: &Palette) {
     }
 }
 
-fn reliefs(scene: &mut SceneBuilder, p: &Palette) {
-    let lion = scene.mesh("lion-medallion", lion_medallion(24, 0.55), p.medallion);
+fn reliefs(scene: &mut SceneBuilder) {
+    let lion = scene.mesh("lion-medallion", lion_medallion(24, 0.55), "bronze");
     let face = 0.375;
     for i in -3..=3 {
         for side in [-1.0f32, 1.0] {
@@ -174,7 +173,7 @@ fn reliefs(scene: &mut SceneBuilder, p: &Palette) {
     }
 }
 
-fn lamps(scene: &mut SceneBuilder, p: &Palette) {
+fn lamps(scene: &mut SceneBuilder) {
     let mut lamp = MeshBuilder::new();
     let body = profile("0,0! 0.05,0.02 0.14,0.1 0.17,0.2! 0.15,0.26 0.07,0.36 0.03,0.42! 0,0.44!");
     lamp.lathe(&curve(&body, 3), 16);
@@ -185,7 +184,7 @@ fn lamps(scene: &mut SceneBuilder, p: &Palette) {
             Vec3::Y * (y + 0.04 * sin) + tilt * (0.016 * cos)
         });
     }
-    let mesh = scene.mesh("lamp", lamp, p.lamp);
+    let mesh = scene.mesh("lamp", lamp, "lamp-brass");
     for i in [-4, -2, 0, 2] {
         for side in [-1.0, 1.0] {
             scene.place(
@@ -200,7 +199,7 @@ fn lamps(scene: &mut SceneBuilder, p: &Palette) {
     }
 }
 
-fn fountain(scene: &mut SceneBuilder, p: &Palette) {
+fn fountain(scene: &mut SceneBuilder) {
     let mut basin = MeshBuilder::new();
     let outer = profile(
         "1.35,0! 1.35,0.12! 1.18,0.16 1.12,0.34 1.2,0.46! 1.26,0.5 1.22,0.55! 1.04,0.55! 1,0.4 \
@@ -217,7 +216,7 @@ fn fountain(scene: &mut SceneBuilder, p: &Palette) {
     scene.put(
         "fountain",
         basin,
-        p.rail,
+        "rail-stone",
         at(vec3(5.25, 0.0, 0.0), 0.0, 1.0),
     );
 }

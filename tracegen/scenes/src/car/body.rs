@@ -3,9 +3,10 @@
 //!
 //! The car points along +x with its middle at x = 0, and z is to its right. Units are metres.
 
-use crate::mesh_builder::MeshBuilder;
+use crate::mesh_builder::{MeshBuilder, profile};
 use crate::noise::smoothstep;
 use glam::{Vec2, Vec3, vec2, vec3};
+use std::sync::LazyLock;
 
 /// Front and rear axle.
 pub const AXLES: [f32; 2] = [1.30, -1.28];
@@ -55,51 +56,28 @@ fn through(points: &[Vec2], x: f32) -> f32 {
         + m1 * (t3 - t2)
 }
 
+/// Lines along the car as points of x and a value: half width, fender line and crown of the body, half width
+/// of the cabin.
+static LINES: LazyLock<Vec<Vec<Vec2>>> = LazyLock::new(|| {
+    let lines = include_str!("../../data/car-lines.txt").lines();
+    lines
+        .map(|line| profile(line).iter().map(|knot| knot.at).collect())
+        .collect()
+});
+
 /// Half width of the body at its widest.
 fn half_width(x: f32) -> f32 {
-    let p = [
-        vec2(TAIL, 0.70),
-        vec2(-2.02, 0.82),
-        vec2(-1.28, 0.935),
-        vec2(-0.3, 0.885),
-        vec2(0.5, 0.875),
-        vec2(1.30, 0.905),
-        vec2(1.85, 0.80),
-        vec2(2.08, 0.66),
-        vec2(NOSE, 0.44),
-    ];
-    through(&p, x)
+    through(&LINES[0], x)
 }
 
 /// Height of the fender line.
 fn shoulder(x: f32) -> f32 {
-    let p = [
-        vec2(TAIL, 0.80),
-        vec2(-1.95, 0.92),
-        vec2(-1.28, 0.955),
-        vec2(-0.5, 0.86),
-        vec2(0.3, 0.80),
-        vec2(1.25, 0.815),
-        vec2(1.75, 0.70),
-        vec2(2.08, 0.56),
-        vec2(NOSE, 0.46),
-    ];
-    through(&p, x)
+    through(&LINES[1], x)
 }
 
 /// Height of bonnet and deck on the centre line.
 fn crown(x: f32) -> f32 {
-    let p = [
-        vec2(TAIL, 0.78),
-        vec2(-2.0, 0.93),
-        vec2(DECK, 0.96),
-        vec2(-0.5, 0.90),
-        vec2(COWL, 0.84),
-        vec2(1.6, 0.70),
-        vec2(2.0, 0.58),
-        vec2(NOSE, 0.47),
-    ];
-    through(&p, x)
+    through(&LINES[2], x)
 }
 
 /// Lower edge: the sill, rising over the wheels.
@@ -179,16 +157,7 @@ pub fn cabin(s: f32, t: f32) -> Vec3 {
     let top = roof(x);
     let base = body(x, 0.47).y.min(shoulder(x)) - 0.02;
     let lift = (top - base).max(0.0);
-    let w = through(
-        &[
-            vec2(DECK, 0.52),
-            vec2(-0.9, 0.66),
-            vec2(-0.2, 0.715),
-            vec2(0.5, 0.715),
-            vec2(COWL, 0.66),
-        ],
-        x,
-    );
+    let w = through(&LINES[3], x);
     // Tumblehome: a high-order oval, narrower at the roof.
     let a = t.clamp(-1.0, 1.0) * std::f32::consts::FRAC_PI_2;
     let (sin, cos) = a.sin_cos();

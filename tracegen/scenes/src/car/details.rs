@@ -1,19 +1,15 @@
 //! Wheels, lamps, mirrors, seams and the other small parts of the car.
 
 use super::body::{self, AXLES, TYRE};
-use crate::mesh_builder::{MeshBuilder, curve, profile, rounded, sharp, smooth, turned};
+use crate::mesh_builder::{MeshBuilder, rounded, smooth, turned};
+use crate::row::Row;
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
-/// Half the width of a tyre, metres. Wheels rotate about y, and their outside is at +y.
-const HALF_WIDTH: f32 = 0.118;
-
 pub(super) fn wheels(scene: &mut SceneBuilder) {
-    let tyre = scene.mesh("tyre", tyre(), "tyre");
-    let rim = scene.mesh("rim", rim(), "alloy");
-    let disc = scene.mesh("brake-disc", brake_disc(), "brake");
-    let caliper = scene.mesh("caliper", caliper(), "tail-lamp");
+    let [tyre, rim, disc, caliper] =
+        ["tyre", "rim", "brake-disc", "caliper"].map(|name| scene.numbers(name)[0]);
     for (i, x) in AXLES.into_iter().enumerate() {
         for side in [-1.0f32, 1.0] {
             let outward = Quat::from_rotation_x(side * FRAC_PI_2);
@@ -38,56 +34,8 @@ pub(super) fn wheels(scene: &mut SceneBuilder) {
     }
 }
 
-fn tyre() -> MeshBuilder {
-    let mut tyre = MeshBuilder::new();
-    let section = [
-        sharp(0.232, -HALF_WIDTH + 0.012),
-        smooth(0.262, -HALF_WIDTH),
-        smooth(0.300, -HALF_WIDTH + 0.004),
-        smooth(0.326, -HALF_WIDTH + 0.022),
-        sharp(TYRE, -HALF_WIDTH + 0.044),
-        sharp(TYRE, -0.05),
-        sharp(TYRE - 0.007, -0.047),
-        sharp(TYRE - 0.007, -0.039),
-        sharp(TYRE, -0.036),
-        sharp(TYRE, -0.005),
-        sharp(TYRE - 0.007, -0.003),
-        sharp(TYRE - 0.007, 0.005),
-        sharp(TYRE, 0.008),
-        sharp(TYRE, 0.036),
-        sharp(TYRE - 0.007, 0.039),
-        sharp(TYRE - 0.007, 0.047),
-        sharp(TYRE, 0.05),
-        sharp(TYRE, HALF_WIDTH - 0.044),
-        smooth(0.326, HALF_WIDTH - 0.022),
-        smooth(0.300, HALF_WIDTH - 0.004),
-        smooth(0.262, HALF_WIDTH),
-        sharp(0.232, HALF_WIDTH - 0.012),
-    ];
-    tyre.lathe(&section, 48);
-    tyre
-}
-
-/// Barrel, hub and five pairs of spokes with a nut between the two spokes of each pair.
-fn rim() -> MeshBuilder {
-    let mut rim = MeshBuilder::new();
-    let barrel = [
-        sharp(0.222, -HALF_WIDTH + 0.01),
-        sharp(0.240, -HALF_WIDTH + 0.012),
-        sharp(0.232, -HALF_WIDTH + 0.016),
-        smooth(0.215, -0.05),
-        smooth(0.212, 0.02),
-        sharp(0.232, HALF_WIDTH - 0.016),
-        sharp(0.243, HALF_WIDTH - 0.010),
-        sharp(0.238, HALF_WIDTH - 0.004),
-        sharp(0.222, HALF_WIDTH - 0.012),
-        smooth(0.204, 0.02),
-        smooth(0.206, -0.05),
-        sharp(0.222, -HALF_WIDTH + 0.01),
-    ];
-    rim.lathe(&barrel, 40);
-    let hub = profile("0,0.03! 0.055,0.03! 0.062,0.06 0.05,0.076! 0.03,0.078! 0.026,0.088 0,0.092");
-    rim.lathe(&curve(&hub, 2), 24);
+/// The spokes of a rim and its nuts.
+pub(super) fn spokes(rim: &mut MeshBuilder) {
     for i in 0..10 {
         let pair = if i % 2 == 0 { 0.115 } else { -0.115 };
         let angle = TAU * (i / 2) as f32 / 5.0;
@@ -100,7 +48,6 @@ fn rim() -> MeshBuilder {
             );
         }
     }
-    rim
 }
 
 /// A spoke that leans from `angle` towards `angle + pair`, dished outwards.
@@ -131,15 +78,7 @@ fn wheel_nut() -> MeshBuilder {
     rounded("0.0085,0! 0.0085,0.01! 0.006,0.016 0,0.018", 2, 8)
 }
 
-fn brake_disc() -> MeshBuilder {
-    turned(
-        "0,0! 0.165,0! 0.165,0.02! 0.07,0.02! 0.065,0.035! 0,0.035!",
-        40,
-    )
-}
-
-fn caliper() -> MeshBuilder {
-    let mut caliper = MeshBuilder::new();
+pub(super) fn caliper(caliper: &mut MeshBuilder) {
     caliper.surface(8, 10, |s, t| {
         let a = 0.9 * (t - 0.5);
         let (sin, cos) = (TAU * (s - s.floor())).sin_cos();
@@ -153,25 +92,26 @@ fn caliper() -> MeshBuilder {
         let out = vec3(p.x, 0.0, p.z).normalize_or_zero();
         p - out * 0.15 - Vec3::Y * 0.012
     });
-    caliper
 }
 
-/// A strip that follows the body at constant `t`, lifted slightly off the skin.
-fn seam(points: &[(f32, f32)], width: f32) -> MeshBuilder {
-    let mut m = MeshBuilder::new();
+/// A strip along the points (x, t) of a row that follows the body, on one side.
+pub(super) fn seam(m: &mut MeshBuilder, row: &mut Row) {
+    let points: Vec<[f32; 2]> = row.points().collect();
+    let side = match row.word() {
+        "left" => -1.0,
+        _ => 1.0,
+    };
+    let on_body = |x: f32, t: f32| (body::body(x, t), 0.0035);
+    let points: Vec<[f32; 2]> = points.iter().map(|[x, t]| [*x, t * side]).collect();
     let line: Vec<(Vec3, f32)> = points
         .windows(2)
         .flat_map(|w| (0..6).map(move |k| (w[0], w[1], k as f32 / 6.0)))
-        .map(|(a, b, f)| {
-            (
-                body::body(a.0 + (b.0 - a.0) * f, a.1 + (b.1 - a.1) * f),
-                width,
-            )
-        })
-        .chain(points.last().map(|p| (body::body(p.0, p.1), width)))
+        .map(|(a, b, f)| on_body(a[0] + (b[0] - a[0]) * f, a[1] + (b[1] - a[1]) * f))
+        .chain(points.last().map(|[x, t]| on_body(*x, *t)))
         .collect();
-    m.tube(&line, 5);
-    m
+    let mut strip = MeshBuilder::new();
+    strip.tube(&line, 5);
+    m.merge(&strip, Affine3A::IDENTITY);
 }
 
 /// A ball of radius 1 about the origin.
@@ -187,43 +127,6 @@ fn ball(cells: usize) -> MeshBuilder {
     m
 }
 
-/// Gaps around doors, bonnet, bumper and boot.
-fn panel_gaps() -> MeshBuilder {
-    let mut gaps = MeshBuilder::new();
-    for side in [-1.0f32, 1.0] {
-        let door = [
-            (0.72, 0.50),
-            (0.76, 0.70),
-            (0.72, 0.86),
-            (0.60, 0.95),
-            (-0.42, 0.95),
-            (-0.56, 0.84),
-            (-0.60, 0.66),
-            (-0.52, 0.50),
-        ];
-        let bonnet = [
-            (0.98, 0.42),
-            (1.3, 0.38),
-            (1.8, 0.32),
-            (2.04, 0.20),
-            (2.07, 0.0),
-        ];
-        let bumper = [
-            (1.78, 0.96),
-            (1.83, 0.80),
-            (1.90, 0.62),
-            (2.02, 0.45),
-            (2.08, 0.3),
-        ];
-        let rear = [(-1.72, 0.96), (-1.80, 0.75), (-1.88, 0.5), (-1.92, 0.0)];
-        for line in [&door[..], &bonnet[..], &bumper[..], &rear[..]] {
-            let line: Vec<(f32, f32)> = line.iter().map(|(x, t)| (*x, t * side)).collect();
-            gaps.merge(&seam(&line, 0.0035), Affine3A::IDENTITY);
-        }
-    }
-    gaps
-}
-
 /// Meshes of the small parts, by material.
 #[derive(Default)]
 struct Details {
@@ -235,7 +138,6 @@ struct Details {
 }
 
 pub(super) fn details(scene: &mut SceneBuilder) {
-    scene.add("panel-gaps", panel_gaps(), "trim");
     let mut details = Details::default();
     for side in [-1.0f32, 1.0] {
         details.headlamp(side);

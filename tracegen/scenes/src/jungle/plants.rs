@@ -13,44 +13,39 @@ fn attach(m: &mut MeshBuilder, leaf: &MeshBuilder, root: Vec3, turn: f32, pitch:
     m.merge(leaf, Affine3A::from_rotation_translation(rotation, root));
 }
 
-/// A fern: fronds around a crown, arching over.
-pub fn fern(fronds: usize, length: f32, rng: &mut Rng) -> MeshBuilder {
+/// Leaves around a crown: `leaf(age)` gives one of them and its root, with an age from 0 to 1.
+fn whorl(
+    count: usize,
+    roll: f32,
+    rng: &mut Rng,
+    leaf: impl Fn(f32, &mut Rng) -> (MeshBuilder, Vec3),
+) -> MeshBuilder {
     let mut m = MeshBuilder::new();
-    for i in 0..fronds {
-        let young = i as f32 / fronds as f32;
-        let size = length * rng.range(0.75, 1.1) * (1.0 - 0.3 * young);
-        let rise = 0.5 + 0.9 * young;
-        let leaf = arching_leaf(size, 0.34 * size, rise, 0.5 + 0.5 * rise, 0.10, [2, 6]);
-        attach(
-            &mut m,
-            &leaf,
-            Vec3::Y * 0.03,
-            2.4 * i as f32 + rng.jitter(0.3),
-            0.0,
-            rng.jitter(0.3),
-        );
+    for i in 0..count {
+        let (leaf, root) = leaf(i as f32 / count as f32, rng);
+        let turn = 2.4 * i as f32 + rng.jitter(0.3);
+        attach(&mut m, &leaf, root, turn, 0.0, rng.jitter(roll));
     }
     m
 }
 
+/// A fern: fronds around a crown, arching over.
+pub fn fern(fronds: usize, length: f32, rng: &mut Rng) -> MeshBuilder {
+    whorl(fronds, 0.3, rng, |young, rng| {
+        let size = length * rng.range(0.75, 1.1) * (1.0 - 0.3 * young);
+        let rise = 0.5 + 0.9 * young;
+        let leaf = arching_leaf(size, 0.34 * size, rise, 0.5 + 0.5 * rise, 0.10, [2, 6]);
+        (leaf, Vec3::Y * 0.03)
+    })
+}
+
 /// A banana-like plant: broad blades on short stalks.
 pub fn broadleaf(blades: usize, length: f32, rng: &mut Rng) -> MeshBuilder {
-    let mut m = MeshBuilder::new();
-    for i in 0..blades {
-        let young = i as f32 / blades as f32;
+    whorl(blades, 0.2, rng, |young, rng| {
         let size = length * rng.range(0.8, 1.1);
         let leaf = arching_leaf(size, 0.38 * size, 1.0 + 0.6 * young, 1.1, 0.22, [4, 7]);
-        let root = Vec3::Y * (0.25 * length * young);
-        attach(
-            &mut m,
-            &leaf,
-            root,
-            2.4 * i as f32 + rng.jitter(0.3),
-            0.0,
-            rng.jitter(0.2),
-        );
-    }
-    m
+        (leaf, Vec3::Y * (0.25 * length * young))
+    })
 }
 
 /// A bush: cards with sprays of small leaves around a dome.

@@ -18,26 +18,22 @@ pub fn build(scene: &mut SceneBuilder, center: Vec3) {
         let (low, high) = (tier as f32 * 0.9 - 0.4, (tier + 1) as f32 * 0.9);
         tiers.block(vec3(-half, low, -half), vec3(half, high - 0.28, half), 0.04);
         for side in 0..4 {
+            let place = Affine3A::from_quat(Quat::from_rotation_y(side as f32 * FRAC_PI_2));
             let mut x = -half;
             while x < half - 0.3 {
                 let w = rng.range(0.5, 1.1).min(half - x);
                 let gone = tier > 0 && rng.unit() < 0.10;
                 if !gone {
-                    let mut one = MeshBuilder::new();
                     let sink = rng.range(0.0, 0.03);
-                    one.block(
+                    tiers.merge_block(
                         vec3(x + 0.008, high - 0.28, half - 0.9),
                         vec3(x + w - 0.008, high - sink, half + 0.05 - sink),
                         0.03,
-                    );
-                    tiers.merge(
-                        &one,
-                        Affine3A::from_quat(Quat::from_rotation_y(side as f32 * FRAC_PI_2)),
+                        place,
                     );
                 }
                 x += w;
             }
-            let place = Affine3A::from_quat(Quat::from_rotation_y(side as f32 * FRAC_PI_2));
             let shift = Affine3A::from_translation(vec3(-half, 0.0, half));
             bands.merge(
                 &moulding(&cornice(0.14, 0.3, 2), 2.0 * half, high - 0.62),
@@ -68,11 +64,7 @@ pub fn build(scene: &mut SceneBuilder, center: Vec3) {
             let x = -8.5 + i as f32 * 0.9;
             let y = 0.25 + i as f32 * 0.6;
             let (z0, z1) = (side * 1.5, side * 2.0);
-            stairs.block(
-                vec3(x, y - 1.4, z0.min(z1)),
-                vec3(x + 1.0, y + 0.35, z0.max(z1)),
-                0.04,
-            );
+            stairs.block(vec3(x, y - 1.4, z0), vec3(x + 1.0, y + 0.35, z1), 0.04);
         }
     }
     scene.put("temple-stairs", stairs, "temple-steps", place);
@@ -88,17 +80,9 @@ fn shrine(scene: &mut SceneBuilder, base: Vec3, bands: &mut MeshBuilder) {
     let (half, wall) = (1.9, 0.5);
     for side in [-1.0f32, 1.0] {
         let (z0, z1) = (side * 0.7, side * half);
-        walls.block(
-            vec3(-half, 0.0, z0.min(z1)),
-            vec3(-half + wall, 2.3, z0.max(z1)),
-            0.03,
-        );
+        walls.block(vec3(-half, 0.0, z0), vec3(-half + wall, 2.3, z1), 0.03);
         let (z0, z1) = (side * (half - wall), side * half);
-        walls.block(
-            vec3(-half + wall, 0.0, z0.min(z1)),
-            vec3(half, 2.3, z0.max(z1)),
-            0.03,
-        );
+        walls.block(vec3(-half + wall, 0.0, z0), vec3(half, 2.3, z1), 0.03);
     }
     walls.block(
         vec3(half - wall, 0.0, -half + wall),

@@ -1,7 +1,7 @@
-//! The still: burner, retort, condenser, receiver and the stand that holds them.
+//! The still: hose, retort, condenser, receiver and tripod.
 
-use super::{LIQUIDS, Ware, at, vessel};
-use crate::glassware::{glass_tube, helix, round_flask, stopper};
+use super::{Ware, place, vessel};
+use crate::glassware::{glass_tube, helix, round_flask};
 use crate::mesh_builder::{Knot, MeshBuilder, curve, lathed, profile, rounded};
 use crate::noise::smoothstep;
 use crate::scene_builder::SceneBuilder;
@@ -14,36 +14,15 @@ const AXIS_Z: f32 = 0.0;
 /// Height of the retort's bottom, metres.
 const LIFT: f32 = 0.131;
 
-pub(super) fn distillation(scene: &mut SceneBuilder) {
-    burner(scene);
-    hose(scene);
-    let neck_end = retort(scene);
+/// The retort's neck, the condenser below it and the receiver below that.
+pub(super) fn still(scene: &mut SceneBuilder) {
+    let neck_end = neck(scene);
     let outlet = condenser(scene, neck_end);
     receiver(scene, outlet);
-    let mut metal = MeshBuilder::new();
-    stand(&mut metal);
-    tripod(&mut metal);
-    scene.add("stand", metal, "steel");
 }
 
-fn burner(scene: &mut SceneBuilder) {
-    let mut burner = MeshBuilder::new();
-    let body = profile(
-        "0,0! 0.036,0! 0.036,0.004 0.026,0.009 0.012,0.013 0.0095,0.02! 0.0115,0.021! \
-        0.0115,0.036! 0.0088,0.037! 0.0088,0.072! 0.0098,0.073! 0.0098,0.079! 0.0072,0.079! \
-        0.0072,0.045! 0,0.045!",
-    );
-    burner.lathe(&curve(&body, 3), 32);
-    scene.put("burner", burner, "brass", at(AXIS_X, 0.0, AXIS_Z));
-    let flame = rounded(
-        "0,0.08 0.0065,0.086 0.0078,0.096 0.0045,0.112 0,0.128",
-        4,
-        20,
-    );
-    scene.put("flame", flame, "flame", at(AXIS_X, 0.0, AXIS_Z));
-}
-
-fn hose(scene: &mut SceneBuilder) {
+/// The burner's hose.
+pub(super) fn hose(m: &mut MeshBuilder) {
     let hose: Vec<(Vec3, f32)> = (0..=24)
         .map(|i| {
             let t = i as f32 / 24.0;
@@ -57,23 +36,11 @@ fn hose(scene: &mut SceneBuilder) {
             )
         })
         .collect();
-    let mut tube = MeshBuilder::new();
-    tube.tube(&hose, 12);
-    scene.add("hose", tube, "rubber");
+    m.tube(&hose, 12);
 }
 
-/// A bulb whose neck bends over into the condenser. Returns the neck's end.
-fn retort(scene: &mut SceneBuilder) -> Vec3 {
-    let bulb = round_flask(0.045, 0.012, 1);
-    vessel(
-        scene,
-        "borosilicate",
-        &Ware::new(&bulb, 0.0015, 47, 0.0),
-        Some((LIQUIDS[2], 0.034)),
-        &[at(AXIS_X, LIFT, AXIS_Z)],
-    );
-    let plug = lathed(&stopper(0.0125), 24);
-    scene.put("stopper", plug, "rubber", at(AXIS_X, LIFT + 0.103, AXIS_Z));
+/// The retort's neck, which bends over into the condenser. Returns its end.
+fn neck(scene: &mut SceneBuilder) -> Vec3 {
     let neck: Vec<(Vec3, f32)> = (0..=40)
         .map(|i| {
             let t = i as f32 / 40.0;
@@ -139,9 +106,14 @@ fn receiver(scene: &mut SceneBuilder, outlet: Vec3) {
     vessel(
         scene,
         "borosilicate",
-        &Ware::new(&flask, 0.0014, 40, 0.0),
-        Some((LIQUIDS[0], 0.018)),
-        &[at(outlet.x, low, outlet.z)],
+        &Ware {
+            outer: &flask,
+            wall: 0.0014,
+            segments: 40,
+            lip: 0.0,
+        },
+        ("copper-sulphate", 0.018),
+        &[place([outlet.x, low, outlet.z])],
     );
     let cork = rounded(
         "0.019,0! 0.023,0.005 0.021,0.012 0.017,0.014! 0.015,0.01! 0.015,0! 0.019,0!",
@@ -152,45 +124,12 @@ fn receiver(scene: &mut SceneBuilder, outlet: Vec3) {
         "cork-ring",
         cork,
         "rack-beech",
-        at(outlet.x, low - 0.012, outlet.z),
+        place([outlet.x, low - 0.012, outlet.z]),
     );
-}
-
-/// Plate, rod and the clamp around the retort's neck.
-fn stand(stand: &mut MeshBuilder) {
-    stand.block(
-        vec3(AXIS_X - 0.12, 0.0, AXIS_Z - 0.13),
-        vec3(AXIS_X + 0.05, 0.010, AXIS_Z - 0.02),
-        0.003,
-    );
-    let rod_x = AXIS_X - 0.075;
-    stand.rod(
-        vec3(rod_x, 0.008, AXIS_Z - 0.075),
-        vec3(rod_x, 0.36, AXIS_Z - 0.075),
-        0.0048,
-        20,
-    );
-    let y = LIFT + 0.094;
-    stand.block(
-        vec3(rod_x - 0.011, y - 0.011, AXIS_Z - 0.087),
-        vec3(rod_x + 0.011, y + 0.011, AXIS_Z - 0.062),
-        0.003,
-    );
-    stand.tube(
-        &[
-            (vec3(rod_x, y, AXIS_Z - 0.07), 0.0034),
-            (vec3(AXIS_X - 0.03, y, AXIS_Z - 0.035), 0.0034),
-            (vec3(AXIS_X - 0.014, y, AXIS_Z - 0.012), 0.0034),
-        ],
-        14,
-    );
-    stand.ring([32, 12], 0.0026, |sin, cos| {
-        vec3(AXIS_X + 0.0165 * cos, y, AXIS_Z + 0.0165 * sin)
-    });
 }
 
 /// A tripod with gauze over the flame.
-fn tripod(stand: &mut MeshBuilder) {
+pub(super) fn tripod(stand: &mut MeshBuilder) {
     let top = 0.1285;
     stand.ring([40, 12], 0.0028, |sin, cos| {
         vec3(AXIS_X + 0.047 * cos, top - 0.004, AXIS_Z + 0.047 * sin)

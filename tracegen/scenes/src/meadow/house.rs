@@ -181,24 +181,22 @@ impl House {
 
     /// The lintel of any opening.
     fn lintel(&mut self, [x, y, ow, oh]: [f32; 4], place: Affine3A) {
-        let mut f = MeshBuilder::new();
-        f.block(
+        self.frames.merge_block(
             vec3(x - 0.14, y + oh, -0.02),
             vec3(x + ow + 0.14, y + oh + 0.22, 0.04),
             0.012,
+            place,
         );
-        self.frames.merge(&f, place);
     }
 
     /// Sill, bars, pane and shutters.
     fn window(&mut self, [x, y, ow, oh]: [f32; 4], place: Affine3A) {
-        let mut f = MeshBuilder::new();
-        f.block(
+        self.frames.merge_block(
             vec3(x - 0.14, y - 0.12, -0.05),
             vec3(x + ow + 0.14, y, 0.09),
             0.015,
+            place,
         );
-        let mut bars = MeshBuilder::new();
         for (a, b) in [
             (
                 vec3(x + ow * 0.5 - 0.025, y, -0.3),
@@ -209,9 +207,8 @@ impl House {
                 vec3(x + ow, y + oh * 0.5 + 0.02, -0.25),
             ),
         ] {
-            bars.block(a, b, 0.006);
+            self.shutters.merge_block(a, b, 0.006, place);
         }
-        self.shutters.merge(&bars, place);
         let mut pane = MeshBuilder::new();
         pane.quad(
             vec3(x, y, -0.29),
@@ -226,37 +223,34 @@ impl House {
             } else {
                 x + ow + 0.03
             };
-            let mut leaf = MeshBuilder::new();
-            leaf.block(
+            self.shutters.merge_block(
                 vec3(near, y, 0.015),
                 vec3(near + ow * 0.5, y + oh, 0.06),
                 0.008,
+                place,
             );
             for k in 0..9 {
                 let ly = y + oh * (0.08 + 0.095 * k as f32);
-                leaf.block(
+                self.shutters.merge_block(
                     vec3(near + 0.05, ly, 0.055),
                     vec3(near + ow * 0.5 - 0.05, ly + 0.055, 0.075),
                     0.006,
+                    place,
                 );
             }
-            self.shutters.merge(&leaf, place);
         }
-        self.frames.merge(&f, place);
     }
 
     /// The door and its step.
     fn entrance(&mut self, [x, y, ow, oh]: [f32; 4], place: Affine3A) {
-        let mut leaf = MeshBuilder::new();
-        leaf.block(vec3(x, y, -0.3), vec3(x + ow, y + oh, -0.22), 0.02);
-        self.door.merge(&leaf, place);
-        let mut step = MeshBuilder::new();
-        step.block(
+        let (low, high) = (vec3(x, y, -0.3), vec3(x + ow, y + oh, -0.22));
+        self.door.merge_block(low, high, 0.02, place);
+        self.frames.merge_block(
             vec3(x - 0.3, -0.4, 0.0),
             vec3(x + ow + 0.3, 0.02, 0.55),
             0.03,
+            place,
         );
-        self.frames.merge(&step, place);
     }
 
     fn gables(&mut self) {

@@ -1,13 +1,13 @@
-//! The music box's gear train, governor, bells and fittings.
+//! The music box's gear train, fan, springs and bells.
 
 use super::{CYLINDER, CYLINDER_HALF, MODULE};
-use crate::gears::{Gear, placed, screw, worm};
-use crate::mesh_builder::{MeshBuilder, curve, lathed, profile, rounded, sharp};
+use crate::gears::{Gear, placed};
+use crate::mesh_builder::{MeshBuilder, lathed, profile, rounded};
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
-/// Spring barrel, great wheel, intermediate wheels and the governor.
+/// Spring barrel, great wheel and intermediate wheels.
 pub(super) fn train(scene: &mut SceneBuilder) {
     // Gears are in planes of constant x: their z axis points to +x.
     let facing = Quat::from_rotation_y(FRAC_PI_2);
@@ -84,20 +84,10 @@ pub(super) fn train(scene: &mut SceneBuilder) {
         }
         scene.add("jewels", jewels, "ruby");
     }
-    governor(scene);
 }
 
-/// Worm and fan: an upright worm with two vanes.
-fn governor(scene: &mut SceneBuilder) {
-    let foot = vec3(-0.071, 0.010, 0.022);
-    let upright = Quat::from_rotation_x(-FRAC_PI_2);
-    scene.put(
-        "worm",
-        worm(0.0016, 0.014, 9.0, 18),
-        "steel",
-        Affine3A::from_rotation_translation(upright, foot + Vec3::Y * 0.012),
-    );
-    let mut fan = MeshBuilder::new();
+/// The two vanes of the governor.
+pub(super) fn fan(fan: &mut MeshBuilder) {
     for s in [-1.0f32, 1.0] {
         fan.surface(10, 6, |u, v| {
             let x = s * (0.0012 + 0.0095 * u);
@@ -110,43 +100,11 @@ fn governor(scene: &mut SceneBuilder) {
             (vec3(x, 0.010 * v, curl), vec2(x, v * 0.01))
         });
     }
-    scene.put(
-        "fan",
-        fan,
-        "polished-brass",
-        Affine3A::from_rotation_translation(Quat::from_rotation_y(0.6), foot + Vec3::Y * 0.021),
-    );
-    let mut cage = MeshBuilder::new();
-    cage.rod(foot, foot + Vec3::Y * 0.034, 0.0009, 12);
-    cage.block(
-        foot + vec3(-0.004, -0.002, -0.004),
-        foot + vec3(0.004, 0.001, 0.004),
-        0.0006,
-    );
-    scene.add("governor-post", cage, "steel");
 }
 
-/// Six bells on a rod behind the cylinder, largest on the left, each with its hammer.
+/// The bells, each with its hammer.
 pub(super) fn bells(scene: &mut SceneBuilder) {
-    let mut bell = MeshBuilder::new();
-    let skin = profile(
-        "0,1! 0.28,0.98 0.52,0.84 0.62,0.55 0.74,0.24 1,0! 0.94,0! 0.68,0.24 0.56,0.55 0.46,0.8 \
-        0,0.92",
-    );
-    // The outline runs from the crown down and is reversed to face outwards.
-    let skin: Vec<_> = skin.into_iter().rev().collect();
-    bell.lathe(&curve(&skin, 2), 32);
-    let bell = scene.mesh("bell", bell, "polished-brass");
-    let mut hammer = rounded("0,-0.0016 0.0016,0 0,0.0016", 4, 14);
-    hammer.tube(
-        &[
-            (vec3(0.0, 0.0, 0.0), 0.0004),
-            (vec3(0.0, -0.012, 0.004), 0.0004),
-            (vec3(0.0, -0.024, 0.005), 0.0004),
-        ],
-        8,
-    );
-    let hammer = scene.mesh("hammer", hammer, "steel");
+    let [bell, hammer] = ["bell", "hammer"].map(|name| scene.numbers(name)[0]);
     let (y, z) = (0.0425, -0.036);
     for i in 0..6 {
         let size = 0.0088 - 0.0007 * i as f32;
@@ -164,78 +122,11 @@ pub(super) fn bells(scene: &mut SceneBuilder) {
             Affine3A::from_translation(vec3(x, y - 0.8 * size, z + size + 0.0022)),
         );
     }
-    let mut rod = MeshBuilder::new();
-    rod.rod(
-        vec3(-0.048, y + 0.001, z),
-        vec3(0.055, y + 0.001, z),
-        0.0011,
-        14,
-    );
-    for x in [-0.046, 0.053] {
-        rod.tube(
-            &[
-                (vec3(x, 0.0066, z), 0.0016),
-                (vec3(x, y + 0.003, z), 0.0013),
-            ],
-            14,
-        );
-    }
-    scene.add("bell-rod", rod, "brass");
 }
 
-/// Bedplate, spring barrels and the winding key.
-pub(super) fn fittings(scene: &mut SceneBuilder) {
-    bedplate(scene);
-    spring_barrels(scene);
-    winding_key(scene);
-}
-
-fn bedplate(scene: &mut SceneBuilder) {
-    let mut bed = MeshBuilder::new();
-    bed.block(
-        vec3(-0.080, 0.0066, -0.042),
-        vec3(0.082, 0.0090, 0.047),
-        0.0008,
-    );
-    scene.add("bedplate", bed, "brass");
-    let head = scene.mesh("bed-screw", screw(0.0028), "blued-steel");
-    for (i, (x, z)) in [
-        (-0.074, -0.037),
-        (0.076, -0.037),
-        (-0.074, 0.042),
-        (0.076, 0.042),
-    ]
-    .into_iter()
-    .enumerate()
-    {
-        let turn = Quat::from_rotation_y(0.9 * i as f32 + 0.4);
-        scene.place(
-            head,
-            Affine3A::from_rotation_translation(turn, vec3(x, 0.0090, z)),
-        );
-    }
-}
-
-/// Barrels behind the cylinder, their mainsprings seen from above.
-fn spring_barrels(scene: &mut SceneBuilder) {
-    let mut barrel = MeshBuilder::new();
-    let (r, h) = (0.0085, 0.012);
-    barrel.lathe(
-        &[
-            sharp(0.0, 0.0),
-            sharp(1.1 * r, 0.0),
-            sharp(1.1 * r, 0.0012),
-            sharp(r, 0.0016),
-            sharp(r, h),
-            sharp(0.92 * r, h),
-            sharp(0.92 * r, 0.003),
-            sharp(0.0, 0.003),
-        ],
-        64,
-    );
-    let place = Affine3A::from_translation(vec3(0.052, 0.009, -0.025));
-    let barrel_mesh = scene.mesh("barrel", barrel, "polished-brass");
-    let mut spring = MeshBuilder::new();
+/// The spring of a barrel.
+pub(super) fn mainspring(spring: &mut MeshBuilder) {
+    let r = 0.0085;
     let coil = |s: f32| {
         let a = 7.0 * TAU * s;
         let radius = 0.0016 + (0.86 * r - 0.0016) * s;
@@ -262,27 +153,4 @@ fn spring_barrels(scene: &mut SceneBuilder) {
         let q = p + p.normalize_or_zero() * (0.0002 - 0.0004 * t);
         (vec3(q.x, 0.011, q.y), vec2(s * 0.2, t * 0.001))
     });
-    let spring = scene.mesh("mainspring", spring, "blued-steel");
-    for x in [0.0, -0.03] {
-        let place = Affine3A::from_translation(Vec3::X * x) * place;
-        scene.place(barrel_mesh, place);
-        scene.place(spring, place);
-    }
-}
-
-/// The key in the front of the box.
-fn winding_key(scene: &mut SceneBuilder) {
-    let mut key = rounded(
-        "0,0! 0.0034,0! 0.0026,0.004 0.0022,0.012 0.003,0.018! 0,0.018!",
-        3,
-        24,
-    );
-    for side in [-1.0f32, 1.0] {
-        key.ring([36, 12], 0.0015, |sin, cos| {
-            vec3(side * (0.0072 + 0.006 * cos), 0.021 + 0.0075 * sin, 0.0)
-        });
-    }
-    let turned = Quat::from_rotation_z(-FRAC_PI_2) * Quat::from_rotation_y(0.5);
-    let place = Affine3A::from_rotation_translation(turned, vec3(0.092, 0.028, 0.01));
-    scene.put("key", key, "polished-brass", place);
 }

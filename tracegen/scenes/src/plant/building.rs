@@ -48,7 +48,7 @@ impl Layout {
             self.put("lamp", ALONG, x + lamp, 10.05, z);
         }
         for main in [4.0, 19.0] {
-            self.put_mesh(self.pipework.pipe[0][3], ALONG, x + main, 11.05, z);
+            self.put("pipe-s-fire", ALONG, x + main, 11.05, z);
             for k in 0..3 {
                 self.put(
                     "sprinkler",
@@ -75,7 +75,7 @@ impl Layout {
             for k in 0..6 {
                 let kind = (k * 5 + level * 2) % 3;
                 let across = x - 0.22 + 0.085 * k as f32;
-                self.put_mesh(self.pipework.cable[kind], ALONG, across, y + 0.018, z);
+                self.put_mesh(self.cables[kind], ALONG, across, y + 0.018, z);
             }
         }
     }

@@ -1,11 +1,8 @@
-//! Materials of the plant: concrete, cladding, painted and bare steel, gratings, signs.
+//! Surfaces of the plant: concrete, cladding, painted and bare steel, gratings, signs.
 
 use crate::noise::{bank, hash_unit, lerp, smoothstep};
-use crate::organic::{metal, planks};
-use crate::scene_builder::SceneBuilder;
-use crate::texture_synth::{Maps, Recipe, Rgb, Surface, Texel, mix, rgb, shade, tones};
+use crate::texture_synth::{Rgb, Surface, Texel, mix, rgb, shade};
 use glam::vec3;
-use scene::AlphaMode;
 use std::f32::consts::TAU;
 
 /// Number of services that pipes carry. Each has its own colour of paint.
@@ -22,92 +19,8 @@ pub(super) const PIPES: [&str; SERVICES] = [
 ];
 /// Materials of cables.
 pub(super) const CABLES: [&str; 3] = ["cable-black", "cable-grey", "cable-orange"];
-/// Materials of signal lights.
-pub(super) const SIGNALS: [&str; 2] = ["signal-green", "signal-red"];
-
-/// Adds the materials.
-pub(super) fn materials(scene: &mut SceneBuilder) {
-    use Maps::{Color, ColorNormal, Full};
-    // Small parts of painted steel.
-    let small = |name, tile_m, color, wear| {
-        let surface = painted(rgb(color), wear);
-        (name, 256, ColorNormal, tile_m, surface)
-    };
-    let stainless = metal(rgb(0xc6cacc), rgb(0x8a7a66), 0.15, 0.32);
-    let pallet_wood = planks(tones(0xb98d58, 0x8d6638), 6, 0.85);
-    for (name, size, maps, tile_m, surface) in [
-        small(PIPES[0], 1.5, 0x3f7a4c, 0.25),
-        small(PIPES[1], 1.5, 0x4d7fa8, 0.25),
-        small(PIPES[2], 1.5, 0xc9a227, 0.25),
-        small(PIPES[3], 1.5, 0xa5281f, 0.25),
-        (PIPES[4], 512, Full, 1.5, lagging()),
-        small(PIPES[5], 1.5, 0x7d5a86, 0.25),
-        ("floor", 1024, Full, 6.0, concrete()),
-        ("cladding", 512, ColorNormal, 3.0, cladding(rgb(0xb9c2c6))),
-        ("roof-deck", 256, ColorNormal, 3.0, cladding(rgb(0xd8dcdd))),
-        ("steel-frame", 512, Full, 2.0, painted(rgb(0x5d7486), 0.35)),
-        small("crane-paint", 2.0, 0xe0a81c, 0.3),
-        ("zinc", 256, Full, 1.0, galvanised()),
-        ("stainless", 512, Full, 2.0, stainless),
-        ("cast-iron", 256, Full, 1.0, painted(rgb(0x3f6f86), 0.5)),
-        ("hazard", 256, ColorNormal, 0.8, hazard_stripes()),
-        ("machine", 512, Full, 2.0, machine_paint(rgb(0xc8ccc4))),
-        ("press", 512, Full, 2.0, machine_paint(rgb(0x4f7d6a))),
-        small("motor", 1.0, 0x3d5f94, 0.3),
-        (
-            "rack-upright",
-            256,
-            ColorNormal,
-            1.0,
-            perforated(rgb(0x2f5ea8)),
-        ),
-        small("rack-beam", 1.0, 0xd8701f, 0.25),
-        ("panel", 512, Full, 1.0, control_panel()),
-        ("sign", 256, Color, 1.0, warning_sign()),
-        ("pallet-wood", 256, ColorNormal, 1.2, pallet_wood),
-        ("cardboard", 256, ColorNormal, 0.8, cardboard()),
-        small("drum", 1.2, 0x27589a, 0.3),
-        ("bin", 256, Color, 0.6, painted(rgb(0xb0352a), 0.05)),
-    ] {
-        scene.textured(Recipe::new(name, size, maps, tile_m, surface), |m| {
-            if maps != Full {
-                m.roughness = 0.55;
-            }
-        });
-    }
-    let grating = Recipe::new("grating", 256, Color, 1.0, grating_bars());
-    scene.textured(grating, |m| {
-        m.alpha = AlphaMode::Mask(0.5);
-        m.double_sided = true;
-        m.roughness = 0.6;
-    });
-    scene.plain("acrylic-guard", rgb(0xb8d8dc), 0.08, |m| {
-        m.base_color.w = 0.28;
-        m.alpha = AlphaMode::Blend;
-        m.double_sided = true;
-    });
-    let dark = [0.0; 3];
-    for (name, color, roughness, emissive) in [
-        ("rubber", 0x1d1d1f, 0.8, dark),
-        (CABLES[0], 0x232326, 0.6, dark),
-        (CABLES[1], 0x77797c, 0.6, dark),
-        (CABLES[2], 0xc8581a, 0.6, dark),
-        ("handwheel", 0xb02418, 0.4, dark),
-        ("dial", 0xe9e9e2, 0.3, dark),
-        ("lamp", 0xfff4e0, 0.5, [5.0, 4.7, 4.2]),
-        ("sky-light", 0xeaf2f8, 0.5, [1.5, 1.65, 1.8]),
-        (SIGNALS[0], 0x1e9c40, 0.4, [0.05, 1.2, 0.25]),
-        (SIGNALS[1], 0xb02018, 0.4, [1.6, 0.1, 0.06]),
-        ("lane-paint", 0xd9b120, 0.7, dark),
-    ] {
-        scene.plain(name, rgb(color), roughness, |m| {
-            m.emissive = emissive.into()
-        });
-    }
-}
-
 /// Painted steel: clouds of dirt, chips down to rust.
-fn painted(color: Rgb, wear: f32) -> Surface {
+pub fn painted(color: Rgb, wear: f32) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
         let [cloud, mottle, grain] = noise.at(u, v);
@@ -127,7 +40,7 @@ fn painted(color: Rgb, wear: f32) -> Surface {
 }
 
 /// A concrete floor with saw cuts along its edges, stains and tyre marks.
-fn concrete() -> Surface {
+pub fn concrete() -> Surface {
     Box::new(|u, v| {
         let noise = bank();
         let [cloud, mottle, grain] = noise.at(u, v);
@@ -158,7 +71,7 @@ fn concrete() -> Surface {
 }
 
 /// Trapezoidal sheet: ribs along v, one lap per texture, streaks below the screws.
-fn cladding(color: Rgb) -> Surface {
+pub fn cladding(color: Rgb) -> Surface {
     Box::new(move |u, v| {
         let noise = bank();
         let rib = (u * 12.0).fract();
@@ -179,7 +92,7 @@ fn cladding(color: Rgb) -> Surface {
 }
 
 /// Zinc with its spangle.
-fn galvanised() -> Surface {
+pub fn galvanised() -> Surface {
     Box::new(|u, v| {
         let noise = bank();
         let spangle = noise.pebble.at(u * 2.0, v * 2.0);
@@ -201,7 +114,7 @@ fn galvanised() -> Surface {
 }
 
 /// Sheet-metal lagging of a steam pipe with its bands.
-fn lagging() -> Surface {
+pub fn lagging() -> Surface {
     Box::new(|u, v| {
         let noise = bank();
         // Pipes run along u.
@@ -221,7 +134,7 @@ fn lagging() -> Surface {
 }
 
 /// Bearing bars and cross rods. More than half is steel, so that distant mip levels stay opaque.
-fn grating_bars() -> Surface {
+pub fn grating_bars() -> Surface {
     Box::new(|u, v| {
         let noise = bank();
         let bar = ((u * 20.0).fract() - 0.5).abs() > 0.31;
@@ -235,7 +148,8 @@ fn grating_bars() -> Surface {
     })
 }
 
-fn hazard_stripes() -> Surface {
+/// Stripes of yellow and black paint.
+pub fn hazard_stripes() -> Surface {
     let paint = painted(rgb(0xe3b91e), 0.3);
     let black = painted(rgb(0x222222), 0.3);
     Box::new(move |u, v| {
@@ -245,7 +159,7 @@ fn hazard_stripes() -> Surface {
 }
 
 /// Enamelled sheets with seams, screws and louvres.
-fn machine_paint(color: Rgb) -> Surface {
+pub fn machine_paint(color: Rgb) -> Surface {
     let paint = painted(color, 0.12);
     Box::new(move |u, v| {
         let mut texel = paint(u, v);
@@ -268,7 +182,7 @@ fn machine_paint(color: Rgb) -> Surface {
 }
 
 /// Slotted uprights of a pallet rack.
-fn perforated(color: Rgb) -> Surface {
+pub fn perforated(color: Rgb) -> Surface {
     let paint = painted(color, 0.2);
     Box::new(move |u, v| {
         let mut texel = paint(u, v);
@@ -281,7 +195,7 @@ fn perforated(color: Rgb) -> Surface {
 }
 
 /// A cabinet's door: a screen, instruments, rows of buttons.
-fn control_panel() -> Surface {
+pub fn control_panel() -> Surface {
     let paint = machine_paint(rgb(0x9aa0a4));
     Box::new(move |u, v| {
         let mut texel = paint(u * 0.5, v * 0.5);
@@ -322,7 +236,7 @@ fn control_panel() -> Surface {
 }
 
 /// A yellow triangle on white above lines of text.
-fn warning_sign() -> Surface {
+pub fn warning_sign() -> Surface {
     Box::new(|u, v| {
         let rim = u.min(1.0 - u).min(v.min(1.0 - v));
         let half = (v - 0.1) * 0.55;
@@ -348,7 +262,7 @@ fn warning_sign() -> Surface {
 }
 
 /// Corrugated board with tape and a printed mark.
-fn cardboard() -> Surface {
+pub fn cardboard() -> Surface {
     Box::new(|u, v| {
         let noise = bank();
         let flute = (u * 64.0 * TAU).sin();

@@ -9,17 +9,16 @@
 mod building;
 mod goods;
 mod machines;
-mod materials;
+pub(crate) mod materials;
 mod moving;
 mod parts;
 mod process;
 
 use crate::scene_builder::SceneBuilder;
+use crate::scene_text::Code;
 use glam::{Affine3A, Mat3, Vec3, vec3};
-use machines::machines;
-use materials::materials;
-use parts::{BAY_M, NAVE_M, Pipework, parts};
-use scene::{Movement, Scene};
+use parts::{BAY_M, NAVE_M, pipe_name};
+use scene::Movement;
 use std::collections::HashMap;
 use std::ops::RangeInclusive;
 
@@ -49,29 +48,42 @@ const UP_LEFT: Mat3 = Mat3::from_cols(Vec3::NEG_Z, Vec3::NEG_X, Vec3::Y);
 /// z to +y, y to +z: a valve in a riser, its wheel to +z.
 const UP_WHEEL_OUT: Mat3 = Mat3::from_cols(Vec3::NEG_X, Vec3::Z, Vec3::Y);
 
+/// What the scene's text names.
+pub const CODE: Code = Code {
+    shapes: &[
+        ("hook", |m, _| machines::hook(m)),
+        ("motor-body", |m, _| machines::motor(m)),
+        ("cabinet-door", |m, _| machines::panel(m)),
+        ("sign", |m, _| parts::sign(m)),
+        ("stairs", |m, _| parts::stairs(m)),
+        ("truss", |m, _| parts::truss(m)),
+    ],
+    steps: &[
+        ("cables", |scene, _| parts::cables(scene)),
+        ("pipes", |scene, _| parts::pipes(scene)),
+    ],
+};
+
 /// Placements before they are sorted.
 struct Layout {
     placed: Vec<(usize, Affine3A, Option<usize>)>,
     motions: Vec<Vec<Movement>>,
-    pipework: Pipework,
+    /// Cables by colour.
+    cables: Vec<usize>,
     /// Green and red lights.
-    signals: [usize; 2],
+    signals: Vec<usize>,
     /// Mesh numbers by name.
     meshes: HashMap<String, usize>,
 }
 
-/// The scene with exactly this number of instances, within [`INSTANCES`].
-pub fn with_instances(instances: u32) -> Scene {
+/// Places exactly this number of instances, within [`INSTANCES`].
+pub fn lay_out(scene: &mut SceneBuilder, instances: u32) {
     let instances = instances as usize;
-    let mut scene = SceneBuilder::new("plant");
-    materials(&mut scene);
-    let pipework = parts(&mut scene);
-    let signals = machines(&mut scene);
     let mut layout = Layout {
         placed: Vec::with_capacity(instances),
         motions: Vec::new(),
-        pipework,
-        signals,
+        cables: scene.numbers("cable"),
+        signals: scene.numbers("signal"),
         meshes: scene.mesh_numbers(),
     };
     // The hall is about three times as long as wide. Its last bay holds the stores.
@@ -87,43 +99,21 @@ pub fn with_instances(instances: u32) -> Scene {
         bays -= 1;
     }
     layout.stores(naves, bays, instances);
-    layout.finish(&mut scene);
+    layout.finish(scene);
 
     let (width, length) = (naves as f32 * NAVE_M, bays as f32 * BAY_M);
     let nave = |x: f32| x - width / 2.0;
     let end = length / 2.0;
-    scene.cameras(
-        0.1,
-        600.0,
-        [
-            (
-                "default",
-                vec3(nave(11.6), 1.75, end - 31.0),
-                vec3(nave(4.6), 2.6, end - 12.0),
-            ),
-            (
-                "aisle",
-                vec3(nave(11.5), 1.7, end - 50.0),
-                vec3(nave(11.5), 2.2, end),
-            ),
-            (
-                "walkway",
-                vec3(nave(20.2), 5.2, end - 40.0),
-                vec3(nave(8.0), 1.5, end - 22.0),
-            ),
-            (
-                "pumps",
-                vec3(nave(9.4), 1.5, end - 24.0),
-                vec3(nave(2.0), 1.6, end - 17.0),
-            ),
-            (
-                "overview",
-                vec3(nave(20.5), 9.9, -end + 1.0),
-                vec3(nave(10.0), 3.0, end),
-            ),
-        ],
-    );
-    scene.sun(vec3(-0.42, -1.0, 0.3), vec3(1.2, 1.16, 1.08));
+    for (name, eye, target) in [
+        ("default", [11.6, 1.75, end - 31.0], [4.6, 2.6, end - 12.0]),
+        ("aisle", [11.5, 1.7, end - 50.0], [11.5, 2.2, end]),
+        ("walkway", [20.2, 5.2, end - 40.0], [8.0, 1.5, end - 22.0]),
+        ("pumps", [9.4, 1.5, end - 24.0], [2.0, 1.6, end - 17.0]),
+        ("overview", [20.5, 9.9, -end + 1.0], [10.0, 3.0, end]),
+    ] {
+        let in_nave = |[x, y, z]: [f32; 3]| vec3(nave(x), y, z);
+        scene.camera(name, 0.1, 600.0, in_nave(eye), in_nave(target));
+    }
     for k in 0..8 {
         let (x, z) = (
             nave(6.0 + 12.0 * (k % 2) as f32),
@@ -131,7 +121,6 @@ pub fn with_instances(instances: u32) -> Scene {
         );
         scene.lamp(vec3(x, 9.0, z), vec3(11.0, 10.4, 9.2));
     }
-    scene.finish(vec3(0.5, 0.55, 0.6), 0)
 }
 
 impl Layout {
@@ -142,6 +131,11 @@ impl Layout {
 
     fn put(&mut self, name: &str, turn: Mat3, x: f32, y: f32, z: f32) {
         self.put_mesh(self.meshes[name], turn, x, y, z);
+    }
+
+    /// Places a kind of pipe for a service.
+    fn put_pipe(&mut self, what: &str, service: usize, turn: Mat3, x: f32, y: f32, z: f32) {
+        self.put(&pipe_name(what, service), turn, x, y, z);
     }
 
     fn put_mesh(&mut self, mesh: usize, turn: Mat3, x: f32, y: f32, z: f32) {

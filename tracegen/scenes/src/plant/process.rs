@@ -1,7 +1,7 @@
 //! Pipes, and the process plant next to the pipe rack.
 
 use super::materials::SERVICES;
-use super::parts::{BEND, RADII_M};
+use super::parts::{BEND, RADII_M, SIZES};
 use super::{ALONG, AROUND, LEFT, Layout, RIGHT, RIGHT_DOWN, UP, UP_LEFT, UP_WHEEL_OUT};
 use crate::noise::hash;
 
@@ -20,10 +20,11 @@ impl Layout {
                 let radius = RADII_M[size];
                 at += radius;
                 let height = y + 0.16 + radius;
-                self.put_mesh(self.pipework.pipe[size][service], ALONG, at, height, z);
+                let name = SIZES[size];
+                self.put_pipe(&format!("pipe-{name}"), service, ALONG, at, height, z);
                 self.put("pipe-shoe", ALONG, at, y + 0.1, z + 1.0);
                 if (bay + slot).is_multiple_of(2) {
-                    self.put_mesh(self.pipework.flange[size], ALONG, at, height, z);
+                    self.put(&format!("flange-{name}"), ALONG, at, height, z);
                 }
                 if (bay * 7 + slot) % 9 == 4 && size == 1 {
                     self.put("valve", ALONG, at, height, z + 4.0);
@@ -58,27 +59,15 @@ impl Layout {
         let service = (nave + bay) % SERVICES;
         let bend = BEND * RADII_M[1];
         let (y, end) = (3.6, x + reach);
-        self.put_mesh(
-            self.pipework.spool[1][service],
-            RIGHT,
-            end - bend - 2.0,
-            y,
-            z,
-        );
-        self.put_mesh(
-            self.pipework.elbow[1][service],
-            RIGHT_DOWN,
-            end - bend,
-            y,
-            z,
-        );
-        self.put_mesh(self.pipework.spool[1][service], UP, end, y - bend - 2.0, z);
-        self.put_mesh(self.pipework.flange[1], UP, end, y - bend, z);
+        self.put_pipe("spool-m", service, RIGHT, end - bend - 2.0, y, z);
+        self.put_pipe("elbow-m", service, RIGHT_DOWN, end - bend, y, z);
+        self.put_pipe("spool-m", service, UP, end, y - bend - 2.0, z);
+        self.put("flange-m", UP, end, y - bend, z);
         let valve = y - bend - 2.0 - 0.2;
         self.put("valve", UP, end, valve, z);
-        self.put_mesh(self.pipework.flange[1], UP, end, valve - 0.2, z);
+        self.put("flange-m", UP, end, valve - 0.2, z);
         // Continues into the floor.
-        self.put_mesh(self.pipework.spool[1][service], UP, end, valve - 2.2, z);
+        self.put_pipe("spool-m", service, UP, end, valve - 2.2, z);
     }
 
     /// Two tanks with legs, ladder, pipes and gauges.
@@ -98,31 +87,20 @@ impl Layout {
             let service = (nave + bay + k) % SERVICES;
             let bend = BEND * RADII_M[1];
             let top = 4.45 + 0.3;
-            self.put_mesh(self.pipework.flange[1], UP, tx, 4.55, tz);
-            self.put_mesh(self.pipework.elbow[1][service], UP_LEFT, tx, top - 0.28, tz);
+            self.put("flange-m", UP, tx, 4.55, tz);
+            self.put_pipe("elbow-m", service, UP_LEFT, tx, top - 0.28, tz);
             let turned = tx - bend;
-            self.put_mesh(
-                self.pipework.spool[1][service],
-                LEFT,
-                turned,
-                top - 0.28 + bend,
-                tz,
-            );
+            self.put_pipe("spool-m", service, LEFT, turned, top - 0.28 + bend, tz);
             if k == 1 {
-                self.put_mesh(
-                    self.pipework.spool[1][service],
+                self.put_pipe(
+                    "spool-m",
+                    service,
                     LEFT,
                     turned - 2.0,
                     top - 0.28 + bend,
                     tz,
                 );
-                self.put_mesh(
-                    self.pipework.flange[1],
-                    LEFT,
-                    turned - 2.0,
-                    top - 0.28 + bend,
-                    tz,
-                );
+                self.put("flange-m", LEFT, turned - 2.0, top - 0.28 + bend, tz);
             }
         }
     }
@@ -139,26 +117,20 @@ impl Layout {
             self.put("motor", ALONG, px, 0.15, pz + 0.36);
             self.put("gauge", AROUND, px - 0.2, 0.6, pz);
             let riser = px + 0.12;
-            self.put_mesh(self.pipework.flange[1], UP, riser, 1.12, pz);
+            self.put("flange-m", UP, riser, 1.12, pz);
             self.put("valve", UP_WHEEL_OUT, riser, 1.34, pz);
-            self.put_mesh(self.pipework.flange[1], UP, riser, 1.56, pz);
-            self.put_mesh(self.pipework.spool[1][service], UP, riser, 1.56, pz);
-            self.put_mesh(self.pipework.flange[1], ALONG, px, 0.5, pz - 0.42);
+            self.put("flange-m", UP, riser, 1.56, pz);
+            self.put_pipe("spool-m", service, UP, riser, 1.56, pz);
+            self.put("flange-m", ALONG, px, 0.5, pz - 0.42);
             self.put("valve", ALONG, px, 0.5, pz - 0.64);
-            self.put_mesh(self.pipework.flange[1], ALONG, px, 0.5, pz - 0.86);
-            self.put_mesh(self.pipework.spool[1][service], AROUND, px, 0.5, pz - 0.84);
+            self.put("flange-m", ALONG, px, 0.5, pz - 0.86);
+            self.put_pipe("spool-m", service, AROUND, px, 0.5, pz - 0.84);
         }
-        self.put_mesh(self.pipework.pipe[2][service], RIGHT, x + 3.3, 3.75, pz);
-        self.put_mesh(self.pipework.flange[2], RIGHT, x + 9.3, 3.75, pz);
-        self.put_mesh(
-            self.pipework.pipe[2][service],
-            RIGHT,
-            x + 3.5,
-            0.5,
-            z + 0.36,
-        );
+        self.put_pipe("pipe-l", service, RIGHT, x + 3.3, 3.75, pz);
+        self.put("flange-l", RIGHT, x + 9.3, 3.75, pz);
+        self.put_pipe("pipe-l", service, RIGHT, x + 3.5, 0.5, z + 0.36);
         for end in [3.5, 9.5] {
-            self.put_mesh(self.pipework.flange[2], RIGHT, x + end, 0.5, z + 0.36);
+            self.put("flange-l", RIGHT, x + end, 0.5, z + 0.36);
         }
         for k in 0..3 {
             self.put("drum", ALONG, x + 5.2 + 0.75 * k as f32, 0.0, z + 5.3);
@@ -175,33 +147,15 @@ impl Layout {
             }
             for y in [1.2, 3.0] {
                 self.put("vessel", ALONG, x + dx, y, z + 0.4);
-                self.put_mesh(self.pipework.flange[1], UP, x + dx, y + 0.6, z + 2.0);
+                self.put("flange-m", UP, x + dx, y + 0.6, z + 2.0);
                 self.put("gauge", RIGHT, x + dx + 0.3, y + 0.5, z + 3.2);
             }
-            self.put_mesh(
-                self.pipework.spool[1][bay % SERVICES],
-                UP,
-                x + dx,
-                3.6,
-                z + 2.0,
-            );
+            self.put_pipe("spool-m", bay % SERVICES, UP, x + dx, 3.6, z + 2.0);
             let bend = BEND * RADII_M[1];
-            self.put_mesh(
-                self.pipework.elbow[1][bay % SERVICES],
-                UP_LEFT,
-                x + dx,
-                5.6,
-                z + 2.0,
-            );
+            self.put_pipe("elbow-m", bay % SERVICES, UP_LEFT, x + dx, 5.6, z + 2.0);
             for k in 0..=usize::from(dx > 6.0) {
                 let from = x + dx - bend - 2.0 * k as f32;
-                self.put_mesh(
-                    self.pipework.spool[1][bay % SERVICES],
-                    LEFT,
-                    from,
-                    5.6 + bend,
-                    z + 2.0,
-                );
+                self.put_pipe("spool-m", bay % SERVICES, LEFT, from, 5.6 + bend, z + 2.0);
             }
         }
         self.put("sign", RIGHT, x + 8.22, 1.0, z + 1.8);
