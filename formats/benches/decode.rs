@@ -111,12 +111,7 @@ fn generated_trace() -> Textrace {
     let mut meta = TraceMeta::default();
     meta.frames.push(FrameViews::default());
     meta.hmd.eye_size_px = [512; 2];
-    meta.hmd.fov = [FovTangents {
-        left: 1.0,
-        right: 1.0,
-        up: 1.0,
-        down: 1.0,
-    }; 2];
+    meta.hmd.fov = [FovTangents::new(1.0, 1.0, 1.0, 1.0); 2];
     let tables = Tables {
         meta,
         draws: vec![Draw {

@@ -50,6 +50,16 @@ pub struct FovTangents {
 }
 
 impl FovTangents {
+    /// The tangents towards the left, right, top and bottom edge.
+    pub const fn new(left: f32, right: f32, up: f32, down: f32) -> Self {
+        Self {
+            left,
+            right,
+            up,
+            down,
+        }
+    }
+
     /// Checks that the frustum is not empty and that computations with it do not overflow.
     ///
     /// # Errors
@@ -222,12 +232,7 @@ mod tests {
 
     #[test]
     fn the_lens_of_a_square_picture_shows_a_circle_of_its_pixels() {
-        let fov = FovTangents {
-            left: 1.2,
-            right: 1.2,
-            up: 1.2,
-            down: 1.2,
-        };
+        let fov = FovTangents::new(1.2, 1.2, 1.2, 1.2);
         let lens = Lens::of(&fov);
         let size_px = [200, 200];
         let seen = |x, y| lens.pixel_visible(&fov, size_px, [x, y]);
@@ -240,12 +245,7 @@ mod tests {
 
     #[test]
     fn an_off_centre_lens_shows_the_pixels_on_its_side() {
-        let fov = FovTangents {
-            left: 1.0,
-            right: 1.0,
-            up: 1.0,
-            down: 1.0,
-        };
+        let fov = FovTangents::new(1.0, 1.0, 1.0, 1.0);
         let lens = Lens {
             center: [0.5, 0.5],
             radius: 0.3,

@@ -23,12 +23,7 @@ use formats::view::{Eye, FovTangents, FrameViews, Hmd};
 const EYE_SIZE_PX: [u32; 2] = [39, 21];
 
 fn fov() -> FovTangents {
-    FovTangents {
-        left: 1.2,
-        right: 0.9,
-        up: 1.1,
-        down: 1.0,
-    }
+    FovTangents::new(1.2, 0.9, 1.1, 1.0)
 }
 
 fn meta(frames: u32) -> TraceMeta {

@@ -66,12 +66,7 @@ fn shoot(folder: &Path, scene: &str, options: &[&str]) -> Shot {
 fn fov() -> FovTangents {
     let horizontal = 50.0_f32.to_radians().tan();
     let vertical = horizontal * SIZE_PX[1] as f32 / SIZE_PX[0] as f32;
-    FovTangents {
-        left: horizontal,
-        right: horizontal,
-        up: vertical,
-        down: vertical,
-    }
+    FovTangents::new(horizontal, horizontal, vertical, vertical)
 }
 
 /// Measures fragments and picture errors with settings against the picture without: all settings, or the

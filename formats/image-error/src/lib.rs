@@ -142,12 +142,7 @@ mod tests {
     #[test]
     fn a_960_px_eye_of_100_degrees_has_seven_pixels_per_degree() {
         let half = 50f32.to_radians().tan();
-        let fov = FovTangents {
-            left: half,
-            right: half,
-            up: half,
-            down: half,
-        };
+        let fov = FovTangents::new(half, half, half, half);
         let ppd = pixels_per_degree(960, &fov);
         assert!((ppd - 7.03).abs() < 0.01, "{ppd}");
     }

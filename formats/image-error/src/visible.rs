@@ -184,12 +184,7 @@ mod tests {
     use crate::psnr::psnr_db;
     use crate::testing::{noise, scene_like, shifted};
 
-    const FOV: FovTangents = FovTangents {
-        left: 1.0,
-        right: 1.0,
-        up: 1.0,
-        down: 1.0,
-    };
+    const FOV: FovTangents = FovTangents::new(1.0, 1.0, 1.0, 1.0);
 
     fn circle(size_px: [u32; 2], center: [f32; 2], radius: f32) -> Mask {
         Mask::of_lens(size_px, &FOV, &Lens { center, radius })

@@ -117,12 +117,7 @@ mod tests {
             right: [1.0, 0.0, 0.0],
             up: [0.0, 1.0, 0.0],
             forward: [0.0, 0.0, -1.0],
-            fov: FovTangents {
-                left: 1.2,
-                right: 0.9,
-                up: 1.1,
-                down: 1.0,
-            },
+            fov: FovTangents::new(1.2, 0.9, 1.1, 1.0),
             size_px: [960, 1080],
         }
     }

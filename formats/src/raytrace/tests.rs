@@ -11,12 +11,7 @@ use proptest::prelude::*;
 const SIZE_PX: [u32; 2] = [20, 18];
 
 fn meta(has_visits: bool) -> RaytraceMeta {
-    let fov = FovTangents {
-        left: 1.2,
-        right: 1.0,
-        up: 1.1,
-        down: 0.9,
-    };
+    let fov = FovTangents::new(1.2, 1.0, 1.1, 0.9);
     let eye = |x: f32| EyeCamera {
         position: [x, 0.1, 0.0],
         right: [1.0, 0.0, 0.0],

@@ -10,12 +10,7 @@ pub(crate) fn tables() -> Tables {
         eye_to_clip: [[0.3; 4]; 4],
         position: [0.032, 1.6, 0.0],
     };
-    let tangents = FovTangents {
-        left: 1.19,
-        right: 1.19,
-        up: 1.3,
-        down: 1.3,
-    };
+    let tangents = FovTangents::new(1.19, 1.19, 1.3, 1.3);
     let texture = |name: &str, size| Texture {
         name: name.to_owned(),
         size: [size, size / 2],

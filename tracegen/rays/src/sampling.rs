@@ -130,12 +130,7 @@ mod tests {
             right: [1.0, 0.0, 0.0],
             up: [0.0, 1.0, 0.0],
             forward: [0.0, 0.0, -1.0],
-            fov: formats::view::FovTangents {
-                left: 1.0,
-                right: 1.0,
-                up: 1.0,
-                down: 1.0,
-            },
+            fov: formats::view::FovTangents::new(1.0, 1.0, 1.0, 1.0),
             size_px: [1, 1],
         };
         let count = 4096;

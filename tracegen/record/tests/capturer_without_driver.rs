@@ -34,12 +34,7 @@ fn tables() -> Tables {
         eye_to_clip: identity,
         position: [0.0; 3],
     };
-    let fov = FovTangents {
-        left: 1.0,
-        right: 1.0,
-        up: 1.0,
-        down: 1.0,
-    };
+    let fov = FovTangents::new(1.0, 1.0, 1.0, 1.0);
     let draw = |first_primitive, primitives| Draw {
         material: "grid".into(),
         first_primitive,

@@ -87,12 +87,7 @@ mod tests {
             position: [x, 0.0, 0.0],
             ..EyeView::default()
         };
-        let fov = FovTangents {
-            left: 1.0,
-            right: 1.0,
-            up: 0.5,
-            down: 0.5,
-        };
+        let fov = FovTangents::new(1.0, 1.0, 0.5, 0.5);
         let hmd = Hmd {
             eye_size_px: [400, 100],
             fov: [fov; 2],

@@ -40,14 +40,14 @@ impl EyePicture {
         }
     }
 
+    /// Tangents towards the left, right, top and bottom edge.
+    fn edges(&self) -> [f32; 4] {
+        [self.fov.left, self.fov.right, self.fov.up, self.fov.down]
+    }
+
     /// Tangents to the right and up at a point in pixels from the top left.
     fn tangents(&self, px: DVec2) -> DVec2 {
-        let FovTangents {
-            left,
-            right,
-            up,
-            down,
-        } = self.fov;
+        let [left, right, up, down] = self.edges();
         let part = px / DVec2::new(self.size_px[0].into(), self.size_px[1].into());
         DVec2::new(
             f64::from(left + right) * part.x - f64::from(left),
@@ -112,12 +112,7 @@ impl EyePicture {
         } else {
             DVec2::ZERO
         };
-        let FovTangents {
-            left,
-            right,
-            up,
-            down,
-        } = self.fov;
+        let [left, right, up, down] = self.edges();
         [
             (at.x + f64::from(left)) / f64::from(left + right) * f64::from(self.size_px[0]),
             (f64::from(up) - at.y) / f64::from(up + down) * f64::from(self.size_px[1]),

@@ -250,12 +250,7 @@ mod tests {
     use formats::view::FovTangents;
 
     fn hmd() -> Hmd {
-        let fov = |left, right| FovTangents {
-            left,
-            right,
-            up: 1.0,
-            down: 1.0,
-        };
+        let fov = |left, right| FovTangents::new(left, right, 1.0, 1.0);
         Hmd {
             eye_size_px: [64, 64],
             fov: [fov(1.2, 0.8), fov(0.8, 1.2)],

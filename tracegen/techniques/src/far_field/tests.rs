@@ -45,12 +45,7 @@ fn eyes(fov: FovTangents, ipd_m: f64, cant_deg: f64, far_m: f64) -> [EyeView; 2]
 }
 
 fn fov(left: f32, right: f32, up: f32, down: f32) -> FovTangents {
-    FovTangents {
-        left,
-        right,
-        up,
-        down,
-    }
+    FovTangents::new(left, right, up, down)
 }
 
 const SIZE_PX: [u32; 2] = [960, 1080];

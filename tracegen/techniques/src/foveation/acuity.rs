@@ -46,12 +46,7 @@ mod tests {
 
     #[test]
     fn rates_start_where_their_cycles_equal_the_smallest_visible_ones() {
-        let fov = FovTangents {
-            left: 1.191_753_6,
-            right: 1.191_753_6,
-            up: 1.191_753_6,
-            down: 1.191_753_6,
-        };
+        let fov = FovTangents::new(1.191_753_6, 1.191_753_6, 1.191_753_6, 1.191_753_6);
         let hmd = Hmd {
             eye_size_px: [960, 960],
             fov: [fov; 2],

@@ -121,12 +121,7 @@ mod tests {
     use glam::Vec4;
 
     fn picture(size_px: [u32; 2]) -> EyePicture {
-        let fov = FovTangents {
-            left: 1.0,
-            right: 1.0,
-            up: 1.0,
-            down: 1.0,
-        };
+        let fov = FovTangents::new(1.0, 1.0, 1.0, 1.0);
         let hmd = Hmd {
             eye_size_px: size_px,
             fov: [fov; 2],

@@ -11,12 +11,7 @@ const BOTH: &[Eye] = &[Eye::Left, Eye::Right];
 
 /// Off-axis eyes whose picture has odd tiles and coarse pixels at its edges.
 fn hmd(size_px: [u32; 2]) -> Hmd {
-    let fov = |left, right| FovTangents {
-        left,
-        right,
-        up: 1.1,
-        down: 1.0,
-    };
+    let fov = |left, right| FovTangents::new(left, right, 1.1, 1.0);
     Hmd {
         eye_size_px: size_px,
         fov: [fov(1.3, 1.0), fov(1.0, 1.3)],
@@ -261,12 +256,7 @@ fn shaded_shares_match_the_rates_and_borders_are_small() {
 fn rings_around_the_gaze_have_the_share_of_a_circle() {
     // One rate beyond 20 degrees: a disc of tan(20) in a square picture with a tangent of 1.15.
     let mut hmd = hmd([1600, 1600]);
-    hmd.fov = [FovTangents {
-        left: 1.15,
-        right: 1.15,
-        up: 1.15,
-        down: 1.15,
-    }; 2];
+    hmd.fov = [FovTangents::new(1.15, 1.15, 1.15, 1.15); 2];
     let mut settings = foveated(FoveationKind::Rings, [0.0, 0.0], false);
     if let Some(foveation) = &mut settings.foveation {
         foveation.rates.edges_deg = [20.0; 4];

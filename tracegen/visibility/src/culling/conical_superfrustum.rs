@@ -95,12 +95,7 @@ mod tests {
 
     #[test]
     fn the_cone_of_parallel_eyes_is_the_closed_form() {
-        let fov = FovTangents {
-            left: 1.2,
-            right: 1.2,
-            up: 1.2,
-            down: 1.2,
-        };
+        let fov = FovTangents::new(1.2, 1.2, 1.2, 1.2);
         let rig = testing::rig([fov; 2], 0.064, 0.0, 0.1, 50.0);
         let cone = cone(&rig, DVec3::splat(60.0)).unwrap();
         // The radius is enlarged by one pixel of 1000, and by the corners of the polygon.

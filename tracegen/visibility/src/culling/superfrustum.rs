@@ -123,12 +123,7 @@ mod tests {
         let (near, far) = (0.1, 50.0);
         for (outer, inner, vertical, ipd) in [(1.0, 1.0, 1.0, 0.064), (1.397, 1.246, 1.466, 0.064)]
         {
-            let fov = |left, right| FovTangents {
-                left,
-                right,
-                up: vertical,
-                down: vertical,
-            };
+            let fov = |left, right| FovTangents::new(left, right, vertical, vertical);
             let eyes = [fov(outer, inner), fov(inner, outer)];
             let rig = testing::rig(eyes, ipd, 0.0, near, far);
             let found = Superfrustum::new(&rig, DVec3::splat(60.0)).unwrap();
@@ -146,12 +141,7 @@ mod tests {
 
     #[test]
     fn eyes_whose_directions_diverge_too_much_are_refused() {
-        let fov = |outer: f32| FovTangents {
-            left: outer,
-            right: outer,
-            up: 1.0,
-            down: 1.0,
-        };
+        let fov = |outer: f32| FovTangents::new(outer, outer, 1.0, 1.0);
         let wide = 70f32.to_radians().tan();
         let combined = |cant| {
             let rig = testing::rig([fov(wide); 2], 0.064, cant, 0.1, 100.0);

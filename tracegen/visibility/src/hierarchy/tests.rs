@@ -129,12 +129,7 @@ fn ten_times_as_many_draws_behind_the_viewer_add_at_most_a_third_of_the_tests() 
     let ahead = [Vec3::new(-30.0, -5.0, -60.0), Vec3::new(30.0, 5.0, 0.0)];
     let behind = [Vec3::new(-30.0, -5.0, 1.0), Vec3::new(30.0, 5.0, 600.0)];
     let seen = boxes(2000, ahead);
-    let fov = FovTangents {
-        left: 1.2,
-        right: 1.2,
-        up: 1.2,
-        down: 1.2,
-    };
+    let fov = FovTangents::new(1.2, 1.2, 1.2, 1.2);
     let rig = rig([fov; 2], 0.064, 0.0, 0.1, 100.0);
     let mut tests = |hidden: usize| {
         let tree = Hierarchy::new(&[seen.clone(), boxes(hidden, behind)].concat());
