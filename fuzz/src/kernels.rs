@@ -8,8 +8,7 @@ use formats::raytrace::TraversalKind;
 use glam::Vec3;
 use rays::bvh::count::Counts;
 use rays::bvh::{AllOpaque, AlphaTest, Bvh, Instructions, RayHit, TraversalStack};
-use rays::ray::{LARGEST_COORDINATE, Ray};
-use rays::reference::brute_force_f32;
+use rays::ray::{LARGEST_COORDINATE, Ray, brute_force_f32};
 
 /// More triangles would take longer without finding more.
 const MOST_TRIANGLES: usize = 24;
@@ -62,7 +61,7 @@ fn found(bvh: &Bvh, tree: TraversalKind, ray: &Ray, alpha: &impl AlphaTest) -> F
     let mut counts = Counts::default();
     let hit = bvh.closest(tree, ray, &mut stack, &mut counts, alpha);
     let hit = hit.map(|h: RayHit| (h.t.to_bits(), h.primitive));
-    let any = bvh.occluded(tree, ray, &mut stack, &mut counts, alpha);
+    let any = bvh.blocker(tree, ray, &mut stack, &mut counts, alpha).is_some();
     (hit, any, counts)
 }
 

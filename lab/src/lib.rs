@@ -1,4 +1,5 @@
-//! Checks of captures: a reference in double precision, and extreme inputs.
+//! Checks of captures: references in double precision, and extreme inputs.
 
 pub mod stress;
+pub mod traversal;
 pub mod verify;

@@ -269,7 +269,8 @@ fn walk<C: Counter + Default>(
         .filter(|ray| {
             let mut counter = C::default();
             let hit = if any_hit {
-                bvh.occluded(tree, ray, stack, &mut counter, &AllOpaque)
+                bvh.blocker(tree, ray, stack, &mut counter, &AllOpaque)
+                    .is_some()
             } else {
                 let hit = bvh.closest(tree, ray, stack, &mut counter, &AllOpaque);
                 hit.is_some()

@@ -272,3 +272,18 @@ pub fn offset(point: Vec3, normal: Vec3) -> Vec3 {
         moved(point.z, normal.z),
     )
 }
+
+/// The traversal's answer without a tree: every triangle is tested with the traversal's own tests.
+pub fn brute_force_f32(
+    triangles: &[[[f32; 3]; 3]],
+    bounds: (Vec3, Vec3),
+    ray: &Ray,
+) -> Option<(f32, u32)> {
+    let prepared = PreparedRay::new(ray, bounds);
+    triangles
+        .iter()
+        .zip(0u32..)
+        .filter(|(v, _)| prepared.line_hits(v))
+        .filter_map(|(v, i)| prepared.distance(v).map(|t| (t, i)))
+        .reduce(|a, b| if b < a { b } else { a })
+}

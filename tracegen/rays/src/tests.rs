@@ -15,7 +15,6 @@ use super::material::Materials;
 use super::scene::TraceScene;
 use super::soup::Soup;
 use super::tracer::{TraceSettings, Tracer};
-use crate::reference::TestMesh;
 use formats::raytrace::{
     EyeCamera, Outcome, RayKind, RayTile, Raytrace, RaytraceMeta, RaytraceTables, RaytraceWriter,
     TraversalKind,
@@ -23,6 +22,7 @@ use formats::raytrace::{
 use formats::textrace::TraceMeta;
 use formats::view::Eye;
 use glam::{Affine3A, Vec2, Vec3, Vec4};
+use lab::traversal::reference::TestMesh;
 use scene::{AlphaMode, Camera, Instance, Light, Material, Mesh, Scene, cameras, hmd};
 
 fn material(name: &str) -> Material {

@@ -18,6 +18,7 @@ mod objective_args;
 pub mod page;
 mod path_args;
 mod pose_args;
+#[cfg(feature = "lab")]
 pub mod precision;
 mod prepared;
 #[cfg(feature = "programs")]
@@ -45,7 +46,7 @@ use clap::{Parser, Subcommand};
 #[cfg(not(feature = "programs"))]
 use not_built::{app, page};
 #[cfg(not(feature = "lab"))]
-use not_built::{stress, verify};
+use not_built::{precision, stress, verify};
 use shell::{Common, Documents, SuperviseArgs};
 use std::process::ExitCode;
 
@@ -118,7 +119,7 @@ pub fn main() -> ExitCode {
                 Command::Verify(args) => return verify::run(&args),
                 Command::Rays(args) => rays::run(&args)?,
                 Command::Stress(args) => return stress::run(&args),
-                Command::Precision(args) => precision::run(&args)?,
+                Command::Precision(args) => return precision::run(&args),
                 Command::Supervise(args) => return args.run(),
                 Command::Documents(documents) => return documents.run::<Cli>(),
             }

@@ -28,4 +28,4 @@ macro_rules! not_built {
 #[cfg(not(feature = "programs"))]
 not_built!(app AppArgs, page PageArgs);
 #[cfg(not(feature = "lab"))]
-not_built!(stress StressArgs, verify VerifyArgs);
+not_built!(precision PrecisionArgs, stress StressArgs, verify VerifyArgs);

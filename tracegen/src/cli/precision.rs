@@ -3,11 +3,12 @@
 use anyhow::Context;
 use clap::Args;
 use formats::container::AtomicFile;
-use rays::precision::{Precision, measure};
-use rays::reference::TestMesh;
+use lab::traversal::precision::{Precision, measure};
+use lab::traversal::reference::TestMesh;
 use serde::Serialize;
 use shell::{Output, Progress};
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 /// Arguments of `tracegen precision`.
 #[derive(Args, Debug)]
@@ -78,7 +79,7 @@ pub(crate) fn schema() -> formats::schemas::Published {
 ///
 /// # Errors
 /// A file that cannot be written.
-pub fn run(args: &PrecisionArgs) -> anyhow::Result<()> {
+pub fn run(args: &PrecisionArgs) -> anyhow::Result<ExitCode> {
     if let Some(path) = &args.output {
         shell::check_outputs(&[Output::text("--output", path)], None)?;
     }
@@ -99,7 +100,8 @@ pub fn run(args: &PrecisionArgs) -> anyhow::Result<()> {
     let text = serde_json::to_string_pretty(&document)? + "\n";
     match &args.output {
         Some(path) => AtomicFile::write_whole(path, text.as_bytes())
-            .with_context(|| format!("cannot write {}", path.display())),
-        None => shell::print(&text),
+            .with_context(|| format!("cannot write {}", path.display()))?,
+        None => shell::print(&text)?,
     }
+    Ok(ExitCode::SUCCESS)
 }

@@ -182,8 +182,8 @@ pub(super) fn compressed(nodes: &[Node8], blocks: usize) -> (Vec<Node8>, Vec<u32
 mod tests {
     use super::super::Bvh;
     use super::*;
-    use crate::reference::TestMesh;
     use glam::DVec3;
+    use lab::traversal::reference::TestMesh;
 
     /// Trees of regular, far and flat meshes, and of one leaf.
     fn trees() -> Vec<Bvh> {

@@ -19,7 +19,7 @@ impl Bvh {
                 })
                 .collect(),
             TraversalKind::Bvh8 => wide(&self.nodes8),
-            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => wide(&self.third.nodes),
+            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => wide(&self.on_demand.nodes),
         };
         let mut blocks: Vec<_> = slots.iter().zip(&self.blocks).collect();
         blocks.sort_unstable_by_key(|(slot, _)| **slot);

@@ -2,7 +2,7 @@
 //!
 //! One build gives two trees over the same leaves. A step in the binary tree tests both children's
 //! boxes; this is the unit in which T&I unit 2.0 works and in which traces count. The eight-wide
-//! tree is faster. A third tree, four-wide or of compressed nodes, is built on demand. All find
+//! tree is faster. A tree on demand, four-wide or of compressed nodes, is built if asked for. All find
 //! bit-identical hits.
 
 #[cfg(target_arch = "x86_64")]
@@ -15,9 +15,9 @@ pub mod count;
 mod kernel;
 mod leaf;
 pub mod node;
+mod on_demand;
 mod pages;
 mod stacks;
-mod third;
 mod traverse;
 mod treelets;
 mod widen;
@@ -32,10 +32,10 @@ use glam::Vec3;
 use kernel::Scalar;
 pub use leaf::{AllOpaque, AlphaTest, RayHit};
 use node::{Block, Child, MASKED, Node2, Node8, TRIANGLE_BYTES};
+pub use on_demand::TreeOptions;
+use on_demand::{OnDemandTree, node_bytes};
 use pages::in_large_pages;
 use stacks::Stacks;
-pub use third::TreeOptions;
-use third::{ThirdTree, node_bytes};
 pub use traverse::TraversalStack;
 use traverse::{Two, Wide, Width, search};
 use treelets::in_treelets;
@@ -87,7 +87,7 @@ pub struct Bvh {
     leaves: u64,
     depth2: u32,
     depth8: u32,
-    third: ThirdTree,
+    on_demand: OnDemandTree,
     treelet_bytes: Option<u32>,
     /// Entries that a traversal stack needs.
     stack_size: usize,
@@ -146,7 +146,7 @@ impl Bvh {
         stacks.expand(&mut tree, &kept);
         let mut layout = build::lay_out(&tree, &kept, &numbers);
         let (mut nodes8, depth8) = build::emit_wide(&tree, &layout.children, MAX_WIDTH);
-        let third = ThirdTree::new(options, &tree, &layout, (&nodes8, depth8));
+        let on_demand = OnDemandTree::new(options, &tree, &layout, (&nodes8, depth8));
         if let Some(most) = options.treelet_nodes() {
             match options.kind {
                 TraversalKind::Bvh2 => layout.nodes2 = in_treelets(&layout.nodes2, most),
@@ -157,7 +157,7 @@ impl Bvh {
         let most_stacked = [
             layout.depth2,
             depth8 * (MAX_WIDTH as u32 - 1),
-            third.depth * (MAX_WIDTH as u32 - 1),
+            on_demand.depth * (MAX_WIDTH as u32 - 1),
         ];
         Ok(Self {
             nodes2: in_large_pages(layout.nodes2),
@@ -169,7 +169,7 @@ impl Bvh {
             leaves: layout.leaves,
             depth2: layout.depth2,
             depth8,
-            third,
+            on_demand,
             treelet_bytes: options.treelet_bytes,
             stack_size: most_stacked.into_iter().max().unwrap_or(0) as usize + MAX_WIDTH,
             sah_cost: layout.sah_cost,
@@ -190,7 +190,7 @@ impl Bvh {
     pub fn has(&self, kind: TraversalKind) -> bool {
         match kind {
             TraversalKind::Bvh2 | TraversalKind::Bvh8 => true,
-            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => self.third.kind == Some(kind),
+            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => self.on_demand.kind == Some(kind),
         }
     }
 
@@ -199,7 +199,7 @@ impl Bvh {
         debug_assert!(self.has(tree));
         match tree {
             TraversalKind::Bvh2 | TraversalKind::Bvh8 => &self.first_slots,
-            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => &self.third.first_slots,
+            TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => &self.on_demand.first_slots,
         }
     }
 
@@ -209,7 +209,7 @@ impl Bvh {
             TraversalKind::Bvh2 => (self.nodes2.len(), self.depth2),
             TraversalKind::Bvh8 => (self.nodes8.len(), self.depth8),
             TraversalKind::Bvh4 | TraversalKind::Cwbvh8 => {
-                (self.third.nodes.len(), self.third.depth)
+                (self.on_demand.nodes.len(), self.on_demand.depth)
             }
         };
         let mut settings = build::settings();
@@ -244,21 +244,6 @@ impl Bvh {
         alpha: &A,
     ) -> Option<RayHit> {
         self.search::<false, C, A>(tree, ray, stack, counter, alpha)
-    }
-
-    /// True if any triangle lies on the ray's segment.
-    ///
-    /// # Panics
-    /// The tree was not built.
-    pub fn occluded<C: Counter, A: AlphaTest>(
-        &self,
-        tree: TraversalKind,
-        ray: &Ray,
-        stack: &mut TraversalStack,
-        counter: &mut C,
-        alpha: &A,
-    ) -> bool {
-        self.blocker(tree, ray, stack, counter, alpha).is_some()
     }
 
     /// The first triangle on the ray's segment that the traversal finds, which need not be the nearest.

@@ -1,8 +1,9 @@
 use super::count::Counts;
 use super::*;
-use crate::reference::{TestMesh, brute_force_f32};
+use crate::ray::brute_force_f32;
 use formats::random::Random;
 use glam::{DVec3, Vec3};
+use lab::traversal::reference::TestMesh;
 
 #[test]
 fn hits_of_all_trees_and_both_kernels_equal_brute_force() {
@@ -52,7 +53,9 @@ fn hits_equal_brute_force(options: TreeOptions) {
                         "{} ray {i}",
                         mesh.name
                     );
-                    let any = bvh.occluded(tree, &ray, &mut stack, &mut counts, &AllOpaque);
+                    let any = bvh
+                        .blocker(tree, &ray, &mut stack, &mut counts, &AllOpaque)
+                        .is_some();
                     assert_eq!(any, expected.is_some(), "{} ray {i}", mesh.name);
                     counts
                 });

@@ -137,16 +137,16 @@ fn ordered(a: u64, b: u64) -> (u64, u64) {
     (a.min(b), a.max(b))
 }
 
-/// A wide tree: the eight-wide one, or the third one, with four children or compressed nodes.
-pub struct Wide<const IS_THIRD: bool>;
+/// A wide tree: the eight-wide one, or the one on demand, with four children or compressed nodes.
+pub struct Wide<const ON_DEMAND: bool>;
 
-impl<const IS_THIRD: bool> Width for Wide<IS_THIRD> {
+impl<const ON_DEMAND: bool> Width for Wide<ON_DEMAND> {
     const LEAVES_OUT_OF_LINE: bool = false;
 
     #[inline(always)]
     fn first_slots(bvh: &Bvh) -> &[u32] {
-        if IS_THIRD {
-            &bvh.third.first_slots
+        if ON_DEMAND {
+            &bvh.on_demand.first_slots
         } else {
             &bvh.first_slots
         }
@@ -161,8 +161,8 @@ impl<const IS_THIRD: bool> Width for Wide<IS_THIRD> {
         stack: &mut [u64],
         top: &mut usize,
     ) -> Option<Child> {
-        let nodes = if IS_THIRD {
-            &bvh.third.nodes
+        let nodes = if ON_DEMAND {
+            &bvh.on_demand.nodes
         } else {
             &bvh.nodes8
         };

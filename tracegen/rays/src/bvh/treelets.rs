@@ -86,8 +86,8 @@ pub(super) fn in_treelets<N: Renumbered>(nodes: &[N], most: usize) -> Vec<N> {
 mod tests {
     use super::super::Bvh;
     use super::*;
-    use crate::reference::TestMesh;
     use glam::DVec3;
+    use lab::traversal::reference::TestMesh;
 
     /// Children of every node, without the numbers of nodes, in depth-first order.
     fn shape(nodes: &[Node8]) -> Vec<Vec<Option<Child>>> {

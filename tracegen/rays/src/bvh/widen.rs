@@ -88,8 +88,8 @@ impl Widening {
 mod tests {
     use super::super::build::build_binary;
     use super::*;
-    use crate::reference::TestMesh;
     use glam::DVec3;
+    use lab::traversal::reference::TestMesh;
 
     /// The cost of all wide nodes, and the leaves below them in order.
     fn widened(tree: &Bvh2, width: usize, children: impl Fn(u32) -> Vec<u32>) -> (f64, Vec<u32>) {

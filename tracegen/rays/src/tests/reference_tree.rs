@@ -219,7 +219,7 @@ fn edge_near(triangle: &Triangle, origin: DVec3, direction: DVec3, tolerance: f6
 #[allow(unused_imports)]
 mod tests {
     use super::*;
-    use rays::reference::{Random, Reference, TestMesh, Verdict};
+    use lab::traversal::reference::{Random, Reference, TestMesh, Verdict};
 
     #[test]
     fn hits_are_those_of_brute_force() {

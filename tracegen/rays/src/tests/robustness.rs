@@ -2,10 +2,10 @@
 
 use formats::raytrace::TraversalKind;
 use glam::{DVec3, Vec3};
+use lab::traversal::reference::{Random, Reference, TestMesh, Verdict};
 use rays::bvh::count::NoCounter;
 use rays::bvh::{AllOpaque, Bvh, TraversalStack};
-use rays::ray::{Ray, barycentrics, offset, point_at};
-use rays::reference::{Random, Reference, TestMesh, Verdict, brute_force_f32};
+use rays::ray::{Ray, barycentrics, brute_force_f32, offset, point_at};
 
 /// Displacement that rounding to `f32` may cause on a mesh of radius 10 seen from a distance of up
 /// to 40: half a unit in the last place of each coordinate and of the shear, times a small factor.
@@ -151,7 +151,11 @@ impl MeshUnderTest {
             let hit = self.bvh.closest(t, ray, stack, &mut NoCounter, &AllOpaque);
             hit.map(|h| (h.t, h.primitive))
         });
-        let any = trees.map(|t| self.bvh.occluded(t, ray, stack, &mut NoCounter, &AllOpaque));
+        let any = trees.map(|t| {
+            self.bvh
+                .blocker(t, ray, stack, &mut NoCounter, &AllOpaque)
+                .is_some()
+        });
         findings.not_brute_force += u64::from(closest.iter().any(|c| *c != plain));
         let says =
             |hit: bool| closest.iter().any(|c| c.is_some() != hit) || any.iter().any(|a| *a != hit);
@@ -195,7 +199,8 @@ impl MeshUnderTest {
         let mut hits = |from: Vec3, to: Vec3| {
             let ray = Ray::new(from, to);
             self.bvh
-                .occluded(tree, &ray, stack, &mut NoCounter, &AllOpaque)
+                .blocker(tree, &ray, stack, &mut NoCounter, &AllOpaque)
+                .is_some()
         };
         if self.convex && hits(offset(point, outward), away) {
             findings.self_hits += 1;

@@ -1,15 +1,15 @@
-//! Compares the precision and speed of a simple ray tracer in single and double precision with this
-//! crate's ray tracer.
+//! Compares the precision and speed of a simple ray tracer in single and double precision with the
+//! ray tracer of the crate `rays`.
 //!
 //! The simple ray tracer uses a tree of boxes split at medians, a slab test, and signed volumes of
 //! the ray with a triangle's edges. Each edge is calculated identically for both of its triangles.
 
-use super::bvh::count::NoCounter;
-use super::bvh::{AllOpaque, Bvh, TraversalStack};
-use super::ray::Ray;
 use super::reference::{Random, Reference, TestMesh, Verdict};
 use formats::raytrace::TraversalKind;
 use glam::DVec3;
+use rays::bvh::count::NoCounter;
+use rays::bvh::{AllOpaque, Bvh, TraversalStack};
+use rays::ray::Ray;
 use std::ops::{Add, Div, Mul, Sub};
 use std::time::{Duration, Instant};
 
@@ -247,7 +247,7 @@ pub const ARITHMETICS: [&str; 4] = [
 /// # Panics
 /// If the mesh has too many triangles for a hierarchy.
 pub fn measure(mesh: &TestMesh, at_m: f64, count: usize) -> [Precision; 4] {
-    /// Displacement that rounding to single precision may cause, as in `tests/robustness.rs`.
+    /// Displacement that rounding to single precision may cause, as in the tests of `rays`.
     const TOLERANCE: f64 = 1e-5;
     let place = DVec3::new(1.0, 0.7, -0.9) * at_m;
     let mut random = Random(11);
@@ -281,7 +281,7 @@ pub fn measure(mesh: &TestMesh, at_m: f64, count: usize) -> [Precision; 4] {
             &rays,
             place - moved.center(),
         ),
-        traced_by_this_crate(&moved, &rays, place),
+        traced_by_rays(&moved, &rays, place),
     ];
     let reference_time = answers[0].1.as_secs_f64().max(1e-9);
     std::array::from_fn(|index| {
@@ -340,8 +340,8 @@ fn traced<T: Real>(mesh: &TestMesh, rays: &[(DVec3, DVec3)], place: DVec3) -> An
     })
 }
 
-/// This crate's ray tracer, on a mesh recentred in the same way as scenes.
-fn traced_by_this_crate(mesh: &TestMesh, rays: &[(DVec3, DVec3)], place: DVec3) -> Answers {
+/// The ray tracer of `rays`, on a mesh recentred in the same way as scenes.
+fn traced_by_rays(mesh: &TestMesh, rays: &[(DVec3, DVec3)], place: DVec3) -> Answers {
     let center = mesh.center();
     let bvh = Bvh::build(&mesh.rounded(center), |_| false).expect("a test mesh is small");
     let rays: Vec<Ray> = (rays.iter())

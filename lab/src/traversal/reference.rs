@@ -5,7 +5,6 @@
 //! and rounded to `f32`). Its answers are exact except for rays that graze a silhouette more
 //! closely than the rounding of the `f32` mesh, which are [`Verdict::Borderline`].
 
-use super::ray::{PreparedRay, Ray};
 use glam::{DVec3, Vec3};
 
 /// A mesh in world space and double precision.
@@ -385,21 +384,6 @@ impl Near {
             t.covers() && t.height() > self.tolerance && clear
         })
     }
-}
-
-/// The traversal's answer without a tree: every triangle is tested with the traversal's own tests.
-pub fn brute_force_f32(
-    triangles: &[[[f32; 3]; 3]],
-    bounds: (Vec3, Vec3),
-    ray: &Ray,
-) -> Option<(f32, u32)> {
-    let prepared = PreparedRay::new(ray, bounds);
-    triangles
-        .iter()
-        .zip(0u32..)
-        .filter(|(v, _)| prepared.line_hits(v))
-        .filter_map(|(v, i)| prepared.distance(v).map(|t| (t, i)))
-        .reduce(|a, b| if b < a { b } else { a })
 }
 
 /// A small seeded generator.

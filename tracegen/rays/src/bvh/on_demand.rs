@@ -45,7 +45,7 @@ pub(super) fn node_bytes(kind: TraversalKind) -> usize {
 
 /// A four-wide tree, or an eight-wide one of compressed nodes.
 #[derive(Default)]
-pub(super) struct ThirdTree {
+pub(super) struct OnDemandTree {
     pub kind: Option<TraversalKind>,
     /// Only the first four children are used in a four-wide tree.
     pub nodes: Vec<Node8>,
@@ -54,7 +54,7 @@ pub(super) struct ThirdTree {
     pub depth: u32,
 }
 
-impl ThirdTree {
+impl OnDemandTree {
     /// The tree that the options describe, if it is not one of the two others.
     pub fn new(options: TreeOptions, tree: &Bvh2, layout: &Layout, eight: (&[Node8], u32)) -> Self {
         let sorted = |nodes: Vec<Node8>| match options.treelet_nodes() {
