@@ -1,6 +1,8 @@
 //! One captured frame of a scene, and its agreement with the reference.
 
 use super::*;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 pub(super) const SIZE_PX: [u32; 2] = [200, 136];
 pub(super) const BUDGET: u64 = 128 << 20;
@@ -60,6 +62,31 @@ pub(super) fn job<'a>(
         fragments: Fragments::DepthTested,
         shaded: true,
     }
+}
+
+/// The driver for a scene and its draws.
+pub(super) fn driver(scene: &Scene, draws: &DrawList, size_px: [u32; 2]) -> Lavapipe {
+    let set = TextureSet::compress(scene).unwrap();
+    Lavapipe::new(scene, draws, &set, size_px, BUDGET).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The path of a downloaded scene, or nothing and a message if it is absent.
+pub(super) fn real_scene(file: &str) -> Option<PathBuf> {
+    let folder = std::env::var_os("PARALLAX_SCENES").map_or_else(
+        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes"),
+        Into::into,
+    );
+    let path = folder.join(file);
+    if path.exists() {
+        return Some(path);
+    }
+    // Not `eprintln`, because libtest captures its lines: `scripts/test.sh` lists this one.
+    let _ = writeln!(
+        std::io::stderr(),
+        "SKIPPED: {} is absent (set PARALLAX_SCENES)",
+        path.display()
+    );
+    None
 }
 
 /// Captures one stereo frame; fails with the names of the packages if there is no lavapipe.

@@ -1,6 +1,8 @@
 //! Compares culling with the visible draws, found by drawing everything.
 
-use super::{BOTH, BUDGET, checker, display, job, planner, random, scene, textured, triangles};
+use super::{
+    BOTH, checker, display, driver, job, planner, random, real_scene, scene, textured, triangles,
+};
 use formats::view::{FrameViews, Hmd, Lens};
 use glam::{Affine3A, Quat, Vec3};
 use raster::backend::{CaptureBackend, Marks};
@@ -14,10 +16,7 @@ use scene::{
     AlphaMode, Camera, Instance, LoadOptions, Scene, TextureSlot, TextureSlots, cameras, hmd,
 };
 use std::collections::BTreeSet;
-use std::io::Write;
-use std::path::PathBuf;
 use techniques::{Planner, Settings};
-use textures::TextureSet;
 use visibility::{Culling, Occlusion};
 
 const SIZE_PX: [u32; 2] = [160, 144];
@@ -126,8 +125,7 @@ fn small_scene() -> Scene {
 fn every_mark_is_seen_in_the_depth_and_unmarked_draws_are_seen_nowhere() {
     let scene = small_scene();
     let draws = DrawList::new(&scene, 0).unwrap();
-    let set = TextureSet::compress(&scene).unwrap();
-    let mut backend = Lavapipe::new(&scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
+    let mut backend = driver(&scene, &draws, SIZE_PX);
     let (hmd, planner) = (display(SIZE_PX), plans(Culling::NONE, false));
     let job = job(&scene, &draws, &planner);
     let views = frames(&scene.cameras[0], &hmd, 1).remove(0);
@@ -189,8 +187,7 @@ fn every_mark_is_seen_in_the_depth_and_unmarked_draws_are_seen_nowhere() {
 fn pictures_are_the_same_whatever_is_culled_and_whatever_is_hidden() {
     let scene = small_scene();
     let draws = DrawList::new(&scene, 0).unwrap();
-    let set = TextureSet::compress(&scene).unwrap();
-    let mut backend = Lavapipe::new(&scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
+    let mut backend = driver(&scene, &draws, SIZE_PX);
     let hmd = display(SIZE_PX);
     let everything = plans(Culling::NONE, false);
     let everything = job(&scene, &draws, &everything);
@@ -237,21 +234,7 @@ fn pictures_are_the_same_whatever_is_culled_and_whatever_is_hidden() {
 /// A scene with only the textures that decide visibility: those of masked materials.
 fn load(spec: &str) -> Option<Scene> {
     let path = if spec.contains('/') {
-        let folder = std::env::var_os("PARALLAX_SCENES").map_or_else(
-            || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/scenes")),
-            PathBuf::from,
-        );
-        let path = folder.join(spec);
-        if !path.exists() {
-            // Not `eprintln`, because libtest captures its lines: `scripts/test.sh` lists this one.
-            let _ = writeln!(
-                std::io::stderr(),
-                "SKIPPED: {} is absent (set PARALLAX_SCENES)",
-                path.display()
-            );
-            return None;
-        }
-        path.to_string_lossy().into_owned()
+        real_scene(spec)?.to_string_lossy().into_owned()
     } else {
         spec.to_owned()
     };
@@ -277,13 +260,12 @@ fn canted() -> Hmd {
 fn judge_scene(spec: &str, camera: Option<&str>, count: u32) {
     let Some(scene) = load(spec) else { return };
     let mut draws = DrawList::new(&scene, 0).unwrap();
-    let set = TextureSet::compress(&scene).unwrap();
     let hmd = canted();
     let lenses = hmd.fov.map(|fov| Lens::of(&fov));
     let plans = |culling, occlusion| {
         Planner::new(&settings(culling, occlusion), &hmd, lenses, BOTH, 72.0).unwrap()
     };
-    let mut backend = Lavapipe::new(&scene, &draws, &set, SIZE_PX, 1 << 20).unwrap();
+    let mut backend = driver(&scene, &draws, SIZE_PX);
     let camera = cameras::find(&scene, camera).unwrap();
     let mut remembered = [(); 2].map(|()| Occlusion::default());
     let mut tests = [0_u64; 2];

@@ -4,8 +4,6 @@ use super::*;
 use glam::{DMat4, DVec2, Mat4};
 use scene::paths::{HeadPath, Moments};
 use scene::{LoadOptions, load_file};
-use std::io::Write;
-use std::path::Path;
 use techniques::far_field::Stereo;
 use techniques::settings::{FarField, Split, Variant};
 use techniques::{Start, start::Composition};
@@ -93,11 +91,8 @@ fn corridor() -> Scene {
         across(0.2, -6.0, 1),
         across(-0.6, -4.0, 2),
     ];
-    let materials = vec![
-        textured(AlphaMode::Opaque, true),
-        textured(AlphaMode::Mask(0.5), true),
-        textured(AlphaMode::Blend, true),
-    ];
+    let modes = [AlphaMode::Opaque, AlphaMode::Mask(0.5), AlphaMode::Blend];
+    let materials = modes.map(|mode| textured(mode, true)).into();
     scene(meshes, materials, vec![checker()])
 }
 
@@ -139,16 +134,10 @@ fn composition(frame: &RenderedFrame, eye: usize) -> &Composition {
 fn a_corridor_has_no_hole_at_the_split_and_is_exact_before_it() {
     let scene = corridor();
     let draws = DrawList::new(&scene, 2).unwrap();
-    let set = TextureSet::compress(&scene).unwrap();
-    let mut backend = Lavapipe::new(&scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
+    let mut backend = driver(&scene, &draws, SIZE_PX);
     let mut views = views(&scene, SIZE_PX);
-    let whole = draw(
-        &mut backend,
-        &scene,
-        &draws,
-        &baseline(SIZE_PX, BOTH),
-        &views,
-    );
+    let without = baseline(SIZE_PX, BOTH);
+    let whole = draw(&mut backend, &scene, &draws, &without, &views);
     let splits = [
         Split::Metres(2.2),
         Split::Metres(3.0),
@@ -195,17 +184,11 @@ fn a_corridor_has_no_hole_at_the_split_and_is_exact_before_it() {
 fn eyes_in_one_place_see_through_a_far_field_what_they_see_without() {
     let scene = corridor();
     let draws = DrawList::new(&scene, 0).unwrap();
-    let set = TextureSet::compress(&scene).unwrap();
-    let mut backend = Lavapipe::new(&scene, &draws, &set, SIZE_PX, BUDGET).unwrap();
+    let mut backend = driver(&scene, &draws, SIZE_PX);
     let mut views = views(&scene, SIZE_PX);
     views.eyes[1] = views.eyes[0];
-    let whole = draw(
-        &mut backend,
-        &scene,
-        &draws,
-        &baseline(SIZE_PX, BOTH),
-        &views,
-    );
+    let without = baseline(SIZE_PX, BOTH);
+    let whole = draw(&mut backend, &scene, &draws, &without, &views);
     for variant in VARIANTS {
         let planner = planner(&far(Split::Metres(3.0), variant), SIZE_PX, BOTH);
         let frame = draw(&mut backend, &scene, &draws, &planner, &views);
@@ -291,20 +274,9 @@ fn shifts(frame: &RenderedFrame, views: &FrameViews, size_px: [u32; 2]) -> Vec<f
 
 /// Shifts over frames of the walk through a real scene: the median, the 99th percentile and the largest.
 fn check_real_scene(file: &str, camera: &str, size_px: [u32; 2], frames: &[u32]) {
-    let folder = std::env::var_os("PARALLAX_SCENES").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/scenes"),
-        Into::into,
-    );
-    let path = folder.join(file);
-    if !path.exists() {
-        // Not `eprintln`, because libtest captures its lines: `scripts/test.sh` lists this one.
-        let _ = writeln!(
-            std::io::stderr(),
-            "SKIPPED: {} is absent (set PARALLAX_SCENES)",
-            path.display()
-        );
+    let Some(path) = real_scene(file) else {
         return;
-    }
+    };
     let scene = load_file(&path, &LoadOptions::ALL).unwrap().scene;
     let camera = cameras::find(&scene, Some(camera)).unwrap();
     let last = frames.iter().max().map_or(0, |last| last + 1);

@@ -69,11 +69,7 @@ fn masked_draws_keep_exactly_the_lanes_that_an_in_order_gpu_keeps() {
 
 #[test]
 fn every_lane_of_a_shadowed_draw_takes_at_most_one_cascade() {
-    let scene = scene(
-        vec![triangles(80, 51, 0)],
-        vec![textured(AlphaMode::Opaque, true)],
-        vec![checker()],
-    );
+    let scene = crowd(&[(80, 51, AlphaMode::Opaque)]);
     let captured = capture(&scene, SIZE_PX, 4, BUDGET);
     let mut shadowed = 0;
     for tile in captured.tiles.iter().flatten() {

@@ -40,7 +40,7 @@ fn capture_with(settings: &Settings, scene: &Scene, size_px: [u32; 2]) -> Captur
 }
 
 /// Draws of every kind all over the picture, emitting the checker's pattern.
-fn crowd() -> Scene {
+fn glowing_crowd() -> Scene {
     let meshes = (0..3).map(|m| triangles(120, 91 + m as u32, m)).collect();
     let modes = [AlphaMode::Opaque, AlphaMode::Mask(0.5), AlphaMode::Blend];
     let glowing = |mode| {
@@ -88,7 +88,7 @@ fn pixels() -> impl Iterator<Item = [u32; 2]> {
 
 #[test]
 fn a_masked_picture_has_every_pixel_of_the_lens_and_no_tile_outside_it() {
-    let scene = crowd();
+    let scene = glowing_crowd();
     let (whole, masked) = (
         capture(&scene, SIZE_PX, 0, BUDGET),
         capture_with(&masked(), &scene, SIZE_PX),
@@ -176,7 +176,7 @@ fn a_surface_over_the_whole_view_has_a_fragment_for_each_pixel_that_may_be_shade
 
 #[test]
 fn tiles_at_full_rate_have_the_baselines_pixels() {
-    let scene = crowd();
+    let scene = glowing_crowd();
     let whole = capture(&scene, SIZE_PX, 0, BUDGET);
     for kind in KINDS {
         let foveated = capture_with(&foveated(kind, [20.0, 30.0, 40.0, 45.0]), &scene, SIZE_PX);
@@ -262,7 +262,7 @@ fn left_out_quads_are_filled_so_that_a_slope_stays_a_slope() {
 
 #[test]
 fn layers_captured_in_parts_give_the_same_trace() {
-    let scene = crowd();
+    let scene = glowing_crowd();
     for settings in [
         masked(),
         foveated(FoveationKind::Rings, [10.0, 20.0, 30.0, 40.0]),

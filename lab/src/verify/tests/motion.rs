@@ -1,13 +1,12 @@
 //! Compares moving draws with a static scene in the same pose.
 
-use super::{BOTH, BUDGET, SIZE_PX, baseline, job, many_instances, views};
+use super::{BOTH, SIZE_PX, baseline, driver, job, many_instances, views};
 use glam::Vec3;
 use raster::backend::CaptureBackend;
 use raster::capture::Pictures;
 use raster::draws::DrawList;
 use raster::lavapipe::Lavapipe;
 use scene::{AlphaMode, Motion, Movement, Scene};
-use textures::TextureSet;
 
 /// Every third instance slides, every seventh rotates.
 fn moving_scene() -> Scene {
@@ -35,11 +34,6 @@ fn moving_scene() -> Scene {
     scene
 }
 
-fn backend(scene: &Scene, draws: &DrawList) -> Lavapipe {
-    let set = TextureSet::compress(scene).unwrap();
-    Lavapipe::new(scene, draws, &set, SIZE_PX, BUDGET).unwrap()
-}
-
 fn pictures(scene: &Scene, draws: &DrawList, backend: &mut Lavapipe) -> Pictures {
     let planner = baseline(SIZE_PX, BOTH);
     let job = job(scene, draws, &planner);
@@ -51,7 +45,7 @@ fn pictures(scene: &Scene, draws: &DrawList, backend: &mut Lavapipe) -> Pictures
 fn what_has_moved_looks_as_if_it_had_always_stood_there() {
     let scene = moving_scene();
     let mut draws = DrawList::new(&scene, 0).unwrap();
-    let mut moved = backend(&scene, &draws);
+    let mut moved = driver(&scene, &draws, SIZE_PX);
     let mut seen: Vec<Pictures> = Vec::new();
     for time_s in [0.0, 0.4, 1.3, 0.0] {
         let before = moved.work().bytes_uploaded;
@@ -64,7 +58,7 @@ fn what_has_moved_looks_as_if_it_had_always_stood_there() {
         there.pose(time_s);
         there.motions.clear();
         let still = DrawList::new(&there, 0).unwrap();
-        let expected = pictures(&there, &still, &mut backend(&there, &still));
+        let expected = pictures(&there, &still, &mut driver(&there, &still, SIZE_PX));
         let found = pictures(&scene, &draws, &mut moved);
         assert!(found == expected, "{time_s} s");
         seen.push(found);
@@ -78,7 +72,7 @@ fn what_has_moved_looks_as_if_it_had_always_stood_there() {
 fn nothing_is_uploaded_of_a_scene_that_stands_still() {
     let scene = many_instances(AlphaMode::Opaque);
     let mut draws = DrawList::new(&scene, 0).unwrap();
-    let mut backend = backend(&scene, &draws);
+    let mut backend = driver(&scene, &draws, SIZE_PX);
     draws.pose(&scene, 1.0);
     backend.pose(&scene, &draws);
     assert_eq!(backend.work().bytes_uploaded, 0);

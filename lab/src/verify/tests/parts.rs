@@ -98,6 +98,14 @@ pub(super) fn checker() -> Image {
     cells(8, |x, y| (x * 5 + y * 3) % 7 < 4)
 }
 
+/// Triangles over one another: their number and seed, and the material of each of these alpha modes.
+pub(super) fn crowd(parts: &[(usize, u32, AlphaMode)]) -> Scene {
+    let meshes = parts.iter().enumerate();
+    let meshes = meshes.map(|(number, (count, seed, _))| triangles(*count, *seed, number));
+    let materials = parts.iter().map(|(.., alpha)| textured(*alpha, true));
+    scene(meshes.collect(), materials.collect(), vec![checker()])
+}
+
 /// For scenes without alpha test.
 pub(super) fn passes(_: &DrawCall, _: DVec2) -> bool {
     true

@@ -4,12 +4,8 @@ use super::*;
 
 #[test]
 fn a_small_record_budget_gives_the_same_trace() {
-    let meshes = vec![triangles(150, 21, 0), triangles(150, 22, 1)];
-    let materials = vec![
-        textured(AlphaMode::Opaque, true),
-        textured(AlphaMode::Mask(0.5), true),
-    ];
-    let scene = scene(meshes, materials, vec![checker()]);
+    let masked = AlphaMode::Mask(0.5);
+    let scene = crowd(&[(150, 21, AlphaMode::Opaque), (150, 22, masked)]);
     let whole = capture(&scene, SIZE_PX, 2, BUDGET);
     for budget in [300 << 10, 64 << 10] {
         let parts = capture(&scene, SIZE_PX, 2, budget);
@@ -58,12 +54,8 @@ fn a_region_after_an_overflow_draws_only_what_may_touch_it() {
 
 #[test]
 fn a_lone_view_has_the_records_that_it_has_in_a_stereo_pair() {
-    let meshes = vec![triangles(60, 81, 0), triangles(60, 82, 1)];
-    let materials = vec![
-        textured(AlphaMode::Opaque, true),
-        textured(AlphaMode::Mask(0.5), true),
-    ];
-    let scene = scene(meshes, materials, vec![checker()]);
+    let masked = AlphaMode::Mask(0.5);
+    let scene = crowd(&[(60, 81, AlphaMode::Opaque), (60, 82, masked)]);
     let both = capture(&scene, SIZE_PX, 2, BUDGET);
     for (pass, eye) in [Eye::Left, Eye::Right].into_iter().enumerate() {
         let alone = try_capture(&scene, SIZE_PX, 2, BUDGET, &[eye], true).unwrap();
@@ -74,12 +66,8 @@ fn a_lone_view_has_the_records_that_it_has_in_a_stereo_pair() {
 
 #[test]
 fn work_that_a_frame_does_not_need_is_not_done() {
-    let meshes = vec![triangles(60, 81, 0), triangles(60, 82, 1)];
-    let materials = vec![
-        textured(AlphaMode::Opaque, true),
-        textured(AlphaMode::Mask(0.5), true),
-    ];
-    let scene = scene(meshes, materials, vec![checker()]);
+    let masked = AlphaMode::Mask(0.5);
+    let scene = crowd(&[(60, 81, AlphaMode::Opaque), (60, 82, masked)]);
     let capture = |plain| try_capture(&scene, SIZE_PX, 2, BUDGET, BOTH, plain).unwrap();
     let (with, without) = (capture(true).work, capture(false).work);
     // Rendered once for the plain and the captured pictures: one per cascade that is looked up; no visible
@@ -96,11 +84,7 @@ fn work_that_a_frame_does_not_need_is_not_done() {
 
 #[test]
 fn a_budget_below_one_tile_is_refused() {
-    let scene = scene(
-        vec![triangles(400, 31, 0)],
-        vec![textured(AlphaMode::Blend, true)],
-        vec![checker()],
-    );
+    let scene = crowd(&[(400, 31, AlphaMode::Blend)]);
     let captured = try_capture(&scene, SIZE_PX, 0, 4096, BOTH, true);
     let message = captured.err().unwrap().to_string();
     assert!(
@@ -111,17 +95,10 @@ fn a_budget_below_one_tile_is_refused() {
 
 #[test]
 fn the_records_of_each_pixel_are_as_many_as_an_additive_counter_sees() {
-    let meshes = vec![triangles(200, 61, 0), triangles(100, 62, 1)];
-    let materials = vec![
-        textured(AlphaMode::Opaque, true),
-        textured(AlphaMode::Blend, true),
-    ];
-    let scene = scene(meshes, materials, vec![checker()]);
+    let scene = crowd(&[(200, 61, AlphaMode::Opaque), (100, 62, AlphaMode::Blend)]);
     let captured = capture(&scene, SIZE_PX, 0, BUDGET);
     let draws = DrawList::new(&scene, 0).unwrap();
-    let set = TextureSet::compress(&scene).unwrap();
-    let mut backend =
-        Lavapipe::new(&scene, &draws, &set, SIZE_PX, BUDGET).unwrap_or_else(|e| panic!("{e}"));
+    let mut backend = driver(&scene, &draws, SIZE_PX);
     let lighting = Lighting::new(&scene);
     for (pass, eye) in BOTH.iter().enumerate() {
         let view = View {
@@ -156,13 +133,11 @@ fn untextured_draws_record_their_quads_without_a_group() {
 
 #[test]
 fn a_device_that_cannot_capture_renders_the_same_pictures_and_refuses_to_capture() {
-    let materials = vec![
-        textured(AlphaMode::Opaque, true),
-        textured(AlphaMode::Mask(0.5), true),
-        textured(AlphaMode::Blend, true),
-    ];
-    let meshes = (0..3).map(|m| triangles(60, 71 + m as u32, m)).collect();
-    let scene = scene(meshes, materials, vec![checker()]);
+    let scene = crowd(&[
+        (60, 71, AlphaMode::Opaque),
+        (60, 72, AlphaMode::Mask(0.5)),
+        (60, 73, AlphaMode::Blend),
+    ]);
     let captured = capture(&scene, SIZE_PX, 1, BUDGET);
     let draws = DrawList::new(&scene, 1).unwrap();
     let set = TextureSet::compress(&scene).unwrap();
