@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const MOST_LINES: usize = 250;
+const MOST_LINES: usize = 400;
 
 /// The text outside fenced code blocks.
 fn prose(text: &str) -> String {
