@@ -61,7 +61,9 @@ fn found(bvh: &Bvh, tree: TraversalKind, ray: &Ray, alpha: &impl AlphaTest) -> F
     let mut counts = Counts::default();
     let hit = bvh.closest(tree, ray, &mut stack, &mut counts, alpha);
     let hit = hit.map(|h: RayHit| (h.t.to_bits(), h.primitive));
-    let any = bvh.blocker(tree, ray, &mut stack, &mut counts, alpha).is_some();
+    let any = bvh
+        .blocker(tree, ray, &mut stack, &mut counts, alpha)
+        .is_some();
     (hit, any, counts)
 }
 

@@ -263,7 +263,7 @@ mod tests {
 
     #[test]
     fn names_of_sweeps_are_their_own_and_the_report_counts_what_is_broken() {
-        let mut names = SWEEPS.each_ref().map(|sweep| sweep.name);
+        let mut names: Vec<_> = SWEEPS.iter().map(|sweep| sweep.name).collect();
         names.sort_unstable();
         assert!(names.windows(2).all(|pair| pair[0] != pair[1]));
         let point = |outcome| Point {

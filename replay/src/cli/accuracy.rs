@@ -142,7 +142,7 @@ fn measured(inputs: &Inputs<'_>) -> Result<AccuracyReport> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let progress = Progress::new("measuring", STUDIES.len() as u64, "studies");
     let mut studies = Vec::new();
-    for study in &STUDIES {
+    for study in STUDIES {
         let choices = pool.install(|| (study.measure)(inputs));
         let choices = choices.map_err(|error| anyhow!(error).context(study.title))?;
         progress.advance(1);

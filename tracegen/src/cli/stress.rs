@@ -23,7 +23,7 @@ pub struct StressArgs {
 }
 
 fn names() -> clap::builder::PossibleValuesParser {
-    SWEEPS.each_ref().map(|sweep| sweep.name).into()
+    SWEEPS.iter().map(|sweep| sweep.name).into()
 }
 
 /// Runs `tracegen stress`.

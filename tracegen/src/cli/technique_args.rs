@@ -125,11 +125,7 @@ fn variant_parser() -> impl TypedValueParser<Value = Variant> {
 }
 
 fn foveate_parser() -> impl TypedValueParser<Value = FoveationKind> {
-    choice(
-        MODES
-            .each_ref()
-            .map(|mode| (mode.name, mode.kind, mode.help)),
-    )
+    choice(MODES.iter().map(|mode| (mode.name, mode.kind, mode.help)))
 }
 
 fn culling_parser() -> impl TypedValueParser<Value = Culling> {

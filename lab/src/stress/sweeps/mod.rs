@@ -34,7 +34,7 @@ const fn sweep(
 }
 
 /// Every sweep, in the order in which they run.
-pub const SWEEPS: [Sweep; 14] = [
+pub const SWEEPS: &[Sweep] = &[
     sweep(
         "translation",
         "A unit sphere at 0 to 10^7 m on each axis, by its node (glTF) and by its vertices (OBJ), against the same at 0.",

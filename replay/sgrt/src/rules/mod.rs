@@ -25,7 +25,7 @@ use std::fmt;
 use std::str::FromStr;
 
 /// All rules, in the order in which combinations are printed.
-pub static RULES: [&RuleKind; 10] = [
+pub static RULES: &[&RuleKind] = &[
     &depth::RULE,
     &row::RULE,
     &object::RULE,

@@ -40,7 +40,7 @@ const fn tangents(left: f32, right: f32, up: f32, down: f32) -> FovTangents {
 
 /// The first one is the default.
 #[rustfmt::skip]
-pub(super) const ROWS: [Preset; 10] = [
+pub(super) const ROWS: &[Preset] = &[
     Preset {
         name: "symmetric-100", eye_size_px: [960, 1080], cant_deg: 0.0,
         fov: Fov::SymmetricDeg(100.0),

@@ -35,7 +35,7 @@ pub struct Mode {
 }
 
 /// The foveation techniques.
-pub static MODES: [Mode; 4] = [
+pub static MODES: &[Mode] = &[
     Mode {
         kind: FoveationKind::Rings,
         name: "rings",
