@@ -9,8 +9,8 @@ mod schemas;
 
 pub use report::notices;
 pub use sim::{
-    addresses, config, engine, line_list, memory, model_version, order, paper, preset, result,
-    size, stream,
+    addresses, config, engine, line_list, memory, model_version, order, paper, preset, registry,
+    result, size, stream,
 };
 pub use studies::{accuracy, compare, experiment, locality, orders_study, techniques};
 pub use {report, sgrt};

@@ -1,13 +1,12 @@
 //! Compares `docs/use/configuration.md` with the code. Keys, defaults, values and their meanings come from
 //! the types. `UPDATE_DOCS=1` rewrites the page; review the diff.
 
-use clap::ValueEnum;
 use replay::config::{
-    Allocation, Assign, BetweenFrames, CountBy, Hsr, Inclusion, LevelClients, Levels, Mode, Order,
-    PrefetchConfig, Prefetching, Replacement, RunConfig, TmuModel,
+    Allocation, Assign, CountBy, FrameConfig, FrameMachine, Hsr, Inclusion, Key, LevelClients,
+    Levels, Mode, Order, PrefetchConfig, Prefetching, Replacement, RunConfig, TmuConfig, TmuModel,
 };
-use replay::config::{FrameConfig, FrameMachine};
 use replay::memory::dram::{DramConfig, DramPreset, Mapping, PagePolicy};
+use replay::registry::Choice;
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -66,8 +65,11 @@ struct Item {
 
 /// The items of `pub struct name` or `pub enum name`, searched in all sources.
 fn items(sources: &str, name: &str) -> Vec<Item> {
-    let head = ["struct", "enum"].map(|kind| format!("pub {kind} {name} {{\n"));
-    let start = head.iter().find_map(|h| Some(sources.find(h)? + h.len()));
+    let head = ["struct", "enum"].map(|kind| format!("pub {kind} {name} "));
+    let start = head.iter().find_map(|head| {
+        let head = sources.find(head)?;
+        Some(head + sources[head..].find("{\n")? + 2)
+    });
     let body = &sources[start.unwrap_or_else(|| panic!("no type {name}"))..];
     let (mut items, mut about, mut renamed) = (Vec::new(), String::new(), None);
     let mut is_key = true;
@@ -107,15 +109,10 @@ fn kebab(variant: &str) -> String {
 
 /// Names and meanings of a type's values; empty for numbers and flags.
 fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
-    fn of<T: ValueEnum>() -> Vec<(String, String)> {
-        let variants = T::value_variants().iter();
-        let possible = variants.filter_map(ValueEnum::to_possible_value);
-        possible
-            .map(|v| {
-                let help = v.get_help().map(ToString::to_string);
-                (v.get_name().to_owned(), help.unwrap_or_default())
-            })
-            .collect()
+    fn of<T: Choice>() -> Vec<(String, String)> {
+        let values = T::choices().iter();
+        let named = values.map(|value| (value.choice_name().to_owned(), value.help().to_owned()));
+        named.collect()
     }
     match type_name {
         "Order" => of::<Order>(),
@@ -191,6 +188,24 @@ fn range(key: &str) -> Option<String> {
         })
 }
 
+/// The default of a key that the serialised default may omit.
+fn default_of(key: &str) -> Option<Value> {
+    fn find<T: Default>(keys: &[Key<T>], key: &str) -> Option<Value> {
+        let (_, value) = keys.iter().find(|(other, _)| *other == key)?;
+        Value::try_from(value(&T::default())).ok()
+    }
+    find(RunConfig::KEYS, key)
+        .or_else(|| find(TmuConfig::KEYS, key))
+        .or_else(|| find(FrameConfig::KEYS, key))
+        .or_else(|| match key {
+            "level.sectors" => Some(Value::Integer(1)),
+            "level.victim_lines" => Some(Value::Integer(0)),
+            "level.inclusion" => Value::try_from(Inclusion::default()).ok(),
+            "level.clients" => Value::try_from(LevelClients::default()).ok(),
+            _ => None,
+        })
+}
+
 /// Adds a line for every key of a type, and the keys of the types in it.
 fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page: &mut String) {
     for item in items(sources, type_name) {
@@ -200,7 +215,8 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
             .split_once(": ")
             .unwrap();
         let key = format!("{prefix}{name}");
-        let kind = kind.trim_end_matches(',');
+        let kind = kind.trim_end_matches([',', ';']);
+        let (kind, _) = kind.split_once(" = ").unwrap_or((kind, ""));
         let kind = kind
             .strip_prefix("Option<")
             .map_or(kind, |k| k.trim_end_matches('>'));
@@ -219,23 +235,7 @@ fn describe(sources: &str, type_name: &str, prefix: &str, defaults: &Table, page
             describe(sources, "LevelConfig", &format!("{key}."), inner, page);
             continue;
         }
-        // Keys that the serialised default omits.
-        let left_out = match &*key {
-            "hsr" => Value::try_from(Hsr::default()).ok(),
-            "between_frames" => Value::try_from(BetweenFrames::default()).ok(),
-            "count_by" => Value::try_from(CountBy::default()).ok(),
-            "tile_px" => Some(Value::Integer(16)),
-            "frame.color_compressed_permille" => Some(Value::Integer(1000)),
-            "tmu.fifo_footprints" => Some(Value::Integer(64)),
-            "tmu.l2_mshrs" => Some(Value::Integer(0)),
-            _ => match name {
-                "sectors" => Some(Value::Integer(1)),
-                "victim_lines" => Some(Value::Integer(0)),
-                "inclusion" => Value::try_from(Inclusion::default()).ok(),
-                "clients" => Value::try_from(LevelClients::default()).ok(),
-                _ => None,
-            },
-        };
+        let left_out = default_of(&key);
         let default = default.or(left_out.as_ref());
         let default = match default {
             _ if key == "level.size_bytes" => "required".to_owned(),

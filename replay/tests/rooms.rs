@@ -9,9 +9,10 @@ const CRATES: [(&str, &[&[&str]]); 2] = [
     (
         "sim",
         &[
-            // `add_fields` is the macro of `sums`.
+            // `add_fields` is the macro of `sums`, `choices` that of `registry`.
             &[
                 "add_fields",
+                "choices",
                 "model_version",
                 "palette",
                 "registry",

@@ -1,9 +1,11 @@
 //! Columns that identify a row in any file: trace, image size, and every configuration key. Rows of several
 //! files can be joined by them.
 
-use super::columns::{Columns, PointColumn, Value, columns_of, name};
+use super::columns::{Cell, Columns, PointColumn, Value, columns_of, name};
 use formats::texture::Sampler;
-use sim::config::{LevelConfig, RunConfig};
+use serde_json::Value as Json;
+use sim::config::{FrameConfig, Key, LevelConfig, RunConfig, TmuConfig};
+use sim::memory::dram::DramConfig;
 use sim::model_version::MODEL_VERSION;
 use studies::experiment::{ResultRow, plain, scene_label};
 
@@ -39,15 +41,38 @@ fn max_anisotropy(row: &ResultRow) -> Option<u64> {
     chosen.or(isotropic.then_some(1)).map(u64::from)
 }
 
-/// Every configuration key, as listed in docs/use/configuration.md.
-#[rustfmt::skip]
-pub fn config<'a>() -> Vec<PointColumn<'a>> {
-    fn key<'a, V: super::columns::Cell + 'static>(
-        key: &'static str,
-        value: fn(&RunConfig) -> V,
-    ) -> PointColumn<'a> {
-        PointColumn::text(key, key, move |r: &ResultRow| value(&r.point.config))
+/// The column of a key. `default` gives its type.
+fn cell<'a>(
+    key: &'static str,
+    default: &Json,
+    value: impl Fn(&RunConfig) -> Option<Json> + 'static,
+) -> PointColumn<'a> {
+    let of = move |r: &ResultRow| value(&r.point.config);
+    match default {
+        Json::Bool(_) => PointColumn::text(key, key, move |r| of(r)?.as_bool()),
+        Json::Number(_) => PointColumn::text(key, key, move |r| of(r)?.as_u64()),
+        _ => PointColumn::text(key, key, move |r| of(r)?.as_str().map(str::to_owned)),
     }
+}
+
+/// The columns of a table of the configuration.
+fn table<'a, T: Default + 'static>(
+    keys: &'static [Key<T>],
+    of: fn(&RunConfig) -> Option<T>,
+) -> Vec<PointColumn<'a>> {
+    let columns = keys
+        .iter()
+        .map(|&(key, value)| cell(key, &value(&T::default()), move |c| Some(value(&of(c)?))));
+    columns.collect()
+}
+
+fn key<'a, V: Cell + 'static>(key: &'static str, value: fn(&RunConfig) -> V) -> PointColumn<'a> {
+    PointColumn::text(key, key, move |r: &ResultRow| value(&r.point.config))
+}
+
+/// The columns of the levels: keys of the L1 and the L2, and a text for those below.
+#[rustfmt::skip]
+fn levels<'a>() -> Vec<PointColumn<'a>> {
     fn cache<'a>(keys: [&'static str; 5], level: fn(&RunConfig) -> &LevelConfig) -> [PointColumn<'a>; 5] {
         let [size_bytes, ways, replacement, sectors, victim_lines] = keys;
         let of = move |r: &ResultRow| *level(&r.point.config);
@@ -59,75 +84,64 @@ pub fn config<'a>() -> Vec<PointColumn<'a>> {
             PointColumn::text(victim_lines, victim_lines, move |r: &ResultRow| of(r).victim_lines),
         ]
     }
-    let mut columns = vec![
-        key("mode", |c| name(&c.mode)),
-        PointColumn::text("order", "order", |r| {
-            let order = r.point.config.order;
-            Value::Named(order.name(), order.title())
-        }),
-        key("seed", |c| c.seed),
-        key("cores", |c| c.cores),
-        key("assign", |c| name(&c.assign)),
-        key("line_bytes", |c| c.line_bytes),
-    ];
+    let mut columns = Vec::new();
     columns.extend(cache(["l1.size_bytes", "l1.ways", "l1.replacement", "l1.sectors", "l1.victim_lines"], |c| &c.level.l1));
     columns.extend(cache(["l2.size_bytes", "l2.ways", "l2.replacement", "l2.sectors", "l2.victim_lines"], |c| &c.level.l2));
     columns.extend([
-        key("l2.inclusion", |c| name(&c.level.l2.inclusion)),
+        key("l2.inclusion", |c| c.level.l2.inclusion.name()),
         key("l2.shared", |c| c.level.l2.shared),
         key("l2.hit_cycles", |c| c.level.l2.hit_cycles),
         key("level", |c| c.level.lower_text(c.line_bytes)),
-        key("memory_cycles", |c| c.memory_cycles),
-        key("sampling.filter", |c| name(&c.sampling.filter)),
-        key("sampling.lod_bias", |c| c.sampling.lod_bias),
-        key("sampling.lod", |c| name(&c.sampling.lod)),
-        key("sampling.helper_lanes", |c| c.sampling.helper_lanes),
-        PointColumn::text("sampling.max_anisotropy", "sampling.max_anisotropy", max_anisotropy),
-        key("sampling.anisotropy", |c| name(&c.sampling.anisotropy)),
-        key("layout.texel_format", |c| c.layout.texel_format.as_ref().map(name)),
-        key("layout.block_order", |c| name(&c.layout.block_order)),
-        key("layout.shadow_map_order", |c| name(&c.layout.shadow_map_order)),
-        key("layout.base_align_bytes", |c| c.layout.base_align_bytes),
-        key("layout.texture_order", |c| name(&c.layout.texture_order)),
-        key("tmu.model", |c| name(&c.tmu.model)),
-        key("tmu.loop_cycles", |c| c.tmu.loop_cycles),
-        key("tmu.threads", |c| c.tmu.threads),
-        key("tmu.retry_footprints", |c| c.tmu.retry_footprints),
-        key("tmu.fetches_per_trip", |c| c.tmu.fetches_per_trip),
-        key("tmu.allocation", |c| name(&c.tmu.allocation)),
-        key("tmu.l2_mshrs", |c| c.tmu.l2_mshrs),
-        key("tmu.fifo_footprints", |c| c.tmu.fifo_footprints),
-        key("tile_px", |c| c.tile_px),
-        key("tile_maps", |c| c.tile_maps),
-        key("count_by", |c| name(&c.count_by)),
-        key("hsr", |c| name(&c.hsr)),
-        key("between_frames", |c| name(&c.between_frames)),
-        key("prefetch.prefetcher", |c| c.prefetch.map(|p| p.prefetcher.name())),
-        key("prefetch.lines", |c| c.prefetch.map(|p| p.lines())),
-        key("dram.preset", |c| c.dram.map(|dram| name(&dram.preset))),
-        key("dram.channels", |c| c.dram.map(|dram| dram.channels)),
-        key("dram.mapping", |c| c.dram.map(|dram| name(&dram.mapping))),
-        key("dram.page_policy", |c| c.dram.map(|dram| name(&dram.page_policy))),
-        key("dram.queue", |c| c.dram.map(|dram| dram.queue)),
-        key("dram.core_mhz", |c| c.dram.map(|dram| dram.core_mhz)),
-        key("frame.machine", |c| c.frame.map(|frame| name(&frame.machine))),
-        key("frame.multiview", |c| c.frame.map(|frame| frame.multiview)),
-        key("frame.composition", |c| c.frame.map(|frame| frame.composition)),
-        key("frame.color_bytes", |c| c.frame.map(|frame| frame.color_bytes)),
-        key("frame.color_compressed_permille", |c| c.frame.map(|frame| frame.color_compressed_permille)),
-        key("frame.depth_bytes", |c| c.frame.map(|frame| frame.depth_bytes)),
-        key("frame.g_buffer_bytes", |c| c.frame.map(|frame| frame.g_buffer_bytes)),
-        key("frame.samples", |c| c.frame.map(|frame| frame.samples)),
-        key("frame.store_depth", |c| c.frame.map(|frame| frame.store_depth)),
-        key("frame.line_bytes", |c| c.frame.map(|frame| frame.line_bytes)),
-        key("frame.post_transform_entries", |c| c.frame.map(|frame| frame.post_transform_entries)),
-        key("frame.vertex_cache_bytes", |c| c.frame.map(|frame| frame.vertex_cache_bytes)),
-        key("frame.varying_bytes", |c| c.frame.map(|frame| frame.varying_bytes)),
-        key("frame.shaded_vertex_cache_bytes", |c| c.frame.map(|frame| frame.shaded_vertex_cache_bytes)),
-        key("frame.list_entry_bytes", |c| c.frame.map(|frame| frame.list_entry_bytes)),
-        key("frame.pixel_cache_bytes", |c| c.frame.map(|frame| frame.pixel_cache_bytes)),
     ]);
     columns
+}
+
+/// Every configuration key, as listed in docs/use/configuration.md.
+pub fn config<'a>() -> Vec<PointColumn<'a>> {
+    let defaults = RunConfig::default();
+    let columns = RunConfig::KEYS.iter().map(|&(of_run, value)| match of_run {
+        "order" => vec![PointColumn::text("order", "order", |r| {
+            let order = r.point.config.order;
+            Value::Named(order.name(), order.title())
+        })],
+        "level" => levels(),
+        "sampling" => vec![
+            key("sampling.filter", |c| name(&c.sampling.filter)),
+            key("sampling.lod_bias", |c| c.sampling.lod_bias),
+            key("sampling.lod", |c| name(&c.sampling.lod)),
+            key("sampling.helper_lanes", |c| c.sampling.helper_lanes),
+            PointColumn::text(
+                "sampling.max_anisotropy",
+                "sampling.max_anisotropy",
+                max_anisotropy,
+            ),
+            key("sampling.anisotropy", |c| name(&c.sampling.anisotropy)),
+        ],
+        "layout" => vec![
+            key("layout.texel_format", |c| {
+                c.layout.texel_format.as_ref().map(name)
+            }),
+            key("layout.block_order", |c| name(&c.layout.block_order)),
+            key("layout.shadow_map_order", |c| {
+                name(&c.layout.shadow_map_order)
+            }),
+            key("layout.base_align_bytes", |c| c.layout.base_align_bytes),
+            key("layout.texture_order", |c| name(&c.layout.texture_order)),
+        ],
+        "tmu" => table(TmuConfig::KEYS, |c| Some(c.tmu)),
+        "prefetch" => vec![
+            key("prefetch.prefetcher", |c| {
+                c.prefetch.map(|p| p.prefetcher.name())
+            }),
+            key("prefetch.lines", |c| c.prefetch.map(|p| p.lines())),
+        ],
+        "dram" => table(DramConfig::KEYS, |c| c.dram),
+        "frame" => table(FrameConfig::KEYS, |c| c.frame),
+        // Not a key of configuration files.
+        "timeline" => Vec::new(),
+        _ => vec![cell(of_run, &value(&defaults), move |c| Some(value(c)))],
+    });
+    columns.flatten().collect()
 }
 
 /// The key that this row changes, if any.

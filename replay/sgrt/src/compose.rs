@@ -15,43 +15,14 @@
 use super::accuracy::position_error_px;
 use super::detect::Decision;
 use super::frame::{Frame, add};
-use clap::ValueEnum;
 use formats::view::Eye;
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
-/// What a right pixel reuses from a left one.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    PartialOrd,
-    Ord,
-    Hash,
-    Serialize,
-    Deserialize,
-    ValueEnum,
-)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(rename_all = "lowercase")]
-pub enum Reuse {
-    /// The primary hit; shadow rays are traced again.
-    #[default]
-    Primary,
-    /// Also the results of its shadow rays.
-    Shadow,
-    /// Also the final colour, if the material looks the same from everywhere.
-    Color,
-    /// The final colour, reflections and refractions included.
-    Pixel,
-}
-
-impl Reuse {
-    /// All levels, in increasing order.
-    pub const ALL: [Self; 4] = [Self::Primary, Self::Shadow, Self::Color, Self::Pixel];
+sim::choices! { Reuse = "What a right pixel reuses from a left one.", default Primary:
+    Primary = "primary", "The primary hit; shadow rays are traced again.";
+    Shadow = "shadow", "Also the results of its shadow rays.";
+    Color = "color", "Also the final colour, if the material looks the same from everywhere.";
+    Pixel = "pixel", "The final colour, reflections and refractions included.";
 }
 
 /// Maximum distance between the reused and the true hit to count as the same spot, in pixels.

@@ -2,26 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The model of the units' time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum Timing {
-    /// The scarcest resource of each tile determines its time
-    #[default]
-    ClosedForm,
-    /// Every ray is simulated cycle by cycle; needs a trace with visits
-    Cycle,
-}
-
-impl Timing {
-    /// Name on the command line and in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ClosedForm => "closed-form",
-            Self::Cycle => "cycle",
-        }
-    }
+sim::choices! { Timing = "The model of the units' time.", default ClosedForm:
+    ClosedForm = "closed-form", "The scarcest resource of each tile determines its time";
+    Cycle = "cycle", "Every ray is simulated cycle by cycle; needs a trace with visits";
 }
 
 /// The cycle-level model beside the closed form.

@@ -7,10 +7,10 @@ mod frame;
 mod level;
 mod levels;
 mod prefetch;
+mod rows;
 mod tmu;
 
 use crate::memory::dram::DramConfig;
-use serde::{Deserialize, Serialize};
 
 pub use crate::memory::Replacement;
 pub use crate::order::Order;
@@ -28,178 +28,94 @@ pub use frame::{FrameConfig, FrameMachine};
 pub use level::{Inclusion, LevelClients, LevelConfig};
 pub use levels::Levels;
 pub use prefetch::{PrefetchConfig, Prefetching};
+pub use rows::Key;
+pub(crate) use rows::settings;
 pub use tmu::{Allocation, TmuConfig, TmuModel};
 
-/// How time is modelled.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum Mode {
-    /// Each core's texture unit (`tmu.model`) has a clock. The clocks decide how the cores' accesses interleave.
-    #[default]
-    Timed,
-    /// No latencies: each footprint takes one unit of time and misses fill immediately.
-    Functional,
+crate::choices! { #[non_exhaustive] Mode = "How time is modelled.", default Timed:
+    Timed = "timed", "Each core's texture unit (`tmu.model`) has a clock. The clocks decide how the cores' accesses interleave.";
+    Functional = "functional", "No latencies: each footprint takes one unit of time and misses fill immediately.";
 }
 
-impl Mode {
-    /// Name in configuration files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Timed => "timed",
-            Self::Functional => "functional",
-        }
-    }
+crate::choices! { #[non_exhaustive] Assign = "How work items are assigned to cores.", default FirstIdle:
+    FirstIdle = "first-idle", "The next item goes to the first idle core.";
+    Static = "static", "Round robin (with LRTA and two cores: left tiles on core 0, right tiles on core 1).";
 }
 
-/// How work items are assigned to cores.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum Assign {
-    /// The next item goes to the first idle core.
-    #[default]
-    FirstIdle,
-    /// Round robin (with LRTA and two cores: left tiles on core 0, right tiles on core 1).
-    Static,
+crate::choices! { #[non_exhaustive] Hsr = "Which of the covered fragments are shaded.", default EarlyZ:
+    None = "none", "All of them. Needs a trace captured without the depth test.";
+    EarlyZ = "early-z", "Those that pass the depth test when drawn, as recorded in the trace.";
+    Deferred = "deferred", "Per pixel, the last opaque fragment and the fragments blended over it, as in tile-based deferred renderers.";
 }
 
-/// Which of the covered fragments are shaded.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum Hsr {
-    /// All of them. Needs a trace captured without the depth test.
-    None,
-    /// Those that pass the depth test when drawn, as recorded in the trace.
-    #[default]
-    EarlyZ,
-    /// Per pixel, the last opaque fragment and the fragments blended over it, as in tile-based deferred renderers.
-    Deferred,
+crate::choices! { CountBy = "What counts are broken down by, in addition to views and tiles.", default Texture:
+    Texture = "texture", "Textures and mip levels.";
+    Draw = "draw", "Draws.";
 }
 
-impl Hsr {
-    fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
-/// What counts are broken down by, in addition to views and tiles.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum CountBy {
-    /// Textures and mip levels.
-    #[default]
-    Texture,
-    /// Draws.
-    Draw,
-}
-
-impl CountBy {
-    fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
-fn is_zero(value: &u32) -> bool {
-    *value == 0
+/// True for a default, which files and results omit.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 fn is_recorded_tile(tile_px: &u32) -> bool {
     *tile_px == TILE_SIZE_PX
 }
 
-/// The complete configuration of a replay.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields, default)]
-pub struct RunConfig {
-    /// How time is modelled.
-    pub mode: Mode,
-    /// Tile order.
-    pub order: Order,
-    /// Seed of the random tile order and of random replacement.
-    pub seed: u64,
-    /// Shader cores, each with its own L1 and texture unit.
-    pub cores: u32,
-    /// Assignment of tiles to cores.
-    pub assign: Assign,
-    /// Line size of the L1 and the L2 in bytes, a power of two.
-    pub line_bytes: u32,
-    /// Cache levels, two to six, the L1 first.
-    pub level: Levels,
-    /// Cycles in which a line travels from memory to the last level.
-    pub memory_cycles: u32,
-    /// Filter and level of detail.
-    #[cfg_attr(feature = "testing", schemars(with = "crate::schemas::Sampling"))]
-    pub sampling: SamplingConfig,
-    /// Memory layout of the textures.
-    #[cfg_attr(feature = "testing", schemars(with = "crate::schemas::Layout"))]
-    pub layout: LayoutConfig,
-    /// Texture unit.
-    pub tmu: TmuConfig,
-    /// Width and height of a tile in pixels. Sizes other than the recorded 16 regroup the recorded tiles.
-    #[serde(skip_serializing_if = "is_recorded_tile")]
-    pub tile_px: u32,
-    /// Also count per tile.
-    pub tile_maps: bool,
-    /// What counts are broken down by, in addition to views and tiles.
-    #[serde(skip_serializing_if = "CountBy::is_default")]
-    pub count_by: CountBy,
-    /// Also record when each core works on which tiles (timed mode, `--timeline`); not a key of
-    /// configuration files.
-    #[serde(skip)]
-    pub timeline: bool,
-    /// Hidden-surface removal. Results name it if it is not the default.
-    #[serde(skip_serializing_if = "Hsr::is_default")]
-    pub hsr: Hsr,
-    /// Cache contents between frames. Results name it if it is not the default.
-    #[serde(skip_serializing_if = "BetweenFrames::is_default")]
-    pub between_frames: BetweenFrames,
-    /// The prefetcher of the L2. Without it, only requested lines are fetched.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub prefetch: Option<PrefetchConfig>,
-    /// The DRAM model below the caches. Without it, lines from memory are only counted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub dram: Option<DramConfig>,
-    /// The machine around the texture units. Without it, only texture traffic is counted.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub frame: Option<FrameConfig>,
-}
-
-impl Default for RunConfig {
-    fn default() -> Self {
-        Self {
-            mode: Mode::Timed,
-            order: Order::MORTON,
-            seed: 1,
-            cores: 2,
-            assign: Assign::FirstIdle,
-            line_bytes: 16,
-            level: Levels::default(),
-            memory_cycles: 200,
-            sampling: SamplingConfig::default(),
-            layout: LayoutConfig::default(),
-            tmu: TmuConfig::default(),
-            tile_px: TILE_SIZE_PX,
-            tile_maps: false,
-            count_by: CountBy::Texture,
-            timeline: false,
-            hsr: Hsr::EarlyZ,
-            between_frames: BetweenFrames::Keep,
-            prefetch: None,
-            dram: None,
-            frame: None,
-        }
+settings! {
+    /// The complete configuration of a replay.
+    pub struct RunConfig in "" {
+        /// How time is modelled.
+        pub mode: Mode = Mode::Timed;
+        /// Tile order.
+        pub order: Order = Order::MORTON;
+        /// Seed of the random tile order and of random replacement.
+        pub seed: u64 = 1;
+        /// Shader cores, each with its own L1 and texture unit.
+        pub cores: u32 = 2, in 1..=64;
+        /// Assignment of tiles to cores.
+        pub assign: Assign = Assign::FirstIdle;
+        /// Line size of the L1 and the L2 in bytes, a power of two.
+        pub line_bytes: u32 = 16;
+        /// Cache levels, two to six, the L1 first.
+        pub level: Levels = Levels::default();
+        /// Cycles in which a line travels from memory to the last level.
+        pub memory_cycles: u32 = 200, in 0..=100_000;
+        /// Filter and level of detail.
+        #[cfg_attr(feature = "testing", schemars(with = "crate::schemas::Sampling"))]
+        pub sampling: SamplingConfig = SamplingConfig::default();
+        /// Memory layout of the textures.
+        #[cfg_attr(feature = "testing", schemars(with = "crate::schemas::Layout"))]
+        pub layout: LayoutConfig = LayoutConfig::default();
+        /// Texture unit.
+        pub tmu: TmuConfig = TmuConfig::default();
+        /// Width and height of a tile in pixels. Sizes other than the recorded 16 regroup the recorded tiles.
+        #[serde(skip_serializing_if = "is_recorded_tile")]
+        pub tile_px: u32 = TILE_SIZE_PX;
+        /// Also count per tile.
+        pub tile_maps: bool = false;
+        /// What counts are broken down by, in addition to views and tiles.
+        #[serde(skip_serializing_if = "is_default")]
+        pub count_by: CountBy = CountBy::Texture;
+        /// Also record when each core works on which tiles (timed mode, `--timeline`); not a key of
+        /// configuration files.
+        #[serde(skip)]
+        pub timeline: bool = false;
+        /// Hidden-surface removal. Results name it if it is not the default.
+        #[serde(skip_serializing_if = "is_default")]
+        pub hsr: Hsr = Hsr::EarlyZ;
+        /// Cache contents between frames. Results name it if it is not the default.
+        #[serde(skip_serializing_if = "is_default")]
+        pub between_frames: BetweenFrames = BetweenFrames::Keep;
+        /// The prefetcher of the L2. Without it, only requested lines are fetched.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub prefetch: Option<PrefetchConfig> = None;
+        /// The DRAM model below the caches. Without it, lines from memory are only counted.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub dram: Option<DramConfig> = None;
+        /// The machine around the texture units. Without it, only texture traffic is counted.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub frame: Option<FrameConfig> = None;
     }
 }
 
@@ -241,8 +157,7 @@ impl RunConfig {
             "a power of two from 16 (the largest block) to 4096",
             self.line_bytes,
         )?;
-        in_range("cores", self.cores, 1..=64)?;
-        in_range("memory_cycles", self.memory_cycles, 0..=100_000)?;
+        self.check_ranges()?;
         accept(
             matches!(self.tile_px, 8 | 16 | 32 | 64),
             "tile_px",
@@ -278,7 +193,7 @@ impl RunConfig {
         )?;
         self.dram.as_ref().map_or(Ok(()), DramConfig::check)?;
         self.frame.as_ref().map_or(Ok(()), FrameConfig::check)?;
-        self.tmu.check()?;
+        self.tmu.check_ranges()?;
         self.level.check(self.line_bytes, self.cores)?;
         let prefetch = self.prefetch.as_ref();
         prefetch.map_or(Ok(()), |prefetch| prefetch.check(self.mode))

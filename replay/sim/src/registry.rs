@@ -2,13 +2,12 @@
 //!
 //! Configurations, results, command-line flags, their help and error messages all derive from the table.
 
-use clap::builder::PossibleValue;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 use std::fmt;
 use std::hash::{Hash, Hasher};
 
 /// A row of a table.
-pub trait Row: fmt::Debug + Sized + 'static {
+pub trait Row: fmt::Debug + Sized + Sync + 'static {
     /// Name in configurations, results and flags; unique in its table.
     fn name(&self) -> &'static str;
     /// One line of help.
@@ -121,14 +120,79 @@ impl<'de, R: Row> Deserialize<'de> for Named<R> {
     }
 }
 
-impl<R: Row> clap::ValueEnum for Named<R> {
-    fn value_variants<'a>() -> &'a [Self] {
+/// A type whose values a user picks by name.
+pub trait Choice: Copy + Send + Sync + 'static {
+    /// Every value with a name of its own, in display order.
+    fn choices() -> &'static [Self];
+    /// Name in configurations, results and flags.
+    fn choice_name(self) -> &'static str;
+    /// One line of help.
+    fn help(self) -> &'static str;
+}
+
+impl<R: Row> Choice for Named<R> {
+    fn choices() -> &'static [Self] {
         R::table()
     }
 
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.name()).help(self.0.help()))
+    fn choice_name(self) -> &'static str {
+        self.name()
     }
+
+    fn help(self) -> &'static str {
+        self.0.help()
+    }
+}
+
+/// Defines an enum whose values a user picks by name: its meaning, and a row per value with its name and its help.
+#[macro_export]
+macro_rules! choices {
+    ($(#[$meta:meta])* $type:ident = $about:tt $(, default $default:ident)?:
+        $($variant:ident = $name:tt, $help:tt;)+
+    ) => {
+        #[doc = $about]
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, serde::Serialize, serde::Deserialize)]
+        #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
+        pub enum $type {
+            $(#[doc = $help] #[serde(rename = $name)] $variant,)+
+        }
+
+        $(impl Default for $type {
+            fn default() -> Self {
+                Self::$default
+            }
+        })?
+
+        impl $type {
+            /// Every value, in display order.
+            pub const ALL: [Self; [$($name),+].len()] = [$(Self::$variant),+];
+
+            /// Name in configurations, results and flags.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name,)+
+                }
+            }
+        }
+
+        impl $crate::registry::Choice for $type {
+            fn choices() -> &'static [Self] {
+                &Self::ALL
+            }
+
+            fn choice_name(self) -> &'static str {
+                self.name()
+            }
+
+            fn help(self) -> &'static str {
+                let help = match self {
+                    $(Self::$variant => $help,)+
+                };
+                help.trim_end_matches('.')
+            }
+        }
+    };
 }
 
 /// Implements [`Row`] for a type with the fields `name` and `help`, and defines one constant per row.

@@ -1,5 +1,6 @@
 //! Flags that set the machine. Flags override `--config`, which overrides the defaults.
 
+use super::choice::choice;
 use super::order_arg::OrderParser;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
@@ -39,13 +40,13 @@ pub struct ConfigArgs {
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
     /// Named machine instead of the defaults; flags override it
-    #[arg(long, conflicts_with = "config")]
+    #[arg(long, value_parser = choice::<Preset>(), conflicts_with = "config")]
     preset: Option<Preset>,
     /// Tile order: a name, or parts as in zig-zag+sta+offset+boustro (docs/models/orders.md)
     #[arg(long, value_parser = OrderParser)]
     order: Option<Order>,
     /// Model: texture units with timing, or cache counts only
-    #[arg(long)]
+    #[arg(long, value_parser = choice::<Mode>())]
     mode: Option<Mode>,
     /// Size of the L1 of each core
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes)]
@@ -66,7 +67,7 @@ pub struct ConfigArgs {
     #[arg(long, value_name = "N", hide_short_help = true)]
     l2_ways: Option<u32>,
     /// Replacement policy of L1 and L2
-    #[arg(long)]
+    #[arg(long, value_parser = choice::<Replacement>())]
     replacement: Option<Replacement>,
     /// Line size of L1 and L2
     #[arg(long, value_name = "SIZE", value_parser = parse_bytes, hide_short_help = true)]
@@ -75,20 +76,20 @@ pub struct ConfigArgs {
     #[arg(long, value_name = "N")]
     cores: Option<u32>,
     /// Assignment of tiles to cores
-    #[arg(long, hide_short_help = true)]
+    #[arg(long, value_parser = choice::<Assign>(), hide_short_help = true)]
     assign: Option<Assign>,
     /// Seed of the random order and of random replacement
     #[arg(long, value_name = "N", hide_short_help = true)]
     seed: Option<u64>,
 
     /// Breakdown of the misses in --json; the table of `replay run` lists the parts with most misses
-    #[arg(long, value_name = "PARTS", hide_short_help = true)]
+    #[arg(long, value_parser = choice::<CountBy>(), value_name = "PARTS", hide_short_help = true)]
     count_by: Option<CountBy>,
     /// Width and height of a tile in pixels: 8, 16 (as recorded), 32 or 64
     #[arg(long, value_name = "PIXELS", hide_short_help = true)]
     tile_px: Option<u32>,
     /// Hidden-surface removal
-    #[arg(long, hide_short_help = true)]
+    #[arg(long, value_parser = choice::<Hsr>(), hide_short_help = true)]
     hsr: Option<Hsr>,
     /// State of the caches at the start of each frame of a trace: keep, flush, or lose-N, after which other work has
     /// filled N percent of each cache below the L1
@@ -96,14 +97,14 @@ pub struct ConfigArgs {
     between_frames: Option<BetweenFrames>,
 
     /// Prefetcher of the L2; `[prefetch]` of --config sets the number of lines
-    #[arg(long, value_name = "PREFETCHER", hide_short_help = true)]
+    #[arg(long, value_parser = choice::<Prefetching>(), value_name = "PREFETCHER", hide_short_help = true)]
     prefetch: Option<Prefetching>,
     /// DRAM below the caches: lpddr4, lpddr5, ddr4, gddr6; `[dram]` of --config sets the number of channels
     /// (2 by default)
     #[arg(long, value_name = "DEVICE", value_parser = named::<DramPreset>)]
     dram: Option<DramPreset>,
     /// Model the traffic of the whole frame on this machine; needs a trace captured with --geometry
-    #[arg(long, value_name = "MACHINE", hide_short_help = true)]
+    #[arg(long, value_parser = choice::<FrameMachine>(), value_name = "MACHINE", hide_short_help = true)]
     frame: Option<FrameMachine>,
 
     /// Texture filter, instead of the recorded one: trilinear, bilinear, nearest
@@ -156,7 +157,7 @@ pub struct ConfigArgs {
 
     /// How a thread waits for lines that are not in the L1
     #[arg(
-        long,
+        long, value_parser = choice::<TmuModel>(),
         value_name = "MODEL",
         help_heading = "Texture unit",
         hide_short_help = true
@@ -211,7 +212,7 @@ pub struct ConfigArgs {
     )]
     fetches_per_trip: Option<u32>,
     /// When a missing line is allocated in a cache
-    #[arg(long, help_heading = "Texture unit", hide_short_help = true)]
+    #[arg(long, value_parser = choice::<Allocation>(), help_heading = "Texture unit", hide_short_help = true)]
     allocation: Option<Allocation>,
 }
 

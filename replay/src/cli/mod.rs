@@ -3,6 +3,7 @@
 mod accuracy;
 mod addresses;
 mod calibrate;
+mod choice;
 mod compare;
 mod config_args;
 pub mod convert;

@@ -1,9 +1,10 @@
 //! Tile orders as arguments: names or lists of parts, one order or several.
 
+use super::choice::possible_values;
 use anyhow::{Result, bail};
 use clap::builder::{PossibleValue, TypedValueParser};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{Arg, Command, Error, ValueEnum};
+use clap::{Arg, Command, Error};
 use sim::config::Order;
 use sim::paper::z2;
 use std::ffi::OsStr;
@@ -45,8 +46,7 @@ impl TypedValueParser for OrderParser {
     }
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
-        let rows = Order::value_variants().iter();
-        Some(Box::new(rows.filter_map(ValueEnum::to_possible_value)))
+        Some(Box::new(possible_values::<Order>()))
     }
 }
 

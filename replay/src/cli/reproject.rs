@@ -1,6 +1,7 @@
 //! `replay reproject`: replays ray traces through a ray-tracing GPU model that reuses the left image for
 //! the right one.
 
+use super::choice::choice;
 use super::outputs::{self, PageOutputs};
 use super::reuse_args::ReuseArgs;
 use crate::files::{self, write_atomically};
@@ -46,7 +47,7 @@ pub struct ReprojectArgs {
     #[command(flatten)]
     reused: ReuseArgs,
     /// Model of the units' time
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_parser = choice::<Timing>(), default_value = "closed-form")]
     timing: Timing,
     /// Print the model parameters as TOML (the defaults with comments) and stop
     #[arg(long)]

@@ -1,5 +1,6 @@
 //! Options of the commands that reuse hits: rule, level of reuse and model parameters.
 
+use super::choice::choice;
 use anyhow::Context;
 use clap::Args;
 use sgrt::DEFAULT_RULE;
@@ -17,7 +18,7 @@ pub(super) struct ReuseArgs {
     #[arg(long, value_name = "RULE", help = rule_help())]
     rule: Option<Rule>,
     /// Values that a reprojected pixel reuses [default: primary]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = choice::<Reuse>())]
     reuse: Option<Reuse>,
     /// TOML file with model parameters; others keep their defaults
     #[arg(long, value_name = "TOML")]

@@ -20,10 +20,6 @@ pub enum BetweenFrames {
 }
 
 impl BetweenFrames {
-    pub(super) fn is_default(&self) -> bool {
-        *self == Self::default()
-    }
-
     /// True if all caches are emptied, for callers that do not simulate other work.
     ///
     /// # Errors

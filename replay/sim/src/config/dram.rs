@@ -1,6 +1,6 @@
 //! Checks of a `[dram]` table.
 
-use super::{ConfigError, accept, in_range};
+use super::{ConfigError, accept};
 use crate::memory::dram::DramConfig;
 
 impl DramConfig {
@@ -15,7 +15,6 @@ impl DramConfig {
             "a power of two up to 64",
             self.channels,
         )?;
-        in_range("dram.queue", self.queue, 1..=1024)?;
-        in_range("dram.core_mhz", self.core_mhz, 1..=100_000)
+        self.check_ranges()
     }
 }

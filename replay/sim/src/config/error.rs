@@ -8,6 +8,7 @@ use thiserror::Error;
 
 /// An invalid configuration.
 #[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
 pub enum ConfigError {
     /// The number of sets is not a power of two.
     #[error(

@@ -1,89 +1,51 @@
 //! The machine around the texture units: the `[frame]` table of a configuration.
 
-use super::{ConfigError, accept, in_range};
-use serde::{Deserialize, Serialize};
+use super::{ConfigError, accept, settings};
 
-/// How a frame is rendered.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum FrameMachine {
-    /// Tile by tile on chip. A G-buffer, if the scene needs one, stays in pixel-local storage.
-    #[default]
-    TileBased,
-    /// Tile by tile. The G-buffer is written to memory and read back.
-    TileBasedGBuffer,
-    /// Colour and depth go through their own caches; shaded vertices stay on chip.
-    Immediate,
-}
-
-/// The machine around the texture units, for the traffic of a whole frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields, default)]
-pub struct FrameConfig {
-    /// How the frame is rendered.
-    pub machine: FrameMachine,
-    /// Read and shade the vertices of both eyes once. Positions are still written per eye.
-    pub multiview: bool,
-    /// Compose layers, then read each picture in the lens warp and write the display's.
-    pub composition: bool,
-    /// Bytes per pixel of a colour attachment.
-    pub color_bytes: u32,
-    /// Size of colour pictures in memory after lossless compression, in thousandths of the
-    /// uncompressed size; `--picture` measures it. Not for an immediate machine.
-    #[serde(skip_serializing_if = "is_uncompressed")]
-    pub color_compressed_permille: u32,
-    /// Bytes per pixel of a depth attachment.
-    pub depth_bytes: u32,
-    /// Bytes per pixel of the G-buffer.
-    pub g_buffer_bytes: u32,
-    /// Samples per pixel. A tile-based machine resolves them on chip.
-    pub samples: u32,
-    /// Write the depth of pictures and layers to memory. Depth of shadow maps is always written.
-    pub store_depth: bool,
-    /// Line size in bytes of all caches except the texture caches.
-    pub line_bytes: u32,
-    /// Shaded vertices kept for reuse within a draw (first in, first out).
-    pub post_transform_entries: u32,
-    /// Size of the vertex fetch cache in bytes (4-way LRU).
-    pub vertex_cache_bytes: u64,
-    /// Bytes per shaded vertex in addition to its 16-byte position.
-    pub varying_bytes: u32,
-    /// Size of each core's cache for shaded vertices in bytes (4-way LRU).
-    pub shaded_vertex_cache_bytes: u64,
-    /// Bytes per entry of a primitive list.
-    pub list_entry_bytes: u32,
-    /// Size in bytes of the colour cache and of the depth cache of each core of an immediate
-    /// machine (4-way LRU, write-back).
-    pub pixel_cache_bytes: u64,
+settings! {
+    /// The machine around the texture units, for the traffic of a whole frame.
+    #[derive(Eq)]
+    pub struct FrameConfig in "frame." {
+        /// How the frame is rendered.
+        pub machine: FrameMachine = FrameMachine::TileBased;
+        /// Read and shade the vertices of both eyes once. Positions are still written per eye.
+        pub multiview: bool = false;
+        /// Compose layers, then read each picture in the lens warp and write the display's.
+        pub composition: bool = true;
+        /// Bytes per pixel of a colour attachment.
+        pub color_bytes: u32 = 4, in 1..=64;
+        /// Size of colour pictures in memory after lossless compression, in thousandths of the
+        /// uncompressed size; `--picture` measures it. Not for an immediate machine.
+        #[serde(skip_serializing_if = "is_uncompressed")]
+        pub color_compressed_permille: u32 = 1000, in 1..=1000;
+        /// Bytes per pixel of a depth attachment.
+        pub depth_bytes: u32 = 4, in 1..=64;
+        /// Bytes per pixel of the G-buffer.
+        pub g_buffer_bytes: u32 = 16, in 1..=64;
+        /// Samples per pixel. A tile-based machine resolves them on chip.
+        pub samples: u32 = 1;
+        /// Write the depth of pictures and layers to memory. Depth of shadow maps is always written.
+        pub store_depth: bool = false;
+        /// Line size in bytes of all caches except the texture caches.
+        pub line_bytes: u32 = 64;
+        /// Shaded vertices kept for reuse within a draw (first in, first out).
+        pub post_transform_entries: u32 = 32, in 3..=4096;
+        /// Size of the vertex fetch cache in bytes (4-way LRU).
+        pub vertex_cache_bytes: u64 = 8 << 10;
+        /// Bytes per shaded vertex in addition to its 16-byte position.
+        pub varying_bytes: u32 = 32, in 0..=1024;
+        /// Size of each core's cache for shaded vertices in bytes (4-way LRU).
+        pub shaded_vertex_cache_bytes: u64 = 16 << 10;
+        /// Bytes per entry of a primitive list.
+        pub list_entry_bytes: u32 = 4, in 1..=64;
+        /// Size in bytes of the colour cache and of the depth cache of each core of an immediate
+        /// machine (4-way LRU, write-back).
+        pub pixel_cache_bytes: u64 = 16 << 10;
+    }
 }
 
 fn is_uncompressed(permille: &u32) -> bool {
     *permille == 1000
-}
-
-impl Default for FrameConfig {
-    fn default() -> Self {
-        Self {
-            machine: FrameMachine::TileBased,
-            multiview: false,
-            composition: true,
-            color_bytes: 4,
-            color_compressed_permille: 1000,
-            depth_bytes: 4,
-            g_buffer_bytes: 16,
-            samples: 1,
-            store_depth: false,
-            line_bytes: 64,
-            post_transform_entries: 32,
-            vertex_cache_bytes: 8 << 10,
-            varying_bytes: 32,
-            shaded_vertex_cache_bytes: 16 << 10,
-            list_entry_bytes: 4,
-            pixel_cache_bytes: 16 << 10,
-        }
-    }
 }
 
 impl FrameConfig {
@@ -105,27 +67,7 @@ impl FrameConfig {
             "1, 2, 4 or 8",
             self.samples,
         )?;
-        for (key, value, least, most) in [
-            ("frame.color_bytes", self.color_bytes, 1, 64),
-            (
-                "frame.color_compressed_permille",
-                self.color_compressed_permille,
-                1,
-                1000,
-            ),
-            ("frame.depth_bytes", self.depth_bytes, 1, 64),
-            ("frame.g_buffer_bytes", self.g_buffer_bytes, 1, 64),
-            (
-                "frame.post_transform_entries",
-                self.post_transform_entries,
-                3,
-                4096,
-            ),
-            ("frame.varying_bytes", self.varying_bytes, 0, 1024),
-            ("frame.list_entry_bytes", self.list_entry_bytes, 1, 64),
-        ] {
-            in_range(key, value, least..=most)?;
-        }
+        self.check_ranges()?;
         accept(
             self.machine != FrameMachine::Immediate || self.color_compressed_permille == 1000,
             "frame.color_compressed_permille",
@@ -151,4 +93,10 @@ impl FrameConfig {
         }
         Ok(())
     }
+}
+
+crate::choices! { #[non_exhaustive] FrameMachine = "How a frame is rendered.", default TileBased:
+    TileBased = "tile-based", "Tile by tile on chip. A G-buffer, if the scene needs one, stays in pixel-local storage.";
+    TileBasedGBuffer = "tile-based-g-buffer", "Tile by tile. The G-buffer is written to memory and read back.";
+    Immediate = "immediate", "Colour and depth go through their own caches; shaded vertices stay on chip.";
 }

@@ -1,6 +1,6 @@
 //! One cache level: a `[[level]]` table of a configuration.
 
-use super::{ConfigError, MOST_LINES, MOST_SETS, accept, is_zero};
+use super::{ConfigError, MOST_LINES, MOST_SETS, accept, is_default};
 use crate::memory::Replacement;
 use crate::size::format_bytes;
 use serde::Serialize;
@@ -22,10 +22,10 @@ pub struct LevelConfig {
     #[serde(skip_serializing_if = "is_one")]
     pub sectors: u32,
     /// Lines of the fully associative victim cache next to it; 0: none.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "is_default")]
     pub victim_lines: u32,
     /// Which lines of the levels above this level holds.
-    #[serde(skip_serializing_if = "Inclusion::is_none")]
+    #[serde(skip_serializing_if = "is_default")]
     pub inclusion: Inclusion,
     /// Line size in bytes, only below the L2; default: that of the level above.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -35,7 +35,7 @@ pub struct LevelConfig {
     /// Cycles in which a line travels from this level to the level above; 0 for the L1.
     pub hit_cycles: u32,
     /// Whose lines it holds. Only used with a `[frame]` table.
-    #[serde(skip_serializing_if = "LevelClients::is_textures")]
+    #[serde(skip_serializing_if = "is_default")]
     pub clients: LevelClients,
 }
 
@@ -184,18 +184,9 @@ impl LevelConfig {
     }
 }
 
-/// Whose lines a level holds.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, serde::Deserialize, clap::ValueEnum,
-)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum LevelClients {
-    /// The texture units.
-    #[default]
-    Textures,
-    /// All clients of memory. Their own caches lie above this level. Writes pass through without allocation.
-    All,
+crate::choices! { #[non_exhaustive] LevelClients = "Whose lines a level holds.", default Textures:
+    Textures = "textures", "The texture units.";
+    All = "all", "All clients of memory. Their own caches lie above this level. Writes pass through without allocation.";
 }
 
 impl LevelClients {
@@ -205,20 +196,10 @@ impl LevelClients {
     }
 }
 
-/// Which lines of the levels above a level holds.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, serde::Deserialize, clap::ValueEnum,
-)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum Inclusion {
-    /// Levels evict independently.
-    #[default]
-    None,
-    /// All lines. A line that this level evicts is invalidated in the levels above.
-    Inclusive,
-    /// No lines. The level holds what the level above evicted, and a hit moves the line up. Not for the L2.
-    Exclusive,
+crate::choices! { #[non_exhaustive] Inclusion = "Which lines of the levels above a level holds.", default None:
+    None = "none", "Levels evict independently.";
+    Inclusive = "inclusive", "All lines. A line that this level evicts is invalidated in the levels above.";
+    Exclusive = "exclusive", "No lines. The level holds what the level above evicted, and a hit moves the line up. Not for the L2.";
 }
 
 impl Inclusion {

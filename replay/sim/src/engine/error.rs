@@ -7,6 +7,7 @@ use thiserror::Error;
 
 /// Reasons why a replay fails.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ReplayError {
     /// An impossible configuration.
     #[error(transparent)]

@@ -4,6 +4,7 @@ use thiserror::Error;
 
 /// Reasons why a trace's accesses cannot be read.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum StreamError {
     /// The trace file is damaged.
     #[error(transparent)]

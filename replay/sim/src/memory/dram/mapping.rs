@@ -1,23 +1,11 @@
 //! Address mapping: bursts to channel, bank, row and column.
 
 use super::presets::Device;
-use serde::{Deserialize, Serialize};
 
-/// Assignment of a burst number's bits, highest to lowest.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum Mapping {
-    /// Row, bank, column, channel: consecutive bursts alternate between channels, and a row holds adjacent bursts.
-    #[default]
-    RowBankColumnChannel,
-    /// Row, column, bank, channel: consecutive bursts lie in different banks.
-    RowColumnBankChannel,
-    /// As the default, with the bank XORed with the lowest row bits, so that rows a power of two
-    /// apart lie in different banks.
-    RowBankXorColumnChannel,
+crate::choices! { #[non_exhaustive] Mapping = "Assignment of a burst number's bits, highest to lowest.", default RowBankColumnChannel:
+    RowBankColumnChannel = "row-bank-column-channel", "Row, bank, column, channel: consecutive bursts alternate between channels, and a row holds adjacent bursts.";
+    RowColumnBankChannel = "row-column-bank-channel", "Row, column, bank, channel: consecutive bursts lie in different banks.";
+    RowBankXorColumnChannel = "row-bank-xor-column-channel", "As the default, with the bank XORed with the lowest row bits, so that rows a power of two apart lie in different banks.";
 }
 
 /// Location of a burst.

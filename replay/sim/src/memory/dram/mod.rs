@@ -21,53 +21,31 @@ pub use mapping::Mapping;
 pub use presets::{Device, DramPreset};
 pub use result::DramResult;
 
+use crate::config::settings;
 use channel::Channel;
 use mapping::Mapper;
-use serde::{Deserialize, Serialize};
 
-/// What happens to a row after its last queued access.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum PagePolicy {
-    /// It stays open until a request needs another row of its bank.
-    #[default]
-    Open,
-    /// It is closed immediately.
-    Closed,
+crate::choices! { #[non_exhaustive] PagePolicy = "What happens to a row after its last queued access.", default Open:
+    Open = "open", "It stays open until a request needs another row of its bank.";
+    Closed = "closed", "It is closed immediately.";
 }
 
-/// The `[dram]` table of a configuration.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(deny_unknown_fields, default)]
-pub struct DramConfig {
-    /// Device and timings.
-    pub preset: DramPreset,
-    /// Number of channels, a power of two.
-    pub channels: u32,
-    /// Which address bits select channel, bank, row and column.
-    pub mapping: Mapping,
-    /// What happens to a row that no queued request needs.
-    pub page_policy: PagePolicy,
-    /// Requests visible to a channel's scheduler; further requests wait in order of arrival.
-    pub queue: u32,
-    /// GPU clock in MHz. Request times are in GPU cycles.
-    pub core_mhz: u32,
-}
-
-impl Default for DramConfig {
-    fn default() -> Self {
-        Self {
-            preset: DramPreset::default(),
-            channels: 2,
-            mapping: Mapping::default(),
-            page_policy: PagePolicy::default(),
-            queue: 32,
-            core_mhz: 600,
-        }
+settings! {
+    /// The `[dram]` table of a configuration.
+    #[derive(Eq)]
+    pub struct DramConfig in "dram." {
+        /// Device and timings.
+        pub preset: DramPreset = DramPreset::default();
+        /// Number of channels, a power of two.
+        pub channels: u32 = 2;
+        /// Which address bits select channel, bank, row and column.
+        pub mapping: Mapping = Mapping::default();
+        /// What happens to a row that no queued request needs.
+        pub page_policy: PagePolicy = PagePolicy::default();
+        /// Requests visible to a channel's scheduler; further requests wait in order of arrival.
+        pub queue: u32 = 32, in 1..=1024;
+        /// GPU clock in MHz. Request times are in GPU cycles.
+        pub core_mhz: u32 = 600, in 1..=100_000;
     }
 }
 

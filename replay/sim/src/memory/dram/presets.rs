@@ -3,24 +3,11 @@
 //! Timings are in clocks of the command bus and follow the speed bins of the standards. Energies
 //! are typical data-sheet values to one digit: suitable for comparison, not as absolute values.
 
-use serde::{Deserialize, Serialize};
-
-/// A named device.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, clap::ValueEnum,
-)]
-#[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-#[serde(rename_all = "kebab-case")]
-pub enum DramPreset {
-    /// LPDDR4-3200, 16-bit channels (JESD209-4).
-    #[default]
-    Lpddr4,
-    /// LPDDR5-6400, 16-bit channels, bank groups (JESD209-5).
-    Lpddr5,
-    /// DDR4-2400R (16-16-16), 64-bit channels of 4 Gb x8 devices (JESD79-4).
-    Ddr4,
-    /// GDDR6 at 14 Gb/s per pin, 16-bit channels (JESD250).
-    Gddr6,
+crate::choices! { #[non_exhaustive] DramPreset = "A named device.", default Lpddr4:
+    Lpddr4 = "lpddr4", "LPDDR4-3200, 16-bit channels (JESD209-4).";
+    Lpddr5 = "lpddr5", "LPDDR5-6400, 16-bit channels, bank groups (JESD209-5).";
+    Ddr4 = "ddr4", "DDR4-2400R (16-16-16), 64-bit channels of 4 Gb x8 devices (JESD79-4).";
+    Gddr6 = "gddr6", "GDDR6 at 14 Gb/s per pin, 16-bit channels (JESD250).";
 }
 
 /// Organisation, timings and energies of one channel.

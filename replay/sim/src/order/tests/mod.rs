@@ -6,7 +6,6 @@ use super::*;
 use crate::config::{Mode, RunConfig};
 use crate::engine::replay;
 use crate::stream::testing::Synthetic;
-use clap::ValueEnum;
 use formats::textrace::{Pass, PassKind, TraceMeta};
 use formats::view::{Eye, FrameViews};
 use std::path::Path;
@@ -370,7 +369,7 @@ fn a_new_order_needs_only_a_file_and_a_row() {
     let order = Order::COLUMNS;
     assert_eq!(order.parts().curve, Curve::COLUMNS);
     assert_eq!(serde_json::to_value(order).unwrap(), "test-columns");
-    assert_eq!(Order::from_str("test-columns", false).unwrap(), order);
+    assert_eq!(Order::find("test-columns").unwrap(), order);
     let config: RunConfig =
         toml::from_str("order = \"test-columns\"\nmode = \"functional\"").unwrap();
     let trace = Synthetic {
