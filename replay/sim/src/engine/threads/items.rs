@@ -2,9 +2,9 @@
 
 use crate::access::FrameClients;
 use crate::config::Assign;
-use crate::memory::{DelayedFill, SecondLevel};
+use crate::memory::Access;
 use crate::order::WorkItem;
-use crate::stream::{Cores, StreamError};
+use crate::stream::StreamError;
 
 /// The remaining items of a phase.
 pub(super) struct Items<'a, 'f> {
@@ -56,29 +56,18 @@ impl<'a, 'f> Items<'a, 'f> {
         *next += step;
         item
     }
-}
 
-/// Starts an item on a core: performs the other clients' accesses for it and, if the prefetcher works
-/// ahead, prefetches lines of the upcoming item.
-#[inline(always)]
-pub(super) fn start_item<D: DelayedFill>(
-    l2: &mut SecondLevel<D>,
-    work: &mut Cores<'_>,
-    items: &mut Items<'_, '_>,
-    core: usize,
-    item: &WorkItem,
-    now: u64,
-) -> Result<(), StreamError> {
-    work.load(core, item)?;
-    if let Some(clients) = &mut items.clients {
-        clients.start_item(core, item)?;
-        clients.send(|access| l2.client_access(core, access, now));
+    /// Performs the accesses of the other clients for an item, if they are simulated.
+    pub(super) fn send_clients(
+        &mut self,
+        core: usize,
+        item: &WorkItem,
+        access: impl FnMut(&Access) -> u64,
+    ) -> Result<(), StreamError> {
+        if let Some(clients) = &mut self.clients {
+            clients.start_item(core, item)?;
+            clients.send(access);
+        }
+        Ok(())
     }
-    let most = l2.lines_of_next_item();
-    if most > 0
-        && let Some(item) = items.upcoming(core)
-    {
-        l2.prefetch_item(core, &work.lines_of(item, most)?, now);
-    }
-    Ok(())
 }

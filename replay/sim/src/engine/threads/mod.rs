@@ -15,11 +15,12 @@ use super::outcome::MachineOutcome;
 use crate::access::FrameClients;
 use crate::config::{Allocation, ConfigError, RunConfig, TmuModel};
 use crate::memory::{Caches, Delay, DelayedFill, MissPath, OtherWork, SecondLevel};
+use crate::order::WorkItem;
 use crate::stream::{Cores, StreamError, furthest_behind};
 use crate::tmu::PipelineStats;
 use first_miss::FirstMiss;
 use formats::layout::Layout;
-use items::{Items, start_item};
+use items::Items;
 use looping::Looping;
 use prefetch_fifo::PrefetchFifo;
 use std::sync::Arc;
@@ -33,23 +34,51 @@ struct CoreRun<'r, 'c, 'i, 'f, D> {
     items: &'r mut Items<'i, 'f>,
 }
 
+impl<'i, D: DelayedFill> CoreRun<'_, '_, 'i, '_, D> {
+    /// Starts the core's next item, if there is one: performs the other clients' accesses for it and, if the
+    /// prefetcher works ahead, prefetches lines of the upcoming item.
+    #[inline(always)]
+    fn start_item(&mut self, now: u64) -> Result<Option<&'i WorkItem>, StreamError> {
+        let Self {
+            shared,
+            core,
+            work,
+            items,
+            ..
+        } = self;
+        let (core, l2) = (*core, &mut shared.l2);
+        let Some(item) = items.next(core) else {
+            return Ok(None);
+        };
+        work.load(core, item)?;
+        items.send_clients(core, item, |access| l2.client_access(core, access, now))?;
+        let most = l2.lines_of_next_item();
+        if most > 0
+            && let Some(item) = items.upcoming(core)
+        {
+            l2.prefetch_item(core, &work.lines_of(item, most)?, now);
+        }
+        Ok(Some(item))
+    }
+}
+
 /// The texture units of all cores.
 trait ThreadModel: Send {
+    /// The clock and the counters of each core.
+    fn units(&self) -> Vec<(u64, PipelineStats)>;
+
     /// Starts a phase at a cycle.
     fn start_phase(&mut self, cycle: u64);
-
-    /// The clock of each core.
-    fn clocks(&self) -> Vec<u64>;
 
     /// Runs a core until it needs a shared resource later than its turn lasts. Returns its cycle, or the maximum
     /// if it is done.
     fn run_core<D: DelayedFill>(&mut self, run: CoreRun<D>) -> Result<u64, StreamError>;
 
     /// Ends the phase and returns the cycle in which the last core finished.
-    fn end_phase(&mut self) -> u64;
-
-    /// The counters of each core.
-    fn stats(&self) -> Vec<PipelineStats>;
+    fn end_phase(&mut self) -> u64 {
+        let clocks = self.units().into_iter().map(|(clock, _)| clock);
+        clocks.max().unwrap_or(0)
+    }
 
     /// Adds the counts that only this model has.
     fn complete<D: DelayedFill>(&self, _shared: &Shared<D>, _outcome: &mut MachineOutcome) {}
@@ -75,7 +104,8 @@ impl<M: ThreadModel, D: DelayedFill> Machine for Clocked<M, D> {
         for phase in phases {
             self.model.start_phase(self.cycles);
             // A finished core has the maximum as its clock.
-            let mut clocks = self.model.clocks();
+            let units = self.model.units().into_iter();
+            let mut clocks: Vec<u64> = units.map(|(clock, _)| clock).collect();
             let mut items = Items::new(phase, assign, clocks.len(), clients.as_deref_mut());
             while let Some((core, until)) = furthest_behind(&clocks) {
                 clocks[core] = self.model.run_core(CoreRun {
@@ -112,9 +142,10 @@ impl<M: ThreadModel, D: DelayedFill> Machine for Clocked<M, D> {
 
     fn outcome(&self, _config: &RunConfig) -> MachineOutcome {
         let counts = self.shared.counts.clone();
+        let stats = self.model.units().into_iter().map(|(_, stats)| stats);
         let mut outcome = MachineOutcome {
             memory: self.shared.l2.result(),
-            ..MachineOutcome::timed(counts, self.model.stats().into_iter(), self.cycles)
+            ..MachineOutcome::timed(counts, stats, self.cycles)
         };
         self.model.complete(&self.shared, &mut outcome);
         outcome

@@ -5,7 +5,7 @@
 //! merge with its fetch.
 
 use super::first_miss::Thread;
-use super::{CoreRun, Shared, ThreadModel, start_item};
+use super::{CoreRun, Shared, ThreadModel};
 use crate::config::{RunConfig, TmuConfig};
 use crate::engine::counts::FootprintMisses;
 use crate::memory::{DelayedFill, NOT_IN_FLIGHT};
@@ -59,22 +59,15 @@ impl PrefetchFifo {
         let Some(footprint) = unit.quad.footprint() else {
             return;
         };
-        let Shared {
-            l1,
-            l2,
-            l2_cycles,
-            counts,
-        } = &mut *shared;
-        let l1 = &mut l1[core];
         let mut misses = FootprintMisses::default();
         let mut ready = now;
         for &line in footprint.lines {
-            let arrival = match l1.look_up(line, now) {
+            let arrival = match shared.l1[core].look_up(line, now) {
                 NOT_IN_FLIGHT => {
                     misses.l1_lines += 1;
-                    let arrival =
-                        misses.count_l2_answer(l2.request(core, line, now), now) + *l2_cycles;
-                    l1.enter(line, now, arrival);
+                    let answer = shared.l2.request(core, line, now);
+                    let arrival = misses.count_l2_answer(answer, now) + shared.l2_cycles;
+                    shared.l1[core].enter(line, now, arrival);
                     arrival
                 }
                 arrival => {
@@ -84,7 +77,9 @@ impl PrefetchFifo {
             };
             ready = ready.max(arrival);
         }
-        counts.footprint(footprint.cell, footprint.tile, &misses);
+        shared
+            .counts
+            .footprint(footprint.cell, footprint.tile, &misses);
         unit.quad.advance();
         unit.last_exit = ready.max(unit.last_exit + 1).max(now + 1);
         unit.exits.push_back(unit.last_exit);
@@ -95,6 +90,11 @@ impl PrefetchFifo {
 }
 
 impl ThreadModel for PrefetchFifo {
+    fn units(&self) -> Vec<(u64, PipelineStats)> {
+        let units = self.units.iter();
+        units.map(|unit| (unit.clock, unit.stats)).collect()
+    }
+
     fn start_phase(&mut self, cycle: u64) {
         self.phase = (
             cycle,
@@ -106,18 +106,8 @@ impl ThreadModel for PrefetchFifo {
         }
     }
 
-    fn clocks(&self) -> Vec<u64> {
-        self.units.iter().map(|unit| unit.clock).collect()
-    }
-
-    fn run_core<D: DelayedFill>(&mut self, run: CoreRun<D>) -> Result<u64, StreamError> {
-        let CoreRun {
-            shared,
-            core,
-            until,
-            work,
-            items,
-        } = run;
+    fn run_core<D: DelayedFill>(&mut self, mut run: CoreRun<D>) -> Result<u64, StreamError> {
+        let (core, until) = (run.core, run.until);
         loop {
             let unit = &mut self.units[core];
             let now = unit.clock;
@@ -125,13 +115,11 @@ impl ThreadModel for PrefetchFifo {
                 return Ok(now);
             }
             if unit.quad.footprint().is_some() {
-                self.check_tags(shared, core);
-            } else if let Some(quad) = work.next_quad(core) {
+                self.check_tags(run.shared, core);
+            } else if let Some(quad) = run.work.next_quad(core) {
                 unit.stats.threads += u64::from(quad.footprints > 0);
                 unit.quad.begin(quad);
-            } else if let Some(item) = items.next(core) {
-                start_item(&mut shared.l2, work, items, core, item, now)?;
-            } else {
+            } else if run.start_item(now)?.is_none() {
                 return Ok(u64::MAX);
             }
         }
@@ -144,9 +132,5 @@ impl ThreadModel for PrefetchFifo {
         }
         let exits = self.units.iter().map(|unit| unit.last_exit);
         exits.max().unwrap_or(*start)
-    }
-
-    fn stats(&self) -> Vec<PipelineStats> {
-        self.units.iter().map(|unit| unit.stats).collect()
     }
 }

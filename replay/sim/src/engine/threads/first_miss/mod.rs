@@ -7,7 +7,7 @@
 mod memory;
 mod thread;
 
-use super::{CoreRun, Shared, ThreadModel, start_item};
+use super::{CoreRun, Shared, ThreadModel};
 use crate::config::{RunConfig, TmuConfig};
 use crate::engine::outcome::MachineOutcome;
 use crate::memory::DelayedFill;
@@ -112,35 +112,30 @@ impl FirstMiss {
 }
 
 impl ThreadModel for FirstMiss {
+    fn units(&self) -> Vec<(u64, PipelineStats)> {
+        let units = self.units.iter();
+        units.map(|unit| (unit.clock, unit.stats)).collect()
+    }
+
     fn start_phase(&mut self, cycle: u64) {
         for unit in &mut self.units {
             (unit.drained, unit.clock) = (false, cycle);
         }
     }
 
-    fn clocks(&self) -> Vec<u64> {
-        self.units.iter().map(|unit| unit.clock).collect()
-    }
-
-    fn run_core<D: DelayedFill>(&mut self, run: CoreRun<D>) -> Result<u64, StreamError> {
-        let CoreRun {
-            shared,
-            core,
-            until,
-            work,
-            items,
-        } = run;
+    fn run_core<D: DelayedFill>(&mut self, mut run: CoreRun<D>) -> Result<u64, StreamError> {
+        let (core, until) = (run.core, run.until);
         loop {
             let unit = &mut self.units[core];
             match unit.next(self.tmu.threads) {
                 Next::Done => return Ok(u64::MAX),
                 Next::Run => {
-                    if !self.pass(shared, core, until) {
+                    if !self.pass(run.shared, core, until) {
                         return Ok(self.units[core].clock);
                     }
                 }
                 Next::Free => {
-                    if let Some(quad) = work.next_quad(core) {
+                    if let Some(quad) = run.work.next_quad(core) {
                         if quad.footprints > 0 {
                             unit.stats.threads += 1;
                             let mut thread = unit.spare.pop().unwrap_or_default();
@@ -149,23 +144,12 @@ impl ThreadModel for FirstMiss {
                         }
                     } else if unit.clock > until {
                         return Ok(unit.clock);
-                    } else if let Some(item) = items.next(core) {
-                        let now = unit.clock;
-                        start_item(&mut shared.l2, work, items, core, item, now)?;
-                    } else {
+                    } else if run.start_item(unit.clock)?.is_none() {
                         unit.drained = true;
                     }
                 }
             }
         }
-    }
-
-    fn end_phase(&mut self) -> u64 {
-        self.units.iter().map(|unit| unit.clock).max().unwrap_or(0)
-    }
-
-    fn stats(&self) -> Vec<PipelineStats> {
-        self.units.iter().map(|unit| unit.stats).collect()
     }
 
     fn complete<D: DelayedFill>(&self, _shared: &Shared<D>, outcome: &mut MachineOutcome) {

@@ -5,7 +5,7 @@ mod memory;
 mod requests;
 mod timeline;
 
-use super::{CoreRun, Shared, ThreadModel, start_item};
+use super::{CoreRun, Shared, ThreadModel};
 use crate::config::RunConfig;
 use crate::engine::outcome::MachineOutcome;
 use crate::memory::DelayedFill;
@@ -37,27 +37,24 @@ impl Looping {
 }
 
 impl ThreadModel for Looping {
+    fn units(&self) -> Vec<(u64, PipelineStats)> {
+        self.units
+            .iter()
+            .map(|unit| (unit.clock(), unit.stats()))
+            .collect()
+    }
+
     fn start_phase(&mut self, cycle: u64) {
         self.units.iter_mut().for_each(|unit| unit.resume(cycle));
     }
 
-    fn clocks(&self) -> Vec<u64> {
-        self.units.iter().map(Pipeline::clock).collect()
-    }
-
-    fn run_core<D: DelayedFill>(&mut self, run: CoreRun<D>) -> Result<u64, StreamError> {
-        let CoreRun {
-            shared,
-            core,
-            until,
-            work,
-            items,
-        } = run;
+    fn run_core<D: DelayedFill>(&mut self, mut run: CoreRun<D>) -> Result<u64, StreamError> {
+        let (core, until) = (run.core, run.until);
         let unit = &mut self.units[core];
         if std::mem::take(&mut self.is_requesting[core])
-            && let Some(quad) = work.quad(core)
+            && let Some(quad) = run.work.quad(core)
         {
-            let waiting = self.memory.request(shared, core, unit.clock(), &quad);
+            let waiting = self.memory.request(run.shared, core, unit.clock(), &quad);
             unit.start(quad.footprints, waiting);
         }
         loop {
@@ -66,11 +63,11 @@ impl ThreadModel for Looping {
                 Turn::Done => return Ok(u64::MAX),
                 Turn::Free => {
                     let now = unit.clock();
-                    if let Some(quad) = work.next_quad(core) {
+                    if let Some(quad) = run.work.next_quad(core) {
                         if quad.footprints == 0 {
                             continue;
                         }
-                        match self.memory.look_up(shared, core, now, &quad) {
+                        match self.memory.look_up(run.shared, core, now, &quad) {
                             QuadLookup::All | QuadLookup::InFlight => {
                                 unit.start(quad.footprints, self.memory.waiting(core));
                             }
@@ -79,17 +76,16 @@ impl ThreadModel for Looping {
                                 return Ok(now);
                             }
                             QuadLookup::NotAll => {
-                                let waiting = self.memory.request(shared, core, now, &quad);
+                                let waiting = self.memory.request(run.shared, core, now, &quad);
                                 unit.start(quad.footprints, waiting);
                             }
                         }
                     } else if now > until {
                         return Ok(now);
-                    } else if let Some(item) = items.next(core) {
+                    } else if let Some(item) = run.start_item(now)? {
                         if let Some(recorder) = &mut self.recorder {
                             recorder.start(core, now, unit.stats(), item);
                         }
-                        start_item(&mut shared.l2, work, items, core, item, now)?;
                     } else {
                         unit.drain();
                     }
@@ -105,10 +101,6 @@ impl ThreadModel for Looping {
             }
         }
         self.units.iter().map(Pipeline::clock).max().unwrap_or(0)
-    }
-
-    fn stats(&self) -> Vec<PipelineStats> {
-        self.units.iter().map(Pipeline::stats).collect()
     }
 
     fn complete<D: DelayedFill>(&self, shared: &Shared<D>, outcome: &mut MachineOutcome) {
