@@ -3,7 +3,8 @@
 
 use replay::config::{
     Allocation, Assign, CountBy, FrameConfig, FrameMachine, Hsr, Inclusion, Key, LevelClients,
-    Levels, Mode, Order, PrefetchConfig, Prefetching, Replacement, RunConfig, TmuConfig, TmuModel,
+    Levels, Mode, Order, PrefetchConfig, Prefetching, Replacement, RunConfig, SetIndex, TmuConfig,
+    TmuModel,
 };
 use replay::memory::dram::{DramConfig, DramPreset, Mapping, PagePolicy};
 use replay::registry::Choice;
@@ -126,6 +127,7 @@ fn values(sources: &str, type_name: &str) -> Vec<(String, String)> {
         "CountBy" => of::<CountBy>(),
         "Inclusion" => of::<Inclusion>(),
         "LevelClients" => of::<LevelClients>(),
+        "SetIndex" => of::<SetIndex>(),
         "DramPreset" => of::<DramPreset>(),
         "Mapping" => of::<Mapping>(),
         "PagePolicy" => of::<PagePolicy>(),
@@ -201,6 +203,7 @@ fn default_of(key: &str) -> Option<Value> {
             "level.sectors" => Some(Value::Integer(1)),
             "level.victim_lines" => Some(Value::Integer(0)),
             "level.inclusion" => Value::try_from(Inclusion::default()).ok(),
+            "level.set_index" => Value::try_from(SetIndex::default()).ok(),
             "level.clients" => Value::try_from(LevelClients::default()).ok(),
             _ => None,
         })

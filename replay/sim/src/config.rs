@@ -25,7 +25,7 @@ pub use formats::footprint::{
 pub use formats::layout::{BlockOrder, LayoutConfig, TextureOrder};
 use formats::view::TILE_SIZE_PX;
 pub use frame::{FrameConfig, FrameMachine};
-pub use level::{Inclusion, LevelClients, LevelConfig};
+pub use level::{Inclusion, LevelClients, LevelConfig, SetIndex};
 pub use levels::Levels;
 pub use prefetch::{PrefetchConfig, Prefetching};
 pub use rows::Key;

@@ -8,7 +8,7 @@ use anyhow::{Result, bail, ensure};
 use formats::interop::plain::{AccessKind, AddressFile, AddressForm};
 use report::addresses::AddressesReport;
 use sim::addresses::{self, KindSet};
-use sim::config::RunConfig;
+use sim::config::{RunConfig, SetIndex};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -132,9 +132,12 @@ pub(super) fn two_levels_only(config: &RunConfig, place: &str) -> Result<()> {
         "{place}: expected an L1 and an L2 only, found [prefetch], [[level]], [dram], [frame] or l2.inclusion"
     );
     ensure!(
-        [config.level.l1, config.level.l2].map(|cache| (cache.sectors, cache.victim_lines))
-            == [(1, 0); 2],
-        "{place}: expected caches of whole lines without victim caches, found sectors or victim_lines"
+        [config.level.l1, config.level.l2].map(|cache| (
+            cache.set_index,
+            cache.sectors,
+            cache.victim_lines
+        )) == [(SetIndex::Modulo, 1, 0); 2],
+        "{place}: expected caches of whole lines without victim caches, found sectors, victim_lines or set_index"
     );
     Ok(())
 }

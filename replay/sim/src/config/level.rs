@@ -8,6 +8,11 @@ use serde::Serialize;
 /// Ways up to this number are proposed where a size is not possible.
 const MOST_NAMED_WAYS: u32 = 64;
 
+crate::choices! { #[non_exhaustive] SetIndex = "How a line's set follows from its number.", default Modulo:
+    Modulo = "modulo", "Its low bits.";
+    Xor = "xor", "Its low bits XOR each further group of as many bits.";
+}
+
 /// A cache level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
@@ -18,6 +23,9 @@ pub struct LevelConfig {
     pub ways: u32,
     /// Replacement policy.
     pub replacement: Replacement,
+    /// How a line's set follows from its number.
+    #[serde(skip_serializing_if = "is_default")]
+    pub set_index: SetIndex,
     /// Lines per tag (a sectored cache); a miss fetches one line.
     #[serde(skip_serializing_if = "is_one")]
     pub sectors: u32,
@@ -50,6 +58,7 @@ impl LevelConfig {
             size_bytes,
             ways: 4,
             replacement: Replacement::LRU,
+            set_index: SetIndex::Modulo,
             sectors: 1,
             victim_lines: 0,
             inclusion: Inclusion::None,
@@ -63,7 +72,7 @@ impl LevelConfig {
     /// True for plain LRU with one line per tag, the only cache that stack distances describe.
     pub fn is_plain_lru(&self) -> bool {
         self.replacement == Replacement::LRU
-            && (self.sectors, self.victim_lines) == (1, 0)
+            && (self.set_index, self.sectors, self.victim_lines) == (SetIndex::Modulo, 1, 0)
             && self.inclusion.is_none()
     }
 

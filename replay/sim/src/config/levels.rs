@@ -1,6 +1,6 @@
 //! The cache levels of a machine: the `[[level]]` tables of a configuration, L1 first.
 
-use super::{ConfigError, Inclusion, LevelClients, LevelConfig, accept};
+use super::{ConfigError, Inclusion, LevelClients, LevelConfig, SetIndex, accept};
 use crate::memory::Replacement;
 use crate::size::{format_bytes, serde_bytes};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
@@ -26,6 +26,8 @@ struct LevelTable {
     ways: Option<u32>,
     #[serde(default)]
     replacement: Replacement,
+    #[serde(default)]
+    set_index: SetIndex,
     sectors: Option<u32>,
     #[serde(default)]
     victim_lines: u32,
@@ -44,6 +46,7 @@ impl LevelTable {
         LevelConfig {
             ways: self.ways.unwrap_or(usual.ways),
             replacement: self.replacement,
+            set_index: self.set_index,
             sectors: self.sectors.unwrap_or(1),
             victim_lines: self.victim_lines,
             inclusion: self.inclusion,
@@ -237,6 +240,9 @@ impl Levels {
                 level.replacement.name(),
                 level.hit_cycles
             );
+            if level.set_index != SetIndex::Modulo {
+                text += &format!(", {} index", level.set_index.name());
+            }
             if level.sectors > 1 {
                 text += &format!(", {} sectors", level.sectors);
             }

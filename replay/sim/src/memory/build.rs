@@ -1,10 +1,11 @@
 //! Builds the cache of a level: policy, victim cache and sectors.
 
+use super::hashed_index::HashedIndex;
 use super::policy::{AnyCache, Geometry, boxed};
 use super::sectored::Sectored;
 use super::victim::WithVictimCache;
 use super::watched::Watched;
-use crate::config::{ConfigError, LevelConfig};
+use crate::config::{ConfigError, LevelConfig, SetIndex};
 
 impl AnyCache {
     /// Builds a cache.
@@ -23,6 +24,9 @@ impl AnyCache {
             seed,
         };
         let mut cache = config.replacement.build(geometry);
+        if config.set_index == SetIndex::Xor {
+            cache = boxed(HashedIndex::new(cache.into_box(), geometry.sets));
+        }
         if config.victim_lines > 0 {
             cache = boxed(WithVictimCache::new(cache.into_box(), config.victim_lines));
         }

@@ -19,6 +19,7 @@ mod cache;
 mod calendar;
 pub mod dram;
 mod fast;
+mod hashed_index;
 mod hierarchy;
 mod in_flight;
 mod policy;
