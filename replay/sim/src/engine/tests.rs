@@ -42,6 +42,17 @@ fn small() -> MemoryTrace {
     .generate()
 }
 
+/// Two layers of rectangles with three textures each.
+fn layered(size_px: [u32; 2], patch_px: u32, seed: u64) -> MemoryTrace {
+    Synthetic {
+        layers: 2,
+        materials: 2,
+        seed,
+        ..Synthetic::new(size_px, patch_px)
+    }
+    .generate()
+}
+
 fn functional(order: Order) -> RunConfig {
     RunConfig {
         mode: Mode::Functional,

@@ -353,17 +353,7 @@ fn first_miss(trace: &MemoryTrace, config: &RunConfig) -> PlainCounts {
 
 #[test]
 fn all_counts_of_the_first_miss_machine_equal_the_plain_one() {
-    let traces = [6, 7].map(|seed| {
-        Synthetic {
-            size_px: [40, 24],
-            patch_px: 13,
-            layers: 2,
-            textures: 3,
-            materials: 2,
-            seed,
-        }
-        .generate()
-    });
+    let traces = [6, 7].map(|seed| layered([40, 24], 13, seed));
     let mut random = Random(3);
     let orders: Vec<Order> = Order::all().chain(composed()).collect();
     let (mut forwarded, mut merged, mut idle) = (0, 0, 0);

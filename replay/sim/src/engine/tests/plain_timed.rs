@@ -331,17 +331,7 @@ impl Machine for PlainTimed {
 
 #[test]
 fn the_fast_machine_agrees_with_the_plain_one_cycle_by_cycle() {
-    let traces = [4, 5].map(|seed| {
-        Synthetic {
-            size_px: [52, 36],
-            patch_px: 17,
-            layers: 2,
-            textures: 3,
-            materials: 2,
-            seed,
-        }
-        .generate()
-    });
+    let traces = [4, 5].map(|seed| layered([52, 36], 17, seed));
     let mut random = Random(2);
     let orders: Vec<Order> = Order::all().chain(composed()).collect();
     let policies: Vec<Replacement> = Replacement::all().collect();
