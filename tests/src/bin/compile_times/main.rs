@@ -12,6 +12,9 @@ mod descriptors;
 #[path = "../vulkan_program/gpu.rs"]
 #[allow(dead_code, reason = "the other program uses the rest")]
 mod gpu;
+#[path = "../vulkan_program/graphics.rs"]
+#[allow(dead_code, reason = "the other program uses the rest")]
+mod graphics;
 mod pipeline;
 mod reflect;
 mod vertex;

@@ -2,6 +2,7 @@
 
 use crate::descriptors::Sets;
 use crate::gpu::{Gpu, Image, ImageKind, Result, checked};
+use crate::graphics::{Graphics, opaque};
 use crate::reflect::{Fragment, Numbers};
 use crate::vertex;
 use ash::vk;
@@ -134,53 +135,23 @@ impl<'a> Fitting<'a> {
     }
 
     fn pipeline(&self, [vertex, fragment]: [vk::ShaderModule; 2]) -> Result<vk::Pipeline> {
-        let stage = |stage, module, name| {
-            vk::PipelineShaderStageCreateInfo::default()
-                .stage(stage)
-                .module(module)
-                .name(name)
-        };
-        let stages = [
-            stage(vk::ShaderStageFlags::VERTEX, vertex, c"main"),
-            stage(vk::ShaderStageFlags::FRAGMENT, fragment, &self.entry),
-        ];
-        let input = vk::PipelineVertexInputStateCreateInfo::default();
-        let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
-            .topology(vk::PrimitiveTopology::TRIANGLE_LIST);
-        let extent = SIZE_PX as f32;
-        let viewport = [vk::Viewport::default()
-            .width(extent)
-            .height(extent)
-            .max_depth(1.0)];
-        let scissor = [self.area()];
-        let viewports = vk::PipelineViewportStateCreateInfo::default()
-            .viewports(&viewport)
-            .scissors(&scissor);
-        let rasterization = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-        let samples = vk::PipelineMultisampleStateCreateInfo::default()
-            .rasterization_samples(vk::SampleCountFlags::TYPE_1);
-        let depth = vk::PipelineDepthStencilStateCreateInfo::default();
-        let attachment = vk::PipelineColorBlendAttachmentState::default()
-            .color_write_mask(vk::ColorComponentFlags::RGBA);
-        let attachments = vec![attachment; self.formats.len()];
-        let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
         let mut rendering =
             vk::PipelineRenderingCreateInfo::default().color_attachment_formats(&self.formats);
-        let info = vk::GraphicsPipelineCreateInfo::default()
-            .stages(&stages)
-            .vertex_input_state(&input)
-            .input_assembly_state(&assembly)
-            .viewport_state(&viewports)
-            .rasterization_state(&rasterization)
-            .multisample_state(&samples)
-            .depth_stencil_state(&depth)
-            .color_blend_state(&blend)
-            .layout(self.layout)
-            .push_next(&mut rendering);
         let device = &self.gpu.device;
-        // SAFETY: the description is valid, and its parts live until the end of the call.
-        let made =
-            unsafe { device.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None) };
+        let graphics = Graphics {
+            shaders: [(vertex, c"main"), (fragment, &self.entry)],
+            stride: 0,
+            attributes: &[],
+            depth: None,
+            attachments: &vec![opaque(); self.formats.len()],
+            side_px: Some(SIZE_PX),
+            layout: self.layout,
+        };
+        let made = graphics.describe(|info| {
+            let info = [info.push_next(&mut rendering)];
+            // SAFETY: the description is valid, and its parts live until the end of the call.
+            unsafe { device.create_graphics_pipelines(vk::PipelineCache::null(), &info, None) }
+        });
         Ok(checked("a pipeline", made.map_err(|(_, error)| error))?[0])
     }
 

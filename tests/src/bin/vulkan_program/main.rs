@@ -15,6 +15,7 @@
 mod also;
 mod fields;
 mod gpu;
+mod graphics;
 mod libraries;
 mod objects;
 mod pipeline;

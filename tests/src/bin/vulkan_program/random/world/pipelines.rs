@@ -1,6 +1,7 @@
 //! Pipeline layouts, pipelines, render passes and targets.
 
 use super::*;
+use crate::graphics::{Graphics, attribute, opaque};
 use crate::libraries::{self, Split};
 
 impl World {
@@ -68,74 +69,37 @@ impl World {
         unsafe {
             let module = vk::ShaderModuleCreateInfo::default().code(&words);
             let module = checked("a module", device.create_shader_module(&module, None))?;
-            let stage = |stage, module, name| {
-                let info = vk::PipelineShaderStageCreateInfo::default();
-                info.stage(stage).module(module).name(name)
-            };
-            let stages = [
-                stage(vk::ShaderStageFlags::VERTEX, self.vertex, c"vertex"),
-                stage(vk::ShaderStageFlags::FRAGMENT, module, c"fragment"),
-            ];
-            let bindings = [vk::VertexInputBindingDescription {
-                binding: 0,
-                stride: 16,
-                input_rate: vk::VertexInputRate::VERTEX,
-            }];
-            let attribute = |location, offset| vk::VertexInputAttributeDescription {
-                location,
-                binding: 0,
-                format: vk::Format::R32G32_SFLOAT,
-                offset,
-            };
-            let attributes = [attribute(0, 0), attribute(1, 8)];
-            let input = vk::PipelineVertexInputStateCreateInfo::default()
-                .vertex_binding_descriptions(&bindings)
-                .vertex_attribute_descriptions(&attributes);
-            let assembly = vk::PipelineInputAssemblyStateCreateInfo::default()
-                .topology(vk::PrimitiveTopology::TRIANGLE_LIST);
-            let viewports = vk::PipelineViewportStateCreateInfo::default()
-                .viewport_count(1)
-                .scissor_count(1);
-            let rasterization = vk::PipelineRasterizationStateCreateInfo::default().line_width(1.0);
-            let samples = vk::PipelineMultisampleStateCreateInfo::default()
-                .rasterization_samples(vk::SampleCountFlags::TYPE_1);
-            let depth = vk::PipelineDepthStencilStateCreateInfo::default()
-                .depth_test_enable(class.depth)
-                .depth_write_enable(class.depth)
-                .depth_compare_op(vk::CompareOp::LESS_OR_EQUAL);
-            let mut attachment = vk::PipelineColorBlendAttachmentState::default()
-                .color_write_mask(vk::ColorComponentFlags::RGBA);
+            let attribute =
+                |location, offset| attribute(location, vk::Format::R32G32_SFLOAT, offset);
+            let mut attachment = opaque();
             if blends {
                 attachment = attachment
                     .blend_enable(true)
                     .src_color_blend_factor(vk::BlendFactor::ONE)
                     .dst_color_blend_factor(vk::BlendFactor::SRC_COLOR);
             }
-            let attachments = [attachment];
-            let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&attachments);
-            let states = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
-            let states = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&states);
+            let graphics = Graphics {
+                shaders: [(self.vertex, c"vertex"), (module, c"fragment")],
+                stride: 16,
+                attributes: &[attribute(0, 0), attribute(1, 8)],
+                depth: class.depth.then_some(vk::CompareOp::LESS_OR_EQUAL),
+                attachments: &[attachment],
+                side_px: None,
+                layout: self.layouts[layout].handle,
+            };
             let formats = [FORMATS[class.format]];
             let mut rendering = rendering(class, &formats);
-            let mut info = vk::GraphicsPipelineCreateInfo::default()
-                .stages(&stages)
-                .vertex_input_state(&input)
-                .input_assembly_state(&assembly)
-                .viewport_state(&viewports)
-                .rasterization_state(&rasterization)
-                .multisample_state(&samples)
-                .depth_stencil_state(&depth)
-                .color_blend_state(&blend)
-                .dynamic_state(&states)
-                .layout(self.layouts[layout].handle);
-            let mut pass = vk::RenderPass::null();
-            if dynamic {
-                info = info.push_next(&mut rendering);
-            } else {
-                pass = self.render_pass(class, true)?;
-                info = info.render_pass(pass);
-            }
-            let made = libraries::create(device, &info, split);
+            let pass = match dynamic {
+                true => vk::RenderPass::null(),
+                false => self.render_pass(class, true)?,
+            };
+            let made = graphics.describe(|info| {
+                let info = match dynamic {
+                    true => info.push_next(&mut rendering),
+                    false => info.render_pass(pass),
+                };
+                libraries::create(device, &info, split)
+            });
             device.destroy_shader_module(module, None);
             device.destroy_render_pass(pass, None);
             let linked = made?;
