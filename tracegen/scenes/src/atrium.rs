@@ -10,7 +10,7 @@ use super::mesh_builder::MeshBuilder;
 use super::scene_builder::SceneBuilder;
 use super::scene_text::Code;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
-use parts::{Bay, Column, baluster, cornice, groin_vault, moulding, rib};
+use parts::{Bay, Column, baluster, cornice, groin_vault, lion_medallion, moulding, rib};
 use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Edge of a bay in metres.
@@ -38,6 +38,17 @@ struct Detail {
     /// Factor of the chamfers of blocks.
     bevel: f32,
     floor_cells: usize,
+}
+
+impl Detail {
+    /// Blocks: two corners and a chamfer each.
+    fn blocks(&self, blocks: &[[f32; 7]]) -> MeshBuilder {
+        let mut m = MeshBuilder::new();
+        for &[x0, y0, z0, x1, y1, z1, bevel] in blocks {
+            m.block(vec3(x0, y0, z0), vec3(x1, y1, z1), bevel * self.bevel);
+        }
+        m
+    }
 }
 
 const RICH: Detail = Detail {
@@ -96,13 +107,22 @@ const PLAIN: Detail = Detail {
 
 /// What the scenes' texts name.
 pub const CODE: Code = Code {
-    shapes: &[],
+    shapes: &[
+        ("fountain", |m, _| furnishing::fountain(m)),
+        ("lamp-chain", |m, _| furnishing::lamp_chain(m)),
+        ("lion-medallion", |m, row| {
+            m.append(lion_medallion(row.number(), row.number()));
+        }),
+    ],
     steps: &[
         ("architecture", |scene, row| match row.word() {
             "rich" => build(scene, &RICH),
             _ => build(scene, &PLAIN),
         }),
-        ("furnishing", |scene, _| furnishing::furnish(scene)),
+        ("drapes", |scene, _| furnishing::drapes(scene)),
+        ("lamps", |scene, _| furnishing::lamps(scene)),
+        ("plants", |scene, _| furnishing::plants(scene)),
+        ("reliefs", |scene, _| furnishing::reliefs(scene)),
     ],
 };
 
@@ -316,17 +336,10 @@ fn colonnades(scene: &mut SceneBuilder, d: &Detail) {
 
     // Balustrade between the upper columns: plinth, balusters, rail.
     let (half, foot) = (0.5 * BAY - 0.3, FLOOR2);
-    let mut rails = MeshBuilder::new();
-    rails.block(
-        vec3(-half, foot, -0.12),
-        vec3(half, foot + 0.12, 0.12),
-        0.015 * d.bevel,
-    );
-    rails.block(
-        vec3(-half, foot + 0.82, -0.13),
-        vec3(half, foot + 0.95, 0.13),
-        0.03 * d.bevel,
-    );
+    let mut rails = d.blocks(&[
+        [-half, foot, -0.12, half, foot + 0.12, 0.12, 0.015],
+        [-half, foot + 0.82, -0.13, half, foot + 0.95, 0.13, 0.03],
+    ]);
     let one = baluster(d.baluster.0, d.baluster.1);
     for i in 0..d.balusters {
         let x = ((i as f32 + 0.5) / d.balusters as f32 * 2.0 - 1.0) * half;
@@ -385,35 +398,19 @@ fn ribs_and_pilasters(scene: &mut SceneBuilder, d: &Detail) {
         "rib",
         &ribs,
     );
-    let mut pilaster = MeshBuilder::new();
-    pilaster.block(vec3(-0.3, 0.0, -0.3), vec3(0.3, 0.35, 0.3), 0.02 * d.bevel);
-    pilaster.block(
-        vec3(-0.24, 0.35, -0.24),
-        vec3(0.24, SPRING - 0.28, 0.24),
-        0.02 * d.bevel,
-    );
-    pilaster.block(
-        vec3(-0.29, SPRING - 0.28, -0.29),
-        vec3(0.29, SPRING - 0.2, 0.29),
-        0.015 * d.bevel,
-    );
-    pilaster.block(
-        vec3(-0.34, SPRING - 0.2, -0.34),
-        vec3(0.34, SPRING, 0.34),
-        0.03 * d.bevel,
-    );
+    let pilaster = d.blocks(&[
+        [-0.3, 0.0, -0.3, 0.3, 0.35, 0.3, 0.02],
+        [-0.24, 0.35, -0.24, 0.24, SPRING - 0.28, 0.24, 0.02],
+        [-0.29, SPRING - 0.28, -0.29, 0.29, SPRING - 0.2, 0.29, 0.015],
+        [-0.34, SPRING - 0.2, -0.34, 0.34, SPRING, 0.34, 0.03],
+    ]);
     place_all(scene, "pilaster", pilaster, "rib", &pilasters);
 }
 
 /// Joists under the gallery's ceiling, every 0.7 m along the long sides.
 fn joists(scene: &mut SceneBuilder, d: &Detail) {
     let half = 0.5 * BAY;
-    let mut joist = MeshBuilder::new();
-    joist.block(
-        vec3(-0.09, EAVES - 0.32, -half),
-        vec3(0.09, EAVES - 0.08, half),
-        0.012 * d.bevel,
-    );
+    let joist = d.blocks(&[[-0.09, EAVES - 0.32, -half, 0.09, EAVES - 0.08, half, 0.012]]);
     let joists: Vec<Affine3A> = (-20..=20)
         .flat_map(|i| [-1.0, 1.0].map(|s| at(vec3(i as f32 * 0.7, 0.0, s * (COURT.1 + half)), 0.0)))
         .chain((-4..=4).flat_map(|i| {
@@ -425,40 +422,19 @@ fn joists(scene: &mut SceneBuilder, d: &Detail) {
 
 /// Doors in the outer wall, every other bay.
 fn doors(scene: &mut SceneBuilder, d: &Detail) {
-    let mut door = MeshBuilder::new();
-    door.block(
-        vec3(-0.75, 0.0, -0.05),
-        vec3(-0.01, 2.55, 0.1),
-        0.015 * d.bevel,
-    );
-    door.block(
-        vec3(0.01, 0.0, -0.05),
-        vec3(0.75, 2.55, 0.1),
-        0.015 * d.bevel,
-    );
-    for (x, y) in [(-0.64, 0.25), (0.12, 0.25), (-0.64, 1.45), (0.12, 1.45)] {
-        door.block(
-            vec3(x, y, 0.09),
-            vec3(x + 0.52, y + 0.95, 0.13),
-            0.03 * d.bevel,
-        );
-    }
-    let mut frame = MeshBuilder::new();
-    frame.block(
-        vec3(-1.0, 0.0, -0.05),
-        vec3(-0.75, 2.55, 0.18),
-        0.03 * d.bevel,
-    );
-    frame.block(
-        vec3(0.75, 0.0, -0.05),
-        vec3(1.0, 2.55, 0.18),
-        0.03 * d.bevel,
-    );
-    frame.block(
-        vec3(-1.08, 2.55, -0.05),
-        vec3(1.08, 2.85, 0.24),
-        0.04 * d.bevel,
-    );
+    let door = d.blocks(&[
+        [-0.75, 0.0, -0.05, -0.01, 2.55, 0.1, 0.015],
+        [0.01, 0.0, -0.05, 0.75, 2.55, 0.1, 0.015],
+        [-0.64, 0.25, 0.09, -0.64 + 0.52, 0.25 + 0.95, 0.13, 0.03],
+        [0.12, 0.25, 0.09, 0.12 + 0.52, 0.25 + 0.95, 0.13, 0.03],
+        [-0.64, 1.45, 0.09, -0.64 + 0.52, 1.45 + 0.95, 0.13, 0.03],
+        [0.12, 1.45, 0.09, 0.12 + 0.52, 1.45 + 0.95, 0.13, 0.03],
+    ]);
+    let frame = d.blocks(&[
+        [-1.0, 0.0, -0.05, -0.75, 2.55, 0.18, 0.03],
+        [0.75, 0.0, -0.05, 1.0, 2.55, 0.18, 0.03],
+        [-1.08, 2.55, -0.05, 1.08, 2.85, 0.24, 0.04],
+    ]);
     let doors: Vec<Affine3A> = (0..4)
         .flat_map(|i| {
             let x = (i as f32 * 2.0 - 3.5) * BAY;

@@ -6,6 +6,7 @@ mod parts;
 use super::jungle::plants::{boughs, buttressed_trunk};
 use super::mesh_builder::{MeshBuilder, upright};
 use super::noise::{Rng, bank, smoothstep};
+use super::row::Row;
 use super::scene_builder::SceneBuilder;
 use super::scene_text::Code;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
@@ -35,11 +36,11 @@ pub const CODE: Code = Code {
     shapes: &[],
     steps: &[
         ("cameras", |scene, _| cameras(scene)),
-        ("farm-house", |scene, _| house::farm_house(scene)),
-        ("garden-and-plants", |scene, _| {
+        ("farm-house", house::farm_house),
+        ("garden-and-plants", |scene, row| {
             let mut rng = Rng::new(600);
             garden_wall(scene, &mut rng);
-            trees(scene, &mut rng);
+            trees(scene, row, &mut rng);
             lavender(scene, &mut rng);
             grass_and_poppies(scene, &mut rng);
         }),
@@ -109,7 +110,8 @@ fn garden_wall(scene: &mut SceneBuilder, rng: &mut Rng) {
     scene.add("garden-wall", m, "field-stone");
 }
 
-fn trees(scene: &mut SceneBuilder, rng: &mut Rng) {
+/// Oaks and olives at the points (x, z, kind) of a row, then cypresses at points (x, z).
+fn trees(scene: &mut SceneBuilder, row: &mut Row, rng: &mut Rng) {
     let oaks: Vec<[usize; 3]> = (0..3)
         .map(|i| {
             let (height, radius) = ([5.2, 4.2, 3.4][i], [3.4, 2.7, 2.3][i]);
@@ -133,35 +135,15 @@ fn trees(scene: &mut SceneBuilder, rng: &mut Rng) {
             ]
         })
         .collect();
-    let spots = [
-        (-6.5, -24.0, 0),
-        (-12.5, -27.5, 1),
-        (-18.5, -23.0, 0),
-        (1.2, -33.0, 1),
-        (17.5, -33.5, 0),
-        (19.5, -22.0, 2),
-        (-21.0, -10.0, 2),
-        (21.5, -9.0, 2),
-        (-30.0, -36.0, 1),
-        (28.0, -40.0, 0),
-    ];
-    for (x, z, kind) in spots {
+    for [x, z, kind] in row.points() {
         let place = upright_at(x, z, rng.range(0.0, TAU), rng.range(0.9, 1.15));
-        for mesh in oaks[kind] {
+        for mesh in oaks[kind as usize] {
             scene.place(mesh, place);
         }
     }
     let spire = scene.mesh("cypress", parts::cypress(2600, 7.5, 0.85, rng), "cypress");
-    for (x, z) in [
-        (0.9, -24.6),
-        (14.3, -22.2),
-        (15.8, -24.0),
-        (17.0, -26.4),
-        (-2.4, -28.5),
-        (-26.0, -30.0),
-        (-28.0, -30.8),
-        (33.0, -34.0),
-    ] {
+    row.expect("cypresses");
+    for [x, z] in row.points() {
         scene.place(
             spire,
             upright_at(x, z, rng.range(0.0, TAU), rng.range(0.85, 1.2)),

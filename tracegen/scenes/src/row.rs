@@ -54,6 +54,13 @@ impl Row {
         self.words.next().unwrap_or_else(|| self.fail("a word"))
     }
 
+    /// Refuses the row unless its next word is this one.
+    pub fn expect(&mut self, word: &str) {
+        if self.word() != word {
+            self.fail(word);
+        }
+    }
+
     /// The next word as a number.
     pub fn number<T: FromStr>(&mut self) -> T {
         let number = self.word().parse();

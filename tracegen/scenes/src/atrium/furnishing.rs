@@ -1,7 +1,7 @@
 //! Furnishing of the atrium: drapes, plants, reliefs, lamps, a fountain.
 
-use super::parts::{arching_leaf, drape, lion_medallion, pot, rosette};
-use crate::mesh_builder::{MeshBuilder, curve, profile, turned, upright as at};
+use super::parts::{arching_leaf, drape, rosette};
+use crate::mesh_builder::{MeshBuilder, curve, profile, upright as at};
 use crate::noise::Rng;
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec3};
@@ -11,16 +11,7 @@ const BAY: f32 = 3.5;
 /// Materials of the drapes.
 const DRAPES: [&str; 3] = ["drape-red", "drape-green", "drape-blue"];
 
-/// Places all furniture.
-pub fn furnish(scene: &mut SceneBuilder) {
-    drapes(scene);
-    plants(scene);
-    reliefs(scene);
-    lamps(scene);
-    fountain(scene);
-}
-
-fn drapes(scene: &mut SceneBuilder) {
+pub(super) fn drapes(scene: &mut SceneBuilder) {
     let cloths: Vec<usize> = (0..3)
         .map(|c| {
             scene.mesh(
@@ -90,11 +81,9 @@ fn drapes(scene: &mut SceneBuilder) {
     }
 }
 
-fn plants(scene: &mut SceneBuilder) {
+pub(super) fn plants(scene: &mut SceneBuilder) {
     let mut rng = Rng::new(77);
-    let pot_mesh = scene.mesh("pot", pot(20, 1), "terracotta");
-    let earth = turned("0.86,0.88! 0.4,0.92 0,0.93", 20);
-    let earth = scene.mesh("earth", earth, "potting-earth");
+    let [pot_mesh, earth] = ["pot", "earth"].map(|name| scene.numbers(name)[0]);
     let bushes: Vec<usize> = (0..3)
         .map(|_| {
             scene.mesh(
@@ -158,8 +147,8 @@ fn plants(scene: &mut SceneBuilder) {
     }
 }
 
-fn reliefs(scene: &mut SceneBuilder) {
-    let lion = scene.mesh("lion-medallion", lion_medallion(24, 0.55), "bronze");
+pub(super) fn reliefs(scene: &mut SceneBuilder) {
+    let lion = scene.numbers("lion-medallion")[0];
     let face = 0.375;
     for i in -3..=3 {
         for side in [-1.0f32, 1.0] {
@@ -173,18 +162,8 @@ fn reliefs(scene: &mut SceneBuilder) {
     }
 }
 
-fn lamps(scene: &mut SceneBuilder) {
-    let mut lamp = MeshBuilder::new();
-    let body = profile("0,0! 0.05,0.02 0.14,0.1 0.17,0.2! 0.15,0.26 0.07,0.36 0.03,0.42! 0,0.44!");
-    lamp.lathe(&curve(&body, 3), 16);
-    for i in 0..12 {
-        let y = 0.44 + i as f32 * 0.06;
-        let tilt = if i % 2 == 0 { Vec3::X } else { Vec3::Z };
-        lamp.ring([6, 3], 0.005, |sin, cos| {
-            Vec3::Y * (y + 0.04 * sin) + tilt * (0.016 * cos)
-        });
-    }
-    let mesh = scene.mesh("lamp", lamp, "lamp-brass");
+pub(super) fn lamps(scene: &mut SceneBuilder) {
+    let mesh = scene.numbers("lamp")[0];
     for i in [-4, -2, 0, 2] {
         for side in [-1.0, 1.0] {
             scene.place(
@@ -199,8 +178,18 @@ fn lamps(scene: &mut SceneBuilder) {
     }
 }
 
-fn fountain(scene: &mut SceneBuilder) {
-    let mut basin = MeshBuilder::new();
+/// The chain of a lamp.
+pub(super) fn lamp_chain(lamp: &mut MeshBuilder) {
+    for i in 0..12 {
+        let y = 0.44 + i as f32 * 0.06;
+        let tilt = if i % 2 == 0 { Vec3::X } else { Vec3::Z };
+        lamp.ring([6, 3], 0.005, |sin, cos| {
+            Vec3::Y * (y + 0.04 * sin) + tilt * (0.016 * cos)
+        });
+    }
+}
+
+pub(super) fn fountain(basin: &mut MeshBuilder) {
     let outer = profile(
         "1.35,0! 1.35,0.12! 1.18,0.16 1.12,0.34 1.2,0.46! 1.26,0.5 1.22,0.55! 1.04,0.55! 1,0.4 \
         0.96,0.22! 0.3,0.2! 0.2,0.3 0.13,0.6 0.16,0.84 0.36,0.98 0.58,1.08! 0.56,1.11! 0.3,1.03 \
@@ -213,10 +202,4 @@ fn fountain(scene: &mut SceneBuilder) {
             1.0
         }
     });
-    scene.put(
-        "fountain",
-        basin,
-        "rail-stone",
-        at(vec3(5.25, 0.0, 0.0), 0.0, 1.0),
-    );
 }

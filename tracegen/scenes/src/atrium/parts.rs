@@ -363,17 +363,6 @@ pub fn lion_medallion(cells: usize, relief: f32) -> MeshBuilder {
     m
 }
 
-/// A flower pot of radius and height 1, open at the top, closed at the earth's level.
-pub fn pot(segments: usize, steps: usize) -> MeshBuilder {
-    let mut m = MeshBuilder::new();
-    let knots = profile(
-        "0,0! 0.55,0! 0.6,0.06! 0.62,0.12 0.86,0.45 0.9,0.7 0.82,0.82! 0.98,0.86! 1.02,0.93 \
-        0.98,1! 0.86,1! 0.84,0.9!",
-    );
-    m.lathe(&curve(&knots, steps), segments);
-    m
-}
-
 /// One arching leaf from the origin along +x, rising: `length` x `width`, covered by the texture once.
 pub fn arching_leaf(
     length: f32,

@@ -3,6 +3,7 @@
 use super::parts;
 use super::{HOUSE, ground};
 use crate::mesh_builder::MeshBuilder;
+use crate::row::Row;
 use crate::scene_builder::SceneBuilder;
 use glam::{Affine3A, Quat, Vec3, vec2, vec3};
 use std::f32::consts::FRAC_PI_2;
@@ -64,9 +65,12 @@ const DEPTH: f32 = 6.0;
 const EAVES: f32 = 4.9;
 const RISE: f32 = 1.75;
 
-pub(super) fn farm_house(scene: &mut SceneBuilder) {
+pub(super) fn farm_house(scene: &mut SceneBuilder, row: &mut Row) {
+    let front: Vec<[f32; 4]> = row.points().collect();
+    row.expect("sides");
+    let sides: Vec<[f32; 4]> = row.points().collect();
     let mut house = House::default();
-    house.facades();
+    house.facades(&front, &sides);
     house.gables();
     house.roof();
     let place = Affine3A::from_rotation_translation(
@@ -125,44 +129,30 @@ struct House {
 }
 
 impl House {
-    /// Front (+z), back, left and right.
-    fn facades(&mut self) {
-        // Door and windows on two floors.
-        let front: Vec<[f32; 4]> = vec![
-            [4.0, 0.0, 1.15, 2.25],
-            [1.2, 0.95, 1.0, 1.35],
-            [6.8, 0.95, 1.0, 1.35],
-            [1.2, 3.2, 0.95, 1.15],
-            [4.1, 3.2, 0.95, 1.15],
-            [6.8, 3.2, 0.95, 1.15],
-        ];
-        let side: Vec<[f32; 4]> = vec![
-            [1.3, 0.95, 0.95, 1.3],
-            [3.7, 0.95, 0.95, 1.3],
-            [2.5, 3.2, 0.9, 1.1],
-        ];
+    /// Front (+z), back, left and right. Openings are x, y, width and height.
+    fn facades(&mut self, front: &[[f32; 4]], side: &[[f32; 4]]) {
         let corner = |turn: f32, at: Vec3| {
             Affine3A::from_rotation_translation(Quat::from_rotation_y(turn), at)
         };
         let facades = [
             (
                 vec2(WIDTH, EAVES),
-                &front,
+                front,
                 corner(0.0, vec3(-WIDTH / 2.0, 0.0, DEPTH / 2.0)),
             ),
             (
                 vec2(WIDTH, EAVES),
-                &front,
+                front,
                 corner(std::f32::consts::PI, vec3(WIDTH / 2.0, 0.0, -DEPTH / 2.0)),
             ),
             (
                 vec2(DEPTH, EAVES),
-                &side,
+                side,
                 corner(-FRAC_PI_2, vec3(-WIDTH / 2.0, 0.0, -DEPTH / 2.0)),
             ),
             (
                 vec2(DEPTH, EAVES),
-                &side,
+                side,
                 corner(FRAC_PI_2, vec3(WIDTH / 2.0, 0.0, DEPTH / 2.0)),
             ),
         ];
