@@ -127,8 +127,9 @@ impl FormatError {
     }
 }
 
-/// A violated rule of the format, in data that were read or are to be written.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// A violated rule, in data that were read or are to be written, or in settings.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{what}: expected {expected}, found {found}")]
 pub struct Broken {
     /// What violates it: `run 3`, `record 12`, `the display`.
     pub what: String,
@@ -158,8 +159,23 @@ impl Broken {
     }
 }
 
+/// A name that nothing has.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{what} '{name}': expected {known}")]
+pub struct UnknownName {
+    /// What was looked up: `unknown display`, `no camera`.
+    pub what: &'static str,
+    /// The name as given.
+    pub name: String,
+    /// The known names: `one of a, b`.
+    pub known: String,
+}
+
 /// Fails unless `holds`. The texts are only formatted for a failure.
-pub(crate) fn ensure(
+///
+/// # Errors
+/// It does not hold.
+pub fn ensure(
     holds: bool,
     what: impl fmt::Display,
     expected: impl fmt::Display,

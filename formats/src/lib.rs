@@ -33,6 +33,7 @@ pub mod raytrace;
 mod records;
 #[cfg(feature = "testing")]
 pub mod schemas;
+pub mod technique_study;
 pub mod text;
 pub mod textrace;
 pub mod texture;
@@ -44,7 +45,7 @@ pub mod view;
 #[cfg(test)]
 mod tests;
 
-pub use error::{Broken, FormatError, Result};
+pub use error::{Broken, FormatError, Result, UnknownName};
 pub use raytrace::{Raytrace, RaytraceWriter};
 pub use textrace::{Textrace, TextraceWriter};
 pub use trace::Trace;

@@ -1,5 +1,6 @@
-//! Escapes text from files for terminals.
+//! Text of names and messages.
 
+use serde::Serialize;
 use std::borrow::Cow;
 
 /// Escapes every character that controls a terminal or changes the reading direction: control characters
@@ -14,6 +15,20 @@ pub fn printable(text: &str) -> Cow<'_, str> {
 /// [`printable`] for whole messages, which may have line breaks and tabs.
 pub fn printable_lines(message: &str) -> Cow<'_, str> {
     escaped(message, |c| steers(c) && c != '\n' && c != '\t')
+}
+
+/// The name of an enum's value in files and on the command line: the one by which serde writes it.
+pub fn name_of(value: &impl Serialize) -> String {
+    let value = serde_json::to_value(value).unwrap_or_default();
+    value.as_str().unwrap_or_default().to_owned()
+}
+
+/// A document as indented JSON that ends in a line break.
+///
+/// # Errors
+/// A value that JSON cannot express.
+pub fn json_text(document: &impl Serialize) -> serde_json::Result<String> {
+    Ok(serde_json::to_string_pretty(document)? + "\n")
 }
 
 /// Text for a cell of a CSV file. A spreadsheet would run a name that begins with `=`, `+`, `-` or `@` as a

@@ -244,11 +244,8 @@ impl Sampler {
     /// Clamped, bilinear, without mip levels, for shadow maps.
     pub const SHADOW: Self = Self {
         wrap: [Wrap::ClampToEdge; 2],
-        mag: Filter::Linear,
-        min: Filter::Linear,
         mip: MipFilter::None,
-        lod: LodRange::WHOLE,
-        max_anisotropy_256ths: Self::ISOTROPIC,
+        ..Self::TRILINEAR_REPEAT
     };
 }
 

@@ -1,6 +1,7 @@
 //! Head-mounted displays, eyes and tiles: the views of a stereo pair.
 
 use crate::error::{Broken, ensure};
+use glam::{DMat4, Mat4};
 use serde::{Deserialize, Serialize};
 
 /// Edge length of a tile in pixels, as in Z2 paper section 4.1.
@@ -214,6 +215,19 @@ impl Default for EyeView {
             eye_to_clip: identity,
             position: [0.0; 3],
         }
+    }
+}
+
+impl EyeView {
+    /// World to clip space, as passed to the driver.
+    pub fn clip_from_world(&self) -> Mat4 {
+        Mat4::from_cols_array_2d(&self.eye_to_clip) * Mat4::from_cols_array_2d(&self.world_to_eye)
+    }
+
+    /// The same, multiplied in double precision.
+    pub fn clip_from_world_f64(&self) -> DMat4 {
+        let wide = |m: &[[f32; 4]; 4]| Mat4::from_cols_array_2d(m).as_dmat4();
+        wide(&self.eye_to_clip) * wide(&self.world_to_eye)
     }
 }
 

@@ -253,13 +253,7 @@ fn texture_tile(tables: &Tables, random: &mut Random) -> Tile {
         if of_draw.groups.iter().any(UvGroup::has_operands) {
             records = paired(of_draw, &records);
         }
-        tile.runs.push(PrimitiveRun {
-            primitive,
-            draw,
-            first: tile.records.len() as u32,
-            count: records.len() as u32,
-        });
-        tile.records.extend(records);
+        tile.push_run(primitive, draw, records);
     }
     tile
 }

@@ -30,11 +30,9 @@ struct Plane {
 impl CutTriangles {
     /// Adds the triangles of a view.
     pub fn look(&mut self, scene: &Scene, draws: &DrawList, view: &EyeView, size_px: [u32; 2]) {
-        let wide = |m: &[[f32; 4]; 4]| Mat4::from_cols_array_2d(m).as_dmat4();
-        let clip_from_eye = wide(&view.eye_to_clip);
-        let clip_from_world = clip_from_eye * wide(&view.world_to_eye);
+        let clip_from_world = view.clip_from_world_f64();
         // Depth is 1 at the near plane and 0 at the far plane.
-        let [scale, shift] = [clip_from_eye.z_axis.z, clip_from_eye.w_axis.z];
+        let [scale, shift] = [2, 3].map(|column| f64::from(view.eye_to_clip[column][2]));
         self.near.metres = shift / (1.0 + scale);
         self.far.metres = shift / scale;
         let size = DVec2::new(size_px[0].into(), size_px[1].into());

@@ -76,8 +76,7 @@ struct Shown {
 impl UnstableTriangles {
     /// Adds the triangles of a view.
     pub fn look(&mut self, scene: &Scene, draws: &DrawList, view: &EyeView, size_px: [u32; 2]) {
-        let wide = |m: &[[f32; 4]; 4]| Mat4::from_cols_array_2d(m).as_dmat4();
-        let clip_from_world = wide(&view.eye_to_clip) * wide(&view.world_to_eye);
+        let clip_from_world = view.clip_from_world_f64();
         let mut places = Places::default();
         for call in &draws.calls {
             let of_draw = on_screen(scene, call, clip_from_world, size_px);

@@ -8,12 +8,22 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// Checks a program's command line: that it is well formed, and that no output replaces an input.
+///
+/// # Panics
+/// If it is not.
+pub fn assert_command_line(command: &Command, uses: &FileUses) {
+    command.clone().debug_assert();
+    let pairs = check_file_table(command, uses).expect("a whole table");
+    assert!(pairs > 20, "{pairs} pairs of an input and an output");
+}
+
 /// Checks that the table has every argument that may name a file and no other, and that every output of every
 /// command is refused over every input. Returns the number of these pairs.
 ///
 /// # Errors
 /// An argument that the table lacks, a row without an argument, or an output that is not refused.
-pub fn check_file_table(command: &Command, uses: &FileUses) -> anyhow::Result<usize> {
+fn check_file_table(command: &Command, uses: &FileUses) -> anyhow::Result<usize> {
     // Requirements and conflicts of arguments do not matter here.
     let mut command = command.clone().ignore_errors(true);
     command.build();

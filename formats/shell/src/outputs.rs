@@ -1,7 +1,9 @@
 //! Checks a command's outputs before its work, which may take minutes.
 
 use anyhow::{Context, bail, ensure};
-use formats::container::{check_target, declare_input, is_same_file, is_stdout, kind_of};
+use formats::container::{
+    AtomicFile, check_target, declare_input, is_same_file, is_stdout, kind_of,
+};
 use std::fs;
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -77,8 +79,7 @@ pub fn check_outputs<'a>(
                 output.named()
             );
         } else {
-            check_target(&output.path)
-                .with_context(|| format!("cannot write {}", output.path.display()))?;
+            check_target(&output.path).with_context(|| cannot_write(&output.path))?;
         }
         let earlier = &outputs[..number];
         if let Some(other) = earlier.iter().find(|o| is_same_file(&o.path, &output.path)) {
@@ -91,6 +92,19 @@ pub fn check_outputs<'a>(
     }
     let taken = |o: &Output| o.kind != Kind::Result && is_stdout(&o.path);
     Ok(!outputs.iter().any(taken))
+}
+
+/// What could not be done, for the context of an error.
+pub fn cannot_write(path: &Path) -> String {
+    format!("cannot write {}", path.display())
+}
+
+/// Writes a file, which appears under its name when it is complete.
+///
+/// # Errors
+/// The file cannot be written.
+pub fn write_file(path: &Path, bytes: impl AsRef<[u8]>) -> anyhow::Result<()> {
+    AtomicFile::write_whole(path, bytes.as_ref()).with_context(|| cannot_write(path))
 }
 
 /// Checks that a folder for outputs exists or can be created.

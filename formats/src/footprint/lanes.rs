@@ -7,6 +7,7 @@ use super::{
 };
 use crate::textrace::QuadRecord;
 use crate::texture::{Filter, Sampler};
+use std::ops::Range;
 
 /// The texels that one lane reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,6 +41,14 @@ impl LaneReach {
             }
             Reach::Probes(probes) => Self::Levels(selected(probes.lod), Some(probes)),
             Reach::Ellipse(ellipse) => Self::Ellipse(ellipse),
+        }
+    }
+
+    /// The range of the levels that the lane reads.
+    pub(super) fn levels(&self) -> Range<u32> {
+        match self {
+            Self::Levels(levels, _) => levels.first..levels.first + levels.count,
+            Self::Ellipse(ellipse) => ellipse.level..ellipse.level + 1,
         }
     }
 

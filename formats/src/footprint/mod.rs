@@ -156,7 +156,7 @@ pub fn footprints(
     options: &SamplingOptions,
     mut visit: impl FnMut(Footprint),
 ) {
-    let mut quad = Quad {
+    let quad = Quad {
         record,
         extent,
         texture,
@@ -167,7 +167,7 @@ pub fn footprints(
             false => record.mask,
         },
     };
-    let mut visit_in = |lane: u32, level: u32, layer: u16, texels: [[i64; 2]; 2]| {
+    let visit_in = |lane: u32, level: u32, layer: u16, texels: [[i64; 2]; 2]| {
         let size = texture.level_size(level);
         let wrapped = |a: usize| {
             let offset = i64::from(sample.offset[a]);
@@ -191,12 +191,13 @@ pub fn footprints(
             let own = LaneLevel::of(sample, texture, operands, lane);
             (lane, own.layer, quad.lane_reach(lane, sample, own.lod))
         });
-        return visit_lanes(&quad, &lanes.collect::<Vec<_>>(), visit_in);
+        let lanes: Vec<_> = lanes.collect();
+        return visit_lanes(&quad, lanes.iter().copied(), visit_in);
     }
-    quad.options.lod_bias += sample.level.lod();
-    visit_quad_levels(&quad, |lane, level, texels| {
-        visit_in(lane, level, sample.layer, texels);
-    });
+    // One level of detail for all lanes.
+    let reach = quad.derivative_reach(0, sample.level.lod());
+    let lanes = quad.lanes().map(|lane| (lane, sample.layer, reach));
+    visit_lanes(&quad, lanes, visit_in);
 }
 
 /// A quad that samples a texture.
@@ -218,12 +219,18 @@ impl Quad<'_> {
 
     /// The texels of a lane that specifies a level, or a bias to that of the derivatives.
     fn lane_reach(&self, lane: u32, sample: &Sample, lod: f32) -> LaneReach {
-        let (size, levels) = (self.texture.size, self.texture.levels);
         if sample.level.rule == LodRule::Explicit {
+            let levels = self.texture.levels;
             return LaneReach::Levels(select_levels(lod, &self.sampler, levels), None);
         }
+        self.derivative_reach(lane, lod)
+    }
+
+    /// The texels of a lane by the derivatives and a bias.
+    fn derivative_reach(&self, lane: u32, bias: f32) -> LaneReach {
+        let (size, levels) = (self.texture.size, self.texture.levels);
         let options = SamplingOptions {
-            lod_bias: self.options.lod_bias + lod,
+            lod_bias: self.options.lod_bias + bias,
             ..self.options
         };
         let (record, extent) = (self.record, self.extent);
@@ -231,87 +238,38 @@ impl Quad<'_> {
     }
 }
 
-/// Visits the texels of lanes that have levels of their own: each is a lane, its layer and what it reads.
+/// Visits the texels of lanes: each is a lane, its layer and what it reads.
 fn visit_lanes(
     quad: &Quad<'_>,
-    lanes: &[(u32, u16, LaneReach)],
+    lanes: impl Iterator<Item = (u32, u16, LaneReach)> + Clone,
     mut visit: impl FnMut(u32, u32, u16, [[i64; 2]; 2]),
 ) {
     let extent = quad.extent;
-    let probes = lanes.iter().map(|(_, _, of)| of.probe_count()).max();
-    for level in 0..quad.texture.levels {
+    let reaches = || lanes.clone().map(|(_, _, of)| of);
+    let probes = reaches().map(|of| of.probe_count()).max();
+    let first = reaches().map(|of| of.levels().start).min();
+    let end = reaches().map(|of| of.levels().end).max();
+    for level in first.unwrap_or(0)..end.unwrap_or(0) {
         let size = quad.texture.level_size(level);
         for probe in 0..probes.unwrap_or(0) {
-            for (lane, layer, of) in lanes {
+            for (lane, layer, of) in lanes.clone() {
                 let Some((from_lane, filter)) = of.probe(level, probe) else {
                     continue;
                 };
-                let uv = quad.record.lane_uv(*lane);
+                let uv = quad.record.lane_uv(lane);
                 let axis = |a: usize| {
                     let at = uv[a].wrapping_add(from_lane[a]);
                     fetch(at, size[a], extent[a], filter)
                 };
-                visit(*lane, level, *layer, [axis(0), axis(1)]);
+                visit(lane, level, layer, [axis(0), axis(1)]);
             }
         }
-        for (lane, layer, of) in lanes {
+        for (lane, layer, of) in lanes.clone() {
             let blocks = of
                 .ellipse(level)
-                .map(|ellipse| ellipse.blocks(quad.record.lane_uv(*lane), size, extent));
+                .map(|ellipse| ellipse.blocks(quad.record.lane_uv(lane), size, extent));
             for [x, y] in blocks.into_iter().flatten() {
-                visit(*lane, level, *layer, [[x, x + 1], [y, y + 1]]);
-            }
-        }
-    }
-}
-
-/// Visits the levels that follow from one level of detail for all lanes.
-fn visit_quad_levels(quad: &Quad<'_>, mut visit: impl FnMut(u32, u32, [[i64; 2]; 2])) {
-    let Quad {
-        record,
-        extent,
-        texture,
-        sampler,
-        options,
-        ..
-    } = quad;
-    let extent = *extent;
-    let reach = Reach::of(
-        record,
-        extent,
-        texture.size,
-        texture.levels,
-        sampler,
-        options,
-    );
-    let (lod, probes) = match reach {
-        Reach::Isotropic => {
-            let lod = quad_lod(record, extent, texture.size, options.lod);
-            (lod + options.lod_bias, None)
-        }
-        Reach::Probes(probes) => (probes.lod, Some(probes)),
-        Reach::Ellipse(ellipse) => {
-            let size = texture.level_size(ellipse.level);
-            for lane in quad.lanes() {
-                for [x, y] in ellipse.blocks(record.lane_uv(lane), size, extent) {
-                    visit(lane, ellipse.level, [[x, x + 1], [y, y + 1]]);
-                }
-            }
-            return;
-        }
-    };
-    let selection = select_levels(lod, sampler, texture.levels);
-    for level in selection.first..selection.first + selection.count {
-        let size = texture.level_size(level);
-        for probe in 0..probes.map_or(1, |probes| probes.count) {
-            let from_middle = probes.map_or([0; 2], |probes| probes.offset(probe));
-            for lane in quad.lanes() {
-                let uv = record.lane_uv(lane);
-                let axis = |a: usize| {
-                    let at = uv[a].wrapping_add(from_middle[a]);
-                    fetch(at, size[a], extent[a], selection.filter)
-                };
-                visit(lane, level, [axis(0), axis(1)]);
+                visit(lane, level, layer, [[x, x + 1], [y, y + 1]]);
             }
         }
     }

@@ -6,11 +6,11 @@
 
 mod placement;
 
-pub use placement::BlockPlacement;
+pub use placement::{BlockPlacement, interleave};
 
+use crate::error::Broken;
 use crate::texture::{Part, TexelFormat, Texture};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
 
 /// Order of the blocks of a level in memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -68,25 +68,6 @@ impl Default for LayoutConfig {
             texture_order: TextureOrder::Table,
         }
     }
-}
-
-/// Reasons why textures cannot be laid out.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-pub enum LayoutError {
-    /// An unusable alignment.
-    #[error("base alignment: expected a power of two of bytes, found {0}")]
-    Alignment(u64),
-    /// Textures that exceed the address space.
-    #[error("texture {index} ({name}): expected addresses below 2^63, found more")]
-    TooLarge {
-        /// Index in the table.
-        index: usize,
-        /// Name.
-        name: String,
-    },
-    /// A part of a texture that lacks it.
-    #[error("texture {0} ({1}): expected a part of another texture, found levels that it lacks")]
-    Part(usize, String),
 }
 
 /// A format's unit of storage.
@@ -194,10 +175,14 @@ impl Layout {
     ///
     /// # Errors
     /// The alignment is not a power of two, or the textures are too large to address.
-    pub fn new(textures: &[Texture], config: &LayoutConfig) -> Result<Self, LayoutError> {
+    pub fn new(textures: &[Texture], config: &LayoutConfig) -> Result<Self, Broken> {
         let align = config.base_align_bytes;
         if !align.is_power_of_two() {
-            return Err(LayoutError::Alignment(align));
+            return Err(Broken::new(
+                "base alignment",
+                "a power of two of bytes",
+                align,
+            ));
         }
         let mut placed = Vec::with_capacity(textures.len());
         for (index, texture) in textures.iter().enumerate() {
@@ -223,8 +208,10 @@ impl Layout {
         }
         for (index, texture) in textures.iter().enumerate() {
             if let Some(part) = texture.part {
-                placed[index] = within(part, texture, &placed)
-                    .ok_or_else(|| LayoutError::Part(index, texture.name.clone()))?;
+                placed[index] = within(part, texture, &placed).ok_or_else(|| {
+                    let (expected, found) = ("a part of another texture", "levels that it lacks");
+                    of_texture(index, texture, expected, found)
+                })?;
             }
         }
         Ok(Self {
@@ -272,11 +259,13 @@ impl Layout {
     }
 }
 
-fn too_large(index: usize, texture: &Texture) -> LayoutError {
-    LayoutError::TooLarge {
-        index,
-        name: texture.name.clone(),
-    }
+fn too_large(index: usize, texture: &Texture) -> Broken {
+    of_texture(index, texture, "addresses below 2^63", "more")
+}
+
+fn of_texture(index: usize, texture: &Texture, expected: &str, found: &str) -> Broken {
+    let what = format!("texture {index} ({})", texture.name);
+    Broken::new(what, expected, found)
 }
 
 /// Format in memory. The override applies only to ordinary colour: its blocks cannot hold depth or channels

@@ -112,7 +112,7 @@ fn collect(interleaved: u64, bits: u32) -> u32 {
 }
 
 /// Inserts a zero bit after each of 32 bits.
-fn interleave(v: u32) -> u64 {
+pub fn interleave(v: u32) -> u64 {
     let mut v = u64::from(v);
     for (shift, mask) in [
         (16, 0x0000_ffff_0000_ffff),

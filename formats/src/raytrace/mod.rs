@@ -22,6 +22,7 @@ mod write;
 #[cfg(test)]
 mod tests;
 
+use crate::text::name_of;
 use crate::textrace::TraceMeta;
 use crate::view::{Eye, TILE_SIZE_PX};
 pub use camera::EyeCamera;
@@ -147,10 +148,11 @@ impl RayTriangle {
 }
 
 /// Traversal of the hierarchy, which defines a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TraversalKind {
     /// Binary tree; a step tests both children's boxes, as in T&I unit 2.0.
+    #[default]
     Bvh2,
     /// Four-wide tree; a step tests all children's boxes.
     Bvh4,
@@ -171,7 +173,7 @@ impl TraversalKind {
 }
 
 /// The bounding volume hierarchy that the counts refer to.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BvhSummary {
     /// Builder and version, `obvhs 0.4 ploc+reinsertion`.
     pub builder: String,
@@ -227,14 +229,7 @@ pub enum Visit {
 
 impl std::fmt::Display for RayKind {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Self::Primary => "primary",
-            Self::Shadow => "shadow",
-            Self::Reflection => "reflection",
-            Self::Refraction => "refraction",
-            Self::AmbientOcclusion => "ambient-occlusion",
-            Self::Diffuse => "diffuse",
-        })
+        f.write_str(&name_of(self))
     }
 }
 

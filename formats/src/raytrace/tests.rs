@@ -10,6 +10,20 @@ use proptest::prelude::*;
 
 const SIZE_PX: [u32; 2] = [20, 18];
 
+/// A point or a directional light.
+fn light(is_point: bool) -> RayLight {
+    match is_point {
+        true => RayLight::Point {
+            position: [0.1, 0.2, 0.3],
+            color: [1.0; 3],
+        },
+        false => RayLight::Directional {
+            direction: [0.0, -1.0, 0.0],
+            color: [3.0; 3],
+        },
+    }
+}
+
 fn meta(has_visits: bool) -> RaytraceMeta {
     let fov = FovTangents::new(1.2, 1.0, 1.1, 0.9);
     let eye = |x: f32| EyeCamera {
@@ -25,32 +39,23 @@ fn meta(has_visits: bool) -> RaytraceMeta {
         eye_to_clip: [[0.3; 4]; 4],
         position: [0.032, 1.6, 0.0],
     };
+    let views = FrameViews {
+        frame: 0,
+        eyes: [view; 2],
+    };
     RaytraceMeta {
         trace: TraceMeta {
             tool: "test 1".to_owned(),
             command_line: vec!["rays".to_owned()],
             scene: "made up".to_owned(),
             scene_triangles: 40,
-            camera: "default".to_owned(),
-            backend: "rays".to_owned(),
-            driver: "bvh2".to_owned(),
-            seed: 0,
             hmd: Hmd {
-                name: "test".to_owned(),
-                source: "unverified".to_owned(),
                 eye_size_px: SIZE_PX,
                 fov: [fov; 2],
-                ipd_m: 0.064,
-                cant_deg: 0.0,
+                ..Hmd::default()
             },
-            frames: vec![FrameViews {
-                frame: 0,
-                eyes: [view; 2],
-            }],
-            surfaces: None,
-            origin_m: [0.0; 3],
-            techniques: None,
-            program: None,
+            frames: vec![views],
+            ..TraceMeta::default()
         },
         origin: [0.1, 1e6 + 1.0 / 3.0, -7.0],
         eyes: [eye(-0.032), eye(0.032)],
@@ -78,9 +83,7 @@ pub(super) fn tables(has_visits: bool) -> RaytraceTables {
     RaytraceTables {
         meta: meta(has_visits),
         bvh: BvhSummary {
-            builder: "test".to_owned(),
             settings: vec![("leaf".to_owned(), "4".to_owned())],
-            traversal: TraversalKind::Bvh2,
             triangles: 40,
             nodes: 17,
             leaves: 18,
@@ -88,18 +91,10 @@ pub(super) fn tables(has_visits: bool) -> RaytraceTables {
             sah_cost: 61.623_411_2,
             bytes_per_node: 64,
             bytes_per_triangle: 40,
+            ..BvhSummary::default()
         },
         materials: vec![material("clay", false), material("chrome", true)],
-        lights: vec![
-            RayLight::Directional {
-                direction: [0.0, -1.0, 0.0],
-                color: [3.0; 3],
-            },
-            RayLight::Point {
-                position: [0.1, 0.2, 0.3],
-                color: [1.0; 3],
-            },
-        ],
+        lights: vec![light(false), light(true)],
         triangles: (0..20)
             .map(|i| RayTriangle {
                 primitive: 2 * i,

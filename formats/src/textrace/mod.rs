@@ -27,6 +27,7 @@ pub use writer::{EncodedTile, TextraceWriter, encode_tile, encode_tile_as};
 
 use crate::container::ChunkTag;
 use crate::error::{Broken, ensure};
+use crate::parse::Parsed;
 use crate::texture::{Sampler, Texture};
 use crate::view::{Eye, FrameViews, Hmd};
 use serde::{Deserialize, Serialize};
@@ -41,6 +42,9 @@ pub const SUBTEXELS: i32 = 2048;
 pub const TILE_INDEX: ChunkTag = ChunkTag(*b"TIDX");
 /// The encoded tiles, in index order.
 pub const TILES: ChunkTag = ChunkTag(*b"TILE");
+
+/// The bytes after a decoded tile.
+type Decoded<'a> = Parsed<'a, ()>;
 
 /// Encoding of a tile's bytes. Each tile names its own.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -435,6 +439,23 @@ pub struct Tile {
 }
 
 impl Tile {
+    /// Appends a primitive with its records.
+    pub fn push_run(
+        &mut self,
+        primitive: u32,
+        draw: u32,
+        records: impl IntoIterator<Item = QuadRecord>,
+    ) {
+        let first = self.records.len() as u32;
+        self.records.extend(records);
+        self.runs.push(PrimitiveRun {
+            primitive,
+            draw,
+            first,
+            count: self.records.len() as u32 - first,
+        });
+    }
+
     /// Empties the tile and keeps its memory for the next one.
     pub fn clear(&mut self) {
         self.runs.clear();

@@ -2,8 +2,8 @@
 //! encodings.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::{PrimitiveRun, QuadRecord, Tile};
-use crate::parse::{Cursor, Number, Parsed};
+use super::{Decoded, PrimitiveRun, QuadRecord, Tile};
+use crate::parse::{Cursor, Number};
 
 /// Bytes of a run: primitive, draw, records.
 pub const RUN_BYTES: usize = 12;
@@ -23,12 +23,7 @@ pub(super) fn encode(tile: &Tile) -> Vec<u8> {
     bytes
 }
 
-pub(super) fn decode<'a>(
-    runs: u32,
-    records: u32,
-    input: &'a [u8],
-    tile: &mut Tile,
-) -> Parsed<'a, ()> {
+pub(super) fn decode<'a>(runs: u32, records: u32, input: &'a [u8], tile: &mut Tile) -> Decoded<'a> {
     let mut input = Cursor::new(input);
     let mut first = 0u32;
     for _ in 0..runs {

@@ -128,13 +128,7 @@ pub(crate) fn tile() -> impl Strategy<Value = Tile> {
                 };
             }
             records.sort_by_key(|record| (quad_morton(record.x, record.y), record.group));
-            tile.runs.push(PrimitiveRun {
-                primitive,
-                draw,
-                first: tile.records.len() as u32,
-                count: records.len() as u32,
-            });
-            tile.records.extend(records);
+            tile.push_run(primitive, draw, records);
         }
         tile
     })

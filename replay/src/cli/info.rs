@@ -11,6 +11,7 @@ use formats::Trace;
 use formats::container::Container;
 use formats::raytrace::RayKind;
 use formats::raytrace::{Raytrace, RaytraceTables};
+use formats::text::name_of;
 use formats::textrace::{ChosenTechniques, PassKind, Textrace, TraceMeta};
 use formats::texture::{Sampler, Texture};
 use json::{PassJson, RayCounts, Totals, lower, passes, ray_counts, version};
@@ -192,7 +193,7 @@ fn ray_text(trace: &Raytrace) -> Result<String> {
          {} bytes a node, {} a triangle\n{} sample(s) a pixel, reflections {} deep, visits {}, \
          geometry {}, hierarchy {}\n\n",
         bvh.builder,
-        format!("{:?}", bvh.traversal).to_lowercase(),
+        name_of(&bvh.traversal),
         bvh.triangles,
         bvh.nodes,
         bvh.leaves,

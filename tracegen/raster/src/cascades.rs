@@ -166,9 +166,7 @@ mod tests {
             30.0,
         );
         for eye in &eyes {
-            let clip = Mat4::from_cols_array_2d(&eye.eye_to_clip)
-                * Mat4::from_cols_array_2d(&eye.world_to_eye);
-            let world = clip.inverse();
+            let world = eye.clip_from_world().inverse();
             for i in 0..1000_u32 {
                 let ndc = Vec3::new(
                     (i % 10) as f32 / 4.5 - 1.0,

@@ -11,7 +11,7 @@ use formats::textrace::{
     TextraceWriter, Tile, TraceMeta, UvGroup,
 };
 use formats::texture::{ColorSpace, Sampler, TexelFormat, Texture};
-use formats::view::{Eye, EyeView, FovTangents, FrameViews, Hmd};
+use formats::view::{Eye, FovTangents, FrameViews, Hmd};
 use record::{
     Captured, Capturer, DepthReplay, RawDepth, RawRecord, RawRecords, RecordError, Recorder,
     Region, Sink,
@@ -23,17 +23,6 @@ const SIZE_PX: [u32; 2] = [64, 96];
 const EDGE: u32 = 64;
 
 fn tables() -> Tables {
-    let identity = [
-        [1.0, 0.0, 0.0, 0.0],
-        [0.0, 1.0, 0.0, 0.0],
-        [0.0, 0.0, 1.0, 0.0],
-        [0.0, 0.0, 0.0, 1.0],
-    ];
-    let eye = EyeView {
-        world_to_eye: identity,
-        eye_to_clip: identity,
-        position: [0.0; 3],
-    };
     let fov = FovTangents::new(1.0, 1.0, 1.0, 1.0);
     let draw = |first_primitive, primitives| Draw {
         material: "grid".into(),
@@ -53,29 +42,14 @@ fn tables() -> Tables {
     Tables {
         meta: TraceMeta {
             tool: "an analytic capturer".into(),
-            command_line: Vec::new(),
             scene: "triangle".into(),
-            scene_triangles: 3,
-            camera: "default".into(),
-            backend: "analytic".into(),
-            driver: "none".into(),
-            seed: 0,
             hmd: Hmd {
-                name: "square".into(),
-                source: "unverified".into(),
                 eye_size_px: SIZE_PX,
                 fov: [fov; 2],
-                ipd_m: 0.064,
-                cant_deg: 0.0,
+                ..Hmd::default()
             },
-            frames: vec![FrameViews {
-                frame: 0,
-                eyes: [eye; 2],
-            }],
-            surfaces: None,
-            origin_m: [0.0; 3],
-            techniques: None,
-            program: None,
+            frames: vec![FrameViews::default()],
+            ..TraceMeta::default()
         },
         textures: vec![Texture {
             name: "grid".into(),

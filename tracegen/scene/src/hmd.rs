@@ -2,6 +2,7 @@
 
 mod presets;
 
+use formats::error::{Broken, UnknownName, ensure};
 use formats::view::{FovTangents, Hmd, MAX_IPD_M};
 use presets::{Fov, ROWS};
 
@@ -10,29 +11,6 @@ pub const DEFAULT_IPD_M: f32 = 0.064;
 
 /// Largest eye image edge in pixels.
 pub const MAX_EYE_SIZE_PX: u32 = 8192;
-
-/// A display that cannot be rendered for.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum HmdError {
-    /// No preset of that name.
-    #[error("unknown display '{name}': expected one of {known}")]
-    Unknown {
-        /// The requested name.
-        name: String,
-        /// Preset names.
-        known: String,
-    },
-    /// A figure out of range.
-    #[error("{what}: expected {expected}, found {found}")]
-    Invalid {
-        /// Name of the figure.
-        what: &'static str,
-        /// The valid range.
-        expected: String,
-        /// The value found.
-        found: String,
-    },
-}
 
 /// Preset names, the default first.
 pub const PRESETS: [&str; ROWS.len()] = {
@@ -48,12 +26,13 @@ pub const PRESETS: [&str; ROWS.len()] = {
 /// A preset by name.
 ///
 /// # Errors
-/// [`HmdError::Unknown`] lists the names.
-pub fn preset(name: &str) -> Result<Hmd, HmdError> {
+/// An unknown name; the error lists the presets.
+pub fn preset(name: &str) -> Result<Hmd, UnknownName> {
     let Some(row) = ROWS.iter().find(|row| row.name == name) else {
-        return Err(HmdError::Unknown {
+        return Err(UnknownName {
+            what: "unknown display",
             name: name.to_owned(),
-            known: PRESETS.join(", "),
+            known: format!("one of {}", PRESETS.join(", ")),
         });
     };
     let both = |left: FovTangents| [left, mirrored(&left)];
@@ -65,12 +44,7 @@ pub fn preset(name: &str) -> Result<Hmd, HmdError> {
             Fov::SymmetricDeg(degrees) => both(symmetric(*degrees, row.eye_size_px)),
             Fov::LeftDeg(degrees) => {
                 let [left, right, up, down] = degrees.map(|angle| angle.to_radians().tan());
-                both(FovTangents {
-                    left,
-                    right,
-                    up,
-                    down,
-                })
+                both(FovTangents::new(left, right, up, down))
             }
             Fov::Left(left) => both(*left),
             Fov::Both(eyes) => *eyes,
@@ -94,36 +68,25 @@ pub fn symmetric(hfov_deg: f32, size_px: [u32; 2]) -> FovTangents {
     // In f64 so that the tangents do not depend on the order of roundings.
     let horizontal = (f64::from(hfov_deg) / 2.0).to_radians().tan();
     let vertical = horizontal * f64::from(size_px[1]) / f64::from(size_px[0]);
-    FovTangents {
-        left: horizontal as f32,
-        right: horizontal as f32,
-        up: vertical as f32,
-        down: vertical as f32,
-    }
+    FovTangents::new(
+        horizontal as f32,
+        horizontal as f32,
+        vertical as f32,
+        vertical as f32,
+    )
 }
 
 /// Checks every figure of a display.
 ///
 /// # Errors
-/// [`HmdError::Invalid`] names the first figure out of range.
-pub fn validate(hmd: &Hmd) -> Result<(), HmdError> {
-    let check = |ok: bool, what, expected: &str, found: String| {
-        if ok {
-            return Ok(());
-        }
-        let expected = expected.to_owned();
-        Err(HmdError::Invalid {
-            what,
-            expected,
-            found,
-        })
-    };
+/// The first figure out of range.
+pub fn validate(hmd: &Hmd) -> Result<(), Broken> {
     let [width, height] = hmd.eye_size_px;
-    check(
+    ensure(
         (1..=MAX_EYE_SIZE_PX).contains(&width) && (1..=MAX_EYE_SIZE_PX).contains(&height),
         "pixels per eye",
-        &format!("1x1 to {MAX_EYE_SIZE_PX}x{MAX_EYE_SIZE_PX}"),
-        format!("{width}x{height}"),
+        format_args!("1x1 to {MAX_EYE_SIZE_PX}x{MAX_EYE_SIZE_PX}"),
+        format_args!("{width}x{height}"),
     )?;
     for fov in &hmd.fov {
         let FovTangents {
@@ -134,30 +97,30 @@ pub fn validate(hmd: &Hmd) -> Result<(), HmdError> {
         } = *fov;
         let shown = format!("{left},{right},{up},{down}");
         let all = [left, right, up, down];
-        check(
+        ensure(
             all.iter().all(|t| t.is_finite() && t.abs() <= 100.0),
             "field-of-view tangents",
             "left,right,up,down, each from -100 to 100",
-            shown.clone(),
+            &shown,
         )?;
-        check(
+        ensure(
             left + right > 1e-4 && up + down > 1e-4,
             "field-of-view tangents",
             "left + right > 0 and up + down > 0",
-            shown,
+            &shown,
         )?;
     }
-    check(
+    ensure(
         (0.0..=MAX_IPD_M).contains(&hmd.ipd_m),
         "distance between the eyes",
         "0 to 1000 mm, or more in a scene of another scale, up to 1000000 m",
-        format!("{} mm", hmd.ipd_m * 1000.0),
+        format_args!("{} mm", hmd.ipd_m * 1000.0),
     )?;
-    check(
+    ensure(
         (-45.0..=45.0).contains(&hmd.cant_deg),
         "cant",
         "-45 to 45 degrees",
-        format!("{} degrees", hmd.cant_deg),
+        format_args!("{} degrees", hmd.cant_deg),
     )
 }
 

@@ -83,6 +83,15 @@ pub(crate) enum Usage {
     Masked(usize),
 }
 
+impl Usage {
+    fn color_space(self) -> ColorSpace {
+        match self {
+            Self::Color | Self::Masked(_) => ColorSpace::Srgb,
+            Self::Data | Self::AlphaFactor => ColorSpace::Linear,
+        }
+    }
+}
+
 /// One image to decode.
 #[derive(Clone, Debug)]
 pub(crate) struct Request {
@@ -147,10 +156,7 @@ impl Requests {
         let image = |(encoded, header): (Encoded, Header)| Image {
             name: encoded.request.name.clone(),
             size: header.size,
-            color_space: match encoded.request.usage {
-                Usage::Color | Usage::Masked(_) => ColorSpace::Srgb,
-                Usage::Data | Usage::AlphaFactor => ColorSpace::Linear,
-            },
+            color_space: encoded.request.usage.color_space(),
             stored: header.stored,
             source: Arc::new(encoded),
             part: 0,
@@ -172,10 +178,7 @@ struct Header {
 }
 
 /// Size and blocks of an image, from its header.
-struct Described {
-    size: [u32; 2],
-    stored: Option<StoredBlocks>,
-}
+type Described = ([u32; 2], Option<StoredBlocks>);
 
 /// Refuses the first image with which the texels of a scene exceed their bound.
 fn check_total(images: &[(Encoded, Header)]) -> Result<(), SceneError> {
@@ -241,18 +244,15 @@ impl Encoded {
             let bytes = self.read(request)?;
             Ok((self.describe(request, &bytes)?, bytes.len() as u64))
         };
-        let absent = Described {
-            size: [0; 2],
-            stored: None,
-        };
-        let (mask, mask_bytes) = self.mask.as_ref().map_or(Ok((absent, 0)), of)?;
-        let (image, bytes) = of(&self.request)?;
+        let mask = self.mask.as_ref().map(of).transpose()?;
+        let ((mask_size, _), mask_bytes) = mask.unwrap_or_default();
+        let ((size, stored), bytes) = of(&self.request)?;
         let rgba_bytes = |[width, height]: [u32; 2]| u64::from(width) * u64::from(height) * 4;
         Ok(Header {
-            size: image.size,
-            texel_bytes: rgba_bytes(image.size) + rgba_bytes(mask.size),
+            size,
+            texel_bytes: rgba_bytes(size) + rgba_bytes(mask_size),
             encoded_bytes: (bytes, mask_bytes),
-            stored: (image.stored).filter(|stored| self.keeps(image.size, stored.format)),
+            stored: stored.filter(|stored| self.keeps(size, stored.format)),
         })
     }
 
@@ -268,15 +268,9 @@ impl Encoded {
         match containers::of(bytes) {
             Some(kind) => {
                 let header = (kind.header)(bytes).map_err(|e| self.fault(request, kind, e))?;
-                Ok(Described {
-                    size: header.size,
-                    stored: Some(header.stored),
-                })
+                Ok((header.size, Some(header.stored)))
             }
-            None => Ok(Described {
-                size: self.decoder(request, bytes)?.1,
-                stored: None,
-            }),
+            None => Ok((self.decoder(request, bytes)?.1, None)),
         }
     }
 
@@ -321,10 +315,7 @@ impl Encoded {
     fn decode(&self, request: &Request, bytes: &[u8]) -> Result<([u32; 2], Vec<u8>), SceneError> {
         if let Some(kind) = containers::of(bytes) {
             let (size, stored) = self.stored(request, bytes, kind)?;
-            let color_space = match request.usage {
-                Usage::Color | Usage::Masked(_) => ColorSpace::Srgb,
-                Usage::Data | Usage::AlphaFactor => ColorSpace::Linear,
-            };
+            let color_space = request.usage.color_space();
             let texels = stored.texels(0, size, color_space).ok_or_else(|| {
                 let expected = format!("blocks of {:?}", stored.held);
                 self.fault(request, kind, (expected, "others".into()))

@@ -12,7 +12,7 @@ use raster::capture::Pictures;
 use raster::geometry::geometry;
 use record::Recorder;
 use scene::{LoadOptions, Scene};
-use shell::{Output, lasting_arguments};
+use shell::{Output, cannot_write, lasting_arguments};
 use std::path::Path;
 use textures::{Cache, TextureSet};
 
@@ -76,7 +76,6 @@ impl<'a> TraceOutput<'a> {
 
     /// Writes the picture and the trace; both appear or neither does. Returns the size of the trace in bytes.
     pub fn finish(self, pictures: Option<&Pictures>, size_px: [u32; 2]) -> anyhow::Result<u64> {
-        let cannot_write = |path: &Path| format!("cannot write {}", path.display());
         let image = match (self.image, pictures) {
             (Some(path), Some(pictures)) => {
                 let prepared = picture::prepare_side_by_side(path, pictures, size_px);
@@ -120,13 +119,11 @@ pub(super) fn tables(
             camera: world.camera.name.clone(),
             backend: backend.name().into(),
             driver: backend.driver().into(),
-            seed: 0,
             hmd: world.hmd.clone(),
             frames: world.views.clone(),
             surfaces: Some(world.draws.surfaces(fragments)),
             origin_m: world.scene.origin.to_array(),
-            techniques: None,
-            program: None,
+            ..TraceMeta::default()
         },
         textures,
         samplers,

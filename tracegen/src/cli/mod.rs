@@ -135,17 +135,11 @@ pub(crate) fn tool() -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use clap::CommandFactory;
-
     #[test]
-    fn the_command_line_is_well_formed() {
-        Cli::command().debug_assert();
-    }
-
-    #[test]
-    fn no_output_of_a_command_replaces_an_input_of_it() {
-        let pairs = shell::check_file_table(&Cli::command(), file_uses::FILES).unwrap();
-        assert!(pairs > 20, "{pairs} pairs of an input and an output");
+    fn the_command_line_is_well_formed_and_no_output_replaces_an_input() {
+        shell::assert_command_line(
+            &<super::Cli as clap::CommandFactory>::command(),
+            super::file_uses::FILES,
+        );
     }
 }

@@ -30,7 +30,7 @@ impl ObjectiveArgs {
             ensure!(
                 other.is_none(),
                 "--objective: expected time with --auto budget-ms, found {}",
-                other.map_or("", Objective::name)
+                other.map(Objective::name).unwrap_or_default()
             );
             return Ok(Objective::Time);
         }

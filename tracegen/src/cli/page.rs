@@ -11,7 +11,7 @@ use formats::container::{AtomicFile, read_regular};
 use formats::view::EyeView;
 use programs::browser::{Headset, Page, Stepped, Tab};
 use programs::{Launch, Session, Wanted};
-use shell::{Output, Program, find_program, note, warn};
+use shell::{Output, Program, cannot_write, find_program, note, warn};
 use spool::{FramesBy, Settings};
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -153,8 +153,7 @@ fn write(
         (args.capture).finish(&mut session, name, settings, eyes, cameras)?
     };
     if let Some((file, path)) = picture {
-        file.persist()
-            .with_context(|| format!("cannot write {}", path.display()))?;
+        file.persist().with_context(|| cannot_write(path))?;
     }
     Ok(code)
 }
@@ -319,7 +318,7 @@ fn write_picture(path: &Path, picture: Option<&str>) -> anyhow::Result<AtomicFil
     let data = picture.and_then(|picture| picture.strip_prefix("data:image/png;base64,"));
     let bytes = data.and_then(|data| STANDARD.decode(data).ok());
     let bytes = bytes.context("the page has no canvas of WebGL")?;
-    let place = || format!("cannot write {}", path.display());
+    let place = || cannot_write(path);
     let mut file = AtomicFile::create(path).with_context(place)?;
     file.write_all(&bytes).with_context(place)?;
     Ok(file)

@@ -1,8 +1,7 @@
 //! `tracegen precision`.
 
-use anyhow::Context;
 use clap::Args;
-use formats::container::AtomicFile;
+use formats::text::json_text;
 use lab::traversal::precision::{Precision, measure};
 use lab::traversal::reference::TestMesh;
 use serde::Serialize;
@@ -97,10 +96,9 @@ pub fn run(args: &PrecisionArgs) -> anyhow::Result<ExitCode> {
         mesh: format!("a sphere of 10 m, {} triangles", mesh.triangles.len()),
         rows,
     };
-    let text = serde_json::to_string_pretty(&document)? + "\n";
+    let text = json_text(&document)?;
     match &args.output {
-        Some(path) => AtomicFile::write_whole(path, text.as_bytes())
-            .with_context(|| format!("cannot write {}", path.display()))?,
+        Some(path) => shell::write_file(path, text)?,
         None => shell::print(&text)?,
     }
     Ok(ExitCode::SUCCESS)

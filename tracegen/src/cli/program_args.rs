@@ -5,7 +5,6 @@ use super::values::{encoding_parser, parse_bytes};
 use anyhow::Context;
 use clap::Args;
 use clap::builder::TypedValueParser;
-use formats::container::AtomicFile;
 use formats::textrace::{Encoding, TextraceWriter};
 use formats::view::EyeView;
 use programs::list::List;
@@ -13,7 +12,6 @@ use programs::{Check, Drained, Job, Rule, RuleFile, Session, Wanted, check, drai
 use shell::{Output, check_outputs, lasting_arguments, note, warn};
 use spool::{FramesBy, Settings};
 use std::collections::BTreeMap;
-use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -223,11 +221,7 @@ impl ProgramArgs {
             shell::print(&format!("{}\n{}", list.eyes_text(), list.table()))?;
         }
         if let Some(path) = &self.list_page {
-            let place = || format!("cannot write {}", path.display());
-            let mut file = AtomicFile::create(path).with_context(place)?;
-            let page = programs::list::page(program, &lists);
-            file.write_all(page.as_bytes()).with_context(place)?;
-            file.persist().with_context(place)?;
+            shell::write_file(path, programs::list::page(program, &lists))?;
         }
         Ok(())
     }

@@ -66,11 +66,12 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
     if planners.use_multiview() {
         warn_of_multiview_defect(&mut backend)?;
     }
-    let frames: Vec<u32> = (0..args.frames()).collect();
-    let mut tables = world.trace_tables(|frame| planners.of_frame(frame), &frames)?;
+    let numbers: Vec<u32> = (0..args.frames()).collect();
+    let frames = world.plan_all(|frame| planners.of_frame(frame), &numbers)?;
+    let mut tables = world.tables_of(&frames);
     let name = |frame: &u32| schedule.row(*frame).name.clone();
     tables.meta.techniques = Some(ChosenTechniques {
-        frames: frames.iter().map(name).collect(),
+        frames: numbers.iter().map(name).collect(),
         schedule: schedule.to_string(),
         choice: choice.clone(),
     });
@@ -79,12 +80,13 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
     let mut memory = Occlusion::default();
     let mut counts = CaptureCounts::default();
     let (mut first, mut doubtful) = (None, DoubtfulTriangles::default());
-    for &frame in &frames {
-        let planner = planners.of_frame(frame);
-        let shot = world.shoot(&mut backend, planner, frame, &mut memory)?;
+    for frame in frames {
+        let number = frame.number;
+        let planner = planners.of_frame(number);
+        let shot = world.draw(&mut backend, planner, frame, &mut memory)?;
         if first.is_none() {
             first = Some(world.pictures(&mut backend, &shot)?);
-            for eye in &world.views[frame as usize].eyes {
+            for eye in &world.views[number as usize].eyes {
                 doubtful.look(&world, eye);
             }
         }
@@ -101,7 +103,7 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
     doubtful.warn(&world.scene, counts.fragments / u64::from(args.frames()));
     note(&format!(
         "{} frame(s): {} quads, {} fragments; file {file_bytes} bytes",
-        frames.len(),
+        numbers.len(),
         counts.quads,
         counts.fragments
     ));
@@ -136,7 +138,7 @@ fn search(
     )?;
     let choice = Choice {
         budget: budget.to_string(),
-        objective: objective.name().to_owned(),
+        objective: objective.name(),
         reason: found.record.reason,
     };
     Ok((Schedule::of(&found.held), choice))

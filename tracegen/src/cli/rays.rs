@@ -11,6 +11,7 @@ use formats::container::AtomicFile;
 use formats::raytrace::{
     EyeCamera, RayKind, RaytraceMeta, RaytraceTables, RaytraceWriter, TraversalKind,
 };
+use formats::text::name_of;
 use formats::textrace::TraceMeta;
 use rays::bvh::TreeOptions;
 use rays::frame::{RayFrame, trace_frame};
@@ -19,7 +20,7 @@ use rays::scene::TraceScene;
 use rays::tracer::TraceSettings;
 use scene::LoadOptions;
 use scene::paths::MAX_FRAMES;
-use shell::{Progress, Threads, lasting_arguments, note};
+use shell::{Progress, Threads, cannot_write, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -199,14 +200,12 @@ fn prepare(args: &RaysArgs, setup: SceneSetup) -> anyhow::Result<(TraceScene, Ra
             scene_triangles,
             camera: camera.name,
             backend: "rays".to_owned(),
-            driver: format!("{:?}", bvh.traversal).to_lowercase(),
+            driver: name_of(&bvh.traversal),
             seed: args.light.seed,
             hmd,
             frames,
-            surfaces: None,
             origin_m: scene_origin.to_array(),
-            techniques: None,
-            program: None,
+            ..TraceMeta::default()
         },
         origin: (scene_origin + scene.soup.origin).to_array(),
         eyes,
@@ -251,10 +250,6 @@ fn trace(
     })?;
     tables.triangles = std::mem::take(&mut frame.triangles);
     Ok((frame, writer))
-}
-
-fn cannot_write(path: &Path) -> String {
-    format!("cannot write {}", path.display())
 }
 
 fn image_file(frame: &RayFrame, path: &Path) -> anyhow::Result<AtomicFile> {

@@ -4,6 +4,7 @@ use super::path_args::PathArgs;
 use super::pose_args::PoseArgs;
 use clap::Args;
 use clap::builder::{OsStringValueParser, TypedValueParser};
+use formats::error::{Broken, ensure};
 use formats::view::{FovTangents, FrameViews, Hmd};
 use glam::{DVec3, Vec3};
 use scene::paths::{HeadPath, Moments};
@@ -267,7 +268,7 @@ impl CameraArgs {
     ///
     /// # Errors
     /// An unknown camera, or one without a direction.
-    pub fn resolve(&self, scene: &Scene) -> Result<Camera, cameras::CameraError> {
+    pub fn resolve(&self, scene: &Scene) -> anyhow::Result<Camera> {
         let from_scene = cameras::find(scene, self.camera.as_deref())?;
         let camera = match (self.eye, self.target) {
             (Some(eye), Some(target)) => {
@@ -284,7 +285,7 @@ impl CameraArgs {
     }
 
     /// Checks the pose from the flags, as far as that is possible without a scene.
-    fn validate_alone(&self) -> Result<(), cameras::CameraError> {
+    fn validate_alone(&self) -> Result<(), Broken> {
         let (Some(eye), Some(target)) = (self.eye, self.target) else {
             return Ok(());
         };
@@ -336,7 +337,7 @@ impl HmdArgs {
         &self,
         default_size_px: Option<[u32; 2]>,
         vfov_deg: Option<f32>,
-    ) -> Result<Hmd, hmd::HmdError> {
+    ) -> anyhow::Result<Hmd> {
         let mut result = hmd::preset(&self.hmd)?;
         let is_default = self.hmd == hmd::PRESETS[0];
         let size = self.size.or(default_size_px.filter(|_| is_default));
@@ -355,12 +356,7 @@ impl HmdArgs {
         if let Some(degrees) = vfov_deg {
             check_angle("vertical field of view", degrees)?;
             let turned = hmd::symmetric(degrees, [size[1], size[0]]);
-            let fov = FovTangents {
-                left: turned.up,
-                right: turned.down,
-                up: turned.left,
-                down: turned.right,
-            };
+            let fov = FovTangents::new(turned.up, turned.down, turned.left, turned.right);
             result.fov = [fov; 2];
         }
         if let Some(fov) = self.fov_tangents {
@@ -381,15 +377,13 @@ impl HmdArgs {
     }
 }
 
-fn check_angle(what: &'static str, degrees: f32) -> Result<(), hmd::HmdError> {
-    if degrees > 0.0 && degrees < 180.0 {
-        return Ok(());
-    }
-    Err(hmd::HmdError::Invalid {
+fn check_angle(what: &str, degrees: f32) -> Result<(), Broken> {
+    ensure(
+        degrees > 0.0 && degrees < 180.0,
         what,
-        expected: "more than 0 and less than 180 degrees".into(),
-        found: format!("{degrees} degrees"),
-    })
+        "more than 0 and less than 180 degrees",
+        format_args!("{degrees} degrees"),
+    )
 }
 
 /// Exactly `N` finite numbers separated by commas.
@@ -447,12 +441,8 @@ pub(super) fn parse_size(text: &str) -> Result<[u32; 2], String> {
 
 fn parse_tangents(text: &str) -> Result<[FovTangents; 2], String> {
     let eye = |part: &str| {
-        parse_numbers::<4>(part).map(|[left, right, up, down]| FovTangents {
-            left,
-            right,
-            up,
-            down,
-        })
+        parse_numbers::<4>(part)
+            .map(|[left, right, up, down]| FovTangents::new(left, right, up, down))
     };
     match text.split_once(';') {
         Some((left, right)) => Ok([eye(left)?, eye(right)?]),

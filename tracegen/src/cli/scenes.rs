@@ -7,6 +7,7 @@ use ::scenes::BUILTINS;
 use clap::Args;
 #[cfg(test)]
 use formats::schemas::Published;
+use formats::text::json_text;
 use glam::Vec3;
 use scene::{LoadOptions, Loaded, Scene};
 use serde::Serialize;
@@ -113,7 +114,7 @@ pub fn run(args: ScenesArgs) -> anyhow::Result<()> {
                 describe(&load_scene(&spec, &options)?)
             };
             if args.json {
-                json(&description)?
+                json_text(&description)?
             } else {
                 table(&description)
             }
@@ -148,10 +149,6 @@ fn read_textures(
     })
 }
 
-fn json(value: &impl Serialize) -> serde_json::Result<String> {
-    Ok(serde_json::to_string_pretty(value)? + "\n")
-}
-
 fn list(as_json: bool) -> anyhow::Result<String> {
     if as_json {
         let scenes = BUILTINS
@@ -163,7 +160,7 @@ fn list(as_json: bool) -> anyhow::Result<String> {
                 cameras: b.cameras,
             })
             .collect();
-        return Ok(json(&BuiltinList {
+        return Ok(json_text(&BuiltinList {
             schema: LIST_SCHEMA,
             scenes,
         })?);

@@ -2,7 +2,8 @@
 
 use anyhow::Context;
 use clap::Args;
-use formats::container::{AtomicFile, ScratchFolder};
+use formats::container::ScratchFolder;
+use formats::text::json_text;
 use lab::stress::{self, SWEEPS};
 use shell::{Output, Progress};
 use std::path::PathBuf;
@@ -52,11 +53,10 @@ pub fn run(args: &StressArgs) -> anyhow::Result<ExitCode> {
     })?;
     drop(progress);
     drop(scratch);
-    let json = serde_json::to_string_pretty(&report)? + "\n";
+    let json = json_text(&report)?;
     let markdown = report.markdown();
     for (file, text) in [(&json_file, &json), (&markdown_file, &markdown)] {
-        AtomicFile::write_whole(file, text.as_bytes())
-            .with_context(|| format!("cannot write {}", file.display()))?;
+        shell::write_file(file, text)?;
     }
     shell::print(&markdown)?;
     let broken = report.broken();

@@ -6,7 +6,7 @@ use ::scenes::load_with;
 use anyhow::{Context, bail, ensure};
 use clap::{Args, Parser};
 use formats::Trace;
-use formats::container::{AtomicFile, check_regular, read_regular, remove_abandoned};
+use formats::container::{check_regular, read_regular, remove_abandoned};
 use scene::{LoadOptions, TextureSlots};
 use serde::Serialize;
 use shell::{Output, Piece, Progress, Shard, ShardArgs, SlurmArray, Threads, balanced};
@@ -279,8 +279,7 @@ fn capture_all(args: &SweepArgs, planned: &[Planned]) -> anyhow::Result<()> {
         let status = shell::run_child(&mut process);
         if status.context("the program itself")?.success() {
             let text = p.capture.recipe_text(content_checksum(&p.trace)?);
-            AtomicFile::write_whole(&recipe, text.as_bytes())
-                .with_context(|| format!("cannot write {}", recipe.display()))?;
+            shell::write_file(&recipe, text)?;
         } else {
             failed.push(p.capture.file.as_str());
         }

@@ -9,7 +9,7 @@ use super::prepared::{Preparation, Prepared, prepare};
 use super::scene_args::{SceneArgs, SceneSetup};
 use super::values::encoding_parser;
 use crate::study::auto::{AutoRecord, Budget, Objective, choose};
-use crate::study::folder::{self, Folder, RowRecord, StudySetup};
+use crate::study::folder::{self, Folder, Manifest, RowRecord};
 use crate::study::frames;
 use crate::study::measure::Bench;
 use crate::study::rows::Row;
@@ -18,6 +18,8 @@ use crate::study::world::World;
 use ::raster::lavapipe::device::{self, Gpu};
 use anyhow::{Context, ensure};
 use clap::Args;
+use formats::technique_study::SCHEMA;
+use formats::text::name_of;
 use formats::textrace::Encoding;
 use image_error::PIXELS_PER_DEGREE;
 use scene::LoadOptions;
@@ -123,14 +125,14 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
             gpu.adapter
         ));
     }
-    let subject = args.subject(&setup, &gpu)?;
+    let mut manifest = args.manifest(&setup, &gpu)?;
     let Prepared {
         mut world,
         mut backend,
     } = prepare(
         Preparation {
             scene: &args.scene.scene,
-            lens: subject.lens,
+            lens: manifest.lens,
             shadows: args.shadows,
             record_budget: RECORD_BUDGET,
             cache: args.cache,
@@ -139,42 +141,40 @@ pub fn run(args: &TechniquesArgs) -> anyhow::Result<()> {
         gpu,
     )?;
     let rows = args.possible(rows, &world)?;
-    let folder = Folder::create(&args.output, &subject)?;
+    let folder = Folder::create(&args.output, &manifest)?;
     let extent = args.extent();
     let mut bench = Bench {
         world: &mut world,
         backend: &mut backend,
         captures,
         extent: &extent,
-        encoding: subject.trace_encoding,
+        encoding: args.encoding,
         truth: HashMap::new(),
         folder: &folder,
         progress: &progress,
     };
-    let mut records = measure(&mut bench, &rows)?;
+    manifest.rows = measure(&mut bench, &rows)?;
     let auto = args
         .auto
         .map(|budget| measure_auto(&mut bench, budget, objective))
         .transpose()?;
     drop(progress);
-    let auto = auto.map(|(record, row)| {
-        records.push(row);
+    manifest.auto = auto.map(|(record, row)| {
+        manifest.rows.push(row);
         record
     });
-    let defect = match records.iter().any(|row| row.settings.multiview) {
-        true => warn_of_multiview_defect(&mut backend)?,
-        false => None,
-    };
-    let manifest = folder.finish(&subject, &records, auto.as_ref(), defect.as_deref())?;
-    if records
-        .iter()
+    if manifest.rows.iter().any(|row| row.settings.multiview) {
+        manifest.multiview_defect = warn_of_multiview_defect(&mut backend)?;
+    }
+    let path = folder.finish(&manifest)?;
+    if (manifest.rows.iter())
         .flat_map(|row| &row.frames)
         .all(|frame| frame.fragments == Some(0))
     {
         shell::warn("no frame shows anything of the scene: choose another --camera");
     }
-    let mut text = format!("{}: {} rows", manifest.display(), records.len());
-    if let Some(auto) = &auto {
+    let mut text = format!("{}: {} rows", path.display(), manifest.rows.len());
+    if let Some(auto) = &manifest.auto {
         text += &format!(
             "\n--auto {} --objective {}: {}",
             auto.budget,
@@ -257,8 +257,8 @@ fn measure_auto(
 }
 
 impl TechniquesArgs {
-    /// What the study measures: its scene, path, display and device.
-    fn subject(&self, setup: &SceneSetup, gpu: &Gpu) -> anyhow::Result<StudySetup> {
+    /// The manifest before the measurements: scene, path, display and device.
+    fn manifest(&self, setup: &SceneSetup, gpu: &Gpu) -> anyhow::Result<Manifest> {
         let pixels_per_degree =
             image_error::pixels_per_degree(setup.hmd.eye_size_px[0], &setup.hmd.fov[0]);
         ensure!(
@@ -272,16 +272,18 @@ impl TechniquesArgs {
             None => extent.trace_frames.clone(),
             Some(_) => Vec::new(),
         };
-        Ok(StudySetup {
+        Ok(Manifest {
+            schema: SCHEMA.to_owned(),
             tool: super::tool(),
             scene: self.scene.scene.to_string(),
             scene_triangles: setup.scene.triangle_count(),
             instances: setup.scene.instances.len() as u64,
             camera: setup.camera.name.clone(),
-            path: self.path.path.to_string(),
+            path: Some(self.path.path.to_string()),
             path_frames: self.path_frames,
             frames: extent.frames(),
-            fps: self.path.fps,
+            // As given: f64::from would write 59.94 as 59.939998626708984.
+            fps: self.path.fps.to_string().parse()?,
             time_s: self.scene.pose.time,
             animation: self.scene.pose.animation.clone(),
             size_px: setup.hmd.eye_size_px,
@@ -294,9 +296,12 @@ impl TechniquesArgs {
             baseline: Row::baseline().name,
             repeats: self.repeats,
             trace_frames,
-            trace_encoding: self.encoding,
+            trace_encoding: name_of(&self.encoding),
             shadow_cascades: capture_steps::cascades(&setup.scene, self.shadows),
             input_checksum: checksum(&setup.inputs)?,
+            rows: Vec::new(),
+            auto: None,
+            multiview_defect: None,
         })
     }
 

@@ -9,6 +9,7 @@ use super::verified_trace::{look_as, refuse_partial, trace_cascades};
 use anyhow::{Context, ensure};
 use clap::Args;
 use formats::footprint::LodFormula;
+use formats::text::json_text;
 use formats::textrace::{Pass, Tables, Textrace, TextraceWriter};
 use formats::view::{Eye, Lens};
 use lab::verify::frame::{CaptureUnderTest, FrameUnderTest, TileChoice, Verified};
@@ -199,7 +200,7 @@ pub fn run(args: &VerifyArgs) -> anyhow::Result<ExitCode> {
 /// Prints a report, and its failures on stderr.
 fn print(report: &Report, json: bool) -> anyhow::Result<ExitCode> {
     if json {
-        shell::print(&(serde_json::to_string_pretty(report)? + "\n"))?;
+        shell::print(&json_text(report)?)?;
     } else {
         shell::print(&report.table())?;
     }

@@ -6,202 +6,31 @@ use super::auto::AutoRecord;
 use super::counted::Counted;
 use anyhow::{Context, ensure};
 use formats::Trace;
-use formats::container::{AtomicFile, check_regular, checksum, read_regular};
-use formats::textrace::Encoding;
-use formats::view::{Hmd, Lens};
+use formats::container::{check_regular, checksum, read_regular};
+use formats::technique_study;
+use formats::text::json_text;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use shell::cannot_write;
 use std::fs;
 use std::path::{Path, PathBuf};
 use techniques::Settings;
 use techniques::layer::Predicted;
 use xxhash_rust::xxh3::xxh3_64;
 
-const SCHEMA: &str = "tracegen.techniques/1";
+/// The manifest. Without rows it is the configuration of the study, and stored rows are reused as long as that
+/// stays the same.
+pub type Manifest = technique_study::Manifest<RowRecord, AutoRecord>;
 
-/// Configuration of a study: the manifest without rows. Stored rows are reused as long as it stays the same.
-#[derive(Clone, Debug, Serialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct StudySetup {
-    /// Program and version.
-    pub tool: String,
-    /// Scene as given.
-    pub scene: String,
-    /// Triangles, including instances.
-    pub scene_triangles: u64,
-    /// Instances.
-    pub instances: u64,
-    /// Name of the camera.
-    pub camera: String,
-    /// The head's path as given.
-    pub path: String,
-    /// Frames of that path.
-    pub path_frames: u32,
-    /// Numbers of the measured frames, ascending.
-    pub frames: Vec<u32>,
-    /// Frames per second along the path.
-    pub fps: f32,
-    /// Scene time of the path's first frame.
-    #[serde(skip_serializing_if = "is_zero")]
-    pub time_s: f64,
-    /// The animation that plays, as given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub animation: Option<String>,
-    /// Width and height of an eye's picture.
-    pub size_px: [u32; 2],
-    /// The display.
-    #[cfg_attr(test, schemars(with = "serde_json::Map<String, serde_json::Value>"))]
-    pub hmd: Hmd,
-    /// Visible parts of the left and right eye's pictures.
-    #[cfg_attr(
-        test,
-        schemars(with = "[serde_json::Map<String, serde_json::Value>; 2]")
-    )]
-    pub lens: [Lens; 2],
-    /// At the centre of an eye's picture.
-    pub pixels_per_degree: f32,
-    /// Device that renders.
-    pub adapter: String,
-    /// Its driver.
-    pub driver: String,
-    /// Whether the device is the processor, so that times are processor time.
-    pub software_driver: bool,
-    /// Technique that the others are compared with.
-    pub baseline: String,
-    /// Repetitions of each frame's timing.
-    pub repeats: u32,
-    /// Frames of each row's trace.
-    pub trace_frames: Vec<u32>,
-    /// How the tiles of the traces are packed.
-    #[cfg_attr(test, schemars(with = "String"))]
-    pub trace_encoding: Encoding,
-    /// Shadow cascades.
-    pub shadow_cascades: u32,
-    /// Checksum of the files that scene and path are read from.
-    pub input_checksum: String,
-}
+/// A measured row, see [`super::rows`].
+pub type RowRecord = technique_study::Row<Settings, FrameRecord>;
 
-/// Omits a time of zero from manifests.
-fn is_zero(time_s: &f64) -> bool {
-    *time_s == 0.0
-}
-
-/// A measured row.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct RowRecord {
-    /// Name, see [`super::rows`].
-    pub technique: String,
-    /// Title for readers.
-    pub title: String,
-    /// Settings of its capture.
-    #[cfg_attr(test, schemars(with = "serde_json::Map<String, serde_json::Value>"))]
-    pub settings: Settings,
-    /// Techniques that it consists of.
-    pub parts: Vec<String>,
-    /// Whether no visible pixel may change.
-    pub lossless: bool,
-    /// One per measured frame.
-    pub frames: Vec<FrameRecord>,
-    /// Peak memory of the process, if the system reports it.
-    pub peak_memory_bytes: Option<u64>,
-    /// Texels of the scene, which do not depend on the technique.
-    #[serde(default)]
-    pub texture_bytes: u64,
-    /// Texture trace, relative to the folder.
-    pub trace: Option<String>,
-    /// Its content checksum.
-    pub trace_checksum: Option<String>,
-    /// Frames of the trace.
-    pub trace_frames: Vec<u32>,
-}
-
-/// A frame of a row. Names with `_s` are times, which differ from run to run; nothing else does.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-pub struct FrameRecord {
-    /// Number.
-    pub frame: u32,
-    /// Boxes tested against volumes.
-    pub cull_tests: u64,
-    /// Time of culling, the median of the repeats.
-    pub cull_s: f64,
-    /// Draws that were culled although they are visible through the lens, both eyes.
-    pub false_negatives: Option<u64>,
-    /// Draws that were submitted although they are not visible through the lens, both eyes.
-    pub false_positives: Option<u64>,
-    /// Draws submitted.
-    pub draws: u64,
-    /// Calls that submitted them.
-    pub draw_calls: u64,
-    /// Pipelines, materials and meshes set.
-    pub state_changes: u64,
-    /// Vertices of the draws' meshes.
-    pub vertices: u64,
-    /// Triangles of the draws.
-    pub triangles: u64,
-    /// Covered 2x2 quads.
-    pub quads: Option<u64>,
-    /// Shaded fragments.
-    pub fragments: Option<u64>,
-    /// Bytes written to the device for views and lists of draws.
-    pub bytes_uploaded: u64,
-    /// Memory traffic by counts; none if the device cannot capture.
-    #[serde(default)]
-    pub counted: Option<Counted>,
-    /// The sum of these bytes.
-    #[serde(default)]
-    pub memory_bytes: Option<u64>,
-    /// Energy of the counts.
-    #[serde(default)]
-    pub energy_mj: Option<f64>,
-    /// Bytes of pictures read and written, if the frame was reprojected from the one before.
-    #[serde(default)]
-    pub bytes_reprojected: u64,
-    /// Bytes of the colour that the frame is rendered into.
-    #[serde(default)]
-    pub target_color_bytes: u64,
-    /// Bytes of its depth buffers that exist at the same time.
-    #[serde(default)]
-    pub target_depth_bytes: u64,
-    /// Times of the frame without capture, one per repetition.
-    pub frame_s: Vec<f64>,
-    /// Times of the baseline's frame, each measured next to the repetition.
-    pub baseline_s: Vec<f64>,
-    /// Processor time of the frame in each repetition over all threads, if the system reports it.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub processor_s: Vec<f64>,
-    /// Processor time of the baseline next to it.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub baseline_processor_s: Vec<f64>,
-    /// Processor time by stage, the median of the repetitions.
-    pub stages_s: BTreeMap<String, f64>,
-    /// Left and right picture, relative to the folder.
-    pub images: [String; 2],
-    /// CRC-32 of their files.
-    pub image_checksums: [String; 2],
-    /// Errors that the techniques predict.
-    #[cfg_attr(test, schemars(with = "serde_json::Map<String, serde_json::Value>"))]
-    pub predicted: Predicted,
-}
-
-#[derive(Serialize)]
-#[cfg_attr(test, derive(schemars::JsonSchema))]
-struct Manifest<'a> {
-    schema: &'static str,
-    #[serde(flatten)]
-    subject: &'a StudySetup,
-    rows: &'a [RowRecord],
-    #[serde(skip_serializing_if = "Option::is_none")]
-    auto: Option<&'a AutoRecord>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    multiview_defect: Option<&'a str>,
-}
+/// A frame of a row.
+pub type FrameRecord = technique_study::Frame<Counted, Predicted>;
 
 /// The schema of the JSON object.
 #[cfg(test)]
 pub(crate) fn schema() -> formats::schemas::Published {
-    formats::schemas::Published::of::<Manifest<'_>>(SCHEMA)
+    formats::schemas::Published::of::<Manifest>(technique_study::SCHEMA)
 }
 
 /// A finished row with the key of its study.
@@ -290,7 +119,7 @@ impl Folder {
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub fn create(root: &Path, subject: &StudySetup) -> anyhow::Result<Self> {
+    pub fn create(root: &Path, study: &Manifest) -> anyhow::Result<Self> {
         for folder in ["rows", "images", "traces"] {
             let path = root.join(folder);
             fs::create_dir_all(&path).with_context(|| cannot_write(&path))?;
@@ -298,7 +127,7 @@ impl Folder {
         }
         Ok(Self {
             root: root.to_owned(),
-            key: xxh3_64(&serde_json::to_vec(subject)?),
+            key: xxh3_64(&serde_json::to_vec(study)?),
         })
     }
 
@@ -351,7 +180,13 @@ impl Folder {
             None => true,
         };
         let mut frames = row.frames.iter();
-        trace && frames.all(|f| f.images.iter().zip(&f.image_checksums).all(picture))
+        trace
+            && frames.all(|f| {
+                f.images
+                    .iter()
+                    .zip(f.image_checksums.iter().flatten())
+                    .all(picture)
+            })
     }
 
     /// Stores a finished row.
@@ -390,30 +225,13 @@ impl Folder {
         write_json(&self.row_path(name), &kept)
     }
 
-    /// Writes the manifest, which completes the study. `multiview_defect` is the reason why the device drew
-    /// one view after the other although both were to be drawn at once.
+    /// Writes the manifest, which completes the study.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn finish(
-        &self,
-        subject: &StudySetup,
-        rows: &[RowRecord],
-        auto: Option<&AutoRecord>,
-        multiview_defect: Option<&str>,
-    ) -> anyhow::Result<PathBuf> {
+    pub fn finish(&self, manifest: &Manifest) -> anyhow::Result<PathBuf> {
         let path = self.root.join("manifest.json");
-        let schema = SCHEMA;
-        write_json(
-            &path,
-            &Manifest {
-                schema,
-                subject,
-                rows,
-                auto,
-                multiview_defect,
-            },
-        )?;
+        write_json(&path, manifest)?;
         Ok(path)
     }
 
@@ -441,34 +259,30 @@ pub fn trace_checksum(path: &Path) -> anyhow::Result<String> {
 }
 
 fn write_json(path: &Path, value: &impl Serialize) -> anyhow::Result<()> {
-    let text = serde_json::to_string_pretty(value)? + "\n";
-    AtomicFile::write_whole(path, text.as_bytes()).with_context(|| cannot_write(path))
-}
-
-fn cannot_write(path: &Path) -> String {
-    format!("cannot write {}", path.display())
+    shell::write_file(path, json_text(value)?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn subject(frames: &[u32]) -> StudySetup {
-        StudySetup {
+    fn subject(frames: &[u32]) -> Manifest {
+        Manifest {
+            schema: technique_study::SCHEMA.into(),
             tool: "test".into(),
             scene: "test".into(),
             scene_triangles: 1,
             instances: 1,
             camera: "test".into(),
-            path: "walk".into(),
+            path: Some("walk".into()),
             path_frames: 72,
             frames: frames.to_vec(),
             fps: 72.0,
             time_s: 0.0,
             animation: None,
             size_px: [4, 4],
-            hmd: Hmd::default(),
-            lens: [Lens {
+            hmd: formats::view::Hmd::default(),
+            lens: [formats::view::Lens {
                 center: [0.0; 2],
                 radius: 1.0,
             }; 2],
@@ -479,9 +293,12 @@ mod tests {
             baseline: "per-eye".into(),
             repeats: 1,
             trace_frames: Vec::new(),
-            trace_encoding: Encoding::Delta,
+            trace_encoding: "delta".into(),
             shadow_cascades: 0,
             input_checksum: String::new(),
+            rows: Vec::new(),
+            auto: None,
+            multiview_defect: None,
         }
     }
 
@@ -494,7 +311,7 @@ mod tests {
             lossless: true,
             frames: Vec::new(),
             peak_memory_bytes: None,
-            texture_bytes: 0,
+            texture_bytes: None,
             trace: trace.map(str::to_owned),
             trace_checksum: trace.map(|_| "0badcafe".to_owned()),
             trace_frames: Vec::new(),

@@ -9,11 +9,13 @@ use super::world::{Shot, World};
 use formats::textrace::{Encoding, Textrace, TextraceWriter};
 use raster::backend::{Fragments, Marks};
 use raster::culling_truth::Wrong;
+use raster::frame::Frame;
 use raster::lavapipe::Lavapipe;
 use record::{CaptureCounts, Recorder};
+use serde_json::Map;
 use shell::Progress;
+use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::collections::{BTreeMap, HashMap};
 use std::time::Duration;
 use techniques::{Planner, Settings};
 use visibility::Occlusion;
@@ -59,9 +61,9 @@ impl Bench<'_> {
             frame.processor_s = seconds(&times.processor);
             frame.baseline_processor_s = seconds(&times.baseline_processor);
             frame.stages_s = (times.stages.iter())
-                .map(|(stage, times)| ((*stage).to_owned(), median_s(times)))
+                .map(|(stage, times)| ((*stage).to_owned(), median_s(times).into()))
                 .collect();
-            frame.cull_s = frame.stages_s[CULL];
+            frame.cull_s = median_s(&times.stages[CULL]);
         }
         Ok(RowRecord {
             technique: row.name.clone(),
@@ -70,7 +72,7 @@ impl Bench<'_> {
             parts: row.parts.iter().map(|part| part.name.to_owned()).collect(),
             lossless: row.lossless,
             frames,
-            texture_bytes: self.world.texture_bytes,
+            texture_bytes: Some(self.world.texture_bytes),
             peak_memory_bytes: can_forget.then(memory::peak_bytes).flatten(),
             trace_frames: trace
                 .iter()
@@ -96,10 +98,12 @@ impl Bench<'_> {
             // A reprojected frame samples no textures of the scene.
             .filter(|frame| !row.settings.reprojects(*frame))
             .partition(|frame| extent.trace_frames.contains(frame));
-        let tables = [
-            self.world.trace_tables(planner, &kept)?,
-            self.world.trace_tables(planner, &left_out)?,
-        ];
+        let planned = [&kept, &left_out].map(|frames| self.world.plan_all(planner, frames));
+        let [in_trace, others] = planned;
+        let (in_trace, others) = (in_trace?, others?);
+        let tables = [&in_trace, &others].map(|frames| self.world.tables_of(frames));
+        let all = in_trace.into_iter().chain(others);
+        let mut planned: HashMap<u32, Frame> = all.map(|frame| (frame.number, frame)).collect();
         let (trace_name, trace_path) = self.folder.trace(&row.name);
         let mut traced = match kept.is_empty() || !self.captures {
             true => None,
@@ -118,12 +122,12 @@ impl Bench<'_> {
         };
         let mut frames = Vec::new();
         let mut memory = Occlusion::default();
-        for (number, measured) in
-            extent.rendered(row.settings.occlusion || row.settings.half_rate.is_some())
-        {
-            let shot = self
-                .world
-                .shoot(self.backend, planner(number), number, &mut memory)?;
+        for (number, measured) in extent.rendered(row.settings.remembers()) {
+            let (world, backend) = (&mut *self.world, &mut *self.backend);
+            let shot = match planned.remove(&number) {
+                Some(frame) => world.draw(backend, planner(number), frame, &mut memory)?,
+                None => world.shoot(backend, planner(number), number, &mut memory)?,
+            };
             if !measured {
                 continue;
             }
@@ -148,7 +152,7 @@ impl Bench<'_> {
             let multiview = row.settings.multiview;
             frames.push(FrameRecord {
                 images,
-                image_checksums,
+                image_checksums: Some(image_checksums),
                 ..frame_record(number, &shot, counts, wrong, multiview)
             });
             self.progress.advance(1);
@@ -231,14 +235,14 @@ fn frame_record(
         // Textures are added when the trace is complete.
         memory_bytes: counts.map(|counts| shot.counted(counts.fragments).bytes()),
         energy_mj: counts.map(|counts| shot.counted(counts.fragments).energy_mj()),
-        target_color_bytes: targets.color,
-        target_depth_bytes: targets.depth,
+        target_color_bytes: Some(targets.color),
+        target_depth_bytes: Some(targets.depth),
         bytes_reprojected: (shot.reprojection.as_ref()).map_or(0, |made| made.bytes),
         frame_s: Vec::new(),
         baseline_s: Vec::new(),
         processor_s: Vec::new(),
         baseline_processor_s: Vec::new(),
-        stages_s: BTreeMap::new(),
+        stages_s: Map::new(),
         images: Default::default(),
         image_checksums: Default::default(),
         predicted: shot.frame.plan.predicted,

@@ -1,5 +1,7 @@
 //! The techniques by name, and the rows of a study: each technique alone, and combinations.
 
+use anyhow::bail;
+use formats::UnknownName;
 use formats::view::Hmd;
 use techniques::distance::DistanceCull;
 use techniques::foveation::{MODES, Mode};
@@ -288,29 +290,6 @@ pub struct Row {
     pub settings: Settings,
 }
 
-/// An invalid row.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum RowError {
-    /// No technique of that name.
-    #[error("unknown technique '{name}': expected some of {known}, alone or joined by '+'")]
-    Unknown {
-        /// The name as given.
-        name: String,
-        /// Names of all techniques.
-        known: String,
-    },
-    /// Two techniques that change the same setting.
-    #[error("'{row}': {first} and {second} exclude each other")]
-    Contradiction {
-        /// The row as given.
-        row: String,
-        /// One of them.
-        first: String,
-        /// The other.
-        second: String,
-    },
-}
-
 impl Row {
     /// The technique that all others are compared with.
     ///
@@ -343,7 +322,7 @@ impl Row {
     ///
     /// # Errors
     /// Two of the parts exclude each other.
-    pub fn of(parts: Vec<Part>) -> Result<Self, RowError> {
+    pub fn of(parts: Vec<Part>) -> anyhow::Result<Self> {
         if parts.is_empty() {
             return Ok(Self::baseline());
         }
@@ -353,11 +332,11 @@ impl Row {
         for (number, part) in parts.iter().enumerate() {
             let same = |other: &&Part| other.setting() == part.setting();
             if let Some(other) = parts[..number].iter().find(same) {
-                return Err(RowError::Contradiction {
-                    row: name,
-                    first: other.name.clone(),
-                    second: part.name.clone(),
-                });
+                bail!(
+                    "'{name}': {} and {} exclude each other",
+                    other.name,
+                    part.name
+                );
             }
             part.apply(&mut settings);
         }
@@ -376,11 +355,12 @@ impl Row {
     ///
     /// # Errors
     /// An unknown technique, or two that exclude each other.
-    pub fn parse(name: &str) -> Result<Self, RowError> {
+    pub fn parse(name: &str) -> anyhow::Result<Self> {
         let all = Part::all();
         let part = |word: &str| {
             let found = all.iter().find(|part| part.name == word);
-            found.cloned().ok_or_else(|| RowError::Unknown {
+            found.cloned().ok_or_else(|| UnknownName {
+                what: "unknown technique",
                 name: word.to_owned(),
                 known: known(),
             })
@@ -392,7 +372,7 @@ impl Row {
     ///
     /// # Errors
     /// See [`Self::parse`].
-    pub fn parse_list(list: &str) -> Result<Vec<Self>, RowError> {
+    pub fn parse_list(list: &str) -> anyhow::Result<Vec<Self>> {
         let mut rows = vec![Self::baseline()];
         for name in list.split(',').map(str::trim) {
             let row = Self::parse(name)?;
@@ -406,7 +386,7 @@ impl Row {
 
 fn known() -> String {
     let names: Vec<String> = Part::all().into_iter().map(|part| part.name).collect();
-    names.join(", ")
+    format!("some of {}, alone or joined by '+'", names.join(", "))
 }
 
 #[cfg(test)]

@@ -152,9 +152,7 @@ mod tests {
 
     /// A world at infinity: light by direction, smooth enough for linear interpolation.
     fn sky(views: &FrameViews) -> Vec<u8> {
-        let clip_from_direction = Mat4::from_cols_array_2d(&views.eyes[0].eye_to_clip)
-            * Mat4::from_cols_array_2d(&views.eyes[0].world_to_eye);
-        let back = clip_from_direction.inverse();
+        let back = views.eyes[0].clip_from_world().inverse();
         let pixels = (0..80).flat_map(|y| (0..120).map(move |x| (x as f32, y as f32)));
         pixels
             .flat_map(|(x, y)| {

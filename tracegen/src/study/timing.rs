@@ -115,7 +115,7 @@ pub fn in_turns<'s>(
     let frames = extent.frames();
     let remembers = (frames.iter())
         .flat_map(|frame| (0..contestants).map(|c| planner(c, *frame).settings()))
-        .any(|settings| settings.occlusion || settings.half_rate.is_some());
+        .any(Settings::remembers);
     for repeat in 0..extent.repeats as usize {
         let mut memories: Vec<Occlusion> = (0..contestants).map(|_| Occlusion::default()).collect();
         let mut measured = 0;

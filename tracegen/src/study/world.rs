@@ -176,8 +176,28 @@ impl World {
         Ok(())
     }
 
-    /// Renders a frame of the path without capture, and leaves its pictures on the device. `memory` is the
-    /// state of occlusion culling from the frame before.
+    /// Plans frames of the path, each with its planner, before any of them is drawn.
+    ///
+    /// # Errors
+    /// As [`CaptureJob::frame`].
+    pub fn plan_all<'s>(
+        &mut self,
+        planner: impl Fn(u32) -> &'s Planner,
+        frames: &[u32],
+    ) -> Result<Vec<Frame>, RasterError> {
+        (frames.iter())
+            .map(|&number| self.plan(planner(number), number))
+            .collect()
+    }
+
+    /// Poses the scene for a frame, on which its layers depend, and plans the frame.
+    fn plan(&mut self, planner: &Planner, number: u32) -> Result<Frame, RasterError> {
+        self.pose(number)?;
+        self.job(planner).frame(&self.views[number as usize])
+    }
+
+    /// Plans a frame of the path and renders it without capture, and leaves its pictures on the device.
+    /// `memory` is the state of occlusion culling from the frame before.
     ///
     /// # Errors
     /// Driver errors, or eyes that the culling technique does not support.
@@ -193,14 +213,40 @@ impl World {
         {
             return self.reproject(planner, number, &shown);
         }
-        let before = backend.work();
         let start = Instant::now();
-        self.pose(number)?;
+        let frame = self.plan(planner, number)?;
+        self.draw_posed(backend, planner, frame, start.elapsed(), memory)
+    }
+
+    /// Renders a frame that was planned before; otherwise as [`Self::shoot`].
+    ///
+    /// # Errors
+    /// Driver errors.
+    pub fn draw(
+        &mut self,
+        backend: &mut dyn CaptureBackend,
+        planner: &Planner,
+        frame: Frame,
+        memory: &mut Occlusion,
+    ) -> Result<Shot, RasterError> {
+        self.pose(frame.number)?;
+        self.draw_posed(backend, planner, frame, Duration::ZERO, memory)
+    }
+
+    /// Renders a frame for which the scene is posed; `planned` is the time for its plan.
+    fn draw_posed(
+        &mut self,
+        backend: &mut dyn CaptureBackend,
+        planner: &Planner,
+        mut frame: Frame,
+        planned: Duration,
+        memory: &mut Occlusion,
+    ) -> Result<Shot, RasterError> {
+        let (start, before) = (Instant::now(), backend.work());
         backend.pose(&self.scene, &self.draws);
         let posed = backend.work() - before;
+        let planned = planned + start.elapsed();
         let job = self.job(planner);
-        let mut frame = job.frame(&self.views[number as usize])?;
-        let planned = start.elapsed();
         // Targets and masks of another technique's frame would not fit.
         backend.prepare(&frame)?;
         let (start, before) = (Instant::now(), backend.work());
@@ -236,7 +282,7 @@ impl World {
             let depths = (follows == Reprojection::Depth).then(|| job.depths(backend, &shot.frame));
             let depths = depths.transpose()?;
             self.shown = Some(Shown {
-                number,
+                number: shot.frame.number,
                 pictures: self.pictures(backend, &shot)?,
                 depths,
             });
@@ -285,26 +331,15 @@ impl World {
             .collect()
     }
 
-    /// The tables of a trace of some frames, each with its planner.
-    ///
-    /// # Errors
-    /// As [`CaptureJob::plan`].
-    pub fn trace_tables<'s>(
-        &mut self,
-        planner: impl Fn(u32) -> &'s Planner,
-        frames: &[u32],
-    ) -> Result<Tables, RasterError> {
+    /// The tables of a trace of planned frames.
+    pub fn tables_of<'f>(&self, frames: impl IntoIterator<Item = &'f Frame>) -> Tables {
         let mut tables = self.tables.clone();
-        tables.meta.frames = (frames.iter())
-            .map(|&number| self.views[number as usize].clone())
-            .collect();
-        for views in &tables.meta.frames {
-            // The layers of a frame depend on where its draws are.
-            self.pose(views.frame)?;
-            let plan = self.job(planner(views.frame)).plan(views)?;
-            tables.passes.extend(plan.passes(views.frame));
+        tables.meta.frames.clear();
+        for frame in frames {
+            (tables.meta.frames).push(self.views[frame.number as usize].clone());
+            tables.passes.extend(frame.plan.passes(frame.number));
         }
-        Ok(tables)
+        tables
     }
 }
 

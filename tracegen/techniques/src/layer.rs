@@ -47,8 +47,7 @@ impl Layer {
 
     /// World to clip space.
     pub fn clip_from_world(&self) -> Mat4 {
-        Mat4::from_cols_array_2d(&self.view.eye_to_clip)
-            * Mat4::from_cols_array_2d(&self.view.world_to_eye)
+        self.view.clip_from_world()
     }
 
     /// World to a clip space whose far end is the end of the drawn geometry.

@@ -9,7 +9,7 @@
 //! best split is therefore one of these depths, or the nearest allowed split.
 
 use formats::view::EyeView;
-use glam::{Mat4, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 
 /// Properties of a visible draw that the model uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,8 +35,7 @@ impl Object {
     ) -> Option<Self> {
         let mut object: Option<Self> = None;
         for eye in eyes {
-            let clip = Mat4::from_cols_array_2d(&eye.eye_to_clip)
-                * Mat4::from_cols_array_2d(&eye.world_to_eye);
+            let clip = eye.clip_from_world();
             let (mut near_m, mut far_m) = (f32::INFINITY, f32::NEG_INFINITY);
             let (mut first, mut last) = (Vec2::INFINITY, Vec2::NEG_INFINITY);
             for corner in 0..8 {

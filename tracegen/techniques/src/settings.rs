@@ -139,6 +139,11 @@ impl Settings {
         self.half_rate.is_some() && frame % 2 == 1
     }
 
+    /// Whether a frame depends on how the one before it was rendered.
+    pub fn remembers(&self) -> bool {
+        self.occlusion || self.half_rate.is_some()
+    }
+
     /// Checks every value, and that the techniques are compatible.
     ///
     /// # Errors

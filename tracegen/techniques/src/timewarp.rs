@@ -42,10 +42,9 @@ const STEPS: u32 = 6;
 impl<'a> ByDepth<'a> {
     /// Maps between two poses of an eye; `depth` is that of the earlier picture.
     pub fn new(before: &EyeView, now: &EyeView, depth: &'a [f32], size_px: [u32; 2]) -> Self {
-        let clip = |eye: &EyeView| wide(&eye.eye_to_clip) * wide(&eye.world_to_eye);
         Self {
             turned: before_from_now_px(before, now, size_px),
-            now_from_before: clip(now) * clip(before).inverse(),
+            now_from_before: now.clip_from_world_f64() * before.clip_from_world_f64().inverse(),
             depth,
             size_px,
         }

@@ -24,12 +24,14 @@ mod tests;
 pub use cache::Cache;
 
 use cache::KeyHasher;
+use formats::error::{Broken, ensure};
 use formats::texture::{ColorSpace, TexelFormat, Texture};
 use rayon::prelude::*;
 use role::{Alpha, Role};
 use scene::blocks::{self, ImageData};
 use scene::{Image, MAX_IMAGE_SIZE, Scene, SceneError};
 use std::borrow::Cow;
+use std::fmt::Display;
 
 /// A texture ready for upload.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -101,15 +103,8 @@ pub struct TextureSet {
 #[derive(Debug, thiserror::Error)]
 pub enum TextureError {
     /// An invalid size or invalid texels.
-    #[error("image '{image}': expected {expected}, found {found}")]
-    Image {
-        /// Image name.
-        image: String,
-        /// The expected value.
-        expected: String,
-        /// The value found.
-        found: String,
-    },
+    #[error(transparent)]
+    Image(#[from] Broken),
     /// The image cannot be read or decoded.
     #[error(transparent)]
     Source(#[from] SceneError),
@@ -279,16 +274,12 @@ impl Member<'_> {
 
     fn check_size(&self) -> Result<(), TextureError> {
         let [width, height] = self.image.size;
-        if [width, height]
-            .iter()
-            .all(|e| (1..=MAX_IMAGE_SIZE).contains(e))
-        {
-            return Ok(());
-        }
-        Err(self.error(
-            format!("a size from 1x1 to {MAX_IMAGE_SIZE}x{MAX_IMAGE_SIZE}"),
-            format!("{width}x{height}"),
-        ))
+        let sizes = 1..=MAX_IMAGE_SIZE;
+        self.ensure(
+            sizes.contains(&width) && sizes.contains(&height),
+            format_args!("a size from 1x1 to {MAX_IMAGE_SIZE}x{MAX_IMAGE_SIZE}"),
+            format_args!("{width}x{height}"),
+        )
     }
 
     /// The texture for the blocks of the image's file. Levels that the file leaves to be made are averages of
@@ -326,21 +317,25 @@ impl Member<'_> {
     fn check_texels(&self, rgba: &[u8]) -> Result<(), TextureError> {
         let [width, height] = self.image.size;
         let expected = width as usize * height as usize * 4;
-        if rgba.len() == expected {
-            return Ok(());
-        }
-        Err(self.error(
-            format!("{expected} bytes of RGBA8 for {width}x{height}"),
-            format!("{} bytes", rgba.len()),
-        ))
+        self.ensure(
+            rgba.len() == expected,
+            format_args!("{expected} bytes of RGBA8 for {width}x{height}"),
+            format_args!("{} bytes", rgba.len()),
+        )
+    }
+
+    fn ensure(
+        &self,
+        holds: bool,
+        expected: impl Display,
+        found: impl Display,
+    ) -> Result<(), TextureError> {
+        let what = format_args!("image '{}'", self.image.name);
+        Ok(ensure(holds, what, expected, found)?)
     }
 
     fn error(&self, expected: String, found: String) -> TextureError {
-        TextureError::Image {
-            image: self.image.name.clone(),
-            expected,
-            found,
-        }
+        Broken::new(format!("image '{}'", self.image.name), expected, found).into()
     }
 
     /// Key of the texture with levels from `first_level` on, computed from the key of its source.

@@ -59,8 +59,7 @@ impl Rig {
 impl Eye {
     /// World to clip space, as passed to the driver.
     pub(crate) fn clip_from_world(&self) -> Mat4 {
-        Mat4::from_cols_array_2d(&self.view.eye_to_clip)
-            * Mat4::from_cols_array_2d(&self.view.world_to_eye)
+        self.view.clip_from_world()
     }
 
     /// Planes of the drawn volume, for geometry whose coordinates are at most `extent`.

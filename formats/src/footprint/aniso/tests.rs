@@ -198,6 +198,12 @@ fn pixels_that_are_square_or_no_longer_than_a_texel_are_filtered_isotropically()
     }
 }
 
+/// What a quad reads of a texture with all its levels.
+fn reach(quad: &QuadRecord, options: &SamplingOptions) -> Reach {
+    let sampler = Sampler::TRILINEAR_REPEAT;
+    Reach::of(quad, [SIZE; 2], [SIZE; 2], 11, &sampler, options)
+}
+
 #[test]
 fn only_the_rounded_ratio_drops_a_level_for_a_pixel_that_is_slightly_longer_than_wide() {
     let quad = record([512.0, 512.0], [8.08, 0.0], [0.0, 8.0]);
@@ -205,15 +211,7 @@ fn only_the_rounded_ratio_drops_a_level_for_a_pixel_that_is_slightly_longer_than
         (AnisotropyModel::Probes, 3.0),
         (AnisotropyModel::RoundedProbes, 4.04_f32.log2()),
     ] {
-        let sampler = Sampler::TRILINEAR_REPEAT;
-        match Reach::of(
-            &quad,
-            [SIZE; 2],
-            [SIZE; 2],
-            11,
-            &sampler,
-            &options(16, model),
-        ) {
+        match reach(&quad, &options(16, model)) {
             Reach::Probes(probes) => {
                 assert_eq!(probes.count, 2);
                 assert!((probes.lod - lod).abs() < 1e-3, "{model:?} {}", probes.lod);
@@ -228,15 +226,7 @@ fn small_changes_of_the_ratio_change_the_level_little() {
     // Widths of 4 texels, lengths from 4.01 on; the rounded ratio jumps at each integer.
     let lod = |model, length: f64| {
         let quad = record([512.0, 512.0], [0.0, length], [4.0, 0.0]);
-        let sampler = Sampler::TRILINEAR_REPEAT;
-        match Reach::of(
-            &quad,
-            [SIZE; 2],
-            [SIZE; 2],
-            11,
-            &sampler,
-            &options(4, model),
-        ) {
+        match reach(&quad, &options(4, model)) {
             Reach::Probes(probes) => probes.lod,
             other => panic!("{length}: {other:?}"),
         }
@@ -330,13 +320,12 @@ proptest! {
         // Near an integer, the result depends on rounding.
         prop_assume!(px.max(py) > 1.1 && (ratio - ratio.round()).abs() > 1e-2);
         let quad = record([100.0, 900.0], dx, dy);
-        let sampler = Sampler::TRILINEAR_REPEAT;
         let model = match rounded {
             true => AnisotropyModel::RoundedProbes,
             false => AnisotropyModel::Probes,
         };
         let options = options(most, model);
-        match Reach::of(&quad, [SIZE; 2], [SIZE; 2], 11, &sampler, &options) {
+        match reach(&quad, &options) {
             Reach::Isotropic => prop_assert_eq!(count, 1),
             Reach::Probes(probes) => {
                 prop_assert_eq!(probes.count, count);
@@ -358,10 +347,8 @@ proptest! {
         at in prop::array::uniform2(300.0_f64..700.0),
     ) {
         let quad = record(at, [d[0], d[1]], [d[2], d[3]]);
-        let sampler = Sampler::TRILINEAR_REPEAT;
         let options = options(8, AnisotropyModel::Ellipse);
-        let reach = Reach::of(&quad, [SIZE; 2], [SIZE; 2], 11, &sampler, &options);
-        let Reach::Ellipse(ellipse) = reach else {
+        let Reach::Ellipse(ellipse) = reach(&quad, &options) else {
             return Ok(());
         };
         let size = SIZE >> ellipse.level;

@@ -23,9 +23,9 @@ mod plane;
 mod residual;
 mod widths;
 
-use super::Tile;
 use super::bits::{BitWriter, PADDING_BYTES};
-use crate::parse::{Cursor, Fault, Parsed};
+use super::{Decoded, Tile};
+use crate::parse::{Cursor, Fault};
 use codes::Codes;
 use decode::Decoder;
 
@@ -47,12 +47,7 @@ pub(super) fn encode(tile: &Tile) -> Vec<u8> {
     bytes
 }
 
-pub(super) fn decode<'a>(
-    runs: u32,
-    records: u32,
-    input: &'a [u8],
-    tile: &mut Tile,
-) -> Parsed<'a, ()> {
+pub(super) fn decode<'a>(runs: u32, records: u32, input: &'a [u8], tile: &mut Tile) -> Decoded<'a> {
     // The bytes in both directions, each with its own padding, so that both can be read in words.
     let padding = [0; PADDING_BYTES];
     let mut both = [input, &padding, input, &padding].concat();

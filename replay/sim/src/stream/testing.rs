@@ -56,12 +56,7 @@ pub fn meta(eye_size_px: [u32; 2], fov: FovTangents) -> TraceMeta {
 /// Tables with one draw that samples all textures (of these sizes, BC1, all levels) trilinearly, and a
 /// stereo pair of one-tile passes.
 pub fn tables(sizes: &[[u32; 2]]) -> Tables {
-    let fov = FovTangents {
-        left: 1.0,
-        right: 1.0,
-        up: 1.0,
-        down: 1.0,
-    };
+    let fov = FovTangents::new(1.0, 1.0, 1.0, 1.0);
     Tables {
         meta: meta([16, 16], fov),
         textures: sizes
@@ -309,12 +304,7 @@ impl Synthetic {
 
     fn tables(&self, primitives: u32) -> Tables {
         let size = |texture: u32| 1024 >> (texture % 3 / 2);
-        let fov = FovTangents {
-            left: 1.19,
-            right: 1.19,
-            up: 1.34,
-            down: 1.34,
-        };
+        let fov = FovTangents::new(1.19, 1.19, 1.34, 1.34);
         Tables {
             meta: TraceMeta {
                 tool: "replay".into(),

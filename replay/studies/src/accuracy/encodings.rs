@@ -5,6 +5,7 @@ use super::headline::Replayed;
 use super::inputs::{Inputs, time_ratio};
 use super::metric::{Metric, metric};
 use super::study::{Choice, Study, StudyError};
+use formats::text::name_of;
 use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as};
 use sim::stream::TileSource;
 
@@ -37,7 +38,7 @@ fn encodings(inputs: &Inputs<'_>) -> Result<Vec<Choice>, StudyError> {
             let share = 100.0 * bytes.len() as f64 / raw_bytes as f64;
             let found = Replayed::new(&Textrace::from_bytes(bytes)?, config)?;
             choices.push(Choice {
-                name: format!("{encoding:?}").to_lowercase(),
+                name: name_of(&encoding),
                 scene: subject.label.clone(),
                 time_ratio: Some(time_ratio(found.time, expected.time)),
                 values: vec![found.errors(&expected)[0], Some(share)],

@@ -1,6 +1,7 @@
 //! Checks rules of a manifest that the types of its keys do not express.
 
-use super::manifest::{Frame, MANIFEST_SCHEMA, Manifest, ManifestRow, numbers};
+use super::manifest::{Frame, Manifest, ManifestRow, numbers};
+use formats::technique_study::SCHEMA;
 use formats::view::MAX_EYE_SIZE_PX;
 use std::path::{Component, Path};
 
@@ -37,9 +38,9 @@ fn ensure(
 /// Checks every rule; fails with the first key that breaks one.
 pub fn check(manifest: &Manifest) -> Checked {
     ensure(
-        manifest.schema == MANIFEST_SCHEMA,
+        manifest.schema == SCHEMA,
         "schema",
-        MANIFEST_SCHEMA,
+        SCHEMA,
         format_args!("`{}`", manifest.schema),
     )?;
     let broken = |key: &str, broken: formats::error::Broken| Fault {

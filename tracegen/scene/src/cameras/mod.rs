@@ -13,40 +13,16 @@ pub use default::{DEFAULT_NAME, around, default_camera};
 use super::{Camera, Scene};
 use crate::origin::relative;
 use crate::suggest::did_you_mean;
+use formats::error::{Broken, UnknownName};
 use formats::view::{EyeView, FovTangents, FrameViews, Hmd};
 use glam::{Affine3A, DVec3, Mat3, Mat4, Vec3, Vec4};
-
-/// A camera that cannot be used.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum CameraError {
-    /// No camera of that name.
-    #[error("no camera '{name}': expected one of {known}{suggestion}")]
-    Unknown {
-        /// The requested name.
-        name: String,
-        /// Names of the scene's cameras.
-        known: String,
-        /// A similar name, or empty.
-        suggestion: String,
-    },
-    /// A pose without a direction, or planes in the wrong order.
-    #[error("camera '{camera}': expected {expected}, found {found}")]
-    Invalid {
-        /// Name of the camera.
-        camera: String,
-        /// What is expected.
-        expected: &'static str,
-        /// What was found.
-        found: String,
-    },
-}
 
 /// Finds a scene's camera by its exact name, or by its name without the prefix `cam_`; the first
 /// camera where no name is given.
 ///
 /// # Errors
-/// [`CameraError::Unknown`] lists the names.
-pub fn find<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a Camera, CameraError> {
+/// An unknown name; the error lists the names.
+pub fn find<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a Camera, UnknownName> {
     let wanted = name.unwrap_or_default();
     let matches = |c: &&Camera| c.name == wanted || c.name.strip_prefix("cam_") == Some(wanted);
     let found = match name {
@@ -56,13 +32,12 @@ pub fn find<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a Camera, Came
     };
     found.ok_or_else(|| {
         let names: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
-        let known = names.join(", ");
         let short = names.iter().filter_map(|name| name.strip_prefix("cam_"));
         let suggestion = did_you_mean(wanted, names.iter().copied().chain(short));
-        CameraError::Unknown {
+        UnknownName {
+            what: "no camera",
             name: wanted.to_owned(),
-            known,
-            suggestion,
+            known: format!("one of {}{suggestion}", names.join(", ")),
         }
     })
 }
@@ -70,53 +45,50 @@ pub fn find<'a>(scene: &'a Scene, name: Option<&str>) -> Result<&'a Camera, Came
 /// Checks that a camera has a direction and that its planes are in order.
 ///
 /// # Errors
-/// [`CameraError::Invalid`] says what is wrong.
-pub fn validate(camera: &Camera) -> Result<(), CameraError> {
-    let invalid = |expected, found: String| CameraError::Invalid {
-        camera: camera.name.clone(),
-        expected,
-        found,
-    };
+/// What is wrong.
+pub fn validate(camera: &Camera) -> Result<(), Broken> {
     let Camera {
         eye, target, up, ..
     } = *camera;
     let steps = 16.0 * f64::from(f32::EPSILON);
-    check_direction(eye.as_dvec3(), target.as_dvec3(), up, steps)
-        .map_err(|(expected, found)| invalid(expected, found))?;
+    check_direction(&camera.name, eye.as_dvec3(), target.as_dvec3(), up, steps)?;
     let (near, far) = (camera.near, camera.far);
     if !(near.is_finite() && near > 0.0 && far > near) {
-        return Err(invalid("0 < near < far", format!("near {near}, far {far}")));
+        let found = format!("near {near}, far {far}");
+        return Err(broken(&camera.name, "0 < near < far", found));
     }
     Ok(())
 }
 
-/// Checks that an eye has a viewing direction: the distance to its target must exceed the rounding
-/// error, `steps` times the eye's distance from zero. Otherwise returns what was expected and what
-/// was found.
+fn broken(camera: &str, expected: &str, found: String) -> Broken {
+    Broken::new(format!("camera '{camera}'"), expected, found)
+}
+
+/// Checks that a camera's eye has a viewing direction: the distance to its target must exceed the
+/// rounding error, `steps` times the eye's distance from zero.
 fn check_direction(
+    name: &str,
     eye: DVec3,
     target: DVec3,
     up: Vec3,
     steps: f64,
-) -> Result<(), (&'static str, String)> {
+) -> Result<(), Broken> {
     if !(eye.is_finite() && target.is_finite() && up.is_finite()) {
         let found = format!("eye {eye}, target {target}, up {up}");
-        return Err(("finite coordinates", found));
+        return Err(broken(name, "finite coordinates", found));
     }
     let forward = target - eye;
     // The square must be representable in single precision.
     let least = f64::from(f32::MIN_POSITIVE).sqrt();
     if forward.length() < (steps * eye.length()).max(least) {
         let found = format!("eye {eye}, target {target}");
-        return Err(("a target away from the eye", found));
+        return Err(broken(name, "a target away from the eye", found));
     }
     let forward = forward.as_vec3();
     if forward.normalize().cross(up.normalize_or_zero()).length() < 1e-4 {
         let found = format!("up {up}, direction {forward}");
-        return Err((
-            "an up vector that is not along the viewing direction",
-            found,
-        ));
+        let expected = "an up vector that is not along the viewing direction";
+        return Err(broken(name, expected, found));
     }
     Ok(())
 }
@@ -144,14 +116,14 @@ pub(crate) fn look_of_node(place: &Affine3A) -> Option<(Vec3, Vec3, Vec3)> {
 /// and far planes are those of `like`, a camera of the scene: they fit its scale.
 ///
 /// # Errors
-/// [`CameraError::Invalid`] for a pose without a viewing direction.
+/// A pose without a viewing direction.
 pub fn posed(
     eye: DVec3,
     target: DVec3,
     up: Vec3,
     origin: DVec3,
     like: &Camera,
-) -> Result<Camera, CameraError> {
+) -> Result<Camera, Broken> {
     let camera = Camera {
         name: "custom".into(),
         eye: relative(eye, origin),
@@ -160,13 +132,7 @@ pub fn posed(
         ..like.clone()
     };
     // Checked before rounding, which may make the two points equal.
-    check_direction(eye, target, up, 16.0 * f64::EPSILON).map_err(|(expected, found)| {
-        CameraError::Invalid {
-            camera: camera.name.clone(),
-            expected,
-            found,
-        }
-    })?;
+    check_direction(&camera.name, eye, target, up, 16.0 * f64::EPSILON)?;
     Ok(camera)
 }
 
@@ -241,11 +207,11 @@ pub fn frame_views(
 /// The frame of a head that stands still at a camera.
 ///
 /// # Errors
-/// [`CameraError::Invalid`] for a camera that cannot be used.
-pub fn still_frame(camera: &Camera, hmd: &Hmd) -> Result<Vec<FrameViews>, CameraError> {
+/// A camera that cannot be used.
+pub fn still_frame(camera: &Camera, hmd: &Hmd) -> Result<Vec<FrameViews>, Broken> {
     validate(camera)?;
     Ok(frame_views(camera, hmd, 0, &[head_pose(camera)]))
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -4,7 +4,7 @@ use super::*;
 use crate::hmd::{self, disparity_px};
 use glam::Vec2;
 
-fn camera() -> Camera {
+pub(crate) fn camera() -> Camera {
     Camera {
         name: "test".into(),
         eye: Vec3::new(1.0, 2.0, 3.0),
@@ -17,9 +17,7 @@ fn camera() -> Camera {
 }
 
 fn clip(view: &EyeView, point: Vec4) -> Vec4 {
-    Mat4::from_cols_array_2d(&view.eye_to_clip)
-        * Mat4::from_cols_array_2d(&view.world_to_eye)
-        * point
+    view.clip_from_world() * point
 }
 
 /// Pixel coordinates of a homogeneous world point (w = 0 is a direction: a point at infinity).
@@ -57,12 +55,7 @@ fn disparity_is_width_over_two_tan_times_ipd_over_depth() {
 
 #[test]
 fn the_projection_matches_a_hand_computation() {
-    let fov = FovTangents {
-        left: 1.0,
-        right: 0.5,
-        up: 2.0,
-        down: 1.0,
-    };
+    let fov = FovTangents::new(1.0, 0.5, 2.0, 1.0);
     let m = projection(&fov, 1.0, 3.0);
     let ndc = |p: Vec3| m.project_point3(p);
     // The corners of the near and far planes, and depth at 2: n (f - z) / (z (f - n)) = 0.25.

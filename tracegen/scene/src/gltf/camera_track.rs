@@ -8,7 +8,7 @@ use super::channels::{self, Moved};
 use super::{Parsed, nodes, parse, read_buffers, rig, tree};
 use crate::SceneError;
 use crate::animation::{Channel, Curve};
-use crate::files::{Origin, read_start, shown};
+use crate::files::{Origin, shown};
 use crate::lookup::Lookup;
 use crate::paths::CameraTrack;
 use crate::warnings::Warnings;
@@ -27,18 +27,18 @@ pub(crate) fn camera_track(
     camera: Option<&str>,
 ) -> Result<(CameraTrack, Vec<String>), SceneError> {
     let origin = Origin::new(path);
-    let (bytes, _) = read_start(path, "path", u64::MAX)?;
     let mut warnings = Warnings::default();
     // The scene loader's warnings do not concern the path.
     let Parsed {
         document,
         transforms,
         blob,
+        json_bytes,
         ..
-    } = parse(&origin, &bytes, &mut Warnings::default())?;
+    } = parse(&origin, "path", &mut Warnings::default())?;
     let root = document.as_json();
     let buffers = read_buffers(&origin, root, blob, &mut Lookup::default(), &mut warnings)?;
-    let buffers = Buffers::new(root, buffers, &origin, bytes.len());
+    let buffers = Buffers::new(root, buffers, &origin, json_bytes);
     let mut targets = channels::targets(root, 0..root.animations.len(), &origin)?;
     let tree = tree::read(root, &origin)?;
     let cameras = cameras(root);
@@ -73,8 +73,7 @@ pub(crate) fn camera_track(
     for &node in &nodes {
         for target in targets.remove(&node).unwrap_or_default() {
             if let Moved::Joint(channel) = target.moved {
-                let (place, sampler) = (&target.place, target.sampler);
-                let curve = channels::curve(&buffers, place, channel, sampler, &mut warnings)?;
+                let curve = target.keys(&buffers).curve(channel, &mut warnings)?;
                 curves.entry(node).or_default().push((channel, curve));
             }
         }

@@ -5,11 +5,12 @@ use crate::SceneError;
 use crate::animation::{Channel, Curve, Interpolation, WeightCurve};
 use crate::files::Origin;
 use crate::warnings::Warnings;
-use glam::{DVec3, DVec4};
+use glam::DVec4;
 use gltf::json::Root;
 use gltf::json::animation::{Interpolation as JsonInterpolation, Property, Sampler};
 use gltf::json::validation::Checked;
 use std::collections::HashMap;
+use std::fmt::Display;
 
 /// The property of a node that a channel animates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +38,17 @@ pub(super) struct Target<'a> {
     /// Its place in the file.
     pub place: String,
     pub sampler: &'a Sampler,
+}
+
+impl Target<'_> {
+    /// The keys of the channel.
+    pub fn keys<'a>(&'a self, buffers: &'a Buffers<'a>) -> Keys<'a> {
+        Keys {
+            buffers,
+            channel: &self.place,
+            sampler: self.sampler,
+        }
+    }
 }
 
 /// The channels of each node in the given animations.
@@ -87,144 +99,118 @@ pub(super) fn targets<'a>(
     Ok(targets)
 }
 
-/// The place of a channel's sampler, for errors.
-struct Place<'a> {
-    origin: &'a Origin,
+/// A channel's sampler, named in errors.
+pub(super) struct Keys<'a> {
+    buffers: &'a Buffers<'a>,
     channel: &'a str,
+    sampler: &'a Sampler,
 }
 
-impl Place<'_> {
+impl Keys<'_> {
     fn invalid<T>(&self, expected: String, found: String) -> Result<T, SceneError> {
         let place = format!("{}, its sampler", self.channel);
-        Err(self.origin.invalid(place, expected, found))
+        Err(self.buffers.origin.invalid(place, expected, found))
     }
 
-    /// Checks the number of values against the number of keys.
-    fn check_count(
+    /// Interpolation, times and values, of which a key has `of_key`.
+    fn read<const N: usize, T: Display>(
         &self,
-        found: usize,
-        of_key: usize,
-        interpolation: Interpolation,
-        times_s: &[f64],
-    ) -> Result<(), SceneError> {
+        (what, of_key): (&'static str, usize),
+        value: impl Fn([f64; N]) -> T,
+        is_finite: impl Fn(&T) -> bool,
+        warnings: &mut Warnings,
+    ) -> Result<(Interpolation, Vec<f64>, Vec<T>), SceneError> {
+        let (interpolation, times_s) = self.times(warnings)?;
+        let floats = self.buffers.floats::<N>(at(&self.sampler.output), what)?;
+        let values: Vec<T> = (floats.into_iter())
+            .map(|floats| value(floats.map(f64::from)))
+            .collect();
         let expected = times_s.len() * of_key * interpolation.values_per_key();
-        if found == expected {
-            return Ok(());
+        if values.len() != expected {
+            let expected = format!("{expected} values for {} times", times_s.len());
+            return self.invalid(expected, values.len().to_string());
         }
-        let expected = format!("{expected} values for {} times", times_s.len());
-        self.invalid(expected, found.to_string())
+        if let Some(key) = values.iter().position(|value| !is_finite(value)) {
+            let found = format!("{} at {key}", values[key]);
+            return self.invalid("finite values".to_owned(), found);
+        }
+        Ok((interpolation, times_s, values))
     }
-}
 
-/// The interpolation and times of the keys.
-fn keys(
-    buffers: &Buffers<'_>,
-    place: &Place<'_>,
-    sampler: &Sampler,
-    warnings: &mut Warnings,
-) -> Result<(Interpolation, Vec<f64>), SceneError> {
-    let interpolation = match sampler.interpolation {
-        Checked::Valid(JsonInterpolation::Linear) => Interpolation::Linear,
-        Checked::Valid(JsonInterpolation::Step) => Interpolation::Step,
-        Checked::Valid(JsonInterpolation::CubicSpline) => Interpolation::Cubic,
-        Checked::Invalid => {
-            let expected = "LINEAR, STEP or CUBICSPLINE interpolation".to_owned();
-            return place.invalid(expected, "another".to_owned());
+    /// The interpolation and times of the keys.
+    fn times(&self, warnings: &mut Warnings) -> Result<(Interpolation, Vec<f64>), SceneError> {
+        let interpolation = match self.sampler.interpolation {
+            Checked::Valid(JsonInterpolation::Linear) => Interpolation::Linear,
+            Checked::Valid(JsonInterpolation::Step) => Interpolation::Step,
+            Checked::Valid(JsonInterpolation::CubicSpline) => Interpolation::Cubic,
+            Checked::Invalid => {
+                let expected = "LINEAR, STEP or CUBICSPLINE interpolation".to_owned();
+                return self.invalid(expected, "another".to_owned());
+            }
+        };
+        let times = self
+            .buffers
+            .floats::<1>(at(&self.sampler.input), "times: scalar floats")?;
+        let times_s: Vec<f64> = times.iter().map(|[time]| f64::from(*time)).collect();
+        let ascending = times_s.is_sorted() && times_s.iter().all(|t| t.is_finite());
+        if times_s.is_empty() || !ascending {
+            return self.invalid(
+                "at least one time, finite and ascending".to_owned(),
+                format!("{} times that are not", times_s.len()),
+            );
         }
-    };
-    let times = buffers.floats::<1>(at(&sampler.input), "times: scalar floats")?;
-    let times_s: Vec<f64> = times.iter().map(|[time]| f64::from(*time)).collect();
-    let ascending = times_s.is_sorted() && times_s.iter().all(|t| t.is_finite());
-    if times_s.is_empty() || !ascending {
-        return place.invalid(
-            "at least one time, finite and ascending".to_owned(),
-            format!("{} times that are not", times_s.len()),
-        );
-    }
-    let equal = times_s.windows(2).filter(|pair| pair[0] == pair[1]).count();
-    if equal > 0 {
-        warnings.count("equal times", || {
-            let channel = place.channel;
+        let equal = times_s.windows(2).filter(|pair| pair[0] == pair[1]).count();
+        if equal > 0 {
+            warnings.count("equal times", || {
+            let channel = self.channel;
             format!("{channel}: {equal} keys have the time of the key before; the last one counts from then on")
         });
+        }
+        Ok((interpolation, times_s))
     }
-    Ok((interpolation, times_s))
-}
 
-/// Reads the curve of a channel that moves a node.
-pub(super) fn curve(
-    buffers: &Buffers<'_>,
-    place: &str,
-    channel: Channel,
-    sampler: &Sampler,
-    warnings: &mut Warnings,
-) -> Result<Curve, SceneError> {
-    let place = Place {
-        origin: buffers.origin,
-        channel: place,
-    };
-    let (interpolation, times_s) = keys(buffers, &place, sampler, warnings)?;
-    let values: Vec<DVec4> = if channel == Channel::Rotation {
-        let values = buffers.floats::<4>(at(&sampler.output), "rotations: vectors of 4 floats")?;
-        values
-            .into_iter()
-            .map(|q| DVec4::from_array(q.map(f64::from)))
-            .collect()
-    } else {
-        let values = buffers.floats::<3>(at(&sampler.output), "vectors of 3 floats")?;
-        let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from)).extend(0.0);
-        values.into_iter().map(wide).collect()
-    };
-    place.check_count(values.len(), 1, interpolation, &times_s)?;
-    if let Some(key) = values.iter().position(|value| !value.is_finite()) {
-        return place.invalid(
-            "finite values".to_owned(),
-            format!("{} at {key}", values[key]),
-        );
+    /// Reads the curve of a channel that moves a node.
+    pub fn curve(&self, channel: Channel, warnings: &mut Warnings) -> Result<Curve, SceneError> {
+        let is_finite = |value: &DVec4| value.is_finite();
+        let (interpolation, times_s, values) = if channel == Channel::Rotation {
+            let what = "rotations: vectors of 4 floats";
+            self.read((what, 1), DVec4::from_array, is_finite, warnings)?
+        } else {
+            let wide = |[x, y, z]: [f64; 3]| DVec4::new(x, y, z, 0.0);
+            self.read(("vectors of 3 floats", 1), wide, is_finite, warnings)?
+        };
+        // Each value of a cubic curve is stored between its two tangents.
+        let a_key = interpolation.values_per_key();
+        let of_keys = || values.iter().skip(a_key / 2).step_by(a_key);
+        let unit = |q: &&DVec4| (q.length() - 1.0).abs() <= 1e-2;
+        if channel == Channel::Rotation && of_keys().count() != of_keys().filter(unit).count() {
+            return self.invalid(
+                "unit quaternions (a length of 1, to 0.01)".to_owned(),
+                "another length".to_owned(),
+            );
+        }
+        Ok(Curve {
+            interpolation,
+            times_s,
+            values,
+        })
     }
-    // Each value of a cubic curve is stored between its two tangents.
-    let a_key = interpolation.values_per_key();
-    let keys = || values.iter().skip(a_key / 2).step_by(a_key);
-    let unit = |q: &&DVec4| (q.length() - 1.0).abs() <= 1e-2;
-    if channel == Channel::Rotation && keys().count() != keys().filter(unit).count() {
-        return place.invalid(
-            "unit quaternions (a length of 1, to 0.01)".to_owned(),
-            "another length".to_owned(),
-        );
-    }
-    Ok(Curve {
-        interpolation,
-        times_s,
-        values,
-    })
-}
 
-/// Reads the curve of a channel that animates the weights of morph targets.
-pub(super) fn weight_curve(
-    buffers: &Buffers<'_>,
-    place: &str,
-    targets: usize,
-    sampler: &Sampler,
-    warnings: &mut Warnings,
-) -> Result<WeightCurve, SceneError> {
-    let place = Place {
-        origin: buffers.origin,
-        channel: place,
-    };
-    let (interpolation, times_s) = keys(buffers, &place, sampler, warnings)?;
-    let values = buffers.floats::<1>(at(&sampler.output), "weights: scalar floats")?;
-    let values: Vec<f64> = values.iter().map(|[weight]| f64::from(*weight)).collect();
-    place.check_count(values.len(), targets, interpolation, &times_s)?;
-    if let Some(key) = values.iter().position(|value| !value.is_finite()) {
-        return place.invalid(
-            "finite values".to_owned(),
-            format!("{} at {key}", values[key]),
-        );
+    /// Reads the curve of a channel that animates the weights of morph targets.
+    pub fn weights(
+        &self,
+        targets: usize,
+        warnings: &mut Warnings,
+    ) -> Result<WeightCurve, SceneError> {
+        let of_key = ("weights: scalar floats", targets);
+        let is_finite = |weight: &f64| weight.is_finite();
+        let (interpolation, times_s, values) =
+            self.read(of_key, |[weight]| weight, is_finite, warnings)?;
+        Ok(WeightCurve {
+            interpolation,
+            times_s,
+            values,
+            targets,
+        })
     }
-    Ok(WeightCurve {
-        interpolation,
-        times_s,
-        values,
-        targets,
-    })
 }

@@ -8,12 +8,14 @@ use serde::Deserialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, HashSet};
 
-/// Extensions with textures of additional layers of a material.
+/// Extensions with textures of a material.
 pub(super) const ANISOTROPY: &str = "KHR_materials_anisotropy";
 pub(super) const CLEARCOAT: &str = "KHR_materials_clearcoat";
 pub(super) const DIFFUSE_TRANSMISSION: &str = "KHR_materials_diffuse_transmission";
+pub(super) const GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
 pub(super) const IRIDESCENCE: &str = "KHR_materials_iridescence";
 pub(super) const SHEEN: &str = "KHR_materials_sheen";
+pub(super) const SPECULAR: &str = "KHR_materials_specular";
 pub(super) const TRANSMISSION: &str = "KHR_materials_transmission";
 pub(super) const VOLUME: &str = "KHR_materials_volume";
 
@@ -30,9 +32,9 @@ pub(super) const SUPPORTED: [&str; 23] = [
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     IRIDESCENCE,
-    "KHR_materials_pbrSpecularGlossiness",
+    GLOSSINESS,
     SHEEN,
-    "KHR_materials_specular",
+    SPECULAR,
     TRANSMISSION,
     "KHR_materials_unlit",
     "KHR_materials_variants",

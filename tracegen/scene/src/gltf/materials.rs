@@ -11,8 +11,8 @@
 
 use super::accessors::Buffers;
 use super::find_file;
-use super::layers::LAYERS;
-use crate::files::{Origin, shown};
+use super::material_textures::{CORE, GLOSSINESS, LAYERS, MaterialTexture};
+use crate::files::shown;
 use crate::image_files::{Embedded, Request, Requests, Source, Usage};
 use crate::lookup::Lookup;
 use crate::uri::{self, Uri};
@@ -22,8 +22,9 @@ use formats::texture::{Filter, MipFilter, Sampler, Wrap};
 use glam::{Vec3, Vec4};
 use gltf::json::extensions::texture::TextureTransform;
 use gltf::material::AlphaMode as JsonAlphaMode;
-use gltf::texture::{Info, MagFilter, MinFilter, Texture, WrappingMode};
+use gltf::texture::{MagFilter, MinFilter, Texture, WrappingMode};
 use serde::Deserialize;
+use serde_json::Value;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -68,7 +69,6 @@ impl Uses {
 pub(super) struct Table<'a> {
     document: &'a gltf::Document,
     buffers: &'a Buffers<'a>,
-    origin: &'a Origin,
     options: &'a LoadOptions,
     /// The image of each texture.
     texture_images: &'a [Option<usize>],
@@ -94,7 +94,6 @@ impl<'a> Table<'a> {
     pub fn new(
         document: &'a gltf::Document,
         buffers: &'a Buffers<'a>,
-        origin: &'a Origin,
         options: &'a LoadOptions,
         texture_images: &'a [Option<usize>],
         lookup: &'a mut Lookup,
@@ -102,7 +101,6 @@ impl<'a> Table<'a> {
         Self {
             document,
             buffers,
-            origin,
             options,
             texture_images,
             lookup,
@@ -165,60 +163,31 @@ impl<'a> Table<'a> {
             },
             ..Material::default()
         };
-        material.textures[TextureSlot::BaseColor] = self.info(
-            TextureSlot::BaseColor,
-            pbr.base_color_texture(),
-            Usage::Color,
-        )?;
-        material.textures[TextureSlot::MetallicRoughness] = self.info(
-            TextureSlot::MetallicRoughness,
-            pbr.metallic_roughness_texture(),
-            Usage::Data,
-        )?;
         if let Some(normal) = json.normal_texture() {
             material.normal_scale = normal.scale();
-            let transform = self.transform(normal.extension_value(TRANSFORM))?;
-            let (texture, set) = (normal.texture(), normal.tex_coord());
-            material.textures[TextureSlot::Normal] =
-                self.texture(TextureSlot::Normal, &texture, set, transform, Usage::Data)?;
         }
-        if let Some(occlusion) = json.occlusion_texture() {
-            let transform = self.transform(occlusion.extension_value(TRANSFORM))?;
-            let (texture, set) = (occlusion.texture(), occlusion.tex_coord());
-            material.textures[TextureSlot::Occlusion] = self.texture(
-                TextureSlot::Occlusion,
-                &texture,
-                set,
-                transform,
-                Usage::Data,
-            )?;
-        }
-        material.textures[TextureSlot::Emissive] =
-            self.info(TextureSlot::Emissive, json.emissive_texture(), Usage::Color)?;
         if let Some(specular) = json.specular() {
             material.specular =
                 Vec3::from(specular.specular_color_factor()) * specular.specular_factor();
-            material.textures[TextureSlot::Specular] = match specular.specular_color_texture() {
-                Some(info) => self.info(TextureSlot::Specular, Some(info), Usage::Color)?,
-                None => self.info(
-                    TextureSlot::Specular,
-                    specular.specular_texture(),
-                    Usage::AlphaFactor,
-                )?,
-            };
+        }
+        let of_file = self.buffers.root.materials.get(index);
+        // As JSON, because the crate has types for some extensions only.
+        let of_file = serde_json::to_value(of_file).unwrap_or_default();
+        let has_color = json.specular().and_then(|s| s.specular_color_texture());
+        for texture in &CORE {
+            if texture.usage != Usage::AlphaFactor || has_color.is_none() {
+                self.add(texture, &of_file, &mut material)?;
+            }
         }
         if let Some(old) = json.pbr_specular_glossiness() {
             material.base_color = Vec4::from(old.diffuse_factor());
             material.metallic = 0.0;
             material.roughness = 1.0 - old.glossiness_factor();
             material.specular = Vec3::from(old.specular_factor());
-            material.textures[TextureSlot::BaseColor] =
-                self.info(TextureSlot::BaseColor, old.diffuse_texture(), Usage::Color)?;
-            material.textures[TextureSlot::Specular] = self.info(
-                TextureSlot::Specular,
-                old.specular_glossiness_texture(),
-                Usage::Color,
-            )?;
+            for texture in &GLOSSINESS {
+                material.textures[texture.slot] = None;
+                self.add(texture, &of_file, &mut material)?;
+            }
         }
         if json.unlit() {
             // The colour is shown unchanged: it is emitted and nothing is reflected.
@@ -229,7 +198,9 @@ impl<'a> Table<'a> {
             (material.metallic, material.roughness) = (0.0, 1.0);
         }
         self.check_factors(&mut material);
-        self.add_layers(json, &mut material)?;
+        for texture in &LAYERS {
+            self.add(texture, &of_file, &mut material)?;
+        }
         self.limit_coordinates(&mut material);
         material.transmission = match json.transmission() {
             Some(transmission) => transmission.transmission_factor(),
@@ -275,52 +246,31 @@ impl<'a> Table<'a> {
         }
     }
 
-    fn info(
+    /// Adds a texture of a material, if the material has it.
+    fn add(
         &mut self,
-        slot: TextureSlot,
-        info: Option<Info<'_>>,
-        usage: Usage,
-    ) -> Result<Option<TextureRef>, SceneError> {
-        let Some(info) = info else {
-            return Ok(None);
-        };
-        let transform = info.texture_transform().map(|t| TextureTransform {
-            offset: gltf::json::extensions::texture::TextureTransformOffset(t.offset()),
-            rotation: gltf::json::extensions::texture::TextureTransformRotation(t.rotation()),
-            scale: gltf::json::extensions::texture::TextureTransformScale(t.scale()),
-            tex_coord: t.tex_coord(),
-            extras: None,
-        });
-        self.texture(slot, &info.texture(), info.tex_coord(), transform, usage)
-    }
-
-    /// Adds the textures of the material's additional layers.
-    fn add_layers(
-        &mut self,
-        json: &gltf::Material<'_>,
+        of: &MaterialTexture,
+        json: &Value,
         material: &mut Material,
     ) -> Result<(), SceneError> {
-        let root = self.buffers.root;
-        let of_file = json.index().and_then(|index| root.materials.get(index));
-        // As JSON, because the crate has types for some of these extensions only.
-        let extensions = serde_json::to_value(of_file.map(|material| &material.extensions));
-        let extensions = extensions.unwrap_or_default();
-        for layer in &LAYERS {
-            let place = format!("{}, {}.{}", self.place, layer.extension, layer.property);
-            let found = layer.of(&extensions);
-            let found =
-                found.map_err(|e| self.origin.invalid(&place, "a texture", e.to_string()))?;
-            let Some(found) = found else { continue };
-            let Some(texture) = self.document.textures().nth(found.index) else {
-                let expected = format!("an index below {}", root.textures.len());
-                return Err(self
-                    .origin
-                    .invalid(place, expected, found.index.to_string()));
-            };
-            let transform = self.transform(found.extensions.get(TRANSFORM))?;
-            let (slot, set) = (layer.slot, found.tex_coord);
-            material.textures[slot] = self.texture(slot, &texture, set, transform, layer.usage)?;
-        }
+        let place = || format!("{}, {}.{}", self.place, of.object, of.property);
+        let found = of.reference(json);
+        let found = found.map_err(|e| {
+            self.buffers
+                .origin
+                .invalid(place(), "a texture", e.to_string())
+        })?;
+        let Some(found) = found else { return Ok(()) };
+        let Some(texture) = self.document.textures().nth(found.index) else {
+            let expected = format!("an index below {}", self.buffers.root.textures.len());
+            return Err(self
+                .buffers
+                .origin
+                .invalid(place(), expected, found.index.to_string()));
+        };
+        let transform = self.transform(found.extensions.get(TRANSFORM))?;
+        let (slot, set) = (of.slot, found.tex_coord);
+        material.textures[slot] = self.texture(slot, &texture, set, transform, of.usage)?;
         Ok(())
     }
 
@@ -352,15 +302,13 @@ impl<'a> Table<'a> {
     }
 
     /// KHR_texture_transform of a texture that the crate leaves as JSON.
-    fn transform(
-        &self,
-        json: Option<&serde_json::Value>,
-    ) -> Result<Option<TextureTransform>, SceneError> {
+    fn transform(&self, json: Option<&Value>) -> Result<Option<TextureTransform>, SceneError> {
         json.map(TextureTransform::deserialize)
             .transpose()
             .map_err(|e| {
                 let place = format!("{}, {TRANSFORM}", self.place);
-                self.origin
+                self.buffers
+                    .origin
                     .invalid(place, "a texture transform", e.to_string())
             })
     }
@@ -405,7 +353,7 @@ impl<'a> Table<'a> {
         let request = self.request(image, usage)?;
         let uv_transform = transform.map_or(TextureRef::IDENTITY, |t| matrix(&t));
         if !uv_transform.as_flattened().iter().all(|v| v.is_finite()) {
-            return Err(self.origin.invalid(
+            return Err(self.buffers.origin.invalid(
                 format!("{}, {TRANSFORM}", self.place),
                 "finite numbers",
                 format!("{uv_transform:?}"),
@@ -446,7 +394,7 @@ impl<'a> Table<'a> {
         index: usize,
         place: &str,
     ) -> Result<(Source, Option<String>), SceneError> {
-        let origin = self.origin;
+        let origin = self.buffers.origin;
         let embedded = |bytes: Arc<[u8]>| {
             Source::Bytes(Embedded {
                 number: index,

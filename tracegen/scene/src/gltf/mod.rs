@@ -18,7 +18,7 @@ mod draco;
 mod draco;
 mod features;
 mod instancing;
-mod layers;
+mod material_textures;
 mod materials;
 mod meshes;
 mod meshopt;
@@ -56,16 +56,14 @@ use transforms::Local;
 /// See [`SceneError`].
 pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     let origin = Origin::new(path);
-    let (bytes, _) = read_start(path, "scene", u64::MAX)?;
     let mut warnings = Warnings::default();
     let Parsed {
         document,
         transforms,
         texture_images,
         blob,
-    } = parse(&origin, &bytes, &mut warnings)?;
-    let json_bytes = bytes.len();
-    drop(bytes);
+        json_bytes,
+    } = parse(&origin, "scene", &mut warnings)?;
     let root = document.as_json();
     let mut lookup = Lookup::default();
     let buffers = read_buffers(&origin, root, blob, &mut lookup, &mut warnings)?;
@@ -85,14 +83,8 @@ pub fn load(path: &Path, options: &LoadOptions) -> Result<Loaded, SceneError> {
     };
     let placed = nodes::walk(root, local, &origin)?;
     let variant = variants::chosen(root, options.variant.as_deref(), &origin)?;
-    let mut materials = materials::Table::new(
-        &document,
-        &buffers,
-        &origin,
-        options,
-        &texture_images,
-        &mut lookup,
-    );
+    let mut materials =
+        materials::Table::new(&document, &buffers, options, &texture_images, &mut lookup);
     let mut placing = Placing {
         buffers: &buffers,
         transforms: &transforms,
@@ -207,12 +199,15 @@ struct Parsed {
     texture_images: Vec<Option<usize>>,
     /// The GLB's BIN chunk.
     blob: Option<Bytes>,
+    /// Size of the JSON, or of the GLB.
+    json_bytes: usize,
 }
 
-/// Parses the container and the JSON and checks every index.
-fn parse(origin: &Origin, bytes: &Bytes, warnings: &mut Warnings) -> Result<Parsed, SceneError> {
+/// Reads the container, which `place` refers to, and its JSON, and checks every index.
+fn parse(origin: &Origin, place: &str, warnings: &mut Warnings) -> Result<Parsed, SceneError> {
+    let (bytes, _) = read_start(&origin.file, place, u64::MAX)?;
     let (json, blob) = if bytes.starts_with(b"glTF") {
-        let whole = binary::check(bytes, origin)?;
+        let whole = binary::check(&bytes, origin)?;
         if whole.len() < bytes.len() {
             let rest = bytes.len() - whole.len();
             warnings.say(&format!(
@@ -227,7 +222,7 @@ fn parse(origin: &Origin, bytes: &Bytes, warnings: &mut Warnings) -> Result<Pars
         });
         (glb.json, bin)
     } else {
-        (Cow::Borrowed(&**bytes), None)
+        (Cow::Borrowed(&*bytes), None)
     };
     let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&json);
     let texture_images = features::check(json, origin, warnings)?;
@@ -238,6 +233,7 @@ fn parse(origin: &Origin, bytes: &Bytes, warnings: &mut Warnings) -> Result<Pars
         texture_images,
         document: gltf::Document::from_json_without_validation(root),
         blob,
+        json_bytes: bytes.len(),
     })
 }
 

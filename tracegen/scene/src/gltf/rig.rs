@@ -100,22 +100,20 @@ pub(super) fn read(
     for (node, local) in transforms.iter().enumerate() {
         let mut curves = Vec::new();
         for target in targets.remove(&node).unwrap_or_default() {
-            let (place, sampler) = (&target.place, target.sampler);
+            let keys = target.keys(buffers);
             match target.moved {
                 Moved::Joint(channel) => {
-                    let curve = channels::curve(buffers, place, channel, sampler, warnings)?;
-                    curves.push((channel, curve));
+                    curves.push((channel, keys.curve(channel, warnings)?));
                 }
                 Moved::Weights => match morphs::count_of_node(root, node) {
                     0 => warnings.count("weights of nothing", || {
                         format!(
-                            "{place} moves morph targets of nodes[{node}], which has none; left out"
+                            "{} moves morph targets of nodes[{node}], which has none; left out",
+                            target.place
                         )
                     }),
                     count => {
-                        let curve =
-                            channels::weight_curve(buffers, place, count, sampler, warnings)?;
-                        weights.insert(node, curve);
+                        weights.insert(node, keys.weights(count, warnings)?);
                     }
                 },
             }

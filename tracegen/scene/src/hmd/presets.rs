@@ -30,12 +30,7 @@ pub(super) enum Fov {
 }
 
 const fn tangents(left: f32, right: f32, up: f32, down: f32) -> FovTangents {
-    FovTangents {
-        left,
-        right,
-        up,
-        down,
-    }
+    FovTangents::new(left, right, up, down)
 }
 
 /// The first one is the default.

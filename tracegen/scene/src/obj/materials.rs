@@ -69,24 +69,25 @@ impl Maker<'_> {
             result.transmission = 1.0 - dissolve;
         }
         let bump = entry.bump_map.as_ref().or(entry.normal_map.as_ref());
-        result.textures[TextureSlot::Normal] =
-            self.texture(TextureSlot::Normal, entry, bump, Usage::Data);
         result.normal_scale = bump.map_or(1.0, |map| map.bump_multiplier.clamp(-100.0, 100.0));
-        result.textures[TextureSlot::Specular] = self.texture(
-            TextureSlot::Specular,
-            entry,
-            entry.specular_map.as_ref(),
-            Usage::Color,
-        );
+        for (slot, map, usage) in [
+            (TextureSlot::Normal, bump, Usage::Data),
+            (
+                TextureSlot::Specular,
+                entry.specular_map.as_ref(),
+                Usage::Color,
+            ),
+            (
+                TextureSlot::Emissive,
+                entry.emissive_map.as_ref(),
+                Usage::Color,
+            ),
+        ] {
+            result.textures[slot] = self.texture(slot, entry, map, usage);
+        }
         if result.textures[TextureSlot::Specular].is_some() && result.specular == Vec3::ZERO {
             result.specular = Vec3::ONE;
         }
-        result.textures[TextureSlot::Emissive] = self.texture(
-            TextureSlot::Emissive,
-            entry,
-            entry.emissive_map.as_ref(),
-            Usage::Color,
-        );
         if result.textures[TextureSlot::Emissive].is_some() && result.emissive == Vec3::ZERO {
             result.emissive = Vec3::ONE;
         }

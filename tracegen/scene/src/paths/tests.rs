@@ -2,20 +2,9 @@
 
 use super::head::{PITCH, ROLL, YAW, sum};
 use super::*;
+use crate::cameras::tests::camera;
 use glam::{Mat3, Quat, Vec3};
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
-
-fn camera() -> Camera {
-    Camera {
-        name: "test".into(),
-        eye: Vec3::new(1.0, 2.0, 3.0),
-        target: Vec3::new(1.0, 2.0, -7.0),
-        up: Vec3::Y,
-        vfov_deg: 60.0,
-        near: 0.1,
-        far: 100.0,
-    }
-}
 
 fn looking(eye: Vec3, direction: Vec3) -> Camera {
     Camera {

@@ -1,7 +1,7 @@
 //! Ways to store geometry. Each must produce the corners of a unit quad.
 
 use super::files::{File, INDICES, QUAD};
-use super::rows::{Row, Status};
+use super::rows::{Row, Status, drawn};
 use draco_core::{
     DataType, EncoderBuffer, EncoderOptions, GeometryAttributeType, Mesh, MeshEncoder,
     PointAttribute,
@@ -11,22 +11,6 @@ use scene::{LoadOptions, Loaded, TextureSlot};
 use serde_json::json;
 
 const TEST: &str = "scene/tests/conformance/geometry.rs";
-
-const fn drawn(
-    feature: &'static str,
-    how: &'static str,
-    load: fn(&std::path::Path) -> Result<Loaded, scene::SceneError>,
-    check: fn(&Loaded, &str),
-) -> Row {
-    Row {
-        feature,
-        status: Status::Drawn,
-        how,
-        load,
-        check,
-        test: TEST,
-    }
-}
 
 pub const ROWS: &[Row] = &[
     drawn(

@@ -1,29 +1,19 @@
 //! Materials, their textures, and lights.
 
 use super::files::{File, QUAD};
-use super::rows::{Row, Status};
+use super::rows::{Check, Load, Row, Status};
 use glam::{Vec3, Vec4};
-use scene::{AlphaMode, Light, Loaded, Material, SceneError, TextureSlot};
+use scene::{AlphaMode, Light, Loaded, Material, TextureSlot};
 use serde_json::{Value, json};
-use std::path::Path;
-
-const TEST: &str = "scene/tests/conformance/materials.rs";
 
 const fn row(
     feature: &'static str,
     status: Status,
     how: &'static str,
-    load: fn(&Path) -> Result<Loaded, SceneError>,
-    check: fn(&Loaded, &str),
+    load: Load,
+    check: Check,
 ) -> Row {
-    Row {
-        feature,
-        status,
-        how,
-        load,
-        check,
-        test: TEST,
-    }
+    Row::new(feature, (status, how), (load, check))
 }
 
 pub const ROWS: &[Row] = &[
@@ -315,11 +305,7 @@ pub const ROWS: &[Row] = &[
     ),
 ];
 
-const fn layer(
-    extension: &'static str,
-    load: fn(&Path) -> Result<Loaded, SceneError>,
-    check: fn(&Loaded, &str),
-) -> Row {
+const fn layer(extension: &'static str, load: Load, check: Check) -> Row {
     row(
         extension,
         Status::Approximated,

@@ -13,8 +13,21 @@ mod rows;
 use rows::{Row, Status};
 use std::path::Path;
 
+/// All rows, each with the file of its test.
 fn all() -> Vec<Row> {
-    [geometry::ROWS, motion::ROWS, images::ROWS, materials::ROWS].concat()
+    let files = [
+        (geometry::ROWS, "scene/tests/conformance/geometry.rs"),
+        (motion::ROWS, "scene/tests/poses/mod.rs"),
+        (images::ROWS, "scene/tests/conformance/images.rs"),
+        (materials::ROWS, "scene/tests/conformance/materials.rs"),
+    ];
+    let tested = |(rows, file): (&'static [Row], &'static str)| {
+        rows.iter().map(move |row| match row.test {
+            "" => Row { test: file, ..*row },
+            _ => *row,
+        })
+    };
+    files.into_iter().flat_map(tested).collect()
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Moving nodes and vertices at a time. `scene/tests/poses` checks values against a second evaluator.
 
 use super::files::{File, QUAD};
-use super::rows::{Row, Status};
+use super::rows::{Row, Status, drawn};
 use glam::{Affine3A, Vec3};
 use scene::{LoadOptions, Loaded, SceneError};
 use serde_json::{Value, json};
@@ -9,23 +9,6 @@ use std::f32::consts::FRAC_PI_2;
 use std::path::Path;
 
 const TEST: &str = "scene/tests/conformance/motion.rs";
-const VALUES: &str = "scene/tests/poses/mod.rs";
-
-const fn drawn(
-    feature: &'static str,
-    how: &'static str,
-    load: fn(&Path) -> Result<Loaded, SceneError>,
-    check: fn(&Loaded, &str),
-) -> Row {
-    Row {
-        feature,
-        status: Status::Drawn,
-        how,
-        load,
-        check,
-        test: VALUES,
-    }
-}
 
 pub const ROWS: &[Row] = &[
     drawn(

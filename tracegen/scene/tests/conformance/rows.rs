@@ -24,6 +24,12 @@ impl Status {
     }
 }
 
+/// Writes the test file and loads it.
+pub type Load = fn(&Path) -> Result<Loaded, SceneError>;
+
+/// Checks the scene of a feature.
+pub type Check = fn(&Loaded, &str);
+
 /// One feature.
 #[derive(Clone, Copy)]
 pub struct Row {
@@ -32,9 +38,32 @@ pub struct Row {
     /// Description of the support. For a refused feature, part of the error.
     pub how: &'static str,
     /// Writes the test file and loads it.
-    pub load: fn(&Path) -> Result<Loaded, SceneError>,
+    pub load: Load,
     /// Checks the scene.
-    pub check: fn(&Loaded, &str),
-    /// File of the test, or of the check of values if that is another one.
+    pub check: Check,
+    /// File of the test, if it is another one than that of the row.
     pub test: &'static str,
+}
+
+impl Row {
+    /// A feature with its name and support, tested in the file of its rows.
+    pub const fn new(
+        feature: &'static str,
+        (status, how): (Status, &'static str),
+        (load, check): (Load, Check),
+    ) -> Self {
+        Self {
+            feature,
+            status,
+            how,
+            load,
+            check,
+            test: "",
+        }
+    }
+}
+
+/// A feature that is supported as specified, tested in the file of its rows.
+pub const fn drawn(feature: &'static str, how: &'static str, load: Load, check: Check) -> Row {
+    Row::new(feature, (Status::Drawn, how), (load, check))
 }

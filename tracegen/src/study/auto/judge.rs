@@ -100,11 +100,11 @@ impl SearchBench<'_> {
     }
 
     /// Counts the frame that was rendered last, by a capture of it.
-    fn count(&mut self, planner: &Planner, shot: &Shot, frame: u32) -> anyhow::Result<Counted> {
+    fn count(&mut self, planner: &Planner, shot: &Shot) -> anyhow::Result<Counted> {
         if shot.reprojection.is_some() {
             return Ok(shot.counted(0));
         }
-        let tables = self.world.trace_tables(|_| planner, &[frame])?;
+        let tables = self.world.tables_of([&shot.frame]);
         let job = self.world.job(planner);
         let writer = TextraceWriter::in_memory(&tables)?;
         let mut recorder = Recorder::new(writer, job.draws.replays(job.fragments));
@@ -121,9 +121,8 @@ impl SearchBench<'_> {
         let planner = self.planner(&row.settings)?;
         let (mut error, mut counted) = (0.0_f64, Counted::default());
         let mut memory = Occlusion::default();
-        let remembers = row.settings.occlusion || row.settings.half_rate.is_some();
-        let rendered: Vec<(u32, bool)> = self.extent.rendered(remembers).collect();
-        for (frame, measured) in rendered {
+        let extent = self.extent.clone();
+        for (frame, measured) in extent.rendered(row.settings.remembers()) {
             // The baseline is rendered first, because it would overwrite the frame that is captured.
             let is_picture = !matches!(self.budget, Budget::Pixels(_));
             if measured && is_picture && !self.references.contains_key(&frame) {
@@ -136,7 +135,7 @@ impl SearchBench<'_> {
             }
             error = error.max(self.error_of(&shot, frame)?);
             if error <= limit {
-                counted += self.count(&planner, &shot, frame)?;
+                counted += self.count(&planner, &shot)?;
             }
         }
         Ok(Seen {
@@ -261,18 +260,8 @@ impl Judge for SearchBench<'_> {
         }
         let extent = self.extent.clone();
         let planner = self.planner(&row.settings)?;
-        let mut error = 0.0_f64;
-        let mut memory = Occlusion::default();
-        for (frame, measured) in
-            extent.rendered(row.settings.occlusion || row.settings.half_rate.is_some())
-        {
-            if measured {
-                error = error.max(self.error(row, frame, &mut memory)?);
-            } else {
-                self.world
-                    .shoot(self.backend, &planner, frame, &mut memory)?;
-            }
-        }
+        // No error is within this limit, so nothing is counted.
+        let error = self.see(row, f64::NEG_INFINITY)?.error;
         let times = time(self.world, self.backend, &extent, |_| &*planner, || ())?;
         self.progress.advance(1);
         let own = undisturbed_s(times.iter().map(|times| &*times.frame));

@@ -2,6 +2,7 @@
 
 use crate::study::counted::Counted;
 use clap::ValueEnum;
+use formats::text::name_of;
 use serde::{Deserialize, Serialize};
 
 /// The cost of a frame that is minimised.
@@ -22,13 +23,8 @@ pub enum Objective {
 
 impl Objective {
     /// Name as on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Time => "time",
-            Self::Fragments => "fragments",
-            Self::Bytes => "bytes",
-            Self::Energy => "energy",
-        }
+    pub fn name(self) -> String {
+        name_of(&self)
     }
 
     /// Unit of its cost.

@@ -116,7 +116,7 @@ fn reason(budget: Budget, objective: Objective, found: &Found, held: &Held) -> S
         _ => format!("{:.0} {}", chosen.per_frame(), objective.unit()),
     };
     let what = match objective {
-        Objective::Time => "frame time",
+        Objective::Time => "frame time".to_owned(),
         other => other.name(),
     };
     let mut text = format!(
