@@ -10,9 +10,9 @@ use formats::raytrace::{
 };
 use formats::textrace::geometry::{Geometry, GeometryView, MeshGeometry, TileLists, ViewTarget};
 use formats::textrace::{
-    Draw, Encoding, LeftOut, LodRule, NO_GROUP, Pass, PassKind, PrimitiveRun, ProgramCapture,
-    QuadRecord, Sample, SampleLevel, Tables, TextraceWriter, Tile, TraceMeta, UnrecordedReads,
-    UvGroup, encode_tile_as, quad_morton,
+    Draw, Encoding, LeftOut, LodRule, NO_GROUP, Pass, PassKind, ProgramCapture, QuadRecord, Sample,
+    SampleLevel, Tables, TextraceWriter, Tile, TraceMeta, UnrecordedReads, UvGroup, encode_tile_as,
+    quad_morton,
 };
 use formats::texture::{
     ColorSpace, Filter, LodRange, MipFilter, Part, Sampler, TexelFormat, Texture, Wrap,
