@@ -304,17 +304,18 @@ impl<'a> Tracer<'a> {
             cosine,
             length,
             number,
+            surface,
         };
 
-        let mut radiance = self.direct(path, &surface, &place, out);
-        radiance.view_independent += surface.emissive + self.ambient(path, &surface, &place, out);
-        radiance.view_dependent += self.reflection(path, &surface, &place, out);
+        let mut radiance = self.direct(path, &place, out);
+        radiance.view_independent += surface.emissive + self.ambient(path, &place, out);
+        radiance.view_dependent += self.reflection(path, &place, out);
         if surface.transmission > 0.0 {
-            let passed = self.glass(path, &surface, &place, front, out);
+            let passed = self.glass(path, &place, front, out);
             radiance.view_dependent += passed;
         }
         if surface.alpha < 1.0 {
-            let behind = self.behind(path, &surface, &place, out);
+            let behind = self.behind(path, &place, out);
             radiance.view_independent *= surface.alpha;
             radiance.view_dependent *= surface.alpha;
             radiance.view_dependent += behind * (1.0 - surface.alpha);
@@ -324,13 +325,8 @@ impl<'a> Tracer<'a> {
 
     /// Reflection of an opaque surface: a ray if it is polished, or else the mean radiance of the
     /// sky.
-    fn reflection(
-        &mut self,
-        path: &Path,
-        surface: &Surface,
-        place: &ShadedPoint,
-        out: &mut RayTile,
-    ) -> Vec3 {
+    fn reflection(&mut self, path: &Path, place: &ShadedPoint, out: &mut RayTile) -> Vec3 {
+        let surface = &place.surface;
         if surface.transmission > 0.0 {
             return Vec3::ZERO;
         }
@@ -369,14 +365,8 @@ impl<'a> Tracer<'a> {
     }
 
     /// Glass: Fresnel's equations divide the light between a mirrored and a refracted ray.
-    fn glass(
-        &mut self,
-        path: &Path,
-        surface: &Surface,
-        place: &ShadedPoint,
-        front: bool,
-        out: &mut RayTile,
-    ) -> Vec3 {
+    fn glass(&mut self, path: &Path, place: &ShadedPoint, front: bool, out: &mut RayTile) -> Vec3 {
+        let surface = &place.surface;
         let eta = if front {
             1.0 / surface.ior
         } else {
@@ -403,14 +393,9 @@ impl<'a> Tracer<'a> {
     }
 
     /// The radiance behind a blended surface: the ray continues straight.
-    fn behind(
-        &mut self,
-        path: &Path,
-        surface: &Surface,
-        place: &ShadedPoint,
-        out: &mut RayTile,
-    ) -> Vec3 {
-        self.through(path, place, -place.to_eye, 1.0 - surface.alpha, out)
+    fn behind(&mut self, path: &Path, place: &ShadedPoint, out: &mut RayTile) -> Vec3 {
+        let fraction = 1.0 - place.surface.alpha;
+        self.through(path, place, -place.to_eye, fraction, out)
     }
 
     fn through(
@@ -444,6 +429,7 @@ struct ShadedPoint {
     length: f32,
     /// The ray's index among the pixel's rays.
     number: u32,
+    surface: Surface,
 }
 
 /// The interpolated normal on the ray's side of the surface.

@@ -2,7 +2,6 @@
 
 use super::{LEAST_WEIGHT, Path, Radiance, ShadedPoint, Tracer};
 use crate::light::{Incident, blinn_phong, incident, incident_of_size, schlick};
-use crate::material::Surface;
 use crate::ray::{Ray, offset};
 use crate::sampling::{Purpose, cosine_direction};
 use formats::raytrace::{RayKind, RayLight, RayLighting, RayTile};
@@ -24,10 +23,10 @@ impl Tracer<'_> {
     pub(super) fn direct(
         &mut self,
         path: &Path,
-        surface: &Surface,
         place: &ShadedPoint,
         out: &mut RayTile,
     ) -> Radiance {
+        let surface = &place.surface;
         let mut radiance = Radiance::default();
         let origin = offset(place.point, place.geometric);
         for (number, light) in (0u32..).zip(&self.scene.lights) {
@@ -78,13 +77,8 @@ impl Tracer<'_> {
 
     /// Light from all around that a diffuse surface scatters: by a diffuse ray, by the sky as far as
     /// ambient-occlusion rays do not meet anything, or by the whole sky.
-    pub(super) fn ambient(
-        &mut self,
-        path: &Path,
-        surface: &Surface,
-        place: &ShadedPoint,
-        out: &mut RayTile,
-    ) -> Vec3 {
+    pub(super) fn ambient(&mut self, path: &Path, place: &ShadedPoint, out: &mut RayTile) -> Vec3 {
+        let surface = &place.surface;
         let sky = surface.albedo * self.scene.sky.ambient(place.shading);
         let lighting = self.settings.lighting.unwrap_or_default();
         let weight = surface.albedo.max_element() * path.weight;
