@@ -225,8 +225,9 @@ fn trees(scene: &mut SceneBuilder, rng: &mut Rng) {
 fn undergrowth(scene: &mut SceneBuilder, rng: &mut Rng) {
     use plants::{boulder, broadleaf, bush, fern, grass};
     type Variant = fn(usize, &mut Rng) -> MeshBuilder;
+    type Kind<'a> = (&'a str, usize, Variant, &'a [&'a str], usize, [f32; 5]);
     let fans = &["palm-fan"; 2];
-    let kinds: [(&str, usize, Variant, &[&str], usize, [f32; 5]); 6] = [
+    let kinds: [Kind<'_>; 6] = [
         (
             "fern",
             4,

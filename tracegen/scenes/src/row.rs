@@ -9,6 +9,9 @@ use std::iter::Peekable;
 use std::ops::Range;
 use std::str::{FromStr, SplitWhitespace};
 
+/// The rotation by an angle.
+type Rotation<T> = fn(f32) -> T;
+
 /// The words of a row that are not read yet.
 pub struct Row {
     place: String,
@@ -127,7 +130,7 @@ impl Row {
     }
 
     /// Rotations about the axis that the next word names, as quaternions and as matrices.
-    fn rotation(&mut self) -> (fn(f32) -> Quat, fn(f32) -> Mat3A) {
+    fn rotation(&mut self) -> (Rotation<Quat>, Rotation<Mat3A>) {
         match self.word() {
             "x" => (Quat::from_rotation_x, Mat3A::from_rotation_x),
             "y" => (Quat::from_rotation_y, Mat3A::from_rotation_y),

@@ -44,13 +44,18 @@ use super::teapot::{self, Copies};
 use super::texture_synth::Recipe;
 use glam::{Vec2, Vec3};
 
+/// A shape that is computed.
+pub type Shape = fn(&mut MeshBuilder, &mut Row);
+/// A step that computes meshes and placements.
+pub type Step = fn(&mut SceneBuilder, &mut Row);
+
 /// The functions that a scene's text names. Each reads what it needs from the rest of its row.
 #[derive(Clone, Copy, Debug)]
 pub struct Code {
-    /// Shapes that are computed.
-    pub shapes: &'static [(&'static str, fn(&mut MeshBuilder, &mut Row))],
-    /// Steps that compute meshes and placements.
-    pub steps: &'static [(&'static str, fn(&mut SceneBuilder, &mut Row))],
+    /// Shapes by name.
+    pub shapes: &'static [(&'static str, Shape)],
+    /// Steps by name.
+    pub steps: &'static [(&'static str, Step)],
 }
 
 impl Code {
