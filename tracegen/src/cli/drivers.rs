@@ -4,7 +4,7 @@ use anyhow::anyhow;
 use raster::backend::CaptureBackend;
 use raster::draws::DrawList;
 use raster::error::RasterError;
-use raster::lavapipe::{Lavapipe, device};
+use raster::lavapipe::Lavapipe;
 use scene::Scene;
 use textures::TextureSet;
 
@@ -46,8 +46,7 @@ impl Driver {
             )
         };
         let lavapipe = || -> Result<Box<dyn CaptureBackend>, RasterError> {
-            let gpu = device::open(None)?;
-            let lavapipe = Lavapipe::on(gpu, scene, draws, textures, view_size_px, budget)?;
+            let lavapipe = Lavapipe::new(scene, draws, textures, view_size_px, budget)?;
             Ok(Box::new(lavapipe))
         };
         let (backend, instead_of) = match self {

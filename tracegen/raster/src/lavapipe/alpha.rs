@@ -7,7 +7,7 @@
 
 use super::bindings;
 use super::device::Gpu;
-use super::targets::attachment;
+use super::targets::{attachment, color_attachment};
 use super::whole::Whole;
 use crate::draws::{DrawList, DrawMode};
 use crate::error::RasterError;
@@ -69,12 +69,7 @@ pub fn copies(
     }
     gpu.checked("copying the alpha of textures", || {
         let source = include_str!("../shaders/alpha_copies.wgsl");
-        let module = gpu
-            .device
-            .create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: Some("alpha"),
-                source: wgpu::ShaderSource::Wgsl(source.into()),
-            });
+        let module = gpu.module("alpha", source);
         let color = bindings::texture(wgpu::TextureSampleType::Float { filterable: true });
         let layout = bindings::fragment_layout(gpu, "alpha", [(0, color)]);
         let whole = Whole {
@@ -120,12 +115,10 @@ fn copy(
         let bound = [(0, wgpu::BindingResource::TextureView(&from))];
         let bindings = bindings::group(gpu, "alpha", layout, bound);
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &level_view(&to, level),
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations::default(),
-            })],
+            color_attachments: &[color_attachment(
+                &level_view(&to, level),
+                Some(wgpu::Color::default()),
+            )],
             ..Default::default()
         });
         pass.set_pipeline(pipeline);
@@ -141,7 +134,6 @@ mod tests {
     use super::super::readback::Readback;
     use super::*;
     use wgpu::TextureFormat::{Bc1RgbaUnormSrgb, Bc3RgbaUnormSrgb, Rgba8UnormSrgb};
-    use wgpu::util::DeviceExt;
 
     const SIDE_PX: u32 = 256;
     const PAIR: wgpu::TextureFormat = wgpu::TextureFormat::Rg32Float;
@@ -178,24 +170,7 @@ fn fragment_both(@builtin(position) position: vec4<f32>) -> @location(0) vec2<f3
                 state.to_le_bytes()[3]
             })
             .collect();
-        let descriptor = wgpu::TextureDescriptor {
-            label: None,
-            size: wgpu::Extent3d {
-                width: side,
-                height: side,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: levels,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        };
-        let order = wgpu::util::TextureDataOrder::LayerMajor;
-        gpu.device
-            .create_texture_with_data(&gpu.queue, &descriptor, order, &noise)
-            .create_view(&Default::default())
+        gpu.texture_of([side; 2], levels, format, &noise)
     }
 
     /// A shader's samples of a texture's alpha and of its copy, pixel by pixel.
@@ -206,12 +181,7 @@ fn fragment_both(@builtin(position) position: vec4<f32>) -> @location(0) vec2<f3
     ) -> Vec<[f32; 2]> {
         let textures = [texture];
         let copies = copies(gpu, &BTreeSet::from([0]), &textures).unwrap();
-        let module = gpu
-            .device
-            .create_shader_module(wgpu::ShaderModuleDescriptor {
-                label: None,
-                source: wgpu::ShaderSource::Wgsl(BOTH.into()),
-            });
+        let module = gpu.module("test", BOTH);
         let view = bindings::texture(wgpu::TextureSampleType::Float { filterable: true });
         let filters = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
         let layout = bindings::fragment_layout(gpu, "both", [(0, view), (1, view), (2, filters)]);
@@ -231,12 +201,10 @@ fn fragment_both(@builtin(position) position: vec4<f32>) -> @location(0) vec2<f3
         let target = attachment(gpu, [SIDE_PX; 2], 1, 1, PAIR, usage);
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &target.create_view(&Default::default()),
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations::default(),
-            })],
+            color_attachments: &[color_attachment(
+                &target.create_view(&Default::default()),
+                Some(wgpu::Color::default()),
+            )],
             ..Default::default()
         });
         pass.set_pipeline(&whole.over_picture(gpu, "fragment_both", PAIR));

@@ -3,13 +3,12 @@
 use super::bindings;
 use super::device::Gpu;
 use super::pipelines::COLOR_FORMAT;
-use super::targets::{ColorTarget, LayerTarget};
+use super::targets::{ColorTarget, LayerTarget, color_attachment};
 use super::whole::{OverLayer, Whole};
 use crate::error::RasterError;
 use formats::view::TILE_SIZE_PX;
 use techniques::Mask;
 use techniques::plan::{Filter, PicturePart};
-use wgpu::util::DeviceExt;
 
 /// Pipelines that mask layers and compose pictures.
 pub struct Composer {
@@ -44,12 +43,7 @@ impl Composer {
                 "const TILE_SIZE: i32 = {TILE_SIZE_PX};\n{}",
                 include_str!("../shaders/layers.wgsl")
             );
-            let module = gpu
-                .device
-                .create_shader_module(wgpu::ShaderModuleDescriptor {
-                    label: Some("layers"),
-                    source: wgpu::ShaderSource::Wgsl(source.into()),
-                });
+            let module = gpu.module("layers", source);
             let flags = bindings::texture(wgpu::TextureSampleType::Uint);
             let color = bindings::texture(wgpu::TextureSampleType::Float { filterable: false });
             let layout = |types: &[wgpu::BindingType]| {
@@ -102,21 +96,12 @@ impl Composer {
         parts: &[(&PicturePart, &LayerTarget)],
     ) -> Result<(), RasterError> {
         let unmasked = self.mask_bindings(gpu, &self.absent);
-        gpu.checked("composing a picture", || {
+        gpu.submit("composing a picture", |encoder| {
             let bound: Vec<_> = (parts.iter())
                 .map(|(part, layer)| self.bind_part(gpu, part, layer))
                 .collect();
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &picture.view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
+                color_attachments: &[color_attachment(&picture.view, Some(wgpu::Color::BLACK))],
                 ..Default::default()
             });
             for ((part, layer), bindings) in parts.iter().zip(&bound) {
@@ -139,8 +124,6 @@ impl Composer {
                 pass.set_bind_group(1, bindings, &[]);
                 pass.draw(0..3, 0..1);
             }
-            drop(pass);
-            gpu.queue.submit([encoder.finish()]);
         })
     }
 
@@ -156,13 +139,7 @@ impl Composer {
                 .to_cols_array_2d()
                 .map(|[x, y, z]| [x, y, z, 0.0]),
         };
-        let uniform = gpu
-            .device
-            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("part"),
-                contents: bytemuck::bytes_of(&data),
-                usage: wgpu::BufferUsages::UNIFORM,
-            });
+        let uniform = gpu.buffer_of(&[data], wgpu::BufferUsages::UNIFORM);
         let tiles = part.tiles.as_ref().map(|tiles| upload(gpu, tiles));
         let resources = [
             uniform.as_entire_binding(),
@@ -175,24 +152,6 @@ impl Composer {
 
 /// A texture with one byte per pixel: 1 where the mask is set.
 fn upload(gpu: &Gpu, mask: &Mask) -> wgpu::TextureView {
-    let [width, height] = mask.size_px();
     let bytes: Vec<u8> = mask.flags().iter().map(|flag| u8::from(*flag)).collect();
-    let descriptor = wgpu::TextureDescriptor {
-        label: Some("mask"),
-        size: wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::R8Uint,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    };
-    let order = wgpu::util::TextureDataOrder::LayerMajor;
-    gpu.device
-        .create_texture_with_data(&gpu.queue, &descriptor, order, &bytes)
-        .create_view(&Default::default())
+    gpu.texture_of(mask.size_px(), 1, wgpu::TextureFormat::R8Uint, &bytes)
 }

@@ -3,7 +3,7 @@
 
 use super::Lavapipe;
 use super::pipelines::{DEPTH_FORMAT, FARTHEST};
-use super::targets::attachment;
+use super::targets::{attachment, color_attachment, depth_attachment};
 use crate::backend::View;
 use crate::draws::{DrawList, DrawMode};
 use crate::error::RasterError;
@@ -38,32 +38,19 @@ impl Lavapipe {
         self.gpu
             .queue
             .write_buffer(&self.buffers.view_uniform, 0, bytemuck::bytes_of(&data));
-        let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
         let (count_view, depth_view) = (
             counts.create_view(&Default::default()),
             depth.create_view(&Default::default()),
         );
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &count_view,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations::default(),
-            })],
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &depth_view,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(FARTHEST),
-                    store: wgpu::StoreOp::Store,
-                }),
-                stencil_ops: None,
-            }),
-            ..Default::default()
-        });
-        pass.set_bind_group(0, &self.eye_bindings, &[]);
-        self.issue(&mut pass, draws, &plan);
-        drop(pass);
-        self.gpu.queue.submit([encoder.finish()]);
+        self.gpu.submit("counting fragments", |encoder| {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                color_attachments: &[color_attachment(&count_view, Some(wgpu::Color::default()))],
+                depth_stencil_attachment: depth_attachment(&depth_view, Some(FARTHEST)),
+                ..Default::default()
+            });
+            pass.set_bind_group(0, &self.eye_bindings, &[]);
+            self.issue(&mut pass, draws, &plan);
+        })?;
         let halves: Vec<u16> = self.readback.texels(&self.gpu, &counts)?;
         Ok(halves.into_iter().map(half_to_integer).collect())
     }

@@ -3,6 +3,7 @@
 use crate::error::RasterError;
 use crate::shader::Granularity;
 use mesa::SUBGROUP_LANES;
+use wgpu::util::DeviceExt;
 
 /// An opened lavapipe.
 pub struct Gpu {
@@ -170,6 +171,87 @@ impl Gpu {
             }
         }
         Ok(result)
+    }
+
+    /// Encodes commands and submits them.
+    ///
+    /// # Errors
+    /// As [`Self::checked`].
+    pub fn submit(
+        &self,
+        doing: &'static str,
+        encode: impl FnOnce(&mut wgpu::CommandEncoder),
+    ) -> Result<(), RasterError> {
+        self.checked(doing, || {
+            let mut encoder = self.device.create_command_encoder(&Default::default());
+            encode(&mut encoder);
+            self.queue.submit([encoder.finish()]);
+        })
+    }
+
+    /// A buffer without contents.
+    pub fn buffer(&self, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+        self.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size,
+            usage,
+            mapped_at_creation: false,
+        })
+    }
+
+    /// A buffer with contents.
+    pub fn buffer_of<T: bytemuck::NoUninit>(
+        &self,
+        contents: &[T],
+        usage: wgpu::BufferUsages,
+    ) -> wgpu::Buffer {
+        let contents = bytemuck::cast_slice(contents);
+        (self.device).create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: None,
+            contents,
+            usage,
+        })
+    }
+
+    /// A texture to sample, with the texels of all its levels.
+    pub fn texture_of(
+        &self,
+        [width, height]: [u32; 2],
+        levels: u32,
+        format: wgpu::TextureFormat,
+        texels: &[u8],
+    ) -> wgpu::TextureView {
+        let descriptor = wgpu::TextureDescriptor {
+            label: None,
+            size: wgpu::Extent3d {
+                width,
+                height,
+                depth_or_array_layers: 1,
+            },
+            mip_level_count: levels,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING,
+            view_formats: &[],
+        };
+        let order = wgpu::util::TextureDataOrder::LayerMajor;
+        (self.device)
+            .create_texture_with_data(&self.queue, &descriptor, order, texels)
+            .create_view(&Default::default())
+    }
+
+    /// Compiles a shader.
+    pub fn module<'s>(
+        &self,
+        label: &str,
+        source: impl Into<std::borrow::Cow<'s, str>>,
+    ) -> wgpu::ShaderModule {
+        let source = wgpu::ShaderSource::Wgsl(source.into());
+        (self.device).create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(label),
+            source,
+        })
     }
 
     /// Waits for all submitted work.

@@ -36,13 +36,12 @@ use scene::Scene;
 use starts::{Drawn, Starts};
 use std::sync::Arc;
 use std::time::Instant;
-use targets::{ColorTarget, LayerMask, LayerTarget, ShadowMaps};
+use targets::{ColorTarget, LayerMask, LayerTarget, ShadowMaps, depth_attachment};
 use techniques::Start;
 use techniques::plan::PictureSource;
 use techniques::start::Opening;
 use textures::TextureSet;
 use upload::SceneBuffers;
-use wgpu::util::DeviceExt;
 
 /// The scene uploaded to lavapipe.
 pub struct Lavapipe {
@@ -408,14 +407,10 @@ impl CaptureBackend for Lavapipe {
             }
             let plan = self.plan(draws, visible, Purpose::Shadow)?;
             self.work.shadow_maps += 1;
-            let uniform = self
-                .gpu
-                .device
-                .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                    label: Some("cascade"),
-                    contents: bytemuck::bytes_of(&ViewData::of_cascade(cascade, lighting)),
-                    usage: wgpu::BufferUsages::UNIFORM,
-                });
+            let uniform = self.gpu.buffer_of(
+                &[ViewData::of_cascade(cascade, lighting)],
+                wgpu::BufferUsages::UNIFORM,
+            );
             let bindings = bind_view(
                 &self.gpu,
                 &self.pipelines,
@@ -425,23 +420,16 @@ impl CaptureBackend for Lavapipe {
                 &uniform,
                 &stand_in.sampled,
             );
-            self.gpu.checked("rendering a shadow cascade", || {
-                let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+            self.gpu.submit("rendering a shadow cascade", |encoder| {
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                        view: &self.shadow_maps.layers[number],
-                        depth_ops: Some(wgpu::Operations {
-                            load: wgpu::LoadOp::Clear(1.0),
-                            store: wgpu::StoreOp::Store,
-                        }),
-                        stencil_ops: None,
-                    }),
+                    depth_stencil_attachment: depth_attachment(
+                        &self.shadow_maps.layers[number],
+                        Some(1.0),
+                    ),
                     ..Default::default()
                 });
                 pass.set_bind_group(0, &bindings, &[]);
                 self.issue(&mut pass, draws, &plan);
-                drop(pass);
-                self.gpu.queue.submit([encoder.finish()]);
             })?;
         }
         self.gpu.wait("rendering the shadow cascades")
@@ -481,15 +469,13 @@ impl CaptureBackend for Lavapipe {
         gpu.queue
             .write_buffer(&buffers.view_uniform, 0, bytemuck::bytes_of(&data));
         gpu.queue.write_buffer(&buffers.counter, 0, &[0; 4]);
-        gpu.checked("rendering a layer", || {
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        gpu.submit("rendering a layer", |encoder| {
             for (purpose, plan) in &plans {
                 let start = start_drawn.as_ref();
                 let picture = purpose.has_picture();
-                let mut pass = self.layer_pass(&mut encoder, target, region, start, picture);
+                let mut pass = self.layer_pass(encoder, target, region, start, picture);
                 self.issue(&mut pass, draws, plan);
             }
-            gpu.queue.submit([encoder.finish()]);
         })?;
         self.work.state_changes += (plans.iter())
             .map(|(_, plan)| state_changes(draws, plan))

@@ -6,7 +6,7 @@
 use super::device::Gpu;
 use super::pipelines::{COLOR_FORMAT, DEPTH_FORMAT, Pipelines, VIEW_COUNT, VIEWS};
 use super::readback::Readback;
-use super::targets::attachment;
+use super::targets::{attachment, color_attachment};
 use super::{Lavapipe, bind_view, state_changes};
 use crate::backend::{CaptureBackend, View};
 use crate::draws::DrawList;
@@ -180,9 +180,8 @@ impl Lavapipe {
             &self.shadow_maps.sampled,
         );
         let targets = [self.target(views[0].target)?, self.target(views[1].target)?];
-        gpu.checked("rendering both views", || {
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
-            let mut pass = multiview.targets.pass(&mut encoder);
+        gpu.submit("rendering both views", |encoder| {
+            let mut pass = multiview.targets.pass(encoder);
             pass.set_bind_group(0, &bindings, &[]);
             if let Some(any) = self.scene.materials.first() {
                 pass.set_bind_group(1, any, &[]);
@@ -203,7 +202,6 @@ impl Lavapipe {
                 let to = target.color.view.texture().as_image_copy();
                 encoder.copy_texture_to_texture(from, to, size);
             }
-            gpu.queue.submit([encoder.finish()]);
         })?;
         let submitted = Instant::now();
         gpu.wait("rendering both views")?;
@@ -243,12 +241,10 @@ impl Multiview {
         })?;
         Ok(Self {
             pipelines,
-            uniform: gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("both views"),
-                size: u64::from(VIEW_COUNT) * size_of::<ViewData>() as u64,
-                usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            }),
+            uniform: gpu.buffer(
+                u64::from(VIEW_COUNT) * size_of::<ViewData>() as u64,
+                wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
+            ),
             targets,
         })
     }
@@ -286,15 +282,7 @@ fn pass<'e>(
     multiview_mask: Option<std::num::NonZeroU32>,
 ) -> wgpu::RenderPass<'e> {
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-            view: color,
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations {
-                load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                store: wgpu::StoreOp::Store,
-            },
-        })],
+        color_attachments: &[color_attachment(color, Some(wgpu::Color::BLACK))],
         depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
             view: depth,
             depth_ops: Some(wgpu::Operations {
@@ -313,12 +301,7 @@ fn pass<'e>(
 /// # Errors
 /// Driver errors.
 pub fn differing_px(gpu: &Gpu) -> Result<u32, RasterError> {
-    let module = gpu
-        .device
-        .create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some("clip edges"),
-            source: wgpu::ShaderSource::Wgsl(include_str!("../shaders/clip_edges.wgsl").into()),
-        });
+    let module = gpu.module("clip edges", include_str!("../shaders/clip_edges.wgsl"));
     let both = gpu.checked("drawing both views at once", || {
         let targets = Targets::new(gpu, [EDGE_PX; 2]);
         let pipeline = pipeline(gpu, &module, "vertex_both", 0, Some(VIEWS));

@@ -88,12 +88,7 @@ impl Pipelines {
         multiview_mask: Option<NonZeroU32>,
     ) -> Result<Self, RasterError> {
         gpu.checked("compiling the shader", || {
-            let module = gpu
-                .device
-                .create_shader_module(wgpu::ShaderModuleDescriptor {
-                    label: Some("capture"),
-                    source: wgpu::ShaderSource::Wgsl(shader::source(granularity, alpha).into()),
-                });
+            let module = gpu.module("capture", shader::source(granularity, alpha));
             let layouts = Layouts {
                 view: bindings::layout(gpu, "view", view_bindings()),
                 material: bindings::fragment_layout(gpu, "material", material_bindings()),

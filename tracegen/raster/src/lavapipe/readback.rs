@@ -59,12 +59,10 @@ impl Readback {
         let mut kept = self.0.borrow_mut();
         kept.take_if(|buffer| buffer.size() < bytes);
         let buffer = kept.get_or_insert_with(|| {
-            gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("texels on their way back"),
-                size: bytes,
-                usage: wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
+            gpu.buffer(
+                bytes,
+                wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST,
+            )
         });
         buffer.clone()
     }

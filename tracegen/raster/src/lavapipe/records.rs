@@ -37,14 +37,6 @@ impl RecordBuffers {
             (budget_bytes.min(binding).min(limits.max_buffer_size) / RECORD_BYTES).max(1);
         let depths = if has_depths { capacity } else { 1 };
         gpu.checked("making the record buffers", || {
-            let buffer = |size, usage| {
-                gpu.device.create_buffer(&wgpu::BufferDescriptor {
-                    label: None,
-                    size,
-                    usage,
-                    mapped_at_creation: false,
-                })
-            };
             use wgpu::BufferUsages as Usage;
             let recorded = if captures {
                 Usage::STORAGE | Usage::MAP_READ
@@ -52,12 +44,12 @@ impl RecordBuffers {
                 Usage::STORAGE
             };
             Self {
-                records: buffer(capacity * RECORD_BYTES, recorded),
-                depths: buffer(depths * DEPTH_BYTES, recorded),
+                records: gpu.buffer(capacity * RECORD_BYTES, recorded),
+                depths: gpu.buffer(depths * DEPTH_BYTES, recorded),
                 has_depths,
-                counter: buffer(4, recorded | Usage::COPY_DST),
+                counter: gpu.buffer(4, recorded | Usage::COPY_DST),
                 capacity: capacity as u32,
-                view_uniform: buffer(
+                view_uniform: gpu.buffer(
                     size_of::<ViewData>() as u64,
                     Usage::UNIFORM | Usage::COPY_DST,
                 ),

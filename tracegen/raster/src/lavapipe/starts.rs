@@ -7,7 +7,6 @@ use super::whole::{OverLayer, Whole};
 use crate::error::RasterError;
 use glam::{Mat3, Mat4};
 use techniques::start::{Composition, Opening};
-use wgpu::util::DeviceExt;
 
 /// Pipelines that draw the initial contents of layers.
 pub struct Starts {
@@ -53,12 +52,7 @@ impl Starts {
     /// Driver and validation errors.
     pub fn new(gpu: &Gpu) -> Result<Self, RasterError> {
         gpu.checked("compiling the shader of the far field", || {
-            let module = gpu
-                .device
-                .create_shader_module(wgpu::ShaderModuleDescriptor {
-                    label: Some("starts"),
-                    source: wgpu::ShaderSource::Wgsl(include_str!("../shaders/starts.wgsl").into()),
-                });
+            let module = gpu.module("starts", include_str!("../shaders/starts.wgsl"));
             let make = |entry_point, textures: &[(u32, wgpu::TextureSampleType)]| {
                 Pipeline::new(gpu, &module, entry_point, textures)
             };
@@ -156,13 +150,7 @@ impl Pipeline {
         textures: &[&wgpu::TextureView],
         over_sky: bool,
     ) -> Drawn<'_> {
-        let uniform = gpu
-            .device
-            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("start"),
-                contents: bytemuck::bytes_of(data),
-                usage: wgpu::BufferUsages::UNIFORM,
-            });
+        let uniform = gpu.buffer_of(std::slice::from_ref(data), wgpu::BufferUsages::UNIFORM);
         let textures = (self.textures.iter().copied())
             .zip(textures)
             .map(|(binding, texture)| (binding, wgpu::BindingResource::TextureView(texture)));

@@ -85,26 +85,12 @@ impl LayerTarget {
         encoder: &'e mut wgpu::CommandEncoder,
         picture: bool,
     ) -> wgpu::RenderPass<'e> {
-        let color = wgpu::RenderPassColorAttachment {
-            view: &self.color.view,
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations {
-                load: wgpu::LoadOp::Load,
-                store: wgpu::StoreOp::Store,
-            },
-        };
-        let colors: Vec<_> = picture.then_some(Some(color)).into_iter().collect();
+        let colors: Vec<_> = (picture.then(|| color_attachment(&self.color.view, None)))
+            .into_iter()
+            .collect();
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             color_attachments: &colors,
-            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &self.depth_view,
-                depth_ops: Some(wgpu::Operations {
-                    load: wgpu::LoadOp::Load,
-                    store: wgpu::StoreOp::Store,
-                }),
-                stencil_ops: None,
-            }),
+            depth_stencil_attachment: depth_attachment(&self.depth_view, None),
             ..Default::default()
         })
     }
@@ -114,23 +100,44 @@ impl LayerTarget {
     /// # Errors
     /// Driver errors.
     pub fn clear(&self, gpu: &Gpu) -> Result<(), RasterError> {
-        gpu.checked("clearing a layer", || {
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        gpu.submit("clearing a layer", |encoder| {
             encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view: &self.color.view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
+                color_attachments: &[color_attachment(&self.color.view, Some(wgpu::Color::BLACK))],
                 ..Default::default()
             });
-            gpu.queue.submit([encoder.finish()]);
         })
     }
+}
+
+/// A colour attachment, cleared if a colour is given.
+pub fn color_attachment(
+    view: &wgpu::TextureView,
+    clear: Option<wgpu::Color>,
+) -> Option<wgpu::RenderPassColorAttachment<'_>> {
+    Some(wgpu::RenderPassColorAttachment {
+        view,
+        depth_slice: None,
+        resolve_target: None,
+        ops: wgpu::Operations {
+            load: clear.map_or(wgpu::LoadOp::Load, wgpu::LoadOp::Clear),
+            store: wgpu::StoreOp::Store,
+        },
+    })
+}
+
+/// A depth attachment, cleared if a depth is given.
+pub fn depth_attachment(
+    view: &wgpu::TextureView,
+    clear: Option<f32>,
+) -> Option<wgpu::RenderPassDepthStencilAttachment<'_>> {
+    Some(wgpu::RenderPassDepthStencilAttachment {
+        view,
+        depth_ops: Some(wgpu::Operations {
+            load: clear.map_or(wgpu::LoadOp::Load, wgpu::LoadOp::Clear),
+            store: wgpu::StoreOp::Store,
+        }),
+        stencil_ops: None,
+    })
 }
 
 /// Checks the size of a layer.

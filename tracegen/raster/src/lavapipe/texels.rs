@@ -2,7 +2,7 @@
 
 use super::Lavapipe;
 use super::pipelines::{DEPTH_FORMAT, FARTHEST, PRIMITIVE_FORMAT, TEXEL_FORMAT};
-use super::targets::attachment;
+use super::targets::{attachment, color_attachment, depth_attachment};
 use crate::backend::{Texels, View};
 use crate::draws::DrawList;
 use crate::error::RasterError;
@@ -37,40 +37,25 @@ impl Lavapipe {
         let views = [&colors, &primitives, &depth].map(|t| t.create_view(&Default::default()));
         let [color_view, primitive_view, depth_view] = &views;
         let cleared = |view, none: f64| {
-            Some(wgpu::RenderPassColorAttachment {
+            color_attachment(
                 view,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color {
-                        r: none,
-                        ..wgpu::Color::default()
-                    }),
-                    store: wgpu::StoreOp::Store,
-                },
-            })
+                Some(wgpu::Color {
+                    r: none,
+                    ..wgpu::Color::default()
+                }),
+            )
         };
-        gpu.checked("rendering texels", || {
-            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+        gpu.submit("rendering texels", |encoder| {
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
                 color_attachments: &[
                     cleared(color_view, 0.0),
                     cleared(primitive_view, f64::from(Texels::NO_PRIMITIVE)),
                 ],
-                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: depth_view,
-                    depth_ops: Some(wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(FARTHEST),
-                        store: wgpu::StoreOp::Store,
-                    }),
-                    stencil_ops: None,
-                }),
+                depth_stencil_attachment: depth_attachment(depth_view, Some(FARTHEST)),
                 ..Default::default()
             });
             pass.set_bind_group(0, &self.eye_bindings, &[]);
             self.issue(&mut pass, draws, &plan);
-            drop(pass);
-            gpu.queue.submit([encoder.finish()]);
         })?;
         Ok(Texels {
             colors: self.readback.texels(gpu, &colors)?,

@@ -9,11 +9,10 @@ use crate::error::RasterError;
 use crate::shader::{ALPHA_BINDING, MATERIAL_BINDING, SAMPLERS_BINDING, TEXTURES_BINDING};
 use crate::uniforms::MaterialData;
 use crate::vertices::{self, InstanceData, VERTEX_STRIDE};
-use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Texture, Wrap};
+use formats::texture::{ColorSpace, Filter, MipFilter, Sampler, TexelFormat, Wrap};
 use scene::{Animation, Material, Mesh, Scene, TextureRef, TextureSlot};
 use std::collections::{BTreeMap, BTreeSet};
 use textures::{CompressedTexture, TextureSet};
-use wgpu::util::DeviceExt;
 
 /// A mesh's buffers.
 pub struct MeshBuffers {
@@ -65,7 +64,11 @@ impl SceneBuffers {
         for (mesh, used) in scene.meshes.iter().zip(used) {
             meshes.push(used.then(|| upload_mesh(gpu, mesh, limit)).transpose()?);
         }
-        let absent = upload_texture(gpu, &white())?;
+        // Replaces the textures that a material lacks. The pipelines never sample it.
+        let format = wgpu::TextureFormat::Rgba8Unorm;
+        let absent = gpu.checked("uploading a texture", || {
+            gpu.texture_of([1, 1], 1, format, &[255; 4])
+        })?;
         let views = textures
             .textures
             .iter()
@@ -84,19 +87,14 @@ impl SceneBuffers {
             })
             .collect();
         let instances = vertices::instances(draws);
-        let instances = gpu
-            .device
-            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("instances"),
-                contents: bytemuck::cast_slice(&instances),
-                usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            });
-        let instance_draws = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("draws by instance"),
-            size: 4 * draws.calls.len().max(1) as u64,
-            usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let instances = gpu.buffer_of(
+            &instances,
+            wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        );
+        let instance_draws = gpu.buffer(
+            4 * draws.calls.len().max(1) as u64,
+            wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+        );
         Ok(Self {
             meshes,
             materials,
@@ -145,48 +143,18 @@ fn upload_mesh(gpu: &Gpu, mesh: &Mesh, limit: u64) -> Result<MeshBuffers, Raster
     }
     let vertices = vertices::pack(mesh);
     let colors = vertices::pack_colors(mesh);
-    let buffer = |contents: &[u8], usage| {
-        gpu.device
-            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: None,
-                contents,
-                usage,
-            })
-    };
     // A trailing partial triangle is not a primitive and is left out of the index range.
     Ok(MeshBuffers {
         // Vertices may move.
-        vertices: buffer(
-            bytemuck::cast_slice(&vertices),
+        vertices: gpu.buffer_of(
+            &vertices,
             wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
         ),
-        colors: (!colors.is_empty())
-            .then(|| buffer(bytemuck::cast_slice(&colors), wgpu::BufferUsages::VERTEX)),
-        indices: buffer(
-            bytemuck::cast_slice(&mesh.indices),
-            wgpu::BufferUsages::INDEX,
-        ),
+        colors: (!colors.is_empty()).then(|| gpu.buffer_of(&colors, wgpu::BufferUsages::VERTEX)),
+        indices: gpu.buffer_of(&mesh.indices, wgpu::BufferUsages::INDEX),
         index_count: mesh.triangles() as u32 * 3,
         vertex_count: mesh.positions.len() as u32,
     })
-}
-
-/// Replaces the textures that a material lacks. The pipelines never sample it.
-fn white() -> CompressedTexture {
-    CompressedTexture {
-        texture: Texture {
-            name: "absent".into(),
-            size: [1, 1],
-            levels: 1,
-            layers: 1,
-            format: TexelFormat::Rgba8,
-            color_space: ColorSpace::Linear,
-            part: None,
-        },
-        first_level: 0,
-        blocks: vec![255; 4],
-        held: TexelFormat::Rgba8,
-    }
 }
 
 fn upload_texture(
@@ -220,29 +188,10 @@ fn upload_texture(
     }
     // Leaving out levels that are never sampled does not change the sampling of coarser ones. See
     // the crate textures.
-    let [width, height] = texture.level_size(compressed.first_level);
+    let first = compressed.first_level;
+    let (size, levels) = (texture.level_size(first), texture.levels - first);
     gpu.checked("uploading a texture", || {
-        gpu.device
-            .create_texture_with_data(
-                &gpu.queue,
-                &wgpu::TextureDescriptor {
-                    label: None,
-                    size: wgpu::Extent3d {
-                        width,
-                        height,
-                        depth_or_array_layers: 1,
-                    },
-                    mip_level_count: texture.levels - compressed.first_level,
-                    sample_count: 1,
-                    dimension: wgpu::TextureDimension::D2,
-                    format,
-                    usage: wgpu::TextureUsages::TEXTURE_BINDING,
-                    view_formats: &[],
-                },
-                wgpu::util::TextureDataOrder::LayerMajor,
-                &compressed.blocks,
-            )
-            .create_view(&wgpu::TextureViewDescriptor::default())
+        gpu.texture_of(size, levels, format, &compressed.blocks)
     })
 }
 
@@ -284,13 +233,7 @@ impl<'a> MaterialViews<'a> {
             .map(|t| samplers.index(gpu, &t.map_or(Sampler::TRILINEAR_REPEAT, |t| t.sampler)))
             .map(|index| &samplers.made[index].1);
         let data = MaterialData::new(material);
-        let uniform = gpu
-            .device
-            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("material"),
-                contents: bytemuck::bytes_of(&data),
-                usage: wgpu::BufferUsages::UNIFORM,
-            });
+        let uniform = gpu.buffer_of(&[data], wgpu::BufferUsages::UNIFORM);
         let textures = self.textures.map(wgpu::BindingResource::TextureView);
         let alpha = wgpu::BindingResource::TextureView(self.alpha);
         let bound = [(MATERIAL_BINDING, uniform.as_entire_binding())]

@@ -1,7 +1,7 @@
 //! Depth for occlusion culling, and the visibility of all draws, found by drawing everything.
 
 use super::pipelines::{DEPTH_FORMAT, FARTHEST};
-use super::targets::attachment;
+use super::targets::{attachment, depth_attachment};
 use super::{Lavapipe, bind_view};
 use crate::backend::{Marks, View};
 use crate::draws::DrawList;
@@ -49,12 +49,10 @@ impl Lavapipe {
         let depth = self.depth_texture(view);
         self.draw_alone(draws, &every, Purpose::Depth, &depth, None)?;
         // Two words per draw, zero until one of its fragments is visible.
-        let words = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("marks"),
-            size: 8 * every.len().max(1) as u64,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
+        let words = self.gpu.buffer(
+            8 * every.len().max(1) as u64,
+            wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::MAP_READ,
+        );
         let bindings = bind_view(
             &self.gpu,
             &self.pipelines,
@@ -90,27 +88,17 @@ impl Lavapipe {
         marking: Option<&wgpu::BindGroup>,
     ) -> Result<(), RasterError> {
         let plan = self.plan(draws, list, purpose)?;
-        let load = match marking {
-            Some(_) => wgpu::LoadOp::Load,
-            None => wgpu::LoadOp::Clear(FARTHEST),
-        };
-        self.gpu.checked("rendering depth alone", || {
-            let mut encoder = self.gpu.device.create_command_encoder(&Default::default());
+        let clear = marking.is_none().then_some(FARTHEST);
+        self.gpu.submit("rendering depth alone", |encoder| {
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                    view: &depth.create_view(&Default::default()),
-                    depth_ops: Some(wgpu::Operations {
-                        load,
-                        store: wgpu::StoreOp::Store,
-                    }),
-                    stencil_ops: None,
-                }),
+                depth_stencil_attachment: depth_attachment(
+                    &depth.create_view(&Default::default()),
+                    clear,
+                ),
                 ..Default::default()
             });
             pass.set_bind_group(0, marking.unwrap_or(&self.eye_bindings), &[]);
             self.issue(&mut pass, draws, &plan);
-            drop(pass);
-            self.gpu.queue.submit([encoder.finish()]);
         })
     }
 }
