@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 use formats::interop::{
     GeometryRow, RayAccess, RayRow, RaySample, RecordRow, SampleRow, Tabular, Values,
-    geometry_rows, ray_rows, ray_samples, record_rows,
+    geometry_rows, ray_rows, ray_samples, record_rows, record_to_json,
 };
 use formats::raytrace::{BvhSummary, Hierarchy, RayTile, Raytrace, RaytraceTables};
 use formats::textrace::{Pass, Textrace, Tile};
@@ -28,47 +28,116 @@ pub fn ray_tiles(tables: &RaytraceTables) -> impl Iterator<Item = (Eye, u32)> + 
     [Eye::Left, Eye::Right].into_iter().flat_map(of_eye)
 }
 
-/// A trace with rows of type `R`.
-pub trait Rows<R>: Sync {
+/// A trace as tiles.
+pub trait Tiles: Sync {
     /// Identifies a tile.
-    type At: Copy + Send + Sync;
+    type Place: Copy + Send + Sync + PartialEq;
     /// A decoded tile.
-    type Tile: Default;
+    type Content: Default + PartialEq;
+    /// What a line of a tile is called.
+    const LINE: &'static str;
 
     /// All tiles, in file order.
-    fn places(&self) -> Vec<Self::At>;
+    fn places(&self) -> Vec<Self::Place>;
 
     /// Number of the pass or eye, and of the tile.
-    fn place(at: Self::At) -> (usize, usize);
+    fn numbers(at: Self::Place) -> (usize, usize);
 
+    /// Name of the pass or eye.
+    fn pass_name(at: Self::Place) -> String;
+
+    /// Decodes everything of a tile.
+    ///
+    /// # Errors
+    /// A damaged tile.
+    fn decode(&self, at: Self::Place, tile: &mut Self::Content) -> formats::Result<()>;
+
+    /// A tile as JSON Lines.
+    ///
+    /// # Errors
+    /// None in practice; the signature is the serialiser's.
+    fn lines(&self, at: Self::Place, tile: &Self::Content) -> serde_json::Result<Vec<String>>;
+}
+
+impl Tiles for Textrace {
+    type Place = (usize, usize);
+    type Content = Tile;
+    const LINE: &'static str = "record";
+
+    fn places(&self) -> Vec<Self::Place> {
+        tiles(&self.tables().passes).collect()
+    }
+
+    fn numbers(at: Self::Place) -> (usize, usize) {
+        at
+    }
+
+    fn pass_name((pass, _): Self::Place) -> String {
+        format!("pass {pass}")
+    }
+
+    fn decode(&self, (pass, index): Self::Place, tile: &mut Tile) -> formats::Result<()> {
+        self.decode_tile(pass, index, tile)
+    }
+
+    fn lines(&self, (pass, index): Self::Place, tile: &Tile) -> serde_json::Result<Vec<String>> {
+        let rows = record_rows(pass as u32, index as u32, tile);
+        let line = |row: RecordRow| record_to_json(row.origin, &row.record).to_string();
+        Ok(rows.map(line).collect())
+    }
+}
+
+impl Tiles for Raytrace {
+    type Place = (Eye, u32);
+    type Content = RayTile;
+    const LINE: &'static str = "sample";
+
+    fn places(&self) -> Vec<Self::Place> {
+        ray_tiles(self.tables()).collect()
+    }
+
+    fn numbers((eye, tile): Self::Place) -> (usize, usize) {
+        (eye as usize, tile as usize)
+    }
+
+    fn pass_name((eye, _): Self::Place) -> String {
+        format!("{eye} eye")
+    }
+
+    fn decode(&self, (eye, index): Self::Place, tile: &mut RayTile) -> formats::Result<()> {
+        self.decode_tile_with_geometry(eye, index, tile)
+    }
+
+    fn lines(&self, (eye, index): Self::Place, tile: &RayTile) -> serde_json::Result<Vec<String>> {
+        let tables = self.tables();
+        let samples = ray_samples(tables, eye, index, tile);
+        samples.map(|sample| sample.to_json(&tables.bvh)).collect()
+    }
+}
+
+/// A trace with rows of type `R`.
+pub trait Rows<R>: Tiles {
     /// Appends the rows of a tile. `tile` is reused.
     ///
     /// # Errors
     /// A damaged tile.
-    fn append(&self, at: Self::At, tile: &mut Self::Tile, rows: &mut Vec<R>)
-    -> formats::Result<()>;
+    fn append(
+        &self,
+        at: Self::Place,
+        tile: &mut Self::Content,
+        rows: &mut Vec<R>,
+    ) -> formats::Result<()>;
 }
 
 impl Rows<RecordRow> for Textrace {
-    type At = (usize, usize);
-    type Tile = Tile;
-
-    fn places(&self) -> Vec<Self::At> {
-        tiles(&self.tables().passes).collect()
-    }
-
-    fn place(at: Self::At) -> (usize, usize) {
-        at
-    }
-
     fn append(
         &self,
-        (pass, index): Self::At,
+        at: Self::Place,
         tile: &mut Tile,
         rows: &mut Vec<RecordRow>,
     ) -> formats::Result<()> {
-        self.decode_tile(pass, index, tile)?;
-        rows.extend(record_rows(pass as u32, index as u32, tile));
+        self.decode(at, tile)?;
+        rows.extend(record_rows(at.0 as u32, at.1 as u32, tile));
         Ok(())
     }
 }
@@ -113,20 +182,9 @@ impl OfSample for RayAccess {
 }
 
 impl<R: OfSample> Rows<R> for Raytrace {
-    type At = (Eye, u32);
-    type Tile = RayTile;
-
-    fn places(&self) -> Vec<Self::At> {
-        ray_tiles(self.tables()).collect()
-    }
-
-    fn place((eye, tile): Self::At) -> (usize, usize) {
-        (eye as usize, tile as usize)
-    }
-
     fn append(
         &self,
-        (eye, index): Self::At,
+        (eye, index): Self::Place,
         tile: &mut RayTile,
         rows: &mut Vec<R>,
     ) -> formats::Result<()> {
@@ -169,8 +227,8 @@ pub fn columns_of<R: Tabular>(rows: &[R]) -> Vec<Values> {
 /// # Errors
 /// The first damaged tile.
 pub fn columns<R: Tabular, T: Rows<R>>(trace: &T) -> formats::Result<Vec<Values>> {
-    let of_chunk = |places: &[T::At]| -> formats::Result<Vec<Values>> {
-        let (mut tile, mut rows) = (T::Tile::default(), Vec::new());
+    let of_chunk = |places: &[T::Place]| -> formats::Result<Vec<Values>> {
+        let (mut tile, mut rows) = (T::Content::default(), Vec::new());
         for &at in places {
             trace.append(at, &mut tile, &mut rows)?;
         }

@@ -3,6 +3,7 @@
 //! [`Tabular::FIELDS`] is the only list of the columns of a row type. Parquet, NPY and the Python package
 //! use it. Values are those of the file, so fixed-point numbers stay integers.
 
+use super::plain::PlainAccess;
 use super::{Access, Origin, RayAccess, RaySample};
 use crate::raytrace::{Hit, PixelRecord, RayGeometry, RayRecord};
 use crate::textrace::{QuadRecord, Tile};
@@ -104,6 +105,11 @@ impl<R> Field<R> {
 pub trait Tabular: Sized + Send + Sync + 'static {
     /// The columns, in order.
     const FIELDS: &'static [Field<Self>];
+
+    /// The row without its texture or ray, if it is an access.
+    fn plain(&self) -> Option<PlainAccess> {
+        None
+    }
 }
 
 /// The columns of a row type: name, type or `[names of codes]`, and value of a row.
@@ -378,6 +384,10 @@ impl Tabular for Access {
         "x" U32 a.x,
         "y" U32 a.y,
     ];
+
+    fn plain(&self) -> Option<PlainAccess> {
+        Some(PlainAccess::read(self.address, self.bytes))
+    }
 }
 
 impl Tabular for RayAccess {
@@ -394,6 +404,10 @@ impl Tabular for RayAccess {
         "entry" [ENTRIES] a.entry as u8,
         "index" U32 a.index,
     ];
+
+    fn plain(&self) -> Option<PlainAccess> {
+        Some(PlainAccess::read(self.address, self.bytes))
+    }
 }
 
 #[cfg(test)]

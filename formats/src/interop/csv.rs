@@ -1,7 +1,6 @@
 //! Rows as CSV with a header line.
 
 use super::columns::{Get, Tabular};
-use super::{Access, AccessSink};
 use std::io::{self, Write};
 use std::marker::PhantomData;
 
@@ -32,7 +31,7 @@ impl<W: Write, R: Tabular> CsvWriter<W, R> {
     ///
     /// # Errors
     /// Errors of the underlying writer.
-    pub fn row(&mut self, row: &R) -> io::Result<()> {
+    pub fn write(&mut self, row: &R) -> io::Result<()> {
         self.line.clear();
         for field in R::FIELDS {
             if !self.line.is_empty() {
@@ -45,11 +44,5 @@ impl<W: Write, R: Tabular> CsvWriter<W, R> {
         }
         self.line.push(b'\n');
         self.out.write_all(&self.line)
-    }
-}
-
-impl<W: Write> AccessSink for CsvWriter<W, Access> {
-    fn write(&mut self, access: &Access) -> io::Result<()> {
-        self.row(access)
     }
 }

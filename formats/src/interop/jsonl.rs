@@ -1,19 +1,32 @@
-//! JSON Lines: one object per access or per record.
+//! JSON Lines: one object per row.
 
-use super::{Access, AccessSink, Origin};
+use super::Origin;
+use super::columns::Tabular;
 use crate::textrace::{NO_GROUP, QuadRecord};
 use serde_json::{Value, json};
 use std::io::{self, Write};
 
-/// Writes JSON Lines.
-#[derive(Debug)]
-pub struct JsonlWriter<W>(pub W);
-
-impl<W: Write> AccessSink for JsonlWriter<W> {
-    fn write(&mut self, access: &Access) -> io::Result<()> {
-        serde_json::to_writer(&mut self.0, access)?;
-        self.0.write_all(b"\n")
+/// Writes a row as a line of JSON: codes as names, numbers that are not finite as null.
+///
+/// # Errors
+/// Errors of the underlying writer.
+pub fn write_json_line<R: Tabular>(row: &R, out: &mut impl Write) -> io::Result<()> {
+    let mut line = b"{".to_vec();
+    for field in R::FIELDS {
+        let separator = if line.len() > 1 { "," } else { "" };
+        write!(line, "{separator}\"{}\":", field.name)?;
+        let begin = line.len();
+        field.write_text(row, &mut line)?;
+        if line.ends_with(b"NaN") {
+            line.truncate(begin);
+            line.extend(b"null");
+        } else if !field.codes.is_empty() {
+            line.insert(begin, b'"');
+            line.push(b'"');
+        }
     }
+    line.extend(b"}\n");
+    out.write_all(&line)
 }
 
 /// A quad record as `replay dump` prints it, with the stored fixed-point numbers.

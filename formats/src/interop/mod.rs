@@ -18,7 +18,7 @@ pub use columns::{
 };
 pub use csv::CsvWriter;
 pub use hierarchy::{ChildRow, SlotRow, child_rows, node_to_json, slot_rows, slot_to_json};
-pub use jsonl::{JsonlWriter, record_to_json};
+pub use jsonl::{record_to_json, write_json_line};
 pub use npy::NpyWriter;
 pub use rays::{Entry, RayAccess, RaySample, ray_samples};
 
@@ -53,12 +53,11 @@ pub struct Origin {
 }
 
 /// One read of texture memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Access {
     /// Byte address.
     pub address: u64,
     /// Number of bytes: those of a line or a block.
-    #[serde(skip)]
     pub bytes: u32,
     /// Index of the pass.
     pub pass: u32,
@@ -160,15 +159,6 @@ impl Expander<'_> {
         );
         outcome
     }
-}
-
-/// A writer of accesses.
-pub trait AccessSink {
-    /// Writes one access.
-    ///
-    /// # Errors
-    /// Errors of the underlying writer.
-    fn write(&mut self, access: &Access) -> io::Result<()>;
 }
 
 #[cfg(test)]

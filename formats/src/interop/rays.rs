@@ -210,8 +210,7 @@ impl RaySample<'_> {
 }
 
 /// Kind of data that an access reads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Entry {
     /// An inner node.
     Node,
@@ -220,7 +219,7 @@ pub enum Entry {
 }
 
 /// One read of the hierarchy's memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RayAccess {
     /// Address of the first byte.
     pub address: u64,

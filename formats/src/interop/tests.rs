@@ -63,10 +63,9 @@ fn csv_and_json_lines_hold_the_same_accesses() {
     let written = accesses(Granularity::Line, &record());
     let (mut csv, mut jsonl) = (Vec::new(), Vec::new());
     let mut csv_sink = CsvWriter::new(&mut csv).unwrap();
-    let mut jsonl_sink = JsonlWriter(&mut jsonl);
     for access in &written {
         csv_sink.write(access).unwrap();
-        jsonl_sink.write(access).unwrap();
+        write_json_line(access, &mut jsonl).unwrap();
     }
     let csv = String::from_utf8(csv).unwrap();
     let mut rows = csv.lines();

@@ -8,11 +8,8 @@ use anyhow::{Context, Result, bail, ensure};
 use columns::RowKind;
 use formats::Trace;
 use formats::container::{AtomicFile, is_stdout};
-use formats::interop::plain::{CompressedWriter, Compression, PlainAccess, PlainForm, PlainWriter};
-use formats::interop::{
-    Access, AccessSink, CsvWriter, Expander, Granularity, JsonlWriter, Origin, RayAccess,
-    ray_samples,
-};
+use formats::interop::plain::{CompressedWriter, Compression, PlainForm};
+use formats::interop::{Access, Expander, Granularity, Origin, RayAccess, ray_samples};
 use formats::layout::Layout;
 use formats::raytrace::{
     RayTile, Raytrace, RaytraceWriter, encode_ray_tile, encode_ray_tile_with_geometry,
@@ -22,7 +19,7 @@ use report::notices;
 use shell::Output;
 use sim::config::RunConfig;
 use sim::stream::{TileSource, for_quads, plan, rendered};
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -86,12 +83,8 @@ impl Target {
         lines || self.plain().is_some_and(PlainForm::is_text)
     }
 
-    fn is_columns(self) -> bool {
-        matches!(self, Self::Npy | Self::Parquet)
-    }
-
     fn has_rows(self) -> bool {
-        self.is_columns() || matches!(self, Self::Csv | Self::Jsonl)
+        self.plain().is_none() && !self.is_trace()
     }
 }
 
@@ -320,46 +313,13 @@ fn write_accesses(
             trace.container().file()
         );
     }
-    match (trace, args.to.plain()) {
-        (Trace::Texture(trace), Some(form)) => {
-            let mut sink = PlainWriter::new(form, out)?;
-            accesses(trace, config, args.granularity(), &mut sink)
-        }
-        (Trace::Texture(trace), None) if args.to == Target::Csv => {
-            accesses(trace, config, args.granularity(), &mut CsvWriter::new(out)?)
-        }
-        (Trace::Texture(trace), None) if args.to.is_columns() => columns::rows(
-            args.to,
-            out,
-            |sink: &mut dyn FnMut(Access) -> Result<()>| {
-                accesses(trace, config, args.granularity(), &mut columns::Sink(sink))
-            },
-        ),
-        (Trace::Texture(trace), None) => {
-            accesses(trace, config, args.granularity(), &mut JsonlWriter(out))
-        }
-        (Trace::Ray(trace), Some(form)) => {
-            let mut out = PlainWriter::new(form, out)?;
-            ray_accesses(trace, config, args, |access| {
-                out.access(&PlainAccess::read(access.address, access.bytes))
-            })
-        }
-        (Trace::Ray(trace), None) if args.to == Target::Csv => {
-            let mut csv = CsvWriter::new(out)?;
-            ray_accesses(trace, config, args, |access| csv.row(access))
-        }
-        (Trace::Ray(trace), None) if args.to.is_columns() => columns::rows(
-            args.to,
-            out,
-            |sink: &mut dyn FnMut(RayAccess) -> Result<()>| {
-                ray_accesses(trace, config, args, |access| {
-                    sink(*access).map_err(io::Error::other)
-                })
-            },
-        ),
-        (Trace::Ray(trace), None) => ray_accesses(trace, config, args, |access| {
-            writeln!(out, "{}", serde_json::to_string(access)?)
+    match trace {
+        Trace::Texture(trace) => columns::rows::<Access>(args.to, out, |sink| {
+            accesses(trace, config, args.granularity(), sink)
         }),
+        Trace::Ray(trace) => {
+            columns::rows::<RayAccess>(args.to, out, |sink| ray_accesses(trace, config, args, sink))
+        }
     }
 }
 
@@ -368,7 +328,7 @@ fn accesses(
     trace: &Textrace,
     config: &RunConfig,
     granularity: GranularityName,
-    sink: &mut impl AccessSink,
+    sink: columns::Row<'_, Access>,
 ) -> Result<()> {
     let config = &RunConfig {
         cores: 1,
@@ -396,7 +356,7 @@ fn accesses(
                 primitive: quad.primitive,
             };
             for (record, operands) in with_operands(quad.records) {
-                expander.expand(origin, record, operands, |access| sink.write(access))?;
+                expander.expand(origin, record, operands, |access| sink(*access))?;
             }
             Ok(())
         })?;
@@ -409,7 +369,7 @@ fn ray_accesses(
     trace: &Raytrace,
     config: &RunConfig,
     args: &ConvertArgs,
-    mut write: impl FnMut(&RayAccess) -> io::Result<()>,
+    sink: columns::Row<'_, RayAccess>,
 ) -> Result<()> {
     let tables = trace.tables();
     let by_line = args.granularity() == GranularityName::Line;
@@ -419,11 +379,11 @@ fn ray_accesses(
         for sample in ray_samples(tables, eye, index, &tile) {
             sample.accesses(&tables.bvh, |access| {
                 if !by_line {
-                    return write(access);
+                    return sink(*access);
                 }
                 let bytes = config.line_bytes;
                 access.lines(bytes).try_for_each(|address| {
-                    write(&RayAccess {
+                    sink(RayAccess {
                         address,
                         bytes,
                         ..*access

@@ -1,14 +1,13 @@
 //! `replay diff`: lists different keys of two traces' descriptions, and the first different entries and
 //! record.
 
-use super::dump::record_lines;
-use super::tiles::{ray_tiles, tiles};
+use crate::records::Tiles;
 use anyhow::Result;
 use formats::Trace;
-use formats::interop::{node_to_json, ray_samples, slot_rows, slot_to_json};
-use formats::raytrace::{RayTile, Raytrace};
+use formats::interop::{node_to_json, slot_rows, slot_to_json};
+use formats::raytrace::Raytrace;
+use formats::textrace::Textrace;
 use formats::textrace::geometry::GeometryView;
-use formats::textrace::{Textrace, Tile};
 use report::notices;
 use serde_json::Value;
 use std::path::PathBuf;
@@ -72,7 +71,7 @@ fn textures(left: &Textrace, right: &Textrace, ignore_meta: bool) -> Result<Vec<
     let same_tiles = passes.is_none();
     found.extend(passes);
     if same_tiles {
-        found.extend(first_record(left, right)?);
+        found.extend(first_line(left, right)?);
         found.extend(geometry(left, right));
     }
     Ok(found)
@@ -85,14 +84,7 @@ fn geometry(left: &Textrace, right: &Textrace) -> Option<String> {
         return None;
     }
     let (Some(a), Some(b)) = (a, b) else {
-        let there = |geometry: Option<_>| {
-            if geometry.is_some() {
-                "there"
-            } else {
-                "absent"
-            }
-        };
-        return Some(differ("geometry", there(a), there(b)));
+        return Some(differ("geometry", there(a.is_some()), there(b.is_some())));
     };
     if (&a.meshes, &a.draw_meshes) != (&b.meshes, &b.draw_meshes) {
         return Some(differ("meshes", a.meshes.len(), b.meshes.len()));
@@ -110,16 +102,20 @@ fn geometry(left: &Textrace, right: &Textrace) -> Option<String> {
     ))
 }
 
-/// The first different record of two traces with the same tiles.
-fn first_record(left: &Textrace, right: &Textrace) -> Result<Option<String>> {
-    let (mut a, mut b) = (Tile::default(), Tile::default());
-    for (pass, index) in tiles(&left.tables().passes) {
-        left.decode_tile(pass, index, &mut a)?;
-        right.decode_tile(pass, index, &mut b)?;
-        if a != b {
-            let [a, b] = [&a, &b].map(|tile| record_lines(pass, index, tile).collect());
-            let place = format!("pass {pass} tile {index} record");
-            return Ok(lines(&place, a, b));
+/// The first different line of two traces with the same tiles.
+fn first_line<T: Tiles>(left: &T, right: &T) -> Result<Option<String>> {
+    let (mut a, mut b) = (T::Content::default(), T::Content::default());
+    for at in left.places() {
+        left.decode(at, &mut a)?;
+        right.decode(at, &mut b)?;
+        if a == b {
+            continue;
+        }
+        let place = format!("{} tile {} {}", T::pass_name(at), T::numbers(at).1, T::LINE);
+        // Text is compared because NaN texture coordinates are not equal to themselves.
+        let found = lines(&place, left.lines(at, &a)?, right.lines(at, &b)?);
+        if found.is_some() {
+            return Ok(found);
         }
     }
     Ok(None)
@@ -136,8 +132,8 @@ fn rays(left: &Raytrace, right: &Raytrace, ignore_meta: bool) -> Result<Vec<Stri
     found.extend(entries("light", &a.lights, &b.lights)?);
     found.extend(entries("triangle", &a.triangles, &b.triangles)?);
     found.extend(hierarchies(left, right)?);
-    if ray_tiles(&a).eq(ray_tiles(b)) {
-        found.extend(first_sample(left, right)?);
+    if left.places() == right.places() {
+        found.extend(first_line(left, right)?);
     }
     Ok(found)
 }
@@ -159,15 +155,8 @@ fn hierarchies(left: &Raytrace, right: &Raytrace) -> Result<Option<String>> {
         let lines: serde_json::Result<_> = nodes.chain(slots).collect();
         Ok(Some(lines?))
     };
-    let there = |trace: &Raytrace| {
-        if trace.has_hierarchy() {
-            "there"
-        } else {
-            "absent"
-        }
-    };
     let (Some(a), Some(b)) = (content(left)?, content(right)?) else {
-        let [a, b] = [left, right].map(there);
+        let [a, b] = [left, right].map(|trace| there(trace.has_hierarchy()));
         return Ok((a != b).then(|| differ("content of the hierarchy", a, b)));
     };
     let first = a.iter().zip(&b).find(|(a, b)| a != b);
@@ -175,30 +164,8 @@ fn hierarchies(left: &Raytrace, right: &Raytrace) -> Result<Option<String>> {
     Ok(first.map(|([place, a], [_, b])| differ(place, a, b)))
 }
 
-/// The first different sample of two traces with the same tiles.
-fn first_sample(left: &Raytrace, right: &Raytrace) -> Result<Option<String>> {
-    let (mut a, mut b) = (RayTile::default(), RayTile::default());
-    for (eye, index) in ray_tiles(left.tables()) {
-        left.decode_tile_with_geometry(eye, index, &mut a)?;
-        right.decode_tile_with_geometry(eye, index, &mut b)?;
-        if a == b {
-            continue;
-        }
-        let of = |trace: &Raytrace, tile: &RayTile| -> Result<Vec<String>> {
-            let tables = trace.tables();
-            let samples = ray_samples(tables, eye, index, tile);
-            Ok(samples
-                .map(|s| s.to_json(&tables.bvh))
-                .collect::<Result<_, _>>()?)
-        };
-        let place = format!("{eye} eye tile {index} sample");
-        // Text is compared because NaN texture coordinates are not equal to themselves.
-        let found = lines(&place, of(left, &a)?, of(right, &b)?);
-        if found.is_some() {
-            return Ok(found);
-        }
-    }
-    Ok(None)
+fn there(is_there: bool) -> &'static str {
+    if is_there { "there" } else { "absent" }
 }
 
 fn differ(what: &str, left: impl std::fmt::Display, right: impl std::fmt::Display) -> String {

@@ -2,17 +2,15 @@
 
 use super::convert::Target;
 use super::convert::columns::{self, RowKind};
-use super::tiles::{NumberRange, ray_tiles, tiles};
+use super::tiles::NumberRange;
 use crate::files;
-use crate::records;
+use crate::records::{self, Tiles};
 use anyhow::{Context, Result, bail, ensure};
 use formats::Trace;
 use formats::container::AtomicFile;
-use formats::interop::{
-    node_to_json, ray_samples, record_rows, record_to_json, slot_rows, slot_to_json,
-};
-use formats::raytrace::{RayTile, Raytrace};
-use formats::textrace::{Textrace, Tile};
+use formats::interop::{node_to_json, slot_rows, slot_to_json};
+use formats::raytrace::Raytrace;
+use formats::textrace::Textrace;
 use report::notices;
 use shell::Output;
 use std::cell::Cell;
@@ -130,10 +128,9 @@ fn to_parquet(trace: &Trace, args: &DumpArgs, path: &Path) -> Result<()> {
 }
 
 fn dump(trace: &Trace, args: &DumpArgs, out: &mut impl Write) -> Result<()> {
-    let chosen = |pass, tile| args.has(pass, tile);
     let any = match trace {
-        Trace::Texture(trace) => records(trace, chosen, out)?,
-        Trace::Ray(trace) => samples(trace, chosen, out)?,
+        Trace::Texture(trace) => lines(&**trace, args, out)?,
+        Trace::Ray(trace) => lines(&**trace, args, out)?,
     };
     check_any(any, trace, args)
 }
@@ -160,28 +157,21 @@ fn check_any(any: bool, trace: &Trace, args: &DumpArgs) -> Result<()> {
     )
 }
 
-/// Prints the records of the chosen tiles; returns false if no tile matches.
-fn records(
-    trace: &Textrace,
-    chosen: impl Fn(usize, usize) -> bool,
-    out: &mut impl Write,
-) -> Result<bool> {
-    let mut tile = Tile::default();
+/// Prints the chosen tiles line by line; returns false if no tile matches.
+fn lines<T: Tiles>(trace: &T, args: &DumpArgs, out: &mut impl Write) -> Result<bool> {
+    let mut tile = T::Content::default();
     let mut any = false;
-    for (pass, index) in tiles(&trace.tables().passes).filter(|at| chosen(at.0, at.1)) {
-        any = true;
-        trace.decode_tile(pass, index, &mut tile)?;
-        for line in record_lines(pass, index, &tile) {
-            writeln!(out, "{line}")?;
+    for at in trace.places() {
+        let (pass, number) = T::numbers(at);
+        if args.has(pass, number) {
+            any = true;
+            trace.decode(at, &mut tile)?;
+            for line in trace.lines(at, &tile)? {
+                writeln!(out, "{line}")?;
+            }
         }
     }
     Ok(any)
-}
-
-/// The records of a tile as JSON Lines.
-pub(super) fn record_lines(pass: usize, index: usize, tile: &Tile) -> impl Iterator<Item = String> {
-    record_rows(pass as u32, index as u32, tile)
-        .map(|row| record_to_json(row.origin, &row.record).to_string())
 }
 
 /// The ray trace whose hierarchy is asked for.
@@ -232,29 +222,10 @@ fn primitive_lists(trace: &Textrace, out: &mut impl Write) -> Result<()> {
     Ok(())
 }
 
-/// Prints the samples of the chosen tiles; returns false if no tile matches.
-fn samples(
-    trace: &Raytrace,
-    chosen: impl Fn(usize, usize) -> bool,
-    out: &mut impl Write,
-) -> Result<bool> {
-    let tables = trace.tables();
-    let mut tile = RayTile::default();
-    let mut any = false;
-    for (eye, index) in ray_tiles(tables).filter(|at| chosen(at.0 as usize, at.1 as usize)) {
-        any = true;
-        trace.decode_tile_with_geometry(eye, index, &mut tile)?;
-        for sample in ray_samples(tables, eye, index, &tile) {
-            writeln!(out, "{}", sample.to_json(&tables.bvh)?)?;
-        }
-    }
-    Ok(any)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::testing::{file_of, lines};
+    use crate::cli::testing::{self, file_of};
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use sim::stream::testing::Synthetic;
 
@@ -276,7 +247,7 @@ mod tests {
         let mut text = Vec::new();
         dump(&trace, &args, &mut text).unwrap();
         let expected: usize = memory.tiles[1][2..5].iter().map(|t| t.records.len()).sum();
-        let lines = lines(&text);
+        let lines = testing::lines(&text);
         assert!(expected > 0);
         assert_eq!(lines.len(), expected);
         let first: serde_json::Value = serde_json::from_str(&lines[0]).unwrap();

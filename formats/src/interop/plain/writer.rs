@@ -1,7 +1,6 @@
 //! Writes plain accesses in any form.
 
 use super::{PlainAccess, champsim, din, gem5, ramulator, words};
-use crate::interop::{Access, AccessSink};
 use std::io::{self, Write};
 
 /// Forms that can be written.
@@ -76,11 +75,5 @@ impl<W: Write> PlainWriter<W> {
             PlainForm::RamulatorO3 => ramulator::write_o3(out, access),
             PlainForm::Champsim => champsim::write(out, access),
         }
-    }
-}
-
-impl<W: Write> AccessSink for PlainWriter<W> {
-    fn write(&mut self, access: &Access) -> io::Result<()> {
-        self.access(&PlainAccess::read(access.address, access.bytes))
     }
 }

@@ -1,27 +1,19 @@
-//! Rows with typed columns: NPY and Parquet, CSV and JSON Lines.
+//! Rows in every form: NPY, Parquet, CSV, JSON Lines and, for accesses, the forms of other simulators.
 
 use super::Target;
 use crate::records::{self, Rows};
 use anyhow::{Result, bail};
 use formats::Trace;
+use formats::interop::plain::PlainWriter;
 use formats::interop::{
-    Access, AccessSink, CsvWriter, GeometryRow, NpyWriter, RayRow, RecordRow, SampleRow, Tabular,
-    child_rows, slot_rows,
+    CsvWriter, GeometryRow, NpyWriter, RayRow, RecordRow, SampleRow, Tabular, child_rows,
+    slot_rows, write_json_line,
 };
 use report::rows_parquet::RowsWriter;
 use std::io::{self, Write};
 
 /// A receiver of rows.
-type Row<'a, R> = &'a mut dyn FnMut(R) -> Result<()>;
-
-/// Passes accesses to a receiver of rows.
-pub(super) struct Sink<'a>(pub(super) Row<'a, Access>);
-
-impl AccessSink for Sink<'_> {
-    fn write(&mut self, access: &Access) -> io::Result<()> {
-        (self.0)(*access).map_err(io::Error::other)
-    }
-}
+pub(super) type Row<'a, R> = &'a mut dyn FnMut(R) -> io::Result<()>;
 
 /// Writes the rows that `send` passes on. The header of NPY has their number, so `send` is called twice for it.
 pub(super) fn rows<R: Tabular>(
@@ -29,27 +21,33 @@ pub(super) fn rows<R: Tabular>(
     out: &mut (impl Write + Send),
     send: impl Fn(Row<'_, R>) -> Result<()>,
 ) -> Result<()> {
-    if to == Target::Parquet {
-        let mut writer = RowsWriter::new(out)?;
-        send(&mut |row| Ok(writer.write(row)?))?;
-        writer.finish()?;
-        return Ok(());
+    if let Some(form) = to.plain() {
+        let mut writer = PlainWriter::new(form, out)?;
+        return send(&mut |row| row.plain().map_or(Ok(()), |access| writer.access(&access)));
     }
-    if to == Target::Csv {
-        let mut csv = CsvWriter::new(out)?;
-        return send(&mut |row| Ok(csv.row(&row)?));
+    match to {
+        Target::Parquet => {
+            let mut writer = RowsWriter::new(out)?;
+            send(&mut |row| writer.write(row).map_err(io::Error::other))?;
+            writer.finish()?;
+        }
+        Target::Npy => {
+            let mut count = 0;
+            send(&mut |_| {
+                count += 1;
+                Ok(())
+            })?;
+            let mut writer = NpyWriter::new(out, count)?;
+            send(&mut |row| writer.write(&row))?;
+            writer.finish()?;
+        }
+        Target::Csv => {
+            let mut writer = CsvWriter::new(out)?;
+            send(&mut |row| writer.write(&row))?;
+        }
+        _ => send(&mut |row| write_json_line(&row, out))?,
     }
-    if !to.is_columns() {
-        return send(&mut |row| Ok(json_row(&row, out)?));
-    }
-    let mut count = 0;
-    send(&mut |_| {
-        count += 1;
-        Ok(())
-    })?;
-    let mut writer = NpyWriter::new(out, count)?;
-    send(&mut |row| Ok(writer.write(&row)?))?;
-    Ok(writer.finish()?)
+    Ok(())
 }
 
 /// Whether a tile is written, by its pass or eye and its number.
@@ -63,9 +61,9 @@ fn of_tiles<R: Tabular, T: Rows<R>>(
     chosen: Chosen<'_>,
 ) -> Result<()> {
     rows(to, out, |send| {
-        let (mut tile, mut found) = (T::Tile::default(), Vec::new());
+        let (mut tile, mut found) = (T::Content::default(), Vec::new());
         for at in trace.places() {
-            let (pass, number) = T::place(at);
+            let (pass, number) = T::numbers(at);
             if chosen(pass, number) {
                 trace.append(at, &mut tile, &mut found)?;
                 found.drain(..).try_for_each(&mut *send)?;
@@ -73,27 +71,6 @@ fn of_tiles<R: Tabular, T: Rows<R>>(
         }
         Ok(())
     })
-}
-
-/// Writes a row as a line of JSON. Codes are written as names.
-fn json_row<R: Tabular>(row: &R, out: &mut impl Write) -> io::Result<()> {
-    let mut line = b"{".to_vec();
-    for field in R::FIELDS {
-        let separator = if line.len() > 1 { "," } else { "" };
-        write!(line, "{separator}\"{}\":", field.name)?;
-        let begin = line.len();
-        field.write_text(row, &mut line)?;
-        if line.ends_with(b"NaN") {
-            // JSON has no NaN.
-            line.truncate(begin);
-            line.extend(b"null");
-        } else if !field.codes.is_empty() {
-            line.insert(begin, b'"');
-            line.push(b'"');
-        }
-    }
-    line.extend(b"}\n");
-    out.write_all(&line)
 }
 
 /// Rows of a trace.
@@ -136,12 +113,16 @@ pub(in crate::cli) fn of_trace(
         RowKind::Node => {
             let (bvh, hierarchy) = (&trace.tables().bvh, records::hierarchy(trace)?);
             rows(to, out, |send| {
-                child_rows(bvh, &hierarchy).try_for_each(send)
+                Ok(child_rows(bvh, &hierarchy).try_for_each(send)?)
             })
         }
         RowKind::Slot => {
             let hierarchy = records::hierarchy(trace)?;
-            rows(to, out, |send| slot_rows(&hierarchy).try_for_each(send))
+            rows(
+                to,
+                out,
+                |send| Ok(slot_rows(&hierarchy).try_for_each(send)?),
+            )
         }
     }
 }
