@@ -146,13 +146,11 @@ def reproject(
     ParallaxError
         A trace cannot be read, or a setting cannot be used.
     """
-    files = [str(path) for path in paths_of(traces)]
-    flags = {"--preset": preset, "--rule": rule, "--reuse": reuse}
-    arguments = [f"{flag}={value}" for flag, value in flags.items() if value is not None]
-    text = None
+    names = [None if name is None else str(name) for name in (preset, rule, reuse)]
+    file = text = None
     settings = _read(config, "config")
     if settings is not None:
-        arguments.append(f"--config={settings['file']}")
+        file = settings["file"]
     elif config:
         text = Writer([], 16).settings(config)["text"]
-    return _frame(_native.reproject([*arguments, "--", *files], text))
+    return _frame(_native.reproject(paths_of(traces), names, file, text))

@@ -5,9 +5,11 @@ use crate::jobs::{self, Traces};
 use crate::policies;
 use anyhow::{Context, Result, anyhow, bail};
 use pyo3::prelude::*;
+use replay::cli::ReuseArgs;
 use replay::config::{Order, RunConfig};
 use replay::experiment::{self, ExperimentFile, Outcome, Plan, PlanError, Subject, parse_config};
 use replay::memory::Replacement;
+use replay::order::{FoundTiles, TileRef};
 use replay::report::document::Document;
 use replay::report::sweep::SweepReport;
 use replay::report::{parquet, run::RunReport};
@@ -99,9 +101,9 @@ pub fn check_orders<'a>(
             pass.tiles = pass.size_px.map(|size| size.div_ceil(config.tile_px));
         }
         config.order.check_for(&passes).map_err(|(pass, fault)| {
-            let found = match fault.found.split_once(':') {
-                Some((of, tile)) => tile_name(&passes, of.parse(), tile.parse()),
-                None => fault.found.clone(),
+            let found = match fault.found {
+                FoundTiles::Wrong(at) => tile_name(&passes, at),
+                missing @ FoundTiles::Missing(_) => missing.to_string(),
             };
             anyhow!(
                 "{}: pass {pass}, item {}: expected {}, found {found}",
@@ -115,20 +117,13 @@ pub fn check_orders<'a>(
 }
 
 /// A tile of a render pass in Python's notation: eye, column, row.
-fn tile_name<E>(
-    passes: &[formats::textrace::Pass],
-    pass: Result<u32, E>,
-    tile: Result<u32, E>,
-) -> String {
-    let of = |pass: u32| passes.get(pass as usize);
-    match (pass.ok().and_then(of), tile) {
-        (Some(pass), Ok(tile)) => {
-            let eye = pass.eye.map_or(0, |eye| eye as u32);
-            let columns = pass.tiles[0].max(1);
-            format!("({eye}, {}, {})", tile % columns, tile / columns)
-        }
-        _ => "a tile of no pass".to_owned(),
-    }
+fn tile_name(passes: &[formats::textrace::Pass], at: TileRef) -> String {
+    let Some(pass) = passes.get(at.pass as usize) else {
+        return "a tile of no pass".to_owned();
+    };
+    let eye = pass.eye.map_or(0, |eye| eye as u32);
+    let columns = pass.tiles[0].max(1);
+    format!("({eye}, {}, {})", at.tile % columns, at.tile / columns)
 }
 
 /// Replays a plan, and passes its outcome to `of`.
@@ -211,15 +206,18 @@ pub fn sweep(py: Python<'_>, paths: Vec<PathBuf>, settings: Settings) -> PyResul
     })
 }
 
-/// The rows of `replay reproject --parquet`.
+/// The rows of `replay reproject --parquet`. Parameters of the model are in a file or are TOML.
 #[pyfunction]
 pub fn reproject(
     py: Python<'_>,
-    arguments: Vec<String>,
+    files: Vec<PathBuf>,
+    names: [Option<String>; 3],
+    config: Option<PathBuf>,
     parameters: Option<String>,
 ) -> PyResult<Vec<u8>> {
     jobs::run(py, move |_| {
-        let rows = replay::cli::reproject::rows(&arguments, parameters.as_deref())?;
+        let reused = ReuseArgs::named(names.each_ref().map(Option::as_deref), config)?;
+        let rows = replay::cli::reproject::rows(files, reused, parameters.as_deref())?;
         Ok(parquet::bytes(&rows)?)
     })
 }

@@ -191,7 +191,7 @@ def test_reprojections_that_are_none(traces, replay):
     refused("unit", parallax.reproject, path, config={"tni": {"unit": 1}})
     refused("--rule", parallax.reproject, path, rule="sometimes")
     refused("--preset", parallax.reproject, path, preset="sgrt")
-    refused("required", parallax.reproject, [])
+    refused("expected at least one ray trace, found none", parallax.reproject, [])
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT")

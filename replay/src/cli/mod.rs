@@ -33,6 +33,7 @@ pub mod validate;
 mod warnings;
 
 pub use config_args::ConfigArgs;
+pub use reuse_args::ReuseArgs;
 
 use clap::{Arg, Parser, Subcommand};
 use shell::{Common, Documents};

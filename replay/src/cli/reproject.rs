@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Arguments of `replay reproject`.
-#[derive(Clone, Debug, Args)]
+#[derive(Clone, Debug, Default, Args)]
 #[command(
     mut_arg("csv", outputs::csv_before_traces),
     mut_arg("html", outputs::page_alone),
@@ -112,34 +112,32 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// The rows that `--parquet` writes. `arguments` are those of the command line, files first; `parameters` is
-/// the text of a `--config` file.
+/// The rows that `--parquet` writes, with the defaults of the other flags. `parameters` is the text of a `--config`
+/// file.
 ///
 /// # Errors
 /// As [`run`].
-pub fn rows(arguments: &[String], parameters: Option<&str>) -> anyhow::Result<Table> {
-    #[derive(clap::Parser)]
-    struct Line {
-        #[command(flatten)]
-        args: ReprojectArgs,
-    }
-    let words = std::iter::once("reproject").chain(arguments.iter().map(String::as_str));
-    let Line { args } = clap::Parser::try_parse_from(words).map_err(|error| {
-        // Without the usage that follows on the command line.
-        let text = error.to_string();
-        let first = text.lines().take_while(|line| !line.is_empty());
-        let text = first.collect::<Vec<_>>().join("\n");
-        anyhow::anyhow!(text.trim_start_matches("error: ").to_owned())
-    })?;
+pub fn rows(
+    files: Vec<PathBuf>,
+    reused: ReuseArgs,
+    parameters: Option<&str>,
+) -> anyhow::Result<Table> {
+    ensure!(
+        !files.is_empty(),
+        "expected at least one ray trace, found none"
+    );
     let config = match parameters {
-        None => args.reused.parameters()?,
+        None => reused.parameters()?,
         Some(text) => {
-            let named = args.reused.preset.map_or("", |preset| preset.parameters);
+            let named = reused.preset.map_or("", |preset| preset.parameters);
             SgrtConfig::from_layers(&[named, text]).context("config")?
         }
     };
-    check_timing(&args)?;
-    paper::values("", "", &args.paper_scenes)?;
+    let args = ReprojectArgs {
+        files,
+        reused,
+        ..ReprojectArgs::default()
+    };
     let entries = args
         .files
         .iter()

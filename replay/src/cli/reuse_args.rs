@@ -2,17 +2,18 @@
 
 use super::choice::choice;
 use anyhow::Context;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use sgrt::DEFAULT_RULE;
 use sgrt::compose::Reuse;
 use sgrt::config::SgrtConfig;
 use sgrt::presets::{self, Preset};
 use sgrt::rules::{self, Rule};
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 /// What is reused, and the machine.
-#[derive(Clone, Debug, Args)]
-pub(super) struct ReuseArgs {
+#[derive(Clone, Debug, Default, Args)]
+pub struct ReuseArgs {
     #[arg(long, value_name = "NAME", help = presets::help(), value_parser = preset)]
     pub preset: Option<&'static Preset>,
     #[arg(long, value_name = "RULE", help = rule_help())]
@@ -35,7 +36,33 @@ fn preset(name: &str) -> Result<&'static Preset, String> {
     presets::find(name).ok_or_else(|| format!("expected {}", names()))
 }
 
+/// The value of a flag, if it is given.
+fn value<T, E: Display>(
+    flag: &str,
+    name: Option<&str>,
+    parse: impl Fn(&str) -> Result<T, E>,
+) -> anyhow::Result<Option<T>> {
+    let parse = |name| parse(name).map_err(|why| anyhow::anyhow!("{flag} {name}: {why}"));
+    name.map(parse).transpose()
+}
+
 impl ReuseArgs {
+    /// The options by name: preset, rule and level of reuse.
+    ///
+    /// # Errors
+    /// A name that its flag does not know.
+    pub fn named(
+        [of_preset, rule, reuse]: [Option<&str>; 3],
+        config: Option<PathBuf>,
+    ) -> anyhow::Result<Self> {
+        Ok(Self {
+            preset: value("--preset", of_preset, preset)?,
+            rule: value("--rule", rule, str::parse::<Rule>)?,
+            reuse: value("--reuse", reuse, |name| Reuse::from_str(name, false))?,
+            config,
+        })
+    }
+
     /// The rule: the user's, else the preset's, else the default.
     pub fn rule(&self) -> anyhow::Result<Rule> {
         let named = self.preset.map_or(DEFAULT_RULE, |preset| preset.rule);

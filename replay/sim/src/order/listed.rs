@@ -3,9 +3,10 @@
 
 use super::cost::{Cost, Information};
 use super::parts::Parts;
-use super::{Order, OrderRow, View, Views, WorkItem, frames, views};
+use super::{Order, OrderRow, TileRef, View, Views, WorkItem, frames, views};
 use crate::palette::GREY;
 use formats::textrace::Pass;
+use std::fmt;
 use std::sync::{Mutex, PoisonError};
 
 /// The orders that configurations accept by name.
@@ -24,8 +25,26 @@ pub struct NotAnOrder {
     pub item: usize,
     /// What was expected there.
     pub expected: &'static str,
-    /// What was found: a tile as `PASS:TILE`, or a number of tiles.
-    pub found: String,
+    /// What was found.
+    pub found: FoundTiles,
+}
+
+/// Tiles that a list must not hold, or lacks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FoundTiles {
+    /// A tile that is unknown or was listed before.
+    Wrong(TileRef),
+    /// This many tiles are not listed.
+    Missing(usize),
+}
+
+impl fmt::Display for FoundTiles {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Wrong(at) => write!(f, "{}:{}", at.pass, at.tile),
+            Self::Missing(tiles) => write!(f, "{tiles} tiles not listed"),
+        }
+    }
 }
 
 /// Checks that items visit every tile of two views exactly once.
@@ -44,7 +63,7 @@ pub fn check_items(items: &[WorkItem], eyes: [View; 2]) -> Result<(), NotAnOrder
                     return Err(NotAnOrder {
                         item,
                         expected: "a tile of these passes that was not listed yet",
-                        found: format!("{}:{}", at.pass, at.tile),
+                        found: FoundTiles::Wrong(at),
                     });
                 }
             }
@@ -57,7 +76,7 @@ pub fn check_items(items: &[WorkItem], eyes: [View; 2]) -> Result<(), NotAnOrder
     Err(NotAnOrder {
         item: items.len(),
         expected: "every tile of both passes",
-        found: format!("{missing} tiles not listed"),
+        found: FoundTiles::Missing(missing),
     })
 }
 

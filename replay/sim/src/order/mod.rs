@@ -18,7 +18,7 @@ mod plan;
 mod plan_inputs;
 mod work;
 
-pub use listed::{Listed, NotAnOrder, check_items};
+pub use listed::{FoundTiles, Listed, NotAnOrder, check_items};
 pub use plan::{Phase, Views, frames, plan_frame, views};
 pub use plan_inputs::{Counters, PlanInputs, ViewCounters};
 pub use work::{Interleave, TileRef, View, WorkItem};

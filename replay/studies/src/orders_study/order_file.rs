@@ -164,7 +164,7 @@ impl OrderFile {
             );
         };
         check_items(&self.items, eyes)
-            .or_else(|fault| error(6 + fault.item, fault.expected, &fault.found))?;
+            .or_else(|fault| error(6 + fault.item, fault.expected, &fault.found.to_string()))?;
         Ok(eyes[0].pass)
     }
 }
