@@ -317,12 +317,12 @@ impl AccuracyReport {
 
     /// Times over the reference's time, as CSV. They differ from run to run.
     pub fn times_csv(&self) -> String {
-        type Line<'a> = (&'a Study, &'a Choice);
-        let lines: Vec<Line<'_>> = (self.studies.iter())
+        type TimeLine<'a> = (&'a Study, &'a Choice);
+        let lines: Vec<TimeLine<'_>> = (self.studies.iter())
             .flat_map(|m| m.choices.iter().map(|choice| (m.study, choice)))
             .filter(|(_, choice)| choice.time_ratio.is_some())
             .collect();
-        let columns = columns_of::<Line<'_>>()
+        let columns = columns_of::<TimeLine<'_>>()
             .text("study", "study", |l| l.0.key)
             .text("choice", "choice", |l| l.1.name.clone())
             .text("scene", "scene", |l| l.1.scene.clone())

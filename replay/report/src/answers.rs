@@ -11,8 +11,16 @@ fn ends<T>(rows: &[T], value: impl Fn(&T) -> f64) -> Option<(&T, &T)> {
     Some((least, most))
 }
 
-fn traffic(pct: f64) -> String {
-    change(pct, "less", "more", "as much")
+/// A change of traffic in words, and the word before what it is compared with.
+fn traffic(pct: f64) -> (String, &'static str) {
+    let words = change(pct, "less", "more", "as much");
+    let than = if words == "as much" { "as" } else { "than" };
+    (words, than)
+}
+
+/// A value as tables print it.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.1}").parse().unwrap_or(0.0)
 }
 
 /// Orders against a baseline: names, and the percentage of the baseline's traffic that each saves. `over`
@@ -23,22 +31,18 @@ pub(super) fn tile_orders(baseline: &str, over: &str, orders: &[(String, f64)]) 
             "Only {baseline} was replayed, so no order is compared with another."
         )];
     };
-    let than = |pct: f64| match traffic(-pct).as_str() {
-        "as much" => format!("as much as {baseline}"),
-        words => format!("{words} than {baseline}"),
+    let than = |pct: f64| {
+        let (words, than) = traffic(-pct);
+        format!("{words} {than} {baseline}")
     };
-    let saves = format!("{:.1}", best.1).parse().unwrap_or(0.0) > 0.0;
-    let mut out = vec![match (orders.len(), saves) {
-        (1, _) => match traffic(-best.1).as_str() {
-            "as much" => format!(
-                "{} fetches as much texture data from memory as {baseline} ({over}).",
+    let mut out = vec![match (orders.len(), rounded(best.1) > 0.0) {
+        (1, _) => {
+            let (words, than) = traffic(-best.1);
+            format!(
+                "{} fetches {words} texture data from memory {than} {baseline} ({over}).",
                 best.0
-            ),
-            words => format!(
-                "{} fetches {words} texture data from memory than {baseline} ({over}).",
-                best.0
-            ),
-        },
+            )
+        }
         (others, true) => format!(
             "Of {}, {} fetches the least texture data from memory: {} ({over}).",
             count(others + 1, "tile order"),
@@ -48,12 +52,11 @@ pub(super) fn tile_orders(baseline: &str, over: &str, orders: &[(String, f64)]) 
         (others, false) => format!(
             "None of the {others} other orders fetches less texture data from memory than {baseline}; {} comes closest with {} ({over}).",
             best.0,
-            traffic(-best.1)
+            traffic(-best.1).0
         ),
     }];
     // Where every order saves, the baseline itself fetches the most.
-    let costs = format!("{:.1}", worst.1).parse().unwrap_or(0.0) < 0.0;
-    if orders.len() > 1 && costs {
+    if orders.len() > 1 && rounded(worst.1) < 0.0 {
         out.push(format!("{} fetches the most: {}.", worst.0, than(worst.1)));
     }
     out
@@ -162,9 +165,9 @@ pub(super) struct Studied {
 
 /// A study of orders and bounds against a baseline, over `rows` pairs of trace and caches.
 pub(super) fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<String> {
-    let compare = |order: &Studied| match traffic(order.change_pct).as_str() {
-        "as much" => format!("{} reads as much from memory as {baseline}", order.name),
-        words => format!("{} reads {words} from memory than {baseline}", order.name),
+    let compare = |order: &Studied| {
+        let (words, than) = traffic(order.change_pct);
+        format!("{} reads {words} from memory {than} {baseline}", order.name)
     };
     let over = format!(
         "geometric mean over {} of trace and caches",
@@ -179,8 +182,7 @@ pub(super) fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<St
     let mut out = Vec::new();
     match of(true) {
         Some(best) => {
-            let fewer = format!("{:.1}", best.change_pct).parse().unwrap_or(0.0) < 0.0;
-            let verdict = if fewer {
+            let verdict = if rounded(best.change_pct) < 0.0 {
                 "Best of the orders that hardware can follow"
             } else {
                 "No other order that hardware can follow reads less than the baseline. The closest"

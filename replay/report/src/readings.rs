@@ -113,9 +113,9 @@ impl Document for ReadingsReport {
     /// A row per reading and scene.
     #[rustfmt::skip]
     fn rows(&self) -> Table {
-        struct Cell<'a> { fit: &'a Fit, scene: &'a SceneReadings, chosen: bool }
-        let figures = |c: &Cell| c.scene.readings[c.fit.index].1;
-        let columns = columns_of::<Cell>()
+        struct ReadingRow<'a> { fit: &'a Fit, scene: &'a SceneReadings, chosen: bool }
+        let figures = |c: &ReadingRow| c.scene.readings[c.fit.index].1;
+        let columns = columns_of::<ReadingRow>()
             .text("scene", "scene", |c| c.scene.label.clone())
             .text("checksum", "checksum", |c| c.scene.trace.checksum.clone())
             .text("width_px", "width", |c| c.scene.eye_size_px[0])
@@ -136,9 +136,9 @@ impl Document for ReadingsReport {
             .real("paper_relative_energy", "paper", "ratio", 2, |c| Some(c.scene.paper.as_ref()?.relative_energy))
             .real("frames_per_second", "frames per second", "", 2, move |c| figures(c).frames_per_second)
             .real("paper_frames_per_second", "paper", "", 1, |c| Some(c.scene.paper.as_ref()?.frames_per_second));
-        let cells: Vec<Cell> = self.fits.iter().flat_map(|fit| {
+        let cells: Vec<ReadingRow> = self.fits.iter().flat_map(|fit| {
             let chosen = self.chosen == Some(fit.index);
-            self.scenes.iter().map(move |scene| Cell { fit, scene, chosen })
+            self.scenes.iter().map(move |scene| ReadingRow { fit, scene, chosen })
         }).collect();
         Table::new(&columns, &cells)
     }

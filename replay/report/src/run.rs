@@ -188,11 +188,11 @@ fn text(row: &ResultRow, by_texture: bool) -> String {
 
 /// Traffic by memory client, and the total.
 fn clients(row: &ResultRow) -> Table {
-    type Line = (&'static str, [u64; 2], f64, f64);
+    type ClientLine = (&'static str, [u64; 2], f64, f64);
     let clients = &row.result.clients;
     let sum: u64 = clients.iter().map(ClientTraffic::bytes).sum();
     let share = |bytes: u64| 100.0 * bytes as f64 / sum.max(1) as f64;
-    let mut lines: Vec<Line> = (clients.iter())
+    let mut lines: Vec<ClientLine> = (clients.iter())
         .map(|c| {
             (
                 c.client.name(),
@@ -205,8 +205,8 @@ fn clients(row: &ResultRow) -> Table {
     let all = [0, 1].map(|kind: usize| lines.iter().map(|line| line.1[kind]).sum());
     let energy_mj = clients.iter().map(|c| c.energy_mj).sum();
     lines.push(("all", all, share(sum), energy_mj));
-    let frames = |kind: usize| move |l: &Line| row.mb_per_frame(l.1[kind]);
-    let columns = columns_of::<Line>()
+    let frames = |kind: usize| move |l: &ClientLine| row.mb_per_frame(l.1[kind]);
+    let columns = columns_of::<ClientLine>()
         .text("client", "", |l| l.0)
         .real("read_mb_per_frame", "read", "MB/frame", 3, frames(0))
         .real("write_mb_per_frame", "written", "MB/frame", 3, frames(1))

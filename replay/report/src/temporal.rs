@@ -54,8 +54,8 @@ impl Document for TemporalReport {
     /// A row per frame and scheme.
     #[rustfmt::skip]
     fn rows(&self) -> Table {
-        type Line<'a> = (&'a FrameSchemes, &'a SchemeFigures);
-        let columns = columns_of::<Line<'_>>()
+        type SchemeLine<'a> = (&'a FrameSchemes, &'a SchemeFigures);
+        let columns = columns_of::<SchemeLine<'_>>()
             .text("frame", "frame", |l| l.0.trace.name.clone())
             .text("scheme", "scheme", |l| l.1.scheme.name())
             .real("left_reused_pct", "left reused", "%", 1, |l| l.1.reused_pct[0])
@@ -69,7 +69,7 @@ impl Document for TemporalReport {
             .real("gbuffer_dram_mb", "of G-buffers", "MB", 2, |l| l.1.gbuffer_dram_bytes as f64 / 1e6)
             .real("left_flip_mean", "left FLIP", "", 4, |l| l.1.flip_mean[0])
             .real("right_flip_mean", "right FLIP", "", 4, |l| l.1.flip_mean[1]);
-        let lines: Vec<Line<'_>> = (self.frames.iter())
+        let lines: Vec<SchemeLine<'_>> = (self.frames.iter())
             .flat_map(|frame| frame.schemes.iter().map(move |scheme| (frame, scheme)))
             .collect();
         Table::new(&columns, &lines)

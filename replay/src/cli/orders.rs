@@ -17,7 +17,7 @@ use std::process::ExitCode;
 use studies::experiment::frame_count;
 use studies::orders_study::learn::learn;
 use studies::orders_study::search::{Method, Schedule};
-use studies::orders_study::{BASELINE, OrderFile, Searched, Study, Subjects, default_orders};
+use studies::orders_study::{BASELINE, OrderFile, OrdersStudy, Searched, Subjects, default_orders};
 
 /// Stands for the orders that the study knows: every curve and every part.
 const ALL: &str = "all";
@@ -129,7 +129,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 }
 
 /// Builds the study from the arguments.
-fn study(args: &Args) -> Result<Study> {
+fn study(args: &Args) -> Result<OrdersStudy> {
     let usual = RunConfig {
         mode: Mode::Functional,
         ..RunConfig::default()
@@ -144,7 +144,7 @@ fn study(args: &Args) -> Result<Study> {
     if !orders.contains(&BASELINE) {
         orders.insert(0, BASELINE);
     }
-    let mut study = Study {
+    let mut study = OrdersStudy {
         base,
         caches_bytes: parse_caches(&args.caches)?,
         between: parse_between(&args.between)?,
@@ -159,16 +159,8 @@ fn study(args: &Args) -> Result<Study> {
             format!("--search: expected greedy, greedy-N with a look-ahead of N items, or anneal, found `{name}`")
         })?);
     }
-    for &(l1_bytes, l2_bytes) in &study.caches_bytes {
-        let mut config = base;
-        (config.level.l1.size_bytes, config.level.l2.size_bytes) = (l1_bytes, l2_bytes);
-        for &between_frames in &study.between {
-            RunConfig {
-                between_frames,
-                ..config
-            }
-            .validate()?;
-        }
+    for config in study.configs() {
+        config.validate()?;
     }
     Ok(study)
 }
@@ -232,7 +224,7 @@ fn warn_of_unused(files: &[Searched], caches_bytes: &[(u64, u64)]) {
 /// Runs the learner, if requested.
 fn learned<'a>(
     args: &Args,
-    study: &Study,
+    study: &OrdersStudy,
     subjects: &'a Subjects<'a>,
 ) -> Result<Vec<LearnedTrace<'a>>> {
     let Some(names) = &args.learn else {
@@ -242,27 +234,20 @@ fn learned<'a>(
     let mut learned = Vec::new();
     for subject in subjects.traces {
         let frames = u64::from(frame_count(subject.source.tables()));
-        for &between_frames in &study.between {
-            for &(l1_bytes, l2_bytes) in &study.caches_bytes {
-                let mut config = RunConfig {
-                    between_frames,
-                    ..study.base
-                };
-                (config.level.l1.size_bytes, config.level.l2.size_bytes) = (l1_bytes, l2_bytes);
-                let progress = Progress::new("learning", frames, "frames");
-                let found = learn(subject.source, &config, &orders, &|done| {
-                    progress.advance(done)
-                });
-                let found = found.with_context(|| subject.label.clone())?;
-                let Some(found) = found else {
-                    bail!("--learn: expected LRU caches of 4 ways, which the learner counts");
-                };
-                learned.push(LearnedTrace {
-                    label: &subject.label,
-                    config,
-                    learned: found,
-                });
-            }
+        for config in study.configs() {
+            let progress = Progress::new("learning", frames, "frames");
+            let found = learn(subject.source, &config, &orders, &|done| {
+                progress.advance(done)
+            });
+            let found = found.with_context(|| subject.label.clone())?;
+            let Some(found) = found else {
+                bail!("--learn: expected LRU caches of 4 ways, which the learner counts");
+            };
+            learned.push(LearnedTrace {
+                label: &subject.label,
+                config,
+                learned: found,
+            });
         }
     }
     Ok(learned)

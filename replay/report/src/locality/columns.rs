@@ -260,21 +260,14 @@ pub fn distances<'a>() -> Vec<Column<'a, Reuses<'a>>> {
 /// Columns of working sets.
 #[rustfmt::skip]
 pub fn working_sets<'a>() -> Vec<Column<'a, Window<'a>>> {
-    type C<'a> = Column<'a, Window<'a>>;
-    let mean = |key: &'static str, name: &'static str, of: fn(&WorkingSet) -> u64| {
-        C::real(key, name, "lines", 1, move |r: &Window| r.mean(of(&r.set)))
-    };
-    let mut columns = subject_columns(|r: &Window| &r.of);
-    columns.extend([
-        C::new("tiles", "tiles", "", Show::Whole, |r| r.set.tiles).about("length of the stretches"),
-        C::new("stretches", "stretches", "", Show::Whole, |r| r.set.stretches),
-        mean("lines", "lines", |s| s.lines),
-        mean("left", "left eye's", |s| s.lines_of_eye[0]),
-        mean("right", "right eye's", |s| s.lines_of_eye[1]),
-        mean("both", "both eyes'", WorkingSet::lines_of_both),
-        C::real("both_pct", "both eyes'", "%", 2, |r| pct(r.set.lines_of_both(), r.set.lines)),
-    ]);
-    columns
+    subject_columns(|r: &Window| &r.of)
+        .whole("tiles", "tiles", "", |r| r.set.tiles).about("length of the stretches")
+        .whole("stretches", "stretches", "", |r| r.set.stretches)
+        .real("lines", "lines", "lines", 1, |r| r.mean(r.set.lines))
+        .real("left", "left eye's", "lines", 1, |r| r.mean(r.set.lines_of_eye[0]))
+        .real("right", "right eye's", "lines", 1, |r| r.mean(r.set.lines_of_eye[1]))
+        .real("both", "both eyes'", "lines", 1, |r| r.mean(r.set.lines_of_both()))
+        .real("both_pct", "both eyes'", "%", 2, |r| pct(r.set.lines_of_both(), r.set.lines))
 }
 
 impl Window<'_> {

@@ -4,7 +4,7 @@ use super::Mean;
 use crate::columns::{Column, Columns, Value, columns_of};
 use sim::config::Order;
 use studies::orders_study::learn::{Learned, Learner};
-use studies::orders_study::{Of, Row};
+use studies::orders_study::{OrderRow, RowKind};
 
 /// Keys of the means' changes and rates.
 pub(super) const CHANGES: [&str; 7] = [
@@ -25,17 +25,17 @@ fn kib(bytes: u64) -> f64 {
 }
 
 /// A part of an order; none for searched orders and bounds.
-fn part(row: &Row<'_>, of: fn(Order) -> String) -> Option<String> {
+fn part(row: &OrderRow<'_>, of: fn(Order) -> String) -> Option<String> {
     match row.of {
-        Of::Order(order) => Some(of(order)),
-        Of::Searched(_) | Of::Bound(_) => None,
+        RowKind::Order(order) => Some(of(order)),
+        RowKind::Searched(_) | RowKind::Bound(_) => None,
     }
 }
 
 /// Columns of the rows.
 #[rustfmt::skip]
-pub fn rows<'a>() -> Vec<Column<'a, Row<'a>>> {
-    columns_of::<Row<'a>>()
+pub fn rows<'a>() -> Vec<Column<'a, OrderRow<'a>>> {
+    columns_of::<OrderRow<'a>>()
         .text("trace", "trace", |r| r.subject.label.clone())
         .text("camera", "camera", |r| r.subject.id.camera.clone())
         .text("display", "display", |r| r.subject.id.display.clone())
@@ -69,11 +69,7 @@ pub fn rows<'a>() -> Vec<Column<'a, Row<'a>>> {
         .real("l2_line_miss_pct", "L2 misses", "% of lines", 2, |r| l2_line_miss_rate(r).map(|rate| 100.0 * rate)).about("of L2 look-ups")
         .real("utilization_pct", "utilisation", "%", 2, |r| utilization(r).map(|rate| 100.0 * rate)).about("of the texture units, in timed mode")
         .whole("cycles", "cycles", "", |r| r.result.as_ref().and_then(|result| result.cycles))
-        .real("cycles_change_pct", "cycles against Z2 STA", "%", 2, |r| {
-            let own = r.result.as_ref()?.cycles?;
-            let base = r.baseline_cycles.filter(|cycles| *cycles > 0)?;
-            Some(100.0 * (own as f64 / base as f64 - 1.0))
-        })
+        .real("cycles_change_pct", "cycles against Z2 STA", "%", 2, |r| r.cycles_ratio().map(|ratio| 100.0 * (ratio - 1.0)))
         .real("dram_row_hit_pct", "DRAM row hits", "%", 2, |r| row_hit_rate(r).map(|rate| 100.0 * rate))
         .real("dram_energy_mj", "DRAM energy", "mJ", 4, |r| Some(r.result.as_ref()?.memory.dram.as_ref()?.energy_mj))
         .whole("whole_frame_bytes", "whole frame", "bytes", |r| {
@@ -82,21 +78,21 @@ pub fn rows<'a>() -> Vec<Column<'a, Row<'a>>> {
         }).about("traffic of all clients of memory, where the configuration has a [frame]")
 }
 
-fn l1_footprint_miss_rate(row: &Row<'_>) -> Option<f64> {
+fn l1_footprint_miss_rate(row: &OrderRow<'_>) -> Option<f64> {
     row.result
         .as_ref()
         .map(|result| result.l1.footprint_miss_rate)
 }
 
-fn l2_line_miss_rate(row: &Row<'_>) -> Option<f64> {
+fn l2_line_miss_rate(row: &OrderRow<'_>) -> Option<f64> {
     row.result.as_ref().map(|result| result.l2.line_miss_rate)
 }
 
-fn utilization(row: &Row<'_>) -> Option<f64> {
+fn utilization(row: &OrderRow<'_>) -> Option<f64> {
     Some(row.result.as_ref()?.tmu.as_ref()?.utilization)
 }
 
-fn row_hit_rate(row: &Row<'_>) -> Option<f64> {
+fn row_hit_rate(row: &OrderRow<'_>) -> Option<f64> {
     Some(row.result.as_ref()?.memory.dram.as_ref()?.row_hit_rate)
 }
 
@@ -174,10 +170,7 @@ pub fn learned<'a>() -> Vec<Column<'a, LearnedRow<'a>>> {
         .text("order", "order", |r| r.order.map_or("learned", |order| r.of.learned.orders[order].name()))
         .whole("frames", "frames", "", |r| r.frames().len() as u64)
         .whole("external_bytes", "traffic", "bytes", LearnedRow::bytes)
-        .real("regret_pct", "over the best fixed", "%", 2, |r| {
-            let (_, best) = r.of.learned.best_fixed().filter(|(_, best)| *best > 0)?;
-            Some(100.0 * (r.bytes() as f64 / best as f64 - 1.0))
-        }).about("bytes over those of the order that is best throughout")
+        .real("regret_pct", "over the best fixed", "%", 2, |r| r.of.learned.regret_pct(r.bytes())).about("bytes over those of the order that is best throughout")
         .real("frame_best_pct", "best of each frame", "%", 2, |r| r.order.is_none().then(|| r.of.learned.frame_best_pct()).flatten())
             .about("what choosing the best order of each frame would save over the best fixed one")
         .whole("state_bytes", "state of the learner", "bytes", |r| r.order.is_none().then(|| u64::from(Learner::state_bytes(r.of.learned.orders.len() as u32))))

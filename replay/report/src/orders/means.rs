@@ -3,7 +3,7 @@
 use crate::lists::{geometric_mean, mean, unique};
 use sim::config::BetweenFrames;
 use sim::order::cost::Cost;
-use studies::orders_study::Row;
+use studies::orders_study::OrderRow;
 
 /// An order over all traces and caches.
 #[derive(Clone)]
@@ -11,7 +11,7 @@ pub struct Mean<'a> {
     /// What happens to caches between frames.
     pub between: BetweenFrames,
     /// All rows of the order.
-    pub rows: Vec<&'a Row<'a>>,
+    pub rows: Vec<&'a OrderRow<'a>>,
 }
 
 /// Geometric mean; none without values, or if a value is not positive.
@@ -32,7 +32,7 @@ impl<'a> Mean<'a> {
     }
 
     /// The rows in which an order can change the bytes; all rows if there are none.
-    fn open(&self) -> impl Iterator<Item = &'a Row<'a>> + '_ {
+    fn open(&self) -> impl Iterator<Item = &'a OrderRow<'a>> + '_ {
         let all = self.count() == 0;
         self.rows
             .iter()
@@ -48,17 +48,12 @@ impl<'a> Mean<'a> {
 
     /// Change of the bytes relative to the baseline, percent.
     pub fn change_pct(&self) -> Option<f64> {
-        geometric(self.open().filter_map(Row::ratio)).map(change_pct)
+        geometric(self.open().filter_map(OrderRow::ratio)).map(change_pct)
     }
 
     /// Change of the cycles relative to the baseline, percent.
     pub fn cycles_change_pct(&self) -> Option<f64> {
-        let ratio = |row: &Row<'_>| {
-            let own = row.result.as_ref()?.cycles?;
-            let base = row.baseline_cycles.filter(|cycles| *cycles > 0)?;
-            Some(own as f64 / base as f64)
-        };
-        geometric(self.open().filter_map(ratio)).map(change_pct)
+        geometric(self.open().filter_map(OrderRow::cycles_ratio)).map(change_pct)
     }
 
     /// The trace with the worst mean over caches, and its change.
@@ -82,21 +77,22 @@ impl<'a> Mean<'a> {
 
     /// The worst change of any trace with any pair of caches.
     pub fn worst_pct(&self) -> Option<f64> {
-        let changes = self.open().filter_map(Row::ratio).map(change_pct);
+        let changes = self.open().filter_map(OrderRow::ratio).map(change_pct);
         changes.max_by(f64::total_cmp)
     }
 
     /// The part of the distance to the greedy order that the order closes, by geometric means.
     pub fn closed_pct(&self) -> Option<f64> {
         let known = || self.open().filter(|row| row.greedy_bytes.is_some());
-        let own = geometric(known().filter_map(Row::ratio))?;
-        let greedy = |row: &Row<'_>| Some(row.greedy_bytes? as f64 / row.baseline_bytes as f64);
+        let own = geometric(known().filter_map(OrderRow::ratio))?;
+        let greedy =
+            |row: &OrderRow<'_>| Some(row.greedy_bytes? as f64 / row.baseline_bytes as f64);
         let greedy = geometric(known().filter_map(greedy))?;
         (greedy < 1.0).then(|| 100.0 * own.ln() / greedy.ln())
     }
 
     /// Mean of a rate over the replays, percent.
-    pub fn rate_pct(&self, rate: fn(&Row<'_>) -> Option<f64>) -> Option<f64> {
+    pub fn rate_pct(&self, rate: fn(&OrderRow<'_>) -> Option<f64>) -> Option<f64> {
         mean(self.open().filter_map(rate)).map(|rate| 100.0 * rate)
     }
 
@@ -108,7 +104,7 @@ impl<'a> Mean<'a> {
 }
 
 /// The means by order and by what happens between frames, fewest bytes first.
-pub fn means<'a>(rows: &'a [Row<'a>]) -> Vec<Mean<'a>> {
+pub fn means<'a>(rows: &'a [OrderRow<'a>]) -> Vec<Mean<'a>> {
     let mut means: Vec<Mean<'a>> = Vec::new();
     let betweens = unique(rows.iter().map(|row| row.config.between_frames));
     for row in rows {

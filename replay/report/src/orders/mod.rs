@@ -12,12 +12,12 @@ pub use means::Mean;
 use serde::Serialize;
 use sim::config::RunConfig;
 use sim::result::TraceId;
-use studies::orders_study::Row;
+use studies::orders_study::OrderRow;
 
 /// The results of a study.
 pub struct OrdersReport<'a> {
     /// Rows, trace by trace.
-    pub rows: Vec<Row<'a>>,
+    pub rows: Vec<OrderRow<'a>>,
     /// Results of the learner, by trace and caches; empty unless requested.
     pub learned: Vec<LearnedTrace<'a>>,
     /// The machine, except for the varied settings.
@@ -29,7 +29,7 @@ pub struct OrdersReport<'a> {
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
 pub struct OrdersJson<'a> {
     config: RunConfig,
-    traces: Vec<TraceFacts<'a>>,
+    traces: Vec<OrdersTrace<'a>>,
     rows: Table,
     means: Table,
     learned: Table,
@@ -37,7 +37,7 @@ pub struct OrdersJson<'a> {
 
 #[derive(Serialize)]
 #[cfg_attr(feature = "testing", derive(schemars::JsonSchema))]
-struct TraceFacts<'a> {
+struct OrdersTrace<'a> {
     label: &'a str,
     #[serde(flatten)]
     id: &'a TraceId,
@@ -61,13 +61,13 @@ impl Document for OrdersReport<'_> {
     const SCHEMA: &'static str = "replay.orders/2";
 
     fn content(&self) -> impl Serialize {
-        let mut traces: Vec<TraceFacts<'_>> = Vec::new();
+        let mut traces: Vec<OrdersTrace<'_>> = Vec::new();
         for row in &self.rows {
             if traces
                 .last()
                 .is_none_or(|last| last.label != row.subject.label)
             {
-                traces.push(TraceFacts {
+                traces.push(OrdersTrace {
                     label: &row.subject.label,
                     id: &row.subject.id,
                     frames: row.frames(),

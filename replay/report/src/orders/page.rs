@@ -11,7 +11,7 @@ use crate::plots::paths::{PathPlot, stops};
 use crate::table::Table;
 use maud::{Markup, html};
 use sim::order::{PlanInputs, View, WorkItem};
-use studies::orders_study::{BASELINE, Of, Row};
+use studies::orders_study::{BASELINE, OrderRow, RowKind};
 
 /// Size of the pictures of paths in tiles.
 const PATH_TILES: [u32; 2] = [12, 8];
@@ -26,12 +26,12 @@ impl OrdersReport<'_> {
     /// A plot that could not be drawn.
     pub fn page(&self) -> Result<String, PlotError> {
         let mut page = Page::default();
-        let display = |row: &Row<'_>| (row.subject.id.display.clone(), row.offset_tiles);
+        let display = |row: &OrderRow<'_>| (row.subject.id.display.clone(), row.offset_tiles);
         let mut displays = unique(self.rows.iter().map(display));
         displays.sort_by_key(|(_, offset)| offset.abs());
         for of in displays {
             let own = self.rows.iter().filter(|row| display(row) == of);
-            let rows: Vec<Row<'_>> = own.cloned().collect();
+            let rows: Vec<OrderRow<'_>> = own.cloned().collect();
             let title = format!("Display {}: infinity {} tiles apart", of.0, of.1);
             page.add(title, of_display(&means::means(&rows)));
         }
@@ -67,7 +67,9 @@ impl OrdersReport<'_> {
         let mut pictures = Vec::new();
         let mut known: Vec<String> = Vec::new();
         for row in &self.rows {
-            let Of::Order(order) = row.of else { continue };
+            let RowKind::Order(order) = row.of else {
+                continue;
+            };
             let name = order.name().to_owned();
             if known.contains(&name) {
                 continue;
@@ -141,11 +143,11 @@ fn best_and_bounds(means: &[Mean<'_>]) -> HBarChart {
 }
 
 /// The tile size at which a picture has as many columns as the small picture.
-fn small_tile_px(row: &Row<'_>) -> u32 {
+fn small_tile_px(row: &OrderRow<'_>) -> u32 {
     row.subject.id.eye_size_px[0].div_ceil(PATH_TILES[0])
 }
 
-fn small_views(row: &Row<'_>) -> [View; 2] {
+fn small_views(row: &OrderRow<'_>) -> [View; 2] {
     let px = small_tile_px(row);
     [0, 1].map(|pass| View {
         size_px: PATH_TILES.map(|tiles| tiles * px),

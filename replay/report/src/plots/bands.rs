@@ -21,8 +21,8 @@ pub(super) type RowAxes<'a, 'b> =
 pub(super) type ColumnAxes<'a, 'b> =
     ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-/// Rows over an axis of values.
-pub(super) struct Rows<'a> {
+/// RowBands over an axis of values.
+pub(super) struct RowBands<'a> {
     pub title: &'a str,
     pub value_label: &'a str,
     pub legend: Vec<LegendEntry<'a>>,
@@ -36,7 +36,7 @@ pub(super) struct Rows<'a> {
     pub values: Range<f64>,
 }
 
-impl Rows<'_> {
+impl RowBands<'_> {
     /// Height of all rows.
     pub fn height_px(&self) -> i32 {
         self.row_px * self.names.len().max(1) as i32
@@ -89,8 +89,8 @@ const TOP_PX: u32 = 66;
 const PLOT_HEIGHT_PX: f64 = 216.0;
 const LINE_HEIGHT_PX: i32 = 15;
 
-/// Columns under an axis of values, which begins at zero.
-pub(super) struct Columns<'a> {
+/// ColumnBands under an axis of values, which begins at zero.
+pub(super) struct ColumnBands<'a> {
     pub title: &'a str,
     pub value_label: &'a str,
     pub legend: Vec<LegendEntry<'a>>,
@@ -106,7 +106,7 @@ pub(super) struct Columns<'a> {
     pub reference: Option<f64>,
 }
 
-impl Columns<'_> {
+impl ColumnBands<'_> {
     /// Draws the axes, then calls `paint` with the number of each column.
     pub fn draw(
         self,

@@ -1,6 +1,6 @@
 //! Grouped bars with optional reference marks, such as a paper's values.
 
-use super::bands::{Columns, boxes, check_bars, end_above};
+use super::bands::{ColumnBands, boxes, check_bars, end_above};
 use super::frame::{LegendEntry, Symbol, text_style};
 use super::lines::exact;
 use super::{PlotError, SeriesStyle};
@@ -70,7 +70,7 @@ impl BarChart {
         let all = self.groups.iter().flat_map(BarGroup::numbers);
         // Without a value, the axis still has room for a number.
         let largest = end_above(all.copied().chain(self.reference), 1.0);
-        let axis = Columns {
+        let axis = ColumnBands {
             title: &self.title,
             value_label: &self.value_label,
             legend: self.legend(),

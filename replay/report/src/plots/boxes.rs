@@ -1,7 +1,7 @@
 //! Distributions as horizontal boxes, one per row: whiskers, quartiles and median.
 
 use super::axis::Axis;
-use super::bands::Rows;
+use super::bands::RowBands;
 use super::frame::{AXIS_PX, text_style};
 use super::lines::exact;
 use super::{PlotError, SeriesStyle};
@@ -18,7 +18,7 @@ pub(crate) struct BoxChart {
     pub note: String,
     /// The values, with their unit.
     pub x: Axis,
-    /// Rows from the top.
+    /// RowBands from the top.
     pub rows: Vec<BoxRow>,
     /// A value to compare with, as a vertical line.
     pub reference: Option<f64>,
@@ -55,7 +55,7 @@ impl BoxChart {
         let end = values.end;
         let names = self.rows.iter().map(|row| row.style.name.as_str());
         let names: Vec<&str> = names.collect();
-        let axis = Rows {
+        let axis = RowBands {
             title: &self.title,
             value_label: &self.note,
             legend: Vec::new(),

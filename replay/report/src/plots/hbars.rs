@@ -1,6 +1,6 @@
 //! Horizontal grouped bars, for long names.
 
-use super::bands::{Rows, boxes, check_bars, end_above};
+use super::bands::{RowBands, boxes, check_bars, end_above};
 use super::frame::text_style;
 use super::lines::exact;
 use super::{PlotError, SeriesStyle};
@@ -43,7 +43,7 @@ impl HBarChart {
         };
         let row_px = bar_px * self.series.len().max(1) as i32 + ROW_GAP_PX;
         let all = self.rows.iter().flat_map(|(_, v)| v.iter().flatten());
-        let axis = Rows {
+        let axis = RowBands {
             title: &self.title,
             value_label: &self.value_label,
             legend: boxes(&self.series),

@@ -1,6 +1,6 @@
 //! Spans of time in rows: when each row works, and on what.
 
-use super::bands::{Rows, boxes};
+use super::bands::{RowBands, boxes};
 use super::frame::text_style;
 use super::{PlotError, SeriesStyle};
 use crate::theme;
@@ -48,7 +48,7 @@ impl SpanChart {
             let problem = format!("from {start} to {end}");
             return Err(PlotError::new(&self.title, problem));
         }
-        let axis = Rows {
+        let axis = RowBands {
             title: &self.title,
             value_label: &self.value_label,
             legend: boxes(&self.kinds),

@@ -1,6 +1,6 @@
 //! Stacked bars: the parts of several totals.
 
-use super::bands::{Columns, boxes, check_bars, end_above};
+use super::bands::{ColumnBands, boxes, check_bars, end_above};
 use super::bars::wrap;
 use super::frame::text_style;
 use super::lines::exact;
@@ -49,7 +49,7 @@ impl StackedChart {
         let sum = |(_, parts): &(String, Vec<f64>)| parts.iter().sum::<f64>();
         let names = self.bars.iter();
         let names = names.map(|(name, _)| wrap(name, self.bar_px * 1.1, theme::TICK_PX));
-        let axis = Columns {
+        let axis = ColumnBands {
             title: &self.title,
             value_label: &self.value_label,
             legend: boxes(&self.series),

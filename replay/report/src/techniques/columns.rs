@@ -127,19 +127,36 @@ fn pacing<'a>() -> Vec<TechniqueColumn<'a>> {
     columns
 }
 
+/// A figure for each of these names: key and title by name, and the value of a technique.
+fn by_name<'a>(
+    names: Vec<&str>,
+    (prefix, unit): (&str, &'static str),
+    title: fn(&str) -> String,
+    about: &'static str,
+    value: fn(&Measured, &str) -> Option<f64>,
+) -> Vec<TechniqueColumn<'a>> {
+    let column = |name: &str| {
+        let (key, title, name) = (format!("{prefix}.{name}"), title(name), name.to_owned());
+        TechniqueColumn::real(key, title, unit, 3, move |m| value(m, &name)).about(about)
+    };
+    names.into_iter().map(column).collect()
+}
+
 /// Times of the stages, under the names that the captures give them.
 fn stages<'a>(rows: &[&'a Measured<'a>]) -> Vec<TechniqueColumn<'a>> {
     let all = rows.iter().flat_map(|m| &m.timing.stages_ms);
     let stages = unique(all.map(|(stage, _)| stage.as_str()));
-    let figures = stages.into_iter().map(str::to_owned).map(|stage| {
-        let heading = (format!("stages_ms.{stage}"), stage.clone());
-        TechniqueColumn::real(heading.0, heading.1, "ms", 3, move |m| {
-            let found = m.timing.stages_ms.iter().find(|(name, _)| *name == stage);
+    let about = "median time of the stage";
+    by_name(
+        stages,
+        ("stages_ms", "ms"),
+        str::to_owned,
+        about,
+        |m, stage| {
+            let found = m.timing.stages_ms.iter().find(|(name, _)| name == stage);
             found.map(|(_, ms)| *ms)
-        })
-        .about("median time of the stage")
-    });
-    figures.collect()
+        },
+    )
 }
 
 /// Counts per frame, and memory.
@@ -208,15 +225,11 @@ fn predictions<'a>(rows: &[&'a Measured<'a>]) -> Vec<TechniqueColumn<'a>> {
     let frames = rows.iter().flat_map(|m| &m.row.frames);
     let all = frames.flat_map(|f| &f.predicted);
     let predictions = unique(all.map(|(key, _)| key.as_str()));
-    let figures = predictions.into_iter().map(str::to_owned).map(|key| {
-        let heading = (
-            format!("predicted.{key}"),
-            format!("predicted {}", key.replace('_', " ")),
-        );
-        TechniqueColumn::real(heading.0, heading.1, "", 3, move |m| m.predicted(&key))
-            .about("mean of the technique's own prediction")
-    });
-    figures.collect()
+    let title = |key: &str| format!("predicted {}", key.replace('_', " "));
+    let about = "mean of the technique's own prediction";
+    by_name(predictions, ("predicted", ""), title, about, |m, key| {
+        m.predicted(key)
+    })
 }
 
 /// Cache figures in an order.

@@ -99,7 +99,7 @@ impl Frusta<'_> {
         self.legend(&mut out);
         let ipd = f64::from(self.hmd.ipd_m).max(1e-3);
         // The eyes take a third of the near drawing's width.
-        let near = Panel {
+        let near = TopView {
             left_px: GAP_PX,
             low: [-1.5 * ipd, -1.2 * ipd],
             span: 3.0 * ipd,
@@ -114,7 +114,7 @@ impl Frusta<'_> {
         } else {
             FAR_M
         };
-        let far = Panel {
+        let far = TopView {
             left_px: 2.0 * GAP_PX + PANEL_PX,
             low: [-0.5 * ahead, -0.04 * ahead],
             span: ahead,
@@ -152,7 +152,7 @@ impl Frusta<'_> {
         }
     }
 
-    fn draw(&self, out: &mut String, panel: &Panel, axis: &str, scale: f64) {
+    fn draw(&self, out: &mut String, panel: &TopView, axis: &str, scale: f64) {
         panel.frame(out, axis, scale);
         let id = format!("panel-{}", panel.left_px as u32);
         let _ = write!(
@@ -205,7 +205,7 @@ impl Frusta<'_> {
     }
 
     /// Draws each split as a horizontal line with its label above, without overlapping labels.
-    fn draw_splits(&self, out: &mut String, panel: &Panel) {
+    fn draw_splits(&self, out: &mut String, panel: &TopView) {
         let mut splits: Vec<(f64, Vec<&str>)> = Vec::new();
         for (name, split) in &self.splits {
             // Splits with the same label text become one line.
@@ -236,7 +236,7 @@ impl Frusta<'_> {
 }
 
 /// One of the two drawings.
-struct Panel {
+struct TopView {
     left_px: f64,
     /// Its left and lower edge, metres.
     low: [f64; 2],
@@ -244,7 +244,7 @@ struct Panel {
     span: f64,
 }
 
-impl Panel {
+impl TopView {
     fn px(&self, [x, z]: [f64; 2]) -> [f64; 2] {
         let part = [(x - self.low[0]) / self.span, (z - self.low[1]) / self.span];
         [

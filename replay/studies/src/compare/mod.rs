@@ -4,16 +4,16 @@
 //! are compared by texture coordinates, levels of detail and footprints. The effect on caches is measured
 //! by replays.
 
+mod differences;
 mod fault;
 mod partners;
-mod spread;
 mod tally;
 #[cfg(test)]
 mod tests;
 mod tile;
 
+pub use differences::Differences;
 pub use fault::NotComparable;
-pub use spread::Spread;
 pub use tally::Tally;
 
 use formats::textrace::Tables;

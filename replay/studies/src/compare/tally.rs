@@ -1,6 +1,6 @@
 //! Counts of differences in a class of fragments.
 
-use super::spread::Spread;
+use super::differences::Differences;
 use formats::textrace::SUBTEXELS;
 use serde::Serialize;
 
@@ -22,15 +22,15 @@ pub struct Tally {
     /// Distance of texture coordinates (the larger of both axes), in texels of the largest texture sampled with them.
     #[cfg_attr(
         feature = "testing",
-        schemars(with = "crate::compare::spread::Summary")
+        schemars(with = "crate::compare::differences::Summary")
     )]
-    pub uv_texels: Spread,
+    pub uv_texels: Differences,
     /// Difference of the exact level of detail in levels, per record.
     #[cfg_attr(
         feature = "testing",
-        schemars(with = "crate::compare::spread::Summary")
+        schemars(with = "crate::compare::differences::Summary")
     )]
-    pub lod_levels: Spread,
+    pub lod_levels: Differences,
     /// Footprints of the common fragments.
     pub footprints: u64,
     /// Footprints that the other capture's fragment does not have.
@@ -44,8 +44,8 @@ impl Default for Tally {
             fragments_only_in_a: 0,
             fragments_only_in_b: 0,
             lanes_sampled_differently: 0,
-            uv_texels: Spread::new(SUBTEXELS as u32),
-            lod_levels: Spread::new(LOD_STEPS),
+            uv_texels: Differences::new(SUBTEXELS as u32),
+            lod_levels: Differences::new(LOD_STEPS),
             footprints: 0,
             footprints_that_differ: 0,
         }

@@ -5,7 +5,7 @@
 
 /// Content of a line after the checksum.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Row<'a> {
+pub(super) struct StoredRow<'a> {
     /// Version of the models that produced the counts.
     pub model_version: u32,
     /// Key of the point.
@@ -14,7 +14,7 @@ pub(super) struct Row<'a> {
     pub json: &'a str,
 }
 
-impl<'a> Row<'a> {
+impl<'a> StoredRow<'a> {
     /// The line, including its line feed.
     pub fn encode(&self) -> Vec<u8> {
         let Self {
@@ -63,24 +63,27 @@ mod tests {
 
     #[test]
     fn every_changed_and_every_missing_byte_of_a_row_is_refused() {
-        let row = Row {
+        let row = StoredRow {
             model_version: 3,
             key: "0badcafe",
             json: r#"{"misses":12}"#,
         };
         let line = row.encode();
-        assert_eq!(Row::decode(&line), Ok(row));
+        assert_eq!(StoredRow::decode(&line), Ok(row));
         for at in 0..line.len() {
             for bits in 1..=255u8 {
                 let mut changed = line.clone();
                 changed[at] ^= bits;
-                assert!(Row::decode(&changed).is_err(), "byte {at}, bits {bits:#x}");
+                assert!(
+                    StoredRow::decode(&changed).is_err(),
+                    "byte {at}, bits {bits:#x}"
+                );
             }
-            assert!(Row::decode(&line[..at]).is_err(), "cut at {at}");
+            assert!(StoredRow::decode(&line[..at]).is_err(), "cut at {at}");
         }
         let mut changed = line.clone();
         changed[line.len() - 3] = b'3';
-        let error = Row::decode(&changed).unwrap_err();
+        let error = StoredRow::decode(&changed).unwrap_err();
         assert!(error.starts_with("expected checksum ") && error.contains("found \""));
     }
 }

@@ -3,7 +3,7 @@
 //! Every process writes its own file, so no file has two writers. Reading takes the rows of all files,
 //! except damaged ones and those that a killed process left incomplete.
 
-use super::rows::Row;
+use super::rows::StoredRow;
 use anyhow::Context;
 use formats::container::open_regular;
 use serde::{Deserialize, Serialize};
@@ -193,7 +193,7 @@ impl Store {
                 crc32: crc32fast::hash(&line),
             };
             offset_bytes += length_bytes;
-            match Row::decode(&line) {
+            match StoredRow::decode(&line) {
                 Err(why) => {
                     let damage = format!("{}: row {number}: {why}", path.display());
                     self.damages.push(damage);
@@ -235,7 +235,7 @@ impl Store {
             Absent::Damaged(format!("{}: {why}", self.name_of(place)))
         };
         let line = self.read_row(place).map_err(|error| damaged(&error))?;
-        let row = Row::decode(&line).map_err(|why| damaged(&why))?;
+        let row = StoredRow::decode(&line).map_err(|why| damaged(&why))?;
         let point: StoredPoint = serde_json::from_str(row.json).map_err(|error| damaged(&error))?;
         if point.schema != POINT_SCHEMA {
             let found = point.schema;
@@ -274,7 +274,7 @@ impl Store {
             result: result.clone(),
         };
         let json = serde_json::to_string(&point)?;
-        let row = Row {
+        let row = StoredRow {
             model_version: MODEL_VERSION,
             key: &point_key(trace, config),
             json: &json,
@@ -347,6 +347,15 @@ mod tests {
 
     fn open(folder: &tempfile::TempDir) -> Store {
         Store::open(folder.path(), None).unwrap()
+    }
+
+    /// Stores a point, and returns its file and row.
+    fn saved(folder: &tempfile::TempDir, config: &RunConfig) -> (PathBuf, Vec<u8>) {
+        let store = open(folder);
+        store.save(&trace(), config, &result(7)).unwrap();
+        let path = files(&store).remove(0);
+        let line = std::fs::read(&path).unwrap();
+        (path, line)
     }
 
     fn files(store: &Store) -> Vec<PathBuf> {
@@ -436,12 +445,9 @@ mod tests {
     fn rows_of_another_model_version_and_conflicting_rows_are_not_used() {
         let folder = tempfile::tempdir().unwrap();
         let config = RunConfig::default();
-        let store = open(&folder);
-        store.save(&trace(), &config, &result(7)).unwrap();
-        let path = files(&store).remove(0);
-        let line = std::fs::read(&path).unwrap();
-        let row = Row::decode(&line).unwrap();
-        let older = Row {
+        let (path, line) = saved(&folder, &config);
+        let row = StoredRow::decode(&line).unwrap();
+        let older = StoredRow {
             model_version: 0,
             ..row
         };
@@ -460,14 +466,11 @@ mod tests {
     fn a_row_under_another_points_key_is_not_used() {
         let folder = tempfile::tempdir().unwrap();
         let config = RunConfig::default();
-        let store = open(&folder);
-        store.save(&trace(), &config, &result(7)).unwrap();
-        let path = files(&store).remove(0);
-        let line = std::fs::read(&path).unwrap();
+        let (path, line) = saved(&folder, &config);
         let other = RunConfig { seed: 2, ..config };
-        let row = Row {
+        let row = StoredRow {
             key: &point_key(&trace(), &other),
-            ..Row::decode(&line).unwrap()
+            ..StoredRow::decode(&line).unwrap()
         };
         std::fs::write(&path, row.encode()).unwrap();
         let found = open(&folder).find(&trace(), &other).unwrap_err();

@@ -94,13 +94,9 @@ pub struct Learned {
 }
 
 impl Learned {
-    fn total(frames: &[u64]) -> u64 {
-        frames.iter().sum()
-    }
-
     /// The best fixed order and its bytes over all frames.
     pub fn best_fixed(&self) -> Option<(Order, u64)> {
-        let totals = self.fixed.iter().map(|frames| Self::total(frames));
+        let totals = self.fixed.iter().map(|frames| frames.iter().sum());
         self.orders
             .iter()
             .copied()
@@ -108,10 +104,10 @@ impl Learned {
             .min_by_key(|(_, total)| *total)
     }
 
-    /// Additional bytes of the learner over the best fixed order, percent.
-    pub fn regret_pct(&self) -> Option<f64> {
+    /// Additional bytes over the best fixed order, percent.
+    pub fn regret_pct(&self, bytes: u64) -> Option<f64> {
         let (_, best) = self.best_fixed().filter(|(_, best)| *best > 0)?;
-        Some(100.0 * (Self::total(&self.learned) as f64 / best as f64 - 1.0))
+        Some(100.0 * (bytes as f64 / best as f64 - 1.0))
     }
 
     /// Bytes saved by the best order of each frame over the best fixed order, percent.

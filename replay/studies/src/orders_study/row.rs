@@ -39,7 +39,7 @@ impl Bound {
 
 /// The subject of a row.
 #[derive(Clone, Debug)]
-pub enum Of {
+pub enum RowKind {
     /// An order.
     Order(Order),
     /// A searched order, by the method's name.
@@ -50,13 +50,13 @@ pub enum Of {
 
 /// An order, or a bound, with caches on a trace.
 #[derive(Clone)]
-pub struct Row<'a> {
+pub struct OrderRow<'a> {
     /// The trace.
     pub subject: &'a Subject<'a>,
     /// Columns by which points at infinity are shifted between the eyes.
     pub offset_tiles: i32,
     /// An order or a bound.
-    pub of: Of,
+    pub of: RowKind,
     /// The whole configuration.
     pub config: RunConfig,
     /// The hardware cost; none for bounds.
@@ -75,18 +75,18 @@ pub struct Row<'a> {
     pub distinct_bytes: u64,
 }
 
-impl Row<'_> {
+impl OrderRow<'_> {
     /// Name in tables.
     pub fn name(&self) -> String {
         match &self.of {
-            Of::Order(order) => order.name().to_owned(),
-            Of::Searched(method) => method.clone(),
-            Of::Bound(bound) => bound.name(),
+            RowKind::Order(order) => order.name().to_owned(),
+            RowKind::Searched(method) => method.clone(),
+            RowKind::Bound(bound) => bound.name(),
         }
     }
 
     pub(super) fn is_baseline(&self) -> bool {
-        matches!(self.of, Of::Order(order) if order == BASELINE)
+        matches!(self.of, RowKind::Order(order) if order == BASELINE)
     }
 
     /// True if hardware can implement it.
@@ -106,6 +106,13 @@ impl Row<'_> {
             (_, 0) => None,
             (own, base) => Some(own as f64 / base as f64),
         }
+    }
+
+    /// Cycles over those of the baseline.
+    pub fn cycles_ratio(&self) -> Option<f64> {
+        let own = self.result.as_ref()?.cycles?;
+        let base = self.baseline_cycles.filter(|cycles| *cycles > 0)?;
+        Some(own as f64 / base as f64)
     }
 
     /// False if the baseline fetches each line once, so that no order can fetch less.
@@ -135,10 +142,10 @@ impl Row<'_> {
 pub(super) fn row<'a>(
     subject: &'a Subject<'a>,
     offset_tiles: i32,
-    of: Of,
+    of: RowKind,
     config: RunConfig,
     result: RunResult,
-) -> Row<'a> {
+) -> OrderRow<'a> {
     let passes = &subject.source.tables().passes;
     let tiles = passes
         .iter()
@@ -147,7 +154,7 @@ pub(super) fn row<'a>(
     let largest = tiles
         .max_by_key(|[columns, rows]| columns * rows)
         .unwrap_or_default();
-    Row {
+    OrderRow {
         subject,
         offset_tiles,
         of,
@@ -163,9 +170,9 @@ pub(super) fn row<'a>(
 }
 
 /// Fills in the values that each row is compared with.
-pub(super) fn compare(rows: &mut [Row<'_>]) {
+pub(super) fn compare(rows: &mut [OrderRow<'_>]) {
     type Caches = (BetweenFrames, u64, u64);
-    let caches = |row: &Row<'_>| -> Caches {
+    let caches = |row: &OrderRow<'_>| -> Caches {
         let config = &row.config;
         (
             config.between_frames,
@@ -178,10 +185,10 @@ pub(super) fn compare(rows: &mut [Row<'_>]) {
     for row in rows.iter() {
         let cycles = row.result.as_ref().and_then(|result| result.cycles);
         match &row.of {
-            Of::Order(order) if *order == BASELINE => {
+            RowKind::Order(order) if *order == BASELINE => {
                 baseline.insert(caches(row), (row.external_bytes, cycles));
             }
-            Of::Searched(name) if name == "greedy" => {
+            RowKind::Searched(name) if name == "greedy" => {
                 greedy.insert(caches(row), row.external_bytes);
             }
             _ => {}

@@ -1,6 +1,6 @@
 //! Replays every order with every pair of caches on every trace, and computes bounds.
 
-use super::row::{BASELINE, Bound, Of, Row, compare, row};
+use super::row::{BASELINE, Bound, OrderRow, RowKind, compare, row};
 use super::search::{Ground, Method};
 use super::{OrderFile, OrderFileError, bounds};
 use crate::experiment::{self, Plan, Point, RunError, Subject, frame_count};
@@ -13,7 +13,7 @@ use thiserror::Error;
 
 /// The subject of a study.
 #[derive(Clone, Debug)]
-pub struct Study {
+pub struct OrdersStudy {
     /// The machine, except for cache sizes, order, and caches between frames.
     pub base: RunConfig,
     /// L1 and L2 sizes in bytes.
@@ -30,7 +30,7 @@ pub struct Study {
 
 /// Reasons why a study fails.
 #[derive(Debug, Error)]
-pub enum StudyError {
+pub enum OrdersError {
     /// A failed replay.
     #[error(transparent)]
     Run(#[from] RunError),
@@ -69,7 +69,7 @@ pub struct Subjects<'a> {
     pub files: Vec<Searched>,
 }
 
-impl Study {
+impl OrdersStudy {
     /// Replays, searches and computes bounds. Returns the rows trace by trace and the searched orders. Calls
     /// `done` with the number of replays of each step.
     ///
@@ -79,11 +79,11 @@ impl Study {
         &self,
         subjects: &'a Subjects<'a>,
         done: &(dyn Fn(u64) + Sync),
-    ) -> Result<(Vec<Row<'a>>, Vec<Searched>, Work), StudyError> {
+    ) -> Result<(Vec<OrderRow<'a>>, Vec<Searched>, Work), OrdersError> {
         let plan = self.plan(&self.orders);
         let mut outcome = experiment::run(&plan, subjects.traces, None, done)?;
         let mut work = std::mem::take(&mut outcome.work);
-        let mut of_traces: Vec<Vec<Row<'a>>> = Vec::new();
+        let mut of_traces: Vec<Vec<OrderRow<'a>>> = Vec::new();
         let all = outcome.rows();
         let per_trace = plan.points.len().max(1);
         for (subject, results) in subjects.traces.iter().zip(all.chunks(per_trace)) {
@@ -93,7 +93,7 @@ impl Study {
                 rows.push(row(
                     subject,
                     offset_tiles,
-                    Of::Order(of_point.point.config.order),
+                    RowKind::Order(of_point.point.config.order),
                     of_point.point.config,
                     of_point.result.clone(),
                 ));
@@ -113,47 +113,52 @@ impl Study {
                 self.sort(rows);
                 Ok(works)
             });
-        let extra: Result<Vec<Work>, StudyError> = extra.collect();
+        let extra: Result<Vec<Work>, OrdersError> = extra.collect();
         extra?.iter().for_each(|of_trace| work.add(of_trace));
         Ok((of_traces.concat(), searched, work))
     }
 
+    /// The machine with every pair of caches, and with every treatment of them between frames.
+    pub fn configs(&self) -> impl Iterator<Item = RunConfig> {
+        self.between.iter().flat_map(move |&between_frames| {
+            self.caches_bytes.iter().map(move |&(l1_bytes, l2_bytes)| {
+                let mut config = RunConfig {
+                    between_frames,
+                    ..self.base
+                };
+                config.level.l1.size_bytes = l1_bytes;
+                config.level.l2.size_bytes = l2_bytes;
+                config
+            })
+        })
+    }
+
     /// Every order with every pair of caches.
     fn plan(&self, orders: &[Order]) -> Plan {
-        let mut points = Vec::new();
-        for &between_frames in &self.between {
-            for &(l1_bytes, l2_bytes) in &self.caches_bytes {
-                for &order in orders {
-                    let mut config = RunConfig {
-                        order,
-                        between_frames,
-                        ..self.base
-                    };
-                    config.level.l1.size_bytes = l1_bytes;
-                    config.level.l2.size_bytes = l2_bytes;
-                    points.push(Point {
-                        settings: Vec::new(),
-                        change: None,
-                        config,
-                    });
-                }
-            }
-        }
+        let point = |config| Point {
+            settings: Vec::new(),
+            change: None,
+            config,
+        };
+        let of = |config: RunConfig| {
+            let orders = orders.iter();
+            orders.map(move |&order| point(RunConfig { order, ..config }))
+        };
         Plan {
             base: self.base,
-            points,
+            points: self.configs().flat_map(of).collect(),
         }
     }
 
     /// Searches orders for all traces of one frame, and checks the orders from files.
-    fn searched(&self, subjects: &Subjects<'_>) -> Result<Vec<Searched>, StudyError> {
+    fn searched(&self, subjects: &Subjects<'_>) -> Result<Vec<Searched>, OrdersError> {
         for searched in &subjects.files {
             let of = subjects
                 .traces
                 .iter()
                 .find(|s| s.id.checksum == searched.file.trace);
             if let Some(subject) = of {
-                let fail = |error| StudyError::File {
+                let fail = |error| OrdersError::File {
                     file: searched.source.clone(),
                     error,
                 };
@@ -163,8 +168,8 @@ impl Study {
         let mut sizes: Vec<u64> = self.caches_bytes.iter().map(|(_, l2)| *l2).collect();
         sizes.sort_unstable();
         sizes.dedup();
-        let search = |subject: &Subject<'_>| -> Result<Vec<Searched>, StudyError> {
-            let fail = |error| StudyError::Replay {
+        let search = |subject: &Subject<'_>| -> Result<Vec<Searched>, OrdersError> {
+            let fail = |error| OrdersError::Replay {
                 label: subject.label.clone(),
                 error,
             };
@@ -192,7 +197,7 @@ impl Study {
             });
             found.collect()
         };
-        let found: Result<Vec<Vec<Searched>>, StudyError> =
+        let found: Result<Vec<Vec<Searched>>, OrdersError> =
             subjects.traces.par_iter().map(search).collect();
         let mut all = subjects.files.clone();
         all.extend(found?.into_iter().flatten());
@@ -209,9 +214,9 @@ impl Study {
         &self,
         subject: &'a Subject<'a>,
         searched: &[Searched],
-        rows: &mut Vec<Row<'a>>,
+        rows: &mut Vec<OrderRow<'a>>,
         done: &(dyn Fn(u64) + Sync),
-    ) -> Result<Work, StudyError> {
+    ) -> Result<Work, OrdersError> {
         let offset_tiles = offset(subject, &self.base);
         let mut points = Vec::new();
         let mut names = Vec::new();
@@ -219,7 +224,7 @@ impl Study {
             .iter()
             .filter(|of| of.file.trace == subject.id.checksum)
         {
-            let fail = |error| StudyError::File {
+            let fail = |error| OrdersError::File {
                 file: source.clone(),
                 error,
             };
@@ -252,7 +257,7 @@ impl Study {
                 rows.push(row(
                     subject,
                     offset_tiles,
-                    Of::Searched(name),
+                    RowKind::Searched(name),
                     of_point.point.config,
                     of_point.result.clone(),
                 ));
@@ -265,18 +270,18 @@ impl Study {
     fn add_bounds<'a>(
         &self,
         subject: &'a Subject<'a>,
-        rows: &mut Vec<Row<'a>>,
-    ) -> Result<(), StudyError> {
+        rows: &mut Vec<OrderRow<'a>>,
+    ) -> Result<(), OrdersError> {
         let offset_tiles = offset(subject, &self.base);
         let distinct_bytes = rows.first().map_or(0, |row| row.distinct_bytes);
-        let fail = |error| StudyError::Replay {
+        let fail = |error| OrdersError::Replay {
             label: subject.label.clone(),
             error,
         };
-        let bound = |bound, config: RunConfig, bytes| Row {
+        let bound = |bound, config: RunConfig, bytes| OrderRow {
             subject,
             offset_tiles,
-            of: Of::Bound(bound),
+            of: RowKind::Bound(bound),
             config,
             cost: None,
             external_bytes: bytes,
@@ -328,8 +333,8 @@ impl Study {
     }
 
     /// Sorts by caches, then orders as listed in the study, then searched orders, then bounds.
-    fn sort(&self, rows: &mut [Row<'_>]) {
-        let caches = |row: &Row<'_>| {
+    fn sort(&self, rows: &mut [OrderRow<'_>]) {
+        let caches = |row: &OrderRow<'_>| {
             let between = self
                 .between
                 .iter()
@@ -343,10 +348,10 @@ impl Study {
                 self.caches_bytes.iter().position(|of| *of == sizes),
             )
         };
-        let kind = |row: &Row<'_>| match &row.of {
-            Of::Order(order) => (0, self.orders.iter().position(|of| of == order)),
-            Of::Searched(_) => (1, None),
-            Of::Bound(_) => (2, None),
+        let kind = |row: &OrderRow<'_>| match &row.of {
+            RowKind::Order(order) => (0, self.orders.iter().position(|of| of == order)),
+            RowKind::Searched(_) => (1, None),
+            RowKind::Bound(_) => (2, None),
         };
         rows.sort_by_key(|row| (caches(row), kind(row)));
     }

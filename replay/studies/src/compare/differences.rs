@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 /// Differences in whole steps. Mean and maximum are exact; percentiles beyond [`EXACT_STEPS`] are rounded
 /// up by less than 1/64.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Spread {
+pub struct Differences {
     steps_per_unit: u32,
     count: u64,
     sum: u128,
@@ -30,7 +30,7 @@ fn bin(steps: u64) -> u64 {
     steps | ((1 << dropped) - 1)
 }
 
-impl Spread {
+impl Differences {
     /// An empty distribution with this many steps per unit.
     pub fn new(steps_per_unit: u32) -> Self {
         Self {
@@ -113,7 +113,7 @@ pub(crate) struct Summary {
     largest: f64,
 }
 
-impl Serialize for Spread {
+impl Serialize for Differences {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         Summary {
             compared: self.count,
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn an_empty_distribution_has_no_difference() {
-        let spread = Spread::new(4);
+        let spread = Differences::new(4);
         assert_eq!(
             (spread.mean(), spread.percentile(99.0), spread.largest()),
             (0.0, 0.0, 0.0)
@@ -144,7 +144,7 @@ mod tests {
         fn a_spread_equals_that_of_the_sorted_list(
             values in prop::collection::vec(prop_oneof![Just(0_u64), 1_u64..9000, 1_u64..1 << 40], 1..300),
         ) {
-            let (mut spread, mut other) = (Spread::new(8), Spread::new(8));
+            let (mut spread, mut other) = (Differences::new(8), Differences::new(8));
             for (index, &value) in values.iter().enumerate() {
                 [&mut spread, &mut other][index % 2].record(value, 1);
             }
