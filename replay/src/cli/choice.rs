@@ -9,11 +9,20 @@ pub(super) fn possible_values<T: Choice>() -> impl Iterator<Item = PossibleValue
     values.map(|value| PossibleValue::new(value.choice_name()).help(value.help()))
 }
 
+/// The value of a name.
+pub(super) fn named<T: Choice>(name: &str) -> Result<T, String> {
+    let mut values = T::choices().iter().copied();
+    let found = values.find(|value| value.choice_name() == name);
+    found.ok_or_else(|| {
+        let names: Vec<_> = T::choices()
+            .iter()
+            .map(|value| value.choice_name())
+            .collect();
+        format!("expected {}", names.join(" or "))
+    })
+}
+
 /// Parses a value by its name.
 pub(super) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
-    PossibleValuesParser::new(possible_values::<T>()).try_map(|name| {
-        let mut values = T::choices().iter().copied();
-        let named = values.find(|value| value.choice_name() == name);
-        named.ok_or_else(|| format!("no value `{name}`"))
-    })
+    PossibleValuesParser::new(possible_values::<T>()).try_map(|name| named(&name))
 }

@@ -1,8 +1,8 @@
 //! Options of the commands that reuse hits: rule, level of reuse and model parameters.
 
-use super::choice::choice;
+use super::choice::{choice, named};
 use anyhow::Context;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use sgrt::DEFAULT_RULE;
 use sgrt::compose::Reuse;
 use sgrt::config::SgrtConfig;
@@ -58,7 +58,7 @@ impl ReuseArgs {
         Ok(Self {
             preset: value("--preset", of_preset, preset)?,
             rule: value("--rule", rule, str::parse::<Rule>)?,
-            reuse: value("--reuse", reuse, |name| Reuse::from_str(name, false))?,
+            reuse: value("--reuse", reuse, named::<Reuse>)?,
             config,
         })
     }

@@ -224,7 +224,7 @@ impl World {
     /// Driver errors.
     pub fn draw(
         &mut self,
-        backend: &mut dyn CaptureBackend,
+        backend: &mut Lavapipe,
         planner: &Planner,
         frame: Frame,
         memory: &mut Occlusion,
@@ -236,7 +236,7 @@ impl World {
     /// Renders a frame for which the scene is posed; `planned` is the time for its plan.
     fn draw_posed(
         &mut self,
-        backend: &mut dyn CaptureBackend,
+        backend: &mut Lavapipe,
         planner: &Planner,
         mut frame: Frame,
         planned: Duration,

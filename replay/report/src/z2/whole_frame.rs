@@ -16,29 +16,16 @@ use studies::experiment::ResultRow;
 /// Frame rates of headsets, Hz.
 const RATES_HZ: [u32; 3] = [72, 90, 120];
 
-/// Parts of a bar, from bottom to top; the theme has eight colours.
-const PARTS: [&str; 8] = [
-    "textures",
-    "indices and vertices",
-    "shaded vertices",
-    "primitive lists",
-    "colour",
-    "depth",
-    "G-buffer",
-    "composition and warp",
-];
-
-/// The part of a bar, by its number in [`PARTS`], that shows a client.
-const fn part_of(client: Client) -> usize {
+/// The part of a bar that shows a client: a title for readers, which clients may share, or the client's name.
+const fn part_of(client: Client) -> &'static str {
     match client {
-        Client::Texture => 0,
-        Client::Index | Client::Vertex => 1,
-        Client::ShadedVertex => 2,
-        Client::PrimitiveList => 3,
-        Client::Colour => 4,
-        Client::Depth => 5,
-        Client::GBuffer => 6,
-        Client::Composition => 7,
+        Client::Texture => "textures",
+        Client::Index | Client::Vertex => "indices and vertices",
+        Client::ShadedVertex => "shaded vertices",
+        Client::PrimitiveList => "primitive lists",
+        Client::GBuffer => "G-buffer",
+        Client::Composition => "composition and warp",
+        other => other.name(),
     }
 }
 
@@ -70,18 +57,21 @@ pub(super) fn section(report: &PaperReport) -> Result<Option<Section>, PlotError
 }
 
 fn chart(scene: &str, rows: &[&ResultRow]) -> StackedChart {
-    let bytes = |row: &ResultRow, part: usize| -> u64 {
+    let bytes = |row: &ResultRow, part: &str| -> u64 {
         let clients = row.result.clients.iter();
         let of = clients.filter(|c| part_of(c.client) == part);
         of.map(ClientTraffic::bytes).sum()
     };
-    let used: Vec<(&str, usize)> = (PARTS.into_iter().zip(0..))
-        .filter(|(_, part)| rows.iter().any(|row| bytes(row, *part) > 0))
+    // From bottom to top. Clients that share a part are neighbours in the list of clients.
+    let mut parts = Client::ALL.map(part_of).to_vec();
+    parts.dedup();
+    let used: Vec<(&str, usize)> = (parts.into_iter().zip(0..))
+        .filter(|(part, _)| rows.iter().any(|row| bytes(row, part) > 0))
         .collect();
     let bar = |row: &&ResultRow| {
         let parts = used
             .iter()
-            .map(|(_, part)| row.mb_per_frame(bytes(row, *part)));
+            .map(|(part, _)| row.mb_per_frame(bytes(row, part)));
         (row.point.config.order.title().to_owned(), parts.collect())
     };
     StackedChart {
