@@ -128,3 +128,11 @@ fn an_unknown_study_and_an_absent_scene_are_named() {
     );
     assert_eq!(fs::read_dir(out.path()).expect("a folder").count(), 0);
 }
+
+/// `python3 -m studies extensions` also compiles and uses them.
+#[test]
+fn each_kind_of_extension_edits_no_more_files_than_its_limit() {
+    if let Some(output) = studies(&["extensions", "--count"]) {
+        assert!(output.status.success(), "{}", text(&output.stderr));
+    }
+}

@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 /// What is reused, and the machine.
 #[derive(Clone, Debug, Default, Args)]
 pub struct ReuseArgs {
+    /// The machine and the rule by name.
     #[arg(long, value_name = "NAME", help = presets::help(), value_parser = preset)]
     pub preset: Option<&'static Preset>,
     #[arg(long, value_name = "RULE", help = rule_help())]
