@@ -258,7 +258,7 @@ mod tests {
         let mut with_ends = chart();
         with_ends.groups[0].ends = vec![Some([9.0, 31.0]), None];
         let svg = with_ends.svg().unwrap();
-        assert!(svg.contains("Morton: 12.5, 9 to 31</title>"), "{svg}");
+        assert!(svg.contains("Morton: 12.500, 9 to 31</title>"), "{svg}");
         assert!(svg.contains("\n30\n"), "a tick above the bars");
         assert!(text_at(&svg, "12.5").1 < text_at(&svg, "30").1 + 8.0);
     }
