@@ -3,7 +3,6 @@
 use super::columns::{Column, Heading, Kind, Show, Value};
 use formats::text::{csv_cell, printable};
 use maud::{Markup, html};
-use sim::figure::Figure;
 use std::borrow::Cow;
 
 /// Longer texts are wrapped on pages.
@@ -91,14 +90,13 @@ impl Table {
                 continue;
             }
             let table = table.to_mut();
-            let ends: [(_, fn(&Figure) -> f64); 2] = [("high", |f| f.high), ("low", |f| f.low)];
-            for (name, end) in ends {
+            for (end, name) in ["low", "high"].iter().enumerate().rev() {
                 let mut heading = self.headings[column].clone();
                 heading.key = format!("{}_{name}", heading.key).into();
                 heading.kind = Kind::Real;
                 table.headings.insert(column + 1, heading);
                 for row in &mut table.rows {
-                    let cell = row[column].figure().map(end);
+                    let cell = row[column].figure().map(|f| [f.low, f.high][end]);
                     row.insert(column + 1, cell.into());
                 }
             }
