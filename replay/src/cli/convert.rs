@@ -356,7 +356,7 @@ fn accesses(
                 primitive: quad.primitive,
             };
             for (record, operands) in with_operands(quad.records) {
-                expander.expand(origin, record, operands, |access| sink(*access))?;
+                expander.expand(origin, record, operands, &mut *sink)?;
             }
             Ok(())
         })?;
@@ -379,11 +379,11 @@ fn ray_accesses(
         for sample in ray_samples(tables, eye, index, &tile) {
             sample.accesses(&tables.bvh, |access| {
                 if !by_line {
-                    return sink(*access);
+                    return sink(access);
                 }
                 let bytes = config.line_bytes;
                 access.lines(bytes).try_for_each(|address| {
-                    sink(RayAccess {
+                    sink(&RayAccess {
                         address,
                         bytes,
                         ..*access

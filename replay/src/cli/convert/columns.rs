@@ -13,10 +13,10 @@ use report::rows_parquet::RowsWriter;
 use std::io::{self, Write};
 
 /// A receiver of rows.
-pub(super) type Row<'a, R> = &'a mut dyn FnMut(R) -> io::Result<()>;
+pub(super) type Row<'a, R> = &'a mut dyn FnMut(&R) -> io::Result<()>;
 
 /// Writes the rows that `send` passes on. The header of NPY has their number, so `send` is called twice for it.
-pub(super) fn rows<R: Tabular>(
+pub(super) fn rows<R: Tabular + Copy>(
     to: Target,
     out: &mut (impl Write + Send),
     send: impl Fn(Row<'_, R>) -> Result<()>,
@@ -28,7 +28,7 @@ pub(super) fn rows<R: Tabular>(
     match to {
         Target::Parquet => {
             let mut writer = RowsWriter::new(out)?;
-            send(&mut |row| writer.write(row).map_err(io::Error::other))?;
+            send(&mut |row: &R| writer.write(*row).map_err(io::Error::other))?;
             writer.finish()?;
         }
         Target::Npy => {
@@ -38,14 +38,14 @@ pub(super) fn rows<R: Tabular>(
                 Ok(())
             })?;
             let mut writer = NpyWriter::new(out, count)?;
-            send(&mut |row| writer.write(&row))?;
+            send(&mut |row| writer.write(row))?;
             writer.finish()?;
         }
         Target::Csv => {
             let mut writer = CsvWriter::new(out)?;
-            send(&mut |row| writer.write(&row))?;
+            send(&mut |row| writer.write(row))?;
         }
-        _ => send(&mut |row| write_json_line(&row, out))?,
+        _ => send(&mut |row| write_json_line(row, out))?,
     }
     Ok(())
 }
@@ -54,7 +54,7 @@ pub(super) fn rows<R: Tabular>(
 pub(in crate::cli) type Chosen<'a> = &'a dyn Fn(usize, usize) -> bool;
 
 /// Writes the rows of the chosen tiles of a trace, in file order.
-fn of_tiles<R: Tabular, T: Rows<R>>(
+fn of_tiles<R: Tabular + Copy, T: Rows<R>>(
     trace: &T,
     to: Target,
     out: &mut (impl Write + Send),
@@ -66,7 +66,8 @@ fn of_tiles<R: Tabular, T: Rows<R>>(
             let (pass, number) = T::numbers(at);
             if chosen(pass, number) {
                 trace.append(at, &mut tile, &mut found)?;
-                found.drain(..).try_for_each(&mut *send)?;
+                found.iter().try_for_each(&mut *send)?;
+                found.clear();
             }
         }
         Ok(())
@@ -113,16 +114,14 @@ pub(in crate::cli) fn of_trace(
         RowKind::Node => {
             let (bvh, hierarchy) = (&trace.tables().bvh, records::hierarchy(trace)?);
             rows(to, out, |send| {
-                Ok(child_rows(bvh, &hierarchy).try_for_each(send)?)
+                Ok(child_rows(bvh, &hierarchy).try_for_each(|row| send(&row))?)
             })
         }
         RowKind::Slot => {
             let hierarchy = records::hierarchy(trace)?;
-            rows(
-                to,
-                out,
-                |send| Ok(slot_rows(&hierarchy).try_for_each(send)?),
-            )
+            rows(to, out, |send| {
+                Ok(slot_rows(&hierarchy).try_for_each(|row| send(&row))?)
+            })
         }
     }
 }
