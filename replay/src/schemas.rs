@@ -5,8 +5,8 @@ use crate::cli;
 use formats::schemas::{Published, assert_published};
 use report::document::published;
 use report::{
-    accuracy, addresses, calibration, compare, locality, orders, readings, run, sgrt, sweep,
-    sweep_plan, techniques, temporal, z2,
+    accuracy, addresses, calibration, compare, locality, orders, readings, run, sample, sgrt,
+    sweep, sweep_plan, techniques, temporal, z2,
 };
 use std::path::Path;
 use studies::experiment;
@@ -24,6 +24,8 @@ fn all() -> Vec<Published> {
         published::<compare::CompareReport, compare::CompareJson>(),
         published::<locality::LocalityReport, locality::LocalityJson>(),
         published::<orders::OrdersReport, orders::OrdersJson>(),
+        published::<sample::SampleReport, sample::SampleJson>(),
+        published::<sample::TrialReport, sample::TrialJson>(),
         published::<techniques::TechniquesReport, techniques::TechniquesJson>(),
         published::<accuracy::AccuracyReport, accuracy::AccuracyJson>(),
         published::<calibration::CalibrationReport, calibration::CalibrationReport>(),

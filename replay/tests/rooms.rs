@@ -32,7 +32,7 @@ const CRATES: [(&str, &[&[&str]]); 2] = [
         &[
             &["compare", "locality"],
             &["experiment"],
-            &["accuracy", "orders_study", "techniques"],
+            &["accuracy", "orders_study", "sampling", "techniques"],
         ],
     ),
 ];

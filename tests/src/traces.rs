@@ -54,6 +54,7 @@ fn meta(frames: u32) -> TraceMeta {
         origin_m: [0.0; 3],
         techniques: None,
         program: None,
+        ..TraceMeta::default()
     }
 }
 

@@ -45,6 +45,7 @@ mod ray_commands;
 mod rays;
 mod refusals;
 mod refused_columns;
+mod sampled;
 mod scene_fetch;
 mod scene_inputs;
 mod slurm;

@@ -14,6 +14,7 @@ mod planes;
 mod program;
 mod raw;
 mod reader;
+mod sampled;
 pub mod tables;
 mod writer;
 
@@ -23,6 +24,7 @@ pub use invariant::{TILE_QUADS, quad_morton};
 pub use program::{LeftOut, ProgramCapture, UnrecordedReads};
 pub use raw::{RECORD_BYTES as RAW_RECORD_BYTES, RUN_BYTES as RAW_RUN_BYTES};
 pub use reader::{Textrace, TileStats};
+pub use sampled::PlannedFrame;
 pub use writer::{EncodedTile, TextraceWriter, encode_tile, encode_tile_as};
 
 use crate::container::ChunkTag;
@@ -113,6 +115,13 @@ pub struct TraceMeta {
     /// Set for the capture of a program; absent for that of a scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub program: Option<ProgramCapture>,
+    /// Set for a plan, which has no passes: what is known of each frame, in the order of `frames`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub plan: Option<Vec<PlannedFrame>>,
+    /// Frames that only fill the caches for the frames after them, ascending. Frames of a sample are not
+    /// consecutive, so caches are empty where numbers leave a gap.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub warm_frames: Vec<u32>,
 }
 
 /// The techniques of the frames of a path, by name.
@@ -200,7 +209,8 @@ impl TraceMeta {
             "origin",
             "finite numbers",
             format_args!("{:?}", self.origin_m),
-        )
+        )?;
+        sampled::check(&self.frames, self.plan.as_deref(), &self.warm_frames)
     }
 }
 

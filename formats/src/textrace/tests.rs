@@ -74,6 +74,7 @@ pub(crate) fn tables() -> Tables {
                 not_opaque: vec![[2, 1]],
             }),
             program: None,
+            ..TraceMeta::default()
         },
         textures: vec![texture("a.png", 1024), texture("b.png", 64)],
         samplers: vec![Sampler::TRILINEAR_REPEAT, Sampler::SHADOW],

@@ -22,6 +22,7 @@ pub mod plots;
 pub mod readings;
 pub mod rows_parquet;
 pub mod run;
+pub mod sample;
 #[cfg(feature = "testing")]
 mod schemas;
 pub mod sgrt;

@@ -484,10 +484,20 @@ pub fn scene_name(scene: &str) -> &str {
     folder.filter(says_more).unwrap_or(stem)
 }
 
-/// The notices of a trace: texture reads that it lacks.
+/// The notices of a trace: texture reads that it lacks, and frames that are no part of the answer.
 pub fn notices_of(meta: &TraceMeta) -> Vec<String> {
     let program = meta.program.as_ref();
-    program.map_or_else(Vec::new, |program| program.notices())
+    let mut notices = program.map_or_else(Vec::new, |program| program.notices());
+    if meta.plan.is_some() {
+        notices.push("this is a plan of frames, which were not captured".to_owned());
+    }
+    if let warm @ 1.. = meta.warm_frames.len() {
+        let all = meta.frames.len();
+        notices.push(format!(
+            "{warm} of {all} frames were captured to fill the caches for those after them; `replay sample` leaves them out, other commands count them"
+        ));
+    }
+    notices
 }
 
 #[cfg(test)]

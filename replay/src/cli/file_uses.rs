@@ -11,6 +11,10 @@ pub const FILES: &FileUses = &[
     (&["accuracy"], &["output"], FileUse::Folder),
     (&["man"], &["folder"], FileUse::Folder),
     (&[], &["out"], FileUse::Folder),
+    (&["sample"], &["keep"], FileUse::Folder),
+    (&["sample"], &["values"], FileUse::Input),
+    (&["sample"], &["save_values"], FileUse::Output),
+    (&["sample"], &["command"], FileUse::NoFile),
     (&[], &["save_orders"], FileUse::FolderOfNewNames),
     (
         &[],

@@ -22,6 +22,7 @@ mod report;
 pub mod reproject;
 mod reuse_args;
 mod run;
+mod sample;
 mod subjects;
 mod sweep;
 mod techniques;
@@ -94,6 +95,9 @@ enum Command {
     /// Compare tile orders with each other and with lower bounds, with their hardware costs.
     #[command(mut_args(without(&["order", "l1", "l2"])))]
     Orders(Box<orders::Args>),
+    /// Answer for a path from a sample of its frames, within a width that is asked for.
+    #[command(mut_args(without(&["order", "l1", "l2"])))]
+    Sample(Box<sample::Args>),
     /// Analyse reuse distances, working sets, miss-ratio curves, OPT and 3C misses, by order.
     #[command(mut_args(without(&["order", "l3", "prefetch", "dram", "frame"])))]
     Locality(Box<locality::Args>),
@@ -135,6 +139,7 @@ pub fn main() -> ExitCode {
             Command::Report(args) => report::run(&args),
             Command::Techniques(args) => techniques::run(&args),
             Command::Orders(args) => orders::run(&args),
+            Command::Sample(args) => sample::run(&args),
             Command::Locality(args) => locality::run(&args),
             Command::Reproject(args) => reproject::run(*args),
             Command::Readings(args) => readings::run(&args),

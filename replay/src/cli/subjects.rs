@@ -1,6 +1,6 @@
 //! Opens and names the texture traces of an experiment.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use formats::textrace::Textrace;
 use shell::Progress;
 use sim::result::TraceId;
@@ -19,6 +19,11 @@ impl Traces {
     pub fn open(paths: &[PathBuf]) -> Result<Self> {
         let open = |path: &PathBuf| {
             let (trace, id) = report::notices::open_textrace(path)?;
+            ensure!(
+                trace.tables().meta.plan.is_none(),
+                "{}: expected captured frames, found a plan; `replay sample` says which frames to capture",
+                path.display()
+            );
             let stem = path.file_stem().unwrap_or_default();
             Ok((trace, id, stem.to_string_lossy().into_owned()))
         };

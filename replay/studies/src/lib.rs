@@ -5,4 +5,5 @@ pub mod compare;
 pub mod experiment;
 pub mod locality;
 pub mod orders_study;
+pub mod sampling;
 pub mod techniques;

@@ -286,6 +286,7 @@ fn meta(
         origin_m: [0.0; 3],
         techniques: None,
         program: Some(drained.program.clone()),
+        ..TraceMeta::default()
     }
 }
 

@@ -9,6 +9,7 @@ mod drivers;
 #[cfg(feature = "programs")]
 mod failed_run;
 mod file_uses;
+mod frames_arg;
 pub mod lens_args;
 mod light_args;
 #[cfg(not(all(feature = "lab", feature = "programs")))]
@@ -27,6 +28,7 @@ pub mod raster;
 mod raster_args;
 mod raster_auto;
 mod raster_frames;
+mod raster_plan;
 mod raster_summary;
 pub mod rays;
 pub mod scene_args;

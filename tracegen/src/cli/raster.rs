@@ -5,6 +5,7 @@ use super::drivers::Driver;
 use super::raster_args::RasterArgs;
 use super::raster_auto::{self, Techniques};
 use super::raster_frames;
+use super::raster_plan;
 use super::scene_args::capture_outputs;
 use raster::backend::Fragments;
 use std::path::PathBuf;
@@ -17,6 +18,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     prepare_environment(args.threads.count);
     args.threads.start()?;
     let outputs = capture_outputs(&args.output, args.image.as_deref());
+    args.check_frames()?;
     args.scene.check_outputs(&args.path, &outputs)?;
     shell::check_outputs(
         &outputs,
@@ -32,6 +34,7 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
     let techniques = match (args.auto, &args.technique) {
         (Some(budget), _) => Techniques::Chosen(budget, objective),
         (None, Some(schedule)) => Techniques::Named(Box::new(schedule.clone())),
+        (None, None) if args.plan_only => return raster_plan::run(args, &outputs),
         (None, None) => return raster_frames::run(args, &outputs),
     };
     raster_auto::run(args, &techniques, &outputs)

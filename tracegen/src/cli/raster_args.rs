@@ -3,8 +3,9 @@
 use super::cache_args::CacheArgs;
 use super::choice::choice;
 use super::drivers::Driver;
+use super::frames_arg::{Chosen, Frames};
 use super::objective_args::ObjectiveArgs;
-use super::path_args::{PathArgs, frame_count};
+use super::path_args::PathArgs;
 use super::scene_args::SceneArgs;
 use super::technique_args::TechniqueArgs;
 use super::values::{encoding_parser, parse_bytes};
@@ -32,9 +33,22 @@ pub struct RasterArgs {
     pub(super) image: Option<PathBuf>,
     #[command(flatten)]
     pub(super) path: PathArgs,
-    /// Frames along the path [default: 1, or all views of `--cameras`].
-    #[arg(long, value_name = "N", help_heading = "Camera", value_parser = frame_count())]
-    frames: Option<u32>,
+    /// Frames along the path: their number, or a list of numbers and ranges without their end, as in
+    /// `3,17,40..43`; the last `--frames` counts [default: 1, or all views of `--cameras`].
+    #[arg(
+        long,
+        value_name = "N|LIST",
+        help_heading = "Camera",
+        overrides_with = "frames"
+    )]
+    frames: Option<Frames>,
+    /// Frames before each run of listed frames that are captured to fill the caches.
+    #[arg(long, value_name = "N", help_heading = "Camera", default_value_t = 1, value_parser = clap::value_parser!(u32).range(0..=16))]
+    warm: u32,
+    /// Write what the plan of each frame knows, without drawing: a trace without passes, for `replay sample`.
+    #[arg(long, help_heading = "Camera",
+          conflicts_with_all = ["image", "auto", "technique", "occlusion", "geometry", "warm"])]
+    pub(super) plan_only: bool,
     /// Light the scene through 4 shadow cascades of 2048x2048.
     #[arg(long)]
     pub(super) shadows: bool,
@@ -95,7 +109,35 @@ pub struct RasterArgs {
 impl RasterArgs {
     /// Number of frames.
     pub(super) fn frames(&self) -> u32 {
-        self.frames.or(self.path.cameras).unwrap_or(1)
+        let frames = self.frames.as_ref().map(Frames::end);
+        frames.or(self.path.cameras).unwrap_or(1)
+    }
+
+    /// The listed frames and the frames that warm them, or none if a path is captured from its start.
+    pub(super) fn chosen(&self) -> Option<Chosen> {
+        Some(Chosen::new(self.frames.as_ref()?.list()?, self.warm))
+    }
+
+    /// Refuses a list of frames beside options with which a frame depends on the frames before it.
+    ///
+    /// # Errors
+    /// Such an option.
+    pub(super) fn check_frames(&self) -> anyhow::Result<()> {
+        let listed = self
+            .frames
+            .as_ref()
+            .is_some_and(|frames| frames.list().is_some());
+        let depends = [
+            (self.auto.is_some(), "--auto"),
+            (self.technique.is_some(), "--technique"),
+            (self.techniques.occludes(), "--occlusion"),
+        ];
+        match depends.iter().find(|flag| flag.0 && listed) {
+            Some((_, flag)) => bail!(
+                "{flag}: expected a number of frames, found a list, whose frames would need all frames before them"
+            ),
+            None => Ok(()),
+        }
     }
 
     /// Pixels of all frames, as far as they are known without the scene.

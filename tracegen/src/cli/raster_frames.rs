@@ -21,9 +21,9 @@ use techniques::{Planner, Skips};
 use textures::TextureSet;
 
 /// What is captured of a scene.
-struct Session<'a> {
+pub(super) struct Session<'a> {
     args: &'a RasterArgs,
-    world: World,
+    pub(super) world: World,
     planner: Planner,
 }
 
@@ -60,6 +60,7 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
         backend,
         args.hsr,
     );
+    tables.meta.warm_frames = args.chosen().map_or_else(Vec::new, |chosen| chosen.warm());
     tables.passes = (planned.iter())
         .flat_map(|frame| frame.plan.passes(frame.number))
         .collect();
@@ -116,7 +117,12 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
 }
 
 impl<'a> Session<'a> {
-    fn new(args: &'a RasterArgs, setup: SceneSetup) -> anyhow::Result<Self> {
+    pub(super) fn new(args: &'a RasterArgs, mut setup: SceneSetup) -> anyhow::Result<Self> {
+        if let Some(chosen) = args.chosen() {
+            setup
+                .frames
+                .retain(|views| chosen.captured.contains(&views.frame));
+        }
         let lens = args.techniques.lens.lenses(&setup.hmd)?;
         let cascades = cascades(&setup.scene, args.shadows);
         let world = world(setup, cascades, lens)?;
@@ -130,7 +136,7 @@ impl<'a> Session<'a> {
     }
 
     /// What to capture of the draws where they are.
-    fn job(&self) -> CaptureJob<'_> {
+    pub(super) fn job(&self) -> CaptureJob<'_> {
         let args = self.args;
         CaptureJob {
             skips: Skips::without(&args.no_skip),
@@ -153,7 +159,7 @@ impl<'a> Session<'a> {
             let views = &self.world.views[position];
             planned.push(self.job().frame_and_levels(views, &mut finest)?);
         }
-        self.world.pose(self.world.moments.frames.start)?;
+        self.world.pose(self.world.views[0].frame)?;
         Ok((planned, finest))
     }
 

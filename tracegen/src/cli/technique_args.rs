@@ -180,6 +180,11 @@ impl TechniqueArgs {
         flags.iter().find(|flag| flag.0).map(|flag| flag.1)
     }
 
+    /// Whether occlusion culling uses what the frame before saw.
+    pub(super) fn occludes(&self) -> bool {
+        self.occlusion
+    }
+
     /// The settings of the techniques.
     ///
     /// # Errors

@@ -144,6 +144,7 @@ fn tables(
             origin_m: [0.0; 3],
             techniques: None,
             program: None,
+            ..TraceMeta::default()
         },
         textures,
         samplers,

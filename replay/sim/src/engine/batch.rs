@@ -83,6 +83,7 @@ pub fn replay_all(
         trace,
         configs,
         finished,
+        after_frame: None,
     };
     let answers = replay_jobs(&[job], memory);
     answers

@@ -26,7 +26,12 @@ pub struct Job<'a> {
     pub configs: &'a [RunConfig],
     /// Called with the index of a configuration and its result as soon as that is complete.
     pub finished: &'a (dyn Fn(usize, RunResult) + Sync),
+    /// Called after each frame with the index of a configuration, the frame's number, and the result so far.
+    pub after_frame: Option<AfterFrame<'a>>,
 }
+
+/// A receiver of results of the frames so far.
+pub type AfterFrame<'a> = &'a (dyn Fn(usize, u32, RunResult) + Sync);
 
 /// Groups that read the same lines, and what they need.
 pub(super) struct Wave<'a> {
@@ -61,6 +66,10 @@ impl<'a> Wave<'a> {
             };
             (self.report_stage)(Stage::Loaded);
             let plans = orders.plans(&walk.plan(&frame)?);
+            // The next frame is expanded while this one is replayed.
+            let so_far = self.job.after_frame.map(|_| walk.counts().clone());
+            // What the caches held before a frame that is not in the trace is unknown.
+            let has_gap = index > 0 && frames[index - 1] + 1 != number;
             let waiting = AtomicUsize::new(groups.len());
             let is_last = index + 1 == frames.len();
             let replay = |group: &mut Group<'a>, frame: &Frame<'_>| {
@@ -68,7 +77,7 @@ impl<'a> Wave<'a> {
                     (self.report_stage)(Stage::LastReplayStarted);
                 }
                 let config = *group.config();
-                let mut machine = self.machine(group, &expander, index)?;
+                let mut machine = self.machine(group, &expander, index, has_gap)?;
                 let mut cores = Cores::new(frame, config.cores as usize);
                 if let Some(clients) = &mut group.clients {
                     clients.start_frame(number)?;
@@ -85,6 +94,13 @@ impl<'a> Wave<'a> {
                     clients.end_frame();
                     machine.client_accesses(clients);
                 }
+                if let (Some(after), Some(counts)) = (self.job.after_frame, &so_far) {
+                    for &index in &group.points {
+                        let result =
+                            self.result(group, index, &*machine, &rendered, &expander, counts);
+                        after(index, number, result);
+                    }
+                }
                 Ok::<_, ReplayError>(machine)
             };
             // The last group to finish frees the frame's memory, even while this thread is busy.
@@ -98,7 +114,8 @@ impl<'a> Wave<'a> {
                 return all.try_for_each(|(group, frame)| {
                     let machine = replay(group, &frame)?;
                     drop(frame);
-                    self.finish(group, &*machine, &rendered, &expander, walk.counts())
+                    self.finish(group, &*machine, &rendered, &expander, walk.counts());
+                    Ok(())
                 });
             };
             let keep = || {
@@ -123,7 +140,7 @@ impl<'a> Wave<'a> {
                 &rendered,
                 &expander,
                 walk.counts(),
-            )?;
+            );
         }
         Ok(())
     }
@@ -134,6 +151,7 @@ impl<'a> Wave<'a> {
         group: &mut Group<'a>,
         expander: &Expander,
         index: usize,
+        has_gap: bool,
     ) -> Result<Box<dyn Machine>, ReplayError> {
         let Some(mut machine) = group.machine.take() else {
             group.build_clients(self.job.trace, expander)?;
@@ -141,6 +159,7 @@ impl<'a> Wave<'a> {
         };
         let config = group.config();
         match config.between_frames {
+            BetweenFrames::Keep if has_gap => machine.flush(),
             BetweenFrames::Keep => {}
             BetweenFrames::Flush => machine.flush(),
             BetweenFrames::Lose(percent) => {
@@ -157,25 +176,43 @@ impl<'a> Wave<'a> {
         rendered: &dyn TileSource,
         expander: &Expander<'_>,
         counts: &TraceCounts,
-    ) -> Result<(), ReplayError> {
-        let tables = rendered.tables();
+    ) {
         for &index in &group.points {
-            let config = &self.job.configs[index];
-            let outcome = machine.outcome(config);
-            let mut result = summary(tables, expander.bins(), counts, &outcome.counts, config);
-            (result.tmu, result.cycles) = (outcome.tmu, outcome.cycles);
-            result.timeline = outcome.timeline;
-            result.first_lookups = outcome.first_lookups;
-            let l2_misses = result.l2.counters.line_misses;
-            result.external_bytes = outcome.memory.external_bytes(l2_misses, config.line_bytes);
-            result.memory = outcome.memory;
-            if let Some(clients) = &group.clients {
-                let (traffic, geometry) = clients.result(result.external_bytes);
-                (result.clients, result.geometry) = (traffic, Some(geometry));
-            }
+            let result = self.result(group, index, machine, rendered, expander, counts);
             (self.job.finished)(index, result);
         }
-        Ok(())
+    }
+
+    /// The result of a configuration for the frames that its machine has run.
+    fn result(
+        &self,
+        group: &Group<'_>,
+        index: usize,
+        machine: &dyn Machine,
+        rendered: &dyn TileSource,
+        expander: &Expander<'_>,
+        counts: &TraceCounts,
+    ) -> RunResult {
+        let config = &self.job.configs[index];
+        let outcome = machine.outcome(config);
+        let mut result = summary(
+            rendered.tables(),
+            expander.bins(),
+            counts,
+            &outcome.counts,
+            config,
+        );
+        (result.tmu, result.cycles) = (outcome.tmu, outcome.cycles);
+        result.timeline = outcome.timeline;
+        result.first_lookups = outcome.first_lookups;
+        let l2_misses = result.l2.counters.line_misses;
+        result.external_bytes = outcome.memory.external_bytes(l2_misses, config.line_bytes);
+        result.memory = outcome.memory;
+        if let Some(clients) = &group.clients {
+            let (traffic, geometry) = clients.result(result.external_bytes);
+            (result.clients, result.geometry) = (traffic, Some(geometry));
+        }
+        result
     }
 }
 

@@ -50,6 +50,7 @@ pub fn meta(eye_size_px: [u32; 2], fov: FovTangents) -> TraceMeta {
         origin_m: [0.0; 3],
         techniques: None,
         program: None,
+        ..TraceMeta::default()
     }
 }
 

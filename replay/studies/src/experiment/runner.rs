@@ -281,6 +281,7 @@ fn replayed(parts: Vec<SubjectRun<'_>>) -> Vec<Result<(Vec<RunResult>, Work), Ru
             trace: part.subject.source,
             configs: &part.configs,
             finished,
+            after_frame: None,
         });
     }
     let answers = replay_jobs(&jobs, &memory);
