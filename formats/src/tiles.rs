@@ -10,7 +10,7 @@ use std::io::{Read, Seek, Write};
 use tempfile::SpooledTempFile;
 
 /// Position of a tile: the first 16 bytes of every index entry.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct TileSpan {
     /// Offset in the chunk of tiles.
     pub offset: u64,
@@ -45,13 +45,33 @@ impl TileChunk {
     /// # Errors
     /// The chunk is missing, damaged or of another size, or an entry is malformed.
     pub fn read_index<T: Record>(&self, container: &Container, slots: u64) -> Result<Vec<T>> {
+        self.read_index_from(container, 0, slots)
+    }
+
+    /// Reads an index whose entries start at byte `first`.
+    ///
+    /// # Errors
+    /// See [`Self::read_index`].
+    pub fn read_index_from<T: Record>(
+        &self,
+        container: &Container,
+        first: usize,
+        slots: u64,
+    ) -> Result<Vec<T>> {
         let bytes = container.chunk(self.index)?.len() as u64;
-        if slots.checked_mul(self.entry_bytes as u64) != Some(bytes) {
-            let expected = format!("{} bytes for each of {slots} tiles", self.entry_bytes);
+        let entries = slots.checked_mul(self.entry_bytes as u64);
+        if entries.and_then(|entries| entries.checked_add(first as u64)) != Some(bytes) {
+            let each = self.entry_bytes;
+            let expected = match first {
+                0 => format!("{each} bytes for each of {slots} tiles"),
+                _ => format!("{first} bytes and {each} for each of {slots} tiles"),
+            };
             return Err(container.malformed(self.index, 0, expected, format!("{bytes} bytes")));
         }
         let (major, _) = container.version();
-        container.parse_chunk(self.index, |input| parse_records(major, input))
+        container.parse_chunk(self.index, |input| {
+            parse_records(major, input.get(first..).unwrap_or_default())
+        })
     }
 
     /// Checks that the tiles fill their chunk in index order without overlap or gap, and the checksums of
@@ -64,15 +84,66 @@ impl TileChunk {
         container: &Container,
         spans: impl Iterator<Item = Option<TileSpan>> + Clone,
     ) -> Result<()> {
+        let at_end = |_: usize, span: TileSpan, end: u64| match span.offset == end {
+            true => Ok(true),
+            false => Err(format!("offset {end}")),
+        };
+        self.check_each(container, spans, 0, at_end)
+    }
+
+    /// Checks an index in which an entry may be that of an earlier tile, whose bytes it shares; else as
+    /// [`Self::check`]. `span` is that of an entry, `None` for a slot without tile. The entries start at byte
+    /// `first` of the index.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub fn check_shared<T: PartialEq>(
+        &self,
+        container: &Container,
+        entries: &[T],
+        first: u64,
+        span: impl Fn(&T) -> Option<TileSpan> + Clone,
+    ) -> Result<()> {
+        // Slots of the stored tiles, by ascending offset.
+        let mut stored: Vec<(u64, usize)> = Vec::new();
+        let new_or_stored = |slot: usize, span: TileSpan, end: u64| {
+            if span.offset == end {
+                stored.push((end, slot));
+                return Ok(true);
+            }
+            let found = stored.binary_search_by_key(&span.offset, |(offset, _)| *offset);
+            let earlier = found.ok().and_then(|found| stored.get(found));
+            match earlier.is_some_and(|(_, earlier)| entries.get(*earlier) == entries.get(slot)) {
+                true => Ok(false),
+                false => Err(format!(
+                    "offset {end} or the whole entry of an earlier tile"
+                )),
+            }
+        };
+        self.check_each(container, entries.iter().map(span), first, new_or_stored)
+    }
+
+    /// Checks each span. `place` says whether a tile lies at the end of those before it or shares the bytes of
+    /// one of them, or what was expected.
+    fn check_each(
+        &self,
+        container: &Container,
+        spans: impl Iterator<Item = Option<TileSpan>> + Clone,
+        first: u64,
+        mut place: impl FnMut(usize, TileSpan, u64) -> Result<bool, String>,
+    ) -> Result<()> {
         let index = self.index;
         let chunk_bytes = container.entry(self.tiles)?.length_bytes;
         let mut end = 0u64;
         for (slot, span) in spans.clone().enumerate() {
             let Some(span) = span else { continue };
-            let at = (slot * self.entry_bytes) as u64;
-            if span.offset != end {
-                let expected = format!("offset {end}");
-                return Err(container.malformed(index, at, expected, span.offset));
+            let at = first + (slot * self.entry_bytes) as u64;
+            match place(slot, span, end) {
+                Ok(true) => (),
+                Ok(false) => continue,
+                Err(expected) => {
+                    return Err(container.malformed(index, at, expected, span.offset));
+                }
             }
             end = end.saturating_add(span.bytes.into());
             if end > chunk_bytes {
@@ -94,17 +165,22 @@ impl TileChunk {
         container.check_chunks()
     }
 
+    /// The bytes of a tile, unchecked.
+    pub fn stored<'a>(&self, container: &'a Container, span: &TileSpan) -> &'a [u8] {
+        let chunk = container.chunk_unchecked(self.tiles).unwrap_or_default();
+        // The index was checked against the chunk when the file was opened.
+        usize::try_from(span.offset)
+            .ok()
+            .and_then(|at| chunk.get(at..at.checked_add(span.bytes as usize)?))
+            .unwrap_or_default()
+    }
+
     /// The bytes of a tile.
     ///
     /// # Errors
     /// The bytes are damaged.
     fn bytes<'a>(&self, container: &'a Container, span: &TileSpan) -> Result<&'a [u8]> {
-        let chunk = container.chunk_unchecked(self.tiles)?;
-        // The index was checked against the chunk when the file was opened.
-        let bytes = usize::try_from(span.offset)
-            .ok()
-            .and_then(|at| chunk.get(at..at.checked_add(span.bytes as usize)?))
-            .unwrap_or_default();
+        let bytes = self.stored(container, span);
         let crc32 = crc32fast::hash(bytes);
         if crc32 == span.crc32 {
             return Ok(bytes);

@@ -82,8 +82,8 @@ def read(path, kind):
     head = Bytes(data)
     magic, major, minor, found_kind, zero16 = head.fields("8sHHHH")
     directory_at, size, entries, directory_crc, zero32, head_crc = head.fields("QQIIII")
-    known = major == 1 or major in (2, 3) and kind == 1
-    require(magic == b"PLXTRACE" and known, "not a trace of version 1, 2 or 3")
+    known = major == 1 or major in (2, 3, 4, 5) and kind == 1
+    require(magic == b"PLXTRACE" and known, "not a trace of versions 1 to 5")
     require(zlib.crc32(data[:44]) == head_crc, "damaged header")
     require(found_kind == kind, "a trace of another kind")
     require(zero16 == 0 and zero32 == 0, "reserved bytes")
@@ -162,10 +162,16 @@ def content_checksum(chunks):
     return f"{zlib.crc32(spelled(meta).encode('utf-8'), crc):08x}"
 
 
-def tile_spans(index, tiles):
-    """Checks (offset, size, CRC-32) of the tiles that have bytes; they must fill their chunk."""
-    end = 0
-    for offset, size, crc in index:
+def tile_spans(index, tiles, shared=False):
+    """Checks (offset, size, CRC-32, ...) of the tiles that have bytes; they must fill their chunk. If shared, an
+    entry may be that of an earlier tile."""
+    end, stored = 0, {}
+    for entry in index:
+        offset, size, crc = entry[:3]
+        if shared and offset < end:
+            require(stored.get(offset) == entry, "a tile that shares its bytes in part")
+            continue
+        stored[offset] = entry
         require(offset == end, "a tile out of place")
         end += size
         require(zlib.crc32(tiles[offset:end]) == crc, "a damaged tile")

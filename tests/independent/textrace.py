@@ -19,6 +19,9 @@ TAGS = {
     2: ["TILE", "TIDX", "META", "TEXS", "SMPS", "DRAW", "PASS"],
 }
 TAGS[3] = TAGS[2]
+# Versions 4 and 5 have the tables of versions 1 and 3.
+TABLES = {1: 1, 2: 2, 3: 3, 4: 1, 5: 3}
+MOST_REPEATS = 63
 GEOMETRY_TAGS = ["GEOM", "PLST", "PLIX"]
 FORMATS = {
     1: "bc1",
@@ -426,9 +429,22 @@ def read_geometry(chunks, version, draws, passes, frames):
         lists.end()
 
 
+def read_repeats(index, passes):
+    """For each pass its own number or that of the earlier pass whose tiles it has."""
+    repeats = []
+    for number, each in enumerate(passes):
+        (of,) = index.fields("I")
+        known = of == number or of < number and repeats[of] == of and passes[of]["tiles"] == each["tiles"]
+        require(known, "a pass that repeats none")
+        repeats.append(of)
+        require(repeats.count(of) <= 1 + MOST_REPEATS, "a pass that is repeated too often")
+    return repeats
+
+
 def main(path, *options):
     chunks, version = read(path, 1)
-    major = version[0]
+    shared = version[0] >= 4
+    major = TABLES[version[0]]
     tags = TAGS[major]
     require([tag for tag in chunks if tag in tags] == tags, "chunks missing or out of order")
     description = parse_json(chunks["META"])
@@ -461,16 +477,21 @@ def main(path, *options):
     if "--lists" in options:
         return
     index = Bytes(chunks["TIDX"])
-    places = [
-        (number, tile)
-        for number, each in enumerate(passes)
-        for tile in range(each["tiles"][0] * each["tiles"][1])
-    ]
-    entries = [index.fields("QIIIIQ") for _ in places]
+    repeats = read_repeats(index, passes) if shared else list(range(len(passes)))
+    of_pass, own = [], []
+    for number, each in enumerate(passes):
+        if repeats[number] == number:
+            count = each["tiles"][0] * each["tiles"][1]
+            of_pass.append([index.fields("QIIIIQ") for _ in range(count)])
+            own += of_pass[-1]
+        else:
+            of_pass.append(of_pass[repeats[number]])
     index.end()
-    touched = [entry for entry in entries if entry[3]]
-    require(all(not any(e[:5]) and e[5] in ENCODINGS for e in entries if not e[3]), "an untouched tile")
-    tile_spans([entry[:3] for entry in touched], chunks["TILE"])
+    touched = [entry for entry in own if entry[3]]
+    require(all(not any(e[:5]) and e[5] in ENCODINGS for e in own if not e[3]), "an untouched tile")
+    tile_spans(touched, chunks["TILE"], shared)
+    places = [(number, tile) for number, entries in enumerate(of_pass) for tile in range(len(entries))]
+    entries = [entry for each in of_pass for entry in each]
     codes = read_codes()
 
     def planes(data, runs, records):

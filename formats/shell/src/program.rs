@@ -11,9 +11,10 @@ use std::sync::LazyLock;
 
 /// Version of the programs, with the version of the trace formats.
 pub static VERSION: LazyLock<String> = LazyLock::new(|| {
-    let [first, second, third] = VERSIONS.map(|(major, minor)| format!("{major}.{minor}"));
+    let [first, second, third, fourth, fifth] =
+        VERSIONS.map(|(major, minor)| format!("{major}.{minor}"));
     format!(
-        "{} (.textrace formats {first}, {second} and {third}, .raytrace format {first})",
+        "{} (.textrace formats {first}, {second}, {third}, {fourth} and {fifth}, .raytrace format {first})",
         env!("CARGO_PKG_VERSION")
     )
 });

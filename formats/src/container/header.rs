@@ -1,7 +1,7 @@
 //! Byte layout of the header and of the directory.
 #![deny(clippy::indexing_slicing, clippy::cast_possible_truncation)]
 
-use super::{ChunkEntry, Kind, MAGIC, MAJOR_1, MAJOR_3};
+use super::{ChunkEntry, Kind, MAGIC, MAJOR_1, MAJOR_5};
 use crate::error::Result;
 use crate::parse::{Cursor, Parsed, Taken};
 use crate::records::{self, Codec, Record};
@@ -70,8 +70,8 @@ impl Header {
         start.check(magic == MAGIC, "the magic PLXTRACE", found)?;
         let at_version = input;
         let major: u16 = input.fixed("a major version")?;
-        let expected = format_args!("a major version from {MAJOR_1} to {MAJOR_3}");
-        at_version.check((MAJOR_1..=MAJOR_3).contains(&major), expected, major)?;
+        let expected = format_args!("a major version from {MAJOR_1} to {MAJOR_5}");
+        at_version.check((MAJOR_1..=MAJOR_5).contains(&major), expected, major)?;
         // The checksum is checked before all other fields, so that the error says that the header is
         // damaged.
         let mut end = start;

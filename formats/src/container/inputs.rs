@@ -25,6 +25,11 @@ pub fn declare_input(path: &Path) {
     }
 }
 
+/// The declared inputs, by absolute path.
+pub fn declared_inputs() -> Vec<PathBuf> {
+    inputs().clone()
+}
+
 /// The declared input that an output would replace.
 pub fn replaced_input(output: &Path) -> Option<PathBuf> {
     let inputs = inputs();

@@ -18,7 +18,7 @@ pub use atomic::{
     AtomicFile, check_target, discard_unfinished, is_stdout, kind_of, remove_abandoned,
 };
 pub use header::{DIRECTORY_ENTRY_BYTES, HEADER_BYTES};
-pub use inputs::{declare_input, input_in, is_same_file, replaced_input};
+pub use inputs::{declare_input, declared_inputs, input_in, is_same_file, replaced_input};
 pub use reader::Container;
 pub use regular::{check_regular, checksum, open_regular, read_regular};
 pub use scratch::ScratchFolder;
@@ -31,13 +31,26 @@ pub const MAGIC: [u8; 8] = *b"PLXTRACE";
 /// Latest minor version of each major version that readers support. A file declares the earliest version that
 /// has all of its features. Readers accept a later minor version, which may only add features, and refuse
 /// another major version.
-pub const VERSIONS: [(u16, u16); 3] = [(1, 3), (2, 0), (3, 0)];
+pub const VERSIONS: [(u16, u16); 5] = [(1, 3), (2, 0), (3, 0), (4, 0), (5, 0)];
 /// Major version of traces of scenes.
 pub(crate) const MAJOR_1: u16 = 1;
 /// Major version of `.textrace` files whose tables come after the tiles: traces of programs.
 pub(crate) const MAJOR_2: u16 = 2;
 /// Major version of those with anisotropic samplers or textures that share memory.
 pub(crate) const MAJOR_3: u16 = 3;
+/// Major versions of `.textrace` files that store equal tiles once, with the tables of version 1 and of version 3.
+pub(crate) const MAJOR_4: u16 = 4;
+/// See [`MAJOR_4`].
+pub(crate) const MAJOR_5: u16 = 5;
+
+/// The major version whose tables a file has.
+pub(crate) const fn major_of_tables(major: u16) -> u16 {
+    match major {
+        MAJOR_4 => MAJOR_1,
+        MAJOR_5 => MAJOR_3,
+        other => other,
+    }
+}
 /// Chunks start at multiples of this many bytes.
 pub const CHUNK_ALIGNMENT_BYTES: u64 = 8;
 

@@ -92,6 +92,12 @@ impl<W: Write + Seek> ContainerWriter<W> {
         self.header.version_major
     }
 
+    /// Declares in the header a major version without minor ones.
+    pub(crate) fn set_major(&mut self, major: u16) {
+        self.header.version_major = major;
+        self.header.version_minor = 0;
+    }
+
     /// Declares in the header that readers need a minor version.
     pub(crate) fn require_minor(&mut self, minor: u16) {
         self.header.version_minor = self.header.version_minor.max(minor);

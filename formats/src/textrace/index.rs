@@ -17,7 +17,7 @@ pub(super) const TILE_CHUNK: TileChunk = TileChunk {
 };
 
 /// One entry of the index. For an untouched tile, all fields except the encoding are zero.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub(super) struct IndexEntry {
     /// Position of the tile.
     pub span: TileSpan,

@@ -15,6 +15,8 @@ mod program;
 mod raw;
 mod reader;
 mod sampled;
+||||||| parent of 66a04468 (Formats: equal tiles and passes are stored once, in versions 4 and 5)
+mod sharing;
 pub mod tables;
 mod writer;
 
@@ -49,7 +51,7 @@ pub const TILES: ChunkTag = ChunkTag(*b"TILE");
 type Decoded<'a> = Parsed<'a, ()>;
 
 /// Encoding of a tile's bytes. Each tile names its own.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[repr(u8)]
 pub enum Encoding {

@@ -3,8 +3,11 @@
 
 use super::geometry::{self, Geometry, TileLists};
 use super::index::{IndexEntry, TILE_CHUNK};
-use super::{Encoding, Pass, TILES, Tables, Tile, delta, invariant, planes, raw, tables};
-use crate::container::{Container, Kind};
+use super::sharing::{MOST_REPEATS, REPEAT_BYTES};
+use super::{
+    Encoding, Pass, TILE_INDEX, TILES, Tables, Tile, delta, invariant, planes, raw, tables,
+};
+use crate::container::{Container, Kind, MAJOR_4};
 use crate::error::{Broken, Result};
 use std::path::Path;
 
@@ -57,24 +60,37 @@ impl Textrace {
     pub fn from_container(container: Container) -> Result<Self> {
         container.expect_kind(Kind::Textrace)?;
         let tables = tables::read(&container)?;
-        let slots: u64 = tables
-            .passes
-            .iter()
-            .map(Pass::tile_count_u64)
-            .fold(0, u64::saturating_add);
-        let index: Vec<IndexEntry> = TILE_CHUNK.read_index(&container, slots)?;
-        TILE_CHUNK.check(&container, index.iter().map(IndexEntry::touched))?;
+        let shares = container.version().0 >= MAJOR_4;
+        let repeats = match shares {
+            true => repeats(&container, &tables.passes)?,
+            false => (0..tables.passes.len()).collect(),
+        };
+        let with_entries = (tables.passes.iter().enumerate().zip(&repeats))
+            .filter(|((number, _), repeated)| number == *repeated)
+            .map(|((_, pass), _)| pass.tile_count_u64());
+        let slots = with_entries.fold(0, u64::saturating_add);
+        let first = if shares {
+            repeats.len() * REPEAT_BYTES
+        } else {
+            0
+        };
+        let index: Vec<IndexEntry> = TILE_CHUNK.read_index_from(&container, first, slots)?;
+        match shares {
+            true => {
+                TILE_CHUNK.check_shared(&container, &index, first as u64, IndexEntry::touched)?
+            }
+            false => TILE_CHUNK.check(&container, index.iter().map(IndexEntry::touched))?,
+        }
         let mut next = 0usize;
-        let pass_slots = tables
-            .passes
-            .iter()
-            .map(|pass| {
-                let first = next;
+        let mut pass_slots: Vec<usize> = Vec::with_capacity(repeats.len());
+        for (number, (pass, &repeated)) in tables.passes.iter().zip(&repeats).enumerate() {
+            let of_earlier = pass_slots.get(repeated).copied();
+            pass_slots.push(of_earlier.unwrap_or(next));
+            if repeated == number {
                 // Cannot overflow, because the sum was compared with the index's size above.
                 next += usize::try_from(pass.tile_count_u64()).unwrap_or(0);
-                first
-            })
-            .collect();
+            }
+        }
         let geometry = geometry::read(&container, &tables)?;
         Ok(Self {
             container,
@@ -166,6 +182,59 @@ impl Textrace {
         )
     }
 
+    /// Number of tiles with records whose bytes are stored for an earlier tile.
+    pub fn shared_tiles(&self) -> u64 {
+        let mut end = 0;
+        let mut stored = 0;
+        for span in self.index.iter().filter_map(IndexEntry::touched) {
+            if span.offset == end {
+                end += u64::from(span.bytes);
+                stored += 1;
+            }
+        }
+        let touched = |(&first, pass): (&usize, &Pass)| {
+            let tiles = self
+                .index
+                .iter()
+                .skip(first)
+                .take(pass.tile_count() as usize);
+            tiles.filter(|entry| entry.records > 0).count() as u64
+        };
+        let all: u64 = self
+            .pass_slots
+            .iter()
+            .zip(&self.tables.passes)
+            .map(touched)
+            .sum();
+        all - stored
+    }
+
+    /// Whether two passes have the same tiles: the same bytes in the same encoding.
+    pub fn has_same_tiles(&self, a: usize, b: usize) -> bool {
+        let [of_a, of_b] = [a, b].map(|pass| {
+            let first = self.pass_slots.get(pass)?;
+            let pass = self.tables.passes.get(pass)?;
+            let entries = self.index.get(*first..first + pass.tile_count() as usize)?;
+            Some((pass.tiles, entries))
+        });
+        let Some(((grid_a, of_a), (grid_b, of_b))) = of_a.zip(of_b) else {
+            return false;
+        };
+        let place = |entry: &IndexEntry| (entry.span.bytes, entry.span.crc32);
+        let facts = |entry: &IndexEntry| (place(entry), entry.records, entry.runs, entry.encoding);
+        let alike = |(a, b): (&IndexEntry, &IndexEntry)| {
+            (a.records, b.records) == (0, 0) || facts(a) == facts(b)
+        };
+        let same_bytes = |(a, b): (&IndexEntry, &IndexEntry)| {
+            let bytes = |entry: &IndexEntry| TILE_CHUNK.stored(&self.container, &entry.span);
+            a.span == b.span || bytes(a) == bytes(b)
+        };
+        // Checksums first, so that different passes differ soon.
+        grid_a == grid_b
+            && of_a.iter().zip(of_b).all(alike)
+            && of_a.iter().zip(of_b).all(same_bytes)
+    }
+
     /// Number of quad records of all tiles.
     pub fn records(&self) -> u64 {
         let passes = (0..).zip(&self.tables().passes);
@@ -230,4 +299,42 @@ impl Textrace {
             .and_then(|tile| self.index.get(first + tile))
             .ok_or_else(|| container.out_of_range("tile", tile as u64, tiles))
     }
+}
+
+/// For each pass the earlier pass whose tiles it has, or its own number: the start of the index of versions 4
+/// and 5.
+fn repeats(container: &Container, passes: &[Pass]) -> Result<Vec<usize>> {
+    let bytes = container.chunk(TILE_INDEX)?;
+    let (numbers, _) = bytes.as_chunks::<REPEAT_BYTES>();
+    let malformed = |number: usize, expected: &str, found: String| {
+        let at = (number * REPEAT_BYTES) as u64;
+        container.malformed(TILE_INDEX, at, expected, found)
+    };
+    if numbers.len() < passes.len() {
+        let found = format!("{} bytes", bytes.len());
+        return Err(malformed(0, "a pass's number for each pass", found));
+    }
+    let mut repeats: Vec<usize> = Vec::with_capacity(passes.len());
+    let mut of_each = vec![0u32; passes.len()];
+    for (number, (pass, of)) in passes.iter().zip(numbers).enumerate() {
+        let of = usize::try_from(u32::from_le_bytes(*of)).unwrap_or(usize::MAX);
+        let has_entries = of == number || repeats.get(of) == Some(&of);
+        let same_grid = passes
+            .get(of)
+            .is_some_and(|other| other.tiles == pass.tiles);
+        if !has_entries || !same_grid {
+            let expected =
+                "its own number or that of an earlier pass of as many tiles that has its own";
+            return Err(malformed(number, expected, of.to_string()));
+        }
+        if let Some(count) = of_each.get_mut(of).filter(|_| of != number) {
+            *count += 1;
+            if *count > MOST_REPEATS {
+                let expected = format!("a pass that at most {MOST_REPEATS} others repeat");
+                return Err(malformed(number, &expected, of.to_string()));
+            }
+        }
+        repeats.push(of);
+    }
+    Ok(repeats)
 }

@@ -5,7 +5,9 @@ use super::{
     Draw, LodRule, Pass, PassKind, Sample, SampleLevel, TILE_INDEX, TILES, Tables, TraceMeta,
     UvGroup,
 };
-use crate::container::{ChunkTag, Container, ContainerWriter, MAJOR_1, MAJOR_2, MAJOR_3};
+use crate::container::{
+    ChunkTag, Container, ContainerWriter, MAJOR_1, MAJOR_2, MAJOR_3, major_of_tables,
+};
 use crate::error::{Broken, Result, ensure};
 use crate::json;
 use crate::parse::Taken;
@@ -80,7 +82,8 @@ pub(super) fn check_writable(tables: &Tables) -> Result<()> {
 
 /// Reads and checks the table chunks.
 pub(super) fn read(container: &Container) -> Result<Tables> {
-    let (major, _) = container.version();
+    let version = container.version().0;
+    let major = major_of_tables(version);
     container.expect_order(&match major {
         MAJOR_1 => [META, TEXTURES, SAMPLERS, DRAWS, PASSES, TILES, TILE_INDEX],
         _ => [TILES, TILE_INDEX, META, TEXTURES, SAMPLERS, DRAWS, PASSES],
@@ -90,7 +93,7 @@ pub(super) fn read(container: &Container) -> Result<Tables> {
         tag: ChunkTag,
         what: &'static str,
     ) -> Result<Vec<T>> {
-        let (major, _) = container.version();
+        let major = major_of_tables(container.version().0);
         container.parse_chunk(tag, |input| parse_table(major, what, input))
     }
     let tables = Tables {
@@ -101,7 +104,7 @@ pub(super) fn read(container: &Container) -> Result<Tables> {
         passes: table(container, PASSES, "pass count")?,
     };
     check(&tables).map_err(|(chunk, broken)| container.broken(chunk, 0, broken))?;
-    if major == MAJOR_1 && has_layers(&tables) {
+    if version == MAJOR_1 && has_layers(&tables) {
         container.expect_minor(LAYERS_MINOR, PASSES, "passes that are layers")?;
     }
     Ok(tables)

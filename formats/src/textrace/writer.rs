@@ -2,8 +2,11 @@
 
 use super::geometry::{Geometry, GeometryView, Spool, TileLists};
 use super::index::IndexEntry;
+use super::sharing::{StoredTiles, repeated_passes};
 use super::{Draw, Encoding, Pass, Tables, Tile, TraceMeta, delta, invariant, planes, raw, tables};
-use crate::container::{AtomicFile, ContainerWriter, Kind, MAJOR_1, MAJOR_2};
+use crate::container::{
+    AtomicFile, ContainerWriter, Kind, MAJOR_1, MAJOR_2, MAJOR_3, MAJOR_4, MAJOR_5,
+};
 use crate::error::{Broken, FormatError, Result};
 use crate::records;
 use crate::texture::{Part, Sampler, Texture};
@@ -80,6 +83,7 @@ pub struct TextraceWriter<W = AtomicFile> {
     tables_last: bool,
     tables: Tables,
     index: Vec<IndexEntry>,
+    stored: StoredTiles,
     /// First index slot that the next tile may have.
     next_slot: usize,
     tile_bytes: u64,
@@ -166,6 +170,7 @@ impl<W: Write + Seek> TextraceWriter<W> {
             tables_last,
             tables: tables.clone(),
             index: vec![IndexEntry::default(); tiles],
+            stored: StoredTiles::default(),
             next_slot: 0,
             tile_bytes: 0,
             encoding: Encoding::default(),
@@ -328,7 +333,7 @@ impl<W: Write + Seek> TextraceWriter<W> {
         if tile.records == 0 {
             return Ok(());
         }
-        self.index[slot] = IndexEntry {
+        let entry = IndexEntry {
             span: TileSpan {
                 offset: self.tile_bytes,
                 bytes: tile.bytes.len() as u32,
@@ -338,22 +343,48 @@ impl<W: Write + Seek> TextraceWriter<W> {
             runs: tile.runs,
             encoding: tile.encoding,
         };
+        self.index[slot] = self.stored.entry(&tile.bytes, entry);
+        if self.index[slot] != entry {
+            return Ok(());
+        }
         self.tile_bytes += tile.bytes.len() as u64;
         self.container.append(&tile.bytes)
     }
 
     fn seal(mut self) -> Result<ContainerWriter<W>> {
-        let mut bytes = Vec::with_capacity(self.index.len() * super::INDEX_ENTRY_BYTES);
-        for entry in &self.index {
-            records::write(MAJOR_2, entry, &mut bytes)?;
+        let shares = self.stored.has_shared();
+        let mut bytes = Vec::new();
+        let mut first = 0;
+        let repeats = shares.then(|| repeated_passes(&self.tables.passes, &self.index));
+        for (number, pass) in (0..).zip(&self.tables.passes) {
+            let end = first + pass.tile_count() as usize;
+            let of_pass = first..end;
+            first = end;
+            let repeated = repeats.as_ref().map_or(number, |all| all[number as usize]);
+            if repeated == number {
+                for entry in &self.index[of_pass] {
+                    records::write(MAJOR_2, entry, &mut bytes)?;
+                }
+            }
+        }
+        if let Some(repeats) = repeats {
+            let numbers = repeats.iter().flat_map(|number| number.to_le_bytes());
+            bytes = numbers.chain(bytes).collect();
         }
         self.container.chunk(super::TILE_INDEX, &bytes)?;
         if self.tables_last {
-            let major = tables::major_of(&self.tables).max(MAJOR_2);
+            let major = match shares {
+                true => MAJOR_3,
+                false => tables::major_of(&self.tables).max(MAJOR_2),
+            };
             tables::write(major, &self.tables, &mut self.container)?;
         }
         if let Some(spool) = self.geometry {
             spool.write(&self.tables, &mut self.container)?;
+        }
+        if shares {
+            let major = if self.tables_last { MAJOR_5 } else { MAJOR_4 };
+            self.container.set_major(major);
         }
         Ok(self.container)
     }

@@ -75,7 +75,9 @@ fn heading(container: &Container, meta: &TraceMeta, checksum: u32) -> String {
 }
 
 fn texture_text(trace: &Textrace) -> Result<String> {
-    let totals = Totals::of(trace)?.counts;
+    let totals = Totals::of(trace)?;
+    let shared = totals.shared_tiles;
+    let totals = totals.counts;
     let mut text = heading(
         trace.container(),
         &trace.tables().meta,
@@ -99,6 +101,9 @@ fn texture_text(trace: &Textrace) -> Result<String> {
         totals.tile_bytes,
         totals.bytes_per_record,
     );
+    if let Some(shared) = shared {
+        text += &format!("{shared} tiles share the bytes of earlier ones\n");
+    }
     Ok(text)
 }
 

@@ -211,6 +211,9 @@ pub(super) struct Totals {
     pub counts: Counts,
     /// Tiles with records, by the name of their encoding.
     tiles_by_encoding: Map<String, Value>,
+    /// Tiles with records whose bytes are stored for an earlier tile; absent if there are none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shared_tiles: Option<u64>,
 }
 
 impl Totals {
@@ -232,6 +235,7 @@ impl Totals {
         Ok(Self {
             counts: Counts::of(trace, tiles(passes)),
             tiles_by_encoding,
+            shared_tiles: Some(trace.shared_tiles()).filter(|shared| *shared > 0),
         })
     }
 }
