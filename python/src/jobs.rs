@@ -105,6 +105,10 @@ impl TileSource for Stoppable {
         self.trace.read_tile(pass, index, tile)
     }
 
+    fn has_same_tiles(&self, a: u32, b: u32) -> bool {
+        TileSource::has_same_tiles(&self.trace, a, b)
+    }
+
     fn geometry(&self) -> Option<&Geometry> {
         self.trace.geometry()
     }

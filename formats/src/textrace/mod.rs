@@ -15,7 +15,6 @@ mod program;
 mod raw;
 mod reader;
 mod sampled;
-||||||| parent of 66a04468 (Formats: equal tiles and passes are stored once, in versions 4 and 5)
 mod sharing;
 pub mod tables;
 mod writer;
@@ -120,8 +119,8 @@ pub struct TraceMeta {
     /// Set for a plan, which has no passes: what is known of each frame, in the order of `frames`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub plan: Option<Vec<PlannedFrame>>,
-    /// Frames that only fill the caches for the frames after them, ascending. Frames of a sample are not
-    /// consecutive, so caches are empty where numbers leave a gap.
+    /// Frames that only fill the caches for the frames after them, ascending. What the
+    /// caches held is unknown where frame numbers leave a gap.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warm_frames: Vec<u32>,
 }

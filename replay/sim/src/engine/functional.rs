@@ -4,7 +4,7 @@ use super::counts::{CacheCounts, FootprintMisses};
 use super::machine::{AtOnce, FrameWork, Machine};
 use super::outcome::MachineOutcome;
 use crate::access::FrameClients;
-use crate::config::RunConfig;
+use crate::config::{BetweenFrames, RunConfig};
 use crate::memory::{Cache, Hierarchy, OtherWork};
 use crate::order::WorkItem;
 use crate::stream::{Consumer, QuadLines, StreamError, Tag, interleave};
@@ -96,6 +96,7 @@ impl<C: Cache> Machine for Functional<C> {
             phases,
             assign,
             clients,
+            ..
         } = frame;
         match clients {
             None => interleave(cores, phases, assign, self),
@@ -114,12 +115,14 @@ impl<C: Cache> Machine for Functional<C> {
         self.caches.follow_evictions();
     }
 
-    fn flush(&mut self) {
-        self.caches.clear();
-    }
-
-    fn lose(&mut self, other: OtherWork) {
-        self.caches.lose(other);
+    fn between_frames(&mut self, index: usize, config: &RunConfig) {
+        match config.between_frames {
+            BetweenFrames::Keep => (),
+            BetweenFrames::Flush => self.caches.clear(),
+            BetweenFrames::Lose(percent) => {
+                self.caches.lose(OtherWork::after(index, percent, config));
+            }
+        }
     }
 
     fn outcome(&self, _config: &RunConfig) -> MachineOutcome {

@@ -7,11 +7,12 @@ use super::functional::Functional;
 use super::machine::{AtOnce, Machine};
 use super::threads;
 use crate::access::FrameClients;
-use crate::config::{ConfigError, Mode, RunConfig, TmuConfig};
+use crate::config::{BetweenFrames, ConfigError, Mode, RunConfig, TmuConfig};
 use crate::memory::{Caches, Hierarchy, MissPath};
 use crate::stream::{Bins, Expander, TileSource};
 use formats::layout::Layout;
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
 /// Configurations per group at most. Their counters are large, and several groups use several cores. It
@@ -111,6 +112,7 @@ pub(super) fn groups(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Group<'_>
         group.sort_by_key(|&index| geometry(&configs[index]));
         members.extend(group.chunks(MOST_TOGETHER).map(<[usize]>::to_vec));
     }
+    let mut members = joined(configs, members);
     members.sort_by_key(|points| points.iter().copied().min());
     let group = |points| Group {
         points,
@@ -121,10 +123,50 @@ pub(super) fn groups(configs: &[RunConfig], stream: Vec<usize>) -> Vec<Group<'_>
     members.into_iter().map(group).collect()
 }
 
+/// Joins groups that differ only in what their caches keep between frames.
+fn joined(configs: &[RunConfig], groups: Vec<Vec<usize>>) -> Vec<Vec<usize>> {
+    let usual = RunConfig::default();
+    let mut joined: Vec<Vec<usize>> = Vec::new();
+    let mut known: HashMap<(String, Vec<LevelGeometry>), usize> = HashMap::new();
+    for group in groups {
+        let config = &configs[group[0]];
+        let of = |&index: &usize| geometry(&configs[index]);
+        let geometries: Option<Vec<LevelGeometry>> = group.iter().map(of).collect();
+        let Some(mut geometries) = geometries.filter(|_| shares_passes(config)) else {
+            joined.push(group);
+            continue;
+        };
+        geometries.dedup();
+        let key = RunConfig {
+            between_frames: usual.between_frames,
+            level: usual.level,
+            ..group_key(config)
+        };
+        let key = serde_json::to_string(&key).unwrap_or_default();
+        match known.entry((key, geometries)) {
+            Entry::Occupied(first) => joined[*first.get()].extend(group),
+            Entry::Vacant(first) => {
+                first.insert(joined.len());
+                joined.push(group);
+            }
+        }
+    }
+    joined
+}
+
 impl<'a> Group<'a> {
-    /// The settings that all configurations of the group share.
+    /// The settings that all configurations of the group share, except for those between frames.
     pub(super) fn config(&self) -> &RunConfig {
         &self.configs[self.points[0]]
+    }
+
+    /// True if a configuration loses part of its L2 between frames.
+    pub(super) fn loses_lines(&self) -> bool {
+        let mut of_points = self
+            .points
+            .iter()
+            .map(|&point| self.configs[point].between_frames);
+        of_points.any(|between| between.lost_percent().is_some())
     }
 
     fn geometries(&self) -> Option<Vec<LevelGeometry>> {
@@ -180,7 +222,14 @@ impl<'a> Group<'a> {
             && let Some(geometries) = self.geometries()
         {
             let maps = self.points.iter().any(|&p| self.configs[p].tile_maps);
-            let one_pass = OnePass::new(bins, config.cores, maps, &geometries);
+            let mut treatments: Vec<BetweenFrames> = Vec::new();
+            for point in &self.points {
+                let between = self.configs[*point].between_frames;
+                if !treatments.contains(&between) {
+                    treatments.push(between);
+                }
+            }
+            let one_pass = OnePass::new(bins, config.cores, maps, &geometries, &treatments);
             return Ok(Box::new(one_pass));
         }
         self.build_alone(bins, layout)

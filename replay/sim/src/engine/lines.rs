@@ -39,6 +39,7 @@ impl LineReplay {
             assign: usual.assign,
             tile_maps: false,
             frame: None,
+            between_frames: usual.between_frames,
             ..*config
         };
         let configs: Vec<RunConfig> = configs.iter().map(caches_alone).collect();

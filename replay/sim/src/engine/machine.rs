@@ -3,7 +3,6 @@
 use super::outcome::MachineOutcome;
 use crate::access::FrameClients;
 use crate::config::{Assign, RunConfig};
-use crate::memory::OtherWork;
 use crate::order::Phase;
 use crate::stream::{Cores, StreamError, Tag};
 
@@ -14,6 +13,8 @@ pub(super) struct FrameWork<'w, 'c, 'f> {
     pub(super) assign: Assign,
     /// The other clients of memory, if simulated.
     pub(super) clients: Option<&'w mut FrameClients<'f>>,
+    /// Identifies the frame's work among frames that have an equal one in the trace.
+    pub(super) identity: Option<u128>,
 }
 
 /// A machine that processes the cores' work: caches, with or without clocks, for one or more configurations.
@@ -24,11 +25,16 @@ pub(super) trait Machine: Send {
     /// Performs the accesses of other clients before the first item of a frame or after the last one.
     fn client_accesses(&mut self, _clients: &mut FrameClients<'_>) {}
 
-    /// Empties the caches between frames.
-    fn flush(&mut self);
+    /// Applies what happens to the caches after the frame with this index.
+    fn between_frames(&mut self, index: usize, config: &RunConfig);
 
-    /// Between frames, other work empties the L1 caches and fills part of each other cache.
-    fn lose(&mut self, other: OtherWork);
+    /// True if it knows the counts of this work with its present contents.
+    fn knows(&self, _identity: u128) -> bool {
+        false
+    }
+
+    /// Repeats known work without its lines.
+    fn repeat(&mut self, _identity: u128) {}
 
     /// The counts for one of its configurations.
     fn outcome(&self, config: &RunConfig) -> MachineOutcome;

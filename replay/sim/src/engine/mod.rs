@@ -9,6 +9,7 @@ mod group;
 mod lines;
 mod machine;
 mod outcome;
+mod repeats;
 mod scheduler;
 mod summary;
 #[cfg(test)]

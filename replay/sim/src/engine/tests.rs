@@ -6,6 +6,7 @@ mod one_pass;
 mod plain_first_miss;
 mod plain_timed;
 mod prefetch_fifo;
+mod repeats;
 mod timeline;
 
 use super::counts::CacheCounts;
@@ -206,6 +207,7 @@ fn alone(trace: &MemoryTrace, config: &RunConfig, machine: &mut dyn Machine) -> 
     let mut cores = Cores::new(&frame, config.cores as usize);
     machine
         .run(FrameWork {
+            identity: None,
             cores: &mut cores,
             phases: &phases,
             assign: config.dispatch(),

@@ -3,15 +3,16 @@
 use super::error::{ReplayError, check_other_work};
 use super::group::Group;
 use super::machine::{FrameWork, Machine};
+use super::repeats::Repeats;
 use super::scheduler::Stage;
 use super::summary::summary;
-use crate::config::{BetweenFrames, Order, RunConfig, TmuModel};
-use crate::memory::OtherWork;
+use crate::config::{Order, RunConfig, TmuModel};
 use crate::order::parts::Eyes;
 use crate::order::{Interleave, Phase};
 use crate::result::RunResult;
 use crate::stream::{
-    Cores, Expander, Frame, FramePlan, LineMemory, TileSource, TraceCounts, Walk, rendered,
+    Cores, Expander, Frame, FramePlan, LineMemory, StreamError, TileSource, TraceCounts, Walk,
+    rendered,
 };
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -46,8 +47,7 @@ impl<'a> Wave<'a> {
     pub(super) fn run(&self, mut groups: Vec<Group<'a>>) -> Result<(), ReplayError> {
         let rendered = rendered(self.job.trace, groups[0].config())?;
         let expander = expander_for(Expander::new(&rendered, groups[0].config())?, &groups);
-        let lost = |group: &Group<'_>| group.config().between_frames.lost_percent();
-        if groups.iter().filter_map(lost).next().is_some() {
+        if groups.iter().any(Group::loses_lines) {
             check_other_work(expander.lines())?;
         }
         let orders = Orders::of(&groups);
@@ -58,26 +58,62 @@ impl<'a> Wave<'a> {
             orders.0.iter().map(|config| config.order),
         );
         let frames = walk.frames();
+        let repeats = Repeats::of(self.job.trace, &frames);
         let mut ahead = None;
         for (index, &number) in frames.iter().enumerate() {
+            let is_last = index + 1 == frames.len();
+            if repeats.is_repeat(index)
+                && let Some(plan) = walk.plan_uncounted(number)
+            {
+                let plans = orders.plans(&plan);
+                let identity = |group: &Group<'_>| {
+                    let phases = orders.plan(&plans, group.config());
+                    repeats.identity(index, phases)
+                };
+                let known = |group: &Group<'_>| {
+                    let work = group.machine.as_ref().zip(identity(group));
+                    work.is_some_and(|(machine, identity)| machine.knows(identity))
+                };
+                let first = frames[repeats.first(index)];
+                if groups.iter().all(known) && walk.repeat(number, first) {
+                    (self.report_stage)(Stage::Loaded);
+                    if is_last {
+                        (self.report_stage)(Stage::LastReplayStarted);
+                    }
+                    groups.par_iter_mut().try_for_each(|group| {
+                        let mut machine = self.machine(group, &expander)?;
+                        identity(group)
+                            .into_iter()
+                            .for_each(|of| machine.repeat(of));
+                        self.report_frame(group, number, &*machine, &rendered, &expander, walk.counts());
+                        if is_last {
+                            self.finish(group, &*machine, &rendered, &expander, walk.counts());
+                        } else {
+                            keep(group, machine, index);
+                        }
+                        Ok::<(), ReplayError>(())
+                    })?;
+                    if is_last {
+                        return Ok(());
+                    }
+                    continue;
+                }
+            }
             let frame = match ahead.take() {
                 Some(frame) => frame,
-                None => walk.expand(number)?,
+                None => expand(&mut walk, number, repeats.recurs(index))?,
             };
             (self.report_stage)(Stage::Loaded);
             let plans = orders.plans(&walk.plan(&frame)?);
             // The next frame is expanded while this one is replayed.
             let so_far = self.job.after_frame.map(|_| walk.counts().clone());
-            // What the caches held before a frame that is not in the trace is unknown.
-            let has_gap = index > 0 && frames[index - 1] + 1 != number;
             let waiting = AtomicUsize::new(groups.len());
-            let is_last = index + 1 == frames.len();
             let replay = |group: &mut Group<'a>, frame: &Frame<'_>| {
                 if waiting.fetch_sub(1, Ordering::Relaxed) == 1 && is_last {
                     (self.report_stage)(Stage::LastReplayStarted);
                 }
                 let config = *group.config();
-                let mut machine = self.machine(group, &expander, index, has_gap)?;
+                let mut machine = self.machine(group, &expander)?;
                 let mut cores = Cores::new(frame, config.cores as usize);
                 if let Some(clients) = &mut group.clients {
                     clients.start_frame(number)?;
@@ -89,17 +125,14 @@ impl<'a> Wave<'a> {
                     phases,
                     assign: config.dispatch(),
                     clients: group.clients.as_mut(),
+                    identity: repeats.identity(index, phases),
                 })?;
                 if let Some(clients) = &mut group.clients {
                     clients.end_frame();
                     machine.client_accesses(clients);
                 }
-                if let (Some(after), Some(counts)) = (self.job.after_frame, &so_far) {
-                    for &index in &group.points {
-                        let result =
-                            self.result(group, index, &*machine, &rendered, &expander, counts);
-                        after(index, number, result);
-                    }
+                if let Some(counts) = &so_far {
+                    self.report_frame(group, number, &*machine, &rendered, &expander, counts);
                 }
                 Ok::<_, ReplayError>(machine)
             };
@@ -110,25 +143,28 @@ impl<'a> Wave<'a> {
             drop(frame);
             // Started in order as threads become free, because the first groups take longest.
             let all = all.into_iter().par_bridge();
-            let Some(&next) = frames.get(index + 1) else {
+            if is_last {
                 return all.try_for_each(|(group, frame)| {
                     let machine = replay(group, &frame)?;
                     drop(frame);
                     self.finish(group, &*machine, &rendered, &expander, walk.counts());
                     Ok(())
                 });
-            };
-            let keep = || {
+            }
+            let replay_and_keep = || {
                 all.try_for_each(|(group, frame)| {
-                    group.machine = Some(replay(group, &frame)?);
+                    let machine = replay(group, &frame)?;
+                    keep(group, machine, index);
                     Ok::<(), ReplayError>(())
                 })
             };
-            let expand = || {
-                let room = self.memory.half_is_left();
-                room.then(|| walk.expand(next))
+            let expand_next = || {
+                // A repeated frame may need no lines.
+                let expands = self.memory.half_is_left() && !repeats.is_repeat(index + 1);
+                let recurs = repeats.recurs(index + 1);
+                expands.then(|| expand(&mut walk, frames[index + 1], recurs))
             };
-            let (kept, expanded) = rayon::join(keep, expand);
+            let (kept, expanded) = rayon::join(replay_and_keep, expand_next);
             kept?;
             ahead = expanded.transpose()?;
         }
@@ -145,28 +181,17 @@ impl<'a> Wave<'a> {
         Ok(())
     }
 
-    /// The machine of a group at the start of a frame: a new one, or the last frame's with what remains in its caches.
+    /// The machine of a group at the start of a frame: the last frame's, or a new one.
     fn machine(
         &self,
         group: &mut Group<'a>,
         expander: &Expander,
-        index: usize,
-        has_gap: bool,
     ) -> Result<Box<dyn Machine>, ReplayError> {
-        let Some(mut machine) = group.machine.take() else {
-            group.build_clients(self.job.trace, expander)?;
-            return group.build(expander);
-        };
-        let config = group.config();
-        match config.between_frames {
-            BetweenFrames::Keep if has_gap => machine.flush(),
-            BetweenFrames::Keep => {}
-            BetweenFrames::Flush => machine.flush(),
-            BetweenFrames::Lose(percent) => {
-                machine.lose(OtherWork::after(index, percent, config));
-            }
+        if let Some(machine) = group.machine.take() {
+            return Ok(machine);
         }
-        Ok(machine)
+        group.build_clients(self.job.trace, expander)?;
+        group.build(expander)
     }
 
     fn finish(
@@ -180,6 +205,25 @@ impl<'a> Wave<'a> {
         for &index in &group.points {
             let result = self.result(group, index, machine, rendered, expander, counts);
             (self.job.finished)(index, result);
+        }
+    }
+
+    /// Passes the results of the frames so far on, if anyone asked for them.
+    fn report_frame(
+        &self,
+        group: &Group<'_>,
+        number: u32,
+        machine: &dyn Machine,
+        rendered: &dyn TileSource,
+        expander: &Expander<'_>,
+        counts: &TraceCounts,
+    ) {
+        let Some(after) = self.job.after_frame else {
+            return;
+        };
+        for &index in &group.points {
+            let result = self.result(group, index, machine, rendered, expander, counts);
+            after(index, number, result);
         }
     }
 
@@ -214,6 +258,20 @@ impl<'a> Wave<'a> {
         }
         result
     }
+}
+
+/// Expands a frame, which may be repeated if it recurs.
+fn expand<'e>(walk: &mut Walk<'e>, number: u32, recurs: bool) -> Result<Frame<'e>, StreamError> {
+    match recurs {
+        true => walk.expand_to_repeat(number),
+        false => walk.expand(number),
+    }
+}
+
+/// Keeps a group's machine after the frame with this index, as the next frame starts with it.
+fn keep(group: &mut Group<'_>, mut machine: Box<dyn Machine>, index: usize) {
+    machine.between_frames(index + 1, group.config());
+    group.machine = Some(machine);
 }
 
 /// Configures the expander to list what the groups read.

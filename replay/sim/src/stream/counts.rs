@@ -237,4 +237,38 @@ impl TraceCounts {
             crate::add_fields!(cell, other, footprints, line_lookups);
         }
     }
+
+    /// The sums over all tiles.
+    pub(super) fn sums(&self) -> Self {
+        Self {
+            cells: self.cells.clone(),
+            tiles: Vec::new(),
+            ..*self
+        }
+    }
+
+    /// What was counted since the sums were `before`.
+    pub(super) fn since(&self, before: &Self) -> Self {
+        let cells = self.cells.iter().zip(&before.cells);
+        let counted = |(now, before): (&CellAccesses, &CellAccesses)| CellAccesses {
+            footprints: now.footprints - before.footprints,
+            line_lookups: now.line_lookups - before.line_lookups,
+        };
+        Self {
+            quads: self.quads - before.quads,
+            lanes: self.lanes - before.lanes,
+            hash: self.hash.wrapping_sub(before.hash),
+            unique_lines: 0,
+            cells: cells.map(counted).collect(),
+            tiles: Vec::new(),
+        }
+    }
+
+    /// Copies the counts of a pass's tiles from another pass with as many.
+    pub(super) fn repeat_tiles(&mut self, bins: &Bins, to: u32, from: u32) {
+        let first = |pass: u32| bins.first_tiles[pass as usize];
+        let end = |pass: u32| bins.first_tiles.get(pass as usize + 1).copied();
+        let tiles = first(from)..end(from).unwrap_or(bins.tiles);
+        self.tiles.copy_within(tiles, first(to));
+    }
 }

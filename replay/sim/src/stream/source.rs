@@ -24,6 +24,11 @@ pub trait TileSource: Sync {
     /// The tile does not exist or is damaged.
     fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError>;
 
+    /// Whether two passes have the same tiles. False if that is unknown.
+    fn has_same_tiles(&self, _a: u32, _b: u32) -> bool {
+        false
+    }
+
     /// Meshes and views of a trace with geometry.
     fn geometry(&self) -> Option<&Geometry> {
         None
@@ -73,6 +78,11 @@ impl TileSource for MemoryTrace {
         tile.records.clone_from(&stored.records);
         Ok(())
     }
+
+    fn has_same_tiles(&self, a: u32, b: u32) -> bool {
+        let [a, b] = [a, b].map(|pass| self.tiles.get(pass as usize));
+        a.is_some() && a == b
+    }
 }
 
 impl TileSource for Textrace {
@@ -86,6 +96,10 @@ impl TileSource for Textrace {
 
     fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
         Ok(self.decode_tile(pass as usize, index as usize, tile)?)
+    }
+
+    fn has_same_tiles(&self, a: u32, b: u32) -> bool {
+        self.has_same_tiles(a as usize, b as usize)
     }
 
     fn geometry(&self) -> Option<&Geometry> {

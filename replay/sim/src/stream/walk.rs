@@ -6,6 +6,7 @@ use super::{Expander, Frame, LineMemory, StreamError, TileSource, TraceCounts};
 use crate::config::{Order, RunConfig};
 use crate::order::{Counters, Phase, PlanInputs, frames, plan_frame};
 use formats::textrace::Tables;
+use std::collections::HashMap;
 use std::sync::Arc;
 
 /// A walk over the frames of a trace, in one or several orders.
@@ -17,6 +18,8 @@ pub struct Walk<'e> {
     /// The frame planned last, and its counters.
     last: Option<(u32, Arc<Counters>)>,
     counts: TraceCounts,
+    /// What frames counted that are repeated.
+    of_frames: HashMap<u32, TraceCounts>,
 }
 
 impl<'e> Walk<'e> {
@@ -35,6 +38,7 @@ impl<'e> Walk<'e> {
             needs_counters: orders.into_iter().any(|of| of.parts().needs_counters()),
             last: None,
             counts: TraceCounts::new(expander.bins()),
+            of_frames: HashMap::new(),
         }
     }
 
@@ -59,6 +63,46 @@ impl<'e> Walk<'e> {
     /// An unreadable tile.
     pub fn expand(&mut self, number: u32) -> Result<Frame<'e>, StreamError> {
         (self.expander).frame(number, self.memory, &mut self.counts)
+    }
+
+    /// Expands a frame that [`Self::repeat`] may repeat.
+    ///
+    /// # Errors
+    /// As [`Self::expand`].
+    pub fn expand_to_repeat(&mut self, number: u32) -> Result<Frame<'e>, StreamError> {
+        let before = self.counts.sums();
+        let frame = self.expand(number)?;
+        let of_frame = self.counts.since(&before);
+        self.of_frames.entry(number).or_insert(of_frame);
+        Ok(frame)
+    }
+
+    /// Counts a frame that equals an earlier one, without expanding it. False if that one is unknown.
+    pub fn repeat(&mut self, number: u32, earlier: u32) -> bool {
+        let Some(counts) = self.of_frames.get(&earlier) else {
+            return false;
+        };
+        self.counts.add(counts);
+        let passes = &self.tables().passes;
+        let of_frame = |number| {
+            let all = (0..)
+                .zip(passes)
+                .filter(move |(_, pass)| pass.frame == number);
+            all.map(|(pass, _)| pass)
+        };
+        for (to, from) in of_frame(number).zip(of_frame(earlier)) {
+            self.counts.repeat_tiles(self.expander.bins(), to, from);
+        }
+        true
+    }
+
+    /// Plans a frame that need not be expanded. None if an order needs counters.
+    pub fn plan_uncounted(&self, number: u32) -> Option<FramePlan<'e>> {
+        (!self.needs_counters).then(|| FramePlan {
+            tables: self.tables(),
+            number,
+            last: None,
+        })
     }
 
     /// Plans an expanded frame. Orders that need counters get those of the frame before; the first frame of

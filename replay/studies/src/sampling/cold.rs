@@ -4,6 +4,8 @@
 //! may have been a hit (Wood, Hill and Kessler, SIGMETRICS 1991). So the misses of a frame lie between those of sets that
 //! were full and all misses of a replay from empty caches.
 
+use super::run::Run;
+use rayon::prelude::*;
 use sim::config::{Mode, RunConfig};
 use sim::engine::ReplayError;
 use sim::memory::{Cache, Found, Hierarchy};
@@ -63,7 +65,13 @@ pub fn cold_misses(
     config: &RunConfig,
 ) -> Result<BTreeMap<u32, u64>, ReplayError> {
     config.validate()?;
-    let rendered = rendered(trace, config)?;
+    let runs = Run::all(trace);
+    let of_runs: Vec<_> = (runs.par_iter().map(|run| of_run(run, config))).collect::<Result<_, _>>()?;
+    Ok(of_runs.into_iter().flatten().collect())
+}
+
+fn of_run(run: &Run<'_>, config: &RunConfig) -> Result<Vec<(u32, u64)>, ReplayError> {
+    let rendered = rendered(run, config)?;
     let expander = Expander::new(&rendered, config)?;
     let sets = config.level.l2.sets("L2", config.line_bytes)? as usize;
     let mut cold = Cold {
@@ -74,20 +82,18 @@ pub fn cold_misses(
     };
     let memory = LineMemory::new(LineMemory::USUAL_BYTES);
     let mut walk = Walk::new(&expander, &memory, config, [config.order]);
-    let mut before: Option<u32> = None;
-    let mut out = BTreeMap::new();
+    let mut out = Vec::new();
     for number in walk.frames() {
-        if before.is_none_or(|before| before + 1 != number) || config.between_frames.empties()? {
+        if config.between_frames.empties()? {
             cold.caches.clear();
             cold.filled.fill(0);
         }
-        before = Some(number);
         cold.misses = 0;
         let frame = walk.expand(number)?;
         let phases = walk.plan(&frame)?.phases(config);
         let mut cores = Cores::new(&frame, config.cores as usize);
         interleave(&mut cores, &phases, config.dispatch(), &mut cold)?;
-        out.insert(number, cold.misses);
+        out.push((number, cold.misses));
     }
     Ok(out)
 }

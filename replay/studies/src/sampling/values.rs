@@ -1,9 +1,11 @@
 //! Counts by frame.
 
+use super::run::Run;
 use sim::config::RunConfig;
 use sim::engine::{Job, ReplayError, replay_jobs};
 use sim::result::RunResult;
 use sim::stream::{LineMemory, TileSource};
+
 use std::collections::BTreeMap;
 use std::sync::{Mutex, PoisonError};
 
@@ -51,34 +53,48 @@ impl FrameCounts {
 /// Counts of each frame, by its number.
 pub type Series = BTreeMap<u32, FrameCounts>;
 
-/// Replays a trace with each configuration and counts by frame, in the order of `configs`.
+/// Replays a trace with each configuration and counts by frame, in the order of `configs`. Caches are empty where frame
+/// numbers leave a gap, because what they held is unknown.
 ///
 /// # Errors
 /// An impossible configuration, or an unreadable trace.
 pub fn by_frame(trace: &dyn TileSource, configs: &[RunConfig]) -> Result<Vec<Series>, ReplayError> {
+    let runs = Run::all(trace);
+    let sums = Mutex::new(vec![vec![Series::new(); configs.len()]; runs.len()]);
+    let receive = |run: usize| {
+        let sums = &sums;
+        move |index: usize, frame, result: RunResult| {
+            let mut sums = sums.lock().unwrap_or_else(PoisonError::into_inner);
+            sums[run][index].insert(frame, FrameCounts::so_far(&result));
+        }
+    };
+    let receivers: Vec<_> = (0..runs.len()).map(receive).collect();
+    let job = |(run, after): (_, &'_ _)| -> Job<'_> {
+        Job {
+            trace: run,
+            configs,
+            finished: &|_, _| (),
+            after_frame: Some(after),
+        }
+    };
+    let mut jobs = Vec::new();
+    for (run, receiver) in runs.iter().zip(&receivers) {
+        jobs.push(job((run, receiver)));
+    }
     let memory = LineMemory::new(LineMemory::USUAL_BYTES);
-    let sums = Mutex::new(vec![Series::new(); configs.len()]);
-    let after = |index: usize, frame, result: RunResult| {
-        let mut sums = sums.lock().unwrap_or_else(PoisonError::into_inner);
-        sums[index].insert(frame, FrameCounts::so_far(&result));
-    };
-    let job = Job {
-        trace,
-        configs,
-        finished: &|_, _| (),
-        after_frame: Some(&after),
-    };
-    for answer in replay_jobs(&[job], &memory) {
+    for answer in replay_jobs(&jobs, &memory) {
         answer.map_err(|(_, error)| error)?;
     }
-    let mut sums = sums.into_inner().unwrap_or_else(PoisonError::into_inner);
-    for series in &mut sums {
-        let mut before = FrameCounts::default();
-        for counts in series.values_mut() {
-            let so_far = *counts;
-            *counts = so_far.since(&before);
-            before = so_far;
+    drop(jobs);
+    let mut found = vec![Series::new(); configs.len()];
+    for of_run in sums.into_inner().unwrap_or_else(PoisonError::into_inner) {
+        for (series, so_far) in found.iter_mut().zip(of_run) {
+            let mut before = FrameCounts::default();
+            for (frame, counts) in so_far {
+                series.insert(frame, counts.since(&before));
+                before = counts;
+            }
         }
     }
-    Ok(sums)
+    Ok(found)
 }

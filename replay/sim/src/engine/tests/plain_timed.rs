@@ -4,7 +4,7 @@
 use super::*;
 use crate::config::{Allocation, Replacement, TmuConfig};
 use crate::engine::counts::FootprintMisses;
-use crate::memory::{AnyCache, Cache, Caches, OtherWork};
+use crate::memory::{AnyCache, Cache, Caches};
 use crate::result::{MemoryResult, MshrResult, TmuResult};
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, VecDeque};
@@ -290,11 +290,12 @@ impl Machine for PlainTimed {
         Ok(())
     }
 
-    fn lose(&mut self, _other: OtherWork) {
-        unreachable!("not drawn");
-    }
-
-    fn flush(&mut self) {
+    fn between_frames(&mut self, _index: usize, config: &RunConfig) {
+        match config.between_frames {
+            BetweenFrames::Keep => return,
+            BetweenFrames::Flush => (),
+            BetweenFrames::Lose(_) => unreachable!("not drawn"),
+        }
         self.mshrs.iter_mut().for_each(|mshrs| mshrs.fill(0));
         for level in self.l1.iter_mut().chain(&mut self.l2) {
             level.cache.clear();

@@ -13,7 +13,7 @@ use super::counts::CacheCounts;
 use super::machine::{FrameWork, Machine};
 use super::outcome::MachineOutcome;
 use crate::access::FrameClients;
-use crate::config::{Allocation, ConfigError, RunConfig, TmuModel};
+use crate::config::{Allocation, BetweenFrames, ConfigError, RunConfig, TmuModel};
 use crate::memory::{Caches, Delay, DelayedFill, MissPath, OtherWork, SecondLevel};
 use crate::order::WorkItem;
 use crate::stream::{Cores, StreamError, furthest_behind};
@@ -100,6 +100,7 @@ impl<M: ThreadModel, D: DelayedFill> Machine for Clocked<M, D> {
             phases,
             assign,
             mut clients,
+            ..
         } = frame;
         for phase in phases {
             self.model.start_phase(self.cycles);
@@ -128,16 +129,21 @@ impl<M: ThreadModel, D: DelayedFill> Machine for Clocked<M, D> {
         l2.catch_up(self.cycles);
     }
 
-    /// Empties all caches and drops the lines in flight.
-    fn flush(&mut self) {
-        self.shared.l1.iter_mut().for_each(D::clear);
-        self.shared.l2.clear();
-    }
-
-    fn lose(&mut self, other: OtherWork) {
-        self.shared.l1.iter_mut().for_each(D::clear);
-        self.shared.l2.lose(other, self.cycles);
-        self.shared.follow_evictions(self.cycles);
+    /// Caches that are emptied drop their lines in flight.
+    fn between_frames(&mut self, index: usize, config: &RunConfig) {
+        let Shared { l1, l2, .. } = &mut self.shared;
+        match config.between_frames {
+            BetweenFrames::Keep => (),
+            BetweenFrames::Flush => {
+                l1.iter_mut().for_each(D::clear);
+                l2.clear();
+            }
+            BetweenFrames::Lose(percent) => {
+                l1.iter_mut().for_each(D::clear);
+                l2.lose(OtherWork::after(index, percent, config), self.cycles);
+                self.shared.follow_evictions(self.cycles);
+            }
+        }
     }
 
     fn outcome(&self, _config: &RunConfig) -> MachineOutcome {

@@ -11,7 +11,7 @@ use crate::memory::policy::to_front;
 use std::hint::select_unpredictable;
 
 /// The stacks for one number of sets.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Stacks {
     /// Lines by set, most recently used first.
     lines: Vec<u32>,
@@ -55,7 +55,7 @@ fn to_front_of<const N: usize>(stack: &mut [u32; N], line: u32) -> u8 {
 }
 
 /// LRU caches with several numbers of sets and ways, accessed by the same lines.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Forest {
     /// By number of sets, ascending.
     trees: Vec<Stacks>,
@@ -74,6 +74,11 @@ impl Forest {
         Self {
             trees: trees.iter().map(stacks).collect(),
         }
+    }
+
+    /// Number of lines of all caches.
+    pub fn lines(&self) -> usize {
+        self.trees.iter().map(|tree| tree.lines.len()).sum()
     }
 
     /// Empties all caches.

@@ -21,6 +21,17 @@ pub(super) struct Under {
     pub(super) rank: usize,
     pub(super) level: LevelTallies,
     pub(super) forest: Forest,
+    /// Another treatment's counts when this L2 started to follow that one's.
+    pub(super) followed_since: Option<LevelTallies>,
+}
+
+impl Under {
+    /// Follows the L2 caches of another treatment, which get the same accesses from now on, if the contents are the same.
+    pub(super) fn follow(&mut self, first: &Self) {
+        if self.followed_since.is_none() && self.forest == first.forest {
+            self.followed_since = Some(first.level.clone());
+        }
+    }
 }
 
 /// Accesses to the L1 caches of all cores, in order.
@@ -30,7 +41,9 @@ pub(super) struct PendingLines {
     depths: Vec<u8>,
     /// Number of L1 set counts.
     trees: usize,
-    /// Misses of one L1, with their depths for one number of L2 sets.
+    /// Misses of one L1.
+    selected: Vec<FootprintLine>,
+    /// Those that are not on top of the sets of some L2, with their depths for one number of L2 sets.
     missed: Vec<FootprintLine>,
     l2_depths: Vec<u8>,
 }
@@ -41,6 +54,7 @@ impl PendingLines {
             accesses: Vec::with_capacity(MOST + LINES),
             depths: vec![0; (MOST + LINES) * trees],
             trees,
+            selected: Vec::new(),
             missed: Vec::new(),
             l2_depths: Vec::new(),
         }
@@ -71,28 +85,39 @@ impl PendingLines {
         self.accesses.len() >= MOST
     }
 
-    /// Counts all accesses and simulates the L2 caches.
-    pub(super) fn drain(&mut self, l1: &mut LevelTallies, under: &mut [Under]) {
+    /// Counts all accesses in the L1 caches.
+    pub(super) fn count(&self, l1: &mut LevelTallies) {
         for (tree, tally) in l1.tallies.iter_mut().enumerate() {
             let depths = of_tree(&self.depths, self.trees, tree);
             tally.count(&self.accesses, depths);
         }
-        for under in under {
-            let depths = of_tree(&self.depths, self.trees, under.tree);
-            self.missed.clone_from(&self.accesses);
-            retain(&mut self.missed, depths, under.ways);
-            let last = under.level.tallies.len() - 1;
-            for (tree, tally) in under.level.tallies.iter_mut().enumerate() {
-                let lines = self.missed.iter().map(|access| access.line);
-                under.forest.access_tree(tree, lines, &mut self.l2_depths);
-                let depths = self.l2_depths.iter().copied();
-                tally.count(&self.missed, depths.clone());
-                if tree < last {
-                    // A line on top with fewer sets is on top with more sets.
-                    retain(&mut self.missed, depths, 1);
-                }
+    }
+
+    /// Selects the misses of one L1.
+    pub(super) fn select(&mut self, tree: usize, ways: u8) {
+        let depths = of_tree(&self.depths, self.trees, tree);
+        self.selected.clone_from(&self.accesses);
+        retain(&mut self.selected, depths, ways);
+    }
+
+    /// Simulates the L2 caches under that L1.
+    pub(super) fn send(&mut self, under: &mut Under) {
+        self.missed.clone_from(&self.selected);
+        let last = under.level.tallies.len() - 1;
+        for (tree, tally) in under.level.tallies.iter_mut().enumerate() {
+            let lines = self.missed.iter().map(|access| access.line);
+            under.forest.access_tree(tree, lines, &mut self.l2_depths);
+            let depths = self.l2_depths.iter().copied();
+            tally.count(&self.missed, depths.clone());
+            if tree < last {
+                // A line on top with fewer sets is on top with more sets.
+                retain(&mut self.missed, depths, 1);
             }
         }
+    }
+
+    /// Forgets all accesses.
+    pub(super) fn clear(&mut self) {
         self.accesses.clear();
     }
 }

@@ -37,6 +37,7 @@ pub(super) enum ByTile {
 
 /// Counts by bin (a cell or a tile) and by the number of associativities that miss, from one on. Index zero
 /// would belong to hits; it overlaps the previous bin, and nothing is added there.
+#[derive(Clone)]
 struct Classes<T> {
     /// Starts one before the first bin.
     counts: Vec<T>,
@@ -51,6 +52,14 @@ impl<T: Copy + Default> Classes<T> {
         }
     }
 
+    /// Adds what `of` counted since it was `since`.
+    fn add_since(&mut self, of: &Self, since: &Self, add: impl Fn(T, T, T) -> T) {
+        let counts = of.counts.iter().zip(&since.counts);
+        for (total, (now, then)) in self.counts.iter_mut().zip(counts) {
+            *total = add(*total, *now, *then);
+        }
+    }
+
     /// Counts of the associativity with this rank, by bin.
     fn of(&self, rank: usize, sum: impl Fn(&[T]) -> T) -> impl Iterator<Item = T> {
         let bins = self.counts[1..].chunks(self.classes);
@@ -59,6 +68,7 @@ impl<T: Copy + Default> Classes<T> {
 }
 
 /// Misses of all caches with one number of sets.
+#[derive(Clone)]
 pub(super) struct Tally {
     pub(super) sets: u32,
     /// Associativities, ascending.
@@ -174,6 +184,7 @@ impl Tally {
 }
 
 /// All caches of a level that receive the same lines.
+#[derive(Clone)]
 pub(super) struct LevelTallies {
     /// By number of sets, ascending.
     pub(super) tallies: Vec<Tally>,
@@ -206,6 +217,26 @@ impl LevelTallies {
         Self {
             tallies: sorted.chunk_by(|a, b| a.0 == b.0).map(tally).collect(),
         }
+    }
+
+    /// Adds what the same caches of another treatment counted since their counts were `since`.
+    pub(super) fn add_since(&mut self, of: &Self, since: &Self) {
+        let counted = of.tallies.iter().zip(&since.tallies);
+        for (tally, (of, since)) in self.tallies.iter_mut().zip(counted) {
+            let add = |total: u64, now: u64, then| total + (now - then);
+            tally.lines.add_since(&of.lines, &since.lines, add);
+            tally
+                .footprints
+                .add_since(&of.footprints, &since.footprints, add);
+            let add = |total: u32, now: u32, then| total.wrapping_add(now.wrapping_sub(then));
+            tally.tiles.add_since(&of.tiles, &since.tiles, add);
+        }
+    }
+
+    /// Number of counters.
+    pub(super) fn counters(&self) -> usize {
+        let of = |tally: &Tally| tally.lines.counts.len() + tally.footprints.counts.len();
+        self.tallies.iter().map(of).sum()
     }
 
     pub(super) fn forest(&self) -> Forest {
