@@ -85,7 +85,14 @@ impl<'a> Wave<'a> {
                         identity(group)
                             .into_iter()
                             .for_each(|of| machine.repeat(of));
-                        self.report_frame(group, number, &*machine, &rendered, &expander, walk.counts());
+                        self.report_frame(
+                            group,
+                            number,
+                            &*machine,
+                            &rendered,
+                            &expander,
+                            walk.counts(),
+                        );
                         if is_last {
                             self.finish(group, &*machine, &rendered, &expander, walk.counts());
                         } else {

@@ -66,7 +66,8 @@ pub fn cold_misses(
 ) -> Result<BTreeMap<u32, u64>, ReplayError> {
     config.validate()?;
     let runs = Run::all(trace);
-    let of_runs: Vec<_> = (runs.par_iter().map(|run| of_run(run, config))).collect::<Result<_, _>>()?;
+    let of_runs: Vec<_> =
+        (runs.par_iter().map(|run| of_run(run, config))).collect::<Result<_, _>>()?;
     Ok(of_runs.into_iter().flatten().collect())
 }
 

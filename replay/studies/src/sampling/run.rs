@@ -1,11 +1,10 @@
 //! Consecutive frames of a trace, as a trace of their own.
 
-use formats::textrace::geometry::{Geometry, TileLists};
 use formats::textrace::{Tables, Tile};
 use sim::order::frames;
 use sim::stream::{StreamError, TileSource};
 
-/// A run of consecutive frames.
+/// A run of consecutive frames, without geometry.
 pub struct Run<'t> {
     trace: &'t dyn TileSource,
     tables: Tables,
@@ -28,7 +27,11 @@ impl<'t> Run<'t> {
             .filter(|(_, pass)| numbers.binary_search(&pass.frame).is_ok())
             .unzip();
         tables.passes = kept;
-        Self { trace, tables, passes }
+        Self {
+            trace,
+            tables,
+            passes,
+        }
     }
 
     fn pass(&self, pass: u32, tile: u32) -> Result<u32, StreamError> {
@@ -57,13 +60,5 @@ impl TileSource for Run<'_> {
 
     fn read_tile(&self, pass: u32, index: u32, tile: &mut Tile) -> Result<(), StreamError> {
         self.trace.read_tile(self.pass(pass, index)?, index, tile)
-    }
-
-    fn geometry(&self) -> Option<&Geometry> {
-        self.trace.geometry()
-    }
-
-    fn tile_lists(&self, view: usize) -> Result<TileLists, StreamError> {
-        self.trace.tile_lists(view)
     }
 }
