@@ -69,17 +69,14 @@ pub fn by_frame(trace: &dyn TileSource, configs: &[RunConfig]) -> Result<Vec<Ser
         }
     };
     let receivers: Vec<_> = (0..runs.len()).map(receive).collect();
-    let job = |(run, after): (_, &'_ _)| -> Job<'_> {
-        Job {
+    let mut jobs = Vec::new();
+    for (run, receiver) in runs.iter().zip(&receivers) {
+        jobs.push(Job {
             trace: run,
             configs,
             finished: &|_, _| (),
-            after_frame: Some(after),
-        }
-    };
-    let mut jobs = Vec::new();
-    for (run, receiver) in runs.iter().zip(&receivers) {
-        jobs.push(job((run, receiver)));
+            after_frame: Some(receiver),
+        });
     }
     let memory = LineMemory::new(LineMemory::USUAL_BYTES);
     for answer in replay_jobs(&jobs, &memory) {
