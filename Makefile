@@ -17,7 +17,7 @@ demo: deps programs
 
 # An archive and a Python wheel, which run without Rust, in $(OUT)/dist (docs/use/install.md).
 dist:
-	$(CARGO) build --release --locked -p tracegen -p replay -p layer -p parallax-python
+	$(CARGO) build --release --locked -p tracegen -p replay -p layer -p xr -p parallax-python
 	@python3 -B scripts/dist.py "$${CARGO_TARGET_DIR:-target}/release" "$(OUT)/dist" archive wheel
 
 install: build
@@ -69,7 +69,7 @@ programs:
 	$(CARGO) build --release --locked --no-default-features -p tracegen -p replay
 
 build:
-	$(CARGO) build --release --locked -p tracegen -p replay -p layer
+	$(CARGO) build --release --locked -p tracegen -p replay -p layer -p xr
 
 # lavapipe is the only thing that the programs need from outside Cargo.
 deps:

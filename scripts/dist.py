@@ -28,7 +28,7 @@ except ImportError:  # before Python 3.11
 ROOT = Path(__file__).resolve().parents[1]
 CARGO = os.environ.get("CARGO", "cargo")
 PROGRAMS = ["replay", "tracegen"]
-LAYER = "lib/parallax/libparallax_layer.so"
+LIBRARIES = ["lib/parallax/libparallax_layer.so", "lib/parallax/libparallax_xr.so"]
 DOCUMENTS = "share/doc/parallax/"
 COMPLETIONS = {
     "bash": "share/bash-completion/completions/{}",
@@ -56,7 +56,7 @@ def built(build, name):
 
 def crates(target):
     """The project's version, and the crates that are linked into the programs."""
-    packages = [f"--package={name}" for name in (*PROGRAMS, "layer", "parallax-python")]
+    packages = [f"--package={name}" for name in (*PROGRAMS, "layer", "xr", "parallax-python")]
     edges = ["--edges=normal,no-proc-macro", f"--target={target}", "--prefix=none", "--format={p}"]
     linked = output(CARGO, "tree", "--locked", *edges, *packages).decode().splitlines()
     metadata = ["--locked", "--format-version=1", f"--filter-platform={target}"]
@@ -92,7 +92,7 @@ def licences(packages):
 def tree(build, packages):
     """The installed files: path and content."""
     files = {
-        LAYER: built(build, Path(LAYER).name),
+        **{path: built(build, Path(path).name) for path in LIBRARIES},
         "lib/parallax/parallax_layer.json": (
             ROOT / "tracegen/programs/src/parallax_layer.json"
         ).read_bytes(),
@@ -133,7 +133,7 @@ def archive(name, files):
 
 
 def wheel(version, tag, native, files):
-    """A wheel of the package, the programs and the layer."""
+    """A wheel of the package, the programs and their libraries."""
     project = tomllib.loads((ROOT / "python/pyproject.toml").read_text())["project"]
     metadata = {"Metadata-Version": "2.1", "Name": project["name"], "Version": version}
     metadata |= {"Summary": project["description"], "Requires-Python": project["requires-python"]}
@@ -195,7 +195,7 @@ def main():
             write(out / path, data)
         print(f"installed {len(files)} files; the programs are in {out / 'bin'}")
     native = built(build, "lib_native.so") if "wheel" in options.kinds else b""
-    binaries = b"".join([native, files[LAYER], *(files[f"bin/{name}"] for name in PROGRAMS)])
+    binaries = b"".join([native, *(files[path] for path in LIBRARIES), *(files[f"bin/{name}"] for name in PROGRAMS)])
     glibc = max(int(minor) for minor in re.findall(rb"GLIBC_2\.(\d+)", binaries))
     outputs = {}
     if "archive" in options.kinds:

@@ -34,6 +34,7 @@ fn the_archive_is_the_same_each_time_and_runs_where_it_is_unpacked() {
         "README.md",
         "docs/use/install.md",
         "lib/parallax/libparallax_layer.so",
+        "lib/parallax/libparallax_xr.so",
         "lib/parallax/parallax_layer.json",
         "share/bash-completion/completions/replay",
         "share/fish/vendor_completions.d/tracegen.fish",

@@ -63,6 +63,7 @@ fn tracegen_reads_what_the_layer_writes_without_the_layer() {
         assert_free_of(package, &["layer", "rspirv"]);
     }
     assert!(tree("layer").iter().any(|n| n == "spool"));
+    assert_free_of("xr", &["layer", "programs", "tracegen", "scene", "cmake"]);
 }
 
 #[test]

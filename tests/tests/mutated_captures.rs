@@ -8,9 +8,8 @@
 use formats::textrace::{Textrace, TextraceWriter, Tile};
 use parallax_tests::traces::Random;
 use parallax_tests::{has_lavapipe, program, run_ok};
-use programs::{Job, Session, Wanted, check, drain};
+use programs::{Cameras, Job, Session, Wanted, check, drain};
 use spool::FramesBy;
-use std::collections::BTreeMap;
 use std::fs;
 use std::panic::catch_unwind;
 use std::path::{Path, PathBuf};
@@ -89,7 +88,7 @@ fn converted(folder: &Path) -> Result<Vec<u8>, String> {
         frames: &FRAMES,
         eyes: &Wanted::First,
         frames_by: FramesBy::Auto,
-        cameras: BTreeMap::new(),
+        cameras: Cameras::default(),
         program: "program".to_owned(),
         tool: "test".to_owned(),
         command_line: Vec::new(),

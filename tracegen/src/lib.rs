@@ -5,6 +5,8 @@ mod captures;
 pub mod cli;
 mod cut_triangles;
 mod hidden_mesh;
+#[cfg(feature = "programs")]
+mod openxr;
 mod picture;
 #[cfg(test)]
 mod schemas;

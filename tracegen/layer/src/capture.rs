@@ -1,6 +1,7 @@
 //! The capture that this process belongs to.
 
 use spool::control::Control;
+use spool::openxr::ShownEye;
 use spool::{Event, FOLDER_VARIABLE, FramesBy, Settings, Writer};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
@@ -219,9 +220,20 @@ impl Capture {
         let counts = match self.settings.frames_by {
             FramesBy::Readback => true,
             FramesBy::Auto => !self.presents.load(Ordering::Relaxed),
-            FramesBy::Present | FramesBy::Launcher => false,
+            FramesBy::Present | FramesBy::Launcher | FramesBy::OpenXr => false,
         };
         if counts {
+            self.end_frame();
+        }
+    }
+
+    /// Notes that an OpenXR program showed pictures to the eyes.
+    pub fn note_shown(&self, eyes: [ShownEye; 2]) {
+        if self.settings.frames_by == FramesBy::OpenXr {
+            let frame = self.frame();
+            if self.wants_number(frame) {
+                self.event(&Event::Shown { frame, eyes });
+            }
             self.end_frame();
         }
     }

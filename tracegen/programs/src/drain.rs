@@ -22,6 +22,15 @@ use std::collections::{BTreeMap, HashMap};
 use std::io::{Seek, Write};
 use thiserror::Error;
 
+/// What is known about the eyes.
+#[derive(Clone, Debug, Default)]
+pub struct Cameras {
+    /// Eyes by frame, if the program reported them.
+    pub eyes: BTreeMap<u32, [EyeView; 2]>,
+    /// The simulated display, if there is one.
+    pub display: Option<Hmd>,
+}
+
 /// Options for converting a session.
 pub struct Job<'a> {
     /// Requested frames, ascending.
@@ -30,8 +39,8 @@ pub struct Job<'a> {
     pub eyes: &'a Wanted,
     /// How frames were counted.
     pub frames_by: FramesBy,
-    /// Eyes by frame, if the program reported them.
-    pub cameras: BTreeMap<u32, [EyeView; 2]>,
+    /// What is known about the eyes.
+    pub cameras: Cameras,
     /// Name of the program.
     pub program: String,
     /// Tool and version.
@@ -232,10 +241,11 @@ fn program(
         FramesBy::Auto | FramesBy::Present => "presents",
         FramesBy::Readback => "readbacks",
         FramesBy::Launcher => "the launcher",
+        FramesBy::OpenXr => "xrEndFrame",
     };
     let mut frames = job.frames.iter();
     ProgramCapture {
-        cameras_known: frames.all(|frame| job.cameras.contains_key(frame)),
+        cameras_known: frames.all(|frame| job.cameras.eyes.contains_key(frame)),
         frames_by: frames_by.to_owned(),
         views_by: rule.map_or("", Rule::name).to_owned(),
         left_out,
@@ -251,7 +261,10 @@ fn meta(
     not_opaque: Vec<[u32; 2]>,
 ) -> TraceMeta {
     let cameras_known = drained.program.cameras_known;
-    let first = job.frames.first().and_then(|frame| job.cameras.get(frame));
+    let first = job
+        .frames
+        .first()
+        .and_then(|frame| job.cameras.eyes.get(frame));
     let (fov, ipd_m) = match first.filter(|_| cameras_known) {
         Some(eyes) => (eyes.map(|eye| fov(&eye)), distance_m(eyes)),
         None => ([PLACEHOLDER_FOV; 2], 0.0),
@@ -266,17 +279,26 @@ fn meta(
         driver: session.driver.clone(),
         seed: 0,
         hmd: Hmd {
-            name: if cameras_known { "emulated" } else { "unknown" }.to_owned(),
-            source: "a program's viewports".to_owned(),
+            name: match (cameras_known, &job.cameras.display) {
+                (true, Some(display)) => display.name.clone(),
+                (true, None) => "emulated".to_owned(),
+                (false, _) => "unknown".to_owned(),
+            },
+            source: match &job.cameras.display {
+                Some(display) if cameras_known => display.source.clone(),
+                _ => "a program's viewports".to_owned(),
+            },
             eye_size_px: drained.size_px,
             fov,
             ipd_m,
-            cant_deg: 0.0,
+            cant_deg: (job.cameras.display.as_ref())
+                .filter(|_| cameras_known)
+                .map_or(0.0, |display| display.cant_deg),
         },
         frames: (job.frames.iter())
             .map(|frame| FrameViews {
                 frame: *frame,
-                eyes: job.cameras.get(frame).copied().unwrap_or_default(),
+                eyes: job.cameras.eyes.get(frame).copied().unwrap_or_default(),
             })
             .collect(),
         surfaces: Some(Surfaces {

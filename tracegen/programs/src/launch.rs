@@ -4,6 +4,7 @@ use crate::loader;
 use formats::container::ScratchFolder;
 use spool::Settings;
 use spool::control::Control;
+use spool::openxr::RuntimeSettings;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -12,11 +13,11 @@ use thiserror::Error;
 /// Reasons why a program cannot be launched.
 #[derive(Debug, Error)]
 pub enum LaunchError {
-    /// The layer's library is missing.
+    /// A library that programs load is missing.
     #[error(
-        "{0} is missing: `make install` installs it with the programs, and `make build` builds it beside them; `cargo install` installs no Vulkan layer"
+        "{0} is missing: `make install` installs it with the programs, and `make build` builds it beside them; `cargo install` installs no libraries"
     )]
-    NoLayer(String),
+    NoLibrary(String),
     /// The capture's folder cannot be written.
     #[error("cannot set up the capture in {folder}: {source}")]
     Folder {
@@ -40,8 +41,9 @@ pub enum LaunchError {
     },
 }
 
-/// File name of the layer's library.
+/// File names of the layer's and the OpenXR runtime's library.
 const LIBRARY: &str = "libparallax_layer.so";
+const OPENXR_LIBRARY: &str = "libparallax_xr.so";
 /// File that is locked while a capture runs.
 const LOCK: &str = "lock";
 
@@ -64,7 +66,7 @@ impl Launch {
     /// # Errors
     /// The layer or the driver is missing, or the folder cannot be written.
     pub fn new(parent: &Path, tool: &Path, settings: &Settings) -> Result<Self, LaunchError> {
-        let library = library(tool)?;
+        let library = library(tool, LIBRARY)?;
         let driver = match loader::driver_of_user()? {
             Some(_) => None,
             None => {
@@ -111,6 +113,20 @@ impl Launch {
         }
     }
 
+    /// Makes a program use an OpenXR runtime of the capture.
+    ///
+    /// # Errors
+    /// The capture's folder cannot be written.
+    pub fn prepare_openxr(
+        &self,
+        command: &mut Command,
+        runtime: &Path,
+        settings: &RuntimeSettings,
+    ) -> std::io::Result<()> {
+        settings.save(self.folder())?;
+        loader::register_openxr(command, self.folder(), runtime)
+    }
+
     /// Makes a program use the layer, and Mesa's zink for OpenGL if requested.
     pub fn prepare(&self, command: &mut Command, opengl: bool) {
         loader::announce(command, self.folder());
@@ -147,22 +163,30 @@ fn remove_abandoned(parent: &Path) {
     }
 }
 
-/// Finds the layer's library next to a program, among Cargo's build outputs, which may be newer, or where
+/// Finds the OpenXR runtime's library next to a program.
+///
+/// # Errors
+/// It is missing.
+pub fn openxr_library(tool: &Path) -> Result<PathBuf, LaunchError> {
+    library(tool, OPENXR_LIBRARY)
+}
+
+/// Finds a library next to a program, among Cargo's build outputs, which may be newer, or where
 /// `scripts/dist.py` puts it.
-fn library(tool: &Path) -> Result<PathBuf, LaunchError> {
+fn library(tool: &Path, name: &str) -> Result<PathBuf, LaunchError> {
     let folder = tool.parent().unwrap_or(Path::new("."));
     let installed = folder.with_file_name("lib").join("parallax");
-    let beside = folder.join(LIBRARY);
+    let beside = folder.join(name);
     let places = [
-        &installed.join(LIBRARY),
-        &folder.join("deps").join(LIBRARY),
+        &installed.join(name),
+        &folder.join("deps").join(name),
         &beside,
     ];
     let files = places.into_iter().filter(|place| place.is_file());
     let found = files.max_by_key(|place| fs::metadata(place).and_then(|of| of.modified()).ok());
     found
         .cloned()
-        .ok_or_else(|| LaunchError::NoLayer(beside.display().to_string()))
+        .ok_or_else(|| LaunchError::NoLibrary(beside.display().to_string()))
 }
 
 #[cfg(test)]
@@ -189,13 +213,13 @@ mod tests {
         let [bin, deps, installed] =
             ["bin", "bin/deps", "lib/parallax"].map(|place| folder.path().join(place));
         let tool = bin.join("tracegen");
-        let text = library(&tool).unwrap_err().to_string();
+        let text = library(&tool, LIBRARY).unwrap_err().to_string();
         assert!(text.contains("libparallax_layer.so is missing"), "{text}");
         for place in [installed, deps, bin] {
             fs::create_dir_all(&place).unwrap();
             let file = place.join(LIBRARY);
             fs::write(&file, b"").unwrap();
-            assert_eq!(library(&tool).unwrap(), file);
+            assert_eq!(library(&tool, LIBRARY).unwrap(), file);
         }
     }
 }

@@ -22,8 +22,8 @@ mod views;
 mod watch;
 
 pub use check::{Check, Difference, check};
-pub use drain::{DrainError, Drained, Job, drain};
-pub use launch::{Launch, LaunchError};
+pub use drain::{Cameras, DrainError, Drained, Job, drain};
+pub use launch::{Launch, LaunchError, openxr_library};
 pub use session::{Executed, ProgramFrame, Session, SessionError};
 pub use views::{FileError, Other, Role, Rule, RuleFile, View, Views, ViewsError, Wanted};
 pub use watch::Watch;

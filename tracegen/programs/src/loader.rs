@@ -3,7 +3,7 @@
 
 use super::launch::LaunchError;
 use formats::container::ScratchFolder;
-use spool::{FOLDER_VARIABLE, LAYER_NAME};
+use spool::{FOLDER_VARIABLE, LAYER_LINK, LAYER_NAME};
 use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
@@ -12,8 +12,6 @@ use std::process::Command;
 
 /// File that registers the layer with the loader.
 pub(super) const MANIFEST: &str = "parallax_layer.json";
-/// Link to the layer's library beside the manifest, which names it.
-const LINK: &str = "libparallax_layer.so";
 /// Character that separates the entries of the loader's lists of paths.
 const SEPARATOR: u8 = b':';
 /// Variable of layers that the loader disables.
@@ -50,8 +48,28 @@ pub fn folder_in(parent: &Path) -> std::io::Result<ScratchFolder> {
 /// # Errors
 /// The folder cannot be written.
 pub fn register(folder: &Path, library: &Path) -> std::io::Result<()> {
-    std::os::unix::fs::symlink(library, folder.join(LINK))?;
+    std::os::unix::fs::symlink(library, folder.join(LAYER_LINK))?;
     fs::write(folder.join(MANIFEST), include_bytes!("parallax_layer.json"))
+}
+
+/// File that registers the OpenXR runtime, and the link to its library beside it.
+const OPENXR_MANIFEST: &str = "parallax_xr.json";
+const OPENXR_LINK: &str = "libparallax_xr.so";
+
+/// Makes the OpenXR loader of a program open the runtime.
+///
+/// # Errors
+/// The folder cannot be written.
+pub fn register_openxr(
+    command: &mut Command,
+    folder: &Path,
+    library: &Path,
+) -> std::io::Result<()> {
+    std::os::unix::fs::symlink(library, folder.join(OPENXR_LINK))?;
+    let manifest = folder.join(OPENXR_MANIFEST);
+    fs::write(&manifest, include_bytes!("parallax_xr.json"))?;
+    command.env("XR_RUNTIME_JSON", manifest);
+    Ok(())
 }
 
 /// Makes a program load the registered layer.

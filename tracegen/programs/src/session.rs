@@ -1,6 +1,7 @@
 //! Frames, render passes and draws of a captured program.
 
 use crate::reads::Reads;
+use spool::openxr::ShownEye;
 use spool::{DepthTests, Form, RawSample, Site, What};
 use spool::{
     DispatchInfo, DrawInfo, Event, ImageInfo, PassInfo, Process, ReadError, Reader, ShaderInfo,
@@ -89,6 +90,8 @@ pub struct ProgramFrame {
     numbers: HashSet<u32>,
     /// Source and destination of each copy between images.
     pub copies: Vec<[u32; 2]>,
+    /// The same by array layer.
+    pub copied_layers: Vec<[u32; 4]>,
     /// Images of which one texel alone was copied to a buffer.
     pub probed: Vec<u32>,
     /// Number of bytes of records that did not fit the buffer.
@@ -125,6 +128,8 @@ pub struct Session {
     pub by_waits: bool,
     /// Number of frames that ended, up to the last requested one.
     pub ended: u32,
+    /// The pictures that an OpenXR program showed to the eyes, by frame.
+    pub shown: BTreeMap<u32, [ShownEye; 2]>,
     draws: HashMap<u32, DrawInfo>,
     passes: HashMap<u32, PassInfo>,
     images: HashMap<u32, ImageInfo>,
@@ -232,11 +237,13 @@ impl Session {
             Event::Copies {
                 frame,
                 pairs,
+                layers,
                 probed,
             } => {
                 let of = self.frames.entry(frame).or_default();
                 of.frame = frame;
                 of.copies.extend(pairs);
+                of.copied_layers.extend(layers);
                 of.probed.extend(probed);
             }
             Event::Frame { frame, took_us } => self.end_frame(frame, took_us),
@@ -245,6 +252,7 @@ impl Session {
                     self.end_frame(frame, took_us);
                 }
             }
+            Event::Shown { frame, eyes } => drop(self.shown.insert(frame, eyes)),
             Event::Picture { pass, size } => drop(self.pictures.insert(pass, size)),
             Event::Trouble { what } => self.troubles.push(what),
             Event::Closed => {}

@@ -22,6 +22,8 @@ pub struct Watch {
     pub vulkan: bool,
     /// Whether a process loaded an OpenGL library.
     pub opengl: bool,
+    /// Whether a process loaded the OpenXR loader.
+    pub openxr: bool,
 }
 
 impl Default for Watch {
@@ -32,6 +34,7 @@ impl Default for Watch {
             cleared: None,
             vulkan: false,
             opengl: false,
+            openxr: false,
         }
     }
 }
@@ -63,6 +66,7 @@ impl Watch {
             return;
         }
         self.vulkan |= maps.contains("/libvulkan.so");
+        self.openxr |= maps.contains("/libopenxr_loader");
         let libraries = ["/libGL.so", "/libGLX.so", "/libEGL.so", "/libOpenGL.so"];
         self.opengl |= libraries.iter().any(|library| maps.contains(library));
         let is_cleared = || {

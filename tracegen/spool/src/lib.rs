@@ -5,6 +5,7 @@
 
 pub mod buffer;
 pub mod control;
+pub mod openxr;
 mod read;
 mod site;
 mod write;
@@ -19,6 +20,8 @@ use std::path::{Path, PathBuf};
 
 /// Environment variable with the name of the folder; without it, the layer is inactive.
 pub const FOLDER_VARIABLE: &str = "PARALLAX_CAPTURE_FOLDER";
+/// Link to the layer's library in the folder, by which the loader opens it.
+pub const LAYER_LINK: &str = "libparallax_layer.so";
 /// Name of the layer for the loader.
 pub const LAYER_NAME: &str = "VK_LAYER_PARALLAX_capture";
 /// Caveat of an indirect draw command, whose draws share one number.
@@ -62,6 +65,8 @@ pub enum FramesBy {
     Readback,
     /// The launcher counts frames, through [`crate::control`].
     Launcher,
+    /// A frame ends when the OpenXR runtime of the capture gets its pictures.
+    OpenXr,
 }
 
 impl Settings {
@@ -147,8 +152,18 @@ pub enum Event {
         frame: u32,
         /// Numbers of the source and the destination of each copy, blit and resolve between images.
         pairs: Vec<[u32; 2]>,
+        /// The same by array layer: image and layer of the source, image and layer of the destination.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        layers: Vec<[u32; 4]>,
         /// Numbers of the images of which one texel alone was copied to a buffer.
         probed: Vec<u32>,
+    },
+    /// The pictures that an OpenXR program showed to the left and the right eye.
+    Shown {
+        /// Frame.
+        frame: u32,
+        /// The eyes.
+        eyes: [openxr::ShownEye; 2],
     },
     /// The small picture of a render pass. Its texels are in the file `PASS.rgba` next to the records, row by
     /// row.

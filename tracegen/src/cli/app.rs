@@ -1,21 +1,20 @@
 //! `tracegen app`.
 
 use super::choice::choice;
-use super::failed_run::{Ended, FailedRun, Tail};
-use super::program_args::{ProgramArgs, note_frame_times};
+use super::failed_run::FailedRun;
+use super::program_args::ProgramArgs;
+use super::program_run::ProgramRun;
 use super::values::parse_timeout;
 use anyhow::{Context, anyhow, bail, ensure};
 use clap::Args;
 use clap::builder::TypedValueParser;
-use programs::{Launch, Session, SessionError, Watch};
-use shell::{Program, find_program, warn};
+use programs::{Cameras, Launch, SessionError};
+use shell::find_program;
 use spool::FramesBy;
-use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
-use std::fs::File;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Stdio};
-use std::time::{Duration, Instant};
+use std::process::ExitCode;
+use std::time::Duration;
 
 /// Arguments of `tracegen app`.
 #[derive(Args, Debug)]
@@ -78,32 +77,39 @@ pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
     let tool = std::env::current_exe().context("cannot find this program's own file")?;
     let launch = Launch::new(&std::env::temp_dir(), &tool, &settings)?;
     let program = args.name()?;
+    let opengl = args.gl || args.apitrace.is_some();
+    let (file, arguments) = args.command();
+    // A replay that is terminated prints its call stack.
+    let log = args
+        .apitrace
+        .as_ref()
+        .map(|_| launch.folder().join(REPLAY_LOG));
+    let to_run = ProgramRun {
+        name: &program,
+        file,
+        arguments,
+        opengl,
+        openxr: false,
+        log: log.as_deref(),
+        frames: args.capture.frames.clone(),
+        grace: (!args.to_end).then_some(Duration::ZERO),
+        timeout: args.timeout,
+    };
     // The supervisor watches over the capture's folder until the end.
-    let (_program, run) = run_program(args, &launch, &program)?;
-    let mut session = Session::of_capture(launch.folder(), &program)
+    let (_program, run) = to_run.start(&launch, |command| {
+        launch.prepare(command, opengl);
+        Ok(())
+    })?;
+    let mut session = to_run
+        .session(&launch)
         .map_err(|error| with_replay_error(error, &run, &launch))?;
-    let milliseconds = |us: u64| us as f64 / 1e3;
-    let wanted = args.capture.frames.clone();
-    let is_complete = |frame: u32| session.frames.get(&frame).is_some_and(|frame| frame.ended);
-    if !wanted.clone().all(is_complete) {
-        let error = SessionError::TooFew {
-            program,
-            first: wanted.start,
-            last: wanted.end - 1,
-            counted: launch.control.counted().max(session.ended),
-        };
-        return Err(with_replay_error(error, &run, &launch));
-    }
-    let before: Vec<f64> = (session.before_us.iter().copied())
-        .map(milliseconds)
-        .collect();
-    let captured: Vec<f64> = (session.frames.values())
-        .filter(|frame| wanted.contains(&frame.frame))
-        .map(|frame| milliseconds(frame.took_us))
-        .collect();
-    note_frame_times(&before, &captured);
-    args.capture
-        .finish(&mut session, program, &settings, &eyes, BTreeMap::new())
+    args.capture.finish(
+        &mut session,
+        program.clone(),
+        &settings,
+        &eyes,
+        Cameras::default(),
+    )
 }
 
 /// Program of apitrace that replays files.
@@ -163,63 +169,6 @@ impl AppArgs {
         );
         Ok(())
     }
-}
-
-/// Interval between two looks at the program's frames.
-const FRAME_INTERVAL: Duration = Duration::from_millis(20);
-
-/// Runs the program until it has rendered its frames or ends.
-fn run_program(
-    args: &AppArgs,
-    launch: &Launch,
-    name: &str,
-) -> anyhow::Result<(Program, FailedRun)> {
-    let opengl = args.gl || args.apitrace.is_some();
-    // A replay that is terminated prints its call stack.
-    let log = args
-        .apitrace
-        .as_ref()
-        .map(|_| File::create(launch.folder().join(REPLAY_LOG)));
-    let log = log
-        .transpose()
-        .context("cannot write the log of the replay")?;
-    let mut tail = None;
-    let (program, arguments) = args.command();
-    let started = Program::start(launch.folder(), program, |command: &mut Command| {
-        command.args(arguments);
-        launch.prepare(command, opengl);
-        match log {
-            Some(log) => drop(command.stdout(Stdio::null()).stderr(log)),
-            None => tail = Some(Tail::of(command)),
-        }
-    });
-    let mut running = started.with_context(|| format!("cannot run {}", program.display()))?;
-    let tail = tail.transpose().context("cannot make a pipe")?;
-    let mut watch = Watch::default();
-    let wanted = args.capture.frames.len() as u32;
-    let start = Instant::now();
-    let (status, stopped) = loop {
-        watch.look();
-        if let Some(status) = running.wait(FRAME_INTERVAL)? {
-            break (status, false);
-        }
-        let late = start.elapsed() >= args.timeout;
-        if late || (!args.to_end && launch.control.ended() >= wanted) {
-            if late {
-                let seconds = args.timeout.as_secs_f64();
-                warn(&format!("{name} was ended after {seconds} seconds"));
-            }
-            break (running.end()?, true);
-        }
-    };
-    let run = FailedRun {
-        ended: Ended { status, stopped },
-        watch,
-        lines: tail.map(|tail| tail.lines()).unwrap_or_default(),
-        file: find_program(program).unwrap_or_default(),
-        opengl,
-    };
-    Ok((running, run))
 }
 
 /// Adds what is known about the run, and the first error of the replay of a file.

@@ -93,6 +93,8 @@ pub struct FailedRun {
     pub file: PathBuf,
     /// Whether it was started with OpenGL on Vulkan.
     pub opengl: bool,
+    /// Whether it was started with an OpenXR runtime.
+    pub openxr: bool,
 }
 
 impl FailedRun {
@@ -101,7 +103,11 @@ impl FailedRun {
         let mut text = format!("{error}; {}", how_it_ended(&self.ended));
         let causes = match error {
             SessionError::NoProcess(_) => self.causes(),
-            SessionError::NoDevice(_) | SessionError::TooFew { .. } => self.no_display(),
+            SessionError::NoDevice(_) | SessionError::TooFew { .. } => self
+                .no_runtime()
+                .into_iter()
+                .chain(self.no_display())
+                .collect(),
             _ => Vec::new(),
         };
         for cause in causes {
@@ -124,6 +130,7 @@ impl FailedRun {
         if let Some(why) = refuses_layers(&self.file) {
             causes.push(format!("{}: {why}", self.file.display()));
         }
+        causes.extend(self.no_runtime());
         causes.extend(self.no_display());
         match (self.watch.vulkan, self.watch.opengl && !self.opengl) {
             _ if !causes.is_empty() => {}
@@ -138,6 +145,16 @@ impl FailedRun {
             }
         }
         causes
+    }
+
+    /// The cause if the program found no OpenXR runtime, or one that does not tell the recorder.
+    fn no_runtime(&self) -> Option<String> {
+        let text = "it uses OpenXR, and had no runtime of a capture: run it with `tracegen xr`";
+        let says = |line: &String| {
+            line.contains("OpenXR-Loader") || line.contains("XR_ERROR_RUNTIME_UNAVAILABLE")
+        };
+        let is_client = self.watch.openxr || self.lines.iter().any(says);
+        (is_client && !self.openxr).then(|| text.to_owned())
     }
 
     /// Whether the program failed by itself.
@@ -203,6 +220,7 @@ mod tests {
             lines: tail.lines(),
             file: PathBuf::from("/none/such"),
             opengl: false,
+            openxr: false,
         }
     }
 
@@ -243,6 +261,9 @@ mod tests {
         assert!(text(&run).contains("neither Vulkan nor OpenGL"));
         run.watch.opengl = true;
         assert!(text(&run).contains("run it with --gl"));
+        run.watch.openxr = true;
+        assert!(text(&run).contains("run it with `tracegen xr`"));
+        run.openxr = true;
         run.watch.vulkan = true;
         assert!(text(&run).contains("did not load the layer"));
         run.watch.cleared = Some("y".to_owned());

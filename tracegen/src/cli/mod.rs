@@ -24,6 +24,8 @@ pub mod precision;
 mod prepared;
 #[cfg(feature = "programs")]
 mod program_args;
+#[cfg(feature = "programs")]
+mod program_run;
 pub mod raster;
 mod raster_args;
 mod raster_auto;
@@ -43,10 +45,12 @@ mod values;
 pub mod verified_trace;
 #[cfg(feature = "lab")]
 mod verify;
+#[cfg(feature = "programs")]
+pub mod xr;
 
 use clap::{Parser, Subcommand};
 #[cfg(not(feature = "programs"))]
-use not_built::{app, page};
+use not_built::{app, page, xr};
 #[cfg(not(feature = "lab"))]
 use not_built::{precision, stress, verify};
 use shell::{Common, Documents, SuperviseArgs};
@@ -82,6 +86,8 @@ enum Command {
     Raster(Box<raster_args::RasterArgs>),
     /// Capture the texture samples of an unmodified Vulkan or OpenGL program into a .textrace file.
     App(Box<app::AppArgs>),
+    /// Capture the texture samples of an unmodified OpenXR program, without a headset, into a .textrace file.
+    Xr(Box<xr::XrArgs>),
     /// Capture the texture samples of a page of WebGL or WebXR in Chromium into a .textrace file.
     Page(Box<page::PageArgs>),
     /// Measure stereo rendering techniques along a path: times, pictures and traces into a folder.
@@ -98,7 +104,7 @@ enum Command {
     /// Measure the cost and the errors of rays in single and in double precision, near the origin and far
     /// from it.
     Precision(precision::PrecisionArgs),
-    /// Run a program for `app` or `page`.
+    /// Run a program for `app`, `xr` or `page`.
     #[command(hide = true)]
     Supervise(SuperviseArgs),
     #[command(flatten)]
@@ -115,6 +121,7 @@ pub fn main() -> ExitCode {
                 Command::Scenes(args) => scenes::run(args)?,
                 Command::Raster(args) => raster::run(&args)?,
                 Command::App(args) => return app::run(&args),
+                Command::Xr(args) => return xr::run(&args),
                 Command::Page(args) => return page::run(&args),
                 Command::Techniques(args) => techniques::run(&args)?,
                 Command::Sweep(args) => sweep::run(&args)?,

@@ -26,6 +26,6 @@ macro_rules! not_built {
 }
 
 #[cfg(not(feature = "programs"))]
-not_built!(app AppArgs, page PageArgs);
+not_built!(app AppArgs, page PageArgs, xr XrArgs);
 #[cfg(not(feature = "lab"))]
 not_built!(precision PrecisionArgs, stress StressArgs, verify VerifyArgs);

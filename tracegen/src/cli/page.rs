@@ -10,7 +10,7 @@ use clap::{Arg, Args};
 use formats::container::{AtomicFile, read_regular};
 use formats::view::EyeView;
 use programs::browser::{Headset, Page, Stepped, Tab};
-use programs::{Launch, Session, Wanted};
+use programs::{Cameras, Launch, Session, Wanted};
 use shell::{Output, Program, cannot_write, find_program, note, warn};
 use spool::{FramesBy, Settings};
 use std::collections::BTreeMap;
@@ -149,7 +149,10 @@ fn write(
         let mut session = Session::of_capture(launch.folder(), "the page")?;
         session.is_page = true;
         let name = format!("{}{}", page_name(&args.page), args.query);
-        let cameras = drawn.cameras.clone();
+        let cameras = Cameras {
+            eyes: drawn.cameras.clone(),
+            display: None,
+        };
         (args.capture).finish(&mut session, name, settings, eyes, cameras)?
     };
     if let Some((file, path)) = picture {

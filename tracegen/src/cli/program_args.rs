@@ -6,12 +6,10 @@ use anyhow::Context;
 use clap::Args;
 use clap::builder::TypedValueParser;
 use formats::textrace::{Encoding, TextraceWriter};
-use formats::view::EyeView;
 use programs::list::List;
-use programs::{Check, Drained, Job, Rule, RuleFile, Session, Wanted, check, drain};
+use programs::{Cameras, Check, Drained, Job, Rule, RuleFile, Session, Wanted, check, drain};
 use shell::{Output, check_outputs, lasting_arguments, note, warn};
 use spool::{FramesBy, Settings};
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -171,7 +169,7 @@ impl ProgramArgs {
         program: String,
         settings: &Settings,
         eyes: &Wanted,
-        cameras: BTreeMap<u32, [EyeView; 2]>,
+        cameras: Cameras,
     ) -> anyhow::Result<ExitCode> {
         for trouble in &session.troubles {
             warn(trouble);

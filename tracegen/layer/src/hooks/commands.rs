@@ -115,17 +115,17 @@ setters! {
 
 before! {
     cmd_copy_image(buffer: vk::CommandBuffer, from: vk::Image, from_layout: vk::ImageLayout, to: vk::Image, to_layout: vk::ImageLayout, count: u32, regions: *const vk::ImageCopy) |device|
-        device.tracker().note_copy(buffer, from, to);
+        device.tracker().note_copy(buffer, from, to, slice(regions, count).iter().map(|region| [region.src_subresource, region.dst_subresource]));
     cmd_copy_image2(buffer: vk::CommandBuffer, info: *const vk::CopyImageInfo2<'_>) |device|
-        device.tracker().note_copy(buffer, (*info).src_image, (*info).dst_image);
+        device.tracker().note_copy(buffer, (*info).src_image, (*info).dst_image, slice((*info).p_regions, (*info).region_count).iter().map(|region| [region.src_subresource, region.dst_subresource]));
     cmd_blit_image(buffer: vk::CommandBuffer, from: vk::Image, from_layout: vk::ImageLayout, to: vk::Image, to_layout: vk::ImageLayout, count: u32, regions: *const vk::ImageBlit, filter: vk::Filter) |device|
-        device.tracker().note_copy(buffer, from, to);
+        device.tracker().note_copy(buffer, from, to, slice(regions, count).iter().map(|region| [region.src_subresource, region.dst_subresource]));
     cmd_blit_image2(buffer: vk::CommandBuffer, info: *const vk::BlitImageInfo2<'_>) |device|
-        device.tracker().note_copy(buffer, (*info).src_image, (*info).dst_image);
+        device.tracker().note_copy(buffer, (*info).src_image, (*info).dst_image, slice((*info).p_regions, (*info).region_count).iter().map(|region| [region.src_subresource, region.dst_subresource]));
     cmd_resolve_image(buffer: vk::CommandBuffer, from: vk::Image, from_layout: vk::ImageLayout, to: vk::Image, to_layout: vk::ImageLayout, count: u32, regions: *const vk::ImageResolve) |device|
-        device.tracker().note_copy(buffer, from, to);
+        device.tracker().note_copy(buffer, from, to, slice(regions, count).iter().map(|region| [region.src_subresource, region.dst_subresource]));
     cmd_resolve_image2(buffer: vk::CommandBuffer, info: *const vk::ResolveImageInfo2<'_>) |device|
-        device.tracker().note_copy(buffer, (*info).src_image, (*info).dst_image);
+        device.tracker().note_copy(buffer, (*info).src_image, (*info).dst_image, slice((*info).p_regions, (*info).region_count).iter().map(|region| [region.src_subresource, region.dst_subresource]));
     cmd_copy_image_to_buffer(buffer: vk::CommandBuffer, image: vk::Image, layout: vk::ImageLayout, to: vk::Buffer, count: u32, regions: *const vk::BufferImageCopy) |device|
         device.tracker().note_read_back(buffer, image, slice(regions, count).iter().map(|region| region.image_extent));
     cmd_copy_image_to_buffer2(buffer: vk::CommandBuffer, info: *const vk::CopyImageToBufferInfo2<'_>) |device|

@@ -13,6 +13,7 @@ mod draws;
 mod instance;
 mod libraries;
 mod next;
+mod openxr;
 mod passes;
 mod pending;
 mod pictures;

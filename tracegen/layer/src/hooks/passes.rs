@@ -2,7 +2,7 @@
 
 use super::api::{find, slice};
 use super::device::Device;
-use crate::track::{Attachment, OpenPass, RenderPass, Subpass};
+use crate::track::{Attachment, CommandState, OpenPass, RenderPass, Subpass};
 use ash::vk::{self, Handle};
 use spool::{PassInfo, ViewInfo};
 use std::sync::Arc;
@@ -182,6 +182,15 @@ unsafe fn begin(device: &Device, buffer: vk::CommandBuffer, info: &vk::RenderPas
     enter(tracker, buffer, open);
 }
 
+/// Notes the resolves of a subpass. Those of a multiview pass are of its views.
+fn note_resolves(state: &mut CommandState, resolves: &[[ViewInfo; 2]], view_mask: u32) {
+    for [from, to] in resolves {
+        let first = [(from.image, from.layers[0]), (to.image, to.layers[0])];
+        let views = u32::BITS - view_mask.leading_zeros();
+        state.effects.copies.add_layers(first, views.max(1));
+    }
+}
+
 /// Starts to track a subpass.
 fn enter(tracker: &mut crate::track::Tracker, buffer: vk::CommandBuffer, open: OpenPass) {
     let pass = tracker.passes.begin(
@@ -194,9 +203,7 @@ fn enter(tracker: &mut crate::track::Tracker, buffer: vk::CommandBuffer, open: O
     let resolves = tracker.passes.resolves(&open);
     let state = tracker.commands.get_mut(buffer.as_raw());
     state.effects.renders = true;
-    for [from, to] in resolves {
-        state.effects.copies.add(from, to);
-    }
+    note_resolves(state, &resolves, pass.view_mask);
     state.pass = Some(Arc::new(pass));
     state.open = Some(open);
 }
@@ -253,12 +260,12 @@ unsafe fn begin_rendering(
         let clears = of.load_op == CLEAR;
         Some(Attachment { view, clears })
     };
-    let resolves: Vec<[u32; 2]> = (all_colors.iter().chain(depth))
+    let resolves: Vec<[ViewInfo; 2]> = (all_colors.iter().chain(depth))
         .filter(|of| of.resolve_mode != vk::ResolveModeFlags::NONE)
         .filter_map(|of| {
             let [from, to] =
                 [of.image_view, of.resolve_image_view].map(|view| tracker.images.view(view));
-            Some([from?.image, to?.image])
+            Some([from?, to?])
         })
         .collect();
     let colors = all_colors.iter().filter_map(attachment).collect();
@@ -267,9 +274,7 @@ unsafe fn begin_rendering(
     let resumes = info.flags.contains(vk::RenderingFlags::RESUMING);
     let state = tracker.commands.get_mut(buffer.as_raw());
     state.effects.renders = true;
-    for [from, to] in resolves {
-        state.effects.copies.add(from, to);
-    }
+    note_resolves(state, &resolves, info.view_mask);
     if !resumes || state.pass.is_none() {
         let (area, views) = (info.render_area, info.view_mask);
         state.pass = Some(Arc::new(tracker.passes.info(colors, depth, area, views)));

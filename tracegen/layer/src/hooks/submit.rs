@@ -179,6 +179,7 @@ unsafe fn submit_frame(
             capture.event(&Event::Copies {
                 frame: place.frame,
                 pairs: effects.copies.pairs.clone(),
+                layers: effects.copies.layers.clone(),
                 probed: effects.copies.probed.clone(),
             });
         }

@@ -68,6 +68,8 @@ pub struct Dynamic {
 pub struct Copies {
     /// Source and destination of copies, blits and resolves between images.
     pub pairs: Vec<[u32; 2]>,
+    /// The same by array layer: image and layer of the source, image and layer of the destination.
+    pub layers: Vec<[u32; 4]>,
     /// Images of which one texel alone is copied to a buffer.
     pub probed: Vec<u32>,
 }
@@ -80,11 +82,25 @@ impl Copies {
         }
     }
 
+    /// Adds a copy between layers of images, once.
+    pub fn add_layers(&mut self, [from, to]: [(u32, u32); 2], count: u32) {
+        self.add(from.0, to.0);
+        for layer in 0..count {
+            let copy = [from.0, from.1 + layer, to.0, to.1 + layer];
+            if from.0 != to.0 && !self.layers.contains(&copy) {
+                self.layers.push(copy);
+            }
+        }
+    }
+
     /// Adds the copies of other commands.
     pub fn append(&mut self, other: &Self) {
         for &[from, to] in &other.pairs {
             self.add(from, to);
         }
+        let new = (other.layers.iter()).filter(|copy| !self.layers.contains(copy));
+        let new: Vec<[u32; 4]> = new.copied().collect();
+        self.layers.extend(new);
         self.probed.extend(&other.probed);
     }
 }

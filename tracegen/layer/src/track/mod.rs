@@ -50,12 +50,28 @@ impl Tracker {
         }
     }
 
-    /// Notes that a command buffer copies an image to another one.
-    pub fn note_copy(&mut self, buffer: vk::CommandBuffer, from: vk::Image, to: vk::Image) {
-        let number = |image| Some(self.images.get(image)?.image);
-        if let (Some(from), Some(to)) = (number(from), number(to)) {
+    /// Notes that a command buffer copies layers of an image to those of another one: first layers, and number of
+    /// layers, of each region.
+    pub fn note_copy(
+        &mut self,
+        buffer: vk::CommandBuffer,
+        from: vk::Image,
+        to: vk::Image,
+        regions: impl IntoIterator<Item = [vk::ImageSubresourceLayers; 2]>,
+    ) {
+        let known = |image| self.images.get(image).cloned();
+        if let (Some(from), Some(to)) = (known(from), known(to)) {
             let effects = &mut self.commands.get_mut(buffer.as_raw()).effects;
-            effects.copies.add(from, to);
+            for [source, target] in regions {
+                let first = [
+                    (from.image, source.base_array_layer),
+                    (to.image, target.base_array_layer),
+                ];
+                let rest = from.layers.saturating_sub(source.base_array_layer);
+                effects
+                    .copies
+                    .add_layers(first, source.layer_count.min(rest));
+            }
         }
         // The host can read the texels of a linear image in memory.
         if self.images.is_linear(to) {

@@ -122,16 +122,16 @@ impl Passes {
         self.info(colors, depth, area, of.view_mask)
     }
 
-    /// Numbers of the images that a subpass resolves, and of those that they are resolved to.
-    pub fn resolves(&self, open: &super::OpenPass) -> Vec<[u32; 2]> {
+    /// The parts of images that a subpass resolves, and those that they are resolved to.
+    pub fn resolves(&self, open: &super::OpenPass) -> Vec<[ViewInfo; 2]> {
         let pass = self.passes.get(&open.pass.as_raw());
         let subpass = pass.and_then(|pass| pass.subpasses.get(open.subpass as usize));
         let known = self.framebuffers.get(&open.framebuffer.as_raw());
         let views = open.views.as_ref().or(known);
-        let image = |place: u32| Some(views?.get(place as usize)?.as_ref()?.image);
+        let view = |place: u32| *views?.get(place as usize)?;
         let pairs = subpass.into_iter().flat_map(|subpass| &subpass.resolves);
         pairs
-            .filter_map(|[from, to]| Some([image(*from)?, image(*to)?]))
+            .filter_map(|[from, to]| Some([view(*from)?, view(*to)?]))
             .collect()
     }
 

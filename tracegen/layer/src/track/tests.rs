@@ -283,7 +283,12 @@ fn copies_are_noted_once_by_the_numbers_of_their_images_also_in_secondary_comman
     let image = vk::Image::from_raw;
     let buffer = vk::CommandBuffer::from_raw;
     for (from, to) in [(7, 8), (7, 8), (9, 9), (7, 99)] {
-        tracker.note_copy(buffer(2), image(from), image(to));
+        let layers = [0, 3].map(|first| vk::ImageSubresourceLayers {
+            base_array_layer: first,
+            layer_count: 1,
+            ..Default::default()
+        });
+        tracker.note_copy(buffer(2), image(from), image(to), [layers]);
     }
     for (number, width) in [(8, 64), (9, 1)] {
         let size = vk::Extent3D {
@@ -299,6 +304,7 @@ fn copies_are_noted_once_by_the_numbers_of_their_images_also_in_secondary_comman
         (&copies.pairs[..], &copies.probed[..]),
         (&[[0, 1]][..], &[2][..])
     );
+    assert_eq!(copies.layers, [[0, 0, 1, 3]]);
     assert!(tracker.commands.effects([1]).reads_back);
 }
 
@@ -327,7 +333,12 @@ fn a_subpass_resolves_attachments_by_the_images_of_its_framebuffer() {
     tracker
         .passes
         .create_framebuffer(open.framebuffer, &views, &tracker.images);
-    assert_eq!(tracker.passes.resolves(&open), [[0, 1]]);
+    let resolves = tracker.passes.resolves(&open);
+    let images: Vec<_> = resolves
+        .iter()
+        .map(|pair| pair.map(|view| view.image))
+        .collect();
+    assert_eq!(images, [[0, 1]]);
 }
 
 #[test]

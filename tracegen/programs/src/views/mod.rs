@@ -5,6 +5,7 @@ mod file;
 mod images;
 mod others;
 mod rules;
+mod shown;
 
 pub use file::{FileError, RuleFile};
 pub use others::Other;
@@ -13,7 +14,7 @@ use crate::session::{Executed, ProgramFrame, Session, writes_color};
 use formats::view::Eye;
 use images::Images;
 use serde::{Deserialize, Serialize};
-use spool::{DrawInfo, PassInfo, ViewInfo};
+use spool::{DepthInfo, DrawInfo, PassInfo, ViewInfo};
 use thiserror::Error;
 
 /// How a program renders for two eyes.
@@ -34,6 +35,8 @@ pub enum Rule {
     Mono,
     /// A file of rules.
     File,
+    /// The images that an OpenXR program shows.
+    Shown,
 }
 
 impl Rule {
@@ -56,6 +59,7 @@ impl Rule {
             Self::Twice => "equal draws twice",
             Self::Mono => "one eye",
             Self::File => "a file of rules",
+            Self::Shown => "the images of xrEndFrame",
         }
     }
 }
@@ -175,19 +179,31 @@ struct Drawn<'a> {
 /// Key that is equal for the draws of both eyes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct DrawKey {
-    /// Pipeline.
-    pub pipeline: u32,
+    /// What it is drawn with.
+    pub program: DrawProgram,
     /// Number of vertices or indices.
     pub vertices: u32,
     /// Number of instances.
     pub instances: u32,
 }
 
+/// What two draws have in common although each has a pipeline of its own. Programs create a pipeline for each target.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum DrawProgram {
+    /// Number of the recording shader, topology, depth test, and whether colours are blended.
+    Shader(u32, i32, DepthInfo, bool),
+    /// Number of the pipeline of a draw that is not recorded.
+    Pipeline(u32),
+}
+
 impl DrawKey {
     /// The key of a draw.
     pub fn of(draw: &DrawInfo) -> Self {
+        let shader = |shader| DrawProgram::Shader(shader, draw.topology, draw.depth, draw.blends);
         Self {
-            pipeline: draw.pipeline,
+            program: draw
+                .shader
+                .map_or(DrawProgram::Pipeline(draw.pipeline), shader),
             vertices: draw.vertices,
             instances: draw.instances,
         }
@@ -317,16 +333,23 @@ pub fn find(
             false => ViewsError::Empty(frame.frame),
         });
     }
-    let (rule, found) = match wanted {
-        Wanted::File(file) => (Rule::File, file.find(frame.frame, &draws)?),
-        Wanted::Rule(rule) => {
+    // What the program itself tells comes first.
+    let by_shown = match wanted {
+        Wanted::Rule(Rule::Shown) | Wanted::First => (session.shown.get(&frame.frame))
+            .and_then(|eyes| shown::find(session, eyes, &draws, &frame.copied_layers)),
+        _ => None,
+    };
+    let (rule, found) = match (by_shown, wanted) {
+        (Some(found), _) => (Rule::Shown, found),
+        (_, Wanted::File(file)) => (Rule::File, file.find(frame.frame, &draws)?),
+        (_, Wanted::Rule(rule)) => {
             let found = rules::find(*rule, &draws).ok_or(ViewsError::NotBy {
                 frame: frame.frame,
                 rule: rule.name(),
             })?;
             (*rule, found)
         }
-        Wanted::First => {
+        (_, Wanted::First) => {
             let all = Rule::ALL.into_iter();
             let mut fitting = all
                 .filter_map(|rule| Some((rule, rules::find(rule, &draws)?)))

@@ -14,7 +14,7 @@ pub(super) fn find(rule: Rule, draws: &[Drawn<'_>]) -> Option<Found> {
         Rule::Channels => channels(draws),
         Rule::Twice => twice(draws),
         Rule::Mono => mono(draws),
-        Rule::File => None,
+        Rule::File | Rule::Shown => None,
     }
 }
 

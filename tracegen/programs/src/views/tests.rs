@@ -1,4 +1,5 @@
 use super::*;
+use spool::openxr::ShownEye;
 use spool::{DepthInfo, Event, Span, TextureInfo};
 
 const SIZE: u32 = 64;
@@ -94,10 +95,35 @@ impl Build {
         });
     }
 
+    /// Copies between layers of images.
+    fn copy_layers(&mut self, layers: &[[u32; 4]]) {
+        self.session.take(Event::Copies {
+            frame: 0,
+            pairs: Vec::new(),
+            layers: layers.to_vec(),
+            probed: Vec::new(),
+        });
+    }
+
+    /// Notes what an OpenXR program shows: image, layer, left edge and width of each eye.
+    fn show(&mut self, eyes: [[u32; 4]; 2]) {
+        let eyes = eyes.map(|[image, layer, left, width]| ShownEye {
+            image,
+            layer,
+            rect: [left as i32, 0, width as i32, SIZE as i32],
+            orientation: [0.0, 0.0, 0.0, 1.0],
+            position_m: [0.0; 3],
+            angles: [0.0; 4],
+            planes_m: None,
+        });
+        self.session.take(Event::Shown { frame: 0, eyes });
+    }
+
     fn copy(&mut self, pairs: &[[u32; 2]], probed: &[u32]) {
         self.session.take(Event::Copies {
             frame: 0,
             pairs: pairs.to_vec(),
+            layers: Vec::new(),
             probed: probed.to_vec(),
         });
     }
@@ -515,4 +541,68 @@ fn invalid_files_of_rules_are_refused_with_name_and_place() {
         assert!(error.starts_with("rules.toml") || error.contains("expected a rule"));
         assert!(error.contains(expected), "{error}");
     }
+}
+
+#[test]
+fn shown_images_are_followed_back_over_full_screen_passes_and_copies() {
+    // Each eye is drawn into the same target, which a pass without depth test reads into the shown image.
+    let mut build = Build::default();
+    for image in [8, 9] {
+        let scene = build.pass(Some(1), Some(2));
+        build.draw(scene, 1, [0, 64], 500);
+        let lens = build.pass(Some(image), None);
+        build.draw_with(lens, 7, [0, 64], 4096, reads(1));
+    }
+    let mirror = build.pass(Some(5), None);
+    build.draw_with(mirror, 8, [0, 64], 4096, reads(8));
+    build.show([[8, 0, 0, 64], [9, 0, 0, 64]]);
+    let views = build.find(&Wanted::First).unwrap();
+    let post = Role::Other(Other::PostProcessing);
+    assert_eq!(views.rule, Rule::Shown);
+    assert_eq!(views.roles, [LEFT, post, RIGHT, post, post]);
+
+    // The eyes are shown in another order than that in which they are drawn, and copied layer by layer.
+    let mut build = Build::default();
+    for color in [3, 4] {
+        let pass = build.pass(Some(color), None);
+        build.draw(pass, 1, [0, 64], 500);
+    }
+    build.copy_layers(&[[3, 0, 9, 1], [4, 0, 9, 0]]);
+    build.show([[9, 0, 0, 64], [9, 1, 0, 64]]);
+    let views = build.find(&Wanted::First).unwrap();
+    assert_eq!((views.rule, views.roles), (Rule::Shown, vec![RIGHT, LEFT]));
+}
+
+#[test]
+fn shown_rectangles_and_views_of_a_multiview_pass_are_the_eyes() {
+    let mut build = Build::default();
+    let pass = build.pass(Some(1), Some(2));
+    for left in [32, 0] {
+        build.draw(pass, 1, [left, 32], 300);
+    }
+    build.session.take(Event::Image(spool::ImageInfo {
+        image: 1,
+        format: 37,
+        size: [SIZE, SIZE, 1],
+        levels: 1,
+        layers: 1,
+        samples: 1,
+        presented: false,
+    }));
+    // The right half is shown to the left eye.
+    build.show([[1, 0, 32, 32], [1, 0, 0, 32]]);
+    let views = build.find(&Wanted::First).unwrap();
+    assert_eq!(
+        (views.rule, &views.roles[..]),
+        (Rule::Shown, &[LEFT, RIGHT][..])
+    );
+    assert_eq!(views.eyes.map(|eye| eye.origin), [[32, 0], [0, 0]]);
+
+    let mut build = Build::default();
+    let pass = build.multiview(Some(1), Some(2), 0b11);
+    build.draw(pass, 1, [0, 64], 500);
+    build.show([[1, 1, 0, 64], [1, 0, 0, 64]]);
+    let views = build.find(&Wanted::First).unwrap();
+    assert_eq!((views.rule, views.layers), (Rule::Shown, [1, 0]));
+    assert_eq!(views.roles, [Role::Multiview]);
 }

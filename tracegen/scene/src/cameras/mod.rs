@@ -170,15 +170,21 @@ pub fn eye_views(camera: &Camera, hmd: &Hmd) -> [EyeView; 2] {
     views_of_head(head_pose(camera), camera, hmd)
 }
 
-/// Both eyes' matrices for a head pose; near and far planes are the camera's.
-fn views_of_head(head: Affine3A, camera: &Camera, hmd: &Hmd) -> [EyeView; 2] {
+/// Poses of the left and the right eye relative to the head.
+pub fn eyes_in_head(hmd: &Hmd) -> [Affine3A; 2] {
     [-1.0f32, 1.0].map(|side| {
         // Outward is to the left for the left eye: a positive rotation about +y.
         let turn = Mat3::from_rotation_y(-side * hmd.cant_deg.to_radians());
-        let eye_in_head =
-            Affine3A::from_mat3_translation(turn, Vec3::new(side * hmd.ipd_m / 2.0, 0.0, 0.0));
-        let eye_to_world = head * eye_in_head;
-        let fov = &hmd.fov[usize::from(side > 0.0)];
+        Affine3A::from_mat3_translation(turn, Vec3::new(side * hmd.ipd_m / 2.0, 0.0, 0.0))
+    })
+}
+
+/// Both eyes' matrices for a head pose; near and far planes are the camera's.
+fn views_of_head(head: Affine3A, camera: &Camera, hmd: &Hmd) -> [EyeView; 2] {
+    let in_head = eyes_in_head(hmd);
+    [0, 1].map(|eye| {
+        let eye_to_world = head * in_head[eye];
+        let fov = &hmd.fov[eye];
         EyeView {
             world_to_eye: Mat4::from(eye_to_world.inverse()).to_cols_array_2d(),
             eye_to_clip: projection(fov, camera.near, camera.far).to_cols_array_2d(),
