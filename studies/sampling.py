@@ -17,7 +17,7 @@ OPTIONS = {
     "--populations": dict(help="folder of counts by frame, which are kept and used again (OUT/sampling)"),
 }
 SCENES = [
-    "crytek-sponza", "dabrovic-sponza", "stk-cocoa-temple", "stk-black-forest", "chess_42k", "bmw_55k",
+    "crytek-sponza", "dabrovic-sponza", "stk-cocoa-temple", "stk-black-forest", "chess_42k", "atrium-plain",
     "atrium", "jungle", "plant", "meadow", "lab", "music-box",
 ]
 ORDERS = "z2-lrta,z2-sta,zig-zag+sta+offset"

@@ -66,7 +66,7 @@ const MOST_CUTS: f64 = 0.25;
 /// Frames per stratum, roughly.
 const PER_BLOCK: usize = 10;
 /// Most strata of a path; each needs two frames.
-const MOST_BLOCKS: usize = 16;
+const MOST_BLOCKS: usize = 6;
 
 /// Strata of a path: cuts, which are all captured, and blocks of consecutive other frames, whose counts differ least
 /// within each block.
