@@ -15,7 +15,7 @@ use sim::stream::TileSource;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use studies::experiment::frame_count;
-use studies::locality::{OrderFigures, Stream, analyse, analyse_addresses};
+use studies::locality::{OrderFigures, Stream, Streams, analyse, analyse_addresses};
 
 /// Default of `--orders`.
 const USUAL_ORDERS: &str = "morton,z2-lrta,z2-sta,z2-sta-merge";
@@ -46,6 +46,9 @@ pub struct Args {
     /// Also analyse the accesses of all cores as one stream
     #[arg(long)]
     merged: bool,
+    /// Analyse only the L2's accesses, which takes a fraction of the time
+    #[arg(long, conflicts_with_all = ["merged", "addresses"])]
+    only_l2: bool,
     #[command(flatten)]
     outputs: PageOutputs,
     #[command(flatten)]
@@ -97,10 +100,15 @@ fn of_traces(args: &Args, config: &RunConfig, orders: &[Order]) -> Result<Vec<Tr
     let frames = |source: &dyn TileSource| u64::from(frame_count(source.tables()));
     let steps: u64 = subjects.iter().map(|s| frames(s.source)).sum();
     let progress = Progress::new("analysing", steps * orders.len() as u64, "frames");
+    let streams = match (args.merged, args.only_l2) {
+        (true, _) => Streams::WithMerged,
+        (false, true) => Streams::OnlyL2,
+        (false, false) => Streams::Levels,
+    };
     let mut figures = Vec::new();
     for subject in &subjects {
         let done = |steps| progress.advance(steps);
-        let orders = analyse(subject.source, config, orders, args.merged, &done)
+        let orders = analyse(subject.source, config, orders, streams, &done)
             .with_context(|| subject.label.clone())?;
         warn_of_bound(&subject.label, &orders);
         figures.push(TraceFigures {

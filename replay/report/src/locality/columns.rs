@@ -82,6 +82,11 @@ impl Summary<'_> {
         pct(count, self.figures.accesses)
     }
 
+    /// Bytes of lines.
+    fn bytes(&self, lines: f64) -> f64 {
+        lines * f64::from(self.of.line_bytes)
+    }
+
     /// Misses of a fully associative cache of this size under OPT.
     pub fn opt_misses(&self) -> u64 {
         self.figures.misses(&self.figures.opt_of_size())
@@ -199,6 +204,14 @@ pub fn summary<'a>() -> Vec<Column<'a, Summary<'a>>> {
             .about("all reuses, by the origin of the previous use: the hits of an infinite cache"));
     }
     columns.extend([
+        C::real("eye_bytes", "lines of an eye", "bytes", 0, |r| r.figures.eye_lines().map(|lines| r.bytes(lines)))
+            .about("distinct lines of an eye in a frame: where the closed form has the knee of the other eye's reuses, in orders that render one eye after the other"),
+        C::real("eye_knee_bytes", "half of the other eye's", "bytes", 0, |r| r.figures.eye_knee_lines().map(|lines| r.bytes(lines as f64)))
+            .about("smallest fully associative LRU cache that hits half of the reuses from the other eye"),
+        C::real("row_bytes", "lines of a row", "bytes", 0, |r| r.figures.row_lines().map(|lines| r.bytes(lines)))
+            .about("mean distinct lines of a row of tile pairs: where the closed form has the knee of the reuses of rows, in orders that render rows"),
+        C::real("row_knee_bytes", "half of the rows'", "bytes", 0, |r| r.figures.row_knee_lines().map(|lines| r.bytes(lines as f64)))
+            .about("smallest fully associative LRU cache that hits half of the reuses from another row"),
         whole("tiles", "tiles", |r| r.figures.tiles).about("tiles with line accesses"),
         C::real("tile_lines", "lines per tile", "", 1, |r| {
             let set = r.figures.working_sets.first()?;

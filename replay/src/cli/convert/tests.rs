@@ -14,7 +14,7 @@ use sim::stream::MemoryTrace;
 use sim::stream::testing::Synthetic;
 use sim::stream::testing::different_frames;
 use std::collections::HashSet;
-use studies::locality::analyse;
+use studies::locality::{Streams, analyse};
 use studies::orders_study::default_orders;
 
 #[derive(Parser)]
@@ -161,7 +161,7 @@ fn every_order_is_the_same_for_convert_run_locality_and_the_line_list() {
         let result = replay(source, &config).unwrap();
         let counted = [&result.l1, &result.l2].map(|level| level.counters.line_misses);
         assert_eq!(counted, misses, "{name}");
-        let figures = analyse(source, &config, &[order], false, &|_| ()).unwrap();
+        let figures = analyse(source, &config, &[order], Streams::Levels, &|_| ()).unwrap();
         let streams = figures[0].streams.iter();
         let counted: Vec<u64> = streams.map(|(_, figures)| figures.split.misses()).collect();
         assert_eq!(counted, misses, "{name}");

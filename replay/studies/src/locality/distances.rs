@@ -1,7 +1,7 @@
 //! Counts of reuse distances: the distinct other lines used between two uses of a line (LRU stack distance,
 //! Mattson et al. 1970). A fully associative LRU cache of `n` lines hits at distances below `n`.
 
-use super::place::{ByOrigin, add};
+use super::place::{ByOrigin, Origin, add};
 use super::set_associative::CacheHits;
 
 /// Reuses by distance and by location of the previous use.
@@ -55,6 +55,11 @@ impl Distances {
     /// Hits of a fully associative LRU cache.
     pub fn hits(&self, lines: u64) -> ByOrigin {
         self.below(usize::try_from(lines).unwrap_or(usize::MAX))
+    }
+
+    /// Reuses of one class, by distance.
+    pub(super) fn of(&self, origin: Origin) -> impl Iterator<Item = u64> + Clone {
+        self.0.iter().map(move |reuses| reuses[origin.index()])
     }
 
     /// The distances that occur, ascending.

@@ -1,6 +1,7 @@
 //! The results of analysing a stream of lines.
 
 use super::distances::Distances;
+use super::knees::Rows;
 use super::place::{ByOrigin, add};
 use super::set_associative::CacheHits;
 use super::split::MissSplit;
@@ -15,12 +16,16 @@ pub struct Figures {
     pub unique_lines: u64,
     /// Tiles with look-ups.
     pub tiles: u64,
+    /// Frames with look-ups, summed over caches.
+    pub frames: u64,
     /// Distinct lines per frame, summed over frames.
     pub frame_lines: u64,
     /// Lines of a frame that tiles of both eyes use, summed over frames.
     pub frame_lines_of_both_eyes: u64,
     /// Lines of a frame that an earlier frame used, summed over frames.
     pub frame_lines_of_earlier_frames: u64,
+    /// Lines and reuses of rows of tiles.
+    pub rows: Rows,
     /// Reuses by LRU stack distance.
     pub distances: Distances,
     /// Misses of the configured cache by cause.
@@ -46,10 +51,12 @@ impl Figures {
             accesses,
             unique_lines,
             tiles,
+            frames,
             frame_lines,
             frame_lines_of_both_eyes,
             frame_lines_of_earlier_frames
         );
+        self.rows.add(&other.rows);
         self.distances.add(&other.distances);
         self.split.add(&other.split);
         let lists = [(&mut self.lru, &other.lru), (&mut self.opt, &other.opt)];

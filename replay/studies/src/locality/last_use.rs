@@ -1,5 +1,6 @@
 //! Time and place of the last use of each used line.
 
+use super::knees::NO_ROW;
 use super::place::TileOfEye;
 
 /// No time.
@@ -12,6 +13,8 @@ pub(super) struct LastUse {
     pub(super) time: u32,
     /// Tile and eye.
     pub(super) place: TileOfEye,
+    /// Row of tiles, or [`NO_ROW`].
+    pub(super) row: u32,
     /// Work item of the last use by any eye, by the left and by the right; zero for never.
     pub(super) span: Span,
     pub(super) span_of_eye: [Span; 2],
@@ -49,6 +52,7 @@ impl LastUse {
     const NONE: Self = Self {
         time: NEVER,
         place: TileOfEye::NONE,
+        row: NO_ROW,
         span: Span(0),
         span_of_eye: [Span(0); 2],
     };

@@ -7,6 +7,7 @@
 mod axis;
 mod distances;
 mod figures;
+mod knees;
 mod last_use;
 mod opt;
 mod optimal;
@@ -22,8 +23,9 @@ mod working_set;
 
 pub use distances::{DistanceBin, Distances};
 pub use figures::Figures;
+pub use knees::Rows;
 pub use optimal::{OptMisses, opt_misses};
-pub use orders::{OrderFigures, Sequence, Stream, analyse};
+pub use orders::{OrderFigures, Sequence, Stream, Streams, analyse};
 pub use place::{ByOrigin, Origin, Place};
 pub use plain::analyse_addresses;
 pub use profile::{Profile, StreamCache};

@@ -8,6 +8,7 @@ use formats::view::Eye;
 use rayon::prelude::*;
 use sim::config::{ConfigError, LevelConfig, Order, RunConfig};
 use sim::engine::ReplayError;
+use sim::memory::{AnyCache, Cache};
 use sim::order::{Phase, frames};
 use sim::stream::{
     Consumer, Cores, Expander, LineMemory, QuadLines, StreamError, TileSource, Walk, interleave,
@@ -43,6 +44,17 @@ impl Stream {
             Self::Merged => "all cores as one",
         }
     }
+}
+
+/// The streams to analyse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Streams {
+    /// Those of the L1 caches and of the L2.
+    Levels,
+    /// These, and the look-ups of all cores as one.
+    WithMerged,
+    /// That of the L2, which takes a fraction of the time.
+    OnlyL2,
 }
 
 /// The order of the accesses.
@@ -99,11 +111,12 @@ pub fn analyse(
     trace: &dyn TileSource,
     config: &RunConfig,
     orders: &[Order],
-    merged: bool,
+    streams: Streams,
     done: &(dyn Fn(u64) + Sync),
 ) -> Result<Vec<OrderFigures>, ReplayError> {
     config.validate()?;
-    check_size(config, config.cores + u32::from(merged))?;
+    let merged = u32::from(streams == Streams::WithMerged);
+    check_size(config, config.cores + merged)?;
     let frames = frames(&trace.tables().passes);
     // State is kept from frame to frame, so with several frames only orders that run concurrently share an expansion.
     let together = match frames.len() {
@@ -123,7 +136,7 @@ pub fn analyse(
             .iter()
             .map(|_| {
                 (frames.len() != 1)
-                    .then(|| Analysis::new(config, merged))
+                    .then(|| Analysis::new(config, streams))
                     .transpose()
             })
             .collect();
@@ -140,7 +153,7 @@ pub fn analyse(
                 let phases = plan.phases(&RunConfig { order, ..*config });
                 let mut analysis = match kept.take() {
                     Some(analysis) => analysis,
-                    None => Analysis::new(config, merged)?,
+                    None => Analysis::new(config, streams)?,
                 };
                 let places = Places::new(passes, number, &phases, expander.bins().first_tiles());
                 if empties {
@@ -180,8 +193,8 @@ struct Places {
     first: usize,
     /// Work item of each tile, counted from 1, and whether it has two tiles.
     items: Vec<(u32, bool)>,
-    /// First tile and eye of each pass of the frame.
-    passes: Vec<(usize, Option<Eye>)>,
+    /// First tile, eye and columns of each pass of the frame.
+    passes: Vec<(usize, Option<Eye>, usize)>,
 }
 
 impl Places {
@@ -204,16 +217,21 @@ impl Places {
         Self {
             first,
             items,
-            passes: of_frame().map(|(pass, &first)| (first, pass.eye)).collect(),
+            passes: of_frame()
+                .map(|(pass, &first)| (first, pass.eye, (pass.tiles[0] as usize).max(1)))
+                .collect(),
         }
     }
 
     fn of(&self, tile: usize) -> Place {
         let (item, pair) = self.items[tile - self.first];
-        let pass = self.passes.iter().rfind(|(first, _)| *first <= tile);
+        let pass = self.passes.iter().rfind(|(first, ..)| *first <= tile);
+        let eye = pass.and_then(|(_, eye, _)| *eye);
+        let row = |(first, _, columns): &(usize, _, usize)| ((tile - first) / columns) as u32;
         Place {
             tile: tile as u32,
-            eye: pass.and_then(|(_, eye)| *eye),
+            eye,
+            row: pass.filter(|_| eye.is_some()).map(row),
             item,
             tiles: 1 + u32::from(pair),
         }
@@ -238,9 +256,26 @@ fn add(streams: &mut Vec<(Stream, Figures)>, stream: Stream, figures: Figures) {
     }
 }
 
-/// A core's analysis, and its current place.
+/// The L1 of a core.
+enum FirstLevel {
+    Analysed(Box<Profile>),
+    Plain(Box<dyn Cache>),
+}
+
+impl FirstLevel {
+    /// Looks up a line, and fills it on a miss. Returns true for a hit.
+    #[inline(always)]
+    fn access(&mut self, line: u32) -> bool {
+        match self {
+            Self::Analysed(profile) => profile.access(line),
+            Self::Plain(cache) => cache.access(line),
+        }
+    }
+}
+
+/// A core's L1, and its current place.
 struct Core {
-    profile: Profile,
+    l1: FirstLevel,
     tile: Option<usize>,
     place: Place,
 }
@@ -263,7 +298,7 @@ impl Shared {
 }
 
 impl Analysis {
-    fn new(config: &RunConfig, merged: bool) -> Result<Self, ConfigError> {
+    fn new(config: &RunConfig, streams: Streams) -> Result<Self, ConfigError> {
         // The seeds of a replay.
         let profile = |level: &'static str, cache: &LevelConfig, number: u32| {
             Profile::new(StreamCache {
@@ -277,18 +312,30 @@ impl Analysis {
             profile,
             tile: None,
         };
+        let plain = |number: u32| {
+            let seed = config.seed.wrapping_add(number.into());
+            AnyCache::build(&config.level.l1, "L1", config.line_bytes, seed)
+        };
         let core = |number| {
-            profile("L1", &config.level.l1, number).map(|profile| Core {
-                profile,
+            let l1 = match streams {
+                Streams::OnlyL2 => FirstLevel::Plain(plain(number)?.into_box()),
+                Streams::Levels | Streams::WithMerged => {
+                    FirstLevel::Analysed(Box::new(profile("L1", &config.level.l1, number)?))
+                }
+            };
+            Ok(Core {
+                l1,
                 tile: None,
                 place: Place::default(),
             })
         };
-        let merged = merged
+        let merged = (streams == Streams::WithMerged)
             .then(|| profile("L1", &config.level.l1, 1))
             .transpose()?;
         Ok(Self {
-            l1: (1..=config.cores).map(core).collect::<Result<_, _>>()?,
+            l1: (1..=config.cores)
+                .map(core)
+                .collect::<Result<_, ConfigError>>()?,
             l2: shared(profile("L2", &config.level.l2, 0)?),
             merged: merged.map(shared),
             places: None,
@@ -302,7 +349,12 @@ impl Analysis {
             return Ok(());
         }
         for core in &mut self.l1 {
-            add(&mut self.flushed, Stream::L1, core.profile.flush()?);
+            match &mut core.l1 {
+                FirstLevel::Analysed(profile) => {
+                    add(&mut self.flushed, Stream::L1, profile.flush()?);
+                }
+                FirstLevel::Plain(cache) => cache.clear(),
+            }
         }
         add(&mut self.flushed, Stream::L2, self.l2.profile.flush()?);
         if let Some(merged) = &mut self.merged {
@@ -315,7 +367,9 @@ impl Analysis {
         self.places = Some(places);
         for core in &mut self.l1 {
             core.tile = None;
-            core.profile.begin_frame();
+            if let FirstLevel::Analysed(profile) = &mut core.l1 {
+                profile.begin_frame();
+            }
         }
         for shared in [Some(&mut self.l2), self.merged.as_mut()]
             .into_iter()
@@ -329,7 +383,9 @@ impl Analysis {
     fn finish(self, order: Order) -> OrderFigures {
         let mut streams = self.flushed;
         for core in self.l1 {
-            add(&mut streams, Stream::L1, core.profile.finish());
+            if let FirstLevel::Analysed(profile) = core.l1 {
+                add(&mut streams, Stream::L1, profile.finish());
+            }
         }
         add(&mut streams, Stream::L2, self.l2.profile.finish());
         if let Some(merged) = self.merged {
@@ -352,12 +408,14 @@ impl Consumer for Analysis {
         if core.tile != Some(tile) {
             core.tile = Some(tile);
             core.place = places.of(tile);
-            core.profile.at(&core.place);
+            if let FirstLevel::Analysed(profile) = &mut core.l1 {
+                profile.at(&core.place);
+            }
         }
         for footprint in quad.footprints() {
             for _ in 0..=footprint.repeats {
                 for &line in footprint.lines {
-                    if !core.profile.access(line) {
+                    if !core.l1.access(line) {
                         self.l2.access(tile, &core.place, line);
                     }
                     if let Some(merged) = &mut self.merged {

@@ -9,6 +9,8 @@ pub struct Place {
     pub tile: u32,
     /// The eye of the tile.
     pub eye: Option<Eye>,
+    /// Row of the tile in the picture of its eye; none in other passes.
+    pub row: Option<u32>,
     /// Number of the work item (one tile, or tiles rendered together), ascending in time.
     pub item: u32,
     /// Tiles of the work item: 1 or 2.

@@ -44,6 +44,7 @@ impl Level {
             self.profile.at(&Place {
                 tile,
                 eye: None,
+                row: None,
                 item: tile + 1,
                 tiles: 1,
             });

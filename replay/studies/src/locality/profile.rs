@@ -8,6 +8,7 @@
 use super::axis::{CountedTimes, Renumbering};
 use super::distances::Distances;
 use super::figures::Figures;
+use super::knees::{NO_ROW, RowCounts};
 use super::last_use::{LastUses, NEVER, Span};
 use super::opt;
 use super::place::{ByOrigin, Origin, Place, TileOfEye, add};
@@ -67,6 +68,8 @@ pub struct Profile {
     lines: u32,
 
     here: TileOfEye,
+    /// Row of the tile, or [`NO_ROW`].
+    row: u32,
     item: Option<u32>,
     span: Span,
     /// Number of tiles so far.
@@ -81,7 +84,11 @@ pub struct Profile {
     /// Start of the frame, on the axis and on the clock of tiles.
     frame_start: u32,
     frame_first: Span,
+    /// Frames with look-ups, and whether this frame has had one.
+    frames: u64,
+    is_frame_counted: bool,
 
+    rows: RowCounts,
     distances: Distances,
     /// Immediate reuses.
     at_once: ByOrigin,
@@ -136,6 +143,7 @@ impl Profile {
             cache: AnyCache::build(&of.cache, of.level, of.line_bytes, of.seed)?.into_box(),
             lines,
             here: TileOfEye::NONE,
+            row: NO_ROW,
             item: None,
             span: Span::new(1, 1),
             tiles: 0,
@@ -145,6 +153,9 @@ impl Profile {
             times,
             frame_start: 0,
             frame_first: Span::new(1, 1),
+            frames: 0,
+            is_frame_counted: false,
+            rows: RowCounts::default(),
             distances: Distances::default(),
             at_once: ByOrigin::default(),
             split: MissSplit::default(),
@@ -177,12 +188,17 @@ impl Profile {
     pub(super) fn begin_frame(&mut self) {
         self.frame_start = self.now;
         self.frame_first = Span::new(self.tiles + 1, 1);
+        self.is_frame_counted = false;
+        self.rows.begin_frame();
         self.item = None;
     }
 
     /// Sets the place of the following look-ups.
     pub fn at(&mut self, place: &Place) {
         self.here = TileOfEye::of(place);
+        self.row = place.row.unwrap_or(NO_ROW);
+        self.frames += u64::from(!self.is_frame_counted);
+        self.is_frame_counted = true;
         if self.item.is_none_or(|item| place.item > item) {
             self.item = Some(place.item);
             self.span = Span::new(self.tiles + 1, place.tiles);
@@ -197,8 +213,14 @@ impl Profile {
         }
         let hit = self.cache.access(line);
         let last = self.uses.of(line);
-        let (before, place_before) = (last.time, last.place);
-        last.place = self.here;
+        let (before, place_before, row_before) = (last.time, last.place, last.row);
+        (last.place, last.row) = (self.here, self.row);
+        let in_this_frame = before != NEVER && before >= self.frame_start;
+        let is_other_row = row_before != self.row && self.row != NO_ROW;
+        if is_other_row || !in_this_frame && self.row != NO_ROW {
+            self.rows.enter(self.row, line);
+        }
+        let is_from_row = in_this_frame && is_other_row && row_before != NO_ROW;
         if last.span != self.span || place_before != self.here {
             if last.span < self.frame_first {
                 self.frame_lines += 1;
@@ -221,15 +243,20 @@ impl Profile {
             self.now += 1;
             return hit;
         }
-        let in_this_frame = before >= self.frame_start;
         let origin = Origin::of(place_before, in_this_frame, self.here).index();
         if before + 1 == now && in_this_frame {
             self.at_once[origin] += 1;
+            if is_from_row {
+                self.rows.reuse(0);
+            }
             return hit;
         }
         last.time = now;
         let distance = self.last_times.move_to_end(before, now);
         self.distances.count(distance, origin, 1);
+        if is_from_row {
+            self.rows.reuse(distance);
+        }
         self.split.count(origin, hit, distance < self.lines);
         self.lru.access(line, Some(origin));
         for opt in &mut self.opt {
@@ -291,6 +318,8 @@ impl Profile {
             accesses: split.compulsory + reuses,
             unique_lines: split.compulsory,
             tiles: self.tiles.into(),
+            frames: self.frames,
+            rows: self.rows.finish(),
             frame_lines: self.frame_lines,
             frame_lines_of_both_eyes: self.frame_lines_of_both_eyes,
             frame_lines_of_earlier_frames: self.frame_lines_of_earlier_frames,

@@ -44,6 +44,7 @@ fn streams() -> impl Strategy<Value = Vec<Access>> {
                     frame,
                     line,
                     place: Place {
+                        row: eye.map(|_| (tile + u32::from(second)) % 16 / 4),
                         // Frames show the same tiles again.
                         tile: (tile + u32::from(second)) % 16,
                         eye,
@@ -138,6 +139,9 @@ proptest! {
         let split = plain::split(&origins, &own, &all);
         prop_assert_eq!(figures.split, split);
 
+        prop_assert_eq!(&figures.rows, &plain::rows(&stream));
+        let frames: std::collections::HashSet<u32> = stream.iter().map(|a| a.frame).collect();
+        prop_assert_eq!(figures.frames, frames.len() as u64);
         let sets = plain::working_sets(&stream);
         prop_assert_eq!(&figures.working_sets, &sets);
         prop_assert_eq!(
@@ -202,7 +206,7 @@ fn misses_equal_those_of_a_replay() {
             level: Levels::two(cache(2 << 10), cache(16 << 10)),
             ..RunConfig::default()
         };
-        let figures = analyse(&trace, &config, &orders, true, &|_| ()).unwrap();
+        let figures = analyse(&trace, &config, &orders, Streams::WithMerged, &|_| ()).unwrap();
         for of_order in figures {
             let Sequence::Order(order) = of_order.order else {
                 panic!("traces are analysed in tile orders");
@@ -225,6 +229,111 @@ fn misses_equal_those_of_a_replay() {
             assert_eq!(merged.unique_lines, result.unique_lines);
             assert_eq!(of_order.streams[1].1.unique_lines, result.unique_lines);
         }
+    }
+}
+
+/// A picture of two eyes whose tiles use lines of their own, the other eye's and the row above's.
+fn pictures(columns: u32, rows: u32, lines_of_tile: u32, order: &[(u32, u32, Eye)]) -> Vec<Access> {
+    let access = |(item, &(column, row, eye)): (u32, &(u32, u32, Eye))| {
+        let tile = row * columns + column;
+        let first = tile * lines_of_tile;
+        // Half of a tile's lines belong to the tile below as well, and all of them to both eyes.
+        let own = first..first + lines_of_tile;
+        let above = (row > 0).then(|| {
+            first - columns * lines_of_tile..first - columns * lines_of_tile + lines_of_tile / 2
+        });
+        let lines = own.chain(above.into_iter().flatten());
+        lines.map(move |line| Access {
+            frame: 0,
+            line,
+            place: Place {
+                tile: tile + if eye == Eye::Left { 0 } else { columns * rows },
+                eye: Some(eye),
+                row: Some(row),
+                item,
+                tiles: 1,
+            },
+        })
+    };
+    (1..).zip(order).flat_map(access).collect()
+}
+
+/// Each closed form equals the smallest LRU cache that finds half of its reuses, which a plain program finds by trying
+/// every size.
+#[test]
+fn both_knees_are_where_their_closed_forms_say() {
+    let (columns, rows, lines) = (6, 5, 8);
+    let tiles = || (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
+    let both = [Eye::Left, Eye::Right];
+    let eye_after_eye: Vec<_> = (both.iter())
+        .flat_map(|&eye| tiles().map(move |(column, row)| (column, row, eye)))
+        .collect();
+    let row_of_pairs: Vec<_> = tiles()
+        .flat_map(|(column, row)| both.map(|eye| (column, row, eye)))
+        .collect();
+    let cache = LevelConfig::lru(64 * 16);
+    // The smallest LRU cache that hits half of the chosen reuses.
+    let smallest = |stream: &[Access], chosen: &dyn Fn(&Access, &Access) -> bool| {
+        let numbers: Vec<u32> = stream.iter().map(|access| access.line).collect();
+        let mut last = std::collections::HashMap::new();
+        let is_chosen: Vec<bool> = (stream.iter())
+            .map(|access| {
+                last.insert(access.line, *access)
+                    .is_some_and(|before| chosen(&before, access))
+            })
+            .collect();
+        let all = is_chosen.iter().filter(|is| **is).count();
+        (1..).find(|&size| {
+            let hits = plain::lru(&numbers, 1, size);
+            2 * hits
+                .iter()
+                .zip(&is_chosen)
+                .filter(|(hit, is)| **hit && **is)
+                .count()
+                >= all
+        })
+    };
+
+    let stream = pictures(columns, rows, lines, &eye_after_eye);
+    let figures = analysed(&stream, &cache);
+    let found = smallest(&stream, &|before, now| before.place.eye != now.place.eye);
+    assert_eq!(figures.eye_knee_lines(), found.map(u64::from));
+    assert_eq!(figures.eye_lines(), Some(f64::from(columns * rows * lines)));
+    assert_eq!(
+        figures.eye_knee_lines(),
+        Some(u64::from(columns * rows * lines))
+    );
+
+    let stream = pictures(columns, rows, lines, &row_of_pairs);
+    let figures = analysed(&stream, &cache);
+    let found = smallest(&stream, &|before, now| before.place.row != now.place.row);
+    assert_eq!(figures.row_knee_lines(), found.map(u64::from));
+    // The first row has no lines of a row above it.
+    let of_row = f64::from(columns * lines) * (1.0 + 0.5 * f64::from(rows - 1) / f64::from(rows));
+    assert_eq!(figures.row_lines(), Some(of_row));
+    let ratio = figures.row_knee_lines().unwrap() as f64 / of_row;
+    assert!((0.8..=1.25).contains(&ratio), "{ratio}");
+    // In pairs, the other eye's lines are found again at once.
+    assert_eq!(figures.eye_knee_lines(), Some(u64::from(lines + lines / 2)));
+}
+
+/// The L2's figures do not depend on whether the L1 is analysed.
+#[test]
+fn the_l2_alone_has_the_same_figures() {
+    let trace = Synthetic::default().generate();
+    let orders = [Order::MORTON, Order::Z2_STA];
+    let config = RunConfig {
+        mode: Mode::Functional,
+        level: Levels::two(LevelConfig::lru(2 << 10), LevelConfig::lru(16 << 10)),
+        ..RunConfig::default()
+    };
+    let of = |streams| analyse(&trace, &config, &orders, streams, &|_| ()).unwrap();
+    for (all, alone) in of(Streams::Levels).iter().zip(of(Streams::OnlyL2)) {
+        let [(Stream::L2, alone)] = alone.streams.as_slice() else {
+            panic!("one stream");
+        };
+        assert_eq!(all.streams[1].1, *alone);
+        assert!(alone.row_lines().is_some());
     }
 }
 
@@ -262,7 +371,9 @@ fn with_a_flush_between_frames_each_frame_has_the_figures_of_a_separate_analysis
             level: Levels::two(cache(2 << 10), cache(16 << 10)),
             ..RunConfig::default()
         };
-        let of = |trace: &MemoryTrace| analyse(trace, &config, &orders, true, &|_| ()).unwrap();
+        let of = |trace: &MemoryTrace| {
+            analyse(trace, &config, &orders, Streams::WithMerged, &|_| ()).unwrap()
+        };
         for (single, flushed) in of(&one).iter().zip(of(&three)) {
             let Sequence::Order(order) = flushed.order else {
                 panic!("traces are analysed in tile orders");

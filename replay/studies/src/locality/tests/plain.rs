@@ -1,7 +1,7 @@
 //! The plainest implementation of each figure.
 
 use super::Access;
-use crate::locality::{ByOrigin, MissSplit, Origin, StreamCache, WorkingSet};
+use crate::locality::{ByOrigin, MissSplit, Origin, Rows, StreamCache, WorkingSet};
 use formats::view::Eye;
 use sim::memory::AnyCache;
 use std::collections::{HashMap, HashSet};
@@ -165,4 +165,37 @@ pub fn frame_lines(stream: &[Access]) -> [u64; 3] {
         earlier.extend(all);
     }
     counts
+}
+
+/// Rows with look-ups, distinct lines of each row, and the reuses from another row of the frame, by distance.
+pub fn rows(stream: &[Access]) -> Rows {
+    let lines: Vec<u32> = stream.iter().map(|access| access.line).collect();
+    let in_rows = || {
+        stream
+            .iter()
+            .filter_map(|a| Some((a.frame, a.place.row?, a.line)))
+    };
+    let seen: HashSet<(u32, u32)> = in_rows().map(|(frame, row, _)| (frame, row)).collect();
+    let lines_of_rows: HashSet<(u32, u32, u32)> = in_rows().collect();
+    let mut distances_of_rows: Vec<u64> = Vec::new();
+    let mut last: HashMap<u32, Access> = HashMap::new();
+    for (access, distance) in stream.iter().zip(distances(&lines)) {
+        let before = last.insert(access.line, *access);
+        let (Some(before), Some(distance)) = (before, distance) else {
+            continue;
+        };
+        let rows = before.place.row.zip(access.place.row);
+        if before.frame == access.frame && rows.is_some_and(|(a, b)| a != b) {
+            let distance = distance as usize;
+            if distances_of_rows.len() <= distance {
+                distances_of_rows.resize(distance + 1, 0);
+            }
+            distances_of_rows[distance] += 1;
+        }
+    }
+    Rows {
+        rows: seen.len() as u64,
+        row_lines: lines_of_rows.len() as u64,
+        distances: distances_of_rows,
+    }
 }
