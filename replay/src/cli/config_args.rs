@@ -39,7 +39,7 @@ pub struct ConfigArgs {
     /// TOML file with the configuration; flags override it
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Named machine instead of the defaults; flags override it
+    /// Named machine instead of the defaults; flags override it (docs/models/machines.md)
     #[arg(long, value_parser = choice::<Preset>(), conflicts_with = "config")]
     preset: Option<Preset>,
     /// Tile order: a name, or parts as in zig-zag+sta+offset+boustro (docs/models/orders.md)
@@ -249,6 +249,23 @@ impl ConfigArgs {
     /// See [`Self::resolve`].
     pub(super) fn resolve_without_preset(&self) -> Result<RunConfig> {
         self.resolve_file_over(RunConfig::default())
+    }
+
+    /// `defaults` at every corner of the ranges of `--preset`, then the flags; nothing if the preset has no ranges.
+    ///
+    /// # Errors
+    /// A corner that the flags make impossible.
+    pub(super) fn resolve_corners(&self, defaults: RunConfig) -> Result<Vec<RunConfig>> {
+        let machine = self.preset.and_then(Preset::machine);
+        let mut corners = Vec::new();
+        for mut config in machine.map_or_else(Vec::new, |machine| machine.corners(defaults)) {
+            self.apply(&mut config)?;
+            config.validate()?;
+            if !corners.contains(&config) {
+                corners.push(config);
+            }
+        }
+        Ok(corners)
     }
 
     /// The machine of `--preset`.

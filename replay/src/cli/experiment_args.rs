@@ -74,6 +74,11 @@ impl ExperimentArgs {
         let mut plan = Plan::paper(base, &caches, &parse_orders(&self.orders)?, functional)?;
         if let Some(preset) = self.machine.preset() {
             ensure!(
+                preset.machine().is_none(),
+                "--preset: expected z2-paper, whose rates are counted as the paper's, found {}; replay run and replay orders take it",
+                preset.name()
+            );
+            ensure!(
                 base.is_looping(),
                 "--preset: it is compared with the timed model; leave out --mode"
             );

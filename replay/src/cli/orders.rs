@@ -10,6 +10,7 @@ use anyhow::{Context, Result, bail, ensure};
 use report::orders::{LearnedTrace, OrdersReport};
 use shell::Progress;
 use sim::config::{BetweenFrames, Mode, Order, RunConfig};
+use sim::preset::{Machine, Preset};
 use sim::size::format_bytes;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -17,7 +18,12 @@ use std::process::ExitCode;
 use studies::experiment::frame_count;
 use studies::orders_study::learn::learn;
 use studies::orders_study::search::{Method, Schedule};
-use studies::orders_study::{BASELINE, OrderFile, OrdersStudy, Searched, Subjects, default_orders};
+use studies::orders_study::{
+    BASELINE, Corners, OrderFile, OrdersStudy, Searched, Subjects, default_orders,
+};
+
+/// The default of `--caches`: the paper's machines.
+const CACHES: &str = "8/128,16/128,8/256,16/256";
 
 /// Stands for the orders that the study knows: every curve and every part.
 const ALL: &str = "all";
@@ -34,6 +40,7 @@ const LEARNER: &str = "adaptive+sta+offset+boustro,zig-zag+sta+offset+boustro,ba
   replay orders head.textrace --between keep,lose-50,flush --orders z2-sta,zig-zag+sta+offset+boustro
   replay orders head.textrace --learn
   replay orders a.textrace --search anneal --moves 1000000 --save-orders searched
+  replay orders a.textrace --preset adreno-740 --orders morton,z2-sta,zig-zag+sta+offset
   replay orders a.textrace --mode timed --dram lpddr4 --orders z2-sta,zig-zag+sta+offset
 docs/models/orders.md explains the parts of an order, docs/results/orders.md has results.")]
 pub struct Args {
@@ -46,13 +53,9 @@ pub struct Args {
     /// [default: all, which has every named order, every curve and every part]
     #[arg(long, value_name = "ORDERS")]
     orders: Option<String>,
-    /// L1/L2 sizes in KiB, comma-separated
-    #[arg(
-        long,
-        value_name = "L1/L2,...",
-        default_value = "8/128,16/128,8/256,16/256"
-    )]
-    caches: String,
+    /// L1/L2 sizes in KiB, comma-separated [default: those of a --preset with caches, else 8/128,16/128,8/256,16/256]
+    #[arg(long, value_name = "L1/L2,...")]
+    caches: Option<String>,
     /// What happens to caches between frames, comma-separated: keep, flush, lose-N
     #[arg(long, value_name = "CACHES,...", default_value = "keep")]
     between: String,
@@ -102,8 +105,9 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 .collect::<Vec<_>>(),
         )?,
     };
-    let replays =
-        opened.len() * study.orders.len() * study.caches_bytes.len() * study.between.len();
+    let corners = study.corners.as_ref().map_or(0, |all| all.configs.len());
+    let machines = study.caches_bytes.len() + corners;
+    let replays = opened.len() * study.orders.len() * machines * study.between.len();
     let progress = Progress::new("replaying", replays as u64, "replays");
     let (rows, searched, work) = study.run(&subjects, &|done| progress.advance(done))?;
     drop(progress);
@@ -135,7 +139,8 @@ fn study(args: &Args) -> Result<OrdersStudy> {
         ..RunConfig::default()
     };
     let base = args.machine.resolve_over(usual)?;
-    refuse_varied(&base, &usual)?;
+    let machine = args.machine.preset().and_then(Preset::machine);
+    refuse_varied(&base, &machine.map_or(usual, |machine| machine.over(usual)))?;
     ensure!(
         base.between_frames == usual.between_frames,
         "--between-frames is varied here; use --between"
@@ -144,9 +149,15 @@ fn study(args: &Args) -> Result<OrdersStudy> {
     if !orders.contains(&BASELINE) {
         orders.insert(0, BASELINE);
     }
+    let caches_bytes = match (&args.caches, machine) {
+        (Some(text), _) => parse_caches(text)?,
+        (None, Some(_)) => vec![(base.level.l1.size_bytes, base.level.l2.size_bytes)],
+        (None, None) => parse_caches(CACHES)?,
+    };
     let mut study = OrdersStudy {
         base,
-        caches_bytes: parse_caches(&args.caches)?,
+        corners: corners(args, machine, usual)?,
+        caches_bytes,
         between: parse_between(&args.between)?,
         orders,
         methods: Vec::new(),
@@ -163,6 +174,21 @@ fn study(args: &Args) -> Result<OrdersStudy> {
         config.validate()?;
     }
     Ok(study)
+}
+
+/// The corners of the ranges of a machine. `--caches` leaves no size to vary.
+fn corners(args: &Args, machine: Option<&Machine>, usual: RunConfig) -> Result<Option<Corners>> {
+    let Some(machine) = machine.filter(|_| args.caches.is_none()) else {
+        return Ok(None);
+    };
+    let configs = args.machine.resolve_corners(usual)?;
+    let over = format!(
+        "{} corners of {}: {}",
+        configs.len(),
+        machine.name,
+        machine.ranges_text()
+    );
+    Ok((!configs.is_empty()).then_some(Corners { configs, over }))
 }
 
 /// Parses comma-separated orders. Here `all` also has every curve and part, not only the orders with a name.

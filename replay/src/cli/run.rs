@@ -9,6 +9,7 @@ use anyhow::{Result, bail, ensure};
 use report::run::{ModesReport, RunReport};
 use shell::Output;
 use sim::config::{Mode, TmuModel};
+use sim::preset::Preset;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -71,6 +72,16 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     if let Some(path) = args.addresses.path(&args.machine)? {
         args.threads.start()?;
         return args.addresses.run(path, &config, &args.outputs);
+    }
+    if let Some(machine) = args.machine.preset().and_then(Preset::machine)
+        && machine.ranged().next().is_some()
+    {
+        shell::note(&format!(
+            "{}: not published: {}; `replay orders --preset {}` states how far figures move",
+            machine.name,
+            machine.ranges_text(),
+            machine.name
+        ));
     }
     config.tile_maps |= args.tiles;
     config.timeline = args.timeline.is_some();

@@ -1,8 +1,9 @@
 //! The columns of the tables, one per line.
 
 use super::Mean;
-use crate::columns::{Column, Columns, Value, columns_of};
+use crate::columns::{Column, Columns, Kind, Value, columns_of};
 use sim::config::Order;
+use sim::figure::{Because, Figure};
 use studies::orders_study::learn::{Learned, Learner};
 use studies::orders_study::{OrderRow, RowKind};
 
@@ -19,6 +20,18 @@ pub(super) const CHANGES: [&str; 7] = [
 
 /// Keys of the sizes of an order's tables.
 pub(super) const SIZES: [&str; 3] = ["state_bytes", "table_bytes", "tile_buffers"];
+
+/// A figure whose ends are shown if they are bounds; a plain number if it is exact.
+fn bounded(figure: Option<Figure>) -> Value {
+    match figure {
+        Some(Figure {
+            value,
+            because: Because::Exact,
+            ..
+        }) => Value::Real(value),
+        figure => figure.into(),
+    }
+}
 
 fn kib(bytes: u64) -> f64 {
     bytes as f64 / 1024.0
@@ -61,8 +74,8 @@ pub fn rows<'a>() -> Vec<Column<'a, OrderRow<'a>>> {
         .whole("frames", "frames", "", |r| r.frames())
         .text("between_frames", "between frames", |r| r.config.between_frames.to_string())
         .whole("external_bytes", "traffic", "bytes", |r| r.external_bytes).about("between the L2 and memory, all frames together")
-        .real("external_mb_per_frame", "traffic", "MB/frame", 3, |r| r.mb_per_frame())
-        .real("change_pct", "against Z2 STA", "%", 2, |r| r.ratio().map(|ratio| 100.0 * (ratio - 1.0))).about("bytes against those of z2-sta with the same caches")
+        .real("external_mb_per_frame", "traffic", "MB/frame", 3, |r| bounded(Some(r.megabytes()))).change_last(|column| column.kind(Kind::Real))
+        .real("change_pct", "against Z2 STA", "%", 2, |r| bounded(r.change_pct())).change_last(|column| column.kind(Kind::Real)).about("bytes against those of z2-sta with the same caches; ends: the corners of the preset's ranges")
         .real("closed_pct", "of the way to greedy", "%", 1, |r| r.closed_pct()).about("of the distance from z2-sta to the offline greedy order")
         .whole("distinct_bytes", "distinct", "bytes", |r| r.distinct_bytes).about("traffic of an infinite cache")
         .real("l1_footprint_miss_pct", "L1 misses", "% of footprints", 3, |r| l1_footprint_miss_rate(r).map(|rate| 100.0 * rate)).about("of footprints")
@@ -106,7 +119,7 @@ pub fn means<'a>() -> Vec<Column<'a, Mean<'a>>> {
         .text("buildable", "buildable", |m| m.cost().is_some_and(|cost| cost.is_buildable()))
         .text("information", "information", information)
         .whole("rows", "rows", "", |m| m.count()).about("traces times caches, without those in which the baseline fetches each line once; means are over these rows, or over all if there are none")
-        .real("change_pct", "against Z2 STA", "%", 2, Mean::change_pct).about("geometric mean of bytes over those of z2-sta")
+        .real("change_pct", "against Z2 STA", "%", 2, |m| bounded(m.change())).change_last(|column| column.kind(Kind::Real)).about("geometric mean of bytes over those of z2-sta; ends: the corners of the preset's ranges")
         .text("worst_trace", "worst trace", |m| m.worst_trace().map(|(label, _)| label.to_owned())).about("by the geometric mean over its caches")
         .real("worst_trace_change_pct", "there", "%", 2, |m| m.worst_trace().map(|(_, change)| change))
         .real("worst_pct", "worst row", "%", 2, Mean::worst_pct).about("of a trace with a pair of caches")

@@ -2,6 +2,7 @@
 
 use crate::lists::{geometric_mean, mean, unique};
 use sim::config::BetweenFrames;
+use sim::figure::Figure;
 use sim::order::cost::Cost;
 use studies::orders_study::OrderRow;
 
@@ -49,6 +50,22 @@ impl<'a> Mean<'a> {
     /// Change of the bytes relative to the baseline, percent.
     pub fn change_pct(&self) -> Option<f64> {
         geometric(self.open().filter_map(OrderRow::ratio)).map(change_pct)
+    }
+
+    /// The same, with the lowest and the highest mean at a corner of the machine's ranges.
+    pub fn change(&self) -> Option<Figure> {
+        let value = self.change_pct()?;
+        let corners: Option<Vec<_>> = self.open().map(|row| row.corners.as_ref()).collect();
+        let corners = corners.unwrap_or_default();
+        let Some(first) = corners.first() else {
+            return Some(Figure::exact(value));
+        };
+        let at = |index| {
+            let ratios = corners.iter().filter_map(move |of| of.ratios().nth(index));
+            geometric(ratios).map(change_pct)
+        };
+        let means = (0..first.bytes.len()).filter_map(at);
+        Some(Figure::bounded(value, means, first.over.clone()))
     }
 
     /// Change of the cycles relative to the baseline, percent.

@@ -19,5 +19,5 @@ mod study;
 pub use default_orders::default_orders;
 pub use items::Items;
 pub use order_file::{OrderFile, OrderFileError};
-pub use row::{BASELINE, Bound, OrderRow, RowKind};
-pub use study::{OrdersError, OrdersStudy, Searched, Subjects};
+pub use row::{BASELINE, Bound, CornerBytes, OrderRow, RowKind};
+pub use study::{Corners, OrdersError, OrdersStudy, Searched, Subjects};

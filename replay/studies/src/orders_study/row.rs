@@ -2,6 +2,7 @@
 
 use crate::experiment::{Subject, frame_count};
 use sim::config::{BetweenFrames, Order, RunConfig};
+use sim::figure::Figure;
 use sim::order::cost::Cost;
 use sim::result::RunResult;
 use std::collections::HashMap;
@@ -73,6 +74,28 @@ pub struct OrderRow<'a> {
     pub greedy_bytes: Option<u64>,
     /// Bytes of the trace's distinct lines.
     pub distinct_bytes: u64,
+    /// Bytes at the corners of a machine's ranges, if it has any.
+    pub corners: Option<CornerBytes>,
+}
+
+/// Bytes of an order at the corners of a machine's ranges.
+#[derive(Clone, Debug, Default)]
+pub struct CornerBytes {
+    /// The ranges in words.
+    pub over: String,
+    /// Bytes of the order and of the baseline at each corner.
+    pub bytes: Vec<[u64; 2]>,
+}
+
+impl CornerBytes {
+    /// Bytes relative to the baseline at each corner.
+    pub fn ratios(&self) -> impl Iterator<Item = f64> + '_ {
+        let of = |&[own, base]: &[u64; 2]| match base {
+            0 => 1.0,
+            base => own as f64 / base as f64,
+        };
+        self.bytes.iter().map(of)
+    }
 }
 
 impl OrderRow<'_> {
@@ -105,6 +128,31 @@ impl OrderRow<'_> {
             (0, 0) => Some(1.0),
             (_, 0) => None,
             (own, base) => Some(own as f64 / base as f64),
+        }
+    }
+
+    /// Bytes relative to the baseline, percent. Its ends are the lowest and the highest value at the corners of the
+    /// machine's ranges.
+    pub fn change_pct(&self) -> Option<Figure> {
+        let pct = |ratio: f64| 100.0 * (ratio - 1.0);
+        let value = pct(self.ratio()?);
+        Some(match &self.corners {
+            None => Figure::exact(value),
+            Some(corners) => {
+                Figure::bounded(value, corners.ratios().map(pct), corners.over.clone())
+            }
+        })
+    }
+
+    /// Bytes per frame in MB, with ends as those of [`Self::change_pct`].
+    pub fn megabytes(&self) -> Figure {
+        match &self.corners {
+            None => Figure::exact(self.mb_per_frame()),
+            Some(corners) => {
+                let per_frame = |bytes: u64| bytes as f64 / f64::from(self.frames().max(1)) / 1e6;
+                let all = corners.bytes.iter().map(|[own, _]| per_frame(*own));
+                Figure::bounded(self.mb_per_frame(), all, corners.over.clone())
+            }
         }
     }
 
@@ -166,6 +214,7 @@ pub(super) fn row<'a>(
         baseline_bytes: 0,
         baseline_cycles: None,
         greedy_bytes: None,
+        corners: None,
     }
 }
 

@@ -1,6 +1,6 @@
 //! Replays every order with every pair of caches on every trace, and computes bounds.
 
-use super::row::{BASELINE, Bound, OrderRow, RowKind, compare, row};
+use super::row::{BASELINE, Bound, CornerBytes, OrderRow, RowKind, compare, row};
 use super::search::{Ground, Method};
 use super::{OrderFile, OrderFileError, bounds};
 use crate::experiment::{self, Plan, Point, RunError, Subject, frame_count};
@@ -16,6 +16,8 @@ use thiserror::Error;
 pub struct OrdersStudy {
     /// The machine, except for cache sizes, order, and caches between frames.
     pub base: RunConfig,
+    /// The machine at the corners of its ranges.
+    pub corners: Option<Corners>,
     /// L1 and L2 sizes in bytes.
     pub caches_bytes: Vec<(u64, u64)>,
     /// What happens to caches between frames. Traces of one frame ignore it.
@@ -26,6 +28,15 @@ pub struct OrdersStudy {
     pub methods: Vec<Method>,
     /// True if bounds are computed.
     pub bounds: bool,
+}
+
+/// A machine at the corners of its ranges.
+#[derive(Clone, Debug)]
+pub struct Corners {
+    /// The machine at each corner.
+    pub configs: Vec<RunConfig>,
+    /// The ranges in words.
+    pub over: String,
 }
 
 /// Reasons why a study fails.
@@ -100,6 +111,9 @@ impl OrdersStudy {
             }
             of_traces.push(rows);
         }
+        if let Some(corners) = &self.corners {
+            work.add(&self.add_corners(corners, subjects.traces, &mut of_traces, done)?);
+        }
         let searched = self.searched(subjects)?;
         let extra = of_traces
             .par_iter_mut()
@@ -148,6 +162,59 @@ impl OrdersStudy {
             base: self.base,
             points: self.configs().flat_map(of).collect(),
         }
+    }
+
+    /// Replays every order at the corners of the machine's ranges, and adds the bytes to the rows.
+    fn add_corners(
+        &self,
+        corners: &Corners,
+        traces: &[Subject<'_>],
+        of_traces: &mut [Vec<OrderRow<'_>>],
+        done: &(dyn Fn(u64) + Sync),
+    ) -> Result<Work, OrdersError> {
+        let settings = self.between.iter().flat_map(|&between_frames| {
+            (corners.configs.iter()).map(move |config| RunConfig {
+                between_frames,
+                ..*config
+            })
+        });
+        let points = settings.flat_map(|config| {
+            (self.orders.iter()).map(move |&order| Point {
+                settings: Vec::new(),
+                change: None,
+                config: RunConfig { order, ..config },
+            })
+        });
+        let plan = Plan {
+            base: self.base,
+            points: points.collect(),
+        };
+        let mut outcome = experiment::run(&plan, traces, None, done)?;
+        let work = std::mem::take(&mut outcome.work);
+        let all = outcome.rows();
+        for (rows, of_trace) in of_traces
+            .iter_mut()
+            .zip(all.chunks(plan.points.len().max(1)))
+        {
+            let results: Vec<_> = (of_trace.iter())
+                .map(|row| (&row.point.config, row.result.external_bytes))
+                .collect();
+            for row in rows {
+                let between = row.config.between_frames;
+                let of = |order: Order| {
+                    let own = results.iter().filter(move |(config, _)| {
+                        config.order == order && config.between_frames == between
+                    });
+                    own.map(|(_, bytes)| *bytes)
+                };
+                let pairs = of(row.config.order).zip(of(BASELINE));
+                row.corners = Some(CornerBytes {
+                    over: corners.over.clone(),
+                    bytes: pairs.map(|(own, base)| [own, base]).collect(),
+                });
+            }
+        }
+        Ok(work)
     }
 
     /// Searches orders for all traces of one frame, and checks the orders from files.
@@ -289,6 +356,7 @@ impl OrdersStudy {
             baseline_bytes: 0,
             baseline_cycles: None,
             greedy_bytes: None,
+            corners: None,
             distinct_bytes,
         };
         let of_baseline = rows.iter().filter(|row| row.is_baseline());
