@@ -1,0 +1,282 @@
+"""What tile orders save by picture size, ways and L2, and how well the full size follows from smaller captures: docs/results/sizes.md.
+
+Parts: table, knees, predict, machines; by default all of them, which takes hours. What a capture gives is kept in OUT/sizes, where a later run finds it.
+"""
+
+import json
+import shutil
+import tomllib
+
+from .common import Failed, mean, read_csv
+from .orders import mean_change, one
+from .size_histograms import Stretched, binned
+
+# Label, source, scene, camera. Scenes of one source share textures.
+CAMERAS = [line.split() for line in """
+crytek-atrium crytek-sponza crytek-sponza cam_atrium_eye
+dabrovic-gallery dabrovic-sponza dabrovic-sponza cam_gallery
+cocoa-jungle supertuxkart stk-cocoa-temple cam_jungle
+forest-brook supertuxkart stk-black-forest cam_brook
+atrium atrium atrium default
+jungle jungle jungle default
+chess-player chess chess_42k cam_player
+meadow meadow meadow default
+plant plant plant default
+car car car default
+lab lab lab default
+music-box music-box music-box default
+""".strip().splitlines()]
+# The scenes of the table of sizes and of machines.
+SIX = [camera[0] for camera in CAMERAS[:6]]
+# Displays, and the scenes and sizes that are measured on each. Sizes are factors of width and height: 1/16, 1/4, 1/2, 1 and 2 times the display's pixels.
+PANELS = {"symmetric-100": (960, 1080), "quest3": (2064, 2208)}
+SCALES = {"1/16": 0.25, "1/4": 0.5, "1/2": 0.5**0.5, "1": 1.0, "2": 2**0.5}
+SHOWN = ["1/4", "1/2", "1", "2"]
+# Sizes that predict the full one, on the first display.
+SMALLER = ["1/16", "1/4"]
+MAIN = "symmetric-100"
+OF_DISPLAY = {MAIN: SIX, "quest3": SIX[:2]}
+ORDERS = ["morton", "z2-lrta", "z2-sta", "zig-zag+sta", "zig-zag+sta+offset"]
+# A hashed L2 shares no work between replays.
+HASHED_ORDERS = ["morton", "z2-sta", "zig-zag+sta+offset"]
+# The Mali-G715 has the values of the Mali-G710.
+MACHINES = ["adreno-650", "adreno-740", "mali-g78", "mali-g710", "apple-m2", "xclipse-920"]
+MACHINE_ORDERS = ["morton", "z2-sta", "zig-zag+sta+offset"]
+# Machines and scenes by display. The ranges of the machines are replayed on the first display.
+ON_MACHINES = {MAIN: (MACHINES, ["crytek-atrium", "cocoa-jungle", "atrium"]), "quest3": (["adreno-740"], ["crytek-atrium", "cocoa-jungle"])}
+L2_KIB = [128, 512, 2048]
+WAYS = [4, 8, 16]
+HASHED = "16 ways, hashed"
+LINE_BYTES = 16
+# A prediction is inside a knee if half or twice the L2 changes it by more points.
+KNEE_POINTS = 10
+
+
+def size_px(display, scale):
+    return tuple(2 * round(side * SCALES[scale] / 2) for side in PANELS[display])
+
+
+def capture(study, camera, display, scale):
+    label, _, scene, name = camera
+    width, height = size_px(display, scale)
+    return study.raster(scene, "--camera", name, "--hmd", display, "--size", f"{width}x{height}", name=f"{label}-{display}-{width}")
+
+
+def kept(study, camera, display, scale, kind, found, last=True):
+    """What `found` says of a capture, from an earlier run if it is there. The capture stays until the last of its measurements."""
+    path = study.out / f"{camera[0]}-{display}-{scale.replace('/', '_')}{kind}.json"
+    if not path.exists():
+        study.say(f"{camera[0]}, {display}, {scale} of the pixels{kind}")
+        trace = capture(study, camera, display, scale)
+        path.write_text(json.dumps(found(study, trace)))
+        if last:
+            study.drop(trace)
+    return json.loads(path.read_text())
+
+
+def sweep(study, trace, orders, ways, *more):
+    """Rows of a sweep of the L2's size and ways."""
+    file, folder = study.work / "sizes.toml", study.work / "sweep"
+    sizes = [f"{kib}KiB" for kib in L2_KIB]
+    axes = ["[base]", 'mode = "functional"', "[axes]", f"order = {json.dumps(orders)}", f"l2.size_bytes = {json.dumps(sizes)}", f"l2.ways = {json.dumps(ways)}", *more]
+    file.write_text("\n".join(axes) + "\n")
+    shutil.rmtree(folder, ignore_errors=True)
+    study.replay("sweep", file, trace, "--quiet --out", folder)
+    return read_csv(folder / "results.csv")
+
+
+def traffic(study, trace):
+    """Bytes between the L2 and memory, by organisation, L2 and order; distinct bytes too."""
+    found = {}
+    for suffix, rows in (("", sweep(study, trace, ORDERS, WAYS)), (", hashed", sweep(study, trace, HASHED_ORDERS, WAYS[-1:], 'l2.set_index = ["xor"]'))):
+        for row in rows:
+            by_size = found.setdefault(f"{row['l2_ways']} ways{suffix}", {})
+            by_size.setdefault(str(int(row["l2_size_bytes"]) >> 10), {})[row["order"]] = int(row["external_bytes"])
+    return {"bytes": found, "distinct_bytes": 1e6 * float(rows[0]["bound_mb_per_frame"])}
+
+
+def histograms(study, trace):
+    """Reuses of the L2's stream by order, class and distance."""
+    folder = study.work / "locality"
+    study.replay("locality", trace, "--only-l2 --mode functional --orders", ",".join(ORDERS), "--csv", folder, "--quiet")
+    return {"distances": binned(folder / "distances.csv"), "summary": [row for row in read_csv(folder / "summary.csv") if row["stream"] == "l2"]}
+
+
+def measured(study):
+    """Traffic by display, camera and size; the sizes of the table only for its scenes."""
+    found = {}
+    for display, labels in OF_DISPLAY.items():
+        for scale in ("1", "1/4", "1/2", "2"):
+            for camera in CAMERAS:
+                if camera[0] in labels or display == MAIN and scale == "1":
+                    found[display, camera[0], scale] = kept(study, camera, display, scale, "", traffic)
+    return found
+
+
+def reuses(study):
+    """Histograms of the two smaller sizes of every camera."""
+    return {(camera[0], scale): kept(study, camera, MAIN, scale, "-reuses", histograms) for camera in CAMERAS for scale in SMALLER}
+
+
+def machine_rows(name, has_ranges):
+    """A measurement of every order on a machine: change against z2-sta, with its ends over the ranges."""
+    def found(study, trace):
+        config = tomllib.loads(study.replay("run --print-config --quiet --preset", name).out)
+        sizes = "/".join(str(level["size_bytes"] >> 10) for level in config["level"][:2])
+        rows = study.json("orders", trace, "--preset", name, "--orders", ",".join(MACHINE_ORDERS), "" if has_ranges else f"--caches {sizes}")["rows"]
+        return [{"order": row["order"], "value": row["change_pct"], **row.get("figures", {}).get("change_pct", {})} for row in rows]
+    return found
+
+
+def on_machines(study):
+    """Changes by display, machine and camera."""
+    found = {}
+    for display, (names, labels) in ON_MACHINES.items():
+        for camera in (camera for camera in CAMERAS if camera[0] in labels):
+            for name in names:
+                measure = machine_rows(name, display == MAIN)
+                found[display, name, camera[0]] = kept(study, camera, display, "1", f"-{name}", measure, name == names[-1])
+    return found
+
+
+# Parts.
+
+
+def saving(bytes_by_order, order):
+    """Bytes saved against Morton order, percent."""
+    return 100 * (1 - bytes_by_order[order] / bytes_by_order["morton"])
+
+
+def ends(values):
+    """Lowest, median and highest of some figures."""
+    values = sorted(values)
+    middle = (values[(len(values) - 1) // 2] + values[len(values) // 2]) / 2
+    return [one(value) for value in (values[0], middle, values[-1])]
+
+
+def table(study):
+    rows, by_size, by_ways, against_sta = [], {}, {}, {}
+    for (display, label, scale), found in measured(study).items():
+        if label not in OF_DISPLAY[display]:
+            continue
+        for organisation, sizes in found["bytes"].items():
+            for kib, of_order in sizes.items():
+                known = HASHED_ORDERS if organisation == HASHED else ORDERS
+                saved = {order: saving(of_order, order) for order in known[1:]}
+                over_bound = of_order["morton"] / found["distinct_bytes"]
+                rows.append([label, display, "x".join(map(str, size_px(display, scale))), scale, organisation, kib, f"{over_bound:.3f}", *(one(saved.get(order), 2) for order in ORDERS[1:])])
+                if organisation == HASHED:
+                    change = 100 * (of_order["zig-zag+sta+offset"] / of_order["z2-sta"] - 1)
+                    against_sta.setdefault((display, kib), {}).setdefault(scale, []).append(change)
+                    by_size.setdefault((display, kib, scale), []).append(saved)
+                if display == MAIN and scale == "1":
+                    by_ways.setdefault((kib, organisation), []).append(saved)
+    rows.sort(key=lambda row: (list(OF_DISPLAY).index(row[1]), SIX.index(row[0]), SHOWN.index(row[3]), row[4], int(row[5])))
+    detail = "tracegen raster SCENE --camera CAMERA --hmd DISPLAY --size WxH, replay sweep: external_bytes against Morton order"
+    study.write("sizes", detail, f"scene | display | size | of the display's pixels | L2 organisation | L2, KiB | Morton's bytes over the bound | {' saved % | '.join(ORDERS[1:])} saved %", rows, part="table")
+    shown = ["z2-sta", "zig-zag+sta+offset"]
+    heading = " | ".join(f"{order}: {end}" for order in shown for end in ("lowest", "median", "highest"))
+
+    def ranges(groups, key):
+        return [[*name, len(group), *(end for order in shown for end in ends(saved[order] for saved in group))] for name, group in sorted(groups.items(), key=key)]
+
+    study.write("sizes-range", f"{detail}; {HASHED}", f"display | L2, KiB | of the display's pixels | scenes | {heading}",
+                ranges(by_size, lambda item: (list(OF_DISPLAY).index(item[0][0]), int(item[0][1]), SHOWN.index(item[0][2]))), part="table")
+    changes = []
+    for (display, kib), of_scale in sorted(against_sta.items(), key=lambda item: (list(OF_DISPLAY).index(item[0][0]), int(item[0][1]))):
+        of = [of_scale[scale] for scale in SHOWN]
+        changes.append([display, kib, len(of[0]), *(f"{one(mean_change(group))} [{one(min(group))} to {one(max(group))}]" for group in of)])
+    study.write("sizes-orders", f"{detail}; {HASHED}; bytes of zig-zag+sta+offset against those of z2-sta: geometric mean [lowest to highest]",
+                f"display | L2, KiB | scenes | {' of the pixels, % | '.join(SHOWN)} of the pixels, %", changes, part="table")
+    organisations = [*(f"{ways} ways" for ways in WAYS), HASHED]
+    study.write("sizes-ways", f"{detail}; {MAIN} at its own size", f"L2, KiB | L2 organisation | scenes | {heading}",
+                ranges(by_ways, lambda item: (int(item[0][0]), organisations.index(item[0][1]))), part="table")
+
+
+def knees(study):
+    rows = []
+    for (label, scale), found in reuses(study).items():
+        of = {row["order"]: row for row in found["summary"]}
+        kib = lambda order, key: float(of[order][key] or "nan") / 1024
+        pairs = [("morton", "eye_bytes", "eye_knee_bytes"), ("zig-zag+sta+offset", "row_bytes", "row_knee_bytes")]
+        cells = []
+        for order, form, knee in pairs:
+            closed, measured_at = kib(order, form), kib(order, knee)
+            cells += [f"{closed:.0f}", f"{measured_at:.0f}", f"{closed / measured_at:.2f}"]
+        rows.append([label, "x".join(map(str, size_px(MAIN, scale))), *cells])
+    study.write("sizes-knees", "replay locality TRACE --only-l2 --mode functional: eye_bytes, eye_knee_bytes, row_bytes, row_knee_bytes",
+                "scene | size | lines of an eye, KiB | half of the other eye's reuses hit from, KiB | ratio | lines of a row of pairs, KiB | half of the reuses of rows hit from, KiB | ratio of rows", rows, part="knees")
+
+
+def predict(study):
+    """Predictions at the display's size, with intervals from the other sources."""
+    small, full = reuses(study), measured(study)
+    cells = []
+    for label, source, *_ in CAMERAS:
+        quarter, half = (small[label, scale] for scale in SMALLER)
+        stretched = {order: Stretched(quarter, half, order) for order in HASHED_ORDERS}
+        truth = full[MAIN, label, "1"]
+
+        def predicted(order, kib):
+            sets = int(kib * 1024 // LINE_BYTES // WAYS[-1])
+            own, base = (stretched[name].misses(sets, WAYS[-1]) for name in (order, "morton"))
+            return 100 * (1 - own / base)
+
+        of_smallest = truth["bytes"][HASHED][str(L2_KIB[0])]["morton"] / truth["distinct_bytes"]
+        if of_smallest < 1.01:
+            study.say(f"{label}: left out, Morton fetches each line once at {L2_KIB[0]} KiB")
+            continue
+        for kib in L2_KIB:
+            for order in HASHED_ORDERS[1:]:
+                around = [predicted(order, kib * factor) for factor in (0.5, 1, 2)]
+                cells.append({
+                    "label": label, "source": source, "kib": kib, "order": order, "predicted": around[1],
+                    "is_knee": max(around) - min(around) > KNEE_POINTS, "true": saving(truth["bytes"][HASHED][str(kib)], order)})
+    outside = [cell for cell in cells if not cell["is_knee"]]
+    sources = list(dict.fromkeys(cell["source"] for cell in cells))
+    error = {source: max((abs(cell["true"] - cell["predicted"]) for cell in outside if cell["source"] == source), default=0.0) for source in sources}
+    half_width = {source: max(error[other] for other in sources if other != source) for source in sources}
+    rows = []
+    for cell in cells:
+        half, near = half_width[cell["source"]], cell["predicted"]
+        answer = ["capture at full size", ""] if cell["is_knee"] else [f"{one(near - half)} to {one(near + half)}", "yes" if abs(cell["true"] - near) <= half else "no"]
+        rows.append([cell["label"], cell["source"], cell["kib"], cell["order"], one(near), *answer, one(cell["true"])])
+    detail = "replay locality at 1/16 and 1/4 of the pixels, replay sweep at the display's size"
+    study.write("sizes-prediction", detail, "scene | source | L2, KiB | order | predicted saving, % | interval, or the answer inside a knee | holds | measured, %", rows, part="predict")
+    holds = [source for source in sources if error[source] <= half_width[source]]
+    knee_errors = [abs(cell["true"] - cell["predicted"]) for cell in cells if cell["is_knee"]]
+    study.write("sizes-coverage", detail, "sources | scenes | level at most, % | sources whose intervals all hold | share, % | mean width, points | largest width, points | cells | inside a knee | largest error outside knees, points | largest error inside, points", [[
+        len(sources), len({cell["label"] for cell in cells}), f"{100 * (len(sources) - 1) / len(sources):.1f}", len(holds), f"{100 * len(holds) / len(sources):.1f}",
+        f"{2 * mean(half_width.values()):.1f}", f"{2 * max(half_width.values()):.1f}", len(cells), len(knee_errors), f"{max(error.values()):.1f}", f"{max(knee_errors, default=0):.1f}"]], part="predict")
+
+
+def machines(study):
+    """The change of each order's bytes against Z2 STA by display and machine: geometric mean of the scenes, and the ends over scenes and corners."""
+    groups = {}
+    for (display, name, label), rows in on_machines(study).items():
+        for row in rows:
+            groups.setdefault((display, name), {}).setdefault(row["order"], []).append(row)
+    table = []
+    for (display, name), of_order in groups.items():
+        changes = {order: mean_change(row["value"] for row in rows) for order, rows in of_order.items()}
+        best = min(changes, key=changes.get)
+        cells = []
+        for order in MACHINE_ORDERS:
+            if order == "z2-sta":
+                continue
+            low, high = (choose(row.get(end, row["value"]) for row in of_order[order]) for choose, end in ((min, "low"), (max, "high")))
+            cells.append(f"{one(changes[order])} [{one(low)} to {one(high)}]")
+        table.append([name, display, "x".join(map(str, PANELS[display])), len(of_order[best]), best, *cells])
+    study.write("sizes-machines", f"replay orders TRACE --preset MACHINE: change_pct and its ends; geometric mean over the scenes [lowest to highest over the scenes, and over the corners of the ranges on {MAIN}]",
+                f"machine | display | size | scenes | least bytes | {' % | '.join(order for order in MACHINE_ORDERS if order != 'z2-sta')} %", table, part="machines")
+
+
+PARTS = {"table": table, "knees": knees, "predict": predict, "machines": machines}
+OPTIONS = {"parts": dict(nargs="*", metavar="PART", help=f"some of: {', '.join(PARTS)} (all)")}
+
+
+def run(study):
+    for part in study.options.parts or PARTS:
+        if part not in PARTS:
+            raise Failed(f"expected some of: {', '.join(PARTS)}; found '{part}'")
+        PARTS[part](study)
