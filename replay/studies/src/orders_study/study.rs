@@ -444,3 +444,80 @@ fn offset(subject: &Subject<'_>, config: &RunConfig) -> i32 {
     });
     pair.map_or(0, |eyes| inputs.offset(eyes)[0])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sim::config::{LevelConfig, Levels, Mode};
+    use sim::engine::replay;
+    use sim::result::TraceId;
+    use sim::stream::testing::Synthetic;
+
+    /// The ends of a figure are the changes of separate replays of the machine at each corner.
+    #[test]
+    fn ends_are_the_changes_at_the_corners() {
+        let trace = Synthetic {
+            size_px: [96, 80],
+            layers: 2,
+            ..Synthetic::default()
+        }
+        .generate();
+        let machine = |l2_bytes, ways| RunConfig {
+            mode: Mode::Functional,
+            level: Levels::two(
+                LevelConfig::lru(1 << 10),
+                LevelConfig {
+                    ways,
+                    ..LevelConfig::lru(l2_bytes)
+                },
+            ),
+            ..RunConfig::default()
+        };
+        let base = machine(8 << 10, 4);
+        let configs = vec![machine(4 << 10, 2), machine(16 << 10, 8)];
+        let study = OrdersStudy {
+            base,
+            corners: Some(Corners {
+                configs: configs.clone(),
+                over: "two corners".to_owned(),
+            }),
+            caches_bytes: vec![(1 << 10, 8 << 10)],
+            between: vec![BetweenFrames::Keep],
+            orders: vec![BASELINE, Order::MORTON],
+            methods: Vec::new(),
+            bounds: false,
+        };
+        let traces = [Subject::new(
+            &trace,
+            TraceId::default(),
+            "synthetic".to_owned(),
+        )];
+        let subjects = Subjects {
+            traces: &traces,
+            files: Vec::new(),
+        };
+        let (rows, ..) = study.run(&subjects, &|_| ()).unwrap();
+        let change = |config: &RunConfig| {
+            let bytes = |order| {
+                replay(&trace, &RunConfig { order, ..*config })
+                    .unwrap()
+                    .external_bytes as f64
+            };
+            100.0 * (bytes(Order::MORTON) / bytes(BASELINE) - 1.0)
+        };
+        let row = rows.iter().find(|row| !row.is_baseline()).unwrap();
+        let figure = row.change_pct().unwrap();
+        let mut all = vec![change(&base)];
+        all.extend(configs.iter().map(change));
+        assert_eq!(figure.value, all[0]);
+        assert_eq!(
+            figure.low,
+            all.iter().copied().fold(f64::INFINITY, f64::min)
+        );
+        assert_eq!(
+            figure.high,
+            all.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+        );
+        assert!(figure.low < figure.high, "{all:?}");
+    }
+}
