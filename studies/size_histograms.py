@@ -60,7 +60,19 @@ def lines_at(found, share):
     return below[1]
 
 
-class Stretched:
+class Measured:
+    """An order's reuses at the size at which they were measured."""
+
+    def __init__(self, found, order):
+        self.first_uses = next(int(row["unique_lines"]) for row in found["summary"] if row["order"] == order)
+        classes = found["distances"][order].values()
+        self.reuses = [(lines_of(int(place)) - 1, count) for bins in classes for place, count in bins.items()]
+
+    def misses(self, sets, ways):
+        return self.first_uses + sum(count * (1 - hit(distance / sets, ways)) for distance, count in self.reuses)
+
+
+class Stretched(Measured):
     """An order's reuses at the full size, from those at a quarter and at half of its width and height."""
 
     def __init__(self, quarter, half, order):
@@ -76,9 +88,6 @@ class Stretched:
             for share, lines, reuses in at_half:
                 ratio = 1.0 if name == "same_tile" else lines / lines_at(at_quarter, share)
                 self.reuses.append((lines * min(max(ratio, LEAST), MOST) - 1, reuses * count / count_at_quarter))
-
-    def misses(self, sets, ways):
-        return self.first_uses + sum(count * (1 - hit(distance / sets, ways)) for distance, count in self.reuses)
 
 
 def hit(mean, ways):

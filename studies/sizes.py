@@ -1,6 +1,6 @@
 """What tile orders save by picture size, ways and L2, and how well the full size follows from smaller captures: docs/results/sizes.md.
 
-Parts: table, knees, predict, machines; by default all of them, which takes hours. What a capture gives is kept in OUT/sizes, where a later run finds it.
+Parts: table, knees, predict, even-sets, machines; by default all of them, which takes hours. What a capture gives is kept in OUT/sizes, where a later run finds it.
 """
 
 import json
@@ -9,7 +9,7 @@ import tomllib
 
 from .common import Failed, mean, read_csv
 from .orders import mean_change, one
-from .size_histograms import Stretched, binned
+from .size_histograms import Measured, Stretched, binned
 
 # Label, source, scene, camera. Scenes of one source share textures.
 CAMERAS = [line.split() for line in """
@@ -250,6 +250,24 @@ def predict(study):
         f"{2 * mean(half_width.values()):.1f}", f"{2 * max(half_width.values()):.1f}", len(cells), len(knee_errors), f"{max(error.values()):.1f}", f"{max(knee_errors, default=0):.1f}"]], part="predict")
 
 
+def even_sets(study):
+    """The push through ways alone: reuses and traffic of the same size."""
+    small, full = reuses(study), measured(study)
+    table = []
+    for organisation in [*(f"{ways} ways" for ways in WAYS), HASHED]:
+        ways, errors, apart = int(organisation.split()[0]), [], []
+        for label in SIX:
+            of = {order: Measured(small[label, "1/4"], order) for order in HASHED_ORDERS}
+            for kib in L2_KIB:
+                true = full[MAIN, label, "1/4"]["bytes"][organisation][str(kib)]
+                pushed = {order: LINE_BYTES * of[order].misses(kib * 1024 // LINE_BYTES // ways, ways) for order in of}
+                apart += [abs(pushed[order] / true[order] - 1) for order in of]
+                errors += [abs(saving(pushed, order) - saving(true, order)) for order in HASHED_ORDERS[1:]]
+        errors.sort()
+        table.append([organisation, len(errors), one(errors[len(errors) // 2]), one(errors[int(0.9 * len(errors))]), one(errors[-1]), one(100 * max(apart))])
+    study.write("sizes-even-sets", "replay locality and replay sweep at 1/4 of the pixels", "L2 organisation | cells | median error of the saving, points | nine of ten within, points | largest, points | largest error of the bytes, %", table, part="even-sets")
+
+
 def machines(study):
     """The change of each order's bytes against Z2 STA by display and machine: geometric mean of the scenes, and the ends over scenes and corners."""
     groups = {}
@@ -271,7 +289,7 @@ def machines(study):
                 f"machine | display | size | scenes | least bytes | {' % | '.join(order for order in MACHINE_ORDERS if order != 'z2-sta')} %", table, part="machines")
 
 
-PARTS = {"table": table, "knees": knees, "predict": predict, "machines": machines}
+PARTS = {"table": table, "knees": knees, "predict": predict, "even-sets": even_sets, "machines": machines}
 OPTIONS = {"parts": dict(nargs="*", metavar="PART", help=f"some of: {', '.join(PARTS)} (all)")}
 
 
