@@ -309,7 +309,8 @@ fn both_knees_are_where_their_closed_forms_say() {
     let found = smallest(&stream, &|before, now| before.place.row != now.place.row);
     assert_eq!(figures.row_knee_lines(), found.map(u64::from));
     // The first row has no lines of a row above it.
-    let of_row = f64::from(columns * lines) * (1.0 + 0.5 * f64::from(rows - 1) / f64::from(rows));
+    let all = columns * lines * rows + columns * lines / 2 * (rows - 1);
+    let of_row = f64::from(all) / f64::from(rows);
     assert_eq!(figures.row_lines(), Some(of_row));
     let ratio = figures.row_knee_lines().unwrap() as f64 / of_row;
     assert!((0.8..=1.25).contains(&ratio), "{ratio}");
