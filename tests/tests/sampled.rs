@@ -17,7 +17,7 @@ fn tracegen(flags: &[&str], out: &Path) -> Command {
 
 fn textrace(path: &Path) -> Textrace {
     match Trace::open(path).expect("a trace") {
-        Trace::Texture(trace) => trace,
+        Trace::Texture(trace) => *trace,
         Trace::Ray(_) => panic!("a texture trace"),
     }
 }
