@@ -51,6 +51,14 @@ const PROFILES: [&str; 24] = [
     "ext/hand_interaction_ext",
 ];
 
+const TYPES: [ActionType; 5] = [
+    ActionType::BOOLEAN_INPUT,
+    ActionType::FLOAT_INPUT,
+    ActionType::VECTOR2F_INPUT,
+    ActionType::POSE_INPUT,
+    ActionType::VIBRATION_OUTPUT,
+];
+
 struct ActionSet {
     name: String,
     localized: String,
@@ -262,7 +270,7 @@ api! {
         }
         let (name, localized) = (taken(&info.action_name)?, taken(&info.localized_action_name)?);
         check_names(&name, &localized)?;
-        if !(ActionType::BOOLEAN_INPUT.into_raw()..=ActionType::VIBRATION_OUTPUT.into_raw()).contains(&info.action_type.into_raw()) {
+        if !TYPES.contains(&info.action_type) {
             return Err(INVALID);
         }
         let subactions = elements(info.subaction_paths, info.count_subaction_paths)?.to_vec();

@@ -172,12 +172,7 @@ impl Search<'_> {
             .size(eye.image)
             .is_none_or(|size| rect.origin == [0; 2] && rect.size == size);
         let part = Some(rect).filter(|_| !whole);
-        let found = self.picture(
-            (eye.image, eye.layer),
-            part,
-            usize::MAX,
-            &mut Vec::new(),
-        )?;
+        let found = self.picture((eye.image, eye.layer), part, usize::MAX, &mut Vec::new())?;
         if found.weight == 0 {
             return None;
         }
