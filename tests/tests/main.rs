@@ -34,6 +34,7 @@ mod material_layers;
 mod mutated_captures;
 mod mutations;
 mod one_light;
+mod openxr;
 mod orders;
 mod outputs;
 mod pages;

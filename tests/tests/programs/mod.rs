@@ -5,7 +5,7 @@
 mod fields;
 mod opengl;
 mod other_stages;
-mod pixels;
+pub(crate) mod pixels;
 mod random;
 
 use formats::textrace::{Tables, Textrace, Tile};

@@ -101,6 +101,35 @@ impl Gpu {
         }
     }
 
+    /// A device that something else has opened, with one queue of the first family.
+    ///
+    /// # Safety
+    /// A device of the instance.
+    #[allow(
+        dead_code,
+        reason = "only one of the programs that share this file needs it"
+    )]
+    pub unsafe fn of_device(
+        entry: Entry,
+        instance: Instance,
+        physical: vk::PhysicalDevice,
+        device: Device,
+    ) -> Self {
+        // SAFETY: as the caller promises.
+        let (queue, memory) = unsafe {
+            let memory = instance.get_physical_device_memory_properties(physical);
+            (device.get_device_queue(0, 0), memory)
+        };
+        Self {
+            _entry: entry,
+            instance,
+            device,
+            queue,
+            family: 0,
+            memory,
+        }
+    }
+
     fn allocate(
         &self,
         needs: vk::MemoryRequirements,
