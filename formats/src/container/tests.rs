@@ -131,13 +131,13 @@ fn a_duplicate_tag_is_refused() {
 #[test]
 fn a_later_major_version_is_named() {
     let mut bytes = sample();
-    bytes[8] = 4;
+    bytes[8] = 6;
     let text = Container::from_bytes(resealed(bytes))
         .unwrap_err()
         .to_string();
     assert_eq!(
         text,
-        "memory: header at byte 8: expected a major version from 1 to 3, found 4"
+        "memory: header at byte 8: expected a major version from 1 to 5, found 6"
     );
 }
 

@@ -145,7 +145,7 @@ mod tests {
         ) {
             let frame = [left.clone(), right.clone()];
             let one = write(&frame, growing);
-            let mut passes = frame.repeat(frames);
+            let mut passes: Vec<Vec<Tile>> = (0..frames).flat_map(|_| frame.clone()).collect();
             passes.extend([left.clone(), other.clone()]);
             let trace = Textrace::from_bytes(write(&passes, growing)).unwrap();
             check(&trace, &passes);
@@ -196,7 +196,7 @@ mod tests {
             tiles
         };
         let frame = [pass(5), pass(2005)];
-        let bytes = write(&frame.repeat(2), false);
+        let bytes = write(&[frame.clone(), frame].concat(), false);
         let container = Container::from_bytes(bytes).unwrap();
         let mut writer = ContainerWriter::in_memory(Kind::Textrace).unwrap();
         let mut change = Some(change);
