@@ -1,0 +1,55 @@
+"""What is not done twice: orders over many frames, and equal frames. Times are processor times."""
+
+from .common import execute, machine
+
+OPTIONS = {"--before": {"help": "an earlier replay program, whose time on the same trace is compared"}}
+ORDERS = [
+    "z2-sta", "z2-sta-merge", "z2-lrta", "morton", "zig-zag", "zig-zag+sta+offset", "strip+sta+offset", "band4+sta+offset+boustro",
+    "hilbert+sta", "zig-zag+sta+row-lines",
+]
+STUDIED = f"orders --orders {','.join(ORDERS)} --caches 8/128,16/256 --between keep,lose-50,flush --json --quiet"
+SCENES = [("jungle", 6), ("atrium", 6)]
+SIZE = "--size 960x1080"
+
+
+def orders(study):
+    """Time of ten orders with two pairs of caches and three treatments between frames, beside one of each."""
+    rows = []
+    for scene, frames in SCENES:
+        trace = study.raster(scene, f"{SIZE} --path head --frames {frames}", name=f"{scene}-{frames}")
+        new = study.replay(STUDIED, trace)
+        one = study.replay("run --mode functional --order z2-sta --json --quiet", trace)
+        old, ratio = "-", "-"
+        if study.options.before:
+            before = execute(study.options.before, STUDIED, trace)
+            assert before.out == new.out, f"{scene}: both programs print the same"
+            old, ratio = f"{before.processor_s:.1f}", f"{before.processor_s / new.processor_s:.2f}"
+        rows.append([scene, frames, f"{one.processor_s:.1f}", old, f"{new.processor_s:.1f}", ratio, f"{new.peak_mb:.0f}"])
+        study.say(f"{scene}: {rows[-1]}")
+        study.drop(trace)
+    study.write(
+        "not-twice-orders", f"head path, {SIZE}: {STUDIED}",
+        "scene | frames | one order s | 60 points before s | 60 points s | ratio | peak MB", rows, machine(),
+    )
+
+
+def frames(study):
+    """Sizes of a trace of 12 equal frames beside one frame, and times to replay it."""
+    poses = study.work / "still.csv"
+    poses.write_text("time_s,x_m,y_m,z_m,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1,0,0,0,0,0,0,1\n")
+    rows = []
+    for scene in ("atrium", "jungle"):
+        one, twelve = (study.raster(scene, f"{SIZE} --path {poses} --frames {n}", name=f"{scene}-still-{n}") for n in (1, 12))
+        sizes = [trace.stat().st_size for trace in (one, twelve)]
+        times = [study.replay("run --mode functional --order z2-sta --json --quiet", trace).processor_s for trace in (one, twelve)]
+        rows.append([scene, f"{sizes[0] / 1e6:.2f}", f"{sizes[1] / 1e6:.2f}", f"{sizes[1] / sizes[0]:.3f}", f"{times[0]:.2f}", f"{times[1]:.2f}"])
+        study.drop(one, twelve)
+    study.write(
+        "not-twice-frames", f"{SIZE}, a head that does not move",
+        "scene | one frame MB | 12 frames MB | ratio | replay of one s | replay of 12 s", rows, machine(),
+    )
+
+
+def run(study):
+    orders(study)
+    frames(study)
