@@ -2,7 +2,7 @@
 //! `UPDATE_CORPUS=1` rewrites them.
 
 use formats::raytrace::TraversalKind;
-use formats::textrace::{Encoding, Pass, Textrace, TextraceWriter, Tile};
+use formats::textrace::Encoding;
 use parallax_tests::columns::{column_tables, column_trace_of};
 use parallax_tests::traces;
 use std::path::Path;
@@ -27,8 +27,6 @@ fn seeds() -> Vec<(String, Vec<u8>)> {
             (name, traces::texture_trace_of(&tables, encoding, 5))
         })
         .collect();
-    let single = traces::texture_trace_of(&tables, Encoding::Planes, 5);
-    seeds.push(("textrace/shared".to_owned(), repeated(single)));
     for (samples, has_visits) in [(1, true), (1, false), (2, true)] {
         let mut tables = traces::ray_tables(samples, has_visits);
         let size_px = [3, 2];
@@ -51,33 +49,6 @@ fn seeds() -> Vec<(String, Vec<u8>)> {
         seeds.push((name, column_trace_of(&tables, 7)));
     }
     seeds
-}
-
-/// The trace with its frame twice, so that tiles and passes share bytes.
-fn repeated(bytes: Vec<u8>) -> Vec<u8> {
-    let trace = Textrace::from_bytes(bytes).expect("a sound trace");
-    let mut tables = trace.tables().clone();
-    let again = tables.passes.clone();
-    let frame = 1 + again.iter().map(|pass| pass.frame).max().unwrap_or(0);
-    tables
-        .passes
-        .extend(again.iter().map(|pass| Pass { frame, ..*pass }));
-    let mut views = tables.meta.frames[0].clone();
-    views.frame = frame;
-    tables.meta.frames.push(views);
-    let writer = TextraceWriter::in_memory(&tables).expect("sound tables");
-    let mut writer = writer.with_encoding(Encoding::Planes);
-    let mut tile = Tile::default();
-    for pass in 0..tables.passes.len() {
-        for index in 0..tables.passes[pass].tile_count() as usize {
-            let of = pass % again.len();
-            trace
-                .decode_tile(of, index, &mut tile)
-                .expect("a sound tile");
-            writer.write_tile(pass, index, &tile).expect("memory");
-        }
-    }
-    writer.into_bytes().expect("memory")
 }
 
 #[test]
