@@ -56,13 +56,14 @@ class Execution:
 
 
 def execute(*parts, allowed=(0,), folder=None, stdin=os.devnull, **environment):
-    """Runs a program to its end. A string may hold several words; a path is one. An exit code that is not allowed is an error."""
+    """Runs a program to its end, without the cache of captures: its time is measured. A string may hold several words; a path is
+    one. An exit code that is not allowed is an error."""
     command = []
     for part in parts:
         command += [str(part)] if isinstance(part, Path) else str(part).split()
     with tempfile.TemporaryFile("w+") as out, tempfile.TemporaryFile("w+") as err, open(stdin) as given:
         start = time.monotonic()
-        started = subprocess.Popen(command, stdin=given, stdout=out, stderr=err, cwd=folder, env={**os.environ, **environment})
+        started = subprocess.Popen(command, stdin=given, stdout=out, stderr=err, cwd=folder, env={"PARALLAX_CAPTURE_CACHE_SIZE": "0", **os.environ, **environment})
         _, status, usage = os.wait4(started.pid, 0)
         wall_s = time.monotonic() - start
         started.returncode = os.waitstatus_to_exitcode(status)

@@ -1,4 +1,6 @@
-"""What is not done twice: orders over many frames, and equal frames. Times are processor times."""
+"""What is not done twice: orders over many frames, equal recipes, equal frames. Times are processor times."""
+
+import shutil
 
 from .common import execute, machine
 
@@ -33,6 +35,34 @@ def orders(study):
     )
 
 
+def captures(study):
+    """Wall time of a capture, of the same recipe again, and of a copy of its output."""
+    rows = []
+    folder = study.work / "cache"
+    cached = {"PARALLAX_CACHE_DIR": str(folder), "PARALLAX_CAPTURE_CACHE_SIZE": "8GiB"}
+    for command, scene, options, kind in [
+        ("raster", "atrium", SIZE, "textrace"), ("raster", "jungle", f"{SIZE} --path head --frames 4", "textrace"),
+        ("rays", "chess", "--size 512x512", "raytrace"),
+    ]:
+        first, again, copy = (study.work / f"{name}.{kind}" for name in ("first", "again", "copy"))
+        runs = [study.tracegen(command, scene, options, "-o", first, **cached)]
+        runs += [study.tracegen(command, scene, options, "-o", again, **cached) for _ in range(5)]
+        assert first.read_bytes() == again.read_bytes() and runs[0].out == runs[1].out, f"{command} {scene}"
+        assert all("from the cache of captures" in run.err for run in runs[1:]), f"{command} {scene}"
+        copies = [execute("cp", "--reflink=auto", first, copy).wall_s for _ in range(5)]
+        hits = sorted(run.wall_s for run in runs[1:])
+        hit, copied = hits[2], sorted(copies)[2]
+        megabytes = first.stat().st_size / 1e6
+        rows.append([f"{command} {scene}", f"{megabytes:.1f}", f"{runs[0].wall_s:.2f}", f"{hit:.3f}", f"{copied:.3f}", f"{hit - copied:.3f}"])
+        for path in (first, again, copy):
+            path.unlink()
+        shutil.rmtree(folder)
+    study.write(
+        "not-twice-captures", "median of five hits and of five copies",
+        "command | output MB | capture s | again s | copy s | again beside the copy s", rows, machine(),
+    )
+
+
 def frames(study):
     """Sizes of a trace of 12 equal frames beside one frame, and times to replay it."""
     poses = study.work / "still.csv"
@@ -52,4 +82,5 @@ def frames(study):
 
 def run(study):
     orders(study)
+    captures(study)
     frames(study)

@@ -20,6 +20,7 @@
 #![doc = include_str!("../examples/read_trace.rs")]
 //! ```
 
+pub mod bounded_folder;
 mod chunk_tag;
 pub mod container;
 pub mod error;

@@ -37,6 +37,8 @@ pub fn program(name: &str) -> Command {
     let mut command = Command::new(&path);
     command.env("PARALLAX_CACHE_DIR", texture_cache(profile));
     command.env("PARALLAX_CACHE_SIZE", "4GiB");
+    // Tests compare captures with each other.
+    command.env("PARALLAX_CAPTURE_CACHE_SIZE", "0");
     command
 }
 

@@ -4,6 +4,7 @@ mod analysis;
 mod animation;
 mod backends;
 mod bad_input;
+mod capture_cache;
 mod captures;
 mod command_line;
 mod determinism;

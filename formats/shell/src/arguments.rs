@@ -3,6 +3,7 @@
 use anyhow::Context;
 use std::error::Error;
 use std::ffi::OsString;
+use std::sync::LazyLock;
 
 /// `--threads`.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
@@ -33,6 +34,10 @@ impl Threads {
         }
     }
 }
+
+/// Names of the arguments that do not affect the content of a trace: [`lasting_arguments`] removes them.
+pub static WITHOUT_EFFECT: LazyLock<Vec<&str>> =
+    LazyLock::new(|| [&OPTIONS_WITHOUT_EFFECT[..], &SWITCHES_WITHOUT_EFFECT].concat());
 
 /// Options with a value that do not affect the content of a trace.
 const OPTIONS_WITHOUT_EFFECT: [&str; 6] = [

@@ -17,14 +17,14 @@ mod signals;
 mod slurm;
 mod supervise;
 
-pub use arguments::{Threads, lasting_arguments};
+pub use arguments::{Threads, WITHOUT_EFFECT, lasting_arguments};
 pub use children::run_child;
 pub use documents::Documents;
 pub use file_table::assert_command_line;
 pub use files::{FileUse, FileUses, find_program};
 pub use formats::container::is_stdout;
 pub use memory::Allocator;
-pub use message::{error, note, print, print_beside, stdout, warn};
+pub use message::{error, has_warned, note, print, print_beside, stdout, warn};
 pub use outputs::{Output, cannot_write, check_folder, check_outputs, write_file};
 pub use program::{Common, VERSION, described, run};
 pub use progress::Progress;

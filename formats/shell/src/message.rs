@@ -12,6 +12,14 @@ pub(crate) const USAGE: u8 = 2;
 /// `--quiet`, set once before the command starts.
 static QUIET: AtomicBool = AtomicBool::new(false);
 
+/// Set by the first warning.
+static WARNED: AtomicBool = AtomicBool::new(false);
+
+/// True if the program has warned.
+pub fn has_warned() -> bool {
+    WARNED.load(Ordering::Relaxed)
+}
+
 pub(crate) fn set_quiet(quiet: bool) {
     QUIET.store(quiet, Ordering::Relaxed);
 }
@@ -82,6 +90,7 @@ pub fn note(message: &str) {
 
 /// Prints a warning on stderr; the command continues.
 pub fn warn(message: &str) {
+    WARNED.store(true, Ordering::Relaxed);
     print_message("\u{1b}[1;33mwarning\u{1b}[0m: ", message);
 }
 

@@ -50,6 +50,11 @@ impl Output {
         &self.path
     }
 
+    /// The flag that names it.
+    pub fn flag(&self) -> &'static str {
+        self.flag
+    }
+
     fn named(&self) -> String {
         match self.kind {
             Kind::Result => self.flag.to_owned(),

@@ -3,7 +3,7 @@
 use super::inputs::replaced_input;
 use std::collections::BTreeSet;
 use std::fs::{self, File, Metadata};
-use std::io::{self, BufWriter, ErrorKind, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -85,6 +85,16 @@ impl AtomicFile {
         let mut file = Self::create(target)?;
         file.write_all(bytes)?;
         file.persist()
+    }
+
+    /// Appends the next `bytes` bytes of a file, which the system copies without passing them to this process
+    /// where it can. Returns how many there were.
+    ///
+    /// # Errors
+    /// A failure of reading or writing.
+    pub fn append_from(&mut self, file: &File, bytes: u64) -> io::Result<u64> {
+        self.writer.flush()?;
+        io::copy(&mut file.take(bytes), self.writer.get_mut())
     }
 
     /// Flushes and renames the file over its target.

@@ -1,19 +1,21 @@
-//! The cache of prepared textures: location, size limit and use.
+//! The caches of prepared textures and of captures: location, size limits and use.
 
 use anyhow::Context;
 use clap::Args;
+use formats::bounded_folder::BoundedFolder;
 use std::env;
 use std::path::PathBuf;
 use textures::Cache;
 
-/// Default size limit, without `PARALLAX_CACHE_SIZE`.
+/// Default size limit of each cache.
 const DEFAULT_BYTES: u64 = 2 << 30;
 
 /// `--no-cache`.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct CacheArgs {
-    /// Do not use the cache of prepared textures. The cache is in ~/.cache/parallax or the folder that
-    /// XDG_CACHE_HOME or PARALLAX_CACHE_DIR sets; it holds at most 2GiB or PARALLAX_CACHE_SIZE.
+    /// Do not use the caches of prepared textures and of captures. They are in ~/.cache/parallax or the folder
+    /// that XDG_CACHE_HOME or PARALLAX_CACHE_DIR sets. Each holds at most 2GiB; PARALLAX_CACHE_SIZE and
+    /// PARALLAX_CAPTURE_CACHE_SIZE change that, and 0 turns a cache off.
     #[arg(long)]
     no_cache: bool,
 }
@@ -24,18 +26,33 @@ impl CacheArgs {
     /// # Errors
     /// A size that cannot be read.
     pub fn open(self) -> anyhow::Result<Option<Cache>> {
-        let limit = match env::var("PARALLAX_CACHE_SIZE") {
+        let found = self.folder("textures", "PARALLAX_CACHE_SIZE")?;
+        Ok(found.map(|(folder, limit)| Cache::new(folder, limit)))
+    }
+
+    /// Opens the cache of captures, likewise.
+    ///
+    /// # Errors
+    /// See [`Self::open`].
+    pub fn open_captures(self) -> anyhow::Result<Option<BoundedFolder>> {
+        let found = self.folder("captures", "PARALLAX_CAPTURE_CACHE_SIZE")?;
+        Ok(found.map(|(folder, limit)| BoundedFolder::new(folder, "capture", limit)))
+    }
+
+    /// The folder of a cache and its limit in bytes, if the cache is enabled.
+    fn folder(self, name: &str, size: &str) -> anyhow::Result<Option<(PathBuf, u64)>> {
+        let limit = match env::var(size) {
             Ok(text) if text == "0" => 0,
             Ok(text) => super::values::parse_bytes(&text)
                 .map_err(anyhow::Error::msg)
-                .context("PARALLAX_CACHE_SIZE")?,
+                .with_context(|| size.to_owned())?,
             Err(_) => DEFAULT_BYTES,
         };
         if self.no_cache || limit == 0 {
             return Ok(None);
         }
-        Ok(folder(|name| env::var_os(name).map(PathBuf::from))
-            .map(|folder| Cache::new(folder.join("textures"), limit)))
+        let folder = folder(|name| env::var_os(name).map(PathBuf::from));
+        Ok(folder.map(|folder| (folder.join(name), limit)))
     }
 }
 

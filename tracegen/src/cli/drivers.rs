@@ -6,6 +6,8 @@ use raster::draws::DrawList;
 use raster::error::RasterError;
 use raster::lavapipe::Lavapipe;
 use scene::Scene;
+use std::env;
+use std::path::PathBuf;
 use textures::TextureSet;
 
 /// A driver by name, or the first one available.
@@ -59,6 +61,25 @@ impl Driver {
             instead_of,
         })
     }
+}
+
+/// Files that change with the version of a driver: those in which drivers name their library, the libraries, and
+/// the list of the system's libraries.
+pub fn version_files() -> Vec<PathBuf> {
+    let mut files = mesa::driver_files();
+    for variable in ["VK_DRIVER_FILES", "VK_ICD_FILENAMES"] {
+        files.extend(env::var_os(variable).iter().flat_map(env::split_paths));
+    }
+    let library = |path: &PathBuf| {
+        let text = std::fs::read(path).ok()?;
+        let value: serde_json::Value = serde_json::from_slice(&text).ok()?;
+        let library = value.pointer("/ICD/library_path")?.as_str()?;
+        Some(path.parent()?.join(library))
+    };
+    let libraries: Vec<PathBuf> = files.iter().filter_map(library).collect();
+    files.extend(libraries);
+    files.push(PathBuf::from("/etc/ld.so.cache"));
+    files
 }
 
 /// An opened driver.

@@ -3,6 +3,7 @@
 #[cfg(feature = "programs")]
 pub mod app;
 mod cache_args;
+mod capture_cache;
 mod capture_steps;
 mod choice;
 mod drivers;

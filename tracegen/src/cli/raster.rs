@@ -1,7 +1,8 @@
 //! `tracegen raster`.
 
+use super::capture_cache::cached;
 use super::capture_steps::prepare_environment;
-use super::drivers::Driver;
+use super::drivers::{self, Driver};
 use super::raster_args::RasterArgs;
 use super::raster_auto::{self, Techniques};
 use super::raster_frames;
@@ -31,11 +32,18 @@ pub fn run(args: &RasterArgs) -> anyhow::Result<()> {
         args.check_plain_frames()?;
     }
     let objective = args.objective.of(args.auto)?;
-    let techniques = match (args.auto, &args.technique) {
-        (Some(budget), _) => Techniques::Chosen(budget, objective),
-        (None, Some(schedule)) => Techniques::Named(Box::new(schedule.clone())),
-        (None, None) if args.plan_only => return raster_plan::run(args, &outputs),
-        (None, None) => return raster_frames::run(args, &outputs),
+    // What `--auto` chooses may depend on measured times.
+    let cache = match args.auto {
+        None => args.cache.open_captures()?,
+        Some(_) => None,
     };
-    raster_auto::run(args, &techniques, &outputs)
+    cached(cache, &outputs, &drivers::version_files(), || {
+        let techniques = match (args.auto, &args.technique) {
+            (Some(budget), _) => Techniques::Chosen(budget, objective),
+            (None, Some(schedule)) => Techniques::Named(Box::new(schedule.clone())),
+            (None, None) if args.plan_only => return raster_plan::run(args, &outputs),
+            (None, None) => return raster_frames::run(args, &outputs),
+        };
+        raster_auto::run(args, &techniques, &outputs)
+    })
 }

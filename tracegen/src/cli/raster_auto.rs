@@ -29,7 +29,11 @@ pub enum Techniques {
 ///
 /// # Errors
 /// Unreadable input, no driver, a budget that nothing meets, or a file that cannot be written.
-pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> anyhow::Result<()> {
+pub fn run(
+    args: &RasterArgs,
+    techniques: &Techniques,
+    outputs: &[Output],
+) -> anyhow::Result<String> {
     let progress = Progress::new("loading the scene", 0, "");
     let setup = load(args, outputs)?;
     progress.stage("preparing textures and shaders", 0, "");
@@ -107,7 +111,7 @@ pub fn run(args: &RasterArgs, techniques: &Techniques, outputs: &[Output]) -> an
         counts.quads,
         counts.fragments
     ));
-    shell::print(&match choice {
+    Ok(match choice {
         Some(choice) => format!(
             "--auto {} --objective {}: {}\nagain by name: --technique {schedule}",
             choice.budget, choice.objective, choice.reason

@@ -34,11 +34,11 @@ struct PlainFrame {
     depths: Option<Vec<Vec<f32>>>,
 }
 
-/// Captures the frames of a path.
+/// Captures the frames of a path. Returns what was recorded.
 ///
 /// # Errors
 /// Unreadable input, no driver, or a file that cannot be written.
-pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
+pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<String> {
     let started = Instant::now();
     let cache = args.cache.open()?;
     let progress = Progress::new("loading the scene", 0, "");
@@ -111,9 +111,8 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
     note(&texels);
     let views = [frames, args.views.len()];
     let result = summary.result(views, size_px, file_bytes);
-    shell::print_beside(outputs, &result)?;
     summary.print(frames, &backend.work());
-    Ok(())
+    Ok(result)
 }
 
 impl<'a> Session<'a> {

@@ -7,11 +7,11 @@ use formats::textrace::{PlannedFrame, Tables, TextraceWriter, TraceMeta};
 use raster::frame::Frame;
 use shell::{Output, Progress, lasting_arguments};
 
-/// Writes the plan of a path.
+/// Writes the plan of a path. Returns the result to print.
 ///
 /// # Errors
 /// Unreadable input, or a file that cannot be written.
-pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
+pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<String> {
     let progress = Progress::new("loading the scene", 0, "");
     let mut session = Session::new(args, load(args, outputs)?)?;
     let frames = session.world.views.len();
@@ -46,11 +46,7 @@ pub fn run(args: &RasterArgs, outputs: &[Output]) -> anyhow::Result<()> {
         ..Tables::default()
     };
     let bytes = TextraceWriter::create(&args.output, &tables)?.finish()?;
-    shell::print_beside(
-        outputs,
-        &format!("{frames} frames planned, file {bytes} bytes"),
-    )?;
-    Ok(())
+    Ok(format!("{frames} frames planned, file {bytes} bytes"))
 }
 
 /// The counts of a planned frame. `before` and `finest` are the finest mip levels by image that the frame before and

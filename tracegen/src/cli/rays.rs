@@ -1,5 +1,7 @@
 //! `tracegen rays`.
 
+use super::cache_args::CacheArgs;
+use super::capture_cache::cached;
 use super::choice::choice;
 use super::light_args::LightArgs;
 use super::path_args::PathArgs;
@@ -20,7 +22,7 @@ use rays::scene::TraceScene;
 use rays::tracer::TraceSettings;
 use scene::LoadOptions;
 use scene::paths::MAX_FRAMES;
-use shell::{Progress, Threads, cannot_write, lasting_arguments, note};
+use shell::{Output, Progress, Threads, cannot_write, lasting_arguments, note};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -72,6 +74,8 @@ pub struct RaysArgs {
     treelets: Option<u32>,
     #[command(flatten)]
     light: LightArgs,
+    #[command(flatten)]
+    cache: CacheArgs,
     #[command(flatten)]
     threads: Threads,
 }
@@ -129,6 +133,13 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     args.threads.start()?;
     let outputs = capture_outputs(&args.output, args.image.as_deref());
     args.scene.check_outputs(&args.path, &outputs)?;
+    cached(args.cache.open_captures()?, &outputs, &[], || {
+        capture(args, &outputs)
+    })
+}
+
+/// Traces a frame. Returns the hierarchy and the numbers of rays, steps and tests.
+fn capture(args: &RaysArgs, outputs: &[Output]) -> anyhow::Result<String> {
     let start = Instant::now();
     let progress = Progress::new("loading the scene", 0, "");
     let textures = LoadOptions {
@@ -139,7 +150,7 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
         let frames = args.frame..args.frame + 1;
         (args.scene).setup(Some(DEFAULT_SIZE_PX), &args.path, frames, &textures)?
     };
-    setup.check_outputs(&outputs)?;
+    setup.check_outputs(outputs)?;
     let loaded = start.elapsed();
     progress.stage("building the hierarchy", 0, "");
     let (camera, bounds, world) = (
@@ -163,9 +174,8 @@ pub fn run(args: &RaysArgs) -> anyhow::Result<()> {
     if frame.stats.hits == 0 {
         super::scene_args::warn_of_nothing_seen(&camera, bounds, world);
     }
-    shell::print_beside(&outputs, &result(&tables, &frame))?;
     note_times(&frame, file_bytes, [loaded, prepared, traced]);
-    Ok(())
+    Ok(result(&tables, &frame))
 }
 
 /// Builds the hierarchy and the tables of the trace.

@@ -1,8 +1,11 @@
 //! Tests of hits, damage, sharing and limits.
 
 use super::*;
-use std::fs::File;
+use formats::bounded_folder::ABANDONED;
+use std::fs::{self, File};
 use std::os::unix::fs::PermissionsExt;
+use std::path::Path;
+use std::time::SystemTime;
 
 fn key(n: u8) -> Key {
     let mut hasher = KeyHasher::new("test");
