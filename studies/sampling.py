@@ -2,6 +2,7 @@
 
 import json
 import math
+import random
 import shutil
 from pathlib import Path
 
@@ -76,6 +77,52 @@ def summary(rows, draws):
     return out
 
 
+def walk_of(random, count, deviation, correlation):
+    """Normal values, each correlated with the one before."""
+    at, out = random.gauss(0, deviation), []
+    for _ in range(count):
+        out.append(at)
+        at = correlation * at + random.gauss(0, deviation * math.sqrt(1 - correlation**2))
+    return out
+
+
+def made_up(random, frames):
+    """Savings by frame that the counts of a plan say nothing about."""
+    knee = random.randrange(frames // 4, 3 * frames // 4)
+    return {
+        "noise, deviation 1 point": [0.3 + v for v in walk_of(random, frames, 0.01, 0)],
+        "noise, deviation 3 points": [0.3 + v for v in walk_of(random, frames, 0.03, 0)],
+        "slow change, deviation 3 points": [0.3 + v for v in walk_of(random, frames, 0.03, 0.95)],
+        "skewed, deviation 3 points": [0.3 - 0.03 * random.expovariate(1) for _ in range(frames)],
+        "a jump from 15 to 45 %": [(0.15 if at < knee else 0.45) + v for at, v in enumerate(walk_of(random, frames, 0.01, 0.5))],
+        "20 points more in 8 % of the frames": [0.3 + v + 0.2 * (random.random() < 0.08) for v in walk_of(random, frames, 0.005, 0)],
+    }
+
+
+def limits(study):
+    """How often intervals hold on made-up paths."""
+    options, found = study.options, {}
+    plan, values = study.work / "limits.textrace", study.work / "limits.csv"
+    study.tracegen("raster teapot --quiet --plan-only --path head --size 64x64 --frames", options.frames, "-o", plan)
+    for seed in range(5):
+        numbers = random.Random(seed)
+        base = [1e6 * (1 + v) for v in walk_of(numbers, options.frames, 0.1, 0.9)]
+        for kind, savings in made_up(numbers, options.frames).items():
+            lines = ["caches,order,frame,external_bytes,footprints,l1_footprint_misses,l2_line_lookups,l2_line_misses,cycles"]
+            for frame, (share, whole) in enumerate(zip(savings, base)):
+                lines += [f"16/256,morton,{frame},{whole:.0f},1,0,1,0,0", f"16/256,z2-sta,{frame},{whole * (1 - share):.0f},1,0,1,0,0"]
+            values.write_text("\n".join(lines) + "\n")
+            [trial] = study.csv("sample", plan, "--values", values, "--draws", options.draws, "--within", options.within)
+            found.setdefault(kind, []).append({key: float(trial[key]) for key in ("holds_pct", "mean_frames", "oracle_frames")})
+    rows = []
+    for kind, trials in found.items():
+        holds = [trial["holds_pct"] for trial in trials]
+        frames, oracle = (mean(trial[key] for trial in trials) for key in ("mean_frames", "oracle_frames"))
+        rows.append([kind, f"{min(holds):.0f} to {max(holds):.0f}", f"{frames:.0f}", f"{oracle:.0f}"])
+    study.write(
+        "sampling-limits", f"five paths of {options.frames} frames each, made up; {options.draws} samples", "saving by frame | interval holds % | frames | oracle", rows)
+
+
 def run(study):
     options = study.options
     folder = study.out if not options.populations else Path(options.populations).resolve()
@@ -100,4 +147,5 @@ def run(study):
     study.write(
         "sampling-summary", detail,
         "path | populations | stopped | held in 90 % or more, % | holds in the mean % | worst % | frames | over the oracle | width over known", summary(rows, options.draws))
+    limits(study)
     study.write("sampling-cost", "processor seconds of a path of all frames", "scene | path | plan s | capture s | replay s", costs, machine())
