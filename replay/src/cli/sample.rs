@@ -296,7 +296,10 @@ fn stepped(args: &Args, points: &Points, plan: &[Planned], promise: &Promise) ->
         baseline: args.baseline.clone(),
         strata: Vec::new(),
         capture: Vec::new(),
-        not_bounded: not_bounded(&points.points[0].config),
+        not_bounded: match &args.values {
+            Some(_) => Some("counts from a file"),
+            None => not_bounded(&points.points[0].config),
+        },
     };
     let sizes = match sample.step(&aims, promise) {
         Step::Capture(frames) => {
@@ -310,7 +313,10 @@ fn stepped(args: &Args, points: &Points, plan: &[Planned], promise: &Promise) ->
                     order: point.config.order.name().to_owned(),
                     of: args.of,
                     kept: figure.half() <= promise.half(figure.value) * (1.0 + 1e-9),
-                    warm_up: warm_up(&sample, args.of, point, baseline, &sizes),
+                    warm_up: match &args.values {
+                        Some(_) => None,
+                        None => warm_up(&sample, args.of, point, baseline, &sizes),
+                    },
                     figure,
                 });
             }

@@ -170,6 +170,7 @@ fn tables(scene: &TraceScene, settings: TraceSettings, size_px: [u32; 2]) -> Ray
                 origin_m: [0.0; 3],
                 techniques: None,
                 program: None,
+                ..TraceMeta::default()
             },
             origin,
             eyes,
