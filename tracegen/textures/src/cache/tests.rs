@@ -5,7 +5,7 @@ use formats::bounded_folder::ABANDONED;
 use std::fs::{self, File};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
-use std::time::SystemTime;
+use std::time::{Duration, SystemTime};
 
 fn key(n: u8) -> Key {
     let mut hasher = KeyHasher::new("test");
