@@ -102,7 +102,7 @@ fn versions_name_the_formats() {
         let text = String::from_utf8(run_ok(program(name).arg("--version")).stdout).expect("UTF-8");
         assert!(text.starts_with(name), "{text}");
         assert!(
-            text.contains(".textrace formats 1.3, 2.0 and 3.0, .raytrace format 1.3"),
+            text.contains(".textrace formats 1.3, 2.0, 3.0, 4.0 and 5.0, .raytrace format 1.3"),
             "{text}"
         );
     }
@@ -412,12 +412,13 @@ fn every_command_prints_what_its_trace_lacks() {
     let text = |path: &std::path::Path| path.to_str().expect("a path").to_owned();
     let (trace, experiment) = (text(&trace), text(&experiment));
     let (trace, experiment) = (trace.as_str(), experiment.as_str());
-    // These read no texture trace, or only a folder with some.
+    // These read no texture trace, only a folder with some, or a plan first.
     let others = [
         "completions",
         "man",
         "readings",
         "reproject",
+        "sample",
         "techniques",
         "temporal",
     ];

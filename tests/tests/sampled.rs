@@ -127,9 +127,9 @@ fn one_command_gives_the_answer_of_its_steps() {
     let driven = answer(&mut command);
     assert_eq!(driven, by_hand);
     let row = &driven["rows"][0];
-    let end = |key: &str| row[key].as_f64().expect(key);
+    let end = |key: &str| row["figures"]["value"][key].as_f64().expect(key);
     assert!(
-        end("value_low") <= end("value") && end("value") <= end("value_high"),
+        end("low") <= end("value") && end("value") <= end("high"),
         "{row}"
     );
 }

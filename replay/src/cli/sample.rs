@@ -7,6 +7,7 @@ use super::outputs::Outputs;
 use crate::files;
 use anyhow::{Context, Result, bail, ensure};
 use formats::textrace::Textrace;
+use report::notices::open_textrace;
 use report::sample::{SampleReport, SampleRow, TrialReport, TrialRow, frame_list};
 use sim::config::{Mode, Order, RunConfig};
 use sim::figure::Figure;
@@ -240,7 +241,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
                 Some(path) => read_values(path, &mut points)?,
                 None => {
                     for path in &args.traces[1..] {
-                        points.add(&Textrace::open(path)?, path, args.draws.is_none())?;
+                        points.add(&open_textrace(path)?.0, path, args.draws.is_none())?;
                     }
                 }
             }
@@ -428,7 +429,7 @@ fn driven(
         ));
         let file = folder.join(format!("stage-{stage}.textrace"));
         capture(&["--frames", &frames], &file)?;
-        points.add(&Textrace::open(&file)?, &file, true)?;
+        points.add(&open_textrace(&file)?.0, &file, true)?;
         ensure!(
             stage < 8,
             "{}: expected the frames that --frames lists, found others",
