@@ -324,10 +324,18 @@ fn stepped(args: &Args, points: &Points, plan: &[Planned], promise: &Promise) ->
             sizes
         }
     };
+    let open = |row: &SampleRow| row.warm_up.is_none();
+    if matches!(args.of, Of::Saving | Of::Bytes) && report.rows.iter().any(open) {
+        let unfilled = "the frames before do not fill them; raise --warm of tracegen raster";
+        report.not_bounded = report.not_bounded.or(Some(unfilled));
+    }
     let strata = sample.strata.iter().zip(sizes);
     report.strata = strata.map(|(block, n)| [block.frames.len(), n]).collect();
     report
 }
+
+/// Largest upper end of a ratio, over its value, that is printed.
+const MOST_TIMES: f64 = 10.0;
 
 /// The lowest and the highest value of a figure for whatever the caches held before the captured frames.
 fn warm_up(
@@ -371,6 +379,10 @@ fn warm_up(
         ratio(&warmest(point), &baseline.values),
         ratio(&point.values, &warmest(baseline)),
     ];
+    // If nearly all misses of the baseline may have been hits, the ratio has no upper end.
+    if ends[1] > MOST_TIMES * value {
+        return None;
+    }
     Some(Figure::bounded(
         value,
         ends,
