@@ -211,7 +211,7 @@ mod tests {
         let hmd = hmd::preset("index").unwrap();
         let size_px = [144, 160];
         let lenses = hmd.fov.map(|fov| Lens::of(&fov));
-        for eye in 0..2 {
+        for (eye, lens) in lenses.iter().enumerate() {
             let fov = &hmd.fov[eye];
             let part = |[x, y]: [f32; 2]| {
                 [
@@ -219,10 +219,7 @@ mod tests {
                     (y + fov.down) / (fov.up + fov.down),
                 ]
             };
-            let triangles: Vec<Triangle> = outside(&lenses[eye], fov)
-                .iter()
-                .map(|t| t.map(part))
-                .collect();
+            let triangles: Vec<Triangle> = outside(lens, fov).iter().map(|t| t.map(part)).collect();
             let mesh = HiddenMesh {
                 left: triangles.clone(),
                 right: triangles,
@@ -230,12 +227,12 @@ mod tests {
             let shown = mesh.shown(eye, size_px);
             // The polygon leaves the circle by a thousandth of its radius.
             let wider = Lens {
-                radius: 1.003 * lenses[eye].radius,
-                ..lenses[eye]
+                radius: 1.003 * lens.radius,
+                ..*lens
             };
             for y in 0..size_px[1] {
                 for x in 0..size_px[0] {
-                    let lens = lenses[eye].pixel_visible(fov, size_px, [x, y]);
+                    let lens = lens.pixel_visible(fov, size_px, [x, y]);
                     assert!(
                         !lens || shown.get(x, y),
                         "{eye} {x} {y}: visible and hidden"

@@ -44,10 +44,13 @@ impl StoredTiles {
     }
 }
 
+/// Tile columns, tile rows and entries of a pass.
+type PassIndex<'i> = ([u32; 2], &'i [IndexEntry]);
+
 /// For each pass the earlier pass whose entries it repeats, or its own number.
 pub(super) fn repeated_passes(passes: &[Pass], index: &[IndexEntry]) -> Vec<u32> {
     // The last pass with entries of its own, and its repeats so far.
-    let mut known: HashMap<([u32; 2], &[IndexEntry]), (u32, u32)> = HashMap::new();
+    let mut known: HashMap<PassIndex<'_>, (u32, u32)> = HashMap::new();
     let mut rest = index;
     let mut repeat = |(number, pass): (u32, &Pass)| {
         let entries = rest
@@ -91,7 +94,7 @@ mod tests {
 
     /// Writes a trace whose pass `p` has the tiles `passes[p]`.
     fn write(passes: &[Vec<Tile>], growing: bool) -> Vec<u8> {
-        let tables = tables_of(passes.len() as u32 / 2);
+        let tables = tables_of(u32::try_from(passes.len() / 2).unwrap());
         let mut writer = match growing {
             false => TextraceWriter::in_memory(&tables).unwrap(),
             true => TextraceWriter::growing_in_memory().unwrap(),
@@ -152,7 +155,7 @@ mod tests {
             let touched = |tiles: &[Tile]| tiles.iter().filter(|tile| !tile.records.is_empty()).count();
             let distinct: std::collections::BTreeSet<Vec<u8>> = (passes.iter().flatten())
                 .filter(|tile| !tile.records.is_empty())
-                .map(|tile| crate::textrace::planes::encode(tile))
+                .map(crate::textrace::planes::encode)
                 .collect();
             let all: usize = passes.iter().map(|tiles| touched(tiles)).sum();
             prop_assert_eq!(trace.shared_tiles(), (all - distinct.len()) as u64);
@@ -221,7 +224,8 @@ mod tests {
             move |index: &mut Vec<u8>| index[at..at + 4].copy_from_slice(&value.to_le_bytes())
         };
         let entry = |slot: usize| FIRST + slot * INDEX_ENTRY_BYTES;
-        let refused: [(Box<dyn FnOnce(&mut Vec<u8>)>, &str); 10] = [
+        type Change = Box<dyn FnOnce(&mut Vec<u8>)>;
+        let refused: [(Change, &str); 10] = [
             // Entries that overlap a stored tile in part, lie outside, or share with other facts.
             (
                 Box::new(put(entry(1), 1)),

@@ -188,19 +188,11 @@ impl Points {
 
     /// Each point with the baseline of its caches, for the figures that are asked for.
     fn asked(&self, of: Of) -> impl Iterator<Item = (&Point, &Point)> {
-        let with_baseline = move |(at, point): (usize, &'_ Point)| {
-            let first = at - at % self.orders;
-            (of != Of::Saving || at != first).then(|| (at, first, point.config.order))
-        };
-        let found: Vec<_> = self
-            .points
-            .iter()
-            .enumerate()
-            .filter_map(with_baseline)
-            .collect();
-        found
-            .into_iter()
-            .map(|(at, first, _)| (&self.points[at], &self.points[first]))
+        let groups = self.points.chunks(self.orders);
+        groups.flat_map(move |group| {
+            let asked = &group[usize::from(of == Of::Saving)..];
+            asked.iter().map(|point| (point, &group[0]))
+        })
     }
 }
 

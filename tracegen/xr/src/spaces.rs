@@ -217,7 +217,8 @@ api! {
 
     fn locate_space(space: xr::Space, base: xr::Space, time: xr::Time, location: *mut xr::SpaceLocation) |state| {
         let instance = state.any_instance()?;
-        (instance.space(space)?, instance.space(base)?);
+        instance.space(space)?;
+        instance.space(base)?;
         let location = output(location, StructureType::SPACE_LOCATION)?;
         check_time(time)?;
         (location.location_flags, location.pose) = instance.located(space, base, time)?;

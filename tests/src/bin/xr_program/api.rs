@@ -17,7 +17,7 @@ macro_rules! xr_call {
     ($api:expr, $kind:ident($($argument:expr),* $(,)?)) => {{
         let function = $api.function(concat!("xr", stringify!($kind)));
         // SAFETY: the name determines the function's type, and the caller passes what the test wants.
-        #[allow(unused_unsafe)]
+        #[allow(unused_unsafe, clippy::macro_metavars_in_unsafe)]
         unsafe {
             let function: openxr_sys::pfn::$kind = std::mem::transmute(function);
             function($($argument),*)

@@ -1179,7 +1179,7 @@ fn masks(checks: &mut Checks, opened: &Opened) {
     checks.expect("a mask counted", get(0, hidden, &mut mask), DONE);
     checks.expect(
         "triangles",
-        mask.index_count_output >= 3 && mask.index_count_output % 3 == 0,
+        mask.index_count_output >= 3 && mask.index_count_output.is_multiple_of(3),
         true,
     );
     let mut vertices = vec![xr::Vector2f { x: 0.0, y: 0.0 }; mask.vertex_count_output as usize];
