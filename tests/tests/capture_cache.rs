@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// A scene of one textured square, copied beside its texture.
-const TRIANGLE: &str = "v -1 -1 -3\nv 1 -1 -3\nv 1 1 -3\nv -1 1 -3\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+const TRIANGLE: &str = "v -3 -3 -3\nv 3 -3 -3\nv 3 3 -3\nv -3 3 -3\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
 
 struct Folder(tempfile::TempDir);
 
@@ -105,12 +105,12 @@ fn a_changed_input_a_damaged_entry_and_another_driver_setting_are_captured_anew(
     assert!(!cached);
     assert!(folder.run(line).1);
     // Other content of the same size, then the first content with another time and inode.
-    write(&TRIANGLE.replace("v 1 1 -3", "v 1 0 -3"));
+    write(&TRIANGLE.replace("v 3 3 -3", "v 3 2 -3"));
     older(&scene);
     let (changed, cached) = folder.run(line);
     assert!(!cached && changed != said);
     fs::remove_file(&scene).expect("a file");
-    write(&TRIANGLE.replace("v 1 1 -3", "v 1 0 -3"));
+    write(&TRIANGLE.replace("v 3 3 -3", "v 3 2 -3"));
     let (same, cached) = folder.run(line);
     assert!(cached && same == changed, "the content is the same");
     // The same words in another folder name another file.
