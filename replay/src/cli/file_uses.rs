@@ -14,7 +14,7 @@ pub const FILES: &FileUses = &[
     (&["sample"], &["keep"], FileUse::Folder),
     (&["sample"], &["values"], FileUse::Input),
     (&["sample"], &["save_values"], FileUse::Output),
-    (&["sample"], &["command"], FileUse::NoFile),
+    (&["sample"], &["command", "baseline"], FileUse::NoFile),
     (&[], &["save_orders"], FileUse::FolderOfNewNames),
     (
         &[],
