@@ -117,7 +117,7 @@ fn a_changed_input_a_damaged_entry_and_another_driver_setting_are_captured_anew(
     fs::create_dir(folder.path("sub")).expect("a folder");
     fs::copy(&scene, folder.path("sub/scene.obj")).expect("a copy");
     let elsewhere = run_ok(folder.command(line).current_dir(folder.path("sub")));
-    assert!(!String::from_utf8_lossy(&elsewhere.stderr).contains("from the cache"));
+    assert!(!String::from_utf8_lossy(&elsewhere.stderr).contains("from the cache of captures"));
     // The entry of the other folder has replaced the first one.
     assert!(!folder.run(line).1);
     assert!(folder.run(line).1);
@@ -135,7 +135,7 @@ fn a_changed_input_a_damaged_entry_and_another_driver_setting_are_captured_anew(
     assert!(!folder.run(line).1, "cut");
     assert!(folder.run(line).1);
     let other = run_ok(folder.command(line).env("GALLIVM_PERF", "no_rho_approx"));
-    assert!(!String::from_utf8_lossy(&other.stderr).contains("from the cache"));
+    assert!(!String::from_utf8_lossy(&other.stderr).contains("from the cache of captures"));
 }
 
 #[test]
