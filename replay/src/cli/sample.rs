@@ -1,5 +1,7 @@
 //! `replay sample`: figures of a path from some of its frames, within a width that is asked for.
 
+mod counts_file;
+
 use super::ConfigArgs;
 use super::experiment_args::{parse_caches, refuse_varied};
 use super::order_arg::parse_named;
@@ -9,18 +11,15 @@ use anyhow::{Context, Result, bail, ensure};
 use formats::textrace::Textrace;
 use report::notices::open_textrace;
 use report::sample::{SampleReport, SampleRow, TrialReport, TrialRow, frame_list};
-use sim::config::{Mode, Order, RunConfig};
-use sim::figure::Figure;
-use std::collections::BTreeMap;
+use sim::config::{Mode, RunConfig};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode, Stdio};
-use studies::sampling::cold::{cold_misses, not_bounded};
 use studies::sampling::of::Of;
+use studies::sampling::points::{Points, aim, bounds};
 use studies::sampling::sample::{Aim, Promise, Sample, Step, Within};
 use studies::sampling::strata::{Planned, planned};
 use studies::sampling::trial::trial;
-use studies::sampling::values::{FrameCounts, Series, by_frame};
 
 /// Arguments of `replay sample`.
 #[derive(Debug, clap::Args)]
@@ -49,7 +48,7 @@ pub struct Args {
     /// Largest distance from a figure to the ends of its interval: `1points` of a share, `2%` of bytes or cycles
     #[arg(long, value_name = "WIDTH", default_value = "1points", value_parser = parse_within)]
     within: (String, Within),
-    /// Figure that the promise is about
+    /// Figure that the intervals are for
     #[arg(long, value_name = "FIGURE", default_value = "saving")]
     of: Of,
     /// Probability that all intervals hold together, percent
@@ -103,97 +102,42 @@ fn parse_confidence(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| format!("expected 50 to 99.99 percent, found '{text}'"))
 }
 
-/// Orders and caches, each with its counts by frame.
-struct Points {
-    /// The baseline first for each pair of caches.
-    points: Vec<Point>,
-    orders: usize,
-}
-
-struct Point {
-    caches: String,
-    config: RunConfig,
-    values: Series,
-    /// Bytes of misses in sets that were not full, by frame.
-    cold: BTreeMap<u32, u64>,
-}
-
-impl Points {
-    fn new(args: &Args) -> Result<Self> {
-        let usual = RunConfig {
-            mode: if args.of == Of::Cycles {
-                Mode::Timed
-            } else {
-                Mode::Functional
-            },
-            ..RunConfig::default()
-        };
-        let base = args.machine.resolve_over(usual)?;
-        refuse_varied(&base, &usual)?;
-        let [baseline] = parse_named(&args.baseline)?[..] else {
-            bail!("--baseline: expected one order, found `{}`", args.baseline);
-        };
-        let mut orders: Vec<Order> = vec![baseline];
-        orders.extend(
-            parse_named(&args.orders)?
-                .into_iter()
-                .filter(|order| *order != baseline),
-        );
-        ensure!(
-            args.of != Of::Saving || orders.len() > 1,
-            "--orders: expected an order other than the baseline, found `{}`",
-            args.orders
-        );
-        let mut points = Vec::new();
-        for (l1, l2) in parse_caches(&args.caches)? {
-            for &order in &orders {
-                let mut config = RunConfig { order, ..base };
-                (config.level.l1.size_bytes, config.level.l2.size_bytes) = (l1, l2);
-                config.validate()?;
-                points.push(Point {
-                    caches: format!("{}/{}", l1 >> 10, l2 >> 10),
-                    config,
-                    values: Series::new(),
-                    cold: BTreeMap::new(),
-                });
-            }
-        }
-        Ok(Self {
-            points,
-            orders: orders.len(),
-        })
+/// The orders and caches of the arguments.
+fn points(args: &Args) -> Result<Points> {
+    let mode = match args.of {
+        Of::Cycles => Mode::Timed,
+        _ => Mode::Functional,
+    };
+    let usual = RunConfig {
+        mode,
+        ..RunConfig::default()
+    };
+    let base = args.machine.resolve_over(usual)?;
+    refuse_varied(&base, &usual)?;
+    ensure!(
+        args.of != Of::Cycles || base.mode == Mode::Timed,
+        "--of cycles: expected --mode timed, found functional, which has no cycles"
+    );
+    ensure!(
+        base.frame.is_none(),
+        "--frame: expected with `replay run`, found with `replay sample`, which counts texture traffic alone"
+    );
+    let [baseline] = parse_named(&args.baseline)?[..] else {
+        bail!("--baseline: expected one order, found `{}`", args.baseline);
+    };
+    let mut orders = parse_named(&args.orders)?;
+    orders.retain(|order| *order != baseline);
+    orders.insert(0, baseline);
+    ensure!(
+        args.of != Of::Saving || orders.len() > 1,
+        "--orders: expected an order other than the baseline, found `{}`",
+        args.orders
+    );
+    let points = Points::new(&base, &orders, &parse_caches(&args.caches)?);
+    for point in &points.points {
+        point.config.validate()?;
     }
-
-    /// Replays a trace and adds the counts of its frames, but of those that only fill the caches. `bounds_cold` also counts
-    /// what a frame missed because the frames before it are absent.
-    fn add(&mut self, trace: &Textrace, path: &Path, bounds_cold: bool) -> Result<()> {
-        let warm = &trace.tables().meta.warm_frames;
-        let configs: Vec<RunConfig> = self.points.iter().map(|point| point.config).collect();
-        let series = by_frame(trace, &configs).with_context(|| path.display().to_string())?;
-        for (point, mut series) in self.points.iter_mut().zip(series) {
-            series.retain(|frame, _| warm.binary_search(frame).is_err());
-            if bounds_cold && not_bounded(&point.config).is_none() {
-                let line = u64::from(point.config.line_bytes);
-                let cold = cold_misses(trace, &point.config)?;
-                // The first frame of a path has no frames before it.
-                let cold = cold.into_iter().filter(|(frame, _)| *frame > 0);
-                point
-                    .cold
-                    .extend(cold.map(|(frame, lines)| (frame, lines * line)));
-            }
-            point.values.extend(series);
-        }
-        Ok(())
-    }
-
-    /// Each point with the baseline of its caches, for the figures that are asked for.
-    fn asked(&self, of: Of) -> impl Iterator<Item = (&Point, &Point)> {
-        let groups = self.points.chunks(self.orders);
-        groups.flat_map(move |group| {
-            let asked = &group[usize::from(of == Of::Saving)..];
-            asked.iter().map(|point| (point, &group[0]))
-        })
-    }
+    Ok(points)
 }
 
 /// Runs the subcommand. Exit code 1 if a complete sample does not keep its promise.
@@ -216,7 +160,7 @@ pub fn run(args: &Args) -> Result<ExitCode> {
         within: *width,
         confidence: args.confidence / 100.0,
     };
-    let mut points = Points::new(args)?;
+    let mut points = points(args)?;
     let mut outputs = match args.draws {
         Some(_) => args.outputs.list::<TrialReport>()?,
         None => args.outputs.list::<SampleReport>()?,
@@ -225,19 +169,19 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     outputs.extend(values.map(|path| shell::Output::text("--save-values", path)));
     let inputs = args.traces.iter().chain(&args.values).map(PathBuf::as_path);
     let prints = files::check_outputs(&outputs, inputs.chain(args.machine.file()))?;
-    let report = match args.command.split_first() {
-        Some((program, rest)) => driven(args, &mut points, &promise, program, rest)?,
-        None => {
+    let report = match (args.command.split_first(), args.draws) {
+        (Some((program, rest)), _) => driven(args, &mut points, &promise, program, rest)?,
+        (None, draws) => {
             let plan = plan_of(&args.traces[0])?;
             match &args.values {
-                Some(path) => read_values(path, &mut points)?,
+                Some(path) => counts_file::read(path, &mut points)?,
                 None => {
                     for path in &args.traces[1..] {
-                        points.add(&open_textrace(path)?.0, path, args.draws.is_none())?;
+                        add(&mut points, path, draws.is_none())?;
                     }
                 }
             }
-            if let Some(draws) = args.draws {
+            if let Some(draws) = draws {
                 let report = trials(args, &points, &plan, &promise, draws)?;
                 save_values(args, &points)?;
                 args.outputs.write(&report, prints)?;
@@ -265,22 +209,23 @@ fn plan_of(path: &Path) -> Result<Vec<Planned>> {
     Ok(planned(&meta.frames, counts))
 }
 
+/// Replays a trace and adds the counts of its frames.
+fn add(points: &mut Points, path: &Path, bounds_cold: bool) -> Result<()> {
+    let (trace, _) = open_textrace(path)?;
+    let added = points.add(&trace, bounds_cold);
+    added.with_context(|| path.display().to_string())
+}
+
+fn save_values(args: &Args, points: &Points) -> Result<()> {
+    let path = args.save_values.as_deref();
+    path.map_or(Ok(()), |path| counts_file::write(path, points))
+}
+
 /// The answer, or the frames that it lacks.
 fn stepped(args: &Args, points: &Points, plan: &[Planned], promise: &Promise) -> SampleReport {
     let seed = points.points[0].config.seed;
     let sample = Sample::new(plan, seed);
-    let asked: Vec<_> = points.asked(args.of).collect();
-    let aim = |(point, baseline): &(&'_ Point, &'_ Point)| -> [Series; 2] {
-        [point.values.clone(), baseline.values.clone()]
-    };
-    let series: Vec<[Series; 2]> = asked.iter().map(aim).collect();
-    let aims: Vec<Aim<'_>> = (series.iter())
-        .map(|[values, baseline]| Aim {
-            of: args.of,
-            values,
-            baseline,
-        })
-        .collect();
+    let aims: Vec<Aim<'_>> = points.asked(args.of).map(|of| aim(args.of, of)).collect();
     let mut report = SampleReport {
         rows: Vec::new(),
         within: args.within.0.clone(),
@@ -289,10 +234,7 @@ fn stepped(args: &Args, points: &Points, plan: &[Planned], promise: &Promise) ->
         baseline: args.baseline.clone(),
         strata: Vec::new(),
         capture: Vec::new(),
-        not_bounded: match &args.values {
-            Some(_) => Some("counts from a file"),
-            None => not_bounded(&points.points[0].config),
-        },
+        not_bounded: None,
     };
     let sizes = match sample.step(&aims, promise) {
         Step::Capture(frames) => {
@@ -300,86 +242,27 @@ fn stepped(args: &Args, points: &Points, plan: &[Planned], promise: &Promise) ->
             vec![0; sample.strata.len()]
         }
         Step::Done(figures, sizes) => {
-            for ((point, baseline), figure) in asked.iter().zip(figures) {
+            for (pair, figure) in points.asked(args.of).zip(figures) {
+                let bounds = match &args.values {
+                    Some(_) => Err("counts from a file"),
+                    None => bounds(&sample, args.of, pair, &sizes),
+                };
+                report.not_bounded = report.not_bounded.or(bounds.as_ref().err().copied());
                 report.rows.push(SampleRow {
-                    caches: point.caches.clone(),
-                    order: point.config.order.name().to_owned(),
+                    caches: pair[0].caches.clone(),
+                    order: pair[0].config.order.name().to_owned(),
                     of: args.of,
                     kept: figure.half() <= promise.half(figure.value) * (1.0 + 1e-9),
-                    warm_up: match &args.values {
-                        Some(_) => None,
-                        None => warm_up(&sample, args.of, point, baseline, &sizes),
-                    },
+                    warm_up: bounds.ok(),
                     figure,
                 });
             }
             sizes
         }
     };
-    let open = |row: &SampleRow| row.warm_up.is_none();
-    if matches!(args.of, Of::Saving | Of::Bytes) && report.rows.iter().any(open) {
-        let unfilled = "the frames before do not fill them; raise --warm of tracegen raster";
-        report.not_bounded = report.not_bounded.or(Some(unfilled));
-    }
     let strata = sample.strata.iter().zip(sizes);
     report.strata = strata.map(|(block, n)| [block.frames.len(), n]).collect();
     report
-}
-
-/// Largest upper end of a ratio, over its value, that is printed.
-const MOST_TIMES: f64 = 10.0;
-
-/// The lowest and the highest value of a figure for whatever the caches held before the captured frames.
-fn warm_up(
-    sample: &Sample<'_>,
-    of: Of,
-    point: &Point,
-    baseline: &Point,
-    sizes: &[usize],
-) -> Option<Figure> {
-    if not_bounded(&point.config).is_some() || !matches!(of, Of::Saving | Of::Bytes) {
-        return None;
-    }
-    let warmest = |point: &Point| -> Series {
-        let less = |(frame, counts): (&u32, &FrameCounts)| {
-            let cold = point.cold.get(frame).copied().unwrap_or(0);
-            let external_bytes = counts.external_bytes - cold;
-            (
-                *frame,
-                FrameCounts {
-                    external_bytes,
-                    ..*counts
-                },
-            )
-        };
-        point.values.iter().map(less).collect()
-    };
-    let ratio = |values: &Series, baseline: &Series| {
-        sample
-            .estimate(
-                &Aim {
-                    of,
-                    values,
-                    baseline,
-                },
-                sizes,
-            )
-            .ratio
-    };
-    let value = ratio(&point.values, &baseline.values);
-    let ends = [
-        ratio(&warmest(point), &baseline.values),
-        ratio(&point.values, &warmest(baseline)),
-    ];
-    // If nearly all misses of the baseline may have been hits, the ratio has no upper end.
-    if ends[1] > MOST_TIMES * value {
-        return None;
-    }
-    Some(Figure::bounded(
-        value,
-        ends,
-        "whatever the caches held before".into(),
-    ))
 }
 
 /// Plans, captures and replays until the sample is complete.
@@ -390,6 +273,8 @@ fn driven(
     program: &OsString,
     rest: &[OsString],
 ) -> Result<SampleReport> {
+    /// A pilot, and the last frames.
+    const STAGES: usize = 2;
     let temporary;
     let folder = match &args.keep {
         Some(folder) => {
@@ -420,10 +305,10 @@ fn driven(
     let file = folder.join("plan.textrace");
     capture(&["--plan-only"], &file)?;
     let plan = plan_of(&file)?;
-    for stage in 1.. {
-        let report = stepped(args, points, &plan, promise);
+    let mut report = stepped(args, points, &plan, promise);
+    for stage in 1..=STAGES {
         if report.capture.is_empty() {
-            return Ok(report);
+            break;
         }
         let frames = frame_list(&report.capture);
         shell::note(&format!(
@@ -433,14 +318,15 @@ fn driven(
         ));
         let file = folder.join(format!("stage-{stage}.textrace"));
         capture(&["--frames", &frames], &file)?;
-        points.add(&open_textrace(&file)?.0, &file, true)?;
-        ensure!(
-            stage < 8,
-            "{}: expected the frames that --frames lists, found others",
-            program.display()
-        );
+        add(points, &file, true)?;
+        report = stepped(args, points, &plan, promise);
     }
-    bail!("no stage")
+    ensure!(
+        report.capture.is_empty(),
+        "{}: expected the frames that --frames lists, found others",
+        program.display()
+    );
+    Ok(report)
 }
 
 /// Trials of each figure.
@@ -452,12 +338,8 @@ fn trials(
     draws: u64,
 ) -> Result<TrialReport> {
     let mut report = TrialReport::default();
-    for (point, baseline) in points.asked(args.of) {
-        let aim = Aim {
-            of: args.of,
-            values: &point.values,
-            baseline: &baseline.values,
-        };
+    for pair in points.asked(args.of) {
+        let aim = aim(args.of, pair);
         if let Some(frame) = plan.iter().find(|frame| aim.pair(frame.number).is_none()) {
             bail!(
                 "--draws: expected the counts of every frame, found none of frame {}",
@@ -465,90 +347,11 @@ fn trials(
             );
         }
         report.rows.push(TrialRow {
-            caches: point.caches.clone(),
-            order: point.config.order.name().to_owned(),
+            caches: pair[0].caches.clone(),
+            order: pair[0].config.order.name().to_owned(),
             of: args.of,
             trial: trial(plan, &aim, promise, draws),
         });
     }
     Ok(report)
-}
-
-const HEADINGS: [&str; 9] = [
-    "caches",
-    "order",
-    "frame",
-    "external_bytes",
-    "footprints",
-    "l1_footprint_misses",
-    "l2_line_lookups",
-    "l2_line_misses",
-    "cycles",
-];
-
-fn save_values(args: &Args, points: &Points) -> Result<()> {
-    let Some(path) = &args.save_values else {
-        return Ok(());
-    };
-    let mut text = HEADINGS.join(",") + "\n";
-    for point in &points.points {
-        for (frame, c) in &point.values {
-            let counts = [
-                c.external_bytes,
-                c.footprints,
-                c.l1_footprint_misses,
-                c.l2_line_lookups,
-                c.l2_line_misses,
-                c.cycles,
-            ];
-            let counts = counts.map(|count| count.to_string()).join(",");
-            text += &format!(
-                "{},{},{frame},{counts}\n",
-                point.caches,
-                point.config.order.name()
-            );
-        }
-    }
-    files::write_atomically(path, text.as_bytes())
-}
-
-fn read_values(path: &Path, points: &mut Points) -> Result<()> {
-    let text = std::fs::read_to_string(path).with_context(|| path.display().to_string())?;
-    let mut lines = (1..).zip(text.lines());
-    let head = lines.next().map(|(_, line)| line).unwrap_or_default();
-    ensure!(
-        head == HEADINGS.join(","),
-        "{}: line 1: expected {}, found {head}",
-        path.display(),
-        HEADINGS.join(",")
-    );
-    for (number, line) in lines {
-        let cells: Vec<&str> = line.split(',').collect();
-        let numbers: Vec<u64> = cells
-            .iter()
-            .skip(2)
-            .filter_map(|cell| cell.parse().ok())
-            .collect();
-        let [frame, bytes, footprints, l1, lookups, l2, cycles] = numbers[..] else {
-            bail!(
-                "{}: line {number}: expected caches, order and 7 counts, found {line}",
-                path.display()
-            );
-        };
-        let frame =
-            u32::try_from(frame).with_context(|| format!("{}: line {number}", path.display()))?;
-        let of_row = |p: &&mut Point| p.caches == cells[0] && p.config.order.name() == cells[1];
-        if let Some(point) = points.points.iter_mut().find(of_row) {
-            let counts = FrameCounts {
-                external_bytes: bytes,
-                footprints,
-                l1_footprint_misses: l1,
-                l2_line_lookups: lookups,
-                l2_line_misses: l2,
-                cycles,
-            };
-            point.values.insert(frame, counts);
-        }
-    }
-    Ok(())
 }

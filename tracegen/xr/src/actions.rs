@@ -84,7 +84,7 @@ pub(crate) struct Actions {
     /// Whether the session has its action sets.
     attached: bool,
     /// Whether the program has synchronised them once, and whether it last had the focus.
-    told: bool,
+    synchronised: bool,
     active: bool,
 }
 
@@ -99,7 +99,7 @@ fn part(path: &str) -> Option<(usize, &'static str)> {
 impl Actions {
     /// Forgets what belonged to the session.
     pub fn detach(&mut self) {
-        (self.attached, self.told, self.active) = (false, false, false);
+        (self.attached, self.synchronised, self.active) = (false, false, false);
         self.sets.values_mut().for_each(|set| set.attached = false);
     }
 
@@ -367,7 +367,7 @@ api! {
         if hand.is_none() && !others.contains(&text) {
             return Err(Code::ERROR_PATH_UNSUPPORTED);
         }
-        let bound = hand.is_some() && instance.actions.told && !instance.actions.bindings.is_empty();
+        let bound = hand.is_some() && instance.actions.synchronised && !instance.actions.bindings.is_empty();
         profile.interaction_profile = if bound { instance.paths.of(PROFILE) } else { xr::Path::NULL };
         DONE
     }
@@ -426,7 +426,7 @@ api! {
             return Ok(Code::SESSION_NOT_FOCUSED);
         }
         let bound = !instance.actions.bindings.is_empty();
-        if !std::mem::replace(&mut instance.actions.told, true) && bound {
+        if !std::mem::replace(&mut instance.actions.synchronised, true) && bound {
             instance.events.push_back(Event::Profile(session));
         }
         DONE

@@ -1,5 +1,5 @@
 //! An OpenXR runtime without a headset: it gives an unmodified program a display, a head path and a clock, and
-//! tells the recording layer of the same process which images the program shows to the eyes.
+//! passes the images that the program shows to the eyes to the recording layer of the same process.
 //!
 //! ```text
 //! loader -> negotiate -> functions: name -> function

@@ -3,7 +3,7 @@
 use crate::state::Code;
 use glam::{DQuat, DVec3};
 use openxr_sys as xr;
-use spool::openxr as told;
+use spool::openxr as settings;
 
 /// A rotation and a translation: from a space to the one that it is given in.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +41,7 @@ impl Pose {
         }
     }
 
-    pub fn of_settings(pose: &told::Pose) -> Self {
+    pub fn of_settings(pose: &settings::Pose) -> Self {
         Self {
             turn: DQuat::from_array(pose.orientation),
             place: DVec3::from_array(pose.position_m),

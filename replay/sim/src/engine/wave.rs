@@ -1,8 +1,10 @@
 //! Runs the groups of a stream, frame by frame.
 
+use super::counts::CacheCounts;
 use super::error::{ReplayError, check_other_work};
 use super::group::Group;
 use super::machine::{FrameWork, Machine};
+use super::outcome::MachineOutcome;
 use super::repeats::Repeats;
 use super::scheduler::Stage;
 use super::summary::summary;
@@ -47,6 +49,7 @@ impl<'a> Wave<'a> {
     pub(super) fn run(&self, mut groups: Vec<Group<'a>>) -> Result<(), ReplayError> {
         let rendered = rendered(self.job.trace, groups[0].config())?;
         let expander = expander_for(Expander::new(&rendered, groups[0].config())?, &groups);
+        let seen = (&rendered as &dyn TileSource, &expander);
         if groups.iter().any(Group::loses_lines) {
             check_other_work(expander.lines())?;
         }
@@ -85,16 +88,9 @@ impl<'a> Wave<'a> {
                         identity(group)
                             .into_iter()
                             .for_each(|of| machine.repeat(of));
-                        self.report_frame(
-                            group,
-                            number,
-                            &*machine,
-                            &rendered,
-                            &expander,
-                            walk.counts(),
-                        );
+                        self.report(group, Some(number), &*machine, seen, walk.counts());
                         if is_last {
-                            self.finish(group, &*machine, &rendered, &expander, walk.counts());
+                            self.report(group, None, &*machine, seen, walk.counts());
                         } else {
                             keep(group, machine, index);
                         }
@@ -139,7 +135,7 @@ impl<'a> Wave<'a> {
                     machine.client_accesses(clients);
                 }
                 if let Some(counts) = &so_far {
-                    self.report_frame(group, number, &*machine, &rendered, &expander, counts);
+                    self.report(group, Some(number), &*machine, seen, counts);
                 }
                 Ok::<_, ReplayError>(machine)
             };
@@ -154,7 +150,7 @@ impl<'a> Wave<'a> {
                 return all.try_for_each(|(group, frame)| {
                     let machine = replay(group, &frame)?;
                     drop(frame);
-                    self.finish(group, &*machine, &rendered, &expander, walk.counts());
+                    self.report(group, None, &*machine, seen, walk.counts());
                     Ok(())
                 });
             }
@@ -177,13 +173,7 @@ impl<'a> Wave<'a> {
         }
         // The trace has no frames.
         for group in &groups {
-            self.finish(
-                group,
-                &*group.build(&expander)?,
-                &rendered,
-                &expander,
-                walk.counts(),
-            );
+            self.report(group, None, &*group.build(&expander)?, seen, walk.counts());
         }
         Ok(())
     }
@@ -201,70 +191,52 @@ impl<'a> Wave<'a> {
         group.build(expander)
     }
 
-    fn finish(
+    /// Passes on the results of a group: those of the frames up to the number `after` if they were asked for, or, without
+    /// a number, those of the whole trace.
+    fn report(
         &self,
         group: &Group<'_>,
+        after: Option<u32>,
         machine: &dyn Machine,
-        rendered: &dyn TileSource,
-        expander: &Expander<'_>,
+        (rendered, expander): (&dyn TileSource, &Expander<'_>),
         counts: &TraceCounts,
     ) {
-        for &index in &group.points {
-            let result = self.result(group, index, machine, rendered, expander, counts);
-            (self.job.finished)(index, result);
-        }
-    }
-
-    /// Passes the results of the frames so far on, if anyone asked for them.
-    fn report_frame(
-        &self,
-        group: &Group<'_>,
-        number: u32,
-        machine: &dyn Machine,
-        rendered: &dyn TileSource,
-        expander: &Expander<'_>,
-        counts: &TraceCounts,
-    ) {
-        let Some(after) = self.job.after_frame else {
+        if after.is_some() && self.job.after_frame.is_none() {
             return;
-        };
+        }
         for &index in &group.points {
-            let result = self.result(group, index, machine, rendered, expander, counts);
-            after(index, number, result);
+            let config = &self.job.configs[index];
+            let tables = rendered.tables();
+            let result = result(group, config, machine.outcome(config), |counted| {
+                summary(tables, expander.bins(), counts, counted, config)
+            });
+            match after.zip(self.job.after_frame) {
+                Some((number, after_frame)) => after_frame(index, number, result),
+                None => (self.job.finished)(index, result),
+            }
         }
     }
+}
 
-    /// The result of a configuration for the frames that its machine has run.
-    fn result(
-        &self,
-        group: &Group<'_>,
-        index: usize,
-        machine: &dyn Machine,
-        rendered: &dyn TileSource,
-        expander: &Expander<'_>,
-        counts: &TraceCounts,
-    ) -> RunResult {
-        let config = &self.job.configs[index];
-        let outcome = machine.outcome(config);
-        let mut result = summary(
-            rendered.tables(),
-            expander.bins(),
-            counts,
-            &outcome.counts,
-            config,
-        );
-        (result.tmu, result.cycles) = (outcome.tmu, outcome.cycles);
-        result.timeline = outcome.timeline;
-        result.first_lookups = outcome.first_lookups;
-        let l2_misses = result.l2.counters.line_misses;
-        result.external_bytes = outcome.memory.external_bytes(l2_misses, config.line_bytes);
-        result.memory = outcome.memory;
-        if let Some(clients) = &group.clients {
-            let (traffic, geometry) = clients.result(result.external_bytes);
-            (result.clients, result.geometry) = (traffic, Some(geometry));
-        }
-        result
+/// The result of a configuration from the outcome of its machine; `summary` adds up its cache counts.
+fn result(
+    group: &Group<'_>,
+    config: &RunConfig,
+    outcome: MachineOutcome,
+    summary: impl FnOnce(&CacheCounts) -> RunResult,
+) -> RunResult {
+    let mut result = summary(&outcome.counts);
+    (result.tmu, result.cycles) = (outcome.tmu, outcome.cycles);
+    result.timeline = outcome.timeline;
+    result.first_lookups = outcome.first_lookups;
+    let l2_misses = result.l2.counters.line_misses;
+    result.external_bytes = outcome.memory.external_bytes(l2_misses, config.line_bytes);
+    result.memory = outcome.memory;
+    if let Some(clients) = &group.clients {
+        let (traffic, geometry) = clients.result(result.external_bytes);
+        (result.clients, result.geometry) = (traffic, Some(geometry));
     }
+    result
 }
 
 /// Expands a frame, which may be repeated if it recurs.

@@ -40,6 +40,13 @@ const BINS: &str = "bins fill the on-chip memory (tile_align_w and tile_align_h 
 const MALI_TILES: &str = "fragment tasks of 32x32 pixels (Arm, counter reference of the Mali-G77); the tiles inside are not published: 16 to 32";
 const MALI_L1: &str = "Arm GPU Datasheet (102849), texture cache";
 
+/// Keys that no vendor publishes for a GPU.
+const OPEN_L1_WAYS: Setting = between(L1Ways, 4, 8, 16, NO_WAYS);
+const OPEN_L2_WAYS: Setting = between(L2Ways, 4, 8, 16, NO_WAYS);
+const OPEN_L2_INDEX: Setting = between(L2SetIndex, MODULO, XOR, XOR, NO_INDEX);
+const BIN: Setting = between(TilePx, 16, 64, 64, BINS);
+const MALI_TILE: Setting = between(TilePx, 16, 16, 32, MALI_TILES);
+
 /// Adreno 650.
 pub(super) const ADRENO_650: Machine = Machine {
     name: "adreno-650",
@@ -50,7 +57,7 @@ pub(super) const ADRENO_650: Machine = Machine {
             3,
             "OpenCL of an Adreno 650: 3 compute units (xmrig issue 2383); Mesa, freedreno/common/a6xx_gpu.py: num_ccu",
         ),
-        between(TilePx, 16, 64, 64, BINS),
+        BIN,
         known(
             LineBytes,
             64,
@@ -61,14 +68,14 @@ pub(super) const ADRENO_650: Machine = Machine {
             KIB,
             "of the same generation: 1 KiB in the Adreno 630 (Romou, MobiCom 2022) and 640 (Chips and Cheese, 2024)",
         ),
-        between(L1Ways, 4, 8, 16, NO_WAYS),
+        OPEN_L1_WAYS,
         known(
             L2Bytes,
             128 * KIB,
             "OpenCL of an Adreno 650: global memory cache (xmrig issue 2383)",
         ),
-        between(L2Ways, 4, 8, 16, NO_WAYS),
-        between(L2SetIndex, MODULO, XOR, XOR, NO_INDEX),
+        OPEN_L2_WAYS,
+        OPEN_L2_INDEX,
         known(
             DramDevice,
             LPDDR5,
@@ -88,7 +95,7 @@ pub(super) const ADRENO_740: Machine = Machine {
     help: "Adreno 740: Snapdragon 8 Gen 2 and XR2 Gen 2 (Quest 3), 2022",
     settings: &[
         known(Cores, 6, "Mesa, freedreno/common/a7xx_gpu.py: num_ccu"),
-        between(TilePx, 16, 64, 64, BINS),
+        BIN,
         known(
             LineBytes,
             64,
@@ -101,7 +108,7 @@ pub(super) const ADRENO_740: Machine = Machine {
             4 * KIB,
             "not published: 1 KiB as in Adreno 6xx, to four times that",
         ),
-        between(L1Ways, 4, 8, 16, NO_WAYS),
+        OPEN_L1_WAYS,
         between(
             L2Bytes,
             512 * KIB,
@@ -109,8 +116,8 @@ pub(super) const ADRENO_740: Machine = Machine {
             1024 * KIB,
             "not published: 1 MiB in the Adreno X1, which Mesa configures alike (die measurement, topcpu.net, 2025), and in the Adreno 830 (OpenCL, ggml-org/whisper.cpp issue 3708), to half that. The X1's cluster caches are not modelled",
         ),
-        between(L2Ways, 4, 8, 16, NO_WAYS),
-        between(L2SetIndex, MODULO, XOR, XOR, NO_INDEX),
+        OPEN_L2_WAYS,
+        OPEN_L2_INDEX,
         known(DramDevice, LPDDR5, "assumed, as in the Snapdragon 865"),
         known(DramChannels, 4, "assumed, as in the Snapdragon 865"),
     ],
@@ -126,21 +133,21 @@ pub(super) const MALI_G78: Machine = Machine {
             20,
             "panfrost's boot log on a Pixel 6 (postmarketOS port of m8l8th814n-eng): shader_present 0x779fff",
         ),
-        between(TilePx, 16, 16, 32, MALI_TILES),
+        MALI_TILE,
         known(
             LineBytes,
             64,
             "the same log: L2_FEATURES 0x08130206, bits 0 to 7",
         ),
         known(L1Bytes, 32 * KIB, MALI_L1),
-        between(L1Ways, 4, 8, 16, NO_WAYS),
+        OPEN_L1_WAYS,
         known(
             L2Bytes,
             2048 * KIB,
             "the same log: L2_FEATURES bits 16 to 23 (512 KiB a slice), MEM_FEATURES 0x301 (four slices); 2 MiB also in a Kirin 9000 (ArchProbe issue 10)",
         ),
         known(L2Ways, 4, "the same log: L2_FEATURES bits 8 to 15"),
-        between(L2SetIndex, MODULO, XOR, XOR, NO_INDEX),
+        OPEN_L2_INDEX,
         known(DramDevice, LPDDR5, "Google Tensor: LPDDR5 (nanoreview.net)"),
         known(
             DramChannels,
@@ -160,21 +167,21 @@ pub(super) const MALI_G710: Machine = Machine {
             7,
             "panthor on a Pixel 7 Pro (GS201 GPU bring-up, 2026): shader_present 0x1110055",
         ),
-        between(TilePx, 16, 16, 32, MALI_TILES),
+        MALI_TILE,
         known(
             LineBytes,
             64,
             "the same bring-up: L2_FEATURES 0x08130306, bits 0 to 7",
         ),
         known(L1Bytes, 32 * KIB, MALI_L1),
-        between(L1Ways, 4, 8, 16, NO_WAYS),
+        OPEN_L1_WAYS,
         known(
             L2Bytes,
             2048 * KIB,
             "OpenCL on a Pixel 7: global memory cache (ggml-org/llama.cpp issue 2636)",
         ),
         known(L2Ways, 8, "the same bring-up: L2_FEATURES bits 8 to 15"),
-        between(L2SetIndex, MODULO, XOR, XOR, NO_INDEX),
+        OPEN_L2_INDEX,
         known(
             DramDevice,
             LPDDR5,
@@ -198,14 +205,14 @@ pub(super) const MALI_G715: Machine = Machine {
             7,
             "VK_ARM_shader_core_builtins on a Mali-G715 MP7: shaderCoreCount 7 (vulkan.gpuinfo.org)",
         ),
-        between(TilePx, 16, 16, 32, MALI_TILES),
+        MALI_TILE,
         known(
             LineBytes,
             64,
             "Arm, The Valhall Shader Core (102203): 64-byte lines",
         ),
         known(L1Bytes, 32 * KIB, MALI_L1),
-        between(L1Ways, 4, 8, 16, NO_WAYS),
+        OPEN_L1_WAYS,
         between(
             L2Bytes,
             1024 * KIB,
@@ -218,7 +225,7 @@ pub(super) const MALI_G715: Machine = Machine {
             8,
             "of the generations before and after: L2_FEATURES of a Mali-G710 and an Immortalis-G925 (panthor)",
         ),
-        between(L2SetIndex, MODULO, XOR, XOR, NO_INDEX),
+        OPEN_L2_INDEX,
         known(DramDevice, LPDDR5, "assumed, as in the Google Tensor G2"),
         known(DramChannels, 4, "assumed, as in the Google Tensor G2"),
     ],
@@ -251,7 +258,7 @@ pub(super) const APPLE_M2: Machine = Machine {
             8 * KIB,
             "Chips and Cheese, 2023, of the M2 Pro; philipturner/metal-benchmarks, data cache of Apple 7 and 8",
         ),
-        between(L1Ways, 4, 8, 16, NO_WAYS),
+        OPEN_L1_WAYS,
         between(
             L2Bytes,
             1024 * KIB,
@@ -259,8 +266,8 @@ pub(super) const APPLE_M2: Machine = Machine {
             2048 * KIB,
             "about 1.5 MiB (philipturner/metal-benchmarks): the powers of two around it",
         ),
-        between(L2Ways, 4, 8, 16, NO_WAYS),
-        between(L2SetIndex, MODULO, XOR, XOR, NO_INDEX),
+        OPEN_L2_WAYS,
+        OPEN_L2_INDEX,
         known(
             DramDevice,
             LPDDR5,
@@ -301,7 +308,7 @@ pub(super) const XCLIPSE_920: Machine = Machine {
             16 * KIB,
             "of RDNA 2: Linux, amdkfd/kfd_crat.c, vangogh_cache_info. The 128 KiB GL1 between L0 and L2 is not modelled",
         ),
-        between(L1Ways, 4, 8, 16, NO_WAYS),
+        OPEN_L1_WAYS,
         between(
             L2Bytes,
             512 * KIB,
@@ -316,7 +323,7 @@ pub(super) const XCLIPSE_920: Machine = Machine {
             16,
             "not published: 16 in AMD GCN (whitepaper, 2012), down to 4",
         ),
-        between(L2SetIndex, MODULO, XOR, XOR, NO_INDEX),
+        OPEN_L2_INDEX,
         known(DramDevice, LPDDR5, "Exynos 2200: LPDDR5 (nanoreview.net)"),
         known(
             DramChannels,

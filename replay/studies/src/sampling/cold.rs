@@ -2,11 +2,11 @@
 //!
 //! In a functional LRU cache a set is exact once it has received as many distinct lines as it has ways. Until then, a miss
 //! may have been a hit (Wood, Hill and Kessler, SIGMETRICS 1991). So the misses of a frame lie between those of sets that
-//! were full and all misses of a replay from empty caches.
+//! were full and all misses of a replay from empty caches, if all sets of the L1 were full.
 
 use super::run::Run;
 use rayon::prelude::*;
-use sim::config::{Mode, RunConfig};
+use sim::config::{BetweenFrames, Mode, RunConfig};
 use sim::engine::ReplayError;
 use sim::memory::{Cache, Found, Hierarchy};
 use sim::stream::{
@@ -14,41 +14,74 @@ use sim::stream::{
 };
 use std::collections::BTreeMap;
 
-/// Why a configuration has no bracket; `None` if it has one.
+/// Why a configuration has no bounds; `None` if it has them.
 pub fn not_bounded(config: &RunConfig) -> Option<&'static str> {
     let levels = [config.level.l1, config.level.l2];
-    let plain = levels.iter().all(|level| level.is_plain_lru());
     if config.mode != Mode::Functional {
         Some("timed mode")
-    } else if !plain || config.level.l2.sets("L2", config.line_bytes).is_err() {
-        Some("a policy other than LRU")
+    } else if !levels.iter().all(|level| level.is_plain_lru()) || !levels[1].shared {
+        Some("caches other than plain LRU")
     } else if config.follows_l2_misses() {
         Some("levels, prefetchers or DRAM below the L2")
+    } else if config.between_frames.lost_percent().is_some() {
+        Some("other work between frames")
     } else {
         None
     }
 }
 
-/// Counts the misses of sets that are not full.
-struct Cold {
-    caches: Hierarchy<Box<dyn Cache>>,
-    /// Lines that each set of the L2 has received since it was empty.
-    filled: Vec<u32>,
-    ways: u32,
-    misses: u64,
+/// What a frame may have missed because of the frames before it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cold {
+    /// Misses in L1 sets that were not full.
+    pub l1_misses: u64,
+    /// Bytes of misses in L2 sets that were not full.
+    pub l2_bytes: u64,
 }
 
-impl Consumer for Cold {
+/// The sets of a cache, and the lines that each has received since it was empty.
+struct Filling {
+    lines: Vec<u32>,
+    ways: u32,
+}
+
+impl Filling {
+    fn new(sets: u32, ways: u32) -> Self {
+        Self {
+            lines: vec![0; sets as usize],
+            ways,
+        }
+    }
+
+    /// Whether the set of a missing line is not full. The line fills it.
+    fn is_cold(&mut self, line: u32) -> bool {
+        let set = line as usize & (self.lines.len() - 1);
+        let cold = self.lines[set] < self.ways;
+        self.lines[set] += u32::from(cold);
+        cold
+    }
+}
+
+struct Counting {
+    caches: Hierarchy<Box<dyn Cache>>,
+    /// One per core.
+    l1: Vec<Filling>,
+    l2: Filling,
+    line_bytes: u64,
+    cold: Cold,
+}
+
+impl Consumer for Counting {
     fn quad(&mut self, core: usize, quad: QuadLines<'_>) {
         for footprint in quad.footprints() {
             for _ in 0..=footprint.repeats {
                 for &line in footprint.lines {
-                    if self.caches.access(core, line) == Found::Below {
-                        let set = line as usize & (self.filled.len() - 1);
-                        if self.filled[set] < self.ways {
-                            self.filled[set] += 1;
-                            self.misses += 1;
-                        }
+                    let found = self.caches.access(core, line);
+                    if found != Found::L1 && self.l1[core].is_cold(line) {
+                        self.cold.l1_misses += 1;
+                    }
+                    if found == Found::Below && self.l2.is_cold(line) {
+                        self.cold.l2_bytes += self.line_bytes;
                     }
                 }
             }
@@ -56,45 +89,52 @@ impl Consumer for Cold {
     }
 }
 
-/// Misses of each frame in L2 sets that were not full. Caches are empty where frame numbers leave a gap.
+/// What each frame may have missed. Caches are empty where frame numbers leave a gap; frame 0 has no frames before it.
 ///
 /// # Errors
 /// An invalid configuration, or an unreadable trace.
-pub fn cold_misses(
+pub fn cold(
     trace: &dyn TileSource,
     config: &RunConfig,
-) -> Result<BTreeMap<u32, u64>, ReplayError> {
+) -> Result<BTreeMap<u32, Cold>, ReplayError> {
     config.validate()?;
     let runs = Run::all(trace);
-    let of_runs: Vec<_> =
+    let found: Vec<_> =
         (runs.par_iter().map(|run| of_run(run, config))).collect::<Result<_, _>>()?;
-    Ok(of_runs.into_iter().flatten().collect())
+    Ok(found.into_iter().flatten().collect())
 }
 
-fn of_run(run: &Run<'_>, config: &RunConfig) -> Result<Vec<(u32, u64)>, ReplayError> {
+fn of_run(run: &Run<'_>, config: &RunConfig) -> Result<Vec<(u32, Cold)>, ReplayError> {
     let rendered = rendered(run, config)?;
     let expander = Expander::new(&rendered, config)?;
-    let sets = config.level.l2.sets("L2", config.line_bytes)? as usize;
-    let mut cold = Cold {
+    let level = &config.level;
+    let l1 = || level.l1.sets("L1", config.line_bytes);
+    let l1 = || l1().map(|sets| Filling::new(sets, level.l1.ways));
+    let mut counting = Counting {
         caches: Hierarchy::build(config)?,
-        filled: vec![0; sets],
-        ways: config.level.l2.ways,
-        misses: 0,
+        l1: (0..config.cores).map(|_| l1()).collect::<Result<_, _>>()?,
+        l2: Filling::new(level.l2.sets("L2", config.line_bytes)?, level.l2.ways),
+        line_bytes: config.line_bytes.into(),
+        cold: Cold::default(),
     };
     let memory = LineMemory::new(LineMemory::USUAL_BYTES);
     let mut walk = Walk::new(&expander, &memory, config, [config.order]);
+    let frames = walk.frames();
+    let starts_empty = config.between_frames == BetweenFrames::Flush || frames.first() == Some(&0);
+    if starts_empty {
+        return Ok(frames
+            .into_iter()
+            .map(|frame| (frame, Cold::default()))
+            .collect());
+    }
     let mut out = Vec::new();
-    for number in walk.frames() {
-        if config.between_frames.empties()? {
-            cold.caches.clear();
-            cold.filled.fill(0);
-        }
-        cold.misses = 0;
+    for number in frames {
+        counting.cold = Cold::default();
         let frame = walk.expand(number)?;
         let phases = walk.plan(&frame)?.phases(config);
         let mut cores = Cores::new(&frame, config.cores as usize);
-        interleave(&mut cores, &phases, config.dispatch(), &mut cold)?;
-        out.push((number, cold.misses));
+        interleave(&mut cores, &phases, config.dispatch(), &mut counting)?;
+        out.push((number, counting.cold));
     }
     Ok(out)
 }

@@ -8,8 +8,8 @@ use sim::figure::{Because, Figure};
 /// Numerator and denominator of a figure in one frame.
 pub type Pair = [f64; 2];
 
-/// Factor on the half width. Values of frames are skewed, so Student's intervals hold too rarely; with this factor those
-/// of made-up skewed paths hold in 88 instead of 83 %.
+/// Factor on the half width. Values of frames are skewed, so Student's intervals hold too rarely. The factor was chosen
+/// on made-up paths (results/sampling-limits.csv), not on scenes.
 const WIDER: f64 = 1.15;
 /// Coefficient of variation of the denominator's total from which on the interval is Fieller's.
 const VARYING: f64 = 0.1;

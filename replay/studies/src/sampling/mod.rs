@@ -7,6 +7,7 @@
 pub mod cold;
 pub mod estimate;
 pub mod of;
+pub mod points;
 mod run;
 pub mod sample;
 pub mod stages;

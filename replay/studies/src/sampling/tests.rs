@@ -1,12 +1,17 @@
+use super::cold::{Cold, cold};
 use super::estimate::{Stratum, chi_square, estimate, figure, student};
 use super::of::Of;
 use super::sample::{Aim, Promise, Sample, Step, Within};
 use super::stages::{fewest, pilot};
 use super::strata::Planned;
 use super::trial::trial;
-use super::values::{FrameCounts, Series};
+use super::values::{FrameCounts, Series, by_frame};
 use formats::random::Random;
+use sim::config::{BetweenFrames, LevelConfig, Levels, Mode, Order, RunConfig};
+use sim::engine::replay;
 use sim::figure::Because;
+use sim::stream::MemoryTrace;
+use sim::stream::testing::different_frames;
 
 /// Quantiles from printed tables.
 #[test]
@@ -194,4 +199,96 @@ fn the_oracle_needs_no_more_frames_where_frames_are_alike() {
     let few = fewest(&sample.strata, &vec![0.0; sample.strata.len()], 1.0);
     let many = fewest(&sample.strata, &vec![1e12; sample.strata.len()], 1.0);
     assert!(few < 25 && many == 100, "{few} {many}");
+}
+
+/// The frames of a trace with these numbers.
+fn only(trace: &MemoryTrace, frames: &[u32]) -> MemoryTrace {
+    let mut kept = trace.clone();
+    kept.tables.passes.clear();
+    kept.tiles.clear();
+    for (pass, tiles) in trace.tables.passes.iter().zip(&trace.tiles) {
+        if frames.contains(&pass.frame) {
+            kept.tables.passes.push(*pass);
+            kept.tiles.push(tiles.clone());
+        }
+    }
+    kept
+}
+
+fn machine(mode: Mode, l2_bytes: u64) -> RunConfig {
+    RunConfig {
+        mode,
+        order: Order::Z2_STA,
+        level: Levels::two(LevelConfig::lru(256), LevelConfig::lru(l2_bytes)),
+        ..RunConfig::default()
+    }
+}
+
+#[test]
+fn counts_by_frame_add_up_to_a_replay_of_all_frames() {
+    let trace = different_frames();
+    for mode in [Mode::Functional, Mode::Timed] {
+        let config = machine(mode, 4 << 10);
+        let whole = replay(&trace, &config).unwrap();
+        let series = by_frame(&trace, &[config]).unwrap().remove(0);
+        let sum = |of: fn(&FrameCounts) -> u64| series.values().map(of).sum::<u64>();
+        assert_eq!(series.keys().copied().collect::<Vec<_>>(), [0, 1, 2]);
+        assert!(series.values().all(|frame| frame.external_bytes > 0));
+        assert_eq!(sum(|f| f.external_bytes), whole.external_bytes);
+        assert_eq!(sum(|f| f.footprints), whole.footprints);
+        assert_eq!(sum(|f| f.l2_line_lookups), whole.l2.counters.line_lookups);
+        assert_eq!(sum(|f| f.cycles), whole.cycles.unwrap_or(0));
+    }
+}
+
+#[test]
+fn a_gap_in_the_numbers_of_frames_empties_the_caches() {
+    let trace = different_frames();
+    let config = machine(Mode::Functional, 64 << 10);
+    let apart = by_frame(&only(&trace, &[0, 2]), &[config])
+        .unwrap()
+        .remove(0);
+    for frame in [0, 2] {
+        let alone = replay(&only(&trace, &[frame]), &config).unwrap();
+        assert_eq!(apart[&frame].external_bytes, alone.external_bytes);
+    }
+    let warmed = by_frame(&trace, &[config]).unwrap().remove(0);
+    assert!(warmed[&2].external_bytes < apart[&2].external_bytes);
+}
+
+/// The bytes of a frame after all frames before it lie between the bounds of a capture of some of them.
+#[test]
+fn bounds_of_a_cold_start_enclose_the_frame_of_the_whole_path() {
+    let trace = different_frames();
+    let (mut exact, mut open) = (0, 0);
+    for l2_kib in [1, 2, 4, 8, 16, 64, 256] {
+        let config = machine(Mode::Functional, l2_kib << 10);
+        let whole = by_frame(&trace, &[config]).unwrap().remove(0);
+        for captured in [&[2][..], &[1, 2]] {
+            let part = only(&trace, captured);
+            let most = by_frame(&part, &[config]).unwrap().remove(0)[&2].external_bytes;
+            let cold = cold(&part, &config).unwrap()[&2];
+            let truth = whole[&2].external_bytes;
+            if cold.l1_misses == 0 {
+                assert!(
+                    most - cold.l2_bytes <= truth && truth <= most,
+                    "{l2_kib} {cold:?}"
+                );
+                exact += u32::from(cold.l2_bytes == 0 && truth == most);
+                open += u32::from(cold.l2_bytes > 0);
+            }
+        }
+    }
+    assert!(exact > 0 && open > 0, "{exact} {open}");
+    let flush = RunConfig {
+        between_frames: BetweenFrames::Flush,
+        ..machine(Mode::Functional, 4 << 10)
+    };
+    let from_the_start = cold(&trace, &machine(Mode::Functional, 4 << 10)).unwrap();
+    for cold in [
+        cold(&only(&trace, &[1, 2]), &flush).unwrap(),
+        from_the_start,
+    ] {
+        assert!(cold.values().all(|cold| *cold == Cold::default()));
+    }
 }

@@ -113,7 +113,7 @@ fn treatments_between_frames_and_equal_frames_have_the_counts_of_plain_replays()
     let mut random = Random(5);
     let (mut shared, mut skipped) = (0, 0);
     let orders: Vec<Order> = Order::all().chain(composed()).collect();
-    for set in 0..150 {
+    for set in 0..60 {
         let length = 2 + random.below(7);
         let numbers: Vec<usize> = (0..length).map(|_| random.below(3) as usize / 2).collect();
         let trace = frames(&numbers);
@@ -167,7 +167,7 @@ fn treatments_between_frames_and_equal_frames_have_the_counts_of_plain_replays()
             .count();
         skipped += u64::from(read < read_all);
     }
-    assert!(shared > 60 && skipped > 10, "{shared} {skipped}");
+    assert!(shared > 24 && skipped > 3, "{shared} {skipped}");
 }
 
 #[test]
