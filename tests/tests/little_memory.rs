@@ -51,6 +51,10 @@ fn fails_with_message(command: &Command, folder: &Path, limits_mib: &[u32]) -> b
 fn a_replay_without_memory_ends_with_a_message() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let trace = root().join("traces/atrium.textrace");
+    // Below the size of the program's file the loader fails, or the program aborts before it can print.
+    let size = fs::metadata(program("replay").get_program()).expect("the program");
+    let size_mib = size.len().div_ceil(1 << 20) as u32;
+    let limits_mib = [0, 4, 10, 20, 30].map(|more| size_mib + more);
     for name in ["run", "paper", "report", "locality"] {
         let mut command = program("replay");
         command.arg(name).arg(&trace);
@@ -59,10 +63,8 @@ fn a_replay_without_memory_ends_with_a_message() {
             "report" => command.arg("-o").arg(folder.path().join("r.html")),
             _ => &mut command,
         };
-        assert!(
-            fails_with_message(&command, folder.path(), &[28, 32, 40, 50, 60]),
-            "{name}"
-        );
+        let refused = fails_with_message(&command, folder.path(), &limits_mib);
+        assert!(refused, "{name}");
     }
 }
 

@@ -87,7 +87,12 @@ pub fn strata(plan: &[Planned]) -> Vec<Block> {
             all: true,
         });
     }
-    for range in segments(&counts, blocks) {
+    let shots = (rest.windows(2)).scan(0, |shot, pair| {
+        *shot += usize::from(pair[1] != pair[0] + 1 || plan[pair[1]].cut);
+        Some(*shot)
+    });
+    let shots: Vec<usize> = std::iter::once(0).chain(shots).collect();
+    for range in segments(&counts, &shots, blocks) {
         strata.push(Block {
             all: range.len() <= 2,
             frames: rest[range].to_vec(),
@@ -121,9 +126,13 @@ fn scaled(counts: Vec<&[f64]>) -> Vec<Vec<f64>> {
     out
 }
 
+/// Cost of a range that spans a cut: more than all counts of a path can differ, so that ranges end at cuts where there
+/// are enough of them.
+const SPANS_CUT: f64 = 1e6;
+
 /// The division of `rows` into consecutive ranges of at least two rows with the least sum of squared distances to the
-/// means of the ranges (Fisher 1958, by dynamic programming).
-fn segments(rows: &[Vec<f64>], ranges: usize) -> Vec<Range<usize>> {
+/// means of the ranges (Fisher 1958, by dynamic programming). `shots` has the number of cuts before each row.
+fn segments(rows: &[Vec<f64>], shots: &[usize], ranges: usize) -> Vec<Range<usize>> {
     let n = rows.len();
     if n == 0 {
         return Vec::new();
@@ -146,7 +155,10 @@ fn segments(rows: &[Vec<f64>], ranges: usize) -> Vec<Range<usize>> {
             .sum();
         // A weak pull towards equal lengths decides where counts do not.
         let length = (to - from) as f64;
-        sums[to][width] - sums[from][width] - square / length + 1e-3 * length * length / n as f64
+        let cuts = (shots[to - 1] - shots[from]) as f64;
+        sums[to][width] - sums[from][width] - square / length
+            + 1e-3 * length * length / n as f64
+            + SPANS_CUT * cuts
     };
     let mut best = vec![vec![(f64::INFINITY, 0); n + 1]; ranges + 1];
     best[0][0] = (0.0, 0);
@@ -206,6 +218,18 @@ mod tests {
         assert_eq!((blocks.len(), frames), (3, 30));
     }
 
+    #[test]
+    fn no_block_spans_a_cut_where_blocks_are_enough() {
+        let counts: Vec<f64> = (0..60).map(|at| 100.0 + f64::from(at)).collect();
+        let blocks = strata(&plan(&counts, &[0, 7, 22, 50]));
+        let shot = |at: usize| [7, 22, 50].iter().filter(|&&cut| at > cut).count();
+        for block in &blocks[1..] {
+            let ends = [block.frames[0], block.frames[block.frames.len() - 1]];
+            assert_eq!(shot(ends[0]), shot(ends[1]), "{block:?}");
+        }
+        assert!(blocks.len() >= 5, "{blocks:?}");
+    }
+
     /// A brute force over all divisions finds none that is better.
     #[test]
     fn segments_have_the_least_squares() {
@@ -219,7 +243,7 @@ mod tests {
                 part.iter().map(|r| (r[0] - mean).powi(2)).sum::<f64>()
                     + 1e-3 * length * length / 9.0
             };
-            let found: f64 = segments(&rows, 3).into_iter().map(cost).sum();
+            let found: f64 = segments(&rows, &[0; 9], 3).into_iter().map(cost).sum();
             let mut least = f64::INFINITY;
             for a in 2..=5 {
                 for b in a + 2..=7 {
