@@ -105,6 +105,24 @@ pub const END_FRAME: &CStr = c"parallax_end_openxr_frame";
 /// Type of that function: the `VkDevice` handle of the session, and the frame's views, of which there are 2.
 pub type EndFrame = unsafe extern "C" fn(device: u64, views: *const ShownView);
 
+/// An image of Vulkan.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NewestImage {
+    /// `VkDevice` handle.
+    pub device: u64,
+    /// `VkImage` handle.
+    pub image: u64,
+}
+
+/// Name of the layer's function that finds the image of a texture of OpenGL.
+pub const NEWEST_IMAGE: &CStr = c"parallax_newest_openxr_image";
+
+/// Type of that function: width, height, layers and samples of the image, which is the newest one of this size that the
+/// function has not found before; and where it is written. Returns whether there is one.
+pub type FindNewestImage =
+    unsafe extern "C" fn(size: *const [u32; 4], found: *mut NewestImage) -> bool;
+
 /// A picture that a program showed to an eye.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ShownEye {

@@ -206,7 +206,8 @@ pub fn run(args: &XrArgs) -> anyhow::Result<ExitCode> {
     };
     // The supervisor watches over the capture's folder until the end.
     let (_program, run) = to_run.start(&launch, |command| {
-        launch.prepare(command, false);
+        // OpenGL on zink, for programs that use it.
+        launch.prepare(command, true);
         launch.prepare_openxr(command, &library, &runtime)
     })?;
     let mut session = to_run

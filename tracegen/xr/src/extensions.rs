@@ -11,15 +11,17 @@ pub(crate) const DEBUG_UTILS: &str = "XR_EXT_debug_utils";
 pub(crate) const DEPTH: &str = "XR_KHR_composition_layer_depth";
 pub(crate) const HEADLESS: &str = "XR_MND_headless";
 pub(crate) const LOCAL_FLOOR: &str = "XR_EXT_local_floor";
+pub(crate) const OPENGL: &str = "XR_KHR_opengl_enable";
 pub(crate) const TIMESPEC: &str = "XR_KHR_convert_timespec_time";
 pub(crate) const VISIBILITY_MASK: &str = "XR_KHR_visibility_mask";
 pub(crate) const VULKAN: &str = "XR_KHR_vulkan_enable";
 pub(crate) const VULKAN2: &str = "XR_KHR_vulkan_enable2";
 
 /// The extensions and their versions.
-pub(crate) const EXTENSIONS: [(&str, u32); 8] = [
+pub(crate) const EXTENSIONS: [(&str, u32); 9] = [
     (VULKAN, 8),
     (VULKAN2, 2),
+    (OPENGL, 10),
     (DEPTH, 6),
     (TIMESPEC, 1),
     (VISIBILITY_MASK, 2),
@@ -195,6 +197,7 @@ pub(crate) fn extension_of(function: &CStr) -> Option<&'static [&'static str]> {
         | b"xrGetVulkanInstanceExtensionsKHR"
         | b"xrGetVulkanDeviceExtensionsKHR"
         | b"xrGetVulkanGraphicsDeviceKHR" => &[VULKAN],
+        b"xrGetOpenGLGraphicsRequirementsKHR" => &[OPENGL],
         b"xrGetVisibilityMaskKHR" => &[VISIBILITY_MASK],
         b"xrConvertTimespecTimeToTimeKHR" | b"xrConvertTimeToTimespecTimeKHR" => &[TIMESPEC],
         name if name.ends_with(b"EXT") => &[DEBUG_UTILS],

@@ -2,7 +2,6 @@
 
 use crate::chain::{elements, find, input, output};
 use crate::extensions::DEPTH;
-use crate::graphics::Graphics;
 use crate::pose::Pose;
 use crate::recorder;
 use crate::session::UP;
@@ -258,11 +257,15 @@ api! {
         let of = instance.session.as_mut().ok_or(INVALID)?;
         of.frames.open = false;
         of.frames.ended += 1;
-        match (&shown, &of.graphics) {
-            (Some(views), Graphics::Vulkan(device)) => {
+        let device = match shown {
+            Some(_) => of.graphics.shown_on()?,
+            None => None,
+        };
+        match (&shown, device) {
+            (Some(views), Some(device)) => {
                 of.frames.shown += 1;
                 of.frames.empty = 0;
-                recorder::end_frame(device.raw(), views);
+                recorder::end_frame(device, views);
             }
             _ => of.frames.empty += 1,
         }

@@ -4,8 +4,8 @@ use crate::extensions::extension_of;
 use crate::negotiate::NEWEST;
 use crate::state::{Code, INVALID, locked};
 use crate::{
-    actions, extensions, frames, instance, paths, session, spaces, swapchains, system, views,
-    vulkan,
+    actions, extensions, frames, instance, opengl, paths, session, spaces, swapchains, system,
+    views, vulkan,
 };
 use openxr_sys as xr;
 use std::ffi::{CStr, c_char};
@@ -95,6 +95,7 @@ functions! {
     b"xrGetVulkanInstanceExtensionsKHR" GetVulkanInstanceExtensionsKHR => vulkan::get_instance_extensions;
     b"xrGetVulkanDeviceExtensionsKHR" GetVulkanDeviceExtensionsKHR => vulkan::get_device_extensions;
     b"xrGetVulkanGraphicsDeviceKHR" GetVulkanGraphicsDeviceKHR => vulkan::get_graphics_device;
+    b"xrGetOpenGLGraphicsRequirementsKHR" GetOpenGLGraphicsRequirementsKHR => opengl::get_requirements;
     b"xrGetVisibilityMaskKHR" GetVisibilityMaskKHR => extensions::get_visibility_mask;
     b"xrConvertTimespecTimeToTimeKHR" ConvertTimespecTimeToTimeKHR => extensions::convert_timespec_time_to_time;
     b"xrConvertTimeToTimespecTimeKHR" ConvertTimeToTimespecTimeKHR => extensions::convert_time_to_timespec_time;

@@ -84,6 +84,7 @@ api! {
             events: VecDeque::new(),
             paths: Paths::default(),
             vulkan: Vulkan::default(),
+            asked_for_opengl: false,
             session: None,
             spaces: HashMap::new(),
             swapchains: HashMap::new(),

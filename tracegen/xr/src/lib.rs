@@ -17,6 +17,7 @@ mod functions;
 mod graphics;
 mod instance;
 mod negotiate;
+mod opengl;
 mod paths;
 mod pose;
 mod recorder;

@@ -4,6 +4,7 @@ use crate::chain::{find, input};
 use crate::extensions::HEADLESS;
 use crate::frames::Frames;
 use crate::graphics::Graphics;
+use crate::opengl::Context;
 use crate::state::{BEGUN, Code, DONE, Event, INVALID, Instance};
 use crate::system::{check_system, check_views};
 use crate::vulkan::Device;
@@ -76,11 +77,13 @@ api! {
         if info.create_flags != xr::SessionCreateFlags::EMPTY {
             return Err(INVALID);
         }
-        let binding = find(info.next, StructureType::GRAPHICS_BINDING_VULKAN_KHR);
-        let graphics = match binding {
-            Some(binding) => Graphics::Vulkan(Device::of_binding(&instance.vulkan, &*binding.cast())?),
-            None if instance.has(HEADLESS, None) => Graphics::None,
-            None => return Err(Code::ERROR_GRAPHICS_DEVICE_INVALID),
+        let vulkan = find(info.next, StructureType::GRAPHICS_BINDING_VULKAN_KHR);
+        let opengl = find(info.next, StructureType::GRAPHICS_BINDING_OPENGL_XLIB_KHR);
+        let graphics = match (vulkan, opengl) {
+            (Some(binding), _) => Graphics::Vulkan(Device::of_binding(&instance.vulkan, &*binding.cast())?),
+            (_, Some(binding)) => Graphics::OpenGl(Context::of_binding(instance.asked_for_opengl, &*binding.cast())?),
+            _ if instance.has(HEADLESS, None) => Graphics::None,
+            _ => return Err(Code::ERROR_GRAPHICS_DEVICE_INVALID),
         };
         if instance.session.is_some() {
             return Err(Code::ERROR_LIMIT_REACHED);

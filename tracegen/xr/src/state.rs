@@ -35,6 +35,8 @@ pub(crate) struct Instance {
     pub events: VecDeque<Event>,
     pub paths: Paths,
     pub vulkan: Vulkan,
+    /// Whether the program has asked for the versions of OpenGL that the runtime supports.
+    pub asked_for_opengl: bool,
     pub session: Option<Session>,
     pub spaces: HashMap<u64, Space>,
     pub swapchains: HashMap<u64, Swapchain>,

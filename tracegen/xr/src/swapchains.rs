@@ -1,10 +1,9 @@
 //! Swapchains: images that a program renders into and shows.
 
 use crate::chain::{input, structures, values};
-use crate::graphics::Graphics;
+use crate::graphics::Image;
 use crate::state::{Answer, Code, DONE, INVALID, Instance};
 use crate::system::{MOST_SAMPLES, MOST_SIZE_PX};
-use crate::vulkan::Image;
 use openxr_sys as xr;
 use std::collections::VecDeque;
 use xr::{Handle, StructureType, SwapchainCreateFlags, SwapchainUsageFlags};
@@ -127,10 +126,7 @@ fn check(info: &xr::SwapchainCreateInfo) -> Result<(), Code> {
 
 api! {
     fn enumerate_swapchain_formats(session: xr::Session, capacity: u32, count: *mut u32, into: *mut i64) |state| {
-        let formats = match &state.session(session)?.graphics {
-            Graphics::None => Vec::new(),
-            Graphics::Vulkan(device) => device.formats(),
-        };
+        let formats = state.session(session)?.graphics.formats();
         values(&formats, capacity, count, into)
     }
 
@@ -138,17 +134,14 @@ api! {
         let of = state.session(session)?;
         let info = input(info, StructureType::SWAPCHAIN_CREATE_INFO)?;
         let swapchain = swapchain.as_mut().ok_or(INVALID)?;
-        let device = match &of.graphics {
-            Graphics::Vulkan(device) => device,
-            Graphics::None => return Err(Code::ERROR_GRAPHICS_DEVICE_INVALID),
-        };
+        let graphics = &of.graphics;
         check(info)?;
-        if !device.formats().contains(&info.format) {
+        if !graphics.formats().contains(&info.format) {
             return Err(Code::ERROR_SWAPCHAIN_FORMAT_UNSUPPORTED);
         }
         let is_static = info.create_flags.contains(SwapchainCreateFlags::STATIC_IMAGE);
         let count = if is_static { 1 } else { IMAGES };
-        let images = (0..count).map(|_| device.image(info)).collect::<Result<Vec<_>, _>>()?;
+        let images = (0..count).map(|_| graphics.image(info)).collect::<Result<Vec<_>, _>>()?;
         let made = Swapchain {
             images,
             size_px: [info.width, info.height],
@@ -174,9 +167,22 @@ api! {
         swapchain: xr::Swapchain, capacity: u32, count: *mut u32, into: *mut xr::SwapchainImageBaseHeader,
     ) |state| {
         let images = &state.swapchain(swapchain)?.images;
-        let ty = StructureType::SWAPCHAIN_IMAGE_VULKAN_KHR;
-        let into = into.cast::<xr::SwapchainImageVulkanKHR>();
-        structures(images.len(), ty, capacity, count, into, |place, image| image.image = images[place].raw())
+        match images.first() {
+            Some(Image::OpenGl(_)) => {
+                let into = into.cast::<xr::SwapchainImageOpenGLKHR>();
+                let fill = |place: usize, of: &mut xr::SwapchainImageOpenGLKHR| {
+                    if let Image::OpenGl(texture) = &images[place] {
+                        of.image = texture.name;
+                    }
+                };
+                structures(images.len(), StructureType::SWAPCHAIN_IMAGE_OPENGL_KHR, capacity, count, into, fill)
+            }
+            _ => {
+                let into = into.cast::<xr::SwapchainImageVulkanKHR>();
+                let fill = |place: usize, of: &mut xr::SwapchainImageVulkanKHR| of.image = images[place].raw();
+                structures(images.len(), StructureType::SWAPCHAIN_IMAGE_VULKAN_KHR, capacity, count, into, fill)
+            }
+        }
     }
 
     fn acquire_swapchain_image(swapchain: xr::Swapchain, info: *const xr::SwapchainImageAcquireInfo, index: *mut u32) |state| {

@@ -112,6 +112,12 @@ impl Device {
         DEVICES.read().ok()?.get(&key).cloned()
     }
 
+    /// All tracked devices.
+    pub fn all() -> Vec<Arc<Self>> {
+        let all = DEVICES.read().ok();
+        all.map_or_else(Vec::new, |all| all.values().cloned().collect())
+    }
+
     /// A recording shader by its number.
     pub fn shader(&self, number: u32) -> Option<Arc<ShaderInfo>> {
         let shaders = lock(&self.recorder.as_ref()?.shaders);

@@ -93,6 +93,16 @@ impl Images {
         self.numbered.get(place as usize)
     }
 
+    /// Number and handle of the newest image with this width, height, number of layers and of samples.
+    pub fn newest(&self, [width, height, layers, samples]: [u32; 4]) -> Option<(u32, vk::Image)> {
+        let has_size = |image: &ImageInfo| {
+            image.size == [width, height, 1] && image.layers == layers && image.samples == samples
+        };
+        let fitting = self.images.iter().filter(|(_, image)| has_size(image));
+        let newest = fitting.max_by_key(|(_, image)| image.image);
+        newest.map(|(handle, image)| (image.image, vk::Image::from_raw(*handle)))
+    }
+
     /// Handle of an image, unless it was destroyed.
     pub fn handle(&self, number: u32) -> Option<vk::Image> {
         let mut all = self.images.iter();
