@@ -11,7 +11,7 @@ use std::process::Command;
 const EYE_PX: [usize; 2] = [240, 200];
 
 /// Whether EGL and zink are installed.
-fn has_zink(folder: &Path) -> bool {
+pub(crate) fn has_zink(folder: &Path) -> bool {
     let picture = folder.join("probe");
     let mut probe = Command::new(env!("CARGO_BIN_EXE_gl_program"));
     probe.arg("1").arg(&picture);

@@ -20,6 +20,7 @@ mod session;
 mod texture;
 mod views;
 mod watch;
+mod x_server;
 
 pub use check::{Check, Difference, check};
 pub use drain::{Cameras, DrainError, Drained, Job, drain};
@@ -27,3 +28,4 @@ pub use launch::{Launch, LaunchError, openxr_library};
 pub use session::{Executed, ProgramFrame, Session, SessionError};
 pub use views::{FileError, Other, Role, Rule, RuleFile, View, Views, ViewsError, Wanted};
 pub use watch::Watch;
+pub use x_server::XServer;

@@ -72,11 +72,11 @@ fn frames_by_parser() -> impl TypedValueParser<Value = FramesBy> {
 /// Wrong use, a program that cannot be captured, and outputs that cannot be written.
 pub fn run(args: &AppArgs) -> anyhow::Result<ExitCode> {
     let eyes = args.capture.check(None)?;
+    let program = args.name()?;
     args.check_program()?;
     let settings = args.capture.settings(args.frames_by)?;
     let tool = std::env::current_exe().context("cannot find this program's own file")?;
     let launch = Launch::new(&std::env::temp_dir(), &tool, &settings)?;
-    let program = args.name()?;
     let opengl = args.gl || args.apitrace.is_some();
     let (file, arguments) = args.command();
     // A replay that is terminated prints its call stack.

@@ -12,7 +12,9 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use clap::builder::TypedValueParser;
 use formats::view::Hmd;
-use programs::{Cameras, DrainError, Launch, Session, SessionError, ViewsError, openxr_library};
+use programs::{
+    Cameras, DrainError, Launch, Session, SessionError, ViewsError, XServer, openxr_library,
+};
 use scene::paths::{DEFAULT_FPS, HeadPath, Moments, PathOrigin, PathSpec};
 use shell::find_program;
 use spool::FramesBy;
@@ -204,8 +206,12 @@ pub fn run(args: &XrArgs) -> anyhow::Result<ExitCode> {
         grace: (!args.to_end).then_some(GRACE),
         timeout: args.timeout,
     };
+    let x_server = XServer::start(launch.folder());
     // The supervisor watches over the capture's folder until the end.
     let (_program, run) = to_run.start(&launch, |command| {
+        if let Some(server) = &x_server {
+            command.env("DISPLAY", &server.display);
+        }
         // OpenGL on zink, for programs that use it.
         launch.prepare(command, true);
         launch.prepare_openxr(command, &library, &runtime)
