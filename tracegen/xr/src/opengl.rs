@@ -20,6 +20,14 @@ const TEXTURE_2D_MULTISAMPLE: c_uint = 0x9100;
 const TEXTURE_2D_MULTISAMPLE_ARRAY: c_uint = 0x9102;
 const TRUE: u8 = 1;
 const NO_ERROR: c_uint = 0;
+const FRAMEBUFFER: c_uint = 0x8d40;
+const DRAW_FRAMEBUFFER_BINDING: c_uint = 0x8ca6;
+const READ_FRAMEBUFFER_BINDING: c_uint = 0x8caa;
+const DRAW_FRAMEBUFFER: c_uint = 0x8ca9;
+const READ_FRAMEBUFFER: c_uint = 0x8ca8;
+const COLOR_ATTACHMENT0: c_uint = 0x8ce0;
+const COLOR_BUFFER_BIT: c_uint = 0x4000;
+const FRAMEBUFFER_SRGB: c_uint = 0x8db9;
 
 /// A texture target and the query of what is bound to it.
 const TARGETS: [(c_uint, c_uint); 5] = [
@@ -35,6 +43,9 @@ const TARGETS: [(c_uint, c_uint); 5] = [
 const FORMATS: [i64; 10] = [
     0x8c43, 0x8058, 0x881a, 0x8c41, 0x8051, 0x8cac, 0x81a6, 0x81a5, 0x88f0, 0x8cad,
 ];
+
+/// Number of colour formats, which come first.
+const COLORS: usize = 5;
 
 /// Lists functions of the library by name and type.
 macro_rules! functions {
@@ -75,6 +86,14 @@ functions! {
     samples_storage: c"glTexStorage2DMultisample" fn(c_uint, c_int, c_uint, c_int, c_int, u8);
     array_samples_storage: c"glTexStorage3DMultisample" fn(c_uint, c_int, c_uint, c_int, c_int, c_int, u8);
     integer: c"glGetIntegerv" fn(c_uint, *mut c_int);
+    generate_framebuffers: c"glGenFramebuffers" fn(c_int, *mut c_uint);
+    delete_framebuffers: c"glDeleteFramebuffers" fn(c_int, *const c_uint);
+    bind_framebuffer: c"glBindFramebuffer" fn(c_uint, c_uint);
+    framebuffer_texture: c"glFramebufferTexture" fn(c_uint, c_uint, c_uint, c_int);
+    clear: c"glClear" fn(c_uint);
+    enable: c"glEnable" fn(c_uint);
+    disable: c"glDisable" fn(c_uint);
+    is_enabled: c"glIsEnabled" fn(c_uint) -> u8;
     error: c"glGetError" fn() -> c_uint;
     finish: c"glFinish" fn();
 }
@@ -225,6 +244,35 @@ impl Context {
     }
 }
 
+/// Clears a texture as a target with and without conversion to sRGB. Zink replaces the image of a texture when a view
+/// needs another format, so all views that programs need are made here, before the image is looked for.
+///
+/// # Safety
+/// A current context, and a texture of colours.
+unsafe fn draw_into(gl: &Functions, name: c_uint) {
+    let (mut framebuffer, mut draw, mut read) = (0, 0, 0);
+    // SAFETY: as the caller promises; the pointers are valid.
+    unsafe {
+        (gl.integer)(DRAW_FRAMEBUFFER_BINDING, &raw mut draw);
+        (gl.integer)(READ_FRAMEBUFFER_BINDING, &raw mut read);
+        let converts = (gl.is_enabled)(FRAMEBUFFER_SRGB) == TRUE;
+        (gl.generate_framebuffers)(1, &raw mut framebuffer);
+        (gl.bind_framebuffer)(FRAMEBUFFER, framebuffer);
+        (gl.framebuffer_texture)(FRAMEBUFFER, COLOR_ATTACHMENT0, name, 0);
+        for switch in [gl.enable, gl.disable] {
+            switch(FRAMEBUFFER_SRGB);
+            (gl.clear)(COLOR_BUFFER_BIT);
+            (gl.finish)();
+        }
+        if converts {
+            (gl.enable)(FRAMEBUFFER_SRGB);
+        }
+        (gl.bind_framebuffer)(DRAW_FRAMEBUFFER, draw as c_uint);
+        (gl.bind_framebuffer)(READ_FRAMEBUFFER, read as c_uint);
+        (gl.delete_framebuffers)(1, &raw const framebuffer);
+    }
+}
+
 /// Creates a texture in the current context, which keeps its state.
 fn create(gl: &Functions, info: &xr::SwapchainCreateInfo) -> Result<u32, Code> {
     let size = [info.width, info.height, info.array_size].map(|of| of as c_int);
@@ -255,6 +303,9 @@ fn create(gl: &Functions, info: &xr::SwapchainCreateInfo) -> Result<u32, Code> {
             _ => (gl.array_samples_storage)(target, samples, format, width, height, layers, TRUE),
         }
         (gl.bind)(target, before as c_uint);
+        if FORMATS[..COLORS].contains(&info.format) {
+            draw_into(gl, name);
+        }
         (gl.error)()
     };
     match error {
