@@ -2,6 +2,7 @@
 
 mod analysis;
 mod animation;
+mod answers;
 mod backends;
 mod bad_input;
 mod capture_cache;

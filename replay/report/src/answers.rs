@@ -1,4 +1,8 @@
-//! The sentences at the top of pages, computed from the figures.
+//! The sentences at the top of pages and of texts for a terminal, computed from the figures.
+
+mod replays;
+
+pub use replays::{MACHINE, Sampled, Scheme, Traffic, machine, replayed, sampled, schemes};
 
 use super::html::{change, count, list};
 use super::lists::{geometric_mean, mean};
@@ -179,8 +183,20 @@ pub(super) fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<St
             .filter(move |o| o.is_buildable == buildable && o.name != baseline);
         orders.min_by(|a, b| a.change_pct.total_cmp(&b.change_pct))
     };
+    let others = || {
+        orders
+            .iter()
+            .filter(|o| o.is_buildable && o.name != baseline)
+    };
     let mut out = Vec::new();
     match of(true) {
+        Some(_) if others().all(|o| rounded(o.change_pct) == 0.0) => out.push(format!(
+            "No order can save here: {} as much from memory as {baseline} ({over}).",
+            match others().count() {
+                1 => "the other order reads".to_owned(),
+                all => format!("all {all} other orders read"),
+            }
+        )),
         Some(best) => {
             let verdict = if rounded(best.change_pct) < 0.0 {
                 "Best of the orders that hardware can follow"
@@ -210,6 +226,8 @@ pub struct Reprojected {
     pub performance: f64,
     /// Energy over that of tracing both eyes.
     pub energy: f64,
+    /// Least and most energy at 14 nm.
+    pub energy_bounds: [f64; 2],
     /// Right pixels that are reused, percent.
     pub reuse_pct: f64,
     /// Mean FLIP of the right image.
@@ -236,12 +254,26 @@ pub fn reprojected(scenes: &[Reprojected]) -> Vec<String> {
     let range = match ends(scenes, |s| s.energy) {
         Some((least, most)) if scenes.len() > 1 => {
             format!(
-                " ({:.2} to {:.2} times, by scene)",
+                "{:.2} to {:.2} times, by scene; ",
                 least.energy, most.energy
             )
         }
         _ => String::new(),
     };
+    let bounds = [0, 1].map(|end| {
+        let ends = scenes
+            .iter()
+            .map(|s| s.energy_bounds[end].max(f64::MIN_POSITIVE));
+        geometric_mean(ends).unwrap_or(1.0)
+    });
+    let open = match bounds[0] < 1.0 && bounds[1] > 1.0 {
+        true => ": whether it saves energy is open",
+        false => "",
+    };
+    let range = format!(
+        " ({range}{:.2} to {:.2} times at 14 nm{open})",
+        bounds[0], bounds[1]
+    );
     let energy = 100.0 * (energy - 1.0);
     let mut out = vec![
         format!(
@@ -312,8 +344,8 @@ impl Timed {
     }
 }
 
-/// Techniques of one scene, without the baseline.
-pub fn timed(scene: &str, techniques: &[Timed]) -> Vec<String> {
+/// Techniques of one scene, without the baseline; its name, and its measurements against itself.
+pub fn timed(scene: &str, techniques: &[Timed], baseline: (&str, Option<Spread>)) -> Vec<String> {
     let fastest = |without_error: bool| {
         let of = techniques
             .iter()
@@ -350,9 +382,16 @@ pub fn timed(scene: &str, techniques: &[Timed]) -> Vec<String> {
             None => out.push("Each of them changes the image.".to_owned()),
         }
     }
+    let noise = baseline.1.map_or_else(String::new, |own| {
+        format!(
+            ", which measured against itself takes {:.2} times its time (quartiles {:.2} to {:.2}): smaller differences are noise",
+            own.median, own.q1, own.q3
+        )
+    });
     if techniques.len() == 1 && out.last().is_some_and(|last| last.starts_with("Each")) {
         out.pop();
     }
+    out.push(format!("The baseline is {}{noise}.", baseline.0));
     out
 }
 
@@ -499,6 +538,15 @@ mod tests {
                 "Only z2-sta is an order that hardware can follow (geometric mean over 1 pair of trace and caches)."
             ]
         );
+        let equal = studied(
+            "z2-sta",
+            &[order("z2-sta", 0.0, true), order("zig", 0.01, true)],
+            1,
+        );
+        assert!(
+            equal[0].contains("the other order reads as much"),
+            "{equal:?}"
+        );
         let worse = studied(
             "z2-sta",
             &[order("zig", 2.0, true), order("bound", -9.0, false)],
@@ -518,6 +566,7 @@ mod tests {
             scene: "chess".to_owned(),
             performance: 1.5,
             energy,
+            energy_bounds: [0.9 * energy, 1.1 * energy],
             reuse_pct: 90.0,
             flip: 0.01,
             paper,
@@ -525,14 +574,16 @@ mod tests {
         assert!(reprojected(&[]).is_empty());
         let one = reprojected(&[scene(1.25, None)]).join(" ");
         assert!(
-            one.starts_with("In chess, ") && one.contains("takes 25.0 % more energy than that."),
+            one.starts_with("In chess, ")
+                && one
+                    .contains("takes 25.0 % more energy than that (1.12 to 1.38 times at 14 nm)."),
             "{one}"
         );
         assert!(!one.contains("paper"), "{one}");
         let two = reprojected(&[scene(1.0, Some([2.0, 0.5])), scene(1.0, None)]).join(" ");
         assert!(
             two.contains("the mean of 2 scenes")
-                && two.contains("takes the same energy (1.00 to 1.00 times, by scene)."),
+                && two.contains("takes the same energy (1.00 to 1.00 times, by scene; 0.90 to 1.10 times at 14 nm: whether it saves energy is open)."),
             "{two}"
         );
         assert!(
@@ -556,11 +607,11 @@ mod tests {
             flip,
         };
         assert_eq!(
-            timed("plant", &[]),
+            timed("plant", &[], ("per-eye", None)),
             ["Only the baseline was measured on plant."]
         );
         assert_eq!(
-            timed("plant", &[technique("a", 1.1, 0.02)]),
+            timed("plant", &[technique("a", 1.1, 0.02)], ("per-eye", None))[..1],
             [
                 "On plant, a takes 10.0 % more frame time than the baseline (quartiles 1.05 to 1.15 times, 8 measurements) with a mean FLIP of 0.0200."
             ]
@@ -568,6 +619,7 @@ mod tests {
         let text = timed(
             "plant",
             &[technique("a", 0.5, 0.02), technique("b", 0.8, 0.0)],
+            ("per-eye", Some(technique("", 0.76, 0.0).time)),
         )
         .join(" ");
         assert!(
@@ -575,12 +627,14 @@ mod tests {
             "{text}"
         );
         assert!(
-            text.contains("b is the fastest without any image error"),
+            text.contains("b is the fastest without any image error")
+                && text.ends_with("against itself takes 0.76 times its time (quartiles 0.71 to 0.81): smaller differences are noise."),
             "{text}"
         );
         let text = timed(
             "plant",
             &[technique("a", 1.0, 0.0), technique("b", 1.2, 0.0)],
+            ("per-eye", None),
         );
         assert_eq!(
             text[0],
@@ -592,7 +646,7 @@ mod tests {
         );
         let mut few = technique("a", 0.5, 0.0);
         few.time.samples = LEAST_SAMPLES - 1;
-        assert!(timed("plant", &[few])[1].contains("do not tell"));
+        assert!(timed("plant", &[few], ("per-eye", None))[1].contains("do not tell"));
     }
 
     #[test]

@@ -13,6 +13,8 @@ pub trait Document {
     const SCHEMA: &'static str;
     /// Version of the models behind its figures.
     const MODEL_VERSION: u32 = MODEL_VERSION;
+    /// Whether the terminal shows more tables with `--details`.
+    const HAS_DETAILS: bool = false;
     /// Whether the JSON object is indented.
     const INDENTED: bool = true;
     /// Files of a folder that `--csv` names; none where it names a file of all rows.
@@ -31,8 +33,35 @@ pub trait Document {
         BTreeMap::new()
     }
 
-    /// The tables for a terminal.
+    /// The sentences that the page and the text for a terminal begin with: what was found, then the machine.
+    fn answer(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// The main table for a terminal, and tables that a flag asks for.
     fn text(&self) -> String;
+
+    /// The other tables for a terminal.
+    fn details(&self) -> String {
+        String::new()
+    }
+
+    /// The text for a terminal.
+    fn terminal(&self, with_details: bool) -> String {
+        let answer = self.answer();
+        let lines: Vec<String> = answer.iter().map(|s| wrapped(s, LINE_CHARS)).collect();
+        let parts = [lines.join("\n"), self.text()].into_iter();
+        let more = match (with_details, Self::HAS_DETAILS) {
+            (true, _) => self.details(),
+            (false, true) => "(more tables: --details)".to_owned(),
+            (false, false) => String::new(),
+        };
+        let parts: Vec<String> = (parts.chain([more]))
+            .map(|part| part.trim_matches('\n').to_owned())
+            .filter(|part| !part.is_empty())
+            .collect();
+        parts.join("\n\n") + "\n"
+    }
 
     /// Texts of [`Self::CSV_FILES`].
     fn csv_files(&self) -> Vec<String> {
@@ -62,6 +91,27 @@ pub trait Document {
             false => serde_json::to_string(&object),
         }
     }
+}
+
+/// Longest line of a sentence for a terminal.
+const LINE_CHARS: usize = 100;
+
+/// A sentence in lines of at most `most` characters, where its words allow it.
+fn wrapped(sentence: &str, most: usize) -> String {
+    let (mut text, mut chars) = (String::new(), 0);
+    for word in sentence.split(' ') {
+        let length = word.chars().count();
+        if chars > 0 && chars + 1 + length > most {
+            text.push('\n');
+            chars = 0;
+        } else if chars > 0 {
+            text.push(' ');
+            chars += 1;
+        }
+        text += word;
+        chars += length;
+    }
+    text
 }
 
 /// The members that every JSON object begins with, and those of its document.
@@ -120,13 +170,24 @@ mod tests {
         }
 
         fn text(&self) -> String {
-            String::new()
+            "table\n".to_owned()
+        }
+
+        fn answer(&self) -> Vec<String> {
+            vec!["One.".to_owned(), "Two.".to_owned()]
         }
 
         fn figures(&self) -> BTreeMap<String, Figure> {
             let figure = self.0.iter().cloned();
             figure.map(|f| ("saved_pct".to_owned(), f)).collect()
         }
+    }
+
+    #[test]
+    fn the_text_begins_with_the_answer_in_lines_that_fit() {
+        assert_eq!(Doubtful(None).terminal(false), "One.\nTwo.\n\ntable\n");
+        assert_eq!(wrapped("one two three", 8), "one two\nthree");
+        assert_eq!(wrapped("overlong", 3), "overlong");
     }
 
     #[test]

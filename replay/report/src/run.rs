@@ -1,5 +1,6 @@
 //! Results of one replay, and of one point in both modes.
 
+use super::answers::{self, Traffic};
 use super::columns::{Column, Columns, Row, Show, Value, columns_of};
 use super::document::{Document, Envelope};
 use super::errors::{self, KnownError, Of};
@@ -10,8 +11,7 @@ use sim::config::RunConfig;
 use sim::model_version::MODEL_VERSION;
 use sim::result::ClientTraffic;
 use sim::result::{LevelResult, Part, RUN_SCHEMA, RunResult, TileMap, TraceId};
-use sim::size::format_bytes;
-use studies::experiment::ResultRow;
+use studies::experiment::{ResultRow, frame_count};
 
 /// One replay.
 pub struct RunReport<'a> {
@@ -67,6 +67,7 @@ fn rows<'r>(rows: impl IntoIterator<Item = &'r ResultRow<'r>>) -> Table {
 
 impl Document for RunReport<'_> {
     const SCHEMA: &'static str = RUN_SCHEMA;
+    const HAS_DETAILS: bool = true;
 
     fn content(&self) -> impl Serialize {
         RunJson::new(self.row)
@@ -76,8 +77,16 @@ impl Document for RunReport<'_> {
         rows([self.row])
     }
 
+    fn answer(&self) -> Vec<String> {
+        answer(self.row)
+    }
+
     fn text(&self) -> String {
         text(self.row, self.by_texture)
+    }
+
+    fn details(&self) -> String {
+        details(self.row)
     }
 }
 
@@ -104,6 +113,10 @@ impl Document for ModesReport<'_> {
         rows(self.0)
     }
 
+    fn answer(&self) -> Vec<String> {
+        answer(self.0[0])
+    }
+
     fn text(&self) -> String {
         let [timed, functional] = self.0;
         modes_text(timed, functional)
@@ -115,11 +128,28 @@ impl Document for ModesReport<'_> {
     }
 }
 
-/// One result as tables: levels, views, the figures of the whole replay, the draws or (if `by_texture`) the
-/// textures with most misses, and tiles if they were counted.
+/// The traffic, and the machine.
+pub(crate) fn answer(row: &ResultRow) -> Vec<String> {
+    let (result, config) = (row.result, &row.point.config);
+    let whole = (result.clients.iter().map(ClientTraffic::bytes)).reduce(|a, b| a + b);
+    let traffic = Traffic {
+        of: format!("{}, {}", row.subject.label, config.order.title()),
+        texture_mb: row.mb_per_frame(result.external_bytes),
+        bound_mb: row.mb_per_frame(row.bound_bytes()),
+        error_pct: errors::sum_of_largest("external_bytes"),
+        frame_mb: whole.map(|bytes| row.mb_per_frame(bytes)),
+    };
+    let caches = [config.level.l1, config.level.l2].map(|cache| cache.size_bytes);
+    let frames = frame_count(row.subject.source.tables());
+    let mut out = answers::replayed(&traffic);
+    out.push(answers::machine(config, [caches], &[frames]));
+    out
+}
+
+/// One result as tables: levels, the draws or (if `by_texture`) the textures with most misses, tiles if they were
+/// counted, and what the machine's other parts counted.
 fn text(row: &ResultRow, by_texture: bool) -> String {
-    let ResultRow { result, point, .. } = row;
-    let config = &point.config;
+    let result = row.result;
     let level: Vec<Column<(&str, &LevelResult)>> = vec![
         Column::text("level", "", |l: &(&str, _)| l.0),
         count("footprints", |l| l.1.counters.footprints),
@@ -143,23 +173,7 @@ fn text(row: &ResultRow, by_texture: bool) -> String {
         ),
     ];
     let levels = Table::new(&level, &[("L1", &result.l1), ("L2", &result.l2)]);
-    let views = Table::new(&Part::columns(), &result.by_view);
-    let mode = config.mode_name();
-    let mut text = format!(
-        "{} ({}), {}, {mode}, L1 {}, L2 {}\n\n{}\n{}\n{}\n",
-        row.subject.id.scene,
-        row.subject.id.checksum,
-        config.order.name(),
-        format_bytes(config.level.l1.size_bytes),
-        format_bytes(config.level.l2.size_bytes),
-        levels.text(),
-        views.text(),
-        whole(row).text().trim_start(),
-    );
-    text += &format!(
-        "quads {}, covered pixels {}, access hash {}\n",
-        result.quads, result.lanes, result.access_hash,
-    );
+    let mut text = levels.text();
     if by_texture || !result.by_draw.is_empty() {
         let (kind, parts) = result.parts();
         text += &busiest(kind, parts);
@@ -169,8 +183,25 @@ fn text(row: &ResultRow, by_texture: bool) -> String {
     }
     text += &result.memory.to_string();
     if !result.clients.is_empty() {
-        text += &clients(row).text();
+        text += &format!("\n{}", clients(row).text());
     }
+    text
+}
+
+/// Views, the figures of the whole replay, and known errors.
+fn details(row: &ResultRow) -> String {
+    let result = row.result;
+    let mut text = format!(
+        "{} ({}), {}\n\n{}\n{}\nquads {}, covered pixels {}, access hash {}\n",
+        row.subject.id.scene,
+        row.subject.id.checksum,
+        row.point.config.order.name(),
+        Table::new(&Part::columns(), &result.by_view).text(),
+        whole(row).text().trim_start(),
+        result.quads,
+        result.lanes,
+        result.access_hash,
+    );
     if let Some(counts) = &result.geometry {
         text += &format!(
             "{} triangles submitted, {} in the list of at least one tile, {} list entries; {} vertices shaded\n",

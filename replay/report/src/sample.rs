@@ -1,6 +1,7 @@
 //! A path's figures from a sample of its frames (`replay.sample/1`), and how often such samples hold
 //! (`replay.sample-trial/1`).
 
+use super::answers::{self, Sampled};
 use super::columns::{Columns, columns_of};
 use super::document::Document;
 use super::table::Table;
@@ -154,15 +155,24 @@ impl Document for SampleReport {
         Table::new(&columns, &self.rows)
     }
 
-    fn text(&self) -> String {
+    fn answer(&self) -> Vec<String> {
         let [of, n] = self.frames();
         if !self.capture.is_empty() {
-            return format!(
+            return vec![format!(
                 "{} of {of} frames are missing: capture them with --frames {}",
                 self.capture.len(),
                 frame_list(&self.capture)
-            );
+            )];
         }
+        let rows: Vec<Sampled> = (self.rows.iter())
+            .map(|row| Sampled {
+                order: row.order.clone(),
+                caches: row.caches.clone(),
+                figure: shown(row.of, row.figure.clone()),
+            })
+            .collect();
+        let figure = self.rows.first().map_or(Of::Saving, |row| row.of);
+        let found = answers::sampled(figure, name_of(figure), &self.baseline, &rows);
         let kept = match self.rows.iter().all(|row| row.kept) {
             true => format!("within {}", self.within),
             false => format!(
@@ -170,18 +180,22 @@ impl Document for SampleReport {
                 self.within
             ),
         };
-        let cold = match self.not_bounded {
-            Some(why) => {
-                format!("\nWhat earlier frames left in the caches is not bounded ({why}).")
-            }
-            None => String::new(),
-        };
-        format!(
-            "{n} of {of} frames captured; all intervals hold together with {} % confidence, {kept}.\nSavings are over {}.{cold}\n\n{}",
-            100.0 * self.confidence,
-            self.baseline,
-            self.rows().text()
-        )
+        let cold = self
+            .not_bounded
+            .map(|why| format!("What earlier frames left in the caches is not bounded ({why})."));
+        let promise = format!(
+            "{n} of {of} frames captured; all intervals hold together with {} % confidence, {kept}.",
+            100.0 * self.confidence
+        );
+        let parts = [found, Some(promise), cold];
+        parts.into_iter().flatten().collect()
+    }
+
+    fn text(&self) -> String {
+        match self.rows.is_empty() {
+            true => String::new(),
+            false => self.rows().text(),
+        }
     }
 }
 

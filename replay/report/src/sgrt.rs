@@ -5,6 +5,7 @@ mod cycle_table;
 mod tables;
 
 use crate::answers;
+use crate::columns::name;
 use crate::document::Document;
 use crate::errors::{self, KnownError, Of};
 use crate::html::{Answer, Page, figure as html_figure, settings};
@@ -77,6 +78,7 @@ fn sentences(entries: &[Entry]) -> Vec<String> {
             scene: tables::scene_name(report),
             performance: result.relative_performance,
             energy: result.relative_energy,
+            energy_bounds: result.relative_energy_bounds,
             reuse_pct: result.reuse_pct,
             flip: result.flip_mean,
             paper: (report.paper.as_ref()).map(|p| [p.relative_performance, p.relative_energy]),
@@ -153,6 +155,7 @@ impl ReprojectReport {
 
 impl Document for ReprojectReport {
     const SCHEMA: &'static str = sgrt::result::SCHEMA;
+    const HAS_DETAILS: bool = true;
     const FILES_BESIDE_PAGE: bool = false;
 
     fn content(&self) -> impl Serialize {
@@ -163,8 +166,26 @@ impl Document for ReprojectReport {
         tables::rows(&self.entries)
     }
 
+    fn answer(&self) -> Vec<String> {
+        let mut out = sentences(&self.entries);
+        if let Some(entry) = self.entries.first() {
+            let (config, [width, height]) = (&entry.report.config, entry.report.eye_size_px);
+            out.push(format!(
+                "Machine: mobile ray-tracing GPU, {} timing; rule {}, reuse of {}; {width}x{height} pixels an eye.",
+                config.timing.name(),
+                config.rule,
+                name(&config.reuse)
+            ));
+        }
+        out
+    }
+
     fn text(&self) -> String {
         text(&self.entries)
+    }
+
+    fn details(&self) -> String {
+        details(&self.entries)
     }
 
     /// One object for each trace; those of several traces have a line each.
@@ -180,15 +201,50 @@ impl Document for ReprojectReport {
     }
 }
 
-/// The tables for a terminal.
+/// Parts of a text, each below its title.
+#[derive(Default)]
+struct Parts(String);
+
+impl Parts {
+    fn push(&mut self, title: &str, table: &str) {
+        self.0 += &format!("{title}\n{}\n\n", table.trim_end());
+    }
+}
+
+/// The main table, and those that a flag asks for.
 fn text(entries: &[Entry]) -> String {
-    let mut out = String::new();
-    let mut part = |title: &str, table: String| {
-        out.push_str(title);
-        out.push('\n');
-        out.push_str(table.trim_end_matches('\n'));
-        out.push_str("\n\n");
-    };
+    let keys = [
+        "scene",
+        "run",
+        "reuse_pct",
+        "relative_performance",
+        "paper_relative_performance",
+        "relative_energy",
+        "relative_energy_least",
+        "relative_energy_most",
+        "paper_relative_energy",
+    ];
+    let table = tables::rows(entries).picked(keys).without_empty_columns();
+    let mut out = Parts::default();
+    out.push("Against tracing both eyes in full", &table.text());
+    for entry in entries {
+        let scene = tables::scene_name(&entry.report);
+        if !entry.report.curve.is_empty() {
+            let title = format!("Cycles against error: {scene}");
+            out.push(&title, &tables::curve(&entry.report).text());
+        }
+        if !entry.report.sensitivity.is_empty() {
+            let title = format!("Sensitivity: {scene}");
+            out.push(&title, &tables::sensitivity(&entry.report).text());
+        }
+    }
+    out.0
+}
+
+/// The other tables.
+fn details(entries: &[Entry]) -> String {
+    let mut out = Parts::default();
+    let mut part = |title: &str, table: String| out.push(title, &table);
     part("Stereo reprojection", tables::rule_line(entries));
     part(
         "Performance and energy",
@@ -206,20 +262,7 @@ fn text(entries: &[Entry]) -> String {
     if let Some(table) = cycle_table::units(entries) {
         part(cycle_table::TITLE, table.text());
     }
-    for entry in entries {
-        let scene = tables::scene_name(&entry.report);
-        if !entry.report.curve.is_empty() {
-            let title = format!("Cycles against error: {scene}");
-            part(&title, tables::curve(&entry.report).text());
-        }
-        if !entry.report.sensitivity.is_empty() {
-            let title = format!("Sensitivity: {scene}");
-            part(&title, tables::sensitivity(&entry.report).text());
-        }
-    }
-    out.truncate(out.trim_end().len());
-    out.push('\n');
-    out + &errors::text(Of::Rays)
+    out.0.trim_end().to_owned() + "\n" + &errors::text(Of::Rays)
 }
 
 fn performance(entries: &[Entry]) -> Result<Markup, PlotError> {

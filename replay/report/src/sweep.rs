@@ -18,7 +18,7 @@ use sim::config::{Order, RunConfig};
 use sim::palette;
 use sim::result::TraceId;
 use studies::experiment::{
-    Axis, ExperimentFile, Outcome, ResultRow, Setting, Subject, plain, point_key,
+    Axis, ExperimentFile, Outcome, ResultRow, Setting, Subject, frame_count, plain, point_key,
 };
 use toml::Value;
 
@@ -100,7 +100,7 @@ impl<'a> SweepReport<'a> {
     }
 
     /// The rows as a table, grouped by trace and change.
-    fn table(&self) -> Table {
+    fn table(&self, for_terminal: bool) -> Table {
         let mut columns =
             columns_of::<ResultRow>().text("label", "scene", |r| r.subject.label.clone());
         if !self.file.one_at_a_time.is_empty() {
@@ -120,7 +120,10 @@ impl<'a> SweepReport<'a> {
             "reduction_pct",
             "over_base",
         ];
-        columns.extend(super::columns::pick(&shown));
+        let shown = shown
+            .iter()
+            .filter(|key| !(for_terminal && **key == "tmu_util_pct"));
+        columns.extend(super::columns::pick(&shown.copied().collect::<Vec<_>>()));
         let table = Table::new(&columns, &self.rows).grouped_by(groups);
         table.without_empty_columns()
     }
@@ -150,7 +153,7 @@ impl<'a> SweepReport<'a> {
         };
         let mut page = Page::default();
         page.add("Charts", html::figures(&pictures));
-        page.add("Results", self.table().markup());
+        page.add("Results", self.table(false).markup());
         page.add("Traces", traces);
         page.add("Base configuration", settings("TOML", &self.file.base));
         let chart = match pictures.first() {
@@ -158,7 +161,7 @@ impl<'a> SweepReport<'a> {
             None => html! {},
         };
         let answer = Answer {
-            sentences: self.sentences(),
+            sentences: self.answer(),
             chart,
             about,
         };
@@ -190,8 +193,12 @@ impl Document for SweepReport<'_> {
         vec![("rows", Table::new(&Self::columns(), []))]
     }
 
+    fn answer(&self) -> Vec<String> {
+        self.sentences()
+    }
+
     fn text(&self) -> String {
-        self.table().text()
+        self.table(true).text()
     }
 }
 
@@ -226,7 +233,15 @@ impl SweepReport<'_> {
             )
         };
         let effects: Vec<_> = self.file.axes.iter().enumerate().map(effect).collect();
-        answers::sweep(&points, &effects)
+        let mut out = answers::sweep(&points, &effects);
+        let caches = self.rows.iter().map(|row| {
+            let level = &row.point.config.level;
+            [level.l1.size_bytes, level.l2.size_bytes]
+        });
+        let subjects = self.outcome.subjects.iter();
+        let frames: Vec<u32> = subjects.map(|s| frame_count(s.source.tables())).collect();
+        out.push(answers::machine(&self.file.base, caches, &frames));
+        out
     }
 }
 

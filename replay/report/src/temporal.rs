@@ -1,7 +1,9 @@
 //! Reuse between the eyes and over time, frame by frame (`replay.temporal/1`).
 
+use super::answers::{self, Scheme};
 use super::columns::{Columns, columns_of, name};
 use super::document::Document;
+use super::lists::{self, geometric_mean};
 use super::table::Table;
 use serde::Serialize;
 use sgrt::compose::Reuse;
@@ -45,6 +47,7 @@ impl TemporalReport {
 
 impl Document for TemporalReport {
     const SCHEMA: &'static str = "replay.temporal/1";
+    const HAS_DETAILS: bool = true;
     const MODEL_VERSION: u32 = sim::model_version::RAY_MODEL_VERSION;
 
     fn content(&self) -> impl Serialize {
@@ -75,15 +78,58 @@ impl Document for TemporalReport {
         Table::new(&columns, &lines)
     }
 
-    /// The table for a terminal.
+    fn answer(&self) -> Vec<String> {
+        let of = |name: &'static str| {
+            let frames = self.frames.iter().flat_map(|frame| &frame.schemes);
+            let own: Vec<&SchemeFigures> = frames.filter(|s| s.scheme.name() == name).collect();
+            let mean = |value: fn(&SchemeFigures) -> f64| {
+                geometric_mean(own.iter().map(|s| value(s).max(f64::MIN_POSITIVE))).unwrap_or(1.0)
+            };
+            let flip = own.iter().flat_map(|s| s.flip_mean);
+            Scheme {
+                name,
+                performance: mean(|s| s.relative_performance),
+                energy: mean(|s| s.relative_energy),
+                energy_bounds: [
+                    mean(|s| s.relative_energy_bounds[0]),
+                    mean(|s| s.relative_energy_bounds[1]),
+                ],
+                flip: lists::mean(flip).unwrap_or(0.0),
+            }
+        };
+        let others = self.frames.first().map_or(&[][..], |frame| &frame.schemes);
+        let others = others.iter().map(|s| s.scheme.name());
+        let others: Vec<Scheme> = others.filter(|name| *name != "full").map(of).collect();
+        let mut out = answers::schemes(self.frames.len(), &others);
+        let reuse = name(&self.reuse);
+        out.push(format!(
+            "Rule {}, reuse of {reuse}. Ratios are over tracing both eyes in full.",
+            self.rule
+        ));
+        out
+    }
+
+    /// The main columns, and what the schemes are.
     fn text(&self) -> String {
         let schemes = "\
 full: both eyes are traced
 stereo: the right eye from the left one
 temporal: each eye from its previous frame
 both: the left eye from its previous frame, the right eye from the left one";
-        let reuse = name(&self.reuse);
-        let (rule, rows) = (&self.rule, self.rows().text());
-        format!("rule {rule}, reuse of {reuse}\n{schemes}\n\n{rows}")
+        let keys = [
+            "frame",
+            "scheme",
+            "left_reused_pct",
+            "right_reused_pct",
+            "relative_performance",
+            "relative_energy",
+            "relative_energy_least",
+            "relative_energy_most",
+        ];
+        format!("{}\n{schemes}\n", self.rows().picked(keys).text())
+    }
+
+    fn details(&self) -> String {
+        self.rows().text()
     }
 }

@@ -74,7 +74,7 @@ enum Command {
     /// Print the first difference between two traces.
     Diff(diff::DiffArgs),
     /// Compare two captures of the same views, fragment by fragment and by cache misses.
-    #[command(mut_args(without(&["order"])))]
+    #[command(mut_args(without(&["order", "details"])))]
     Compare(Box<compare::Args>),
     /// Write a trace's accesses for other simulators, or the trace in another encoding.
     Convert(Box<convert::ConvertArgs>),
@@ -84,6 +84,7 @@ enum Command {
     /// Measure the run time and the error of faster methods.
     Accuracy(Box<accuracy::Args>),
     /// Choose settings of the paper's machine on some scenes and evaluate them on others.
+    #[command(mut_args(without(&["details"])))]
     Calibrate(Box<calibrate::Args>),
     /// Replay every point of an experiment file; an interrupted sweep continues.
     Sweep(sweep::Args),
@@ -96,7 +97,7 @@ enum Command {
     #[command(mut_args(without(&["order", "l1", "l2"])))]
     Orders(Box<orders::Args>),
     /// Answer for a path from a sample of its frames, within a width that is asked for.
-    #[command(mut_args(without(&["order", "l1", "l2"])))]
+    #[command(mut_args(without(&["order", "l1", "l2", "details"])))]
     Sample(Box<sample::Args>),
     /// Analyse reuse distances, working sets, miss-ratio curves, OPT and 3C misses, by order.
     #[command(mut_args(without(&["order", "l3", "prefetch", "dram", "frame"])))]
@@ -104,6 +105,7 @@ enum Command {
     /// Replay ray traces through a ray-tracing GPU that reuses the left image for the right.
     Reproject(Box<reproject::ReprojectArgs>),
     /// Set every reading of the SGRT paper's figure 3 beside the paper.
+    #[command(mut_args(without(&["details"])))]
     Readings(Box<readings::ReadingsArgs>),
     /// Compare reuse of the previous frame with reuse between the eyes, on ray traces of a sequence.
     Temporal(Box<temporal::TemporalArgs>),
@@ -121,6 +123,15 @@ fn without(refused: &'static [&'static str]) -> impl Fn(Arg) -> Arg {
 
 /// Parses the arguments, runs the subcommand and turns its outcome into an exit code.
 pub fn main() -> ExitCode {
+    if std::env::args_os()
+        .nth(1)
+        .is_some_and(|name| name == "sgrt")
+    {
+        shell::error(
+            "sgrt: no command of this name; `replay reproject` replays ray traces through the SGRT model",
+        );
+        return ExitCode::from(2);
+    }
     shell::run(
         file_uses::FILES,
         |cli: &Cli| cli.common,

@@ -1,7 +1,7 @@
 //! Where a command writes what it found: `--json`, `--csv`, `--parquet` and `--html`.
 
 use crate::files::write_atomically;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::Arg;
 use report::document::Document;
 use report::parquet;
@@ -49,6 +49,9 @@ pub(super) struct Outputs {
     pub csv: Option<PathBuf>,
     #[command(flatten)]
     parquet: ParquetArg,
+    /// Also print the tables below the main one: parts, all figures, known errors
+    #[arg(long, conflicts_with = "json")]
+    details: bool,
 }
 
 /// `--csv` of a command whose traces may follow the flag.
@@ -65,8 +68,12 @@ impl Outputs {
     /// Every output.
     ///
     /// # Errors
-    /// A folder for several CSV files that cannot be one.
+    /// A folder for several CSV files that cannot be one, or `--details` of a result without any.
     pub fn list<D: Document>(&self) -> Result<Vec<Output>> {
+        ensure!(
+            D::HAS_DETAILS || !self.details,
+            "--details: this result has no other tables"
+        );
         let mut outputs = Vec::new();
         if let Some(path) = &self.csv {
             if D::CSV_FILES.is_empty() || is_stdout(path) {
@@ -103,7 +110,7 @@ impl Outputs {
         match (prints, self.json) {
             (false, _) => Ok(()),
             (true, true) => super::print(&document.json()?),
-            (true, false) => super::print(&document.text()),
+            (true, false) => super::print(&document.terminal(self.details)),
         }
     }
 }

@@ -238,7 +238,7 @@ impl<'a> Sweep<'a> {
         match (prints, self.args.json) {
             (false, _) => Ok(()),
             (true, true) => super::print(&json),
-            (true, false) => super::print(&report.text()),
+            (true, false) => super::print(&report.terminal(false)),
         }
     }
 

@@ -49,6 +49,12 @@ pub enum Of {
     Rays,
 }
 
+/// The largest errors of a figure, one for each source, together.
+pub(super) fn sum_of_largest(figure: &str) -> f64 {
+    let errors = ERRORS.iter().filter(|error| error.figure == figure);
+    errors.map(|error| error.largest).sum()
+}
+
 /// The measured errors of these figures.
 pub fn known(of: Of) -> Vec<&'static KnownError> {
     let rays = |error: &&KnownError| error.figure == REUSE.key;

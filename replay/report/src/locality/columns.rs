@@ -132,7 +132,19 @@ pub(super) const MISSES: [&str; 7] = [
     "opt_line_miss_pct",
 ];
 
-/// Keys of the summary on a terminal.
+/// Keys of the summary that fit a terminal.
+pub(super) const TERMINAL: [&str; 8] = [
+    "trace",
+    "order",
+    "stream",
+    "line_miss_pct",
+    "compulsory_pct",
+    "opt_line_miss_pct",
+    "hits_other_eye_pct",
+    "hits_earlier_frame_pct",
+];
+
+/// Keys of the summary with details.
 pub(super) fn short() -> Vec<&'static str> {
     let stream = ["trace", "order", "stream", "accesses", "unique_lines"];
     let hits = ["hits_other_eye_pct", "hits_earlier_frame_pct", "tile_lines"];

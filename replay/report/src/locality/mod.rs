@@ -4,11 +4,12 @@ mod columns;
 mod page;
 mod plots;
 
+use super::answers;
 use super::document::Document;
 use super::table::Table;
 use columns::{CurvePoint, Reuses, Subject, Summary, Window};
 use serde::Serialize;
-use sim::config::{LevelConfig, RunConfig};
+use sim::config::{LevelConfig, Mode, RunConfig};
 use sim::result::TraceId;
 use studies::locality::{Figures, OrderFigures, Stream};
 
@@ -89,6 +90,14 @@ impl LocalityReport {
             Stream::L1 | Stream::Merged => &self.config.level.l1,
             Stream::L2 => &self.config.level.l2,
         }
+    }
+
+    /// Columns of the summary as text; the trace only if there are several.
+    fn table(&self, keys: &[&'static str]) -> String {
+        let one = self.traces.len() == 1;
+        let keys = keys.iter().copied();
+        let keys = keys.filter(|key| !(one && *key == "trace"));
+        self.rows().picked(keys).text()
     }
 
     /// A row a trace, stream and order.
@@ -176,6 +185,7 @@ fn working_sets(rows: &[Summary]) -> Table {
 
 impl Document for LocalityReport {
     const SCHEMA: &'static str = "replay.locality/2";
+    const HAS_DETAILS: bool = true;
     const CSV_FILES: &'static [&'static str] = &[
         "summary.csv",
         "curves.csv",
@@ -210,11 +220,25 @@ impl Document for LocalityReport {
         ]
     }
 
+    fn answer(&self) -> Vec<String> {
+        let mut out = page::sentences(&self.summaries());
+        let caches = [self.config.level.l1, self.config.level.l2].map(|cache| cache.size_bytes);
+        let frames: Vec<u32> = self.traces.iter().map(|trace| trace.frames).collect();
+        // Counts of misses without latencies: the mode does not matter.
+        let config = RunConfig {
+            mode: Mode::Functional,
+            ..self.config
+        };
+        out.push(answers::machine(&config, [caches], &frames));
+        out
+    }
+
     fn text(&self) -> String {
-        let one = self.traces.len() == 1;
-        let keys = columns::short().into_iter();
-        let keys = keys.filter(|key| !(one && *key == "trace"));
-        self.rows().picked(keys).text()
+        self.table(&columns::TERMINAL)
+    }
+
+    fn details(&self) -> String {
+        self.table(&columns::short())
     }
 
     fn csv_files(&self) -> Vec<String> {

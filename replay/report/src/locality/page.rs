@@ -74,7 +74,7 @@ impl LocalityReport {
         };
         let first = rows.chunk_by(same).next();
         let answer = Answer {
-            sentences: sentences(&rows),
+            sentences: self.answer(),
             chart: html::chart(first.map(|rows| plots::miss_ratio(rows).svg()), "")?,
             about,
         };
@@ -83,7 +83,7 @@ impl LocalityReport {
 }
 
 /// The misses of the first trace's streams, and its hits on the other eye's lines.
-fn sentences(rows: &[Summary]) -> Vec<String> {
+pub(super) fn sentences(rows: &[Summary]) -> Vec<String> {
     let Some(first) = rows.first() else {
         return Vec::new();
     };

@@ -18,6 +18,18 @@ pub(super) const CHANGES: [&str; 7] = [
     "cycles_change_pct",
 ];
 
+/// Keys of the means that fit a terminal.
+pub(super) const TERMINAL: [&str; 8] = [
+    "between_frames",
+    "order",
+    "buildable",
+    "change_pct",
+    "worst_pct",
+    "closed_pct",
+    "cycles_change_pct",
+    "state_bytes",
+];
+
 /// Keys of the sizes of an order's tables.
 pub(super) const SIZES: [&str; 3] = ["state_bytes", "table_bytes", "tile_buffers"];
 

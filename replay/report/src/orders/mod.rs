@@ -4,7 +4,9 @@ mod columns;
 mod means;
 mod page;
 
+use super::answers;
 use super::document::Document;
+use super::lists::unique;
 use super::table::Table;
 use columns::LearnedRow;
 pub use columns::LearnedTrace;
@@ -59,6 +61,7 @@ impl<'a> OrdersReport<'a> {
 
 impl Document for OrdersReport<'_> {
     const SCHEMA: &'static str = "replay.orders/2";
+    const HAS_DETAILS: bool = true;
 
     fn content(&self) -> impl Serialize {
         let mut traces: Vec<OrdersTrace<'_>> = Vec::new();
@@ -97,15 +100,42 @@ impl Document for OrdersReport<'_> {
         ]
     }
 
-    /// The means; for a single trace, its rows.
+    fn answer(&self) -> Vec<String> {
+        let caches = self.rows.iter().map(|row| {
+            let level = &row.config.level;
+            [level.l1.size_bytes, level.l2.size_bytes]
+        });
+        let frames = unique(
+            self.rows
+                .iter()
+                .map(|row| (&row.subject.label, row.frames())),
+        );
+        let frames: Vec<u32> = frames.into_iter().map(|(_, frames)| frames).collect();
+        let mut out = page::sentences(&self.means());
+        out.push(answers::machine(&self.config, caches, &frames));
+        out
+    }
+
+    /// The means.
     fn text(&self) -> String {
         let means = Table::new(&columns::means(), &self.means()).grouped_by(1);
-        let names = ["between_frames", "order", "buildable"].into_iter();
-        let table = means.picked(names.chain(columns::CHANGES).chain(columns::SIZES));
+        let treatments = unique(self.rows.iter().map(|row| row.config.between_frames)).len();
+        let table = means.picked(
+            columns::TERMINAL
+                .into_iter()
+                .skip(usize::from(treatments < 2)),
+        );
         let mut text = table.without_empty_columns().text();
         if !self.learned.is_empty() {
             text += &format!("\n{}", self.learned_table().text());
         }
         text
+    }
+
+    fn details(&self) -> String {
+        let means = Table::new(&columns::means(), &self.means()).grouped_by(1);
+        let names = ["between_frames", "order", "buildable"].into_iter();
+        let table = means.picked(names.chain(columns::CHANGES).chain(columns::SIZES));
+        table.without_empty_columns().text()
     }
 }

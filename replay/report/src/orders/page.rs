@@ -2,6 +2,7 @@
 
 use super::{Mean, OrdersReport, columns, means};
 use crate::answers;
+use crate::document::Document;
 use crate::html::{self, Answer, Page};
 use crate::lists::unique;
 use crate::plots::PlotError;
@@ -55,7 +56,7 @@ impl OrdersReport<'_> {
         };
         let means = self.means();
         let answer = Answer {
-            sentences: sentences(&means),
+            sentences: self.answer(),
             chart: html::figure(&best_and_bounds(&means).svg()?, ""),
             about,
         };
@@ -105,7 +106,7 @@ fn is_buildable(mean: &Mean<'_>) -> bool {
     mean.rows.first().is_some_and(|row| row.is_buildable())
 }
 
-fn sentences(means: &[Mean<'_>]) -> Vec<String> {
+pub(super) fn sentences(means: &[Mean<'_>]) -> Vec<String> {
     let orders = first_of(means).map(|mean| answers::Studied {
         name: mean.name(),
         change_pct: mean.change_pct().unwrap_or(0.0),

@@ -118,7 +118,7 @@ fn eyes_unsuitable_for_the_row_test_are_reported_in_every_output() {
         ..View::default()
     });
     let needle = "the paper's row test does not apply";
-    assert!(text(std::slice::from_ref(&canted)).contains(needle));
+    assert!(details(std::slice::from_ref(&canted)).contains(needle));
     let html = page(std::slice::from_ref(&canted)).expect("a page");
     assert!(html.contains("row test does not apply"));
     let json = serde_json::to_value(&canted.report).expect("json");
@@ -132,12 +132,19 @@ fn eyes_unsuitable_for_the_row_test_are_reported_in_every_output() {
             .ends_with("false")
     );
 
-    assert!(!text(&[entry()]).contains(needle));
+    assert!(!details(&[entry()]).contains(needle));
 }
 
 #[test]
 fn the_terminal_tables_name_scene_and_rule() {
-    let text = text(&[entry()]);
-    assert!(text.contains("teapot") && text.contains(sgrt::DEFAULT_RULE));
-    assert!(text.ends_with('\n') && !text.ends_with("\n\n"));
+    let entries = vec![entry()];
+    let report = ReprojectReport { entries };
+    for with_details in [false, true] {
+        let text = report.terminal(with_details);
+        assert!(
+            text.contains("teapot") && text.contains(sgrt::DEFAULT_RULE),
+            "{text}"
+        );
+        assert!(text.ends_with('\n') && !text.ends_with("\n\n"));
+    }
 }

@@ -8,6 +8,7 @@ mod published;
 
 pub use page::Scene;
 
+use super::columns::{Columns, columns_of};
 use super::document::Document;
 use super::table::Table;
 use columns::{columns, order_columns};
@@ -117,6 +118,7 @@ impl<'a> TechniquesReport<'a> {
 
 impl<'r> Document for TechniquesReport<'r> {
     const SCHEMA: &'static str = "replay.techniques/2";
+    const HAS_DETAILS: bool = true;
 
     fn content(&self) -> impl Serialize {
         let facts = |(scene, m): (&'r Measures<'r>, &&'r Manifest)| SceneFacts {
@@ -151,8 +153,36 @@ impl<'r> Document for TechniquesReport<'r> {
         Table::new(&columns, &rows).grouped_by(1)
     }
 
-    /// The tables for a terminal.
+    fn answer(&self) -> Vec<String> {
+        self.sentences()
+    }
+
+    /// Time with its quartiles, error and traffic of each technique.
     fn text(&self) -> String {
+        let one = self.scenes.len() == 1;
+        let rows = self.measured();
+        let mut columns = columns_of::<&Measured>()
+            .text("scene", "scene", |m| m.scene)
+            .text("technique", "technique", |m| m.row.technique.clone())
+            .real("time", "time", "\u{d7} baseline", 2, |m| {
+                m.timing.ratio.median
+            })
+            .text("quartiles", "quartiles", |m| {
+                format!("{:.2} to {:.2}", m.timing.ratio.q1, m.timing.ratio.q3)
+            })
+            .real("flip_mean", "mean FLIP", "", 4, |m| m.pictures.flip_mean);
+        let traffic = self.rows().picked(["external_mb_per_frame"]);
+        columns.drain(..usize::from(one));
+        let mut table = Table::new(&columns, &rows);
+        table.headings.extend(traffic.headings);
+        for (row, cells) in table.rows.iter_mut().zip(traffic.rows) {
+            row.extend(cells);
+        }
+        table.grouped_by(usize::from(!one)).text()
+    }
+
+    /// All columns, pacing, orders, and notes about the driver.
+    fn details(&self) -> String {
         let mut text = self.short_table().text();
         text += "\n";
         text += &self.pacing_table().text();

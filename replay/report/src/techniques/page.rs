@@ -159,26 +159,45 @@ impl TechniquesReport<'_> {
         };
         let first = self.scenes.first();
         let chart = html::chart(first.map(|m| plots::pareto(m).svg()), PARETO_CAPTION)?;
-        let mut sentences = self.scenes.first().map_or_else(Vec::new, |measures| {
-            let others = measures.rows.iter().filter(|m| !m.is_baseline());
-            let timed = others.map(|m| answers::Timed {
+        Ok(Answer {
+            sentences: self.sentences(),
+            chart,
+            about,
+        })
+    }
+
+    /// The fastest technique of the first scene, the baseline, the driver and the machine.
+    pub(super) fn sentences(&self) -> Vec<String> {
+        let mut out = self.scenes.first().map_or_else(Vec::new, |measures| {
+            let (own, others): (Vec<&Measured>, Vec<_>) =
+                measures.rows.iter().partition(|m| m.is_baseline());
+            let timed = others.iter().map(|m| answers::Timed {
                 name: m.row.technique.clone(),
                 time: m.timing.ratio,
                 flip: m.pictures.flip_mean,
             });
-            answers::timed(measures.scene, &timed.collect::<Vec<_>>())
+            let baseline = own
+                .first()
+                .map_or("the first technique", |m| &m.row.technique);
+            let noise = own.first().map(|m| m.timing.ratio);
+            answers::timed(
+                measures.scene,
+                &timed.collect::<Vec<_>>(),
+                (baseline, noise),
+            )
         });
-        if software {
-            sentences.push(
+        if self.manifests.iter().any(|m| m.software_driver) {
+            out.push(
                 "The driver renders in software, so frame times are a processor's, not a GPU's."
                     .to_owned(),
             );
         }
-        Ok(Answer {
-            sentences,
-            chart,
-            about,
-        })
+        let caches = [self.config.level.l1, self.config.level.l2].map(|cache| cache.size_bytes);
+        let frames: Vec<u32> = (self.manifests.iter())
+            .map(|m| m.frames.len() as u32)
+            .collect();
+        out.push(answers::machine(&self.config, [caches], &frames));
+        out
     }
 
     /// The times of the stages, if the capture has them.

@@ -6,7 +6,7 @@ use crate::errors::{self, KnownError, Of};
 use crate::figures::number;
 use crate::lists::{mean, unique};
 use crate::table::Table;
-use crate::z2::tables;
+use crate::z2::{page, tables};
 use formats::textrace::TraceMeta;
 use serde::Serialize;
 use sim::config::{Order, RunConfig};
@@ -248,6 +248,7 @@ pub struct PaperJson<'a> {
 
 impl Document for PaperReport<'_> {
     const SCHEMA: &'static str = "replay.paper/3";
+    const HAS_DETAILS: bool = true;
     const INDENTED: bool = false;
 
     fn content(&self) -> impl Serialize {
@@ -276,8 +277,16 @@ impl Document for PaperReport<'_> {
         ]
     }
 
+    fn answer(&self) -> Vec<String> {
+        page::sentences(self)
+    }
+
     fn text(&self) -> String {
         tables::text(self)
+    }
+
+    fn details(&self) -> String {
+        tables::details(self)
     }
 }
 

@@ -88,7 +88,7 @@ pub fn page(report: &PaperReport, pictures: &[EmbeddedPicture]) -> Result<String
 }
 
 /// The answer: the best order in the mean over everything, and the paper's figure for it.
-fn sentences(report: &PaperReport) -> Vec<String> {
+pub(super) fn sentences(report: &PaperReport) -> Vec<String> {
     let last = report.averages.last();
     let means: Vec<_> = (report.averages.iter())
         .filter(|a| last.is_some_and(|last| last.scene == a.scene))
@@ -119,6 +119,12 @@ fn sentences(report: &PaperReport) -> Vec<String> {
             ));
         }
     }
+    let caches = report.rows.iter().map(|row| {
+        let level = &row.point.config.level;
+        [level.l1.size_bytes, level.l2.size_bytes]
+    });
+    let frames: Vec<u32> = report.traces.iter().map(|trace| trace.frames).collect();
+    out.push(answers::machine(&report.config, caches, &frames));
     out
 }
 

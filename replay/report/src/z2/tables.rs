@@ -141,8 +141,27 @@ pub(crate) fn busiest(parts: &[Part], most: usize) -> Vec<usize> {
     index
 }
 
-/// The tables as text for a terminal.
+/// Columns of Table 2 that fit a terminal.
+const TERMINAL: [&str; 8] = [
+    "label",
+    "caches",
+    "order",
+    "external_mb_per_frame",
+    "bound_mb_per_frame",
+    "reduction_pct",
+    "tmu_ratio",
+    "paper.reduction_pct",
+];
+
+/// The main columns of Table 2, and the comparison of modes if it was asked for.
 pub(super) fn text(report: &PaperReport) -> String {
+    let table = table_2(report).picked(TERMINAL).grouped_by(2);
+    let modes = modes(report).map(|table| format!("\n{}", table.text()));
+    table.text() + &modes.unwrap_or_default()
+}
+
+/// All columns of Table 2, means, counts as in the paper, and known errors.
+pub(super) fn details(report: &PaperReport) -> String {
     let mut text = table_2(report).text();
     let _ = write!(text, "\n{}", averages(&report.averages).text());
     if let Some(table) = as_the_paper_counts(report) {
@@ -151,9 +170,6 @@ pub(super) fn text(report: &PaperReport) -> String {
             "\nCounted as in the paper (--preset z2-paper): first look-ups, with merged requests; memory traffic is in the columns on the right\n{}",
             table.text()
         );
-    }
-    if let Some(table) = modes(report) {
-        let _ = write!(text, "\n{}", table.text());
     }
     let fit = &report.closed_form;
     if fit.rows > 0 {

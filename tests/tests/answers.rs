@@ -1,0 +1,94 @@
+//! Commands begin with their answer: a sentence with a number, then a table that fits a terminal.
+
+use parallax_tests::{program, root, run_ok};
+use std::path::{Path, PathBuf};
+
+/// Widest line of the text without `--details`.
+const TERMINAL_CHARS: usize = 100;
+
+/// Commands, and where their inputs are.
+fn commands() -> Vec<(&'static str, PathBuf)> {
+    let [traces, data] = ["traces", "tests/tests/data"].map(|folder| root().join(folder));
+    vec![
+        ("run atrium.textrace --order z2-sta", traces.clone()),
+        ("run geometry.textrace --frame tile-based", data.clone()),
+        (
+            "paper atrium.textrace --caches 8/128,16/256",
+            traces.clone(),
+        ),
+        ("orders program.textrace --caches 8/64", traces.clone()),
+        ("locality program.textrace", traces.clone()),
+        ("reproject chess-rays.raytrace", traces),
+        ("temporal frame-0.raytrace frame-1.raytrace", data.clone()),
+        ("techniques techniques --orders morton,z2-sta", data.clone()),
+        ("sample plan.textrace --values frames.csv", data),
+    ]
+}
+
+fn text(command: &str, folder: &Path) -> String {
+    let output = run_ok(
+        program("replay")
+            .args(command.split(' '))
+            .current_dir(folder),
+    );
+    String::from_utf8(output.stdout).expect("text")
+}
+
+#[test]
+fn the_answer_comes_first_and_its_lines_fit_a_terminal() {
+    for (command, folder) in commands() {
+        let text = text(command, &folder);
+        let (answer, table) = text.split_once("\n\n").expect("an answer, then a table");
+        let first = answer.split(". ").next().expect("a sentence");
+        assert!(
+            answer.ends_with('.') && first.contains(|c: char| c.is_ascii_digit()),
+            "{command}: {answer}"
+        );
+        for line in text.lines() {
+            assert!(
+                line.chars().count() <= TERMINAL_CHARS,
+                "{command}: {} characters: {line}",
+                line.chars().count()
+            );
+        }
+        assert!(!table.contains("largest error of"), "{command}: {table}");
+    }
+}
+
+#[test]
+fn details_add_tables_and_change_no_line() {
+    for (command, folder) in commands() {
+        let short = text(command, &folder);
+        let Some(kept) = short.strip_suffix("\n(more tables: --details)\n") else {
+            assert!(command.starts_with("sample"), "{command}");
+            parallax_tests::refuse(
+                program("replay")
+                    .args(command.split(' '))
+                    .arg("--details")
+                    .current_dir(folder),
+                &["--details", "no other tables"],
+            );
+            continue;
+        };
+        let long = text(&format!("{command} --details"), &folder);
+        assert!(
+            long.starts_with(kept) && long.len() > kept.len(),
+            "{command}: {long}"
+        );
+    }
+}
+
+#[test]
+fn a_cache_that_holds_everything_is_named_in_the_answer() {
+    let folder = root().join("traces");
+    let all = text("run program.textrace --l2 64MiB", &folder);
+    assert!(
+        all.contains("The L2 holds everything; no order can save."),
+        "{all}"
+    );
+    let equal = text(
+        "orders program.textrace --orders morton,z2-sta --caches 64/65536",
+        &folder,
+    );
+    assert!(equal.starts_with("No order can save here"), "{equal}");
+}
