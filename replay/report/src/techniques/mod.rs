@@ -198,14 +198,6 @@ impl<'r> Document for TechniquesReport<'r> {
                 formats::text::printable(&manifest.adapter)
             );
         }
-        for manifest in &self.manifests {
-            if let Some(defect) = &manifest.multiview_defect {
-                text += &format!(
-                    "multiview was timed as separate views and counted as one submission: {}\n",
-                    formats::text::printable(defect)
-                );
-            }
-        }
         text
     }
 }

@@ -192,6 +192,16 @@ impl TechniquesReport<'_> {
                     .to_owned(),
             );
         }
+        let defects = self
+            .manifests
+            .iter()
+            .filter_map(|m| m.multiview_defect.as_deref());
+        out.extend(defects.map(|defect| {
+            let defect = formats::text::printable(defect);
+            format!(
+                "Multiview was timed as separate views and counted as one submission: {defect}."
+            )
+        }));
         let caches = [self.config.level.l1, self.config.level.l2].map(|cache| cache.size_bytes);
         let frames: Vec<u32> = (self.manifests.iter())
             .map(|m| m.frames.len() as u32)
