@@ -28,6 +28,7 @@ PAGES = [
     "report inputs/atrium.textrace --image atrium=inputs/atrium.png -o pages/report.html",
     "report inputs/atrium.textrace --as atrium=crytek-sponza --orders all -o pages/report-orders.html",
     "paper golden/atrium.textrace golden/jungle.textrace --functional --html pages/paper.html",
+    "view inputs/atrium.textrace --image inputs/atrium.png -o pages/view.html",
     "sweep inputs/sweep.toml golden/atrium.textrace -o sweep",
     "locality inputs/atrium.textrace --orders all --html pages/locality.html",
     "orders inputs/atrium.textrace --html pages/orders.html",

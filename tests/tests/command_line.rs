@@ -431,7 +431,7 @@ fn every_command_prints_what_its_trace_lacks() {
             "calibrate" => vec!["--try", "cores=1,2", trace, trace],
             "compare" | "diff" => vec![trace, trace],
             "convert" => vec!["--to", "din", "-o", output, trace],
-            "report" => vec!["-o", output, trace],
+            "report" | "view" => vec!["-o", output, trace],
             "sweep" => vec!["-o", output, experiment, trace],
             _ => vec![trace],
         };

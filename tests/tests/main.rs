@@ -61,4 +61,5 @@ mod timeline;
 mod tutorial;
 mod verify;
 mod verify_damage;
+mod view;
 mod whole_frame;

@@ -34,4 +34,5 @@ pub mod techniques;
 pub mod temporal;
 pub mod theme;
 pub mod timeline;
+pub mod view;
 pub mod z2;

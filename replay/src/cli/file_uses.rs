@@ -5,6 +5,7 @@ use shell::{FileUse, FileUses};
 /// Uses of the arguments of `replay`; a test compares the table with the command line.
 pub const FILES: &FileUses = &[
     (&["report", "paper"], &["images"], FileUse::Input),
+    (&["view"], &["image"], FileUse::Input),
     (&["techniques"], &["folders"], FileUse::InputFolder),
     (&["accuracy"], &["techniques"], FileUse::InputFolder),
     (&["locality"], &["csv"], FileUse::Folder),

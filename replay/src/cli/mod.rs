@@ -31,6 +31,7 @@ mod temporal;
 pub(crate) mod testing;
 mod tiles;
 pub mod validate;
+mod view;
 mod warnings;
 
 pub use config_args::ConfigArgs;
@@ -91,6 +92,9 @@ enum Command {
     /// Write the Z2 paper's experiment as a self-contained page, with JSON and CSV files.
     #[command(mut_args(without(&["order", "l1", "l2"])))]
     Report(Box<report::Args>),
+    /// Write a page to explore tiles: maps of misses, and orders as an animation.
+    #[command(mut_args(without(&["order"])))]
+    View(Box<view::Args>),
     /// Compare stereo rendering techniques: frame time, image error, cache misses.
     Techniques(Box<techniques::Args>),
     /// Compare tile orders with each other and with lower bounds, with their hardware costs.
@@ -148,6 +152,7 @@ pub fn main() -> ExitCode {
             Command::Calibrate(args) => calibrate::run(&args),
             Command::Sweep(args) => sweep::run(&args),
             Command::Report(args) => report::run(&args),
+            Command::View(args) => view::run(&args),
             Command::Techniques(args) => techniques::run(&args),
             Command::Orders(args) => orders::run(&args),
             Command::Sample(args) => sample::run(&args),

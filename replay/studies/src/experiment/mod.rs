@@ -15,6 +15,7 @@ mod runner;
 mod split;
 mod store;
 mod subject;
+mod tiles;
 
 pub use calibration::{Objective, SceneCaptures, SceneFit, Trial, is_of_the_table, trials};
 pub use file::{ExperimentFile, parse_config};
@@ -26,6 +27,7 @@ pub use split::{Split, Task};
 pub use store::point_schema;
 pub use store::{Absent, POINT_SCHEMA, Store, StoredPoint, point_key};
 pub use subject::{Subject, frame_count, has_shadow_maps, labels, scene_label};
+pub use tiles::{PassTiles, pass_tiles};
 
 #[cfg(test)]
 mod tests;
