@@ -1,8 +1,10 @@
 //! `replay diff`: lists different keys of two traces' descriptions, and the first different entries and
-//! record.
+//! record; or compares two results of `replay run`.
+
+mod results;
 
 use crate::records::Tiles;
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use formats::Trace;
 use formats::interop::{node_to_json, slot_rows, slot_to_json};
 use formats::raytrace::Raytrace;
@@ -18,16 +20,29 @@ use std::process::ExitCode;
 #[command(after_help = "Exit code: 0 the same, 1 different, 2 unreadable.
 Prints every different line of the description, then the first different entry of each table, then
 the first different record. The tile encoding is not compared.
+Of two results of `replay run --json`, prints settings and figures that differ; exit code 1 if a figure
+differs by more than --threshold.
 
-Example: replay diff a.textrace b.textrace")]
+Examples:
+  replay diff a.textrace b.textrace
+  replay diff before.json after.json --threshold 1")]
 pub struct DiffArgs {
-    /// First trace
+    /// First trace, or JSON result
     pub left: PathBuf,
-    /// Second trace
+    /// Second trace, or JSON result
     pub right: PathBuf,
     /// Ignore the description (tool, command line, driver, ...)
     #[arg(long)]
     pub ignore_meta: bool,
+    /// Largest change of a result's figure that counts as none, percent
+    #[arg(long = "threshold", value_name = "PERCENT", default_value_t = 0.0, value_parser = parse_pct)]
+    pub threshold_pct: f64,
+}
+
+fn parse_pct(text: &str) -> Result<f64, String> {
+    let number = text.trim_end_matches('%').parse::<f64>().ok();
+    let number = number.filter(|number| number.is_finite() && *number >= 0.0);
+    number.ok_or_else(|| format!("expected a percentage of 0 or more, found '{text}'"))
 }
 
 /// Runs the subcommand.
@@ -35,6 +50,13 @@ pub struct DiffArgs {
 /// # Errors
 /// A trace cannot be read.
 pub fn run(args: &DiffArgs) -> Result<ExitCode> {
+    if results::is_json(&args.left) || results::is_json(&args.right) {
+        return results::run(args);
+    }
+    ensure!(
+        args.threshold_pct == 0.0,
+        "--threshold: expected two JSON results of `replay run`, found traces"
+    );
     let left = notices::open(&args.left)?;
     let right = notices::open(&args.right)?;
     let differences = differences(&left, &right, args.ignore_meta)?;
