@@ -19,7 +19,13 @@
     const scroll = box.querySelector(".scroll"), table = box.querySelector("table"), body = table.tBodies[0];
     const heads = [...table.tHead.rows[table.tHead.rows.length - 1].cells];
     const rows = [...body.rows], bar = make("div", { className: "bar" });
+    const above = [...document.querySelectorAll("main h2, main h3")].filter(h => h.compareDocumentPosition(box) & Node.DOCUMENT_POSITION_FOLLOWING).pop();
+    if (!table.caption && above) {
+      const name = above.textContent, number = (above.tables = (above.tables || 0) + 1);
+      scroll.setAttribute("aria-label", number > 1 ? `${name}, table ${number}` : name);
+    }
     heads.forEach((head, column) => {
+      if (!head.textContent.trim()) return;
       const button = make("button", { type: "button" }, ...head.childNodes);
       head.append(button);
       button.onclick = () => {
@@ -95,7 +101,11 @@
   }
   for (const svg of document.querySelectorAll("svg")) {
     const parts = [...svg.querySelectorAll("title")].map(title => title.parentNode);
-    if (!parts.length) continue;
+    if (!parts.length) {
+      // Without marks to go through, the keyboard scrolls the chart's box.
+      svg.closest(".scroll")?.setAttribute("tabindex", "0");
+      continue;
+    }
     const says = make("output", { className: "exact" });
     svg.after(says);
     let at = -1;

@@ -41,7 +41,14 @@ impl HBarChart {
             Some(_) => (NUMBERED_BAR_PX, 60),
             None => (BAR_PX, 22),
         };
-        let row_px = bar_px * self.series.len().max(1) as i32 + ROW_GAP_PX;
+        // Where each row has one value at most, its bar stands at the row's name.
+        let is_single = (self.rows.iter()).all(|(_, values)| values.iter().flatten().count() < 2);
+        let bars = if is_single {
+            1
+        } else {
+            self.series.len().max(1)
+        };
+        let row_px = bar_px * bars as i32 + ROW_GAP_PX;
         let all = self.rows.iter().flat_map(|(_, v)| v.iter().flatten());
         let axis = RowBands {
             title: &self.title,
@@ -59,6 +66,7 @@ impl HBarChart {
             for (row, (name, values)) in (0..).zip(&self.rows) {
                 for (bar, (value, style)) in (0..).zip(values.iter().zip(&self.series)) {
                     let Some(value) = *value else { continue };
+                    let bar = if is_single { 0 } else { bar };
                     let y = row_px * row + ROW_GAP_PX / 2 + bar_px * bar;
                     let corners = [(0.0, y), (value, y + bar_px - 1)];
                     let corners = corners.map(|at| axes.backend_coord(&at));

@@ -70,8 +70,11 @@ impl PathPlot {
             let problem = format!("{bad:?} is outside of 2 x {columns}x{rows} tiles");
             return Err(PlotError::new(&self.title, problem));
         }
+        // Numbers of neighbours stay apart.
+        let widest_px = theme::text_width_px(&self.stops.len().to_string(), theme::TICK_PX);
         let cell = (240.0 / f64::from(columns.max(rows).max(1)))
             .clamp(8.0, 30.0)
+            .max(widest_px + 8.0)
             .floor();
         let (w, h) = (cell * f64::from(columns), cell * f64::from(rows));
         let frame = Frame {

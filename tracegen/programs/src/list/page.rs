@@ -8,22 +8,23 @@ use image::codecs::png::PngEncoder;
 use std::fmt::Write as _;
 
 const STYLE: &str =
-    "body { font: 14px sans-serif; margin: 2em; } table { border-collapse: collapse; }
-th, td { border: 1px solid #ccc; padding: 4px 8px; text-align: left; vertical-align: top; }
-img { max-width: 256px; max-height: 256px; background: #888; } .why { color: #a30; }";
+    ":root { color-scheme: light dark; } body { font: 14px sans-serif; margin: 2em; } table { border-collapse: collapse; }
+.scroll { overflow-x: auto; } th, td { border: 1px solid #888; padding: 4px 8px; text-align: left; vertical-align: top; }
+img { max-width: 256px; max-height: 256px; background: #888; } .why { color: light-dark(#a30, #f0914a); }";
 
 /// The page with lists of frames of a program.
 pub fn page(program: &str, lists: &[List]) -> String {
     let title = escaped(program);
     let mut text = format!(
-        "<!doctype html>\n<meta charset=\"utf-8\">\n<title>Passes of {title}</title>\n<style>{STYLE}</style>\n\
+        "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>Passes of {title}</title>\n<style>{STYLE}</style>\n\
          <h1>Passes of {title}</h1>\n"
     );
     for list in lists {
         let _ = writeln!(
             text,
-            "<h2>{}</h2>\n<table>\n<tr><th>picture</th>",
-            escaped(&list.eyes_text())
+            "<h2>{}</h2>\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"passes of frame {}\">\n<table>\n<tr><th>picture</th>",
+            escaped(&list.eyes_text()),
+            list.frame
         );
         for column in COLUMNS {
             let _ = write!(text, "<th>{column}</th>");
@@ -32,7 +33,7 @@ pub fn page(program: &str, lists: &[List]) -> String {
         for row in &list.rows {
             line(row, &mut text);
         }
-        let _ = writeln!(text, "</table>");
+        let _ = writeln!(text, "</table>\n</div>");
     }
     text
 }
