@@ -92,3 +92,44 @@ fn a_cache_that_holds_everything_is_named_in_the_answer() {
     );
     assert!(equal.starts_with("No order can save here"), "{equal}");
 }
+
+#[test]
+fn a_change_of_a_result_beyond_the_threshold_has_exit_code_1() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let trace = root().join("traces/atrium.textrace");
+    for order in ["morton", "z2-sta"] {
+        let output = run_ok(
+            program("replay")
+                .arg("run")
+                .arg(&trace)
+                .args(["--json", "--order", order]),
+        );
+        std::fs::write(folder.path().join(order), output.stdout).expect("a file");
+    }
+    let diff = |files: [&str; 2], threshold: &str| {
+        let mut command = program("replay");
+        command
+            .arg("diff")
+            .args(files)
+            .args(["--threshold", threshold]);
+        command
+            .current_dir(folder.path())
+            .output()
+            .expect("replay starts")
+    };
+    let changed = diff(["morton", "z2-sta"], "1");
+    let text = String::from_utf8_lossy(&changed.stdout);
+    assert_eq!(changed.status.code(), Some(1));
+    assert!(
+        text.starts_with("z2-sta reads 42.8 % less texture data from DRAM than morton"),
+        "{text}"
+    );
+    assert!(
+        text.contains("config.order: \"morton\" and \"z2-sta\""),
+        "{text}"
+    );
+    assert_eq!(diff(["morton", "z2-sta"], "99").status.code(), Some(0));
+    assert_eq!(diff(["morton", "morton"], "0").status.code(), Some(0));
+    std::fs::write(folder.path().join("other"), "{}").expect("a file");
+    assert_eq!(diff(["other", "morton"], "0").status.code(), Some(2));
+}

@@ -30,6 +30,8 @@ fn sums_of_tiles_equal_the_counts_of_a_run() {
     for (name, orders) in [
         ("atrium.textrace", "morton,z2-sta"),
         ("atrium-shadows.textrace", "zig-zag+sta+offset"),
+        // Two frames.
+        ("program.textrace", "z2-lrta"),
     ] {
         let file = folder.path().join("view.html");
         let mut command = program("replay");

@@ -270,7 +270,8 @@
     asked = 0;
     const began = performance.now();
     if (state.playing) {
-      state.at = Math.min(1, state.at + (now - lastTick) / (1000 * $("speed").value));
+      // The time of a picture can lie before the key or click that started it.
+      state.at = Math.min(1, state.at + Math.max(0, now - lastTick) / (1000 * $("speed").value));
       $("at").value = 1000 * state.at;
       if (state.at >= 1) play(false);
     }

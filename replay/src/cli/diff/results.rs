@@ -84,8 +84,8 @@ pub(super) fn run(args: &DiffArgs) -> Result<ExitCode> {
     if !differing.is_empty() {
         let columns = columns_of::<Figure>()
             .text("figure", "figure", |of| of.key.clone())
-            .real("first", "first", "", 4, |of| of.values[0])
-            .real("second", "second", "", 4, |of| of.values[1])
+            .real("first", "first", "", 0, |of| shown(of.values[0]))
+            .real("second", "second", "", 0, |of| shown(of.values[1]))
             .real("change_pct", "change", "%", 2, |of| {
                 Some(of.change_pct()).filter(|pct| pct.is_finite())
             })
@@ -94,6 +94,12 @@ pub(super) fn run(args: &DiffArgs) -> Result<ExitCode> {
     }
     super::super::print(text.trim_end())?;
     Ok(ExitCode::from(u8::from(count > 0)))
+}
+
+/// Counts as integers, rates with four decimals.
+fn shown(value: f64) -> String {
+    let decimals = if value.fract() == 0.0 { 0 } else { 4 };
+    format!("{value:.decimals$}")
 }
 
 fn read(path: &Path) -> Result<Value> {
