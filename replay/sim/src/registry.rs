@@ -77,7 +77,7 @@ impl<R: Row> Named<R> {
     }
 
     /// The row itself.
-    pub(crate) const fn row(self) -> &'static R {
+    pub const fn row(self) -> &'static R {
         self.0
     }
 }

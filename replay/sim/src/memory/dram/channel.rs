@@ -37,6 +37,8 @@ struct Request {
     arrival: u64,
     /// The first command it needed.
     needed: Option<Needed>,
+    /// Number to be answered with, in a closed loop.
+    number: Option<u64>,
 }
 
 /// The next command of a request.
@@ -74,13 +76,15 @@ pub struct Channel {
     writes: Vec<Request>,
     /// True while writes are served.
     is_writing: bool,
-    /// Requests that found their queue full: place, true for writes, and arrival clock if given.
-    backlog: VecDeque<(BurstAddress, bool, Option<u64>)>,
+    /// Requests that found their queue full: place, true for writes, arrival clock and number if given.
+    backlog: VecDeque<(BurstAddress, bool, Option<u64>, Option<u64>)>,
     /// The next free clock of the command bus.
     now: u64,
     refresh_due: u64,
     /// Counts so far.
     pub counts: Counts,
+    /// Numbers of answered requests, each with the clock of its last data.
+    pub answered: Vec<(u64, u64)>,
 }
 
 impl Channel {
@@ -103,6 +107,7 @@ impl Channel {
             now: 0,
             refresh_due: u64::from(device.refi),
             counts: Counts::default(),
+            answered: Vec::new(),
         }
     }
 
@@ -114,26 +119,53 @@ impl Channel {
     /// Adds a request that arrives at `clock`, or without one as soon as the queue has room.
     pub fn arrive(&mut self, place: BurstAddress, write: bool, clock: Option<u64>) {
         if let Some(clock) = clock {
-            // Later requests cannot change earlier commands.
-            while self.is_busy() && self.step(Some(clock)) {}
-            if !self.is_busy() {
-                // The channel was idle; only refreshes happened.
-                while self.refresh_due <= clock {
-                    self.now = self.now.max(self.refresh_due);
-                    self.refresh();
-                }
-                self.now = self.now.max(clock);
-            }
+            self.advance(clock);
         } else {
             while self.queue(write).len() >= self.capacity || !self.backlog.is_empty() {
                 self.step(None);
             }
         }
-        self.backlog.push_back((place, write, clock));
+        self.backlog.push_back((place, write, clock, None));
         self.admit();
     }
 
-    fn is_busy(&self) -> bool {
+    /// Adds a numbered request that arrives at `clock`. The caller has checked that a write finds room.
+    pub fn arrive_numbered(&mut self, place: BurstAddress, write: bool, clock: u64, number: u64) {
+        self.advance(clock);
+        match write {
+            true => self.writes.push(Request {
+                place,
+                arrival: clock,
+                needed: None,
+                number: Some(number),
+            }),
+            false => self
+                .backlog
+                .push_back((place, write, Some(clock), Some(number))),
+        }
+        self.admit();
+    }
+
+    /// True if the queue of writes has room.
+    pub fn takes_writes(&self) -> bool {
+        self.writes.len() < self.capacity
+    }
+
+    /// Issues the commands before `clock`. Later requests cannot change them.
+    pub fn advance(&mut self, clock: u64) {
+        while self.is_busy() && self.step(Some(clock)) {}
+        if !self.is_busy() {
+            // The channel was idle; only refreshes happened.
+            while self.refresh_due <= clock {
+                self.now = self.now.max(self.refresh_due);
+                self.refresh();
+            }
+            self.now = self.now.max(clock);
+        }
+    }
+
+    /// True while a request is queued.
+    pub fn is_busy(&self) -> bool {
         !(self.reads.is_empty() && self.writes.is_empty())
     }
 
@@ -170,7 +202,7 @@ impl Channel {
 
     /// Moves requests from the backlog into the queues while there is room.
     fn admit(&mut self) {
-        while let Some(&(place, write, clock)) = self.backlog.front()
+        while let Some(&(place, write, clock, number)) = self.backlog.front()
             && self.queue(write).len() < self.capacity
         {
             self.backlog.pop_front();
@@ -179,6 +211,7 @@ impl Channel {
                 place,
                 arrival,
                 needed: None,
+                number,
             });
         }
     }
@@ -330,6 +363,8 @@ impl Channel {
     }
 
     fn count(&mut self, request: &Request, data: u64) {
+        let answer = request.number.map(|number| (number, data));
+        self.answered.extend(answer);
         let counts = &mut self.counts;
         counts.end = counts.end.max(data);
         let is_hit = !matches!(request.needed, Some(Needed::Precharge | Needed::Activate));

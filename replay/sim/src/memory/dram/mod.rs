@@ -1,7 +1,8 @@
 //! DRAM model: row activations, time and energy of the lines that miss the last cache level.
 //!
-//! The model is open-loop: requests arrive when the caches issue them, and the caches' own memory
-//! latency (`memory_cycles`) does not change. Requests read or write whole bursts.
+//! [`Dram`] is open-loop: requests arrive when the caches issue them, and the caches' own memory
+//! latency (`memory_cycles`) does not change. [`ClosedLoop`] answers each request when its data has
+//! arrived. Requests read or write whole bursts.
 //!
 //! Writes have their own queue. A channel switches to writes when that queue is four fifths full or
 //! no read waits, and back to reads when it is down to one fifth, as in Ramulator.
@@ -11,12 +12,14 @@
 //! request needs it.
 
 mod channel;
+mod closed_loop;
 mod mapping;
 mod presets;
 mod result;
 #[cfg(test)]
 mod tests;
 
+pub use closed_loop::ClosedLoop;
 pub use mapping::Mapping;
 pub use presets::{Device, DramPreset};
 pub use result::DramResult;
@@ -93,8 +96,7 @@ impl Dram {
         self.requests += bytes.div_ceil(self.line_bytes.into());
         let burst = u64::from(self.device.burst_bytes);
         let clock = cycle.map(|cycle| {
-            let ps = u128::from(cycle) * 1_000_000 / u128::from(self.config.core_mhz);
-            let clock = (ps / u128::from(self.device.clock_ps)) as u64 + self.late_by;
+            let clock = self.clock(cycle) + self.late_by;
             self.last = self.last.max(clock);
             self.last
         });
@@ -104,10 +106,22 @@ impl Dram {
         }
     }
 
+    /// The clock of a GPU cycle.
+    fn clock(&self, cycle: u64) -> u64 {
+        let ps = u128::from(cycle) * 1_000_000 / u128::from(self.config.core_mhz);
+        (ps / u128::from(self.device.clock_ps)) as u64
+    }
+
+    /// Numbers of the bursts of a line.
+    fn bursts(&self, line: u32) -> std::ops::RangeInclusive<u64> {
+        let bytes = u64::from(self.line_bytes);
+        let (first, burst) = (u64::from(line) * bytes, u64::from(self.device.burst_bytes));
+        first / burst..=(first + bytes - 1) / burst
+    }
+
     /// Delays all requests from `cycle` on by the time that requests without a time have taken.
     pub fn catch_up(&mut self, cycle: u64) {
-        let ps = u128::from(cycle) * 1_000_000 / u128::from(self.config.core_mhz);
-        let clock = (ps / u128::from(self.device.clock_ps)) as u64;
+        let clock = self.clock(cycle);
         let now = self.channels.iter().map(Channel::now).max().unwrap_or(0);
         self.late_by = self.late_by.max(now.saturating_sub(clock));
     }
