@@ -326,7 +326,11 @@ impl Core {
             (entry, 0)
         });
         let name = self.left + self.fifo.len() as u64;
-        for &line in lines.iter().skip(looked as usize).take(machine.lookups as usize) {
+        for &line in lines
+            .iter()
+            .skip(looked as usize)
+            .take(machine.lookups as usize)
+        {
             if self.cache.lookup(line) {
                 self.counts.l1[0] += 1;
             } else if let Some(mshr) = self.mshrs.get_mut(&line) {

@@ -366,7 +366,13 @@ impl Device {
             let of = &core.counts;
             all.cycles.add(&of.cycles);
             sim::add_fields!(
-                all, of, warp_cycles, warps_in_flight, footprints, alu_ticks, answered
+                all,
+                of,
+                warp_cycles,
+                warps_in_flight,
+                footprints,
+                alu_ticks,
+                answered
             );
             for (sums, counts) in [
                 (&mut all.warps[..], &of.warps[..]),

@@ -100,7 +100,9 @@ impl Figures {
             cycles: cycles.clone().sum(),
             slowest_cycles: cycles.max().unwrap_or(0),
             core_cycles: all.cycles,
-            dram_bytes: all.dram_lines.map(|lines| lines * transferred_bytes(machine)),
+            dram_bytes: all
+                .dram_lines
+                .map(|lines| lines * transferred_bytes(machine)),
             dram_latency_cycles: all.dram_cycles as f64 / all.dram_lines[0].max(1) as f64,
             energy: energy(machine, &all),
             bound: bound(time, &all),

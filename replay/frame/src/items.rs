@@ -168,7 +168,13 @@ impl<'a, 'f> Items<'a, 'f> {
             let warp = &mut warps[place];
             warp.push(number);
             if warp.len() == self.machine.warp_quads {
-                add_warp(self.machine, warp, &self.quads, &self.lines, &mut parts[place]);
+                add_warp(
+                    self.machine,
+                    warp,
+                    &self.quads,
+                    &self.lines,
+                    &mut parts[place],
+                );
                 warp.clear();
             }
         }
@@ -302,7 +308,10 @@ fn add_warp(
     let first = part.requests.len() as u32;
     let levels = numbers.iter().map(|&number| quads[number].len()).max();
     for level in 0..levels.unwrap_or(0) {
-        for request in numbers.iter().filter_map(|&number| quads[number].get(level)) {
+        for request in numbers
+            .iter()
+            .filter_map(|&number| quads[number].get(level))
+        {
             let start = part.lines.len() as u32;
             part.lines
                 .extend_from_slice(&lines[request.first as usize..request.end as usize]);

@@ -23,6 +23,7 @@ pub mod readings;
 pub mod rows_parquet;
 pub mod run;
 pub mod sample;
+pub mod schedule;
 #[cfg(feature = "testing")]
 mod schemas;
 pub mod sgrt;

@@ -16,6 +16,7 @@ pub const FILES: &FileUses = &[
     (&["sample"], &["values"], FileUse::Input),
     (&["sample"], &["save_values"], FileUse::Output),
     (&["sample"], &["command", "baseline"], FileUse::NoFile),
+    (&["schedule"], &["schedulers"], FileUse::NoFile),
     (&[], &["save_orders"], FileUse::FolderOfNewNames),
     (
         &[],

@@ -23,6 +23,7 @@ pub mod reproject;
 mod reuse_args;
 mod run;
 mod sample;
+mod schedule;
 mod subjects;
 mod sweep;
 mod techniques;
@@ -103,6 +104,9 @@ enum Command {
     /// Answer for a path from a sample of its frames, within a width that is asked for.
     #[command(mut_args(without(&["order", "l1", "l2", "details"])))]
     Sample(Box<sample::Args>),
+    /// Model frame time by scheduler: shaders, texture units, caches and DRAM in a closed loop.
+    #[command(mut_args(without(&["order", "mode", "l3", "assign", "between_frames", "prefetch", "frame", "count_by", "tmu", "memory_cycles", "loop_cycles", "tmu_threads", "retry_footprints", "fetches_per_trip", "allocation"])))]
+    Schedule(Box<schedule::Args>),
     /// Analyse reuse distances, working sets, miss-ratio curves, OPT and 3C misses, by order.
     #[command(mut_args(without(&["order", "l3", "prefetch", "dram", "frame"])))]
     Locality(Box<locality::Args>),
@@ -156,6 +160,7 @@ pub fn main() -> ExitCode {
             Command::Techniques(args) => techniques::run(&args),
             Command::Orders(args) => orders::run(&args),
             Command::Sample(args) => sample::run(&args),
+            Command::Schedule(args) => schedule::run(&args),
             Command::Locality(args) => locality::run(&args),
             Command::Reproject(args) => reproject::run(*args),
             Command::Readings(args) => readings::run(&args),

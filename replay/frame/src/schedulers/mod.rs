@@ -201,7 +201,10 @@ mod tests {
         names.dedup();
         assert_eq!(names.len(), TABLE.len());
         for scheduler in Scheduler::all() {
-            assert!(Order::find(scheduler.row().order).is_some(), "{scheduler:?}");
+            assert!(
+                Order::find(scheduler.row().order).is_some(),
+                "{scheduler:?}"
+            );
         }
     }
 

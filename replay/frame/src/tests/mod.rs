@@ -6,7 +6,6 @@ mod queues;
 mod twin;
 mod whole;
 
-use super::core::Core;
 use super::machine::DramMachine;
 use super::*;
 use proptest::prelude::*;

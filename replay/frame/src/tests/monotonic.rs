@@ -1,1 +1,101 @@
-//! x
+//! More of a resource does not make a frame slower by more than 1 %, as long as it does not change what the caches hold.
+
+use super::*;
+use std::sync::Mutex;
+
+/// Tiles of warps that read neighbouring lines, each line by two warps or more.
+fn tiles(random: u64, tiles: u32) -> List {
+    let mut random = formats::random::Random(random);
+    let parts = (0..tiles).map(|tile| {
+        let lines: Vec<Vec<Vec<u32>>> = (0..8)
+            .map(|warp| {
+                let requests = 1 + random.below(6);
+                let request = |_| {
+                    let first = tile * 16 + warp + random.below(16);
+                    (first..=first + random.below(3)).collect()
+                };
+                (0..requests).map(request).collect()
+            })
+            .collect();
+        let requests: Vec<Vec<&[u32]>> = lines
+            .iter()
+            .map(|of| of.iter().map(|lines| &lines[..]).collect())
+            .collect();
+        let warps: Vec<_> = requests
+            .iter()
+            .map(|of| {
+                let cycles = [0, 1].map(|_| (1 + random.below(30_u64)) * TICKS);
+                (&of[..], 4, cycles)
+            })
+            .collect();
+        let mut part = part(&warps);
+        part.write_lines = 16;
+        part
+    });
+    List::shared(parts.collect())
+}
+
+/// Machines whose caches hold all lines.
+fn roomy() -> impl Strategy<Value = (Machine, u64)> {
+    let sizes = (
+        1_usize..5,
+        2_usize..33,
+        2_usize..65,
+        4_usize..129,
+        2_usize..65,
+    );
+    let rates = (TICKS / 4..8 * TICKS, 20_u64..300, TICKS / 8..TICKS);
+    (sizes, rates, any::<u64>()).prop_map(|(sizes, rates, seed)| {
+        let (cores, warps, l1_mshrs, l2_mshrs, fifo) = sizes;
+        let (ticks_per_line, latency, filter_ticks) = rates;
+        let machine = Machine {
+            cores,
+            warps,
+            l1_mshrs,
+            l2_mshrs,
+            fifo,
+            filter_ticks,
+            merges: 8,
+            banks: 4,
+            l1: LevelConfig::lru(1 << 20),
+            l2: LevelConfig::lru(1 << 20),
+            dram: rate(latency, ticks_per_line),
+            ..machine()
+        };
+        (machine, seed)
+    })
+}
+
+/// How much slower a machine with more of a resource is, in percent.
+fn slower(machine: &Machine, seed: u64, more: impl Fn(&mut Machine)) -> f64 {
+    let work = |machine: &Machine| run(machine, tiles(seed, 800)).0 as f64;
+    let before = work(machine);
+    let mut richer = machine.clone();
+    more(&mut richer);
+    100.0 * (work(&richer) / before - 1.0)
+}
+
+static WORST: Mutex<[f64; 4]> = Mutex::new([f64::MIN; 4]);
+
+proptest! {
+    #![proptest_config(ProptestConfig { max_shrink_iters: 0, ..cases(16) })]
+
+    #[test]
+    fn more_of_a_resource_costs_at_most_one_percent((machine, seed) in roomy()) {
+        let bandwidth = slower(&machine, seed, |m| {
+            let DramMachine::Rate { ticks_per_line, .. } = &mut m.dram else { unreachable!() };
+            *ticks_per_line = *ticks_per_line * 4 / 5;
+        });
+        let warps = slower(&machine, seed, |m| m.warps += 1 + m.warps / 4);
+        let l1_mshrs = slower(&machine, seed, |m| m.l1_mshrs += 1 + m.l1_mshrs / 4);
+        let l2_mshrs = slower(&machine, seed, |m| m.l2_mshrs += 1 + m.l2_mshrs / 4);
+        let found = [bandwidth, warps, l1_mshrs, l2_mshrs];
+        let mut worst = WORST.lock().unwrap();
+        let is_worse = found.iter().zip(&*worst).any(|(found, worst)| found > worst);
+        worst.iter_mut().zip(found).for_each(|(worst, found)| *worst = worst.max(found));
+        if is_worse {
+            println!("slower by at most, %: bandwidth, warps, MSHRs of the L1, of the L2: {worst:.3?}");
+        }
+        prop_assert!(found.iter().all(|slower| *slower <= 1.0), "{:?} {:?}", found, machine);
+    }
+}

@@ -176,7 +176,11 @@ pub(super) fn twin(m: &Machine, mut list: List) -> (u64, Counts) {
     };
     t.fetch(&mut list, 0);
     let mut now = 0;
-    while t.cores.iter().any(|core| core.tiles.iter().any(Option::is_some)) {
+    while t
+        .cores
+        .iter()
+        .any(|core| core.tiles.iter().any(Option::is_some))
+    {
         t.count(now);
         now += 1;
         assert!(now < 1 << 20, "the twin does not end");
@@ -226,17 +230,28 @@ impl Twin<'_> {
     }
 
     fn arrivals(&mut self, now: u64) {
-        self.read_arrivals.sort_unstable_by_key(|(_, line, _)| *line);
-        let (due, later): (Vec<_>, Vec<_>) =
-            self.read_arrivals.drain(..).partition(|(at, ..)| *at == now);
+        self.read_arrivals
+            .sort_unstable_by_key(|(_, line, _)| *line);
+        let (due, later): (Vec<_>, Vec<_>) = self
+            .read_arrivals
+            .drain(..)
+            .partition(|(at, ..)| *at == now);
         self.read_arrivals = later;
         for (_, line, _) in due {
             self.l2.fill(line);
             self.counts.fills[1] += 1;
-            let asked = self.asked_dram.iter().position(|(of, _)| *of == line).unwrap();
+            let asked = self
+                .asked_dram
+                .iter()
+                .position(|(of, _)| *of == line)
+                .unwrap();
             let (_, since) = self.asked_dram.remove(asked);
             self.counts.dram_cycles += now - since;
-            let at = self.l2_flight.iter().position(|(of, _)| *of == line).unwrap();
+            let at = self
+                .l2_flight
+                .iter()
+                .position(|(of, _)| *of == line)
+                .unwrap();
             for core in self.l2_flight.remove(at).1 {
                 let core = &mut self.cores[core];
                 core.to_port.push((now + self.m.l2_cycles, line));
@@ -339,7 +354,9 @@ impl Twin<'_> {
             }
             let mark = |cores: &mut Vec<CoreTwin>| {
                 let flight = cores[core].in_flight.iter_mut();
-                flight.filter(|(of, ..)| *of == line).for_each(|of| of.2 = true);
+                flight
+                    .filter(|(of, ..)| *of == line)
+                    .for_each(|of| of.2 = true);
             };
             if self.l2.look_up(line) {
                 self.counts.l2[0] += 1;
@@ -370,7 +387,11 @@ impl Twin<'_> {
     fn step_dram(&mut self, now: u64, latency: u64, ticks: u64, most_writes: u64) {
         while self.dram / TICKS <= now {
             let start = self.dram.max(now * TICKS);
-            let waiting: u64 = self.writes.iter().map(|(.., lines)| u64::from(*lines)).sum();
+            let waiting: u64 = self
+                .writes
+                .iter()
+                .map(|(.., lines)| u64::from(*lines))
+                .sum();
             if !self.writes.is_empty() && (waiting > most_writes || self.reads.is_empty()) {
                 self.writes[0].2 -= 1;
                 if let (core, slot, 0) = self.writes[0] {
@@ -392,7 +413,9 @@ impl Twin<'_> {
         let m = self.m;
         let core = &mut self.cores[number];
         // Filter.
-        while core.filter / TICKS <= now && core.fifo.first().is_some_and(|of| of.missing.is_empty()) {
+        while core.filter / TICKS <= now
+            && core.fifo.first().is_some_and(|of| of.missing.is_empty())
+        {
             let looked = core.fifo.remove(0);
             core.filter =
                 core.filter.max(now * TICKS) + u64::from(looked.footprints) * m.filter_ticks;
@@ -407,10 +430,14 @@ impl Twin<'_> {
         }
         // Look-up.
         core.is_stalled = false;
-        let asks = core.warps.iter().enumerate().filter_map(|(slot, of)| match of.as_ref()?.phase {
-            Phase::Asks(since) => Some((since, slot)),
-            _ => None,
-        });
+        let asks =
+            core.warps
+                .iter()
+                .enumerate()
+                .filter_map(|(slot, of)| match of.as_ref()?.phase {
+                    Phase::Asks(since) => Some((since, slot)),
+                    _ => None,
+                });
         if let Some((_, slot)) = asks.min() {
             let state = core.warps[slot].clone().unwrap();
             let part = &core.tiles[state.tile].as_ref().unwrap().part;
@@ -488,7 +515,11 @@ impl Twin<'_> {
         // Launch.
         core.is_blocked = false;
         while core.warps.iter().flatten().count() < m.warps {
-            let tiles = core.tiles.iter().enumerate().filter_map(|(at, tile)| Some((at, tile.as_ref()?)));
+            let tiles = core
+                .tiles
+                .iter()
+                .enumerate()
+                .filter_map(|(at, tile)| Some((at, tile.as_ref()?)));
             let unfinished = tiles.clone().filter(|(_, tile)| !tile.is_shaded);
             let oldest = unfinished.map(|(_, tile)| tile.part.item).min();
             let next = tiles.filter(|(_, tile)| tile.launched < tile.part.warps.len());
@@ -526,7 +557,11 @@ impl Twin<'_> {
     fn fetch(&mut self, list: &mut List, _now: u64) {
         loop {
             let held = |core: &CoreTwin| core.tiles.iter().flatten().count();
-            let free = self.cores.iter().enumerate().filter(|(_, core)| core.has_items);
+            let free = self
+                .cores
+                .iter()
+                .enumerate()
+                .filter(|(_, core)| core.has_items);
             let Some((number, fewest)) = free
                 .map(|(number, core)| (number, held(core)))
                 .min_by_key(|(_, held)| *held)
