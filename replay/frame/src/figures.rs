@@ -23,7 +23,7 @@ pub enum Limit {
     Dram,
     /// Instructions.
     Issue,
-    /// Footprints.
+    /// Look-ups and footprints.
     Texture,
 }
 
@@ -87,6 +87,7 @@ impl Figures {
             all.cycles.add(&of.cycles);
             sim::add_fields!(all, of, footprints, alu_ticks, dram_cycles);
             for (sums, counts) in [
+                (&mut all.requests[..], &of.requests[..]),
                 (&mut all.l1[..], &of.l1[..]),
                 (&mut all.l2[..], &of.l2[..]),
                 (&mut all.dram_lines[..], &of.dram_lines[..]),
@@ -151,14 +152,17 @@ fn bound(time: &FrameTime, all: &Counts) -> Bound {
     let reads = time.unique_lines.min(all.dram_lines[0]);
     let bytes = (reads + all.dram_lines[1]) * transferred_bytes(machine);
     let cores = machine.cores as f64 * TICKS as f64;
-    let filter_ticks = (all.footprints * machine.filter_ticks) as f64;
+    // A texture unit looks up one request per cycle, of so many lines.
+    let look_ups = all.l1.iter().sum::<u64>() / u64::from(machine.lookups);
+    let look_up_ticks = all.requests[1].max(look_ups) * TICKS;
+    let texture_ticks = look_up_ticks.max(all.footprints * machine.filter_ticks) as f64;
     let limits = [
         (
             bytes as f64 / machine.sustained_bytes_per_cycle(),
             Limit::Dram,
         ),
         (all.alu_ticks as f64 / cores, Limit::Issue),
-        (filter_ticks / cores, Limit::Texture),
+        (texture_ticks / cores, Limit::Texture),
     ];
     let largest = |a: (f64, Limit), b: (f64, Limit)| if b.0 > a.0 { b } else { a };
     let (cycles, limit) = limits.into_iter().fold((0.0, Limit::Dram), largest);

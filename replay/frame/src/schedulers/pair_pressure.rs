@@ -6,12 +6,12 @@ use super::{SchedulerRow, both_ends};
 
 pub const ROW: SchedulerRow = SchedulerRow {
     name: "pair-pressure",
-    help: "Groups of 4x4 tile pairs by the last frame's DRAM reads, most and fewest at the same time",
+    help: "Groups of up to 4x4 tile pairs by the last frame's DRAM reads, most and fewest at the same time",
     source: "ours",
     order: "morton+sta+offset",
     plan: both_ends::plan,
     uses_last_frame: true,
     priority_warps: false,
     skips_equal: false,
-    bits: |hardware| both_ends::bits(hardware.tiles.div_ceil(2)),
+    bits: |hardware| both_ends::bits(hardware.tiles.div_ceil(2), hardware.cores),
 };
