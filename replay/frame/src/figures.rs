@@ -67,6 +67,8 @@ pub struct Figures {
     pub slowest_cycles: u64,
     /// Cycles of all cores by cause.
     pub core_cycles: CoreCycles,
+    /// Look-ups in the L2.
+    pub l2_look_ups: u64,
     /// Bytes from and to DRAM.
     pub dram_bytes: [u64; 2],
     /// Mean latency of a read.
@@ -101,6 +103,7 @@ impl Figures {
             cycles: cycles.clone().sum(),
             slowest_cycles: cycles.max().unwrap_or(0),
             core_cycles: all.cycles,
+            l2_look_ups: all.l2.iter().sum(),
             dram_bytes: all
                 .dram_lines
                 .map(|lines| lines * transferred_bytes(machine)),

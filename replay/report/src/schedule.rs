@@ -226,6 +226,7 @@ impl Document for ScheduleReport {
             .real("read_mb", "read", "MB", 2, |r| r.per_frame(r.times[0].dram_bytes[0] as f64 * 1e-6))
             .real("written_mb", "written", "MB", 2, |r| r.per_frame(r.times[0].dram_bytes[1] as f64 * 1e-6))
             .real("used_gb_s", "used", "GB/s", 2, |r| r.times[0].gb_per_s())
+            .real("l2_look_ups_m", "L2 look-ups", "M", 3, |r| r.per_frame(r.times[0].l2_look_ups as f64 * 1e-6))
             .real("latency_cycles", "latency", "cycles", 0, |r| r.times[0].dram_latency_cycles)
             .real("energy_mj", "energy", "mJ", 2, ScheduleRow::energy_mj)
             .real("issue_pct", "issue", "%", 1, |r| r.share(|c| c.issue))
