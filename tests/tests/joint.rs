@@ -51,6 +51,7 @@ fn models_depend_neither_on_studies_nor_on_reports() {
         "sgrt",
         &["shell", "studies", "report", "plotters", "parquet"],
     );
+    assert_free_of("frame", &["shell", "sgrt", "studies", "report", "anyhow"]);
     assert_free_of(
         "studies",
         &["report", "replay", "plotters", "parquet", "maud"],

@@ -377,3 +377,46 @@ fn requests_are_lines_and_reads_and_writes_are_bursts() {
         }
     }
 }
+
+/// A closed loop issues the commands of the open one, and answers each read in the cycle of its last data.
+#[test]
+fn a_closed_loop_gives_the_result_of_an_open_one_and_no_answer_is_late() {
+    for preset in ALL {
+        let config = config(preset);
+        let line_bytes = 64;
+        let mut open = Dram::new(&config, line_bytes);
+        let mut closed = ClosedLoop::new(&config, line_bytes);
+        let mut answered = Vec::new();
+        let (mut cycle, mut polled, mut latencies) = (0, 0, Vec::new());
+        for number in 0..3000_u64 {
+            let line = (number as u32).wrapping_mul(2_654_435_761) >> (12 + number % 3);
+            cycle += number % 40;
+            while polled + closed.poll_cycles() < cycle {
+                polled += closed.poll_cycles();
+                closed.advance(polled, &mut answered);
+                assert!(answered.iter().all(|(_, at)| *at >= polled), "{preset:?}");
+                latencies.append(&mut answered);
+            }
+            open.read(line, Some(cycle));
+            closed.read(cycle, line, number);
+        }
+        closed.advance(u64::from(u32::MAX), &mut latencies);
+        let mut numbers: Vec<u64> = latencies.iter().map(|(number, _)| *number).collect();
+        numbers.sort_unstable();
+        assert!(numbers.into_iter().eq(0..3000), "{preset:?}");
+        assert!(!closed.is_busy());
+        let (open, closed) = (open.result(), closed.result());
+        assert_eq!(
+            (open.row_hits, open.row_conflicts),
+            (closed.row_hits, closed.row_conflicts)
+        );
+        assert_eq!(
+            (open.reads, open.latency_p99_ns),
+            (closed.reads, closed.latency_p99_ns)
+        );
+        assert_eq!(
+            (open.latency_mean_ns, open.time_us),
+            (closed.latency_mean_ns, closed.time_us)
+        );
+    }
+}
