@@ -332,11 +332,9 @@ fn add_warp(
 }
 
 /// Moves every eighth warp to the front, with priority.
-fn start_some_first(warps: &mut Vec<Warp>) {
-    let mut number = 0;
-    for warp in &mut *warps {
-        warp.priority = number % PRIORITY_STRIDE == 0;
-        number += 1;
+fn start_some_first(warps: &mut [Warp]) {
+    for warp in warps.iter_mut().step_by(PRIORITY_STRIDE) {
+        warp.priority = true;
     }
     warps.sort_by_key(|warp| !warp.priority);
 }

@@ -127,8 +127,11 @@ fn rate(latency: u64, ticks_per_line: u64) -> DramMachine {
     }
 }
 
-/// A part of warps, each with the lines of its requests, footprints per request, and instructions.
-fn part(warps: &[(&[&[u32]], u32, [u64; 2])]) -> Part {
+/// A warp: the lines of its requests, footprints per request, and instructions.
+type Listed<'a> = (&'a [&'a [u32]], u32, [u64; 2]);
+
+/// A part of warps.
+fn part(warps: &[Listed<'_>]) -> Part {
     let mut part = Part::default();
     for (requests, footprints, alu_ticks) in warps {
         let first = part.requests.len() as u32;
@@ -227,7 +230,7 @@ fn random_machine() -> impl Strategy<Value = Machine> {
     let level = |log_sets: std::ops::Range<u32>| {
         (log_sets, 1_u32..4).prop_map(|(log_sets, ways)| LevelConfig {
             ways,
-            ..LevelConfig::lru(u64::from(ways) * 16 << log_sets)
+            ..LevelConfig::lru((u64::from(ways) * 16) << log_sets)
         })
     };
     let caches = (

@@ -37,11 +37,11 @@ fn named(name: &str) -> Scheduler {
     Scheduler::find(name).unwrap()
 }
 
-/// Caches that hold all lines, so that no set is crowded and the order of accesses changes no count.
+/// Caches that hold all textures, so that no set is crowded and the order of accesses changes no count.
 #[test]
 fn counts_equal_those_of_functional_replay_where_no_set_is_crowded() {
     let trace = trace();
-    let level = sim::config::LevelConfig::lru(1 << 20);
+    let level = sim::config::LevelConfig::lru(64 << 20);
     let config = RunConfig {
         mode: Mode::Functional,
         cores: 1,
