@@ -95,6 +95,8 @@ pub struct FailedRun {
     pub opengl: bool,
     /// Whether it was started with an OpenXR runtime.
     pub openxr: bool,
+    /// Whether its environment named a display.
+    pub display: bool,
 }
 
 impl FailedRun {
@@ -163,8 +165,7 @@ impl FailedRun {
     }
 
     fn no_display(&self) -> Vec<String> {
-        let is_set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
-        let missing = self.failed() && !is_set("DISPLAY") && !is_set("WAYLAND_DISPLAY");
+        let missing = self.failed() && !self.display;
         let text = "neither DISPLAY nor WAYLAND_DISPLAY is set, which a program with a window needs (xvfb-run sets one)";
         missing.then(|| text.to_owned()).into_iter().collect()
     }
@@ -221,6 +222,7 @@ mod tests {
             file: PathBuf::from("/none/such"),
             opengl: false,
             openxr: false,
+            display: false,
         }
     }
 

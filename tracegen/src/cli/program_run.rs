@@ -48,10 +48,11 @@ impl ProgramRun<'_> {
     ) -> anyhow::Result<(Program, FailedRun)> {
         let log = self.log.map(File::create).transpose();
         let log = log.context("cannot write the log of the replay")?;
-        let (mut tail, mut prepared) = (None, Ok(()));
+        let (mut tail, mut prepared, mut display) = (None, Ok(()), false);
         let started = Program::start(launch.folder(), self.file, |command: &mut Command| {
             command.args(&self.arguments);
             prepared = prepare(command);
+            display = names_display(command);
             if self.openxr {
                 // Samples of OpenXR end with their standard input.
                 command.stdin(Stdio::piped());
@@ -95,6 +96,7 @@ impl ProgramRun<'_> {
             file: find_program(self.file).unwrap_or_default(),
             opengl: self.opengl,
             openxr: self.openxr,
+            display,
         };
         Ok((running, run))
     }
@@ -126,4 +128,16 @@ impl ProgramRun<'_> {
         note_frame_times(&before, &captured);
         Ok(session)
     }
+}
+
+/// Whether a program's environment names an X server or a compositor.
+fn names_display(command: &Command) -> bool {
+    ["DISPLAY", "WAYLAND_DISPLAY"].iter().any(|name| {
+        let mut set = command.get_envs().filter(|(key, _)| key == name);
+        let value = match set.next() {
+            Some((_, value)) => value.map(OsStr::to_owned),
+            None => std::env::var_os(name),
+        };
+        value.is_some_and(|value| !value.is_empty())
+    })
 }

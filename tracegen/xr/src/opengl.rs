@@ -10,6 +10,7 @@ use crate::system::check_system;
 use libloading::os::unix::Library;
 use openxr_sys as xr;
 use std::ffi::{c_char, c_int, c_uint, c_ulong, c_void};
+use std::ptr::NonNull;
 use std::sync::{Arc, OnceLock};
 use xr::StructureType;
 
@@ -70,7 +71,7 @@ macro_rules! functions {
     };
 }
 
-type Function = unsafe extern "C" fn();
+type Function = NonNull<c_void>;
 type GetProcAddress = unsafe extern "C" fn(*const c_char) -> Option<Function>;
 
 functions! {
