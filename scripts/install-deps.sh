@@ -2,7 +2,8 @@
 # Installs what Cargo cannot, where it is missing and apt can be used; otherwise says what to
 # install. Always lavapipe (a Vulkan driver that needs no GPU) and a C++ compiler, which the decoder of
 # meshopt needs; with `test` also OSMesa, where there is a package of it (the tests that need it are skipped
-# without), and Python for the independent trace readers and Slurm for sweeps on a cluster, whose tests are skipped where they cannot be had.
+# without), Python for the independent trace readers, hello_xr with an X server for OpenXR, and Slurm for sweeps on a
+# cluster; tests are skipped where the last two cannot be had.
 # With `apps` also Chromium, npm and Python, which scripts/apps.sh captures pages with.
 set -eu
 
@@ -44,7 +45,11 @@ slurm=""
 if [ "${1:-}" = test ] && ! command -v slurmctld >/dev/null 2>&1; then
     slurm=" slurm-wlm munge"
 fi
-packages="$packages$slurm"
+openxr=""
+if [ "${1:-}" = test ] && ! command -v hello_xr >/dev/null 2>&1; then
+    openxr=" libopenxr-utils xserver-xorg-core xserver-xorg-video-dummy"
+fi
+packages="$packages$openxr$slurm"
 [ -n "$packages" ] || exit 0
 
 # Fails unless all that is missing can be done without.
@@ -88,9 +93,13 @@ install_slurm() {
     return "$code"
 }
 
-if [ "$packages" != "$slurm" ]; then
+if [ "$packages" != "$openxr$slurm" ]; then
     # shellcheck disable=SC2086 # a list of packages, split on purpose
-    install ${packages%"$slurm"}
+    install ${packages%"$openxr$slurm"}
+fi
+# shellcheck disable=SC2086 # as above
+if [ -n "$openxr" ] && ! install --no-install-recommends $openxr; then
+    echo "cannot install$openxr: the tests of hello_xr will be skipped" >&2
 fi
 if [ -n "$slurm" ] && ! install_slurm; then
     echo "cannot install$slurm: the tests of sweeps on a cluster will be skipped" >&2

@@ -18,6 +18,10 @@ fn commands() -> Vec<(&'static str, PathBuf)> {
         ),
         ("orders program.textrace --caches 8/64", traces.clone()),
         ("locality program.textrace", traces.clone()),
+        (
+            "schedule atrium.textrace --schedulers z2-sta",
+            traces.clone(),
+        ),
         ("reproject chess-rays.raytrace", traces),
         ("temporal frame-0.raytrace frame-1.raytrace", data.clone()),
         ("techniques techniques --orders morton,z2-sta", data.clone()),
@@ -60,7 +64,10 @@ fn details_add_tables_and_change_no_line() {
     for (command, folder) in commands() {
         let short = text(command, &folder);
         let Some(kept) = short.strip_suffix("\n(more tables: --details)\n") else {
-            assert!(command.starts_with("sample"), "{command}");
+            let has_none = ["sample", "schedule"]
+                .iter()
+                .any(|of| command.starts_with(of));
+            assert!(has_none, "{command}");
             parallax_tests::refuse(
                 program("replay")
                     .args(command.split(' '))

@@ -54,7 +54,7 @@ fn a_replay_without_memory_ends_with_a_message() {
     // Near the size of the program's file it cannot even start its threads.
     let size = fs::metadata(program("replay").get_program()).expect("the program");
     let size_mib = size.len().div_ceil(1 << 20) as u32;
-    let limits_mib = [8, 12, 16, 20, 26].map(|more| size_mib + more);
+    let limits_mib = [4, 8, 12, 20, 26].map(|more| size_mib + more);
     for name in ["run", "paper", "report", "locality"] {
         let mut command = program("replay");
         command.arg(name).arg(&trace);

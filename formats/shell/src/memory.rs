@@ -11,6 +11,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Size of the last failed allocation in bytes; 0 if none has failed.
 static FAILED_BYTES: AtomicUsize = AtomicUsize::new(0);
 
+/// Memory that the standard library's panic hook may need.
+const HOOK_BYTES: usize = 1 << 20;
+
 /// The system's allocator, with failures recorded.
 #[derive(Clone, Copy, Debug)]
 pub struct Allocator;
@@ -65,9 +68,10 @@ pub(crate) fn explain_aborts() -> anyhow::Result<()> {
     registered.context("cannot handle signals")?;
     let default_hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
-        let bytes = FAILED_BYTES.load(Ordering::Relaxed);
-        // An earlier failure may have been handled, so check whether memory is exhausted now.
-        if bytes > 0 && Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
+        // An earlier failure may have been handled, so check whether memory is exhausted now. The default hook allocates
+        // under a lock, and would wait for itself if that failed.
+        let bytes = FAILED_BYTES.load(Ordering::Relaxed).max(HOOK_BYTES);
+        if Vec::<u8>::new().try_reserve_exact(bytes).is_err() {
             report_and_exit(bytes);
         }
         default_hook(info);

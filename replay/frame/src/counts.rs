@@ -1,6 +1,7 @@
 //! Counters, and what the model conserves.
 
 use serde::Serialize;
+use sim::sums::{Unbalanced, check_balance};
 
 /// Cycles of all cores by what they did. A cycle in which a core neither issues nor filters counts for the first cause
 /// that applies, in the order of the fields.
@@ -105,7 +106,7 @@ impl Counts {
     pub(super) fn check(&self, core_cycles: u64) -> Result<(), Unbalanced> {
         let [_, merged, missed] = self.l1;
         let l2_all: u64 = self.l2.iter().sum();
-        for (what, expected, found) in [
+        let sums = [
             ("warps that finished", self.warps[0], self.warps[1]),
             ("requests filtered", self.requests[0], self.requests[1]),
             ("answers to look-ups", merged + missed, self.answered),
@@ -116,27 +117,7 @@ impl Counts {
             ("warps over time", self.warp_cycles, self.warps_in_flight),
             ("reads over time", self.dram_cycles, self.dram_in_flight),
             ("cycles of cores", core_cycles, self.cycles.all()),
-        ] {
-            if expected != found {
-                return Err(Unbalanced {
-                    what,
-                    expected,
-                    found,
-                });
-            }
-        }
-        Ok(())
+        ];
+        check_balance("model of frame time", &sums)
     }
-}
-
-/// A sum that the model did not conserve: a defect of the model.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("model of frame time: expected {expected} {what}, found {found}")]
-pub struct Unbalanced {
-    /// What was counted.
-    pub what: &'static str,
-    /// Its value by another counter.
-    pub expected: u64,
-    /// The counter.
-    pub found: u64,
 }

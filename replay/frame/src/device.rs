@@ -1,13 +1,14 @@
 //! The event loop: cores, the L2, DRAM, and the items that cores take.
 
 use super::core::{Asks, Core};
-use super::counts::{Counts, Unbalanced};
+use super::counts::Counts;
 use super::dram::{Answer, Dram};
 use super::l2::{Found, L2};
 use super::machine::Machine;
 use super::work::Part;
 use sim::config::ConfigError;
 use sim::memory::{Calendar, Servers};
+use sim::sums::Unbalanced;
 use std::collections::VecDeque;
 
 /// Cycles that most events lie ahead at most.

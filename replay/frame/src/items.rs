@@ -76,13 +76,21 @@ pub struct Items<'a, 'f> {
     first: u64,
     /// Items that each core has taken, if dealt.
     of_core: Vec<u64>,
-    quads: Vec<Vec<Request>>,
+    quads: Quads,
+}
+
+/// The quads of an item.
+#[derive(Default)]
+struct Quads {
+    /// Requests of each quad.
+    of: Vec<Range<usize>>,
+    requests: Vec<Request>,
     lines: Vec<u32>,
 }
 
 /// What is left of a queue.
 enum Cursor {
-    /// Items in order, for whoever asks.
+    /// Items in order; any core takes the next one.
     All(Range<usize>),
     /// The next item of each core, and the number of cores.
     Own(Vec<usize>),
@@ -118,8 +126,7 @@ impl<'a, 'f> Items<'a, 'f> {
             dealt: VecDeque::new(),
             first: 0,
             of_core: vec![0; cores],
-            quads: Vec::new(),
-            lines: Vec::new(),
+            quads: Quads::default(),
         }
     }
 
@@ -160,27 +167,20 @@ impl<'a, 'f> Items<'a, 'f> {
         self.reader.load(0, item)?;
         let mut warps: Vec<Vec<usize>> = vec![Vec::new(); parts.len()];
         self.quads.clear();
-        self.lines.clear();
         while let Some(quad) = self.reader.next_quad(0) {
-            let number = self.quads.len();
+            let number = self.quads.of.len();
             let place = to(number);
-            self.quads.push(requests(quad, &mut self.lines));
+            self.quads.push(quad);
             let warp = &mut warps[place];
             warp.push(number);
             if warp.len() == self.machine.warp_quads {
-                add_warp(
-                    self.machine,
-                    warp,
-                    &self.quads,
-                    &self.lines,
-                    &mut parts[place],
-                );
+                add_warp(self.machine, warp, &self.quads, &mut parts[place]);
                 warp.clear();
             }
         }
         for (warp, part) in warps.iter().zip(parts.iter_mut()) {
             if !warp.is_empty() {
-                add_warp(self.machine, warp, &self.quads, &self.lines, part);
+                add_warp(self.machine, warp, &self.quads, part);
             }
         }
         let count = parts.len() as u32;
@@ -270,65 +270,55 @@ impl Source for Items<'_, '_> {
     }
 }
 
-/// The requests of a quad: its footprints level by level, with the distinct lines of each level.
-fn requests(quad: QuadLines<'_>, lines: &mut Vec<u32>) -> Vec<Request> {
-    let mut requests: Vec<Request> = Vec::new();
-    let mut cell = None;
-    for footprint in quad.footprints() {
-        if cell != Some(footprint.cell) {
-            cell = Some(footprint.cell);
-            requests.push(Request {
-                first: lines.len() as u32,
-                end: lines.len() as u32,
-                footprints: 0,
-            });
-        }
-        let Some(request) = requests.last_mut() else {
-            continue;
-        };
-        request.footprints += 1 + footprint.repeats;
-        for &line in footprint.lines {
-            if !lines[request.first as usize..].contains(&line) {
-                lines.push(line);
-            }
-        }
-        request.end = lines.len() as u32;
+impl Quads {
+    fn clear(&mut self) {
+        self.of.clear();
+        self.requests.clear();
+        self.lines.clear();
     }
-    requests
+
+    /// Adds the requests of a quad: its footprints level by level, with the distinct lines of each level.
+    fn push(&mut self, quad: QuadLines<'_>) {
+        let start = self.requests.len();
+        let mut cell = None;
+        for footprint in quad.footprints() {
+            let first = self.lines.len() as u32;
+            if cell.replace(footprint.cell) != Some(footprint.cell) {
+                self.requests.push(Request {
+                    first,
+                    end: first,
+                    footprints: 0,
+                });
+            }
+            let Some(request) = self.requests.last_mut() else {
+                continue;
+            };
+            request.footprints += 1 + footprint.repeats;
+            for &line in footprint.lines {
+                if !self.lines[request.first as usize..].contains(&line) {
+                    self.lines.push(line);
+                }
+            }
+            request.end = self.lines.len() as u32;
+        }
+        self.of.push(start..self.requests.len());
+    }
 }
 
 /// Appends a warp of these quads: the first level of each quad, then the second, and so on.
-fn add_warp(
-    machine: &Machine,
-    numbers: &[usize],
-    quads: &[Vec<Request>],
-    lines: &[u32],
-    part: &mut Part,
-) {
-    let first = part.requests.len() as u32;
-    let levels = numbers.iter().map(|&number| quads[number].len()).max();
-    for level in 0..levels.unwrap_or(0) {
-        for request in numbers
+fn add_warp(machine: &Machine, numbers: &[usize], quads: &Quads, part: &mut Part) {
+    let of = |number: &usize| &quads.requests[quads.of[*number].clone()];
+    let levels = numbers.iter().map(|number| of(number).len()).max();
+    let requests = (0..levels.unwrap_or(0)).flat_map(|level| {
+        let of_level = numbers
             .iter()
-            .filter_map(|&number| quads[number].get(level))
-        {
-            let start = part.lines.len() as u32;
-            part.lines
-                .extend_from_slice(&lines[request.first as usize..request.end as usize]);
-            part.requests.push(Request {
-                first: start,
-                end: part.lines.len() as u32,
-                footprints: request.footprints,
-            });
-        }
-    }
-    part.warps.push(Warp {
-        first,
-        end: part.requests.len() as u32,
-        quads: numbers.len() as u32,
-        alu_ticks: machine.alu_ticks,
-        priority: false,
+            .filter_map(move |number| of(number).get(level));
+        of_level.map(|request| {
+            let lines = &quads.lines[request.first as usize..request.end as usize];
+            (lines, request.footprints)
+        })
     });
+    part.add_warp(requests, numbers.len() as u32, machine.alu_ticks, false);
 }
 
 /// Moves every eighth warp to the front, with priority.

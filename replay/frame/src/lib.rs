@@ -31,7 +31,7 @@ mod replay;
 pub mod schedulers;
 mod work;
 
-pub use counts::{CoreCycles, Counts, Unbalanced};
+pub use counts::{CoreCycles, Counts};
 pub use device::{Device, Source};
 pub use figures::{Bound, Energy, Figures};
 pub use machine::{DramModel, Machine, Settings};

@@ -1,6 +1,6 @@
 //! Replays the frames of a trace on a machine, for several schedulers and parameters at once.
 
-use super::counts::{Counts, Unbalanced};
+use super::counts::Counts;
 use super::device::Device;
 use super::items::{Items, Pictures};
 use super::machine::{Machine, Settings};
@@ -12,6 +12,7 @@ use sim::order::{TileRef, WorkItem, frames};
 use sim::stream::{
     Cores, Expander, Frame, FramePlan, LineMemory, StreamError, TileSource, Walk, rendered,
 };
+use sim::sums::Unbalanced;
 use std::collections::{HashMap, HashSet};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -57,7 +58,8 @@ struct Run {
     config: RunConfig,
     machine: Machine,
     pictures: Pictures,
-    device: Device,
+    /// The machine after the last frame.
+    device: Option<Device>,
     last: Pressure,
     before: (u64, Counts),
     out: FrameTime,
@@ -167,7 +169,7 @@ impl Run {
         Ok(Self {
             point: *point,
             pictures: Pictures::new(source, texture_lines, pixel_bytes, config.line_bytes),
-            device: Device::new(&machine)?,
+            device: None,
             last: Pressure::default(),
             before: (0, Counts::default()),
             out: FrameTime {
@@ -197,11 +199,13 @@ impl Run {
             let mut apart = Device::new(&self.machine)?;
             self.last = self.phases(&mut apart, source, frame, plan, signatures)?.0;
         }
-        let mut device = std::mem::replace(&mut self.device, Device::new(&self.machine)?);
+        let mut device = match self.device.take() {
+            Some(device) => device,
+            None => Device::new(&self.machine)?,
+        };
         let (counted, skipped) = self.phases(&mut device, source, frame, plan, signatures)?;
-        (self.last, self.device) = (counted, device);
-        let counts = self.device.counts()?;
-        let now = self.device.now();
+        let (counts, now) = (device.counts()?, device.now());
+        (self.last, self.device) = (counted, Some(device));
         let cycles = now - self.before.0;
         self.out.frames.push((cycles, counts.since(&self.before.1)));
         self.before = (now, counts);

@@ -55,6 +55,33 @@ impl Part {
         (self.write_first, self.write_lines) = (0, 0);
     }
 
+    /// Appends a warp: the distinct lines and the footprints of each request, its quads, and its instructions in ticks.
+    pub fn add_warp<'a>(
+        &mut self,
+        requests: impl IntoIterator<Item = (&'a [u32], u32)>,
+        quads: u32,
+        alu_ticks: [u64; 2],
+        priority: bool,
+    ) {
+        let first = self.requests.len() as u32;
+        for (lines, footprints) in requests {
+            let first = self.lines.len() as u32;
+            self.lines.extend_from_slice(lines);
+            self.requests.push(Request {
+                first,
+                end: self.lines.len() as u32,
+                footprints,
+            });
+        }
+        self.warps.push(Warp {
+            first,
+            end: self.requests.len() as u32,
+            quads,
+            alu_ticks,
+            priority,
+        });
+    }
+
     /// The lines of a request.
     pub fn lines_of(&self, request: &Request) -> &[u32] {
         &self.lines[request.first as usize..request.end as usize]

@@ -2,6 +2,7 @@
 
 use super::columns::{Columns, columns_of};
 use super::document::Document;
+use super::lists::{geometric_mean, unique};
 use super::table::Table;
 use frame::schedulers::{Hardware, Scheduler, bits};
 use frame::{Figures, FrameTime, Settings};
@@ -136,27 +137,19 @@ impl ScheduleReport {
             .map(ScheduleRow::faster_pct)
             .collect();
         let mean = |end: fn(&Figure) -> f64| {
-            let logs = figures
-                .iter()
-                .map(|figure| (1.0 + end(figure) / 100.0).ln());
-            100.0 * ((logs.sum::<f64>() / figures.len().max(1) as f64).exp() - 1.0)
+            let speeds = figures.iter().map(|figure| 1.0 + end(figure) / 100.0);
+            100.0 * (geometric_mean(speeds).unwrap_or(1.0) - 1.0)
         };
         let ends = [mean(|of| of.low), mean(|of| of.high)];
         Figure::bounded(mean(|of| of.value), ends, OVER.to_owned())
     }
 
     fn schedulers(&self) -> Vec<Scheduler> {
-        let mut schedulers: Vec<Scheduler> = Vec::new();
-        for row in &self.rows {
-            if !schedulers.contains(&row.scheduler) {
-                schedulers.push(row.scheduler);
-            }
-        }
-        schedulers
+        unique(self.rows.iter().map(|row| row.scheduler))
     }
 
-    /// The answer in a sentence or two.
-    fn answer(&self) -> String {
+    /// The scheduler that renders a frame in the least time.
+    fn fastest(&self) -> String {
         let schedulers = self.schedulers();
         let Some(&baseline) = schedulers.first() else {
             return String::new();
@@ -182,11 +175,9 @@ impl ScheduleReport {
             ),
         };
         let of_best = |row: &&ScheduleRow| row.scheduler == best;
-        let gap: Vec<f64> = (self.rows.iter().filter(of_best))
-            .map(|row| row.times[0].ms() / row.times[0].bound_ms().max(f64::MIN_POSITIVE))
-            .collect();
-        let gap = gap.iter().map(|of| of.ln()).sum::<f64>() / gap.len().max(1) as f64;
-        let gap = 100.0 * (gap.exp() - 1.0);
+        let gaps = (self.rows.iter().filter(of_best))
+            .map(|row| row.times[0].ms() / row.times[0].bound_ms().max(f64::MIN_POSITIVE));
+        let gap = 100.0 * (geometric_mean(gaps).unwrap_or(1.0) - 1.0);
         let over = match points {
             1 => String::new(),
             points => format!(", geometric mean of {points} traces and bandwidths"),
@@ -251,6 +242,15 @@ impl Document for ScheduleReport {
             .collect()
     }
 
+    fn answer(&self) -> Vec<String> {
+        vec![
+            self.fastest(),
+            format!(
+                "Clients of memory: textures and colour. Figures are means of a frame; faster than the first row [for {OVER}]."
+            ),
+        ]
+    }
+
     #[rustfmt::skip]
     fn text(&self) -> String {
         let waits = |c: &frame::CoreCycles| c.mshr + c.dram + c.l2;
@@ -269,10 +269,6 @@ impl Document for ScheduleReport {
             .real("other", "rest", "%", 0, move |r| r.share(|c| c.all() - c.issue - c.texture - waits(c)))
             .real("bits", "bits", "", 0, |r| r.bits as f64);
         let table = Table::new(&columns, &self.rows).without_empty_columns();
-        format!(
-            "{}\nClients of memory: textures and colour; mean of a frame; faster than the first row [for {OVER}].\n\n{}",
-            self.answer(),
-            table.text()
-        )
+        table.text()
     }
 }

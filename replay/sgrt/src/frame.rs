@@ -1,11 +1,11 @@
 //! A stereo frame of a ray trace: the hit of each pixel and the cost of its rays.
 
-use super::cycles::Unbalanced;
 use super::work::PixelWork;
 use formats::raytrace::camera::sample_position_px;
 use formats::raytrace::{RayTile, Raytrace, RaytraceTables};
 use formats::view::{Eye, TILE_SIZE_PX};
 use rayon::prelude::*;
+use sim::sums::Unbalanced;
 use std::error::Error;
 use std::sync::Arc;
 

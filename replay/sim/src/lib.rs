@@ -33,7 +33,7 @@ pub mod result;
 pub mod schemas;
 pub mod size;
 pub mod stream;
-mod sums;
+pub mod sums;
 pub mod tmu;
 
 pub use config::RunConfig;

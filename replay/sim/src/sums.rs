@@ -1,4 +1,4 @@
-//! Sums of counters, field by field.
+//! Sums of counters, field by field, and what a model conserves.
 
 /// Adds the named fields of one value to those of another.
 #[macro_export]
@@ -6,4 +6,37 @@ macro_rules! add_fields {
     ($sum:expr, $other:expr, $($field:ident),+ $(,)?) => {
         $($sum.$field += $other.$field;)+
     };
+}
+
+/// A sum that a model did not conserve: a defect of the model.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{model}: expected {expected} {what}, found {found}")]
+pub struct Unbalanced {
+    /// Name of the model.
+    pub model: &'static str,
+    /// What was counted.
+    pub what: &'static str,
+    /// Its value by the input or by another counter.
+    pub expected: u64,
+    /// The counter.
+    pub found: u64,
+}
+
+/// Compares sums of a model: what each is, its value by the input or by another counter, and the counter.
+///
+/// # Errors
+/// The first sum that differs.
+pub fn check_balance(
+    model: &'static str,
+    sums: &[(&'static str, u64, u64)],
+) -> Result<(), Unbalanced> {
+    match sums.iter().find(|(_, expected, found)| expected != found) {
+        None => Ok(()),
+        Some(&(what, expected, found)) => Err(Unbalanced {
+            model,
+            what,
+            expected,
+            found,
+        }),
+    }
 }

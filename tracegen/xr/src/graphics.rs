@@ -6,7 +6,6 @@ use crate::vulkan::{self, Device};
 use openxr_sys as xr;
 
 /// What a session renders with.
-#[derive(Clone)]
 pub(crate) enum Graphics {
     /// Nothing: a session without pictures.
     None,

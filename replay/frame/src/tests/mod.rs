@@ -134,23 +134,8 @@ type Listed<'a> = (&'a [&'a [u32]], u32, [u64; 2]);
 fn part(warps: &[Listed<'_>]) -> Part {
     let mut part = Part::default();
     for (requests, footprints, alu_ticks) in warps {
-        let first = part.requests.len() as u32;
-        for lines in *requests {
-            let start = part.lines.len() as u32;
-            part.lines.extend_from_slice(lines);
-            part.requests.push(Request {
-                first: start,
-                end: part.lines.len() as u32,
-                footprints: *footprints,
-            });
-        }
-        part.warps.push(Warp {
-            first,
-            end: part.requests.len() as u32,
-            quads: 8,
-            alu_ticks: *alu_ticks,
-            priority: false,
-        });
+        let requests = requests.iter().map(|lines| (*lines, *footprints));
+        part.add_warp(requests, 8, *alu_ticks, false);
     }
     part
 }
@@ -185,23 +170,9 @@ impl RandomWork {
         let to_part = |(place, warps): (usize, &Vec<RandomWarp>)| {
             let mut part = Part::default();
             for (requests, alu_ticks, priority) in warps {
-                let first = part.requests.len() as u32;
-                for (lines, footprints) in requests {
-                    let start = part.lines.len() as u32;
-                    part.lines.extend_from_slice(lines);
-                    part.requests.push(Request {
-                        first: start,
-                        end: part.lines.len() as u32,
-                        footprints: *footprints,
-                    });
-                }
-                part.warps.push(Warp {
-                    first,
-                    end: part.requests.len() as u32,
-                    quads: 1 + (place as u32 + first) % 8,
-                    alu_ticks: *alu_ticks,
-                    priority: *priority,
-                });
+                let quads = 1 + (place as u32 + part.requests.len() as u32) % 8;
+                let requests = requests.iter().map(|(lines, of)| (&lines[..], *of));
+                part.add_warp(requests, quads, *alu_ticks, *priority);
             }
             (part.write_first, part.write_lines) = (1000 + first_of(place), place as u32 % 4);
             part

@@ -1,5 +1,7 @@
 //! Counters of the simulation, and the conservation of rays and requests.
 
+use sim::sums::{Unbalanced, check_balance};
+
 /// Look-ups of cache lines by result.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineCounts {
@@ -119,7 +121,7 @@ impl Counts {
     /// The first sum that is not conserved.
     pub(super) fn check(&self, rays: u64, requests: u64) -> Result<(), Unbalanced> {
         let l1_misses = self.node_l1.misses + self.triangle_l1.misses;
-        for (what, expected, found) in [
+        let sums = [
             ("rays that entered", rays, self.rays_entered),
             ("rays that left", rays, self.rays_left),
             ("requests", requests, self.requests),
@@ -127,29 +129,9 @@ impl Counts {
             ("steps and tests", requests, self.steps + self.tests),
             ("L2 look-ups", l1_misses, self.l2.all()),
             ("lines read from DRAM", self.l2.misses, self.dram_lines),
-        ] {
-            if expected != found {
-                return Err(Unbalanced {
-                    what,
-                    expected,
-                    found,
-                });
-            }
-        }
-        Ok(())
+        ];
+        check_balance("cycle-level model", &sums)
     }
-}
-
-/// A sum that the simulation did not conserve: a defect of the model.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("cycle-level model: expected {expected} {what}, found {found}")]
-pub struct Unbalanced {
-    /// What was counted.
-    pub what: &'static str,
-    /// Its value by the input or by another counter.
-    pub expected: u64,
-    /// The counter.
-    pub found: u64,
 }
 
 #[cfg(test)]

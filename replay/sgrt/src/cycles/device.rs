@@ -2,12 +2,13 @@
 
 use super::batch::{Batch, BatchSource, Item};
 use super::cores::Cores;
-use super::counts::{Counts, Unbalanced};
+use super::counts::Counts;
 use super::event::{SLOT, key, phase};
 use super::machine::Machine;
 use super::memory::CacheMemory;
 use super::unit::Unit;
 use sim::memory::Calendar;
+use sim::sums::Unbalanced;
 use std::collections::VecDeque;
 
 /// Cycles that most events lie ahead at most; a queue for memory is rarely longer.
