@@ -1,7 +1,7 @@
-"""Every kind of page from small inputs, with screenshots at 1280 and 800 px and as printed, and checks of its layout: OUT/screenshots.
+"""Every kind of page from small inputs, with screenshots at three widths, dark and as printed, and checks of its layout: OUT/screenshots.
 
-Checks what a machine can check: no page is wider than its window, no two texts of a chart overlap, and no heading ends a printed page. Without Chromium
-the pages are only written. Exit code 1 if there are problems.
+Checks what a machine can check: no page is wider than its window, no two texts of a chart overlap, no text is smaller than 9 px, and no heading ends a
+printed page. With --axe, also the accessibility rules of axe-core. Without Chromium the pages are only written. Exit code 1 if there are problems.
 """
 
 import html
@@ -14,7 +14,10 @@ from pathlib import Path
 
 from .common import ROOT
 
-OPTIONS = {"--pages": dict(type=Path, help="check the pages of this folder, and write none")}
+OPTIONS = {
+    "--pages": dict(type=Path, help="check the pages of this folder, and write none"),
+    "--axe": dict(type=Path, help="axe.min.js of axe-core: report its serious and critical findings"),
+}
 # Inputs below OUT/screenshots, and the commands that make them. A command for a file that is there already is left out.
 GOLDEN = ["atrium.textrace", "jungle.textrace", "chess-rays.raytrace", "teapot-rays.raytrace"]
 INPUTS = {
@@ -29,6 +32,7 @@ PAGES = [
     "report inputs/atrium.textrace --as atrium=crytek-sponza --orders all -o pages/report-orders.html",
     "paper golden/atrium.textrace golden/jungle.textrace --functional --html pages/paper.html",
     "view inputs/atrium.textrace --image inputs/atrium.png -o pages/view.html",
+    "view golden/chess-rays.raytrace -o pages/view-rays.html",
     "sweep inputs/sweep.toml golden/atrium.textrace -o sweep",
     "locality inputs/atrium.textrace --orders all --html pages/locality.html",
     "orders inputs/atrium.textrace --html pages/orders.html",
@@ -49,7 +53,8 @@ l1.replacement = ["lru", "random"]
 [one-at-a-time]
 cores = [1, 4]
 """
-WIDTHS_PX = (1280, 800)
+WIDTHS_PX = (1280, 800, 400)
+SMALLEST_TEXT_PX = 9
 TALLEST_PX = 16000
 # Reports the page's size, texts of one chart that overlap, and texts outside of their chart. A text's box
 # is higher than its glyphs, so two rows of it may touch.
@@ -68,10 +73,19 @@ addEventListener("load", () => {
           overlaps.push(svg.getAttribute("aria-label") + ": " + other + " / " + text);
     });
   }
+  const small = new Set();
+  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  for (let node; (node = walk.nextNode());) {
+    const of = node.parentElement, text = node.textContent.trim();
+    if (!text || of.closest("script, style, noscript, option") || !of.getClientRects().length) continue;
+    const matrix = of.getScreenCTM && of.getScreenCTM();
+    const px = parseFloat(getComputedStyle(of).fontSize) * (matrix ? Math.hypot(matrix.a, matrix.b) : 1);
+    if (px < SMALLEST - 0.05) small.add(px.toFixed(1) + " px: " + text.slice(0, 40));
+  }
   const root = document.documentElement;
   const pre = document.createElement("pre");
   pre.id = "check";
-  pre.textContent = JSON.stringify({width: root.scrollWidth, window: innerWidth, height: root.scrollHeight, overlaps, outside});
+  pre.textContent = JSON.stringify({width: root.scrollWidth, window: innerWidth, height: root.scrollHeight, overlaps, outside, small: [...small]});
   document.body.replaceChildren(pre);
 });
 </script>"""
@@ -83,12 +97,28 @@ def chromium(program, profile, *arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False).stdout
 
 
+AXE = """<script>
+addEventListener("load", async () => {
+  const found = await axe.run(document, {resultTypes: ["violations"]});
+  const of = found.violations.filter(v => ["serious", "critical"].includes(v.impact));
+  const pre = document.createElement("pre");
+  pre.id = "axe";
+  pre.textContent = JSON.stringify(of.map(v => `${v.impact} ${v.id}, ${v.nodes.length} times: ${v.nodes[0].target[0]}`));
+  document.body.replaceChildren(pre);
+});
+</script>"""
+
+
+def dom(program, profile, page, folder, width, added, name, *flags):
+    """Loads a page with a script added, and returns what the script left in its element."""
+    copy = folder / f"{name}-{page.name}"
+    copy.write_text(page.read_text() + added)
+    found = chromium(program, profile, f"--window-size={width},1000", "--virtual-time-budget=20000", *flags, "--dump-dom", copy.resolve().as_uri())
+    return json.loads(html.unescape(found.split(f'<pre id="{name}">')[1].split("</pre>")[0]))
+
+
 def check(program, profile, page, folder, width):
-    copy = folder / f"check-{page.name}"
-    copy.write_text(page.read_text() + CHECK)
-    dom = chromium(program, profile, f"--window-size={width},1000", "--virtual-time-budget=2000", "--dump-dom", copy.resolve().as_uri())
-    text = dom.split('<pre id="check">')[1].split("</pre>")[0]
-    return json.loads(text.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
+    return dom(program, profile, page, folder, width, CHECK.replace("SMALLEST", str(SMALLEST_TEXT_PX)), "check")
 
 
 def stranded(page, pdf):
@@ -122,17 +152,25 @@ def write_pages(study):
     return out / "pages"
 
 
-def problems_of(program, profile, page, folder, out):
+def problems_of(program, profile, page, folder, out, axe):
     """Screenshots of a page, and what is wrong with it at each width and as printed."""
     for width in WIDTHS_PX:
         found = check(program, profile, page, folder, width)
         problems = [f"text over text: {text}" for text in found["overlaps"]]
         problems += [f"text outside of its chart: {text}" for text in found["outside"]]
+        if small := sorted(found["small"], key=lambda text: float(text.split()[0])):
+            problems.append(f"{len(small)} texts smaller than {SMALLEST_TEXT_PX} px, the smallest {small[0]}")
         if found["width"] > found["window"]:
             problems.append(f"{found['width']} px wide")
         yield from (f"at {width} px: {problem}" for problem in problems)
         height = min(found["height"] + 20, TALLEST_PX)
         chromium(program, profile, f"--window-size={width},{height}", f"--screenshot={out / f'{page.stem}-{width}.png'}", page.as_uri())
+    chromium(program, profile, "--force-dark-mode", "--blink-settings=preferredColorScheme=0", f"--window-size={WIDTHS_PX[0]},{TALLEST_PX // 8}",
+             f"--screenshot={out / f'{page.stem}-dark.png'}", page.as_uri())
+    if axe:
+        script = f"<script>{axe.read_text()}</script>{AXE}"
+        for theme, flags in (("light", ()), ("dark", ("--force-dark-mode", "--blink-settings=preferredColorScheme=0"))):
+            yield from (f"axe, {theme}: {text}" for text in dom(program, profile, page, folder, WIDTHS_PX[0], script, "axe", *flags))
     pdf = out / f"{page.stem}.pdf"
     chromium(program, profile, "--no-pdf-header-footer", f"--print-to-pdf={pdf}", page.as_uri())
     yield from stranded(page, pdf)
@@ -149,7 +187,7 @@ def run(study):
     with tempfile.TemporaryDirectory() as profile:
         for page in sorted(pages.glob("*.html")):
             print(f"{page.stem}: {page.stat().st_size // 1024} KiB")
-            for problem in problems_of(program, profile, page, study.work, study.out):
+            for problem in problems_of(program, profile, page, study.work, study.out, study.options.axe):
                 bad += 1
                 print(f"  {problem}", flush=True)
     print(f"{bad} problems")

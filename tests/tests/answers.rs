@@ -1,6 +1,6 @@
 //! Commands begin with their answer: a sentence with a number, then a table that fits a terminal.
 
-use parallax_tests::{program, root, run_ok};
+use parallax_tests::{program, refuse, root, run_ok};
 use std::path::{Path, PathBuf};
 
 /// Widest line of the text without `--details`.
@@ -139,4 +139,41 @@ fn a_change_of_a_result_beyond_the_threshold_has_exit_code_1() {
     assert_eq!(diff(["morton", "morton"], "0").status.code(), Some(0));
     std::fs::write(folder.path().join("other"), "{}").expect("a file");
     assert_eq!(diff(["other", "morton"], "0").status.code(), Some(2));
+}
+
+#[test]
+fn a_capture_on_the_command_line_is_replayed_and_removed() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let tracegen = program("tracegen").get_program().to_owned();
+    let flags = [
+        "raster",
+        "atrium",
+        "--size",
+        "64x72",
+        "--no-plain",
+        "--no-cache",
+    ];
+    let mut command = program("replay");
+    command
+        .args(["run", "--json", "--"])
+        .arg(&tracegen)
+        .args(flags);
+    let direct = run_ok(command.env("TMPDIR", folder.path())).stdout;
+    assert_eq!(folder.path().read_dir().expect("a folder").count(), 0);
+    let trace = folder.path().join("atrium.textrace");
+    run_ok(program("tracegen").args(flags).arg("-o").arg(&trace));
+    let captured = run_ok(program("replay").args(["run", "--json"]).arg(&trace)).stdout;
+    assert_eq!(String::from_utf8(direct), String::from_utf8(captured));
+    for (words, expected) in [
+        (
+            &["scenes"][..],
+            "expected raster, rays, techniques, app, page or xr, found",
+        ),
+        (&["raster", "none.glb"], "none.glb"),
+    ] {
+        let mut command = program("replay");
+        command.args(["run", "--"]).arg(&tracegen).args(words);
+        refuse(command.env("TMPDIR", folder.path()), &[expected]);
+    }
+    assert_eq!(folder.path().read_dir().expect("a folder").count(), 1);
 }

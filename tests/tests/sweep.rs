@@ -476,3 +476,55 @@ fn rows_of_different_sweeps_can_be_joined() {
     assert_eq!(first["change"], serde_json::Value::Null);
     assert_eq!(json["rows"][1]["change"]["key"], "l1.ways");
 }
+
+#[test]
+fn lists_on_the_command_line_are_axes_and_write_no_folder() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let trace = root().join("traces/atrium-shadows.textrace");
+    let experiment = folder.path().join("a.toml");
+    let axes = "[axes]\norder = [\"morton\", \"z2-sta\"]\ncaches = [\"4/64\", \"8KiB/128KiB\"]\nl2.ways = [4, 16]\n";
+    fs::write(&experiment, axes).expect("temporary file");
+    let rows = |arguments: &[&str]| {
+        let mut command = program("replay");
+        command
+            .arg("sweep")
+            .args(arguments)
+            .arg(&trace)
+            .arg("--json");
+        let output = run_ok(command.current_dir(folder.path()));
+        let json: serde_json::Value = serde_json::from_slice(&output.stdout).expect("JSON");
+        assert_eq!(json["rows"].as_array().map(Vec::len), Some(8));
+        json
+    };
+    let lists = [
+        "--orders",
+        "morton,z2-sta",
+        "--caches",
+        "4/64,8KiB/128KiB",
+        "--vary",
+        "l2.ways=4,16",
+    ];
+    let of_lists = rows(&lists);
+    assert!(!folder.path().join("out").exists());
+    assert_eq!(of_lists, rows(&["a.toml"]));
+    for (arguments, expected) in [
+        (&["--vary", "l2.wyas=4"][..], "l2.wyas"),
+        (&["--vary", "cores"], "expected KEY=V1,V2"),
+        (&["--caches", "8-128"], "8-128"),
+        (&["--caches", "8/128", "--l2", "1MiB"], "use --caches"),
+        (&["--orders", "morton", "--order", "z2-sta"], "use --orders"),
+        (
+            &["--orders", "morton", "--vary", "order=z2-sta"],
+            "`order`: expected one list",
+        ),
+        (
+            &["--orders", "morton", "--shard", "1/2"],
+            "needs an experiment file",
+        ),
+        (&["a.toml", "--l2", "1MiB"], "whose [base] sets the machine"),
+    ] {
+        let mut command = program("replay");
+        command.arg("sweep").args(arguments).arg(&trace);
+        refuse(command.current_dir(folder.path()), &[expected]);
+    }
+}

@@ -109,3 +109,42 @@ fn machines_without_a_timeline_and_too_many_orders_are_refused() {
         refuse(command.args(["-o", "-"]), &[expected]);
     }
 }
+
+#[test]
+fn maps_of_a_ray_trace_have_the_shares_that_reproject_prints() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("rays.html");
+    let trace = trace("chess-rays.raytrace");
+    run_ok(
+        program("replay")
+            .arg("view")
+            .arg(&trace)
+            .arg("-o")
+            .arg(&file),
+    );
+    let data = data(&fs::read_to_string(&file).expect("the page"));
+    let eyes = &data["frames"][0]["passes"];
+    let output = run_ok(program("replay").arg("reproject").arg(&trace).arg("--json"));
+    let found: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    for (run, key) in ["result", "plain"].into_iter().enumerate() {
+        let traced = &eyes[1]["runs"][run]["traced_pct"];
+        let tiles = traced.as_array().expect("a list").len() as f64;
+        let reuse_pct = found[key]["reuse_pct"].as_f64().expect("a share");
+        // All tiles have the same size; their shares are whole percents.
+        let shown = 100.0 - sum(traced) as f64 / tiles;
+        assert!(
+            (shown - reuse_pct).abs() < 0.5,
+            "{key}: {shown}, {reuse_pct}"
+        );
+    }
+    let output = run_ok(program("replay").arg("dump").arg(&trace));
+    let lines = String::from_utf8(output.stdout).expect("text");
+    let rays = sum(&eyes[0]["rays"]) + sum(&eyes[1]["rays"]);
+    assert_eq!(rays as usize, lines.matches("\"kind\":\"").count());
+    let mut command = program("replay");
+    command
+        .arg("view")
+        .arg(&trace)
+        .args(["--orders", "morton", "-o", "-"]);
+    refuse(&mut command, &["takes no --orders"]);
+}

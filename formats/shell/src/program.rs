@@ -5,6 +5,7 @@ use super::{memory, message, signals};
 use clap::{ArgMatches, CommandFactory, Parser};
 use formats::container::VERSIONS;
 use formats::text::printable_lines;
+use std::ffi::OsString;
 use std::io::{self, Write};
 use std::process::ExitCode;
 use std::sync::LazyLock;
@@ -35,14 +36,15 @@ pub struct Common {
     quiet: bool,
 }
 
-/// Parses the command line, checks the files that it names, runs the command and returns its exit code. Errors
+/// Parses the arguments, checks the files that it names, runs the command and returns its exit code. Errors
 /// go to stderr. A closed output pipe (`... | head`) is not an error.
 pub fn run<C: Parser>(
+    arguments: Vec<OsString>,
     files: &FileUses,
     common: impl FnOnce(&C) -> Common,
     command: impl FnOnce(C) -> anyhow::Result<ExitCode>,
 ) -> ExitCode {
-    let (cli, matches) = parse::<C>();
+    let (cli, matches) = parse::<C>(&arguments);
     message::set_quiet(common(&cli).quiet);
     let outcome = memory::explain_aborts()
         .and_then(|()| signals::discard_unfinished_on_exit())
@@ -96,16 +98,14 @@ fn shortened(text: &str) -> String {
     lines.join("\n")
 }
 
-fn parse<C: Parser>() -> (C, ArgMatches) {
+fn parse<C: Parser>(arguments: &[OsString]) -> (C, ArgMatches) {
     let parsed = command::<C>()
-        .try_get_matches()
+        .try_get_matches_from(arguments)
         .and_then(|matches| Ok((C::from_arg_matches(&matches)?, matches)));
     parsed.unwrap_or_else(|error| {
-        let arguments: Vec<String> = (std::env::args_os())
-            .map(|a| a.to_string_lossy().into_owned())
-            .collect();
         // Clap prints arguments unchanged, so control characters in file names must be replaced.
-        if arguments.iter().all(|a| printable_lines(a) == a.as_str()) {
+        let mut texts = arguments.iter().map(|argument| argument.to_string_lossy());
+        if texts.all(|text| printable_lines(&text) == text) {
             error.exit();
         }
         let _untold = write!(io::stderr(), "{}", printable_lines(&error.to_string()));

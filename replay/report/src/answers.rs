@@ -6,6 +6,7 @@ pub use replays::{MACHINE, Sampled, Scheme, Traffic, machine, replayed, sampled,
 
 use super::html::{change, count, list};
 use super::lists::{geometric_mean, mean};
+use sim::config::Order;
 use studies::techniques::{LEAST_SAMPLES, Spread};
 
 /// Least and largest of named values; `None` if there are none.
@@ -165,7 +166,16 @@ pub(super) struct Studied {
     pub change_pct: f64,
     /// Whether hardware can have it.
     pub is_buildable: bool,
+    /// Least and most change over the rows or over a machine's ranges.
+    pub range_pct: Option<[f64; 2]>,
+    /// Change against Morton order, percent, if it was replayed.
+    pub over_morton_pct: Option<f64>,
+    /// Bytes of its registers.
+    pub state_bytes: u64,
 }
+
+/// Orders whose means differ by at most this many points are called equal.
+const TIE_POINTS: f64 = 0.1;
 
 /// A study of orders and bounds against a baseline, over `rows` pairs of trace and caches.
 pub(super) fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<String> {
@@ -177,6 +187,21 @@ pub(super) fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<St
         "geometric mean over {} of trace and caches",
         count(rows, "pair")
     );
+    let range = |order: &Studied| match order.range_pct {
+        Some([low, high]) if rounded(low) < rounded(high) => {
+            format!("{low:+.1} to {high:+.1} %; {over}")
+        }
+        _ => over.clone(),
+    };
+    let over_morton = |order: &Studied| {
+        let pct = order
+            .over_morton_pct
+            .filter(|_| order.name != Order::MORTON.name());
+        pct.map_or_else(String::new, |pct| {
+            let (words, than) = traffic(pct);
+            format!(", and {words} {than} {}", Order::MORTON.name())
+        })
+    };
     let of = |buildable: bool| {
         let orders = orders
             .iter()
@@ -203,7 +228,32 @@ pub(super) fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<St
             } else {
                 "No other order that hardware can follow reads less than the baseline. The closest"
             };
-            out.push(format!("{verdict}: {} ({over}).", compare(best)));
+            out.push(format!(
+                "{verdict}: {} ({}){}.",
+                compare(best),
+                range(best),
+                over_morton(best)
+            ));
+            let near: Vec<&Studied> = others()
+                .filter(|o| o.name != best.name && o.change_pct - best.change_pct <= TIE_POINTS)
+                .collect();
+            let simplest = near.iter().min_by_key(|o| o.state_bytes);
+            out.extend(simplest.map(|simplest| {
+                let least = match simplest.state_bytes < best.state_bytes {
+                    true => format!(
+                        "; {} has the least state of them, {} instead of {} bytes",
+                        simplest.name, simplest.state_bytes, best.state_bytes
+                    ),
+                    false => String::new(),
+                };
+                format!(
+                    "{} within {TIE_POINTS} points of it{least}.",
+                    match near.len() {
+                        1 => "One other is".to_owned(),
+                        all => format!("{all} others are"),
+                    }
+                )
+            }));
         }
         None => out.push(format!(
             "Only {baseline} is an order that hardware can follow ({over})."
@@ -530,6 +580,9 @@ mod tests {
             name: name.to_owned(),
             change_pct,
             is_buildable,
+            range_pct: Some([change_pct - 1.0, change_pct + 1.0]),
+            over_morton_pct: Some(change_pct - 40.0),
+            state_bytes: name.len() as u64,
         };
         let alone = studied("z2-sta", &[order("z2-sta", 0.0, true)], 1);
         assert_eq!(
@@ -553,7 +606,16 @@ mod tests {
             4,
         );
         assert!(worse[0].starts_with("No other order"), "{worse:?}");
-        assert!(worse[0].contains("zig reads 2.0 % more"), "{worse:?}");
+        assert_eq!(
+            worse[0],
+            "No other order that hardware can follow reads less than the baseline. The closest: zig reads 2.0 % more from memory than z2-sta \
+             (+1.0 to +3.0 %; geometric mean over 4 pairs of trace and caches), and 38.0 % less than morton."
+        );
+        let near = [order("zig-zag", -2.04, true), order("zig", -2.0, true)];
+        assert_eq!(
+            studied("z2-sta", &near, 1)[1],
+            "One other is within 0.1 points of it; zig has the least state of them, 3 instead of 7 bytes."
+        );
         assert!(
             worse[1].contains("bound reads 9.0 % less from memory than z2-sta"),
             "{worse:?}"

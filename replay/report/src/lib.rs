@@ -36,4 +36,5 @@ pub mod temporal;
 pub mod theme;
 pub mod timeline;
 pub mod view;
+pub mod view_rays;
 pub mod z2;

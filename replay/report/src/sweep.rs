@@ -6,6 +6,7 @@ use super::config_columns;
 use super::document::Document;
 use super::figures::{figure, figures, number};
 use super::html::{self, Answer, Page, settings};
+use super::lists::unique;
 use super::plots::bars::{BarChart, BarGroup};
 use super::plots::hbars::HBarChart;
 use super::plots::lines::{self, Doublings, LineChart, LineSeries};
@@ -17,6 +18,7 @@ use serde::Serialize;
 use sim::config::{Order, RunConfig};
 use sim::palette;
 use sim::result::TraceId;
+use sim::size::format_bytes;
 use studies::experiment::{
     Axis, ExperimentFile, Outcome, ResultRow, Setting, Subject, frame_count, plain, point_key,
 };
@@ -203,6 +205,36 @@ impl Document for SweepReport<'_> {
 }
 
 impl SweepReport<'_> {
+    /// The smallest L2 whose traffic, with the best other settings, is within 5 % of the least; none unless the L2
+    /// is varied. Traffic is summed over the traces.
+    fn smallest_l2(&self) -> Option<String> {
+        const NEAR: f64 = 1.05;
+        let l2 = |row: &ResultRow| row.point.config.level.l2.size_bytes;
+        let titles = unique(self.rows.iter().map(|row| row.point.title()));
+        let sums = titles.into_iter().filter_map(|title| {
+            let own = || self.rows.iter().filter(|row| row.point.title() == title);
+            let sum: f64 = own().filter_map(|row| number(row, TRAFFIC)).sum();
+            Some((l2(own().next()?), sum, title.clone()))
+        });
+        let sums: Vec<(u64, f64, String)> = sums.collect();
+        let [smallest, largest] = [
+            sums.iter().map(|s| s.0).min()?,
+            sums.iter().map(|s| s.0).max()?,
+        ];
+        let least = sums.iter().map(|s| s.1).min_by(f64::total_cmp)?;
+        let near = sums.iter().filter(|s| s.1 <= NEAR * least);
+        let best = near.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)))?;
+        let traces = self.outcome.subjects.len() as f64;
+        (smallest < largest).then(|| {
+            format!(
+                "The smallest L2 within 5 % of the least traffic has {}: {:.2} MB per frame ({}).",
+                format_bytes(best.0),
+                best.1 / traces,
+                best.2
+            )
+        })
+    }
+
     fn sentences(&self) -> Vec<String> {
         let several = self.outcome.subjects.len() > 1;
         let point = |row: &ResultRow| {
@@ -233,14 +265,15 @@ impl SweepReport<'_> {
             )
         };
         let effects: Vec<_> = self.file.axes.iter().enumerate().map(effect).collect();
-        let mut out = answers::sweep(&points, &effects);
+        let mut out: Vec<String> = self.smallest_l2().into_iter().collect();
+        out.extend(answers::sweep(&points, &effects));
         let caches = self.rows.iter().map(|row| {
             let level = &row.point.config.level;
             [level.l1.size_bytes, level.l2.size_bytes]
         });
         let subjects = self.outcome.subjects.iter();
         let frames: Vec<u32> = subjects.map(|s| frame_count(s.source.tables())).collect();
-        out.push(answers::machine(&self.file.base, caches, &frames));
+        out.insert(1, answers::machine(&self.file.base, caches, &frames));
         out
     }
 }

@@ -121,7 +121,8 @@ impl<'a> ViewReport<'a> {
         // Names may contain the end of a script.
         let json = serde_json::to_string(&data)?.replace('<', "\\u003c");
         let mut page = Page::default();
-        page.add("Tiles", self.viewer(&json));
+        let titles = self.rows.iter().map(|row| row.point.config.order.title());
+        page.add("Tiles", viewer(&titles.collect::<Vec<_>>(), &json, true));
         page.add("What the maps show", meanings());
         page.add(
             "Machine",
@@ -188,9 +189,7 @@ impl<'a> ViewReport<'a> {
                 .rows
                 .first()
                 .map_or(0, |row| row.point.config.line_bytes),
-            ramp: (0..256)
-                .map(|step| hex(heatmap::color(f64::from(step) / 255.0)))
-                .collect(),
+            ramp: ramp(),
             picture: self.picture.map(EmbeddedPicture::data_uri),
             draws: tables
                 .draws
@@ -249,41 +248,52 @@ impl<'a> ViewReport<'a> {
             passes: of_frame().filter_map(pass_data).collect(),
         }
     }
+}
 
-    /// The controls and canvases, which the script fills.
-    fn viewer(&self, json: &str) -> Markup {
-        html! {
-            style { (PreEscaped(STYLE)) }
-            div #view {
-                div.controls {
-                    button #view-play type="button" { "Play" }
-                    label { "progress " input #view-at type="range" min="0" max="1000" value="1000"; }
-                    label { "advance by " select #view-by { option value="time" { "time" } option value="work" { "tiles" } } }
-                    label { "length " select #view-speed { option value="40" { "40 s" } option value="10" selected { "10 s" } option value="3" { "3 s" } } }
-                    label { "show " select #view-metric {} }
-                    label { "only " select #view-part {} }
-                    label #view-frames { "frame " input #view-frame type="range" min="0" value="0"; output #view-number {} }
-                }
-                div.scale { span { "0" } span #view-ramp role="img" aria-label="colour scale" {} span #view-most {} span.now { "in work" } }
-                div.orders {
-                    @for (number, row) in self.rows.iter().enumerate() {
-                        figure {
-                            figcaption #{ "view-name-" (number) } { (row.point.config.order.title()) }
-                            canvas tabindex="0" role="img" aria-labelledby={ "view-name-" (number) } aria-describedby="view-keys" {}
-                        }
+/// 256 colours of the maps, six digits each.
+pub(super) fn ramp() -> String {
+    (0..256)
+        .map(|step| hex(heatmap::color(f64::from(step) / 255.0)))
+        .collect()
+}
+
+/// The controls and canvases, which the script fills: a figure for each title. Maps without time are not `animated`.
+pub(super) fn viewer(titles: &[&str], json: &str, animated: bool) -> Markup {
+    html! {
+        style { (PreEscaped(STYLE)) }
+        div #view {
+            div.controls {
+                button #view-play type="button" hidden[!animated] { "Play" }
+                label hidden[!animated] { "progress " input #view-at type="range" min="0" max="1000" value="1000"; }
+                label hidden[!animated] { "advance by " select #view-by { option value="time" { "time" } option value="work" { "tiles" } } }
+                label hidden[!animated] { "length " select #view-speed { option value="40" { "40 s" } option value="10" selected { "10 s" } option value="3" { "3 s" } } }
+                label { "show " select #view-metric {} }
+                label hidden[!animated] { "only " select #view-part {} }
+                label #view-frames { "frame " input #view-frame type="range" min="0" value="0"; output #view-number {} }
+            }
+            div.scale { span { "0" } span #view-ramp role="img" aria-label="colour scale" {} span #view-most {} span.now hidden[!animated] { "in work" } }
+            div.orders {
+                @for (number, title) in titles.iter().enumerate() {
+                    figure {
+                        figcaption #{ "view-name-" (number) } { (title) }
+                        canvas tabindex="0" role="img" aria-labelledby={ "view-name-" (number) } aria-describedby="view-keys" {}
                     }
                 }
-                output #view-tile aria-live="polite" {}
-                div.scroll tabindex="0" role="region" aria-label="counts so far" { table #view-counts {} }
-                figure {
-                    canvas #view-curve role="img" aria-label="Bytes from DRAM over the frame, by order" {}
-                    figcaption #view-curve-name {}
-                }
-                p.note #view-keys { "Keys on a map: arrows choose a tile, Space plays, comma and full stop step by a tile, Home and End go to the start and the end." }
             }
-            script #view-data type="application/json" { (PreEscaped(json)) }
-            script { (PreEscaped(SCRIPT)) }
+            output #view-tile aria-live="polite" {}
+            div.scroll tabindex="0" role="region" aria-label="counts so far" hidden[!animated] { table #view-counts {} }
+            figure hidden[!animated] {
+                canvas #view-curve role="img" aria-label="Bytes from DRAM over the frame, by order" {}
+                figcaption #view-curve-name {}
+            }
+            p.note #view-keys {
+                "Keys on a map: arrows choose a tile"
+                @if animated { ", Space plays, comma and full stop step by a tile, Home and End go to the start and the end" }
+                "."
+            }
         }
+        script #view-data type="application/json" { (PreEscaped(json)) }
+        script { (PreEscaped(SCRIPT)) }
     }
 }
 

@@ -27,7 +27,7 @@ pub enum PixelClass {
 
 impl PixelClass {
     /// True for the reused classes.
-    pub(super) fn is_reused(self) -> bool {
+    pub fn is_reused(self) -> bool {
         matches!(self, Self::Reused | Self::Overlapped)
     }
 }

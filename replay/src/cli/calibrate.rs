@@ -117,26 +117,14 @@ pub fn run(args: &Args) -> Result<ExitCode> {
 
 /// Parses `KEY=V1,V2,...`; values are numbers, booleans or text.
 fn axis(text: &str) -> Result<Axis> {
-    let (key, values) = text
-        .split_once('=')
-        .filter(|(key, values)| !key.is_empty() && !values.is_empty())
-        .with_context(|| format!("--try {text}: expected KEY=V1,V2,..."))?;
+    let axis = Axis::parse(text);
+    let axis = axis.with_context(|| format!("--try {text}: expected KEY=V1,V2,..."))?;
     ensure!(
-        !experiment::is_of_the_table(key),
-        "--try {key}: the paper's table already varies this key"
+        !experiment::is_of_the_table(&axis.key),
+        "--try {}: the paper's table already varies this key",
+        axis.key
     );
-    let value = |text: &str| {
-        let text = text.trim();
-        let number = text.parse().map(Value::Integer).ok();
-        let real = || text.parse().map(Value::Float).ok();
-        let flag = || text.parse().map(Value::Boolean).ok();
-        let value = number.or_else(real).or_else(flag);
-        value.unwrap_or_else(|| Value::String(text.to_owned()))
-    };
-    Ok(Axis {
-        key: key.to_owned(),
-        values: values.split(',').map(value).collect(),
-    })
+    Ok(axis)
 }
 
 /// Which labels are held out.

@@ -163,14 +163,22 @@ impl ExperimentArgs {
 /// # Errors
 /// A setting that differs from the `usual` one.
 pub(super) fn refuse_varied(base: &RunConfig, usual: &RunConfig) -> Result<()> {
-    let [sizes, usual_sizes] = [base, usual].map(|config| {
-        let level = &config.level;
-        [level.l1.size_bytes, level.l2.size_bytes]
-    });
     ensure!(
         base.order == usual.order,
         "--order is varied here; use --orders"
     );
+    refuse_sizes(base, usual)
+}
+
+/// As [`refuse_varied`], of the sizes alone.
+///
+/// # Errors
+/// As above.
+pub(super) fn refuse_sizes(base: &RunConfig, usual: &RunConfig) -> Result<()> {
+    let [sizes, usual_sizes] = [base, usual].map(|config| {
+        let level = &config.level;
+        [level.l1.size_bytes, level.l2.size_bytes]
+    });
     ensure!(
         sizes == usual_sizes,
         "--l1 and --l2 are varied here; use --caches"

@@ -16,6 +16,8 @@ pub const FILES: &FileUses = &[
     (&["sample"], &["values"], FileUse::Input),
     (&["sample"], &["save_values"], FileUse::Output),
     (&["sample"], &["command", "baseline"], FileUse::NoFile),
+    (&["sweep"], &["inputs"], FileUse::Input),
+    (&["sweep"], &["vary"], FileUse::NoFile),
     (&["schedule"], &["schedulers"], FileUse::NoFile),
     (&[], &["save_orders"], FileUse::FolderOfNewNames),
     (
@@ -34,7 +36,6 @@ pub const FILES: &FileUses = &[
             "right",
             "files",
             "config",
-            "experiment",
             "addresses",
             "order_files",
         ],

@@ -3,6 +3,7 @@
 mod accuracy;
 mod addresses;
 mod calibrate;
+mod capture;
 mod choice;
 mod compare;
 mod config_args;
@@ -38,6 +39,7 @@ mod warnings;
 pub use config_args::ConfigArgs;
 pub use reuse_args::ReuseArgs;
 
+use capture::Capture;
 use clap::{Arg, Parser, Subcommand};
 use shell::{Common, Documents};
 use std::process::ExitCode;
@@ -51,7 +53,10 @@ Examples:
   replay report atrium.textrace -o report.html --image atrium=atrium.png
   replay techniques out/plant --html out/techniques.html
   replay convert atrium.textrace --to din --order morton -o accesses.din
-  replay reproject chess.raytrace --html chess.html";
+  replay reproject chess.raytrace --html chess.html
+  replay orders -- tracegen raster model.glb --hmd quest2
+
+In place of a trace, commands take `-- tracegen raster|rays|techniques|app|page|xr ...`, and capture it themselves.";
 
 /// Replays Parallax traces through cache, texture-unit and ray-tracing-unit models.
 #[derive(Debug, Parser)]
@@ -140,34 +145,51 @@ pub fn main() -> ExitCode {
         );
         return ExitCode::from(2);
     }
+    let (arguments, mut capture) = match Capture::split(std::env::args_os().collect()) {
+        Ok(split) => split,
+        Err(error) => {
+            shell::error(&shell::described(&error));
+            return ExitCode::from(2);
+        }
+    };
     shell::run(
+        arguments,
         file_uses::FILES,
         |cli: &Cli| cli.common,
-        |cli| match cli.command {
-            Command::Run(args) => run::run(&args),
-            Command::Info(args) => info::run(&args),
-            Command::Validate(args) => validate::run(&args),
-            Command::Dump(args) => dump::run(&args),
-            Command::Diff(args) => diff::run(&args),
-            Command::Compare(args) => compare::run(&args),
-            Command::Convert(args) => convert::run(&args),
-            Command::Paper(args) => paper::run(&args),
-            Command::Accuracy(args) => accuracy::run(&args),
-            Command::Calibrate(args) => calibrate::run(&args),
-            Command::Sweep(args) => sweep::run(&args),
-            Command::Report(args) => report::run(&args),
-            Command::View(args) => view::run(&args),
-            Command::Techniques(args) => techniques::run(&args),
-            Command::Orders(args) => orders::run(&args),
-            Command::Sample(args) => sample::run(&args),
-            Command::Schedule(args) => schedule::run(&args),
-            Command::Locality(args) => locality::run(&args),
-            Command::Reproject(args) => reproject::run(*args),
-            Command::Readings(args) => readings::run(&args),
-            Command::Temporal(args) => temporal::run(&args),
-            Command::Documents(documents) => documents.run::<Cli>(),
+        |cli| {
+            capture.as_mut().map_or(Ok(()), Capture::run)?;
+            cli.command.run()
         },
     )
+}
+
+impl Command {
+    fn run(self) -> anyhow::Result<ExitCode> {
+        match self {
+            Self::Run(args) => run::run(&args),
+            Self::Info(args) => info::run(&args),
+            Self::Validate(args) => validate::run(&args),
+            Self::Dump(args) => dump::run(&args),
+            Self::Diff(args) => diff::run(&args),
+            Self::Compare(args) => compare::run(&args),
+            Self::Convert(args) => convert::run(&args),
+            Self::Paper(args) => paper::run(&args),
+            Self::Accuracy(args) => accuracy::run(&args),
+            Self::Calibrate(args) => calibrate::run(&args),
+            Self::Sweep(args) => sweep::run(&args),
+            Self::Report(args) => report::run(&args),
+            Self::View(args) => view::run(&args),
+            Self::Techniques(args) => techniques::run(&args),
+            Self::Orders(args) => orders::run(&args),
+            Self::Sample(args) => sample::run(&args),
+            Self::Schedule(args) => schedule::run(&args),
+            Self::Locality(args) => locality::run(&args),
+            Self::Reproject(args) => reproject::run(*args),
+            Self::Readings(args) => readings::run(&args),
+            Self::Temporal(args) => temporal::run(&args),
+            Self::Documents(documents) => documents.run::<Cli>(),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -12,6 +12,7 @@ use image_error::{Picture, png};
 use report::document::Document;
 use report::sgrt::{self as document, Entry, ReprojectReport, Thumbnails};
 use report::table::Table;
+use report::view_rays::RayMaps;
 use sgrt::compose::Reuse;
 use sgrt::config::{DEFAULT_TOML, SgrtConfig};
 use sgrt::loaded::{LoadedTrace, RuleRun};
@@ -158,10 +159,37 @@ fn check_timing(args: &ReprojectArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// The maps of `replay view`: of the default rule and of the plain scheme.
+///
+/// # Errors
+/// As [`run`].
+pub(super) fn view(path: &Path) -> anyhow::Result<String> {
+    let file = Raytrace::open(path)?;
+    let loaded = LoadedTrace::load(&file).with_context(|| path.display().to_string())?;
+    let args = ReprojectArgs::default();
+    let config = args.reused.parameters()?;
+    let (entry, runs) = report_of(path, &file, &loaded, &args, &config)?;
+    let maps = RayMaps::new(&entry.report.trace.name, &loaded, &runs)?;
+    let report = ReprojectReport {
+        entries: vec![entry],
+    };
+    Ok(maps.page(&report)?)
+}
+
 fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::Result<Entry> {
     let file = Raytrace::open(path)?;
+    let loaded = LoadedTrace::load(&file).with_context(|| path.display().to_string())?;
+    Ok(report_of(path, &file, &loaded, args, config)?.0)
+}
+
+fn report_of(
+    path: &Path,
+    file: &Raytrace,
+    loaded: &LoadedTrace<'_>,
+    args: &ReprojectArgs,
+    config: &SgrtConfig,
+) -> anyhow::Result<(Entry, [RuleRun; 2])> {
     let in_file = || path.display().to_string();
-    let loaded = LoadedTrace::load(&file).with_context(in_file)?;
     let (rule, reuse) = (args.reused.rule()?, args.reused.reuse());
     let traced = match args.timing {
         Timing::ClosedForm => None,
@@ -206,11 +234,11 @@ fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::
         plain: plain.outcome.clone(),
     };
     let pictures = if args.outputs.html.is_some() {
-        Some(thumbnails(&loaded, &ours, &plain)?)
+        Some(thumbnails(loaded, &ours, &plain)?)
     } else {
         None
     };
-    Ok(Entry { report, pictures })
+    Ok((Entry { report, pictures }, [ours, plain]))
 }
 
 /// The right image, its bad pixels, and its error map, side by side.

@@ -8,13 +8,14 @@ use super::order_arg::parse_named;
 use super::outputs::Outputs;
 use crate::files;
 use anyhow::{Context, Result, bail, ensure};
+use formats::container::ScratchFolder;
 use formats::textrace::Textrace;
 use report::notices::open_textrace;
 use report::sample::{SampleReport, SampleRow, TrialReport, TrialRow, frame_list};
 use sim::config::{Mode, RunConfig};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode, Stdio};
+use std::process::{Command, ExitCode};
 use studies::sampling::of::Of;
 use studies::sampling::points::{Points, aim, bounds};
 use studies::sampling::sample::{Aim, Promise, Sample, Step, Within};
@@ -282,25 +283,14 @@ fn driven(
             folder.as_path()
         }
         None => {
-            temporary = tempfile::tempdir()?;
+            temporary = ScratchFolder::create_in(&std::env::temp_dir())?;
             temporary.path()
         }
     };
     let capture = |added: &[&str], file: &Path| -> Result<()> {
         let mut command = Command::new(program);
         command.args(rest).args(added).arg("-o").arg(file);
-        // The answer alone goes to standard output.
-        command.stdin(Stdio::null()).stdout(std::io::stderr());
-        let status = command
-            .status()
-            .with_context(|| format!("{}", program.display()))?;
-        ensure!(
-            status.success() && file.is_file(),
-            "{}: expected to write {}, ended with {status}",
-            program.display(),
-            file.display()
-        );
-        Ok(())
+        super::capture::run(&mut command, file)
     };
     let file = folder.join("plan.textrace");
     capture(&["--plan-only"], &file)?;

@@ -1,33 +1,51 @@
-//! `replay sweep`: replays the points of an experiment file on one or many machines.
+//! `replay sweep`: replays the points of an experiment on one or many machines.
 
+use super::ConfigArgs;
+use super::experiment_args::refuse_sizes;
 use super::outputs::ParquetArg;
 use super::subjects::Traces;
 use crate::files::{self, write_atomically};
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
+use formats::container::ScratchFolder;
 use report::document::Document;
 use report::sweep::SweepReport;
 use report::sweep_plan::SweepPlan;
 use shell::{Needs, Output, Progress, Shard, ShardArgs, SlurmArray};
+use sim::preset::Preset;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use studies::experiment::{self, ExperimentFile, Outcome, Plan, Point, Split, Store, Subject};
+use studies::experiment::{
+    self, CACHES, ExperimentFile, Outcome, Plan, Point, Split, Store, Subject,
+};
 
 /// Arguments of `replay sweep`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   replay sweep replay/experiments/caches.toml crytek.textrace --out out/caches
   replay sweep replay/experiments/open-choices.toml *.textrace --out out/open-choices --json
+  replay sweep model.textrace --caches 8/64,8/128,8/256 --orders morton,z2-sta --preset adreno-740
+  replay sweep model.textrace --vary l2.ways=4,8,16
   replay sweep caches.toml --out out/caches --shard 3/8
   replay sweep caches.toml --out out/caches --merge-only
   replay sweep caches.toml --out out/caches --emit-slurm 8 > caches.sh && sh caches.sh
 
 A sweep that was stopped goes on where it stopped when it is started again with the same --out.")]
 pub struct Args {
-    /// Experiment file: [base], [axes] and [one-at-a-time] over configuration keys
-    experiment: PathBuf,
-    /// Texture traces; they override the list in the experiment file
-    traces: Vec<PathBuf>,
-    /// Folder for results.json, results.csv, report.html and points/ [default: out/NAME]
+    /// Experiment file with [base], [axes] and [one-at-a-time] over configuration keys, unless flags list the values;
+    /// then texture traces, which override the list in the experiment file
+    #[arg(value_name = "EXPERIMENT.toml|TRACE", required = true)]
+    inputs: Vec<PathBuf>,
+    /// L1/L2 sizes in KiB to vary, comma-separated
+    #[arg(long, value_name = "L1/L2,...")]
+    caches: Option<String>,
+    /// Orders to vary, comma-separated
+    #[arg(long, value_name = "ORDERS")]
+    orders: Option<String>,
+    /// Configuration key to vary, and its values; several are crossed
+    #[arg(long, value_name = "KEY=V1,V2,...")]
+    vary: Vec<String>,
+    /// Folder for results.json, results.csv, report.html and points/ [default: out/NAME of an experiment file, none
+    /// without]
     #[arg(short, long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Print one JSON object (schema replay.sweep/3, with --plan replay.plan/2)
@@ -45,6 +63,8 @@ pub struct Args {
     threads: shell::Threads,
     #[command(flatten)]
     shards: ShardArgs,
+    #[command(flatten)]
+    machine: ConfigArgs,
 }
 
 impl Args {
@@ -74,6 +94,73 @@ impl Args {
         );
         Ok(())
     }
+
+    /// The lists of values on the command line, as axes.
+    fn axes(&self) -> Vec<String> {
+        let orders = self.orders.iter().map(|list| format!("order={list}"));
+        let caches = self.caches.iter().map(|list| format!("{CACHES}={list}"));
+        orders
+            .chain(caches)
+            .chain(self.vary.iter().cloned())
+            .collect()
+    }
+
+    /// The experiment file, if the first input is one: without lists on the command line, or by its extension.
+    fn experiment(&self) -> Option<&Path> {
+        let first = self.inputs.first().map(PathBuf::as_path)?;
+        let is_toml = first
+            .extension()
+            .is_some_and(|extension| extension == "toml");
+        (is_toml || self.axes().is_empty()).then_some(first)
+    }
+
+    /// Name of the experiment file for messages.
+    fn name(&self) -> String {
+        let name = |path: &Path| path.display().to_string();
+        self.experiment().map_or_else(|| "sweep".to_owned(), name)
+    }
+
+    /// The experiment: its file, then the flags.
+    fn plan(&self) -> Result<(ExperimentFile, Plan)> {
+        let name = self.name();
+        let mut file = match self.experiment() {
+            Some(path) => {
+                ExperimentFile::parse(&shell::read_settings(path)?).with_context(|| name.clone())?
+            }
+            None => ExperimentFile::default(),
+        };
+        let given = file.base;
+        file.base = self.machine.resolve_over(given)?;
+        let axes = self.axes();
+        if axes.is_empty() {
+            ensure!(
+                file.base == given,
+                "flags of the machine: expected with --caches, --orders or --vary, found with an experiment file alone, whose [base] sets the machine"
+            );
+        } else {
+            ensure!(
+                self.shards.shard.is_none() && self.shards.emit_slurm.is_none() && !self.merge_only,
+                "--caches, --orders, --vary: a sweep on many machines needs an experiment file with the same [axes]"
+            );
+        }
+        let machine = self.machine.preset().and_then(Preset::machine);
+        let usual = machine.map_or(given, |machine| machine.over(given));
+        if self.orders.is_some() {
+            ensure!(
+                file.base.order == usual.order,
+                "--order is varied here; use --orders"
+            );
+        }
+        if self.caches.is_some() {
+            refuse_sizes(&file.base, &usual)?;
+        }
+        for axis in axes {
+            file.add_axis(&axis)
+                .map_err(|message| anyhow!("{message}"))?;
+        }
+        let plan = file.plan().with_context(|| name)?;
+        Ok((file, plan))
+    }
 }
 
 /// Runs the subcommand.
@@ -84,10 +171,7 @@ impl Args {
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.check()?;
     args.threads.start()?;
-    let name = args.experiment.display();
-    let file = ExperimentFile::parse(&shell::read_settings(&args.experiment)?);
-    let file = file.with_context(|| name.to_string())?;
-    let plan = file.plan().with_context(|| name.to_string())?;
+    let (file, plan) = args.plan()?;
     if args.plan && !args.json {
         let titles: Vec<String> = plan.points.iter().map(Point::title).collect();
         super::print(&titles.join("\n"))?;
@@ -142,6 +226,8 @@ struct Sweep<'a> {
     paths: Vec<PathBuf>,
     traces: Traces,
     out: PathBuf,
+    /// Stands for --out where nothing is kept.
+    temporary: Option<ScratchFolder>,
     store: Store,
 }
 
@@ -151,10 +237,19 @@ impl<'a> Sweep<'a> {
         ensure!(
             !paths.is_empty(),
             "{}: expected traces in `traces` or on the command line, found none",
-            args.experiment.display()
+            args.name()
         );
-        let usual = || Path::new("out").join(args.experiment.file_stem().unwrap_or_default());
-        let out = args.out.clone().unwrap_or_else(usual);
+        let (out, temporary) = match (&args.out, args.experiment()) {
+            (Some(out), _) => (out.clone(), None),
+            (None, Some(file)) => (
+                Path::new("out").join(file.file_stem().unwrap_or_default()),
+                None,
+            ),
+            (None, None) => {
+                let folder = ScratchFolder::create_in(&std::env::temp_dir())?;
+                (folder.path().to_owned(), Some(folder))
+            }
+        };
         shell::check_folder("--out", &out)?;
         shell::check_folder("--out", &out.join("points"))?;
         let store = Store::open(&out, args.shards.shard)?;
@@ -166,6 +261,7 @@ impl<'a> Sweep<'a> {
             plan,
             paths,
             out,
+            temporary,
         })
     }
 
@@ -198,8 +294,13 @@ impl<'a> Sweep<'a> {
         let outputs = outputs.iter().map(|path| Output::text("--out", path));
         let mut outputs: Vec<Output> = outputs.chain(self.args.parquet.output()).collect();
         outputs.extend(self.args.json.then(|| Output::result("--json")));
-        let inputs = self.paths.iter().chain([&self.args.experiment]);
-        files::check_outputs(&outputs, inputs.map(PathBuf::as_path))
+        let inputs = self.paths.iter().map(PathBuf::as_path);
+        let settings = self
+            .args
+            .experiment()
+            .into_iter()
+            .chain(self.args.machine.file());
+        files::check_outputs(&outputs, inputs.chain(settings))
     }
 
     /// Replays the points of a shard and writes only their rows.
@@ -227,12 +328,17 @@ impl<'a> Sweep<'a> {
     /// Writes and prints the results.
     fn write(&self, outcome: &Outcome, prints: bool) -> Result<()> {
         let report = SweepReport::new(&self.file, outcome);
-        let stem = self.args.experiment.file_stem().unwrap_or_default();
         let json = report.json()?;
-        let page = report.page(&format!("Parallax sweep: {}", stem.to_string_lossy()))?;
-        let contents = [format!("{json}\n"), report.csv(), page];
-        for (path, text) in self.outputs().iter().zip(contents) {
-            write_atomically(path, text.as_bytes())?;
+        if self.temporary.is_none() {
+            let of = self.args.experiment().unwrap_or(&self.out).file_stem();
+            let page = report.page(&format!(
+                "Parallax sweep: {}",
+                of.unwrap_or_default().to_string_lossy()
+            ))?;
+            let contents = [format!("{json}\n"), report.csv(), page];
+            for (path, text) in self.outputs().iter().zip(contents) {
+                write_atomically(path, text.as_bytes())?;
+            }
         }
         self.args.parquet.write(|| report.rows())?;
         match (prints, self.args.json) {
@@ -246,12 +352,11 @@ impl<'a> Sweep<'a> {
     fn slurm_script(&self, shards: u32) -> Result<String> {
         let program = std::env::current_exe().context("the program's own path")?;
         let mut command = vec![shell::absolute(&program)?, "sweep".to_owned()];
-        command.push(shell::absolute(&self.args.experiment)?);
-        for trace in &self.args.traces {
-            command.push(shell::absolute(trace)?);
+        for input in &self.args.inputs {
+            command.push(shell::absolute(input)?);
         }
         command.extend(["--out".to_owned(), shell::absolute(&self.out)?]);
-        let name = self.args.experiment.file_stem().unwrap_or_default();
+        let name = self.args.inputs[0].file_stem().unwrap_or_default();
         let mut then = vec!["--merge-only".to_owned()];
         if let Some(path) = &self.args.parquet.path {
             ensure!(
@@ -277,9 +382,12 @@ impl<'a> Sweep<'a> {
 
 /// The traces of the command line, or those of the file, which are relative to it.
 fn trace_paths(args: &Args, file: &ExperimentFile) -> Vec<PathBuf> {
-    if !args.traces.is_empty() {
-        return args.traces.clone();
+    let Some(experiment) = args.experiment() else {
+        return args.inputs.clone();
+    };
+    if args.inputs.len() > 1 {
+        return args.inputs[1..].to_vec();
     }
-    let folder = args.experiment.parent().unwrap_or(Path::new(""));
+    let folder = experiment.parent().unwrap_or(Path::new(""));
     file.traces.iter().map(|t| folder.join(t)).collect()
 }

@@ -1,10 +1,11 @@
-//! `replay view`: a page to explore tiles and orders of a trace.
+//! `replay view`: a page to explore tiles and orders of a texture trace, or tiles and reuse of a ray trace.
 
 use super::ConfigArgs;
 use super::order_arg::parse_orders;
 use super::subjects::{Traces, replayed};
 use crate::files::{self, write_atomically};
 use anyhow::{Result, ensure};
+use formats::Trace;
 use report::picture::EmbeddedPicture;
 use report::view::ViewReport;
 use shell::Output;
@@ -16,19 +17,22 @@ use studies::experiment::{Plan, pass_tiles};
 /// Orders that a page compares.
 const MOST_ORDERS: usize = 4;
 
+const ORDERS: &str = "morton,z2-sta";
+
 /// Arguments of `replay view`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:
   replay view atrium.textrace -o view.html
+  replay view chess.raytrace -o view.html
   replay view atrium.textrace --orders morton,zig-zag+sta+offset --image atrium.png -o view.html")]
 pub struct Args {
-    /// Texture trace
+    /// Texture trace; or ray trace, whose page has the rays and the reuse of each tile
     trace: PathBuf,
     /// Page to write
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
     /// Orders to compare, comma-separated, at most four
-    #[arg(long, value_name = "ORDERS", default_value = "morton,z2-sta")]
+    #[arg(long, value_name = "ORDERS", default_value = ORDERS)]
     orders: String,
     /// Rendered picture of both eyes, to show below the maps
     #[arg(long, value_name = "FILE")]
@@ -45,11 +49,7 @@ pub struct Args {
 /// A machine without a timeline, an unreadable trace or picture, or a page that cannot be written.
 pub fn run(args: &Args) -> Result<ExitCode> {
     args.threads.start()?;
-    let base = RunConfig {
-        tile_maps: true,
-        timeline: true,
-        ..args.machine.resolve()?
-    };
+    let base = machine(&args.machine)?;
     ensure!(
         base.order == RunConfig::default().order,
         "--order: this command varies the order; use --orders"
@@ -71,6 +71,19 @@ pub fn run(args: &Args) -> Result<ExitCode> {
     ];
     let output = Output::text("--output", &args.output);
     let prints = files::check_outputs(&[output], inputs.into_iter().flatten())?;
+    // Standard input can be read only once, so it holds a texture trace.
+    if !shell::is_stdout(&args.trace)
+        && let Trace::Ray(_) = Trace::open(&args.trace)?
+    {
+        ensure!(
+            args.image.is_none()
+                && args.orders == ORDERS
+                && base == machine(&ConfigArgs::default())?,
+            "{}: a ray trace takes no --orders, no --image and no flags of the machine",
+            args.trace.display()
+        );
+        return write(args, &super::reproject::view(&args.trace)?, prints);
+    }
     let caches = (base.level.l1.size_bytes, base.level.l2.size_bytes);
     let plan = Plan::paper(base, &[caches], &orders, false)?;
     let traces = Traces::open(std::slice::from_ref(&args.trace))?;
@@ -92,6 +105,18 @@ pub fn run(args: &Args) -> Result<ExitCode> {
             left_out.len()
         ));
     }
+    write(args, &page, prints)
+}
+
+fn machine(args: &ConfigArgs) -> Result<RunConfig> {
+    Ok(RunConfig {
+        tile_maps: true,
+        timeline: true,
+        ..args.resolve()?
+    })
+}
+
+fn write(args: &Args, page: &str, prints: bool) -> Result<ExitCode> {
     write_atomically(&args.output, page.as_bytes())?;
     if prints {
         super::print(&args.output.display().to_string())?;

@@ -1,6 +1,7 @@
 //! Frames, render passes and draws of a captured program.
 
 use crate::reads::Reads;
+use crate::views::{Other, Role};
 use spool::openxr::ShownEye;
 use spool::{DepthTests, Form, RawSample, Site, What};
 use spool::{
@@ -136,6 +137,8 @@ pub struct Session {
     shaders: HashMap<u32, ShaderInfo>,
     /// Size of the picture of each render pass that has one.
     pictures: HashMap<u32, [u32; 2]>,
+    /// Whether the program draws through OpenGL on Vulkan.
+    opengl: bool,
     process: Option<Process>,
     records: Option<Reader>,
     /// Number of draws with new numbers.
@@ -200,11 +203,13 @@ impl Session {
                 name,
                 driver,
                 refused,
+                opengl,
                 ..
             } => {
                 // The program may have opened other devices without rendering on them.
                 if self.device.is_empty() || self.refused.is_some() {
                     (self.device, self.driver, self.refused) = (name, driver, refused);
+                    self.opengl = opengl;
                 }
             }
             Event::Shader(shader) => drop(self.shaders.insert(shader.shader, shader)),
@@ -346,6 +351,13 @@ impl Session {
     /// The render pass with a number.
     pub fn pass(&self, number: u32) -> Option<&PassInfo> {
         self.passes.get(&number)
+    }
+
+    /// Whether a draw fills its image from the lowest row: OpenGL draws like that, except into a window. A browser's
+    /// window is an image of its own.
+    pub fn is_bottom_up(&self, draw: &DrawInfo, role: Option<Role>) -> bool {
+        let is_browser = role == Some(Role::Other(Other::Browser));
+        self.opengl && (draw.viewport[3] > 0.0 || is_browser)
     }
 
     /// Size and RGBA texels of the picture of a render pass.

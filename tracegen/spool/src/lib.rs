@@ -118,6 +118,9 @@ pub enum Event {
         refused: Option<String>,
         /// Whether one record holds all lanes of a quad.
         ballots: bool,
+        /// Whether the caller implements OpenGL, whose images have their lowest row first.
+        #[serde(default)]
+        opengl: bool,
     },
     /// A recording shader was created.
     Shader(ShaderInfo),

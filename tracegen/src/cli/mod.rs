@@ -115,6 +115,7 @@ enum Command {
 /// Parses the arguments, runs the subcommand and returns its exit code.
 pub fn main() -> ExitCode {
     shell::run(
+        std::env::args_os().collect(),
         file_uses::FILES,
         |cli: &Cli| cli.common,
         |cli| {

@@ -267,7 +267,7 @@ fn covered(frame: &Frame, depths: &[Vec<f32>]) -> f64 {
 }
 
 /// Share of the pixels below which a view shows little of a scene.
-const FEW: f64 = 0.25;
+const FEW: f64 = 0.5;
 
 /// Warns of a first frame that is mostly background; its caches see little.
 fn warn_of_few_pixels(covered: Option<f64>, camera: &str) {

@@ -46,19 +46,17 @@ pub fn replayed(traffic: &Traffic) -> Vec<String> {
         ),
         false => String::new(),
     };
+    let share = frame_mb.filter(|mb| *mb > 0.0).map(|mb| {
+        let pct = 100.0 * texture_mb / mb;
+        format!(", {pct:.1} % of the frame's DRAM traffic of {}", size(mb))
+    });
     let mut out = vec![format!(
-        "{of}: {} of texture per frame from DRAM (known errors: {error_pct:.1} %){bound}.",
-        size(*texture_mb)
+        "{of}: {} of texture per frame from DRAM (known errors: {error_pct:.1} %){}{bound}.",
+        size(*texture_mb),
+        share.unwrap_or_default()
     )];
     if texture_mb <= bound_mb {
         out.push("The L2 holds everything; no order can save.".to_owned());
-    }
-    if let Some(frame_mb) = frame_mb.filter(|mb| *mb > 0.0) {
-        out.push(format!(
-            "Texture is {:.1} % of the frame's DRAM traffic of {}.",
-            100.0 * texture_mb / frame_mb,
-            size(frame_mb)
-        ));
     }
     out
 }
@@ -200,7 +198,7 @@ mod tests {
         let text = replayed(&traffic);
         assert!(text[0].contains("10.0 kB"), "{text:?}");
         assert!(text[1].contains("no order can save"), "{text:?}");
-        assert!(text[2].contains("10.0 % of the frame's"), "{text:?}");
+        assert!(text[0].contains("10.0 % of the frame's"), "{text:?}");
     }
 
     #[test]

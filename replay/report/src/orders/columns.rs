@@ -19,10 +19,11 @@ pub(super) const CHANGES: [&str; 7] = [
 ];
 
 /// Keys of the means that fit a terminal.
-pub(super) const TERMINAL: [&str; 8] = [
+pub(super) const TERMINAL: [&str; 9] = [
     "between_frames",
     "order",
     "buildable",
+    "over_morton_pct",
     "change_pct",
     "worst_pct",
     "closed_pct",
@@ -132,6 +133,7 @@ pub fn means<'a>() -> Vec<Column<'a, Mean<'a>>> {
         .text("information", "information", information)
         .whole("rows", "rows", "", |m| m.count()).about("traces times caches, without those in which the baseline fetches each line once; means are over these rows, or over all if there are none")
         .real("change_pct", "against Z2 STA", "%", 2, |m| bounded(m.change())).change_last(|column| column.kind(Kind::Real)).about("geometric mean of bytes over those of z2-sta")
+        .real("over_morton_pct", "against Morton", "%", 2, Mean::over_morton_pct).about("the same over those of morton")
         .text("worst_trace", "worst trace", |m| m.worst_trace().map(|(label, _)| label.to_owned())).about("by the geometric mean over its caches")
         .real("worst_trace_change_pct", "there", "%", 2, |m| m.worst_trace().map(|(_, change)| change))
         .real("worst_pct", "worst row", "%", 2, Mean::worst_pct).about("of a trace with a pair of caches")

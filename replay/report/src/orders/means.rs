@@ -1,8 +1,8 @@
 //! Means of an order over traces and caches.
 
 use crate::lists::{geometric_mean, mean, unique};
-use sim::config::BetweenFrames;
-use sim::figure::Figure;
+use sim::config::{BetweenFrames, Order};
+use sim::figure::{Because, Figure};
 use sim::order::cost::Cost;
 use studies::orders_study::OrderRow;
 
@@ -13,6 +13,8 @@ pub struct Mean<'a> {
     pub between: BetweenFrames,
     /// All rows of the order.
     pub rows: Vec<&'a OrderRow<'a>>,
+    /// Morton's change over the same rows, percent.
+    morton_pct: Option<f64>,
 }
 
 /// Geometric mean; none without values, or if a value is not positive.
@@ -66,6 +68,27 @@ impl<'a> Mean<'a> {
         };
         let means = (0..first.bytes.len()).filter_map(at);
         Some(Figure::bounded(value, means, first.over.clone()))
+    }
+
+    /// Change of the bytes relative to Morton order, percent; none if it was not replayed.
+    pub fn over_morton_pct(&self) -> Option<f64> {
+        let ratio = |pct: f64| 1.0 + pct / 100.0;
+        Some(change_pct(
+            ratio(self.change_pct()?) / ratio(self.morton_pct?),
+        ))
+    }
+
+    /// Least and most change: over the corners of the machine's ranges, or else over the rows.
+    pub fn range_pct(&self) -> Option<[f64; 2]> {
+        let change = self.change()?;
+        if !matches!(change.because, Because::Exact) {
+            return Some([change.low, change.high]);
+        }
+        let changes = || self.open().filter_map(OrderRow::ratio).map(change_pct);
+        Some([
+            changes().min_by(f64::total_cmp)?,
+            changes().max_by(f64::total_cmp)?,
+        ])
     }
 
     /// Change of the cycles relative to the baseline, percent.
@@ -135,8 +158,23 @@ pub fn means<'a>(rows: &'a [OrderRow<'a>]) -> Vec<Mean<'a>> {
             None => means.push(Mean {
                 between,
                 rows: vec![row],
+                morton_pct: None,
             }),
         }
+    }
+    let morton = |between| {
+        let mut orders = means.iter().filter(|of: &&Mean<'_>| of.between == between);
+        orders
+            .find(|of| of.name() == Order::MORTON.name())?
+            .change_pct()
+    };
+    let mortons: Vec<_> = betweens
+        .iter()
+        .map(|between| (*between, morton(*between)))
+        .collect();
+    for mean in &mut means {
+        let own = mortons.iter().find(|(between, _)| *between == mean.between);
+        mean.morton_pct = own.and_then(|(_, pct)| *pct);
     }
     let place = |of: &Mean<'_>| betweens.iter().position(|between| *between == of.between);
     means.sort_by(|a, b| {

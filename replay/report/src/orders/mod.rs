@@ -112,7 +112,7 @@ impl Document for OrdersReport<'_> {
         );
         let frames: Vec<u32> = frames.into_iter().map(|(_, frames)| frames).collect();
         let mut out = page::sentences(&self.means());
-        out.push(answers::machine(&self.config, caches, &frames));
+        out.insert(1, answers::machine(&self.config, caches, &frames));
         out
     }
 

@@ -111,6 +111,9 @@ pub(super) fn sentences(means: &[Mean<'_>]) -> Vec<String> {
         name: mean.name(),
         change_pct: mean.change_pct().unwrap_or(0.0),
         is_buildable: is_buildable(mean),
+        range_pct: mean.range_pct(),
+        over_morton_pct: mean.over_morton_pct(),
+        state_bytes: mean.cost().map_or(0, |cost| cost.state_bytes.into()),
     });
     let rows = first_of(means).map(|mean| mean.rows.len()).max();
     answers::studied(

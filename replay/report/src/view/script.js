@@ -17,7 +17,7 @@
 
   // Values of a tile by metric: of the pass, of a run's part of it, and of the whole frame.
   const share = (part, all) => (all ? 100 * part / all : 0);
-  const metrics = [
+  const metrics = data.metrics ? data.metrics.map(([key, name, unit]) => [name, unit, (p, r, t) => (r[key] || p[key])[t]]) : [
     ["L2 misses", "lines", (p, r, t) => r.l2_misses[t]],
     ["bytes from DRAM", "bytes", (p, r, t) => r.l2_misses[t] * data.line_bytes],
     ["L1 misses", "footprints", (p, r, t) => r.l1_misses[t]],
@@ -30,8 +30,14 @@
 
   // The tiles of each run by the time at which they end, with sums of misses up to each of them.
   for (const frame of data.frames) {
+    for (const pass of frame.passes) {
+      // Maps without time have no counts to sum.
+      const none = new Uint32Array(pass.tiles[0] * pass.tiles[1]);
+      pass.footprints ||= none;
+      if (data.metrics) for (const run of pass.runs) Object.assign(run, { start: none, end: none, l1_misses: none, l2_misses: none });
+    }
     frame.runs = data.runs.map((_, run) => {
-      const tiles = frame.passes.flatMap((pass, at) => pass.footprints.map((_, tile) => ({ pass: at, tile, of: pass.runs[run] })));
+      const tiles = frame.passes.flatMap((pass, at) => Array.from(pass.footprints, (_, tile) => ({ pass: at, tile, of: pass.runs[run] })));
       const begun = [...tiles].sort((a, b) => a.of.start[a.tile] - b.of.start[b.tile]);
       for (const pass of frame.passes) pass.runs[run].rank = new Uint32Array(pass.footprints.length);
       begun.forEach(({ of, tile }, rank) => (of.rank[tile] = rank));
@@ -258,6 +264,11 @@
   const describe = () => {
     if (!state.cursor) return ($("tile").textContent = "");
     const { pass: at, tile } = state.cursor, pass = frame().passes[at], columns = pass.tiles[0];
+    if (data.metrics) {
+      const own = run => metrics.map(([name, unit, of]) => `${digits(of(pass, run, tile))}${unit ? ` ${unit}` : ""} ${name}`).join(", ");
+      const texts = pass.runs.map((run, number) => `${data.runs[number].title}: ${own(run)}`);
+      return ($("tile").textContent = `${pass.name}, column ${tile % columns}, row ${Math.floor(tile / columns)}. ${texts.join("; ")}.`);
+    }
     const counts = pass.runs.map((run, number) => `${data.runs[number].title}: ${digits(run.l1_misses[tile])} L1 misses, ${digits(run.l2_misses[tile])} lines from memory, tile ${digits(run.rank[tile] + 1)} of the order on core ${run.core[tile]}`);
     const draws = [...pass.byDraw].filter(([, quads]) => quads.has(tile)).sort((a, b) => b[1].get(tile) - a[1].get(tile));
     const names = draws.slice(0, 3).map(([draw]) => data.draws[draw]);

@@ -10,6 +10,8 @@
 //! [one-at-a-time]                   # each value alone, the rest as in base; crossed with axes
 //! layout.block_order = ["morton", "tiled"]
 //! ```
+//!
+//! The key `caches` sets the sizes of L1 and L2 together, as in `caches = ["8/128", "16/256"]`.
 
 use super::keys::{parsed, set};
 use super::plan::{Axis, MOST_POINTS, Plan, PlanError};
@@ -19,7 +21,7 @@ use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
 /// A parsed experiment file.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ExperimentFile {
     /// Traces named in the file.
     pub traces: Vec<String>,
@@ -51,12 +53,7 @@ impl ExperimentFile {
     }
 
     fn read(document: &DeTable) -> Result<Self, KeyError> {
-        let mut file = Self {
-            traces: Vec::new(),
-            base: RunConfig::default(),
-            axes: Vec::new(),
-            one_at_a_time: Vec::new(),
-        };
+        let mut file = Self::default();
         let mut base = to_table(&file.base);
         // Axes are checked against the base, wherever it stands in the file.
         let mut sections: Vec<_> = document.iter().collect();
@@ -97,6 +94,28 @@ impl ExperimentFile {
             }
         }
         Ok(file)
+    }
+
+    /// Adds an axis `KEY=V1,V2,...`, whose values are numbers, booleans or text.
+    ///
+    /// # Errors
+    /// Another syntax, a second axis of the same key, or a value that the key does not take.
+    pub fn add_axis(&mut self, text: &str) -> Result<(), String> {
+        let axis =
+            Axis::parse(text).ok_or_else(|| format!("expected KEY=V1,V2,..., found `{text}`"))?;
+        if self.axes.iter().any(|known| known.key == axis.key) {
+            return Err(format!(
+                "`{}`: expected one list of values, found two",
+                axis.key
+            ));
+        }
+        for value in &axis.values {
+            let mut table = to_table(&self.base);
+            set(&mut table, &axis.key, value.clone());
+            parsed(&table).map_err(|message| format!("`{}`: {message}", axis.key))?;
+        }
+        self.axes.push(axis);
+        Ok(())
     }
 
     /// All points of the file.

@@ -4,9 +4,24 @@ use serde::Deserialize;
 use sim::config::{Levels, RunConfig};
 use toml::{Table, Value};
 
+/// Sizes of L1 and L2 as one key, as in `8/128`. Numbers without a unit are KiB.
+pub const CACHES: &str = "caches";
+
 /// Sets a dotted key, creating the tables on its path. Levels are addressed by name (`l1.size_bytes`); the
-/// level after the last one is added.
+/// level after the last one is added. [`CACHES`] sets two keys.
 pub(super) fn set(table: &mut Table, key: &str, value: Value) {
+    if key == CACHES
+        && let Some(sizes) = value.as_str()
+    {
+        // Without a slash, both sizes are the whole text, which no size is.
+        let (l1, l2) = sizes.split_once('/').unwrap_or((sizes, sizes));
+        for (key, size) in [("l1.size_bytes", l1), ("l2.size_bytes", l2)] {
+            let is_kib = sizes.contains('/') && size.trim().parse::<u64>().is_ok();
+            let unit = if is_kib { "KiB" } else { "" };
+            set(table, key, Value::String(format!("{}{unit}", size.trim())));
+        }
+        return;
+    }
     let Some((first, rest)) = key.split_once('.') else {
         table.insert(key.to_owned(), value);
         return;

@@ -19,6 +19,7 @@ mod tiles;
 
 pub use calibration::{Objective, SceneCaptures, SceneFit, Trial, is_of_the_table, trials};
 pub use file::{ExperimentFile, parse_config};
+pub use keys::CACHES;
 pub use outcome::{Outcome, ResultRow};
 pub use plan::{Axis, MOST_POINTS, Plan, PlanError, Point, Setting, plain};
 pub use runner::{AbsentPoint, Incomplete, RunError, merge, run, run_part};

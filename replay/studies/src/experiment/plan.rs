@@ -25,6 +25,25 @@ pub struct Axis {
 }
 
 impl Axis {
+    /// Parses `KEY=V1,V2,...`, whose values are numbers, booleans or text.
+    pub fn parse(text: &str) -> Option<Self> {
+        let (key, values) = text
+            .split_once('=')
+            .filter(|(key, values)| !key.is_empty() && !values.is_empty())?;
+        let value = |text: &str| {
+            let text = text.trim();
+            let number = text.parse().map(Value::Integer).ok();
+            let real = || text.parse().map(Value::Float).ok();
+            let flag = || text.parse().map(Value::Boolean).ok();
+            let value = number.or_else(real).or_else(flag);
+            value.unwrap_or_else(|| Value::String(text.to_owned()))
+        };
+        Some(Self {
+            key: key.to_owned(),
+            values: values.split(',').map(value).collect(),
+        })
+    }
+
     fn settings(&self) -> impl Iterator<Item = Setting> {
         let setting = |value: &Value| (self.key.clone(), value.clone());
         self.values.iter().map(setting)

@@ -246,6 +246,7 @@ unsafe fn track(
         driver: driver_text,
         refused,
         ballots,
+        opengl: instance.opengl,
     });
     if recorder.is_some() {
         // Without the space, recording is only slower.

@@ -17,7 +17,12 @@ pub(super) struct Instance {
     extensions: vk::PFN_vkEnumerateDeviceExtensionProperties,
     properties: vk::PFN_vkGetPhysicalDeviceProperties,
     properties2: Option<vk::PFN_vkGetPhysicalDeviceProperties2>,
+    /// Whether the caller implements OpenGL on Vulkan.
+    pub opengl: bool,
 }
+
+/// Engine names of the implementations of OpenGL on Vulkan.
+const OPENGL_ENGINES: [&CStr; 2] = [c"mesa zink", c"ANGLE"];
 
 static INSTANCES: LazyLock<Mutex<HashMap<usize, Arc<Instance>>>> = LazyLock::new(Mutex::default);
 
@@ -134,6 +139,8 @@ pub(super) unsafe extern "system" fn create_instance(
             .as_ref()
             .copied()
             .unwrap_or_default();
+        let engine = application.engine_name_as_c_str();
+        let opengl = engine.is_some_and(|name| OPENGL_ENGINES.contains(&name));
         application.api_version = application.api_version.max(NEEDED);
         let mut asked = *info;
         if capture().is_some() {
@@ -176,6 +183,7 @@ pub(super) unsafe extern "system" fn create_instance(
                     c"vkGetPhysicalDeviceProperties2",
                     PFN_vkGetPhysicalDeviceProperties2
                 ),
+                opengl,
             };
             lock(&INSTANCES).insert(dispatch_key(handle), Arc::new(new));
         }

@@ -23,6 +23,16 @@ pub struct Thumbnail {
     pub texels: Vec<u8>,
 }
 
+impl Thumbnail {
+    pub(crate) fn upside_down(self) -> Self {
+        let rows = self.texels.chunks(4 * self.size[0] as usize);
+        Self {
+            texels: rows.rev().flatten().copied().collect(),
+            size: self.size,
+        }
+    }
+}
+
 /// A render pass of a frame.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PassRow {
@@ -91,11 +101,13 @@ fn rows(
     let numbers = views::pass_numbers(frame);
     let mut rows: Vec<PassRow> = Vec::new();
     let mut textures: Vec<HashSet<ViewInfo>> = Vec::new();
+    let mut bottom_up: Vec<bool> = Vec::new();
     for (place, executed) in frame.draws.iter().enumerate() {
         let number = numbers[place];
         if number == rows.len() {
             rows.push(empty_row(session, number, executed.pass));
             textures.push(HashSet::new());
+            bottom_up.push(false);
         }
         let row = &mut rows[number];
         row.draws += 1;
@@ -111,6 +123,8 @@ fn rows(
             continue;
         };
         add_once(&mut row.viewports, viewport(info));
+        let role = views.map(|views| views.roles[place]);
+        bottom_up[number] |= session.is_bottom_up(info, role);
         for caveat in info.unrecorded.iter().chain(&info.caveats) {
             add_once(&mut row.caveats, caveat.clone());
         }
@@ -132,6 +146,13 @@ fn rows(
             Some((0..texture.levels).map(level).sum::<u64>() * u64::from(texture.layers))
         });
         row.texture_bytes = bytes.sum();
+    }
+    for (row, _) in rows
+        .iter_mut()
+        .zip(bottom_up)
+        .filter(|(_, bottom_up)| *bottom_up)
+    {
+        row.picture = row.picture.take().map(Thumbnail::upside_down);
     }
     rows
 }

@@ -89,6 +89,15 @@ mod tests {
     use crate::views::{Role, Rule, View};
 
     #[test]
+    fn a_picture_that_is_bottom_up_is_turned() {
+        let picture = Thumbnail {
+            size: [1, 2],
+            texels: vec![1, 2, 3, 4, 5, 6, 7, 8],
+        };
+        assert_eq!(picture.upside_down().texels, [5, 6, 7, 8, 1, 2, 3, 4]);
+    }
+
+    #[test]
     fn a_page_shows_passes_and_their_pictures_and_escapes_names() {
         let row = PassRow {
             shows: vec![Role::Shadow],

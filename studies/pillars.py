@@ -1,0 +1,44 @@
+"""README.md's table of what each part of Parallax measures: one row for each kind of result, from the results files of the studies behind them."""
+
+from .common import read_csv
+
+MASK, MULTIVIEW, RINGS = "hidden-area-mask", "multiview", "foveation-rings"
+SCENES = ("atrium", "jungle", "plant")
+
+
+def ends(values, unit="%", digits=1):
+    values = [float(value) for value in values]
+    return f"{min(values):.{digits}f} to {max(values):.{digits}f}{' ' + unit if unit else ''}"
+
+
+def techniques(study, name, key):
+    """The change of a count by a technique in percent, and its image error, over three scenes."""
+    rows = [next(row for row in read_csv(study.results / f"techniques-{scene}.csv") if row["technique"] == name) for scene in SCENES]
+    return ends(100 * (1 - float(row[key])) for row in rows), ends((row["FLIP, mean"] for row in rows), "", 3)
+
+
+def run(study):
+    table = lambda name: read_csv(study.results / f"{name}.csv")
+    rows = []
+
+    def add(what, saves, error, measured, page):
+        rows.append([what, saves, error, measured, f"[{page.split('/')[-1]}](docs/results/{page}.md)"])
+
+    paper = [row for row in table("paper-means") if row["scene"] in ("Crytek Sponza", "Dabrovic Sponza", "atrium", "jungle", "atrium-plain")]
+    add("Tile order Z2 STA", f"{ends(row['STA saved %'].split()[0] for row in paper)} of texture bytes against Morton", "none",
+        f"{len(paper)} scenes, the Z2 paper's machine", "z2-comparison")
+    quest = next(row for row in table("sizes-machines") if row["machine"] == "adreno-740" and row["display"] == "quest3")
+    low, high = quest["zig-zag+sta+offset %"].split("[")[1].rstrip("]").split(" to ")
+    add("Tile order zig-zag+sta+offset", f"{ends((-float(high), -float(low)))} of texture bytes against Z2 STA", "none",
+        f"{quest['scenes']} scenes, Adreno 740, Quest 3", "sizes")
+    for name, key, what in ((MASK, "fragments", "fragments"), (MULTIVIEW, "draws", "draw calls"), (RINGS, "fragments", "fragments")):
+        saved, flip = techniques(study, name, key)
+        add(f"Technique {name}", f"{saved} of {what}", f"FLIP {flip}" if float(flip.split()[-1]) else "none", f"{len(SCENES)} built-in scenes, 10 pixels per degree", "techniques")
+    reuse = [row for row in table("reprojection") if row["run"] == "chosen"]
+    add("Reprojection of ray hits", f"{ends((100 * (float(row['relative_performance']) - 1) for row in reuse))} more frames per second, "
+        f"{ends((100 * (float(row['relative_energy']) - 1) for row in reuse))} more energy", f"FLIP {ends((row['flip_mean'] for row in reuse), '', 4)}",
+        f"{len(reuse)} scenes, the SGRT paper's machine", "reprojection")
+    programs = [row for row in table("applications") if row["Z2 STA saves %"] not in ("", "-")]
+    add("Z2 STA in unmodified programs", f"{ends(row['Z2 STA saves %'] for row in programs)} of texture bytes against Morton", "none",
+        f"{len(programs)} programs and pages", "applications")
+    study.write("pillars", "from paper-means, sizes-machines, techniques-*, reprojection and applications", "what | saves, lowest to highest | image error | measured on | page", rows)
