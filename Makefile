@@ -10,15 +10,18 @@ PREFIX ?= $(HOME)/.local
 # Folder of the real scenes (docs/use/real-scenes.md).
 SCENES ?= $(OUT)/scenes
 
-.PHONY: demo dist install apps techniques accuracy stress notebooks test fuzz faults bench lint programs build deps golden figures reproduce clean screenshots scenes scene-files
+.PHONY: demo dist wheel install apps techniques accuracy stress notebooks test fuzz faults bench lint programs build deps golden figures reproduce clean screenshots scenes scene-files
 
 demo: deps programs
 	@OUT="$(OUT)" scripts/demo.sh
 
 # An archive and a Python wheel, which run without Rust, in $(OUT)/dist (docs/use/install.md).
-dist:
+dist: KINDS = archive wheel
+# The wheel alone.
+wheel: KINDS = wheel
+dist wheel:
 	$(CARGO) build --release --locked -p tracegen -p replay -p layer -p xr -p parallax-python
-	@python3 -B scripts/dist.py "$${CARGO_TARGET_DIR:-target}/release" "$(OUT)/dist" archive wheel
+	@python3 -B scripts/dist.py "$${CARGO_TARGET_DIR:-target}/release" "$(OUT)/dist" $(KINDS)
 
 install: build
 	@python3 -B scripts/dist.py "$${CARGO_TARGET_DIR:-target}/release" "$(DESTDIR)$(PREFIX)" install
@@ -39,9 +42,9 @@ stress: deps build
 accuracy: deps build
 	@python3 -m studies accuracy --out "$(OUT)" --results "$(OUT)/accuracy"
 
-# The Python package and its notebooks in a fresh virtual environment, with packages from PyPI (docs/use/python.md).
-notebooks: build
-	@OUT="$(OUT)" scripts/notebooks.sh
+# The wheel in a fresh virtual environment with packages from PyPI: its notebooks in empty folders, and its tests (docs/use/python.md).
+notebooks: wheel
+	@OUT="$(OUT)" PARALLAX_WHEEL="$$(ls -t "$(OUT)"/dist/*.whl | head -n 1)" scripts/notebooks.sh
 
 test:
 	@scripts/install-deps.sh test

@@ -133,22 +133,23 @@ def archive(name, files):
 
 
 def wheel(version, tag, native, files):
-    """A wheel of the package, the programs and their libraries."""
+    """Name and bytes of a wheel of the package, the programs and their libraries."""
     project = tomllib.loads((ROOT / "python/pyproject.toml").read_text())["project"]
     metadata = {"Metadata-Version": "2.1", "Name": project["name"], "Version": version}
     metadata |= {"Summary": project["description"], "Requires-Python": project["requires-python"]}
+    package = project["name"].replace("-", "_")
     lines = [f"{key}: {value}" for key, value in metadata.items()]
     lines += [f"License: {project['license']['text']}"]
     lines += [f"Requires-Dist: {need}" for need in project["dependencies"]]
     for extra, needs in project["optional-dependencies"].items():
         lines += [f"Provides-Extra: {extra}"]
         lines += [f'Requires-Dist: {need}; extra == "{extra}"' for need in needs]
-    info = f"parallax-{version}.dist-info/"
-    data = f"parallax-{version}.data/"
-    entries = {"parallax/_native.abi3.so": native}
-    for path in (ROOT / "python/parallax").glob("*.*"):
+    info = f"{package}-{version}.dist-info/"
+    data = f"{package}-{version}.data/"
+    entries = {f"{package}/_native.abi3.so": native}
+    for path in (ROOT / "python" / package).glob("*.*"):
         if path.suffix in (".py", ".pyi", ".typed"):
-            entries[f"parallax/{path.name}"] = path.read_bytes()
+            entries[f"{package}/{path.name}"] = path.read_bytes()
     for path, content in files.items():
         if path.startswith("bin/"):
             entries[data + "scripts" + path[3:]] = content
@@ -169,7 +170,7 @@ def wheel(version, tag, native, files):
             entry = zipfile.ZipInfo(path)  # of 1980
             entry.external_attr = (0o100000 | mode(path)) << 16
             out.writestr(entry, content, zipfile.ZIP_DEFLATED)
-    return packed.getvalue()
+    return f"{package}-{version}-{tag}.whl", packed.getvalue()
 
 
 def write(path, data):
@@ -204,7 +205,8 @@ def main():
     if "wheel" in options.kinds:
         # abi3-py39 of the crate pyo3.
         tag = f"cp39-abi3-manylinux_2_{glibc}_{target.split('-')[0]}"
-        outputs[f"parallax-{version}-{tag}.whl"] = wheel(version, tag, native, files)
+        file, data = wheel(version, tag, native, files)
+        outputs[file] = data
     for file, data in outputs.items():
         write(out / file, data)
         print(f"{out / file}: {len(data) / 1e6:.1f} MB, for glibc 2.{glibc} or later")

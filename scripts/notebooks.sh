@@ -1,10 +1,11 @@
 #!/bin/sh
-# Installs the Python package into a fresh virtual environment, tests it, and executes its notebooks.
+# Installs the wheel into a fresh virtual environment, executes the package's notebooks, and runs its tests.
+#   PARALLAX_WHEEL=FILE   the wheel (`make wheel`)
 #   OUT=FOLDER            executed notebooks and their figures go to FOLDER/notebooks (default out)
-#   PARALLAX_WHEEL=FILE   the wheel (`make dist`); without it, pip builds the extension module
 #   UPDATE_NOTEBOOKS=1    rewrites the notebooks and the figures of docs/use/python.md
 # Exit code 3, with a line `SKIPPED: ...`, where venv or the package index is absent.
 set -eu
+wheel=$(realpath "${PARALLAX_WHEEL:?expected the wheel that \`make wheel\` writes}")
 cd "$(dirname "$0")/.."
 out=${OUT:-out}/notebooks
 mkdir -p "$out"
@@ -26,11 +27,18 @@ pip download --quiet --no-deps --dest "$out" iniconfig >"$out/pip.log" 2>&1 ||
     absent "the Python package index cannot be reached"
 
 # Byte code of packages that run once is not worth its time.
-pip install --quiet --no-compile "${PARALLAX_WHEEL:-./python}[notebooks]"
-# Not from python/, whose folder `parallax` has no extension module.
-"$python" -m pytest -q -p no:cacheprovider python/tests
+pip install --quiet --no-compile "$wheel[notebooks,tests]"
+# Not from python/, whose folder `parallax_traces` has no extension module.
+"$python" -m pytest -q -p no:cacheprovider python/tests >"$out/tests.log" 2>&1 &
+code=0
 if [ "${UPDATE_NOTEBOOKS:-}" = 1 ]; then
-    "$python" python/notebooks/execute.py --update
+    "$python" python/notebooks/execute.py --update || code=1
 else
-    "$python" python/notebooks/execute.py "$out"
+    # The copies have the package, and neither its sources nor the programs that were built.
+    rm -rf "$out/copy"
+    cp -r python/notebooks "$out/copy"
+    (cd "$out/copy" && "$python" execute.py "$out") || code=1
 fi
+wait $! || code=1
+cat "$out/tests.log"
+exit $code

@@ -11,7 +11,7 @@ import sys
 import time
 from pathlib import Path
 
-import parallax
+import parallax_traces as plx
 
 RUNS = 5
 
@@ -48,10 +48,10 @@ def median(call):
 
 def main(trace, target):
     functional = {"mode": "functional", "order": "z2-sta"}
-    read_s, records = median(lambda: parallax.read_textrace(trace))
-    lines_s, lines = median(lambda: parallax.lines(trace, "z2-sta"))
-    run_s, built_in = median(lambda: parallax.run(trace, functional))
-    own_s, own = once(lambda: parallax.run(trace, functional, policy=LRU))
+    read_s, records = median(lambda: plx.read_textrace(trace))
+    lines_s, lines = median(lambda: plx.lines(trace, "z2-sta"))
+    run_s, built_in = median(lambda: plx.run(trace, functional))
+    own_s, own = once(lambda: plx.run(trace, functional, policy=LRU))
     assert own["external_bytes"][0] == built_in["external_bytes"][0]
     lookups = len(lines["address"])
     rows = [

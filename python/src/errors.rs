@@ -5,7 +5,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 create_exception!(
-    parallax,
+    parallax_traces,
     ParallaxError,
     PyValueError,
     "A trace that cannot be read, or a setting that cannot be used. The text is that of the command line."

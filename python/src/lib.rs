@@ -1,4 +1,4 @@
-//! The extension module of the Python package `parallax`. It contains the functions that need Rust.
+//! The extension module of the Python package `parallax_traces`. It contains the functions that need Rust.
 //! The package's Python modules convert their results to tables and data frames, and document them.
 
 mod errors;
@@ -11,7 +11,7 @@ mod tables;
 
 use pyo3::prelude::*;
 
-/// Functions of the package `parallax` written in Rust.
+/// Functions of the package `parallax_traces` written in Rust.
 #[pymodule]
 mod _native {
     #[pymodule_export]
@@ -23,7 +23,7 @@ mod _native {
     #[pymodule_export]
     use super::policies::name_policy;
     #[pymodule_export]
-    use super::replays::{config_json, read_settings, reproject, result, run, sweep};
+    use super::replays::{config_json, read_settings, result, run, sweep};
     #[pymodule_export]
     use super::tables::{info, raytrace, textrace};
 

@@ -5,7 +5,6 @@ use crate::jobs::{self, Traces};
 use crate::policies;
 use anyhow::{Context, Result, anyhow, bail};
 use pyo3::prelude::*;
-use replay::cli::ReuseArgs;
 use replay::config::{Order, RunConfig};
 use replay::experiment::{self, ExperimentFile, Outcome, Plan, PlanError, Subject, parse_config};
 use replay::memory::Replacement;
@@ -203,22 +202,6 @@ pub fn sweep(py: Python<'_>, paths: Vec<PathBuf>, settings: Settings) -> PyResul
         replayed(&paths, &settings.policies, &plan, &stop, |outcome| {
             rows(&file, outcome)
         })
-    })
-}
-
-/// The rows of `replay reproject --parquet`. Parameters of the model are in a file or are TOML.
-#[pyfunction]
-pub fn reproject(
-    py: Python<'_>,
-    files: Vec<PathBuf>,
-    names: [Option<String>; 3],
-    config: Option<PathBuf>,
-    parameters: Option<String>,
-) -> PyResult<Vec<u8>> {
-    jobs::run(py, move |_| {
-        let reused = ReuseArgs::named(names.each_ref().map(Option::as_deref), config)?;
-        let rows = replay::cli::reproject::rows(files, reused, parameters.as_deref())?;
-        Ok(parquet::bytes(&rows)?)
     })
 }
 

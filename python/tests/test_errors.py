@@ -6,9 +6,9 @@ import sys
 import textwrap
 
 import numpy as np
-import parallax
+import parallax_traces as plx
 import pytest
-from parallax import ParallaxError
+from parallax_traces import ParallaxError
 from test_replays import LRU, SMALL, scanline
 
 
@@ -39,16 +39,16 @@ def test_files_that_are_no_traces(atrium, traces, tmp_path, replay):
     empty.write_bytes(b"")
     for path in [tmp_path / "none.textrace", tmp_path, cut, broken, empty]:
         expected = printed(replay, "run", path)
-        for call in [parallax.read_textrace, parallax.lines, parallax.run, parallax.result]:
+        for call in [plx.read_textrace, plx.lines, plx.run, plx.result]:
             assert refused(str(path), call, path) == expected
     rays = traces / "teapot-rays.raytrace"
-    assert refused("textrace", parallax.run, rays) == printed(replay, "run", rays)
-    refused("raytrace", parallax.read_raytrace, atrium)
-    assert refused("raytrace", parallax.reproject, atrium) == printed(replay, "reproject", atrium)
-    refused("rows: expected rays, samples, visits, nodes or slots", parallax.read_raytrace, rays, "pixels")
+    assert refused("textrace", plx.run, rays) == printed(replay, "run", rays)
+    refused("raytrace", plx.read_raytrace, atrium)
+    assert refused("raytrace", plx.reproject, atrium) == printed(replay, "reproject", atrium)
+    refused("rows: expected rays, samples, visits, nodes or slots", plx.read_raytrace, rays, "pixels")
     for wrong in [None, 7, b"bytes", [atrium]]:
-        refused("path: expected a path, found", parallax.read_textrace, wrong)
-    refused("trace: expected a path, found NoneType", parallax.run, [None])
+        refused("path: expected a path, found", plx.read_textrace, wrong)
+    refused("trace: expected a path, found NoneType", plx.run, [None])
     assert issubclass(ParallaxError, ValueError)
 
 
@@ -75,7 +75,7 @@ def test_files_that_are_no_traces(atrium, traces, tmp_path, replay):
     ],
 )
 def test_settings_that_are_none(atrium, config, match):
-    refused(match, parallax.run, atrium, config)
+    refused(match, plx.run, atrium, config)
 
 
 def test_settings_in_files_have_the_errors_of_the_program(atrium, replay, tmp_path):
@@ -83,23 +83,28 @@ def test_settings_in_files_have_the_errors_of_the_program(atrium, replay, tmp_pa
     for text in ["cores = 1\ncore = 2", "cores = ", "[l1]\nways = 0", "\udcff"]:
         file.write_bytes(text.encode("utf-8", "surrogateescape"))
         expected = printed(replay, "run", atrium, "--config", file)
-        assert refused("", parallax.run, atrium, file) == expected
+        assert refused("", plx.run, atrium, file) == expected
     absent = tmp_path / "absent.toml"
     expected = printed(replay, "run", atrium, "--config", absent)
-    assert refused("absent.toml", parallax.run, atrium, absent) == expected
+    assert refused("absent.toml", plx.run, atrium, absent) == expected
     file.write_text("mode = 'functional'\ncores = 1")
-    assert parallax.run(atrium, file, order="z2-sta")["cores"][0] == 1
+    assert plx.run(atrium, file, order="z2-sta")["cores"][0] == 1
+
+
+def test_no_traces_are_an_error():
+    for call in [plx.run, plx.orders, lambda none: plx.sweep({"base": {}}, none)]:
+        refused("traces: expected at least one, found none", call, [])
 
 
 def test_sweeps_that_are_none(atrium):
-    refused("traces: expected at least one, found none", parallax.sweep, {"base": {}})
-    refused("experiment: `bas`: unknown key", parallax.sweep, {"bas": {"cores": 1}}, atrium)
+    refused("traces: expected at least one, found none", plx.sweep, {"base": {}})
+    refused("experiment: `bas`: unknown key", plx.sweep, {"bas": {"cores": 1}}, atrium)
     axes = {"axes": {"seed": range(10**6)}}
-    refused("expected at most 100000 values, found 1000000", parallax.sweep, axes, atrium)
-    refused("experiment: expected a dict or a path", parallax.sweep, 7, atrium)
+    refused("expected at most 100000 values, found 1000000", plx.sweep, axes, atrium)
+    refused("experiment: expected a dict or a path", plx.sweep, 7, atrium)
 
 
-ITEMS = scanline(parallax.Grid(15, 17, 2, 0, 0))
+ITEMS = scanline(plx.Grid(15, 17, 2, 0, 0))
 
 
 @pytest.mark.parametrize(
@@ -125,17 +130,17 @@ ITEMS = scanline(parallax.Grid(15, 17, 2, 0, 0))
     ],
 )
 def test_orders_that_are_none(atrium, order, match):
-    refused(match, parallax.run, atrium, SMALL, order=order)
-    refused(match, parallax.lines, atrium, order)
+    refused(match, plx.run, atrium, SMALL, order=order)
+    refused(match, plx.lines, atrium, order)
 
 
 def test_orders_of_other_traces(atrium, traces):
-    name = parallax.run(atrium, SMALL, order=scanline)["order"][0]
-    refused("expected", parallax.run, traces / "jungle.textrace", SMALL, order=name)
-    refused("expected", parallax.run, atrium, {**SMALL, "tile_px": 32}, order=name)
+    name = plx.run(atrium, SMALL, order=scanline)["order"][0]
+    refused("expected", plx.run, traces / "jungle.textrace", SMALL, order=name)
+    refused("expected", plx.run, atrium, {**SMALL, "tile_px": 32}, order=name)
     both = [atrium, traces / "jungle.textrace"]
-    refused("expected one trace for an order that is not named, found 2", parallax.run, both, order=scanline)
-    refused("expected", parallax.sweep, {"base": {**SMALL, "order": scanline}, "axes": {"tile_px": [32]}}, atrium)
+    refused("expected one trace for an order that is not named, found 2", plx.run, both, order=scanline)
+    refused("expected", plx.sweep, {"base": {**SMALL, "order": scanline}, "axes": {"tile_px": [32]}}, atrium)
 
 
 def test_exceptions_of_orders_and_policies_pass_through(atrium):
@@ -143,29 +148,29 @@ def test_exceptions_of_orders_and_policies_pass_through(atrium):
         raise KeyError("mine")
 
     with pytest.raises(KeyError, match="mine"):
-        parallax.run(atrium, SMALL, order=order)
+        plx.run(atrium, SMALL, order=order)
 
     class Raises(LRU):
         def victim(self, set):
             raise LookupError("no way")
 
     with pytest.raises(LookupError, match="no way"):
-        parallax.run(atrium, SMALL, policy=Raises)
+        plx.run(atrium, SMALL, policy=Raises)
 
     class NoArguments:
         pass
 
     with pytest.raises(TypeError):
-        parallax.run(atrium, SMALL, policy=NoArguments)
+        plx.run(atrium, SMALL, policy=NoArguments)
 
     class NoMethods:
         def __init__(self, sets, ways):
             pass
 
     with pytest.raises(AttributeError, match="hit"):
-        parallax.run(atrium, SMALL, policy=NoMethods)
+        plx.run(atrium, SMALL, policy=NoMethods)
     # A class that failed does not spoil the next replay.
-    assert parallax.run(atrium, SMALL, policy=LRU)["l1_footprint_miss_pct"][0] > 0
+    assert plx.run(atrium, SMALL, policy=LRU)["l1_footprint_miss_pct"][0] > 0
 
 
 @pytest.mark.parametrize("way", [4, -1, None, "0", 1 << 70, 0.5])
@@ -174,30 +179,30 @@ def test_ways_that_are_none(atrium, way):
         def victim(self, set):
             return way
 
-    text = refused("expected a way from 0 to 3, found", parallax.run, atrium, SMALL, policy=Bad)
+    text = refused("expected a way from 0 to 3, found", plx.run, atrium, SMALL, policy=Bad)
     assert text.startswith("Bad@python: victim(") and text.endswith(f"found {way!r}")
 
 
 def test_policies_that_are_none(atrium):
-    refused("policy: expected a name of a policy, found `mru`", parallax.run, atrium, SMALL, policy="mru")
+    refused("policy: expected a name of a policy, found `mru`", plx.run, atrium, SMALL, policy="mru")
     other = type("LRU", (LRU,), {})
     two = {**SMALL, "l1.replacement": LRU, "l2.replacement": other}
-    refused("policy: two classes are named LRU", parallax.run, atrium, two)
+    refused("policy: two classes are named LRU", plx.run, atrium, two)
 
 
 def test_reprojections_that_are_none(traces, replay):
     path = traces / "teapot-rays.raytrace"
-    refused("tni.units", parallax.reproject, path, config={"tni": {"units": 0}})
-    refused("unit", parallax.reproject, path, config={"tni": {"unit": 1}})
-    refused("--rule", parallax.reproject, path, rule="sometimes")
-    refused("--preset", parallax.reproject, path, preset="sgrt")
-    refused("expected at least one ray trace, found none", parallax.reproject, [])
+    refused("tni.units", plx.reproject, path, config={"tni": {"units": 0}})
+    refused("unit", plx.reproject, path, config={"tni": {"unit": 1}})
+    refused("--rule", plx.reproject, path, rule="sometimes")
+    refused("--preset", plx.reproject, path, preset="sgrt")
+    refused("traces: expected at least one, found none", plx.reproject, [])
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT")
 def test_ctrl_c_ends_a_long_replay(atrium):
     code = f"""
-        import parallax, signal
+        import parallax_traces as plx, signal
         # A parent that runs in the background may have left SIGINT ignored.
         signal.signal(signal.SIGINT, signal.default_int_handler)
         class Slow:
@@ -207,7 +212,7 @@ def test_ctrl_c_ends_a_long_replay(atrium):
             def victim(self, set): return 0
         print("started", flush=True)
         try:
-            parallax.run({str(atrium)!r}, {{"mode": "functional"}}, policy=Slow)
+            plx.run({str(atrium)!r}, {{"mode": "functional"}}, policy=Slow)
         except KeyboardInterrupt:
             print("interrupted")
     """

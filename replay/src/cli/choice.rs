@@ -10,7 +10,7 @@ pub(super) fn possible_values<T: Choice>() -> impl Iterator<Item = PossibleValue
 }
 
 /// The value of a name.
-pub(super) fn named<T: Choice>(name: &str) -> Result<T, String> {
+fn named<T: Choice>(name: &str) -> Result<T, String> {
     let mut values = T::choices().iter().copied();
     let found = values.find(|value| value.choice_name() == name);
     found.ok_or_else(|| {

@@ -37,7 +37,6 @@ mod view;
 mod warnings;
 
 pub use config_args::ConfigArgs;
-pub use reuse_args::ReuseArgs;
 
 use capture::Capture;
 use clap::{Arg, Parser, Subcommand};

@@ -9,9 +9,7 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use formats::raytrace::Raytrace;
 use image_error::{Picture, png};
-use report::document::Document;
 use report::sgrt::{self as document, Entry, ReprojectReport, Thumbnails};
-use report::table::Table;
 use report::view_rays::RayMaps;
 use sgrt::compose::Reuse;
 use sgrt::config::{DEFAULT_TOML, SgrtConfig};
@@ -111,40 +109,6 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     args.outputs
         .write(&report, prints, || document::page(&report.entries))?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// The rows that `--parquet` writes, with the defaults of the other flags. `parameters` is the text of a `--config`
-/// file.
-///
-/// # Errors
-/// As [`run`].
-pub fn rows(
-    files: Vec<PathBuf>,
-    reused: ReuseArgs,
-    parameters: Option<&str>,
-) -> anyhow::Result<Table> {
-    ensure!(
-        !files.is_empty(),
-        "expected at least one ray trace, found none"
-    );
-    let config = match parameters {
-        None => reused.parameters()?,
-        Some(text) => {
-            let named = reused.preset.map_or("", |preset| preset.parameters);
-            SgrtConfig::from_layers(&[named, text]).context("config")?
-        }
-    };
-    let args = ReprojectArgs {
-        files,
-        reused,
-        ..ReprojectArgs::default()
-    };
-    let entries = args
-        .files
-        .iter()
-        .map(|path| report_on(path, &args, &config));
-    let entries = entries.collect::<anyhow::Result<_>>()?;
-    Ok(ReprojectReport { entries }.rows())
 }
 
 /// Refuses options that only the closed form supports.

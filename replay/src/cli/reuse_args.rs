@@ -1,6 +1,6 @@
 //! Options of the commands that reuse hits: rule, level of reuse and model parameters.
 
-use super::choice::{choice, named};
+use super::choice::choice;
 use anyhow::Context;
 use clap::Args;
 use sgrt::DEFAULT_RULE;
@@ -8,7 +8,6 @@ use sgrt::compose::Reuse;
 use sgrt::config::SgrtConfig;
 use sgrt::presets::{self, Preset};
 use sgrt::rules::{self, Rule};
-use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 /// What is reused, and the machine.
@@ -37,33 +36,7 @@ fn preset(name: &str) -> Result<&'static Preset, String> {
     presets::find(name).ok_or_else(|| format!("expected {}", names()))
 }
 
-/// The value of a flag, if it is given.
-fn value<T, E: Display>(
-    flag: &str,
-    name: Option<&str>,
-    parse: impl Fn(&str) -> Result<T, E>,
-) -> anyhow::Result<Option<T>> {
-    let parse = |name| parse(name).map_err(|why| anyhow::anyhow!("{flag} {name}: {why}"));
-    name.map(parse).transpose()
-}
-
 impl ReuseArgs {
-    /// The options by name: preset, rule and level of reuse.
-    ///
-    /// # Errors
-    /// A name that its flag does not know.
-    pub fn named(
-        [of_preset, rule, reuse]: [Option<&str>; 3],
-        config: Option<PathBuf>,
-    ) -> anyhow::Result<Self> {
-        Ok(Self {
-            preset: value("--preset", of_preset, preset)?,
-            rule: value("--rule", rule, str::parse::<Rule>)?,
-            reuse: value("--reuse", reuse, named::<Reuse>)?,
-            config,
-        })
-    }
-
     /// The rule: the user's, else the preset's, else the default.
     pub fn rule(&self) -> anyhow::Result<Rule> {
         let named = self.preset.map_or(DEFAULT_RULE, |preset| preset.rule);

@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Union
 
 import pandas as pd
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from . import _native
-from ._settings import Writer, experiment_of, path_of, paths_of, settings_of, _read
+from ._settings import AnyPath, Config, Order, Paths, Policy, experiment_of, path_of, paths_of, settings_of
+from ._tables import frame_of
 
 
-def _frame(rows: bytes) -> pd.DataFrame:
-    """The rows of a Parquet file of ``replay``. ``attrs["columns"]`` has units and meanings."""
-    table = pq.read_table(pa.BufferReader(rows))
-    frame = table.to_pandas()
-    columns = (table.schema.metadata or {}).get(b"parallax.columns")
-    if columns:
-        frame.attrs["columns"] = json.loads(columns)
-    return frame
-
-
-def run(traces: Any, config: Any = None, *, order: Any = None, policy: Any = None) -> pd.DataFrame:
+def run(
+    traces: Paths, config: Config = None, *, order: Order = None, policy: Policy = None
+) -> pd.DataFrame:
     """Replays traces through caches and texture units, like ``replay run``.
 
     Parameters
@@ -56,12 +48,12 @@ def run(traces: Any, config: Any = None, *, order: Any = None, policy: Any = Non
         Ctrl-C. The replay ends in the background at its next frame.
     """
     paths = paths_of(traces)
-    return _frame(_native.run(paths, settings_of(config, paths, order, policy)))
+    return frame_of(_native.run(paths, settings_of(config, paths, order, policy)))
 
 
 def result(
-    trace: Any, config: Any = None, *, order: Any = None, policy: Any = None, tiles: bool = False
-) -> dict:
+    trace: AnyPath, config: Config = None, *, order: Order = None, policy: Policy = None, tiles: bool = False
+) -> dict[str, Any]:
     """What ``replay run --json`` prints: all counts of one replay, by view, texture and level.
 
     Parameters
@@ -85,10 +77,13 @@ def result(
     path = path_of(trace)
     settings = settings_of(config, [path], order, policy)
     settings["tiles"] = bool(tiles)
-    return json.loads(_native.result(path, settings))
+    found: dict[str, Any] = json.loads(_native.result(path, settings))
+    return found
 
 
-def sweep(experiment: Any, traces: Any = ()) -> pd.DataFrame:
+def sweep(
+    experiment: Union[AnyPath, Mapping[str, Any]], traces: Union[Paths, None] = None
+) -> pd.DataFrame:
     """Replays every point of an experiment, like ``replay sweep``. Points share work.
 
     Parameters
@@ -110,47 +105,7 @@ def sweep(experiment: Any, traces: Any = ()) -> pd.DataFrame:
     ParallaxError
         As :func:`run`.
     """
-    paths = paths_of(traces)
-    if not paths and hasattr(experiment, "get"):
-        paths = paths_of(experiment.get("traces", ()))
-    return _frame(_native.sweep(paths, experiment_of(experiment, paths)))
-
-
-def reproject(
-    traces: Any,
-    *,
-    preset: str | None = None,
-    rule: str | None = None,
-    reuse: str | None = None,
-    config: Any = None,
-) -> pd.DataFrame:
-    """Replays ray traces through a ray-tracing GPU that reuses left pixels, like ``replay reproject``.
-
-    Parameters
-    ----------
-    traces : path or list of paths
-        Ray traces.
-    preset, rule, reuse : str, optional
-        As the flags of the same names.
-    config : dict or path, optional
-        Parameters of the model, nested or with dots, or a TOML file with them.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Two rows per trace, one for the rule and one for plain reuse, with the columns of
-        ``replay reproject --csv``.
-
-    Raises
-    ------
-    ParallaxError
-        A trace cannot be read, or a setting cannot be used.
-    """
-    names = [None if name is None else str(name) for name in (preset, rule, reuse)]
-    file = text = None
-    settings = _read(config, "config")
-    if settings is not None:
-        file = settings["file"]
-    elif config:
-        text = Writer([], 16).settings(config)["text"]
-    return _frame(_native.reproject(paths_of(traces), names, file, text))
+    if traces is None and isinstance(experiment, Mapping):
+        traces = experiment.get("traces")
+    paths = [] if traces is None else paths_of(traces)
+    return frame_of(_native.sweep(paths, experiment_of(experiment, paths)))

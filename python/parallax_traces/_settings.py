@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Callable, Union
 
 import numpy as np
 
 from . import _native, _orders
 
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
-class Settings(dict):
+AnyPath = Union[str, "os.PathLike[str]"]
+Paths = Union[AnyPath, Iterable[AnyPath]]
+Config = Union[AnyPath, Mapping[str, Any], None]
+Order = Union[
+    str, Callable[["_orders.Grid"], "Union[Sequence[Any], NDArray[Any]]"], Sequence[Any], "NDArray[Any]", None
+]
+Policy = Union[str, type, None]
+
+
+class Settings(dict[str, Any]):
     """What the native functions take: the text, its file, and names of what is not text."""
 
     def __init__(self, text: str = "", file: Path | None = None) -> None:
@@ -22,30 +33,31 @@ class Settings(dict):
         )
 
 
-def path_of(trace: Any, what: str = "trace") -> Path:
+def path_of(trace: AnyPath, what: str = "trace") -> Path:
     """A path, or an error that names the argument."""
     if isinstance(trace, (str, os.PathLike)):
         return Path(os.fspath(trace))
     raise _native.ParallaxError(f"{what}: expected a path, found {type(trace).__name__}")
 
 
-def paths_of(traces: Any) -> list[Path]:
-    """One path, or several."""
-    if isinstance(traces, (str, os.PathLike)):
+def paths_of(traces: Paths) -> list[Path]:
+    """One path or more."""
+    if isinstance(traces, (str, os.PathLike)) or not isinstance(traces, Iterable):
         return [path_of(traces)]
-    try:
-        return [path_of(trace) for trace in traces]
-    except TypeError:
-        return [path_of(traces)]
+    paths = [path_of(trace) for trace in traces]
+    if not paths:
+        raise _native.ParallaxError("traces: expected at least one, found none")
+    return paths
 
 
 def settings_of(
-    config: Any, paths: list[Path], order: Any = None, policy: Any = None
+    config: Config, paths: list[Path], order: Order = None, policy: Policy = None
 ) -> Settings:
     """The configuration of a replay. `order` and `policy` override it."""
-    found = _read(config, "config")
-    if found is None:
+    if config is None or isinstance(config, Mapping):
         found = Writer(paths, _tile_px(config)).settings(config or {})
+    else:
+        found = _read(config, "config")
     if order is not None:
         if isinstance(order, str):
             found["order"] = order
@@ -61,19 +73,16 @@ def settings_of(
     return found
 
 
-def experiment_of(experiment: Any, paths: list[Path]) -> Settings:
+def experiment_of(experiment: Union[AnyPath, Mapping[str, Any]], paths: list[Path]) -> Settings:
     """The settings of a sweep."""
-    found = _read(experiment, "experiment")
-    if found is not None:
-        return found
+    if not isinstance(experiment, Mapping):
+        return _read(experiment, "experiment")
     base = experiment.get("base") or {}
     return Writer(paths, _tile_px(base)).settings(experiment)
 
 
-def _read(settings: Any, what: str) -> Settings | None:
-    """The settings of a file; None for a dict."""
-    if settings is None or isinstance(settings, Mapping):
-        return None
+def _read(settings: AnyPath, what: str) -> Settings:
+    """The settings of a file."""
     if not isinstance(settings, (str, os.PathLike)):
         found = type(settings).__name__
         raise _native.ParallaxError(f"{what}: expected a dict or a path, found {found}")
@@ -94,14 +103,14 @@ class Writer:
         self.tile_px = tile_px
         self.policies: dict[str, Any] = {}
 
-    def settings(self, values: Mapping) -> Settings:
+    def settings(self, values: Mapping[str, Any]) -> Settings:
         lines: list[str] = []
         self._table(values, (), lines)
         found = Settings("\n".join(lines) + "\n")
         found["policies"] = list(self.policies)
         return found
 
-    def policy(self, policy: type) -> str:
+    def policy(self, policy: Any) -> str:
         """The name of a class."""
         title = getattr(policy, "__name__", type(policy).__name__)
         if not callable(policy):
@@ -113,7 +122,7 @@ class Writer:
         self.policies[name] = policy
         return name
 
-    def _table(self, values: Mapping, path: tuple[str, ...], lines: list[str]) -> None:
+    def _table(self, values: Mapping[str, Any], path: tuple[str, ...], lines: list[str]) -> None:
         for key, value in values.items():
             if not isinstance(key, str):
                 raise _native.ParallaxError(f"config: expected text as keys, found {key!r}")

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+import pandas as pd
 import pyarrow as pa
+import pyarrow.parquet as pq
 
 from . import _native
-from ._settings import path_of, settings_of
+from ._settings import AnyPath, Config, Order, path_of, settings_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
 
 EYES = {0: "left", 1: "right", 255: None}
 """Meaning of the column ``eye`` of :func:`lines`. 255 is a pass of both eyes, such as a shadow map."""
 
 
-def _table(columns: list) -> pa.Table:
+def _table(columns: list[Any]) -> pa.Table:
     arrays = {}
     for name, codes, values in columns:
         array = pa.array(values)
@@ -25,7 +29,17 @@ def _table(columns: list) -> pa.Table:
     return pa.table(arrays)
 
 
-def read_textrace(path: Any) -> pa.Table:
+def frame_of(rows: bytes) -> pd.DataFrame:
+    """The rows of a Parquet file of ``replay``. ``attrs["columns"]`` has units and meanings."""
+    table = pq.read_table(pa.BufferReader(rows))
+    frame: pd.DataFrame = table.to_pandas()
+    columns = (table.schema.metadata or {}).get(b"parallax.columns")
+    if columns:
+        frame.attrs["columns"] = json.loads(columns)
+    return frame
+
+
+def read_textrace(path: AnyPath) -> pa.Table:
     """Reads all quad records of a texture trace.
 
     The columns are those of ``replay dump --parquet``, and the numbers are those of the file (FORMAT.md). The
@@ -62,7 +76,7 @@ def read_textrace(path: Any) -> pa.Table:
     return _table(_native.textrace(path_of(path, "path")))
 
 
-def read_raytrace(path: Any, rows: str = "rays") -> pa.Table:
+def read_raytrace(path: AnyPath, rows: str = "rays") -> pa.Table:
     """Reads all rays, samples or visits of a ray trace, or its hierarchy.
 
     The columns are those of ``replay dump --parquet``, and of ``replay convert --to parquet`` for visits. The table uses the decoder's memory without a copy.
@@ -104,7 +118,7 @@ def read_raytrace(path: Any, rows: str = "rays") -> pa.Table:
     return _table(_native.raytrace(path_of(path, "path"), rows))
 
 
-def info(path: Any) -> dict:
+def info(path: AnyPath) -> dict[str, Any]:
     """What ``replay info --json`` prints: description, tables and totals of a trace of either kind.
 
     Raises
@@ -112,10 +126,11 @@ def info(path: Any) -> dict:
     ParallaxError
         The file cannot be read or is damaged.
     """
-    return json.loads(_native.info(path_of(path, "path")))
+    found: dict[str, Any] = json.loads(_native.info(path_of(path, "path")))
+    return found
 
 
-def lines(path: Any, order: Any = None, config: Any = None) -> dict[str, np.ndarray]:
+def lines(path: AnyPath, order: Order = None, config: Config = None) -> dict[str, NDArray[Any]]:
     """Every look-up of a cache line, in the order in which a replay in functional mode performs them.
 
     Parameters
@@ -151,5 +166,5 @@ def lines(path: Any, order: Any = None, config: Any = None) -> dict[str, np.ndar
     ParallaxError
         The trace cannot be read, or a setting cannot be used.
     """
-    path = path_of(path, "path")
-    return _native.lines(path, settings_of(config, [path], order))
+    file = path_of(path, "path")
+    return _native.lines(file, settings_of(config, [file], order))

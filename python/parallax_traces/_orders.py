@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _native
+
+if TYPE_CHECKING:
+    from ._settings import AnyPath, Config, Order
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,7 @@ def name(order: Any, paths: list[Path], tile_px: int) -> str:
     return _native.name_order(paths[0], tile_px, title, lists)
 
 
-def _items(title: str, given: Any) -> list:
+def _items(title: str, given: Any) -> list[Any]:
     """Items as the native functions take them."""
     if isinstance(given, np.ndarray):
         given = given.tolist()
@@ -63,7 +66,7 @@ def _items(title: str, given: Any) -> list:
     return [_item(title, index, item) for index, item in enumerate(given)]
 
 
-def _item(title: str, index: int, item: Any) -> tuple:
+def _item(title: str, index: int, item: Any) -> tuple[Any, ...]:
     try:
         parts = tuple(item)
         if len(parts) == 3 and not isinstance(parts[0], (Sequence, np.ndarray)):
@@ -92,8 +95,8 @@ def _number(part: Any) -> int:
 
 
 def order_items(
-    trace: Any, order: str | Callable[[Grid], Any] = "morton", config: Any = None
-) -> list:
+    trace: AnyPath, order: Order = "morton", config: Config = None
+) -> list[Any]:
     """The tiles of a trace in an order, in the form that ``order=`` takes.
 
     Parameters
@@ -122,8 +125,8 @@ def order_items(
 
     path = path_of(trace)
     lists = _native.order_items(path, settings_of(config, [path], order))
-    lists = [
+    of_pairs = [
         [tile if other is None else (tile, other[0], other[1]) for tile, other in items]
         for items in lists
     ]
-    return lists[0] if len(lists) == 1 else lists
+    return of_pairs[0] if len(of_pairs) == 1 else of_pairs
