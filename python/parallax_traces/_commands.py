@@ -273,7 +273,8 @@ class Page:
 
     def _repr_html_(self) -> str:
         style = "width: 100%; height: 45rem; border: 0"
-        page = html.escape(self.text)
+        # Without this, links to parts of the page lead to the notebook's address.
+        page = html.escape(self.text.replace("<head>", '<head><base href="about:srcdoc">', 1))
         return f'<iframe srcdoc="{page}" sandbox="allow-scripts" style="{style}"></iframe>'
 
 
