@@ -215,6 +215,14 @@ sample = _analysis(
 reproject = _analysis(
     "reproject", "Replays a ray-tracing GPU that reuses the left image for the right", "Ray traces"
 )
+temporal = _analysis(
+    "temporal",
+    "Compares reuse of the previous frame with reuse between the eyes",
+    "Ray traces of a sequence of frames",
+)
+readings = _analysis("readings", "Sets every reading of the SGRT paper beside its figure 3", "Ray traces")
+schedule = _analysis("schedule", "Models frame time by scheduler")
+compare = _analysis("compare", "Compares two captures of the same views", "Two texture traces")
 techniques = _analysis(
     "techniques",
     "Compares rendering techniques: frame time, image error, cache misses",

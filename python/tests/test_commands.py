@@ -109,6 +109,11 @@ def test_captures_write_what_the_analyses_read(small, tmp_path, monkeypatch):
     assert str(near) == "atrium.textrace" and plx.info(near) != plx.info(small)
     trace = plx.rays("teapot", spp=1, **TINY)
     assert str(trace) == "teapot.raytrace" and list(plx.reproject(trace)["run"]) == ["chosen", "plain"]
+    second = plx.rays("teapot", "second.raytrace", frame=1, **TINY)
+    assert len(plx.temporal([trace, second])) and plx.readings(trace)["chosen"].any()
+    assert (plx.compare([small, small])["external_over_pct"] == 0).all()
+    times = plx.schedule(small, quiet=True)
+    assert (times["ms_low"] <= times["ms"]).all() and (times["ms"] <= times["ms_high"]).all()
     folder = plx.capture_techniques("atrium", only=["multi-resolution"], frames=1, repeats=1, **TINY)
     frame = plx.techniques(folder, quiet=True)
     assert str(folder) == "atrium-techniques" and list(frame["technique"]) == ["per-eye", "multi-resolution"]
@@ -145,7 +150,7 @@ def test_a_view_is_a_page_in_a_frame(atrium, tmp_path):
     view = plx.view(atrium, orders=["morton", "z2-sta"], quiet=True)
     assert view.save(tmp_path / "view.html").read_text() == view.text
     shown = view._repr_html_()
-    assert shown.startswith('<iframe srcdoc="&lt;!') and shown.count('"') == 6 and "<script" not in shown
+    assert shown.startswith('<iframe srcdoc="&lt;!') and "&lt;base href=&quot;about:srcdoc" in shown and shown.count('"') == 6 and "<script" not in shown
 
 
 def test_usage_is_the_help_of_the_program(replay):
