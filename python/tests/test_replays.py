@@ -74,7 +74,7 @@ layout.block_order = ["morton"]
     assert len(frame) == len(printed) == 16
     for key in frame.columns:
         if frame[key].dtype.kind in "iuf":
-            assert np.array_equal(frame[key], printed[key], equal_nan=True), key
+            assert np.allclose(frame[key], printed[key], rtol=1e-12, atol=0, equal_nan=True), key
     as_dict = {
         "base": {"mode": "functional"},
         "axes": {"order": ("morton", "z2-sta"), "l1.size_bytes": ["4KiB", 8192]},
@@ -96,7 +96,7 @@ def test_reproject_has_the_rows_of_the_program(traces, replay):
         assert list(printed.columns) == list(frame.columns) and len(frame) == len(printed)
         for key in frame.columns:
             if frame[key].dtype.kind in "iuf":
-                assert np.array_equal(frame[key], printed[key], equal_nan=True), key
+                assert np.allclose(frame[key], printed[key], rtol=1e-12, atol=0, equal_nan=True), key
     slow = plx.reproject(path, config={"tni": {"units": 1}})
     assert not slow.equals(plx.reproject(path))
 
