@@ -184,12 +184,12 @@ pub(super) fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<St
         format!("{} reads {words} from memory {than} {baseline}", order.name)
     };
     let over = format!(
-        "geometric mean over {} of trace and caches",
+        "mean over {} of trace and caches",
         count(rows, "pair")
     );
     let range = |order: &Studied| match order.range_pct {
         Some([low, high]) if rounded(low) < rounded(high) => {
-            format!("{low:+.1} to {high:+.1} %; {over}")
+            format!("{low:+.1} to {high:+.1} %, {over}")
         }
         _ => over.clone(),
     };
@@ -224,9 +224,9 @@ pub(super) fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<St
         )),
         Some(best) => {
             let verdict = if rounded(best.change_pct) < 0.0 {
-                "Best of the orders that hardware can follow"
+                "Best buildable order"
             } else {
-                "No other order that hardware can follow reads less than the baseline. The closest"
+                "No other buildable order reads less. The closest"
             };
             out.push(format!(
                 "{verdict}: {} ({}){}.",
@@ -588,7 +588,7 @@ mod tests {
         assert_eq!(
             alone,
             [
-                "Only z2-sta is an order that hardware can follow (geometric mean over 1 pair of trace and caches)."
+                "Only z2-sta is an order that hardware can follow (mean over 1 pair of trace and caches)."
             ]
         );
         let equal = studied(
@@ -605,11 +605,11 @@ mod tests {
             &[order("zig", 2.0, true), order("bound", -9.0, false)],
             4,
         );
-        assert!(worse[0].starts_with("No other order"), "{worse:?}");
+        assert!(worse[0].starts_with("No other buildable order"), "{worse:?}");
         assert_eq!(
             worse[0],
-            "No other order that hardware can follow reads less than the baseline. The closest: zig reads 2.0 % more from memory than z2-sta \
-             (+1.0 to +3.0 %; geometric mean over 4 pairs of trace and caches), and 38.0 % less than morton."
+            "No other buildable order reads less. The closest: zig reads 2.0 % more from memory than z2-sta \
+             (+1.0 to +3.0 %, mean over 4 pairs of trace and caches), and 38.0 % less than morton."
         );
         let near = [order("zig-zag", -2.04, true), order("zig", -2.0, true)];
         assert_eq!(
