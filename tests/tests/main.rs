@@ -45,6 +45,7 @@ mod programs;
 mod python;
 mod raster;
 mod ray_commands;
+mod ray_orders;
 mod rays;
 mod refusals;
 mod refused_columns;

@@ -250,7 +250,7 @@ fn a_dash_is_standard_input_for_every_command() {
 }
 
 #[test]
-fn an_order_for_rays_is_refused() {
+fn settings_of_textures_are_refused_for_rays() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let rays = write_generated_trace(&folder, "r.raytrace", 3);
     let config = folder.path().join("machine.toml");
@@ -258,8 +258,8 @@ fn an_order_for_rays_is_refused() {
     let config = config.to_str().expect("a name");
     for (setting, expected) in [
         (
-            ["--order", "morton"],
-            "--order: it has no effect on a ray trace",
+            ["--order", "z2-sta-merge"],
+            "--order: eyes part: expected sv, lrta, sta or halves",
         ),
         (
             ["--tile-px", "8"],

@@ -183,10 +183,7 @@ pub(super) fn studied(baseline: &str, orders: &[Studied], rows: usize) -> Vec<St
         let (words, than) = traffic(order.change_pct);
         format!("{} reads {words} from memory {than} {baseline}", order.name)
     };
-    let over = format!(
-        "mean over {} of trace and caches",
-        count(rows, "pair")
-    );
+    let over = format!("mean over {} of trace and caches", count(rows, "pair"));
     let range = |order: &Studied| match order.range_pct {
         Some([low, high]) if rounded(low) < rounded(high) => {
             format!("{low:+.1} to {high:+.1} %, {over}")
@@ -605,7 +602,10 @@ mod tests {
             &[order("zig", 2.0, true), order("bound", -9.0, false)],
             4,
         );
-        assert!(worse[0].starts_with("No other buildable order"), "{worse:?}");
+        assert!(
+            worse[0].starts_with("No other buildable order"),
+            "{worse:?}"
+        );
         assert_eq!(
             worse[0],
             "No other buildable order reads less. The closest: zig reads 2.0 % more from memory than z2-sta \

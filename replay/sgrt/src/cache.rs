@@ -4,9 +4,12 @@
 //! in which rays are traced. Otherwise, configured hit rates apply.
 
 use super::config::{HitRates, SgrtConfig};
+use super::order_rules::Recorded;
 use super::work::{BatchWork, RayClass};
 use formats::raytrace::{BvhSummary, Visit};
-use sim::memory::{AnyCache, Cache, Caches, Found, Hierarchy, MissPath};
+use sim::config::{BetweenFrames, RunConfig};
+use sim::memory::{AnyCache, Cache, Caches, Found, Hierarchy, MissPath, OtherWork};
+use sim::order::TileRef;
 
 /// Misses of a batch. Traffic depends on lines. Time depends on visits, because a visit requests all lines
 /// of its node or triangle at once and waits for the last one.
@@ -80,7 +83,7 @@ pub(super) fn by_rates(work: &BatchWork, bvh: &BvhSummary, config: &SgrtConfig) 
     misses
 }
 
-fn lru(bytes: u64, ways: u32, line_bytes: u64) -> Box<dyn Cache> {
+pub(super) fn lru(bytes: u64, ways: u32, line_bytes: u64) -> Box<dyn Cache> {
     let sets = bytes / (u64::from(ways) * line_bytes);
     AnyCache::lru(sets as u32, ways).into_box()
 }
@@ -91,6 +94,9 @@ pub(super) struct DeviceCaches {
     caches: Hierarchy<Box<dyn Cache>>,
     units: usize,
     line_bytes: u64,
+    /// The tile and its pixel that [`Self::visit`] counts for.
+    pub at: (TileRef, usize),
+    recorded: Option<Recorded>,
 }
 
 impl DeviceCaches {
@@ -113,6 +119,38 @@ impl DeviceCaches {
             caches: Hierarchy::new(caches, MissPath::memory_alone()),
             units,
             line_bytes: c.line_bytes,
+            at: (TileRef { pass: 0, tile: 0 }, 0),
+            recorded: None,
+        }
+    }
+
+    /// Records accesses from now on.
+    pub fn record(&mut self, into: Recorded) {
+        self.recorded = Some(into);
+    }
+
+    /// These caches, which record accesses.
+    pub fn recording(mut self, into: Recorded) -> Self {
+        self.record(into);
+        self
+    }
+
+    /// Ends recording.
+    pub fn take_recorded(&mut self) -> Option<Recorded> {
+        self.recorded.take()
+    }
+
+    /// Applies what happens to the caches before the frame with this index.
+    pub fn between_frames(&mut self, between: BetweenFrames, frame: usize, config: &SgrtConfig) {
+        match between {
+            BetweenFrames::Keep => {}
+            BetweenFrames::Flush => self.caches.clear(),
+            BetweenFrames::Lose(percent) => {
+                let mut machine = RunConfig::default();
+                machine.level.l2.size_bytes = config.cache.l2_bytes;
+                machine.line_bytes = config.cache.line_bytes as u32;
+                self.caches.lose(OtherWork::after(frame, percent, &machine));
+            }
         }
     }
 
@@ -124,6 +162,10 @@ impl DeviceCaches {
         let cache = 2 * (unit % self.units) + usize::from(matches!(visit, Visit::Triangle(_)));
         let before = *misses;
         for line in first / self.line_bytes..=last / self.line_bytes {
+            if let Some(recorded) = &mut self.recorded {
+                let (at, pixel) = self.at;
+                recorded.add(at, pixel, line as u32);
+            }
             match self.caches.access(cache, line as u32) {
                 Found::L1 => {}
                 Found::L2 => misses.l1_lines += 1.0,

@@ -58,11 +58,19 @@ pub enum FrameError {
         /// Lines of all nodes and triangles.
         lines: u64,
     },
-    /// The cycle-level model needs the addresses that rays visit.
+    /// An option needs the addresses that rays visit.
     #[error(
-        "--timing cycle: expected a trace with the visits of its rays (tracegen rays --visits), found a trace without"
+        "{0}: expected a trace with the visits of its rays (tracegen rays --visits), found a trace without"
     )]
-    NoVisits,
+    NoVisits(&'static str),
+    /// Frames of a sequence with different tiles.
+    #[error("--between: expected frames of {}x{} tiles an eye as before, found {}x{}", expected[0], expected[1], found[0], found[1])]
+    Grid {
+        /// Tile columns and rows of the last frame.
+        expected: [u32; 2],
+        /// Those of this frame.
+        found: [u32; 2],
+    },
     /// A defect of the cycle-level model.
     #[error(transparent)]
     Unbalanced(#[from] Unbalanced),

@@ -7,10 +7,14 @@ use super::detect::Decision;
 use super::energy_bounds::relative_bounds;
 use super::frame::{Frame, FrameError, RaySource};
 use super::run::Run;
+use super::tile_orders::usual_plan;
+use super::ways::Way;
 use super::work::{BatchWork, RayClass};
-use formats::raytrace::{BvhSummary, RayTile, Visit};
+use formats::raytrace::{BvhSummary, RayRecord, RayTile, Visit};
 use formats::view::Eye;
 use rayon::prelude::*;
+use sim::order::rays::{RayPlan, eye_of, tiles_of};
+use sim::order::{TileRef, WorkItem};
 
 /// The frame rendered in three ways, with the right eye's share.
 #[derive(Clone, Copy, Debug, Default)]
@@ -160,6 +164,18 @@ pub struct TileMisses {
     pub right: Misses,
 }
 
+impl TileMisses {
+    /// Those of an eye's tile in a way.
+    pub(super) fn of(&self, way: Way, at: TileRef) -> Misses {
+        match (way, eye_of(at)) {
+            (Way::Reference, Eye::Left) => self.left_full,
+            (Way::Reference, Eye::Right) => self.right_full,
+            (_, Eye::Left) => self.left,
+            (_, Eye::Right) => self.right,
+        }
+    }
+}
+
 /// Misses by the configured hit rates, by tile number.
 pub(super) fn misses_by_rates(
     work: &[TileWork],
@@ -202,80 +218,154 @@ pub(super) fn misses_of_retests(work: &BatchWork, bvh: &BvhSummary, config: &Sgr
     cache::by_rates(&retests, bvh, config)
 }
 
-/// Tiles that are decoded at a time.
-const DECODED_TILES: usize = 32;
+/// Batches that are decoded at a time.
+const DECODED_BATCHES: usize = 32;
 
-/// Misses of the addresses in the trace, by eye and tile, for each choice of rays and the caches that they visit. The
-/// trace is read once: tiles in order, left before right, pixels assigned to the units round robin.
+/// The tiles of a batch.
+///
+/// # Errors
+/// [`FrameError`] for an unreadable tile.
+pub(super) fn decoded(
+    source: &dyn RaySource,
+    batch: &[WorkItem],
+) -> Result<Vec<RayTile>, FrameError> {
+    let decode = |at: TileRef| {
+        let (eye, tile) = (eye_of(at), at.tile);
+        let mut data = RayTile::default();
+        let decoded = source.tile(eye, tile, &mut data);
+        decoded.map_err(|source| FrameError::Tile { eye, tile, source })?;
+        Ok(data)
+    };
+    tiles_of(batch).map(decode).collect()
+}
+
+/// Misses of the addresses in the trace, by eye and tile, for each choice of rays in caches of its own. The trace is read
+/// once, in the order of `plan`.
 ///
 /// # Errors
 /// [`FrameError`] for an unreadable tile.
 pub(super) fn misses_of(
     source: &dyn RaySource,
     frame: &Frame,
+    plan: &RayPlan,
     choices: &[(&Kept<'_>, &SgrtConfig)],
+    caches: &mut [&mut DeviceCaches],
 ) -> Result<Vec<[Vec<Misses>; 2]>, FrameError> {
-    let bvh = &frame.tables.bvh;
-    let decode = |&(tile, eye): &(u32, Eye)| {
-        let mut data = RayTile::default();
-        let decoded = source.tile(eye, tile, &mut data);
-        decoded.map_err(|source| FrameError::Tile { eye, tile, source })?;
-        Ok(data)
-    };
-    let mut runs = Vec::new();
-    for (kept, config) in choices {
-        check_lines(bvh, config)?;
-        runs.push((kept, DeviceCaches::new(config), [Vec::new(), Vec::new()]));
+    for (_, config) in choices {
+        check_lines(&frame.tables.bvh, config)?;
     }
-    let tiles =
-        (0..frame.tables.tile_count()).flat_map(|tile| [(tile, Eye::Left), (tile, Eye::Right)]);
-    for places in tiles.collect::<Vec<_>>().chunks(DECODED_TILES) {
-        let decoded: Vec<Result<RayTile, FrameError>> = places.par_iter().map(decode).collect();
-        let decoded = decoded.into_iter().collect::<Result<Vec<_>, _>>()?;
-        runs.par_iter_mut().for_each(|(kept, caches, misses)| {
-            for (&(tile, eye), data) in places.iter().zip(&decoded) {
-                let is_kept = |sample, class| kept(eye, sample, class);
-                let of_tile = misses_of_tile(frame, tile, data, is_kept, caches);
-                misses[eye as usize].push(of_tile);
+    let none = vec![Misses::default(); frame.tables.tile_count() as usize];
+    let mut found = vec![[none.clone(), none]; choices.len()];
+    let batches: Vec<&[WorkItem]> = plan.batches().collect();
+    for batches in batches.chunks(DECODED_BATCHES) {
+        let tiles: Vec<Result<Vec<RayTile>, FrameError>> =
+            (batches.par_iter().map(|batch| decoded(source, batch))).collect();
+        let tiles = tiles.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let runs = caches.par_iter_mut().zip(&mut found).zip(choices);
+        runs.for_each(|((caches, found), (kept, _))| {
+            for (batch, tiles) in batches.iter().zip(&tiles) {
+                for_rays(frame, plan, batch, tiles, |of| {
+                    if kept(eye_of(of.at), of.sample, RayClass::of(of.ray)) {
+                        caches.at = (of.at, of.pixel);
+                        let misses = &mut found[of.at.pass as usize][of.at.tile as usize];
+                        for &visit in of.visits {
+                            caches.visit(of.unit, visit, &frame.tables.bvh, misses);
+                        }
+                    }
+                });
             }
         });
     }
-    Ok(runs.into_iter().map(|(.., misses)| misses).collect())
+    Ok(found)
 }
 
-fn misses_of_tile(
-    frame: &Frame,
-    tile: u32,
-    data: &RayTile,
-    is_kept: impl Fn(usize, RayClass) -> bool,
-    caches: &mut DeviceCaches,
-) -> Misses {
-    let mut misses = Misses::default();
-    let mut at = 0usize;
-    let pixels = data.pixels.iter().zip(frame.tile_samples(tile));
-    for (turn, (pixel, sample)) in pixels.enumerate() {
-        for ray in data.rays_of(pixel) {
-            let end = at.saturating_add(ray.visit_count() as usize);
-            let visits = data.visits.get(at..end).unwrap_or(&[]);
-            at = end;
-            if is_kept(sample, RayClass::of(ray)) {
-                for &visit in visits {
-                    caches.visit(turn, visit, &frame.tables.bvh, &mut misses);
-                }
-            }
-        }
-    }
-    misses
-}
-
-/// Misses of the addresses in the trace, with both eyes completely traced and with reprojection, by run and tile.
+/// The same for choices with empty caches, in the default order.
 ///
 /// # Errors
-/// [`FrameError`] for an unreadable tile.
-pub(super) fn misses_by_addresses(
+/// As [`misses_of`].
+pub(super) fn misses_in_usual_order(
     source: &dyn RaySource,
     frame: &Frame,
+    choices: &[(&Kept<'_>, &SgrtConfig)],
+) -> Result<Vec<[Vec<Misses>; 2]>, FrameError> {
+    let empty = choices.iter().map(|(_, config)| DeviceCaches::new(config));
+    let mut caches: Vec<DeviceCaches> = empty.collect();
+    let mut caches: Vec<&mut DeviceCaches> = caches.iter_mut().collect();
+    let plan = usual_plan(&frame.tables);
+    misses_of(source, frame, &plan, choices, &mut caches)
+}
+
+/// A ray in its turn.
+pub(super) struct RayTurn<'a> {
+    pub at: TileRef,
+    /// Its pixel in the tile.
+    pub pixel: usize,
+    /// Its pixel in the eye's image.
+    pub sample: usize,
+    /// The unit that traces it, to be taken modulo the units.
+    pub unit: usize,
+    pub ray: &'a RayRecord,
+    /// True for the first ray of its pixel.
+    pub is_first: bool,
+    pub visits: &'a [Visit],
+}
+
+/// Calls `visit` for each ray of a batch in the order of `plan`.
+pub(super) fn for_rays(
+    frame: &Frame,
+    plan: &RayPlan,
+    batch: &[WorkItem],
+    tiles: &[RayTile],
+    mut visit: impl FnMut(RayTurn<'_>),
+) {
+    let places: Vec<TileRef> = tiles_of(batch).collect();
+    let pixels: Vec<usize> = tiles.iter().map(|tile| tile.pixels.len()).collect();
+    let first_visits: Vec<Vec<usize>> = tiles.iter().map(first_visits).collect();
+    let samples = places.iter().map(|at| frame.tile_samples(at.tile));
+    let samples: Vec<Vec<usize>> = samples.map(Iterator::collect).collect();
+    for turn in plan.turns(batch, &pixels) {
+        let data = &tiles[turn.tile];
+        let Some(&sample) = samples[turn.tile].get(turn.pixel) else {
+            continue;
+        };
+        let mut first = first_visits[turn.tile][turn.pixel];
+        for (number, ray) in data.rays_of(&data.pixels[turn.pixel]).iter().enumerate() {
+            let end = first.saturating_add(ray.visit_count() as usize);
+            visit(RayTurn {
+                at: places[turn.tile],
+                pixel: turn.pixel,
+                sample,
+                unit: turn.unit,
+                ray,
+                is_first: number == 0,
+                visits: data.visits.get(first..end).unwrap_or(&[]),
+            });
+            first = end;
+        }
+    }
+}
+
+/// The position of each pixel's first visit.
+fn first_visits(tile: &RayTile) -> Vec<usize> {
+    let mut next = 0usize;
+    let first = |pixel| {
+        let own = next;
+        let visits = tile.rays_of(pixel).iter().map(RayRecord::visit_count);
+        next = next.saturating_add(visits.sum::<u64>() as usize);
+        own
+    };
+    tile.pixels.iter().map(first).collect()
+}
+
+/// Misses of the addresses in the trace, with both eyes completely traced and with reprojection, by run and tile. `count`
+/// returns those of each choice of rays, the references first.
+///
+/// # Errors
+/// Errors of `count`.
+pub(super) fn misses_by_addresses(
+    frame: &Frame,
     runs: &[(&RemainingWork, &SgrtConfig)],
+    count: impl FnOnce(&[(&Kept<'_>, &SgrtConfig)]) -> Result<Vec<[Vec<Misses>; 2]>, FrameError>,
 ) -> Result<Vec<Vec<TileMisses>>, FrameError> {
     let all: &Kept<'_> = &|_, _, _| true;
     let mut references: Vec<&SgrtConfig> = runs.iter().map(|(_, config)| *config).collect();
@@ -289,11 +379,7 @@ pub(super) fn misses_by_addresses(
         .zip(runs)
         .map(|(kept, (_, config))| (kept as &Kept<'_>, *config));
     let choices = references.iter().map(|config| (all, *config));
-    let misses = misses_of(
-        source,
-        frame,
-        &choices.chain(reprojected).collect::<Vec<_>>(),
-    )?;
+    let misses = count(&choices.chain(reprojected).collect::<Vec<_>>())?;
     let (of_references, of_runs) = misses.split_at(references.len());
     let run =
         |((work, config), [left, right]): (&(&RemainingWork, &SgrtConfig), &[Vec<Misses>; 2])| {

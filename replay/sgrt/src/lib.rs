@@ -10,7 +10,7 @@
 //! ([`tni`], [`srp`]), bytes ([`dram`]) and energy ([`energy`]) by the closed form. With [`timing::Timing::Cycle`],
 //! [`cycles`] simulates the units cycle by cycle instead (`ray_batches`: its input; `timed`: its use). The share of [`gbuffer`] follows from the fields that a rule [`reads`] and from
 //! the [`rows`] that hold them. [`loaded`] runs one rule on a trace, [`variations`] many rules or
-//! parameters, [`readings`] every reading of the paper, [`temporal`] reuse of the previous frame. [`presets`] name whole settings.
+//! parameters in the default order of tiles ([`tile_orders`]), [`readings`] every reading of the paper, [`temporal`] reuse of the previous frame. [`presets`] name whole settings.
 
 pub mod accuracy;
 pub mod cache;
@@ -25,10 +25,12 @@ pub mod frame;
 pub mod gbuffer;
 pub mod hardware;
 pub mod loaded;
+pub mod order_rules;
 pub mod picture;
 pub mod place;
 pub mod presets;
 mod ray_batches;
+pub mod ray_kinds;
 pub mod readings;
 pub mod reads;
 pub mod reproject;
@@ -38,6 +40,7 @@ pub mod rules;
 pub mod run;
 pub mod srp;
 pub mod temporal;
+pub mod tile_orders;
 pub mod timed;
 pub mod timing;
 pub mod tni;

@@ -6,19 +6,22 @@ use super::config::{RowStorage, SgrtConfig};
 use super::detect::{Decision, decide};
 use super::frame::{Frame, FrameError, RaySource};
 use super::hardware::{
-    Comparison, RemainingWork, TileMisses, TileWork, misses_by_addresses, misses_by_rates,
-    tile_work,
+    Comparison, Kept, RemainingWork, TileMisses, TileWork, misses_by_addresses, misses_by_rates,
+    misses_in_usual_order,
 };
 use super::reads::Reads;
 use super::reproject::{Reprojection, reproject};
 use super::result::{ImageError, Outcome};
 use super::rows::RowNeeds;
 use super::rules::Rule;
+use super::tile_orders::{TileSequence, usual_plan};
 use super::timed::{self, TracedTiming};
+use super::timing::Timing;
 use super::ways::{Model, compare};
 use formats::view::Eye;
 use image_error::flip::{FlipMap, Prepared};
 use image_error::{Picture, pixels_per_degree, psnr, ssim};
+use sim::order::rays::RayPlan;
 
 /// A loaded trace, on which rules can be run.
 pub struct LoadedTrace<'a> {
@@ -119,17 +122,8 @@ impl<'a> LoadedTrace<'a> {
         let decided = self.decided(rule, reuse);
         let misses = self.misses(&[(&decided.work, config)])?;
         let misses = misses.into_iter().next().unwrap_or_default();
-        self.finish(decided, misses, config, None)
-    }
-
-    /// Simulates the units cycle by cycle without reprojection, for [`Self::run_with_plain`] with the same `config`.
-    ///
-    /// # Errors
-    /// [`FrameError`] for a trace without visits or for a tile whose addresses cannot be read.
-    pub fn traced_timing(&self, config: &SgrtConfig) -> Result<TracedTiming, FrameError> {
-        let decisions = decide(&self.frame, &self.arrived, &Rule::default());
-        let work = tile_work(&self.frame, &decisions, Reuse::Primary);
-        TracedTiming::new(self.source, &self.model(Reads::NOTHING, config), &work)
+        let plan = usual_plan(&self.frame.tables);
+        self.finish(decided, misses, [&plan; 2], config, None)
     }
 
     pub(super) fn model<'b>(&'b self, reads: Reads, config: &'b SgrtConfig) -> Model<'b> {
@@ -141,26 +135,44 @@ impl<'a> LoadedTrace<'a> {
         }
     }
 
-    /// Runs a rule, and the paper's plain reuse of every arrival: with `traced` by the cycle-level model, without by
-    /// the closed form.
+    /// Runs a rule, and the paper's plain reuse of every arrival, on the next frame of `tiles`.
     ///
     /// # Errors
-    /// [`FrameError`] for a tile whose addresses cannot be read.
+    /// [`FrameError`] for a trace without the visits that are needed, or for a tile whose addresses cannot be read.
     pub fn run_with_plain(
         &self,
         rule: &Rule,
         reuse: Reuse,
         config: &SgrtConfig,
-        traced: Option<&TracedTiming>,
+        timing: Timing,
+        tiles: &mut TileSequence,
     ) -> Result<[RuleRun; 2], FrameError> {
         let [ours, plain] = [rule, &Rule::default()].map(|rule| self.decided(rule, reuse));
-        let misses = self.misses(&[(&ours.work, config), (&plain.work, config)])?;
-        let mut misses = misses.into_iter();
-        let mut finish = |decided| {
-            let misses = misses.next().unwrap_or_default();
-            self.finish(decided, misses, config, traced)
+        let runs = [(&ours.work, config), (&plain.work, config)];
+        let misses = if self.frame.tables.meta.has_visits {
+            misses_by_addresses(&self.frame, &runs, |choices| {
+                tiles.misses_of(self.source, &self.frame, choices)
+            })?
+        } else {
+            let all: &Kept<'_> = &|_, _, _| true;
+            tiles.begin(self.source, &self.frame, &[(all, config); 3])?;
+            self.misses(&runs)?
         };
-        Ok([finish(ours)?, finish(plain)?])
+        let [full, of_ours, of_plain] = tiles.plans();
+        let traced = match timing {
+            Timing::ClosedForm => None,
+            Timing::Cycle => {
+                let model = self.model(Reads::NOTHING, config);
+                let traced = TracedTiming::new(self.source, &model, full, &ours.work.tiles)?;
+                Some(traced)
+            }
+        };
+        let mut misses = misses.into_iter();
+        let mut finish = |decided, plan| {
+            let misses = misses.next().unwrap_or_default();
+            self.finish(decided, misses, [full, plan], config, traced.as_ref())
+        };
+        Ok([finish(ours, of_ours)?, finish(plain, of_plain)?])
     }
 
     fn decided(&self, rule: &Rule, reuse: Reuse) -> Decided {
@@ -177,6 +189,7 @@ impl<'a> LoadedTrace<'a> {
         &self,
         decided: Decided,
         misses: Vec<TileMisses>,
+        plans: [&RayPlan; 2],
         config: &SgrtConfig,
         traced: Option<&TracedTiming>,
     ) -> Result<RuleRun, FrameError> {
@@ -188,12 +201,17 @@ impl<'a> LoadedTrace<'a> {
         } = decided;
         let accuracy = count_errors(&self.frame, &decisions);
         let (comparison, cycles) = match traced {
-            None => (self.compare(&work.tiles, &misses, reads, config), None),
+            None => {
+                let (frame, rows) = (&self.frame, &self.rows);
+                let closed = compare(frame, plans, &work.tiles, &misses, reads, rows, config);
+                (closed, None)
+            }
             Some(traced) => {
                 let model = self.model(reads, config);
                 let decided = (decisions.as_slice(), reuse);
+                let work = &work.tiles;
                 let (comparison, cycles) =
-                    timed::compare(self.source, &model, decided, &work.tiles, &misses, traced)?;
+                    timed::compare(self.source, &model, plans, decided, work, &misses, traced)?;
                 (comparison, Some(cycles))
             }
         };
@@ -236,6 +254,7 @@ impl<'a> LoadedTrace<'a> {
         }
     }
 
+    /// Compares by the closed form in the default order.
     pub(super) fn compare(
         &self,
         work: &[TileWork],
@@ -243,16 +262,20 @@ impl<'a> LoadedTrace<'a> {
         reads: Reads,
         config: &SgrtConfig,
     ) -> Comparison {
-        compare(&self.frame, work, misses, reads, &self.rows, config)
+        let plan = usual_plan(&self.frame.tables);
+        let (frame, rows) = (&self.frame, &self.rows);
+        compare(frame, [&plan; 2], work, misses, reads, rows, config)
     }
 
-    /// The misses of each run by tile. Addresses are read once for all of them.
+    /// The misses of each run by tile in the default order. Addresses are read once for all of them.
     pub(super) fn misses(
         &self,
         runs: &[(&RemainingWork, &SgrtConfig)],
     ) -> Result<Vec<Vec<TileMisses>>, FrameError> {
         if self.frame.tables.meta.has_visits {
-            return misses_by_addresses(self.source, &self.frame, runs);
+            return misses_by_addresses(&self.frame, runs, |choices| {
+                misses_in_usual_order(self.source, &self.frame, choices)
+            });
         }
         let of_run = |(work, config): &(&RemainingWork, &_)| {
             misses_by_rates(&work.tiles, &self.frame, config)

@@ -4,22 +4,24 @@ use super::compose::Reuse;
 use super::cycles::{Batch, BatchSource, Item, Machine, Pipeline, Request, merge};
 use super::detect::Decision;
 use super::frame::{FrameError, RaySource};
-use super::hardware::{TileWork, is_traced};
+use super::hardware::{TileWork, decoded, for_rays, is_traced};
 use super::srp;
 use super::ways::{Model, Way};
 use super::work::RayClass;
 use formats::raytrace::{BvhSummary, RayTile, Visit};
 use formats::view::Eye;
+use sim::order::WorkItem;
+use sim::order::rays::{RayPlan, eye_of};
 use std::ops::Range;
 
-/// The batches of one or both eyes in one way: tiles in order, left before right, pixels assigned to the units round
-/// robin.
+/// The batches of one or both eyes in one way, in the order of a plan.
 ///
 /// A warp consists of rays of one class and unit. The rays of a tile are all available at once, as in the closed form:
 /// a shadow ray does not wait for the shading of its parent's hit.
 pub(super) struct RayBatches<'a> {
     source: &'a dyn RaySource,
     model: &'a Model<'a>,
+    plan: &'a RayPlan,
     way: Way,
     /// Of every right sample; not used for the reference.
     decisions: &'a [Decision],
@@ -27,9 +29,8 @@ pub(super) struct RayBatches<'a> {
     work: &'a [TileWork],
     machine: &'a Machine,
     eyes: &'a [Eye],
-    /// Number of the next batch.
-    next: usize,
-    tile: RayTile,
+    /// The next batches.
+    batches: Box<dyn Iterator<Item = &'a [WorkItem]> + Send + 'a>,
     /// Rays of the batch by unit and class, as ranges of its requests.
     rays: Vec<[Vec<Range<usize>>; 3]>,
 }
@@ -39,6 +40,7 @@ impl<'a> RayBatches<'a> {
     pub(super) fn reference(
         source: &'a dyn RaySource,
         model: &'a Model<'a>,
+        plan: &'a RayPlan,
         work: &'a [TileWork],
         machine: &'a Machine,
         eyes: &'a [Eye],
@@ -46,14 +48,14 @@ impl<'a> RayBatches<'a> {
         Self {
             source,
             model,
+            plan,
             way: Way::Reference,
             decisions: &[],
             reuse: Reuse::Primary,
             work,
             machine,
             eyes,
-            next: 0,
-            tile: RayTile::default(),
+            batches: Box::new(plan.batches()),
             rays: vec![Default::default(); machine.units],
         }
     }
@@ -74,38 +76,30 @@ impl<'a> RayBatches<'a> {
     }
 
     /// Adds the requests of the batch's rays, and their ranges to `self.rays`.
-    fn add_rays(&mut self, tile: u32, eye: Eye, batch: &mut Batch) {
+    fn add_rays(&mut self, items: &[WorkItem], tiles: &[RayTile], batch: &mut Batch) {
         let frame = self.model.frame;
         let bvh = &frame.tables.bvh;
         let line_bytes = self.model.config.cache.line_bytes;
-        let is_complete = eye == Eye::Left || self.way == Way::Reference;
-        let mut at = 0usize;
-        let pixels = self.tile.pixels.iter().zip(frame.tile_samples(tile));
-        for (turn, (pixel, sample)) in pixels.enumerate() {
-            let decision = self.decisions.get(sample).filter(|_| !is_complete);
-            let rays = &mut self.rays[turn % self.machine.units];
-            if let Some(decision) = decision
-                && decision.tests > 0
-            {
+        for_rays(frame, self.plan, items, tiles, |of| {
+            let is_complete = eye_of(of.at) == Eye::Left || self.way == Way::Reference;
+            let decision = self.decisions.get(of.sample).filter(|_| !is_complete);
+            let rays = &mut self.rays[of.unit % self.machine.units];
+            if let Some(decision) = decision.filter(|of_pixel| of.is_first && of_pixel.tests > 0) {
                 let first = batch.requests.len();
                 for test in 0..u32::from(decision.tests) {
                     batch.requests.push(retest(decision, test, bvh, line_bytes));
                 }
                 rays[RayClass::Primary as usize].push(first..batch.requests.len());
             }
-            for ray in self.tile.rays_of(pixel) {
-                let end = at.saturating_add(ray.visit_count() as usize);
-                let visits = self.tile.visits.get(at..end).unwrap_or(&[]);
-                at = end;
-                let class = RayClass::of(ray);
-                if decision.is_none_or(|decision| is_traced(decision, class, self.reuse)) {
-                    let first = batch.requests.len();
-                    let requests = visits.iter().map(|visit| request(*visit, bvh, line_bytes));
-                    batch.requests.extend(requests);
-                    rays[class as usize].push(first..batch.requests.len());
-                }
+            let class = RayClass::of(of.ray);
+            if decision.is_none_or(|decision| is_traced(decision, class, self.reuse)) {
+                let first = batch.requests.len();
+                let requests = of.visits.iter();
+                let requests = requests.map(|visit| request(*visit, bvh, line_bytes));
+                batch.requests.extend(requests);
+                rays[class as usize].push(first..batch.requests.len());
             }
-        }
+        });
     }
 
     /// Makes the batch's items of the collected rays.
@@ -148,18 +142,26 @@ impl BatchSource for RayBatches<'_> {
     type Error = FrameError;
 
     fn next(&mut self, batch: &mut Batch) -> Result<bool, FrameError> {
-        let (tile, eye) = (self.next / self.eyes.len(), self.next % self.eyes.len());
-        let Some(work) = self.work.get(tile) else {
-            return Ok(false);
+        let is_of_eyes = |item: &&WorkItem| item.tiles().any(|at| self.eyes.contains(&eye_of(at)));
+        let items = loop {
+            let Some(items) = self.batches.next() else {
+                return Ok(false);
+            };
+            let of_eyes = items.iter().filter(is_of_eyes).map(|item| match *item {
+                WorkItem::Pair(left, right, _) if self.eyes.len() == 1 => {
+                    WorkItem::Tile([left, right][self.eyes[0] as usize])
+                }
+                item => item,
+            });
+            let of_eyes: Vec<WorkItem> = of_eyes.collect();
+            if !of_eyes.is_empty() {
+                break of_eyes;
+            }
         };
-        let (tile, eye) = (tile as u32, self.eyes[eye]);
-        self.next += 1;
-        self.source
-            .tile(eye, tile, &mut self.tile)
-            .map_err(|source| FrameError::Tile { eye, tile, source })?;
-        self.add_rays(tile, eye, batch);
+        let tiles = decoded(self.source, &items)?;
+        self.add_rays(&items, &tiles, batch);
         self.make_items(batch);
-        let of_cores = &self.model.batches(self.way, tile, work)[eye as usize];
+        let of_cores = &self.model.batch(self.way, &items, self.work);
         let config = self.model.config;
         let cycles = srp::cycles(&of_cores.work, config).total();
         batch.core_cycles = (cycles * config.tni.clock_mhz / config.srp.clock_mhz).ceil() as u64;

@@ -9,6 +9,7 @@ use super::reads::Reads;
 use super::rows::RowSummary;
 use super::rules::Rule;
 use super::run::{EnergyPj, Run};
+use super::tile_orders::TileOrders;
 use super::timing::{CycleTiming, Timing};
 use serde::{Deserialize, Serialize};
 use sim::paper::sgrt::PaperValues;
@@ -66,6 +67,12 @@ pub struct Config {
     pub timing: Timing,
     /// The hardware.
     pub model: SgrtConfig,
+    /// Kinds of the traced rays; empty for all.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rays: Vec<String>,
+    /// The order of the tiles, if one was chosen.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tiles: Option<TileOrders>,
 }
 
 /// The figures of a rule and a level of reuse.

@@ -13,7 +13,7 @@ use super::compose::Reuse;
 use super::config::SgrtConfig;
 use super::detect::{Decision, decide};
 use super::frame::{Frame, FrameError, RaySource};
-use super::hardware::{Kept, RemainingWork, misses_of, misses_of_retests};
+use super::hardware::{Kept, RemainingWork, misses_in_usual_order, misses_of_retests};
 use super::loaded::LoadedTrace;
 use super::reads::Reads;
 use super::rules::Rule;
@@ -353,7 +353,7 @@ impl Sequence<'_> {
             }
         });
         let choices = kept.each_ref().map(|kept| (kept as &Kept<'_>, self.config));
-        let mut misses = misses_of(self.current, frame, &choices)?;
+        let mut misses = misses_in_usual_order(self.current, frame, &choices)?;
         let of_eyes = misses.iter_mut().flatten().zip(works.iter().flatten());
         for (misses, works) in of_eyes {
             for (misses, work) in misses.iter_mut().zip(works) {

@@ -8,13 +8,14 @@ use super::cycles::{Counts, LineCounts, Machine, Simulated, SimulationError, sim
 use super::detect::Decision;
 use super::energy;
 use super::frame::{FrameError, RaySource};
-use super::hardware::{Comparison, Kept, TileMisses, TileWork, check_lines, misses_of};
+use super::hardware::{Comparison, Kept, TileMisses, TileWork, check_lines, misses_in_usual_order};
 use super::ray_batches::RayBatches;
 use super::timing::{CycleTiming, FrameTiming, IdlePct};
 use super::tni::TniCycles;
 use super::ways::{Model, Way, WayRun, comparison};
 use formats::view::Eye;
 use rayon::prelude::*;
+use sim::order::rays::{RayPlan, eye_of, tiles_of};
 
 /// The eyes of the simulations without reprojection: a frame, and each eye alone.
 const TRACED: [&[Eye]; 3] = [&[Eye::Left, Eye::Right], &[Eye::Left], &[Eye::Right]];
@@ -35,18 +36,19 @@ impl TracedTiming {
     pub(super) fn new(
         source: &dyn RaySource,
         model: &Model,
+        plan: &RayPlan,
         work: &[TileWork],
     ) -> Result<Self, FrameError> {
         let tables = &model.frame.tables;
         if !tables.meta.has_visits {
-            return Err(FrameError::NoVisits);
+            return Err(FrameError::NoVisits("--timing cycle"));
         }
         check_lines(&tables.bvh, model.config)?;
         let machine = Machine::new(model.config, tables.bvh.traversal);
         let mut runs: Vec<Simulated> = TRACED
             .par_iter()
             .map(|eyes| {
-                let rays = RayBatches::reference(source, model, work, &machine, eyes);
+                let rays = RayBatches::reference(source, model, plan, work, &machine, eyes);
                 run(&machine, rays)
             })
             .collect::<Result<_, _>>()?;
@@ -54,10 +56,14 @@ impl TracedTiming {
             eye == Eye::Right
         }];
         let choices = each_alone.map(|kept| (kept, model.config));
-        let own_misses = misses_of(source, model.frame, &choices)?;
+        let own_misses = misses_in_usual_order(source, model.frame, &choices)?;
         let alone = |eye: Eye, simulated: &Simulated| {
-            let of_batches = simulated.batches.iter().map(|batch| misses(&batch.counts));
-            let simulated_misses: Vec<Misses> = of_batches.collect();
+            let mut simulated_misses = vec![Misses::default(); work.len()];
+            // The first tile of a batch stands for all of them.
+            let first = |batch| tiles_of(batch).find(|&at| eye_of(at) == eye);
+            for (at, of) in plan.batches().filter_map(first).zip(&simulated.batches) {
+                simulated_misses[at.tile as usize] = misses(&of.counts);
+            }
             let (resources, own) = model.eye(eye, work, &own_misses[eye as usize][eye as usize]);
             let (_, same) = model.eye(eye, work, &simulated_misses);
             timing(&machine, simulated, &resources, [own, same])
@@ -81,33 +87,35 @@ impl TracedTiming {
 pub(super) fn compare(
     source: &dyn RaySource,
     model: &Model,
+    plans: [&RayPlan; 2],
     (decisions, reuse): (&[Decision], Reuse),
     work: &[TileWork],
     closed_misses: &[TileMisses],
     traced: &TracedTiming,
 ) -> Result<(Comparison, CycleTiming), FrameError> {
     let machine = &traced.machine;
+    let plan_of = |way: Way| plans[usize::from(way != Way::Reference)];
     let closed = Way::ALL.map(|way| {
-        model.run(way, work, |tile| {
-            let of_tile = &closed_misses[tile];
-            match way {
-                Way::Reference => [of_tile.left_full, of_tile.right_full],
-                _ => [of_tile.left, of_tile.right],
-            }
+        model.run(way, plan_of(way), work, |_, at| {
+            closed_misses[at.tile as usize].of(way, at)
         })
     });
     let simulated: Vec<Simulated> = [Way::Reprojected, Way::WholeScreen]
         .par_iter()
         .map(|&way| {
-            let all = RayBatches::reference(source, model, work, machine, TRACED[0]);
+            let all = RayBatches::reference(source, model, plans[1], work, machine, TRACED[0]);
             run(machine, all.reprojected(way, decisions, reuse))
         })
         .collect::<Result<_, _>>()?;
     let all = [&traced.frame, &simulated[0], &simulated[1]];
     let left_cycles = traced.left.cycles as f64;
     let timed = [0, 1, 2].map(|at| {
-        let same_misses = model.run(Way::ALL[at], work, |tile| {
-            [2 * tile, 2 * tile + 1].map(|batch| misses(&all[at].batches[batch].counts))
+        let (way, plan) = (Way::ALL[at], plan_of(Way::ALL[at]));
+        let batches: Vec<_> = plan.batches().collect();
+        let same_misses = model.run(way, plan, work, |batch, tile| {
+            let is_first = tiles_of(batches[batch]).next() == Some(tile);
+            let all_of_batch = is_first.then(|| misses(&all[at].batches[batch].counts));
+            all_of_batch.unwrap_or_default()
         });
         let by_closed_form = [closed[at].run.tni_cycles, same_misses.run.tni_cycles];
         let timing = timing(machine, all[at], &closed[at].run.tni, by_closed_form);

@@ -18,6 +18,8 @@ use super::srp;
 use super::tni::{self, TniCycles};
 use super::work::BatchWork;
 use formats::view::Eye;
+use sim::order::rays::{RayPlan, eye_of, tiles_of};
+use sim::order::{TileRef, WorkItem};
 
 /// A way of rendering the frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +42,7 @@ impl Way {
 }
 
 /// A tile of one eye, rendered in one way.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TileBatch {
     /// Its work.
     pub work: BatchWork,
@@ -48,6 +50,15 @@ pub(super) struct TileBatch {
     traffic: Traffic,
     /// Finished pixels.
     pixels: u64,
+}
+
+impl TileBatch {
+    fn add(&mut self, other: &Self) {
+        self.work.add(&other.work);
+        self.traffic.on_chip_bytes += other.traffic.on_chip_bytes;
+        self.traffic.dram_bytes += other.traffic.dram_bytes;
+        self.pixels += other.pixels;
+    }
 }
 
 /// A frame rendered in one way.
@@ -124,22 +135,37 @@ impl Model<'_> {
         }
     }
 
-    /// Renders the frame in one way by the closed form. `misses` returns those of a tile's left and right batch.
+    /// The work of tiles that are traced together.
+    pub(super) fn batch(&self, way: Way, items: &[WorkItem], work: &[TileWork]) -> TileBatch {
+        let mut batch = TileBatch::default();
+        for at in tiles_of(items) {
+            let of_eyes = self.batches(way, at.tile, &work[at.tile as usize]);
+            batch.add(&of_eyes[at.pass as usize]);
+        }
+        batch
+    }
+
+    /// Renders the frame in one way by the closed form. `misses` returns those of a tile, given the number of its batch.
     pub(super) fn run(
         &self,
         way: Way,
+        plan: &RayPlan,
         work: &[TileWork],
-        misses: impl Fn(usize) -> [Misses; 2],
+        misses: impl Fn(usize, TileRef) -> Misses,
     ) -> WayRun {
         let mut out = WayRun::default();
-        for (tile, work) in work.iter().enumerate() {
-            let batches = self.batches(way, tile as u32, work);
-            for (eye, (batch, misses)) in batches.iter().zip(misses(tile)).enumerate() {
-                let tni = self.add(&mut out.run, batch, &misses);
-                if eye == Eye::Right as usize {
-                    out.right_tni_cycles += tni.total();
+        for (number, items) in plan.batches().enumerate() {
+            let mut of_batch = Misses::default();
+            for at in tiles_of(items) {
+                let own = misses(number, at);
+                of_batch.add(&own);
+                if eye_of(at) == Eye::Right {
+                    let right = &self.batches(way, at.tile, &work[at.tile as usize])[1].work;
+                    let tree = self.frame.tables.bvh.traversal;
+                    out.right_tni_cycles += tni::cycles(right, &own, tree, self.config).total();
                 }
             }
+            self.add(&mut out.run, &self.batch(way, items, work), &of_batch);
         }
         out.run.energy = energy::energy(&out.run, &self.frame.tables.bvh, self.config);
         out
@@ -158,8 +184,8 @@ impl Model<'_> {
         (sum, total)
     }
 
-    /// Adds a batch to a run, and returns its unit cycles.
-    fn add(&self, run: &mut Run, batch: &TileBatch, misses: &Misses) -> TniCycles {
+    /// Adds a batch to a run.
+    fn add(&self, run: &mut Run, batch: &TileBatch, misses: &Misses) {
         let (config, work) = (self.config, &batch.work);
         let tni = tni::cycles(work, misses, self.frame.tables.bvh.traversal, config);
         let srp = srp::cycles(work, config);
@@ -178,7 +204,6 @@ impl Model<'_> {
         if dram_ns > tni_ns.max(srp_ns) {
             run.memory_bound_ns += dram_ns;
         }
-        tni
     }
 }
 
@@ -222,9 +247,10 @@ fn row_read_bytes(work: &BatchWork, config: &SgrtConfig) -> u64 {
     }
 }
 
-/// Runs the three ways through the closed form.
+/// Runs the three ways through the closed form, the reference and the ways that reproject in the order of a plan each.
 pub fn compare(
     frame: &Frame,
+    [full, reprojected]: [&RayPlan; 2],
     work: &[TileWork],
     misses: &[TileMisses],
     reads: Reads,
@@ -238,9 +264,13 @@ pub fn compare(
         config,
     };
     let ways = Way::ALL.map(|way| {
-        model.run(way, work, |tile| match way {
-            Way::Reference => [misses[tile].left_full, misses[tile].right_full],
-            _ => [misses[tile].left, misses[tile].right],
+        let plan = if way == Way::Reference {
+            full
+        } else {
+            reprojected
+        };
+        model.run(way, plan, work, |_, at| {
+            misses[at.tile as usize].of(way, at)
         })
     });
     comparison(&ways)

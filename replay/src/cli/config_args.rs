@@ -298,6 +298,19 @@ impl ConfigArgs {
         self.apply_of_traces(&mut RunConfig::default())
     }
 
+    /// The order of `--order`.
+    pub(super) fn order(&self) -> Option<Order> {
+        self.order
+    }
+
+    /// The same without `--order`.
+    pub(super) fn without_order(&self) -> Self {
+        Self {
+            order: None,
+            ..self.clone()
+        }
+    }
+
     /// The parts of `--count-by`, if given.
     pub(super) fn counts_by(&self) -> Option<CountBy> {
         self.count_by

@@ -17,8 +17,10 @@ use formats::raytrace::{
 use formats::textrace::{Encoding, Textrace, TextraceWriter, Tile, encode_tile_as, with_operands};
 use report::notices;
 use shell::Output;
-use sim::config::RunConfig;
-use sim::stream::{TileSource, for_quads, plan, rendered};
+use sim::config::{Order, RunConfig};
+use sim::order::rays::{RayPlan, eye_of, tiles_of};
+use sim::order::{PlanInputs, TileRef};
+use sim::stream::{TileSource, for_quads, plan, ray_counters, rendered};
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
@@ -150,9 +152,10 @@ impl GranularityName {
   replay convert c.textrace --to npy --granularity record -o records.npy
   replay convert c.textrace --to textrace --encoding raw -o raw.textrace
   replay convert r.raytrace --to csv | head
+  replay convert r.raytrace --to din --order z2-lrta -o r.din
   replay convert r.raytrace --to npy --granularity node -o nodes.npy
-Rays are written tile by tile, left eye first. Their accesses need a trace with visits
-(tracegen rays --visits).")]
+Without --order, rays are written tile by tile, left eye first. Their accesses need a trace with
+visits (tracegen rays --visits).")]
 pub struct ConvertArgs {
     /// Trace, .textrace or .raytrace
     pub trace: PathBuf,
@@ -171,7 +174,7 @@ pub struct ConvertArgs {
     /// Tile encoding of --to textrace [default: delta]
     #[arg(long)]
     pub encoding: Option<EncodingName>,
-    /// Order, sampling and layout for a texture trace, --line for both kinds. Of the caches only the line size
+    /// Sampling and layout for a texture trace, --order and --line for both kinds. Of the caches only the line size
     /// counts, and the size of the L2 where the order depends on it
     #[command(flatten)]
     pub machine: ConfigArgs,
@@ -240,18 +243,19 @@ impl ConvertArgs {
         Ok(())
     }
 
-    /// Fails if the order, or another setting of tiles and textures, is given for rays.
+    /// Fails if a setting of tiles and textures other than the order is given for rays, or an order for no accesses.
     fn check_for_rays(&self, config: &RunConfig) -> Result<()> {
-        let rays = "rays are written tile by tile, left eye first";
-        if let Some(flag) = self.machine.first_of_traces() {
-            bail!("{flag}: it has no effect on a ray trace; {rays}");
+        if let Some(flag) = self.machine.without_order().first_of_traces() {
+            bail!("{flag}: it has no effect on a ray trace");
         }
-        if let (Some(file), true) = (
+        if let Some(order) = self.machine.order() {
+            RayPlan::check(order).context("--order")?;
+        } else if let (Some(file), true) = (
             self.machine.file(),
             config.order != RunConfig::default().order,
         ) {
             bail!(
-                "{}: order {} has no effect on a ray trace; {rays}",
+                "{}: order {} has no effect on a ray trace; give it with --order",
                 file.display(),
                 config.order.name()
             );
@@ -364,7 +368,7 @@ fn accesses(
     Ok(())
 }
 
-/// Writes the accesses of rays to the hierarchy, in file order.
+/// Writes the accesses of rays to the hierarchy as one unit makes them, without an order in file order.
 fn ray_accesses(
     trace: &Raytrace,
     config: &RunConfig,
@@ -373,11 +377,32 @@ fn ray_accesses(
 ) -> Result<()> {
     let tables = trace.tables();
     let by_line = args.granularity() == GranularityName::Line;
-    let mut tile = RayTile::default();
-    for (eye, index) in ray_tiles(tables) {
-        trace.decode_tile(eye, index, &mut tile)?;
-        for sample in ray_samples(tables, eye, index, &tile) {
-            sample.accesses(&tables.bvh, |access| {
+    let order = args.machine.order().unwrap_or(Order::SCANLINE);
+    let mut inputs = PlanInputs {
+        cores: 1,
+        ..PlanInputs::new(config, &tables.meta.trace)
+    };
+    let decode = |eye, index, tile: &mut RayTile| trace.decode_tile(eye, index, tile);
+    let counters = if order.parts().needs_counters() {
+        Some(ray_counters(tables, &inputs, decode)?)
+    } else {
+        None
+    };
+    inputs.last = counters.as_ref();
+    let plan = RayPlan::new(order, &inputs, tables, 0);
+    for batch in plan.batches() {
+        let places: Vec<TileRef> = tiles_of(batch).collect();
+        let mut tiles = vec![RayTile::default(); places.len()];
+        let mut samples = Vec::new();
+        for (at, tile) in places.iter().zip(&mut tiles) {
+            decode(eye_of(*at), at.tile, tile)?;
+        }
+        for (at, tile) in places.iter().zip(&tiles) {
+            samples.push(ray_samples(tables, eye_of(*at), at.tile, tile).collect::<Vec<_>>());
+        }
+        let pixels: Vec<usize> = samples.iter().map(Vec::len).collect();
+        for turn in plan.turns(batch, &pixels) {
+            samples[turn.tile][turn.pixel].accesses(&tables.bvh, |access| {
                 if !by_line {
                     return sink(access);
                 }

@@ -7,7 +7,8 @@ use super::reuse_args::ReuseArgs;
 use crate::files::{self, write_atomically};
 use anyhow::{Context, ensure};
 use clap::Args;
-use formats::raytrace::Raytrace;
+use formats::raytrace::{RayKind, Raytrace};
+use formats::text::name_of;
 use image_error::{Picture, png};
 use report::sgrt::{self as document, Entry, ReprojectReport, Thumbnails};
 use report::view_rays::RayMaps;
@@ -15,10 +16,13 @@ use sgrt::compose::Reuse;
 use sgrt::config::{DEFAULT_TOML, SgrtConfig};
 use sgrt::loaded::{LoadedTrace, RuleRun};
 use sgrt::picture;
+use sgrt::ray_kinds::OfKinds;
 use sgrt::result::{Config, Report, SCHEMA};
+use sgrt::tile_orders::{self, RayOrder, TileSequence};
 use sgrt::timing::Timing;
 use sgrt::variations::curve_rules;
 use shell::{Output, Progress};
+use sim::config::BetweenFrames;
 use sim::model_version::RAY_MODEL_VERSION;
 use sim::paper::sgrt as paper;
 use sim::result::{TOOL, TraceId, scene_name};
@@ -36,6 +40,8 @@ use std::process::ExitCode;
   replay reproject teapot.raytrace --preset sgrt-paper
   replay reproject teapot.raytrace --rule none --image plain.png --json
   replay reproject teapot.raytrace --timing cycle
+  replay reproject chess.raytrace --order z2-sta+offset
+  replay reproject f0.raytrace f1.raytrace f2.raytrace --order sampled --between keep
   replay reproject *.raytrace --html out/reprojection.html
   replay reproject chess.raytrace --curve --sensitivity --html chess.html"
 )]
@@ -48,6 +54,15 @@ pub struct ReprojectArgs {
     /// Model of the units' time
     #[arg(long, value_parser = choice::<Timing>(), default_value = "closed-form")]
     timing: Timing,
+    #[arg(long, help = tile_orders::help(), value_parser = str::parse::<RayOrder>)]
+    order: Option<RayOrder>,
+    /// Files are consecutive frames of a path, between which the caches keep, lose-N or flush their lines: lose-N
+    /// empties the L1 caches, and other work fills N percent of the L2 [default: each file is a frame of its own]
+    #[arg(long, value_name = "CACHES", value_parser = str::parse::<BetweenFrames>)]
+    between: Option<BetweenFrames>,
+    /// Only rays of these kinds: primary, shadow, reflection, refraction, ambient-occlusion, diffuse [default: all]
+    #[arg(long, value_name = "KIND,...", value_delimiter = ',', value_parser = ray_kind)]
+    rays: Vec<RayKind>,
     /// Print the model parameters as TOML (the defaults with comments) and stop
     #[arg(long)]
     print_config: bool,
@@ -90,7 +105,7 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
         "--image: expected one FILE, found {}",
         args.files.len()
     );
-    check_timing(&args)?;
+    check_closed_form(&args)?;
     // Report a wrong --as before the replays.
     paper::values("", "", &args.paper_scenes)?;
     let mut outputs = args.outputs.list::<ReprojectReport>()?;
@@ -100,8 +115,9 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     let prints = files::check_outputs(&outputs, inputs.map(PathBuf::as_path))?;
     let mut entries = Vec::new();
     let progress = Progress::new("reprojecting", args.files.len() as u64, "traces");
+    let mut tiles = args.tiles();
     for path in &args.files {
-        entries.push(report_on(path, &args, &config)?);
+        entries.push(report_on(path, &args, &config, &mut tiles)?);
         progress.advance(1);
     }
     drop(progress);
@@ -111,13 +127,39 @@ pub fn run(args: ReprojectArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Refuses options that only the closed form supports.
-fn check_timing(args: &ReprojectArgs) -> anyhow::Result<()> {
+impl ReprojectArgs {
+    fn tiles(&self) -> TileSequence {
+        TileSequence::new(self.order, self.between)
+    }
+}
+
+/// The kind of ray of a name.
+fn ray_kind(name: &str) -> Result<RayKind, String> {
+    let found = RayKind::ALL.into_iter().find(|kind| name_of(kind) == name);
+    found.ok_or_else(|| {
+        format!(
+            "expected {}",
+            RayKind::ALL.map(|kind| name_of(&kind)).join(" or ")
+        )
+    })
+}
+
+/// Refuses options that only the closed form supports, or only the default order of tiles.
+fn check_closed_form(args: &ReprojectArgs) -> anyhow::Result<()> {
+    ensure!(
+        args.timing == Timing::ClosedForm || args.between.is_none(),
+        "--between: expected --timing closed-form, found --timing {}",
+        args.timing.name()
+    );
     for (option, is_given) in [("--curve", args.curve), ("--sensitivity", args.sensitivity)] {
         ensure!(
             !is_given || args.timing == Timing::ClosedForm,
             "{option}: expected --timing closed-form, found --timing {}",
             args.timing.name()
+        );
+        ensure!(
+            !is_given || (args.order.is_none() && args.between.is_none()),
+            "{option}: expected neither --order nor --between, because it replays the default order of tiles"
         );
     }
     Ok(())
@@ -128,39 +170,46 @@ fn check_timing(args: &ReprojectArgs) -> anyhow::Result<()> {
 /// # Errors
 /// As [`run`].
 pub(super) fn view(path: &Path) -> anyhow::Result<String> {
-    let file = Raytrace::open(path)?;
-    let loaded = LoadedTrace::load(&file).with_context(|| path.display().to_string())?;
     let args = ReprojectArgs::default();
     let config = args.reused.parameters()?;
-    let (entry, runs) = report_of(path, &file, &loaded, &args, &config)?;
-    let maps = RayMaps::new(&entry.report.trace.name, &loaded, &runs)?;
+    let label = path.file_stem().unwrap_or_default().to_string_lossy();
+    let maps = |loaded: &LoadedTrace<'_>, runs: &[RuleRun; 2]| RayMaps::new(&label, loaded, runs);
+    let (entry, maps) = report_with(path, &args, &config, &mut args.tiles(), maps)?;
     let report = ReprojectReport {
         entries: vec![entry],
     };
     Ok(maps.page(&report)?)
 }
 
-fn report_on(path: &Path, args: &ReprojectArgs, config: &SgrtConfig) -> anyhow::Result<Entry> {
-    let file = Raytrace::open(path)?;
-    let loaded = LoadedTrace::load(&file).with_context(|| path.display().to_string())?;
-    Ok(report_of(path, &file, &loaded, args, config)?.0)
-}
-
-fn report_of(
+fn report_on(
     path: &Path,
-    file: &Raytrace,
-    loaded: &LoadedTrace<'_>,
     args: &ReprojectArgs,
     config: &SgrtConfig,
-) -> anyhow::Result<(Entry, [RuleRun; 2])> {
+    tiles: &mut TileSequence,
+) -> anyhow::Result<Entry> {
+    Ok(report_with(path, args, config, tiles, |_, _| Ok(()))?.0)
+}
+
+/// The figures of a trace, and what `of_runs` takes from its replays.
+fn report_with<T>(
+    path: &Path,
+    args: &ReprojectArgs,
+    config: &SgrtConfig,
+    tiles: &mut TileSequence,
+    of_runs: impl FnOnce(&LoadedTrace<'_>, &[RuleRun; 2]) -> anyhow::Result<T>,
+) -> anyhow::Result<(Entry, T)> {
+    let file = Raytrace::open(path)?;
     let in_file = || path.display().to_string();
-    let (rule, reuse) = (args.reused.rule()?, args.reused.reuse());
-    let traced = match args.timing {
-        Timing::ClosedForm => None,
-        Timing::Cycle => Some(loaded.traced_timing(config).with_context(in_file)?),
+    let of_kinds = OfKinds {
+        source: &file,
+        kinds: &args.rays,
     };
-    let runs = loaded.run_with_plain(&rule, reuse, config, traced.as_ref());
+    let loaded = LoadedTrace::load(&of_kinds).with_context(in_file)?;
+    let (rule, reuse) = (args.reused.rule()?, args.reused.reuse());
+    let runs = loaded.run_with_plain(&rule, reuse, config, args.timing, tiles);
     let [ours, plain] = runs.with_context(in_file)?;
+    let orders = tiles.report();
+    tiles.advance();
     if let Some(image) = &args.image {
         write_atomically(image, &png::encode(&triptych(&ours))?)?;
     }
@@ -180,6 +229,8 @@ fn report_of(
             cache_misses: loaded.cache_misses().to_owned(),
             timing: args.timing,
             model: config.clone(),
+            rays: args.rays.iter().map(name_of).collect(),
+            tiles: orders,
         },
         paper: paper::values(scene, scene_name(scene), &args.paper_scenes)?,
         curve: if args.curve {
@@ -198,11 +249,12 @@ fn report_of(
         plain: plain.outcome.clone(),
     };
     let pictures = if args.outputs.html.is_some() {
-        Some(thumbnails(loaded, &ours, &plain)?)
+        Some(thumbnails(&loaded, &ours, &plain)?)
     } else {
         None
     };
-    Ok((Entry { report, pictures }, [ours, plain]))
+    let seen = of_runs(&loaded, &[ours, plain])?;
+    Ok((Entry { report, pictures }, seen))
 }
 
 /// The right image, its bad pixels, and its error map, side by side.
@@ -247,7 +299,13 @@ mod tests {
     fn a_trace_file_and_the_same_trace_in_memory_have_equal_results() {
         let (_folder, path) = trace_file();
         let args = args(&[&path]);
-        let entry = report_on(Path::new(&path), &args, &SgrtConfig::default()).expect("a report");
+        let entry = report_on(
+            Path::new(&path),
+            &args,
+            &SgrtConfig::default(),
+            &mut args.tiles(),
+        )
+        .expect("a report");
         let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
         scene.extend(globe([0.1, 0.0, -1.5], 0.5, 2));
         let source = trace(&scene, View::default());

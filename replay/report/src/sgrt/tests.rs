@@ -53,6 +53,8 @@ fn entry_of(view: View) -> Entry {
                 cache_misses: "rates".to_owned(),
                 timing: Default::default(),
                 model,
+                rays: Vec::new(),
+                tiles: None,
             },
             result: ours.outcome,
             plain: plain.outcome,

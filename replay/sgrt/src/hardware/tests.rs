@@ -27,7 +27,8 @@ fn compared_as(
     let rows = RowNeeds::new(frame, &reproject(frame));
     let work = tile_work(frame, decisions, reuse);
     let misses = misses_by_rates(&work, frame, config);
-    compare(frame, &work, &misses, reads, &rows, config)
+    let plan = usual_plan(&frame.tables);
+    compare(frame, [&plan; 2], &work, &misses, reads, &rows, config)
 }
 
 /// A wall seen by two eyes at the same position: the whole right image is reused.

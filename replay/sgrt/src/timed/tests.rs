@@ -2,7 +2,10 @@ use super::*;
 use crate::config::SgrtConfig;
 use crate::loaded::LoadedTrace;
 use crate::result::Outcome;
+use crate::rules::Rule;
 use crate::testing::{MIRROR, Synthetic, View, globe, trace, wall};
+use crate::tile_orders::TileSequence;
+use crate::timing::Timing;
 
 fn room() -> Synthetic {
     let mut scene = wall(4.0, [30.0, 30.0], 0.0, 1);
@@ -13,9 +16,14 @@ fn room() -> Synthetic {
 
 fn outcome(source: &Synthetic, rule: &str, config: &SgrtConfig) -> Outcome {
     let loaded = LoadedTrace::load(source).expect("loads");
-    let traced = loaded.traced_timing(config).expect("simulates");
     let rule = rule.parse().expect("a rule");
-    let runs = loaded.run_with_plain(&rule, Reuse::Primary, config, Some(&traced));
+    let runs = loaded.run_with_plain(
+        &rule,
+        Reuse::Primary,
+        config,
+        Timing::Cycle,
+        &mut TileSequence::default(),
+    );
     let [ours, _] = runs.expect("runs");
     ours.outcome
 }
@@ -124,7 +132,10 @@ fn a_warp_requests_the_union_of_its_rays_requests() {
 fn a_trace_without_visits_is_refused_with_the_option_that_adds_them() {
     let source = room();
     let loaded = LoadedTrace::load(&source).expect("loads");
-    let error = loaded.traced_timing(&SgrtConfig::default()).map(drop);
+    let (rule, config) = (Rule::default(), SgrtConfig::default());
+    let mut tiles = TileSequence::default();
+    let runs = loaded.run_with_plain(&rule, Reuse::Primary, &config, Timing::Cycle, &mut tiles);
+    let error = runs.map(drop);
     let text = error.unwrap_err().to_string();
     assert!(text.contains("tracegen rays --visits"), "{text}");
 }

@@ -16,6 +16,7 @@ pub mod pairing;
 pub mod parts;
 mod plan;
 mod plan_inputs;
+pub mod rays;
 mod work;
 
 pub use listed::{FoundTiles, Listed, NotAnOrder, check_items};

@@ -2,7 +2,10 @@
 
 use super::expand::TileBuffers;
 use super::{Frame, StreamError, TileLines};
+use crate::order::rays::ray_passes;
 use crate::order::{Counters, PlanInputs, TileRef, View, ViewCounters, Views, views};
+use formats::raytrace::{RayTile, RaytraceTables};
+use formats::view::Eye;
 
 /// Maximum distance in columns between a row's best shift and the shift of infinity.
 const SHIFTS: i32 = 8;
@@ -17,16 +20,32 @@ struct Own {
 impl Own {
     fn of(tile: &TileLines) -> Self {
         // Streams without all lines list the distinct lines of each quad.
-        let mut lines = match tile.lines.is_empty() {
+        let lines = match tile.lines.is_empty() {
             true => tile.distinct.clone(),
             false => tile.lines.clone(),
         };
-        lines.sort_unstable();
-        lines.dedup();
-        let mut primitives: Vec<u32> = tile.list().map(|of| of.primitive).collect();
-        primitives.sort_unstable();
-        primitives.dedup();
+        let primitives = tile.list().map(|of| of.primitive);
+        Self::distinct(lines, primitives.collect())
+    }
+
+    fn distinct(mut lines: Vec<u32>, mut primitives: Vec<u32>) -> Self {
+        for list in [&mut lines, &mut primitives] {
+            list.sort_unstable();
+            list.dedup();
+        }
         Self { lines, primitives }
+    }
+
+    /// The lines of the visits, and the primitives that primary rays hit.
+    fn of_rays(tile: &RayTile, tables: &RaytraceTables, line_bytes: u32) -> Self {
+        let lines = tile.visits.iter().flat_map(|&visit| {
+            let first = tables.bvh.address(visit);
+            let last = first + u64::from(tables.bvh.visit_bytes(visit)).max(1) - 1;
+            let line = |address: u64| (address / u64::from(line_bytes)) as u32;
+            line(first)..=line(last)
+        });
+        let hits = tile.pixels.iter().filter_map(|pixel| pixel.hit.as_ref());
+        Self::distinct(lines.collect(), hits.map(|hit| hit.primitive).collect())
     }
 }
 
@@ -59,6 +78,73 @@ fn nothing(view: View) -> ViewCounters {
         primitive_shift: Vec::new(),
         line_shift: Vec::new(),
     }
+}
+
+fn pair_counters<E>(
+    eyes: [View; 2],
+    inputs: &PlanInputs<'_>,
+    mut row: impl FnMut(View, Option<u32>) -> Result<Vec<Own>, E>,
+) -> Result<ViewCounters, E> {
+    let offset = inputs.offset(eyes);
+    let rows = eyes[0].tiles[1];
+    let mut counted = nothing(eyes[0]);
+    for y in 0..rows {
+        let other = y.checked_add_signed(-offset[1]);
+        let left = row(eyes[0], Some(y))?;
+        let right = row(eyes[1], other)?;
+        let at = |x: usize, shift: i32| right.get(x.checked_add_signed(-shift as isize)?);
+        let agreement = |shift: i32, of: fn(&Own) -> &[u32]| -> u32 {
+            let tiles = left.iter().enumerate();
+            let pairs = tiles.filter_map(|(x, own)| Some((own, at(x, shift)?)));
+            pairs.map(|(l, r)| common(of(l), of(r))).sum()
+        };
+        let best = |of: fn(&Own) -> &[u32]| {
+            let shifts = offset[0] - SHIFTS..=offset[0] + SHIFTS;
+            // If equal, the shift nearest to that of infinity wins, then the larger one, which suits near
+            // surfaces.
+            shifts
+                .max_by_key(|&shift| {
+                    let far = (shift - offset[0]).abs();
+                    (agreement(shift, of), -far, shift)
+                })
+                .unwrap_or(offset[0])
+        };
+        let both = lines_of(&left) + lines_of(&right);
+        let lines = both - agreement(offset[0], |own| &own.lines);
+        counted.bytes += u64::from(lines) * u64::from(inputs.line_bytes);
+        counted.line_shift.push(best(|own| &own.lines));
+        counted.primitive_shift.push(best(|own| &own.primitives));
+    }
+    Ok(counted)
+}
+
+/// The counters of a frame of rays, whose tiles `tile` decodes.
+///
+/// # Errors
+/// A tile that cannot be decoded.
+pub fn ray_counters<E>(
+    tables: &RaytraceTables,
+    inputs: &PlanInputs<'_>,
+    mut tile: impl FnMut(Eye, u32, &mut RayTile) -> Result<(), E>,
+) -> Result<Counters, E> {
+    let passes = ray_passes(tables, 0);
+    let view = |at: usize| View::of(at as u32, at as u32, &passes[at]);
+    let mut data = RayTile::default();
+    let counted = pair_counters([view(0), view(1)], inputs, |view, y| {
+        let [columns, rows] = view.tiles;
+        let eye = [Eye::Left, Eye::Right][view.pass as usize];
+        let first = y.filter(|&y| y < rows).map(|y| y * columns);
+        let tiles = first.map_or(0..0, |first| first..first + columns);
+        tiles
+            .map(|index| {
+                tile(eye, index, &mut data)?;
+                Ok(Own::of_rays(&data, tables, inputs.line_bytes))
+            })
+            .collect()
+    })?;
+    Ok(Counters {
+        views: vec![counted],
+    })
 }
 
 impl Frame<'_> {
@@ -99,37 +185,7 @@ impl Frame<'_> {
         inputs: &PlanInputs<'_>,
         work: &mut TileBuffers,
     ) -> Result<ViewCounters, StreamError> {
-        let offset = inputs.offset(eyes);
-        let rows = eyes[0].tiles[1];
-        let mut counted = nothing(eyes[0]);
-        for y in 0..rows {
-            let other = y.checked_add_signed(-offset[1]);
-            let left = self.row(eyes[0], Some(y), work)?;
-            let right = self.row(eyes[1], other, work)?;
-            let at = |x: usize, shift: i32| right.get(x.checked_add_signed(-shift as isize)?);
-            let agreement = |shift: i32, of: fn(&Own) -> &[u32]| -> u32 {
-                let tiles = left.iter().enumerate();
-                let pairs = tiles.filter_map(|(x, own)| Some((own, at(x, shift)?)));
-                pairs.map(|(l, r)| common(of(l), of(r))).sum()
-            };
-            let best = |of: fn(&Own) -> &[u32]| {
-                let shifts = offset[0] - SHIFTS..=offset[0] + SHIFTS;
-                // If equal, the shift nearest to that of infinity wins, then the larger one, which suits near
-                // surfaces.
-                shifts
-                    .max_by_key(|&shift| {
-                        let far = (shift - offset[0]).abs();
-                        (agreement(shift, of), -far, shift)
-                    })
-                    .unwrap_or(offset[0])
-            };
-            let both = lines_of(&left) + lines_of(&right);
-            let lines = both - agreement(offset[0], |own| &own.lines);
-            counted.bytes += u64::from(lines) * u64::from(inputs.line_bytes);
-            counted.line_shift.push(best(|own| &own.lines));
-            counted.primitive_shift.push(best(|own| &own.primitives));
-        }
-        Ok(counted)
+        pair_counters(eyes, inputs, |view, y| self.row(view, y, work))
     }
 
     /// The tiles of a row; none outside of the grid.

@@ -26,6 +26,7 @@ pub mod testing;
 mod walk;
 
 pub use cores::Cores;
+pub use counters::ray_counters;
 pub use counts::{Bins, Cell, CellAccesses, TileAccesses, TraceCounts};
 pub use error::StreamError;
 pub use expand::{Expander, Frame, LineMemory};

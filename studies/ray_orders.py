@@ -1,0 +1,111 @@
+"""Tile orders for rays: DRAM bytes of the hierarchy and cycles of Morton per eye, Z2 LRTA, Z2 STA and the rule, along head paths."""
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+
+from .common import mean, saved
+
+OPTIONS = {
+    "--size": dict(default="128x128", help="pixels per eye (128x128)"),
+    "--frames": dict(type=int, default=4, help="consecutive frames of each path, 72 per second (4)"),
+}
+SCENES = ["chess", "car", "lab", "music-box", "crytek-sponza", "stk-cocoa-temple", "stk-black-forest", "bmw_55k"]
+KINDS = {"primary": "primary", "shadow": "shadow", "mirror and glass": "reflection,refraction", "diffuse": "diffuse"}
+# L2 sizes; the L1 caches of each unit have 4 KiB each.
+L2_KIB = [16, 64, 256]
+FIXED = ["morton", "z2-lrta", "z2-sta"]
+RULE = "sampled"
+# What the results call both ways, and the place of their run among the chosen orders.
+WAYS = {"full": ("reference_dram", "reference_tni_cycles", 0), "reprojected": ("dram", "tni_cycles", 1)}
+
+
+class Row:
+    """A scene, a kind of ray, an L2 and a way: figures of each order by frame. The first frame, whose rule uses its own record, is left out."""
+
+    def __init__(self, way, runs):
+        dram, cycles, run = WAYS[way]
+        self.bytes = {order: [of["result"][dram]["hierarchy_bytes"] for of in frames[1:]] for order, frames in runs.items()}
+        self.cycles = {order: sum(of["result"][cycles] for of in frames[1:]) for order, frames in runs.items()}
+        self.own = [of["config"]["tiles"]["rule_bytes"][run] for of in runs[RULE][1:]]
+        self.sums = {order: sum(values) for order, values in self.bytes.items()}
+        self.oracle = sum(map(min, zip(*(self.bytes[order] for order in FIXED))))
+        self.with_own = self.sums[RULE] + sum(self.own)
+        self.best = min(self.sums[order] for order in FIXED)
+
+    def cells(self):
+        base = self.sums["morton"]
+        return [f"{base / len(self.own) / 1e6:.3f}", *(saved(self.sums[order], base) for order in FIXED[1:]), saved(self.sums[RULE], base),
+                saved(self.with_own, base), saved(self.oracle, base), f"{100 * (self.with_own / self.best - 1):.2f}",
+                *(f"{self.cycles[order] / len(self.own) / 1e3:.1f}" for order in [*FIXED, RULE])]
+
+
+def pair_kib(study, trace, kinds):
+    """KiB of the distinct lines of a pair of tiles, mean over pairs, by kind of ray."""
+    path = study.work / f"{trace.stem}.csv"
+    study.replay("convert --to csv --line 64 --quiet", trace, "-o", path)
+    of_name = {name: kind for kind, names in kinds.items() for name in names.split(",")}
+    lines = {kind: set() for kind in kinds}
+    with path.open() as rows:
+        address, tile, kind = map(next(rows).rstrip().split(",").index, ("address", "tile", "kind"))
+        for row in rows:
+            cells = row.split(",")
+            lines[of_name[cells[kind]]].add((cells[tile], cells[address]))
+    path.unlink()
+    tiles = {kind: len({tile for tile, _ in pairs}) for kind, pairs in lines.items()}
+    return {kind: len(pairs) * 64 / 1024 / max(1, tiles[kind]) for kind, pairs in lines.items()}
+
+
+def measure(study, traces, kind, kib):
+    """The rows of both ways; none without such rays."""
+    machine = study.work / f"{kib}.toml"
+    machine.write_text(f"[cache]\nnode_l1_bytes = 4096\ntriangle_l1_bytes = 4096\nl2_bytes = {kib * 1024}\n")
+    runs = {}
+    for order in [*FIXED, RULE]:
+        text = study.replay(
+            "reproject --rule none --reuse pixel --between keep --json --quiet --rays", KINDS[kind], "--order", order, "--config", machine, *traces).out
+        runs[order] = [json.loads(line) for line in text.splitlines()]
+        if not runs[order][0]["result"]["reference_dram"]["hierarchy_bytes"]:
+            return None
+    return {way: Row(way, runs) for way in WAYS}
+
+
+def run(study):
+    for scene in SCENES:
+        study.scene(scene)
+    size, frames = study.options.size, study.options.frames
+    table, by_scene, found = [], [], {}
+    for scene in SCENES:
+        captured = lambda frame: study.rays(scene, f"--size {size} --visits --bounces 1 --path head --frame {frame}", name=f"{scene}-{frame}")
+        traces = [captured(frame) for frame in range(frames)]
+        pairs = pair_kib(study, traces[0], KINDS)
+        study.say(scene)
+        with ThreadPoolExecutor(2) as pool:
+            rows = list(pool.map(lambda of: (of, measure(study, traces, *of)), [(kind, kib) for kind in KINDS for kib in L2_KIB]))
+        study.drop(*traces)
+        for (kind, kib), ways in rows:
+            for way, row in (ways or {}).items():
+                found[kind, kib, way, scene] = row
+                table.append([scene, kind, f"{pairs[kind]:.1f}", kib, way, *row.cells()])
+    detail = (f"tracegen rays SCENE --size {size} --visits --bounces 1 --path head --frame K, {frames} frames from 0, replay reproject --rule none "
+              "--reuse pixel --between keep --rays KIND --order ORDER")
+    figures = ("Morton MB per frame | LRTA saves % | STA saves % | rule saves % | with its own traffic % | oracle saves % | rule over the best fixed order % | "
+               "Morton kcycles | LRTA kcycles | STA kcycles | rule kcycles")
+    study.write("ray-orders", detail, f"scene | rays | tile pair KiB | L2 KiB | eyes | {figures}", table)
+    middle = [[scene, kind, pair, way, *cells[:7]] for scene, kind, pair, kib, way, *cells in table if kib == L2_KIB[1]]
+    names = " | ".join(figures.split(" | ")[:7])
+    study.write("ray-orders-scenes", detail, f"scene | rays | tile pair KiB | eyes | {names}", middle, f"L2 of {L2_KIB[1]} KiB")
+    summary = []
+    for kind in KINDS:
+        for kib in L2_KIB:
+            for way in WAYS:
+                rows = {scene: row for (k, l2, w, scene), row in found.items() if (k, l2, w) == (kind, kib, way)}
+                share = lambda sums: mean(100 * (1 - sums(row) / row.sums["morton"]) for row in rows.values())
+                shares = [share(lambda row, order=order: row.sums[order]) for order in [*FIXED[1:], RULE]]
+                oracle = share(lambda row: row.oracle)
+                kept = sum(row.sums["morton"] - row.sums[RULE] for row in rows.values()) / max(1, sum(row.sums["morton"] - row.oracle for row in rows.values()))
+                worst = max(rows, key=lambda scene: rows[scene].with_own / rows[scene].best)
+                over = 100 * (rows[worst].with_own / rows[worst].best - 1)
+                summary.append([kind, kib, way, len(rows), *(f"{value:.1f}" for value in [*shares, oracle]), f"{100 * kept:.0f}", f"{worst}: {over:.2f}"])
+    study.write(
+        "ray-orders-summary", detail, "rays | L2 KiB | eyes | scenes | LRTA saves % | STA saves % | rule saves % | oracle saves % | of the oracle's bytes, rule % | "
+        "rule and its traffic over the best fixed order, worst scene %", summary)

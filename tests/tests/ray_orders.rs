@@ -1,0 +1,206 @@
+//! Compares the DRAM bytes of `replay reproject --order` with plain caches that replay the output of `replay convert`,
+//! and tests refusals of orders for rays.
+
+use parallax_tests::{program, refuse, root, run_ok};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+const UNITS: usize = 4;
+const LINE_BYTES: u64 = 64;
+const WIDTH: usize = 88;
+
+/// An LRU cache: one list per set, most recently used first.
+struct Lru {
+    sets: Vec<Vec<u64>>,
+    ways: usize,
+}
+
+impl Lru {
+    fn new(bytes: u64, ways: usize) -> Self {
+        let sets = bytes as usize / ways / LINE_BYTES as usize;
+        Self {
+            sets: vec![Vec::new(); sets],
+            ways,
+        }
+    }
+
+    fn access(&mut self, line: u64) -> bool {
+        let at = line as usize % self.sets.len();
+        let set = &mut self.sets[at];
+        let found = set.iter().position(|&other| other == line);
+        if let Some(found) = found {
+            set.remove(found);
+        }
+        set.insert(0, line);
+        set.truncate(self.ways);
+        found.is_some()
+    }
+}
+
+/// A trace whose right and lower tiles are narrower than the others.
+fn capture(folder: &Path) -> PathBuf {
+    let path = folder.join("chess.raytrace");
+    let size = format!("{WIDTH}x56");
+    let words = ["rays", "chess", "--visits", "--size", &size, "-o"];
+    run_ok(program("tracegen").args(words).arg(&path));
+    path
+}
+
+/// Bytes that the L2 fetches, by the caches of this file.
+fn plain_bytes(trace: &Path, order: Option<&str>) -> u64 {
+    let mut convert = program("replay");
+    convert
+        .args(["convert", "--to", "csv", "--line", "64"])
+        .arg(trace);
+    if let Some(order) = order {
+        convert.args(["--order", order]);
+    }
+    let text = String::from_utf8(run_ok(&mut convert).stdout).expect("text");
+    let mut l1: Vec<Lru> = (0..2 * UNITS).map(|_| Lru::new(16384, 4)).collect();
+    let mut l2 = Lru::new(131_072, 8);
+    let mut misses = 0;
+    for row in text.lines().skip(1) {
+        let cells: Vec<&str> = row.split(',').collect();
+        let address = u64::from_str_radix(&cells[0][2..], 16).expect("an address");
+        let number = |at: usize| cells[at].parse::<usize>().expect("a number");
+        let (x, y) = (number(4), number(5));
+        let tile_width = (WIDTH - x / 16 * 16).min(16);
+        let unit = (y % 16 * tile_width + x % 16) % UNITS;
+        let cache = 2 * unit + usize::from(cells[9] == "triangle");
+        let line = address / LINE_BYTES;
+        misses += u64::from(!l1[cache].access(line) && !l2.access(line));
+    }
+    misses * LINE_BYTES
+}
+
+fn reprojected(arguments: &[&str], traces: &[&Path]) -> Vec<Value> {
+    let mut command = program("replay");
+    command
+        .args(["reproject", "--json"])
+        .args(arguments)
+        .args(traces);
+    let text = String::from_utf8(run_ok(&mut command).stdout).expect("text");
+    let values = serde_json::Deserializer::from_str(&text).into_iter();
+    values.map(|value| value.expect("JSON")).collect()
+}
+
+fn dram(report: &Value) -> u64 {
+    let bytes = &report["result"]["reference_dram"]["hierarchy_bytes"];
+    bytes.as_u64().expect("a number")
+}
+
+#[test]
+fn bytes_equal_those_of_plain_caches_that_replay_the_converted_addresses() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let trace = capture(folder.path());
+    let mut all = Vec::new();
+    for order in [
+        "morton",
+        "z2-lrta",
+        "zig-zag+sta+offset",
+        "hilbert+halves",
+        "adaptive+lrta+row-lines",
+    ] {
+        let reports = reprojected(&["--order", order], &[&trace]);
+        assert_eq!(
+            dram(&reports[0]),
+            plain_bytes(&trace, Some(order)),
+            "{order}"
+        );
+        assert_eq!(reports[0]["config"]["tiles"]["order"], order);
+        all.push(dram(&reports[0]));
+    }
+    all.sort_unstable();
+    all.dedup();
+    assert!(all.len() > 3, "orders differ: {all:?}");
+    // Without an order: tiles row by row, left and right in turn. `convert` writes the left eye first.
+    let usual = dram(&reprojected(&[], &[&trace])[0]);
+    assert_eq!(usual, plain_bytes(&trace, Some("scanline+lrta")));
+    assert_eq!(
+        plain_bytes(&trace, None),
+        plain_bytes(&trace, Some("scanline"))
+    );
+}
+
+#[test]
+fn frames_of_a_path_hit_lines_of_the_frame_before_and_choose_by_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let trace = capture(folder.path());
+    let run = |between, order| {
+        let words = ["--between", between, "--order", order];
+        let reports = reprojected(&words, &[&trace, &trace]);
+        [dram(&reports[0]), dram(&reports[1])]
+    };
+    let [kept, lost, flushed] = ["keep", "lose-50", "flush"].map(|of| run(of, "morton"));
+    assert_eq!(flushed[0], flushed[1]);
+    assert!(
+        kept[1] < lost[1] && lost[1] < flushed[1],
+        "{kept:?} {lost:?} {flushed:?}"
+    );
+    // The rule knows the equal frame before, so it takes the best order.
+    let fixed = ["morton", "z2-lrta", "z2-sta"].map(|order| run("flush", order)[1]);
+    let least = fixed.into_iter().min().expect("three");
+    let chosen = run("flush", "sampled")[1];
+    assert!(chosen * 100 <= least * 101, "{chosen} {fixed:?}");
+    // Every other frame backwards.
+    let turned = run("flush", "morton+boustro");
+    assert!(turned[0] == flushed[0] && turned[1] != flushed[1]);
+}
+
+#[test]
+fn an_assignment_gives_whole_tiles_to_units_and_all_models_trace_all_rays() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let trace = capture(folder.path());
+    let rays = |report: &Value| report["result"]["reference_work"]["rays"].as_u64();
+    let usual = &reprojected(&[], &[&trace])[0];
+    for order in ["morton+sta+runs", "morton+affinity", "hilbert+halves"] {
+        let report = &reprojected(&["--order", order, "--timing", "cycle"], &[&trace])[0];
+        assert_eq!(rays(report), rays(usual), "{order}");
+        let cycles = &report["result"]["cycles"]["reference"];
+        assert_eq!(cycles["rays_left"].as_u64(), rays(usual), "{order}");
+    }
+}
+
+#[test]
+fn orders_that_rays_cannot_have_are_refused() {
+    let golden = |name: &str| root().join("traces").join(name);
+    let light = golden("chess-light.raytrace");
+    let reproject = |words: &[&str], path: &Path| {
+        let mut command = program("replay");
+        command.arg("reproject").args(words).arg(path);
+        command
+    };
+    let merge = "sv, lrta, sta or halves";
+    for (words, expected) in [
+        (vec!["--order", "spiral"], "morton"),
+        (
+            vec!["--order", "morton+sta+lrta"],
+            "one way to combine the eyes",
+        ),
+        (vec!["--order", "z2-sta-merge"], merge),
+        (vec!["--order", "morton", "--curve"], "--curve"),
+        (vec!["--between", "half"], "keep, flush"),
+        (vec!["--between", "keep", "--timing", "cycle"], "--between"),
+        (vec!["--rays", "light"], "ambient-occlusion"),
+    ] {
+        refuse(&mut reproject(&words, &light), &[expected]);
+    }
+    // A trace without visits, an empty file, a texture trace, and frames of different sizes.
+    let order = ["--order", "morton"];
+    let teapot = golden("teapot-rays.raytrace");
+    refuse(&mut reproject(&order, &teapot), &["--order", "--visits"]);
+    let folder = tempfile::tempdir().expect("a folder");
+    let empty = folder.path().join("empty.raytrace");
+    std::fs::write(&empty, "").expect("written");
+    refuse(&mut reproject(&order, &empty), &["empty.raytrace"]);
+    refuse(
+        &mut reproject(&order, &golden("atrium.textrace")),
+        &["atrium.textrace"],
+    );
+    let other = capture(folder.path());
+    let mut sizes = reproject(&["--between", "keep", "--order", "morton"], &light);
+    refuse(sizes.arg(&other), &["expected frames of 2x2 tiles"]);
+    let mut convert = program("replay");
+    convert.args(["convert", "--to", "din", "--order", "morton+merge"]);
+    refuse(convert.arg(&light), &[merge]);
+}
