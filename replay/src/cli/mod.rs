@@ -93,7 +93,7 @@ enum Command {
     #[command(mut_args(without(&["details"])))]
     Calibrate(Box<calibrate::Args>),
     /// Replay every point of an experiment file; an interrupted sweep continues.
-    Sweep(sweep::Args),
+    Sweep(Box<sweep::Args>),
     /// Write the Z2 paper's experiment as a self-contained page, with JSON and CSV files.
     #[command(mut_args(without(&["order", "l1", "l2"])))]
     Report(Box<report::Args>),
