@@ -8,7 +8,8 @@ SCENES = ("atrium", "jungle", "plant")
 
 def ends(values, unit="%", digits=1):
     values = [float(value) for value in values]
-    return f"{min(values):.{digits}f} to {max(values):.{digits}f}{' ' + unit if unit else ''}"
+    low, high = (f"{value:.{digits}f}" for value in (min(values), max(values)))
+    return f"{low if low == high else f'{low} to {high}'}{' ' + unit if unit else ''}"
 
 
 def techniques(study, name, key):
