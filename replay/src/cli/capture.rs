@@ -42,7 +42,7 @@ impl Capture {
         let Some(place) = place.filter(|place| {
             let program = arguments.get(place + 1).map(Path::new);
             program.and_then(Path::file_stem) == Some(OsStr::new("tracegen"))
-                && !arguments[..*place].iter().any(|a| a == "sample")
+                && !is_sample(&arguments[..*place])
         }) else {
             return Ok((arguments, None));
         };
@@ -85,6 +85,13 @@ impl Capture {
     pub fn run(&mut self) -> Result<()> {
         run(&mut self.command, &self.output)
     }
+}
+
+/// Whether the command, the first argument of the program that is no flag, is `sample`.
+fn is_sample(arguments: &[OsString]) -> bool {
+    let mut words = arguments.iter().skip(1);
+    let command = words.find(|word| !word.as_encoded_bytes().starts_with(b"-"));
+    command.is_some_and(|word| word == "sample")
 }
 
 /// Name of the output: that of the scene, which is the first argument or a file of a known kind.
@@ -148,9 +155,15 @@ mod tests {
 
     #[test]
     fn other_command_lines_stay() {
+        let words = [
+            "replay", "view", "-o", "sample", "--", "tracegen", "raster", "atrium",
+        ];
+        assert!(split(&words).expect("a capture").1.is_some());
         for words in [
             &["replay", "run", "--", "-odd.textrace"][..],
-            &["replay", "sample", "--", "tracegen", "raster", "atrium"],
+            &[
+                "replay", "-q", "sample", "--", "tracegen", "raster", "atrium",
+            ],
             &["replay", "run", "--"],
         ] {
             let (arguments, capture) = split(words).expect("arguments");
